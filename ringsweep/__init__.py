@@ -1,0 +1,30 @@
+"""Regime maps of dry-friction systems whose friction coefficient jumps."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ringsweep.engine import run, sweep
+    from ringsweep.errors import InputError
+    from ringsweep.single import simulate
+
+__all__ = ["InputError", "run", "simulate", "sweep"]
+
+_HOMES = {"run": "engine", "sweep": "engine", "simulate": "single", "InputError": "errors"}
+
+
+def __getattr__(name: str) -> Any:
+    # Compilers and plotting are slow to import; `--help` and a misspelt key should not wait for them.
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("ringsweep")
+    if name in _HOMES:
+        return getattr(import_module(f"ringsweep.{_HOMES[name]}"), name)
+    raise AttributeError(f"module 'ringsweep' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return [*globals(), *_HOMES, "__version__"]

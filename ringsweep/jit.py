@@ -1,0 +1,129 @@
+"""Compilation: the one owner of Numba's options, of the cache key and of static dispatch."""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba import types
+from numba.extending import overload
+
+# Contraction to fused multiply-add is the only liberty taken with IEEE arithmetic: "nnan" and
+# "ninf" would delete the checks by which a run is flagged as failed, and "reassoc" would undo the
+# care taken over cancellation.
+OPTIONS: Any = {
+    "nogil": True,
+    "error_model": "numpy",
+    "fastmath": {"contract"},
+}
+
+
+def _sources_digest() -> str:
+    """Digest over every source file of the package."""
+    digest = hashlib.sha256()
+    root = Path(__file__).parent
+    for path in sorted(root.rglob("*.py")):
+        digest.update(str(path.relative_to(root)).encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+SOURCES_DIGEST = _sources_digest()
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile a function lazily, without the interpreter lock, and keep it on disk.
+
+    Numba's cache notices an edit only in the file that holds the function; here the key covers
+    all sources of the package, so that an edit in a callee is never missed. Where no directory
+    can be written, the function is compiled anew in each process.
+    """
+    dispatcher = numba.njit(**OPTIONS)(function)
+    try:
+        dispatcher.enable_caching()
+    except RuntimeError:
+        return dispatcher
+    index = dispatcher._cache._cache_file
+    index._source_stamp = (index._source_stamp, SOURCES_DIGEST)
+    return dispatcher
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """Compile a small formula that callers absorb; it needs no cache entry of its own."""
+    return numba.njit(**OPTIONS)(function)
+
+
+def hook(stub: Callable[..., Any]) -> Any:
+    """A function whose body is chosen by the type of its first argument.
+
+    `stub` gives name, signature and docstring. Bodies are added by
+    ``@name.implements(SomeNamedTuple)``; within a kernel Numba picks the body while compiling, so a
+    scene holds the code of the law, drive and model that it names and no other. Called from
+    Python it dispatches in the same way.
+    """
+    bodies: dict[type, Callable[..., Any]] = {}
+    names = list(inspect.signature(stub).parameters)
+
+    def choose(first: Any) -> Callable[..., Any]:
+        return bodies[type(first)]
+
+    def typed(first: Any) -> Callable[..., Any] | None:
+        return bodies.get(getattr(first, "instance_class", type(None)))
+
+    # Numba compares signatures of an overload and its bodies by name: hence generated text.
+    arguments = ", ".join(names)
+    scope: dict[str, Any] = {"choose": choose, "typed": typed}
+    exec(
+        f"def {stub.__name__}({arguments}): return choose({names[0]})({arguments})\n"
+        f"def overloaded({arguments}): return typed({names[0]})\n",
+        scope,
+    )
+    function = scope[stub.__name__]
+    function.__doc__ = stub.__doc__
+    function.__module__ = stub.__module__
+    overload(function, jit_options=OPTIONS)(scope["overloaded"])
+
+    def implements(*classes: type) -> Callable[..., Any]:
+        def register(body: Callable[..., Any]) -> Callable[..., Any]:
+            for cls in classes:
+                bodies[cls] = body
+            return body
+
+        return register
+
+    function.implements = implements
+    return function
+
+
+def take(batch: Any, i: int) -> Any:
+    """Cell `i` of a batch: the same nested ``NamedTuple`` with each array replaced by its row."""
+    if isinstance(batch, tuple):
+        return type(batch)(*(take(leaf, i) for leaf in batch))
+    return batch[i]
+
+
+@overload(take, jit_options=OPTIONS)
+def _take(batch, i):
+    if isinstance(batch, types.Array):
+        return lambda batch, i: batch[i]
+    leaves = ", ".join(f"take(batch[{k}], i)" for k in range(len(batch)))
+    scope = {"cls": batch.instance_class, "take": take}
+    exec(f"def row(batch, i): return cls({leaves})", scope)
+    return scope["row"]
+
+
+def add_scaled(y: Any, factor: float, k: Any) -> Any:
+    """``y + factor * k`` for states, which are tuples of floats of any length."""
+    return tuple(a + factor * b for a, b in zip(y, k, strict=True))
+
+
+@overload(add_scaled, jit_options=OPTIONS)
+def _add_scaled(y, factor, k):
+    sums = "".join(f"y[{i}] + factor * k[{i}], " for i in range(len(y)))
+    scope: dict[str, Any] = {}
+    exec(f"def add(y, factor, k): return ({sums})", scope)
+    return scope["add"]

@@ -1,0 +1,135 @@
+"""What a model offers to the solvers: the whole of what a solver knows of it.
+
+A scene is one cell of a batch; its type decides the bodies. A state is a tuple of floats. An
+inspection is the model's own account of a state: rates, reactions, distance from the end of its
+validity.
+"""
+
+from __future__ import annotations
+
+from ringsweep.jit import hook
+
+
+@hook
+def launch(scene):
+    """State at t = 0."""
+
+
+@hook
+def rates(scene, y, theta, ring_omega):
+    """Time derivative of the state `y` while the drive is at `theta` (rad), `ring_omega` (rad/s)."""
+
+
+@hook
+def inspect(scene, y, theta, ring_omega):
+    """Inspection of the state `y`; its field ``rates`` is the time derivative."""
+
+
+@hook
+def verdict(scene, before, now):
+    """How the run stands after passing from inspection `before` to `now`.
+
+    Returns
+    -------
+    tuple
+        ``(status, fraction)``: a status of :mod:`ringsweep.regimes`, and the fraction of the step
+        after which it was reached.
+    """
+
+
+@hook
+def stiffness(scene, before, now, h):
+    """Largest magnitude of the eigenvalue times `h` that a step of `h` seconds met."""
+
+
+@hook
+def begin(scene, y, now):
+    """Record of a run at its launch."""
+
+
+@hook
+def observe(scene, record, y, before, now, h):
+    """Record after a step of `h` seconds to the state `y`."""
+
+
+@hook
+def conclude(scene, record, status, t, y):
+    """Outcome of a run: a tuple of floats, one for each of the model's outcomes."""
+
+
+@hook
+def describe(scene, y, theta, ring_omega):
+    """One row of a time history: a tuple of floats, one for each of the model's history variables."""
+
+
+@hook
+def enter(scene, t, y):
+    """Status and mode of the piecewise-smooth system in the state `y` at time `t`."""
+
+
+@hook
+def embark(scene):
+    """State at t = 0 in the coordinates of the piecewise-smooth system."""
+
+
+@hook
+def rows(scene):
+    """Number of rows of the series, and the first row that is a guard."""
+
+
+@hook
+def start(scene, c):
+    """Record of a run whose first series is `c`."""
+
+
+@hook
+def finish(scene, record, status, t, y):
+    """Outcome of a run in the coordinates of the piecewise-smooth system."""
+
+
+@hook
+def expand(scene, mode, t, y, tolerance, c):
+    """Power series about `(t, y)` within a mode.
+
+    Parameters
+    ----------
+    scene, mode : NamedTuple
+    t : float
+        Time, s.
+    y : tuple of float
+        State.
+    tolerance : float
+        Error allowed to a step, in units of the state.
+    c : ndarray of shape ``(rows, columns)``
+        Filled with the series; the last rows, one for each guard, are positive while the mode holds.
+
+    Returns
+    -------
+    float
+        Step over which the series meets the tolerance, s.
+    """
+
+
+@hook
+def land(scene, mode, c, t, s):
+    """State at time `t`, the step `s` after the series `c` began."""
+
+
+@hook
+def switch(scene, mode, guard, t, y):
+    """Status and mode after the guard of that index has reached zero in the state `y`, and that state."""
+
+
+@hook
+def watch(scene, record, mode, c, s, work):
+    """Record after a step of length `s` along the series `c`, extremes within it included."""
+
+
+@hook
+def sample(scene, mode, c, t, s):
+    """One row of a time history at time `t`, the step `s` after the series `c` began."""
+
+
+@hook
+def onward(mode):
+    """The mode after its first step, when no guard is zero any more for its having been entered."""

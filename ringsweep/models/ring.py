@@ -1,0 +1,268 @@
+"""The ring as a model: its parameters, their consistency, and the cells that kernels run over."""
+
+from __future__ import annotations
+
+from math import cos, inf, isfinite, isnan, pi, sin
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsweep import regimes
+from ringsweep.jit import inlined
+from ringsweep.models import hooks
+from ringsweep.parameters import Parameter, declared
+from ringsweep.physics import drives, friction, ring, zones
+from ringsweep.regimes import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2
+from ringsweep.scene import Structure, Values, require
+
+MASS = Parameter("kg", "mass of the body", lower=0.0, open_lower=True)
+GRAVITY = Parameter("m/s^2", "acceleration of gravity", lower=0.0, default=9.81)
+SPAN = Parameter("s", "span of time", lower=0.0, open_lower=True)
+RADIUS = Parameter("m", "radius of the inner race", lower=0.0, open_lower=True)
+
+
+class SingleContactRing:
+    """A small body on one contact with the ring (the paper's Fig. 13)."""
+
+    name: ClassVar[str] = "ring-single-contact"
+    doc: ClassVar[str] = "a small body in a rotating ring, one contact"
+    outcomes: ClassVar[tuple[str, ...]] = regimes.Outcome._fields
+    history: ClassVar[tuple[str, ...]] = (
+        "phi", "omega", "epsilon", "normal_1", "normal_2", "ring_omega", "zone_1", "zone_2", "mode"
+    )  # fmt: skip
+    absent: ClassVar[frozenset[str]] = frozenset({"normal_min_2", "normal_2", "zone_2"})
+    body: ClassVar[dict[str, Parameter]] = {"body.mass": MASS, "ring.radius": RADIUS}
+
+    def parameters(self, structure: Structure) -> dict[str, Parameter]:
+        """Every numeric path of a scene of this structure."""
+        law = friction.LAWS[structure.law]
+        found = dict(self.body)
+        places = ["friction.rest"]
+        if structure.arcs == ("zone",):
+            places.append("friction.rough")
+        elif structure.arcs:
+            places.extend(structure.arcs)
+        for place in places:
+            found |= {f"{place}.{name}": p for name, p in friction.coefficients_of(law).items()}
+        found |= {f"friction.{name}": p for name, p in declared(law).items()}
+        for arc in structure.arcs:
+            found |= {f"{arc}.{name}": p for name, p in declared(zones.Arc).items()}
+        found |= {f"drive.{name}": p for name, p in declared(drives.DRIVES[structure.drive]).items()}
+        return found | {
+            "initial.phi": Parameter("rad", "angle of the body at launch", default=0.0),
+            "initial.omega": Parameter("rad/s", "angular velocity of the body at launch", default=0.0),
+            "time.span": SPAN,
+            "gravity": GRAVITY,
+            "classify.epsilon_omega": Parameter(
+                "rad/s", "angular velocity beyond which a change of sign is a reversal", lower=0.0, default=1e-3
+            ),
+        }
+
+    def build(self, structure: Structure, values: Values) -> ring.Ring:
+        """Cells of a sweep; see :func:`ringsweep.scene.batch`."""
+        law = friction.LAWS[structure.law]
+        rough = "friction.rough" if structure.arcs == ("zone",) else None
+        arcs = [
+            zones.Arc(values[f"{arc}.center"], values[f"{arc}.half_angle"], *_mu(law, rough or arc, values))
+            for arc in structure.arcs
+        ]
+        surface = zones.cut(arcs, *_mu(law, "friction.rest", values))
+        return ring.Ring(
+            body=self.build_body(values),
+            surface=surface,
+            law=law(*(values[f"friction.{name}"] for name in declared(law))),
+            drive=drives.build(structure.drive, structure.table, values),
+            initial_phi=values["initial.phi"],
+            initial_omega=values["initial.omega"],
+            span=values["time.span"],
+            epsilon_omega=values["classify.epsilon_omega"],
+        )
+
+    def build_body(self, values: Values) -> Any:
+        """The body's cells."""
+        return ring.OneContact(values["body.mass"], values["ring.radius"], values["gravity"])
+
+
+class Ring(SingleContactRing):
+    """Two balls joined by a rod, sliding in the ring (the paper's Fig. 22)."""
+
+    name = "ring"
+    doc = "a two-contact body in a rotating ring"
+    absent = frozenset()
+    body: ClassVar[dict[str, Parameter]] = {
+        "body.mass": MASS,
+        "body.inertia": Parameter("kg m^2", "central moment of inertia of the body", lower=0.0),
+        "body.half_distance": Parameter(
+            "m", "half the distance between the centres of the balls", lower=0.0, open_lower=True
+        ),
+        "body.ball_radius": Parameter("m", "radius of the balls", lower=0.0),
+        "body.beta": Parameter(
+            "rad", "half the angle that the contacts subtend", 0.0, pi / 2, True, True, optional=True
+        ),
+        "ring.radius": Parameter("m", "radius of the inner race", lower=0.0, open_lower=True, optional=True),
+    }
+
+    def build_body(self, values: Values) -> ring.TwoContacts:
+        """The body's cells, from (a, r, R) or from (a, r, beta)."""
+        a, r = values["body.half_distance"], values["body.ball_radius"]
+        given = "ring.radius" in values, "body.beta" in values
+        if not any(given):
+            require(False, "ring.radius", np.nan, "missing: give ring.radius, or body.beta in its place")
+        if given[0]:
+            R = values["ring.radius"]
+            require(
+                r + a < R,
+                "ring.radius",
+                R,
+                "{} m is too small: the ring must be larger than ball_radius + half_distance of the body",
+            )
+            sin_beta = a / (R - r)
+            if given[1]:
+                require(
+                    np.abs(np.arcsin(sin_beta) - values["body.beta"]) < 2e-4,
+                    "body.beta",
+                    values["body.beta"],
+                    "{} rad contradicts ring.radius: sin(beta) = half_distance / (radius - ball_radius); give one",
+                )
+        else:
+            sin_beta = np.sin(values["body.beta"])
+            R = r + a / sin_beta
+        cos_beta = np.sqrt((1.0 - sin_beta) * (1.0 + sin_beta))
+        return ring.TwoContacts(
+            mass=values["body.mass"],
+            inertia=values["body.inertia"],
+            radius=R,
+            xi=(R - r) * cos_beta,
+            beta=np.arcsin(sin_beta),
+            sin_beta=sin_beta,
+            cos_beta=cos_beta,
+            gravity=values["gravity"],
+        )
+
+
+def _mu(law: type, place: str, values: Values) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Static and kinetic coefficient at a place, checked against each other."""
+    mu_k = values[f"{place}.mu_k"]
+    if "mu_s" not in friction.coefficients_of(law):
+        return mu_k, mu_k
+    mu_s = values[f"{place}.mu_s"]
+    require(
+        mu_s >= mu_k, f"{place}.mu_k", mu_k, "{} exceeds mu_s: kinetic friction cannot be greater than static friction"
+    )
+    return mu_s, mu_k
+
+
+class Inspection(NamedTuple):
+    """A state of the ring seen from within: what a step needs and what ends a run."""
+
+    rates: tuple[float, float]
+    v: float
+    normal_1: float
+    normal_2: float
+    D: float
+    inertia: float
+    slope: float
+    sin_phi: float
+    cos_phi: float
+    omega: float
+
+
+@hooks.launch.implements(ring.Ring)
+def _launch(scene):
+    return scene.initial_phi, scene.initial_omega
+
+
+@hooks.rates.implements(ring.Ring)
+def _rates(scene, y, theta, ring_omega):
+    phi, omega = y
+    _, K1, K2, _, _ = ring.friction(scene, phi, omega, theta, ring_omega)
+    return omega, ring.acceleration(scene.body, K1, K2, sin(phi), cos(phi), omega)[0]
+
+
+@hooks.inspect.implements(ring.Ring)
+def _inspect(scene, y, theta, ring_omega):
+    phi, omega = y
+    v, K1, K2, slope_1, slope_2 = ring.friction(scene, phi, omega, theta, ring_omega)
+    sin_phi, cos_phi = sin(phi), cos(phi)
+    epsilon, D, inertia = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
+    normal_1, normal_2 = ring.reactions(scene.body, K1, K2, sin_phi, cos_phi, omega, epsilon)
+    slope = ring.acceleration_slope(scene.body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega)
+    return Inspection((omega, epsilon), v, normal_1, normal_2, D, inertia, slope, sin_phi, cos_phi, omega)
+
+
+@hooks.verdict.implements(ring.Ring)
+def _verdict(scene, before, now):
+    if not (now.D > 0.0 and now.inertia > 0.0):
+        return (BROKEN if isnan(now.inertia) else JAM), 1.0
+    if not (isfinite(now.rates[1]) and isfinite(now.omega)):
+        return BROKEN, 1.0
+    status, fraction = RUNNING, 1.0
+    if now.normal_1 <= 0.0:
+        status, fraction = SEPARATED_1, _zero(before.normal_1, now.normal_1)
+    if now.normal_2 <= 0.0:
+        second = _zero(before.normal_2, now.normal_2)
+        if status == RUNNING or second < fraction:
+            status, fraction = SEPARATED_2, second
+    return status, fraction
+
+
+@inlined
+def _zero(before, now):
+    """Where a straight line from `before` > 0 to `now` <= 0 vanishes, as a fraction of the way."""
+    return before / (before - now) if before > now else 0.0
+
+
+@inlined
+def _in_band(scene, before, now):
+    """Whether a step lay in the stiction band or jumped across it."""
+    return abs(before.v) < friction.stiction_band(scene.law) or before.v * now.v < 0.0
+
+
+@hooks.stiffness.implements(ring.Ring)
+def _stiffness(scene, before, now, h):
+    if not _in_band(scene, before, now):
+        return abs(now.slope) * h
+    # A step that jumps the band never samples its slope, and is the one that is wrong in kind:
+    # it has met the band all the same. A discontinuous law has no slope that any step could follow.
+    band = friction.stiction_band(scene.law)
+    if band == 0.0:
+        return inf
+    mu_s, mu_k = zones.roughest(scene.surface)
+    worst = 0.0
+    for speed in (0.0, band):
+        _, _, dw_s, dw_k = friction.weights(scene.law, speed)
+        slope = -(dw_s * mu_s + dw_k * mu_k) * scene.body.radius
+        worst = max(
+            worst,
+            abs(ring.acceleration_slope(scene.body, 0.0, 0.0, slope, slope, now.sin_phi, now.cos_phi, now.omega)),
+        )
+    return worst * h
+
+
+@hooks.begin.implements(ring.Ring)
+def _begin(scene, y, now):
+    return regimes.begin(y[0], y[1], now.normal_1, now.normal_2, scene.epsilon_omega)
+
+
+@hooks.observe.implements(ring.Ring)
+def _observe(scene, record, y, before, now, h):
+    stuck_for = h if _in_band(scene, before, now) else 0.0
+    return regimes.observe(record, y[0], y[1], now.normal_1, now.normal_2, stuck_for, scene.epsilon_omega)
+
+
+@hooks.conclude.implements(ring.Ring)
+def _conclude(scene, record, status, t, y):
+    return regimes.conclude(record, status, t, y[0], y[1])
+
+
+@hooks.describe.implements(ring.Ring)
+def _describe(scene, y, theta, ring_omega):
+    now = hooks.inspect(scene, y, theta, ring_omega)
+    band = friction.stiction_band(scene.law)
+    mode = 0.0 if abs(now.v) < band or now.v == 0.0 else 1.0 if now.v > 0.0 else -1.0
+    offset = ring.contact_offset(scene.body)
+    rho = y[0] - theta
+    zone_1 = zones.coefficients(scene.surface, zones.segment(scene.surface, rho - offset))[2]
+    zone_2 = zones.coefficients(scene.surface, zones.segment(scene.surface, rho + offset))[2]
+    return y[0], y[1], now.rates[1], now.normal_1, now.normal_2, ring_omega, zone_1, zone_2, mode

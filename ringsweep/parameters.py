@@ -1,0 +1,74 @@
+"""What a number of the scene is: unit, meaning, admissible interval.
+
+Physics declares its parameters where it defines them, as annotated fields of a
+``NamedTuple``; configuration, schema, coordinates of a dataset and messages about
+wrong input are all derived from these declarations.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: A number of one cell, or of every cell of a batch: shape ``(cells,)``.
+Leaf = float | NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One numeric parameter of a scene.
+
+    Attributes
+    ----------
+    unit : str
+        SI unit; ``"1"`` if it has none, ``""`` if it depends on another parameter.
+    long_name : str
+        What it is, for documentation and coordinate attributes.
+    lower, upper : float
+        Ends of the admissible interval.
+    open_lower, open_upper : bool
+        Whether the end itself is excluded.
+    default : float or None
+        Value where the configuration is silent; None if it must be given.
+    optional : bool
+        True where silence is allowed and means "derived from the others".
+    """
+
+    unit: str
+    long_name: str
+    lower: float = -math.inf
+    upper: float = math.inf
+    open_lower: bool = False
+    open_upper: bool = False
+    default: float | None = None
+    optional: bool = False
+
+    def allows(self, value: float) -> bool:
+        """Whether a finite `value` lies within the interval."""
+        above = value > self.lower if self.open_lower else value >= self.lower
+        below = value < self.upper if self.open_upper else value <= self.upper
+        return math.isfinite(value) and above and below
+
+    @property
+    def interval(self) -> str:
+        """The admissible interval in words, such as ``"greater than 0"``."""
+        parts = []
+        if math.isfinite(self.lower):
+            parts.append(f"{'greater than' if self.open_lower else 'at least'} {self.lower:.6g}")
+        if math.isfinite(self.upper):
+            parts.append(f"{'less than' if self.open_upper else 'at most'} {self.upper:.6g}")
+        return " and ".join(parts) or "any finite number"
+
+
+def declared(cls: type) -> dict[str, Parameter]:
+    """Parameters that a ``NamedTuple`` class declares by ``Annotated`` fields."""
+    found = {}
+    for name, hint in get_type_hints(cls, include_extras=True).items():
+        for note in getattr(hint, "__metadata__", ()):
+            if isinstance(note, Parameter):
+                found[name] = note
+    return found

@@ -1,0 +1,282 @@
+"""Laws by which the ring (or the belt) is driven.
+
+Every law is an amplitude times a shape, :math:`\\theta(t) = A\\, s(t)`. Shapes do not depend on the
+amplitude, so cells that differ only in it share one table of the drive.
+
+To add a drive: a ``NamedTuple`` with its shape's parameters, a body for each hook below, a line
+in ``DRIVES``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import atan, cos, inf, log1p, pi, sin
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from ringsweep.jit import hook, inlined
+from ringsweep.parameters import Parameter, declared
+from ringsweep.scene import require
+
+
+class Still(NamedTuple):
+    """No drive: the ring is at rest."""
+
+
+class Constant(NamedTuple):
+    """Constant angular velocity: :math:`s = t`."""
+
+    amplitude: Annotated[float, Parameter("rad/s", "angular velocity of the ring")]
+
+
+class Arctan(NamedTuple):
+    """Smooth run-up (the paper's h): :math:`s = t \\arctan t - \\tfrac12 \\ln(1 + t^2)`."""
+
+    amplitude: Annotated[float, Parameter("rad/s", "amplitude of the ring's angular velocity")]
+
+
+class Power(NamedTuple):
+    """Power law: :math:`s = t^n`; for n < 2 the acceleration is infinite at t = 0."""
+
+    amplitude: Annotated[float, Parameter("", "angle of the ring after one second")]
+    exponent: Annotated[float, Parameter("1", "exponent of the power law", lower=1.0)]
+
+
+class Sinusoidal(NamedTuple):
+    """Rocking ring: :math:`s = \\sin(2 \\pi f t + \\psi)`."""
+
+    amplitude: Annotated[float, Parameter("rad", "amplitude of the rocking angle")]
+    frequency: Annotated[float, Parameter("Hz", "frequency of rocking", lower=0.0)]
+    phase: Annotated[float, Parameter("rad", "phase of rocking at t = 0", default=0.0)]
+
+
+class Table(NamedTuple):
+    """Measured angle: a cubic spline through (time, angle), hence smooth to second order."""
+
+    amplitude: Annotated[float, Parameter("1", "factor on the measured angle", default=1.0)]
+    knots: Any
+    coefficients: Any
+
+
+DRIVES: dict[str, type] = {
+    "none": Still,
+    "constant": Constant,
+    "arctan": Arctan,
+    "power": Power,
+    "sinusoidal": Sinusoidal,
+    "table": Table,
+}
+
+
+def build(name: str, table: tuple[NDArray, NDArray] | None, values: Mapping[str, NDArray]) -> Any:
+    """A drive whose leaves have shape ``(cells, ...)``.
+
+    Raises
+    ------
+    InputError
+        If a table ends before the span of time does.
+    """
+    law = DRIVES[name]
+    columns: dict[str, Any] = {field: values[f"drive.{field}"] for field in declared(law)}
+    if table is None:
+        return law(**columns)
+    times, angles = table
+    cells = len(values["time.span"])
+    require(
+        values["time.span"] <= times[-1],
+        "time.span",
+        values["time.span"],
+        f"{{}} s is longer than the table of the drive, which ends at {times[-1]:.6g} s",
+    )
+    # A spline of third degree is the smoothest that a few noisy samples bear, and is C2.
+    pieces = np.ascontiguousarray(CubicSpline(times, angles).c.T)
+    return Table(
+        **columns,
+        knots=np.broadcast_to(times, (cells, *times.shape)),
+        coefficients=np.broadcast_to(pieces, (cells, *pieces.shape)),
+    )
+
+
+@hook
+def shape(drive, t):
+    """Shape of the drive and its first two derivatives at time `t` (s)."""
+
+
+@shape.implements(Still)
+def _still(drive, t):
+    return 0.0, 0.0, 0.0
+
+
+@shape.implements(Constant)
+def _constant(drive, t):
+    return t, 1.0, 0.0
+
+
+@shape.implements(Arctan)
+def _arctan(drive, t):
+    rate = atan(t)
+    return t * rate - 0.5 * log1p(t * t), rate, 1.0 / (1.0 + t * t)
+
+
+@shape.implements(Power)
+def _power(drive, t):
+    n = drive.exponent
+    if t == 0.0:
+        return 0.0, 1.0 if n == 1.0 else 0.0, (2.0 if n == 2.0 else 0.0 if n > 2.0 or n == 1.0 else inf)
+    return t**n, n * t ** (n - 1.0), n * (n - 1.0) * t ** (n - 2.0)
+
+
+@shape.implements(Sinusoidal)
+def _sinusoidal(drive, t):
+    rate = 2.0 * pi * drive.frequency
+    s = sin(rate * t + drive.phase)
+    return s, rate * cos(rate * t + drive.phase), -rate * rate * s
+
+
+@inlined
+def _piece(knots, t):
+    """Index of the spline piece that holds `t`; the outer pieces extend to infinity."""
+    low, high = 0, len(knots) - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if t < knots[middle]:
+            high = middle
+        else:
+            low = middle
+    return low
+
+
+@shape.implements(Table)
+def _table(drive, t):
+    j = _piece(drive.knots, t)
+    x = t - drive.knots[j]
+    c3, c2, c1, c0 = drive.coefficients[j]
+    return c0 + x * (c1 + x * (c2 + x * c3)), c1 + x * (2.0 * c2 + 3.0 * x * c3), 2.0 * c2 + 6.0 * x * c3
+
+
+@hook
+def turn(drive, t):
+    """Angle of the ring and its first two derivatives at time `t` (s); rad, rad/s, rad/s^2."""
+
+
+@turn.implements(Still)
+def _no_turn(drive, t):
+    return 0.0, 0.0, 0.0
+
+
+@turn.implements(Constant, Arctan, Power, Sinusoidal, Table)
+def _turn(drive, t):
+    theta, omega, epsilon = shape(drive, t)
+    a = drive.amplitude
+    # An amplitude of zero stills a drive whose acceleration is infinite.
+    return a * theta, a * omega, a * epsilon if a != 0.0 else 0.0
+
+
+@hook
+def lookup(drive, table, k):
+    """Angle (rad) and angular velocity (rad/s) of the drive from row `k` of a table of its shape."""
+
+
+@lookup.implements(Still)
+def _no_lookup(drive, table, k):
+    return 0.0, 0.0
+
+
+@lookup.implements(Constant, Arctan, Power, Sinusoidal, Table)
+def _lookup(drive, table, k):
+    return drive.amplitude * table[k, 0], drive.amplitude * table[k, 1]
+
+
+@hook
+def expand(drive, t, order, theta):
+    """Taylor series of the drive's angle about time `t`.
+
+    Parameters
+    ----------
+    drive : NamedTuple
+        One of ``DRIVES``.
+    t : float
+        Time, s.
+    order : int
+        Highest power.
+    theta : ndarray of shape ``(order + 1,)``
+        Filled with the coefficients, rad/s^k.
+    """
+
+
+@expand.implements(Still)
+def _expand_still(drive, t, order, theta):
+    for k in range(order + 1):
+        theta[k] = 0.0
+
+
+@expand.implements(Constant)
+def _expand_constant(drive, t, order, theta):
+    for k in range(2, order + 1):
+        theta[k] = 0.0
+    theta[0], theta[1] = drive.amplitude * t, drive.amplitude
+
+
+@expand.implements(Arctan)
+def _expand_arctan(drive, t, order, theta):
+    # g = 1/(1 + (t + s)^2) obeys (1 + t^2 + 2 t s + s^2) g = 1, and theta'' = A g.
+    scale = 1.0 / (1.0 + t * t)
+    before, g = 0.0, scale
+    rate = atan(t)
+    theta[0] = drive.amplitude * (t * rate - 0.5 * log1p(t * t))
+    theta[1] = drive.amplitude * rate
+    for k in range(2, order + 1):
+        theta[k] = drive.amplitude * g / (k * (k - 1.0))
+        before, g = g, -(2.0 * t * g + before) * scale
+
+
+@expand.implements(Power)
+def _expand_power(drive, t, order, theta):
+    # No series exists at t = 0; what happens in 1e-14 s is below rounding.
+    t = max(t, 1e-14)
+    n = drive.exponent
+    theta[0] = drive.amplitude * t**n
+    for k in range(1, order + 1):
+        theta[k] = theta[k - 1] * (n - k + 1.0) / (k * t)
+
+
+@expand.implements(Sinusoidal)
+def _expand_sinusoidal(drive, t, order, theta):
+    rate = 2.0 * pi * drive.frequency
+    a = drive.amplitude * sin(rate * t + drive.phase)
+    b = drive.amplitude * cos(rate * t + drive.phase)
+    for k in range(order + 1):
+        theta[k] = a
+        a, b = b * rate / (k + 1.0), -a * rate / (k + 1.0)
+
+
+@expand.implements(Table)
+def _expand_table(drive, t, order, theta):
+    for k in range(4, order + 1):
+        theta[k] = 0.0
+    j = _piece(drive.knots, t)
+    x = t - drive.knots[j]
+    c3, c2, c1, c0 = drive.coefficients[j]
+    theta[0] = drive.amplitude * (c0 + x * (c1 + x * (c2 + x * c3)))
+    theta[1] = drive.amplitude * (c1 + x * (2.0 * c2 + 3.0 * x * c3))
+    theta[2] = drive.amplitude * (c2 + 3.0 * x * c3)
+    theta[3] = drive.amplitude * c3
+
+
+@hook
+def next_knot(drive, t):
+    """First time after `t` (s) at which the drive is not smooth; infinite if there is none."""
+
+
+@next_knot.implements(Still, Constant, Arctan, Power, Sinusoidal)
+def _no_knot(drive, t):
+    return inf
+
+
+@next_knot.implements(Table)
+def _next_knot(drive, t):
+    j = _piece(drive.knots, t)
+    return drive.knots[j + 1] if j + 2 < len(drive.knots) else inf

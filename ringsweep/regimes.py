@@ -1,0 +1,130 @@
+"""What a run on the ring was: reversals, turns, extremes, motion, regime; counted while a solver runs."""
+
+from __future__ import annotations
+
+from math import floor, isfinite, nan, pi
+from typing import NamedTuple
+
+from ringsweep.jit import inlined
+from ringsweep.variables import FAILED, JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
+
+#: How a run stands or ended.
+RUNNING, COMPLETE, SEPARATED_1, SEPARATED_2, JAM, BROKEN = range(6)
+
+
+class Record(NamedTuple):
+    """What is remembered of a run on the ring; angles in rad, times in s, forces in N.
+
+    ``sense`` is the sign of the last motion beyond the threshold; ``lowest`` and ``highest`` bound
+    the angle since the last reversal, or since the start.
+    """
+
+    sense: int
+    reversals: int
+    lowest: float
+    highest: float
+    phi_min: float
+    phi_max: float
+    omega_min: float
+    omega_max: float
+    stick_time: float
+    normal_min_1: float
+    normal_min_2: float
+
+
+class Outcome(NamedTuple):
+    """A run in the numbers that a dataset holds, in the order of their columns."""
+
+    regime: float
+    motion: float
+    separating_contact: float
+    t_separation: float
+    t_end: float
+    phi_end: float
+    omega_end: float
+    phi_min: float
+    phi_max: float
+    omega_min: float
+    omega_max: float
+    reversals: float
+    turns: float
+    stick_time: float
+    normal_min_1: float
+    normal_min_2: float
+
+
+@inlined
+def begin(phi, omega, normal_1, normal_2, epsilon_omega):
+    """Record of a run at its launch."""
+    sense = 1 if omega > epsilon_omega else -1 if omega < -epsilon_omega else 0
+    return Record(sense, 0, phi, phi, phi, phi, omega, omega, 0.0, normal_1, normal_2)
+
+
+@inlined
+def observe(record, phi, omega, normal_1, normal_2, stuck_for, epsilon_omega):
+    """Record after a state was met; `stuck_for` is the time for which the body has stuck since the last one.
+
+    A reversal needs the angular velocity to pass from beyond one threshold to beyond the other,
+    so that chatter about zero does not count.
+    """
+    r = record
+    sense, reversals, lowest, highest = r.sense, r.reversals, min(r.lowest, phi), max(r.highest, phi)
+    if omega > epsilon_omega and sense < 1:
+        if sense == -1:
+            reversals += 1
+            highest = max(lowest, phi)
+        sense = 1
+    elif omega < -epsilon_omega and sense > -1:
+        if sense == 1:
+            reversals += 1
+            lowest = min(highest, phi)
+        sense = -1
+    return Record(
+        sense,
+        reversals,
+        lowest,
+        highest,
+        min(r.phi_min, phi),
+        max(r.phi_max, phi),
+        min(r.omega_min, omega),
+        max(r.omega_max, omega),
+        r.stick_time + stuck_for,
+        min(r.normal_min_1, normal_1),
+        min(r.normal_min_2, normal_2),
+    )
+
+
+@inlined
+def conclude(record, status, t, phi, omega):
+    """Outcome of a run that ended with `status` at time `t` in the state `(phi, omega)`."""
+    r = record
+    turns = floor((r.highest - r.lowest) / (2.0 * pi))
+    motion = REVOLVING if turns >= 1 else OSCILLATORY if r.reversals > 0 else RESTING
+    if status == BROKEN or not (isfinite(phi) and isfinite(omega)):
+        regime, motion = FAILED, FAILED
+    elif status == JAM:
+        regime = JAMMED
+    elif status in (SEPARATED_1, SEPARATED_2):
+        regime = SEPARATING
+    else:
+        regime = motion
+    separated = regime == SEPARATING
+    return Outcome(
+        float(regime),
+        float(motion),
+        float(status - SEPARATED_1 + 1 if separated else 0),
+        t if separated else nan,
+        t,
+        phi,
+        omega,
+        r.phi_min,
+        r.phi_max,
+        r.omega_min,
+        r.omega_max,
+        float(r.reversals),
+        float(turns),
+        r.stick_time,
+        # A step ends beyond the instant at which a reaction vanishes.
+        max(r.normal_min_1, 0.0),
+        max(r.normal_min_2, 0.0),
+    )

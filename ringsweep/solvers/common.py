@@ -1,0 +1,56 @@
+"""What every method offers to a sweep, and what methods share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Result:
+    """Outcomes of a batch.
+
+    Attributes
+    ----------
+    rows : ndarray of shape ``(cells, outcomes)``
+        The model's outcomes, in the order of its columns.
+    steps, certified : ndarray of shape ``(cells,)``
+    stiffness : ndarray of shape ``(cells,)``, optional
+        Only from methods of fixed step.
+    """
+
+    rows: NDArray[np.float64]
+    steps: NDArray[Any]
+    certified: NDArray[np.bool_]
+    stiffness: NDArray[np.float64] | None = None
+
+
+class Method:
+    """A way to advance time. Its options are the fields of the dataclass that derives from it."""
+
+    name: ClassVar[str]
+
+    def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:
+        """Run every cell of `batch`; `outcomes` names the model's columns."""
+        raise NotImplementedError
+
+    def history(self, batch: Any, samples: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Time history of cell 0 in about `samples` rows of `width` columns."""
+        raise NotImplementedError
+
+
+def same_drive(batch: Any, cells: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
+    """Groups of `cells` that share span and shape of the drive, whatever its amplitude."""
+    shape = [
+        leaf
+        for name, leaf in zip(batch.drive._fields, batch.drive, strict=True)
+        if name != "amplitude" and leaf.ndim == 1
+    ]
+    keys = np.stack([batch.span, *shape], axis=1)[cells]
+    _, group = np.unique(keys, axis=0, return_inverse=True)
+    order = np.argsort(group, kind="stable")
+    yield from np.split(cells[order], np.flatnonzero(np.diff(group[order])) + 1)

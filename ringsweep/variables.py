@@ -1,0 +1,80 @@
+"""Every quantity of a dataset once: name, type, unit, meaning and flags."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+#: Regimes in the order of their flag values; motions are the ones that can precede an end.
+REGIMES = ("resting", "oscillatory", "revolving", "separating", "jammed", "failed", "stick-slip")
+RESTING, OSCILLATORY, REVOLVING, SEPARATING, JAMMED, FAILED, STICK_SLIP = range(7)
+
+MODES = {-1: "slip_backward", 0: "stick", 1: "slip_forward"}
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A quantity of a dataset; `flags` maps the values of a classification to their meanings."""
+
+    long_name: str
+    units: str = "1"
+    dtype: str = "float64"
+    flags: dict[int, str] | None = None
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """CF attributes."""
+        import numpy as np
+
+        attributes: dict[str, Any] = {"long_name": self.long_name, "units": self.units}
+        if self.flags:
+            attributes["flag_values"] = np.array(list(self.flags), dtype=self.dtype)
+            attributes["flag_meanings"] = " ".join(meaning.replace(" ", "_") for meaning in self.flags.values())
+        return attributes
+
+
+_regimes = dict(enumerate(REGIMES))
+
+OUTCOMES: dict[str, Variable] = {
+    "regime": Variable("regime of the run", dtype="int8", flags=_regimes),
+    "motion": Variable(
+        "motion up to the end of the run",
+        dtype="int8",
+        flags={k: v for k, v in _regimes.items() if k not in (SEPARATING, JAMMED)},
+    ),
+    "separating_contact": Variable(
+        "contact that separates", dtype="int8", flags={0: "none", 1: "contact_1", 2: "contact_2"}
+    ),
+    "t_separation": Variable("time of separation", "s"),
+    "t_end": Variable("time at which the run ends", "s"),
+    "phi_end": Variable("angle of the body at the end", "rad"),
+    "omega_end": Variable("angular velocity of the body at the end", "rad s-1"),
+    "phi_min": Variable("least angle of the body", "rad"),
+    "phi_max": Variable("greatest angle of the body", "rad"),
+    "omega_min": Variable("least angular velocity of the body", "rad s-1"),
+    "omega_max": Variable("greatest angular velocity of the body", "rad s-1"),
+    "reversals": Variable("reversals of the motion", dtype="int32"),
+    "turns": Variable("full turns since the last reversal or the start", dtype="int32"),
+    "stick_time": Variable("time for which the body sticks to the ring", "s"),
+    "normal_min_1": Variable("least normal reaction at contact 1", "N"),
+    "normal_min_2": Variable("least normal reaction at contact 2", "N"),
+    "steps": Variable("steps of the integration", dtype="int64"),
+    "stiffness": Variable("largest stiffness met: magnitude of the eigenvalue times the step"),
+    "certified": Variable(
+        "whether two independent resolutions agree on regime, motion and separating contact",
+        dtype="int8",
+        flags={0: "not_certified", 1: "certified"},
+    ),
+}
+
+HISTORY: dict[str, Variable] = {
+    "phi": Variable("angle of the body", "rad"),
+    "omega": Variable("angular velocity of the body", "rad s-1"),
+    "epsilon": Variable("angular acceleration of the body", "rad s-2"),
+    "normal_1": Variable("normal reaction at contact 1", "N"),
+    "normal_2": Variable("normal reaction at contact 2", "N"),
+    "ring_omega": Variable("angular velocity of the ring", "rad s-1"),
+    "zone_1": Variable("segment of the ring under contact 1", dtype="int32"),
+    "zone_2": Variable("segment of the ring under contact 2", dtype="int32"),
+    "mode": Variable("friction mode", dtype="int8", flags=MODES),
+}
