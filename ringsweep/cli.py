@@ -1,0 +1,212 @@
+"""Command line: verbs, each a few lines over the Python calls."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ringsweep.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command; the exit status is 0 if done, 2 if the input is wrong, 1 for anything else."""
+    arguments = _parser().parse_args(argv)
+    logging.basicConfig(stream=sys.stderr, level=logging.WARNING, format="ringsweep: %(message)s")
+    try:
+        arguments.verb(arguments)
+    except InputError as error:
+        return _fail(str(error), 2)
+    except KeyboardInterrupt:
+        return _fail("interrupted", 130)
+    except Exception as error:
+        return _fail(f"{type(error).__name__}: {error}", 1)
+    return 0
+
+
+def _fail(message: str, status: int) -> int:
+    print("ringsweep:", " ".join(message.split()), file=sys.stderr)
+    return status
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="ringsweep", description="Regime maps of dry-friction systems whose friction coefficient jumps."
+    )
+    verbs = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    run = verbs.add_parser("run", help="run a sweep: NetCDF, and a regime map beside it")
+    run.add_argument("config", metavar="CONFIG.yaml")
+    run.add_argument("-o", "--output", metavar="OUT.nc", help="default: the configuration's name, in this folder")
+    run.add_argument("--jobs", type=_positive, metavar="N", help="threads (default: all cores)")
+    run.add_argument("--fresh", action="store_true", help="run again even if OUT.nc holds this very sweep")
+    run.set_defaults(verb=_run)
+
+    draw = verbs.add_parser("map", help="draw a variable of a sweep")
+    draw.add_argument("dataset", metavar="OUT.nc")
+    draw.add_argument("-o", "--output", metavar="MAP.png", help="default: beside OUT.nc")
+    draw.add_argument("--x", metavar="DIM", help="coordinate across")
+    draw.add_argument("--y", metavar="DIM", help="coordinate up")
+    draw.add_argument("--var", default="regime", metavar="V", help="variable to draw (default: regime)")
+    draw.add_argument(
+        "--sel", action="append", default=[], metavar="DIM=VALUE", help="hold at the nearest value; units allowed"
+    )
+    draw.set_defaults(verb=_map)
+
+    simulate = verbs.add_parser("simulate", help="run once: NetCDF of the history, and a picture beside it")
+    simulate.add_argument("config", metavar="CONFIG.yaml")
+    simulate.add_argument("-o", "--output", metavar="RUN.nc", help="default: the configuration's name with -run")
+    simulate.add_argument(
+        "--set", action="append", default=[], metavar="PATH=VALUE", help="change a value, as drive.amplitude=3"
+    )
+    simulate.set_defaults(verb=_simulate)
+
+    info = verbs.add_parser("info", help="tell what a result file holds")
+    info.add_argument("dataset", metavar="OUT.nc")
+    info.set_defaults(verb=_info)
+
+    verbs.add_parser("schema", help="print the JSON schema of the configuration").set_defaults(verb=_schema)
+    return parser
+
+
+def _positive(text: str) -> int:
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"{number} is not at least 1")
+    return number
+
+
+def _run(arguments: argparse.Namespace) -> None:
+    from ringsweep.config import load
+
+    config = load(arguments.config)
+    target, picture = _outputs(arguments.output or f"{config.name}.nc")
+
+    from ringsweep import storage
+    from ringsweep.engine import compute
+    from ringsweep.jit import SOURCES_DIGEST
+
+    # A file there that is no result of ours is refused rather than replaced.
+    result = storage.load(target) if target.exists() else None
+    same = {"configuration": json.dumps(config.source, sort_keys=True), "ringsweep_sources": SOURCES_DIGEST}
+    if result is not None and not arguments.fresh and same.items() <= _texts(result.attrs).items():
+        print(f"{target} holds this sweep already (--fresh runs it again)")
+    else:
+        result = compute(config, jobs=arguments.jobs, progress=True)
+        storage.save(result, target)
+        print(f"wrote {target}")
+    _summarise(result)
+    if not config.axes.sizes:
+        return
+    from ringsweep import plots
+
+    try:
+        plots.save(plots.regime_map(result), picture)
+    except InputError as error:
+        # The sweep is sound and saved; only what to hold fixed in a picture is open.
+        print(f"no map yet: {error.problem} (ringsweep map {target})")
+    else:
+        print(f"wrote {picture}")
+
+
+def _map(arguments: argparse.Namespace) -> None:
+    from ringsweep import plots, storage
+
+    result = storage.load(arguments.dataset)
+    target = Path(arguments.output or Path(arguments.dataset).with_suffix(".png"))
+    storage.check_writable(target)
+    held = dict(_selection(result, text) for text in arguments.sel)
+    plots.save(plots.regime_map(result, arguments.x, arguments.y, arguments.var, held), target)
+    print(f"wrote {target}")
+
+
+def _simulate(arguments: argparse.Namespace) -> None:
+    from ringsweep.config import with_values
+
+    config = with_values(arguments.config, arguments.set)
+    target, picture = _outputs(arguments.output or f"{config.name}-run.nc")
+
+    from ringsweep import plots, storage
+    from ringsweep.single import history
+
+    result = history(config)
+    storage.save(result, target)
+    plots.save(plots.history(result), picture)
+    print(result.attrs["outcome"])
+    print(f"wrote {target}\nwrote {picture}")
+
+
+def _info(arguments: argparse.Namespace) -> None:
+    from ringsweep import storage
+
+    result = storage.load(arguments.dataset)
+    print(result.attrs.get("title", arguments.dataset))
+    print("dimensions:", ", ".join(f"{name} {size}" for name, size in result.sizes.items()) or "none: a single run")
+    for name, axis in result.coords.items():
+        unit = axis.attrs.get("units", "1")
+        print(f"  {name}: {axis.values.min():g} to {axis.values.max():g}{'' if unit == '1' else f' {unit}'}")
+    _summarise(result)
+    configuration = json.loads(result.attrs.get("configuration", "{}"))
+    print("solver:", json.dumps(configuration.get("solver", result.attrs.get("method"))))
+    print("versions:", result.attrs["ringsweep_version"], result.attrs.get("versions", ""))
+
+
+def _schema(arguments: argparse.Namespace) -> None:
+    from ringsweep.schema import schema
+
+    print(json.dumps(schema(), indent=2, ensure_ascii=False))
+
+
+def _summarise(result: xr.Dataset) -> None:
+    """Print how many cells there are, and the share of each regime."""
+    import numpy as np
+
+    regime = result["regime"]
+    print("cells:", regime.size)
+    meanings = str(regime.attrs["flag_meanings"]).split()
+    for flag, meaning in zip(np.atleast_1d(regime.attrs["flag_values"]), meanings, strict=True):
+        count = int((regime == flag).sum())
+        if count:
+            print(f"  {meaning}: {count} ({count / regime.size:.1%})")
+    if "certified" in result:
+        print(f"certified: {float((result['certified'] == 1).mean()):.1%}")
+
+
+def _selection(result: xr.Dataset, text: str) -> tuple[str, float | str]:
+    """A coordinate and a value in its unit, from ``DIM=VALUE``."""
+    from ringsweep.parameters import Parameter
+    from ringsweep.units import quantity
+
+    name, equals, value = (part.strip() for part in text.partition("="))
+    if not equals:
+        raise InputError("--sel", f"{text!r} is not of the form DIM=VALUE")
+    if name not in result.coords or result[name].dtype.kind not in "iuf":
+        return name, value
+    attributes = result[name].attrs
+    parameter = Parameter(str(attributes.get("units", "1")), str(attributes.get("long_name", name)))
+    return name, quantity(value, parameter, f"--sel {name}")
+
+
+def _texts(attributes: dict[Any, Any]) -> dict[str, str]:
+    """Attributes that are text; arrays among them have no single truth value to compare by."""
+    return {name: value for name, value in attributes.items() if isinstance(value, str)}
+
+
+def _outputs(name: str) -> tuple[Path, Path]:
+    """Dataset and picture to be written, both known to be writable before any work is done."""
+    from ringsweep import storage
+
+    target = Path(name)
+    storage.check_writable(target)
+    picture = target.with_suffix(".png")
+    if target == picture:
+        raise InputError(name, "is where the picture goes: name the dataset *.nc")
+    storage.check_writable(picture)
+    return target, picture

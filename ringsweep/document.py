@@ -1,0 +1,242 @@
+"""Configuration text as plain values, with the line that each of them stands on."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import os
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from numbers import Integral, Real
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from ringsweep.errors import InputError
+from ringsweep.units import NUMBER, show
+
+#: Nodes that a configuration may have after its aliases are expanded.
+LIMIT = 100_000
+
+_DEEPEST = 30
+_TAGS = {f"tag:yaml.org,2002:{name}" for name in ("null", "bool", "int", "float", "str", "timestamp", "map", "seq")}
+# What YAML resolves these plain scalars to; everywhere here they are text.
+_TAGS |= {"tag:yaml.org,2002:merge", "tag:yaml.org,2002:value"}
+
+
+@dataclass
+class Document:
+    """A configuration as plain values.
+
+    Attributes
+    ----------
+    tree : dict
+        Nested dicts and lists of numbers, booleans, None and strings, as they were given.
+    folder : Path
+        Folder that file names in it are relative to.
+    name : str
+        Stem of the file.
+    marks : dict of str to tuple
+        File and line of what stands at a dotted path.
+    """
+
+    tree: dict[str, Any]
+    folder: Path = field(default_factory=Path)
+    name: str = "ringsweep"
+    marks: dict[str, tuple[str, int | None]] = field(default_factory=dict)
+
+    @contextmanager
+    def placing(self) -> Iterator[None]:
+        """Give errors raised within the block the file and line that their path stands on."""
+        try:
+            yield
+        except InputError as error:
+            if error.file is None:
+                path = error.path
+                while path not in self.marks and path:
+                    path = path.rpartition(".")[0]
+                error.file, error.line = self.marks.get(path, (None, None))
+            raise
+
+    def inline_csv(self, name: Any, path: str, section: str) -> dict[str, list[Any]]:
+        """Columns of a CSV file, by its header; a unit in the header is appended to each cell.
+
+        Parameters
+        ----------
+        name : object
+            File name as the configuration gives it.
+        path : str
+            Where the name stands.
+        section : str
+            Where the columns will stand: cells are marked as ``section.column.row``.
+        """
+        if not isinstance(name, str):
+            raise InputError(path, f"a file name is expected, got {show(name)}")
+        file = self.folder / name
+        try:
+            text = _read(file)
+        except InputError as error:
+            raise InputError(path, f"{file} {error.problem}") from None
+        rows = csv.reader(io.StringIO(text, newline=""), strict=True)
+        try:
+            header = next(rows, [])
+            columns: dict[str, tuple[str, list[Any]]] = {}
+            for cell in header:
+                match = re.fullmatch(r"([^\s(\[]+)\s*(?:[(\[](.*)[)\]])?", cell.strip())
+                if match is None or match[1] in columns:
+                    raise InputError(path, f"column {show(cell)} has no name, or one taken", file=str(file), line=1)
+                columns[match[1]] = match[2] or "", []
+            if not columns:
+                raise InputError(path, "the file is empty", file=str(file))
+            count = 0
+            for row in rows:
+                if not any(cell.strip() for cell in row):
+                    continue
+                if len(row) != len(columns):
+                    problem = f"{len(row)} cells under {len(columns)} columns"
+                    raise InputError(path, problem, file=str(file), line=rows.line_num)
+                for (column, (unit, cells)), cell in zip(columns.items(), row, strict=True):
+                    cells.append(scalar(f"{cell.strip()} {unit}".strip()))
+                    self.marks[f"{section}.{column}.{count}"] = str(file), rows.line_num
+                count += 1
+        except csv.Error as error:
+            raise InputError(path, f"not a CSV file: {error}", file=str(file), line=rows.line_num) from None
+        for column in columns:
+            self.marks[f"{section}.{column}"] = str(file), 1
+        return {column: cells for column, (_, cells) in columns.items()}
+
+
+def read(config: str | os.PathLike[str] | Mapping[str, Any]) -> Document:
+    """Read a configuration from a YAML file, or take it as a mapping.
+
+    Raises
+    ------
+    InputError
+        If it is not one YAML mapping of plain values.
+    """
+    if isinstance(config, Mapping):
+        return Document(_plain(config, "", 0))
+    if not isinstance(config, str | os.PathLike):
+        raise InputError("config", f"a path or a mapping is expected, got {show(config)}")
+    file = Path(config)
+    text = _read(file)
+    expansion = _Expansion(str(file))
+    try:
+        node = yaml.compose(text, Loader=yaml.SafeLoader)
+        if not isinstance(node, yaml.MappingNode):
+            found = "is empty" if node is None else "holds no mapping"
+            raise InputError("", f"{found}: a configuration has the sections scene, solver and sweep", file=str(file))
+        tree = expansion.value(node, "")
+    except InputError:
+        raise
+    except yaml.MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark else None
+        raise InputError("", f"not valid YAML: {error.problem or error.context}", file=str(file), line=line) from None
+    except RecursionError:
+        raise InputError("", "nested too deeply", file=str(file)) from None
+    except (yaml.YAMLError, ValueError, OverflowError) as error:
+        # PyYAML lets go of bare errors on escapes of characters that do not exist.
+        raise InputError("", f"not valid YAML: {' '.join(str(error).split())}", file=str(file)) from None
+    return Document(tree, file.parent, file.stem, expansion.marks)
+
+
+def scalar(text: str) -> Any:
+    """A plain scalar: None, a boolean, a number, or the text itself.
+
+    YAML 1.1 reads ``1.0e5`` as text, ``010`` as eight and ``1:30`` as ninety; here they are what they look like.
+    """
+    if text in ("", "~", "null", "Null", "NULL"):
+        return None
+    if text in ("true", "True", "TRUE", "false", "False", "FALSE"):
+        return text.lower() == "true"
+    if len(text) <= 100 and NUMBER.fullmatch(text):
+        number = float(text)
+        if text.lstrip("+-").isdigit():
+            return int(text)
+        return number if math.isfinite(number) else text
+    return text
+
+
+@dataclass
+class _Expansion:
+    """Nodes of YAML on their way to plain values."""
+
+    file: str
+    marks: dict[str, tuple[str, int | None]] = field(default_factory=dict)
+    count: int = 0
+    ancestors: set[int] = field(default_factory=set)
+
+    def value(self, node: yaml.Node, path: str) -> Any:
+        line = node.start_mark.line + 1
+        self.marks.setdefault(path, (self.file, line))
+        self.count += 1
+        if self.count > LIMIT:
+            raise InputError("", f"more than {LIMIT} values after expanding aliases", file=self.file, line=line)
+        if node.tag not in _TAGS:
+            raise InputError(path, f"the tag {node.tag} is not allowed", file=self.file, line=line)
+        if isinstance(node, yaml.ScalarNode):
+            return scalar(node.value) if node.style is None else node.value
+        if id(node) in self.ancestors or len(self.ancestors) >= _DEEPEST:
+            raise InputError(path, "nested too deeply, or an alias within itself", file=self.file, line=line)
+        self.ancestors.add(id(node))
+        value = self.mapping(node, path) if isinstance(node, yaml.MappingNode) else self.sequence(node, path)
+        self.ancestors.remove(id(node))
+        return value
+
+    def mapping(self, node: yaml.MappingNode, path: str) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        for key, child in node.value:
+            line = key.start_mark.line + 1
+            if not isinstance(key, yaml.ScalarNode) or key.tag not in _TAGS:
+                raise InputError(path, "a key must be plain text", file=self.file, line=line)
+            here = _join(path, key.value)
+            if key.value in found:
+                raise InputError(here, "given twice", file=self.file, line=line)
+            self.marks[here] = self.file, line
+            found[key.value] = self.value(child, here)
+        return found
+
+    def sequence(self, node: yaml.Node, path: str) -> list[Any]:
+        return [self.value(child, _join(path, i)) for i, child in enumerate(node.value)]
+
+
+def _join(path: str, key: object) -> str:
+    return f"{path}.{key}" if path else str(key)
+
+
+def _plain(value: Any, path: str, depth: int) -> Any:
+    """A copy of nothing but dicts, lists, numbers, booleans, None and strings."""
+    if depth > _DEEPEST:
+        raise InputError(path, "nested too deeply")
+    if isinstance(value, Mapping):
+        for key in value:
+            if not isinstance(key, str):
+                raise InputError(path, f"keys are text, got {show(key)}")
+        return {key: _plain(child, _join(path, key), depth + 1) for key, child in value.items()}
+    if isinstance(value, list | tuple | range) or (isinstance(value, np.ndarray) and value.ndim):
+        return [_plain(child, _join(path, i), depth + 1) for i, child in enumerate(value)]
+    if value is None or isinstance(value, str):
+        return value
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    if isinstance(value, Integral):
+        return int(value)
+    if isinstance(value, Real):
+        return float(value)
+    raise InputError(path, f"{show(value)} cannot stand in a configuration")
+
+
+def _read(file: Path) -> str:
+    try:
+        return file.read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError("", "cannot be read: not a text file in UTF-8", file=str(file)) from None
+    except OSError as error:
+        raise InputError("", f"cannot be read: {error.strerror or error}", file=str(file)) from None
+    except ValueError as error:
+        raise InputError("", f"cannot be read: {error}", file=repr(str(file))) from None

@@ -1,0 +1,133 @@
+"""JSON Schema of the configuration, from what models, laws, drives and methods declare."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from itertools import product
+from typing import Any, get_type_hints
+
+from ringsweep.config import COUNT, TABLE
+from ringsweep.models import MODELS
+from ringsweep.parameters import Parameter, declared
+from ringsweep.physics.drives import DRIVES
+from ringsweep.physics.friction import LAWS
+from ringsweep.scene import Structure, parameters
+from ringsweep.solvers import METHODS
+
+
+def schema() -> dict[str, Any]:
+    """JSON Schema (2020-12) that every valid configuration satisfies.
+
+    Editors complete and explain keys from it. It does not know what depends on several values at
+    once, nor units; :func:`ringsweep.config.load` does.
+    """
+    known: dict[str, list[Parameter]] = {}
+    for model, law, drive, arcs in product(MODELS, LAWS, DRIVES, ((), ("zone",), ("zones.0",))):
+        for path, parameter in parameters(Structure(model, law, drive, arcs)).items():
+            meanings = known.setdefault(path, [])
+            if parameter not in meanings:
+                meanings.append(parameter)
+    leaves = {path: _any_of([_number(parameter) for parameter in meanings]) for path, meanings in known.items()}
+    scene = _nest(
+        {
+            "model": _names(MODELS, "what moves"),
+            "friction.law": _names(LAWS, "friction law"),
+            "drive.law": _names(DRIVES, "how the ring is driven"),
+            "drive.file": {"type": "string", "description": "CSV file with columns t (s), theta (rad)"},
+            **{f"drive.{name}": _list(_number(parameter)) for name, parameter in TABLE.items()},
+            **leaves,
+        }
+    )
+    scene["required"] = ["model", "friction"]
+    scene["properties"]["friction"]["required"] = ["law"]
+    scene["properties"]["drive"]["required"] = ["law"]
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "ringsweep configuration",
+        **_section({"scene": scene, "solver": _solver(), "sweep": _sweep(list(known))}),
+        "required": ["scene"],
+    }
+
+
+def _number(parameter: Parameter, kind: str = "number") -> dict[str, Any]:
+    about = parameter.long_name
+    if parameter.unit not in ("", "1"):
+        about += f", {parameter.unit}"
+    if parameter.default is not None:
+        about += f" (default {parameter.default:g})"
+    bounds: dict[str, Any] = {"type": kind}
+    if math.isfinite(parameter.lower):
+        bounds["exclusiveMinimum" if parameter.open_lower else "minimum"] = parameter.lower
+    if math.isfinite(parameter.upper):
+        bounds["exclusiveMaximum" if parameter.open_upper else "maximum"] = parameter.upper
+    return {"description": about, "anyOf": [bounds, {"type": "string"}]}
+
+
+def _names(registry: Mapping[str, Any], about: str) -> dict[str, Any]:
+    choices = [{"const": name, "description": (entry.__doc__ or "").split("\n")[0]} for name, entry in registry.items()]
+    return {"description": about, "type": "string", "oneOf": choices}
+
+
+def _nest(leaves: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
+    """Schema of nested sections from schemas by dotted path; the key ``0`` stands for items of a list."""
+    groups: dict[str, dict[str, dict[str, Any]]] = {}
+    for path, leaf in leaves.items():
+        key, _, rest = path.partition(".")
+        groups.setdefault(key, {})[rest] = leaf
+    children = {key: group[""] if "" in group else _nest(group) for key, group in groups.items()}
+    return _list(children["0"]) if "0" in children else _section(children)
+
+
+def _section(properties: Mapping[str, Any]) -> dict[str, Any]:
+    return {"type": "object", "properties": dict(properties), "additionalProperties": False}
+
+
+def _list(items: dict[str, Any]) -> dict[str, Any]:
+    return {"type": "array", "items": items, "minItems": 1}
+
+
+def _any_of(options: list[dict[str, Any]]) -> dict[str, Any]:
+    return options[0] if len(options) == 1 else {"anyOf": options}
+
+
+def _solver() -> dict[str, Any]:
+    methods: list[dict[str, Any]] = [{"type": "string", "enum": list(METHODS)}]
+    method: Any
+    for name, method in METHODS.items():
+        numbers, hints = declared(method), get_type_hints(method)
+        options: dict[str, Any] = {"method": {"const": name, "description": (method.__doc__ or "").split("\n")[0]}}
+        for option in dataclasses.fields(method):
+            if option.name in numbers:
+                kind = "integer" if hints[option.name] is int else "number"
+                options[option.name] = _number(numbers[option.name], kind)
+            else:
+                options[option.name] = {"type": "boolean"}
+        methods.append({**_section(options), "required": ["method"]})
+    return {"description": "how time advances", "anyOf": methods}
+
+
+def _sweep(paths: list[str]) -> dict[str, Any]:
+    value = {"type": ["number", "string"]}
+    arcs = "|".join(path.removeprefix("zones.0.") for path in paths if path.startswith("zones.0."))
+    names = {"anyOf": [{"enum": paths}, {"pattern": rf"^zones\.[0-9]+\.({arcs})$"}]}
+    bounds = {"type": "array", "prefixItems": [value, value, _number(COUNT, "integer")], "minItems": 3, "maxItems": 3}
+    axis = {"anyOf": [_list(value), *(_section({kind: bounds}) for kind in ("linspace", "geomspace"))]}
+    return _section(
+        {
+            "grid": {
+                "description": "path -> values; every combination is run",
+                "type": "object",
+                "propertyNames": names,
+                "additionalProperties": axis,
+            },
+            "points": {
+                "description": "CSV file whose columns are paths and whose rows are runs, or its columns",
+                "anyOf": [
+                    {"type": "string"},
+                    {"type": "object", "propertyNames": names, "additionalProperties": _list(value)},
+                ],
+            },
+        }
+    )

@@ -1,0 +1,154 @@
+"""Numbers as people write them: plain ones are SI, strings may carry a unit."""
+
+from __future__ import annotations
+
+import math
+import re
+import reprlib
+from functools import cache, lru_cache
+from numbers import Real
+from typing import Any
+
+from ringsweep.errors import InputError
+from ringsweep.parameters import Parameter
+
+NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+
+_NOT_FINITE = re.compile(r"[-+]?\.?(nan|inf|infinity)", re.IGNORECASE)
+_WORD = r"[A-Za-zµμ°%]+(?:(?:\^|\*\*)?-?[0-9])?"
+_UNIT = re.compile(rf"(?:1\s*/\s*)?{_WORD}(?:(?:\s*[*/·]\s*|\s+){_WORD})*")
+_LONGEST = 100
+
+# Pint's own registry takes the radian for a pure number: 5 Hz would become 5 rad/s, and 30 rpm 3.14 Hz.
+_UNITS = """
+kilo- = 1e3 = k-
+mega- = 1e6 = M-
+centi- = 1e-2 = c-
+milli- = 1e-3 = m-
+micro- = 1e-6 = µ- = μ- = u-
+nano- = 1e-9 = n-
+meter = [length] = m = metre
+second = [time] = s = sec
+gram = [mass] = g
+radian = [angle] = rad
+degree = 0.017453292519943295 radian = deg = °
+turn = 6.283185307179586 radian = _ = rev = revolution
+minute = 60 second = min
+hour = 3600 second = h
+revolutions_per_minute = turn / minute = rpm
+hertz = 1 / second = Hz
+newton = kilogram * meter / second ** 2 = N
+joule = newton * meter = J
+percent = 0.01 = %
+inch = 0.0254 meter = in
+foot = 0.3048 meter = ft
+pound = 0.45359237 kilogram = lb
+"""
+
+
+def quantity(value: Any, parameter: Parameter, path: str) -> float:
+    """A value as it was given, in the unit of its parameter.
+
+    Parameters
+    ----------
+    value : object
+        A plain number (SI), or a string with a number and, where it has one, a unit.
+    parameter : Parameter
+        Gives the unit, and the interval that the result must lie in.
+    path : str
+        Where the value stands, for messages.
+
+    Raises
+    ------
+    InputError
+        If `value` is not a finite number, its unit does not fit, or it lies outside the interval.
+    """
+    number = _convert(value, parameter, path)
+    if parameter.allows(number):
+        return number
+    unit = f" {parameter.unit}" if parameter.unit not in ("", "1") else ""
+    plain = not isinstance(value, str) or NUMBER.fullmatch(value.strip())
+    if plain and parameter.unit == "rad" and abs(number) > parameter.upper > 0.0:
+        raise InputError(path, f"{number:g} rad is beyond {_in_turns(parameter.upper)}: was `{number:g} deg` meant?")
+    shown = f"{number:g}{unit}" if plain else f"{show(value)} ({number:g}{unit})"
+    raise InputError(path, f"{shown} is not allowed: {parameter.long_name} must be {parameter.interval}{unit}")
+
+
+def show(value: Any) -> str:
+    """A value as messages quote it: on one line and not long."""
+    return "nothing" if value is None else reprlib.repr(value)
+
+
+def _convert(value: Any, parameter: Parameter, path: str) -> float:
+    """A finite number in the parameter's unit."""
+    wanted = f"{parameter.long_name} is a number" + (f" in {parameter.unit}" if parameter.unit not in ("", "1") else "")
+    unit = None
+    if isinstance(value, str):
+        text = value.strip()
+        match = NUMBER.match(text) if len(text) <= _LONGEST else None
+        if match is None and not _NOT_FINITE.fullmatch(text):
+            raise InputError(path, f"{show(value)} is not a number: {wanted}")
+        number = float(match.group()) if match else math.nan
+        unit = text[match.end() :].strip() if match else None
+    elif isinstance(value, Real) and not isinstance(value, bool):
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf
+    else:
+        raise InputError(path, f"{show(value)} is not a number: {wanted}")
+    if unit:
+        number *= _factor_or_refusal(unit, value, parameter, path)
+    if not math.isfinite(number):
+        raise InputError(path, f"{show(value)} is not finite: {wanted}")
+    return number
+
+
+def _factor_or_refusal(unit: str, value: str, parameter: Parameter, path: str) -> float:
+    if not parameter.unit:
+        raise InputError(path, f"{show(value)} has a unit, but {parameter.long_name} takes a plain number")
+    try:
+        return _factor(unit, parameter.unit)
+    except LookupError:
+        raise InputError(path, f"{show(value)}: {show(unit)} is not a known unit") from None
+    except ValueError:
+        target = "has no unit" if parameter.unit == "1" else f"is in {parameter.unit}"
+        raise InputError(path, f"{show(value)} has the wrong unit: {parameter.long_name} {target}") from None
+
+
+@lru_cache(maxsize=256)
+def _factor(unit: str, target: str) -> float:
+    """Factor from `unit` to `target`; LookupError if it is unknown, ValueError if it does not fit."""
+    if unit == target:
+        return 1.0
+    if not _UNIT.fullmatch(unit):
+        raise LookupError
+    registry = _registry()
+    try:
+        source = registry.Quantity(1.0, _parsed(unit))
+    except Exception:
+        # On text that is no unit pint fails in more ways than its own errors cover.
+        raise LookupError from None
+    if not source.is_compatible_with(_parsed(target)):
+        raise ValueError
+    return float(source.to(_parsed(target)).magnitude)
+
+
+def _parsed(unit: str) -> Any:
+    # CF writes powers as "rad s-1".
+    powers = re.sub(r"(?<=[A-Za-zµμ°%])(-?[0-9])", r"^\1", unit)
+    return _registry().parse_units("" if powers == "1" else powers)
+
+
+@cache
+def _registry() -> Any:
+    # Most configurations do without: pint takes longer to import than a small sweep to run.
+    import pint
+
+    return pint.UnitRegistry(_UNITS.strip().splitlines())
+
+
+def _in_turns(angle: float) -> str:
+    """An angle as a multiple of pi, where it is a simple one."""
+    names = {0.5: "pi/2", 1.0: "pi", 2.0: "2 pi"}
+    return names.get(angle / math.pi, f"{angle:g}")
