@@ -1,0 +1,199 @@
+"""Sweeps: cells to chunks, chunks to workers, outcomes to a dataset."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import platform
+import sys
+from collections.abc import Iterator, Mapping
+from importlib.metadata import version
+from typing import Any
+
+import joblib
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from tqdm.auto import tqdm
+
+from ringsweep.config import Axes, Config, load, read_axes, read_scene, read_solver
+from ringsweep.jit import SOURCES_DIGEST
+from ringsweep.models import MODELS
+from ringsweep.scene import Scene, Values, batch, parameters
+from ringsweep.solvers.common import Result
+from ringsweep.variables import OUTCOMES
+
+# Large enough that a task is not overhead, small enough that a progress bar moves, that Ctrl-C is
+# heard and that the last tasks are shared out.
+_CELLS_PER_TASK = 64
+
+
+def run(
+    config: str | os.PathLike[str] | Mapping[str, Any], *, jobs: int | None = None, progress: bool = True
+) -> xr.Dataset:
+    """Run the sweep that a configuration describes.
+
+    Parameters
+    ----------
+    config : path or mapping
+        A YAML file, or the mapping that it would hold.
+    jobs : int, optional
+        Threads; all cores unless given.
+    progress : bool
+        Whether to show a progress bar where there is a terminal or a notebook.
+
+    Returns
+    -------
+    xarray.Dataset
+        One dimension per swept path; see :data:`ringsweep.variables.OUTCOMES`.
+
+    Raises
+    ------
+    InputError
+        If the configuration is wrong.
+    """
+    return compute(load(config), jobs=jobs, progress=progress)
+
+
+def sweep(
+    scene: Mapping[str, Any],
+    axes: Mapping[str, Any],
+    *,
+    solver: str | Mapping[str, Any] = "auto",
+    jobs: int | None = None,
+    progress: bool = True,
+) -> xr.Dataset:
+    """Run a scene over axes.
+
+    Parameters
+    ----------
+    scene : mapping
+        The configuration's ``scene``.
+    axes : mapping of str to sequence or xarray.DataArray
+        Values for paths of the scene, such as ``"drive.amplitude"``. A 1-D sequence is a grid axis;
+        ``DataArray`` that share a dimension vary together along it.
+    solver : str or mapping
+        A method's name, or the configuration's ``solver``.
+    jobs, progress
+        As for :func:`run`.
+
+    Returns
+    -------
+    xarray.Dataset
+
+    Raises
+    ------
+    InputError
+        If scene, axes or solver are wrong.
+    """
+    parsed = read_scene(scene, swept=tuple(axes))
+    found = read_axes(parsed, axes)
+    method = {"method": solver} if isinstance(solver, str) else dict(solver)
+    source = {"scene": dict(parsed.source), "solver": method, "sweep": _as_sweep(found)}
+    config = Config(scene=parsed, solver=read_solver(method), axes=found, source=source, name="ringsweep")
+    return compute(config, jobs=jobs, progress=progress)
+
+
+def _as_sweep(axes: Axes) -> dict[str, Any]:
+    """Axes as the configuration would give them; what varies over several dimensions becomes points."""
+    shared = {dim for dims, _ in axes.columns.values() if len(dims) > 1 for dim in dims}
+    names = [dims for dims, _ in axes.columns.values()]
+    shared |= {dims[0] for dims in names if names.count(dims) > 1}
+    grid = {path: values.tolist() for path, (dims, values) in axes.columns.items() if shared.isdisjoint(dims)}
+    sizes = {dim: size for dim, size in axes.sizes.items() if dim in shared}
+    place = dict(zip(sizes, np.indices(tuple(sizes.values())).reshape(len(sizes), -1), strict=True))
+    points = {
+        path: values[tuple(place[dim] for dim in dims)].tolist()
+        for path, (dims, values) in axes.columns.items()
+        if not shared.isdisjoint(dims)
+    }
+    return {name: part for name, part in (("points", points), ("grid", grid)) if part}
+
+
+def compute(config: Config, *, jobs: int | None, progress: bool) -> xr.Dataset:
+    """Run a validated configuration; see :func:`run`."""
+    axes, scene = config.axes, config.scene
+    outcomes = MODELS[scene.structure.model].outcomes
+    total = math.prod(axes.sizes.values())
+    jobs = jobs or joblib.cpu_count()
+    size = max(1, min(_CELLS_PER_TASK, math.ceil(total / (4 * jobs))))
+    chunks = [np.arange(start, min(start + size, total)) for start in range(0, total, size)]
+    parallel = joblib.Parallel(n_jobs=jobs, prefer="threads", return_as="generator_unordered")
+    results = parallel(joblib.delayed(_task)(config, chunk, outcomes) for chunk in chunks)
+
+    columns: dict[str, NDArray[Any]] = {}
+    with _bar(total, progress) as bar:
+        for chunk, result in results:
+            for name, column in _columns(outcomes, result):
+                columns.setdefault(name, np.empty(total))[chunk] = column
+            bar.update(len(chunk))
+    return _dataset(config, columns)
+
+
+def cells(scene: Scene, axes: Axes, indices: NDArray[np.intp]) -> Values:
+    """Values of every path in the cells with these flat indices, each of shape ``(len(indices),)``."""
+    place = dict(zip(axes.sizes, np.unravel_index(indices, tuple(axes.sizes.values()) or (1,)), strict=False))
+    values = {path: np.full(len(indices), value) for path, value in scene.values.items()}
+    for path, (dims, column) in axes.columns.items():
+        values[path] = np.ascontiguousarray(column[tuple(place[dim] for dim in dims)], dtype=float)
+    return values
+
+
+def _task(config: Config, chunk: NDArray[np.intp], outcomes: tuple[str, ...]) -> tuple[NDArray[np.intp], Result]:
+    part = batch(config.scene.structure, cells(config.scene, config.axes, chunk))
+    return chunk, config.solver.run(part, outcomes)
+
+
+def _columns(outcomes: tuple[str, ...], result: Result) -> Iterator[tuple[str, NDArray[Any]]]:
+    yield from zip(outcomes, result.rows.T, strict=True)
+    yield "steps", result.steps
+    yield "certified", result.certified
+    if result.stiffness is not None:
+        yield "stiffness", result.stiffness
+
+
+def _bar(total: int, progress: bool) -> Any:
+    # tqdm takes a notebook's stream for a pipe and would stay silent there.
+    notebook = "ipykernel" in sys.modules
+    return tqdm(total=total, unit="run", disable=(False if notebook else None) if progress else True)
+
+
+def _dataset(config: Config, columns: Mapping[str, NDArray[Any]]) -> xr.Dataset:
+    """Label the columns of a sweep."""
+    axes, scene = config.axes, config.scene
+    model = MODELS[scene.structure.model]
+    known = parameters(scene.structure)
+    shape = tuple(axes.sizes.values())
+    dataset = xr.Dataset(
+        {
+            name: (tuple(axes.sizes), column.reshape(shape).astype(OUTCOMES[name].dtype), OUTCOMES[name].attributes)
+            for name, column in columns.items()
+            if name not in model.absent
+        },
+        coords={
+            path.replace(".", "_"): (
+                dims,
+                column,
+                {"long_name": known[path].long_name, "units": known[path].unit or "1", "path": path},
+            )
+            for path, (dims, column) in axes.columns.items()
+        },
+    )
+    return dataset.assign_attrs(provenance(config))
+
+
+def provenance(config: Config) -> dict[str, Any]:
+    """Attributes from which a file's contents can be computed again."""
+    return {
+        "Conventions": "CF-1.11",
+        "title": f"ringsweep: {MODELS[config.scene.structure.model].doc}",
+        "source": f"ringsweep {version('ringsweep')}",
+        "ringsweep_version": version("ringsweep"),
+        "ringsweep_sources": SOURCES_DIGEST,
+        "versions": json.dumps(
+            {"python": platform.python_version()} | {name: version(name) for name in ("numpy", "numba", "xarray")}
+        ),
+        "method": config.solver.name,
+        "configuration": json.dumps(config.source, sort_keys=True),
+    }
