@@ -1,0 +1,122 @@
+"""The paper's rig, its figures, and the shortest way from values to a run."""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType, SimpleNamespace
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import settings
+
+from ringsweep.models import MODELS
+from ringsweep.scene import Structure, batch, parameters
+from ringsweep.solvers.rk4 import RK4
+
+settings.register_profile("ringsweep", deadline=None, derandomize=True)
+settings.load_profile("ringsweep")
+
+#: Values of the rig by path; the friction is that of Figs. 29 and 30.
+RIG: Mapping[str, float] = MappingProxyType(
+    {
+        "body.mass": 0.076,
+        "body.inertia": 4.47e-5,
+        "body.half_distance": 0.025,
+        "body.ball_radius": 0.010,
+        "ring.radius": 0.043378,
+        "friction.rough.mu_s": 0.5,
+        "friction.rough.mu_k": 0.3,
+        "friction.rest.mu_s": 0.2,
+        "friction.rest.mu_k": 0.1,
+        "friction.alpha": 1e5,
+        "friction.v0": 2e-6,
+        "zone.half_angle": np.radians(15.0),
+        "drive.amplitude": 0.0,
+        "drive.exponent": 1.1,
+        "time.span": 1.0,
+    }
+)
+
+
+class Figure(NamedTuple):
+    """Setting of one of the paper's figures: drive, values other than the rig's, number of steps."""
+
+    drive: str
+    changes: dict[str, float]
+    steps: int
+
+
+def _figure(drive: str, steps: int, span: float, rough: tuple, rest: tuple, alpha: float, v0: float, **more: float):
+    changes = {"time.span": span, "friction.alpha": alpha, "friction.v0": v0}
+    for place, (mu_s, mu_k) in {"rough": rough, "rest": rest}.items():
+        changes |= {f"friction.{place}.mu_s": mu_s, f"friction.{place}.mu_k": mu_k}
+    return Figure(drive, changes | {name.replace("__", "."): value for name, value in more.items()}, steps)
+
+
+FIGURES: Mapping[int, Figure] = MappingProxyType(
+    {
+        25: _figure("arctan", 15000, 10, (0.5, 0.3), (0.3, 0.1), 100, 0.2, drive__amplitude=0.2),
+        26: _figure("arctan", 15000, 10, (0.5, 0.3), (0.2, 0.1), 100, 2e-5, drive__amplitude=0.2),
+        27: _figure("arctan", 15000, 10, (0.5, 0.3), (0.2, 0.1), 1e4, 0.2, drive__amplitude=0.2),
+        28: _figure("arctan", 15000, 10, (0.5, 0.3), (0.2, 0.1), 1e4, 2e-6, drive__amplitude=0.2),
+        29: _figure("arctan", 5000, 10, (0.5, 0.3), (0.2, 0.1), 1e5, 2e-6, drive__amplitude=2),
+        30: _figure("arctan", 15000, 8, (0.5, 0.3), (0.2, 0.1), 1e5, 2e-6, drive__amplitude=10),
+        31: _figure(
+            "power", 5000, 2, (0.5, 0.4), (0.2, 0.1), 1e5, 2e-6, drive__amplitude=20, zone__half_angle=np.pi / 2
+        ),
+        32: _figure("none", 5000, 1, (0.2, 0.15), (0.15, 0.1), 1e5, 2e-6, initial__omega=16),
+        33: _figure("none", 5000, 1, (0.2, 0.15), (0.15, 0.1), 1e5, 2e-6, initial__omega=100),
+    }
+)
+
+
+@pytest.fixture(scope="session")
+def figure() -> Callable[[int], Figure]:
+    """Setting of a figure by its number."""
+    return FIGURES.__getitem__
+
+
+@pytest.fixture(scope="session")
+def cells() -> Callable[..., Any]:
+    """Batch of the rig with `changes` by path; arrays among them make several cells."""
+
+    def build(
+        changes: Mapping[str, Any] | None = None,
+        *,
+        model: str = "ring",
+        law: str = "bengisu-akay",
+        drive: str = "none",
+        arcs: tuple[str, ...] = ("zone",),
+    ) -> Any:
+        structure = Structure(model, law, drive, arcs)
+        known = parameters(structure)
+        values = {path: RIG.get(path, parameter.default) for path, parameter in known.items()} | dict(changes or {})
+        assert values.keys() == known.keys(), "a change that the scene does not know"
+        given = {path: value for path, value in values.items() if value is not None}
+        columns = np.broadcast_arrays(*(np.atleast_1d(np.asarray(value, dtype=float)) for value in given.values()))
+        return batch(structure, {path: column.copy() for path, column in zip(given, columns, strict=True)})
+
+    return build
+
+
+@pytest.fixture(scope="session")
+def run() -> Callable[..., Any]:
+    """Outcomes of a batch under RK4: one array for each outcome, besides those of `Result`."""
+    names = MODELS["ring"].outcomes
+
+    def integrate(batch: Any, steps: int, *, certify: bool = False) -> Any:
+        result = RK4(steps, certify).run(batch, names)
+        return SimpleNamespace(**vars(result), **dict(zip(names, result.rows.T, strict=True)))
+
+    return integrate
+
+
+@pytest.fixture(scope="session")
+def history() -> Callable[..., Any]:
+    """History of a batch's first cell under RK4, at every step: ``t`` and one array for each quantity."""
+    names = MODELS["ring"].history
+
+    def integrate(batch: Any, steps: int) -> Any:
+        t, rows = RK4(steps).history(batch, steps, len(names))
+        return SimpleNamespace(t=t, **dict(zip(names, rows.T, strict=True)))
+
+    return integrate

@@ -1,0 +1,152 @@
+"""The command line where it meets wrong input: one message, status 2, nothing left behind."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from ringsweep.cli import main
+
+TEXT = """\
+scene:
+  model: ring
+  body: {mass: 0.076 kg, inertia: 4.47e-5 kg m^2, half_distance: 25 mm, ball_radius: 10 mm}
+  ring: {radius: 43.378 mm}
+  friction:
+    law: bengisu-akay
+    rough: {mu_s: 0.5, mu_k: 0.3}
+    rest: {mu_s: 0.2, mu_k: 0.1}
+    alpha: 1.0e5
+    v0: 2.0e-6
+  zone: {half_angle: 15 deg}
+  drive: {law: arctan, amplitude: 2.0}
+  time: {span: 10}
+solver: {method: rk4, steps: 1000}
+sweep:
+  grid:
+    drive.amplitude: {geomspace: [0.1, 10, 5]}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "case.yaml").write_text(TEXT)
+    return tmp_path
+
+
+def refused(capsys, *arguments):
+    """The one line that a refused command says."""
+    assert main(arguments) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("ringsweep: ")
+    assert err.count("\n") == 1
+    assert "Traceback" not in err
+    return err
+
+
+WRONG = {
+    "unknown key": ("{radius:", "{radus:", 4, "did you mean `radius`?"),
+    "missing key": ("    v0: 2.0e-6\n", "", 5, "scene.friction.v0: missing"),
+    "wrong unit": ("0.076 kg", "0.076 s", 3, "scene.body.mass"),
+    "degrees taken for radians": ("15 deg", "15", 11, "was `15 deg` meant?"),
+    "negative mass": ("0.076 kg", "-0.076", 3, "greater than 0 kg"),
+    "kinetic beyond static": ("mu_k: 0.1", "mu_k: 0.4", 8, "0.4 exceeds mu_s"),
+    "no stiction band": ("2.0e-6", "0", 10, "scene.friction.v0"),
+    "ring too small": ("43.378 mm", "35 mm", 4, "scene.ring.radius"),
+    "axis of nothing": ("drive.amplitude:", "drive.frequency:", 17, "sweep.grid.drive.frequency"),
+    "empty axis": ("{geomspace: [0.1, 10, 5]}", "[]", 17, "empty"),
+    "not a number": ("span: 10", "span: .nan", 13, "scene.time.span"),
+    "infinite": ("span: 10", "span: .inf", 13, "scene.time.span"),
+    "a tag": ("0.076 kg", "!!python/object/apply:os.system [ls]", 3, "tag"),
+    "contradiction in a cell": (
+        "drive.amplitude: {geomspace: [0.1, 10, 5]}",
+        "friction.rest.mu_s: [1, 0]",
+        8,
+        "a cell",
+    ),
+}
+
+
+@pytest.mark.parametrize(("old", "new", "line", "problem"), WRONG.values(), ids=WRONG)
+def test_wrong_input_ends_with_one_message_and_no_file(folder, capsys, old, new, line, problem):
+    (folder / "case.yaml").write_text(TEXT.replace(old, new))
+    message = refused(capsys, "run", "case.yaml")
+    assert f"case.yaml, line {line}: " in message
+    assert problem in message
+    assert [file.name for file in folder.iterdir()] == ["case.yaml"]
+
+
+def test_a_yaml_bomb_is_refused(folder, capsys):
+    levels = [f"x{i + 1}: &x{i + 1} [{', '.join([f'*x{i}'] * 9)}]" for i in range(9)]
+    (folder / "case.yaml").write_text("\n".join(["x0: &x0 [lol]", *levels]))
+    assert "aliases" in refused(capsys, "run", "case.yaml")
+
+
+def test_a_table_that_runs_backwards_is_refused_with_its_own_line(folder, capsys):
+    (folder / "theta.csv").write_text("t,theta\n0,0\n1,1\n0.5,2\n20,3\n")
+    (folder / "case.yaml").write_text(TEXT.replace("law: arctan", "law: table, file: theta.csv"))
+    assert "theta.csv, line 4: scene.drive.time.2: 0.5 s does not come after 1 s" in refused(capsys, "run", "case.yaml")
+
+
+@pytest.mark.parametrize("verb", ["run", "simulate"])
+@pytest.mark.parametrize("output", ["nowhere/out.nc", "case.yaml/out.nc", ".", "out.png"])
+def test_an_output_that_cannot_be_written_is_refused_before_any_work(folder, capsys, verb, output):
+    assert output in refused(capsys, verb, "case.yaml", "-o", output)
+    assert [file.name for file in folder.iterdir()] == ["case.yaml"]
+
+
+def test_a_file_that_is_no_result_is_not_replaced(folder, capsys):
+    (folder / "notes.nc").write_text("mine")
+    for options in ([], ["--fresh"]):
+        assert "notes.nc" in refused(capsys, "run", "case.yaml", "-o", "notes.nc", *options)
+    assert (folder / "notes.nc").read_text() == "mine"
+
+
+def test_a_wrong_setting_is_refused_with_what_was_typed(folder, capsys):
+    message = refused(capsys, "simulate", "case.yaml", "--set", "body.mas=1")
+    assert "--set body.mas=1: scene.body.mas: unknown key; did you mean `mass`?" in message
+
+
+def test_a_single_run_needs_a_value_for_what_is_swept(folder, capsys):
+    (folder / "case.yaml").write_text(TEXT.replace(", amplitude: 2.0", ""))
+    assert "--set drive.amplitude=VALUE" in refused(capsys, "simulate", "case.yaml")
+
+
+@pytest.mark.parametrize("verb", ["map", "info"])
+def test_a_result_that_is_not_there_is_refused(folder, capsys, verb):
+    assert "nowhere.nc" in refused(capsys, verb, "nowhere.nc")
+
+
+@pytest.mark.parametrize("arguments", [[], ["rum"], ["run"], ["run", "case.yaml", "--jobs", "0"]])
+def test_a_wrong_command_line_has_status_2(capsys, arguments):
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    assert ended.value.code == 2
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "message"),
+    [(KeyboardInterrupt(), 130, "interrupted"), (OSError("disk\nfull"), 1, "OSError: disk full")],
+)
+def test_any_other_end_is_told_in_one_line(monkeypatch, capsys, error, status, message):
+    def fail(path):
+        raise error
+
+    monkeypatch.setattr("ringsweep.storage.load", fail)
+    assert main(["info", "out.nc"]) == status
+    assert capsys.readouterr().err == f"ringsweep: {message}\n"
+
+
+def test_the_schema_is_printed_as_json(capsys):
+    assert main(["schema"]) == 0
+    assert json.loads(capsys.readouterr().out)["title"] == "ringsweep configuration"
+
+
+def test_help_comes_without_the_weight_of_solvers():
+    script = "import sys, ringsweep.cli as c\ntry: c.main(['--help'])\nexcept SystemExit: print('numba' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert "simulate" in done.stdout
+    assert done.stdout.endswith("False\n")

@@ -1,0 +1,563 @@
+"""Configurations: what is read, and what is said where it is wrong."""
+
+import contextlib
+import copy
+import json
+import logging
+import math
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from jsonschema import Draft202012Validator
+
+from ringsweep.config import load, read_axes, read_scene, read_solver, with_values
+from ringsweep.errors import InputError
+from ringsweep.parameters import Parameter
+from ringsweep.schema import schema
+from ringsweep.units import quantity
+
+CONFIGS = Path(__file__).parents[1] / "configs"
+
+TEXT = """\
+scene:
+  model: ring
+  body: {mass: 0.076 kg, inertia: 4.47e-5 kg m^2, half_distance: 25 mm, ball_radius: 10 mm}
+  ring: {radius: 43.378 mm}
+  friction:
+    law: bengisu-akay
+    rough: {mu_s: 0.5, mu_k: 0.3}
+    rest: {mu_s: 0.2, mu_k: 0.1}
+    alpha: 1.0e5
+    v0: 2.0e-6
+  zone:
+    half_angle: 15 deg
+  drive:
+    law: arctan
+    amplitude: 2.0
+  time: {span: 10}
+solver: {method: rk4, steps: 1000}
+sweep:
+  grid:
+    drive.amplitude: {geomspace: [0.1, 10, 5]}
+    zone.half_angle: [2 deg, 0.5]
+"""
+
+SCENE = {
+    "model": "ring",
+    "body": {"mass": "0.076 kg", "inertia": "4.47e-5 kg m^2", "half_distance": "25 mm", "ball_radius": "10 mm"},
+    "ring": {"radius": "43.378 mm"},
+    "friction": {
+        "law": "bengisu-akay",
+        "rough": {"mu_s": 0.5, "mu_k": 0.3},
+        "rest": {"mu_s": 0.2, "mu_k": 0.1},
+        "alpha": 1.0e5,
+        "v0": 2.0e-6,
+    },
+    "zone": {"half_angle": "15 deg"},
+    "drive": {"law": "arctan", "amplitude": 2.0},
+    "time": {"span": 10},
+}
+SOLVER = {"method": "rk4", "steps": 1000}
+
+
+def edited(**changes):
+    """The scene with paths (dots as double underscores) replaced; None takes a key away."""
+    scene = copy.deepcopy(SCENE)
+    for path, value in changes.items():
+        *parents, last = path.split("__")
+        node = scene
+        for key in parents:
+            node = node.setdefault(key, {})
+        if value is None:
+            del node[last]
+        else:
+            node[last] = value
+    return scene
+
+
+@pytest.fixture
+def write(tmp_path):
+    def to_file(text, name="case.yaml"):
+        file = tmp_path / name
+        file.write_text(text, encoding="utf-8")
+        return file
+
+    return to_file
+
+
+def refusal(call, *arguments, **options):
+    with pytest.raises(InputError) as caught:
+        call(*arguments, **options)
+    assert "\n" not in str(caught.value)
+    return caught.value
+
+
+def test_the_example_of_the_contract_is_read_in_si_units(write):
+    config = load(write(TEXT))
+    assert config.name == "case"
+    assert config.scene.values["body.inertia"] == pytest.approx(4.47e-5)
+    assert config.scene.values["ring.radius"] == pytest.approx(0.043378)
+    assert config.scene.values["zone.half_angle"] == pytest.approx(math.radians(15))
+    assert config.scene.values["friction.alpha"] == 1e5
+    assert config.scene.values["gravity"] == 9.81
+    assert config.solver.steps == 1000
+    assert config.axes.sizes == {"drive_amplitude": 5, "zone_half_angle": 2}
+    dims, values = config.axes.columns["zone.half_angle"]
+    assert dims == ("zone_half_angle",)
+    np.testing.assert_allclose(values, [math.radians(2), 0.5])
+
+
+def test_the_source_of_a_configuration_is_json_and_reads_the_same(write):
+    config = load(write(TEXT))
+    again = load(json.loads(json.dumps(config.source)))
+    assert again.scene.values == config.scene.values
+    assert again.source == config.source
+    assert again.axes.sizes == config.axes.sizes
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "expected"),
+    [
+        ("4.47e-5 kg m^2", "kg m^2", 4.47e-5),
+        ("4.47e-5 kg*m**2", "kg m^2", 4.47e-5),
+        ("447 g cm^2", "kg m^2", 4.47e-5),
+        ("43.378 mm", "m", 0.043378),
+        ("15deg", "rad", math.pi / 12),
+        ("30 rpm", "rad/s", math.pi),
+        ("3 rad s-1", "rad/s", 3.0),
+        ("2e-6 m/s", "m/s", 2e-6),
+        ("30 %", "1", 0.3),
+        ("-1.5", "m", -1.5),
+        (np.float32(0.5), "m", 0.5),
+    ],
+)
+def test_units_are_converted(text, unit, expected):
+    assert quantity(text, Parameter(unit, "something"), "path") == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "problem"),
+    [
+        ("15 mm", "kg", "wrong unit"),
+        ("5 Hz", "rad/s", "wrong unit"),
+        ("30 rpm", "Hz", "wrong unit"),
+        ("15 deg", "1", "wrong unit"),
+        ("3 bananas", "m", "not a known unit"),
+        ("3 m^9^9^9", "m", "not a known unit"),
+        ("3 rad", "", "takes a plain number"),
+        ("ten", "m", "is not a number"),
+        ("1 m\n2", "m", "is not a known unit"),
+        ("nan", "m", "not finite"),
+        ("-.inf", "m", "not finite"),
+        ("1e999", "m", "not finite"),
+        (10**400, "m", "not finite"),
+        (True, "m", "is not a number"),
+        (None, "m", "is not a number"),
+        ([1], "m", "is not a number"),
+    ],
+)
+def test_what_is_no_quantity_of_the_unit_is_refused(text, unit, problem):
+    assert problem in refusal(quantity, text, Parameter(unit, "something"), "path").problem
+
+
+BAD_LINES = {
+    "unknown key": ("ring: {radius:", "ring: {radus:", "scene.ring.radus", 4, "did you mean `radius`?"),
+    "unknown section": ("  time:", "  tme:", "scene.tme", 16, "did you mean `time`?"),
+    "unknown law": ("bengisu-akay", "bengisu", "scene.friction.law", 6, "did you mean `bengisu-akay`?"),
+    "missing key": ("    v0: 2.0e-6\n", "", "scene.friction.v0", 5, "missing: half-width of the stiction band"),
+    "wrong unit": ("0.076 kg", "0.076 m", "scene.body.mass", 3, "is in kg"),
+    "degrees taken for radians": ("15 deg", "15", "scene.zone.half_angle", 12, "was `15 deg` meant?"),
+    "negative mass": ("0.076 kg", "-76 g", "scene.body.mass", 3, "must be greater than 0 kg"),
+    "kinetic beyond static": ("mu_k: 0.1", "mu_k: 0.4", "scene.friction.rest.mu_k", 8, "0.4 exceeds mu_s"),
+    "no stiction band": ("2.0e-6", "0", "scene.friction.v0", 10, "must be greater than 0 m/s"),
+    "ring too small": ("43.378 mm", "35 mm", "scene.ring.radius", 4, "too small"),
+    "not a number": ("0.076 kg", ".nan", "scene.body.mass", 3, "not finite"),
+    "infinite": ("0.076 kg", ".inf", "scene.body.mass", 3, "not finite"),
+    "a section that is none": ("{span: 10}", "10", "scene.time", 16, "a section is expected"),
+    "given twice": ("    alpha: 1.0e5", "    v0: 1.0e5", "scene.friction.v0", 10, "given twice"),
+    "a tag": ("0.076 kg", "!!python/object:os.system x", "scene.body.mass", 3, "tag"),
+    "axis of nothing": (
+        "drive.amplitude: {",
+        "drive.amplitud: {",
+        "sweep.grid.drive.amplitud",
+        20,
+        "`drive.amplitude`",
+    ),
+    "empty axis": ("[2 deg, 0.5]", "[]", "sweep.grid.zone.half_angle", 21, "empty"),
+    "axis value out of its interval": ("[2 deg, 0.5]", "[2 deg, 60]", "sweep.grid.zone.half_angle.1", 21, "60 deg"),
+    "geomspace from zero": ("[0.1, 10, 5]", "[0, 10, 5]", "sweep.grid.drive.amplitude.geomspace", 20, "greater than 0"),
+    "fractional count": ("[0.1, 10, 5]", "[1, 10, 5.5]", "sweep.grid.drive.amplitude.geomspace.2", 20, "whole number"),
+    "unknown option": ("steps: 1000", "stps: 1000", "solver.stps", 17, "did you mean `steps`?"),
+    "no steps": (", steps: 1000", "", "solver.steps", 17, "missing"),
+    "key of many levels in one": ("time: {span: 10}", "time.span: 10", "scene.time.span", 16, "unknown key"),
+}
+
+
+@pytest.mark.parametrize(("old", "new", "path", "line", "problem"), BAD_LINES.values(), ids=BAD_LINES)
+def test_wrong_input_is_refused_with_path_line_and_remedy(write, old, new, path, line, problem):
+    assert TEXT.count(old) == 1 or old in ("15 deg", "[0.1, 10, 5]")
+    file = write(TEXT.replace(old, new))
+    error = refusal(load, file)
+    assert (error.path, error.file, error.line) == (path, str(file), line)
+    assert problem in error.problem
+
+
+def test_values_that_contradict_each_other_only_in_some_cell_are_refused(write):
+    file = write(TEXT.replace("drive.amplitude: {geomspace: [0.1, 10, 5]}", "friction.rough.mu_s: [0.5, 0.6, 0.25]"))
+    error = refusal(load, file)
+    assert error.path == "scene.friction.rough.mu_k"
+    assert "0.3 exceeds mu_s" in error.problem
+    assert "in a cell of the sweep" in error.problem
+
+
+def test_a_contradiction_in_a_swept_value_points_at_the_axis(write):
+    file = write(TEXT.replace("drive.amplitude: {geomspace: [0.1, 10, 5]}", "ring.radius: [30 mm, 50 mm]"))
+    error = refusal(load, file)
+    assert (error.path, error.line) == ("scene.ring.radius", 20)
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        (b"", "is empty"),
+        (b"- 1\n", "holds no mapping"),
+        (b"a: 1\n---\nb: 2\n", "document"),
+        (b"scene: {a: [1, 2\n", "not valid YAML"),
+        (b'scene: "\\UFFFFFFFF"\n', "not valid YAML"),
+        (b"\xff\xfe\x00", "UTF-8"),
+        (b"scene: \x00\n", "not valid YAML"),
+        (b"scene: &a {b: *a}\n", "alias within itself"),
+        (b"[" * 5000, "nested too deeply"),
+        (b"scnee: {}\n", "did you mean `scene`?"),
+        (b"? [1, 2]\n: 3\n", "a key must be plain text"),
+        (b"{}\n", "missing"),
+        (
+            b"a: &a [x, x, x, x, x, x, x, x, x, x]\n"
+            + b"".join(f"{q}: &{q} [{', '.join([f'*{p}'] * 10)}]\n".encode() for p, q in pairwise("abcdef")),
+            "after expanding aliases",
+        ),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_text_that_is_no_configuration_is_refused(tmp_path, content, problem):
+    file = tmp_path / "bad.yaml"
+    file.write_bytes(content)
+    error = refusal(load, file)
+    assert error.file == str(file)
+    assert problem in error.problem
+
+
+@pytest.mark.parametrize("name", ["nowhere.yaml", ".", "nul\0.yaml"])
+def test_what_cannot_be_read_is_refused(tmp_path, name):
+    assert "cannot be read" in refusal(load, f"{tmp_path}/{name}").problem
+
+
+def test_a_value_may_be_left_to_the_sweep_but_not_to_a_single_run(write):
+    file = write(TEXT.replace("    amplitude: 2.0\n", ""))
+    assert "drive.amplitude" not in load(file).scene.values
+    assert "--set drive.amplitude=VALUE" in refusal(with_values, file).problem
+    assert with_values(file, ["drive.amplitude=3"]).scene.values["drive.amplitude"] == 3.0
+
+
+def test_settings_change_scene_and_solver_and_drop_the_sweep(write):
+    config = with_values(write(TEXT), ["zone.half_angle = 20 deg", "solver.steps=50", "classify.epsilon_omega=0.1"])
+    assert config.scene.values["zone.half_angle"] == pytest.approx(math.radians(20))
+    assert config.scene.values["classify.epsilon_omega"] == 0.1
+    assert config.solver.steps == 50
+    assert not config.axes.sizes
+    assert "sweep" not in config.source
+
+
+@pytest.mark.parametrize(
+    ("setting", "problem"),
+    [
+        ("drive.amplitude", "PATH=VALUE"),
+        ("drive.amplitud=3", "did you mean `amplitude`?"),
+        ("body.mass=-1", "greater than 0"),
+        ("body.mass.kg=1", "cannot be set"),
+        ("zones.3.mu_s=1", "list of arcs"),
+        ("scene=1", "a section with keys"),
+    ],
+)
+def test_a_wrong_setting_is_refused_by_its_own_text(write, setting, problem):
+    assert problem in str(refusal(with_values, write(TEXT), [setting]))
+
+
+def test_values_of_another_law_are_dropped_with_a_warning(caplog):
+    with caplog.at_level(logging.WARNING, logger="ringsweep"):
+        scene = read_scene(edited(friction__law="coulomb"))
+    assert {record.args[0] for record in caplog.records} == {
+        "friction.alpha",
+        "friction.v0",
+        "friction.rough.mu_s",
+        "friction.rest.mu_s",
+    }
+    assert "friction.alpha" not in scene.values
+    assert "friction.rest.mu_k" in refusal(read_axes, scene, {"friction.rest.mu_s": [0.1]}).problem
+
+
+def test_several_arcs_stand_in_place_of_one_zone():
+    arcs = [{"center": f"{i} deg", "half_angle": "0.5 deg", "mu_s": 0.5, "mu_k": 0.3} for i in range(0, 200, 2)]
+    scene = read_scene(edited(zone=None, friction__rough=None, zones=arcs))
+    assert scene.structure.arcs == tuple(f"zones.{i}" for i in range(100))
+    assert scene.values["zones.99.center"] == pytest.approx(math.radians(198))
+    axes = read_axes(scene, {"zones.1.mu_s": [0.4, 0.5]})
+    assert axes.sizes == {"zones_1_mu_s": 2}
+
+
+@pytest.mark.parametrize(
+    ("changes", "path", "problem"),
+    [
+        ({"zones": [{"half_angle": 0.1, "mu_s": 0.5, "mu_k": 0.3}]}, "scene.zone", "beside zones"),
+        ({"zone": None, "zones": []}, "scene.zones", "list of arcs"),
+        ({"zone": None, "zones": [{"mu_s": 0.5}], "friction__rough": None}, "scene.zones.0.mu_k", "missing"),
+        ({"zone": None}, "scene.friction.rough.mu_s", "no rough zone"),
+        ({"friction__rough": None}, "scene.friction.rough.mu_s", "missing"),
+        ({"friction": None}, "scene.friction", "missing"),
+        ({"model": None}, "scene.model", "missing: name a model"),
+        ({"model": ["ring"]}, "scene.model", "is not a model"),
+        ({"ring": None}, "scene.ring.radius", "body.beta"),
+        ({"body__beta": 48.504}, "scene.body.beta", "beyond pi/2"),
+        ({"body__beta": 0.5}, "scene.body.beta", "contradicts"),
+        ({"drive": "arctan"}, "scene.drive", "section"),
+        ({"drive": {"law": "table", "file": 3}}, "scene.drive.file", "file name"),
+        ({"initial__phi": {"deg": 3}}, "scene.initial.phi", "is not a number"),
+    ],
+)
+def test_a_scene_that_cannot_be_is_refused(changes, path, problem):
+    error = refusal(read_scene, edited(**changes))
+    assert error.path == path
+    assert problem in error.problem
+
+
+def test_a_missing_drive_is_a_ring_at_rest():
+    assert read_scene(edited(drive=None)).structure.drive == "none"
+
+
+def table(write, rows, header="t (s), theta (rad)"):
+    file = write("\n".join([header, *rows, ""]), "theta.csv")
+    return edited(drive={"law": "table", "file": str(file)}, time__span=0.3), file
+
+
+ROWS = ["-0.1, 0", "0.1, 0.5", "", "0.2, 0.8", "0.4, 0.9"]
+
+
+def test_a_tabulated_drive_moves_into_the_configuration(write):
+    scene, file = table(write, ROWS)
+    first = read_scene(scene)
+    file.unlink()
+    assert first.source["drive"] == {
+        "law": "table",
+        "time": ["-0.1 s", "0.1 s", "0.2 s", "0.4 s"],
+        "theta": ["0 rad", "0.5 rad", "0.8 rad", "0.9 rad"],
+    }
+    again = read_scene(first.source)
+    np.testing.assert_array_equal(again.structure.table, first.structure.table)
+    assert again.values["drive.amplitude"] == 1.0
+
+
+def test_units_in_the_header_of_a_table_are_heeded(write):
+    scene, _ = table(write, ["0, 0", "100, 30", "200, 60", "400, 90"], header="time (ms), theta (deg)")
+    times, angles = read_scene(scene).structure.table
+    np.testing.assert_allclose(times, [0, 0.1, 0.2, 0.4])
+    np.testing.assert_allclose(angles, np.radians([0, 30, 60, 90]))
+
+
+@pytest.mark.parametrize(
+    ("rows", "header", "line", "problem"),
+    [
+        ([*ROWS, "0.3, 1"], "t, theta", 7, "does not come after"),
+        (["0, 0", "0.1, x", "0.2, 0", "0.4, 0"], "t, theta", 3, "is not a number"),
+        (["0, 0", "0.1, nan", "0.2, 0", "0.4, 0"], "t, theta", 3, "not finite"),
+        (["0, 0", "0.1", "0.2, 0", "0.4, 0"], "t, theta", 3, "1 cells under 2 columns"),
+        (["0.1, 0", "0.2, 0", "0.3, 0", "0.4, 0"], "t, theta", 2, "begins at 0.1 s"),
+        (ROWS[:3], "t, theta", None, "too few"),
+        (ROWS, "t, phi", None, "columns t, theta"),
+        (ROWS, "t, t", 1, "taken"),
+    ],
+)
+def test_a_wrong_table_is_refused_with_its_line(write, rows, header, line, problem):
+    scene, file = table(write, rows, header)
+    error = refusal(load, {"scene": scene, "solver": SOLVER})
+    assert problem in error.problem
+    if line is not None:
+        assert (error.file, error.line) == (str(file), line)
+
+
+def test_a_table_that_is_not_there_is_refused_at_its_name(write):
+    error = refusal(load, write(TEXT.replace("law: arctan", "law: table\n    file: nowhere.csv")))
+    assert (error.path, error.line) == ("scene.drive.file", 15)
+    assert "nowhere.csv cannot be read" in error.problem
+
+
+def test_a_table_shorter_than_the_run_is_refused(write):
+    scene, _ = table(write, ROWS)
+    scene["time"]["span"] = 1
+    assert "table of the drive" in refusal(read_scene, scene).problem
+
+
+def test_points_share_one_dimension_and_combine_with_a_grid(write):
+    write("drive.amplitude, ring.radius\n1, 50 mm\n2, 0.06\n3, 70 mm\n", "cells.csv")
+    config = load(write(TEXT.replace("    drive.amplitude: {geomspace: [0.1, 10, 5]}\n", "") + "  points: cells.csv\n"))
+    assert config.axes.sizes == {"point": 3, "zone_half_angle": 2}
+    dims, radii = config.axes.columns["ring.radius"]
+    assert dims == ("point",)
+    np.testing.assert_allclose(radii, [0.05, 0.06, 0.07])
+    assert load(json.loads(json.dumps(config.source))).axes.sizes == config.axes.sizes
+
+
+def test_points_are_checked_row_by_row(write):
+    file = write("drive.amplitude, ring.radius\n1, 50 mm\n2, 60 deg\n", "cells.csv")
+    config = write(TEXT.split("  grid:")[0] + "  points: cells.csv\n")
+    error = refusal(load, config)
+    assert (error.file, error.line, error.path) == (str(file), 3, "sweep.points.ring.radius.1")
+
+
+def test_a_path_varies_in_one_place_only(write):
+    write("drive.amplitude\n1\n", "cells.csv")
+    assert "one place only" in refusal(load, write(TEXT + "  points: cells.csv\n")).problem
+
+
+def test_sequences_make_grid_axes_and_dataarrays_share_their_dimensions():
+    scene = read_scene(SCENE, swept=("ring.radius",))
+    axes = read_axes(
+        scene,
+        {
+            "drive.amplitude": np.linspace(1, 2, 3),
+            "zone.half_angle": xr.DataArray([10.0, 20.0], dims="case", attrs={"units": "deg"}),
+            "ring.radius": xr.DataArray([[0.05, 0.06, 0.07], [0.06, 0.07, 0.08]], dims=("case", "other")),
+        },
+    )
+    assert axes.sizes == {"drive_amplitude": 3, "case": 2, "other": 3}
+    np.testing.assert_allclose(axes.columns["zone.half_angle"][1], np.radians([10, 20]))
+    assert axes.columns["ring.radius"][0] == ("case", "other")
+
+
+@pytest.mark.parametrize(
+    ("axes", "problem"),
+    [
+        ({"drive.amplitud": [1]}, "did you mean `drive.amplitude`?"),
+        ({"drive.amplitude": []}, "empty"),
+        ({"drive.amplitude": [1, math.nan]}, "not finite"),
+        ({"drive.amplitude": [1, math.inf]}, "not finite"),
+        ({"drive.amplitude": 3.0}, "list of values"),
+        ({"drive.amplitude": "123"}, "list of values"),
+        ({"drive.amplitude": np.ones((2, 2))}, "list of numbers"),
+        ({"drive.amplitude": [[1, 2], [3, 4]]}, "is not a number"),
+        ({"drive.amplitude": np.array([True])}, "list of numbers"),
+        ({"drive.amplitude": xr.DataArray(1.0)}, "without dimensions"),
+        ({"drive.amplitude": xr.DataArray([1.0], dims="regime")}, "name of a variable"),
+        (
+            {"drive.amplitude": xr.DataArray([1.0], dims="p"), "ring.radius": xr.DataArray([0.05, 0.06], dims="p")},
+            "2 values along p",
+        ),
+        ({"friction.rough.mu_k": [0.1, 0.7]}, "exceeds mu_s"),
+        ({3: [1]}, "no such number"),
+    ],
+)
+def test_wrong_axes_are_refused(axes, problem):
+    assert problem in refusal(read_axes, read_scene(SCENE), axes).problem
+
+
+def test_a_million_cells_are_checked_at_the_corners_of_the_grid():
+    axes = {path: np.linspace(0.1, 0.2, 1000) for path in ("friction.rough.mu_k", "friction.rough.mu_s")}
+    assert "exceeds mu_s" in refusal(read_axes, read_scene(SCENE), axes).problem
+
+
+def test_a_method_is_read_with_its_options():
+    solver = read_solver({"method": "rk4", "steps": 10, "certify": False})
+    assert (solver.steps, solver.certify) == (10, False)
+    assert "needs it" in refusal(read_solver, "rk4").problem
+    assert "did you mean `rk4`?" in refusal(read_solver, "rk45").problem
+    assert "true or false" in refusal(read_solver, {"method": "rk4", "steps": 10, "certify": "yes"}).problem
+
+
+def test_the_schema_is_one_and_accepts_what_is_accepted(write):
+    Draft202012Validator.check_schema(schema())
+    validator = Draft202012Validator(schema())
+    scene, _ = table(write, ROWS)
+    arcs = [{"half_angle": 0.1, "mu_s": 0.5, "mu_k": 0.3}]
+    for config in (
+        load(write(TEXT)).source,
+        {"scene": scene, "solver": SOLVER},
+        {"scene": dict(read_scene(scene).source), "solver": SOLVER},
+        {"scene": edited(zone=None, zones=arcs, friction__rough=None), "solver": SOLVER},
+        {"scene": SCENE, "solver": SOLVER, "sweep": {"points": {"drive.amplitude": [1, "2"]}}},
+    ):
+        load(config)
+        validator.validate(config)
+
+
+@pytest.mark.parametrize("file", sorted(CONFIGS.rglob("*.yaml")), ids=lambda file: file.stem)
+def test_every_configuration_of_the_package_is_valid(file):
+    Draft202012Validator(schema()).validate(load(file).source)
+
+
+@pytest.mark.parametrize(
+    "changes", [{"body__mas": 1}, {"friction__law": "bengisu"}, {"body__mass": -1}, {"zones": []}, {"body": 3}]
+)
+def test_the_schema_refuses_what_an_editor_can_see(changes):
+    assert not Draft202012Validator(schema()).is_valid({"scene": edited(**changes)})
+
+
+JUNK = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner, max_size=3),
+    max_leaves=8,
+)
+PATHS = st.sampled_from(
+    [
+        *("model", "body", "body__mass", "friction", "friction__law", "friction__rough", "zone", "zones"),
+        *("zone__half_angle", "ring__radius", "drive", "drive__law", "drive__time", "drive__file"),
+        *("initial", "time", "gravity", "unknown"),
+    ]
+)
+
+
+def accepted_or_refused(call, *arguments):
+    with contextlib.suppress(InputError):
+        call(*arguments)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.dictionaries(PATHS, JUNK.filter(lambda value: value is not None), max_size=3), JUNK, JUNK)
+def test_junk_in_a_configuration_is_accepted_or_refused_but_never_crashes(changes, solver, sweep):
+    scene = copy.deepcopy(SCENE)
+    for path, value in changes.items():
+        section, _, key = path.partition("__")
+        if key and isinstance(scene.get(section), dict):
+            scene[section][key] = value
+        else:
+            scene[section] = value
+    accepted_or_refused(load, {"scene": scene, "solver": SOLVER})
+    accepted_or_refused(load, {"scene": scene, "solver": SOLVER, "sweep": sweep})
+    accepted_or_refused(load, {"scene": SCENE, "solver": solver, "sweep": {"grid": sweep}})
+    accepted_or_refused(load, {"scene": SCENE, "solver": SOLVER, "sweep": {"grid": {"gravity": sweep}}})
+
+
+@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.text(max_size=60)
+    | st.text("{}[]:,-&*a!|>'\"%#? \n\t1", max_size=60)
+    | st.just(TEXT).flatmap(
+        lambda text: st.tuples(st.integers(0, len(text)), st.integers(0, 30), st.text(max_size=5)).map(
+            lambda cut: text[: cut[0]] + cut[2] + text[cut[0] + cut[1] :]
+        )
+    )
+)
+def test_any_text_is_accepted_or_refused_but_never_crashes(tmp_path, text):
+    file = tmp_path / "any.yaml"
+    file.write_bytes(text.encode("utf-8", "surrogatepass"))
+    accepted_or_refused(load, file)
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.text(max_size=12) | st.from_regex(r"[0-9]{1,2} ?[a-zA-Zµ°%^*/·0-9 -]{0,8}", fullmatch=True))
+def test_any_text_is_a_quantity_or_refused(text):
+    accepted_or_refused(quantity, text, Parameter("m/s", "speed"), "path")
+    accepted_or_refused(quantity, text, Parameter("1", "ratio"), "path")

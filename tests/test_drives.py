@@ -1,0 +1,110 @@
+"""How the ring is turned: angle, rate and acceleration belong together in every drive."""
+
+from math import atan, inf, log, radians
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import quad
+
+from ringsweep.errors import InputError
+from ringsweep.jit import take
+from ringsweep.physics.drives import DRIVES, Arctan, Constant, Power, Sinusoidal, Still, build, lookup, shape
+
+KNOTS = np.array([0.0, 0.4, 0.5, 1.1, 2.0, 3.0])
+
+
+def tabulated(angles, times=KNOTS, amplitude=1.0):
+    values = {"drive.amplitude": np.array([amplitude]), "time.span": np.array([times[-1]])}
+    return take(build("table", (times, np.asarray(angles, dtype=float)), values), 0)
+
+
+SAMPLES = [
+    Still(),
+    Constant(3.0),
+    Arctan(2.0),
+    Power(20.0, 1.1),
+    Power(1.0, 2.0),
+    Power(1.0, 3.7),
+    Sinusoidal(0.3, 0.7, 0.2),
+    tabulated(np.sin(2 * KNOTS)),
+]
+
+
+def test_every_drive_is_sampled():
+    assert {type(drive) for drive in SAMPLES} == set(DRIVES.values())
+
+
+@pytest.mark.parametrize("drive", SAMPLES, ids=repr)
+class TestDerivatives:
+    """Rate and acceleration are what finite differences of angle and rate say."""
+
+    TIMES = np.linspace(0.05, 2.95, 30)
+    STEP = 1e-5
+
+    @pytest.mark.parametrize("order", [1, 2])
+    def test_each_is_the_derivative_of_the_one_before(self, drive, order):
+        for t in self.TIMES:
+            before, after = shape(drive, t - self.STEP), shape(drive, t + self.STEP)
+            difference = (after[order - 1] - before[order - 1]) / (2 * self.STEP)
+            assert shape(drive, t)[order] == pytest.approx(difference, rel=1e-6, abs=1e-6)
+
+
+class TestArctan:
+    """The paper's run-up."""
+
+    def test_angle_is_h(self):
+        for t in (0.0, 0.3, 1.0, 10.0):
+            assert shape(Arctan(1.0), t)[0] == pytest.approx(t * atan(t) - 0.5 * log(1 + t * t), abs=1e-15)
+            assert shape(Arctan(1.0), t)[0] == pytest.approx(quad(atan, 0.0, t)[0], abs=1e-12)
+
+    def test_rate_is_arctan(self):
+        assert shape(Arctan(1.0), 5.0)[1] == atan(5.0)
+
+
+class TestPowerAtTheStart:
+    @pytest.mark.parametrize(
+        ("exponent", "at_rest"),
+        [(1.0, (0.0, 1.0, 0.0)), (1.1, (0.0, 0.0, inf)), (2.0, (0.0, 0.0, 2.0)), (2.5, (0.0, 0.0, 0.0))],
+    )
+    def test_limits(self, exponent, at_rest):
+        assert shape(Power(1.0, exponent), 0.0) == at_rest
+
+    def test_acceleration_of_the_papers_law_grows_without_bound(self):
+        accelerations = [shape(Power(1.0, 1.1), t)[2] for t in (1e-2, 1e-6, 1e-12)]
+        assert accelerations == sorted(accelerations)
+        assert accelerations[-1] > 1e9
+
+
+class TestTable:
+    @given(st.lists(st.floats(-5, 5), min_size=4, max_size=4), st.floats(0.0, 3.0))
+    def test_reproduces_a_cubic(self, coefficients, t):
+        cubic = np.polynomial.Polynomial(coefficients)
+        expected = [cubic(t), cubic.deriv(1)(t), cubic.deriv(2)(t)]
+        np.testing.assert_allclose(shape(tabulated(cubic(KNOTS)), t), expected, rtol=1e-10, atol=1e-9)
+
+    @given(st.lists(st.floats(-3, 3), min_size=len(KNOTS), max_size=len(KNOTS)))
+    def test_passes_smoothly_to_second_order_through_every_knot(self, angles):
+        drive = tabulated(angles)
+        for knot, angle in zip(KNOTS, angles, strict=True):
+            here = shape(drive, knot)
+            assert here[0] == pytest.approx(angle, abs=1e-9)
+            for side in (-1e-10, 1e-10):
+                np.testing.assert_allclose(shape(drive, knot + side), here, rtol=1e-6, atol=1e-6)
+
+    def test_a_span_beyond_the_table_is_an_input_error(self):
+        values = {"drive.amplitude": np.ones(2), "time.span": np.array([3.0, 3.5])}
+        with pytest.raises(InputError, match=r"time\.span.*3\.5 s is longer than the table.*3 s"):
+            build("table", (KNOTS, np.zeros(len(KNOTS))), values)
+
+
+class TestAmplitude:
+    """Cells that differ only in amplitude share one table of the drive's shape."""
+
+    @pytest.mark.parametrize("drive", SAMPLES, ids=repr)
+    def test_angle_and_rate_are_amplitude_times_shape(self, drive):
+        t = radians(70.0)
+        table = np.array([shape(drive, t)[:2]])
+        amplitude = getattr(drive, "amplitude", 0.0)
+        assert lookup(drive, table, 0) == (amplitude * table[0, 0], amplitude * table[0, 1])

@@ -1,0 +1,387 @@
+"""What a reader takes from a picture is what the dataset says."""
+
+import os
+import time
+
+import matplotlib
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.collections import PathCollection, QuadMesh
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+
+from ringsweep import plots
+from ringsweep.errors import InputError
+from ringsweep.variables import HISTORY, OUTCOMES, REGIMES
+
+DRIVE = {"units": "rad s-1", "long_name": "amplitude of the drive"}
+ANGLE = {"units": "rad", "long_name": "half-angle of the rough arc"}
+FRICTION = {"units": "1", "long_name": "coefficient of kinetic friction"}
+
+
+def make_sweep(shape: tuple[int, ...] = (12, 9)) -> xr.Dataset:
+    """Regimes in diagonal bands, without warnings."""
+    dims = ("drive_amplitude", "zone_half_angle", "friction_rough_mu_k", "friction_rest_mu_k", "initial_omega")
+    values = [np.geomspace(0.1, 10, shape[0]), np.radians(np.linspace(2, 60, shape[1] if len(shape) > 1 else 1))]
+    values += [np.linspace(0.1, 0.5, n) for n in shape[2:]]
+    attributes = [DRIVE, ANGLE, FRICTION, FRICTION, {"units": "rad s-1"}]
+    dims = dims[: len(shape)]
+    index = sum(np.indices(shape))
+    regime = (index * 5 // (index.max() + 1)).astype("int8")
+    return xr.Dataset(
+        {
+            "regime": (dims, regime, OUTCOMES["regime"].attributes),
+            "motion": (dims, np.minimum(regime, 2), OUTCOMES["motion"].attributes),
+            "t_separation": (dims, np.where(regime == 3, index, np.nan), OUTCOMES["t_separation"].attributes),
+            "certified": (dims, np.ones(shape, "int8"), OUTCOMES["certified"].attributes),
+            "stiffness": (dims, np.ones(shape), OUTCOMES["stiffness"].attributes),
+        },
+        coords={dim: (dim, value, a) for dim, value, a in zip(dims, values, attributes, strict=False)},
+    )
+
+
+def make_points(count: int = 30) -> xr.Dataset:
+    grid = make_sweep()
+    random = np.random.default_rng(1)
+    along = {dim: xr.DataArray(random.integers(0, size, count), dims="point") for dim, size in grid.sizes.items()}
+    return grid.isel(along)
+
+
+def make_history(count: int = 2000, ring: bool = True) -> xr.Dataset:
+    t = np.linspace(0, 10, count)
+    wave = {name: np.sin(t + k) for k, name in enumerate(HISTORY)}
+    wave["mode"] = np.where(t % 3 < 1, 0, 1).astype("int8")
+    wave["zone_1"], wave["zone_2"] = (t % 2 < 0.5).astype("int32"), (t % 5 < 0.5).astype("int32") * 2
+    ds = xr.Dataset({name: ("time", wave[name], HISTORY[name].attributes) for name in HISTORY})
+    ds = ds.assign_coords(time=("time", t, {"units": "s", "long_name": "time"}))
+    if not ring:
+        units = {"x": "m", "velocity": "m s-1", "friction_force": "N", "deflection": "m"}
+        ds = ds[["time", "mode"]].assign({name: ("time", np.sin(t), {"units": unit}) for name, unit in units.items()})
+    return ds
+
+
+def mesh(figure: Figure, panel: int = 0) -> QuadMesh:
+    return next(artist for artist in figure.axes[panel].collections if isinstance(artist, QuadMesh))
+
+
+def entries(figure: Figure) -> list[str]:
+    return [text.get_text().replace("\n", " ") for legend in figure.legends for text in legend.get_texts()]
+
+
+def drawn_colours(figure: Figure, meaning: str) -> set[tuple[float, ...]]:
+    handles = [h for h in figure.legends[0].get_patches() if h.get_label().startswith(meaning)]
+    return {to_rgb(h.get_facecolor()) for h in handles}
+
+
+def hatched(figure: Figure) -> int:
+    """Cells under hatching of the first panel, whatever its ink."""
+    x, y = mesh(figure).get_coordinates()[0, :, 0], mesh(figure).get_coordinates()[:, 0, 1]
+    area = 0
+    for patch in figure.axes[0].patches:
+        corners = patch.get_path().vertices.reshape(-1, 5, 2)
+        width = np.searchsorted(x, corners[:, 1, 0]) - np.searchsorted(x, corners[:, 0, 0])
+        assert np.isin(corners[..., 1], y).all()
+        area += width.sum()
+    return int(area)
+
+
+def test_every_regime_has_a_colour_of_its_own_that_survives_greyscale():
+    assert plots.REGIME_COLOURS.keys() == set(REGIMES)
+
+    def lightness(colour):
+        channels = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in to_rgb(colour)]
+        return 116 * (np.array([0.2126, 0.7152, 0.0722]) @ channels) ** (1 / 3) - 16
+
+    for model in (set(REGIMES) - {"stick-slip"}, {"stick-slip", "oscillatory", "resting", "failed"}):
+        shades = sorted(lightness(plots.REGIME_COLOURS[name]) for name in model)
+        assert min(np.diff(shades)) > 10
+
+
+def test_cells_tile_the_plane_each_around_its_own_value():
+    ds = make_sweep()
+    corners = mesh(plots.regime_map(ds)).get_coordinates()
+    x, y = corners[0, :, 0], corners[:, 0, 1]
+    np.testing.assert_allclose(np.sqrt(x[1:] * x[:-1]), ds["drive_amplitude"], rtol=1e-12)
+    np.testing.assert_allclose((y[1:] + y[:-1]) / 2, np.degrees(ds["zone_half_angle"]), rtol=1e-12)
+    assert len(x) == 13
+    assert len(y) == 10
+
+
+def test_a_cell_shows_its_regime_where_its_coordinates_are():
+    ds = make_sweep().isel(drive_amplitude=[3, 0, 2, 1])
+    drawn = mesh(plots.regime_map(ds)).get_array()
+    np.testing.assert_array_equal(drawn, ds["regime"].sortby("drive_amplitude").transpose())
+    swapped = mesh(plots.regime_map(ds, x="zone.half_angle", y="drive.amplitude")).get_array()
+    np.testing.assert_array_equal(swapped, drawn.T)
+
+
+def test_axes_are_logarithmic_exactly_where_the_grid_is_geometric():
+    axes = plots.regime_map(make_sweep()).axes[0]
+    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "linear")
+    for values in ([1, 2], [1, 2, 3], [-1, -2, -4], [0, 1, 10]):
+        ds = make_sweep((len(values), 3)).assign_coords(drive_amplitude=np.array(values, float))
+        assert plots.regime_map(ds).axes[0].get_xscale() == "linear"
+
+
+def test_labels_carry_names_and_units_and_angles_are_in_degrees():
+    figure = plots.regime_map(make_sweep(), var="t_separation")
+    assert figure.axes[0].get_xlabel() == "amplitude of the drive (rad s$^{-1}$)"
+    assert figure.axes[0].get_ylabel() == "half-angle of the rough arc (°)"
+    assert figure.axes[1].get_ylabel() == "time of separation (s)"
+
+
+def test_coordinates_of_one_long_name_are_told_apart():
+    ds = make_sweep((3, 3, 3, 3))
+    figure = plots.regime_map(ds.isel(drive_amplitude=0, zone_half_angle=0))
+    assert figure.axes[0].get_xlabel() == "coefficient of kinetic friction, friction_rough_mu_k"
+
+
+def test_the_colour_of_a_regime_is_the_same_in_every_figure():
+    ds = make_sweep()
+    few = ds.where(ds["regime"] == 3, drop=True).assign(regime=lambda d: d["regime"].fillna(1))
+    few["regime"].attrs = ds["regime"].attrs
+    for name in ("oscillatory", "separating"):
+        for figure in (plots.regime_map(ds), plots.regime_map(few), plots.regime_map(make_points())):
+            assert drawn_colours(figure, name) == {to_rgb(plots.REGIME_COLOURS[name])}
+    assert drawn_colours(plots.regime_map(ds, var="motion"), "oscillatory") == {
+        to_rgb(plots.REGIME_COLOURS["oscillatory"])
+    }
+
+
+def test_the_legend_lists_what_occurs_with_its_share():
+    ds = make_sweep((10, 10))
+    ds["regime"][:] = 1
+    ds["regime"][0, 0] = 3
+    assert entries(plots.regime_map(ds)) == ["oscillatory, 99.0 %", "separating, 1.0 %"]
+
+
+def test_missing_values_are_grey_and_said_to_be():
+    figure = plots.regime_map(make_sweep((10, 10)), var="t_separation")
+    share = 100 * float(make_sweep((10, 10))["t_separation"].isnull().mean())
+    assert entries(figure) == [f"no value, {share:.1f} %"]
+    assert to_rgb(mesh(figure).get_cmap().get_bad()) == to_rgb("#DDDDDD")
+    nothing = make_sweep()
+    nothing["t_separation"][:] = np.nan
+    assert entries(plots.regime_map(nothing, var="t_separation")) == ["no value, 100.0 %"]
+
+
+def test_exactly_the_cells_that_are_not_certified_are_hatched():
+    ds = make_sweep((10, 10))
+    ds["certified"][2:5, 3:7] = 0
+    ds["certified"][9, 9] = 0
+    figure = plots.regime_map(ds)
+    assert hatched(figure) == 13
+    assert "not certified, 13.0 %" in entries(figure)
+    assert not plots.regime_map(ds, var="t_separation").axes[0].patches
+
+
+def test_steps_beyond_the_stability_limit_have_a_mark_of_their_own():
+    ds = make_sweep((10, 10))
+    ds["certified"][:3] = 0
+    ds["stiffness"][:2] = 2.8
+    figure = plots.regime_map(ds)
+    assert {patch.get_hatch() for patch in figure.axes[0].patches} == {"//////", ".."}
+    assert entries(figure)[-2:] == ["not certified, 30.0 %", "step beyond stability limit, 20.0 %"]
+    ds["stiffness"][2] = 2.8
+    figure = plots.regime_map(ds)
+    assert {patch.get_hatch() for patch in figure.axes[0].patches} == {"//////"}
+    assert entries(figure)[-1] == "not certified: step beyond stability limit, 30.0 %"
+
+
+def test_hatching_a_large_map_does_not_take_long(tmp_path):
+    ds = make_sweep((512, 512))
+    ds["certified"][:] = np.random.default_rng(0).integers(0, 2, (512, 512))
+    begin = time.perf_counter()
+    plots.save(plots.regime_map(ds), tmp_path / "map.png")
+    assert time.perf_counter() - begin < 5
+
+
+def test_a_single_value_still_makes_an_axis():
+    for ds in (make_sweep((1, 5)), make_sweep((5, 1)), make_sweep((1, 1))):
+        assert mesh(plots.regime_map(ds)).get_array().shape == ds["regime"].transpose().shape
+    at_zero = make_sweep((1, 3)).assign_coords(drive_amplitude=[0.0])
+    assert np.ptp(mesh(plots.regime_map(at_zero)).get_coordinates()[0, :, 0]) == 1
+
+
+def test_one_swept_quantity_becomes_a_strip_or_a_line():
+    ds = make_sweep((12,))
+    np.testing.assert_array_equal(mesh(plots.regime_map(ds)).get_array()[0], ds["regime"])
+    axes = plots.regime_map(ds, var="t_separation").axes[0]
+    np.testing.assert_array_equal(axes.lines[0].get_xydata()[:, 1], ds["t_separation"])
+    assert axes.get_xscale() == "log"
+
+
+def test_words_make_an_axis_too():
+    ds = make_sweep((3, 4)).assign_coords(drive_amplitude=["stiction", "coulomb", "dahl"])
+    figure = plots.regime_map(ds)
+    assert [label.get_text() for label in figure.axes[0].get_xticklabels()] == ["coulomb", "dahl", "stiction"]
+    np.testing.assert_array_equal(mesh(figure).get_array()[:, 2], ds["regime"].sel(drive_amplitude="stiction"))
+    assert "drive_amplitude = dahl" in plots.regime_map(ds, sel={"drive_amplitude": "dahl"}).get_suptitle()
+
+
+def test_selecting_holds_the_nearest_value_and_says_so():
+    ds = make_sweep((12, 9, 3))
+    figure = plots.regime_map(ds, sel={"friction.rough.mu_k": 0.32, "zone_half_angle": 0.0})
+    np.testing.assert_array_equal(mesh(figure).get_array()[0], ds["regime"][:, 0, 1])
+    assert "friction_rough_mu_k = 0.3" in figure.get_suptitle()
+    assert "zone_half_angle = 2°" in figure.get_suptitle()
+
+
+def test_more_dimensions_become_panels_of_one_scale():
+    ds = make_sweep((6, 5, 2, 3))
+    figure = plots.regime_map(ds, var="t_separation")
+    panels = [axes for axes in figure.axes if axes.get_title()]
+    assert len(panels) == 6
+    assert panels[4].get_title() == "friction_rough_mu_k = 0.5\nfriction_rest_mu_k = 0.3"
+    np.testing.assert_array_equal(mesh(figure, 4).get_array(), ds["t_separation"][:, :, 1, 1].transpose())
+    assert len({mesh(figure, k).get_clim() for k in range(6)}) == 1
+
+
+def test_too_many_panels_are_refused_with_the_way_out():
+    with pytest.raises(InputError, match=r"small multiples.*50 panels.*--sel friction_rough_mu_k=VALUE"):
+        plots.regime_map(make_sweep((3, 3, 5, 5, 2)))
+
+
+def test_points_are_scattered_over_their_coordinates():
+    ds = make_points()
+    ds["certified"][:4] = 0
+    figure = plots.regime_map(ds, x="zone_half_angle", y="drive_amplitude")
+    clouds = [artist for artist in figure.axes[0].collections if isinstance(artist, PathCollection)]
+    expected = np.column_stack([np.degrees(ds["zone_half_angle"]), ds["drive_amplitude"]])
+    np.testing.assert_allclose(clouds[0].get_offsets(), expected)
+    for rgba, regime in zip(clouds[0].get_facecolors(), ds["regime"].values, strict=True):
+        assert to_rgb(rgba) == pytest.approx(to_rgb(plots.REGIME_COLOURS[REGIMES[regime]]))
+    assert sum(len(cloud.get_offsets()) for cloud in clouds[1:]) == 4
+
+
+def test_points_beside_a_grid_can_be_scattered_against_it():
+    ds = make_sweep((6, 5)).isel(drive_amplitude=xr.DataArray([0, 3, 5], dims="point"))
+    cloud = plots.regime_map(ds).axes[0].collections[0]
+    assert len(cloud.get_offsets()) == 15
+
+
+@pytest.mark.parametrize(
+    ("arguments", "problem"),
+    [
+        ({"var": "regim"}, "var: 'regim' is not in the dataset.*did you mean regime"),
+        ({"x": "drive_amplitud"}, "x: .*did you mean drive_amplitude"),
+        ({"y": "nothing"}, "y: .*zone_half_angle"),
+        ({"sel": {"zone_angle": 1}}, "sel: .*did you mean zone_half_angle"),
+        ({"sel": {"zone_half_angle": "wide"}}, "takes a number, not 'wide'"),
+        ({"sel": {"zone_half_angle": np.nan}}, "finite"),
+        ({"x": "zone_half_angle", "y": "zone_half_angle"}, "must differ"),
+        ({"sel": {"zone_half_angle": 1, "drive_amplitude": 1}}, "a single cell has no map"),
+    ],
+)
+def test_wrong_names_are_answered_with_the_right_ones(arguments, problem):
+    with pytest.raises(InputError, match=problem):
+        plots.regime_map(make_sweep(), **arguments)
+
+
+def test_a_sweep_and_a_history_are_not_mistaken_for_each_other():
+    with pytest.raises(InputError, match="history"):
+        plots.regime_map(make_history())
+    with pytest.raises(InputError, match="regime_map"):
+        plots.history(make_sweep())
+
+
+def test_a_history_has_the_four_panels_of_the_paper_over_one_time_axis():
+    ds = make_history().assign_attrs(outcome="separating (oscillatory), contact 2, t = 3.58236 s")
+    figure = plots.history(ds)
+    assert [axes.get_ylabel().replace("\n", " ") for axes in figure.axes[:4]] == [
+        "angle (rad)",
+        "angular velocity (rad s$^{-1}$)",
+        "angular acceleration (rad s$^{-2}$)",
+        "normal reaction (N)",
+    ]
+    assert [len(axes.lines) for axes in figure.axes[:4]] == [1, 2, 1, 2]
+    assert {axes.get_xlim() for axes in figure.axes} == {(0, 10)}
+    assert figure.axes[-1].get_xlabel() == "time (s)"
+    assert figure.get_suptitle() == ds.attrs["outcome"]
+
+
+def test_stick_is_shaded_for_as_long_as_it_lasts():
+    axes = plots.history(make_history()).axes[3]
+    widths = [np.ptp(path.vertices[:, 0]) for path in axes.collections[0].get_paths()]
+    np.testing.assert_allclose(widths, 1, atol=0.02)
+
+
+def test_the_strip_shows_the_arc_under_each_contact():
+    ds = make_history()
+    strip = mesh(plots.history(ds), -1).get_array()
+    np.testing.assert_allclose((strip > 0).mean(axis=1), [(ds[z] > 0).mean() for z in ("zone_1", "zone_2")], atol=2e-3)
+    assert set(np.unique(strip[1])) == {0, 2}
+
+
+def test_one_contact_and_a_single_sample_are_histories_too():
+    single = plots.history(make_history().drop_vars(["normal_2", "zone_2"]))
+    assert len(single.axes[3].lines) == 1
+    plots.history(make_history(1))
+
+
+def test_spikes_do_not_flatten_the_acceleration_and_the_clipping_is_said():
+    ds = make_history()
+    ds["epsilon"][::400] = 1e6
+    axes = plots.history(ds).axes[2]
+    assert axes.get_ylim()[1] < 2
+    assert axes.get_title(loc="right") == "axis clipped; values from -1 to 1e+06"
+    assert not plots.history(make_history()).axes[2].get_title(loc="right")
+
+
+def test_a_long_history_is_condensed_without_losing_its_extremes(tmp_path):
+    ds = make_history(1_000_000)
+    ds["normal_2"][123_456] = -7
+    begin = time.perf_counter()
+    figure = plots.history(ds)
+    plots.save(figure, tmp_path / "history.png")
+    assert time.perf_counter() - begin < 5
+    line = figure.axes[3].lines[1].get_xydata()
+    assert len(line) < 20_000
+    assert line[:, 1].min() == -7
+
+
+def test_a_belt_has_panels_of_its_own():
+    figure = plots.history(make_history(ring=False))
+    assert [axes.get_ylabel().replace("\n", " ") for axes in figure.axes] == [
+        "displacement (m)",
+        "velocity (m s$^{-1}$)",
+        "friction force (N)",
+        "friction force (N)",
+    ]
+    assert figure.axes[3].get_xlim()[1] < 0.5 < figure.axes[2].get_xlim()[1]
+
+
+@pytest.mark.parametrize("name", ["map.png", "map.PDF", "map.svg"])
+def test_a_figure_is_saved_as_its_suffix_says(tmp_path, name):
+    plots.save(plots.regime_map(make_sweep()), tmp_path / name)
+    magic = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}[name[-3:].lower()]
+    assert (tmp_path / name).read_bytes().startswith(magic)
+    assert os.listdir(tmp_path) == [name]
+
+
+@pytest.mark.parametrize("name", ["map.xyz", "map"])
+def test_an_unknown_suffix_is_refused(tmp_path, name):
+    with pytest.raises(InputError, match=r"\.png"):
+        plots.save(Figure(), tmp_path / name)
+
+
+def test_a_failing_save_leaves_the_old_picture_intact(tmp_path, monkeypatch):
+    (tmp_path / "map.png").write_text("old")
+
+    def fail(self, target, **_):
+        target.write_bytes(b"half")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Figure, "savefig", fail)
+    with pytest.raises(KeyboardInterrupt):
+        plots.save(Figure(), tmp_path / "map.png")
+    assert (tmp_path / "map.png").read_text() == "old"
+    assert os.listdir(tmp_path) == ["map.png"]
+
+
+def test_drawing_touches_no_global_state():
+    before = dict(matplotlib.rcParams)
+    plots.regime_map(make_sweep())
+    plots.history(make_history())
+    assert dict(matplotlib.rcParams) == before

@@ -1,0 +1,367 @@
+"""The ring's equations: balances, symmetries, limits; friction laws; the compiled model against plain formulas."""
+
+from math import cos, exp, nextafter, pi, radians, sin
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from ringsweep.errors import InputError
+from ringsweep.jit import inlined, take
+from ringsweep.models.hooks import inspect
+from ringsweep.physics import ring
+from ringsweep.physics.friction import BengisuAkay, Coulomb, stiction_band, weights
+from ringsweep.physics.ring import OneContact, Ring, TwoContacts, acceleration, acceleration_slope, reactions
+from ringsweep.physics.zones import Arc, cut
+
+angles = st.floats(-20.0, 20.0)
+friction_ratios = st.floats(-1.2, 1.2)
+#: Centripetal acceleration over g.
+lifts = st.floats(0.0, 100.0)
+
+
+@st.composite
+def two_contacts(draw):
+    """Bodies of any size that fit into their ring."""
+    radius, beta = draw(st.floats(0.01, 10.0)), draw(st.floats(0.1, 1.5))
+    mass, gravity = draw(st.floats(1e-3, 1e3)), draw(st.floats(0.1, 30.0))
+    xi = radius * (1.0 - draw(st.floats(0.0, 0.7))) * cos(beta)
+    inertia = mass * xi * xi * draw(st.floats(0.0, 3.0))
+    return TwoContacts(mass, inertia, radius, xi, beta, sin(beta), cos(beta), gravity)
+
+
+@st.composite
+def states(draw):
+    """A body, its K1 and K2, angle and angular velocity, not close to jamming."""
+    body = draw(two_contacts())
+    K1, K2, phi = draw(friction_ratios), draw(friction_ratios), draw(angles)
+    omega = (draw(lifts) * body.gravity / body.radius) ** 0.5
+    _, D, inertia = acceleration(body, K1, K2, sin(phi), cos(phi), omega)
+    assume(abs(D) > 0.05)
+    assume(abs(inertia) > 0.05 * body.mass * body.xi**2)
+    return body, K1, K2, phi, omega
+
+
+def motion(body, K1, K2, phi, omega):
+    """Angular acceleration and reactions."""
+    epsilon = acceleration(body, K1, K2, sin(phi), cos(phi), omega)[0]
+    return epsilon, *reactions(body, K1, K2, sin(phi), cos(phi), omega, epsilon)
+
+
+def force_scale(body, omega, epsilon, *normals):
+    """Size of the terms that a balance adds up."""
+    return body.mass * (body.gravity + body.radius * (omega**2 + abs(epsilon))) + sum(map(abs, normals))
+
+
+class TestTwoContactBalances:
+    @given(states())
+    def test_momentum_and_moment_of_momentum(self, state):
+        body, K1, K2, phi, omega = state
+        M, J, R, xi, beta, g = body.mass, body.inertia, body.radius, body.xi, body.beta, body.gravity
+        epsilon, N1, N2 = motion(*state)
+        radial = M * xi * omega**2 + M * g * cos(phi) - (N1 + N2) * cos(beta) + (K1 * N1 - K2 * N2) * sin(beta)
+        tangential = M * xi * epsilon + M * g * sin(phi) - (N1 - N2) * sin(beta) - (K1 * N1 + K2 * N2) * cos(beta)
+        about_axis = (J + M * xi**2) * epsilon + M * g * xi * sin(phi) - R * (K1 * N1 + K2 * N2)
+        scale = force_scale(body, omega, epsilon, N1, N2)
+        assert abs(radial) < 1e-12 * scale
+        assert abs(tangential) < 1e-12 * scale
+        assert abs(about_axis) < 1e-12 * scale * R
+
+    @given(states())
+    def test_reactions_are_the_papers_closed_expressions(self, state):
+        body, K1, K2, phi, omega = state
+        M, xi, beta, g = body.mass, body.xi, body.beta, body.gravity
+        epsilon, N1, N2 = motion(*state)
+        a, c = xi * epsilon, xi * omega**2
+        D = (K1 - K2) * cos(2 * beta) + (1 + K1 * K2) * sin(2 * beta)
+        first = (
+            g * sin(phi + beta)
+            + c * sin(beta)
+            + a * cos(beta)
+            - K2 * (g * cos(phi + beta) + c * cos(beta) - a * sin(beta))
+        )
+        second = (
+            c * sin(beta)
+            - g * sin(phi - beta)
+            - a * cos(beta)
+            + K1 * (g * cos(phi - beta) + c * cos(beta) + a * sin(beta))
+        )
+        scale = force_scale(body, omega, epsilon, N1, N2)
+        assert abs(N1 - M * first / D) < 1e-12 * scale
+        assert abs(N2 - M * second / D) < 1e-12 * scale
+
+    @given(states())
+    def test_power_of_friction_is_the_rate_of_energy(self, state):
+        body, K1, K2, phi, omega = state
+        epsilon, N1, N2 = motion(*state)
+        inertia = body.inertia + body.mass * body.xi**2
+        rate = inertia * omega * epsilon + body.mass * body.gravity * body.xi * sin(phi) * omega
+        power = body.radius * omega * (K1 * N1 + K2 * N2)
+        assert abs(rate - power) < 1e-12 * force_scale(body, omega, epsilon, N1, N2) * body.radius * (1 + abs(omega))
+
+    @given(two_contacts(), angles, lifts)
+    def test_without_friction_the_body_is_a_pendulum(self, body, phi, lift):
+        M, xi, g = body.mass, body.xi, body.gravity
+        omega = (lift * g / body.radius) ** 0.5
+        pendulum = -M * g * xi / (body.inertia + M * xi**2) * sin(phi)
+        assert motion(body, 0.0, 0.0, phi, omega)[0] == pytest.approx(pendulum, rel=1e-12, abs=1e-300)
+
+
+class TestSlope:
+    """How fast friction changes the acceleration: what decides on the stiffness of a step."""
+
+    @given(states(), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
+    def test_is_the_derivative_of_the_acceleration(self, state, slope_1, slope_2):
+        body, K1, K2, phi, omega = state
+        where = (sin(phi), cos(phi), omega)
+        tiny = 1e-40j
+        complex_step = acceleration(body, K1 + tiny * slope_1, K2 + tiny * slope_2, *where)[0].imag / 1e-40
+        slope = acceleration_slope(body, K1, K2, slope_1, slope_2, *where)
+        epsilon, _, inertia = acceleration(body, K1, K2, *where)
+        scale = (abs(epsilon) + body.gravity / body.radius + omega**2) * body.mass * body.radius**2 / abs(inertia)
+        assert abs(slope - complex_step) < 1e-12 * scale * (1 + body.mass * body.radius**2 / abs(inertia))
+
+    @given(lifts, friction_ratios, angles, st.floats(-1.0, 1.0))
+    def test_of_one_contact(self, lift, K, phi, slope):
+        body = OneContact(0.1, 0.05, 9.81)
+        where = (sin(phi), cos(phi), (lift * 9.81 / 0.05) ** 0.5)
+        complex_step = acceleration(body, K + 1e-40j * slope, 0.0, *where)[0].imag / 1e-40
+        assert acceleration_slope(body, K, 0.0, slope, 0.0, *where) == pytest.approx(complex_step, rel=1e-12)
+
+
+class TestOneContact:
+    @given(friction_ratios, angles, st.floats(-50.0, 50.0))
+    def test_balances(self, K, phi, omega):
+        body = OneContact(mass=0.3, radius=0.2, gravity=9.81)
+        epsilon, normal, repeated = motion(body, K, 0.7, phi, omega)
+        assert normal == repeated
+        assert normal == pytest.approx(0.3 * (9.81 * cos(phi) + 0.2 * omega**2), rel=1e-12, abs=1e-12)
+        assert 0.3 * 0.2 * epsilon == pytest.approx(-0.3 * 9.81 * sin(phi) + K * normal, rel=1e-12, abs=1e-11)
+
+    @given(friction_ratios, angles, st.floats(-50.0, 50.0))
+    def test_is_the_limit_of_two_contacts_that_close_up(self, K, phi, omega):
+        M, R, g = 0.3, 0.2, 9.81
+        epsilon, N, _ = motion(OneContact(M, R, g), K, K, phi, omega)
+        scale = g + R * omega**2
+        gaps = []
+        for beta in (1e-3, 1e-4, 1e-5):
+            close = TwoContacts(M, 0.0, R, R * cos(beta), beta, sin(beta), cos(beta), g)
+            epsilon_2, N1, N2 = motion(close, K, K, phi, omega)
+            gaps.append((abs(epsilon_2 - epsilon) * R + abs(N1 + N2 - N) / M) / scale)
+        assert gaps[0] < 1e-2
+        assert gaps[2] < 1e-8
+
+
+class TestMirror:
+    """Left and right are alike: phi, omega, theta, K change sign, and contact 1 becomes contact 2."""
+
+    @given(states())
+    def test_of_acceleration_and_reactions(self, state):
+        body, K1, K2, phi, omega = state
+        epsilon, N1, N2 = motion(*state)
+        scale = force_scale(body, omega, epsilon, N1, N2)
+        mirrored, M1, M2 = motion(body, -K2, -K1, -phi, -omega)
+        assert mirrored == -epsilon
+        assert abs(M1 - N2) < 1e-13 * scale
+        assert abs(M2 - N1) < 1e-13 * scale
+
+    @given(angles, angles, st.floats(-30, 30), st.floats(-30, 30), st.floats(-3, 3), st.floats(0.1, 1.5))
+    def test_of_friction(self, cells, phi, theta, omega, ring_omega, center, half_angle):
+        def at(sign):
+            surface = cut([Arc(sign * center, half_angle, 0.5, 0.3)], 0.2, 0.1)
+            scene = Ring(body, surface, BengisuAkay(1.0, 0.5), None, 0.0, 0.0, 1.0, 0.0)
+            return ring.friction.py_func(scene, sign * phi, sign * omega, sign * theta, sign * ring_omega)
+
+        body = take(cells().body, 0)
+        edges = [center + side * half_angle + contact for side in (-1, 1) for contact in (-body.beta, body.beta)]
+        assume(all(abs((phi - theta - edge + pi) % (2 * pi) - pi) > 1e-9 for edge in edges))
+        v, K1, K2, slope_1, slope_2 = at(1)
+        assert at(-1) == (-v, -K2, -K1, slope_2, slope_1)
+
+    @pytest.mark.parametrize("number", [30, 33])
+    def test_of_a_figure(self, number, figure, cells, run):
+        """Launched, driven and cut the other way round, the body loses the other contact at the same time."""
+        drive, changes, steps = figure(number)
+        found = run(cells(mirrored(changes | {"zone.center": 0.3}), drive=drive), steps)
+        self.assert_mirrored(found)
+        assert sorted(found.separating_contact) == [1, 2]
+
+    @given(
+        st.floats(-20, 20), st.floats(-20, 20), st.floats(-0.5, 0.5), st.floats(-3, 3), st.floats(0.01, 3), st.data()
+    )
+    def test_of_any_run(self, cells, run, amplitude, omega, phi, center, half_angle, data):
+        changes = {
+            "drive.amplitude": amplitude,
+            "initial.omega": omega,
+            "initial.phi": phi,
+            "zone.center": center,
+            "zone.half_angle": half_angle,
+            "friction.alpha": 10.0,
+            "friction.v0": data.draw(st.floats(0.01, 0.3)),
+        }
+        self.assert_mirrored(run(cells(mirrored(changes), drive="arctan"), 500))
+
+    @staticmethod
+    def assert_mirrored(found):
+        for name in ("regime", "motion", "reversals", "turns", "steps"):
+            here, there = getattr(found, name)
+            assert here == there, name
+        for name in ("t_end", "stick_time", "stiffness"):
+            np.testing.assert_allclose(*getattr(found, name), rtol=1e-9, atol=1e-12, err_msg=name)
+        for name in ("phi_end", "omega_end"):
+            here, there = getattr(found, name)
+            assert here == pytest.approx(-there, rel=1e-9, abs=1e-9), name
+        for name in ("phi", "omega"):
+            low, high = getattr(found, f"{name}_min"), getattr(found, f"{name}_max")
+            np.testing.assert_allclose(low, -high[::-1], rtol=1e-9, atol=1e-9, err_msg=name)
+        np.testing.assert_allclose(found.normal_min_1, found.normal_min_2[::-1], rtol=1e-9, atol=1e-12)
+        contact = {0: 0, 1: 2, 2: 1}
+        assert found.separating_contact[1] == contact[found.separating_contact[0]]
+
+
+#: Quantities that change sign in a mirror.
+ODD = {"drive.amplitude", "zone.center", "initial.phi", "initial.omega"}
+
+
+def mirrored(changes):
+    """Two cells: the values themselves and their mirror image."""
+    return {path: np.array([value, -value if path in ODD else value]) for path, value in changes.items()}
+
+
+class TestGeometry:
+    """The paper's rig: R is not printed, beta is."""
+
+    def test_radius_and_angle_say_the_same(self, cells):
+        from_radius = take(cells().body, 0)
+        from_beta = take(cells({"ring.radius": None, "body.beta": radians(48.504)}).body, 0)
+        assert np.degrees(from_radius.beta) == pytest.approx(48.504, abs=1e-3)
+        assert from_radius.xi == pytest.approx(0.022115, abs=1e-6)
+        assert from_beta == pytest.approx(from_radius, rel=2e-5)
+
+    @pytest.mark.parametrize(
+        ("changes", "message"),
+        [
+            ({"ring.radius": 0.0349}, r"ring\.radius.*0\.0349 m is too small"),
+            ({"body.beta": radians(48.0)}, r"body\.beta.*contradicts ring\.radius"),
+            ({"ring.radius": None}, r"ring\.radius.*missing"),
+            ({"friction.rough.mu_k": 0.6}, r"friction\.rough\.mu_k.*0\.6 exceeds mu_s"),
+        ],
+    )
+    def test_values_that_contradict_each_other_are_input_errors(self, cells, changes, message):
+        with pytest.raises(InputError, match=message):
+            cells(changes)
+
+
+laws = st.builds(BengisuAkay, st.floats(0.0, 1e5), st.floats(1e-6, 1.0))
+
+
+def mu(law, speed, mu_s=0.5, mu_k=0.3):
+    w_s, w_k, _, _ = weights(law, speed)
+    return w_s * mu_s + w_k * mu_k
+
+
+class TestBengisuAkay:
+    @given(laws, st.floats(0.0, 3.0))
+    def test_is_the_papers_law(self, law, speed):
+        alpha, v0 = law
+        inside = 0.5 * (1 - (1 - speed / v0) ** 2)
+        outside = 0.3 * (1 + (0.5 / 0.3 - 1) * exp(-alpha * (speed - v0))) if speed >= v0 else None
+        assert mu(law, speed) == pytest.approx(inside if speed < v0 else outside, rel=1e-12, abs=1e-15)
+
+    @given(laws)
+    def test_is_continuous_at_the_edge_of_the_band(self, law):
+        assert mu(law, law.v0) == 0.5
+        assert mu(law, nextafter(law.v0, 0.0)) == pytest.approx(0.5, rel=1e-14)
+
+    @given(laws)
+    def test_vanishes_at_rest_and_falls_to_mu_k(self, law):
+        assert mu(law, 0.0) == 0.0
+        if law.alpha > 0.0:
+            assert mu(law, law.v0 + 50.0 / law.alpha) == pytest.approx(0.3, rel=1e-14)
+
+    @given(laws, st.floats(0.0, 3.0), st.floats(0.0, 3.0))
+    def test_rises_within_the_band_and_falls_beyond(self, law, one, other):
+        slower, faster = sorted((one, other))
+        inside = min(slower, law.v0), min(faster, law.v0)
+        outside = max(slower, law.v0), max(faster, law.v0)
+        assert mu(law, inside[0]) <= mu(law, inside[1]) <= 0.5
+        assert 0.3 <= mu(law, outside[1]) <= mu(law, outside[0])
+
+    @given(laws, st.floats(0.0, 3.0))
+    def test_slopes_are_derivatives(self, law, relative):
+        speed = relative * law.v0
+        reach = 1e-6 * min(law.v0, 1.0 / max(law.alpha, 1.0))
+        assume(abs(speed - law.v0) > 2 * reach)
+        _, _, *slopes = weights(law, speed)
+        ahead, behind = weights(law, speed + reach), weights(law, speed - reach)
+        width = (speed + reach) - (speed - reach)
+        for k in range(2):
+            assert slopes[k] == pytest.approx((ahead[k] - behind[k]) / width, rel=1e-4, abs=1e-4 / law.v0)
+
+    @given(st.floats(1e-3, 3.0))
+    def test_tends_to_coulomb_as_the_band_shrinks(self, speed):
+        """Outside the band, at the same speed; inside there is always a band left."""
+        assert weights(BengisuAkay(1e5, 2e-6), speed) == pytest.approx(weights(Coulomb(), speed), abs=1e-12)
+        assert stiction_band(BengisuAkay(1e5, 2e-6)) == 2e-6
+        assert stiction_band(Coulomb()) == 0.0
+
+
+@inlined
+def compiled_inspect(batch, i, y, theta, ring_omega):
+    return inspect(take(batch, i), y, theta, ring_omega)
+
+
+class TestCompiledModel:
+    """What a kernel sees of a state, against the balances solved as three linear equations in plain Python."""
+
+    #: Angle and angular velocity of the body, angle of the ring.
+    STATES = np.random.default_rng(22).uniform((-9, -40, -9), (9, 40, 9), (200, 3))
+
+    def test_agrees_with_plain_formulas(self, cells):
+        batch = cells({"friction.alpha": 2.0, "friction.v0": 0.3, "zone.half_angle": 1.0}, drive="arctan")
+        body = take(batch.body, 0)
+        M, J, R, xi, beta, g = body.mass, body.inertia, body.radius, body.xi, body.beta, body.gravity
+        met = set()
+        for phi, omega, theta in self.STATES:
+            ring_omega = 0.5 * omega + 1.0
+            v = (omega - ring_omega) * R
+            K = []
+            for contact in (phi - beta, phi + beta):
+                rough = (contact - theta + 1.0) % (2 * pi) < 2.0
+                mu_s, mu_k = (0.5, 0.3) if rough else (0.2, 0.1)
+                inside, speed = abs(v) < 0.3, abs(v)
+                size = mu_s * (1 - (1 - speed / 0.3) ** 2) if inside else mu_k + (mu_s - mu_k) * exp(-2 * (speed - 0.3))
+                K.append(-np.sign(v) * size)
+                met.add((rough, inside, v > 0))
+            K1, K2 = K
+            balances = [
+                [0.0, cos(beta) - K1 * sin(beta), cos(beta) + K2 * sin(beta)],
+                [M * xi, -sin(beta) - K1 * cos(beta), sin(beta) - K2 * cos(beta)],
+                [J + M * xi**2, -R * K1, -R * K2],
+            ]
+            loads = [M * g * cos(phi) + M * xi * omega**2, -M * g * sin(phi), -M * g * xi * sin(phi)]
+            now = compiled_inspect(batch, 0, (phi, omega), theta, ring_omega)
+            found = (now.rates[1], now.normal_1, now.normal_2)
+            np.testing.assert_allclose(found, np.linalg.solve(balances, loads), rtol=1e-9, atol=1e-9)
+            assert now.v == pytest.approx(v, rel=1e-14)
+            assert now.rates[0] == now.omega == omega
+            determinant = (K1 - K2) * cos(2 * beta) + (1 + K1 * K2) * sin(2 * beta)
+            np.testing.assert_allclose(now.D, determinant, rtol=1e-12)
+        assert len(met) == 8
+
+    def test_slope_is_the_derivative_through_friction_alone(self, cells):
+        batch = cells({"friction.alpha": 2.0, "friction.v0": 0.3, "zone.half_angle": 1.0}, drive="arctan")
+        body, scene = take(batch.body, 0), take(batch, 0)
+        for phi, omega, theta in self.STATES:
+            ring_omega, reach = 0.5 * omega + 1.0, 1e-6
+            speed = abs(omega - ring_omega) * body.radius
+            if min(speed, abs(speed - 0.3)) < 1e-4:
+                continue
+            ends = []
+            for sliding in (omega - reach, omega + reach):
+                _, K1, K2, _, _ = ring.friction.py_func(scene, phi, sliding, theta, ring_omega)
+                ends.append(acceleration(body, K1, K2, sin(phi), cos(phi), omega)[0])
+            difference = (ends[1] - ends[0]) / (2 * reach)
+            slope = compiled_inspect(batch, 0, (phi, omega), theta, ring_omega).slope
+            assert slope == pytest.approx(difference, rel=1e-5, abs=1e-3)

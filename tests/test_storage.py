@@ -1,0 +1,153 @@
+"""Results reach the disk whole or not at all, and come back as they were."""
+
+import json
+import os
+
+import netCDF4
+import numpy as np
+import pytest
+import xarray as xr
+
+from ringsweep import storage
+from ringsweep.errors import InputError
+from ringsweep.variables import OUTCOMES
+
+
+@pytest.fixture
+def sweep() -> xr.Dataset:
+    shape = (40, 50)
+    dims = ("drive_amplitude", "zone_half_angle")
+    regime = np.arange(2000, dtype="int8").reshape(shape) % 5
+    t_separation = np.where(regime == 3, 1.5, np.nan)
+    return xr.Dataset(
+        {
+            "regime": (dims, regime, OUTCOMES["regime"].attributes),
+            "t_separation": (dims, t_separation, OUTCOMES["t_separation"].attributes),
+            "steps": (dims, np.full(shape, 2**40), OUTCOMES["steps"].attributes),
+        },
+        coords={
+            "drive_amplitude": ("drive_amplitude", np.geomspace(0.1, 10, 40), {"units": "rad s-1"}),
+            "zone_half_angle": ("zone_half_angle", np.linspace(0.1, 1, 50), {"units": "rad"}),
+            "law": ("drive_amplitude", np.array(["arctan"] * 40)),
+        },
+        attrs={"Conventions": "CF-1.11", "ringsweep_version": "0", "title": "ω against Δθ"},
+    )
+
+
+def test_what_is_loaded_is_what_was_saved(sweep, tmp_path):
+    storage.save(sweep, tmp_path / "out.nc")
+    loaded = storage.load(tmp_path / "out.nc")
+    xr.testing.assert_identical(loaded, sweep)
+    for name, variable in sweep.data_vars.items():
+        assert loaded[name].dtype == variable.dtype
+    assert loaded["regime"].attrs["flag_values"].dtype == np.int8
+
+
+def test_no_variable_has_a_fill_value_and_large_ones_are_compressed(sweep, tmp_path):
+    storage.save(sweep, tmp_path / "out.nc")
+    with netCDF4.Dataset(tmp_path / "out.nc") as file:
+        assert not [name for name, variable in file.variables.items() if "_FillValue" in variable.ncattrs()]
+        assert file["regime"].dtype == np.int8
+        assert file["regime"].filters()["zlib"]
+        assert not file["zone_half_angle"].filters()["zlib"]
+        assert file["zone_half_angle"].units == "rad"
+
+
+def test_attributes_without_a_netcdf_type_are_written_as_json(sweep, tmp_path):
+    sweep.attrs |= {"fresh": True, "seed": None, "scene": {"body": {"mass": np.float64(0.076)}}, "tags": ["a", "b"]}
+    storage.save(sweep, tmp_path / "out.nc")
+    attributes = storage.load(tmp_path / "out.nc").attrs
+    assert json.loads(attributes["fresh"]) is True
+    assert json.loads(attributes["seed"]) is None
+    assert json.loads(attributes["scene"]) == {"body": {"mass": 0.076}}
+    assert json.loads(attributes["tags"]) == ["a", "b"]
+    assert sweep.attrs["fresh"] is True, "saving must not change the dataset in memory"
+
+
+@pytest.mark.parametrize("failure", [OSError("disk full"), KeyboardInterrupt()])
+def test_a_failing_save_leaves_the_old_file_intact_and_nothing_else(sweep, tmp_path, monkeypatch, failure):
+    path = tmp_path / "out.nc"
+    storage.save(sweep, path)
+    before = path.read_bytes()
+
+    def fail(self, target, **_):
+        target.write_bytes(b"half a fi")
+        raise failure
+
+    monkeypatch.setattr(xr.Dataset, "to_netcdf", fail)
+    with pytest.raises(type(failure)):
+        storage.save(sweep, path)
+    assert path.read_bytes() == before
+    assert os.listdir(tmp_path) == ["out.nc"]
+
+
+def test_a_file_that_reads_back_differently_does_not_count(sweep, tmp_path, monkeypatch):
+    write = xr.Dataset.to_netcdf
+    monkeypatch.setattr(
+        xr.Dataset, "to_netcdf", lambda self, *a, **k: write(self.assign(steps=self.steps + 1), *a, **k)
+    )
+    with pytest.raises(OSError, match="does not read back"):
+        storage.save(sweep, tmp_path / "out.nc")
+    assert not os.listdir(tmp_path)
+
+
+def test_saving_follows_a_symbolic_link_and_keeps_usual_permissions(sweep, tmp_path):
+    (tmp_path / "plain").touch()
+    (tmp_path / "link.nc").symlink_to(tmp_path / "real.nc")
+    storage.save(sweep, tmp_path / "link.nc")
+    assert (tmp_path / "link.nc").is_symlink()
+    assert (tmp_path / "real.nc").stat().st_mode == (tmp_path / "plain").stat().st_mode
+
+
+@pytest.mark.parametrize(
+    ("name", "problem"),
+    [
+        ("missing/out.nc", "does not exist"),
+        ("file/out.nc", "not a folder"),
+        (".", "is a folder"),
+        ("n" * 300 + ".nc", "cannot be written"),
+    ],
+)
+def test_a_place_that_cannot_be_written_is_refused_before_any_work(tmp_path, name, problem):
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match=problem) as caught:
+        storage.check_writable(tmp_path / name)
+    assert caught.value.path == str(tmp_path / name)
+    assert os.listdir(tmp_path) == ["file"]
+
+
+def test_a_folder_that_refuses_files_is_found_by_trying(tmp_path, monkeypatch):
+    def refuse(*_, **__):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("pathlib.Path.touch", refuse)
+    with pytest.raises(InputError, match="Permission denied"):
+        storage.check_writable(tmp_path / "out.nc")
+
+
+def test_checking_leaves_an_existing_file_alone(tmp_path):
+    (tmp_path / "out.nc").write_text("old")
+    storage.check_writable(tmp_path / "out.nc")
+    assert (tmp_path / "out.nc").read_text() == "old"
+    assert os.listdir(tmp_path) == ["out.nc"]
+
+
+def test_load_says_what_is_wrong_with_a_file(tmp_path):
+    (tmp_path / "text.nc").write_text("time,phi\n0,0\n")
+    xr.Dataset({"a": 1}, attrs={"Conventions": "CF-1.11"}).to_netcdf(tmp_path / "foreign.nc")
+    for name, problem in {
+        "none.nc": "does not exist",
+        ".": "is not a file",
+        "text.nc": "is not a NetCDF file",
+        "foreign.nc": "not written by ringsweep: its attributes lack ringsweep_version",
+    }.items():
+        with pytest.raises(InputError, match=problem):
+            storage.load(tmp_path / name)
+
+
+def test_a_truncated_file_is_damaged_not_short(sweep, tmp_path):
+    storage.save(sweep, tmp_path / "out.nc")
+    whole = (tmp_path / "out.nc").read_bytes()
+    (tmp_path / "out.nc").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(InputError, match="damaged"):
+        storage.load(tmp_path / "out.nc")
