@@ -36,7 +36,7 @@ def test_every_drive_is_sampled():
     assert {type(drive) for drive in SAMPLES} == set(DRIVES.values())
 
 
-@pytest.mark.parametrize("drive", SAMPLES, ids=repr)
+@pytest.mark.parametrize("drive", SAMPLES, ids=lambda drive: type(drive).__name__)
 class TestDerivatives:
     """Rate and acceleration are what finite differences of angle and rate say."""
 
@@ -102,7 +102,7 @@ class TestTable:
 class TestAmplitude:
     """Cells that differ only in amplitude share one table of the drive's shape."""
 
-    @pytest.mark.parametrize("drive", SAMPLES, ids=repr)
+    @pytest.mark.parametrize("drive", SAMPLES, ids=lambda drive: type(drive).__name__)
     def test_angle_and_rate_are_amplitude_times_shape(self, drive):
         t = radians(70.0)
         table = np.array([shape(drive, t)[:2]])

@@ -1,6 +1,6 @@
 """Runge-Kutta 4 at constant step: closed-form orbits, order, the paper's figures, and how runs end."""
 
-from math import atan2, cos, exp, nan, pi, sin
+from math import atan2, cos, exp, inf, nan, pi, sin
 
 import numpy as np
 import pytest
@@ -8,9 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ringsweep.jit import take
+from ringsweep.models.hooks import verdict
+from ringsweep.models.ring import Inspection
 from ringsweep.physics.friction import weights
 from ringsweep.physics.ring import acceleration, reactions
-from ringsweep.regimes import Outcome
+from ringsweep.regimes import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2, Outcome
 from ringsweep.solvers.rk4 import RK4, STABILITY_LIMIT
 from ringsweep.variables import FAILED, JAMMED, OSCILLATORY, REGIMES, RESTING, REVOLVING, SEPARATING
 
@@ -318,6 +320,35 @@ class TestCertificate:
         np.testing.assert_array_equal(found.reversals > 0, [True, False])
         np.testing.assert_array_equal(found.stiffness, [np.inf, 0.0])
         np.testing.assert_array_equal(found.certified, [False, True])
+
+
+class TestVerdict:
+    """How a run stands after a step, from what was seen at both ends of it."""
+
+    SOUND = Inspection((1.0, 0.0), 0.1, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0)
+
+    @pytest.mark.parametrize(
+        ("change", "standing"),
+        [
+            ({}, (RUNNING, 1.0)),
+            ({"normal_1": -1.0}, (SEPARATED_1, 0.5)),
+            ({"normal_2": -3.0}, (SEPARATED_2, 0.25)),
+            ({"normal_2": 0.0}, (SEPARATED_2, 1.0)),
+            # Both vanish within the step: the first to do so separates.
+            ({"normal_1": -1.0, "normal_2": -3.0}, (SEPARATED_2, 0.25)),
+            ({"normal_1": -3.0, "normal_2": -1.0}, (SEPARATED_1, 0.25)),
+            # A jam has no reactions, so that their signs say nothing.
+            ({"D": 0.0, "normal_2": -1.0}, (JAM, 1.0)),
+            ({"inertia": -1.0, "normal_2": -1.0}, (JAM, 1.0)),
+            ({"inertia": nan}, (BROKEN, 1.0)),
+            ({"D": nan, "inertia": nan}, (BROKEN, 1.0)),
+            ({"rates": (1.0, inf), "normal_2": -1.0}, (BROKEN, 1.0)),
+            ({"rates": (1.0, nan)}, (BROKEN, 1.0)),
+            ({"omega": -inf}, (BROKEN, 1.0)),
+        ],
+    )
+    def test_after_a_sound_state(self, coulomb, change, standing):
+        assert verdict(take(coulomb({}), 0), self.SOUND, self.SOUND._replace(**change)) == standing
 
 
 class TestEnd:

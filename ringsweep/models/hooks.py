@@ -69,7 +69,7 @@ def enter(scene, t, y):
 
 @hook
 def embark(scene):
-    """State at t = 0 in the coordinates of the piecewise-smooth system."""
+    """Time at which the run begins, and the state there in the coordinates of the piecewise-smooth system."""
 
 
 @hook
@@ -133,3 +133,58 @@ def sample(scene, mode, c, t, s):
 @hook
 def onward(mode):
     """The mode after its first step, when no guard is zero any more for its having been entered."""
+
+
+@hook
+def creeps(scene, mode):
+    """Whether the mode is one that can want implicit steps."""
+
+
+@hook
+def is_stiff(scene, mode, y, line):
+    """Whether, linearised, the mode relaxes so fast, compared with its own motion, that it wants an implicit step."""
+
+
+@hook
+def to_stiff(scene, t, y):
+    """State in the coordinates of the implicit method, in which nothing large cancels."""
+
+
+@hook
+def from_stiff(scene, t, x):
+    """State from the coordinates of the implicit method."""
+
+
+@hook
+def forcing(scene, t):
+    """What :func:`stiff_rates` needs of the time `t`."""
+
+
+@hook
+def stiff_rates(scene, mode, force, x):
+    """Time derivative of the state in the coordinates of the implicit method, under a :func:`forcing`."""
+
+
+@hook
+def linearise(scene, mode, t, x):
+    """Time derivative, Jacobian (row by row) and partial derivative by time of :func:`stiff_rates`."""
+
+
+@hook
+def stiff_scales(scene, tolerance):
+    """Error allowed to each component of the state in the coordinates of the implicit method."""
+
+
+@hook
+def stiff_view(scene, mode, t, x):
+    """Guards of the mode, positive while it holds, and what else :func:`stiff_watch` needs of a state."""
+
+
+@hook
+def stiff_watch(scene, record, view, duration):
+    """Record after `duration` seconds in the mode to a state of which this is the view."""
+
+
+@hook
+def stiff_sample(scene, mode, t, x):
+    """One row of a time history."""

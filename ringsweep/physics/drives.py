@@ -61,6 +61,10 @@ class Table(NamedTuple):
     coefficients: Any
 
 
+# A power law has no series at t = 0. What happens before this time is below rounding.
+_BEGINNING = 1e-14
+
+#: Drives by the name that the configuration gives them.
 DRIVES: dict[str, type] = {
     "none": Still,
     "constant": Constant,
@@ -235,8 +239,7 @@ def _expand_arctan(drive, t, order, theta):
 
 @expand.implements(Power)
 def _expand_power(drive, t, order, theta):
-    # No series exists at t = 0; what happens in 1e-14 s is below rounding.
-    t = max(t, 1e-14)
+    t = max(t, _BEGINNING)
     n = drive.exponent
     theta[0] = drive.amplitude * t**n
     for k in range(1, order + 1):
@@ -280,3 +283,51 @@ def _no_knot(drive, t):
 def _next_knot(drive, t):
     j = _piece(drive.knots, t)
     return drive.knots[j + 1] if j + 2 < len(drive.knots) else inf
+
+
+@hook
+def jerk(drive, t):
+    """Third derivative of the ring's angle at time `t` (s), rad/s^3."""
+
+
+@jerk.implements(Still, Constant)
+def _no_jerk(drive, t):
+    return 0.0
+
+
+@jerk.implements(Arctan)
+def _arctan_jerk(drive, t):
+    g = 1.0 / (1.0 + t * t)
+    return -2.0 * drive.amplitude * t * g * g
+
+
+@jerk.implements(Power)
+def _power_jerk(drive, t):
+    n = drive.exponent
+    return drive.amplitude * n * (n - 1.0) * (n - 2.0) * max(t, _BEGINNING) ** (n - 3.0)
+
+
+@jerk.implements(Sinusoidal)
+def _sinusoidal_jerk(drive, t):
+    rate = 2.0 * pi * drive.frequency
+    return -drive.amplitude * rate**3 * cos(rate * t + drive.phase)
+
+
+@jerk.implements(Table)
+def _table_jerk(drive, t):
+    return 6.0 * drive.amplitude * drive.coefficients[_piece(drive.knots, t)][0]
+
+
+@hook
+def beginning(drive):
+    """Time at which the drive's series can begin, s: 0 unless it is singular there."""
+
+
+@beginning.implements(Still, Constant, Arctan, Sinusoidal, Table)
+def _at_zero(drive):
+    return 0.0
+
+
+@beginning.implements(Power)
+def _after_zero(drive):
+    return _BEGINNING

@@ -12,7 +12,7 @@ To add a law: a ``NamedTuple`` with its parameters, one body for :func:`weights`
 
 from __future__ import annotations
 
-from math import exp, inf
+from math import exp, inf, log
 from typing import Annotated, NamedTuple
 
 from ringsweep.jit import hook
@@ -61,6 +61,12 @@ LAWS: dict[str, type] = {
     "bengisu-akay": BengisuAkay,
 }
 
+
+#: Laws whose friction at rest is whatever holds the contact, up to a bound.
+SET_VALUED = (Coulomb, Stiction, Tustin)
+
+#: Laws whose friction is a continuous function of the sliding velocity.
+SMOOTH = (BengisuAkay,)
 
 #: Laws that know no static friction.
 WITHOUT_STATIC = {Coulomb}
@@ -144,8 +150,8 @@ def _one_region(law, region):
 @region_bounds.implements(Tustin, BengisuAkay)
 def _three_regions(law, region):
     band = stiction_band(law)
-    # exp(-40) is below the rounding of the sum of which it is a term.
-    end = band + 40.0 / law.alpha if law.alpha > 0.0 else inf
+    # What is cut off changes the sliding velocity by less than 1e-17 m/s.
+    end = band + min(40.0, max(10.0, 39.1 - log(law.alpha))) / law.alpha if law.alpha > 0.0 else inf
     if region == CLEAN:
         return end, inf
     return (band, end) if region == TAIL else (0.0, band)

@@ -9,6 +9,12 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsweep.scene import Structure
+from ringsweep.variables import FAILED
+
+#: What two resolutions must agree on for a certificate.
+_WITNESSED = ("regime", "motion", "separating_contact")
+
 
 @dataclass(frozen=True)
 class Result:
@@ -34,6 +40,9 @@ class Method:
 
     name: ClassVar[str]
 
+    def check(self, structure: Structure) -> None:
+        """Raise an `InputError` if the method cannot take such a scene."""
+
     def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:
         """Run every cell of `batch`; `outcomes` names the model's columns."""
         raise NotImplementedError
@@ -54,3 +63,10 @@ def same_drive(batch: Any, cells: NDArray[np.intp]) -> Iterator[NDArray[np.intp]
     _, group = np.unique(keys, axis=0, return_inverse=True)
     order = np.argsort(group, kind="stable")
     yield from np.split(cells[order], np.flatnonzero(np.diff(group[order])) + 1)
+
+
+def agree(rows: NDArray[np.float64], witness: NDArray[np.float64], outcomes: tuple[str, ...]) -> NDArray[np.bool_]:
+    """Where two resolutions agree on what is certified, and have not both failed."""
+    columns = [outcomes.index(name) for name in _WITNESSED if name in outcomes]
+    same: NDArray[np.bool_] = (rows[:, columns] == witness[:, columns]).all(axis=1)
+    return same & (rows[:, outcomes.index("regime")] != FAILED)

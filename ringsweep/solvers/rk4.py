@@ -17,8 +17,7 @@ from ringsweep.models.hooks import begin, conclude, describe, inspect, launch, o
 from ringsweep.parameters import Parameter
 from ringsweep.physics.drives import lookup, shape
 from ringsweep.regimes import COMPLETE, RUNNING
-from ringsweep.solvers.common import Method, Result, same_drive
-from ringsweep.variables import FAILED
+from ringsweep.solvers.common import Method, Result, agree, same_drive
 
 #: End of the interval of stability on the negative real axis.
 STABILITY_LIMIT = 2.785
@@ -47,13 +46,7 @@ class RK4(Method):
             stable = np.flatnonzero(report[:, 1] <= STABILITY_LIMIT)
             if len(stable):
                 half, finer = self._integrate(batch, stable, 2 * self.steps, len(outcomes))
-                same = np.ones(len(stable), dtype=bool)
-                regime = outcomes.index("regime")
-                for name in ("regime", "motion", "separating_contact"):
-                    if name in outcomes:
-                        column = outcomes.index(name)
-                        same &= rows[stable, column] == half[:, column]
-                certified[stable] = same & (finer[:, 1] <= STABILITY_LIMIT) & (half[:, regime] != FAILED)
+                certified[stable] = agree(rows[stable], half, outcomes) & (finer[:, 1] <= STABILITY_LIMIT)
         return Result(rows, steps=report[:, 0], stiffness=report[:, 1], certified=certified)
 
     def _integrate(

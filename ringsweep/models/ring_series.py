@@ -1,0 +1,492 @@
+"""The ring as a piecewise-smooth system: modes, guards and their power series.
+
+A mode is a sign of sliding (or stick), a region of the friction law, and the segment under each
+contact. The state is ``(phi, v)``: the sliding velocity itself, not the difference of two large
+angular velocities, so that a band of 1e-9 m/s is resolved.
+
+In slip with constant K the acceleration is ``p omega^2 + q cos phi + r sin phi``; in stick the
+balances of :mod:`ringsweep.physics.ring` are solved for the reactions at the ring's own
+acceleration, and no differential equation is left.
+"""
+
+from __future__ import annotations
+
+from math import cos, inf, sin, sqrt
+from typing import NamedTuple
+
+from ringsweep import regimes
+from ringsweep.jit import hook, inlined
+from ringsweep.models import hooks
+from ringsweep.physics import drives, ring
+from ringsweep.physics.friction import (
+    BAND,
+    CLEAN,
+    TAIL,
+    BengisuAkay,
+    Coulomb,
+    Stiction,
+    Tustin,
+    constant_weights,
+    expand_weights,
+    region_bounds,
+    stiction_band,
+)
+from ringsweep.physics.zones import coefficients, cross, edge_ahead, locate
+from ringsweep.regimes import JAM, RUNNING, SEPARATED_1, SEPARATED_2
+from ringsweep.solvers.series import (
+    INVERSE,
+    ORDER,
+    ascending,
+    crossings,
+    may_fall_below,
+    product,
+    reach,
+    value,
+    variation,
+)
+
+# Rows of the series; the guards last.
+PHI, V, OMEGA, EPSILON, SIN, COS, SQUARE, THETA, SPEED, STATIC, KINETIC = range(11)
+K1, K2, D, LEVER, PULL, LIFT, SPARE = range(11, 18)
+SLOW, NORMAL_1, NORMAL_2, EDGE, FAST, INERTIA = range(18, 24)
+
+
+class Mode(NamedTuple):
+    """Where the ring stands among its smooth pieces.
+
+    ``sign`` of the sliding velocity, 0 in stick; ``region`` of the friction law; ``fresh`` the guard
+    that is zero as the mode is entered, or -1; ``place_1``, ``place_2`` segment and turn of each contact.
+    """
+
+    sign: int
+    region: int
+    fresh: int
+    place_1: tuple[int, int]
+    place_2: tuple[int, int]
+
+
+@hook
+def holding(law, mu_s, mu_k):
+    """Coefficient up to which a contact at rest holds."""
+
+
+@holding.implements(Coulomb)
+def _hold_kinetic(law, mu_s, mu_k):
+    return mu_k
+
+
+@holding.implements(Stiction, Tustin, BengisuAkay)
+def _hold_static(law, mu_s, mu_k):
+    return mu_s
+
+
+@inlined
+def coefficients_under(scene, mode):
+    """Static and kinetic coefficient under each contact."""
+    mu_s1, mu_k1, _ = coefficients(scene.surface, mode.place_1[0])
+    mu_s2, mu_k2, _ = coefficients(scene.surface, mode.place_2[0])
+    return mu_s1, mu_k1, mu_s2, mu_k2
+
+
+@inlined
+def _region(law, speed):
+    """Region that holds a sliding speed, m/s; a boundary belongs to the region above it."""
+    for region in (CLEAN, TAIL):
+        if speed >= region_bounds(law, region)[0]:
+            return region
+    return BAND
+
+
+@hooks.embark.implements(ring.Ring)
+def _embark(scene):
+    t = drives.beginning(scene.drive)
+    _, ring_omega, _ = drives.turn(scene.drive, t)
+    return t, (scene.initial_phi, (scene.initial_omega - ring_omega) * scene.body.radius)
+
+
+@hooks.rows.implements(ring.Ring)
+def _rows(scene):
+    return INERTIA + 1, SLOW
+
+
+@hooks.enter.implements(ring.Ring)
+def _enter(scene, t, y):
+    phi, v = y
+    theta, _, _ = drives.turn(scene.drive, t)
+    offset = ring.contact_offset(scene.body)
+    places = locate(scene.surface, phi - theta - offset), locate(scene.surface, phi - theta + offset)
+    if v == 0.0:
+        if stiction_band(scene.law) == 0.0:
+            return _settle(scene, t, phi, places)
+        # Friction is zero here: the way the body goes is the way that it is pushed.
+        _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
+        push, _, _ = ring.acceleration(scene.body, 0.0, 0.0, sin(phi), cos(phi), ring_omega)
+        return RUNNING, Mode(1 if push >= ring_epsilon else -1, BAND, SLOW, places[0], places[1])
+    return RUNNING, Mode(1 if v > 0.0 else -1, _region(scene.law, abs(v)), -1, places[0], places[1])
+
+
+@inlined
+def _settle(scene, t, phi, places):
+    """Mode of a set-valued law where the sliding velocity is zero: stick unless full friction cannot hold."""
+    _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
+    still = Mode(0, CLEAN, -1, places[0], places[1])
+    mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, still)
+    m1, m2 = holding(scene.law, mu_s1, mu_k1), holding(scene.law, mu_s2, mu_k2)
+    sin_phi, cos_phi = sin(phi), cos(phi)
+    against_forward, D1, inertia_1 = ring.acceleration(scene.body, -m1, -m2, sin_phi, cos_phi, ring_omega)
+    against_backward, D2, inertia_2 = ring.acceleration(scene.body, m1, m2, sin_phi, cos_phi, ring_omega)
+    if not (D1 > 0.0 and D2 > 0.0 and inertia_1 > 0.0 and inertia_2 > 0.0):
+        return JAM, still
+    forward, backward = against_forward > ring_epsilon, against_backward < ring_epsilon
+    region = _region(scene.law, 0.0)
+    if forward and backward:
+        return JAM, still
+    # Without any friction there is nothing to stick to.
+    if forward or (m1 + m2 == 0.0 and not backward):
+        return RUNNING, Mode(1, region, SLOW, places[0], places[1])
+    if backward:
+        return RUNNING, Mode(-1, region, SLOW, places[0], places[1])
+    return RUNNING, still
+
+
+@hooks.switch.implements(ring.Ring)
+def _switch(scene, mode, guard, t, y):
+    phi, v = y
+    sign, region, place_1, place_2 = mode.sign, mode.region, mode.place_1, mode.place_2
+    if guard == NORMAL_1:
+        return SEPARATED_1, mode, y
+    if guard == NORMAL_2:
+        return SEPARATED_2, mode, y
+    if guard == INERTIA:
+        return JAM, mode, y
+    if guard == EDGE:
+        theta, _, _ = drives.turn(scene.drive, t)
+        offset = ring.contact_offset(scene.body)
+        ahead_1 = sign * (edge_ahead(scene.surface, place_1, sign) - (phi - theta - offset))
+        ahead_2 = sign * (edge_ahead(scene.surface, place_2, sign) - (phi - theta + offset))
+        if ahead_1 <= ahead_2:
+            place_1 = cross(scene.surface, place_1, sign)
+        else:
+            place_2 = cross(scene.surface, place_2, sign)
+        return RUNNING, Mode(sign, region, SLOW if v == 0.0 else -1, place_1, place_2), y
+    if sign == 0:
+        return RUNNING, Mode(1 if guard == SLOW else -1, _region(scene.law, 0.0), SLOW, place_1, place_2), (phi, 0.0)
+    low, high = region_bounds(scene.law, region)
+    if guard == FAST:
+        return RUNNING, Mode(sign, region - 1, SLOW, place_1, place_2), (phi, sign * high)
+    if low > 0.0:
+        return RUNNING, Mode(sign, region + 1, FAST, place_1, place_2), (phi, sign * low)
+    if region == BAND:
+        return RUNNING, Mode(-sign, BAND, SLOW, place_1, place_2), (phi, 0.0)
+    status, settled = _settle(scene, t, phi, (place_1, place_2))
+    return status, settled, (phi, 0.0)
+
+
+@inlined
+def _sine(c, k):
+    """Coefficient `k` of sine, cosine and square of the angular velocity."""
+    if k == 0:
+        c[SIN, 0], c[COS, 0] = sin(c[PHI, 0]), cos(c[PHI, 0])
+        c[SQUARE, 0] = c[OMEGA, 0] * c[OMEGA, 0]
+        return
+    # phi' = omega.
+    c[SIN, k] = product(c[OMEGA], c[COS], k - 1) * INVERSE[k]
+    c[COS, k] = -product(c[OMEGA], c[SIN], k - 1) * INVERSE[k]
+    c[SQUARE, k] = product(c[OMEGA], c[OMEGA], k)
+
+
+@inlined
+def _next_state(scene, c, k):
+    """Coefficient `k` + 1 of the state from coefficient `k` of its rate."""
+    c[PHI, k + 1] = c[OMEGA, k] * INVERSE[k + 1]
+    c[OMEGA, k + 1] = c[EPSILON, k] * INVERSE[k + 1]
+    c[V, k + 1] = scene.body.radius * (c[OMEGA, k + 1] - (k + 2.0) * c[THETA, k + 2])
+
+
+@hooks.expand.implements(ring.Ring)
+def _expand(scene, mode, t, y, tolerance, c):
+    drives.expand(scene.drive, t, ORDER + 2, c[THETA])
+    c[PHI, 0] = y[0]
+    c[V, 0] = y[1]
+    if mode.sign == 0:
+        return _expand_stick(scene, mode, tolerance, c)
+    c[OMEGA, 0] = y[1] / scene.body.radius + c[THETA, 1]
+    if constant_weights(scene.law, mode.region):
+        _expand_sliding(scene, mode, c)
+    else:
+        _expand_blended(scene, mode, c)
+    _guard_sliding(scene, mode, c)
+    scale = 1.0 / tolerance
+    rate = scale / (scene.body.radius * (1.0 + abs(c[OMEGA, 0])))
+    last = max(abs(c[PHI, ORDER]) * scale, abs(c[V, ORDER]) * rate)
+    previous = max(abs(c[PHI, ORDER - 1]) * scale, abs(c[V, ORDER - 1]) * rate)
+    return reach(last, previous)
+
+
+@inlined
+def _expand_sliding(scene, mode, c):
+    """Slip with constant K: the flow is autonomous."""
+    body = scene.body
+    _, mu_k1, _, mu_k2 = coefficients_under(scene, mode)
+    k1, k2 = -mode.sign * mu_k1, -mode.sign * mu_k2
+    p, determinant, inertia = ring.acceleration(body, k1, k2, 0.0, 0.0, 1.0)
+    q, _, _ = ring.acceleration(body, k1, k2, 0.0, 1.0, 0.0)
+    r, _, _ = ring.acceleration(body, k1, k2, 1.0, 0.0, 0.0)
+    for k in range(ORDER + 1):
+        _sine(c, k)
+        c[EPSILON, k] = p * c[SQUARE, k] + q * c[COS, k] + r * c[SIN, k]
+        if k < ORDER:
+            _next_state(scene, c, k)
+    # Reactions are linear in sine, cosine, square and acceleration.
+    s1, s2 = ring.reactions(body, k1, k2, 1.0, 0.0, 0.0, 0.0)
+    c1, c2 = ring.reactions(body, k1, k2, 0.0, 1.0, 0.0, 0.0)
+    w1, w2 = ring.reactions(body, k1, k2, 0.0, 0.0, 1.0, 0.0)
+    e1, e2 = ring.reactions(body, k1, k2, 0.0, 0.0, 0.0, 1.0)
+    for k in range(ORDER + 1):
+        c[NORMAL_1, k] = s1 * c[SIN, k] + c1 * c[COS, k] + w1 * c[SQUARE, k] + e1 * c[EPSILON, k]
+        c[NORMAL_2, k] = s2 * c[SIN, k] + c2 * c[COS, k] + w2 * c[SQUARE, k] + e2 * c[EPSILON, k]
+    c[INERTIA, 0] = inf if determinant > 0.0 and inertia > 0.0 else -1.0
+
+
+@inlined
+def _expand_blended(scene, mode, c):
+    """Slip in which the friction coefficients vary with the sliding speed."""
+    mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
+    for k in range(ORDER + 1):
+        _sine(c, k)
+        c[SPEED, k] = mode.sign * c[V, k]
+        expand_weights(scene.law, mode.region, c[SPEED], k, c[STATIC], c[KINETIC])
+        c[K1, k] = -mode.sign * (c[STATIC, k] * mu_s1 + c[KINETIC, k] * mu_k1)
+        c[K2, k] = -mode.sign * (c[STATIC, k] * mu_s2 + c[KINETIC, k] * mu_k2)
+        c[EPSILON, k] = _acceleration_term(scene.body, c, k)
+        if k < ORDER:
+            _next_state(scene, c, k)
+    _reaction_terms(scene.body, c)
+    if not c[D, 0] > 0.0:
+        c[INERTIA, 0] = -1.0
+
+
+@hook
+def _acceleration_term(body, c, k):
+    """Coefficient `k` of the angular acceleration where K1 and K2 are series."""
+
+
+@_acceleration_term.implements(ring.TwoContacts)
+def _two_acceleration_term(body, c, k):
+    b = body
+    both = product(c[K1], c[K2], k)
+    difference = c[K1, k] - c[K2, k]
+    one = 1.0 if k == 0 else 0.0
+    RM, Mxi = b.radius * b.mass, b.mass * b.xi
+    cos_2beta = b.cos_beta * b.cos_beta - b.sin_beta * b.sin_beta
+    c[D, k] = difference * cos_2beta + (one + both) * 2.0 * b.sin_beta * b.cos_beta
+    T = difference * b.cos_beta + 2.0 * both * b.sin_beta
+    c[INERTIA, k] = (b.inertia + Mxi * b.xi) * c[D, k] - RM * b.xi * T
+    c[LEVER, k] = b.gravity * (RM * T - Mxi * c[D, k])
+    c[PULL, k] = RM * (c[K1, k] + c[K2, k])
+    c[LIFT, k] = (b.gravity * c[COS, k] + b.xi * c[SQUARE, k]) * b.sin_beta
+    c[EPSILON, k] = 0.0
+    moment = product(c[SIN], c[LEVER], k) + product(c[LIFT], c[PULL], k)
+    return (moment - product(c[INERTIA], c[EPSILON], k)) / c[INERTIA, 0]
+
+
+@_acceleration_term.implements(ring.OneContact)
+def _one_acceleration_term(body, c, k):
+    c[D, k] = c[INERTIA, k] = 1.0 if k == 0 else 0.0
+    c[LIFT, k] = body.gravity / body.radius * c[COS, k] + c[SQUARE, k]
+    return product(c[K1], c[LIFT], k) - body.gravity / body.radius * c[SIN, k]
+
+
+@hook
+def _reaction_terms(body, c):
+    """Series of the normal reactions where K1 and K2 are series."""
+
+
+@_reaction_terms.implements(ring.TwoContacts)
+def _two_reaction_terms(body, c):
+    b = body
+    sb, cb = b.sin_beta, b.cos_beta
+    plus, minus = c[LEVER], c[PULL]
+    for k in range(ORDER + 1):
+        plus[k] = b.gravity * (c[COS, k] * cb - c[SIN, k] * sb) + b.xi * (c[SQUARE, k] * cb - c[EPSILON, k] * sb)
+        minus[k] = b.gravity * (c[COS, k] * cb + c[SIN, k] * sb) + b.xi * (c[SQUARE, k] * cb + c[EPSILON, k] * sb)
+        n1 = b.gravity * (c[SIN, k] * cb + c[COS, k] * sb) + b.xi * (c[SQUARE, k] * sb + c[EPSILON, k] * cb)
+        n2 = -b.gravity * (c[SIN, k] * cb - c[COS, k] * sb) + b.xi * (c[SQUARE, k] * sb - c[EPSILON, k] * cb)
+        n1 = b.mass * (n1 - product(c[K2], plus, k))
+        n2 = b.mass * (n2 + product(c[K1], minus, k))
+        c[NORMAL_1, k] = c[NORMAL_2, k] = 0.0
+        c[NORMAL_1, k] = (n1 - product(c[D], c[NORMAL_1], k)) / c[D, 0]
+        c[NORMAL_2, k] = (n2 - product(c[D], c[NORMAL_2], k)) / c[D, 0]
+
+
+@_reaction_terms.implements(ring.OneContact)
+def _one_reaction_terms(body, c):
+    for k in range(ORDER + 1):
+        c[NORMAL_1, k] = body.mass * (body.gravity * c[COS, k] + body.radius * c[SQUARE, k])
+        c[NORMAL_2, k] = c[NORMAL_1, k]
+
+
+@inlined
+def _guard_sliding(scene, mode, c):
+    """Guards of slip: both bounds of the region of speed, and the nearer edge."""
+    low, high = region_bounds(scene.law, mode.region)
+    offset = ring.contact_offset(scene.body)
+    rho = c[PHI, 0] - c[THETA, 0]
+    ahead_1 = mode.sign * (edge_ahead(scene.surface, mode.place_1, mode.sign) - (rho - offset))
+    ahead_2 = mode.sign * (edge_ahead(scene.surface, mode.place_2, mode.sign) - (rho + offset))
+    for k in range(1, ORDER + 1):
+        c[SLOW, k] = mode.sign * c[V, k]
+        c[FAST, k] = -c[SLOW, k]
+        c[EDGE, k] = -mode.sign * (c[PHI, k] - c[THETA, k])
+    c[SLOW, 0] = 0.0 if mode.fresh == SLOW else mode.sign * c[V, 0] - low
+    c[FAST, 0] = 0.0 if mode.fresh == FAST else high - mode.sign * c[V, 0]
+    c[EDGE, 0] = min(ahead_1, ahead_2)
+    # Breakaway of a law without a drop of friction is tangential: what is left of the slope is rounding.
+    if mode.fresh == SLOW and low == 0.0:
+        body = scene.body
+        terms = body.gravity + body.radius * (c[SQUARE, 0] + abs(c[EPSILON, 0]) + 2.0 * abs(c[THETA, 2]))
+        if abs(c[V, 1]) <= 1e-12 * terms:
+            c[SLOW, 1] = 0.0
+
+
+@inlined
+def _expand_stick(scene, mode, tolerance, c):
+    """Stick: the body moves with the ring; reactions and friction follow from the balances."""
+    for k in range(ORDER + 1):
+        c[V, k] = 0.0
+        c[OMEGA, k] = (k + 1.0) * c[THETA, k + 1]
+        c[EPSILON, k] = (k + 1.0) * (k + 2.0) * c[THETA, k + 2]
+        if k > 0:
+            c[PHI, k] = c[THETA, k]
+        _sine(c, k)
+    mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
+    _hold(scene.body, holding(scene.law, mu_s1, mu_k1), holding(scene.law, mu_s2, mu_k2), c)
+    c[EDGE, 0] = inf
+    c[INERTIA, 0] = inf
+    weight = 1.0 / (scene.body.mass * (scene.body.gravity + scene.body.radius * c[SQUARE, 0]))
+    last, previous = 0.0, 0.0
+    for row, unit in ((PHI, 1.0), (SIN, 1.0), (COS, 1.0), (SLOW, weight), (FAST, weight)):
+        last = max(last, abs(c[row, ORDER]) * unit)
+        previous = max(previous, abs(c[row, ORDER - 1]) * unit)
+    return reach(last / tolerance, previous / tolerance)
+
+
+@hook
+def _hold(body, m1, m2, c):
+    """Fill reactions and the reserves of friction forwards (SLOW) and backwards (FAST) in stick.
+
+    The moment about the axis gives the total friction, the tangential balance the difference of
+    the reactions, the radial one, with friction shared in proportion to ``m_i N_i``, a quadratic
+    equation for their sum.
+    """
+
+
+@_hold.implements(ring.TwoContacts)
+def _two_hold(body, m1, m2, c):
+    b = body
+    sb, cb = b.sin_beta, b.cos_beta
+    mean, half = 0.5 * (m1 + m2), 0.5 * (m1 - m2)
+    moment = b.inertia + b.mass * b.xi * b.xi
+    friction, difference, load, total, linear = c[K1], c[K2], c[D], c[PULL], c[SPARE]
+    share = c[LEVER]
+    for k in range(ORDER + 1):
+        friction[k] = (moment * c[EPSILON, k] + b.mass * b.gravity * b.xi * c[SIN, k]) / b.radius
+        difference[k] = (b.mass * (b.xi * c[EPSILON, k] + b.gravity * c[SIN, k]) - friction[k] * cb) / sb
+        load[k] = b.mass * (b.xi * c[SQUARE, k] + b.gravity * c[COS, k])
+        # mean cb total^2 - linear total - constant = 0
+        linear[k] = mean * load[k] - cb * half * difference[k] + sb * half * friction[k]
+        share[k] = half * load[k] + mean * sb * friction[k]
+        constant = product(difference, share, k)
+        if k == 0:
+            root = sqrt(linear[0] * linear[0] + 4.0 * mean * cb * constant)
+            total[0] = (linear[0] + root) / (2.0 * mean * cb)
+        else:
+            total[k] = 0.0
+            rest = constant + product(linear, total, k) - mean * cb * product(total, total, k)
+            total[k] = rest / (2.0 * mean * cb * total[0] - linear[0])
+        c[NORMAL_1, k] = 0.5 * (total[k] + difference[k])
+        c[NORMAL_2, k] = 0.5 * (total[k] - difference[k])
+        reserve = m1 * c[NORMAL_1, k] + m2 * c[NORMAL_2, k]
+        c[SLOW, k], c[FAST, k] = reserve + friction[k], reserve - friction[k]
+
+
+@_hold.implements(ring.OneContact)
+def _one_hold(body, m1, m2, c):
+    for k in range(ORDER + 1):
+        friction = body.mass * (body.radius * c[EPSILON, k] + body.gravity * c[SIN, k])
+        c[NORMAL_1, k] = body.mass * (body.gravity * c[COS, k] + body.radius * c[SQUARE, k])
+        c[NORMAL_2, k] = c[NORMAL_1, k]
+        c[SLOW, k], c[FAST, k] = m1 * c[NORMAL_1, k] + friction, m1 * c[NORMAL_1, k] - friction
+
+
+@hooks.land.implements(ring.Ring)
+def _land(scene, mode, c, t, s):
+    return value(c[PHI], s), value(c[V], s)
+
+
+@hooks.watch.implements(ring.Ring)
+def _watch(scene, record, mode, c, s, work):
+    instants = work[0]
+    count = 0
+    omega, sway, shift = c[OMEGA, 0], variation(c[OMEGA], s), variation(c[PHI], s)
+    turning = abs(omega) <= sway
+    # An extreme is looked for where it could be a new one, or a reversal within the step.
+    if turning and not (c[PHI, 0] - shift >= record.lowest and c[PHI, 0] + shift <= record.highest):
+        count = crossings(c[OMEGA], s, work, count)
+    if turning or omega - sway < record.omega_min or omega + sway > record.omega_max:
+        count = crossings(c[EPSILON], s, work, count)
+    for row, lowest in ((NORMAL_1, record.normal_min_1), (NORMAL_2, record.normal_min_2)):
+        if may_fall_below(c[row], s, lowest):
+            for k in range(ORDER):
+                c[SPARE, k] = (k + 1.0) * c[row, k + 1]
+            c[SPARE, ORDER] = 0.0
+            count = crossings(c[SPARE], s, work, count)
+    ascending(instants, count)
+    before = 0.0
+    stuck = mode.sign == 0 or mode.region == BAND
+    for j in range(count + 1):
+        now = instants[j] if j < count else s
+        record = regimes.observe(
+            record,
+            value(c[PHI], now),
+            value(c[OMEGA], now),
+            value(c[NORMAL_1], now),
+            value(c[NORMAL_2], now),
+            now - before if stuck else 0.0,
+            scene.epsilon_omega,
+        )
+        before = now
+    return record
+
+
+@hooks.sample.implements(ring.Ring)
+def _sample(scene, mode, c, t, s):
+    _, _, zone_1 = coefficients(scene.surface, mode.place_1[0])
+    _, _, zone_2 = coefficients(scene.surface, mode.place_2[0])
+    return (
+        value(c[PHI], s),
+        value(c[OMEGA], s),
+        value(c[EPSILON], s),
+        value(c[NORMAL_1], s),
+        value(c[NORMAL_2], s),
+        drives.turn(scene.drive, t)[1],
+        zone_1,
+        zone_2,
+        0.0 if mode.region == BAND else float(mode.sign),
+    )
+
+
+@hooks.start.implements(ring.Ring)
+def _start(scene, c):
+    return regimes.begin(c[PHI, 0], c[OMEGA, 0], c[NORMAL_1, 0], c[NORMAL_2, 0], scene.epsilon_omega)
+
+
+@hooks.finish.implements(ring.Ring)
+def _finish(scene, record, status, t, y):
+    _, ring_omega, _ = drives.turn(scene.drive, t)
+    return regimes.conclude(record, status, t, y[0], y[1] / scene.body.radius + ring_omega)
+
+
+@hooks.onward.implements(Mode)
+def _onward(mode):
+    return Mode(mode.sign, mode.region, -1, mode.place_1, mode.place_2)

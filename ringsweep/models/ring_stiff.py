@@ -1,0 +1,136 @@
+"""The ring within the stiction band of a smooth law, where it creeps on a slow manifold.
+
+The state is ``(rho, v)``, angle in the ring's frame and sliding velocity: neither is the difference
+of two large numbers, however slow the creep.
+"""
+
+from __future__ import annotations
+
+from math import cos, sin, sqrt
+
+from ringsweep import regimes
+from ringsweep.jit import inlined
+from ringsweep.models import hooks
+from ringsweep.models.ring_series import coefficients_under
+from ringsweep.physics import drives, ring
+from ringsweep.physics.friction import BAND, stiction_band, weights
+from ringsweep.physics.zones import coefficients, edge_ahead
+
+
+@inlined
+def _friction(scene, mode, v):
+    """K at each contact and its derivative by the angular velocity, in the segments of the mode."""
+    mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
+    sign = 1.0 if v >= 0.0 else -1.0
+    w_s, w_k, dw_s, dw_k = weights(scene.law, abs(v))
+    radius = scene.body.radius
+    return (
+        -sign * (w_s * mu_s1 + w_k * mu_k1),
+        -sign * (w_s * mu_s2 + w_k * mu_k2),
+        -radius * (dw_s * mu_s1 + dw_k * mu_k1),
+        -radius * (dw_s * mu_s2 + dw_k * mu_k2),
+    )
+
+
+@hooks.to_stiff.implements(ring.Ring)
+def _to_stiff(scene, t, y):
+    return y[0] - drives.turn(scene.drive, t)[0], y[1]
+
+
+@hooks.from_stiff.implements(ring.Ring)
+def _from_stiff(scene, t, x):
+    return x[0] + drives.turn(scene.drive, t)[0], x[1]
+
+
+@hooks.is_stiff.implements(ring.Ring)
+def _is_stiff(scene, mode, y, line):
+    (_, push), (_, _, _, decay), _ = line
+    # Fast against the body's own motion, and settled: what is left of the way in, and the way out
+    # through the top of the band, run at the rate of the decay itself.
+    own = sqrt(scene.body.gravity / scene.body.radius) + abs(y[1]) / scene.body.radius
+    return -decay > 50.0 * own and abs(push) < 0.01 * -decay * stiction_band(scene.law)
+
+
+@hooks.creeps.implements(ring.Ring)
+def _creeps(scene, mode):
+    return mode.region == BAND
+
+
+@hooks.forcing.implements(ring.Ring)
+def _forcing(scene, t):
+    return drives.turn(scene.drive, t)
+
+
+@hooks.stiff_scales.implements(ring.Ring)
+def _stiff_scales(scene, tolerance):
+    return tolerance, tolerance * stiction_band(scene.law)
+
+
+@hooks.stiff_rates.implements(ring.Ring)
+def _stiff_rates(scene, mode, force, x):
+    radius = scene.body.radius
+    theta, ring_omega, ring_epsilon = force
+    phi, omega = x[0] + theta, x[1] / radius + ring_omega
+    K1, K2, _, _ = _friction(scene, mode, x[1])
+    epsilon, _, _ = ring.acceleration(scene.body, K1, K2, sin(phi), cos(phi), omega)
+    return x[1] / radius, radius * (epsilon - ring_epsilon)
+
+
+@hooks.linearise.implements(ring.Ring)
+def _linearise(scene, mode, t, x):
+    b = scene.body
+    radius = b.radius
+    theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
+    ring_jerk = drives.jerk(scene.drive, t)
+    phi, omega = x[0] + theta, x[1] / radius + ring_omega
+    K1, K2, slope_1, slope_2 = _friction(scene, mode, x[1])
+    sin_phi, cos_phi = sin(phi), cos(phi)
+    epsilon, _, _ = ring.acceleration(b, K1, K2, sin_phi, cos_phi, omega)
+    # epsilon = p omega^2 + q cos phi + r sin phi
+    p, _, _ = ring.acceleration(b, K1, K2, 0.0, 0.0, 1.0)
+    by_phi, _, _ = ring.acceleration(b, K1, K2, cos_phi, -sin_phi, 0.0)
+    by_omega = 2.0 * p * omega
+    friction = ring.acceleration_slope(b, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega)
+    return (
+        (x[1] / radius, radius * (epsilon - ring_epsilon)),
+        (0.0, 1.0 / radius, radius * by_phi, by_omega + friction),
+        (0.0, radius * (by_phi * ring_omega + by_omega * ring_epsilon - ring_jerk)),
+    )
+
+
+@hooks.stiff_view.implements(ring.Ring)
+def _stiff_view(scene, mode, t, x):
+    theta, ring_omega, _ = drives.turn(scene.drive, t)
+    phi, omega = x[0] + theta, x[1] / scene.body.radius + ring_omega
+    K1, K2, _, _ = _friction(scene, mode, x[1])
+    sin_phi, cos_phi = sin(phi), cos(phi)
+    epsilon, determinant, inertia = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
+    normal_1, normal_2 = ring.reactions(scene.body, K1, K2, sin_phi, cos_phi, omega, epsilon)
+    offset = ring.contact_offset(scene.body)
+    ahead_1 = mode.sign * (edge_ahead(scene.surface, mode.place_1, mode.sign) - (x[0] - offset))
+    ahead_2 = mode.sign * (edge_ahead(scene.surface, mode.place_2, mode.sign) - (x[0] + offset))
+    speed = mode.sign * x[1]
+    # In the order of the rows of the series: SLOW, NORMAL_1, NORMAL_2, EDGE, FAST, INERTIA.
+    guards = (
+        speed,
+        normal_1,
+        normal_2,
+        min(ahead_1, ahead_2),
+        stiction_band(scene.law) - speed,
+        min(determinant, inertia),
+    )
+    return guards, (phi, omega, epsilon, ring_omega)
+
+
+@hooks.stiff_watch.implements(ring.Ring)
+def _stiff_watch(scene, record, view, duration):
+    guards, (phi, omega, _, _) = view
+    return regimes.observe(record, phi, omega, guards[1], guards[2], duration, scene.epsilon_omega)
+
+
+@hooks.stiff_sample.implements(ring.Ring)
+def _stiff_sample(scene, mode, t, x):
+    guards, (phi, omega, epsilon, ring_omega) = hooks.stiff_view(scene, mode, t, x)
+    _, _, zone_1 = coefficients(scene.surface, mode.place_1[0])
+    _, _, zone_2 = coefficients(scene.surface, mode.place_2[0])
+    return phi, omega, epsilon, guards[1], guards[2], ring_omega, zone_1, zone_2, 0.0

@@ -1,0 +1,308 @@
+"""Piecewise-smooth integration: power series within a mode, guards whose roots end it.
+
+The series of a mode is exact to the tolerance on its step, and every guard is a series on the same
+step, so that its first root is located to rounding and none is stepped over. A mode of a smooth law
+that relaxes much faster than it moves is taken by implicit steps instead (:mod:`rosenbrock`);
+scenes with a set-valued law have none, and their kernels do not contain the method.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+
+import numpy as np
+
+from ringsweep.jit import hook, inlined, kernel, take
+from ringsweep.models.hooks import (
+    creeps,
+    embark,
+    enter,
+    expand,
+    finish,
+    from_stiff,
+    is_stiff,
+    land,
+    linearise,
+    onward,
+    rows,
+    sample,
+    start,
+    stiff_sample,
+    stiff_scales,
+    stiff_view,
+    stiff_watch,
+    switch,
+    to_stiff,
+    watch,
+)
+from ringsweep.physics.drives import next_knot
+from ringsweep.physics.friction import SET_VALUED, SMOOTH
+from ringsweep.regimes import BROKEN, COMPLETE, RUNNING
+from ringsweep.solvers import rosenbrock
+from ringsweep.solvers.series import ORDER, STACK, first_root
+
+
+@inlined
+def _first_event(c, guards, fresh, h, work):
+    """First guard to reach zero within the step `h`, and when; -1 and `h` if none does.
+
+    A guard that is zero as its mode is entered has that root divided out.
+    """
+    event = -1
+    for g in range(guards, c.shape[0]):
+        row = c[g]
+        if g == fresh:
+            low = 0
+            while low < ORDER and row[low] == 0.0:
+                low += 1
+            if row[low] == 0.0:
+                continue
+            for k in range(ORDER + 1):
+                row[k] = row[k + low] if k + low <= ORDER else 0.0
+        if row[0] <= 0.0:
+            return g, 0.0
+        s, found = first_root(row, h, work)
+        if found and (event < 0 or s < h):
+            event, h = g, s
+    return event, h
+
+
+@inlined
+def _guard_after(scene, mode, t, x, line, h, g, stages):
+    """Guard `g` after a step `h`."""
+    x_next, _ = rosenbrock.step(scene, mode, t, x, line, h, stages)
+    return stiff_view(scene, mode, t + h, x_next)[0][g]
+
+
+@inlined
+def _locate(scene, mode, t, x, line, h, g, stages):
+    """Step at which guard `g`, not positive after a step `h`, reaches zero, by steps of that very length.
+
+    The method itself, not an interpolant of it, is solved for the event.
+    """
+    low, high = 0.0, h
+    f_low = stiff_view(scene, mode, t, x)[0][g]
+    f_high = _guard_after(scene, mode, t, x, line, h, g, stages)
+    if f_low <= 0.0:
+        # Zero as the mode was entered: find a step before the event, if there is one.
+        s = h
+        for _ in range(80):
+            s *= 0.5
+            f_low = _guard_after(scene, mode, t, x, line, s, g, stages)
+            if f_low > 0.0:
+                low = s
+                break
+            high, f_high = s, f_low
+        if low == 0.0:
+            return 0.0
+    for _ in range(60):
+        s = (low * f_high - high * f_low) / (f_high - f_low)
+        if not (low < s < high):
+            s = 0.5 * (low + high)
+        f = _guard_after(scene, mode, t, x, line, s, g, stages)
+        if f > 0.0:
+            # Illinois: an end that stays is made to count for less.
+            low, f_low = s, f
+            f_high *= 0.5
+        else:
+            high, f_high = s, f
+            f_low *= 0.5
+        if high - low <= 1e-14 * h or high - low <= 2e-16 * t:
+            break
+    return high
+
+
+@hook
+def _creep(law, scene, record, mode, t, y, h, horizon, tolerance, guards, stages):
+    """One accepted implicit step, cut at the first event within it.
+
+    Returns
+    -------
+    tuple
+        Whether the mode is stiff here (nothing is done where it is not), guard or -1, length of the
+        step (negative if none was found), state, record, next step to try.
+    """
+
+
+@_creep.implements(*SET_VALUED)
+def _no_creep(law, scene, record, mode, t, y, h, horizon, tolerance, guards, stages):
+    return False, -1, 0.0, y, record, h
+
+
+@_creep.implements(*SMOOTH)
+def _stiff_creep(law, scene, record, mode, t, y, h, horizon, tolerance, guards, stages):
+    if not creeps(scene, mode):
+        return False, -1, 0.0, y, record, h
+    x = to_stiff(scene, t, y)
+    line = linearise(scene, mode, t, x)
+    if not is_stiff(scene, mode, y, line):
+        return False, -1, 0.0, y, record, h
+    scale_0, scale_1 = stiff_scales(scene, tolerance)
+    s = min(h, horizon)
+    for _ in range(200):
+        x_next, error = rosenbrock.step(scene, mode, t, x, line, s, stages)
+        size = max(abs(error[0]) / scale_0, abs(error[1]) / scale_1)
+        if size <= 1.0:
+            break
+        s *= max(0.2, 0.9 * size**-0.2) if isfinite(size) else 0.1
+    else:
+        return True, -1, -1.0, y, record, h
+    grown = s * min(6.0, 0.9 * max(size, 1e-8) ** -0.2)
+    # A step cut short by the horizon says little about the next one.
+    h = max(h, grown) if s == horizon else grown
+    within = stiff_view(scene, mode, t + 0.5 * s, rosenbrock.dense(x, x_next, stages, 0.5))
+    after = stiff_view(scene, mode, t + s, x_next)
+    event, end = -1, s
+    for g in range(len(after[0])):
+        if after[0][g] <= 0.0 or within[0][g] <= 0.0:
+            until = min(end, s if after[0][g] <= 0.0 else 0.5 * s)
+            if event >= 0 and _guard_after(scene, mode, t, x, line, until, g, stages) > 0.0:
+                continue
+            event, end = guards + g, _locate(scene, mode, t, x, line, until, g, stages)
+    if event >= 0:
+        if end == 0.0:
+            return True, event, 0.0, y, record, h
+        x_next, _ = rosenbrock.step(scene, mode, t, x, line, end, stages)
+        within = stiff_view(scene, mode, t + 0.5 * end, rosenbrock.dense(x, x_next, stages, 0.5))
+        after = stiff_view(scene, mode, t + end, x_next)
+    record = stiff_watch(scene, record, within, 0.5 * end)
+    record = stiff_watch(scene, record, after, 0.5 * end)
+    return True, event, end, from_stiff(scene, t + end, x_next), record, h
+
+
+@inlined
+def _store(row, values):
+    for k in range(len(values)):
+        row[k] = values[k]
+
+
+@kernel
+def trace(batch, tolerance, creep_tolerance, limit, spacing, times, table):
+    """History of cell 0: every end of a step, and within longer ones instants `spacing` apart.
+
+    Parameters
+    ----------
+    batch, tolerance, creep_tolerance, limit
+        As for :func:`integrate`.
+    spacing : float
+        Greatest distance between rows, s.
+    times, table : ndarray of shapes ``(rows,)`` and ``(rows, variables)``
+        Filled as far as they reach.
+
+    Returns
+    -------
+    int
+        Number of rows.
+    """
+    scene = take(batch, 0)
+    count, guards = rows(scene)
+    c = np.zeros((count, ORDER + 3))
+    work = np.empty((STACK, ORDER + 3))
+    stages = np.empty((rosenbrock.STAGES, 2))
+    t, y = embark(scene)
+    status, mode = enter(scene, t, y)
+    expand(scene, mode, t, y, tolerance, c)
+    record = start(scene, c)
+    trial = 1e-6 * scene.span
+    n = 0
+    entered = True
+    for _ in range(limit):
+        if status != RUNNING or n == len(times):
+            break
+        horizon = min(scene.span, next_knot(scene.drive, t)) - t
+        stiff, guard, s, y_next, record, trial = _creep(
+            scene.law, scene, record, mode, t, y, min(trial, spacing), horizon, creep_tolerance, guards, stages
+        )
+        if stiff:
+            if s > 0.0:
+                for ahead, state in ((0.0, y), (s, y_next)):
+                    if (entered or ahead > 0.0) and n < len(times):
+                        _store(table[n], stiff_sample(scene, mode, t + ahead, to_stiff(scene, t + ahead, state)))
+                        times[n] = t + ahead
+                        n += 1
+            y = y_next
+        else:
+            h = min(expand(scene, mode, t, y, tolerance, c), horizon)
+            guard, s = _first_event(c, guards, mode.fresh, h, work)
+            if s > 0.0:
+                parts = int(s / spacing) + 1
+                for part in range(0 if entered else 1, parts + 1):
+                    if n < len(times):
+                        inside = s * part / parts
+                        _store(table[n], sample(scene, mode, c, t + inside, inside))
+                        times[n] = t + inside
+                        n += 1
+            y = land(scene, mode, c, t, s)
+        if not s >= 0.0:
+            break
+        entered = guard >= 0 or (entered and s == 0.0)
+        t = t + s if s < horizon else t + horizon
+        if guard >= 0:
+            status, mode, y = switch(scene, mode, guard, t, y)
+            trial = 1e-6 * scene.span
+        elif t >= scene.span:
+            status = COMPLETE
+        elif s > 0.0:
+            mode = onward(mode)
+    return n
+
+
+@kernel
+def integrate(batch, tolerance, creep_tolerance, limit, out, steps):
+    """Run every cell of a batch to its end, or to `limit` steps.
+
+    Parameters
+    ----------
+    batch : NamedTuple
+        Cells, as :func:`ringsweep.scene.batch` makes them.
+    tolerance, creep_tolerance : float
+        Error allowed to a step of the series and to an implicit step: rad, and rad/s relative to
+        1 rad/s + \\|omega\\| or m/s relative to the width of the stiction band.
+    limit : int
+        Steps after which a run is given up.
+    out : ndarray of shape ``(cells, outcomes)``
+    steps : ndarray of shape ``(cells,)``
+    """
+    count, guards = rows(take(batch, 0))
+    c = np.zeros((count, ORDER + 3))
+    work = np.empty((STACK, ORDER + 3))
+    stages = np.empty((rosenbrock.STAGES, 2))
+    for i in range(len(steps)):
+        scene = take(batch, i)
+        t, y = embark(scene)
+        status, mode = enter(scene, t, y)
+        expand(scene, mode, t, y, tolerance, c)
+        record = start(scene, c)
+        trial = 1e-6 * scene.span
+        n = 0
+        while status == RUNNING:
+            if n == limit:
+                status = BROKEN
+                break
+            n += 1
+            horizon = min(scene.span, next_knot(scene.drive, t)) - t
+            stiff, guard, s, y, record, trial = _creep(
+                scene.law, scene, record, mode, t, y, trial, horizon, creep_tolerance, guards, stages
+            )
+            if not stiff:
+                h = min(expand(scene, mode, t, y, tolerance, c), horizon)
+                guard, s = _first_event(c, guards, mode.fresh, h, work)
+                if s > 0.0:
+                    record = watch(scene, record, mode, c, s, work)
+                y = land(scene, mode, c, t, s)
+            if not s >= 0.0:
+                status = BROKEN
+                break
+            # To the very end of the span or of a piece of the drive, not to the rounding of a sum.
+            t = t + s if s < horizon else t + horizon
+            if guard >= 0:
+                status, mode, y = switch(scene, mode, guard, t, y)
+                trial = 1e-6 * scene.span
+            elif t >= scene.span:
+                status = COMPLETE
+            elif s > 0.0:
+                mode = onward(mode)
+        outcome = finish(scene, record, status, t, y)
+        for k in range(len(outcome)):
+            out[i, k] = outcome[k]
+        steps[i] = n

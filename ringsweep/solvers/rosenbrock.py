@@ -1,0 +1,157 @@
+"""Rodas5P: an L-stable Rosenbrock method of order 5 with dense output of order 4.
+
+One linear system per stage and no iteration, which is what a stiff system of two equations wants;
+its order does not drop on the slow manifold that a stuck contact creeps along. Coefficients:
+G. Steinebach, BIT Numerical Mathematics 63, 27 (2023).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ringsweep.jit import inlined
+from ringsweep.models.hooks import forcing, stiff_rates
+
+STAGES = 8
+GAMMA = 0.21193756319429014
+
+A = np.zeros((STAGES, STAGES))
+A[1, :1] = 3.0
+A[2, :2] = 2.849394379747939, 0.45842242204463923
+A[3, :3] = -6.954028509809101, 2.489845061869568, -10.358996098473584
+A[4, :4] = 2.8029986275628964, 0.5072464736228206, -0.3988312541770524, -0.04721187230404641
+A[5, :5] = -7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946
+A[6] = A[5]
+A[6, 5] = 1.0
+A[7] = A[6]
+A[7, 6] = 1.0
+
+C = np.zeros((STAGES, STAGES))
+C[1, :1] = -14.155112264123755
+C[2, :2] = -17.97296035885952, -2.859693295451294
+C[3, :3] = 147.12150275711716, -1.41221402718213, 71.68940251302358
+C[4, :4] = 165.43517024871676, -0.4592823456491126, 42.90938336958603, -5.961986721573306
+C[5, :5] = 24.854864614690072, -3.0009227002832186, 47.4931110020768, 5.5814197821558125, -0.6610691825249471
+C[6, :6] = (
+    30.91273214028599,
+    -3.1208243349937974,
+    77.79954646070892,
+    34.28646028294783,
+    -19.097331116725623,
+    -28.087943162872662,
+)
+C[7, :7] = (
+    37.80277123390563,
+    -3.2571969029072276,
+    112.26918849496327,
+    66.9347231244047,
+    -40.06618937091002,
+    -54.66780262877968,
+    -9.48861652309627,
+)
+
+#: Times of the stages, and weights of the time derivative.
+TIMES = np.array([0.0, 0.6358126895828704, 0.4095798393397535, 0.9769306725060716, 0.4288403609558664, 1.0, 1.0, 1.0])
+DRIFT = np.array(
+    [
+        0.21193756319429014,
+        -0.42387512638858027,
+        -0.3384627126235924,
+        1.8046452872882734,
+        2.325825639765069,
+        0.0,
+        0.0,
+        0.0,
+    ]
+)
+
+#: Dense output.
+DENSE = np.array(
+    [
+        [
+            25.948786856663858,
+            -2.5579724845846235,
+            10.433815404888879,
+            -2.3679251022685204,
+            0.524948541321073,
+            1.1241088310450404,
+            0.4272876194431874,
+            -0.17202221070155493,
+        ],
+        [
+            -9.91568850695171,
+            -0.9689944594115154,
+            3.0438037242978453,
+            -24.495224566215796,
+            20.176138334709044,
+            15.98066361424651,
+            -6.789040303419874,
+            -6.710236069923372,
+        ],
+        [
+            11.419903575922262,
+            2.8879645146136994,
+            72.92137995996029,
+            80.12511834622643,
+            -52.072871366152654,
+            -59.78993625266729,
+            -0.15582684282751913,
+            4.883087185713722,
+        ],
+    ]
+)
+
+
+@inlined
+def step(scene, mode, t, x, line, h, stages):
+    """One step of length `h` from the state `x` of two components at time `t`, where it is linearised as `line`.
+
+    `stages`, of shape ``(STAGES, 2)``, is filled with the stages. Returns the new state and the
+    estimate of its error; for dense output see :func:`dense`.
+    """
+    (f0, f1), (j00, j01, j10, j11), (d0, d1) = line
+    shift = 1.0 / (GAMMA * h)
+    w00, w11 = shift - j00, shift - j11
+    inverse = 1.0 / (w00 * w11 - j01 * j10)
+    over_h = 1.0 / h
+    force = forcing(scene, t + TIMES[1] * h)
+    y0, y1 = x
+    for i in range(STAGES):
+        if i > 0:
+            y0, y1 = x
+            c0 = c1 = 0.0
+            for j in range(i):
+                y0 += A[i, j] * stages[j, 0]
+                y1 += A[i, j] * stages[j, 1]
+                c0 += C[i, j] * stages[j, 0]
+                c1 += C[i, j] * stages[j, 1]
+            # The last three stages are at the same time.
+            if 1 < i < STAGES - 2:
+                force = forcing(scene, t + TIMES[i] * h)
+            f0, f1 = stiff_rates(scene, mode, force, (y0, y1))
+            f0 += c0 * over_h
+            f1 += c1 * over_h
+        r0 = f0 + h * DRIFT[i] * d0
+        r1 = f1 + h * DRIFT[i] * d1
+        stages[i, 0] = (w11 * r0 + j01 * r1) * inverse
+        stages[i, 1] = (j10 * r0 + w00 * r1) * inverse
+    # Stiffly accurate: the last stage is the correction, and the error estimate, of the one before.
+    error = stages[STAGES - 1, 0], stages[STAGES - 1, 1]
+    return (y0 + error[0], y1 + error[1]), error
+
+
+@inlined
+def dense(x, x_next, stages, fraction):
+    """State within a step, from both its ends and its stages."""
+    rest = 1.0 - fraction
+    total0 = total1 = 0.0
+    for row in range(2, -1, -1):
+        k0 = k1 = 0.0
+        for j in range(STAGES):
+            k0 += DENSE[row, j] * stages[j, 0]
+            k1 += DENSE[row, j] * stages[j, 1]
+        total0, total1 = k0 + fraction * total0, k1 + fraction * total1
+    return (
+        rest * x[0] + fraction * (x_next[0] + rest * total0),
+        rest * x[1] + fraction * (x_next[1] + rest * total1),
+    )
