@@ -15,6 +15,8 @@ from ringsweep.errors import InputError
 if TYPE_CHECKING:
     import xarray as xr
 
+    from ringsweep.config import Config
+
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; the exit status is 0 if done, 2 if the input is wrong, 1 for anything else."""
@@ -103,6 +105,7 @@ def _run(arguments: argparse.Namespace) -> None:
         storage.save(result, target)
         print(f"wrote {target}")
     _summarise(result)
+    _warn_of_stiffness(result, config)
     if not config.axes.sizes:
         return
     from ringsweep import plots
@@ -177,6 +180,31 @@ def _summarise(result: xr.Dataset) -> None:
             print(f"  {meaning}: {count} ({count / regime.size:.1%})")
     if "certified" in result:
         print(f"certified: {float((result['certified'] == 1).mean()):.1%}")
+
+
+def _warn_of_stiffness(result: xr.Dataset, config: Config) -> None:
+    """Say which share of the cells a fixed step cannot follow, and which step could."""
+    import numpy as np
+
+    if "stiffness" not in result:
+        return
+    from ringsweep.solvers.rk4 import STABILITY_LIMIT
+
+    stiffness = result["stiffness"].values
+    beyond = ~(stiffness <= STABILITY_LIMIT)
+    if not beyond.any():
+        return
+    if np.isfinite(stiffness[beyond]).all():
+        remedy = f"about {config.solver.steps * stiffness[beyond].max() / STABILITY_LIMIT:.2g} steps would be needed"
+    else:
+        remedy = "no step is small enough for a friction law that jumps"
+    logging.getLogger("ringsweep").warning(
+        "%.1f %% of the cells went beyond the limit of stability of rk4 (stiffness above %.4g) "
+        "and may be wrong in kind: %s; solver auto needs none",
+        100.0 * beyond.mean(),
+        STABILITY_LIMIT,
+        remedy,
+    )
 
 
 def _selection(result: xr.Dataset, text: str) -> tuple[str, float | str]:

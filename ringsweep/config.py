@@ -200,7 +200,8 @@ def _config(doc: Document) -> Config:
             raise InputError(key, "unknown section" + suggestion(key, ("scene", "solver", "sweep")))
     sweep = _sweep(doc)
     scene = _scene(doc, _swept(sweep))
-    solver = _solver(tree["solver"]) if "solver" in tree else _default_solver()
+    solver = _solver(tree.get("solver", "auto"))
+    solver.check(scene.structure)
     axes = _sweep_axes(scene, sweep)
     for path in axes.columns:
         place = f"sweep.grid.{path}" if path in sweep.get("grid", {}) else f"sweep.points.{path}"
@@ -406,14 +407,6 @@ def _number(given: Any, parameter: Parameter, kind: type, path: str) -> float | 
     if not value.is_integer():
         raise InputError(path, f"{show(given)} is not a whole number: {parameter.long_name} must be one")
     return int(value)
-
-
-def _default_solver() -> Any:
-    from ringsweep.solvers import METHODS
-
-    if "auto" not in METHODS:
-        raise InputError("solver.method", f"missing: name one of {', '.join(METHODS)}")
-    return _solver("auto")
 
 
 # ---- axes ----------------------------------------------------------------------------------

@@ -91,7 +91,9 @@ def sweep(
     found = read_axes(parsed, axes)
     method = {"method": solver} if isinstance(solver, str) else dict(solver)
     source = {"scene": dict(parsed.source), "solver": method, "sweep": _as_sweep(found)}
-    config = Config(scene=parsed, solver=read_solver(method), axes=found, source=source, name="ringsweep")
+    chosen = read_solver(method)
+    chosen.check(parsed.structure)
+    config = Config(scene=parsed, solver=chosen, axes=found, source=source, name="ringsweep")
     return compute(config, jobs=jobs, progress=progress)
 
 

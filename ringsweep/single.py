@@ -59,7 +59,9 @@ def _alone(scene: str | os.PathLike[str] | Mapping[str, Any], solver: str | Mapp
     if solver is None:
         return config
     method = {"method": solver} if isinstance(solver, str) else dict(solver)
-    return replace(config, solver=read_solver(method), source=config.source | {"solver": method})
+    chosen = read_solver(method)
+    chosen.check(config.scene.structure)
+    return replace(config, solver=chosen, source=config.source | {"solver": method})
 
 
 def history(config: Config, *, samples: int = SAMPLES) -> xr.Dataset:

@@ -221,23 +221,29 @@ def _in_band(scene, before, now):
 
 @hooks.stiffness.implements(ring.Ring)
 def _stiffness(scene, before, now, h):
-    if not _in_band(scene, before, now):
-        return abs(now.slope) * h
-    # A step that jumps the band never samples its slope, and is the one that is wrong in kind:
-    # it has met the band all the same. A discontinuous law has no slope that any step could follow.
+    crossed = before.v * now.v < 0.0
+    slow, fast = min(abs(before.v), abs(now.v)), max(abs(before.v), abs(now.v))
     band = friction.stiction_band(scene.law)
-    if band == 0.0:
+    if crossed and band == 0.0:
+        # A discontinuous law has no slope that any step could follow.
         return inf
+    met = abs(now.slope)
+    # A step that jumps the band, or its edge, never samples the slope there, and is the one that is
+    # wrong in kind: it has met it all the same.
+    if crossed:
+        met = max(met, _steepest(scene, now, 0.0))
+    if crossed or slow < band <= fast:
+        met = max(met, _steepest(scene, now, band))
+    return met * h
+
+
+@inlined
+def _steepest(scene, now, speed):
+    """Bound on the eigenvalue of friction at a sliding speed, 1/s."""
     mu_s, mu_k = zones.roughest(scene.surface)
-    worst = 0.0
-    for speed in (0.0, band):
-        _, _, dw_s, dw_k = friction.weights(scene.law, speed)
-        slope = -(dw_s * mu_s + dw_k * mu_k) * scene.body.radius
-        worst = max(
-            worst,
-            abs(ring.acceleration_slope(scene.body, 0.0, 0.0, slope, slope, now.sin_phi, now.cos_phi, now.omega)),
-        )
-    return worst * h
+    _, _, dw_s, dw_k = friction.weights(scene.law, speed)
+    slope = -(dw_s * mu_s + dw_k * mu_k) * scene.body.radius
+    return abs(ring.acceleration_slope(scene.body, 0.0, 0.0, slope, slope, now.sin_phi, now.cos_phi, now.omega))
 
 
 @hooks.begin.implements(ring.Ring)

@@ -217,7 +217,11 @@ def _expand(scene, mode, t, y, tolerance, c):
         _expand_blended(scene, mode, c)
     _guard_sliding(scene, mode, c)
     scale = 1.0 / tolerance
-    rate = scale / (scene.body.radius * (1.0 + abs(c[OMEGA, 0])))
+    speed = scene.body.radius * (1.0 + abs(c[OMEGA, 0]))
+    if mode.region == BAND:
+        # Noise that is large for the band would keep the creep from ever settling.
+        speed = min(speed, 1e3 * stiction_band(scene.law))
+    rate = scale / speed
     last = max(abs(c[PHI, ORDER]) * scale, abs(c[V, ORDER]) * rate)
     previous = max(abs(c[PHI, ORDER - 1]) * scale, abs(c[V, ORDER - 1]) * rate)
     return reach(last, previous)

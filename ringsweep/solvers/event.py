@@ -91,7 +91,7 @@ class _Piecewise(Method):
 def pick(batch: Any, cells: NDArray[np.intp]) -> Any:
     """Those cells of a batch, as a batch."""
     if isinstance(batch, tuple):
-        return type(batch)(*(pick(leaf, cells) for leaf in batch))  # type: ignore[call-arg]
+        return type(batch)(*(pick(leaf, cells) for leaf in batch))
     return batch[cells]
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ringsweep.jit import add_scaled, inlined, kernel, take
 from ringsweep.models.hooks import begin, conclude, describe, inspect, launch, observe, rates, stiffness, verdict
 from ringsweep.parameters import Parameter
-from ringsweep.physics.drives import lookup, shape
+from ringsweep.physics.drives import lookup, shape, turn
 from ringsweep.regimes import COMPLETE, RUNNING
 from ringsweep.solvers.common import Method, Result, agree, same_drive
 
@@ -154,7 +154,9 @@ def _integrate(batch, cells, steps, rows, report):
         run = runs[j]
         scene = take(batch, cells[j])
         status = COMPLETE if run.status == RUNNING else run.status
-        outcome = conclude(scene, run.record, status, run.t, run.y)
+        # Not the rounding of a sum of steps.
+        t = scene.span if status == COMPLETE else run.t
+        outcome = conclude(scene, run.record, status, t, run.y)
         for column in range(len(outcome)):
             rows[cells[j], column] = outcome[column]
         report[cells[j], 0] = run.steps
@@ -175,7 +177,7 @@ def _history(batch, steps, stride, times, rows):
     count = 0
     for k in range(steps + 1):
         if k % stride == 0 or k == steps or status != RUNNING:
-            times[count] = k * h
+            times[count] = k * h if k < steps else scene.span
             row = describe(scene, y, theta, ring_omega)
             for column in range(len(row)):
                 rows[count, column] = row[column]
@@ -183,9 +185,17 @@ def _history(batch, steps, stride, times, rows):
         if k == steps or status != RUNNING:
             break
         _tabulate(table, scene.drive, k, 1, h)
-        y = _step(scene, y, now.rates, table, 0, h)
+        y_next = _step(scene, y, now.rates, table, 0, h)
         theta, ring_omega = lookup(scene.drive, table, 2)
-        after = inspect(scene, y, theta, ring_omega)
-        status, _ = verdict(scene, now, after)
-        now = after
+        after = inspect(scene, y_next, theta, ring_omega)
+        status, fraction = verdict(scene, now, after)
+        if status != RUNNING:
+            # The history ends where the run does, within the step.
+            times[count] = (k + fraction) * h
+            theta, ring_omega, _ = turn(scene.drive, times[count])
+            row = describe(scene, _hermite(y, now.rates, y_next, after.rates, h, fraction), theta, ring_omega)
+            for column in range(len(row)):
+                rows[count, column] = row[column]
+            return count + 1
+        y, now = y_next, after
     return count
