@@ -104,7 +104,8 @@ def _as_sweep(axes: Axes) -> dict[str, Any]:
     shared |= {dims[0] for dims in names if names.count(dims) > 1}
     grid = {path: values.tolist() for path, (dims, values) in axes.columns.items() if shared.isdisjoint(dims)}
     sizes = {dim: size for dim, size in axes.sizes.items() if dim in shared}
-    place = dict(zip(sizes, np.indices(tuple(sizes.values())).reshape(len(sizes), -1), strict=True))
+    index = np.unravel_index(np.arange(math.prod(sizes.values())), tuple(sizes.values())) if sizes else ()
+    place = dict(zip(sizes, index, strict=True))
     points = {
         path: values[tuple(place[dim] for dim in dims)].tolist()
         for path, (dims, values) in axes.columns.items()

@@ -1,0 +1,154 @@
+"""Sweeps and single runs as a user calls them."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import ringsweep
+from ringsweep.config import load
+from ringsweep.variables import OUTCOMES, REGIMES
+
+CONFIGS = Path(__file__).parents[1] / "configs"
+AMPLITUDES = [0.5, 2.0, 8.0]
+WIDTHS = ["5 deg", "15 deg", "40 deg"]
+
+
+@pytest.fixture(scope="module")
+def scene():
+    """The paper's Fig. 29 with the limit law."""
+    scene = dict(load(CONFIGS / "regime_map.yaml").source["scene"])
+    friction = {"law": "stiction", "rough": scene["friction"]["rough"], "rest": scene["friction"]["rest"]}
+    return scene | {"friction": friction, "time": {"span": "4 s"}}
+
+
+@pytest.fixture(scope="module")
+def grid(scene):
+    return ringsweep.sweep(scene, {"drive.amplitude": AMPLITUDES, "zone.half_angle": WIDTHS})
+
+
+class TestDataset:
+    def test_has_a_dimension_for_each_path_and_every_variable_of_the_contract(self, grid):
+        assert dict(grid.sizes) == {"drive_amplitude": 3, "zone_half_angle": 3}
+        assert set(grid.data_vars) == set(OUTCOMES) - {"stiffness"}
+        np.testing.assert_allclose(grid.zone_half_angle, np.radians([5, 15, 40]), rtol=1e-15)
+        assert grid.zone_half_angle.attrs["units"] == "rad"
+        assert grid.drive_amplitude.attrs["long_name"]
+
+    def test_flags_are_int8_with_values_of_the_same_type(self, grid):
+        for name in ("regime", "motion", "certified", "separating_contact"):
+            assert grid[name].dtype == grid[name].attrs["flag_values"].dtype == np.int8
+            assert set(np.unique(grid[name])) <= set(grid[name].attrs["flag_values"].tolist())
+
+    def test_a_separation_has_a_time_and_a_contact_and_nothing_else_has(self, grid):
+        separating = grid.regime == REGIMES.index("separating")
+        assert separating.any()
+        assert not separating.all()
+        assert ((grid.separating_contact > 0) == separating).all()
+        assert (np.isfinite(grid.t_separation) == separating).all()
+        np.testing.assert_array_equal(grid.t_end, xr.where(separating, grid.t_separation, 4.0))
+
+    def test_alone_is_enough_to_run_it_again(self, grid):
+        again = ringsweep.run(json.loads(grid.attrs["configuration"]), progress=False)
+        xr.testing.assert_identical(again, grid)
+
+
+class TestAxes:
+    def test_a_cell_of_a_batch_equals_the_run_alone(self, scene, grid):
+        for i, j in ((0, 0), (1, 1), (2, 0), (2, 2)):
+            changed = scene | {
+                "drive": {"law": "arctan", "amplitude": AMPLITUDES[i]},
+                "zone": {"half_angle": WIDTHS[j]},
+            }
+            alone = ringsweep.run({"scene": changed}, progress=False)
+            for name in alone.data_vars:
+                np.testing.assert_array_equal(alone[name], grid[name][i, j])
+
+    def test_the_number_of_threads_changes_nothing(self, scene, grid):
+        serial = ringsweep.sweep(scene, {"drive.amplitude": AMPLITUDES, "zone.half_angle": WIDTHS}, jobs=1)
+        xr.testing.assert_identical(serial, grid)
+
+    def test_axes_that_share_a_dimension_vary_together(self, scene, grid):
+        amplitude = xr.DataArray(AMPLITUDES, dims="rig")
+        width = xr.DataArray(np.radians([5.0, 15.0, 40.0]), dims="rig")
+        points = ringsweep.sweep(scene, {"drive.amplitude": amplitude, "zone.half_angle": width})
+        assert dict(points.sizes) == {"rig": 3}
+        np.testing.assert_array_equal(points.t_end, np.diag(grid.t_end))
+        again = ringsweep.run(json.loads(points.attrs["configuration"]), progress=False)
+        np.testing.assert_array_equal(again.t_end, points.t_end)
+
+    def test_points_stand_beside_a_grid(self, scene, grid):
+        config = {
+            "scene": scene,
+            "sweep": {"points": {"drive.amplitude": AMPLITUDES}, "grid": {"zone.half_angle": WIDTHS}},
+        }
+        found = ringsweep.run(config, progress=False)
+        assert dict(found.sizes) == {"point": 3, "zone_half_angle": 3}
+        np.testing.assert_array_equal(found.t_end, grid.t_end)
+
+    def test_five_axes(self, scene):
+        axes = {
+            "drive.amplitude": [1.0, 6.0],
+            "zone.half_angle": [0.1, 0.5],
+            "friction.rough.mu_k": [0.25, 0.3],
+            "body.mass": [0.05, 0.076],
+            "initial.omega": [0.0, 1.0],
+        }
+        found = ringsweep.sweep(scene, axes)
+        assert found.regime.shape == (2, 2, 2, 2, 2)
+        assert (found.certified == 1).all()
+
+    def test_mass_and_inertia_scale_together(self, scene):
+        """Forces are proportional to the mass: trebling mass and inertia changes no motion."""
+        rig = {"body.mass": xr.DataArray([0.076, 0.228], dims="rig")}
+        rig["body.inertia"] = xr.DataArray([4.47e-5, 13.41e-5], dims="rig")
+        light, heavy = (found for _, found in ringsweep.sweep(scene, rig).groupby("rig"))
+        assert float(heavy.t_end[0]) == pytest.approx(float(light.t_end[0]), rel=1e-10)
+        assert float(heavy.normal_min_1[0]) == pytest.approx(3 * float(light.normal_min_1[0]), rel=1e-10)
+
+
+class TestSingleRun:
+    def test_history_and_outcome_agree(self, scene):
+        run = ringsweep.simulate(scene)
+        assert run.phi.dims == ("time",)
+        assert float(run.time[0]) == 0.0
+        assert float(run.time[-1]) == float(run.t_end)
+        assert (run.time.diff("time") >= 0).all()
+        assert float(run.phi[-1]) == pytest.approx(float(run.phi_end), abs=1e-12)
+        assert float(run.phi.max()) == pytest.approx(float(run.phi_max), abs=1e-5)
+        assert float(run.normal_2[-1]) == pytest.approx(0.0, abs=1e-9)
+        assert run.attrs["outcome"].startswith("separating (oscillatory), contact 2")
+
+    def test_sticks_where_the_body_turns_with_the_ring(self, scene):
+        run = ringsweep.simulate(scene)
+        stuck = run["mode"] == 0
+        assert stuck.any()
+        np.testing.assert_allclose(run.omega[stuck], run.ring_omega[stuck], atol=1e-12)
+
+    def test_one_contact_has_no_second(self, scene):
+        alone = scene | {"model": "ring-single-contact", "body": {"mass": 0.076}, "drive": {"law": "none"}}
+        run = ringsweep.simulate(alone | {"initial": {"omega": 5.0}})
+        assert "normal_1" in run
+        assert not {"normal_2", "zone_2", "normal_min_2"} & set(run.variables)
+
+
+class TestProgress:
+    def test_is_silent_in_a_pipe(self, scene, capfd):
+        ringsweep.sweep(scene, {"drive.amplitude": [1.0]})
+        assert capfd.readouterr().err == ""
+
+
+class TestConfigurations:
+    @pytest.mark.parametrize("path", sorted(CONFIGS.rglob("*.yaml")), ids=lambda path: path.stem)
+    def test_every_one_that_is_shipped_is_valid(self, path):
+        config = load(path)
+        assert config.axes.sizes or path.parent.name == "paper"
+
+    def test_the_main_job_is_the_one_described(self):
+        axes = load(CONFIGS / "regime_map.yaml").axes
+        assert axes.sizes == {"drive_amplitude": 64, "zone_half_angle": 64}
+        amplitude, width = (values for _, values in axes.columns.values())
+        np.testing.assert_allclose(np.diff(np.log(amplitude)), np.log(100) / 63)
+        np.testing.assert_allclose(np.degrees(width[[0, -1]]), [2, 60])
