@@ -89,6 +89,8 @@ def hook(stub: Callable[..., Any]) -> Any:
 
     def implements(*classes: type) -> Callable[..., Any]:
         def register(body: Callable[..., Any]) -> Callable[..., Any]:
+            if list(inspect.signature(body).parameters) != names:
+                raise TypeError(f"{body.__qualname__}: the arguments of {stub.__name__} are ({arguments})")
             for cls in classes:
                 bodies[cls] = body
             return body

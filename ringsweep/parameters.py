@@ -8,7 +8,7 @@ wrong input are all derived from these declarations.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import get_type_hints
 
 import numpy as np
@@ -52,6 +52,13 @@ class Parameter:
         above = value > self.lower if self.open_lower else value >= self.lower
         below = value < self.upper if self.open_upper else value <= self.upper
         return math.isfinite(value) and above and below
+
+    def along_a_line(self) -> Parameter:
+        """The same quantity where what turns on a ring moves along a line: m in place of rad."""
+        name = self.long_name.replace("angular velocity of the ring", "velocity of the belt")
+        name = name.replace("angle of the ring", "displacement of the belt").replace("rocking angle", "displacement")
+        unit = {"rad": "m", "rad/s": "m/s"}.get(self.unit, self.unit)
+        return replace(self, long_name=name, unit=unit if "phase" not in name else self.unit)
 
     @property
     def interval(self) -> str:

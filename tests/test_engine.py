@@ -9,6 +9,7 @@ import xarray as xr
 
 import ringsweep
 from ringsweep.config import load
+from ringsweep.regimes import Outcome
 from ringsweep.variables import OUTCOMES, REGIMES
 
 CONFIGS = Path(__file__).parents[1] / "configs"
@@ -32,7 +33,10 @@ def grid(scene):
 class TestDataset:
     def test_has_a_dimension_for_each_path_and_every_variable_of_the_contract(self, grid):
         assert dict(grid.sizes) == {"drive_amplitude": 3, "zone_half_angle": 3}
-        assert set(grid.data_vars) == set(OUTCOMES) - {"stiffness"}
+        assert set(grid.data_vars) == {*Outcome._fields, "steps", "certified"}
+        for name, variable in grid.data_vars.items():
+            assert variable.attrs["units"] == OUTCOMES[name].units
+            assert variable.dtype == OUTCOMES[name].dtype
         np.testing.assert_allclose(grid.zone_half_angle, np.radians([5, 15, 40]), rtol=1e-15)
         assert grid.zone_half_angle.attrs["units"] == "rad"
         assert grid.drive_amplitude.attrs["long_name"]

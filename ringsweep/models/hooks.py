@@ -16,12 +16,12 @@ def launch(scene):
 
 
 @hook
-def rates(scene, y, theta, ring_omega):
-    """Time derivative of the state `y` while the drive is at `theta` (rad), `ring_omega` (rad/s)."""
+def rates(scene, y, drive_at, drive_rate):
+    """Time derivative of the state `y` while the drive is at `drive_at` and moves at `drive_rate`."""
 
 
 @hook
-def inspect(scene, y, theta, ring_omega):
+def inspect(scene, y, drive_at, drive_rate):
     """Inspection of the state `y`; its field ``rates`` is the time derivative."""
 
 
@@ -48,8 +48,8 @@ def begin(scene, y, now):
 
 
 @hook
-def observe(scene, record, y, before, now, h):
-    """Record after a step of `h` seconds to the state `y`."""
+def observe(scene, record, y, before, now, t, h):
+    """Record after a step of `h` seconds to the state `y` at time `t`."""
 
 
 @hook
@@ -58,7 +58,7 @@ def conclude(scene, record, status, t, y):
 
 
 @hook
-def describe(scene, y, theta, ring_omega):
+def describe(scene, y, drive_at, drive_rate):
     """One row of a time history: a tuple of floats, one for each of the model's history variables."""
 
 
@@ -121,8 +121,8 @@ def switch(scene, mode, guard, t, y):
 
 
 @hook
-def watch(scene, record, mode, c, s, work):
-    """Record after a step of length `s` along the series `c`, extremes within it included."""
+def watch(scene, record, mode, c, t, s, work):
+    """Record after a step of length `s` from time `t` along the series `c`, extremes within it included."""
 
 
 @hook
@@ -181,8 +181,8 @@ def stiff_view(scene, mode, t, x):
 
 
 @hook
-def stiff_watch(scene, record, view, duration):
-    """Record after `duration` seconds in the mode to a state of which this is the view."""
+def stiff_watch(scene, record, view, t, duration):
+    """Record after `duration` seconds in the mode to a state at time `t` of which this is the view."""
 
 
 @hook

@@ -64,10 +64,10 @@ class SingleContactRing:
         law = friction.LAWS[structure.law]
         rough = "friction.rough" if structure.arcs == ("zone",) else None
         arcs = [
-            zones.Arc(values[f"{arc}.center"], values[f"{arc}.half_angle"], *_mu(law, rough or arc, values))
+            zones.Arc(values[f"{arc}.center"], values[f"{arc}.half_angle"], *pair(law, rough or arc, values))
             for arc in structure.arcs
         ]
-        surface = zones.cut(arcs, *_mu(law, "friction.rest", values))
+        surface = zones.cut(arcs, *pair(law, "friction.rest", values))
         return ring.Ring(
             body=self.build_body(values),
             surface=surface,
@@ -141,7 +141,7 @@ class Ring(SingleContactRing):
         )
 
 
-def _mu(law: type, place: str, values: Values) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def pair(law: type, place: str, values: Values) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Static and kinetic coefficient at a place, checked against each other."""
     mu_k = values[f"{place}.mu_k"]
     if "mu_s" not in friction.coefficients_of(law):
@@ -174,16 +174,16 @@ def _launch(scene):
 
 
 @hooks.rates.implements(ring.Ring)
-def _rates(scene, y, theta, ring_omega):
+def _rates(scene, y, drive_at, drive_rate):
     phi, omega = y
-    _, K1, K2, _, _ = ring.friction(scene, phi, omega, theta, ring_omega)
+    _, K1, K2, _, _ = ring.friction(scene, phi, omega, drive_at, drive_rate)
     return omega, ring.acceleration(scene.body, K1, K2, sin(phi), cos(phi), omega)[0]
 
 
 @hooks.inspect.implements(ring.Ring)
-def _inspect(scene, y, theta, ring_omega):
+def _inspect(scene, y, drive_at, drive_rate):
     phi, omega = y
-    v, K1, K2, slope_1, slope_2 = ring.friction(scene, phi, omega, theta, ring_omega)
+    v, K1, K2, slope_1, slope_2 = ring.friction(scene, phi, omega, drive_at, drive_rate)
     sin_phi, cos_phi = sin(phi), cos(phi)
     epsilon, D, inertia = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
     normal_1, normal_2 = ring.reactions(scene.body, K1, K2, sin_phi, cos_phi, omega, epsilon)
@@ -252,7 +252,7 @@ def _begin(scene, y, now):
 
 
 @hooks.observe.implements(ring.Ring)
-def _observe(scene, record, y, before, now, h):
+def _observe(scene, record, y, before, now, t, h):
     stuck_for = h if _in_band(scene, before, now) else 0.0
     return regimes.observe(record, y[0], y[1], now.normal_1, now.normal_2, stuck_for, scene.epsilon_omega)
 
@@ -263,12 +263,12 @@ def _conclude(scene, record, status, t, y):
 
 
 @hooks.describe.implements(ring.Ring)
-def _describe(scene, y, theta, ring_omega):
-    now = hooks.inspect(scene, y, theta, ring_omega)
+def _describe(scene, y, drive_at, drive_rate):
+    now = hooks.inspect(scene, y, drive_at, drive_rate)
     band = friction.stiction_band(scene.law)
     mode = 0.0 if abs(now.v) < band or now.v == 0.0 else 1.0 if now.v > 0.0 else -1.0
     offset = ring.contact_offset(scene.body)
-    rho = y[0] - theta
+    rho = y[0] - drive_at
     zone_1 = zones.coefficients(scene.surface, zones.segment(scene.surface, rho - offset))[2]
     zone_2 = zones.coefficients(scene.surface, zones.segment(scene.surface, rho + offset))[2]
-    return y[0], y[1], now.rates[1], now.normal_1, now.normal_2, ring_omega, zone_1, zone_2, mode
+    return y[0], y[1], now.rates[1], now.normal_1, now.normal_2, drive_rate, zone_1, zone_2, mode

@@ -21,13 +21,10 @@ from ringsweep.physics import drives, ring
 from ringsweep.physics.friction import (
     BAND,
     CLEAN,
-    TAIL,
-    BengisuAkay,
-    Coulomb,
-    Stiction,
-    Tustin,
     constant_weights,
     expand_weights,
+    holding,
+    region_at,
     region_bounds,
     stiction_band,
 )
@@ -65,36 +62,12 @@ class Mode(NamedTuple):
     place_2: tuple[int, int]
 
 
-@hook
-def holding(law, mu_s, mu_k):
-    """Coefficient up to which a contact at rest holds."""
-
-
-@holding.implements(Coulomb)
-def _hold_kinetic(law, mu_s, mu_k):
-    return mu_k
-
-
-@holding.implements(Stiction, Tustin, BengisuAkay)
-def _hold_static(law, mu_s, mu_k):
-    return mu_s
-
-
 @inlined
 def coefficients_under(scene, mode):
     """Static and kinetic coefficient under each contact."""
     mu_s1, mu_k1, _ = coefficients(scene.surface, mode.place_1[0])
     mu_s2, mu_k2, _ = coefficients(scene.surface, mode.place_2[0])
     return mu_s1, mu_k1, mu_s2, mu_k2
-
-
-@inlined
-def _region(law, speed):
-    """Region that holds a sliding speed, m/s; a boundary belongs to the region above it."""
-    for region in (CLEAN, TAIL):
-        if speed >= region_bounds(law, region)[0]:
-            return region
-    return BAND
 
 
 @hooks.embark.implements(ring.Ring)
@@ -122,7 +95,7 @@ def _enter(scene, t, y):
         _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
         push, _, _ = ring.acceleration(scene.body, 0.0, 0.0, sin(phi), cos(phi), ring_omega)
         return RUNNING, Mode(1 if push >= ring_epsilon else -1, BAND, SLOW, places[0], places[1])
-    return RUNNING, Mode(1 if v > 0.0 else -1, _region(scene.law, abs(v)), -1, places[0], places[1])
+    return RUNNING, Mode(1 if v > 0.0 else -1, region_at(scene.law, abs(v)), -1, places[0], places[1])
 
 
 @inlined
@@ -138,7 +111,7 @@ def _settle(scene, t, phi, places):
     if not (D1 > 0.0 and D2 > 0.0 and inertia_1 > 0.0 and inertia_2 > 0.0):
         return JAM, still
     forward, backward = against_forward > ring_epsilon, against_backward < ring_epsilon
-    region = _region(scene.law, 0.0)
+    region = region_at(scene.law, 0.0)
     if forward and backward:
         return JAM, still
     # Without any friction there is nothing to stick to.
@@ -170,7 +143,7 @@ def _switch(scene, mode, guard, t, y):
             place_2 = cross(scene.surface, place_2, sign)
         return RUNNING, Mode(sign, region, SLOW if v == 0.0 else -1, place_1, place_2), y
     if sign == 0:
-        return RUNNING, Mode(1 if guard == SLOW else -1, _region(scene.law, 0.0), SLOW, place_1, place_2), (phi, 0.0)
+        return RUNNING, Mode(1 if guard == SLOW else -1, region_at(scene.law, 0.0), SLOW, place_1, place_2), (phi, 0.0)
     low, high = region_bounds(scene.law, region)
     if guard == FAST:
         return RUNNING, Mode(sign, region - 1, SLOW, place_1, place_2), (phi, sign * high)
@@ -429,7 +402,7 @@ def _land(scene, mode, c, t, s):
 
 
 @hooks.watch.implements(ring.Ring)
-def _watch(scene, record, mode, c, s, work):
+def _watch(scene, record, mode, c, t, s, work):
     instants = work[0]
     count = 0
     omega, sway, shift = c[OMEGA, 0], variation(c[OMEGA], s), variation(c[PHI], s)

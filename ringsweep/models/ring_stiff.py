@@ -123,7 +123,7 @@ def _stiff_view(scene, mode, t, x):
 
 
 @hooks.stiff_watch.implements(ring.Ring)
-def _stiff_watch(scene, record, view, duration):
+def _stiff_watch(scene, record, view, t, duration):
     guards, (phi, omega, _, _) = view
     return regimes.observe(record, phi, omega, guards[1], guards[2], duration, scene.epsilon_omega)
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from ringsweep.jit import hook, inlined
-from ringsweep.parameters import Parameter, declared
+from ringsweep.parameters import Leaf, Parameter, declared
 from ringsweep.scene import require
 
 
@@ -29,7 +29,7 @@ class Still(NamedTuple):
 class Constant(NamedTuple):
     """Constant angular velocity: :math:`s = t`."""
 
-    amplitude: Annotated[float, Parameter("rad/s", "angular velocity of the ring")]
+    amplitude: Annotated[Leaf, Parameter("rad/s", "angular velocity of the ring")]
 
 
 class Arctan(NamedTuple):

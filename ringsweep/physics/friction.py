@@ -15,7 +15,7 @@ from __future__ import annotations
 from math import exp, inf, log
 from typing import Annotated, NamedTuple
 
-from ringsweep.jit import hook
+from ringsweep.jit import hook, inlined
 from ringsweep.parameters import Parameter
 
 MU_S = Parameter("1", "static friction coefficient", lower=0.0)
@@ -211,3 +211,27 @@ def _expand_tail(law, region, speed, k, static, kinetic):
         kinetic[k] = (1.0 if k == 0 else 0.0) - static[k]
     else:
         static[k], kinetic[k] = 0.0, 1.0 if k == 0 else 0.0
+
+
+@hook
+def holding(law, mu_s, mu_k):
+    """Coefficient up to which a contact at rest holds."""
+
+
+@holding.implements(Coulomb)
+def _hold_kinetic(law, mu_s, mu_k):
+    return mu_k
+
+
+@holding.implements(Stiction, Tustin, BengisuAkay)
+def _hold_static(law, mu_s, mu_k):
+    return mu_s
+
+
+@inlined
+def region_at(law, speed):
+    """Region that holds a sliding speed, m/s; a boundary belongs to the region above it."""
+    for region in (CLEAN, TAIL):
+        if speed >= region_bounds(law, region)[0]:
+            return region
+    return BAND

@@ -154,8 +154,9 @@ def _stiff_creep(law, scene, record, mode, t, y, h, horizon, tolerance, guards, 
     after = stiff_view(scene, mode, t + s, x_next)
     event, end = -1, s
     for g in range(len(after[0])):
-        if after[0][g] <= 0.0 or within[0][g] <= 0.0:
-            until = min(end, s if after[0][g] <= 0.0 else 0.5 * s)
+        # Zero is no violation: a body at rest in equilibrium stays there.
+        if after[0][g] < 0.0 or within[0][g] < 0.0:
+            until = min(end, s if after[0][g] < 0.0 else 0.5 * s)
             if event >= 0 and _guard_after(scene, mode, t, x, line, until, g, stages) > 0.0:
                 continue
             event, end = guards + g, _locate(scene, mode, t, x, line, until, g, stages)
@@ -165,8 +166,8 @@ def _stiff_creep(law, scene, record, mode, t, y, h, horizon, tolerance, guards, 
         x_next, _ = rosenbrock.step(scene, mode, t, x, line, end, stages)
         within = stiff_view(scene, mode, t + 0.5 * end, rosenbrock.dense(x, x_next, stages, 0.5))
         after = stiff_view(scene, mode, t + end, x_next)
-    record = stiff_watch(scene, record, within, 0.5 * end)
-    record = stiff_watch(scene, record, after, 0.5 * end)
+    record = stiff_watch(scene, record, within, t + 0.5 * end, 0.5 * end)
+    record = stiff_watch(scene, record, after, t + end, 0.5 * end)
     return True, event, end, from_stiff(scene, t + end, x_next), record, h
 
 
@@ -222,6 +223,7 @@ def trace(batch, tolerance, creep_tolerance, limit, spacing, times, table):
                         n += 1
             y = y_next
         else:
+            trial = 1e-6 * scene.span
             h = min(expand(scene, mode, t, y, tolerance, c), horizon)
             guard, s = _first_event(c, guards, mode.fresh, h, work)
             if s > 0.0:
@@ -239,7 +241,6 @@ def trace(batch, tolerance, creep_tolerance, limit, spacing, times, table):
         t = t + s if s < horizon else t + horizon
         if guard >= 0:
             status, mode, y = switch(scene, mode, guard, t, y)
-            trial = 1e-6 * scene.span
         elif t >= scene.span:
             status = COMPLETE
         elif s > 0.0:
@@ -285,10 +286,11 @@ def integrate(batch, tolerance, creep_tolerance, limit, out, steps):
                 scene.law, scene, record, mode, t, y, trial, horizon, creep_tolerance, guards, stages
             )
             if not stiff:
+                trial = 1e-6 * scene.span
                 h = min(expand(scene, mode, t, y, tolerance, c), horizon)
                 guard, s = _first_event(c, guards, mode.fresh, h, work)
                 if s > 0.0:
-                    record = watch(scene, record, mode, c, s, work)
+                    record = watch(scene, record, mode, c, t, s, work)
                 y = land(scene, mode, c, t, s)
             if not s >= 0.0:
                 status = BROKEN
@@ -297,7 +299,6 @@ def integrate(batch, tolerance, creep_tolerance, limit, out, steps):
             t = t + s if s < horizon else t + horizon
             if guard >= 0:
                 status, mode, y = switch(scene, mode, guard, t, y)
-                trial = 1e-6 * scene.span
             elif t >= scene.span:
                 status = COMPLETE
             elif s > 0.0:

@@ -121,10 +121,10 @@ def _advance(scene, run, table, first, steps, h):
         worst = max(worst, stiffness(scene, now, after, h))
         if status != RUNNING:
             y_end = _hermite(y, now.rates, y_next, after.rates, h, fraction)
-            record = observe(scene, record, y_end, now, after, fraction * h)
             t = (first + k + fraction) * h
+            record = observe(scene, record, y_end, now, after, t, fraction * h)
             return _Run(status, t, y_end, after, record, first + k + 1.0, worst)
-        record = observe(scene, record, y_next, now, after, h)
+        record = observe(scene, record, y_next, now, after, (first + k + 1) * h, h)
         y, now = y_next, after
     return _Run(RUNNING, (first + steps) * h, y, now, record, float(first + steps), worst)
 
