@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 from ringsweep import document
 from ringsweep.document import Document, scalar
 from ringsweep.errors import InputError
+from ringsweep.models import batch, parameters
 from ringsweep.parameters import Parameter, declared
-from ringsweep.scene import Scene, Structure, batch, parameters
+from ringsweep.scene import Scene, Structure
 from ringsweep.units import quantity, show
 from ringsweep.variables import OUTCOMES
 

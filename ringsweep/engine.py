@@ -19,8 +19,8 @@ from tqdm.auto import tqdm
 
 from ringsweep.config import Axes, Config, load, read_axes, read_scene, read_solver
 from ringsweep.jit import SOURCES_DIGEST
-from ringsweep.models import MODELS
-from ringsweep.scene import Scene, Values, batch, parameters
+from ringsweep.models import MODELS, batch, parameters
+from ringsweep.scene import Scene, Values
 from ringsweep.solvers.common import Result
 from ringsweep.variables import OUTCOMES
 

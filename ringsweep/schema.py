@@ -9,11 +9,11 @@ from itertools import product
 from typing import Any, get_type_hints
 
 from ringsweep.config import COUNT, TABLE
-from ringsweep.models import MODELS
+from ringsweep.models import MODELS, parameters
 from ringsweep.parameters import Parameter, declared
 from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS
-from ringsweep.scene import Structure, parameters
+from ringsweep.scene import Structure
 from ringsweep.solvers import METHODS
 
 

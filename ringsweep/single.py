@@ -12,8 +12,7 @@ import xarray as xr
 
 from ringsweep.config import Config, read_solver, with_values
 from ringsweep.engine import compute, provenance
-from ringsweep.models import MODELS
-from ringsweep.scene import batch
+from ringsweep.models import MODELS, batch
 from ringsweep.variables import HISTORY, REGIMES
 
 #: Instants that a history keeps, about.

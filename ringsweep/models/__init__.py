@@ -1,8 +1,34 @@
 """Models: which parameters a scene of each kind has, and how they become what kernels take."""
 
+from typing import Any
+
 import ringsweep.models.ring_series
 import ringsweep.models.ring_stiff  # noqa: F401  importing them gives the solvers their hooks
 from ringsweep.models.belt import Belt
 from ringsweep.models.ring import Ring, SingleContactRing
+from ringsweep.parameters import Parameter
+from ringsweep.scene import Structure, Values
 
 MODELS = {model.name: model for model in (Ring(), SingleContactRing(), Belt())}
+
+
+def parameters(structure: Structure) -> dict[str, Parameter]:
+    """Every numeric path that a scene of this structure has, in the order of the documentation."""
+    return MODELS[structure.model].parameters(structure)
+
+
+def batch(structure: Structure, values: Values) -> Any:
+    """Cells as a kernel takes them: a nested ``NamedTuple`` of arrays of shape ``(cells, ...)``.
+
+    Parameters
+    ----------
+    structure : Structure
+    values : mapping of str to ndarray of shape ``(cells,)``
+        One array for every path given.
+
+    Raises
+    ------
+    InputError
+        If values contradict each other, as a ring too small for its body.
+    """
+    return MODELS[structure.model].build(structure, values)

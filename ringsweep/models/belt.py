@@ -12,7 +12,7 @@ from typing import Any, ClassVar, NamedTuple
 from ringsweep.errors import InputError
 from ringsweep.jit import inlined
 from ringsweep.models import hooks
-from ringsweep.models.ring import GRAVITY, MASS, SPAN, pair
+from ringsweep.models.common import GRAVITY, MASS, SPAN, drive_of, pair
 from ringsweep.parameters import Parameter, declared
 from ringsweep.physics import belt, drives, friction
 from ringsweep.physics.friction import BAND, CLEAN
@@ -81,7 +81,7 @@ class Belt:
         if given:
             drive: Any = drives.Constant(values["belt.velocity"])
         else:
-            drive = drives.build(structure.drive, structure.table, values)
+            drive = drive_of(structure, values)
         return belt.Belt(
             mass=values["body.mass"],
             stiffness=values["spring.stiffness"],

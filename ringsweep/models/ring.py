@@ -6,19 +6,16 @@ from math import cos, inf, isfinite, isnan, pi, sin
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ringsweep import regimes
 from ringsweep.jit import inlined
 from ringsweep.models import hooks
+from ringsweep.models.common import GRAVITY, MASS, SPAN, drive_of, pair
 from ringsweep.parameters import Parameter, declared
 from ringsweep.physics import drives, friction, ring, zones
 from ringsweep.regimes import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2
 from ringsweep.scene import Structure, Values, require
 
-MASS = Parameter("kg", "mass of the body", lower=0.0, open_lower=True)
-GRAVITY = Parameter("m/s^2", "acceleration of gravity", lower=0.0, default=9.81)
-SPAN = Parameter("s", "span of time", lower=0.0, open_lower=True)
 RADIUS = Parameter("m", "radius of the inner race", lower=0.0, open_lower=True)
 
 
@@ -72,7 +69,7 @@ class SingleContactRing:
             body=self.build_body(values),
             surface=surface,
             law=law(*(values[f"friction.{name}"] for name in declared(law))),
-            drive=drives.build(structure.drive, structure.table, values),
+            drive=drive_of(structure, values),
             initial_phi=values["initial.phi"],
             initial_omega=values["initial.omega"],
             span=values["time.span"],
@@ -139,18 +136,6 @@ class Ring(SingleContactRing):
             cos_beta=cos_beta,
             gravity=values["gravity"],
         )
-
-
-def pair(law: type, place: str, values: Values) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Static and kinetic coefficient at a place, checked against each other."""
-    mu_k = values[f"{place}.mu_k"]
-    if "mu_s" not in friction.coefficients_of(law):
-        return mu_k, mu_k
-    mu_s = values[f"{place}.mu_s"]
-    require(
-        mu_s >= mu_k, f"{place}.mu_k", mu_k, "{} exceeds mu_s: kinetic friction cannot be greater than static friction"
-    )
-    return mu_s, mu_k
 
 
 class Inspection(NamedTuple):

@@ -9,17 +9,11 @@ in ``DRIVES``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from math import atan, cos, inf, log1p, pi, sin
 from typing import Annotated, Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
-
 from ringsweep.jit import hook, inlined
-from ringsweep.parameters import Leaf, Parameter, declared
-from ringsweep.scene import require
+from ringsweep.parameters import Leaf, Parameter
 
 
 class Still(NamedTuple):
@@ -73,35 +67,6 @@ DRIVES: dict[str, type] = {
     "sinusoidal": Sinusoidal,
     "table": Table,
 }
-
-
-def build(name: str, table: tuple[NDArray, NDArray] | None, values: Mapping[str, NDArray]) -> Any:
-    """A drive whose leaves have shape ``(cells, ...)``.
-
-    Raises
-    ------
-    InputError
-        If a table ends before the span of time does.
-    """
-    law = DRIVES[name]
-    columns: dict[str, Any] = {field: values[f"drive.{field}"] for field in declared(law)}
-    if table is None:
-        return law(**columns)
-    times, angles = table
-    cells = len(values["time.span"])
-    require(
-        values["time.span"] <= times[-1],
-        "time.span",
-        values["time.span"],
-        f"{{}} s is longer than the table of the drive, which ends at {times[-1]:.6g} s",
-    )
-    # A spline of third degree is the smoothest that a few noisy samples bear, and is C2.
-    pieces = np.ascontiguousarray(CubicSpline(times, angles).c.T)
-    return Table(
-        **columns,
-        knots=np.broadcast_to(times, (cells, *times.shape)),
-        coefficients=np.broadcast_to(pieces, (cells, *pieces.shape)),
-    )
 
 
 @hook

@@ -172,6 +172,21 @@ def _stiff_creep(law, scene, record, mode, t, y, h, horizon, tolerance, guards, 
 
 
 @inlined
+def _arrive(scene, mode, guard, t, s, horizon, y):
+    """Time, status, mode and state after a step `s` that ended at `guard`, or at none (-1)."""
+    # To the very end of the span or of a piece of the drive, not to the rounding of a sum.
+    t = t + s if s < horizon else t + horizon
+    if not s >= 0.0:
+        return t, BROKEN, mode, y
+    if guard >= 0:
+        status, mode, y = switch(scene, mode, guard, t, y)
+        return t, status, mode, y
+    if t >= scene.span:
+        return t, COMPLETE, mode, y
+    return t, RUNNING, onward(mode) if s > 0.0 else mode, y
+
+
+@inlined
 def _store(row, values):
     for k in range(len(values)):
         row[k] = values[k]
@@ -235,16 +250,8 @@ def trace(batch, tolerance, creep_tolerance, limit, spacing, times, table):
                         times[n] = t + inside
                         n += 1
             y = land(scene, mode, c, t, s)
-        if not s >= 0.0:
-            break
         entered = guard >= 0 or (entered and s == 0.0)
-        t = t + s if s < horizon else t + horizon
-        if guard >= 0:
-            status, mode, y = switch(scene, mode, guard, t, y)
-        elif t >= scene.span:
-            status = COMPLETE
-        elif s > 0.0:
-            mode = onward(mode)
+        t, status, mode, y = _arrive(scene, mode, guard, t, s, horizon, y)
     return n
 
 
@@ -292,17 +299,7 @@ def integrate(batch, tolerance, creep_tolerance, limit, out, steps):
                 if s > 0.0:
                     record = watch(scene, record, mode, c, t, s, work)
                 y = land(scene, mode, c, t, s)
-            if not s >= 0.0:
-                status = BROKEN
-                break
-            # To the very end of the span or of a piece of the drive, not to the rounding of a sum.
-            t = t + s if s < horizon else t + horizon
-            if guard >= 0:
-                status, mode, y = switch(scene, mode, guard, t, y)
-            elif t >= scene.span:
-                status = COMPLETE
-            elif s > 0.0:
-                mode = onward(mode)
+            t, status, mode, y = _arrive(scene, mode, guard, t, s, horizon, y)
         outcome = finish(scene, record, status, t, y)
         for k in range(len(outcome)):
             out[i, k] = outcome[k]

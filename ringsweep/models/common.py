@@ -1,0 +1,58 @@
+"""What several models share: parameters, friction coefficients of a place, drives."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from ringsweep.parameters import Parameter, declared
+from ringsweep.physics import drives, friction
+from ringsweep.scene import Structure, Values, require
+
+MASS = Parameter("kg", "mass of the body", lower=0.0, open_lower=True)
+GRAVITY = Parameter("m/s^2", "acceleration of gravity", lower=0.0, default=9.81)
+SPAN = Parameter("s", "span of time", lower=0.0, open_lower=True)
+
+
+def pair(law: type, place: str, values: Values) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Static and kinetic coefficient at a place, checked against each other."""
+    mu_k = values[f"{place}.mu_k"]
+    if "mu_s" not in friction.coefficients_of(law):
+        return mu_k, mu_k
+    mu_s = values[f"{place}.mu_s"]
+    require(
+        mu_s >= mu_k, f"{place}.mu_k", mu_k, "{} exceeds mu_s: kinetic friction cannot be greater than static friction"
+    )
+    return mu_s, mu_k
+
+
+def drive_of(structure: Structure, values: Values) -> Any:
+    """A drive whose leaves have shape ``(cells, ...)``.
+
+    Raises
+    ------
+    InputError
+        If a table ends before the span of time does.
+    """
+    law = drives.DRIVES[structure.drive]
+    columns: dict[str, Any] = {field: values[f"drive.{field}"] for field in declared(law)}
+    if structure.table is None:
+        return law(**columns)
+    times, angles = structure.table
+    cells = len(values["time.span"])
+    require(
+        values["time.span"] <= times[-1],
+        "time.span",
+        values["time.span"],
+        f"{{}} s is longer than the table of the drive, which ends at {times[-1]:.6g} s",
+    )
+    # A spline of third degree is the smoothest that a few noisy samples bear, and is C2.
+    pieces = np.ascontiguousarray(CubicSpline(times, angles).c.T)
+    return drives.Table(
+        **columns,
+        knots=np.broadcast_to(times, (cells, *times.shape)),
+        coefficients=np.broadcast_to(pieces, (cells, *pieces.shape)),
+    )
