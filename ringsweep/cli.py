@@ -47,7 +47,7 @@ def _parser() -> argparse.ArgumentParser:
     run = verbs.add_parser("run", help="run a sweep: NetCDF, and a regime map beside it")
     run.add_argument("config", metavar="CONFIG.yaml")
     run.add_argument("-o", "--output", metavar="OUT.nc", help="default: the configuration's name, in this folder")
-    run.add_argument("--jobs", type=_positive, metavar="N", help="threads (default: all cores)")
+    run.add_argument("--jobs", type=whole_number, metavar="N", help="threads (default: all cores)")
     run.add_argument("--fresh", action="store_true", help="run again even if OUT.nc holds this very sweep")
     run.set_defaults(verb=_run)
 
@@ -78,7 +78,7 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _positive(text: str) -> int:
+def whole_number(text: str) -> int:
     number = int(text)
     if number < 1:
         raise argparse.ArgumentTypeError(f"{number} is not at least 1")
@@ -123,7 +123,10 @@ def _map(arguments: argparse.Namespace) -> None:
     from ringsweep import plots, storage
 
     result = storage.load(arguments.dataset)
-    target = Path(arguments.output or Path(arguments.dataset).with_suffix(".png"))
+    dataset = Path(arguments.dataset)
+    # Beside the regime map of the sweep, not in its place.
+    shown = [arguments.var] * (arguments.var != "regime") + [held.replace(" ", "") for held in arguments.sel]
+    target = Path(arguments.output or dataset.with_name("-".join([dataset.stem, *shown]) + ".png"))
     storage.check_writable(target)
     held = dict(_selection(result, text) for text in arguments.sel)
     plots.save(plots.regime_map(result, arguments.x, arguments.y, arguments.var, held), target)
@@ -138,6 +141,9 @@ def _simulate(arguments: argparse.Namespace) -> None:
 
     from ringsweep import plots, storage
     from ringsweep.single import history
+
+    if target.exists() and "time" not in storage.load(target).dims:
+        raise InputError(str(target), "holds a sweep: name another file for the history of a run")
 
     result = history(config)
     storage.save(result, target)

@@ -36,6 +36,9 @@ logger = logging.getLogger("ringsweep")
 TABLE = {"time": Parameter("s", "time in the table of the drive"), "theta": Parameter("rad", "angle of the drive")}
 COUNT = Parameter("1", "number of values", lower=1, upper=1_000_000)
 
+#: Cells of a sweep at most: what 24 variables of them take is a few gigabytes.
+MOST_CELLS = 10_000_000
+
 # Cells whose consistency is checked at once: many arcs over many points must not fill the memory.
 _CHUNK = 4096
 
@@ -339,7 +342,7 @@ def _leaves(node: Any, path: str, names: _Names) -> Iterator[tuple[str, Any]]:
 def _missing(path: str, parameter: Parameter) -> str:
     examples = {"rad": "15 deg", "m": "10 mm", "1": "0.2", "": "1"}
     unit = f", in {parameter.unit}" if parameter.unit not in ("", "1") else ""
-    example = examples.get(parameter.unit, f"1 {parameter.unit}")
+    example = "5000" if path.endswith(("steps", ".max_steps")) else examples.get(parameter.unit, f"1 {parameter.unit}")
     return f"missing: {parameter.long_name}{unit} (for example `{path.rpartition('.')[2]}: {example}`)"
 
 
@@ -517,6 +520,14 @@ def _axes(entries: Iterable[_Entry]) -> Axes:
             if found.sizes.setdefault(dim, size) != size:
                 raise InputError(where, f"{size} values along {dim}, where others have {found.sizes[dim]}")
         found.columns[path] = dims, values
+    total = math.prod(found.sizes.values())
+    if total > MOST_CELLS:
+        sizes = " x ".join(map(str, found.sizes.values()))
+        raise InputError("sweep", f"{sizes} makes {total:.3g} cells: at most {MOST_CELLS:.3g} fit into one sweep")
+    for path, (dims, values) in found.columns.items():
+        name = _dimension(path)
+        if dims == (name,) and len(np.unique(values)) < len(values):
+            raise InputError(path, "a value stands twice on this axis")
     for path, (dims, _) in found.columns.items():
         name = _dimension(path)
         if name in found.sizes and dims != (name,):

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from math import floor, isfinite, nan, pi
+from math import isfinite, nan, pi
 from typing import NamedTuple
+
+import numpy as np
 
 from ringsweep.jit import inlined
 from ringsweep.variables import FAILED, JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 
 #: How a run stands or ended.
 RUNNING, COMPLETE, SEPARATED_1, SEPARATED_2, JAM, BROKEN = range(6)
+
+
+#: What a count of turns saturates at: a diverging run of constant step makes more than an int32 holds.
+MOST_TURNS = 2.0**31 - 1.0
 
 
 class Record(NamedTuple):
@@ -98,7 +104,7 @@ def observe(record, phi, omega, normal_1, normal_2, stuck_for, epsilon_omega):
 def conclude(record, status, t, phi, omega):
     """Outcome of a run that ended with `status` at time `t` in the state `(phi, omega)`."""
     r = record
-    turns = floor((r.highest - r.lowest) / (2.0 * pi))
+    turns = min(np.floor((r.highest - r.lowest) / (2.0 * pi)), MOST_TURNS)
     motion = REVOLVING if turns >= 1 else OSCILLATORY if r.reversals > 0 else RESTING
     if status == BROKEN or not (isfinite(phi) and isfinite(omega)):
         regime, motion = FAILED, FAILED

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
-from ringsweep.parameters import Parameter
 
 Values = Mapping[str, NDArray[np.float64]]
 
@@ -54,31 +53,3 @@ def require(allowed: Any, path: str, values: Any, problem: str) -> None:
     allowed, values = np.broadcast_arrays(np.atleast_1d(allowed), np.atleast_1d(values))
     if not allowed.all():
         raise InputError(f"scene.{path}", problem.format(f"{values[~allowed][0]:.6g}"))
-
-
-def parameters(structure: Structure) -> dict[str, Parameter]:
-    """Every numeric path that a scene of this structure has, in the order of the documentation."""
-    return _model(structure).parameters(structure)
-
-
-def batch(structure: Structure, values: Values) -> Any:
-    """Cells as a kernel takes them: a nested ``NamedTuple`` of arrays of shape ``(cells, ...)``.
-
-    Parameters
-    ----------
-    structure : Structure
-    values : mapping of str to ndarray of shape ``(cells,)``
-        One array for every path given.
-
-    Raises
-    ------
-    InputError
-        If values contradict each other, as a ring too small for its body.
-    """
-    return _model(structure).build(structure, values)
-
-
-def _model(structure: Structure) -> Any:
-    from ringsweep.models import MODELS
-
-    return MODELS[structure.model]

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from ringsweep.models import MODELS
-from ringsweep.scene import Structure, batch, parameters
+from ringsweep.models import MODELS, batch, parameters
+from ringsweep.scene import Structure
 from ringsweep.solvers.rk4 import RK4
 
 settings.register_profile("ringsweep", deadline=None, derandomize=True)

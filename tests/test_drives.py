@@ -10,14 +10,20 @@ from scipy.integrate import quad
 
 from ringsweep.errors import InputError
 from ringsweep.jit import take
-from ringsweep.physics.drives import DRIVES, Arctan, Constant, Power, Sinusoidal, Still, build, lookup, shape
+from ringsweep.models.common import drive_of
+from ringsweep.physics.drives import DRIVES, Arctan, Constant, Power, Sinusoidal, Still, lookup, shape
+from ringsweep.scene import Structure
 
 KNOTS = np.array([0.0, 0.4, 0.5, 1.1, 2.0, 3.0])
 
 
+def table(times, angles):
+    return Structure("ring", "coulomb", "table", table=(times, angles))
+
+
 def tabulated(angles, times=KNOTS, amplitude=1.0):
     values = {"drive.amplitude": np.array([amplitude]), "time.span": np.array([times[-1]])}
-    return take(build("table", (times, np.asarray(angles, dtype=float)), values), 0)
+    return take(drive_of(table(times, np.asarray(angles, dtype=float)), values), 0)
 
 
 SAMPLES = [
@@ -96,7 +102,7 @@ class TestTable:
     def test_a_span_beyond_the_table_is_an_input_error(self):
         values = {"drive.amplitude": np.ones(2), "time.span": np.array([3.0, 3.5])}
         with pytest.raises(InputError, match=r"time\.span.*3\.5 s is longer than the table.*3 s"):
-            build("table", (KNOTS, np.zeros(len(KNOTS))), values)
+            drive_of(table(KNOTS, np.zeros(len(KNOTS))), values)
 
 
 class TestAmplitude:

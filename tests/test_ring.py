@@ -8,8 +8,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from ringsweep.errors import InputError
+from ringsweep.hooks import inspect
 from ringsweep.jit import inlined, take
-from ringsweep.models.hooks import inspect
 from ringsweep.physics import ring
 from ringsweep.physics.friction import BengisuAkay, Coulomb, stiction_band, weights
 from ringsweep.physics.ring import OneContact, Ring, TwoContacts, acceleration, acceleration_slope, reactions

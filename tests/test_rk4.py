@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ringsweep.hooks import verdict
 from ringsweep.jit import take
-from ringsweep.models.hooks import verdict
 from ringsweep.models.ring import Inspection
 from ringsweep.physics.friction import weights
 from ringsweep.physics.ring import acceleration, reactions

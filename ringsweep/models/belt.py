@@ -9,16 +9,16 @@ from __future__ import annotations
 from math import inf, isfinite, nan
 from typing import Any, ClassVar, NamedTuple
 
+from ringsweep import hooks
 from ringsweep.errors import InputError
 from ringsweep.jit import inlined
-from ringsweep.models import hooks
 from ringsweep.models.common import GRAVITY, MASS, SPAN, drive_of, pair
 from ringsweep.parameters import Parameter, declared
 from ringsweep.physics import belt, drives, friction
 from ringsweep.physics.friction import BAND, CLEAN
 from ringsweep.regimes import BROKEN, RUNNING
 from ringsweep.scene import Structure, Values
-from ringsweep.solvers.series import INVERSE, ORDER, ascending, crossings, reach, value, variation
+from ringsweep.series import INVERSE, ORDER, ascending, crossings, reach, value, variation
 from ringsweep.variables import FAILED, OSCILLATORY, RESTING, STICK_SLIP
 
 
@@ -69,7 +69,7 @@ class Belt:
         }
 
     def build(self, structure: Structure, values: Values) -> belt.Belt:
-        """Cells of a sweep; see :func:`ringsweep.scene.batch`."""
+        """Cells of a sweep; see :func:`ringsweep.models.batch`."""
         if structure.arcs:
             raise InputError(f"scene.{structure.arcs[0]}", "a belt has no rough zones")
         law = friction.LAWS[structure.law]

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import cos, inf, isfinite, isnan, pi, sin
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ringsweep import regimes
+from ringsweep import hooks, regimes
 from ringsweep.jit import inlined
-from ringsweep.models import hooks
 from ringsweep.models.common import GRAVITY, MASS, SPAN, drive_of, pair
 from ringsweep.parameters import Parameter, declared
 from ringsweep.physics import drives, friction, ring, zones
@@ -35,13 +35,14 @@ class SingleContactRing:
         """Every numeric path of a scene of this structure."""
         law = friction.LAWS[structure.law]
         found = dict(self.body)
-        places = ["friction.rest"]
+        places = {"friction.rest": "rest of the ring"}
         if structure.arcs == ("zone",):
-            places.append("friction.rough")
-        elif structure.arcs:
-            places.extend(structure.arcs)
-        for place in places:
-            found |= {f"{place}.{name}": p for name, p in friction.coefficients_of(law).items()}
+            places["friction.rough"] = "rough zone"
+        else:
+            places |= {arc: f"zone {number}" for number, arc in enumerate(structure.arcs)}
+        for place, where in places.items():
+            for name, p in friction.coefficients_of(law).items():
+                found[f"{place}.{name}"] = replace(p, long_name=f"{p.long_name} of the {where}")
         found |= {f"friction.{name}": p for name, p in declared(law).items()}
         for arc in structure.arcs:
             found |= {f"{arc}.{name}": p for name, p in declared(zones.Arc).items()}
@@ -57,7 +58,7 @@ class SingleContactRing:
         }
 
     def build(self, structure: Structure, values: Values) -> ring.Ring:
-        """Cells of a sweep; see :func:`ringsweep.scene.batch`."""
+        """Cells of a sweep; see :func:`ringsweep.models.batch`."""
         law = friction.LAWS[structure.law]
         rough = "friction.rough" if structure.arcs == ("zone",) else None
         arcs = [

@@ -11,12 +11,11 @@ acceleration, and no differential equation is left.
 
 from __future__ import annotations
 
-from math import cos, inf, sin, sqrt
+from math import cos, inf, isnan, sin, sqrt
 from typing import NamedTuple
 
-from ringsweep import regimes
+from ringsweep import hooks, regimes
 from ringsweep.jit import hook, inlined
-from ringsweep.models import hooks
 from ringsweep.physics import drives, ring
 from ringsweep.physics.friction import (
     BAND,
@@ -29,8 +28,8 @@ from ringsweep.physics.friction import (
     stiction_band,
 )
 from ringsweep.physics.zones import coefficients, cross, edge_ahead, locate
-from ringsweep.regimes import JAM, RUNNING, SEPARATED_1, SEPARATED_2
-from ringsweep.solvers.series import (
+from ringsweep.regimes import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2
+from ringsweep.series import (
     INVERSE,
     ORDER,
     ascending,
@@ -42,10 +41,10 @@ from ringsweep.solvers.series import (
     variation,
 )
 
-# Rows of the series; the guards last.
+# Rows of the series; the guards last, and first of them the one without which the others mean nothing.
 PHI, V, OMEGA, EPSILON, SIN, COS, SQUARE, THETA, SPEED, STATIC, KINETIC = range(11)
 K1, K2, D, LEVER, PULL, LIFT, SPARE = range(11, 18)
-SLOW, NORMAL_1, NORMAL_2, EDGE, FAST, INERTIA = range(18, 24)
+INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(18, 24)
 
 
 class Mode(NamedTuple):
@@ -79,7 +78,7 @@ def _embark(scene):
 
 @hooks.rows.implements(ring.Ring)
 def _rows(scene):
-    return INERTIA + 1, SLOW
+    return FAST + 1, INERTIA
 
 
 @hooks.enter.implements(ring.Ring)
@@ -109,7 +108,7 @@ def _settle(scene, t, phi, places):
     against_forward, D1, inertia_1 = ring.acceleration(scene.body, -m1, -m2, sin_phi, cos_phi, ring_omega)
     against_backward, D2, inertia_2 = ring.acceleration(scene.body, m1, m2, sin_phi, cos_phi, ring_omega)
     if not (D1 > 0.0 and D2 > 0.0 and inertia_1 > 0.0 and inertia_2 > 0.0):
-        return JAM, still
+        return BROKEN if isnan(inertia_1 + inertia_2) else JAM, still
     forward, backward = against_forward > ring_epsilon, against_backward < ring_epsilon
     region = region_at(scene.law, 0.0)
     if forward and backward:
@@ -195,8 +194,14 @@ def _expand(scene, mode, t, y, tolerance, c):
         # Noise that is large for the band would keep the creep from ever settling.
         speed = min(speed, 1e3 * stiction_band(scene.law))
     rate = scale / speed
-    last = max(abs(c[PHI, ORDER]) * scale, abs(c[V, ORDER]) * rate)
-    previous = max(abs(c[PHI, ORDER - 1]) * scale, abs(c[V, ORDER - 1]) * rate)
+    # The reactions follow the acceleration: an error of it could make or hide a separation.
+    push = (
+        1e-2
+        * scale
+        / (scene.body.gravity / scene.body.radius + c[SQUARE, 0] + abs(c[EPSILON, 0]) + abs(2.0 * c[THETA, 2]))
+    )
+    last = max(abs(c[PHI, ORDER]) * scale, abs(c[V, ORDER]) * rate, abs(c[EPSILON, ORDER]) * push)
+    previous = max(abs(c[PHI, ORDER - 1]) * scale, abs(c[V, ORDER - 1]) * rate, abs(c[EPSILON, ORDER - 1]) * push)
     return reach(last, previous)
 
 
@@ -222,7 +227,7 @@ def _expand_sliding(scene, mode, c):
     for k in range(ORDER + 1):
         c[NORMAL_1, k] = s1 * c[SIN, k] + c1 * c[COS, k] + w1 * c[SQUARE, k] + e1 * c[EPSILON, k]
         c[NORMAL_2, k] = s2 * c[SIN, k] + c2 * c[COS, k] + w2 * c[SQUARE, k] + e2 * c[EPSILON, k]
-    c[INERTIA, 0] = inf if determinant > 0.0 and inertia > 0.0 else -1.0
+    c[INERTIA, 0] = inf if determinant > 0.0 and inertia > 0.0 else min(determinant, inertia)
 
 
 @inlined
@@ -239,7 +244,8 @@ def _expand_blended(scene, mode, c):
         if k < ORDER:
             _next_state(scene, c, k)
     _reaction_terms(scene.body, c)
-    if not c[D, 0] > 0.0:
+    # On the way to a jam all accelerations grow without bound: at some point it is one.
+    if not (c[D, 0] > 0.0 and c[INERTIA, 0] > 1e-6 * ring.about_axis(scene.body) * c[D, 0]):
         c[INERTIA, 0] = -1.0
 
 
@@ -419,6 +425,8 @@ def _watch(scene, record, mode, c, t, s, work):
             c[SPARE, ORDER] = 0.0
             count = crossings(c[SPARE], s, work, count)
     ascending(instants, count)
+    # The reactions may have jumped as the mode was entered.
+    record = regimes.observe(record, c[PHI, 0], c[OMEGA, 0], c[NORMAL_1, 0], c[NORMAL_2, 0], 0.0, scene.epsilon_omega)
     before = 0.0
     stuck = mode.sign == 0 or mode.region == BAND
     for j in range(count + 1):

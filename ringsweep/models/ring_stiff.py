@@ -8,9 +8,8 @@ from __future__ import annotations
 
 from math import cos, sin, sqrt
 
-from ringsweep import regimes
+from ringsweep import hooks, regimes
 from ringsweep.jit import inlined
-from ringsweep.models import hooks
 from ringsweep.models.ring_series import coefficients_under
 from ringsweep.physics import drives, ring
 from ringsweep.physics.friction import BAND, stiction_band, weights
@@ -110,14 +109,14 @@ def _stiff_view(scene, mode, t, x):
     ahead_1 = mode.sign * (edge_ahead(scene.surface, mode.place_1, mode.sign) - (x[0] - offset))
     ahead_2 = mode.sign * (edge_ahead(scene.surface, mode.place_2, mode.sign) - (x[0] + offset))
     speed = mode.sign * x[1]
-    # In the order of the rows of the series: SLOW, NORMAL_1, NORMAL_2, EDGE, FAST, INERTIA.
+    # In the order of the rows of the series: INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST.
     guards = (
+        min(determinant, inertia),
         speed,
         normal_1,
         normal_2,
         min(ahead_1, ahead_2),
         stiction_band(scene.law) - speed,
-        min(determinant, inertia),
     )
     return guards, (phi, omega, epsilon, ring_omega)
 
@@ -125,7 +124,7 @@ def _stiff_view(scene, mode, t, x):
 @hooks.stiff_watch.implements(ring.Ring)
 def _stiff_watch(scene, record, view, t, duration):
     guards, (phi, omega, _, _) = view
-    return regimes.observe(record, phi, omega, guards[1], guards[2], duration, scene.epsilon_omega)
+    return regimes.observe(record, phi, omega, guards[2], guards[3], duration, scene.epsilon_omega)
 
 
 @hooks.stiff_sample.implements(ring.Ring)
@@ -133,4 +132,4 @@ def _stiff_sample(scene, mode, t, x):
     guards, (phi, omega, epsilon, ring_omega) = hooks.stiff_view(scene, mode, t, x)
     _, _, zone_1 = coefficients(scene.surface, mode.place_1[0])
     _, _, zone_2 = coefficients(scene.surface, mode.place_2[0])
-    return phi, omega, epsilon, guards[1], guards[2], ring_omega, zone_1, zone_2, 0.0
+    return phi, omega, epsilon, guards[2], guards[3], ring_omega, zone_1, zone_2, 0.0

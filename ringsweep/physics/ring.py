@@ -87,6 +87,21 @@ def _one_offset(body):
 
 
 @hook
+def about_axis(body):
+    """What the effective inertia is measured by: the moment of inertia about the axis, kg m^2."""
+
+
+@about_axis.implements(TwoContacts)
+def _two_about_axis(body):
+    return body.inertia + body.mass * body.xi * body.xi
+
+
+@about_axis.implements(OneContact)
+def _one_about_axis(body):
+    return 1.0
+
+
+@hook
 def acceleration(body, K1, K2, sin_phi, cos_phi, omega):
     """Angular acceleration, and what tells whether it exists.
 

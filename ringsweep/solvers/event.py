@@ -118,7 +118,7 @@ class Implicit(_Piecewise):
     name: ClassVar[str] = "implicit"
     laws: ClassVar[tuple[type, ...]] = SMOOTH
 
-    rtol: Annotated[float, Parameter("1", "error allowed to a step", lower=1e-13, upper=1e-3)] = 1e-6
+    rtol: Annotated[float, Parameter("1", "error allowed to a step", lower=1e-13, upper=1e-3)] = 3e-6
     max_steps: Annotated[int, LIMIT] = 1_000_000
     certify: bool = True
 

@@ -8,12 +8,11 @@ scenes with a set-valued law have none, and their kernels do not contain the met
 
 from __future__ import annotations
 
-from math import isfinite
+from math import isfinite, isnan, nan
 
 import numpy as np
 
-from ringsweep.jit import hook, inlined, kernel, take
-from ringsweep.models.hooks import (
+from ringsweep.hooks import (
     creeps,
     embark,
     enter,
@@ -35,11 +34,12 @@ from ringsweep.models.hooks import (
     to_stiff,
     watch,
 )
+from ringsweep.jit import hook, inlined, kernel, take
 from ringsweep.physics.drives import next_knot
 from ringsweep.physics.friction import SET_VALUED, SMOOTH
 from ringsweep.regimes import BROKEN, COMPLETE, RUNNING
+from ringsweep.series import ORDER, STACK, first_root
 from ringsweep.solvers import rosenbrock
-from ringsweep.solvers.series import ORDER, STACK, first_root
 
 
 @inlined
@@ -61,8 +61,11 @@ def _first_event(c, guards, fresh, h, work):
                 row[k] = row[k + low] if k + low <= ORDER else 0.0
         if row[0] <= 0.0:
             return g, 0.0
+        if isnan(row[0]):
+            return -1, nan
         s, found = first_root(row, h, work)
-        if found and (event < 0 or s < h):
+        # Guards that vanish together, as those of one contact seen twice, go to the first of them.
+        if found and (event < 0 or s < h * (1.0 - 1e-14)):
             event, h = g, s
     return event, h
 
@@ -150,6 +153,7 @@ def _stiff_creep(law, scene, record, mode, t, y, h, horizon, tolerance, guards, 
     grown = s * min(6.0, 0.9 * max(size, 1e-8) ** -0.2)
     # A step cut short by the horizon says little about the next one.
     h = max(h, grown) if s == horizon else grown
+    before = stiff_view(scene, mode, t, x)
     within = stiff_view(scene, mode, t + 0.5 * s, rosenbrock.dense(x, x_next, stages, 0.5))
     after = stiff_view(scene, mode, t + s, x_next)
     event, end = -1, s
@@ -159,15 +163,32 @@ def _stiff_creep(law, scene, record, mode, t, y, h, horizon, tolerance, guards, 
             until = min(end, s if after[0][g] < 0.0 else 0.5 * s)
             if event >= 0 and _guard_after(scene, mode, t, x, line, until, g, stages) > 0.0:
                 continue
-            event, end = guards + g, _locate(scene, mode, t, x, line, until, g, stages)
+            found = _locate(scene, mode, t, x, line, until, g, stages)
+            if event < 0 or found < end * (1.0 - 1e-12):
+                event, end = guards + g, found
     if event >= 0:
         if end == 0.0:
             return True, event, 0.0, y, record, h
         x_next, _ = rosenbrock.step(scene, mode, t, x, line, end, stages)
         within = stiff_view(scene, mode, t + 0.5 * end, rosenbrock.dense(x, x_next, stages, 0.5))
         after = stiff_view(scene, mode, t + end, x_next)
-    record = stiff_watch(scene, record, within, t + 0.5 * end, 0.5 * end)
-    record = stiff_watch(scene, record, after, t + end, 0.5 * end)
+    record = stiff_watch(scene, record, before, t, 0.0)
+    done = 0.0
+    for half, left, right in ((0.0, before, within), (0.5, within, after)):
+        # The motion turns within this half: its extreme is a moment of its own.
+        if left[1][1] * right[1][1] < 0.0:
+            low, high = half, half + 0.5
+            for _ in range(40):
+                middle = 0.5 * (low + high)
+                view = stiff_view(scene, mode, t + middle * end, rosenbrock.dense(x, x_next, stages, middle))
+                if view[1][1] * left[1][1] > 0.0:
+                    low = middle
+                else:
+                    high = middle
+            record = stiff_watch(scene, record, view, t + middle * end, (middle - done) * end)
+            done = middle
+        record = stiff_watch(scene, record, right, t + (half + 0.5) * end, (half + 0.5 - done) * end)
+        done = half + 0.5
     return True, event, end, from_stiff(scene, t + end, x_next), record, h
 
 
@@ -175,8 +196,9 @@ def _stiff_creep(law, scene, record, mode, t, y, h, horizon, tolerance, guards, 
 def _arrive(scene, mode, guard, t, s, horizon, y):
     """Time, status, mode and state after a step `s` that ended at `guard`, or at none (-1)."""
     # To the very end of the span or of a piece of the drive, not to the rounding of a sum.
+    before = t
     t = t + s if s < horizon else t + horizon
-    if not s >= 0.0:
+    if not (s >= 0.0 and isfinite(y[0]) and isfinite(y[1])) or (guard < 0 and t == before):
         return t, BROKEN, mode, y
     if guard >= 0:
         status, mode, y = switch(scene, mode, guard, t, y)
@@ -252,6 +274,11 @@ def trace(batch, tolerance, creep_tolerance, limit, spacing, times, table):
             y = land(scene, mode, c, t, s)
         entered = guard >= 0 or (entered and s == 0.0)
         t, status, mode, y = _arrive(scene, mode, guard, t, s, horizon, y)
+    if n == 0:
+        # A run that ends as it begins was somewhere all the same.
+        _store(table[0], sample(scene, mode, c, t, 0.0))
+        times[0] = t
+        n = 1
     return n
 
 
@@ -262,7 +289,7 @@ def integrate(batch, tolerance, creep_tolerance, limit, out, steps):
     Parameters
     ----------
     batch : NamedTuple
-        Cells, as :func:`ringsweep.scene.batch` makes them.
+        Cells, as :func:`ringsweep.models.batch` makes them.
     tolerance, creep_tolerance : float
         Error allowed to a step of the series and to an implicit step: rad, and rad/s relative to
         1 rad/s + \\|omega\\| or m/s relative to the width of the stiction band.

@@ -12,8 +12,8 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsweep.hooks import begin, conclude, describe, inspect, launch, observe, rates, stiffness, verdict
 from ringsweep.jit import add_scaled, inlined, kernel, take
-from ringsweep.models.hooks import begin, conclude, describe, inspect, launch, observe, rates, stiffness, verdict
 from ringsweep.parameters import Parameter
 from ringsweep.physics.drives import lookup, shape, turn
 from ringsweep.regimes import COMPLETE, RUNNING

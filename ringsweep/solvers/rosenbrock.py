@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ringsweep.hooks import forcing, stiff_rates
 from ringsweep.jit import inlined
-from ringsweep.models.hooks import forcing, stiff_rates
 
 STAGES = 8
 GAMMA = 0.21193756319429014

@@ -177,7 +177,7 @@ def stiff_scales(scene, tolerance):
 
 @hook
 def stiff_view(scene, mode, t, x):
-    """Guards of the mode, positive while it holds, and what else :func:`stiff_watch` needs of a state."""
+    """Guards of the mode, positive while it holds, and place, velocity and what else :func:`stiff_watch` needs."""
 
 
 @hook

@@ -1,0 +1,174 @@
+"""Solutions that tests hold the solvers to, from the balances of momentum alone, and the shortest way to a run."""
+
+from math import cos, exp, inf, pi, sin
+from types import SimpleNamespace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq
+
+from ringsweep.jit import take
+from ringsweep.physics.friction import weights
+from ringsweep.regimes import Outcome
+from ringsweep.solvers.piecewise import trace
+
+
+def solve(method, batch):
+    """Outcomes of a batch: one array for each, besides those of `Result`."""
+    result = method.run(batch, Outcome._fields)
+    return SimpleNamespace(**vars(result), **dict(zip(Outcome._fields, result.rows.T, strict=True)))
+
+
+HISTORY = ("phi", "omega", "epsilon", "normal_1", "normal_2", "ring_omega", "zone_1", "zone_2", "mode")
+
+
+def trail(method, batch, spacing):
+    """History of the first cell: every end of a step, and instants `spacing` apart."""
+    times, rows = np.empty(2_000_000), np.empty((2_000_000, len(HISTORY)))
+    count = trace(batch, *method.tolerances(), method.max_steps, spacing, times, rows)
+    return SimpleNamespace(t=times[:count], **dict(zip(HISTORY, rows[:count].T, strict=True)))
+
+
+def motion(body, K1, K2):
+    """What multiplies ``(omega^2, cos phi, sin phi)`` in the angular acceleration and in both reactions."""
+    if not hasattr(body, "xi"):
+        g, R, M = body.gravity, body.radius, body.mass
+        return np.array([[K1, K1 * g / R, -g / R], [M * R, M * g, 0.0], [M * R, M * g, 0.0]])
+    M, g, R, xi, s, c = body.mass, body.gravity, body.radius, body.xi, body.sin_beta, body.cos_beta
+    balances = np.array(
+        [
+            [0.0, c - K1 * s, c + K2 * s],
+            [M * xi, -s - K1 * c, s - K2 * c],
+            [body.inertia + M * xi * xi, -R * K1, -R * K2],
+        ]
+    )
+    loads = M * np.array([[xi, g, 0.0], [0.0, 0.0, -g], [0.0, 0.0, -g * xi]])
+    return np.linalg.solve(balances, loads)
+
+
+class Fall:
+    """Coulomb friction with stiction on an immobile ring with one rough arc: orbit by orbit, in closed form.
+
+    Between two edges ``u = omega^2 = C e^(2 p phi) + A cos phi + B sin phi``, and the reactions are
+    combinations of u, cosine and sine.
+    """
+
+    def __init__(self, body, center, half_angle, rough, rest):
+        self.body, self.rough, self.rest = body, rough, rest
+        self.start, self.width = center - half_angle, 2 * half_angle
+        self.offset = getattr(body, "beta", 0.0)
+
+    def friction(self, angle, kind):
+        return (self.rough if (angle - self.start) % (2 * pi) < self.width else self.rest)[kind]
+
+    def coefficients(self, phi, kind):
+        return self.friction(phi - self.offset, kind), self.friction(phi + self.offset, kind)
+
+    def edge(self, phi, sense):
+        """Nearest angle of the body ahead at which a contact meets an edge."""
+        ahead = []
+        for side in (-1, 1):
+            for edge in (self.start, self.start + self.width):
+                way = (sense * (edge - side * self.offset - phi)) % (2 * pi)
+                ahead.append(way if way > 1e-9 else 2 * pi)
+        return phi + sense * min(ahead)
+
+    def holds(self, phi):
+        """Whether friction at rest can carry the body: full friction of either sense would move it that way."""
+        m1, m2 = self.coefficients(phi, 0)
+        place = np.array([0.0, cos(phi), sin(phi)])
+        return motion(self.body, -m1, -m2)[0] @ place <= 0.0 <= motion(self.body, m1, m2)[0] @ place
+
+    def run(self, phi, omega):
+        """Angle at which the body rests for good or loses a contact, that contact or 0, and the time taken."""
+        sense, u, t = (1 if omega > 0 else -1), omega * omega, 0.0
+        for _ in range(200):
+            end = self.edge(phi, sense)
+            m1, m2 = self.coefficients(0.5 * (phi + end), 1)
+            rows = motion(self.body, -sense * m1, -sense * m2)
+            p, q, r = rows[0]
+            A = -(4 * p * q + 2 * r) / (1 + 4 * p * p)
+            B = 2 * p * A + 2 * q
+            C = u - A * cos(phi) - B * sin(phi)
+
+            def square(x, p=p, A=A, B=B, C=C, origin=phi):
+                return C * exp(2 * p * (x - origin)) + A * cos(x) + B * sin(x)
+
+            def reaction(x, k, rows=rows, square=square):
+                return rows[k] @ (square(x), cos(x), sin(x))
+
+            ends = [(self.first(square, phi, end, 1e-9 if u == 0.0 else 0.0), "rest")]
+            ends += [(self.first(lambda x, k=k: reaction(x, k), phi, end), k) for k in (1, 2)]
+            at, what = min(ends, key=lambda pair: abs(pair[0] - phi))
+            stop = min(at, end, key=lambda x: abs(x - phi))
+            t += self.duration(square, phi, stop, at == stop and what == "rest", u == 0.0)
+            if at != stop:
+                phi, u = end, square(end)
+            elif what != "rest":
+                return stop, what, t
+            elif self.holds(stop):
+                return stop, 0, t
+            else:
+                phi, u, sense = stop, 0.0, -sense
+        raise AssertionError("no end")
+
+    @staticmethod
+    def first(f, start, end, skip=0.0):
+        """First zero of a function positive at `start`, or infinity."""
+        x = np.linspace(start + skip * np.sign(end - start), end, 4001)
+        below = np.flatnonzero([f(one) <= 0.0 for one in x])
+        if not len(below):
+            return inf
+        k = below[0]
+        return brentq(f, x[k - 1], x[k], xtol=1e-15, rtol=1e-15) if k else start
+
+    @staticmethod
+    def duration(square, start, end, rests, rested):
+        """Time from angle to angle by quadrature; at rest, in the root of the distance from there."""
+        x, weights = np.polynomial.legendre.leggauss(120)
+        middle, sense = 0.5 * (start + end), np.sign(end - start)
+        total = 0.0
+        for place, still in ((start, rested), (end, rests)):
+            way = middle - place
+            fraction = 0.5 * (x + 1)
+            # phi = place + way z^2 takes away the root that u has at rest.
+            phi, rate = (place + way * fraction**2, 2 * fraction) if still else (place + way * fraction, 1.0)
+            speed = np.sqrt([square(one) for one in phi])
+            total += 0.5 * abs(way) * (weights * rate / speed).sum()
+        return total if sense else 0.0
+
+
+def imbalance(batch, run, coefficients):
+    """Largest difference of energy and work up to any instant of a history, relative to all work done.
+
+    `coefficients` are ``(mu_s, mu_k)`` of the rest of the ring and of its arcs. Where the law is
+    set-valued, what friction does in stick follows from the ring's motion.
+    """
+    scene = take(batch, 0)
+    body = scene.body
+    inertia = body.inertia + body.mass * body.xi**2
+    weight = body.mass * body.gravity * body.xi
+    force = (inertia * run.epsilon + weight * np.sin(run.phi)) / body.radius
+    v = body.radius * (run.omega - run.ring_omega)
+    slips = run.mode != 0 if not hasattr(scene.law, "v0") else np.ones(len(run.t), dtype=bool)
+    table = np.array(coefficients)
+    for k in np.flatnonzero(slips):
+        w_s, w_k, _, _ = weights(scene.law, abs(v[k]))
+        mu = table @ (w_s, w_k)
+        load = mu[int(run.zone_1[k])] * run.normal_1[k] + mu[int(run.zone_2[k])] * run.normal_2[k]
+        sense = run.mode[k] or np.sign(v[k])
+        force[k] = -sense * load
+    power = body.radius * run.omega * force
+    energy = 0.5 * inertia * run.omega**2 - weight * np.cos(run.phi)
+    # An instant that appears twice parts two modes, between which the power may jump.
+    parts = np.split(np.arange(len(run.t)), np.flatnonzero(np.diff(run.t) <= 0.0) + 1)
+    work = np.zeros(len(run.t))
+    done = 0.0
+    for part in parts:
+        if len(part) > 1:
+            spline = CubicSpline(run.t[part], power[part]).antiderivative()
+            work[part] = done + spline(run.t[part])
+            done = work[part[-1]]
+        else:
+            work[part] = done
+    return np.abs(energy - energy[0] - work).max() / np.abs(work).max()

@@ -1,0 +1,348 @@
+"""The default method: what its certificate means, and what it makes of the ends of every range."""
+
+from math import acos, pi, sqrt
+
+import numpy as np
+import pytest
+from conftest import RIG
+from scipy.special import ellipk
+from solutions import Fall, solve
+
+from ringsweep.jit import take
+from ringsweep.models import batch, parameters
+from ringsweep.scene import Structure
+from ringsweep.solvers import event
+from ringsweep.solvers.event import Auto, Event, Implicit
+from ringsweep.solvers.rk4 import RK4
+from ringsweep.variables import FAILED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
+
+KINDS = ("regime", "motion", "separating_contact")
+COEFFICIENTS = [f"friction.{place}.{name}" for place in ("rough", "rest") for name in ("mu_s", "mu_k")]
+BETA = float(np.arcsin(0.025 / 0.033378))
+
+
+def kinds(found):
+    return np.array([getattr(found, name) for name in KINDS])
+
+
+@pytest.fixture(params=["stiction", "bengisu-akay"])
+def law(request):
+    return request.param
+
+
+@pytest.fixture
+def scenes(cells, law):
+    """Batch under a set-valued or a smooth law; on a ring at rest unless it is driven."""
+
+    def build(changes, drive="arctan", **more):
+        return cells({"time.span": 3.0} | changes, law=law, drive=drive, **more)
+
+    return build
+
+
+class TestChoice:
+    def test_never_replaces_the_law(self, cells):
+        """Each law goes to the method that takes it as it is."""
+        changes = {"drive.amplitude": 2.0, "time.span": 3.0}
+        for law, method in (("stiction", Event()), ("tustin", Event()), ("bengisu-akay", Implicit())):
+            scene = cells(changes, law=law, drive="arctan")
+            auto, own = solve(Auto(), scene), solve(method, scene)
+            np.testing.assert_array_equal(auto.rows, own.rows)
+            np.testing.assert_array_equal(auto.steps, own.steps)
+
+
+class TestCertificate:
+    """A cell is certified where two resolutions agree in kind; where they do not, it is tried again, tighter."""
+
+    def test_is_no_false_witness(self, figure, cells):
+        """Fig. 29: steps of 2 ms and of 0.1 ms agree with their halves, and with each other, on the wrong regime."""
+        drive, changes, _ = figure(29)
+        scene = cells(changes, drive=drive)
+        for steps in (5000, 100_000):
+            fixed = solve(RK4(steps), scene)
+            assert fixed.regime == fixed.motion == OSCILLATORY
+            assert not fixed.certified
+        found = solve(Auto(), scene)
+        assert (found.regime, found.separating_contact) == (SEPARATING, 2)
+        assert found.certified
+
+    @pytest.fixture
+    def calls(self, monkeypatch):
+        """Tolerance and number of cells of every integration."""
+        seen = []
+
+        def spy(batch, tolerance, *rest, integrate=event.integrate):
+            seen.append((tolerance, len(batch.span)))
+            return integrate(batch, tolerance, *rest)
+
+        monkeypatch.setattr(event, "integrate", spy)
+        return seen
+
+    @pytest.fixture
+    def launches(self, cells):
+        return cells(
+            {"initial.omega": np.linspace(5, 60, 200), "drive.amplitude": 5.0, "time.span": 3.0},
+            law="stiction",
+            drive="arctan",
+        )
+
+    def test_is_given_at_once_where_both_tolerances_agree(self, calls, launches):
+        found = solve(Event(), launches)
+        assert found.certified.all()
+        assert calls == [(1e-10, 200), (pytest.approx(3e-9), 200)]
+
+    def test_is_sought_at_tighter_tolerances_where_they_do_not(self, calls, launches):
+        """From a tolerance so loose that runs differ in kind, the doubtful ones come out right."""
+        loose = Event(rtol=1.0)
+        first, witness = (solve(Event(rtol=rtol, certify=False), launches) for rtol in (1.0, 30.0))
+        doubtful = (kinds(first) != kinds(witness)).any(axis=0)
+        calls.clear()
+        found = solve(loose, launches)
+        assert 0 < doubtful.sum() < 200
+        assert [cells for _, cells in calls[:3]] == [200, 200, doubtful.sum()]
+        tolerances = [tolerance for tolerance, _ in calls]
+        assert tolerances == pytest.approx([1.0, 30.0, *(30.0**-k for k in range(1, len(calls) - 1))])
+        right = kinds(solve(Event(), launches))
+        retried = doubtful & found.certified
+        assert retried.any()
+        np.testing.assert_array_equal(kinds(found)[:, retried], right[:, retried])
+        assert (found.steps[doubtful] > first.steps[doubtful] + witness.steps[doubtful]).all()
+
+    def test_is_withheld_after_so_many_tries(self, monkeypatch, calls, launches):
+        monkeypatch.setattr(event, "agree", lambda rows, *_: np.zeros(len(rows), dtype=bool))
+        assert not solve(Event(), launches).certified.any()
+        assert 3 <= len(calls) <= 6
+
+    def test_is_given_only_where_it_was_sought(self, calls, launches):
+        assert not solve(Auto(certify=False), launches).certified.any()
+        assert len(calls) == 1
+
+    def test_is_withheld_from_a_run_that_reached_the_limit_of_work(self, scenes, law):
+        method = Event(max_steps=10) if law == "stiction" else Implicit(max_steps=10)
+        found = solve(method, scenes({"drive.amplitude": np.array([2.0, 5.0])}))
+        np.testing.assert_array_equal(found.regime, FAILED)
+        np.testing.assert_array_equal(found.motion, FAILED)
+        assert not found.certified.any()
+
+    @pytest.mark.parametrize(
+        "path", ["initial.omega", "initial.phi", "drive.amplitude", "zone.half_angle", "body.mass", "time.span"]
+    )
+    def test_is_withheld_from_what_is_not_a_number(self, scenes, law, path):
+        method = Event(max_steps=2000) if law == "stiction" else Implicit(max_steps=2000)
+        good = {"drive.amplitude": 2.0, **{path: np.array([np.nan, 1.0])}}
+        found = solve(method, scenes(good))
+        np.testing.assert_array_equal(found.regime == FAILED, [True, False])
+        np.testing.assert_array_equal(found.certified, [False, True])
+
+    def test_failing_is_quick(self, scenes, law):
+        """What is no number is seen at once, not after all the work that is allowed."""
+        method = Event(max_steps=5000) if law == "stiction" else Implicit(max_steps=5000)
+        found = solve(method, scenes({"initial.omega": np.array([np.nan, np.inf, 1e200, 1e20])}))
+        np.testing.assert_array_equal(found.regime, FAILED)
+        assert found.steps.max() < 1000
+
+
+class TestSurface:
+    """Zones at the ends of their range."""
+
+    AMPLITUDES = np.array([0.2, 2.0, 5.0, -5.0])
+
+    def agree(self, one, other):
+        np.testing.assert_array_equal(kinds(one), kinds(other))
+        np.testing.assert_allclose(one.phi_end, other.phi_end, atol=1e-7)
+        np.testing.assert_allclose(one.stick_time, other.stick_time, atol=1e-7)
+
+    def test_no_arc_all_arc_and_an_arc_like_the_rest_are_one(self, scenes):
+        own, other = (0.2, 0.1), (0.9, 0.8)
+        found = [
+            solve(
+                Auto(),
+                scenes(
+                    dict(zip(COEFFICIENTS, (*rough, *rest), strict=True))
+                    | {"zone.half_angle": half_angle, "drive.amplitude": self.AMPLITUDES}
+                ),
+            )
+            for half_angle, rough, rest in ((0.0, other, own), (pi, own, other), (1.0, own, own))
+        ]
+        assert {RESTING, OSCILLATORY} <= set(found[0].regime)
+        for one in found[1:]:
+            self.agree(one, found[0])
+
+    def test_no_arc_is_a_ring_without_arcs(self, cells):
+        changes = {"drive.amplitude": self.AMPLITUDES, "time.span": 3.0}
+        uniform = cells(changes, law="stiction", drive="arctan", arcs=())
+        cut = cells(changes | {"zone.half_angle": 0.0}, law="stiction", drive="arctan")
+        self.agree(solve(Auto(), uniform), solve(Auto(), cut))
+
+    def test_where_arcs_overlap_the_later_holds(self, scenes):
+        def arcs(*given):
+            names = ("center", "half_angle", "mu_s", "mu_k")
+            changes = {
+                f"zones.{k}.{name}": x for k, arc in enumerate(given) for name, x in zip(names, arc, strict=True)
+            }
+            paths = tuple(f"zones.{k}" for k in range(len(given)))
+            return solve(Auto(), scenes(changes | {"drive.amplitude": self.AMPLITUDES}, arcs=paths))
+
+        wide, narrow = (0.5, 0.3), (0.1, 0.05)
+        whole = arcs((0.9, 0.5, *wide), (0.9, 0.2, *narrow))
+        parts = arcs((0.55, 0.15, *wide), (0.9, 0.2, *narrow), (1.25, 0.15, *wide))
+        self.agree(whole, parts)
+        hidden = arcs((0.9, 0.2, *narrow), (0.9, 0.5, *wide))
+        self.agree(hidden, arcs((0.9, 0.5, *wide)))
+        assert (whole.phi_end != hidden.phi_end).any()
+
+    @pytest.mark.parametrize("contact", [-1, 1])
+    @pytest.mark.parametrize("end", [-1, 1])
+    def test_an_edge_exactly_under_a_contact_belongs_to_one_side_of_it(self, scenes, contact, end):
+        """Whichever way the body goes, it goes as it would with the edge a little to one side or to the other."""
+        center = contact * BETA + end * RIG["zone.half_angle"]
+        ways = {"drive.amplitude": np.array([2.0, -2.0, 0.0, 0.0, 0.0]), "time.span": 0.6}
+        launch = {"initial.omega": np.array([0.0, 0.0, 10.0, -10.0, 0.0])}
+        below, on, above = (
+            solve(Auto(), scenes(ways | launch | {"zone.center": center + shift})) for shift in (-1e-9, 0.0, 1e-9)
+        )
+        assert on.certified.all()
+        for i in range(5):
+            assert min(abs(on.phi_end[i] - side.phi_end[i]) for side in (below, above)) < 1e-7
+            assert min(abs(on.omega_end[i] - side.omega_end[i]) for side in (below, above)) < 1e-6
+
+
+class TestBody:
+    @pytest.mark.parametrize("half_distance", [1e-4, 1e-2, 0.0333, 0.033377])
+    def test_contacts_close_together_and_opposite_each_other(self, cells, half_distance):
+        """From beta = 0.2 deg to 89.6 deg, against closed forms."""
+        omega = np.array([0.5, 5.0, -5.0, 30.0, 80.0])
+        changes = {"body.half_distance": half_distance, "initial.omega": omega, "time.span": 50.0}
+        scene = cells(changes | {"drive.amplitude": 0.0, "zone.center": 0.5}, law="stiction", drive="arctan")
+        found = solve(Event(rtol=1e-12), scene)
+        for i in range(len(omega)):
+            fall = Fall(take(scene.body, i), 0.5, RIG["zone.half_angle"], (0.5, 0.3), (0.2, 0.1))
+            phi, contact, _ = fall.run(0.0, omega[i])
+            assert found.separating_contact[i] == contact
+            assert found.phi_end[i] == pytest.approx(phi, abs=1e-9)
+
+    def test_without_friction_it_is_a_pendulum(self, scenes, law):
+        """Amplitude and period by energy and by the complete elliptic integral, however the ring turns."""
+        omega = np.array([0.5, 5.0, -8.0, 100.0])
+        scene = scenes(
+            dict.fromkeys(COEFFICIENTS, 0.0) | {"initial.omega": omega, "drive.amplitude": 2.0, "time.span": 10.0}
+        )
+        body = take(scene.body, 0)
+        inertia, weight = body.inertia + body.mass * body.xi**2, body.mass * body.gravity * body.xi
+        found = solve(Auto(), scene)
+        for i in range(len(omega)):
+            cosine = 1 - inertia * omega[i] ** 2 / (2 * weight)
+            if cosine < -1:
+                assert found.regime[i] == REVOLVING
+                continue
+            period = 4 * sqrt(inertia / weight) * ellipk((1 - cosine) / 2)
+            assert found.regime[i] == OSCILLATORY
+            assert found.phi_max[i] == pytest.approx(acos(cosine), abs=1e-7)
+            assert found.phi_min[i] == pytest.approx(-acos(cosine), abs=1e-7)
+            assert found.reversals[i] == int(10.0 / period * 2 + 0.5)
+        assert found.certified.all()
+
+    def test_friction_up_to_two(self, scenes):
+        """None of it fails; where it is far from jamming both kinds of law have the same regimes."""
+        mu = np.linspace(0.0, 2.0, 21)
+        found = solve(
+            Auto(),
+            scenes(
+                dict.fromkeys(COEFFICIENTS, mu)
+                | {"friction.rest.mu_k": mu / 2, "drive.amplitude": 2.0, "initial.omega": -10.0}
+            ),
+        )
+        assert not (found.regime == FAILED).any()
+        assert found.certified.all()
+        np.testing.assert_array_equal(found.regime[:4], OSCILLATORY)
+        np.testing.assert_array_equal(found.regime[6:14], SEPARATING)
+
+    def test_launched_at_ten_thousand_radians_a_second(self, scenes, law):
+        """It slips through seven turns and more until a contact lifts; how friction begins does not matter."""
+        omega = np.array([1e4, -1e4])
+        scene = scenes({"initial.omega": omega, "drive.amplitude": 0.0})
+        method = Event(rtol=1e-12) if law == "stiction" else Implicit(rtol=1e-9)
+        found = solve(method, scene)
+        for i, w in enumerate(omega):
+            fall = Fall(take(scene.body, i), 0.0, RIG["zone.half_angle"], (0.5, 0.3), (0.2, 0.1))
+            phi, contact, _ = fall.run(0.0, w)
+            assert abs(phi) > 6 * pi
+            assert found.separating_contact[i] == contact
+            assert found.phi_end[i] == pytest.approx(phi, abs=1e-8)
+            assert found.motion[i] == REVOLVING
+
+    def test_launched_exactly_at_the_speed_of_the_ring(self, scenes):
+        """As a little faster and as a little slower: a power law of exponent 1 turns at once."""
+        rate = np.array([5.0, -5.0])
+        slow, same, fast = (
+            solve(
+                Auto(),
+                scenes(
+                    {"initial.omega": rate * factor, "drive.amplitude": rate, "drive.exponent": 1.0, "time.span": 1.0},
+                    drive="power",
+                ),
+            )
+            for factor in (1 - 1e-9, 1.0, 1 + 1e-9)
+        )
+        for other in (slow, fast):
+            np.testing.assert_array_equal(kinds(same), kinds(other))
+            np.testing.assert_allclose(same.phi_end, other.phi_end, atol=1e-6)
+        assert (same.stick_time > 0.01).all()
+
+
+class TestTime:
+    def test_a_microsecond(self, scenes):
+        found = solve(
+            Auto(), scenes({"initial.omega": np.array([0.0, 5.0, -5.0]), "drive.amplitude": 2.0, "time.span": 1e-6})
+        )
+        np.testing.assert_allclose(found.phi_end, [0.0, 5e-6, -5e-6], atol=1e-9)
+        np.testing.assert_array_equal(found.t_end, 1e-6)
+        np.testing.assert_array_equal(found.regime, RESTING)
+        np.testing.assert_allclose(found.stick_time, [1e-6, 0.0, 0.0], rtol=1e-12)
+
+    def test_three_hours(self, scenes):
+        """The ring turns steadily by then, and each time it carries the body up again."""
+        found = solve(Auto(), scenes({"drive.amplitude": 0.02, "time.span": 1e4}))
+        assert found.t_end == 1e4
+        assert found.regime == OSCILLATORY
+        assert found.certified
+        assert 500 < found.reversals < 2000
+        assert 0.9e4 < found.stick_time < 1e4
+
+    def test_a_drive_whose_acceleration_is_infinite_at_the_start(self, scenes):
+        """Neither reversed nor resolved more finely does it come out otherwise."""
+        amplitude = np.array([1e-3, 1.0, 20.0, -20.0, -1.0, 0.0])
+        scene = scenes({"drive.amplitude": amplitude, "drive.exponent": 1.1, "time.span": 1.0}, drive="power")
+        found = solve(Auto(), scene)
+        assert found.certified.all()
+        exact = solve((Event if type(scene.law).__name__ == "Stiction" else Implicit)(rtol=1e-11), scene)
+        np.testing.assert_array_equal(kinds(found), kinds(exact))
+        np.testing.assert_allclose(found.phi_end, exact.phi_end, atol=1e-7)
+        np.testing.assert_allclose(found.phi_end[[2, 1]], -found.phi_end[[3, 4]], atol=1e-7)
+        assert found.phi_end[5] == 0.0
+
+    def test_a_ring_that_rocks_and_is_let_go_thousands_of_times(self, cells):
+        """Two reversals in each period, a stick in every half of it, no drift in between."""
+        changes = {"drive.amplitude": 0.2, "drive.frequency": 4.5, "zone.half_angle": 0.0}
+        spans = np.array([10.0, 1000.0])
+        found = solve(Auto(), cells(changes | {"time.span": spans}, law="stiction", drive="sinusoidal"))
+        np.testing.assert_array_equal(found.regime, OSCILLATORY)
+        np.testing.assert_allclose(found.reversals, 2 * 4.5 * spans, atol=1)
+        share = found.stick_time / spans
+        assert 0.1 < share[1] < 0.9
+        assert share[0] == pytest.approx(share[1], rel=0.05)
+        assert found.certified.all()
+
+    def test_a_measured_ring(self, cells):
+        """A spline through samples of a drive is that drive, to the spline's own error."""
+        t = np.linspace(0.0, 3.0, 1201)
+        table = t, 2.0 * (t * np.arctan(t) - 0.5 * np.log1p(t * t))
+        structure = Structure("ring", "stiction", "table", ("zone",), table)
+        values = {path: RIG.get(path, parameter.default) for path, parameter in parameters(structure).items()}
+        values |= {"time.span": 3.0, "drive.amplitude": 1.0}
+        given = {path: np.array([float(value)]) for path, value in values.items() if value is not None}
+        measured = solve(Auto(), batch(structure, given))
+        known = solve(Auto(), cells({"drive.amplitude": 2.0, "time.span": 3.0}, law="stiction", drive="arctan"))
+        np.testing.assert_array_equal(kinds(measured), kinds(known))
+        assert measured.phi_end == pytest.approx(known.phi_end, abs=1e-6)
+        assert measured.reversals == known.reversals

@@ -1,0 +1,262 @@
+"""Set-valued laws, every switching point located: against closed forms, against themselves, and in their limits."""
+
+from math import atan, cos, log1p, sin
+
+import numpy as np
+import pytest
+from scipy.optimize import fsolve
+from solutions import Fall, imbalance, motion, solve, trail
+
+from ringsweep.jit import take
+from ringsweep.solvers.event import Event
+from ringsweep.variables import JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
+
+EXACT = Event(rtol=1e-14, certify=False)
+
+
+@pytest.fixture
+def stiction(cells):
+    """Batch with set-valued friction; still unless a drive is named."""
+
+    def build(changes, drive="arctan", law="stiction", **more):
+        return cells(dict(changes), law=law, drive=drive, **more)
+
+    return build
+
+
+@pytest.fixture
+def limit(figure, cells):
+    """A figure's setting under a set-valued law; without a drive it is a drive of no amplitude."""
+
+    def build(number, law):
+        drive, changes, _ = figure(number)
+        known = {"stiction": ("friction.alpha", "friction.v0"), "tustin": ("friction.v0",)}[law]
+        return cells(
+            {path: value for path, value in changes.items() if path not in known},
+            law=law,
+            drive="arctan" if drive == "none" else drive,
+        )
+
+    return build
+
+
+class TestFigures:
+    """The paper's figures in the limit of a vanishing stiction band, with the tail and without it."""
+
+    @pytest.mark.parametrize("law", ["stiction", "tustin"])
+    @pytest.mark.parametrize(
+        ("number", "motion", "t", "phi"),
+        # With the band as it is printed: 3.58236 s, 1.28477 s, 0.14977 s, 0.1727 s.
+        [
+            (29, OSCILLATORY, 3.5822, 1.2445),
+            (30, OSCILLATORY, 1.2848, 1.2911),
+            (31, RESTING, 0.14977, 2.0436),
+            (33, REVOLVING, 0.17274, 8.5540),
+        ],
+    )
+    def test_contact_2_separates(self, limit, law, number, motion, t, phi):
+        batch = limit(number, law)
+        found, exact = solve(Event(), batch), solve(EXACT, batch)
+        assert (found.regime, found.motion, found.separating_contact) == (SEPARATING, motion, 2)
+        assert found.certified
+        assert found.t_separation == pytest.approx(exact.t_separation, abs=1e-8)
+        assert found.phi_end == pytest.approx(exact.phi_end, abs=2e-8)
+        assert exact.t_separation == pytest.approx(t, abs=2e-4)
+        assert exact.phi_end == pytest.approx(phi, abs=2e-4)
+
+    @pytest.mark.parametrize("law", ["stiction", "tustin"])
+    def test_32_swings_once_and_rests(self, limit, law):
+        batch = limit(32, law)
+        found, exact = solve(Event(), batch), solve(EXACT, batch)
+        assert found.regime == found.motion == OSCILLATORY
+        assert found.reversals == 1
+        assert found.certified
+        for name in ("phi_end", "phi_max", "stick_time"):
+            assert getattr(found, name) == pytest.approx(getattr(exact, name), abs=1e-10)
+
+    def test_error_falls_with_the_tolerance(self, limit):
+        batch = limit(30, "tustin")
+        exact = solve(EXACT, batch).t_end
+        tolerances = 10.0 ** -np.arange(6, 13)
+        errors = [abs(solve(Event(rtol=rtol, certify=False), batch).t_end - exact)[0] for rtol in tolerances]
+        assert np.polyfit(np.log(tolerances), np.log(errors), 1)[0] == pytest.approx(0.85, abs=0.15)
+        assert errors[-1] < 1e-10
+
+
+class TestClosedForms:
+    """On an immobile ring every edge is known, and between two of them the orbit is too."""
+
+    def test_of_launches_into_rough_arcs(self, stiction):
+        rng = np.random.default_rng(3)
+        n = 60
+        omega = rng.uniform(5, 60, n) * rng.choice([-1, 1], n)
+        center, half_angle = rng.uniform(-3, 3, n), rng.uniform(0.05, 3, n)
+        rough_k, rest_k = rng.uniform(0.0, 0.2, (2, n)) * rng.choice([0.1, 1.0], n)
+        rough_s, rest_s = rough_k + rng.uniform(0, 0.1, n), rest_k + rng.uniform(0, 0.1, n)
+        batch = stiction(
+            {
+                "initial.omega": omega,
+                "zone.center": center,
+                "zone.half_angle": half_angle,
+                "friction.rough.mu_s": rough_s,
+                "friction.rough.mu_k": rough_k,
+                "friction.rest.mu_s": rest_s,
+                "friction.rest.mu_k": rest_k,
+                "time.span": 20.0,
+            }
+        )
+        found = solve(Event(rtol=1e-12), batch)
+        for i in range(n):
+            rough, rest = (rough_s[i], rough_k[i]), (rest_s[i], rest_k[i])
+            fall = Fall(take(batch.body, i), center[i], half_angle[i], rough, rest)
+            phi, contact, t = fall.run(0.0, omega[i])
+            assert found.separating_contact[i] == contact
+            assert found.phi_end[i] == pytest.approx(phi, abs=1e-10)
+            assert found.t_end[i] - found.stick_time[i] == pytest.approx(t, abs=1e-10)
+        assert {0, 1, 2} == set(found.separating_contact)
+        assert {RESTING, OSCILLATORY, REVOLVING} <= set(found.motion)
+        assert found.reversals.max() >= 3
+
+    def test_of_a_single_contact(self, stiction):
+        rng = np.random.default_rng(5)
+        n = 20
+        omega, half_angle = rng.uniform(5, 80, n), rng.uniform(0.05, 3, n)
+        batch = stiction(
+            {"initial.omega": omega, "zone.half_angle": half_angle, "zone.center": 1.0, "time.span": 20.0},
+            model="ring-single-contact",
+        )
+        found = solve(Event(rtol=1e-12), batch)
+        for i in range(n):
+            fall = Fall(take(batch.body, i), 1.0, half_angle[i], (0.5, 0.3), (0.2, 0.1))
+            phi, contact, t = fall.run(0.0, omega[i])
+            assert found.separating_contact[i] == contact
+            assert found.phi_end[i] == pytest.approx(phi, abs=1e-10)
+            assert found.t_end[i] - found.stick_time[i] == pytest.approx(t, abs=1e-10)
+        assert {0, 1} == set(found.separating_contact)
+
+
+class TestStick:
+    """Where it sticks the body moves with the ring, and friction is what the balances of momentum ask for."""
+
+    @pytest.fixture
+    def run(self, limit):
+        batch = limit(29, "stiction")
+        return take(batch, 0), trail(Event(), batch, 1e-3)
+
+    def test_moves_with_the_ring(self, run):
+        _, run = run
+        stuck = run.mode == 0
+        assert 0.3 < stuck.mean() < 0.9
+        np.testing.assert_allclose(run.omega[stuck], run.ring_omega[stuck], rtol=1e-8)
+        np.testing.assert_allclose(run.epsilon[stuck], 2 / (1 + run.t[stuck] ** 2), rtol=1e-7)
+
+    def test_friction_stays_within_its_bounds_and_ends_at_one_of_them(self, run):
+        scene, run = run
+        body = scene.body
+        needed = (
+            (body.inertia + body.mass * body.xi**2) * run.epsilon + body.mass * body.gravity * body.xi * np.sin(run.phi)
+        ) / body.radius
+        mu = np.array([0.2, 0.5])
+        available = mu[run.zone_1.astype(int)] * run.normal_1 + mu[run.zone_2.astype(int)] * run.normal_2
+        kappa = needed / available
+        stuck = run.mode == 0
+        assert (np.abs(kappa[stuck]) <= 1 + 1e-12).all()
+        ends = np.flatnonzero(stuck[:-1] & ~stuck[1:])
+        assert len(ends) >= 5
+        np.testing.assert_allclose(np.abs(kappa[ends]), 1.0, atol=1e-9)
+        # The reactions are those that share the friction in the same measure.
+        for k in np.flatnonzero(stuck)[::100]:
+            K1, K2 = kappa[k] * mu[int(run.zone_1[k])], kappa[k] * mu[int(run.zone_2[k])]
+            place = np.array([run.omega[k] ** 2, cos(run.phi[k]), sin(run.phi[k])])
+            expected = motion(body, K1, K2) @ place
+            np.testing.assert_allclose([run.epsilon[k], run.normal_1[k], run.normal_2[k]], expected, rtol=1e-9)
+
+    @pytest.mark.parametrize("amplitude", [0.02, 0.1, -0.5, 3.0])
+    def test_breaks_away_where_full_friction_no_longer_holds(self, stiction, amplitude):
+        """Solved for the instant at which friction is used up, with both reactions, from the balances as printed."""
+        batch = stiction({"drive.amplitude": amplitude, "zone.half_angle": 0.0, "time.span": 60.0})
+        body = take(batch.body, 0)
+        M, J, g, R, xi, s, c = (
+            getattr(body, name) for name in ("mass", "inertia", "gravity", "radius", "xi", "sin_beta", "cos_beta")
+        )
+        # Friction pulls the way that the ring turns; no contact is on an arc.
+        K = 0.2 * np.sign(amplitude)
+
+        def balances(unknown):
+            t, N1, N2 = unknown
+            phi = amplitude * (t * atan(t) - 0.5 * log1p(t * t))
+            omega, epsilon = amplitude * atan(t), amplitude / (1 + t * t)
+            return (
+                M * xi * omega**2 + M * g * cos(phi) - (N1 + N2) * c + K * (N1 - N2) * s,
+                M * xi * epsilon + M * g * sin(phi) - (N1 - N2) * s - K * (N1 + N2) * c,
+                (J + M * xi**2) * epsilon + M * g * xi * sin(phi) - R * K * (N1 + N2),
+            )
+
+        guess = next(t for t in np.linspace(0.1, 60, 6000) if abs(amplitude) * (t * atan(t) - 0.5 * log1p(t * t)) > 0.2)
+        t, N1, N2 = fsolve(balances, (guess, M * g, M * g), xtol=1e-13)
+        assert min(N1, N2) > 0
+        run = trail(Event(), batch, 0.1)
+        slips = np.flatnonzero(run.mode != 0)[0]
+        assert run.t[slips] == pytest.approx(t, abs=1e-9)
+        assert run.mode[slips] == -np.sign(amplitude)
+        assert run.normal_1[slips - 1] == pytest.approx(N1, rel=1e-8)
+        assert run.normal_2[slips - 1] == pytest.approx(N2, rel=1e-8)
+        short = stiction({"drive.amplitude": amplitude, "zone.half_angle": 0.0, "time.span": t + 1e-3})
+        assert solve(Event(), short).stick_time == pytest.approx(t, abs=1e-9)
+        held = stiction({"drive.amplitude": amplitude, "zone.half_angle": 0.0, "time.span": t - 1e-6})
+        assert solve(Event(), held).stick_time == t - 1e-6
+
+
+class TestEnergy:
+    """What the body gains in energy is the work of friction."""
+
+    @pytest.mark.parametrize("number", [29, 30, 32, 33])
+    def test_balances_to_the_tolerance(self, limit, number):
+        """As well as the work can be summed from a history."""
+        rough, rest = ((0.5, 0.3), (0.2, 0.1)) if number < 32 else ((0.2, 0.15), (0.15, 0.1))
+        batch = limit(number, "stiction")
+        assert imbalance(batch, trail(Event(), batch, 2e-4), (rest, rough)) < 1e-9
+
+
+class TestLimit:
+    def test_tustin_tends_to_stiction_as_the_tail_steepens(self, limit, cells, figure):
+        """The way out of the tail is exponential: it takes a time of log(alpha) / alpha."""
+        for number in (29, 30):
+            drive, changes, _ = figure(number)
+            alpha = 10.0 ** np.arange(3, 8)
+            changes = {path: value for path, value in changes.items() if path != "friction.v0"}
+            found = solve(EXACT, cells(changes | {"friction.alpha": alpha}, law="tustin", drive=drive))
+            error = abs(found.t_separation - solve(EXACT, limit(number, "stiction")).t_separation)
+            slope = np.polyfit(np.log(alpha), np.log(error / np.log(alpha)), 1)[0]
+            assert slope == pytest.approx(-1.0, abs=0.03)
+            assert error[-1] < 2e-6
+
+
+class TestEnds:
+    def test_jamming_at_launch_is_where_the_effective_inertia_vanishes(self, stiction):
+        body = take(stiction({}).body, 0)
+        about_axis = (body.inertia / body.mass + body.xi**2) * body.cos_beta
+        limit = np.sqrt(about_axis / (body.radius * body.xi - about_axis))
+        mu = limit * np.array([0.999, 1.001])
+        paths = [f"friction.{place}.{name}" for place in ("rough", "rest") for name in ("mu_s", "mu_k")]
+        found = solve(Event(), stiction(dict.fromkeys(paths, mu) | {"initial.omega": 10.0, "time.span": 1e-6}))
+        np.testing.assert_array_equal(found.regime == JAMMED, [False, True])
+        np.testing.assert_array_equal(found.t_end == 0.0, [False, True])
+
+    def test_jamming_where_a_contact_reaches_a_rough_arc(self, stiction):
+        rough = {"friction.rough.mu_s": 3.0, "friction.rough.mu_k": 3.0}
+        batch = stiction(rough | {"zone.center": 1.5, "initial.omega": 30.0})
+        found = solve(Event(), batch)
+        assert found.regime == JAMMED
+        assert found.motion == RESTING
+        assert found.phi_end == pytest.approx(1.5 - np.radians(15.0) - take(batch.body, 0).beta, abs=1e-13)
+
+    def test_separation_is_where_the_reaction_vanishes(self, stiction):
+        batch = stiction({"initial.omega": np.linspace(30, 60, 20), "zone.half_angle": 0.0})
+        found = solve(Event(), batch)
+        assert (found.regime == SEPARATING).all()
+        for phi, omega, contact in zip(found.phi_end, found.omega_end, found.separating_contact, strict=True):
+            reactions = motion(take(batch.body, 0), -0.1, -0.1)[1:] @ (omega**2, cos(phi), sin(phi))
+            assert reactions[int(contact) - 1] == pytest.approx(0.0, abs=1e-9)
+            assert reactions[2 - int(contact)] > 0
+        np.testing.assert_allclose(np.minimum(found.normal_min_1, found.normal_min_2), 0.0, atol=1e-9)

@@ -1,0 +1,206 @@
+"""Smooth laws as they are written: against brute force, against converged references, and in their limits."""
+
+import numpy as np
+import pytest
+from solutions import imbalance, solve, trail
+
+from ringsweep.solvers.event import Event, Implicit
+from ringsweep.solvers.rk4 import RK4
+from ringsweep.variables import JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
+
+EXACT = Implicit(rtol=1e-11, certify=False)
+LIMIT = Event(rtol=1e-14, certify=False)
+
+
+@pytest.fixture
+def setting(figure, cells):
+    """A figure's setting with `changes`; without a drive it is a drive of no amplitude."""
+
+    def build(number, law="bengisu-akay", **changes):
+        drive, values, _ = figure(number)
+        values = values | {path.replace("__", "."): value for path, value in changes.items()}
+        if law != "bengisu-akay":
+            values.pop("friction.v0")
+        return cells(
+            {path: value for path, value in values.items() if value is not None},
+            law=law,
+            drive="arctan" if drive == "none" else drive,
+        )
+
+    return build
+
+
+class TestFigures:
+    """The law as printed, v0 = 2e-6 m/s and all: what a step of 0.2 us of Runge-Kutta 4 gives."""
+
+    @pytest.mark.parametrize(
+        ("number", "motion", "t", "phi"),
+        [
+            (29, OSCILLATORY, (3.58236, 1e-5), (1.24458, 2e-5)),
+            (30, OSCILLATORY, (1.28477, 1e-5), (1.29125, 3e-5)),
+            (31, RESTING, (0.14977, 1e-5), (2.04373, 1e-5)),
+            (33, REVOLVING, (0.1727, 5e-5), (8.554, 5e-4)),
+        ],
+    )
+    def test_contact_2_separates(self, setting, number, motion, t, phi):
+        found, exact = solve(Implicit(), setting(number)), solve(EXACT, setting(number))
+        for run in (found, exact):
+            assert (run.regime, run.motion, run.separating_contact) == (SEPARATING, motion, 2)
+            assert run.t_separation == pytest.approx(t[0], abs=t[1])
+            assert run.phi_end == pytest.approx(phi[0], abs=phi[1])
+        assert found.certified
+        assert found.t_separation == pytest.approx(exact.t_separation, abs=1e-6)
+
+    @pytest.mark.parametrize(("number", "phi_max"), [(28, 0.69946), (32, 0.82937)])
+    def test_no_contact_separates(self, setting, number, phi_max):
+        found, exact = solve(Implicit(), setting(number)), solve(EXACT, setting(number))
+        assert found.regime == found.motion == OSCILLATORY
+        assert found.certified
+        assert found.phi_max == pytest.approx(phi_max, abs=2e-5)
+        assert found.phi_max == pytest.approx(exact.phi_max, abs=1e-7)
+        assert found.phi_end == pytest.approx(exact.phi_end, abs=1e-6)
+
+    @pytest.mark.parametrize("number", [25, 27])
+    def test_of_a_wide_band_agree_with_runge_kutta(self, setting, number):
+        """At v0 = 0.2 m/s nothing is stiff, and a small step converges."""
+        batch = setting(number)
+        found, other = solve(EXACT, batch), solve(RK4(2_000_000, certify=False), batch)
+        assert found.regime == other.regime == OSCILLATORY
+        assert found.reversals == other.reversals
+        assert found.phi_end == pytest.approx(other.phi_end, abs=1e-8)
+        assert found.phi_max == pytest.approx(other.phi_max, abs=1e-8)
+        assert solve(Implicit(), batch).phi_end == pytest.approx(other.phi_end, abs=1e-6)
+
+    def test_error_falls_with_the_tolerance(self, setting):
+        """Over six decades, down to rounding."""
+        batch = setting(30)
+        exact = solve(Implicit(rtol=1e-12, certify=False), batch).t_end
+        tolerances = 10.0 ** -np.arange(4, 11)
+        errors = np.array([abs(solve(Implicit(rtol, certify=False), batch).t_end - exact)[0] for rtol in tolerances])
+        assert (np.diff(errors) < 0).all()
+        assert (errors < tolerances).all()
+        assert errors[-1] < 1e-12
+
+
+class TestLimit:
+    """As v0 vanishes the law becomes set-valued, with the tail that it has."""
+
+    V0 = 2.0 * 10.0 ** -np.arange(5, 10)
+
+    def slope(self, x, error):
+        return np.polyfit(np.log(x), np.log(error), 1)[0]
+
+    @pytest.mark.parametrize("number", [29, 30])
+    def test_a_flat_tail_is_left_with_an_error_proportional_to_v0(self, setting, number):
+        """The creep of a stuck contact, and the velocity with which it leaves the band."""
+        exact = solve(LIMIT, setting(number, "tustin", friction__alpha=10.0))
+        found = solve(EXACT, setting(number, friction__alpha=10.0, friction__v0=self.V0))
+        error = abs(found.t_separation - exact.t_separation)
+        assert self.slope(self.V0, error) == pytest.approx(1.0, abs=0.02)
+        assert error[-1] < 1e-8
+
+    @pytest.mark.parametrize("alpha", [10.0, 1e5])
+    @pytest.mark.parametrize("number", [29, 30])
+    def test_the_passage_over_the_top_of_the_band_takes_v0_to_the_two_thirds(self, setting, number, alpha):
+        """At the top the parabola is flat: ``v0 x' = -(c t + x^2)`` has the time scale v0^(2/3)."""
+        exact = solve(LIMIT, setting(number, "tustin", friction__alpha=alpha))
+        found = solve(EXACT, setting(number, friction__alpha=alpha, friction__v0=self.V0))
+        error = found.stick_time - exact.stick_time
+        assert (error > 0).all()
+        assert self.slope(self.V0, error) == pytest.approx(2 / 3, abs=0.02)
+
+    @pytest.mark.parametrize("number", [29, 30])
+    def test_a_drop_is_left_late_by_that_passage(self, setting, number):
+        """With a tail far shorter than the band, separation is late by as much as every breakaway is."""
+        exact = solve(LIMIT, setting(number, "stiction", friction__alpha=None))
+        found = solve(EXACT, setting(number, friction__alpha=1e12, friction__v0=self.V0))
+        error = abs(found.t_separation - exact.t_separation)
+        assert self.slope(self.V0, error) == pytest.approx(2 / 3, abs=0.03)
+
+    def test_v0_is_not_replaced_by_its_limit(self, setting):
+        """What 2e-6 m/s of band change is small, and is there."""
+        exact = solve(LIMIT, setting(29, "tustin"))
+        found = solve(Implicit(), setting(29))
+        assert found.t_separation - exact.t_separation == pytest.approx(5.9e-5, rel=0.05)
+
+
+class TestEnergy:
+    """What the body gains in energy is the work of friction."""
+
+    @pytest.mark.parametrize(("alpha", "v0"), [(100.0, 0.2), (10.0, 1e-2), (100.0, 1e-3)])
+    def test_balances_to_the_tolerance(self, setting, alpha, v0):
+        """As well as the work can be summed from a history."""
+        batch = setting(30, friction__alpha=alpha, friction__v0=v0)
+        coarse, fine = (
+            imbalance(batch, trail(Implicit(rtol), batch, 1e-5), ((0.2, 0.1), (0.5, 0.3))) for rtol in (1e-4, 1e-8)
+        )
+        assert coarse < 1e-5
+        assert fine < 1e-8
+
+
+class TestCreep:
+    """A stuck contact creeps: slowly, and the way that it is pushed."""
+
+    def test_is_as_fast_as_friction_is_short_of_the_load(self, setting):
+        """Ever less friction is needed of a band ever narrower: the fraction of it that is used stays the same."""
+        fractions = []
+        for v0 in (1e-4, 1e-6, 1e-8):
+            run = trail(Implicit(), setting(29, friction__v0=v0, time__span=0.5), 1e-2)
+            assert (run.mode == 0).all()
+            v = 0.043378 * (run.omega - run.ring_omega)
+            fractions.append(v[-1] / v0)
+            assert (v[1:] < 0).all()
+        assert np.ptp(fractions) < 1e-3
+        assert -0.9 < fractions[0] < -0.1
+
+    def test_at_rest_on_a_ring_at_rest(self, setting):
+        """Nothing pushes and nothing moves."""
+        found = solve(Implicit(max_steps=2000), setting(29, drive__amplitude=0.0))
+        assert found.regime == RESTING
+        assert found.certified
+        assert found.phi_end == found.omega_end == 0.0
+        assert found.stick_time == 10.0
+
+
+class TestJam:
+    """Where friction rises as the body slows down it may jam; what brute force finds there, to 1e-12 in LSODA."""
+
+    PATHS = (
+        "drive.amplitude", "zone.center", "zone.half_angle", "friction.rough.mu_s", "friction.rough.mu_k",
+        "friction.rest.mu_s", "friction.rest.mu_k", "friction.alpha", "friction.v0", "initial.omega", "time.span",
+    )  # fmt: skip
+
+    @pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-9])
+    @pytest.mark.parametrize(
+        ("values", "t"),
+        [
+            ((0.196958, -0.674266, 0.690522, 1.8017, 0.694367, 1.04223, 0.819171, 1293490, 7.22657e-8, -8.15013, 2), 0.015409496),
+            ((-9.808, 0, 0.888738, 0.979616, 0.944569, 1.85271, 1.19351, 5207650, 0.0864945, -24.9425, 1), 0.012403025),
+            ((0.119525, -2.37554, 2.50495, 1.42968, 0.283686, 1.74709, 1.05556, 19.7123, 1.28436e-4, -96.8931, 1), 0.175363621),
+        ],
+        ids=["tail of 1e-6 m/s", "tail of 2e-7 m/s", "top of the band"],
+    )  # fmt: skip
+    def test_is_no_separation(self, cells, values, t, rtol):
+        """Both reactions grow without bound as the effective inertia vanishes: neither contact lifts."""
+        scene = cells(dict(zip(self.PATHS, values, strict=True)), drive="arctan")
+        found = solve(Implicit(rtol, max_steps=20_000), scene)
+        assert found.regime == JAMMED
+        assert found.separating_contact == 0
+        assert found.t_end == pytest.approx(t, abs=1e-7)
+
+    @pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-9])
+    @pytest.mark.parametrize(
+        ("values", "exponent"),
+        [
+            ((-5.14749, 1.5474, 2.7933, 0.0459787, 0.0268141, 0.0200699, 0.00798642, 834491, 0.00131495, 0, 0.5), 1.24144),
+            ((4.11348, -2.61388, 0.252879, 0.308912, 0.127823, 0.359504, 0.115791, 128008, 0.00588388, 0, 0.5), 1.13513),
+            ((0.127277, -1.08592, 3.05932, 0.557637, 0.254864, 0.365293, 0.222557, 2175370, 3.45722e-5, 0, 0.5), 1.2062),
+        ],
+        ids=["ice", "alpha 1e5", "alpha 2e6"],
+    )  # fmt: skip
+    def test_is_not_seen_where_a_ring_starts_with_infinite_acceleration(self, cells, values, exponent, rtol):
+        """The tail of the law is passed in 1e-12 s, at coefficients that no body of this shape jams at."""
+        scene = cells(dict(zip(self.PATHS, values, strict=True)) | {"drive.exponent": exponent}, drive="power")
+        found = solve(Implicit(rtol), scene)
+        assert found.t_end == 0.5
+        assert found.regime in (RESTING, OSCILLATORY)
