@@ -181,6 +181,11 @@ def stiff_view(scene, mode, t, x):
 
 
 @hook
+def stiff_velocity(scene, t, x):
+    """Velocity of the body, whose changes of sign are the extremes of its place."""
+
+
+@hook
 def stiff_watch(scene, record, view, t, duration):
     """Record after `duration` seconds in the mode to a state at time `t` of which this is the view."""
 

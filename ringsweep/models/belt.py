@@ -541,6 +541,11 @@ def _stiff_view(scene, mode, t, x):
     return (speed, friction.stiction_band(scene.law) - speed), (x[0] + shift, x[1] + belt_velocity, force)
 
 
+@hooks.stiff_velocity.implements(belt.Belt)
+def _stiff_velocity(scene, t, x):
+    return x[1] + drives.turn(scene.drive, t)[1]
+
+
 @hooks.stiff_watch.implements(belt.Belt)
 def _stiff_watch(scene, record, view, t, duration):
     _, (x, velocity, force) = view

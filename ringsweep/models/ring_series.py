@@ -26,6 +26,7 @@ from ringsweep.physics.friction import (
     region_at,
     region_bounds,
     stiction_band,
+    weights,
 )
 from ringsweep.physics.zones import coefficients, cross, edge_ahead, locate
 from ringsweep.regimes import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2
@@ -121,14 +122,28 @@ def _settle(scene, t, phi, places):
     return RUNNING, still
 
 
+@inlined
+def _is_jamming(scene, mode, t, y):
+    """Whether slip is so near to a jam that its reactions, which grow without bound there, have no sign to go by."""
+    if mode.sign == 0:
+        return False
+    phi, v = y
+    mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
+    w_s, w_k, _, _ = weights(scene.law, abs(v))
+    K1, K2 = -mode.sign * (w_s * mu_s1 + w_k * mu_k1), -mode.sign * (w_s * mu_s2 + w_k * mu_k2)
+    omega = v / scene.body.radius + drives.turn(scene.drive, t)[1]
+    _, determinant, inertia = ring.acceleration(scene.body, K1, K2, sin(phi), cos(phi), omega)
+    return not (determinant > 0.0 and inertia > 1e-4 * ring.about_axis(scene.body) * determinant)
+
+
 @hooks.switch.implements(ring.Ring)
 def _switch(scene, mode, guard, t, y):
     phi, v = y
     sign, region, place_1, place_2 = mode.sign, mode.region, mode.place_1, mode.place_2
-    if guard == NORMAL_1:
-        return SEPARATED_1, mode, y
-    if guard == NORMAL_2:
-        return SEPARATED_2, mode, y
+    if guard in (NORMAL_1, NORMAL_2):
+        if _is_jamming(scene, mode, t, y):
+            return JAM, mode, y
+        return (SEPARATED_1 if guard == NORMAL_1 else SEPARATED_2), mode, y
     if guard == INERTIA:
         return JAM, mode, y
     if guard == EDGE:
@@ -195,11 +210,7 @@ def _expand(scene, mode, t, y, tolerance, c):
         speed = min(speed, 1e3 * stiction_band(scene.law))
     rate = scale / speed
     # The reactions follow the acceleration: an error of it could make or hide a separation.
-    push = (
-        1e-2
-        * scale
-        / (scene.body.gravity / scene.body.radius + c[SQUARE, 0] + abs(c[EPSILON, 0]) + abs(2.0 * c[THETA, 2]))
-    )
+    push = 1e-3 * scale / (scene.body.gravity / scene.body.radius + c[SQUARE, 0] + abs(c[EPSILON, 0]))
     last = max(abs(c[PHI, ORDER]) * scale, abs(c[V, ORDER]) * rate, abs(c[EPSILON, ORDER]) * push)
     previous = max(abs(c[PHI, ORDER - 1]) * scale, abs(c[V, ORDER - 1]) * rate, abs(c[EPSILON, ORDER - 1]) * push)
     return reach(last, previous)

@@ -121,6 +121,11 @@ def _stiff_view(scene, mode, t, x):
     return guards, (phi, omega, epsilon, ring_omega)
 
 
+@hooks.stiff_velocity.implements(ring.Ring)
+def _stiff_velocity(scene, t, x):
+    return x[1] / scene.body.radius + drives.turn(scene.drive, t)[1]
+
+
 @hooks.stiff_watch.implements(ring.Ring)
 def _stiff_watch(scene, record, view, t, duration):
     guards, (phi, omega, _, _) = view

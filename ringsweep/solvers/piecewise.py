@@ -28,6 +28,7 @@ from ringsweep.hooks import (
     start,
     stiff_sample,
     stiff_scales,
+    stiff_velocity,
     stiff_view,
     stiff_watch,
     switch,
@@ -40,6 +41,9 @@ from ringsweep.physics.friction import SET_VALUED, SMOOTH
 from ringsweep.regimes import BROKEN, COMPLETE, RUNNING
 from ringsweep.series import ORDER, STACK, first_root
 from ringsweep.solvers import rosenbrock
+
+# Steps and events in a row at one instant after which a run is given up.
+_STALLED = 400
 
 
 @inlined
@@ -153,7 +157,6 @@ def _stiff_creep(law, scene, record, mode, t, y, h, horizon, tolerance, guards, 
     grown = s * min(6.0, 0.9 * max(size, 1e-8) ** -0.2)
     # A step cut short by the horizon says little about the next one.
     h = max(h, grown) if s == horizon else grown
-    before = stiff_view(scene, mode, t, x)
     within = stiff_view(scene, mode, t + 0.5 * s, rosenbrock.dense(x, x_next, stages, 0.5))
     after = stiff_view(scene, mode, t + s, x_next)
     event, end = -1, s
@@ -172,16 +175,15 @@ def _stiff_creep(law, scene, record, mode, t, y, h, horizon, tolerance, guards, 
         x_next, _ = rosenbrock.step(scene, mode, t, x, line, end, stages)
         within = stiff_view(scene, mode, t + 0.5 * end, rosenbrock.dense(x, x_next, stages, 0.5))
         after = stiff_view(scene, mode, t + end, x_next)
-    record = stiff_watch(scene, record, before, t, 0.0)
     done = 0.0
-    for half, left, right in ((0.0, before, within), (0.5, within, after)):
+    for half, velocity, right in ((0.0, stiff_velocity(scene, t, x), within), (0.5, within[1][1], after)):
         # The motion turns within this half: its extreme is a moment of its own.
-        if left[1][1] * right[1][1] < 0.0:
+        if velocity * right[1][1] < 0.0:
             low, high = half, half + 0.5
             for _ in range(40):
                 middle = 0.5 * (low + high)
                 view = stiff_view(scene, mode, t + middle * end, rosenbrock.dense(x, x_next, stages, middle))
-                if view[1][1] * left[1][1] > 0.0:
+                if view[1][1] * velocity > 0.0:
                     low = middle
                 else:
                     high = middle
@@ -196,9 +198,8 @@ def _stiff_creep(law, scene, record, mode, t, y, h, horizon, tolerance, guards, 
 def _arrive(scene, mode, guard, t, s, horizon, y):
     """Time, status, mode and state after a step `s` that ended at `guard`, or at none (-1)."""
     # To the very end of the span or of a piece of the drive, not to the rounding of a sum.
-    before = t
     t = t + s if s < horizon else t + horizon
-    if not (s >= 0.0 and isfinite(y[0]) and isfinite(y[1])) or (guard < 0 and t == before):
+    if not (s >= 0.0 and isfinite(y[0]) and isfinite(y[1])):
         return t, BROKEN, mode, y
     if guard >= 0:
         status, mode, y = switch(scene, mode, guard, t, y)
@@ -309,11 +310,15 @@ def integrate(batch, tolerance, creep_tolerance, limit, out, steps):
         expand(scene, mode, t, y, tolerance, c)
         record = start(scene, c)
         trial = 1e-6 * scene.span
-        n = 0
+        n = stalled = 0
+        before = -1.0
         while status == RUNNING:
-            if n == limit:
+            # Steps below the rounding of time do move the state, on the way into a jam, but not for ever.
+            stalled = stalled + 1 if t == before else 0
+            if n == limit or stalled == _STALLED:
                 status = BROKEN
                 break
+            before = t
             n += 1
             horizon = min(scene.span, next_knot(scene.drive, t)) - t
             stiff, guard, s, y, record, trial = _creep(
