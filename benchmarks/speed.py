@@ -152,7 +152,8 @@ def error_against_time(effort: Effort) -> None:
     for method, target in TARGETS.items():
         default = METHODS[method].rtol  # type: ignore[attr-defined]
         plain = {
-            f"{rtol:.0e}": family(effort.side, method, rtol=rtol, certify=False) for rtol in effort.tolerances[method]
+            f"{rtol:.0e}": family(effort.side, method, rtol=rtol, certify=False)
+            for rtol in sorted({*effort.tolerances[method], default}, reverse=True)
         }
         certified = f"{default:.0e} certified"
         configs = plain | {certified: family(effort.side, method)}
