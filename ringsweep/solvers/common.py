@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -35,21 +36,21 @@ class Result:
     stiffness: NDArray[np.float64] | None = None
 
 
-class Method:
+class Method(ABC):
     """A way to advance time. Its options are the fields of the dataclass that derives from it."""
 
     name: ClassVar[str]
 
-    def check(self, structure: Structure) -> None:
+    def check(self, structure: Structure) -> None:  # noqa: B027  most methods take every scene
         """Raise an `InputError` if the method cannot take such a scene."""
 
+    @abstractmethod
     def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:
         """Run every cell of `batch`; `outcomes` names the model's columns."""
-        raise NotImplementedError
 
+    @abstractmethod
     def history(self, batch: Any, samples: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Time history of cell 0 in about `samples` rows of `width` columns."""
-        raise NotImplementedError
 
 
 def same_drive(batch: Any, cells: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:

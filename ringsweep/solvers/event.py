@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar
 
@@ -42,9 +43,9 @@ class _Piecewise(Method):
                 f"{self.name} does not take friction law {structure.law}: it takes {able}; auto takes all",
             )
 
+    @abstractmethod
     def tolerances(self) -> tuple[float, float]:
         """Tolerance of the series and of the implicit steps."""
-        raise NotImplementedError
 
     def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:
         """Outcomes of every cell; see :class:`ringsweep.solvers.common.Method`.
