@@ -251,7 +251,6 @@ def _child(node: Any, key: str, full: str) -> Any:
 def _scene(doc: Document, swept: Collection[str]) -> Scene:
     from ringsweep.models import MODELS
     from ringsweep.physics.drives import DRIVES
-    from ringsweep.physics.friction import LAWS
 
     scene = _section(doc.tree, "scene", "")
     model = _choose(MODELS, scene, "scene.model", "model")
@@ -261,7 +260,7 @@ def _scene(doc: Document, swept: Collection[str]) -> Scene:
     zones = tuple(f"zones.{i}" for i in range(len(arcs)))
     # A misspelt key is found before the key that it leaves missing.
     leaves = dict(_leaves(scene, "", _Names(_all_paths(model, zones or ("zones.0",)))))
-    law = _choose(LAWS, _section(scene, "friction", "scene."), "scene.friction.law", "friction law")
+    law = _choose(MODELS[model].laws, _section(scene, "friction", "scene."), "scene.friction.law", "friction law")
     drive = "none"
     if "drive" in scene:
         drive = _choose(DRIVES, _section(scene, "drive", "scene."), "scene.drive.law", "drive law")
@@ -299,11 +298,11 @@ def _structural(drive: str) -> tuple[str, ...]:
 
 def _all_paths(model: str, zones: tuple[str, ...]) -> list[str]:
     """Every path that some scene of this model has, whatever its laws."""
+    from ringsweep.models import MODELS
     from ringsweep.physics.drives import DRIVES
-    from ringsweep.physics.friction import LAWS
 
     paths = dict.fromkeys(_structural("table"))
-    for law, drive, arcs in product(LAWS, DRIVES, {(), ("zone",), zones}):
+    for law, drive, arcs in product(MODELS[model].laws, DRIVES, {(), ("zone",), zones}):
         paths |= dict.fromkeys(parameters(Structure(model, law, drive, arcs)))
     return list(paths)
 

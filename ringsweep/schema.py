@@ -24,11 +24,12 @@ def schema() -> dict[str, Any]:
     once, nor units; :func:`ringsweep.config.load` does.
     """
     known: dict[str, list[Parameter]] = {}
-    for model, law, drive, arcs in product(MODELS, LAWS, DRIVES, ((), ("zone",), ("zones.0",))):
-        for path, parameter in parameters(Structure(model, law, drive, arcs)).items():
-            meanings = known.setdefault(path, [])
-            if parameter not in meanings:
-                meanings.append(parameter)
+    for model, drive, arcs in product(MODELS, DRIVES, ((), ("zone",), ("zones.0",))):
+        for law in MODELS[model].laws:
+            for path, parameter in parameters(Structure(model, law, drive, arcs)).items():
+                meanings = known.setdefault(path, [])
+                if parameter not in meanings:
+                    meanings.append(parameter)
     leaves = {path: _any_of([_number(parameter) for parameter in meanings]) for path, meanings in known.items()}
     scene = _nest(
         {

@@ -67,12 +67,13 @@ def history(config: Config, *, samples: int = SAMPLES) -> xr.Dataset:
     """Run a configuration without axes and keep its history; see :func:`simulate`."""
     model = MODELS[config.scene.structure.model]
     cell = batch(config.scene.structure, {path: np.array([value]) for path, value in config.scene.values.items()})
-    times, rows = config.solver.history(cell, samples, len(model.history))
+    names = model.history(config.scene.structure)
+    times, rows = config.solver.history(cell, samples, len(names))
     outcome = compute(config, jobs=1, progress=False)
     kept = xr.Dataset(
         {
             name: ("time", rows[:, k].astype(HISTORY[name].dtype), HISTORY[name].attributes)
-            for k, name in enumerate(model.history)
+            for k, name in enumerate(names)
             if name not in model.absent
         },
         coords={"time": ("time", times, {"long_name": "time", "units": "s", "axis": "T"})},

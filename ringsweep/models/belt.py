@@ -46,8 +46,12 @@ class Belt:
     name: ClassVar[str] = "belt"
     doc: ClassVar[str] = "a mass on a spring on a moving belt"
     outcomes: ClassVar[tuple[str, ...]] = Outcome._fields
-    history: ClassVar[tuple[str, ...]] = ("x", "velocity", "friction_force", "mode")
+    laws: ClassVar[dict[str, type]] = friction.LAWS
     absent: ClassVar[frozenset[str]] = frozenset()
+
+    def history(self, structure: Structure) -> tuple[str, ...]:
+        """Quantities of a time history, in the order of their columns."""
+        return "x", "velocity", "friction_force", "mode"
 
     def parameters(self, structure: Structure) -> dict[str, Parameter]:
         """Every numeric path of a scene of this structure."""

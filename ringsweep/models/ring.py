@@ -25,11 +25,13 @@ class SingleContactRing:
     name: ClassVar[str] = "ring-single-contact"
     doc: ClassVar[str] = "a small body in a rotating ring, one contact"
     outcomes: ClassVar[tuple[str, ...]] = regimes.Outcome._fields
-    history: ClassVar[tuple[str, ...]] = (
-        "phi", "omega", "epsilon", "normal_1", "normal_2", "ring_omega", "zone_1", "zone_2", "mode"
-    )  # fmt: skip
+    laws: ClassVar[dict[str, type]] = friction.LAWS
     absent: ClassVar[frozenset[str]] = frozenset({"normal_min_2", "normal_2", "zone_2"})
     body: ClassVar[dict[str, Parameter]] = {"body.mass": MASS, "ring.radius": RADIUS}
+
+    def history(self, structure: Structure) -> tuple[str, ...]:
+        """Quantities of a time history, in the order of their columns."""
+        return "phi", "omega", "epsilon", "normal_1", "normal_2", "ring_omega", "zone_1", "zone_2", "mode"
 
     def parameters(self, structure: Structure) -> dict[str, Parameter]:
         """Every numeric path of a scene of this structure."""
