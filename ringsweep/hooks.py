@@ -73,6 +73,11 @@ def embark(scene):
 
 
 @hook
+def stiff_start(scene, mode, t, y):
+    """Record of a run that begins in the state `y`, for laws without series."""
+
+
+@hook
 def rows(scene):
     """Number of rows of the series, and the first row that is a guard."""
 
@@ -167,26 +172,35 @@ def stiff_rates(scene, mode, force, x):
 
 @hook
 def linearise(scene, mode, t, x):
-    """Time derivative, Jacobian (row by row) and partial derivative by time of :func:`stiff_rates`."""
+    """Time derivative, Jacobian and partial derivative by time of :func:`stiff_rates`.
+
+    The state is place, velocity and the deflection of each bristle, if there are any.
+
+    Returns
+    -------
+    tuple
+        ``(rates, core, bristles, drift)``: the Jacobian of place and velocity, row by row; for each bristle the
+        derivative of the acceleration by its deflection, and of its rate by the velocity and by its deflection.
+    """
 
 
 @hook
-def stiff_scales(scene, tolerance):
-    """Error allowed to each component of the state in the coordinates of the implicit method."""
+def stiff_scales(scene, tolerance, x):
+    """Error allowed to each component of the state `x` in the coordinates of the implicit method."""
 
 
 @hook
 def stiff_view(scene, mode, t, x):
-    """Guards of the mode, positive while it holds, and place, velocity and what else :func:`stiff_watch` needs."""
+    """Guards of the mode, positive while it holds; place, velocity, acceleration and what :func:`stiff_watch` needs."""
 
 
 @hook
-def stiff_velocity(scene, t, x):
-    """Velocity of the body, whose changes of sign are the extremes of its place."""
+def stiff_motion(scene, t, x, line):
+    """Velocity and acceleration of the body where it is linearised: at their zeros place and velocity are extreme."""
 
 
 @hook
-def stiff_watch(scene, record, view, t, duration):
+def stiff_watch(scene, record, mode, view, t, duration):
     """Record after `duration` seconds in the mode to a state at time `t` of which this is the view."""
 
 

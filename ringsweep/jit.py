@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import pickle
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -49,6 +50,16 @@ def kernel(function: Callable[..., Any]) -> Any:
         return dispatcher
     index = dispatcher._cache._cache_file
     index._source_stamp = (index._source_stamp, SOURCES_DIGEST)
+    load = index._load_index
+
+    def load_index() -> Any:
+        # An index left by other sources may name types that are no more: it is stale, not an error.
+        try:
+            return load()
+        except (AttributeError, ImportError, EOFError, pickle.UnpicklingError):
+            return {}
+
+    index._load_index = load_index
     return dispatcher
 
 
@@ -118,14 +129,60 @@ def _take(batch, i):
     return scope["row"]
 
 
-def add_scaled(y: Any, factor: float, k: Any) -> Any:
-    """``y + factor * k`` for states, which are tuples of floats of any length."""
-    return tuple(a + factor * b for a, b in zip(y, k, strict=True))
+# ---- states: tuples of floats of any length --------------------------------------------------
 
 
-@overload(add_scaled, jit_options=OPTIONS)
-def _add_scaled(y, factor, k):
-    sums = "".join(f"y[{i}] + factor * k[{i}], " for i in range(len(y)))
-    scope: dict[str, Any] = {}
-    exec(f"def add(y, factor, k): return ({sums})", scope)
-    return scope["add"]
+def _unrolled(function: Callable[..., Any]) -> Any:
+    """A function of states whose body is written out for the length of its argument `y`.
+
+    `function` returns, for a length, the lines of the body, whose last gives the state to return.
+    """
+    names = ", ".join(list(inspect.signature(function).parameters)[1:])
+
+    def written(length: int) -> Any:
+        lines = "\n    ".join(function(length, *names.split(", ")))
+        scope: dict[str, Any] = {}
+        exec(f"def body({names}):\n    {lines}", scope)
+        return scope["body"]
+
+    scope: dict[str, Any] = {"written": written}
+    exec(
+        f"def {function.__name__}({names}): return written(len(y))({names})\n"
+        f"def overloaded({names}): return written(len(y))\n",
+        scope,
+    )
+    unrolled = scope[function.__name__]
+    unrolled.__doc__ = function.__doc__
+    overload(unrolled, jit_options=OPTIONS)(scope["overloaded"])
+    return unrolled
+
+
+@_unrolled
+def add_scaled(length, y, factor, k):
+    """``y + factor * k``."""
+    return ["return (" + "".join(f"y[{i}] + factor * k[{i}], " for i in range(length)) + ")"]
+
+
+@_unrolled
+def combine(length, y, weights, rows, count):
+    """``y`` and the first `count` of the rows of an array, each times its weight."""
+    numbers = range(length)
+    return [
+        "".join(f"a{i}, " for i in numbers) + "= y",
+        "for j in range(count):",
+        "    w = weights[j]",
+        *(f"    a{i} += w * rows[j, {i}]" for i in numbers),
+        "return (" + "".join(f"a{i}, " for i in numbers) + ")",
+    ]
+
+
+@_unrolled
+def zero(length, y):
+    """A state of zeros."""
+    return ["return (" + "0.0, " * length + ")"]
+
+
+@_unrolled
+def as_tuple(length, row, y):
+    """A row of an array as a state like `y`."""
+    return ["return (" + "".join(f"row[{i}], " for i in range(length)) + ")"]

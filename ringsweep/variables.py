@@ -88,5 +88,6 @@ HISTORY: dict[str, Variable] = {
     "x": Variable("displacement of the body", "m"),
     "velocity": Variable("velocity of the body", "m s-1"),
     "friction_force": Variable("friction force", "N"),
+    "deflection": Variable("deflection of the bristles", "m"),
     "mode": Variable("friction mode", dtype="int8", flags=MODES),
 }

@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 from ringsweep.jit import take
-from ringsweep.physics.friction import weights
+from ringsweep.physics.friction.static import weights
 from ringsweep.regimes import Outcome
 from ringsweep.solvers.piecewise import trace
 

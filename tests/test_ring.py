@@ -11,7 +11,9 @@ from ringsweep.errors import InputError
 from ringsweep.hooks import inspect
 from ringsweep.jit import inlined, take
 from ringsweep.physics import ring
-from ringsweep.physics.friction import BengisuAkay, Coulomb, stiction_band, weights
+from ringsweep.physics.friction.set_valued import Coulomb
+from ringsweep.physics.friction.smooth import BengisuAkay
+from ringsweep.physics.friction.static import stiction_band, weights
 from ringsweep.physics.ring import OneContact, Ring, TwoContacts, acceleration, acceleration_slope, reactions
 from ringsweep.physics.zones import Arc, cut
 

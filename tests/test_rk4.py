@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from ringsweep.hooks import verdict
 from ringsweep.jit import take
 from ringsweep.models.ring import Inspection
-from ringsweep.physics.friction import weights
+from ringsweep.physics.friction.static import weights
 from ringsweep.physics.ring import acceleration, reactions
 from ringsweep.regimes import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2, Outcome
 from ringsweep.solvers.rk4 import RK4, STABILITY_LIMIT

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-import ringsweep.models.ring_series
-import ringsweep.models.ring_stiff  # noqa: F401  importing them gives the solvers their hooks
+# Importing them gives the solvers their hooks.
+from ringsweep.models import belt_bristles, belt_static, ring_series, ring_stiff  # noqa: F401
 from ringsweep.models.belt import Belt
 from ringsweep.models.ring import Ring, SingleContactRing
 from ringsweep.parameters import Parameter

@@ -29,6 +29,23 @@ def pair(law: type, place: str, values: Values) -> tuple[NDArray[np.float64], ND
     return mu_s, mu_k
 
 
+def law_of(law: type, values: Values) -> Any:
+    """A friction law whose leaves have shape ``(cells, ...)``; `values` holds its parameters by path.
+
+    Raises
+    ------
+    InputError
+        If parameters that must ascend do not.
+    """
+    columns = {name: values[f"friction.{name}"] for name in declared(law)}
+    if law in friction.ASCENDING:
+        low, high = friction.ASCENDING[law]
+        problem = f"{{}} is not greater than friction.{low}"
+        require(columns[high] > columns[low], f"friction.{high}", columns[high], problem)
+    made: Any = getattr(law, "of", law)
+    return made(**columns)
+
+
 def drive_of(structure: Structure, values: Values) -> Any:
     """A drive whose leaves have shape ``(cells, ...)``.
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ringsweep import hooks, regimes
 from ringsweep.jit import inlined
-from ringsweep.models.common import GRAVITY, MASS, SPAN, drive_of, pair
+from ringsweep.models.common import GRAVITY, MASS, SPAN, drive_of, law_of, pair
 from ringsweep.parameters import Parameter, declared
 from ringsweep.physics import drives, friction, ring, zones
 from ringsweep.regimes import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2
@@ -25,7 +25,9 @@ class SingleContactRing:
     name: ClassVar[str] = "ring-single-contact"
     doc: ClassVar[str] = "a small body in a rotating ring, one contact"
     outcomes: ClassVar[tuple[str, ...]] = regimes.Outcome._fields
-    laws: ClassVar[dict[str, type]] = friction.LAWS
+    laws: ClassVar[dict[str, type]] = {
+        name: law for name, law in friction.LAWS.items() if name not in ("karnopp", "reset-integrator", "bristle")
+    }
     absent: ClassVar[frozenset[str]] = frozenset({"normal_min_2", "normal_2", "zone_2"})
     body: ClassVar[dict[str, Parameter]] = {"body.mass": MASS, "ring.radius": RADIUS}
 
@@ -71,7 +73,7 @@ class SingleContactRing:
         return ring.Ring(
             body=self.build_body(values),
             surface=surface,
-            law=law(*(values[f"friction.{name}"] for name in declared(law))),
+            law=law_of(law, values),
             drive=drive_of(structure, values),
             initial_phi=values["initial.phi"],
             initial_omega=values["initial.omega"],

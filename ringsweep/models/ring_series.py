@@ -17,14 +17,15 @@ from typing import NamedTuple
 from ringsweep import hooks, regimes
 from ringsweep.jit import hook, inlined
 from ringsweep.physics import drives, ring
-from ringsweep.physics.friction import (
+from ringsweep.physics.friction.static import (
     BAND,
     CLEAN,
     constant_weights,
     expand_weights,
-    holding,
+    faster,
     region_at,
     region_bounds,
+    slower,
     stiction_band,
     weights,
 )
@@ -43,9 +44,9 @@ from ringsweep.series import (
 )
 
 # Rows of the series; the guards last, and first of them the one without which the others mean nothing.
-PHI, V, OMEGA, EPSILON, SIN, COS, SQUARE, THETA, SPEED, STATIC, KINETIC = range(11)
-K1, K2, D, LEVER, PULL, LIFT, SPARE = range(11, 18)
-INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(18, 24)
+PHI, V, OMEGA, EPSILON, SIN, COS, SQUARE, THETA, EXCESS, BASIS, STATIC, KINETIC = range(12)
+K1, K2, D, LEVER, PULL, LIFT, SPARE = range(12, 19)
+INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(19, 25)
 
 
 class Mode(NamedTuple):
@@ -103,8 +104,7 @@ def _settle(scene, t, phi, places):
     """Mode of a set-valued law where the sliding velocity is zero: stick unless full friction cannot hold."""
     _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     still = Mode(0, CLEAN, -1, places[0], places[1])
-    mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, still)
-    m1, m2 = holding(scene.law, mu_s1, mu_k1), holding(scene.law, mu_s2, mu_k2)
+    m1, _, m2, _ = coefficients_under(scene, still)
     sin_phi, cos_phi = sin(phi), cos(phi)
     against_forward, D1, inertia_1 = ring.acceleration(scene.body, -m1, -m2, sin_phi, cos_phi, ring_omega)
     against_backward, D2, inertia_2 = ring.acceleration(scene.body, m1, m2, sin_phi, cos_phi, ring_omega)
@@ -160,9 +160,9 @@ def _switch(scene, mode, guard, t, y):
         return RUNNING, Mode(1 if guard == SLOW else -1, region_at(scene.law, 0.0), SLOW, place_1, place_2), (phi, 0.0)
     low, high = region_bounds(scene.law, region)
     if guard == FAST:
-        return RUNNING, Mode(sign, region - 1, SLOW, place_1, place_2), (phi, sign * high)
+        return RUNNING, Mode(sign, faster(scene.law, region), SLOW, place_1, place_2), (phi, sign * high)
     if low > 0.0:
-        return RUNNING, Mode(sign, region + 1, FAST, place_1, place_2), (phi, sign * low)
+        return RUNNING, Mode(sign, slower(scene.law, region), FAST, place_1, place_2), (phi, sign * low)
     if region == BAND:
         return RUNNING, Mode(-sign, BAND, SLOW, place_1, place_2), (phi, 0.0)
     status, settled = _settle(scene, t, phi, (place_1, place_2))
@@ -245,10 +245,11 @@ def _expand_sliding(scene, mode, c):
 def _expand_blended(scene, mode, c):
     """Slip in which the friction coefficients vary with the sliding speed."""
     mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
+    low, _ = region_bounds(scene.law, mode.region)
     for k in range(ORDER + 1):
         _sine(c, k)
-        c[SPEED, k] = mode.sign * c[V, k]
-        expand_weights(scene.law, mode.region, c[SPEED], k, c[STATIC], c[KINETIC])
+        c[EXCESS, k] = mode.sign * c[V, k] - (low if k == 0 else 0.0)
+        expand_weights(scene.law, mode.region, c[EXCESS], k, c[BASIS], c[STATIC], c[KINETIC])
         c[K1, k] = -mode.sign * (c[STATIC, k] * mu_s1 + c[KINETIC, k] * mu_k1)
         c[K2, k] = -mode.sign * (c[STATIC, k] * mu_s2 + c[KINETIC, k] * mu_k2)
         c[EPSILON, k] = _acceleration_term(scene.body, c, k)
@@ -353,8 +354,8 @@ def _expand_stick(scene, mode, tolerance, c):
         if k > 0:
             c[PHI, k] = c[THETA, k]
         _sine(c, k)
-    mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
-    _hold(scene.body, holding(scene.law, mu_s1, mu_k1), holding(scene.law, mu_s2, mu_k2), c)
+    mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
+    _hold(scene.body, mu_s1, mu_s2, c)
     c[EDGE, 0] = inf
     c[INERTIA, 0] = inf
     weight = 1.0 / (scene.body.mass * (scene.body.gravity + scene.body.radius * c[SQUARE, 0]))

@@ -12,7 +12,7 @@ from ringsweep import hooks, regimes
 from ringsweep.jit import inlined
 from ringsweep.models.ring_series import coefficients_under
 from ringsweep.physics import drives, ring
-from ringsweep.physics.friction import BAND, stiction_band, weights
+from ringsweep.physics.friction.static import BAND, stiction_band, weights
 from ringsweep.physics.zones import coefficients, edge_ahead
 
 
@@ -43,7 +43,7 @@ def _from_stiff(scene, t, x):
 
 @hooks.is_stiff.implements(ring.Ring)
 def _is_stiff(scene, mode, y, line):
-    (_, push), (_, _, _, decay), _ = line
+    (_, push), (_, _, _, decay), _, _ = line
     # Fast against the body's own motion, and settled: what is left of the way in, and the way out
     # through the top of the band, run at the rate of the decay itself.
     own = sqrt(scene.body.gravity / scene.body.radius) + abs(y[1]) / scene.body.radius
@@ -61,7 +61,7 @@ def _forcing(scene, t):
 
 
 @hooks.stiff_scales.implements(ring.Ring)
-def _stiff_scales(scene, tolerance):
+def _stiff_scales(scene, tolerance, x):
     return tolerance, tolerance * stiction_band(scene.law)
 
 
@@ -93,6 +93,7 @@ def _linearise(scene, mode, t, x):
     return (
         (x[1] / radius, radius * (epsilon - ring_epsilon)),
         (0.0, 1.0 / radius, radius * by_phi, by_omega + friction),
+        (),
         (0.0, radius * (by_phi * ring_omega + by_omega * ring_epsilon - ring_jerk)),
     )
 
@@ -121,13 +122,14 @@ def _stiff_view(scene, mode, t, x):
     return guards, (phi, omega, epsilon, ring_omega)
 
 
-@hooks.stiff_velocity.implements(ring.Ring)
-def _stiff_velocity(scene, t, x):
-    return x[1] / scene.body.radius + drives.turn(scene.drive, t)[1]
+@hooks.stiff_motion.implements(ring.Ring)
+def _stiff_motion(scene, t, x, line):
+    _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
+    return x[1] / scene.body.radius + ring_omega, line[0][1] / scene.body.radius + ring_epsilon
 
 
 @hooks.stiff_watch.implements(ring.Ring)
-def _stiff_watch(scene, record, view, t, duration):
+def _stiff_watch(scene, record, mode, view, t, duration):
     guards, (phi, omega, _, _) = view
     return regimes.observe(record, phi, omega, guards[2], guards[3], duration, scene.epsilon_omega)
 

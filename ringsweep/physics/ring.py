@@ -33,7 +33,7 @@ from typing import Any, NamedTuple
 
 from ringsweep.jit import hook, inlined
 from ringsweep.parameters import Leaf
-from ringsweep.physics.friction import weights
+from ringsweep.physics.friction.static import weights
 from ringsweep.physics.zones import coefficients, segment
 
 

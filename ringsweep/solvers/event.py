@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.parameters import Parameter
-from ringsweep.physics.friction import LAWS, SET_VALUED, SMOOTH
+from ringsweep.physics.friction import DYNAMIC, LAWS, SET_VALUED, SMOOTH
 from ringsweep.scene import Structure
 from ringsweep.solvers.common import Method, Result, agree
 from ringsweep.solvers.piecewise import integrate, trace
@@ -74,7 +74,7 @@ class _Piecewise(Method):
     def _integrate(self, batch: Any, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         rows = np.empty((len(batch.span), width))
         steps = np.empty(len(rows))
-        integrate(batch, *self.tolerances(), self.max_steps, rows, steps)
+        integrate(batch, self.tolerances(), self.max_steps, rows, steps)
         return rows, steps
 
     def history(self, batch: Any, samples: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -83,7 +83,7 @@ class _Piecewise(Method):
         size = 4 * samples
         while True:
             times, rows = np.empty(size), np.empty((size, width))
-            count = trace(batch, *self.tolerances(), self.max_steps, spacing, times, rows)
+            count = trace(batch, self.tolerances(), self.max_steps, spacing, times, rows)
             if count < size or size >= self.max_steps:
                 return times[:count], rows[:count]
             size *= 4
@@ -114,10 +114,10 @@ class Event(_Piecewise):
 
 @dataclass(frozen=True)
 class Implicit(_Piecewise):
-    """Smooth laws as they are written: power series where they are not stiff, L-stable steps where they are."""
+    """Smooth and dynamic laws as they are written: power series where they are not stiff, else L-stable steps."""
 
     name: ClassVar[str] = "implicit"
-    laws: ClassVar[tuple[type, ...]] = SMOOTH
+    laws: ClassVar[tuple[type, ...]] = (*SMOOTH, *DYNAMIC)
 
     rtol: Annotated[float, Parameter("1", "error allowed to a step", lower=1e-13, upper=1e-3)] = 3e-6
     max_steps: Annotated[int, LIMIT] = 1_000_000

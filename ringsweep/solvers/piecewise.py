@@ -2,13 +2,13 @@
 
 The series of a mode is exact to the tolerance on its step, and every guard is a series on the same
 step, so that its first root is located to rounding and none is stepped over. A mode of a smooth law
-that relaxes much faster than it moves is taken by implicit steps instead (:mod:`rosenbrock`);
-scenes with a set-valued law have none, and their kernels do not contain the method.
+that relaxes much faster than it moves is taken by implicit steps instead (:mod:`rosenbrock`), and
+so is every mode of a law with bristles. The family of the law decides which of both methods a kernel contains.
 """
 
 from __future__ import annotations
 
-from math import isfinite, isnan, nan
+from math import inf, isfinite, isnan, nan
 
 import numpy as np
 
@@ -26,9 +26,10 @@ from ringsweep.hooks import (
     rows,
     sample,
     start,
+    stiff_motion,
     stiff_sample,
     stiff_scales,
-    stiff_velocity,
+    stiff_start,
     stiff_view,
     stiff_watch,
     switch,
@@ -37,7 +38,7 @@ from ringsweep.hooks import (
 )
 from ringsweep.jit import hook, inlined, kernel, take
 from ringsweep.physics.drives import next_knot
-from ringsweep.physics.friction import SET_VALUED, SMOOTH
+from ringsweep.physics.friction import DYNAMIC, SET_VALUED, SMOOTH
 from ringsweep.regimes import BROKEN, COMPLETE, RUNNING
 from ringsweep.series import ORDER, STACK, first_root
 from ringsweep.solvers import rosenbrock
@@ -119,41 +120,29 @@ def _locate(scene, mode, t, x, line, h, g, stages):
     return high
 
 
-@hook
-def _creep(law, scene, record, mode, t, y, h, horizon, tolerance, guards, stages):
-    """One accepted implicit step, cut at the first event within it.
+@inlined
+def _creep(scene, record, mode, t, y, x, line, h, horizon, tolerance, guards, stages):
+    """One accepted implicit step from the state `y`, which is `x` in its own coordinates, cut at the first event.
 
     Returns
     -------
     tuple
-        Whether the mode is stiff here (nothing is done where it is not), guard or -1, length of the
-        step (negative if none was found), state, record, next step to try.
+        Guard or -1, length of the step (negative if none was found), state, record, next step to try.
     """
-
-
-@_creep.implements(*SET_VALUED)
-def _no_creep(law, scene, record, mode, t, y, h, horizon, tolerance, guards, stages):
-    return False, -1, 0.0, y, record, h
-
-
-@_creep.implements(*SMOOTH)
-def _stiff_creep(law, scene, record, mode, t, y, h, horizon, tolerance, guards, stages):
-    if not creeps(scene, mode):
-        return False, -1, 0.0, y, record, h
-    x = to_stiff(scene, t, y)
-    line = linearise(scene, mode, t, x)
-    if not is_stiff(scene, mode, y, line):
-        return False, -1, 0.0, y, record, h
-    scale_0, scale_1 = stiff_scales(scene, tolerance)
+    scales = stiff_scales(scene, tolerance, x)
     s = min(h, horizon)
     for _ in range(200):
         x_next, error = rosenbrock.step(scene, mode, t, x, line, s, stages)
-        size = max(abs(error[0]) / scale_0, abs(error[1]) / scale_1)
+        size = 0.0
+        for k in range(len(error)):
+            part = abs(error[k]) / scales[k]
+            if not part <= size:
+                size = part if part >= 0.0 else inf
         if size <= 1.0:
             break
         s *= max(0.2, 0.9 * size**-0.2) if isfinite(size) else 0.1
     else:
-        return True, -1, -1.0, y, record, h
+        return -1, -1.0, y, record, h
     grown = s * min(6.0, 0.9 * max(size, 1e-8) ** -0.2)
     # A step cut short by the horizon says little about the next one.
     h = max(h, grown) if s == horizon else grown
@@ -171,27 +160,129 @@ def _stiff_creep(law, scene, record, mode, t, y, h, horizon, tolerance, guards, 
                 event, end = guards + g, found
     if event >= 0:
         if end == 0.0:
-            return True, event, 0.0, y, record, h
+            return event, 0.0, y, record, h
         x_next, _ = rosenbrock.step(scene, mode, t, x, line, end, stages)
         within = stiff_view(scene, mode, t + 0.5 * end, rosenbrock.dense(x, x_next, stages, 0.5))
         after = stiff_view(scene, mode, t + end, x_next)
+    velocity, acceleration = stiff_motion(scene, t, x, line)
     done = 0.0
-    for half, velocity, right in ((0.0, stiff_velocity(scene, t, x), within), (0.5, within[1][1], after)):
-        # The motion turns within this half: its extreme is a moment of its own.
-        if velocity * right[1][1] < 0.0:
-            low, high = half, half + 0.5
-            for _ in range(40):
-                middle = 0.5 * (low + high)
-                view = stiff_view(scene, mode, t + middle * end, rosenbrock.dense(x, x_next, stages, middle))
-                if view[1][1] * velocity > 0.0:
-                    low = middle
-                else:
-                    high = middle
-            record = stiff_watch(scene, record, view, t + middle * end, (middle - done) * end)
-            done = middle
-        record = stiff_watch(scene, record, right, t + (half + 0.5) * end, (half + 0.5 - done) * end)
+    for half, right in ((0.0, within), (0.5, after)):
+        # Where the motion or its acceleration turns within this half there is an extreme: a moment of its own.
+        turns, rises = velocity * right[1][1] < 0.0, acceleration * right[1][2] < 0.0
+        first = _turning(scene, mode, t, x, x_next, end, stages, half, 1, velocity) if turns else 2.0
+        second = _turning(scene, mode, t, x, x_next, end, stages, half, 2, acceleration) if rises else 2.0
+        for moment in (min(first, second), max(first, second)):
+            if moment < 1.0:
+                view = stiff_view(scene, mode, t + moment * end, rosenbrock.dense(x, x_next, stages, moment))
+                record = stiff_watch(scene, record, mode, view, t + moment * end, (moment - done) * end)
+                done = moment
+        record = stiff_watch(scene, record, mode, right, t + (half + 0.5) * end, (half + 0.5 - done) * end)
         done = half + 0.5
-    return True, event, end, from_stiff(scene, t + end, x_next), record, h
+        velocity, acceleration = right[1][1], right[1][2]
+    return event, end, from_stiff(scene, t + end, x_next), record, h
+
+
+@inlined
+def _turning(scene, mode, t, x, x_next, h, stages, half, which, start):
+    """Where in the half step from the fraction `half` on velocity (1) or acceleration (2), there `start`, turns."""
+    low, high = half, half + 0.5
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        view = stiff_view(scene, mode, t + middle * h, rosenbrock.dense(x, x_next, stages, middle))
+        if view[1][which] * start > 0.0:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+@inlined
+def _along(scene, record, mode, t, y, horizon, tolerance, c, guards, work):
+    """One step of the series, cut at the first event: guard or -1, length, state, record."""
+    h = min(expand(scene, mode, t, y, tolerance, c), horizon)
+    guard, s = _first_event(c, guards, mode.fresh, h, work)
+    if s > 0.0:
+        record = watch(scene, record, mode, c, t, s, work)
+    return guard, s, land(scene, mode, c, t, s), record
+
+
+@hook
+def _stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages):
+    """One step in the way that the family of the law wants.
+
+    Returns
+    -------
+    tuple
+        Whether the step was implicit, guard or -1, length of the step, state, record, next implicit step to try.
+    """
+
+
+@_stride.implements(*SET_VALUED)
+def _series_stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages):
+    guard, s, y, record = _along(scene, record, mode, t, y, horizon, tolerances[0], c, guards, work)
+    return False, guard, s, y, record, trial
+
+
+@_stride.implements(*SMOOTH)
+def _either_stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages):
+    if creeps(scene, mode):
+        x = to_stiff(scene, t, y)
+        line = linearise(scene, mode, t, x)
+        if is_stiff(scene, mode, y, line):
+            guard, s, y, record, trial = _creep(
+                scene, record, mode, t, y, x, line, trial, horizon, tolerances[1], guards, stages
+            )
+            return True, guard, s, y, record, trial
+    guard, s, y, record = _along(scene, record, mode, t, y, horizon, tolerances[0], c, guards, work)
+    return False, guard, s, y, record, 1e-6 * scene.span
+
+
+@_stride.implements(*DYNAMIC)
+def _implicit_stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages):
+    x = to_stiff(scene, t, y)
+    line = linearise(scene, mode, t, x)
+    guard, s, y, record, trial = _creep(
+        scene, record, mode, t, y, x, line, trial, horizon, tolerances[1], guards, stages
+    )
+    return True, guard, s, y, record, trial
+
+
+@hook
+def _outset(law, scene, mode, t, y, tolerances, c):
+    """Record of a run that begins."""
+
+
+@_outset.implements(*SET_VALUED, *SMOOTH)
+def _series_outset(law, scene, mode, t, y, tolerances, c):
+    expand(scene, mode, t, y, tolerances[0], c)
+    return start(scene, c)
+
+
+@_outset.implements(*DYNAMIC)
+def _implicit_outset(law, scene, mode, t, y, tolerances, c):
+    return stiff_start(scene, mode, t, y)
+
+
+@hook
+def _row(law, scene, mode, implicit, c, t, s, y):
+    """One row of a time history, after the part `s` of a step that began in the state `y` if it was a series."""
+
+
+@_row.implements(*SET_VALUED)
+def _series_row(law, scene, mode, implicit, c, t, s, y):
+    return sample(scene, mode, c, t, s)
+
+
+@_row.implements(*SMOOTH)
+def _either_row(law, scene, mode, implicit, c, t, s, y):
+    if implicit:
+        return stiff_sample(scene, mode, t, to_stiff(scene, t, y))
+    return sample(scene, mode, c, t, s)
+
+
+@_row.implements(*DYNAMIC)
+def _implicit_row(law, scene, mode, implicit, c, t, s, y):
+    return stiff_sample(scene, mode, t, to_stiff(scene, t, y))
 
 
 @inlined
@@ -216,12 +307,12 @@ def _store(row, values):
 
 
 @kernel
-def trace(batch, tolerance, creep_tolerance, limit, spacing, times, table):
+def trace(batch, tolerances, limit, spacing, times, table):
     """History of cell 0: every end of a step, and within longer ones instants `spacing` apart.
 
     Parameters
     ----------
-    batch, tolerance, creep_tolerance, limit
+    batch, tolerances, limit
         As for :func:`integrate`.
     spacing : float
         Greatest distance between rows, s.
@@ -237,61 +328,50 @@ def trace(batch, tolerance, creep_tolerance, limit, spacing, times, table):
     count, guards = rows(scene)
     c = np.zeros((count, ORDER + 3))
     work = np.empty((STACK, ORDER + 3))
-    stages = np.empty((rosenbrock.STAGES, 2))
     t, y = embark(scene)
+    stages = np.empty((rosenbrock.STAGES, len(y)))
     status, mode = enter(scene, t, y)
-    expand(scene, mode, t, y, tolerance, c)
-    record = start(scene, c)
+    record = _outset(scene.law, scene, mode, t, y, tolerances, c)
     trial = 1e-6 * scene.span
     n = 0
     entered = True
+    implicit = False
     for _ in range(limit):
         if status != RUNNING or n == len(times):
             break
         horizon = min(scene.span, next_knot(scene.drive, t)) - t
-        stiff, guard, s, y_next, record, trial = _creep(
-            scene.law, scene, record, mode, t, y, min(trial, spacing), horizon, creep_tolerance, guards, stages
+        implicit, guard, s, y_next, record, trial = _stride(
+            scene.law, scene, record, mode, t, y, min(trial, spacing), horizon, tolerances, c, guards, work, stages
         )
-        if stiff:
-            if s > 0.0:
-                for ahead, state in ((0.0, y), (s, y_next)):
-                    if (entered or ahead > 0.0) and n < len(times):
-                        _store(table[n], stiff_sample(scene, mode, t + ahead, to_stiff(scene, t + ahead, state)))
-                        times[n] = t + ahead
-                        n += 1
-            y = y_next
-        else:
-            trial = 1e-6 * scene.span
-            h = min(expand(scene, mode, t, y, tolerance, c), horizon)
-            guard, s = _first_event(c, guards, mode.fresh, h, work)
-            if s > 0.0:
-                parts = int(s / spacing) + 1
-                for part in range(0 if entered else 1, parts + 1):
-                    if n < len(times):
-                        inside = s * part / parts
-                        _store(table[n], sample(scene, mode, c, t + inside, inside))
-                        times[n] = t + inside
-                        n += 1
-            y = land(scene, mode, c, t, s)
+        if s > 0.0:
+            parts = 1 if implicit else int(s / spacing) + 1
+            for part in range(0 if entered else 1, parts + 1):
+                if n < len(times):
+                    inside = s * part / parts
+                    state = y if part == 0 else y_next
+                    _store(table[n], _row(scene.law, scene, mode, implicit, c, t + inside, inside, state))
+                    times[n] = t + inside
+                    n += 1
+        y = y_next
         entered = guard >= 0 or (entered and s == 0.0)
         t, status, mode, y = _arrive(scene, mode, guard, t, s, horizon, y)
     if n == 0:
         # A run that ends as it begins was somewhere all the same.
-        _store(table[0], sample(scene, mode, c, t, 0.0))
+        _store(table[0], _row(scene.law, scene, mode, implicit, c, t, 0.0, y))
         times[0] = t
         n = 1
     return n
 
 
 @kernel
-def integrate(batch, tolerance, creep_tolerance, limit, out, steps):
+def integrate(batch, tolerances, limit, out, steps):
     """Run every cell of a batch to its end, or to `limit` steps.
 
     Parameters
     ----------
     batch : NamedTuple
         Cells, as :func:`ringsweep.models.batch` makes them.
-    tolerance, creep_tolerance : float
+    tolerances : tuple of float
         Error allowed to a step of the series and to an implicit step: rad, and rad/s relative to
         1 rad/s + \\|omega\\| or m/s relative to the width of the stiction band.
     limit : int
@@ -299,16 +379,16 @@ def integrate(batch, tolerance, creep_tolerance, limit, out, steps):
     out : ndarray of shape ``(cells, outcomes)``
     steps : ndarray of shape ``(cells,)``
     """
-    count, guards = rows(take(batch, 0))
+    first = take(batch, 0)
+    count, guards = rows(first)
     c = np.zeros((count, ORDER + 3))
     work = np.empty((STACK, ORDER + 3))
-    stages = np.empty((rosenbrock.STAGES, 2))
+    stages = np.empty((rosenbrock.STAGES, len(embark(first)[1])))
     for i in range(len(steps)):
         scene = take(batch, i)
         t, y = embark(scene)
         status, mode = enter(scene, t, y)
-        expand(scene, mode, t, y, tolerance, c)
-        record = start(scene, c)
+        record = _outset(scene.law, scene, mode, t, y, tolerances, c)
         trial = 1e-6 * scene.span
         n = stalled = 0
         before = -1.0
@@ -321,16 +401,9 @@ def integrate(batch, tolerance, creep_tolerance, limit, out, steps):
             before = t
             n += 1
             horizon = min(scene.span, next_knot(scene.drive, t)) - t
-            stiff, guard, s, y, record, trial = _creep(
-                scene.law, scene, record, mode, t, y, trial, horizon, creep_tolerance, guards, stages
+            _, guard, s, y, record, trial = _stride(
+                scene.law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages
             )
-            if not stiff:
-                trial = 1e-6 * scene.span
-                h = min(expand(scene, mode, t, y, tolerance, c), horizon)
-                guard, s = _first_event(c, guards, mode.fresh, h, work)
-                if s > 0.0:
-                    record = watch(scene, record, mode, c, t, s, work)
-                y = land(scene, mode, c, t, s)
             t, status, mode, y = _arrive(scene, mode, guard, t, s, horizon, y)
         outcome = finish(scene, record, status, t, y)
         for k in range(len(outcome)):

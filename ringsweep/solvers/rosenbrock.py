@@ -1,16 +1,19 @@
 """Rodas5P: an L-stable Rosenbrock method of order 5 with dense output of order 4.
 
-One linear system per stage and no iteration, which is what a stiff system of two equations wants;
+One linear system per stage and no iteration, which is what a stiff system of a few equations wants;
 its order does not drop on the slow manifold that a stuck contact creeps along. Coefficients:
 G. Steinebach, BIT Numerical Mathematics 63, 27 (2023).
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numba.extending import overload
 
 from ringsweep.hooks import forcing, stiff_rates
-from ringsweep.jit import inlined
+from ringsweep.jit import OPTIONS, add_scaled, as_tuple, combine, inlined, zero
 
 STAGES = 8
 GAMMA = 0.21193756319429014
@@ -104,54 +107,72 @@ DENSE = np.array(
 
 @inlined
 def step(scene, mode, t, x, line, h, stages):
-    """One step of length `h` from the state `x` of two components at time `t`, where it is linearised as `line`.
+    """One step of length `h` from the state `x` at time `t`, where the system is linearised as `line`.
 
-    `stages`, of shape ``(STAGES, 2)``, is filled with the stages. Returns the new state and the
-    estimate of its error; for dense output see :func:`dense`.
+    `stages`, of shape ``(STAGES, components)``, is filled with the stages. Returns the new state and the
+    estimate of its error; for dense output see :func:`dense`. For `line` see :func:`ringsweep.hooks.linearise`.
     """
-    (f0, f1), (j00, j01, j10, j11), (d0, d1) = line
+    rates, core, bristles, drift = line
     shift = 1.0 / (GAMMA * h)
-    w00, w11 = shift - j00, shift - j11
-    inverse = 1.0 / (w00 * w11 - j01 * j10)
     over_h = 1.0 / h
     force = forcing(scene, t + TIMES[1] * h)
-    y0, y1 = x
+    y = x
     for i in range(STAGES):
         if i > 0:
-            y0, y1 = x
-            c0 = c1 = 0.0
-            for j in range(i):
-                y0 += A[i, j] * stages[j, 0]
-                y1 += A[i, j] * stages[j, 1]
-                c0 += C[i, j] * stages[j, 0]
-                c1 += C[i, j] * stages[j, 1]
+            y = combine(x, A[i], stages, i)
             # The last three stages are at the same time.
             if 1 < i < STAGES - 2:
                 force = forcing(scene, t + TIMES[i] * h)
-            f0, f1 = stiff_rates(scene, mode, force, (y0, y1))
-            f0 += c0 * over_h
-            f1 += c1 * over_h
-        r0 = f0 + h * DRIFT[i] * d0
-        r1 = f1 + h * DRIFT[i] * d1
-        stages[i, 0] = (w11 * r0 + j01 * r1) * inverse
-        stages[i, 1] = (j10 * r0 + w00 * r1) * inverse
+            rates = stiff_rates(scene, mode, force, y)
+            rates = add_scaled(rates, over_h, combine(zero(x), C[i], stages, i))
+        solve(core, bristles, shift, add_scaled(rates, h * DRIFT[i], drift), stages[i])
     # Stiffly accurate: the last stage is the correction, and the error estimate, of the one before.
-    error = stages[STAGES - 1, 0], stages[STAGES - 1, 1]
-    return (y0 + error[0], y1 + error[1]), error
+    error = as_tuple(stages[STAGES - 1], x)
+    return add_scaled(y, 1.0, error), error
+
+
+def solve(core: Any, bristles: Any, shift: float, right: Any, out: Any) -> None:
+    """Fill `out` with the solution k of ``(shift I - J) k = right``.
+
+    The Jacobian J of place, velocity and bristles has the structure of a body on bristles: its `core` is that of
+    place and velocity, row by row, and each of `bristles` gives how the acceleration depends on the deflection, and
+    the rate of the deflection on the velocity and on itself. The last is never positive, so that the
+    bristles can be eliminated in any order without pivoting.
+    """
+    return _solve_for(len(bristles))(core, bristles, shift, right, out)
+
+
+def _solve_for(count: int) -> Any:
+    """The body of :func:`solve` for so many bristles."""
+    numbers = range(count)
+    lines = [
+        "j00, j01, j10, j11 = core",
+        "r0, r1 = right[0], right[1]",
+        "w00, w11 = shift - j00, shift - j11",
+        *(f"b{i}, c{i}, d{i} = bristles[{i}]; p{i} = 1.0 / (shift - d{i})" for i in numbers),
+        *(f"w11 -= b{i} * c{i} * p{i}; r1 += b{i} * p{i} * right[{i + 2}]" for i in numbers),
+        "inverse = 1.0 / (w00 * w11 - j01 * j10)",
+        "k1 = (j10 * r0 + w00 * r1) * inverse",
+        "out[0], out[1] = (w11 * r0 + j01 * r1) * inverse, k1",
+        *(f"out[{i + 2}] = (right[{i + 2}] + c{i} * k1) * p{i}" for i in numbers),
+    ]
+    scope: dict[str, Any] = {}
+    exec("def solve(core, bristles, shift, right, out):\n    " + "\n    ".join(lines), scope)
+    return scope["solve"]
+
+
+@overload(solve, jit_options=OPTIONS)
+def _solve(core, bristles, shift, right, out):
+    return _solve_for(len(bristles))
 
 
 @inlined
 def dense(x, x_next, stages, fraction):
     """State within a step, from both its ends and its stages."""
     rest = 1.0 - fraction
-    total0 = total1 = 0.0
+    total = zero(x)
     for row in range(2, -1, -1):
-        k0 = k1 = 0.0
-        for j in range(STAGES):
-            k0 += DENSE[row, j] * stages[j, 0]
-            k1 += DENSE[row, j] * stages[j, 1]
-        total0, total1 = k0 + fraction * total0, k1 + fraction * total1
-    return (
-        rest * x[0] + fraction * (x_next[0] + rest * total0),
-        rest * x[1] + fraction * (x_next[1] + rest * total1),
-    )
+        total = add_scaled(combine(zero(x), DENSE[row], stages, STAGES), fraction, total)
+    # rest x + fraction (x_next + rest total)
+    end = add_scaled(x_next, rest, total)
+    return add_scaled(add_scaled(zero(x), rest, x), fraction, end)

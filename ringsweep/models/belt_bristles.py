@@ -1,0 +1,243 @@
+"""The belt with a friction law that has bristles: the hooks of all solvers.
+
+The state is ``(x, velocity, z)`` for steps of constant length and ``(x, v, z)``, with the sliding velocity itself,
+for implicit steps; z is the deflection of the bristles.
+"""
+
+from __future__ import annotations
+
+from math import isfinite, sqrt
+from typing import NamedTuple
+
+from ringsweep import hooks
+from ringsweep.jit import inlined
+from ringsweep.models.belt import begin, conclude, observe
+from ringsweep.physics import drives
+from ringsweep.physics.belt import BristleBelt
+from ringsweep.physics.friction.dynamic import bristle, lasts, made, yields
+from ringsweep.physics.friction.static import BAND, CLEAN
+from ringsweep.regimes import BROKEN, RUNNING
+
+
+@inlined
+def _contact(scene, v, z, sign, region):
+    """Rate of the deflection, friction force (N), each with its derivatives by v and z."""
+    rate, rate_v, rate_z, traction, by_v, by_z = bristle(scene.law, scene.mu_s, scene.mu_k, v, z, sign, region)
+    load = scene.mass * scene.gravity
+    return rate, rate_v, rate_z, load * traction, load * by_v, load * by_z
+
+
+@inlined
+def _region(scene, v, z, sign):
+    """Whether the contact counts as stuck (BAND) or slips (CLEAN)."""
+    return BAND if lasts(scene.law, scene.mu_s, scene.mu_k, v, z, sign, BAND) > 0.0 else CLEAN
+
+
+@inlined
+def _recoil(scene):
+    """Speed that bristles at their greatest deflection give the body on their way back, m/s."""
+    return scene.mu_s * sqrt(scene.gravity / scene.law.sigma0)
+
+
+# ---- constant step ---------------------------------------------------------------------------
+
+
+class Inspection(NamedTuple):
+    """A state of the belt seen from within; ``eigenvalue`` is the largest magnitude of one of the contact, 1/s."""
+
+    rates: tuple[float, float, float]
+    force: float
+    eigenvalue: float
+    stuck: bool
+
+
+@hooks.launch.implements(BristleBelt)
+def _launch(scene):
+    return scene.initial_x, scene.initial_velocity, made(scene.law, scene.mu_s, scene.mu_k)
+
+
+@hooks.rates.implements(BristleBelt)
+def _rates(scene, y, drive_at, drive_rate):
+    v = y[1] - drive_rate
+    sign = 1.0 if v >= 0.0 else -1.0
+    rate, _, _, force, _, _ = _contact(scene, v, y[2], sign, _region(scene, v, y[2], sign))
+    return y[1], -(scene.stiffness * y[0] + force) / scene.mass, rate
+
+
+@hooks.inspect.implements(BristleBelt)
+def _inspect(scene, y, drive_at, drive_rate):
+    v = y[1] - drive_rate
+    sign = 1.0 if v >= 0.0 else -1.0
+    region = _region(scene, v, y[2], sign)
+    rate, rate_v, rate_z, force, by_v, by_z = _contact(scene, v, y[2], sign, region)
+    trace = rate_z - by_v / scene.mass
+    determinant = (scene.stiffness + by_z * rate_v - by_v * rate_z) / scene.mass
+    square = trace * trace - 4.0 * determinant
+    eigenvalue = 0.5 * (abs(trace) + sqrt(square)) if square > 0.0 else sqrt(determinant)
+    rates = y[1], -(scene.stiffness * y[0] + force) / scene.mass, rate
+    return Inspection(rates, force, eigenvalue, region == BAND)
+
+
+@hooks.verdict.implements(BristleBelt)
+def _verdict(scene, before, now):
+    x, velocity, z = now.rates
+    return (RUNNING if isfinite(x) and isfinite(velocity) and isfinite(z) else BROKEN), 1.0
+
+
+@hooks.stiffness.implements(BristleBelt)
+def _stiffness(scene, before, now, h):
+    return max(before.eigenvalue, now.eigenvalue) * h
+
+
+@hooks.begin.implements(BristleBelt)
+def _begin(scene, y, now):
+    return begin(y[0], y[1], now.force)
+
+
+@hooks.observe.implements(BristleBelt)
+def _observe(scene, record, y, before, now, t, h):
+    return observe(record, scene, t, h, y[0], y[1], now.force, before.stuck)
+
+
+@hooks.conclude.implements(BristleBelt)
+def _conclude(scene, record, status, t, y):
+    return conclude(record, scene, status, t, y[0], y[1], _recoil(scene))
+
+
+@hooks.describe.implements(BristleBelt)
+def _describe(scene, y, drive_at, drive_rate):
+    now = hooks.inspect(scene, y, drive_at, drive_rate)
+    return y[0], y[1], now.force, y[2], 0.0 if now.stuck else 1.0 if y[1] > drive_rate else -1.0
+
+
+# ---- implicit steps --------------------------------------------------------------------------
+
+# Guards.
+SLOW, FAST = range(2)
+
+
+class Mode(NamedTuple):
+    """Sign of the sliding velocity, and whether the contact counts as stuck (BAND) or slips (CLEAN)."""
+
+    sign: int
+    region: int
+
+
+@hooks.onward.implements(Mode)
+def _onward(mode):
+    return mode
+
+
+@hooks.rows.implements(BristleBelt)
+def _rows(scene):
+    return 0, 0
+
+
+@hooks.embark.implements(BristleBelt)
+def _embark(scene):
+    t = drives.beginning(scene.drive)
+    v = scene.initial_velocity - drives.turn(scene.drive, t)[1]
+    return t, (scene.initial_x, v, made(scene.law, scene.mu_s, scene.mu_k))
+
+
+@hooks.enter.implements(BristleBelt)
+def _enter(scene, t, y):
+    x, v, z = y
+    sign = 1 if v > 0.0 else -1
+    if v == 0.0:
+        # The way that the body is pushed; if it is not, the belt runs away under it.
+        _, _, _, force, _, _ = _contact(scene, v, z, 1.0, BAND)
+        push = -scene.stiffness * x - force - scene.mass * drives.turn(scene.drive, t)[2]
+        sign = 1 if push > 0.0 else -1
+    return RUNNING, Mode(sign, _region(scene, v, z, float(sign)))
+
+
+@hooks.switch.implements(BristleBelt)
+def _switch(scene, mode, guard, t, y):
+    x, v, z = y
+    if guard == SLOW:
+        return RUNNING, Mode(-mode.sign, BAND), (x, 0.0, z)
+    z, region = yields(scene.law, scene.mu_s, scene.mu_k, z, float(mode.sign), mode.region)
+    return RUNNING, Mode(mode.sign, region), (x, v, z)
+
+
+@hooks.to_stiff.implements(BristleBelt)
+def _to_stiff(scene, t, y):
+    return y
+
+
+@hooks.from_stiff.implements(BristleBelt)
+def _from_stiff(scene, t, x):
+    return x
+
+
+@hooks.forcing.implements(BristleBelt)
+def _forcing(scene, t):
+    return drives.turn(scene.drive, t)
+
+
+@hooks.stiff_rates.implements(BristleBelt)
+def _stiff_rates(scene, mode, force, x):
+    _, belt_velocity, belt_acceleration = force
+    rate, _, _, drag, _, _ = _contact(scene, x[1], x[2], float(mode.sign), mode.region)
+    return x[1] + belt_velocity, -(scene.stiffness * x[0] + drag) / scene.mass - belt_acceleration, rate
+
+
+@hooks.linearise.implements(BristleBelt)
+def _linearise(scene, mode, t, x):
+    _, belt_velocity, belt_acceleration = drives.turn(scene.drive, t)
+    rate, rate_v, rate_z, drag, by_v, by_z = _contact(scene, x[1], x[2], float(mode.sign), mode.region)
+    return (
+        (x[1] + belt_velocity, -(scene.stiffness * x[0] + drag) / scene.mass - belt_acceleration, rate),
+        (0.0, 1.0, -scene.stiffness / scene.mass, -by_v / scene.mass),
+        ((-by_z / scene.mass, rate_v, rate_z),),
+        (belt_acceleration, -drives.jerk(scene.drive, t), 0.0),
+    )
+
+
+@hooks.stiff_scales.implements(BristleBelt)
+def _stiff_scales(scene, tolerance, x):
+    deflection = scene.mu_s / scene.law.sigma0
+    return (
+        tolerance * (abs(x[0]) + deflection),
+        tolerance * (abs(x[1]) + _recoil(scene)),
+        tolerance * deflection,
+    )
+
+
+@hooks.stiff_view.implements(BristleBelt)
+def _stiff_view(scene, mode, t, x):
+    _, belt_velocity, _ = drives.turn(scene.drive, t)
+    sign = float(mode.sign)
+    _, _, _, force, _, _ = _contact(scene, x[1], x[2], sign, mode.region)
+    guards = sign * x[1], lasts(scene.law, scene.mu_s, scene.mu_k, x[1], x[2], sign, mode.region)
+    return guards, (x[0], x[1] + belt_velocity, -(scene.stiffness * x[0] + force) / scene.mass, force)
+
+
+@hooks.stiff_motion.implements(BristleBelt)
+def _stiff_motion(scene, t, x, line):
+    _, belt_velocity, belt_acceleration = drives.turn(scene.drive, t)
+    return x[1] + belt_velocity, line[0][1] + belt_acceleration
+
+
+@hooks.stiff_start.implements(BristleBelt)
+def _stiff_start(scene, mode, t, y):
+    _, (x, velocity, _, force) = hooks.stiff_view(scene, mode, t, y)
+    return begin(x, velocity, force)
+
+
+@hooks.stiff_watch.implements(BristleBelt)
+def _stiff_watch(scene, record, mode, view, t, duration):
+    _, (x, velocity, _, force) = view
+    return observe(record, scene, t, duration, x, velocity, force, mode.region == BAND)
+
+
+@hooks.stiff_sample.implements(BristleBelt)
+def _stiff_sample(scene, mode, t, x):
+    _, (place, velocity, _, force) = hooks.stiff_view(scene, mode, t, x)
+    return place, velocity, force, x[2], 0.0 if mode.region == BAND else float(mode.sign)
+
+
+@hooks.finish.implements(BristleBelt)
+def _finish(scene, record, status, t, y):
+    return conclude(record, scene, status, t, y[0], y[1] + drives.turn(scene.drive, t)[1], _recoil(scene))

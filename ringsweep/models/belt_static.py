@@ -1,0 +1,409 @@
+"""The belt with friction that depends on the sliding velocity alone: the hooks of all solvers.
+
+The state is ``(x, velocity)`` for steps of constant length and ``(x, v)``, with the sliding
+velocity itself, for the piecewise-smooth system.
+"""
+
+from __future__ import annotations
+
+from math import inf, isfinite
+from typing import NamedTuple
+
+from ringsweep import hooks
+from ringsweep.jit import inlined
+from ringsweep.models.belt import begin, conclude, observe
+from ringsweep.physics import belt, drives
+from ringsweep.physics.friction.static import (
+    BAND,
+    CLEAN,
+    constant_weights,
+    expand_weights,
+    faster,
+    region_at,
+    region_bounds,
+    slower,
+    stiction_band,
+    weights,
+)
+from ringsweep.regimes import BROKEN, RUNNING
+from ringsweep.series import INVERSE, ORDER, ascending, crossings, reach, value, variation
+
+# ---- constant step ---------------------------------------------------------------------------
+
+
+class Inspection(NamedTuple):
+    """A state of the belt seen from within."""
+
+    rates: tuple[float, float]
+    v: float
+    force: float
+    slope: float
+
+
+@inlined
+def _holds(law):
+    """Whether a contact in the band of the law is held by whatever force it takes, as at rest or in a dead band."""
+    return constant_weights(law, BAND)
+
+
+@inlined
+def _bound(scene):
+    """Force up to which a stuck contact holds, N."""
+    return scene.mu_s * scene.mass * scene.gravity
+
+
+@inlined
+def _force(scene, x, v):
+    """Friction force, N, and its derivative by the sliding velocity, N s/m."""
+    if _holds(scene.law) and abs(v) < stiction_band(scene.law):
+        return max(-_bound(scene), min(_bound(scene), -scene.stiffness * x)), 0.0
+    w_s, w_k, dw_s, dw_k = weights(scene.law, abs(v))
+    load = scene.mass * scene.gravity
+    sign = 1.0 if v > 0.0 else -1.0 if v < 0.0 else 0.0
+    return (
+        sign * load * (w_s * scene.mu_s + w_k * scene.mu_k) + scene.viscous * v,
+        load * (dw_s * scene.mu_s + dw_k * scene.mu_k) + scene.viscous,
+    )
+
+
+@hooks.launch.implements(belt.Belt)
+def _launch(scene):
+    return scene.initial_x, scene.initial_velocity
+
+
+@hooks.rates.implements(belt.Belt)
+def _rates(scene, y, drive_at, drive_rate):
+    force, _ = _force(scene, y[0], y[1] - drive_rate)
+    return y[1], -(scene.stiffness * y[0] + force) / scene.mass
+
+
+@hooks.inspect.implements(belt.Belt)
+def _inspect(scene, y, drive_at, drive_rate):
+    v = y[1] - drive_rate
+    force, slope = _force(scene, y[0], v)
+    return Inspection((y[1], -(scene.stiffness * y[0] + force) / scene.mass), v, force, slope)
+
+
+@hooks.verdict.implements(belt.Belt)
+def _verdict(scene, before, now):
+    return (RUNNING if isfinite(now.rates[1]) and isfinite(now.rates[0]) else BROKEN), 1.0
+
+
+@hooks.stiffness.implements(belt.Belt)
+def _stiffness(scene, before, now, h):
+    crossed = before.v * now.v < 0.0
+    slow, fast = min(abs(before.v), abs(now.v)), max(abs(before.v), abs(now.v))
+    band = stiction_band(scene.law)
+    if _holds(scene.law):
+        # A discontinuous law has no slope that any step could follow; but one may land in a dead band.
+        return inf if crossed and slow >= band else abs(now.slope) / scene.mass * h
+    met = abs(now.slope)
+    # A step that jumps the band, or its edge, never samples the slope there, but has met it.
+    if crossed:
+        met = max(met, abs(_force(scene, 0.0, 0.0)[1]))
+    if crossed or slow < band <= fast:
+        met = max(met, abs(_force(scene, 0.0, band)[1]))
+    return met / scene.mass * h
+
+
+@hooks.begin.implements(belt.Belt)
+def _begin(scene, y, now):
+    return begin(y[0], y[1], now.force)
+
+
+@hooks.observe.implements(belt.Belt)
+def _observe(scene, record, y, before, now, t, h):
+    stuck = abs(before.v) < stiction_band(scene.law) or before.v * now.v < 0.0
+    return observe(record, scene, t, h, y[0], y[1], now.force, stuck)
+
+
+@hooks.conclude.implements(belt.Belt)
+def _conclude(scene, record, status, t, y):
+    return conclude(record, scene, status, t, y[0], y[1], stiction_band(scene.law))
+
+
+@hooks.describe.implements(belt.Belt)
+def _describe(scene, y, drive_at, drive_rate):
+    v = y[1] - drive_rate
+    mode = 0.0 if abs(v) < stiction_band(scene.law) or v == 0.0 else 1.0 if v > 0.0 else -1.0
+    return y[0], y[1], _force(scene, y[0], v)[0], 0.0, mode
+
+
+# ---- piecewise-smooth system -----------------------------------------------------------------
+
+# Rows of the series; the guards last.
+X, V, VELOCITY, EXCESS, BASIS, STATIC, KINETIC, FORCE, SHIFT = range(9)
+SLOW, FAST = range(9, 11)
+
+
+class Mode(NamedTuple):
+    """Sign of the sliding velocity (0: held), region of the law, guard that is zero on entry or -1.
+
+    In a dead band that does not hold any more, the sign is that of the pull.
+    """
+
+    sign: int
+    region: int
+    fresh: int
+
+
+@hooks.onward.implements(Mode)
+def _onward(mode):
+    return Mode(mode.sign, mode.region, -1)
+
+
+@hooks.embark.implements(belt.Belt)
+def _embark(scene):
+    t = drives.beginning(scene.drive)
+    return t, (scene.initial_x, scene.initial_velocity - drives.turn(scene.drive, t)[1])
+
+
+@hooks.rows.implements(belt.Belt)
+def _rows(scene):
+    return FAST + 1, SLOW
+
+
+@inlined
+def _pull(scene, t, x):
+    """Force that friction must overcome to hold the body to the belt, N; positive forwards."""
+    return -scene.stiffness * x - scene.mass * drives.turn(scene.drive, t)[2]
+
+
+@hooks.enter.implements(belt.Belt)
+def _enter(scene, t, y):
+    x, v = y
+    if _holds(scene.law) and abs(v) <= stiction_band(scene.law):
+        return RUNNING, _settle(scene, t, x)
+    if v == 0.0:
+        return RUNNING, Mode(1 if _pull(scene, t, x) >= 0.0 else -1, BAND, SLOW)
+    return RUNNING, Mode(1 if v > 0.0 else -1, region_at(scene.law, abs(v)), -1)
+
+
+@inlined
+def _settle(scene, t, x):
+    """Mode of a set-valued law where the sliding velocity is zero, or within its dead band."""
+    pull = _pull(scene, t, x)
+    bound = _bound(scene)
+    if abs(pull) <= bound and bound > 0.0:
+        return Mode(0, CLEAN, -1)
+    return Mode(1 if pull >= 0.0 else -1, region_at(scene.law, 0.0), SLOW)
+
+
+@hooks.switch.implements(belt.Belt)
+def _switch(scene, mode, guard, t, y):
+    x, _ = y
+    sign, region = mode.sign, mode.region
+    if sign == 0:
+        return RUNNING, Mode(1 if guard == SLOW else -1, region_at(scene.law, 0.0), SLOW), y
+    low, high = region_bounds(scene.law, region)
+    if guard == FAST:
+        return RUNNING, Mode(sign, faster(scene.law, region), SLOW), (x, sign * high)
+    if low > 0.0:
+        entered = slower(scene.law, region)
+        if _holds(scene.law) and entered == BAND:
+            return RUNNING, _settle(scene, t, x), (x, sign * low)
+        return RUNNING, Mode(sign, entered, FAST), (x, sign * low)
+    if _holds(scene.law) and region == BAND:
+        # The pull has fallen to what the contact holds.
+        return RUNNING, Mode(0, CLEAN, SLOW if sign > 0 else FAST), y
+    if region == BAND:
+        return RUNNING, Mode(-sign, BAND, SLOW), (x, 0.0)
+    return RUNNING, _settle(scene, t, x), (x, 0.0)
+
+
+@hooks.expand.implements(belt.Belt)
+def _expand(scene, mode, t, y, tolerance, c):
+    drives.expand(scene.drive, t, ORDER + 2, c[SHIFT])
+    load = scene.mass * scene.gravity
+    rate = scene.stiffness / scene.mass
+    c[X, 0], c[V, 0] = y
+    c[VELOCITY, 0] = y[1] + c[SHIFT, 1]
+    if mode.sign == 0:
+        bound = _bound(scene)
+        for k in range(ORDER + 1):
+            # The sliding velocity that the body had in a dead band stays, or is zero.
+            slide = y[1] if k == 0 else 0.0
+            c[V, k] = slide
+            c[VELOCITY, k] = (k + 1.0) * c[SHIFT, k + 1] + slide
+            if k > 0:
+                c[X, k] = c[SHIFT, k] + (y[1] if k == 1 else 0.0)
+            c[FORCE, k] = -scene.stiffness * c[X, k] - scene.mass * (k + 1.0) * (k + 2.0) * c[SHIFT, k + 2]
+            c[SLOW, k], c[FAST, k] = -c[FORCE, k], c[FORCE, k]
+        c[SLOW, 0] = 0.0 if mode.fresh == SLOW else c[SLOW, 0] + bound
+        c[FAST, 0] = 0.0 if mode.fresh == FAST else c[FAST, 0] + bound
+    else:
+        low, high = region_bounds(scene.law, mode.region)
+        yielding = _holds(scene.law) and mode.region == BAND
+        viscous = 0.0 if yielding else scene.viscous
+        for k in range(ORDER + 1):
+            c[EXCESS, k] = mode.sign * c[V, k] - (low if k == 0 else 0.0)
+            expand_weights(scene.law, mode.region, c[EXCESS], k, c[BASIS], c[STATIC], c[KINETIC])
+            c[FORCE, k] = mode.sign * load * (c[STATIC, k] * scene.mu_s + c[KINETIC, k] * scene.mu_k)
+            c[FORCE, k] += viscous * c[V, k]
+            if k < ORDER:
+                c[X, k + 1] = c[VELOCITY, k] * INVERSE[k + 1]
+                c[VELOCITY, k + 1] = -(rate * c[X, k] + c[FORCE, k] / scene.mass) * INVERSE[k + 1]
+                c[V, k + 1] = c[VELOCITY, k + 1] - (k + 2.0) * c[SHIFT, k + 2]
+        for k in range(1, ORDER + 1):
+            c[SLOW, k], c[FAST, k] = c[EXCESS, k], -c[EXCESS, k]
+        if yielding:
+            for k in range(ORDER + 1):
+                # A belt under a dead band has constant velocity.
+                c[SLOW, k] = -mode.sign * scene.stiffness * c[X, k]
+            c[EXCESS, 0] = c[SLOW, 0] - _bound(scene)
+        c[SLOW, 0] = 0.0 if mode.fresh == SLOW else c[EXCESS, 0]
+        c[FAST, 0] = 0.0 if mode.fresh == FAST else high - mode.sign * c[V, 0]
+        # Breakaway of a law without a drop of friction is tangential: what is left of the slope is rounding.
+        terms = rate * abs(c[X, 0]) + abs(c[FORCE, 0]) / scene.mass
+        if mode.fresh == SLOW and low == 0.0 and not yielding and abs(c[V, 1]) <= 1e-12 * terms:
+            c[SLOW, 1] = 0.0
+    # Lengths are measured by the way that the belt, the body or the load could go in the spring's own time.
+    length = abs(c[X, 0]) + _length(scene, abs(c[VELOCITY, 0]) + abs(c[SHIFT, 1]))
+    speed = length * (rate**0.5 if rate > 0.0 else 1.0)
+    if mode.region == BAND and not _holds(scene.law):
+        # Noise that is large for the band would keep the creep from ever settling.
+        speed = min(speed, 1e3 * stiction_band(scene.law))
+    last = max(abs(c[X, ORDER]) / length, abs(c[V, ORDER]) / speed)
+    previous = max(abs(c[X, ORDER - 1]) / length, abs(c[V, ORDER - 1]) / speed)
+    return reach(last / tolerance, previous / tolerance)
+
+
+@inlined
+def _length(scene, velocity):
+    """A length to measure errors by, m."""
+    push = scene.mu_s * scene.gravity * scene.mass
+    if scene.stiffness > 0.0:
+        return velocity * (scene.mass / scene.stiffness) ** 0.5 + push / scene.stiffness + 1e-300
+    return velocity + push / scene.mass + 1e-300
+
+
+@hooks.start.implements(belt.Belt)
+def _start(scene, c):
+    return begin(c[X, 0], c[VELOCITY, 0], c[FORCE, 0])
+
+
+@hooks.land.implements(belt.Belt)
+def _land(scene, mode, c, t, s):
+    return value(c[X], s), value(c[V], s)
+
+
+@hooks.watch.implements(belt.Belt)
+def _watch(scene, record, mode, c, t, s, work):
+    count = 0
+    if abs(c[VELOCITY, 0]) <= variation(c[VELOCITY], s):
+        count = crossings(c[VELOCITY], s, work, count)
+    if mode.sign != 0:
+        # Extremes of the velocity are zeros of the net force.
+        for k in range(ORDER + 1):
+            c[SHIFT, k] = scene.stiffness * c[X, k] + c[FORCE, k]
+        count = crossings(c[SHIFT], s, work, count)
+    ascending(work[0], count)
+    before = 0.0
+    stuck = mode.sign == 0 or mode.region == BAND
+    for j in range(count + 1):
+        now = work[0, j] if j < count else s
+        velocity = value(c[VELOCITY], now)
+        if abs(velocity) <= 1e-15 * (abs(c[VELOCITY, 0]) + variation(c[VELOCITY], s)):
+            # A maximum is met where the velocity vanishes, not where its rounding changes sign.
+            velocity = 0.0
+        record = observe(record, scene, t + now, now - before, value(c[X], now), velocity, value(c[FORCE], now), stuck)
+        before = now
+    return record
+
+
+@hooks.sample.implements(belt.Belt)
+def _sample(scene, mode, c, t, s):
+    mode_now = 0.0 if mode.region == BAND else float(mode.sign)
+    return value(c[X], s), value(c[VELOCITY], s), value(c[FORCE], s), 0.0, mode_now
+
+
+@hooks.finish.implements(belt.Belt)
+def _finish(scene, record, status, t, y):
+    return conclude(record, scene, status, t, y[0], y[1] + drives.turn(scene.drive, t)[1], stiction_band(scene.law))
+
+
+# ---- creep in the stiction band --------------------------------------------------------------
+
+
+@hooks.creeps.implements(belt.Belt)
+def _creeps(scene, mode):
+    return mode.region == BAND
+
+
+@hooks.is_stiff.implements(belt.Belt)
+def _is_stiff(scene, mode, y, line):
+    (_, push), (_, _, _, decay), _, _ = line
+    own = (scene.stiffness / scene.mass) ** 0.5
+    return -decay > 50.0 * own and abs(push) < 0.01 * -decay * stiction_band(scene.law)
+
+
+# The displacement relative to the belt, so that nothing large cancels in a creep.
+@hooks.to_stiff.implements(belt.Belt)
+def _to_stiff(scene, t, y):
+    return y[0] - drives.turn(scene.drive, t)[0], y[1]
+
+
+@hooks.from_stiff.implements(belt.Belt)
+def _from_stiff(scene, t, x):
+    return x[0] + drives.turn(scene.drive, t)[0], x[1]
+
+
+@hooks.stiff_scales.implements(belt.Belt)
+def _stiff_scales(scene, tolerance, x):
+    length = _length(scene, abs(drives.turn(scene.drive, scene.span)[1]))
+    return tolerance * length, tolerance * stiction_band(scene.law)
+
+
+@hooks.forcing.implements(belt.Belt)
+def _forcing(scene, t):
+    return drives.turn(scene.drive, t)
+
+
+@hooks.stiff_rates.implements(belt.Belt)
+def _stiff_rates(scene, mode, force, x):
+    shift, _, belt_acceleration = force
+    drag, _ = _force(scene, x[0] + shift, x[1])
+    return x[1], -(scene.stiffness * (x[0] + shift) + drag) / scene.mass - belt_acceleration
+
+
+@hooks.linearise.implements(belt.Belt)
+def _linearise(scene, mode, t, x):
+    shift, belt_velocity, belt_acceleration = drives.turn(scene.drive, t)
+    drag, slope = _force(scene, x[0] + shift, x[1])
+    rate = scene.stiffness / scene.mass
+    push = -rate * (x[0] + shift) - drag / scene.mass - belt_acceleration
+    return (
+        (x[1], push),
+        (0.0, 1.0, -rate, -slope / scene.mass),
+        (),
+        (0.0, -rate * belt_velocity - drives.jerk(scene.drive, t)),
+    )
+
+
+@hooks.stiff_view.implements(belt.Belt)
+def _stiff_view(scene, mode, t, x):
+    shift, belt_velocity, _ = drives.turn(scene.drive, t)
+    place = x[0] + shift
+    force, _ = _force(scene, place, x[1])
+    acceleration = -(scene.stiffness * place + force) / scene.mass
+    speed = mode.sign * x[1]
+    # In the order of the rows of the series: SLOW, FAST.
+    return (speed, stiction_band(scene.law) - speed), (place, x[1] + belt_velocity, acceleration, force)
+
+
+@hooks.stiff_motion.implements(belt.Belt)
+def _stiff_motion(scene, t, x, line):
+    _, belt_velocity, belt_acceleration = drives.turn(scene.drive, t)
+    return x[1] + belt_velocity, line[0][1] + belt_acceleration
+
+
+@hooks.stiff_watch.implements(belt.Belt)
+def _stiff_watch(scene, record, mode, view, t, duration):
+    _, (x, velocity, _, force) = view
+    return observe(record, scene, t, duration, x, velocity, force, True)
+
+
+@hooks.stiff_sample.implements(belt.Belt)
+def _stiff_sample(scene, mode, t, x):
+    _, (position, velocity, _, force) = hooks.stiff_view(scene, mode, t, x)
+    return position, velocity, force, 0.0, 0.0

@@ -1,0 +1,35 @@
+"""Friction laws, one file to a family: to add a law is to add a class, its formula and its name to one of them.
+
+Every law gives a coefficient of friction, the force per unit of the normal load whatever that is, so that one
+law serves the belt under its weight and the ring under reactions that vary.
+"""
+
+from typing import Any
+
+from ringsweep.parameters import Parameter
+from ringsweep.physics.friction import dynamic, set_valued, smooth
+from ringsweep.physics.friction.static import MU_K, MU_S
+
+#: Laws whose friction at rest is whatever holds the contact, up to a bound.
+SET_VALUED: tuple[type, ...] = tuple(set_valued.LAWS.values())
+
+#: Laws whose friction is a continuous function of the sliding velocity.
+SMOOTH: tuple[type, ...] = tuple(smooth.LAWS.values())
+
+#: Laws with a memory: their friction depends on the deflection of bristles.
+DYNAMIC: tuple[type, ...] = tuple(dynamic.LAWS.values())
+
+#: Laws by the name that the configuration gives them.
+LAWS: dict[str, type] = set_valued.LAWS | smooth.LAWS | dynamic.LAWS
+
+#: Laws that know no static friction.
+WITHOUT_STATIC: set[type] = {*set_valued.WITHOUT_STATIC, *smooth.WITHOUT_STATIC, *dynamic.WITHOUT_STATIC}
+
+#: Parameters of a law of which the first must be less than the second.
+ASCENDING: dict[Any, tuple[str, str]] = smooth.ASCENDING
+
+
+def coefficients_of(law: type) -> dict[str, Parameter]:
+    """Coefficients that a law needs of each surface."""
+    mu_k = dynamic.MU_K if law in DYNAMIC else MU_K
+    return {"mu_k": mu_k} if law in WITHOUT_STATIC else {"mu_s": MU_S, "mu_k": mu_k}

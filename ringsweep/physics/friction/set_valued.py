@@ -1,0 +1,107 @@
+"""Laws whose friction at rest is whatever holds the contact, up to a bound: a formula each, :func:`piece`."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+
+from ringsweep.jit import inlined
+from ringsweep.parameters import Leaf, Parameter
+from ringsweep.physics.friction.static import BAND, CLEAN, ONE, TAIL, ZERO, Piece, piece
+
+ALPHA = Parameter("s/m", "decay of friction with sliding speed", lower=0.0)
+
+
+@inlined
+def absent():
+    """A region that a law lacks."""
+    return Piece(0.0, 0.0, 0.0, ONE, ZERO)
+
+
+@inlined
+def tail(region, low, high, alpha):
+    """Weights that pass from static to kinetic friction as ``exp(-alpha (speed - low))``, and beyond."""
+    if region == CLEAN:
+        return Piece(high, inf, 0.0, ZERO, ONE)
+    if alpha == 0.0:
+        return Piece(low, high, 0.0, ONE, ZERO)
+    return Piece(low, high, alpha, (0.0, 0.0, 1.0, 0.0), (1.0, 0.0, -1.0, 0.0))
+
+
+def end_of_tail(alpha: Any, low: Any) -> Any:
+    """Speed beyond which an exponential tail changes the sliding velocity by less than 1e-17 m/s, m/s."""
+    with np.errstate(divide="ignore"):
+        length = np.clip(39.1 - np.log(alpha), 10.0, 40.0) / alpha
+    return np.where(np.asarray(alpha) > 0.0, low + length, inf)
+
+
+class Coulomb(NamedTuple):
+    """Amontons-Coulomb friction: :math:`\\mu_k` against the motion (the paper's Eqs. 25-26)."""
+
+
+@piece.implements(Coulomb)
+def _coulomb(law, region):
+    return Piece(0.0, inf, 0.0, ZERO, ONE) if region == CLEAN else absent()
+
+
+class Stiction(NamedTuple):
+    """Coulomb friction with stiction: up to :math:`\\mu_s` at rest, :math:`\\mu_k` in motion."""
+
+
+@piece.implements(Stiction)
+def _stiction(law, region):
+    return Piece(0.0, inf, 0.0, ZERO, ONE) if region == CLEAN else absent()
+
+
+class Tustin(NamedTuple):
+    """Stiction that decays with speed: the tail of Bengisu and Akay in the limit of a vanishing band.
+
+    Up to :math:`\\mu_s` at rest and, in motion,
+    :math:`\\mu = \\mu_k + (\\mu_s - \\mu_k) e^{-\\alpha |v|}` (Tustin 1947).
+    """
+
+    alpha: Annotated[Leaf, ALPHA]
+    end: Any = inf
+
+    @classmethod
+    def of(cls, alpha: Any) -> Tustin:
+        """The law with the end of its tail worked out."""
+        return cls(alpha, end_of_tail(alpha, 0.0))
+
+
+@piece.implements(Tustin)
+def _tustin(law, region):
+    return tail(region, 0.0, law.end, law.alpha) if region != BAND else absent()
+
+
+class Karnopp(NamedTuple):
+    """Stiction with a dead band: slower than D_v a contact counts as stuck (the paper's Fig. 4).
+
+    .. math::
+
+        F = \\operatorname{sgn}(F_e)\\, \\min(|F_e|, \\mu_s F_N) \\quad (|v| \\le D_v), \\qquad
+        F = \\mu_k F_N \\operatorname{sgn} v \\quad (|v| > D_v)
+
+    with :math:`F_e` the force that friction must balance (Karnopp, J. Dyn. Syst. Meas. Control 107, 1985). Where it
+    does balance it the contact keeps the speed, at most D_v, at which it entered the band.
+    """
+
+    dead_band: Annotated[Leaf, Parameter("m/s", "half-width of the dead band D_v", lower=0.0, open_lower=True)]
+
+
+@piece.implements(Karnopp)
+def _karnopp(law, region):
+    if region == TAIL:
+        return absent()
+    if region == CLEAN:
+        return Piece(law.dead_band, inf, 0.0, ZERO, ONE)
+    return Piece(0.0, law.dead_band, 0.0, ONE, ZERO)
+
+
+#: Laws that know no static friction.
+WITHOUT_STATIC = {Coulomb}
+
+#: Laws by the name that the configuration gives them.
+LAWS: dict[str, type] = {"coulomb": Coulomb, "stiction": Stiction, "tustin": Tustin, "karnopp": Karnopp}

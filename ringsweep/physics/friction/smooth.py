@@ -1,0 +1,126 @@
+"""Laws whose friction is a continuous function of the sliding velocity: a formula each, :func:`piece`."""
+
+from __future__ import annotations
+
+from math import exp, inf
+from typing import Annotated, Any, NamedTuple
+
+from ringsweep.parameters import Leaf, Parameter
+from ringsweep.physics.friction.set_valued import ALPHA, absent, end_of_tail, tail
+from ringsweep.physics.friction.static import BAND, CLEAN, ONE, TAIL, ZERO, Piece, piece
+
+V0 = Parameter("m/s", "half-width of the stiction band", lower=0.0, open_lower=True)
+V1 = Parameter("m/s", "sliding speed from which friction is kinetic", lower=0.0, open_lower=True)
+
+
+class Threlfall(NamedTuple):
+    """Coulomb friction rounded off by an exponential (Threlfall, Mech. Mach. Theory 13, 1978).
+
+    .. math::
+
+        \\mu = \\mu_k\\, \\frac{1 - e^{-3|v|/v_0}}{1 - e^{-3}} \\quad (|v| < v_0), \\qquad
+        \\mu = \\mu_k \\quad (|v| \\ge v_0)
+
+    The denominator, often rounded to 0.95, makes it continuous.
+    """
+
+    v0: Annotated[Leaf, V0]
+
+
+@piece.implements(Threlfall)
+def _threlfall(law, region):
+    if region == TAIL:
+        return absent()
+    if region == CLEAN:
+        return Piece(law.v0, inf, 0.0, ZERO, ONE)
+    full = 1.0 / (1.0 - exp(-3.0))
+    return Piece(0.0, law.v0, 3.0 / law.v0, ZERO, (full, 0.0, -full, 0.0))
+
+
+class PiecewiseLinear(NamedTuple):
+    """Stiction regularised by straight lines (the paper's Fig. 5).
+
+    From 0 to :math:`\\mu_s` at v0, down to :math:`\\mu_k` at v1, constant beyond.
+    """
+
+    v0: Annotated[Leaf, V0]
+    v1: Annotated[Leaf, V1]
+
+
+@piece.implements(PiecewiseLinear)
+def _piecewise_linear(law, region):
+    if region == CLEAN:
+        return Piece(law.v1, inf, 0.0, ZERO, ONE)
+    if region == BAND:
+        return Piece(0.0, law.v0, 0.0, (0.0, 1.0 / law.v0, 0.0, 0.0), ZERO)
+    rate = 1.0 / (law.v1 - law.v0)
+    return Piece(law.v0, law.v1, 0.0, (1.0, -rate, 0.0, 0.0), (0.0, rate, 0.0, 0.0))
+
+
+class PiecewiseCubic(NamedTuple):
+    """Stiction regularised by cubics whose slopes meet (the paper's Fig. 6; STEP functions of multibody codes).
+
+    .. math::
+
+        \\mu = \\tfrac12 \\mu_s (3\\eta - \\eta^3),\\ \\eta = \\tfrac{|v|}{v_0} \\ (|v| < v_0), \\qquad
+        \\mu = \\mu_s + (\\mu_k - \\mu_s)(3\\xi^2 - 2\\xi^3),\\ \\xi = \\tfrac{|v| - v_0}{v_1 - v_0} \\ (|v| < v_1)
+
+    and :math:`\\mu_k` beyond.
+    """
+
+    v0: Annotated[Leaf, V0]
+    v1: Annotated[Leaf, V1]
+
+
+@piece.implements(PiecewiseCubic)
+def _piecewise_cubic(law, region):
+    if region == CLEAN:
+        return Piece(law.v1, inf, 0.0, ZERO, ONE)
+    if region == BAND:
+        rate = 1.0 / law.v0
+        return Piece(0.0, law.v0, 0.0, (0.0, 1.5 * rate, 0.0, -0.5 * rate * rate * rate), ZERO)
+    rate = 1.0 / (law.v1 - law.v0)
+    square, cube = 3.0 * rate * rate, 2.0 * rate * rate * rate
+    return Piece(law.v0, law.v1, 0.0, (1.0, 0.0, -square, cube), (0.0, 0.0, square, -cube))
+
+
+class BengisuAkay(NamedTuple):
+    """Bengisu-Akay friction: a parabola up to v0, an exponential tail beyond (the paper's Eqs. 23-24).
+
+    .. math::
+
+        \\mu = \\mu_s [1 - (1 - |v|/v_0)^2] \\quad (|v| < v_0), \\qquad
+        \\mu = \\mu_k [1 + (\\mu_s/\\mu_k - 1) e^{-\\alpha(|v| - v_0)}] \\quad (|v| \\ge v_0)
+    """
+
+    alpha: Annotated[Leaf, ALPHA]
+    v0: Annotated[Leaf, V0]
+    end: Any = inf
+
+    @classmethod
+    def of(cls, alpha: Any, v0: Any) -> BengisuAkay:
+        """The law with the end of its tail worked out."""
+        return cls(alpha, v0, end_of_tail(alpha, v0))
+
+
+@piece.implements(BengisuAkay)
+def _bengisu_akay(law, region):
+    if region != BAND:
+        return tail(region, law.v0, law.end, law.alpha)
+    rate = 1.0 / law.v0
+    return Piece(0.0, law.v0, 0.0, (0.0, 2.0 * rate, -rate * rate, 0.0), ZERO)
+
+
+#: Laws that know no static friction.
+WITHOUT_STATIC = {Threlfall}
+
+#: Parameters of which the first must be less than the second.
+ASCENDING: dict[Any, tuple[str, str]] = {PiecewiseLinear: ("v0", "v1"), PiecewiseCubic: ("v0", "v1")}
+
+#: Laws by the name that the configuration gives them.
+LAWS: dict[str, type] = {
+    "threlfall": Threlfall,
+    "piecewise-linear": PiecewiseLinear,
+    "piecewise-cubic": PiecewiseCubic,
+    "bengisu-akay": BengisuAkay,
+}

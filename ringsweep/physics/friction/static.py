@@ -1,0 +1,169 @@
+"""Friction as a function of the sliding velocity alone: what every such law offers, from one formula.
+
+A law gives the magnitude of the friction coefficient as a blend of the static and the kinetic
+coefficient of the surface under the contact,
+
+.. math:: \\mu(|v|) = w_s(|v|)\\, \\mu_s + w_k(|v|)\\, \\mu_k ,
+
+so that one evaluation of the weights serves every contact, whatever surface it stands on. The weights
+are analytic within each of at most three regions of the sliding speed; :func:`piece` gives them there,
+and values, slopes, power series and regions all follow from it.
+"""
+
+from __future__ import annotations
+
+from math import exp
+from typing import NamedTuple
+
+from ringsweep.jit import hook, inlined
+from ringsweep.parameters import Parameter
+
+MU_S = Parameter("1", "static friction coefficient", lower=0.0)
+MU_K = Parameter("1", "kinetic friction coefficient", lower=0.0)
+
+#: Regions of the sliding speed, from the fastest to the slowest. In the last a contact counts as stuck.
+CLEAN, TAIL, BAND = 0, 1, 2
+
+
+class Piece(NamedTuple):
+    """Weights between the sliding speeds ``low`` and ``high``, m/s; where both are zero the law lacks the region.
+
+    With ``x = speed - low`` and ``q = exp(-decay x)``, or ``q = x**2`` where ``decay`` is zero, a weight with the
+    coefficients ``(a0, a1, a2, a3)`` is ``a0 + a1 x + a2 q + a3 x q``.
+    """
+
+    low: float
+    high: float
+    decay: float
+    static: tuple[float, float, float, float]
+    kinetic: tuple[float, float, float, float]
+
+
+#: Coefficients of weights that are constant.
+ZERO = (0.0, 0.0, 0.0, 0.0)
+ONE = (1.0, 0.0, 0.0, 0.0)
+
+
+@hook
+def piece(law, region):
+    """Weights of both coefficients in a region of the sliding speed, a :class:`Piece`."""
+
+
+@inlined
+def stiction_band(law):
+    """Speed below which a contact counts as stuck, m/s; 0 for laws that stick exactly or never."""
+    return piece(law, BAND).high
+
+
+@inlined
+def region_bounds(law, region):
+    """Speeds between which a region lies, m/s."""
+    p = piece(law, region)
+    return p.low, p.high
+
+
+@inlined
+def region_at(law, speed):
+    """Region that holds a sliding speed, m/s; a boundary belongs to the region above it."""
+    if speed >= piece(law, CLEAN).low:
+        return CLEAN
+    tail = piece(law, TAIL)
+    return TAIL if tail.low < tail.high and speed >= tail.low else BAND
+
+
+@inlined
+def faster(law, region):
+    """Region beyond the upper bound of one."""
+    return TAIL if region == BAND and piece(law, TAIL).low < piece(law, TAIL).high else CLEAN
+
+
+@inlined
+def slower(law, region):
+    """Region below the lower bound of one."""
+    return TAIL if region == CLEAN and piece(law, TAIL).low < piece(law, TAIL).high else BAND
+
+
+@inlined
+def constant_weights(law, region):
+    """Whether the friction coefficients are constant in a region."""
+    p = piece(law, region)
+    (_, s1, s2, s3), (_, k1, k2, k3) = p.static, p.kinetic
+    return s1 == 0.0 and s2 == 0.0 and s3 == 0.0 and k1 == 0.0 and k2 == 0.0 and k3 == 0.0
+
+
+@inlined
+def weights(law, speed):
+    """Weights of the static and the kinetic coefficient, and their slopes.
+
+    Parameters
+    ----------
+    law : NamedTuple
+        A law of this kind.
+    speed : float
+        Magnitude of the sliding velocity, m/s.
+
+    Returns
+    -------
+    tuple of float
+        ``(w_s, w_k, dw_s/dspeed, dw_k/dspeed)``; weights in 1, slopes in s/m.
+    """
+    region = region_at(law, speed)
+    p = piece(law, region)
+    if constant_weights(law, region):
+        return p.static[0], p.kinetic[0], 0.0, 0.0
+    x = speed - p.low
+    if p.decay > 0.0:
+        # exp(-40) is below the rounding of the sum: spare the call.
+        q = exp(-p.decay * x) if p.decay * x < 40.0 else 0.0
+        q_x = -p.decay * q
+    else:
+        q, q_x = x * x, 2.0 * x
+    (s0, s1, s2, s3), (k0, k1, k2, k3) = p.static, p.kinetic
+    return (
+        s0 + s1 * x + (s2 + s3 * x) * q,
+        k0 + k1 * x + (k2 + k3 * x) * q,
+        s1 + s3 * q + (s2 + s3 * x) * q_x,
+        k1 + k3 * q + (k2 + k3 * x) * q_x,
+    )
+
+
+@inlined
+def expand_weights(law, region, x, k, basis, static, kinetic):
+    """Coefficient `k` of the series of both weights, given those of the speed up to `k`.
+
+    Parameters
+    ----------
+    law : NamedTuple
+    region : int
+    x : ndarray
+        Series of the speed in excess of the lower bound of the region, m/s.
+    k : int
+    basis, static, kinetic : ndarray
+        Series of what :class:`Piece` calls q, and of the weights; coefficient `k` is filled.
+    """
+    p = piece(law, region)
+    (s0, s1, s2, s3), (k0, k1, k2, k3) = p.static, p.kinetic
+    if k == 0:
+        basis[0] = exp(-p.decay * max(x[0], 0.0)) if p.decay > 0.0 else x[0] * x[0]
+    else:
+        total = 0.0
+        if p.decay > 0.0:
+            # q' = -decay x' q
+            for j in range(1, k + 1):
+                total += j * x[j] * basis[k - j]
+            total *= -p.decay / k
+        else:
+            for j in range(k + 1):
+                total += x[j] * x[k - j]
+        basis[k] = total
+    static[k] = s1 * x[k] + s2 * basis[k]
+    kinetic[k] = k1 * x[k] + k2 * basis[k]
+    if s3 != 0.0 or k3 != 0.0:
+        cube = 0.0
+        for j in range(k + 1):
+            cube += x[j] * basis[k - j]
+        static[k] += s3 * cube
+        kinetic[k] += k3 * cube
+    if k == 0:
+        static[0] += s0
+        kinetic[0] += k0
