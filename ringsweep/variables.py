@@ -89,5 +89,7 @@ HISTORY: dict[str, Variable] = {
     "velocity": Variable("velocity of the body", "m s-1"),
     "friction_force": Variable("friction force", "N"),
     "deflection": Variable("deflection of the bristles", "m"),
+    "deflection_1": Variable("deflection of the bristles at contact 1", "m"),
+    "deflection_2": Variable("deflection of the bristles at contact 2", "m"),
     "mode": Variable("friction mode", dtype="int8", flags=MODES),
 }

@@ -28,16 +28,17 @@ class SingleContactRing:
     laws: ClassVar[dict[str, type]] = {
         name: law for name, law in friction.LAWS.items() if name not in ("karnopp", "reset-integrator", "bristle")
     }
-    absent: ClassVar[frozenset[str]] = frozenset({"normal_min_2", "normal_2", "zone_2"})
+    absent: ClassVar[frozenset[str]] = frozenset({"normal_min_2", "normal_2", "zone_2", "deflection_2"})
     body: ClassVar[dict[str, Parameter]] = {"body.mass": MASS, "ring.radius": RADIUS}
 
     def history(self, structure: Structure) -> tuple[str, ...]:
         """Quantities of a time history, in the order of their columns."""
-        return "phi", "omega", "epsilon", "normal_1", "normal_2", "ring_omega", "zone_1", "zone_2", "mode"
+        names = "phi", "omega", "epsilon", "normal_1", "normal_2", "ring_omega", "zone_1", "zone_2", "mode"
+        return (*names, "deflection_1", "deflection_2") if self.laws[structure.law] in friction.DYNAMIC else names
 
     def parameters(self, structure: Structure) -> dict[str, Parameter]:
         """Every numeric path of a scene of this structure."""
-        law = friction.LAWS[structure.law]
+        law = self.laws[structure.law]
         found = dict(self.body)
         places = {"friction.rest": "rest of the ring"}
         if structure.arcs == ("zone",):
@@ -61,16 +62,16 @@ class SingleContactRing:
             ),
         }
 
-    def build(self, structure: Structure, values: Values) -> ring.Ring:
+    def build(self, structure: Structure, values: Values) -> ring.Ring | ring.BristleRing:
         """Cells of a sweep; see :func:`ringsweep.models.batch`."""
-        law = friction.LAWS[structure.law]
+        law = self.laws[structure.law]
         rough = "friction.rough" if structure.arcs == ("zone",) else None
         arcs = [
             zones.Arc(values[f"{arc}.center"], values[f"{arc}.half_angle"], *pair(law, rough or arc, values))
             for arc in structure.arcs
         ]
         surface = zones.cut(arcs, *pair(law, "friction.rest", values))
-        return ring.Ring(
+        return (ring.BristleRing if law in friction.DYNAMIC else ring.Ring)(
             body=self.build_body(values),
             surface=surface,
             law=law_of(law, values),
@@ -181,7 +182,7 @@ def _inspect(scene, y, drive_at, drive_rate):
     return Inspection((omega, epsilon), v, normal_1, normal_2, D, inertia, slope, sin_phi, cos_phi, omega)
 
 
-@hooks.verdict.implements(ring.Ring)
+@hooks.verdict.implements(ring.Ring, ring.BristleRing)
 def _verdict(scene, before, now):
     if not (now.D > 0.0 and now.inertia > 0.0):
         return (BROKEN if isnan(now.inertia) else JAM), 1.0
@@ -236,7 +237,7 @@ def _steepest(scene, now, speed):
     return abs(ring.acceleration_slope(scene.body, 0.0, 0.0, slope, slope, now.sin_phi, now.cos_phi, now.omega))
 
 
-@hooks.begin.implements(ring.Ring)
+@hooks.begin.implements(ring.Ring, ring.BristleRing)
 def _begin(scene, y, now):
     return regimes.begin(y[0], y[1], now.normal_1, now.normal_2, scene.epsilon_omega)
 
@@ -247,7 +248,7 @@ def _observe(scene, record, y, before, now, t, h):
     return regimes.observe(record, y[0], y[1], now.normal_1, now.normal_2, stuck_for, scene.epsilon_omega)
 
 
-@hooks.conclude.implements(ring.Ring)
+@hooks.conclude.implements(ring.Ring, ring.BristleRing)
 def _conclude(scene, record, status, t, y):
     return regimes.conclude(record, status, t, y[0], y[1])
 

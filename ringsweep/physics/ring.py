@@ -71,6 +71,19 @@ class Ring(NamedTuple):
     epsilon_omega: Leaf
 
 
+class BristleRing(NamedTuple):
+    """The same with a friction law that has bristles: their deflections are states, one at each contact."""
+
+    body: Any
+    surface: Any
+    law: Any
+    drive: Any
+    initial_phi: Leaf
+    initial_omega: Leaf
+    span: Leaf
+    epsilon_omega: Leaf
+
+
 @hook
 def contact_offset(body):
     """Half the angle between the contacts, rad; contact 1 is at ``phi - offset``, 2 at ``phi + offset``."""

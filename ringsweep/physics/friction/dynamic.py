@@ -62,6 +62,11 @@ def made(law, mu_s, mu_k):
     """Deflection of a contact that has just been made, m."""
 
 
+@hook
+def steady(law, mu_s, mu_k, v):
+    """Deflection of bristles that have slid at the velocity `v` for long, m; zero at rest."""
+
+
 class Dahl(NamedTuple):
     """Dahl's bristles: :math:`\\dot z = v - \\sigma_0 |v| z/\\mu_k` and the traction :math:`\\sigma_0 z` (Dahl 1968).
 
@@ -83,6 +88,11 @@ def _dahl(law, mu_s, mu_k, v, z, sign, region):
 def _dahl_lasts(law, mu_s, mu_k, v, z, sign, region):
     slack = 0.99 - law.sigma0 * sign * z / mu_k
     return slack if region == BAND else -slack
+
+
+@steady.implements(Dahl)
+def _dahl_steady(law, mu_s, mu_k, v):
+    return (1.0 if v > 0.0 else -1.0 if v < 0.0 else 0.0) * mu_k / law.sigma0
 
 
 @inlined
@@ -174,6 +184,12 @@ def _elasto_plastic(law, mu_s, mu_k, v, z, sign, region):
 def _slower_than_stribeck(law, mu_s, mu_k, v, z, sign, region):
     slack = 1.0 - sign * v / law.v_s
     return slack if region == BAND else -slack
+
+
+@steady.implements(LuGre, ElastoPlastic)
+def _stribeck_steady(law, mu_s, mu_k, v):
+    g, _ = stribeck(law, mu_s, mu_k, v)
+    return (1.0 if v > 0.0 else -1.0 if v < 0.0 else 0.0) * g / law.sigma0
 
 
 @yields.implements(Dahl, LuGre, ElastoPlastic)

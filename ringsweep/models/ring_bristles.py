@@ -1,0 +1,369 @@
+"""The ring with a friction law that has bristles, one bundle at each contact: the hooks of all solvers.
+
+Their traction is per unit of the normal reaction: ``K_i = -(sigma0 z_i + sigma1 dz_i/dt + sigma2 v)``, with the
+coefficients of the zone under the contact. The state is ``(phi, omega, z_1, z_2)`` for steps of constant length and
+``(rho, v, z_1, z_2)``, angle in the ring's frame and sliding velocity, for implicit steps. At launch the bristles
+are as after long sliding at that velocity.
+"""
+
+from __future__ import annotations
+
+from math import cos, isnan, sin, sqrt
+from typing import NamedTuple
+
+from ringsweep import hooks, regimes
+from ringsweep.jit import inlined
+from ringsweep.models.ring_series import coefficients_under
+from ringsweep.physics import drives, ring
+from ringsweep.physics.friction.dynamic import bristle, lasts, steady
+from ringsweep.physics.friction.static import BAND, CLEAN
+from ringsweep.physics.ring import BristleRing
+from ringsweep.physics.zones import coefficients, cross, edge_ahead, locate, roughest, segment
+from ringsweep.regimes import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2
+
+
+class Contacts(NamedTuple):
+    """Both contacts at an instant: rates of deflection, K, and their derivatives by v and z."""
+
+    rates: tuple[float, float]
+    rates_v: tuple[float, float]
+    rates_z: tuple[float, float]
+    K1: float
+    K2: float
+    slopes_v: tuple[float, float]
+    slopes_z: tuple[float, float]
+
+
+@inlined
+def _contacts(scene, under, v, z_1, z_2, sign, region):
+    """Bristles on the surface with the coefficients `under` the contacts, as `coefficients_under` gives them."""
+    mu_s1, mu_k1, mu_s2, mu_k2 = under
+    rate_1, rate_v1, rate_z1, pull_1, v_1, stretch_1 = bristle(scene.law, mu_s1, mu_k1, v, z_1, sign, region)
+    rate_2, rate_v2, rate_z2, pull_2, v_2, stretch_2 = bristle(scene.law, mu_s2, mu_k2, v, z_2, sign, region)
+    return Contacts(
+        (rate_1, rate_2),
+        (rate_v1, rate_v2),
+        (rate_z1, rate_z2),
+        -pull_1,
+        -pull_2,
+        (-v_1, -v_2),
+        (-stretch_1, -stretch_2),
+    )
+
+
+@inlined
+def _lasts(scene, under, v, z_1, z_2, sign, region):
+    """Positive while the region lasts: the body counts as stuck while both contacts do."""
+    mu_s1, mu_k1, mu_s2, mu_k2 = under
+    first = lasts(scene.law, mu_s1, mu_k1, v, z_1, sign, region)
+    second = lasts(scene.law, mu_s2, mu_k2, v, z_2, sign, region)
+    return min(first, second) if region == BAND else max(first, second)
+
+
+@inlined
+def _under_at(scene, rho):
+    """Coefficients under the contacts at an angle in the ring's frame."""
+    offset = ring.contact_offset(scene.body)
+    mu_s1, mu_k1, _ = coefficients(scene.surface, segment(scene.surface, rho - offset))
+    mu_s2, mu_k2, _ = coefficients(scene.surface, segment(scene.surface, rho + offset))
+    return mu_s1, mu_k1, mu_s2, mu_k2
+
+
+@inlined
+def _launched(scene, rho, v):
+    """Deflections at launch."""
+    mu_s1, mu_k1, mu_s2, mu_k2 = _under_at(scene, rho)
+    return steady(scene.law, mu_s1, mu_k1, v), steady(scene.law, mu_s2, mu_k2, v)
+
+
+# ---- constant step ---------------------------------------------------------------------------
+
+
+class Inspection(NamedTuple):
+    """A state of the ring seen from within; ``eigenvalue`` is about the largest magnitude of one, 1/s."""
+
+    rates: tuple[float, float, float, float]
+    normal_1: float
+    normal_2: float
+    D: float
+    inertia: float
+    eigenvalue: float
+    omega: float
+    v: float
+    stuck: bool
+
+
+@hooks.launch.implements(BristleRing)
+def _launch(scene):
+    _, ring_omega, _ = drives.turn(scene.drive, 0.0)
+    theta, _, _ = drives.turn(scene.drive, 0.0)
+    v = (scene.initial_omega - ring_omega) * scene.body.radius
+    z_1, z_2 = _launched(scene, scene.initial_phi - theta, v)
+    return scene.initial_phi, scene.initial_omega, z_1, z_2
+
+
+@hooks.rates.implements(BristleRing)
+def _rates(scene, y, drive_at, drive_rate):
+    phi, omega, z_1, z_2 = y
+    v = (omega - drive_rate) * scene.body.radius
+    sign = 1.0 if v >= 0.0 else -1.0
+    now = _contacts(scene, _under_at(scene, phi - drive_at), v, z_1, z_2, sign, BAND)
+    epsilon, _, _ = ring.acceleration(scene.body, now.K1, now.K2, sin(phi), cos(phi), omega)
+    return omega, epsilon, now.rates[0], now.rates[1]
+
+
+@hooks.inspect.implements(BristleRing)
+def _inspect(scene, y, drive_at, drive_rate):
+    phi, omega, z_1, z_2 = y
+    b = scene.body
+    v = (omega - drive_rate) * b.radius
+    sign = 1.0 if v >= 0.0 else -1.0
+    under = _under_at(scene, phi - drive_at)
+    stuck = _lasts(scene, under, v, z_1, z_2, sign, BAND) > 0.0
+    now = _contacts(scene, under, v, z_1, z_2, sign, BAND)
+    sin_phi, cos_phi = sin(phi), cos(phi)
+    epsilon, D, inertia = ring.acceleration(b, now.K1, now.K2, sin_phi, cos_phi, omega)
+    normal_1, normal_2 = ring.reactions(b, now.K1, now.K2, sin_phi, cos_phi, omega, epsilon)
+    by_v, by_1, by_2 = _by_contacts(scene, now, sin_phi, cos_phi, omega)
+    decay = max(-now.rates_z[0], -now.rates_z[1])
+    coupling = abs(by_1 * now.rates_v[0]) + abs(by_2 * now.rates_v[1])
+    trace = decay - by_v
+    square = trace * trace - 4.0 * (coupling - decay * by_v)
+    eigenvalue = 0.5 * (abs(trace) + sqrt(square)) if square > 0.0 else sqrt(coupling - decay * by_v)
+    rates = omega, epsilon, now.rates[0], now.rates[1]
+    return Inspection(rates, normal_1, normal_2, D, inertia, eigenvalue, omega, v, stuck)
+
+
+@inlined
+def _by_contacts(scene, now, sin_phi, cos_phi, omega):
+    """How the sliding acceleration depends on the sliding velocity by way of friction, and on both deflections."""
+    b = scene.body
+    v_1, v_2 = now.slopes_v
+    z_1, z_2 = now.slopes_z
+    by_v = ring.acceleration_slope(b, now.K1, now.K2, v_1, v_2, sin_phi, cos_phi, omega)
+    by_1 = ring.acceleration_slope(b, now.K1, now.K2, z_1, 0.0, sin_phi, cos_phi, omega)
+    by_2 = ring.acceleration_slope(b, now.K1, now.K2, 0.0, z_2, sin_phi, cos_phi, omega)
+    return b.radius * by_v, b.radius * by_1, b.radius * by_2
+
+
+@hooks.stiffness.implements(BristleRing)
+def _stiffness(scene, before, now, h):
+    return max(before.eigenvalue, now.eigenvalue) * h
+
+
+@hooks.observe.implements(BristleRing)
+def _observe(scene, record, y, before, now, t, h):
+    stuck_for = h if before.stuck else 0.0
+    return regimes.observe(record, y[0], y[1], now.normal_1, now.normal_2, stuck_for, scene.epsilon_omega)
+
+
+@hooks.describe.implements(BristleRing)
+def _describe(scene, y, drive_at, drive_rate):
+    now = hooks.inspect(scene, y, drive_at, drive_rate)
+    mode = 0.0 if now.stuck else 1.0 if now.v > 0.0 else -1.0
+    offset = ring.contact_offset(scene.body)
+    rho = y[0] - drive_at
+    _, _, zone_1 = coefficients(scene.surface, segment(scene.surface, rho - offset))
+    _, _, zone_2 = coefficients(scene.surface, segment(scene.surface, rho + offset))
+    return y[0], y[1], now.rates[1], now.normal_1, now.normal_2, drive_rate, zone_1, zone_2, mode, y[2], y[3]
+
+
+# ---- implicit steps --------------------------------------------------------------------------
+
+# Guards.
+INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(6)
+
+
+class Mode(NamedTuple):
+    """Sign of the sliding velocity, whether the body counts as stuck (BAND), segment and turn of each contact."""
+
+    sign: int
+    region: int
+    place_1: tuple[int, int]
+    place_2: tuple[int, int]
+
+
+@hooks.onward.implements(Mode)
+def _onward(mode):
+    return mode
+
+
+@hooks.rows.implements(BristleRing)
+def _rows(scene):
+    return 0, 0
+
+
+@hooks.embark.implements(BristleRing)
+def _embark(scene):
+    t = drives.beginning(scene.drive)
+    theta, ring_omega, _ = drives.turn(scene.drive, t)
+    rho, v = scene.initial_phi - theta, (scene.initial_omega - ring_omega) * scene.body.radius
+    z_1, z_2 = _launched(scene, rho, v)
+    return t, (rho, v, z_1, z_2)
+
+
+@hooks.enter.implements(BristleRing)
+def _enter(scene, t, y):
+    rho, v, z_1, z_2 = y
+    offset = ring.contact_offset(scene.body)
+    places = locate(scene.surface, rho - offset), locate(scene.surface, rho + offset)
+    theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
+    phi, omega = rho + theta, ring_omega + v / scene.body.radius
+    sign = 1 if v > 0.0 else -1
+    mode = Mode(sign, BAND, places[0], places[1])
+    now = _contacts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(sign), BAND)
+    epsilon, D, inertia = ring.acceleration(scene.body, now.K1, now.K2, sin(phi), cos(phi), omega)
+    if v == 0.0:
+        sign = 1 if epsilon > ring_epsilon else -1
+    stuck = _lasts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(sign), BAND) > 0.0
+    mode = Mode(sign, BAND if stuck else CLEAN, places[0], places[1])
+    if not (D > 0.0 and inertia > 0.0):
+        return BROKEN if isnan(inertia) else JAM, mode
+    return RUNNING, mode
+
+
+@hooks.switch.implements(BristleRing)
+def _switch(scene, mode, guard, t, y):
+    rho, v, z_1, z_2 = y
+    sign, place_1, place_2 = mode.sign, mode.place_1, mode.place_2
+    if guard == INERTIA:
+        return JAM, mode, y
+    if guard in (NORMAL_1, NORMAL_2):
+        # On the way into a jam both reactions grow without bound and have no sign to go by.
+        theta, ring_omega, _ = drives.turn(scene.drive, t)
+        phi, omega = rho + theta, ring_omega + v / scene.body.radius
+        now = _contacts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(sign), mode.region)
+        _, D, inertia = ring.acceleration(scene.body, now.K1, now.K2, sin(phi), cos(phi), omega)
+        if not (D > 0.0 and inertia > 1e-4 * ring.about_axis(scene.body) * D):
+            return JAM, mode, y
+        return (SEPARATED_1 if guard == NORMAL_1 else SEPARATED_2), mode, y
+    if guard == SLOW:
+        return RUNNING, Mode(-sign, BAND, place_1, place_2), (rho, 0.0, z_1, z_2)
+    if guard == FAST:
+        return RUNNING, Mode(sign, CLEAN if mode.region == BAND else BAND, place_1, place_2), y
+    offset = ring.contact_offset(scene.body)
+    ahead_1 = sign * (edge_ahead(scene.surface, place_1, sign) - (rho - offset))
+    ahead_2 = sign * (edge_ahead(scene.surface, place_2, sign) - (rho + offset))
+    if ahead_1 <= ahead_2:
+        place_1 = cross(scene.surface, place_1, sign)
+    else:
+        place_2 = cross(scene.surface, place_2, sign)
+    return RUNNING, Mode(sign, mode.region, place_1, place_2), y
+
+
+@hooks.to_stiff.implements(BristleRing)
+def _to_stiff(scene, t, y):
+    return y
+
+
+@hooks.from_stiff.implements(BristleRing)
+def _from_stiff(scene, t, x):
+    return x
+
+
+@hooks.forcing.implements(BristleRing)
+def _forcing(scene, t):
+    return drives.turn(scene.drive, t)
+
+
+@hooks.stiff_rates.implements(BristleRing)
+def _stiff_rates(scene, mode, force, x):
+    rho, v, z_1, z_2 = x
+    radius = scene.body.radius
+    theta, ring_omega, ring_epsilon = force
+    phi, omega = rho + theta, v / radius + ring_omega
+    now = _contacts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(mode.sign), mode.region)
+    epsilon, _, _ = ring.acceleration(scene.body, now.K1, now.K2, sin(phi), cos(phi), omega)
+    return v / radius, radius * (epsilon - ring_epsilon), now.rates[0], now.rates[1]
+
+
+@hooks.linearise.implements(BristleRing)
+def _linearise(scene, mode, t, x):
+    rho, v, z_1, z_2 = x
+    b = scene.body
+    radius = b.radius
+    theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
+    phi, omega = rho + theta, v / radius + ring_omega
+    now = _contacts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(mode.sign), mode.region)
+    sin_phi, cos_phi = sin(phi), cos(phi)
+    epsilon, _, _ = ring.acceleration(b, now.K1, now.K2, sin_phi, cos_phi, omega)
+    # epsilon = p omega^2 + q cos phi + r sin phi
+    p, _, _ = ring.acceleration(b, now.K1, now.K2, 0.0, 0.0, 1.0)
+    by_phi, _, _ = ring.acceleration(b, now.K1, now.K2, cos_phi, -sin_phi, 0.0)
+    by_omega = 2.0 * p * omega
+    by_v, by_1, by_2 = _by_contacts(scene, now, sin_phi, cos_phi, omega)
+    push = radius * (by_phi * ring_omega + by_omega * ring_epsilon - drives.jerk(scene.drive, t))
+    return (
+        (v / radius, radius * (epsilon - ring_epsilon), now.rates[0], now.rates[1]),
+        (0.0, 1.0 / radius, radius * by_phi, by_omega + by_v),
+        ((by_1, now.rates_v[0], now.rates_z[0]), (by_2, now.rates_v[1], now.rates_z[1])),
+        (0.0, push, 0.0, 0.0),
+    )
+
+
+@hooks.stiff_scales.implements(BristleRing)
+def _stiff_scales(scene, tolerance, x):
+    mu, _ = roughest(scene.surface)
+    deflection = mu / scene.law.sigma0
+    speed = mu * sqrt(scene.body.gravity / scene.law.sigma0) + abs(x[1])
+    return tolerance, tolerance * speed, tolerance * deflection, tolerance * deflection
+
+
+@hooks.stiff_view.implements(BristleRing)
+def _stiff_view(scene, mode, t, x):
+    rho, v, z_1, z_2 = x
+    b = scene.body
+    theta, ring_omega, _ = drives.turn(scene.drive, t)
+    phi, omega = rho + theta, v / b.radius + ring_omega
+    under = coefficients_under(scene, mode)
+    sign = float(mode.sign)
+    now = _contacts(scene, under, v, z_1, z_2, sign, mode.region)
+    sin_phi, cos_phi = sin(phi), cos(phi)
+    epsilon, determinant, inertia = ring.acceleration(b, now.K1, now.K2, sin_phi, cos_phi, omega)
+    normal_1, normal_2 = ring.reactions(b, now.K1, now.K2, sin_phi, cos_phi, omega, epsilon)
+    offset = ring.contact_offset(b)
+    ahead_1 = sign * (edge_ahead(scene.surface, mode.place_1, mode.sign) - (rho - offset))
+    ahead_2 = sign * (edge_ahead(scene.surface, mode.place_2, mode.sign) - (rho + offset))
+    guards = (
+        min(determinant, inertia),
+        sign * v,
+        normal_1,
+        normal_2,
+        min(ahead_1, ahead_2),
+        _lasts(scene, under, v, z_1, z_2, sign, mode.region),
+    )
+    return guards, (phi, omega, epsilon, ring_omega)
+
+
+@hooks.stiff_motion.implements(BristleRing)
+def _stiff_motion(scene, t, x, line):
+    _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
+    return x[1] / scene.body.radius + ring_omega, line[0][1] / scene.body.radius + ring_epsilon
+
+
+@hooks.stiff_start.implements(BristleRing)
+def _stiff_start(scene, mode, t, y):
+    guards, (phi, omega, _, _) = hooks.stiff_view(scene, mode, t, y)
+    return regimes.begin(phi, omega, guards[NORMAL_1], guards[NORMAL_2], scene.epsilon_omega)
+
+
+@hooks.stiff_watch.implements(BristleRing)
+def _stiff_watch(scene, record, mode, view, t, duration):
+    guards, (phi, omega, _, _) = view
+    stuck_for = duration if mode.region == BAND else 0.0
+    return regimes.observe(record, phi, omega, guards[NORMAL_1], guards[NORMAL_2], stuck_for, scene.epsilon_omega)
+
+
+@hooks.stiff_sample.implements(BristleRing)
+def _stiff_sample(scene, mode, t, x):
+    guards, (phi, omega, epsilon, ring_omega) = hooks.stiff_view(scene, mode, t, x)
+    _, _, zone_1 = coefficients(scene.surface, mode.place_1[0])
+    _, _, zone_2 = coefficients(scene.surface, mode.place_2[0])
+    state = 0.0 if mode.region == BAND else float(mode.sign)
+    return phi, omega, epsilon, guards[NORMAL_1], guards[NORMAL_2], ring_omega, zone_1, zone_2, state, x[2], x[3]
+
+
+@hooks.finish.implements(BristleRing)
+def _finish(scene, record, status, t, y):
+    theta, ring_omega, _ = drives.turn(scene.drive, t)
+    return regimes.conclude(record, status, t, y[0] + theta, y[1] / scene.body.radius + ring_omega)
