@@ -13,6 +13,7 @@ from ringsweep.jit import inlined
 from ringsweep.models.common import GRAVITY, MASS, SPAN, drive_of, law_of, pair
 from ringsweep.parameters import Parameter, declared
 from ringsweep.physics import drives, friction, ring, zones
+from ringsweep.physics.friction.static import stiction_band, weights
 from ringsweep.regimes import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2
 from ringsweep.scene import Structure, Values, require
 
@@ -207,14 +208,14 @@ def _zero(before, now):
 @inlined
 def _in_band(scene, before, now):
     """Whether a step lay in the stiction band or jumped across it."""
-    return abs(before.v) < friction.stiction_band(scene.law) or before.v * now.v < 0.0
+    return abs(before.v) < stiction_band(scene.law) or before.v * now.v < 0.0
 
 
 @hooks.stiffness.implements(ring.Ring)
 def _stiffness(scene, before, now, h):
     crossed = before.v * now.v < 0.0
     slow, fast = min(abs(before.v), abs(now.v)), max(abs(before.v), abs(now.v))
-    band = friction.stiction_band(scene.law)
+    band = stiction_band(scene.law)
     if crossed and band == 0.0:
         # A discontinuous law has no slope that any step could follow.
         return inf
@@ -232,7 +233,7 @@ def _stiffness(scene, before, now, h):
 def _steepest(scene, now, speed):
     """Bound on the eigenvalue of friction at a sliding speed, 1/s."""
     mu_s, mu_k = zones.roughest(scene.surface)
-    _, _, dw_s, dw_k = friction.weights(scene.law, speed)
+    _, _, dw_s, dw_k = weights(scene.law, speed)
     slope = -(dw_s * mu_s + dw_k * mu_k) * scene.body.radius
     return abs(ring.acceleration_slope(scene.body, 0.0, 0.0, slope, slope, now.sin_phi, now.cos_phi, now.omega))
 
@@ -256,7 +257,7 @@ def _conclude(scene, record, status, t, y):
 @hooks.describe.implements(ring.Ring)
 def _describe(scene, y, drive_at, drive_rate):
     now = hooks.inspect(scene, y, drive_at, drive_rate)
-    band = friction.stiction_band(scene.law)
+    band = stiction_band(scene.law)
     mode = 0.0 if abs(now.v) < band or now.v == 0.0 else 1.0 if now.v > 0.0 else -1.0
     offset = ring.contact_offset(scene.body)
     rho = y[0] - drive_at
