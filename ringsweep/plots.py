@@ -56,8 +56,10 @@ _OTHER_COLOURS = ("#BBBBBB", "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E0
 _SMALL = 8
 _MOST_PANELS = 25
 
-# Fraction of a run that counts as its start, and of the greatest force that is a difference.
+# Fraction of a run that the detail of its start shows, before which what happens can count as part of the
+# start, and fraction of the force that counts as a difference.
 _DETAIL = 0.02
+_LATEST = 0.1
 _APART = 0.05
 
 # Columns into which a history is condensed: finer than the pixels of a printed panel.
@@ -173,7 +175,8 @@ def history(ds: xr.Dataset) -> Figure:
     For a ring these are angle, angular velocity, angular acceleration and normal reactions, above a strip
     that shows which arc lies under each contact; for a belt displacement, velocity, friction force, and the
     force just after the start. Stick is shaded. Of several laws each is a line, and neither arcs nor stick are
-    shown; the last panel goes on until the first differences between their forces are over.
+    shown; the last panel goes on for as long again as the differences between their forces at the start last,
+    over a logarithmic time if these are of more than one scale.
 
     Parameters
     ----------
@@ -219,9 +222,12 @@ def history(ds: xr.Dataset) -> Figure:
     if zones:
         _draw_zones(axes[-1], ds, zones)
     if detail:
-        end = _first_differences(ds) if compared else time[0] + _DETAIL * (time[-1] - time[0])
-        start = ds.isel(time=slice(0, max(20, int(np.searchsorted(time, end)))))
+        first, last = _transients(ds) if compared else (0.0, _DETAIL / 2 * (time[-1] - time[0]))
+        start = ds.isel(time=slice(0, max(20, int(np.searchsorted(time, time[0] + 2.0 * last)))))
         draw(axes[-1], start, ["friction_force"])
+        if 0.0 < first < 0.05 * last:
+            axes[-1].set_xscale("log")
+            axes[-1].set_xlim(left=first / 20.0)
         axes[-1].set_title("friction force just after the start", fontsize=_SMALL, loc="left")
         timed[-1].set_xlabel(_label(ds["time"], ds))
     if time[-1] > time[0]:
@@ -519,7 +525,7 @@ def _draw_laws(axes: Axes, ds: xr.Dataset, names: list[str]) -> None:
     axes.margins(x=0)
     if name.startswith("normal"):
         axes.set_title(f"contact {name[-1]}", fontsize=_SMALL, loc="left")
-    if name == "epsilon":
+    if name in ("epsilon", "friction_force"):
         _clip(axes, numbers)
 
 
@@ -530,22 +536,23 @@ def _regime(ds: xr.Dataset, k: int) -> str:
     return meanings[flags.index(int(ds["regime"][k]))]
 
 
-def _first_differences(ds: xr.Dataset) -> float:
-    """Time up to which to look for how friction laws differ at first.
+def _transients(ds: xr.Dataset) -> tuple[float, float]:
+    """When the first and the last of the differences at the start of runs under several friction laws are over.
 
-    That is twice the time after which their forces agree for as long as has gone by then; if they
-    never do, twice the time for which they agree at first.
+    A difference between their forces is over if they agree for as long again as has gone by then. The
+    bristles of a law bend within milliseconds, and the body rings on them for longer.
     """
-    time = ds["time"].values
+    since = ds["time"].values - ds["time"].values[0]
     force = ds["friction_force"].transpose("friction_law", "time").values
-    spread = np.nanmax(force, axis=0) - np.nanmin(force, axis=0)
-    apart = np.flatnonzero((spread > _APART * np.nanmax(np.abs(force))) & (time > time[0]))
-    usual = time[0] + _DETAIL * (time[-1] - time[0])
-    if not len(apart):
-        return float(usual)
-    since = time[apart] - time[0]
-    agreeing = np.flatnonzero((since[1:] > 2.0 * since[:-1]) & (np.diff(apart) > 1))
-    return float(time[0] + 2.0 * since[agreeing[0]] if len(agreeing) else max(usual, time[0] + 2.0 * since[0]))
+    spread = np.fmax.reduce(force) - np.fmin.reduce(force)
+    # Not of the greatest force: it may be a spike.
+    apart = np.flatnonzero((spread > _APART * np.nanpercentile(np.abs(force), 95)) & (since > 0.0))
+    again = np.append(apart[1:], len(since) - 1)
+    ends = since[apart[(since[again] > 2.0 * since[apart]) & (again > apart + 1)]]
+    ends = ends[ends < _LATEST * since[-1]]
+    if not len(ends):
+        return _DETAIL / 2 * since[-1], _DETAIL / 2 * since[-1]
+    return ends[0], ends[-1]
 
 
 def _draw_zones(axes: Axes, ds: xr.Dataset, zones: list[str]) -> None:
@@ -587,7 +594,10 @@ def _envelope(time: NDArray[Any], numbers: NDArray[Any]) -> tuple[NDArray[Any], 
         return time, numbers
     starts = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], _COLUMNS, endpoint=False)))
     low, high = np.fmin.reduceat(numbers, starts), np.fmax.reduceat(numbers, starts)
-    return np.repeat(time[starts], 2), np.column_stack([low, high]).ravel()
+    # A line that went back and forth where it falls would fill the gaps between its dashes.
+    falls = numbers[starts] > numbers[np.append(starts[1:], len(time)) - 1]
+    columns = np.where(falls, (high, low), (low, high))
+    return np.repeat(time[starts], 2), columns.T.ravel()
 
 
 def _sampled(time: NDArray[Any], states: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -672,6 +682,7 @@ def _symbol(ds: xr.Dataset, names: list[str]) -> str:
         "omega": "angular velocity",
         "epsilon": "angular\nacceleration",
         "normal_1": "normal reaction",
+        "normal_2": "normal reaction",
         "x": "displacement",
         "velocity": "velocity",
         "friction_force": "friction force",
