@@ -62,7 +62,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     draw.set_defaults(verb=_map)
 
-    simulate = verbs.add_parser("simulate", help="run once: NetCDF of the history, and a picture beside it")
+    simulate = verbs.add_parser(
+        "simulate",
+        help="run once, or under each law of a sweep: NetCDF of the history, and a picture",
+    )
     simulate.add_argument("config", metavar="CONFIG.yaml")
     simulate.add_argument("-o", "--output", metavar="RUN.nc", help="default: the configuration's name with -run")
     simulate.add_argument(

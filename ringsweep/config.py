@@ -512,7 +512,8 @@ def _values(given: Any, parameter: Parameter | Choice, where: str) -> NDArray[An
     if hasattr(given, "__array__"):
         array = np.asarray(given)
         if array.ndim != 1 or array.dtype.kind not in "iufOU":
-            raise InputError(where, f"a list of numbers is expected, got shape {array.shape} of {array.dtype}")
+            what = "names" if isinstance(parameter, Choice) else "numbers"
+            raise InputError(where, f"a list of {what} is expected, got shape {array.shape} of {array.dtype}")
         given = array.tolist()
     if not isinstance(given, Sequence) or isinstance(given, str | bytes):
         raise InputError(where, f"a list of values is expected, got {show(given)}")

@@ -46,10 +46,10 @@ REGIME_COLOURS: dict[str, str] = {
 #: Kinds of file that `save` writes.
 SUFFIXES = (".pdf", ".png", ".svg")
 
-# Lines of friction laws, which may lie on top of each other: told apart by hue, by style, and by a gap through
-# which the one below shows.
+# Lines of friction laws, which may lie on top of each other: told apart by hue and, the one below showing through
+# gaps, by style. The lengths have no common factor, so that no pair returns soon.
 _LAW_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-_LAW_STYLES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (8, 3)), (0, (3, 1, 1, 1, 1, 1)), (0, (1, 3)))
+_LAW_STYLES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (8, 3)))
 
 _NO_VALUE = "#DDDDDD"
 _OTHER_COLOURS = ("#BBBBBB", "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#F0E442")
