@@ -62,10 +62,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     draw.set_defaults(verb=_map)
 
-    simulate = verbs.add_parser(
-        "simulate",
-        help="run once, or under each law of a sweep: NetCDF of the history, and a picture",
-    )
+    simulate = verbs.add_parser("simulate", help="run once, or under each law of a sweep: history and a picture of it")
     simulate.add_argument("config", metavar="CONFIG.yaml")
     simulate.add_argument("-o", "--output", metavar="RUN.nc", help="default: the configuration's name with -run")
     simulate.add_argument(

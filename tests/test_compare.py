@@ -264,9 +264,9 @@ class TestPicture:
         assert figure.axes[0].collections
 
     def test_many_laws_are_told_apart(self, compared):
-        many = compared.isel(friction_law=[0, 1, 2] * 4).assign_coords(friction_law=list("abcdefghijkl"))
+        many = compared.isel(friction_law=[0, 1, 2] * 3).assign_coords(friction_law=list("abcdefghi"))
         lines = plots.history(many).axes[0].lines
-        assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == 12
+        assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == 9
 
     def test_the_detail_ends_when_the_first_differences_have_been_over_for_as_long(self, compared):
         """Tustin's body is caught by the belt before the others; then all stick until the first breaks loose."""
