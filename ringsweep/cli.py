@@ -62,7 +62,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     draw.set_defaults(verb=_map)
 
-    simulate = verbs.add_parser("simulate", help="run once: NetCDF of the history, and a picture beside it")
+    simulate = verbs.add_parser("simulate", help="run once, or under each law of a sweep: history and a picture of it")
     simulate.add_argument("config", metavar="CONFIG.yaml")
     simulate.add_argument("-o", "--output", metavar="RUN.nc", help="default: the configuration's name with -run")
     simulate.add_argument(
@@ -79,10 +79,10 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def whole_number(text: str) -> int:
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"{number} is not at least 1")
-    return number
+    # Of a bare ValueError argparse would show the name of this function.
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least 1")
+    return int(text)
 
 
 def _run(arguments: argparse.Namespace) -> None:
@@ -159,6 +159,9 @@ def _info(arguments: argparse.Namespace) -> None:
     print(result.attrs.get("title", arguments.dataset))
     print("dimensions:", ", ".join(f"{name} {size}" for name, size in result.sizes.items()) or "none: a single run")
     for name, axis in result.coords.items():
+        if axis.dtype.kind not in "iuf":
+            print(f"  {name}: {', '.join(dict.fromkeys(map(str, axis.values.flat)))}")
+            continue
         unit = axis.attrs.get("units", "1")
         print(f"  {name}: {axis.values.min():g} to {axis.values.max():g}{'' if unit == '1' else f' {unit}'}")
     _summarise(result)

@@ -23,8 +23,8 @@ from ringsweep import document
 from ringsweep.document import Document, scalar
 from ringsweep.errors import InputError
 from ringsweep.models import batch, parameters
-from ringsweep.parameters import Parameter, declared
-from ringsweep.scene import Scene, Structure
+from ringsweep.parameters import Choice, Parameter, declared
+from ringsweep.scene import LAW, Scene, Structure
 from ringsweep.units import quantity, show
 from ringsweep.variables import OUTCOMES
 
@@ -52,11 +52,12 @@ class Axes:
     sizes : dict of str to int
         Length of each dimension, in order.
     columns : dict of str to tuple
-        For each swept path its dimensions, and its values in SI units with a shape to match.
+        For each swept path its dimensions, and its values with a shape to match: numbers in SI units,
+        or names of friction laws.
     """
 
     sizes: dict[str, int] = field(default_factory=dict)
-    columns: dict[str, tuple[tuple[str, ...], NDArray[np.float64]]] = field(default_factory=dict)
+    columns: dict[str, tuple[tuple[str, ...], NDArray[Any]]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -105,19 +106,22 @@ def load(config: str | os.PathLike[str] | Mapping[str, Any]) -> Config:
 def with_values(config: str | os.PathLike[str] | Mapping[str, Any], settings: Iterable[str] = ()) -> Config:
     """The configuration of a single run: axes left out, some values changed.
 
+    If the grid goes through friction laws, and none is set, it is that of a run under each of them.
+
     Parameters
     ----------
     config : path-like or mapping
-        As in :func:`load`; a sweep in it is ignored.
+        As in :func:`load`; what else it sweeps is ignored.
     settings : iterable of str
         ``"PATH=VALUE"`` with a path in the scene (``drive.amplitude=3``) or ``solver.steps=...``.
     """
     doc = document.read(config)
     with doc.placing():
-        for setting in settings:
-            _set(doc, setting)
+        settled = {_set(doc, setting) for setting in settings}
         sweep = _sweep(doc)
         doc.tree.pop("sweep", None)
+        if LAW in sweep.get("grid", {}) and f"scene.{LAW}" not in settled:
+            doc.tree["sweep"] = {"grid": {LAW: sweep["grid"][LAW]}}
         try:
             return _config(doc)
         except InputError as error:
@@ -133,11 +137,12 @@ def read_scene(scene: Mapping[str, Any], swept: Collection[str] = ()) -> Scene:
     Parameters
     ----------
     scene : mapping
-    swept : collection of str
+    swept : collection of str, or mapping of str to sequence
         Paths that a sweep will fill; their values may be missing, and contradictions between
-        values are left to :func:`read_axes`.
+        values are left to :func:`read_axes`. Which friction laws these are only a mapping can tell.
     """
-    found = _scene(Document(document.read({"scene": scene}).tree), swept)
+    laws = (f"axes[{LAW!r}]", swept[LAW]) if isinstance(swept, Mapping) and LAW in swept else None
+    found = _scene(Document(document.read({"scene": scene}).tree), swept, laws)
     if not swept:
         _check(found, Axes())
     return found
@@ -164,7 +169,7 @@ def read_axes(scene: Scene, axes: Mapping[str, Any]) -> Axes:
 
     if not isinstance(axes, Mapping):
         raise InputError("axes", f"a mapping of paths to values is expected, got {show(axes)}")
-    known = parameters(scene.structure)
+    known = sweepable(scene)
 
     def entries() -> Iterator[_Entry]:
         for path, given in axes.items():
@@ -180,10 +185,24 @@ def read_axes(scene: Scene, axes: Mapping[str, Any]) -> Axes:
     return found
 
 
-def read_solver(solver: str | Mapping[str, Any]) -> Any:
-    """A method with its options, from its name or from the mapping under ``solver`` in a configuration."""
-    tree = document.read({"solver": solver}).tree
-    return _solver(tree["solver"])
+def read_solver(solver: str | Mapping[str, Any], scene: Scene | None = None) -> Any:
+    """A method with its options, from its name or from the mapping under ``solver`` in a configuration.
+
+    Parameters
+    ----------
+    solver : str or mapping
+    scene : Scene, optional
+        What the method must be able to take.
+    """
+    found = _solver(document.read({"solver": solver}).tree["solver"])
+    for structure in scene.structures.values() if scene else ():
+        found.check(structure)
+    return found
+
+
+def sweepable(scene: Scene) -> dict[str, Parameter | Choice]:
+    """Every path of a scene that a sweep can vary, with what it is."""
+    return {**_numbers(scene.structures), LAW: _law(scene.structure.model)}
 
 
 def suggestion(word: object, known: Iterable[str]) -> str:
@@ -203,9 +222,9 @@ def _config(doc: Document) -> Config:
         if key not in ("scene", "solver", "sweep"):
             raise InputError(key, "unknown section" + suggestion(key, ("scene", "solver", "sweep")))
     sweep = _sweep(doc)
-    scene = _scene(doc, _swept(sweep))
-    solver = _solver(tree.get("solver", "auto"))
-    solver.check(scene.structure)
+    laws = [(f"sweep.{part}.{LAW}", columns[LAW]) for part, columns in sweep.items() if LAW in columns]
+    scene = _scene(doc, _swept(sweep), laws[0] if laws else None)
+    solver = read_solver(tree.get("solver", "auto"), scene)
     axes = _sweep_axes(scene, sweep)
     for path in axes.columns:
         place = f"sweep.grid.{path}" if path in sweep.get("grid", {}) else f"sweep.points.{path}"
@@ -215,8 +234,8 @@ def _config(doc: Document) -> Config:
     return Config(scene, solver, axes, tree, doc.name)
 
 
-def _set(doc: Document, setting: str) -> None:
-    """Put one ``PATH=VALUE`` into the tree; whether the path means anything shows when it is read."""
+def _set(doc: Document, setting: str) -> str:
+    """Put one ``PATH=VALUE`` into the tree, and tell where; whether it means anything shows when it is read."""
     path, equals, text = (part.strip() for part in setting.partition("="))
     if not equals or not path:
         raise InputError("--set", f"{show(setting)} is not of the form PATH=VALUE")
@@ -235,6 +254,7 @@ def _set(doc: Document, setting: str) -> None:
     else:
         raise InputError(full, f"cannot be set: {'.'.join(parents)} is {show(node)}")
     doc.marks[full] = f"--set {setting}", None
+    return full
 
 
 def _child(node: Any, key: str, full: str) -> Any:
@@ -248,7 +268,8 @@ def _child(node: Any, key: str, full: str) -> Any:
 # ---- scene ---------------------------------------------------------------------------------
 
 
-def _scene(doc: Document, swept: Collection[str]) -> Scene:
+def _scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | None) -> Scene:
+    """The scene, under its own friction law or those that a sweep gives: their place, and what stands there."""
     from ringsweep.models import MODELS
     from ringsweep.physics.drives import DRIVES
 
@@ -260,7 +281,11 @@ def _scene(doc: Document, swept: Collection[str]) -> Scene:
     zones = tuple(f"zones.{i}" for i in range(len(arcs)))
     # A misspelt key is found before the key that it leaves missing.
     leaves = dict(_leaves(scene, "", _Names(_all_paths(model, zones or ("zones.0",)))))
-    law = _choose(MODELS[model].laws, _section(scene, "friction", "scene."), "scene.friction.law", "friction law")
+    names = []
+    if laws is None or LAW in leaves:
+        names = [_choose(MODELS[model].laws, _section(scene, "friction", "scene."), f"scene.{LAW}", "friction law")]
+    if laws is not None:
+        names = _values(laws[1], _law(model), laws[0]).tolist()
     drive = "none"
     if "drive" in scene:
         drive = _choose(DRIVES, _section(scene, "drive", "scene."), "scene.drive.law", "drive law")
@@ -274,8 +299,8 @@ def _scene(doc: Document, swept: Collection[str]) -> Scene:
     elif rough:
         raise InputError(f"scene.{rough[0]}", "there is no rough zone: give zone, or leave friction.rough out")
     table = _table(doc, scene["drive"]) if drive == "table" else None
-    structure = Structure(model, law, drive, zones, table)
-    known = parameters(structure)
+    structures = {law: Structure(model, law, drive, zones, table) for law in names}
+    known = _numbers(structures)
     values = {}
     for path, parameter in known.items():
         if path in leaves:
@@ -286,14 +311,28 @@ def _scene(doc: Document, swept: Collection[str]) -> Scene:
             raise InputError(f"scene.{path}", _missing(path, parameter))
     for path in leaves:
         if path not in known and path not in _structural(drive):
-            where, name = ("drive", drive) if path.startswith("drive.") else ("friction", law)
+            where, name = ("drive", drive) if path.startswith("drive.") else ("friction", " or ".join(structures))
             logger.warning("scene.%s is not used: %s law %s has no such parameter", path, where, name)
-    return Scene(structure, values, scene)
+    return Scene(structures, values, scene)
+
+
+def _numbers(structures: Mapping[str, Structure]) -> dict[str, Parameter]:
+    """Every numeric path that a scene has under any of its laws."""
+    found: dict[str, Parameter] = {}
+    for structure in structures.values():
+        found |= parameters(structure)
+    return found
+
+
+def _law(model: str) -> Choice:
+    from ringsweep.models import MODELS
+
+    return Choice("friction law", tuple(MODELS[model].laws))
 
 
 def _structural(drive: str) -> tuple[str, ...]:
     """Paths that choose the structure and carry no number."""
-    return ("model", "friction.law", "drive.law", *(f"drive.{name}" for name in (*TABLE, "file") if drive == "table"))
+    return ("model", LAW, "drive.law", *(f"drive.{name}" for name in (*TABLE, "file") if drive == "table"))
 
 
 def _all_paths(model: str, zones: tuple[str, ...]) -> list[str]:
@@ -414,7 +453,7 @@ def _number(given: Any, parameter: Parameter, kind: type, path: str) -> float | 
 
 # ---- axes ----------------------------------------------------------------------------------
 
-_Entry = tuple[str, str, tuple[str, ...], NDArray[np.float64]]
+_Entry = tuple[str, str, tuple[str, ...], NDArray[Any]]
 
 
 def _sweep(doc: Document) -> dict[str, Any]:
@@ -440,7 +479,7 @@ def _swept(sweep: dict[str, Any]) -> set[str]:
 
 
 def _sweep_axes(scene: Scene, sweep: dict[str, Any]) -> Axes:
-    known = parameters(scene.structure)
+    known = sweepable(scene)
     points = sweep.get("points", {})
 
     def entries() -> Iterator[_Entry]:
@@ -458,7 +497,7 @@ def _sweep_axes(scene: Scene, sweep: dict[str, Any]) -> Axes:
     return _axes(entries())
 
 
-def _axis(known: Mapping[str, Parameter], path: object, where: str) -> Parameter:
+def _axis(known: Mapping[str, Parameter | Choice], path: object, where: str) -> Parameter | Choice:
     if not isinstance(path, str) or path not in known:
         raise InputError(where, "the scene has no such number to vary" + suggestion(path, known))
     return known[path]
@@ -468,21 +507,30 @@ def _dimension(path: str) -> str:
     return path.replace(".", "_")
 
 
-def _values(given: Any, parameter: Parameter, where: str) -> NDArray[np.float64]:
-    """A sequence of quantities, shape ``(n,)``."""
+def _values(given: Any, parameter: Parameter | Choice, where: str) -> NDArray[Any]:
+    """A sequence of quantities, or of names, shape ``(n,)``."""
     if hasattr(given, "__array__"):
         array = np.asarray(given)
         if array.ndim != 1 or array.dtype.kind not in "iufOU":
-            raise InputError(where, f"a list of numbers is expected, got shape {array.shape} of {array.dtype}")
+            what = "names" if isinstance(parameter, Choice) else "numbers"
+            raise InputError(where, f"a list of {what} is expected, got shape {array.shape} of {array.dtype}")
         given = array.tolist()
     if not isinstance(given, Sequence) or isinstance(given, str | bytes):
         raise InputError(where, f"a list of values is expected, got {show(given)}")
     if not given:
         raise InputError(where, "empty: give at least one value")
-    return np.array([quantity(value, parameter, f"{where}.{i}") for i, value in enumerate(given)])
+    read: Any = _name if isinstance(parameter, Choice) else quantity
+    return np.array([read(value, parameter, f"{where}.{i}") for i, value in enumerate(given)])
 
 
-def _array(given: xr.DataArray, parameter: Parameter, where: str) -> tuple[tuple[str, ...], NDArray[np.float64]]:
+def _name(given: object, choice: Choice, path: str) -> str:
+    """One of the names that there are to choose from."""
+    if not isinstance(given, str) or given not in choice.names:
+        raise InputError(path, f"{show(given)} is not a {choice.long_name}" + suggestion(given, choice.names))
+    return given
+
+
+def _array(given: xr.DataArray, parameter: Parameter | Choice, where: str) -> tuple[tuple[str, ...], NDArray[Any]]:
     """Dimensions and values of a DataArray."""
     dims = tuple(map(str, given.dims))
     if not dims:
@@ -494,8 +542,10 @@ def _array(given: xr.DataArray, parameter: Parameter, where: str) -> tuple[tuple
     return dims, _values(flat, parameter, where).reshape(given.shape)
 
 
-def _spaced(given: dict[str, Any], parameter: Parameter, where: str) -> NDArray[np.float64]:
+def _spaced(given: dict[str, Any], parameter: Parameter | Choice, where: str) -> NDArray[np.float64]:
     """Values from ``{linspace: [first, last, count]}`` or ``geomspace``."""
+    if isinstance(parameter, Choice):
+        raise InputError(where, f"a list of names is expected, got {show(given)}")
     if len(given) != 1 or next(iter(given)) not in ("linspace", "geomspace"):
         raise InputError(where, f"a list of values, linspace or geomspace is expected, got {show(given)}")
     ((kind, bounds),) = given.items()
@@ -519,14 +569,15 @@ def _axes(entries: Iterable[_Entry]) -> Axes:
             if found.sizes.setdefault(dim, size) != size:
                 raise InputError(where, f"{size} values along {dim}, where others have {found.sizes[dim]}")
         found.columns[path] = dims, values
+        if dims == (_dimension(path),):
+            _, first = np.unique(values, return_index=True)
+            again = np.setdiff1d(np.arange(len(values)), first)
+            if len(again):
+                raise InputError(f"{where}.{again[0]}", f"{show(values[again[0]].item())} stands twice on this axis")
     total = math.prod(found.sizes.values())
     if total > MOST_CELLS:
         sizes = " x ".join(map(str, found.sizes.values()))
         raise InputError("sweep", f"{sizes} makes {total:.3g} cells: at most {MOST_CELLS:.3g} fit into one sweep")
-    for path, (dims, values) in found.columns.items():
-        name = _dimension(path)
-        if dims == (name,) and len(np.unique(values)) < len(values):
-            raise InputError(path, "a value stands twice on this axis")
     for path, (dims, _) in found.columns.items():
         name = _dimension(path)
         if name in found.sizes and dims != (name,):
@@ -540,7 +591,7 @@ def _check(scene: Scene, axes: Axes) -> None:
     picks = []
     for dim, size in axes.sizes.items():
         along = [values for dims, values in axes.columns.values() if dim in dims]
-        alone = len(along) == 1 and along[0].ndim == 1
+        alone = len(along) == 1 and along[0].ndim == 1 and along[0].dtype.kind == "f"
         picks.append(np.unique([along[0].argmin(), along[0].argmax()]) if alone else np.arange(size))
     shape = (1, *map(len, picks))
     total = math.prod(shape)
@@ -550,12 +601,36 @@ def _check(scene: Scene, axes: Axes) -> None:
         place = {dim: pick[cell] for dim, pick, cell in zip(axes.sizes, picks, cells, strict=True)}
         values = {path: np.full(len(flat), value) for path, value in scene.values.items()}
         values |= {path: column[tuple(place[dim] for dim in dims)] for path, (dims, column) in axes.columns.items()}
+        laws = values.pop(LAW, np.full(len(flat), scene.structure.law))
+        for law, structure in scene.structures.items():
+            own = laws == law
+            if not own.any():
+                continue
+            try:
+                batch(structure, {path: column[own] for path, column in values.items()})
+            except InputError as error:
+                if _is_swept(structure, scene, axes, error):
+                    error.problem += " (in a cell of the sweep)"
+                raise
+
+
+def _is_swept(structure: Structure, scene: Scene, axes: Axes, error: InputError) -> bool:
+    """Whether a contradiction comes from values of a sweep.
+
+    It does not if the scene by itself says the same, with the least as with the greatest of the
+    values that only the sweep gives.
+    """
+    if error.path.removeprefix("scene.") in axes.columns:
+        return True
+    for end in (np.min, np.max):
+        swept = {path: end(column) for path, (_, column) in axes.columns.items() if path != LAW}
         try:
-            batch(scene.structure, values)
-        except InputError as error:
-            if axes.sizes:
-                error.problem += " (in a cell of the sweep)"
-            raise
+            batch(structure, {path: np.array([value]) for path, value in {**swept, **scene.values}.items()})
+        except InputError as alone:
+            if str(alone) == str(error):
+                continue
+        return True
+    return False
 
 
 # ---- sections ------------------------------------------------------------------------------

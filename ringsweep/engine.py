@@ -17,10 +17,10 @@ import xarray as xr
 from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
-from ringsweep.config import Axes, Config, load, read_axes, read_scene, read_solver
+from ringsweep.config import Axes, Config, load, read_axes, read_scene, read_solver, sweepable
 from ringsweep.jit import SOURCES_DIGEST
-from ringsweep.models import MODELS, batch, parameters
-from ringsweep.scene import Scene, Values
+from ringsweep.models import MODELS, batch
+from ringsweep.scene import LAW, Scene, Structure, Values
 from ringsweep.solvers.common import Result
 from ringsweep.variables import OUTCOMES
 
@@ -71,8 +71,8 @@ def sweep(
     scene : mapping
         The configuration's ``scene``.
     axes : mapping of str to sequence or xarray.DataArray
-        Values for paths of the scene, such as ``"drive.amplitude"``. A 1-D sequence is a grid axis;
-        ``DataArray`` that share a dimension vary together along it.
+        Values for paths of the scene, such as ``"drive.amplitude"``, and names for ``"friction.law"``.
+        A 1-D sequence is a grid axis; ``DataArray`` that share a dimension vary together along it.
     solver : str or mapping
         A method's name, or the configuration's ``solver``.
     jobs, progress
@@ -87,12 +87,11 @@ def sweep(
     InputError
         If scene, axes or solver are wrong.
     """
-    parsed = read_scene(scene, swept=tuple(axes))
+    parsed = read_scene(scene, swept=axes)
     found = read_axes(parsed, axes)
     method = {"method": solver} if isinstance(solver, str) else dict(solver)
     source = {"scene": dict(parsed.source), "solver": method, "sweep": _as_sweep(found)}
-    chosen = read_solver(method)
-    chosen.check(parsed.structure)
+    chosen = read_solver(method, parsed)
     config = Config(scene=parsed, solver=chosen, axes=found, source=source, name="ringsweep")
     return compute(config, jobs=jobs, progress=progress)
 
@@ -121,30 +120,54 @@ def compute(config: Config, *, jobs: int | None, progress: bool) -> xr.Dataset:
     total = math.prod(axes.sizes.values())
     jobs = jobs or joblib.cpu_count()
     size = max(1, min(_CELLS_PER_TASK, math.ceil(total / (4 * jobs))))
-    chunks = [np.arange(start, min(start + size, total)) for start in range(0, total, size)]
+    tasks = [
+        (structure, own[start : start + size])
+        for structure, own in _by_law(scene, axes)
+        for start in range(0, len(own), size)
+    ]
     parallel = joblib.Parallel(n_jobs=jobs, prefer="threads", return_as="generator_unordered")
-    results = parallel(joblib.delayed(_task)(config, chunk, outcomes) for chunk in chunks)
+    results = parallel(joblib.delayed(_task)(config, structure, chunk, outcomes) for structure, chunk in tasks)
 
     columns: dict[str, NDArray[Any]] = {}
     with _bar(total, progress) as bar:
         for chunk, result in results:
             for name, column in _columns(outcomes, result):
-                columns.setdefault(name, np.empty(total))[chunk] = column
+                columns.setdefault(name, np.full(total, np.nan))[chunk] = column
             bar.update(len(chunk))
     return _dataset(config, columns)
 
 
 def cells(scene: Scene, axes: Axes, indices: NDArray[np.intp]) -> Values:
-    """Values of every path in the cells with these flat indices, each of shape ``(len(indices),)``."""
-    place = dict(zip(axes.sizes, np.unravel_index(indices, tuple(axes.sizes.values()) or (1,)), strict=False))
+    """Values of every numeric path in the cells with these flat indices, each of shape ``(len(indices),)``."""
     values = {path: np.full(len(indices), value) for path, value in scene.values.items()}
+    place = _places(axes, indices)
     for path, (dims, column) in axes.columns.items():
-        values[path] = np.ascontiguousarray(column[tuple(place[dim] for dim in dims)], dtype=float)
+        if path != LAW:
+            values[path] = np.ascontiguousarray(column[tuple(place[dim] for dim in dims)], dtype=float)
     return values
 
 
-def _task(config: Config, chunk: NDArray[np.intp], outcomes: tuple[str, ...]) -> tuple[NDArray[np.intp], Result]:
-    part = batch(config.scene.structure, cells(config.scene, config.axes, chunk))
+def _places(axes: Axes, indices: NDArray[np.intp]) -> dict[str, NDArray[np.intp]]:
+    """Where along each dimension the cells with these flat indices lie."""
+    return dict(zip(axes.sizes, np.unravel_index(indices, tuple(axes.sizes.values()) or (1,)), strict=False))
+
+
+def _by_law(scene: Scene, axes: Axes) -> Iterator[tuple[Structure, NDArray[np.intp]]]:
+    """Flat indices of the cells under each friction law: one decides what is compiled, so that no task has two."""
+    every = np.arange(math.prod(axes.sizes.values()))
+    if LAW not in axes.columns:
+        yield scene.structure, every
+        return
+    place = _places(axes, every)
+    dims, names = axes.columns[LAW]
+    for law, structure in scene.structures.items():
+        yield structure, every[(names == law)[tuple(place[dim] for dim in dims)]]
+
+
+def _task(
+    config: Config, structure: Structure, chunk: NDArray[np.intp], outcomes: tuple[str, ...]
+) -> tuple[NDArray[np.intp], Result]:
+    part = batch(structure, cells(config.scene, config.axes, chunk))
     return chunk, config.solver.run(part, outcomes)
 
 
@@ -166,7 +189,7 @@ def _dataset(config: Config, columns: Mapping[str, NDArray[Any]]) -> xr.Dataset:
     """Label the columns of a sweep."""
     axes, scene = config.axes, config.scene
     model = MODELS[scene.structure.model]
-    known = parameters(scene.structure)
+    known = sweepable(scene)
     shape = tuple(axes.sizes.values())
     dataset = xr.Dataset(
         {
@@ -175,11 +198,7 @@ def _dataset(config: Config, columns: Mapping[str, NDArray[Any]]) -> xr.Dataset:
             if name not in model.absent
         },
         coords={
-            path.replace(".", "_"): (
-                dims,
-                column,
-                {"long_name": known[path].long_name, "units": known[path].unit or "1", "path": path},
-            )
+            path.replace(".", "_"): (dims, column, {**known[path].attributes, "path": path})
             for path, (dims, column) in axes.columns.items()
         },
     )

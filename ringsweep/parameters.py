@@ -53,6 +53,11 @@ class Parameter:
         below = value < self.upper if self.open_upper else value <= self.upper
         return math.isfinite(value) and above and below
 
+    @property
+    def attributes(self) -> dict[str, str]:
+        """CF attributes."""
+        return {"long_name": self.long_name, "units": self.unit or "1"}
+
     def along_a_line(self) -> Parameter:
         """The same quantity where what turns on a ring moves along a line: m in place of rad."""
         name = self.long_name.replace("angular velocity of the ring", "velocity of the belt")
@@ -69,6 +74,27 @@ class Parameter:
         if math.isfinite(self.upper):
             parts.append(f"{'less than' if self.open_upper else 'at most'} {self.upper:.6g}")
         return " and ".join(parts) or "any finite number"
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One of several names, where a parameter is a number.
+
+    Attributes
+    ----------
+    long_name : str
+        What is chosen.
+    names : tuple of str
+        What there is to choose from.
+    """
+
+    long_name: str
+    names: tuple[str, ...]
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """CF attributes; a name has no unit."""
+        return {"long_name": self.long_name}
 
 
 def declared(cls: type) -> dict[str, Parameter]:

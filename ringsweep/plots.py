@@ -46,10 +46,21 @@ REGIME_COLOURS: dict[str, str] = {
 #: Kinds of file that `save` writes.
 SUFFIXES = (".pdf", ".png", ".svg")
 
+# Lines of friction laws, which may lie on top of each other: told apart by hue and, the one below showing through
+# gaps, by style. The lengths have no common factor, so that no pair returns soon.
+_LAW_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+_LAW_STYLES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (8, 3)))
+
 _NO_VALUE = "#DDDDDD"
 _OTHER_COLOURS = ("#BBBBBB", "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#F0E442")
 _SMALL = 8
 _MOST_PANELS = 25
+
+# Fraction of a run that the detail of its start shows, before which what happens can count as part of the
+# start, and fraction of the force that counts as a difference.
+_DETAIL = 0.02
+_LATEST = 0.1
+_APART = 0.05
 
 # Columns into which a history is condensed: finer than the pixels of a printed panel.
 _COLUMNS = 4000
@@ -159,11 +170,13 @@ def regime_map(
 
 
 def history(ds: xr.Dataset) -> Figure:
-    """Draw the time history of one run: the four panels of the paper.
+    """Draw the time history of one run, or of one under each of several friction laws: the paper's panels.
 
     For a ring these are angle, angular velocity, angular acceleration and normal reactions, above a strip
     that shows which arc lies under each contact; for a belt displacement, velocity, friction force, and the
-    force just after the start. Stick is shaded.
+    force just after the start. Stick is shaded. Of several laws each is a line, and neither arcs nor stick are
+    shown; the last panel goes on for as long again as the differences between their forces at the start last,
+    over a logarithmic time if these are of more than one scale.
 
     Parameters
     ----------
@@ -181,12 +194,17 @@ def history(ds: xr.Dataset) -> Figure:
     """
     if "time" not in ds.dims or not ds.sizes["time"]:
         raise InputError("ds", "has no dimension time: it is not the history of a run; draw a sweep with regime_map")
-    if "phi" in ds:
+    if ds.sizes.get("friction_law") == 1:
+        ds = ds.isel(friction_law=0)
+    compared = "friction_law" in ds.dims
+    if "phi" not in ds:
+        panels = [["x"], ["velocity"], ["friction_force"]]
+    elif compared:
+        panels = [[name] for name in ("phi", "omega", "epsilon", "normal_1", "normal_2") if name in ds]
+    else:
         panels = [["phi"], ["omega", "ring_omega"], ["epsilon"], ["normal_1", "normal_2"]]
         panels = [[name for name in panel if name in ds] for panel in panels]
-    else:
-        panels = [["x"], ["velocity"], ["friction_force"]]
-    zones = [name for name in ("zone_1", "zone_2") if name in ds]
+    zones = [] if compared else [name for name in ("zone_1", "zone_2") if name in ds]
     detail = "phi" not in ds
 
     time = ds["time"].values
@@ -198,20 +216,28 @@ def history(ds: xr.Dataset) -> Figure:
         ax.sharex(timed[0])
     for ax in timed[:-1]:
         ax.tick_params(labelbottom=False)
+    draw = _draw_laws if compared else _draw_history
     for ax, names in zip(axes, panels, strict=False):
-        _draw_history(ax, ds, names)
+        draw(ax, ds, names)
     if zones:
         _draw_zones(axes[-1], ds, zones)
     if detail:
-        start = ds.isel(time=slice(0, max(20, int(np.searchsorted(time, time[0] + 0.02 * (time[-1] - time[0]))))))
-        _draw_history(axes[-1], start, ["friction_force"])
+        first, last = _transients(ds) if compared else (0.0, _DETAIL / 2 * (time[-1] - time[0]))
+        start = ds.isel(time=slice(0, max(20, int(np.searchsorted(time, time[0] + 2.0 * last)))))
+        draw(axes[-1], start, ["friction_force"])
+        if 0.0 < first < 0.05 * last:
+            axes[-1].set_xscale("log")
+            axes[-1].set_xlim(left=first / 20.0)
         axes[-1].set_title("friction force just after the start", fontsize=_SMALL, loc="left")
         timed[-1].set_xlabel(_label(ds["time"], ds))
     if time[-1] > time[0]:
         timed[0].set_xlim(time[0], time[-1])
     axes[-1].set_xlabel(_label(ds["time"], ds))
     figure.align_ylabels(axes)
-    if outcome := ds.attrs.get("outcome"):
+    if compared:
+        lines = axes[0].get_legend_handles_labels()
+        figure.legend(*lines, loc="outside upper center", ncols=3, fontsize=_SMALL, frameon=False, handlelength=4)
+    elif outcome := ds.attrs.get("outcome"):
         figure.suptitle(str(outcome), fontsize=11)
     return figure
 
@@ -483,6 +509,52 @@ def _draw_history(axes: Axes, ds: xr.Dataset, names: list[str]) -> None:
         _clip(axes, ds["epsilon"].values)
 
 
+def _draw_laws(axes: Axes, ds: xr.Dataset, names: list[str]) -> None:
+    """One quantity under each friction law."""
+    (name,) = names
+    numbers = ds[name].transpose("friction_law", "time").values
+    for k, law in enumerate(ds["friction_law"].values):
+        axes.plot(
+            *_envelope(ds["time"].values, numbers[k]),
+            color=_LAW_COLOURS[k % len(_LAW_COLOURS)],
+            linestyle=_LAW_STYLES[k % len(_LAW_STYLES)],
+            linewidth=1.8 if k == 0 else 1.2,
+            label=f"{law}: {_regime(ds, k)}" if "regime" in ds else str(law),
+        )
+    axes.set_ylabel(_symbol(ds, names))
+    axes.margins(x=0)
+    if name.startswith("normal"):
+        axes.set_title(f"contact {name[-1]}", fontsize=_SMALL, loc="left")
+    if name in ("epsilon", "friction_force"):
+        _clip(axes, numbers)
+
+
+def _regime(ds: xr.Dataset, k: int) -> str:
+    """Regime under the friction law at place `k`, in words."""
+    flags = np.atleast_1d(ds["regime"].attrs["flag_values"]).tolist()
+    meanings = str(ds["regime"].attrs["flag_meanings"]).split()
+    return meanings[flags.index(int(ds["regime"][k]))]
+
+
+def _transients(ds: xr.Dataset) -> tuple[float, float]:
+    """When the first and the last of the differences at the start of runs under several friction laws are over.
+
+    A difference between their forces is over if they agree for as long again as has gone by then. The
+    bristles of a law bend within milliseconds, and the body rings on them for longer.
+    """
+    since = ds["time"].values - ds["time"].values[0]
+    force = ds["friction_force"].transpose("friction_law", "time").values
+    spread = np.fmax.reduce(force) - np.fmin.reduce(force)
+    # Not of the greatest force: it may be a spike.
+    apart = np.flatnonzero((spread > _APART * np.nanpercentile(np.abs(force), 95)) & (since > 0.0))
+    again = np.append(apart[1:], len(since) - 1)
+    ends = since[apart[(since[again] > 2.0 * since[apart]) & (again > apart + 1)]]
+    ends = ends[ends < _LATEST * since[-1]]
+    if not len(ends):
+        return _DETAIL / 2 * since[-1], _DETAIL / 2 * since[-1]
+    return ends[0], ends[-1]
+
+
 def _draw_zones(axes: Axes, ds: xr.Dataset, zones: list[str]) -> None:
     rows = []
     for name in zones:
@@ -522,7 +594,10 @@ def _envelope(time: NDArray[Any], numbers: NDArray[Any]) -> tuple[NDArray[Any], 
         return time, numbers
     starts = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], _COLUMNS, endpoint=False)))
     low, high = np.fmin.reduceat(numbers, starts), np.fmax.reduceat(numbers, starts)
-    return np.repeat(time[starts], 2), np.column_stack([low, high]).ravel()
+    # A line that went back and forth where it falls would fill the gaps between its dashes.
+    falls = numbers[starts] > numbers[np.append(starts[1:], len(time)) - 1]
+    columns = np.where(falls, (high, low), (low, high))
+    return np.repeat(time[starts], 2), columns.T.ravel()
 
 
 def _sampled(time: NDArray[Any], states: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -607,6 +682,7 @@ def _symbol(ds: xr.Dataset, names: list[str]) -> str:
         "omega": "angular velocity",
         "epsilon": "angular\nacceleration",
         "normal_1": "normal reaction",
+        "normal_2": "normal reaction",
         "x": "displacement",
         "velocity": "velocity",
         "friction_force": "friction force",
@@ -617,7 +693,9 @@ def _symbol(ds: xr.Dataset, names: list[str]) -> str:
 def _units(data: xr.DataArray, angle: str) -> str:
     units = str(data.attrs.get("units", "1"))
     units = angle if units == "rad" else "" if units == "1" else units
-    return re.sub(r"(?<=[A-Za-z])(-?\d+)", r"$^{\1}$", units)
+    # Parameters have "m/s^2" where variables have "m s-2".
+    units = re.sub(r"/([A-Za-z]+)\^?(\d*)", lambda unit: f" {unit[1]}-{unit[2] or 1}", units)
+    return re.sub(r"(?<=[A-Za-z])\^?(-?\d+)", r"$^{\1}$", units)
 
 
 def _value_text(value: xr.DataArray) -> str:

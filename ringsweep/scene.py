@@ -17,6 +17,9 @@ from ringsweep.errors import InputError
 
 Values = Mapping[str, NDArray[np.float64]]
 
+#: Path of the friction law: the one choice, among numbers, that a sweep can go through.
+LAW = "friction.law"
+
 
 @dataclass(frozen=True)
 class Structure:
@@ -41,11 +44,26 @@ class Structure:
 
 @dataclass(frozen=True)
 class Scene:
-    """A structure, its values in SI units by dotted path, and the mapping that they came from."""
+    """What a configuration describes.
 
-    structure: Structure
+    Attributes
+    ----------
+    structures : dict of str to Structure
+        By the name of the friction law; several, alike in all else, where a sweep goes through laws.
+    values : mapping of str to float
+        In SI units by dotted path. Where there are several laws, each finds its own among them.
+    source : mapping
+        What they came from.
+    """
+
+    structures: dict[str, Structure]
     values: Mapping[str, float]
     source: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def structure(self) -> Structure:
+        """The structure; the first, where a sweep goes through laws."""
+        return next(iter(self.structures.values()))
 
 
 def require(allowed: Any, path: str, values: Any, problem: str) -> None:

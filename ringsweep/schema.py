@@ -13,7 +13,7 @@ from ringsweep.models import MODELS, parameters
 from ringsweep.parameters import Parameter, declared
 from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS
-from ringsweep.scene import Structure
+from ringsweep.scene import LAW, Structure
 from ringsweep.solvers import METHODS
 
 
@@ -34,15 +34,14 @@ def schema() -> dict[str, Any]:
     scene = _nest(
         {
             "model": _names(MODELS, "what moves"),
-            "friction.law": _names(LAWS, "friction law"),
+            LAW: _names(LAWS, "friction law; may be missing where sweep goes through laws"),
             "drive.law": _names(DRIVES, "how the ring is driven"),
             "drive.file": {"type": "string", "description": "CSV file with columns t (s), theta (rad)"},
             **{f"drive.{name}": _list(_number(parameter)) for name, parameter in TABLE.items()},
             **leaves,
         }
     )
-    scene["required"] = ["model", "friction"]
-    scene["properties"]["friction"]["required"] = ["law"]
+    scene["required"] = ["model"]
     scene["properties"]["drive"]["required"] = ["law"]
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -112,7 +111,8 @@ def _solver() -> dict[str, Any]:
 def _sweep(paths: list[str]) -> dict[str, Any]:
     value = {"type": ["number", "string"]}
     arcs = "|".join(path.removeprefix("zones.0.") for path in paths if path.startswith("zones.0."))
-    names = {"anyOf": [{"enum": paths}, {"pattern": rf"^zones\.[0-9]+\.({arcs})$"}]}
+    laws = {LAW: _list(_names(LAWS, "friction law"))}
+    names = {"anyOf": [{"enum": [*laws, *paths]}, {"pattern": rf"^zones\.[0-9]+\.({arcs})$"}]}
     bounds = {"type": "array", "prefixItems": [value, value, _number(COUNT, "integer")], "minItems": 3, "maxItems": 3}
     axis = {"anyOf": [_list(value), *(_section({kind: bounds}) for kind in ("linspace", "geomspace"))]}
     return _section(
@@ -121,13 +121,19 @@ def _sweep(paths: list[str]) -> dict[str, Any]:
                 "description": "path -> values; every combination is run",
                 "type": "object",
                 "propertyNames": names,
+                "properties": {LAW: {**laws[LAW], "uniqueItems": True}},
                 "additionalProperties": axis,
             },
             "points": {
                 "description": "CSV file whose columns are paths and whose rows are runs, or its columns",
                 "anyOf": [
                     {"type": "string"},
-                    {"type": "object", "propertyNames": names, "additionalProperties": _list(value)},
+                    {
+                        "type": "object",
+                        "propertyNames": names,
+                        "properties": laws,
+                        "additionalProperties": _list(value),
+                    },
                 ],
             },
         }

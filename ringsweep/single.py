@@ -1,4 +1,4 @@
-"""Single runs: one cell, with its history."""
+"""Single runs: one cell, with its history, under one friction law or several."""
 
 from __future__ import annotations
 
@@ -9,10 +9,12 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from ringsweep.config import Config, read_solver, with_values
 from ringsweep.engine import compute, provenance
 from ringsweep.models import MODELS, batch
+from ringsweep.scene import Structure
 from ringsweep.variables import HISTORY, REGIMES
 
 #: Instants that a history keeps, about.
@@ -25,22 +27,25 @@ def simulate(
     solver: str | Mapping[str, Any] | None = None,
     samples: int = SAMPLES,
 ) -> xr.Dataset:
-    """Run one scene and keep its history.
+    """Run one scene and keep its history; a sweep over friction laws makes it a run under each.
 
     Parameters
     ----------
     scene : mapping or path
-        The configuration's ``scene``, or a whole configuration, or the path of one; its sweep is ignored.
+        The configuration's ``scene``, or a whole configuration, or the path of one; what it sweeps,
+        other than a grid of friction laws, is ignored.
     solver : str or mapping, optional
         A method's name, or the configuration's ``solver``; by default the configuration's own.
     samples : int
-        About how many instants to keep.
+        About how many instants to keep of a run.
 
     Returns
     -------
     xarray.Dataset
         Dimension ``time``, variables as in :data:`ringsweep.variables.HISTORY`, and the outcomes of
-        the run as scalars.
+        the run as scalars. If laws are compared these have the dimension ``friction_law``, and the
+        histories both: at the instants of all runs, NaN after the end of a run that ends early (where a
+        classification stays as it was).
 
     Raises
     ------
@@ -58,19 +63,30 @@ def _alone(scene: str | os.PathLike[str] | Mapping[str, Any], solver: str | Mapp
     if solver is None:
         return config
     method = {"method": solver} if isinstance(solver, str) else dict(solver)
-    chosen = read_solver(method)
-    chosen.check(config.scene.structure)
-    return replace(config, solver=chosen, source=config.source | {"solver": method})
+    return replace(config, solver=read_solver(method, config.scene), source=config.source | {"solver": method})
 
 
 def history(config: Config, *, samples: int = SAMPLES) -> xr.Dataset:
-    """Run a configuration without axes and keep its history; see :func:`simulate`."""
-    model = MODELS[config.scene.structure.model]
-    cell = batch(config.scene.structure, {path: np.array([value]) for path, value in config.scene.values.items()})
-    names = model.history(config.scene.structure)
-    times, rows = config.solver.history(cell, samples, len(names))
+    """Run a configuration with no axis but friction laws and keep the history; see :func:`simulate`."""
+    runs = {law: _trace(config, structure, samples) for law, structure in config.scene.structures.items()}
     outcome = compute(config, jobs=1, progress=False)
-    kept = xr.Dataset(
+    if not config.axes.sizes:
+        (kept,) = runs.values()
+        words = describe(outcome)
+    else:
+        times = np.unique(np.concatenate([run["time"] for run in runs.values()]))
+        kept = xr.concat([_resampled(run, times) for run in runs.values()], "friction_law")
+        words = "\n".join(f"{law}: {describe(outcome.sel(friction_law=law))}" for law in runs)
+    return kept.merge(outcome).assign_attrs(provenance(config) | {"outcome": words})
+
+
+def _trace(config: Config, structure: Structure, samples: int) -> xr.Dataset:
+    """History under one friction law, as the method stores it."""
+    model = MODELS[structure.model]
+    cell = batch(structure, {path: np.array([value]) for path, value in config.scene.values.items()})
+    names = model.history(structure)
+    times, rows = config.solver.history(cell, samples, len(names))
+    return xr.Dataset(
         {
             name: ("time", rows[:, k].astype(HISTORY[name].dtype), HISTORY[name].attributes)
             for k, name in enumerate(names)
@@ -78,7 +94,19 @@ def history(config: Config, *, samples: int = SAMPLES) -> xr.Dataset:
         },
         coords={"time": ("time", times, {"long_name": "time", "units": "s", "axis": "T"})},
     )
-    return kept.merge(outcome).assign_attrs(provenance(config) | {"outcome": describe(outcome)})
+
+
+def _resampled(run: xr.Dataset, times: NDArray[np.float64]) -> xr.Dataset:
+    """A history at other times: numbers from the line between two samples, classifications from the one before."""
+    # Where an event stores two states of one instant, the second is the one that goes on.
+    run = run.isel(time=np.append(np.diff(run["time"]) > 0.0, True))
+    own = run["time"].values
+    before = np.maximum(np.searchsorted(own, times, side="right") - 1, 0)
+    found = run.isel(time=before).assign_coords(time=("time", times, run["time"].attrs))
+    for name, data in run.items():
+        if data.dtype.kind == "f":
+            found[name] = found[name].copy(data=np.interp(times, own, data, right=np.nan))
+    return found
 
 
 def describe(outcome: xr.Dataset) -> str:

@@ -131,6 +131,16 @@ def test_labels_carry_names_and_units_and_angles_are_in_degrees():
     assert figure.axes[1].get_ylabel() == "time of separation (s)"
 
 
+@pytest.mark.parametrize(
+    ("units", "shown"),
+    [("rad/s", "rad s$^{-1}$"), ("m/s^2", "m s$^{-2}$"), ("kg m^2", "kg m$^{2}$"), ("s/m", "s m$^{-1}$"), ("kg", "kg")],
+)
+def test_units_of_parameters_are_written_like_those_of_variables(units, shown):
+    ds = make_sweep()
+    ds["drive_amplitude"].attrs["units"] = units
+    assert plots.regime_map(ds).axes[0].get_xlabel() == f"amplitude of the drive ({shown})"
+
+
 def test_coordinates_of_one_long_name_are_told_apart():
     ds = make_sweep((3, 3, 3, 3))
     figure = plots.regime_map(ds.isel(drive_amplitude=0, zone_half_angle=0))

@@ -1,0 +1,325 @@
+"""Friction laws side by side: as an axis of a sweep, as runs in one dataset, as lines in one picture."""
+
+import copy
+import json
+import logging
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+import yaml
+from jsonschema import Draft202012Validator
+
+import ringsweep
+from ringsweep import plots, storage
+from ringsweep.cli import main
+from ringsweep.config import load, with_values
+from ringsweep.errors import InputError
+from ringsweep.schema import schema
+
+CONFIGS = Path(__file__).parents[1] / "configs"
+LAWS = ["coulomb", "stiction", "tustin"]
+CONFIG = {
+    "scene": {
+        "model": "belt",
+        "body": {"mass": 1.0},
+        "spring": {"stiffness": 2.0},
+        "belt": {"velocity": 0.1},
+        "friction": {"mu_s": 0.15, "mu_k": 0.1, "alpha": 10.0},
+        "time": {"span": 20.0},
+    },
+    "sweep": {"grid": {"friction.law": LAWS, "belt.velocity": [0.05, 0.1]}},
+}
+
+
+def changed(**changes):
+    """The configuration with paths (dots as double underscores) replaced; None takes a key away."""
+    config = copy.deepcopy(CONFIG)
+    for path, value in changes.items():
+        *parents, last = path.split("__")
+        node = config
+        for key in parents:
+            node = node[key]
+        if value is None:
+            del node[last]
+        else:
+            node[last] = value
+    return config
+
+
+def grid(**axes):
+    return changed(sweep={"grid": {path.replace("__", "."): values for path, values in axes.items()}})
+
+
+def refusal(call, *arguments):
+    with pytest.raises(InputError) as caught:
+        call(*arguments)
+    return caught.value
+
+
+@pytest.fixture(scope="module")
+def swept():
+    return ringsweep.run(CONFIG, progress=False)
+
+
+@pytest.fixture(scope="module")
+def compared():
+    return ringsweep.simulate(grid(friction__law=LAWS))
+
+
+class TestSweep:
+    def test_laws_are_an_axis_of_words(self, swept):
+        assert dict(swept.sizes) == {"friction_law": 3, "belt_velocity": 2}
+        assert swept.friction_law.values.tolist() == LAWS
+        assert swept.friction_law.attrs == {"long_name": "friction law", "path": "friction.law"}
+
+    @pytest.mark.parametrize("law", LAWS)
+    def test_each_cell_is_the_run_under_its_law(self, swept, law):
+        for speed in (0.05, 0.1):
+            run = ringsweep.simulate(changed(scene__friction__law=law, scene__belt__velocity=speed, sweep=None))
+            cell = swept.sel(friction_law=law, belt_velocity=speed)
+            for name in swept.data_vars:
+                np.testing.assert_array_equal(cell[name], run[name], err_msg=name)
+
+    def test_the_order_of_axes_changes_no_cell(self, swept):
+        turned = ringsweep.run(grid(belt__velocity=[0.05, 0.1], friction__law=LAWS[::-1]), jobs=1, progress=False)
+        assert turned.regime.dims == ("belt_velocity", "friction_law")
+        xr.testing.assert_equal(turned.transpose(*swept.dims).sel(friction_law=LAWS), swept)
+
+    def test_a_parameter_of_one_law_repeats_the_cells_of_the_others(self):
+        found = ringsweep.run(grid(friction__alpha=[1.0, 10.0], friction__law=["stiction", "tustin"]), progress=False)
+        first, second = (found.x_end.sel(friction_alpha=alpha) for alpha in (1.0, 10.0))
+        assert (first == second).values.tolist() == [True, False]
+
+    def test_python_takes_laws_beside_numbers(self, swept):
+        found = ringsweep.sweep(CONFIG["scene"], {"friction.law": LAWS, "belt.velocity": [0.05, 0.1]}, progress=False)
+        xr.testing.assert_equal(found, swept)
+        again = ringsweep.run(json.loads(found.attrs["configuration"]), progress=False)
+        xr.testing.assert_equal(again.transpose(*found.dims), found)
+
+    def test_a_law_can_be_paired_with_a_number(self, swept):
+        law = xr.DataArray(["tustin", "coulomb"], dims="rig")
+        speed = xr.DataArray([0.05, 0.1], dims="rig")
+        found = ringsweep.sweep(CONFIG["scene"], {"friction.law": law, "belt.velocity": speed}, progress=False)
+        np.testing.assert_array_equal(found.x_end, swept.x_end.sel(friction_law=law, belt_velocity=speed))
+        again = ringsweep.run(json.loads(found.attrs["configuration"]), progress=False)
+        np.testing.assert_array_equal(again.x_end, found.x_end)
+
+    def test_the_file_is_read_back_and_drawn(self, swept, tmp_path):
+        storage.save(swept, tmp_path / "laws.nc")
+        loaded = storage.load(tmp_path / "laws.nc")
+        xr.testing.assert_identical(loaded, swept)
+        ticks = plots.regime_map(loaded, x="friction.law").axes[0].get_xticklabels()
+        assert [tick.get_text() for tick in ticks] == LAWS
+
+
+class TestConfiguration:
+    @pytest.mark.parametrize(
+        ("laws", "path", "problem"),
+        [
+            (["coulomb", "striction"], "sweep.grid.friction.law.1", "did you mean `stiction`?"),
+            (["coulomb", "coulomb"], "sweep.grid.friction.law.1", "stands twice"),
+            (["coulomb", 3], "sweep.grid.friction.law.1", "3 is not a friction law"),
+            ("coulomb", "sweep.grid.friction.law", "a list of values"),
+            ([], "sweep.grid.friction.law", "empty"),
+            ({"linspace": [1, 2, 3]}, "sweep.grid.friction.law", "list"),
+        ],
+    )
+    def test_wrong_names_are_refused_where_they_stand(self, laws, path, problem):
+        error = refusal(load, grid(friction__law=laws))
+        assert error.path == path
+        assert problem in error.problem
+        assert not Draft202012Validator(schema()).is_valid(grid(friction__law=laws))
+
+    def test_a_misspelt_law_of_the_scene_is_refused_though_it_is_swept(self):
+        assert refusal(load, changed(scene__friction__law="colomb")).path == "scene.friction.law"
+
+    def test_what_any_law_needs_must_be_given_or_swept(self):
+        missing = changed(scene__friction__alpha=None)
+        assert refusal(load, missing).path == "scene.friction.alpha"
+        missing["sweep"]["grid"]["friction.alpha"] = [5.0, 10.0]
+        assert load(missing).axes.sizes["friction_alpha"] == 2
+        assert load(changed(scene__friction={"mu_k": 0.1}, sweep={"grid": {"friction.law": ["coulomb"]}}))
+
+    def test_only_what_no_law_uses_is_said_to_be_unused(self, caplog):
+        with caplog.at_level(logging.WARNING, logger="ringsweep"):
+            load(CONFIG)
+            assert not caplog.records
+            load(grid(friction__law=["coulomb", "stiction"]))
+        assert [record.args[0] for record in caplog.records] == ["friction.alpha"]
+
+    def test_the_method_must_take_each_law(self):
+        config = changed(solver={"method": "event"}, scene__friction__v0=1e-3)
+        load(config)
+        config["sweep"]["grid"]["friction.law"] = ["coulomb", "bengisu-akay"]
+        assert "does not take friction law bengisu-akay" in refusal(load, config).problem
+
+    def test_values_are_checked_under_each_law(self):
+        """Coulomb friction knows no static coefficient that the kinetic one could exceed."""
+        load(grid(friction__law=["coulomb"], friction__mu_k=[0.1, 0.2]))
+        assert "exceeds mu_s" in refusal(load, grid(friction__law=LAWS, friction__mu_k=[0.1, 0.2])).problem
+
+    def test_a_sweep_is_not_blamed_for_what_is_wrong_without_it(self):
+        wrong = changed(scene__friction__mu_k=0.2)
+        assert refusal(load, wrong).problem.endswith("static friction")
+        wrong["scene"]["belt"].clear()
+        assert refusal(load, wrong).problem.endswith("static friction")
+        assert refusal(load, grid(friction__law=LAWS, friction__mu_s=[0.05, 0.2])).problem.endswith("of the sweep)")
+
+    def test_the_schema_accepts_laws_as_an_axis(self):
+        Draft202012Validator(schema()).validate(CONFIG)
+        points = {"points": {"friction.law": ["coulomb", "coulomb"], "belt.velocity": [0.1, 0.2]}}
+        Draft202012Validator(schema()).validate(changed(sweep=points))
+        assert load(changed(sweep=points)).axes.sizes == {"point": 2}
+
+
+class TestRuns:
+    def test_each_history_is_that_of_its_law_alone(self, compared):
+        assert compared.x.dims == ("friction_law", "time")
+        assert (compared.time.diff("time") > 0).all()
+        for law in LAWS:
+            alone = ringsweep.simulate(changed(scene__friction__law=law, sweep=None))
+            own = compared.sel(friction_law=law)
+            assert np.isin(alone.time, compared.time).all()
+            # At an event the state after it is kept.
+            last = alone.isel(time=np.append(np.diff(alone.time) > 0, True))
+            for name in ("x", "velocity", "friction_force", "mode"):
+                np.testing.assert_array_equal(own[name].sel(time=last.time), last[name], err_msg=name)
+                assert own[name].dtype == alone[name].dtype
+                assert own[name].attrs.keys() == alone[name].attrs.keys()
+            for name in ("regime", "x_end", "slips"):
+                assert own[name] == alone[name]
+
+    def test_between_samples_numbers_are_interpolated_and_modes_held(self, compared):
+        """Stuck to the belt the body moves at its speed, whether or not its own run had a sample there."""
+        stuck = compared.where(compared["mode"] == 0)
+        np.testing.assert_allclose(stuck.velocity.where(stuck.velocity.notnull(), 0.1), 0.1, atol=1e-9)
+        assert set(np.unique(compared["mode"])) <= {-1, 0, 1}
+
+    def test_the_outcome_is_told_for_each_law(self, compared):
+        lines = compared.attrs["outcome"].split("\n")
+        assert [line.split(":")[0] for line in lines] == LAWS
+        assert lines[0].startswith("coulomb: oscillatory")
+        assert lines[1].startswith("stiction: stick-slip")
+
+    def test_the_file_is_enough_to_run_again(self, compared, tmp_path):
+        storage.save(compared, tmp_path / "laws-run.nc")
+        loaded = storage.load(tmp_path / "laws-run.nc")
+        xr.testing.assert_identical(loaded, compared)
+        xr.testing.assert_identical(ringsweep.simulate(json.loads(loaded.attrs["configuration"])), compared)
+
+    def test_a_law_that_is_set_is_the_only_one(self):
+        config = with_values(CONFIG, ["friction.law=stiction"])
+        assert not config.axes.sizes
+        assert config.scene.structure.law == "stiction"
+
+    def test_what_else_is_swept_still_needs_a_value(self):
+        missing = changed(scene__belt={}, sweep__grid__gravity=[9.81])
+        missing["scene"]["body"].clear()
+        missing["sweep"]["grid"]["body.mass"] = [1.0, 2.0]
+        assert "--set body.mass=VALUE" in refusal(with_values, missing).problem
+        settled = with_values(missing, ["body.mass=1", "belt.velocity=0.1"])
+        assert settled.axes.sizes == {"friction_law": 3}
+
+    def test_a_run_that_ends_early_has_no_numbers_afterwards(self):
+        ring = load(CONFIGS / "regime_map.yaml").source["scene"]
+        friction = {"rough": ring["friction"]["rough"], "rest": ring["friction"]["rest"]}
+        scene = ring | {"friction": friction, "time": {"span": 4.0}}
+        laws = ["stiction", "coulomb"]
+        found = ringsweep.simulate({"scene": scene, "sweep": {"grid": {"friction.law": laws}}})
+        ended = found.time > found.t_end
+        assert ended.any("time").values.tolist() == [True, False]
+        assert (found.phi.isnull() == ended).all()
+        assert found.zone_1.dtype == "int32"
+        figure = plots.history(found)
+        assert [len(axes.lines) for axes in figure.axes] == [2] * 5
+        assert figure.axes[4].get_title(loc="left") == "contact 2"
+
+
+class TestPicture:
+    def test_each_panel_has_a_line_for_each_law_and_no_shading(self, compared):
+        figure = plots.history(compared)
+        assert len(figure.axes) == 4
+        for axes in figure.axes:
+            assert len({(line.get_color(), line.get_linestyle()) for line in axes.lines}) == 3
+            assert not axes.collections
+            assert axes.get_legend() is None
+        (legend,) = figure.legends
+        assert [text.get_text() for text in legend.get_texts()] == [
+            "coulomb: oscillatory",
+            "stiction: stick-slip",
+            "tustin: stick-slip",
+        ]
+
+    def test_the_legend_covers_no_panel(self, compared):
+        figure = plots.history(compared)
+        figure.draw_without_rendering()
+        legend = figure.legends[0].get_window_extent()
+        assert not any(legend.overlaps(axes.get_window_extent()) for axes in figure.axes)
+
+    def test_one_law_is_drawn_as_ever(self, compared):
+        figure = plots.history(compared.isel(friction_law=[1]))
+        assert not figure.legends
+        assert figure.axes[0].collections
+
+    def test_many_laws_are_told_apart(self, compared):
+        many = compared.isel(friction_law=[0, 1, 2] * 3).assign_coords(friction_law=list("abcdefghi"))
+        lines = plots.history(many).axes[0].lines
+        assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == 9
+
+    def test_the_detail_ends_when_the_first_differences_have_been_over_for_as_long(self, compared):
+        """Tustin's body is caught by the belt before the others; then all stick until the first breaks loose."""
+        caught = 0.1 / (0.1 * 9.81)
+        start, end = plots.history(compared).axes[-1].get_xlim()
+        assert start == 0.0
+        assert end == pytest.approx(2 * caught, rel=0.05)
+        force = compared.friction_force.sel(time=slice(caught * 1.05, end))
+        assert float((force.max("friction_law") - force.min("friction_law")).max()) < 0.02
+
+    def test_transients_of_two_scales_are_drawn_over_logarithmic_time(self, compared):
+        time = np.concatenate([np.linspace(0, 1e-3, 1000), np.linspace(2e-3, 10, 20_000)])
+        bristle = 1 - np.exp(-time / 1e-4) + np.where(time > 0.1, np.exp(-5 * (time - 0.1)) * np.sin(200 * time), 0)
+        force = ("friction_law", "time"), np.array([np.ones_like(time), bristle]), compared.friction_force.attrs
+        ds = xr.Dataset(
+            dict.fromkeys(("x", "velocity", "friction_force"), force),
+            coords={"time": ("time", time, compared.time.attrs), "friction_law": ["rigid", "bristle"]},
+        )
+        detail = plots.history(ds).axes[-1]
+        assert detail.get_xscale() == "log"
+        start, end = detail.get_xlim()
+        assert start < 5e-5
+        assert 0.5 < end < 2.0
+
+
+class TestCommands:
+    @pytest.fixture
+    def folder(self, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        (tmp_path / "laws.yaml").write_text(yaml.safe_dump(CONFIG))
+        return tmp_path
+
+    def test_a_sweep_is_run_drawn_and_told(self, folder, capsys):
+        assert main(["run", "laws.yaml"]) == 0
+        assert main(["run", "laws.yaml"]) == 0
+        assert main(["map", "laws.nc", "--sel", "friction.law=tustin"]) == 0
+        assert main(["info", "laws.nc"]) == 0
+        out, err = capsys.readouterr()
+        assert err == ""
+        assert "holds this sweep already" in out
+        assert "friction_law: coulomb, stiction, tustin\n" in out
+        assert (folder / "laws-friction.law=tustin.png").exists()
+
+    def test_a_comparison_tells_a_line_for_each_law(self, folder, capsys):
+        assert main(["simulate", "laws.yaml"]) == 0
+        out, _ = capsys.readouterr()
+        assert [line.split(":")[0] for line in out.splitlines()[:3]] == LAWS
+        assert (folder / "laws-run.png").exists()
+        assert main(["info", "laws-run.nc"]) == 0
+        assert "friction_law 3" in capsys.readouterr().out
+
+    def test_a_number_of_threads_in_words_is_refused_readably(self, capsys):
+        for jobs in ("two", "0", "-1", "1.5"):
+            with pytest.raises(SystemExit):
+                main(["run", "laws.yaml", f"--jobs={jobs}"])
+            assert f"'{jobs}' is not a whole number of at least 1" in capsys.readouterr().err
