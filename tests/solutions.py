@@ -25,7 +25,7 @@ HISTORY = ("phi", "omega", "epsilon", "normal_1", "normal_2", "ring_omega", "zon
 def trail(method, batch, spacing):
     """History of the first cell: every end of a step, and instants `spacing` apart."""
     times, rows = np.empty(2_000_000), np.empty((2_000_000, len(HISTORY)))
-    count = trace(batch, *method.tolerances(), method.max_steps, spacing, times, rows)
+    count = trace(batch, method.tolerances(), method.max_steps, spacing, times, rows)
     return SimpleNamespace(t=times[:count], **dict(zip(HISTORY, rows[:count].T, strict=True)))
 
 

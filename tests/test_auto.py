@@ -71,9 +71,9 @@ class TestCertificate:
         """Tolerance and number of cells of every integration."""
         seen = []
 
-        def spy(batch, tolerance, *rest, integrate=event.integrate):
-            seen.append((tolerance, len(batch.span)))
-            return integrate(batch, tolerance, *rest)
+        def spy(batch, tolerances, *rest, integrate=event.integrate):
+            seen.append((tolerances[0], len(batch.span)))
+            return integrate(batch, tolerances, *rest)
 
         monkeypatch.setattr(event, "integrate", spy)
         return seen

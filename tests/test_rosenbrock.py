@@ -127,7 +127,7 @@ def _rates(scene, mode, force, x):
 def _linearise(scene, mode, t, x):
     k, slow = scene.stiffness, x[1]
     rates = _rates(scene, mode, _forcing(scene, t), x)
-    return rates, (-(k + 2), 2 * k * slow, 1.0, -1 - 2 * slow), ((k + 2) * cos(t) - sin(t), -cos(t))
+    return rates, (-(k + 2), 2 * k * slow, 1.0, -1 - 2 * slow), (), ((k + 2) * cos(t) - sin(t), -cos(t))
 
 
 class Pursuit(NamedTuple):
@@ -154,7 +154,7 @@ def _pursuit_rates(scene, mode, force, x):
 def _pursuit_linearise(scene, mode, t, x):
     k = scene.stiffness
     rates = _pursuit_rates(scene, mode, _pursuit_forcing(scene, t), x)
-    return rates, (-k, 0.0, 1.0, -1.0), (k * cos(t) - sin(t), -cos(t))
+    return rates, (-k, 0.0, 1.0, -1.0), (), (k * cos(t) - sin(t), -cos(t))
 
 
 def integrate(scene, steps, end=1.0):
@@ -182,6 +182,25 @@ def distance(one, other):
 def orders(scene, steps):
     errors = np.array([integrate(scene, n) for n in steps])
     return -np.polyfit(np.log(steps), np.log(errors), 1)[0]
+
+
+class TestLinearSystem:
+    """The stages solve ``(shift I - J) k = r`` with the Jacobian of a body on bristles."""
+
+    @pytest.mark.parametrize("count", [0, 1, 2])
+    def test_is_that_of_dense_algebra(self, count):
+        rng = np.random.default_rng(count)
+        for decay in (1.0, 1e6, 1e12):
+            core, couplings = rng.normal(size=4), rng.normal(size=(count, 3))
+            couplings[:, 2] = -decay * abs(couplings[:, 2])
+            right, found, shift = rng.normal(size=2 + count), np.empty(2 + count), 3.0
+            jacobian = np.zeros((2 + count, 2 + count))
+            jacobian[:2, :2] = core.reshape(2, 2)
+            jacobian[1, 2:], jacobian[2:, 1] = couplings[:, 0], couplings[:, 1]
+            jacobian[range(2, 2 + count), range(2, 2 + count)] = couplings[:, 2]
+            rosenbrock.solve(tuple(core), tuple(map(tuple, couplings)), shift, tuple(right), found)
+            expected = np.linalg.solve(shift * np.eye(2 + count) - jacobian, right)
+            np.testing.assert_allclose(found, expected, rtol=1e-11)
 
 
 class TestOrder:
