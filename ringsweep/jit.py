@@ -177,6 +177,20 @@ def combine(length, y, weights, rows, count):
 
 
 @_unrolled
+def combine_twice(length, y, weights, others, rows, count):
+    """:func:`combine` of ``y`` and of zero, with two sets of weights in one pass."""
+    numbers = range(length)
+    return [
+        "".join(f"a{i}, " for i in numbers) + "= y",
+        " = ".join(f"b{i}" for i in numbers) + " = 0.0",
+        "for j in range(count):",
+        "    v, w = weights[j], others[j]",
+        *(f"    a{i} += v * rows[j, {i}]; b{i} += w * rows[j, {i}]" for i in numbers),
+        "return (" + "".join(f"a{i}, " for i in numbers) + "), (" + "".join(f"b{i}, " for i in numbers) + ")",
+    ]
+
+
+@_unrolled
 def zero(length, y):
     """A state of zeros."""
     return ["return (" + "0.0, " * length + ")"]

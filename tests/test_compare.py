@@ -27,6 +27,7 @@ CONFIG = {
         "spring": {"stiffness": 2.0},
         "belt": {"velocity": 0.1},
         "friction": {"mu_s": 0.15, "mu_k": 0.1, "alpha": 10.0},
+        "initial": {"velocity": 0.0},
         "time": {"span": 20.0},
     },
     "sweep": {"grid": {"friction.law": LAWS, "belt.velocity": [0.05, 0.1]}},

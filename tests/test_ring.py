@@ -266,7 +266,7 @@ def mu(law, speed, mu_s=0.5, mu_k=0.3):
 class TestBengisuAkay:
     @given(laws, st.floats(0.0, 3.0))
     def test_is_the_papers_law(self, law, speed):
-        alpha, v0 = law
+        alpha, v0, _ = law
         inside = 0.5 * (1 - (1 - speed / v0) ** 2)
         outside = 0.3 * (1 + (0.5 / 0.3 - 1) * exp(-alpha * (speed - v0))) if speed >= v0 else None
         assert mu(law, speed) == pytest.approx(inside if speed < v0 else outside, rel=1e-12, abs=1e-15)

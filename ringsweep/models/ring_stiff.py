@@ -12,7 +12,7 @@ from ringsweep import hooks, regimes
 from ringsweep.jit import inlined
 from ringsweep.models.ring_series import coefficients_under
 from ringsweep.physics import drives, ring
-from ringsweep.physics.friction.static import BAND, stiction_band, weights
+from ringsweep.physics.friction.static import BAND, stiction_band, weights_in
 from ringsweep.physics.zones import coefficients, edge_ahead
 
 
@@ -21,7 +21,7 @@ def _friction(scene, mode, v):
     """K at each contact and its derivative by the angular velocity, in the segments of the mode."""
     mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
     sign = 1.0 if v >= 0.0 else -1.0
-    w_s, w_k, dw_s, dw_k = weights(scene.law, abs(v))
+    w_s, w_k, dw_s, dw_k = weights_in(scene.law, mode.region, abs(v))
     radius = scene.body.radius
     return (
         -sign * (w_s * mu_s1 + w_k * mu_k1),

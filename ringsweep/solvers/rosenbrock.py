@@ -13,7 +13,7 @@ import numpy as np
 from numba.extending import overload
 
 from ringsweep.hooks import forcing, stiff_rates
-from ringsweep.jit import OPTIONS, add_scaled, as_tuple, combine, inlined, zero
+from ringsweep.jit import OPTIONS, add_scaled, as_tuple, combine, combine_twice, inlined, zero
 
 STAGES = 8
 GAMMA = 0.21193756319429014
@@ -119,12 +119,12 @@ def step(scene, mode, t, x, line, h, stages):
     y = x
     for i in range(STAGES):
         if i > 0:
-            y = combine(x, A[i], stages, i)
+            y, coupling = combine_twice(x, A[i], C[i], stages, i)
             # The last three stages are at the same time.
             if 1 < i < STAGES - 2:
                 force = forcing(scene, t + TIMES[i] * h)
             rates = stiff_rates(scene, mode, force, y)
-            rates = add_scaled(rates, over_h, combine(zero(x), C[i], stages, i))
+            rates = add_scaled(rates, over_h, coupling)
         solve(core, bristles, shift, add_scaled(rates, h * DRIFT[i], drift), stages[i])
     # Stiffly accurate: the last stage is the correction, and the error estimate, of the one before.
     error = as_tuple(stages[STAGES - 1], x)

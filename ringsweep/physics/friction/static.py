@@ -107,7 +107,12 @@ def weights(law, speed):
     tuple of float
         ``(w_s, w_k, dw_s/dspeed, dw_k/dspeed)``; weights in 1, slopes in s/m.
     """
-    region = region_at(law, speed)
+    return weights_in(law, region_at(law, speed), speed)
+
+
+@inlined
+def weights_in(law, region, speed):
+    """:func:`weights` by the formula of a region, beyond its bounds too."""
     p = piece(law, region)
     if constant_weights(law, region):
         return p.static[0], p.kinetic[0], 0.0, 0.0
