@@ -127,7 +127,8 @@ class Record(NamedTuple):
     A cycle runs from one maximum of the displacement to the next. ``stuck_for`` is how long the
     body has stuck without a break, ``stuck_later`` how long in all since its first slip, ``stuck_now`` and
     ``stuck_last`` how long in this cycle and in the last complete one. ``low`` is the least displacement since the
-    last maximum, ``middle`` the number of maxima up to half of the span; a swing is the way from ``low`` to a maximum.
+    last maximum, and a swing the way from it to a maximum: the first, the last, and the greatest in the third and in
+    the fourth quarter of the span.
     """
 
     velocity: float
@@ -143,11 +144,12 @@ class Record(NamedTuple):
     slips: int
     first_slip: float
     maxima: int
-    middle: int
     first_maximum: float
     last_maximum: float
     low: float
-    reference_swing: float
+    first_swing: float
+    third_swing: float
+    fourth_swing: float
     last_swing: float
 
 
@@ -157,18 +159,16 @@ _TOUCH = 1e-9
 # A stick shorter than this fraction of the cycle or the span does not make it a cycle of stick and slip.
 _SHORT = 1e-6
 
-# A swing must keep this much of itself over the second half of a run for its amplitude to count as lasting,
-# and be more than rounding makes of the displacement.
+# Swings must keep this much of themselves from one quarter of a run to the next for their amplitude to count as
+# lasting, and be more than the tolerance makes of the displacement.
 _LASTING, _ROUNDING = 0.95, 1e-6
 
 
 @inlined
 def begin(x, velocity, force):
     """Record of a run at its launch."""
-    zero = 0.0
-    return Record(
-        velocity, x, x, velocity, abs(force), zero, zero, zero, zero, zero, 0, nan, 0, 0, nan, nan, x, nan, nan
-    )
+    times = 0.0, 0.0, 0.0, 0.0, 0.0
+    return Record(velocity, x, x, velocity, abs(force), *times, 0, nan, 0, nan, nan, x, nan, 0.0, 0.0, nan)
 
 
 @inlined
@@ -187,21 +187,23 @@ def observe(r, scene, t, duration, x, velocity, force, stuck):
             if slips == 1:
                 first_slip = t - duration
         stuck_for = 0.0
-    maxima, middle, first_maximum, last_maximum = r.maxima, r.middle, r.first_maximum, r.last_maximum
-    low, reference_swing, last_swing = min(r.low, x), r.reference_swing, r.last_swing
+    maxima, first_maximum, last_maximum = r.maxima, r.first_maximum, r.last_maximum
+    low, first_swing, last_swing = min(r.low, x), r.first_swing, r.last_swing
+    third_swing, fourth_swing = r.third_swing, r.fourth_swing
     if r.velocity > 0.0 and velocity <= 0.0:
         # Between two states the velocity is all but linear.
         maximum = t - duration * velocity / (velocity - r.velocity)
         maxima += 1
-        if 2.0 * maximum <= scene.span:
-            middle = maxima
         if maxima == 1:
             first_maximum = maximum
         else:
             last_swing = x - low
-            # The first swing, until there is one that begins in the second half.
-            if maxima == 2 or maxima == middle + 2:
-                reference_swing = last_swing
+            if maxima == 2:
+                first_swing = last_swing
+            if maximum > 0.75 * scene.span:
+                fourth_swing = max(fourth_swing, last_swing)
+            elif maximum > 0.5 * scene.span:
+                third_swing = max(third_swing, last_swing)
         last_maximum = maximum
         low = x
         stuck_last, stuck_now = stuck_now, 0.0
@@ -219,11 +221,12 @@ def observe(r, scene, t, duration, x, velocity, force, stuck):
         slips,
         first_slip,
         maxima,
-        middle,
         first_maximum,
         last_maximum,
         low,
-        reference_swing,
+        first_swing,
+        third_swing,
+        fourth_swing,
         last_swing,
     )
 
@@ -235,7 +238,9 @@ def conclude(r, scene, status, t, x, velocity, band):
     `band` is the sliding speed below which a contact counts as stuck, or zero.
     """
     cycle = (r.last_maximum - r.first_maximum) / (r.maxima - 1) if r.maxima >= 2 else nan
-    swings = r.last_swing > _ROUNDING * max(abs(r.x_min), abs(r.x_max))
+    # Irregular swings are judged by the greatest of a quarter, few ones by the first and the last.
+    seen = r.third_swing > 0.0 and r.fourth_swing > 0.0
+    before, after = (r.third_swing, r.fourth_swing) if seen else (r.first_swing, r.last_swing)
     # A harmonic that grazes the velocity of the belt is slower than the band for so long, and does not stick.
     curvature = (scene.stiffness / scene.mass) ** 1.5 * (r.x_max - r.x_min)
     graze = sqrt(32.0 * band / curvature) if curvature > 0.0 else 0.0
@@ -245,7 +250,7 @@ def conclude(r, scene, status, t, x, velocity, band):
         r.stuck_last > max(_SHORT * cycle, graze) if r.maxima >= 2 else r.stuck_later > max(_SHORT * scene.span, graze)
     ):
         motion = STICK_SLIP
-    elif r.maxima >= 2 and swings and r.last_swing >= _LASTING * r.reference_swing:
+    elif after >= _LASTING * before and after > _ROUNDING * max(abs(r.x_min), abs(r.x_max)):
         motion = OSCILLATORY
     else:
         motion = RESTING

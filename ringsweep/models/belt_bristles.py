@@ -14,7 +14,7 @@ from ringsweep.jit import inlined
 from ringsweep.models.belt import begin, conclude, observe
 from ringsweep.physics import drives
 from ringsweep.physics.belt import BristleBelt
-from ringsweep.physics.friction.dynamic import bristle, lasts, made, yields
+from ringsweep.physics.friction.dynamic import bristle, crawl, lasts, made, yields
 from ringsweep.physics.friction.static import BAND, CLEAN
 from ringsweep.regimes import BROKEN, RUNNING
 
@@ -101,7 +101,7 @@ def _observe(scene, record, y, before, now, t, h):
 
 @hooks.conclude.implements(BristleBelt)
 def _conclude(scene, record, status, t, y):
-    return conclude(record, scene, status, t, y[0], y[1], _recoil(scene))
+    return conclude(record, scene, status, t, y[0], y[1], crawl(scene.law, _recoil(scene)))
 
 
 @hooks.describe.implements(BristleBelt)
@@ -240,4 +240,6 @@ def _stiff_sample(scene, mode, t, x):
 
 @hooks.finish.implements(BristleBelt)
 def _finish(scene, record, status, t, y):
-    return conclude(record, scene, status, t, y[0], y[1] + drives.turn(scene.drive, t)[1], _recoil(scene))
+    return conclude(
+        record, scene, status, t, y[0], y[1] + drives.turn(scene.drive, t)[1], crawl(scene.law, _recoil(scene))
+    )

@@ -12,11 +12,14 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsweep.errors import InputError
 from ringsweep.hooks import begin, conclude, describe, inspect, launch, observe, rates, stiffness, verdict
 from ringsweep.jit import add_scaled, inlined, kernel, take
 from ringsweep.parameters import Parameter
 from ringsweep.physics.drives import lookup, shape, turn
+from ringsweep.physics.friction import LAWS, WITH_SNAPS
 from ringsweep.regimes import COMPLETE, RUNNING
+from ringsweep.scene import Structure
 from ringsweep.solvers.common import Method, Result, agree, same_drive
 
 #: End of the interval of stability on the negative real axis.
@@ -35,6 +38,13 @@ class RK4(Method):
     steps: Annotated[int, Parameter("1", "steps over the span of time", lower=1, upper=1e10)]
     certify: bool = True
     """Whether cells within the limit of stability are run again at half the step."""
+
+    def check(self, structure: Structure) -> None:
+        """Refuse a law that changes at instants which no constant step meets."""
+        if LAWS[structure.law] in WITH_SNAPS:
+            raise InputError(
+                "solver.method", f"rk4 does not take friction law {structure.law}, whose bonds snap: auto takes it"
+            )
 
     def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:
         """Outcomes of every cell; see :class:`ringsweep.solvers.common.Method`."""

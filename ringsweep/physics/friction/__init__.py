@@ -25,6 +25,9 @@ LAWS: dict[str, type] = set_valued.LAWS | smooth.LAWS | dynamic.LAWS
 #: Laws that know no static friction.
 WITHOUT_STATIC: set[type] = {*set_valued.WITHOUT_STATIC, *smooth.WITHOUT_STATIC, *dynamic.WITHOUT_STATIC}
 
+#: Laws whose memory changes in jumps, at instants that only a method with events meets.
+WITH_SNAPS: set[type] = {*dynamic.WITH_SNAPS}
+
 #: Parameters of a law of which the first must be less than the second.
 ASCENDING: dict[Any, tuple[str, str]] = smooth.ASCENDING
 

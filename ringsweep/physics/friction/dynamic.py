@@ -17,6 +17,10 @@ from ringsweep.parameters import Leaf, Parameter
 from ringsweep.physics.friction.static import BAND, CLEAN
 
 MU_K = Parameter("1", "kinetic friction coefficient", lower=0.0, open_lower=True)
+
+#: Share of the deflection of steady sliding from which on a contact counts as slipping.
+NEARLY = 0.99
+
 SIGMA_0 = Parameter("1/m", "stiffness of the bristles", lower=0.0, open_lower=True)
 SIGMA_1 = Parameter("s/m", "damping of the bristles", lower=0.0, default=0.0)
 SIGMA_2 = Parameter("s/m", "viscous friction", lower=0.0, default=0.0)
@@ -58,6 +62,11 @@ def yields(law, mu_s, mu_k, z, sign, region):
 
 
 @hook
+def crawl(law, recoil):
+    """Speed by which to tell stick from a graze, m/s, where `recoil` is that of a body let go by its bristles."""
+
+
+@hook
 def made(law, mu_s, mu_k):
     """Deflection of a contact that has just been made, m."""
 
@@ -86,7 +95,7 @@ def _dahl(law, mu_s, mu_k, v, z, sign, region):
 
 @lasts.implements(Dahl)
 def _dahl_lasts(law, mu_s, mu_k, v, z, sign, region):
-    slack = 0.99 - law.sigma0 * sign * z / mu_k
+    slack = NEARLY - law.sigma0 * sign * z / mu_k
     return slack if region == BAND else -slack
 
 
@@ -124,7 +133,8 @@ class LuGre(NamedTuple):
         \\dot z = v - \\frac{\\sigma_0 |v|}{g(v)} z, \\qquad g = \\mu_k + (\\mu_s - \\mu_k) e^{-(v/v_s)^2}, \\qquad
         \\mu = \\sigma_0 z + \\sigma_1 \\dot z + \\sigma_2 v
 
-    The contact counts as stuck while it is slower than the Stribeck velocity.
+    The contact counts as stuck while it is slower than the Stribeck velocity and its bristles have not yet come within
+    a hundredth of the deflection :math:`g/\\sigma_0` of steady sliding.
     """
 
     sigma0: Annotated[Leaf, SIGMA_0]
@@ -181,8 +191,9 @@ def _elasto_plastic(law, mu_s, mu_k, v, z, sign, region):
 
 
 @lasts.implements(LuGre, ElastoPlastic)
-def _slower_than_stribeck(law, mu_s, mu_k, v, z, sign, region):
-    slack = 1.0 - sign * v / law.v_s
+def _loading(law, mu_s, mu_k, v, z, sign, region):
+    g, _ = stribeck(law, mu_s, mu_k, v)
+    slack = min(NEARLY - law.sigma0 * sign * z / g, 1.0 - sign * v / law.v_s)
     return slack if region == BAND else -slack
 
 
@@ -195,6 +206,11 @@ def _stribeck_steady(law, mu_s, mu_k, v):
 @yields.implements(Dahl, LuGre, ElastoPlastic)
 def _passes(law, mu_s, mu_k, z, sign, region):
     return z, CLEAN if region == BAND else BAND
+
+
+@crawl.implements(LuGre, ElastoPlastic)
+def _stribeck_or_recoil(law, recoil):
+    return min(law.v_s, recoil)
 
 
 @made.implements(Dahl, LuGre, ElastoPlastic)
@@ -321,8 +337,16 @@ def _random_bonds(law, mu_s, mu_k):
     return 0.0
 
 
+@crawl.implements(Dahl, ResetIntegrator, Bristles)
+def _recoil(law, recoil):
+    return recoil
+
+
 #: Laws that know no static friction.
 WITHOUT_STATIC = {Dahl, Bristles}
+
+#: Laws whose memory changes in jumps.
+WITH_SNAPS = {Bristles}
 
 #: Laws by the name that the configuration gives them.
 LAWS: dict[str, type] = {
