@@ -1,20 +1,24 @@
 """The mass on a spring on a belt against what is known of it in closed form."""
 
-from math import atan, cos, pi, sin, sqrt
+from math import acos, atan, cos, pi, sin, sqrt
+from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import ringsweep
 from ringsweep.variables import REGIMES
 
+CONFIGS = Path(__file__).parents[1] / "configs"
 G = 9.81
 
 
 def belt(law="stiction", *, m=1.0, k=2.0, v_b=0.1, mu_s=0.15, mu_k=0.1, span=60.0, start=None, **of_law):
     """Scene of the paper's belt, by default launched at the speed of the belt."""
     friction = {"law": law, "mu_s": mu_s, "mu_k": mu_k, **of_law}
-    if law == "coulomb":
+    if law in ("coulomb", "threlfall", "dahl", "bristle"):
         del friction["mu_s"]
     return {
         "model": "belt",
@@ -28,9 +32,9 @@ def belt(law="stiction", *, m=1.0, k=2.0, v_b=0.1, mu_s=0.15, mu_k=0.1, span=60.
 
 
 def outcome(scene, **solver):
-    return ringsweep.sweep(scene, {"time.span": [scene["time"]["span"]]}, solver={"method": "auto", **solver}).isel(
-        time_span=0
-    )
+    return ringsweep.sweep(
+        scene, {"time.span": [scene["time"]["span"]]}, solver={"method": "auto", **solver}, progress=False
+    ).isel(time_span=0)
 
 
 class TestStickSlipCycle:
@@ -99,9 +103,124 @@ class TestCoulomb:
         assert float(found.velocity_end) == 0.0
 
 
+class TestLaunch:
+    def test_is_at_rest_on_the_belt_unless_told_otherwise(self):
+        scene = belt(span=10.0)
+        del scene["initial"]
+        assert float(outcome(scene).first_slip) == pytest.approx(7.3575, rel=1e-12)
+        del scene["belt"]
+        scene["drive"] = {"law": "sinusoidal", "amplitude": 0.1, "frequency": 0.5}
+        assert float(ringsweep.simulate(scene).velocity[0]) == pytest.approx(0.1 * pi, rel=1e-12)
+
+
+class TestViscous:
+    """Under stiction and viscous friction c, slip is a damped oscillation about (F_c + c v_b)/k."""
+
+    def test_steady_sliding_is_where_the_forces_balance(self):
+        found = outcome(belt("coulomb", viscous=0.5, span=200.0))
+        assert REGIMES[int(found.regime)] == "resting"
+        assert float(found.x_end) == pytest.approx((0.981 + 0.5 * 0.1) / 2, rel=1e-10)
+
+    def test_stick_slip_ends_at_the_speed_of_theory(self):
+        """It goes on while the damped swing after breakaway catches up with the belt again."""
+        m, k, c, mu_k = 1.0, 2.0, 0.2, 0.1
+        speeds, mu_s = np.geomspace(0.02, 2.0, 15), np.linspace(0.11, 0.2, 12)
+        maps = ringsweep.sweep(
+            belt(viscous=c, span=250.0, start=0.0), {"belt.velocity": speeds, "friction.mu_s": mu_s}, progress=False
+        )
+        decay = c / (2 * m)
+        omega = sqrt(k / m - decay**2)
+        t = np.linspace(0, 4 * pi / omega, 40_001)
+
+        def returns(v_b, drop):
+            velocity = np.exp(-decay * t) * (
+                v_b * np.cos(omega * t) + (decay * v_b - drop * G) / omega * np.sin(omega * t)
+            )
+            behind = np.argmin(velocity)
+            return velocity[behind:].max() / v_b
+
+        ratio = np.array([[returns(v, s - mu_k) for s in mu_s] for v in speeds])
+        sticks = maps.regime.values == REGIMES.index("stick-slip")
+        clear = abs(ratio - 1) > 1e-6
+        assert clear.mean() > 0.99
+        np.testing.assert_array_equal(sticks[clear], (ratio > 1)[clear])
+        assert 0.3 < sticks.mean() < 0.7
+        # For light damping the critical speed is (F_s - F_c)/sqrt(4 pi zeta k m).
+        zeta = decay / sqrt(k / m)
+        critical = (mu_s - mu_k) * m * G / sqrt(4 * pi * zeta * k * m)
+        last = np.array([speeds[column].max(initial=0.0) for column in sticks.T])
+        assert (last[4:] < 1.3 * critical[4:]).all()
+        assert (last[4:] > 0.5 * critical[4:]).all()
+
+
+class TestKarnopp:
+    """Within the dead band D_v the body keeps the speed at which it came in: the cycle is that of a slower belt."""
+
+    @pytest.mark.parametrize("dead_band", [1e-6, 1e-3, 0.02])
+    def test_cycle_is_that_of_a_belt_slower_by_the_dead_band(self, dead_band):
+        found = outcome(belt("karnopp", dead_band=dead_band, span=100.0, start=0.1 - dead_band))
+        v, drop, omega = 0.1 - dead_band, 0.05 * G, sqrt(2.0)
+        expected = drop / v + 2 / omega * (pi - atan(drop * omega / (2 * v)))
+        assert REGIMES[int(found.regime)] == "stick-slip"
+        assert float(found.period) == pytest.approx(expected, rel=1e-10)
+
+    @pytest.mark.parametrize("dead_band", [1e-6, 1e-3, 0.02])
+    def test_first_slip_comes_when_the_yielding_body_has_left_the_band(self, dead_band):
+        found = outcome(belt("karnopp", dead_band=dead_band, span=20.0))
+        assert float(found.first_slip) == pytest.approx(7.3575 + acos(1 - dead_band / 0.1) / sqrt(2.0), rel=1e-10)
+
+
+TIGHT = {"method": "implicit", "rtol": 1e-9, "certify": False}
+
+
+def exponent(law, of, values, limit, quantity, **fixed):
+    """Power of its parameters, `values` times the factors `of` each, with which a law's distance to a `limit` falls."""
+    axes = {f"friction.{name}": xr.DataArray(factor * np.array(values), dims="cell") for name, factor in of.items()}
+    found = ringsweep.sweep(belt(law, **fixed), axes, solver=TIGHT)[quantity].values
+    errors = np.abs(found - float(outcome(belt(limit))[quantity]))
+    assert errors[-1] < 0.3 * errors[0]
+    return np.diff(np.log(errors)) / np.diff(np.log(values))
+
+
 class TestLimits:
-    def test_a_regularised_law_tends_to_the_law_that_it_regularises(self):
-        """Linearly in the width of the band: the creep of stick is as fast as the band is wide."""
+    """Every regularised law tends to the law that it regularises as theory says."""
+
+    def test_threlfall_to_coulomb_as_the_width_of_the_band(self):
+        slopes = exponent("threlfall", {"v0": 1}, [1e-3, 1e-4, 1e-5], "coulomb", "x_max")
+        np.testing.assert_allclose(slopes, 1.0, atol=0.01)
+
+    def test_straight_lines_to_stiction_as_the_width_of_the_band(self):
+        """At the corner of the law the body is let go at once: what is left is the creep before."""
+        slopes = exponent("piecewise-linear", {"v0": 1, "v1": 2}, [1e-4, 1e-5, 1e-6], "stiction", "first_slip")
+        np.testing.assert_allclose(slopes, 1.0, atol=0.01)
+
+    def test_cubics_to_stiction_as_the_passage_of_a_fold(self):
+        """Where the law is flat at its top, the way over it takes two thirds of a power."""
+        slopes = exponent("piecewise-cubic", {"v0": 1, "v1": 2}, [1e-4, 1e-5, 1e-6], "stiction", "x_max")
+        np.testing.assert_allclose(slopes, 2 / 3, atol=0.02)
+
+    def test_karnopp_to_stiction_as_the_root_of_the_dead_band(self):
+        widths = [1e-4, 1e-5, 1e-6]
+        found = [float(outcome(belt("karnopp", dead_band=width)).x_max) for width in widths]
+        errors = np.abs(np.array(found) - float(outcome(belt()).x_max))
+        np.testing.assert_allclose(np.diff(np.log(errors)) / np.diff(np.log(widths)), 0.5, atol=0.01)
+
+    def test_dahl_to_coulomb_as_two_thirds_of_the_compliance(self):
+        slopes = exponent("dahl", {"sigma0": 1}, [1e4, 1e5, 1e6], "coulomb", "x_max")
+        np.testing.assert_allclose(slopes, -2 / 3, atol=0.01)
+
+    def test_the_reset_integrator_to_stiction_as_the_compliance(self):
+        slopes = exponent("reset-integrator", {"sigma0": 1}, [1e4, 1e5, 1e6], "stiction", "period", sigma1=300.0)
+        np.testing.assert_allclose(slopes, -1.0, atol=0.01)
+
+    def test_lugre_to_stiction_as_its_stribeck_velocity_once_bristles_are_stiff(self):
+        """The top of Stribeck's curve is another fold."""
+        fixed = {"sigma0": 1e9, "sigma1": 300.0}
+        slopes = exponent("lugre", {"v_s": 1}, [3e-3, 1e-3, 3e-4], "stiction", "x_max", **fixed)
+        np.testing.assert_allclose(slopes, 2 / 3, atol=0.04)
+
+    def test_bengisu_akay_to_tustin_as_the_width_of_the_band(self):
+        """Linearly: the creep of stick is as fast as the band is wide."""
         limit = float(outcome(belt("tustin", alpha=1e3)).period)
         widths = np.array([1e-4, 1e-5, 1e-6])
         errors = [abs(float(outcome(belt("bengisu-akay", alpha=1e3, v0=v0)).period) - limit) for v0 in widths]
@@ -123,19 +242,147 @@ class TestLimits:
         assert (fine.certified == 1).all()
 
 
+MILD = {
+    "piecewise-cubic": {"v0": 0.01, "v1": 0.03},
+    "karnopp": {"dead_band": 0.01},
+    "lugre": {"sigma0": 1e3, "sigma1": 30.0, "sigma2": 0.1, "v_s": 0.01},
+    "elasto-plastic": {"sigma0": 1e3, "sigma1": 30.0, "sigma2": 0.1, "v_s": 0.01},
+    "reset-integrator": {"sigma0": 1e3, "sigma1": 30.0},
+}
+
+
+class TestTwoMethods:
+    """Where a constant step can follow, it finds the same run; the order of its error is that of its events."""
+
+    @pytest.mark.parametrize(("law", "error"), [("lugre", 1e-4), ("piecewise-cubic", 1e-6), ("karnopp", 0.1)])
+    def test_agree(self, law, error):
+        scene = belt(law, span=20.0, start=0.0, **MILD[law])
+        own = outcome(scene)
+        fixed = outcome(scene, method="rk4", steps=100_000)
+        assert fixed.stiffness < 2.785
+        assert own.regime == fixed.regime
+        assert own.certified == fixed.certified == 1
+        for name in ("x_end", "x_max", "velocity_end", "period"):
+            assert float(own[name]) == pytest.approx(float(fixed[name]), abs=error)
+
+    def test_a_step_too_long_for_bristles_is_flagged(self):
+        """LuGre at 2e-4 s: a wrong trajectory without a NaN."""
+        scene = belt("lugre", span=20.0, sigma0=1e5, sigma1=sqrt(1e5), sigma2=0.1, v_s=0.001)
+        fixed, own = outcome(scene, method="rk4", steps=40_000), outcome(scene)
+        assert fixed.stiffness > 2.785
+        assert fixed.certified == 0
+        assert own.certified == 1
+
+    def test_bonds_that_snap_are_no_matter_for_a_constant_step(self):
+        with pytest.raises(ringsweep.InputError, match="rk4 does not take friction law bristle"):
+            outcome(belt("bristle", sigma0=1e3), method="rk4", steps=1000)
+
+
+class TestPaper:
+    """The paper's Figs. 9-12: what it says of its four laws, in numbers."""
+
+    @pytest.fixture(scope="class")
+    @staticmethod
+    def runs():
+        found = ringsweep.simulate(CONFIGS / "paper" / "fig09-12.yaml")
+        return found.interp(time=np.linspace(0.0, 20.0, 20_001))
+
+    def test_in_motion_coulomb_is_like_dahl_and_stiction_like_lugre(self, runs):
+        def apart(one, other):
+            return float(np.sqrt(((runs.x.sel(friction_law=one) - runs.x.sel(friction_law=other)) ** 2).mean()))
+
+        assert apart("coulomb", "dahl") < 0.01 * apart("coulomb", "stiction")
+        assert apart("stiction", "lugre") < 0.5 * min(apart("coulomb", "stiction"), apart("coulomb", "lugre"))
+        assert [REGIMES[int(regime)] for regime in runs.regime] == ["oscillatory", "stick-slip"] * 2
+
+    def test_forces_differ_most_just_after_the_start(self, runs):
+        spread = runs.friction_force.max("friction_law") - runs.friction_force.min("friction_law")
+        assert float(spread.idxmax()) < 0.001
+        # Bristles at rest under a sliding body: sigma1 v.
+        assert float(spread.max()) == pytest.approx(0.1 * 316.2278 + 0.1 * 0.1, rel=1e-3)
+        assert float(spread.sel(time=slice(0.2, None)).max()) < 1.0
+
+
+class TestSteadySliding:
+    def test_under_lugre_is_lost_where_linear_theory_says(self):
+        """Eigenvalues of the three equations linearised about it; away from them the sweep agrees cell by cell."""
+        sigma_1, sigma_2, v_s, k = 2.0, 0.2, 0.1, 2.0
+        stiffness, speeds = np.geomspace(100, 1e5, 7), np.geomspace(0.05, 1.0, 12)
+        drop = 0.5 * 0.981 * np.exp(-((speeds / v_s) ** 2))
+        growth = np.empty((len(stiffness), len(speeds)))
+        for i, sigma_0 in enumerate(stiffness):
+            for j, v in enumerate(speeds):
+                g, slope = 0.981 + drop[j], -2 * v / v_s**2 * drop[j]
+                by_v, by_z = v * slope / g, -sigma_0 * v / g
+                jacobian = [
+                    [0, 1, 0],
+                    [-k, -(sigma_1 * by_v + sigma_2), -(sigma_0 + sigma_1 * by_z)],
+                    [0, by_v, by_z],
+                ]
+                growth[i, j] = np.linalg.eigvals(jacobian).real.max()
+        scene = belt("lugre", sigma1=sigma_1, sigma2=sigma_2, v_s=v_s, start=0.0, span=200.0)
+        axes = {
+            "friction.sigma0": stiffness,
+            "belt.velocity": xr.DataArray(speeds, dims="v"),
+            "initial.x": xr.DataArray((0.981 + drop + sigma_2 * speeds) / k, dims="v"),
+        }
+        maps = ringsweep.sweep(scene, axes, solver={"method": "auto", "certify": False}, progress=False)
+        steady = maps.regime.transpose("friction_sigma0", "v").values == REGIMES.index("resting")
+        clear = abs(growth) > 0.02
+        assert clear.mean() > 0.8
+        np.testing.assert_array_equal(steady[clear], (growth < 0)[clear])
+        assert 0.2 < steady.mean() < 0.8
+
+
 class TestExtremes:
-    @pytest.mark.parametrize("law", ["stiction", "bengisu-akay"])
-    @pytest.mark.parametrize(
-        "change",
-        [{"v_b": 0.0}, {"v_b": 1e-9}, {"mu_s": 0.1}, {"m": 1e-6}, {"k": 0.0}, {"mu_s": 0.0, "mu_k": 0.0}],
-        ids=str,
-    )
-    def test_gives_numbers_or_says_that_it_has_none(self, law, change):
-        of_law = {"v0": 1e-6, "alpha": 1e4} if law == "bengisu-akay" else {}
-        found = outcome(belt(law, start=0.0, span=20.0, **change, **of_law))
-        assert REGIMES[int(found.regime)] != "failed"
-        for name in ("t_end", "x_end", "velocity_end", "x_min", "x_max", "force_max"):
-            assert np.isfinite(found[name])
+    SMALL: ClassVar = {
+        "stiction": {},
+        "karnopp": {"dead_band": 1e-6},
+        "bengisu-akay": {"v0": 1e-6, "alpha": 1e4},
+        "piecewise-cubic": {"v0": 1e-6, "v1": 2e-6},
+        "dahl": {"sigma0": 1e5},
+        "lugre": {"sigma0": 1e5, "sigma1": 300.0, "v_s": 1e-3},
+        "elasto-plastic": {"sigma0": 1e5, "sigma1": 300.0, "v_s": 1e-3},
+        "reset-integrator": {"sigma0": 1e5, "sigma1": 300.0},
+    }
+    CASES: ClassVar = [
+        {"belt.velocity": 0.0},
+        {"belt.velocity": 1e-9},
+        {"friction.mu_s": 0.1},
+        {"body.mass": 1e-6},
+        {"spring.stiffness": 0.0},
+        {"friction.sigma0": 1e9},
+        {"friction.sigma1": 0.0},
+        {"belt.velocity": 0.0, "spring.stiffness": 0.0},
+        {"initial.x": 50.0, "initial.velocity": -20.0},
+    ]
+
+    @pytest.mark.parametrize("law", SMALL)
+    def test_give_numbers_or_say_that_they_have_none(self, law):
+        scene = belt(law, span=20.0, start=0.0, **self.SMALL[law])
+        usual = {
+            "belt.velocity": 0.1,
+            "body.mass": 1.0,
+            "spring.stiffness": 2.0,
+            "initial.x": 0.0,
+            "initial.velocity": 0.0,
+        }
+        usual |= {f"friction.{name}": value for name, value in scene["friction"].items() if name != "law"}
+        cases = [usual | {path: value for path, value in case.items() if path in usual} for case in self.CASES]
+        axes = {path: xr.DataArray([case[path] for case in cases], dims="case") for path in usual}
+        found = ringsweep.sweep(scene, axes, progress=False)
+        failed = found.regime.values == REGIMES.index("failed")
+        assert not failed.any(), np.array(self.CASES)[failed]
+        for name in ("t_end", "x_end", "velocity_end", "x_min", "x_max", "force_max", "stick_time"):
+            assert np.isfinite(found[name]).all(), name
+        at_rest = found.isel(case=0)
+        assert REGIMES[int(at_rest.regime)] == "resting"
+        assert abs(float(at_rest.x_end)) < 1e-9
+
+    def test_the_limit_of_work_is_flagged(self):
+        found = outcome(belt("lugre", **self.SMALL["lugre"]), method="implicit", max_steps=50)
+        assert REGIMES[int(found.regime)] == "failed"
+        assert found.certified == 0
 
     def test_without_spring_the_body_ends_at_the_speed_of_the_belt(self):
         found = outcome(belt(k=0.0, start=0.0))

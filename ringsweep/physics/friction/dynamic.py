@@ -19,7 +19,7 @@ from ringsweep.physics.friction.static import BAND, CLEAN
 MU_K = Parameter("1", "kinetic friction coefficient", lower=0.0, open_lower=True)
 
 #: Share of the deflection of steady sliding from which on a contact counts as slipping.
-NEARLY = 0.99
+NEARLY = 0.999
 
 SIGMA_0 = Parameter("1/m", "stiffness of the bristles", lower=0.0, open_lower=True)
 SIGMA_1 = Parameter("s/m", "damping of the bristles", lower=0.0, default=0.0)
@@ -79,7 +79,7 @@ def steady(law, mu_s, mu_k, v):
 class Dahl(NamedTuple):
     """Dahl's bristles: :math:`\\dot z = v - \\sigma_0 |v| z/\\mu_k` and the traction :math:`\\sigma_0 z` (Dahl 1968).
 
-    Coulomb friction with presliding. The contact counts as slipping where the bristles have come within a hundredth
+    Coulomb friction with presliding. The contact counts as slipping where the bristles have come within a thousandth
     of their greatest traction.
     """
 
@@ -134,7 +134,7 @@ class LuGre(NamedTuple):
         \\mu = \\sigma_0 z + \\sigma_1 \\dot z + \\sigma_2 v
 
     The contact counts as stuck while it is slower than the Stribeck velocity and its bristles have not yet come within
-    a hundredth of the deflection :math:`g/\\sigma_0` of steady sliding.
+    a thousandth of the deflection :math:`g/\\sigma_0` of steady sliding.
     """
 
     sigma0: Annotated[Leaf, SIGMA_0]
