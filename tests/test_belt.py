@@ -265,6 +265,19 @@ class TestTwoMethods:
         for name in ("x_end", "x_max", "velocity_end", "period"):
             assert float(own[name]) == pytest.approx(float(fixed[name]), abs=error)
 
+    def test_error_falls_with_the_tolerance(self):
+        """Also where the body is caught, and Stribeck's curve rises within a thousandth of the step before."""
+        scene = belt("lugre", sigma0=1e5, sigma1=sqrt(1e5), sigma2=0.1, v_s=0.001)
+        speeds = np.geomspace(0.02, 0.5, 8)
+
+        def periods(rtol):
+            solver = {"method": "implicit", "rtol": rtol, "certify": False}
+            return ringsweep.sweep(scene, {"belt.velocity": speeds}, solver=solver, progress=False).period.values
+
+        exact = periods(1e-11)
+        for rtol in (1e-5, 1e-6, 1e-7):
+            assert (abs(periods(rtol) - exact) < 20 * rtol * exact).all()
+
     def test_a_step_too_long_for_bristles_is_flagged(self):
         """LuGre at 2e-4 s: a wrong trajectory without a NaN."""
         scene = belt("lugre", span=20.0, sigma0=1e5, sigma1=sqrt(1e5), sigma2=0.1, v_s=0.001)

@@ -121,6 +121,33 @@ def _locate(scene, mode, t, x, line, h, g, stages):
 
 
 @inlined
+def _size(error, scales):
+    """Largest component of an error, measured by what is allowed; infinite if one is not a number."""
+    size = 0.0
+    for k in range(len(error)):
+        part = abs(error[k]) / scales[k]
+        if not part <= size:
+            size = part if part >= 0.0 else inf
+    return size
+
+
+@inlined
+def _first_creep_event(scene, mode, t, x, line, s, within, after, stages):
+    """First guard to fall below zero within an implicit step, of which `within` and `after` are the guards."""
+    event, end = -1, s
+    for g in range(len(after)):
+        # Zero is no violation: a body at rest in equilibrium stays there.
+        if after[g] < 0.0 or within[g] < 0.0:
+            until = min(end, s if after[g] < 0.0 else 0.5 * s)
+            if event >= 0 and _guard_after(scene, mode, t, x, line, until, g, stages) > 0.0:
+                continue
+            found = _locate(scene, mode, t, x, line, until, g, stages)
+            if event < 0 or found < end * (1.0 - 1e-12):
+                event, end = g, found
+    return event, end
+
+
+@inlined
 def _creep(scene, record, mode, t, y, x, line, h, horizon, tolerance, guards, stages):
     """One accepted implicit step from the state `y`, which is `x` in its own coordinates, cut at the first event.
 
@@ -131,37 +158,32 @@ def _creep(scene, record, mode, t, y, x, line, h, horizon, tolerance, guards, st
     """
     scales = stiff_scales(scene, tolerance, x)
     s = min(h, horizon)
+    event, end = -1, s
     for _ in range(200):
         x_next, error = rosenbrock.step(scene, mode, t, x, line, s, stages)
-        size = 0.0
-        for k in range(len(error)):
-            part = abs(error[k]) / scales[k]
-            if not part <= size:
-                size = part if part >= 0.0 else inf
+        size = _size(error, scales)
         if size <= 1.0:
-            break
+            within = stiff_view(scene, mode, t + 0.5 * s, rosenbrock.dense(x, x_next, stages, 0.5))
+            after = stiff_view(scene, mode, t + s, x_next)
+            event, end = _first_creep_event(scene, mode, t, x, line, s, within[0], after[0], stages)
+            if event < 0 or end == 0.0:
+                break
+            # The step up to the event is another one, which may see what the stages of the longer one passed over.
+            x_next, error = rosenbrock.step(scene, mode, t, x, line, end, stages)
+            short = _size(error, scales)
+            if short <= 1.0:
+                break
+            s, size = end, short
         s *= max(0.2, 0.9 * size**-0.2) if isfinite(size) else 0.1
     else:
         return -1, -1.0, y, record, h
     grown = s * min(6.0, 0.9 * max(size, 1e-8) ** -0.2)
     # A step cut short by the horizon says little about the next one.
     h = max(h, grown) if s == horizon else grown
-    within = stiff_view(scene, mode, t + 0.5 * s, rosenbrock.dense(x, x_next, stages, 0.5))
-    after = stiff_view(scene, mode, t + s, x_next)
-    event, end = -1, s
-    for g in range(len(after[0])):
-        # Zero is no violation: a body at rest in equilibrium stays there.
-        if after[0][g] < 0.0 or within[0][g] < 0.0:
-            until = min(end, s if after[0][g] < 0.0 else 0.5 * s)
-            if event >= 0 and _guard_after(scene, mode, t, x, line, until, g, stages) > 0.0:
-                continue
-            found = _locate(scene, mode, t, x, line, until, g, stages)
-            if event < 0 or found < end * (1.0 - 1e-12):
-                event, end = guards + g, found
     if event >= 0:
         if end == 0.0:
-            return event, 0.0, y, record, h
-        x_next, _ = rosenbrock.step(scene, mode, t, x, line, end, stages)
+            return guards + event, 0.0, y, record, h
+        event += guards
         within = stiff_view(scene, mode, t + 0.5 * end, rosenbrock.dense(x, x_next, stages, 0.5))
         after = stiff_view(scene, mode, t + end, x_next)
     velocity, acceleration = stiff_motion(scene, t, x, line)
