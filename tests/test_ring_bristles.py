@@ -226,6 +226,17 @@ class TestZones:
         assert traction[-1] == pytest.approx(0.15, abs=1e-4)
         np.testing.assert_allclose(MILD * run.deflection_2[after], 0.1, rtol=1e-9)
 
+    def test_the_body_counts_as_stuck_while_both_contacts_do(self, launched):
+        """Each within a hundredth of what its own place can bear."""
+        _, run = launched
+        side = np.where(run.omega >= 0.0, 1.0, -1.0)
+        held = [
+            side * MILD * z / np.where(zone == 1, 0.15, 0.1) < 0.99
+            for z, zone in ((run.deflection_1, run.zone_1), (run.deflection_2, run.zone_2))
+        ]
+        assert (held[0] != held[1]).any()
+        np.testing.assert_array_equal(run.mode == 0, held[0] & held[1])
+
 
 class TestEnds:
     """Are named as under the other laws."""
