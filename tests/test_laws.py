@@ -1,0 +1,355 @@
+"""Friction as a function of the sliding velocity: each law against its own statement, all against what they share."""
+
+from itertools import pairwise
+from math import exp, inf, log, nextafter
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ringsweep.config import load
+from ringsweep.errors import InputError
+from ringsweep.jit import take
+from ringsweep.physics.friction import SET_VALUED, SMOOTH
+from ringsweep.physics.friction.set_valued import Coulomb, Karnopp, Stiction, Tustin
+from ringsweep.physics.friction.smooth import BengisuAkay, PiecewiseCubic, PiecewiseLinear, Threlfall
+from ringsweep.physics.friction.static import (
+    BAND,
+    CLEAN,
+    TAIL,
+    expand_weights,
+    faster,
+    piece,
+    region_at,
+    region_bounds,
+    slower,
+    stiction_band,
+    weights,
+    weights_in,
+)
+
+MU_S, MU_K = 0.5, 0.3
+
+
+def made(law, *columns):
+    """A law of one cell, made as a sweep makes it."""
+    return take(getattr(law, "of", law)(*(np.array([value]) for value in columns)), 0)
+
+
+def powers(low, high):
+    """Numbers spread evenly over orders of magnitude."""
+    return st.floats(log(low), log(high)).map(exp)
+
+
+widths = powers(1e-9, 1.0)
+alphas = powers(1e-3, 1e9)
+
+threlfall = st.builds(lambda v0: made(Threlfall, v0), widths)
+linear = st.builds(lambda v0, share: made(PiecewiseLinear, v0, v0 * (1 + share)), widths, powers(1e-6, 1e3))
+cubic = st.builds(lambda v0, share: made(PiecewiseCubic, v0, v0 * (1 + share)), widths, powers(1e-6, 1e3))
+bengisu_akay = st.builds(lambda alpha, v0: made(BengisuAkay, alpha, v0), st.just(0.0) | alphas, widths)
+tustin = st.builds(lambda alpha: made(Tustin, alpha), st.just(0.0) | alphas)
+karnopp = st.builds(lambda band: made(Karnopp, band), widths)
+constant = st.sampled_from([Coulomb(), Stiction()])
+
+# One of each kind together: no choice of examples misses a law.
+smooth = st.tuples(threlfall, linear, cubic, bengisu_akay)
+every = st.tuples(threlfall, linear, cubic, bengisu_akay, tustin, karnopp, constant)
+
+
+def pieces(law):
+    """Pieces of a law from the slowest to the fastest, by region."""
+    found = {region: piece(law, region) for region in (BAND, TAIL, CLEAN)}
+    return {region: p for region, p in found.items() if p.low < p.high}
+
+
+def reach(p):
+    """Sliding speed over which the weights of a piece change, m/s."""
+    ends = [length for length in (p.high - p.low, 1 / p.decay if p.decay else inf) if length < inf]
+    return min(ends, default=1.0)
+
+
+def mu(law, speed):
+    w_s, w_k, _, _ = weights(law, speed)
+    return w_s * MU_S + w_k * MU_K
+
+
+def slope(law, speed, region=None):
+    """Slope of the coefficient of friction, s/m; by the formula of a region if one is named."""
+    _, _, dw_s, dw_k = weights(law, speed) if region is None else weights_in(law, region, speed)
+    return dw_s * MU_S + dw_k * MU_K
+
+
+def test_there_is_a_test_for_every_law():
+    tested = {Threlfall, PiecewiseLinear, PiecewiseCubic, BengisuAkay, Tustin, Karnopp, Coulomb, Stiction}
+    assert {*SMOOTH, *SET_VALUED} == tested
+
+
+class TestRegions:
+    @given(every)
+    def test_tile_the_half_line(self, laws):
+        for law in laws:
+            found = list(pieces(law).values())
+            assert found[0].low == 0.0
+            assert found[-1].high == inf
+            for one, other in pairwise(found):
+                assert one.high == other.low
+
+    @given(every, st.floats(0.0, 3.0))
+    def test_hold_the_speeds_between_their_bounds(self, laws, relative):
+        for law in laws:
+            for p in pieces(law).values():
+                speed = p.low + relative * reach(p)
+                low, high = region_bounds(law, region_at(law, speed))
+                assert low <= speed < high
+
+    @given(every)
+    def test_a_boundary_belongs_to_the_region_above_it(self, laws):
+        for law in laws:
+            for below, above in pairwise(pieces(law)):
+                edge = piece(law, above).low
+                assert region_at(law, edge) == above
+                assert region_at(law, nextafter(edge, 0.0)) == below
+
+    @given(every)
+    def test_follow_each_other_up_and_down(self, laws):
+        for law in laws:
+            for below, above in pairwise(pieces(law)):
+                assert faster(law, below) == above
+                assert slower(law, above) == below
+
+    @given(widths)
+    def test_a_contact_counts_as_stuck_within_the_band(self, v0):
+        for law in (Threlfall(v0), PiecewiseLinear(v0, 2 * v0), PiecewiseCubic(v0, 2 * v0), Karnopp(v0)):
+            assert stiction_band(law) == v0
+        assert stiction_band(made(BengisuAkay, 10.0, v0)) == v0
+        for law in (Coulomb(), Stiction(), made(Tustin, 1 / v0)):
+            assert stiction_band(law) == 0.0
+
+
+class TestWeights:
+    @given(smooth)
+    def test_of_a_smooth_law_are_continuous(self, laws):
+        """Beyond the end of a tail the sliding velocity changes by less than 1e-17 m/s, or by rounding."""
+        for law in laws:
+            for below, above in pairwise(pieces(law)):
+                edge = piece(law, above).low
+                left = max(1.1e-17 * piece(law, below).decay, 1e-14)
+                one, other = weights_in(law, below, edge), weights_in(law, above, edge)
+                # Where a piece is steep, a rounding of the edge itself is felt.
+                left += np.spacing(edge) * max(map(abs, one[2:] + other[2:]))
+                assert other[:2] == pytest.approx(one[:2], abs=left)
+
+    @given(cubic)
+    def test_of_cubics_have_continuous_slopes(self, law):
+        """And a smooth top: both slopes vanish where regions meet."""
+        for below, above in pairwise(pieces(law)):
+            edge = piece(law, above).low
+            for region in (below, above):
+                p = piece(law, region)
+                spread = 1e-13 + 10 * np.spacing(edge) / reach(p)
+                assert weights_in(law, region, edge)[2:] == pytest.approx((0.0, 0.0), abs=spread / reach(p))
+
+    @given(every, st.floats(0.0, 1.0, exclude_max=True))
+    def test_never_leave_what_friction_can_be(self, laws, relative):
+        """However steep the law: a blend of both coefficients, at most mu_s, and above mu_k beyond the band."""
+        for law in laws:
+            for region, p in pieces(law).items():
+                speed = p.low + relative * (p.high - p.low if p.high < inf else 1.0)
+                w_s, w_k, _, _ = weights(law, speed)
+                rounding = 1e-14 + 10 * np.spacing(speed) / reach(p)
+                assert -rounding <= w_s <= 1 + rounding
+                assert -rounding <= w_k <= 1 + rounding
+                assert 0.0 <= mu(law, speed) <= MU_S * (1 + rounding)
+                if region != BAND:
+                    assert w_s + w_k == pytest.approx(1.0, abs=rounding)
+
+    @given(every, st.floats(0.0, 1.0))
+    def test_have_slopes_that_are_derivatives(self, laws, relative):
+        for law in laws:
+            for region, p in pieces(law).items():
+                length = reach(p)
+                speed = p.low + relative * length
+                after, before = speed + 1e-5 * length, speed - 1e-5 * length
+                _, _, *slopes = weights_in(law, region, speed)
+                ahead, behind = weights_in(law, region, after), weights_in(law, region, before)
+                spread = (1e-8 + 1e6 * np.spacing(p.low) / length) / length
+                for k in range(2):
+                    assert slopes[k] == pytest.approx((ahead[k] - behind[k]) / (after - before), abs=spread)
+
+    @given(every, st.floats(0.0, 1.0), st.lists(st.floats(-1.0, 1.0), min_size=8, max_size=8))
+    def test_follow_a_speed_that_is_a_series(self, laws, relative, coefficients):
+        """The series of the weights, summed a little later, are the weights at the speed of then."""
+        for law in laws:
+            for region, p in pieces(law).items():
+                length, s = reach(p), 0.02
+                x = length * np.array([relative, *coefficients])
+                basis, static, kinetic = np.zeros((3, len(x)))
+                for k in range(len(x)):
+                    expand_weights.py_func(law, region, x, k, basis, static, kinetic)
+                now = p.low + np.polynomial.polynomial.polyval(s, x)
+                spread = 1e-11 + 10 * np.spacing(p.low) / length
+                w_s, w_k, _, _ = weights_in(law, region, now)
+                assert np.polynomial.polynomial.polyval(s, static) == pytest.approx(w_s, abs=spread)
+                assert np.polynomial.polynomial.polyval(s, kinetic) == pytest.approx(w_k, abs=spread)
+
+
+class TestThrelfall:
+    @given(widths)
+    def test_rises_from_zero_to_mu_k_at_v0_and_stays(self, v0):
+        law = Threlfall(v0)
+        assert mu(law, 0.0) == pytest.approx(0.0, abs=1e-16)
+        for times in (1.0, 1.5, 1e6):
+            assert mu(law, times * v0) == MU_K
+        assert mu(law, nextafter(v0, 0.0)) == pytest.approx(MU_K, rel=1e-14)
+
+    @given(widths)
+    def test_has_the_slope_of_its_exponential(self, v0):
+        """At rest three times the secant over 1 - e^-3; a twentieth of that is left at v0."""
+        assert slope(Threlfall(v0), 0.0) == pytest.approx(3 / (1 - exp(-3)) * MU_K / v0, rel=1e-14)
+        left = slope(Threlfall(v0), v0, BAND) / slope(Threlfall(v0), 0.0)
+        assert left == pytest.approx(exp(-3), rel=1e-13)
+
+    @given(widths, st.floats(0.0, 1.0))
+    def test_is_threlfalls_law(self, v0, relative):
+        """With 0.95 for the denominator, as it is often printed, it is the same to 3 parts in 10,000."""
+        exact = MU_K * (1 - exp(-3 * relative)) / (1 - exp(-3))
+        assert mu(Threlfall(v0), relative * v0) == pytest.approx(exact, rel=1e-13, abs=1e-15)
+        assert exact == pytest.approx(MU_K * (1 - exp(-3 * relative)) / 0.95, rel=3e-4)
+
+    def test_knows_no_static_friction(self):
+        assert {weights(Threlfall(0.1), speed)[0] for speed in np.linspace(0, 0.3, 50)} == {0.0}
+
+
+class TestPiecewiseLinear:
+    @given(widths, powers(1e-3, 1e3))
+    def test_goes_through_its_corners_by_straight_lines(self, v0, share):
+        v1 = v0 * (1 + share)
+        law = PiecewiseLinear(v0, v1)
+        assert mu(law, 0.0) == 0.0
+        assert mu(law, v0 / 2) == pytest.approx(MU_S / 2, rel=1e-14)
+        assert mu(law, v0) == MU_S
+        assert mu(law, (v0 + v1) / 2) == pytest.approx((MU_S + MU_K) / 2, rel=1e-12)
+        assert mu(law, v1) == mu(law, 1e6 * v1) == MU_K
+        assert slope(law, v0 / 3) == pytest.approx(MU_S / v0, rel=1e-14)
+        assert slope(law, (v0 + v1) / 2) == pytest.approx((MU_K - MU_S) / (v1 - v0), rel=1e-12)
+        assert slope(law, v1) == 0.0
+
+
+class TestPiecewiseCubic:
+    @given(widths, powers(1e-3, 1e3))
+    def test_goes_through_its_characteristic_values(self, v0, share):
+        v1 = v0 * (1 + share)
+        law = PiecewiseCubic(v0, v1)
+        assert mu(law, 0.0) == 0.0
+        assert mu(law, v0 / 2) == pytest.approx(11 / 16 * MU_S, rel=1e-14)
+        assert mu(law, v0) == MU_S
+        assert mu(law, (v0 + v1) / 2) == pytest.approx((MU_S + MU_K) / 2, rel=1e-12)
+        assert mu(law, v1) == mu(law, 1e6 * v1) == MU_K
+        assert slope(law, 0.0) == pytest.approx(1.5 * MU_S / v0, rel=1e-14)
+        assert slope(law, (v0 + v1) / 2) == pytest.approx(1.5 * (MU_K - MU_S) / (v1 - v0), rel=1e-12)
+        assert slope(law, v1) == 0.0
+
+    @given(widths, powers(1e-3, 1e3), st.floats(0.0, 1.0))
+    def test_is_the_papers_law(self, v0, share, relative):
+        v1 = v0 * (1 + share)
+        law = PiecewiseCubic(v0, v1)
+        rise, fall = weights_in(law, BAND, relative * v0), weights_in(law, TAIL, v0 + relative * (v1 - v0))
+        step = relative**2 * (3 - 2 * relative)
+        assert rise[:2] == pytest.approx((relative * (3 - relative**2) / 2, 0.0), abs=1e-14)
+        assert fall[:2] == pytest.approx((1 - step, step), abs=1e-11)
+
+
+class TestBengisuAkay:
+    @given(alphas, powers(1e-6, 1.0))
+    def test_goes_through_its_characteristic_values(self, alpha, v0):
+        law = made(BengisuAkay, alpha, v0)
+        assert mu(law, v0 / 2) == pytest.approx(0.75 * MU_S, rel=1e-14)
+        assert mu(law, v0) == MU_S
+        half = v0 + log(2) / alpha
+        assert mu(law, half) == pytest.approx((MU_S + MU_K) / 2, abs=1e-13 + alpha * np.spacing(half))
+        assert mu(law, law.end) == mu(law, 2 * law.end) == MU_K
+        assert slope(law, 0.0) == pytest.approx(2 * MU_S / v0, rel=1e-14)
+        assert slope(law, v0, BAND) == pytest.approx(0.0, abs=1e-14 / v0)
+        assert slope(law, v0) == pytest.approx(alpha * (MU_K - MU_S), rel=1e-14)
+
+
+class TestTustin:
+    @given(alphas, st.floats(0.0, 30.0))
+    def test_decays_from_mu_s_at_rest(self, alpha, x):
+        law = made(Tustin, alpha)
+        assert mu(law, 0.0) == MU_S
+        if x / alpha < law.end:
+            assert mu(law, x / alpha) == pytest.approx(MU_K + (MU_S - MU_K) * exp(-x), rel=1e-13)
+        assert mu(law, law.end) == mu(law, 2 * law.end) == MU_K
+
+    @given(powers(1.0, 1e9), powers(1e-6, 1.0), st.floats(0.0, 30.0))
+    def test_is_the_tail_of_bengisu_and_akay(self, alpha, v0, x):
+        one, other = made(Tustin, alpha), made(BengisuAkay, alpha, v0)
+        for a, b in zip(weights_in(one, TAIL, x / alpha), weights_in(other, TAIL, v0 + x / alpha), strict=True):
+            assert a == pytest.approx(b, rel=1e-12 + 2 * alpha * np.spacing(v0 + x / alpha))
+
+
+class TestTailWithoutDecay:
+    @given(widths, powers(1e-9, 1e9))
+    def test_is_a_constant_mu_s(self, v0, times):
+        law = made(BengisuAkay, 0.0, v0)
+        assert law.end == inf
+        assert weights(law, v0 * (1 + times)) == (1.0, 0.0, 0.0, 0.0)
+        assert weights(made(Tustin, 0.0), times) == (1.0, 0.0, 0.0, 0.0)
+        assert CLEAN not in pieces(law)
+
+    @given(alphas)
+    def test_is_what_a_slow_one_tends_to(self, alpha):
+        """At a given speed, linearly in alpha."""
+        fall = MU_S - mu(made(Tustin, alpha), 1e-4 / alpha)
+        assert fall == pytest.approx(1e-4 * (MU_S - MU_K), rel=1e-4)
+
+
+class TestEndOfATail:
+    @given(powers(1.0, 1e9), st.just(0.0) | powers(1e-6, 1.0))
+    def test_is_where_the_rest_changes_the_velocity_by_nothing(self, alpha, low):
+        """The integral of what is left of it, 1e-17 m/s; and not much before."""
+        length = (made(BengisuAkay, alpha, low).end if low else made(Tustin, alpha).end) - low
+        rounding = 1 + 3 * alpha * np.spacing(low)
+        assert 1e-18 < exp(-alpha * length) / alpha < 1.1e-17 * rounding
+
+
+class TestSetValued:
+    @given(powers(1e-12, 1e6))
+    def test_kinetic_friction_does_not_depend_on_the_speed(self, speed):
+        for law in (Coulomb(), Stiction()):
+            assert weights(law, speed) == (0.0, 1.0, 0.0, 0.0)
+
+    @given(widths, st.floats(0.0, 3.0))
+    def test_a_dead_band_is_bounded_by_mu_s_and_mu_k_follows_it(self, band, relative):
+        expected = (1.0, 0.0, 0.0, 0.0) if relative * band < band else (0.0, 1.0, 0.0, 0.0)
+        assert weights(Karnopp(band), relative * band) == expected
+
+
+def scene(law, **of_law):
+    return {
+        "model": "belt",
+        "body": {"mass": 1.0},
+        "spring": {"stiffness": 2.0},
+        "belt": {"velocity": 0.1},
+        "friction": {"law": law, "mu_s": MU_S, "mu_k": MU_K, **of_law},
+        "time": {"span": 1.0},
+    }
+
+
+@pytest.mark.parametrize("law", ["piecewise-linear", "piecewise-cubic"])
+class TestOrderOfSpeeds:
+    @pytest.mark.parametrize("v1", [0.1, 0.2])
+    def test_kinetic_friction_before_the_top_is_refused(self, law, v1):
+        with pytest.raises(InputError, match=rf"friction\.v1: {v1} is not greater than friction\.v0"):
+            load({"scene": scene(law, v0=0.2, v1=v1)})
+
+    def test_in_one_cell_of_a_sweep_too(self, law):
+        with pytest.raises(InputError, match=r"friction\.v1.* is not greater than friction\.v0.*in a cell"):
+            load({"scene": scene(law, v0=0.2), "sweep": {"grid": {"friction.v1": [0.5, 0.3, 0.15]}}})
+
+    def test_in_order_they_are_taken(self, law):
+        found = load({"scene": scene(law, v0="1 mm/s", v1="2 mm/s")})
+        assert (found.scene.values["friction.v0"], found.scene.values["friction.v1"]) == (1e-3, 2e-3)
