@@ -126,6 +126,11 @@ def switch(scene, mode, guard, t, y):
 
 
 @hook
+def impasse(scene, mode, t, y):
+    """Status of a run that finds no way on from the state `y`: jammed if that is on the brink of a jam, else broken."""
+
+
+@hook
 def watch(scene, record, mode, c, t, s, work):
     """Record after a step of length `s` from time `t` along the series `c`, extremes within it included."""
 
@@ -186,7 +191,10 @@ def linearise(scene, mode, t, x):
 
 @hook
 def stiff_scales(scene, tolerance, x):
-    """Error allowed to each component of the state `x` in the coordinates of the implicit method."""
+    """Error allowed to each component of the state `x` in the coordinates of the implicit method.
+
+    With bristles one number more: that allowed to the acceleration.
+    """
 
 
 @hook

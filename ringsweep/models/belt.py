@@ -82,9 +82,9 @@ class Belt:
         law = self.laws[structure.law]
         mu_s, mu_k = pair(law, "friction", values)
         drive = self._drive(structure, values)
-        velocity = values.get("initial.velocity")
-        if velocity is None:
-            velocity = np.array([drives.turn(take(drive, i), 0.0)[1] for i in range(len(mu_k))])
+        sliding = np.zeros(len(mu_k))
+        if "initial.velocity" in values:
+            sliding = values["initial.velocity"] - [drives.turn(take(drive, i), 0.0)[1] for i in range(len(mu_k))]
         mass, gravity = values["body.mass"], values["gravity"]
         given = {
             "mass": mass,
@@ -94,11 +94,19 @@ class Belt:
             "mu_k": mu_k,
             "drive": drive,
             "initial_x": values["initial.x"],
-            "initial_velocity": velocity,
+            "initial_v": sliding,
             "span": values["time.span"],
         }
         if law not in friction.DYNAMIC:
-            return belt.Belt(**given, law=law_of(law, values), viscous=values["friction.viscous"])
+            viscous, load = values["friction.viscous"], mass * gravity
+            if structure.law == "karnopp":
+                require(
+                    mu_k * load + viscous * values["friction.dead_band"] <= mu_s * load,
+                    "friction.viscous",
+                    viscous,
+                    "{} N s/m makes friction at the edge of the dead band greater than what holds within it",
+                )
+            return belt.Belt(**given, law=law_of(law, values), viscous=viscous)
         require(gravity > 0.0, "gravity", gravity, "{} m/s^2 leaves the bristles of friction without a load")
         per_load = {
             path: value / (mass * gravity) for path, value in values.items() if path.startswith("friction.sigma")
@@ -113,7 +121,7 @@ class Belt:
             raise InputError("scene.belt.velocity", what)
         if given:
             return drives.Constant(values["belt.velocity"])
-        if structure.law == "karnopp":
+        if structure.law == "karnopp" and structure.drive != "constant":
             raise InputError("scene.drive", "the dead band of law karnopp needs a belt of constant velocity")
         return drive_of(structure, values)
 
@@ -124,11 +132,11 @@ class Belt:
 class Record(NamedTuple):
     """What is remembered of a run on the belt; lengths in m, times in s, forces in N.
 
-    A cycle runs from one maximum of the displacement to the next. ``stuck_for`` is how long the
-    body has stuck without a break, ``stuck_later`` how long in all since its first slip, ``stuck_now`` and
-    ``stuck_last`` how long in this cycle and in the last complete one. ``low`` is the least displacement since the
-    last maximum, and a swing the way from it to a maximum: the first, the last, and the greatest in the third and in
-    the fourth quarter of the span.
+    A cycle runs from one extreme of the displacement to the next of its ``kind``, maxima (+1) or minima (-1) as the
+    first was (0: none yet), and a swing is the way from ``low``, the farthest place between, to that extreme: the
+    first, the last, and the greatest in the third and in the fourth quarter of the span. ``stuck_for`` is how long the
+    body has stuck without a break, ``stuck_now`` and ``stuck_last`` how long in this cycle and in the last complete
+    one, ``last_stick`` how long before its last slip, which began at ``last_slip``.
     """
 
     velocity: float
@@ -138,14 +146,16 @@ class Record(NamedTuple):
     force_max: float
     stick_time: float
     stuck_for: float
-    stuck_later: float
     stuck_now: float
     stuck_last: float
     slips: int
     first_slip: float
-    maxima: int
-    first_maximum: float
-    last_maximum: float
+    last_slip: float
+    last_stick: float
+    kind: int
+    extremes: int
+    first_extreme: float
+    last_extreme: float
     low: float
     first_swing: float
     third_swing: float
@@ -163,49 +173,77 @@ _SHORT = 1e-6
 # lasting, and be more than the tolerance makes of the displacement.
 _LASTING, _ROUNDING = 0.95, 1e-6
 
+# A stuck body that the spring would not load by this fraction of what holds it over another span sticks for good,
+# and so does one that has stuck for so many cycles.
+_LOADED, _CYCLES = 0.1, 2.0
+
 
 @inlined
 def begin(x, velocity, force):
     """Record of a run at its launch."""
-    times = 0.0, 0.0, 0.0, 0.0, 0.0
-    return Record(velocity, x, x, velocity, abs(force), *times, 0, nan, 0, nan, nan, x, nan, 0.0, 0.0, nan)
+    return Record(
+        velocity=velocity,
+        x_min=x,
+        x_max=x,
+        velocity_max=velocity,
+        force_max=abs(force),
+        stick_time=0.0,
+        stuck_for=0.0,
+        stuck_now=0.0,
+        stuck_last=0.0,
+        slips=0,
+        first_slip=nan,
+        last_slip=nan,
+        last_stick=0.0,
+        kind=0,
+        extremes=0,
+        first_extreme=nan,
+        last_extreme=nan,
+        low=0.0,
+        first_swing=0.0,
+        third_swing=0.0,
+        fourth_swing=0.0,
+        last_swing=0.0,
+    )
 
 
 @inlined
 def observe(r, scene, t, duration, x, velocity, force, stuck):
     """Record after `duration` seconds to the state at time `t`, in all of which the body stuck or slipped."""
-    slips, first_slip, stuck_for, stuck_later = r.slips, r.first_slip, r.stuck_for, r.stuck_later
-    stuck_now, stuck_last = r.stuck_now, r.stuck_last
+    slips, first_slip, last_slip, last_stick = r.slips, r.first_slip, r.last_slip, r.last_stick
+    stuck_for, stuck_now, stuck_last = r.stuck_for, r.stuck_now, r.stuck_last
     if stuck:
         stuck_for += duration
         stuck_now += duration
-        if slips > 0:
-            stuck_later += duration
     else:
         if stuck_for > _TOUCH * scene.span:
             slips += 1
+            last_slip, last_stick = t - duration, stuck_for
             if slips == 1:
-                first_slip = t - duration
+                first_slip = last_slip
         stuck_for = 0.0
-    maxima, first_maximum, last_maximum = r.maxima, r.first_maximum, r.last_maximum
-    low, first_swing, last_swing = min(r.low, x), r.first_swing, r.last_swing
-    third_swing, fourth_swing = r.third_swing, r.fourth_swing
-    if r.velocity > 0.0 and velocity <= 0.0:
+    kind, extremes, first_extreme, last_extreme = r.kind, r.extremes, r.first_extreme, r.last_extreme
+    first_swing, third_swing, fourth_swing, last_swing = r.first_swing, r.third_swing, r.fourth_swing, r.last_swing
+    before = r.velocity
+    if kind == 0:
+        kind = 1 if before > 0.0 and velocity <= 0.0 else -1 if before < 0.0 and velocity >= 0.0 else 0
+    low = min(r.low, kind * x)
+    if kind * before > 0.0 and kind * velocity <= 0.0:
         # Between two states the velocity is all but linear.
-        maximum = t - duration * velocity / (velocity - r.velocity)
-        maxima += 1
-        if maxima == 1:
-            first_maximum = maximum
+        extreme = t - duration * velocity / (velocity - before)
+        extremes += 1
+        if extremes == 1:
+            first_extreme = extreme
         else:
-            last_swing = x - low
-            if maxima == 2:
+            last_swing = kind * x - low
+            if extremes == 2:
                 first_swing = last_swing
-            if maximum > 0.75 * scene.span:
+            if extreme > 0.75 * scene.span:
                 fourth_swing = max(fourth_swing, last_swing)
-            elif maximum > 0.5 * scene.span:
+            elif extreme > 0.5 * scene.span:
                 third_swing = max(third_swing, last_swing)
-        last_maximum = maximum
-        low = x
+        last_extreme = extreme
+        low = kind * x
         stuck_last, stuck_now = stuck_now, 0.0
     return Record(
         velocity,
@@ -215,14 +253,16 @@ def observe(r, scene, t, duration, x, velocity, force, stuck):
         max(r.force_max, abs(force)),
         r.stick_time + (duration if stuck else 0.0),
         stuck_for,
-        stuck_later,
         stuck_now,
         stuck_last,
         slips,
         first_slip,
-        maxima,
-        first_maximum,
-        last_maximum,
+        last_slip,
+        last_stick,
+        kind,
+        extremes,
+        first_extreme,
+        last_extreme,
         low,
         first_swing,
         third_swing,
@@ -237,20 +277,12 @@ def conclude(r, scene, status, t, x, velocity, band):
 
     `band` is the sliding speed below which a contact counts as stuck, or zero.
     """
-    cycle = (r.last_maximum - r.first_maximum) / (r.maxima - 1) if r.maxima >= 2 else nan
-    # Irregular swings are judged by the greatest of a quarter, few ones by the first and the last.
-    seen = r.third_swing > 0.0 and r.fourth_swing > 0.0
-    before, after = (r.third_swing, r.fourth_swing) if seen else (r.first_swing, r.last_swing)
-    # A harmonic that grazes the velocity of the belt is slower than the band for so long, and does not stick.
-    curvature = (scene.stiffness / scene.mass) ** 1.5 * (r.x_max - r.x_min)
-    graze = sqrt(32.0 * band / curvature) if curvature > 0.0 else 0.0
+    cycle = (r.last_extreme - r.first_extreme) / (r.extremes - 1) if r.extremes >= 2 else nan
     if status == BROKEN or not (isfinite(x) and isfinite(velocity)):
         motion = FAILED
-    elif r.slips > 0 and (
-        r.stuck_last > max(_SHORT * cycle, graze) if r.maxima >= 2 else r.stuck_later > max(_SHORT * scene.span, graze)
-    ):
+    elif _sticks_and_slips(r, scene, velocity, cycle, band):
         motion = STICK_SLIP
-    elif after >= _LASTING * before and after > _ROUNDING * max(abs(r.x_min), abs(r.x_max)):
+    elif r.stuck_for < cycle and _swings_on(r):
         motion = OSCILLATORY
     else:
         motion = RESTING
@@ -269,3 +301,28 @@ def conclude(r, scene, status, t, x, velocity, band):
         cycle,
         r.force_max,
     )
+
+
+@inlined
+def _sticks_and_slips(r, scene, velocity, cycle, band):
+    """Whether stick and slip go on following each other."""
+    # A harmonic that grazes the velocity of the belt is slower than the band for so long, and does not stick.
+    curvature = (scene.stiffness / scene.mass) ** 1.5 * (r.x_max - r.x_min)
+    graze = sqrt(32.0 * band / curvature) if curvature > 0.0 else 0.0
+    if r.extremes >= 2:
+        return r.slips > 0 and r.stuck_last > max(_SHORT * cycle, graze) and r.stuck_for <= _CYCLES * cycle
+    shortest = max(_SHORT * scene.span, graze)
+    if r.stuck_for > 0.0:
+        # Without a cycle to go by: a body that has slipped and stuck again will slip again if it is loaded.
+        loaded = scene.stiffness * abs(velocity) * scene.span > _LOADED * scene.mu_s * scene.mass * scene.gravity
+        return r.slips > 0 and r.stuck_for > shortest and loaded
+    return r.slips > 1 and r.last_stick > shortest and r.last_slip > 0.5 * scene.span
+
+
+@inlined
+def _swings_on(r):
+    """Whether the body swings at an amplitude that lasts."""
+    # Irregular swings are judged by the greatest of a quarter, few ones by the first and the last.
+    seen = r.third_swing > 0.0 and r.fourth_swing > 0.0
+    before, after = (r.third_swing, r.fourth_swing) if seen else (r.first_swing, r.last_swing)
+    return r.extremes >= 3 and after >= _LASTING * before and after > _ROUNDING * max(abs(r.x_min), abs(r.x_max))

@@ -53,7 +53,8 @@ class Inspection(NamedTuple):
 
 @hooks.launch.implements(BristleBelt)
 def _launch(scene):
-    return scene.initial_x, scene.initial_velocity, made(scene.law, scene.mu_s, scene.mu_k)
+    velocity = scene.initial_v + drives.turn(scene.drive, 0.0)[1]
+    return scene.initial_x, velocity, made(scene.law, scene.mu_s, scene.mu_k)
 
 
 @hooks.rates.implements(BristleBelt)
@@ -135,9 +136,8 @@ def _rows(scene):
 
 @hooks.embark.implements(BristleBelt)
 def _embark(scene):
-    t = drives.beginning(scene.drive)
-    v = scene.initial_velocity - drives.turn(scene.drive, t)[1]
-    return t, (scene.initial_x, v, made(scene.law, scene.mu_s, scene.mu_k))
+    z = made(scene.law, scene.mu_s, scene.mu_k)
+    return drives.beginning(scene.drive), (scene.initial_x, scene.initial_v, z)
 
 
 @hooks.enter.implements(BristleBelt)
@@ -202,6 +202,7 @@ def _stiff_scales(scene, tolerance, x):
         tolerance * (abs(x[0]) + deflection),
         tolerance * (abs(x[1]) + _recoil(scene)),
         tolerance * deflection,
+        tolerance * scene.mu_s * scene.gravity,
     )
 
 
@@ -236,6 +237,11 @@ def _stiff_watch(scene, record, mode, view, t, duration):
 def _stiff_sample(scene, mode, t, x):
     _, (place, velocity, _, force) = hooks.stiff_view(scene, mode, t, x)
     return place, velocity, force, x[2], 0.0 if mode.region == BAND else float(mode.sign)
+
+
+@hooks.impasse.implements(BristleBelt)
+def _impasse(scene, mode, t, y):
+    return BROKEN
 
 
 @hooks.finish.implements(BristleBelt)

@@ -68,7 +68,7 @@ def _force(scene, x, v):
 
 @hooks.launch.implements(belt.Belt)
 def _launch(scene):
-    return scene.initial_x, scene.initial_velocity
+    return scene.initial_x, scene.initial_v + drives.turn(scene.drive, 0.0)[1]
 
 
 @hooks.rates.implements(belt.Belt)
@@ -91,8 +91,12 @@ def _verdict(scene, before, now):
 
 @hooks.stiffness.implements(belt.Belt)
 def _stiffness(scene, before, now, h):
-    crossed = before.v * now.v < 0.0
-    slow, fast = min(abs(before.v), abs(now.v)), max(abs(before.v), abs(now.v))
+    # The stages reach about as far as the acceleration at the beginning takes the body in one step.
+    belt_gains = (now.rates[0] - now.v) - (before.rates[0] - before.v)
+    ahead = before.v + h * before.rates[1] - belt_gains
+    crossed = before.v * now.v < 0.0 or before.v * ahead < 0.0
+    slow = min(abs(before.v), abs(now.v), abs(ahead))
+    fast = max(abs(before.v), abs(now.v), abs(ahead))
     band = stiction_band(scene.law)
     if _holds(scene.law):
         # A discontinuous law has no slope that any step could follow; but one may land in a dead band.
@@ -154,8 +158,7 @@ def _onward(mode):
 
 @hooks.embark.implements(belt.Belt)
 def _embark(scene):
-    t = drives.beginning(scene.drive)
-    return t, (scene.initial_x, scene.initial_velocity - drives.turn(scene.drive, t)[1])
+    return drives.beginning(scene.drive), (scene.initial_x, scene.initial_v)
 
 
 @hooks.rows.implements(belt.Belt)
@@ -186,7 +189,13 @@ def _settle(scene, t, x):
     bound = _bound(scene)
     if abs(pull) <= bound and bound > 0.0:
         return Mode(0, CLEAN, -1)
-    return Mode(1 if pull >= 0.0 else -1, region_at(scene.law, 0.0), SLOW)
+    if pull == 0.0:
+        # What the pull will be in a moment, as the belt takes the body along.
+        _, belt_velocity, _ = drives.turn(scene.drive, t)
+        pull = -scene.stiffness * belt_velocity - scene.mass * drives.jerk(scene.drive, t)
+    # Without a band the sliding velocity is a guard, and zero here.
+    fresh = SLOW if stiction_band(scene.law) == 0.0 else -1
+    return Mode(1 if pull >= 0.0 else -1, region_at(scene.law, 0.0), fresh)
 
 
 @hooks.switch.implements(belt.Belt)
@@ -315,6 +324,11 @@ def _watch(scene, record, mode, c, t, s, work):
 def _sample(scene, mode, c, t, s):
     mode_now = 0.0 if mode.region == BAND else float(mode.sign)
     return value(c[X], s), value(c[VELOCITY], s), value(c[FORCE], s), 0.0, mode_now
+
+
+@hooks.impasse.implements(belt.Belt)
+def _impasse(scene, mode, t, y):
+    return BROKEN
 
 
 @hooks.finish.implements(belt.Belt)

@@ -213,8 +213,13 @@ def _in_band(scene, before, now):
 
 @hooks.stiffness.implements(ring.Ring)
 def _stiffness(scene, before, now, h):
-    crossed = before.v * now.v < 0.0
-    slow, fast = min(abs(before.v), abs(now.v)), max(abs(before.v), abs(now.v))
+    # The stages reach about as far as the acceleration at the beginning takes the body in one step.
+    radius = scene.body.radius
+    ring_gains = (radius * now.omega - now.v) - (radius * before.omega - before.v)
+    ahead = before.v + h * radius * before.rates[1] - ring_gains
+    crossed = before.v * now.v < 0.0 or before.v * ahead < 0.0
+    slow = min(abs(before.v), abs(now.v), abs(ahead))
+    fast = max(abs(before.v), abs(now.v), abs(ahead))
     band = stiction_band(scene.law)
     if crossed and band == 0.0:
         # A discontinuous law has no slope that any step could follow.

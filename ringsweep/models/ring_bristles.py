@@ -222,19 +222,30 @@ def _enter(scene, t, y):
     return RUNNING, mode
 
 
+@inlined
+def _is_jamming(scene, mode, t, y):
+    """Whether slip is so near to a jam that its reactions, which grow without bound there, have no sign to go by."""
+    rho, v, z_1, z_2 = y
+    theta, ring_omega, _ = drives.turn(scene.drive, t)
+    phi, omega = rho + theta, ring_omega + v / scene.body.radius
+    now = _contacts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(mode.sign), mode.region)
+    _, D, inertia = ring.acceleration(scene.body, now.K1, now.K2, sin(phi), cos(phi), omega)
+    return not (D > 0.0 and inertia > 1e-4 * ring.about_axis(scene.body) * D)
+
+
+@hooks.impasse.implements(BristleRing)
+def _impasse(scene, mode, t, y):
+    return JAM if _is_jamming(scene, mode, t, y) else BROKEN
+
+
 @hooks.switch.implements(BristleRing)
 def _switch(scene, mode, guard, t, y):
-    rho, v, z_1, z_2 = y
+    rho, _, z_1, z_2 = y
     sign, place_1, place_2 = mode.sign, mode.place_1, mode.place_2
     if guard == INERTIA:
         return JAM, mode, y
     if guard in (NORMAL_1, NORMAL_2):
-        # On the way into a jam both reactions grow without bound and have no sign to go by.
-        theta, ring_omega, _ = drives.turn(scene.drive, t)
-        phi, omega = rho + theta, ring_omega + v / scene.body.radius
-        now = _contacts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(sign), mode.region)
-        _, D, inertia = ring.acceleration(scene.body, now.K1, now.K2, sin(phi), cos(phi), omega)
-        if not (D > 0.0 and inertia > 1e-4 * ring.about_axis(scene.body) * D):
+        if _is_jamming(scene, mode, t, y):
             return JAM, mode, y
         return (SEPARATED_1 if guard == NORMAL_1 else SEPARATED_2), mode, y
     if guard == SLOW:
@@ -305,8 +316,10 @@ def _linearise(scene, mode, t, x):
 def _stiff_scales(scene, tolerance, x):
     mu, _ = roughest(scene.surface)
     deflection = mu / scene.law.sigma0
-    speed = mu * sqrt(scene.body.gravity / scene.law.sigma0) + abs(x[1])
-    return tolerance, tolerance * speed, tolerance * deflection, tolerance * deflection
+    # Without weight the load is that of turning at about 1 rad/s.
+    load = scene.body.gravity + scene.body.radius
+    speed = mu * sqrt(load / scene.law.sigma0) + abs(x[1])
+    return tolerance, tolerance * speed, tolerance * deflection, tolerance * deflection, tolerance * mu * load
 
 
 @hooks.stiff_view.implements(BristleRing)

@@ -136,6 +136,11 @@ def _is_jamming(scene, mode, t, y):
     return not (determinant > 0.0 and inertia > 1e-4 * ring.about_axis(scene.body) * determinant)
 
 
+@hooks.impasse.implements(ring.Ring)
+def _impasse(scene, mode, t, y):
+    return JAM if _is_jamming(scene, mode, t, y) else BROKEN
+
+
 @hooks.switch.implements(ring.Ring)
 def _switch(scene, mode, guard, t, y):
     phi, v = y

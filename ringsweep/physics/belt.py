@@ -27,7 +27,7 @@ class Belt(NamedTuple):
     law: Any
     drive: Any
     initial_x: Leaf
-    initial_velocity: Leaf
+    initial_v: Leaf
     span: Leaf
 
 
@@ -42,5 +42,5 @@ class BristleBelt(NamedTuple):
     law: Any
     drive: Any
     initial_x: Leaf
-    initial_velocity: Leaf
+    initial_v: Leaf
     span: Leaf

@@ -136,6 +136,7 @@ class Auto(Method):
 
     name: ClassVar[str] = "auto"
 
+    max_steps: Annotated[int, LIMIT] = 1_000_000
     certify: bool = True
 
     def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:
@@ -148,4 +149,4 @@ class Auto(Method):
 
     def _method(self, batch: Any) -> Method:
         method = Event if type(batch.law) in SET_VALUED else Implicit
-        return method(certify=self.certify)
+        return method(max_steps=self.max_steps, certify=self.certify)

@@ -19,6 +19,7 @@ from ringsweep.hooks import (
     expand,
     finish,
     from_stiff,
+    impasse,
     is_stiff,
     land,
     linearise,
@@ -45,6 +46,9 @@ from ringsweep.solvers import rosenbrock
 
 # Steps and events in a row at one instant after which a run is given up.
 _STALLED = 400
+
+# How much larger the relative error of a step may be in the friction of bristles than in the state.
+_PUSH = 100.0
 
 
 @inlined
@@ -121,9 +125,16 @@ def _locate(scene, mode, t, x, line, h, g, stages):
 
 
 @inlined
-def _size(error, scales):
-    """Largest component of an error, measured by what is allowed; infinite if one is not a number."""
-    size = 0.0
+def _size(error, scales, line):
+    """Largest component of an error, or of that of the friction of bristles, measured by what is allowed.
+
+    Infinite if one is not a number.
+    """
+    _, core, bristles, _ = line
+    # Stiff bristles turn a small error of the velocity into a large one of the force.
+    size = rosenbrock.push(bristles, core, error, scales) / _PUSH
+    if not size >= 0.0:
+        size = inf
     for k in range(len(error)):
         part = abs(error[k]) / scales[k]
         if not part <= size:
@@ -161,7 +172,7 @@ def _creep(scene, record, mode, t, y, x, line, h, horizon, tolerance, guards, st
     event, end = -1, s
     for _ in range(200):
         x_next, error = rosenbrock.step(scene, mode, t, x, line, s, stages)
-        size = _size(error, scales)
+        size = _size(error, scales, line)
         if size <= 1.0:
             within = stiff_view(scene, mode, t + 0.5 * s, rosenbrock.dense(x, x_next, stages, 0.5))
             after = stiff_view(scene, mode, t + s, x_next)
@@ -170,7 +181,7 @@ def _creep(scene, record, mode, t, y, x, line, h, horizon, tolerance, guards, st
                 break
             # The step up to the event is another one, which may see what the stages of the longer one passed over.
             x_next, error = rosenbrock.step(scene, mode, t, x, line, end, stages)
-            short = _size(error, scales)
+            short = _size(error, scales, line)
             if short <= 1.0:
                 break
             s, size = end, short
@@ -311,9 +322,12 @@ def _implicit_row(law, scene, mode, implicit, c, t, s, y):
 def _arrive(scene, mode, guard, t, s, horizon, y):
     """Time, status, mode and state after a step `s` that ended at `guard`, or at none (-1)."""
     # To the very end of the span or of a piece of the drive, not to the rounding of a sum.
-    t = t + s if s < horizon else t + horizon
-    if not (s >= 0.0 and isfinite(y[0]) and isfinite(y[1])):
+    if s >= 0.0:
+        t = t + s if s < horizon else t + horizon
+    if not (isfinite(y[0]) and isfinite(y[1])):
         return t, BROKEN, mode, y
+    if not s >= 0.0:
+        return t, impasse(scene, mode, t, y), mode, y
     if guard >= 0:
         status, mode, y = switch(scene, mode, guard, t, y)
         return t, status, mode, y
@@ -358,9 +372,13 @@ def trace(batch, tolerances, limit, spacing, times, table):
     n = 0
     entered = True
     implicit = False
+    stalled = 0
+    before = -1.0
     for _ in range(limit):
-        if status != RUNNING or n == len(times):
+        stalled = stalled + 1 if t == before else 0
+        if status != RUNNING or n == len(times) or stalled == _STALLED:
             break
+        before = t
         horizon = min(scene.span, next_knot(scene.drive, t)) - t
         implicit, guard, s, y_next, record, trial = _stride(
             scene.law, scene, record, mode, t, y, min(trial, spacing), horizon, tolerances, c, guards, work, stages
@@ -372,7 +390,8 @@ def trace(batch, tolerances, limit, spacing, times, table):
                     inside = s * part / parts
                     state = y if part == 0 else y_next
                     _store(table[n], _row(scene.law, scene, mode, implicit, c, t + inside, inside, state))
-                    times[n] = t + inside
+                    # Sums that should be equal differ by rounding.
+                    times[n] = max(t + inside, times[n - 1]) if n > 0 else t
                     n += 1
         y = y_next
         entered = guard >= 0 or (entered and s == 0.0)
@@ -418,7 +437,7 @@ def integrate(batch, tolerances, limit, out, steps):
             # Steps below the rounding of time do move the state, on the way into a jam, but not for ever.
             stalled = stalled + 1 if t == before else 0
             if n == limit or stalled == _STALLED:
-                status = BROKEN
+                status = impasse(scene, mode, t, y) if stalled == _STALLED else BROKEN
                 break
             before = t
             n += 1

@@ -166,6 +166,25 @@ def _solve(core, bristles, shift, right, out):
     return _solve_for(len(bristles))
 
 
+def push(bristles: Any, core: Any, error: Any, scales: Any) -> float:
+    """Error of the acceleration that an error of velocity and bristles makes, measured by the last of `scales`."""
+    return float(_push_of(len(bristles))(bristles, core, error, scales))
+
+
+def _push_of(count: int) -> Any:
+    """The body of :func:`push` for so many bristles."""
+    terms = "".join(f" + bristles[{i}][0] * error[{i + 2}]" for i in range(count))
+    measured = f"abs(core[3] * error[1]{terms}) / scales[{count + 2}]" if count else "0.0"
+    scope: dict[str, Any] = {}
+    exec(f"def push(bristles, core, error, scales):\n    return {measured}", scope)
+    return scope["push"]
+
+
+@overload(push, jit_options=OPTIONS)
+def _push(bristles, core, error, scales):
+    return _push_of(len(bristles))
+
+
 @inlined
 def dense(x, x_next, stages, fraction):
     """State within a step, from both its ends and its stages."""
