@@ -442,7 +442,7 @@ class TestNames:
 
     def test_a_body_carried_to_and_fro_rests_on_the_belt(self):
         scene = belt(k=0.5, span=60.0)
-        del scene["belt"]
+        del scene["belt"], scene["initial"]
         scene["drive"] = {"law": "sinusoidal", "amplitude": 0.1, "frequency": 0.1}
         found = outcome(scene)
         assert float(found.stick_time) == pytest.approx(60.0, rel=1e-12)
