@@ -279,6 +279,10 @@ def _scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | None) 
     if not isinstance(arcs, list) or ("zones" in scene and not arcs):
         raise InputError("scene.zones", f"a list of arcs is expected, got {show(arcs)}")
     zones = tuple(f"zones.{i}" for i in range(len(arcs)))
+    named = scene.get("friction")
+    if isinstance(named, dict) and "law" in named:
+        # A law that the model does not take is found before the parameters that only it has.
+        _choose(MODELS[model].laws, named, f"scene.{LAW}", f"friction law of model {model}")
     # A misspelt key is found before the key that it leaves missing.
     leaves = dict(_leaves(scene, "", _Names(_all_paths(model, zones or ("zones.0",)))))
     names = []
@@ -308,7 +312,9 @@ def _scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | None) 
         elif parameter.default is not None:
             values[path] = parameter.default
         elif not parameter.optional and path not in swept:
-            raise InputError(f"scene.{path}", _missing(path, parameter))
+            needing = [law for law, structure in structures.items() if path in parameters(structure)]
+            who = f"; law {needing[0]} needs it" if len(structures) > len(needing) else ""
+            raise InputError(f"scene.{path}", _missing(path, parameter) + who)
     for path in leaves:
         if path not in known and path not in _structural(drive):
             where, name = ("drive", drive) if path.startswith("drive.") else ("friction", " or ".join(structures))

@@ -343,7 +343,7 @@ def scene(law, **of_law):
 class TestOrderOfSpeeds:
     @pytest.mark.parametrize("v1", [0.1, 0.2])
     def test_kinetic_friction_before_the_top_is_refused(self, law, v1):
-        with pytest.raises(InputError, match=rf"friction\.v1: {v1} is not greater than friction\.v0"):
+        with pytest.raises(InputError, match=rf"friction\.v1: {v1} m/s is not greater than friction\.v0"):
             load({"scene": scene(law, v0=0.2, v1=v1)})
 
     def test_in_one_cell_of_a_sweep_too(self, law):

@@ -40,8 +40,11 @@ def law_of(law: type, values: Values) -> Any:
     columns = {name: values[f"friction.{name}"] for name in declared(law)}
     if law in friction.ASCENDING:
         low, high = friction.ASCENDING[law]
-        problem = f"{{}} is not greater than friction.{low}"
+        unit = declared(law)[high].unit
+        problem = f"{{}} {unit} is not greater than friction.{low}"
         require(columns[high] > columns[low], f"friction.{high}", columns[high], problem)
+    if "seed" in columns:
+        require(columns["seed"] % 1.0 == 0.0, "friction.seed", columns["seed"], "{} is not a whole number")
     made: Any = getattr(law, "of", law)
     return made(**columns)
 

@@ -271,7 +271,7 @@ class Bristles(NamedTuple):
     """
 
     sigma0: Annotated[Leaf, SIGMA_0]
-    seed: Annotated[Leaf, Parameter("1", "seed of the random bonds", lower=0.0, upper=2.0**31, default=0.0)]
+    seed: Annotated[Leaf, Parameter("1", "seed of the random bonds", lower=0.0, upper=2.0**31 - 4.0, default=0.0)]
     bonds: Any = None
 
     @classmethod
