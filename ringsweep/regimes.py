@@ -130,7 +130,7 @@ def conclude(record, status, t, phi, omega):
         float(r.reversals),
         float(turns),
         r.stick_time,
-        # A step ends beyond the instant at which a reaction vanishes.
-        max(r.normal_min_1, 0.0),
-        max(r.normal_min_2, 0.0),
+        # A step ends beyond the instant at which a reaction vanishes, and at the end of an arc one may jump below zero.
+        0.0 if status == SEPARATED_1 else max(r.normal_min_1, 0.0),
+        0.0 if status == SEPARATED_2 else max(r.normal_min_2, 0.0),
     )

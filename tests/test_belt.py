@@ -262,8 +262,10 @@ class TestTwoMethods:
         assert fixed.stiffness < 2.785
         assert own.regime == fixed.regime
         assert own.certified == fixed.certified == 1
-        for name in ("x_end", "x_max", "velocity_end", "period"):
+        for name in ("x_end", "x_max", "velocity_end"):
             assert float(own[name]) == pytest.approx(float(fixed[name]), abs=error)
+        # A constant step knows to a step when a slip begins.
+        assert float(own.period) == pytest.approx(float(fixed.period), abs=max(error, 2e-4))
 
     def test_error_falls_with_the_tolerance(self):
         """Also where the body is caught, and Stribeck's curve rises within a thousandth of the step before."""
@@ -439,6 +441,32 @@ class TestNames:
         still = belt(law, v_b=0.0, span=60.0, **of_law) | {"initial": {"x": 1.0, "velocity": 0.0}}
         for scene in (without_spring, still):
             assert REGIMES[int(outcome(scene).regime)] == "resting"
+
+    @pytest.mark.parametrize("law", ["reset-integrator", "lugre"])
+    def test_bristles_that_ring_as_the_body_sticks_make_no_slips(self, law):
+        """On a belt slower than their ringing the velocity changes sign again and again within one stick."""
+        bristles = {"sigma0": 1000.0, "sigma1": 5.0} | ({"v_s": 0.001} if law == "lugre" else {})
+        scene = belt(law, v_b=0.01, mu_s=0.2, start=0.01, **bristles)
+        found = ringsweep.sweep(scene, {"time.span": [300.0, 710.0, 1000.0]}, progress=False)
+        assert (found.regime == REGIMES.index("stick-slip")).all()
+        # Nearly 2 (F_s - F_c)/(k v_b), and whatever the span.
+        assert float(found.period[2]) == pytest.approx(98.1, rel=0.25)
+        np.testing.assert_allclose(found.period, found.period[2], rtol=1e-4)
+        np.testing.assert_allclose(found.slips, (found.time_span - found.first_slip) // found.period + 1, atol=1)
+
+    def test_a_body_that_creeps_home_rests(self):
+        scene = belt("bengisu-akay", v_b=0.0, v0=0.01, alpha=100.0) | {"initial": {"x": 1.5, "velocity": 0.0}}
+        found = ringsweep.sweep(scene, {"time.span": [20.0, 60.0, 240.0, 1000.0]}, progress=False)
+        assert (found.regime == REGIMES.index("resting")).all()
+        assert found.period.isnull().all()
+
+    def test_a_constant_step_that_misses_the_stick_at_the_start_is_flagged(self):
+        scene = belt(span=30.0) | {"initial": {"x": 0.5}}
+        assert REGIMES[int(outcome(scene).regime)] == "stick-slip"
+        for steps in (500, 2000, 10_000):
+            fixed = outcome(scene, method="rk4", steps=steps)
+            assert REGIMES[int(fixed.regime)] == "oscillatory"
+            assert fixed.certified == 0
 
     def test_a_body_carried_to_and_fro_rests_on_the_belt(self):
         scene = belt(k=0.5, span=60.0)

@@ -132,11 +132,14 @@ class Belt:
 class Record(NamedTuple):
     """What is remembered of a run on the belt; lengths in m, times in s, forces in N.
 
-    A cycle runs from one extreme of the displacement to the next of its ``kind``, maxima (+1) or minima (-1) as the
-    first was (0: none yet), and a swing is the way from ``low``, the farthest place between, to that extreme: the
-    first, the last, and the greatest in the third and in the fourth quarter of the span. ``stuck_for`` is how long the
-    body has stuck without a break, ``stuck_now`` and ``stuck_last`` how long in this cycle and in the last complete
-    one, ``last_stick`` how long before its last slip, which began at ``last_slip``.
+    A slip counts once it is longer than the play of the bristles, which ring as the body sticks. ``place`` is where the
+    body is on the belt, ``slip_from`` and ``slip_start`` where and when it began to slip, ``counted`` whether that is a
+    slip already; ``stuck_for`` is how long it has stuck since the last slip that counts, ``last_stick`` how long before
+    that one, which began at ``last_slip``.
+
+    A cycle of a swing runs from one extreme of the displacement to the next of its ``kind``, maxima (+1) or minima (-1)
+    as the first was (0: none yet), and a swing is the way from ``low``, the farthest place between, to that extreme:
+    the first, the last, and the greatest in the third and in the fourth quarter of the span.
     """
 
     velocity: float
@@ -145,9 +148,11 @@ class Record(NamedTuple):
     velocity_max: float
     force_max: float
     stick_time: float
+    place: float
+    slip_from: float
+    slip_start: float
+    counted: bool
     stuck_for: float
-    stuck_now: float
-    stuck_last: float
     slips: int
     first_slip: float
     last_slip: float
@@ -166,20 +171,20 @@ class Record(NamedTuple):
 # A stick shorter than this fraction of the span is a touch.
 _TOUCH = 1e-9
 
-# A stick shorter than this fraction of the cycle or the span does not make it a cycle of stick and slip.
-_SHORT = 1e-6
+# A stick shorter than this fraction of the cycle does not make it a cycle of stick and slip; the second is for laws
+# under which a contact is only nearly stuck.
+_SHORT, _SHORT_CREEP = 1e-6, 1e-2
 
 # Swings must keep this much of themselves from one quarter of a run to the next for their amplitude to count as
 # lasting, and be more than the tolerance makes of the displacement.
 _LASTING, _ROUNDING = 0.95, 1e-6
 
-# A stuck body that the spring would not load by this fraction of what holds it over another span sticks for good,
-# and so does one that has stuck for so many cycles.
-_LOADED, _CYCLES = 0.1, 2.0
+# A body whose last slip lies so many cycles back slips no more.
+_CYCLES = 2.0
 
 
 @inlined
-def begin(x, velocity, force):
+def begin(scene, t, x, velocity, force):
     """Record of a run at its launch."""
     return Record(
         velocity=velocity,
@@ -188,9 +193,11 @@ def begin(x, velocity, force):
         velocity_max=velocity,
         force_max=abs(force),
         stick_time=0.0,
+        place=x - drives.turn(scene.drive, t)[0],
+        slip_from=x - drives.turn(scene.drive, t)[0],
+        slip_start=t,
+        counted=False,
         stuck_for=0.0,
-        stuck_now=0.0,
-        stuck_last=0.0,
         slips=0,
         first_slip=nan,
         last_slip=nan,
@@ -208,17 +215,23 @@ def begin(x, velocity, force):
 
 
 @inlined
-def observe(r, scene, t, duration, x, velocity, force, stuck):
-    """Record after `duration` seconds to the state at time `t`, in all of which the body stuck or slipped."""
+def observe(r, scene, t, duration, x, velocity, force, stuck, play):
+    """Record after `duration` seconds to the state at time `t`, in all of which the body stuck or slipped.
+
+    `play` is the way that a body on bristles can move without slipping, m.
+    """
     slips, first_slip, last_slip, last_stick = r.slips, r.first_slip, r.last_slip, r.last_stick
-    stuck_for, stuck_now, stuck_last = r.stuck_for, r.stuck_now, r.stuck_last
+    slip_from, slip_start, counted, stuck_for = r.slip_from, r.slip_start, r.counted, r.stuck_for
+    place = x - drives.turn(scene.drive, t)[0]
     if stuck:
         stuck_for += duration
-        stuck_now += duration
-    else:
+        # Where and when the next slip will have begun.
+        slip_from, slip_start, counted = place, t, False
+    elif not counted and abs(place - slip_from) > play:
+        counted = True
         if stuck_for > _TOUCH * scene.span:
             slips += 1
-            last_slip, last_stick = t - duration, stuck_for
+            last_slip, last_stick = slip_start, stuck_for
             if slips == 1:
                 first_slip = last_slip
         stuck_for = 0.0
@@ -228,7 +241,8 @@ def observe(r, scene, t, duration, x, velocity, force, stuck):
     if kind == 0:
         kind = 1 if before > 0.0 and velocity <= 0.0 else -1 if before < 0.0 and velocity >= 0.0 else 0
     low = min(r.low, kind * x)
-    if kind * before > 0.0 and kind * velocity <= 0.0:
+    seen = extremes == 0 or kind * x - low > _ROUNDING * max(abs(r.x_min), abs(r.x_max))
+    if kind * before > 0.0 and kind * velocity <= 0.0 and seen:
         # Between two states the velocity is all but linear.
         extreme = t - duration * velocity / (velocity - before)
         extremes += 1
@@ -244,7 +258,6 @@ def observe(r, scene, t, duration, x, velocity, force, stuck):
                 third_swing = max(third_swing, last_swing)
         last_extreme = extreme
         low = kind * x
-        stuck_last, stuck_now = stuck_now, 0.0
     return Record(
         velocity,
         min(r.x_min, x),
@@ -252,9 +265,11 @@ def observe(r, scene, t, duration, x, velocity, force, stuck):
         max(r.velocity_max, velocity),
         max(r.force_max, abs(force)),
         r.stick_time + (duration if stuck else 0.0),
+        place,
+        slip_from,
+        slip_start,
+        counted,
         stuck_for,
-        stuck_now,
-        stuck_last,
         slips,
         first_slip,
         last_slip,
@@ -280,8 +295,9 @@ def conclude(r, scene, status, t, x, velocity, band):
     cycle = (r.last_extreme - r.first_extreme) / (r.extremes - 1) if r.extremes >= 2 else nan
     if status == BROKEN or not (isfinite(x) and isfinite(velocity)):
         motion = FAILED
-    elif _sticks_and_slips(r, scene, velocity, cycle, band):
+    elif _sticks_and_slips(r, scene, t, x, velocity, band):
         motion = STICK_SLIP
+        cycle = (r.last_slip - r.first_slip) / (r.slips - 1) if r.slips >= 2 else nan
     elif r.stuck_for < cycle and _swings_on(r):
         motion = OSCILLATORY
     else:
@@ -304,19 +320,21 @@ def conclude(r, scene, status, t, x, velocity, band):
 
 
 @inlined
-def _sticks_and_slips(r, scene, velocity, cycle, band):
+def _sticks_and_slips(r, scene, t, x, velocity, band):
     """Whether stick and slip go on following each other."""
+    if r.slips == 0:
+        return False
     # A harmonic that grazes the velocity of the belt is slower than the band for so long, and does not stick.
     curvature = (scene.stiffness / scene.mass) ** 1.5 * (r.x_max - r.x_min)
     graze = sqrt(32.0 * band / curvature) if curvature > 0.0 else 0.0
-    if r.extremes >= 2:
-        return r.slips > 0 and r.stuck_last > max(_SHORT * cycle, graze) and r.stuck_for <= _CYCLES * cycle
-    shortest = max(_SHORT * scene.span, graze)
-    if r.stuck_for > 0.0:
-        # Without a cycle to go by: a body that has slipped and stuck again will slip again if it is loaded.
-        loaded = scene.stiffness * abs(velocity) * scene.span > _LOADED * scene.mu_s * scene.mass * scene.gravity
-        return r.slips > 0 and r.stuck_for > shortest and loaded
-    return r.slips > 1 and r.last_stick > shortest and r.last_slip > 0.5 * scene.span
+    if r.slips >= 2:
+        cycle = (r.last_slip - r.first_slip) / (r.slips - 1)
+        shortest = max((_SHORT_CREEP if band > 0.0 else _SHORT) * cycle, graze)
+        return r.last_stick > shortest and t - r.last_slip <= _CYCLES * cycle
+    # It has slipped once and stuck again: what the spring will be after as long again tells whether it will hold.
+    pull = scene.stiffness * abs(x + velocity * scene.span)
+    holds = pull <= scene.mu_s * scene.mass * scene.gravity
+    return r.stuck_for > max(_SHORT * scene.span, graze) and not holds
 
 
 @inlined

@@ -39,6 +39,12 @@ def _recoil(scene):
     return scene.mu_s * sqrt(scene.gravity / scene.law.sigma0)
 
 
+@inlined
+def _play(scene):
+    """Way that the body can move while its bristles swing from one end of their deflection to the other, m."""
+    return 2.0 * scene.mu_s / scene.law.sigma0
+
+
 # ---- constant step ---------------------------------------------------------------------------
 
 
@@ -92,12 +98,12 @@ def _stiffness(scene, before, now, h):
 
 @hooks.begin.implements(BristleBelt)
 def _begin(scene, y, now):
-    return begin(y[0], y[1], now.force)
+    return begin(scene, 0.0, y[0], y[1], now.force)
 
 
 @hooks.observe.implements(BristleBelt)
 def _observe(scene, record, y, before, now, t, h):
-    return observe(record, scene, t, h, y[0], y[1], now.force, before.stuck)
+    return observe(record, scene, t, h, y[0], y[1], now.force, before.stuck, _play(scene))
 
 
 @hooks.conclude.implements(BristleBelt)
@@ -224,13 +230,13 @@ def _stiff_motion(scene, t, x, line):
 @hooks.stiff_start.implements(BristleBelt)
 def _stiff_start(scene, mode, t, y):
     _, (x, velocity, _, force) = hooks.stiff_view(scene, mode, t, y)
-    return begin(x, velocity, force)
+    return begin(scene, t, x, velocity, force)
 
 
 @hooks.stiff_watch.implements(BristleBelt)
 def _stiff_watch(scene, record, mode, view, t, duration):
     _, (x, velocity, _, force) = view
-    return observe(record, scene, t, duration, x, velocity, force, mode.region == BAND)
+    return observe(record, scene, t, duration, x, velocity, force, mode.region == BAND, _play(scene))
 
 
 @hooks.stiff_sample.implements(BristleBelt)

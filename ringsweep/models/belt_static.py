@@ -95,13 +95,15 @@ def _stiffness(scene, before, now, h):
     belt_gains = (now.rates[0] - now.v) - (before.rates[0] - before.v)
     ahead = before.v + h * before.rates[1] - belt_gains
     crossed = before.v * now.v < 0.0 or before.v * ahead < 0.0
+    # At rest a law without a band has every value at once.
+    crossed = crossed or (stiction_band(scene.law) == 0.0 and before.v * now.v == 0.0)
     slow = min(abs(before.v), abs(now.v), abs(ahead))
     fast = max(abs(before.v), abs(now.v), abs(ahead))
     band = stiction_band(scene.law)
     if _holds(scene.law):
         # A discontinuous law has no slope that any step could follow; but one may land in a dead band.
         return inf if crossed and slow >= band else abs(now.slope) / scene.mass * h
-    met = abs(now.slope)
+    met = max(abs(before.slope), abs(now.slope))
     # A step that jumps the band, or its edge, never samples the slope there, but has met it.
     if crossed:
         met = max(met, abs(_force(scene, 0.0, 0.0)[1]))
@@ -112,13 +114,13 @@ def _stiffness(scene, before, now, h):
 
 @hooks.begin.implements(belt.Belt)
 def _begin(scene, y, now):
-    return begin(y[0], y[1], now.force)
+    return begin(scene, 0.0, y[0], y[1], now.force)
 
 
 @hooks.observe.implements(belt.Belt)
 def _observe(scene, record, y, before, now, t, h):
     stuck = abs(before.v) < stiction_band(scene.law) or before.v * now.v < 0.0
-    return observe(record, scene, t, h, y[0], y[1], now.force, stuck)
+    return observe(record, scene, t, h, y[0], y[1], now.force, stuck, 0.0)
 
 
 @hooks.conclude.implements(belt.Belt)
@@ -288,7 +290,7 @@ def _length(scene, velocity):
 
 @hooks.start.implements(belt.Belt)
 def _start(scene, c):
-    return begin(c[X, 0], c[VELOCITY, 0], c[FORCE, 0])
+    return begin(scene, drives.beginning(scene.drive), c[X, 0], c[VELOCITY, 0], c[FORCE, 0])
 
 
 @hooks.land.implements(belt.Belt)
@@ -315,7 +317,8 @@ def _watch(scene, record, mode, c, t, s, work):
         if abs(velocity) <= 1e-15 * (abs(c[VELOCITY, 0]) + variation(c[VELOCITY], s)):
             # A maximum is met where the velocity vanishes, not where its rounding changes sign.
             velocity = 0.0
-        record = observe(record, scene, t + now, now - before, value(c[X], now), velocity, value(c[FORCE], now), stuck)
+        x, force = value(c[X], now), value(c[FORCE], now)
+        record = observe(record, scene, t + now, now - before, x, velocity, force, stuck, 0.0)
         before = now
     return record
 
@@ -414,7 +417,7 @@ def _stiff_motion(scene, t, x, line):
 @hooks.stiff_watch.implements(belt.Belt)
 def _stiff_watch(scene, record, mode, view, t, duration):
     _, (x, velocity, _, force) = view
-    return observe(record, scene, t, duration, x, velocity, force, True)
+    return observe(record, scene, t, duration, x, velocity, force, True, 0.0)
 
 
 @hooks.stiff_sample.implements(belt.Belt)

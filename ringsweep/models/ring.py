@@ -218,13 +218,15 @@ def _stiffness(scene, before, now, h):
     ring_gains = (radius * now.omega - now.v) - (radius * before.omega - before.v)
     ahead = before.v + h * radius * before.rates[1] - ring_gains
     crossed = before.v * now.v < 0.0 or before.v * ahead < 0.0
+    # At rest a law without a band has every value at once.
+    crossed = crossed or (stiction_band(scene.law) == 0.0 and before.v * now.v == 0.0)
     slow = min(abs(before.v), abs(now.v), abs(ahead))
     fast = max(abs(before.v), abs(now.v), abs(ahead))
     band = stiction_band(scene.law)
     if crossed and band == 0.0:
         # A discontinuous law has no slope that any step could follow.
         return inf
-    met = abs(now.slope)
+    met = max(abs(before.slope), abs(now.slope))
     # A step that jumps the band, or its edge, never samples the slope there, and is the one that is
     # wrong in kind: it has met it all the same.
     if crossed:
