@@ -134,8 +134,8 @@ class Record(NamedTuple):
 
     A slip counts once it is longer than the play of the bristles, which ring as the body sticks. ``place`` is where the
     body is on the belt, ``slip_from`` and ``slip_start`` where and when it began to slip, ``counted`` whether that is a
-    slip already; ``stuck_for`` is how long it has stuck since the last slip that counts, ``last_stick`` how long before
-    that one, which began at ``last_slip``.
+    slip already; ``stuck_for`` is how long it has stuck since the last slip that counts, ``held_for`` how long without
+    any, ``last_stick`` how long before the last one that counts, which began at ``last_slip``.
 
     A cycle of a swing runs from one extreme of the displacement to the next of its ``kind``, maxima (+1) or minima (-1)
     as the first was (0: none yet), and a swing is the way from ``low``, the farthest place between, to that extreme:
@@ -153,6 +153,7 @@ class Record(NamedTuple):
     slip_start: float
     counted: bool
     stuck_for: float
+    held_for: float
     slips: int
     first_slip: float
     last_slip: float
@@ -198,6 +199,7 @@ def begin(scene, t, x, velocity, force):
         slip_start=t,
         counted=False,
         stuck_for=0.0,
+        held_for=0.0,
         slips=0,
         first_slip=nan,
         last_slip=nan,
@@ -270,6 +272,7 @@ def observe(r, scene, t, duration, x, velocity, force, stuck, play):
         slip_start,
         counted,
         stuck_for,
+        r.held_for + duration if stuck else 0.0,
         slips,
         first_slip,
         last_slip,
@@ -298,7 +301,7 @@ def conclude(r, scene, status, t, x, velocity, band):
     elif _sticks_and_slips(r, scene, t, x, velocity, band):
         motion = STICK_SLIP
         cycle = (r.last_slip - r.first_slip) / (r.slips - 1) if r.slips >= 2 else nan
-    elif r.stuck_for < cycle and _swings_on(r):
+    elif r.held_for < cycle and _swings_on(r):
         motion = OSCILLATORY
     else:
         motion = RESTING
