@@ -188,7 +188,9 @@ def _summarise(result: xr.Dataset) -> None:
         if count:
             print(f"  {meaning}: {count} ({count / regime.size:.1%})")
     if "certified" in result:
-        print(f"certified: {float((result['certified'] == 1).mean()):.1%}")
+        share = float((result["certified"] == 1).mean())
+        # All is said only of all.
+        print(f"certified: {share if share == 1.0 else min(share, 0.999):.1%}")
 
 
 def _warn_of_stiffness(result: xr.Dataset, config: Config) -> None:
