@@ -3,7 +3,7 @@
 from typing import Any
 
 # Importing them gives the solvers their hooks.
-from ringsweep.models import belt_bristles, belt_static, ring_bristles, ring_series, ring_stiff  # noqa: F401
+from ringsweep.models import belt_bristles, belt_static, ring_bristles, ring_series, ring_stiff, shared  # noqa: F401
 from ringsweep.models.belt import Belt
 from ringsweep.models.ring import Ring, SingleContactRing
 from ringsweep.parameters import Parameter

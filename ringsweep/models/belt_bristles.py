@@ -135,11 +135,6 @@ def _onward(mode):
     return mode
 
 
-@hooks.rows.implements(BristleBelt)
-def _rows(scene):
-    return 0, 0
-
-
 @hooks.embark.implements(BristleBelt)
 def _embark(scene):
     z = made(scene.law, scene.mu_s, scene.mu_k)
@@ -165,21 +160,6 @@ def _switch(scene, mode, guard, t, y):
         return RUNNING, Mode(-mode.sign, BAND), (x, 0.0, z)
     z, region = yields(scene.law, scene.mu_s, scene.mu_k, z, float(mode.sign), mode.region)
     return RUNNING, Mode(mode.sign, region), (x, v, z)
-
-
-@hooks.to_stiff.implements(BristleBelt)
-def _to_stiff(scene, t, y):
-    return y
-
-
-@hooks.from_stiff.implements(BristleBelt)
-def _from_stiff(scene, t, x):
-    return x
-
-
-@hooks.forcing.implements(BristleBelt)
-def _forcing(scene, t):
-    return drives.turn(scene.drive, t)
 
 
 @hooks.stiff_rates.implements(BristleBelt)
@@ -221,12 +201,6 @@ def _stiff_view(scene, mode, t, x):
     return guards, (x[0], x[1] + belt_velocity, -(scene.stiffness * x[0] + force) / scene.mass, force)
 
 
-@hooks.stiff_motion.implements(BristleBelt)
-def _stiff_motion(scene, t, x, line):
-    _, belt_velocity, belt_acceleration = drives.turn(scene.drive, t)
-    return x[1] + belt_velocity, line[0][1] + belt_acceleration
-
-
 @hooks.stiff_start.implements(BristleBelt)
 def _stiff_start(scene, mode, t, y):
     _, (x, velocity, _, force) = hooks.stiff_view(scene, mode, t, y)
@@ -243,11 +217,6 @@ def _stiff_watch(scene, record, mode, view, t, duration):
 def _stiff_sample(scene, mode, t, x):
     _, (place, velocity, _, force) = hooks.stiff_view(scene, mode, t, x)
     return place, velocity, force, x[2], 0.0 if mode.region == BAND else float(mode.sign)
-
-
-@hooks.impasse.implements(BristleBelt)
-def _impasse(scene, mode, t, y):
-    return BROKEN
 
 
 @hooks.finish.implements(BristleBelt)

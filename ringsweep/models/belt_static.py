@@ -19,6 +19,7 @@ from ringsweep.physics.friction.static import (
     constant_weights,
     expand_weights,
     faster,
+    met,
     region_at,
     region_bounds,
     slower,
@@ -94,22 +95,17 @@ def _stiffness(scene, before, now, h):
     # The stages reach about as far as the acceleration at the beginning takes the body in one step.
     belt_gains = (now.rates[0] - now.v) - (before.rates[0] - before.v)
     ahead = before.v + h * before.rates[1] - belt_gains
-    crossed = before.v * now.v < 0.0 or before.v * ahead < 0.0
-    # At rest a law without a band has every value at once.
-    crossed = crossed or (stiction_band(scene.law) == 0.0 and before.v * now.v == 0.0)
-    slow = min(abs(before.v), abs(now.v), abs(ahead))
-    fast = max(abs(before.v), abs(now.v), abs(ahead))
-    band = stiction_band(scene.law)
+    rest, edge, jumped = met(scene.law, before.v, now.v, ahead)
+    steepest = max(abs(before.slope), abs(now.slope))
     if _holds(scene.law):
         # A discontinuous law has no slope that any step could follow; but one may land in a dead band.
-        return inf if crossed and slow >= band else abs(now.slope) / scene.mass * h
-    met = max(abs(before.slope), abs(now.slope))
+        return inf if jumped else steepest / scene.mass * h
     # A step that jumps the band, or its edge, never samples the slope there, but has met it.
-    if crossed:
-        met = max(met, abs(_force(scene, 0.0, 0.0)[1]))
-    if crossed or slow < band <= fast:
-        met = max(met, abs(_force(scene, 0.0, band)[1]))
-    return met / scene.mass * h
+    if rest:
+        steepest = max(steepest, abs(_force(scene, 0.0, 0.0)[1]))
+    if edge:
+        steepest = max(steepest, abs(_force(scene, 0.0, stiction_band(scene.law))[1]))
+    return steepest / scene.mass * h
 
 
 @hooks.begin.implements(belt.Belt)
@@ -329,7 +325,7 @@ def _sample(scene, mode, c, t, s):
     return value(c[X], s), value(c[VELOCITY], s), value(c[FORCE], s), 0.0, mode_now
 
 
-@hooks.impasse.implements(belt.Belt)
+@hooks.impasse.implements(belt.Belt, belt.BristleBelt)
 def _impasse(scene, mode, t, y):
     return BROKEN
 
@@ -342,11 +338,6 @@ def _finish(scene, record, status, t, y):
 # ---- creep in the stiction band --------------------------------------------------------------
 
 
-@hooks.creeps.implements(belt.Belt)
-def _creeps(scene, mode):
-    return mode.region == BAND
-
-
 @hooks.is_stiff.implements(belt.Belt)
 def _is_stiff(scene, mode, y, line):
     (_, push), (_, _, _, decay), _, _ = line
@@ -354,26 +345,10 @@ def _is_stiff(scene, mode, y, line):
     return -decay > 50.0 * own and abs(push) < 0.01 * -decay * stiction_band(scene.law)
 
 
-# The displacement relative to the belt, so that nothing large cancels in a creep.
-@hooks.to_stiff.implements(belt.Belt)
-def _to_stiff(scene, t, y):
-    return y[0] - drives.turn(scene.drive, t)[0], y[1]
-
-
-@hooks.from_stiff.implements(belt.Belt)
-def _from_stiff(scene, t, x):
-    return x[0] + drives.turn(scene.drive, t)[0], x[1]
-
-
 @hooks.stiff_scales.implements(belt.Belt)
 def _stiff_scales(scene, tolerance, x):
     length = _length(scene, abs(drives.turn(scene.drive, scene.span)[1]))
     return tolerance * length, tolerance * stiction_band(scene.law)
-
-
-@hooks.forcing.implements(belt.Belt)
-def _forcing(scene, t):
-    return drives.turn(scene.drive, t)
 
 
 @hooks.stiff_rates.implements(belt.Belt)
@@ -408,7 +383,7 @@ def _stiff_view(scene, mode, t, x):
     return (speed, stiction_band(scene.law) - speed), (place, x[1] + belt_velocity, acceleration, force)
 
 
-@hooks.stiff_motion.implements(belt.Belt)
+@hooks.stiff_motion.implements(belt.Belt, belt.BristleBelt)
 def _stiff_motion(scene, t, x, line):
     _, belt_velocity, belt_acceleration = drives.turn(scene.drive, t)
     return x[1] + belt_velocity, line[0][1] + belt_acceleration

@@ -13,7 +13,7 @@ from ringsweep.jit import inlined
 from ringsweep.models.common import GRAVITY, MASS, SPAN, drive_of, law_of, pair
 from ringsweep.parameters import Parameter, declared
 from ringsweep.physics import drives, friction, ring, zones
-from ringsweep.physics.friction.static import stiction_band, weights
+from ringsweep.physics.friction.static import met, stiction_band, weights
 from ringsweep.regimes import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2
 from ringsweep.scene import Structure, Values, require
 
@@ -217,23 +217,18 @@ def _stiffness(scene, before, now, h):
     radius = scene.body.radius
     ring_gains = (radius * now.omega - now.v) - (radius * before.omega - before.v)
     ahead = before.v + h * radius * before.rates[1] - ring_gains
-    crossed = before.v * now.v < 0.0 or before.v * ahead < 0.0
-    # At rest a law without a band has every value at once.
-    crossed = crossed or (stiction_band(scene.law) == 0.0 and before.v * now.v == 0.0)
-    slow = min(abs(before.v), abs(now.v), abs(ahead))
-    fast = max(abs(before.v), abs(now.v), abs(ahead))
-    band = stiction_band(scene.law)
-    if crossed and band == 0.0:
+    rest, edge, jumped = met(scene.law, before.v, now.v, ahead)
+    if jumped and stiction_band(scene.law) == 0.0:
         # A discontinuous law has no slope that any step could follow.
         return inf
-    met = max(abs(before.slope), abs(now.slope))
+    steepest = max(abs(before.slope), abs(now.slope))
     # A step that jumps the band, or its edge, never samples the slope there, and is the one that is
     # wrong in kind: it has met it all the same.
-    if crossed:
-        met = max(met, _steepest(scene, now, 0.0))
-    if crossed or slow < band <= fast:
-        met = max(met, _steepest(scene, now, band))
-    return met * h
+    if rest:
+        steepest = max(steepest, _steepest(scene, now, 0.0))
+    if edge:
+        steepest = max(steepest, _steepest(scene, now, stiction_band(scene.law)))
+    return steepest * h
 
 
 @inlined

@@ -95,8 +95,7 @@ class Inspection(NamedTuple):
 
 @hooks.launch.implements(BristleRing)
 def _launch(scene):
-    _, ring_omega, _ = drives.turn(scene.drive, 0.0)
-    theta, _, _ = drives.turn(scene.drive, 0.0)
+    theta, ring_omega, _ = drives.turn(scene.drive, 0.0)
     v = (scene.initial_omega - ring_omega) * scene.body.radius
     z_1, z_2 = _launched(scene, scene.initial_phi - theta, v)
     return scene.initial_phi, scene.initial_omega, z_1, z_2
@@ -188,11 +187,6 @@ def _onward(mode):
     return mode
 
 
-@hooks.rows.implements(BristleRing)
-def _rows(scene):
-    return 0, 0
-
-
 @hooks.embark.implements(BristleRing)
 def _embark(scene):
     t = drives.beginning(scene.drive)
@@ -260,21 +254,6 @@ def _switch(scene, mode, guard, t, y):
     else:
         place_2 = cross(scene.surface, place_2, sign)
     return RUNNING, Mode(sign, mode.region, place_1, place_2), y
-
-
-@hooks.to_stiff.implements(BristleRing)
-def _to_stiff(scene, t, y):
-    return y
-
-
-@hooks.from_stiff.implements(BristleRing)
-def _from_stiff(scene, t, x):
-    return x
-
-
-@hooks.forcing.implements(BristleRing)
-def _forcing(scene, t):
-    return drives.turn(scene.drive, t)
 
 
 @hooks.stiff_rates.implements(BristleRing)
@@ -346,12 +325,6 @@ def _stiff_view(scene, mode, t, x):
         _lasts(scene, under, v, z_1, z_2, sign, mode.region),
     )
     return guards, (phi, omega, epsilon, ring_omega)
-
-
-@hooks.stiff_motion.implements(BristleRing)
-def _stiff_motion(scene, t, x, line):
-    _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
-    return x[1] / scene.body.radius + ring_omega, line[0][1] / scene.body.radius + ring_epsilon
 
 
 @hooks.stiff_start.implements(BristleRing)

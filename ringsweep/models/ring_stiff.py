@@ -12,7 +12,7 @@ from ringsweep import hooks, regimes
 from ringsweep.jit import inlined
 from ringsweep.models.ring_series import coefficients_under
 from ringsweep.physics import drives, ring
-from ringsweep.physics.friction.static import BAND, stiction_band, weights_in
+from ringsweep.physics.friction.static import stiction_band, weights_in
 from ringsweep.physics.zones import coefficients, edge_ahead
 
 
@@ -31,16 +31,6 @@ def _friction(scene, mode, v):
     )
 
 
-@hooks.to_stiff.implements(ring.Ring)
-def _to_stiff(scene, t, y):
-    return y[0] - drives.turn(scene.drive, t)[0], y[1]
-
-
-@hooks.from_stiff.implements(ring.Ring)
-def _from_stiff(scene, t, x):
-    return x[0] + drives.turn(scene.drive, t)[0], x[1]
-
-
 @hooks.is_stiff.implements(ring.Ring)
 def _is_stiff(scene, mode, y, line):
     (_, push), (_, _, _, decay), _, _ = line
@@ -48,16 +38,6 @@ def _is_stiff(scene, mode, y, line):
     # through the top of the band, run at the rate of the decay itself.
     own = sqrt(scene.body.gravity / scene.body.radius) + abs(y[1]) / scene.body.radius
     return -decay > 50.0 * own and abs(push) < 0.01 * -decay * stiction_band(scene.law)
-
-
-@hooks.creeps.implements(ring.Ring)
-def _creeps(scene, mode):
-    return mode.region == BAND
-
-
-@hooks.forcing.implements(ring.Ring)
-def _forcing(scene, t):
-    return drives.turn(scene.drive, t)
 
 
 @hooks.stiff_scales.implements(ring.Ring)
@@ -122,7 +102,7 @@ def _stiff_view(scene, mode, t, x):
     return guards, (phi, omega, epsilon, ring_omega)
 
 
-@hooks.stiff_motion.implements(ring.Ring)
+@hooks.stiff_motion.implements(ring.Ring, ring.BristleRing)
 def _stiff_motion(scene, t, x, line):
     _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     return x[1] / scene.body.radius + ring_omega, line[0][1] / scene.body.radius + ring_epsilon

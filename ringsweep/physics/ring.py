@@ -71,17 +71,8 @@ class Ring(NamedTuple):
     epsilon_omega: Leaf
 
 
-class BristleRing(NamedTuple):
+class BristleRing(Ring):
     """The same with a friction law that has bristles: their deflections are states, one at each contact."""
-
-    body: Any
-    surface: Any
-    law: Any
-    drive: Any
-    initial_phi: Leaf
-    initial_omega: Leaf
-    span: Leaf
-    epsilon_omega: Leaf
 
 
 @hook

@@ -133,6 +133,23 @@ def weights_in(law, region, speed):
 
 
 @inlined
+def met(law, before, after, ahead):
+    """What a step meets whose sliding velocity is `before` at its beginning, `after` at its end, `ahead` in its stages.
+
+    Returns
+    -------
+    tuple of bool
+        Whether it meets rest, whether the edge of the band, and whether it jumps across the whole band.
+    """
+    band = stiction_band(law)
+    slow, fast = min(abs(before), abs(after), abs(ahead)), max(abs(before), abs(after), abs(ahead))
+    rest = before * after < 0.0 or before * ahead < 0.0
+    # At rest a law without a band has every value at once.
+    rest = rest or (band == 0.0 and before * after == 0.0)
+    return rest, rest or slow < band <= fast, rest and slow >= band
+
+
+@inlined
 def expand_weights(law, region, x, k, basis, static, kinetic):
     """Coefficient `k` of the series of both weights, given those of the speed up to `k`.
 

@@ -1,0 +1,46 @@
+"""Hooks whose body is the same for several models."""
+
+from __future__ import annotations
+
+from ringsweep import hooks
+from ringsweep.physics import drives
+from ringsweep.physics.belt import Belt, BristleBelt
+from ringsweep.physics.friction.static import BAND
+from ringsweep.physics.ring import BristleRing, Ring
+
+
+@hooks.forcing.implements(Belt, BristleBelt, Ring, BristleRing)
+def _forcing(scene, t):
+    return drives.turn(scene.drive, t)
+
+
+# The place relative to the drive, so that nothing large cancels in a creep.
+@hooks.to_stiff.implements(Belt, Ring)
+def _to_stiff(scene, t, y):
+    return y[0] - drives.turn(scene.drive, t)[0], y[1]
+
+
+@hooks.from_stiff.implements(Belt, Ring)
+def _from_stiff(scene, t, x):
+    return x[0] + drives.turn(scene.drive, t)[0], x[1]
+
+
+@hooks.creeps.implements(Belt, Ring)
+def _creeps(scene, mode):
+    return mode.region == BAND
+
+
+# With bristles every step is an implicit one: there are no series, and no other coordinates.
+@hooks.rows.implements(BristleBelt, BristleRing)
+def _rows(scene):
+    return 0, 0
+
+
+@hooks.to_stiff.implements(BristleBelt, BristleRing)
+def _bristles_to_stiff(scene, t, y):
+    return y
+
+
+@hooks.from_stiff.implements(BristleBelt, BristleRing)
+def _bristles_from_stiff(scene, t, x):
+    return x
