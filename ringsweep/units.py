@@ -107,12 +107,14 @@ def _convert(value: Any, parameter: Parameter, path: str) -> float:
 def _factor_or_refusal(unit: str, value: str, parameter: Parameter, path: str) -> float:
     if not parameter.unit:
         raise InputError(path, f"{show(value)} has a unit, but {parameter.long_name} takes a plain number")
+    target = "has no unit" if parameter.unit == "1" else f"is in {parameter.unit}"
     try:
         return _factor(unit, parameter.unit)
     except LookupError:
-        raise InputError(path, f"{show(value)}: {show(unit)} is not a known unit") from None
+        raise InputError(
+            path, f"{show(value)}: {show(unit)} is not a known unit; {parameter.long_name} {target}"
+        ) from None
     except ValueError:
-        target = "has no unit" if parameter.unit == "1" else f"is in {parameter.unit}"
         raise InputError(path, f"{show(value)} has the wrong unit: {parameter.long_name} {target}") from None
 
 
