@@ -99,6 +99,20 @@ def cells() -> Callable[..., Any]:
 
 
 @pytest.fixture(scope="session")
+def setting(cells: Callable[..., Any]) -> Callable[..., Any]:
+    """Batch of a figure's setting with `changes`, dots as double underscores; no drive is one without amplitude."""
+
+    def build(number: int, law: str = "bengisu-akay", **changes: float) -> Any:
+        drive, values, _ = FIGURES[number]
+        drive = "arctan" if drive == "none" else drive
+        values = values | {path.replace("__", "."): value for path, value in changes.items()}
+        known = parameters(Structure("ring", law, drive, ("zone",)))
+        return cells({path: value for path, value in values.items() if path in known}, law=law, drive=drive)
+
+    return build
+
+
+@pytest.fixture(scope="session")
 def run() -> Callable[..., Any]:
     """Outcomes of a batch under RK4: one array for each outcome, besides those of `Result`."""
     names = MODELS["ring"].outcomes

@@ -54,10 +54,7 @@ class TestStickSlipCycle:
         assert found.certified == 1
         assert float(found.first_slip) == pytest.approx(first, rel=1e-10)
         assert float(found.period) == pytest.approx(stick + slip, rel=1e-10)
-        greatest = v_b + sqrt(v_b**2 + (drop * omega / k) ** 2)
-        # The belt's own velocity is the body's greatest: the slip is symmetric about it in v, not in x'.
         assert float(found.velocity_max) == pytest.approx(v_b, rel=1e-10)
-        assert greatest > 2 * v_b
         assert float(found.slips) == 7
         assert float(found.force_max) == pytest.approx(mu_s * m * G, rel=1e-12)
         assert float(found.x_max) == pytest.approx(
@@ -73,6 +70,8 @@ class TestStickSlipCycle:
         run = ringsweep.simulate(belt(span=12.0))
         end_of_slip = np.flatnonzero(np.diff(run["mode"].values) == 1)[0]
         assert float(run.x[end_of_slip]) == pytest.approx(0.24525, abs=1e-10)
+        # The greatest velocity against the belt; a history has it to its spacing.
+        assert float(0.1 - run.velocity.min()) == pytest.approx(0.460964, abs=1e-5)
 
     def test_from_rest_slides_first(self):
         """From rest on a moving belt the body slips until it has the belt's speed, then sticks."""
@@ -98,8 +97,7 @@ class TestCoulomb:
         turning = run.x.values[np.flatnonzero(np.abs(run.velocity.values) < 1e-12)]
         for expected in (3.0, -2.2, 1.4, -0.6):
             assert np.abs(turning - expected).min() < 1e-10
-        assert float(found.x_end) == pytest.approx(-0.2 + 0.4, abs=0.41)
-        assert abs(float(found.x_end)) <= 0.4
+        assert float(found.x_end) == pytest.approx(-0.2, abs=1e-10)
         assert float(found.velocity_end) == 0.0
 
 
@@ -426,13 +424,13 @@ class TestExtremes:
 class TestNames:
     """Stick-slip goes on, a swing lasts; what decays, slides or sticks for good is at rest."""
 
-    @pytest.mark.parametrize("law", ["stiction", "karnopp", "lugre"])
+    @pytest.mark.parametrize("law", ["stiction", "karnopp"])
     def test_friction_never_exceeds_what_holds(self, law):
         """Thrown from far off, the body passes the speed of the belt many times before it can stick."""
-        of_law = {"dead_band": 1e-3} if law == "karnopp" else TestExtremes.SMALL[law]
+        of_law = {"dead_band": 1e-3} if law == "karnopp" else {}
         for v_b, x, velocity in ((0.0, 10.0, 0.0), (0.1, -5.0, 0.0), (0.1, 5.0, 0.1)):
             found = outcome(belt(law, v_b=v_b, span=20.0, **of_law) | {"initial": {"x": x, "velocity": velocity}})
-            assert float(found.force_max) < 1.4715 * (1.001 if law != "lugre" else 40.0)
+            assert float(found.force_max) <= 1.4715 * (1 + 1e-9)
             assert float(found.x_min) < -0.8 * abs(x)
 
     @pytest.mark.parametrize("cycles", [2.4, 3.4, 5.4, 8.4])

@@ -24,22 +24,6 @@ def stiction(cells):
     return build
 
 
-@pytest.fixture
-def limit(figure, cells):
-    """A figure's setting under a set-valued law; without a drive it is a drive of no amplitude."""
-
-    def build(number, law):
-        drive, changes, _ = figure(number)
-        known = {"stiction": ("friction.alpha", "friction.v0"), "tustin": ("friction.v0",)}[law]
-        return cells(
-            {path: value for path, value in changes.items() if path not in known},
-            law=law,
-            drive="arctan" if drive == "none" else drive,
-        )
-
-    return build
-
-
 class TestFigures:
     """The paper's figures in the limit of a vanishing stiction band, with the tail and without it."""
 
@@ -54,8 +38,8 @@ class TestFigures:
             (33, REVOLVING, 0.17274, 8.5540),
         ],
     )
-    def test_contact_2_separates(self, limit, law, number, motion, t, phi):
-        batch = limit(number, law)
+    def test_contact_2_separates(self, setting, law, number, motion, t, phi):
+        batch = setting(number, law)
         found, exact = solve(Event(), batch), solve(EXACT, batch)
         assert (found.regime, found.motion, found.separating_contact) == (SEPARATING, motion, 2)
         assert found.certified
@@ -65,8 +49,8 @@ class TestFigures:
         assert exact.phi_end == pytest.approx(phi, abs=2e-4)
 
     @pytest.mark.parametrize("law", ["stiction", "tustin"])
-    def test_32_swings_once_and_rests(self, limit, law):
-        batch = limit(32, law)
+    def test_32_swings_once_and_rests(self, setting, law):
+        batch = setting(32, law)
         found, exact = solve(Event(), batch), solve(EXACT, batch)
         assert found.regime == found.motion == OSCILLATORY
         assert found.reversals == 1
@@ -74,8 +58,8 @@ class TestFigures:
         for name in ("phi_end", "phi_max", "stick_time"):
             assert getattr(found, name) == pytest.approx(getattr(exact, name), abs=1e-10)
 
-    def test_error_falls_with_the_tolerance(self, limit):
-        batch = limit(30, "tustin")
+    def test_error_falls_with_the_tolerance(self, setting):
+        batch = setting(30, "tustin")
         exact = solve(EXACT, batch).t_end
         tolerances = 10.0 ** -np.arange(6, 13)
         errors = [abs(solve(Event(rtol=rtol, certify=False), batch).t_end - exact)[0] for rtol in tolerances]
@@ -139,8 +123,8 @@ class TestStick:
     """Where it sticks the body moves with the ring, and friction is what the balances of momentum ask for."""
 
     @pytest.fixture
-    def run(self, limit):
-        batch = limit(29, "stiction")
+    def run(self, setting):
+        batch = setting(29, "stiction")
         return take(batch, 0), trail(Event(), batch, 1e-3)
 
     def test_moves_with_the_ring(self, run):
@@ -211,22 +195,22 @@ class TestEnergy:
     """What the body gains in energy is the work of friction."""
 
     @pytest.mark.parametrize("number", [29, 30, 32, 33])
-    def test_balances_to_the_tolerance(self, limit, number):
+    def test_balances_to_the_tolerance(self, setting, number):
         """As well as the work can be summed from a history."""
         rough, rest = ((0.5, 0.3), (0.2, 0.1)) if number < 32 else ((0.2, 0.15), (0.15, 0.1))
-        batch = limit(number, "stiction")
+        batch = setting(number, "stiction")
         assert imbalance(batch, trail(Event(), batch, 2e-4), (rest, rough)) < 1e-9
 
 
 class TestLimit:
-    def test_tustin_tends_to_stiction_as_the_tail_steepens(self, limit, cells, figure):
+    def test_tustin_tends_to_stiction_as_the_tail_steepens(self, setting, cells, figure):
         """The way out of the tail is exponential: it takes a time of log(alpha) / alpha."""
         for number in (29, 30):
             drive, changes, _ = figure(number)
             alpha = 10.0 ** np.arange(3, 8)
             changes = {path: value for path, value in changes.items() if path != "friction.v0"}
             found = solve(EXACT, cells(changes | {"friction.alpha": alpha}, law="tustin", drive=drive))
-            error = abs(found.t_separation - solve(EXACT, limit(number, "stiction")).t_separation)
+            error = abs(found.t_separation - solve(EXACT, setting(number, "stiction")).t_separation)
             slope = np.polyfit(np.log(alpha), np.log(error / np.log(alpha)), 1)[0]
             assert slope == pytest.approx(-1.0, abs=0.03)
             assert error[-1] < 2e-6

@@ -12,24 +12,6 @@ EXACT = Implicit(rtol=1e-11, certify=False)
 LIMIT = Event(rtol=1e-14, certify=False)
 
 
-@pytest.fixture
-def setting(figure, cells):
-    """A figure's setting with `changes`; without a drive it is a drive of no amplitude."""
-
-    def build(number, law="bengisu-akay", **changes):
-        drive, values, _ = figure(number)
-        values = values | {path.replace("__", "."): value for path, value in changes.items()}
-        if law != "bengisu-akay":
-            values.pop("friction.v0")
-        return cells(
-            {path: value for path, value in values.items() if value is not None},
-            law=law,
-            drive="arctan" if drive == "none" else drive,
-        )
-
-    return build
-
-
 class TestFigures:
     """The law as printed, v0 = 2e-6 m/s and all: what a step of 0.2 us of Runge-Kutta 4 gives."""
 
@@ -112,7 +94,7 @@ class TestLimit:
     @pytest.mark.parametrize("number", [29, 30])
     def test_a_drop_is_left_late_by_that_passage(self, setting, number):
         """With a tail far shorter than the band, separation is late by as much as every breakaway is."""
-        exact = solve(LIMIT, setting(number, "stiction", friction__alpha=None))
+        exact = solve(LIMIT, setting(number, "stiction"))
         found = solve(EXACT, setting(number, friction__alpha=1e12, friction__v0=self.V0))
         error = abs(found.t_separation - exact.t_separation)
         assert self.slope(self.V0, error) == pytest.approx(2 / 3, abs=0.03)

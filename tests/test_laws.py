@@ -274,6 +274,23 @@ class TestBengisuAkay:
         assert slope(law, v0, BAND) == pytest.approx(0.0, abs=1e-14 / v0)
         assert slope(law, v0) == pytest.approx(alpha * (MU_K - MU_S), rel=1e-14)
 
+    @given(bengisu_akay, st.floats(0.0, 3.0))
+    def test_is_the_papers_law(self, law, relative):
+        speed = relative * law.v0
+        inside = MU_S * (1 - (1 - speed / law.v0) ** 2)
+        outside = MU_K * (1 + (MU_S / MU_K - 1) * exp(-law.alpha * max(speed - law.v0, 0.0)))
+        assert mu(law, speed) == pytest.approx(inside if speed < law.v0 else outside, rel=1e-12, abs=1e-15)
+
+    @given(bengisu_akay, st.floats(0.0, 3.0), st.floats(0.0, 3.0))
+    def test_rises_within_the_band_and_falls_beyond(self, law, one, other):
+        slow, fast = sorted((one * law.v0, other * law.v0))
+        assert mu(law, min(slow, law.v0)) <= mu(law, min(fast, law.v0)) <= MU_S
+        assert MU_K <= mu(law, max(fast, law.v0)) <= mu(law, max(slow, law.v0))
+
+    @given(st.floats(1e-3, 3.0))
+    def test_tends_to_coulomb_as_the_band_shrinks(self, speed):
+        assert weights(made(BengisuAkay, 1e5, 2e-6), speed) == pytest.approx(weights(Coulomb(), speed), abs=1e-12)
+
 
 class TestTustin:
     @given(alphas, st.floats(0.0, 30.0))

@@ -1,6 +1,6 @@
 """The ring's equations: balances, symmetries, limits; friction laws; the compiled model against plain formulas."""
 
-from math import cos, exp, inf, nextafter, pi, radians, sin
+from math import cos, exp, pi, radians, sin
 
 import numpy as np
 import pytest
@@ -11,9 +11,7 @@ from ringsweep.errors import InputError
 from ringsweep.hooks import inspect
 from ringsweep.jit import inlined, take
 from ringsweep.physics import ring
-from ringsweep.physics.friction.set_valued import Coulomb
 from ringsweep.physics.friction.smooth import BengisuAkay
-from ringsweep.physics.friction.static import stiction_band, weights
 from ringsweep.physics.ring import OneContact, Ring, TwoContacts, acceleration, acceleration_slope, reactions
 from ringsweep.physics.zones import Arc, cut
 
@@ -253,60 +251,6 @@ class TestGeometry:
     def test_values_that_contradict_each_other_are_input_errors(self, cells, changes, message):
         with pytest.raises(InputError, match=message):
             cells(changes)
-
-
-laws = st.builds(BengisuAkay, st.floats(0.0, 1e5), st.floats(1e-6, 1.0), st.just(inf))
-
-
-def mu(law, speed, mu_s=0.5, mu_k=0.3):
-    w_s, w_k, _, _ = weights(law, speed)
-    return w_s * mu_s + w_k * mu_k
-
-
-class TestBengisuAkay:
-    @given(laws, st.floats(0.0, 3.0))
-    def test_is_the_papers_law(self, law, speed):
-        alpha, v0, _ = law
-        inside = 0.5 * (1 - (1 - speed / v0) ** 2)
-        outside = 0.3 * (1 + (0.5 / 0.3 - 1) * exp(-alpha * (speed - v0))) if speed >= v0 else None
-        assert mu(law, speed) == pytest.approx(inside if speed < v0 else outside, rel=1e-12, abs=1e-15)
-
-    @given(laws)
-    def test_is_continuous_at_the_edge_of_the_band(self, law):
-        assert mu(law, law.v0) == 0.5
-        assert mu(law, nextafter(law.v0, 0.0)) == pytest.approx(0.5, rel=1e-14)
-
-    @given(laws)
-    def test_vanishes_at_rest_and_falls_to_mu_k(self, law):
-        assert mu(law, 0.0) == 0.0
-        if law.alpha > 0.0:
-            assert mu(law, law.v0 + 50.0 / law.alpha) == pytest.approx(0.3, rel=1e-14)
-
-    @given(laws, st.floats(0.0, 3.0), st.floats(0.0, 3.0))
-    def test_rises_within_the_band_and_falls_beyond(self, law, one, other):
-        slower, faster = sorted((one, other))
-        inside = min(slower, law.v0), min(faster, law.v0)
-        outside = max(slower, law.v0), max(faster, law.v0)
-        assert mu(law, inside[0]) <= mu(law, inside[1]) <= 0.5
-        assert 0.3 <= mu(law, outside[1]) <= mu(law, outside[0])
-
-    @given(laws, st.floats(0.0, 3.0))
-    def test_slopes_are_derivatives(self, law, relative):
-        speed = relative * law.v0
-        reach = 1e-6 * min(law.v0, 1.0 / max(law.alpha, 1.0))
-        assume(abs(speed - law.v0) > 2 * reach)
-        _, _, *slopes = weights(law, speed)
-        ahead, behind = weights(law, speed + reach), weights(law, speed - reach)
-        width = (speed + reach) - (speed - reach)
-        for k in range(2):
-            assert slopes[k] == pytest.approx((ahead[k] - behind[k]) / width, rel=1e-4, abs=1e-4 / law.v0)
-
-    @given(st.floats(1e-3, 3.0))
-    def test_tends_to_coulomb_as_the_band_shrinks(self, speed):
-        """Outside the band, at the same speed; inside there is always a band left."""
-        assert weights(BengisuAkay(1e5, 2e-6), speed) == pytest.approx(weights(Coulomb(), speed), abs=1e-12)
-        assert stiction_band(BengisuAkay(1e5, 2e-6)) == 2e-6
-        assert stiction_band(Coulomb()) == 0.0
 
 
 @inlined
