@@ -132,38 +132,39 @@ def _take(batch, i):
 # ---- states: tuples of floats of any length --------------------------------------------------
 
 
-def _unrolled(function: Callable[..., Any]) -> Any:
-    """A function of states whose body is written out for the length of its argument `y`.
+def unrolled(function: Callable[..., Any]) -> Any:
+    """A function whose body is written out for the length of its first argument, a tuple.
 
-    `function` returns, for a length, the lines of the body, whose last gives the state to return.
+    `function` takes that length, then the names of the arguments; it returns the lines of the body.
     """
-    names = ", ".join(list(inspect.signature(function).parameters)[1:])
+    first, *others = list(inspect.signature(function).parameters)[1:]
+    names = ", ".join([first, *others])
 
     def written(length: int) -> Any:
-        lines = "\n    ".join(function(length, *names.split(", ")))
+        lines = "\n    ".join(function(length, first, *others))
         scope: dict[str, Any] = {}
         exec(f"def body({names}):\n    {lines}", scope)
         return scope["body"]
 
     scope: dict[str, Any] = {"written": written}
     exec(
-        f"def {function.__name__}({names}): return written(len(y))({names})\n"
-        f"def overloaded({names}): return written(len(y))\n",
+        f"def {function.__name__}({names}): return written(len({first}))({names})\n"
+        f"def overloaded({names}): return written(len({first}))\n",
         scope,
     )
-    unrolled = scope[function.__name__]
-    unrolled.__doc__ = function.__doc__
-    overload(unrolled, jit_options=OPTIONS)(scope["overloaded"])
-    return unrolled
+    found = scope[function.__name__]
+    found.__doc__ = function.__doc__
+    overload(found, jit_options=OPTIONS)(scope["overloaded"])
+    return found
 
 
-@_unrolled
+@unrolled
 def add_scaled(length, y, factor, k):
     """``y + factor * k``."""
     return ["return (" + "".join(f"y[{i}] + factor * k[{i}], " for i in range(length)) + ")"]
 
 
-@_unrolled
+@unrolled
 def combine(length, y, weights, rows, count):
     """``y`` and the first `count` of the rows of an array, each times its weight."""
     numbers = range(length)
@@ -176,7 +177,7 @@ def combine(length, y, weights, rows, count):
     ]
 
 
-@_unrolled
+@unrolled
 def combine_twice(length, y, weights, others, rows, count):
     """:func:`combine` of ``y`` and of zero, with two sets of weights in one pass."""
     numbers = range(length)
@@ -190,13 +191,13 @@ def combine_twice(length, y, weights, others, rows, count):
     ]
 
 
-@_unrolled
+@unrolled
 def zero(length, y):
     """A state of zeros."""
     return ["return (" + "0.0, " * length + ")"]
 
 
-@_unrolled
-def as_tuple(length, row, y):
-    """A row of an array as a state like `y`."""
+@unrolled
+def like(length, y, row):
+    """A row of an array as a state of the length of `y`."""
     return ["return (" + "".join(f"row[{i}], " for i in range(length)) + ")"]

@@ -198,7 +198,7 @@ class TestLinearSystem:
             jacobian[:2, :2] = core.reshape(2, 2)
             jacobian[1, 2:], jacobian[2:, 1] = couplings[:, 0], couplings[:, 1]
             jacobian[range(2, 2 + count), range(2, 2 + count)] = couplings[:, 2]
-            rosenbrock.solve(tuple(core), tuple(map(tuple, couplings)), shift, tuple(right), found)
+            rosenbrock.solve(tuple(map(tuple, couplings)), tuple(core), shift, tuple(right), found)
             expected = np.linalg.solve(shift * np.eye(2 + count) - jacobian, right)
             np.testing.assert_allclose(found, expected, rtol=1e-11)
 

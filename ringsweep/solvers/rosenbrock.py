@@ -7,13 +7,10 @@ G. Steinebach, BIT Numerical Mathematics 63, 27 (2023).
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numba.extending import overload
 
 from ringsweep.hooks import forcing, stiff_rates
-from ringsweep.jit import OPTIONS, add_scaled, as_tuple, combine, combine_twice, inlined, zero
+from ringsweep.jit import add_scaled, combine, combine_twice, inlined, like, unrolled, zero
 
 STAGES = 8
 GAMMA = 0.21193756319429014
@@ -125,13 +122,14 @@ def step(scene, mode, t, x, line, h, stages):
                 force = forcing(scene, t + TIMES[i] * h)
             rates = stiff_rates(scene, mode, force, y)
             rates = add_scaled(rates, over_h, coupling)
-        solve(core, bristles, shift, add_scaled(rates, h * DRIFT[i], drift), stages[i])
+        solve(bristles, core, shift, add_scaled(rates, h * DRIFT[i], drift), stages[i])
     # Stiffly accurate: the last stage is the correction, and the error estimate, of the one before.
-    error = as_tuple(stages[STAGES - 1], x)
+    error = like(x, stages[STAGES - 1])
     return add_scaled(y, 1.0, error), error
 
 
-def solve(core: Any, bristles: Any, shift: float, right: Any, out: Any) -> None:
+@unrolled
+def solve(count, bristles, core, shift, right, out):
     """Fill `out` with the solution k of ``(shift I - J) k = right``.
 
     The Jacobian J of place, velocity and bristles has the structure of a body on bristles: its `core` is that of
@@ -139,13 +137,8 @@ def solve(core: Any, bristles: Any, shift: float, right: Any, out: Any) -> None:
     the rate of the deflection on the velocity and on itself. The last is never positive, so that the
     bristles can be eliminated in any order without pivoting.
     """
-    return _solve_for(len(bristles))(core, bristles, shift, right, out)
-
-
-def _solve_for(count: int) -> Any:
-    """The body of :func:`solve` for so many bristles."""
     numbers = range(count)
-    lines = [
+    return [
         "j00, j01, j10, j11 = core",
         "r0, r1 = right[0], right[1]",
         "w00, w11 = shift - j00, shift - j11",
@@ -156,33 +149,16 @@ def _solve_for(count: int) -> Any:
         "out[0], out[1] = (w11 * r0 + j01 * r1) * inverse, k1",
         *(f"out[{i + 2}] = (right[{i + 2}] + c{i} * k1) * p{i}" for i in numbers),
     ]
-    scope: dict[str, Any] = {}
-    exec("def solve(core, bristles, shift, right, out):\n    " + "\n    ".join(lines), scope)
-    return scope["solve"]
 
 
-@overload(solve, jit_options=OPTIONS)
-def _solve(core, bristles, shift, right, out):
-    return _solve_for(len(bristles))
+@unrolled
+def push(count, bristles, core, error, scales):
+    """Error of the acceleration that one of velocity and bristles makes, measured by the last of `scales`.
 
-
-def push(bristles: Any, core: Any, error: Any, scales: Any) -> float:
-    """Error of the acceleration that an error of velocity and bristles makes, measured by the last of `scales`."""
-    return float(_push_of(len(bristles))(bristles, core, error, scales))
-
-
-def _push_of(count: int) -> Any:
-    """The body of :func:`push` for so many bristles."""
+    Zero without bristles.
+    """
     terms = "".join(f" + bristles[{i}][0] * error[{i + 2}]" for i in range(count))
-    measured = f"abs(core[3] * error[1]{terms}) / scales[{count + 2}]" if count else "0.0"
-    scope: dict[str, Any] = {}
-    exec(f"def push(bristles, core, error, scales):\n    return {measured}", scope)
-    return scope["push"]
-
-
-@overload(push, jit_options=OPTIONS)
-def _push(bristles, core, error, scales):
-    return _push_of(len(bristles))
+    return [f"return abs(core[3] * error[1]{terms}) / scales[{count + 2}]" if count else "return 0.0"]
 
 
 @inlined
