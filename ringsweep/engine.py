@@ -24,10 +24,6 @@ from ringsweep.scene import LAW, Scene, Structure, Values
 from ringsweep.solvers.common import Result
 from ringsweep.variables import OUTCOMES
 
-# Large enough that a task is not overhead, small enough that a progress bar moves, that Ctrl-C is
-# heard and that the last tasks are shared out.
-_CELLS_PER_TASK = 64
-
 
 def run(
     config: str | os.PathLike[str] | Mapping[str, Any], *, jobs: int | None = None, progress: bool = True
@@ -119,7 +115,7 @@ def compute(config: Config, *, jobs: int | None, progress: bool) -> xr.Dataset:
     outcomes = MODELS[scene.structure.model].outcomes
     total = math.prod(axes.sizes.values())
     jobs = jobs or joblib.cpu_count()
-    size = max(1, min(_CELLS_PER_TASK, math.ceil(total / (4 * jobs))))
+    size = max(1, min(config.solver.cells_per_task, math.ceil(total / (4 * jobs))))
     tasks = [
         (structure, own[start : start + size])
         for structure, own in _by_law(scene, axes)

@@ -7,7 +7,7 @@ validity.
 
 from __future__ import annotations
 
-from ringsweep.jit import hook
+from ringsweep.jit import hook, inner_hook
 
 
 @hook
@@ -15,14 +15,25 @@ def launch(scene):
     """State at t = 0."""
 
 
-@hook
-def rates(scene, y, drive_at, drive_rate):
-    """Time derivative of the state `y` while the drive is at `drive_at` and moves at `drive_rate`."""
+@inner_hook
+def rates(scene, now, y, drive_at, drive_rate):
+    """Time derivative of the state `y`, within a step of one inspected, while the drive is at `drive_at` and moves at
+    `drive_rate`."""
 
 
-@hook
+@inner_hook
 def inspect(scene, y, drive_at, drive_rate):
     """Inspection of the state `y`; its field ``rates`` is the time derivative."""
+
+
+@hook
+def lanes(scene):
+    """How many runs of such a scene stand side by side in the kernel of a constant step: `Eight` or `Single`."""
+
+
+@inner_hook
+def holds(scene, now):
+    """Whether the model still holds in an inspected state; where not, :func:`verdict` says why."""
 
 
 @hook
@@ -37,7 +48,7 @@ def verdict(scene, before, now):
     """
 
 
-@hook
+@inner_hook
 def stiffness(scene, before, now, h):
     """Largest magnitude of the eigenvalue times `h` that a step of `h` seconds met."""
 
@@ -47,7 +58,7 @@ def begin(scene, y, now):
     """Record of a run at its launch."""
 
 
-@hook
+@inner_hook
 def observe(scene, record, y, before, now, t, h):
     """Record after a step of `h` seconds to the state `y` at time `t`."""
 

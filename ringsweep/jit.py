@@ -68,7 +68,17 @@ def inlined(function: Callable[..., Any]) -> Any:
     return numba.njit(**OPTIONS)(function)
 
 
-def hook(stub: Callable[..., Any]) -> Any:
+def absorbed(function: Callable[..., Any]) -> Any:
+    """The same, whatever its size: in the innermost loop of a kernel a call would pass its arguments through memory."""
+    return numba.njit(**OPTIONS, forceinline=True)(function)
+
+
+def inner_hook(stub: Callable[..., Any]) -> Any:
+    """A :func:`hook` whose bodies are :func:`absorbed`."""
+    return hook(stub, within=True)
+
+
+def hook(stub: Callable[..., Any], *, within: bool = False) -> Any:
     """A function whose body is chosen by the type of its first argument.
 
     `stub` gives name, signature and docstring. Bodies are added by
@@ -96,7 +106,7 @@ def hook(stub: Callable[..., Any]) -> Any:
     function = scope[stub.__name__]
     function.__doc__ = stub.__doc__
     function.__module__ = stub.__module__
-    overload(function, jit_options=OPTIONS)(scope["overloaded"])
+    overload(function, jit_options=OPTIONS | {"forceinline": within})(scope["overloaded"])
 
     def implements(*classes: type) -> Callable[..., Any]:
         def register(body: Callable[..., Any]) -> Callable[..., Any]:
@@ -115,7 +125,8 @@ def hook(stub: Callable[..., Any]) -> Any:
 def take(batch: Any, i: int) -> Any:
     """Cell `i` of a batch: the same nested ``NamedTuple`` with each array replaced by its row."""
     if isinstance(batch, tuple):
-        return type(batch)(*(take(leaf, i) for leaf in batch))
+        leaves = (take(leaf, i) for leaf in batch)
+        return type(batch)(*leaves) if hasattr(batch, "_fields") else tuple(leaves)
     return batch[i]
 
 
@@ -123,9 +134,9 @@ def take(batch: Any, i: int) -> Any:
 def _take(batch, i):
     if isinstance(batch, types.Array):
         return lambda batch, i: batch[i]
-    leaves = ", ".join(f"take(batch[{k}], i)" for k in range(len(batch)))
-    scope = {"cls": batch.instance_class, "take": take}
-    exec(f"def row(batch, i): return cls({leaves})", scope)
+    leaves = "".join(f"take(batch[{k}], i), " for k in range(len(batch)))
+    scope = {"cls": getattr(batch, "instance_class", None), "take": take}
+    exec(f"def row(batch, i): return {'cls' if scope['cls'] else ''}({leaves})", scope)
     return scope["row"]
 
 
@@ -142,7 +153,7 @@ def unrolled(function: Callable[..., Any]) -> Any:
 
     def written(length: int) -> Any:
         lines = "\n    ".join(function(length, first, *others))
-        scope: dict[str, Any] = {}
+        scope = dict(function.__globals__)
         exec(f"def body({names}):\n    {lines}", scope)
         return scope["body"]
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ringsweep.jit import inlined
+from ringsweep.lanes import any_of, select
 from ringsweep.variables import FAILED, JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 
 #: How a run stands or ended.
@@ -22,11 +23,11 @@ class Record(NamedTuple):
     """What is remembered of a run on the ring; angles in rad, times in s, forces in N.
 
     ``sense`` is the sign of the last motion beyond the threshold; ``lowest`` and ``highest`` bound
-    the angle since the last reversal, or since the start.
+    the angle since the last reversal, or since the start, ``phi_min`` and ``phi_max`` what it was before.
     """
 
-    sense: int
-    reversals: int
+    sense: float
+    reversals: float
     lowest: float
     highest: float
     phi_min: float
@@ -62,8 +63,8 @@ class Outcome(NamedTuple):
 @inlined
 def begin(phi, omega, normal_1, normal_2, epsilon_omega):
     """Record of a run at its launch."""
-    sense = 1 if omega > epsilon_omega else -1 if omega < -epsilon_omega else 0
-    return Record(sense, 0, phi, phi, phi, phi, omega, omega, 0.0, normal_1, normal_2)
+    sense = 1.0 if omega > epsilon_omega else -1.0 if omega < -epsilon_omega else 0.0
+    return Record(sense, 0.0, phi, phi, phi, phi, omega, omega, 0.0, normal_1, normal_2)
 
 
 @inlined
@@ -74,24 +75,22 @@ def observe(record, phi, omega, normal_1, normal_2, stuck_for, epsilon_omega):
     so that chatter about zero does not count.
     """
     r = record
-    sense, reversals, lowest, highest = r.sense, r.reversals, min(r.lowest, phi), max(r.highest, phi)
-    if omega > epsilon_omega and sense < 1:
-        if sense == -1:
-            reversals += 1
-            highest = max(lowest, phi)
-        sense = 1
-    elif omega < -epsilon_omega and sense > -1:
-        if sense == 1:
-            reversals += 1
-            lowest = min(highest, phi)
-        sense = -1
+    sense, reversals = r.sense, r.reversals
+    lowest, highest, phi_min, phi_max = min(r.lowest, phi), max(r.highest, phi), r.phi_min, r.phi_max
+    if any_of(omega * sense <= 0.0):
+        forth, back = omega > epsilon_omega, omega < -epsilon_omega
+        turned_forth, turned_back = forth & (sense < 0.0), back & (sense > 0.0)
+        phi_min, phi_max = min(phi_min, lowest), max(phi_max, highest)
+        lowest, highest = select(turned_back, phi, lowest), select(turned_forth, phi, highest)
+        reversals = reversals + select(turned_forth | turned_back, 1.0, 0.0)
+        sense = select(forth, 1.0, select(back, -1.0, sense))
     return Record(
         sense,
         reversals,
         lowest,
         highest,
-        min(r.phi_min, phi),
-        max(r.phi_max, phi),
+        phi_min,
+        phi_max,
         min(r.omega_min, omega),
         max(r.omega_max, omega),
         r.stick_time + stuck_for,
@@ -123,11 +122,11 @@ def conclude(record, status, t, phi, omega):
         t,
         phi,
         omega,
-        r.phi_min,
-        r.phi_max,
+        min(r.phi_min, r.lowest),
+        max(r.phi_max, r.highest),
         r.omega_min,
         r.omega_max,
-        float(r.reversals),
+        r.reversals,
         float(turns),
         r.stick_time,
         # A step ends beyond the instant at which a reaction vanishes, and at the end of an arc one may jump below zero.

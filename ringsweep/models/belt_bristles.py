@@ -64,7 +64,7 @@ def _launch(scene):
 
 
 @hooks.rates.implements(BristleBelt)
-def _rates(scene, y, drive_at, drive_rate):
+def _rates(scene, now, y, drive_at, drive_rate):
     v = y[1] - drive_rate
     sign = 1.0 if v >= 0.0 else -1.0
     rate, _, _, force, _, _ = _contact(scene, v, y[2], sign, _region(scene, v, y[2], sign))

@@ -73,7 +73,7 @@ def _launch(scene):
 
 
 @hooks.rates.implements(belt.Belt)
-def _rates(scene, y, drive_at, drive_rate):
+def _rates(scene, now, y, drive_at, drive_rate):
     force, _ = _force(scene, y[0], y[1] - drive_rate)
     return y[1], -(scene.stiffness * y[0] + force) / scene.mass
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import cos, inf, isfinite, isnan, pi, sin
+from math import inf, isfinite, isnan, pi
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from ringsweep import hooks, regimes
 from ringsweep.jit import inlined
+from ringsweep.lanes import Several, any_of, select, sine_cosine, sine_cosine_near
 from ringsweep.models.common import GRAVITY, MASS, SPAN, drive_of, law_of, pair
 from ringsweep.parameters import Parameter, declared
 from ringsweep.physics import drives, friction, ring, zones
-from ringsweep.physics.friction.static import met, stiction_band, weights
+from ringsweep.physics.friction.static import met, steepest, stiction_band
 from ringsweep.regimes import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2
 from ringsweep.scene import Structure, Values, require
 
@@ -133,12 +134,11 @@ class Ring(SingleContactRing):
             sin_beta = np.sin(values["body.beta"])
             R = r + a / sin_beta
         cos_beta = np.sqrt((1.0 - sin_beta) * (1.0 + sin_beta))
-        return ring.TwoContacts(
+        return ring.TwoContacts.of(
             mass=values["body.mass"],
             inertia=values["body.inertia"],
             radius=R,
             xi=(R - r) * cos_beta,
-            beta=np.arcsin(sin_beta),
             sin_beta=sin_beta,
             cos_beta=cos_beta,
             gravity=values["gravity"],
@@ -155,9 +155,15 @@ class Inspection(NamedTuple):
     D: float
     inertia: float
     slope: float
+    phi: float
     sin_phi: float
     cos_phi: float
     omega: float
+
+
+@hooks.lanes.implements(ring.Ring)
+def _lanes(scene):
+    return Several()
 
 
 @hooks.launch.implements(ring.Ring)
@@ -166,21 +172,29 @@ def _launch(scene):
 
 
 @hooks.rates.implements(ring.Ring)
-def _rates(scene, y, drive_at, drive_rate):
+def _rates(scene, now, y, drive_at, drive_rate):
     phi, omega = y
     _, K1, K2, _, _ = ring.friction(scene, phi, omega, drive_at, drive_rate)
-    return omega, ring.acceleration(scene.body, K1, K2, sin(phi), cos(phi), omega)[0]
+    sin_phi, cos_phi = sine_cosine_near(phi, now.phi, now.sin_phi, now.cos_phi)
+    return omega, ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)[0]
 
 
 @hooks.inspect.implements(ring.Ring)
 def _inspect(scene, y, drive_at, drive_rate):
     phi, omega = y
     v, K1, K2, slope_1, slope_2 = ring.friction(scene, phi, omega, drive_at, drive_rate)
-    sin_phi, cos_phi = sin(phi), cos(phi)
+    sin_phi, cos_phi = sine_cosine(phi)
     epsilon, D, inertia = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
     normal_1, normal_2 = ring.reactions(scene.body, K1, K2, sin_phi, cos_phi, omega, epsilon)
     slope = ring.acceleration_slope(scene.body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega)
-    return Inspection((omega, epsilon), v, normal_1, normal_2, D, inertia, slope, sin_phi, cos_phi, omega)
+    return Inspection((omega, epsilon), v, normal_1, normal_2, D, inertia, slope, phi, sin_phi, cos_phi, omega)
+
+
+@hooks.holds.implements(ring.Ring, ring.BristleRing)
+def _holds(scene, now):
+    # Of a NaN every comparison is false.
+    supported = (now.D > 0.0) & (now.inertia > 0.0) & (now.normal_1 > 0.0) & (now.normal_2 > 0.0)
+    return supported & (abs(now.rates[1]) < inf) & (abs(now.omega) < inf)
 
 
 @hooks.verdict.implements(ring.Ring, ring.BristleRing)
@@ -205,39 +219,25 @@ def _zero(before, now):
     return before / (before - now) if before > now else 0.0
 
 
-@inlined
-def _in_band(scene, before, now):
-    """Whether a step lay in the stiction band or jumped across it."""
-    return abs(before.v) < stiction_band(scene.law) or before.v * now.v < 0.0
-
-
 @hooks.stiffness.implements(ring.Ring)
 def _stiffness(scene, before, now, h):
     # The stages reach about as far as the acceleration at the beginning takes the body in one step.
     radius = scene.body.radius
     ring_gains = (radius * now.omega - now.v) - (radius * before.omega - before.v)
     ahead = before.v + h * radius * before.rates[1] - ring_gains
-    rest, edge, jumped = met(scene.law, before.v, now.v, ahead)
-    if jumped and stiction_band(scene.law) == 0.0:
-        # A discontinuous law has no slope that any step could follow.
-        return inf
-    steepest = max(abs(before.slope), abs(now.slope))
+    band = stiction_band(scene.law)
+    eigenvalue = max(abs(before.slope), abs(now.slope))
     # A step that jumps the band, or its edge, never samples the slope there, and is the one that is
     # wrong in kind: it has met it all the same.
-    if rest:
-        steepest = max(steepest, _steepest(scene, now, 0.0))
-    if edge:
-        steepest = max(steepest, _steepest(scene, now, stiction_band(scene.law)))
-    return steepest * h
-
-
-@inlined
-def _steepest(scene, now, speed):
-    """Bound on the eigenvalue of friction at a sliding speed, 1/s."""
-    mu_s, mu_k = zones.roughest(scene.surface)
-    _, _, dw_s, dw_k = weights(scene.law, speed)
-    slope = -(dw_s * mu_s + dw_k * mu_k) * scene.body.radius
-    return abs(ring.acceleration_slope(scene.body, 0.0, 0.0, slope, slope, now.sin_phi, now.cos_phi, now.omega))
+    low, high = min(min(before.v, now.v), ahead), max(max(before.v, now.v), ahead)
+    if any_of((low <= band) & (high >= -band)):
+        rest, edge, _ = met(scene.law, before.v, now.v, ahead)
+        mu_s, mu_k = zones.roughest(scene.surface)
+        (rest_s, rest_k), (edge_s, edge_k) = steepest(scene.law)
+        at_rest, at_edge = abs(rest_s * mu_s + rest_k * mu_k), abs(edge_s * mu_s + edge_k * mu_k)
+        slope = max(select(rest, at_rest, 0.0), select(edge, at_edge, 0.0))
+        eigenvalue = max(eigenvalue, slope * radius * abs(ring.grip(scene.body, now.cos_phi, now.omega)))
+    return eigenvalue * h
 
 
 @hooks.begin.implements(ring.Ring, ring.BristleRing)
@@ -247,7 +247,9 @@ def _begin(scene, y, now):
 
 @hooks.observe.implements(ring.Ring)
 def _observe(scene, record, y, before, now, t, h):
-    stuck_for = h if _in_band(scene, before, now) else 0.0
+    # Whether the step lay in the stiction band or jumped across it.
+    stuck = (abs(before.v) < stiction_band(scene.law)) | (before.v * now.v < 0.0)
+    stuck_for = select(stuck, h, 0.0)
     return regimes.observe(record, y[0], y[1], now.normal_1, now.normal_2, stuck_for, scene.epsilon_omega)
 
 

@@ -102,7 +102,7 @@ def _launch(scene):
 
 
 @hooks.rates.implements(BristleRing)
-def _rates(scene, y, drive_at, drive_rate):
+def _rates(scene, now, y, drive_at, drive_rate):
     phi, omega, z_1, z_2 = y
     v = (omega - drive_rate) * scene.body.radius
     sign = 1.0 if v >= 0.0 else -1.0

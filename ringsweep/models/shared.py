@@ -2,11 +2,24 @@
 
 from __future__ import annotations
 
+from math import isfinite
+
 from ringsweep import hooks
+from ringsweep.lanes import Single
 from ringsweep.physics import drives
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.friction.static import BAND
 from ringsweep.physics.ring import BristleRing, Ring
+
+
+@hooks.lanes.implements(Belt, BristleBelt, BristleRing)
+def _lanes(scene):
+    return Single()
+
+
+@hooks.holds.implements(Belt, BristleBelt)
+def _holds(scene, now):
+    return isfinite(now.rates[0]) and isfinite(now.rates[1])
 
 
 @hooks.forcing.implements(Belt, BristleBelt, Ring, BristleRing)

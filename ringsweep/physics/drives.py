@@ -12,7 +12,7 @@ from __future__ import annotations
 from math import atan, cos, inf, log1p, pi, sin
 from typing import Annotated, Any, NamedTuple
 
-from ringsweep.jit import hook, inlined
+from ringsweep.jit import hook, inlined, inner_hook
 from ringsweep.parameters import Leaf, Parameter
 
 
@@ -53,6 +53,17 @@ class Table(NamedTuple):
     amplitude: Annotated[float, Parameter("1", "factor on the measured angle", default=1.0)]
     knots: Any
     coefficients: Any
+
+
+class Scaled(NamedTuple):
+    """What is left of a drive where its shape is tabulated."""
+
+    amplitude: Any
+
+
+def scaled(drive: Any) -> Any:
+    """A drive without its shape: all that :func:`lookup` needs."""
+    return Scaled(drive.amplitude) if hasattr(drive, "amplitude") else drive
 
 
 # A power law has no series at t = 0. What happens before this time is below rounding.
@@ -144,7 +155,7 @@ def _turn(drive, t):
     return a * theta, a * omega, a * epsilon if a != 0.0 else 0.0
 
 
-@hook
+@inner_hook
 def lookup(drive, table, k):
     """Angle (rad) and angular velocity (rad/s) of the drive from row `k` of a table of its shape."""
 
@@ -154,7 +165,7 @@ def _no_lookup(drive, table, k):
     return 0.0, 0.0
 
 
-@lookup.implements(Constant, Arctan, Power, Sinusoidal, Table)
+@lookup.implements(Constant, Arctan, Power, Sinusoidal, Table, Scaled)
 def _lookup(drive, table, k):
     return drive.amplitude * table[k, 0], drive.amplitude * table[k, 1]
 

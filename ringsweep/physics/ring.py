@@ -13,32 +13,37 @@ Balance of momentum, radial and tangential, and of moment of momentum about the 
     M \\xi \\ddot\\varphi &= -M g \\sin\\varphi + (N_1 - N_2) \\sin\\beta + (K_1 N_1 + K_2 N_2) \\cos\\beta \\\\
     (J + M \\xi^2) \\ddot\\varphi &= -M g \\xi \\sin\\varphi + R (K_1 N_1 + K_2 N_2)
 
-With ``S = K1 + K2``, ``T = (K1 - K2) cos beta + 2 K1 K2 sin beta`` and
-``D = (K1 - K2) cos 2 beta + (1 + K1 K2) sin 2 beta`` the first two give the paper's Eq. 17 and all
-three give
+With ``S = K1 + K2``, ``Delta = K1 - K2`` and ``P = K1 K2`` the first two give the paper's Eq. 17 with the
+determinant :math:`D = D_0 + D_1 \\Delta + D_2 P`, and all three give
 
 .. math::
 
-    \\ddot\\varphi = \\frac{-M g \\xi \\sin\\varphi\\, D
-        + R M [g \\sin\\varphi\\, T + (g \\cos\\varphi + \\xi \\omega^2) \\sin\\beta\\, S]}
-        {(J + M \\xi^2) D - R M \\xi T} .
+    \\ddot\\varphi = \\frac{(m_0 + m_1 \\Delta + m_2 P) \\sin\\varphi + (l_0 \\cos\\varphi + l_1 \\omega^2) S}
+        {i_0 + i_1 \\Delta + i_2 P} ,
 
-The denominator is D times the effective inertia; where D or it is not positive no motion of a
-rigid body exists or it is not unique (jamming, Painleve).
+whose coefficients :class:`TwoContacts` defines. The denominator is D times the effective inertia; where D or it is not
+positive no motion of a rigid body exists or it is not unique (jamming, Painleve).
 """
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from ringsweep.jit import hook, inlined
+import numpy as np
+
+from ringsweep.jit import absorbed, hook, inlined, inner_hook
+from ringsweep.lanes import opposing
 from ringsweep.parameters import Leaf
 from ringsweep.physics.friction.static import weights
-from ringsweep.physics.zones import coefficients, segment
+from ringsweep.physics.zones import PER_TURN, roughness
 
 
 class TwoContacts(NamedTuple):
-    """Two balls joined by a rod (the paper's Fig. 22)."""
+    """Two balls joined by a rod (the paper's Fig. 22).
+
+    The last four are the coefficients of D, of D times the effective inertia, of the weight's moment and of what lifts
+    the body against friction; see the head of this module and :meth:`of`.
+    """
 
     mass: Leaf
     inertia: Leaf
@@ -48,6 +53,37 @@ class TwoContacts(NamedTuple):
     sin_beta: Leaf
     cos_beta: Leaf
     gravity: Leaf
+    determinant: tuple[Leaf, Leaf, Leaf]
+    effective: tuple[Leaf, Leaf, Leaf]
+    weight: tuple[Leaf, Leaf, Leaf]
+    lift: tuple[Leaf, Leaf]
+
+    @classmethod
+    def of(
+        cls, mass: Any, inertia: Any, radius: Any, xi: Any, sin_beta: Any, cos_beta: Any, gravity: Any
+    ) -> TwoContacts:
+        """The body with the coefficients of its acceleration worked out."""
+        D = 2.0 * sin_beta * cos_beta, cos_beta * cos_beta - sin_beta * sin_beta, 2.0 * sin_beta * cos_beta
+        # The tangential balance, less the part of it that the moment about the axis takes up.
+        T = 0.0, cos_beta, 2.0 * sin_beta
+        about_axis = inertia + mass * xi * xi
+        lever, arm = radius * mass, mass * xi
+        effective = [about_axis * d - lever * xi * t for d, t in zip(D, T, strict=True)]
+        weight = [gravity * (lever * t - arm * d) for d, t in zip(D, T, strict=True)]
+        return cls(
+            mass,
+            inertia,
+            radius,
+            xi,
+            np.arcsin(sin_beta),
+            sin_beta,
+            cos_beta,
+            gravity,
+            D,
+            (effective[0], effective[1], effective[2]),
+            (weight[0], weight[1], weight[2]),
+            (lever * gravity * sin_beta, lever * xi * sin_beta),
+        )
 
 
 class OneContact(NamedTuple):
@@ -105,7 +141,7 @@ def _one_about_axis(body):
     return 1.0
 
 
-@hook
+@inner_hook
 def acceleration(body, K1, K2, sin_phi, cos_phi, omega):
     """Angular acceleration, and what tells whether it exists.
 
@@ -117,19 +153,20 @@ def acceleration(body, K1, K2, sin_phi, cos_phi, omega):
     """
 
 
+@inlined
+def _combine(coefficients, delta, P):
+    """Value of ``c_0 + c_1 Delta + c_2 P``."""
+    c_0, c_1, c_2 = coefficients
+    return c_0 + c_1 * delta + c_2 * P
+
+
 @acceleration.implements(TwoContacts)
 def _two_acceleration(body, K1, K2, sin_phi, cos_phi, omega):
-    b = body
-    P = K1 * K2
-    sin_2beta = 2.0 * b.sin_beta * b.cos_beta
-    cos_2beta = b.cos_beta * b.cos_beta - b.sin_beta * b.sin_beta
-    D = (K1 - K2) * cos_2beta + (1.0 + P) * sin_2beta
-    T = (K1 - K2) * b.cos_beta + 2.0 * P * b.sin_beta
-    lift = (b.gravity * cos_phi + b.xi * omega * omega) * b.sin_beta
-    RM = b.radius * b.mass
-    inertia = (b.inertia + b.mass * b.xi * b.xi) * D - RM * b.xi * T
-    moment = b.gravity * sin_phi * (RM * T - b.mass * b.xi * D) + RM * lift * (K1 + K2)
-    return moment / inertia, D, inertia
+    delta, P = K1 - K2, K1 * K2
+    l_0, l_1 = body.lift
+    inertia = _combine(body.effective, delta, P)
+    moment = _combine(body.weight, delta, P) * sin_phi + (l_0 * cos_phi + l_1 * (omega * omega)) * (K1 + K2)
+    return moment * (1.0 / inertia), _combine(body.determinant, delta, P), inertia
 
 
 @acceleration.implements(OneContact)
@@ -139,31 +176,24 @@ def _one_acceleration(body, K1, K2, sin_phi, cos_phi, omega):
     return phi_dd, 1.0, 1.0
 
 
-@hook
+@inner_hook
 def acceleration_slope(body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega):
     """Derivative of the angular acceleration along ``(dK1, dK2) = (slope_1, slope_2)``."""
 
 
 @acceleration_slope.implements(TwoContacts)
 def _two_slope(body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega):
-    b = body
-    P = K1 * K2
-    dP = slope_1 * K2 + K1 * slope_2
-    sin_2beta = 2.0 * b.sin_beta * b.cos_beta
-    cos_2beta = b.cos_beta * b.cos_beta - b.sin_beta * b.sin_beta
-    D = (K1 - K2) * cos_2beta + (1.0 + P) * sin_2beta
-    dD = (slope_1 - slope_2) * cos_2beta + dP * sin_2beta
-    T = (K1 - K2) * b.cos_beta + 2.0 * P * b.sin_beta
-    dT = (slope_1 - slope_2) * b.cos_beta + 2.0 * dP * b.sin_beta
-    lift = (b.gravity * cos_phi + b.xi * omega * omega) * b.sin_beta
-    RM = b.radius * b.mass
-    about_axis = b.inertia + b.mass * b.xi * b.xi
-    weight = b.gravity * sin_phi
-    inertia = about_axis * D - RM * b.xi * T
-    d_inertia = about_axis * dD - RM * b.xi * dT
-    moment = weight * (RM * T - b.mass * b.xi * D) + RM * lift * (K1 + K2)
-    d_moment = weight * (RM * dT - b.mass * b.xi * dD) + RM * lift * (slope_1 + slope_2)
-    return (d_moment - moment / inertia * d_inertia) / inertia
+    delta, P = K1 - K2, K1 * K2
+    d_delta, d_P = slope_1 - slope_2, slope_1 * K2 + K1 * slope_2
+    _, i_1, i_2 = body.effective
+    _, m_1, m_2 = body.weight
+    l_0, l_1 = body.lift
+    lift = l_0 * cos_phi + l_1 * (omega * omega)
+    inertia = _combine(body.effective, delta, P)
+    moment = _combine(body.weight, delta, P) * sin_phi + lift * (K1 + K2)
+    d_moment = (m_1 * d_delta + m_2 * d_P) * sin_phi + lift * (slope_1 + slope_2)
+    per_inertia = 1.0 / inertia
+    return (d_moment - moment * per_inertia * (i_1 * d_delta + i_2 * d_P)) * per_inertia
 
 
 @acceleration_slope.implements(OneContact)
@@ -171,7 +201,23 @@ def _one_slope(body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega):
     return slope_1 * (body.gravity / body.radius * cos_phi + omega * omega)
 
 
-@hook
+@inner_hook
+def grip(body, cos_phi, omega):
+    """Derivative of the angular acceleration by the K of all contacts together, where there is no friction."""
+
+
+@grip.implements(TwoContacts)
+def _two_grip(body, cos_phi, omega):
+    l_0, l_1 = body.lift
+    return 2.0 * (l_0 * cos_phi + l_1 * (omega * omega)) / body.effective[0]
+
+
+@grip.implements(OneContact)
+def _one_grip(body, cos_phi, omega):
+    return body.gravity / body.radius * cos_phi + omega * omega
+
+
+@inner_hook
 def reactions(body, K1, K2, sin_phi, cos_phi, omega, phi_dd):
     """Normal reactions ``(N1, N2)``, N (the paper's Eq. 17); with one contact N2 repeats N1."""
 
@@ -179,25 +225,13 @@ def reactions(body, K1, K2, sin_phi, cos_phi, omega, phi_dd):
 @reactions.implements(TwoContacts)
 def _two_reactions(body, K1, K2, sin_phi, cos_phi, omega, phi_dd):
     b = body
-    sb, cb = b.sin_beta, b.cos_beta
-    sin_plus, cos_plus = sin_phi * cb + cos_phi * sb, cos_phi * cb - sin_phi * sb
-    sin_minus, cos_minus = sin_phi * cb - cos_phi * sb, cos_phi * cb + sin_phi * sb
-    D = (K1 - K2) * (cb * cb - sb * sb) + (1.0 + K1 * K2) * 2.0 * sb * cb
-    centripetal = b.xi * omega * omega
-    inertial = b.xi * phi_dd
-    N1 = (
-        b.gravity * sin_plus
-        + centripetal * sb
-        + inertial * cb
-        - K2 * (b.gravity * cos_plus + centripetal * cb - inertial * sb)
-    )
-    N2 = (
-        centripetal * sb
-        - b.gravity * sin_minus
-        - inertial * cb
-        + K1 * (b.gravity * cos_minus + centripetal * cb + inertial * sb)
-    )
-    return b.mass * N1 / D, b.mass * N2 / D
+    # Weight and inertia per unit of mass, along the race and across it.
+    along = b.gravity * sin_phi + b.xi * phi_dd
+    across = b.gravity * cos_phi + b.xi * (omega * omega)
+    load = b.mass / _combine(b.determinant, K1 - K2, K1 * K2)
+    N1 = across * (b.sin_beta - K2 * b.cos_beta) + along * (b.cos_beta + K2 * b.sin_beta)
+    N2 = across * (b.sin_beta + K1 * b.cos_beta) - along * (b.cos_beta - K1 * b.sin_beta)
+    return load * N1, load * N2
 
 
 @reactions.implements(OneContact)
@@ -206,7 +240,7 @@ def _one_reactions(body, K1, K2, sin_phi, cos_phi, omega, phi_dd):
     return N, N
 
 
-@inlined
+@absorbed
 def friction(scene, phi, omega, theta, ring_omega):
     """Sliding velocity, K at each contact and its slope.
 
@@ -224,12 +258,10 @@ def friction(scene, phi, omega, theta, ring_omega):
     """
     radius = scene.body.radius
     v = (omega - ring_omega) * radius
-    sign = 1.0 if v > 0.0 else -1.0 if v < 0.0 else 0.0
-    offset = contact_offset(scene.body)
     w_s, w_k, dw_s, dw_k = weights(scene.law, abs(v))
-    rho = phi - theta
-    mu_s, mu_k, _ = coefficients(scene.surface, segment(scene.surface, rho - offset))
-    K1, slope_1 = -(w_s * mu_s + w_k * mu_k) * sign, -(dw_s * mu_s + dw_k * mu_k) * radius
-    mu_s, mu_k, _ = coefficients(scene.surface, segment(scene.surface, rho + offset))
-    K2, slope_2 = -(w_s * mu_s + w_k * mu_k) * sign, -(dw_s * mu_s + dw_k * mu_k) * radius
+    turns, offset = (phi - theta) * PER_TURN, contact_offset(scene.body) * PER_TURN
+    mu_s, mu_k = roughness(scene.surface, turns - offset)
+    K1, slope_1 = opposing(w_s * mu_s + w_k * mu_k, v), -(dw_s * mu_s + dw_k * mu_k) * radius
+    mu_s, mu_k = roughness(scene.surface, turns + offset)
+    K2, slope_2 = opposing(w_s * mu_s + w_k * mu_k, v), -(dw_s * mu_s + dw_k * mu_k) * radius
     return v, K1, K2, slope_1, slope_2

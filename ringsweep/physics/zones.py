@@ -6,16 +6,23 @@ the ring's frame, where an arc stands still.
 
 from __future__ import annotations
 
-from math import floor, inf, pi
+import math
+from math import inf, pi
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+from numba import types
+from numba.extending import overload
 
-from ringsweep.jit import hook, inlined
-from ringsweep.parameters import Parameter
+from ringsweep.jit import OPTIONS, hook, inlined, inner_hook
+from ringsweep.lanes import floor, select
+from ringsweep.parameters import Leaf, Parameter
 
 HALF_ANGLE = Parameter("rad", "half-angle of the rough zone", lower=0.0, upper=pi)
 CENTER = Parameter("rad", "centre of the rough zone in the ring's frame", lower=-2 * pi, upper=2 * pi, default=0.0)
+
+#: Turns in a radian.
+PER_TURN = 0.5 / pi
 
 
 class Uniform(NamedTuple):
@@ -28,13 +35,16 @@ class Uniform(NamedTuple):
 class Segments(NamedTuple):
     """A ring cut at ``edges`` (ascending, in [0, 2 pi)); segment j runs from edge j to edge j + 1.
 
-    ``arc`` is 0 where no rough arc lies and k on the k-th of them.
+    ``arc`` is 0 where no rough arc lies and k on the k-th of them; ``roughest`` is the largest static and the least
+    kinetic coefficient. In memory a cell's segments are a row of an array; where cells stand side by side, in
+    :mod:`ringsweep.lanes`, they are a tuple.
     """
 
     edges: Any
     mu_s: Any
     mu_k: Any
     arc: Any
+    roughest: tuple[Leaf, Leaf]
 
 
 class Arc(NamedTuple):
@@ -49,9 +59,8 @@ class Arc(NamedTuple):
 @inlined
 def wrap(x):
     """Angle reduced to [0, 2 pi): the paper's psi (Eq. 28)."""
-    # NumPy's floor is one instruction; that of math goes by way of an integer.
-    y = x - 2.0 * pi * np.floor(x * (0.5 / pi))
-    return y if y < 2.0 * pi else 0.0
+    y = x - 2.0 * pi * floor(x * (0.5 / pi))
+    return select(y < 2.0 * pi, y, 0.0)
 
 
 def cut(arcs: list[Arc], mu_s: Any, mu_k: Any) -> Uniform | Segments:
@@ -67,7 +76,7 @@ def cut(arcs: list[Arc], mu_s: Any, mu_k: Any) -> Uniform | Segments:
     Returns
     -------
     Uniform or Segments
-        Leaves of shape ``(cells,)`` and ``(cells, 2 * len(arcs))``.
+        Leaves of shape ``(cells,)`` and ``(cells, segments)`` with two segments to an arc.
     """
     if not arcs:
         return Uniform(mu_s, mu_k)
@@ -87,7 +96,8 @@ def cut(arcs: list[Arc], mu_s: Any, mu_k: Any) -> Uniform | Segments:
         static = np.where(inside, rough_s, static)
         kinetic = np.where(inside, rough_k, kinetic)
         index = np.where(inside, k, index)
-    return Segments(*(np.ascontiguousarray(leaf) for leaf in (edges, static, kinetic, index)))
+    static, kinetic = np.ascontiguousarray(static), np.ascontiguousarray(kinetic)
+    return Segments(edges, static, kinetic, index, (static.max(axis=-1), kinetic.min(axis=-1)))
 
 
 @hook
@@ -126,6 +136,45 @@ def _segments(surface, segment):
     return surface.mu_s[segment], surface.mu_k[segment], surface.arc[segment]
 
 
+def under(values, edges, x):
+    """The value at `x`, in turns from 0 to 1, of those that hold in the segments which begin at `edges` (rad)."""
+    # Below the first edge lies the last segment, which closes the ring.
+    found = values[len(values) - 1]
+    for j in range(len(edges) - 1):
+        middle, half = 0.5 * PER_TURN * (edges[j + 1] + edges[j]), 0.5 * PER_TURN * (edges[j + 1] - edges[j])
+        found = values[j] if abs(x - middle) < half else found
+    return found
+
+
+@overload(under, jit_options=OPTIONS)
+def _under(values, edges, x):
+    if isinstance(values, types.Array):
+        return under
+    lines = [f"found = values[{len(values) - 1}]"]
+    for j in range(len(values) - 1):
+        lines.append(f"middle, half = (edges[{j + 1}] + edges[{j}]) * scale, (edges[{j + 1}] - edges[{j}]) * scale")
+        lines.append(f"found = select(abs(x - middle) < half, values[{j}], found)")
+    scope: dict[str, Any] = {"select": select, "scale": 0.5 * PER_TURN}
+    exec("def body(values, edges, x):\n    " + "\n    ".join([*lines, "return found"]), scope)
+    return scope["body"]
+
+
+@inner_hook
+def roughness(surface, turns):
+    """Static and kinetic coefficient under a contact at an angle in the ring's frame, in turns."""
+
+
+@roughness.implements(Uniform)
+def _uniform_roughness(surface, turns):
+    return surface.mu_s, surface.mu_k
+
+
+@roughness.implements(Segments)
+def _segments_roughness(surface, turns):
+    x = turns - floor(turns)
+    return under(surface.mu_s, surface.edges, x), under(surface.mu_k, surface.edges, x)
+
+
 @hook
 def roughest(surface):
     """Largest static coefficient of the surface, and the least kinetic one: the steepest fall of friction."""
@@ -138,7 +187,7 @@ def _uniform_roughest(surface):
 
 @roughest.implements(Segments)
 def _segments_roughest(surface):
-    return surface.mu_s.max(), surface.mu_k.min()
+    return surface.roughest
 
 
 @hook
@@ -153,7 +202,7 @@ def _nowhere(surface, angle):
 
 @locate.implements(Segments)
 def _locate(surface, angle):
-    turn = floor(angle / (2.0 * pi))
+    turn = math.floor(angle / (2.0 * pi))
     x = angle - 2.0 * pi * turn
     found = -1
     for j in range(len(surface.edges)):

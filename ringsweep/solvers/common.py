@@ -41,6 +41,15 @@ class Method(ABC):
 
     name: ClassVar[str]
 
+    @property
+    def cells_per_task(self) -> int:
+        """Cells that a task takes at most.
+
+        Enough that a task is not overhead, few enough that a progress bar moves, that Ctrl-C is heard and that the
+        last tasks are shared out.
+        """
+        return 64
+
     def check(self, structure: Structure) -> None:  # noqa: B027  most methods take every scene
         """Raise an `InputError` if the method cannot take such a scene."""
 

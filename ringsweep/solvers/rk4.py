@@ -13,10 +13,37 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
-from ringsweep.hooks import begin, conclude, describe, inspect, launch, observe, rates, stiffness, verdict
-from ringsweep.jit import add_scaled, inlined, kernel, take
+from ringsweep.hooks import (
+    begin,
+    conclude,
+    describe,
+    holds,
+    inspect,
+    lanes,
+    launch,
+    observe,
+    rates,
+    stiffness,
+    verdict,
+)
+from ringsweep.jit import absorbed, add_scaled, hook, inlined, kernel, take
+from ringsweep.lanes import (
+    Several,
+    Single,
+    align_stack,
+    any_of,
+    conform,
+    gather,
+    read,
+    read_lanes,
+    select,
+    side_by_side,
+    size_of,
+    width,
+    write,
+)
 from ringsweep.parameters import Parameter
-from ringsweep.physics.drives import lookup, shape, turn
+from ringsweep.physics.drives import lookup, scaled, shape, turn
 from ringsweep.physics.friction import LAWS, WITH_SNAPS
 from ringsweep.regimes import COMPLETE, RUNNING
 from ringsweep.scene import Structure
@@ -26,7 +53,7 @@ from ringsweep.solvers.common import Method, Result, agree, same_drive
 STABILITY_LIMIT = 2.785
 
 # Steps between two visits of a cell: the drive's table of so many steps stays in the cache.
-_BLOCK = 1024
+_BLOCK = 256
 
 
 @dataclass(frozen=True)
@@ -46,6 +73,11 @@ class RK4(Method):
                 "solver.method", f"rk4 does not take friction law {structure.law}, whose bonds snap: auto takes it"
             )
 
+    @property
+    def cells_per_task(self) -> int:
+        """Cells that a task takes at most: they share one table of the drive, but must not take minutes."""
+        return max(64, min(512, 1_000_000_000 // (16 * self.steps)))
+
     def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:
         """Outcomes of every cell; see :class:`ringsweep.solvers.common.Method`."""
         cells = len(batch.span)
@@ -64,8 +96,10 @@ class RK4(Method):
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         rows = np.empty((len(batch.span), width))
         report = np.empty((len(batch.span), 2))
+        kind = lanes(batch)
+        scenes = side_by_side(batch._replace(drive=scaled(batch.drive))) if isinstance(kind, Several) else batch
         for group in same_drive(batch, cells):
-            _integrate(batch, group, steps, rows, report)
+            _integrate(kind, scenes, take(batch.drive, group[0]), group, steps, rows, report)
         return rows[cells], report[cells]
 
     def history(self, batch: Any, samples: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -77,16 +111,18 @@ class RK4(Method):
         return times[:count], rows[:count]
 
 
-class _Run(NamedTuple):
-    """A cell between two blocks of steps."""
+# Whether a run goes on, was seen off, ends in the step ahead, or goes on through that whatever it looks like.
+LIVE, GONE, ENDING, EXCUSED = 1.0, 0.0, 2.0, -1.0
 
-    status: int
-    t: float
+
+class _Run(NamedTuple):
+    """Where the runs of a value stand."""
+
     y: Any
     now: Any
     record: Any
-    steps: float
-    stiffness: float
+    stiffness: Any
+    live: Any
 
 
 @inlined
@@ -96,14 +132,15 @@ def _tabulate(table, drive, first, steps, h):
         table[k, 0], table[k, 1], _ = shape(drive, (first + 0.5 * k) * h)
 
 
-@inlined
-def _step(scene, y, k1, table, k, h):
-    """State one step after `y`; row `k` of `table` holds the drive at its beginning."""
+@absorbed
+def _step(scene, y, now, table, k, h):
+    """State one step after `y`, inspected; row `k` of `table` holds the drive at its beginning."""
+    k1 = now.rates
     theta, ring_omega = lookup(scene.drive, table, k + 1)
-    k2 = rates(scene, add_scaled(y, 0.5 * h, k1), theta, ring_omega)
-    k3 = rates(scene, add_scaled(y, 0.5 * h, k2), theta, ring_omega)
+    k2 = rates(scene, now, add_scaled(y, 0.5 * h, k1), theta, ring_omega)
+    k3 = rates(scene, now, add_scaled(y, 0.5 * h, k2), theta, ring_omega)
     theta, ring_omega = lookup(scene.drive, table, k + 2)
-    k4 = rates(scene, add_scaled(y, h, k3), theta, ring_omega)
+    k4 = rates(scene, now, add_scaled(y, h, k3), theta, ring_omega)
     total = add_scaled(add_scaled(add_scaled(k1, 2.0, k2), 2.0, k3), 1.0, k4)
     return add_scaled(y, h / 6.0, total)
 
@@ -119,58 +156,167 @@ def _hermite(y, rate, y_next, rate_next, h, x):
     return add_scaled(add_scaled(add_scaled(add_scaled(zero, a, y), b, y_next), c, rate), d, rate_next)
 
 
+@hook
+def _scene(kind, batch, cell, memory, at):
+    """Scenes of the runs in a value: in memory, where runs stand side by side, else in the batch."""
+
+
+@_scene.implements(Single)
+def _one_scene(kind, batch, cell, memory, at):
+    return take(batch, cell)
+
+
+@_scene.implements(Several)
+def _several_scenes(kind, batch, cell, memory, at):
+    return read_lanes(memory, at, take(batch, cell))
+
+
+@hook
+def _seat(kind, memory, at, scene, run):
+    """Give a run a seat in memory."""
+
+
+@_seat.implements(Single)
+def _seat_one(kind, memory, at, scene, run):
+    write(memory, at + size_of(scene), 1, run)
+
+
+@_seat.implements(Several)
+def _seat_among_several(kind, memory, at, scene, run):
+    write(memory, at, width(kind), scene)
+    write(memory, at + width(kind) * size_of(scene), width(kind), run)
+
+
 @inlined
-def _advance(scene, run, table, first, steps, h):
-    """Take a run through `steps` steps from step number `first` on, or to its end."""
-    y, now, record, worst = run.y, run.now, run.record, run.stiffness
-    for k in range(steps):
-        y_next = _step(scene, y, now.rates, table, 2 * k, h)
+def _advance(kind, batch, memory, at, seated, sample, table, first, k, steps, h):
+    """Take the runs of a value from step `k` of a block to its end, or to where one of them ends.
+
+    Returns the step that was not taken.
+    """
+    align_stack()
+    runs_at = at + width(kind) * size_of(take(batch, seated[0]))
+    scene = _scene(kind, batch, seated[0], memory, at)
+    y, now, record, worst, live = gather(kind, memory, runs_at, sample)
+    while k < steps:
+        y_next = _step(scene, y, now, table, 2 * k, h)
         theta, ring_omega = lookup(scene.drive, table, 2 * k + 2)
-        after = inspect(scene, y_next, theta, ring_omega)
-        status, fraction = verdict(scene, now, after)
+        after = conform(inspect(scene, y_next, theta, ring_omega), now)
+        ended = live > select(holds(scene, after), 1.0, 0.0)
+        if any_of(ended):
+            live = select(ended, ENDING, live)
+            break
         worst = max(worst, stiffness(scene, now, after, h))
-        if status != RUNNING:
-            y_end = _hermite(y, now.rates, y_next, after.rates, h, fraction)
-            t = (first + k + fraction) * h
-            record = observe(scene, record, y_end, now, after, t, fraction * h)
-            return _Run(status, t, y_end, after, record, first + k + 1.0, worst)
-        record = observe(scene, record, y_next, now, after, (first + k + 1) * h, h)
-        y, now = y_next, after
-    return _Run(RUNNING, (first + steps) * h, y, now, record, float(first + steps), worst)
+        record = conform(observe(scene, record, y_next, now, after, (first + k + 1) * h, h), record)
+        y, now, live = y_next, after, abs(live)
+        k += 1
+    write(memory, runs_at, width(kind), _Run(y, now, record, worst, live))
+    return k
+
+
+@inlined
+def _part(kind, batch, memory, at, seated, sample, table, first, k, h, rows, report):
+    """See off the runs of a value that end in a step, one by one by the plain formulas; returns how many are left."""
+    left = 0
+    for lane in range(len(seated)):
+        scene = take(batch, seated[lane])
+        place = at + width(kind) * size_of(scene) + lane
+        run = read(memory, place, width(kind), sample)
+        live = run.live
+        if live == ENDING:
+            y_next = _step(scene, run.y, run.now, table, 2 * k, h)
+            theta, ring_omega = lookup(scene.drive, table, 2 * k + 2)
+            after = inspect(scene, y_next, theta, ring_omega)
+            status, fraction = verdict(scene, run.now, after)
+            # By the last bit it may hold after all: then it is not asked again in this step.
+            live = EXCUSED
+            if status != RUNNING:
+                live = GONE
+                worst = max(run.stiffness, stiffness(scene, run.now, after, h))
+                y_end = _hermite(run.y, run.now.rates, y_next, after.rates, h, fraction)
+                t = (first + k + fraction) * h
+                record = observe(scene, run.record, y_end, run.now, after, t, fraction * h)
+                _conclude(scene, record, status, t, y_end, first + k + 1.0, worst, seated[lane], rows, report)
+            write(memory, place, width(kind), _Run(run.y, run.now, run.record, run.stiffness, live))
+        left += int(live != GONE)
+    return left
+
+
+@inlined
+def _conclude(scene, record, status, t, y, steps, worst, cell, rows, report):
+    """Enter the outcome of a run."""
+    outcome = conclude(scene, record, status, t, y)
+    for column in range(len(outcome)):
+        rows[cell, column] = outcome[column]
+    report[cell, 0] = steps
+    report[cell, 1] = worst
 
 
 @kernel
-def _integrate(batch, cells, steps, rows, report):
-    """Run `cells` of a batch, all with the same shape of drive and span, for `steps` steps."""
-    first = take(batch, cells[0])
-    h = first.span / steps
+def _integrate(kind, batch, drive, cells, steps, rows, report):
+    """Run `cells` of a batch, all with the same shape of drive and span, for `steps` steps.
+
+    Runs are seated side by side in memory, as many as make a value in a block: the numbers of their scenes, then of
+    where they stand. After every block of steps those that go on move together.
+    """
+    span = take(batch, cells[0]).span
+    h = span / steps
     table = np.empty((2 * min(_BLOCK, steps) + 1, 2))
-    _tabulate(table, first.drive, 0, 0, h)
-    runs = []
+    _tabulate(table, drive, 0, 0, h)
+    per = width(kind)
+    sample = _launch(take(batch, cells[0]), table)[0]
+    lines = size_of(take(batch, cells[0])) + size_of(sample)
+    blocks = (len(cells) + per - 1) // per
+    memory = np.zeros((blocks, lines, per))
+    seats = memory.reshape(memory.size)
+    seated = np.full(blocks * per, cells[0])
+    live = 0
     for i in cells:
         scene = take(batch, i)
-        y = launch(scene)
-        theta, ring_omega = lookup(scene.drive, table, 0)
-        now = inspect(scene, y, theta, ring_omega)
-        status, _ = verdict(scene, now, now)
-        runs.append(_Run(status, 0.0, y, now, begin(scene, y, now), 0.0, 0.0))
-    for start in range(0, steps, _BLOCK):
-        size = min(_BLOCK, steps - start)
-        _tabulate(table, first.drive, start, size, h)
-        for j in range(len(cells)):
-            if runs[j].status == RUNNING:
-                runs[j] = _advance(take(batch, cells[j]), runs[j], table, start, size, h)
-    for j in range(len(cells)):
-        run = runs[j]
-        scene = take(batch, cells[j])
-        status = COMPLETE if run.status == RUNNING else run.status
-        # Not the rounding of a sum of steps.
-        t = scene.span if status == COMPLETE else run.t
-        outcome = conclude(scene, run.record, status, t, run.y)
-        for column in range(len(outcome)):
-            rows[cells[j], column] = outcome[column]
-        report[cells[j], 0] = run.steps
-        report[cells[j], 1] = run.stiffness
+        run, status = _launch(scene, table)
+        if status != RUNNING:
+            _conclude(scene, run.record, status, 0.0, run.y, 0.0, 0.0, i, rows, report)
+            continue
+        at = live // per * lines * per + live % per
+        _seat(kind, seats, at, scene, run)
+        seated[live] = i
+        live += 1
+    for first in range(0, steps, _BLOCK):
+        size = min(_BLOCK, steps - first)
+        _tabulate(table, drive, first, size, h)
+        for place in range(0, live, per):
+            at, seated_here = place * lines, seated[place : place + per]
+            k, left = 0, per
+            while left > 0:
+                k = _advance(kind, batch, seats, at, seated_here, sample, table, first, k, size, h)
+                if k == size:
+                    break
+                left = _part(kind, batch, seats, at, seated_here, sample, table, first, k, h, rows, report)
+        kept = 0
+        for seat in range(live):
+            if memory[seat // per, lines - 1, seat % per] != GONE:
+                memory[kept // per, :, kept % per] = memory[seat // per, :, seat % per]
+                seated[kept] = seated[seat]
+                kept += 1
+        # Empty seats of the last block go on with what they hold, unheard.
+        for seat in range(kept, live):
+            memory[seat // per, lines - 1, seat % per] = GONE
+        live = kept
+    for seat in range(live):
+        at = seat // per * lines * per + seat % per
+        run = read(seats, at + per * (lines - size_of(sample)), per, sample)
+        # The end of the span, not the rounding of a sum of steps.
+        cell = seated[seat]
+        _conclude(take(batch, cell), run.record, COMPLETE, span, run.y, float(steps), run.stiffness, cell, rows, report)
+
+
+@inlined
+def _launch(scene, table):
+    """A run at its launch, and how it stands."""
+    y = launch(scene)
+    theta, ring_omega = lookup(scene.drive, table, 0)
+    now = inspect(scene, y, theta, ring_omega)
+    status, _ = verdict(scene, now, now)
+    return _Run(y, now, begin(scene, y, now), 0.0, LIVE), status
 
 
 @kernel
@@ -195,7 +341,7 @@ def _history(batch, steps, stride, times, rows):
         if k == steps or status != RUNNING:
             break
         _tabulate(table, scene.drive, k, 1, h)
-        y_next = _step(scene, y, now.rates, table, 0, h)
+        y_next = _step(scene, y, now, table, 0, h)
         theta, ring_omega = lookup(scene.drive, table, 2)
         after = inspect(scene, y_next, theta, ring_omega)
         status, fraction = verdict(scene, now, after)

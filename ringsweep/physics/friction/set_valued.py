@@ -8,8 +8,9 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from ringsweep.jit import inlined
+from ringsweep.lanes import decay, select
 from ringsweep.parameters import Leaf, Parameter
-from ringsweep.physics.friction.static import BAND, CLEAN, ONE, TAIL, ZERO, Piece, piece
+from ringsweep.physics.friction.static import BAND, CLEAN, ONE, TAIL, ZERO, Piece, blend, piece, steepest, stiction_band
 
 ALPHA = Parameter("s/m", "decay of friction with sliding speed", lower=0.0)
 
@@ -30,6 +31,13 @@ def tail(region, low, high, alpha):
     return Piece(low, high, alpha, (0.0, 0.0, 1.0, 0.0), (1.0, 0.0, -1.0, 0.0))
 
 
+@inlined
+def decaying(alpha, x, lasts):
+    """:func:`~ringsweep.physics.friction.static.weights` in a tail, `x` beyond where it begins, while it lasts."""
+    q = select(lasts, decay(alpha * x), 0.0)
+    return q, 1.0 - q, -alpha * q, alpha * q
+
+
 def end_of_tail(alpha: Any, low: Any) -> Any:
     """Speed beyond which an exponential tail changes the sliding velocity by less than 1e-17 m/s, m/s."""
     with np.errstate(divide="ignore"):
@@ -48,6 +56,12 @@ def _coulomb(law, region):
 
 class Stiction(NamedTuple):
     """Coulomb friction with stiction: up to :math:`\\mu_s` at rest, :math:`\\mu_k` in motion."""
+
+
+@blend.implements(Coulomb, Stiction)
+def _kinetic(law, speed):
+    # At rest a law that jumps has no value of its own.
+    return 0.0, select(speed > 0.0, 1.0, 0.0), 0.0, 0.0
 
 
 @piece.implements(Stiction)
@@ -76,6 +90,23 @@ def _tustin(law, region):
     return tail(region, 0.0, law.end, law.alpha) if region != BAND else absent()
 
 
+@steepest.implements(Coulomb, Stiction, Tustin)
+def _infinite(law):
+    return (inf, inf), (inf, inf)
+
+
+@stiction_band.implements(Coulomb, Stiction, Tustin)
+def _none(law):
+    return 0.0
+
+
+@blend.implements(Tustin)
+def _tustin_everywhere(law, speed):
+    w_s, w_k, dw_s, dw_k = decaying(law.alpha, speed, speed < law.end)
+    moves = select(speed > 0.0, 1.0, 0.0)
+    return moves * w_s, moves * w_k, dw_s, dw_k
+
+
 class Karnopp(NamedTuple):
     """Stiction with a dead band: slower than D_v a contact counts as stuck (the paper's Fig. 4).
 
@@ -98,6 +129,11 @@ def _karnopp(law, region):
     if region == CLEAN:
         return Piece(law.dead_band, inf, 0.0, ZERO, ONE)
     return Piece(0.0, law.dead_band, 0.0, ONE, ZERO)
+
+
+@stiction_band.implements(Karnopp)
+def _dead_band(law):
+    return law.dead_band
 
 
 #: Laws that know no static friction.

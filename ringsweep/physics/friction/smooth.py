@@ -5,9 +5,10 @@ from __future__ import annotations
 from math import exp, inf
 from typing import Annotated, Any, NamedTuple
 
+from ringsweep.lanes import decay, select
 from ringsweep.parameters import Leaf, Parameter
-from ringsweep.physics.friction.set_valued import ALPHA, absent, end_of_tail, tail
-from ringsweep.physics.friction.static import BAND, CLEAN, ONE, TAIL, ZERO, Piece, piece
+from ringsweep.physics.friction.set_valued import ALPHA, absent, decaying, end_of_tail, tail
+from ringsweep.physics.friction.static import BAND, CLEAN, ONE, TAIL, ZERO, Piece, blend, piece, steepest, stiction_band
 
 V0 = Parameter("m/s", "half-width of the stiction band", lower=0.0, open_lower=True)
 V1 = Parameter("m/s", "sliding speed from which friction is kinetic", lower=0.0, open_lower=True)
@@ -37,6 +38,19 @@ def _threlfall(law, region):
     return Piece(0.0, law.v0, 3.0 / law.v0, ZERO, (full, 0.0, -full, 0.0))
 
 
+@blend.implements(Threlfall)
+def _threlfall_everywhere(law, speed):
+    full, rate = 1.0 / (1.0 - exp(-3.0)), 3.0 / law.v0
+    q = full * decay(rate * speed)
+    within = speed < law.v0
+    return 0.0, select(within, full - q, 1.0), 0.0, select(within, rate * q, 0.0)
+
+
+@steepest.implements(Threlfall)
+def _threlfall_steepest(law):
+    return (0.0, 3.0 / (law.v0 * (1.0 - exp(-3.0)))), (0.0, 0.0)
+
+
 class PiecewiseLinear(NamedTuple):
     """Stiction regularised by straight lines (the paper's Fig. 5).
 
@@ -55,6 +69,21 @@ def _piecewise_linear(law, region):
         return Piece(0.0, law.v0, 0.0, (0.0, 1.0 / law.v0, 0.0, 0.0), ZERO)
     rate = 1.0 / (law.v1 - law.v0)
     return Piece(law.v0, law.v1, 0.0, (1.0, -rate, 0.0, 0.0), (0.0, rate, 0.0, 0.0))
+
+
+@blend.implements(PiecewiseLinear)
+def _piecewise_linear_everywhere(law, speed):
+    up, down = 1.0 / law.v0, 1.0 / (law.v1 - law.v0)
+    x = min(max((speed - law.v0) * down, 0.0), 1.0)
+    within = speed < law.v0
+    fall = select(within | (speed >= law.v1), 0.0, down)
+    return select(within, speed * up, 1.0 - x), x, select(within, up, -fall), fall
+
+
+@steepest.implements(PiecewiseLinear)
+def _piecewise_linear_steepest(law):
+    rate = 1.0 / (law.v1 - law.v0)
+    return (1.0 / law.v0, 0.0), (-rate, rate)
 
 
 class PiecewiseCubic(NamedTuple):
@@ -84,6 +113,23 @@ def _piecewise_cubic(law, region):
     return Piece(law.v0, law.v1, 0.0, (1.0, 0.0, -square, cube), (0.0, 0.0, square, -cube))
 
 
+@blend.implements(PiecewiseCubic)
+def _piecewise_cubic_everywhere(law, speed):
+    up, down = 1.0 / law.v0, 1.0 / (law.v1 - law.v0)
+    eta, x = speed * up, min(max((speed - law.v0) * down, 0.0), 1.0)
+    within = speed < law.v0
+    kinetic, fall = x * x * (3.0 - 2.0 * x), 6.0 * down * x * (1.0 - x)
+    rising, rise = 0.5 * eta * (3.0 - eta * eta), 1.5 * up * (1.0 - eta * eta)
+    return select(within, rising, 1.0 - kinetic), kinetic, select(within, rise, -fall), fall
+
+
+@steepest.implements(PiecewiseCubic)
+def _piecewise_cubic_steepest(law):
+    # In the middle of the fall, which begins with none.
+    rate = 1.5 / (law.v1 - law.v0)
+    return (1.5 / law.v0, 0.0), (-rate, rate)
+
+
 class BengisuAkay(NamedTuple):
     """Bengisu-Akay friction: a parabola up to v0, an exponential tail beyond (the paper's Eqs. 23-24).
 
@@ -109,6 +155,29 @@ def _bengisu_akay(law, region):
         return tail(region, law.v0, law.end, law.alpha)
     rate = 1.0 / law.v0
     return Piece(0.0, law.v0, 0.0, (0.0, 2.0 * rate, -rate * rate, 0.0), ZERO)
+
+
+@blend.implements(BengisuAkay)
+def _bengisu_akay_everywhere(law, speed):
+    w_s, w_k, dw_s, dw_k = decaying(law.alpha, speed - law.v0, speed < law.end)
+    rate = 1.0 / law.v0
+    eta, within = speed * rate, speed < law.v0
+    return (
+        select(within, eta * (2.0 - eta), w_s),
+        select(within, 0.0, w_k),
+        select(within, 2.0 * rate * (1.0 - eta), dw_s),
+        select(within, 0.0, dw_k),
+    )
+
+
+@steepest.implements(BengisuAkay)
+def _bengisu_akay_steepest(law):
+    return (2.0 / law.v0, 0.0), (-law.alpha, law.alpha)
+
+
+@stiction_band.implements(Threlfall, PiecewiseLinear, PiecewiseCubic, BengisuAkay)
+def _band(law):
+    return law.v0
 
 
 #: Laws that know no static friction.

@@ -15,7 +15,8 @@ from __future__ import annotations
 from math import exp
 from typing import NamedTuple
 
-from ringsweep.jit import hook, inlined
+from ringsweep.jit import hook, inlined, inner_hook
+from ringsweep.lanes import either
 from ringsweep.parameters import Parameter
 
 MU_S = Parameter("1", "static friction coefficient", lower=0.0)
@@ -49,10 +50,9 @@ def piece(law, region):
     """Weights of both coefficients in a region of the sliding speed, a :class:`Piece`."""
 
 
-@inlined
+@inner_hook
 def stiction_band(law):
-    """Speed below which a contact counts as stuck, m/s; 0 for laws that stick exactly or never."""
-    return piece(law, BAND).high
+    """Speed below which a contact counts as stuck, m/s: where BAND ends; 0 for laws that stick exactly or never."""
 
 
 @inlined
@@ -91,7 +91,16 @@ def constant_weights(law, region):
     return s1 == 0.0 and s2 == 0.0 and s3 == 0.0 and k1 == 0.0 and k2 == 0.0 and k3 == 0.0
 
 
-@inlined
+@inner_hook
+def blend(law, speed):
+    """:func:`weights` where the speed is :mod:`ringsweep.lanes`, each in a region of its own: hence without ``if``."""
+
+
+@inner_hook
+def steepest(law):
+    """Slopes of both weights at rest, and where the band ends, on its far side: there friction is steepest, s/m."""
+
+
 def weights(law, speed):
     """Weights of the static and the kinetic coefficient, and their slopes.
 
@@ -108,6 +117,11 @@ def weights(law, speed):
         ``(w_s, w_k, dw_s/dspeed, dw_k/dspeed)``; weights in 1, slopes in s/m.
     """
     return weights_in(law, region_at(law, speed), speed)
+
+
+@either(weights)
+def _lanes_weights(law, speed):
+    return blend(law, speed)
 
 
 @inlined
@@ -142,11 +156,12 @@ def met(law, before, after, ahead):
         Whether it meets rest, whether the edge of the band, and whether it jumps across the whole band.
     """
     band = stiction_band(law)
-    slow, fast = min(abs(before), abs(after), abs(ahead)), max(abs(before), abs(after), abs(ahead))
-    rest = before * after < 0.0 or before * ahead < 0.0
+    slow = min(min(abs(before), abs(after)), abs(ahead))
+    fast = max(max(abs(before), abs(after)), abs(ahead))
+    rest = (before * after < 0.0) | (before * ahead < 0.0)
     # At rest a law without a band has every value at once.
-    rest = rest or (band == 0.0 and before * after == 0.0)
-    return rest, rest or slow < band <= fast, rest and slow >= band
+    rest = rest | ((band == 0.0) & (before * after == 0.0))
+    return rest, rest | ((slow < band) & (band <= fast)), rest & (slow >= band)
 
 
 @inlined

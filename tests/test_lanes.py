@@ -1,0 +1,175 @@
+"""Runs side by side: the functions of lanes are those of the C library, and each lane is its run alone."""
+
+from math import radians
+
+import numpy as np
+import pytest
+
+from ringsweep.jit import inlined, take
+from ringsweep.lanes import (
+    WIDTH,
+    Several,
+    Single,
+    any_of,
+    conform,
+    decay,
+    floor,
+    opposing,
+    read_lanes,
+    select,
+    side_by_side,
+    sine_cosine,
+    sine_cosine_near,
+    write,
+)
+from ringsweep.models import MODELS
+from ringsweep.parameters import declared
+from ringsweep.physics.drives import scaled
+from ringsweep.physics.friction import LAWS
+from ringsweep.physics.friction.static import steepest, stiction_band, weights
+from ringsweep.solvers import rk4
+
+NAMES = MODELS["ring"].outcomes
+
+
+@inlined
+def _functions(x, near, out):
+    (a,), (b,) = read_lanes(x, 0, (0.0,)), read_lanes(near, 0, (0.0,))
+    sine, cosine = sine_cosine(a)
+    far = select(a > b, a, -b)
+    write(out, 0, WIDTH, (sine, cosine, decay(abs(a)), floor(a), opposing(abs(a), b), far, min(a, b), max(a, b)))
+    write(out, 8 * WIDTH, WIDTH, sine_cosine_near(b, a, sine, cosine))
+    return any_of(a > 1e5)
+
+
+@inlined
+def _weights(law, memory, at, speed, out):
+    (x,) = read_lanes(speed, 0, (0.0,))
+    write(out, 0, WIDTH, conform(weights(read_lanes(memory, at, law), x), read_lanes(out, 0, (0.0, 0.0, 0.0, 0.0))))
+
+
+class TestFunctions:
+    """In every lane what NumPy says, to the last digits."""
+
+    @pytest.mark.parametrize("scale", [1e-3, 1.0, 30.0, 1e6])
+    @pytest.mark.parametrize("apart", [0.0, 1e-4, 0.03, 0.04, 1.0, 1e3])
+    def test_are_those_of_the_c_library(self, scale, apart):
+        rng = np.random.default_rng(4)
+        out = np.empty((10, WIDTH))
+        for _ in range(200):
+            x = rng.uniform(-scale, scale, WIDTH)
+            near = x + rng.uniform(-apart, apart, WIDTH)
+            some = _functions(x, near, out.reshape(-1))
+            assert some == (x > 1e5).any()
+            exact = np.sin(x), np.cos(x), np.exp(-abs(x))
+            np.testing.assert_allclose(out[:2], exact[:2], rtol=0, atol=4e-16)
+            if scale < 700:
+                np.testing.assert_allclose(out[2], exact[2], rtol=0, atol=6e-16)
+            np.testing.assert_array_equal(out[3], np.floor(x))
+            np.testing.assert_array_equal(out[4], np.copysign(x, -near))
+            np.testing.assert_array_equal(out[5], np.where(x > near, x, -near))
+            np.testing.assert_array_equal(out[6:8], [np.minimum(x, near), np.maximum(x, near)])
+            np.testing.assert_allclose(out[8:], [np.sin(near), np.cos(near)], rtol=0, atol=6e-16)
+
+    def test_a_number_that_is_none_is_not_heard(self):
+        x = np.linspace(-1.0, 1.0, WIDTH)
+        near = x.copy()
+        near[3] = np.nan
+        out = np.empty((10, WIDTH))
+        _functions(x, near, out.reshape(-1))
+        # Extremes keep what they held, as Python's do.
+        np.testing.assert_array_equal(out[6:8], [x, x])
+
+
+class TestWeights:
+    """Each law has a formula without a branch beside its pieces."""
+
+    @pytest.mark.parametrize(
+        "name", ["coulomb", "stiction", "tustin", "threlfall", "piecewise-linear", "piecewise-cubic", "bengisu-akay"]
+    )
+    def test_of_both_formulas_agree(self, name):
+        rng = np.random.default_rng(2)
+        cls = LAWS[name]
+        out = np.empty((4, WIDTH))
+        for _ in range(300):
+            v0, alpha = 10.0 ** rng.uniform(-4, 0), 10.0 ** rng.uniform(0, 4)
+            given = {"v0": v0, "v1": v0 * rng.uniform(1.1, 10.0), "alpha": alpha}
+            law = cls(*map(float, getattr(cls, "of", cls)(**{name: given[name] for name in declared(cls)})))
+            speed = 10.0 ** rng.uniform(-5, 1, WIDTH)
+            memory = np.repeat(np.array([float(x) for x in law]), WIDTH) if law else np.zeros(WIDTH)
+            _weights(law, memory, 0, speed, out.reshape(-1))
+            exact = np.transpose([weights(law, float(x)) for x in speed])
+            scale = 1.0 + np.abs(exact).max(axis=1, keepdims=True)
+            np.testing.assert_allclose(out / scale, exact / scale, rtol=0, atol=1e-14)
+
+    @pytest.mark.parametrize("name", ["threlfall", "piecewise-linear", "piecewise-cubic", "bengisu-akay"])
+    def test_are_steepest_where_the_law_says(self, name):
+        """At rest as declared; nowhere beyond the band steeper than declared for its edge."""
+        cls = LAWS[name]
+        given = {"v0": 0.1, "v1": 0.4, "alpha": 7.0}
+        law = cls(*map(float, getattr(cls, "of", cls)(**{key: given[key] for key in declared(cls)})))
+        at_rest, at_edge = steepest(law)
+        assert weights(law, 0.0)[2:] == pytest.approx(at_rest, rel=1e-14)
+        slopes = np.array([weights(law, v)[2:] for v in np.linspace(stiction_band(law), 3.0, 20001)])
+        np.testing.assert_allclose(np.abs(slopes).max(axis=0), np.abs(at_edge), rtol=1e-6)
+
+
+def family(cells, law="bengisu-akay", model="ring", count=40):
+    """Cells over amplitude, half-angle and launch, which slip, stick, reverse and separate."""
+    rng = np.random.default_rng(7)
+    values = {
+        "drive.amplitude": rng.uniform(0.1, 8.0, count),
+        "zone.half_angle": rng.uniform(radians(2.0), radians(60.0), count),
+        "initial.omega": rng.uniform(-20.0, 20.0, count),
+        "time.span": 3.0,
+    }
+    smooth = {"friction.v0": 0.2, "friction.v1": 0.5, "friction.alpha": 100.0}
+    known = {name for name in ("v0", "v1", "alpha") if name in LAWS[law]._fields}
+    values |= {path: value for path, value in smooth.items() if path.split(".")[1] in known}
+    return cells(values, law=law, drive="arctan", model=model)
+
+
+def integrate(kind, batch, steps, order=None):
+    """Outcomes of a batch's cells, taken in an order, by the kernel for one run or for several side by side."""
+    order = np.arange(len(batch.span)) if order is None else order
+    rows, report = np.empty((len(batch.span), len(NAMES))), np.empty((len(batch.span), 2))
+    scenes = side_by_side(batch._replace(drive=scaled(batch.drive))) if isinstance(kind, Several) else batch
+    rk4._integrate(kind, scenes, take(batch.drive, 0), order, steps, rows, report)
+    return dict(zip(NAMES, rows.T, strict=True)) | {"steps": report[:, 0], "stiffness": report[:, 1]}
+
+
+class TestEachLane:
+    @pytest.mark.parametrize("model", ["ring", "ring-single-contact"])
+    @pytest.mark.parametrize("law", ["threlfall", "piecewise-linear", "piecewise-cubic", "bengisu-akay"])
+    def test_is_its_run_alone(self, cells, model, law):
+        """Smooth laws, short steps: what is left between the two is rounding."""
+        batch = family(cells, law, model=model)
+        alone, together = (integrate(kind, batch, 6000) for kind in (Single(), Several()))
+        assert alone["reversals"].max() > 1
+        for name in alone:
+            scale = np.nanmax(np.abs(alone[name]), initial=1.0)
+            np.testing.assert_allclose(together[name], alone[name], rtol=0, atol=1e-11 * scale, err_msg=name)
+        regimes = "regime", "motion", "separating_contact", "reversals", "turns", "steps"
+        for name in regimes:
+            np.testing.assert_array_equal(together[name], alone[name])
+
+    @pytest.mark.parametrize("law", ["bengisu-akay", "stiction", "tustin"])
+    def test_does_not_depend_on_its_neighbours(self, cells, law):
+        """Bit for bit, whoever sits beside it and in whichever order they came."""
+        batch = family(cells, law)
+        whole = integrate(Several(), batch, 2000)
+        shuffled = integrate(Several(), batch, 2000, np.random.default_rng(1).permutation(len(batch.span)))
+        for name in whole:
+            np.testing.assert_array_equal(shuffled[name], whole[name], err_msg=name)
+        for i in (0, 17, 39):
+            one = integrate(Several(), take_rows(batch, [i]), 2000)
+            for name in whole:
+                np.testing.assert_array_equal(one[name][0], whole[name][i], err_msg=name)
+
+
+def take_rows(batch, rows):
+    """Some cells of a batch."""
+    if isinstance(batch, tuple):
+        leaves = [take_rows(leaf, rows) for leaf in batch]
+        return type(batch)(*leaves) if hasattr(batch, "_fields") else tuple(leaves)
+    return batch[rows]
