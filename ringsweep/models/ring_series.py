@@ -214,10 +214,14 @@ def _expand(scene, mode, t, y, tolerance, c):
         # Noise that is large for the band would keep the creep from ever settling.
         speed = min(speed, 1e3 * stiction_band(scene.law))
     rate = scale / speed
-    # The reactions follow the acceleration: an error of it could make or hide a separation.
+    # An error of the reactions could make or hide a separation. They follow the acceleration, but friction that
+    # varies loads even the contacts of a body too inert to be moved by it.
     push = 1e-3 * scale / (scene.body.gravity / scene.body.radius + c[SQUARE, 0] + abs(c[EPSILON, 0]))
-    last = max(abs(c[PHI, ORDER]) * scale, abs(c[V, ORDER]) * rate, abs(c[EPSILON, ORDER]) * push)
-    previous = max(abs(c[PHI, ORDER - 1]) * scale, abs(c[V, ORDER - 1]) * rate, abs(c[EPSILON, ORDER - 1]) * push)
+    load = push / (scene.body.mass * scene.body.radius)
+    last = previous = 0.0
+    for row, unit in ((PHI, scale), (V, rate), (EPSILON, push), (NORMAL_1, load), (NORMAL_2, load)):
+        last = max(last, abs(c[row, ORDER]) * unit)
+        previous = max(previous, abs(c[row, ORDER - 1]) * unit)
     return reach(last, previous)
 
 
