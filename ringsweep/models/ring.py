@@ -10,7 +10,7 @@ import numpy as np
 
 from ringsweep import hooks, regimes
 from ringsweep.jit import inlined
-from ringsweep.models.common import GRAVITY, MASS, SPAN, drive_of, law_of, pair
+from ringsweep.models.common import GRAVITY, MASS, SPAN, drive_of, largest_eigenvalue, law_of, pair
 from ringsweep.parameters import Parameter, declared
 from ringsweep.physics import drives, friction, ring, zones
 from ringsweep.physics.friction.static import met, stiction_band, weights
@@ -146,7 +146,11 @@ class Ring(SingleContactRing):
 
 
 class Inspection(NamedTuple):
-    """A state of the ring seen from within: what a step needs and what ends a run."""
+    """A state of the ring seen from within: what a step needs and what ends a run.
+
+    ``slope`` is how the acceleration depends on the angular velocity by way of the friction coefficients; ``by_phi``
+    and ``by_omega`` how it depends on angle and angular velocity with these held.
+    """
 
     rates: tuple[float, float]
     v: float
@@ -155,6 +159,8 @@ class Inspection(NamedTuple):
     D: float
     inertia: float
     slope: float
+    by_phi: float
+    by_omega: float
     sin_phi: float
     cos_phi: float
     omega: float
@@ -180,7 +186,10 @@ def _inspect(scene, y, drive_at, drive_rate):
     epsilon, D, inertia = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
     normal_1, normal_2 = ring.reactions(scene.body, K1, K2, sin_phi, cos_phi, omega, epsilon)
     slope = ring.acceleration_slope(scene.body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega)
-    return Inspection((omega, epsilon), v, normal_1, normal_2, D, inertia, slope, sin_phi, cos_phi, omega)
+    by_phi, by_omega = ring.acceleration_gradient(scene.body, K1, K2, sin_phi, cos_phi, omega)
+    return Inspection(
+        (omega, epsilon), v, normal_1, normal_2, D, inertia, slope, by_phi, by_omega, sin_phi, cos_phi, omega
+    )
 
 
 @hooks.verdict.implements(ring.Ring, ring.BristleRing)
@@ -221,23 +230,30 @@ def _stiffness(scene, before, now, h):
     if jumped and stiction_band(scene.law) == 0.0:
         # A discontinuous law has no slope that any step could follow.
         return inf
-    steepest = max(abs(before.slope), abs(now.slope))
+    friction = _steeper(before.slope, now.slope)
     # A step that jumps the band, or its edge, never samples the slope there, and is the one that is
     # wrong in kind: it has met it all the same.
     if rest:
-        steepest = max(steepest, _steepest(scene, now, 0.0))
+        friction = _steeper(friction, _steepest(scene, now, 0.0))
     if edge:
-        steepest = max(steepest, _steepest(scene, now, stiction_band(scene.law)))
-    return steepest * h
+        friction = _steeper(friction, _steepest(scene, now, stiction_band(scene.law)))
+    # Even without friction the body swings, and under friction its speed loads the contacts.
+    return largest_eigenvalue(friction + now.by_omega, -now.by_phi) * h
+
+
+@inlined
+def _steeper(a, b):
+    """The one of two slopes that is the larger in magnitude."""
+    return a if abs(a) > abs(b) else b
 
 
 @inlined
 def _steepest(scene, now, speed):
-    """Bound on the eigenvalue of friction at a sliding speed, 1/s."""
+    """Eigenvalue of friction at a sliding speed where it is steepest, 1/s."""
     mu_s, mu_k = zones.roughest(scene.surface)
     _, _, dw_s, dw_k = weights(scene.law, speed)
     slope = -(dw_s * mu_s + dw_k * mu_k) * scene.body.radius
-    return abs(ring.acceleration_slope(scene.body, 0.0, 0.0, slope, slope, now.sin_phi, now.cos_phi, now.omega))
+    return ring.acceleration_slope(scene.body, 0.0, 0.0, slope, slope, now.sin_phi, now.cos_phi, now.omega)
 
 
 @hooks.begin.implements(ring.Ring, ring.BristleRing)

@@ -172,6 +172,29 @@ def _one_slope(body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega):
 
 
 @hook
+def acceleration_gradient(body, K1, K2, sin_phi, cos_phi, omega):
+    """Derivatives of the angular acceleration by angle and by angular velocity, friction K held; 1/s^2 and 1/s."""
+
+
+@acceleration_gradient.implements(TwoContacts)
+def _two_gradient(body, K1, K2, sin_phi, cos_phi, omega):
+    b = body
+    P = K1 * K2
+    D = (K1 - K2) * (b.cos_beta * b.cos_beta - b.sin_beta * b.sin_beta) + (1.0 + P) * 2.0 * b.sin_beta * b.cos_beta
+    T = (K1 - K2) * b.cos_beta + 2.0 * P * b.sin_beta
+    RM = b.radius * b.mass
+    scale = 1.0 / ((b.inertia + b.mass * b.xi * b.xi) * D - RM * b.xi * T)
+    lift = RM * b.sin_beta * (K1 + K2)
+    by_phi = b.gravity * (cos_phi * (RM * T - b.mass * b.xi * D) - sin_phi * lift)
+    return by_phi * scale, 2.0 * omega * b.xi * lift * scale
+
+
+@acceleration_gradient.implements(OneContact)
+def _one_gradient(body, K1, K2, sin_phi, cos_phi, omega):
+    return -body.gravity / body.radius * (cos_phi + K1 * sin_phi), 2.0 * omega * K1
+
+
+@hook
 def reactions(body, K1, K2, sin_phi, cos_phi, omega, phi_dd):
     """Normal reactions ``(N1, N2)``, N (the paper's Eq. 17); with one contact N2 repeats N1."""
 
