@@ -123,17 +123,36 @@ def _settle(scene, t, phi, places):
 
 
 @inlined
-def _is_jamming(scene, mode, t, y):
-    """Whether slip is so near to a jam that its reactions, which grow without bound there, have no sign to go by."""
-    if mode.sign == 0:
-        return False
+def _sliding_at(scene, mode, t, y):
+    """D, inertia, both reactions and their scale in slip, from the balances themselves and not from a series."""
     phi, v = y
     mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
     w_s, w_k, _, _ = weights(scene.law, abs(v))
     K1, K2 = -mode.sign * (w_s * mu_s1 + w_k * mu_k1), -mode.sign * (w_s * mu_s2 + w_k * mu_k2)
-    omega = v / scene.body.radius + drives.turn(scene.drive, t)[1]
-    _, determinant, inertia = ring.acceleration(scene.body, K1, K2, sin(phi), cos(phi), omega)
+    body = scene.body
+    omega = v / body.radius + drives.turn(scene.drive, t)[1]
+    epsilon, determinant, inertia = ring.acceleration(body, K1, K2, sin(phi), cos(phi), omega)
+    normal_1, normal_2 = ring.reactions(body, K1, K2, sin(phi), cos(phi), omega, epsilon)
+    scale = body.mass * (body.gravity + body.radius * (omega * omega + abs(epsilon)))
+    return determinant, inertia, normal_1, normal_2, scale
+
+
+@inlined
+def _is_jamming(scene, mode, t, y):
+    """Whether slip is so near to a jam that its reactions, which grow without bound there, have no sign to go by."""
+    if mode.sign == 0:
+        return False
+    determinant, inertia, _, _, _ = _sliding_at(scene, mode, t, y)
     return not (determinant > 0.0 and inertia > 1e-4 * ring.about_axis(scene.body) * determinant)
+
+
+@inlined
+def _is_held(scene, mode, guard, t, y):
+    """Whether a reaction whose series vanishes does not: on the way into a jam that series meets its singularity."""
+    if mode.sign == 0:
+        return False
+    _, _, normal_1, normal_2, scale = _sliding_at(scene, mode, t, y)
+    return (normal_1 if guard == NORMAL_1 else normal_2) > 1e-2 * scale
 
 
 @hooks.impasse.implements(ring.Ring)
@@ -146,7 +165,7 @@ def _switch(scene, mode, guard, t, y):
     phi, v = y
     sign, region, place_1, place_2 = mode.sign, mode.region, mode.place_1, mode.place_2
     if guard in (NORMAL_1, NORMAL_2):
-        if _is_jamming(scene, mode, t, y):
+        if _is_jamming(scene, mode, t, y) or _is_held(scene, mode, guard, t, y):
             return JAM, mode, y
         return (SEPARATED_1 if guard == NORMAL_1 else SEPARATED_2), mode, y
     if guard == INERTIA:
