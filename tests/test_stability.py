@@ -104,6 +104,24 @@ def test_the_way_into_a_jam_is_no_separation(cells):
     assert found.t_end == pytest.approx(0.0037337271, abs=1e-9)
 
 
+@pytest.mark.parametrize("law", ["bengisu-akay", "tustin"])
+def test_a_tail_that_does_not_decay_is_static_friction_throughout(cells, law):
+    changes = {"friction.alpha": 0.0, "drive.amplitude": 2.0, "time.span": 5.0}
+    changes |= {"friction.v0": 1e-6} if law == "bengisu-akay" else {}
+    level = {"friction.rough.mu_k": 0.5, "friction.rest.mu_k": 0.2}
+    found, twin = (solve(Auto(), cells(changes | more, law=law, drive="arctan")) for more in ({}, level))
+    assert found.regime == SEPARATING
+    assert found.t_separation == pytest.approx(twin.t_separation[0], abs=1e-8)
+
+
+@pytest.mark.parametrize("law", ["bengisu-akay", "tustin", "stiction"])
+def test_a_body_at_rest_on_top_falls_off(cells, law):
+    found = solve(Auto(), cells({"initial.phi": pi}, law=law))
+    assert found.regime == SEPARATING
+    assert found.t_separation == 0.0
+    assert found.certified
+
+
 class TestRungeKutta:
     """Beyond the limit of stability nothing is certified, whatever makes the system fast."""
 

@@ -28,6 +28,7 @@ from ringsweep.physics.friction.static import (
     slower,
     stiction_band,
     weights,
+    weights_in,
 )
 from ringsweep.physics.zones import coefficients, cross, edge_ahead, locate
 from ringsweep.regimes import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2
@@ -113,6 +114,11 @@ def _settle(scene, t, phi, places):
     forward, backward = against_forward > ring_epsilon, against_backward < ring_epsilon
     region = region_at(scene.law, 0.0)
     if forward and backward:
+        # Friction that drives either way is that of a contact that would have to pull, or no motion is the one.
+        free, _, _ = ring.acceleration(scene.body, 0.0, 0.0, sin_phi, cos_phi, ring_omega)
+        normal_1, normal_2 = ring.reactions(scene.body, 0.0, 0.0, sin_phi, cos_phi, ring_omega, free)
+        if min(normal_1, normal_2) <= 0.0:
+            return (SEPARATED_1 if normal_1 <= normal_2 else SEPARATED_2), still
         return JAM, still
     # Without any friction there is nothing to stick to.
     if forward or (m1 + m2 == 0.0 and not backward):
@@ -248,8 +254,10 @@ def _expand(scene, mode, t, y, tolerance, c):
 def _expand_sliding(scene, mode, c):
     """Slip with constant K: the flow is autonomous."""
     body = scene.body
-    _, mu_k1, _, mu_k2 = coefficients_under(scene, mode)
-    k1, k2 = -mode.sign * mu_k1, -mode.sign * mu_k2
+    mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
+    # Kinetic but in a tail that does not decay.
+    w_s, w_k, _, _ = weights_in(scene.law, mode.region, 0.0)
+    k1, k2 = -mode.sign * (w_s * mu_s1 + w_k * mu_k1), -mode.sign * (w_s * mu_s2 + w_k * mu_k2)
     p, determinant, inertia = ring.acceleration(body, k1, k2, 0.0, 0.0, 1.0)
     q, _, _ = ring.acceleration(body, k1, k2, 0.0, 1.0, 0.0)
     r, _, _ = ring.acceleration(body, k1, k2, 1.0, 0.0, 0.0)
