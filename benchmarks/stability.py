@@ -325,6 +325,8 @@ class Extreme:
     """Words for the table; ``tighter``: the same method at its tightest useful tolerance."""
     expected: Mapping[str, Any] = field(default_factory=dict)
     """A closed form's outcomes; or a solver's, where there is none."""
+    twin: Mapping[str, Any] | None = None
+    """A scene that must end alike, if the check is a run of another."""
     solver: Mapping[str, Any] = field(default_factory=dict)
     """The method that checks, if another one."""
 
@@ -406,6 +408,7 @@ def extremes() -> list[Extreme]:
         ("gravity 0, launched at 10 rad/s", {"gravity": 0.0, "initial.omega": 10.0}, {}),
         ("gravity 1e6 m/s²", {"gravity": 1e6, "time.span": 1.0}, {}),
     ]  # fmt: skip
+    flat = {f"friction.{place}.mu_k": mu["mu_s"] for place, mu in (("rough", ROUGH), ("rest", REST))}
     found = [
         Extreme("v0 = 1e-9 m/s", changed(smooth, {"friction.v0": 1e-9})),
         Extreme("v0 = 1e-12 m/s", changed(smooth, {"friction.v0": 1e-12}), "limit v0 → 0 (tustin, event)",
@@ -414,7 +417,7 @@ def extremes() -> list[Extreme]:
                 solver={"method": "rk4", "steps": 1_000_000}),
         Extreme("v0 = 1e9 m/s", changed(smooth, {"friction.v0": 1e9}), "rk4, 1e6 steps",
                 solver={"method": "rk4", "steps": 1_000_000}),
-        Extreme("alpha = 0", changed(smooth, {"friction.alpha": 0.0})),
+        Extreme("alpha = 0", changed(smooth, {"friction.alpha": 0.0}), "μk = μs", twin=changed(smooth, flat)),
         Extreme("alpha = 1e9 s/m", changed(smooth, {"friction.alpha": 1e9})),
     ]  # fmt: skip
     for law, scene in (("bengisu-akay", smooth), ("stiction", stick)):
@@ -500,7 +503,7 @@ def _reference(extreme: Extreme) -> Mapping[str, Any]:
         return extreme.expected
     smooth = extreme.scene["friction"]["law"] not in ("stiction", "coulomb", "tustin")
     solver = dict(extreme.solver or _TIGHT["implicit" if smooth else "event"])
-    scene = extreme.scene
+    scene = extreme.twin or extreme.scene
     if solver["method"] == "event" and smooth:
         scene = changed(scene, {"friction.law": "tustin", "friction.v0": None})
     if solver["method"] != "rk4":
