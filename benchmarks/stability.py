@@ -268,6 +268,8 @@ def draw_maps(quick: bool) -> tuple[xr.Dataset, list[Map]]:
             variables[f"{map_.name}_{name}"] = (dims, stacked, {"units": "1"} | attributes)
 
         put("class", [classify(*pair) for pair in both], "int8", long_name="class of the run", **flags)
+        put("wrong_in_kind", [difference(*pair)[0] for pair in both], "int8",
+            long_name="another regime, motion or contact than the reference")  # fmt: skip
         put("error", [difference(*pair)[1] * CLOSE for pair in both], "float64",
             long_name="larger of the errors of phi_end (rad) and t_separation (s)")  # fmt: skip
         put("certified", [found["certified"] for found, _ in both], "int8", long_name="certified")
@@ -663,13 +665,14 @@ def counts(ds: xr.Dataset, chosen: Sequence[Map]) -> list[list[str]]:
     rows = []
     for map_ in chosen:
         classes = ds[f"{map_.name}_class"].values
+        in_kind = int(((classes == SILENT) & (ds[f"{map_.name}_wrong_in_kind"].values == 1)).sum())
         beyond = "-"
         if f"{map_.name}_stiffness" in ds:
             over = ds[f"{map_.name}_stiffness"] > STABILITY_LIMIT
             beyond = str(int((over & (ds[f"{map_.name}_certified"] == 1)).sum()))
         unsure = int((ds[f"{map_.name}_reference_certified"] == 0).sum())
-        rows.append([map_.title, str(classes.size), *(str(int((classes == k).sum())) for k in range(4)), beyond,
-                     str(unsure)])  # fmt: skip
+        each = (str(int((classes == k).sum())) for k in range(4))
+        rows.append([map_.title, str(classes.size), *each, str(in_kind), beyond, str(unsure)])
     return rows
 
 
@@ -701,8 +704,8 @@ def main() -> None:
     picture(ds, chosen, arguments.out / "stability.png")
     sections = [
         ("Maps", markdown(
-            ["map", "runs", *(name.replace("_", " ") for name in CLASSES), "certified beyond the limit",
-             "reference unsure"], counts(ds, chosen))),
+            ["map", "runs", *(name.replace("_", " ") for name in CLASSES), "silent in kind",
+             "certified beyond the limit", "reference unsure"], counts(ds, chosen))),
         ("Reference (implicit, rtol 1e-11) against others", markdown(
             ["scene", "v0 (m/s)", "alpha (s/m)", "ours", "brute force by", "same kind", "Δ t_separation (s)",
              "Δ phi_end to rk4 (rad)"], checks)),
