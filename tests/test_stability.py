@@ -122,6 +122,18 @@ def test_a_body_at_rest_on_top_falls_off(cells, law):
     assert found.certified
 
 
+@pytest.mark.parametrize("rtol", [1e-3, 1e-4])
+def test_a_loose_tolerance_makes_no_reaction_vanish(cells, rtol):
+    """The series of a reaction has roots of its own and, if it is poor, others."""
+    static = {f"friction.{place}.mu_s": np.linspace(1.0, 5.0, 19) * mu for place, mu in (("rough", 0.3), ("rest", 0.1))}
+    batch = cells(
+        static | {"drive.amplitude": 2.0, "time.span": 10.0, "friction.alpha": 1e5}, law="tustin", drive="arctan"
+    )
+    found, exact = solve(Event(rtol), batch), solve(Event(1e-14), batch)
+    np.testing.assert_array_equal(found.regime, exact.regime)
+    assert set(exact.regime) == {OSCILLATORY, SEPARATING}
+
+
 class TestRungeKutta:
     """Beyond the limit of stability nothing is certified, whatever makes the system fast."""
 

@@ -241,7 +241,9 @@ def _expand(scene, mode, t, y, tolerance, c):
     rate = scale / speed
     # An error of the reactions could make or hide a separation. They follow the acceleration, but friction that
     # varies loads even the contacts of a body too inert to be moved by it.
-    push = 1e-3 * scale / (scene.body.gravity / scene.body.radius + c[SQUARE, 0] + abs(c[EPSILON, 0]))
+    # However loose the tolerance, they must be good enough to tell a root of their own from one of the error.
+    sharpness = max(1e-3 * scale, 1e4)
+    push = sharpness / (scene.body.gravity / scene.body.radius + c[SQUARE, 0] + abs(c[EPSILON, 0]))
     load = push / (scene.body.mass * scene.body.radius)
     last = previous = 0.0
     for row, unit in ((PHI, scale), (V, rate), (EPSILON, push), (NORMAL_1, load), (NORMAL_2, load)):
