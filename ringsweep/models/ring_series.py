@@ -241,8 +241,10 @@ def _expand(scene, mode, t, y, tolerance, c):
     rate = scale / speed
     # An error of the reactions could make or hide a separation. They follow the acceleration, but friction that
     # varies loads even the contacts of a body too inert to be moved by it.
-    # However loose the tolerance, they must be good enough to tell a root of their own from one of the error.
-    sharpness = max(1e-3 * scale, 1e4)
+    sharpness = 1e-3 * scale
+    if not constant_weights(scene.law, mode.region):
+        # However loose the tolerance, a root of theirs must be told from one of the error.
+        sharpness = max(sharpness, 1e3)
     push = sharpness / (scene.body.gravity / scene.body.radius + c[SQUARE, 0] + abs(c[EPSILON, 0]))
     load = push / (scene.body.mass * scene.body.radius)
     last = previous = 0.0
