@@ -122,12 +122,17 @@ def hook(stub: Callable[..., Any], *, within: bool = False) -> Any:
     return function
 
 
+def over_leaves(change: Callable[[Any], Any], nested: Any) -> Any:
+    """A nested tuple with each of its leaves changed."""
+    if not isinstance(nested, tuple):
+        return change(nested)
+    leaves = (over_leaves(change, part) for part in nested)
+    return type(nested)(*leaves) if hasattr(nested, "_fields") else tuple(leaves)
+
+
 def take(batch: Any, i: int) -> Any:
-    """Cell `i` of a batch: the same nested ``NamedTuple`` with each array replaced by its row."""
-    if isinstance(batch, tuple):
-        leaves = (take(leaf, i) for leaf in batch)
-        return type(batch)(*leaves) if hasattr(batch, "_fields") else tuple(leaves)
-    return batch[i]
+    """Cell `i` of a batch: the same nested tuple with each array replaced by its row; from Python also several cells."""
+    return over_leaves(lambda leaf: leaf[i], batch)
 
 
 @overload(take, jit_options=OPTIONS)

@@ -28,7 +28,7 @@ from numba.core import cgutils, types
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, overload, register_model
 
-from ringsweep.jit import OPTIONS, hook
+from ringsweep.jit import OPTIONS, hook, over_leaves
 
 #: Runs in one value.
 WIDTH = 16
@@ -163,7 +163,7 @@ def _unary(name: str) -> Any:
     return function
 
 
-_floor = _unary("llvm.floor")
+_floor, _sqrt = _unary("llvm.floor"), _unary("llvm.sqrt")
 _copy = _named("llvm.copysign")
 
 
@@ -245,6 +245,16 @@ def floor(x):
 @either(floor)
 def _lanes_floor(x):
     return _floor(x)
+
+
+def square_root(x):
+    """Square root of `x`."""
+    return math.sqrt(x)
+
+
+@either(square_root)
+def _lanes_square_root(x):
+    return _sqrt(x)
 
 
 def decay(x):
@@ -518,7 +528,6 @@ def _gather_several(kind, memory, at, like):
 
 def side_by_side(batch: Any) -> Any:
     """A batch in which each array of shape ``(cells, n)`` is a tuple of n arrays: every leaf is one number a cell."""
-    if isinstance(batch, tuple):
-        leaves = (side_by_side(leaf) for leaf in batch)
-        return type(batch)(*leaves) if hasattr(batch, "_fields") else tuple(leaves)
-    return batch if batch.ndim == 1 else tuple(np.ascontiguousarray(column) for column in batch.T)
+    return over_leaves(
+        lambda leaf: leaf if leaf.ndim == 1 else tuple(np.ascontiguousarray(column) for column in leaf.T), batch
+    )

@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 
 import ringsweep
+from ringsweep.solvers.rk4 import STABILITY_LIMIT
 from ringsweep.variables import REGIMES
 
 CONFIGS = Path(__file__).parents[1] / "configs"
@@ -236,7 +237,7 @@ class TestLimits:
         fine = ringsweep.sweep(scene, {"body.mass": [1.0]}, solver={"method": "rk4", "steps": 40_000})
         auto = ringsweep.sweep(scene, {"body.mass": [1.0]})
         assert float(fine.x_end[0]) == pytest.approx(float(auto.x_end[0]), abs=1e-7)
-        assert float(fine.stiffness[0]) < 2.785
+        assert float(fine.stiffness[0]) < STABILITY_LIMIT
         assert (fine.certified == 1).all()
 
 
@@ -257,7 +258,7 @@ class TestTwoMethods:
         scene = belt(law, span=20.0, start=0.0, **MILD[law])
         own = outcome(scene)
         fixed = outcome(scene, method="rk4", steps=100_000)
-        assert fixed.stiffness < 2.785
+        assert fixed.stiffness < STABILITY_LIMIT
         assert own.regime == fixed.regime
         assert own.certified == fixed.certified == 1
         for name in ("x_end", "x_max", "velocity_end"):
@@ -282,7 +283,7 @@ class TestTwoMethods:
         """LuGre at 2e-4 s: a wrong trajectory without a NaN."""
         scene = belt("lugre", span=20.0, sigma0=1e5, sigma1=sqrt(1e5), sigma2=0.1, v_s=0.001)
         fixed, own = outcome(scene, method="rk4", steps=40_000), outcome(scene)
-        assert fixed.stiffness > 2.785
+        assert fixed.stiffness > STABILITY_LIMIT
         assert fixed.certified == 0
         assert own.certified == 1
 

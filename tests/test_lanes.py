@@ -162,14 +162,6 @@ class TestEachLane:
         for name in whole:
             np.testing.assert_array_equal(shuffled[name], whole[name], err_msg=name)
         for i in (0, 17, 39):
-            one = integrate(Several(), take_rows(batch, [i]), 2000)
+            one = integrate(Several(), take(batch, [i]), 2000)
             for name in whole:
                 np.testing.assert_array_equal(one[name][0], whole[name][i], err_msg=name)
-
-
-def take_rows(batch, rows):
-    """Some cells of a batch."""
-    if isinstance(batch, tuple):
-        leaves = [take_rows(leaf, rows) for leaf in batch]
-        return type(batch)(*leaves) if hasattr(batch, "_fields") else tuple(leaves)
-    return batch[rows]

@@ -12,6 +12,7 @@ from typing import NamedTuple
 from ringsweep import hooks
 from ringsweep.jit import inlined
 from ringsweep.models.belt import begin, conclude, observe
+from ringsweep.models.common import largest_eigenvalue
 from ringsweep.physics import belt, drives
 from ringsweep.physics.friction.static import (
     BAND,
@@ -97,15 +98,16 @@ def _stiffness(scene, before, now, h):
     ahead = before.v + h * before.rates[1] - belt_gains
     rest, edge, jumped = met(scene.law, before.v, now.v, ahead)
     steepest = max(abs(before.slope), abs(now.slope))
+    swing = scene.stiffness / scene.mass
     if _holds(scene.law):
         # A discontinuous law has no slope that any step could follow; but one may land in a dead band.
-        return inf if jumped else steepest / scene.mass * h
+        return inf if jumped else largest_eigenvalue(steepest / scene.mass, swing) * h
     # A step that jumps the band, or its edge, never samples the slope there, but has met it.
     if rest:
         steepest = max(steepest, abs(_force(scene, 0.0, 0.0)[1]))
     if edge:
         steepest = max(steepest, abs(_force(scene, 0.0, stiction_band(scene.law))[1]))
-    return steepest / scene.mass * h
+    return largest_eigenvalue(steepest / scene.mass, swing) * h
 
 
 @hooks.begin.implements(belt.Belt)

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from ringsweep.jit import absorbed
+from ringsweep.lanes import select, square_root
 from ringsweep.parameters import Parameter, declared
 from ringsweep.physics import drives, friction
 from ringsweep.scene import Structure, Values, require
@@ -15,6 +17,14 @@ from ringsweep.scene import Structure, Values, require
 MASS = Parameter("kg", "mass of the body", lower=0.0, open_lower=True)
 GRAVITY = Parameter("m/s^2", "acceleration of gravity", lower=0.0, default=9.81)
 SPAN = Parameter("s", "span of time", lower=0.0, open_lower=True)
+
+
+@absorbed
+def largest_eigenvalue(trace, determinant):
+    """Largest magnitude of an eigenvalue of two equations whose Jacobian has this trace and determinant."""
+    square = trace * trace - 4.0 * determinant
+    root = square_root(select(square > 0.0, square, determinant))
+    return select(square > 0.0, 0.5 * (abs(trace) + root), root)
 
 
 def pair(law: type, place: str, values: Values) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -11,7 +11,7 @@ import numpy as np
 from ringsweep import hooks, regimes
 from ringsweep.jit import inlined
 from ringsweep.lanes import Several, any_of, select, sine_cosine, sine_cosine_near
-from ringsweep.models.common import GRAVITY, MASS, SPAN, drive_of, law_of, pair
+from ringsweep.models.common import GRAVITY, MASS, SPAN, drive_of, largest_eigenvalue, law_of, pair
 from ringsweep.parameters import Parameter, declared
 from ringsweep.physics import drives, friction, ring, zones
 from ringsweep.physics.friction.static import met, steepest, stiction_band
@@ -146,7 +146,11 @@ class Ring(SingleContactRing):
 
 
 class Inspection(NamedTuple):
-    """A state of the ring seen from within: what a step needs and what ends a run."""
+    """A state of the ring seen from within: what a step needs and what ends a run.
+
+    ``slope`` is how the acceleration depends on the angular velocity by way of the friction coefficients; ``by_phi``
+    and ``by_omega`` how it depends on angle and angular velocity with these held.
+    """
 
     rates: tuple[float, float]
     v: float
@@ -155,6 +159,8 @@ class Inspection(NamedTuple):
     D: float
     inertia: float
     slope: float
+    by_phi: float
+    by_omega: float
     phi: float
     sin_phi: float
     cos_phi: float
@@ -187,7 +193,10 @@ def _inspect(scene, y, drive_at, drive_rate):
     epsilon, D, inertia = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
     normal_1, normal_2 = ring.reactions(scene.body, K1, K2, sin_phi, cos_phi, omega, epsilon)
     slope = ring.acceleration_slope(scene.body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega)
-    return Inspection((omega, epsilon), v, normal_1, normal_2, D, inertia, slope, phi, sin_phi, cos_phi, omega)
+    by_phi, by_omega = ring.acceleration_gradient(scene.body, K1, K2, sin_phi, cos_phi, omega)
+    return Inspection(
+        (omega, epsilon), v, normal_1, normal_2, D, inertia, slope, by_phi, by_omega, phi, sin_phi, cos_phi, omega
+    )
 
 
 @hooks.holds.implements(ring.Ring, ring.BristleRing)
@@ -226,7 +235,7 @@ def _stiffness(scene, before, now, h):
     ring_gains = (radius * now.omega - now.v) - (radius * before.omega - before.v)
     ahead = before.v + h * radius * before.rates[1] - ring_gains
     band = stiction_band(scene.law)
-    eigenvalue = max(abs(before.slope), abs(now.slope))
+    friction = _steeper(before.slope, now.slope)
     # A step that jumps the band, or its edge, never samples the slope there, and is the one that is
     # wrong in kind: it has met it all the same.
     low, high = min(min(before.v, now.v), ahead), max(max(before.v, now.v), ahead)
@@ -234,10 +243,17 @@ def _stiffness(scene, before, now, h):
         rest, edge, _ = met(scene.law, before.v, now.v, ahead)
         mu_s, mu_k = zones.roughest(scene.surface)
         (rest_s, rest_k), (edge_s, edge_k) = steepest(scene.law)
-        at_rest, at_edge = abs(rest_s * mu_s + rest_k * mu_k), abs(edge_s * mu_s + edge_k * mu_k)
-        slope = max(select(rest, at_rest, 0.0), select(edge, at_edge, 0.0))
-        eigenvalue = max(eigenvalue, slope * radius * abs(ring.grip(scene.body, now.cos_phi, now.omega)))
-    return eigenvalue * h
+        scale = -radius * ring.grip(scene.body, now.cos_phi, now.omega)
+        friction = _steeper(friction, select(rest, scale * (rest_s * mu_s + rest_k * mu_k), 0.0))
+        friction = _steeper(friction, select(edge, scale * (edge_s * mu_s + edge_k * mu_k), 0.0))
+    # Even without friction the body swings, and under friction its speed loads the contacts.
+    return largest_eigenvalue(friction + now.by_omega, -now.by_phi) * h
+
+
+@inlined
+def _steeper(a, b):
+    """The one of two slopes that is the larger in magnitude."""
+    return select(abs(b) > abs(a), b, a)
 
 
 @hooks.begin.implements(ring.Ring, ring.BristleRing)

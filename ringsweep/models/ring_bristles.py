@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from ringsweep import hooks, regimes
 from ringsweep.jit import inlined
+from ringsweep.models.common import largest_eigenvalue
 from ringsweep.models.ring_series import coefficients_under
 from ringsweep.physics import drives, ring
 from ringsweep.physics.friction.dynamic import bristle, lasts, steady
@@ -129,6 +130,9 @@ def _inspect(scene, y, drive_at, drive_rate):
     trace = decay - by_v
     square = trace * trace - 4.0 * (coupling - decay * by_v)
     eigenvalue = 0.5 * (abs(trace) + sqrt(square)) if square > 0.0 else sqrt(coupling - decay * by_v)
+    # With little friction left the body swings all the same.
+    by_phi, by_omega = ring.acceleration_gradient(b, now.K1, now.K2, sin_phi, cos_phi, omega)
+    eigenvalue = max(eigenvalue, largest_eigenvalue(by_omega, -by_phi))
     rates = omega, epsilon, now.rates[0], now.rates[1]
     return Inspection(rates, normal_1, normal_2, D, inertia, eigenvalue, omega, v, stuck)
 

@@ -28,6 +28,7 @@ from ringsweep.physics.friction.static import (
     slower,
     stiction_band,
     weights,
+    weights_in,
 )
 from ringsweep.physics.zones import coefficients, cross, edge_ahead, locate
 from ringsweep.regimes import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2
@@ -113,6 +114,11 @@ def _settle(scene, t, phi, places):
     forward, backward = against_forward > ring_epsilon, against_backward < ring_epsilon
     region = region_at(scene.law, 0.0)
     if forward and backward:
+        # Friction that drives either way is that of a contact that would have to pull, or no motion is the one.
+        free, _, _ = ring.acceleration(scene.body, 0.0, 0.0, sin_phi, cos_phi, ring_omega)
+        normal_1, normal_2 = ring.reactions(scene.body, 0.0, 0.0, sin_phi, cos_phi, ring_omega, free)
+        if min(normal_1, normal_2) <= 0.0:
+            return (SEPARATED_1 if normal_1 <= normal_2 else SEPARATED_2), still
         return JAM, still
     # Without any friction there is nothing to stick to.
     if forward or (m1 + m2 == 0.0 and not backward):
@@ -123,17 +129,36 @@ def _settle(scene, t, phi, places):
 
 
 @inlined
-def _is_jamming(scene, mode, t, y):
-    """Whether slip is so near to a jam that its reactions, which grow without bound there, have no sign to go by."""
-    if mode.sign == 0:
-        return False
+def _sliding_at(scene, mode, t, y):
+    """D, inertia, both reactions and their scale in slip, from the balances themselves and not from a series."""
     phi, v = y
     mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
     w_s, w_k, _, _ = weights(scene.law, abs(v))
     K1, K2 = -mode.sign * (w_s * mu_s1 + w_k * mu_k1), -mode.sign * (w_s * mu_s2 + w_k * mu_k2)
-    omega = v / scene.body.radius + drives.turn(scene.drive, t)[1]
-    _, determinant, inertia = ring.acceleration(scene.body, K1, K2, sin(phi), cos(phi), omega)
+    body = scene.body
+    omega = v / body.radius + drives.turn(scene.drive, t)[1]
+    epsilon, determinant, inertia = ring.acceleration(body, K1, K2, sin(phi), cos(phi), omega)
+    normal_1, normal_2 = ring.reactions(body, K1, K2, sin(phi), cos(phi), omega, epsilon)
+    scale = body.mass * (body.gravity + body.radius * (omega * omega + abs(epsilon)))
+    return determinant, inertia, normal_1, normal_2, scale
+
+
+@inlined
+def _is_jamming(scene, mode, t, y):
+    """Whether slip is so near to a jam that its reactions, which grow without bound there, have no sign to go by."""
+    if mode.sign == 0:
+        return False
+    determinant, inertia, _, _, _ = _sliding_at(scene, mode, t, y)
     return not (determinant > 0.0 and inertia > 1e-4 * ring.about_axis(scene.body) * determinant)
+
+
+@inlined
+def _is_held(scene, mode, guard, t, y):
+    """Whether a reaction whose series vanishes does not: on the way into a jam that series meets its singularity."""
+    if mode.sign == 0:
+        return False
+    _, _, normal_1, normal_2, scale = _sliding_at(scene, mode, t, y)
+    return (normal_1 if guard == NORMAL_1 else normal_2) > 1e-2 * scale
 
 
 @hooks.impasse.implements(ring.Ring)
@@ -146,7 +171,7 @@ def _switch(scene, mode, guard, t, y):
     phi, v = y
     sign, region, place_1, place_2 = mode.sign, mode.region, mode.place_1, mode.place_2
     if guard in (NORMAL_1, NORMAL_2):
-        if _is_jamming(scene, mode, t, y):
+        if _is_jamming(scene, mode, t, y) or _is_held(scene, mode, guard, t, y):
             return JAM, mode, y
         return (SEPARATED_1 if guard == NORMAL_1 else SEPARATED_2), mode, y
     if guard == INERTIA:
@@ -214,10 +239,18 @@ def _expand(scene, mode, t, y, tolerance, c):
         # Noise that is large for the band would keep the creep from ever settling.
         speed = min(speed, 1e3 * stiction_band(scene.law))
     rate = scale / speed
-    # The reactions follow the acceleration: an error of it could make or hide a separation.
-    push = 1e-3 * scale / (scene.body.gravity / scene.body.radius + c[SQUARE, 0] + abs(c[EPSILON, 0]))
-    last = max(abs(c[PHI, ORDER]) * scale, abs(c[V, ORDER]) * rate, abs(c[EPSILON, ORDER]) * push)
-    previous = max(abs(c[PHI, ORDER - 1]) * scale, abs(c[V, ORDER - 1]) * rate, abs(c[EPSILON, ORDER - 1]) * push)
+    # An error of the reactions could make or hide a separation. They follow the acceleration, but friction that
+    # varies loads even the contacts of a body too inert to be moved by it.
+    sharpness = 1e-3 * scale
+    if not constant_weights(scene.law, mode.region):
+        # However loose the tolerance, a root of theirs must be told from one of the error.
+        sharpness = max(sharpness, 1e3)
+    push = sharpness / (scene.body.gravity / scene.body.radius + c[SQUARE, 0] + abs(c[EPSILON, 0]))
+    load = push / (scene.body.mass * scene.body.radius)
+    last = previous = 0.0
+    for row, unit in ((PHI, scale), (V, rate), (EPSILON, push), (NORMAL_1, load), (NORMAL_2, load)):
+        last = max(last, abs(c[row, ORDER]) * unit)
+        previous = max(previous, abs(c[row, ORDER - 1]) * unit)
     return reach(last, previous)
 
 
@@ -225,8 +258,10 @@ def _expand(scene, mode, t, y, tolerance, c):
 def _expand_sliding(scene, mode, c):
     """Slip with constant K: the flow is autonomous."""
     body = scene.body
-    _, mu_k1, _, mu_k2 = coefficients_under(scene, mode)
-    k1, k2 = -mode.sign * mu_k1, -mode.sign * mu_k2
+    mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
+    # Kinetic but in a tail that does not decay.
+    w_s, w_k, _, _ = weights_in(scene.law, mode.region, 0.0)
+    k1, k2 = -mode.sign * (w_s * mu_s1 + w_k * mu_k1), -mode.sign * (w_s * mu_s2 + w_k * mu_k2)
     p, determinant, inertia = ring.acceleration(body, k1, k2, 0.0, 0.0, 1.0)
     q, _, _ = ring.acceleration(body, k1, k2, 0.0, 1.0, 0.0)
     r, _, _ = ring.acceleration(body, k1, k2, 1.0, 0.0, 0.0)

@@ -202,6 +202,25 @@ def _one_slope(body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega):
 
 
 @inner_hook
+def acceleration_gradient(body, K1, K2, sin_phi, cos_phi, omega):
+    """Derivatives of the angular acceleration by angle and by angular velocity, friction K held; 1/s^2 and 1/s."""
+
+
+@acceleration_gradient.implements(TwoContacts)
+def _two_gradient(body, K1, K2, sin_phi, cos_phi, omega):
+    delta, P = K1 - K2, K1 * K2
+    l_0, l_1 = body.lift
+    per_inertia = 1.0 / _combine(body.effective, delta, P)
+    by_phi = _combine(body.weight, delta, P) * cos_phi - l_0 * sin_phi * (K1 + K2)
+    return by_phi * per_inertia, 2.0 * omega * l_1 * (K1 + K2) * per_inertia
+
+
+@acceleration_gradient.implements(OneContact)
+def _one_gradient(body, K1, K2, sin_phi, cos_phi, omega):
+    return -body.gravity / body.radius * (cos_phi + K1 * sin_phi), 2.0 * omega * K1
+
+
+@inner_hook
 def grip(body, cos_phi, omega):
     """Derivative of the angular acceleration by the K of all contacts together, where there is no friction."""
 

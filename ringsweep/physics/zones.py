@@ -25,6 +25,11 @@ CENTER = Parameter("rad", "centre of the rough zone in the ring's frame", lower=
 PER_TURN = 0.5 / pi
 
 
+# What rounding leaves between two ends that meet, such as those of an arc that goes all round: as a surface of its own
+# it could jam a body, or lift it, at an edge that is not there.
+_SLIVER = 1e-14
+
+
 class Uniform(NamedTuple):
     """A ring with one pair of friction coefficients all round."""
 
@@ -96,7 +101,11 @@ def cut(arcs: list[Arc], mu_s: Any, mu_k: Any) -> Uniform | Segments:
         static = np.where(inside, rough_s, static)
         kinetic = np.where(inside, rough_k, kinetic)
         index = np.where(inside, k, index)
-    static, kinetic = np.ascontiguousarray(static), np.ascontiguousarray(kinetic)
+    # A sliver takes after the segment before it.
+    number = np.where(width > _SLIVER, np.arange(edges.shape[-1]), -1)
+    number = np.maximum.accumulate(number, axis=-1)
+    number = np.where(number < 0, number[..., -1:], number)
+    static, kinetic, index = (np.take_along_axis(leaf, number, axis=-1) for leaf in (static, kinetic, index))
     return Segments(edges, static, kinetic, index, (static.max(axis=-1), kinetic.min(axis=-1)))
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
+from ringsweep.jit import take
 from ringsweep.parameters import Parameter
 from ringsweep.physics.friction import DYNAMIC, LAWS, SET_VALUED, SMOOTH
 from ringsweep.scene import Structure
@@ -65,7 +66,7 @@ class _Piecewise(Method):
                 finer = replace(finer, rtol=finer.rtol / _FACTOR)
                 if not len(doubtful) or finer.tolerances()[0] < 1e-15:
                     break
-                again, more = finer._integrate(pick(batch, doubtful), len(outcomes))
+                again, more = finer._integrate(take(batch, doubtful), len(outcomes))
                 steps[doubtful] += more
                 certified[doubtful] = agree(again, rows[doubtful], outcomes)
                 rows[doubtful] = again
@@ -87,13 +88,6 @@ class _Piecewise(Method):
             if count < size or size >= self.max_steps:
                 return times[:count], rows[:count]
             size *= 4
-
-
-def pick(batch: Any, cells: NDArray[np.intp]) -> Any:
-    """Those cells of a batch, as a batch."""
-    if isinstance(batch, tuple):
-        return type(batch)(*(pick(leaf, cells) for leaf in batch))
-    return batch[cells]
 
 
 @dataclass(frozen=True)

@@ -92,7 +92,8 @@ def _tustin(law, region):
 
 @steepest.implements(Coulomb, Stiction, Tustin)
 def _infinite(law):
-    return (inf, inf), (inf, inf)
+    # No step could follow a jump; its size is that of the static coefficient.
+    return (inf, 0.0), (inf, 0.0)
 
 
 @stiction_band.implements(Coulomb, Stiction, Tustin)

@@ -1,0 +1,195 @@
+"""Extremes: `auto` is never wrong without a word, `rk4` never certified beyond its limit, energy is kept."""
+
+from math import pi, sqrt
+
+import numpy as np
+import pytest
+from solutions import solve
+
+from ringsweep.models import MODELS
+from ringsweep.regimes import Outcome
+from ringsweep.solvers.event import Auto, Event, Implicit
+from ringsweep.solvers.rk4 import RK4, STABILITY_LIMIT
+from ringsweep.variables import JAMMED, OSCILLATORY, RESTING, SEPARATING
+
+FRICTIONLESS = {f"friction.{place}.mu_{kind}": 0.0 for place in ("rough", "rest") for kind in "sk"}
+XI = sqrt((0.043378 - 0.010) ** 2 - 0.025**2)
+OWN = sqrt(0.076 * XI / (4.47e-5 + 0.076 * XI**2))
+"""Frequency of small swings without friction, divided by the root of gravity."""
+
+
+def draw(count, seed):
+    """Extreme scenes by path: twelve decades of the band, ten of the decay, masses and inertias far apart."""
+    rng = np.random.default_rng(seed)
+
+    def often(usual, low, high):
+        return np.where(rng.random(count) < 0.3, 10.0 ** rng.uniform(low, high, count), usual)
+
+    columns = {"friction.alpha": 10.0 ** rng.uniform(-1, 9, count), "friction.v0": 10.0 ** rng.uniform(-12, 3, count)}
+    for place in ("rough", "rest"):
+        mu_k = 10.0 ** rng.uniform(-3, 0.3, count)
+        columns |= {
+            f"friction.{place}.mu_k": mu_k,
+            f"friction.{place}.mu_s": mu_k * rng.choice([1.0, 1.5, 4.0], count),
+        }
+    return columns | {
+        "body.mass": often(0.076, -9, 6),
+        "body.inertia": often(4.47e-5, -9, 6),
+        "zone.half_angle": rng.choice([0.0, 1e-15, 1e-6, 0.3, pi], count),
+        "zone.center": rng.choice([0.0, 1.0, -2.0], count),
+        "initial.phi": rng.choice([0.0, 0.5, pi], count, p=[0.5, 0.4, 0.1]),
+        "initial.omega": rng.choice([0.0, 1e-6, 20.0, -1e4], count),
+        "drive.amplitude": rng.choice([0.0, 1e-12, 2.0, -20.0], count),
+        "time.span": 10.0 ** rng.uniform(-3, 0.3, count),
+        "gravity": often(9.81, -6, 4),
+    }
+
+
+@pytest.mark.parametrize(("law", "fine"), [("bengisu-akay", Implicit(1e-10)), ("tustin", Event(1e-13))])
+def test_auto_is_never_wrong_and_silent(cells, law, fine):
+    columns = draw(600, seed=17)
+    if law == "tustin":
+        del columns["friction.v0"]
+    batch = cells(columns, law=law, drive="arctan")
+    found, exact = solve(Auto(max_steps=30_000), batch), solve(fine, batch)
+    settled = (found.certified & exact.certified).astype(bool)
+    assert settled.mean() > 0.97
+    for name in ("regime", "motion", "separating_contact"):
+        np.testing.assert_array_equal(getattr(found, name)[settled], getattr(exact, name)[settled])
+    np.testing.assert_allclose(found.t_end[settled], exact.t_end[settled], atol=1e-3)
+    np.testing.assert_allclose(found.phi_end[settled], exact.phi_end[settled], rtol=1e-3, atol=1e-3)
+    assert len(set(found.regime)) >= 4
+
+
+@pytest.mark.parametrize("law", ["bengisu-akay", "tustin"])
+def test_a_body_too_inert_to_be_moved_by_friction_keeps_its_contacts(cells, law):
+    """Friction that varies loads the contacts all the same: a step too long for it sees reactions that are not."""
+    changes = {"body.inertia": 1e6, "drive.amplitude": 2.0, "friction.alpha": 1e5}
+    changes |= {"friction.v0": np.geomspace(1e-9, 1e-3, 7)} if law == "bengisu-akay" else {}
+    found = solve(Auto(), cells(changes, law=law, drive="arctan"))
+    assert (found.regime == RESTING).all()
+    assert found.certified.all()
+
+
+@pytest.mark.parametrize("law", ["bengisu-akay", "stiction"])
+def test_an_arc_that_goes_all_round_has_no_seam(cells, law):
+    """Rounding leaves a sliver of the rest of the ring, on which this body would jam."""
+    changes = {"zone.half_angle": pi, "zone.center": np.linspace(-3.0, 3.0, 9), "initial.omega": 60.0}
+    changes |= {"friction.rough.mu_s": 0.1, "friction.rough.mu_k": 0.1}
+    jammed = {"friction.rest.mu_s": 3.0, "friction.rest.mu_k": 3.0}
+    smooth = {"friction.rest.mu_s": 0.1, "friction.rest.mu_k": 0.1}
+    seamed, seamless = (solve(Auto(), cells(changes | rest, law=law, drive="arctan")) for rest in (jammed, smooth))
+    np.testing.assert_array_equal(seamed.regime, SEPARATING)
+    np.testing.assert_allclose(seamed.t_separation, seamless.t_separation, rtol=1e-12)
+
+
+def test_the_way_into_a_jam_is_no_separation(cells):
+    """Both reactions grow without bound there, and the series of either meets a singularity."""
+    changes = {
+        "gravity": 1658.5181940544094,
+        "friction.alpha": 398303945.4118323,
+        "friction.rest.mu_k": 0.003533855927459637,
+        "friction.rest.mu_s": 0.007921801333855385,
+        "friction.rough.mu_k": 0.6056357754034847,
+        "friction.rough.mu_s": 1.8311381410867449,
+        "zone.half_angle": pi,
+        "initial.phi": -0.6955526718682674,
+        "initial.omega": 333.2476631309329,
+        "drive.amplitude": 17.604301653296005,
+        "time.span": 0.006601531514513469,
+    }
+    found = solve(Event(), cells(changes, law="tustin", drive="arctan"))
+    assert found.regime == JAMMED
+    assert found.normal_min_1 > 1.0
+    assert found.t_end == pytest.approx(0.0037337271, abs=1e-9)
+
+
+@pytest.mark.parametrize("law", ["bengisu-akay", "tustin"])
+def test_a_tail_that_does_not_decay_is_static_friction_throughout(cells, law):
+    changes = {"friction.alpha": 0.0, "drive.amplitude": 2.0, "time.span": 5.0}
+    changes |= {"friction.v0": 1e-6} if law == "bengisu-akay" else {}
+    level = {"friction.rough.mu_k": 0.5, "friction.rest.mu_k": 0.2}
+    found, twin = (solve(Auto(), cells(changes | more, law=law, drive="arctan")) for more in ({}, level))
+    assert found.regime == SEPARATING
+    assert found.t_separation == pytest.approx(twin.t_separation[0], abs=1e-8)
+
+
+@pytest.mark.parametrize("law", ["bengisu-akay", "tustin", "stiction"])
+def test_a_body_at_rest_on_top_falls_off(cells, law):
+    found = solve(Auto(), cells({"initial.phi": pi}, law=law, drive="arctan"))
+    assert found.regime == SEPARATING
+    assert found.t_separation == 0.0
+    assert found.certified
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-4])
+def test_a_loose_tolerance_makes_no_reaction_vanish(cells, rtol):
+    """The series of a reaction has roots of its own and, if it is poor, others."""
+    static = {f"friction.{place}.mu_s": np.linspace(1.0, 5.0, 19) * mu for place, mu in (("rough", 0.3), ("rest", 0.1))}
+    batch = cells(
+        static | {"drive.amplitude": 2.0, "time.span": 10.0, "friction.alpha": 1e5}, law="tustin", drive="arctan"
+    )
+    found, exact = solve(Event(rtol), batch), solve(Event(1e-14), batch)
+    np.testing.assert_array_equal(found.regime, exact.regime)
+    assert set(exact.regime) == {OSCILLATORY, SEPARATING}
+
+
+class TestRungeKutta:
+    """Beyond the limit of stability nothing is certified, whatever makes the system fast."""
+
+    @staticmethod
+    def run(batch, steps):
+        result = RK4(steps).run(batch, MODELS["ring"].outcomes)
+        return result, dict(zip(Outcome._fields, result.rows.T, strict=True))
+
+    def test_a_swing_too_fast_for_the_step(self, cells):
+        """Without any friction the eigenvalue is that of a pendulum, on the imaginary axis."""
+        gravity = np.array([1e3, 1e5, 7e5, 9e5, 1e6, 1.2e6, 2e6])
+        changes = {"gravity": gravity, "initial.phi": 1e-3, "time.span": 10.0}
+        batch = cells(FRICTIONLESS | changes, drive="arctan")
+        result, _ = self.run(batch, 15_000)
+        true = OWN * np.sqrt(gravity) * 10.0 / 15_000
+        np.testing.assert_allclose(result.stiffness[:4], true[:4], rtol=1e-2)
+        assert not result.certified[true > STABILITY_LIMIT].any()
+        assert result.certified[true < 2.0].all()
+
+    def test_a_launch_too_fast_for_the_step(self, cells):
+        """Friction grows with the square of the speed: the launch decays at a rate proportional to it."""
+        result, _ = self.run(cells({"initial.omega": np.array([1e2, 1e5]), "time.span": 0.02}, drive="arctan"), 20)
+        slow, fast = result.stiffness
+        assert 0.0 < slow < STABILITY_LIMIT < fast
+        assert not result.certified[1]
+
+    def test_of_bands_narrower_and_narrower(self, cells):
+        v0 = np.geomspace(1e-12, 1.0, 25)
+        result, _ = self.run(cells({"friction.v0": v0, "drive.amplitude": 2.0}, drive="arctan"), 1500)
+        assert not result.certified[result.stiffness > STABILITY_LIMIT].any()
+        assert not result.certified[0]
+        assert result.certified[-1]
+
+
+class TestEnergy:
+    """Without friction and drive a body launched from the bottom keeps its energy."""
+
+    OMEGA = 10.0
+
+    def drift(self, cells, method, law, span):
+        changes = {"initial.omega": self.OMEGA, "time.span": span}
+        found = solve(method, cells(FRICTIONLESS | changes, law=law, drive="arctan"))
+        assert found.regime == OSCILLATORY
+        kinetic = (found.omega_end / self.OMEGA) ** 2
+        potential = 2.0 * OWN**2 * 9.81 * (1.0 - np.cos(found.phi_end)) / self.OMEGA**2
+        return abs(kinetic + potential - 1.0)[0], found.steps[0]
+
+    @pytest.mark.parametrize(("law", "method"), [("bengisu-akay", Implicit), ("stiction", Event)])
+    def test_piecewise(self, cells, law, method):
+        """No more than the tolerance of each step, summed up."""
+        for rtol in (1e-7, 1e-10):
+            drift, steps = self.drift(cells, method(rtol, certify=False), law, 1000.0)
+            assert drift < steps * rtol
+
+    def test_constant_step(self, cells):
+        """Runge-Kutta 4 loses energy with the fifth power of the step."""
+        steps = np.array([1000, 2000, 4000])
+        losses = [self.drift(cells, RK4(int(n), certify=False), "bengisu-akay", 10.0)[0] for n in steps]
+        assert -np.polyfit(np.log(steps), np.log(losses), 1)[0] == pytest.approx(5.0, abs=0.3)
