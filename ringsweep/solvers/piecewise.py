@@ -37,7 +37,7 @@ from ringsweep.hooks import (
     to_stiff,
     watch,
 )
-from ringsweep.jit import hook, inlined, kernel, take
+from ringsweep.jit import borrowed, hook, inlined, kernel, take
 from ringsweep.physics.drives import next_knot
 from ringsweep.physics.friction import DYNAMIC, SET_VALUED, SMOOTH
 from ringsweep.regimes import BROKEN, COMPLETE, RUNNING
@@ -425,6 +425,13 @@ def integrate(batch, tolerances, limit, out, steps):
     c = np.zeros((count, ORDER + 3))
     work = np.empty((STACK, ORDER + 3))
     stages = np.empty((rosenbrock.STAGES, len(embark(first)[1])))
+    _integrate(batch, tolerances, limit, out, steps, guards, c, work, stages)
+
+
+@inlined
+def _integrate(batch, tolerances, limit, out, steps, guards, c, work, stages):
+    c, work, stages = borrowed(c), borrowed(work), borrowed(stages)
+    out, steps = borrowed(out), borrowed(steps)
     for i in range(len(steps)):
         scene = take(batch, i)
         t, y = embark(scene)
