@@ -168,10 +168,11 @@ class Trial(NamedTuple):
 
 
 @inlined
-def _next_trial(trial, s, size, cut):
+def _next_trial(trial, s, size, cut, rejected):
     """What to try after a step `s` whose error was `size`; `cut` if it was shortened to end somewhere."""
     size = max(size, 1e-8)
-    h = s * min(6.0, 0.9 * size**-0.2)
+    # A step that would have been too long a moment ago will hardly be short enough now.
+    h = s * min(1.0 if rejected else 20.0, 0.9 * size**-0.2)
     # Towards the end of a creep steps shorten at a steady rate, which the step before tells (Gustafsson).
     if trial.last > 0.0:
         h = min(h, s * 0.9 * s / trial.last * (trial.size / (size * size)) ** 0.2)
@@ -209,7 +210,7 @@ def _creep(scene, record, mode, t, y, x, line, trial, horizon, tolerance, guards
         s *= max(0.2, 0.9 * size**-0.2) if isfinite(size) else 0.1
     else:
         return -1, -1.0, y, record, trial
-    trial = _next_trial(trial, s, size, s == horizon)
+    trial = _next_trial(trial, s, size, s == horizon, s < min(trial.h, horizon))
     if event >= 0:
         if end == 0.0:
             return guards + event, 0.0, y, record, trial
@@ -281,6 +282,9 @@ def _either_stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c
         x = to_stiff(scene, t, y)
         line = linearise(scene, mode, t, x)
         if is_stiff(scene, mode, y, line):
+            if trial.last == 0.0:
+                # What is left of the way in ends at the rate of the decay.
+                trial = Trial(min(trial.h, -1.0 / line[1][3]), 0.0, 0.0)
             guard, s, y, record, trial = _creep(
                 scene, record, mode, t, y, x, line, trial, horizon, tolerances[1], guards, stages
             )
