@@ -172,7 +172,7 @@ def _next_trial(trial, s, size, cut, rejected):
     """What to try after a step `s` whose error was `size`; `cut` if it was shortened to end somewhere."""
     size = max(size, 1e-8)
     # A step that would have been too long a moment ago will hardly be short enough now.
-    h = s * min(1.0 if rejected else 20.0, 0.9 * size**-0.2)
+    h = s * min(1.0 if rejected else 6.0, 0.9 * size**-0.2)
     # Towards the end of a creep steps shorten at a steady rate, which the step before tells (Gustafsson).
     if trial.last > 0.0:
         h = min(h, s * 0.9 * s / trial.last * (trial.size / (size * size)) ** 0.2)
@@ -403,8 +403,9 @@ def trace(batch, tolerances, limit, spacing, times, table):
             break
         before = t
         horizon = min(scene.span, next_knot(scene.drive, t)) - t
+        trial = Trial(min(trial.h, spacing), trial.last, trial.size)
         implicit, guard, s, y_next, record, trial = _stride(
-            scene.law, scene, record, mode, t, y, Trial(min(trial.h, spacing), trial.last, trial.size), horizon, tolerances, c, guards, work, stages
+            scene.law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages
         )
         if s > 0.0:
             parts = 1 if implicit else int(s / spacing) + 1
