@@ -11,7 +11,8 @@ from typing import Any
 
 import numba
 from numba import types
-from numba.extending import overload
+from numba.core import cgutils
+from numba.extending import intrinsic, overload
 
 # Contraction to fused multiply-add is the only liberty taken with IEEE arithmetic: "nnan" and
 # "ninf" would delete the checks by which a run is flagged as failed, and "reassoc" would undo the
@@ -130,15 +131,32 @@ def over_leaves(change: Callable[[Any], Any], nested: Any) -> Any:
     return type(nested)(*leaves) if hasattr(nested, "_fields") else tuple(leaves)
 
 
-def take(batch: Any, i: int) -> Any:
-    """Cell `i` of a batch: the same nested tuple with each array replaced by its row; from Python also several cells."""
+@intrinsic
+def borrowed(typingctx: Any, array: Any) -> Any:
+    """The same array without a count of references, for as long as its owner lives.
+
+    Else every call that is handed the array, or a tuple that holds it, counts up and down again, and each of these
+    is an atomic operation that costs more than a coefficient of a series.
+    """
+
+    def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        view = context.make_array(array)(context, builder, args[0])
+        view.meminfo = cgutils.get_null_value(view.meminfo.type)
+        view.parent = cgutils.get_null_value(view.parent.type)
+        return view._getvalue()
+
+    return array(array), build
+
+
+def take(batch: Any, i: Any) -> Any:
+    """Cell `i` of a batch: the same nested tuple with each array replaced by its row; in Python several cells too."""
     return over_leaves(lambda leaf: leaf[i], batch)
 
 
 @overload(take, jit_options=OPTIONS)
 def _take(batch, i):
     if isinstance(batch, types.Array):
-        return lambda batch, i: batch[i]
+        return (lambda batch, i: batch[i]) if batch.ndim == 1 else (lambda batch, i: borrowed(batch[i]))
     leaves = "".join(f"take(batch[{k}], i), " for k in range(len(batch)))
     scope = {"cls": getattr(batch, "instance_class", None), "take": take}
     exec(f"def row(batch, i): return {'cls' if scope['cls'] else ''}({leaves})", scope)

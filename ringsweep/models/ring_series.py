@@ -46,8 +46,8 @@ from ringsweep.series import (
 
 # Rows of the series; the guards last, and first of them the one without which the others mean nothing.
 PHI, V, OMEGA, EPSILON, SIN, COS, SQUARE, THETA, EXCESS, BASIS, STATIC, KINETIC = range(12)
-K1, K2, D, LEVER, PULL, LIFT, SPARE = range(12, 19)
-INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(19, 25)
+K1, K2, SPARE = range(12, 15)
+INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(15, 21)
 
 
 class Mode(NamedTuple):
@@ -284,81 +284,82 @@ def _expand_sliding(scene, mode, c):
 @inlined
 def _expand_blended(scene, mode, c):
     """Slip in which the friction coefficients vary with the sliding speed."""
-    mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
+    under = coefficients_under(scene, mode)
     low, _ = region_bounds(scene.law, mode.region)
+    w_s, w_k, _, _ = weights_in(scene.law, mode.region, max(abs(c[V, 0]), low))
+    mu_s1, mu_k1, mu_s2, mu_k2 = under
+    k1, k2 = -mode.sign * (w_s * mu_s1 + w_k * mu_k1), -mode.sign * (w_s * mu_s2 + w_k * mu_k2)
+    answer = _answer(scene.body, k1, k2)
     for k in range(ORDER + 1):
         _sine(c, k)
         c[EXCESS, k] = mode.sign * c[V, k] - (low if k == 0 else 0.0)
         expand_weights(scene.law, mode.region, c[EXCESS], k, c[BASIS], c[STATIC], c[KINETIC])
         c[K1, k] = -mode.sign * (c[STATIC, k] * mu_s1 + c[KINETIC, k] * mu_k1)
         c[K2, k] = -mode.sign * (c[STATIC, k] * mu_s2 + c[KINETIC, k] * mu_k2)
-        c[EPSILON, k] = _acceleration_term(scene.body, c, k)
+        _balance_term(scene.body, answer, c, k)
         if k < ORDER:
             _next_state(scene, c, k)
-    _reaction_terms(scene.body, c)
     # On the way to a jam all accelerations grow without bound: at some point it is one.
-    if not (c[D, 0] > 0.0 and c[INERTIA, 0] > 1e-6 * ring.about_axis(scene.body) * c[D, 0]):
+    _, determinant, inertia = ring.acceleration(scene.body, k1, k2, 0.0, 0.0, 0.0)
+    if not (determinant > 0.0 and inertia > 1e-6 * ring.about_axis(scene.body) * determinant):
         c[INERTIA, 0] = -1.0
 
 
 @hook
-def _acceleration_term(body, c, k):
-    """Coefficient `k` of the angular acceleration where K1 and K2 are series."""
+def _answer(body, k1, k2):
+    """What :func:`_balance_term` needs of the friction at the beginning of the step."""
 
 
-@_acceleration_term.implements(ring.TwoContacts)
-def _two_acceleration_term(body, c, k):
+@_answer.implements(ring.TwoContacts)
+def _two_answer(body, k1, k2):
+    # With the angular acceleration eliminated the balances are, for K_i = k_i,
+    #     (cb - k1 sb) N1 + (cb + k2 sb) N2 = A,   (sb + k1 lever) N1 - (sb - k2 lever) N2 = B.
     b = body
-    both = product(c[K1], c[K2], k)
-    difference = c[K1, k] - c[K2, k]
-    one = 1.0 if k == 0 else 0.0
-    RM, Mxi = b.radius * b.mass, b.mass * b.xi
-    cos_2beta = b.cos_beta * b.cos_beta - b.sin_beta * b.sin_beta
-    c[D, k] = difference * cos_2beta + (one + both) * 2.0 * b.sin_beta * b.cos_beta
-    T = difference * b.cos_beta + 2.0 * both * b.sin_beta
-    c[INERTIA, k] = (b.inertia + Mxi * b.xi) * c[D, k] - RM * b.xi * T
-    c[LEVER, k] = b.gravity * (RM * T - Mxi * c[D, k])
-    c[PULL, k] = RM * (c[K1, k] + c[K2, k])
-    c[LIFT, k] = (b.gravity * c[COS, k] + b.xi * c[SQUARE, k]) * b.sin_beta
-    c[EPSILON, k] = 0.0
-    moment = product(c[SIN], c[LEVER], k) + product(c[LIFT], c[PULL], k)
-    return (moment - product(c[INERTIA], c[EPSILON], k)) / c[INERTIA, 0]
+    sb, cb = b.sin_beta, b.cos_beta
+    lever = cb - b.mass * b.xi * b.radius / ring.about_axis(b)
+    a1, a2 = cb - k1 * sb, cb + k2 * sb
+    b1, b2 = sb + k1 * lever, sb - k2 * lever
+    scale = 1.0 / (a2 * b1 + a1 * b2)
+    return lever, k1, k2, a1 * scale, a2 * scale, b1 * scale, b2 * scale
 
 
-@_acceleration_term.implements(ring.OneContact)
-def _one_acceleration_term(body, c, k):
-    c[D, k] = c[INERTIA, k] = 1.0 if k == 0 else 0.0
-    c[LIFT, k] = body.gravity / body.radius * c[COS, k] + c[SQUARE, k]
-    return product(c[K1], c[LIFT], k) - body.gravity / body.radius * c[SIN, k]
+@_answer.implements(ring.OneContact)
+def _one_answer(body, k1, k2):
+    return 0.0
 
 
 @hook
-def _reaction_terms(body, c):
-    """Series of the normal reactions where K1 and K2 are series."""
+def _balance_term(body, answer, c, k):
+    """Coefficient `k` of the angular acceleration, of the reactions and of the inertia where K1 and K2 are series."""
 
 
-@_reaction_terms.implements(ring.TwoContacts)
-def _two_reaction_terms(body, c):
+@_balance_term.implements(ring.TwoContacts)
+def _two_balance_term(body, answer, c, k):
     b = body
     sb, cb = b.sin_beta, b.cos_beta
-    plus, minus = c[LEVER], c[PULL]
-    for k in range(ORDER + 1):
-        plus[k] = b.gravity * (c[COS, k] * cb - c[SIN, k] * sb) + b.xi * (c[SQUARE, k] * cb - c[EPSILON, k] * sb)
-        minus[k] = b.gravity * (c[COS, k] * cb + c[SIN, k] * sb) + b.xi * (c[SQUARE, k] * cb + c[EPSILON, k] * sb)
-        n1 = b.gravity * (c[SIN, k] * cb + c[COS, k] * sb) + b.xi * (c[SQUARE, k] * sb + c[EPSILON, k] * cb)
-        n2 = -b.gravity * (c[SIN, k] * cb - c[COS, k] * sb) + b.xi * (c[SQUARE, k] * sb - c[EPSILON, k] * cb)
-        n1 = b.mass * (n1 - product(c[K2], plus, k))
-        n2 = b.mass * (n2 + product(c[K1], minus, k))
-        c[NORMAL_1, k] = c[NORMAL_2, k] = 0.0
-        c[NORMAL_1, k] = (n1 - product(c[D], c[NORMAL_1], k)) / c[D, 0]
-        c[NORMAL_2, k] = (n2 - product(c[D], c[NORMAL_2], k)) / c[D, 0]
+    lever, k1, k2, a1, a2, b1, b2 = answer
+    about_axis = ring.about_axis(b)
+    # Friction but for what the reactions of this order make of it.
+    f1, f2 = product(c[K1, 1:], c[NORMAL_1], k - 1), product(c[K2, 1:], c[NORMAL_2], k - 1)
+    radial = b.mass * (b.gravity * c[COS, k] + b.xi * c[SQUARE, k]) + (f1 - f2) * sb
+    tangential = b.mass * b.gravity * (1.0 - b.mass * b.xi * b.xi / about_axis) * c[SIN, k] - (f1 + f2) * lever
+    c[NORMAL_1, k] = b2 * radial + a2 * tangential
+    c[NORMAL_2, k] = b1 * radial - a1 * tangential
+    friction = (f1 + k1 * c[NORMAL_1, k]) + (f2 + k2 * c[NORMAL_2, k])
+    c[EPSILON, k] = (b.radius * friction - b.mass * b.gravity * b.xi * c[SIN, k]) / about_axis
+    one = 1.0 if k == 0 else 0.0
+    both = product(c[K1], c[K2], k)
+    difference = (cb * lever - sb * sb) * (c[K1, k] - c[K2, k])
+    c[INERTIA, k] = about_axis * (2.0 * sb * (one * cb + both * lever) + difference)
 
 
-@_reaction_terms.implements(ring.OneContact)
-def _one_reaction_terms(body, c):
-    for k in range(ORDER + 1):
-        c[NORMAL_1, k] = body.mass * (body.gravity * c[COS, k] + body.radius * c[SQUARE, k])
-        c[NORMAL_2, k] = c[NORMAL_1, k]
+@_balance_term.implements(ring.OneContact)
+def _one_balance_term(body, answer, c, k):
+    c[INERTIA, k] = 1.0 if k == 0 else 0.0
+    load = body.mass * (body.gravity * c[COS, k] + body.radius * c[SQUARE, k])
+    c[NORMAL_1, k] = c[NORMAL_2, k] = load
+    friction = product(c[K1], c[NORMAL_1], k)
+    c[EPSILON, k] = (friction / body.mass - body.gravity * c[SIN, k]) / body.radius
 
 
 @inlined
@@ -422,8 +423,8 @@ def _two_hold(body, m1, m2, c):
     sb, cb = b.sin_beta, b.cos_beta
     mean, half = 0.5 * (m1 + m2), 0.5 * (m1 - m2)
     moment = b.inertia + b.mass * b.xi * b.xi
-    friction, difference, load, total, linear = c[K1], c[K2], c[D], c[PULL], c[SPARE]
-    share = c[LEVER]
+    # Rows that only slip needs.
+    friction, difference, load, total, linear, share = c[K1], c[K2], c[STATIC], c[KINETIC], c[SPARE], c[BASIS]
     for k in range(ORDER + 1):
         friction[k] = (moment * c[EPSILON, k] + b.mass * b.gravity * b.xi * c[SIN, k]) / b.radius
         difference[k] = (b.mass * (b.xi * c[EPSILON, k] + b.gravity * c[SIN, k]) - friction[k] * cb) / sb

@@ -9,6 +9,7 @@ so is every mode of a law with bristles. The family of the law decides which of 
 from __future__ import annotations
 
 from math import inf, isfinite, isnan, nan
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,7 +38,7 @@ from ringsweep.hooks import (
     to_stiff,
     watch,
 )
-from ringsweep.jit import hook, inlined, kernel, take
+from ringsweep.jit import borrowed, hook, inlined, kernel, take
 from ringsweep.physics.drives import next_knot
 from ringsweep.physics.friction import DYNAMIC, SET_VALUED, SMOOTH
 from ringsweep.regimes import BROKEN, COMPLETE, RUNNING
@@ -158,17 +159,38 @@ def _first_creep_event(scene, mode, t, x, line, s, within, after, stages):
     return event, end
 
 
+class Trial(NamedTuple):
+    """Implicit step to try, and the last one that was accepted with the size of its error; 0 if there is none."""
+
+    h: float
+    last: float
+    size: float
+
+
 @inlined
-def _creep(scene, record, mode, t, y, x, line, h, horizon, tolerance, guards, stages):
+def _next_trial(trial, s, size, cut, rejected):
+    """What to try after a step `s` whose error was `size`; `cut` if it was shortened to end somewhere."""
+    size = max(size, 1e-8)
+    # A step that would have been too long a moment ago will hardly be short enough now.
+    h = s * min(1.0 if rejected else 6.0, 0.9 * size**-0.2)
+    # Towards the end of a creep steps shorten at a steady rate, which the step before tells (Gustafsson).
+    if trial.last > 0.0:
+        h = min(h, s * 0.9 * s / trial.last * (trial.size / (size * size)) ** 0.2)
+    # A step cut short by the horizon says little about the next one.
+    return Trial(max(trial.h, h), trial.last, trial.size) if cut else Trial(h, s, size)
+
+
+@inlined
+def _creep(scene, record, mode, t, y, x, line, trial, horizon, tolerance, guards, stages):
     """One accepted implicit step from the state `y`, which is `x` in its own coordinates, cut at the first event.
 
     Returns
     -------
     tuple
-        Guard or -1, length of the step (negative if none was found), state, record, next step to try.
+        Guard or -1, length of the step (negative if none was found), state, record, next :class:`Trial`.
     """
     scales = stiff_scales(scene, tolerance, x)
-    s = min(h, horizon)
+    s = min(trial.h, horizon)
     event, end = -1, s
     for _ in range(200):
         x_next, error = rosenbrock.step(scene, mode, t, x, line, s, stages)
@@ -187,13 +209,11 @@ def _creep(scene, record, mode, t, y, x, line, h, horizon, tolerance, guards, st
             s, size = end, short
         s *= max(0.2, 0.9 * size**-0.2) if isfinite(size) else 0.1
     else:
-        return -1, -1.0, y, record, h
-    grown = s * min(6.0, 0.9 * max(size, 1e-8) ** -0.2)
-    # A step cut short by the horizon says little about the next one.
-    h = max(h, grown) if s == horizon else grown
+        return -1, -1.0, y, record, trial
+    trial = _next_trial(trial, s, size, s == horizon, s < min(trial.h, horizon))
     if event >= 0:
         if end == 0.0:
-            return guards + event, 0.0, y, record, h
+            return guards + event, 0.0, y, record, trial
         event += guards
         within = stiff_view(scene, mode, t + 0.5 * end, rosenbrock.dense(x, x_next, stages, 0.5))
         after = stiff_view(scene, mode, t + end, x_next)
@@ -212,7 +232,7 @@ def _creep(scene, record, mode, t, y, x, line, h, horizon, tolerance, guards, st
         record = stiff_watch(scene, record, mode, right, t + (half + 0.5) * end, (half + 0.5 - done) * end)
         done = half + 0.5
         velocity, acceleration = right[1][1], right[1][2]
-    return event, end, from_stiff(scene, t + end, x_next), record, h
+    return event, end, from_stiff(scene, t + end, x_next), record, trial
 
 
 @inlined
@@ -262,12 +282,15 @@ def _either_stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c
         x = to_stiff(scene, t, y)
         line = linearise(scene, mode, t, x)
         if is_stiff(scene, mode, y, line):
+            if trial.last == 0.0:
+                # What is left of the way in ends at the rate of the decay.
+                trial = Trial(min(trial.h, -1.0 / line[1][3]), 0.0, 0.0)
             guard, s, y, record, trial = _creep(
                 scene, record, mode, t, y, x, line, trial, horizon, tolerances[1], guards, stages
             )
             return True, guard, s, y, record, trial
     guard, s, y, record = _along(scene, record, mode, t, y, horizon, tolerances[0], c, guards, work)
-    return False, guard, s, y, record, 1e-6 * scene.span
+    return False, guard, s, y, record, Trial(1e-6 * scene.span, 0.0, 0.0)
 
 
 @_stride.implements(*DYNAMIC)
@@ -368,7 +391,7 @@ def trace(batch, tolerances, limit, spacing, times, table):
     stages = np.empty((rosenbrock.STAGES, len(y)))
     status, mode = enter(scene, t, y)
     record = _outset(scene.law, scene, mode, t, y, tolerances, c)
-    trial = 1e-6 * scene.span
+    trial = Trial(1e-6 * scene.span, 0.0, 0.0)
     n = 0
     entered = True
     implicit = False
@@ -380,8 +403,9 @@ def trace(batch, tolerances, limit, spacing, times, table):
             break
         before = t
         horizon = min(scene.span, next_knot(scene.drive, t)) - t
+        trial = Trial(min(trial.h, spacing), trial.last, trial.size)
         implicit, guard, s, y_next, record, trial = _stride(
-            scene.law, scene, record, mode, t, y, min(trial, spacing), horizon, tolerances, c, guards, work, stages
+            scene.law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages
         )
         if s > 0.0:
             parts = 1 if implicit else int(s / spacing) + 1
@@ -425,12 +449,19 @@ def integrate(batch, tolerances, limit, out, steps):
     c = np.zeros((count, ORDER + 3))
     work = np.empty((STACK, ORDER + 3))
     stages = np.empty((rosenbrock.STAGES, len(embark(first)[1])))
+    _integrate(batch, tolerances, limit, out, steps, guards, c, work, stages)
+
+
+@inlined
+def _integrate(batch, tolerances, limit, out, steps, guards, c, work, stages):
+    c, work, stages = borrowed(c), borrowed(work), borrowed(stages)
+    out, steps = borrowed(out), borrowed(steps)
     for i in range(len(steps)):
         scene = take(batch, i)
         t, y = embark(scene)
         status, mode = enter(scene, t, y)
         record = _outset(scene.law, scene, mode, t, y, tolerances, c)
-        trial = 1e-6 * scene.span
+        trial = Trial(1e-6 * scene.span, 0.0, 0.0)
         n = stalled = 0
         before = -1.0
         while status == RUNNING:
