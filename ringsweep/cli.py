@@ -204,6 +204,8 @@ def _info(arguments: argparse.Namespace) -> None:
     print(result.attrs.get("title", arguments.dataset))
     print("dimensions:", ", ".join(f"{name} {size}" for name, size in result.sizes.items()) or "none: a single run")
     for name, axis in result.coords.items():
+        if "contender" in axis.dims:
+            continue
         if axis.dtype.kind not in "iuf":
             print(f"  {name}: {', '.join(dict.fromkeys(map(str, axis.values.flat)))}")
             continue

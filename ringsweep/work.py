@@ -209,11 +209,12 @@ def _verdict(ds: xr.Dataset, unit: str) -> list[str]:
     name = attributes.get("recommended", attributes.get("closest"))
     k = ds["solver"].values.tolist().index(name)
     worst, wrong = _bounds(ds).max(axis=1)[k], int((ds["regime_wrong"][k] == 1).sum())
-    reached = f"{wrong or 'no'} wrong regime{'s' * (wrong != 1)}, errors up to {worst:.1e} (the reference's included)"
+    errors = f"errors up to {worst:.1e} (the reference's included)" if np.isfinite(worst) else "runs that failed"
+    reached = f"{wrong or 'no'} wrong regime{'s' * (wrong != 1)}, {errors}"
     words.append(
         f"certificates, on unless told otherwise, make a run take {attributes['certificate_cost']:.2g} times as long"
     )
-    target = f"target {attributes['target']:g} ({unit} at the end, s at separation)"
+    target = f"target {attributes['target']:g} ({unit} at the end{', s at separation' * ('error_separation' in ds)})"
     if "recommended" in attributes:
         words.append(f"{target} in every cell sampled is met fastest by this one: {reached}")
         return [*words, f"solver: {{{name}}}"]
@@ -314,7 +315,7 @@ def _race(
             expected = more * before.seconds[0]
             if expected > _BUDGET:
                 left_out.append(
-                    f"{method.name}, {_setting(method)} (some {expected:.0f} s a round; at most {_BUDGET:g})"
+                    f"{method.name}, {_setting(method)} (some {expected:.0f} s a round; {_BUDGET:g} are allowed)"
                 )
                 bar.update(rounds + 1)
                 continue
