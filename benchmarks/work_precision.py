@@ -20,11 +20,10 @@ import os
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
-from io import StringIO
 from math import sqrt
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -142,16 +141,16 @@ class Effort:
     fewest: int
     """Cells of the slowest."""
     rounds: int
-    largest: int
-    """Steps of `rk4`, at most."""
+    finest: int
+    """Decades of steps of `rk4` beyond the coarsest."""
     every: int
     """One in so many of the tolerances."""
     side: int
     """Of the family whose throughput is measured."""
 
 
-FULL = Effort(cells=32, few=8, fewest=4, rounds=3, largest=10**8, every=1, side=SIDE)
-QUICK = Effort(cells=4, few=2, fewest=1, rounds=2, largest=10**6, every=2, side=16)
+FULL = Effort(cells=32, few=8, fewest=4, rounds=3, finest=5, every=1, side=SIDE)
+QUICK = Effort(cells=4, few=2, fewest=1, rounds=2, finest=3, every=2, side=16)
 
 
 @dataclass(frozen=True)
@@ -208,11 +207,12 @@ def contenders(scene: Scene, effort: Effort) -> tuple[list[Contender], list[str]
     }
     for rtol in tolerances[scene.method]:
         enter(scene.method, f"rtol {rtol:.0e}", partial(own_of, scene, scene.method, rtol=rtol), everything)
-    for steps in [10**k for k in range(3, 9) if 10**k <= effort.largest]:
-        # On the belt a shorter step than this is left to rounding, and a longer one leaves the stable.
-        if belt and not 10**4 <= steps <= 10**7:
-            continue
-        count = everything if steps <= 10**6 else few if steps <= 10**7 else fewest
+    # Each scene has the decades in which `rk4` goes from hopeless to as good as it gets.
+    coarsest = 1e3 if scene is SCENES["stiff"] else 1e4 if belt else 1e2
+    for steps in [round(coarsest * 10**k) for k in range(effort.finest + 1)]:
+        if belt and steps > 10**7:
+            break
+        count = everything if steps <= 10**6 else fewest
         enter("rk4", f"{steps:.0e} steps", partial(own_of, scene, "rk4", steps=steps), count)
         if scene.law is not None and scene.law.v0 > 0.0 and steps <= 10**7 and in_c.compiler():
             enter("C, rk4", f"{steps:.0e} steps", lambda c, n=steps: in_c.ring(scene.law, c, n), count)
@@ -485,6 +485,15 @@ def throughput(effort: Effort) -> tuple[list[list[str]], list[list[str]]]:
     return targets, [[name, f"{rate:.0f}"] for name, rate in rates.items()]
 
 
+#: What the report says of itself.
+ABOUT = """
+One core, warm, no certificates; medians over rounds in which contenders alternate. Errors are those of φ(T), or x(T) on
+the belt, and of the time of separation; the regime of a peer is whether the body separates. diffrax's time is that of a
+lane of a full solve.
+
+![error against run time](work_precision.png)
+"""
+
 # ---- the command ---------------------------------------------------------------------------
 
 
@@ -515,18 +524,12 @@ def main() -> None:
     warnings.filterwarnings("ignore", message="lsoda", category=UserWarning)
     begin = time.perf_counter()
 
-    where = machine(("numbalsoda", "diffrax", "jax", "heyoka", "xarray"))
-    print(where + f"\n{in_c.compiler() or 'no C compiler'}")
-    report = StringIO()
-    with redirect_stdout(report):
-        print("# Error against run time\n")
-        print("\n\n".join(["`python -m benchmarks.work_precision` on", *where.splitlines(), in_c.compiler() or ""]))
-        print(
-            "\nOne core, warm, no certificates; medians over rounds in which contenders alternate. Errors are those of "
-            "φ(T), or x(T) on the belt, and of the time of separation; the regime of a peer is whether the body "
-            "separates. diffrax's time is that of a lane of a full solve.\n\n"
-            "![error against run time](work_precision.png)"
-        )
+    where = machine(("numbalsoda", "diffrax", "jax", "heyoka", "xarray")) + f"\n{in_c.compiler() or 'no C compiler'}"
+    print(where)
+    folder = Path() if arguments.quick or arguments.scene else RESULTS
+    folder.mkdir(exist_ok=True)
+    report = "# Error against run time\n\n`python -m benchmarks.work_precision` on\n\n"
+    report += "".join(f"- {line}\n" for line in where.splitlines()) + ABOUT
     measured: dict[str, Measured] = {}
     with one_core():
         for name in arguments.scene or SCENES:
@@ -535,9 +538,10 @@ def main() -> None:
             print("\n".join(found.words))
             table(HEADER, lines(found.data))
             print(f"({time.perf_counter() - begin:.0f} s so far)")
-            with redirect_stdout(report):
-                print(f"\n## {SCENES[name].title}\n\n" + "\n".join(f"- {words}" for words in found.words) + "\n")
-                print(markdown(HEADER, lines(found.data)), end="")
+            report += f"\n## {SCENES[name].title}\n\n" + "".join(f"- {words}\n" for words in found.words)
+            report += "\n" + markdown(HEADER, lines(found.data))
+            # Scene by scene: what an interrupted run has measured is there.
+            write(folder, report, measured, where)
     targets = []
     if "smooth" in measured:
         targets.append(against_peer(measured["smooth"], ("heyoka", "rtol 1e-09"), 1.0, 8.0))
@@ -554,17 +558,18 @@ def main() -> None:
         if rows:
             heading(title)
             table(header, rows)
-            with redirect_stdout(report):
-                print(f"\n## {title}\n\n{markdown(header, rows)}", end="")
+            report += f"\n## {title}\n\n{markdown(header, rows)}"
+    write(folder, report, measured, where)
+    print(f"\nwork_precision.md, .nc and .png are in {folder.resolve()}; {time.perf_counter() - begin:.0f} s in all")
 
-    folder = Path() if arguments.quick or arguments.scene else RESULTS
-    folder.mkdir(exist_ok=True)
-    (folder / "work_precision.md").write_text(report.getvalue())
+
+def write(folder: Path, report: str, measured: dict[str, Measured], where: str) -> None:
+    """Write the report, the figures in groups named after the scenes, and the picture."""
+    (folder / "work_precision.md").write_text(report)
     for k, (name, found) in enumerate(measured.items()):
         found.data.attrs["machine"] = where
         found.data.to_netcdf(folder / "work_precision.nc", group=name, mode="a" if k else "w")
-    draw(measured).savefig(folder / "work_precision.png", dpi=90)
-    print(f"\nwork_precision.md, .nc and .png are in {folder.resolve()}; {time.perf_counter() - begin:.0f} s in all")
+    draw(measured).savefig(folder / "work_precision.png", dpi=80)
 
 
 if __name__ == "__main__":
