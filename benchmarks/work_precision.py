@@ -394,11 +394,13 @@ def draw(measured: dict[str, Measured]) -> Figure:
             second.text(0.5, 0.5, "nothing separates here", ha="center", transform=second.transAxes)
         else:
             plots.work_precision(data, "error_separation", second)
+            # The first has it already.
+            second.get_legend().remove()
         for method, line in styles.items():
             own_rows = data.isel(contender=data.method.values == method)
             share = 100.0 * own_rows.regime_wrong.mean("cell")
             third.plot(own_rows.time_per_run, share, color=line.get_color(), marker=line.get_marker(), label=method)
-        third.set(xscale="log", xlabel="time per run, one core [s]", ylabel="cells whose regime is wrong [%]")
+        third.set(xscale="log", xlabel="time per run, one core (s)", ylabel="cells whose regime is wrong (%)")
         third.set_ylim(-4.0, 104.0)
         third.grid(True, color="#E6E6E6", linewidth=0.6)
     return figure

@@ -22,7 +22,7 @@ jax.config.update("jax_enable_x64", True)
 
 #: Lanes of an explicit solve: many share what an iteration costs, though it lasts as long as the longest run.
 LANES = 256
-#: Where an implicit one gives up, of which a step costs far more.
+#: Steps after which a lane gives up and counts as failed: all lanes wait for the last.
 _MOST_STEPS = {"ring": 20_000, "belt": 100_000}
 
 
