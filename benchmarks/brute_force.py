@@ -1,6 +1,6 @@
 """Regimes of 500 random scenes by brute force: the data of ``tests/test_brute_force.py``.
 
-    python benchmarks/brute_force.py tests/data/brute_force.csv
+    python -m benchmarks.brute_force tests/data/brute_force.csv
 
 takes about six minutes on one core. Nothing of the package is used: the balances of momentum are
 solved anew, and every scene is integrated twice, the second time at twice the step or a hundred

@@ -9,10 +9,11 @@ if TYPE_CHECKING:
     from ringsweep.engine import run, sweep
     from ringsweep.errors import InputError
     from ringsweep.single import simulate
+    from ringsweep.work import precision
 
-__all__ = ["InputError", "run", "simulate", "sweep"]
+__all__ = ["InputError", "precision", "run", "simulate", "sweep"]
 
-_HOMES = {"run": "engine", "sweep": "engine", "simulate": "single", "InputError": "errors"}
+_HOMES = {"run": "engine", "sweep": "engine", "simulate": "single", "precision": "work", "InputError": "errors"}
 
 
 def __getattr__(name: str) -> Any:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import argparse
 import json
 import logging
+import math
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -70,6 +72,19 @@ def _parser() -> argparse.ArgumentParser:
     )
     simulate.set_defaults(verb=_simulate)
 
+    precision = verbs.add_parser("precision", help="error against run time for this scene, and the cheapest solver")
+    precision.add_argument("config", metavar="CONFIG.yaml")
+    precision.add_argument("-o", "--output", metavar="OUT.nc", help="default: the configuration's name with -precision")
+    precision.add_argument(
+        "--target",
+        type=positive_number,
+        metavar="E",
+        help="largest error allowed: rad or m at the end, s at separation (default: 1e-6)",
+    )
+    precision.add_argument("--cells", type=whole_number, metavar="N", help="cells to draw from the sweep (default: 16)")
+    precision.add_argument("--rounds", type=whole_number, metavar="N", help="timings of each setting (default: 3)")
+    precision.set_defaults(verb=_precision)
+
     info = verbs.add_parser("info", help="tell what a result file holds")
     info.add_argument("dataset", metavar="OUT.nc")
     info.set_defaults(verb=_info)
@@ -85,6 +100,14 @@ def whole_number(text: str) -> int:
     return int(text)
 
 
+def positive_number(text: str) -> float:
+    # "nan" compares as false.
+    with suppress(ValueError):
+        if 0.0 < float(text) < math.inf:
+            return float(text)
+    raise argparse.ArgumentTypeError(f"{text!r} is not a number greater than 0")
+
+
 def _run(arguments: argparse.Namespace) -> None:
     from ringsweep.config import load
 
@@ -97,6 +120,8 @@ def _run(arguments: argparse.Namespace) -> None:
 
     # A file there that is no result of ours is refused rather than replaced.
     result = storage.load(target) if target.exists() else None
+    if result is not None and "contender" in result.dims:
+        raise InputError(str(target), "holds error against run time: name another file for a sweep")
     same = {"configuration": json.dumps(config.source, sort_keys=True), "ringsweep_sources": SOURCES_DIGEST}
     if result is not None and not arguments.fresh and same.items() <= _texts(result.attrs).items():
         print(f"{target} holds this sweep already (--fresh runs it again)")
@@ -143,12 +168,32 @@ def _simulate(arguments: argparse.Namespace) -> None:
     from ringsweep.single import history
 
     if target.exists() and "time" not in storage.load(target).dims:
-        raise InputError(str(target), "holds a sweep: name another file for the history of a run")
+        raise InputError(str(target), "holds no history: name another file for that of a run")
 
     result = history(config)
     storage.save(result, target)
     plots.save(plots.history(result), picture)
     print(result.attrs["outcome"])
+    print(f"wrote {target}\nwrote {picture}")
+
+
+def _precision(arguments: argparse.Namespace) -> None:
+    from ringsweep.config import load
+
+    config = load(arguments.config)
+    target, picture = _outputs(arguments.output or f"{config.name}-precision.nc")
+
+    from ringsweep import plots, storage
+    from ringsweep.work import measure, report
+
+    if target.exists() and "contender" not in storage.load(target).dims:
+        raise InputError(str(target), "holds something else: name another file for error against run time")
+
+    given = {name: getattr(arguments, name) for name in ("target", "cells", "rounds")}
+    result = measure(config, **{name: value for name, value in given.items() if value is not None})
+    storage.save(result, target)
+    plots.save(plots.work_precision(result), picture)
+    print(report(result))
     print(f"wrote {target}\nwrote {picture}")
 
 
@@ -159,12 +204,19 @@ def _info(arguments: argparse.Namespace) -> None:
     print(result.attrs.get("title", arguments.dataset))
     print("dimensions:", ", ".join(f"{name} {size}" for name, size in result.sizes.items()) or "none: a single run")
     for name, axis in result.coords.items():
+        if "contender" in axis.dims:
+            continue
         if axis.dtype.kind not in "iuf":
             print(f"  {name}: {', '.join(dict.fromkeys(map(str, axis.values.flat)))}")
             continue
         unit = axis.attrs.get("units", "1")
         print(f"  {name}: {axis.values.min():g} to {axis.values.max():g}{'' if unit == '1' else f' {unit}'}")
-    _summarise(result)
+    if "contender" in result.dims:
+        from ringsweep.work import report
+
+        print(report(result))
+    else:
+        _summarise(result)
     configuration = json.loads(result.attrs.get("configuration", "{}"))
     print("solver:", json.dumps(configuration.get("solver", result.attrs.get("method"))))
     print("versions:", result.attrs["ringsweep_version"], result.attrs.get("versions", ""))

@@ -125,7 +125,7 @@ def compute(config: Config, *, jobs: int | None, progress: bool) -> xr.Dataset:
     results = parallel(joblib.delayed(_task)(config, structure, chunk, outcomes) for structure, chunk in tasks)
 
     columns: dict[str, NDArray[Any]] = {}
-    with _bar(total, progress) as bar:
+    with progress_bar(total, progress) as bar:
         for chunk, result in results:
             for name, column in _columns(outcomes, result):
                 columns.setdefault(name, np.full(total, np.nan))[chunk] = column
@@ -175,7 +175,8 @@ def _columns(outcomes: tuple[str, ...], result: Result) -> Iterator[tuple[str, N
         yield "stiffness", result.stiffness
 
 
-def _bar(total: int, progress: bool) -> Any:
+def progress_bar(total: int, progress: bool) -> Any:
+    """A bar of so many runs, where there is a terminal or a notebook to show it."""
     # tqdm takes a notebook's stream for a pipe and would stay silent there.
     notebook = "ipykernel" in sys.modules
     return tqdm(total=total, unit="run", disable=(False if notebook else None) if progress else True)

@@ -93,3 +93,23 @@ HISTORY: dict[str, Variable] = {
     "deflection_2": Variable("deflection of the bristles at contact 2", "m"),
     "mode": Variable("friction mode", dtype="int8", flags=MODES),
 }
+
+#: Of what `ringsweep.work` measures; a length stands in for the angle where the body moves along a line.
+PRECISION: dict[str, Variable] = {
+    "time_per_run": Variable("time per run in one thread", "s"),
+    "steps": Variable("steps of the integration, mean over the cells"),
+    "error_end": Variable("error of the angle of the body at the end", "rad"),
+    "error_separation": Variable("error of the time of separation, where both separate", "s"),
+    "regime_wrong": Variable(
+        "whether regime, motion or separating contact differ from those of the reference",
+        dtype="int8",
+        flags={0: "right", 1: "wrong"},
+    ),
+    "flagged": Variable(
+        "whether the certificate of this setting does not pass the answer: not certified, or replaced by a finer run's",
+        dtype="int8",
+        flags={0: "passed", 1: "flagged"},
+    ),
+    "reference_error_end": Variable("difference of the two tightest runs in the angle of the body at the end", "rad"),
+    "reference_error_separation": Variable("difference of the two tightest runs in the time of separation", "s"),
+}

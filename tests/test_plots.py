@@ -61,6 +61,19 @@ def make_history(count: int = 2000, ring: bool = True) -> xr.Dataset:
     return ds
 
 
+def make_work(methods: int = 3, settings: int = 4, cells: int = 5) -> xr.Dataset:
+    """Errors that fall as runs take longer, under methods that nobody has heard of."""
+    k, j, i = np.meshgrid(range(methods), range(settings), range(cells), indexing="ij")
+    error = 10.0 ** (-1.0 - 2 * j - 0.1 * k) * (1 + i)
+    return xr.Dataset(
+        {
+            "time_per_run": ("contender", 10.0 ** (0.3 * j + k - 6)[..., 0].ravel(), {"units": "s"}),
+            "error_end": (("contender", "cell"), error.reshape(-1, cells), {"units": "rad", "long_name": "error"}),
+        },
+        coords={"method": ("contender", [f"method {n}" for n in k[..., 0].ravel()])},
+    )
+
+
 def mesh(figure: Figure, panel: int = 0) -> QuadMesh:
     return next(artist for artist in figure.axes[panel].collections if isinstance(artist, QuadMesh))
 
@@ -360,6 +373,81 @@ def test_a_belt_has_panels_of_its_own():
         "friction force (N)",
     ]
     assert figure.axes[3].get_xlim()[1] < 0.5 < figure.axes[2].get_xlim()[1]
+
+
+class TestWorkPrecision:
+    def test_a_curve_for_each_method_shows_the_median_and_a_bar_the_largest(self):
+        ds = make_work()
+        axes = plots.work_precision(ds).axes[0]
+        assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+        curves = {line.get_label(): line for line in axes.lines if str(line.get_label()).startswith("method")}
+        for name in ("method 0", "method 1", "method 2"):
+            rows = ds["method"].values == name
+            np.testing.assert_array_equal(curves[name].get_xdata(), ds["time_per_run"][rows])
+            np.testing.assert_allclose(curves[name].get_ydata(), ds["error_end"][rows].median("cell"))
+        tops = [path.vertices[1, 1] for bars in axes.collections for path in bars.get_paths()]
+        np.testing.assert_allclose(tops, ds["error_end"].max("cell"))
+        assert axes.get_ylabel() == "error (rad)"
+
+    def test_a_dozen_methods_are_told_apart(self):
+        axes = plots.work_precision(make_work(13)).axes[0]
+        looks = {(line.get_color(), line.get_marker()) for line in axes.lines if "method" in str(line.get_label())}
+        assert len(looks) == 13
+
+    def test_no_error_lies_on_a_marked_floor_and_a_failure_on_a_ceiling(self):
+        ds = make_work(1)
+        ds["error_end"][3], ds["error_end"][0] = 0.0, np.inf
+        axes = plots.work_precision(ds).axes[0]
+        (curve,) = (line for line in axes.lines if line.get_label() == "method 0")
+        drawn = curve.get_ydata()
+        assert 0.0 < drawn[3] < ds["error_end"].values[2].min()
+        assert np.isfinite(drawn[0])
+        assert drawn[0] > ds["error_end"].values[1].max()
+        words = [text.get_text() for text in axes.get_legend().get_texts()]
+        assert words == ["method 0", "no error (at the floor)", "failed (at the ceiling)"]
+
+    def test_all_may_be_free_of_error(self):
+        ds = make_work(1)
+        ds["error_end"][:] = 0.0
+        assert (plots.work_precision(ds).axes[0].lines[0].get_ydata() > 0.0).all()
+
+    def test_a_cell_without_such_an_error_does_not_count_and_a_contender_without_any_is_not_drawn(self):
+        ds = make_work(2)
+        ds["error_end"][4:] = np.nan
+        ds["error_end"][0, 1:] = np.nan
+        axes = plots.work_precision(ds).axes[0]
+        assert [line.get_label() for line in axes.lines if "method" in str(line.get_label())] == ["method 0"]
+        with pytest.raises(InputError, match="no value"):
+            plots.work_precision(ds.isel(contender=slice(4, None)))
+
+    def test_target_recommendation_and_wrong_regimes_are_shown_where_there_are_any(self):
+        ds = make_work()
+        plain = [text.get_text() for text in plots.work_precision(ds).axes[0].get_legend().get_texts()]
+        assert plain == ["method 0", "method 1", "method 2"]
+        names = [f"method: {k}" for k in range(ds.sizes["contender"])]
+        ds = ds.assign_coords(solver=("contender", names)).assign_attrs(target=1e-4, recommended=names[6])
+        ds["regime_wrong"] = ds["error_end"].dims, (ds["error_end"] > 1e-2).values.astype("int8")
+        axes = plots.work_precision(ds).axes[0]
+        words = [text.get_text().replace("\n", " ") for text in axes.get_legend().get_texts()]
+        assert words[3:] == ["target, 0.0001", "hollow: a regime is wrong in some cell", "recommended: 6"]
+        hollow = sum(len(line.get_xdata()) for line in axes.lines if line.get_markerfacecolor() == "white")
+        assert hollow == (ds["regime_wrong"] == 1).any("cell").sum()
+        (ring,) = (line for line in axes.lines if line.get_markerfacecolor() == "none" and line.get_markersize() > 10)
+        np.testing.assert_array_equal(ring.get_xdata(), [ds["time_per_run"].values[6]])
+
+    def test_axes_that_are_given_are_drawn_in(self):
+        figure = Figure()
+        _, right = figure.subplots(1, 2)
+        assert plots.work_precision(make_work(), ax=right) is figure
+        assert right.lines
+
+    def test_other_datasets_and_unknown_errors_are_refused(self):
+        with pytest.raises(InputError, match="has no contender, cell"):
+            plots.work_precision(make_sweep())
+        with pytest.raises(InputError, match="did you mean error_end"):
+            plots.work_precision(make_work(), "error_and")
+        with pytest.raises(InputError, match="work_precision"):
+            plots.regime_map(make_work())
 
 
 @pytest.mark.parametrize("name", ["map.png", "map.PDF", "map.svg"])

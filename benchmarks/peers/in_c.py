@@ -1,0 +1,85 @@
+"""`rk4.c`, Runge-Kutta 4 by hand in scalar C, compiled at run time."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.peers.physics import (
+    BALL,
+    GRAVITY,
+    HALF_DISTANCE,
+    INERTIA,
+    MASS,
+    RADIUS,
+    REST,
+    ROUGH,
+    SPAN,
+    Cell,
+    Found,
+    Law,
+)
+
+FLAGS = ("-O3", "-march=native", "-ffast-math")
+#: Angular velocity below which a reversal does not count, as the package has it.
+_EPSILON_OMEGA = 1e-3
+#: Columns of its outcomes.
+_COLUMNS, _T_END, _PHI_END, _CONTACT = 14, 0, 1, 3
+
+
+class _Scene(ctypes.Structure):
+    """`scene_t` of rk4.c."""
+
+    _fields_ = [
+        (name, ctypes.c_double)
+        for name in (
+            "mass", "inertia", "half_distance", "ball_radius", "radius", "gravity",
+            "rough_s", "rough_k", "rest_s", "rest_k", "alpha", "v0", "epsilon_omega",
+        )
+    ]  # fmt: skip
+
+
+def compiler() -> str | None:
+    """What the compiler calls itself, or None if there is none."""
+    found = shutil.which("cc")
+    if found is None:
+        return None
+    return subprocess.run([found, "--version"], check=True, capture_output=True, text=True).stdout.splitlines()[0]
+
+
+@cache
+def _library() -> Any:
+    source = Path(__file__).with_name("rk4.c")
+    with tempfile.TemporaryDirectory() as directory:
+        target = Path(directory) / "rk4.so"
+        subprocess.run(["cc", *FLAGS, "-shared", "-fPIC", str(source), "-o", str(target), "-lm"], check=True)
+        run = ctypes.CDLL(str(target)).run
+    vector = np.ctypeslib.ndpointer(dtype=np.float64, flags="C_CONTIGUOUS")
+    run.restype = ctypes.c_int64
+    run.argtypes = [
+        ctypes.c_int64, vector, vector, ctypes.POINTER(_Scene), ctypes.c_int64, ctypes.c_double, vector,
+    ]  # fmt: skip
+    return run
+
+
+def ring(law: Law, cells: Sequence[Cell], steps: int) -> Callable[[], Found]:
+    """A call that runs cells of the ring."""
+    run = _library()
+    amplitudes, half_angles = (np.array(column) for column in zip(*cells, strict=True))
+    scene = _Scene(MASS, INERTIA, HALF_DISTANCE, BALL, RADIUS, GRAVITY, *ROUGH, *REST, *law, _EPSILON_OMEGA)
+
+    def call() -> Found:
+        out = np.empty((len(cells), _COLUMNS))
+        if run(len(cells), amplitudes, half_angles, ctypes.byref(scene), steps, SPAN, out) != _COLUMNS:
+            raise MemoryError("rk4.c found no memory for the table of the drive")
+        return Found(out[:, _PHI_END], np.where(out[:, _CONTACT] > 0.0, out[:, _T_END], np.nan))
+
+    return call

@@ -1,0 +1,578 @@
+"""Error against run time on four scenes: `rk4`, `event`, `implicit`, and what a specialist would use instead.
+
+    python -m benchmarks.work_precision                  all, about ten minutes
+    python -m benchmarks.work_precision --quick          fewer cells and settings, under two minutes
+    python -m benchmarks.work_precision --scene stiff    one scene (smooth, stiff, limit, lugre); repeatable
+
+Scenes: a seeded sample of the Fig. 29 family (two-contact ring, T = 10 s) under Bengisu and Akay's law, smooth
+(alpha 100, v0 0.2) and stiff (alpha 1e5, v0 2e-6), and under its limit, stiction; and the belt under LuGre's law.
+Peers share no formula with the package; one that is not installed is skipped with a word (`pip install '.[bench]'`).
+Everything runs warm, pinned to one core, in turn within rounds, forwards and backwards; times are medians over the
+rounds and ratios medians of the ratios within them. No certificates: a peer has none.
+
+Writes `work_precision.{md,nc,png}` to `benchmarks/results/`; `--quick` or `--scene`, to the current folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import time
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
+from math import sqrt
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import joblib
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from benchmarks._common import (
+    PAPER_STEPS,
+    SPAN,
+    Times,
+    alternate,
+    configure,
+    family,
+    heading,
+    machine,
+    markdown,
+    on_all_cores,
+    on_one_core,
+    ring,
+    table,
+)
+from benchmarks.peers import in_c
+from benchmarks.peers.physics import Law
+from ringsweep import plots
+from ringsweep.variables import SEPARATING
+
+SEED, SIDE = 181, 64
+RESULTS = Path(__file__).parent / "results"
+PEERS = ("scipy", "numbalsoda", "diffrax", "heyoka")
+
+_BELT = {
+    "model": "belt",
+    "body": {"mass": 1.0},
+    "spring": {"stiffness": 2.0},
+    "friction": {
+        "law": "lugre",
+        "mu_s": 0.15,
+        "mu_k": 0.1,
+        "sigma0": 1e5,
+        "sigma1": sqrt(1e5),
+        "sigma2": 0.1,
+        "v_s": 1e-3,
+    },
+    "time": {"span": 30.0},
+}
+
+
+class Outcome(NamedTuple):
+    """What a method made of some cells; the regime of the package's own methods only."""
+
+    end: Any
+    separation: Any
+    regime: Any = None
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One of the four: what its methods are given."""
+
+    title: str
+    scene: dict[str, Any]
+    method: str
+    """That of ours, beside `rk4`, which takes the law."""
+    law: Law | None
+    """For the peers; None on the belt."""
+    unit: str = "rad"
+
+    def cells(self, count: int) -> list[Any]:
+        """A sample of the scene: the same at every call, and a longer one begins with a shorter."""
+        if self.law is None:
+            # From the slowest and the fastest inwards.
+            return np.geomspace(0.05, 0.4, 8)[[0, 7, 3, 5, 1, 6, 2, 4]][:count].tolist()
+        everything = family(SIDE)
+        order = np.random.default_rng(SEED).permutation(len(everything))
+        return [everything[k] for k in order[:count]]
+
+    def configuration(self, cells: Sequence[Any], method: str, **options: Any) -> Any:
+        """Configuration of a run of our own over cells."""
+        if self.law is None:
+            return configure(self.scene, {"belt.velocity": list(cells)}, method, **options)
+        amplitudes, half_angles = (list(column) for column in zip(*cells, strict=True))
+        points = {"drive.amplitude": amplitudes, "zone.half_angle": half_angles}
+        return configure(self.scene, points, method, **options)
+
+
+_BENGISU_AKAY = {"law": "bengisu-akay"}
+SCENES = {
+    "smooth": Scene(
+        "Smooth: alpha = 100 s/m, v0 = 0.2 m/s",
+        ring(_BENGISU_AKAY | {"alpha": 100.0, "v0": 0.2}),
+        "implicit",
+        Law(100.0, 0.2),
+    ),
+    "stiff": Scene(
+        "Stiff: alpha = 1e5 s/m, v0 = 2e-6 m/s",
+        ring(_BENGISU_AKAY | {"alpha": 1e5, "v0": 2e-6}),
+        "implicit",
+        Law(1e5, 2e-6),
+    ),
+    "limit": Scene("Limit law: stiction", ring({"law": "stiction"}), "event", Law(0.0, 0.0)),
+    "lugre": Scene("LuGre on the belt", _BELT, "implicit", None, "m"),
+}
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much to measure."""
+
+    cells: int
+    few: int
+    """Cells of slow contenders."""
+    fewest: int
+    """Cells of the slowest."""
+    rounds: int
+    finest: int
+    """Decades of steps of `rk4` beyond the coarsest."""
+    every: int
+    """One in so many of the tolerances."""
+    side: int
+    """Of the family whose throughput is measured."""
+
+
+FULL = Effort(cells=32, few=8, fewest=4, rounds=3, finest=5, every=1, side=SIDE)
+QUICK = Effort(cells=4, few=2, fewest=1, rounds=2, finest=3, every=2, side=16)
+
+
+@dataclass(frozen=True)
+class Contender:
+    """A method at a setting. `make` prepares, compilation included, a call that runs cells."""
+
+    method: str
+    setting: str
+    make: Callable[[Sequence[Any]], Callable[[], Any]]
+    cells: int
+    lanes: int
+    """Runs that one call makes: more than `cells` where it repeats them."""
+
+
+# ---- contenders ----------------------------------------------------------------------------
+
+
+def own(scene: Scene, method: str, cells: Sequence[Any], **options: Any) -> Callable[[], Outcome]:
+    """A call of a method of the package."""
+    call = on_one_core(scene.configuration(cells, method, **options))
+
+    def outcome() -> Outcome:
+        found = call()
+        if scene.law is None:
+            return Outcome(found["x_end"], np.full(len(cells), np.nan), found["regime"])
+        return Outcome(found["phi_end"], found["t_separation"], found["regime"])
+
+    return outcome
+
+
+def contenders(scene: Scene, effort: Effort) -> tuple[list[Contender], list[str]]:
+    """Those of a scene, and a word on those left out."""
+    entered: list[Contender] = []
+    skipped: list[str] = []
+    belt = scene.law is None
+    everything, few, fewest = (len(scene.cells(n)) for n in (effort.cells, effort.few, effort.fewest))
+
+    def enter(method: str, setting: str, make: Any, cells: int, lanes: int | None = None) -> None:
+        entered.append(Contender(method, setting, make, cells, lanes or cells))
+
+    def peer(module: str, label: str, tolerances: Sequence[float], cells: int, *given: Any) -> None:
+        try:
+            loaded = import_module(f"benchmarks.peers.with_{module}")
+        except ImportError as missing:
+            skipped.append(f"{label}: {missing}")
+            return
+        for rtol in tolerances[:: effort.every]:
+            lanes = loaded.lanes_of(given[0], cells) if module == "diffrax" else None
+            enter(label, f"rtol {rtol:.0e}", partial(of_peer, loaded, scene, *given, rtol), cells, lanes)
+
+    tolerances = {
+        "event": [1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13],
+        "implicit": [1e-3, 1e-4, 1e-5, 3e-6, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10],
+    }
+    for rtol in tolerances[scene.method]:
+        enter(scene.method, f"rtol {rtol:.0e}", partial(own_of, scene, scene.method, rtol=rtol), everything)
+    # Each scene has the decades in which `rk4` goes from hopeless to as good as it gets.
+    coarsest = 1e3 if scene is SCENES["stiff"] else 1e4 if belt else 1e2
+    for steps in [round(coarsest * 10**k) for k in range(effort.finest + 1)]:
+        if belt and steps > 10**7:
+            break
+        count = everything if steps <= 10**6 else fewest
+        enter("rk4", f"{steps:.0e} steps", partial(own_of, scene, "rk4", steps=steps), count)
+        if scene.law is not None and scene.law.v0 > 0.0 and steps <= 10**7 and in_c.compiler():
+            enter("C, rk4", f"{steps:.0e} steps", lambda c, n=steps: in_c.ring(scene.law, c, n), count)
+    if not in_c.compiler():
+        skipped.append("C: there is no compiler (cc) here")
+
+    loose, tight = [1e-4, 1e-6, 1e-8], [1e-6, 1e-8, 1e-10]
+    stiff = scene is SCENES["stiff"] or belt
+    if stiff:
+        skipped.append("SciPy DOP853, diffrax Tsit5: explicit, and the scene is stiff")
+    else:
+        peer("scipy", "SciPy DOP853", tight, few, "DOP853")
+    peer("scipy", "SciPy LSODA", tight, few, "LSODA")
+    peer("scipy", "SciPy Radau", loose[:2] if belt else loose, fewest, "Radau")
+    if scene is SCENES["limit"]:
+        skipped.append("numbalsoda, diffrax: they cannot switch between pieces, as a set-valued law requires")
+    else:
+        peer("numbalsoda", "numbalsoda LSODA", [1e-6, 1e-8, 1e-9, 1e-10], everything)
+        method, cells = ("Kvaerno5", few) if stiff else ("Tsit5", everything)
+        peer("diffrax", f"diffrax {method}", loose[: 2 if scene is SCENES["stiff"] else 3], cells, method)
+    if scene is SCENES["stiff"]:
+        skipped.append("heyoka: Taylor's method is explicit; a creep would take it millions of steps")
+    else:
+        # On the belt it is wrong by 1e-6 m at 1e-14 and beyond, and right at 1e-13.
+        tightest = 1e-13 if belt else 1e-15
+        peer("heyoka", "heyoka", [1e-3, 1e-6, 1e-9, 1e-12, tightest], few if belt else everything)
+    return entered, skipped
+
+
+def own_of(scene: Scene, method: str, cells: Sequence[Any], **options: Any) -> Callable[[], Outcome]:
+    """As :func:`own`, with the compilation behind it."""
+    call = own(scene, method, cells, **options)
+    # What is compiled depends on types alone: the longest run need not be made to warm up.
+    own(scene, method, cells[:1], **({"steps": 100} if method == "rk4" else options))()
+    return call
+
+
+def of_peer(peer: Any, scene: Scene, *given: Any) -> Callable[[], Any]:
+    """A call of a peer, compiled behind it; the last of `given` are the cells."""
+    *options, cells = given
+
+    def prepare(chosen: Sequence[Any]) -> Callable[[], Any]:
+        return peer.belt(chosen, *options) if scene.law is None else peer.ring(scene.law, chosen, *options)
+
+    if peer.LAZY:
+        prepare(cells[:1])()
+    return prepare(cells)
+
+
+# ---- a scene -------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A scene's figures: errors in a dataset, times as they were taken, words on reference and absentees."""
+
+    data: xr.Dataset
+    times: dict[tuple[str, str], Times]
+    words: list[str]
+
+    def largest(self, key: tuple[str, str]) -> float:
+        """Largest error at the end of a contender."""
+        return float(self._row(key).error_end.max())
+
+    def per_run(self, key: tuple[str, str]) -> float:
+        """Seconds of a run."""
+        return float(self._row(key).time_per_run)
+
+    def ratio(self, slow: tuple[str, str], fast: tuple[str, str]) -> float:
+        """How many times longer a run of the first takes: median over the rounds."""
+        lanes = float(self._row(fast).lanes) / float(self._row(slow).lanes)
+        return self.times[slow].ratio(self.times[fast]) * lanes
+
+    def _row(self, key: tuple[str, str]) -> xr.Dataset:
+        keys = list(zip(self.data.method.values, self.data.setting.values, strict=True))
+        return self.data.isel(contender=keys.index(key))
+
+
+def reference(scene: Scene, cells: Sequence[Any], effort: Effort) -> tuple[Outcome, str]:
+    """The tightest run of ours, and how far a peer's tightest, which shares no formula with it, is from it."""
+    rtol = {"event": 1e-15, "implicit": 1e-12}[scene.method]
+    found = own(scene, scene.method, cells, rtol=rtol)()
+    words = f"Reference: `{scene.method}` at rtol {rtol:.0e}"
+    stiff = scene is SCENES["stiff"]
+    count, name, *given = (
+        (effort.few, "scipy", "Radau", 1e-10)
+        if stiff
+        else (len(cells), "heyoka", 1e-13 if scene.law is None else 1e-15)
+    )
+    try:
+        peer = import_module(f"benchmarks.peers.with_{name}")
+    except ImportError:
+        return found, f"{words}; no peer is installed to check it."
+    chosen = cells[:count]
+    theirs = of_peer(peer, scene, *given, chosen)()
+    by = abs(theirs.end - found.end[:count])
+    words += (
+        f". {'SciPy Radau' if stiff else 'heyoka'} at {given[-1]:.0e} agrees with it in {len(chosen)} cells to "
+        f"{np.median(by):.0e} {scene.unit} in the median, {by.max():.0e} at most"
+    )
+    if scene.law is not None:
+        apart = abs(theirs.separation - found.separation[:count])
+        differ = int((np.isfinite(theirs.separation) != np.isfinite(found.separation[:count])).sum())
+        words += f", on the time of separation to {np.nanmax(apart):.0e} s, and on the regime in all but {differ}"
+    return found, words + "."
+
+
+def measure(scene: Scene, effort: Effort) -> Measured:
+    """Run every contender of a scene."""
+    cells = scene.cells(effort.cells)
+    exact, agreement = reference(scene, cells, effort)
+    entered, skipped = contenders(scene, effort)
+    calls = {}
+    for contender in entered:
+        calls[contender.method, contender.setting] = contender.make(cells[: contender.cells])
+    times, results = alternate(calls, effort.rounds)
+    shape = len(entered), len(cells)
+    columns = {name: np.full(shape, np.nan) for name in ("error_end", "error_separation", "regime_wrong")}
+    for row, contender in enumerate(entered):
+        found, count = Outcome(*results[contender.method, contender.setting]), contender.cells
+        end, separation, regime = exact.end[:count], exact.separation[:count], exact.regime[:count]
+        error = abs(found.end - end)
+        columns["error_end"][row, :count] = np.where(np.isfinite(error), error, np.inf)
+        columns["error_separation"][row, :count] = abs(found.separation - separation)
+        if found.regime is not None:
+            columns["regime_wrong"][row, :count] = found.regime != regime
+        elif scene.law is not None:
+            # A peer tells whether the body separates, and not how it moves.
+            separates = np.isfinite(found.separation) != (regime == SEPARATING)
+            columns["regime_wrong"][row, :count] = separates | ~np.isfinite(found.end)
+    data = xr.Dataset(
+        {name: (("contender", "cell"), column) for name, column in columns.items()},
+        coords={
+            "method": ("contender", [contender.method for contender in entered]),
+            "setting": ("contender", [contender.setting for contender in entered]),
+            "lanes": ("contender", [contender.lanes for contender in entered], {"long_name": "runs in one call"}),
+        },
+        attrs={"title": scene.title},
+    )
+    each = [times[c.method, c.setting].median / c.lanes for c in entered]
+    data["time_per_run"] = "contender", each, {"units": "s", "long_name": "time per run, one core"}
+    data["error_end"].attrs = {"units": scene.unit, "long_name": f"error of {'x' if scene.law is None else 'φ'}(T)"}
+    data["error_separation"].attrs = {"units": "s", "long_name": "error of the time of separation"}
+    data["regime_wrong"].attrs = {"units": "1", "long_name": "whether the regime is wrong"}
+    return Measured(data, times, [agreement, *(f"Left out: {words}." for words in skipped)])
+
+
+# ---- what is shown -------------------------------------------------------------------------
+
+HEADER = ["method", "setting", "cells", "ms per run", "error at T: median", "max", "t_sep: max", "regimes wrong"]
+
+
+def lines(data: xr.Dataset) -> list[list[str]]:
+    """Rows of a scene's table."""
+    found = []
+    for k in range(data.sizes["contender"]):
+        row = data.isel(contender=k)
+        end = row.error_end.values[~np.isnan(row.error_end.values)]
+        apart, wrong = (v[~np.isnan(v)] for v in (row.error_separation.values, row.regime_wrong.values))
+        found.append([
+            str(row.method.values), str(row.setting.values), str(len(end)), f"{1e3 * float(row.time_per_run):.3g}",
+            f"{np.median(end):.0e}", f"{end.max():.0e}", f"{apart.max():.0e}" if len(apart) else "-",
+            str(int(wrong.sum())) if len(wrong) else "-",
+        ])  # fmt: skip
+    return found
+
+
+def draw(measured: dict[str, Measured]) -> Figure:
+    """Scenes down, the three errors across."""
+    figure = Figure(figsize=(19.0, 5.2 * len(measured)), layout="constrained")
+    axes = figure.subplots(len(measured), 3, squeeze=False)
+    for (first, second, third), found in zip(axes, measured.values(), strict=True):
+        data = found.data
+        plots.work_precision(data, "error_end", first)
+        first.set_title(data.attrs["title"], loc="left")
+        styles = {line.get_label(): line for line in first.get_lines() if not str(line.get_label()).startswith("_")}
+        if data.error_separation.isnull().all():
+            second.set_axis_off()
+            second.text(0.5, 0.5, "nothing separates here", ha="center", transform=second.transAxes)
+        else:
+            plots.work_precision(data, "error_separation", second)
+            # The first has it already.
+            second.get_legend().remove()
+        for method, line in styles.items():
+            own_rows = data.isel(contender=data.method.values == method)
+            share = 100.0 * own_rows.regime_wrong.mean("cell")
+            third.plot(own_rows.time_per_run, share, color=line.get_color(), marker=line.get_marker(), label=method)
+        third.set(xscale="log", xlabel="time per run, one core (s)", ylabel="cells whose regime is wrong (%)")
+        third.set_ylim(-4.0, 104.0)
+        third.grid(True, color="#E6E6E6", linewidth=0.6)
+    return figure
+
+
+# ---- targets -------------------------------------------------------------------------------
+
+
+def cheapest(found: Measured, method: str, error: float) -> tuple[str, str] | None:
+    """Fastest setting of a method whose largest error at the end is no larger than that."""
+    keys = [key for key in found.times if key[0] == method and found.largest(key) <= error]
+    return min(keys, key=found.per_run, default=None)
+
+
+def against_peer(found: Measured, peer: tuple[str, str], factor: float, least: float) -> list[str]:
+    """Line of a target of the kind 'so many times faster than a peer, at its error over a factor'."""
+    words = f"`implicit` ≥ {least:g}x {peer[0]}, {peer[1]}"
+    words += f", with {factor:g} times less error" if factor > 1.0 else ", at its error"
+    if peer not in found.times:
+        return [words, "-", "peer absent", "not measured"]
+    theirs = found.largest(peer)
+    best = cheapest(found, "implicit", theirs / factor)
+    if best is None:
+        return [words, "-", f"no setting has an error of {theirs / factor:.0e}", "MISSED"]
+    ratio = found.ratio(peer, best)
+    note = (
+        f"{best[1]}: max {found.largest(best):.0e}, {1e3 * found.per_run(best):.3g} ms; "
+        f"peer: max {theirs:.0e}, {1e3 * found.per_run(peer):.3g} ms"
+    )
+    return [words, f"{ratio:.2g}x", note, "met" if ratio >= least else "MISSED"]
+
+
+def throughput(effort: Effort) -> tuple[list[list[str]], list[list[str]]]:
+    """Lines of the targets about whole families, and of the runs per second on all cores."""
+    cells = family(effort.side)
+    smooth, stiff, limit = SCENES["smooth"], SCENES["stiff"], SCENES["limit"]
+    cores = joblib.cpu_count()
+
+    with one_core():
+        single = {"rk4": own_of(smooth, "rk4", cells, steps=PAPER_STEPS)}
+        if in_c.compiler():
+            single["C"] = in_c.ring(smooth.law, cells, PAPER_STEPS)
+        alone, _ = alternate(single, effort.rounds + 2)
+
+    many: dict[str, tuple[int, Callable[[], Any]]] = {}
+    for name, scene, method, options in (
+        ("`event`, limit law, rtol 1e-10", limit, "event", {"rtol": 1e-10}),
+        ("`implicit`, stiff, rtol 3e-06", stiff, "implicit", {"rtol": 3e-6}),
+        ("`implicit`, smooth, rtol 3e-06", smooth, "implicit", {"rtol": 3e-6}),
+        (f"`rk4`, smooth, {PAPER_STEPS} steps", smooth, "rk4", {"steps": PAPER_STEPS}),
+    ):
+        configuration = scene.configuration(cells, method, **options)
+        many[name] = len(cells), partial(on_all_cores, configuration)
+    try:
+        numbalsoda = import_module("benchmarks.peers.with_numbalsoda")
+        share = stiff.cells(min(64, len(cells)))
+        parts = [of_peer(numbalsoda, stiff, 1e-9, share[k::cores]) for k in range(cores)]
+        run = partial(joblib.Parallel(n_jobs=cores, prefer="threads"), [joblib.delayed(part)() for part in parts])
+        many["numbalsoda, stiff, rtol 1e-09, in threads"] = len(share), run
+    except ImportError:
+        pass
+    for _, call in many.values():
+        call()
+    times, results = alternate({name: call for name, (_, call) in many.items()}, effort.rounds)
+    rates = {name: many[name][0] / times[name].median for name in many}
+
+    event = next(iter(many))
+    exact = on_one_core(limit.configuration(cells, "event", rtol=1e-15))()["phi_end"]
+    error = float(np.median(abs(np.ravel(results[event]["phi_end"]) - exact)))
+    small = "" if effort is FULL else " (of a family too small to reach the rate)"
+    targets = [[
+        f"`event` ≥ 25000 runs/s on all cores, error ≤ 1e-10, {len(cells)} cells{small}", f"{rates[event]:.0f} runs/s",
+        f"rtol 1e-10: median error {error:.0e} rad, {cores} cores",
+        "met" if rates[event] >= 25_000 and error <= 1e-10 else "MISSED",
+    ]]  # fmt: skip
+    wanted = f"`rk4` ≥ 18x scalar C, one core, {PAPER_STEPS} steps, smooth, {len(cells)} cells"
+    if "C" in alone:
+        ratio = alone["C"].ratio(alone["rk4"])
+        each = {name: 1e9 * alone[name].median / (len(cells) * PAPER_STEPS) for name in alone}
+        note = f"{each['rk4']:.3g} and {each['C']:.3g} ns per step of the span; {' '.join(in_c.FLAGS)}"
+        targets.append([wanted, f"{ratio:.2g}x", note, "met" if ratio >= 18.0 else "MISSED"])
+    else:
+        targets.append([wanted, "-", "no compiler", "not measured"])
+    return targets, [[name, f"{rate:.0f}"] for name, rate in rates.items()]
+
+
+#: What the report says of itself.
+ABOUT = """
+One core, warm, no certificates; medians over rounds in which contenders alternate. Errors are those of φ(T), or x(T) on
+the belt, and of the time of separation; the regime of a peer is whether the body separates. diffrax's time is that of a
+lane of a full solve.
+
+![error against run time](work_precision.png)
+"""
+
+# ---- the command ---------------------------------------------------------------------------
+
+
+@contextmanager
+def one_core() -> Iterator[None]:
+    """Pin this process to one of its cores, with what threads a library may start."""
+    if not hasattr(os, "sched_setaffinity"):
+        yield
+        return
+    cores = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {max(cores)})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, cores)
+
+
+def main() -> None:
+    """Measure, print, write."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="fewer cells and settings")
+    parser.add_argument("--scene", action="append", choices=SCENES, help="only this scene; repeatable")
+    arguments = parser.parse_args()
+    effort = QUICK if arguments.quick else FULL
+    # Read by XLA as JAX is imported, which is not before a scene asks for diffrax.
+    os.environ["XLA_FLAGS"] = "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"
+    # LSODA warns where a tolerance is loose; the table shows what came of it.
+    warnings.filterwarnings("ignore", message="lsoda", category=UserWarning)
+    begin = time.perf_counter()
+
+    where = machine(("numbalsoda", "diffrax", "jax", "heyoka", "xarray")) + f"\n{in_c.compiler() or 'no C compiler'}"
+    print(where)
+    folder = Path() if arguments.quick or arguments.scene else RESULTS
+    folder.mkdir(exist_ok=True)
+    report = "# Error against run time\n\n`python -m benchmarks.work_precision` on\n\n"
+    report += "".join(f"- {line}\n" for line in where.splitlines()) + ABOUT
+    measured: dict[str, Measured] = {}
+    with one_core():
+        for name in arguments.scene or SCENES:
+            found = measured[name] = measure(SCENES[name], effort)
+            heading(SCENES[name].title)
+            print("\n".join(found.words))
+            table(HEADER, lines(found.data))
+            print(f"({time.perf_counter() - begin:.0f} s so far)")
+            report += f"\n## {SCENES[name].title}\n\n" + "".join(f"- {words}\n" for words in found.words)
+            report += "\n" + markdown(HEADER, lines(found.data))
+            # Scene by scene: what an interrupted run has measured is there.
+            write(folder, report, measured, where)
+    targets = []
+    if "smooth" in measured:
+        targets.append(against_peer(measured["smooth"], ("heyoka", "rtol 1e-09"), 1.0, 8.0))
+    if "stiff" in measured:
+        targets.append(against_peer(measured["stiff"], ("numbalsoda LSODA", "rtol 1e-09"), 10.0, 10.0))
+    rates: list[list[str]] = []
+    if not arguments.scene:
+        more, rates = throughput(effort)
+        targets += more
+    for title, header, rows in (
+        ("Targets", ["target", "measured", "how", ""], targets),
+        (f"Runs per second on all cores, T = {SPAN:g} s", ["", "runs/s"], rates),
+    ):
+        if rows:
+            heading(title)
+            table(header, rows)
+            report += f"\n## {title}\n\n{markdown(header, rows)}"
+    write(folder, report, measured, where)
+    print(f"\nwork_precision.md, .nc and .png are in {folder.resolve()}; {time.perf_counter() - begin:.0f} s in all")
+
+
+def write(folder: Path, report: str, measured: dict[str, Measured], where: str) -> None:
+    """Write the report, the figures in groups named after the scenes, and the picture."""
+    (folder / "work_precision.md").write_text(report)
+    for k, (name, found) in enumerate(measured.items()):
+        found.data.attrs["machine"] = where
+        found.data.to_netcdf(folder / "work_precision.nc", group=name, mode="a" if k else "w")
+    draw(measured).savefig(folder / "work_precision.png", dpi=80)
+
+
+if __name__ == "__main__":
+    main()

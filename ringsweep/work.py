@@ -1,0 +1,433 @@
+"""Error against run time: which setting of which method is the cheapest that is right, for a scene of one's own."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from statistics import median
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ringsweep.config import COUNT, Config, load, sweepable
+from ringsweep.engine import cells as values_of
+from ringsweep.engine import progress_bar, provenance
+from ringsweep.errors import InputError
+from ringsweep.models import MODELS, batch
+from ringsweep.parameters import Parameter
+from ringsweep.physics.friction import LAWS, SET_VALUED
+from ringsweep.scene import LAW
+from ringsweep.solvers.common import Result, agree
+from ringsweep.solvers.event import Event, Implicit, pick
+from ringsweep.solvers.rk4 import RK4
+from ringsweep.units import quantity
+from ringsweep.variables import FAILED, PRECISION, Variable
+
+#: What is asked of a setting, unless the user says otherwise: largest error in rad or m, and in s.
+TARGET = 1e-6
+CELLS = 16
+ROUNDS = 3
+
+# Down to two digits above the tolerances of the reference.
+_TOLERANCES: dict[type, tuple[float, ...]] = {
+    Event: (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12),
+    Implicit: (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9),
+}
+_STEPS = tuple(10**k for k in range(2, 8))
+
+# Tightest first: the reference, and what tells how far it can be trusted.
+_TIGHTEST: dict[type, tuple[float, float]] = {Event: (1e-15, 1e-14), Implicit: (1e-11, 1e-10)}
+
+# Seconds in a round that one setting may take.
+_BUDGET = 10.0
+
+# Seconds below which a clock measures itself and the scheduler: shorter calls are repeated.
+_LEAST = 0.01
+
+_WANTED = Parameter("1", "target", lower=0.0, open_lower=True)
+
+
+def precision(
+    config: str | os.PathLike[str] | Mapping[str, Any],
+    *,
+    target: float = TARGET,
+    cells: int = CELLS,
+    rounds: int = ROUNDS,
+    progress: bool = True,
+) -> xr.Dataset:
+    """Measure error against run time of every method that takes a scene's friction law, and recommend a setting.
+
+    `event` or `implicit`, whichever `auto` picks for the law, runs over a range of `rtol`, and `rk4` over
+    five decades of `steps`; what would take longer than 10 s a round is left out and named. A setting meets the
+    target if in every sampled cell regime, motion and separating contact are right, and the errors
+    of the state at the end and of the time of separation, each enlarged by the uncertainty of the reference,
+    are at most `target`. Recommended is the fastest of those.
+
+    Parameters
+    ----------
+    config : path or mapping
+        A YAML file, or the mapping that it would hold.
+    target : float
+        Largest error allowed: of the angle (rad) or displacement (m) at the end, and of the time of separation (s).
+    cells : int
+        Cells of the sweep to measure at most, drawn at random, the same at every call; a scene without a
+        sweep is one cell.
+    rounds : int
+        How often each setting is timed; the median counts.
+    progress : bool
+        Whether to show a progress bar where there is a terminal or a notebook.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions ``contender`` and ``cell``, variables as in :data:`ringsweep.variables.PRECISION`; coordinates
+        ``method``, ``setting`` and ``solver`` (what stands under ``solver`` in a configuration) of each contender, and
+        those of each cell. Run times are those of one thread, without certificates and compilation; the
+        error of a run that failed is infinite.
+        Attributes: ``target``; ``recommended``, one of ``solver``, or ``closest`` where none meets the
+        target; ``certificate_cost``, the factor by which certificates lengthen the runs of that one; ``reference``,
+        ``sampled`` and ``left_out`` in words.
+
+    Raises
+    ------
+    InputError
+        If the configuration is wrong, sweeps over several friction laws, or has no cell in which the
+        two tightest runs agree about the regime; or if another argument is out of range.
+    """
+    return measure(load(config), target=target, cells=cells, rounds=rounds, progress=progress)
+
+
+def measure(
+    config: Config, *, target: float = TARGET, cells: int = CELLS, rounds: int = ROUNDS, progress: bool = True
+) -> xr.Dataset:
+    """Measure a validated configuration; see :func:`precision`."""
+    target = quantity(target, _WANTED, "target")
+    cells, rounds = _count(cells, "cells"), _count(rounds, "rounds")
+    scene = config.scene
+    if len(scene.structures) > 1:
+        place = "points" if LAW in config.source["sweep"].get("points", {}) else "grid"
+        raise InputError(
+            f"sweep.{place}.{LAW}",
+            f"each of {', '.join(scene.structures)} has methods and a truth of its own: measure one law at a time, "
+            "with a single name here",
+        )
+    structure = scene.structure
+    names = MODELS[structure.model].outcomes
+    contenders, left_out = _contenders(config)
+    best = type(contenders[0])
+    total = math.prod(config.axes.sizes.values())
+    sample = np.arange(total)
+    if cells < total:
+        sample = np.sort(np.random.default_rng(0).choice(total, cells, replace=False))
+    part = batch(structure, values_of(scene, config.axes, sample))
+
+    def run(method: Any) -> Result:
+        return method.run(part, names)
+
+    with progress_bar(2 + len(contenders) * (rounds + 1), progress) as bar:
+        tight, looser = (_ticked(bar, best(rtol=rtol, certify=False), run).rows for rtol in _TIGHTEST[best])
+        known = np.flatnonzero(agree(tight, looser, names))
+        if not len(known):
+            raise InputError(
+                "scene",
+                f"there is nothing to measure errors against: in all of the {len(sample)} cells tried {best.name} "
+                "fails, or its two tightest runs disagree about the regime",
+            )
+        part = pick(part, known)
+        raced, slow = _race(contenders, run, rounds, bar)
+        certified = [_ticked(bar, replace(one.method, certify=True), run) for one in raced]
+
+    dataset = _dataset(config, sample[known], raced, certified, tight[known], looser[known])
+    words = {"reference": _yaml(best(rtol=_TIGHTEST[best][0])), "sampled": f"{len(known)} of {total} cells"}
+    if dropped := len(sample) - len(known):
+        words["sampled"] += (
+            f"; {dropped} more were drawn that have no reference: its two tightest runs disagree, or fail"
+        )
+    if left_out or slow:
+        words["left_out"] = "; ".join([*left_out, *slow])
+    dataset = dataset.assign_attrs({"target": target, **words})
+
+    chosen, met = _choose(dataset)
+    pair = [_Timed(replace(raced[chosen].method, certify=certify)) for certify in (False, True)]
+    for k in range(rounds):
+        for one in pair[:: 1 if k % 2 == 0 else -1]:
+            one.turn(run)
+    cost = median(b / a for a, b in zip(pair[0].seconds, pair[1].seconds, strict=True))
+    name = str(dataset["solver"].values[chosen])
+    return dataset.assign_attrs({"recommended" if met else "closest": name, "certificate_cost": cost})
+
+
+def report(ds: xr.Dataset) -> str:
+    """What :func:`precision` found, as text: an aligned table, and what to put into the configuration.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        Result of :func:`precision`.
+
+    Returns
+    -------
+    str
+        Several lines.
+    """
+    unit = ds["error_end"].attrs["units"]
+    separating = "error_separation" in ds and bool(np.isfinite(ds["error_separation"]).any())
+    header = ["", "ms per run", "steps", f"median error, {unit}", f"largest, {unit}"]
+    header += ["largest of separation, s"] * separating + ["wrong regimes", "of these silent"]
+    lines = []
+    for k in range(ds.sizes["contender"]):
+        one = ds.isel(contender=k)
+        end, wrong = one["error_end"].values, one["regime_wrong"].values == 1
+        silent = one["flagged"].values[wrong] == 0
+        line = [f"{one['method'].item()}, {one['setting'].item()}", f"{1e3 * one['time_per_run'].item():.3g}"]
+        line += [f"{one['steps'].item():.0f}", f"{np.median(end):.1e}", f"{end.max():.1e}"]
+        if separating:
+            apart = one["error_separation"].values
+            line.append(f"{np.nanmax(apart):.1e}" if np.isfinite(apart).any() else "-")
+        lines.append([*line, f"{wrong.mean():.0%}", f"{silent.mean():.0%}" if wrong.any() else "-"])
+    return "\n".join([*_aligned(header, lines), "", *_verdict(ds, unit)])
+
+
+def _verdict(ds: xr.Dataset, unit: str) -> list[str]:
+    """Against what was measured, what it came to, and what certificates cost."""
+    attributes = ds.attrs
+    off = [f"{ds['reference_error_end'].values.max():.1e} {unit}"]
+    if "reference_error_separation" in ds and np.isfinite(ds["reference_error_separation"]).any():
+        off.append(f"{np.nanmax(ds['reference_error_separation'].values):.1e} s")
+    words = [
+        f"sampled: {attributes['sampled']}",
+        f"reference: {attributes['reference']}; a run ten times looser differs from it by {' and '.join(off)} at most",
+    ]
+    if "left_out" in attributes:
+        words.append(f"left out: {attributes['left_out']}")
+    name = attributes.get("recommended", attributes.get("closest"))
+    k = ds["solver"].values.tolist().index(name)
+    worst, wrong = _bounds(ds).max(axis=1)[k], int((ds["regime_wrong"][k] == 1).sum())
+    errors = f"errors up to {worst:.1e} (the reference's included)" if np.isfinite(worst) else "runs that failed"
+    reached = f"{wrong or 'no'} wrong regime{'s' * (wrong != 1)}, {errors}"
+    words.append(
+        f"certificates, on unless told otherwise, make a run take {attributes['certificate_cost']:.2g} times as long"
+    )
+    target = f"target {attributes['target']:g} ({unit} at the end{', s at separation' * ('error_separation' in ds)})"
+    if "recommended" in attributes:
+        words.append(f"{target} in every cell sampled is met fastest by this one: {reached}")
+        return [*words, f"solver: {{{name}}}"]
+    return [*words, f"{target} in every cell sampled is met by none; closest is `{name}`: {reached}"]
+
+
+def _aligned(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    widths = [max(map(len, column)) for column in zip(header, *rows, strict=True)]
+    return [
+        "  ".join([line[0].ljust(widths[0]), *map(str.rjust, line[1:], widths[1:])]).rstrip()
+        for line in (header, *rows)
+    ]
+
+
+def _count(given: int, path: str) -> int:
+    number = quantity(given, COUNT, path)
+    if not number.is_integer():
+        raise InputError(path, f"{number:g} is not a whole number")
+    return int(number)
+
+
+# ---- contenders ----------------------------------------------------------------------------
+
+
+def _contenders(config: Config) -> tuple[list[Any], list[str]]:
+    """Methods with settings, each from cheap to dear, without certificates; and in words what does not compete."""
+    structure, own = config.scene.structure, config.solver
+    best: Any = Event if LAWS[structure.law] in SET_VALUED else Implicit
+    tolerances = {*_TOLERANCES[best], best.rtol} | ({own.rtol} if isinstance(own, best) else set())
+    limit = getattr(own, "max_steps", best.max_steps)
+    found = [best(rtol=rtol, max_steps=limit, certify=False) for rtol in sorted(tolerances, reverse=True)]
+    steps = {*_STEPS} | ({own.steps} if isinstance(own, RK4) else set())
+    fixed = [RK4(steps=n, certify=False) for n in sorted(steps)]
+    try:
+        fixed[0].check(structure)
+    except InputError as error:
+        return found, [error.problem]
+    return found + fixed, []
+
+
+def _setting(method: Any) -> str:
+    return f"{method.steps} steps" if isinstance(method, RK4) else f"rtol {method.rtol!r}"
+
+
+def _yaml(method: Any) -> str:
+    """What stands under ``solver`` in a configuration, defaults left out but for the setting."""
+    options = {"steps": method.steps} if isinstance(method, RK4) else {"rtol": method.rtol}
+    options |= {
+        option.name: getattr(method, option.name)
+        for option in dataclasses.fields(method)
+        if option.name not in (*options, "certify") and getattr(method, option.name) != option.default
+    }
+    return ", ".join([f"method: {method.name}", *(f"{name}: {value!r}" for name, value in options.items())])
+
+
+@dataclass
+class _Timed:
+    """A contender: its method, seconds of each turn, and what it returned last."""
+
+    method: Any
+    seconds: list[float] = field(default_factory=list)
+    result: Any = None
+    repeats: int = 0
+
+    def turn(self, run: Callable[[Any], Result]) -> None:
+        """Run and time once, or as often as the clock needs."""
+        if not self.repeats:
+            begin = perf_counter()
+            self.result = run(self.method)
+            once = perf_counter() - begin
+            self.repeats = math.ceil(_LEAST / once)
+            if self.repeats == 1:
+                self.seconds.append(once)
+                return
+        begin = perf_counter()
+        for _ in range(self.repeats):
+            self.result = run(self.method)
+        self.seconds.append((perf_counter() - begin) / self.repeats)
+
+
+def _race(
+    methods: Sequence[Any], run: Callable[[Any], Result], rounds: int, bar: Any
+) -> tuple[list[_Timed], list[str]]:
+    """Time methods in turn, forwards and backwards, so that a noisy neighbour troubles all of them alike.
+
+    Also tells in words which were left out, by the time of the one before.
+    """
+    raced: list[_Timed] = []
+    left_out = []
+    latest: dict[type, _Timed] = {}
+    for method in methods:
+        before = latest.get(type(method))
+        if before is None:
+            # Compiles.
+            run(method)
+        else:
+            more = method.steps / before.method.steps if isinstance(method, RK4) else 1.0
+            expected = more * before.seconds[0]
+            if expected > _BUDGET:
+                left_out.append(
+                    f"{method.name}, {_setting(method)} (some {expected:.0f} s a round; {_BUDGET:g} are allowed)"
+                )
+                bar.update(rounds + 1)
+                continue
+        latest[type(method)] = _Timed(method)
+        latest[type(method)].turn(run)
+        bar.update()
+        raced.append(latest[type(method)])
+    for k in range(1, rounds):
+        for one in raced[:: 1 if k % 2 == 0 else -1]:
+            one.turn(run)
+            bar.update()
+    return raced, left_out
+
+
+def _ticked(bar: Any, method: Any, run: Callable[[Any], Result]) -> Result:
+    result = run(method)
+    bar.update()
+    return result
+
+
+# ---- errors --------------------------------------------------------------------------------
+
+
+def _errors(
+    rows: NDArray[np.float64], reference: NDArray[np.float64], names: tuple[str, ...]
+) -> dict[str, NDArray[np.float64]]:
+    """Errors of each cell, shape ``(cells,)``: infinite if it failed, NaN where there is nothing to compare."""
+    failed = rows[:, names.index("regime")] == FAILED
+    found = {}
+    for name, outcome in {"error_end": _end(names), "error_separation": "t_separation"}.items():
+        if outcome in names:
+            column = names.index(outcome)
+            found[name] = np.abs(rows[:, column] - reference[:, column])
+    found["error_end"] = np.where(failed, np.inf, found["error_end"])
+    return found
+
+
+def _end(names: tuple[str, ...]) -> str:
+    return "phi_end" if "phi_end" in names else "x_end"
+
+
+def _dataset(
+    config: Config,
+    sample: NDArray[np.intp],
+    raced: Sequence[_Timed],
+    certified: Sequence[Result],
+    tight: NDArray[np.float64],
+    looser: NDArray[np.float64],
+) -> xr.Dataset:
+    """Times, errors and flags of the contenders in the cells with these flat indices, labelled."""
+    scene, axes = config.scene, config.axes
+    names = MODELS[scene.structure.model].outcomes
+    columns: dict[str, tuple[tuple[str, ...], Any]] = {
+        "time_per_run": (("contender",), [median(one.seconds) / len(sample) for one in raced]),
+        "steps": (("contender",), [one.result.steps.mean() for one in raced]),
+    }
+    each = [_errors(one.result.rows, tight, names) for one in raced]
+    for name in each[0]:
+        columns[name] = ("contender", "cell"), [errors[name] for errors in each]
+    # A certificate vouches for an answer that it left as it was.
+    passed = [
+        witness.certified & agree(one.result.rows, witness.rows, names)
+        for one, witness in zip(raced, certified, strict=True)
+    ]
+    right = [agree(one.result.rows, tight, names) for one in raced]
+    columns["regime_wrong"] = ("contender", "cell"), ~np.array(right)
+    columns["flagged"] = ("contender", "cell"), ~np.array(passed)
+    columns |= {f"reference_{name}": (("cell",), error) for name, error in _errors(looser, tight, names).items()}
+
+    known, values = sweepable(scene), values_of(scene, axes, sample)
+    along = {path: values[path] if path != LAW else [scene.structure.law] * len(sample) for path in axes.columns}
+    return xr.Dataset(
+        {
+            name: (dims, np.asarray(column, dtype=PRECISION[name].dtype), _described(name, names).attributes)
+            for name, (dims, column) in columns.items()
+        },
+        coords={
+            "method": ("contender", [one.method.name for one in raced], {"long_name": "method"}),
+            "setting": ("contender", [_setting(one.method) for one in raced], {"long_name": "its setting"}),
+            "solver": (
+                "contender",
+                [_yaml(one.method) for one in raced],
+                {"long_name": "what stands under solver in a configuration"},
+            ),
+            "cell": ("cell", sample, {"long_name": "number of the cell in the sweep, last dimension fastest"}),
+            **{
+                path.replace(".", "_"): ("cell", column, {**known[path].attributes, "path": path})
+                for path, column in along.items()
+            },
+        },
+    ).assign_attrs(provenance(config))
+
+
+def _described(name: str, names: tuple[str, ...]) -> Variable:
+    variable = PRECISION[name]
+    if name.endswith("error_end") and _end(names) == "x_end":
+        return replace(variable, long_name=variable.long_name.replace("angle", "displacement"), units="m")
+    return variable
+
+
+def _bounds(ds: xr.Dataset) -> NDArray[np.float64]:
+    """What an error can be at most, given how far the reference is to be trusted; shape ``(contender, cell)``."""
+    bounds = (ds["error_end"] + ds["reference_error_end"]).values
+    if "error_separation" in ds:
+        bounds = np.fmax(bounds, (ds["error_separation"] + ds["reference_error_separation"]).values)
+    return np.asarray(bounds)
+
+
+def _choose(ds: xr.Dataset) -> tuple[int, bool]:
+    """The fastest contender that meets the target, else the one that comes closest; and whether it does."""
+    wrong, worst = (ds["regime_wrong"] == 1).sum("cell").values, _bounds(ds).max(axis=1)
+    met = np.flatnonzero((wrong == 0) & (worst <= ds.attrs["target"]))
+    if len(met):
+        return int(met[np.argmin(ds["time_per_run"].values[met])]), True
+    return int(np.lexsort([worst, wrong])[0]), False

@@ -1,0 +1,289 @@
+"""Error against run time: what is measured is true, and what is recommended holds."""
+
+from math import acos, pi, sqrt
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+import ringsweep
+from ringsweep import plots, storage, work
+from ringsweep.cli import main
+from ringsweep.config import load
+from ringsweep.errors import InputError
+from ringsweep.variables import PRECISION
+
+CONFIGS = Path(__file__).parents[1] / "configs"
+TARGET = 1e-7
+
+BELT = {
+    "model": "belt",
+    "body": {"mass": 1.0},
+    "spring": {"stiffness": 2.0},
+    "belt": {"velocity": 0.1},
+    "friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.1},
+    "time": {"span": 9.0},
+}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def short():
+    """Few steps of rk4 are as instructive as many."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(work, "_STEPS", (100, 1000, 10_000))
+        yield
+
+
+@pytest.fixture(scope="module")
+def config():
+    """The paper's Fig. 29 with the limit law, over amplitudes and widths."""
+    scene = dict(load(CONFIGS / "regime_map.yaml").source["scene"])
+    friction = {"law": "stiction", "rough": scene["friction"]["rough"], "rest": scene["friction"]["rest"]}
+    grid = {
+        "drive.amplitude": {"geomspace": [0.5, 8.0, 5]},
+        "zone.half_angle": {"linspace": ["5 deg", "40 deg", 4]},
+    }
+    return {"scene": scene | {"friction": friction, "time": {"span": "4 s"}}, "sweep": {"grid": grid}}
+
+
+@pytest.fixture(scope="module")
+def found(config):
+    return ringsweep.precision(config, target=TARGET, cells=8, rounds=2, progress=False)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "belt.yaml").write_text(yaml.safe_dump({"scene": BELT}))
+    return tmp_path
+
+
+def rerun(found, config, solver):
+    """Outcomes of the sampled cells under a solver as the dataset names it, certificates and all."""
+    points = {found[name].attrs["path"]: found[name].values for name in ("drive_amplitude", "zone_half_angle")}
+    return ringsweep.run(
+        {"scene": config["scene"], "sweep": {"points": points}, "solver": yaml.safe_load(f"{{{solver}}}")},
+        progress=False,
+    )
+
+
+class TestDataset:
+    def test_names_units_and_flags_are_those_declared(self, found):
+        assert set(found.data_vars) == set(PRECISION)
+        assert found.sizes["cell"] == 8
+        for name, data in found.data_vars.items():
+            assert data.attrs["units"] == PRECISION[name].units
+            assert data.dtype == PRECISION[name].dtype
+        for name in ("regime_wrong", "flagged"):
+            assert found[name].dtype == found[name].attrs["flag_values"].dtype == np.int8
+
+    def test_a_cell_carries_what_was_swept_there(self, found, config):
+        axes = load(config).axes.columns
+        grid = np.meshgrid(*(values for _, values in axes.values()), indexing="ij")
+        for name, values in zip(("drive_amplitude", "zone_half_angle"), grid, strict=True):
+            np.testing.assert_array_equal(found[name], values.ravel()[found["cell"]])
+
+    def test_the_method_of_auto_competes_with_rk4_and_the_default_is_among_its_settings(self, found):
+        assert set(found["method"].values) == {"event", "rk4"}
+        assert "method: event, rtol: 1e-10" in found["solver"].values
+
+    def test_survives_a_file(self, found, tmp_path):
+        storage.save(found, tmp_path / "found.nc")
+        again = storage.load(tmp_path / "found.nc")
+        assert again.equals(found)
+        assert again.attrs == found.attrs
+        assert work.report(again) == work.report(found)
+
+
+class TestErrors:
+    def test_fall_with_the_tolerance_and_come_down_to_rounding(self, found):
+        event = found.isel(contender=found["method"].values == "event")
+        median = event["error_end"].median("cell").values
+        assert (median[2:] < median[:-2]).all()
+        assert median[-1] < 1e-11
+        assert (event["error_end"].max("cell")[-1] < 1e-8).all()
+
+    def test_of_rk4_do_not_fall_where_static_friction_escapes_it_and_it_is_not_silent(self, found):
+        rk4 = found.isel(contender=found["method"].values == "rk4")
+        assert rk4["error_end"].max("cell").min() > 1e-3
+        assert (rk4["regime_wrong"] == 1).any("cell").all()
+        assert (rk4["flagged"] == 1).all()
+
+    def test_of_separation_are_there_exactly_where_both_separate(self, found, config):
+        reference = rerun(found, config, found.attrs["reference"])
+        separating = np.isfinite(reference["t_separation"].values)
+        assert separating.any()
+        assert not separating.all()
+        best = found.isel(contender=found["solver"].values == found.attrs["recommended"]).squeeze("contender")
+        np.testing.assert_array_equal(np.isfinite(best["error_separation"]), separating)
+        np.testing.assert_array_equal(np.isfinite(best["reference_error_separation"]), separating)
+
+    def test_are_those_of_the_state_that_a_run_reports(self, found, config):
+        reference = rerun(found, config, found.attrs["reference"])
+        for k in (0, 4):
+            plain = rerun(found, config, f"{found['solver'].values[k]}, certify: false")
+            np.testing.assert_array_equal(found["error_end"][k], abs(plain["phi_end"] - reference["phi_end"]))
+
+    def test_the_reference_agrees_with_the_closed_form_and_its_uncertainty_is_honest(self):
+        found = ringsweep.precision({"scene": BELT}, rounds=1, progress=False)
+        solver = yaml.safe_load(f"{{{found.attrs['reference']}}}")
+        x = float(ringsweep.run({"scene": BELT, "solver": solver}, progress=False)["x_end"])
+        # It sticks until the spring pulls with the friction at rest, slips on a circle about the kinetic one's
+        # deflection until it moves with the belt again, and is carried on.
+        rate, far, middle = sqrt(2.0), 0.15 * 9.81 / 2.0, 0.1 * 9.81 / 2.0
+        slip = 2.0 * (pi - acos((far - middle) / np.hypot(far - middle, 0.1 / rate))) / rate
+        after = 9.0 - far / 0.1
+        assert 0.0 < after < slip
+        exact = middle + (far - middle) * np.cos(rate * after) + 0.1 / rate * np.sin(rate * after)
+        assert x == pytest.approx(exact, abs=1e-13)
+        assert found["reference_error_end"].item() < 1e-12
+        assert found["error_end"].attrs["units"] == "m"
+        assert "error_separation" not in found
+
+
+class TestRecommendation:
+    def test_meets_the_target_when_it_is_run_again(self, found, config):
+        line = work.report(found).splitlines()[-1]
+        solver = yaml.safe_load(line)["solver"]
+        assert line == f"solver: {{{found.attrs['recommended']}}}"
+        again = rerun(found, config, ", ".join(f"{name}: {value}" for name, value in solver.items()))
+        reference = rerun(found, config, found.attrs["reference"])
+        for name in ("regime", "motion", "separating_contact"):
+            np.testing.assert_array_equal(again[name], reference[name])
+        assert abs(again["phi_end"] - reference["phi_end"]).max() <= TARGET
+        assert abs(again["t_separation"] - reference["t_separation"]).max() <= TARGET
+
+    def test_is_the_fastest_that_meets_it(self, found):
+        bound = (found["error_end"] + found["reference_error_end"]).max("cell")
+        apart = (found["error_separation"] + found["reference_error_separation"]).max("cell")
+        met = (bound <= TARGET) & ~(apart > TARGET) & (found["regime_wrong"] == 0).all("cell")
+        assert met.any()
+        assert not met.all()
+        fastest = found["time_per_run"].where(met).argmin("contender")
+        assert found.attrs["recommended"] == found["solver"].values[fastest]
+
+    def test_a_target_out_of_reach_is_said_to_be_and_the_closest_is_named(self, folder, capsys):
+        assert main(["precision", "belt.yaml", "--target", "1e-40", "--rounds", "1"]) == 0
+        out = capsys.readouterr().out
+        closest = storage.load("belt-precision.nc").attrs["closest"]
+        assert f"met by none; closest is `{closest}`: no wrong regimes, errors up to" in out
+        assert "\nsolver:" not in out
+
+    def test_a_setting_of_ones_own_competes_and_keeps_its_limit_of_work(self):
+        solver = {"method": "event", "rtol": 2.5e-7, "max_steps": 1}
+        found = ringsweep.precision({"scene": BELT, "solver": solver}, rounds=1, progress=False)
+        own = found["solver"].values == "method: event, rtol: 2.5e-07, max_steps: 1"
+        assert own.sum() == 1
+        assert np.isinf(found["error_end"][own]).all()
+        assert "closest" in found.attrs
+        found = ringsweep.precision({"scene": BELT, "solver": {"method": "rk4", "steps": 777}}, progress=False)
+        assert "method: rk4, steps: 777" in found["solver"].values
+
+
+class TestSample:
+    def test_is_the_same_at_every_call_and_all_if_there_are_no_more(self, config, found):
+        again = ringsweep.precision(config, cells=8, rounds=1, progress=False)
+        np.testing.assert_array_equal(again["cell"], found["cell"])
+        few = {"scene": BELT, "sweep": {"grid": {"belt.velocity": [0.05, 0.1], "friction.law": ["stiction"]}}}
+        found = ringsweep.precision(few, cells=16, rounds=1, progress=False)
+        np.testing.assert_array_equal(found["belt_velocity"], [0.05, 0.1])
+        np.testing.assert_array_equal(found["friction_law"], ["stiction", "stiction"])
+
+    def test_a_cell_whose_reference_disagrees_with_itself_is_not_measured_and_that_is_said(self, config, monkeypatch):
+        monkeypatch.setattr(work, "_STEPS", (100,))
+        monkeypatch.setattr(work, "_TIGHTEST", {work.Event: (1e-15, 1e-3)})
+        found = ringsweep.precision(CONFIGS / "belt_viscous.yaml", rounds=1, progress=False)
+        assert 0 < found.sizes["cell"] < 16
+        dropped = 16 - found.sizes["cell"]
+        assert f"{found.sizes['cell']} of 4096 cells; {dropped} more were drawn" in found.attrs["sampled"]
+
+    def test_what_would_take_too_long_is_left_out_and_named(self, monkeypatch):
+        monkeypatch.setattr(work, "_BUDGET", 0.0)
+        found = ringsweep.precision({"scene": BELT}, rounds=1, progress=False)
+        assert found["setting"].values.tolist() == ["rtol 0.0001", "100 steps"]
+        for name in ("event, rtol 1e-12", "rk4, 1000 steps", "rk4, 10000 steps"):
+            assert name in found.attrs["left_out"]
+        assert found.attrs["left_out"] in work.report(found)
+
+    def test_a_law_that_rk4_does_not_take_is_measured_without_it(self):
+        friction = {"law": "bristle", "mu_k": 0.1, "sigma0": 100.0, "seed": 1}
+        found = ringsweep.precision({"scene": BELT | {"friction": friction}}, rounds=1, progress=False)
+        assert set(found["method"].values) == {"implicit"}
+        assert "rk4 does not take friction law bristle" in found.attrs["left_out"]
+
+
+class TestInput:
+    @pytest.mark.parametrize(
+        ("arguments", "problem"),
+        [
+            ({"target": 0}, "target: 0 is not allowed: target must be greater than 0"),
+            ({"target": float("nan")}, "target: .* not finite"),
+            ({"target": "small"}, "target: 'small' is not a number"),
+            ({"cells": 0}, "cells: 0 is not allowed"),
+            ({"cells": 2.5}, "cells: 2.5 is not a whole number"),
+            ({"rounds": None}, "rounds: nothing is not a number"),
+        ],
+    )
+    def test_arguments_out_of_range_are_refused_before_any_work(self, arguments, problem):
+        with pytest.raises(InputError, match=problem):
+            ringsweep.precision({"scene": BELT}, **arguments)
+
+    @pytest.mark.parametrize("part", ["grid", "points"])
+    def test_several_laws_are_refused_where_they_stand(self, part):
+        sweep = {part: {"friction.law": ["coulomb", "stiction"]}}
+        with pytest.raises(InputError, match=rf"sweep\.{part}\.friction\.law: each of coulomb, stiction"):
+            ringsweep.precision({"scene": BELT, "sweep": sweep})
+
+    @pytest.mark.parametrize(
+        "arguments", [["--target", "0"], ["--target", "nan"], ["--target", "x"], ["--cells", "0"], ["--rounds", "-1"]]
+    )
+    def test_a_wrong_option_has_status_2(self, folder, arguments):
+        with pytest.raises(SystemExit) as ended:
+            main(["precision", "belt.yaml", *arguments])
+        assert ended.value.code == 2
+
+    @pytest.mark.parametrize("output", ["nowhere/out.nc", ".", "out.png"])
+    def test_an_output_that_cannot_be_written_is_refused_before_any_work(self, folder, capsys, output):
+        assert main(["precision", "belt.yaml", "-o", output]) == 2
+        assert output in capsys.readouterr().err
+
+
+def test_the_command_leaves_dataset_picture_table_and_a_line_to_paste(folder, capsys):
+    assert main(["precision", "belt.yaml", "-o", "out.nc", "--rounds", "1"]) == 0
+    out = capsys.readouterr().out
+    found = storage.load("out.nc")
+    assert (folder / "out.png").read_bytes().startswith(b"\x89PNG")
+    assert found.attrs["target"] == 1e-6
+    lines = out.splitlines()
+    assert [line.split("  ")[0] for line in lines[1 : 1 + found.sizes["contender"]]] == [
+        f"{method}, {setting}" for method, setting in zip(found["method"].values, found["setting"].values, strict=True)
+    ]
+    (pasted,) = (line for line in lines if line.startswith("solver: "))
+    config = {"scene": BELT, **yaml.safe_load(pasted)}
+    assert load(config).solver.name == "event"
+    assert main(["info", "out.nc"]) == 0
+    assert pasted in capsys.readouterr().out
+
+
+def test_a_result_of_another_kind_is_not_replaced_or_misread(folder, capsys):
+    assert main(["run", "belt.yaml", "-o", "sweep.nc"]) == 0
+    assert main(["precision", "belt.yaml", "-o", "belt.nc", "--rounds", "1"]) == 0
+    kept = {name: (folder / name).read_bytes() for name in ("sweep.nc", "belt.nc")}
+    for arguments in (
+        ["precision", "belt.yaml", "-o", "sweep.nc"],
+        ["run", "belt.yaml"],
+        ["simulate", "belt.yaml", "-o", "belt.nc"],
+        ["map", "belt.nc", "--var", "error_end"],
+    ):
+        assert main(arguments) == 2
+    assert {name: (folder / name).read_bytes() for name in kept} == kept
+
+
+def test_the_picture_shows_what_was_found(found):
+    axes = plots.work_precision(found).axes[0]
+    (event,) = (line for line in axes.lines if line.get_label() == "event")
+    rows = found["method"].values == "event"
+    np.testing.assert_array_equal(event.get_xdata(), found["time_per_run"][rows])
+    np.testing.assert_array_equal(event.get_ydata(), found["error_end"][rows].median("cell"))
+    assert any(np.allclose(line.get_ydata(), TARGET, rtol=1e-12) for line in axes.lines)
