@@ -163,7 +163,12 @@ def _is_held(scene, mode, guard, t, y):
 
 @hooks.impasse.implements(ring.Ring)
 def _impasse(scene, mode, t, y):
-    return JAM if _is_jamming(scene, mode, t, y) else BROKEN
+    if mode.sign == 0:
+        return BROKEN
+    # A sharp tail brings the singularity nearer than the inertia tells: what friction rises to may jam the body.
+    mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
+    _, determinant, inertia = ring.acceleration(scene.body, -mode.sign * mu_s1, -mode.sign * mu_s2, 0.0, 1.0, 0.0)
+    return JAM if _is_jamming(scene, mode, t, y) or not (determinant > 0.0 and inertia > 0.0) else BROKEN
 
 
 @hooks.switch.implements(ring.Ring)
