@@ -8,7 +8,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from statistics import median
-from time import perf_counter
+from time import get_clock_info, perf_counter, thread_time
 from typing import Any
 
 import numpy as np
@@ -47,8 +47,11 @@ _TIGHTEST: dict[type, tuple[float, float]] = {Event: (1e-15, 1e-14), Implicit: (
 # Seconds in a round that one setting may take.
 _BUDGET = 10.0
 
-# Seconds below which a clock measures itself and the scheduler: shorter calls are repeated.
+# Seconds below which a clock measures itself: shorter calls are repeated.
 _LEAST = 0.01
+
+# A thread's own time leaves out what a busy machine does meanwhile; some systems count it in ticks too coarse for that.
+_clock = thread_time if get_clock_info("thread_time").resolution < 1e-4 else perf_counter
 
 _WANTED = Parameter("1", "target", lower=0.0, open_lower=True)
 
@@ -88,8 +91,8 @@ def precision(
     xarray.Dataset
         Dimensions ``contender`` and ``cell``, variables as in :data:`ringsweep.variables.PRECISION`; coordinates
         ``method``, ``setting`` and ``solver`` (what stands under ``solver`` in a configuration) of each contender, and
-        those of each cell. Run times are those of one thread, without certificates and compilation; the
-        error of a run that failed is infinite.
+        those of each cell. Run times are processor times of one thread, without certificates and
+        compilation; the error of a run that failed is infinite.
         Attributes: ``target``; ``recommended``, one of ``solver``, or ``closest`` where none meets the
         target; ``certificate_cost``, the factor by which certificates lengthen the runs of that one; ``reference``,
         ``sampled`` and ``left_out`` in words.
@@ -277,22 +280,21 @@ class _Timed:
     method: Any
     seconds: list[float] = field(default_factory=list)
     result: Any = None
-    repeats: int = 0
+    repeats: int = 1
 
     def turn(self, run: Callable[[Any], Result]) -> None:
-        """Run and time once, or as often as the clock needs."""
-        if not self.repeats:
-            begin = perf_counter()
-            self.result = run(self.method)
-            once = perf_counter() - begin
-            self.repeats = math.ceil(_LEAST / once)
-            if self.repeats == 1:
-                self.seconds.append(once)
-                return
-        begin = perf_counter()
+        """Run and time once; the first turn finds how often that must be for the clock to tell."""
+        elapsed = self._lap(run)
+        while not self.seconds and elapsed < _LEAST:
+            self.repeats *= 4
+            elapsed = self._lap(run)
+        self.seconds.append(elapsed / self.repeats)
+
+    def _lap(self, run: Callable[[Any], Result]) -> float:
+        begin = _clock()
         for _ in range(self.repeats):
             self.result = run(self.method)
-        self.seconds.append((perf_counter() - begin) / self.repeats)
+        return _clock() - begin
 
 
 def _race(
