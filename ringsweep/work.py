@@ -24,7 +24,7 @@ from ringsweep.parameters import Parameter
 from ringsweep.physics.friction import LAWS, SET_VALUED
 from ringsweep.scene import LAW
 from ringsweep.solvers.common import Result, agree
-from ringsweep.solvers.event import Event, Implicit, pick
+from ringsweep.solvers.event import Event, Implicit, 
 from ringsweep.solvers.rk4 import RK4
 from ringsweep.units import quantity
 from ringsweep.variables import FAILED, PRECISION, Variable
@@ -142,7 +142,7 @@ def measure(
                 f"there is nothing to measure errors against: in all of the {len(sample)} cells tried {best.name} "
                 "fails, or its two tightest runs disagree about the regime",
             )
-        part = pick(part, known)
+        part = take(part, known)
         raced, slow = _race(contenders, run, rounds, bar)
         certified = [_ticked(bar, replace(one.method, certify=True), run) for one in raced]
 
