@@ -19,12 +19,13 @@ from ringsweep.config import COUNT, Config, load, sweepable
 from ringsweep.engine import cells as values_of
 from ringsweep.engine import progress_bar, provenance
 from ringsweep.errors import InputError
+from ringsweep.jit import take
 from ringsweep.models import MODELS, batch
 from ringsweep.parameters import Parameter
 from ringsweep.physics.friction import LAWS, SET_VALUED
 from ringsweep.scene import LAW
 from ringsweep.solvers.common import Result, agree
-from ringsweep.solvers.event import Event, Implicit, 
+from ringsweep.solvers.event import Event, Implicit
 from ringsweep.solvers.rk4 import RK4
 from ringsweep.units import quantity
 from ringsweep.variables import FAILED, PRECISION, Variable
