@@ -42,7 +42,7 @@ def _is_stiff(scene, mode, y, line):
 
 @hooks.stiff_scales.implements(ring.Ring)
 def _stiff_scales(scene, tolerance, x):
-    return tolerance, tolerance * stiction_band(scene.law)
+    return tolerance, tolerance * stiction_band(scene.law) * ring.support(scene.body)
 
 
 @hooks.stiff_rates.implements(ring.Ring)

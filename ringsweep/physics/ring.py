@@ -236,6 +236,21 @@ def _one_grip(body, cos_phi, omega):
     return body.gravity / body.radius * cos_phi + omega * omega
 
 
+@hook
+def support(body):
+    """Determinant of the reactions without friction: the less it is, the more they make of an error of friction."""
+
+
+@support.implements(TwoContacts)
+def _two_support(body):
+    return body.determinant[0]
+
+
+@support.implements(OneContact)
+def _one_support(body):
+    return 1.0
+
+
 @inner_hook
 def reactions(body, K1, K2, sin_phi, cos_phi, omega, phi_dd):
     """Normal reactions ``(N1, N2)``, N (the paper's Eq. 17); with one contact N2 repeats N1."""

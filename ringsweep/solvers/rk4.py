@@ -26,7 +26,7 @@ from ringsweep.hooks import (
     stiffness,
     verdict,
 )
-from ringsweep.jit import absorbed, add_scaled, hook, inlined, kernel, take
+from ringsweep.jit import absorbed, add_scaled, hook, inlined, inner_hook, kernel, take
 from ringsweep.lanes import (
     Several,
     Single,
@@ -53,8 +53,9 @@ from ringsweep.solvers.common import Method, Result, agree, same_drive
 #: complex; on the real axis alone it would be 2.785.
 STABILITY_LIMIT = 2.61
 
-# Steps between two visits of a cell: the drive's table of so many steps stays in the cache.
-_BLOCK = 256
+# Steps between two visits of a cell: the drive's table of so many steps stays in the cache, and so few are lost on a
+# run that ends among others that go on.
+_BLOCK = 512
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,8 @@ class RK4(Method):
     steps: Annotated[int, Parameter("1", "steps over the span of time", lower=1, upper=1e10)]
     certify: bool = True
     """Whether cells within the limit of stability are run again at half the step."""
+    diagnose: bool = True
+    """Whether the stiffness of each run is kept; without it none can be certified."""
 
     def check(self, structure: Structure) -> None:
         """Refuse a law that changes at instants which no constant step meets."""
@@ -84,6 +87,8 @@ class RK4(Method):
         cells = len(batch.span)
         rows, report = self._integrate(batch, np.arange(cells), self.steps, len(outcomes))
         certified = np.zeros(cells, dtype=bool)
+        if not self.diagnose:
+            return Result(rows, steps=report[:, 0], certified=certified)
         if self.certify:
             # Beyond the limit of stability a second run agrees with the first for the wrong reason.
             stable = np.flatnonzero(report[:, 1] <= STABILITY_LIMIT)
@@ -97,10 +102,9 @@ class RK4(Method):
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         rows = np.empty((len(batch.span), width))
         report = np.empty((len(batch.span), 2))
-        kind = lanes(batch)
-        scenes = side_by_side(batch._replace(drive=scaled(batch.drive))) if isinstance(kind, Several) else batch
+        kind, account = lanes(batch), Kept() if self.diagnose else Dropped()
         for group in same_drive(batch, cells):
-            _integrate(kind, scenes, take(batch.drive, group[0]), group, steps, rows, report)
+            integrate(kind, account, batch, group, steps, rows, report)
         return rows[cells], report[cells]
 
     def history(self, batch: Any, samples: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -116,6 +120,29 @@ class RK4(Method):
 LIVE, GONE, ENDING, EXCUSED = 1.0, 0.0, 2.0, -1.0
 
 
+class Kept(NamedTuple):
+    """The stiffness of each run is kept."""
+
+
+class Dropped(NamedTuple):
+    """It is not."""
+
+
+@inner_hook
+def _stiffer(account, scene, worst, before, now, h):
+    """Stiffness of a run after a step, given what it was."""
+
+
+@_stiffer.implements(Kept)
+def _keep(account, scene, worst, before, now, h):
+    return max(worst, stiffness(scene, before, now, h))
+
+
+@_stiffer.implements(Dropped)
+def _drop(account, scene, worst, before, now, h):
+    return worst
+
+
 class _Run(NamedTuple):
     """Where the runs of a value stand."""
 
@@ -126,7 +153,7 @@ class _Run(NamedTuple):
     live: Any
 
 
-@inlined
+@kernel
 def _tabulate(table, drive, first, steps, h):
     """Fill `table` with the drive's shape at whole and half steps from step `first` on."""
     for k in range(2 * steps + 1):
@@ -189,7 +216,7 @@ def _seat_among_several(kind, memory, at, scene, run):
 
 
 @inlined
-def _advance(kind, batch, memory, at, seated, sample, table, first, k, steps, h):
+def _advance(kind, account, batch, memory, at, seated, sample, table, first, k, steps, h):
     """Take the runs of a value from step `k` of a block to its end, or to where one of them ends.
 
     Returns the step that was not taken.
@@ -206,7 +233,7 @@ def _advance(kind, batch, memory, at, seated, sample, table, first, k, steps, h)
         if any_of(ended):
             live = select(ended, ENDING, live)
             break
-        worst = max(worst, stiffness(scene, now, after, h))
+        worst = _stiffer(account, scene, worst, now, after, h)
         record = conform(observe(scene, record, y_next, now, after, (first + k + 1) * h, h), record)
         y, now, live = y_next, after, abs(live)
         k += 1
@@ -215,7 +242,7 @@ def _advance(kind, batch, memory, at, seated, sample, table, first, k, steps, h)
 
 
 @inlined
-def _part(kind, batch, memory, at, seated, sample, table, first, k, h, rows, report):
+def _part(kind, account, batch, memory, at, seated, sample, table, first, k, h, rows, report):
     """See off the runs of a value that end in a step, one by one by the plain formulas; returns how many are left."""
     left = 0
     for lane in range(len(seated)):
@@ -232,7 +259,7 @@ def _part(kind, batch, memory, at, seated, sample, table, first, k, h, rows, rep
             live = EXCUSED
             if status != RUNNING:
                 live = GONE
-                worst = max(run.stiffness, stiffness(scene, run.now, after, h))
+                worst = _stiffer(account, scene, run.stiffness, run.now, after, h)
                 y_end = _hermite(run.y, run.now.rates, y_next, after.rates, h, fraction)
                 t = (first + k + fraction) * h
                 record = observe(scene, run.record, y_end, run.now, after, t, fraction * h)
@@ -252,19 +279,55 @@ def _conclude(scene, record, status, t, y, steps, worst, cell, rows, report):
     report[cell, 1] = worst
 
 
-@kernel
-def _integrate(kind, batch, drive, cells, steps, rows, report):
+def integrate(
+    kind: Any,
+    account: Any,
+    batch: Any,
+    cells: NDArray[np.intp],
+    steps: int,
+    rows: NDArray[np.float64],
+    report: NDArray[np.float64],
+) -> None:
     """Run `cells` of a batch, all with the same shape of drive and span, for `steps` steps.
 
-    Runs are seated side by side in memory, as many as make a value in a block: the numbers of their scenes, then of
-    where they stand. After every block of steps those that go on move together.
+    Parameters
+    ----------
+    kind : Single or Several
+        How many runs stand side by side.
+    account : Kept or Dropped
+        Whether the stiffness is kept.
+    rows, report : ndarray of shape ``(cells of the batch, outcomes)`` and ``(cells of the batch, 2)``
+        Filled for these cells: outcomes; number of steps and stiffness.
     """
-    span = take(batch, cells[0]).span
-    h = span / steps
+    # What the kernels are compiled for knows no shape of the drive: that of its table is a kernel of its own.
+    drive = take(batch.drive, cells[0])
+    if isinstance(kind, Several):
+        batch = side_by_side(batch._replace(drive=scaled(batch.drive)))
+    h = float(batch.span[cells[0]]) / steps
     table = np.empty((2 * min(_BLOCK, steps) + 1, 2))
     _tabulate(table, drive, 0, 0, h)
+    memory, seated, live = _begin(kind, batch, cells, table, rows, report)
+    for first in range(0, steps, _BLOCK):
+        if live == 0:
+            return
+        size = min(_BLOCK, steps - first)
+        _tabulate(table, drive, first, size, h)
+        live = _go_on(kind, account, batch, memory, seated, live, table, first, size, h, rows, report)
+    _complete(kind, batch, memory, seated, live, steps, rows, report)
+
+
+@kernel
+def _begin(kind, batch, cells, table, rows, report):
+    """Seat runs side by side in memory, as many as make a value in a block, those out that end at their launch.
+
+    Returns
+    -------
+    tuple
+        Memory of shape ``(blocks, numbers of a scene and of where it stands, runs in a value)``; the cells seated
+        there, in order; how many of them there are.
+    """
     per = width(kind)
-    sample = _launch(take(batch, cells[0]), table)[0]
+    sample = _sample(take(batch, cells[0]))
     lines = size_of(take(batch, cells[0])) + size_of(sample)
     blocks = (len(cells) + per - 1) // per
     memory = np.zeros((blocks, lines, per))
@@ -277,37 +340,49 @@ def _integrate(kind, batch, drive, cells, steps, rows, report):
         if status != RUNNING:
             _conclude(scene, run.record, status, 0.0, run.y, 0.0, 0.0, i, rows, report)
             continue
-        at = live // per * lines * per + live % per
-        _seat(kind, seats, at, scene, run)
+        _seat(kind, seats, live // per * lines * per + live % per, scene, run)
         seated[live] = i
         live += 1
-    for first in range(0, steps, _BLOCK):
-        size = min(_BLOCK, steps - first)
-        _tabulate(table, drive, first, size, h)
-        for place in range(0, live, per):
-            at, seated_here = place * lines, seated[place : place + per]
-            k, left = 0, per
-            while left > 0:
-                k = _advance(kind, batch, seats, at, seated_here, sample, table, first, k, size, h)
-                if k == size:
-                    break
-                left = _part(kind, batch, seats, at, seated_here, sample, table, first, k, h, rows, report)
-        kept = 0
-        for seat in range(live):
-            if memory[seat // per, lines - 1, seat % per] != GONE:
-                memory[kept // per, :, kept % per] = memory[seat // per, :, seat % per]
-                seated[kept] = seated[seat]
-                kept += 1
-        # Empty seats of the last block go on with what they hold, unheard.
-        for seat in range(kept, live):
-            memory[seat // per, lines - 1, seat % per] = GONE
-        live = kept
+    return memory, seated, live
+
+
+@kernel
+def _go_on(kind, account, batch, memory, seated, live, table, first, steps, h, rows, report):
+    """Take all seated runs through a block of steps; those that are left move together. Returns their number."""
+    per, lines = width(kind), memory.shape[1]
+    seats = memory.reshape(memory.size)
+    sample = _sample(take(batch, seated[0]))
+    for place in range(0, live, per):
+        at, here = place * lines, seated[place : place + per]
+        k, left = 0, per
+        while left > 0:
+            k = _advance(kind, account, batch, seats, at, here, sample, table, first, k, steps, h)
+            if k == steps:
+                break
+            left = _part(kind, account, batch, seats, at, here, sample, table, first, k, h, rows, report)
+    kept = 0
     for seat in range(live):
-        at = seat // per * lines * per + seat % per
-        run = read(seats, at + per * (lines - size_of(sample)), per, sample)
-        # The end of the span, not the rounding of a sum of steps.
+        if memory[seat // per, lines - 1, seat % per] != GONE:
+            memory[kept // per, :, kept % per] = memory[seat // per, :, seat % per]
+            seated[kept] = seated[seat]
+            kept += 1
+    # Empty seats of the last block go on with what they hold, unheard.
+    for seat in range(kept, live):
+        memory[seat // per, lines - 1, seat % per] = GONE
+    return kept
+
+
+@kernel
+def _complete(kind, batch, memory, seated, live, steps, rows, report):
+    """Enter the outcomes of the runs that reached the end of the span."""
+    per, lines = width(kind), memory.shape[1]
+    seats = memory.reshape(memory.size)
+    for seat in range(live):
         cell = seated[seat]
-        _conclude(take(batch, cell), run.record, COMPLETE, span, run.y, float(steps), run.stiffness, cell, rows, report)
+        scene = take(batch, cell)
+        run = read(seats, (seat // per * lines + size_of(scene)) * per + seat % per, per, _sample(scene))
+        # The end of the span, not the rounding of a sum of steps.
+        _conclude(scene, run.record, COMPLETE, scene.span, run.y, float(steps), run.stiffness, cell, rows, report)
 
 
 @inlined
@@ -318,6 +393,14 @@ def _launch(scene, table):
     now = inspect(scene, y, theta, ring_omega)
     status, _ = verdict(scene, now, now)
     return _Run(y, now, begin(scene, y, now), 0.0, LIVE), status
+
+
+@inlined
+def _sample(scene):
+    """A run of the type that such scenes have."""
+    y = launch(scene)
+    now = inspect(scene, y, 0.0, 0.0)
+    return _Run(y, now, begin(scene, y, now), 0.0, LIVE)
 
 
 @kernel
