@@ -17,6 +17,7 @@ import numpy as np
 
 from ringsweep import config, engine
 from ringsweep.models import MODELS, batch
+from ringsweep.solvers.common import Result
 
 #: The ring of the paper's Fig. 29 (SI units) but for its law.
 SPAN = 10.0
@@ -54,18 +55,20 @@ def configure(scene: Mapping[str, Any], points: Mapping[str, Sequence[float]], m
     return config.load({"scene": scene, "solver": solver, "sweep": {"points": points}})
 
 
-def on_one_core(configuration: Any) -> Callable[[], dict[str, Any]]:
-    """A call that runs a configuration in this thread, and nothing else (no engine, no dataset): its outcomes."""
+def bare(configuration: Any) -> Callable[[], Result]:
+    """A call that runs a configuration in this thread, and nothing else (no engine, no dataset)."""
     structure = configuration.scene.structure
     names = MODELS[structure.model].outcomes
     count = len(next(iter(configuration.source["sweep"]["points"].values())))
     prepared = batch(structure, engine.cells(configuration.scene, configuration.axes, np.arange(count)))
+    return lambda: configuration.solver.run(prepared, names)
 
-    def call() -> dict[str, Any]:
-        result = configuration.solver.run(prepared, names)
-        return dict(zip(names, result.rows.T, strict=True))
 
-    return call
+def on_one_core(configuration: Any) -> Callable[[], dict[str, Any]]:
+    """The same: its outcomes by name."""
+    names = MODELS[configuration.scene.structure.model].outcomes
+    run = bare(configuration)
+    return lambda: dict(zip(names, run().rows.T, strict=True))
 
 
 def on_all_cores(configuration: Any) -> Any:

@@ -12,7 +12,7 @@ from typing import Any
 import numba
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic, overload
+from numba.extending import intrinsic, overload, register_jitable
 
 # Contraction to fused multiply-add is the only liberty taken with IEEE arithmetic: "nnan" and
 # "ninf" would delete the checks by which a run is flagged as failed, and "reassoc" would undo the
@@ -21,6 +21,8 @@ OPTIONS: Any = {
     "nogil": True,
     "error_model": "numpy",
     "fastmath": {"contract"},
+    # A second entry point for callers in C, of whom there are none.
+    "no_cfunc_wrapper": True,
 }
 
 
@@ -65,13 +67,17 @@ def kernel(function: Callable[..., Any]) -> Any:
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """Compile a small formula that callers absorb; it needs no cache entry of its own."""
-    return numba.njit(**OPTIONS)(function)
+    """Compile a small formula that callers absorb; it needs no cache entry of its own.
+
+    Called from Python it is the function that it was: an entry from there, through which a whole scene is unpacked,
+    takes longer to compile than most formulas, and there would be one for each.
+    """
+    return register_jitable(**OPTIONS)(function)
 
 
 def absorbed(function: Callable[..., Any]) -> Any:
     """The same, whatever its size: in the innermost loop of a kernel a call would pass its arguments through memory."""
-    return numba.njit(**OPTIONS, forceinline=True)(function)
+    return register_jitable(**OPTIONS, forceinline=True)(function)
 
 
 def inner_hook(stub: Callable[..., Any]) -> Any:

@@ -187,7 +187,7 @@ class TestWeights:
                 x = length * np.array([relative, *coefficients])
                 basis, static, kinetic = np.zeros((3, len(x)))
                 for k in range(len(x)):
-                    expand_weights.py_func(law, region, x, k, basis, static, kinetic)
+                    expand_weights(law, region, x, k, basis, static, kinetic)
                 now = p.low + np.polynomial.polynomial.polyval(s, x)
                 spread = 1e-11 + 10 * np.spacing(p.low) / length
                 w_s, w_k, _, _ = weights_in(law, region, now)

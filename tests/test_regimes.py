@@ -13,7 +13,7 @@ from ringsweep.regimes import BROKEN, COMPLETE, JAM, SEPARATED_1, SEPARATED_2
 from ringsweep.variables import FAILED, JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 
 EPSILON = 1e-3
-begin, observe, conclude = (f.py_func for f in (regimes.begin, regimes.observe, regimes.conclude))
+begin, observe, conclude = regimes.begin, regimes.observe, regimes.conclude
 
 
 def outcome(phi, omega, status=COMPLETE, normal_1=1.0, normal_2=1.0, stuck_for=0.0):

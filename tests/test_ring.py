@@ -171,7 +171,7 @@ class TestMirror:
         def at(sign):
             surface = cut([Arc(sign * center, half_angle, 0.5, 0.3)], 0.2, 0.1)
             scene = Ring(body, surface, BengisuAkay(1.0, 0.5), None, 0.0, 0.0, 1.0, 0.0)
-            return ring.friction.py_func(scene, sign * phi, sign * omega, sign * theta, sign * ring_omega)
+            return ring.friction(scene, sign * phi, sign * omega, sign * theta, sign * ring_omega)
 
         body = take(cells().body, 0)
         edges = [center + side * half_angle + contact for side in (-1, 1) for contact in (-body.beta, body.beta)]
@@ -307,7 +307,7 @@ class TestCompiledModel:
                 continue
             ends = []
             for sliding in (omega - reach, omega + reach):
-                _, K1, K2, _, _ = ring.friction.py_func(scene, phi, sliding, theta, ring_omega)
+                _, K1, K2, _, _ = ring.friction(scene, phi, sliding, theta, ring_omega)
                 ends.append(acceleration(body, K1, K2, sin(phi), cos(phi), omega)[0])
             difference = (ends[1] - ends[0]) / (2 * reach)
             slope = compiled_inspect(batch, 0, (phi, omega), theta, ring_omega).slope

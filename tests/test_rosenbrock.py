@@ -159,7 +159,7 @@ def _pursuit_linearise(scene, mode, t, x):
 
 def integrate(scene, steps, end=1.0):
     """Error at the end, largest error of the dense output within a step, largest estimate."""
-    step, dense = rosenbrock.step.py_func, rosenbrock.dense.py_func
+    step, dense = rosenbrock.step, rosenbrock.dense
     stages = np.empty((STAGES, 2))
     h = end / steps
     state = scene.solution(0.0)
@@ -232,5 +232,5 @@ class TestOrder:
         stages = np.empty((STAGES, 2))
         start = (1.0 + scene.solution(0.0)[0], 1.0)
         line = linearise(scene, None, 0.0, start)
-        (x, y), _ = rosenbrock.step.py_func(scene, None, 0.0, start, line, 0.01, stages)
+        (x, y), _ = rosenbrock.step(scene, None, 0.0, start, line, 0.01, stages)
         assert x - sin(0.01) == pytest.approx(y * y, abs=1e-4)

@@ -1,0 +1,447 @@
+"""What each thing that a scene may hold costs: from the leanest scene to the fullest, every row adds one.
+
+    python -m benchmarks.scenes            # about ten minutes, most of it compilation
+    python -m benchmarks.scenes --quick    # fewer cells and rounds
+
+Each row is measured under `rk4` and under whichever of `event` and `implicit` takes its law, on one core, warm, without
+certificates, all rows in turn within rounds; a ratio is the median of those within the rounds. *Idle* pairs run the
+very same motion twice: with a thing that is there and does nothing (a drive of amplitude 0, an arc as rough as the
+rest), and without it. Compilation is measured in CPU seconds, in a process of its own for each kernel: other work on
+the machine does not count there.
+
+Writes `scenes.md` to `benchmarks/results/`; `--quick`, to the current folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import re
+import resource
+import subprocess
+import sys
+import tempfile
+import termios
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from math import radians
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from benchmarks._common import PAPER_STEPS, SPAN, Times, alternate, bare, configure, heading, machine, markdown, table
+from ringsweep import engine, hooks, regimes
+from ringsweep.jit import inlined
+from ringsweep.physics import ring
+from ringsweep.physics.friction import LAWS, SET_VALUED, WITHOUT_STATIC
+from ringsweep.solvers import piecewise, rk4
+
+ROOT = Path(__file__).parent.parent
+RESULTS = Path(__file__).parent / "results"
+
+#: Functions of the C library that a kernel may call, and the feature that each speaks for.
+CALLS = ("exp", "atan", "log1p", "log", "pow", "sin", "cos")
+
+
+#: What times are kept under: `rk4`, and whichever of the others takes the law.
+METHODS = ("rk4", "piecewise")
+
+
+# ---- scenes --------------------------------------------------------------------------------
+
+
+class Rung(NamedTuple):
+    """A scene, what it is compared with, and what is swept."""
+
+    scene: dict[str, Any]
+    before: str | None
+    swept: str = "initial.phi"
+    between: tuple[float, float] = (0.05, 0.3)
+
+    @property
+    def piecewise(self) -> str:
+        """Which of the piecewise methods takes the law."""
+        return "event" if LAWS[self.scene["friction"]["law"]] in SET_VALUED else "implicit"
+
+    def configuration(self, method: str, cells: int, **options: Any) -> Any:
+        """Configuration of a run over so many cells."""
+        if method == "rk4":
+            options.setdefault("steps", PAPER_STEPS)
+        return configure(self.scene, {self.swept: np.linspace(*self.between, cells).tolist()}, method, **options)
+
+
+def on_ring(law: str = "coulomb", *, contacts: int = 2, drive: Any = None, arcs: int = 0, rough: Any = None) -> Any:
+    """A ring with so many contacts and arcs; `rough` are their coefficients."""
+    pair = {"mu_s": 0.2, "mu_k": 0.1}
+    rough = rough or {"mu_s": 0.3, "mu_k": 0.15}
+    if LAWS[law] in WITHOUT_STATIC:
+        pair, rough = {"mu_k": pair["mu_k"]}, {"mu_k": rough["mu_k"]}
+    more = {"tustin": {"alpha": 100.0}, "bengisu-akay": {"alpha": 100.0, "v0": 0.2}}.get(law, {})
+    body = {"mass": 0.076}
+    if contacts == 2:
+        body |= {"inertia": 4.47e-5, "half_distance": 0.025, "ball_radius": 0.01}
+    scene: dict[str, Any] = {
+        "model": "ring" if contacts == 2 else "ring-single-contact",
+        "body": body,
+        "ring": {"radius": 0.043378},
+        "friction": {"law": law, "rest": pair, **more},
+        "drive": drive or {"law": "none"},
+        "initial": {"omega": 5.0},
+        "time": {"span": SPAN},
+    }
+    if arcs:
+        places = [(k - 1) * radians(60.0) for k in range(arcs)] if arcs > 1 else [0.0]
+        scene["zones"] = [{"center": place, "half_angle": radians(15.0), **rough} for place in places]
+    return scene
+
+
+def on_belt(law: str) -> Any:
+    """A mass on a belt."""
+    pair = {"mu_k": 0.1} if LAWS[law] in WITHOUT_STATIC else {"mu_s": 0.15, "mu_k": 0.1}
+    more = {"sigma0": 1e3, "sigma1": 30.0, "sigma2": 0.1, "v_s": 1e-2} if law == "lugre" else {}
+    return {
+        "model": "belt",
+        "body": {"mass": 1.0},
+        "spring": {"stiffness": 2.0},
+        "friction": {"law": law, **pair, **more},
+        "time": {"span": SPAN},
+    }
+
+
+_CONSTANT, _ARCTAN = {"law": "constant", "amplitude": 2.0}, {"law": "arctan", "amplitude": 2.0}
+_BELT = ("belt.velocity", (0.05, 0.2))
+
+LADDER: dict[str, Rung] = {
+    "one contact, Coulomb, immobile uniform ring": Rung(on_ring(contacts=1), None),
+    "+ second contact": Rung(on_ring(), "one contact, Coulomb, immobile uniform ring"),
+    "+ constant drive": Rung(on_ring(drive=_CONSTANT), "+ second contact"),
+    "+ arctan drive in its place": Rung(on_ring(drive=_ARCTAN), "+ constant drive"),
+    "+ an arc": Rung(on_ring(drive=_ARCTAN, arcs=1), "+ arctan drive in its place"),
+    "+ two more arcs": Rung(on_ring(drive=_ARCTAN, arcs=3), "+ an arc"),
+    "+ stiction": Rung(on_ring("stiction", drive=_ARCTAN, arcs=3), "+ two more arcs"),
+    "+ exponential tail (tustin)": Rung(on_ring("tustin", drive=_ARCTAN, arcs=3), "+ stiction"),
+    "+ stiction band (bengisu-akay)": Rung(
+        on_ring("bengisu-akay", drive=_ARCTAN, arcs=3), "+ exponential tail (tustin)"
+    ),
+    "belt, Coulomb": Rung(on_belt("coulomb"), None, *_BELT),
+    "belt + stiction": Rung(on_belt("stiction"), "belt, Coulomb", *_BELT),
+    "belt + bristles (lugre)": Rung(on_belt("lugre"), "belt + stiction", *_BELT),
+}
+
+_REST = {"mu_s": 0.2, "mu_k": 0.1}
+_ALL_ALIKE = {"mu_s": 0.1, "mu_k": 0.1}
+
+
+def _level(law: str) -> dict[str, Any]:
+    """A law whose static coefficient is its kinetic one."""
+    scene = on_ring(law, drive=_ARCTAN)
+    scene["friction"]["rest"] = _ALL_ALIKE if law != "coulomb" else {"mu_k": 0.1}
+    scene["zones"] = on_ring(drive=_ARCTAN, arcs=3, rough={"mu_k": 0.1})["zones"]
+    if law != "coulomb":
+        scene["zones"] = [zone | _ALL_ALIKE for zone in scene["zones"]]
+    return scene
+
+
+#: What is there and does nothing, beside the same motion without it: structures of the ladder, with other numbers.
+IDLE: dict[str, tuple[Rung, Rung]] = {
+    "constant drive of amplitude 0": (
+        Rung(on_ring(drive=_CONSTANT | {"amplitude": 0.0}), None),
+        LADDER["+ second contact"],
+    ),
+    "arctan drive of amplitude 0": (
+        Rung(on_ring(drive=_ARCTAN | {"amplitude": 0.0}), None),
+        LADDER["+ second contact"],
+    ),
+    "an arc like the rest": (
+        Rung(on_ring(drive=_ARCTAN, arcs=1, rough=_REST), None),
+        LADDER["+ arctan drive in its place"],
+    ),
+    "three arcs like the rest": (
+        Rung(on_ring(drive=_ARCTAN, arcs=3, rough=_REST), None),
+        LADDER["+ arctan drive in its place"],
+    ),
+    "stiction with μs = μk": (Rung(_level("stiction"), None), Rung(_level("coulomb"), None)),
+    "tustin with μs = μk": (Rung(_level("tustin"), None), Rung(_level("stiction"), None)),
+}
+
+
+# ---- what a process of its own measures: each returns what JSON can hold -------------------
+
+
+def compile_one(name: str, method: str) -> dict[str, Any]:
+    """CPU seconds and code of one kernel, of which there is nothing in the cache yet."""
+    rung = LADDER[name]
+    run = bare(rung.configuration(method, 2, **({"steps": 4} if method == "rk4" else {})))
+    begin = time.process_time(), time.perf_counter()
+    run()
+    took = time.process_time() - begin[0], time.perf_counter() - begin[1]
+    kernel = rk4._integrate if method == "rk4" else piecewise.integrate
+    found = {"cpu": took[0], "wall": took[1]}
+    if kernel.stats.cache_hits:
+        # Another scene has the very same types, and what is loaded has no text.
+        return found | {"instructions": "the same", "calls": ["the same"]}
+    (assembly,) = kernel.inspect_asm().values()
+    return found | code_of(assembly)
+
+
+def code_of(assembly: str) -> dict[str, Any]:
+    """How many instructions there are, and which functions of the C library they call."""
+    instructions = re.findall(r"^\t[a-z].*", assembly, re.MULTILINE)
+    # A function may be called by name or, far away, through its address: "movabsq $exp, %rax".
+    named = {name for line in instructions for name in re.findall(r"[\s$](\w+)", line)}
+    return {"instructions": len(instructions), "calls": [name for name in CALLS if name in named]}
+
+
+def step_times(cells: int, few: int, rounds: int) -> dict[str, Any]:
+    """Seconds of every scene under both methods in each round, and the steps taken."""
+    rungs = LADDER | {f"idle: {name}": pair[0] for name, pair in IDLE.items()}
+    rungs |= {f"without: {name}": pair[1] for name, pair in IDLE.items()}
+    found: dict[str, Any] = {}
+    with one_core():
+        for own in (False, True):
+            calls = {
+                name: bare(rung.configuration(rung.piecewise if own else "rk4", few if own else cells))
+                for name, rung in rungs.items()
+            }
+            for call in calls.values():
+                call()
+            times, results = alternate(calls, rounds)
+            for name in rungs:
+                found[f"{name}, {METHODS[own]}"] = {
+                    "wall": times[name].wall,
+                    "steps": float(results[name].steps.sum()),
+                    "runs": len(results[name].steps),
+                }
+    return found
+
+
+def diagnostics(cells: int, rounds: int, without: bool) -> float:
+    """Seconds of the fullest ring under `rk4`, as it is or with a kernel that keeps no stiffness and no stick time."""
+    if without:
+        rk4.stiffness = inlined(lambda scene, before, now, h: 0.0)
+
+        def observe(scene, record, y, before, now, t, h):
+            return regimes.observe(record, y[0], y[1], now.normal_1, now.normal_2, 0.0, scene.epsilon_omega)
+
+        hooks.observe.implements(ring.Ring)(observe)
+    run = bare(LADDER["+ stiction band (bengisu-akay)"].configuration("rk4", cells))
+    run()
+    with one_core():
+        times, _ = alternate({"": run}, rounds)
+    return min(times[""].wall)
+
+
+def memory(cells: int) -> dict[str, float]:
+    """Peak resident memory, MiB: after the import, after a small sweep, and after one of so many cells."""
+    rung = LADDER["one contact, Coulomb, immobile uniform ring"]
+
+    def peak() -> float:
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+
+    found = {"imported": peak()}
+    engine.compute(rung.configuration("rk4", 64, steps=10), jobs=None, progress=False)
+    found["small"] = peak()
+    engine.compute(rung.configuration("rk4", cells, steps=10), jobs=None, progress=False)
+    return found | {"large": peak()}
+
+
+@contextmanager
+def one_core() -> Iterator[None]:
+    """Pin this process to one of its cores."""
+    cores = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {max(cores)})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, cores)
+
+
+# ---- processes -----------------------------------------------------------------------------
+
+
+def in_child(function: Callable[..., Any], *args: Any, cache: Path) -> Any:
+    """Call a function of this module in a process of its own, with that folder for compiled code."""
+    code = f"import json; from benchmarks import scenes; print(json.dumps(scenes.{function.__name__}(*{args!r})))"
+    done = subprocess.run([sys.executable, "-c", code], env=environment(cache), stdout=subprocess.PIPE, check=True)
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def environment(cache: Path) -> dict[str, str]:
+    """That of a process which finds the package, and keeps what it compiles in a folder."""
+    found = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
+    return {**os.environ, "NUMBA_CACHE_DIR": str(cache), "PYTHONPATH": found}
+
+
+def size_of(folder: Path) -> int:
+    """Bytes of the files in a folder."""
+    return sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
+
+
+def best_of(command: Sequence[str], rounds: int, cache: Path) -> float:
+    """Least seconds that a command takes."""
+    walls = []
+    for _ in range(rounds):
+        begin = time.perf_counter()
+        subprocess.run(command, env=environment(cache), stdout=subprocess.DEVNULL, check=True)
+        walls.append(time.perf_counter() - begin)
+    return min(walls)
+
+
+def first_and_last(config: Path, folder: Path, cache: Path) -> tuple[float, float]:
+    """Seconds until the progress bar of `ringsweep run` first moves, and until the command is done."""
+    # The bar shows itself to a terminal alone.
+    bar, terminal = os.openpty()
+    termios.tcsetwinsize(terminal, (24, 80))
+    command = [sys.executable, "-m", "ringsweep", "run", str(config), "--fresh", "-o", str(folder / "map.nc")]
+    begin = time.perf_counter()
+    with subprocess.Popen(command, env=environment(cache), stdout=subprocess.DEVNULL, stderr=terminal) as process:
+        os.close(terminal)
+        said, first = b"", 0.0
+        while True:
+            try:
+                said += os.read(bar, 4096)
+            except OSError:
+                # So Linux tells that nobody writes any more.
+                break
+            if not first and re.search(rb"[1-9]\d*/\d+ \[", said):
+                first = time.perf_counter() - begin
+    os.close(bar)
+    if process.returncode:
+        raise RuntimeError(said.decode())
+    return first, time.perf_counter() - begin
+
+
+# ---- the command ---------------------------------------------------------------------------
+
+
+HEADER = [
+    "scene", "", "rk4, ns per step", "x", "us per run", "steps per run", "us per run, x", "ns per step, x",
+    "compile rk4, CPU s", "other", "cache rk4, KiB", "other", "instructions rk4", "other", "calls of rk4", "other",
+]  # fmt: skip
+
+
+def ladder(found: Mapping[str, Any], compiled: Mapping[tuple[str, str], Any]) -> list[list[str]]:
+    """Lines of the table of scenes."""
+    lines = []
+    for name, rung in LADDER.items():
+
+        def ratio(method: str, per: str, name: str = name, before: str | None = rung.before) -> str:
+            return f"{over(found, name, before, method, per):.2f}" if before else "-"
+
+        times, own = (found[f"{name}, {method}"] for method in METHODS)
+        both = [compiled[name, method] for method in ("rk4", rung.piecewise)]
+        lines.append([
+            name, rung.piecewise,
+            f"{1e9 * Times(times['wall']).median / times['steps']:.1f}", ratio("rk4", "steps"),
+            f"{1e6 * Times(own['wall']).median / own['runs']:.1f}", f"{own['steps'] / own['runs']:.0f}",
+            ratio("piecewise", "runs"), ratio("piecewise", "steps"),
+            *(f"{one['cpu']:.1f}" for one in both), *(f"{one['cache'] / 1024:.0f}" for one in both),
+            *(str(one["instructions"]) for one in both), *(" ".join(one["calls"]) or "none" for one in both),
+        ])  # fmt: skip
+    return lines
+
+
+def over(found: Mapping[str, Any], name: str, other: str, method: str, per: str = "runs") -> float:
+    """Time of a scene over that of another, of a run or of a step."""
+    one, two = found[f"{name}, {method}"], found[f"{other}, {method}"]
+    return Times(one["wall"]).ratio(Times(two["wall"])) * two[per] / one[per]
+
+
+def judge(value: float, target: float, unit: str) -> list[str]:
+    """Value, target and word of a line of the targets."""
+    return [f"{value:.2f}{unit}", f"{target:g}{unit}", "met" if value <= target else "MISSED"]
+
+
+def main() -> None:
+    """Measure, print, write."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="fewer cells and rounds")
+    quick = parser.parse_args().quick
+    cells, few, rounds = (64, 16, 3) if quick else (512, 128, 7)
+    begin = time.perf_counter()
+    where = machine()
+    print(where)
+
+    compiled: dict[tuple[str, str], Any] = {}
+    sections: list[tuple[str, Sequence[str], list[list[str]]]] = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        shared = folder / "shared"
+        shared.mkdir()
+        for rung_name, rung in LADDER.items():
+            for method in ("rk4", rung.piecewise):
+                # One folder serves all: what a scene shares with one before costs nothing.
+                before = size_of(shared)
+                one = in_child(compile_one, rung_name, method, cache=shared)
+                compiled[rung_name, method] = one | {"cache": size_of(shared) - before}
+                print(f"{rung_name}, {method}: compiled in {one['cpu']:.1f} s ({one['wall']:.1f} s)", flush=True)
+
+        found = in_child(step_times, cells, few, rounds, cache=shared)
+        sections.append(("From the leanest scene to the fullest", HEADER, ladder(found, compiled)))
+        idle = [[thing, *(f"{over(found, f'idle: {thing}', f'without: {thing}', method):.2f}" for method in METHODS)]
+                for thing in IDLE]  # fmt: skip
+        sections.append(("There, and idle: time over that without it", ["", "rk4", "event"], idle))
+        kept, bereft = (
+            in_child(diagnostics, cells, rounds, off, cache=folder / "bereft" if off else shared)
+            for off in (False, True)
+        )
+
+        python = [sys.executable, "-c"]
+        bare_start = best_of([*python, "pass"], rounds, shared)
+        imported = best_of([*python, "import ringsweep"], rounds, shared)
+        everything = best_of([*python, "import ringsweep.engine"], rounds, shared)
+        helped = best_of([sys.executable, "-m", "ringsweep", "--help"], rounds, shared)
+        many = 100_000
+        peaks = in_child(memory, many, cache=shared)
+        config, cache = ROOT / "configs" / "regime_map.yaml", folder / "cold"
+        cold = first_and_last(config, folder, cache)
+        print(f"cold: {cold[0]:.1f} s, {cold[1]:.1f} s", flush=True)
+        warm = min(first_and_last(config, folder, cache) for _ in range(3))
+        sections.append(("Start and memory", ["", ""], [
+            ["python alone", f"{bare_start:.2f} s"],
+            ["`import ringsweep`", f"{imported:.2f} s"],
+            ["`import ringsweep.engine`, Numba and xarray with it", f"{everything:.2f} s"],
+            ["`ringsweep --help`", f"{helped:.2f} s"],
+            ["`ringsweep run configs/regime_map.yaml`, cold: first cells, all", f"{cold[0]:.1f} s, {cold[1]:.1f} s"],
+            ["the same, warm", f"{warm[0]:.1f} s, {warm[1]:.1f} s"],
+            ["its cache", f"{size_of(cache) / 1024:.0f} KiB"],
+            ["peak memory after the import", f"{peaks['imported']:.0f} MiB"],
+            ["after a sweep of 64 cells", f"{peaks['small']:.0f} MiB"],
+            [f"more for {many} cells", f"{peaks['large'] - peaks['small']:.0f} MiB"],
+        ]))  # fmt: skip
+        contacts = 1.0 / over(found, "+ second contact", "one contact, Coulomb, immobile uniform ring", "rk4", "steps")
+        sections.append(("Targets", ["target", "measured", "at most", ""], [
+            ["first result of a cold `ringsweep run`", *judge(cold[0], 20.0, " s")],
+            ["the same, warm", *judge(warm[0], 2.0, " s")],
+            ["a step of `rk4` with one contact over one with two", *judge(contacts, 1.0, "")],
+            ["stiffness and stick time: a step of `rk4` over one without them", *judge(kept / bereft, 1.02, "")],
+        ]))  # fmt: skip
+
+    report = "# What each thing costs\n\n`python -m benchmarks.scenes` on\n\n"
+    report += "".join(f"- {line}\n" for line in where.splitlines()) + ABOUT
+    for title, header, rows in sections:
+        heading(title)
+        table(header, rows)
+        report += f"\n## {title}\n\n{markdown(header, rows)}"
+    target = Path() if quick else RESULTS
+    target.mkdir(exist_ok=True)
+    (target / "scenes.md").write_text(report)
+    print(f"\nscenes.md is in {target.resolve()}; {time.perf_counter() - begin:.0f} s in all")
+
+
+#: What the report says of itself.
+ABOUT = f"""
+One core, warm, no certificates, T = {SPAN:g} s, {PAPER_STEPS} steps of `rk4`; x is the ratio to the row whose scene
+this one adds to. A run with more in it may also move otherwise: where it takes more or fewer steps, the ratio per step
+tells what the thing itself costs. Instructions are those of the whole kernel, its set-up and its ends included; calls
+are those to the C library, and the drive's table is made with them once for all the cells of a task. What is absent is
+not in the code: `tests/test_scenes.py` looks there. Diagnostics cannot be switched off: the last target compares with
+a kernel that was made without.
+"""
+
+
+if __name__ == "__main__":
+    main()

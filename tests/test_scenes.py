@@ -1,0 +1,53 @@
+"""A scene compiles to what it uses: what it lacks is not in the code, and a sweep keeps nothing but outcomes."""
+
+import tracemalloc
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from benchmarks import scenes
+from ringsweep import engine
+
+LEANEST, DRIVEN, CUT = (
+    "one contact, Coulomb, immobile uniform ring",
+    "+ arctan drive in its place",
+    "+ an arc",
+)
+
+
+@pytest.fixture(scope="module")
+def code(tmp_path_factory: pytest.TempPathFactory):
+    """Code of the `rk4` kernel of a scene, compiled where nothing is cached: what comes from there has no text."""
+
+    def compiled(name: str):
+        return name, scenes.in_child(scenes.compile_one, name, "rk4", cache=tmp_path_factory.mktemp("cache"))
+
+    with ThreadPoolExecutor(2) as pool:
+        return dict(pool.map(compiled, (LEANEST, DRIVEN, CUT)))
+
+
+def test_calls_are_found_in_code():
+    text = "\tmovabsq\t$exp, %rax\n\tcallq\t*%rax\n\tcallq\tatan@PLT\n\t.globl\tlog\n_exponent:\n"
+    assert scenes.code_of(text) == {"instructions": 3, "calls": ["exp", "atan"]}
+
+
+def test_kernel_holds_what_the_scene_uses(code):
+    assert code[LEANEST]["calls"] == []
+    assert set(code[DRIVEN]["calls"]) == {"atan", "log1p"}
+    assert set(code[CUT]["calls"]) == {"atan", "log1p"}
+    assert code[LEANEST]["instructions"] < code[DRIVEN]["instructions"] < code[CUT]["instructions"]
+
+
+def test_sweep_stores_outcomes_alone():
+    def most(steps: int) -> int:
+        configuration = scenes.LADDER[LEANEST].configuration("rk4", 256, steps=steps)
+        engine.compute(configuration, jobs=1, progress=False)
+        tracemalloc.start()
+        try:
+            engine.compute(configuration, jobs=1, progress=False)
+            return tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+
+    # A state of 256 cells at each of 2000 steps would be eight megabytes.
+    assert most(2000) < most(20) + 100_000
