@@ -353,7 +353,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="fewer cells and rounds")
     quick = parser.parse_args().quick
-    cells, few, rounds = (64, 16, 3) if quick else (512, 128, 7)
+    cells, few, rounds = (64, 16, 3) if quick else (512, 128, 5)
     begin = time.perf_counter()
     where = machine()
     print(where)

@@ -24,6 +24,9 @@ from ringsweep.scene import LAW, Scene, Structure, Values
 from ringsweep.solvers.common import Result
 from ringsweep.variables import OUTCOMES
 
+# A task of fewer cells is overhead where there are many of them.
+_LEAST = 8
+
 
 def run(
     config: str | os.PathLike[str] | Mapping[str, Any], *, jobs: int | None = None, progress: bool = True
@@ -115,11 +118,10 @@ def compute(config: Config, *, jobs: int | None, progress: bool) -> xr.Dataset:
     outcomes = MODELS[scene.structure.model].outcomes
     total = math.prod(axes.sizes.values())
     jobs = jobs or joblib.cpu_count()
-    size = max(1, min(config.solver.cells_per_task, math.ceil(total / (4 * jobs))))
     tasks = [
-        (structure, own[start : start + size])
+        (structure, part)
         for structure, own in _by_law(scene, axes)
-        for start in range(0, len(own), size)
+        for part in _parts(own, config.solver.cells_per_task, jobs)
     ]
     parallel = joblib.Parallel(n_jobs=jobs, prefer="threads", return_as="generator_unordered")
     results = parallel(joblib.delayed(_task)(config, structure, chunk, outcomes) for structure, chunk in tasks)
@@ -131,6 +133,16 @@ def compute(config: Config, *, jobs: int | None, progress: bool) -> xr.Dataset:
                 columns.setdefault(name, np.full(total, np.nan))[chunk] = column
             bar.update(len(chunk))
     return _dataset(config, columns)
+
+
+def _parts(cells: NDArray[np.intp], most: int, jobs: int) -> Iterator[NDArray[np.intp]]:
+    """Cells in tasks of `most` at most, the last ones smaller so that no job is left with a large one alone."""
+    least = min(_LEAST, math.ceil(len(cells) / (4 * jobs)))
+    start = 0
+    while start < len(cells):
+        size = min(most, max(least, math.ceil((len(cells) - start) / (4 * jobs))))
+        yield cells[start : start + size]
+        start += size
 
 
 def cells(scene: Scene, axes: Axes, indices: NDArray[np.intp]) -> Values:
