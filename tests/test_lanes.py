@@ -2,10 +2,11 @@
 
 from math import radians
 
+import numba
 import numpy as np
 import pytest
 
-from ringsweep.jit import inlined, take
+from ringsweep.jit import OPTIONS, take
 from ringsweep.lanes import (
     WIDTH,
     Several,
@@ -31,7 +32,7 @@ from ringsweep.solvers.rk4 import RK4
 NAMES = MODELS["ring"].outcomes
 
 
-@inlined
+@numba.njit(**OPTIONS)
 def _functions(x, near, out):
     (a,), (b,) = read_lanes(x, 0, (0.0,)), read_lanes(near, 0, (0.0,))
     sine, cosine = sine_cosine(a)
@@ -41,7 +42,7 @@ def _functions(x, near, out):
     return any_of(a > 1e5)
 
 
-@inlined
+@numba.njit(**OPTIONS)
 def _weights(law, memory, at, speed, out):
     (x,) = read_lanes(speed, 0, (0.0,))
     write(out, 0, WIDTH, conform(weights(read_lanes(memory, at, law), x), read_lanes(out, 0, (0.0, 0.0, 0.0, 0.0))))
