@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from ringsweep.errors import InputError
 from ringsweep.hooks import inspect
-from ringsweep.jit import inlined, take
+from ringsweep.jit import kernel, take
 from ringsweep.physics import ring
 from ringsweep.physics.friction.smooth import BengisuAkay
 from ringsweep.physics.ring import OneContact, Ring, TwoContacts, acceleration, acceleration_slope, reactions
@@ -254,7 +254,7 @@ class TestGeometry:
             cells(changes)
 
 
-@inlined
+@kernel
 def compiled_inspect(batch, i, y, theta, ring_omega):
     return inspect(take(batch, i), y, theta, ring_omega)
 
