@@ -22,17 +22,21 @@ from ringsweep.solvers.common import Result
 #: The ring of the paper's Fig. 29 (SI units) but for its law.
 SPAN = 10.0
 PAPER_STEPS = 5000
+BODY = {"mass": 0.076, "inertia": 4.47e-5, "half_distance": 0.025, "ball_radius": 0.01}
+RADIUS, GRAVITY = 0.043378, 9.81
+ROUGH, REST = {"mu_s": 0.5, "mu_k": 0.3}, {"mu_s": 0.2, "mu_k": 0.1}
+#: Its law.
+ALPHA, V0 = 1e5, 2e-6
 _RING: dict[str, Any] = {
     "model": "ring",
-    "body": {"mass": 0.076, "inertia": 4.47e-5, "half_distance": 0.025, "ball_radius": 0.01},
-    "ring": {"radius": 0.043378},
+    "body": BODY,
+    "ring": {"radius": RADIUS},
     "zone": {"half_angle": radians(15.0)},
     "drive": {"law": "arctan", "amplitude": 2.0},
     "initial": {"phi": 0.0, "omega": 0.0},
     "time": {"span": SPAN},
-    "gravity": 9.81,
+    "gravity": GRAVITY,
 }
-_COEFFICIENTS = {"rough": {"mu_s": 0.5, "mu_k": 0.3}, "rest": {"mu_s": 0.2, "mu_k": 0.1}}
 
 #: A cell of the family: amplitude of the drive (rad/s), half-angle of the rough zone (rad).
 Cell = tuple[float, float]
@@ -40,7 +44,7 @@ Cell = tuple[float, float]
 
 def ring(law: Mapping[str, Any]) -> dict[str, Any]:
     """The scene of Fig. 29 with another law of friction."""
-    return _RING | {"friction": {**law, **_COEFFICIENTS}}
+    return _RING | {"friction": {**law, "rough": ROUGH, "rest": REST}}
 
 
 def family(side: int) -> list[Cell]:

@@ -20,9 +20,7 @@ limit and against ``benchmarks.brute_force``, which shares no code with the pack
 from __future__ import annotations
 
 import argparse
-import contextlib
 import copy
-import io
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -683,9 +681,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder of the results (default %(default)s)")
     arguments = parser.parse_args()
     begin = time.perf_counter()
-    with contextlib.redirect_stdout(io.StringIO()) as said:
-        machine()
-    print(said.getvalue(), end="", flush=True)
+    where = machine()
+    print(where, flush=True)
     ds, chosen = draw_maps(arguments.quick)
     checks = crosscheck(arguments.quick)
     print(f"reference checked: {time.perf_counter() - begin:.0f} s", flush=True)
@@ -697,7 +694,7 @@ def main() -> None:
         "Conventions": "CF-1.11",
         "title": "ringsweep: where solvers are right, flagged, silent or failed",
         "close": CLOSE,
-        "machine": said.getvalue(),
+        "machine": where,
     }
     arguments.out.mkdir(parents=True, exist_ok=True)
     storage.save(ds, arguments.out / "stability.nc")
@@ -716,7 +713,7 @@ def main() -> None:
             ["method", *(f"{span:g} s" for span in energy["span"].values)], losses)
          + f"\n\nThe loss of rk4 over 10 s falls with the power {order:.2f} of the step (theory: 5)."),
     ]  # fmt: skip
-    text = "# Numerical stability\n\n" + "  \n".join(said.getvalue().splitlines())
+    text = "# Numerical stability\n\n" + "  \n".join(where.splitlines())
     text += f"\n\nWrong: another regime, motion or contact, or off by more than {CLOSE:g} rad or s; see the module.\n"
     text += "".join(f"\n## {title}\n\n{body}\n" for title, body in sections)
     text += f"\n{time.perf_counter() - begin:.0f} s in all.\n"
