@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ringsweep import config, engine
+from ringsweep import cells, config, engine
 from ringsweep.models import MODELS, batch
 from ringsweep.solvers.common import Result
 
@@ -64,7 +64,7 @@ def bare(configuration: Any) -> Callable[[], Result]:
     structure = configuration.scene.structure
     names = MODELS[structure.model].outcomes
     count = len(next(iter(configuration.source["sweep"]["points"].values())))
-    prepared = batch(structure, engine.cells(configuration.scene, configuration.axes, np.arange(count)))
+    prepared = batch(structure, cells.cells(configuration.scene, configuration.axes, np.arange(count)))
     return lambda: configuration.solver.run(prepared, names)
 
 

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ringsweep.errors import InputError
 
@@ -24,19 +24,21 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; the exit status is 0 if done, 2 if the input is wrong, 1 for anything else."""
     arguments = _parser().parse_args(argv)
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING, format="ringsweep: %(message)s")
+    logging.getLogger("ringsweep").setLevel(logging.INFO)
     try:
         arguments.verb(arguments)
     except InputError as error:
         return _fail(str(error), 2)
-    except KeyboardInterrupt:
-        return _fail("interrupted", 130)
+    except KeyboardInterrupt as error:
+        return _fail("interrupted", 130, error)
     except Exception as error:
-        return _fail(f"{type(error).__name__}: {error}", 1)
+        return _fail(f"{type(error).__name__}: {error}", 1, error)
     return 0
 
 
-def _fail(message: str, status: int) -> int:
-    print("ringsweep:", " ".join(message.split()), file=sys.stderr)
+def _fail(message: str, status: int, error: BaseException | None = None) -> int:
+    notes = getattr(error, "__notes__", [])
+    print("ringsweep:", " ".join("; ".join([message, *notes]).split()), file=sys.stderr)
     return status
 
 
@@ -47,10 +49,13 @@ def _parser() -> argparse.ArgumentParser:
     verbs = parser.add_subparsers(required=True, metavar="COMMAND")
 
     run = verbs.add_parser("run", help="run a sweep: NetCDF, and a regime map beside it")
-    run.add_argument("config", metavar="CONFIG.yaml")
+    run.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose sweep is repeated")
     run.add_argument("-o", "--output", metavar="OUT.nc", help="default: the configuration's name, in this folder")
     run.add_argument("--jobs", type=whole_number, metavar="N", help="threads (default: all cores)")
-    run.add_argument("--fresh", action="store_true", help="run again even if OUT.nc holds this very sweep")
+    run.add_argument("--fresh", action="store_true", help="start over: discard what an earlier run has left")
+    run.add_argument("--reuse", metavar="OLD.nc", help="take the cells that it shares with this earlier sweep")
+    run.add_argument("--backend", choices=["threads", "dask"], help="who computes (default: threads of this machine)")
+    run.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers compute, as tcp://host:8786")
     run.set_defaults(verb=_run)
 
     draw = verbs.add_parser("map", help="draw a variable of a sweep")
@@ -111,44 +116,40 @@ def positive_number(text: str) -> float:
 def _run(arguments: argparse.Namespace) -> None:
     from ringsweep.config import load
 
+    if arguments.backend == "dask" and arguments.scheduler is None:
+        raise InputError("--backend", "dask needs the address of its scheduler: --scheduler ADDRESS")
+    if arguments.backend == "threads" and arguments.scheduler is not None:
+        raise InputError("--scheduler", "is for --backend dask")
     config = load(arguments.config)
-    target, picture = _outputs(arguments.output or f"{config.name}.nc")
+    target, picture = _outputs(arguments.output or f"{config.name}.nc", "regime", "sweep")
 
-    from ringsweep import storage
-    from ringsweep.engine import compute
-    from ringsweep.jit import SOURCES_DIGEST
+    from ringsweep import plots, storage
+    from ringsweep.engine import write
 
-    # A file there that is no result of ours is refused rather than replaced.
-    result = storage.load(target) if target.exists() else None
-    if result is not None and "contender" in result.dims:
-        raise InputError(str(target), "holds error against run time: name another file for a sweep")
-    same = {"configuration": json.dumps(config.source, sort_keys=True), "ringsweep_sources": SOURCES_DIGEST}
-    if result is not None and not arguments.fresh and same.items() <= _texts(result.attrs).items():
-        print(f"{target} holds this sweep already (--fresh runs it again)")
-    else:
-        result = compute(config, jobs=arguments.jobs, progress=True)
-        storage.save(result, target)
+    options = {name: getattr(arguments, name) for name in ("jobs", "fresh", "reuse", "scheduler")}
+    if write(config, target, **options):
         print(f"wrote {target}")
-    _summarise(result)
-    _warn_of_stiffness(result, config)
-    if not config.axes.sizes:
-        return
-    from ringsweep import plots
-
-    try:
-        plots.save(plots.regime_map(result), picture)
-    except InputError as error:
-        # The sweep is sound and saved; only what to hold fixed in a picture is open.
-        print(f"no map yet: {error.problem} (ringsweep map {target})")
     else:
-        print(f"wrote {picture}")
+        print(f"{target} holds this sweep already (--fresh runs it again)")
+    with storage.open_dataset(target) as result:
+        _summarise(result)
+        _warn_of_stiffness(result, config)
+        if not config.axes.sizes:
+            return
+        try:
+            plots.save(plots.regime_map(result), picture)
+        except InputError as error:
+            # The sweep is sound and saved; only what to hold fixed in a picture is open.
+            print(f"no map yet: {error.problem} (ringsweep map {target})")
+        else:
+            print(f"wrote {picture}")
 
 
 def _map(arguments: argparse.Namespace) -> None:
     from ringsweep import plots, storage
 
-    result = storage.load(arguments.dataset)
     dataset = Path(arguments.dataset)
+    result = storage.open_dataset(dataset)
     # Beside the regime map of the sweep, not in its place.
     shown = [arguments.var] * (arguments.var != "regime") + [held.replace(" ", "") for held in arguments.sel]
     target = Path(arguments.output or dataset.with_name("-".join([dataset.stem, *shown]) + ".png"))
@@ -162,13 +163,10 @@ def _simulate(arguments: argparse.Namespace) -> None:
     from ringsweep.config import with_values
 
     config = with_values(arguments.config, arguments.set)
-    target, picture = _outputs(arguments.output or f"{config.name}-run.nc")
+    target, picture = _outputs(arguments.output or f"{config.name}-run.nc", "time", "history")
 
     from ringsweep import plots, storage
     from ringsweep.single import history
-
-    if target.exists() and "time" not in storage.load(target).dims:
-        raise InputError(str(target), "holds no history: name another file for that of a run")
 
     result = history(config)
     storage.save(result, target)
@@ -181,13 +179,10 @@ def _precision(arguments: argparse.Namespace) -> None:
     from ringsweep.config import load
 
     config = load(arguments.config)
-    target, picture = _outputs(arguments.output or f"{config.name}-precision.nc")
+    target, picture = _outputs(arguments.output or f"{config.name}-precision.nc", "contender", "error against run time")
 
     from ringsweep import plots, storage
     from ringsweep.work import measure, report
-
-    if target.exists() and "contender" not in storage.load(target).dims:
-        raise InputError(str(target), "holds something else: name another file for error against run time")
 
     given = {name: getattr(arguments, name) for name in ("target", "cells", "rounds")}
     result = measure(config, **{name: value for name, value in given.items() if value is not None})
@@ -200,7 +195,7 @@ def _precision(arguments: argparse.Namespace) -> None:
 def _info(arguments: argparse.Namespace) -> None:
     from ringsweep import storage
 
-    result = storage.load(arguments.dataset)
+    result = storage.open_dataset(arguments.dataset)
     print(result.attrs.get("title", arguments.dataset))
     print("dimensions:", ", ".join(f"{name} {size}" for name, size in result.sizes.items()) or "none: a single run")
     for name, axis in result.coords.items():
@@ -285,13 +280,12 @@ def _selection(result: xr.Dataset, text: str) -> tuple[str, float | str]:
     return name, quantity(value, parameter, f"--sel {name}")
 
 
-def _texts(attributes: dict[Any, Any]) -> dict[str, str]:
-    """Attributes that are text; arrays among them have no single truth value to compare by."""
-    return {name: value for name, value in attributes.items() if isinstance(value, str)}
+def _outputs(name: str, mark: str, content: str) -> tuple[Path, Path]:
+    """Dataset and picture to be written, both known to be writable before any work is done.
 
-
-def _outputs(name: str) -> tuple[Path, Path]:
-    """Dataset and picture to be written, both known to be writable before any work is done."""
+    A file that is there is replaced if it is a result of the same kind, known by a variable or dimension, and
+    refused otherwise.
+    """
     from ringsweep import storage
 
     target = Path(name)
@@ -300,4 +294,9 @@ def _outputs(name: str) -> tuple[Path, Path]:
     if target == picture:
         raise InputError(name, "is where the picture goes: name the dataset *.nc")
     storage.check_writable(picture)
+    if target.exists():
+        with storage.open_dataset(target) as there:
+            kinds = [kind for kind in ("contender", "time", "regime") if kind in there.dims or kind in there]
+        if kinds[:1] != [mark]:
+            raise InputError(name, f"holds something else: name another file for this {content}")
     return target, picture

@@ -36,8 +36,8 @@ logger = logging.getLogger("ringsweep")
 TABLE = {"time": Parameter("s", "time in the table of the drive"), "theta": Parameter("rad", "angle of the drive")}
 COUNT = Parameter("1", "number of values", lower=1, upper=1_000_000)
 
-#: Cells of a sweep at most: what 24 variables of them take is a few gigabytes.
-MOST_CELLS = 10_000_000
+#: Cells of a sweep at most: what 24 variables of them take on a disk is some ten gigabytes.
+MOST_CELLS = 100_000_000
 
 # Cells whose consistency is checked at once: many arcs over many points must not fill the memory.
 _CHUNK = 4096

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import math
 import os
 import re
@@ -112,18 +113,20 @@ class Document:
 
 
 def read(config: str | os.PathLike[str] | Mapping[str, Any]) -> Document:
-    """Read a configuration from a YAML file, or take it as a mapping.
+    """Read a configuration from a YAML file or the attributes of a result file, or take it as a mapping.
 
     Raises
     ------
     InputError
-        If it is not one YAML mapping of plain values.
+        If it is not one YAML mapping of plain values, or the result file holds no configuration.
     """
     if isinstance(config, Mapping):
         return Document(_plain(config, "", 0))
     if not isinstance(config, str | os.PathLike):
         raise InputError("config", f"a path or a mapping is expected, got {show(config)}")
     file = Path(config)
+    if _is_result(file):
+        return _of_result(file)
     text = _read(file)
     expansion = _Expansion(str(file))
     try:
@@ -143,6 +146,28 @@ def read(config: str | os.PathLike[str] | Mapping[str, Any]) -> Document:
         # PyYAML lets go of bare errors on escapes of characters that do not exist.
         raise InputError("", f"not valid YAML: {' '.join(str(error).split())}", file=str(file)) from None
     return Document(tree, file.parent, file.stem, expansion.marks)
+
+
+def _is_result(file: Path) -> bool:
+    try:
+        with file.open("rb") as content:
+            return content.read(8) == b"\x89HDF\r\n\x1a\n"
+    except (OSError, ValueError):
+        return False
+
+
+def _of_result(file: Path) -> Document:
+    """The configuration that a result file carries."""
+    import netCDF4
+
+    try:
+        with netCDF4.Dataset(file) as content:
+            tree = json.loads(content.getncattr("configuration"))
+    except (OSError, RuntimeError, AttributeError, ValueError) as error:
+        raise InputError(
+            "", "is damaged, or no result of ringsweep: it carries no configuration", file=str(file)
+        ) from error
+    return Document(_plain(tree, "", 0), file.parent, file.stem, {"": (str(file), None)})
 
 
 def scalar(text: str) -> Any:

@@ -1,14 +1,17 @@
-"""Sweeps: cells to chunks, chunks to workers, outcomes to a dataset."""
+"""Sweeps: cells to chunks, chunks to workers, outcomes to a dataset in memory or on disk."""
 
 from __future__ import annotations
 
-import json
+import logging
 import math
 import os
-import platform
+import secrets
+import signal
 import sys
+import threading
 from collections.abc import Iterator, Mapping
-from importlib.metadata import version
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
 from typing import Any
 
 import joblib
@@ -17,50 +20,86 @@ import xarray as xr
 from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
+from ringsweep import storage
+from ringsweep.cells import Chunk
+from ringsweep.chunks import Chunks, Columns, owned
 from ringsweep.config import Axes, Config, load, read_axes, read_scene, read_solver, sweepable
-from ringsweep.jit import SOURCES_DIGEST
-from ringsweep.models import MODELS, batch
-from ringsweep.scene import LAW, Scene, Structure, Values
-from ringsweep.solvers.common import Result
+from ringsweep.errors import InputError
+from ringsweep.layout import Layout
+from ringsweep.pace import Pace
+from ringsweep.pace import chunks as chunks_of
+from ringsweep.provenance import attributes, differences, environment, identity
+from ringsweep.reuse import Earlier
 from ringsweep.variables import OUTCOMES
 
-# A task of fewer cells is overhead where there are many of them.
-_LEAST = 8
+logger = logging.getLogger("ringsweep")
+
+#: Cells of a sweep that has no file to go to: some gigabytes.
+MOST_IN_MEMORY = 10_000_000
 
 
 def run(
-    config: str | os.PathLike[str] | Mapping[str, Any], *, jobs: int | None = None, progress: bool = True
+    config: str | os.PathLike[str] | Mapping[str, Any],
+    output: str | os.PathLike[str] | None = None,
+    *,
+    jobs: int | None = None,
+    fresh: bool = False,
+    reuse: str | os.PathLike[str] | None = None,
+    scheduler: str | None = None,
+    progress: bool = True,
 ) -> xr.Dataset:
     """Run the sweep that a configuration describes.
 
     Parameters
     ----------
     config : path or mapping
-        A YAML file, or the mapping that it would hold.
+        A YAML file, the mapping that it would hold, or a result file, whose sweep is repeated.
+    output : path-like, optional
+        NetCDF file to write. Finished cells are kept beside it meanwhile, in memory they are not: the same call goes
+        on after whatever stopped it, and the number of cells is bounded by the disk.
     jobs : int, optional
         Threads; all cores unless given.
+    fresh : bool
+        Whether to start over, whatever is there.
+    reuse : path-like, optional
+        File of an earlier sweep, some of whose cells are those of this one: they are taken from there.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers compute the cells, in place of threads.
     progress : bool
         Whether to show a progress bar where there is a terminal or a notebook.
 
     Returns
     -------
     xarray.Dataset
-        One dimension per swept path; see :data:`ringsweep.variables.OUTCOMES`.
+        One dimension per swept path; see :data:`ringsweep.variables.OUTCOMES`. That of an output file reads what
+        is asked of it; ``.load()`` reads all.
 
     Raises
     ------
     InputError
-        If the configuration is wrong.
+        If the configuration is wrong, the output cannot be written or is being computed by another process, or the
+        chunks beside it are of another sweep.
     """
-    return compute(load(config), jobs=jobs, progress=progress)
+    return _run(load(config), output, fresh, jobs=jobs, reuse=reuse, scheduler=scheduler, progress=progress)
+
+
+def _run(config: Config, output: str | os.PathLike[str] | None, fresh: bool, **options: Any) -> xr.Dataset:
+    if output is None:
+        return compute(config, **options)
+    write(config, Path(output), fresh=fresh, **options)
+    return storage.open_dataset(output)
 
 
 def sweep(
     scene: Mapping[str, Any],
     axes: Mapping[str, Any],
+    output: str | os.PathLike[str] | None = None,
     *,
     solver: str | Mapping[str, Any] = "auto",
     jobs: int | None = None,
+    fresh: bool = False,
+    reuse: str | os.PathLike[str] | None = None,
+    scheduler: str | None = None,
     progress: bool = True,
 ) -> xr.Dataset:
     """Run a scene over axes.
@@ -74,7 +113,7 @@ def sweep(
         A 1-D sequence is a grid axis; ``DataArray`` that share a dimension vary together along it.
     solver : str or mapping
         A method's name, or the configuration's ``solver``.
-    jobs, progress
+    output, jobs, fresh, reuse, scheduler, progress
         As for :func:`run`.
 
     Returns
@@ -84,7 +123,7 @@ def sweep(
     Raises
     ------
     InputError
-        If scene, axes or solver are wrong.
+        If scene, axes or solver are wrong; see :func:`run` too.
     """
     parsed = read_scene(scene, swept=axes)
     found = read_axes(parsed, axes)
@@ -92,7 +131,7 @@ def sweep(
     source = {"scene": dict(parsed.source), "solver": method, "sweep": _as_sweep(found)}
     chosen = read_solver(method, parsed)
     config = Config(scene=parsed, solver=chosen, axes=found, source=source, name="ringsweep")
-    return compute(config, jobs=jobs, progress=progress)
+    return _run(config, output, fresh, jobs=jobs, reuse=reuse, scheduler=scheduler, progress=progress)
 
 
 def _as_sweep(axes: Axes) -> dict[str, Any]:
@@ -112,119 +151,201 @@ def _as_sweep(axes: Axes) -> dict[str, Any]:
     return {name: part for name, part in (("points", points), ("grid", grid)) if part}
 
 
-def compute(config: Config, *, jobs: int | None, progress: bool) -> xr.Dataset:
-    """Run a validated configuration; see :func:`run`."""
-    axes, scene = config.axes, config.scene
-    outcomes = MODELS[scene.structure.model].outcomes
-    total = math.prod(axes.sizes.values())
-    jobs = jobs or joblib.cpu_count()
-    tasks = [
-        (structure, part)
-        for structure, own in _by_law(scene, axes)
-        for part in _parts(own, config.solver.cells_per_task, jobs)
-    ]
-    parallel = joblib.Parallel(n_jobs=jobs, prefer="threads", return_as="generator_unordered")
-    results = parallel(joblib.delayed(_task)(config, structure, chunk, outcomes) for structure, chunk in tasks)
-
-    columns: dict[str, NDArray[Any]] = {}
-    with progress_bar(total, progress) as bar:
-        for chunk, result in results:
-            for name, column in _columns(outcomes, result):
-                columns.setdefault(name, np.full(total, np.nan))[chunk] = column
-            bar.update(len(chunk))
-    return _dataset(config, columns)
-
-
-def _parts(cells: NDArray[np.intp], most: int, jobs: int) -> Iterator[NDArray[np.intp]]:
-    """Cells in tasks of `most` at most, the last ones smaller so that no job is left with a large one alone."""
-    least = min(_LEAST, math.ceil(len(cells) / (4 * jobs)))
-    start = 0
-    while start < len(cells):
-        size = min(most, max(least, math.ceil((len(cells) - start) / (4 * jobs))))
-        yield cells[start : start + size]
-        start += size
+def compute(
+    config: Config,
+    *,
+    jobs: int | None = None,
+    reuse: str | os.PathLike[str] | None = None,
+    scheduler: str | None = None,
+    progress: bool = True,
+) -> xr.Dataset:
+    """Run a validated configuration in memory; see :func:`run`."""
+    config, earlier = _earlier(config, reuse)
+    sizes = tuple(config.axes.sizes.values())
+    layout = Layout(sizes, brick=sizes)
+    if layout.total > MOST_IN_MEMORY:
+        raise InputError("sweep", f"{layout.total:.3g} cells do not fit into memory: name a file as output")
+    kept = _InMemory(layout.total)
+    _fill(config, layout, kept, earlier, jobs, scheduler, progress)
+    return _frame(config).assign(
+        {
+            name: (tuple(config.axes.sizes), column.reshape(sizes), OUTCOMES[name].attributes)
+            for name, column in kept.columns.items()
+        }
+    )
 
 
-def cells(scene: Scene, axes: Axes, indices: NDArray[np.intp]) -> Values:
-    """Values of every numeric path in the cells with these flat indices, each of shape ``(len(indices),)``."""
-    values = {path: np.full(len(indices), value) for path, value in scene.values.items()}
-    place = _places(axes, indices)
-    for path, (dims, column) in axes.columns.items():
-        if path != LAW:
-            values[path] = np.ascontiguousarray(column[tuple(place[dim] for dim in dims)], dtype=float)
-    return values
+def write(
+    config: Config,
+    target: Path,
+    *,
+    jobs: int | None = None,
+    fresh: bool = False,
+    reuse: str | os.PathLike[str] | None = None,
+    scheduler: str | None = None,
+    progress: bool = True,
+) -> bool:
+    """Run a validated configuration into a file, going on from where an earlier run was stopped; see :func:`run`.
+
+    Returns
+    -------
+    bool
+        False if the file held this sweep already.
+    """
+    config, earlier = _earlier(config, reuse)
+    target = target.resolve()
+    layout = Layout(tuple(config.axes.sizes.values()))
+    described = identity(config)
+    with owned(target, described, layout, fresh=fresh) as chunks:
+        if not fresh and _holds(target, chunks):
+            chunks.clear()
+            return False
+        if resumed := int(chunks.done.sum()):
+            logger.info("going on: %d of %d cells are done", resumed, layout.total)
+        try:
+            _fill(config, layout, chunks, earlier, jobs, scheduler, progress)
+            frame = _frame(config)
+            frame.attrs["processors"] = ", ".join(sorted(chunks.processors))
+            storage.write(target, chunks.folder, frame, OUTCOMES, layout, chunks.bricks())
+        except BaseException as error:
+            if kept := int(chunks.done.sum()):
+                error.add_note(
+                    f"{kept} of {layout.total} cells are kept in {chunks.folder}: the same command goes on from there"
+                )
+            raise
+        chunks.clear()
+    return True
 
 
-def _places(axes: Axes, indices: NDArray[np.intp]) -> dict[str, NDArray[np.intp]]:
-    """Where along each dimension the cells with these flat indices lie."""
-    return dict(zip(axes.sizes, np.unravel_index(indices, tuple(axes.sizes.values()) or (1,)), strict=False))
+def _holds(target: Path, chunks: Chunks) -> bool:
+    """Whether a file holds this very sweep; how another differs from it is told."""
+    if not target.exists():
+        return False
+    with storage.open_dataset(target) as ds:
+        found = dict(ds.attrs)
+    if found.get("fingerprint") == chunks.key:
+        return True
+    try:
+        changes = differences(identity(load(target)), chunks.identity) or ["the version of ringsweep"]
+    except InputError:
+        changes = ["what a configuration may say"]
+    logger.warning("%s is replaced when this sweep is done; what changed: %s", target, "; ".join(changes))
+    return False
 
 
-def _by_law(scene: Scene, axes: Axes) -> Iterator[tuple[Structure, NDArray[np.intp]]]:
-    """Flat indices of the cells under each friction law: one decides what is compiled, so that no task has two."""
-    every = np.arange(math.prod(axes.sizes.values()))
-    if LAW not in axes.columns:
-        yield scene.structure, every
+class _InMemory:
+    """Finished cells as whole columns."""
+
+    def __init__(self, total: int):
+        self.done = np.zeros(total, dtype=bool)
+        self.columns: dict[str, NDArray[Any]] = {}
+
+    def put(self, positions: NDArray[np.integer], columns: Columns, processor: str) -> None:
+        """Keep the columns of the cells at these positions."""
+        for name, column in columns.items():
+            self.columns.setdefault(name, np.empty(len(self.done), dtype=column.dtype))[positions] = column
+        self.done[positions] = True
+
+
+def _fill(
+    config: Config,
+    layout: Layout,
+    kept: Chunks | _InMemory,
+    earlier: Earlier | None,
+    jobs: int | None,
+    scheduler: str | None,
+    progress: bool,
+) -> None:
+    """Compute every cell that is not there yet, chunk after chunk."""
+    if earlier is not None:
+        count = earlier.give(config, layout, kept)
+        logger.info("%d of %d cells are taken from %s", count, layout.total, earlier.path)
+    if jobs is not None and scheduler is not None:
+        raise InputError("--jobs", "is for threads of this machine: Dask's workers have their own number of threads")
+    left = layout.total - int(kept.done.sum())
+    if not left:
         return
-    place = _places(axes, every)
-    dims, names = axes.columns[LAW]
-    for law, structure in scene.structures.items():
-        yield structure, every[(names == law)[tuple(place[dim] for dim in dims)]]
+    task = Chunk(config, layout)
+    with ExitStack() as stack:
+        stopped = stack.enter_context(_stop_on_interrupt())
+        if scheduler is None:
+            threads = jobs or joblib.cpu_count()
+            pace = Pace(config.solver.side_by_side, lambda: threads)
+            chunks = chunks_of(kept.done, left, pace, stopped)
+            parallel = joblib.Parallel(n_jobs=threads, prefer="threads", return_as="generator_unordered")
+            results = parallel(joblib.delayed(task)(chunk) for chunk in chunks)
+        else:
+            try:
+                from ringsweep import remote
+            except ImportError:
+                raise InputError("--scheduler", "Dask is not installed: pip install 'ringsweep[dask]'") from None
+            client = stack.enter_context(remote.connect(scheduler))
+            pace = Pace(config.solver.side_by_side, lambda: remote.threads(client))
+            chunks = chunks_of(kept.done, left, pace, stopped)
+            results = remote.compute(task, chunks, secrets.token_hex(8), client)
+        bar = stack.enter_context(progress_bar(layout.total, progress, layout.total - left))
+        try:
+            for finished in results:
+                if finished.environment != environment():
+                    changes = "; ".join(differences(environment(), finished.environment))
+                    raise InputError("--scheduler", f"a worker has other versions than this process: {changes}")
+                kept.put(finished.positions, finished.columns, finished.processor)
+                if finished.seconds is not None:
+                    pace.learn(len(finished.positions), finished.seconds)
+                bar.update(len(finished.positions))
+        finally:
+            # Chunks under way cannot be interrupted; nobody is to wait for what comes after them.
+            stopped.set()
+            for _ in results:
+                pass
+        if not kept.done.all():
+            raise KeyboardInterrupt
 
 
-def _task(
-    config: Config, structure: Structure, chunk: NDArray[np.intp], outcomes: tuple[str, ...]
-) -> tuple[NDArray[np.intp], Result]:
-    part = batch(structure, cells(config.scene, config.axes, chunk))
-    return chunk, config.solver.run(part, outcomes)
+@contextmanager
+def _stop_on_interrupt() -> Iterator[threading.Event]:
+    """An event that the first Ctrl-C within the block sets; the second raises `KeyboardInterrupt` as ever."""
+    stopped = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        # Signals are a matter of the main thread.
+        yield stopped
+        return
+    before = signal.getsignal(signal.SIGINT)
+
+    def interrupt(number: int, frame: Any) -> None:
+        signal.signal(signal.SIGINT, before)
+        stopped.set()
+        logger.info("stopping when the chunks under way are done (Ctrl-C again: at once, without them)")
+
+    signal.signal(signal.SIGINT, interrupt)
+    try:
+        yield stopped
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
-def _columns(outcomes: tuple[str, ...], result: Result) -> Iterator[tuple[str, NDArray[Any]]]:
-    yield from zip(outcomes, result.rows.T, strict=True)
-    yield "steps", result.steps
-    yield "certified", result.certified
-    if result.stiffness is not None:
-        yield "stiffness", result.stiffness
-
-
-def progress_bar(total: int, progress: bool) -> Any:
-    """A bar of so many runs, where there is a terminal or a notebook to show it."""
+def progress_bar(total: int, progress: bool, done: int = 0) -> Any:
+    """A bar of so many runs, some of them done, where there is a terminal or a notebook to show it."""
     # tqdm takes a notebook's stream for a pipe and would stay silent there.
     notebook = "ipykernel" in sys.modules
-    return tqdm(total=total, unit="run", disable=(False if notebook else None) if progress else True)
+    return tqdm(total=total, initial=done, unit="run", disable=(False if notebook else None) if progress else True)
 
 
-def _dataset(config: Config, columns: Mapping[str, NDArray[Any]]) -> xr.Dataset:
-    """Label the columns of a sweep."""
-    axes, scene = config.axes, config.scene
-    model = MODELS[scene.structure.model]
-    known = sweepable(scene)
-    shape = tuple(axes.sizes.values())
-    dataset = xr.Dataset(
-        {
-            name: (tuple(axes.sizes), column.reshape(shape).astype(OUTCOMES[name].dtype), OUTCOMES[name].attributes)
-            for name, column in columns.items()
-            if name not in model.absent
-        },
+def _frame(config: Config) -> xr.Dataset:
+    """Coordinates and attributes of a sweep's dataset."""
+    known = sweepable(config.scene)
+    return xr.Dataset(
         coords={
             path.replace(".", "_"): (dims, column, {**known[path].attributes, "path": path})
-            for path, (dims, column) in axes.columns.items()
+            for path, (dims, column) in config.axes.columns.items()
         },
+        attrs=attributes(config),
     )
-    return dataset.assign_attrs(provenance(config))
 
 
-def provenance(config: Config) -> dict[str, Any]:
-    """Attributes from which a file's contents can be computed again."""
-    return {
-        "Conventions": "CF-1.11",
-        "title": f"ringsweep: {MODELS[config.scene.structure.model].doc}",
-        "source": f"ringsweep {version('ringsweep')}",
-        "ringsweep_version": version("ringsweep"),
-        "ringsweep_sources": SOURCES_DIGEST,
-        "versions": json.dumps(
-            {"python": platform.python_version()} | {name: version(name) for name in ("numpy", "numba", "xarray")}
-        ),
-        "method": config.solver.name,
-        "configuration": json.dumps(config.source, sort_keys=True),
-    }
+def _earlier(config: Config, reuse: str | os.PathLike[str] | None) -> tuple[Config, Earlier | None]:
+    """The configuration, its axes at the very values of an earlier file's where these differ by rounding alone."""
+    if reuse is None:
+        return config, None
+    earlier = Earlier(reuse, config)
+    return earlier.aligned(config), earlier

@@ -12,8 +12,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.config import Config, read_solver, with_values
-from ringsweep.engine import compute, provenance
+from ringsweep.engine import compute
 from ringsweep.models import MODELS, batch
+from ringsweep.provenance import attributes
 from ringsweep.scene import Structure
 from ringsweep.variables import HISTORY, REGIMES
 
@@ -77,7 +78,7 @@ def history(config: Config, *, samples: int = SAMPLES) -> xr.Dataset:
         times = np.unique(np.concatenate([run["time"] for run in runs.values()]))
         kept = xr.concat([_resampled(run, times) for run in runs.values()], "friction_law")
         words = "\n".join(f"{law}: {describe(outcome.sel(friction_law=law))}" for law in runs)
-    return kept.merge(outcome).assign_attrs(provenance(config) | {"outcome": words})
+    return kept.merge(outcome).assign_attrs(attributes(config) | {"outcome": words})
 
 
 def _trace(config: Config, structure: Structure, samples: int) -> xr.Dataset:

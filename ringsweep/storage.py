@@ -5,15 +5,21 @@ from __future__ import annotations
 import json
 import os
 import secrets
-from collections.abc import Iterator
+import tempfile
+import zlib
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+import netCDF4
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
+from ringsweep.layout import Layout
+from ringsweep.variables import Variable
 
 #: Attributes that tell a file of this package from any other NetCDF file.
 SIGNATURE = ("Conventions", "ringsweep_version")
@@ -48,9 +54,8 @@ def check_writable(path: str | os.PathLike[str]) -> None:
         with suppress(FileNotFoundError):
             target.stat()
         # Permission bits do not tell on network drives, read-only mounts or for root: only trying does.
-        trial = _sibling(target)
-        trial.touch(exist_ok=False)
-        trial.unlink()
+        with tempfile.TemporaryFile(dir=folder):
+            pass
     except OSError as error:
         raise InputError(str(path), f"cannot be written: {error.strerror or error}") from error
 
@@ -104,19 +109,119 @@ def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
     OSError
         If writing fails, or the file does not read back as it was written.
     """
+    with replacing(path) as temporary:
+        _to_netcdf(ds, temporary)
+        if not load(temporary).equals(ds):
+            raise OSError(f"{path}: the file does not read back as it was written; the disk may be full or faulty")
+
+
+def write(
+    target: Path,
+    folder: Path,
+    frame: xr.Dataset,
+    variables: Mapping[str, Variable],
+    layout: Layout,
+    bricks: Iterable[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]],
+) -> None:
+    """Write the dataset of a sweep brick by brick, whole or not at all, and no more than a few bricks in memory.
+
+    Parameters
+    ----------
+    target : Path
+        File to be written or replaced.
+    folder : Path
+        Folder on the same disk, to write in meanwhile.
+    frame : xarray.Dataset
+        Coordinates and attributes.
+    variables : mapping of str to Variable
+        What the columns are.
+    layout : Layout
+        Bricks of the grid; they are what is compressed, and read, as one.
+    bricks : iterable of tuple
+        The place of each brick in the grid, and its columns in the shape of that place.
+
+    Raises
+    ------
+    OSError
+        If writing fails, or the file does not read back as it was written.
+    """
+    temporary = folder / f"{secrets.token_hex(4)}.tmp"
+    try:
+        _to_netcdf(frame, temporary)
+        written = _write_bricks(temporary, frame, variables, layout, bricks)
+        if written != _checksums(temporary, written, layout):
+            raise OSError("the file does not read back as it was written")
+        with temporary.open("r+b") as file:
+            os.fsync(file.fileno())
+        temporary.replace(target)
+        _flush_folder(target.parent)
+    except (OSError, RuntimeError) as error:
+        # Of a full disk the NetCDF library says no more than "HDF error".
+        raise OSError(f"{target} could not be written ({error}); is the disk full, or faulty?") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _to_netcdf(ds: xr.Dataset, path: Path) -> None:
     ds = ds.drop_encoding()
     ds.attrs = _storable(ds.attrs)
     for variable in ds.variables.values():
         variable.attrs = _storable(variable.attrs)
-    with replacing(path) as temporary:
-        ds.to_netcdf(
-            temporary,
-            format="NETCDF4",
-            engine="netcdf4",
-            encoding={name: _encoding(variable) for name, variable in ds.variables.items()},
-        )
-        if not _read(temporary).equals(ds):
-            raise OSError(f"{path}: the file does not read back as it was written; the disk may be full or faulty")
+    encoding = {name: _encoding(variable) for name, variable in ds.variables.items()}
+    ds.to_netcdf(path, format="NETCDF4", engine="netcdf4", encoding=encoding)
+
+
+def _write_bricks(
+    path: Path,
+    frame: xr.Dataset,
+    variables: Mapping[str, Variable],
+    layout: Layout,
+    bricks: Iterable[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]],
+) -> dict[str, int]:
+    """Add the columns to a file; returns a checksum of each."""
+    dims = tuple(map(str, frame.sizes))
+    others = " ".join(str(name) for name in frame.coords if name not in dims)
+    sums: dict[str, int] = {}
+    with netCDF4.Dataset(path, "a") as file:
+        for place, columns in bricks:
+            for name, column in columns.items():
+                if name not in sums:
+                    variable = file.createVariable(name, column.dtype, dims, fill_value=False, **_chunked(layout))
+                    if layout.total >= COMPRESSED_FROM:
+                        # Each brick is written once: more than one in memory, for each variable, would serve nothing.
+                        variable.set_var_chunk_cache(size=2 * column.nbytes, nelems=11, preemption=1.0)
+                    variable.setncatts(variables[name].attributes | ({"coordinates": others} if others else {}))
+                file[name][place] = column
+                sums[name] = zlib.crc32(column.tobytes(), sums.get(name, 0))
+    return sums
+
+
+def _checksums(path: Path, names: Iterable[str], layout: Layout) -> dict[str, int]:
+    """Checksums of variables of a file, as :func:`_write_bricks` takes them."""
+    found = {}
+    with netCDF4.Dataset(path) as file:
+        file.set_auto_maskandscale(False)
+        for name in names:
+            found[name] = 0
+            for _, _, place in layout.bricks():
+                found[name] = zlib.crc32(file[name][place].tobytes(), found[name])
+    return found
+
+
+def _chunked(layout: Layout) -> dict[str, Any]:
+    if layout.total < COMPRESSED_FROM:
+        return {}
+    return {"compression": "zlib", "complevel": 1, "shuffle": True, "chunksizes": layout.brick}
+
+
+def _flush_folder(folder: Path) -> None:
+    # What Windows neither needs nor allows.
+    if hasattr(os, "O_DIRECTORY"):
+        descriptor = os.open(folder, os.O_DIRECTORY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
 
 
 def load(path: str | os.PathLike[str]) -> xr.Dataset:
@@ -125,7 +230,7 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
     Parameters
     ----------
     path : path-like
-        File written by `save`.
+        File written by `save` or `write`.
 
     Returns
     -------
@@ -136,16 +241,27 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
     InputError
         If the file is missing, is not NetCDF, or was not written by this package.
     """
+    with open_dataset(path) as ds:
+        return ds.load()
+
+
+def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
+    """A file of this package, of which no more is read than is asked for; the rest as for :func:`load`.
+
+    It is a context manager, and closes the file at the end.
+    """
     if not Path(path).is_file():
         raise InputError(str(path), "is not a file" if Path(path).exists() else "does not exist")
     try:
-        ds = _read(Path(path))
+        # Seconds are numbers here; decoding would turn them into timedelta64 wherever a unit spells them out.
+        ds = xr.open_dataset(Path(path).resolve(), engine="netcdf4", decode_times=False)
     except PermissionError as error:
         raise InputError(str(path), "may not be read: permission denied") from error
     except (OSError, RuntimeError, ValueError) as error:
         raise InputError(str(path), "is not a NetCDF file, or is damaged") from error
     missing = [name for name in SIGNATURE if name not in ds.attrs]
     if missing:
+        ds.close()
         raise InputError(
             str(path), f"was not written by ringsweep: its attributes lack {' and '.join(missing)}; give a result file"
         )
@@ -154,11 +270,6 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
 
 def _sibling(target: Path) -> Path:
     return target.with_name(f".ringsweep-{secrets.token_hex(8)}{target.suffix}")
-
-
-def _read(path: Path) -> xr.Dataset:
-    # Seconds are numbers here; decoding would turn them into timedelta64 wherever a unit spells them out.
-    return xr.load_dataset(path.resolve(), engine="netcdf4", decode_times=False)
 
 
 def _encoding(variable: xr.Variable) -> dict[str, Any]:

@@ -15,14 +15,15 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ringsweep.cells import cells as values_of
 from ringsweep.config import COUNT, Config, load, sweepable
-from ringsweep.engine import cells as values_of
-from ringsweep.engine import progress_bar, provenance
+from ringsweep.engine import progress_bar
 from ringsweep.errors import InputError
 from ringsweep.jit import take
 from ringsweep.models import MODELS, batch
 from ringsweep.parameters import Parameter
 from ringsweep.physics.friction import LAWS, SET_VALUED
+from ringsweep.provenance import attributes
 from ringsweep.scene import LAW
 from ringsweep.solvers.common import Result, agree
 from ringsweep.solvers.event import Event, Implicit
@@ -409,7 +410,7 @@ def _dataset(
                 for path, column in along.items()
             },
         },
-    ).assign_attrs(provenance(config))
+    ).assign_attrs(attributes(config))
 
 
 def _described(name: str, names: tuple[str, ...]) -> Variable:

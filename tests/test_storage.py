@@ -120,7 +120,7 @@ def test_a_folder_that_refuses_files_is_found_by_trying(tmp_path, monkeypatch):
     def refuse(*_, **__):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("pathlib.Path.touch", refuse)
+    monkeypatch.setattr("tempfile.TemporaryFile", refuse)
     with pytest.raises(InputError, match="Permission denied"):
         storage.check_writable(tmp_path / "out.nc")
 

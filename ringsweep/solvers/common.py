@@ -40,15 +40,8 @@ class Method(ABC):
     """A way to advance time. Its options are the fields of the dataclass that derives from it."""
 
     name: ClassVar[str]
-
-    @property
-    def cells_per_task(self) -> int:
-        """Cells that a task takes at most.
-
-        Enough that a task is not overhead, few enough that a progress bar moves, that Ctrl-C is heard and that the
-        last tasks are shared out.
-        """
-        return 64
+    side_by_side: ClassVar[int] = 1
+    """Cells that it runs at once: fewer take as long."""
 
     def check(self, structure: Structure) -> None:  # noqa: B027  most methods take every scene
         """Raise an `InputError` if the method cannot take such a scene."""

@@ -28,6 +28,7 @@ from ringsweep.hooks import (
 )
 from ringsweep.jit import absorbed, add_scaled, hook, inlined, inner_hook, kernel, take
 from ringsweep.lanes import (
+    WIDTH,
     Several,
     Single,
     align_stack,
@@ -63,6 +64,7 @@ class RK4(Method):
     """Constant-step Runge-Kutta 4."""
 
     name: ClassVar[str] = "rk4"
+    side_by_side: ClassVar[int] = WIDTH
 
     steps: Annotated[int, Parameter("1", "steps over the span of time", lower=1, upper=1e10)]
     certify: bool = True
@@ -76,11 +78,6 @@ class RK4(Method):
             raise InputError(
                 "solver.method", f"rk4 does not take friction law {structure.law}, whose bonds snap: auto takes it"
             )
-
-    @property
-    def cells_per_task(self) -> int:
-        """Cells that a task takes at most: they share one table of the drive, but must not take minutes."""
-        return max(64, min(512, 1_000_000_000 // (16 * self.steps)))
 
     def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:
         """Outcomes of every cell; see :class:`ringsweep.solvers.common.Method`."""

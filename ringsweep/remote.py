@@ -1,0 +1,89 @@
+"""Chunks on the workers of a Dask scheduler."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Generator, Iterator
+from itertools import islice
+from typing import Any
+
+import numpy as np
+from distributed import Client, as_completed
+from distributed.diagnostics.plugin import WorkerPlugin
+from numpy.typing import NDArray
+
+from ringsweep.errors import InputError
+
+logger = logging.getLogger("ringsweep")
+
+Positions = NDArray[np.integer[Any]]
+
+# Seconds to wait for a scheduler.
+_PATIENCE = 10.0
+
+# In a worker: tasks by their key.
+_tasks: dict[str, Callable[[Positions], Any]] = {}
+
+
+class _Shared(WorkerPlugin):
+    """Hands a task to every worker once, and to those that come later."""
+
+    def __init__(self, key: str, task: Callable[[Positions], Any]):
+        self.name = f"ringsweep-{key}"
+        self.key = key
+        self.task = task
+
+    def setup(self, worker: Any) -> None:
+        _tasks[self.key] = self.task
+
+    def teardown(self, worker: Any) -> None:
+        _tasks.pop(self.key, None)
+
+
+def _run(key: str, chunk: Positions) -> Any:
+    return _tasks[key](chunk)
+
+
+def connect(address: str) -> Client:
+    """A client of the scheduler at this address.
+
+    Raises
+    ------
+    InputError
+        If nothing answers there.
+    """
+    try:
+        return Client(address, timeout=_PATIENCE, set_as_default=False, name="ringsweep")
+    except (OSError, ValueError, TypeError) as error:
+        raise InputError("--scheduler", f"no Dask scheduler answers at {address!r}: {error}") from error
+
+
+def threads(client: Client) -> int:
+    """Threads that the workers have at this moment."""
+    return sum(client.nthreads().values())
+
+
+def compute(task: Callable[[Positions], Any], chunks: Iterator[Positions], key: str, client: Client) -> Generator[Any]:
+    """Results of `task` for each of `chunks`, as they come; a chunk is asked for when a worker is about to need it.
+
+    A chunk whose worker dies goes to another; one that takes several workers with it raises
+    `distributed.KilledWorker`. (joblib's backend for Dask waits for ever then, and counts workers at the start only.)
+    """
+    plugin = _Shared(key, task)
+    client.register_plugin(plugin)
+    try:
+        if not threads(client):
+            logger.warning("the scheduler has no worker yet: waiting for one")
+        futures = as_completed(loop=client.loop, with_results=True)
+
+        def fill() -> None:
+            # One in hand for each thread, so that none waits for the next.
+            for chunk in islice(chunks, max(0, max(2, 2 * threads(client)) - futures.count())):
+                futures.add(client.submit(_run, key, chunk, pure=False))
+
+        fill()
+        for _, result in futures:
+            yield result
+            fill()
+    finally:
+        client.unregister_worker_plugin(plugin.name)

@@ -1,0 +1,104 @@
+"""Order of cells and size of chunks: every cell once, neighbours together."""
+
+import math
+from threading import Event
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ringsweep.layout import BRICK, Layout
+from ringsweep.pace import Pace, chunks
+
+SIZES = st.lists(st.integers(1, 9), min_size=0, max_size=4)
+
+
+@given(sizes=SIZES, data=st.data())
+def test_every_cell_has_one_position_and_lies_in_its_brick(sizes, data):
+    layout = Layout(sizes, [data.draw(st.integers(1, size)) for size in sizes])
+    seen = np.zeros(sizes, dtype=int)
+    after = 0
+    for begin, end, place in layout.bricks():
+        assert begin == after
+        after = end
+        indices = layout.indices(np.arange(begin, end))
+        here = np.zeros(sizes, dtype=bool)
+        here[place] = True
+        assert here[indices].all()
+        # In the order of the brick's own array.
+        assert (
+            list(zip(*indices, strict=True)) == [tuple(index) for index in np.argwhere(here)][: len(indices[0])]
+            if sizes
+            else True
+        )
+        seen[place] += 1
+        assert end - begin == here.sum()
+    assert after == layout.total
+    assert (seen == 1).all()
+
+
+@given(sizes=st.lists(st.integers(1, 300), min_size=1, max_size=5))
+def test_a_brick_is_small_and_no_smaller_than_needed(sizes):
+    brick = Layout(sizes).brick
+    assert math.prod(brick) <= BRICK
+    assert all(1 <= edge <= size for edge, size in zip(brick, sizes, strict=True))
+    if math.prod(sizes) > BRICK:
+        assert math.prod(brick) > BRICK / 4
+
+
+def test_a_map_of_a_sweep_over_five_axes_lies_in_few_bricks():
+    layout = Layout([25] * 5)
+    bricks = [place for _, _, place in layout.bricks()]
+    passed = sum(all(place[dim].start <= 12 < place[dim].stop for dim in (1, 2, 4)) for place in bricks)
+    assert passed * math.prod(layout.brick) < 0.06 * layout.total
+
+
+class TestPace:
+    def test_a_chunk_takes_a_hundredth_of_the_time_before_within_bounds(self):
+        pace = Pace(1, lambda: 2)
+        assert pace.next(10**9) == 1
+        pace.learn(100, 0.1)
+        assert pace.next(10**9) == 30
+        pace.learn(99_000, 99.0)
+        assert pace.next(10**9) == pytest.approx(1000, rel=0.02)
+        pace.learn(10**6, 1e3)
+        assert pace.next(10**9) == pytest.approx(2000, rel=0.02)
+
+    def test_a_chunk_grows_no_faster_than_what_is_known_of_the_cost(self):
+        pace = Pace(1, lambda: 2)
+        pace.learn(1, 1e-6)
+        assert pace.next(10**9) == 8
+
+    def test_runs_that_go_side_by_side_are_not_parted(self):
+        pace = Pace(16, lambda: 2)
+        assert pace.next(10**9) == 16
+        pace.learn(16, 100.0)
+        assert pace.next(10**9) == 16
+        pace.learn(1600, 1.6)
+        assert pace.next(10**9) % 16 == 0
+
+    @given(done=st.lists(st.booleans(), min_size=1, max_size=200), cost=st.floats(1e-5, 10.0))
+    def test_chunks_hold_every_open_cell_once_and_shrink_to_the_end(self, done, cost):
+        done = np.array(done)
+        pace = Pace(1, lambda: 2)
+        pace.learn(4, 4 * cost)
+        found = list(chunks(done, int((~done).sum()), pace, Event()))
+        if not found:
+            assert done.all()
+            return
+        np.testing.assert_array_equal(np.concatenate(found), np.flatnonzero(~done))
+        assert all(len(chunk) for chunk in found)
+        if cost > Pace.longest:
+            assert {len(chunk) for chunk in found} == {1}
+
+
+@pytest.mark.parametrize("total", [1, 40_000])
+def test_gaps_wider_than_a_chunk_are_passed_over(total):
+    done = np.ones(total + 100_000, dtype=bool)
+    done[-total:] = False
+    pace = Pace(1, lambda: 1)
+    pace.learn(1000, 0.001)
+    np.testing.assert_array_equal(
+        np.concatenate(list(chunks(done, total, pace, Event()))), np.arange(100_000, 100_000 + total)
+    )

@@ -1,0 +1,72 @@
+"""The same chunks, files and bits from the workers of a Dask scheduler."""
+
+import logging
+import os
+import signal
+
+import numpy as np
+import pytest
+import yaml
+from distributed import LocalCluster
+
+import ringsweep
+from benchmarks.kills import same_bits
+from ringsweep import cli
+from ringsweep.chunks import Chunks
+from ringsweep.pace import Pace
+
+# Of what a scheduler leaves behind when its workers are killed.
+pytestmark = pytest.mark.filterwarnings("ignore")
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    """A scheduler and two worker processes on the loopback address."""
+    with LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL
+    ) as cluster:
+        yield cluster
+
+
+def test_a_worker_that_dies_costs_its_chunk_and_nothing_else(cluster, scene, tmp_path, monkeypatch):
+    axes = {"drive.amplitude": np.geomspace(0.5, 8.0, 12), "zone.half_angle": np.radians(np.linspace(5.0, 40.0, 10))}
+    ringsweep.sweep(scene, axes, tmp_path / "threads.nc", progress=False).close()
+    monkeypatch.setattr(Pace, "most", 4)
+    put, killed = Chunks.put, []
+
+    def kill_one(self, *rest):
+        put(self, *rest)
+        if len(self.files) == 5:
+            killed.append(next(iter(cluster.workers.values())).pid)
+            os.kill(killed[0], signal.SIGKILL)
+
+    monkeypatch.setattr(Chunks, "put", kill_one)
+    ringsweep.sweep(scene, axes, tmp_path / "dask.nc", scheduler=cluster.scheduler_address, progress=False).close()
+    assert killed
+    assert same_bits(tmp_path / "threads.nc", tmp_path / "dask.nc")
+
+
+def test_a_worker_of_another_version_is_refused(cluster, scene, monkeypatch):
+    monkeypatch.setattr("ringsweep.engine.environment", lambda: {"numba": "99.0"})
+    with pytest.raises(ringsweep.InputError, match=r"a worker has other versions.*numba was 99\.0"):
+        ringsweep.sweep(scene, {"drive.amplitude": [1.0]}, scheduler=cluster.scheduler_address, progress=False)
+
+
+@pytest.mark.parametrize(
+    ("options", "problem"),
+    [
+        (["--backend", "dask"], "--scheduler ADDRESS"),
+        (["--backend", "threads", "--scheduler", "tcp://127.0.0.1:1"], "--backend dask"),
+        (["--scheduler", "tcp://127.0.0.1:1"], "no Dask scheduler answers at 'tcp://127.0.0.1:1'"),
+        (["--scheduler", "tcp://127.0.0.1:1", "--jobs", "2"], "--jobs"),
+    ],
+)
+def test_what_cannot_be_connected_is_refused_in_one_line(scene, tmp_path, monkeypatch, capsys, options, problem):
+    monkeypatch.setattr("ringsweep.remote._PATIENCE", 0.5)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.yaml").write_text(yaml.safe_dump({"scene": scene}))
+    assert cli.main(["run", "a.yaml", *options]) == 2
+    message = capsys.readouterr().err
+    assert problem in message
+    assert message.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["a.yaml"]

@@ -1,0 +1,278 @@
+"""A sweep on disk goes on after whatever stopped it, and its file is that of a sweep never stopped."""
+
+import errno
+import os
+import shutil
+import signal
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+import xarray as xr
+import yaml
+
+import ringsweep
+from benchmarks.kills import POINTS, killed_at, same_bits
+from ringsweep import cli, storage
+from ringsweep.chunks import Chunks, owned
+from ringsweep.config import load
+from ringsweep.engine import write
+from ringsweep.layout import Layout
+from ringsweep.pace import Pace
+from ringsweep.provenance import identity
+
+SWEEP = {
+    "grid": {"drive.amplitude": {"geomspace": [0.5, 8.0, 9]}, "zone.half_angle": {"linspace": ["5 deg", "40 deg", 8]}}
+}
+
+
+@pytest.fixture(scope="module")
+def config(scene, tmp_path_factory):
+    """A file that describes a sweep of 72 cells."""
+    path = tmp_path_factory.mktemp("never") / "sweep.yaml"
+    path.write_text(yaml.safe_dump({"scene": scene, "sweep": SWEEP}, sort_keys=False))
+    return path
+
+
+@pytest.fixture(scope="module")
+def never_stopped(config):
+    """The file of a run that nothing stopped."""
+    path = config.with_name("never.nc")
+    ringsweep.run(config, path, progress=False).close()
+    return path
+
+
+@pytest.fixture
+def small_chunks(monkeypatch):
+    """Chunks of at most three cells, so that a small sweep has many."""
+    monkeypatch.setattr(Pace, "most", 3)
+
+
+class Stopped(BaseException):
+    """What stops a sweep in these tests."""
+
+
+@contextmanager
+def stopping(monkeypatch, owner, name, after):
+    """Let a method raise `Stopped` instead of its work once it has been called so often."""
+    method, count = getattr(owner, name), iter(range(after))
+
+    def stop(*args, **kwargs):
+        if next(count, None) is None:
+            raise Stopped
+        return method(*args, **kwargs)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(owner, name, stop)
+        yield
+
+
+@pytest.fixture
+def half_done(config, tmp_path, monkeypatch, small_chunks):
+    """Where a sweep was to be written that was stopped after ten chunks."""
+    target = tmp_path / "out.nc"
+    with stopping(monkeypatch, Chunks, "put", 10), pytest.raises(Stopped):
+        ringsweep.run(config, target, progress=False)
+    return target
+
+
+def chunks_of(target):
+    return sorted(target.with_name("out.nc.partial").glob("*.npz"))
+
+
+def left(target):
+    """Everything in the folder of a file."""
+    return sorted(path.name for path in target.parent.iterdir())
+
+
+class TestGoingOn:
+    @pytest.mark.parametrize("point", POINTS)
+    def test_a_killed_process_costs_nothing_but_time(self, config, never_stopped, tmp_path, point):
+        target = tmp_path / "out.nc"
+        arguments = ["run", str(config), "-o", str(target)]
+        assert killed_at(point, min(2, POINTS[point]), arguments).returncode == -9
+        assert target.with_name("out.nc.partial").exists()
+        assert cli.main(arguments) == 0
+        assert same_bits(target, never_stopped)
+        assert left(target) == ["out.nc", "out.png"]
+
+    def test_finished_chunks_are_not_computed_again(self, config, half_done, monkeypatch, caplog):
+        assert len(chunks_of(half_done)) == 10
+        put, computed = Chunks.put, []
+        monkeypatch.setattr(Chunks, "put", lambda self, p, *rest: (computed.extend(p), put(self, p, *rest)))
+        with caplog.at_level("INFO", logger="ringsweep"):
+            ringsweep.run(config, half_done, progress=False).close()
+        assert f"going on: {72 - len(computed)} of 72 cells are done" in caplog.text
+        assert 0 < len(computed) < 72
+
+    def test_a_stop_tells_how_to_go_on(self, config, tmp_path, monkeypatch, capsys, caplog, small_chunks):
+        learn = Pace.learn
+
+        def interrupted(*arguments):
+            learn(*arguments)
+            signal.raise_signal(signal.SIGINT)
+
+        monkeypatch.setattr(Pace, "learn", interrupted)
+        assert cli.main(["run", str(config), "-o", str(tmp_path / "out.nc")]) == 130
+        message = capsys.readouterr().err
+        assert message.count("\n") == 1
+        assert "stopping when the chunks under way are done" in caplog.text
+        assert "interrupted" in message
+        assert "cells are kept in" in message
+        assert "the same command goes on from there" in message
+
+    def test_what_decides_no_bit_may_change_meanwhile(self, scene, half_done, never_stopped):
+        """Units as typed, the order of keys, the value of what is swept."""
+        scene = dict(reversed(scene.items())) | {"drive": {"amplitude": "3 rad/s", "law": "arctan"}}
+        grid = {"drive.amplitude": SWEEP["grid"]["drive.amplitude"]}
+        grid["zone.half_angle"] = {"linspace": [np.radians(5), np.radians(40), 8]}
+        ringsweep.run({"sweep": {"grid": grid}, "scene": scene}, half_done, progress=False).close()
+        assert same_bits(half_done, never_stopped)
+
+
+class TestNeverMixed:
+    def test_another_sweep_is_refused_by_what_changed(self, config, half_done, capsys):
+        text = config.read_text().replace("mu_k: 0.3", "mu_k: 0.31")
+        other = half_done.with_name("other.yaml")
+        other.write_text(text)
+        before = chunks_of(half_done)
+        assert cli.main(["run", str(other), "-o", str(half_done)]) == 2
+        message = capsys.readouterr().err
+        assert "scene.friction.rough.mu_k was 0.3, is 0.31" in message
+        assert "--fresh" in message
+        assert chunks_of(half_done) == before
+
+    def test_another_version_is_refused(self, config, half_done, monkeypatch):
+        now = identity(load(config)) | {"numba": "99.0"}
+        monkeypatch.setattr("ringsweep.engine.identity", lambda _: now)
+        with pytest.raises(ringsweep.InputError, match=r"numba was .*, is 99\.0"):
+            ringsweep.run(config, half_done, progress=False)
+
+    def test_fresh_starts_over(self, config, half_done, never_stopped):
+        damaged = chunks_of(half_done)[0]
+        damaged.write_bytes(b"")
+        ringsweep.run(config, half_done, fresh=True, progress=False).close()
+        assert same_bits(half_done, never_stopped)
+
+    @pytest.mark.parametrize("damage", ["truncated", "empty", "one bit", "of another sweep", "no archive"])
+    def test_a_damaged_or_foreign_chunk_is_noticed_and_computed_again(
+        self, config, half_done, never_stopped, caplog, damage
+    ):
+        path = chunks_of(half_done)[4]
+        content = bytearray(path.read_bytes())
+        if damage == "of another sweep":
+            with owned(half_done.with_name("b.nc"), {"a": "b"}, Layout([72])) as others:
+                others.put(np.arange(3), {"regime": np.zeros(3, dtype="int8")}, "none")
+                shutil.copy(next(iter(others.files)), path)
+        else:
+            with np.load(path) as members:
+                inside = content.index(members["phi_end"].tobytes())
+            content[inside] ^= 4
+            cut = {"truncated": content[:-200], "empty": b"", "one bit": content, "no archive": b"regime"}
+            path.write_bytes(cut[damage])
+        ringsweep.run(config, half_done, progress=False).close()
+        assert f"{path} is {'not of this sweep' if damage == 'of another sweep' else 'damaged'}" in caplog.text
+        assert "its cells are computed again" in caplog.text
+        assert same_bits(half_done, never_stopped)
+
+    def test_two_at_once_are_one(self, config, tmp_path, capsys):
+        target = tmp_path / "out.nc"
+        loaded = load(config)
+        with owned(target, identity(loaded), Layout([9, 8])):
+            assert cli.main(["run", str(config), "-o", str(target)]) == 2
+        assert "another ringsweep is computing it" in capsys.readouterr().err
+        assert left(target) == []
+
+    def test_a_finished_file_is_not_computed_again_and_one_of_another_sweep_is_named(
+        self, config, never_stopped, tmp_path, caplog
+    ):
+        target = tmp_path / "out.nc"
+        shutil.copy(never_stopped, target)
+        assert not write(load(config), target, progress=False)
+        other = load(config.read_text() and {"scene": load(config).source["scene"] | {"time": {"span": "3 s"}}})
+        assert write(other, target, progress=False)
+        assert "scene.time.span was 4.0, is 3.0" in caplog.text
+
+
+class TestWhereTheDiskFails:
+    @pytest.mark.parametrize("name", ["fsync", "replace"])
+    def test_one_message_and_nothing_half_written(self, config, never_stopped, tmp_path, monkeypatch, capsys, name):
+        target = tmp_path / "out.nc"
+        calls = iter(range(5))
+        function = getattr(os, name)
+
+        def full(*args, **kwargs):
+            if next(calls, None) is None:
+                raise OSError(errno.ENOSPC, "No space left on device")
+            return function(*args, **kwargs)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(Pace, "most", 3)
+            patch.setattr(f"os.{name}", full)
+            assert cli.main(["run", str(config), "-o", str(target)]) == 1
+        message = capsys.readouterr().err.splitlines()[-1]
+        assert "No space left on device" in message
+        assert "the same command goes on" in message
+        assert left(target) == ["out.nc.partial"]
+        assert not list(target.with_name("out.nc.partial").glob("*.tmp"))
+        assert cli.main(["run", str(config), "-o", str(target)]) == 0
+        assert same_bits(target, never_stopped)
+
+    def test_a_file_that_does_not_read_back_is_not_left(self, config, tmp_path, monkeypatch, capsys):
+        target = tmp_path / "out.nc"
+        monkeypatch.setattr(storage, "_checksums", lambda *_: {})
+        assert cli.main(["run", str(config), "-o", str(target)]) == 1
+        assert "does not read back" in capsys.readouterr().err
+        assert left(target) == ["out.nc.partial"]
+
+
+class TestFile:
+    def test_holds_what_a_sweep_in_memory_gives(self, config, never_stopped):
+        undated = {"date_created": ""}
+        in_memory = ringsweep.run(config, progress=False)
+        xr.testing.assert_identical(storage.load(never_stopped).assign_attrs(undated), in_memory.assign_attrs(undated))
+
+    def test_is_enough_to_run_it_again(self, never_stopped, tmp_path, monkeypatch, capsys):
+        monkeypatch.chdir(tmp_path)
+        again = tmp_path / "again.nc"
+        assert cli.main(["run", str(never_stopped), "-o", str(again)]) == 0
+        assert same_bits(again, never_stopped)
+        attributes = storage.load(again).attrs
+        for name in ("versions", "platform", "processors", "solver", "configuration", "date_created"):
+            assert attributes[name]
+        assert '"rtol"' in attributes["solver"] or '"max_steps"' in attributes["solver"]
+        assert cli.main(["run", str(again)]) == 0
+        assert "holds this sweep already" in capsys.readouterr().out
+
+    def test_is_made_of_bricks_that_are_read_alone(self, scene, tmp_path, monkeypatch):
+        """Of points and laws beside a grid too, whatever the bricks are."""
+        monkeypatch.setattr("ringsweep.layout.BRICK", 6)
+        monkeypatch.setattr(storage, "COMPRESSED_FROM", 1)
+        axes = {
+            "drive.amplitude": xr.DataArray([0.5, 1.0, 2.0, 8.0], dims="rig"),
+            "body.mass": xr.DataArray([0.05, 0.06, 0.07, 0.08], dims="rig"),
+            "zone.half_angle": ["5 deg", "15 deg", "40 deg"],
+            "friction.law": ["coulomb", "stiction"],
+        }
+        found = ringsweep.sweep(scene, axes, tmp_path / "out.nc", progress=False)
+        assert found["t_end"].encoding["chunksizes"] == (1, 2, 2)
+        assert {"drive_amplitude", "body_mass"} <= set(found.coords)
+        in_memory = ringsweep.sweep(scene, axes, progress=False)
+        xr.testing.assert_equal(found.load(), in_memory)
+        found.close()
+
+    def test_a_single_run_has_no_dimension(self, scene, tmp_path):
+        with ringsweep.run({"scene": scene}, tmp_path / "out.nc", progress=False) as found:
+            assert not found.sizes
+            xr.testing.assert_equal(found.load(), ringsweep.run({"scene": scene}, progress=False))
+
+
+@pytest.mark.parametrize("solver", ["auto", {"method": "rk4", "steps": 300}], ids=["event", "rk4"])
+def test_the_order_of_computation_changes_no_bit(scene, monkeypatch, solver):
+    axes = {"drive.amplitude": np.geomspace(0.5, 8.0, 9), "zone.half_angle": np.radians([5.0, 20.0, 40.0])}
+    whole = ringsweep.sweep(scene, axes, solver=solver, progress=False, jobs=1)
+    for size, jobs in ((1, 2), (5, 1), (20, 2)):
+        monkeypatch.setattr(Pace, "next", lambda self, left, size=size: size)
+        parted = ringsweep.sweep(scene, axes, solver=solver, progress=False, jobs=jobs)
+        for name in whole.data_vars:
+            assert parted[name].values.tobytes() == whole[name].values.tobytes(), name
