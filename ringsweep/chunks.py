@@ -128,7 +128,7 @@ class Chunks:
             before = {}
         others = sorted(self.folder.glob("*.npz"))
         if before and before != self.identity and others:
-            changes = "; ".join(differences(before, self.identity))
+            changes = differences(before, self.identity)
             raise InputError(
                 str(self.folder),
                 f"holds finished cells of another sweep: {changes}. --fresh starts over, -o keeps both",

@@ -226,10 +226,10 @@ def _holds(target: Path, chunks: Chunks) -> bool:
     if found.get("fingerprint") == chunks.key:
         return True
     try:
-        changes = differences(identity(load(target)), chunks.identity) or ["the version of ringsweep"]
+        changes = differences(identity(load(target)), chunks.identity) or "the version of ringsweep"
     except InputError:
-        changes = ["what a configuration may say"]
-    logger.warning("%s is replaced when this sweep is done; what changed: %s", target, "; ".join(changes))
+        changes = "what a configuration may say"
+    logger.warning("%s is replaced when this sweep is done; what changed: %s", target, changes)
     return False
 
 
@@ -278,7 +278,7 @@ def _fill(
             try:
                 from ringsweep import remote
             except ImportError:
-                raise InputError("--scheduler", "Dask is not installed: pip install 'ringsweep[dask]'") from None
+                raise InputError("--scheduler", "Dask is not installed: pip install distributed") from None
             client = stack.enter_context(remote.connect(scheduler))
             pace = Pace(config.solver.side_by_side, lambda: remote.threads(client))
             chunks = chunks_of(kept.done, left, pace, stopped)
@@ -287,7 +287,7 @@ def _fill(
         try:
             for finished in results:
                 if finished.environment != environment():
-                    changes = "; ".join(differences(environment(), finished.environment))
+                    changes = differences(environment(), finished.environment)
                     raise InputError("--scheduler", f"a worker has other versions than this process: {changes}")
                 kept.put(finished.positions, finished.columns, finished.processor)
                 if finished.seconds is not None:

@@ -59,18 +59,23 @@ def identity(config: Config) -> dict[str, str]:
     return found | {"solver": repr(config.solver)} | environment()
 
 
+# Differences that are told one by one.
+_MOST = 4
+
+
 def fingerprint(identity: Mapping[str, str]) -> str:
     """A digest of an identity, the same for all that give the same bits."""
     return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
 
 
-def differences(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:
+def differences(old: Mapping[str, str], new: Mapping[str, str]) -> str:
     """In words, what of an identity is not as it was."""
     names = [name for name in {**new, **old} if old.get(name) != new.get(name)]
     if "sources" in names:
         # Versions of a checkout stay while its sources change.
         names = [name for name in names if name != "ringsweep"]
-    return [f"{name} was {_short(old.get(name))}, is {_short(new.get(name))}" for name in names]
+    words = [f"{name} was {_short(old.get(name))}, is {_short(new.get(name))}" for name in names[:_MOST]]
+    return "; ".join(words + [f"and {len(names) - _MOST} more"] * (len(names) > _MOST))
 
 
 def attributes(config: Config) -> dict[str, Any]:
@@ -78,7 +83,8 @@ def attributes(config: Config) -> dict[str, Any]:
     model = MODELS[config.scene.structure.model]
     versions = {"python": platform.python_version(), **environment(), "xarray": version("xarray")}
     digest = versions.pop("sources")
-    options = {"method": config.solver.name, **dataclasses.asdict(config.solver)}
+    methods = {law: config.solver.resolved(structure) for law, structure in config.scene.structures.items()}
+    options = {law: {"method": method.name, **dataclasses.asdict(method)} for law, method in methods.items()}
     return {
         "Conventions": "CF-1.11",
         "title": f"ringsweep: {model.doc}",
@@ -90,7 +96,7 @@ def attributes(config: Config) -> dict[str, Any]:
         "platform": f"{platform.system()} {platform.machine()}",
         "processors": processor(),
         "method": config.solver.name,
-        "solver": json.dumps(options),
+        "solver": json.dumps(options if len(options) > 1 else next(iter(options.values()))),
         "configuration": json.dumps(config.source, sort_keys=True),
         "date_created": datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
     }
@@ -107,4 +113,4 @@ def _digest(*arrays: Any) -> str:
 def _short(value: str | None) -> str:
     if value is None:
         return "absent"
-    return value if len(value) <= 80 else f"{value[:12]}..."
+    return value if len(value) <= 100 else f"{value[:97]}..."

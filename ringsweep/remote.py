@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Generator, Iterator
+from concurrent.futures import CancelledError
+from contextlib import suppress
 from itertools import islice
 from typing import Any
 
@@ -85,5 +87,8 @@ def compute(task: Callable[[Positions], Any], chunks: Iterator[Positions], key: 
         for _, result in futures:
             yield result
             fill()
+    except (OSError, CancelledError) as error:
+        raise ConnectionError(f"the Dask scheduler is gone ({error})") from error
     finally:
-        client.unregister_worker_plugin(plugin.name)
+        with suppress(OSError):
+            client.unregister_worker_plugin(plugin.name)

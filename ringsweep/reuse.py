@@ -75,7 +75,7 @@ class Earlier:
         if any(len(dims) > 1 for dims, _ in self.axes.columns.values()):
             raise InputError(str(self.path), "has an axis of several dimensions: its cells cannot be reused")
         if changes := differences(*fixed):
-            raise InputError(str(self.path), f"has no cell of this sweep: {'; '.join(changes)}")
+            raise InputError(str(self.path), f"has no cell of this sweep: {changes}")
 
     def aligned(self, config: Config) -> Config:
         """The new sweep with the very values of the earlier one where its axes differ from them by rounding."""

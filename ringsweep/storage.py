@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import secrets
 import tempfile
@@ -187,9 +188,7 @@ def _write_bricks(
             for name, column in columns.items():
                 if name not in sums:
                     variable = file.createVariable(name, column.dtype, dims, fill_value=False, **_chunked(layout))
-                    if layout.total >= COMPRESSED_FROM:
-                        # Each brick is written once: more than one in memory, for each variable, would serve nothing.
-                        variable.set_var_chunk_cache(size=2 * column.nbytes, nelems=11, preemption=1.0)
+                    _cache_one_brick(variable, layout)
                     variable.setncatts(variables[name].attributes | ({"coordinates": others} if others else {}))
                 file[name][place] = column
                 sums[name] = zlib.crc32(column.tobytes(), sums.get(name, 0))
@@ -203,9 +202,17 @@ def _checksums(path: Path, names: Iterable[str], layout: Layout) -> dict[str, in
         file.set_auto_maskandscale(False)
         for name in names:
             found[name] = 0
+            _cache_one_brick(file[name], layout)
             for _, _, place in layout.bricks():
                 found[name] = zlib.crc32(file[name][place].tobytes(), found[name])
     return found
+
+
+def _cache_one_brick(variable: Any, layout: Layout) -> None:
+    # Each is passed once; by default some 64 MiB of each variable would be kept.
+    if layout.total >= COMPRESSED_FROM:
+        size = math.prod(layout.brick) * variable.dtype.itemsize
+        variable.set_var_chunk_cache(size=2 * size, nelems=11, preemption=1.0)
 
 
 def _chunked(layout: Layout) -> dict[str, Any]:

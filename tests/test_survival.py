@@ -1,6 +1,7 @@
 """A sweep on disk goes on after whatever stopped it, and its file is that of a sweep never stopped."""
 
 import errno
+import json
 import os
 import shutil
 import signal
@@ -240,7 +241,9 @@ class TestFile:
         attributes = storage.load(again).attrs
         for name in ("versions", "platform", "processors", "solver", "configuration", "date_created"):
             assert attributes[name]
-        assert '"rtol"' in attributes["solver"] or '"max_steps"' in attributes["solver"]
+        solver = json.loads(attributes["solver"])
+        assert solver["method"] == "event"
+        assert solver["rtol"] == 1e-10
         assert cli.main(["run", str(again)]) == 0
         assert "holds this sweep already" in capsys.readouterr().out
 

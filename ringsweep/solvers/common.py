@@ -46,6 +46,10 @@ class Method(ABC):
     def check(self, structure: Structure) -> None:  # noqa: B027  most methods take every scene
         """Raise an `InputError` if the method cannot take such a scene."""
 
+    def resolved(self, structure: Structure) -> Method:
+        """The method, with its tolerances, that such a scene is run by."""
+        return self
+
     @abstractmethod
     def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:
         """Run every cell of `batch`; `outcomes` names the model's columns."""

@@ -135,12 +135,16 @@ class Auto(Method):
 
     def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:
         """Outcomes of every cell; see :class:`ringsweep.solvers.common.Method`."""
-        return self._method(batch).run(batch, outcomes)
+        return self._method(type(batch.law)).run(batch, outcomes)
 
     def history(self, batch: Any, samples: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Times and rows of the history of cell 0; see :class:`ringsweep.solvers.common.Method`."""
-        return self._method(batch).history(batch, samples, width)
+        return self._method(type(batch.law)).history(batch, samples, width)
 
-    def _method(self, batch: Any) -> Method:
-        method = Event if type(batch.law) in SET_VALUED else Implicit
+    def resolved(self, structure: Structure) -> Method:
+        """The method that a scene is run by."""
+        return self._method(LAWS[structure.law])
+
+    def _method(self, law: type) -> Method:
+        method = Event if law in SET_VALUED else Implicit
         return method(max_steps=self.max_steps, certify=self.certify)

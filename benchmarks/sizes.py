@@ -1,0 +1,123 @@
+"""What the size of a sweep costs: cells per second, memory and disk at 1e5, 1e6 and 1e7 cells.
+
+    python -m benchmarks.sizes            # a quarter of an hour
+    python -m benchmarks.sizes --quick    # without the largest
+
+`ringsweep run` of a grid over five axes (drive, width of the zone, two coefficients of friction, launch) of the ring
+of the paper's Fig. 29 under stiction for 2 s, with certificates, each size in a process of its own: start, chunks,
+merge, verification and all. Memory is the greatest resident set of that process. Then one map is drawn of each file.
+
+Writes `sizes.md` to `benchmarks/results/`; `--quick`, to the current folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+
+from benchmarks._common import heading, machine, markdown, ring, table
+
+RESULTS = Path(__file__).parent / "results"
+#: Values along each of the five axes.
+SIDES = (10, 16, 25)
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a process took: seconds, CPU seconds and bytes of memory."""
+
+    wall: float
+    cpu: float
+    memory: float
+
+
+def configuration(side: int) -> str:
+    """YAML of a sweep of so many values along each of five axes."""
+    spans = {
+        "drive.amplitude": (0.5, 10.0),
+        "zone.half_angle": (0.05, 1.0),
+        "friction.rough.mu_k": (0.2, 0.4),
+        "friction.rest.mu_s": (0.11, 0.25),
+        "initial.omega": (0.0, 5.0),
+    }
+    grid = {path: {"linspace": [*ends, side]} for path, ends in spans.items()}
+    scene = ring({"law": "stiction"}) | {"time": {"span": 2.0}}
+    return yaml.safe_dump({"scene": scene, "sweep": {"grid": grid}}, sort_keys=False)
+
+
+def cost(*arguments: str) -> Cost:
+    """Run the command line and take its measure."""
+    begin = time.perf_counter()
+    process = subprocess.Popen([sys.executable, "-m", "ringsweep", *arguments], stdout=subprocess.DEVNULL)
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        sys.exit(f"ringsweep {' '.join(arguments)} ended with status {process.returncode}")
+    # Linux counts in KiB, macOS in bytes.
+    unit = 1 if sys.platform == "darwin" else 1024
+    return Cost(time.perf_counter() - begin, usage.ru_utime + usage.ru_stime, unit * usage.ru_maxrss)
+
+
+def main() -> None:
+    """Measure, print, write."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="without the largest")
+    quick = parser.parse_args().quick
+    where = machine()
+    print(where)
+    rows = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        config, target = folder / "sweep.yaml", folder / "sweep.nc"
+        config.write_text(configuration(3))
+        start = cost("run", str(config), "-o", str(folder / "start.nc"))
+        for side in SIDES[: 2 if quick else 3]:
+            cells = side**5
+            config.write_text(configuration(side))
+            target.unlink(missing_ok=True)
+            took = cost("run", str(config), "-o", str(target))
+            held = [f"{axis}={value}" for axis, value in
+                    (("friction_rough_mu_k", 0.3), ("friction_rest_mu_s", 0.2), ("initial_omega", 0.0))]  # fmt: skip
+            picture = cost("map", str(target), "-o", str(folder / "map.png"),
+                           *(word for one in held for word in ("--sel", one)))  # fmt: skip
+            rows.append([
+                f"{cells}", f"{took.wall:.0f}", f"{cells / took.wall:.0f}", f"{1e6 * took.cpu / cells:.1f}",
+                f"{took.memory / 2**20:.0f}", f"{target.stat().st_size / cells:.0f}",
+                f"{picture.wall:.1f}", f"{picture.memory / 2**20:.0f}",
+            ])  # fmt: skip
+            print(*rows[-1], flush=True)
+    header = [
+        "cells",
+        "s",
+        "cells/s",
+        "CPU µs per cell",
+        "memory, MiB",
+        "bytes per cell",
+        "one map, s",
+        "its memory, MiB",
+    ]
+    heading("Size of a sweep over five axes")
+    table(header, rows)
+    report = "# Size of a sweep\n\n`python -m benchmarks.sizes` on\n\n"
+    report += "".join(f"- {line}\n" for line in where.splitlines())
+    report += f"""
+A grid over five axes, two seconds of stiction a cell, with certificates, from start to finished file;
+{start.wall:.1f} s and {start.memory / 2**20:.0f} MiB are for a sweep of {3**5} cells.
+
+"""
+    out = Path() if quick else RESULTS
+    out.mkdir(exist_ok=True)
+    (out / "sizes.md").write_text(report + markdown(header, rows))
+    print(f"\nsizes.md is in {out.resolve()}")
+
+
+if __name__ == "__main__":
+    main()
