@@ -18,12 +18,14 @@ from ringsweep.lanes import (
     opposing,
     read_lanes,
     select,
+    side_by_side,
     sine_cosine,
     sine_cosine_near,
     write,
 )
 from ringsweep.models import MODELS
 from ringsweep.parameters import declared
+from ringsweep.physics.drives import scaled
 from ringsweep.physics.friction import LAWS
 from ringsweep.physics.friction.static import steepest, stiction_band, weights
 from ringsweep.solvers import rk4
@@ -130,7 +132,8 @@ def integrate(kind, batch, steps, order=None):
     """Outcomes of a batch's cells, taken in an order, by the kernel for one run or for several side by side."""
     order = np.arange(len(batch.span)) if order is None else order
     rows, report = np.empty((len(batch.span), len(NAMES))), np.empty((len(batch.span), 2))
-    rk4.integrate(kind, rk4.Kept(), batch, order, steps, rows, report)
+    scenes = side_by_side(batch._replace(drive=scaled(batch.drive))) if isinstance(kind, Several) else batch
+    rk4.integrate(kind, rk4.Kept(), scenes, take(batch.drive, 0), order, steps, rows, report)
     return dict(zip(NAMES, rows.T, strict=True)) | {"steps": report[:, 0], "stiffness": report[:, 1]}
 
 
