@@ -27,7 +27,7 @@ from ringsweep.models import MODELS
 from ringsweep.parameters import declared
 from ringsweep.physics.drives import scaled
 from ringsweep.physics.friction import LAWS
-from ringsweep.physics.friction.static import steepest, stiction_band, weights
+from ringsweep.physics.friction.static import BAND, piece, steepest, stiction_band, weights
 from ringsweep.solvers import rk4
 from ringsweep.solvers.rk4 import RK4
 
@@ -110,6 +110,7 @@ class TestWeights:
         cls = LAWS[name]
         given = {"v0": 0.1, "v1": 0.4, "alpha": 7.0}
         law = cls(*map(float, getattr(cls, "of", cls)(**{key: given[key] for key in declared(cls)})))
+        assert stiction_band(law) == piece(law, BAND).high
         at_rest, at_edge = steepest(law)
         assert weights(law, 0.0)[2:] == pytest.approx(at_rest, rel=1e-14)
         slopes = np.array([weights(law, v)[2:] for v in np.linspace(stiction_band(law), 3.0, 20001)])
