@@ -24,15 +24,26 @@ import sys
 import tempfile
 import termios
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from math import radians
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks._common import PAPER_STEPS, SPAN, Times, alternate, bare, configure, heading, machine, markdown, table
+from benchmarks._common import (
+    PAPER_STEPS,
+    SPAN,
+    Times,
+    alternate,
+    bare,
+    configure,
+    heading,
+    machine,
+    markdown,
+    one_core,
+    table,
+)
 from ringsweep import engine
 from ringsweep.physics.friction import LAWS, SET_VALUED, WITHOUT_STATIC
 from ringsweep.solvers import piecewise, rk4
@@ -239,17 +250,6 @@ def memory(cells: int) -> dict[str, float]:
     found["small"] = peak()
     engine.compute(rung.configuration("rk4", cells, steps=10), jobs=None, progress=False)
     return found | {"large": peak()}
-
-
-@contextmanager
-def one_core() -> Iterator[None]:
-    """Pin this process to one of its cores."""
-    cores = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {max(cores)})
-    try:
-        yield
-    finally:
-        os.sched_setaffinity(0, cores)
 
 
 # ---- processes -----------------------------------------------------------------------------
