@@ -193,7 +193,12 @@ def compile_one(name: str, method: str) -> dict[str, Any]:
     if any(kernel.stats.cache_hits for kernel in kernels[-2:]):
         # Another scene has the very same types, and what is loaded has no text.
         return found | {"instructions": "the same", "calls": ["the same"]}
-    return found | code_of("".join(text for kernel in kernels for text in kernel.inspect_asm().values()))
+    return found | code_of("".join(kernel.inspect_asm(kernel.signatures[-1]) for kernel in kernels))
+
+
+def codes(names: Sequence[str], method: str) -> dict[str, Any]:
+    """Code of the kernels of several scenes, compiled in turn."""
+    return {name: compile_one(name, method) for name in names}
 
 
 def code_of(assembly: str) -> dict[str, Any]:
