@@ -83,6 +83,11 @@ class TestFunctions:
         np.testing.assert_array_equal(out[6:8], [x, x])
 
 
+def test_what_is_written_for_types_is_not_for_python():
+    with pytest.raises(TypeError, match="write is for kernels alone"):
+        write(np.empty(1), 0, 1, (0.0,))
+
+
 class TestWeights:
     """Each law has a formula without a branch beside its pieces."""
 
