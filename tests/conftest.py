@@ -1,5 +1,6 @@
 """The paper's rig, its figures, and the shortest way from values to a run."""
 
+import gc
 from collections.abc import Callable, Mapping
 from types import MappingProxyType, SimpleNamespace
 from typing import Any, NamedTuple
@@ -14,6 +15,9 @@ from ringsweep.solvers.rk4 import RK4
 
 settings.register_profile("ringsweep", deadline=None, derandomize=True)
 settings.load_profile("ringsweep")
+
+# What a compiler makes mostly stays: looking for garbage in it as often as usual takes a twentieth of all time.
+gc.set_threshold(50_000)
 
 #: Values of the rig by path; the friction is that of Figs. 29 and 30.
 RIG: Mapping[str, float] = MappingProxyType(
