@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import platform
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from math import ceil, radians
@@ -78,6 +79,20 @@ def on_one_core(configuration: Any) -> Callable[[], dict[str, Any]]:
 def on_all_cores(configuration: Any) -> Any:
     """Run a configuration through the engine: its dataset."""
     return engine.compute(configuration, jobs=None, progress=False)
+
+
+@contextmanager
+def one_core() -> Iterator[None]:
+    """Pin this process to one of its cores, with what threads a library may start."""
+    if not hasattr(os, "sched_setaffinity"):
+        yield
+        return
+    cores = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {max(cores)})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, cores)
 
 
 @dataclass(frozen=True)

@@ -24,15 +24,26 @@ import sys
 import tempfile
 import termios
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from math import radians
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks._common import PAPER_STEPS, SPAN, Times, alternate, bare, configure, heading, machine, markdown, table
+from benchmarks._common import (
+    PAPER_STEPS,
+    SPAN,
+    Times,
+    alternate,
+    bare,
+    configure,
+    heading,
+    machine,
+    markdown,
+    one_core,
+    table,
+)
 from ringsweep import engine
 from ringsweep.physics.friction import LAWS, SET_VALUED, WITHOUT_STATIC
 from ringsweep.solvers import piecewise, rk4
@@ -182,7 +193,12 @@ def compile_one(name: str, method: str) -> dict[str, Any]:
     if any(kernel.stats.cache_hits for kernel in kernels[-2:]):
         # Another scene has the very same types, and what is loaded has no text.
         return found | {"instructions": "the same", "calls": ["the same"]}
-    return found | code_of("".join(text for kernel in kernels for text in kernel.inspect_asm().values()))
+    return found | code_of("".join(kernel.inspect_asm(kernel.signatures[-1]) for kernel in kernels))
+
+
+def codes(names: Sequence[str], method: str) -> dict[str, Any]:
+    """Code of the kernels of several scenes, compiled in turn."""
+    return {name: compile_one(name, method) for name in names}
 
 
 def code_of(assembly: str) -> dict[str, Any]:
@@ -239,17 +255,6 @@ def memory(cells: int) -> dict[str, float]:
     found["small"] = peak()
     engine.compute(rung.configuration("rk4", cells, steps=10), jobs=None, progress=False)
     return found | {"large": peak()}
-
-
-@contextmanager
-def one_core() -> Iterator[None]:
-    """Pin this process to one of its cores."""
-    cores = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {max(cores)})
-    try:
-        yield
-    finally:
-        os.sched_setaffinity(0, cores)
 
 
 # ---- processes -----------------------------------------------------------------------------

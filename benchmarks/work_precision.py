@@ -19,8 +19,7 @@ import argparse
 import os
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
@@ -45,6 +44,7 @@ from benchmarks._common import (
     markdown,
     on_all_cores,
     on_one_core,
+    one_core,
     ring,
     table,
 )
@@ -497,20 +497,6 @@ lane of a full solve.
 """
 
 # ---- the command ---------------------------------------------------------------------------
-
-
-@contextmanager
-def one_core() -> Iterator[None]:
-    """Pin this process to one of its cores, with what threads a library may start."""
-    if not hasattr(os, "sched_setaffinity"):
-        yield
-        return
-    cores = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {max(cores)})
-    try:
-        yield
-    finally:
-        os.sched_setaffinity(0, cores)
 
 
 def main() -> None:

@@ -17,8 +17,10 @@ def launch(scene):
 
 @inner_hook
 def rates(scene, now, y, drive_at, drive_rate):
-    """Time derivative of the state `y`, within a step of one inspected, while the drive is at `drive_at` and moves at
-    `drive_rate`."""
+    """Time derivative of the state `y` while the drive is at `drive_at` and moves at `drive_rate`.
+
+    `now` is the inspection of the state at which the step began.
+    """
 
 
 @inner_hook
@@ -28,7 +30,7 @@ def inspect(scene, y, drive_at, drive_rate):
 
 @hook
 def lanes(scene):
-    """How many runs of such a scene stand side by side in the kernel of a constant step: `Eight` or `Single`."""
+    """How many runs of such a scene stand side by side in the kernel of a constant step: `Several` or `Single`."""
 
 
 @inner_hook

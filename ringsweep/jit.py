@@ -198,6 +198,30 @@ def unrolled(function: Callable[..., Any]) -> Any:
     return found
 
 
+def generated(write: Callable[..., Any]) -> Any:
+    """A function for kernels alone, whose body is written out for the types of its arguments.
+
+    `write` takes these types under the names of the arguments; it returns the lines of the body, and what they name.
+    """
+    name, names = write.__name__, ", ".join(inspect.signature(write).parameters)
+
+    def written(*kinds: Any) -> Any:
+        lines, scope = write(*kinds)
+        exec(f"def body({names}):\n    " + "\n    ".join(lines), scope)
+        return scope["body"]
+
+    scope: dict[str, Any] = {"written": written}
+    exec(
+        f"def {name}({names}): raise TypeError('{name} is for kernels alone')\n"
+        f"def overloaded({names}): return written({names})\n",
+        scope,
+    )
+    found = scope[name]
+    found.__doc__ = write.__doc__
+    overload(found, jit_options=OPTIONS)(scope["overloaded"])
+    return found
+
+
 @unrolled
 def add_scaled(length, y, factor, k):
     """``y + factor * k``."""

@@ -65,8 +65,8 @@ FIGURES: Mapping[int, Figure] = MappingProxyType(
         31: _figure(
             "power", 5000, 2, (0.5, 0.4), (0.2, 0.1), 1e5, 2e-6, drive__amplitude=20, zone__half_angle=np.pi / 2
         ),
-        32: _figure("none", 5000, 1, (0.2, 0.15), (0.15, 0.1), 1e5, 2e-6, initial__omega=16),
-        33: _figure("none", 5000, 1, (0.2, 0.15), (0.15, 0.1), 1e5, 2e-6, initial__omega=100),
+        32: _figure("arctan", 5000, 1, (0.2, 0.15), (0.15, 0.1), 1e5, 2e-6, initial__omega=16),
+        33: _figure("arctan", 5000, 1, (0.2, 0.15), (0.15, 0.1), 1e5, 2e-6, initial__omega=100),
     }
 )
 
@@ -87,14 +87,17 @@ def figure() -> Callable[[int], Figure]:
 
 @pytest.fixture(scope="session")
 def cells() -> Callable[..., Any]:
-    """Batch of the rig with `changes` by path; arrays among them make several cells."""
+    """Batch of the rig with `changes` by path; arrays among them make several cells.
+
+    A ring at rest has a drive without amplitude: it needs no kernel of its own.
+    """
 
     def build(
         changes: Mapping[str, Any] | None = None,
         *,
         model: str = "ring",
         law: str = "bengisu-akay",
-        drive: str = "none",
+        drive: str = "arctan",
         arcs: tuple[str, ...] = ("zone",),
     ) -> Any:
         structure = Structure(model, law, drive, arcs)
@@ -110,11 +113,10 @@ def cells() -> Callable[..., Any]:
 
 @pytest.fixture(scope="session")
 def setting(cells: Callable[..., Any]) -> Callable[..., Any]:
-    """Batch of a figure's setting with `changes`, dots as double underscores; no drive is one without amplitude."""
+    """Batch of a figure's setting with `changes`, dots as double underscores."""
 
     def build(number: int, law: str = "bengisu-akay", **changes: float) -> Any:
         drive, values, _ = FIGURES[number]
-        drive = "arctan" if drive == "none" else drive
         values = values | {path.replace("__", "."): value for path, value in changes.items()}
         known = parameters(Structure("ring", law, drive, ("zone",)))
         return cells({path: value for path, value in values.items() if path in known}, law=law, drive=drive)

@@ -1,6 +1,6 @@
 """Solutions that tests hold the solvers to, from the balances of momentum alone, and the shortest way to a run."""
 
-from math import cos, exp, inf, pi, sin
+from math import cos, inf, pi, sin
 from types import SimpleNamespace
 
 import numpy as np
@@ -44,6 +44,10 @@ def motion(body, K1, K2):
     )
     loads = M * np.array([[xi, g, 0.0], [0.0, 0.0, -g], [0.0, 0.0, -g * xi]])
     return np.linalg.solve(balances, loads)
+
+
+#: Nodes and weights of Gauss's quadrature.
+NODES, NODE_WEIGHTS = np.polynomial.legendre.leggauss(120)
 
 
 class Fall:
@@ -92,10 +96,10 @@ class Fall:
             C = u - A * cos(phi) - B * sin(phi)
 
             def square(x, p=p, A=A, B=B, C=C, origin=phi):
-                return C * exp(2 * p * (x - origin)) + A * cos(x) + B * sin(x)
+                return C * np.exp(2 * p * (x - origin)) + A * np.cos(x) + B * np.sin(x)
 
             def reaction(x, k, rows=rows, square=square):
-                return rows[k] @ (square(x), cos(x), sin(x))
+                return rows[k] @ (square(x), np.cos(x), np.sin(x))
 
             ends = [(self.first(square, phi, end, 1e-9 if u == 0.0 else 0.0), "rest")]
             ends += [(self.first(lambda x, k=k: reaction(x, k), phi, end), k) for k in (1, 2)]
@@ -116,7 +120,7 @@ class Fall:
     def first(f, start, end, skip=0.0):
         """First zero of a function positive at `start`, or infinity."""
         x = np.linspace(start + skip * np.sign(end - start), end, 4001)
-        below = np.flatnonzero([f(one) <= 0.0 for one in x])
+        below = np.flatnonzero(f(x) <= 0.0)
         if not len(below):
             return inf
         k = below[0]
@@ -125,16 +129,14 @@ class Fall:
     @staticmethod
     def duration(square, start, end, rests, rested):
         """Time from angle to angle by quadrature; at rest, in the root of the distance from there."""
-        x, weights = np.polynomial.legendre.leggauss(120)
         middle, sense = 0.5 * (start + end), np.sign(end - start)
         total = 0.0
         for place, still in ((start, rested), (end, rests)):
             way = middle - place
-            fraction = 0.5 * (x + 1)
+            fraction = 0.5 * (NODES + 1)
             # phi = place + way z^2 takes away the root that u has at rest.
             phi, rate = (place + way * fraction**2, 2 * fraction) if still else (place + way * fraction, 1.0)
-            speed = np.sqrt([square(one) for one in phi])
-            total += 0.5 * abs(way) * (weights * rate / speed).sum()
+            total += 0.5 * abs(way) * (NODE_WEIGHTS * rate / np.sqrt(square(phi))).sum()
         return total if sense else 0.0
 
 

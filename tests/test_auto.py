@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from conftest import RIG
 from scipy.special import ellipk
-from solutions import Fall, solve
+from solutions import HISTORY, Fall, solve
 
 from ringsweep.jit import take
 from ringsweep.models import batch, parameters
@@ -49,6 +49,13 @@ class TestChoice:
             auto, own = solve(Auto(), scene), solve(method, scene)
             np.testing.assert_array_equal(auto.rows, own.rows)
             np.testing.assert_array_equal(auto.steps, own.steps)
+
+    def test_nor_does_a_history(self, scenes, law):
+        scene = scenes({"drive.amplitude": 2.0})
+        own = Event() if law == "stiction" else Implicit()
+        (times, rows), expected = (method.history(scene, 100, len(HISTORY)) for method in (Auto(), own))
+        np.testing.assert_array_equal(times, expected[0])
+        np.testing.assert_array_equal(rows, expected[1])
 
 
 class TestCertificate:
@@ -167,12 +174,6 @@ class TestSurface:
         assert {RESTING, OSCILLATORY} <= set(found[0].regime)
         for one in found[1:]:
             self.agree(one, found[0])
-
-    def test_no_arc_is_a_ring_without_arcs(self, cells):
-        changes = {"drive.amplitude": self.AMPLITUDES, "time.span": 3.0}
-        uniform = cells(changes, law="stiction", drive="arctan", arcs=())
-        cut = cells(changes | {"zone.half_angle": 0.0}, law="stiction", drive="arctan")
-        self.agree(solve(Auto(), uniform), solve(Auto(), cut))
 
     def test_where_arcs_overlap_the_later_holds(self, scenes):
         def arcs(*given):
@@ -333,16 +334,17 @@ class TestTime:
         assert share[0] == pytest.approx(share[1], rel=0.05)
         assert found.certified.all()
 
-    def test_a_measured_ring(self, cells):
-        """A spline through samples of a drive is that drive, to the spline's own error."""
-        t = np.linspace(0.0, 3.0, 1201)
-        table = t, 2.0 * (t * np.arctan(t) - 0.5 * np.log1p(t * t))
-        structure = Structure("ring", "stiction", "table", ("zone",), table)
+    def test_a_measured_ring_without_arcs(self, cells):
+        """A spline through samples of a drive is that drive, to the spline's own error; no arc is one of no width."""
+        t, amplitude = np.linspace(0.0, 3.0, 1201), np.array([0.2, 2.0, 5.0, -5.0])
+        table = t, t * np.arctan(t) - 0.5 * np.log1p(t * t)
+        structure = Structure("ring", "stiction", "table", (), table)
         values = {path: RIG.get(path, parameter.default) for path, parameter in parameters(structure).items()}
-        values |= {"time.span": 3.0, "drive.amplitude": 1.0}
-        given = {path: np.array([float(value)]) for path, value in values.items() if value is not None}
+        values |= {"time.span": 3.0, "drive.amplitude": amplitude}
+        given = {path: np.resize(np.asarray(x, dtype=float), 4) for path, x in values.items() if x is not None}
         measured = solve(Auto(), batch(structure, given))
-        known = solve(Auto(), cells({"drive.amplitude": 2.0, "time.span": 3.0}, law="stiction", drive="arctan"))
+        changes = {"drive.amplitude": amplitude, "time.span": 3.0, "zone.half_angle": 0.0}
+        known = solve(Auto(), cells(changes, law="stiction", drive="arctan"))
         np.testing.assert_array_equal(kinds(measured), kinds(known))
-        assert measured.phi_end == pytest.approx(known.phi_end, abs=1e-6)
-        assert measured.reversals == known.reversals
+        np.testing.assert_allclose(measured.phi_end, known.phi_end, atol=1e-6)
+        np.testing.assert_array_equal(measured.reversals, known.reversals)

@@ -232,14 +232,6 @@ class TestLimits:
         assert np.log(errors[0] / errors[1]) / np.log(10) == pytest.approx(1.0, abs=0.2)
         assert np.log(errors[1] / errors[2]) / np.log(10) == pytest.approx(1.0, abs=0.2)
 
-    def test_methods_agree_where_a_constant_step_can_follow(self):
-        scene = belt("bengisu-akay", v0=0.02, alpha=5.0, span=20.0)
-        fine = ringsweep.sweep(scene, {"body.mass": [1.0]}, solver={"method": "rk4", "steps": 40_000})
-        auto = ringsweep.sweep(scene, {"body.mass": [1.0]})
-        assert float(fine.x_end[0]) == pytest.approx(float(auto.x_end[0]), abs=1e-7)
-        assert float(fine.stiffness[0]) < STABILITY_LIMIT
-        assert (fine.certified == 1).all()
-
 
 MILD = {
     "piecewise-cubic": {"v0": 0.01, "v1": 0.03},
@@ -253,7 +245,7 @@ MILD = {
 class TestTwoMethods:
     """Where a constant step can follow, it finds the same run; the order of its error is that of its events."""
 
-    @pytest.mark.parametrize(("law", "error"), [("lugre", 1e-4), ("piecewise-cubic", 1e-6), ("karnopp", 0.1)])
+    @pytest.mark.parametrize(("law", "error"), [("lugre", 1e-4), ("piecewise-cubic", 1e-7), ("karnopp", 0.1)])
     def test_agree(self, law, error):
         scene = belt(law, span=20.0, start=0.0, **MILD[law])
         own = outcome(scene)

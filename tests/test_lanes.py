@@ -18,14 +18,16 @@ from ringsweep.lanes import (
     opposing,
     read_lanes,
     select,
+    side_by_side,
     sine_cosine,
     sine_cosine_near,
     write,
 )
 from ringsweep.models import MODELS
 from ringsweep.parameters import declared
+from ringsweep.physics.drives import scaled
 from ringsweep.physics.friction import LAWS
-from ringsweep.physics.friction.static import steepest, stiction_band, weights
+from ringsweep.physics.friction.static import BAND, piece, steepest, stiction_band, weights
 from ringsweep.solvers import rk4
 from ringsweep.solvers.rk4 import RK4
 
@@ -81,6 +83,11 @@ class TestFunctions:
         np.testing.assert_array_equal(out[6:8], [x, x])
 
 
+def test_what_is_written_for_types_is_not_for_python():
+    with pytest.raises(TypeError, match="write is for kernels alone"):
+        write(np.empty(1), 0, 1, (0.0,))
+
+
 class TestWeights:
     """Each law has a formula without a branch beside its pieces."""
 
@@ -108,6 +115,7 @@ class TestWeights:
         cls = LAWS[name]
         given = {"v0": 0.1, "v1": 0.4, "alpha": 7.0}
         law = cls(*map(float, getattr(cls, "of", cls)(**{key: given[key] for key in declared(cls)})))
+        assert stiction_band(law) == piece(law, BAND).high
         at_rest, at_edge = steepest(law)
         assert weights(law, 0.0)[2:] == pytest.approx(at_rest, rel=1e-14)
         slopes = np.array([weights(law, v)[2:] for v in np.linspace(stiction_band(law), 3.0, 20001)])
@@ -130,7 +138,8 @@ def integrate(kind, batch, steps, order=None):
     """Outcomes of a batch's cells, taken in an order, by the kernel for one run or for several side by side."""
     order = np.arange(len(batch.span)) if order is None else order
     rows, report = np.empty((len(batch.span), len(NAMES))), np.empty((len(batch.span), 2))
-    rk4.integrate(kind, rk4.Kept(), batch, order, steps, rows, report)
+    scenes = side_by_side(batch._replace(drive=scaled(batch.drive))) if isinstance(kind, Several) else batch
+    rk4.integrate(kind, rk4.Kept(), scenes, take(batch.drive, 0), order, steps, rows, report)
     return dict(zip(NAMES, rows.T, strict=True)) | {"steps": report[:, 0], "stiffness": report[:, 1]}
 
 

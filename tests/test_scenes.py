@@ -1,11 +1,11 @@
 """A scene compiles to what it uses: what it lacks is not in the code, and a sweep keeps nothing but outcomes."""
 
 import tracemalloc
-from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
 from benchmarks import scenes
+from benchmarks.work_precision import SCENES
 from ringsweep import engine
 
 LEANEST, DRIVEN, CUT = (
@@ -17,13 +17,9 @@ LEANEST, DRIVEN, CUT = (
 
 @pytest.fixture(scope="module")
 def code(tmp_path_factory: pytest.TempPathFactory):
-    """Code of the `rk4` kernel of a scene, compiled where nothing is cached: what comes from there has no text."""
-
-    def compiled(name: str):
-        return name, scenes.in_child(scenes.compile_one, name, "rk4", cache=tmp_path_factory.mktemp("cache"))
-
-    with ThreadPoolExecutor(2) as pool:
-        return dict(pool.map(compiled, (LEANEST, DRIVEN, CUT)))
+    """Code of the `rk4` kernel of scenes, compiled where nothing is cached: what comes from there has no text."""
+    cache = tmp_path_factory.mktemp("cache")
+    return scenes.in_child(scenes.codes, (LEANEST, DRIVEN, CUT), "rk4", cache=cache)
 
 
 def test_calls_are_found_in_code():
@@ -40,7 +36,8 @@ def test_kernel_holds_what_the_scene_uses(code):
 
 def test_sweep_stores_outcomes_alone():
     def most(steps: int) -> int:
-        configuration = scenes.LADDER[LEANEST].configuration("rk4", 256, steps=steps)
+        smooth = SCENES["smooth"]
+        configuration = smooth.configuration(smooth.cells(256), "rk4", steps=steps)
         engine.compute(configuration, jobs=1, progress=False)
         tracemalloc.start()
         try:

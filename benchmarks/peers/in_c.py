@@ -60,7 +60,10 @@ def _library() -> Any:
     source = Path(__file__).with_name("rk4.c")
     with tempfile.TemporaryDirectory() as directory:
         target = Path(directory) / "rk4.so"
-        subprocess.run(["cc", *FLAGS, "-shared", "-fPIC", str(source), "-o", str(target), "-lm"], check=True)
+        compiled = target.with_suffix(".o")
+        subprocess.run(["cc", *FLAGS, "-fPIC", "-c", str(source), "-o", str(compiled)], check=True)
+        # Linked with -ffast-math it would have the whole process that loads it take the smallest numbers for zero.
+        subprocess.run(["cc", "-shared", str(compiled), "-o", str(target), "-lm"], check=True)
         run = ctypes.CDLL(str(target)).run
     vector = np.ctypeslib.ndpointer(dtype=np.float64, flags="C_CONTIGUOUS")
     run.restype = ctypes.c_int64

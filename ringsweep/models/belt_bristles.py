@@ -12,6 +12,7 @@ from typing import NamedTuple
 from ringsweep import hooks
 from ringsweep.jit import inlined
 from ringsweep.models.belt import begin, conclude, observe
+from ringsweep.models.common import largest_eigenvalue
 from ringsweep.physics import drives
 from ringsweep.physics.belt import BristleBelt
 from ringsweep.physics.friction.dynamic import bristle, crawl, lasts, made, yields
@@ -77,10 +78,8 @@ def _inspect(scene, y, drive_at, drive_rate):
     sign = 1.0 if v >= 0.0 else -1.0
     region = _region(scene, v, y[2], sign)
     rate, rate_v, rate_z, force, by_v, by_z = _contact(scene, v, y[2], sign, region)
-    trace = rate_z - by_v / scene.mass
     determinant = (scene.stiffness + by_z * rate_v - by_v * rate_z) / scene.mass
-    square = trace * trace - 4.0 * determinant
-    eigenvalue = 0.5 * (abs(trace) + sqrt(square)) if square > 0.0 else sqrt(determinant)
+    eigenvalue = largest_eigenvalue(rate_z - by_v / scene.mass, determinant)
     rates = y[1], -(scene.stiffness * y[0] + force) / scene.mass, rate
     return Inspection(rates, force, eigenvalue, region == BAND)
 

@@ -127,9 +127,7 @@ def _inspect(scene, y, drive_at, drive_rate):
     by_v, by_1, by_2 = _by_contacts(scene, now, sin_phi, cos_phi, omega)
     decay = max(-now.rates_z[0], -now.rates_z[1])
     coupling = abs(by_1 * now.rates_v[0]) + abs(by_2 * now.rates_v[1])
-    trace = decay - by_v
-    square = trace * trace - 4.0 * (coupling - decay * by_v)
-    eigenvalue = 0.5 * (abs(trace) + sqrt(square)) if square > 0.0 else sqrt(coupling - decay * by_v)
+    eigenvalue = largest_eigenvalue(decay - by_v, coupling - decay * by_v)
     # With little friction left the body swings all the same.
     by_phi, by_omega = ring.acceleration_gradient(b, now.K1, now.K2, sin_phi, cos_phi, omega)
     eigenvalue = max(eigenvalue, largest_eigenvalue(by_omega, -by_phi))

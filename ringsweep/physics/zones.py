@@ -146,7 +146,10 @@ def _segments(surface, segment):
 
 
 def under(values, edges, x):
-    """The value at `x`, in turns from 0 to 1, of those that hold in the segments which begin at `edges` (rad)."""
+    """The value at `x`, in turns from 0 to 1, of those that hold in the segments which begin at `edges` (rad).
+
+    On an edge itself the answer may go either way: it is ``abs(x - middle) < half`` that decides, rounded.
+    """
     # Below the first edge lies the last segment, which closes the ring.
     found = values[len(values) - 1]
     for j in range(len(edges) - 1):

@@ -100,8 +100,10 @@ class RK4(Method):
         rows = np.empty((len(batch.span), width))
         report = np.empty((len(batch.span), 2))
         kind, account = lanes(batch), Kept() if self.diagnose else Dropped()
+        # What the kernels are compiled for knows no shape of the drive: that of its table is a kernel of its own.
+        scenes = side_by_side(batch._replace(drive=scaled(batch.drive))) if isinstance(kind, Several) else batch
         for group in same_drive(batch, cells):
-            integrate(kind, account, batch, group, steps, rows, report)
+            integrate(kind, account, scenes, take(batch.drive, group[0]), group, steps, rows, report)
         return rows[cells], report[cells]
 
     def history(self, batch: Any, samples: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -280,6 +282,7 @@ def integrate(
     kind: Any,
     account: Any,
     batch: Any,
+    drive: Any,
     cells: NDArray[np.intp],
     steps: int,
     rows: NDArray[np.float64],
@@ -293,13 +296,14 @@ def integrate(
         How many runs stand side by side.
     account : Kept or Dropped
         Whether the stiffness is kept.
+    batch : NamedTuple
+        Scenes; where several stand side by side, :func:`ringsweep.lanes.side_by_side` and with their drive
+        :func:`ringsweep.physics.drives.scaled`.
+    drive : NamedTuple
+        The drive of one of the cells.
     rows, report : ndarray of shape ``(cells of the batch, outcomes)`` and ``(cells of the batch, 2)``
         Filled for these cells: outcomes; number of steps and stiffness.
     """
-    # What the kernels are compiled for knows no shape of the drive: that of its table is a kernel of its own.
-    drive = take(batch.drive, cells[0])
-    if isinstance(kind, Several):
-        batch = side_by_side(batch._replace(drive=scaled(batch.drive)))
     h = float(batch.span[cells[0]]) / steps
     table = np.empty((2 * min(_BLOCK, steps) + 1, 2))
     _tabulate(table, drive, 0, 0, h)
@@ -324,7 +328,7 @@ def _begin(kind, batch, cells, table, rows, report):
         there, in order; how many of them there are.
     """
     per = width(kind)
-    sample = _sample(take(batch, cells[0]))
+    sample = _begun(take(batch, cells[0]), 0.0, 0.0)
     lines = size_of(take(batch, cells[0])) + size_of(sample)
     blocks = (len(cells) + per - 1) // per
     memory = np.zeros((blocks, lines, per))
@@ -333,7 +337,9 @@ def _begin(kind, batch, cells, table, rows, report):
     live = 0
     for i in cells:
         scene = take(batch, i)
-        run, status = _launch(scene, table)
+        theta, ring_omega = lookup(scene.drive, table, 0)
+        run = _begun(scene, theta, ring_omega)
+        status, _ = verdict(scene, run.now, run.now)
         if status != RUNNING:
             _conclude(scene, run.record, status, 0.0, run.y, 0.0, 0.0, i, rows, report)
             continue
@@ -348,7 +354,7 @@ def _go_on(kind, account, batch, memory, seated, live, table, first, steps, h, r
     """Take all seated runs through a block of steps; those that are left move together. Returns their number."""
     per, lines = width(kind), memory.shape[1]
     seats = memory.reshape(memory.size)
-    sample = _sample(take(batch, seated[0]))
+    sample = _begun(take(batch, seated[0]), 0.0, 0.0)
     for place in range(0, live, per):
         at, here = place * lines, seated[place : place + per]
         k, left = 0, per
@@ -377,26 +383,16 @@ def _complete(kind, batch, memory, seated, live, steps, rows, report):
     for seat in range(live):
         cell = seated[seat]
         scene = take(batch, cell)
-        run = read(seats, (seat // per * lines + size_of(scene)) * per + seat % per, per, _sample(scene))
+        run = read(seats, (seat // per * lines + size_of(scene)) * per + seat % per, per, _begun(scene, 0.0, 0.0))
         # The end of the span, not the rounding of a sum of steps.
         _conclude(scene, run.record, COMPLETE, scene.span, run.y, float(steps), run.stiffness, cell, rows, report)
 
 
 @inlined
-def _launch(scene, table):
-    """A run at its launch, and how it stands."""
+def _begun(scene, theta, ring_omega):
+    """A run at its launch; with the drive anywhere, a sample of what runs of such scenes are made of."""
     y = launch(scene)
-    theta, ring_omega = lookup(scene.drive, table, 0)
     now = inspect(scene, y, theta, ring_omega)
-    status, _ = verdict(scene, now, now)
-    return _Run(y, now, begin(scene, y, now), 0.0, LIVE), status
-
-
-@inlined
-def _sample(scene):
-    """A run of the type that such scenes have."""
-    y = launch(scene)
-    now = inspect(scene, y, 0.0, 0.0)
     return _Run(y, now, begin(scene, y, now), 0.0, LIVE)
 
 
