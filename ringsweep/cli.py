@@ -6,11 +6,15 @@ import argparse
 import json
 import logging
 import math
+import os
+import shutil
 import sys
+import traceback
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import nullcontext, redirect_stdout, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from textwrap import dedent, indent
+from typing import TYPE_CHECKING, Any
 
 from ringsweep.errors import InputError
 
@@ -23,62 +27,118 @@ if TYPE_CHECKING:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; the exit status is 0 if done, 2 if the input is wrong, 1 for anything else."""
     arguments = _parser().parse_args(argv)
-    logging.basicConfig(stream=sys.stderr, level=logging.WARNING, format="ringsweep: %(message)s")
-    logging.getLogger("ringsweep").setLevel(logging.INFO)
+    told = logging.getLogger("ringsweep")
+    logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
+    logging.getLogger().handlers[0].setFormatter(_Words(_is_coloured(sys.stderr)))
+    told.setLevel(logging.DEBUG if arguments.verbose else logging.WARNING if arguments.quiet else logging.INFO)
     try:
-        arguments.verb(arguments)
+        with redirect_stdout(None) if arguments.quiet else nullcontext():
+            arguments.verb(arguments)
     except InputError as error:
         return _fail(str(error), 2)
     except KeyboardInterrupt as error:
         return _fail("interrupted", 130, error)
+    except BrokenPipeError:
+        # What reads the output, as `head` does, has enough.
+        sys.stdout = None
+        return 0
     except Exception as error:
+        if arguments.verbose:
+            traceback.print_exception(error)
         return _fail(f"{type(error).__name__}: {error}", 1, error)
     return 0
 
 
 def _fail(message: str, status: int, error: BaseException | None = None) -> int:
     notes = getattr(error, "__notes__", [])
-    print("ringsweep:", " ".join("; ".join([message, *notes]).split()), file=sys.stderr)
+    prefix = "\033[1;31mringsweep:\033[0m" if _is_coloured(sys.stderr) else "ringsweep:"
+    print(prefix, " ".join("; ".join([message, *notes]).split()), file=sys.stderr)
     return status
+
+
+def _is_coloured(stream: Any) -> bool:
+    return stream.isatty() and "NO_COLOR" not in os.environ and os.environ.get("TERM") != "dumb"
+
+
+class _Words(logging.Formatter):
+    """What is told besides results: one line each, warnings in colour on a terminal."""
+
+    def __init__(self, coloured: bool):
+        super().__init__("ringsweep: %(message)s")
+        self.coloured = coloured
+
+    def format(self, record: logging.LogRecord) -> str:
+        text = super().format(record)
+        if self.coloured and record.levelno >= logging.WARNING:
+            return text.replace("ringsweep:", "\033[33mringsweep:\033[0m", 1)
+        return text
+
+
+# ---- what can be asked -----------------------------------------------------------------------
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="ringsweep", description="Regime maps of dry-friction systems whose friction coefficient jumps."
+        prog="ringsweep",
+        description="Regime maps of dry-friction systems whose friction coefficient jumps.",
+        epilog="ringsweep COMMAND --help tells more, with examples.",
+        formatter_class=_formatter,
     )
+    parser.add_argument("--version", action=_Version)
     verbs = parser.add_subparsers(required=True, metavar="COMMAND")
 
-    run = verbs.add_parser("run", help="run a sweep: NetCDF, and a regime map beside it")
-    run.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose sweep is repeated")
+    init = _verb(verbs, "init", _init, "write a configuration to start from", """
+        ringsweep init                     my-sweep.yaml: two balls in a ring
+        ringsweep init --model belt belt.yaml
+        """)  # fmt: skip
+    init.add_argument("config", nargs="?", default="my-sweep.yaml", metavar="NEW.yaml", help="default: my-sweep.yaml")
+    init.add_argument("--model", choices=["ring", "belt"], default="ring", help="what it describes (default: ring)")
+
+    run = _verb(verbs, "run", _run, "run a sweep: NetCDF, and a regime map beside it", """
+        ringsweep run my.yaml              my.nc and my.png; the same again goes on after a stop
+        ringsweep run my.yaml --jobs 1 -o results/one.nc
+        ringsweep run finer.yaml --reuse my.nc
+        ringsweep run my.nc -o again.nc    the sweep that my.nc holds
+        ringsweep run my.yaml --backend dask --scheduler tcp://host:8786
+        """)  # fmt: skip
+    _config(run, "CONFIG.yaml", "or OUT.nc, whose sweep is repeated")
     run.add_argument("-o", "--output", metavar="OUT.nc", help="default: the configuration's name, in this folder")
     run.add_argument("--jobs", type=whole_number, metavar="N", help="threads (default: all cores)")
     run.add_argument("--fresh", action="store_true", help="start over: discard what an earlier run has left")
     run.add_argument("--reuse", metavar="OLD.nc", help="take the cells that it shares with this earlier sweep")
     run.add_argument("--backend", choices=["threads", "dask"], help="who computes (default: threads of this machine)")
     run.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers compute, as tcp://host:8786")
-    run.set_defaults(verb=_run)
 
-    draw = verbs.add_parser("map", help="draw a variable of a sweep")
+    draw = _verb(verbs, "map", _map, "draw a variable of a sweep", """
+        ringsweep map my.nc                my.png: the regimes
+        ringsweep map my.nc --var t_separation --x zone.half_angle
+        ringsweep map my.nc --sel "zone.half_angle=15 deg" -o line.pdf
+        """)  # fmt: skip
     draw.add_argument("dataset", metavar="OUT.nc")
-    draw.add_argument("-o", "--output", metavar="MAP.png", help="default: beside OUT.nc")
+    draw.add_argument("-o", "--output", metavar="MAP.png", help="default: beside OUT.nc; .pdf and .svg too")
     draw.add_argument("--x", metavar="DIM", help="coordinate across")
     draw.add_argument("--y", metavar="DIM", help="coordinate up")
     draw.add_argument("--var", default="regime", metavar="V", help="variable to draw (default: regime)")
     draw.add_argument(
         "--sel", action="append", default=[], metavar="DIM=VALUE", help="hold at the nearest value; units allowed"
     )
-    draw.set_defaults(verb=_map)
 
-    simulate = verbs.add_parser("simulate", help="run once, or under each law of a sweep: history and a picture of it")
-    simulate.add_argument("config", metavar="CONFIG.yaml")
+    simulate = _verb(verbs, "simulate", _simulate,
+        "run once, or under each law of a sweep: history and a picture of it", """
+        ringsweep simulate my.yaml         my-run.nc and my-run.png
+        ringsweep simulate my.yaml --set drive.amplitude=4 --set "zone.half_angle=20 deg"
+        ringsweep simulate my.nc --set drive.amplitude=4     a cell of the sweep that my.nc holds
+        """)  # fmt: skip
+    _config(simulate, "CONFIG.yaml", "or OUT.nc, whose scene is run")
     simulate.add_argument("-o", "--output", metavar="RUN.nc", help="default: the configuration's name with -run")
-    simulate.add_argument(
-        "--set", action="append", default=[], metavar="PATH=VALUE", help="change a value, as drive.amplitude=3"
-    )
-    simulate.set_defaults(verb=_simulate)
+    _settings(simulate)
 
-    precision = verbs.add_parser("precision", help="error against run time for this scene, and the cheapest solver")
-    precision.add_argument("config", metavar="CONFIG.yaml")
+    precision = _verb(verbs, "precision", _precision,
+        "error against run time for this scene, and the cheapest solver", """
+        ringsweep precision my.yaml
+        ringsweep precision my.yaml --target 1e-9 --cells 64
+        """)  # fmt: skip
+    _config(precision, "CONFIG.yaml", "or OUT.nc, whose sweep is taken")
     precision.add_argument("-o", "--output", metavar="OUT.nc", help="default: the configuration's name with -precision")
     precision.add_argument(
         "--target",
@@ -88,14 +148,66 @@ def _parser() -> argparse.ArgumentParser:
     )
     precision.add_argument("--cells", type=whole_number, metavar="N", help="cells to draw from the sweep (default: 16)")
     precision.add_argument("--rounds", type=whole_number, metavar="N", help="timings of each setting (default: 3)")
-    precision.set_defaults(verb=_precision)
 
-    info = verbs.add_parser("info", help="tell what a result file holds")
+    info = _verb(verbs, "info", _info, "tell what a result file holds", "ringsweep info my.nc")
     info.add_argument("dataset", metavar="OUT.nc")
-    info.set_defaults(verb=_info)
 
-    verbs.add_parser("schema", help="print the JSON schema of the configuration").set_defaults(verb=_schema)
+    _verb(verbs, "schema", _schema, "print the JSON schema of the configuration, for editors", """
+        ringsweep schema > schema.json
+        Editors that know YAML's language server then check what begins with
+            # yaml-language-server: $schema=schema.json
+        """)  # fmt: skip
+
+    completion = _verb(verbs, "completion", _completion, "print what lets a shell complete these commands", """
+        ringsweep completion bash > ~/.local/share/bash-completion/completions/ringsweep
+        ringsweep completion zsh > ~/.zfunc/_ringsweep
+        """)  # fmt: skip
+    completion.add_argument("shell", choices=["bash", "zsh", "tcsh"])
     return parser
+
+
+def _verb(verbs: Any, name: str, function: Any, words: str, examples: str) -> argparse.ArgumentParser:
+    """A command with what all have in common."""
+    parser: argparse.ArgumentParser = verbs.add_parser(
+        name,
+        help=words,
+        description=f"{words[0].upper()}{words[1:]}.",
+        epilog="examples:\n" + indent(dedent(examples).strip(), "  "),
+        formatter_class=_formatter,
+    )
+    loudness = parser.add_mutually_exclusive_group()
+    loudness.add_argument("-q", "--quiet", action="store_true", help="tell only what is wrong")
+    loudness.add_argument("-v", "--verbose", action="store_true", help="tell more, and where an unexpected error arose")
+    parser.set_defaults(verb=function)
+    return parser
+
+
+def _formatter(prog: str) -> argparse.HelpFormatter:
+    return argparse.RawDescriptionHelpFormatter(
+        prog, max_help_position=28, width=min(shutil.get_terminal_size().columns - 2, 100)
+    )
+
+
+def _config(parser: argparse.ArgumentParser, metavar: str, words: str) -> None:
+    parser.add_argument("config", metavar=metavar, help=words)
+
+
+def _settings(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="PATH=VALUE", help="change a value, as drive.amplitude=3"
+    )
+
+
+class _Version(argparse.Action):
+    """Prints the version; it is looked up when asked for."""
+
+    def __init__(self, **options: Any):
+        super().__init__(**options, nargs=0, help="print the version")
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        from importlib.metadata import version
+
+        parser.exit(message=f"ringsweep {version('ringsweep')}\n")
 
 
 def whole_number(text: str) -> int:
@@ -113,6 +225,31 @@ def positive_number(text: str) -> float:
     raise argparse.ArgumentTypeError(f"{text!r} is not a number greater than 0")
 
 
+# ---- what is done ----------------------------------------------------------------------------
+
+
+def _init(arguments: argparse.Namespace) -> None:
+    from importlib.resources import files
+
+    target = Path(arguments.config)
+    if target.exists():
+        raise InputError(str(target), "is there already: name another file")
+    if target.suffix not in (".yaml", ".yml"):
+        raise InputError(str(target), "is no name for a configuration: name it *.yaml")
+    text = (files("ringsweep") / "templates" / f"{arguments.model}.yaml").read_text(encoding="utf-8")
+    try:
+        target.write_text(text.replace("{name}", str(target)), encoding="utf-8")
+    except OSError as error:
+        raise InputError(str(target), f"cannot be written: {error.strerror or error}") from error
+    print(f"wrote {target}; next: ringsweep run {target}")
+
+
+def _completion(arguments: argparse.Namespace) -> None:
+    import shtab
+
+    print(shtab.complete(_parser(), arguments.shell))
+
+
 def _run(arguments: argparse.Namespace) -> None:
     from ringsweep.config import load
 
@@ -127,7 +264,7 @@ def _run(arguments: argparse.Namespace) -> None:
     from ringsweep.engine import write
 
     options = {name: getattr(arguments, name) for name in ("jobs", "fresh", "reuse", "scheduler")}
-    if write(config, target, **options):
+    if write(config, target, **options, progress=not arguments.quiet):
         print(f"wrote {target}")
     else:
         print(f"{target} holds this sweep already (--fresh runs it again)")
@@ -185,7 +322,8 @@ def _precision(arguments: argparse.Namespace) -> None:
     from ringsweep.work import measure, report
 
     given = {name: getattr(arguments, name) for name in ("target", "cells", "rounds")}
-    result = measure(config, **{name: value for name, value in given.items() if value is not None})
+    options = {name: value for name, value in given.items() if value is not None}
+    result = measure(config, **options, progress=not arguments.quiet)
     storage.save(result, target)
     plots.save(plots.work_precision(result), picture)
     print(report(result))

@@ -290,6 +290,8 @@ def _fill(
                     changes = differences(environment(), finished.environment)
                     raise InputError("--scheduler", f"a worker has other versions than this process: {changes}")
                 kept.put(finished.positions, finished.columns, finished.processor)
+                cost = "kernels were being compiled" if finished.seconds is None else f"{finished.seconds:.3g} s"
+                logger.debug("a chunk of %d cells: %s", len(finished.positions), cost)
                 if finished.seconds is not None:
                     pace.learn(len(finished.positions), finished.seconds)
                 bar.update(len(finished.positions))

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import logging
 import pickle
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,8 @@ import numba
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, overload, register_jitable
+
+logger = logging.getLogger("ringsweep")
 
 # Contraction to fused multiply-add is the only liberty taken with IEEE arithmetic: "nnan" and
 # "ninf" would delete the checks by which a run is flagged as failed, and "reassoc" would undo the
@@ -63,7 +67,21 @@ def kernel(function: Callable[..., Any]) -> Any:
             return {}
 
     index._load_index = load_index
+    load_overload = dispatcher._cache.load_overload
+
+    def load_or_tell(*arguments: Any) -> Any:
+        found = load_overload(*arguments)
+        if found is None:
+            _tell_of_compilation()
+        return found
+
+    dispatcher._cache.load_overload = load_or_tell
     return dispatcher
+
+
+@cache
+def _tell_of_compilation() -> None:
+    logger.info("compiling for a kind of scene that is new here: some ten to twenty seconds, once")
 
 
 def inlined(function: Callable[..., Any]) -> Any:
