@@ -1,12 +1,19 @@
 """The command line where it meets wrong input: one message, status 2, nothing left behind."""
 
 import json
+import re
+import shlex
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+from jsonschema import Draft202012Validator
 
+from ringsweep import cli
 from ringsweep.cli import main
+from ringsweep.config import load
+from ringsweep.schema import schema
 
 TEXT = """\
 scene:
@@ -143,6 +150,63 @@ def test_any_other_end_is_told_in_one_line(monkeypatch, capsys, error, status, m
 def test_the_schema_is_printed_as_json(capsys):
     assert main(["schema"]) == 0
     assert json.loads(capsys.readouterr().out)["title"] == "ringsweep configuration"
+
+
+CONFIGS = Path(__file__).parents[1] / "configs"
+
+
+def test_the_schema_that_editors_use_is_current():
+    """After a change: ringsweep schema > configs/schema.json."""
+    assert json.loads((CONFIGS / "schema.json").read_text()) == json.loads(json.dumps(schema()))
+
+
+@pytest.mark.parametrize("path", sorted(CONFIGS.rglob("*.yaml")), ids=lambda path: path.stem)
+def test_every_configuration_names_it_on_its_first_line(path):
+    first = path.read_text().splitlines()[0]
+    assert (path.parent / first.removeprefix("# yaml-language-server: $schema=")).resolve() == CONFIGS / "schema.json"
+
+
+@pytest.mark.parametrize("model", ["ring", "belt"])
+def test_a_new_configuration_is_valid_and_replaces_nothing(folder, capsys, model):
+    assert main(["init", "--model", model]) == 0
+    config = load("my-sweep.yaml")
+    assert config.scene.structure.model == model
+    assert len(config.axes.sizes) == 2
+    Draft202012Validator(schema()).validate(config.source)
+    capsys.readouterr()
+    assert "is there already" in refused(capsys, "init", "--model", model)
+    assert "*.yaml" in refused(capsys, "init", "sweep.txt")
+    assert "cannot be written" in refused(capsys, "init", "nowhere/a.yaml")
+
+
+def test_every_command_shows_examples_that_parse(capsys):
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    verbs = re.findall(r"^    (\w+)", capsys.readouterr().out, re.M)
+    assert {"init", "run", "map", "simulate", "precision", "info", "schema", "completion"} <= set(verbs)
+    for verb in verbs:
+        with pytest.raises(SystemExit):
+            main([verb, "--help"])
+        examples = re.findall(r"^  ringsweep (.+)$", capsys.readouterr().out, re.M)
+        assert examples
+        for example in examples:
+            words = shlex.split(re.split(r"  +| >", example)[0])
+            assert words[0] == verb
+            cli._parser().parse_args(words)
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "tcsh"])
+def test_completion_knows_every_command(capsys, shell):
+    assert main(["completion", shell]) == 0
+    printed = capsys.readouterr().out
+    assert "simulate" in printed
+    assert "precision" in printed
+
+
+def test_quiet_leaves_only_what_is_wrong(folder, capsys):
+    assert main(["init", "-q"]) == 0
+    assert capsys.readouterr() == ("", "")
+    assert "is there already" in refused(capsys, "init", "-q")
 
 
 def test_help_comes_without_the_weight_of_solvers():

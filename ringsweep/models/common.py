@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from ringsweep.jit import absorbed
 from ringsweep.lanes import select, square_root
@@ -79,6 +78,9 @@ def drive_of(structure: Structure, values: Values) -> Any:
         values["time.span"],
         f"{{}} s is longer than the table of the drive, which ends at {times[-1]:.6g} s",
     )
+    # Few drives are tables, and this import takes longer than a small sweep.
+    from scipy.interpolate import CubicSpline
+
     # A spline of third degree is the smoothest that a few noisy samples bear, and is C2.
     pieces = np.ascontiguousarray(CubicSpline(times, angles).c.T)
     return drives.Table(
