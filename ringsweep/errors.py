@@ -14,6 +14,15 @@ class InputError(ValueError):
         What is wrong and what is allowed, with the value.
     file, line : str, int, optional
         Where it stands, if it came from a file.
+
+    Examples
+    --------
+    >>> import ringsweep
+    >>> try:
+    ...     ringsweep.run({"scene": {"model": "bealt"}})
+    ... except ringsweep.InputError as error:
+    ...     print(error.path, "|", error.problem)
+    scene.model | 'bealt' is not a model; did you mean `belt`? (known: ring, ring-single-contact, belt)
     """
 
     def __init__(self, path: str, problem: str, *, file: str | None = None, line: int | None = None):

@@ -52,6 +52,23 @@ def simulate(
     ------
     InputError
         If scene or solver are wrong.
+
+    Examples
+    --------
+    >>> import ringsweep
+    >>> scene = {
+    ...     "model": "belt",
+    ...     "body": {"mass": 1.0},
+    ...     "spring": {"stiffness": 2.0},
+    ...     "belt": {"velocity": 0.1},
+    ...     "friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.1},
+    ...     "time": {"span": 60.0},
+    ... }
+    >>> run = ringsweep.simulate(scene)
+    >>> run.attrs["outcome"]
+    'stick-slip, t = 60 s'
+    >>> run.x.max().round(6).item()
+    0.74574
     """
     return history(_alone(scene, solver), samples=samples)
 

@@ -104,6 +104,21 @@ def precision(
     InputError
         If the configuration is wrong, sweeps over several friction laws, or has no cell in which the
         two tightest runs agree about the regime; or if another argument is out of range.
+
+    Examples
+    --------
+    >>> import ringsweep
+    >>> scene = {
+    ...     "model": "belt",
+    ...     "body": {"mass": 1.0},
+    ...     "spring": {"stiffness": 2.0},
+    ...     "belt": {"velocity": 0.1},
+    ...     "friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.1},
+    ...     "time": {"span": 20.0},
+    ... }
+    >>> found = ringsweep.precision({"scene": scene, "solver": "event"}, target=1e-3, cells=1, rounds=1)
+    >>> found.attrs["recommended"].startswith("method: ")
+    True
     """
     return measure(load(config), target=target, cells=cells, rounds=rounds, progress=progress)
 

@@ -1,0 +1,43 @@
+"""What the docstrings show is what happens, and the reference is built from them without a warning."""
+
+import doctest
+import importlib.util
+import inspect
+from pathlib import Path
+
+import pytest
+
+import ringsweep
+from ringsweep import plots
+
+ROOT = Path(__file__).parents[1]
+PUBLIC = {
+    f"{module.__name__}.{name}": getattr(module, name)
+    for module in (ringsweep, plots)
+    for name in getattr(module, "__all__", [])
+}
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_every_public_name_has_an_example_that_holds(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (test,) = doctest.DocTestFinder(recurse=False).find(PUBLIC[name], name, globs={})
+    assert test.examples
+    report: list[str] = []
+    assert doctest.DocTestRunner().run(test, out=report.append).failed == 0, "".join(report)
+
+
+def test_every_public_name_tells_what_it_takes():
+    for name, function in PUBLIC.items():
+        for parameter in inspect.signature(function).parameters:
+            assert parameter in (function.__doc__ or ""), f"{name}: {parameter}"
+
+
+def test_the_reference_is_built_without_a_warning(tmp_path):
+    spec = importlib.util.spec_from_file_location("api", ROOT / "docs" / "api.py")
+    api = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(api)
+    api.build(tmp_path)
+    page = (tmp_path / "ringsweep.html").read_text()
+    for name in ringsweep.__all__:
+        assert f'id="{name}"' in page
