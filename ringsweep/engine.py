@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
 from ringsweep import storage
-from ringsweep.cells import Chunk
+from ringsweep.cells import Chunk, Finished
 from ringsweep.chunks import Chunks, Columns, owned
 from ringsweep.config import Axes, Config, load, read_axes, read_scene, read_solver, sweepable
 from ringsweep.errors import InputError
@@ -309,6 +309,8 @@ def _fill(
     if not left:
         return
     task = Chunk(config, layout)
+    pace: Pace[Finished]
+    results: Iterator[Finished]
     with ExitStack() as stack:
         stopped = stack.enter_context(_stop_on_interrupt())
         if scheduler is None:
@@ -316,7 +318,8 @@ def _fill(
             pace = Pace(config.solver.side_by_side, lambda: threads)
             chunks = chunks_of(kept.done, left, pace, stopped)
             parallel = joblib.Parallel(n_jobs=threads, prefer="threads", return_as="generator_unordered")
-            results = parallel(joblib.delayed(task)(chunk) for chunk in chunks)
+            # What a chunk has cost is known before joblib hands it over, which it does in ticks.
+            results = parallel(joblib.delayed(lambda chunk: pace.learn(task(chunk)))(chunk) for chunk in chunks)
         else:
             try:
                 from ringsweep import remote
@@ -325,7 +328,7 @@ def _fill(
             client = stack.enter_context(remote.connect(scheduler))
             pace = Pace(config.solver.side_by_side, lambda: remote.threads(client))
             chunks = chunks_of(kept.done, left, pace, stopped)
-            results = remote.compute(task, chunks, secrets.token_hex(8), client)
+            results = map(pace.learn, remote.compute(task, chunks, secrets.token_hex(8), client))
         bar = stack.enter_context(progress_bar(layout.total, progress, layout.total - left))
         try:
             for finished in results:
@@ -333,10 +336,6 @@ def _fill(
                     changes = differences(environment(), finished.environment)
                     raise InputError("--scheduler", f"a worker has other versions than this process: {changes}")
                 kept.put(finished.positions, finished.columns, finished.processor)
-                cost = "kernels were being compiled" if finished.seconds is None else f"{finished.seconds:.3g} s"
-                logger.debug("a chunk of %d cells: %s", len(finished.positions), cost)
-                if finished.seconds is not None:
-                    pace.learn(len(finished.positions), finished.seconds)
                 bar.update(len(finished.positions))
         finally:
             # Chunks under way cannot be interrupted; nobody is to wait for what comes after them.

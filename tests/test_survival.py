@@ -107,13 +107,13 @@ class TestGoingOn:
         assert 0 < len(computed) < 72
 
     def test_a_stop_tells_how_to_go_on(self, config, tmp_path, monkeypatch, capsys, caplog, small_chunks):
-        learn = Pace.learn
+        put = Chunks.put
 
         def interrupted(*arguments):
-            learn(*arguments)
+            put(*arguments)
             signal.raise_signal(signal.SIGINT)
 
-        monkeypatch.setattr(Pace, "learn", interrupted)
+        monkeypatch.setattr(Chunks, "put", interrupted)
         assert cli.main(["run", str(config), "-o", str(tmp_path / "out.nc")]) == 130
         message = capsys.readouterr().err
         assert message.count("\n") == 1
