@@ -148,12 +148,16 @@ class Chunks:
     def put(self, positions: NDArray[np.integer], columns: Columns, processor: str) -> None:
         """Keep the columns of the cells at these positions, which ascend."""
         path = self.folder / f"{self.key[:12]}-{positions[0]:010d}-{len(positions)}.npz"
+        # One array of all columns: each member of an archive takes longer to write than a few hundred cells.
+        cells = np.empty(len(positions), dtype=[(name, column.dtype) for name, column in columns.items()])
+        for name, column in columns.items():
+            cells[name] = column
         members = {
             "key": np.array(self.key),
             "processor": np.array(processor),
             "positions": positions.astype(np.uint32),
         }
-        _durably(path, lambda file: np.savez(file, allow_pickle=False, **members, **columns))
+        _durably(path, lambda file: np.savez(file, allow_pickle=False, cells=cells, **members))
         self.processors.add(processor)
         self.done[positions] = True
         self.files[path] = int(positions[0]), int(positions[-1])
@@ -174,8 +178,9 @@ class Chunks:
             raise Damaged(f"{path} is damaged ({' '.join(str(problem).split())})") from problem
         if str(found.pop("key", "")) != self.key:
             raise Damaged(f"{path} is not of this sweep")
-        self.processors.add(str(found.pop("processor")))
-        return found.pop("positions").astype(np.intp), found
+        self.processors.add(str(found["processor"]))
+        cells = found["cells"]
+        return found["positions"].astype(np.intp), {name: cells[name] for name in cells.dtype.names}
 
     def bricks(self) -> Iterator[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]]:
         """Place of every brick in the grid, in order, and its columns in the shape of that place."""

@@ -37,7 +37,7 @@ class Pace(Generic[Measured]):
     waits long for another.
     """
 
-    shortest, longest, last = 0.03, 2.0, 0.01
+    shortest, longest, last = 0.1, 2.0, 0.02
     most = BRICK
 
     def __init__(self, side_by_side: int, workers: Callable[[], int]):

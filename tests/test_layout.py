@@ -67,7 +67,7 @@ class TestPace:
         pace = Pace(1, lambda: 2)
         assert pace.next(10**9) == 1
         pace.learn(Took(100, 0.1))
-        assert pace.next(10**9) == 30
+        assert pace.next(10**9) == 100
         pace.learn(Took(99_000, 99.0))
         assert pace.next(10**9) == pytest.approx(1000, rel=0.02)
         pace.learn(Took(10**6, 1e3))

@@ -167,7 +167,7 @@ class TestNeverMixed:
                 shutil.copy(next(iter(others.files)), path)
         else:
             with np.load(path) as members:
-                inside = content.index(members["phi_end"].tobytes())
+                inside = content.index(members["cells"].tobytes())
             content[inside] ^= 4
             cut = {"truncated": content[:-200], "empty": b"", "one bit": content, "no archive": b"regime"}
             path.write_bytes(cut[damage])
