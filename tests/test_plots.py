@@ -438,7 +438,7 @@ class TestWorkPrecision:
     def test_axes_that_are_given_are_drawn_in(self):
         figure = Figure()
         _, right = figure.subplots(1, 2)
-        assert plots.work_precision(make_work(), ax=right) is figure
+        assert plots.precision_panel(make_work(), ax=right) is right
         assert right.lines
 
     def test_other_datasets_and_unknown_errors_are_refused(self):
