@@ -45,7 +45,7 @@ _APART = 0.05
 _COLUMNS = 4000
 
 # Quantities that share a panel.
-_TOGETHER = (("omega", "ring_omega"), ("normal_1", "normal_2"))
+TOGETHER = (("omega", "ring_omega"), ("normal_1", "normal_2"))
 
 
 def history(ds: xr.Dataset) -> Figure:
@@ -127,8 +127,8 @@ def history_panel(ds: xr.Dataset, var: str = "phi", ax: Axes | None = None) -> A
         _draw_laws(ax, ds, [var])
         beside(ax, handlelength=4)
     else:
-        together = next((pair for pair in _TOGETHER if var in pair), (var,))
-        _draw_history(ax, ds, [name for name in together if name in ds], told=True)
+        together = next((pair for pair in TOGETHER if var in pair), (var,))
+        draw_panel(ax, ds, [name for name in together if name in ds], told=True)
     ax.set_xlabel(label_of(ds["time"], ds))
     return ax
 
@@ -148,7 +148,7 @@ def draw_history(figure: Figure | SubFigure, ds: xr.Dataset) -> None:
         ax.sharex(timed[0])
     for ax in timed[:-1]:
         ax.tick_params(labelbottom=False)
-    draw = _draw_laws if compared else _draw_history
+    draw = _draw_laws if compared else draw_panel
     for ax, names in zip(axes, panels, strict=False):
         draw(ax, ds, names)
     if zones:
@@ -185,7 +185,7 @@ def _panels(ds: xr.Dataset) -> list[list[str]]:
         return [["x"], ["velocity"], ["friction_force"]]
     if "friction_law" in ds.dims:
         return [[name] for name in ("phi", "omega", "epsilon", "normal_1", "normal_2") if name in ds]
-    panels: list[tuple[str, ...]] = [("phi",), _TOGETHER[0], ("epsilon",), _TOGETHER[1]]
+    panels: list[tuple[str, ...]] = [("phi",), TOGETHER[0], ("epsilon",), TOGETHER[1]]
     return [[name for name in panel if name in ds] for panel in panels]
 
 
@@ -199,7 +199,8 @@ def _heights(ds: xr.Dataset) -> list[float]:
     return [1.0] * (len(_panels(ds)) + ("phi" not in ds)) + [0.13 * zones] * bool(zones)
 
 
-def _draw_history(axes: Axes, ds: xr.Dataset, names: list[str], told: bool = False) -> None:
+def draw_panel(axes: Axes, ds: xr.Dataset, names: list[str], told: bool = False) -> None:
+    """Draw quantities of one run in one panel; the first of several tells what the shading is, others if `told`."""
     time = ds["time"].values
     # One panel explains the shading for all.
     first = told or names[0] in ("phi", "x")
@@ -333,4 +334,5 @@ def _symbol(ds: xr.Dataset, names: list[str]) -> str:
         "velocity": "velocity",
         "friction_force": "friction force",
     }
-    return f"{short.get(names[0], long_name(ds[names[0]]))}\n({units_of(ds[names[0]], 'rad')})"
+    name, units = short.get(names[0], long_name(ds[names[0]])), units_of(ds[names[0]], "rad")
+    return f"{name}\n({units})" if units else name

@@ -89,7 +89,7 @@ def regime_map(
     >>> regime_map(ds, var="phi_max").axes[0].get_ylabel()
     'angle (°)'
     """
-    found = _Map.of(ds, x, y, var, sel or {})
+    found = Map.of(ds, x, y, var, sel or {})
     panels, up = found.panels, found.up
     columns = found.columns
     rows = math.ceil(len(panels) / columns)
@@ -169,14 +169,14 @@ def map_panel(
     >>> map_panel(ds, var="phi_max", ax=Figure().add_subplot()).get_ylabel()
     'phi_max (rad)'
     """
-    found = _Map.of(ds, x, y, var, sel or {})
+    found = Map.of(ds, x, y, var, sel or {})
     ax = axes_or_current(ax, (7.6, 4.8))
     found.draw_alone(ax)
     return ax
 
 
 @dataclass(frozen=True)
-class _Map:
+class Map:
     """A map before it is drawn: what is painted, along which axes, in which panels.
 
     `ds` is the dataset with what is held taken out; `picks` are the places along its dimensions that are drawn.
@@ -195,7 +195,7 @@ class _Map:
     title: str
 
     @classmethod
-    def of(cls, ds: xr.Dataset, x: str | None, y: str | None, var: str, sel: Mapping[str, float | str]) -> _Map:
+    def of(cls, ds: xr.Dataset, x: str | None, y: str | None, var: str, sel: Mapping[str, float | str]) -> Map:
         if "time" in ds.dims:
             raise InputError("ds", "is the time history of one run, not a sweep; draw it with history")
         if "contender" in ds.dims:
@@ -286,21 +286,27 @@ class _Map:
         bar = ScalarMappable(self.field.norm, self.field.colours)
         panels[0].figure.colorbar(bar, ax=panels, label=label_of(self.ds[self.var], self.ds))
 
-    def place(self, axes: Axes, x: float, y: float) -> dict[str, int]:
-        """Where in `ds` the cell lies that is drawn at a point of the only panel."""
+    def cell_at(self, axes: Axes, x: float, y: float) -> xr.Dataset:
+        """The cell that is drawn at a point of the only panel."""
         if self.scattered and self.up is not None:
             drawn = np.column_stack([_spread(self.across, self.data), _spread(self.up, self.data)])
             # What looks nearest is meant, whatever the scales of the axes.
             away = axes.transData.transform(drawn) - axes.transData.transform([(x, y)])
             found = np.unravel_index(int(np.nanargmin((away**2).sum(axis=1))), self.data.shape)
-            return {str(dim): int(k) for dim, k in zip(self.data.dims, found, strict=True)}
+            return self.ds.isel(dict(zip(self.data.dims, map(int, found), strict=True)))
         place = {}
         for axis, at in ((self.across, x), (self.up, y)):
             if axis is not None:
                 k = int(axis.order[np.searchsorted(axis.edges[1:-1], at)])
                 (dim,) = axis.dims
                 place[dim] = int(self.picks[dim][k]) if dim in self.picks else k
-        return place
+        return self.ds.isel(place)
+
+    def position(self, one: xr.Dataset) -> tuple[float, float]:
+        """Where in the only panel a single cell is drawn."""
+        if self.up:
+            return self.across.shown(one), self.up.shown(one)
+        return self.across.shown(one), 0.5 if self.field.meanings else float(one[self.var])
 
 
 @dataclass(frozen=True)
@@ -342,6 +348,11 @@ class _Axis:
         middles = (at[1:] + at[:-1]) / 2
         edges = np.concatenate([[2 * at[0] - middles[0]], middles, [2 * at[-1] - middles[-1]]])
         return np.exp(edges) if self.scale == "log" else edges
+
+    def shown(self, one: xr.Dataset) -> float:
+        """Where along the axis a dataset of a single cell lies."""
+        value = one[self.name]
+        return float(self.categories.index(str(value.item()))) if self.categories else value.item() * factor(value)
 
     def dress(self, set_scale: Any, ticks: Any) -> None:
         set_scale(self.scale)
