@@ -98,14 +98,14 @@ def save_animation(ds: xr.Dataset, path: str | os.PathLike[str], *, fps: float =
     Traceback (most recent call last):
     ringsweep.errors.InputError: fig29.mp3: animations end in .mp4, .gif, .html, not in '.mp3'
     """
-    check_film(path)
+    check_animation(path)
     film = _Film(ds, fps, duration)
     kind = Path(path).suffix.lower()
     with storage.replacing(path) as temporary, film.painted():
         film.animation().save(temporary, writer=_writer(kind, fps), dpi=_DPI)
 
 
-def check_film(path: str | os.PathLike[str]) -> None:
+def check_animation(path: str | os.PathLike[str]) -> None:
     """Make sure that an animation can be written to `path`, before a run is made for it.
 
     Raises
@@ -163,7 +163,8 @@ class _Film:
         left, right = parts
         self.stage = Stage(run, Rig.of(ds))
         self.stage.build(left.add_subplot())
-        left.legend(handles=self.stage.legend(), loc="outside lower center", ncols=3, fontsize=SMALL, frameon=False)
+        look: dict[str, Any] = {"ncols": 3, "fontsize": SMALL, "frameon": False, "columnspacing": 1}
+        left.legend(handles=self.stage.legend(), loc="outside lower center", **look)
         panels = list(right.subplots(3, 1, sharex=True))
         for panel, names in zip(panels, (["phi"], *map(list, TOGETHER)), strict=True):
             draw_panel(panel, run, [name for name in names if name in run])
@@ -242,7 +243,19 @@ class _Frames(AbstractMovieWriter):
         if self.frames:
             self.frames.append(frame.quantize(palette=self.frames[0], dither=Image.Dither.NONE))
         else:
-            self.frames.append(frame.quantize(128, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE))
+            self.frames.append(_few_colours(frame))
+
+
+def _few_colours(frame: Image.Image) -> Image.Image:
+    """A picture with a palette, in which the ground is as it was."""
+    few = frame.quantize(256, dither=Image.Dither.NONE)
+    # Pillow finds the entries of a given palette only about: a white page would come out grey.
+    few = frame.quantize(palette=few, dither=Image.Dither.NONE)
+    palette, ground = few.getpalette(), few.getpixel((0, 0))
+    if palette is not None and isinstance(ground, int):
+        palette[3 * ground : 3 * ground + 3] = np.asarray(frame)[0, 0].tolist()
+        few.putpalette(palette)
+    return few
 
 
 class _Gif(_Frames):

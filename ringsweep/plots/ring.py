@@ -253,7 +253,7 @@ class Stage:
         # Metres of arrow to a newton; frictions, which are small beside reactions, are magnified by a round factor.
         self.scale = 0.75 * rig.radius / self.reference
         friction = _reference([np.abs(run[f"friction_{k}"].values) for k in rig.contacts], 0.0)
-        self.magnified = max(1.0, _round(1.2 * self.reference / friction)) if friction else 1.0
+        self.magnified = max(1.0, float(f"{1.5 * self.reference / friction:.0e}")) if friction else 1.0
 
     def build(self, ax: Axes) -> None:
         """Make the artists; what does not move is in its place already."""
@@ -276,10 +276,11 @@ class Stage:
         for _ in rig.contacts:
             ball = Circle((0.0, 0.0), rig.ball, facecolor="0.85", edgecolor="0.2", linewidth=1.2, zorder=4)
             self.balls.append(ball)
-        # A body on one contact has nothing to number, nor room for it.
-        self.numbers = [
-            ax.text(0.0, 0.0, str(k), ha="center", va="center", fontsize=SMALL, zorder=5) for k in rig.contacts
-        ]
+        for patch in (*self.arcs, self.notch, *self.balls):
+            ax.add_patch(patch)
+        # A single contact needs no number.
+        words = [str(k) if len(rig.contacts) > 1 else "" for k in rig.contacts]
+        self.numbers = [ax.text(0.0, 0.0, word, ha="center", va="center", fontsize=SMALL, zorder=5) for word in words]
         (self.centre,) = ax.plot([], [], marker="o", markersize=4, color="black", linestyle="", zorder=5)
         colours = [PAIR_COLOURS[k - 1] for k in rig.contacts]
         self.reactions = self._arrows(colours, 0.032)
@@ -339,7 +340,7 @@ class Stage:
         entries.append(Patch(facecolor=REST, edgecolor="0.3", label="rest"))
         for c in self.rig.contacts:
             words = f" at {c}" if len(self.rig.contacts) > 1 else ""
-            enlarged = f" (enlarged {self.magnified:g} times)" if self.magnified > 1.0 else ""
+            enlarged = f", {self.magnified:g}:1" if self.magnified > 1.0 else ""
             for label, width in (("reaction" + words, 3.5), ("friction" + words + enlarged, 1.6)):
                 entries.append(Line2D([], [], color=PAIR_COLOURS[c - 1], linewidth=width, label=label))
         entries.append(Line2D([], [], color="black", linewidth=1.6, label="weight"))
