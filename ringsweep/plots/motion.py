@@ -247,14 +247,12 @@ class _Frames(AbstractMovieWriter):
 
 
 def _few_colours(frame: Image.Image) -> Image.Image:
-    """A picture with a palette, in which the ground is as it was."""
+    """A picture with a palette in which nothing is nearly, but not quite, of the colour of the ground."""
     few = frame.quantize(256, dither=Image.Dither.NONE)
+    palette, ground = np.reshape(few.getpalette() or [], (-1, 3)), np.asarray(frame)[0, 0]
     # Pillow finds the entries of a given palette only about: a white page would come out grey.
-    few = frame.quantize(palette=few, dither=Image.Dither.NONE)
-    palette, ground = few.getpalette(), few.getpixel((0, 0))
-    if palette is not None and isinstance(ground, int):
-        palette[3 * ground : 3 * ground + 3] = np.asarray(frame)[0, 0].tolist()
-        few.putpalette(palette)
+    palette[np.abs(palette - ground.astype(int)).max(axis=1) < 8] = ground
+    few.putpalette(palette.ravel().tolist())
     return few
 
 
