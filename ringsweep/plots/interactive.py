@@ -45,8 +45,9 @@ def cell(ds: xr.Dataset, sel: Mapping[str, float | str] | None = None) -> dict[s
 
     Examples
     --------
-    >>> import ringsweep, yaml
-    >>> scene = yaml.safe_load(open("configs/regime_map.yaml"))["scene"]
+    >>> import ringsweep
+    >>> from ringsweep.config import load
+    >>> scene = load("ringsweep/templates/ring.yaml").source["scene"]
     >>> maps = ringsweep.sweep(scene, {"drive.amplitude": [1.0, 2.0], "zone.half_angle": ["10 deg", "20 deg"]})
     >>> cell(maps, {"drive.amplitude": 1.9, "zone.half_angle": 0.2})["scene"]["drive"]
     {'amplitude': 2.0, 'law': 'arctan'}
@@ -101,8 +102,9 @@ def explore(
 
     Examples
     --------
-    >>> import ringsweep, yaml
-    >>> scene = yaml.safe_load(open("configs/regime_map.yaml"))["scene"]
+    >>> import ringsweep
+    >>> from ringsweep.config import load
+    >>> scene = load("ringsweep/templates/ring.yaml").source["scene"]
     >>> maps = ringsweep.sweep(scene, {"drive.amplitude": [1.0, 2.0], "zone.half_angle": ["10 deg", "20 deg"]})
     >>> figure = explore(maps, at={"drive.amplitude": 1.0})
     """

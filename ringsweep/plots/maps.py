@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path as Outline
+from matplotlib.ticker import LogFormatterSciNotation
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
@@ -41,6 +42,9 @@ _MOST_PANELS = 25
 
 # Cells along an axis that are drawn: more than the pixels of a printed page. Millions of others take gigabytes.
 _MOST_ACROSS = 1200
+
+# Letters in a line of a title.
+_WIDEST = 60
 
 
 def regime_map(
@@ -216,7 +220,8 @@ class Map:
         # A line shows its spikes, however many values it has.
         picks = {} if scattered or up is None else _picks([across, up], _MOST_ACROSS // _columns(panels))
         thin = ds.isel(picks)
-        words = [f"1 of {ds.sizes[dim] / len(pick):.0f} values of {dim} drawn" for dim, pick in picks.items()]
+        share = math.prod(ds.sizes[dim] / len(pick) for dim, pick in picks.items())
+        words = [f"1 cell in {share:.0f} drawn"] if picks else []
         return cls(
             ds,
             var,
@@ -228,7 +233,7 @@ class Map:
             panels,
             picks,
             entries,
-            "; ".join(filter(None, ["" if field.meanings is None and up else long_name(ds[var]), *held, *words])),
+            _lines(["" if field.meanings is None and up else long_name(ds[var]), *held, *words]),
         )
 
     @property
@@ -309,6 +314,13 @@ class Map:
         return self.across.shown(one), 0.5 if self.field.meanings else float(one[self.var])
 
 
+class _Plain(LogFormatterSciNotation):
+    """Plain numbers at the ticks of a logarithmic axis."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        return f"{x:g}" if super().__call__(x, pos) else ""
+
+
 @dataclass(frozen=True)
 class _Axis:
     """A coordinate as an axis: values as displayed, sorted where they span a grid."""
@@ -356,6 +368,9 @@ class _Axis:
 
     def dress(self, set_scale: Any, ticks: Any) -> None:
         set_scale(self.scale)
+        if self.scale == "log" and self.values[0] >= 1e-3 and self.values[-1] < 1e5:
+            ticks.set_major_formatter(_Plain())
+            ticks.set_minor_formatter(_Plain(labelOnlyBase=False))
         if self.categories:
             ticks.set_ticks(range(len(self.categories)), labels=self.categories)
 
@@ -408,6 +423,16 @@ class _Mark:
 
 def _columns(panels: list[tuple[str, dict[str, int]]]) -> int:
     return math.ceil(math.sqrt(len(panels)))
+
+
+def _lines(words: list[str]) -> str:
+    """Words parted by semicolons, in lines that are no wider than a map."""
+    lines = [""]
+    for word in filter(None, words):
+        if len(lines[-1]) + len(word) > _WIDEST and lines[-1]:
+            lines.append("")
+        lines[-1] += ("; " if lines[-1] else "") + word
+    return ";\n".join(lines)
 
 
 def _picks(axes: list[_Axis], most: int) -> dict[str, NDArray[np.intp]]:

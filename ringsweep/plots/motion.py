@@ -63,9 +63,9 @@ def animation(ds: xr.Dataset, *, fps: float = 25.0, duration: float = 10.0) -> F
     Examples
     --------
     >>> import ringsweep
-    >>> run = ringsweep.simulate("configs/paper/fig29.yaml")
-    >>> film = animation(run, duration=0.2)
-    >>> film.save("fig29.gif")  # doctest: +SKIP
+    >>> run = ringsweep.simulate("ringsweep/templates/ring.yaml")
+    >>> "<img" in animation(run, fps=5, duration=1).to_jshtml()
+    True
     """
     return _Film(ds, fps, duration).animation()
 
@@ -93,7 +93,7 @@ def save_animation(ds: xr.Dataset, path: str | os.PathLike[str], *, fps: float =
     Examples
     --------
     >>> import ringsweep
-    >>> run = ringsweep.simulate("configs/paper/fig29.yaml")
+    >>> run = ringsweep.simulate("ringsweep/templates/ring.yaml")
     >>> save_animation(run, "fig29.mp3")
     Traceback (most recent call last):
     ringsweep.errors.InputError: fig29.mp3: animations end in .mp4, .gif, .html, not in '.mp3'
