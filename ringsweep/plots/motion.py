@@ -94,9 +94,9 @@ def save_animation(ds: xr.Dataset, path: str | os.PathLike[str], *, fps: float =
     --------
     >>> import ringsweep
     >>> run = ringsweep.simulate("ringsweep/templates/ring.yaml")
-    >>> save_animation(run, "fig29.mp3")
+    >>> save_animation(run, "run.mp3")
     Traceback (most recent call last):
-    ringsweep.errors.InputError: fig29.mp3: animations end in .mp4, .gif, .html, not in '.mp3'
+    ringsweep.errors.InputError: run.mp3: animations end in .mp4, .gif, .html, not in '.mp3'
     """
     check_animation(path)
     film = _Film(ds, fps, duration)

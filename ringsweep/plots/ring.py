@@ -106,17 +106,16 @@ def phase_portrait(ds: xr.Dataset, frame: Literal["space", "ring"] = "space", ax
         ax.plot(*_laid(angle, run["ring_omega"].values, wrapped), **own)
     entries.append(Line2D([], [], **own, label="speed of the ring" + (", stick" if seen_from_ring else "")))
     mode = run["mode"].values
+    # A way that slip begins or ends is one of slip, however long it is.
+    way = np.where(mode[:-1] != 0, mode[:-1], mode[1:])
     for value, style in _MODE_LINES.items():
-        here = np.where(mode == value, 0.0, np.nan)
-        # A piece goes on to where the next begins.
-        here[1:] = np.where(mode[:-1] == value, 0.0, here[1:])
-        if np.isnan(here).all():
+        if not (mode == value).any():
             continue
-        ax.plot(*_laid(angle, speed + here, wrapped), **style)
+        ax.plot(*_laid(*_pieces(way == value, angle, speed), wrapped), **style)
         # Seen from the ring a stick is a point.
-        first = [i for i, _ in runs(mode == value)]
         dot: dict[str, Any] = {"marker": "o", "markersize": 3.5} if value == 0 else {}
         if dot:
+            first = [i for i, _ in runs(mode == value)]
             ax.plot(_turned(angle[first], wrapped), speed[first], color=style["color"], linestyle="", **dot)
         entries.append(Line2D([], [], **style, **dot, label=MODES[value].replace("_", " ")))
     for k, label, look in ((0, "start", {"markerfacecolor": "white"}), (-1, "end", {"markerfacecolor": "black"})):
@@ -429,6 +428,13 @@ def _laid(angle: NDArray[Any], speed: NDArray[Any], wrapped: bool) -> tuple[NDAr
     turns = np.floor((angle + 180.0) / 360.0)
     breaks = np.flatnonzero(np.diff(turns)) + 1
     return np.insert(_turned(angle, True), breaks, np.nan), np.insert(speed, breaks, np.nan)
+
+
+def _pieces(kept: NDArray[Any], angle: NDArray[Any], speed: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Of a curve the ways from one sample to the next that are kept, shape ``(samples - 1,)``, NaN between them."""
+    places = [np.append(np.arange(i, j + 1), -1) for i, j in runs(kept)]
+    index = np.concatenate([*places, np.array([-1])])
+    return np.where(index < 0, np.nan, angle[index]), np.where(index < 0, np.nan, speed[index])
 
 
 def _mark_arcs(ax: Axes, rig: Rig, angle: NDArray[Any], wrapped: bool) -> list[Artist]:
