@@ -7,7 +7,8 @@ from matplotlib.backend_bases import MouseEvent
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import ringsweep
-from ringsweep import plots
+from ringsweep import engine, plots
+from ringsweep.config import load
 from ringsweep.errors import InputError
 from ringsweep.variables import OUTCOMES, REGIMES
 
@@ -16,8 +17,8 @@ AXES = {"drive.amplitude": [0.5, 2.0, 8.0], "zone.half_angle": ["10 deg", "20 de
 
 def mapped(scene, axes, points=False):
     """What a sweep over axes gives, without its having been run."""
-    config = ringsweep.config.load({"scene": scene, "sweep": {"points" if points else "grid": axes}})
-    ds = ringsweep.engine._frame(config)
+    config = load({"scene": scene, "sweep": {"points" if points else "grid": axes}})
+    ds = engine._frame(config)
     shape = tuple(config.axes.sizes.values())
     regime = (np.arange(np.prod(shape)) % 3).astype("int8").reshape(shape)
     return ds.assign(regime=(tuple(config.axes.sizes), regime, OUTCOMES["regime"].attributes))
@@ -36,7 +37,7 @@ def asked(monkeypatch):
     history = xr.Dataset(dict.fromkeys(("phi", "omega", "epsilon", "normal_1"), ("time", time)), {"time": time})
 
     def simulate(configuration):
-        found.append(ringsweep.config.load(configuration).scene.values)
+        found.append(load(configuration).scene.values)
         return history.assign_attrs(outcome=f"history {len(found)}")
 
     monkeypatch.setattr("ringsweep.single.simulate", simulate)
@@ -54,18 +55,18 @@ class TestCell:
     def test_is_the_configuration_with_the_values_of_the_cell(self, maps):
         found = plots.cell(maps, {"drive.amplitude": 1.9, "zone_half_angle": np.radians(39.0)})
         assert "sweep" not in found
-        values = ringsweep.config.load(found).scene.values
+        values = load(found).scene.values
         assert values["drive.amplitude"] == 2.0
         assert values["zone.half_angle"] == float(maps["zone_half_angle"][2])
 
     def test_may_have_been_chosen_as_xarray_does(self, maps):
         found = plots.cell(maps.isel(drive_amplitude=2).sel(zone_half_angle=0.3, method="nearest"))
-        values = ringsweep.config.load(found).scene.values
+        values = load(found).scene.values
         assert (values["drive.amplitude"], values["zone.half_angle"]) == (8.0, float(maps["zone_half_angle"][1]))
 
     def test_of_points_is_one_of_them(self, scene):
         ds = mapped(scene, {"drive.amplitude": [0.5, 2.0, 8.0], "initial.omega": [3.0, 1.0, 2.0]}, points=True)
-        values = ringsweep.config.load(plots.cell(ds, {"point": 1})).scene.values
+        values = load(plots.cell(ds, {"point": 1})).scene.values
         assert (values["drive.amplitude"], values["initial.omega"]) == (2.0, 1.0)
 
     def test_may_lie_on_an_axis_of_laws_or_in_a_list_of_arcs(self, scene):
@@ -129,6 +130,18 @@ class TestExplore:
         click(figure, 0.5, 0.5, ax=figure.axes[1])
         figure.canvas.callbacks.process("button_press_event", MouseEvent("button_press_event", figure.canvas, 1, 1, 1))
         assert len(asked) == 1
+
+    def test_where_clicks_are_heard_the_figure_is_pyplots_and_elsewhere_a_picture(self, maps, asked, monkeypatch):
+        from matplotlib import pyplot
+
+        plots.explore(maps)
+        assert not pyplot.get_fignums()
+        monkeypatch.setattr("matplotlib.get_backend", lambda: "widget")
+        try:
+            figure = plots.explore(maps)
+            assert figure is pyplot.figure(pyplot.get_fignums()[0])
+        finally:
+            pyplot.close("all")
 
     def test_axes_may_be_exchanged_and_others_held(self, scene, asked):
         maps = mapped(scene, AXES | {"friction.rough.mu_k": [0.25, 0.3]})

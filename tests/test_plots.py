@@ -254,6 +254,18 @@ def test_selecting_holds_the_nearest_value_and_says_so():
     assert "zone_half_angle = 2°" in figure.get_suptitle()
 
 
+def test_a_long_title_is_laid_in_lines():
+    held = {"friction.rough.mu_k": 0.1, "friction.rest.mu_k": 0.1, "initial.omega": 0.1}
+    title = plots.regime_map(make_sweep((3, 3, 2, 2, 2)), sel=held).get_suptitle()
+    assert "initial_omega = 0.1" in title
+    assert max(map(len, title.split("\n"))) < 70
+
+
+def test_pictures_have_an_opaque_ground_on_dark_pages_too():
+    for figure in (plots.regime_map(make_sweep()), plots.history(make_history()), plots.work_precision(make_work())):
+        assert figure.get_facecolor() == (1.0, 1.0, 1.0, 1.0)
+
+
 def test_more_dimensions_become_panels_of_one_scale():
     ds = make_sweep((6, 5, 2, 3))
     figure = plots.regime_map(ds, var="t_separation")
