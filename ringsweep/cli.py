@@ -133,6 +133,17 @@ def _parser() -> argparse.ArgumentParser:
     simulate.add_argument("-o", "--output", metavar="RUN.nc", help="default: the configuration's name with -run")
     _settings(simulate)
 
+    animate = _verb(verbs, "animate", _animate, "run once: a film of the body in the ring", """
+        ringsweep animate my.yaml          my-run.gif
+        ringsweep animate my.yaml -o run.mp4 --set drive.amplitude=4
+        ringsweep animate my.nc -o run.html  a page with buttons, of the scene that my.nc holds
+        """)  # fmt: skip
+    _config(animate, "CONFIG.yaml", "or OUT.nc, whose scene is run")
+    animate.add_argument(
+        "-o", "--output", metavar="RUN.gif", help="default: the configuration's name with -run; .mp4 and .html too"
+    )
+    _settings(animate)
+
     precision = _verb(verbs, "precision", _precision,
         "error against run time for this scene, and the cheapest solver", """
         ringsweep precision my.yaml
@@ -325,6 +336,22 @@ def _simulate(arguments: argparse.Namespace) -> None:
     plots.save(plots.history(result), picture)
     print(result.attrs["outcome"])
     print(f"wrote {target}\nwrote {picture}")
+
+
+def _animate(arguments: argparse.Namespace) -> None:
+    from ringsweep.config import with_values
+
+    config = with_values(arguments.config, arguments.set)
+    target = arguments.output or f"{config.name}-run.gif"
+
+    from ringsweep import plots
+    from ringsweep.single import history
+
+    plots.check_animation(target)
+    result = history(config)
+    plots.save_animation(result, target)
+    print(result.attrs["outcome"])
+    print(f"wrote {target}")
 
 
 def _precision(arguments: argparse.Namespace) -> None:
