@@ -21,6 +21,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import yaml
 
 from benchmarks._common import heading, machine, markdown, ring, table
@@ -48,7 +49,9 @@ def configuration(side: int) -> str:
         "friction.rest.mu_s": (0.11, 0.25),
         "initial.omega": (0.0, 5.0),
     }
-    grid = {path: {"linspace": [*ends, side]} for path, ends in spans.items()}
+    # The middles of equal parts: with the ends a coarse grid would have more of the extremes than a fine one.
+    shares = (np.arange(side) + 0.5) / side
+    grid = {path: (low + (high - low) * shares).tolist() for path, (low, high) in spans.items()}
     scene = ring({"law": "stiction"}) | {"time": {"span": 2.0}}
     return yaml.safe_dump({"scene": scene, "sweep": {"grid": grid}}, sort_keys=False)
 
@@ -78,7 +81,8 @@ def main() -> None:
         folder = Path(name)
         config, target = folder / "sweep.yaml", folder / "sweep.nc"
         config.write_text(configuration(3))
-        start = cost("run", str(config), "-o", str(folder / "start.nc"))
+        # Twice: the first compiles.
+        start = [cost("run", str(config), "-o", str(folder / name)) for name in ("first.nc", "second.nc")][1]
         for side in SIDES[: 2 if quick else 3]:
             cells = side**5
             config.write_text(configuration(side))
@@ -89,7 +93,8 @@ def main() -> None:
             picture = cost("map", str(target), "-o", str(folder / "map.png"),
                            *(word for one in held for word in ("--sel", one)))  # fmt: skip
             rows.append([
-                f"{cells}", f"{took.wall:.0f}", f"{cells / took.wall:.0f}", f"{1e6 * took.cpu / cells:.1f}",
+                f"{cells}", f"{took.wall:.0f}", f"{cells / (took.wall - start.wall):.0f}",
+                f"{1e6 * (took.cpu - start.cpu) / cells:.1f}",
                 f"{took.memory / 2**20:.0f}", f"{target.stat().st_size / cells:.0f}",
                 f"{picture.wall:.1f}", f"{picture.memory / 2**20:.0f}",
             ])  # fmt: skip
@@ -110,7 +115,7 @@ def main() -> None:
     report += "".join(f"- {line}\n" for line in where.splitlines())
     report += f"""
 A grid over five axes, two seconds of stiction a cell, with certificates, from start to finished file;
-{start.wall:.1f} s and {start.memory / 2**20:.0f} MiB are for a sweep of {3**5} cells.
+{start.wall:.1f} s and {start.memory / 2**20:.0f} MiB are for a sweep of {3**5} cells; rates are of what comes on top.
 
 """
     out = Path() if quick else RESULTS

@@ -386,14 +386,14 @@ def draw(measured: dict[str, Measured]) -> Figure:
     axes = figure.subplots(len(measured), 3, squeeze=False)
     for (first, second, third), found in zip(axes, measured.values(), strict=True):
         data = found.data
-        plots.work_precision(data, "error_end", first)
+        plots.precision_panel(data, "error_end", first)
         first.set_title(data.attrs["title"], loc="left")
         styles = {line.get_label(): line for line in first.get_lines() if not str(line.get_label()).startswith("_")}
         if data.error_separation.isnull().all():
             second.set_axis_off()
             second.text(0.5, 0.5, "nothing separates here", ha="center", transform=second.transAxes)
         else:
-            plots.work_precision(data, "error_separation", second)
+            plots.precision_panel(data, "error_separation", second)
             # The first has it already.
             second.get_legend().remove()
         for method, line in styles.items():

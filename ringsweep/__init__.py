@@ -22,6 +22,8 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("ringsweep")
+    if name == "plots":
+        return import_module("ringsweep.plots")
     if name in _HOMES:
         return getattr(import_module(f"ringsweep.{_HOMES[name]}"), name)
     raise AttributeError(f"module 'ringsweep' has no attribute {name!r}")

@@ -7,16 +7,16 @@ checksums, so that nothing else is ever mixed in. One process at a time owns the
 
 from __future__ import annotations
 
+import hashlib
+import io
 import json
 import logging
 import os
 import secrets
-import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, Any
-from zipfile import BadZipFile
+from typing import Any
 
 import numpy as np
 from filelock import FileLock, Timeout
@@ -30,18 +30,8 @@ logger = logging.getLogger("ringsweep")
 
 Columns = Mapping[str, NDArray[Any]]
 
-# What NumPy may make of a file that is no archive of arrays, or a damaged one.
-_UNREADABLE = (
-    OSError,
-    ValueError,
-    TypeError,
-    AttributeError,
-    EOFError,
-    KeyError,
-    NotImplementedError,
-    BadZipFile,
-    zlib.error,
-)
+# Files that are left out, which are named one by one.
+_MOST = 3
 
 _MANIFEST, _LOCK = "sweep.json", "lock"
 
@@ -69,6 +59,8 @@ def owned(target: Path, identity: Mapping[str, str], layout: Layout, *, fresh: b
         If another process owns the folder, if it holds chunks of another sweep, or cannot be written.
     """
     folder = target.with_name(f"{target.name}.partial")
+    if folder.exists() and not folder.is_dir():
+        raise InputError(str(target), f"cannot be computed: {folder} stands where its chunks would, and is no folder")
     try:
         folder.mkdir(exist_ok=True)
         lock = FileLock(folder / _LOCK, timeout=0)
@@ -84,7 +76,7 @@ def owned(target: Path, identity: Mapping[str, str], layout: Layout, *, fresh: b
         chunks.begin()
         yield chunks
     finally:
-        empty = not any(folder.glob("*.npz"))
+        empty = not chunks.found()
         if empty:
             chunks.clear()
         lock.release()
@@ -103,7 +95,7 @@ class Chunks:
     done : ndarray of bool, shape ``(cells,)``
         Whether the cell at each position of the layout's order is here.
     files : dict of Path to tuple of int
-        Chunk files, with the first and the last position in each.
+        Chunk files, with the first and the last position in each. The name of each ends with a digest of it.
     processors : set of str
         Names of those that computed them.
     """
@@ -122,38 +114,55 @@ class Chunks:
         manifest = self.folder / _MANIFEST
         for path in self.folder.glob("*.tmp"):
             path.unlink()
-        try:
-            before = dict(json.loads(manifest.read_text()))
-        except (OSError, ValueError):
-            before = {}
-        others = sorted(self.folder.glob("*.npz"))
-        if before and before != self.identity and others:
+        before = _texts(manifest)
+        if before and before != self.identity and self.found():
             changes = differences(before, self.identity)
             raise InputError(
                 str(self.folder),
                 f"holds finished cells of another sweep: {changes}. --fresh starts over, -o keeps both",
             )
         if before != self.identity:
-            text = json.dumps(self.identity, indent=1)
-            _durably(manifest, lambda file: file.write(text.encode()))
-        for path in others:
+            _durably(manifest, json.dumps(self.identity, indent=1).encode())
+        self.take_stock()
+
+    def found(self) -> list[Path]:
+        """Whatever chunk files there are, of this sweep or not."""
+        return sorted(path for path in self.folder.glob("*.npz") if path.is_file())
+
+    def take_stock(self) -> None:
+        """Read what is there; what is not whole, or not of this sweep, is left out with a word."""
+        self.done[:] = False
+        self.files.clear()
+        left_out = 0
+        for path in self.found():
             try:
                 positions, _ = self.read(path)
             except Damaged as damage:
-                logger.warning("%s: its cells are computed again", damage)
+                left_out += 1
+                if left_out <= _MOST:
+                    logger.warning("%s: its cells are computed again", damage)
             else:
                 self.done[positions] = True
-                self.files[path] = int(positions.min()), int(positions.max())
+                self.files[path] = int(positions[0]), int(positions[-1])
+        if left_out > _MOST:
+            logger.warning("so are those of %d more such files", left_out - _MOST)
 
     def put(self, positions: NDArray[np.integer], columns: Columns, processor: str) -> None:
         """Keep the columns of the cells at these positions, which ascend."""
-        path = self.folder / f"{self.key[:12]}-{positions[0]:010d}-{len(positions)}.npz"
+        # One array of all columns: each member of an archive takes longer to write than a few hundred cells.
+        cells = np.empty(len(positions), dtype=[(name, column.dtype) for name, column in columns.items()])
+        for name, column in columns.items():
+            cells[name] = column
         members = {
             "key": np.array(self.key),
             "processor": np.array(processor),
             "positions": positions.astype(np.uint32),
         }
-        _durably(path, lambda file: np.savez(file, allow_pickle=False, **members, **columns))
+        content = io.BytesIO()
+        np.savez(content, allow_pickle=False, cells=cells, **members)
+        stem = f"{self.key[:12]}-{positions[0]:010d}-{len(positions)}"
+        path = self.folder / f"{stem}-{_digest(content.getvalue())}.npz"
+        _durably(path, content.getvalue())
         self.processors.add(processor)
         self.done[positions] = True
         self.files[path] = int(positions[0]), int(positions[-1])
@@ -167,18 +176,28 @@ class Chunks:
             If it is not a whole chunk of this sweep.
         """
         try:
-            # The checksum of each member is verified on the way.
-            with path.open("rb") as file, np.load(file, allow_pickle=False) as members:
-                found = dict(members)
-        except _UNREADABLE as problem:
-            raise Damaged(f"{path} is damaged ({' '.join(str(problem).split())})") from problem
-        if str(found.pop("key", "")) != self.key:
+            content = path.read_bytes()
+        except OSError as error:
+            raise Damaged(f"{path} cannot be read ({error.strerror or error})") from error
+        # Members of an archive have checksums, its directory has none.
+        if not path.stem.endswith(f"-{_digest(content)}"):
+            raise Damaged(f"{path} is damaged")
+        with np.load(io.BytesIO(content), allow_pickle=False) as members:
+            found = dict(members)
+        if str(found["key"]) != self.key:
             raise Damaged(f"{path} is not of this sweep")
-        self.processors.add(str(found.pop("processor")))
-        return found.pop("positions").astype(np.intp), found
+        self.processors.add(str(found["processor"]))
+        cells = found["cells"]
+        return found["positions"].astype(np.intp), {name: cells[name] for name in cells.dtype.names}
 
     def bricks(self) -> Iterator[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]]:
-        """Place of every brick in the grid, in order, and its columns in the shape of that place."""
+        """Place of every brick in the grid, in order, and its columns in the shape of that place.
+
+        Raises
+        ------
+        Damaged
+            If a file is not what it was, or some cells are in none.
+        """
         waiting = sorted(self.files, key=lambda path: self.files[path], reverse=True)
         read: dict[Path, tuple[NDArray[np.intp], dict[str, NDArray[Any]]]] = {}
         for begin, end, place in self.layout.bricks():
@@ -186,18 +205,22 @@ class Chunks:
                 path = waiting.pop()
                 read[path] = self.read(path)
             brick: dict[str, NDArray[Any]] = {}
+            missing = np.ones(end - begin, dtype=bool)
             for positions, columns in read.values():
                 part = slice(*np.searchsorted(positions, (begin, end)))
+                missing[positions[part] - begin] = False
                 for name, column in columns.items():
                     whole = brick.setdefault(name, np.empty(end - begin, dtype=column.dtype))
                     whole[positions[part] - begin] = column[part]
+            if missing.any():
+                raise Damaged(f"{missing.sum()} cells are in no chunk of {self.folder}")
             yield place, {name: column.reshape([s.stop - s.start for s in place]) for name, column in brick.items()}
             for path in [path for path in read if self.files[path][1] < end]:
                 del read[path]
 
     def clear(self) -> None:
         """Remove all that was kept."""
-        for path in [*self.folder.glob("*.npz"), *self.folder.glob("*.tmp"), self.folder / _MANIFEST]:
+        for path in [*self.found(), *self.folder.glob("*.tmp"), self.folder / _MANIFEST]:
             path.unlink(missing_ok=True)
         self.files.clear()
         self.done[:] = False
@@ -207,14 +230,30 @@ class Damaged(Exception):
     """A chunk file is not a whole chunk of this sweep."""
 
 
-def _durably(path: Path, write: Callable[[IO[bytes]], Any]) -> None:
+def _digest(content: bytes) -> str:
+    return hashlib.blake2b(content, digest_size=8).hexdigest()
+
+
+def _texts(path: Path) -> dict[str, str]:
+    """A mapping of texts from a file of JSON; empty if that is not what it holds."""
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) and all(isinstance(value, str) for value in found.values()) else {}
+
+
+def _durably(path: Path, content: bytes) -> None:
     """Write a file aside, flush it to the disk, and give it its name."""
     temporary = path.with_name(f"{secrets.token_hex(4)}.tmp")
     try:
         with temporary.open("xb") as file:
-            write(file)
+            file.write(content)
             file.flush()
             os.fsync(file.fileno())
         temporary.replace(path)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path.parent)) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)

@@ -133,6 +133,17 @@ def _parser() -> argparse.ArgumentParser:
     simulate.add_argument("-o", "--output", metavar="RUN.nc", help="default: the configuration's name with -run")
     _settings(simulate)
 
+    animate = _verb(verbs, "animate", _animate, "run once: a film of the body in the ring", """
+        ringsweep animate my.yaml          my-run.gif
+        ringsweep animate my.yaml -o run.mp4 --set drive.amplitude=4
+        ringsweep animate my.nc -o run.html  a page with buttons, of the scene that my.nc holds
+        """)  # fmt: skip
+    _config(animate, "CONFIG.yaml", "or OUT.nc, whose scene is run")
+    animate.add_argument(
+        "-o", "--output", metavar="RUN.gif", help="default: the configuration's name with -run; .mp4 and .html too"
+    )
+    _settings(animate)
+
     precision = _verb(verbs, "precision", _precision,
         "error against run time for this scene, and the cheapest solver", """
         ringsweep precision my.yaml
@@ -258,20 +269,22 @@ def _run(arguments: argparse.Namespace) -> None:
     if arguments.backend == "threads" and arguments.scheduler is not None:
         raise InputError("--scheduler", "is for --backend dask")
     config = load(arguments.config)
-    target, picture = _outputs(arguments.output or f"{config.name}.nc", "regime", "sweep")
+    target, picture = _outputs(f"{config.name}.nc" if arguments.output is None else arguments.output, "regime", "sweep")
 
     from ringsweep import plots, storage
     from ringsweep.engine import write
 
+    if arguments.scheduler is not None and not arguments.verbose:
+        _silence_dask()
     options = {name: getattr(arguments, name) for name in ("jobs", "fresh", "reuse", "scheduler")}
-    if write(config, target, **options, progress=not arguments.quiet):
+    if computed := write(config, target, **options, progress=not arguments.quiet):
         print(f"wrote {target}")
     else:
         print(f"{target} holds this sweep already (--fresh runs it again)")
     with storage.open_dataset(target) as result:
         _summarise(result)
         _warn_of_stiffness(result, config)
-        if not config.axes.sizes:
+        if not config.axes.sizes or (not computed and _is_newer(picture, target)):
             return
         try:
             plots.save(plots.regime_map(result), picture)
@@ -280,6 +293,19 @@ def _run(arguments: argparse.Namespace) -> None:
             print(f"no map yet: {error.problem} (ringsweep map {target})")
         else:
             print(f"wrote {picture}")
+
+
+def _is_newer(one: Path, other: Path) -> bool:
+    return one.exists() and one.stat().st_mtime >= other.stat().st_mtime
+
+
+def _silence_dask() -> None:
+    """Of a connection that is lost Dask tells with tracebacks what is told here in one line."""
+    with suppress(ImportError):
+        # It sets the levels of its loggers when it is imported.
+        import distributed  # noqa: F401
+    for name in ("distributed", "tornado", "asyncio"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
 def _map(arguments: argparse.Namespace) -> None:
@@ -310,6 +336,22 @@ def _simulate(arguments: argparse.Namespace) -> None:
     plots.save(plots.history(result), picture)
     print(result.attrs["outcome"])
     print(f"wrote {target}\nwrote {picture}")
+
+
+def _animate(arguments: argparse.Namespace) -> None:
+    from ringsweep.config import with_values
+
+    config = with_values(arguments.config, arguments.set)
+    target = arguments.output or f"{config.name}-run.gif"
+
+    from ringsweep import plots
+    from ringsweep.single import history
+
+    plots.check_animation(target)
+    result = history(config)
+    plots.save_animation(result, target)
+    print(result.attrs["outcome"])
+    print(f"wrote {target}")
 
 
 def _precision(arguments: argparse.Namespace) -> None:
@@ -433,8 +475,5 @@ def _outputs(name: str, mark: str, content: str) -> tuple[Path, Path]:
         raise InputError(name, "is where the picture goes: name the dataset *.nc")
     storage.check_writable(picture)
     if target.exists():
-        with storage.open_dataset(target) as there:
-            kinds = [kind for kind in ("contender", "time", "regime") if kind in there.dims or kind in there]
-        if kinds[:1] != [mark]:
-            raise InputError(name, f"holds something else: name another file for this {content}")
+        storage.check_kind(target, mark, content)
     return target, picture

@@ -91,7 +91,7 @@ def load(config: str | os.PathLike[str] | Mapping[str, Any]) -> Config:
     Parameters
     ----------
     config : path-like or mapping
-        A YAML file, or what one would hold.
+        A YAML file, what one would hold, or a result file, whose sweep it is.
 
     Raises
     ------
@@ -100,7 +100,12 @@ def load(config: str | os.PathLike[str] | Mapping[str, Any]) -> Config:
     """
     doc = document.read(config)
     with doc.placing():
-        return _config(doc)
+        found = _config(doc)
+    if doc.swept is None:
+        return found
+    # The very axes that were run, by dimensions that a configuration cannot name.
+    given = ((path, path, dims, values) for path, (dims, values) in doc.swept.items())
+    return dataclasses.replace(found, axes=_axes(given))
 
 
 def with_values(config: str | os.PathLike[str] | Mapping[str, Any], settings: Iterable[str] = ()) -> Config:

@@ -44,12 +44,15 @@ class Document:
         Stem of the file.
     marks : dict of str to tuple
         File and line of what stands at a dotted path.
+    swept : dict of str to tuple, optional
+        Of a result file, dimensions and values of each swept path: its `tree` may know them by fewer dimensions.
     """
 
     tree: dict[str, Any]
     folder: Path = field(default_factory=Path)
     name: str = "ringsweep"
     marks: dict[str, tuple[str, int | None]] = field(default_factory=dict)
+    swept: dict[str, tuple[tuple[str, ...], Any]] | None = None
 
     @contextmanager
     def placing(self) -> Iterator[None]:
@@ -163,11 +166,20 @@ def _of_result(file: Path) -> Document:
     try:
         with netCDF4.Dataset(file) as content:
             tree = json.loads(content.getncattr("configuration"))
-    except (OSError, RuntimeError, AttributeError, ValueError) as error:
+            swept = None
+            if "regime" in content.variables and not {"time", "contender"} & set(content.dimensions):
+                swept = {
+                    variable.path: (variable.dimensions, np.array(variable[:].tolist()))
+                    for variable in content.variables.values()
+                    if "path" in variable.ncattrs()
+                }
+                dims = content["regime"].dimensions
+                swept = dict(sorted(swept.items(), key=lambda one: dims.index(one[1][0][0])))
+    except (OSError, RuntimeError, AttributeError, ValueError, IndexError) as error:
         raise InputError(
             "", "is damaged, or no result of ringsweep: it carries no configuration", file=str(file)
         ) from error
-    return Document(_plain(tree, "", 0), file.parent, file.stem, {"": (str(file), None)})
+    return Document(_plain(tree, "", 0), file.parent, file.stem, {"": (str(file), None)}, swept)
 
 
 def scalar(text: str) -> Any:

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
 from ringsweep import storage
-from ringsweep.cells import Chunk
-from ringsweep.chunks import Chunks, Columns, owned
+from ringsweep.cells import Chunk, Finished
+from ringsweep.chunks import Chunks, Columns, Damaged, owned
 from ringsweep.config import Axes, Config, load, read_axes, read_scene, read_solver, sweepable
 from ringsweep.errors import InputError
 from ringsweep.layout import Layout
@@ -237,6 +237,8 @@ def write(
     """
     config, earlier = _earlier(config, reuse)
     target = target.resolve()
+    if target.exists():
+        storage.check_kind(target, "regime")
     layout = Layout(tuple(config.axes.sizes.values()))
     described = identity(config)
     with owned(target, described, layout, fresh=fresh) as chunks:
@@ -247,17 +249,29 @@ def write(
             logger.info("going on: %d of %d cells are done", resumed, layout.total)
         try:
             _fill(config, layout, chunks, earlier, jobs, scheduler, progress)
-            frame = _frame(config)
-            frame.attrs["processors"] = ", ".join(sorted(chunks.processors))
-            storage.write(target, chunks.folder, frame, OUTCOMES, layout, chunks.bricks())
+            try:
+                _merge(config, target, layout, chunks)
+            except Damaged as damage:
+                logger.warning("%s: looking for what is missing", damage)
+                chunks.take_stock()
+                _fill(config, layout, chunks, earlier, jobs, scheduler, progress)
+                _merge(config, target, layout, chunks)
         except BaseException as error:
-            if kept := int(chunks.done.sum()):
+            if (kept := int(chunks.done.sum())) and chunks.folder.exists():
+                again = "the same command without --fresh" if fresh else "the same command"
                 error.add_note(
-                    f"{kept} of {layout.total} cells are kept in {chunks.folder}: the same command goes on from there"
+                    f"{kept} of {layout.total} cells are kept in {chunks.folder}: {again} goes on from there"
                 )
             raise
         chunks.clear()
     return True
+
+
+def _merge(config: Config, target: Path, layout: Layout, chunks: Chunks) -> None:
+    """Make the file of finished chunks."""
+    frame = _frame(config)
+    frame.attrs["processors"] = ", ".join(sorted(chunks.processors))
+    storage.write(target, chunks.folder, frame, OUTCOMES, layout, chunks.bricks())
 
 
 def _holds(target: Path, chunks: Chunks) -> bool:
@@ -302,13 +316,18 @@ def _fill(
     """Compute every cell that is not there yet, chunk after chunk."""
     if earlier is not None:
         count = earlier.give(config, layout, kept)
-        logger.info("%d of %d cells are taken from %s", count, layout.total, earlier.path)
+        tell = logger.info if count else logger.warning
+        tell("%d of %d cells are taken from %s", count, layout.total, earlier.path)
+    if jobs is not None and jobs < 1:
+        raise InputError("jobs", f"{jobs} threads compute nothing: give at least 1")
     if jobs is not None and scheduler is not None:
         raise InputError("--jobs", "is for threads of this machine: Dask's workers have their own number of threads")
     left = layout.total - int(kept.done.sum())
     if not left:
         return
     task = Chunk(config, layout)
+    pace: Pace[Finished]
+    results: Iterator[Finished]
     with ExitStack() as stack:
         stopped = stack.enter_context(_stop_on_interrupt())
         if scheduler is None:
@@ -316,7 +335,8 @@ def _fill(
             pace = Pace(config.solver.side_by_side, lambda: threads)
             chunks = chunks_of(kept.done, left, pace, stopped)
             parallel = joblib.Parallel(n_jobs=threads, prefer="threads", return_as="generator_unordered")
-            results = parallel(joblib.delayed(task)(chunk) for chunk in chunks)
+            # What a chunk has cost is known before joblib hands it over, which it does in ticks.
+            results = parallel(joblib.delayed(lambda chunk: pace.learn(task(chunk)))(chunk) for chunk in chunks)
         else:
             try:
                 from ringsweep import remote
@@ -325,7 +345,7 @@ def _fill(
             client = stack.enter_context(remote.connect(scheduler))
             pace = Pace(config.solver.side_by_side, lambda: remote.threads(client))
             chunks = chunks_of(kept.done, left, pace, stopped)
-            results = remote.compute(task, chunks, secrets.token_hex(8), client)
+            results = map(pace.learn, remote.compute(task, chunks, secrets.token_hex(8), client, stopped))
         bar = stack.enter_context(progress_bar(layout.total, progress, layout.total - left))
         try:
             for finished in results:
@@ -333,10 +353,6 @@ def _fill(
                     changes = differences(environment(), finished.environment)
                     raise InputError("--scheduler", f"a worker has other versions than this process: {changes}")
                 kept.put(finished.positions, finished.columns, finished.processor)
-                cost = "kernels were being compiled" if finished.seconds is None else f"{finished.seconds:.3g} s"
-                logger.debug("a chunk of %d cells: %s", len(finished.positions), cost)
-                if finished.seconds is not None:
-                    pace.learn(len(finished.positions), finished.seconds)
                 bar.update(len(finished.positions))
         finally:
             # Chunks under way cannot be interrupted; nobody is to wait for what comes after them.

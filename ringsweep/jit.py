@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import inspect
 import logging
+import os
 import pickle
 from collections.abc import Callable
 from functools import cache
@@ -15,6 +16,8 @@ import numba
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, overload, register_jitable
+
+from ringsweep.errors import InputError
 
 logger = logging.getLogger("ringsweep")
 
@@ -30,13 +33,22 @@ OPTIONS: Any = {
 }
 
 
+#: Files of friction laws that are the user's own, from the environment: they are compiled with the package's.
+OWN_LAWS = [Path(name) for name in os.environ.get("RINGSWEEP_LAWS", "").split(os.pathsep) if name]
+
+
 def _sources_digest() -> str:
-    """Digest over every source file of the package."""
+    """Digest over every source file of the package, and of laws that are the user's own."""
     digest = hashlib.sha256()
     root = Path(__file__).parent
     for path in sorted(root.rglob("*.py")):
         digest.update(str(path.relative_to(root)).encode())
         digest.update(path.read_bytes())
+    for path in OWN_LAWS:
+        try:
+            digest.update(path.read_bytes())
+        except OSError as error:
+            raise InputError("RINGSWEEP_LAWS", f"{path} cannot be read: {error.strerror or error}") from error
     return digest.hexdigest()
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Callable, Iterator
 from threading import Event
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +14,22 @@ from numpy.typing import NDArray
 from ringsweep.layout import BRICK
 
 
-class Pace:
+class _Measured(Protocol):
+    """Cells at some positions, and the seconds that they took: None if something else came between."""
+
+    @property
+    def positions(self) -> NDArray[np.integer]: ...
+
+    @property
+    def seconds(self) -> float | None: ...
+
+
+Measured = TypeVar("Measured", bound=_Measured)
+
+logger = logging.getLogger("ringsweep")
+
+
+class Pace(Generic[Measured]):
     """How many cells the next chunk takes, from what those before have cost.
 
     A chunk takes a hundredth of the time that all before it have taken, within bounds: what a stopped sweep loses
@@ -20,7 +37,7 @@ class Pace:
     waits long for another.
     """
 
-    shortest, longest, last = 0.03, 2.0, 0.01
+    shortest, longest, last = 0.1, 2.0, 0.02
     most = BRICK
 
     def __init__(self, side_by_side: int, workers: Callable[[], int]):
@@ -30,13 +47,17 @@ class Pace:
         self.cost = math.nan
         self.largest = side_by_side
 
-    def learn(self, cells: int, seconds: float) -> None:
-        """Take note of what so many cells have cost."""
-        self.spent += seconds
-        cost = max(seconds, 1e-9) / cells
-        # Neighbours in the order are neighbours in the grid, and alike.
-        self.cost = cost if math.isnan(self.cost) else 0.5 * (self.cost + cost)
-        self.largest = max(self.largest, cells)
+    def learn(self, finished: Measured) -> Measured:
+        """Take note of what a chunk has cost; returns it."""
+        cells, seconds = len(finished.positions), finished.seconds
+        logger.debug("a chunk of %d cells: %s", cells, "compiling" if seconds is None else f"{seconds:.3g} s")
+        if seconds is not None:
+            self.spent += seconds
+            cost = max(seconds, 1e-9) / cells
+            # Neighbours in the order are neighbours in the grid, and alike.
+            self.cost = cost if math.isnan(self.cost) else 0.5 * (self.cost + cost)
+            self.largest = max(self.largest, cells)
+        return finished
 
     def next(self, left: int) -> int:
         """Cells of the next chunk where so many are left."""

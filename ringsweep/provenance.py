@@ -54,7 +54,7 @@ def identity(config: Config) -> dict[str, str]:
     found |= {f"scene.{path}": repr(float(value)) for path, value in scene.values.items() if path not in axes.columns}
     found["sweep"] = ", ".join(f"{name} {size}" for name, size in axes.sizes.items()) or "a single run"
     for path, (dims, column) in axes.columns.items():
-        ends = f"{column.flat[0]!s} to {column.flat[-1]!s}"
+        ends = " to ".join(f"{end:.6g}" if column.dtype.kind == "f" else str(end) for end in column.flat[[0, -1]])
         found[f"sweep.{path}"] = f"{column.size} values, {ends}, along {' x '.join(dims)} ({_digest(column)})"
     return found | {"solver": repr(config.solver)} | environment()
 

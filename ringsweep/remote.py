@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import logging
+import socket
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import CancelledError
 from contextlib import suppress
 from itertools import islice
+from threading import Event
 from typing import Any
 
 import numpy as np
 from distributed import Client, as_completed
+from distributed.comm.addressing import parse_address, parse_host_port
 from distributed.diagnostics.plugin import WorkerPlugin
 from numpy.typing import NDArray
 
@@ -22,6 +25,9 @@ Positions = NDArray[np.integer[Any]]
 
 # Seconds to wait for a scheduler.
 _PATIENCE = 10.0
+
+# Seconds between looks for a first worker.
+_TICK = 0.5
 
 # In a worker: tasks by their key.
 _tasks: dict[str, Callable[[Positions], Any]] = {}
@@ -55,6 +61,10 @@ def connect(address: str) -> Client:
         If nothing answers there.
     """
     try:
+        # A client that finds nobody goes on trying in the background, and complains there.
+        protocol, place = parse_address(address)
+        if protocol in ("tcp", "tls"):
+            socket.create_connection(parse_host_port(place, 8786), timeout=_PATIENCE).close()
         return Client(address, timeout=_PATIENCE, set_as_default=False, name="ringsweep")
     except (OSError, ValueError, TypeError) as error:
         raise InputError("--scheduler", f"no Dask scheduler answers at {address!r}: {error}") from error
@@ -65,7 +75,9 @@ def threads(client: Client) -> int:
     return sum(client.nthreads().values())
 
 
-def compute(task: Callable[[Positions], Any], chunks: Iterator[Positions], key: str, client: Client) -> Generator[Any]:
+def compute(
+    task: Callable[[Positions], Any], chunks: Iterator[Positions], key: str, client: Client, stopped: Event
+) -> Generator[Any]:
     """Results of `task` for each of `chunks`, as they come; a chunk is asked for when a worker is about to need it.
 
     A chunk whose worker dies goes to another; one that takes several workers with it raises
@@ -74,8 +86,6 @@ def compute(task: Callable[[Positions], Any], chunks: Iterator[Positions], key: 
     plugin = _Shared(key, task)
     client.register_plugin(plugin)
     try:
-        if not threads(client):
-            logger.warning("the scheduler has no worker yet: waiting for one")
         futures = as_completed(loop=client.loop, with_results=True)
 
         def fill() -> None:
@@ -84,6 +94,11 @@ def compute(task: Callable[[Positions], Any], chunks: Iterator[Positions], key: 
                 futures.add(client.submit(_run, key, chunk, pure=False))
 
         fill()
+        if not threads(client):
+            logger.warning("the scheduler has no worker yet: waiting for one")
+            while not threads(client):
+                if stopped.wait(_TICK):
+                    return
         for _, result in futures:
             yield result
             fill()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping
 from copy import deepcopy
@@ -15,9 +14,10 @@ from numpy.typing import NDArray
 
 from ringsweep import storage
 from ringsweep.cells import laws_at, values_at
-from ringsweep.config import Axes, Config, load
+from ringsweep.config import Config, load
 from ringsweep.errors import InputError
 from ringsweep.layout import Layout
+from ringsweep.models import parameters
 from ringsweep.provenance import differences, fingerprint, identity
 from ringsweep.scene import LAW
 
@@ -52,17 +52,11 @@ class Earlier:
 
     def __init__(self, path: str | os.PathLike[str], config: Config):
         self.path = path
+        storage.check_kind(path, "regime", "sweep")
         with storage.open_dataset(path) as ds:
-            if "regime" not in ds or "time" in ds.dims:
-                raise InputError(str(path), "holds no sweep whose cells could be reused")
             self.attributes = dict(ds.attrs)
-            columns = {
-                str(coordinate.attrs["path"]): (tuple(map(str, coordinate.dims)), coordinate.values)
-                for coordinate in ds.coords.values()
-                if "path" in coordinate.attrs
-            }
-            self.axes = Axes({str(dim): size for dim, size in ds.sizes.items()}, columns)
-        self.config = replace(load(json.loads(self.attributes["configuration"])), axes=self.axes)
+        self.config = load(path)
+        self.axes = self.config.axes
         self._check(config)
 
     def _check(self, config: Config) -> None:
@@ -70,10 +64,18 @@ class Earlier:
         old, new = identity(self.config), identity(config)
         if self.attributes.get("fingerprint") != fingerprint(old):
             raise InputError(str(self.path), "was computed by another version: its cells cannot be reused")
-        varied = {f"scene.{name}" for axes in (self.axes, config.axes) for name in axes.columns}
-        fixed = [{k: v for k, v in one.items() if k not in varied and not k.startswith("sweep")} for one in (old, new)]
         if any(len(dims) > 1 for dims, _ in self.axes.columns.values()):
             raise InputError(str(self.path), "has an axis of several dimensions: its cells cannot be reused")
+        varied = {path for axes in (self.axes, config.axes) for path in axes.columns}
+        # A parameter that only some laws have says nothing about the cells of the others.
+        needed: list[set[str]] = [set(parameters(structure)) for structure in config.scene.structures.values()]
+        apart = (
+            varied
+            | (set().union(*needed) - needed[0].intersection(*needed))
+            | (set(config.scene.values) ^ set(self.config.scene.values))
+        )
+        ignored = {f"scene.{path}" for path in apart}
+        fixed = [{k: v for k, v in one.items() if k not in ignored and not k.startswith("sweep")} for one in (old, new)]
         if changes := differences(*fixed):
             raise InputError(str(self.path), f"has no cell of this sweep: {changes}")
 
@@ -118,20 +120,34 @@ class Earlier:
         """Which of the new cells the file holds, and where along its dimensions those lie."""
         values: dict[str, NDArray[Any]] = {**values_at(config.scene, config.axes, place, count)}
         values[LAW] = laws_at(config.scene, config.axes, place, count)
-        shared = np.ones(count, dtype=bool)
+        shared = np.zeros(count, dtype=bool)
+        there = {dim: np.zeros(count, dtype=np.intp) for dim in self.axes.sizes}
+        for law, structure in config.scene.structures.items():
+            own = np.flatnonzero(values[LAW] == law)
+            # Of what other laws need, a cell is independent.
+            needed = {path: values[path][own] for path in (LAW, *parameters(structure)) if path in values}
+            shared[own] = self._find_alike(needed, {dim: (at, own) for dim, at in there.items()})
+        return shared, {dim: at[shared] for dim, at in there.items()}
+
+    def _find_alike(
+        self, needed: Mapping[str, NDArray[Any]], there: Mapping[str, tuple[NDArray[np.intp], NDArray[np.intp]]]
+    ) -> NDArray[np.bool_]:
+        """Which cells under one law the file holds; enters where, into the places given of the arrays given."""
+        shared = np.ones(len(needed[LAW]), dtype=bool)
         fixed = {**self.config.scene.values, LAW: self.config.scene.structure.law}
-        for path, value in fixed.items():
+        for path, column in needed.items():
             if path not in self.axes.columns:
-                shared &= values[path] == value if path in values else False
-        there = {}
-        for dim in self.axes.sizes:
-            paths = [path for path, (dims, _) in self.axes.columns.items() if dims == (dim,)]
+                shared &= column == fixed[path] if path in fixed else False
+        for dim, (at, own) in there.items():
+            paths = [path for path, (dims, _) in self.axes.columns.items() if dims == (dim,) and path in needed]
+            if not paths:
+                continue
             known = pd.MultiIndex.from_arrays([self.axes.columns[path][1] for path in paths])
             first = np.flatnonzero(~known.duplicated())
-            at = known[first].get_indexer(pd.MultiIndex.from_arrays([values[path] for path in paths]))
-            shared &= at >= 0
-            there[dim] = first[at]
-        return shared, {dim: at[shared] for dim, at in there.items()}
+            found = known[first].get_indexer(pd.MultiIndex.from_arrays([needed[path] for path in paths]))
+            shared &= found >= 0
+            at[own] = first[found]
+        return shared
 
 
 def _aligned(column: NDArray[np.float64], known: NDArray[np.float64]) -> NDArray[np.float64]:

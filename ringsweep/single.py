@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 
 from ringsweep.config import Config, read_solver, with_values
 from ringsweep.engine import compute
+from ringsweep.jit import take
 from ringsweep.models import MODELS, batch
+from ringsweep.physics.drives import turn
 from ringsweep.provenance import attributes
 from ringsweep.scene import Structure
 from ringsweep.variables import HISTORY, REGIMES
@@ -104,10 +106,14 @@ def _trace(config: Config, structure: Structure, samples: int) -> xr.Dataset:
     cell = batch(structure, {path: np.array([value]) for path, value in config.scene.values.items()})
     names = model.history(structure)
     times, rows = config.solver.history(cell, samples, len(names))
+    columns = dict(zip(names, rows.T, strict=True))
+    if "ring_omega" in columns:
+        drive = take(cell.drive, 0)
+        columns["theta"] = np.array([turn(drive, t)[0] for t in times.tolist()])
     return xr.Dataset(
         {
-            name: ("time", rows[:, k].astype(HISTORY[name].dtype), HISTORY[name].attributes)
-            for k, name in enumerate(names)
+            name: ("time", column.astype(HISTORY[name].dtype), HISTORY[name].attributes)
+            for name, column in columns.items()
             if name not in model.absent
         },
         coords={"time": ("time", times, {"long_name": "time", "units": "s", "axis": "T"})},

@@ -218,7 +218,7 @@ def _cache_one_brick(variable: Any, layout: Layout) -> None:
 def _chunked(layout: Layout) -> dict[str, Any]:
     if layout.total < COMPRESSED_FROM:
         return {}
-    return {"compression": "zlib", "complevel": 1, "shuffle": True, "chunksizes": layout.brick}
+    return {"compression": "zlib", "complevel": 1, "shuffle": True, "fletcher32": True, "chunksizes": layout.brick}
 
 
 def _flush_folder(folder: Path) -> None:
@@ -229,6 +229,29 @@ def _flush_folder(folder: Path) -> None:
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
+
+
+def check_kind(path: str | os.PathLike[str], mark: str, content: str = "sweep") -> None:
+    """Make sure that a file is a result of one kind, which a new one may replace.
+
+    Parameters
+    ----------
+    path : path-like
+        File that exists.
+    mark : {"regime", "time", "contender"}
+        What tells the kind: a dimension, or for sweeps a variable.
+    content : str
+        What the new file holds.
+
+    Raises
+    ------
+    InputError
+        If it is none of this package, or of another kind.
+    """
+    with open_dataset(path) as there:
+        kinds = [kind for kind in ("contender", "time", "regime") if kind in there.dims or kind in there]
+    if kinds[:1] != [mark]:
+        raise InputError(str(path), f"holds something else: name another file for this {content}")
 
 
 def load(path: str | os.PathLike[str]) -> xr.Dataset:

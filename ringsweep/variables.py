@@ -83,6 +83,7 @@ HISTORY: dict[str, Variable] = {
     "normal_1": Variable("normal reaction at contact 1", "N"),
     "normal_2": Variable("normal reaction at contact 2", "N"),
     "ring_omega": Variable("angular velocity of the ring", "rad s-1"),
+    "theta": Variable("angle of the ring", "rad"),
     "zone_1": Variable("segment of the ring under contact 1", dtype="int32"),
     "zone_2": Variable("segment of the ring under contact 2", dtype="int32"),
     "x": Variable("displacement of the body", "m"),

@@ -1,5 +1,8 @@
 """Friction as a function of the sliding velocity: each law against its own statement, all against what they share."""
 
+import os
+import subprocess
+import sys
 from itertools import pairwise
 from math import exp, inf, log, nextafter
 
@@ -10,7 +13,7 @@ from hypothesis import strategies as st
 
 from ringsweep.config import load
 from ringsweep.errors import InputError
-from ringsweep.jit import take
+from ringsweep.jit import SOURCES_DIGEST, take
 from ringsweep.physics.friction import SET_VALUED, SMOOTH
 from ringsweep.physics.friction.set_valued import Coulomb, Karnopp, Stiction, Tustin
 from ringsweep.physics.friction.smooth import BengisuAkay, PiecewiseCubic, PiecewiseLinear, Threlfall
@@ -370,3 +373,72 @@ class TestOrderOfSpeeds:
     def test_in_order_they_are_taken(self, law):
         found = load({"scene": scene(law, v0="1 mm/s", v1="2 mm/s")})
         assert (found.scene.values["friction.v0"], found.scene.values["friction.v1"]) == (1e-3, 2e-3)
+
+
+OWN = """
+from typing import Annotated, NamedTuple
+from ringsweep.lanes import select
+from ringsweep.parameters import Leaf
+from ringsweep.physics.friction import smooth
+from ringsweep.physics.friction.static import BAND, CLEAN, ONE, TAIL, ZERO, Piece, piece, stiction_band
+
+
+class Ramp(NamedTuple):
+    v0: Annotated[Leaf, smooth.V0]
+
+
+@piece.implements(Ramp)
+def _ramp(law, region):
+    if region == TAIL:
+        return smooth.absent()
+    if region == CLEAN:
+        return Piece(law.v0, float("inf"), 0.0, ZERO, ONE)
+    return Piece(0.0, law.v0, 0.0, ZERO, (0.0, 1.0 / law.v0, 0.0, 0.0))
+
+
+@stiction_band.implements(Ramp)
+def _band(law):
+    return law.v0
+
+
+smooth.LAWS["ramp"] = Ramp
+"""
+
+USE = """
+from ringsweep.config import load
+from ringsweep.jit import SOURCES_DIGEST
+from ringsweep.physics.friction import LAWS, SMOOTH
+from ringsweep.physics.friction.static import weights
+from ringsweep.solvers.event import Auto
+scene = {"model": "belt", "body": {"mass": 1}, "spring": {"stiffness": 2}, "belt": {"velocity": 0.1},
+         "friction": {"law": "ramp", "mu_s": 0.2, "mu_k": 0.1, "v0": "1 cm/s"}, "time": {"span": 1}}
+structure = load({"scene": scene}).scene.structure
+law = LAWS[structure.law]
+assert law in SMOOTH and Auto().resolved(structure).name == "implicit"
+print(weights(law(0.01), 0.005)[1], SOURCES_DIGEST)
+"""
+
+
+def in_a_process(script, **environment):
+    environment = {**os.environ, **environment}
+    return subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=False)
+
+
+class TestOwnLaws:
+    def test_a_file_named_by_the_environment_adds_a_law(self, tmp_path):
+        (tmp_path / "my_law.py").write_text(OWN)
+        done = in_a_process(USE, RINGSWEEP_LAWS=str(tmp_path / "my_law.py"))
+        assert done.stdout.startswith("0.5 "), done.stderr
+        # What was compiled or computed with it is not taken for what is without.
+        assert SOURCES_DIGEST not in done.stdout
+
+    @pytest.mark.parametrize("name", ["nowhere.py", "json.py"])
+    def test_a_file_that_cannot_be_taken_is_refused_in_one_line(self, tmp_path, name):
+        if name == "json.py":
+            (tmp_path / name).write_text(OWN)
+        (tmp_path / "a.yaml").write_text("scene: {}")
+        script = f"from ringsweep.cli import main; raise SystemExit(main(['run', {str(tmp_path / 'a.yaml')!r}]))"
+        done = in_a_process(script, RINGSWEEP_LAWS=str(tmp_path / name))
+        assert done.returncode == 2
+        assert done.stderr.count("\n") == 1
+        assert "RINGSWEEP_LAWS" in done.stderr

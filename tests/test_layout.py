@@ -11,6 +11,14 @@ from hypothesis import strategies as st
 from ringsweep.layout import BRICK, Layout
 from ringsweep.pace import Pace, chunks
 
+
+class Took:
+    """So many cells that took so many seconds."""
+
+    def __init__(self, cells, seconds):
+        self.positions, self.seconds = range(cells), seconds
+
+
 SIZES = st.lists(st.integers(1, 9), min_size=0, max_size=4)
 
 
@@ -58,31 +66,31 @@ class TestPace:
     def test_a_chunk_takes_a_hundredth_of_the_time_before_within_bounds(self):
         pace = Pace(1, lambda: 2)
         assert pace.next(10**9) == 1
-        pace.learn(100, 0.1)
-        assert pace.next(10**9) == 30
-        pace.learn(99_000, 99.0)
+        pace.learn(Took(100, 0.1))
+        assert pace.next(10**9) == 100
+        pace.learn(Took(99_000, 99.0))
         assert pace.next(10**9) == pytest.approx(1000, rel=0.02)
-        pace.learn(10**6, 1e3)
+        pace.learn(Took(10**6, 1e3))
         assert pace.next(10**9) == pytest.approx(2000, rel=0.02)
 
     def test_a_chunk_grows_no_faster_than_what_is_known_of_the_cost(self):
         pace = Pace(1, lambda: 2)
-        pace.learn(1, 1e-6)
+        pace.learn(Took(1, 1e-6))
         assert pace.next(10**9) == 8
 
     def test_runs_that_go_side_by_side_are_not_parted(self):
         pace = Pace(16, lambda: 2)
         assert pace.next(10**9) == 16
-        pace.learn(16, 100.0)
+        pace.learn(Took(16, 100.0))
         assert pace.next(10**9) == 16
-        pace.learn(1600, 1.6)
+        pace.learn(Took(1600, 1.6))
         assert pace.next(10**9) % 16 == 0
 
     @given(done=st.lists(st.booleans(), min_size=1, max_size=200), cost=st.floats(1e-5, 10.0))
     def test_chunks_hold_every_open_cell_once_and_shrink_to_the_end(self, done, cost):
         done = np.array(done)
         pace = Pace(1, lambda: 2)
-        pace.learn(4, 4 * cost)
+        pace.learn(Took(4, 4 * cost))
         found = list(chunks(done, int((~done).sum()), pace, Event()))
         if not found:
             assert done.all()
@@ -98,7 +106,7 @@ def test_gaps_wider_than_a_chunk_are_passed_over(total):
     done = np.ones(total + 100_000, dtype=bool)
     done[-total:] = False
     pace = Pace(1, lambda: 1)
-    pace.learn(1000, 0.001)
+    pace.learn(Took(1000, 0.001))
     np.testing.assert_array_equal(
         np.concatenate(list(chunks(done, total, pace, Event()))), np.arange(100_000, 100_000 + total)
     )

@@ -1,7 +1,10 @@
 """What a reader takes from a picture is what the dataset says."""
 
+import doctest
+import importlib
 import os
 import time
+from pathlib import Path
 
 import matplotlib
 import numpy as np
@@ -251,6 +254,18 @@ def test_selecting_holds_the_nearest_value_and_says_so():
     assert "zone_half_angle = 2°" in figure.get_suptitle()
 
 
+def test_a_long_title_is_laid_in_lines():
+    held = {"friction.rough.mu_k": 0.1, "friction.rest.mu_k": 0.1, "initial.omega": 0.1}
+    title = plots.regime_map(make_sweep((3, 3, 2, 2, 2)), sel=held).get_suptitle()
+    assert "initial_omega = 0.1" in title
+    assert max(map(len, title.split("\n"))) < 70
+
+
+def test_pictures_have_an_opaque_ground_on_dark_pages_too():
+    for figure in (plots.regime_map(make_sweep()), plots.history(make_history()), plots.work_precision(make_work())):
+        assert figure.get_facecolor() == (1.0, 1.0, 1.0, 1.0)
+
+
 def test_more_dimensions_become_panels_of_one_scale():
     ds = make_sweep((6, 5, 2, 3))
     figure = plots.regime_map(ds, var="t_separation")
@@ -264,6 +279,82 @@ def test_more_dimensions_become_panels_of_one_scale():
 def test_too_many_panels_are_refused_with_the_way_out():
     with pytest.raises(InputError, match=r"small multiples.*50 panels.*--sel friction_rough_mu_k=VALUE"):
         plots.regime_map(make_sweep((3, 3, 5, 5, 2)))
+
+
+def test_of_a_large_grid_no_more_is_drawn_than_a_page_shows_and_the_title_says_so():
+    ds = make_sweep((3000, 1500))
+    ds["regime"][:] = 1
+    ds["regime"][0, 0] = 3
+    figure = plots.regime_map(ds)
+    assert mesh(figure).get_array().shape == (750, 1000)
+    assert figure.get_suptitle() == "regime of the run; 1 cell in 6 drawn"
+    # Shares are those of all cells.
+    assert entries(figure) == ["oscillatory, > 99.9 %", "separating, < 0.1 %"]
+    corners = mesh(figure).get_coordinates()
+    assert corners[0, 0, 0] == pytest.approx(0.1, rel=0.01)
+    assert corners[0, -1, 0] == pytest.approx(10.0, rel=0.01)
+
+
+def test_a_line_is_drawn_with_all_its_values():
+    assert len(plots.regime_map(make_sweep((5000,)), var="t_separation").axes[0].lines[0].get_xdata()) == 5000
+
+
+class TestPanels:
+    """What draws one picture draws it where it is told, and returns that."""
+
+    def test_a_map(self):
+        left, right = Figure().subplots(1, 2)
+        assert plots.map_panel(make_sweep(), ax=right) is right
+        assert not left.collections
+        assert right.get_xlabel() == "amplitude of the drive (rad s$^{-1}$)"
+        assert [text.get_text().split(",")[0] for text in right.get_legend().get_texts()] == list(REGIMES[:5])
+
+    def test_a_map_of_numbers_has_a_scale(self):
+        ax = Figure().add_subplot()
+        plots.map_panel(make_sweep(), var="t_separation", ax=ax)
+        assert ax.figure.axes[1].get_ylabel() == "time of separation (s)"
+
+    def test_a_map_of_more_dimensions_is_refused_with_the_way_out(self):
+        with pytest.raises(InputError, match="friction_rough_mu_k: hold it, or draw regime_map"):
+            plots.map_panel(make_sweep((3, 3, 2)), ax=Figure().add_subplot())
+        held = plots.map_panel(make_sweep((3, 3, 2)), sel={"friction.rough.mu_k": 0.1}, ax=Figure().add_subplot())
+        assert "friction_rough_mu_k = 0.1" in held.get_title()
+
+    @pytest.mark.parametrize(("var", "lines"), [("phi", 1), ("ring_omega", 2), ("normal_2", 2), ("epsilon", 1)])
+    def test_a_panel_of_a_history_has_what_belongs_together(self, var, lines):
+        ax = Figure().add_subplot()
+        assert plots.history_panel(make_history(), var, ax) is ax
+        assert len(ax.lines) == lines
+        assert ax.get_xlabel() == "time (s)"
+        assert "(" in ax.get_ylabel()
+
+    def test_a_panel_of_several_laws_has_a_line_for_each(self):
+        one = make_history().drop_vars(["mode", "zone_1", "zone_2"])
+        ds = xr.concat([one, one], "friction_law").assign_coords(friction_law=["coulomb", "stiction"])
+        ax = plots.history_panel(ds, "phi", Figure().add_subplot())
+        assert [text.get_text() for text in ax.get_legend().get_texts()] == ["coulomb", "stiction"]
+
+    def test_an_unknown_quantity_is_refused_with_the_right_one(self):
+        with pytest.raises(InputError, match="did you mean omega"):
+            plots.history_panel(make_history(), "omeg", Figure().add_subplot())
+
+    def test_without_axes_the_current_ones_are_drawn_in(self):
+        from matplotlib import pyplot
+
+        try:
+            assert plots.map_panel(make_sweep()) is pyplot.gca()
+            assert plots.history_panel(make_history()) is pyplot.gca()
+            assert len(pyplot.get_fignums()) == 1
+        finally:
+            pyplot.close("all")
+
+
+@pytest.mark.parametrize("module", ["style", "maps", "histories", "precision", "ring", "motion", "interactive"])
+def test_examples_in_docstrings_hold(module, monkeypatch):
+    monkeypatch.chdir(Path(__file__).parents[1])
+    failed, tried = doctest.testmod(importlib.import_module(f"ringsweep.plots.{module}"))
+    assert tried
+    assert not failed
 
 
 def test_points_are_scattered_over_their_coordinates():
@@ -438,7 +529,7 @@ class TestWorkPrecision:
     def test_axes_that_are_given_are_drawn_in(self):
         figure = Figure()
         _, right = figure.subplots(1, 2)
-        assert plots.work_precision(make_work(), ax=right) is figure
+        assert plots.precision_panel(make_work(), ax=right) is right
         assert right.lines
 
     def test_other_datasets_and_unknown_errors_are_refused(self):

@@ -52,9 +52,24 @@ def test_a_worker_of_another_version_is_refused(cluster, scene, monkeypatch):
         ringsweep.sweep(scene, {"drive.amplitude": [1.0]}, scheduler=cluster.scheduler_address, progress=False)
 
 
+def test_a_stop_while_no_worker_is_there_is_heeded(scene, tmp_path, monkeypatch):
+    with LocalCluster(n_workers=0, dashboard_address=None, silence_logs=logging.CRITICAL) as empty:
+        looks = iter(range(3))
+
+        def none_yet(client):
+            if next(looks, None) == 2:
+                signal.raise_signal(signal.SIGINT)
+            return 0
+
+        monkeypatch.setattr("ringsweep.remote.threads", none_yet)
+        with pytest.raises(KeyboardInterrupt):
+            ringsweep.sweep(scene, {"drive.amplitude": [1.0]}, scheduler=empty.scheduler_address, progress=False)
+
+
 @pytest.mark.parametrize(
     ("options", "problem"),
     [
+        (["--scheduler", "http://127.0.0.1:1"], "no Dask scheduler answers at 'http://127.0.0.1:1'"),
         (["--backend", "dask"], "--scheduler ADDRESS"),
         (["--backend", "threads", "--scheduler", "tcp://127.0.0.1:1"], "--backend dask"),
         (["--scheduler", "tcp://127.0.0.1:1"], "no Dask scheduler answers at 'tcp://127.0.0.1:1'"),

@@ -84,6 +84,23 @@ def test_points_take_cells_of_a_grid_and_a_grid_those_of_points(scene, earlier, 
     assert [line.split(" cells")[0] for line in lines] == ["2 of 3", "2 of 15"]
 
 
+def test_a_sweep_through_laws_does_whatever_only_the_others_need(scene, earlier, tmp_path, caplog):
+    laws = scene | {"friction": scene["friction"] | {"alpha": 1e3}}
+    axes = COARSE | {"friction.law": ["stiction", "coulomb"]}
+    assert taken(laws, axes, earlier, tmp_path, caplog) == 15
+
+
+def test_one_law_takes_its_cells_of_a_sweep_through_laws(scene, tmp_path, caplog):
+    friction = {"friction": scene["friction"] | {"alpha": 1e3}}
+    axes = {"drive.amplitude": AMPLITUDES, "friction.law": ["coulomb", "stiction"], "friction.alpha": [1e3, 2e3]}
+    with pytest.raises(InputError, match="no such number"):
+        ringsweep.sweep(scene | friction, axes, progress=False)
+    ringsweep.sweep(
+        scene, {"friction.law": ["coulomb", "stiction"], **COARSE}, tmp_path / "l.nc", progress=False
+    ).close()
+    assert taken(scene, COARSE, tmp_path / "l.nc", tmp_path, caplog) == 15
+
+
 def test_nothing_is_computed_that_the_file_holds(scene, earlier, tmp_path, computed):
     ringsweep.sweep(scene, COARSE, tmp_path / "new.nc", reuse=earlier, progress=False).close()
     assert computed == [15]

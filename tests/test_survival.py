@@ -107,13 +107,13 @@ class TestGoingOn:
         assert 0 < len(computed) < 72
 
     def test_a_stop_tells_how_to_go_on(self, config, tmp_path, monkeypatch, capsys, caplog, small_chunks):
-        learn = Pace.learn
+        put = Chunks.put
 
         def interrupted(*arguments):
-            learn(*arguments)
+            put(*arguments)
             signal.raise_signal(signal.SIGINT)
 
-        monkeypatch.setattr(Pace, "learn", interrupted)
+        monkeypatch.setattr(Chunks, "put", interrupted)
         assert cli.main(["run", str(config), "-o", str(tmp_path / "out.nc")]) == 130
         message = capsys.readouterr().err
         assert message.count("\n") == 1
@@ -155,7 +155,7 @@ class TestNeverMixed:
         ringsweep.run(config, half_done, fresh=True, progress=False).close()
         assert same_bits(half_done, never_stopped)
 
-    @pytest.mark.parametrize("damage", ["truncated", "empty", "one bit", "of another sweep", "no archive"])
+    @pytest.mark.parametrize("damage", ["truncated", "empty", "one bit", "directory", "of another sweep", "no archive"])
     def test_a_damaged_or_foreign_chunk_is_noticed_and_computed_again(
         self, config, half_done, never_stopped, caplog, damage
     ):
@@ -164,17 +164,55 @@ class TestNeverMixed:
         if damage == "of another sweep":
             with owned(half_done.with_name("b.nc"), {"a": "b"}, Layout([72])) as others:
                 others.put(np.arange(3), {"regime": np.zeros(3, dtype="int8")}, "none")
+                path = path.with_name(next(iter(others.files)).name)
                 shutil.copy(next(iter(others.files)), path)
         else:
             with np.load(path) as members:
-                inside = content.index(members["phi_end"].tobytes())
-            content[inside] ^= 4
-            cut = {"truncated": content[:-200], "empty": b"", "one bit": content, "no archive": b"regime"}
+                content[content.index(members["cells"].tobytes())] ^= 4
+            changed = bytearray(path.read_bytes())
+            # The name of a member, where an archive has no checksum.
+            changed[changed.rindex(b"cells.npy")] ^= 1
+            cut = {
+                "truncated": content[:-200],
+                "empty": b"",
+                "one bit": content,
+                "directory": changed,
+                "no archive": b"a",
+            }
             path.write_bytes(cut[damage])
         ringsweep.run(config, half_done, progress=False).close()
         assert f"{path} is {'not of this sweep' if damage == 'of another sweep' else 'damaged'}" in caplog.text
         assert "its cells are computed again" in caplog.text
         assert same_bits(half_done, never_stopped)
+
+    @pytest.mark.parametrize("text", ["", "[1]", "5", "null", '{"scene.model": 1}', "\xff"])
+    def test_a_damaged_list_of_what_decides_is_no_obstacle(self, config, half_done, never_stopped, text):
+        half_done.with_name("out.nc.partial").joinpath("sweep.json").write_bytes(text.encode("latin-1"))
+        ringsweep.run(config, half_done, progress=False).close()
+        assert same_bits(half_done, never_stopped)
+
+    def test_chunks_that_vanish_meanwhile_are_computed_again(
+        self, config, half_done, never_stopped, monkeypatch, caplog
+    ):
+        merge = storage.write
+
+        def vanish(*arguments):
+            monkeypatch.setattr(storage, "write", merge)
+            for path in chunks_of(half_done)[:3]:
+                path.unlink()
+            merge(*arguments)
+
+        monkeypatch.setattr(storage, "write", vanish)
+        ringsweep.run(config, half_done, progress=False).close()
+        assert "looking for what is missing" in caplog.text
+        assert same_bits(half_done, never_stopped)
+
+    @pytest.mark.parametrize("fresh", [False, True])
+    def test_a_file_of_something_else_is_not_replaced(self, config, tmp_path, fresh):
+        (tmp_path / "notes.txt").write_text("precious")
+        with pytest.raises(ringsweep.InputError, match=r"notes\.txt"):
+            ringsweep.run(config, tmp_path / "notes.txt", fresh=fresh, progress=False)
+        assert (tmp_path / "notes.txt").read_text() == "precious"
 
     def test_two_at_once_are_one(self, config, tmp_path, capsys):
         target = tmp_path / "out.nc"
@@ -213,6 +251,7 @@ class TestWhereTheDiskFails:
             assert cli.main(["run", str(config), "-o", str(target)]) == 1
         message = capsys.readouterr().err.splitlines()[-1]
         assert "No space left on device" in message
+        assert "out.nc.partial" in message
         assert "the same command goes on" in message
         assert left(target) == ["out.nc.partial"]
         assert not list(target.with_name("out.nc.partial").glob("*.tmp"))
@@ -263,6 +302,20 @@ class TestFile:
         in_memory = ringsweep.sweep(scene, axes, progress=False)
         xr.testing.assert_equal(found.load(), in_memory)
         found.close()
+
+    def test_of_shared_dimensions_is_repeated_with_them(self, scene, tmp_path, caplog):
+        """A configuration cannot name them; the coordinates of the file do."""
+        axes = {
+            "drive.amplitude": xr.DataArray([[0.5, 1.0], [2.0, 8.0]], dims=("i", "j")),
+            "body.mass": xr.DataArray([0.05, 0.06], dims="j"),
+            "friction.law": ["coulomb", "stiction"],
+        }
+        one, two = tmp_path / "one.nc", tmp_path / "two.nc"
+        ringsweep.sweep(scene, axes, one, progress=False).close()
+        ringsweep.run(one, two, progress=False).close()
+        assert same_bits(one, two)
+        assert not write(load(two), one, progress=False)
+        assert "replaced" not in caplog.text
 
     def test_a_single_run_has_no_dimension(self, scene, tmp_path):
         with ringsweep.run({"scene": scene}, tmp_path / "out.nc", progress=False) as found:

@@ -299,3 +299,26 @@ def friction(scene, phi, omega, theta, ring_omega):
     mu_s, mu_k = roughness(scene.surface, turns + offset)
     K2, slope_2 = opposing(w_s * mu_s + w_k * mu_k, v), -(dw_s * mu_s + dw_k * mu_k) * radius
     return v, K1, K2, slope_1, slope_2
+
+
+@hook
+def tractions(body, sin_phi, cos_phi, omega, phi_dd, normal_1, normal_2):
+    """Friction ``(F1, F2)`` along the race, N, positive the way phi grows, that a motion and its reactions tell.
+
+    In stick too, where no law gives it; with one contact F2 repeats F1.
+    """
+
+
+@tractions.implements(TwoContacts)
+def _two_tractions(body, sin_phi, cos_phi, omega, phi_dd, normal_1, normal_2):
+    b = body
+    both = ((b.inertia + b.mass * b.xi * b.xi) * phi_dd + b.mass * b.gravity * b.xi * sin_phi) / b.radius
+    load = b.mass * (b.gravity * cos_phi + b.xi * omega * omega)
+    difference = ((normal_1 + normal_2) * b.cos_beta - load) / b.sin_beta
+    return 0.5 * (both + difference), 0.5 * (both - difference)
+
+
+@tractions.implements(OneContact)
+def _one_traction(body, sin_phi, cos_phi, omega, phi_dd, normal_1, normal_2):
+    friction = body.mass * (body.radius * phi_dd + body.gravity * sin_phi)
+    return friction, friction

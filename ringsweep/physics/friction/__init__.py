@@ -4,11 +4,23 @@ Every law gives a coefficient of friction, the force per unit of the normal load
 law serves the belt under its weight and the ring under reactions that vary.
 """
 
+import importlib.util
+import sys
 from typing import Any
 
+from ringsweep.errors import InputError
+from ringsweep.jit import OWN_LAWS
 from ringsweep.parameters import Parameter
 from ringsweep.physics.friction import dynamic, set_valued, smooth
 from ringsweep.physics.friction.static import MU_K, MU_S
+
+for _path in OWN_LAWS:
+    # By its name in `sys.modules` a law is found again when compiled code is loaded.
+    _spec = importlib.util.spec_from_file_location(_path.stem, _path)
+    if _spec is None or _spec.loader is None or _path.stem in sys.modules:
+        raise InputError("RINGSWEEP_LAWS", f"{_path} is no file of Python with a name of its own")
+    sys.modules[_path.stem] = _module = importlib.util.module_from_spec(_spec)
+    _spec.loader.exec_module(_module)
 
 #: Laws whose friction at rest is whatever holds the contact, up to a bound.
 SET_VALUED: tuple[type, ...] = tuple(set_valued.LAWS.values())

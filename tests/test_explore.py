@@ -1,0 +1,170 @@
+"""A click on a map asks for the cell that is drawn there, and for no other."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.backend_bases import MouseEvent
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+import ringsweep
+from ringsweep import engine, plots
+from ringsweep.config import load
+from ringsweep.errors import InputError
+from ringsweep.variables import OUTCOMES, REGIMES
+
+AXES = {"drive.amplitude": [0.5, 2.0, 8.0], "zone.half_angle": ["10 deg", "20 deg", "40 deg", "60 deg"]}
+
+
+def mapped(scene, axes, points=False):
+    """What a sweep over axes gives, without its having been run."""
+    config = load({"scene": scene, "sweep": {"points" if points else "grid": axes}})
+    ds = engine._frame(config)
+    shape = tuple(config.axes.sizes.values())
+    regime = (np.arange(np.prod(shape)) % 3).astype("int8").reshape(shape)
+    return ds.assign(regime=(tuple(config.axes.sizes), regime, OUTCOMES["regime"].attributes))
+
+
+@pytest.fixture
+def maps(scene):
+    return mapped(scene, AXES)
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """Configurations of which histories are asked for; all of them are one and the same."""
+    found = []
+    time = np.linspace(0.0, 1.0, 20)
+    history = xr.Dataset(dict.fromkeys(("phi", "omega", "epsilon", "normal_1"), ("time", time)), {"time": time})
+
+    def simulate(configuration):
+        found.append(load(configuration).scene.values)
+        return history.assign_attrs(outcome=f"history {len(found)}")
+
+    monkeypatch.setattr("ringsweep.single.simulate", simulate)
+    return found
+
+
+def click(figure, x, y, button=1, ax=None):
+    FigureCanvasAgg(figure).draw()
+    ax = ax or figure.axes[0]
+    at = ax.transData.transform((x, y))
+    figure.canvas.callbacks.process("button_press_event", MouseEvent("button_press_event", figure.canvas, *at, button))
+
+
+class TestCell:
+    def test_is_the_configuration_with_the_values_of_the_cell(self, maps):
+        found = plots.cell(maps, {"drive.amplitude": 1.9, "zone_half_angle": np.radians(39.0)})
+        assert "sweep" not in found
+        values = load(found).scene.values
+        assert values["drive.amplitude"] == 2.0
+        assert values["zone.half_angle"] == float(maps["zone_half_angle"][2])
+
+    def test_may_have_been_chosen_as_xarray_does(self, maps):
+        found = plots.cell(maps.isel(drive_amplitude=2).sel(zone_half_angle=0.3, method="nearest"))
+        values = load(found).scene.values
+        assert (values["drive.amplitude"], values["zone.half_angle"]) == (8.0, float(maps["zone_half_angle"][1]))
+
+    def test_of_points_is_one_of_them(self, scene):
+        ds = mapped(scene, {"drive.amplitude": [0.5, 2.0, 8.0], "initial.omega": [3.0, 1.0, 2.0]}, points=True)
+        values = load(plots.cell(ds, {"point": 1})).scene.values
+        assert (values["drive.amplitude"], values["initial.omega"]) == (2.0, 1.0)
+
+    def test_may_lie_on_an_axis_of_laws_or_in_a_list_of_arcs(self, scene):
+        bare = {name: part for name, part in scene.items() if name != "zone"}
+        bare["friction"] = {"rest": scene["friction"]["rest"]}
+        bare["zones"] = [{"half_angle": "10 deg", "mu_s": 0.5, "mu_k": 0.3}]
+        ds = mapped(bare, {"friction.law": ["coulomb", "stiction"], "zones.0.mu_k": [0.2, 0.25]})
+        found = plots.cell(ds, {"friction.law": "coulomb", "zones.0.mu_k": 0.25})
+        assert found["scene"]["friction"]["law"] == "coulomb"
+        assert found["scene"]["zones"][0]["mu_k"] == 0.25
+
+    def test_runs_as_it_did_in_the_sweep(self, scene):
+        ds = ringsweep.sweep(scene, {"drive.amplitude": [0.5, 8.0], "zone.half_angle": ["15 deg", "40 deg"]})
+        for i, j in ((0, 1), (1, 0)):
+            one = ds.isel(drive_amplitude=i, zone_half_angle=j)
+            run = ringsweep.simulate(plots.cell(one))
+            assert REGIMES[int(run["regime"])] == REGIMES[int(one["regime"])]
+            assert float(run["phi_end"]) == float(one["phi_end"])
+
+    def test_more_than_one_is_refused_with_what_is_left(self, maps):
+        with pytest.raises(InputError, match=r"zone_half_angle \(4\) is left"):
+            plots.cell(maps, {"drive.amplitude": 2.0})
+        with pytest.raises(InputError, match="did you mean drive_amplitude"):
+            plots.cell(maps, {"drive.amplitud": 2.0})
+        with pytest.raises(InputError, match="no attribute configuration"):
+            plots.cell(maps.isel(drive_amplitude=0, zone_half_angle=0).drop_attrs())
+
+
+class TestExplore:
+    def test_draws_the_map_and_the_history_of_the_cell_in_the_middle(self, maps, asked):
+        figure = plots.explore(maps)
+        assert [axes.get_ylabel().replace("\n", " ") for axes in figure.axes[:2]] == [
+            "half-angle of the rough zone (°)",
+            "angle",
+        ]
+        assert asked[0]["drive.amplitude"] == 2.0
+        assert asked[0]["zone.half_angle"] == pytest.approx(np.radians(40.0))
+        assert figure.subfigs[1].get_suptitle().endswith("history 1")
+
+    def test_begins_with_the_cell_that_is_named(self, maps, asked):
+        plots.explore(maps, at={"drive.amplitude": 8.0, "zone.half_angle": 0.1})
+        assert asked[0]["drive.amplitude"] == 8.0
+        assert asked[0]["zone.half_angle"] == pytest.approx(np.radians(10.0))
+
+    @pytest.mark.parametrize(("x", "y"), [(0.5, 10.0), (8.0, 20.0), (1.3, 48.0)])
+    def test_a_click_draws_the_cell_under_it_and_marks_it(self, maps, asked, x, y):
+        figure = plots.explore(maps)
+        click(figure, x, y)
+        near = min(AXES["drive.amplitude"], key=lambda value: abs(np.log(value / x)))
+        assert len(asked) == 2
+        assert asked[1]["drive.amplitude"] == near
+        assert asked[1]["zone.half_angle"] == pytest.approx(np.radians({10.0: 10, 20.0: 20, 48.0: 40}[y]))
+        assert figure.subfigs[1].get_suptitle().endswith("history 2")
+        assert f"drive_amplitude = {near:g} rad s" in figure.subfigs[1].get_suptitle()
+        mark = figure.axes[0].lines[-1].get_xydata()[0]
+        np.testing.assert_allclose(mark, [near, np.degrees(asked[1]["zone.half_angle"])])
+
+    def test_other_clicks_are_not_for_it(self, maps, asked):
+        figure = plots.explore(maps)
+        click(figure, 2.0, 20.0, button=3)
+        click(figure, 0.5, 0.5, ax=figure.axes[1])
+        figure.canvas.callbacks.process("button_press_event", MouseEvent("button_press_event", figure.canvas, 1, 1, 1))
+        assert len(asked) == 1
+
+    def test_where_clicks_are_heard_the_figure_is_pyplots_and_elsewhere_a_picture(self, maps, asked, monkeypatch):
+        from matplotlib import pyplot
+
+        plots.explore(maps)
+        assert not pyplot.get_fignums()
+        monkeypatch.setattr("matplotlib.get_backend", lambda: "widget")
+        try:
+            figure = plots.explore(maps)
+            assert figure is pyplot.figure(pyplot.get_fignums()[0])
+        finally:
+            pyplot.close("all")
+
+    def test_axes_may_be_exchanged_and_others_held(self, scene, asked):
+        maps = mapped(scene, AXES | {"friction.rough.mu_k": [0.25, 0.3]})
+        with pytest.raises(InputError, match="friction_rough_mu_k"):
+            plots.explore(maps)
+        figure = plots.explore(maps, x="zone.half_angle", y="drive.amplitude", sel={"friction.rough.mu_k": 0.26})
+        click(figure, 20.0, 8.0)
+        assert asked[1]["friction.rough.mu_k"] == 0.25
+        assert asked[1]["drive.amplitude"] == 8.0
+
+    def test_of_points_the_nearest_to_the_eye_is_meant(self, scene, asked):
+        axes = {"drive.amplitude": [0.5, 2.0, 8.0, 8.0], "initial.omega": [3.0, 1.0, 2.0, 0.0]}
+        figure = plots.explore(mapped(scene, axes, points=True))
+        click(figure, 7.0, 1.8)
+        assert (asked[1]["drive.amplitude"], asked[1]["initial.omega"]) == (8.0, 2.0)
+
+    def test_laws_are_an_axis_too(self, scene, asked):
+        ds = mapped(scene, {"drive.amplitude": [0.5, 2.0], "friction.law": ["coulomb", "stiction"]})
+        figure = plots.explore(ds)
+        click(figure, 2.0, 0.0)
+        assert "friction_law = coulomb" in figure.subfigs[1].get_suptitle()
+
+    def test_one_axis_is_enough(self, scene, asked):
+        figure = plots.explore(mapped(scene, {"drive.amplitude": [0.5, 2.0, 8.0]}))
+        click(figure, 8.0, 0.5)
+        assert asked[1]["drive.amplitude"] == 8.0

@@ -1,0 +1,393 @@
+"""What the pictures of the body in the ring show is where things are, and what acts on them."""
+
+import io
+import json
+import os
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.animation import AbstractMovieWriter, FFMpegWriter
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Rectangle, Wedge
+from matplotlib.quiver import Quiver
+from PIL import Image
+
+import ringsweep
+from ringsweep import plots
+from ringsweep.cli import main
+from ringsweep.errors import InputError
+from ringsweep.plots import motion
+
+RADIUS, BALL, HALF_DISTANCE = 0.043378, 0.010, 0.025
+BETA = np.arcsin(HALF_DISTANCE / (RADIUS - BALL))
+WEIGHT = 0.076 * 9.81
+
+
+@pytest.fixture(scope="module")
+def run(scene):
+    """The scene of the paper's Fig. 29 with the limit law: sticks and slips until contact 2 separates."""
+    return ringsweep.simulate(scene)
+
+
+@pytest.fixture
+def other(run):
+    """The run with another scene in its attributes."""
+
+    def change(**changes):
+        scene = json.loads(run.attrs["configuration"])["scene"]
+        scene = {name: part for name, part in (scene | changes).items() if part is not None}
+        return run.assign_attrs(configuration=json.dumps({"scene": scene}))
+
+    return change
+
+
+@pytest.fixture
+def ax():
+    return Figure(figsize=(7, 5)).add_subplot()
+
+
+def at(run, time):
+    """State of a run at one of its samples, by name."""
+    k = int(np.searchsorted(run["time"], time))
+    return {name: float(data[k]) for name, data in run.items() if data.dims == ("time",)} | {"time": float(run.time[k])}
+
+
+def arrows(ax):
+    """Reactions, frictions, weight: where each begins, and how far it goes."""
+    found = [artist for artist in ax.collections if isinstance(artist, Quiver)]
+    return [(np.asarray(q.get_offsets()), np.column_stack([q.U, q.V])) for q in found]
+
+
+def place(angle, radius=RADIUS):
+    return radius * np.array([np.sin(angle), -np.cos(angle)])
+
+
+class TestHistory:
+    def test_has_the_angle_of_the_ring(self, run):
+        t = run["time"].values
+        np.testing.assert_allclose(run["theta"], 2.0 * (t * np.arctan(t) - 0.5 * np.log1p(t * t)), rtol=1e-12)
+        assert run["theta"].attrs["units"] == "rad"
+
+    def test_tells_the_friction_which_in_slip_is_that_of_the_law(self, run):
+        found = plots.ring.run_of(run)
+        for k in (1, 2):
+            zone, mode = found[f"zone_{k}"].values, found["mode"].values
+            friction, normal = found[f"friction_{k}"].values, found[f"normal_{k}"].values
+            slips = mode != 0
+            expected = -mode * np.where(zone > 0, 0.3, 0.1) * normal
+            # Where an event stores two states of an instant, the mode is that of one of them.
+            agrees = np.isclose(friction, expected, rtol=1e-6, atol=1e-9)[slips]
+            assert agrees.mean() > 0.99
+            sticks = np.abs(friction)[~slips] <= (np.where(zone > 0, 0.5, 0.2) * normal)[~slips] + 1e-9
+            assert sticks.mean() > 0.99
+
+
+class TestPolarView:
+    TIMES = (0.3, 1.2, 2.6, 3.4)
+
+    @pytest.mark.parametrize("time", TIMES)
+    def test_has_the_balls_where_the_body_is_touching_the_ring(self, run, ax, time):
+        now = at(run, time)
+        plots.polar_view(run, now["time"], ax)
+        balls = [patch for patch in ax.patches if isinstance(patch, Circle)]
+        for ball, side in zip(balls, (-1, 1), strict=True):
+            np.testing.assert_allclose(ball.center, place(now["phi"] + side * BETA, RADIUS - BALL), atol=1e-9)
+            assert ball.radius == BALL
+
+    @pytest.mark.parametrize("time", TIMES)
+    def test_arcs_turn_with_the_ring(self, run, ax, time):
+        now = at(run, time)
+        plots.polar_view(run, now["time"], ax)
+        *_, arc = (patch for patch in ax.patches if isinstance(patch, Wedge))
+        # Matplotlib's angles count from the right, ours from below.
+        ends = np.degrees(now["theta"]) + np.array([-15.0, 15.0])
+        np.testing.assert_allclose([arc.theta1 + 90.0, arc.theta2 + 90.0], ends, atol=1e-9)
+
+    @pytest.mark.parametrize("time", TIMES)
+    def test_reactions_begin_at_the_contacts_point_inwards_and_are_to_scale_with_the_weight(self, run, ax, time):
+        now = at(run, time)
+        plots.polar_view(run, now["time"], ax)
+        (begin, reach), (same, friction), (centre, weight) = arrows(ax)
+        scale = -weight[0, 1] / WEIGHT
+        assert weight[0, 0] == 0.0
+        np.testing.assert_allclose(centre[0], place(now["phi"], (RADIUS - BALL) * np.cos(BETA)), atol=1e-9)
+        np.testing.assert_array_equal(begin, same)
+        for k, side in ((1, -1), (2, 1)):
+            angle = now["phi"] + side * BETA
+            np.testing.assert_allclose(begin[k - 1], place(angle), atol=1e-9)
+            np.testing.assert_allclose(reach[k - 1], -place(angle, scale * now[f"normal_{k}"]), atol=1e-9)
+            assert friction[k - 1] @ reach[k - 1] == pytest.approx(0.0, abs=1e-12)
+
+    def test_friction_opposes_slip_and_its_magnification_is_told(self, run, ax):
+        backward = at(run.isel(time=run["mode"] == -1), 1.0)
+        plots.polar_view(run, backward["time"], ax)
+        (begin, _), (_, friction), (_, weight) = arrows(ax)
+        (told,) = (text.get_text() for text in ax.get_legend().get_texts() if "friction at 1" in text.get_text())
+        enlarged = float(told.rpartition(", ")[2].removesuffix(":1")) if ":1" in told else 1.0
+        for k in (0, 1):
+            forwards = np.array([-begin[k, 1], begin[k, 0]]) / RADIUS
+            assert friction[k] @ forwards > 0.0
+        mu = 0.3 if backward["zone_1"] else 0.1
+        newtons = np.linalg.norm(friction[0]) / (-weight[0, 1] / WEIGHT) / enlarged
+        assert newtons == pytest.approx(mu * backward["normal_1"], rel=1e-6)
+
+    def test_scales_are_given(self, run, ax):
+        plots.polar_view(run, 1.0, ax)
+        (_, _), _, (_, weight) = arrows(ax)
+        words = {text.get_text(): text for text in ax.texts}
+        bars = [line for line in ax.lines if line.get_marker() == "|"]
+        lengths = [np.ptp(bar.get_xdata()) for bar in bars]
+        force, length = (name for name in words if name.endswith((" N", " mm")))
+        assert lengths[0] == pytest.approx(float(force.split()[0]) * -weight[0, 1] / WEIGHT)
+        assert lengths[1] == pytest.approx(float(length.split()[0]) / 1000)
+
+    def test_title_has_time_and_mode(self, run, ax):
+        stick = at(run.isel(time=run["mode"] == 0), 0.5)
+        plots.polar_view(run, stick["time"], ax)
+        assert ax.get_title() == f"t = {stick['time']:.4f} s, stick"
+
+    def test_a_single_contact_has_one_ball_and_one_reaction(self, other, ax):
+        ds = other(model="ring-single-contact", body={"mass": 0.05}).drop_vars(["normal_2", "zone_2"])
+        plots.polar_view(ds, 1.0, ax)
+        assert sum(isinstance(patch, Circle) for patch in ax.patches) == 1
+        assert [len(begin) for begin, _ in arrows(ax)] == [1, 1, 1]
+
+    def test_every_arc_has_its_colour_and_a_ring_may_have_none(self, other, ax):
+        arcs = [{"center": f"{100 * k} deg", "half_angle": "20 deg", "mu_s": 0.4, "mu_k": 0.3} for k in range(3)]
+        friction = {"law": "stiction", "rest": {"mu_s": 0.2, "mu_k": 0.1}}
+        plots.polar_view(other(zone=None, zones=arcs, friction=friction), 1.0, ax)
+        colours = {patch.get_facecolor() for patch in ax.patches if isinstance(patch, Wedge)}
+        assert len(colours) == 4
+        smooth = Figure().add_subplot()
+        plots.polar_view(other(zone=None, friction=friction), 1.0, smooth)
+        assert sum(isinstance(patch, Wedge) for patch in smooth.patches) == 1
+
+    @pytest.mark.parametrize("time", [-0.1, 3.9, np.nan])
+    def test_an_instant_beyond_the_run_is_refused(self, run, ax, time):
+        with pytest.raises(InputError, match="not within the run"):
+            plots.polar_view(run, time, ax)
+
+
+class TestPhasePortrait:
+    def test_shows_speed_over_angle_and_the_ring_beside(self, run, ax):
+        assert plots.phase_portrait(run, ax=ax) is ax
+        lines = {line.get_label(): line for line in ax.get_legend().get_lines()}
+        assert {"speed of the ring", "slip backward", "stick", "a contact on rough arc", "start", "end"} <= set(lines)
+        drawn = [line.get_xydata() for line in ax.lines]
+        ring = np.column_stack([np.degrees(run["phi"]), run["ring_omega"]])
+        assert any(len(points) == len(ring) and np.allclose(points, ring) for points in drawn)
+        body = np.column_stack([np.degrees(run["phi"]), run["omega"]])[run["mode"] == 0]
+        stick = next(line for line in ax.lines if line.get_linewidth() > 2 and line.get_color() == "black")
+        shown = stick.get_xydata()[~np.isnan(stick.get_xydata()[:, 1])]
+        assert {tuple(point) for point in body} <= {tuple(point) for point in shown}
+
+    def test_seen_from_the_ring_arcs_are_bands_for_each_contact(self, run, ax):
+        plots.phase_portrait(run, "ring", ax)
+        bands = {tuple(np.round(np.sort([p.get_x(), p.get_x() + p.get_width()]), 6)) for p in ax.patches}
+        low, high = ax.get_xlim()
+        for side in (-1, 1):
+            # Contact 1 lags behind the body by beta: it is there when the body is beyond.
+            middle = -side * np.degrees(BETA)
+            images = [(middle - 15 + turn, middle + 15 + turn) for turn in (-720, -360, 0, 360)]
+            seen = {(round(max(a, low), 6), round(min(b, high), 6)) for a, b in images if b > low and a < high}
+            assert seen
+            assert seen <= bands
+        assert all(isinstance(patch, Rectangle) for patch in ax.patches)
+
+    def test_the_strip_of_the_history_agrees_with_the_bands(self, run, ax):
+        plots.phase_portrait(run, "ring", ax)
+        psi = np.degrees(run["phi"] - run["theta"]).values
+        under = np.zeros((2, len(psi)), dtype=bool)
+        for patch in ax.patches:
+            if patch.get_hatch():
+                own = (patch.get_x() <= psi) & (psi < patch.get_x() + patch.get_width())
+                under[int("/" not in patch.get_hatch())] |= own
+        for row, zone in zip(under, ("zone_1", "zone_2"), strict=True):
+            assert np.mean(row == (run[zone].values > 0)) > 0.995
+
+    def test_axes_have_names_and_units_in_either_frame(self, run):
+        for frame in ("space", "ring"):
+            ax = plots.phase_portrait(run, frame, Figure().add_subplot())
+            assert "(°)" in ax.get_xlabel()
+            assert "(rad s$^{-1}$)" in ax.get_ylabel()
+        (slide,) = ax.child_axes
+        assert slide.get_ylabel() == "sliding velocity (m s$^{-1}$)"
+
+    def test_many_turns_are_laid_over_one_another_without_a_stroke_across(self, run, ax):
+        spun = run.assign(phi=run["phi"] * 20.0)
+        plots.phase_portrait(spun, ax=ax)
+        assert ax.get_xlim() == (-180.0, 180.0)
+        for line in ax.lines:
+            if line.get_linestyle() not in ("None", ""):
+                steps = np.abs(np.diff(line.get_xdata()))
+                assert not (steps > 180.0).any()
+
+    def test_a_ring_at_rest_has_bands_in_space_too(self, run, other, ax):
+        still = other().assign(theta=run["theta"] * 0.0, ring_omega=run["ring_omega"] * 0.0)
+        plots.phase_portrait(still, ax=ax)
+        assert any(patch.get_hatch() for patch in ax.patches)
+        assert not any(isinstance(artist, PolyCollection) for artist in ax.collections)
+
+    def test_an_unknown_frame_is_refused(self, run, ax):
+        with pytest.raises(InputError, match="neither 'space' nor 'ring'"):
+            plots.phase_portrait(run, "body", ax)
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [plots.phase_portrait, lambda ds: plots.polar_view(ds, 1.0), plots.animation],
+    ids=["phase", "polar", "film"],
+)
+class TestRefused:
+    def test_a_belt(self, run, draw):
+        with pytest.raises(InputError, match="belt"):
+            draw(run.drop_vars("phi"))
+
+    def test_a_sweep(self, run, draw):
+        with pytest.raises(InputError, match="history of a run"):
+            draw(run.isel(time=0))
+
+    def test_a_file_without_the_angle_of_the_ring(self, run, draw):
+        with pytest.raises(InputError, match=r"theta.*run it again"):
+            draw(run.drop_vars("theta"))
+
+    def test_a_file_without_its_configuration(self, run, draw):
+        with pytest.raises(InputError, match="configuration"):
+            draw(run.drop_attrs())
+
+    def test_several_laws_at_once(self, run, draw):
+        both = run.expand_dims(friction_law=["coulomb", "stiction"])
+        with pytest.raises(InputError, match=r"coulomb, stiction: choose one.*sel\(friction_law"):
+            draw(both)
+
+
+class Recorder(AbstractMovieWriter):
+    """Notes what each frame shows."""
+
+    def setup(self, fig, outfile, dpi=None):
+        super().setup(fig, outfile, dpi)
+        self.noted = []
+
+    def grab_frame(self, **_):
+        (ax,) = (axes for axes in self.fig.axes if axes.get_title())
+        (_, reach), *_ = arrows(ax)
+        veil = self.fig.axes[-1].patches[-1]
+        self.noted.append((ax.get_title(), reach.copy(), veil.get_x()))
+
+    def finish(self):
+        pass
+
+
+class TestAnimation:
+    def test_has_frames_at_equal_times_from_the_beginning_to_the_end(self, run, tmp_path):
+        film, recorder = plots.animation(run, fps=5, duration=2.0), Recorder()
+        film.save(tmp_path / "film", writer=recorder)
+        times = np.linspace(0.0, float(run["time"][-1]), 10)
+        assert len(recorder.noted) == 10
+        scale = np.linalg.norm(recorder.noted[0][1][0]) / float(run["normal_1"][0])
+        for (title, reach, veil), time in zip(recorder.noted, times, strict=True):
+            assert title.startswith(f"t = {time:.4f} s, ")
+            assert veil == time
+            assert np.linalg.norm(reach[0]) / scale == pytest.approx(np.interp(time, run["time"], run["normal_1"]))
+
+    def test_says_how_much_slower_than_the_run_it_is(self, run):
+        film = motion._Film(run, 25.0, 2.0 * float(run["time"][-1]))
+        assert film.figure.subfigs[0].get_suptitle() == "2 times slower than real"
+        assert motion._pace(4.0, 4.0) == "real time"
+        assert motion._pace(30.0, 10.0) == "3 times faster than real"
+
+    def test_a_frame_on_the_painted_ground_is_the_whole_picture(self, run):
+        film = motion._Film(run, 25.0, 1.0)
+        pictures = []
+        film.show(12)
+        with film.painted():
+            pictures.append(pixels(film.figure))
+        pictures.append(pixels(film.figure))
+        assert np.mean(np.abs(pictures[0] - pictures[1]) > 40) < 2e-3
+
+    def test_needs_no_pyplot(self, run):
+        before = dict(matplotlib.rcParams)
+        motion._Film(run, 25.0, 1.0)
+        assert dict(matplotlib.rcParams) == before
+
+    def test_is_written_as_gif(self, run, tmp_path):
+        plots.save_animation(run, tmp_path / "run.gif", fps=10, duration=0.4)
+        with Image.open(tmp_path / "run.gif") as film:
+            assert film.n_frames == 4
+            assert film.info["duration"] == 100
+            assert film.convert("RGB").getpixel((0, 0)) == (255, 255, 255)
+        assert os.listdir(tmp_path) == ["run.gif"]
+
+    def test_is_written_as_a_page_that_needs_nothing_else(self, run, tmp_path):
+        plots.save_animation(run, tmp_path / "run.HTML", fps=10, duration=0.3)
+        page = (tmp_path / "run.HTML").read_text(encoding="utf-8")
+        frames = json.loads(page.partition("const frames = ")[2].partition(";\n")[0])
+        assert len(frames) == 3
+        assert "http" not in page.replace("".join(frames), "")
+        assert os.listdir(tmp_path) == ["run.HTML"]
+
+    @pytest.mark.skipif(not FFMpegWriter.isAvailable(), reason="ffmpeg is not installed")
+    def test_is_written_as_mp4(self, run, tmp_path):
+        plots.save_animation(run, tmp_path / "run.mp4", fps=10, duration=0.3)
+        assert (tmp_path / "run.mp4").read_bytes()[4:8] == b"ftyp"
+
+    def test_without_ffmpeg_mp4_is_refused_with_what_does_without(self, run, tmp_path, monkeypatch):
+        monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
+        with pytest.raises(InputError, match=r"ffmpeg.*not installed; \.gif and \.html"):
+            plots.save_animation(run, tmp_path / "run.mp4")
+
+    @pytest.mark.parametrize("name", ["run.avi", "run", "nowhere/run.gif"])
+    def test_a_wrong_name_is_refused(self, run, tmp_path, name):
+        with pytest.raises(InputError, match=r"run"):
+            plots.save_animation(run, tmp_path / name)
+
+    @pytest.mark.parametrize("wrong", [{"fps": 0}, {"duration": -1.0}, {"duration": np.inf}])
+    def test_a_wrong_number_is_refused(self, run, wrong):
+        with pytest.raises(InputError, match="not a number greater than 0"):
+            plots.animation(run, **wrong)
+
+    def test_a_failing_save_leaves_the_old_film_intact(self, run, tmp_path, monkeypatch):
+        (tmp_path / "run.gif").write_text("old")
+
+        def fail(self):
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr(motion._Gif, "finish", fail)
+        with pytest.raises(KeyboardInterrupt):
+            plots.save_animation(run, tmp_path / "run.gif", fps=5, duration=0.4)
+        assert (tmp_path / "run.gif").read_text() == "old"
+        assert os.listdir(tmp_path) == ["run.gif"]
+
+
+def pixels(figure):
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="rgba", dpi=100)
+    return np.frombuffer(buffer.getvalue(), np.uint8).astype(int)
+
+
+class TestCommand:
+    @pytest.fixture
+    def folder(self, scene, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        (tmp_path / "case.yaml").write_text(json.dumps({"scene": scene}))
+        return tmp_path
+
+    def test_writes_a_film_named_after_the_configuration(self, run, folder, monkeypatch, capsys):
+        asked = []
+        monkeypatch.setattr("ringsweep.single.history", lambda config: asked.append(config) or run)
+        monkeypatch.setattr("ringsweep.plots.save_animation", lambda ds, path: asked.append((ds, path)), raising=False)
+        assert main(["animate", "case.yaml", "--set", "drive.amplitude=4"]) == 0
+        config, (ds, path) = asked
+        assert config.scene.values["drive.amplitude"] == 4.0
+        assert ds is run
+        assert path == "case-run.gif"
+        assert "wrote case-run.gif" in capsys.readouterr().out
+
+    @pytest.mark.parametrize("output", ["run.avi", "nowhere/run.gif"])
+    def test_refuses_a_wrong_output_before_any_work(self, folder, monkeypatch, capsys, output):
+        monkeypatch.setattr("ringsweep.single.history", lambda config: pytest.fail("the run was made"))
+        assert main(["animate", "case.yaml", "-o", output]) == 2
+        assert output in capsys.readouterr().err
+        assert os.listdir(folder) == ["case.yaml"]
