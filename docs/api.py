@@ -14,9 +14,10 @@ MODULES = ("ringsweep", "ringsweep.plots", "ringsweep.variables")
 
 def build(folder: Path) -> None:
     """Write the pages; whatever is amiss in a docstring is an error."""
-    for name in ringsweep.__all__:
-        # They are imported when first asked for, and pdoc does not ask.
-        setattr(ringsweep, name, getattr(ringsweep, name))
+    for module in (ringsweep, ringsweep.plots):
+        for name in module.__all__:
+            # They are imported when first asked for, and pdoc does not ask.
+            setattr(module, name, getattr(module, name))
     pdoc.render.configure(docformat="numpy", math=True, search=False)
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)

@@ -345,9 +345,10 @@ def _animate(arguments: argparse.Namespace) -> None:
     target = arguments.output or f"{config.name}-run.gif"
 
     from ringsweep import plots
+    from ringsweep.plots.motion import check_animation
     from ringsweep.single import history
 
-    plots.check_animation(target)
+    check_animation(target)
     result = history(config)
     plots.save_animation(result, target)
     print(result.attrs["outcome"])

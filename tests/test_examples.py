@@ -8,20 +8,29 @@ from pathlib import Path
 import pytest
 
 import ringsweep
-from ringsweep import plots
+from ringsweep import cli, plots
 
 ROOT = Path(__file__).parents[1]
 PUBLIC = {
     f"{module.__name__}.{name}": getattr(module, name)
     for module in (ringsweep, plots)
-    for name in getattr(module, "__all__", [])
+    for name in module.__all__
+    if callable(getattr(module, name))
 }
 
 
-@pytest.mark.parametrize("name", PUBLIC)
-def test_every_public_name_has_an_example_that_holds(name, tmp_path, monkeypatch):
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder with what `ringsweep init` writes."""
     monkeypatch.chdir(tmp_path)
-    (test,) = doctest.DocTestFinder(recurse=False).find(PUBLIC[name], name, globs={})
+    assert cli.main(["init", "-q"]) == 0
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_every_public_name_has_an_example_that_holds(name, folder):
+    drawing = {name: getattr(plots, name) for name in plots.__all__}
+    (test,) = doctest.DocTestFinder(recurse=False).find(PUBLIC[name], name, globs=drawing)
     assert test.examples
     report: list[str] = []
     assert doctest.DocTestRunner().run(test, out=report.append).failed == 0, "".join(report)

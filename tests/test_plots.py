@@ -1,10 +1,7 @@
 """What a reader takes from a picture is what the dataset says."""
 
-import doctest
-import importlib
 import os
 import time
-from pathlib import Path
 
 import matplotlib
 import numpy as np
@@ -347,14 +344,6 @@ class TestPanels:
             assert len(pyplot.get_fignums()) == 1
         finally:
             pyplot.close("all")
-
-
-@pytest.mark.parametrize("module", ["style", "maps", "histories", "precision", "ring", "motion", "interactive"])
-def test_examples_in_docstrings_hold(module, monkeypatch):
-    monkeypatch.chdir(Path(__file__).parents[1])
-    failed, tried = doctest.testmod(importlib.import_module(f"ringsweep.plots.{module}"))
-    assert tried
-    assert not failed
 
 
 def test_points_are_scattered_over_their_coordinates():

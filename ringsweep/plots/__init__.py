@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ringsweep.plots.histories import history, history_panel
     from ringsweep.plots.interactive import cell, explore
     from ringsweep.plots.maps import map_panel, regime_map
-    from ringsweep.plots.motion import animation, check_animation, save_animation
+    from ringsweep.plots.motion import animation, save_animation
     from ringsweep.plots.precision import precision_panel, work_precision
     from ringsweep.plots.ring import phase_portrait, polar_view
 
@@ -25,7 +25,6 @@ __all__ = [
     "SUFFIXES",
     "animation",
     "cell",
-    "check_animation",
     "explore",
     "history",
     "history_panel",
@@ -49,7 +48,6 @@ _HOMES = {
     "phase_portrait": "ring",
     "polar_view": "ring",
     "animation": "motion",
-    "check_animation": "motion",
     "save_animation": "motion",
     "cell": "interactive",
     "explore": "interactive",

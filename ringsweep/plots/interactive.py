@@ -47,7 +47,7 @@ def cell(ds: xr.Dataset, sel: Mapping[str, float | str] | None = None) -> dict[s
     --------
     >>> import ringsweep
     >>> from ringsweep.config import load
-    >>> scene = load("ringsweep/templates/ring.yaml").source["scene"]
+    >>> scene = load("my-sweep.yaml").source["scene"]
     >>> maps = ringsweep.sweep(scene, {"drive.amplitude": [1.0, 2.0], "zone.half_angle": ["10 deg", "20 deg"]})
     >>> cell(maps, {"drive.amplitude": 1.9, "zone.half_angle": 0.2})["scene"]["drive"]
     {'amplitude': 2.0, 'law': 'arctan'}
@@ -104,7 +104,7 @@ def explore(
     --------
     >>> import ringsweep
     >>> from ringsweep.config import load
-    >>> scene = load("ringsweep/templates/ring.yaml").source["scene"]
+    >>> scene = load("my-sweep.yaml").source["scene"]
     >>> maps = ringsweep.sweep(scene, {"drive.amplitude": [1.0, 2.0], "zone.half_angle": ["10 deg", "20 deg"]})
     >>> figure = explore(maps, at={"drive.amplitude": 1.0})
     """

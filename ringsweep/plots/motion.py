@@ -63,7 +63,7 @@ def animation(ds: xr.Dataset, *, fps: float = 25.0, duration: float = 10.0) -> F
     Examples
     --------
     >>> import ringsweep
-    >>> run = ringsweep.simulate("ringsweep/templates/ring.yaml")
+    >>> run = ringsweep.simulate("my-sweep.yaml")
     >>> "<img" in animation(run, fps=5, duration=1).to_jshtml()
     True
     """
@@ -93,7 +93,7 @@ def save_animation(ds: xr.Dataset, path: str | os.PathLike[str], *, fps: float =
     Examples
     --------
     >>> import ringsweep
-    >>> run = ringsweep.simulate("ringsweep/templates/ring.yaml")
+    >>> run = ringsweep.simulate("my-sweep.yaml")
     >>> save_animation(run, "run.mp3")
     Traceback (most recent call last):
     ringsweep.errors.InputError: run.mp3: animations end in .mp4, .gif, .html, not in '.mp3'

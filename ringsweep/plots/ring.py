@@ -81,7 +81,7 @@ def phase_portrait(ds: xr.Dataset, frame: Literal["space", "ring"] = "space", ax
     --------
     >>> import ringsweep
     >>> from matplotlib.figure import Figure
-    >>> run = ringsweep.simulate("ringsweep/templates/ring.yaml")
+    >>> run = ringsweep.simulate("my-sweep.yaml")
     >>> phase_portrait(run, ax=Figure().add_subplot()).get_xlabel()
     'angle of the body (°)'
     """
@@ -166,7 +166,7 @@ def polar_view(ds: xr.Dataset, time: float, ax: Axes | None = None) -> Axes:
     --------
     >>> import ringsweep
     >>> from matplotlib.figure import Figure
-    >>> run = ringsweep.simulate("ringsweep/templates/ring.yaml")
+    >>> run = ringsweep.simulate("my-sweep.yaml")
     >>> polar_view(run, 1.5, Figure().add_subplot()).get_title()
     't = 1.5000 s, slip backward'
     """
