@@ -69,6 +69,11 @@ def kernel(function: Callable[..., Any]) -> Any:
         return dispatcher
     index = dispatcher._cache._cache_file
     index._source_stamp = (index._source_stamp, SOURCES_DIGEST)
+    if OWN_LAWS:
+        # Beside what is compiled without them, whose index would be started anew.
+        name = f"{index._index_name.removesuffix('.nbi')}-{SOURCES_DIGEST[:12]}"
+        index._index_name, index._data_name_pattern = f"{name}.nbi", f"{name}.{{number:d}}.nbc"
+        index._index_path = str(Path(index._cache_path) / index._index_name)
     load = index._load_index
 
     def load_index() -> Any:

@@ -8,7 +8,10 @@ wrong input are all derived from these declarations.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cache
+from types import MappingProxyType
 from typing import get_type_hints
 
 import numpy as np
@@ -97,11 +100,12 @@ class Choice:
         return {"long_name": self.long_name}
 
 
-def declared(cls: type) -> dict[str, Parameter]:
+@cache
+def declared(cls: type) -> Mapping[str, Parameter]:
     """Parameters that a ``NamedTuple`` class declares by ``Annotated`` fields."""
     found = {}
     for name, hint in get_type_hints(cls, include_extras=True).items():
         for note in getattr(hint, "__metadata__", ()):
             if isinstance(note, Parameter):
                 found[name] = note
-    return found
+    return MappingProxyType(found)

@@ -124,7 +124,8 @@ def regime_map(
     if found.entries:
         figure.legend(
             handles=found.entries,
-            loc="outside right upper" if found.field.meanings else "outside lower center",
+            # Below several panels stands the name of the axis that they share.
+            loc="outside right upper" if found.field.meanings or len(panels) > 1 else "outside lower center",
             fontsize=SMALL,
             frameon=False,
             handleheight=1.4,
