@@ -17,6 +17,14 @@ from ringsweep.solvers.rk4 import RK4
 settings.register_profile("ringsweep", deadline=None, derandomize=True)
 settings.load_profile("ringsweep")
 
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Keep the tests of a file, which share kernels and fixtures, in one process; each notebook is its own world."""
+    for item in items:
+        alone = item.path.name == "test_notebooks.py"
+        item.add_marker(pytest.mark.xdist_group(item.name if alone else item.path.name))
+
+
 #: Values of the rig by path; the friction is that of Figs. 29 and 30.
 RIG: Mapping[str, float] = MappingProxyType(
     {
