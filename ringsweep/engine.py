@@ -388,7 +388,8 @@ def _stop_on_interrupt() -> Iterator[threading.Event]:
 def progress_bar(total: int, progress: bool, done: int = 0) -> Any:
     """A bar of so many runs, some of them done, where there is a terminal or a notebook to show it."""
     # tqdm takes a notebook's stream for a pipe and would stay silent there.
-    notebook = "ipykernel" in sys.modules
+    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+    notebook = hasattr(shell, "kernel")
     return tqdm(total=total, initial=done, unit="run", disable=(False if notebook else None) if progress else True)
 
 
