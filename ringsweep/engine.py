@@ -238,7 +238,7 @@ def write(
     config, earlier = _earlier(config, reuse)
     target = target.resolve()
     if target.exists():
-        storage.check_kind(target, "regime")
+        storage.check_kind(target, "regime", "sweep")
     layout = Layout(tuple(config.axes.sizes.values()))
     described = identity(config)
     with owned(target, described, layout, fresh=fresh) as chunks:
@@ -314,14 +314,14 @@ def _fill(
     progress: bool,
 ) -> None:
     """Compute every cell that is not there yet, chunk after chunk."""
-    if earlier is not None:
-        count = earlier.give(config, layout, kept)
-        tell = logger.info if count else logger.warning
-        tell("%d of %d cells are taken from %s", count, layout.total, earlier.path)
     if jobs is not None and jobs < 1:
         raise InputError("jobs", f"{jobs} threads compute nothing: give at least 1")
     if jobs is not None and scheduler is not None:
         raise InputError("--jobs", "is for threads of this machine: Dask's workers have their own number of threads")
+    if earlier is not None:
+        count = earlier.give(config, layout, kept)
+        tell = logger.info if count else logger.warning
+        tell("%d of %d cells are taken from %s", count, layout.total, earlier.path)
     left = layout.total - int(kept.done.sum())
     if not left:
         return
@@ -343,9 +343,10 @@ def _fill(
             except ImportError:
                 raise InputError("--scheduler", "Dask is not installed: pip install distributed") from None
             client = stack.enter_context(remote.connect(scheduler))
-            pace = Pace(config.solver.side_by_side, lambda: remote.threads(client))
+            workers = remote.Workers(client)
+            pace = Pace(config.solver.side_by_side, workers.threads)
             chunks = chunks_of(kept.done, left, pace, stopped)
-            results = map(pace.learn, remote.compute(task, chunks, secrets.token_hex(8), client, stopped))
+            results = map(pace.learn, workers.compute(task, chunks, secrets.token_hex(8), stopped))
         bar = stack.enter_context(progress_bar(layout.total, progress, layout.total - left))
         try:
             for finished in results:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import logging
+import math
 import socket
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import CancelledError
 from contextlib import suppress
 from itertools import islice
 from threading import Event
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -26,7 +28,7 @@ Positions = NDArray[np.integer[Any]]
 # Seconds to wait for a scheduler.
 _PATIENCE = 10.0
 
-# Seconds between looks for a first worker.
+# Seconds between counts of the workers.
 _TICK = 0.5
 
 # In a worker: tasks by their key.
@@ -70,40 +72,49 @@ def connect(address: str) -> Client:
         raise InputError("--scheduler", f"no Dask scheduler answers at {address!r}: {error}") from error
 
 
-def threads(client: Client) -> int:
-    """Threads that the workers have at this moment."""
-    return sum(client.nthreads().values())
+class Workers:
+    """The workers of a scheduler, as many as there are at any moment."""
 
+    def __init__(self, client: Client):
+        self.client = client
+        self._count, self._counted = 0, -math.inf
 
-def compute(
-    task: Callable[[Positions], Any], chunks: Iterator[Positions], key: str, client: Client, stopped: Event
-) -> Generator[Any]:
-    """Results of `task` for each of `chunks`, as they come; a chunk is asked for when a worker is about to need it.
+    def threads(self) -> int:
+        """Threads that they have; the scheduler, which is far away, is asked for it now and then."""
+        if monotonic() - self._counted > _TICK:
+            self._count, self._counted = sum(self.client.nthreads().values()), monotonic()
+        return self._count
 
-    A chunk whose worker dies goes to another; one that takes several workers with it raises
-    `distributed.KilledWorker`. (joblib's backend for Dask waits for ever then, and counts workers at the start only.)
-    """
-    plugin = _Shared(key, task)
-    client.register_plugin(plugin)
-    try:
-        futures = as_completed(loop=client.loop, with_results=True)
+    def compute(
+        self, task: Callable[[Positions], Any], chunks: Iterator[Positions], key: str, stopped: Event
+    ) -> Generator[Any]:
+        """Results of `task` for each of `chunks`, as they come; a chunk is asked for when a worker is about to need it.
 
-        def fill() -> None:
-            # One in hand for each thread, so that none waits for the next.
-            for chunk in islice(chunks, max(0, max(2, 2 * threads(client)) - futures.count())):
-                futures.add(client.submit(_run, key, chunk, pure=False))
+        A chunk whose worker dies goes to another; one that takes several workers with it raises
+        `distributed.KilledWorker`. (joblib's backend for Dask waits for ever then, and counts workers at the start
+        only.)
+        """
+        plugin = _Shared(key, task)
+        self.client.register_plugin(plugin)
+        try:
+            futures = as_completed(loop=self.client.loop, with_results=True)
 
-        fill()
-        if not threads(client):
-            logger.warning("the scheduler has no worker yet: waiting for one")
-            while not threads(client):
-                if stopped.wait(_TICK):
-                    return
-        for _, result in futures:
-            yield result
+            def fill() -> None:
+                # One in hand for each thread, so that none waits for the next.
+                for chunk in islice(chunks, max(0, max(2, 2 * self.threads()) - futures.count())):
+                    futures.add(self.client.submit(_run, key, chunk, pure=False))
+
             fill()
-    except (OSError, CancelledError) as error:
-        raise ConnectionError(f"the Dask scheduler is gone ({error})") from error
-    finally:
-        with suppress(OSError):
-            client.unregister_worker_plugin(plugin.name)
+            if not self.threads():
+                logger.warning("the scheduler has no worker yet: waiting for one")
+                while not self.threads():
+                    if stopped.wait(_TICK):
+                        return
+            for _, result in futures:
+                yield result
+                fill()
+        except (OSError, CancelledError) as error:
+            raise ConnectionError(f"the Dask scheduler is gone ({error})") from error
+        finally:
+            with suppress(OSError):
+                self.client.unregister_worker_plugin(plugin.name)

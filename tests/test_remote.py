@@ -56,12 +56,12 @@ def test_a_stop_while_no_worker_is_there_is_heeded(scene, tmp_path, monkeypatch)
     with LocalCluster(n_workers=0, dashboard_address=None, silence_logs=logging.CRITICAL) as empty:
         looks = iter(range(3))
 
-        def none_yet(client):
+        def none_yet(workers):
             if next(looks, None) == 2:
                 signal.raise_signal(signal.SIGINT)
             return 0
 
-        monkeypatch.setattr("ringsweep.remote.threads", none_yet)
+        monkeypatch.setattr("ringsweep.remote.Workers.threads", none_yet)
         with pytest.raises(KeyboardInterrupt):
             ringsweep.sweep(scene, {"drive.amplitude": [1.0]}, scheduler=empty.scheduler_address, progress=False)
 
