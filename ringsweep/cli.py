@@ -101,7 +101,7 @@ def _parser() -> argparse.ArgumentParser:
         ringsweep run my.nc -o again.nc    the sweep that my.nc holds
         ringsweep run my.yaml --backend dask --scheduler tcp://host:8786
         """)  # fmt: skip
-    _config(run, "CONFIG.yaml", "or OUT.nc, whose sweep is repeated")
+    run.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose sweep is repeated")
     run.add_argument("-o", "--output", metavar="OUT.nc", help="default: the configuration's name, in this folder")
     run.add_argument("--jobs", type=whole_number, metavar="N", help="threads (default: all cores)")
     run.add_argument("--fresh", action="store_true", help="start over: discard what an earlier run has left")
@@ -129,7 +129,7 @@ def _parser() -> argparse.ArgumentParser:
         ringsweep simulate my.yaml --set drive.amplitude=4 --set "zone.half_angle=20 deg"
         ringsweep simulate my.nc --set drive.amplitude=4     a cell of the sweep that my.nc holds
         """)  # fmt: skip
-    _config(simulate, "CONFIG.yaml", "or OUT.nc, whose scene is run")
+    simulate.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose scene is run")
     simulate.add_argument("-o", "--output", metavar="RUN.nc", help="default: the configuration's name with -run")
     _settings(simulate)
 
@@ -138,7 +138,7 @@ def _parser() -> argparse.ArgumentParser:
         ringsweep animate my.yaml -o run.mp4 --set drive.amplitude=4
         ringsweep animate my.nc -o run.html  a page with buttons, of the scene that my.nc holds
         """)  # fmt: skip
-    _config(animate, "CONFIG.yaml", "or OUT.nc, whose scene is run")
+    animate.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose scene is run")
     animate.add_argument(
         "-o", "--output", metavar="RUN.gif", help="default: the configuration's name with -run; .mp4 and .html too"
     )
@@ -149,7 +149,7 @@ def _parser() -> argparse.ArgumentParser:
         ringsweep precision my.yaml
         ringsweep precision my.yaml --target 1e-9 --cells 64
         """)  # fmt: skip
-    _config(precision, "CONFIG.yaml", "or OUT.nc, whose sweep is taken")
+    precision.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose sweep is taken")
     precision.add_argument("-o", "--output", metavar="OUT.nc", help="default: the configuration's name with -precision")
     precision.add_argument(
         "--target",
@@ -197,10 +197,6 @@ def _formatter(prog: str) -> argparse.HelpFormatter:
     return argparse.RawDescriptionHelpFormatter(
         prog, max_help_position=28, width=min(shutil.get_terminal_size().columns - 2, 100)
     )
-
-
-def _config(parser: argparse.ArgumentParser, metavar: str, words: str) -> None:
-    parser.add_argument("config", metavar=metavar, help=words)
 
 
 def _settings(parser: argparse.ArgumentParser) -> None:

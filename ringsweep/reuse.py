@@ -52,8 +52,9 @@ class Earlier:
 
     def __init__(self, path: str | os.PathLike[str], config: Config):
         self.path = path
-        storage.check_kind(path, "regime", "sweep")
         with storage.open_dataset(path) as ds:
+            if "regime" not in ds or "time" in ds.dims:
+                raise InputError(str(path), "holds no sweep whose cells could be reused")
             self.attributes = dict(ds.attrs)
         self.config = load(path)
         self.axes = self.config.axes

@@ -231,7 +231,7 @@ def _flush_folder(folder: Path) -> None:
             os.close(descriptor)
 
 
-def check_kind(path: str | os.PathLike[str], mark: str, content: str = "sweep") -> None:
+def check_kind(path: str | os.PathLike[str], mark: str, content: str) -> None:
     """Make sure that a file is a result of one kind, which a new one may replace.
 
     Parameters

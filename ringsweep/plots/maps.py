@@ -234,7 +234,7 @@ class Map:
             panels,
             picks,
             entries,
-            _lines(["" if field.meanings is None and up else long_name(ds[var]), *held, *words]),
+            _lines(["" if field.meanings is None else long_name(ds[var]), *held, *words]),
         )
 
     @property
