@@ -13,7 +13,7 @@ FOLDER = Path(__file__).parents[1] / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 
 #: What only one machine would say: its folders, its times, its warnings.
-FOREIGN = re.compile(r"/home/|/tmp/|/root/|/Users/|[A-Z]:\\\\|site-packages|Warning\b|it/s\]|Traceback")
+FOREIGN = re.compile(r"""(^|[\s'"(])(/\w+/|[A-Z]:\\)|site-packages|Warning\b|it/s\]|Traceback""", re.M)
 
 
 def texts(output):

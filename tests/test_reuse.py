@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import ringsweep
-from ringsweep import cli
+from ringsweep import cli, storage
 from ringsweep.chunks import Chunks
 from ringsweep.errors import InputError
 
@@ -130,6 +130,7 @@ def test_a_file_of_another_version_is_refused(scene, earlier, tmp_path, monkeypa
 
 
 def test_a_history_is_refused(scene, tmp_path, earlier, capsys):
-    (tmp_path / "history.nc").write_bytes(b"")
-    assert cli.main(["run", str(earlier), "--reuse", str(tmp_path / "history.nc")]) == 2
-    assert "history.nc" in capsys.readouterr().err
+    storage.save(ringsweep.simulate(scene), tmp_path / "history.nc")
+    output = ["-o", str(tmp_path / "new.nc")]
+    assert cli.main(["run", str(earlier), *output, "--reuse", str(tmp_path / "history.nc")]) == 2
+    assert "history.nc: holds no sweep whose cells could be reused" in capsys.readouterr().err
