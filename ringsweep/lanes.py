@@ -28,7 +28,7 @@ from numba.core import cgutils, types
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, overload, register_model
 
-from ringsweep.jit import OPTIONS, generated, hook, over_leaves
+from ringsweep.jit import WITHIN, generated, hook, over_leaves
 
 #: Runs in one value.
 WIDTH = 16
@@ -212,7 +212,7 @@ def either(scalar: Any) -> Any:
         names = ", ".join(inspect.signature(scalar).parameters)
         scope: dict[str, Any] = {"choose": lambda *kinds: lanes if LANES in kinds or MASK in kinds else scalar}
         exec(f"def overloaded({names}): return choose({names})", scope)
-        overload(scalar, jit_options=OPTIONS)(scope["overloaded"])
+        overload(scalar, jit_options=WITHIN)(scope["overloaded"])
         return lanes
 
     return register

@@ -46,5 +46,6 @@ def test_sweep_stores_outcomes_alone():
         finally:
             tracemalloc.stop()
 
+    most(20)  # Modules that are imported late.
     # A state of 256 cells at each of 2000 steps would be eight megabytes.
     assert most(2000) < most(20) + 100_000

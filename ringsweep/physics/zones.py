@@ -14,7 +14,7 @@ import numpy as np
 from numba import types
 from numba.extending import overload
 
-from ringsweep.jit import OPTIONS, hook, inlined, inner_hook
+from ringsweep.jit import WITHIN, hook, inlined, inner_hook
 from ringsweep.lanes import floor, select
 from ringsweep.parameters import Leaf, Parameter
 
@@ -158,7 +158,7 @@ def under(values, edges, x):
     return found
 
 
-@overload(under, jit_options=OPTIONS)
+@overload(under, jit_options=WITHIN)
 def _under(values, edges, x):
     if isinstance(values, types.Array):
         return under

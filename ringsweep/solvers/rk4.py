@@ -366,7 +366,9 @@ def _go_on(kind, account, batch, memory, seated, live, table, first, steps, h, r
     kept = 0
     for seat in range(live):
         if memory[seat // per, lines - 1, seat % per] != GONE:
-            memory[kept // per, :, kept % per] = memory[seat // per, :, seat % per]
+            # Slices would drag in what raises errors about their shapes, a second of compilation.
+            for line in range(lines):
+                memory[kept // per, line, kept % per] = memory[seat // per, line, seat % per]
             seated[kept] = seated[seat]
             kept += 1
     # Empty seats of the last block go on with what they hold, unheard.
