@@ -9,11 +9,19 @@ if TYPE_CHECKING:
     from ringsweep.engine import run, sweep
     from ringsweep.errors import InputError
     from ringsweep.single import simulate
+    from ringsweep.variables import words
     from ringsweep.work import precision
 
-__all__ = ["InputError", "precision", "run", "simulate", "sweep"]
+__all__ = ["InputError", "precision", "run", "simulate", "sweep", "words"]
 
-_HOMES = {"run": "engine", "sweep": "engine", "simulate": "single", "precision": "work", "InputError": "errors"}
+_HOMES = {
+    "run": "engine",
+    "sweep": "engine",
+    "simulate": "single",
+    "precision": "work",
+    "words": "variables",
+    "InputError": "errors",
+}
 
 
 def __getattr__(name: str) -> Any:

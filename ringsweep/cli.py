@@ -85,6 +85,8 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=_formatter,
     )
     parser.add_argument("--version", action=_Version)
+    _loudness(parser)
+    parser.set_defaults(quiet=False, verbose=False)
     verbs = parser.add_subparsers(required=True, metavar="COMMAND")
 
     init = _verb(verbs, "init", _init, "write a configuration to start from", """
@@ -186,11 +188,19 @@ def _verb(verbs: Any, name: str, function: Any, words: str, examples: str) -> ar
         epilog="examples:\n" + indent(dedent(examples).strip(), "  "),
         formatter_class=_formatter,
     )
-    loudness = parser.add_mutually_exclusive_group()
-    loudness.add_argument("-q", "--quiet", action="store_true", help="tell only what is wrong")
-    loudness.add_argument("-v", "--verbose", action="store_true", help="tell more, and where an unexpected error arose")
+    _loudness(parser)
     parser.set_defaults(verb=function)
     return parser
+
+
+def _loudness(parser: argparse.ArgumentParser) -> None:
+    """May be asked for before the command and after it: where it is not, what was said before stands."""
+    loudness = parser.add_mutually_exclusive_group()
+    for letter, name, words in (
+        ("-q", "--quiet", "tell only what is wrong"),
+        ("-v", "--verbose", "tell more, and where an unexpected error arose"),
+    ):
+        loudness.add_argument(letter, name, action="store_true", default=argparse.SUPPRESS, help=words)
 
 
 def _formatter(prog: str) -> argparse.HelpFormatter:
@@ -339,6 +349,11 @@ def _animate(arguments: argparse.Namespace) -> None:
 
     config = with_values(arguments.config, arguments.set)
     target = arguments.output or f"{config.name}-run.gif"
+    model = config.scene.structure.model
+    if not model.startswith("ring"):
+        raise InputError("scene.model", f"{model}: there is no ring to film; ringsweep simulate draws its history")
+    if config.axes.sizes:
+        raise InputError("sweep", "several friction laws: a film is of one run; give its law by --set friction.law=...")
 
     from ringsweep import plots
     from ringsweep.plots.motion import check_animation

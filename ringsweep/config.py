@@ -13,6 +13,7 @@ import math
 import os
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from itertools import product
 from typing import TYPE_CHECKING, Any, get_type_hints
 
@@ -323,8 +324,14 @@ def _scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | None) 
     for path in leaves:
         if path not in known and path not in _structural(drive):
             where, name = ("drive", drive) if path.startswith("drive.") else ("friction", " or ".join(structures))
-            logger.warning("scene.%s is not used: %s law %s has no such parameter", path, where, name)
+            _tell_of_unused(path, where, name)
     return Scene(structures, values, scene)
+
+
+@cache
+def _tell_of_unused(path: str, where: str, name: str) -> None:
+    """Once: a run, its picture and its file read one configuration several times."""
+    logger.warning("scene.%s is not used: %s law %s has no such parameter", path, where, name)
 
 
 def _numbers(structures: Mapping[str, Structure]) -> dict[str, Parameter]:

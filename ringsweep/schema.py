@@ -27,6 +27,10 @@ def schema() -> dict[str, Any]:
     for model, drive, arcs in product(MODELS, DRIVES, ((), ("zone",), ("zones.0",))):
         for law in MODELS[model].laws:
             for path, parameter in parameters(Structure(model, law, drive, arcs)).items():
+                # One description serves all arcs of a list.
+                parameter = dataclasses.replace(
+                    parameter, long_name=parameter.long_name.replace("rough arc 1", "the rough arc")
+                )
                 meanings = known.setdefault(path, [])
                 if parameter not in meanings:
                     meanings.append(parameter)

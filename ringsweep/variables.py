@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+from ringsweep.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 #: Regimes in the order of their flag values; motions are the ones that can precede an end.
 REGIMES = ("resting", "oscillatory", "revolving", "separating", "jammed", "failed", "stick-slip")
@@ -114,3 +119,44 @@ PRECISION: dict[str, Variable] = {
     "reference_error_end": Variable("difference of the two tightest runs in the angle of the body at the end", "rad"),
     "reference_error_separation": Variable("difference of the two tightest runs in the time of separation", "s"),
 }
+
+
+def words(data: xr.DataArray) -> xr.DataArray:
+    """The names that the flags of a classification stand for.
+
+    Parameters
+    ----------
+    data : xarray.DataArray
+        A classification as datasets have it, ``regime`` or ``certified`` say, or a part of one.
+
+    Returns
+    -------
+    xarray.DataArray
+        Text of the same shape; empty where a value is none of the flags.
+
+    Raises
+    ------
+    InputError
+        If it is not a classification.
+
+    Examples
+    --------
+    >>> import ringsweep
+    >>> from ringsweep.config import load
+    >>> scene = load("my-sweep.yaml").source["scene"]
+    >>> maps = ringsweep.sweep(scene, {"drive.amplitude": [0.1, 2.0]})
+    >>> ringsweep.words(maps.regime).values.tolist()
+    ['oscillatory', 'separating']
+    """
+    import numpy as np
+
+    if not {"flag_values", "flag_meanings"} <= data.attrs.keys():
+        raise InputError(str(data.name), "is not a classification: it has no flag_values and flag_meanings")
+    meanings = dict(zip(np.atleast_1d(data.attrs["flag_values"]), data.attrs["flag_meanings"].split(), strict=True))
+    named = np.full(data.shape, "", dtype=f"<U{max(map(len, meanings.values()))}")
+    for value, meaning in meanings.items():
+        named[data.values == value] = meaning
+    kept = {name: text for name, text in data.attrs.items() if not name.startswith("flag_")}
+    found = data.copy(data=named)
+    found.attrs = kept
+    return found

@@ -214,3 +214,9 @@ def test_help_comes_without_the_weight_of_solvers():
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert "simulate" in done.stdout
     assert done.stdout.endswith("False\n")
+
+
+@pytest.mark.parametrize("arguments", [["-q", "init"], ["init", "-q"], ["init", "new.yaml", "--quiet"]])
+def test_quiet_may_be_asked_for_before_the_command_and_after_it(folder, capsys, arguments):
+    assert main(arguments) == 0
+    assert capsys.readouterr() == ("", "")

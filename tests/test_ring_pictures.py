@@ -391,3 +391,16 @@ class TestCommand:
         assert main(["animate", "case.yaml", "-o", output]) == 2
         assert output in capsys.readouterr().err
         assert os.listdir(folder) == ["case.yaml"]
+
+    def test_refuses_a_belt_before_any_work(self, folder, monkeypatch, capsys):
+        monkeypatch.setattr("ringsweep.single.history", lambda config: pytest.fail("the run was made"))
+        assert main(["init", "--model", "belt", "belt.yaml"]) == 0
+        assert main(["animate", "belt.yaml"]) == 2
+        assert "there is no ring" in capsys.readouterr().err
+
+    def test_refuses_several_laws_before_any_work(self, scene, folder, monkeypatch, capsys):
+        monkeypatch.setattr("ringsweep.single.history", lambda config: pytest.fail("the run was made"))
+        laws = {"sweep": {"grid": {"friction.law": ["stiction", "coulomb"]}}}
+        (folder / "laws.yaml").write_text(json.dumps({"scene": scene} | laws))
+        assert main(["animate", "laws.yaml"]) == 2
+        assert "--set friction.law=" in capsys.readouterr().err

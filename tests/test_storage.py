@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import ringsweep
 from ringsweep import storage
 from ringsweep.errors import InputError
 from ringsweep.variables import OUTCOMES
@@ -151,3 +152,13 @@ def test_a_truncated_file_is_damaged_not_short(sweep, tmp_path):
     (tmp_path / "out.nc").write_bytes(whole[: len(whole) // 2])
     with pytest.raises(InputError, match="damaged"):
         storage.load(tmp_path / "out.nc")
+
+
+def test_flags_are_told_in_words_and_what_has_none_is_refused():
+    flags = {"long_name": "regime", "flag_values": np.array([0, 3], "int8"), "flag_meanings": "resting separating"}
+    told = ringsweep.words(xr.DataArray([[3, 0, 7]], dims=("a", "b"), attrs=flags))
+    assert told.values.tolist() == [["separating", "resting", ""]]
+    assert told.dims == ("a", "b")
+    assert told.attrs == {"long_name": "regime"}
+    with pytest.raises(InputError, match="phi_end"):
+        ringsweep.words(xr.DataArray([0.5], name="phi_end"))

@@ -42,17 +42,19 @@ class SingleContactRing:
         """Every numeric path of a scene of this structure."""
         law = self.laws[structure.law]
         found = dict(self.body)
-        places = {"friction.rest": "rest of the ring"}
+        places = {"friction.rest": "the rest of the ring"}
         if structure.arcs == ("zone",):
-            places["friction.rough"] = "rough zone"
+            places["friction.rough"] = "the rough zone"
         else:
-            places |= {arc: f"zone {number}" for number, arc in enumerate(structure.arcs)}
+            places |= {arc: f"rough arc {number}" for number, arc in enumerate(structure.arcs, start=1)}
         for place, where in places.items():
             for name, p in friction.coefficients_of(law).items():
-                found[f"{place}.{name}"] = replace(p, long_name=f"{p.long_name} of the {where}")
+                found[f"{place}.{name}"] = replace(p, long_name=f"{p.long_name} of {where}")
         found |= {f"friction.{name}": p for name, p in declared(law).items()}
         for arc in structure.arcs:
-            found |= {f"{arc}.{name}": p for name, p in declared(zones.Arc).items()}
+            for name, p in declared(zones.Arc).items():
+                whose = places.get(arc, "the rough zone")
+                found[f"{arc}.{name}"] = replace(p, long_name=p.long_name.replace("the rough zone", whose))
         found |= {f"drive.{name}": p for name, p in declared(drives.DRIVES[structure.drive]).items()}
         return found | {
             "initial.phi": Parameter("rad", "angle of the body at launch", default=0.0),
