@@ -26,7 +26,16 @@ if TYPE_CHECKING:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; the exit status is 0 if done, 2 if the input is wrong, 1 for anything else."""
-    arguments = _parser().parse_args(argv)
+    parser = _parser()
+    given = sys.argv[1:] if argv is None else list(argv)
+    if not given:
+        parser.print_help()
+        return 2
+    arguments, unknown = parser.parse_known_args(given)
+    if unknown:
+        takes_values = any(option in given for option in ("--set", "--sel"))
+        hint = "; what has a space wants quotes: --set 'drive.amplitude=2 rad/s'" if takes_values else ""
+        parser.error(f"unrecognized arguments: {' '.join(unknown)}{hint}")
     told = logging.getLogger("ringsweep")
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
     logging.getLogger().handlers[0].setFormatter(_Words(_is_coloured(sys.stderr)))
@@ -129,7 +138,7 @@ def _parser() -> argparse.ArgumentParser:
         "run once, or under each law of a sweep: history and a picture of it", """
         ringsweep simulate my.yaml         my-run.nc and my-run.png
         ringsweep simulate my.yaml --set drive.amplitude=4 --set "zone.half_angle=20 deg"
-        ringsweep simulate my.nc --set drive.amplitude=4     a cell of the sweep that my.nc holds
+        ringsweep simulate my.nc --set drive.amplitude=4     the scene that my.nc holds, with this amplitude
         """)  # fmt: skip
     simulate.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose scene is run")
     simulate.add_argument("-o", "--output", metavar="RUN.nc", help="default: the configuration's name with -run")
@@ -290,6 +299,7 @@ def _run(arguments: argparse.Namespace) -> None:
     with storage.open_dataset(target) as result:
         _summarise(result)
         _warn_of_stiffness(result, config)
+        _warn_of_launch(result)
         if not config.axes.sizes or (not computed and _is_newer(picture, target)):
             return
         try:
@@ -323,8 +333,14 @@ def _map(arguments: argparse.Namespace) -> None:
     shown = [arguments.var] * (arguments.var != "regime") + [held.replace(" ", "") for held in arguments.sel]
     target = Path(arguments.output or dataset.with_name("-".join([dataset.stem, *shown]) + ".png"))
     storage.check_writable(target)
-    held = dict(_selection(result, text) for text in arguments.sel)
-    plots.save(plots.regime_map(result, arguments.x, arguments.y, arguments.var, held), target)
+    held = dict(_selection(text) for text in arguments.sel)
+    try:
+        figure = plots.regime_map(result, arguments.x, arguments.y, arguments.var, held)
+    except InputError as error:
+        if error.path == "ds":
+            raise InputError(str(dataset), error.problem) from error
+        raise
+    plots.save(figure, target)
     print(f"wrote {target}")
 
 
@@ -341,6 +357,8 @@ def _simulate(arguments: argparse.Namespace) -> None:
     storage.save(result, target)
     plots.save(plots.history(result), picture)
     print(result.attrs["outcome"])
+    _warn_of_stiffness(result, config)
+    _warn_of_launch(result)
     print(f"wrote {target}\nwrote {picture}")
 
 
@@ -457,19 +475,22 @@ def _warn_of_stiffness(result: xr.Dataset, config: Config) -> None:
     )
 
 
-def _selection(result: xr.Dataset, text: str) -> tuple[str, float | str]:
-    """A coordinate and a value in its unit, from ``DIM=VALUE``."""
-    from ringsweep.parameters import Parameter
-    from ringsweep.units import quantity
+def _warn_of_launch(result: xr.Dataset) -> None:
+    """Say if most runs are over as they begin, which a forgotten unit can do."""
+    share = float((result["t_end"] == 0.0).mean())
+    if share > 0.5:
+        logging.getLogger("ringsweep").warning(
+            "%s at t = 0: is a unit or the launch other than meant?",
+            "the run ends" if result["t_end"].size == 1 else f"{share:.0%} of the runs end",
+        )
 
+
+def _selection(text: str) -> tuple[str, str]:
+    """A coordinate and a value, from ``DIM=VALUE``."""
     name, equals, value = (part.strip() for part in text.partition("="))
     if not equals:
         raise InputError("--sel", f"{text!r} is not of the form DIM=VALUE")
-    if name not in result.coords or result[name].dtype.kind not in "iuf":
-        return name, value
-    attributes = result[name].attrs
-    parameter = Parameter(str(attributes.get("units", "1")), str(attributes.get("long_name", name)))
-    return name, quantity(value, parameter, f"--sel {name}")
+    return name, value
 
 
 def _outputs(name: str, mark: str, content: str) -> tuple[Path, Path]:

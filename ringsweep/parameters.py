@@ -64,7 +64,8 @@ class Parameter:
     def along_a_line(self) -> Parameter:
         """The same quantity where what turns on a ring moves along a line: m in place of rad."""
         name = self.long_name.replace("angular velocity of the ring", "velocity of the belt")
-        name = name.replace("angle of the ring", "displacement of the belt").replace("rocking angle", "displacement")
+        name = name.replace("ring's angular velocity", "belt's velocity").replace("rocking angle", "displacement")
+        name = name.replace("angle of the ring", "displacement of the belt")
         unit = {"rad": "m", "rad/s": "m/s"}.get(self.unit, self.unit)
         return replace(self, long_name=name, unit=unit if "phase" not in name else self.unit)
 

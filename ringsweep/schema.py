@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from collections.abc import Mapping
 from itertools import product
 from typing import Any, get_type_hints
@@ -70,8 +71,14 @@ def _number(parameter: Parameter, kind: str = "number") -> dict[str, Any]:
 
 
 def _names(registry: Mapping[str, Any], about: str) -> dict[str, Any]:
-    choices = [{"const": name, "description": (entry.__doc__ or "").split("\n")[0]} for name, entry in registry.items()]
+    choices = [{"const": name, "description": _first_line(entry)} for name, entry in registry.items()]
     return {"description": about, "type": "string", "oneOf": choices}
+
+
+def _first_line(documented: Any) -> str:
+    """What it is, as an editor shows it."""
+    line: str = (documented.__doc__ or "").split("\n")[0]
+    return re.sub(r":math:`([^`]*)`", lambda formula: formula[1].replace("\\", ""), line)
 
 
 def _nest(leaves: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
@@ -101,7 +108,7 @@ def _solver() -> dict[str, Any]:
     method: Any
     for name, method in METHODS.items():
         numbers, hints = declared(method), get_type_hints(method)
-        options: dict[str, Any] = {"method": {"const": name, "description": (method.__doc__ or "").split("\n")[0]}}
+        options: dict[str, Any] = {"method": {"const": name, "description": _first_line(method)}}
         for option in dataclasses.fields(method):
             if option.name in numbers:
                 kind = "integer" if hints[option.name] is int else "number"

@@ -107,6 +107,10 @@ def _trace(config: Config, structure: Structure, samples: int) -> xr.Dataset:
     names = model.history(structure)
     times, rows = config.solver.history(cell, samples, len(names))
     columns = dict(zip(names, rows.T, strict=True))
+    for name in columns:
+        if name.startswith("normal_"):
+            # Where friction jumps a contact may be asked to pull: there it lets go, and the run ends.
+            columns[name][-1:] = np.maximum(columns[name][-1:], 0.0)
     if "ring_omega" in columns:
         drive = take(cell.drive, 0)
         columns["theta"] = np.array([turn(drive, t)[0] for t in times.tolist()])
@@ -136,9 +140,10 @@ def _resampled(run: xr.Dataset, times: NDArray[np.float64]) -> xr.Dataset:
 def describe(outcome: xr.Dataset) -> str:
     """A run's outcome in words."""
     regime = REGIMES[int(outcome["regime"])]
+    doubt = "" if outcome["certified"] == 1 else ", not certified"
     if "t_separation" in outcome and np.isfinite(outcome["t_separation"]):
         return (
             f"{regime} ({REGIMES[int(outcome['motion'])]}), contact {int(outcome['separating_contact'])}, "
-            f"t = {float(outcome['t_separation']):.6g} s"
+            f"t = {float(outcome['t_separation']):.6g} s{doubt}"
         )
-    return f"{regime}, t = {float(outcome['t_end']):.6g} s"
+    return f"{regime}, t = {float(outcome['t_end']):.6g} s{doubt}"

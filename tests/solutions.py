@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from ringsweep.jit import take
 from ringsweep.physics.friction.static import weights
 from ringsweep.regimes import Outcome
-from ringsweep.solvers.piecewise import trace
+from ringsweep.solvers.piecewise import integrate
 
 
 def solve(method, batch):
@@ -25,7 +25,9 @@ HISTORY = ("phi", "omega", "epsilon", "normal_1", "normal_2", "ring_omega", "zon
 def trail(method, batch, spacing):
     """History of the first cell: every end of a step, and instants `spacing` apart."""
     times, rows = np.empty(2_000_000), np.empty((2_000_000, len(HISTORY)))
-    count = trace(batch, method.tolerances(), method.max_steps, spacing, times, rows)
+    batch = take(batch, [0])
+    out, steps = np.empty((1, 0)), np.empty(1)
+    count = integrate(batch, method.tolerances(), method.max_steps, out, steps, spacing, times, rows)
     return SimpleNamespace(t=times[:count], **dict(zip(HISTORY, rows[:count].T, strict=True)))
 
 

@@ -5,6 +5,7 @@ import re
 import shlex
 import subprocess
 import sys
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,15 @@ from jsonschema import Draft202012Validator
 from ringsweep import cli
 from ringsweep.cli import main
 from ringsweep.config import load
+from ringsweep.models import MODELS, parameters
+from ringsweep.physics.drives import DRIVES
+from ringsweep.physics.friction import LAWS
+from ringsweep.scene import Structure
 from ringsweep.schema import schema
+from ringsweep.solvers import METHODS
+from ringsweep.variables import HISTORY, OUTCOMES
+
+ROOT = Path(__file__).parents[1]
 
 TEXT = """\
 scene:
@@ -127,7 +136,40 @@ def test_a_result_that_is_not_there_is_refused(folder, capsys, verb):
     assert "nowhere.nc" in refused(capsys, verb, "nowhere.nc")
 
 
-@pytest.mark.parametrize("arguments", [[], ["rum"], ["run"], ["run", "case.yaml", "--jobs", "0"]])
+def test_no_command_at_all_is_answered_by_help(capsys):
+    assert main([]) == 2
+    out, _ = capsys.readouterr()
+    assert out.startswith("usage: ringsweep")
+    assert "simulate" in out
+
+
+def test_a_value_that_wants_quotes_is_told_so(folder, capsys):
+    with pytest.raises(SystemExit):
+        main(["simulate", "case.yaml", "--set", "drive.amplitude=1", "rad/s"])
+    assert "unrecognized arguments: rad/s; what has a space wants quotes" in capsys.readouterr().err
+
+
+def test_a_run_that_is_not_certified_says_so(folder, capsys, caplog):
+    assert main(["simulate", "case.yaml"]) == 0
+    assert "not certified" in capsys.readouterr().out.splitlines()[0]
+    assert "limit of stability of rk4" in caplog.text
+
+
+def test_a_launch_that_cannot_be_is_told_from_a_run(folder, capsys, caplog):
+    """At the top, at rest, the body falls off at once."""
+    wrong = ["initial.phi=180 deg", "solver.method=rk4"]
+    assert main(["simulate", "case.yaml", *(word for setting in wrong for word in ("--set", setting))]) == 0
+    assert "separating" in capsys.readouterr().out
+    assert "the run ends at t = 0" in caplog.text
+
+
+def test_a_history_is_no_map_and_the_message_names_the_file(folder, capsys):
+    assert main(["simulate", "case.yaml", "-q"]) == 0
+    capsys.readouterr()
+    assert refused(capsys, "map", "case-run.nc").startswith("ringsweep: case-run.nc: is the time history of one run")
+
+
+@pytest.mark.parametrize("arguments", [["rum"], ["run"], ["run", "case.yaml", "--jobs", "0"]])
 def test_a_wrong_command_line_has_status_2(capsys, arguments):
     with pytest.raises(SystemExit) as ended:
         main(arguments)
@@ -220,3 +262,16 @@ def test_help_comes_without_the_weight_of_solvers():
 def test_quiet_may_be_asked_for_before_the_command_and_after_it(folder, capsys, arguments):
     assert main(arguments) == 0
     assert capsys.readouterr() == ("", "")
+
+
+def test_the_pages_name_every_key_law_drive_and_number():
+    """What can be typed, and what comes back, is somewhere to be read."""
+    text = "".join((ROOT / "docs" / f"{name}.md").read_text() for name in ("scenes", "laws"))
+    keys = {
+        path
+        for model, drive, arcs in product(MODELS, DRIVES, ((), ("zone",), ("zones.0",)))
+        for law in MODELS[model].laws
+        for path in parameters(Structure(model, law, drive, arcs))
+    }
+    for name in {*keys, *MODELS, *LAWS, *DRIVES, *METHODS, *OUTCOMES, *HISTORY} - {"auto"}:
+        assert re.search(rf"`[^`]*\b{re.escape(name)}`", text), name

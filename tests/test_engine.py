@@ -124,6 +124,15 @@ class TestSingleRun:
         assert stuck.any()
         np.testing.assert_allclose(run.omega[stuck], run.ring_omega[stuck], atol=1e-12)
 
+    def test_shows_the_jump_by_which_a_contact_is_lost(self, scene):
+        """As the body turns in the ring's frame friction changes its sign at once, and with it the reactions."""
+        run = ringsweep.simulate(scene | {"drive": {"law": "arctan", "amplitude": 0.5}, "zone": {"half_angle": 0.9}})
+        assert run.separating_contact == 2
+        assert run.time[-2] == run.time[-1] == run.t_separation
+        assert run.normal_2[-2] > 0.04
+        assert run.normal_2[-1] == 0.0
+        assert run.normal_2.min() == run.normal_min_2
+
     def test_one_contact_has_no_second(self, scene):
         alone = scene | {"model": "ring-single-contact", "body": {"mass": 0.076}, "drive": {"law": "none"}}
         run = ringsweep.simulate(alone | {"initial": {"omega": 5.0}})

@@ -120,7 +120,7 @@ class TestExplore:
         assert asked[1]["drive.amplitude"] == near
         assert asked[1]["zone.half_angle"] == pytest.approx(np.radians({10.0: 10, 20.0: 20, 48.0: 40}[y]))
         assert figure.subfigs[1].get_suptitle().endswith("history 2")
-        assert f"drive_amplitude = {near:g} rad s" in figure.subfigs[1].get_suptitle()
+        assert f"angular velocity = {near:g} rad s" in figure.subfigs[1].get_suptitle()
         mark = figure.axes[0].lines[-1].get_xydata()[0]
         np.testing.assert_allclose(mark, [near, np.degrees(asked[1]["zone.half_angle"])])
 
@@ -162,7 +162,7 @@ class TestExplore:
         ds = mapped(scene, {"drive.amplitude": [0.5, 2.0], "friction.law": ["coulomb", "stiction"]})
         figure = plots.explore(ds)
         click(figure, 2.0, 0.0)
-        assert "friction_law = coulomb" in figure.subfigs[1].get_suptitle()
+        assert "friction law = coulomb" in figure.subfigs[1].get_suptitle()
 
     def test_one_axis_is_enough(self, scene, asked):
         figure = plots.explore(mapped(scene, {"drive.amplitude": [0.5, 2.0, 8.0]}))

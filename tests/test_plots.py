@@ -238,17 +238,47 @@ def test_one_swept_quantity_becomes_a_strip_or_a_line():
 def test_words_make_an_axis_too():
     ds = make_sweep((3, 4)).assign_coords(drive_amplitude=["stiction", "coulomb", "dahl"])
     figure = plots.regime_map(ds)
-    assert [label.get_text() for label in figure.axes[0].get_xticklabels()] == ["coulomb", "dahl", "stiction"]
-    np.testing.assert_array_equal(mesh(figure).get_array()[:, 2], ds["regime"].sel(drive_amplitude="stiction"))
-    assert "drive_amplitude = dahl" in plots.regime_map(ds, sel={"drive_amplitude": "dahl"}).get_suptitle()
+    assert [label.get_text() for label in figure.axes[0].get_xticklabels()] == ["stiction", "coulomb", "dahl"]
+    np.testing.assert_array_equal(mesh(figure).get_array()[:, 2], ds["regime"].sel(drive_amplitude="dahl"))
+    assert " = dahl" in plots.regime_map(ds, sel={"drive_amplitude": "dahl"}).get_suptitle()
 
 
 def test_selecting_holds_the_nearest_value_and_says_so():
     ds = make_sweep((12, 9, 3))
     figure = plots.regime_map(ds, sel={"friction.rough.mu_k": 0.32, "zone_half_angle": 0.0})
     np.testing.assert_array_equal(mesh(figure).get_array()[0], ds["regime"][:, 0, 1])
-    assert "friction_rough_mu_k = 0.3" in figure.get_suptitle()
-    assert "zone_half_angle = 2°" in figure.get_suptitle()
+    assert "coefficient of kinetic friction = 0.3" in figure.get_suptitle()
+    assert "half-angle of the rough arc = 2°" in figure.get_suptitle()
+
+
+@pytest.mark.parametrize("value", ["30 deg", "0.5236", 0.5236, "0.08333 turn"])
+def test_a_value_to_hold_may_have_a_unit(value):
+    ds = make_sweep((12, 30))
+    title = plots.regime_map(ds, sel={"zone.half_angle": value}).get_suptitle()
+    assert "half-angle of the rough arc = 30°" in title
+
+
+@pytest.mark.parametrize(
+    ("held", "problem"),
+    [
+        ({"zone.half_angle": 15}, "was `15 deg` meant"),
+        ({"zone.half_angle": "70 deg"}, "at most 1.1"),
+        ({"zone.half_angle": "1 m"}, "wrong unit"),
+        ({"drive_amplitude": 100.0}, "at most 1"),
+        ({"drive_amplitude": float("nan")}, "not finite"),
+    ],
+)
+def test_a_value_beyond_the_axis_is_not_taken_for_its_end(held, problem):
+    with pytest.raises(InputError, match=problem) as refused:
+        plots.regime_map(make_sweep(), sel=held)
+    assert refused.value.path == f"sel.{next(iter(held))}"
+
+
+def test_a_count_has_whole_numbers_beside_its_colours():
+    ds = make_sweep().assign(reversals=(("drive_amplitude", "zone_half_angle"), np.arange(108).reshape(12, 9) % 4))
+    figure = plots.regime_map(ds, var="reversals")
+    figure.draw_without_rendering()
+    assert all(tick == round(tick) for tick in figure.axes[1].get_yticks())
 
 
 def test_a_long_title_is_laid_in_lines():
@@ -315,7 +345,7 @@ class TestPanels:
         with pytest.raises(InputError, match="friction_rough_mu_k: hold it, or draw regime_map"):
             plots.map_panel(make_sweep((3, 3, 2)), ax=Figure().add_subplot())
         held = plots.map_panel(make_sweep((3, 3, 2)), sel={"friction.rough.mu_k": 0.1}, ax=Figure().add_subplot())
-        assert "friction_rough_mu_k = 0.1" in held.get_title()
+        assert "coefficient of kinetic friction = 0.1" in held.get_title()
 
     @pytest.mark.parametrize(("var", "lines"), [("phi", 1), ("ring_omega", 2), ("normal_2", 2), ("epsilon", 1)])
     def test_a_panel_of_a_history_has_what_belongs_together(self, var, lines):
@@ -371,7 +401,7 @@ def test_points_beside_a_grid_can_be_scattered_against_it():
         ({"x": "drive_amplitud"}, "x: .*did you mean drive_amplitude"),
         ({"y": "nothing"}, "y: .*zone_half_angle"),
         ({"sel": {"zone_angle": 1}}, "sel: .*did you mean zone_half_angle"),
-        ({"sel": {"zone_half_angle": "wide"}}, "takes a number, not 'wide'"),
+        ({"sel": {"zone_half_angle": "wide"}}, "'wide' is not a number"),
         ({"sel": {"zone_half_angle": np.nan}}, "finite"),
         ({"x": "zone_half_angle", "y": "zone_half_angle"}, "must differ"),
         ({"sel": {"zone_half_angle": 1, "drive_amplitude": 1}}, "a single cell has no map"),
@@ -444,8 +474,10 @@ def test_a_long_history_is_condensed_without_losing_its_extremes(tmp_path):
     assert line[:, 1].min() == -7
 
 
-def test_a_belt_has_panels_of_its_own():
-    figure = plots.history(make_history(ring=False))
+def test_a_belt_has_panels_of_its_own_and_bristles_one_for_their_bending():
+    rigid = make_history(ring=False)
+    assert len(plots.history(rigid.drop_vars("deflection")).axes) == 3
+    figure = plots.history(rigid)
     assert [axes.get_ylabel().replace("\n", " ") for axes in figure.axes] == [
         "displacement (m)",
         "velocity (m s$^{-1}$)",

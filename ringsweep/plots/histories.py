@@ -52,10 +52,10 @@ def history(ds: xr.Dataset) -> Figure:
     """Draw the time history of one run, or of one under each of several friction laws: the paper's panels.
 
     For a ring these are angle, angular velocity, angular acceleration and normal reactions, above a strip
-    that shows which arc lies under each contact; for a belt displacement, velocity, friction force, and the
-    force just after the start. Stick is shaded. Of several laws each is a line, and neither arcs nor stick are
-    shown; the last panel goes on for as long again as the differences between their forces at the start last,
-    over a logarithmic time if these are of more than one scale.
+    that shows which arc lies under each contact; for a belt displacement, velocity and friction force, and for laws
+    with bristles the force just after the start. Stick is shaded. Of several laws each is a line, and neither arcs
+    nor stick are shown; where their forces differ at the start a last panel goes on for as long again as that lasts,
+    over a logarithmic time if the differences are of more than one scale.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def draw_history(figure: Figure | SubFigure, ds: xr.Dataset) -> None:
     compared = "friction_law" in ds.dims
     panels = _panels(ds)
     zones = _zones(ds)
-    detail = "phi" not in ds
+    detail = _start(ds)
     time = ds["time"].values
     heights = _heights(ds)
     axes = list(figure.subplots(len(heights), 1, gridspec_kw={"height_ratios": heights}))
@@ -154,7 +154,7 @@ def draw_history(figure: Figure | SubFigure, ds: xr.Dataset) -> None:
     if zones:
         _draw_zones(axes[-1], ds, zones)
     if detail:
-        first, last = _transients(ds) if compared else (0.0, _DETAIL / 2 * (time[-1] - time[0]))
+        first, last = detail
         start = ds.isel(time=slice(0, max(20, int(np.searchsorted(time, time[0] + 2.0 * last)))))
         draw(axes[-1], start, ["friction_force"])
         if 0.0 < first < 0.05 * last:
@@ -196,7 +196,16 @@ def _zones(ds: xr.Dataset) -> list[str]:
 def _heights(ds: xr.Dataset) -> list[float]:
     """Of all panels, the detail of a belt's start and the strip of a ring's arcs among them."""
     zones = len(_zones(ds))
-    return [1.0] * (len(_panels(ds)) + ("phi" not in ds)) + [0.13 * zones] * bool(zones)
+    return [1.0] * (len(_panels(ds)) + (_start(ds) is not None)) + [0.13 * zones] * bool(zones)
+
+
+def _start(ds: xr.Dataset) -> tuple[float, float] | None:
+    """When what a belt's start has of its own begins and ends: the bending of bristles, or how several laws differ."""
+    if "phi" in ds:
+        return None
+    if "friction_law" in ds.dims:
+        return _transients(ds)
+    return (0.0, _DETAIL / 2 * float(np.ptp(ds["time"].values))) if "deflection" in ds else None
 
 
 def draw_panel(axes: Axes, ds: xr.Dataset, names: list[str], told: bool = False) -> None:
@@ -252,8 +261,10 @@ def _regime(ds: xr.Dataset, k: int) -> str:
     return meanings[flags.index(int(ds["regime"][k]))]
 
 
-def _transients(ds: xr.Dataset) -> tuple[float, float]:
+def _transients(ds: xr.Dataset) -> tuple[float, float] | None:
     """When the first and the last of the differences at the start of runs under several friction laws are over.
+
+    None if there are no such differences.
 
     A difference between their forces is over if they agree for as long again as has gone by then. The
     bristles of a law bend within milliseconds, and the body rings on them for longer.
@@ -266,9 +277,7 @@ def _transients(ds: xr.Dataset) -> tuple[float, float]:
     again = np.append(apart[1:], len(since) - 1)
     ends = since[apart[(since[again] > 2.0 * since[apart]) & (again > apart + 1)]]
     ends = ends[ends < _LATEST * since[-1]]
-    if not len(ends):
-        return _DETAIL / 2 * since[-1], _DETAIL / 2 * since[-1]
-    return ends[0], ends[-1]
+    return (float(ends[0]), float(ends[-1])) if len(ends) else None
 
 
 def _draw_zones(axes: Axes, ds: xr.Dataset, zones: list[str]) -> None:

@@ -18,10 +18,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path as Outline
-from matplotlib.ticker import LogFormatterSciNotation
+from matplotlib.ticker import LogFormatterSciNotation, MaxNLocator
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
+from ringsweep.parameters import Parameter
 from ringsweep.plots.style import (
     NO_VALUE,
     OTHER_COLOURS,
@@ -37,6 +38,7 @@ from ringsweep.plots.style import (
     runs,
     value_text,
 )
+from ringsweep.units import quantity
 
 _MOST_PANELS = 25
 
@@ -70,7 +72,7 @@ def regime_map(
     var : str
         Variable to draw.
     sel : mapping of str to float or str, optional
-        Coordinates held at the value nearest to the one given, in SI units.
+        Coordinates held at the value nearest to the one given: a plain number is SI, text may have a unit.
 
     Returns
     -------
@@ -152,7 +154,7 @@ def map_panel(
     var : str
         Variable to draw.
     sel : mapping of str to float or str, optional
-        Coordinates held at the value nearest to the one given, in SI units.
+        Coordinates held at the value nearest to the one given: a plain number is SI, text may have a unit.
     ax : matplotlib.axes.Axes, optional
         Where to draw; pyplot's current axes unless given.
 
@@ -290,7 +292,8 @@ class Map:
     def add_bar(self, panels: list[Axes]) -> None:
         """A scale of the colours beside the panels."""
         bar = ScalarMappable(self.field.norm, self.field.colours)
-        panels[0].figure.colorbar(bar, ax=panels, label=label_of(self.ds[self.var], self.ds))
+        ticks = MaxNLocator(integer=True) if self.data.dtype.kind in "iu" else None
+        panels[0].figure.colorbar(bar, ax=panels, label=label_of(self.ds[self.var], self.ds), ticks=ticks)
 
     def cell_at(self, axes: Axes, x: float, y: float) -> xr.Dataset:
         """The cell that is drawn at a point of the only panel."""
@@ -341,8 +344,10 @@ class _Axis:
         if coordinate.dtype.kind in "iuf":
             values = coordinate.values * factor(coordinate)
         else:
-            named, positions = np.unique(coordinate.values.astype(str), return_inverse=True)
-            categories, values = tuple(named), positions.astype(float)
+            # In the order in which they were given.
+            named = coordinate.values.astype(str).tolist()
+            categories = tuple(dict.fromkeys(named))
+            values = np.array([categories.index(name) for name in named], dtype=float)
         order = np.argsort(values, kind="stable")
         scale = "log" if _is_geometric(np.unique(values)) else "linear"
         return cls(name, dims, label_of(coordinate, ds, angle="°"), values[order], order, scale, categories)
@@ -453,19 +458,24 @@ def select(ds: xr.Dataset, sel: Mapping[str, float | str]) -> tuple[xr.Dataset, 
         name = known("sel", wanted, [n for n in {**ds.sizes, **ds.coords} if n in ds.dims or ds[n].ndim == 1])
         coordinate = ds[name]
         if coordinate.dtype.kind in "iuf":
-            try:
-                distance = np.abs(coordinate.values - float(value))
-            except ValueError:
-                raise InputError("sel", f"{name} takes a number, not {value!r}") from None
-            if np.isnan(distance).all():
-                raise InputError("sel", f"{name} takes a finite number, not {value!r}")
-            index = int(np.nanargmin(distance))
+            number = quantity(value, _within(coordinate), f"sel.{wanted}")
+            index = int(np.nanargmin(np.abs(coordinate.values - number)))
         else:
             names = [str(one) for one in coordinate.values]
             index = names.index(known("sel", str(value), names))
         ds = ds.isel({coordinate.dims[0]: index})
         held.append(value_text(coordinate[index]))
     return ds, held
+
+
+def _within(coordinate: xr.DataArray) -> Parameter:
+    """What can be held: the values of an axis, and half a step beyond either end."""
+    values = np.unique(coordinate.values[np.isfinite(coordinate.values)])
+    if len(values) > 1:
+        low, high = 1.5 * values[[0, -1]] - 0.5 * values[[1, -2]]
+    else:
+        low, high = values[0] - 0.5 * abs(values[0]), values[0] + 0.5 * abs(values[0])
+    return Parameter(str(coordinate.attrs.get("units", "1")), long_name(coordinate), float(low), float(high))
 
 
 def _choose_axes(ds: xr.Dataset, data: xr.DataArray, x: str | None, y: str | None) -> tuple[_Axis, _Axis | None]:
@@ -498,7 +508,7 @@ def _panels(ds: xr.Dataset, dims: list[str]) -> list[tuple[str, dict[str, int]]]
     panels = []
     for index in np.ndindex(*sizes):
         place = dict(zip(dims, map(int, index), strict=True))
-        panels.append(("\n".join(value_text(ds[dim][k]) for dim, k in place.items()), place))
+        panels.append(("\n".join(value_text(ds[dim][k], brief=True) for dim, k in place.items()), place))
     return panels
 
 

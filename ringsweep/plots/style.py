@@ -156,13 +156,14 @@ def units_of(data: xr.DataArray, angle: str) -> str:
     return re.sub(r"(?<=[A-Za-z])\^?(-?\d+)", r"$^{\1}$", units)
 
 
-def value_text(value: xr.DataArray) -> str:
-    """A value of a coordinate in words."""
+def value_text(value: xr.DataArray, brief: bool = False) -> str:
+    """A value of a coordinate in words, by its long name or briefly by its path."""
+    name = value.attrs.get("path", value.name) if brief else long_name(value)
     if value.dtype.kind not in "iuf":
-        return f"{value.name} = {value.item()}"
+        return f"{name} = {value.item()}"
     units = units_of(value, "°")
     number = f"{value.item() * factor(value):.4g}"
-    return f"{value.name} = {number}{units if units == '°' else f' {units}'.rstrip()}"
+    return f"{name} = {number}{units if units == '°' else f' {units}'.rstrip()}"
 
 
 def runs(mask: NDArray[Any]) -> NDArray[np.intp]:

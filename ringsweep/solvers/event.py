@@ -15,7 +15,7 @@ from ringsweep.parameters import Parameter
 from ringsweep.physics.friction import DYNAMIC, LAWS, SET_VALUED, SMOOTH
 from ringsweep.scene import Structure
 from ringsweep.solvers.common import Method, Result, agree
-from ringsweep.solvers.piecewise import integrate, trace
+from ringsweep.solvers.piecewise import integrate
 
 LIMIT = Parameter("1", "steps after which a run is given up as failed", lower=1, upper=1e10)
 
@@ -75,7 +75,7 @@ class _Piecewise(Method):
     def _integrate(self, batch: Any, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         rows = np.empty((len(batch.span), width))
         steps = np.empty(len(rows))
-        integrate(batch, self.tolerances(), self.max_steps, rows, steps)
+        integrate(batch, self.tolerances(), self.max_steps, rows, steps, np.inf, np.empty(0), np.empty((0, 0)))
         return rows, steps
 
     def history(self, batch: Any, samples: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -83,10 +83,11 @@ class _Piecewise(Method):
         spacing = float(batch.span[0]) / samples
         size = 4 * samples
         while True:
-            times, rows = np.empty(size), np.empty((size, width))
-            count = trace(batch, self.tolerances(), self.max_steps, spacing, times, rows)
+            times, table = np.empty(size), np.empty((size, width))
+            none, steps = np.empty((1, 0)), np.empty(1)
+            count = integrate(batch, self.tolerances(), self.max_steps, none, steps, spacing, times, table)
             if count < size or size >= self.max_steps:
-                return times[:count], rows[:count]
+                return times[:count], table[:count]
             size *= 4
 
 

@@ -366,71 +366,10 @@ def _store(row, values):
 
 
 @kernel
-def trace(batch, tolerances, limit, spacing, times, table):
-    """History of cell 0: every end of a step, and within longer ones instants `spacing` apart.
-
-    Parameters
-    ----------
-    batch, tolerances, limit
-        As for :func:`integrate`.
-    spacing : float
-        Greatest distance between rows, s.
-    times, table : ndarray of shapes ``(rows,)`` and ``(rows, variables)``
-        Filled as far as they reach.
-
-    Returns
-    -------
-    int
-        Number of rows.
-    """
-    scene = take(batch, 0)
-    count, guards = rows(scene)
-    c = np.zeros((count, ORDER + 3))
-    work = np.empty((STACK, ORDER + 3))
-    t, y = embark(scene)
-    stages = np.empty((rosenbrock.STAGES, len(y)))
-    status, mode = enter(scene, t, y)
-    record = _outset(scene.law, scene, mode, t, y, tolerances, c)
-    trial = Trial(1e-6 * scene.span, 0.0, 0.0)
-    n = 0
-    entered = True
-    implicit = False
-    stalled = 0
-    before = -1.0
-    for _ in range(limit):
-        stalled = stalled + 1 if t == before else 0
-        if status != RUNNING or n == len(times) or stalled == _STALLED:
-            break
-        before = t
-        horizon = min(scene.span, next_knot(scene.drive, t)) - t
-        trial = Trial(min(trial.h, spacing), trial.last, trial.size)
-        implicit, guard, s, y_next, record, trial = _stride(
-            scene.law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages
-        )
-        if s > 0.0:
-            parts = 1 if implicit else int(s / spacing) + 1
-            for part in range(0 if entered else 1, parts + 1):
-                if n < len(times):
-                    inside = s * part / parts
-                    state = y if part == 0 else y_next
-                    _store(table[n], _row(scene.law, scene, mode, implicit, c, t + inside, inside, state))
-                    # Sums that should be equal differ by rounding.
-                    times[n] = max(t + inside, times[n - 1]) if n > 0 else t
-                    n += 1
-        y = y_next
-        entered = guard >= 0 or (entered and s == 0.0)
-        t, status, mode, y = _arrive(scene, mode, guard, t, s, horizon, y)
-    if n == 0:
-        # A run that ends as it begins was somewhere all the same.
-        _store(table[0], _row(scene.law, scene, mode, implicit, c, t, 0.0, y))
-        times[0] = t
-        n = 1
-    return n
-
-
-@kernel
-def integrate(batch, tolerances, limit, out, steps):
+def integrate(batch, tolerances, limit, out, steps, spacing, times, table):
     """Run every cell of a batch to its end, or to `limit` steps.
+
+    One kernel serves sweeps and histories: a user of both compiles a kind of scene once.
 
     Parameters
     ----------
@@ -442,20 +381,32 @@ def integrate(batch, tolerances, limit, out, steps):
     limit : int
         Steps after which a run is given up.
     out : ndarray of shape ``(cells, outcomes)``
+        Or without columns, if outcomes are not wanted.
     steps : ndarray of shape ``(cells,)``
+    spacing : float
+        Greatest distance between rows of a history, s.
+    times, table : ndarray of shapes ``(rows,)`` and ``(rows, variables)``
+        Filled, as far as they reach, with the history of the only cell: every end of a step, and within longer ones
+        instants `spacing` apart. A run that fills them ends there. Without rows no history is kept.
+
+    Returns
+    -------
+    int
+        Number of rows.
     """
     first = take(batch, 0)
     count, guards = rows(first)
     c = np.zeros((count, ORDER + 3))
     work = np.empty((STACK, ORDER + 3))
     stages = np.empty((rosenbrock.STAGES, len(embark(first)[1])))
-    _integrate(batch, tolerances, limit, out, steps, guards, c, work, stages)
+    return _integrate(batch, tolerances, limit, out, steps, spacing, times, table, guards, c, work, stages)
 
 
 @inlined
-def _integrate(batch, tolerances, limit, out, steps, guards, c, work, stages):
+def _integrate(batch, tolerances, limit, out, steps, spacing, times, table, guards, c, work, stages):
     c, work, stages = borrowed(c), borrowed(work), borrowed(stages)
-    out, steps = borrowed(out), borrowed(steps)
+    out, steps, times, table = borrowed(out), borrowed(steps), borrowed(times), borrowed(table)
+    kept = 0
     for i in range(len(steps)):
         scene = take(batch, i)
         t, y = embark(scene)
@@ -464,6 +415,8 @@ def _integrate(batch, tolerances, limit, out, steps, guards, c, work, stages):
         trial = Trial(1e-6 * scene.span, 0.0, 0.0)
         n = stalled = 0
         before = -1.0
+        entered = True
+        implicit = False
         while status == RUNNING:
             # Steps below the rounding of time do move the state, on the way into a jam, but not for ever.
             stalled = stalled + 1 if t == before else 0
@@ -473,11 +426,38 @@ def _integrate(batch, tolerances, limit, out, steps, guards, c, work, stages):
             before = t
             n += 1
             horizon = min(scene.span, next_knot(scene.drive, t)) - t
-            _, guard, s, y, record, trial = _stride(
+            trial = Trial(min(trial.h, spacing), trial.last, trial.size)
+            implicit, guard, s, y_next, record, trial = _stride(
                 scene.law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages
             )
-            t, status, mode, y = _arrive(scene, mode, guard, t, s, horizon, y)
+            if len(times) > 0:
+                if kept == len(times):
+                    return kept
+                if s > 0.0:
+                    parts = 1 if implicit else int(s / spacing) + 1
+                    for part in range(0 if entered else 1, parts + 1):
+                        if kept < len(times):
+                            inside = s * part / parts
+                            state = y if part == 0 else y_next
+                            _store(table[kept], _row(scene.law, scene, mode, implicit, c, t + inside, inside, state))
+                            # Sums that should be equal differ by rounding.
+                            times[kept] = max(t + inside, times[kept - 1]) if kept > 0 else t
+                            kept += 1
+                entered = guard >= 0 or (entered and s == 0.0)
+            last = mode
+            t, status, mode, y = _arrive(scene, mode, guard, t, s, horizon, y_next)
+            if len(times) > 0 and s == 0.0 and status != RUNNING and kept < len(times):
+                # What a mode ends by that is over as it is entered is to be seen.
+                _store(table[kept], _row(scene.law, scene, last, implicit, c, t, 0.0, y))
+                times[kept] = t
+                kept += 1
+        if len(times) > 0 and kept == 0:
+            # A run that ends as it begins was somewhere all the same.
+            _store(table[0], _row(scene.law, scene, mode, implicit, c, t, 0.0, y))
+            times[0] = t
+            kept = 1
         outcome = finish(scene, record, status, t, y)
-        for k in range(len(outcome)):
+        for k in range(min(len(outcome), out.shape[1])):
             out[i, k] = outcome[k]
         steps[i] = n
+    return kept
