@@ -21,6 +21,8 @@ def build(folder: Path) -> None:
     pdoc.render.configure(docformat="numpy", math=True, search=False)
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)
+        # In a clone there is a folder of the same name: the installed package is the one that is meant.
+        warnings.filterwarnings("ignore", "'ringsweep' may refer to", RuntimeWarning)
         pdoc.pdoc(*MODULES, output_directory=folder)
 
 

@@ -235,6 +235,14 @@ def test_one_swept_quantity_becomes_a_strip_or_a_line():
     assert axes.get_xscale() == "log"
 
 
+def test_quantities_that_vary_together_make_one_axis_of_a_grid():
+    """Two arcs that widen alike: the cells tile, as with one."""
+    ds = make_sweep((12, 9)).rename(zone_half_angle="width")
+    widths = {f"zones_{k}_half_angle": ("width", ds["width"].values, ANGLE) for k in range(2)}
+    together = ds.drop_vars("width").assign_coords(widths)
+    np.testing.assert_array_equal(mesh(plots.regime_map(together)).get_array(), ds["regime"].transpose())
+
+
 def test_words_make_an_axis_too():
     ds = make_sweep((3, 4)).assign_coords(drive_amplitude=["stiction", "coulomb", "dahl"])
     figure = plots.regime_map(ds)

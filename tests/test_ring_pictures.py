@@ -19,6 +19,7 @@ from ringsweep import plots
 from ringsweep.cli import main
 from ringsweep.errors import InputError
 from ringsweep.plots import motion
+from ringsweep.plots.ring import TIMES
 
 RADIUS, BALL, HALF_DISTANCE = 0.043378, 0.010, 0.025
 BETA = np.arcsin(HALF_DISTANCE / (RADIUS - BALL))
@@ -125,7 +126,7 @@ class TestPolarView:
         plots.polar_view(run, backward["time"], ax)
         (begin, _), (_, friction), (_, weight) = arrows(ax)
         (told,) = (text.get_text() for text in ax.get_legend().get_texts() if "friction at 1" in text.get_text())
-        enlarged = float(told.rpartition(", ")[2].removesuffix(":1")) if ":1" in told else 1.0
+        enlarged = float(told.rpartition(TIMES)[2]) if TIMES in told else 1.0
         for k in (0, 1):
             forwards = np.array([-begin[k, 1], begin[k, 0]]) / RADIUS
             assert friction[k] @ forwards > 0.0

@@ -218,7 +218,7 @@ class Map:
         marks = _marks(ds, var, ds[var])
         others = [str(d) for d in ds[var].dims if d not in {*across.dims, *(up.dims if up else ())}]
         panels = _panels(ds, others)
-        scattered = not across.gridded or (up is not None and not up.gridded)
+        scattered = _is_scattered(across, up)
         entries = _legend(field, ds[var], marks, scattered)
         # A line shows its spikes, however many values it has.
         picks = {} if scattered or up is None else _picks([across, up], _MOST_ACROSS // _columns(panels))
@@ -245,7 +245,7 @@ class Map:
 
     @property
     def scattered(self) -> bool:
-        return not self.across.gridded or (self.up is not None and not self.up.gridded)
+        return _is_scattered(self.across, self.up)
 
     @property
     def up_label(self) -> str:
@@ -354,7 +354,8 @@ class _Axis:
 
     @property
     def gridded(self) -> bool:
-        return self.dims == (self.name,)
+        """Whether it has a dimension of its own, along which others may vary with it."""
+        return len(self.dims) == 1 and len(np.unique(self.values)) == len(self.values)
 
     @property
     def edges(self) -> NDArray[Any]:
@@ -425,6 +426,13 @@ class _Mark:
     hatch: str
     marker: str
     cells: xr.DataArray
+
+
+def _is_scattered(across: _Axis, up: _Axis | None) -> bool:
+    """Whether values are those of points rather than of the cells of a grid."""
+    if up is None:
+        return across.dims != (across.name,)
+    return across.dims == up.dims or not (across.gridded and up.gridded)
 
 
 def _columns(panels: list[tuple[str, dict[str, int]]]) -> int:

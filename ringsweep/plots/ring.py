@@ -46,7 +46,7 @@ _MODE_LINES: dict[int, dict[str, Any]] = {
 # An angle that goes through more than this is shown modulo a turn, degrees.
 _LONGEST = 720.0
 
-MINUS = "\N{MINUS SIGN}"
+MINUS, TIMES = "\N{MINUS SIGN}", "\N{MULTIPLICATION SIGN}"
 
 _SIZE = (7.6, 4.8)
 _SQUARE = (6.6, 5.2)
@@ -339,7 +339,7 @@ class Stage:
         entries.append(Patch(facecolor=REST, edgecolor="0.3", label="rest"))
         for c in self.rig.contacts:
             words = f" at {c}" if len(self.rig.contacts) > 1 else ""
-            enlarged = f", {self.magnified:g}:1" if self.magnified > 1.0 else ""
+            enlarged = f", {TIMES}{self.magnified:g}" if self.magnified > 1.0 else ""
             for label, width in (("reaction" + words, 3.5), ("friction" + words + enlarged, 1.6)):
                 entries.append(Line2D([], [], color=PAIR_COLOURS[c - 1], linewidth=width, label=label))
         entries.append(Line2D([], [], color="black", linewidth=1.6, label="weight"))
