@@ -416,6 +416,8 @@ def _info(arguments: argparse.Namespace) -> None:
             continue
         unit = axis.attrs.get("units", "1")
         print(f"  {name}: {axis.values.min():g} to {axis.values.max():g}{'' if unit == '1' else f' {unit}'}")
+    if not {"contender", "time"} & set(result.dims):
+        print("variables:", ", ".join(map(str, result.data_vars)))
     if "contender" in result.dims:
         from ringsweep.work import report
 

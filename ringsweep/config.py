@@ -410,7 +410,8 @@ def _table(doc: Document, drive: dict[str, Any]) -> tuple[NDArray[np.float64], N
         columns = doc.inline_csv(drive["file"], "scene.drive.file", "scene.drive")
         renamed = {"time" if name == "t" else name: cells for name, cells in columns.items()}
         if set(renamed) != {"time", "theta"} or len(columns) != 2:
-            raise InputError("scene.drive.file", f"columns t, theta are expected, got {', '.join(columns)}")
+            hint = ": parted by commas" if len(columns) == 1 else ""
+            raise InputError("scene.drive.file", f"columns t, theta are expected{hint}, got {', '.join(columns)}")
         doc.marks |= {k.replace("drive.t.", "drive.time."): v for k, v in doc.marks.items()}
         del drive["file"]
         drive |= renamed

@@ -99,7 +99,8 @@ def history_panel(ds: xr.Dataset, var: str = "phi", ax: Axes | None = None) -> A
     var : str
         Variable to draw.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; pyplot's current axes unless given.
+        Where to draw; pyplot's current axes unless given. For the legend beside them a figure with
+        ``layout="constrained"`` makes room.
 
     Returns
     -------

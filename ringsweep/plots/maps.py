@@ -156,7 +156,8 @@ def map_panel(
     sel : mapping of str to float or str, optional
         Coordinates held at the value nearest to the one given: a plain number is SI, text may have a unit.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; pyplot's current axes unless given.
+        Where to draw; pyplot's current axes unless given. For the legend beside them a figure with
+        ``layout="constrained"`` makes room.
 
     Returns
     -------

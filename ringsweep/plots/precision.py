@@ -69,7 +69,8 @@ def precision_panel(ds: xr.Dataset, error: str = "error_end", ax: Axes | None = 
     error : str
         Variable to draw; NaN stands for a cell that has no such error.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; pyplot's current axes unless given.
+        Where to draw; pyplot's current axes unless given. For the legend beside them a figure with
+        ``layout="constrained"`` makes room.
 
     Returns
     -------

@@ -66,7 +66,8 @@ def phase_portrait(ds: xr.Dataset, frame: Literal["space", "ring"] = "space", ax
     frame : {"space", "ring"}
         What stands still.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; pyplot's current axes unless given.
+        Where to draw; pyplot's current axes unless given. For the legend beside them a figure with
+        ``layout="constrained"`` makes room.
 
     Returns
     -------
@@ -151,7 +152,8 @@ def polar_view(ds: xr.Dataset, time: float, ax: Axes | None = None) -> Axes:
     time : float
         Instant, s.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; pyplot's current axes unless given.
+        Where to draw; pyplot's current axes unless given. For the legend beside them a figure with
+        ``layout="constrained"`` makes room.
 
     Returns
     -------
