@@ -384,8 +384,9 @@ def draw(measured: dict[str, Measured]) -> Figure:
     """Scenes down, the three errors across."""
     figure = Figure(figsize=(19.0, 5.2 * len(measured)), layout="constrained")
     axes = figure.subplots(len(measured), 3, squeeze=False)
+    methods = list(dict.fromkeys(str(name) for found in measured.values() for name in found.data.method.values))
     for (first, second, third), found in zip(axes, measured.values(), strict=True):
-        data = found.data
+        data = found.data.assign_attrs(methods=methods)
         plots.precision_panel(data, "error_end", first)
         first.set_title(data.attrs["title"], loc="left")
         styles = {line.get_label(): line for line in first.get_lines() if not str(line.get_label()).startswith("_")}

@@ -107,7 +107,7 @@ class TestExplore:
         assert figure.subfigs[1].get_suptitle().endswith("history 1")
 
     def test_begins_with_the_cell_that_is_named(self, maps, asked):
-        plots.explore(maps, at={"drive.amplitude": 8.0, "zone.half_angle": 0.1})
+        plots.explore(maps, at={"drive.amplitude": 8.0, "zone.half_angle": 0.18})
         assert asked[0]["drive.amplitude"] == 8.0
         assert asked[0]["zone.half_angle"] == pytest.approx(np.radians(10.0))
 

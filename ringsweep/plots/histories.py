@@ -295,7 +295,7 @@ def _draw_zones(axes: Axes, ds: xr.Dataset, zones: list[str]) -> None:
     axes.set_yticks(np.arange(len(zones)) + 0.5, labels=[f"contact {name[-1]}" for name in zones], fontsize=SMALL)
     axes.tick_params(axis="y", length=0)
     axes.invert_yaxis()
-    names = ["rest", *arc_names(arcs)]
+    names = ["elsewhere", *arc_names(arcs)]
     handles: list[Artist] = [Patch(facecolor=c, edgecolor="0.7", label=n) for c, n in zip(colours, names, strict=True)]
     beside(axes, handles, bbox_to_anchor=(1.0, 1.2))
 

@@ -31,7 +31,8 @@ def cell(ds: xr.Dataset, sel: Mapping[str, float | str] | None = None) -> dict[s
     ds : xarray.Dataset
         Result of a sweep, or a part of one: what ``ds.isel(...)`` has left out is held already.
     sel : mapping of str to float or str, optional
-        Coordinates held at the value nearest to the one given: a plain number is SI, text may have a unit.
+        Coordinates held at the value nearest to the one given, which must lie within the axis: a plain number is SI,
+        text may have a unit.
 
     Returns
     -------
@@ -86,7 +87,8 @@ def explore(
     var : str
         Variable to draw.
     sel : mapping of str to float or str, optional
-        Coordinates held at the value nearest to the one given: a plain number is SI, text may have a unit.
+        Coordinates held at the value nearest to the one given, which must lie within the axis: a plain number is SI,
+        text may have a unit.
     at : mapping of str to float or str, optional
         The cell whose history is drawn first, found in the same way; on an axis that it does not name, the middle.
 

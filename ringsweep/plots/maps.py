@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -45,8 +46,8 @@ _MOST_PANELS = 25
 # Cells along an axis that are drawn: more than the pixels of a printed page. Millions of others take gigabytes.
 _MOST_ACROSS = 1200
 
-# Letters in a line of a title.
-_WIDEST = 60
+# Letters in a line of a title, and in one of a small panel's.
+_WIDEST, _PANEL_WIDTH = 60, 30
 
 
 def regime_map(
@@ -72,7 +73,8 @@ def regime_map(
     var : str
         Variable to draw.
     sel : mapping of str to float or str, optional
-        Coordinates held at the value nearest to the one given: a plain number is SI, text may have a unit.
+        Coordinates held at the value nearest to the one given, which must lie within the axis: a plain number is SI,
+        text may have a unit.
 
     Returns
     -------
@@ -154,7 +156,8 @@ def map_panel(
     var : str
         Variable to draw.
     sel : mapping of str to float or str, optional
-        Coordinates held at the value nearest to the one given: a plain number is SI, text may have a unit.
+        Coordinates held at the value nearest to the one given, which must lie within the axis: a plain number is SI,
+        text may have a unit.
     ax : matplotlib.axes.Axes, optional
         Where to draw; pyplot's current axes unless given. For the legend beside them a figure with
         ``layout="constrained"`` makes room.
@@ -209,7 +212,10 @@ class Map:
         if "contender" in ds.dims:
             raise InputError("ds", "is error against run time, not a sweep; draw it with work_precision")
         var = known("var", var, [name for name, data in ds.data_vars.items() if data.dtype.kind in "iuf"])
+        # What was held before stands in the title as well.
+        earlier = [value_text(c) for c in ds.coords.values() if not c.dims and "path" in c.attrs]
         ds, held = select(ds, sel)
+        held = earlier + held
         if not ds[var].dims:
             raise InputError(
                 "sel" if sel else "ds", "a single cell has no map; at least one swept dimension must remain"
@@ -355,8 +361,8 @@ class _Axis:
 
     @property
     def gridded(self) -> bool:
-        """Whether it has a dimension of its own, along which others may vary with it."""
-        return len(self.dims) == 1 and len(np.unique(self.values)) == len(self.values)
+        """Whether it has a dimension of its own, along which others may vary with it; points have none."""
+        return len(self.dims) == 1 and self.dims != ("point",) and len(np.unique(self.values)) == len(self.values)
 
     @property
     def edges(self) -> NDArray[Any]:
@@ -478,13 +484,12 @@ def select(ds: xr.Dataset, sel: Mapping[str, float | str]) -> tuple[xr.Dataset, 
 
 
 def _within(coordinate: xr.DataArray) -> Parameter:
-    """What can be held: the values of an axis, and half a step beyond either end."""
-    values = np.unique(coordinate.values[np.isfinite(coordinate.values)])
-    if len(values) > 1:
-        low, high = 1.5 * values[[0, -1]] - 0.5 * values[[1, -2]]
-    else:
-        low, high = values[0] - 0.5 * abs(values[0]), values[0] + 0.5 * abs(values[0])
-    return Parameter(str(coordinate.attrs.get("units", "1")), long_name(coordinate), float(low), float(high))
+    """What can be held: no value that the nearest one would have to stand in for from outside the axis."""
+    values = coordinate.values[np.isfinite(coordinate.values)]
+    low, high = float(values.min()), float(values.max())
+    # Degrees have few digits.
+    slack = 1e-4 * ((high - low) or abs(high))
+    return Parameter(str(coordinate.attrs.get("units", "1")), long_name(coordinate), low - slack, high + slack)
 
 
 def _choose_axes(ds: xr.Dataset, data: xr.DataArray, x: str | None, y: str | None) -> tuple[_Axis, _Axis | None]:
@@ -517,7 +522,8 @@ def _panels(ds: xr.Dataset, dims: list[str]) -> list[tuple[str, dict[str, int]]]
     panels = []
     for index in np.ndindex(*sizes):
         place = dict(zip(dims, map(int, index), strict=True))
-        panels.append(("\n".join(value_text(ds[dim][k], brief=True) for dim, k in place.items()), place))
+        words = [textwrap.fill(value_text(ds[dim][k]), _PANEL_WIDTH) for dim, k in place.items()]
+        panels.append(("\n".join(words), place))
     return panels
 
 

@@ -124,7 +124,11 @@ def precision_panel(ds: xr.Dataset, error: str = "error_end", ax: Axes | None = 
         ax.axhline(target, color="0.25", linewidth=1, linestyle=(0, (5, 3)))
         entries.append(Line2D([], [], color="0.25", linewidth=1, linestyle=(0, (5, 3)), label=f"target, {target:g}"))
     curves: list[Artist] = []
-    for k, method in enumerate(dict.fromkeys(methods[rows].tolist())):
+    present = dict.fromkeys(methods[rows].tolist())
+    # Pictures that are compared name all their methods, so that each looks the same in all of them.
+    family = list(dict.fromkeys([*ds.attrs.get("methods", ()), *present]))
+    for method in present:
+        k = family.index(method)
         own = rows[methods[rows] == method]
         colour = LAW_COLOURS[k % len(LAW_COLOURS)]
         style: dict[str, Any] = {

@@ -99,7 +99,7 @@ def phase_portrait(ds: xr.Dataset, frame: Literal["space", "ring"] = "space", ax
     if not entries:
         entries = _underlay_arcs(ax, run, angle, speed, wrapped)
     # In stick the two are one.
-    own: dict[str, Any] = {"color": PAIR_COLOURS[1], "linewidth": 0.8, "alpha": 0.7, "zorder": 2.5}
+    own: dict[str, Any] = {"color": PAIR_COLOURS[1], "linewidth": 0.8, "alpha": 0.7, "zorder": 1.8}
     if seen_from_ring or still:
         own |= {"linestyle": PAIR_STYLES[1], "linewidth": 1.2, "alpha": 1.0}
         ax.axhline(0.0, **own)
@@ -253,7 +253,8 @@ class Stage:
         self.reference = _reference([run[f"normal_{k}"].values for k in rig.contacts], self.weight or 1.0)
         # Metres of arrow to a newton; frictions, which are small beside reactions, are magnified by a round factor.
         self.scale = 0.75 * rig.radius / self.reference
-        friction = _reference([np.abs(run[f"friction_{k}"].values) for k in rig.contacts], 0.0)
+        # A scratch makes peaks of friction that are what is to be seen.
+        friction = _reference([np.abs(run[f"friction_{k}"].values) for k in rig.contacts], 0.0, spike=6.0)
         self.magnified = max(1.0, float(f"{1.5 * self.reference / friction:.0e}")) if friction else 1.0
 
     def build(self, ax: Axes) -> None:
@@ -338,7 +339,7 @@ class Stage:
             for k, name in enumerate(arc_names(len(self.rig.arcs)), start=1)
             if self.rig.arcs
         ]
-        entries.append(Patch(facecolor=REST, edgecolor="0.3", label="rest"))
+        entries.append(Patch(facecolor=REST, edgecolor="0.3", label="elsewhere"))
         for c in self.rig.contacts:
             words = f" at {c}" if len(self.rig.contacts) > 1 else ""
             enlarged = f", {TIMES}{self.magnified:g}" if self.magnified > 1.0 else ""
@@ -403,13 +404,16 @@ def _aim(arrows: Quiver, places: NDArray[Any], vectors: NDArray[Any]) -> None:
     arrows.set_UVC(*vectors.T)
 
 
-def _reference(forces: list[NDArray[Any]], least: float) -> float:
-    """The force that arrows are scaled by, N: the greatest, unless that is a spike; `least` if there are none."""
+def _reference(forces: list[NDArray[Any]], least: float, spike: float = 3.0) -> float:
+    """The force that arrows are scaled by, N: the greatest, unless that is a spike; `least` if there are none.
+
+    A spike is one so many times greater than what is usual.
+    """
     finite = np.concatenate(forces)
     finite = finite[np.isfinite(finite)]
     usual = float(np.percentile(finite, 95)) if finite.size else 0.0
     greatest = float(finite.max(initial=0.0))
-    return (greatest if greatest < 3.0 * usual else usual) or least
+    return (greatest if greatest < spike * usual else usual) or least
 
 
 def _round(value: float) -> float:

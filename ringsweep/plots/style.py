@@ -156,9 +156,9 @@ def units_of(data: xr.DataArray, angle: str) -> str:
     return re.sub(r"(?<=[A-Za-z])\^?(-?\d+)", r"$^{\1}$", units)
 
 
-def value_text(value: xr.DataArray, brief: bool = False) -> str:
-    """A value of a coordinate in words, by its long name or briefly by its path."""
-    name = value.attrs.get("path", value.name) if brief else long_name(value)
+def value_text(value: xr.DataArray) -> str:
+    """A value of a coordinate in words."""
+    name = long_name(value)
     if value.dtype.kind not in "iuf":
         return f"{name} = {value.item()}"
     units = units_of(value, "°")
