@@ -169,7 +169,8 @@ def draw_history(figure: Figure | SubFigure, ds: xr.Dataset) -> None:
     figure.align_ylabels(axes)
     if compared:
         lines = axes[0].get_legend_handles_labels()
-        figure.legend(*lines, loc="outside upper center", ncols=3, fontsize=SMALL, frameon=False, handlelength=4)
+        look: dict[str, Any] = {"fontsize": SMALL, "frameon": False, "handlelength": 4}
+        figure.legend(*lines, loc="outside upper center", ncols=4 if len(lines[0]) == 4 else 3, **look)
     elif outcome := ds.attrs.get("outcome"):
         figure.suptitle(str(outcome), fontsize=11)
 
@@ -244,7 +245,8 @@ def _draw_laws(axes: Axes, ds: xr.Dataset, names: list[str]) -> None:
             *envelope(ds["time"].values, numbers[k]),
             color=LAW_COLOURS[k % len(LAW_COLOURS)],
             linestyle=LAW_STYLES[k % len(LAW_STYLES)],
-            linewidth=1.8 if k == 0 else 1.2,
+            # Of lines that coincide the earlier are seen on both sides of the later.
+            linewidth=max(1.2, 3.0 - 0.6 * k),
             label=f"{law}: {_regime(ds, k)}" if "regime" in ds else str(law),
         )
     axes.set_ylabel(_symbol(ds, names))
