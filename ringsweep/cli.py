@@ -364,11 +364,12 @@ def _simulate(arguments: argparse.Namespace) -> None:
 
 def _animate(arguments: argparse.Namespace) -> None:
     from ringsweep.config import with_values
+    from ringsweep.models import MODELS
 
     config = with_values(arguments.config, arguments.set)
     target = arguments.output or f"{config.name}-run.gif"
     model = config.scene.structure.model
-    if not model.startswith("ring"):
+    if "phi_end" not in MODELS[model].outcomes:
         raise InputError("scene.model", f"{model}: there is no ring to film; ringsweep simulate draws its history")
     if config.axes.sizes:
         raise InputError("sweep", "several friction laws: a film is of one run; give its law by --set friction.law=...")

@@ -365,6 +365,17 @@ def _store(row, values):
         row[k] = values[k]
 
 
+@inlined
+def _keep(scene, mode, implicit, c, t, s, y, times, table, kept):
+    """Store the state after the part `s` of a step as row `kept` of a history that has room; the number of rows."""
+    if kept == len(times):
+        return kept
+    _store(table[kept], _row(scene.law, scene, mode, implicit, c, t + s, s, y))
+    # Sums that should be equal differ by rounding.
+    times[kept] = max(t + s, times[kept - 1]) if kept > 0 else t
+    return kept + 1
+
+
 @kernel
 def integrate(batch, tolerances, limit, out, steps, spacing, times, table):
     """Run every cell of a batch to its end, or to `limit` steps.
@@ -436,26 +447,17 @@ def _integrate(batch, tolerances, limit, out, steps, spacing, times, table, guar
                 if s > 0.0:
                     parts = 1 if implicit else int(s / spacing) + 1
                     for part in range(0 if entered else 1, parts + 1):
-                        if kept < len(times):
-                            inside = s * part / parts
-                            state = y if part == 0 else y_next
-                            _store(table[kept], _row(scene.law, scene, mode, implicit, c, t + inside, inside, state))
-                            # Sums that should be equal differ by rounding.
-                            times[kept] = max(t + inside, times[kept - 1]) if kept > 0 else t
-                            kept += 1
+                        state = y if part == 0 else y_next
+                        kept = _keep(scene, mode, implicit, c, t, s * part / parts, state, times, table, kept)
                 entered = guard >= 0 or (entered and s == 0.0)
             last = mode
             t, status, mode, y = _arrive(scene, mode, guard, t, s, horizon, y_next)
-            if len(times) > 0 and s == 0.0 and status != RUNNING and kept < len(times):
+            if s == 0.0 and status != RUNNING:
                 # What a mode ends by that is over as it is entered is to be seen.
-                _store(table[kept], _row(scene.law, scene, last, implicit, c, t, 0.0, y))
-                times[kept] = t
-                kept += 1
-        if len(times) > 0 and kept == 0:
+                kept = _keep(scene, last, implicit, c, t, 0.0, y, times, table, kept)
+        if kept == 0:
             # A run that ends as it begins was somewhere all the same.
-            _store(table[0], _row(scene.law, scene, mode, implicit, c, t, 0.0, y))
-            times[0] = t
-            kept = 1
+            kept = _keep(scene, mode, implicit, c, t, 0.0, y, times, table, kept)
         outcome = finish(scene, record, status, t, y)
         for k in range(min(len(outcome), out.shape[1])):
             out[i, k] = outcome[k]
