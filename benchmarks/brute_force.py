@@ -1,60 +1,444 @@
-"""Regimes of 500 random scenes by brute force: the data of ``tests/test_brute_force.py``.
+"""Certified answers against an independent reference, over the whole space of scenes.
 
-    python -m benchmarks.brute_force tests/data/brute_force.csv
+    python -m benchmarks.brute_force [--count 20000] [--families stiction belt-dahl ...] [--out TABLE.md]
 
-takes about six minutes on one core. Nothing of the package is used: the balances of momentum are
-solved anew, and every scene is integrated twice, the second time at twice the step or a hundred
-times the tolerance.
+draws random scenes by families, has `ringsweep.sweep` answer them in batches and :mod:`benchmarks.reference` one by
+one, and prints a table per family:
 
-- ``rk4``: Runge-Kutta 4 at a step that resolves the stiction band, 0.2 relaxation times of a stuck
-  contact and never above 1 us; blind to edges, as at that step it may be.
-- ``lsoda``: where that would take too many steps, SciPy's LSODA in the coordinates of the ring's
-  frame, begun anew at every edge of the rough arc that a contact crosses.
+- contradicted: certified, but of another kind than the reference finds (regime, motion, separating contact). Each is
+  printed as a scene that can be run again, with what the reference finds;
+- off: certified and of the right kind, but the end is elsewhere (angle, metres or seconds) by more than 1e-3;
+- uncertified: the sweep says itself that it is not sure;
+- ambiguous: the reference's own runs, at other tolerances or with everything that the verdict may hang by moved by a
+  millionth, do not agree; or several contacts could leave. Not compared;
+- unresolved: the reference did not finish within its budget. Not compared;
+- bounded: of the certified ends that carry an error, the share where the true one is no larger, and the median of
+  stated over true.
 
-Columns: the scene (SI units, on the rig of the paper); regime, motion, contact and time of
-separation; smallest reaction of either contact in weights of the body; whether the second run
-agrees in kind.
+On the belt trajectories are compared, not the words for them: contradicted is where the end is off by more than a
+thousandth of the stick scale mu_s m g / k and the way of the belt together, ambiguous where the reference's own two
+tolerances differ by more than a hundredth of that. The law `bristle` is left out: its random bonds cannot be repeated
+independently.
+
+``--csv PATH`` writes the 500 scenes of ``tests/test_brute_force.py`` instead: the scene (SI units, on the rig of the
+paper); regime, motion, contact and time of separation; smallest reaction in weights of the body; whether the
+reference's runs agree in kind.
 """
 
 import argparse
 import csv
 import math
+import pprint
+import time
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
-from numba import njit
-from scipy.integrate import LSODA
+import xarray as xr
 from tqdm import tqdm
 
-COUNT, SEED = 500, 181
+import ringsweep
+from benchmarks import _common
+from benchmarks.reference import judge
+from benchmarks.reference.problem import problem
+from benchmarks.reference.run import drive
 
-MASS, INERTIA, HALF_DISTANCE, BALL_RADIUS, RADIUS, GRAVITY = 0.076, 4.47e-5, 0.025, 0.010, 0.043378, 9.81
-BETA = math.asin(HALF_DISTANCE / (RADIUS - BALL_RADIUS))
-SB, CB = math.sin(BETA), math.cos(BETA)
-XI = (RADIUS - BALL_RADIUS) * CB
-ABOUT_AXIS = INERTIA + MASS * XI * XI
-TURN = 2.0 * math.pi
-EPSILON = 1e-3
+COUNT, SEED = 20_000, 181
+RIG = {
+    "body.mass": 0.076,
+    "body.inertia": 4.47e-5,
+    "body.half_distance": 0.025,
+    "body.ball_radius": 0.010,
+    "ring.radius": 0.043378,
+}
+ONE = ("mu_k",)
+BOTH = ("mu_s", "mu_k")
+#: Laws: coefficients and parameters.
+LAWS = {
+    "coulomb": (ONE, ()),
+    "stiction": (BOTH, ()),
+    "tustin": (BOTH, ("alpha",)),
+    "threlfall": (ONE, ("v0",)),
+    "piecewise-linear": (BOTH, ("v0", "v1")),
+    "piecewise-cubic": (BOTH, ("v0", "v1")),
+    "bengisu-akay": (BOTH, ("alpha", "v0")),
+    "dahl": (ONE, ("sigma0",)),
+    "lugre": (BOTH, ("sigma0", "sigma1", "sigma2", "v_s")),
+    "elasto-plastic": (BOTH, ("sigma0", "sigma1", "sigma2", "v_s")),
+    "karnopp": (BOTH, ("dead_band",)),
+    "reset-integrator": (BOTH, ("sigma0", "sigma1")),
+}
+BRISTLES = ("dahl", "lugre", "elasto-plastic", "reset-integrator")
+RING_LAWS = tuple(name for name in LAWS if name not in ("karnopp", "reset-integrator"))
+DRIVES = ("none", "constant", "arctan", "power", "sinusoidal", "table")
+#: Samples of the drive `table`: s, rad (m on the belt).
+TABLE_TIME = np.linspace(0.0, 3.2, 17)
+TABLE_THETA = np.round(0.4 * np.sin(2.1 * TABLE_TIME) + 0.15 * np.sin(5.3 * TABLE_TIME + 0.7) - 0.0966, 6)
 
-PARAMETERS = ["amplitude", "exponent", "center", "half_angle", "rough_s", "rough_k", "rest_s", "rest_k", "alpha", "v0"]
-SCENE = ["drive", *PARAMETERS, "omega", "span"]
-OUTCOME = ["method", "regime", "motion", "contact", "t_separation", "normal_min", "agrees"]
-# Positions in the vector of parameters that the compiled functions take.
-(POWER, AMPLITUDE, EXPONENT, CENTER, HALF, ROUGH_S, ROUGH_K, REST_S, REST_K, ALPHA, V0) = range(11)
 
-MOST_STEPS = 30_000_000
-HELD, LOST_1, LOST_2, JAMMED, UNRESOLVED = range(5)
+@dataclass(frozen=True)
+class Kind:
+    """What a batch has in common: it compiles to one kernel."""
+
+    model: str
+    law: str
+    drive: str
+    arcs: int = 0
+    launch: str = "mixed"
+    grip: str = "usual"
+    shape: str = "usual"
 
 
-def draw(rng):
-    """A random scene, rounded to what the file holds."""
+def families():
+    """Kinds of scenes by family."""
+    table = {}
+    others = ("sinusoidal", "power", "constant", "none", "table")
+    for i, law in enumerate(RING_LAWS):
+        table[law] = [Kind("ring", law, "arctan", 1), Kind("ring", law, others[i % 5])]
+    for i, law in enumerate(RING_LAWS):
+        drives = ("arctan", "none", "sinusoidal", "power", "constant", "table")
+        table.setdefault("one contact", []).append(Kind("ring-single-contact", law, drives[i % 6], i % 2))
+    for law in ("coulomb", "stiction", "tustin", "piecewise-linear", "bengisu-akay", "lugre"):
+        table.setdefault("several arcs", []).extend(Kind("ring", law, "arctan", n) for n in (2, 5))
+        table.setdefault("high friction", []).append(Kind("ring", law, "arctan", 1, grip="high"))
+        table.setdefault("geometry", []).append(Kind("ring", law, "arctan", 1, shape="any"))
+    for law in ("stiction", "bengisu-akay"):
+        table.setdefault("drives", []).extend(Kind("ring", law, name, 1) for name in DRIVES)
+        table.setdefault("launches", []).extend(
+            Kind("ring", law, name, 1, launch=how) for name in ("none", "constant") for how in ("at rest", "any")
+        )
+    for law in ("coulomb", "stiction"):
+        table["launches"].append(Kind("ring", law, "none", 0, launch="at rest", grip="high", shape="any"))
+        table["launches"].append(Kind("ring", law, "arctan", 1, launch="at rest", grip="high", shape="any"))
+    for i, law in enumerate(LAWS):
+        table[f"belt {law}"] = [Kind("belt", law, ""), Kind("belt", law, DRIVES[1:][i % 5])]
+    return table
 
-    def coefficients():
+
+def pick(rng, *choices):
+    """One of several (weight, value) pairs."""
+    weights = np.array([weight for weight, _ in choices], float)
+    return choices[rng.choice(len(choices), p=weights / weights.sum())][1]
+
+
+def log(rng, low, high):
+    """Log-uniform between powers of ten."""
+    return 10.0 ** rng.uniform(low, high)
+
+
+def parameters(rng, law, belt, weight=1.0):
+    """Parameters of a law, on the belt per weight of the body."""
+    v0 = log(rng, -9, 0)
+    values = {
+        "alpha": log(rng, 0, 7),
+        "v0": v0,
+        "v1": v0 * (1.0 + log(rng, -1, 2)),
+        "v_s": log(rng, -3, -1),
+        "dead_band": log(rng, -4, -1.5),
+        "sigma0": weight * (log(rng, 1.0, 3.7) if belt else log(rng, 1.5, 4.3)),
+        "sigma1": weight * pick(rng, (1, 0.0), (4, log(rng, -2, 0.7))),
+        "sigma2": weight * pick(rng, (1, 0.0), (1, rng.uniform(0.0, 0.05))),
+    }
+    if belt and law in ("threlfall", "piecewise-linear", "piecewise-cubic", "bengisu-akay"):
+        values["v0"] = log(rng, -6, -1)
+        values["v1"] = values["v0"] * (1.0 + log(rng, -1, 2))
+    return {f"friction.{name}": values[name] for name in LAWS[law][1]}
+
+
+def coefficients(rng, law, prefix, scale):
+    """Coefficients of friction under a path."""
+    mu_k = rng.uniform(0.02, 0.5) * scale
+    mu_s = mu_k + pick(rng, (1, 0.0), (9, rng.uniform(0.0, 0.4))) * scale
+    return {f"{prefix}.{name}": {"mu_s": mu_s, "mu_k": mu_k}[name] for name in LAWS[law][0]}
+
+
+def driven(rng, name, belt):
+    """Parameters of a drive."""
+    sign = rng.choice([-1.0, 1.0])
+    values = {
+        "none": {},
+        "constant": {"amplitude": sign * log(rng, -1, 1.3)},
+        "arctan": {"amplitude": sign * log(rng, -1, 1.3)},
+        "power": {"amplitude": sign * log(rng, -1, 1.3), "exponent": rng.uniform(1.05, 3.0)},
+        "sinusoidal": {
+            "amplitude": sign * log(rng, -1.3, 0.3),
+            "frequency": rng.uniform(0.3, 5.0),
+            "phase": pick(rng, (1, 0.0), (1, 0.5 * math.pi), (2, rng.uniform(-math.pi, math.pi))),
+        },
+        "table": {"amplitude": sign * log(rng, -1, 1)},
+    }[name]
+    if belt and "amplitude" in values:
+        values["amplitude"] *= 0.1
+    return {f"drive.{key}": value for key, value in values.items()}
+
+
+def ring_scene(rng, kind):
+    """A random scene of a ring by paths."""
+    two = kind.model == "ring"
+    values = dict(RIG) if two else {"body.mass": 0.076, "ring.radius": rng.uniform(0.03, 0.2)}
+    if two and (kind.shape == "any" or rng.random() < 0.3):
+        beta = math.radians(rng.uniform(5.0, 85.0) if kind.shape == "any" else rng.uniform(25.0, 65.0))
+        radius, ball = rng.uniform(0.03, 0.1), rng.uniform(0.1, 0.4)
+        half, mass = radius * (1.0 - ball) * math.sin(beta), rng.uniform(0.02, 0.5)
+        values = {
+            "body.mass": mass,
+            "body.inertia": mass * (half * rng.uniform(0.4, 1.3)) ** 2,
+            "body.half_distance": half,
+            "body.ball_radius": radius * ball,
+            "ring.radius": radius,
+        }
+    # Some on ice, where the body revolves; some so rough that they can jam.
+    scale = pick(rng, (2, 0.02), (8, 1.0), (1, 2.2))
+    if kind.grip == "high":
+        scale = pick(rng, (1, 1.0), (3, 2.2))
+    values |= coefficients(rng, kind.law, "friction.rest", scale)
+    values |= parameters(rng, kind.law, False)
+    for i in range(kind.arcs):
+        single = kind.arcs == 1
+        here = pick(rng, (1, 0.02), (5, scale))
+        values |= coefficients(rng, kind.law, "friction.rough" if single else f"zones.{i}", here)
+        path = "zone" if single else f"zones.{i}"
+        half = pick(rng, (1, 0.0), (1, math.pi), (4, log(rng, -4, -1)), (20, rng.uniform(0.0, math.pi)))
+        values[f"{path}.half_angle"] = half if single else min(half, pick(rng, (1, math.pi), (4, 0.8)))
+        values[f"{path}.center"] = pick(rng, (1, 0.0), (1, math.pi), (8, rng.uniform(-math.pi, math.pi)))
+    values |= driven(rng, kind.drive, False)
+    values["time.span"] = rng.uniform(0.2, 3.0)
+    phi = pick(rng, (6, 0.0), (3, rng.uniform(-0.8, 0.8)), (1, rng.uniform(-math.pi, math.pi)))
+    omega = pick(rng, (5, 0.0), (3, rng.uniform(-30.0, 30.0)), (2, rng.uniform(-120.0, 120.0)))
+    if kind.launch == "at rest" or (kind.launch == "mixed" and rng.random() < 0.15):
+        phi, omega = rng.uniform(-1.0, 1.0) * pick(rng, (2, 1.5), (1, math.pi)), "ring"
+    elif kind.launch == "any":
+        phi = rng.uniform(-math.pi, math.pi)
+    values["initial.phi"], values["initial.omega"] = phi, omega
+    return values
+
+
+def belt_scene(rng, kind):
+    """A random scene of the belt by paths."""
+    mass, stiffness, span = log(rng, -0.5, 0.5), log(rng, 0, 1.5), rng.uniform(2.0, 20.0)
+    values = {"body.mass": mass, "spring.stiffness": stiffness}
+    if kind.drive:
+        values |= driven(rng, kind.drive, True)
+        span = min(span, 3.0) if kind.drive == "table" else span
+    else:
+        values["belt.velocity"] = rng.choice([-1.0, 1.0]) * log(rng, -2, 0)
+    values["time.span"] = span
+    values |= coefficients(rng, kind.law, "friction", pick(rng, (4, 0.3), (1, 1.0)))
+    values |= parameters(rng, kind.law, True, 9.81 * mass)
+    if kind.law in BRISTLES:
+        values["time.span"] = min(span, 8.0)
+    else:
+        # Karnopp's body must not meet more friction at the edge of the dead band than holds it within.
+        most = math.inf
+        if kind.law == "karnopp":
+            grip = values["friction.mu_s"] - values["friction.mu_k"]
+            most = 0.9 * grip * 9.81 * mass / values["friction.dead_band"]
+        values["friction.viscous"] = min(most, pick(rng, (1, 0.0), (1, log(rng, -2, 0))))
+    values["initial.x"] = pick(rng, (1, 0.0), (2, rng.uniform(-1.0, 1.0)))
+    values["initial.velocity"] = pick(rng, (1, "ring"), (1, rng.uniform(-1.0, 1.0)))
+    return values
+
+
+def nest(kind, values):
+    """The scene of values by paths, with what its kind adds."""
+    scene = {"model": kind.model, "friction": {"law": kind.law}}
+    if kind.model != "belt" or kind.drive:
+        scene["drive"] = {"law": kind.drive}
+        if kind.drive == "table":
+            scene["drive"] |= {"time": TABLE_TIME.tolist(), "theta": TABLE_THETA.tolist()}
+    for path, value in values.items():
+        names = path.split(".")
+        if names[0] == "zones":
+            arcs = scene.setdefault("zones", [{} for _ in range(kind.arcs)])
+            arcs[int(names[1])][names[2]] = value
+            continue
+        place = scene
+        for name in names[:-1]:
+            place = place.setdefault(name, {})
+        place[names[-1]] = value
+    return scene
+
+
+def draw(rng, kind):
+    """A random scene of a kind by paths, rounded to what can be read."""
+    values = (belt_scene if kind.model == "belt" else ring_scene)(rng, kind)
+    values = {k: v if v == "ring" or abs(v) == math.pi or v == 0.5 * math.pi else float(f"{v:.6g}")
+              for k, v in values.items()}  # fmt: skip
+    for path, value in values.items():
+        if value == "ring":
+            # At the speed of the ring (belt) at launch.
+            values[path] = 0.0
+            values[path] = float(drive(problem(nest(kind, values)), 0.0)[1]) + 0.0
+    return values
+
+
+@dataclass
+class Count:
+    """What became of a family."""
+
+    tally: Counter = field(default_factory=Counter)
+    bounded: list = field(default_factory=list)
+    seconds: Counter = field(default_factory=Counter)
+
+
+def answers(kind, batch, solver):
+    """What the package says of a batch of scenes of one kind."""
+    axes = {path: xr.DataArray([values[path] for values in batch], dims="run") for path in batch[0]}
+    return ringsweep.sweep(nest(kind, batch[0]), axes, solver=solver, progress=False)
+
+
+def scales(scene):
+    """Length of the belt's stick and way, m."""
+    p = problem(scene)
+    return p.mu_s[0] / p.stiffness + abs(drive(p, p.span)[0] - drive(p, 0.0)[0]) * (p.span < 1.0)
+
+
+def compare(kind, batch, data, count, report):
+    """Enter a batch into the count of its family; contradictions go to `report`."""
+    belt = kind.model == "belt"
+    words = [] if belt else list(zip(*(ringsweep.words(data[n]).values for n in ("regime", "motion")), strict=True))
+    for i, values in enumerate(batch):
+        scene = nest(kind, values)
+        begin = time.perf_counter()
+        verdict = judge(scene)
+        count.seconds["reference"] += time.perf_counter() - begin
+        certified = int(data.certified[i]) == 1
+        state, spread = verdict.state, verdict.spread
+        scale = scales(scene) if belt else 1.0
+        if belt and state == "clear" and not spread["x_end"] < 1e-5 * scale:
+            state = "ambiguous"
+        count.tally["runs"] += 1
+        count.tally[state] += 1
+        count.tally["certified" if certified else "uncertified"] += 1
+        if state != "clear" or not certified:
+            if report.verbose and state == "unresolved":
+                report.scene("unresolved", scene, verdict.why, "")
+            continue
+        count.tally["compared"] += 1
+        errors = {n: abs(float(data[n][i]) - verdict.numbers[n]) for n in verdict.numbers if n in data}
+        if belt:
+            said = f"x_end {float(data.x_end[i]):.9g}"
+            if not errors["x_end"] < 1e-3 * scale:
+                count.tally["contradicted"] += 1
+                report.scene("contradicted", scene, verdict.why, said)
+                continue
+        else:
+            kind_said = (str(words[i][0]), str(words[i][1]), int(data.separating_contact[i]))
+            said = f"{kind_said}, t_end {float(data.t_end[i]):.9g}, phi_end {float(data.phi_end[i]):.6g}"
+            if kind_said != verdict.kind:
+                count.tally["contradicted"] += 1
+                report.scene("contradicted", scene, f"{verdict.kind}: {verdict.why}", said)
+                continue
+            places = [n for n in ("phi_end", "t_end") if not errors[n] < max(1e-3, 1e3 * spread[n])]
+            if places:
+                count.tally["off"] += 1
+                why = f"{verdict.why}; phi_end {verdict.numbers['phi_end']:.9g}, t_end {verdict.numbers['t_end']:.9g}"
+                report.scene("off", scene, why, said)
+        for name, error in errors.items():
+            stated = float(data[f"{name}_error"][i]) if f"{name}_error" in data else math.nan
+            if math.isfinite(stated) and math.isfinite(error) and spread[name] < 0.1 * error:
+                count.bounded.append((stated >= error, stated / error))
+
+
+class Report:
+    """Prints what is wrong as it is found."""
+
+    def __init__(self, verbose):
+        self.verbose = verbose
+
+    def scene(self, word, scene, why, said):
+        """A scene, what the reference finds and what the package says."""
+        listing = pprint.pformat(scene, width=120, sort_dicts=False)
+        tqdm.write(f"\n# {word}; reference: {why}\n# ringsweep: {said}\n{listing}")
+
+
+def run_family(name, kinds, many, seed, solver, report):
+    """Count of a family of about so many scenes."""
+    count, batches = Count(), []
+    for k, kind in enumerate(kinds):
+        rng = np.random.default_rng([seed, *name.encode(), k])
+        batches.append((kind, [draw(rng, kind) for _ in range(max(1, round(many / len(kinds))))]))
+    for kind, batch in batches:
+        begin = time.perf_counter()
+        data = answers(kind, batch, solver)
+        count.seconds["package"] += time.perf_counter() - begin
+        compare(kind, batch, data, count, report)
+    return count
+
+
+HEADER = ["family", "runs", "certified", "compared", "contradicted", "off", "uncertified", "ambiguous", "unresolved",
+          "bounded", "stated/true"]  # fmt: skip
+
+
+def row(name, count):
+    """A line of the table."""
+    tally = count.tally
+    share = 100.0 * tally["uncertified"] / max(tally["runs"], 1)
+    bounded = [b for b, _ in count.bounded]
+    return [
+        name, *(str(tally[n]) for n in HEADER[1:6]), f"{tally['uncertified']} ({share:.1f} %)",
+        str(tally["ambiguous"]), str(tally["unresolved"]),
+        f"{100.0 * np.mean(bounded):.1f} %" if bounded else "",
+        f"{np.median([r for _, r in count.bounded]):.3g}" if bounded else "",
+    ]  # fmt: skip
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--count", type=int, default=COUNT, help="scenes (default %(default)s)")
+    parser.add_argument("--seed", type=int, default=SEED)
+    parser.add_argument("--families", nargs="+", metavar="NAME", help=", ".join(families()))
+    parser.add_argument("--solver", default="auto")
+    parser.add_argument("--verbose", action="store_true", help="print what the reference could not resolve, too")
+    parser.add_argument("--out", type=Path, help="Markdown file to write")
+    parser.add_argument("--csv", type=Path, help="write the 500 scenes of the tests instead")
+    arguments = parser.parse_args()
+    if arguments.csv:
+        write_csv(arguments.csv)
+        return
+    chosen = {name: kinds for name, kinds in families().items() if name in (arguments.families or families())}
+    heading = _common.machine()
+    print(heading)
+    report, counts, total = Report(arguments.verbose), {}, Count()
+    many = arguments.count / len(chosen)
+    with _common.one_core():
+        for name in tqdm(chosen, disable=None):
+            counts[name] = count = run_family(name, chosen[name], many, arguments.seed, arguments.solver, report)
+            total.tally.update(count.tally)
+            total.seconds.update(count.seconds)
+            total.bounded += count.bounded
+            tqdm.write(" | ".join(row(name, count)))
+    rows = [row(name, count) for name, count in [*counts.items(), ("all", total)]]
+    _common.heading("Certified answers against an independent reference")
+    _common.table(HEADER, rows)
+    cost = ", ".join(f"{name} {seconds:.0f} s" for name, seconds in total.seconds.items())
+    print(f"on one core: {cost} (compilation included), seed {arguments.seed}")
+    if arguments.out:
+        where = "; ".join(heading.splitlines())
+        text = "# Certified answers against an independent reference\n\n"
+        text += f"`python -m benchmarks.brute_force`, seed {arguments.seed}; {where}; {cost}.\n\n"
+        arguments.out.write_text(text + _common.markdown(HEADER, rows))
+
+
+# The 500 scenes of the tests.
+CSV_COUNT, CSV_SEED = 500, 181
+CSV_PARAMETERS = ["amplitude", "exponent", "center", "half_angle", "rough_s", "rough_k", "rest_s", "rest_k", "alpha",
+                  "v0"]  # fmt: skip
+CSV_SCENE = ["drive", *CSV_PARAMETERS, "omega", "span"]
+CSV_OUTCOME = ["method", "regime", "motion", "contact", "t_separation", "normal_min", "agrees"]
+
+
+def draw_csv(rng):
+    """A random scene on the rig of the paper, rounded to what the file holds."""
+
+    def pair():
         mu_k = rng.uniform(0.02, 0.4) * grip
         return mu_k + rng.choice([0.0, rng.uniform(0.0, 0.4)], p=[0.1, 0.9]) * grip, mu_k
 
     # Some on ice, where the body revolves; some so rough that they can jam.
     grip = rng.choice([0.1, 1.0, 3.0], p=[0.15, 0.8, 0.05])
-    rough, rest = coefficients(), coefficients()
+    rough, rest = pair(), pair()
     scene = {
         "amplitude": rng.choice([-1, 1]) * 10.0 ** rng.uniform(-1, 1.3),
         "exponent": rng.uniform(1.1, 3.0),
@@ -73,251 +457,47 @@ def draw(rng):
     return {"drive": str(rng.choice(["arctan", "power"]))} | scene
 
 
-@njit(error_model="numpy")
-def ring(p, t):
-    """Angle of the ring and its first two derivatives."""
-    a, n = p[AMPLITUDE], p[EXPONENT]
-    if p[POWER]:
-        return a * t**n, a * n * t ** (n - 1.0), a * n * (n - 1.0) * t ** (n - 2.0)
-    return a * (t * math.atan(t) - 0.5 * math.log1p(t * t)), a * math.atan(t), a / (1.0 + t * t)
-
-
-@njit(error_model="numpy")
-def mu(p, rough, speed):
-    """Bengisu-Akay, rough or not."""
-    mu_s, mu_k = (p[ROUGH_S], p[ROUGH_K]) if rough else (p[REST_S], p[REST_K])
-    if speed < p[V0]:
-        return mu_s * (1.0 - (1.0 - speed / p[V0]) ** 2)
-    return mu_k + (mu_s - mu_k) * math.exp(-p[ALPHA] * (speed - p[V0]))
-
-
-@njit(error_model="numpy")
-def balances(phi, omega, K1, K2):
-    """Angular acceleration and both reactions from the three balances; whether they are jammed."""
-    s, c = math.sin(phi), math.cos(phi)
-    lever = MASS * XI * RADIUS / ABOUT_AXIS - CB
-    a11, a12, b1 = CB - K1 * SB, CB + K2 * SB, MASS * (GRAVITY * c + XI * omega * omega)
-    a21, a22, b2 = K1 * lever - SB, K2 * lever + SB, -MASS * GRAVITY * s * (1.0 - MASS * XI * XI / ABOUT_AXIS)
-    determinant = a11 * a22 - a12 * a21
-    N1, N2 = (b1 * a22 - a12 * b2) / determinant, (a11 * b2 - a21 * b1) / determinant
-    epsilon = (RADIUS * (K1 * N1 + K2 * N2) - MASS * GRAVITY * XI * s) / ABOUT_AXIS
-    # At a given acceleration the first two balances alone must be soluble too.
-    jammed = not (determinant > 0.0 and a11 * (SB - K2 * CB) + a12 * (SB + K1 * CB) > 0.0)
-    return epsilon, N1, N2, jammed
-
-
-@njit(error_model="numpy")
-def sliding(p, phi, omega, v, rough_1, rough_2):
-    """The balances under friction."""
-    sign = 1.0 if v > 0.0 else -1.0
-    return balances(phi, omega, -sign * mu(p, rough_1, abs(v)), -sign * mu(p, rough_2, abs(v)))
-
-
-@njit(error_model="numpy")
-def is_rough(p, angle):
-    x = angle - p[CENTER] + p[HALF]
-    return x - TURN * math.floor(x / TURN) < 2.0 * p[HALF]
-
-
-@njit(error_model="numpy")
-def state(p, theta, ring_omega, phi, omega):
-    rho = phi - theta
-    return sliding(p, phi, omega, (omega - ring_omega) * RADIUS, is_rough(p, rho - BETA), is_rough(p, rho + BETA))
-
-
-@njit
-def classify(track, phi, omega):
-    """Sense of the motion, reversals, least and greatest angle since the last one, most turned since then."""
-    sense, reversals, low, high = track
-    low, high = min(low, phi), max(high, phi)
-    if omega > EPSILON and sense <= 0.0:
-        if sense < 0.0:
-            reversals, high = reversals + 1.0, phi
-        sense = 1.0
-    elif omega < -EPSILON and sense >= 0.0:
-        if sense > 0.0:
-            reversals, low = reversals + 1.0, phi
-        sense = -1.0
-    return sense, reversals, low, high
-
-
-def motion(track):
-    _, reversals, low, high = track
-    return "revolving" if high - low >= TURN else "oscillatory" if reversals else "resting"
-
-
-@njit(error_model="numpy")
-def runge_kutta(p, omega, span, steps):
-    """End, its time, the track of the motion and the smallest reaction."""
-    h = span / steps
-    phi = 0.0
-    theta, ring_omega, _ = ring(p, 0.0)
-    k1, N1, N2, jammed = state(p, theta, ring_omega, phi, omega)
-    track = classify((0.0, 0.0, phi, phi), phi, omega)
-    least = min(N1, N2)
-    if jammed or least <= 0.0:
-        return (JAMMED if jammed else LOST_1 if N1 <= N2 else LOST_2), 0.0, track, least
-    for step in range(steps):
-        theta, ring_omega, _ = ring(p, (step + 0.5) * h)
-        w2 = omega + 0.5 * h * k1
-        k2 = state(p, theta, ring_omega, phi + 0.5 * h * omega, w2)[0]
-        w3 = omega + 0.5 * h * k2
-        k3 = state(p, theta, ring_omega, phi + 0.5 * h * w2, w3)[0]
-        theta, ring_omega, _ = ring(p, (step + 1.0) * h)
-        w4 = omega + h * k3
-        k4 = state(p, theta, ring_omega, phi + h * w3, w4)[0]
-        phi += h / 6.0 * (omega + 2.0 * w2 + 2.0 * w3 + w4)
-        omega += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-        before_1, before_2 = N1, N2
-        k1, N1, N2, jammed = state(p, theta, ring_omega, phi, omega)
-        track = classify(track, phi, omega)
-        if jammed:
-            return JAMMED, (step + 1.0) * h, track, least
-        least = min(least, N1, N2)
-        if not least > 0.0:
-            at_1 = before_1 / (before_1 - N1) if N1 <= 0.0 else 2.0
-            at_2 = before_2 / (before_2 - N2) if N2 <= 0.0 else 2.0
-            return (LOST_1 if at_1 < at_2 else LOST_2), (step + min(at_1, at_2)) * h, track, least
-    return HELD, span, track, least
-
-
-class Place:
-    """A contact's segment of the ring: even ones are rough, as many turns on as half their number."""
-
-    def __init__(self, p, offset, rho):
-        self.offset, self.start, self.width = offset, p[CENTER] - p[HALF], 2.0 * p[HALF]
-        turns, rest = divmod(rho + offset - self.start, TURN)
-        self.number = 2 * int(turns) + (0 if rest < self.width else 1)
-
-    def bound(self, number):
-        return self.start + TURN * (number // 2) + (self.width if number % 2 else 0.0) - self.offset
-
-    @property
-    def rough(self):
-        return self.number % 2 == 0
-
-    def reserve(self, rho, v):
-        """How far the contact has yet to go to the edge that it moves towards."""
-        return self.bound(self.number + 1) - rho if v > 0.0 else rho - self.bound(self.number)
-
-
-@njit(error_model="numpy")
-def view(p, t, rho, v, rough_1, rough_2):
-    """Angle, its rate, the ring's acceleration and the balances in the ring's frame."""
-    theta, ring_omega, ring_epsilon = ring(p, t)
-    phi, omega = rho + theta, v / RADIUS + ring_omega
-    return phi, omega, ring_epsilon, sliding(p, phi, omega, v, rough_1, rough_2)
-
-
-def lsoda(p, omega, span, rtol):
-    """As :func:`runge_kutta`; each step is looked at in quarters."""
-    # The drive may have an infinite acceleration at 0; what it does before 1e-13 s is below rounding.
-    t = 1e-13
-    theta, ring_omega, _ = ring(p, t)
-    y = np.array([-theta, (omega - ring_omega) * RADIUS])
-    places = [Place(p, side * BETA, y[0]) for side in (-1, 1)]
-    track, least = (0.0, 0.0, 0.0, 0.0), math.inf
-    for _ in range(20000):
-        rough_1, rough_2 = (place.rough for place in places)
-
-        def rates(t, y, rough_1=rough_1, rough_2=rough_2):
-            _, _, ring_epsilon, (epsilon, _, _, _) = view(p, t, y[0], y[1], rough_1, rough_2)
-            return y[1] / RADIUS, RADIUS * (epsilon - ring_epsilon)
-
-        def guards(t, y, rough_1=rough_1, rough_2=rough_2):
-            phi, omega, _, (_, N1, N2, jammed) = view(p, t, y[0], y[1], rough_1, rough_2)
-            values = N1, N2, -1.0 if jammed else 1.0, *(place.reserve(y[0], y[1]) for place in places)
-            return phi, omega, values
-
-        solver = LSODA(
-            rates, t, y, span, rtol=rtol, atol=[1e-2 * rtol, 1e2 * rtol * p[V0]], first_step=min(1e-13, span)
-        )
-        phi, omega, values = guards(t, y)
-        dense, low = None, t
-        while min(values) > 0.0 and solver.status == "running":
-            message = solver.step()
-            if solver.status == "failed":
-                return UNRESOLVED, solver.t, track, message
-            dense, low = solver.dense_output(), solver.t_old
-            for part in (0.25, 0.5, 0.75, 1.0):
-                high = solver.t_old + part * (solver.t - solver.t_old)
-                y = dense(high) if part < 1.0 else solver.y
-                phi, omega, values = guards(high, y)
-                if min(values) <= 0.0:
-                    break
-                track = classify(track, phi, omega)
-                least = min(least, *values[:2])
-                low = high
-            t = high
-        if min(values) > 0.0:
-            return HELD, span, track, least
-        if dense is not None:
-            # The earliest guard to reach zero, by bisection.
-            while t - low > 4e-16 * t:
-                middle = 0.5 * (low + t)
-                if not low < middle < t:
-                    break
-                if min(guards(middle, dense(middle))[2]) <= 0.0:
-                    t = middle
-                else:
-                    low = middle
-            y = np.array(dense(t))
-            phi, omega, values = guards(t, y)
-        which = [k for k, value in enumerate(values) if value <= 0.0]
-        if 2 in which:
-            return JAMMED, t, track, least
-        if min(which) < 2:
-            return (LOST_1 if values[0] <= values[1] else LOST_2), t, track, least
-        for k in which:
-            places[k - 3].number += 1 if y[1] > 0.0 else -1
-    return UNRESOLVED, t, track, "too many crossings"
-
-
-def stuck_rate(p, span):
-    """Rate at which the sliding velocity of a stuck contact relaxes."""
-    mu_s = max(p[ROUGH_S], p[REST_S])
-    omega = max(abs(ring(p, span)[1]), 1.0)
-    return max(
-        abs(balances(phi, omega, 1e-6, 1e-6)[0] - balances(phi, omega, -1e-6, -1e-6)[0]) / 2e-6
-        for phi in np.linspace(-math.pi, math.pi, 25)
-    ) * RADIUS * 2.0 * mu_s / p[V0]  # fmt: skip
-
-
-def resolve(scene):
-    """Outcome of a scene by brute force."""
-    p = np.array([float(scene["drive"] == "power"), *(scene[name] for name in PARAMETERS)])
-    steps = math.ceil(scene["span"] * max(1e6, stuck_rate(p, scene["span"]) / 0.2))
-    if steps <= MOST_STEPS:
-        runs = [runge_kutta(p, scene["omega"], scene["span"], n) for n in (steps, steps // 2)]
-    else:
-        runs = [lsoda(p, scene["omega"], scene["span"], rtol) for rtol in (1e-10, 1e-8)]
-    kinds = [(run[0], motion(run[2])) for run in runs]
-    end, t, track, least = runs[0]
-    regime = [motion(track), "separating", "separating", "jammed", "unresolved"][end]
-    return {
-        "method": "rk4" if steps <= MOST_STEPS else "lsoda",
-        "regime": regime,
-        "motion": motion(track),
-        "contact": end if end in (LOST_1, LOST_2) else 0,
-        "t_separation": f"{t:.8g}" if end in (LOST_1, LOST_2) else "",
-        "normal_min": f"{least / (MASS * GRAVITY):.2g}" if end == HELD else least if end == UNRESOLVED else "",
-        "agrees": int(kinds[0] == kinds[1]),
+def from_csv(values):
+    """The scene of a line of the file."""
+    number = {name: float(values[name]) for name in CSV_SCENE[1:]}
+    paths = RIG | {
+        "friction.alpha": number["alpha"],
+        "friction.v0": number["v0"],
+        "zone.center": number["center"],
+        "zone.half_angle": number["half_angle"],
+        "drive.amplitude": number["amplitude"],
+        "initial.phi": 0.0,
+        "initial.omega": number["omega"],
+        "time.span": number["span"],
     }
+    for where in ("rough", "rest"):
+        paths |= {f"friction.{where}.mu_{letter}": number[f"{where}_{letter}"] for letter in "sk"}
+    if values["drive"] == "power":
+        paths["drive.exponent"] = number["exponent"]
+    return nest(Kind("ring", "bengisu-akay", values["drive"], 1), paths)
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("out", help="CSV file to write")
-    parser.add_argument("--count", type=int, default=COUNT, help="scenes (default %(default)s)")
-    arguments = parser.parse_args()
-    rng = np.random.default_rng(SEED)
-    with open(arguments.out, "w", newline="") as file:
-        writer = csv.DictWriter(file, SCENE + OUTCOME, lineterminator="\n")
+def write_csv(path):
+    """Write the 500 scenes and what the reference finds."""
+    rng = np.random.default_rng(CSV_SEED)
+    with open(path, "w", newline="") as file:
+        writer = csv.DictWriter(file, CSV_SCENE + CSV_OUTCOME, lineterminator="\n")
         writer.writeheader()
-        for _ in tqdm(range(arguments.count)):
-            scene = draw(rng)
-            writer.writerow(scene | resolve(scene))
-            file.flush()
+        for _ in tqdm(range(CSV_COUNT), disable=None):
+            values = draw_csv(rng)
+            verdict = judge(from_csv(values))
+            regime, motion, contact = verdict.kind or ("unresolved", "unresolved", 0)
+            apart, held = regime == "separating", regime in ("resting", "oscillatory", "revolving")
+            outcome = {
+                "method": "radau",
+                "regime": regime,
+                "motion": motion,
+                "contact": contact,
+                "t_separation": f"{verdict.numbers['t_separation']:.8g}" if apart else "",
+                "normal_min": f"{min(verdict.runs[0]['least_1'], verdict.runs[0]['least_2']):.2g}" if held else "",
+                "agrees": int(verdict.state == "clear"),
+            }
+            writer.writerow(values | outcome)
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from ringsweep.layout import Layout
 from ringsweep.models import MODELS, batch
 from ringsweep.provenance import environment, processor
 from ringsweep.scene import LAW, Scene, Values
-from ringsweep.solvers.common import Result
+from ringsweep.solvers.common import Result, with_errors
 from ringsweep.variables import OUTCOMES
 
 #: Where along each dimension cells lie, by name of the dimension.
@@ -99,3 +99,5 @@ def _columns(outcomes: tuple[str, ...], result: Result) -> Iterator[tuple[str, N
     yield "certified", result.certified
     if result.stiffness is not None:
         yield "stiffness", result.stiffness
+    if result.errors is not None:
+        yield from zip((f"{name}_error" for name in with_errors(outcomes)), result.errors.T, strict=True)

@@ -451,6 +451,15 @@ def _summarise(result: xr.Dataset) -> None:
         share = float((result["certified"] == 1).mean())
         # All is said only of all.
         print(f"certified: {share if share == 1.0 else min(share, 0.999):.1%}")
+    stated = [str(name).removesuffix("_error") for name in result.data_vars if str(name).endswith("_error")]
+    if stated:
+        print("bounds on errors (median, largest):")
+    for name in stated:
+        bounds = result[f"{name}_error"].values
+        bounds = bounds[np.isfinite(bounds)]
+        unit = result[name].attrs.get("units", "")
+        if bounds.size:
+            print(f"  {name}: {np.median(bounds):.1e}, {bounds.max():.1e} {unit}")
 
 
 def _warn_of_stiffness(result: xr.Dataset, config: Config) -> None:

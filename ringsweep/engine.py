@@ -30,7 +30,7 @@ from ringsweep.pace import Pace
 from ringsweep.pace import chunks as chunks_of
 from ringsweep.provenance import attributes, differences, environment, identity
 from ringsweep.reuse import Earlier
-from ringsweep.variables import OUTCOMES
+from ringsweep.variables import OUTCOMES, linked
 
 logger = logging.getLogger("ringsweep")
 
@@ -212,7 +212,11 @@ def compute(
     _fill(config, layout, kept, earlier, jobs, scheduler, progress)
     return _frame(config).assign(
         {
-            name: (tuple(config.axes.sizes), column.reshape(sizes), OUTCOMES[name].attributes)
+            name: (
+                tuple(config.axes.sizes),
+                column.reshape(sizes),
+                OUTCOMES[name].attributes | linked(name, kept.columns),
+            )
             for name, column in kept.columns.items()
         }
     )

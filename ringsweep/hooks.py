@@ -55,6 +55,19 @@ def stiffness(scene, before, now, h):
     """Largest magnitude of the eigenvalue times `h` that a step of `h` seconds met."""
 
 
+@inner_hook
+def slack(scene, before, now):
+    """How far from its end the model stayed within a step between two inspections, bounded from below; in its own unit.
+
+    A guard that turns between two instants has changed by more than four times its dip in the step before or after.
+    """
+
+
+@hook
+def falls(scene, before, now, h):
+    """How fast the guard fell that ended a run in a step of `h` seconds between two inspections, its unit times 1/s."""
+
+
 @hook
 def begin(scene, y, now):
     """Record of a run at its launch."""
@@ -134,6 +147,11 @@ def land(scene, mode, c, t, s):
 
 
 @hook
+def drift(scene, mode, c, s):
+    """Time derivative of the state, the step `s` after the series `c` began."""
+
+
+@hook
 def switch(scene, mode, guard, t, y):
     """Status and mode after the guard of that index has reached zero in the state `y`, and that state."""
 
@@ -169,13 +187,13 @@ def is_stiff(scene, mode, y, line):
 
 
 @hook
-def to_stiff(scene, t, y):
-    """State in the coordinates of the implicit method, in which nothing large cancels."""
+def to_stiff(scene, force, y):
+    """State in the coordinates of the implicit method, in which nothing large cancels, under a :func:`forcing`."""
 
 
 @hook
-def from_stiff(scene, t, x):
-    """State from the coordinates of the implicit method."""
+def from_stiff(scene, force, x):
+    """State from the coordinates of the implicit method, under a :func:`forcing`."""
 
 
 @hook
@@ -216,6 +234,11 @@ def stiff_view(scene, mode, t, x):
 
 
 @hook
+def stiff_near(scene, motion):
+    """How near to zero each guard is watched closely, whatever it does over a step; `motion` is that of a view."""
+
+
+@hook
 def stiff_motion(scene, t, x, line):
     """Velocity and acceleration of the body where it is linearised: at their zeros place and velocity are extreme."""
 
@@ -228,3 +251,51 @@ def stiff_watch(scene, record, mode, view, t, duration):
 @hook
 def stiff_sample(scene, mode, t, x):
     """One row of a time history."""
+
+
+@hook
+def breach(scene, mode, force, y, rates, s, tolerance):
+    """How far a state, and the rate at which it changes, break the law of the scene; from its formulas alone.
+
+    Parameters
+    ----------
+    scene, mode : NamedTuple
+    force : tuple of float
+        The :func:`forcing` there.
+    y, rates : tuple of float
+        State of the piecewise-smooth system within a step, and its time derivative.
+    s : float
+        Length of the step, s.
+    tolerance : float
+        Error allowed to a step of the series.
+
+    Returns
+    -------
+    tuple of float
+        ``(breach, power)``: the largest violation of the friction law, of the balances and of the signs of reactions,
+        measured by what the error allowed to a step makes of it; and the power of friction on the body, W.
+    """
+
+
+@hook
+def energy(scene, force, y):
+    """Mechanical energy of a state of the piecewise-smooth system, under a :func:`forcing`, J."""
+
+
+@hook
+def undecided(batch, rows, witness, fall):
+    """Which runs of a batch hang, in their kind, by less than two resolutions differ; outside kernels.
+
+    Parameters
+    ----------
+    batch : NamedTuple
+        Scenes, whose type decides.
+    rows, witness : ndarray of shape ``(cells, outcomes)``
+        What the runs came to at both resolutions.
+    fall : ndarray of shape ``(cells,)``
+        How fast the guard fell by which each run ended, its unit times 1/s.
+
+    Returns
+    -------
+    ndarray of bool, shape ``(cells,)``
+    """

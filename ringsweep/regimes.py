@@ -9,11 +9,17 @@ import numpy as np
 
 from ringsweep.jit import inlined
 from ringsweep.lanes import any_of, select
+from ringsweep.physics import contact
 from ringsweep.variables import FAILED, JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 
 #: How a run stands or ended.
-RUNNING, COMPLETE, SEPARATED_1, SEPARATED_2, JAM, BROKEN = range(6)
+RUNNING, COMPLETE, SEPARATED_1, SEPARATED_2, SEPARATED_BOTH, JAM, BROKEN = range(7)
 
+
+#: How a run goes on or ended, by the mode of :mod:`ringsweep.physics.contact`.
+ENDS = np.full(8, RUNNING)
+ENDS[[contact.OPEN_1, contact.OPEN_2, contact.OPEN_BOTH]] = SEPARATED_1, SEPARATED_2, SEPARATED_BOTH
+ENDS[contact.IMPOSSIBLE] = JAM
 
 #: What a count of turns saturates at: a diverging run of constant step makes more than an int32 holds.
 MOST_TURNS = 2.0**31 - 1.0
@@ -105,11 +111,11 @@ def conclude(record, status, t, phi, omega):
     r = record
     turns = min(np.floor((r.highest - r.lowest) / (2.0 * pi)), MOST_TURNS)
     motion = REVOLVING if turns >= 1 else OSCILLATORY if r.reversals > 0 else RESTING
-    if status == BROKEN or not (isfinite(phi) and isfinite(omega)):
+    if status == BROKEN or not (isfinite(phi + omega) and isfinite(r.normal_min_1 + r.normal_min_2)):
         regime, motion = FAILED, FAILED
     elif status == JAM:
         regime = JAMMED
-    elif status in (SEPARATED_1, SEPARATED_2):
+    elif status in (SEPARATED_1, SEPARATED_2, SEPARATED_BOTH):
         regime = SEPARATING
     else:
         regime = motion
@@ -130,6 +136,6 @@ def conclude(record, status, t, phi, omega):
         float(turns),
         r.stick_time,
         # A step ends beyond the instant at which a reaction vanishes, and at the end of an arc one may jump below zero.
-        0.0 if status == SEPARATED_1 else max(r.normal_min_1, 0.0),
-        0.0 if status == SEPARATED_2 else max(r.normal_min_2, 0.0),
+        0.0 if status in (SEPARATED_1, SEPARATED_BOTH) else max(r.normal_min_1, 0.0),
+        0.0 if status in (SEPARATED_2, SEPARATED_BOTH) else max(r.normal_min_2, 0.0),
     )

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.layout import Layout
-from ringsweep.variables import Variable
+from ringsweep.variables import Variable, linked
 
 #: Attributes that tell a file of this package from any other NetCDF file.
 SIGNATURE = ("Conventions", "ringsweep_version")
@@ -189,7 +189,8 @@ def _write_bricks(
                 if name not in sums:
                     variable = file.createVariable(name, column.dtype, dims, fill_value=False, **_chunked(layout))
                     _cache_one_brick(variable, layout)
-                    variable.setncatts(variables[name].attributes | ({"coordinates": others} if others else {}))
+                    described = variables[name].attributes | linked(name, columns)
+                    variable.setncatts(described | ({"coordinates": others} if others else {}))
                 file[name][place] = column
                 sums[name] = zlib.crc32(column.tobytes(), sums.get(name, 0))
     return sums

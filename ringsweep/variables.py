@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from ringsweep.errors import InputError
@@ -48,7 +49,7 @@ OUTCOMES: dict[str, Variable] = {
         flags={k: v for k, v in _regimes.items() if k not in (SEPARATING, JAMMED)},
     ),
     "separating_contact": Variable(
-        "contact that separates", dtype="int8", flags={0: "none", 1: "contact_1", 2: "contact_2"}
+        "contact that separates", dtype="int8", flags={0: "none", 1: "contact_1", 2: "contact_2", 3: "both"}
     ),
     "t_separation": Variable("time of separation", "s"),
     "t_end": Variable("time at which the run ends", "s"),
@@ -75,11 +76,29 @@ OUTCOMES: dict[str, Variable] = {
     "steps": Variable("steps of the integration", dtype="int64"),
     "stiffness": Variable("largest stiffness met: magnitude of the eigenvalue times the step"),
     "certified": Variable(
-        "whether two independent resolutions agree on regime, motion and separating contact",
+        "whether two resolutions agree on regime, motion and separating contact, and the run obeys its law",
         dtype="int8",
         flags={0: "not_certified", 1: "certified"},
     ),
 }
+
+# Bounds on errors, of which two digits are enough.
+OUTCOMES |= {
+    f"{name}_error": replace(
+        OUTCOMES[name], long_name=f"bound on the error: {OUTCOMES[name].long_name}", dtype="float32"
+    )
+    for name in (
+        *("t_separation", "t_end", "phi_end", "omega_end", "phi_min", "phi_max", "omega_min", "omega_max"),
+        *("x_end", "velocity_end", "x_min", "x_max", "velocity_max", "period"),
+    )
+}
+
+
+def linked(name: str, columns: Collection[str]) -> dict[str, str]:
+    """CF attribute that leads from a quantity to the bound on its error, if that is among the columns of a dataset."""
+    error = f"{name}_error"
+    return {"ancillary_variables": error} if error in columns else {}
+
 
 HISTORY: dict[str, Variable] = {
     "phi": Variable("angle of the body", "rad"),

@@ -27,7 +27,7 @@ def trail(method, batch, spacing):
     times, rows = np.empty(2_000_000), np.empty((2_000_000, len(HISTORY)))
     batch = take(batch, [0])
     out, steps = np.empty((1, 0)), np.empty(1)
-    count = integrate(batch, method.tolerances(), method.max_steps, out, steps, spacing, times, rows)
+    count = integrate(batch, method.tolerances(), method.max_steps, out, steps, np.empty((0, 4)), spacing, times, rows)
     return SimpleNamespace(t=times[:count], **dict(zip(HISTORY, rows[:count].T, strict=True)))
 
 
@@ -100,6 +100,12 @@ class Fall:
             def square(x, p=p, A=A, B=B, C=C, origin=phi):
                 return C * np.exp(2 * p * (x - origin)) + A * np.cos(x) + B * np.sin(x)
 
+            def gain(x, way, p=p, A=A, B=B, C=C, origin=phi):
+                """What the square gains on the way to x, without the cancellation of a difference."""
+                middle, half = x - 0.5 * way, np.sin(0.5 * way)
+                exponential = C * np.exp(2 * p * (x - way - origin)) * np.expm1(2 * p * way)
+                return exponential + 2.0 * half * (B * np.cos(middle) - A * np.sin(middle))
+
             def reaction(x, k, rows=rows, square=square):
                 return rows[k] @ (square(x), np.cos(x), np.sin(x))
 
@@ -107,7 +113,7 @@ class Fall:
             ends += [(self.first(lambda x, k=k: reaction(x, k), phi, end), k) for k in (1, 2)]
             at, what = min(ends, key=lambda pair: abs(pair[0] - phi))
             stop = min(at, end, key=lambda x: abs(x - phi))
-            t += self.duration(square, phi, stop, at == stop and what == "rest", u == 0.0)
+            t += self.duration(square, gain, phi, stop, at == stop and what == "rest", u == 0.0)
             if at != stop:
                 phi, u = end, square(end)
             elif what != "rest":
@@ -129,7 +135,7 @@ class Fall:
         return brentq(f, x[k - 1], x[k], xtol=1e-15, rtol=1e-15) if k else start
 
     @staticmethod
-    def duration(square, start, end, rests, rested):
+    def duration(square, gain, start, end, rests, rested):
         """Time from angle to angle by quadrature; at rest, in the root of the distance from there."""
         middle, sense = 0.5 * (start + end), np.sign(end - start)
         total = 0.0
@@ -137,8 +143,9 @@ class Fall:
             way = middle - place
             fraction = 0.5 * (NODES + 1)
             # phi = place + way z^2 takes away the root that u has at rest.
-            phi, rate = (place + way * fraction**2, 2 * fraction) if still else (place + way * fraction, 1.0)
-            total += 0.5 * abs(way) * (NODE_WEIGHTS * rate / np.sqrt(square(phi))).sum()
+            part, rate = (way * fraction**2, 2 * fraction) if still else (way * fraction, 1.0)
+            speed = np.sqrt(gain(place + part, part) if still else square(place + part))
+            total += 0.5 * abs(way) * (NODE_WEIGHTS * rate / speed).sum()
         return total if sense else 0.0
 
 

@@ -106,7 +106,9 @@ class TestCertificate:
         calls.clear()
         found = solve(loose, launches)
         assert 0 < doubtful.sum() < 200
-        assert [cells for _, cells in calls[:3]] == [200, 200, doubtful.sum()]
+        # Those besides that break their law, or hang by less than their error.
+        assert [cells for _, cells in calls[:2]] == [200, 200]
+        assert doubtful.sum() <= calls[2][1] < 200
         tolerances = [tolerance for tolerance, _ in calls]
         assert tolerances == pytest.approx([1.0, 30.0, *(30.0**-k for k in range(1, len(calls) - 1))])
         right = kinds(solve(Event(), launches))
@@ -116,7 +118,7 @@ class TestCertificate:
         assert (found.steps[doubtful] > first.steps[doubtful] + witness.steps[doubtful]).all()
 
     def test_is_withheld_after_so_many_tries(self, monkeypatch, calls, launches):
-        monkeypatch.setattr(event, "agree", lambda rows, *_: np.zeros(len(rows), dtype=bool))
+        monkeypatch.setattr(event, "vouched", lambda batch, rows, *_: np.zeros(len(rows), dtype=bool))
         assert not solve(Event(), launches).certified.any()
         assert 3 <= len(calls) <= 6
 

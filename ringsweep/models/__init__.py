@@ -3,7 +3,16 @@
 from typing import Any
 
 # Importing them gives the solvers their hooks.
-from ringsweep.models import belt_bristles, belt_static, ring_bristles, ring_series, ring_stiff, shared  # noqa: F401
+from ringsweep.models import (  # noqa: F401
+    belt_bristles,
+    belt_law,
+    belt_static,
+    ring_bristles,
+    ring_law,
+    ring_series,
+    ring_stiff,
+    shared,
+)
 from ringsweep.models.belt import Belt
 from ringsweep.models.ring import Ring, SingleContactRing
 from ringsweep.parameters import Parameter

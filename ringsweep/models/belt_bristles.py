@@ -21,7 +21,7 @@ from ringsweep.regimes import BROKEN, RUNNING
 
 
 @inlined
-def _contact(scene, v, z, sign, region):
+def contact_force(scene, v, z, sign, region):
     """Rate of the deflection, friction force (N), each with its derivatives by v and z."""
     rate, rate_v, rate_z, traction, by_v, by_z = bristle(scene.law, scene.mu_s, scene.mu_k, v, z, sign, region)
     load = scene.mass * scene.gravity
@@ -68,7 +68,7 @@ def _launch(scene):
 def _rates(scene, now, y, drive_at, drive_rate):
     v = y[1] - drive_rate
     sign = 1.0 if v >= 0.0 else -1.0
-    rate, _, _, force, _, _ = _contact(scene, v, y[2], sign, _region(scene, v, y[2], sign))
+    rate, _, _, force, _, _ = contact_force(scene, v, y[2], sign, _region(scene, v, y[2], sign))
     return y[1], -(scene.stiffness * y[0] + force) / scene.mass, rate
 
 
@@ -77,7 +77,7 @@ def _inspect(scene, y, drive_at, drive_rate):
     v = y[1] - drive_rate
     sign = 1.0 if v >= 0.0 else -1.0
     region = _region(scene, v, y[2], sign)
-    rate, rate_v, rate_z, force, by_v, by_z = _contact(scene, v, y[2], sign, region)
+    rate, rate_v, rate_z, force, by_v, by_z = contact_force(scene, v, y[2], sign, region)
     determinant = (scene.stiffness + by_z * rate_v - by_v * rate_z) / scene.mass
     eigenvalue = largest_eigenvalue(rate_z - by_v / scene.mass, determinant)
     rates = y[1], -(scene.stiffness * y[0] + force) / scene.mass, rate
@@ -137,7 +137,7 @@ def _onward(mode):
 @hooks.embark.implements(BristleBelt)
 def _embark(scene):
     z = made(scene.law, scene.mu_s, scene.mu_k)
-    return drives.beginning(scene.drive), (scene.initial_x, scene.initial_v, z)
+    return drives.beginning(scene.drive), (scene.initial_x, drives.launched(scene.drive, scene.initial_v), z)
 
 
 @hooks.enter.implements(BristleBelt)
@@ -146,7 +146,7 @@ def _enter(scene, t, y):
     sign = 1 if v > 0.0 else -1
     if v == 0.0:
         # The way that the body is pushed; if it is not, the belt runs away under it.
-        _, _, _, force, _, _ = _contact(scene, v, z, 1.0, BAND)
+        _, _, _, force, _, _ = contact_force(scene, v, z, 1.0, BAND)
         push = -scene.stiffness * x - force - scene.mass * drives.turn(scene.drive, t)[2]
         sign = 1 if push > 0.0 else -1
     return RUNNING, Mode(sign, _region(scene, v, z, float(sign)))
@@ -164,14 +164,14 @@ def _switch(scene, mode, guard, t, y):
 @hooks.stiff_rates.implements(BristleBelt)
 def _stiff_rates(scene, mode, force, x):
     _, belt_velocity, belt_acceleration = force
-    rate, _, _, drag, _, _ = _contact(scene, x[1], x[2], float(mode.sign), mode.region)
+    rate, _, _, drag, _, _ = contact_force(scene, x[1], x[2], float(mode.sign), mode.region)
     return x[1] + belt_velocity, -(scene.stiffness * x[0] + drag) / scene.mass - belt_acceleration, rate
 
 
 @hooks.linearise.implements(BristleBelt)
 def _linearise(scene, mode, t, x):
     _, belt_velocity, belt_acceleration = drives.turn(scene.drive, t)
-    rate, rate_v, rate_z, drag, by_v, by_z = _contact(scene, x[1], x[2], float(mode.sign), mode.region)
+    rate, rate_v, rate_z, drag, by_v, by_z = contact_force(scene, x[1], x[2], float(mode.sign), mode.region)
     return (
         (x[1] + belt_velocity, -(scene.stiffness * x[0] + drag) / scene.mass - belt_acceleration, rate),
         (0.0, 1.0, -scene.stiffness / scene.mass, -by_v / scene.mass),
@@ -195,7 +195,7 @@ def _stiff_scales(scene, tolerance, x):
 def _stiff_view(scene, mode, t, x):
     _, belt_velocity, _ = drives.turn(scene.drive, t)
     sign = float(mode.sign)
-    _, _, _, force, _, _ = _contact(scene, x[1], x[2], sign, mode.region)
+    _, _, _, force, _, _ = contact_force(scene, x[1], x[2], sign, mode.region)
     guards = sign * x[1], lasts(scene.law, scene.mu_s, scene.mu_k, x[1], x[2], sign, mode.region)
     return guards, (x[0], x[1] + belt_velocity, -(scene.stiffness * x[0] + force) / scene.mass, force)
 

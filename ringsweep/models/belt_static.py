@@ -25,10 +25,11 @@ from ringsweep.physics.friction.static import (
     region_bounds,
     slower,
     stiction_band,
+    tail_reach,
     weights,
 )
 from ringsweep.regimes import BROKEN, RUNNING
-from ringsweep.series import INVERSE, ORDER, ascending, crossings, reach, value, variation
+from ringsweep.series import INVERSE, ORDER, ascending, crossings, reach, slope, value, variation
 
 # ---- constant step ---------------------------------------------------------------------------
 
@@ -43,7 +44,7 @@ class Inspection(NamedTuple):
 
 
 @inlined
-def _holds(law):
+def holds_in_band(law):
     """Whether a contact in the band of the law is held by whatever force it takes, as at rest or in a dead band."""
     return constant_weights(law, BAND)
 
@@ -55,9 +56,9 @@ def _bound(scene):
 
 
 @inlined
-def _force(scene, x, v):
+def friction_force(scene, x, v):
     """Friction force, N, and its derivative by the sliding velocity, N s/m."""
-    if _holds(scene.law) and abs(v) < stiction_band(scene.law):
+    if holds_in_band(scene.law) and abs(v) < stiction_band(scene.law):
         return max(-_bound(scene), min(_bound(scene), -scene.stiffness * x)), 0.0
     w_s, w_k, dw_s, dw_k = weights(scene.law, abs(v))
     load = scene.mass * scene.gravity
@@ -75,14 +76,14 @@ def _launch(scene):
 
 @hooks.rates.implements(belt.Belt)
 def _rates(scene, now, y, drive_at, drive_rate):
-    force, _ = _force(scene, y[0], y[1] - drive_rate)
+    force, _ = friction_force(scene, y[0], y[1] - drive_rate)
     return y[1], -(scene.stiffness * y[0] + force) / scene.mass
 
 
 @hooks.inspect.implements(belt.Belt)
 def _inspect(scene, y, drive_at, drive_rate):
     v = y[1] - drive_rate
-    force, slope = _force(scene, y[0], v)
+    force, slope = friction_force(scene, y[0], v)
     return Inspection((y[1], -(scene.stiffness * y[0] + force) / scene.mass), v, force, slope)
 
 
@@ -99,14 +100,14 @@ def _stiffness(scene, before, now, h):
     rest, edge, jumped = met(scene.law, before.v, now.v, ahead)
     steepest = max(abs(before.slope), abs(now.slope))
     swing = scene.stiffness / scene.mass
-    if _holds(scene.law):
+    if holds_in_band(scene.law):
         # A discontinuous law has no slope that any step could follow; but one may land in a dead band.
         return inf if jumped else largest_eigenvalue(steepest / scene.mass, swing) * h
     # A step that jumps the band, or its edge, never samples the slope there, but has met it.
     if rest:
-        steepest = max(steepest, abs(_force(scene, 0.0, 0.0)[1]))
+        steepest = max(steepest, abs(friction_force(scene, 0.0, 0.0)[1]))
     if edge:
-        steepest = max(steepest, abs(_force(scene, 0.0, stiction_band(scene.law))[1]))
+        steepest = max(steepest, abs(friction_force(scene, 0.0, stiction_band(scene.law))[1]))
     return largest_eigenvalue(steepest / scene.mass, swing) * h
 
 
@@ -130,7 +131,7 @@ def _conclude(scene, record, status, t, y):
 def _describe(scene, y, drive_at, drive_rate):
     v = y[1] - drive_rate
     mode = 0.0 if abs(v) < stiction_band(scene.law) or v == 0.0 else 1.0 if v > 0.0 else -1.0
-    return y[0], y[1], _force(scene, y[0], v)[0], 0.0, mode
+    return y[0], y[1], friction_force(scene, y[0], v)[0], 0.0, mode
 
 
 # ---- piecewise-smooth system -----------------------------------------------------------------
@@ -158,7 +159,7 @@ def _onward(mode):
 
 @hooks.embark.implements(belt.Belt)
 def _embark(scene):
-    return drives.beginning(scene.drive), (scene.initial_x, scene.initial_v)
+    return drives.beginning(scene.drive), (scene.initial_x, drives.launched(scene.drive, scene.initial_v))
 
 
 @hooks.rows.implements(belt.Belt)
@@ -175,7 +176,7 @@ def _pull(scene, t, x):
 @hooks.enter.implements(belt.Belt)
 def _enter(scene, t, y):
     x, v = y
-    if _holds(scene.law) and abs(v) <= stiction_band(scene.law):
+    if holds_in_band(scene.law) and abs(v) <= stiction_band(scene.law):
         return RUNNING, _settle(scene, t, x)
     if v == 0.0:
         return RUNNING, Mode(1 if _pull(scene, t, x) >= 0.0 else -1, BAND, SLOW)
@@ -209,10 +210,10 @@ def _switch(scene, mode, guard, t, y):
         return RUNNING, Mode(sign, faster(scene.law, region), SLOW), (x, sign * high)
     if low > 0.0:
         entered = slower(scene.law, region)
-        if _holds(scene.law) and entered == BAND:
+        if holds_in_band(scene.law) and entered == BAND:
             return RUNNING, _settle(scene, t, x), (x, sign * low)
         return RUNNING, Mode(sign, entered, FAST), (x, sign * low)
-    if _holds(scene.law) and region == BAND:
+    if holds_in_band(scene.law) and region == BAND:
         # The pull has fallen to what the contact holds.
         return RUNNING, Mode(0, CLEAN, SLOW if sign > 0 else FAST), y
     if region == BAND:
@@ -242,7 +243,7 @@ def _expand(scene, mode, t, y, tolerance, c):
         c[FAST, 0] = 0.0 if mode.fresh == FAST else c[FAST, 0] + bound
     else:
         low, high = region_bounds(scene.law, mode.region)
-        yielding = _holds(scene.law) and mode.region == BAND
+        yielding = holds_in_band(scene.law) and mode.region == BAND
         viscous = 0.0 if yielding else scene.viscous
         for k in range(ORDER + 1):
             c[EXCESS, k] = mode.sign * c[V, k] - (low if k == 0 else 0.0)
@@ -267,18 +268,19 @@ def _expand(scene, mode, t, y, tolerance, c):
         if mode.fresh == SLOW and low == 0.0 and not yielding and abs(c[V, 1]) <= 1e-12 * terms:
             c[SLOW, 1] = 0.0
     # Lengths are measured by the way that the belt, the body or the load could go in the spring's own time.
-    length = abs(c[X, 0]) + _length(scene, abs(c[VELOCITY, 0]) + abs(c[SHIFT, 1]))
+    length = abs(c[X, 0]) + length_scale(scene, abs(c[VELOCITY, 0]) + abs(c[SHIFT, 1]))
     speed = length * (rate**0.5 if rate > 0.0 else 1.0)
-    if mode.region == BAND and not _holds(scene.law):
+    if mode.region == BAND and not holds_in_band(scene.law):
         # Noise that is large for the band would keep the creep from ever settling.
         speed = min(speed, 1e3 * stiction_band(scene.law))
     last = max(abs(c[X, ORDER]) / length, abs(c[V, ORDER]) / speed)
     previous = max(abs(c[X, ORDER - 1]) / length, abs(c[V, ORDER - 1]) / speed)
-    return reach(last / tolerance, previous / tolerance)
+    h = reach(last / tolerance, previous / tolerance)
+    return h if mode.sign == 0 else tail_reach(scene.law, mode.region, c[V], h)
 
 
 @inlined
-def _length(scene, velocity):
+def length_scale(scene, velocity):
     """A length to measure errors by, m."""
     push = scene.mu_s * scene.gravity * scene.mass
     if scene.stiffness > 0.0:
@@ -294,6 +296,11 @@ def _start(scene, c):
 @hooks.land.implements(belt.Belt)
 def _land(scene, mode, c, t, s):
     return value(c[X], s), value(c[V], s)
+
+
+@hooks.drift.implements(belt.Belt)
+def _drift(scene, mode, c, s):
+    return slope(c[X], s), slope(c[V], s)
 
 
 @hooks.watch.implements(belt.Belt)
@@ -349,21 +356,21 @@ def _is_stiff(scene, mode, y, line):
 
 @hooks.stiff_scales.implements(belt.Belt)
 def _stiff_scales(scene, tolerance, x):
-    length = _length(scene, abs(drives.turn(scene.drive, scene.span)[1]))
+    length = length_scale(scene, abs(drives.turn(scene.drive, scene.span)[1]))
     return tolerance * length, tolerance * stiction_band(scene.law)
 
 
 @hooks.stiff_rates.implements(belt.Belt)
 def _stiff_rates(scene, mode, force, x):
     shift, _, belt_acceleration = force
-    drag, _ = _force(scene, x[0] + shift, x[1])
+    drag, _ = friction_force(scene, x[0] + shift, x[1])
     return x[1], -(scene.stiffness * (x[0] + shift) + drag) / scene.mass - belt_acceleration
 
 
 @hooks.linearise.implements(belt.Belt)
 def _linearise(scene, mode, t, x):
     shift, belt_velocity, belt_acceleration = drives.turn(scene.drive, t)
-    drag, slope = _force(scene, x[0] + shift, x[1])
+    drag, slope = friction_force(scene, x[0] + shift, x[1])
     rate = scene.stiffness / scene.mass
     push = -rate * (x[0] + shift) - drag / scene.mass - belt_acceleration
     return (
@@ -378,7 +385,7 @@ def _linearise(scene, mode, t, x):
 def _stiff_view(scene, mode, t, x):
     shift, belt_velocity, _ = drives.turn(scene.drive, t)
     place = x[0] + shift
-    force, _ = _force(scene, place, x[1])
+    force, _ = friction_force(scene, place, x[1])
     acceleration = -(scene.stiffness * place + force) / scene.mass
     speed = mode.sign * x[1]
     # In the order of the rows of the series: SLOW, FAST.

@@ -13,9 +13,9 @@ from ringsweep.jit import inlined
 from ringsweep.lanes import Several, any_of, select, sine_cosine, sine_cosine_near
 from ringsweep.models.common import GRAVITY, MASS, SPAN, drive_of, largest_eigenvalue, law_of, pair
 from ringsweep.parameters import Parameter, declared
-from ringsweep.physics import drives, friction, ring, zones
+from ringsweep.physics import contact, drives, friction, ring, zones
 from ringsweep.physics.friction.static import met, steepest, stiction_band
-from ringsweep.regimes import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2
+from ringsweep.regimes import BROKEN, ENDS, JAM, RUNNING
 from ringsweep.scene import Structure, Values, require
 
 RADIUS = Parameter("m", "radius of the inner race", lower=0.0, open_lower=True)
@@ -214,19 +214,18 @@ def _verdict(scene, before, now):
         return (BROKEN if isnan(now.inertia) else JAM), 1.0
     if not (isfinite(now.rates[1]) and isfinite(now.omega)):
         return BROKEN, 1.0
-    status, fraction = RUNNING, 1.0
-    if now.normal_1 <= 0.0:
-        status, fraction = SEPARATED_1, _zero(before.normal_1, now.normal_1)
-    if now.normal_2 <= 0.0:
-        second = _zero(before.normal_2, now.normal_2)
-        if status == RUNNING or second < fraction:
-            status, fraction = SEPARATED_2, second
-    return status, fraction
+    first, second = _zero(before.normal_1, now.normal_1), _zero(before.normal_2, now.normal_2)
+    fraction = min(first, second)
+    if fraction > 1.0:
+        return RUNNING, 1.0
+    return ENDS[contact.lost(scene.body, first == fraction, second == fraction)], fraction
 
 
 @inlined
 def _zero(before, now):
-    """Where a straight line from `before` > 0 to `now` <= 0 vanishes, as a fraction of the way."""
+    """Where a straight line from `before` to `now` vanishes, as a fraction of the way; 2 if it does not."""
+    if now > 0.0:
+        return 2.0
     return before / (before - now) if before > now else 0.0
 
 
@@ -256,6 +255,20 @@ def _stiffness(scene, before, now, h):
 def _steeper(a, b):
     """The one of two slopes that is the larger in magnitude."""
     return select(abs(b) > abs(a), b, a)
+
+
+@hooks.slack.implements(ring.Ring, ring.BristleRing)
+def _slack(scene, before, now):
+    first = min(before.normal_1, now.normal_1) - 0.25 * abs(now.normal_1 - before.normal_1)
+    second = min(before.normal_2, now.normal_2) - 0.25 * abs(now.normal_2 - before.normal_2)
+    return min(first, second)
+
+
+@hooks.falls.implements(ring.Ring, ring.BristleRing)
+def _falls(scene, before, now, h):
+    first = before.normal_1 - now.normal_1 if now.normal_1 <= 0.0 else 0.0
+    second = before.normal_2 - now.normal_2 if now.normal_2 <= 0.0 else 0.0
+    return max(first, second) / h
 
 
 @hooks.begin.implements(ring.Ring, ring.BristleRing)

@@ -14,13 +14,13 @@ from typing import NamedTuple
 from ringsweep import hooks, regimes
 from ringsweep.jit import inlined
 from ringsweep.models.common import largest_eigenvalue
-from ringsweep.models.ring_series import coefficients_under
-from ringsweep.physics import drives, ring
+from ringsweep.models.ring_series import AT_ONCE, NEARLY_JAMMED, coefficients_under
+from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction.dynamic import bristle, lasts, steady
 from ringsweep.physics.friction.static import BAND, CLEAN
 from ringsweep.physics.ring import BristleRing
-from ringsweep.physics.zones import coefficients, cross, edge_ahead, locate, roughest, segment
-from ringsweep.regimes import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2
+from ringsweep.physics.zones import behind, coefficients, cross, edge_ahead, locate, roughest, segment
+from ringsweep.regimes import BROKEN, ENDS, JAM, RUNNING
 
 
 class Contacts(NamedTuple):
@@ -71,9 +71,10 @@ def _under_at(scene, rho):
 
 
 @inlined
-def _launched(scene, rho, v):
+def _launched(scene):
     """Deflections at launch."""
-    mu_s1, mu_k1, mu_s2, mu_k2 = _under_at(scene, rho)
+    v = ring.launch_velocity(scene) * scene.body.radius
+    mu_s1, mu_k1, mu_s2, mu_k2 = _under_at(scene, scene.initial_phi - drives.turn(scene.drive, 0.0)[0])
     return steady(scene.law, mu_s1, mu_k1, v), steady(scene.law, mu_s2, mu_k2, v)
 
 
@@ -96,9 +97,7 @@ class Inspection(NamedTuple):
 
 @hooks.launch.implements(BristleRing)
 def _launch(scene):
-    theta, ring_omega, _ = drives.turn(scene.drive, 0.0)
-    v = (scene.initial_omega - ring_omega) * scene.body.radius
-    z_1, z_2 = _launched(scene, scene.initial_phi - theta, v)
+    z_1, z_2 = _launched(scene)
     return scene.initial_phi, scene.initial_omega, z_1, z_2
 
 
@@ -192,46 +191,69 @@ def _onward(mode):
 @hooks.embark.implements(BristleRing)
 def _embark(scene):
     t = drives.beginning(scene.drive)
-    theta, ring_omega, _ = drives.turn(scene.drive, t)
-    rho, v = scene.initial_phi - theta, (scene.initial_omega - ring_omega) * scene.body.radius
-    z_1, z_2 = _launched(scene, rho, v)
-    return t, (rho, v, z_1, z_2)
+    v = drives.launched(scene.drive, ring.launch_velocity(scene)) * scene.body.radius
+    z_1, z_2 = _launched(scene)
+    return t, (scene.initial_phi - drives.turn(scene.drive, t)[0], v, z_1, z_2)
 
 
 @hooks.enter.implements(BristleRing)
 def _enter(scene, t, y):
     rho, v, z_1, z_2 = y
     offset = ring.contact_offset(scene.body)
-    places = locate(scene.surface, rho - offset), locate(scene.surface, rho + offset)
+    place_1, place_2 = locate(scene.surface, rho - offset), locate(scene.surface, rho + offset)
     theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     phi, omega = rho + theta, ring_omega + v / scene.body.radius
     sign = 1 if v > 0.0 else -1
-    mode = Mode(sign, BAND, places[0], places[1])
-    now = _contacts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(sign), BAND)
-    epsilon, D, inertia = ring.acceleration(scene.body, now.K1, now.K2, sin(phi), cos(phi), omega)
     if v == 0.0:
+        mode = Mode(sign, BAND, place_1, place_2)
+        now = _contacts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(sign), BAND)
+        epsilon, _, _ = ring.acceleration(scene.body, now.K1, now.K2, sin(phi), cos(phi), omega)
         sign = 1 if epsilon > ring_epsilon else -1
-    stuck = _lasts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(sign), BAND) > 0.0
-    mode = Mode(sign, BAND if stuck else CLEAN, places[0], places[1])
-    if not (D > 0.0 and inertia > 0.0):
-        return BROKEN if isnan(inertia) else JAM, mode
-    return RUNNING, mode
+    if sign < 0:
+        place_1, place_2 = behind(scene.surface, place_1, rho - offset), behind(scene.surface, place_2, rho + offset)
+    mode = Mode(sign, BAND, place_1, place_2)
+    if not _lasts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(sign), BAND) > 0.0:
+        mode = Mode(sign, CLEAN, place_1, place_2)
+    return _after_jump(scene, mode, t, y), mode
 
 
 @inlined
-def _is_jamming(scene, mode, t, y):
-    """Whether slip is so near to a jam that its reactions, which grow without bound there, have no sign to go by."""
+def _sliding_at(scene, mode, t, y):
+    """Friction at each contact per unit of its reaction; sine and cosine of the angle of the body, its rate."""
     rho, v, z_1, z_2 = y
     theta, ring_omega, _ = drives.turn(scene.drive, t)
     phi, omega = rho + theta, ring_omega + v / scene.body.radius
     now = _contacts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(mode.sign), mode.region)
-    _, D, inertia = ring.acceleration(scene.body, now.K1, now.K2, sin(phi), cos(phi), omega)
-    return not (D > 0.0 and inertia > 1e-4 * ring.about_axis(scene.body) * D)
+    return now.K1, now.K2, sin(phi), cos(phi), omega
+
+
+@inlined
+def _after_jump(scene, mode, t, y):
+    """Status of a body where friction may have jumped."""
+    K1, K2, sin_phi, cos_phi, omega = _sliding_at(scene, mode, t, y)
+    if isnan(K1 + K2 + sin_phi + omega):
+        return BROKEN
+    return ENDS[contact.sliding(scene.body, K1, K2, sin_phi, cos_phi, omega)]
+
+
+@inlined
+def _lose(scene, mode, guard, t, y):
+    """Status where a reaction has vanished."""
+    body = scene.body
+    K1, K2, sin_phi, cos_phi, omega = _sliding_at(scene, mode, t, y)
+    epsilon, D, inertia = ring.acceleration(body, K1, K2, sin_phi, cos_phi, omega)
+    if not (D > 0.0 and inertia > NEARLY_JAMMED * ring.about_axis(body) * D):
+        return JAM
+    normal_1, normal_2 = ring.reactions(body, K1, K2, sin_phi, cos_phi, omega, epsilon)
+    least = AT_ONCE * body.mass * (body.gravity + body.radius * (omega * omega + abs(epsilon)))
+    return ENDS[contact.lost(body, guard == NORMAL_1 or normal_1 <= least, guard == NORMAL_2 or normal_2 <= least)]
 
 
 @hooks.impasse.implements(BristleRing)
 def _impasse(scene, mode, t, y):
-    return JAM if _is_jamming(scene, mode, t, y) else BROKEN
+    K1, K2, sin_phi, cos_phi, omega = _sliding_at(scene, mode, t, y)
+    _, D, inertia = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
+    return BROKEN if D > 0.0 and inertia > NEARLY_JAMMED * ring.about_axis(scene.body) * D else JAM
 
 
 @hooks.switch.implements(BristleRing)
@@ -241,9 +263,7 @@ def _switch(scene, mode, guard, t, y):
     if guard == INERTIA:
         return JAM, mode, y
     if guard in (NORMAL_1, NORMAL_2):
-        if _is_jamming(scene, mode, t, y):
-            return JAM, mode, y
-        return (SEPARATED_1 if guard == NORMAL_1 else SEPARATED_2), mode, y
+        return _lose(scene, mode, guard, t, y), mode, y
     if guard == SLOW:
         return RUNNING, Mode(-sign, BAND, place_1, place_2), (rho, 0.0, z_1, z_2)
     if guard == FAST:
@@ -255,7 +275,8 @@ def _switch(scene, mode, guard, t, y):
         place_1 = cross(scene.surface, place_1, sign)
     else:
         place_2 = cross(scene.surface, place_2, sign)
-    return RUNNING, Mode(sign, mode.region, place_1, place_2), y
+    mode = Mode(sign, mode.region, place_1, place_2)
+    return _after_jump(scene, mode, t, y), mode, y
 
 
 @hooks.stiff_rates.implements(BristleRing)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from ringsweep import hooks, regimes
 from ringsweep.jit import hook, inlined
-from ringsweep.physics import drives, ring
+from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction.static import (
     BAND,
     CLEAN,
@@ -27,11 +27,11 @@ from ringsweep.physics.friction.static import (
     region_bounds,
     slower,
     stiction_band,
-    weights,
+    tail_reach,
     weights_in,
 )
-from ringsweep.physics.zones import coefficients, cross, edge_ahead, locate
-from ringsweep.regimes import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2
+from ringsweep.physics.zones import behind, coefficients, cross, edge_ahead, locate
+from ringsweep.regimes import BROKEN, ENDS, JAM, RUNNING
 from ringsweep.series import (
     INVERSE,
     ORDER,
@@ -40,6 +40,7 @@ from ringsweep.series import (
     may_fall_below,
     product,
     reach,
+    slope,
     value,
     variation,
 )
@@ -48,6 +49,14 @@ from ringsweep.series import (
 PHI, V, OMEGA, EPSILON, SIN, COS, SQUARE, THETA, EXCESS, BASIS, STATIC, KINETIC = range(12)
 K1, K2, SPARE = range(12, 15)
 INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(15, 21)
+
+
+# Reactions that vanish together are both this close to zero, as a share of the weight, where one of them vanishes.
+AT_ONCE = 1e-9
+
+# Share of the moment of inertia about the axis below which the effective inertia is that of a motion on its way into a
+# jam.
+NEARLY_JAMMED = 1e-4
 
 
 class Mode(NamedTuple):
@@ -74,9 +83,8 @@ def coefficients_under(scene, mode):
 
 @hooks.embark.implements(ring.Ring)
 def _embark(scene):
-    t = drives.beginning(scene.drive)
-    _, ring_omega, _ = drives.turn(scene.drive, t)
-    return t, (scene.initial_phi, (scene.initial_omega - ring_omega) * scene.body.radius)
+    v = drives.launched(scene.drive, ring.launch_velocity(scene)) * scene.body.radius
+    return drives.beginning(scene.drive), (scene.initial_phi, v)
 
 
 @hooks.rows.implements(ring.Ring)
@@ -87,56 +95,92 @@ def _rows(scene):
 @hooks.enter.implements(ring.Ring)
 def _enter(scene, t, y):
     phi, v = y
-    theta, _, _ = drives.turn(scene.drive, t)
+    theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     offset = ring.contact_offset(scene.body)
-    places = locate(scene.surface, phi - theta - offset), locate(scene.surface, phi - theta + offset)
+    place_1, place_2 = locate(scene.surface, phi - theta - offset), locate(scene.surface, phi - theta + offset)
+    if v == 0.0 and stiction_band(scene.law) == 0.0:
+        return _settle(scene, t, phi, place_1, place_2, 0)
+    sign = 1 if v > 0.0 else -1
+    region, fresh = region_at(scene.law, abs(v)), -1
     if v == 0.0:
-        if stiction_band(scene.law) == 0.0:
-            return _settle(scene, t, phi, places)
         # Friction is zero here: the way the body goes is the way that it is pushed.
-        _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
         push, _, _ = ring.acceleration(scene.body, 0.0, 0.0, sin(phi), cos(phi), ring_omega)
-        return RUNNING, Mode(1 if push >= ring_epsilon else -1, BAND, SLOW, places[0], places[1])
-    return RUNNING, Mode(1 if v > 0.0 else -1, region_at(scene.law, abs(v)), -1, places[0], places[1])
+        sign, fresh = (1 if push >= ring_epsilon else -1), SLOW
+    mode = Mode(sign, region, fresh, place_1, place_2)
+    if sign < 0:
+        mode = Mode(sign, region, fresh, *_behind(scene, mode, phi - theta))
+    return _after_jump(scene, mode, t, y), mode
 
 
 @inlined
-def _settle(scene, t, phi, places):
-    """Mode of a set-valued law where the sliding velocity is zero: stick unless full friction cannot hold."""
-    _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
-    still = Mode(0, CLEAN, -1, places[0], places[1])
-    m1, _, m2, _ = coefficients_under(scene, still)
-    sin_phi, cos_phi = sin(phi), cos(phi)
-    against_forward, D1, inertia_1 = ring.acceleration(scene.body, -m1, -m2, sin_phi, cos_phi, ring_omega)
-    against_backward, D2, inertia_2 = ring.acceleration(scene.body, m1, m2, sin_phi, cos_phi, ring_omega)
-    if not (D1 > 0.0 and D2 > 0.0 and inertia_1 > 0.0 and inertia_2 > 0.0):
-        return BROKEN if isnan(inertia_1 + inertia_2) else JAM, still
-    forward, backward = against_forward > ring_epsilon, against_backward < ring_epsilon
+def _behind(scene, mode, rho):
+    """Places of contacts that move backwards from the angle `rho` in the ring's frame."""
+    offset = ring.contact_offset(scene.body)
+    return behind(scene.surface, mode.place_1, rho - offset), behind(scene.surface, mode.place_2, rho + offset)
+
+
+@inlined
+def _at_breakaway(scene, mode):
+    """Friction coefficients under each contact as it begins to slide."""
+    mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
+    w_s, w_k, _, _ = weights_in(scene.law, mode.region, 0.0)
+    return w_s * mu_s1 + w_k * mu_k1, w_s * mu_s2 + w_k * mu_k2
+
+
+@inlined
+def _settle(scene, t, phi, place_1, place_2, released):
+    """Status and mode of a set-valued law where the sliding velocity is zero; see :func:`contact.at_rest`."""
+    theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     region = region_at(scene.law, 0.0)
-    if forward and backward:
-        # Friction that drives either way is that of a contact that would have to pull, or no motion is the one.
-        free, _, _ = ring.acceleration(scene.body, 0.0, 0.0, sin_phi, cos_phi, ring_omega)
-        normal_1, normal_2 = ring.reactions(scene.body, 0.0, 0.0, sin_phi, cos_phi, ring_omega, free)
-        if min(normal_1, normal_2) <= 0.0:
-            return (SEPARATED_1 if normal_1 <= normal_2 else SEPARATED_2), still
-        return JAM, still
-    # Without any friction there is nothing to stick to.
-    if forward or (m1 + m2 == 0.0 and not backward):
-        return RUNNING, Mode(1, region, SLOW, places[0], places[1])
-    if backward:
-        return RUNNING, Mode(-1, region, SLOW, places[0], places[1])
-    return RUNNING, still
+    still = Mode(0, CLEAN, -1, place_1, place_2)
+    forward = Mode(1, region, SLOW, place_1, place_2)
+    backward = Mode(-1, region, SLOW, *_behind(scene, still, phi - theta))
+    mu_s1, _, mu_s2, _ = coefficients_under(scene, still)
+    found = contact.at_rest(
+        scene.body,
+        (mu_s1, mu_s2),
+        _at_breakaway(scene, forward),
+        _at_breakaway(scene, backward),
+        sin(phi),
+        cos(phi),
+        ring_omega,
+        ring_epsilon,
+        released,
+    )
+    if found == contact.FORWARD:
+        return RUNNING, forward
+    if found == contact.BACKWARD:
+        return RUNNING, backward
+    if isnan(phi + ring_epsilon):
+        return BROKEN, still
+    return ENDS[found], still
+
+
+@inlined
+def _after_jump(scene, mode, t, y):
+    """Status of slip where friction may have jumped."""
+    phi, v = y
+    K1, K2, omega = _friction_at(scene, mode, t, v)
+    if isnan(phi + omega):
+        return BROKEN
+    return ENDS[contact.sliding(scene.body, K1, K2, sin(phi), cos(phi), omega)]
+
+
+@inlined
+def _friction_at(scene, mode, t, v):
+    """Friction at each contact per unit of its reaction, and angular velocity of the body, at a sliding velocity."""
+    mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
+    w_s, w_k, _, _ = weights_in(scene.law, mode.region, abs(v))
+    K1, K2 = -mode.sign * (w_s * mu_s1 + w_k * mu_k1), -mode.sign * (w_s * mu_s2 + w_k * mu_k2)
+    return K1, K2, v / scene.body.radius + drives.turn(scene.drive, t)[1]
 
 
 @inlined
 def _sliding_at(scene, mode, t, y):
     """D, inertia, both reactions and their scale in slip, from the balances themselves and not from a series."""
     phi, v = y
-    mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
-    w_s, w_k, _, _ = weights(scene.law, abs(v))
-    K1, K2 = -mode.sign * (w_s * mu_s1 + w_k * mu_k1), -mode.sign * (w_s * mu_s2 + w_k * mu_k2)
     body = scene.body
-    omega = v / body.radius + drives.turn(scene.drive, t)[1]
+    K1, K2, omega = _friction_at(scene, mode, t, v)
     epsilon, determinant, inertia = ring.acceleration(body, K1, K2, sin(phi), cos(phi), omega)
     normal_1, normal_2 = ring.reactions(body, K1, K2, sin(phi), cos(phi), omega, epsilon)
     scale = body.mass * (body.gravity + body.radius * (omega * omega + abs(epsilon)))
@@ -149,16 +193,31 @@ def _is_jamming(scene, mode, t, y):
     if mode.sign == 0:
         return False
     determinant, inertia, _, _, _ = _sliding_at(scene, mode, t, y)
-    return not (determinant > 0.0 and inertia > 1e-4 * ring.about_axis(scene.body) * determinant)
+    return not (determinant > 0.0 and inertia > NEARLY_JAMMED * ring.about_axis(scene.body) * determinant)
 
 
 @inlined
-def _is_held(scene, mode, guard, t, y):
-    """Whether a reaction whose series vanishes does not: on the way into a jam that series meets its singularity."""
+def _lose(scene, mode, guard, t, y):
+    """Status, mode and state where a reaction has vanished."""
     if mode.sign == 0:
-        return False
-    _, _, normal_1, normal_2, scale = _sliding_at(scene, mode, t, y)
-    return (normal_1 if guard == NORMAL_1 else normal_2) > 1e-2 * scale
+        # Of the modes that are closed, a slip may take over.
+        status, slip = _settle(scene, t, y[0], mode.place_1, mode.place_2, 2)
+        if status == RUNNING:
+            return status, slip, (y[0], 0.0)
+        _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
+        mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
+        _, _, normal_1, normal_2 = contact.stick(
+            scene.body, mu_s1, mu_s2, sin(y[0]), cos(y[0]), ring_omega, ring_epsilon
+        )
+        scale = scene.body.mass * (scene.body.gravity + scene.body.radius * ring_omega * ring_omega)
+    else:
+        _, _, normal_1, normal_2, scale = _sliding_at(scene, mode, t, y)
+        # On the way into a jam the series of a reaction meets its singularity, and vanishes where that does not.
+        if _is_jamming(scene, mode, t, y) or (normal_1 if guard == NORMAL_1 else normal_2) > 1e-2 * scale:
+            return JAM, mode, y
+    least = AT_ONCE * scale
+    lost_1, lost_2 = guard == NORMAL_1 or normal_1 <= least, guard == NORMAL_2 or normal_2 <= least
+    return ENDS[contact.lost(scene.body, lost_1, lost_2)], mode, y
 
 
 @hooks.impasse.implements(ring.Ring)
@@ -176,11 +235,13 @@ def _switch(scene, mode, guard, t, y):
     phi, v = y
     sign, region, place_1, place_2 = mode.sign, mode.region, mode.place_1, mode.place_2
     if guard in (NORMAL_1, NORMAL_2):
-        if _is_jamming(scene, mode, t, y) or _is_held(scene, mode, guard, t, y):
-            return JAM, mode, y
-        return (SEPARATED_1 if guard == NORMAL_1 else SEPARATED_2), mode, y
+        return _lose(scene, mode, guard, t, y)
     if guard == INERTIA:
         return JAM, mode, y
+    if sign == 0:
+        released = 1 if guard == SLOW else -1 if guard == FAST else 2
+        status, mode = _settle(scene, t, phi, place_1, place_2, released)
+        return status, mode, (phi, 0.0)
     if guard == EDGE:
         theta, _, _ = drives.turn(scene.drive, t)
         offset = ring.contact_offset(scene.body)
@@ -190,9 +251,8 @@ def _switch(scene, mode, guard, t, y):
             place_1 = cross(scene.surface, place_1, sign)
         else:
             place_2 = cross(scene.surface, place_2, sign)
-        return RUNNING, Mode(sign, region, SLOW if v == 0.0 else -1, place_1, place_2), y
-    if sign == 0:
-        return RUNNING, Mode(1 if guard == SLOW else -1, region_at(scene.law, 0.0), SLOW, place_1, place_2), (phi, 0.0)
+        mode = Mode(sign, region, SLOW if v == 0.0 else -1, place_1, place_2)
+        return _after_jump(scene, mode, t, y), mode, y
     low, high = region_bounds(scene.law, region)
     if guard == FAST:
         return RUNNING, Mode(sign, faster(scene.law, region), SLOW, place_1, place_2), (phi, sign * high)
@@ -200,7 +260,7 @@ def _switch(scene, mode, guard, t, y):
         return RUNNING, Mode(sign, slower(scene.law, region), FAST, place_1, place_2), (phi, sign * low)
     if region == BAND:
         return RUNNING, Mode(-sign, BAND, SLOW, place_1, place_2), (phi, 0.0)
-    status, settled = _settle(scene, t, phi, (place_1, place_2))
+    status, settled = _settle(scene, t, phi, place_1, place_2, 0)
     return status, settled, (phi, 0.0)
 
 
@@ -256,7 +316,7 @@ def _expand(scene, mode, t, y, tolerance, c):
     for row, unit in ((PHI, scale), (V, rate), (EPSILON, push), (NORMAL_1, load), (NORMAL_2, load)):
         last = max(last, abs(c[row, ORDER]) * unit)
         previous = max(previous, abs(c[row, ORDER - 1]) * unit)
-    return reach(last, previous)
+    return tail_reach(scene.law, mode.region, c[V], reach(last, previous))
 
 
 @inlined
@@ -401,8 +461,8 @@ def _expand_stick(scene, mode, tolerance, c):
             c[PHI, k] = c[THETA, k]
         _sine(c, k)
     mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
-    _hold(scene.body, mu_s1, mu_s2, c)
     c[EDGE, 0] = inf
+    _hold(scene.body, mu_s1, mu_s2, c)
     c[INERTIA, 0] = inf
     weight = 1.0 / (scene.body.mass * (scene.body.gravity + scene.body.radius * c[SQUARE, 0]))
     last, previous = 0.0, 0.0
@@ -414,7 +474,7 @@ def _expand_stick(scene, mode, tolerance, c):
 
 @hook
 def _hold(body, m1, m2, c):
-    """Fill reactions and the reserves of friction forwards (SLOW) and backwards (FAST) in stick.
+    """Fill reactions, the reserves of friction forwards (SLOW) and backwards (FAST), and whether stick exists (EDGE).
 
     The moment about the axis gives the total friction, the tangential balance the difference of
     the reactions, the radial one, with friction shared in proportion to ``m_i N_i``, a quadratic
@@ -438,8 +498,10 @@ def _two_hold(body, m1, m2, c):
         linear[k] = mean * load[k] - cb * half * difference[k] + sb * half * friction[k]
         share[k] = half * load[k] + mean * sb * friction[k]
         constant = product(difference, share, k)
+        # No saturation gives the acceleration of the ring any more where both roots meet.
+        c[EDGE, k] = product(linear, linear, k) + 4.0 * mean * cb * constant
         if k == 0:
-            root = sqrt(linear[0] * linear[0] + 4.0 * mean * cb * constant)
+            root = sqrt(max(c[EDGE, 0], 0.0))
             total[0] = (linear[0] + root) / (2.0 * mean * cb)
         else:
             total[k] = 0.0
@@ -463,6 +525,11 @@ def _one_hold(body, m1, m2, c):
 @hooks.land.implements(ring.Ring)
 def _land(scene, mode, c, t, s):
     return value(c[PHI], s), value(c[V], s)
+
+
+@hooks.drift.implements(ring.Ring)
+def _drift(scene, mode, c, s):
+    return slope(c[PHI], s), slope(c[V], s)
 
 
 @hooks.watch.implements(ring.Ring)

@@ -102,6 +102,15 @@ def _stiff_view(scene, mode, t, x):
     return guards, (phi, omega, epsilon, ring_omega)
 
 
+@hooks.stiff_near.implements(ring.Ring, ring.BristleRing)
+def _stiff_near(scene, motion):
+    b = scene.body
+    _, omega, _, _ = motion
+    load = 0.05 * b.mass * (b.gravity + b.radius * omega * omega)
+    inertia = 0.02 * ring.support(b) * min(1.0, ring.about_axis(b))
+    return inertia, 0.0, load, load, 0.0, 0.0
+
+
 @hooks.stiff_motion.implements(ring.Ring, ring.BristleRing)
 def _stiff_motion(scene, t, x, line):
     _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from math import inf, isfinite
+
+import numpy as np
 
 from ringsweep import hooks
 from ringsweep.lanes import Single
@@ -29,13 +31,13 @@ def _forcing(scene, t):
 
 # The place relative to the drive, so that nothing large cancels in a creep.
 @hooks.to_stiff.implements(Belt, Ring)
-def _to_stiff(scene, t, y):
-    return y[0] - drives.turn(scene.drive, t)[0], y[1]
+def _to_stiff(scene, force, y):
+    return y[0] - force[0], y[1]
 
 
 @hooks.from_stiff.implements(Belt, Ring)
-def _from_stiff(scene, t, x):
-    return x[0] + drives.turn(scene.drive, t)[0], x[1]
+def _from_stiff(scene, force, x):
+    return x[0] + force[0], x[1]
 
 
 @hooks.creeps.implements(Belt, Ring)
@@ -50,10 +52,30 @@ def _rows(scene):
 
 
 @hooks.to_stiff.implements(BristleBelt, BristleRing)
-def _bristles_to_stiff(scene, t, y):
+def _bristles_to_stiff(scene, force, y):
     return y
 
 
 @hooks.from_stiff.implements(BristleBelt, BristleRing)
-def _bristles_from_stiff(scene, t, x):
+def _bristles_from_stiff(scene, force, x):
     return x
+
+
+@hooks.slack.implements(Belt, BristleBelt)
+def _slack(scene, before, now):
+    return inf
+
+
+@hooks.falls.implements(Belt, BristleBelt)
+def _falls(scene, before, now, h):
+    return 0.0
+
+
+@hooks.stiff_near.implements(Belt, BristleBelt)
+def _stiff_near(scene, motion):
+    return 0.0, 0.0
+
+
+@hooks.undecided.implements(Belt, BristleBelt)
+def _undecided(batch, rows, witness, fall):
+    return np.zeros(len(rows), dtype=bool)

@@ -247,12 +247,18 @@ def _expand_table(drive, t, order, theta):
 
 @hook
 def next_knot(drive, t):
-    """First time after `t` (s) at which the drive is not smooth; infinite if there is none."""
+    """Time after `t` (s) beyond which no series about `t` holds, as where the drive is not smooth; infinite if none."""
 
 
-@next_knot.implements(Still, Constant, Arctan, Power, Sinusoidal)
+@next_knot.implements(Still, Constant, Arctan, Sinusoidal)
 def _no_knot(drive, t):
     return inf
+
+
+@next_knot.implements(Power)
+def _within_convergence(drive, t):
+    # About t a series reaches back to the singularity at 0, and as far ahead.
+    return inf if drive.exponent % 1.0 == 0.0 else 1.5 * max(t, _BEGINNING)
 
 
 @next_knot.implements(Table)
@@ -307,3 +313,26 @@ def _at_zero(drive):
 @beginning.implements(Power)
 def _after_zero(drive):
     return _BEGINNING
+
+
+# Speeds that differ by less than this share of them are the same but for rounding.
+_SAME = 1e-15
+
+
+@inlined
+def relative(speed, drive_speed):
+    """Difference of two speeds, 0 where that is their rounding."""
+    difference = speed - drive_speed
+    return 0.0 if abs(difference) < _SAME * (abs(speed) + abs(drive_speed)) else difference
+
+
+@inlined
+def launched(drive, velocity):
+    """Velocity relative to the drive, of a body launched with `velocity` relative to it, where its series can begin.
+
+    Both in units of :func:`turn`. At rest on a drive whose acceleration is finite at first, it stays there until then.
+    """
+    _, before, acceleration = turn(drive, 0.0)
+    if velocity == 0.0 and abs(acceleration) < inf:
+        return 0.0
+    return velocity - (turn(drive, beginning(drive))[1] - before)

@@ -34,6 +34,7 @@ import numpy as np
 from ringsweep.jit import absorbed, hook, inlined, inner_hook
 from ringsweep.lanes import opposing
 from ringsweep.parameters import Leaf
+from ringsweep.physics import drives
 from ringsweep.physics.friction.static import weights
 from ringsweep.physics.zones import PER_TURN, roughness
 
@@ -109,6 +110,12 @@ class Ring(NamedTuple):
 
 class BristleRing(Ring):
     """The same with a friction law that has bristles: their deflections are states, one at each contact."""
+
+
+@inlined
+def launch_velocity(scene):
+    """Angular velocity of the body relative to the ring at launch, rad/s."""
+    return drives.relative(scene.initial_omega, drives.turn(scene.drive, 0.0)[1])
 
 
 @hook
@@ -272,6 +279,38 @@ def _two_reactions(body, K1, K2, sin_phi, cos_phi, omega, phi_dd):
 def _one_reactions(body, K1, K2, sin_phi, cos_phi, omega, phi_dd):
     N = body.mass * (body.gravity * cos_phi + body.radius * omega * omega)
     return N, N
+
+
+@hook
+def energy(body, cos_phi, omega):
+    """Mechanical energy of the body, J."""
+
+
+@energy.implements(TwoContacts)
+def _two_energy(body, cos_phi, omega):
+    b = body
+    return 0.5 * (b.inertia + b.mass * b.xi * b.xi) * omega * omega - b.mass * b.gravity * b.xi * cos_phi
+
+
+@energy.implements(OneContact)
+def _one_energy(body, cos_phi, omega):
+    b = body
+    return b.mass * b.radius * (0.5 * b.radius * omega * omega - b.gravity * cos_phi)
+
+
+@hook
+def friction_power(body, K1, K2, normal_1, normal_2, omega):
+    """Power of friction on the body, W."""
+
+
+@friction_power.implements(TwoContacts)
+def _two_power(body, K1, K2, normal_1, normal_2, omega):
+    return body.radius * omega * (K1 * normal_1 + K2 * normal_2)
+
+
+@friction_power.implements(OneContact)
+def _one_power(body, K1, K2, normal_1, normal_2, omega):
+    return body.radius * omega * K1 * normal_1
 
 
 @absorbed

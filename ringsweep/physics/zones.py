@@ -264,3 +264,9 @@ def _cross(surface, place, direction):
     if j < 0:
         return len(surface.edges) - 1, turn - 1
     return j, turn
+
+
+@inlined
+def behind(surface, place, angle):
+    """Place of a contact that moves backwards from `angle` (rad): that beyond the edge, if it is on one."""
+    return cross(surface, place, -1) if edge_ahead(surface, place, -1) >= angle else place

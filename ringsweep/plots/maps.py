@@ -14,7 +14,7 @@ from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, Normalize, to_rgb
+from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, LogNorm, Normalize, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
@@ -402,6 +402,10 @@ class _Field:
     def of(cls, data: xr.DataArray) -> _Field:
         if "flag_values" not in data.attrs:
             finite = data.values[np.isfinite(data.values)]
+            positive = finite[finite > 0.0]
+            if str(data.name).endswith("_error") and positive.size and positive.max() > positive.min():
+                # Bounds on errors lie decades apart.
+                return cls(_with_bad("viridis"), LogNorm(positive.min(), positive.max()))
             limits = (finite.min(), finite.max()) if finite.size else (0.0, 1.0)
             return cls(_with_bad("viridis"), Normalize(*limits))
         flags = np.atleast_1d(data.attrs["flag_values"])
@@ -414,6 +418,8 @@ class _Field:
     def numbers(self, data: xr.DataArray) -> xr.DataArray:
         """What is painted: finite numbers or NaN, or the position of a class among the flags."""
         numbers = data.astype(float).where(np.isfinite(data))
+        if isinstance(self.norm, LogNorm):
+            return numbers.clip(min=self.norm.vmin)
         if self.flags is None:
             return numbers
         classes = xr.full_like(numbers, np.nan)

@@ -14,7 +14,7 @@ from ringsweep.jit import take
 from ringsweep.parameters import Parameter
 from ringsweep.physics.friction import DYNAMIC, LAWS, SET_VALUED, SMOOTH
 from ringsweep.scene import Structure
-from ringsweep.solvers.common import Method, Result, agree
+from ringsweep.solvers.common import Method, Result, errors, vouched, with_errors
 from ringsweep.solvers.piecewise import integrate
 
 LIMIT = Parameter("1", "steps after which a run is given up as failed", lower=1, upper=1e10)
@@ -23,6 +23,18 @@ LIMIT = Parameter("1", "steps after which a run is given up as failed", lower=1,
 # is run again, tighter by it, so often at most.
 _FACTOR = 30.0
 _TRIES = 3
+
+# A run obeys its law if no violation exceeds so many times what the tolerance of a step makes of it, and all but this
+# share of the energy that is turned over is work of friction.
+_BREACH, _ENERGY = 1e3, 5e-3
+
+# Error of a run in units of its difference from one at the looser tolerance, at most: it is some fiftieth of it.
+_SAFETY = 1.5
+
+
+def _some(batch: Any, cells: NDArray[np.intp]) -> Any:
+    """Some cells of a batch; all of them are the batch itself."""
+    return batch if len(cells) == len(batch.span) else take(batch, cells)
 
 
 @dataclass(frozen=True)
@@ -51,32 +63,70 @@ class _Piecewise(Method):
     def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:
         """Outcomes of every cell; see :class:`ringsweep.solvers.common.Method`.
 
-        A cell is certified if a run at a looser tolerance agrees with it; where it does not, both
+        A cell is certified if a run at a looser tolerance agrees with it and it obeys its law; where it does not, both
         tolerances are tightened.
         """
-        rows, steps = self._integrate(batch, len(outcomes))
+        rows, steps, shown = self._integrate(batch, len(outcomes), self.certify)
         certified = np.zeros(len(rows), dtype=bool)
-        if self.certify:
-            witness, more = replace(self, rtol=self.rtol * _FACTOR)._integrate(batch, len(outcomes))
-            steps = steps + more
-            certified = agree(rows, witness, outcomes)
-            finer = self
-            for _ in range(_TRIES):
-                doubtful = np.flatnonzero(~certified)
-                finer = replace(finer, rtol=finer.rtol / _FACTOR)
-                if not len(doubtful) or finer.tolerances()[0] < 1e-15:
-                    break
-                again, more = finer._integrate(take(batch, doubtful), len(outcomes))
-                steps[doubtful] += more
-                certified[doubtful] = agree(again, rows[doubtful], outcomes)
-                rows[doubtful] = again
-        return Result(rows, steps=steps, certified=certified)
+        if not self.certify:
+            return Result(rows, steps=steps, certified=certified)
+        bounds = np.full((len(rows), len(with_errors(outcomes))), np.nan)
+        # What met the limit of work is not worked on any more.
+        live = np.flatnonzero(steps < self.max_steps)
+        if not len(live):
+            return Result(rows, steps=steps, certified=certified, errors=bounds)
+        witness, more, _ = replace(self, rtol=self.rtol * _FACTOR)._integrate(_some(batch, live), len(outcomes), False)
+        certified[live] = self._vouched(_some(batch, live), rows[live], witness, shown[live], outcomes)
+        bounds[live] = self._errors(batch, rows[live], witness, steps[live], outcomes)
+        steps[live] += more
+        finer = self
+        for _ in range(_TRIES):
+            live = live[~certified[live]]
+            finer = replace(finer, rtol=finer.rtol / _FACTOR)
+            if not len(live) or finer.tolerances()[0] < 1e-15:
+                break
+            part = _some(batch, live)
+            again, more, shown = finer._integrate(part, len(outcomes), True)
+            certified[live] = self._vouched(part, again, rows[live], shown, outcomes)
+            bounds[live] = finer._errors(batch, again, rows[live], more, outcomes)
+            steps[live] += more
+            done = more < self.max_steps
+            rows[live[done]] = again[done]
+            live = live[done]
+        return Result(rows, steps=steps, certified=certified, errors=bounds)
 
-    def _integrate(self, batch: Any, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    @staticmethod
+    def _vouched(
+        batch: Any,
+        rows: NDArray[np.float64],
+        witness: NDArray[np.float64],
+        shown: NDArray[np.float64],
+        outcomes: tuple[str, ...],
+    ) -> NDArray[np.bool_]:
+        """Which runs are certified, given what a run at another tolerance came to and what they have shown."""
+        lawful: NDArray[np.bool_] = (shown[:, 0] <= _BREACH) & (shown[:, 1] <= _ENERGY)
+        return lawful & vouched(batch, rows, witness, shown[:, 2], outcomes)
+
+    def _errors(
+        self,
+        batch: Any,
+        rows: NDArray[np.float64],
+        witness: NDArray[np.float64],
+        steps: NDArray[Any],
+        outcomes: tuple[str, ...],
+    ) -> NDArray[np.float64]:
+        """Bounds on the errors of runs at this tolerance, given runs at a looser one."""
+        tolerance = self.tolerances()[type(batch.law) in DYNAMIC]
+        return errors(rows, witness, outcomes, safety=_SAFETY, tolerance=tolerance, steps=steps)
+
+    def _integrate(
+        self, batch: Any, width: int, audit: bool
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Outcomes, numbers of steps, and if that is asked for what each run has shown of its law."""
         rows = np.empty((len(batch.span), width))
-        steps = np.empty(len(rows))
-        integrate(batch, self.tolerances(), self.max_steps, rows, steps, np.inf, np.empty(0), np.empty((0, 0)))
-        return rows, steps
+        steps, shown = np.empty(len(rows)), np.empty((len(rows) if audit else 0, 4))
+        integrate(batch, self.tolerances(), self.max_steps, rows, steps, shown, np.inf, np.empty(0), np.empty((0, 0)))
+        return rows, steps, shown
 
     def history(self, batch: Any, samples: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Times and rows of the history of cell 0; see :class:`ringsweep.solvers.common.Method`."""
@@ -85,7 +135,9 @@ class _Piecewise(Method):
         while True:
             times, table = np.empty(size), np.empty((size, width))
             none, steps = np.empty((1, 0)), np.empty(1)
-            count = integrate(batch, self.tolerances(), self.max_steps, none, steps, spacing, times, table)
+            count = integrate(
+                batch, self.tolerances(), self.max_steps, none, steps, np.empty((0, 4)), spacing, times, table
+            )
             if count < size or size >= self.max_steps:
                 return times[:count], table[:count]
             size *= 4

@@ -8,17 +8,21 @@ so is every mode of a law with bristles. The family of the law decides which of 
 
 from __future__ import annotations
 
-from math import inf, isfinite, isnan, nan
+from math import inf, isfinite, isnan, nan, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from ringsweep.hooks import (
+    breach,
     creeps,
+    drift,
     embark,
+    energy,
     enter,
     expand,
     finish,
+    forcing,
     from_stiff,
     impasse,
     is_stiff,
@@ -29,6 +33,7 @@ from ringsweep.hooks import (
     sample,
     start,
     stiff_motion,
+    stiff_near,
     stiff_sample,
     stiff_scales,
     stiff_start,
@@ -42,14 +47,104 @@ from ringsweep.jit import borrowed, hook, inlined, kernel, take
 from ringsweep.physics.drives import next_knot
 from ringsweep.physics.friction import DYNAMIC, SET_VALUED, SMOOTH
 from ringsweep.regimes import BROKEN, COMPLETE, RUNNING
-from ringsweep.series import ORDER, STACK, first_root
+from ringsweep.series import ORDER, STACK, ascending, first_root, slope, value
 from ringsweep.solvers import rosenbrock
 
 # Steps and events in a row at one instant after which a run is given up.
 _STALLED = 400
 
+# Parts of an implicit step at whose ends guards are looked at where one of them may vanish.
+_INSTANTS = 4
+
+# Coefficients of the polynomial through the values at these instants.
+_THROUGH = np.ascontiguousarray(np.linalg.inv(np.vander(np.linspace(0.0, 1.0, _INSTANTS + 1), increasing=True)))
+
+# Guards of an implicit step, at most.
+_MOST_GUARDS = 6
+
 # How much larger the relative error of a step may be in the friction of bristles than in the state.
 _PUSH = 100.0
+
+
+class Audit(NamedTuple):
+    """What a run has shown of its law at instants that the solver did not choose.
+
+    ``breach`` is the largest violation, measured by what the tolerance of a step makes of it; ``unexplained`` what of
+    the changes of the mechanical energy is not work of friction, J; ``turnover`` the sum of the magnitudes of both.
+    """
+
+    breach: float
+    unexplained: float
+    turnover: float
+
+
+# Fractions of a step at which the law is checked: Gauss's, which make a quadrature of the work of friction as well.
+_EARLY, _LATE = 0.5 - 0.5 / sqrt(3.0), 0.5 + 0.5 / sqrt(3.0)
+
+# Share of the energy itself that counts as turned over in a step: without friction what it loses is rounding.
+_STORED = 1e-5
+
+# The law is checked in so many steps at first, then in this share of them, which no period of the motion can evade.
+_ALL_CHECKED, _CHECKED = 8, 0.25
+
+
+@inlined
+def _is_checked(n):
+    """Whether the law is checked in step `n`."""
+    return n <= _ALL_CHECKED or (n * 0.6180339887498949) % 1.0 < _CHECKED
+
+
+@inlined
+def _entered(audit, first, second, begins, ends, s):
+    """Audit after a step of length `s`, checked at two instants; `begins` and `ends` are energies."""
+    (breach_1, power_1), (breach_2, power_2) = first, second
+    worst = max(audit.breach, max(breach_1, breach_2))
+    work, change = 0.5 * s * (power_1 + power_2), ends - begins
+    return Audit(
+        worst if isfinite(work) else inf,
+        audit.unexplained + (change - work),
+        audit.turnover + 0.5 * s * (abs(power_1) + abs(power_2)) + abs(change) + _STORED * (abs(begins) + abs(ends)),
+    )
+
+
+@inlined
+def _audit_series(scene, mode, c, t, s, y, y_next, tolerance, audit):
+    """Audit after a step of length `s` along the series `c`, from the state `y` at time `t` to the state `y_next`."""
+    first = _breach_along(scene, mode, c, t, s, tolerance, _EARLY * s)
+    second = _breach_along(scene, mode, c, t, s, tolerance, _LATE * s)
+    begins, ends = energy(scene, forcing(scene, t), y), energy(scene, forcing(scene, t + s), y_next)
+    return _entered(audit, first, second, begins, ends, s)
+
+
+@inlined
+def _breach_along(scene, mode, c, t, s, tolerance, at):
+    state, rates = land(scene, mode, c, t + at, at), drift(scene, mode, c, at)
+    return breach(scene, mode, forcing(scene, t + at), state, rates, s, tolerance)
+
+
+@inlined
+def _audit_creep(scene, mode, t, s, y, y_next, stages, tolerance, audit):
+    """The same of an implicit step from the state `y` to `y_next`."""
+    begin, end = forcing(scene, t), forcing(scene, t + s)
+    x, x_next = to_stiff(scene, begin, y), to_stiff(scene, end, y_next)
+    first = _breach_within(scene, mode, t, s, x, x_next, stages, tolerance, _EARLY)
+    second = _breach_within(scene, mode, t, s, x, x_next, stages, tolerance, _LATE)
+    return _entered(audit, first, second, energy(scene, begin, y), energy(scene, end, y_next), s)
+
+
+@inlined
+def _breach_within(scene, mode, t, s, x, x_next, stages, tolerance, fraction):
+    force = forcing(scene, t + fraction * s)
+    state = from_stiff(scene, force, rosenbrock.dense(x, x_next, stages, fraction))
+    return breach(scene, mode, force, state, rosenbrock.dense_rates(x, x_next, stages, fraction, s), s, tolerance)
+
+
+@inlined
+def _fall_of_creep(scene, mode, t, s, y, y_next, stages, guard):
+    """How fast a guard falls as an implicit step ends by it, 1/s times its unit."""
+    x, x_next = to_stiff(scene, forcing(scene, t), y), to_stiff(scene, forcing(scene, t + s), y_next)
+    late = stiff_view(scene, mode, t + 0.9 * s, rosenbrock.dense(x, x_next, stages, 0.9))
+    return late[0][guard] / (0.1 * s)
 
 
 @inlined
@@ -88,14 +183,13 @@ def _guard_after(scene, mode, t, x, line, h, g, stages):
 
 
 @inlined
-def _locate(scene, mode, t, x, line, h, g, stages):
-    """Step at which guard `g`, not positive after a step `h`, reaches zero, by steps of that very length.
+def _locate(scene, mode, t, x, line, h, f_high, g, stages):
+    """Step at which guard `g` reaches zero, which after a step `h` is `f_high`, not positive; by steps of that length.
 
     The method itself, not an interpolant of it, is solved for the event.
     """
     low, high = 0.0, h
     f_low = stiff_view(scene, mode, t, x)[0][g]
-    f_high = _guard_after(scene, mode, t, x, line, h, g, stages)
     if f_low <= 0.0:
         # Zero as the mode was entered: find a step before the event, if there is one.
         s = h
@@ -144,19 +238,72 @@ def _size(error, scales, line):
 
 
 @inlined
-def _first_creep_event(scene, mode, t, x, line, s, within, after, stages):
-    """First guard to fall below zero within an implicit step, of which `within` and `after` are the guards."""
+def _may_vanish(nearness, first, middle, last):
+    """Whether a guard may vanish within a step of which it is known at both ends and in the middle."""
+    # A parabola through the three dips by less than an eighth of its second difference below the lowest of them.
+    return not min(first, min(middle, last)) >= nearness + 0.5 * abs(first - 2.0 * middle + last)
+
+
+@inlined
+def _first_creep_event(scene, mode, t, x, x_next, line, s, before, within, after, stages, seen, work):
+    """First guard to fall below zero within an implicit step, and when; -1 and `s` if none does.
+
+    A guard is a polynomial through five instants of the dense output, which is of that degree itself. Its first root
+    is isolated as that of a series is, so that no dip between two instants is missed. `before`, `within` and `after`
+    are the views of the step's beginning, middle and end; `seen` is filled with the guards at the five instants.
+    """
+    early = stiff_view(scene, mode, t + 0.25 * s, rosenbrock.dense(x, x_next, stages, 0.25))
+    late = stiff_view(scene, mode, t + 0.75 * s, rosenbrock.dense(x, x_next, stages, 0.75))
+    nearness = stiff_near(scene, within[1])
+    for g in range(len(nearness)):
+        seen[g, 0], seen[g, 1], seen[g, 2] = before[0][g], early[0][g], within[0][g]
+        seen[g, 3], seen[g, 4] = late[0][g], after[0][g]
     event, end = -1, s
-    for g in range(len(after)):
-        # Zero is no violation: a body at rest in equilibrium stays there.
-        if after[g] < 0.0 or within[g] < 0.0:
-            until = min(end, s if after[g] < 0.0 else 0.5 * s)
-            if event >= 0 and _guard_after(scene, mode, t, x, line, until, g, stages) > 0.0:
-                continue
-            found = _locate(scene, mode, t, x, line, until, g, stages)
-            if event < 0 or found < end * (1.0 - 1e-12):
-                event, end = g, found
+    for g in range(len(nearness)):
+        if not _may_vanish(nearness[g], before[0][g], within[0][g], after[0][g]):
+            continue
+        until = min(end, s * _below(seen[g], work))
+        if until == 0.0:
+            continue
+        last = _guard_after(scene, mode, t, x, line, until, g, stages)
+        # The guard may vanish after another one has, or graze zero where the dense output is beyond it by its error.
+        if last > 0.0:
+            continue
+        found = _locate(scene, mode, t, x, line, until, last, g, stages)
+        if event < 0 or found < end * (1.0 - 1e-12):
+            event, end = g, found
     return event, end
+
+
+@inlined
+def _below(samples, work):
+    """A fraction of a step at which a guard is below zero, soon after it first falls to it; 0 if it never does.
+
+    Zero is no violation: a body at rest in equilibrium stays there.
+    """
+    first = 1
+    while first <= _INSTANTS and samples[first] >= 0.0:
+        first += 1
+    end = first / _INSTANTS if first <= _INSTANTS else 0.0
+    if samples[0] <= 0.0:
+        return end
+    row = work[0]
+    for k in range(ORDER + 1):
+        row[k] = 0.0
+        if k <= _INSTANTS:
+            for i in range(_INSTANTS + 1):
+                row[k] += _THROUGH[k, i] * samples[i]
+    root, found = first_root(row, 1.0, work[1:])
+    if not found or (end > 0.0 and root > end - 1.0 / _INSTANTS):
+        return end
+    # A dip between two instants: its bottom.
+    lowest, bottom = 0.0, 0.0
+    for i in range(1, 33):
+        at = root + (1.0 / _INSTANTS) * i / 32.0
+        depth = value(row, min(at, 1.0))
+        if depth < lowest:
+            lowest, bottom = depth, min(at, 1.0)
+    return bottom if bottom > 0.0 else root
 
 
 class Trial(NamedTuple):
@@ -181,7 +328,7 @@ def _next_trial(trial, s, size, cut, rejected):
 
 
 @inlined
-def _creep(scene, record, mode, t, y, x, line, trial, horizon, tolerance, guards, stages):
+def _creep(scene, record, mode, t, y, x, line, trial, horizon, tolerance, guards, stages, seen, work):
     """One accepted implicit step from the state `y`, which is `x` in its own coordinates, cut at the first event.
 
     Returns
@@ -191,16 +338,28 @@ def _creep(scene, record, mode, t, y, x, line, trial, horizon, tolerance, guards
     """
     scales = stiff_scales(scene, tolerance, x)
     s = min(trial.h, horizon)
-    event, end = -1, s
+    event, end, near = -1, s, False
+    before = stiff_view(scene, mode, t, x)
+    within, after = before, before
     for _ in range(200):
         x_next, error = rosenbrock.step(scene, mode, t, x, line, s, stages)
         size = _size(error, scales, line)
         if size <= 1.0:
             within = stiff_view(scene, mode, t + 0.5 * s, rosenbrock.dense(x, x_next, stages, 0.5))
             after = stiff_view(scene, mode, t + s, x_next)
-            event, end = _first_creep_event(scene, mode, t, x, line, s, within[0], after[0], stages)
+            event, end = -1, s
+            near, nearness = False, stiff_near(scene, within[1])
+            for g in range(len(nearness)):
+                near = near or _may_vanish(nearness[g], before[0][g], within[0][g], after[0][g])
+            if near:
+                event, end = _first_creep_event(
+                    scene, mode, t, x, x_next, line, s, before, within, after, stages, seen, work
+                )
+                if event < 0:
+                    rosenbrock.step(scene, mode, t, x, line, s, stages)
             if event < 0 or end == 0.0:
                 break
+            near = False
             # The step up to the event is another one, which may see what the stages of the longer one passed over.
             x_next, error = rosenbrock.step(scene, mode, t, x, line, end, stages)
             short = _size(error, scales, line)
@@ -217,22 +376,34 @@ def _creep(scene, record, mode, t, y, x, line, trial, horizon, tolerance, guards
         event += guards
         within = stiff_view(scene, mode, t + 0.5 * end, rosenbrock.dense(x, x_next, stages, 0.5))
         after = stiff_view(scene, mode, t + end, x_next)
+    moments, count = work[0], 0
     velocity, acceleration = stiff_motion(scene, t, x, line)
-    done = 0.0
     for half, right in ((0.0, within), (0.5, after)):
         # Where the motion or its acceleration turns within this half there is an extreme: a moment of its own.
-        turns, rises = velocity * right[1][1] < 0.0, acceleration * right[1][2] < 0.0
-        first = _turning(scene, mode, t, x, x_next, end, stages, half, 1, velocity) if turns else 2.0
-        second = _turning(scene, mode, t, x, x_next, end, stages, half, 2, acceleration) if rises else 2.0
-        for moment in (min(first, second), max(first, second)):
-            if moment < 1.0:
-                view = stiff_view(scene, mode, t + moment * end, rosenbrock.dense(x, x_next, stages, moment))
-                record = stiff_watch(scene, record, mode, view, t + moment * end, (moment - done) * end)
-                done = moment
-        record = stiff_watch(scene, record, mode, right, t + (half + 0.5) * end, (half + 0.5 - done) * end)
-        done = half + 0.5
+        if velocity * right[1][1] < 0.0:
+            moments[count] = _turning(scene, mode, t, x, x_next, end, stages, half, 1, velocity)
+            count += 1
+        if acceleration * right[1][2] < 0.0:
+            moments[count] = _turning(scene, mode, t, x, x_next, end, stages, half, 2, acceleration)
+            count += 1
         velocity, acceleration = right[1][1], right[1][2]
-    return event, end, from_stiff(scene, t + end, x_next), record, trial
+    if near:
+        for i in range(1, _INSTANTS):
+            moments[count] = i / _INSTANTS
+            count += 1
+    else:
+        moments[count] = 0.5
+        count += 1
+    ascending(moments, count)
+    done = 0.0
+    for j in range(count):
+        view = within
+        if moments[j] != 0.5:
+            view = stiff_view(scene, mode, t + moments[j] * end, rosenbrock.dense(x, x_next, stages, moments[j]))
+        record = stiff_watch(scene, record, mode, view, t + moments[j] * end, (moments[j] - done) * end)
+        done = moments[j]
+    record = stiff_watch(scene, record, mode, after, t + end, (1.0 - done) * end)
+    return event, end, from_stiff(scene, forcing(scene, t + end), x_next), record, trial
 
 
 @inlined
@@ -260,7 +431,7 @@ def _along(scene, record, mode, t, y, horizon, tolerance, c, guards, work):
 
 
 @hook
-def _stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages):
+def _stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages, seen):
     """One step in the way that the family of the law wants.
 
     Returns
@@ -271,22 +442,22 @@ def _stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c, guard
 
 
 @_stride.implements(*SET_VALUED)
-def _series_stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages):
+def _series_stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages, seen):
     guard, s, y, record = _along(scene, record, mode, t, y, horizon, tolerances[0], c, guards, work)
     return False, guard, s, y, record, trial
 
 
 @_stride.implements(*SMOOTH)
-def _either_stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages):
+def _either_stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages, seen):
     if creeps(scene, mode):
-        x = to_stiff(scene, t, y)
+        x = to_stiff(scene, forcing(scene, t), y)
         line = linearise(scene, mode, t, x)
         if is_stiff(scene, mode, y, line):
             if trial.last == 0.0:
                 # What is left of the way in ends at the rate of the decay.
                 trial = Trial(min(trial.h, -1.0 / line[1][3]), 0.0, 0.0)
             guard, s, y, record, trial = _creep(
-                scene, record, mode, t, y, x, line, trial, horizon, tolerances[1], guards, stages
+                scene, record, mode, t, y, x, line, trial, horizon, tolerances[1], guards, stages, seen, work
             )
             return True, guard, s, y, record, trial
     guard, s, y, record = _along(scene, record, mode, t, y, horizon, tolerances[0], c, guards, work)
@@ -294,13 +465,57 @@ def _either_stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c
 
 
 @_stride.implements(*DYNAMIC)
-def _implicit_stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages):
-    x = to_stiff(scene, t, y)
+def _implicit_stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages, seen):
+    x = to_stiff(scene, forcing(scene, t), y)
     line = linearise(scene, mode, t, x)
     guard, s, y, record, trial = _creep(
-        scene, record, mode, t, y, x, line, trial, horizon, tolerances[1], guards, stages
+        scene, record, mode, t, y, x, line, trial, horizon, tolerances[1], guards, stages, seen, work
     )
     return True, guard, s, y, record, trial
+
+
+@hook
+def _audited(law, scene, mode, implicit, c, t, s, y, y_next, stages, tolerance, audit):
+    """Audit after a step of length `s` from the state `y` at time `t`."""
+
+
+@_audited.implements(*SET_VALUED)
+def _series_audited(law, scene, mode, implicit, c, t, s, y, y_next, stages, tolerance, audit):
+    return _audit_series(scene, mode, c, t, s, y, y_next, tolerance, audit)
+
+
+@_audited.implements(*SMOOTH)
+def _either_audited(law, scene, mode, implicit, c, t, s, y, y_next, stages, tolerance, audit):
+    if implicit:
+        return _audit_creep(scene, mode, t, s, y, y_next, stages, tolerance, audit)
+    return _audit_series(scene, mode, c, t, s, y, y_next, tolerance, audit)
+
+
+@_audited.implements(*DYNAMIC)
+def _implicit_audited(law, scene, mode, implicit, c, t, s, y, y_next, stages, tolerance, audit):
+    return _audit_creep(scene, mode, t, s, y, y_next, stages, tolerance, audit)
+
+
+@hook
+def _fall(law, scene, mode, implicit, c, t, s, y, y_next, stages, guard, first):
+    """How fast a guard falls as a step ends by it; `first` is the first guard."""
+
+
+@_fall.implements(*SET_VALUED)
+def _series_fall(law, scene, mode, implicit, c, t, s, y, y_next, stages, guard, first):
+    return -slope(c[guard], s)
+
+
+@_fall.implements(*SMOOTH)
+def _either_fall(law, scene, mode, implicit, c, t, s, y, y_next, stages, guard, first):
+    if implicit:
+        return _fall_of_creep(scene, mode, t, s, y, y_next, stages, guard - first)
+    return -slope(c[guard], s)
+
+
+@_fall.implements(*DYNAMIC)
+def _implicit_fall(law, scene, mode, implicit, c, t, s, y, y_next, stages, guard, first):
+    return _fall_of_creep(scene, mode, t, s, y, y_next, stages, guard - first)
 
 
 @hook
@@ -332,13 +547,13 @@ def _series_row(law, scene, mode, implicit, c, t, s, y):
 @_row.implements(*SMOOTH)
 def _either_row(law, scene, mode, implicit, c, t, s, y):
     if implicit:
-        return stiff_sample(scene, mode, t, to_stiff(scene, t, y))
+        return stiff_sample(scene, mode, t, to_stiff(scene, forcing(scene, t), y))
     return sample(scene, mode, c, t, s)
 
 
 @_row.implements(*DYNAMIC)
 def _implicit_row(law, scene, mode, implicit, c, t, s, y):
-    return stiff_sample(scene, mode, t, to_stiff(scene, t, y))
+    return stiff_sample(scene, mode, t, to_stiff(scene, forcing(scene, t), y))
 
 
 @inlined
@@ -377,7 +592,7 @@ def _keep(scene, mode, implicit, c, t, s, y, times, table, kept):
 
 
 @kernel
-def integrate(batch, tolerances, limit, out, steps, spacing, times, table):
+def integrate(batch, tolerances, limit, out, steps, shown, spacing, times, table):
     """Run every cell of a batch to its end, or to `limit` steps.
 
     One kernel serves sweeps and histories: a user of both compiles a kind of scene once.
@@ -394,6 +609,10 @@ def integrate(batch, tolerances, limit, out, steps, spacing, times, table):
     out : ndarray of shape ``(cells, outcomes)``
         Or without columns, if outcomes are not wanted.
     steps : ndarray of shape ``(cells,)``
+    shown : ndarray of shape ``(cells, 4)`` or ``(0, 4)``
+        Filled, unless it is empty, with what each run has shown of its law: the largest violation, measured by what the
+        tolerance of a step makes of it; the share of the energy turned over that is not work of friction; how fast the
+        guard fell by which the run ended; and the number of implicit steps.
     spacing : float
         Greatest distance between rows of a history, s.
     times, table : ndarray of shapes ``(rows,)`` and ``(rows, variables)``
@@ -410,13 +629,15 @@ def integrate(batch, tolerances, limit, out, steps, spacing, times, table):
     c = np.zeros((count, ORDER + 3))
     work = np.empty((STACK, ORDER + 3))
     stages = np.empty((rosenbrock.STAGES, len(embark(first)[1])))
-    return _integrate(batch, tolerances, limit, out, steps, spacing, times, table, guards, c, work, stages)
+    seen = np.empty((_MOST_GUARDS, _INSTANTS + 1))
+    return _integrate(batch, tolerances, limit, out, steps, shown, spacing, times, table, guards, c, work, stages, seen)
 
 
 @inlined
-def _integrate(batch, tolerances, limit, out, steps, spacing, times, table, guards, c, work, stages):
-    c, work, stages = borrowed(c), borrowed(work), borrowed(stages)
-    out, steps, times, table = borrowed(out), borrowed(steps), borrowed(times), borrowed(table)
+def _integrate(batch, tolerances, limit, out, steps, shown, spacing, times, table, guards, c, work, stages, seen):
+    c, work, stages, seen = borrowed(c), borrowed(work), borrowed(stages), borrowed(seen)
+    out, steps, shown, times, table = borrowed(out), borrowed(steps), borrowed(shown), borrowed(times), borrowed(table)
+    audited = len(shown) > 0
     kept = 0
     for i in range(len(steps)):
         scene = take(batch, i)
@@ -424,7 +645,8 @@ def _integrate(batch, tolerances, limit, out, steps, spacing, times, table, guar
         status, mode = enter(scene, t, y)
         record = _outset(scene.law, scene, mode, t, y, tolerances, c)
         trial = Trial(1e-6 * scene.span, 0.0, 0.0)
-        n = stalled = 0
+        audit, fall = Audit(0.0, 0.0, 0.0), 0.0
+        n = stalled = crept = 0
         before = -1.0
         entered = True
         implicit = False
@@ -439,7 +661,7 @@ def _integrate(batch, tolerances, limit, out, steps, spacing, times, table, guar
             horizon = min(scene.span, next_knot(scene.drive, t)) - t
             trial = Trial(min(trial.h, spacing), trial.last, trial.size)
             implicit, guard, s, y_next, record, trial = _stride(
-                scene.law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages
+                scene.law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages, seen
             )
             if len(times) > 0:
                 if kept == len(times):
@@ -450,8 +672,13 @@ def _integrate(batch, tolerances, limit, out, steps, spacing, times, table, guar
                         state = y if part == 0 else y_next
                         kept = _keep(scene, mode, implicit, c, t, s * part / parts, state, times, table, kept)
                 entered = guard >= 0 or (entered and s == 0.0)
-            last = mode
+            if audited and s > 0.0 and _is_checked(n):
+                audit = _audited(scene.law, scene, mode, implicit, c, t, s, y, y_next, stages, tolerances[0], audit)
+            crept += int(implicit)
+            last, begun = mode, y
             t, status, mode, y = _arrive(scene, mode, guard, t, s, horizon, y_next)
+            if audited and status != RUNNING and guard >= 0 and s > 0.0:
+                fall = _fall(scene.law, scene, last, implicit, c, before, s, begun, y_next, stages, guard, guards)
             if s == 0.0 and status != RUNNING:
                 # What a mode ends by that is over as it is entered is to be seen.
                 kept = _keep(scene, last, implicit, c, t, 0.0, y, times, table, kept)
@@ -462,4 +689,9 @@ def _integrate(batch, tolerances, limit, out, steps, spacing, times, table, guar
         for k in range(min(len(outcome), out.shape[1])):
             out[i, k] = outcome[k]
         steps[i] = n
+        if audited:
+            shown[i, 0] = audit.breach
+            shown[i, 1] = abs(audit.unexplained) / audit.turnover if audit.turnover > 0.0 else 0.0
+            shown[i, 2] = fall
+            shown[i, 3] = crept
     return kept

@@ -7,6 +7,7 @@ right-hand side were smooth. ``stiffness`` tells where that is beyond the limit 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -17,12 +18,14 @@ from ringsweep.hooks import (
     begin,
     conclude,
     describe,
+    falls,
     holds,
     inspect,
     lanes,
     launch,
     observe,
     rates,
+    slack,
     stiffness,
     verdict,
 )
@@ -48,11 +51,15 @@ from ringsweep.physics.drives import lookup, scaled, shape, turn
 from ringsweep.physics.friction import LAWS, WITH_SNAPS
 from ringsweep.regimes import COMPLETE, RUNNING
 from ringsweep.scene import Structure
-from ringsweep.solvers.common import Method, Result, agree, same_drive
+from ringsweep.solvers.common import Method, Result, errors, same_drive, vouched, with_errors
+from ringsweep.variables import SEPARATING
 
 #: Radius of the largest half disc of the left half plane in which the method is stable: 2.616 where an eigenvalue is
 #: complex; on the real axis alone it would be 2.785.
 STABILITY_LIMIT = 2.61
+
+# Error of a run in units of its difference from one at half the step, at most: of first order where friction jumps.
+_SAFETY = 2.5
 
 # Steps between two visits of a cell: the drive's table of so many steps stays in the cache, and so few are lost on a
 # run that ends among others that go on.
@@ -83,22 +90,29 @@ class RK4(Method):
         """Outcomes of every cell; see :class:`ringsweep.solvers.common.Method`."""
         cells = len(batch.span)
         rows, report = self._integrate(batch, np.arange(cells), self.steps, len(outcomes))
-        certified = np.zeros(cells, dtype=bool)
+        certified, bounds = np.zeros(cells, dtype=bool), None
         if not self.diagnose:
             return Result(rows, steps=report[:, 0], certified=certified)
         if self.certify:
-            # Beyond the limit of stability a second run agrees with the first for the wrong reason.
-            stable = np.flatnonzero(report[:, 1] <= STABILITY_LIMIT)
+            bounds = np.full((cells, len(with_errors(outcomes))), np.nan)
+            # Beyond the limit of stability a second run agrees with the first for the wrong reason, and a run that ends
+            # at its launch has shown nothing.
+            stable = np.flatnonzero((report[:, 1] <= STABILITY_LIMIT) & (report[:, 0] > 0.0))
             if len(stable):
                 half, finer = self._integrate(batch, stable, 2 * self.steps, len(outcomes))
-                certified[stable] = agree(rows[stable], half, outcomes) & (finer[:, 1] <= STABILITY_LIMIT)
-        return Result(rows, steps=report[:, 0], stiffness=report[:, 1], certified=certified)
+                some, ours = (batch, rows) if len(stable) == cells else (take(batch, stable), rows[stable])
+                # What may have vanished between two steps has not been held.
+                held = (finer[:, 2] > 0.0) | (half[:, outcomes.index("regime")] == SEPARATING)
+                sure = held & (finer[:, 1] <= STABILITY_LIMIT)
+                certified[stable] = sure & vouched(some, ours, half, finer[:, 3], outcomes)
+                bounds[stable] = errors(ours, half, outcomes, safety=_SAFETY)
+        return Result(rows, steps=report[:, 0], stiffness=report[:, 1], certified=certified, errors=bounds)
 
     def _integrate(
         self, batch: Any, cells: NDArray[np.intp], steps: int, width: int
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         rows = np.empty((len(batch.span), width))
-        report = np.empty((len(batch.span), 2))
+        report = np.empty((len(batch.span), 4))
         kind, account = lanes(batch), Kept() if self.diagnose else Dropped()
         # What the kernels are compiled for knows no shape of the drive: that of its table is a kernel of its own.
         scenes = side_by_side(batch._replace(drive=scaled(batch.drive))) if isinstance(kind, Several) else batch
@@ -120,26 +134,33 @@ LIVE, GONE, ENDING, EXCUSED = 1.0, 0.0, 2.0, -1.0
 
 
 class Kept(NamedTuple):
-    """The stiffness of each run is kept."""
+    """What tells whether a run can be trusted is kept."""
 
 
 class Dropped(NamedTuple):
     """It is not."""
 
 
+class Trust(NamedTuple):
+    """What tells whether a run can be trusted: its largest stiffness, and the least :func:`slack` of its steps."""
+
+    stiffness: Any
+    slack: Any
+
+
 @inner_hook
-def _stiffer(account, scene, worst, before, now, h):
-    """Stiffness of a run after a step, given what it was."""
+def _trusted(account, scene, trust, before, now, h):
+    """Trust in a run after a step that its guards outlast, given what it was."""
 
 
-@_stiffer.implements(Kept)
-def _keep(account, scene, worst, before, now, h):
-    return max(worst, stiffness(scene, before, now, h))
+@_trusted.implements(Kept)
+def _keep(account, scene, trust, before, now, h):
+    return Trust(max(trust.stiffness, stiffness(scene, before, now, h)), min(trust.slack, slack(scene, before, now)))
 
 
-@_stiffer.implements(Dropped)
-def _drop(account, scene, worst, before, now, h):
-    return worst
+@_trusted.implements(Dropped)
+def _drop(account, scene, trust, before, now, h):
+    return trust
 
 
 class _Run(NamedTuple):
@@ -148,7 +169,7 @@ class _Run(NamedTuple):
     y: Any
     now: Any
     record: Any
-    stiffness: Any
+    trust: Any
     live: Any
 
 
@@ -223,7 +244,7 @@ def _advance(kind, account, batch, memory, at, seated, sample, table, first, k, 
     align_stack()
     runs_at = at + width(kind) * size_of(take(batch, seated[0]))
     scene = _scene(kind, batch, seated[0], memory, at)
-    y, now, record, worst, live = gather(kind, memory, runs_at, sample)
+    y, now, record, trust, live = gather(kind, memory, runs_at, sample)
     while k < steps:
         y_next = _step(scene, y, now, table, 2 * k, h)
         theta, ring_omega = lookup(scene.drive, table, 2 * k + 2)
@@ -232,11 +253,11 @@ def _advance(kind, account, batch, memory, at, seated, sample, table, first, k, 
         if any_of(ended):
             live = select(ended, ENDING, live)
             break
-        worst = _stiffer(account, scene, worst, now, after, h)
+        trust = conform(_trusted(account, scene, trust, now, after, h), trust)
         record = conform(observe(scene, record, y_next, now, after, (first + k + 1) * h, h), record)
         y, now, live = y_next, after, abs(live)
         k += 1
-    write(memory, runs_at, width(kind), _Run(y, now, record, worst, live))
+    write(memory, runs_at, width(kind), _Run(y, now, record, trust, live))
     return k
 
 
@@ -258,24 +279,25 @@ def _part(kind, account, batch, memory, at, seated, sample, table, first, k, h, 
             live = EXCUSED
             if status != RUNNING:
                 live = GONE
-                worst = _stiffer(account, scene, run.stiffness, run.now, after, h)
+                trust = _trusted(account, scene, run.trust, run.now, after, h)
                 y_end = _hermite(run.y, run.now.rates, y_next, after.rates, h, fraction)
                 t = (first + k + fraction) * h
                 record = observe(scene, run.record, y_end, run.now, after, t, fraction * h)
-                _conclude(scene, record, status, t, y_end, first + k + 1.0, worst, seated[lane], rows, report)
-            write(memory, place, width(kind), _Run(run.y, run.now, run.record, run.stiffness, live))
+                trust = Trust(trust.stiffness, run.trust.slack)
+                fall = falls(scene, run.now, after, h)
+                _conclude(scene, record, status, t, y_end, first + k + 1.0, trust, fall, seated[lane], rows, report)
+            write(memory, place, width(kind), _Run(run.y, run.now, run.record, run.trust, live))
         left += int(live != GONE)
     return left
 
 
 @inlined
-def _conclude(scene, record, status, t, y, steps, worst, cell, rows, report):
+def _conclude(scene, record, status, t, y, steps, trust, fall, cell, rows, report):
     """Enter the outcome of a run."""
     outcome = conclude(scene, record, status, t, y)
     for column in range(len(outcome)):
         rows[cell, column] = outcome[column]
-    report[cell, 0] = steps
-    report[cell, 1] = worst
+    report[cell, 0], report[cell, 1], report[cell, 2], report[cell, 3] = steps, trust.stiffness, trust.slack, fall
 
 
 def integrate(
@@ -295,14 +317,15 @@ def integrate(
     kind : Single or Several
         How many runs stand side by side.
     account : Kept or Dropped
-        Whether the stiffness is kept.
+        Whether stiffness and slack are kept.
     batch : NamedTuple
         Scenes; where several stand side by side, :func:`ringsweep.lanes.side_by_side` and with their drive
         :func:`ringsweep.physics.drives.scaled`.
     drive : NamedTuple
         The drive of one of the cells.
-    rows, report : ndarray of shape ``(cells of the batch, outcomes)`` and ``(cells of the batch, 2)``
-        Filled for these cells: outcomes; number of steps and stiffness.
+    rows, report : ndarray of shape ``(cells of the batch, outcomes)`` and ``(cells of the batch, 4)``
+        Filled for these cells: outcomes; number of steps, stiffness, least slack, and how fast the guard fell by which
+        the run ended.
     """
     h = float(batch.span[cells[0]]) / steps
     table = np.empty((2 * min(_BLOCK, steps) + 1, 2))
@@ -341,7 +364,7 @@ def _begin(kind, batch, cells, table, rows, report):
         run = _begun(scene, theta, ring_omega)
         status, _ = verdict(scene, run.now, run.now)
         if status != RUNNING:
-            _conclude(scene, run.record, status, 0.0, run.y, 0.0, 0.0, i, rows, report)
+            _conclude(scene, run.record, status, 0.0, run.y, 0.0, run.trust, 0.0, i, rows, report)
             continue
         _seat(kind, seats, live // per * lines * per + live % per, scene, run)
         seated[live] = i
@@ -387,7 +410,7 @@ def _complete(kind, batch, memory, seated, live, steps, rows, report):
         scene = take(batch, cell)
         run = read(seats, (seat // per * lines + size_of(scene)) * per + seat % per, per, _begun(scene, 0.0, 0.0))
         # The end of the span, not the rounding of a sum of steps.
-        _conclude(scene, run.record, COMPLETE, scene.span, run.y, float(steps), run.stiffness, cell, rows, report)
+        _conclude(scene, run.record, COMPLETE, scene.span, run.y, float(steps), run.trust, 0.0, cell, rows, report)
 
 
 @inlined
@@ -395,7 +418,7 @@ def _begun(scene, theta, ring_omega):
     """A run at its launch; with the drive anywhere, a sample of what runs of such scenes are made of."""
     y = launch(scene)
     now = inspect(scene, y, theta, ring_omega)
-    return _Run(y, now, begin(scene, y, now), 0.0, LIVE)
+    return _Run(y, now, begin(scene, y, now), Trust(0.0, inf), LIVE)
 
 
 @kernel

@@ -171,3 +171,14 @@ def dense(x, x_next, stages, fraction):
     # rest x + fraction (x_next + rest total)
     end = add_scaled(x_next, rest, total)
     return add_scaled(add_scaled(zero(x), rest, x), fraction, end)
+
+
+@inlined
+def dense_rates(x, x_next, stages, fraction, h):
+    """Time derivative of :func:`dense`, of a step of length `h`."""
+    total, rate = zero(x), zero(x)
+    for row in range(2, -1, -1):
+        rate = add_scaled(total, fraction, rate)
+        total = add_scaled(combine(zero(x), DENSE[row], stages, STAGES), fraction, total)
+    change = add_scaled(add_scaled(x_next, -1.0, x), 1.0 - 2.0 * fraction, total)
+    return add_scaled(zero(x), 1.0 / h, add_scaled(change, fraction * (1.0 - fraction), rate))

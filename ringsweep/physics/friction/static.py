@@ -12,7 +12,7 @@ and values, slopes, power series and regions all follow from it.
 
 from __future__ import annotations
 
-from math import exp
+from math import exp, sqrt
 from typing import NamedTuple
 
 from ringsweep.jit import hook, inlined, inner_hook
@@ -204,3 +204,15 @@ def expand_weights(law, region, x, k, basis, static, kinetic):
     if k == 0:
         static[0] += s0
         kinetic[0] += k0
+
+
+# Powers of e by which an exponential may change within a step of its series: of more the terms still grow where the
+# series ends, and say nothing of what is left out.
+_POWERS = 8.0
+
+
+@inlined
+def tail_reach(law, region, v, h):
+    """A step not above `h`, short enough for the series of the weights; `v` is the series of the sliding velocity."""
+    decay = piece(law, region).decay
+    return min(h, min(0.5 * _POWERS / (decay * abs(v[1])), sqrt(0.5 * _POWERS / (decay * abs(v[2])))))

@@ -1,0 +1,86 @@
+"""An independent answer to a scene, and how sure it is: nothing of the package is used.
+
+The balances of momentum are solved anew and integrated by Radau IIA; at rest and wherever friction jumps the
+contact problem is a choice among all of its modes. Each scene is run four times: with tight tolerances, with
+tolerances a hundred times as wide, and twice more with all friction, all thresholds of the reactions (in weights of
+the body), the full turn and (a thousand times that) the threshold of a reversal moved up or down by a millionth
+(once, contacts under a drive whose acceleration is infinite at 0 are looked at then, instead of an instant later).
+Where these do not agree on the kind, the problem itself is ambiguous.
+"""
+
+from dataclasses import dataclass, field
+
+from benchmarks.reference.physics import JAMMED, OPEN_1, OPEN_2, OPEN_BOTH, SEVERAL
+from benchmarks.reference.problem import problem
+from benchmarks.reference.run import RESULT, UNRESOLVED, run
+
+TIGHT, LOOSE, SHIFT = 1e-9, 1e-7, 1e-6
+MOST_STEPS = 60_000
+#: Variations of a scene: tolerance and shift of everything that a verdict may hang by.
+VARIATIONS = ((TIGHT, 0.0), (LOOSE, 0.0), (LOOSE, SHIFT), (LOOSE, -SHIFT))
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the reference says of a scene.
+
+    `state` is ``clear``, ``ambiguous`` or ``unresolved``; `kind` regime, motion and separating contact (None on the
+    belt); `numbers` the outcomes, and `spread` by how much the two tolerances differ in each; `why` is for a reader.
+    """
+
+    state: str
+    kind: tuple | None
+    numbers: dict
+    spread: dict
+    why: str
+    runs: list = field(repr=False, default_factory=list)
+
+
+def _kind(found):
+    motion = "revolving" if found["turned"] else "oscillatory" if found["reversals"] else "resting"
+    end = found["end"]
+    if end in (OPEN_1, OPEN_2, OPEN_BOTH):
+        return "separating", motion, end - OPEN_1 + 1
+    return ("jammed" if end in (JAMMED, SEVERAL) else motion), motion, 0
+
+
+def _numbers(found, belt):
+    if belt:
+        return {"x_end": found["position"], "velocity_end": found["speed"], "t_end": found["t_end"]}
+    apart = found["end"] in (OPEN_1, OPEN_2, OPEN_BOTH)
+    return {
+        "t_end": found["t_end"],
+        "phi_end": found["position"],
+        "omega_end": found["speed"],
+        "t_separation": found["t_end"] if apart else float("nan"),
+    }
+
+
+def judge(scene):
+    """Verdict on a scene (a mapping as the package takes it, numbers only)."""
+    belt = scene["model"] == "belt"
+    runs = []
+    for rtol, shift in VARIATIONS[: 2 if belt else 4]:
+        found = dict(zip(RESULT, run(problem(scene, 1.0 + shift), rtol, shift, shift, MOST_STEPS), strict=True))
+        runs.append(found)
+        if found["end"] == UNRESOLVED:
+            why = f"stopped at {found['t_end']:.6g} s after {found['steps']} steps and {found['events']} events"
+            return Verdict("unresolved", None, {}, {}, why, runs)
+    first, second = runs[:2]
+    numbers, other = _numbers(first, belt), _numbers(second, belt)
+    spread = {name: abs(numbers[name] - other[name]) for name in numbers}
+    if belt:
+        return Verdict("clear", None, numbers, spread, f"ends at {numbers['x_end']:.9g} m", runs)
+    kinds = [_kind(found) for found in runs]
+    if first["end"] in (OPEN_1, OPEN_2, OPEN_BOTH):
+        why = f"contact {kinds[0][2]} leaves at {first['t_end']:.9g} s, {first['position']:.6g} rad"
+        why = why.replace("contact 3 leaves", "both contacts leave")
+    elif first["end"] in (JAMMED, SEVERAL):
+        why = f"jams at {first['t_end']:.9g} s, {first['position']:.6g} rad"
+    else:
+        why = f"holds, least reactions in sliding {first['least_1']:.3g} and {first['least_2']:.3g} weights"
+    if any(kind != kinds[0] for kind in kinds):
+        return Verdict("ambiguous", kinds[0], numbers, spread, " / ".join(map(str, dict.fromkeys(kinds))), runs)
+    if any(found["end"] == SEVERAL for found in runs):
+        return Verdict("ambiguous", kinds[0], numbers, spread, "several contacts could leave", runs)
+    return Verdict("clear", kinds[0], numbers, spread, f"{why}; {first['reversals']:.0f} reversals", runs)

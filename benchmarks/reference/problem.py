@@ -1,0 +1,155 @@
+"""A scene as the numbers that the compiled reference takes."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+TURN = 2.0 * math.pi
+
+RING, SINGLE, BELT = range(3)
+MODELS = ("ring", "ring-single-contact", "belt")
+
+# Set-valued at rest (the first three), functions of the sliding speed, with bristles.
+COULOMB, STICTION, TUSTIN, KARNOPP, THRELFALL, LINEAR, CUBIC, BENGISU, DAHL, LUGRE, ELASTO, RESET = range(12)
+LAWS = (
+    "coulomb", "stiction", "tustin", "karnopp", "threlfall", "piecewise-linear", "piecewise-cubic", "bengisu-akay",
+    "dahl", "lugre", "elasto-plastic", "reset-integrator",
+)  # fmt: skip
+
+NONE, CONSTANT, ARCTAN, POWER, SINUSOIDAL, TABLE = range(6)
+DRIVES = ("none", "constant", "arctan", "power", "sinusoidal", "table")
+
+
+class Problem(NamedTuple):
+    """A scene in SI units.
+
+    Angles `edges` part the ring into segments with coefficients `mu_s` and `mu_k`, each from its edge to the next.
+    On the belt there is one segment, both coefficients are forces, and the radius is 1.
+    """
+
+    model: int
+    law: int
+    mass: float
+    inertia: float
+    xi: float
+    beta: float
+    radius: float
+    half_distance: float
+    ball_radius: float
+    gravity: float
+    stiffness: float
+    viscous: float
+    edges: np.ndarray
+    mu_s: np.ndarray
+    mu_k: np.ndarray
+    alpha: float
+    v0: float
+    v1: float
+    v_s: float
+    dead_band: float
+    sigma0: float
+    sigma1: float
+    sigma2: float
+    elastic: float
+    drive: int
+    amplitude: float
+    exponent: float
+    frequency: float
+    phase: float
+    knots: np.ndarray
+    pieces: np.ndarray
+    position: float
+    speed: float
+    at_rest: bool
+    span: float
+    epsilon: float
+
+
+def segments(arcs, rest):
+    """Edges of the ring's segments, and coefficients on each; where arcs overlap the later one holds.
+
+    Parameters
+    ----------
+    arcs : list of (center, half_angle, mu_s, mu_k)
+    rest : (mu_s, mu_k)
+
+    """
+    ends = [0.0] + [(c + side * h) % TURN for c, h, _, _ in arcs if 0.0 < h < math.pi for side in (-1.0, 1.0)]
+    edges = np.unique([0.0 if end == TURN else end for end in ends])
+    middles = 0.5 * (edges + np.append(edges[1:], TURN))
+    values = []
+    for x in middles:
+        here = rest
+        for center, half, mu_s, mu_k in arcs:
+            if (x - center + half) % TURN < 2.0 * half:
+                here = (mu_s, mu_k)
+        values.append(here)
+    return edges, *np.array(values).T.copy()
+
+
+def coefficients(values):
+    """Static and kinetic coefficient; laws that know one take it for both."""
+    mu_k = float(values["mu_k"])
+    return float(values.get("mu_s", mu_k)), mu_k
+
+
+def problem(scene, grip=1.0):
+    """Problem of a scene, all coefficients of friction times `grip`.
+
+    Parameters
+    ----------
+    scene : mapping
+        As the package takes it, numbers only (SI).
+    grip : float
+
+    """
+    body, friction, drive = scene["body"], scene["friction"], dict(scene.get("drive", {"law": "none"}))
+    model, gravity = MODELS.index(scene["model"]), float(scene.get("gravity", 9.81))
+    initial, mass, law = scene.get("initial", {}), float(body["mass"]), LAWS.index(friction["law"])
+    inertia = xi = beta = half = ball = stiffness = 0.0
+    radius = 1.0
+    if model == RING:
+        half, ball, inertia = float(body["half_distance"]), float(body["ball_radius"]), float(body["inertia"])
+        radius = float(scene["ring"]["radius"]) if "ring" in scene else ball + half / math.sin(float(body["beta"]))
+        beta = math.asin(half / (radius - ball))
+        xi = (radius - ball) * math.cos(beta)
+    elif model == SINGLE:
+        radius = float(scene["ring"]["radius"])
+    else:
+        stiffness = float(scene["spring"]["stiffness"])
+        if "belt" in scene:
+            drive = {"law": "constant", "amplitude": scene["belt"]["velocity"]}
+    if model == BELT:
+        weight = mass * gravity
+        edges, mu_s, mu_k = np.zeros(1), *(np.array([value * weight]) for value in coefficients(friction))
+    else:
+        arcs = [
+            (float(arc.get("center", 0.0)), float(arc["half_angle"]), *coefficients(arc))
+            for arc in scene.get("zones", [])
+        ]
+        if "zone" in scene:
+            arcs = [
+                (float(scene["zone"].get("center", 0.0)), float(scene["zone"]["half_angle"]),
+                 *coefficients(friction["rough"]))
+            ]  # fmt: skip
+        edges, mu_s, mu_k = segments(arcs, coefficients(friction["rest"]))
+    knots, pieces = np.zeros(2), np.zeros((4, 1))
+    if drive["law"] == "table":
+        spline = CubicSpline(np.asarray(drive["time"], float), np.asarray(drive["theta"], float), bc_type="not-a-knot")
+        knots, pieces = np.ascontiguousarray(spline.x), np.ascontiguousarray(spline.c)
+    number = {name: float(friction.get(name, 0.0)) for name in ("alpha", "v0", "v1", "v_s", "dead_band")}
+    bristles = {name: float(friction.get(name, 0.0)) for name in ("sigma0", "sigma1", "sigma2")}
+    position, speed = initial.get("phi", initial.get("x", 0.0)), initial.get("omega", initial.get("velocity"))
+    at_rest = speed is None and model == BELT
+    return Problem(
+        model=model, law=law, mass=mass, inertia=inertia, xi=xi, beta=beta, radius=radius, half_distance=half,
+        ball_radius=ball, gravity=gravity, stiffness=stiffness, viscous=float(friction.get("viscous", 0.0)),
+        edges=edges, mu_s=mu_s * grip, mu_k=mu_k * grip, **number, **bristles,
+        elastic=float(friction.get("elastic_fraction", 0.7)), drive=DRIVES.index(drive["law"]),
+        amplitude=float(drive.get("amplitude", 1.0)), exponent=float(drive.get("exponent", 0.0)),
+        frequency=float(drive.get("frequency", 0.0)), phase=float(drive.get("phase", 0.0)), knots=knots, pieces=pieces,
+        position=float(position), speed=float(speed or 0.0), at_rest=at_rest, span=float(scene["time"]["span"]),
+        epsilon=float(scene.get("classify", {}).get("epsilon_omega", 1e-3)),
+    )  # fmt: skip

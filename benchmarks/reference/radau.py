@@ -1,0 +1,122 @@
+"""One step of Radau IIA, order 5, with its collocation polynomial and an estimate of its error."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from benchmarks.reference.physics import factor, rates, substitute
+
+_S = math.sqrt(6.0)
+NODES = np.array([(4.0 - _S) / 10.0, (4.0 + _S) / 10.0, 1.0])
+WEIGHTS = np.array(
+    [
+        [(88.0 - 7.0 * _S) / 360.0, (296.0 - 169.0 * _S) / 1800.0, (-2.0 + 3.0 * _S) / 225.0],
+        [(296.0 + 169.0 * _S) / 1800.0, (88.0 + 7.0 * _S) / 360.0, (-2.0 - 3.0 * _S) / 225.0],
+        [(16.0 - _S) / 36.0, (16.0 + _S) / 36.0, 1.0 / 9.0],
+    ]
+)
+# Real eigenvalue of the inverse of WEIGHTS, and the combination of stages that estimates the error with it.
+GAMMA = 1.0 / (3.0 + 3.0 ** (2.0 / 3.0) - 3.0 ** (1.0 / 3.0))
+ESTIMATE = np.array([-13.0 - 7.0 * _S, -13.0 + 7.0 * _S, -1.0]) / 3.0
+
+
+@njit(cache=True, error_model="numpy")
+def interpolate(y, Z, x, n, out):
+    """The collocation polynomial at a share x of the step, into out."""
+    c1, c2, c3 = NODES
+    l1 = x * (x - c2) * (x - c3) / (c1 * (c1 - c2) * (c1 - c3))
+    l2 = x * (x - c1) * (x - c3) / (c2 * (c2 - c1) * (c2 - c3))
+    l3 = x * (x - c1) * (x - c2) / (c3 * (c3 - c1) * (c3 - c2))
+    for i in range(n):
+        out[i] = y[i] + l1 * Z[0, i] + l2 * Z[1, i] + l3 * Z[2, i]
+
+
+@njit(cache=True, error_model="numpy")
+def jacobian(p, k1, k2, piece, t, y, f, scale, n, J, work):
+    """Jacobian of the rates by differences, into J."""
+    y_, f_ = work[0], work[1]
+    for j in range(n):
+        y_[:] = y
+        delta = 1e-7 * scale[j]
+        y_[j] += delta
+        delta = y_[j] - y[j]
+        rates(p, k1, k2, piece, t, y_, f_)
+        for i in range(n):
+            J[i, j] = (f_[i] - f[i]) / delta
+
+
+@njit(cache=True, error_model="numpy")
+def norm(b, rtol, scale, n):
+    """Size of an error in units of the tolerance; not a number where one of its parts is none."""
+    total = 0.0
+    for i in range(n):
+        total += (b[i] / (rtol * scale[i])) ** 2
+    return math.sqrt(total)
+
+
+@njit(cache=True, error_model="numpy")
+def attempt(p, k1, k2, piece, t, h, y, f, J, scale, rtol, n, Z, A, order, b, work):
+    """Stages of a step of h from y, whose rates are f, into Z (which comes with a guess).
+
+    Returns the error in units of the tolerance; infinite where Newton's iteration does not converge.
+    """
+    m = 3 * n
+    for r in range(3):
+        for c in range(3):
+            for i in range(n):
+                for j in range(n):
+                    A[r * n + i, c * n + j] = -h * WEIGHTS[r, c] * J[i, j]
+    for i in range(m):
+        A[i, i] += 1.0
+    factor(A, order, m)
+    F, y_ = work[:3], work[3]
+    y_[:] = y
+    last, done = math.inf, False
+    for iteration in range(15):
+        for r in range(3):
+            for i in range(n):
+                y_[i] = y[i] + Z[r, i]
+            rates(p, k1, k2, piece, t + NODES[r] * h, y_, F[r])
+        for r in range(3):
+            for i in range(n):
+                b[r * n + i] = -Z[r, i] + h * (
+                    WEIGHTS[r, 0] * F[0, i] + WEIGHTS[r, 1] * F[1, i] + WEIGHTS[r, 2] * F[2, i]
+                )
+        substitute(A, order, b, m)
+        size = 0.0
+        for r in range(3):
+            for i in range(n):
+                Z[r, i] += b[r * n + i]
+                size += (b[r * n + i] / (rtol * scale[i])) ** 2
+        size = math.sqrt(size)
+        if not size < 1e30:
+            return math.inf
+        # To a thousandth of the tolerance, or as far as rounding lets it.
+        if size < 1e-3 or (iteration > 3 and size > 0.5 * last and size < 0.1):
+            done = True
+            break
+        if iteration > 4 and size > 2.0 * last:
+            return math.inf
+        last = size
+    if not done:
+        return math.inf
+    for i in range(n):
+        for j in range(n):
+            A[i, j] = -h * GAMMA * J[i, j]
+        A[i, i] += 1.0
+    factor(A, order, n)
+    for i in range(n):
+        b[i] = GAMMA * (h * f[i] + ESTIMATE[0] * Z[0, i] + ESTIMATE[1] * Z[1, i] + ESTIMATE[2] * Z[2, i])
+    substitute(A, order, b, n)
+    error = norm(b, rtol, scale, n)
+    # Where the problem is stiff the first estimate is too large: once more, from the state that it moves to.
+    if not error <= 1.0:
+        for i in range(n):
+            y_[i] = y[i] + b[i]
+        rates(p, k1, k2, piece, t, y_, F[0])
+        for i in range(n):
+            b[i] = GAMMA * (h * F[0, i] + ESTIMATE[0] * Z[0, i] + ESTIMATE[1] * Z[1, i] + ESTIMATE[2] * Z[2, i])
+        substitute(A, order, b, n)
+        error = norm(b, rtol, scale, n)
+    return error if error < 1e30 else math.inf

@@ -1,0 +1,451 @@
+"""A run: modes one after the other, every inequality watched at twenty instants of each step, every event located."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from benchmarks.reference.physics import (
+    BACKWARD,
+    FORWARD,
+    JAMMED,
+    LEAST_INERTIA,
+    OPEN_1,
+    OPEN_2,
+    OPEN_BOTH,
+    STICK,
+    bound,
+    corners,
+    drive,
+    falls_at_rest,
+    is_set_valued,
+    load_on_band,
+    lower_segments,
+    piece_of,
+    rates,
+    resting_problem,
+    segment,
+    sliding_problem,
+    state,
+    steady,
+    stick_reserve,
+)
+from benchmarks.reference.problem import BELT, DAHL, KARNOPP, NONE, POWER, RESET, RING, SINUSOIDAL, TABLE, TURN
+from benchmarks.reference.radau import NODES, attempt, interpolate, jacobian
+
+#: How a run may end, besides the contact problem's own words; and a reaction that sinks on, but opens no gap.
+HELD, UNRESOLVED = 0, 7
+SAMPLES = 20
+#: What :func:`run` returns, in this order.
+RESULT = (
+    "end", "t_end", "position", "speed", "reversals", "turned", "least_1", "least_2", "steps", "events",
+)  # fmt: skip
+# The guards: reactions, determinant, effective inertia, edges of the piece, edges of both segments, bristles.
+_N1, _N2, _D, _INERTIA, _SLOWER, _FASTER, _EDGE_1, _EDGE_2, _BRISTLE, _COUNT = range(10)
+
+
+@njit(cache=True, error_model="numpy")
+def observe(p, track, phi, omega, slack):
+    """Follow sense and reversals, and how far the body has turned since the last; slack moves the thresholds."""
+    before, last = track[4], track[5]
+    peak = omega
+    bend = before - 2.0 * last + omega
+    if (last - before) * (last - omega) > 0.0 and bend != 0.0:
+        peak = last - 0.125 * (omega - before) ** 2 / bend
+    track[4], track[5] = last, omega
+    epsilon = p.epsilon * (1.0 + 1e3 * slack)
+    track[2], track[3] = min(track[2], phi), max(track[3], phi)
+    for w in (peak, omega):
+        if w > epsilon and track[0] <= 0.0:
+            if track[0] < 0.0:
+                track[1] += 1.0
+                track[3] = phi
+            track[0] = 1.0
+        elif w < -epsilon and track[0] >= 0.0:
+            if track[0] > 0.0:
+                track[1] += 1.0
+                track[2] = phi
+            track[0] = -1.0
+
+
+@njit(cache=True, error_model="numpy")
+def guard(p, k1, k2, piece, t, y, least, g):
+    """What must stay positive within a mode, into g."""
+    _, _, _, N1, N2, D, effective, _, _, _ = state(p, k1, k2, piece, t, y)
+    weight = p.mass * p.gravity
+    g[:] = 1.0
+    if p.model != BELT:
+        g[_N1], g[_D], g[_INERTIA] = N1 / weight - least, D, effective - LEAST_INERTIA
+        g[_N2] = N2 / weight - least
+        if piece > 0:
+            g[_EDGE_1] = bound(p, k1 + 1) - (y[0] - p.beta)
+            g[_EDGE_2] = bound(p, k2 + 1) - (y[0] + p.beta)
+        else:
+            g[_EDGE_1] = y[0] - p.beta - bound(p, k1)
+            g[_EDGE_2] = y[0] + p.beta - bound(p, k2)
+        if p.model != RING:
+            g[_N2] = g[_EDGE_2] = 1.0
+    speed = y[1] if piece > 0 else -y[1]
+    low, high = corners(p, piece)
+    # A law that is continuous at a corner may be looked at a rounding too far.
+    slack = 0.0 if is_set_valued(p) else 1e-12 * (abs(low) if low != 0.0 else (high if high < math.inf else 1e-6))
+    g[_SLOWER] = speed - low + slack
+    if high < math.inf:
+        g[_FASTER] = high - speed + 1e-12 * high
+    if p.law == RESET and abs(piece) == 1:
+        z = y[2] if piece > 0 else -y[2]
+        g[_BRISTLE] = p.mu_s[0] / p.sigma0 - z
+    if p.law == KARNOPP and abs(piece) != 2:
+        load = load_on_band(p, t, y)
+        g[_BRISTLE] = p.mu_s[0] - abs(load) if abs(piece) == 1 else load * piece / 3.0 - p.mu_s[0]
+        g[_BRISTLE] += 1e-12 * p.mu_s[0]
+
+
+@njit(cache=True, error_model="numpy")
+def root(p, k1, k2, piece, t, h, y, Z, n, least, low, high, which, g, y_):
+    """Share of a step at which a guard (any, if `which` is negative) comes to zero between two shares."""
+    y_[:] = y
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if not low < middle < high:
+            break
+        interpolate(y, Z, middle, n, y_)
+        guard(p, k1, k2, piece, t + middle * h, y_, least, g)
+        if (g[which] if which >= 0 else g.min()) <= 0.0:
+            high = middle
+        else:
+            low = middle
+    return high
+
+
+@njit(cache=True, error_model="numpy")
+def passage(p, k1, k2, t, y, least):
+    """A launch whose sliding velocity is left at once (the drive's acceleration is infinite at 0): what it meets.
+
+    The velocity goes from that of the launch to that at `t` in no time, and the friction with it.
+    """
+    y_, last = y.copy(), y[1]
+    y_[1] = 0.0
+    first = drive(p, 0.0)[1] - drive(p, t)[1]
+    begin = last - p.radius * first
+    for i in range(401):
+        x = (i / 400.0) ** 6
+        y_[1] = begin + (last - begin) * x
+        piece = piece_of(p, y_[1])
+        found = sliding_problem(p, k1, k2, piece, 0.0, y_, least)
+        if found != FORWARD and found != BACKWARD:
+            return found
+    return STICK
+
+
+@njit(cache=True, error_model="numpy")
+def after_stick(p, k1, k2, t, rho, least):
+    """What follows where the body can stick no more: the mode, and the instant at which it is plain."""
+    if falls_at_rest(p):
+        found = resting_problem(p, k1, k2, t, rho, least)
+        if found != STICK and found != JAMMED:
+            return found, t
+    found = JAMMED
+    for delay in (1e-10, 1e-8, 1e-6):
+        found = resting_problem(p, k1, k2, t + delay, rho, least)
+        if found != JAMMED:
+            return found, t + delay
+    return found, t
+
+
+@njit(cache=True, error_model="numpy")
+def run(p, rtol, least, slack, most_steps):
+    """Run a scene.
+
+    Parameters
+    ----------
+    p : Problem
+    rtol : float
+        Tolerance of a step's embedded estimate, which is two orders lower than the step.
+    least : float
+        Reaction at which a contact is lost, in weights of the body.
+    slack : float
+        By how much the thresholds of a turn (a share) and of a reversal (a thousand times that) are moved.
+    most_steps : int
+
+    Returns
+    -------
+    tuple
+        See ``RESULT``.
+
+    """
+    set_valued, span = is_set_valued(p), p.span
+    n = 2 if p.law < DAHL else (4 if p.model == RING else 3)
+    y, y_, f = np.zeros(4), np.zeros(4), np.zeros(4)
+    Z, Z_, previous = np.zeros((3, 4)), np.zeros((3, 4)), np.zeros(4)
+    J, A, order, b, work = np.zeros((4, 4)), np.zeros((12, 12)), np.zeros(12, np.int64), np.zeros(12), np.zeros((4, 4))
+    G, g, scale = np.zeros((SAMPLES + 2, _COUNT)), np.zeros(_COUNT), np.ones(4)
+    least_1 = least_2 = math.inf
+
+    # Launch. Where the drive's acceleration is infinite at 0, what it does before an instant is below notice; only
+    # one variation, that with positive slack, asks what contacts can do at 0 itself.
+    t, instant = 0.0, 0.0
+    if p.drive == POWER and p.exponent < 2.0:
+        instant = 1e-14 if p.exponent < 1.5 else 1e-10
+    theta, ring_omega, _ = drive(p, t)
+    y[0] = p.position - theta
+    speed = ring_omega if p.at_rest else p.speed
+    y[1] = (speed - ring_omega) * p.radius
+    if abs(speed - ring_omega) <= 4e-16 * max(abs(speed), abs(ring_omega), p.amplitude if p.drive != NONE else 0.0):
+        y[1] = 0.0
+    track = np.array([0.0, 0.0, p.position, p.position, speed, speed])
+    observe(p, track, p.position, speed, slack)
+    k1, k2 = segment(p, y[0] - p.beta), segment(p, y[0] + p.beta)
+    if y[1] < 0.0:
+        k1, k2 = lower_segments(p, k1, k2, y[0])
+    if p.law >= DAHL and p.model != BELT and y[1] != 0.0:
+        m = p.edges.size
+        for i, k in ((2, k1), (3, k2)):
+            y[i] = math.copysign(steady(p, y[1], p.mu_s[k % m], p.mu_k[k % m]) / p.sigma0, y[1])
+    piece, end = piece_of(p, y[1]), STICK
+    if set_valued and y[1] == 0.0:
+        mode = resting_problem(p, k1, k2, 0.0 if slack > 0.0 else instant, y[0], least)
+    else:
+        mode = sliding_problem(p, k1, k2, piece, t, y, least)
+    t = instant
+    if instant > 0.0 and mode != STICK:
+        theta, ring_omega, _ = drive(p, t)
+        y[0], y[1] = p.position + speed * t - theta, (speed - ring_omega) * p.radius
+        if mode in (FORWARD, BACKWARD):
+            if p.model != BELT and not set_valued:
+                found = passage(p, k1, k2, t, y, least)
+                if found != STICK:
+                    mode = found
+            if not set_valued:
+                piece = piece_of(p, y[1])
+    if set_valued and mode in (FORWARD, BACKWARD):
+        piece = mode
+    if mode == BACKWARD and p.model != BELT:
+        k1, k2 = lower_segments(p, k1, k2, y[0])
+
+    # Scales of the tolerance: radians (metres), sliding velocity, bristles.
+    slow = 1e-2 * p.radius
+    if p.v0 > 0.0:
+        slow = min(slow, p.v0)
+    if p.v_s > 0.0:
+        slow = min(slow, p.v_s)
+    if p.law >= DAHL:
+        scale[2] = scale[3] = p.mu_k.min() / p.sigma0
+        if p.model != BELT:
+            slow = min(slow, 1.0 / (p.sigma1 + p.sigma2 + 1e-9))
+    longest = span / 20.0
+    if p.drive == SINUSOIDAL:
+        longest = min(longest, 0.05 / p.frequency)
+    h, before, steps, events, stalled = min(1e-4, longest), 0.0, 0, 0, 0
+
+    while t < span:
+        if mode > FORWARD:
+            end = mode
+            break
+        if steps > most_steps or events > 20000:
+            end = UNRESOLVED
+            break
+        if mode == STICK:
+            # The body goes with the ring; nothing is left but to look how long.
+            y[1] = 0.0
+            dt, low, broke = longest / SAMPLES, t, False
+            older, old = math.inf, stick_reserve(p, k1, k2, t, y[0], least)
+            while t < span and not broke:
+                high = min(t + dt, span)
+                new = stick_reserve(p, k1, k2, high, y[0], least)
+                if new <= 0.0:
+                    low, broke = t, True
+                elif old < older and old < new:
+                    # A least value between the looks: it may dip below zero. Golden section.
+                    a_, b_ = max(t - dt, low), high
+                    for _ in range(40):
+                        c_, d_ = b_ - 0.6180339887 * (b_ - a_), a_ + 0.6180339887 * (b_ - a_)
+                        if stick_reserve(p, k1, k2, c_, y[0], least) < stick_reserve(p, k1, k2, d_, y[0], least):
+                            b_ = d_
+                        else:
+                            a_ = c_
+                    if stick_reserve(p, k1, k2, a_, y[0], least) <= 0.0:
+                        low, high, broke = max(t - dt, low), a_, True
+                if broke:
+                    for _ in range(80):
+                        middle = 0.5 * (low + high)
+                        if not low < middle < high:
+                            break
+                        if stick_reserve(p, k1, k2, middle, y[0], least) <= 0.0:
+                            high = middle
+                        else:
+                            low = middle
+                theta, ring_omega, _ = drive(p, high)
+                observe(p, track, y[0] + theta, ring_omega, slack)
+                steps += 1
+                t, older, old = high, old, new
+            if broke:
+                events += 1
+                track[5] = math.nan
+                mode, t = after_stick(p, k1, k2, t, y[0], least)
+                if mode == STICK:
+                    stalled += 1
+                    if stalled > 1000:
+                        end = UNRESOLVED
+                        break
+                    t = t + 1e-9
+                elif mode in (FORWARD, BACKWARD):
+                    piece = mode
+                    if mode == BACKWARD and p.model != BELT:
+                        k1, k2 = lower_segments(p, k1, k2, y[0])
+            before = 0.0
+            h = min(1e-4, longest)
+            continue
+
+        # A step of sliding.
+        scale[1] = abs(y[1]) + slow
+        rates(p, k1, k2, piece, t, y, f)
+        jacobian(p, k1, k2, piece, t, y, f, scale, n, J, work)
+        limit = span
+        if p.drive == TABLE:
+            for knot in p.knots:
+                if knot > t + 1e-12:
+                    limit = min(limit, knot)
+                    break
+        error = math.inf
+        while True:
+            h = min(h, longest)
+            last = t + h >= limit - 1e-13 * span
+            step = limit - t if last else h
+            if before > 0.0:
+                for i in range(3):
+                    interpolate(previous, Z, 1.0 + NODES[i] * step / before, n, y_)
+                    for j in range(n):
+                        Z_[i, j] = y_[j] - y[j]
+            else:
+                for i in range(3):
+                    for j in range(n):
+                        Z_[i, j] = 0.0
+            error = attempt(p, k1, k2, piece, t, step, y, f, J, scale, rtol, n, Z_, A, order, b, work)
+            steps += 1
+            if error <= 1.0 or step < 1e-17 or steps > most_steps:
+                break
+            before = 0.0
+            h = step * (0.1 if error == math.inf else max(0.1, 0.9 * error**-0.25))
+        if not error <= 1.0:
+            # The acceleration grows without bound as the body comes to where it jams: closer than rounding.
+            _, _, _, _, _, D, effective, _, _, _ = state(p, k1, k2, piece, t, y)
+            end = JAMMED if step < 1e-17 and min(D, effective) < 1e-2 else UNRESOLVED
+            break
+        # Watch the inequalities, the last sample beyond the end for least values at the end.
+        hit, at = -1, 1.0
+        y_[:] = y
+        for i in range(SAMPLES + 2):
+            x = i / SAMPLES
+            interpolate(y, Z_, x, n, y_)
+            guard(p, k1, k2, piece, t + x * step, y_, least, G[i])
+            if i >= 2:
+                for c in (_N1, _N2, _D, _INERTIA, _SLOWER):
+                    a0, a1, a2 = G[i - 2, c], G[i - 1, c], G[i, c]
+                    if a1 < a0 and a1 < a2 and a1 > 0.0 and a2 > 0.0 and (c != _SLOWER or set_valued):
+                        bend = a0 - 2.0 * a1 + a2
+                        if a1 - 0.125 * (a2 - a0) ** 2 / bend <= 0.0 and hit < 0:
+                            x0 = x + (-1.0 - 0.5 * (a2 - a0) / bend) / SAMPLES
+                            interpolate(y, Z_, x0, n, y_)
+                            guard(p, k1, k2, piece, t + x0 * step, y_, least, g)
+                            if g[c] <= 0.0 and x0 <= 1.0:
+                                at = root(p, k1, k2, piece, t, step, y, Z_, n, least, x0 - 1.0 / SAMPLES, x0, c, g, y_)
+                                hit = c
+            if hit >= 0 or i > SAMPLES:
+                break
+            if i > 0 and G[i].min() <= 0.0:
+                at = root(p, k1, k2, piece, t, step, y, Z_, n, least, (i - 1) / SAMPLES, x, -1, g, y_)
+                interpolate(y, Z_, at, n, y_)
+                guard(p, k1, k2, piece, t + at * step, y_, least, g)
+                hit = np.argmin(g > 0.0)
+                break
+            if i > 0:
+                theta, ring_omega, _ = drive(p, t + x * step)
+                least_1, least_2 = min(least_1, G[i, _N1]), min(least_2, G[i, _N2])
+                observe(p, track, y_[0] + theta, y_[1] / p.radius + ring_omega, slack)
+        if hit < 0:
+            previous[:] = y
+            interpolate(y, Z_, 1.0, n, y_)
+            y[:] = y_
+            Z[:], before = Z_, step
+            t = limit if last else t + step
+            h = step * min(4.0, max(0.3, 0.9 * max(error, 1e-12) ** -0.25)) if not last else h
+            continue
+        # Step anew to the event itself, so that no interpolation is left in its place.
+        part = at * step
+        for _ in range(3):
+            if part <= 1e-16 * t:
+                break
+            for i in range(3):
+                interpolate(y, Z_, NODES[i] * part / step, n, y_)
+                for j in range(n):
+                    Z[i, j] = y_[j] - y[j]
+            if attempt(p, k1, k2, piece, t, part, y, f, J, scale, rtol, n, Z, A, order, b, work) == math.inf:
+                break
+            Z_[:], step = Z, part
+            interpolate(y, Z_, 1.1, n, y_)
+            guard(p, k1, k2, piece, t + 1.1 * step, y_, least, g)
+            beyond = g[hit]
+            interpolate(y, Z_, 0.9, n, y_)
+            guard(p, k1, k2, piece, t + 0.9 * step, y_, least, g)
+            if not (beyond <= 0.0 < g[hit]):
+                break
+            at = root(p, k1, k2, piece, t, step, y, Z_, n, least, 0.9, 1.1, hit, g, y_)
+            part = at * step
+        interpolate(y, Z_, part / step, n, y_)
+        y[:] = y_
+        t += part
+        events += 1
+        before = 0.0
+        h = max(min(h, part), 1e-9)
+        if hit in (_N1, _N2):
+            guard(p, k1, k2, piece, t, y, least, g)
+            end = OPEN_1 if hit == _N1 else OPEN_2
+            if abs(g[_N1]) < 1e-9 and abs(g[_N2]) < 1e-9 and p.model == RING:
+                end = OPEN_BOTH
+            break
+        if hit in (_D, _INERTIA):
+            end = JAMMED
+            break
+        theta, ring_omega, _ = drive(p, t)
+        observe(p, track, y[0] + theta, y[1] / p.radius + ring_omega, slack)
+        track[5] = math.nan  # the acceleration may jump here: no peak across it
+        if hit in (_EDGE_1, _EDGE_2):
+            way = 1 if piece > 0 else -1
+            guard(p, k1, k2, piece, t, y, least, g)
+            if hit == _EDGE_1 or g[_EDGE_1] < 1e-13:
+                k1 += way
+            if hit == _EDGE_2 or g[_EDGE_2] < 1e-13:
+                k2 += way
+            mode = sliding_problem(p, k1, k2, piece, t, y, least)
+        elif p.law == KARNOPP:
+            if hit == _BRISTLE:
+                piece = (3 if load_on_band(p, t, y) > 0.0 else -3) if abs(piece) == 1 else piece // 3
+            elif abs(piece) == 2:
+                piece //= 2
+            else:
+                piece = 2 if y[1] > 0.0 else -2
+        elif hit == _BRISTLE:
+            piece *= 2
+        elif hit == _FASTER:
+            piece += 1 if piece > 0 else -1
+        elif abs(piece) > 1 and p.law != RESET:
+            piece -= 1 if piece > 0 else -1
+        elif set_valued:
+            y[1] = 0.0
+            mode = resting_problem(p, k1, k2, t, y[0], least)
+            if mode in (FORWARD, BACKWARD):
+                piece = mode
+                if mode == BACKWARD and p.model != BELT:
+                    k1, k2 = lower_segments(p, k1, k2, y[0])
+        else:
+            piece = -1 if piece > 0 else 1
+            if piece < 0 and p.model != BELT:
+                k1, k2 = lower_segments(p, k1, k2, y[0])
+
+    theta, ring_omega, _ = drive(p, t)
+    turned = 1.0 if track[3] - track[2] >= TURN * (1.0 + slack) else 0.0
+    return (
+        end, t, y[0] + theta, y[1] / p.radius + ring_omega, track[1], turned, least_1 + least, least_2 + least,
+        steps, events,
+    )  # fmt: skip

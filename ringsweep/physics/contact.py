@@ -1,0 +1,273 @@
+"""The contact problem at an instant: which contacts stick, slip or open.
+
+Where the sliding velocity is zero, and wherever friction jumps, the state alone does not tell how the body goes on.
+Every mode is tried with its equations and its inequalities:
+
+- stick: friction ``K_i = -kappa mu_s,i`` with one saturation ``kappa`` in [-1, 1] gives the acceleration of the ring,
+  and both normal reactions are positive;
+- slip forwards or backwards: the relative acceleration has the sign of the slip, both normal reactions are positive;
+- a contact opens: its reaction is zero and its gap grows, while the other contact sticks or slips with a positive
+  reaction, or opens too.
+
+Stick goes before slip, and what is closed before what opens. Two slips without stick, or no mode at all: no motion of
+rigid bodies follows from the state (jamming).
+
+Once a contact may open the body has three degrees of freedom. Per unit of reaction ``N`` and of friction ``F`` at one
+contact alone, ``s = -1`` at contact 1 and ``+1`` at contact 2, its gap opens and its place on the race accelerates with
+
+.. math::
+
+    \\ddot g = \\ddot g_0 + \\Bigl(\\frac1M + \\frac{\\xi^2 \\sin^2\\beta}{J}\\Bigr) N + s c F, \\qquad
+    \\ddot x = \\ddot x_0 + s c N + \\Bigl(\\frac1M + \\frac{\\lambda^2}{J}\\Bigr) F, \\qquad
+    c = \\frac{\\xi \\lambda \\sin\\beta}{J},\\ \\lambda = R - \\xi \\cos\\beta .
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+
+from ringsweep.jit import hook, inlined
+from ringsweep.physics import ring
+
+#: What the contacts do: both closed in a slip that goes on; one open, or both; both closed in a mode that begins at
+#: rest; no motion of rigid bodies.
+CLOSED, OPEN_1, OPEN_2, OPEN_BOTH, STICK, FORWARD, BACKWARD, IMPOSSIBLE = range(8)
+
+# Rounding of forces and accelerations, as a share of the largest terms in them: what is that close to a bound meets it.
+_ROUNDING = 1e-13
+
+
+@hook
+def stick(body, m1, m2, sin_phi, cos_phi, omega, epsilon):
+    """Saturation of friction, and reactions, of a body that sticks to a ring.
+
+    Parameters
+    ----------
+    body : TwoContacts or OneContact
+    m1, m2 : float
+        Static friction coefficients under the contacts.
+    sin_phi, cos_phi, omega : float
+        Place and angular velocity of the body, rad/s.
+    epsilon : float
+        Angular acceleration of the ring, rad/s^2.
+
+    Returns
+    -------
+    tuple of float
+        ``(kappa, reserve, N1, N2)``: saturation; friction that is left before breakaway, N; reactions, N. If no
+        saturation gives that acceleration the reserve is minus infinity.
+    """
+
+
+@stick.implements(ring.TwoContacts)
+def _two_stick(body, m1, m2, sin_phi, cos_phi, omega, epsilon):
+    b = body
+    sb, cb = b.sin_beta, b.cos_beta
+    mean, half = 0.5 * (m1 + m2), 0.5 * (m1 - m2)
+    # The moment about the axis gives the total friction, the tangential balance the difference of the reactions.
+    friction = ((b.inertia + b.mass * b.xi * b.xi) * epsilon + b.mass * b.gravity * b.xi * sin_phi) / b.radius
+    difference = (b.mass * (b.xi * epsilon + b.gravity * sin_phi) - friction * cb) / sb
+    load = b.mass * (b.xi * omega * omega + b.gravity * cos_phi)
+    if mean == 0.0:
+        total = load / cb
+        return 0.0, -abs(friction), 0.5 * (total + difference), 0.5 * (total - difference)
+    # The radial balance, friction shared in proportion to m_i N_i: mean cb total^2 - linear total - constant = 0.
+    linear = mean * load - cb * half * difference + sb * half * friction
+    constant = difference * (half * load + mean * sb * friction)
+    square = linear * linear + 4.0 * mean * cb * constant
+    if not square >= 0.0:
+        return 0.0, -inf, 0.0, 0.0
+    root = sqrt(square)
+    # Where the smaller root is admissible the larger one is, with more of every reaction.
+    total = (linear + root) / (2.0 * mean * cb) if linear >= 0.0 else 2.0 * constant / (root - linear)
+    normal_1, normal_2 = 0.5 * (total + difference), 0.5 * (total - difference)
+    capacity = m1 * normal_1 + m2 * normal_2
+    return -friction / capacity if capacity != 0.0 else 0.0, capacity - abs(friction), normal_1, normal_2
+
+
+@stick.implements(ring.OneContact)
+def _one_stick(body, m1, m2, sin_phi, cos_phi, omega, epsilon):
+    b = body
+    friction = b.mass * (b.radius * epsilon + b.gravity * sin_phi)
+    normal = b.mass * (b.gravity * cos_phi + b.radius * omega * omega)
+    capacity = m1 * normal
+    return -friction / capacity if capacity != 0.0 else 0.0, capacity - abs(friction), normal, normal
+
+
+@hook
+def opening(body, k1, k2, m1, m2, sense, sin_phi, cos_phi, omega, epsilon):
+    """Which contacts open, of a body whose contacts cannot both stay closed.
+
+    Parameters
+    ----------
+    body : TwoContacts or OneContact
+    k1, k2 : float
+        Friction per unit of the reaction: if the body slides, with its sign, positive the way phi grows; at rest its
+        magnitude just after breakaway.
+    m1, m2 : float
+        Static friction coefficients, where the body is at rest.
+    sense : int
+        0 if the body is at rest on the ring, else 1.
+    sin_phi, cos_phi, omega, epsilon : float
+        As for :func:`stick`.
+
+    Returns
+    -------
+    int
+        OPEN_1, OPEN_2, OPEN_BOTH or IMPOSSIBLE.
+    """
+
+
+@inlined
+def _alone(body, side, k, m, sense, sin_phi, cos_phi, omega, epsilon):
+    """Whether the contact on a side can carry the body by itself while the other one opens."""
+    b = body
+    sb, cb = b.sin_beta, b.cos_beta
+    # The rotational inertia may be zero; what is a billionth of the body's counts as that.
+    per_inertia = b.mass / max(b.inertia, 1e-9 * b.mass * b.radius * b.radius)
+    lever = b.radius - b.xi * cb
+    # Times the mass.
+    gap_n, slide_f = 1.0 + b.xi * b.xi * sb * sb * per_inertia, 1.0 + lever * lever * per_inertia
+    cross = side * b.xi * lever * sb * per_inertia
+    other_n = cb * cb - sb * sb * (1.0 + b.xi * b.xi * per_inertia)
+    other_f = side * sb * (2.0 * cb - b.xi * lever * per_inertia)
+    across, along = b.mass * (b.gravity * cos_phi + b.xi * omega * omega), b.mass * b.gravity * sin_phi
+    gap, other = side * sb * along - cb * across, -side * sb * along - cb * across
+    slide = -side * sb * across - cb * along - b.mass * b.radius * epsilon
+    least = -_ROUNDING * (abs(across) + abs(along) + b.mass * b.radius * abs(epsilon))
+    if sense != 0:
+        stiffness = gap_n + k * cross
+        load = -gap / stiffness
+        return stiffness > 0.0 and load > 0.0 and other + (other_n + k * other_f) * load > least
+    determinant = gap_n * slide_f - cross * cross
+    load, pull = (cross * slide - slide_f * gap) / determinant, (cross * gap - gap_n * slide) / determinant
+    if load > 0.0 and abs(pull) <= m * load and other + other_n * load + other_f * pull > least:
+        return True
+    for sign in (-1.0, 1.0):
+        stiffness = gap_n - sign * k * cross
+        load = -gap / stiffness
+        slides = sign * (slide + (cross - sign * k * slide_f) * load) > 0.0
+        opens = other + (other_n - sign * k * other_f) * load > least
+        if stiffness > 0.0 and load > 0.0 and slides and opens:
+            return True
+    return False
+
+
+@opening.implements(ring.TwoContacts)
+def _two_opening(body, k1, k2, m1, m2, sense, sin_phi, cos_phi, omega, epsilon):
+    across = body.gravity * cos_phi + body.xi * omega * omega
+    along = body.gravity * sin_phi
+    if body.cos_beta * across + body.sin_beta * abs(along) < 0.0:
+        return OPEN_BOTH
+    first = _alone(body, 1.0, k2, m2, sense, sin_phi, cos_phi, omega, epsilon)
+    second = _alone(body, -1.0, k1, m1, sense, sin_phi, cos_phi, omega, epsilon)
+    if first:
+        return OPEN_BOTH if second else OPEN_1
+    return OPEN_2 if second else IMPOSSIBLE
+
+
+@opening.implements(ring.OneContact)
+def _one_opening(body, k1, k2, m1, m2, sense, sin_phi, cos_phi, omega, epsilon):
+    return OPEN_1
+
+
+@hook
+def lost(body, first, second):
+    """Which contacts open, given whether the reaction of each has vanished; one of them at least has."""
+
+
+@lost.implements(ring.TwoContacts)
+def _two_lost(body, first, second):
+    return OPEN_BOTH if first and second else OPEN_1 if first else OPEN_2
+
+
+@lost.implements(ring.OneContact)
+def _one_lost(body, first, second):
+    return OPEN_1
+
+
+@inlined
+def _scale(body, sin_phi, cos_phi, omega, epsilon):
+    """Largest of the terms in the balances of momentum, per unit of mass, m/s^2."""
+    return body.gravity + body.radius * (omega * omega + abs(epsilon))
+
+
+@inlined
+def _slip_margin(body, sign, friction, tangential, sin_phi, cos_phi, omega, epsilon):
+    """By how much a slip that begins at rest meets its inequalities, as a share of the terms; negative: it does not.
+
+    `tangential` is whether stick has just ended by this breakaway without a drop of friction: then there is no relative
+    acceleration yet.
+    """
+    K1, K2 = -sign * friction[0], -sign * friction[1]
+    phi_dd, _, inertia = ring.acceleration(body, K1, K2, sin_phi, cos_phi, omega)
+    n1, n2 = ring.reactions(body, K1, K2, sin_phi, cos_phi, omega, phi_dd)
+    terms = _scale(body, sin_phi, cos_phi, omega, epsilon)
+    push = sign * body.radius * (phi_dd - epsilon) / terms
+    if tangential:
+        # The body starts if still more friction would be needed to hold it.
+        gain = sign * ring.acceleration_slope(body, K1, K2, K1, K2, sin_phi, cos_phi, omega)
+        push = -body.radius * gain / terms if inertia > 0.0 else -1.0
+    margin = min(push, min(n1, n2) / (body.mass * terms))
+    return margin if margin >= -1.0 else -1.0
+
+
+@inlined
+def at_rest(body, static, forward, backward, sin_phi, cos_phi, omega, epsilon, released):
+    """Mode of a body that is at rest on the ring.
+
+    Parameters
+    ----------
+    body : TwoContacts or OneContact
+    static, forward, backward : tuple of float
+        Friction coefficients under both contacts: greatest in stick, and just after breakaway either way.
+    sin_phi, cos_phi, omega, epsilon : float
+        As for :func:`stick`.
+    released : int
+        0 where the body may stick; else stick has just ended: +1 or -1 by friction used up, in the slip of that sign;
+        2 by a reaction.
+
+    Returns
+    -------
+    int
+        STICK, FORWARD, BACKWARD, OPEN_1, OPEN_2, OPEN_BOTH or IMPOSSIBLE.
+    """
+    m1, m2 = static
+    held = -1.0
+    if released == 0:
+        _, reserve, n1, n2 = stick(body, m1, m2, sin_phi, cos_phi, omega, epsilon)
+        held = min(reserve, min(n1, n2)) / (body.mass * _scale(body, sin_phi, cos_phi, omega, epsilon))
+        # Without friction there is nothing to stick to.
+        if held >= 0.0 and m1 + m2 > 0.0:
+            return STICK
+    tangential = released == 1 and forward == static
+    ahead = _slip_margin(body, 1.0, forward, tangential, sin_phi, cos_phi, omega, epsilon)
+    tangential = released == -1 and backward == static
+    back = _slip_margin(body, -1.0, backward, tangential, sin_phi, cos_phi, omega, epsilon)
+    if ahead > 0.0 or back > 0.0:
+        if min(ahead, back) > 0.0:
+            return IMPOSSIBLE
+        return FORWARD if ahead > 0.0 else BACKWARD
+    # A tie, such as that of a body without friction in equilibrium.
+    if max(held, max(ahead, back)) >= -_ROUNDING:
+        return FORWARD if ahead >= max(held, back) else BACKWARD if back >= held else STICK
+    k1, k2 = max(forward[0], backward[0]), max(forward[1], backward[1])
+    return opening(body, k1, k2, m1, m2, 0, sin_phi, cos_phi, omega, epsilon)
+
+
+@inlined
+def sliding(body, K1, K2, sin_phi, cos_phi, omega):
+    """Mode of a body that slides with the friction ``K1``, ``K2`` per unit of the reactions.
+
+    Returns
+    -------
+    int
+        CLOSED, OPEN_1, OPEN_2, OPEN_BOTH or IMPOSSIBLE.
+    """
+    phi_dd, determinant, inertia = ring.acceleration(body, K1, K2, sin_phi, cos_phi, omega)
+    if not (determinant > 0.0 and inertia > 0.0):
+        return IMPOSSIBLE
+    n1, n2 = ring.reactions(body, K1, K2, sin_phi, cos_phi, omega, phi_dd)
+    if n1 > 0.0 and n2 > 0.0:
+        return CLOSED
+    return opening(body, K1, K2, 0.0, 0.0, 1, sin_phi, cos_phi, omega, 0.0)

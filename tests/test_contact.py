@@ -1,0 +1,185 @@
+"""The contact problem: every mode by the balances of a rigid body that may leave either contact, solved anew."""
+
+from math import cos, sin
+
+import numpy as np
+import pytest
+
+from ringsweep.physics import contact
+from ringsweep.physics.contact import BACKWARD, CLOSED, FORWARD, IMPOSSIBLE, OPEN_1, OPEN_2, OPEN_BOTH, STICK
+from ringsweep.physics.ring import OneContact, TwoContacts
+
+MIRRORED = {OPEN_1: OPEN_2, OPEN_2: OPEN_1, FORWARD: BACKWARD, BACKWARD: FORWARD}
+
+
+def draw(rng):
+    """A body at rest on a ring, somewhere, under friction that may be great."""
+    beta, radius = np.radians(rng.uniform(5, 85)), rng.uniform(0.03, 0.1)
+    centre = radius * rng.uniform(0.5, 0.95)
+    body = TwoContacts.of(
+        mass=rng.uniform(0.02, 0.5),
+        inertia=1e-4 * 10 ** rng.uniform(-2, 1),
+        radius=radius,
+        xi=centre * cos(beta),
+        sin_beta=sin(beta),
+        cos_beta=cos(beta),
+        gravity=9.81,
+    )
+    kinetic = rng.uniform(0.0, rng.choice([0.8, 2.5]), 2)
+    static = kinetic + rng.choice([0.0, 1.0]) * rng.uniform(0.0, 0.8, 2)
+    return body, tuple(static), tuple(kinetic), rng.uniform(-np.pi, np.pi), rng.uniform(-10, 10), rng.normal(0, 60)
+
+
+def balances(body, phi, omega):
+    """Accelerations of a free body, and what a unit of each reaction and of each friction adds to them.
+
+    Columns: outwards and along the race at the centre of mass, angular.
+    """
+    b = body
+    free = np.array([b.gravity * cos(phi), -b.gravity * sin(phi), 0.0])
+    centre = b.xi / b.cos_beta
+    units = []
+    for side in (-1, 1):
+        # Where the contact is seen from the centre of mass, its normal and its tangent, in radial and tangential parts.
+        out, along = np.array([b.cos_beta, side * b.sin_beta]), np.array([-side * b.sin_beta, b.cos_beta])
+        arm = b.radius * out - np.array([b.xi, 0.0])
+        for force in (-out, along):
+            units.append([*force / b.mass, (arm[0] * force[1] - arm[1] * force[0]) / b.inertia])
+    return free, np.array(units).T, centre
+
+
+def relative(body, motion, omega):
+    """Of both contacts: how the gap and the place on the race accelerate."""
+    b = body
+    radial, tangential, angular = motion
+    centre = b.xi / b.cos_beta
+    found = []
+    for side in (-1, 1):
+        half = side * centre * b.sin_beta
+        # The ball's centre sits `half` along the tangent from the centre of mass.
+        ball = np.array([radial - half * angular, tangential - half * omega**2])
+        out, along = np.array([b.cos_beta, side * b.sin_beta]), np.array([-side * b.sin_beta, b.cos_beta])
+        gap = -(ball @ out + centre * omega**2)
+        found.append((gap, ball @ along + (b.radius - centre) * angular))
+    return found
+
+
+def admissible(body, static, kinetic, phi, omega, epsilon):
+    """Every mode whose equations and inequalities hold, and by how much the nearest one to hang does."""
+    free, units, _ = balances(body, phi, omega)
+    scale = body.mass * (body.gravity + body.radius * (omega**2 + abs(epsilon)))
+    found, margins = set(), []
+
+    def enter(mode, *values):
+        margins.append(min(values))
+        if min(values) > 0:
+            found.add(mode)
+
+    def response(columns):
+        """Gaps and places as affine functions of unknown factors of combinations of the four forces."""
+        base = relative(body, free, omega)
+        parts = [np.array(relative(body, free + units @ np.asarray(c), omega)) - np.array(base) for c in columns]
+        return np.array(base), parts
+
+    # Slip of both, either way.
+    for mode, sign in ((FORWARD, 1), (BACKWARD, -1)):
+        columns = [(1, -sign * kinetic[0], 0, 0), (0, 0, 1, -sign * kinetic[1])]
+        base, parts = response(columns)
+        normals = np.linalg.solve(np.array([p[:, 0] for p in parts]).T, -base[:, 0])
+        places = base[:, 1] + sum(n * p[:, 1] for n, p in zip(normals, parts, strict=True))
+        enter(mode, *normals / scale, sign * (places.mean() - body.radius * epsilon) * body.mass / scale)
+    # Stick of both, with one saturation: looked for between its bounds.
+    kappas = np.linspace(-1, 1, 2001)
+    base, (n1, f1, n2, f2) = response(np.eye(4))
+    one, two = (n - np.multiply.outer(kappas, mu * f) for n, f, mu in ((n1, f1, static[0]), (n2, f2, static[1])))
+    matrices = np.stack([one[:, :, 0], two[:, :, 0]], axis=-1)
+    normals = np.linalg.solve(matrices, np.broadcast_to(-base[:, :1], (len(kappas), 2, 1)))[:, :, 0]
+    places = base[:, 1] + normals[:, :1] * one[:, :, 1] + normals[:, 1:] * two[:, :, 1]
+    away = places.mean(axis=1) - body.radius * epsilon
+    turns = np.flatnonzero((away[:-1] * away[1:] <= 0) & (np.abs(np.diff(away)) < scale / body.mass))
+    for k in turns:
+        enter(STICK, *normals[k : k + 2].min(axis=0) / scale, 1 - abs(kappas[k]) + 1e-3)
+    # One open, the other sticks or slips.
+    for mode, own, other in ((OPEN_1, 1, 0), (OPEN_2, 0, 1)):
+        base, (normal, friction) = response(np.eye(4)[[2 * own, 2 * own + 1]])
+        matrix = np.array([normal[own], friction[own]]).T
+        load, pull = np.linalg.solve(matrix, [-base[own, 0], body.radius * epsilon - base[own, 1]])
+        gap = base[other, 0] + load * normal[other, 0] + pull * friction[other, 0]
+        enter(mode, load / scale, (static[own] * load - abs(pull)) / scale, gap * body.mass / scale)
+        for sign in (-1, 1):
+            part = normal - sign * kinetic[own] * friction
+            load = -base[own, 0] / part[own, 0]
+            place, gap = base[own, 1] + load * part[own, 1], base[other, 0] + load * part[other, 0]
+            slides = sign * (place - body.radius * epsilon)
+            enter(mode, load / scale, slides * body.mass / scale, gap * body.mass / scale, part[own, 0] * body.mass)
+    enter(OPEN_BOTH, *np.array(relative(body, free, omega))[:, 0] * body.mass / scale)
+    return found, np.abs(margins).min()
+
+
+def chosen(found):
+    """The rule: stick, else the only slip, else what opens."""
+    slips, opens = found & {FORWARD, BACKWARD}, found & {OPEN_1, OPEN_2, OPEN_BOTH}
+    if STICK in found:
+        return STICK
+    if slips:
+        return slips.pop() if len(slips) == 1 else IMPOSSIBLE
+    if len(opens) > 1:
+        return OPEN_BOTH
+    return opens.pop() if opens else IMPOSSIBLE
+
+
+@pytest.fixture(scope="module")
+def problems():
+    rng = np.random.default_rng(14)
+    return [draw(rng) for _ in range(1000)]
+
+
+class TestAtRest:
+    @staticmethod
+    def mode(body, static, kinetic, phi, omega, epsilon):
+        return contact.at_rest(body, static, kinetic, kinetic, sin(phi), cos(phi), omega, epsilon, 0)
+
+    def test_the_mode_is_the_one_whose_inequalities_hold(self, problems):
+        seen = set()
+        for problem in problems:
+            found, margin = admissible(*problem)
+            if margin > 2e-3:
+                assert self.mode(*problem) == chosen(found), problem
+                seen.add(self.mode(*problem))
+        assert seen == {STICK, FORWARD, BACKWARD, OPEN_1, OPEN_2, OPEN_BOTH}
+
+    def test_where_no_mode_is_admissible_none_is_taken(self):
+        """One problem in thirty thousand: too little friction to stick, too much to slip, and no gap opens."""
+        beta = np.radians(75.9)
+        body = TwoContacts.of(0.0806, 7.78e-4, 0.0379, 0.0266 * cos(beta), sin(beta), cos(beta), 9.81)
+        problem = body, (0.98, 0.68), (0.54, 0.66), -0.08, -9.31, -85.5
+        assert admissible(*problem)[0] == set()
+        assert self.mode(*problem) == IMPOSSIBLE
+
+    def test_of_a_mirror_image_is_the_mirror_image(self, problems):
+        for body, (s1, s2), (k1, k2), phi, omega, epsilon in problems:
+            one = self.mode(body, (s1, s2), (k1, k2), phi, omega, epsilon)
+            other = self.mode(body, (s2, s1), (k2, k1), -phi, -omega, -epsilon)
+            assert other == MIRRORED.get(one, one)
+
+    def test_stick_is_as_strong_as_it_can_be(self, problems):
+        """Of the saturations that give the acceleration of the ring, the one with the largest reactions."""
+        for body, static, kinetic, phi, omega, epsilon in problems:
+            if self.mode(body, static, kinetic, phi, omega, epsilon) == STICK:
+                kappa, reserve, n1, n2 = contact.stick(body, *static, sin(phi), cos(phi), omega, epsilon)
+                assert min(n1, n2) >= 0.0
+                assert reserve >= 0.0
+                assert abs(kappa) <= 1.0
+
+
+class TestSliding:
+    def test_a_contact_that_would_pull_opens(self):
+        """On ice at the top a body that turns slowly leaves the race with both contacts, a fast one with none."""
+        body = TwoContacts.of(0.076, 4.47e-5, 0.043378, 0.022, 0.75, np.sqrt(1 - 0.75**2), 9.81)
+        modes = [contact.sliding(body, 0.0, 0.0, sin(3.1), cos(3.1), omega) for omega in (0.0, 50.0)]
+        assert modes == [OPEN_BOTH, CLOSED]
+
+    def test_one_contact_has_no_other(self):
+        body = OneContact(0.076, 0.043378, 9.81)
+        assert contact.sliding(body, 0.1, 0.1, sin(3.0), cos(3.0), 1.0) == OPEN_1
+        assert contact.at_rest(body, (0.5, 0.5), (0.3, 0.3), (0.3, 0.3), sin(3.0), cos(3.0), 0.0, 0.0, 0) == OPEN_1

@@ -1,0 +1,210 @@
+"""What must hold between runs whatever their numbers: symmetry, scales, twins, limits. No reference is needed.
+
+Thousands of random scenes, in few batches. Runs without a certificate are left out, and must be few.
+"""
+
+import numpy as np
+import pytest
+from solutions import solve
+
+from ringsweep.solvers.event import Auto
+from ringsweep.variables import SEPARATING
+
+COUNT = 1000
+KINDS = ("regime", "motion")
+PLACES = ("rough", "rest")
+
+
+def draw(rng, count=COUNT, high=0.4):
+    """Random values by path: friction, a rough arc, a drive, a launch; some on ice, some at the speed of the ring."""
+    values = {
+        "zone.center": rng.uniform(-np.pi, np.pi, count),
+        "zone.half_angle": rng.choice([0.0, np.pi, 0.01, 1.0], count, p=[0.05, 0.05, 0.1, 0.8]),
+        "drive.amplitude": rng.choice([-1, 1], count) * 10 ** rng.uniform(-1, 1.2, count),
+        "initial.phi": rng.choice([0.0, 0.5, 1.0], count, p=[0.5, 0.4, 0.1]) * rng.uniform(-np.pi, np.pi, count),
+        "initial.omega": rng.choice([0.0, 1.0], count) * rng.uniform(-40, 40, count),
+        "time.span": rng.uniform(0.3, 2.0, count),
+    }
+    values["zone.half_angle"] *= np.where(values["zone.half_angle"] == 1.0, rng.uniform(0.05, 3.0, count), 1.0)
+    grip = rng.choice([0.02, 1.0, 3.0], count, p=[0.15, 0.75, 0.1])
+    for place in PLACES:
+        kinetic = rng.uniform(0.02, high, count) * grip
+        values[f"friction.{place}.mu_k"] = kinetic
+        values[f"friction.{place}.mu_s"] = kinetic + rng.choice([0.0, 1.0], count) * rng.uniform(0, 0.3, count) * grip
+    return values
+
+
+def both_certified(one, other):
+    """Cells in which both runs are certified; nearly all are."""
+    certified = (one.certified == 1) & (other.certified == 1)
+    assert certified.mean() > 0.98
+    return certified
+
+
+def assert_alike(one, other, cells, atol=1e-6, **signs):
+    for name in KINDS:
+        np.testing.assert_array_equal(getattr(one, name)[cells], getattr(other, name)[cells], err_msg=name)
+    for name in ("t_end", "phi_end", "omega_end"):
+        a, b = getattr(one, name)[cells], signs.get(name, 1.0) * getattr(other, name)[cells]
+        # What a long run makes of the tolerance, told by its own bound.
+        apart = np.abs(a - b) / (1.0 + np.abs(a))
+        assert np.quantile(apart, 0.995) < atol, name
+
+
+@pytest.fixture(params=["stiction", "bengisu-akay"])
+def scenes(request, cells):
+    """Batch under a set-valued or a smooth law, driven by the arctan law."""
+    law = request.param
+    rng = np.random.default_rng(1)
+    own = {} if law == "stiction" else {"friction.alpha": 10 ** rng.uniform(0, 5, COUNT)}
+    if law != "stiction":
+        own["friction.v0"] = 10 ** rng.uniform(-6, -0.5, COUNT)
+
+    def build(values, **more):
+        few = len(next(iter(values.values())))
+        return cells({path: column[:few] for path, column in own.items()} | values, law=law, drive="arctan", **more)
+
+    return build
+
+
+class TestMirror:
+    """Left and right are alike: what one contact does, the other does in the mirror."""
+
+    def test_of_a_run_is_the_run_in_the_mirror(self, scenes):
+        values = draw(np.random.default_rng(21))
+        odd = ("zone.center", "drive.amplitude", "initial.phi", "initial.omega")
+        one = solve(Auto(), scenes(values))
+        other = solve(Auto(), scenes(values | {path: -values[path] for path in odd}))
+        cells = both_certified(one, other)
+        assert_alike(one, other, cells, phi_end=-1.0, omega_end=-1.0)
+        mirrored = np.array([0.0, 2.0, 1.0, 3.0])[other.separating_contact.astype(int)]
+        np.testing.assert_array_equal(one.separating_contact[cells], mirrored[cells])
+        assert {0, 1, 2, 3} == set(one.separating_contact)
+
+
+class TestScales:
+    def test_mass_does_not_matter_bit_for_bit(self, scenes):
+        """Sixteen times the mass, and of the inertia: sixteen times the forces, and nothing else."""
+        values = draw(np.random.default_rng(23), 300)
+        body = {"body.mass": np.full(300, 0.076), "body.inertia": np.full(300, 4.47e-5)}
+        one = solve(Auto(), scenes(values | body))
+        other = solve(Auto(), scenes(values | {path: 16.0 * column for path, column in body.items()}))
+        for name in (*KINDS, "separating_contact", "t_end", "phi_end", "omega_end", "reversals", "steps", "certified"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+        np.testing.assert_array_equal(16.0 * one.normal_min_1, other.normal_min_1)
+
+    def test_of_length_and_time_leave_the_motion_as_it_is(self, cells):
+        """On an immobile ring: four times the lengths, twice the times."""
+        values = draw(np.random.default_rng(24))
+        values["drive.amplitude"][:] = 0.0
+        lengths = {"body.half_distance": 0.025, "body.ball_radius": 0.010, "ring.radius": 0.043378}
+        small = values | {path: np.full(COUNT, x) for path, x in lengths.items()}
+        large = values | {path: np.full(COUNT, 4.0 * x) for path, x in lengths.items()}
+        large |= {
+            "body.inertia": np.full(COUNT, 16.0 * 4.47e-5),
+            "initial.omega": 0.5 * values["initial.omega"],
+            "time.span": 2.0 * values["time.span"],
+            "classify.epsilon_omega": np.full(COUNT, 0.5e-3),
+        }
+        one, other = (solve(Auto(), cells(v, law="stiction", drive="arctan")) for v in (small, large))
+        certified = both_certified(one, other)
+        assert_alike(one, other, certified, t_end=0.5, omega_end=2.0)
+        np.testing.assert_array_equal(one.separating_contact[certified], other.separating_contact[certified])
+
+    def test_of_length_and_time_under_a_drive_whose_acceleration_is_infinite_at_first(self, cells):
+        """A power law with an exponent below 2: whatever the unit of time, the body is left behind in one way."""
+        rng = np.random.default_rng(25)
+        count, exponent = 300, rng.uniform(1.05, 1.95, 300)
+        values = {
+            "drive.amplitude": 10 ** rng.uniform(-1.5, 1, count),
+            "drive.exponent": exponent,
+            "time.span": rng.uniform(0.2, 1.0, count),
+            "zone.half_angle": rng.uniform(0.0, 3.0, count),
+        }
+        large = values | {
+            "body.half_distance": np.full(count, 16 * 0.025),
+            "body.ball_radius": np.full(count, 16 * 0.010),
+            "ring.radius": np.full(count, 16 * 0.043378),
+            "body.inertia": np.full(count, 256 * 4.47e-5),
+            "drive.amplitude": values["drive.amplitude"] / 4.0**exponent,
+            "time.span": 4.0 * values["time.span"],
+            "classify.epsilon_omega": np.full(count, 0.25e-3),
+            "friction.v0": np.full(count, 4 * 2e-6),
+            "friction.alpha": np.full(count, 0.25e5),
+        }
+        one, other = (solve(Auto(), cells(v, drive="power")) for v in (values, large))
+        certified = both_certified(one, other)
+        assert_alike(one, other, certified, t_end=0.25, omega_end=4.0)
+        np.testing.assert_array_equal(one.reversals[certified], other.reversals[certified])
+
+
+class TestShiftOfTime:
+    def test_a_run_may_be_broken_off_and_go_on(self, cells):
+        """On an immobile ring, from where it was in the middle of the span."""
+        values = draw(np.random.default_rng(26))
+        values["drive.amplitude"][:] = 0.0
+        whole = solve(Auto(), cells(values, law="stiction", drive="arctan"))
+        half = solve(Auto(), cells(values | {"time.span": 0.5 * values["time.span"]}, law="stiction", drive="arctan"))
+        rest = {"initial.phi": half.phi_end, "initial.omega": half.omega_end, "time.span": 0.5 * values["time.span"]}
+        rest = solve(Auto(), cells(values | rest, law="stiction", drive="arctan"))
+        went_on = (half.t_end == 0.5 * values["time.span"]) & (whole.certified == 1) & (rest.certified == 1)
+        assert went_on.mean() > 0.4
+        np.testing.assert_allclose(whole.phi_end[went_on], rest.phi_end[went_on], atol=1e-6)
+        separating = [(found.regime == SEPARATING)[went_on] for found in (whole, rest)]
+        np.testing.assert_array_equal(*separating)
+
+
+class TestTwins:
+    """One scene said in two ways."""
+
+    def test_an_arc_like_the_rest_is_none(self, scenes):
+        values = draw(np.random.default_rng(27))
+        values |= {f"friction.rough.{name}": values[f"friction.rest.{name}"] for name in ("mu_s", "mu_k")}
+        one, other = (solve(Auto(), scenes(values | {"zone.half_angle": x * np.ones(COUNT)})) for x in (0.0, 0.7))
+        assert_alike(one, other, both_certified(one, other))
+
+    @staticmethod
+    def with_arcs(values, arcs):
+        """The rough arc replaced by others, as ``(centre, half-angle)`` each."""
+        kept = {path: x for path, x in values.items() if not path.startswith(("zone.", "friction.rough."))}
+        for k, (center, half_angle) in enumerate(arcs):
+            kept |= {f"zones.{k}.center": center, f"zones.{k}.half_angle": half_angle}
+            kept |= {f"zones.{k}.{name}": values[f"friction.rough.{name}"] for name in ("mu_s", "mu_k")}
+        return kept
+
+    def test_an_arc_is_two_that_abut(self, scenes):
+        values = draw(np.random.default_rng(28))
+        center, half = values["zone.center"], 0.25 * values["zone.half_angle"]
+        arcs = [(center - 2 * half, 2 * half), (center + 2 * half, 2 * half)]
+        one = solve(Auto(), scenes(values))
+        other = solve(Auto(), scenes(self.with_arcs(values, arcs), arcs=("zones.0", "zones.1")))
+        assert_alike(one, other, both_certified(one, other))
+
+    def test_the_order_of_disjoint_arcs_does_not_matter_bit_for_bit(self, scenes):
+        values = draw(np.random.default_rng(29), 300)
+        center, half = values["zone.center"], np.minimum(values["zone.half_angle"], 0.7)
+        arcs = [(center, half), (center + 2.0, half), (center - 2.0, half)]
+        names = ("zones.0", "zones.1", "zones.2")
+        one, other = (solve(Auto(), scenes(self.with_arcs(values, order), arcs=names)) for order in (arcs, arcs[::-1]))
+        np.testing.assert_array_equal(one.rows, other.rows)
+
+
+class TestLimits:
+    def test_one_contact_is_two_that_come_together(self, cells):
+        """A point mass on two contacts: the angle between them, and the difference, tend to zero together."""
+        rng = np.random.default_rng(30)
+        count = 200
+        values = {path: column for path, column in draw(rng, count, 0.3).items() if path != "drive.amplitude"}
+        values |= {"drive.amplitude": rng.uniform(-3.0, 3.0, count), "ring.radius": np.full(count, 0.05)}
+        # Close together on different surfaces, two contacts jam.
+        values["zone.half_angle"][:] = 0.0
+        one = solve(Auto(), cells(values, model="ring-single-contact", law="stiction", drive="arctan"))
+        apart = []
+        for half_distance in (1e-4, 1e-5):
+            point = {"body.half_distance": half_distance, "body.ball_radius": 0.0, "body.inertia": 0.0}
+            two = solve(Auto(), cells(values | point, law="stiction", drive="arctan"))
+            alike = (one.regime == two.regime) & (one.certified == 1) & (two.certified == 1)
+            apart.append(np.abs(one.phi_end - two.phi_end)[alike])
+            assert alike.mean() > 0.9
+        medians = [np.median(a[a > 0.0]) for a in apart]
+        assert medians[1] < 0.2 * medians[0] < 1e-3
