@@ -12,8 +12,8 @@ one, and prints a table per family:
 - ambiguous: the reference's own runs, at other tolerances or with everything that the verdict may hang by moved by a
   millionth, do not agree; or several contacts could leave. Not compared;
 - unresolved: the reference did not finish within its budget. Not compared;
-- bounded: of the certified ends that carry an error, the share where the true one is no larger, and the median of
-  stated over true.
+- bounded: of the certified numbers whose stated error is ten times what the reference itself is sure of, the share
+  where the true one is no larger, and the median of stated over true.
 
 On the belt trajectories are compared, not the words for them: contradicted is where the end is off by more than a
 thousandth of the stick scale mu_s m g / k and the way of the belt together, ambiguous where the reference's own two
@@ -337,8 +337,8 @@ def compare(kind, batch, data, count, report):
                 report.scene("off", scene, why, said)
         for name, error in errors.items():
             stated = float(data[f"{name}_error"][i]) if f"{name}_error" in data else math.nan
-            if math.isfinite(stated) and math.isfinite(error) and spread[name] < 0.1 * error:
-                count.bounded.append((stated >= error, stated / error))
+            if math.isfinite(stated) and math.isfinite(error) and spread[name] < 0.1 * stated:
+                count.bounded.append((stated >= error - spread[name], stated / max(error, spread[name], 1e-300)))
 
 
 class Report:

@@ -142,8 +142,9 @@ def describe(outcome: xr.Dataset) -> str:
     regime = REGIMES[int(outcome["regime"])]
     doubt = "" if outcome["certified"] == 1 else ", not certified"
     if "t_separation" in outcome and np.isfinite(outcome["t_separation"]):
+        contact = ("no contact", "contact 1", "contact 2", "both contacts")[int(outcome["separating_contact"])]
         return (
-            f"{regime} ({REGIMES[int(outcome['motion'])]}), contact {int(outcome['separating_contact'])}, "
+            f"{regime} ({REGIMES[int(outcome['motion'])]}), {contact}, "
             f"t = {float(outcome['t_separation']):.6g} s{doubt}"
         )
     return f"{regime}, t = {float(outcome['t_end']):.6g} s{doubt}"

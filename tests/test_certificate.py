@@ -181,7 +181,7 @@ class TestLaw:
     def test_is_obeyed_to_the_tolerance_by_what_is_certified(self, cells, law):
         method = Event() if law == "stiction" else Implicit()
         batch = self.scene(cells, law)
-        _, _, shown = method._integrate(batch, len(NAMES), True)
+        _, _, shown = method.integrate(batch, len(NAMES), audit=True)
         assert shown[:, 0].max() < 0.2 * event._BREACH
         assert shown[:, 1].max() < 0.2 * event._ENERGY
 

@@ -16,7 +16,7 @@ from ringsweep.models.ring_series import coefficients_under
 from ringsweep.physics import contact, ring
 from ringsweep.physics.friction.dynamic import bristle
 from ringsweep.physics.friction.static import BAND, stiction_band, weights
-from ringsweep.physics.zones import PER_TURN, edge_ahead, roughness
+from ringsweep.physics.zones import PER_TURN, edge_ahead, roughest, roughness
 from ringsweep.variables import SEPARATING
 
 # Rounding of accelerations, as a share of their largest terms.
@@ -164,9 +164,11 @@ def _hangs(batch, a, b, fall):
         lost = separating & ((a.separating_contact.astype(int) & number) > 0)
         found |= moved & ~lost & (least <= 2.0 * np.abs(least - other))
     # A contact lost in passing: a reaction that falls slowly may turn before it vanishes. Its greatest curvature is
-    # that of the load as the body swings or turns.
-    rate = batch.body.gravity / batch.body.radius + np.maximum(np.abs(a.omega_min), np.abs(a.omega_max)) ** 2
-    curvature = batch.body.mass * batch.body.radius * rate * rate
+    # about that of the weight as the body swings or turns, and of the load of a turning that friction slows down.
+    body, (mu, _) = batch.body, roughest(batch.surface)
+    square = np.maximum(np.abs(a.omega_min), np.abs(a.omega_max)) ** 2
+    slowed = np.minimum(1.0, 4.0 * mu * mu) * body.radius * square * square
+    curvature = body.mass * (body.gravity * (body.gravity / body.radius + square) + slowed)
     found |= separating & moved & (_SINKS * np.abs(a.t_separation - b.t_separation) * curvature > fall)
     # A reversal, or a turn, that is only just one.
     off = 2.0 * np.maximum(np.abs(a.omega_min - b.omega_min), np.abs(a.omega_max - b.omega_max))

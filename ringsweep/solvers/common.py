@@ -22,7 +22,7 @@ _MAY_LACK = ("t_separation", "first_slip", "period")
 
 # Least error stated: a share of the tolerance of a step, what rounding leaves of a step, and a share of the difference,
 # relative to its scale, of the number in which two resolutions differ most. Found by trial, see docs/accuracy.md.
-_FLOOR, _ROUNDING, _TOGETHER = 0.03, 1e-15, 0.05
+_FLOOR, _ROUNDING, _TOGETHER = 0.05, 1e-15, 0.04
 
 
 @dataclass(frozen=True)
@@ -153,19 +153,20 @@ def errors(
     names = with_errors(outcomes)
     columns = [outcomes.index(name) for name in names]
     a = rows[:, columns]
-    apart = np.abs(a - witness[:, columns])
+    with np.errstate(invalid="ignore", over="ignore"):
+        apart = np.abs(a - witness[:, columns])
     units = np.array([OUTCOMES[name].units for name in names])
     scale = np.empty_like(a)
     for unit in set(units.tolist()):
         own = units == unit
         largest = np.nanmax(np.abs(a[:, own]), axis=1, initial=0.0)
         scale[:, own] = (largest + (0.0 if unit.startswith("m") else 1.0))[:, None]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        all_apart = np.nanmax(np.where(scale > 0.0, apart / scale, 0.0), axis=1, initial=0.0)[:, None]
     least = _FLOOR * tolerance + _ROUNDING * np.sqrt(1.0 + np.asarray(steps))[..., None]
-    bound: NDArray[np.float64] = safety * np.maximum(apart, _TOGETHER * all_apart * scale) + least * scale
-    # The end of the span is exact.
-    end = names.index("t_end")
-    bound[:, end] = np.where(apart[:, end] == 0.0, 0.0, bound[:, end])
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        all_apart = np.nanmax(np.where(scale > 0.0, apart / scale, 0.0), axis=1, initial=0.0)[:, None]
+        bound: NDArray[np.float64] = safety * np.maximum(apart, _TOGETHER * all_apart * scale) + least * scale
+    # The end of the span is exact, where a run reaches it.
+    reached = rows[:, outcomes.index("regime")] == rows[:, outcomes.index("motion")]
+    bound[reached & (apart[:, names.index("t_end")] == 0.0), names.index("t_end")] = 0.0
     bound[~agree(rows, witness, outcomes)] = np.nan
     return bound

@@ -19,17 +19,14 @@ from ringsweep.solvers.piecewise import integrate
 
 LIMIT = Parameter("1", "steps after which a run is given up as failed", lower=1, upper=1e10)
 
-# The witness of a certificate runs at a tolerance looser by this factor; where it disagrees the cell
-# is run again, tighter by it, so often at most.
-_FACTOR = 30.0
+#: The witness of a certificate runs at a tolerance looser by this factor; where it disagrees the cell
+#: is run again, tighter by it, so often at most.
+FACTOR = 30.0
 _TRIES = 3
 
 # A run obeys its law if no violation exceeds so many times what the tolerance of a step makes of it, and all but this
 # share of the energy that is turned over is work of friction.
 _BREACH, _ENERGY = 1e3, 5e-3
-
-# Error of a run in units of its difference from one at the looser tolerance, at most: it is some fiftieth of it.
-_SAFETY = 1.5
 
 
 def _some(batch: Any, cells: NDArray[np.intp]) -> Any:
@@ -42,6 +39,8 @@ class _Piecewise(Method):
     """What both methods share: integration of the piecewise-smooth system, and its certificate."""
 
     laws: ClassVar[tuple[type, ...]]
+    safety: ClassVar[float]
+    """Error of a run in units of its difference from one at the looser tolerance, at most; half of runs: a fiftieth."""
 
     rtol: float
     max_steps: int = 1_000_000
@@ -66,7 +65,7 @@ class _Piecewise(Method):
         A cell is certified if a run at a looser tolerance agrees with it and it obeys its law; where it does not, both
         tolerances are tightened.
         """
-        rows, steps, shown = self._integrate(batch, len(outcomes), self.certify)
+        rows, steps, shown = self.integrate(batch, len(outcomes), audit=self.certify)
         certified = np.zeros(len(rows), dtype=bool)
         if not self.certify:
             return Result(rows, steps=steps, certified=certified)
@@ -75,18 +74,20 @@ class _Piecewise(Method):
         live = np.flatnonzero(steps < self.max_steps)
         if not len(live):
             return Result(rows, steps=steps, certified=certified, errors=bounds)
-        witness, more, _ = replace(self, rtol=self.rtol * _FACTOR)._integrate(_some(batch, live), len(outcomes), False)
+        witness, more, _ = replace(self, rtol=self.rtol * FACTOR).integrate(
+            _some(batch, live), len(outcomes), audit=False
+        )
         certified[live] = self._vouched(_some(batch, live), rows[live], witness, shown[live], outcomes)
         bounds[live] = self._errors(batch, rows[live], witness, steps[live], outcomes)
         steps[live] += more
         finer = self
         for _ in range(_TRIES):
             live = live[~certified[live]]
-            finer = replace(finer, rtol=finer.rtol / _FACTOR)
+            finer = replace(finer, rtol=finer.rtol / FACTOR)
             if not len(live) or finer.tolerances()[0] < 1e-15:
                 break
             part = _some(batch, live)
-            again, more, shown = finer._integrate(part, len(outcomes), True)
+            again, more, shown = finer.integrate(part, len(outcomes), audit=True)
             certified[live] = self._vouched(part, again, rows[live], shown, outcomes)
             bounds[live] = finer._errors(batch, again, rows[live], more, outcomes)
             steps[live] += more
@@ -117,14 +118,17 @@ class _Piecewise(Method):
     ) -> NDArray[np.float64]:
         """Bounds on the errors of runs at this tolerance, given runs at a looser one."""
         tolerance = self.tolerances()[type(batch.law) in DYNAMIC]
-        return errors(rows, witness, outcomes, safety=_SAFETY, tolerance=tolerance, steps=steps)
+        return errors(rows, witness, outcomes, safety=self.safety, tolerance=tolerance, steps=steps)
 
-    def _integrate(
-        self, batch: Any, width: int, audit: bool
+    def integrate(
+        self, batch: Any, width: int, *, audit: bool
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Outcomes, numbers of steps, and if that is asked for what each run has shown of its law."""
+        """One run of every cell at the tolerance: outcomes, steps, and under `audit` what each has shown of its law.
+
+        See :func:`ringsweep.solvers.piecewise.integrate`.
+        """
         rows = np.empty((len(batch.span), width))
-        steps, shown = np.empty(len(rows)), np.empty((len(rows) if audit else 0, 4))
+        steps, shown = np.empty(len(rows)), np.empty((len(rows) if audit else 0, 3))
         integrate(batch, self.tolerances(), self.max_steps, rows, steps, shown, np.inf, np.empty(0), np.empty((0, 0)))
         return rows, steps, shown
 
@@ -136,7 +140,7 @@ class _Piecewise(Method):
             times, table = np.empty(size), np.empty((size, width))
             none, steps = np.empty((1, 0)), np.empty(1)
             count = integrate(
-                batch, self.tolerances(), self.max_steps, none, steps, np.empty((0, 4)), spacing, times, table
+                batch, self.tolerances(), self.max_steps, none, steps, np.empty((0, 3)), spacing, times, table
             )
             if count < size or size >= self.max_steps:
                 return times[:count], table[:count]
@@ -149,6 +153,7 @@ class Event(_Piecewise):
 
     name: ClassVar[str] = "event"
     laws: ClassVar[tuple[type, ...]] = SET_VALUED
+    safety: ClassVar[float] = 0.7
 
     rtol: Annotated[float, Parameter("1", "error allowed to a step", lower=1e-15, upper=1e-3)] = 1e-10
     max_steps: Annotated[int, LIMIT] = 1_000_000
@@ -165,6 +170,7 @@ class Implicit(_Piecewise):
 
     name: ClassVar[str] = "implicit"
     laws: ClassVar[tuple[type, ...]] = (*SMOOTH, *DYNAMIC)
+    safety: ClassVar[float] = 1.5
 
     rtol: Annotated[float, Parameter("1", "error allowed to a step", lower=1e-13, upper=1e-3)] = 3e-6
     max_steps: Annotated[int, LIMIT] = 1_000_000

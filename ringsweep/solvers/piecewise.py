@@ -609,10 +609,10 @@ def integrate(batch, tolerances, limit, out, steps, shown, spacing, times, table
     out : ndarray of shape ``(cells, outcomes)``
         Or without columns, if outcomes are not wanted.
     steps : ndarray of shape ``(cells,)``
-    shown : ndarray of shape ``(cells, 4)`` or ``(0, 4)``
+    shown : ndarray of shape ``(cells, 3)`` or ``(0, 3)``
         Filled, unless it is empty, with what each run has shown of its law: the largest violation, measured by what the
         tolerance of a step makes of it; the share of the energy turned over that is not work of friction; how fast the
-        guard fell by which the run ended; and the number of implicit steps.
+        guard fell by which the run ended.
     spacing : float
         Greatest distance between rows of a history, s.
     times, table : ndarray of shapes ``(rows,)`` and ``(rows, variables)``
@@ -646,7 +646,7 @@ def _integrate(batch, tolerances, limit, out, steps, shown, spacing, times, tabl
         record = _outset(scene.law, scene, mode, t, y, tolerances, c)
         trial = Trial(1e-6 * scene.span, 0.0, 0.0)
         audit, fall = Audit(0.0, 0.0, 0.0), 0.0
-        n = stalled = crept = 0
+        n = stalled = 0
         before = -1.0
         entered = True
         implicit = False
@@ -674,7 +674,6 @@ def _integrate(batch, tolerances, limit, out, steps, shown, spacing, times, tabl
                 entered = guard >= 0 or (entered and s == 0.0)
             if audited and s > 0.0 and _is_checked(n):
                 audit = _audited(scene.law, scene, mode, implicit, c, t, s, y, y_next, stages, tolerances[0], audit)
-            crept += int(implicit)
             last, begun = mode, y
             t, status, mode, y = _arrive(scene, mode, guard, t, s, horizon, y_next)
             if audited and status != RUNNING and guard >= 0 and s > 0.0:
@@ -693,5 +692,4 @@ def _integrate(batch, tolerances, limit, out, steps, shown, spacing, times, tabl
             shown[i, 0] = audit.breach
             shown[i, 1] = abs(audit.unexplained) / audit.turnover if audit.turnover > 0.0 else 0.0
             shown[i, 2] = fall
-            shown[i, 3] = crept
     return kept

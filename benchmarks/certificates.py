@@ -1,0 +1,83 @@
+"""What a certificate costs: a run, the run that is its witness, and the law that it must obey.
+
+    python -m benchmarks.certificates            # a minute, most of it compilation
+    python -m benchmarks.certificates --quick    # fewer cells and rounds
+
+The map of `configs/regime_map.yaml` under its own law and under the law that it tends to, on one core, warm. A run, a
+run that is held to its law, and a run at the looser tolerance take turns within rounds; ratios are medians of those
+within the rounds. With each time comes the error that it buys: the largest of the angle at the end, against a run at a
+tolerance a thousand times tighter.
+
+Writes `certificates.md` to `benchmarks/results/`; `--quick`, to the current folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+
+from benchmarks._common import ALPHA, V0, alternate, family, heading, machine, markdown, one_core, ring, table
+from ringsweep import cells, config
+from ringsweep.models import MODELS, batch
+from ringsweep.solvers.common import errors, with_errors
+from ringsweep.solvers.event import FACTOR, Event, Implicit
+
+RESULTS = Path(__file__).parent / "results"
+NAMES = MODELS["ring"].outcomes
+LAWS = {
+    "bengisu-akay": ({"law": "bengisu-akay", "alpha": ALPHA, "v0": V0}, Implicit()),
+    "stiction": ({"law": "stiction"}, Event()),
+}
+HEADER = ["law", "", "us per run", "largest error, rad", "bound, median, rad", "certificate with the law / without it"]
+
+
+def measure(law: str, side: int, rounds: int) -> list[str]:
+    """A row of the table."""
+    friction, method = LAWS[law]
+    amplitudes, half_angles = map(list, zip(*family(side), strict=True))
+    points = {"drive.amplitude": amplitudes, "zone.half_angle": half_angles}
+    made = config.load({"scene": ring(friction), "sweep": {"points": points}})
+    prepared = batch(made.scene.structure, cells.cells(made.scene, made.axes, np.arange(side * side)))
+    width, looser = len(NAMES), replace(method, rtol=method.rtol * FACTOR)
+    calls = {
+        "run": lambda: method.integrate(prepared, width, audit=False),
+        "held": lambda: method.integrate(prepared, width, audit=True),
+        "witness": lambda: looser.integrate(prepared, width, audit=False),
+    }
+    for call in calls.values():
+        call()
+    with one_core():
+        times, results = alternate(calls, rounds)
+    exact = replace(method, rtol=max(1e-3 * method.rtol, 1e-14)).integrate(prepared, width, audit=False)[0]
+    end = NAMES.index("phi_end")
+    (rows, _, _), (other, _, _) = results["run"], results["witness"]
+    bounds = errors(rows, other, NAMES, safety=method.safety)[:, with_errors(NAMES).index("phi_end")]
+    ratio = median(
+        (held + witness) / (run + witness)
+        for run, held, witness in zip(*(times[name].wall for name in ("run", "held", "witness")), strict=True)
+    )
+    parts = " + ".join(f"{1e6 * times[name].median / side**2:.0f}" for name in ("held", "witness"))
+    largest = np.nanmax(np.abs(rows[:, end] - exact[:, end]))
+    return [law, method.name, parts, f"{largest:.1e}", f"{np.nanmedian(bounds):.1e}", f"{ratio:.3f}"]
+
+
+def main() -> None:
+    """Measure, print and write."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="fewer cells and rounds")
+    quick = parser.parse_args().quick
+    print(where := machine())
+    rows = [measure(law, 16 if quick else 64, 3 if quick else 9) for law in LAWS]
+    heading("What a certificate costs")
+    table(HEADER, rows)
+    report = "# What a certificate costs\n\n`python -m benchmarks.certificates` on\n\n"
+    report += "".join(f"- {line}\n" for line in where.splitlines()) + f"\n{markdown(HEADER, rows)}"
+    (Path() if quick else RESULTS).joinpath("certificates.md").write_text(report)
+
+
+if __name__ == "__main__":
+    main()
