@@ -88,8 +88,11 @@ def _alone(scene: str | os.PathLike[str] | Mapping[str, Any], solver: str | Mapp
 
 def history(config: Config, *, samples: int = SAMPLES) -> xr.Dataset:
     """Run a configuration with no axis but friction laws and keep the history; see :func:`simulate`."""
-    runs = {law: _trace(config, structure, samples) for law, structure in config.scene.structures.items()}
     outcome = compute(config, jobs=1, progress=False)
+    runs = {}
+    for law, structure in config.scene.structures.items():
+        own = outcome.sel(friction_law=law) if config.axes.sizes else outcome
+        runs[law] = _with_jump(_trace(config, structure, samples), own)
     if not config.axes.sizes:
         (kept,) = runs.values()
         words = describe(outcome)
@@ -122,6 +125,20 @@ def _trace(config: Config, structure: Structure, samples: int) -> xr.Dataset:
         },
         coords={"time": ("time", times, {"long_name": "time", "units": "s", "axis": "T"})},
     )
+
+
+# Share of its largest reaction from which on a contact has not been lost gradually.
+_AT_ONCE = 1e-6
+
+
+def _with_jump(run: xr.Dataset, outcome: xr.Dataset) -> xr.Dataset:
+    """A history that ends with the contact open, where a jump of friction opened it: that instant stands twice."""
+    lost = int(outcome.get("separating_contact", 0))
+    names = [name for k, name in ((1, "normal_1"), (2, "normal_2")) if lost & k and name in run]
+    if not any(run[name][-1] > _AT_ONCE * run[name].max() for name in names):
+        return run
+    after = run.isel(time=[-1]).assign({name: 0.0 * run[name][-1:] for name in names})
+    return xr.concat([run, after], "time", data_vars="all", combine_attrs="override")
 
 
 def _resampled(run: xr.Dataset, times: NDArray[np.float64]) -> xr.Dataset:

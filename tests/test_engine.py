@@ -10,6 +10,7 @@ import xarray as xr
 import ringsweep
 from ringsweep.config import load
 from ringsweep.regimes import Outcome
+from ringsweep.solvers.common import with_errors
 from ringsweep.variables import OUTCOMES, REGIMES
 
 CONFIGS = Path(__file__).parents[1] / "configs"
@@ -25,7 +26,8 @@ def grid(scene):
 class TestDataset:
     def test_has_a_dimension_for_each_path_and_every_variable_of_the_contract(self, grid):
         assert dict(grid.sizes) == {"drive_amplitude": 3, "zone_half_angle": 3}
-        assert set(grid.data_vars) == {*Outcome._fields, "steps", "certified"}
+        bounded = {f"{name}_error" for name in with_errors(Outcome._fields)}
+        assert set(grid.data_vars) == {*Outcome._fields, *bounded, "steps", "certified"}
         for name, variable in grid.data_vars.items():
             assert variable.attrs["units"] == OUTCOMES[name].units
             assert variable.dtype == OUTCOMES[name].dtype
