@@ -63,6 +63,11 @@ def slack(scene, before, now):
     """
 
 
+@inner_hook
+def stride(scene, now, h):
+    """Share of the narrowest segment of the surface that the body slides across in a step of `h` seconds."""
+
+
 @hook
 def falls(scene, before, now, h):
     """How fast the guard fell that ended a run in a step of `h` seconds between two inspections, its unit times 1/s."""

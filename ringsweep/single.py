@@ -127,7 +127,7 @@ def _trace(config: Config, structure: Structure, samples: int) -> xr.Dataset:
     )
 
 
-# Share of its largest reaction from which on a contact has not been lost gradually.
+# Share of the largest reaction of the run from which on a contact has not been lost gradually.
 _AT_ONCE = 1e-6
 
 
@@ -135,7 +135,8 @@ def _with_jump(run: xr.Dataset, outcome: xr.Dataset) -> xr.Dataset:
     """A history that ends with the contact open, where a jump of friction opened it: that instant stands twice."""
     lost = int(outcome.get("separating_contact", 0))
     names = [name for k, name in ((1, "normal_1"), (2, "normal_2")) if lost & k and name in run]
-    if not any(run[name][-1] > _AT_ONCE * run[name].max() for name in names):
+    largest = max((float(run[name].max()) for name in ("normal_1", "normal_2") if name in run), default=0.0)
+    if not any(run[name][-1] > max(_AT_ONCE * largest, 1e-15) for name in names):
         return run
     after = run.isel(time=[-1]).assign({name: 0.0 * run[name][-1:] for name in names})
     return xr.concat([run, after], "time", data_vars="all", combine_attrs="override")

@@ -96,7 +96,9 @@ class TestCertificate:
     def test_is_given_at_once_where_both_tolerances_agree(self, calls, launches):
         found = solve(Event(), launches)
         assert found.certified.all()
-        assert calls == [(1e-10, 200), (pytest.approx(3e-9), 200)]
+        assert calls[:2] == [(1e-10, 200), (pytest.approx(3e-9), 200)]
+        # But for a few whose steps no tolerance has shortened, so that both runs are one.
+        assert sum(cells for _, cells in calls[2:]) < 20
 
     def test_is_sought_at_tighter_tolerances_where_they_do_not(self, calls, launches):
         """From a tolerance so loose that runs differ in kind, the doubtful ones come out right."""

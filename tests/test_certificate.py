@@ -14,7 +14,7 @@ from ringsweep.solvers import event, piecewise
 from ringsweep.solvers.common import with_errors
 from ringsweep.solvers.event import Auto, Event, Implicit
 from ringsweep.solvers.rk4 import RK4
-from ringsweep.variables import FAILED, RESTING, SEPARATING
+from ringsweep.variables import FAILED, JAMMED, RESTING, SEPARATING
 
 NAMES = MODELS["ring"].outcomes
 COEFFICIENTS = [f"friction.{place}.{name}" for place in ("rough", "rest") for name in ("mu_s", "mu_k")]
@@ -126,6 +126,26 @@ class TestContactProblem:
         assert found.separating_contact[1] == {1: 2, 2: 1, 3: 3}[int(found.separating_contact[2])]
         assert found.normal_min_1[0] == found.normal_min_2[0] == 0.0
 
+    @pytest.mark.parametrize("amplitude", [0.0, 2.0])
+    def test_without_a_load_there_is_no_contact(self, cells, amplitude):
+        """Nothing jams that nothing presses together."""
+        found = solve(Auto(), cells({"gravity": 0.0, "drive.amplitude": amplitude}, law="stiction", drive="arctan"))
+        assert (found.regime, found.separating_contact, found.t_end) == (SEPARATING, 3, 0.0)
+
+    def test_a_contact_on_an_edge_is_on_either_side_of_it(self, cells):
+        """With contact 1 just where an icy arc begins: held by the rest as it would slide there, as in the mirror.
+
+        But which side of an edge holds a body at rest is rounding, and nothing to certify.
+        """
+        edge = 0.546545997641859
+        values = dict(zip(COEFFICIENTS, (0.1, 0.1, 0.8, 0.6), strict=True)) | {"zone.half_angle": 0.3}
+        values |= {"initial.phi": np.array([edge, edge - 1e-12, -edge]), "drive.amplitude": np.array([2.0, 2.0, -2.0])}
+        found = solve(Auto(), cells(values, law="stiction", drive="arctan"))
+        np.testing.assert_array_equal(found.regime, SEPARATING)
+        np.testing.assert_array_equal(found.separating_contact, [2, 2, 1])
+        np.testing.assert_allclose(found.t_separation, 0.969176928911, atol=1e-10)
+        assert not found.certified[[0, 2]].any()
+
 
 class TestLaunch:
     """What a body is at launch does not depend on how its speed, or that of the ring, is rounded."""
@@ -146,6 +166,11 @@ class TestLaunch:
     def test_nor_those_of_a_body_launched_at_the_speed_of_the_ring(self, cells, rounding):
         speed = 0.3 * 2 * np.pi * 1.7 * np.cos(0.4)
         rocking = {"drive.frequency": 1.7, "drive.phase": 0.4, "initial.omega": speed * (1.0 + rounding)}
+        assert self.bristles(cells(self.LUGRE | rocking, law="lugre", drive="sinusoidal")) == (0.0, 0.0)
+
+    def test_nor_those_of_a_body_at_rest_on_a_ring_that_turns_back(self, cells):
+        """Its speed there is the rounding of a cosine."""
+        rocking = {"drive.frequency": 0.9, "drive.phase": np.pi / 2}
         assert self.bristles(cells(self.LUGRE | rocking, law="lugre", drive="sinusoidal")) == (0.0, 0.0)
 
     def test_a_body_at_rest_stays_at_rest_until_the_drive_moves_it(self, cells):
@@ -206,9 +231,35 @@ class TestLaw:
         for power in range(4):
             assert 0.5 * (early**power + late**power) == pytest.approx(1.0 / (power + 1))
 
+    def test_of_an_arc_that_rk4_steps_over_is_no_certificate(self, cells):
+        """A scratch a thousandth of a radian wide, so rough that it jams the body: no step of rk4 ends on it."""
+        values = {"zone.half_angle": 1e-3, "zone.center": 2.0, "initial.omega": 60.0, "time.span": 0.5}
+        values |= dict(zip(COEFFICIENTS, (2.0, 2.0, 0.1, 0.1), strict=True)) | {
+            "friction.v0": 0.1,
+            "friction.alpha": 0.0,
+        }
+        batch = cells(values, drive="arctan")
+        truth, stepped = solve(Auto(), batch), solve(RK4(500), batch)
+        assert (truth.regime, truth.certified) == (JAMMED, 1)
+        assert (stepped.regime, stepped.certified) == (SEPARATING, 0)
+
 
 class TestErrors:
-    """Every number comes with a bound on its error."""
+    """Numbers come with bounds on their errors."""
+
+    def test_of_two_runs_that_are_one_say_nothing(self, cells):
+        """Two steps that no tolerance shortens: the second resolution repeats the first, and a third must tell."""
+        values = dict(zip(COEFFICIENTS, (1.7, 1.5, 0.2, 0.0), strict=True)) | {
+            "body.inertia": 0.01,
+            "drive.amplitude": -2.0,
+            "initial.omega": 20.0,
+            "zone.half_angle": 0.0,
+        }
+        batch = cells(values, law="stiction", drive="arctan")
+        found, exact = Auto().run(batch, NAMES), solve(Event(rtol=1e-14, certify=False), batch)
+        error = np.abs(found.rows[:, NAMES.index("t_separation")] - exact.t_separation)
+        assert found.certified.all()
+        assert (found.errors[:, with_errors(NAMES).index("t_separation")] >= error).all()
 
     @pytest.mark.parametrize("law", ["stiction", "bengisu-akay"])
     def test_are_covered_by_what_is_stated(self, cells, law):

@@ -30,14 +30,13 @@ def draw(rng):
     return body, tuple(static), tuple(kinetic), rng.uniform(-np.pi, np.pi), rng.uniform(-10, 10), rng.normal(0, 60)
 
 
-def balances(body, phi, omega):
+def balances(body, phi):
     """Accelerations of a free body, and what a unit of each reaction and of each friction adds to them.
 
-    Columns: outwards and along the race at the centre of mass, angular.
+    Outwards and along the race at the centre of mass, and angular; the second array has a column for each force.
     """
     b = body
     free = np.array([b.gravity * cos(phi), -b.gravity * sin(phi), 0.0])
-    centre = b.xi / b.cos_beta
     units = []
     for side in (-1, 1):
         # Where the contact is seen from the centre of mass, its normal and its tangent, in radial and tangential parts.
@@ -45,7 +44,7 @@ def balances(body, phi, omega):
         arm = b.radius * out - np.array([b.xi, 0.0])
         for force in (-out, along):
             units.append([*force / b.mass, (arm[0] * force[1] - arm[1] * force[0]) / b.inertia])
-    return free, np.array(units).T, centre
+    return free, np.array(units).T
 
 
 def relative(body, motion, omega):
@@ -66,7 +65,7 @@ def relative(body, motion, omega):
 
 def admissible(body, static, kinetic, phi, omega, epsilon):
     """Every mode whose equations and inequalities hold, and by how much the nearest one to hang does."""
-    free, units, _ = balances(body, phi, omega)
+    free, units = balances(body, phi)
     scale = body.mass * (body.gravity + body.radius * (omega**2 + abs(epsilon)))
     found, margins = set(), []
 

@@ -137,15 +137,11 @@ def family(cells, model="ring", count=40):
 def integrate(kind, batch, steps, order=None):
     """Outcomes of a batch's cells, taken in an order, by the kernel for one run or for several side by side."""
     order = np.arange(len(batch.span)) if order is None else order
-    rows, report = np.empty((len(batch.span), len(NAMES))), np.empty((len(batch.span), 4))
+    rows, report = np.empty((len(batch.span), len(NAMES))), np.empty((len(batch.span), 5))
     scenes = side_by_side(batch._replace(drive=scaled(batch.drive))) if isinstance(kind, Several) else batch
     rk4.integrate(kind, rk4.Kept(), scenes, take(batch.drive, 0), order, steps, rows, report)
-    return dict(zip(NAMES, rows.T, strict=True)) | {
-        "steps": report[:, 0],
-        "stiffness": report[:, 1],
-        "slack": report[:, 2],
-        "fall": report[:, 3],
-    }
+    columns = zip(("steps", "stiffness", "slack", "fall", "stride"), report.T, strict=True)
+    return dict(zip(NAMES, rows.T, strict=True)) | dict(columns)
 
 
 class TestEachLane:

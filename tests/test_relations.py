@@ -72,6 +72,10 @@ class TestMirror:
 
     def test_of_a_run_is_the_run_in_the_mirror(self, scenes):
         values = draw(np.random.default_rng(21))
+        # A tenth of all with contact 2 on an edge of the arc; what sets out from there goes one way.
+        edge = values["zone.center"] + values["zone.half_angle"] - np.arcsin(0.025 / 0.033378)
+        on_edge = (np.arange(COUNT) % 10 == 0) & (values["initial.omega"] != 0.0)
+        values["initial.phi"] = np.where(on_edge, edge, values["initial.phi"])
         odd = ("zone.center", "drive.amplitude", "initial.phi", "initial.omega")
         one = solve(Auto(), scenes(values))
         other = solve(Auto(), scenes(values | {path: -values[path] for path in odd}))

@@ -84,8 +84,8 @@ class Belt:
         drive = self._drive(structure, values)
         sliding = np.zeros(len(mu_k))
         if "initial.velocity" in values:
-            of_belt = [drives.turn(take(drive, i), 0.0)[1] for i in range(len(mu_k))]
-            sliding = np.array(list(map(drives.relative, values["initial.velocity"], of_belt)))
+            launched = values["initial.velocity"]
+            sliding = np.array([drives.relative(take(drive, i), velocity) for i, velocity in enumerate(launched)])
         mass, gravity = values["body.mass"], values["gravity"]
         given = {
             "mass": mass,

@@ -24,6 +24,7 @@ def _breach(scene, mode, force, y, rates, s, tolerance):
     swing, load = scene.stiffness / scene.mass, scene.mass * scene.gravity
     length = abs(x) + length_scale(scene, abs(v + belt_velocity) + abs(belt_velocity))
     speed = length * (swing**0.5 if swing > 0.0 else 1.0)
+    # In a dead band the body moves as it came, whichever way it is pulled.
     held, worst, relaxation = holds_in_band(scene.law) and mode.region == BAND, 0.0, 0.0
     if mode.sign == 0:
         drag = -scene.stiffness * x - scene.mass * belt_acceleration
@@ -39,7 +40,7 @@ def _breach(scene, mode, force, y, rates, s, tolerance):
     terms = swing * abs(x) + abs(drag) / scene.mass + abs(belt_acceleration)
     off = abs(-swing * x - drag / scene.mass - belt_acceleration - rates[1])
     off = off / ((1.0 / s + relaxation) * tolerance * speed + _ROUNDING * terms)
-    return (max(worst, off) if off < inf else inf), -drag * (v + belt_velocity)
+    return (max(worst, off) if worst + off < inf else inf), -drag * (v + belt_velocity)
 
 
 @hooks.energy.implements(Belt, BristleBelt)

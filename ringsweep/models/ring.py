@@ -264,6 +264,11 @@ def _slack(scene, before, now):
     return min(first, second)
 
 
+@hooks.stride.implements(ring.Ring, ring.BristleRing)
+def _stride(scene, now, h):
+    return abs(now.v) * h / (scene.body.radius * zones.narrowest(scene.surface))
+
+
 @hooks.falls.implements(ring.Ring, ring.BristleRing)
 def _falls(scene, before, now, h):
     first = before.normal_1 - now.normal_1 if now.normal_1 <= 0.0 else 0.0

@@ -19,7 +19,7 @@ from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction.dynamic import bristle, lasts, steady
 from ringsweep.physics.friction.static import BAND, CLEAN
 from ringsweep.physics.ring import BristleRing
-from ringsweep.physics.zones import behind, coefficients, cross, edge_ahead, locate, roughest, segment
+from ringsweep.physics.zones import beyond, coefficients, cross, edge_ahead, locate, roughest, segment
 from ringsweep.regimes import BROKEN, ENDS, JAM, RUNNING
 
 
@@ -209,8 +209,8 @@ def _enter(scene, t, y):
         now = _contacts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(sign), BAND)
         epsilon, _, _ = ring.acceleration(scene.body, now.K1, now.K2, sin(phi), cos(phi), omega)
         sign = 1 if epsilon > ring_epsilon else -1
-    if sign < 0:
-        place_1, place_2 = behind(scene.surface, place_1, rho - offset), behind(scene.surface, place_2, rho + offset)
+    place_1 = beyond(scene.surface, place_1, rho - offset, sign)
+    place_2 = beyond(scene.surface, place_2, rho + offset, sign)
     mode = Mode(sign, BAND, place_1, place_2)
     if not _lasts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(sign), BAND) > 0.0:
         mode = Mode(sign, CLEAN, place_1, place_2)

@@ -1,7 +1,7 @@
 """Whether a run on the ring obeys its law: violations of friction law, balances and signs, from the plain formulas.
 
-Nothing here is shared with the solvers: friction is that of the surface at the angle of each contact, not of the
-segment that a mode names; reactions and accelerations are those of :mod:`ringsweep.physics.ring`, not of a series.
+No series is used, and no segment that a mode names: friction is that of the surface at the angle of each contact,
+reactions and accelerations are those of :mod:`ringsweep.physics.ring`. The formulas of the law are shared, of course.
 """
 
 from __future__ import annotations
@@ -11,12 +11,12 @@ from math import cos, inf, sin
 import numpy as np
 
 from ringsweep import hooks, regimes
-from ringsweep.jit import inlined
+from ringsweep.jit import inlined, take
 from ringsweep.models.ring_series import coefficients_under
-from ringsweep.physics import contact, ring
+from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction.dynamic import bristle
 from ringsweep.physics.friction.static import BAND, stiction_band, weights
-from ringsweep.physics.zones import PER_TURN, edge_ahead, roughest, roughness
+from ringsweep.physics.zones import PER_TURN, Segments, edge_ahead, roughest, roughness
 from ringsweep.variables import SEPARATING
 
 # Rounding of accelerations, as a share of their largest terms.
@@ -25,8 +25,8 @@ _ROUNDING = 1e-12
 # Angle within which a contact counts as on the edge of an arc, where either side may hold, rad.
 _ON_EDGE = 1e-8
 
-# Error of the reactions in units of the tolerance, as a share of the weight: they follow friction, and that a velocity
-# which is resolved to so much less.
+# Tolerance of an implicit step, and error allowed to the reactions as a share of the weight, in units of the tolerance
+# of the series.
 _LOADS = 1e3
 
 
@@ -71,12 +71,12 @@ def _breach(scene, mode, force, y, rates, s, tolerance):
     (mu_s1, mu_k1), (mu_s2, mu_k2) = under
     worst = inf if _misplaced(scene, mode, phi - theta, under) else 0.0
     terms = body.gravity + body.radius * (omega * omega + abs(ring_epsilon))
+    speed = body.radius * (1.0 + abs(omega))
     if mode.sign == 0:
         kappa, reserve, normal_1, normal_2 = contact.stick(body, mu_s1, mu_s2, sin_phi, cos_phi, omega, ring_epsilon)
         K1, K2 = -kappa * mu_s1, -kappa * mu_s2
         epsilon, _, _ = ring.acceleration(body, K1, K2, sin_phi, cos_phi, omega)
-        least = min(reserve, min(normal_1, normal_2))
-        speed, relaxation = body.radius * (1.0 + abs(omega)), 0.0
+        least, relaxation = min(reserve, min(normal_1, normal_2)), 0.0
     else:
         w_s, w_k, dw_s, dw_k = weights(scene.law, abs(v))
         sign = 1.0 if v > 0.0 else -1.0
@@ -86,13 +86,12 @@ def _breach(scene, mode, force, y, rates, s, tolerance):
         normal_1, normal_2 = ring.reactions(body, K1, K2, sin_phi, cos_phi, omega, epsilon)
         least = min(normal_1, normal_2)
         relaxation = body.radius * abs(ring.acceleration_slope(body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega))
-        speed = body.radius * (1.0 + abs(omega))
         if mode.region == BAND:
             speed = min(speed, 1e3 * stiction_band(scene.law))
         worst = _worst(worst, -mode.sign * v / (tolerance * speed))
         if not (determinant > 0.0 and inertia > 0.0):
             worst = inf
-    # The error of the acceleration as one of the velocity, which friction pulls back.
+    # An error of the velocity makes one of its rate: over the step, and by the slope of friction.
     pull = 1.0 / s + relaxation
     off = abs(body.radius * (epsilon - ring_epsilon) - rates[1])
     worst = _worst(worst, off / (pull * tolerance * speed + _ROUNDING * terms))
@@ -143,6 +142,12 @@ def _bristle_energy(scene, force, y):
     return ring.energy(scene.body, cos(y[0] + force[0]), y[1] / scene.body.radius + force[1])
 
 
+# What rounding makes of an angle at most, rad.
+_ROUNDED = 1e-12
+
+# Time up to which a run has ended at its launch, s.
+_AT_LAUNCH = 1e-13
+
 # A separation counts where the reaction goes on to sink by several times what the resolutions differ by.
 _SINKS = 5.0
 
@@ -151,12 +156,31 @@ _SINKS = 5.0
 def _undecided(batch, rows, witness, fall):
     # Of what is not a number every comparison is false.
     with np.errstate(invalid="ignore", over="ignore"):
-        return _hangs(batch, regimes.Outcome(*rows.T), regimes.Outcome(*witness.T), fall)
+        return _hangs(batch, regimes.Outcome(*rows.T), regimes.Outcome(*witness.T), fall) | _rests_on_edge(batch)
+
+
+def _rests_on_edge(batch):
+    """Which bodies are launched at rest with a contact on an edge: which side of it holds them is rounding."""
+    if not isinstance(batch.surface, Segments):
+        return np.zeros(len(batch.span), dtype=bool)
+    drive = batch.drive
+    if isinstance(drive, drives.Table):
+        turned = np.array([drives.turn(take(drive, i), 0.0)[0] for i in range(len(batch.span))])
+    else:
+        turned = drive.amplitude * np.sin(drive.phase) if isinstance(drive, drives.Sinusoidal) else 0.0
+    rho, offset = batch.initial_phi - turned, ring.contact_offset(batch.body)
+    found = np.zeros(len(batch.span), dtype=bool)
+    for angle in (rho - offset, rho + offset):
+        away = (angle[:, None] - batch.surface.edges + np.pi) % (2.0 * np.pi) - np.pi
+        found |= (np.abs(away) < _ROUNDED).any(axis=1)
+    for i in np.flatnonzero(found):
+        found[i] = ring.launch_velocity(take(batch, i)) == 0.0
+    return found
 
 
 def _hangs(batch, a, b, fall):
-    """The same of outcomes."""
-    separating, moved = a.regime == SEPARATING, a.t_end > 0.0
+    """Which runs hang by less than the outcomes `a` and `b` of two resolutions differ."""
+    separating, moved = a.regime == SEPARATING, a.t_end > _AT_LAUNCH
     found = np.zeros(len(fall), dtype=bool)
     # A contact that holds by less than its reaction is uncertain.
     contacts = (1, a.normal_min_1, b.normal_min_1), (2, a.normal_min_2, b.normal_min_2)

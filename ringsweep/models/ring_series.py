@@ -30,7 +30,7 @@ from ringsweep.physics.friction.static import (
     tail_reach,
     weights_in,
 )
-from ringsweep.physics.zones import behind, coefficients, cross, edge_ahead, locate
+from ringsweep.physics.zones import beyond, coefficients, cross, edge_ahead, locate
 from ringsweep.regimes import BROKEN, ENDS, JAM, RUNNING
 from ringsweep.series import (
     INVERSE,
@@ -107,16 +107,16 @@ def _enter(scene, t, y):
         push, _, _ = ring.acceleration(scene.body, 0.0, 0.0, sin(phi), cos(phi), ring_omega)
         sign, fresh = (1 if push >= ring_epsilon else -1), SLOW
     mode = Mode(sign, region, fresh, place_1, place_2)
-    if sign < 0:
-        mode = Mode(sign, region, fresh, *_behind(scene, mode, phi - theta))
+    mode = Mode(sign, region, fresh, *_moving(scene, mode, phi - theta, sign))
     return _after_jump(scene, mode, t, y), mode
 
 
 @inlined
-def _behind(scene, mode, rho):
-    """Places of contacts that move backwards from the angle `rho` in the ring's frame."""
+def _moving(scene, mode, rho, sign):
+    """Places of contacts that move from the angle `rho` in the ring's frame, forwards or backwards."""
     offset = ring.contact_offset(scene.body)
-    return behind(scene.surface, mode.place_1, rho - offset), behind(scene.surface, mode.place_2, rho + offset)
+    first = beyond(scene.surface, mode.place_1, rho - offset, sign)
+    return first, beyond(scene.surface, mode.place_2, rho + offset, sign)
 
 
 @inlined
@@ -133,20 +133,19 @@ def _settle(scene, t, phi, place_1, place_2, released):
     theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     region = region_at(scene.law, 0.0)
     still = Mode(0, CLEAN, -1, place_1, place_2)
-    forward = Mode(1, region, SLOW, place_1, place_2)
-    backward = Mode(-1, region, SLOW, *_behind(scene, still, phi - theta))
+    forward = Mode(1, region, SLOW, *_moving(scene, still, phi - theta, 1))
+    backward = Mode(-1, region, SLOW, *_moving(scene, still, phi - theta, -1))
     mu_s1, _, mu_s2, _ = coefficients_under(scene, still)
-    found = contact.at_rest(
-        scene.body,
-        (mu_s1, mu_s2),
-        _at_breakaway(scene, forward),
-        _at_breakaway(scene, backward),
-        sin(phi),
-        cos(phi),
-        ring_omega,
-        ring_epsilon,
-        released,
-    )
+    breakaway = _at_breakaway(scene, forward), _at_breakaway(scene, backward)
+    motion = sin(phi), cos(phi), ring_omega, ring_epsilon
+    found = contact.at_rest(scene.body, (mu_s1, mu_s2), *breakaway, *motion, released)
+    if found == contact.IMPOSSIBLE:
+        # A contact on an edge is on either side of it.
+        for moving in (forward, backward):
+            mu_s1, _, mu_s2, _ = coefficients_under(scene, moving)
+            on_edge = moving.place_1 != place_1 or moving.place_2 != place_2
+            if on_edge and contact.at_rest(scene.body, (mu_s1, mu_s2), *breakaway, *motion, 0) == contact.STICK:
+                return RUNNING, Mode(0, CLEAN, -1, moving.place_1, moving.place_2)
     if found == contact.FORWARD:
         return RUNNING, forward
     if found == contact.BACKWARD:

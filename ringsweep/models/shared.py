@@ -66,6 +66,11 @@ def _slack(scene, before, now):
     return inf
 
 
+@hooks.stride.implements(Belt, BristleBelt)
+def _stride(scene, now, h):
+    return 0.0
+
+
 @hooks.falls.implements(Belt, BristleBelt)
 def _falls(scene, before, now, h):
     return 0.0

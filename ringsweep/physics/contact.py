@@ -114,7 +114,7 @@ def opening(body, k1, k2, m1, m2, sense, sin_phi, cos_phi, omega, epsilon):
     Returns
     -------
     int
-        OPEN_1, OPEN_2, OPEN_BOTH or IMPOSSIBLE.
+        OPEN_1, OPEN_2, OPEN_BOTH or IMPOSSIBLE. If either contact could open alone it is OPEN_BOTH: neither is blamed.
     """
 
 
@@ -123,10 +123,11 @@ def _alone(body, side, k, m, sense, sin_phi, cos_phi, omega, epsilon):
     """Whether the contact on a side can carry the body by itself while the other one opens."""
     b = body
     sb, cb = b.sin_beta, b.cos_beta
-    # The rotational inertia may be zero; what is a billionth of the body's counts as that.
+    # The rotational inertia may be zero: then it is a billionth of that of a ring of the body's mass.
     per_inertia = b.mass / max(b.inertia, 1e-9 * b.mass * b.radius * b.radius)
     lever = b.radius - b.xi * cb
-    # Times the mass.
+    # Accelerations times the mass: of the gap and of the place on the race, as they are without this contact and per
+    # unit of its reaction (_n) and friction (_f); `cross` is both of these; `other` is the gap of the other contact.
     gap_n, slide_f = 1.0 + b.xi * b.xi * sb * sb * per_inertia, 1.0 + lever * lever * per_inertia
     cross = side * b.xi * lever * sb * per_inertia
     other_n = cb * cb - sb * sb * (1.0 + b.xi * b.xi * per_inertia)
@@ -157,7 +158,8 @@ def _alone(body, side, k, m, sense, sin_phi, cos_phi, omega, epsilon):
 def _two_opening(body, k1, k2, m1, m2, sense, sin_phi, cos_phi, omega, epsilon):
     across = body.gravity * cos_phi + body.xi * omega * omega
     along = body.gravity * sin_phi
-    if body.cos_beta * across + body.sin_beta * abs(along) < 0.0:
+    # Without a load no gap closes either.
+    if body.cos_beta * across + body.sin_beta * abs(along) <= 0.0:
         return OPEN_BOTH
     first = _alone(body, 1.0, k2, m2, sense, sin_phi, cos_phi, omega, epsilon)
     second = _alone(body, -1.0, k1, m1, sense, sin_phi, cos_phi, omega, epsilon)
@@ -188,8 +190,8 @@ def _one_lost(body, first, second):
 
 @inlined
 def _scale(body, sin_phi, cos_phi, omega, epsilon):
-    """Largest of the terms in the balances of momentum, per unit of mass, m/s^2."""
-    return body.gravity + body.radius * (omega * omega + abs(epsilon))
+    """Largest of the terms in the balances of momentum, per unit of mass, m/s^2; not zero, where there is no load."""
+    return body.gravity + body.radius * (omega * omega + abs(epsilon)) + 1e-300
 
 
 @inlined
@@ -209,6 +211,7 @@ def _slip_margin(body, sign, friction, tangential, sin_phi, cos_phi, omega, epsi
         gain = sign * ring.acceleration_slope(body, K1, K2, K1, K2, sin_phi, cos_phi, omega)
         push = -body.radius * gain / terms if inertia > 0.0 else -1.0
     margin = min(push, min(n1, n2) / (body.mass * terms))
+    # Where there is no acceleration at all it is not a number.
     return margin if margin >= -1.0 else -1.0
 
 
@@ -237,8 +240,8 @@ def at_rest(body, static, forward, backward, sin_phi, cos_phi, omega, epsilon, r
     if released == 0:
         _, reserve, n1, n2 = stick(body, m1, m2, sin_phi, cos_phi, omega, epsilon)
         held = min(reserve, min(n1, n2)) / (body.mass * _scale(body, sin_phi, cos_phi, omega, epsilon))
-        # Without friction there is nothing to stick to.
-        if held >= 0.0 and m1 + m2 > 0.0:
+        # Without friction, or without a load, there is nothing to stick to.
+        if held >= 0.0 and m1 + m2 > 0.0 and min(n1, n2) > 0.0:
             return STICK
     tangential = released == 1 and forward == static
     ahead = _slip_margin(body, 1.0, forward, tangential, sin_phi, cos_phi, omega, epsilon)
@@ -249,7 +252,8 @@ def at_rest(body, static, forward, backward, sin_phi, cos_phi, omega, epsilon, r
             return IMPOSSIBLE
         return FORWARD if ahead > 0.0 else BACKWARD
     # A tie, such as that of a body without friction in equilibrium.
-    if max(held, max(ahead, back)) >= -_ROUNDING:
+    loaded = body.gravity > 0.0 or omega != 0.0
+    if loaded and max(held, max(ahead, back)) >= -_ROUNDING:
         return FORWARD if ahead >= max(held, back) else BACKWARD if back >= held else STICK
     k1, k2 = max(forward[0], backward[0]), max(forward[1], backward[1])
     return opening(body, k1, k2, m1, m2, 0, sin_phi, cos_phi, omega, epsilon)

@@ -315,15 +315,31 @@ def _after_zero(drive):
     return _BEGINNING
 
 
+@hook
+def top_speed(drive):
+    """What the rounding of the drive's speed at t = 0 is measured by."""
+
+
+@top_speed.implements(Still, Constant, Arctan, Power, Table)
+def _first_speed(drive):
+    return abs(turn(drive, 0.0)[1])
+
+
+@top_speed.implements(Sinusoidal)
+def _greatest_speed(drive):
+    # Where a rocking ring turns back its speed is the rounding of a cosine.
+    return abs(2.0 * pi * drive.frequency * drive.amplitude)
+
+
 # Speeds that differ by less than this share of them are the same but for rounding.
 _SAME = 1e-15
 
 
 @inlined
-def relative(speed, drive_speed):
-    """Difference of two speeds, 0 where that is their rounding."""
-    difference = speed - drive_speed
-    return 0.0 if abs(difference) < _SAME * (abs(speed) + abs(drive_speed)) else difference
+def relative(drive, speed):
+    """Speed relative to the drive at t = 0, where that is not rounding; all in units of :func:`turn`."""
+    difference = speed - turn(drive, 0.0)[1]
+    return 0.0 if abs(difference) < _SAME * (abs(speed) + top_speed(drive)) else difference
 
 
 @inlined

@@ -115,7 +115,7 @@ class BristleRing(Ring):
 @inlined
 def launch_velocity(scene):
     """Angular velocity of the body relative to the ring at launch, rad/s."""
-    return drives.relative(scene.initial_omega, drives.turn(scene.drive, 0.0)[1])
+    return drives.relative(scene.drive, scene.initial_omega)
 
 
 @hook

@@ -41,8 +41,8 @@ class Segments(NamedTuple):
     """A ring cut at ``edges`` (ascending, in [0, 2 pi)); segment j runs from edge j to edge j + 1.
 
     ``arc`` is 0 where no rough arc lies and k on the k-th of them; ``roughest`` is the largest static and the least
-    kinetic coefficient. In memory a cell's segments are a row of an array; where cells stand side by side, in
-    :mod:`ringsweep.lanes`, they are a tuple.
+    kinetic coefficient, ``narrowest`` the width of the narrowest segment, rad. In memory a cell's segments are a row of
+    an array; where cells stand side by side, in :mod:`ringsweep.lanes`, they are a tuple.
     """
 
     edges: Any
@@ -50,6 +50,7 @@ class Segments(NamedTuple):
     mu_k: Any
     arc: Any
     roughest: tuple[Leaf, Leaf]
+    narrowest: Leaf
 
 
 class Arc(NamedTuple):
@@ -106,7 +107,8 @@ def cut(arcs: list[Arc], mu_s: Any, mu_k: Any) -> Uniform | Segments:
     number = np.maximum.accumulate(number, axis=-1)
     number = np.where(number < 0, number[..., -1:], number)
     static, kinetic, index = (np.take_along_axis(leaf, number, axis=-1) for leaf in (static, kinetic, index))
-    return Segments(edges, static, kinetic, index, (static.max(axis=-1), kinetic.min(axis=-1)))
+    narrowest = np.where(width > _SLIVER, width, turn).min(axis=-1)
+    return Segments(edges, static, kinetic, index, (static.max(axis=-1), kinetic.min(axis=-1)), narrowest)
 
 
 @hook
@@ -203,6 +205,21 @@ def _segments_roughest(surface):
 
 
 @hook
+def narrowest(surface):
+    """Width of the narrowest segment of the surface, rad."""
+
+
+@narrowest.implements(Uniform)
+def _uniform_narrowest(surface):
+    return 2.0 * pi
+
+
+@narrowest.implements(Segments)
+def _segments_narrowest(surface):
+    return surface.narrowest
+
+
+@hook
 def locate(surface, angle):
     """Segment that holds `angle` and the number of whole turns to its lower edge."""
 
@@ -266,7 +283,12 @@ def _cross(surface, place, direction):
     return j, turn
 
 
+# A contact that is this near to an edge is on it, rad.
+_ON_EDGE = 1e-13
+
+
 @inlined
-def behind(surface, place, angle):
-    """Place of a contact that moves backwards from `angle` (rad): that beyond the edge, if it is on one."""
-    return cross(surface, place, -1) if edge_ahead(surface, place, -1) >= angle else place
+def beyond(surface, place, angle, direction):
+    """Place of a contact that moves from `angle` (rad) in a direction (+1, -1): beyond the edge, if it is on one."""
+    away = direction * (edge_ahead(surface, place, direction) - angle)
+    return cross(surface, place, direction) if away <= _ON_EDGE else place

@@ -20,6 +20,9 @@ _WITNESSED = ("regime", "motion", "separating_contact")
 # Outcomes that a run may lack.
 _MAY_LACK = ("t_separation", "first_slip", "period")
 
+# Share by which ends may differ that are the same but for rounding.
+_SAME = 1e-14
+
 # Least error stated: a share of the tolerance of a step, what rounding leaves of a step, and a share of the difference,
 # relative to its scale, of the number in which two resolutions differ most. Found by trial, see docs/accuracy.md.
 _FLOOR, _ROUNDING, _TOGETHER = 0.05, 1e-15, 0.04
@@ -113,6 +116,19 @@ def vouched(
     needed = [column for column, name in enumerate(outcomes) if name not in _MAY_LACK]
     certain: NDArray[np.bool_] = agree(rows, witness, outcomes) & ~undecided(batch, rows, witness, fall)
     return certain & np.isfinite(rows[:, needed]).all(axis=1)
+
+
+def repeated(rows: NDArray[np.float64], witness: NDArray[np.float64], outcomes: tuple[str, ...]) -> NDArray[np.bool_]:
+    """Where two resolutions took the same steps, by their ends: they tell nothing of their error.
+
+    A body that sticks all the time is where the drive takes it, whatever the steps.
+    """
+    ends = [column for column, name in enumerate(outcomes) if name.endswith("_end")]
+    stuck = rows[:, outcomes.index("stick_time")] == rows[:, outcomes.index("t_end")]
+    a, b = rows[:, ends], witness[:, ends]
+    with np.errstate(invalid="ignore"):
+        same = (np.abs(a - b) <= _SAME * (1.0 + np.abs(a))).all(axis=1)
+    return np.asarray(same & ~stuck)
 
 
 def with_errors(outcomes: tuple[str, ...]) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from ringsweep.jit import take
 from ringsweep.parameters import Parameter
 from ringsweep.physics.friction import DYNAMIC, LAWS, SET_VALUED, SMOOTH
 from ringsweep.scene import Structure
-from ringsweep.solvers.common import Method, Result, errors, vouched, with_errors
+from ringsweep.solvers.common import Method, Result, errors, repeated, vouched, with_errors
 from ringsweep.solvers.piecewise import integrate
 
 LIMIT = Parameter("1", "steps after which a run is given up as failed", lower=1, upper=1e10)
@@ -62,8 +62,8 @@ class _Piecewise(Method):
     def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:
         """Outcomes of every cell; see :class:`ringsweep.solvers.common.Method`.
 
-        A cell is certified if a run at a looser tolerance agrees with it and it obeys its law; where it does not, both
-        tolerances are tightened.
+        A cell is certified if a run at a looser tolerance agrees with it and it obeys its law. Where it does not, or
+        where the two are one run, whose steps no tolerance has shortened, both tolerances are tightened.
         """
         rows, steps, shown = self.integrate(batch, len(outcomes), audit=self.certify)
         certified = np.zeros(len(rows), dtype=bool)
@@ -78,6 +78,7 @@ class _Piecewise(Method):
             _some(batch, live), len(outcomes), audit=False
         )
         certified[live] = self._vouched(_some(batch, live), rows[live], witness, shown[live], outcomes)
+        certified[live] &= ~repeated(rows[live], witness, outcomes)
         bounds[live] = self._errors(batch, rows[live], witness, steps[live], outcomes)
         steps[live] += more
         finer = self

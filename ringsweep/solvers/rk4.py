@@ -27,6 +27,7 @@ from ringsweep.hooks import (
     rates,
     slack,
     stiffness,
+    stride,
     verdict,
 )
 from ringsweep.jit import absorbed, add_scaled, hook, inlined, inner_hook, kernel, take
@@ -58,8 +59,12 @@ from ringsweep.variables import SEPARATING
 #: complex; on the real axis alone it would be 2.785.
 STABILITY_LIMIT = 2.61
 
-# Error of a run in units of its difference from one at half the step, at most: of first order where friction jumps.
-_SAFETY = 2.5
+# Error of a run in units of its difference from one at half the step, at most: where friction jumps the order is one at
+# best.
+_SAFETY = 5.0
+
+# Share of the narrowest segment of the surface that a step may slide across, for the arc to be seen.
+_LONGEST = 0.5
 
 # Steps between two visits of a cell: the drive's table of so many steps stays in the cache, and so few are lost on a
 # run that ends among others that go on.
@@ -103,16 +108,17 @@ class RK4(Method):
                 some, ours = (batch, rows) if len(stable) == cells else (take(batch, stable), rows[stable])
                 # What may have vanished between two steps has not been held.
                 held = (finer[:, 2] > 0.0) | (half[:, outcomes.index("regime")] == SEPARATING)
-                sure = held & (finer[:, 1] <= STABILITY_LIMIT)
+                # So has an arc that may lie between two steps.
+                sure = held & (finer[:, 1] <= STABILITY_LIMIT) & (finer[:, 4] <= _LONGEST)
                 certified[stable] = sure & vouched(some, ours, half, finer[:, 3], outcomes)
-                bounds[stable] = errors(ours, half, outcomes, safety=_SAFETY)
+                bounds[stable] = errors(ours, half, outcomes, safety=_SAFETY, steps=report[stable, 0])
         return Result(rows, steps=report[:, 0], stiffness=report[:, 1], certified=certified, errors=bounds)
 
     def _integrate(
         self, batch: Any, cells: NDArray[np.intp], steps: int, width: int
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         rows = np.empty((len(batch.span), width))
-        report = np.empty((len(batch.span), 4))
+        report = np.empty((len(batch.span), 5))
         kind, account = lanes(batch), Kept() if self.diagnose else Dropped()
         # What the kernels are compiled for knows no shape of the drive: that of its table is a kernel of its own.
         scenes = side_by_side(batch._replace(drive=scaled(batch.drive))) if isinstance(kind, Several) else batch
@@ -142,10 +148,11 @@ class Dropped(NamedTuple):
 
 
 class Trust(NamedTuple):
-    """What tells whether a run can be trusted: its largest stiffness, and the least :func:`slack` of its steps."""
+    """What tells whether a run can be trusted: the largest stiffness, least slack, and longest stride of its steps."""
 
     stiffness: Any
     slack: Any
+    stride: Any
 
 
 @inner_hook
@@ -155,7 +162,11 @@ def _trusted(account, scene, trust, before, now, h):
 
 @_trusted.implements(Kept)
 def _keep(account, scene, trust, before, now, h):
-    return Trust(max(trust.stiffness, stiffness(scene, before, now, h)), min(trust.slack, slack(scene, before, now)))
+    return Trust(
+        max(trust.stiffness, stiffness(scene, before, now, h)),
+        min(trust.slack, slack(scene, before, now)),
+        max(trust.stride, stride(scene, now, h)),
+    )
 
 
 @_trusted.implements(Dropped)
@@ -283,7 +294,8 @@ def _part(kind, account, batch, memory, at, seated, sample, table, first, k, h, 
                 y_end = _hermite(run.y, run.now.rates, y_next, after.rates, h, fraction)
                 t = (first + k + fraction) * h
                 record = observe(scene, run.record, y_end, run.now, after, t, fraction * h)
-                trust = Trust(trust.stiffness, run.trust.slack)
+                # Of a contact that is lost there is no slack to speak of.
+                trust = Trust(trust.stiffness, run.trust.slack, trust.stride)
                 fall = falls(scene, run.now, after, h)
                 _conclude(scene, record, status, t, y_end, first + k + 1.0, trust, fall, seated[lane], rows, report)
             write(memory, place, width(kind), _Run(run.y, run.now, run.record, run.trust, live))
@@ -297,7 +309,8 @@ def _conclude(scene, record, status, t, y, steps, trust, fall, cell, rows, repor
     outcome = conclude(scene, record, status, t, y)
     for column in range(len(outcome)):
         rows[cell, column] = outcome[column]
-    report[cell, 0], report[cell, 1], report[cell, 2], report[cell, 3] = steps, trust.stiffness, trust.slack, fall
+    report[cell, 0], report[cell, 1], report[cell, 2] = steps, trust.stiffness, trust.slack
+    report[cell, 3], report[cell, 4] = fall, trust.stride
 
 
 def integrate(
@@ -323,9 +336,9 @@ def integrate(
         :func:`ringsweep.physics.drives.scaled`.
     drive : NamedTuple
         The drive of one of the cells.
-    rows, report : ndarray of shape ``(cells of the batch, outcomes)`` and ``(cells of the batch, 4)``
-        Filled for these cells: outcomes; number of steps, stiffness, least slack, and how fast the guard fell by which
-        the run ended.
+    rows, report : ndarray of shape ``(cells of the batch, outcomes)`` and ``(cells of the batch, 5)``
+        Filled for these cells: outcomes; number of steps, stiffness, least slack, how fast the guard fell by which the
+        run ended, and longest stride.
     """
     h = float(batch.span[cells[0]]) / steps
     table = np.empty((2 * min(_BLOCK, steps) + 1, 2))
@@ -418,7 +431,7 @@ def _begun(scene, theta, ring_omega):
     """A run at its launch; with the drive anywhere, a sample of what runs of such scenes are made of."""
     y = launch(scene)
     now = inspect(scene, y, theta, ring_omega)
-    return _Run(y, now, begin(scene, y, now), Trust(0.0, inf), LIVE)
+    return _Run(y, now, begin(scene, y, now), Trust(0.0, inf, 0.0), LIVE)
 
 
 @kernel
