@@ -14,6 +14,7 @@ from ringsweep import hooks, regimes
 from ringsweep.jit import inlined, take
 from ringsweep.models.ring_series import coefficients_under
 from ringsweep.physics import contact, drives, ring
+from ringsweep.physics.friction import SET_VALUED
 from ringsweep.physics.friction.dynamic import bristle
 from ringsweep.physics.friction.static import BAND, stiction_band, weights
 from ringsweep.physics.zones import PER_TURN, Segments, edge_ahead, roughest, roughness
@@ -160,8 +161,8 @@ def _undecided(batch, rows, witness, fall):
 
 
 def _rests_on_edge(batch):
-    """Which bodies are launched at rest with a contact on an edge: which side of it holds them is rounding."""
-    if not isinstance(batch.surface, Segments):
+    """Which bodies are launched at rest with a contact on an edge, where rounding tells which side of it holds them."""
+    if not isinstance(batch.surface, Segments) or type(batch.law) not in SET_VALUED:
         return np.zeros(len(batch.span), dtype=bool)
     drive = batch.drive
     if isinstance(drive, drives.Table):
