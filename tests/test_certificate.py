@@ -261,8 +261,10 @@ class TestErrors:
         assert found.certified.all()
         assert (found.errors[:, with_errors(NAMES).index("t_separation")] >= error).all()
 
-    @pytest.mark.parametrize("law", ["stiction", "bengisu-akay"])
-    def test_are_covered_by_what_is_stated(self, cells, law):
+    @pytest.mark.parametrize(
+        ("law", "drive"), [("stiction", "arctan"), ("bengisu-akay", "arctan"), ("bengisu-akay", "power")]
+    )
+    def test_are_covered_by_what_is_stated(self, cells, law, drive):
         rng = np.random.default_rng(8)
         count = 400
         values = {
@@ -276,7 +278,10 @@ class TestErrors:
                 "friction.alpha": 10 ** rng.uniform(0, 5, count),
                 "friction.v0": 10 ** rng.uniform(-6, -0.5, count),
             }
-        batch = cells(values, law=law, drive="arctan")
+        if drive == "power":
+            # Below 2 the acceleration is infinite at first, and the first steps are as short at any tolerance.
+            values["drive.exponent"] = rng.uniform(1.05, 1.95, count)
+        batch = cells(values, law=law, drive=drive)
         found = Auto().run(batch, NAMES)
         exact = solve(Event(rtol=1e-14) if law == "stiction" else Implicit(rtol=3e-10), batch)
         held, ratios = [], []
