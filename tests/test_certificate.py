@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from solutions import solve
+from solutions import HISTORY, solve
 
 import ringsweep
 from ringsweep import hooks
@@ -179,6 +179,24 @@ class TestLaunch:
             scene = take(cells({"drive.amplitude": 0.3, "drive.exponent": exponent}, law=law, drive="power"), 0)
             _, (_, v) = hooks.embark(scene)
             assert (v < 0.0) == (exponent < 2.0)
+
+    def test_a_drive_that_begins_with_an_infinite_acceleration_leaves_the_body_behind(self, cells):
+        """No friction keeps up with it: the body lags from the first instant, though its lag is below the tolerance."""
+        rng = np.random.default_rng(5)
+        count = 60
+        values = {
+            "drive.amplitude": 10 ** rng.uniform(-2, 1, count),
+            "drive.exponent": rng.uniform(1.5, 1.99, count),
+            "friction.v0": 10 ** rng.uniform(-9, -2, count),
+            "time.span": 0.3,
+        }
+        batch = cells(values, drive="power")
+        omega, ring_omega = HISTORY.index("omega"), HISTORY.index("ring_omega")
+        for i in range(count):
+            times, rows = Implicit().history(take(batch, [i]), 50, len(HISTORY))
+            early = rows[times < 1e-8]
+            assert len(early) > 10
+            assert (early[:, omega] < early[:, ring_omega]).all()
 
 
 class TestNumbers:
