@@ -51,7 +51,7 @@ from benchmarks._common import (
 from benchmarks.peers import in_c
 from benchmarks.peers.physics import Law
 from ringsweep import plots
-from ringsweep.variables import SEPARATING
+from ringsweep.quantities.variables import SEPARATING
 
 SEED, SIDE = 181, 64
 RESULTS = Path(__file__).parent / "results"

@@ -9,7 +9,7 @@ import pdoc
 import ringsweep
 
 # Reference pages for what users call; the rest is for those who read the code.
-MODULES = ("ringsweep", "ringsweep.plots", "ringsweep.variables")
+MODULES = ("ringsweep", "ringsweep.plots", "ringsweep.quantities.variables")
 
 
 def build(folder: Path) -> None:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ringsweep.engine import run, sweep
     from ringsweep.errors import InputError
+    from ringsweep.quantities.variables import words
     from ringsweep.single import simulate
-    from ringsweep.variables import words
     from ringsweep.work import precision
 
 __all__ = ["InputError", "precision", "run", "simulate", "sweep", "words"]
@@ -19,7 +19,7 @@ _HOMES = {
     "sweep": "engine",
     "simulate": "single",
     "precision": "work",
-    "words": "variables",
+    "words": "quantities.variables",
     "InputError": "errors",
 }
 

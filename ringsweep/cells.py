@@ -14,9 +14,9 @@ from ringsweep.config import Axes, Config
 from ringsweep.layout import Layout
 from ringsweep.models import MODELS, batch
 from ringsweep.provenance import environment, processor
+from ringsweep.quantities.variables import OUTCOMES
 from ringsweep.scene import LAW, Scene, Values
 from ringsweep.solvers.common import Result, with_errors
-from ringsweep.variables import OUTCOMES
 
 #: Where along each dimension cells lie, by name of the dimension.
 Place = Mapping[str, NDArray[np.intp]]

@@ -1,7 +1,7 @@
 """Configuration text to validated scene, axes and solver in SI units.
 
 Every message about wrong input starts here, from what physics and solvers declare about their
-parameters; :mod:`ringsweep.document` knows the lines, :mod:`ringsweep.units` the units.
+parameters; :mod:`ringsweep.document` knows the lines, :mod:`ringsweep.quantities.units` the units.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from ringsweep import document
 from ringsweep.document import Document, scalar
 from ringsweep.errors import InputError
 from ringsweep.models import batch, parameters
-from ringsweep.parameters import Choice, Parameter, declared
+from ringsweep.quantities.parameters import Choice, Parameter, declared
+from ringsweep.quantities.units import quantity, show
+from ringsweep.quantities.variables import OUTCOMES
 from ringsweep.scene import LAW, Scene, Structure
-from ringsweep.units import quantity, show
-from ringsweep.variables import OUTCOMES
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -19,7 +19,7 @@ import numpy as np
 import yaml
 
 from ringsweep.errors import InputError
-from ringsweep.units import NUMBER, show
+from ringsweep.quantities.units import NUMBER, show
 
 #: Nodes that a configuration may have after its aliases are expanded.
 LIMIT = 100_000

@@ -29,8 +29,8 @@ from ringsweep.layout import Layout
 from ringsweep.pace import Pace
 from ringsweep.pace import chunks as chunks_of
 from ringsweep.provenance import attributes, differences, environment, identity
+from ringsweep.quantities.variables import OUTCOMES, linked
 from ringsweep.reuse import Earlier
-from ringsweep.variables import OUTCOMES, linked
 
 logger = logging.getLogger("ringsweep")
 
@@ -71,8 +71,8 @@ def run(
     Returns
     -------
     xarray.Dataset
-        One dimension per swept path; see :data:`ringsweep.variables.OUTCOMES`. That of an output file reads what
-        is asked of it; ``.load()`` reads all.
+        One dimension per swept path; see :data:`ringsweep.quantities.variables.OUTCOMES`. The dataset of an output
+        file reads values when they are asked for; ``.load()`` reads all.
 
     Raises
     ------

@@ -10,7 +10,7 @@ import numpy as np
 from ringsweep.jit import inlined
 from ringsweep.lanes import any_of, select
 from ringsweep.physics import contact
-from ringsweep.variables import FAILED, JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
+from ringsweep.quantities.variables import FAILED, JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 
 #: How a run stands or ended.
 RUNNING, COMPLETE, SEPARATED_1, SEPARATED_2, SEPARATED_BOTH, JAM, BROKEN = range(7)

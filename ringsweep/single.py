@@ -17,8 +17,8 @@ from ringsweep.jit import take
 from ringsweep.models import MODELS, batch
 from ringsweep.physics.drives import turn
 from ringsweep.provenance import attributes
+from ringsweep.quantities.variables import HISTORY, REGIMES
 from ringsweep.scene import Structure
-from ringsweep.variables import HISTORY, REGIMES
 
 #: Instants that a history keeps, about.
 SAMPLES = 20_000
@@ -45,7 +45,7 @@ def simulate(
     Returns
     -------
     xarray.Dataset
-        Dimension ``time``, variables as in :data:`ringsweep.variables.HISTORY`, and the outcomes of
+        Dimension ``time``, variables as in :data:`ringsweep.quantities.variables.HISTORY`, and the outcomes of
         the run as scalars. If laws are compared these have the dimension ``friction_law``, and the
         histories both: at the instants of all runs, NaN after the end of a run that ends early (where a
         classification stays as it was).

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.layout import Layout
-from ringsweep.variables import Variable, linked
+from ringsweep.quantities.variables import Variable, linked
 
 #: Attributes that tell a file of this package from any other NetCDF file.
 SIGNATURE = ("Conventions", "ringsweep_version")

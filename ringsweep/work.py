@@ -21,15 +21,15 @@ from ringsweep.engine import progress_bar
 from ringsweep.errors import InputError
 from ringsweep.jit import take
 from ringsweep.models import MODELS, batch
-from ringsweep.parameters import Parameter
 from ringsweep.physics.friction import LAWS, SET_VALUED
 from ringsweep.provenance import attributes
+from ringsweep.quantities.parameters import Parameter
+from ringsweep.quantities.units import quantity
+from ringsweep.quantities.variables import FAILED, PRECISION, Variable
 from ringsweep.scene import LAW
 from ringsweep.solvers.common import Result, agree
 from ringsweep.solvers.event import Event, Implicit
 from ringsweep.solvers.rk4 import RK4
-from ringsweep.units import quantity
-from ringsweep.variables import FAILED, PRECISION, Variable
 
 #: What is asked of a setting, unless the user says otherwise: largest error in rad or m, and in s.
 TARGET = 1e-6
@@ -91,8 +91,8 @@ def precision(
     Returns
     -------
     xarray.Dataset
-        Dimensions ``contender`` and ``cell``, variables as in :data:`ringsweep.variables.PRECISION`; coordinates
-        ``method``, ``setting`` and ``solver`` (what stands under ``solver`` in a configuration) of each contender, and
+        Dimensions ``contender`` and ``cell``; the variables are those of
+        :data:`ringsweep.quantities.variables.PRECISION`; coordinates ``method``, ``setting`` and ``solver`` (what stands under ``solver`` in a configuration) of each contender, and
         those of each cell. Run times are processor times of one thread, without certificates and
         compilation; the error of a run that failed is infinite.
         Attributes: ``target``; ``recommended``, one of ``solver``, or ``closest`` where none meets the

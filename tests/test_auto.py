@@ -10,11 +10,11 @@ from solutions import HISTORY, Fall, solve
 
 from ringsweep.jit import take
 from ringsweep.models import batch, parameters
+from ringsweep.quantities.variables import FAILED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 from ringsweep.scene import Structure
 from ringsweep.solvers import event
 from ringsweep.solvers.event import Auto, Event, Implicit
 from ringsweep.solvers.rk4 import RK4
-from ringsweep.variables import FAILED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 
 KINDS = ("regime", "motion", "separating_contact")
 COEFFICIENTS = [f"friction.{place}.{name}" for place in ("rough", "rest") for name in ("mu_s", "mu_k")]

@@ -9,8 +9,8 @@ import pytest
 import xarray as xr
 
 import ringsweep
+from ringsweep.quantities.variables import REGIMES
 from ringsweep.solvers.rk4 import STABILITY_LIMIT
-from ringsweep.variables import REGIMES
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 G = 9.81

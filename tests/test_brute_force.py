@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from solutions import solve
 
+from ringsweep.quantities.variables import REGIMES
 from ringsweep.solvers.event import Auto
-from ringsweep.variables import REGIMES
 
 PATHS = {
     "amplitude": "drive.amplitude",

@@ -10,11 +10,11 @@ import ringsweep
 from ringsweep import hooks
 from ringsweep.jit import take
 from ringsweep.models import MODELS
+from ringsweep.quantities.variables import FAILED, JAMMED, RESTING, SEPARATING
 from ringsweep.solvers import event, piecewise
 from ringsweep.solvers.common import with_errors
 from ringsweep.solvers.event import Auto, Event, Implicit
 from ringsweep.solvers.rk4 import RK4
-from ringsweep.variables import FAILED, JAMMED, RESTING, SEPARATING
 
 NAMES = MODELS["ring"].outcomes
 COEFFICIENTS = [f"friction.{place}.{name}" for place in ("rough", "rest") for name in ("mu_s", "mu_k")]

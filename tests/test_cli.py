@@ -17,10 +17,10 @@ from ringsweep.config import load
 from ringsweep.models import MODELS, parameters
 from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS
+from ringsweep.quantities.variables import HISTORY, OUTCOMES
 from ringsweep.scene import Structure
 from ringsweep.schema import schema
 from ringsweep.solvers import METHODS
-from ringsweep.variables import HISTORY, OUTCOMES
 
 ROOT = Path(__file__).parents[1]
 

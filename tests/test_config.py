@@ -18,9 +18,9 @@ from jsonschema import Draft202012Validator
 from ringsweep import config as reading
 from ringsweep.config import load, read_axes, read_scene, read_solver, with_values
 from ringsweep.errors import InputError
-from ringsweep.parameters import Parameter
+from ringsweep.quantities.parameters import Parameter
+from ringsweep.quantities.units import quantity
 from ringsweep.schema import schema
-from ringsweep.units import quantity
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 

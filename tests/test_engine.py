@@ -9,9 +9,9 @@ import xarray as xr
 
 import ringsweep
 from ringsweep.config import load
+from ringsweep.quantities.variables import OUTCOMES, REGIMES
 from ringsweep.regimes import Outcome
 from ringsweep.solvers.common import with_errors
-from ringsweep.variables import OUTCOMES, REGIMES
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 AMPLITUDES = [0.5, 2.0, 8.0]

@@ -8,8 +8,8 @@ from scipy.optimize import fsolve
 from solutions import Fall, imbalance, motion, solve, trail
 
 from ringsweep.jit import take
+from ringsweep.quantities.variables import JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 from ringsweep.solvers.event import Event
-from ringsweep.variables import JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 
 EXACT = Event(rtol=1e-14, certify=False)
 

@@ -10,7 +10,7 @@ import ringsweep
 from ringsweep import engine, plots
 from ringsweep.config import load
 from ringsweep.errors import InputError
-from ringsweep.variables import OUTCOMES, REGIMES
+from ringsweep.quantities.variables import OUTCOMES, REGIMES
 
 AXES = {"drive.amplitude": [0.5, 2.0, 8.0], "zone.half_angle": ["10 deg", "20 deg", "40 deg", "60 deg"]}
 

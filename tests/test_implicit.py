@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from solutions import imbalance, solve, trail
 
+from ringsweep.quantities.variables import JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 from ringsweep.solvers.event import Event, Implicit
 from ringsweep.solvers.rk4 import RK4
-from ringsweep.variables import JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 
 EXACT = Implicit(rtol=1e-11, certify=False)
 LIMIT = Event(rtol=1e-14, certify=False)

@@ -24,10 +24,10 @@ from ringsweep.lanes import (
     write,
 )
 from ringsweep.models import MODELS
-from ringsweep.parameters import declared
 from ringsweep.physics.drives import scaled
 from ringsweep.physics.friction import LAWS
 from ringsweep.physics.friction.static import BAND, piece, steepest, stiction_band, weights
+from ringsweep.quantities.parameters import declared
 from ringsweep.solvers import rk4
 from ringsweep.solvers.rk4 import RK4
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from ringsweep import plots
 from ringsweep.errors import InputError
-from ringsweep.variables import HISTORY, OUTCOMES, REGIMES
+from ringsweep.quantities.variables import HISTORY, OUTCOMES, REGIMES
 
 DRIVE = {"units": "rad s-1", "long_name": "amplitude of the drive"}
 ANGLE = {"units": "rad", "long_name": "half-angle of the rough arc"}

@@ -12,7 +12,7 @@ from ringsweep import plots, storage, work
 from ringsweep.cli import main
 from ringsweep.config import load
 from ringsweep.errors import InputError
-from ringsweep.variables import PRECISION
+from ringsweep.quantities.variables import PRECISION
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 TARGET = 1e-7

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from solutions import solve
 
+from ringsweep.quantities.variables import SEPARATING
 from ringsweep.solvers.event import Auto
-from ringsweep.variables import SEPARATING
 
 COUNT = 1000
 KINDS = ("regime", "motion")

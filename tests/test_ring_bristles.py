@@ -9,10 +9,10 @@ from solutions import solve
 from ringsweep.jit import take
 from ringsweep.models import MODELS
 from ringsweep.physics.friction.dynamic import NEARLY
+from ringsweep.quantities.variables import JAMMED, OSCILLATORY, REVOLVING, SEPARATING
 from ringsweep.scene import Structure
 from ringsweep.solvers.event import Event, Implicit
 from ringsweep.solvers.rk4 import RK4
-from ringsweep.variables import JAMMED, OSCILLATORY, REVOLVING, SEPARATING
 
 EXACT = Implicit(rtol=1e-9, certify=False)
 LIMIT = Event(rtol=1e-14, certify=False)

@@ -12,9 +12,9 @@ from ringsweep.jit import take
 from ringsweep.models.ring import Inspection
 from ringsweep.physics.friction.static import weights
 from ringsweep.physics.ring import acceleration, reactions
+from ringsweep.quantities.variables import FAILED, JAMMED, OSCILLATORY, REGIMES, RESTING, REVOLVING, SEPARATING
 from ringsweep.regimes import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2, Outcome
 from ringsweep.solvers.rk4 import RK4, STABILITY_LIMIT
-from ringsweep.variables import FAILED, JAMMED, OSCILLATORY, REGIMES, RESTING, REVOLVING, SEPARATING
 
 MU = 0.1
 #: Turned so fast that the body slips backward whatever it does.

@@ -7,10 +7,10 @@ import pytest
 from solutions import solve
 
 from ringsweep.models import MODELS
+from ringsweep.quantities.variables import JAMMED, OSCILLATORY, RESTING, SEPARATING
 from ringsweep.regimes import Outcome
 from ringsweep.solvers.event import Auto, Event, Implicit
 from ringsweep.solvers.rk4 import RK4, STABILITY_LIMIT
-from ringsweep.variables import JAMMED, OSCILLATORY, RESTING, SEPARATING
 
 FRICTIONLESS = {f"friction.{place}.mu_{kind}": 0.0 for place in ("rough", "rest") for kind in "sk"}
 XI = sqrt((0.043378 - 0.010) ** 2 - 0.025**2)

@@ -11,7 +11,7 @@ import xarray as xr
 import ringsweep
 from ringsweep import storage
 from ringsweep.errors import InputError
-from ringsweep.variables import OUTCOMES
+from ringsweep.quantities.variables import OUTCOMES
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from ringsweep.models import (  # noqa: F401
 )
 from ringsweep.models.belt import Belt
 from ringsweep.models.ring import Ring, SingleContactRing
-from ringsweep.parameters import Parameter
+from ringsweep.quantities.parameters import Parameter
 from ringsweep.scene import Structure, Values
 
 MODELS = {model.name: model for model in (Ring(), SingleContactRing(), Belt())}

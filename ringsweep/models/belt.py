@@ -11,11 +11,11 @@ import numpy as np
 from ringsweep.errors import InputError
 from ringsweep.jit import inlined, take
 from ringsweep.models.common import GRAVITY, MASS, SPAN, drive_of, law_of, pair
-from ringsweep.parameters import Parameter, declared
 from ringsweep.physics import belt, drives, friction
+from ringsweep.quantities.parameters import Parameter, declared
+from ringsweep.quantities.variables import FAILED, OSCILLATORY, RESTING, STICK_SLIP
 from ringsweep.regimes import BROKEN
 from ringsweep.scene import Structure, Values, require
-from ringsweep.variables import FAILED, OSCILLATORY, RESTING, STICK_SLIP
 
 
 class Outcome(NamedTuple):

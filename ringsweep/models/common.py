@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ringsweep.jit import absorbed
 from ringsweep.lanes import select, square_root
-from ringsweep.parameters import Parameter, declared
 from ringsweep.physics import drives, friction
+from ringsweep.quantities.parameters import Parameter, declared
 from ringsweep.scene import Structure, Values, require
 
 MASS = Parameter("kg", "mass of the body", lower=0.0, open_lower=True)

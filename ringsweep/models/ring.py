@@ -12,9 +12,9 @@ from ringsweep import hooks, regimes
 from ringsweep.jit import inlined
 from ringsweep.lanes import Several, any_of, select, sine_cosine, sine_cosine_near
 from ringsweep.models.common import GRAVITY, MASS, SPAN, drive_of, largest_eigenvalue, law_of, pair
-from ringsweep.parameters import Parameter, declared
 from ringsweep.physics import contact, drives, friction, ring, zones
 from ringsweep.physics.friction.static import met, steepest, stiction_band
+from ringsweep.quantities.parameters import Parameter, declared
 from ringsweep.regimes import BROKEN, ENDS, JAM, RUNNING
 from ringsweep.scene import Structure, Values, require
 

@@ -18,7 +18,7 @@ from ringsweep.physics.friction import SET_VALUED
 from ringsweep.physics.friction.dynamic import bristle
 from ringsweep.physics.friction.static import BAND, stiction_band, weights
 from ringsweep.physics.zones import PER_TURN, Segments, edge_ahead, roughest, roughness
-from ringsweep.variables import SEPARATING
+from ringsweep.quantities.variables import SEPARATING
 
 # Rounding of accelerations, as a share of their largest terms.
 _ROUNDING = 1e-12

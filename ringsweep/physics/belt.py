@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from ringsweep.parameters import Leaf
+from ringsweep.quantities.parameters import Leaf
 
 
 class Belt(NamedTuple):

@@ -13,7 +13,7 @@ from math import atan, cos, inf, log1p, pi, sin
 from typing import Annotated, Any, NamedTuple
 
 from ringsweep.jit import hook, inlined, inner_hook
-from ringsweep.parameters import Leaf, Parameter
+from ringsweep.quantities.parameters import Leaf, Parameter
 
 
 class Still(NamedTuple):

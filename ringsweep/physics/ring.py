@@ -33,10 +33,10 @@ import numpy as np
 
 from ringsweep.jit import absorbed, hook, inlined, inner_hook
 from ringsweep.lanes import opposing
-from ringsweep.parameters import Leaf
 from ringsweep.physics import drives
 from ringsweep.physics.friction.static import weights
 from ringsweep.physics.zones import PER_TURN, roughness
+from ringsweep.quantities.parameters import Leaf
 
 
 class TwoContacts(NamedTuple):

@@ -16,7 +16,7 @@ from numba.extending import overload
 
 from ringsweep.jit import WITHIN, hook, inlined, inner_hook
 from ringsweep.lanes import floor, select
-from ringsweep.parameters import Leaf, Parameter
+from ringsweep.quantities.parameters import Leaf, Parameter
 
 HALF_ANGLE = Parameter("rad", "half-angle of the rough zone", lower=0.0, upper=pi)
 CENTER = Parameter("rad", "centre of the rough zone in the ring's frame", lower=-2 * pi, upper=2 * pi, default=0.0)

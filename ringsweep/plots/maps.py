@@ -23,7 +23,6 @@ from matplotlib.ticker import LogFormatterSciNotation, MaxNLocator
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
-from ringsweep.parameters import Parameter
 from ringsweep.plots.style import (
     NO_VALUE,
     OTHER_COLOURS,
@@ -39,7 +38,8 @@ from ringsweep.plots.style import (
     runs,
     value_text,
 )
-from ringsweep.units import quantity
+from ringsweep.quantities.parameters import Parameter
+from ringsweep.quantities.units import quantity
 
 _MOST_PANELS = 25
 

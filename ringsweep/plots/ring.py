@@ -34,7 +34,7 @@ from ringsweep.plots.style import (
     beside,
     runs,
 )
-from ringsweep.variables import MODES
+from ringsweep.quantities.variables import MODES
 
 # Slip is of the body's hue in every picture; the darker is forward.
 _MODE_LINES: dict[int, dict[str, Any]] = {

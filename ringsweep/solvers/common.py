@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.hooks import undecided
+from ringsweep.quantities.variables import FAILED, OUTCOMES
 from ringsweep.scene import Structure
-from ringsweep.variables import FAILED, OUTCOMES
 
 #: What two resolutions must agree on for a certificate.
 _WITNESSED = ("regime", "motion", "separating_contact")

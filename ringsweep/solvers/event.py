@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.jit import take
-from ringsweep.parameters import Parameter
 from ringsweep.physics.friction import DYNAMIC, LAWS, SET_VALUED, SMOOTH
+from ringsweep.quantities.parameters import Parameter
 from ringsweep.scene import Structure
 from ringsweep.solvers.common import Method, Result, errors, repeated, vouched, with_errors
 from ringsweep.solvers.piecewise import integrate

@@ -47,13 +47,13 @@ from ringsweep.lanes import (
     width,
     write,
 )
-from ringsweep.parameters import Parameter
 from ringsweep.physics.drives import lookup, scaled, shape, turn
 from ringsweep.physics.friction import LAWS, WITH_SNAPS
+from ringsweep.quantities.parameters import Parameter
+from ringsweep.quantities.variables import SEPARATING
 from ringsweep.regimes import COMPLETE, RUNNING
 from ringsweep.scene import Structure
 from ringsweep.solvers.common import Method, Result, errors, same_drive, vouched, with_errors
-from ringsweep.variables import SEPARATING
 
 #: Radius of the largest half disc of the left half plane in which the method is stable: 2.616 where an eigenvalue is
 #: complex; on the real axis alone it would be 2.785.

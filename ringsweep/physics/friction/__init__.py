@@ -10,9 +10,9 @@ from typing import Any
 
 from ringsweep.errors import InputError
 from ringsweep.jit import OWN_LAWS
-from ringsweep.parameters import Parameter
 from ringsweep.physics.friction import dynamic, set_valued, smooth
 from ringsweep.physics.friction.static import MU_K, MU_S
+from ringsweep.quantities.parameters import Parameter
 
 for _path in OWN_LAWS:
     # By its name in `sys.modules` a law is found again when compiled code is loaded.

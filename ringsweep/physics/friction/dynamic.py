@@ -13,8 +13,8 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from ringsweep.jit import hook, inlined
-from ringsweep.parameters import Leaf, Parameter
 from ringsweep.physics.friction.static import BAND, CLEAN
+from ringsweep.quantities.parameters import Leaf, Parameter
 
 MU_K = Parameter("1", "kinetic friction coefficient", lower=0.0, open_lower=True)
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from ringsweep.jit import inlined
 from ringsweep.lanes import decay, select
-from ringsweep.parameters import Leaf, Parameter
 from ringsweep.physics.friction.static import BAND, CLEAN, ONE, TAIL, ZERO, Piece, blend, piece, steepest, stiction_band
+from ringsweep.quantities.parameters import Leaf, Parameter
 
 ALPHA = Parameter("s/m", "decay of friction with sliding speed", lower=0.0)
 

@@ -6,9 +6,9 @@ from math import exp, inf
 from typing import Annotated, Any, NamedTuple
 
 from ringsweep.lanes import decay, select
-from ringsweep.parameters import Leaf, Parameter
 from ringsweep.physics.friction.set_valued import ALPHA, absent, decaying, end_of_tail, tail
 from ringsweep.physics.friction.static import BAND, CLEAN, ONE, TAIL, ZERO, Piece, blend, piece, steepest, stiction_band
+from ringsweep.quantities.parameters import Leaf, Parameter
 
 V0 = Parameter("m/s", "half-width of the stiction band", lower=0.0, open_lower=True)
 V1 = Parameter("m/s", "sliding speed from which friction is kinetic", lower=0.0, open_lower=True)

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from ringsweep.jit import hook, inlined, inner_hook
 from ringsweep.lanes import either
-from ringsweep.parameters import Parameter
+from ringsweep.quantities.parameters import Parameter
 
 MU_S = Parameter("1", "static friction coefficient", lower=0.0)
 MU_K = Parameter("1", "kinetic friction coefficient", lower=0.0)

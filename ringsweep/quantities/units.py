@@ -10,7 +10,7 @@ from numbers import Real
 from typing import Any
 
 from ringsweep.errors import InputError
-from ringsweep.parameters import Parameter
+from ringsweep.quantities.parameters import Parameter
 
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 
