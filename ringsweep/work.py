@@ -92,7 +92,8 @@ def precision(
     -------
     xarray.Dataset
         Dimensions ``contender`` and ``cell``; the variables are those of
-        :data:`ringsweep.quantities.variables.PRECISION`; coordinates ``method``, ``setting`` and ``solver`` (what stands under ``solver`` in a configuration) of each contender, and
+        :data:`ringsweep.quantities.variables.PRECISION`; coordinates ``method``, ``setting`` and ``solver`` (what
+        stands under ``solver`` in a configuration) of each contender, and
         those of each cell. Run times are processor times of one thread, without certificates and
         compilation; the error of a run that failed is infinite.
         Attributes: ``target``; ``recommended``, one of ``solver``, or ``closest`` where none meets the

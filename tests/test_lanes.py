@@ -7,23 +7,10 @@ import numpy as np
 import pytest
 
 from ringsweep.jit import OPTIONS, take
-from ringsweep.lanes import (
-    WIDTH,
-    Several,
-    Single,
-    any_of,
-    conform,
-    decay,
-    floor,
-    opposing,
-    read_lanes,
-    select,
-    side_by_side,
-    sine_cosine,
-    sine_cosine_near,
-    write,
-)
 from ringsweep.models import MODELS
+from ringsweep.numerics.functions import any_of, decay, floor, opposing, select, sine_cosine, sine_cosine_near
+from ringsweep.numerics.lanes import WIDTH
+from ringsweep.numerics.memory import Several, Single, conform, read_lanes, side_by_side, write
 from ringsweep.physics.drives import scaled
 from ringsweep.physics.friction import LAWS
 from ringsweep.physics.friction.static import BAND, piece, steepest, stiction_band, weights

@@ -377,7 +377,7 @@ class TestOrderOfSpeeds:
 
 OWN = """
 from typing import Annotated, NamedTuple
-from ringsweep.lanes import select
+from ringsweep.numerics.functions import select
 from ringsweep.quantities.parameters import Leaf
 from ringsweep.physics.friction import smooth
 from ringsweep.physics.friction.static import BAND, CLEAN, ONE, TAIL, ZERO, Piece, piece, stiction_band

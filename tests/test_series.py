@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from ringsweep.series import (
+from ringsweep.numerics.series import (
     INVERSE,
     ORDER,
     STACK,

@@ -13,6 +13,7 @@ from ringsweep import hooks
 from ringsweep.jit import inlined
 from ringsweep.models.belt import begin, conclude, observe
 from ringsweep.models.common import largest_eigenvalue
+from ringsweep.numerics.series import INVERSE, ORDER, ascending, crossings, reach, slope, value, variation
 from ringsweep.physics import belt, drives
 from ringsweep.physics.friction.static import (
     BAND,
@@ -29,7 +30,6 @@ from ringsweep.physics.friction.static import (
     weights,
 )
 from ringsweep.regimes import BROKEN, RUNNING
-from ringsweep.series import INVERSE, ORDER, ascending, crossings, reach, slope, value, variation
 
 # ---- constant step ---------------------------------------------------------------------------
 

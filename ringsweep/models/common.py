@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.jit import absorbed
-from ringsweep.lanes import select, square_root
+from ringsweep.numerics.functions import select, square_root
 from ringsweep.physics import drives, friction
 from ringsweep.quantities.parameters import Parameter, declared
 from ringsweep.scene import Structure, Values, require

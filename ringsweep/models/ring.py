@@ -10,8 +10,9 @@ import numpy as np
 
 from ringsweep import hooks, regimes
 from ringsweep.jit import inlined
-from ringsweep.lanes import Several, any_of, select, sine_cosine, sine_cosine_near
 from ringsweep.models.common import GRAVITY, MASS, SPAN, drive_of, largest_eigenvalue, law_of, pair
+from ringsweep.numerics.functions import any_of, select, sine_cosine, sine_cosine_near
+from ringsweep.numerics.memory import Several
 from ringsweep.physics import contact, drives, friction, ring, zones
 from ringsweep.physics.friction.static import met, steepest, stiction_band
 from ringsweep.quantities.parameters import Parameter, declared

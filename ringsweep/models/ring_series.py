@@ -16,6 +16,18 @@ from typing import NamedTuple
 
 from ringsweep import hooks, regimes
 from ringsweep.jit import hook, inlined
+from ringsweep.numerics.series import (
+    INVERSE,
+    ORDER,
+    ascending,
+    crossings,
+    may_fall_below,
+    product,
+    reach,
+    slope,
+    value,
+    variation,
+)
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction.static import (
     BAND,
@@ -32,18 +44,6 @@ from ringsweep.physics.friction.static import (
 )
 from ringsweep.physics.zones import beyond, coefficients, cross, edge_ahead, locate
 from ringsweep.regimes import BROKEN, ENDS, JAM, RUNNING
-from ringsweep.series import (
-    INVERSE,
-    ORDER,
-    ascending,
-    crossings,
-    may_fall_below,
-    product,
-    reach,
-    slope,
-    value,
-    variation,
-)
 
 # Rows of the series; the guards last, and first of them the one without which the others mean nothing.
 PHI, V, OMEGA, EPSILON, SIN, COS, SQUARE, THETA, EXCESS, BASIS, STATIC, KINETIC = range(12)

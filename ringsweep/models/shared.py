@@ -7,7 +7,7 @@ from math import inf, isfinite
 import numpy as np
 
 from ringsweep import hooks
-from ringsweep.lanes import Single
+from ringsweep.numerics.memory import Single
 from ringsweep.physics import drives
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.friction.static import BAND

@@ -32,7 +32,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ringsweep.jit import absorbed, hook, inlined, inner_hook
-from ringsweep.lanes import opposing
+from ringsweep.numerics.functions import opposing
 from ringsweep.physics import drives
 from ringsweep.physics.friction.static import weights
 from ringsweep.physics.zones import PER_TURN, roughness

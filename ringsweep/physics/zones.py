@@ -15,7 +15,7 @@ from numba import types
 from numba.extending import overload
 
 from ringsweep.jit import WITHIN, hook, inlined, inner_hook
-from ringsweep.lanes import floor, select
+from ringsweep.numerics.functions import floor, select
 from ringsweep.quantities.parameters import Leaf, Parameter
 
 HALF_ANGLE = Parameter("rad", "half-angle of the rough zone", lower=0.0, upper=pi)
@@ -42,7 +42,7 @@ class Segments(NamedTuple):
 
     ``arc`` is 0 where no rough arc lies and k on the k-th of them; ``roughest`` is the largest static and the least
     kinetic coefficient, ``narrowest`` the width of the narrowest segment, rad. In memory a cell's segments are a row of
-    an array; where cells stand side by side, in :mod:`ringsweep.lanes`, they are a tuple.
+    an array; where cells stand side by side, in :mod:`ringsweep.numerics.lanes`, they are a tuple.
     """
 
     edges: Any

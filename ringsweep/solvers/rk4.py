@@ -31,17 +31,16 @@ from ringsweep.hooks import (
     verdict,
 )
 from ringsweep.jit import absorbed, add_scaled, hook, inlined, inner_hook, kernel, take
-from ringsweep.lanes import (
-    WIDTH,
+from ringsweep.numerics.functions import any_of, select
+from ringsweep.numerics.lanes import WIDTH
+from ringsweep.numerics.memory import (
     Several,
     Single,
     align_stack,
-    any_of,
     conform,
     gather,
     read,
     read_lanes,
-    select,
     side_by_side,
     size_of,
     width,
@@ -332,7 +331,7 @@ def integrate(
     account : Kept or Dropped
         Whether stiffness and slack are kept.
     batch : NamedTuple
-        Scenes; where several stand side by side, :func:`ringsweep.lanes.side_by_side` and with their drive
+        Scenes; where several stand side by side, :func:`ringsweep.numerics.lanes.side_by_side` and with their drive
         :func:`ringsweep.physics.drives.scaled`.
     drive : NamedTuple
         The drive of one of the cells.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import exp, inf
 from typing import Annotated, Any, NamedTuple
 
-from ringsweep.lanes import decay, select
+from ringsweep.numerics.functions import decay, select
 from ringsweep.physics.friction.set_valued import ALPHA, absent, decaying, end_of_tail, tail
 from ringsweep.physics.friction.static import BAND, CLEAN, ONE, TAIL, ZERO, Piece, blend, piece, steepest, stiction_band
 from ringsweep.quantities.parameters import Leaf, Parameter

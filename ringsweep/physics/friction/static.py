@@ -16,7 +16,7 @@ from math import exp, sqrt
 from typing import NamedTuple
 
 from ringsweep.jit import hook, inlined, inner_hook
-from ringsweep.lanes import either
+from ringsweep.numerics.functions import either
 from ringsweep.quantities.parameters import Parameter
 
 MU_S = Parameter("1", "static friction coefficient", lower=0.0)
@@ -93,7 +93,8 @@ def constant_weights(law, region):
 
 @inner_hook
 def blend(law, speed):
-    """:func:`weights` where the speed is :mod:`ringsweep.lanes`, each in a region of its own: hence without ``if``."""
+    """:func:`weights` where the speed is :mod:`ringsweep.numerics.lanes`, each in a region of its own: hence without
+    ``if``."""
 
 
 @inner_hook

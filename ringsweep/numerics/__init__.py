@@ -1,0 +1,1 @@
+"""What formulas and solvers compute with: vector lanes, and power series."""
