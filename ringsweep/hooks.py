@@ -7,7 +7,7 @@ validity.
 
 from __future__ import annotations
 
-from ringsweep.jit import hook, inner_hook
+from ringsweep.compile import absorbed_hook, hook
 
 
 @hook
@@ -15,7 +15,7 @@ def launch(scene):
     """State at t = 0."""
 
 
-@inner_hook
+@absorbed_hook
 def rates(scene, now, y, drive_at, drive_rate):
     """Time derivative of the state `y` while the drive is at `drive_at` and moves at `drive_rate`.
 
@@ -23,7 +23,7 @@ def rates(scene, now, y, drive_at, drive_rate):
     """
 
 
-@inner_hook
+@absorbed_hook
 def inspect(scene, y, drive_at, drive_rate):
     """Inspection of the state `y`; its field ``rates`` is the time derivative."""
 
@@ -33,7 +33,7 @@ def lanes(scene):
     """How many runs of such a scene stand side by side in the kernel of a constant step: `Several` or `Single`."""
 
 
-@inner_hook
+@absorbed_hook
 def holds(scene, now):
     """Whether the model still holds in an inspected state; where not, :func:`verdict` says why."""
 
@@ -50,12 +50,12 @@ def verdict(scene, before, now):
     """
 
 
-@inner_hook
+@absorbed_hook
 def stiffness(scene, before, now, h):
     """Largest magnitude of the eigenvalue times `h` that a step of `h` seconds met."""
 
 
-@inner_hook
+@absorbed_hook
 def slack(scene, before, now):
     """How far from its end the model stayed within a step between two inspections, bounded from below; in its own unit.
 
@@ -63,7 +63,7 @@ def slack(scene, before, now):
     """
 
 
-@inner_hook
+@absorbed_hook
 def stride(scene, now, h):
     """Share of the narrowest segment of the surface that the body slides across in a step of `h` seconds."""
 
@@ -78,7 +78,7 @@ def begin(scene, y, now):
     """Record of a run at its launch."""
 
 
-@inner_hook
+@absorbed_hook
 def observe(scene, record, y, before, now, t, h):
     """Record after a step of `h` seconds to the state `y` at time `t`."""
 

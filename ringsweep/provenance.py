@@ -15,8 +15,8 @@ from typing import Any
 import llvmlite.binding
 import numpy as np
 
+from ringsweep.compile import SOURCES_DIGEST
 from ringsweep.config import Config
-from ringsweep.jit import SOURCES_DIGEST
 from ringsweep.models import MODELS
 from ringsweep.scene import LAW
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ringsweep.jit import inlined
+from ringsweep.compile import inlined
 from ringsweep.numerics.functions import any_of, select
 from ringsweep.physics import contact
 from ringsweep.quantities.variables import FAILED, JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING

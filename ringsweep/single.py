@@ -11,9 +11,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ringsweep.compile import take
 from ringsweep.config import Config, read_solver, with_values
 from ringsweep.engine import compute
-from ringsweep.jit import take
 from ringsweep.models import MODELS, batch
 from ringsweep.physics.drives import turn
 from ringsweep.provenance import attributes

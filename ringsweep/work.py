@@ -16,10 +16,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.cells import cells as values_of
+from ringsweep.compile import take
 from ringsweep.config import COUNT, Config, load, sweepable
 from ringsweep.engine import progress_bar
 from ringsweep.errors import InputError
-from ringsweep.jit import take
 from ringsweep.models import MODELS, batch
 from ringsweep.physics.friction import LAWS, SET_VALUED
 from ringsweep.provenance import attributes

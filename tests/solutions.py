@@ -7,7 +7,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from ringsweep.jit import take
+from ringsweep.compile import take
 from ringsweep.physics.friction.static import weights
 from ringsweep.regimes import Outcome
 from ringsweep.solvers.piecewise import integrate

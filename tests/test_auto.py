@@ -8,7 +8,7 @@ from conftest import RIG
 from scipy.special import ellipk
 from solutions import HISTORY, Fall, solve
 
-from ringsweep.jit import take
+from ringsweep.compile import take
 from ringsweep.models import batch, parameters
 from ringsweep.quantities.variables import FAILED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 from ringsweep.scene import Structure

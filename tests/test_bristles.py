@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import ringsweep
-from ringsweep.jit import take
+from ringsweep.compile import take
 from ringsweep.physics.friction import DYNAMIC
 from ringsweep.physics.friction.dynamic import (
     BONDS,

@@ -8,7 +8,7 @@ from solutions import HISTORY, solve
 
 import ringsweep
 from ringsweep import hooks
-from ringsweep.jit import take
+from ringsweep.compile import take
 from ringsweep.models import MODELS
 from ringsweep.quantities.variables import FAILED, JAMMED, RESTING, SEPARATING
 from ringsweep.solvers import event, piecewise

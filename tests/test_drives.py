@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
+from ringsweep.compile import take
 from ringsweep.errors import InputError
-from ringsweep.jit import take
 from ringsweep.models.common import drive_of
 from ringsweep.physics.drives import DRIVES, Arctan, Constant, Power, Sinusoidal, Still, lookup, shape
 from ringsweep.scene import Structure

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import fsolve
 from solutions import Fall, imbalance, motion, solve, trail
 
-from ringsweep.jit import take
+from ringsweep.compile import take
 from ringsweep.quantities.variables import JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 from ringsweep.solvers.event import Event
 

@@ -6,7 +6,7 @@ import numba
 import numpy as np
 import pytest
 
-from ringsweep.jit import OPTIONS, take
+from ringsweep.compile import KERNEL_OPTIONS, take
 from ringsweep.models import MODELS
 from ringsweep.numerics.functions import any_of, decay, floor, opposing, select, sine_cosine, sine_cosine_near
 from ringsweep.numerics.lanes import WIDTH
@@ -21,7 +21,7 @@ from ringsweep.solvers.rk4 import RK4
 NAMES = MODELS["ring"].outcomes
 
 
-@numba.njit(**OPTIONS)
+@numba.njit(**KERNEL_OPTIONS)
 def _functions(x, near, out):
     (a,), (b,) = read_lanes(x, 0, (0.0,)), read_lanes(near, 0, (0.0,))
     sine, cosine = sine_cosine(a)
@@ -31,7 +31,7 @@ def _functions(x, near, out):
     return any_of(a > 1e5)
 
 
-@numba.njit(**OPTIONS)
+@numba.njit(**KERNEL_OPTIONS)
 def _weights(law, memory, at, speed, out):
     (x,) = read_lanes(speed, 0, (0.0,))
     write(out, 0, WIDTH, conform(weights(read_lanes(memory, at, law), x), read_lanes(out, 0, (0.0, 0.0, 0.0, 0.0))))

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ringsweep.compile import SOURCES_DIGEST, take
 from ringsweep.config import load
 from ringsweep.errors import InputError
-from ringsweep.jit import SOURCES_DIGEST, take
 from ringsweep.physics.friction import SET_VALUED, SMOOTH
 from ringsweep.physics.friction.set_valued import Coulomb, Karnopp, Stiction, Tustin
 from ringsweep.physics.friction.smooth import BengisuAkay, PiecewiseCubic, PiecewiseLinear, Threlfall
@@ -406,7 +406,7 @@ smooth.LAWS["ramp"] = Ramp
 
 USE = """
 from ringsweep.config import load
-from ringsweep.jit import SOURCES_DIGEST
+from ringsweep.compile import SOURCES_DIGEST
 from ringsweep.physics.friction import LAWS, SMOOTH
 from ringsweep.physics.friction.static import weights
 from ringsweep.solvers.event import Auto

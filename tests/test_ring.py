@@ -7,9 +7,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from ringsweep.compile import kernel, take
 from ringsweep.errors import InputError
 from ringsweep.hooks import inspect
-from ringsweep.jit import kernel, take
 from ringsweep.physics import ring
 from ringsweep.physics.friction.smooth import BengisuAkay
 from ringsweep.physics.ring import OneContact, Ring, TwoContacts, acceleration, acceleration_slope, reactions

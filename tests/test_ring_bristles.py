@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from solutions import solve
 
-from ringsweep.jit import take
+from ringsweep.compile import take
 from ringsweep.models import MODELS
 from ringsweep.physics.friction.dynamic import NEARLY
 from ringsweep.quantities.variables import JAMMED, OSCILLATORY, REVOLVING, SEPARATING

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ringsweep.compile import take
 from ringsweep.hooks import verdict
-from ringsweep.jit import take
 from ringsweep.models.ring import Inspection
 from ringsweep.physics.friction.static import weights
 from ringsweep.physics.ring import acceleration, reactions

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from ringsweep.jit import take
+from ringsweep.compile import take
 from ringsweep.physics.zones import Arc, Uniform, coefficients, cut, roughest, segment, wrap
 
 REST = (0.2, 0.1)

@@ -8,8 +8,8 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from ringsweep.compile import inlined, take
 from ringsweep.errors import InputError
-from ringsweep.jit import inlined, take
 from ringsweep.models.common import GRAVITY, MASS, SPAN, drive_of, law_of, pair
 from ringsweep.physics import belt, drives, friction
 from ringsweep.quantities.parameters import Parameter, declared

@@ -10,7 +10,7 @@ from math import inf, isfinite
 from typing import NamedTuple
 
 from ringsweep import hooks
-from ringsweep.jit import inlined
+from ringsweep.compile import inlined
 from ringsweep.models.belt import begin, conclude, observe
 from ringsweep.models.common import largest_eigenvalue
 from ringsweep.numerics.series import INVERSE, ORDER, ascending, crossings, reach, slope, value, variation

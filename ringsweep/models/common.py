@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.jit import absorbed
+from ringsweep.compile import absorbed
 from ringsweep.numerics.functions import select, square_root
 from ringsweep.physics import drives, friction
 from ringsweep.quantities.parameters import Parameter, declared

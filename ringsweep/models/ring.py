@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from ringsweep import hooks, regimes
-from ringsweep.jit import inlined
+from ringsweep.compile import inlined
 from ringsweep.models.common import GRAVITY, MASS, SPAN, drive_of, largest_eigenvalue, law_of, pair
 from ringsweep.numerics.functions import any_of, select, sine_cosine, sine_cosine_near
 from ringsweep.numerics.memory import Several

@@ -12,7 +12,7 @@ from math import cos, isnan, sin, sqrt
 from typing import NamedTuple
 
 from ringsweep import hooks, regimes
-from ringsweep.jit import inlined
+from ringsweep.compile import inlined
 from ringsweep.models.common import largest_eigenvalue
 from ringsweep.models.ring_series import AT_ONCE, NEARLY_JAMMED, coefficients_under
 from ringsweep.physics import contact, drives, ring

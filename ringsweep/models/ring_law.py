@@ -11,7 +11,7 @@ from math import cos, inf, sin
 import numpy as np
 
 from ringsweep import hooks, regimes
-from ringsweep.jit import inlined, take
+from ringsweep.compile import inlined, take
 from ringsweep.models.ring_series import coefficients_under
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction import SET_VALUED

@@ -15,7 +15,7 @@ from math import cos, inf, isnan, sin, sqrt
 from typing import NamedTuple
 
 from ringsweep import hooks, regimes
-from ringsweep.jit import hook, inlined
+from ringsweep.compile import hook, inlined
 from ringsweep.numerics.series import (
     INVERSE,
     ORDER,

@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import cos, sin, sqrt
 
 from ringsweep import hooks, regimes
-from ringsweep.jit import inlined
+from ringsweep.compile import inlined
 from ringsweep.models.ring_series import coefficients_under
 from ringsweep.physics import drives, ring
 from ringsweep.physics.friction.static import stiction_band, weights_in

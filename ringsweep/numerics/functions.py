@@ -14,19 +14,16 @@ The numbers of a run never depend on its neighbours: a branch only saves work th
 
 from __future__ import annotations
 
-import inspect
 import math
 from typing import Any
 
 import llvmlite.ir as ir
 import numpy as np
 from numba.core import types
-from numba.extending import intrinsic, overload
+from numba.extending import intrinsic
 
-from ringsweep.jit import WITHIN
+from ringsweep.compile import specialise
 from ringsweep.numerics.lanes import LANES, MASK, VECTOR, WIDTH, WORDS, named
-
-# ---- functions of a float or of Lanes --------------------------------------------------------
 
 
 @intrinsic
@@ -108,13 +105,10 @@ _HALF_PI_1, _HALF_PI_2, _HALF_PI_3 = map(
 
 
 def either(scalar: Any) -> Any:
-    """A function of numbers whose body for Lanes is given by the decorator ``@either(scalar)``."""
+    """A function of numbers whose body for lanes is given by the decorator ``@either(scalar)``."""
 
     def register(lanes: Any) -> Any:
-        names = ", ".join(inspect.signature(scalar).parameters)
-        scope: dict[str, Any] = {"choose": lambda *kinds: lanes if LANES in kinds or MASK in kinds else scalar}
-        exec(f"def overloaded({names}): return choose({names})", scope)
-        overload(scalar, jit_options=WITHIN)(scope["overloaded"])
+        specialise(scalar, lambda *kinds: lanes if LANES in kinds or MASK in kinds else scalar)
         return lanes
 
     return register

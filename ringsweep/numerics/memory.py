@@ -10,10 +10,8 @@ import numpy as np
 from numba.core import types
 from numba.extending import intrinsic
 
-from ringsweep.jit import generated, hook, over_leaves
+from ringsweep.compile import generated, hook, map_leaves
 from ringsweep.numerics.lanes import LANES, VECTOR, WIDTH, spread_scalar
-
-# ---- nested tuples in memory -----------------------------------------------------------------
 
 
 def _numbers(kind: Any, name: str) -> list[tuple[str, Any]]:
@@ -181,6 +179,6 @@ def _gather_several(kind, memory, at, like):
 
 def side_by_side(batch: Any) -> Any:
     """A batch in which each array of shape ``(cells, n)`` is a tuple of n arrays: every leaf is one number a cell."""
-    return over_leaves(
+    return map_leaves(
         lambda leaf: leaf if leaf.ndim == 1 else tuple(np.ascontiguousarray(column) for column in leaf.T), batch
     )

@@ -9,7 +9,7 @@ from math import exp, inf, log
 
 import numpy as np
 
-from ringsweep.jit import inlined
+from ringsweep.compile import inlined
 
 #: Highest power of every series.
 ORDER = 16

@@ -26,7 +26,7 @@ from __future__ import annotations
 
 from math import inf, sqrt
 
-from ringsweep.jit import hook, inlined
+from ringsweep.compile import hook, inlined
 from ringsweep.physics import ring
 
 #: What the contacts do: both closed in a slip that goes on; one open, or both; both closed in a mode that begins at

@@ -12,9 +12,8 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numba import types
-from numba.extending import overload
 
-from ringsweep.jit import WITHIN, hook, inlined, inner_hook
+from ringsweep.compile import absorbed_hook, hook, inlined, specialise, written
 from ringsweep.numerics.functions import floor, select
 from ringsweep.quantities.parameters import Leaf, Parameter
 
@@ -160,20 +159,20 @@ def under(values, edges, x):
     return found
 
 
-@overload(under, jit_options=WITHIN)
-def _under(values, edges, x):
+def _unrolled_under(values: Any, edges: Any, x: Any) -> Any:
     if isinstance(values, types.Array):
         return under
     lines = [f"found = values[{len(values) - 1}]"]
     for j in range(len(values) - 1):
         lines.append(f"middle, half = (edges[{j + 1}] + edges[{j}]) * scale, (edges[{j + 1}] - edges[{j}]) * scale")
         lines.append(f"found = select(abs(x - middle) < half, values[{j}], found)")
-    scope: dict[str, Any] = {"select": select, "scale": 0.5 * PER_TURN}
-    exec("def body(values, edges, x):\n    " + "\n    ".join([*lines, "return found"]), scope)
-    return scope["body"]
+    return written("values, edges, x", [*lines, "return found"], {"select": select, "scale": 0.5 * PER_TURN})
 
 
-@inner_hook
+specialise(under, _unrolled_under)
+
+
+@absorbed_hook
 def roughness(surface, turns):
     """Static and kinetic coefficient under a contact at an angle in the ring's frame, in turns."""
 

@@ -18,9 +18,9 @@ from matplotlib.patches import Circle, Patch, Polygon, Wedge
 from matplotlib.quiver import Quiver
 from numpy.typing import NDArray
 
+from ringsweep.compile import take
 from ringsweep.config import load
 from ringsweep.errors import InputError
-from ringsweep.jit import take
 from ringsweep.models import MODELS
 from ringsweep.physics import ring
 from ringsweep.plots.style import (

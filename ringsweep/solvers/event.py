@@ -9,8 +9,8 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsweep.compile import take
 from ringsweep.errors import InputError
-from ringsweep.jit import take
 from ringsweep.physics.friction import DYNAMIC, LAWS, SET_VALUED, SMOOTH
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.scene import Structure

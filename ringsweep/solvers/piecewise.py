@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ringsweep.compile import borrowed, hook, inlined, kernel, take
 from ringsweep.hooks import (
     breach,
     creeps,
@@ -43,7 +44,6 @@ from ringsweep.hooks import (
     to_stiff,
     watch,
 )
-from ringsweep.jit import borrowed, hook, inlined, kernel, take
 from ringsweep.numerics.series import ORDER, STACK, ascending, first_root, slope, value
 from ringsweep.physics.drives import next_knot
 from ringsweep.physics.friction import DYNAMIC, SET_VALUED, SMOOTH

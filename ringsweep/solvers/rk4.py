@@ -13,6 +13,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsweep.compile import absorbed, absorbed_hook, add_scaled, hook, inlined, kernel, take
 from ringsweep.errors import InputError
 from ringsweep.hooks import (
     begin,
@@ -30,7 +31,6 @@ from ringsweep.hooks import (
     stride,
     verdict,
 )
-from ringsweep.jit import absorbed, add_scaled, hook, inlined, inner_hook, kernel, take
 from ringsweep.numerics.functions import any_of, select
 from ringsweep.numerics.lanes import WIDTH
 from ringsweep.numerics.memory import (
@@ -154,7 +154,7 @@ class Trust(NamedTuple):
     stride: Any
 
 
-@inner_hook
+@absorbed_hook
 def _trusted(account, scene, trust, before, now, h):
     """Trust in a run after a step that its guards outlast, given what it was."""
 

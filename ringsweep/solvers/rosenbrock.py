@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ringsweep.compile import add_scaled, inlined, unrolled
 from ringsweep.hooks import forcing, stiff_rates
-from ringsweep.jit import add_scaled, combine, combine_twice, inlined, like, unrolled, zero
 
 STAGES = 8
 GAMMA = 0.21193756319429014
@@ -182,3 +182,45 @@ def dense_rates(x, x_next, stages, fraction, h):
         total = add_scaled(combine(zero(x), DENSE[row], stages, STAGES), fraction, total)
     change = add_scaled(add_scaled(x_next, -1.0, x), 1.0 - 2.0 * fraction, total)
     return add_scaled(zero(x), 1.0 / h, add_scaled(change, fraction * (1.0 - fraction), rate))
+
+
+# ---- states: tuples of floats -----------------------------------------------------------------
+
+
+@unrolled
+def combine(length, y, weights, rows, count):
+    """``y`` and the first `count` of the rows of an array, each times its weight."""
+    numbers = range(length)
+    return [
+        "".join(f"a{i}, " for i in numbers) + "= y",
+        "for j in range(count):",
+        "    w = weights[j]",
+        *(f"    a{i} += w * rows[j, {i}]" for i in numbers),
+        "return (" + "".join(f"a{i}, " for i in numbers) + ")",
+    ]
+
+
+@unrolled
+def combine_twice(length, y, weights, others, rows, count):
+    """:func:`combine` of ``y`` and of zero, with two sets of weights in one pass."""
+    numbers = range(length)
+    return [
+        "".join(f"a{i}, " for i in numbers) + "= y",
+        " = ".join(f"b{i}" for i in numbers) + " = 0.0",
+        "for j in range(count):",
+        "    v, w = weights[j], others[j]",
+        *(f"    a{i} += v * rows[j, {i}]; b{i} += w * rows[j, {i}]" for i in numbers),
+        "return (" + "".join(f"a{i}, " for i in numbers) + "), (" + "".join(f"b{i}, " for i in numbers) + ")",
+    ]
+
+
+@unrolled
+def zero(length, y):
+    """A state of zeros."""
+    return ["return (" + "0.0, " * length + ")"]
+
+
+@unrolled
+def like(length, y, row):
+    """A row of an array as a state of the length of `y`."""
+    return ["return (" + "".join(f"row[{i}], " for i in range(length)) + ")"]

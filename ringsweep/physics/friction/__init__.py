@@ -8,8 +8,8 @@ import importlib.util
 import sys
 from typing import Any
 
+from ringsweep.compile.cache import OWN_LAWS
 from ringsweep.errors import InputError
-from ringsweep.jit import OWN_LAWS
 from ringsweep.physics.friction import dynamic, set_valued, smooth
 from ringsweep.physics.friction.static import MU_K, MU_S
 from ringsweep.quantities.parameters import Parameter

@@ -12,7 +12,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from ringsweep.jit import hook, inlined
+from ringsweep.compile import hook, inlined
 from ringsweep.physics.friction.static import BAND, CLEAN
 from ringsweep.quantities.parameters import Leaf, Parameter
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from ringsweep.jit import inlined
+from ringsweep.compile import inlined
 from ringsweep.numerics.functions import decay, select
 from ringsweep.physics.friction.static import BAND, CLEAN, ONE, TAIL, ZERO, Piece, blend, piece, steepest, stiction_band
 from ringsweep.quantities.parameters import Leaf, Parameter

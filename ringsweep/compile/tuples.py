@@ -1,0 +1,98 @@
+"""Tuples of any length within kernels: code that is written out for the types or the length of an argument."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from typing import Any
+
+from numba import types
+
+from ringsweep.compile.numba_private import borrowed
+from ringsweep.compile.options import specialise
+
+__all__ = ["add_scaled", "borrowed", "generated", "map_leaves", "take", "unrolled", "written"]
+
+
+def written(names: str, lines: list[str], scope: dict[str, Any]) -> Any:
+    """A function with these arguments and these lines of a body, which may use the names in `scope`."""
+    scope = dict(scope)
+    exec(f"def body({names}):\n    " + "\n    ".join(lines), scope)
+    return scope["body"]
+
+
+def _stub(function: Callable[..., Any], names: list[str], call: Callable[..., Any]) -> Any:
+    """A function with these arguments that does `call`; name and docstring are those of another one."""
+
+    def found(*arguments: Any) -> Any:
+        return call(*arguments)
+
+    found.__name__, found.__doc__, found.__module__ = function.__name__, function.__doc__, function.__module__
+    parameters = [inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD) for name in names]
+    found.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    return found
+
+
+def unrolled(write: Callable[..., Any]) -> Any:
+    """A function whose body is written out for the length of its first argument, a tuple.
+
+    `write` takes that length, then the names of the arguments; it returns the lines of the body.
+    """
+    names = list(inspect.signature(write).parameters)[1:]
+
+    def body(first: Any) -> Any:
+        return written(", ".join(names), write(len(first), *names), write.__globals__)
+
+    found = _stub(write, names, lambda *arguments: body(arguments[0])(*arguments))
+    specialise(found, lambda *kinds: body(kinds[0]))
+    return found
+
+
+def generated(write: Callable[..., Any]) -> Any:
+    """A function for kernels alone, whose body is written out for the types of its arguments.
+
+    `write` takes these types under the names of the arguments; it returns the lines of the body, and what they name;
+    or a function with the same arguments.
+    """
+    names = list(inspect.signature(write).parameters)
+
+    def refuse(*arguments: Any) -> Any:
+        raise TypeError(f"{write.__name__} is for kernels alone")
+
+    def body(*kinds: Any) -> Any:
+        made = write(*kinds)
+        return written(", ".join(names), *made) if isinstance(made, tuple) else made
+
+    found = _stub(write, names, refuse)
+    specialise(found, body)
+    return found
+
+
+def map_leaves(change: Callable[[Any], Any], nested: Any) -> Any:
+    """A nested tuple with each of its leaves changed."""
+    if not isinstance(nested, tuple):
+        return change(nested)
+    leaves = (map_leaves(change, part) for part in nested)
+    return type(nested)(*leaves) if hasattr(nested, "_fields") else tuple(leaves)
+
+
+def take(batch: Any, i: Any) -> Any:
+    """Cell `i` of a batch: the same nested tuple with each array replaced by its row; in Python several cells too."""
+    return map_leaves(lambda leaf: leaf[i], batch)
+
+
+def _take_one(batch: Any, i: Any) -> Any:
+    if isinstance(batch, types.Array):
+        return (lambda batch, i: batch[i]) if batch.ndim == 1 else (lambda batch, i: borrowed(batch[i]))
+    leaves = "".join(f"take(batch[{k}], i), " for k in range(len(batch)))
+    cls = getattr(batch, "instance_class", None)
+    return written("batch, i", [f"return {'cls' if cls else ''}({leaves})"], {"cls": cls, "take": take})
+
+
+specialise(take, _take_one)
+
+
+@unrolled
+def add_scaled(length, y, factor, k):
+    """``y + factor * k``."""
+    return ["return (" + "".join(f"y[{i}] + factor * k[{i}], " for i in range(length)) + ")"]
