@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 from ringsweep.compile import take
-from ringsweep.physics.friction.static import weights
+from ringsweep.physics.friction.velocity import weights
 from ringsweep.regimes import Outcome
 from ringsweep.solvers.piecewise import integrate
 

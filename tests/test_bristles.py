@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 import ringsweep
 from ringsweep.compile import take
 from ringsweep.physics.friction import DYNAMIC
-from ringsweep.physics.friction.dynamic import (
+from ringsweep.physics.friction.bristles import (
     BONDS,
     Bristles,
     Dahl,
@@ -26,7 +26,7 @@ from ringsweep.physics.friction.dynamic import (
     steady,
     yields,
 )
-from ringsweep.physics.friction.static import BAND, CLEAN
+from ringsweep.physics.friction.velocity import BAND, CLEAN
 
 MU_S, MU_K = 0.6, 0.4
 SIGMA_0, V_S = 1e3, 1e-2

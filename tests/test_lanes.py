@@ -13,7 +13,7 @@ from ringsweep.numerics.lanes import WIDTH
 from ringsweep.numerics.memory import Several, Single, conform, read_lanes, side_by_side, write
 from ringsweep.physics.drives import scaled
 from ringsweep.physics.friction import LAWS
-from ringsweep.physics.friction.static import BAND, piece, steepest, stiction_band, weights
+from ringsweep.physics.friction.velocity import BAND, piece, steepest, stiction_band, weights
 from ringsweep.quantities.parameters import declared
 from ringsweep.solvers import rk4
 from ringsweep.solvers.rk4 import RK4

@@ -15,9 +15,9 @@ from ringsweep.compile import SOURCES_DIGEST, take
 from ringsweep.config import load
 from ringsweep.errors import InputError
 from ringsweep.physics.friction import SET_VALUED, SMOOTH
-from ringsweep.physics.friction.set_valued import Coulomb, Karnopp, Stiction, Tustin
-from ringsweep.physics.friction.smooth import BengisuAkay, PiecewiseCubic, PiecewiseLinear, Threlfall
-from ringsweep.physics.friction.static import (
+from ringsweep.physics.friction.coulomb import Coulomb, Karnopp, Stiction, Tustin
+from ringsweep.physics.friction.regularised import BengisuAkay, PiecewiseCubic, PiecewiseLinear, Threlfall
+from ringsweep.physics.friction.velocity import (
     BAND,
     CLEAN,
     TAIL,
@@ -379,18 +379,18 @@ OWN = """
 from typing import Annotated, NamedTuple
 from ringsweep.numerics.functions import select
 from ringsweep.quantities.parameters import Leaf
-from ringsweep.physics.friction import smooth
-from ringsweep.physics.friction.static import BAND, CLEAN, ONE, TAIL, ZERO, Piece, piece, stiction_band
+from ringsweep.physics.friction import regularised
+from ringsweep.physics.friction.velocity import BAND, CLEAN, ONE, TAIL, ZERO, Piece, piece, stiction_band
 
 
 class Ramp(NamedTuple):
-    v0: Annotated[Leaf, smooth.V0]
+    v0: Annotated[Leaf, regularised.V0]
 
 
 @piece.implements(Ramp)
 def _ramp(law, region):
     if region == TAIL:
-        return smooth.absent()
+        return regularised.absent()
     if region == CLEAN:
         return Piece(law.v0, float("inf"), 0.0, ZERO, ONE)
     return Piece(0.0, law.v0, 0.0, ZERO, (0.0, 1.0 / law.v0, 0.0, 0.0))
@@ -401,14 +401,14 @@ def _band(law):
     return law.v0
 
 
-smooth.LAWS["ramp"] = Ramp
+regularised.LAWS["ramp"] = Ramp
 """
 
 USE = """
 from ringsweep.config import load
 from ringsweep.compile import SOURCES_DIGEST
 from ringsweep.physics.friction import LAWS, SMOOTH
-from ringsweep.physics.friction.static import weights
+from ringsweep.physics.friction.velocity import weights
 from ringsweep.solvers.event import Auto
 scene = {"model": "belt", "body": {"mass": 1}, "spring": {"stiffness": 2}, "belt": {"velocity": 0.1},
          "friction": {"law": "ramp", "mu_s": 0.2, "mu_k": 0.1, "v0": "1 cm/s"}, "time": {"span": 1}}

@@ -11,7 +11,7 @@ from ringsweep.compile import kernel, take
 from ringsweep.errors import InputError
 from ringsweep.hooks import inspect
 from ringsweep.physics import ring
-from ringsweep.physics.friction.smooth import BengisuAkay
+from ringsweep.physics.friction.regularised import BengisuAkay
 from ringsweep.physics.ring import OneContact, Ring, TwoContacts, acceleration, acceleration_slope, reactions
 from ringsweep.physics.zones import Arc, cut
 

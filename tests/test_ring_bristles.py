@@ -8,7 +8,7 @@ from solutions import solve
 
 from ringsweep.compile import take
 from ringsweep.models import MODELS
-from ringsweep.physics.friction.dynamic import NEARLY
+from ringsweep.physics.friction.bristles import NEARLY
 from ringsweep.quantities.variables import JAMMED, OSCILLATORY, REVOLVING, SEPARATING
 from ringsweep.scene import Structure
 from ringsweep.solvers.event import Event, Implicit

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from ringsweep.compile import take
 from ringsweep.hooks import verdict
 from ringsweep.models.ring import Inspection
-from ringsweep.physics.friction.static import weights
+from ringsweep.physics.friction.velocity import weights
 from ringsweep.physics.ring import acceleration, reactions
 from ringsweep.quantities.variables import FAILED, JAMMED, OSCILLATORY, REGIMES, RESTING, REVOLVING, SEPARATING
 from ringsweep.regimes import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2, Outcome

@@ -15,8 +15,8 @@ from ringsweep.models.belt import begin, conclude, observe
 from ringsweep.models.common import largest_eigenvalue
 from ringsweep.physics import drives
 from ringsweep.physics.belt import BristleBelt
-from ringsweep.physics.friction.dynamic import bristle, crawl, lasts, made, yields
-from ringsweep.physics.friction.static import BAND, CLEAN
+from ringsweep.physics.friction.bristles import bristle, crawl, lasts, made, yields
+from ringsweep.physics.friction.velocity import BAND, CLEAN
 from ringsweep.regimes import BROKEN, RUNNING
 
 

@@ -8,7 +8,7 @@ from ringsweep import hooks
 from ringsweep.models.belt_bristles import contact_force
 from ringsweep.models.belt_static import friction_force, holds_in_band, length_scale
 from ringsweep.physics.belt import Belt, BristleBelt
-from ringsweep.physics.friction.static import BAND, stiction_band
+from ringsweep.physics.friction.velocity import BAND, stiction_band
 
 # Rounding of accelerations, as a share of their largest terms.
 _ROUNDING = 1e-12

@@ -15,7 +15,7 @@ from ringsweep.models.belt import begin, conclude, observe
 from ringsweep.models.common import largest_eigenvalue
 from ringsweep.numerics.series import INVERSE, ORDER, ascending, crossings, reach, slope, value, variation
 from ringsweep.physics import belt, drives
-from ringsweep.physics.friction.static import (
+from ringsweep.physics.friction.velocity import (
     BAND,
     CLEAN,
     constant_weights,

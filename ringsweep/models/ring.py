@@ -14,7 +14,7 @@ from ringsweep.models.common import GRAVITY, MASS, SPAN, drive_of, largest_eigen
 from ringsweep.numerics.functions import any_of, select, sine_cosine, sine_cosine_near
 from ringsweep.numerics.memory import Several
 from ringsweep.physics import contact, drives, friction, ring, zones
-from ringsweep.physics.friction.static import met, steepest, stiction_band
+from ringsweep.physics.friction.velocity import met, steepest, stiction_band
 from ringsweep.quantities.parameters import Parameter, declared
 from ringsweep.regimes import BROKEN, ENDS, JAM, RUNNING
 from ringsweep.scene import Structure, Values, require

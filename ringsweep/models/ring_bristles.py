@@ -16,8 +16,8 @@ from ringsweep.compile import inlined
 from ringsweep.models.common import largest_eigenvalue
 from ringsweep.models.ring_series import AT_ONCE, NEARLY_JAMMED, coefficients_under
 from ringsweep.physics import contact, drives, ring
-from ringsweep.physics.friction.dynamic import bristle, lasts, steady
-from ringsweep.physics.friction.static import BAND, CLEAN
+from ringsweep.physics.friction.bristles import bristle, lasts, steady
+from ringsweep.physics.friction.velocity import BAND, CLEAN
 from ringsweep.physics.ring import BristleRing
 from ringsweep.physics.zones import beyond, coefficients, cross, edge_ahead, locate, roughest, segment
 from ringsweep.regimes import BROKEN, ENDS, JAM, RUNNING

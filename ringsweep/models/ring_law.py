@@ -15,8 +15,8 @@ from ringsweep.compile import inlined, take
 from ringsweep.models.ring_series import coefficients_under
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction import SET_VALUED
-from ringsweep.physics.friction.dynamic import bristle
-from ringsweep.physics.friction.static import BAND, stiction_band, weights
+from ringsweep.physics.friction.bristles import bristle
+from ringsweep.physics.friction.velocity import BAND, stiction_band, weights
 from ringsweep.physics.zones import PER_TURN, Segments, edge_ahead, roughest, roughness
 from ringsweep.quantities.variables import SEPARATING
 

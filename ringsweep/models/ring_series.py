@@ -29,7 +29,7 @@ from ringsweep.numerics.series import (
     variation,
 )
 from ringsweep.physics import contact, drives, ring
-from ringsweep.physics.friction.static import (
+from ringsweep.physics.friction.velocity import (
     BAND,
     CLEAN,
     constant_weights,

@@ -12,7 +12,7 @@ from ringsweep import hooks, regimes
 from ringsweep.compile import inlined
 from ringsweep.models.ring_series import coefficients_under
 from ringsweep.physics import drives, ring
-from ringsweep.physics.friction.static import stiction_band, weights_in
+from ringsweep.physics.friction.velocity import stiction_band, weights_in
 from ringsweep.physics.zones import coefficients, edge_ahead
 
 

@@ -10,7 +10,7 @@ from ringsweep import hooks
 from ringsweep.numerics.memory import Single
 from ringsweep.physics import drives
 from ringsweep.physics.belt import Belt, BristleBelt
-from ringsweep.physics.friction.static import BAND
+from ringsweep.physics.friction.velocity import BAND
 from ringsweep.physics.ring import BristleRing, Ring
 
 

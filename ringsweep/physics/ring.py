@@ -34,7 +34,7 @@ import numpy as np
 from ringsweep.compile import absorbed, absorbed_hook, hook, inlined
 from ringsweep.numerics.functions import opposing
 from ringsweep.physics import drives
-from ringsweep.physics.friction.static import weights
+from ringsweep.physics.friction.velocity import weights
 from ringsweep.physics.zones import PER_TURN, roughness
 from ringsweep.quantities.parameters import Leaf
 

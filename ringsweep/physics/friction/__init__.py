@@ -10,8 +10,8 @@ from typing import Any
 
 from ringsweep.compile.cache import OWN_LAWS
 from ringsweep.errors import InputError
-from ringsweep.physics.friction import dynamic, set_valued, smooth
-from ringsweep.physics.friction.static import MU_K, MU_S
+from ringsweep.physics.friction import bristles, coulomb, regularised
+from ringsweep.physics.friction.velocity import MU_K, MU_S
 from ringsweep.quantities.parameters import Parameter
 
 for _path in OWN_LAWS:
@@ -23,28 +23,28 @@ for _path in OWN_LAWS:
     _spec.loader.exec_module(_module)
 
 #: Laws whose friction at rest is whatever holds the contact, up to a bound.
-SET_VALUED: tuple[type, ...] = tuple(set_valued.LAWS.values())
+SET_VALUED: tuple[type, ...] = tuple(coulomb.LAWS.values())
 
 #: Laws whose friction is a continuous function of the sliding velocity.
-SMOOTH: tuple[type, ...] = tuple(smooth.LAWS.values())
+SMOOTH: tuple[type, ...] = tuple(regularised.LAWS.values())
 
 #: Laws with a memory: their friction depends on the deflection of bristles.
-DYNAMIC: tuple[type, ...] = tuple(dynamic.LAWS.values())
+DYNAMIC: tuple[type, ...] = tuple(bristles.LAWS.values())
 
 #: Laws by the name that the configuration gives them.
-LAWS: dict[str, type] = set_valued.LAWS | smooth.LAWS | dynamic.LAWS
+LAWS: dict[str, type] = coulomb.LAWS | regularised.LAWS | bristles.LAWS
 
 #: Laws that know no static friction.
-WITHOUT_STATIC: set[type] = {*set_valued.WITHOUT_STATIC, *smooth.WITHOUT_STATIC, *dynamic.WITHOUT_STATIC}
+WITHOUT_STATIC: set[type] = {*coulomb.WITHOUT_STATIC, *regularised.WITHOUT_STATIC, *bristles.WITHOUT_STATIC}
 
 #: Laws whose memory changes in jumps, at instants that only a method with events meets.
-WITH_SNAPS: set[type] = {*dynamic.WITH_SNAPS}
+WITH_SNAPS: set[type] = {*bristles.WITH_SNAPS}
 
 #: Parameters of a law of which the first must be less than the second.
-ASCENDING: dict[Any, tuple[str, str]] = smooth.ASCENDING
+ASCENDING: dict[Any, tuple[str, str]] = regularised.ASCENDING
 
 
 def coefficients_of(law: type) -> dict[str, Parameter]:
     """Coefficients that a law needs of each surface."""
-    mu_k = dynamic.MU_K if law in DYNAMIC else MU_K
+    mu_k = bristles.MU_K if law in DYNAMIC else MU_K
     return {"mu_k": mu_k} if law in WITHOUT_STATIC else {"mu_s": MU_S, "mu_k": mu_k}

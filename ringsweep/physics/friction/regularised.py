@@ -6,8 +6,19 @@ from math import exp, inf
 from typing import Annotated, Any, NamedTuple
 
 from ringsweep.numerics.functions import decay, select
-from ringsweep.physics.friction.set_valued import ALPHA, absent, decaying, end_of_tail, tail
-from ringsweep.physics.friction.static import BAND, CLEAN, ONE, TAIL, ZERO, Piece, blend, piece, steepest, stiction_band
+from ringsweep.physics.friction.coulomb import ALPHA, absent, decaying, end_of_tail, tail
+from ringsweep.physics.friction.velocity import (
+    BAND,
+    CLEAN,
+    ONE,
+    TAIL,
+    ZERO,
+    Piece,
+    blend,
+    piece,
+    steepest,
+    stiction_band,
+)
 from ringsweep.quantities.parameters import Leaf, Parameter
 
 V0 = Parameter("m/s", "half-width of the stiction band", lower=0.0, open_lower=True)

@@ -13,7 +13,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from ringsweep.compile import hook, inlined
-from ringsweep.physics.friction.static import BAND, CLEAN
+from ringsweep.physics.friction.velocity import BAND, CLEAN
 from ringsweep.quantities.parameters import Leaf, Parameter
 
 MU_K = Parameter("1", "kinetic friction coefficient", lower=0.0, open_lower=True)

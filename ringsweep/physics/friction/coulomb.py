@@ -9,7 +9,18 @@ import numpy as np
 
 from ringsweep.compile import inlined
 from ringsweep.numerics.functions import decay, select
-from ringsweep.physics.friction.static import BAND, CLEAN, ONE, TAIL, ZERO, Piece, blend, piece, steepest, stiction_band
+from ringsweep.physics.friction.velocity import (
+    BAND,
+    CLEAN,
+    ONE,
+    TAIL,
+    ZERO,
+    Piece,
+    blend,
+    piece,
+    steepest,
+    stiction_band,
+)
 from ringsweep.quantities.parameters import Leaf, Parameter
 
 ALPHA = Parameter("s/m", "decay of friction with sliding speed", lower=0.0)
@@ -33,7 +44,7 @@ def tail(region, low, high, alpha):
 
 @inlined
 def decaying(alpha, x, lasts):
-    """:func:`~ringsweep.physics.friction.static.weights` in a tail, `x` beyond where it begins, while it lasts."""
+    """:func:`~ringsweep.physics.friction.velocity.weights` in a tail, `x` beyond where it begins, while it lasts."""
     q = select(lasts, decay(alpha * x), 0.0)
     return q, 1.0 - q, -alpha * q, alpha * q
 
