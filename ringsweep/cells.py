@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from ringsweep.config import Axes, Config
 from ringsweep.layout import Layout
 from ringsweep.models import MODELS, batch
+from ringsweep.models.scene import LAW, Scene, Values
 from ringsweep.provenance import environment, processor
 from ringsweep.quantities.variables import OUTCOMES
-from ringsweep.scene import LAW, Scene, Values
 from ringsweep.solvers.common import Result, with_errors
 
 #: Where along each dimension cells lie, by name of the dimension.

@@ -24,10 +24,10 @@ from ringsweep import document
 from ringsweep.document import Document, scalar
 from ringsweep.errors import InputError
 from ringsweep.models import batch, parameters
+from ringsweep.models.scene import LAW, Scene, Structure
 from ringsweep.quantities.parameters import Choice, Parameter, declared
 from ringsweep.quantities.units import quantity, show
 from ringsweep.quantities.variables import OUTCOMES
-from ringsweep.scene import LAW, Scene, Structure
 
 if TYPE_CHECKING:
     import xarray as xr

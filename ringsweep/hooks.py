@@ -45,7 +45,7 @@ def verdict(scene, before, now):
     Returns
     -------
     tuple
-        ``(status, fraction)``: a status of :mod:`ringsweep.regimes`, and the fraction of the step
+        ``(status, fraction)``: a status of :mod:`ringsweep.models.ring.record`, and the fraction of the step
         after which it was reached.
     """
 

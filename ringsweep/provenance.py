@@ -18,7 +18,7 @@ import numpy as np
 from ringsweep.compile import SOURCES_DIGEST
 from ringsweep.config import Config
 from ringsweep.models import MODELS
-from ringsweep.scene import LAW
+from ringsweep.models.scene import LAW
 
 
 @cache

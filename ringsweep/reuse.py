@@ -18,8 +18,8 @@ from ringsweep.config import Config, load
 from ringsweep.errors import InputError
 from ringsweep.layout import Layout
 from ringsweep.models import parameters
+from ringsweep.models.scene import LAW
 from ringsweep.provenance import differences, fingerprint, identity
-from ringsweep.scene import LAW
 
 # Two ways of spacing an axis differ by so many units in the last place.
 _ROUNDING = 8 * np.finfo(float).eps

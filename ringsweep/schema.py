@@ -11,10 +11,10 @@ from typing import Any, get_type_hints
 
 from ringsweep.config import COUNT, TABLE
 from ringsweep.models import MODELS, parameters
+from ringsweep.models.scene import LAW, Structure
 from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS
 from ringsweep.quantities.parameters import Parameter, declared
-from ringsweep.scene import LAW, Structure
 from ringsweep.solvers import METHODS
 
 

@@ -15,10 +15,10 @@ from ringsweep.compile import take
 from ringsweep.config import Config, read_solver, with_values
 from ringsweep.engine import compute
 from ringsweep.models import MODELS, batch
+from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import turn
 from ringsweep.provenance import attributes
 from ringsweep.quantities.variables import HISTORY, REGIMES
-from ringsweep.scene import Structure
 
 #: Instants that a history keeps, about.
 SAMPLES = 20_000

@@ -21,12 +21,12 @@ from ringsweep.config import COUNT, Config, load, sweepable
 from ringsweep.engine import progress_bar
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, batch
+from ringsweep.models.scene import LAW
 from ringsweep.physics.friction import LAWS, SET_VALUED
 from ringsweep.provenance import attributes
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity
 from ringsweep.quantities.variables import FAILED, PRECISION, Variable
-from ringsweep.scene import LAW
 from ringsweep.solvers.common import Result, agree
 from ringsweep.solvers.event import Event, Implicit
 from ringsweep.solvers.rk4 import RK4

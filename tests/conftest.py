@@ -11,7 +11,7 @@ from hypothesis import settings
 
 from ringsweep.config import load
 from ringsweep.models import MODELS, batch, parameters
-from ringsweep.scene import Structure
+from ringsweep.models.scene import Structure
 from ringsweep.solvers.rk4 import RK4
 
 settings.register_profile("ringsweep", deadline=None, derandomize=True)

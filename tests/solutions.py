@@ -8,8 +8,8 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 from ringsweep.compile import take
+from ringsweep.models.ring.record import Outcome
 from ringsweep.physics.friction.velocity import weights
-from ringsweep.regimes import Outcome
 from ringsweep.solvers.piecewise import integrate
 
 

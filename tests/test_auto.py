@@ -10,8 +10,8 @@ from solutions import HISTORY, Fall, solve
 
 from ringsweep.compile import take
 from ringsweep.models import batch, parameters
+from ringsweep.models.scene import Structure
 from ringsweep.quantities.variables import FAILED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
-from ringsweep.scene import Structure
 from ringsweep.solvers import event
 from ringsweep.solvers.event import Auto, Event, Implicit
 from ringsweep.solvers.rk4 import RK4

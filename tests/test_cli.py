@@ -15,10 +15,10 @@ from ringsweep import cli
 from ringsweep.cli import main
 from ringsweep.config import load
 from ringsweep.models import MODELS, parameters
+from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS
 from ringsweep.quantities.variables import HISTORY, OUTCOMES
-from ringsweep.scene import Structure
 from ringsweep.schema import schema
 from ringsweep.solvers import METHODS
 

@@ -10,9 +10,9 @@ from scipy.integrate import quad
 
 from ringsweep.compile import take
 from ringsweep.errors import InputError
-from ringsweep.models.common import drive_of
+from ringsweep.models.parts import drive_of
+from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import DRIVES, Arctan, Constant, Power, Sinusoidal, Still, lookup, shape
-from ringsweep.scene import Structure
 
 KNOTS = np.array([0.0, 0.4, 0.5, 1.1, 2.0, 3.0])
 

@@ -9,8 +9,8 @@ import xarray as xr
 
 import ringsweep
 from ringsweep.config import load
+from ringsweep.models.ring.record import Outcome
 from ringsweep.quantities.variables import OUTCOMES, REGIMES
-from ringsweep.regimes import Outcome
 from ringsweep.solvers.common import with_errors
 
 CONFIGS = Path(__file__).parents[1] / "configs"

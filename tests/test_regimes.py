@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringsweep import regimes
+from ringsweep.models.interface.status import BROKEN, COMPLETE, JAM, SEPARATED_1, SEPARATED_2
+from ringsweep.models.ring import record as regimes
 from ringsweep.quantities.variables import FAILED, JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
-from ringsweep.regimes import BROKEN, COMPLETE, JAM, SEPARATED_1, SEPARATED_2
 
 EPSILON = 1e-3
 begin, observe, conclude = regimes.begin, regimes.observe, regimes.conclude

@@ -9,11 +9,12 @@ from hypothesis import strategies as st
 
 from ringsweep.compile import take
 from ringsweep.hooks import verdict
-from ringsweep.models.ring import Inspection
+from ringsweep.models.interface.status import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2
+from ringsweep.models.ring.record import Outcome
+from ringsweep.models.ring.rk4 import Inspection
 from ringsweep.physics.friction.velocity import weights
 from ringsweep.physics.ring import acceleration, reactions
 from ringsweep.quantities.variables import FAILED, JAMMED, OSCILLATORY, REGIMES, RESTING, REVOLVING, SEPARATING
-from ringsweep.regimes import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2, Outcome
 from ringsweep.solvers.rk4 import RK4, STABILITY_LIMIT
 
 MU = 0.1

@@ -7,8 +7,8 @@ import pytest
 from solutions import solve
 
 from ringsweep.models import MODELS
+from ringsweep.models.ring.record import Outcome
 from ringsweep.quantities.variables import JAMMED, OSCILLATORY, RESTING, SEPARATING
-from ringsweep.regimes import Outcome
 from ringsweep.solvers.event import Auto, Event, Implicit
 from ringsweep.solvers.rk4 import RK4, STABILITY_LIMIT
 

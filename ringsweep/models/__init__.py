@@ -2,21 +2,11 @@
 
 from typing import Any
 
-# Importing them gives the solvers their hooks.
-from ringsweep.models import (  # noqa: F401
-    belt_bristles,
-    belt_law,
-    belt_static,
-    ring_bristles,
-    ring_law,
-    ring_series,
-    ring_stiff,
-    shared,
-)
+from ringsweep.models import shared  # noqa: F401
 from ringsweep.models.belt import Belt
 from ringsweep.models.ring import Ring, SingleContactRing
+from ringsweep.models.scene import Structure, Values
 from ringsweep.quantities.parameters import Parameter
-from ringsweep.scene import Structure, Values
 
 MODELS = {model.name: model for model in (Ring(), SingleContactRing(), Belt())}
 

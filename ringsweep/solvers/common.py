@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.hooks import undecided
+from ringsweep.models.scene import Structure
 from ringsweep.quantities.variables import FAILED, OUTCOMES
-from ringsweep.scene import Structure
 
 #: What two resolutions must agree on for a certificate.
 _WITNESSED = ("regime", "motion", "separating_contact")

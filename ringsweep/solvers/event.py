@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from ringsweep.compile import take
 from ringsweep.errors import InputError
+from ringsweep.models.scene import Structure
 from ringsweep.physics.friction import DYNAMIC, LAWS, SET_VALUED, SMOOTH
 from ringsweep.quantities.parameters import Parameter
-from ringsweep.scene import Structure
 from ringsweep.solvers.common import Method, Result, errors, repeated, vouched, with_errors
 from ringsweep.solvers.piecewise import integrate
 

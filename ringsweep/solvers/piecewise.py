@@ -44,10 +44,10 @@ from ringsweep.hooks import (
     to_stiff,
     watch,
 )
+from ringsweep.models.interface.status import BROKEN, COMPLETE, RUNNING
 from ringsweep.numerics.series import ORDER, STACK, ascending, first_root, slope, value
 from ringsweep.physics.drives import next_knot
 from ringsweep.physics.friction import DYNAMIC, SET_VALUED, SMOOTH
-from ringsweep.regimes import BROKEN, COMPLETE, RUNNING
 from ringsweep.solvers import rosenbrock
 
 # Steps and events in a row at one instant after which a run is given up.

@@ -31,6 +31,8 @@ from ringsweep.hooks import (
     stride,
     verdict,
 )
+from ringsweep.models.interface.status import COMPLETE, RUNNING
+from ringsweep.models.scene import Structure
 from ringsweep.numerics.functions import any_of, select
 from ringsweep.numerics.lanes import WIDTH
 from ringsweep.numerics.memory import (
@@ -50,8 +52,6 @@ from ringsweep.physics.drives import lookup, scaled, shape, turn
 from ringsweep.physics.friction import LAWS, WITH_SNAPS
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.variables import SEPARATING
-from ringsweep.regimes import COMPLETE, RUNNING
-from ringsweep.scene import Structure
 from ringsweep.solvers.common import Method, Result, errors, same_drive, vouched, with_errors
 
 #: Radius of the largest half disc of the left half plane in which the method is stable: 2.616 where an eigenvalue is

@@ -14,8 +14,11 @@ from __future__ import annotations
 from math import cos, inf, isnan, sin, sqrt
 from typing import NamedTuple
 
-from ringsweep import hooks, regimes
+from ringsweep import hooks
 from ringsweep.compile import hook, inlined
+from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
+from ringsweep.models.ring import record as regimes
+from ringsweep.models.ring.record import ENDS
 from ringsweep.numerics.series import (
     INVERSE,
     ORDER,
@@ -43,7 +46,6 @@ from ringsweep.physics.friction.velocity import (
     weights_in,
 )
 from ringsweep.physics.zones import beyond, coefficients, cross, edge_ahead, locate
-from ringsweep.regimes import BROKEN, ENDS, JAM, RUNNING
 
 # Rows of the series; the guards last, and first of them the one without which the others mean nothing.
 PHI, V, OMEGA, EPSILON, SIN, COS, SQUARE, THETA, EXCESS, BASIS, STATIC, KINETIC = range(12)

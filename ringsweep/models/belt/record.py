@@ -1,21 +1,14 @@
-"""The belt as a model: its parameters, the cells that kernels run over, and what is remembered of a run."""
+"""What is remembered of a run on the belt, and what it makes of it: motion, slips, period."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import isfinite, nan, sqrt
-from typing import Any, ClassVar, NamedTuple
+from typing import NamedTuple
 
-import numpy as np
-
-from ringsweep.compile import inlined, take
-from ringsweep.errors import InputError
-from ringsweep.models.common import GRAVITY, MASS, SPAN, drive_of, law_of, pair
-from ringsweep.physics import belt, drives, friction
-from ringsweep.quantities.parameters import Parameter, declared
+from ringsweep.compile import inlined
+from ringsweep.models.interface.status import BROKEN
+from ringsweep.physics import drives
 from ringsweep.quantities.variables import FAILED, OSCILLATORY, RESTING, STICK_SLIP
-from ringsweep.regimes import BROKEN
-from ringsweep.scene import Structure, Values, require
 
 
 class Outcome(NamedTuple):
@@ -34,97 +27,6 @@ class Outcome(NamedTuple):
     first_slip: float
     period: float
     force_max: float
-
-
-class Belt:
-    """A mass on a spring on a moving belt (the paper's Fig. 1)."""
-
-    name: ClassVar[str] = "belt"
-    doc: ClassVar[str] = "a mass on a spring on a moving belt"
-    outcomes: ClassVar[tuple[str, ...]] = Outcome._fields
-    laws: ClassVar[dict[str, type]] = friction.LAWS
-    absent: ClassVar[frozenset[str]] = frozenset()
-
-    def history(self, structure: Structure) -> tuple[str, ...]:
-        """Quantities of a time history, in the order of their columns."""
-        return "x", "velocity", "friction_force", "deflection", "mode"
-
-    def parameters(self, structure: Structure) -> dict[str, Parameter]:
-        """Every numeric path of a scene of this structure."""
-        law = self.laws[structure.law]
-        found = {
-            "body.mass": MASS,
-            "spring.stiffness": Parameter("N/m", "stiffness of the spring", lower=0.0),
-            "belt.velocity": Parameter("m/s", "velocity of the belt", optional=True),
-        }
-        found |= {f"friction.{name}": p for name, p in friction.coefficients_of(law).items()}
-        for name, p in declared(law).items():
-            # What bristles have per unit of the load, they have here under the weight of the body.
-            absolute = {"1/m": "N/m", "s/m": "N s/m"} if name.startswith("sigma") else {}
-            found[f"friction.{name}"] = replace(p, unit=absolute.get(p.unit, p.unit))
-        if law not in friction.DYNAMIC:
-            found["friction.viscous"] = Parameter("N s/m", "viscous friction", lower=0.0, default=0.0)
-        for name, p in declared(drives.DRIVES[structure.drive]).items():
-            found[f"drive.{name}"] = p.along_a_line()
-        return found | {
-            "initial.x": Parameter("m", "displacement of the body at the start", default=0.0),
-            "initial.velocity": Parameter(
-                "m/s", "velocity of the body at the start (default: that of the belt)", optional=True
-            ),
-            "time.span": SPAN,
-            "gravity": GRAVITY,
-        }
-
-    def build(self, structure: Structure, values: Values) -> belt.Belt | belt.BristleBelt:
-        """Cells of a sweep; see :func:`ringsweep.models.batch`."""
-        if structure.arcs:
-            raise InputError(f"scene.{structure.arcs[0]}", "a belt has no rough zones")
-        law = self.laws[structure.law]
-        mu_s, mu_k = pair(law, "friction", values)
-        drive = self._drive(structure, values)
-        sliding = np.zeros(len(mu_k))
-        if "initial.velocity" in values:
-            launched = values["initial.velocity"]
-            sliding = np.array([drives.relative(take(drive, i), velocity) for i, velocity in enumerate(launched)])
-        mass, gravity = values["body.mass"], values["gravity"]
-        given = {
-            "mass": mass,
-            "stiffness": values["spring.stiffness"],
-            "gravity": gravity,
-            "mu_s": mu_s,
-            "mu_k": mu_k,
-            "drive": drive,
-            "initial_x": values["initial.x"],
-            "initial_v": sliding,
-            "span": values["time.span"],
-        }
-        if law not in friction.DYNAMIC:
-            viscous, load = values["friction.viscous"], mass * gravity
-            if structure.law == "karnopp":
-                require(
-                    mu_k * load + viscous * values["friction.dead_band"] <= mu_s * load,
-                    "friction.viscous",
-                    viscous,
-                    "{} N s/m makes friction at the edge of the dead band greater than what holds within it",
-                )
-            return belt.Belt(**given, law=law_of(law, values), viscous=viscous)
-        require(gravity > 0.0, "gravity", gravity, "{} m/s^2 leaves the bristles of friction without a load")
-        per_load = {
-            path: value / (mass * gravity) for path, value in values.items() if path.startswith("friction.sigma")
-        }
-        return belt.BristleBelt(**given, law=law_of(law, {**values, **per_load}))
-
-    def _drive(self, structure: Structure, values: Values) -> Any:
-        """What moves the belt: a velocity of its own, or a drive."""
-        given = "belt.velocity" in values
-        if given == (structure.drive != "none"):
-            what = "given beside drive: the belt moves by one or the other" if given else "missing: give it, or a drive"
-            raise InputError("scene.belt.velocity", what)
-        if given:
-            return drives.Constant(values["belt.velocity"])
-        if structure.law == "karnopp" and structure.drive != "constant":
-            raise InputError("scene.drive", "the dead band of law karnopp needs a belt of constant velocity")
-        return drive_of(structure, values)
 
 
 # ---- what is remembered of a run -------------------------------------------------------------
@@ -173,13 +75,16 @@ class Record(NamedTuple):
 # A stick shorter than this fraction of the span is a touch.
 _TOUCH = 1e-9
 
+
 # A stick shorter than this fraction of the cycle does not make it a cycle of stick and slip; the second is for laws
 # under which a contact is only nearly stuck.
 _SHORT, _SHORT_CREEP = 1e-6, 1e-2
 
+
 # Swings must keep this much of themselves from one quarter of a run to the next for their amplitude to count as
 # lasting, and be more than the tolerance makes of the displacement.
 _LASTING, _ROUNDING = 0.95, 1e-6
+
 
 # A body whose last slip lies so many cycles back slips no more.
 _CYCLES = 2.0

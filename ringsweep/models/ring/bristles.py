@@ -11,16 +11,18 @@ from __future__ import annotations
 from math import cos, isnan, sin, sqrt
 from typing import NamedTuple
 
-from ringsweep import hooks, regimes
+from ringsweep import hooks
 from ringsweep.compile import inlined
-from ringsweep.models.common import largest_eigenvalue
-from ringsweep.models.ring_series import AT_ONCE, NEARLY_JAMMED, coefficients_under
+from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
+from ringsweep.models.parts import largest_eigenvalue
+from ringsweep.models.ring import record as regimes
+from ringsweep.models.ring.record import ENDS
+from ringsweep.models.ring.series import AT_ONCE, NEARLY_JAMMED, coefficients_under
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction.bristles import bristle, lasts, steady
 from ringsweep.physics.friction.velocity import BAND, CLEAN
 from ringsweep.physics.ring import BristleRing
 from ringsweep.physics.zones import beyond, coefficients, cross, edge_ahead, locate, roughest, segment
-from ringsweep.regimes import BROKEN, ENDS, JAM, RUNNING
 
 
 class Contacts(NamedTuple):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import inf
 
 from ringsweep import hooks
-from ringsweep.models.belt_bristles import contact_force
-from ringsweep.models.belt_static import friction_force, holds_in_band, length_scale
+from ringsweep.models.belt.bristles import contact_force
+from ringsweep.models.belt.force import friction_force, holds_in_band, length_scale
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.friction.velocity import BAND, stiction_band
 

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.compile import absorbed
+from ringsweep.models.scene import Structure, Values, require
 from ringsweep.numerics.functions import select, square_root
 from ringsweep.physics import drives, friction
 from ringsweep.quantities.parameters import Parameter, declared
-from ringsweep.scene import Structure, Values, require
 
 MASS = Parameter("kg", "mass of the body", lower=0.0, open_lower=True)
 GRAVITY = Parameter("m/s^2", "acceleration of gravity", lower=0.0, default=9.81)

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from math import cos, sin, sqrt
 
-from ringsweep import hooks, regimes
+from ringsweep import hooks
 from ringsweep.compile import inlined
-from ringsweep.models.ring_series import coefficients_under
+from ringsweep.models.ring import record as regimes
+from ringsweep.models.ring.series import coefficients_under
 from ringsweep.physics import drives, ring
 from ringsweep.physics.friction.velocity import stiction_band, weights_in
 from ringsweep.physics.zones import coefficients, edge_ahead

@@ -10,9 +10,10 @@ from math import cos, inf, sin
 
 import numpy as np
 
-from ringsweep import hooks, regimes
+from ringsweep import hooks
 from ringsweep.compile import inlined, take
-from ringsweep.models.ring_series import coefficients_under
+from ringsweep.models.ring import record as regimes
+from ringsweep.models.ring.series import coefficients_under
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction import SET_VALUED
 from ringsweep.physics.friction.bristles import bristle

@@ -1,4 +1,4 @@
-"""What a run on the ring was: reversals, turns, extremes, motion, regime; counted while a solver runs."""
+"""What is remembered of a run on the ring, and what it makes of it: reversals, turns, extremes, motion, regime."""
 
 from __future__ import annotations
 
@@ -8,18 +8,20 @@ from typing import NamedTuple
 import numpy as np
 
 from ringsweep.compile import inlined
+from ringsweep.models.interface.status import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2, SEPARATED_BOTH
 from ringsweep.numerics.functions import any_of, select
 from ringsweep.physics import contact
 from ringsweep.quantities.variables import FAILED, JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 
-#: How a run stands or ended.
-RUNNING, COMPLETE, SEPARATED_1, SEPARATED_2, SEPARATED_BOTH, JAM, BROKEN = range(7)
-
-
 #: How a run goes on or ended, by the mode of :mod:`ringsweep.physics.contact`.
 ENDS = np.full(8, RUNNING)
+
+
 ENDS[[contact.OPEN_1, contact.OPEN_2, contact.OPEN_BOTH]] = SEPARATED_1, SEPARATED_2, SEPARATED_BOTH
+
+
 ENDS[contact.IMPOSSIBLE] = JAM
+
 
 #: What a count of turns saturates at: a diverging run of constant step makes more than an int32 holds.
 MOST_TURNS = 2.0**31 - 1.0

@@ -1,143 +1,37 @@
-"""The belt with friction that depends on the sliding velocity alone: the hooks of all solvers.
+"""The belt as a piecewise-smooth system: modes, guards and their power series.
 
-The state is ``(x, velocity)`` for steps of constant length and ``(x, v)``, with the sliding
-velocity itself, for the piecewise-smooth system.
+The state is ``(x, v)``: the sliding velocity itself, not the difference of two large velocities.
 """
 
 from __future__ import annotations
 
-from math import inf, isfinite
 from typing import NamedTuple
 
 from ringsweep import hooks
 from ringsweep.compile import inlined
-from ringsweep.models.belt import begin, conclude, observe
-from ringsweep.models.common import largest_eigenvalue
+from ringsweep.models.belt.force import _bound, holds_in_band, length_scale
+from ringsweep.models.belt.record import begin, conclude, observe
+from ringsweep.models.interface.status import BROKEN, RUNNING
 from ringsweep.numerics.series import INVERSE, ORDER, ascending, crossings, reach, slope, value, variation
 from ringsweep.physics import belt, drives
 from ringsweep.physics.friction.velocity import (
     BAND,
     CLEAN,
-    constant_weights,
     expand_weights,
     faster,
-    met,
     region_at,
     region_bounds,
     slower,
     stiction_band,
     tail_reach,
-    weights,
 )
-from ringsweep.regimes import BROKEN, RUNNING
-
-# ---- constant step ---------------------------------------------------------------------------
-
-
-class Inspection(NamedTuple):
-    """A state of the belt seen from within."""
-
-    rates: tuple[float, float]
-    v: float
-    force: float
-    slope: float
-
-
-@inlined
-def holds_in_band(law):
-    """Whether a contact in the band of the law is held by whatever force it takes, as at rest or in a dead band."""
-    return constant_weights(law, BAND)
-
-
-@inlined
-def _bound(scene):
-    """Force up to which a stuck contact holds, N."""
-    return scene.mu_s * scene.mass * scene.gravity
-
-
-@inlined
-def friction_force(scene, x, v):
-    """Friction force, N, and its derivative by the sliding velocity, N s/m."""
-    if holds_in_band(scene.law) and abs(v) < stiction_band(scene.law):
-        return max(-_bound(scene), min(_bound(scene), -scene.stiffness * x)), 0.0
-    w_s, w_k, dw_s, dw_k = weights(scene.law, abs(v))
-    load = scene.mass * scene.gravity
-    sign = 1.0 if v > 0.0 else -1.0 if v < 0.0 else 0.0
-    return (
-        sign * load * (w_s * scene.mu_s + w_k * scene.mu_k) + scene.viscous * v,
-        load * (dw_s * scene.mu_s + dw_k * scene.mu_k) + scene.viscous,
-    )
-
-
-@hooks.launch.implements(belt.Belt)
-def _launch(scene):
-    return scene.initial_x, scene.initial_v + drives.turn(scene.drive, 0.0)[1]
-
-
-@hooks.rates.implements(belt.Belt)
-def _rates(scene, now, y, drive_at, drive_rate):
-    force, _ = friction_force(scene, y[0], y[1] - drive_rate)
-    return y[1], -(scene.stiffness * y[0] + force) / scene.mass
-
-
-@hooks.inspect.implements(belt.Belt)
-def _inspect(scene, y, drive_at, drive_rate):
-    v = y[1] - drive_rate
-    force, slope = friction_force(scene, y[0], v)
-    return Inspection((y[1], -(scene.stiffness * y[0] + force) / scene.mass), v, force, slope)
-
-
-@hooks.verdict.implements(belt.Belt)
-def _verdict(scene, before, now):
-    return (RUNNING if isfinite(now.rates[1]) and isfinite(now.rates[0]) else BROKEN), 1.0
-
-
-@hooks.stiffness.implements(belt.Belt)
-def _stiffness(scene, before, now, h):
-    # The stages reach about as far as the acceleration at the beginning takes the body in one step.
-    belt_gains = (now.rates[0] - now.v) - (before.rates[0] - before.v)
-    ahead = before.v + h * before.rates[1] - belt_gains
-    rest, edge, jumped = met(scene.law, before.v, now.v, ahead)
-    steepest = max(abs(before.slope), abs(now.slope))
-    swing = scene.stiffness / scene.mass
-    if holds_in_band(scene.law):
-        # A discontinuous law has no slope that any step could follow; but one may land in a dead band.
-        return inf if jumped else largest_eigenvalue(steepest / scene.mass, swing) * h
-    # A step that jumps the band, or its edge, never samples the slope there, but has met it.
-    if rest:
-        steepest = max(steepest, abs(friction_force(scene, 0.0, 0.0)[1]))
-    if edge:
-        steepest = max(steepest, abs(friction_force(scene, 0.0, stiction_band(scene.law))[1]))
-    return largest_eigenvalue(steepest / scene.mass, swing) * h
-
-
-@hooks.begin.implements(belt.Belt)
-def _begin(scene, y, now):
-    return begin(scene, 0.0, y[0], y[1], now.force)
-
-
-@hooks.observe.implements(belt.Belt)
-def _observe(scene, record, y, before, now, t, h):
-    stuck = abs(before.v) < stiction_band(scene.law) or before.v * now.v < 0.0
-    return observe(record, scene, t, h, y[0], y[1], now.force, stuck, 0.0)
-
-
-@hooks.conclude.implements(belt.Belt)
-def _conclude(scene, record, status, t, y):
-    return conclude(record, scene, status, t, y[0], y[1], stiction_band(scene.law))
-
-
-@hooks.describe.implements(belt.Belt)
-def _describe(scene, y, drive_at, drive_rate):
-    v = y[1] - drive_rate
-    mode = 0.0 if abs(v) < stiction_band(scene.law) or v == 0.0 else 1.0 if v > 0.0 else -1.0
-    return y[0], y[1], friction_force(scene, y[0], v)[0], 0.0, mode
-
 
 # ---- piecewise-smooth system -----------------------------------------------------------------
 
 # Rows of the series; the guards last.
 X, V, VELOCITY, EXCESS, BASIS, STATIC, KINETIC, FORCE, SHIFT = range(9)
+
+
 SLOW, FAST = range(9, 11)
 
 
@@ -279,15 +173,6 @@ def _expand(scene, mode, t, y, tolerance, c):
     return h if mode.sign == 0 else tail_reach(scene.law, mode.region, c[V], h)
 
 
-@inlined
-def length_scale(scene, velocity):
-    """A length to measure errors by, m."""
-    push = scene.mu_s * scene.gravity * scene.mass
-    if scene.stiffness > 0.0:
-        return velocity * (scene.mass / scene.stiffness) ** 0.5 + push / scene.stiffness + 1e-300
-    return velocity + push / scene.mass + 1e-300
-
-
 @hooks.start.implements(belt.Belt)
 def _start(scene, c):
     return begin(scene, drives.beginning(scene.drive), c[X, 0], c[VELOCITY, 0], c[FORCE, 0])
@@ -342,69 +227,3 @@ def _impasse(scene, mode, t, y):
 @hooks.finish.implements(belt.Belt)
 def _finish(scene, record, status, t, y):
     return conclude(record, scene, status, t, y[0], y[1] + drives.turn(scene.drive, t)[1], stiction_band(scene.law))
-
-
-# ---- creep in the stiction band --------------------------------------------------------------
-
-
-@hooks.is_stiff.implements(belt.Belt)
-def _is_stiff(scene, mode, y, line):
-    (_, push), (_, _, _, decay), _, _ = line
-    own = (scene.stiffness / scene.mass) ** 0.5
-    return -decay > 50.0 * own and abs(push) < 0.01 * -decay * stiction_band(scene.law)
-
-
-@hooks.stiff_scales.implements(belt.Belt)
-def _stiff_scales(scene, tolerance, x):
-    length = length_scale(scene, abs(drives.turn(scene.drive, scene.span)[1]))
-    return tolerance * length, tolerance * stiction_band(scene.law)
-
-
-@hooks.stiff_rates.implements(belt.Belt)
-def _stiff_rates(scene, mode, force, x):
-    shift, _, belt_acceleration = force
-    drag, _ = friction_force(scene, x[0] + shift, x[1])
-    return x[1], -(scene.stiffness * (x[0] + shift) + drag) / scene.mass - belt_acceleration
-
-
-@hooks.linearise.implements(belt.Belt)
-def _linearise(scene, mode, t, x):
-    shift, belt_velocity, belt_acceleration = drives.turn(scene.drive, t)
-    drag, slope = friction_force(scene, x[0] + shift, x[1])
-    rate = scene.stiffness / scene.mass
-    push = -rate * (x[0] + shift) - drag / scene.mass - belt_acceleration
-    return (
-        (x[1], push),
-        (0.0, 1.0, -rate, -slope / scene.mass),
-        (),
-        (0.0, -rate * belt_velocity - drives.jerk(scene.drive, t)),
-    )
-
-
-@hooks.stiff_view.implements(belt.Belt)
-def _stiff_view(scene, mode, t, x):
-    shift, belt_velocity, _ = drives.turn(scene.drive, t)
-    place = x[0] + shift
-    force, _ = friction_force(scene, place, x[1])
-    acceleration = -(scene.stiffness * place + force) / scene.mass
-    speed = mode.sign * x[1]
-    # In the order of the rows of the series: SLOW, FAST.
-    return (speed, stiction_band(scene.law) - speed), (place, x[1] + belt_velocity, acceleration, force)
-
-
-@hooks.stiff_motion.implements(belt.Belt, belt.BristleBelt)
-def _stiff_motion(scene, t, x, line):
-    _, belt_velocity, belt_acceleration = drives.turn(scene.drive, t)
-    return x[1] + belt_velocity, line[0][1] + belt_acceleration
-
-
-@hooks.stiff_watch.implements(belt.Belt)
-def _stiff_watch(scene, record, mode, view, t, duration):
-    _, (x, velocity, _, force) = view
-    return observe(record, scene, t, duration, x, velocity, force, True, 0.0)
-
-
-@hooks.stiff_sample.implements(belt.Belt)
-def _stiff_sample(scene, mode, t, x):
-    _, (position, velocity, _, force) = hooks.stiff_view(scene, mode, t, x)
-    return position, velocity, force, 0.0, 0.0

@@ -11,13 +11,13 @@ from typing import NamedTuple
 
 from ringsweep import hooks
 from ringsweep.compile import inlined
-from ringsweep.models.belt import begin, conclude, observe
-from ringsweep.models.common import largest_eigenvalue
+from ringsweep.models.belt.record import begin, conclude, observe
+from ringsweep.models.interface.status import BROKEN, RUNNING
+from ringsweep.models.parts import largest_eigenvalue
 from ringsweep.physics import drives
 from ringsweep.physics.belt import BristleBelt
 from ringsweep.physics.friction.bristles import bristle, crawl, lasts, made, yields
 from ringsweep.physics.friction.velocity import BAND, CLEAN
-from ringsweep.regimes import BROKEN, RUNNING
 
 
 @inlined

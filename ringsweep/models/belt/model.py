@@ -1,0 +1,107 @@
+"""The belt as a model: its parameters, the cells that kernels run over, and what is remembered of a run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ringsweep.compile import take
+from ringsweep.errors import InputError
+from ringsweep.models.belt.record import Outcome
+from ringsweep.models.parts import GRAVITY, MASS, SPAN, drive_of, law_of, pair
+from ringsweep.models.scene import Structure, Values, require
+from ringsweep.physics import belt, drives, friction
+from ringsweep.quantities.parameters import Parameter, declared
+
+
+class Belt:
+    """A mass on a spring on a moving belt (the paper's Fig. 1)."""
+
+    name: ClassVar[str] = "belt"
+    doc: ClassVar[str] = "a mass on a spring on a moving belt"
+    outcomes: ClassVar[tuple[str, ...]] = Outcome._fields
+    laws: ClassVar[dict[str, type]] = friction.LAWS
+    absent: ClassVar[frozenset[str]] = frozenset()
+
+    def history(self, structure: Structure) -> tuple[str, ...]:
+        """Quantities of a time history, in the order of their columns."""
+        return "x", "velocity", "friction_force", "deflection", "mode"
+
+    def parameters(self, structure: Structure) -> dict[str, Parameter]:
+        """Every numeric path of a scene of this structure."""
+        law = self.laws[structure.law]
+        found = {
+            "body.mass": MASS,
+            "spring.stiffness": Parameter("N/m", "stiffness of the spring", lower=0.0),
+            "belt.velocity": Parameter("m/s", "velocity of the belt", optional=True),
+        }
+        found |= {f"friction.{name}": p for name, p in friction.coefficients_of(law).items()}
+        for name, p in declared(law).items():
+            # What bristles have per unit of the load, they have here under the weight of the body.
+            absolute = {"1/m": "N/m", "s/m": "N s/m"} if name.startswith("sigma") else {}
+            found[f"friction.{name}"] = replace(p, unit=absolute.get(p.unit, p.unit))
+        if law not in friction.DYNAMIC:
+            found["friction.viscous"] = Parameter("N s/m", "viscous friction", lower=0.0, default=0.0)
+        for name, p in declared(drives.DRIVES[structure.drive]).items():
+            found[f"drive.{name}"] = p.along_a_line()
+        return found | {
+            "initial.x": Parameter("m", "displacement of the body at the start", default=0.0),
+            "initial.velocity": Parameter(
+                "m/s", "velocity of the body at the start (default: that of the belt)", optional=True
+            ),
+            "time.span": SPAN,
+            "gravity": GRAVITY,
+        }
+
+    def build(self, structure: Structure, values: Values) -> belt.Belt | belt.BristleBelt:
+        """Cells of a sweep; see :func:`ringsweep.models.batch`."""
+        if structure.arcs:
+            raise InputError(f"scene.{structure.arcs[0]}", "a belt has no rough zones")
+        law = self.laws[structure.law]
+        mu_s, mu_k = pair(law, "friction", values)
+        drive = self._drive(structure, values)
+        sliding = np.zeros(len(mu_k))
+        if "initial.velocity" in values:
+            launched = values["initial.velocity"]
+            sliding = np.array([drives.relative(take(drive, i), velocity) for i, velocity in enumerate(launched)])
+        mass, gravity = values["body.mass"], values["gravity"]
+        given = {
+            "mass": mass,
+            "stiffness": values["spring.stiffness"],
+            "gravity": gravity,
+            "mu_s": mu_s,
+            "mu_k": mu_k,
+            "drive": drive,
+            "initial_x": values["initial.x"],
+            "initial_v": sliding,
+            "span": values["time.span"],
+        }
+        if law not in friction.DYNAMIC:
+            viscous, load = values["friction.viscous"], mass * gravity
+            if structure.law == "karnopp":
+                require(
+                    mu_k * load + viscous * values["friction.dead_band"] <= mu_s * load,
+                    "friction.viscous",
+                    viscous,
+                    "{} N s/m makes friction at the edge of the dead band greater than what holds within it",
+                )
+            return belt.Belt(**given, law=law_of(law, values), viscous=viscous)
+        require(gravity > 0.0, "gravity", gravity, "{} m/s^2 leaves the bristles of friction without a load")
+        per_load = {
+            path: value / (mass * gravity) for path, value in values.items() if path.startswith("friction.sigma")
+        }
+        return belt.BristleBelt(**given, law=law_of(law, {**values, **per_load}))
+
+    def _drive(self, structure: Structure, values: Values) -> Any:
+        """What moves the belt: a velocity of its own, or a drive."""
+        given = "belt.velocity" in values
+        if given == (structure.drive != "none"):
+            what = "given beside drive: the belt moves by one or the other" if given else "missing: give it, or a drive"
+            raise InputError("scene.belt.velocity", what)
+        if given:
+            return drives.Constant(values["belt.velocity"])
+        if structure.law == "karnopp" and structure.drive != "constant":
+            raise InputError("scene.drive", "the dead band of law karnopp needs a belt of constant velocity")
+        return drive_of(structure, values)

@@ -1,0 +1,143 @@
+"""The ring as a model: its parameters, their consistency, and the cells that kernels run over."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import pi
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ringsweep.models.parts import GRAVITY, MASS, SPAN, drive_of, law_of, pair
+from ringsweep.models.ring import record as regimes
+from ringsweep.models.scene import Structure, Values, require
+from ringsweep.physics import drives, friction, ring, zones
+from ringsweep.quantities.parameters import Parameter, declared
+
+RADIUS = Parameter("m", "radius of the inner race", lower=0.0, open_lower=True)
+
+
+class SingleContactRing:
+    """A small body on one contact with the ring (the paper's Fig. 13)."""
+
+    name: ClassVar[str] = "ring-single-contact"
+    doc: ClassVar[str] = "a small body in a rotating ring, one contact"
+    outcomes: ClassVar[tuple[str, ...]] = regimes.Outcome._fields
+    laws: ClassVar[dict[str, type]] = {
+        name: law for name, law in friction.LAWS.items() if name not in ("karnopp", "reset-integrator", "bristle")
+    }
+    absent: ClassVar[frozenset[str]] = frozenset({"normal_min_2", "normal_2", "zone_2", "deflection_2"})
+    body: ClassVar[dict[str, Parameter]] = {"body.mass": MASS, "ring.radius": RADIUS}
+
+    def history(self, structure: Structure) -> tuple[str, ...]:
+        """Quantities of a time history, in the order of their columns."""
+        names = "phi", "omega", "epsilon", "normal_1", "normal_2", "ring_omega", "zone_1", "zone_2", "mode"
+        return (*names, "deflection_1", "deflection_2") if self.laws[structure.law] in friction.DYNAMIC else names
+
+    def parameters(self, structure: Structure) -> dict[str, Parameter]:
+        """Every numeric path of a scene of this structure."""
+        law = self.laws[structure.law]
+        found = dict(self.body)
+        places = {"friction.rest": "the rest of the ring"}
+        if structure.arcs == ("zone",):
+            places["friction.rough"] = "the rough zone"
+        else:
+            places |= {arc: f"rough arc {number}" for number, arc in enumerate(structure.arcs, start=1)}
+        for place, where in places.items():
+            for name, p in friction.coefficients_of(law).items():
+                found[f"{place}.{name}"] = replace(p, long_name=f"{p.long_name} of {where}")
+        found |= {f"friction.{name}": p for name, p in declared(law).items()}
+        for arc in structure.arcs:
+            for name, p in declared(zones.Arc).items():
+                whose = places.get(arc, "the rough zone")
+                found[f"{arc}.{name}"] = replace(p, long_name=p.long_name.replace("the rough zone", whose))
+        found |= {f"drive.{name}": p for name, p in declared(drives.DRIVES[structure.drive]).items()}
+        return found | {
+            "initial.phi": Parameter("rad", "angle of the body at launch", default=0.0),
+            "initial.omega": Parameter("rad/s", "angular velocity of the body at launch", default=0.0),
+            "time.span": SPAN,
+            "gravity": GRAVITY,
+            "classify.epsilon_omega": Parameter(
+                "rad/s", "angular velocity beyond which a change of sign is a reversal", lower=0.0, default=1e-3
+            ),
+        }
+
+    def build(self, structure: Structure, values: Values) -> ring.Ring | ring.BristleRing:
+        """Cells of a sweep; see :func:`ringsweep.models.batch`."""
+        law = self.laws[structure.law]
+        rough = "friction.rough" if structure.arcs == ("zone",) else None
+        arcs = [
+            zones.Arc(values[f"{arc}.center"], values[f"{arc}.half_angle"], *pair(law, rough or arc, values))
+            for arc in structure.arcs
+        ]
+        surface = zones.cut(arcs, *pair(law, "friction.rest", values))
+        return (ring.BristleRing if law in friction.DYNAMIC else ring.Ring)(
+            body=self.build_body(values),
+            surface=surface,
+            law=law_of(law, values),
+            drive=drive_of(structure, values),
+            initial_phi=values["initial.phi"],
+            initial_omega=values["initial.omega"],
+            span=values["time.span"],
+            epsilon_omega=values["classify.epsilon_omega"],
+        )
+
+    def build_body(self, values: Values) -> Any:
+        """The body's cells."""
+        return ring.OneContact(values["body.mass"], values["ring.radius"], values["gravity"])
+
+
+class Ring(SingleContactRing):
+    """Two balls joined by a rod, sliding in the ring (the paper's Fig. 22)."""
+
+    name = "ring"
+    doc = "a two-contact body in a rotating ring"
+    absent = frozenset()
+    body: ClassVar[dict[str, Parameter]] = {
+        "body.mass": MASS,
+        "body.inertia": Parameter("kg m^2", "central moment of inertia of the body", lower=0.0),
+        "body.half_distance": Parameter(
+            "m", "half the distance between the centres of the balls", lower=0.0, open_lower=True
+        ),
+        "body.ball_radius": Parameter("m", "radius of the balls", lower=0.0),
+        "body.beta": Parameter(
+            "rad", "half the angle that the contacts subtend", 0.0, pi / 2, True, True, optional=True
+        ),
+        "ring.radius": Parameter("m", "radius of the inner race", lower=0.0, open_lower=True, optional=True),
+    }
+
+    def build_body(self, values: Values) -> ring.TwoContacts:
+        """The body's cells, from (a, r, R) or from (a, r, beta)."""
+        a, r = values["body.half_distance"], values["body.ball_radius"]
+        given = "ring.radius" in values, "body.beta" in values
+        if not any(given):
+            require(False, "ring.radius", np.nan, "missing: give ring.radius, or body.beta in its place")
+        if given[0]:
+            R = values["ring.radius"]
+            require(
+                r + a < R,
+                "ring.radius",
+                R,
+                "{} m is too small: the ring must be larger than ball_radius + half_distance of the body",
+            )
+            sin_beta = a / (R - r)
+            if given[1]:
+                require(
+                    np.abs(np.arcsin(sin_beta) - values["body.beta"]) < 2e-4,
+                    "body.beta",
+                    values["body.beta"],
+                    "{} rad contradicts ring.radius: sin(beta) = half_distance / (radius - ball_radius); give one",
+                )
+        else:
+            sin_beta = np.sin(values["body.beta"])
+            R = r + a / sin_beta
+        cos_beta = np.sqrt((1.0 - sin_beta) * (1.0 + sin_beta))
+        return ring.TwoContacts.of(
+            mass=values["body.mass"],
+            inertia=values["body.inertia"],
+            radius=R,
+            xi=(R - r) * cos_beta,
+            sin_beta=sin_beta,
+            cos_beta=cos_beta,
+            gravity=values["gravity"],
+        )
