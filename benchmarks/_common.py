@@ -18,7 +18,7 @@ import numpy as np
 
 from ringsweep import cells, config, engine
 from ringsweep.models import MODELS, batch
-from ringsweep.solvers.common import Result
+from ringsweep.solvers.method import Result
 
 #: The ring of the paper's Fig. 29 (SI units) but for its law.
 SPAN = 10.0

@@ -23,7 +23,7 @@ import numpy as np
 from benchmarks._common import ALPHA, V0, alternate, family, heading, machine, markdown, one_core, ring, table
 from ringsweep import cells, config
 from ringsweep.models import MODELS, batch
-from ringsweep.solvers.common import errors, with_errors
+from ringsweep.solvers.certificate import errors, with_errors
 from ringsweep.solvers.event import FACTOR, Event, Implicit
 
 RESULTS = Path(__file__).parent / "results"

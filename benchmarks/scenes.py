@@ -46,7 +46,7 @@ from benchmarks._common import (
 )
 from ringsweep import engine
 from ringsweep.physics.friction import LAWS, SET_VALUED, WITHOUT_STATIC
-from ringsweep.solvers import piecewise, rk4
+from ringsweep.solvers import automaton, rk4
 
 ROOT = Path(__file__).parent.parent
 RESULTS = Path(__file__).parent / "results"
@@ -188,7 +188,7 @@ def compile_one(name: str, method: str) -> dict[str, Any]:
     run()
     took = time.process_time() - begin[0], time.perf_counter() - begin[1]
     rk4_kernels = (rk4._tabulate, rk4._begin, rk4._go_on, rk4._complete)
-    kernels = rk4_kernels if method == "rk4" else (piecewise.integrate,)
+    kernels = rk4_kernels if method == "rk4" else (automaton.integrate,)
     found = {"cpu": took[0], "wall": took[1]}
     if any(kernel.stats.cache_hits for kernel in kernels[-2:]):
         # Another scene has the very same types, and what is loaded has no text.

@@ -16,7 +16,8 @@ from ringsweep.models import MODELS, batch
 from ringsweep.models.scene import LAW, Scene, Values
 from ringsweep.provenance import environment, processor
 from ringsweep.quantities.variables import OUTCOMES
-from ringsweep.solvers.common import Result, with_errors
+from ringsweep.solvers.certificate import with_errors
+from ringsweep.solvers.method import Result
 
 #: Where along each dimension cells lie, by name of the dimension.
 Place = Mapping[str, NDArray[np.intp]]

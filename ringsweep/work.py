@@ -27,8 +27,9 @@ from ringsweep.provenance import attributes
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity
 from ringsweep.quantities.variables import FAILED, PRECISION, Variable
-from ringsweep.solvers.common import Result, agree
+from ringsweep.solvers.certificate import agree
 from ringsweep.solvers.event import Event, Implicit
+from ringsweep.solvers.method import Result
 from ringsweep.solvers.rk4 import RK4
 
 #: What is asked of a setting, unless the user says otherwise: largest error in rad or m, and in s.

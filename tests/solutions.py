@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from ringsweep.compile import take
 from ringsweep.models.ring.record import Outcome
 from ringsweep.physics.friction.velocity import weights
-from ringsweep.solvers.piecewise import integrate
+from ringsweep.solvers.automaton import integrate
 
 
 def solve(method, batch):

@@ -11,8 +11,8 @@ from ringsweep import hooks
 from ringsweep.compile import take
 from ringsweep.models import MODELS
 from ringsweep.quantities.variables import FAILED, JAMMED, RESTING, SEPARATING
-from ringsweep.solvers import event, piecewise
-from ringsweep.solvers.common import with_errors
+from ringsweep.solvers import automaton, event
+from ringsweep.solvers.certificate import with_errors
 from ringsweep.solvers.event import Auto, Event, Implicit
 from ringsweep.solvers.rk4 import RK4
 
@@ -245,7 +245,7 @@ class TestLaw:
 
     def test_two_instants_a_step_are_gauss_s(self):
         """The work of friction is integrated to third order."""
-        early, late = piecewise._EARLY, piecewise._LATE
+        early, late = automaton._EARLY, automaton._LATE
         for power in range(4):
             assert 0.5 * (early**power + late**power) == pytest.approx(1.0 / (power + 1))
 

@@ -11,7 +11,7 @@ import ringsweep
 from ringsweep.config import load
 from ringsweep.models.ring.record import Outcome
 from ringsweep.quantities.variables import OUTCOMES, REGIMES
-from ringsweep.solvers.common import with_errors
+from ringsweep.solvers.certificate import with_errors
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 AMPLITUDES = [0.5, 2.0, 8.0]

@@ -14,8 +14,9 @@ from ringsweep.errors import InputError
 from ringsweep.models.scene import Structure
 from ringsweep.physics.friction import DYNAMIC, LAWS, SET_VALUED, SMOOTH
 from ringsweep.quantities.parameters import Parameter
-from ringsweep.solvers.common import Method, Result, errors, repeated, vouched, with_errors
-from ringsweep.solvers.piecewise import integrate
+from ringsweep.solvers.automaton import integrate
+from ringsweep.solvers.certificate import errors, repeated, vouched, with_errors
+from ringsweep.solvers.method import Method, Result
 
 LIMIT = Parameter("1", "steps after which a run is given up as failed", lower=1, upper=1e10)
 
@@ -60,7 +61,7 @@ class _Piecewise(Method):
         """Tolerance of the series and of the implicit steps."""
 
     def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:
-        """Outcomes of every cell; see :class:`ringsweep.solvers.common.Method`.
+        """Outcomes of every cell; see :class:`ringsweep.solvers.method.Method`.
 
         A cell is certified if a run at a looser tolerance agrees with it and it obeys its law. Where it does not, or
         where the two are one run, whose steps no tolerance has shortened, both tolerances are tightened.
@@ -126,7 +127,7 @@ class _Piecewise(Method):
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """One run of every cell at the tolerance: outcomes, steps, and under `audit` what each has shown of its law.
 
-        See :func:`ringsweep.solvers.piecewise.integrate`.
+        See :func:`ringsweep.solvers.automaton.integrate`.
         """
         rows = np.empty((len(batch.span), width))
         steps, shown = np.empty(len(rows)), np.empty((len(rows) if audit else 0, 3))
@@ -134,7 +135,7 @@ class _Piecewise(Method):
         return rows, steps, shown
 
     def history(self, batch: Any, samples: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Times and rows of the history of cell 0; see :class:`ringsweep.solvers.common.Method`."""
+        """Times and rows of the history of cell 0; see :class:`ringsweep.solvers.method.Method`."""
         spacing = float(batch.span[0]) / samples
         size = 4 * samples
         while True:
@@ -194,11 +195,11 @@ class Auto(Method):
     certify: bool = True
 
     def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:
-        """Outcomes of every cell; see :class:`ringsweep.solvers.common.Method`."""
+        """Outcomes of every cell; see :class:`ringsweep.solvers.method.Method`."""
         return self._method(type(batch.law)).run(batch, outcomes)
 
     def history(self, batch: Any, samples: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Times and rows of the history of cell 0; see :class:`ringsweep.solvers.common.Method`."""
+        """Times and rows of the history of cell 0; see :class:`ringsweep.solvers.method.Method`."""
         return self._method(type(batch.law)).history(batch, samples, width)
 
     def resolved(self, structure: Structure) -> Method:

@@ -52,7 +52,8 @@ from ringsweep.physics.drives import lookup, scaled, shape, turn
 from ringsweep.physics.friction import LAWS, WITH_SNAPS
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.variables import SEPARATING
-from ringsweep.solvers.common import Method, Result, errors, same_drive, vouched, with_errors
+from ringsweep.solvers.certificate import errors, vouched, with_errors
+from ringsweep.solvers.method import Method, Result, same_drive
 
 #: Radius of the largest half disc of the left half plane in which the method is stable: 2.616 where an eigenvalue is
 #: complex; on the real axis alone it would be 2.785.
@@ -91,7 +92,7 @@ class RK4(Method):
             )
 
     def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:
-        """Outcomes of every cell; see :class:`ringsweep.solvers.common.Method`."""
+        """Outcomes of every cell; see :class:`ringsweep.solvers.method.Method`."""
         cells = len(batch.span)
         rows, report = self._integrate(batch, np.arange(cells), self.steps, len(outcomes))
         certified, bounds = np.zeros(cells, dtype=bool), None
@@ -126,7 +127,7 @@ class RK4(Method):
         return rows[cells], report[cells]
 
     def history(self, batch: Any, samples: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Times and rows of the history of cell 0; see :class:`ringsweep.solvers.common.Method`."""
+        """Times and rows of the history of cell 0; see :class:`ringsweep.solvers.method.Method`."""
         stride = max(1, self.steps // samples)
         rows = np.empty((self.steps // stride + 2, width))
         times = np.empty(len(rows))
