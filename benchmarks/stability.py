@@ -33,7 +33,8 @@ import xarray as xr
 
 from benchmarks import brute_force
 from benchmarks._common import ALPHA, BODY, GRAVITY, RADIUS, REST, ROUGH, V0, machine
-from ringsweep import config, engine, storage
+from ringsweep import engine, storage
+from ringsweep import config
 from ringsweep.quantities.variables import REGIMES
 from ringsweep.solvers.rk4 import STABILITY_LIMIT
 

@@ -431,7 +431,7 @@ def _info(arguments: argparse.Namespace) -> None:
 
 
 def _schema(arguments: argparse.Namespace) -> None:
-    from ringsweep.schema import schema
+    from ringsweep.config.schema import schema
 
     print(json.dumps(schema(), indent=2, ensure_ascii=False))
 

@@ -23,7 +23,9 @@ from tqdm.auto import tqdm
 from ringsweep import storage
 from ringsweep.cells import Chunk, Finished
 from ringsweep.chunks import Chunks, Columns, Damaged, owned
-from ringsweep.config import Axes, Config, load, read_axes, read_scene, read_solver, sweepable
+from ringsweep.config import Axes, Config, load, read_axes, read_scene
+from ringsweep.config.scene import sweepable
+from ringsweep.config.solver import read_solver
 from ringsweep.errors import InputError
 from ringsweep.layout import Layout
 from ringsweep.pace import Pace

@@ -12,7 +12,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.compile import take
-from ringsweep.config import Config, read_solver, with_values
+from ringsweep.config import Config, with_values
+from ringsweep.config.solver import read_solver
 from ringsweep.engine import compute
 from ringsweep.models import MODELS, batch
 from ringsweep.models.scene import Structure

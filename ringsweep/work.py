@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 
 from ringsweep.cells import cells as values_of
 from ringsweep.compile import take
-from ringsweep.config import COUNT, Config, load, sweepable
+from ringsweep.config import Config, load
+from ringsweep.config.axes import COUNT
+from ringsweep.config.scene import sweepable
 from ringsweep.engine import progress_bar
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, batch

@@ -14,12 +14,12 @@ from jsonschema import Draft202012Validator
 from ringsweep import cli
 from ringsweep.cli import main
 from ringsweep.config import load
+from ringsweep.config.schema import schema
 from ringsweep.models import MODELS, parameters
 from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS
 from ringsweep.quantities.variables import HISTORY, OUTCOMES
-from ringsweep.schema import schema
 from ringsweep.solvers import METHODS
 
 ROOT = Path(__file__).parents[1]

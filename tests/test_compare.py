@@ -15,8 +15,8 @@ import ringsweep
 from ringsweep import plots, storage
 from ringsweep.cli import main
 from ringsweep.config import load, with_values
+from ringsweep.config.schema import schema
 from ringsweep.errors import InputError
-from ringsweep.schema import schema
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 LAWS = ["coulomb", "stiction", "tustin"]

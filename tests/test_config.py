@@ -15,12 +15,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
-from ringsweep import config as reading
-from ringsweep.config import load, read_axes, read_scene, read_solver, with_values
+from ringsweep.config import configuration as reading
+from ringsweep.config import load, read_axes, read_scene, with_values
+from ringsweep.config.schema import schema
+from ringsweep.config.solver import read_solver
 from ringsweep.errors import InputError
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity
-from ringsweep.schema import schema
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 

@@ -9,7 +9,8 @@ from collections.abc import Mapping
 from itertools import product
 from typing import Any, get_type_hints
 
-from ringsweep.config import COUNT, TABLE
+from ringsweep.config.axes import COUNT
+from ringsweep.config.scene import TABLE
 from ringsweep.models import MODELS, parameters
 from ringsweep.models.scene import LAW, Structure
 from ringsweep.physics.drives import DRIVES
@@ -22,7 +23,7 @@ def schema() -> dict[str, Any]:
     """JSON Schema (2020-12) that every valid configuration satisfies.
 
     Editors complete and explain keys from it. It does not know what depends on several values at
-    once, nor units; :func:`ringsweep.config.load` does.
+    once, nor units; :func:`ringsweep.config.configuration.load` does.
     """
     known: dict[str, list[Parameter]] = {}
     for model, drive, arcs in product(MODELS, DRIVES, ((), ("zone",), ("zones.0",))):

@@ -1,0 +1,8 @@
+"""Configurations: YAML text to a validated scene, axes and solver in SI units."""
+
+from ringsweep.config.axes import Axes
+from ringsweep.config.configuration import Config, load, read_axes, read_scene, with_values
+from ringsweep.config.scene import sweepable
+from ringsweep.config.solver import read_solver
+
+__all__ = ["Axes", "Config", "load", "read_axes", "read_scene", "read_solver", "sweepable", "with_values"]

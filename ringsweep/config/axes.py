@@ -1,0 +1,155 @@
+"""The section ``sweep`` of a configuration, or the axes given in Python: what a sweep varies."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsweep.config.yaml_text import Document
+from ringsweep.errors import InputError
+from ringsweep.models.scene import Scene
+from ringsweep.quantities.parameters import Choice, Parameter
+from ringsweep.quantities.units import quantity, show
+from ringsweep.quantities.variables import OUTCOMES
+
+if TYPE_CHECKING:
+    import xarray as xr
+from ringsweep.config.scene import sweepable
+from ringsweep.config.sections import number_of, section_of, suggestion, values_of
+
+COUNT = Parameter("1", "number of values", lower=1, upper=1_000_000)
+
+
+#: Cells of a sweep at most: what 24 variables of them take on a disk is some ten gigabytes.
+MOST_CELLS = 100_000_000
+
+
+@dataclass(frozen=True)
+class Axes:
+    """What a sweep varies.
+
+    Attributes
+    ----------
+    sizes : dict of str to int
+        Length of each dimension, in order.
+    columns : dict of str to tuple
+        For each swept path its dimensions, and its values with a shape to match: numbers in SI units,
+        or names of friction laws.
+    """
+
+    sizes: dict[str, int] = field(default_factory=dict)
+    columns: dict[str, tuple[tuple[str, ...], NDArray[Any]]] = field(default_factory=dict)
+
+
+Entry = tuple[str, str, tuple[str, ...], NDArray[Any]]
+
+
+def sweep_section(doc: Document) -> dict[str, Any]:
+    """The section ``sweep``, its files inlined; empty if there is none."""
+    if "sweep" not in doc.tree:
+        return {}
+    sweep = section_of(doc.tree, "sweep", "")
+    for key in sweep:
+        if key not in ("grid", "points"):
+            raise InputError(f"sweep.{key}", "unknown key" + suggestion(key, ("grid", "points")))
+    if not sweep:
+        raise InputError("sweep", "empty: give grid or points, or leave sweep out")
+    if isinstance(sweep.get("points"), str):
+        sweep["points"] = doc.inline_csv(sweep["points"], "sweep.points", "sweep.points")
+    for key in sweep:
+        if not section_of(sweep, key, "sweep."):
+            raise InputError(f"sweep.{key}", "empty: name at least one path, or leave it out")
+    return sweep
+
+
+def swept_paths(sweep: dict[str, Any]) -> set[str]:
+    return set(sweep.get("grid", ())) | set(sweep.get("points", ()))
+
+
+def sweep_axes(scene: Scene, sweep: dict[str, Any]) -> Axes:
+    known = sweepable(scene)
+    points = sweep.get("points", {})
+
+    def entries() -> Iterator[Entry]:
+        for path, given in points.items():
+            where = f"sweep.points.{path}"
+            yield path, where, ("point",), values_of(given, axis(known, path, where), where)
+        for path, given in sweep.get("grid", {}).items():
+            where = f"sweep.grid.{path}"
+            parameter = axis(known, path, where)
+            if path in points:
+                raise InputError(where, "also a column of sweep.points: a path can vary in one place only")
+            spaced = isinstance(given, dict)
+            yield path, where, (dimension(path),), (_spaced if spaced else values_of)(given, parameter, where)
+
+    return axes_of(entries())
+
+
+def axis(known: Mapping[str, Parameter | Choice], path: object, where: str) -> Parameter | Choice:
+    if not isinstance(path, str) or path not in known:
+        raise InputError(where, "the scene has no such number to vary" + suggestion(path, known))
+    return known[path]
+
+
+def dimension(path: str) -> str:
+    return path.replace(".", "_")
+
+
+def array(given: xr.DataArray, parameter: Parameter | Choice, where: str) -> tuple[tuple[str, ...], NDArray[Any]]:
+    """Dimensions and values of a DataArray."""
+    dims = tuple(map(str, given.dims))
+    if not dims:
+        raise InputError(where, "a DataArray without dimensions varies nothing")
+    unit = str(given.attrs.get("units", "1"))
+    flat: Any = given.values.ravel()
+    if unit != "1" and given.dtype.kind in "iuf":
+        flat = [f"{value!r} {unit}" for value in flat.tolist()]
+    return dims, values_of(flat, parameter, where).reshape(given.shape)
+
+
+def _spaced(given: dict[str, Any], parameter: Parameter | Choice, where: str) -> NDArray[np.float64]:
+    """Values from ``{linspace: [first, last, count]}`` or ``geomspace``."""
+    if isinstance(parameter, Choice):
+        raise InputError(where, f"a list of names is expected, got {show(given)}")
+    if len(given) != 1 or next(iter(given)) not in ("linspace", "geomspace"):
+        raise InputError(where, f"a list of values, linspace or geomspace is expected, got {show(given)}")
+    ((kind, bounds),) = given.items()
+    where = f"{where}.{kind}"
+    if not isinstance(bounds, list) or len(bounds) != 3:
+        raise InputError(where, f"[first, last, count] is expected, got {show(bounds)}")
+    first, last = (quantity(bound, parameter, f"{where}.{i}") for i, bound in enumerate(bounds[:2]))
+    count = int(number_of(bounds[2], COUNT, int, f"{where}.2"))
+    if kind == "geomspace" and min(first, last) <= 0.0:
+        raise InputError(where, f"both ends of geomspace must be greater than 0, got {first:g} and {last:g}")
+    return np.linspace(first, last, count) if kind == "linspace" else np.geomspace(first, last, count)
+
+
+def axes_of(entries: Iterable[Entry]) -> Axes:
+    """Axes from columns, in their order."""
+    found = Axes()
+    for path, where, dims, values in entries:
+        for dim, size in zip(dims, values.shape, strict=True):
+            if dim in OUTCOMES:
+                raise InputError(where, f"the dimension {dim} has the name of a variable of the result")
+            if found.sizes.setdefault(dim, size) != size:
+                raise InputError(where, f"{size} values along {dim}, where others have {found.sizes[dim]}")
+        found.columns[path] = dims, values
+        if dims == (dimension(path),):
+            _, first = np.unique(values, return_index=True)
+            again = np.setdiff1d(np.arange(len(values)), first)
+            if len(again):
+                raise InputError(f"{where}.{again[0]}", f"{show(values[again[0]].item())} stands twice on this axis")
+    total = math.prod(found.sizes.values())
+    if total > MOST_CELLS:
+        sizes = " x ".join(map(str, found.sizes.values()))
+        raise InputError("sweep", f"{sizes} makes {total:.3g} cells: at most {MOST_CELLS:.3g} fit into one sweep")
+    for path, (dims, _) in found.columns.items():
+        name = dimension(path)
+        if name in found.sizes and dims != (name,):
+            raise InputError(path, f"the dimension {name} has the name of this path, but does not index it alone")
+    return found

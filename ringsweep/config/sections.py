@@ -1,0 +1,80 @@
+"""Sections and values of a configuration, and the messages about what is wrong in them."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsweep.errors import InputError
+from ringsweep.quantities.parameters import Choice, Parameter
+from ringsweep.quantities.units import quantity, show
+
+
+def suggestion(word: object, known: Iterable[str]) -> str:
+    """The end of a message about an unknown name: the nearest known one, and all of them."""
+    names = list(dict.fromkeys(known))
+    near = difflib.get_close_matches(str(word)[:100], names, n=1)
+    rest = "" if len(names) <= 40 else f", ... ({len(names)} in all)"
+    return (f"; did you mean `{near[0]}`?" if near else "") + f" (known: {', '.join(names[:40])}{rest})"
+
+
+def missing_text(path: str, parameter: Parameter) -> str:
+    examples = {"rad": "15 deg", "m": "10 mm", "1": "0.2", "": "1"}
+    unit = f", in {parameter.unit}" if parameter.unit not in ("", "1") else ""
+    example = "5000" if path.endswith(("steps", ".max_steps")) else examples.get(parameter.unit, f"1 {parameter.unit}")
+    return f"missing: {parameter.long_name}{unit} (for example `{path.rpartition('.')[2]}: {example}`)"
+
+
+def number_of(given: Any, parameter: Parameter, kind: type, path: str) -> float | int:
+    value = quantity(given, parameter, path)
+    if kind is not int:
+        return value
+    if not value.is_integer():
+        raise InputError(path, f"{show(given)} is not a whole number: {parameter.long_name} must be one")
+    return int(value)
+
+
+def values_of(given: Any, parameter: Parameter | Choice, where: str) -> NDArray[Any]:
+    """A sequence of quantities, or of names, shape ``(n,)``."""
+    if hasattr(given, "__array__"):
+        array = np.asarray(given)
+        if array.ndim != 1 or array.dtype.kind not in "iufOU":
+            what = "names" if isinstance(parameter, Choice) else "numbers"
+            raise InputError(where, f"a list of {what} is expected, got shape {array.shape} of {array.dtype}")
+        given = array.tolist()
+    if not isinstance(given, Sequence) or isinstance(given, str | bytes):
+        raise InputError(where, f"a list of values is expected, got {show(given)}")
+    if not given:
+        raise InputError(where, "empty: give at least one value")
+    read: Any = name_of if isinstance(parameter, Choice) else quantity
+    return np.array([read(value, parameter, f"{where}.{i}") for i, value in enumerate(given)])
+
+
+def name_of(given: object, choice: Choice, path: str) -> str:
+    """One of the names that there are to choose from."""
+    if not isinstance(given, str) or given not in choice.names:
+        raise InputError(path, f"{show(given)} is not a {choice.long_name}" + suggestion(given, choice.names))
+    return given
+
+
+def section_of(parent: dict[str, Any], key: str, prefix: str) -> dict[str, Any]:
+    if key not in parent:
+        raise InputError(f"{prefix}{key}", "missing")
+    if not isinstance(parent[key], dict):
+        raise InputError(f"{prefix}{key}", f"a section with keys is expected, got {show(parent[key])}")
+    return parent[key]
+
+
+def choose(registry: Mapping[str, Any], section: dict[str, Any], path: str, what: str) -> str:
+    """The name under the last key of `path`, which must be one of a registry."""
+    key = path.rpartition(".")[2]
+    if key not in section:
+        raise InputError(path, f"missing: name a {what}: {', '.join(registry)}")
+    name = section[key]
+    if not isinstance(name, str) or name not in registry:
+        raise InputError(path, f"{show(name)} is not a {what}" + suggestion(name, registry))
+    return name
