@@ -16,8 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ringsweep import cells, engine
-from ringsweep import config
+from ringsweep import cells, config, engine
 from ringsweep.models import MODELS, batch
 from ringsweep.solvers.method import Result
 

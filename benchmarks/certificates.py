@@ -21,8 +21,7 @@ from statistics import median
 import numpy as np
 
 from benchmarks._common import ALPHA, V0, alternate, family, heading, machine, markdown, one_core, ring, table
-from ringsweep import cells
-from ringsweep import config
+from ringsweep import cells, config
 from ringsweep.models import MODELS, batch
 from ringsweep.solvers.certificate import errors, with_errors
 from ringsweep.solvers.event import FACTOR, Event, Implicit

@@ -59,14 +59,14 @@ def _after(owner: Any, name: str, die: Callable[[], None]) -> None:
 
 def _points() -> dict[str, Callable[[Callable[[], None]], None]]:
     """Where a run can be made to die, by name."""
-    from ringsweep import storage
-    from ringsweep.chunks import Chunks
+    from ringsweep.storage import netcdf
+    from ringsweep.storage.partial import Chunks
 
     return {
         "flush": lambda die: _before(os, "fsync", die),
         "before a rename": lambda die: _before(Path, "replace", die),
         "after a rename": lambda die: _after(Path, "replace", die),
-        "merge": lambda die: _before(storage.zlib, "crc32", die),
+        "merge": lambda die: _before(netcdf.zlib, "crc32", die),
         "read back": lambda die: _before(storage, "_checksums", die),
         "clean-up": lambda die: _before(Chunks, "clear", die),
     }

@@ -33,10 +33,10 @@ import xarray as xr
 
 from benchmarks import brute_force
 from benchmarks._common import ALPHA, BODY, GRAVITY, RADIUS, REST, ROUGH, V0, machine
-from ringsweep import engine, storage
-from ringsweep import config
+from ringsweep import config, engine
 from ringsweep.quantities.variables import REGIMES
 from ringsweep.solvers.rk4 import STABILITY_LIMIT
+from ringsweep.storage import netcdf
 
 RESULTS = Path(__file__).parent / "results"
 SEED = 29
@@ -698,7 +698,7 @@ def main() -> None:
         "machine": where,
     }
     arguments.out.mkdir(parents=True, exist_ok=True)
-    storage.save(ds, arguments.out / "stability.nc")
+    netcdf.save(ds, arguments.out / "stability.nc")
     picture(ds, chosen, arguments.out / "stability.png")
     sections = [
         ("Maps", markdown(

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.config import Axes, Config
-from ringsweep.layout import Layout
 from ringsweep.models import MODELS, batch
 from ringsweep.models.scene import LAW, Scene, Values
-from ringsweep.provenance import environment, processor
 from ringsweep.quantities.variables import OUTCOMES
 from ringsweep.solvers.certificate import with_errors
 from ringsweep.solvers.method import Result
+from ringsweep.storage.chunks import Layout
+from ringsweep.storage.provenance import environment, processor
 
 #: Where along each dimension cells lie, by name of the dimension.
 Place = Mapping[str, NDArray[np.intp]]

@@ -286,8 +286,9 @@ def _run(arguments: argparse.Namespace) -> None:
     config = load(arguments.config)
     target, picture = _outputs(f"{config.name}.nc" if arguments.output is None else arguments.output, "regime", "sweep")
 
-    from ringsweep import plots, storage
+    from ringsweep import plots
     from ringsweep.engine import write
+    from ringsweep.storage import netcdf
 
     if arguments.scheduler is not None and not arguments.verbose:
         _silence_dask()
@@ -296,7 +297,7 @@ def _run(arguments: argparse.Namespace) -> None:
         print(f"wrote {target}")
     else:
         print(f"{target} holds this sweep already (--fresh runs it again)")
-    with storage.open_dataset(target) as result:
+    with netcdf.open_dataset(target) as result:
         _summarise(result)
         _warn_of_stiffness(result, config)
         _warn_of_launch(result)
@@ -325,14 +326,15 @@ def _silence_dask() -> None:
 
 
 def _map(arguments: argparse.Namespace) -> None:
-    from ringsweep import plots, storage
+    from ringsweep import plots
+    from ringsweep.storage import netcdf
 
     dataset = Path(arguments.dataset)
-    result = storage.open_dataset(dataset)
+    result = netcdf.open_dataset(dataset)
     # Beside the regime map of the sweep, not in its place.
     shown = [arguments.var] * (arguments.var != "regime") + [held.replace(" ", "") for held in arguments.sel]
     target = Path(arguments.output or dataset.with_name("-".join([dataset.stem, *shown]) + ".png"))
-    storage.check_writable(target)
+    netcdf.check_writable(target)
     held = dict(_selection(text) for text in arguments.sel)
     try:
         figure = plots.regime_map(result, arguments.x, arguments.y, arguments.var, held)
@@ -350,11 +352,12 @@ def _simulate(arguments: argparse.Namespace) -> None:
     config = with_values(arguments.config, arguments.set)
     target, picture = _outputs(arguments.output or f"{config.name}-run.nc", "time", "history")
 
-    from ringsweep import plots, storage
+    from ringsweep import plots
     from ringsweep.single import history
+    from ringsweep.storage import netcdf
 
     result = history(config)
-    storage.save(result, target)
+    netcdf.save(result, target)
     plots.save(plots.history(result), picture)
     print(result.attrs["outcome"])
     _warn_of_stiffness(result, config)
@@ -391,22 +394,23 @@ def _precision(arguments: argparse.Namespace) -> None:
     config = load(arguments.config)
     target, picture = _outputs(arguments.output or f"{config.name}-precision.nc", "contender", "error against run time")
 
-    from ringsweep import plots, storage
+    from ringsweep import plots
+    from ringsweep.storage import netcdf
     from ringsweep.work import measure, report
 
     given = {name: getattr(arguments, name) for name in ("target", "cells", "rounds")}
     options = {name: value for name, value in given.items() if value is not None}
     result = measure(config, **options, progress=not arguments.quiet)
-    storage.save(result, target)
+    netcdf.save(result, target)
     plots.save(plots.work_precision(result), picture)
     print(report(result))
     print(f"wrote {target}\nwrote {picture}")
 
 
 def _info(arguments: argparse.Namespace) -> None:
-    from ringsweep import storage
+    from ringsweep.storage import netcdf
 
-    result = storage.open_dataset(arguments.dataset)
+    result = netcdf.open_dataset(arguments.dataset)
     print(result.attrs.get("title", arguments.dataset))
     print("dimensions:", ", ".join(f"{name} {size}" for name, size in result.sizes.items()) or "none: a single run")
     for name, axis in result.coords.items():
@@ -511,14 +515,14 @@ def _outputs(name: str, mark: str, content: str) -> tuple[Path, Path]:
     A file that is there is replaced if it is a result of the same kind, known by a variable or dimension, and
     refused otherwise.
     """
-    from ringsweep import storage
+    from ringsweep.storage import netcdf
 
     target = Path(name)
-    storage.check_writable(target)
+    netcdf.check_writable(target)
     picture = target.with_suffix(".png")
     if target == picture:
         raise InputError(name, "is where the picture goes: name the dataset *.nc")
-    storage.check_writable(picture)
+    netcdf.check_writable(picture)
     if target.exists():
-        storage.check_kind(target, mark, content)
+        netcdf.check_kind(target, mark, content)
     return target, picture

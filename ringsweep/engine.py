@@ -20,19 +20,19 @@ import xarray as xr
 from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
-from ringsweep import storage
 from ringsweep.cells import Chunk, Finished
-from ringsweep.chunks import Chunks, Columns, Damaged, owned
 from ringsweep.config import Axes, Config, load, read_axes, read_scene
 from ringsweep.config.scene import sweepable
 from ringsweep.config.solver import read_solver
 from ringsweep.errors import InputError
-from ringsweep.layout import Layout
 from ringsweep.pace import Pace
 from ringsweep.pace import chunks as chunks_of
-from ringsweep.provenance import attributes, differences, environment, identity
 from ringsweep.quantities.variables import OUTCOMES, linked
 from ringsweep.reuse import Earlier
+from ringsweep.storage import netcdf
+from ringsweep.storage.chunks import Layout
+from ringsweep.storage.partial import Chunks, Columns, Damaged, owned
+from ringsweep.storage.provenance import attributes, differences, environment, identity
 
 logger = logging.getLogger("ringsweep")
 
@@ -113,7 +113,7 @@ def _run(config: Config, output: str | os.PathLike[str] | None, fresh: bool, **o
     if output is None:
         return compute(config, **options)
     write(config, Path(output), fresh=fresh, **options)
-    return storage.open_dataset(output)
+    return netcdf.open_dataset(output)
 
 
 def sweep(
@@ -244,7 +244,7 @@ def write(
     config, earlier = _earlier(config, reuse)
     target = target.resolve()
     if target.exists():
-        storage.check_kind(target, "regime", "sweep")
+        netcdf.check_kind(target, "regime", "sweep")
     layout = Layout(tuple(config.axes.sizes.values()))
     described = identity(config)
     with owned(target, described, layout, fresh=fresh) as chunks:
@@ -277,14 +277,14 @@ def _merge(config: Config, target: Path, layout: Layout, chunks: Chunks) -> None
     """Make the file of finished chunks."""
     frame = _frame(config)
     frame.attrs["processors"] = ", ".join(sorted(chunks.processors))
-    storage.write(target, chunks.folder, frame, OUTCOMES, layout, chunks.bricks())
+    netcdf.write(target, chunks.folder, frame, OUTCOMES, layout, chunks.bricks())
 
 
 def _holds(target: Path, chunks: Chunks) -> bool:
     """Whether a file holds this very sweep; how another differs from it is told."""
     if not target.exists():
         return False
-    with storage.open_dataset(target) as ds:
+    with netcdf.open_dataset(target) as ds:
         found = dict(ds.attrs)
     if found.get("fingerprint") == chunks.key:
         return True

@@ -11,7 +11,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.layout import BRICK
+from ringsweep.storage.chunks import BRICK
 
 
 class _Measured(Protocol):

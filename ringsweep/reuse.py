@@ -12,14 +12,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ringsweep import storage
 from ringsweep.cells import laws_at, values_at
 from ringsweep.config import Config, load
 from ringsweep.errors import InputError
-from ringsweep.layout import Layout
 from ringsweep.models import parameters
 from ringsweep.models.scene import LAW
-from ringsweep.provenance import differences, fingerprint, identity
+from ringsweep.storage import netcdf
+from ringsweep.storage.chunks import Layout
+from ringsweep.storage.provenance import differences, fingerprint, identity
 
 # Two ways of spacing an axis differ by so many units in the last place.
 _ROUNDING = 8 * np.finfo(float).eps
@@ -52,7 +52,7 @@ class Earlier:
 
     def __init__(self, path: str | os.PathLike[str], config: Config):
         self.path = path
-        with storage.open_dataset(path) as ds:
+        with netcdf.open_dataset(path) as ds:
             if "regime" not in ds or "time" in ds.dims:
                 raise InputError(str(path), "holds no sweep whose cells could be reused")
             self.attributes = dict(ds.attrs)
@@ -98,7 +98,7 @@ class Earlier:
     def give(self, config: Config, layout: Layout, keeper: Keeper) -> int:
         """Hand over all cells of the new sweep that the file holds and that are not there yet; returns how many."""
         count = 0
-        with storage.open_dataset(self.path) as ds:
+        with netcdf.open_dataset(self.path) as ds:
             for begin, end, _ in layout.bricks():
                 positions = begin + np.flatnonzero(~keeper.done[begin:end])
                 place = dict(zip(config.axes.sizes, layout.indices(positions), strict=True))

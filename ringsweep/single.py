@@ -18,8 +18,8 @@ from ringsweep.engine import compute
 from ringsweep.models import MODELS, batch
 from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import turn
-from ringsweep.provenance import attributes
 from ringsweep.quantities.variables import HISTORY, REGIMES
+from ringsweep.storage.provenance import attributes
 
 #: Instants that a history keeps, about.
 SAMPLES = 20_000

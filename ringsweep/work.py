@@ -25,7 +25,6 @@ from ringsweep.errors import InputError
 from ringsweep.models import MODELS, batch
 from ringsweep.models.scene import LAW
 from ringsweep.physics.friction import LAWS, SET_VALUED
-from ringsweep.provenance import attributes
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity
 from ringsweep.quantities.variables import FAILED, PRECISION, Variable
@@ -33,6 +32,7 @@ from ringsweep.solvers.certificate import agree
 from ringsweep.solvers.event import Event, Implicit
 from ringsweep.solvers.method import Result
 from ringsweep.solvers.rk4 import RK4
+from ringsweep.storage.provenance import attributes
 
 #: What is asked of a setting, unless the user says otherwise: largest error in rad or m, and in s.
 TARGET = 1e-6

@@ -184,7 +184,7 @@ def test_any_other_end_is_told_in_one_line(monkeypatch, capsys, error, status, m
     def fail(path):
         raise error
 
-    monkeypatch.setattr("ringsweep.storage.open_dataset", fail)
+    monkeypatch.setattr("ringsweep.storage.netcdf.open_dataset", fail)
     assert main(["info", "out.nc"]) == status
     assert capsys.readouterr().err == f"ringsweep: {message}\n"
 

@@ -12,11 +12,12 @@ import yaml
 from jsonschema import Draft202012Validator
 
 import ringsweep
-from ringsweep import plots, storage
+from ringsweep import plots
 from ringsweep.cli import main
 from ringsweep.config import load, with_values
 from ringsweep.config.schema import schema
 from ringsweep.errors import InputError
+from ringsweep.storage import netcdf
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 LAWS = ["coulomb", "stiction", "tustin"]
@@ -108,8 +109,8 @@ class TestSweep:
         np.testing.assert_array_equal(again.x_end, found.x_end)
 
     def test_the_file_is_read_back_and_drawn(self, swept, tmp_path):
-        storage.save(swept, tmp_path / "laws.nc")
-        loaded = storage.load(tmp_path / "laws.nc")
+        netcdf.save(swept, tmp_path / "laws.nc")
+        loaded = netcdf.load(tmp_path / "laws.nc")
         xr.testing.assert_identical(loaded, swept)
         ticks = plots.regime_map(loaded, x="friction.law").axes[0].get_xticklabels()
         assert [tick.get_text() for tick in ticks] == LAWS
@@ -205,8 +206,8 @@ class TestRuns:
         assert lines[1].startswith("stiction: stick-slip")
 
     def test_the_file_is_enough_to_run_again(self, compared, tmp_path):
-        storage.save(compared, tmp_path / "laws-run.nc")
-        loaded = storage.load(tmp_path / "laws-run.nc")
+        netcdf.save(compared, tmp_path / "laws-run.nc")
+        loaded = netcdf.load(tmp_path / "laws-run.nc")
         xr.testing.assert_identical(loaded, compared)
         xr.testing.assert_equal(ringsweep.simulate(json.loads(loaded.attrs["configuration"])), compared)
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringsweep.layout import BRICK, Layout
 from ringsweep.pace import Pace, chunks
+from ringsweep.storage.chunks import BRICK, Layout
 
 
 class Took:

@@ -8,11 +8,12 @@ import pytest
 import yaml
 
 import ringsweep
-from ringsweep import plots, storage, work
+from ringsweep import plots, work
 from ringsweep.cli import main
 from ringsweep.config import load
 from ringsweep.errors import InputError
 from ringsweep.quantities.variables import PRECISION
+from ringsweep.storage import netcdf
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 TARGET = 1e-7
@@ -89,8 +90,8 @@ class TestDataset:
         assert "method: event, rtol: 1e-10" in found["solver"].values
 
     def test_survives_a_file(self, found, tmp_path):
-        storage.save(found, tmp_path / "found.nc")
-        again = storage.load(tmp_path / "found.nc")
+        netcdf.save(found, tmp_path / "found.nc")
+        again = netcdf.load(tmp_path / "found.nc")
         assert again.equals(found)
         assert again.attrs == found.attrs
         assert work.report(again) == work.report(found)
@@ -166,7 +167,7 @@ class TestRecommendation:
     def test_a_target_out_of_reach_is_said_to_be_and_the_closest_is_named(self, folder, capsys):
         assert main(["precision", "belt.yaml", "--target", "1e-40", "--rounds", "1"]) == 0
         out = capsys.readouterr().out
-        closest = storage.load("belt-precision.nc").attrs["closest"]
+        closest = netcdf.load("belt-precision.nc").attrs["closest"]
         assert f"met by none; closest is `{closest}`: no wrong regimes, errors up to" in out
         assert "\nsolver:" not in out
 
@@ -252,7 +253,7 @@ class TestInput:
 def test_the_command_leaves_dataset_picture_table_and_a_line_to_paste(folder, capsys):
     assert main(["precision", "belt.yaml", "-o", "out.nc", "--rounds", "1"]) == 0
     out = capsys.readouterr().out
-    found = storage.load("out.nc")
+    found = netcdf.load("out.nc")
     assert (folder / "out.png").read_bytes().startswith(b"\x89PNG")
     assert found.attrs["target"] == 1e-6
     lines = out.splitlines()

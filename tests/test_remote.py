@@ -12,8 +12,8 @@ from distributed import LocalCluster
 import ringsweep
 from benchmarks.kills import same_bits
 from ringsweep import cli
-from ringsweep.chunks import Chunks
 from ringsweep.pace import Pace
+from ringsweep.storage.partial import Chunks
 
 # Of what a scheduler leaves behind when its workers are killed.
 pytestmark = pytest.mark.filterwarnings("ignore")

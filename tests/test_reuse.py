@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 import ringsweep
-from ringsweep import cli, storage
-from ringsweep.chunks import Chunks
+from ringsweep import cli
 from ringsweep.errors import InputError
+from ringsweep.storage import netcdf
+from ringsweep.storage.partial import Chunks
 
 AMPLITUDES, WIDTHS = np.linspace(0.5, 4.5, 5), np.radians([10.0, 20.0, 30.0])
 COARSE = {"drive.amplitude": AMPLITUDES, "zone.half_angle": WIDTHS}
@@ -130,7 +131,7 @@ def test_a_file_of_another_version_is_refused(scene, earlier, tmp_path, monkeypa
 
 
 def test_a_history_is_refused(scene, tmp_path, earlier, capsys):
-    storage.save(ringsweep.simulate(scene), tmp_path / "history.nc")
+    netcdf.save(ringsweep.simulate(scene), tmp_path / "history.nc")
     output = ["-o", str(tmp_path / "new.nc")]
     assert cli.main(["run", str(earlier), *output, "--reuse", str(tmp_path / "history.nc")]) == 2
     assert "history.nc: holds no sweep whose cells could be reused" in capsys.readouterr().err

@@ -9,9 +9,9 @@ import pytest
 import xarray as xr
 
 import ringsweep
-from ringsweep import storage
 from ringsweep.errors import InputError
 from ringsweep.quantities.variables import OUTCOMES
+from ringsweep.storage import netcdf
 
 
 @pytest.fixture
@@ -36,8 +36,8 @@ def sweep() -> xr.Dataset:
 
 
 def test_what_is_loaded_is_what_was_saved(sweep, tmp_path):
-    storage.save(sweep, tmp_path / "out.nc")
-    loaded = storage.load(tmp_path / "out.nc")
+    netcdf.save(sweep, tmp_path / "out.nc")
+    loaded = netcdf.load(tmp_path / "out.nc")
     xr.testing.assert_identical(loaded, sweep)
     for name, variable in sweep.data_vars.items():
         assert loaded[name].dtype == variable.dtype
@@ -45,7 +45,7 @@ def test_what_is_loaded_is_what_was_saved(sweep, tmp_path):
 
 
 def test_no_variable_has_a_fill_value_and_large_ones_are_compressed(sweep, tmp_path):
-    storage.save(sweep, tmp_path / "out.nc")
+    netcdf.save(sweep, tmp_path / "out.nc")
     with netCDF4.Dataset(tmp_path / "out.nc") as file:
         assert not [name for name, variable in file.variables.items() if "_FillValue" in variable.ncattrs()]
         assert file["regime"].dtype == np.int8
@@ -56,8 +56,8 @@ def test_no_variable_has_a_fill_value_and_large_ones_are_compressed(sweep, tmp_p
 
 def test_attributes_without_a_netcdf_type_are_written_as_json(sweep, tmp_path):
     sweep.attrs |= {"fresh": True, "seed": None, "scene": {"body": {"mass": np.float64(0.076)}}, "tags": ["a", "b"]}
-    storage.save(sweep, tmp_path / "out.nc")
-    attributes = storage.load(tmp_path / "out.nc").attrs
+    netcdf.save(sweep, tmp_path / "out.nc")
+    attributes = netcdf.load(tmp_path / "out.nc").attrs
     assert json.loads(attributes["fresh"]) is True
     assert json.loads(attributes["seed"]) is None
     assert json.loads(attributes["scene"]) == {"body": {"mass": 0.076}}
@@ -68,7 +68,7 @@ def test_attributes_without_a_netcdf_type_are_written_as_json(sweep, tmp_path):
 @pytest.mark.parametrize("failure", [OSError("disk full"), KeyboardInterrupt()])
 def test_a_failing_save_leaves_the_old_file_intact_and_nothing_else(sweep, tmp_path, monkeypatch, failure):
     path = tmp_path / "out.nc"
-    storage.save(sweep, path)
+    netcdf.save(sweep, path)
     before = path.read_bytes()
 
     def fail(self, target, **_):
@@ -77,7 +77,7 @@ def test_a_failing_save_leaves_the_old_file_intact_and_nothing_else(sweep, tmp_p
 
     monkeypatch.setattr(xr.Dataset, "to_netcdf", fail)
     with pytest.raises(type(failure)):
-        storage.save(sweep, path)
+        netcdf.save(sweep, path)
     assert path.read_bytes() == before
     assert os.listdir(tmp_path) == ["out.nc"]
 
@@ -88,14 +88,14 @@ def test_a_file_that_reads_back_differently_does_not_count(sweep, tmp_path, monk
         xr.Dataset, "to_netcdf", lambda self, *a, **k: write(self.assign(steps=self.steps + 1), *a, **k)
     )
     with pytest.raises(OSError, match="does not read back"):
-        storage.save(sweep, tmp_path / "out.nc")
+        netcdf.save(sweep, tmp_path / "out.nc")
     assert not os.listdir(tmp_path)
 
 
 def test_saving_follows_a_symbolic_link_and_keeps_usual_permissions(sweep, tmp_path):
     (tmp_path / "plain").touch()
     (tmp_path / "link.nc").symlink_to(tmp_path / "real.nc")
-    storage.save(sweep, tmp_path / "link.nc")
+    netcdf.save(sweep, tmp_path / "link.nc")
     assert (tmp_path / "link.nc").is_symlink()
     assert (tmp_path / "real.nc").stat().st_mode == (tmp_path / "plain").stat().st_mode
 
@@ -112,7 +112,7 @@ def test_saving_follows_a_symbolic_link_and_keeps_usual_permissions(sweep, tmp_p
 def test_a_place_that_cannot_be_written_is_refused_before_any_work(tmp_path, name, problem):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match=problem) as caught:
-        storage.check_writable(tmp_path / name)
+        netcdf.check_writable(tmp_path / name)
     assert caught.value.path == str(tmp_path / name)
     assert os.listdir(tmp_path) == ["file"]
 
@@ -123,12 +123,12 @@ def test_a_folder_that_refuses_files_is_found_by_trying(tmp_path, monkeypatch):
 
     monkeypatch.setattr("tempfile.TemporaryFile", refuse)
     with pytest.raises(InputError, match="Permission denied"):
-        storage.check_writable(tmp_path / "out.nc")
+        netcdf.check_writable(tmp_path / "out.nc")
 
 
 def test_checking_leaves_an_existing_file_alone(tmp_path):
     (tmp_path / "out.nc").write_text("old")
-    storage.check_writable(tmp_path / "out.nc")
+    netcdf.check_writable(tmp_path / "out.nc")
     assert (tmp_path / "out.nc").read_text() == "old"
     assert os.listdir(tmp_path) == ["out.nc"]
 
@@ -143,15 +143,15 @@ def test_load_says_what_is_wrong_with_a_file(tmp_path):
         "foreign.nc": "not written by ringsweep: its attributes lack ringsweep_version",
     }.items():
         with pytest.raises(InputError, match=problem):
-            storage.load(tmp_path / name)
+            netcdf.load(tmp_path / name)
 
 
 def test_a_truncated_file_is_damaged_not_short(sweep, tmp_path):
-    storage.save(sweep, tmp_path / "out.nc")
+    netcdf.save(sweep, tmp_path / "out.nc")
     whole = (tmp_path / "out.nc").read_bytes()
     (tmp_path / "out.nc").write_bytes(whole[: len(whole) // 2])
     with pytest.raises(InputError, match="damaged"):
-        storage.load(tmp_path / "out.nc")
+        netcdf.load(tmp_path / "out.nc")
 
 
 def test_flags_are_told_in_words_and_what_has_none_is_refused():

@@ -14,13 +14,14 @@ import yaml
 
 import ringsweep
 from benchmarks.kills import POINTS, killed_at, same_bits
-from ringsweep import cli, storage
-from ringsweep.chunks import Chunks, owned
+from ringsweep import cli
 from ringsweep.config import load
 from ringsweep.engine import write
-from ringsweep.layout import Layout
 from ringsweep.pace import Pace
-from ringsweep.provenance import identity
+from ringsweep.storage import netcdf
+from ringsweep.storage.chunks import Layout
+from ringsweep.storage.partial import Chunks, owned
+from ringsweep.storage.provenance import identity
 
 SWEEP = {
     "grid": {"drive.amplitude": {"geomspace": [0.5, 8.0, 9]}, "zone.half_angle": {"linspace": ["5 deg", "40 deg", 8]}}
@@ -194,7 +195,7 @@ class TestNeverMixed:
     def test_chunks_that_vanish_meanwhile_are_computed_again(
         self, config, half_done, never_stopped, monkeypatch, caplog
     ):
-        merge = storage.write
+        merge = netcdf.write
 
         def vanish(*arguments):
             monkeypatch.setattr(storage, "write", merge)
@@ -270,14 +271,14 @@ class TestFile:
     def test_holds_what_a_sweep_in_memory_gives(self, config, never_stopped):
         undated = {"date_created": ""}
         in_memory = ringsweep.run(config, progress=False)
-        xr.testing.assert_identical(storage.load(never_stopped).assign_attrs(undated), in_memory.assign_attrs(undated))
+        xr.testing.assert_identical(netcdf.load(never_stopped).assign_attrs(undated), in_memory.assign_attrs(undated))
 
     def test_is_enough_to_run_it_again(self, never_stopped, tmp_path, monkeypatch, capsys):
         monkeypatch.chdir(tmp_path)
         again = tmp_path / "again.nc"
         assert cli.main(["run", str(never_stopped), "-o", str(again)]) == 0
         assert same_bits(again, never_stopped)
-        attributes = storage.load(again).attrs
+        attributes = netcdf.load(again).attrs
         for name in ("versions", "platform", "processors", "solver", "configuration", "date_created"):
             assert attributes[name]
         solver = json.loads(attributes["solver"])
@@ -288,7 +289,7 @@ class TestFile:
 
     def test_is_made_of_bricks_that_are_read_alone(self, scene, tmp_path, monkeypatch):
         """Of points and laws beside a grid too, whatever the bricks are."""
-        monkeypatch.setattr("ringsweep.layout.BRICK", 6)
+        monkeypatch.setattr("ringsweep.storage.chunks.BRICK", 6)
         monkeypatch.setattr(storage, "COMPRESSED_FROM", 1)
         axes = {
             "drive.amplitude": xr.DataArray([0.5, 1.0, 2.0, 8.0], dims="rig"),

@@ -78,12 +78,12 @@ def scene_of(doc: Document, swept: Collection[str], laws: tuple[str, Any] | None
     for path in leaves:
         if path not in known and path not in _structural(drive):
             where, name = ("drive", drive) if path.startswith("drive.") else ("friction", " or ".join(structures))
-            _tell_of_unused(path, where, name)
+            tell_of_unused(path, where, name)
     return Scene(structures, values, scene)
 
 
 @cache
-def _tell_of_unused(path: str, where: str, name: str) -> None:
+def tell_of_unused(path: str, where: str, name: str) -> None:
     """Once: a run, its picture and its file read one configuration several times."""
     logger.warning("scene.%s is not used: %s law %s has no such parameter", path, where, name)
 

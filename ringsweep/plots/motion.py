@@ -22,11 +22,11 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 from PIL import Image
 
-from ringsweep import storage
 from ringsweep.errors import InputError
 from ringsweep.plots.histories import TOGETHER, draw_panel
 from ringsweep.plots.ring import Rig, Stage, instants, run_of
 from ringsweep.plots.style import SMALL, label_of
+from ringsweep.storage import netcdf
 
 #: Kinds of file that `save_animation` writes.
 FILMS = (".mp4", ".gif", ".html")
@@ -101,7 +101,7 @@ def save_animation(ds: xr.Dataset, path: str | os.PathLike[str], *, fps: float =
     check_animation(path)
     film = _Film(ds, fps, duration)
     kind = Path(path).suffix.lower()
-    with storage.replacing(path) as temporary, film.painted():
+    with netcdf.replacing(path) as temporary, film.painted():
         film.animation().save(temporary, writer=_writer(kind, fps), dpi=_DPI)
 
 
@@ -118,7 +118,7 @@ def check_animation(path: str | os.PathLike[str]) -> None:
         raise InputError(str(path), f"animations end in {', '.join(FILMS)}, not in {suffix or 'nothing'!r}")
     if suffix == ".mp4" and not FFMpegWriter.isAvailable():
         raise InputError(str(path), "ffmpeg, which writes .mp4, is not installed; .gif and .html do without it")
-    storage.check_writable(path)
+    netcdf.check_writable(path)
 
 
 class _Screen(Figure):

@@ -17,8 +17,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ringsweep import storage
 from ringsweep.errors import InputError
+from ringsweep.storage import netcdf
 
 # Okabe and Ito's hues, which colour-blind readers tell apart, with lightness spread so that
 # the regimes of one model stay apart in greyscale too.
@@ -112,7 +112,7 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
         raise InputError(str(path), f"pictures end in {', '.join(SUFFIXES)}, not in {suffix or 'nothing'!r}")
-    with storage.replacing(path) as temporary:
+    with netcdf.replacing(path) as temporary:
         figure.savefig(temporary, dpi=150, format=suffix[1:])
 
 

@@ -19,8 +19,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
-from ringsweep.layout import Layout
 from ringsweep.quantities.variables import Variable, linked
+from ringsweep.storage.chunks import Layout
 
 #: Attributes that tell a file of this package from any other NetCDF file.
 SIGNATURE = ("Conventions", "ringsweep_version")

@@ -1,7 +1,8 @@
 """Finished cells of a sweep on disk, in a folder beside the file that they will become.
 
 The folder of `OUT.nc` is `OUT.nc.partial`. It holds one file a chunk, which is complete or absent: it is written
-aside, flushed and renamed. Each knows what determines its bits (:func:`ringsweep.provenance.identity`) and carries
+aside, flushed and renamed. Each knows what determines its bits (:func:`ringsweep.storage.provenance.identity`) and
+carries
 checksums, so that nothing else is ever mixed in. One process at a time owns the folder.
 """
 
@@ -23,8 +24,8 @@ from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
-from ringsweep.layout import Layout
-from ringsweep.provenance import differences, fingerprint
+from ringsweep.storage.chunks import Layout
+from ringsweep.storage.provenance import differences, fingerprint
 
 logger = logging.getLogger("ringsweep")
 
