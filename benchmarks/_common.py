@@ -16,8 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from ringsweep import cells, config, engine
+from ringsweep import config
 from ringsweep.models import MODELS, batch
+from ringsweep.runs import cells, sweep
 from ringsweep.solvers.method import Result
 
 #: The ring of the paper's Fig. 29 (SI units) but for its law.
@@ -77,8 +78,8 @@ def on_one_core(configuration: Any) -> Callable[[], dict[str, Any]]:
 
 
 def on_all_cores(configuration: Any) -> Any:
-    """Run a configuration through the engine: its dataset."""
-    return engine.compute(configuration, jobs=None, progress=False)
+    """Run a configuration through the sweep engine: its dataset."""
+    return sweep.compute(configuration, jobs=None, progress=False)
 
 
 @contextmanager

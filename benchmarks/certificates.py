@@ -21,8 +21,9 @@ from statistics import median
 import numpy as np
 
 from benchmarks._common import ALPHA, V0, alternate, family, heading, machine, markdown, one_core, ring, table
-from ringsweep import cells, config
+from ringsweep import config
 from ringsweep.models import MODELS, batch
+from ringsweep.runs import cells
 from ringsweep.solvers.certificate import errors, with_errors
 from ringsweep.solvers.event import FACTOR, Event, Implicit
 

@@ -4,7 +4,7 @@
     python -m benchmarks.kills --quick    # fewer kills
 
 `ringsweep run` is killed (SIGKILL: no handler, no clean-up) at random: after so many seconds, or at the n-th time that
-it flushes a chunk, is about to rename one, has just renamed one, writes a brick of the final file or reads one back.
+it flushes a task, is about to rename one, has just renamed one, writes a chunk of the final file or reads one back.
 After each kill the same command is given again; when it ends, its file is compared, bit for bit in all variables,
 with that of a run never stopped, and the sweep begins anew until there have been enough kills.
 """
@@ -60,15 +60,15 @@ def _after(owner: Any, name: str, die: Callable[[], None]) -> None:
 def _points() -> dict[str, Callable[[Callable[[], None]], None]]:
     """Where a run can be made to die, by name."""
     from ringsweep.storage import netcdf
-    from ringsweep.storage.partial import Chunks
+    from ringsweep.storage.partial import Partial
 
     return {
         "flush": lambda die: _before(os, "fsync", die),
         "before a rename": lambda die: _before(Path, "replace", die),
         "after a rename": lambda die: _after(Path, "replace", die),
         "merge": lambda die: _before(netcdf.zlib, "crc32", die),
-        "read back": lambda die: _before(storage, "_checksums", die),
-        "clean-up": lambda die: _before(Chunks, "clear", die),
+        "read back": lambda die: _before(netcdf, "_checksums", die),
+        "clean-up": lambda die: _before(Partial, "clear", die),
     }
 
 

@@ -1,4 +1,4 @@
-"""What a second core is worth: throughput of the engine with one job and with two.
+"""What a second core is worth: throughput of the sweep engine with one job and with two.
 
     python -m benchmarks.scaling            # about three minutes
     python -m benchmarks.scaling --quick    # fewer cells and rounds
@@ -7,7 +7,8 @@ Grids of the ring of the paper's Fig. 29, under a law that the method takes. On 
 alike. On the *uneven* one cells that separate early stand beside cells that run to the end, and those that cost most
 come last, where a core that has nothing left to do would wait for the other. Both counts of jobs run in turn within
 rounds, forwards and backwards, and a ratio is the median of those within the rounds. What the machine itself gives is
-measured in the same way: two processes of plain arithmetic against one. What the engine would make of two cores of its
+measured in the same way: two processes of plain arithmetic against one. What the sweep engine would make of two cores
+of its
 own follows from CPU seconds, which other work on the machine does not lengthen: its tasks, as they are and in the order
 that they are in, dealt to two cores, and all that is done outside of them by one.
 
@@ -30,12 +31,12 @@ from unittest import mock
 import numpy as np
 
 from benchmarks._common import PAPER_STEPS, alternate, bare, configure, family, heading, machine, markdown, ring, table
-from ringsweep import engine
-from ringsweep.cells import Chunk
+from ringsweep.runs import sweep
+from ringsweep.runs.cells import ComputeCells
 
 RESULTS = Path(__file__).parent / "results"
 TARGET = 1.9
-#: What the machine must give for the target to say something about the engine.
+#: What the machine must give for the target to say something about the sweep engine.
 FREE = 1.95
 
 SMOOTH, STIFF = ({"law": "bengisu-akay", "alpha": alpha, "v0": v0} for alpha, v0 in ((100.0, 0.2), (1e5, 2e-6)))
@@ -84,9 +85,9 @@ def what_the_machine_gives(rounds: int, count: int = 5_000_000) -> float:
 
 @contextmanager
 def timed_tasks() -> Iterator[list[float]]:
-    """CPU seconds of every task of the engine, in the order in which they end."""
+    """CPU seconds of every task of the sweep engine, in the order in which they end."""
     seconds: list[float] = []
-    compute = Chunk.__call__
+    compute = ComputeCells.__call__
 
     def timed(*args: Any) -> Any:
         begin = time.thread_time()
@@ -94,7 +95,7 @@ def timed_tasks() -> Iterator[list[float]]:
         seconds.append(time.thread_time() - begin)
         return result
 
-    with mock.patch.object(Chunk, "__call__", timed):
+    with mock.patch.object(ComputeCells, "__call__", timed):
         yield seconds
 
 
@@ -102,7 +103,7 @@ def on_free_cores(configuration: Any) -> float:
     """How much faster two cores would be than one, from CPU seconds of one run with two jobs."""
     with timed_tasks() as tasks:
         begin = time.process_time()
-        engine.compute(configuration, jobs=2, progress=False)
+        sweep.compute(configuration, jobs=2, progress=False)
         serial = time.process_time() - begin - sum(tasks)
     busy = [0.0, 0.0]
     for seconds in tasks:
@@ -123,7 +124,7 @@ def main() -> None:
     for method in METHODS:
         for grid in (even, uneven):
             configuration = grid(method, cells)
-            runs = {jobs: partial(engine.compute, configuration, jobs=jobs, progress=False) for jobs in (1, 2)}
+            runs = {jobs: partial(sweep.compute, configuration, jobs=jobs, progress=False) for jobs in (1, 2)}
             runs[2]()
             given = what_the_machine_gives(3)
             times, results = alternate(runs, rounds)
@@ -145,9 +146,11 @@ def main() -> None:
     report = "# One core and two\n\n`python -m benchmarks.scaling` on\n\n"
     report += "".join(f"- {line}\n" for line in where.splitlines())
     report += f"""
-{cells} cells through the engine, without certificates; medians over {rounds} rounds in which both alternate. *Plain
+{cells} cells through the sweep engine, without certificates; medians over {rounds} rounds in which both alternate.
+*Plain
 arithmetic* is what a second process adds to work that shares nothing, measured right before and after: a machine that
-gives less than {FREE} is at work on something else, and says little about the engine. *By CPU seconds* is what two free
+gives less than {FREE} is at work on something else, and says little about the sweep engine. *By CPU seconds* is what
+two free
 cores would give: the tasks dealt to both in their order, all else done by one.
 
 """

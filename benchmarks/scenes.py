@@ -44,8 +44,8 @@ from benchmarks._common import (
     one_core,
     table,
 )
-from ringsweep import engine
 from ringsweep.physics.friction import LAWS, SET_VALUED, WITHOUT_STATIC
+from ringsweep.runs import sweep
 from ringsweep.solvers import automaton, rk4
 
 ROOT = Path(__file__).parent.parent
@@ -251,9 +251,9 @@ def memory(cells: int) -> dict[str, float]:
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
 
     found = {"imported": peak()}
-    engine.compute(rung.configuration("rk4", 64, steps=10), jobs=None, progress=False)
+    sweep.compute(rung.configuration("rk4", 64, steps=10), jobs=None, progress=False)
     found["small"] = peak()
-    engine.compute(rung.configuration("rk4", cells, steps=10), jobs=None, progress=False)
+    sweep.compute(rung.configuration("rk4", cells, steps=10), jobs=None, progress=False)
     return found | {"large": peak()}
 
 
@@ -387,7 +387,7 @@ def main() -> None:
         python = [sys.executable, "-c"]
         bare_start = best_of([*python, "pass"], rounds, shared)
         imported = best_of([*python, "import ringsweep"], rounds, shared)
-        everything = best_of([*python, "import ringsweep.engine"], rounds, shared)
+        everything = best_of([*python, "import ringsweep.runs.sweep"], rounds, shared)
         helped = best_of([sys.executable, "-m", "ringsweep", "--help"], rounds, shared)
         many = 100_000
         peaks = in_child(memory, many, cache=shared)
@@ -399,7 +399,7 @@ def main() -> None:
         sections.append(("Start and memory", ["", ""], [
             ["python alone", f"{bare_start:.2f} s"],
             ["`import ringsweep`", f"{imported:.2f} s"],
-            ["`import ringsweep.engine`, Numba and xarray with it", f"{everything:.2f} s"],
+            ["`import ringsweep.runs.sweep`, Numba and xarray with it", f"{everything:.2f} s"],
             ["`ringsweep --help`", f"{helped:.2f} s"],
             ["`ringsweep run configs/regime_map.yaml`, cold: first cells, all", f"{cold[0]:.1f} s, {cold[1]:.1f} s"],
             ["the same, warm", f"{warm[0]:.1f} s, {warm[1]:.1f} s"],

@@ -4,7 +4,7 @@
     python -m benchmarks.sizes --quick    # without the largest
 
 `ringsweep run` of a grid over five axes (drive, width of the zone, two coefficients of friction, launch) of the ring
-of the paper's Fig. 29 under stiction for 2 s, with certificates, each size in a process of its own: start, chunks,
+of the paper's Fig. 29 under stiction for 2 s, with certificates, each size in a process of its own: start, tasks,
 merge, verification and all. Memory is the greatest resident set of that process. Then one map is drawn of each file.
 
 Writes `sizes.md` to `benchmarks/results/`; `--quick`, to the current folder.

@@ -33,8 +33,9 @@ import xarray as xr
 
 from benchmarks import brute_force
 from benchmarks._common import ALPHA, BODY, GRAVITY, RADIUS, REST, ROUGH, V0, machine
-from ringsweep import config, engine
+from ringsweep import config
 from ringsweep.quantities.variables import REGIMES
+from ringsweep.runs import sweep
 from ringsweep.solvers.rk4 import STABILITY_LIMIT
 from ringsweep.storage import netcdf
 
@@ -111,7 +112,7 @@ def run(scene: Mapping[str, Any], solver: Mapping[str, Any], points: Mapping[str
     tree: dict[str, Any] = {"scene": copy.deepcopy(dict(scene)), "solver": dict(solver)}
     if points:
         tree["sweep"] = {"points": {path: np.asarray(column).tolist() for path, column in points.items()}}
-    return engine.compute(config.load(tree), jobs=None, progress=False)
+    return sweep.compute(config.load(tree), jobs=None, progress=False)
 
 
 def difference(found: xr.Dataset, reference: Mapping[str, Any]) -> tuple[Any, Any]:

@@ -6,19 +6,19 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ringsweep.engine import run, sweep
     from ringsweep.errors import InputError
     from ringsweep.quantities.variables import words
-    from ringsweep.single import simulate
-    from ringsweep.work import precision
+    from ringsweep.runs.precision import precision
+    from ringsweep.runs.simulate import simulate
+    from ringsweep.runs.sweep import run, sweep
 
 __all__ = ["InputError", "precision", "run", "simulate", "sweep", "words"]
 
 _HOMES = {
-    "run": "engine",
-    "sweep": "engine",
-    "simulate": "single",
-    "precision": "work",
+    "run": "runs.sweep",
+    "sweep": "runs.sweep",
+    "simulate": "runs.simulate",
+    "precision": "runs.precision",
     "words": "quantities.variables",
     "InputError": "errors",
 }

@@ -15,8 +15,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
-from ringsweep.config import scene as reading
 from ringsweep.config import load, read_axes, read_scene, with_values
+from ringsweep.config import scene as scenes
 from ringsweep.config.schema import schema
 from ringsweep.config.solver import read_solver
 from ringsweep.errors import InputError
@@ -291,7 +291,7 @@ def test_a_wrong_setting_is_refused_by_its_own_text(write, setting, problem):
 
 
 def test_values_of_another_law_are_dropped_with_a_warning_each(caplog):
-    reading.tell_of_unused.cache_clear()
+    scenes.tell_of_unused.cache_clear()
     with caplog.at_level(logging.WARNING, logger="ringsweep"):
         scene = read_scene(edited(friction__law="coulomb"))
         assert read_scene(edited(friction__law="coulomb")).values == scene.values

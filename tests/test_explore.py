@@ -7,10 +7,11 @@ from matplotlib.backend_bases import MouseEvent
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import ringsweep
-from ringsweep import engine, plots
+from ringsweep import plots
 from ringsweep.config import load
 from ringsweep.errors import InputError
 from ringsweep.quantities.variables import OUTCOMES, REGIMES
+from ringsweep.runs import sweep
 
 AXES = {"drive.amplitude": [0.5, 2.0, 8.0], "zone.half_angle": ["10 deg", "20 deg", "40 deg", "60 deg"]}
 
@@ -18,7 +19,7 @@ AXES = {"drive.amplitude": [0.5, 2.0, 8.0], "zone.half_angle": ["10 deg", "20 de
 def mapped(scene, axes, points=False):
     """What a sweep over axes gives, without its having been run."""
     config = load({"scene": scene, "sweep": {"points" if points else "grid": axes}})
-    ds = engine._frame(config)
+    ds = sweep._frame(config)
     shape = tuple(config.axes.sizes.values())
     regime = (np.arange(np.prod(shape)) % 3).astype("int8").reshape(shape)
     return ds.assign(regime=(tuple(config.axes.sizes), regime, OUTCOMES["regime"].attributes))
@@ -40,7 +41,7 @@ def asked(monkeypatch):
         found.append(load(configuration).scene.values)
         return history.assign_attrs(outcome=f"history {len(found)}")
 
-    monkeypatch.setattr("ringsweep.single.simulate", simulate)
+    monkeypatch.setattr("ringsweep.runs.simulate.simulate", simulate)
     return found
 
 

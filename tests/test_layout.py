@@ -1,4 +1,4 @@
-"""Order of cells and size of chunks: every cell once, neighbours together."""
+"""Order of cells and size of tasks: every cell once, neighbours together."""
 
 import math
 from threading import Event
@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringsweep.pace import Pace, chunks
-from ringsweep.storage.chunks import BRICK, Layout
+from ringsweep.runs.pace import Pace, tasks
+from ringsweep.storage.chunks import CHUNK, Layout
 
 
 class Took:
@@ -23,18 +23,18 @@ SIZES = st.lists(st.integers(1, 9), min_size=0, max_size=4)
 
 
 @given(sizes=SIZES, data=st.data())
-def test_every_cell_has_one_position_and_lies_in_its_brick(sizes, data):
+def test_every_cell_has_one_position_and_lies_in_its_chunk(sizes, data):
     layout = Layout(sizes, [data.draw(st.integers(1, size)) for size in sizes])
     seen = np.zeros(sizes, dtype=int)
     after = 0
-    for begin, end, place in layout.bricks():
+    for begin, end, place in layout.chunks():
         assert begin == after
         after = end
         indices = layout.indices(np.arange(begin, end))
         here = np.zeros(sizes, dtype=bool)
         here[place] = True
         assert here[indices].all()
-        # In the order of the brick's own array.
+        # In the order of the chunk's own array.
         if sizes:
             np.testing.assert_array_equal(np.transpose(indices), np.argwhere(here))
         seen[place] += 1
@@ -44,23 +44,23 @@ def test_every_cell_has_one_position_and_lies_in_its_brick(sizes, data):
 
 
 @given(sizes=st.lists(st.integers(1, 300), min_size=1, max_size=5))
-def test_a_brick_is_small_and_no_smaller_than_needed(sizes):
-    brick = Layout(sizes).brick
-    assert math.prod(brick) <= BRICK
-    assert all(1 <= edge <= size for edge, size in zip(brick, sizes, strict=True))
-    if math.prod(sizes) > BRICK:
-        assert math.prod(brick) > BRICK / 4
+def test_a_chunk_is_small_and_no_smaller_than_needed(sizes):
+    chunk = Layout(sizes).chunk
+    assert math.prod(chunk) <= CHUNK
+    assert all(1 <= edge <= size for edge, size in zip(chunk, sizes, strict=True))
+    if math.prod(sizes) > CHUNK:
+        assert math.prod(chunk) > CHUNK / 4
 
 
-def test_a_map_of_a_sweep_over_five_axes_lies_in_few_bricks():
+def test_a_map_of_a_sweep_over_five_axes_lies_in_few_chunks():
     layout = Layout([25] * 5)
-    bricks = [place for _, _, place in layout.bricks()]
-    passed = sum(all(place[dim].start <= 12 < place[dim].stop for dim in (1, 2, 4)) for place in bricks)
-    assert passed * math.prod(layout.brick) < 0.06 * layout.total
+    chunks = [place for _, _, place in layout.chunks()]
+    passed = sum(all(place[dim].start <= 12 < place[dim].stop for dim in (1, 2, 4)) for place in chunks)
+    assert passed * math.prod(layout.chunk) < 0.06 * layout.total
 
 
 class TestPace:
-    def test_a_chunk_takes_a_hundredth_of_the_time_before_within_bounds(self):
+    def test_a_task_takes_a_hundredth_of_the_time_before_within_bounds(self):
         pace = Pace(1, lambda: 2)
         assert pace.next(10**9) == 1
         pace.learn(Took(100, 0.1))
@@ -70,7 +70,7 @@ class TestPace:
         pace.learn(Took(10**6, 1e3))
         assert pace.next(10**9) == pytest.approx(2000, rel=0.02)
 
-    def test_a_chunk_grows_no_faster_than_what_is_known_of_the_cost(self):
+    def test_a_task_grows_no_faster_than_what_is_known_of_the_cost(self):
         pace = Pace(1, lambda: 2)
         pace.learn(Took(1, 1e-6))
         assert pace.next(10**9) == 8
@@ -84,26 +84,26 @@ class TestPace:
         assert pace.next(10**9) % 16 == 0
 
     @given(done=st.lists(st.booleans(), min_size=1, max_size=200), cost=st.floats(1e-5, 10.0))
-    def test_chunks_hold_every_open_cell_once_and_shrink_to_the_end(self, done, cost):
+    def test_tasks_hold_every_open_cell_once_and_shrink_to_the_end(self, done, cost):
         done = np.array(done)
         pace = Pace(1, lambda: 2)
         pace.learn(Took(4, 4 * cost))
-        found = list(chunks(done, int((~done).sum()), pace, Event()))
+        found = list(tasks(done, int((~done).sum()), pace, Event()))
         if not found:
             assert done.all()
             return
         np.testing.assert_array_equal(np.concatenate(found), np.flatnonzero(~done))
-        assert all(len(chunk) for chunk in found)
+        assert all(len(task) for task in found)
         if cost > Pace.longest:
-            assert {len(chunk) for chunk in found} == {1}
+            assert {len(task) for task in found} == {1}
 
 
 @pytest.mark.parametrize("total", [1, 40_000])
-def test_gaps_wider_than_a_chunk_are_passed_over(total):
+def test_gaps_wider_than_a_task_are_passed_over(total):
     done = np.ones(total + 100_000, dtype=bool)
     done[-total:] = False
     pace = Pace(1, lambda: 1)
     pace.learn(Took(1000, 0.001))
     np.testing.assert_array_equal(
-        np.concatenate(list(chunks(done, total, pace, Event()))), np.arange(100_000, 100_000 + total)
+        np.concatenate(list(tasks(done, total, pace, Event()))), np.arange(100_000, 100_000 + total)
     )

@@ -8,11 +8,13 @@ import pytest
 import yaml
 
 import ringsweep
-from ringsweep import plots, work
+from ringsweep import plots
 from ringsweep.cli import main
+from ringsweep.cli.precision_table import report
 from ringsweep.config import load
 from ringsweep.errors import InputError
 from ringsweep.quantities.variables import PRECISION
+from ringsweep.runs import contenders, precision
 from ringsweep.storage import netcdf
 
 CONFIGS = Path(__file__).parents[1] / "configs"
@@ -32,7 +34,7 @@ BELT = {
 def short():
     """Few steps of rk4 are as instructive as many."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(work, "_STEPS", (100, 1000, 10_000))
+        patch.setattr(contenders, "_STEPS", (100, 1000, 10_000))
         yield
 
 
@@ -94,7 +96,7 @@ class TestDataset:
         again = netcdf.load(tmp_path / "found.nc")
         assert again.equals(found)
         assert again.attrs == found.attrs
-        assert work.report(again) == work.report(found)
+        assert report(again) == report(found)
 
 
 class TestErrors:
@@ -145,7 +147,7 @@ class TestErrors:
 
 class TestRecommendation:
     def test_meets_the_target_when_it_is_run_again(self, found, config):
-        line = work.report(found).splitlines()[-1]
+        line = report(found).splitlines()[-1]
         solver = yaml.safe_load(line)["solver"]
         assert line == f"solver: {{{found.attrs['recommended']}}}"
         again = rerun(found, config, ", ".join(f"{name}: {value}" for name, value in solver.items()))
@@ -192,20 +194,20 @@ class TestSample:
         np.testing.assert_array_equal(found["friction_law"], ["stiction", "stiction"])
 
     def test_a_cell_whose_reference_disagrees_with_itself_is_not_measured_and_that_is_said(self, config, monkeypatch):
-        monkeypatch.setattr(work, "_STEPS", (100,))
-        monkeypatch.setattr(work, "_TIGHTEST", {work.Event: (1e-15, 1e-3)})
+        monkeypatch.setattr(contenders, "_STEPS", (100,))
+        monkeypatch.setattr(precision, "_TIGHTEST", {precision.Event: (1e-15, 1e-3)})
         found = ringsweep.precision(CONFIGS / "belt_viscous.yaml", rounds=1, progress=False)
         assert 0 < found.sizes["cell"] < 16
         dropped = 16 - found.sizes["cell"]
         assert f"{found.sizes['cell']} of 4096 cells; {dropped} more were drawn" in found.attrs["sampled"]
 
     def test_what_would_take_too_long_is_left_out_and_named(self, monkeypatch):
-        monkeypatch.setattr(work, "_BUDGET", 0.0)
+        monkeypatch.setattr(contenders, "_BUDGET", 0.0)
         found = ringsweep.precision({"scene": BELT}, rounds=1, progress=False)
         assert found["setting"].values.tolist() == ["rtol 0.0001", "100 steps"]
         for name in ("event, rtol 1e-12", "rk4, 1000 steps", "rk4, 10000 steps"):
             assert name in found.attrs["left_out"]
-        assert found.attrs["left_out"] in work.report(found)
+        assert found.attrs["left_out"] in report(found)
 
     def test_a_law_that_rk4_does_not_take_is_measured_without_it(self):
         friction = {"law": "bristle", "mu_k": 0.1, "sigma0": 100.0, "seed": 1}

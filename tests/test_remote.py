@@ -1,4 +1,4 @@
-"""The same chunks, files and bits from the workers of a Dask scheduler."""
+"""The same tasks, files and bits from the workers of a Dask scheduler."""
 
 import logging
 import os
@@ -12,8 +12,8 @@ from distributed import LocalCluster
 import ringsweep
 from benchmarks.kills import same_bits
 from ringsweep import cli
-from ringsweep.pace import Pace
-from ringsweep.storage.partial import Chunks
+from ringsweep.runs.pace import Pace
+from ringsweep.storage.partial import Partial
 
 # Of what a scheduler leaves behind when its workers are killed.
 pytestmark = pytest.mark.filterwarnings("ignore")
@@ -28,11 +28,11 @@ def cluster():
         yield cluster
 
 
-def test_a_worker_that_dies_costs_its_chunk_and_nothing_else(cluster, scene, tmp_path, monkeypatch):
+def test_a_worker_that_dies_costs_its_task_and_nothing_else(cluster, scene, tmp_path, monkeypatch):
     axes = {"drive.amplitude": np.geomspace(0.5, 8.0, 12), "zone.half_angle": np.radians(np.linspace(5.0, 40.0, 10))}
     ringsweep.sweep(scene, axes, tmp_path / "threads.nc", progress=False).close()
     monkeypatch.setattr(Pace, "most", 4)
-    put, killed = Chunks.put, []
+    put, killed = Partial.put, []
 
     def kill_one(self, *rest):
         put(self, *rest)
@@ -40,14 +40,14 @@ def test_a_worker_that_dies_costs_its_chunk_and_nothing_else(cluster, scene, tmp
             killed.append(next(iter(cluster.workers.values())).pid)
             os.kill(killed[0], signal.SIGKILL)
 
-    monkeypatch.setattr(Chunks, "put", kill_one)
+    monkeypatch.setattr(Partial, "put", kill_one)
     ringsweep.sweep(scene, axes, tmp_path / "dask.nc", scheduler=cluster.scheduler_address, progress=False).close()
     assert killed
     assert same_bits(tmp_path / "threads.nc", tmp_path / "dask.nc")
 
 
 def test_a_worker_of_another_version_is_refused(cluster, scene, monkeypatch):
-    monkeypatch.setattr("ringsweep.engine.environment", lambda: {"numba": "99.0"})
+    monkeypatch.setattr("ringsweep.runs.sweep.environment", lambda: {"numba": "99.0"})
     with pytest.raises(ringsweep.InputError, match=r"a worker has other versions.*numba was 99\.0"):
         ringsweep.sweep(scene, {"drive.amplitude": [1.0]}, scheduler=cluster.scheduler_address, progress=False)
 
@@ -61,7 +61,7 @@ def test_a_stop_while_no_worker_is_there_is_heeded(scene, tmp_path, monkeypatch)
                 signal.raise_signal(signal.SIGINT)
             return 0
 
-        monkeypatch.setattr("ringsweep.remote.Workers.threads", none_yet)
+        monkeypatch.setattr("ringsweep.runs.dask.Workers.threads", none_yet)
         with pytest.raises(KeyboardInterrupt):
             ringsweep.sweep(scene, {"drive.amplitude": [1.0]}, scheduler=empty.scheduler_address, progress=False)
 
@@ -77,7 +77,7 @@ def test_a_stop_while_no_worker_is_there_is_heeded(scene, tmp_path, monkeypatch)
     ],
 )
 def test_what_cannot_be_connected_is_refused_in_one_line(scene, tmp_path, monkeypatch, capsys, options, problem):
-    monkeypatch.setattr("ringsweep.remote._PATIENCE", 0.5)
+    monkeypatch.setattr("ringsweep.runs.dask._PATIENCE", 0.5)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a.yaml").write_text(yaml.safe_dump({"scene": scene}))
     assert cli.main(["run", "a.yaml", *options]) == 2

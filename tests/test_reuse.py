@@ -7,7 +7,7 @@ import ringsweep
 from ringsweep import cli
 from ringsweep.errors import InputError
 from ringsweep.storage import netcdf
-from ringsweep.storage.partial import Chunks
+from ringsweep.storage.partial import Partial
 
 AMPLITUDES, WIDTHS = np.linspace(0.5, 4.5, 5), np.radians([10.0, 20.0, 30.0])
 COARSE = {"drive.amplitude": AMPLITUDES, "zone.half_angle": WIDTHS}
@@ -25,8 +25,8 @@ def earlier(scene, tmp_path_factory):
 def computed(monkeypatch):
     """How many cells were handed over at a time, computed or taken."""
     counts = []
-    put = Chunks.put
-    monkeypatch.setattr(Chunks, "put", lambda self, p, *rest: (counts.append(len(p)), put(self, p, *rest)))
+    put = Partial.put
+    monkeypatch.setattr(Partial, "put", lambda self, p, *rest: (counts.append(len(p)), put(self, p, *rest)))
     return counts
 
 
@@ -122,7 +122,7 @@ def test_a_file_of_another_scene_or_solver_is_refused_by_what_differs(scene, ear
 
 
 def test_a_file_of_another_version_is_refused(scene, earlier, tmp_path, monkeypatch):
-    from ringsweep import reuse
+    from ringsweep.runs import reuse
 
     known = reuse.identity
     monkeypatch.setattr(reuse, "identity", lambda config: known(config) | {"sources": "others"})

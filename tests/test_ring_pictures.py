@@ -377,7 +377,7 @@ class TestCommand:
 
     def test_writes_a_film_named_after_the_configuration(self, run, folder, monkeypatch, capsys):
         asked = []
-        monkeypatch.setattr("ringsweep.single.history", lambda config: asked.append(config) or run)
+        monkeypatch.setattr("ringsweep.runs.simulate.history", lambda config: asked.append(config) or run)
         monkeypatch.setattr("ringsweep.plots.save_animation", lambda ds, path: asked.append((ds, path)), raising=False)
         assert main(["animate", "case.yaml", "--set", "drive.amplitude=4"]) == 0
         config, (ds, path) = asked
@@ -388,19 +388,19 @@ class TestCommand:
 
     @pytest.mark.parametrize("output", ["run.avi", "nowhere/run.gif"])
     def test_refuses_a_wrong_output_before_any_work(self, folder, monkeypatch, capsys, output):
-        monkeypatch.setattr("ringsweep.single.history", lambda config: pytest.fail("the run was made"))
+        monkeypatch.setattr("ringsweep.runs.simulate.history", lambda config: pytest.fail("the run was made"))
         assert main(["animate", "case.yaml", "-o", output]) == 2
         assert output in capsys.readouterr().err
         assert os.listdir(folder) == ["case.yaml"]
 
     def test_refuses_a_belt_before_any_work(self, folder, monkeypatch, capsys):
-        monkeypatch.setattr("ringsweep.single.history", lambda config: pytest.fail("the run was made"))
+        monkeypatch.setattr("ringsweep.runs.simulate.history", lambda config: pytest.fail("the run was made"))
         assert main(["init", "--model", "belt", "belt.yaml"]) == 0
         assert main(["animate", "belt.yaml"]) == 2
         assert "there is no ring" in capsys.readouterr().err
 
     def test_refuses_several_laws_before_any_work(self, scene, folder, monkeypatch, capsys):
-        monkeypatch.setattr("ringsweep.single.history", lambda config: pytest.fail("the run was made"))
+        monkeypatch.setattr("ringsweep.runs.simulate.history", lambda config: pytest.fail("the run was made"))
         laws = {"sweep": {"grid": {"friction.law": ["stiction", "coulomb"]}}}
         (folder / "laws.yaml").write_text(json.dumps({"scene": scene} | laws))
         assert main(["animate", "laws.yaml"]) == 2

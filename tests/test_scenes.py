@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks import scenes
 from benchmarks.work_precision import SCENES
-from ringsweep import engine
+from ringsweep.runs import sweep
 
 LEANEST, CUT = "one contact, Coulomb, immobile uniform ring", "+ an arc"
 
@@ -34,10 +34,10 @@ def test_sweep_stores_outcomes_alone():
     def most(steps: int) -> int:
         smooth = SCENES["smooth"]
         configuration = smooth.configuration(smooth.cells(256), "rk4", steps=steps)
-        engine.compute(configuration, jobs=1, progress=False)
+        sweep.compute(configuration, jobs=1, progress=False)
         tracemalloc.start()
         try:
-            engine.compute(configuration, jobs=1, progress=False)
+            sweep.compute(configuration, jobs=1, progress=False)
             return tracemalloc.get_traced_memory()[1]
         finally:
             tracemalloc.stop()

@@ -16,11 +16,11 @@ import ringsweep
 from benchmarks.kills import POINTS, killed_at, same_bits
 from ringsweep import cli
 from ringsweep.config import load
-from ringsweep.engine import write
-from ringsweep.pace import Pace
+from ringsweep.runs.pace import Pace
+from ringsweep.runs.sweep import write
 from ringsweep.storage import netcdf
 from ringsweep.storage.chunks import Layout
-from ringsweep.storage.partial import Chunks, owned
+from ringsweep.storage.partial import Partial, owned
 from ringsweep.storage.provenance import identity
 
 SWEEP = {
@@ -45,8 +45,8 @@ def never_stopped(config):
 
 
 @pytest.fixture
-def small_chunks(monkeypatch):
-    """Chunks of at most three cells, so that a small sweep has many."""
+def small_tasks(monkeypatch):
+    """Partial of at most three cells, so that a small sweep has many."""
     monkeypatch.setattr(Pace, "most", 3)
 
 
@@ -70,15 +70,15 @@ def stopping(monkeypatch, owner, name, after):
 
 
 @pytest.fixture
-def half_done(config, tmp_path, monkeypatch, small_chunks):
-    """Where a sweep was to be written that was stopped after ten chunks."""
+def half_done(config, tmp_path, monkeypatch, small_tasks):
+    """Where a sweep was to be written that was stopped after ten tasks."""
     target = tmp_path / "out.nc"
-    with stopping(monkeypatch, Chunks, "put", 10), pytest.raises(Stopped):
+    with stopping(monkeypatch, Partial, "put", 10), pytest.raises(Stopped):
         ringsweep.run(config, target, progress=False)
     return target
 
 
-def chunks_of(target):
+def tasks_of(target):
     return sorted(target.with_name("out.nc.partial").glob("*.npz"))
 
 
@@ -98,27 +98,27 @@ class TestGoingOn:
         assert same_bits(target, never_stopped)
         assert left(target) == ["out.nc", "out.png"]
 
-    def test_finished_chunks_are_not_computed_again(self, config, half_done, monkeypatch, caplog):
-        assert len(chunks_of(half_done)) == 10
-        put, computed = Chunks.put, []
-        monkeypatch.setattr(Chunks, "put", lambda self, p, *rest: (computed.extend(p), put(self, p, *rest)))
+    def test_finished_tasks_are_not_computed_again(self, config, half_done, monkeypatch, caplog):
+        assert len(tasks_of(half_done)) == 10
+        put, computed = Partial.put, []
+        monkeypatch.setattr(Partial, "put", lambda self, p, *rest: (computed.extend(p), put(self, p, *rest)))
         with caplog.at_level("INFO", logger="ringsweep"):
             ringsweep.run(config, half_done, progress=False).close()
         assert f"going on: {72 - len(computed)} of 72 cells are done" in caplog.text
         assert 0 < len(computed) < 72
 
-    def test_a_stop_tells_how_to_go_on(self, config, tmp_path, monkeypatch, capsys, caplog, small_chunks):
-        put = Chunks.put
+    def test_a_stop_tells_how_to_go_on(self, config, tmp_path, monkeypatch, capsys, caplog, small_tasks):
+        put = Partial.put
 
         def interrupted(*arguments):
             put(*arguments)
             signal.raise_signal(signal.SIGINT)
 
-        monkeypatch.setattr(Chunks, "put", interrupted)
+        monkeypatch.setattr(Partial, "put", interrupted)
         assert cli.main(["run", str(config), "-o", str(tmp_path / "out.nc")]) == 130
         message = capsys.readouterr().err
         assert message.count("\n") == 1
-        assert "stopping when the chunks under way are done" in caplog.text
+        assert "stopping when the tasks under way are done" in caplog.text
         assert "interrupted" in message
         assert "cells are kept in" in message
         assert "the same command goes on from there" in message
@@ -137,30 +137,30 @@ class TestNeverMixed:
         text = config.read_text().replace("mu_k: 0.3", "mu_k: 0.31")
         other = half_done.with_name("other.yaml")
         other.write_text(text)
-        before = chunks_of(half_done)
+        before = tasks_of(half_done)
         assert cli.main(["run", str(other), "-o", str(half_done)]) == 2
         message = capsys.readouterr().err
         assert "scene.friction.rough.mu_k was 0.3, is 0.31" in message
         assert "--fresh" in message
-        assert chunks_of(half_done) == before
+        assert tasks_of(half_done) == before
 
     def test_another_version_is_refused(self, config, half_done, monkeypatch):
         now = identity(load(config)) | {"numba": "99.0"}
-        monkeypatch.setattr("ringsweep.engine.identity", lambda _: now)
+        monkeypatch.setattr("ringsweep.runs.sweep.identity", lambda _: now)
         with pytest.raises(ringsweep.InputError, match=r"numba was .*, is 99\.0"):
             ringsweep.run(config, half_done, progress=False)
 
     def test_fresh_starts_over(self, config, half_done, never_stopped):
-        damaged = chunks_of(half_done)[0]
+        damaged = tasks_of(half_done)[0]
         damaged.write_bytes(b"")
         ringsweep.run(config, half_done, fresh=True, progress=False).close()
         assert same_bits(half_done, never_stopped)
 
     @pytest.mark.parametrize("damage", ["truncated", "empty", "one bit", "directory", "of another sweep", "no archive"])
-    def test_a_damaged_or_foreign_chunk_is_noticed_and_computed_again(
+    def test_a_damaged_or_foreign_task_is_noticed_and_computed_again(
         self, config, half_done, never_stopped, caplog, damage
     ):
-        path = chunks_of(half_done)[4]
+        path = tasks_of(half_done)[4]
         content = bytearray(path.read_bytes())
         if damage == "of another sweep":
             with owned(half_done.with_name("b.nc"), {"a": "b"}, Layout([72])) as others:
@@ -192,18 +192,18 @@ class TestNeverMixed:
         ringsweep.run(config, half_done, progress=False).close()
         assert same_bits(half_done, never_stopped)
 
-    def test_chunks_that_vanish_meanwhile_are_computed_again(
+    def test_tasks_that_vanish_meanwhile_are_computed_again(
         self, config, half_done, never_stopped, monkeypatch, caplog
     ):
         merge = netcdf.write
 
         def vanish(*arguments):
-            monkeypatch.setattr(storage, "write", merge)
-            for path in chunks_of(half_done)[:3]:
+            monkeypatch.setattr(netcdf, "write", merge)
+            for path in tasks_of(half_done)[:3]:
                 path.unlink()
             merge(*arguments)
 
-        monkeypatch.setattr(storage, "write", vanish)
+        monkeypatch.setattr(netcdf, "write", vanish)
         ringsweep.run(config, half_done, progress=False).close()
         assert "looking for what is missing" in caplog.text
         assert same_bits(half_done, never_stopped)
@@ -261,7 +261,7 @@ class TestWhereTheDiskFails:
 
     def test_a_file_that_does_not_read_back_is_not_left(self, config, tmp_path, monkeypatch, capsys):
         target = tmp_path / "out.nc"
-        monkeypatch.setattr(storage, "_checksums", lambda *_: {})
+        monkeypatch.setattr(netcdf, "_checksums", lambda *_: {})
         assert cli.main(["run", str(config), "-o", str(target)]) == 1
         assert "does not read back" in capsys.readouterr().err
         assert left(target) == ["out.nc.partial"]
@@ -287,10 +287,10 @@ class TestFile:
         assert cli.main(["run", str(again)]) == 0
         assert "holds this sweep already" in capsys.readouterr().out
 
-    def test_is_made_of_bricks_that_are_read_alone(self, scene, tmp_path, monkeypatch):
-        """Of points and laws beside a grid too, whatever the bricks are."""
-        monkeypatch.setattr("ringsweep.storage.chunks.BRICK", 6)
-        monkeypatch.setattr(storage, "COMPRESSED_FROM", 1)
+    def test_is_made_of_chunks_that_are_read_alone(self, scene, tmp_path, monkeypatch):
+        """Of points and laws beside a grid too, whatever the chunks are."""
+        monkeypatch.setattr("ringsweep.storage.chunks.CHUNK", 6)
+        monkeypatch.setattr(netcdf, "COMPRESSED_FROM", 1)
         axes = {
             "drive.amplitude": xr.DataArray([0.5, 1.0, 2.0, 8.0], dims="rig"),
             "body.mass": xr.DataArray([0.05, 0.06, 0.07, 0.08], dims="rig"),
@@ -298,7 +298,7 @@ class TestFile:
             "friction.law": ["coulomb", "stiction"],
         }
         found = ringsweep.sweep(scene, axes, tmp_path / "out.nc", progress=False)
-        assert found["t_end"].encoding["chunksizes"] == (1, 2, 2)
+        assert found["t_end"].encoding["chunkssizes"] == (1, 2, 2)
         assert {"drive_amplitude", "body_mass"} <= set(found.coords)
         in_memory = ringsweep.sweep(scene, axes, progress=False)
         xr.testing.assert_equal(found.load(), in_memory)

@@ -12,7 +12,7 @@ from ringsweep.models import batch
 from ringsweep.models.scene import LAW, Scene, Structure
 
 # Cells whose consistency is checked at once: many arcs over many points must not fill the memory.
-_CHUNK = 4096
+_BLOCK = 4096
 
 
 def check_consistency(scene: Scene, axes: Axes) -> None:
@@ -25,8 +25,8 @@ def check_consistency(scene: Scene, axes: Axes) -> None:
         picks.append(np.unique([along[0].argmin(), along[0].argmax()]) if alone else np.arange(size))
     shape = (1, *map(len, picks))
     total = math.prod(shape)
-    for start in range(0, total, _CHUNK):
-        flat = np.arange(start, min(start + _CHUNK, total))
+    for start in range(0, total, _BLOCK):
+        flat = np.arange(start, min(start + _BLOCK, total))
         cells = np.unravel_index(flat, shape)[1:]
         place = {dim: pick[cell] for dim, pick, cell in zip(axes.sizes, picks, cells, strict=True)}
         values = {path: np.full(len(flat), value) for path, value in scene.values.items()}

@@ -13,12 +13,12 @@ from matplotlib.backend_bases import Event, MouseEvent
 from matplotlib.backends import BackendFilter, backend_registry
 from matplotlib.figure import Figure
 
-from ringsweep import single
 from ringsweep.config import with_values
 from ringsweep.errors import InputError
 from ringsweep.plots.histories import draw_history
 from ringsweep.plots.maps import Map, select
 from ringsweep.plots.style import value_text
+from ringsweep.runs import simulate
 
 _SIZE = (9.0, 11.0)
 
@@ -123,7 +123,7 @@ def explore(
     marks = [*ax.plot([], [], color="white", markeredgewidth=3.5, **look), *ax.plot([], [], color="black", **look)]
 
     def show(one: xr.Dataset) -> None:
-        run = single.simulate(cell(one))
+        run = simulate.simulate(cell(one))
         for mark in marks:
             mark.set_data(*([value] for value in found.position(one)))
         below.clear()

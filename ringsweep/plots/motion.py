@@ -271,7 +271,7 @@ class _Page(_Frames):
             buffer = io.BytesIO()
             frame.save(buffer, "png")
             texts.append(base64.b64encode(buffer.getvalue()).decode())
-        page = (files("ringsweep") / "templates" / "animation.html").read_text(encoding="utf-8")
+        page = (files("ringsweep.plots") / "animation.html").read_text(encoding="utf-8")
         values = {"width": self.frame_size[0], "interval": 1000 / self.fps, "frames": json.dumps(texts)}
         for name, value in values.items():
             page = page.replace(f"{{{name}}}", str(value))

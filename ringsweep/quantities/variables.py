@@ -119,7 +119,7 @@ HISTORY: dict[str, Variable] = {
     "mode": Variable("friction mode", dtype="int8", flags=MODES),
 }
 
-#: Of what `ringsweep.work` measures; a length stands in for the angle where the body moves along a line.
+#: Of what `ringsweep.runs.precision` measures; a length stands in for the angle where the body moves along a line.
 PRECISION: dict[str, Variable] = {
     "time_per_run": Variable("time per run in one thread", "s"),
     "steps": Variable("steps of the integration, mean over the cells"),

@@ -122,9 +122,9 @@ def write(
     frame: xr.Dataset,
     variables: Mapping[str, Variable],
     layout: Layout,
-    bricks: Iterable[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]],
+    chunks: Iterable[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]],
 ) -> None:
-    """Write the dataset of a sweep brick by brick, whole or not at all, and no more than a few bricks in memory.
+    """Write the dataset of a sweep chunk by chunk, whole or not at all, and no more than a few chunks in memory.
 
     Parameters
     ----------
@@ -137,9 +137,9 @@ def write(
     variables : mapping of str to Variable
         What the columns are.
     layout : Layout
-        Bricks of the grid; they are what is compressed, and read, as one.
-    bricks : iterable of tuple
-        The place of each brick in the grid, and its columns in the shape of that place.
+        Chunks of the grid; they are what is compressed, and read, as one.
+    chunks : iterable of tuple
+        The place of each chunk in the grid, and its columns in the shape of that place.
 
     Raises
     ------
@@ -149,7 +149,7 @@ def write(
     temporary = folder / f"{secrets.token_hex(4)}.tmp"
     try:
         _to_netcdf(frame, temporary)
-        written = _write_bricks(temporary, frame, variables, layout, bricks)
+        written = _write_chunks(temporary, frame, variables, layout, chunks)
         if written != _checksums(temporary, written, layout):
             raise OSError("the file does not read back as it was written")
         with temporary.open("r+b") as file:
@@ -172,23 +172,23 @@ def _to_netcdf(ds: xr.Dataset, path: Path) -> None:
     ds.to_netcdf(path, format="NETCDF4", engine="netcdf4", encoding=encoding)
 
 
-def _write_bricks(
+def _write_chunks(
     path: Path,
     frame: xr.Dataset,
     variables: Mapping[str, Variable],
     layout: Layout,
-    bricks: Iterable[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]],
+    chunks: Iterable[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]],
 ) -> dict[str, int]:
     """Add the columns to a file; returns a checksum of each."""
     dims = tuple(map(str, frame.sizes))
     others = " ".join(str(name) for name in frame.coords if name not in dims)
     sums: dict[str, int] = {}
     with netCDF4.Dataset(path, "a") as file:
-        for place, columns in bricks:
+        for place, columns in chunks:
             for name, column in columns.items():
                 if name not in sums:
                     variable = file.createVariable(name, column.dtype, dims, fill_value=False, **_chunked(layout))
-                    _cache_one_brick(variable, layout)
+                    _cache_one_chunk(variable, layout)
                     described = variables[name].attributes | linked(name, columns)
                     variable.setncatts(described | ({"coordinates": others} if others else {}))
                 file[name][place] = column
@@ -197,29 +197,29 @@ def _write_bricks(
 
 
 def _checksums(path: Path, names: Iterable[str], layout: Layout) -> dict[str, int]:
-    """Checksums of variables of a file, as :func:`_write_bricks` takes them."""
+    """Checksums of variables of a file, as :func:`_write_chunks` takes them."""
     found = {}
     with netCDF4.Dataset(path) as file:
         file.set_auto_maskandscale(False)
         for name in names:
             found[name] = 0
-            _cache_one_brick(file[name], layout)
-            for _, _, place in layout.bricks():
+            _cache_one_chunk(file[name], layout)
+            for _, _, place in layout.chunks():
                 found[name] = zlib.crc32(file[name][place].tobytes(), found[name])
     return found
 
 
-def _cache_one_brick(variable: Any, layout: Layout) -> None:
+def _cache_one_chunk(variable: Any, layout: Layout) -> None:
     # Each is passed once; by default some 64 MiB of each variable would be kept.
     if layout.total >= COMPRESSED_FROM:
-        size = math.prod(layout.brick) * variable.dtype.itemsize
+        size = math.prod(layout.chunk) * variable.dtype.itemsize
         variable.set_var_chunk_cache(size=2 * size, nelems=11, preemption=1.0)
 
 
 def _chunked(layout: Layout) -> dict[str, Any]:
     if layout.total < COMPRESSED_FROM:
         return {}
-    return {"compression": "zlib", "complevel": 1, "shuffle": True, "fletcher32": True, "chunksizes": layout.brick}
+    return {"compression": "zlib", "complevel": 1, "shuffle": True, "fletcher32": True, "chunksizes": layout.chunk}
 
 
 def _flush_folder(folder: Path) -> None:

@@ -1,6 +1,6 @@
 """Finished cells of a sweep on disk, in a folder beside the file that they will become.
 
-The folder of `OUT.nc` is `OUT.nc.partial`. It holds one file a chunk, which is complete or absent: it is written
+The folder of `OUT.nc` is `OUT.nc.partial`. It holds one file a task, which is complete or absent: it is written
 aside, flushed and renamed. Each knows what determines its bits (:func:`ringsweep.storage.provenance.identity`) and
 carries
 checksums, so that nothing else is ever mixed in. One process at a time owns the folder.
@@ -38,10 +38,10 @@ _MANIFEST, _LOCK = "sweep.json", "lock"
 
 
 @contextmanager
-def owned(target: Path, identity: Mapping[str, str], layout: Layout, *, fresh: bool = False) -> Iterator[Chunks]:
-    """The chunks of the sweep that becomes `target`, to be read and added to by this process alone.
+def owned(target: Path, identity: Mapping[str, str], layout: Layout, *, fresh: bool = False) -> Iterator[Partial]:
+    """The tasks of the sweep that becomes `target`, to be read and added to by this process alone.
 
-    If no chunk is there at the end the folder goes with it.
+    If no task is there at the end the folder goes with it.
 
     Parameters
     ----------
@@ -57,11 +57,11 @@ def owned(target: Path, identity: Mapping[str, str], layout: Layout, *, fresh: b
     Raises
     ------
     InputError
-        If another process owns the folder, if it holds chunks of another sweep, or cannot be written.
+        If another process owns the folder, if it holds tasks of another sweep, or cannot be written.
     """
     folder = target.with_name(f"{target.name}.partial")
     if folder.exists() and not folder.is_dir():
-        raise InputError(str(target), f"cannot be computed: {folder} stands where its chunks would, and is no folder")
+        raise InputError(str(target), f"cannot be computed: {folder} stands where its tasks would, and is no folder")
     try:
         folder.mkdir(exist_ok=True)
         lock = FileLock(folder / _LOCK, timeout=0)
@@ -70,16 +70,16 @@ def owned(target: Path, identity: Mapping[str, str], layout: Layout, *, fresh: b
         raise InputError(str(target), f"another ringsweep is computing it (it owns {folder})") from None
     except OSError as error:
         raise InputError(str(target), f"cannot be written: {error.strerror or error}") from error
-    chunks = Chunks(folder, identity, layout)
+    tasks = Partial(folder, identity, layout)
     try:
         if fresh:
-            chunks.clear()
-        chunks.begin()
-        yield chunks
+            tasks.clear()
+        tasks.begin()
+        yield tasks
     finally:
-        empty = not chunks.found()
+        empty = not tasks.found()
         if empty:
-            chunks.clear()
+            tasks.clear()
         lock.release()
         if empty:
             with suppress(OSError):
@@ -87,8 +87,8 @@ def owned(target: Path, identity: Mapping[str, str], layout: Layout, *, fresh: b
                 folder.rmdir()
 
 
-class Chunks:
-    """Finished cells of a sweep, a file a chunk; made by :func:`owned`.
+class Partial:
+    """Finished cells of a sweep, a file a task; made by :func:`owned`.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class Chunks:
     done : ndarray of bool, shape ``(cells,)``
         Whether the cell at each position of the layout's order is here.
     files : dict of Path to tuple of int
-        Chunk files, with the first and the last position in each. The name of each ends with a digest of it.
+        Task files, with the first and the last position in each. The name of each ends with a digest of it.
     processors : set of str
         Names of those that computed them.
     """
@@ -127,7 +127,7 @@ class Chunks:
         self.take_stock()
 
     def found(self) -> list[Path]:
-        """Whatever chunk files there are, of this sweep or not."""
+        """Whatever task files there are, of this sweep or not."""
         return sorted(path for path in self.folder.glob("*.npz") if path.is_file())
 
     def take_stock(self) -> None:
@@ -169,12 +169,12 @@ class Chunks:
         self.files[path] = int(positions[0]), int(positions[-1])
 
     def read(self, path: Path) -> tuple[NDArray[np.intp], dict[str, NDArray[Any]]]:
-        """Positions and columns of a chunk file.
+        """Positions and columns of a task file.
 
         Raises
         ------
         Damaged
-            If it is not a whole chunk of this sweep.
+            If it is not a whole task of this sweep.
         """
         try:
             content = path.read_bytes()
@@ -191,8 +191,8 @@ class Chunks:
         cells = found["cells"]
         return found["positions"].astype(np.intp), {name: cells[name] for name in cells.dtype.names}
 
-    def bricks(self) -> Iterator[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]]:
-        """Place of every brick in the grid, in order, and its columns in the shape of that place.
+    def chunks(self) -> Iterator[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]]:
+        """Place of every chunk in the grid, in order, and its columns in the shape of that place.
 
         Raises
         ------
@@ -201,21 +201,21 @@ class Chunks:
         """
         waiting = sorted(self.files, key=lambda path: self.files[path], reverse=True)
         read: dict[Path, tuple[NDArray[np.intp], dict[str, NDArray[Any]]]] = {}
-        for begin, end, place in self.layout.bricks():
+        for begin, end, place in self.layout.chunks():
             while waiting and self.files[waiting[-1]][0] < end:
                 path = waiting.pop()
                 read[path] = self.read(path)
-            brick: dict[str, NDArray[Any]] = {}
+            chunk: dict[str, NDArray[Any]] = {}
             missing = np.ones(end - begin, dtype=bool)
             for positions, columns in read.values():
                 part = slice(*np.searchsorted(positions, (begin, end)))
                 missing[positions[part] - begin] = False
                 for name, column in columns.items():
-                    whole = brick.setdefault(name, np.empty(end - begin, dtype=column.dtype))
+                    whole = chunk.setdefault(name, np.empty(end - begin, dtype=column.dtype))
                     whole[positions[part] - begin] = column[part]
             if missing.any():
-                raise Damaged(f"{missing.sum()} cells are in no chunk of {self.folder}")
-            yield place, {name: column.reshape([s.stop - s.start for s in place]) for name, column in brick.items()}
+                raise Damaged(f"{missing.sum()} cells are in no task of {self.folder}")
+            yield place, {name: column.reshape([s.stop - s.start for s in place]) for name, column in chunk.items()}
             for path in [path for path in read if self.files[path][1] < end]:
                 del read[path]
 
@@ -228,7 +228,7 @@ class Chunks:
 
 
 class Damaged(Exception):
-    """A chunk file is not a whole chunk of this sweep."""
+    """A task file is not a whole task of this sweep."""
 
 
 def _digest(content: bytes) -> str:

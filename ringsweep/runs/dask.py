@@ -1,17 +1,18 @@
-"""Chunks on the workers of a Dask scheduler."""
+"""Partial on the workers of a Dask scheduler."""
 
 from __future__ import annotations
 
 import logging
 import math
+import secrets
 import socket
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import CancelledError
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from itertools import islice
 from threading import Event
 from time import monotonic
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from distributed import Client, as_completed
@@ -23,6 +24,7 @@ from ringsweep.errors import InputError
 
 logger = logging.getLogger("ringsweep")
 
+Result = TypeVar("Result")
 Positions = NDArray[np.integer[Any]]
 
 # Seconds to wait for a scheduler.
@@ -50,8 +52,8 @@ class _Shared(WorkerPlugin):
         _tasks.pop(self.key, None)
 
 
-def _run(key: str, chunk: Positions) -> Any:
-    return _tasks[key](chunk)
+def _run(key: str, task: Positions) -> Any:
+    return _tasks[key](task)
 
 
 def connect(address: str) -> Client:
@@ -72,37 +74,49 @@ def connect(address: str) -> Client:
         raise InputError("--scheduler", f"no Dask scheduler answers at {address!r}: {error}") from error
 
 
+@contextmanager
+def workers(address: str) -> Iterator[Workers]:
+    """The workers of the scheduler at this address, until the end of the block; errors as for :func:`connect`."""
+    with connect(address) as client:
+        yield Workers(client)
+
+
 class Workers:
-    """The workers of a scheduler, as many as there are at any moment."""
+    """The workers of a scheduler: an :class:`ringsweep.runs.executors.Executor`."""
 
     def __init__(self, client: Client):
         self.client = client
         self._count, self._counted = 0, -math.inf
 
     def threads(self) -> int:
-        """Threads that they have; the scheduler, which is far away, is asked for it now and then."""
+        """Threads that the workers have; the scheduler, which is far away, is asked now and then."""
         if monotonic() - self._counted > _TICK:
             self._count, self._counted = sum(self.client.nthreads().values()), monotonic()
         return self._count
 
-    def compute(
-        self, task: Callable[[Positions], Any], chunks: Iterator[Positions], key: str, stopped: Event
-    ) -> Generator[Any]:
-        """Results of `task` for each of `chunks`, as they come; a chunk is asked for when a worker is about to need it.
+    def results(
+        self,
+        compute: Callable[[Positions], Result],
+        tasks: Iterator[Positions],
+        learn: Callable[[Result], Result],
+        stopped: Event,
+    ) -> Generator[Result]:
+        """Results as they come.
 
-        A chunk whose worker dies goes to another; one that takes several workers with it raises
+        A task whose worker dies goes to another worker; a task that takes several workers with it raises
         `distributed.KilledWorker`. (joblib's backend for Dask waits for ever then, and counts workers at the start
         only.)
         """
-        plugin = _Shared(key, task)
+        key = secrets.token_hex(8)
+        plugin = _Shared(key, compute)
         self.client.register_plugin(plugin)
         try:
             futures = as_completed(loop=self.client.loop, with_results=True)
 
             def fill() -> None:
-                # One in hand for each thread, so that none waits for the next.
-                for chunk in islice(chunks, max(0, max(2, 2 * self.threads()) - futures.count())):
-                    futures.add(self.client.submit(_run, key, chunk, pure=False))
+                # One more than each thread computes, so that none waits for the next.
+                for task in islice(tasks, max(0, max(2, 2 * self.threads()) - futures.count())):
+                    futures.add(self.client.submit(_run, key, task, pure=False))
 
             fill()
             if not self.threads():
@@ -111,7 +125,7 @@ class Workers:
                     if stopped.wait(_TICK):
                         return
             for _, result in futures:
-                yield result
+                yield learn(result)
                 fill()
         except (OSError, CancelledError) as error:
             raise ConnectionError(f"the Dask scheduler is gone ({error})") from error

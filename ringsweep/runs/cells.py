@@ -1,4 +1,4 @@
-"""Cells of a sweep: the values that each has, and the task of computing a chunk of them."""
+"""Cells of a sweep: the values that each has, and the task of computing a task of them."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def laws_at(scene: Scene, axes: Axes, place: Place, count: int) -> NDArray[np.st
 
 @dataclass(frozen=True)
 class Finished:
-    """A chunk of cells: where they stand, their outcomes, and what they cost."""
+    """A task of cells: where they stand, their outcomes, and what they cost."""
 
     positions: NDArray[np.integer]
     columns: dict[str, NDArray[Any]]
@@ -62,7 +62,7 @@ class Finished:
 
 
 @dataclass(frozen=True)
-class Chunk:
+class ComputeCells:
     """The task of computing the cells at some positions, which other machines can take too."""
 
     config: Config

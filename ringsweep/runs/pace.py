@@ -1,4 +1,4 @@
-"""Cells to chunks, sized by what those before have cost."""
+"""Cells to tasks, sized by what those before have cost."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.storage.chunks import BRICK
+from ringsweep.storage.chunks import CHUNK
 
 
 class _Measured(Protocol):
@@ -30,15 +30,15 @@ logger = logging.getLogger("ringsweep")
 
 
 class Pace(Generic[Measured]):
-    """How many cells the next chunk takes, from what those before have cost.
+    """How many cells the next task takes, from what those before have cost.
 
-    A chunk takes a hundredth of the time that all before it have taken, within bounds: what a stopped sweep loses
+    A task takes a hundredth of the time that all before it have taken, within bounds: what a stopped sweep loses
     stays small, and so does the number of files. Towards the end it takes a share of what is left, so that no worker
     waits long for another.
     """
 
     shortest, longest, last = 0.1, 2.0, 0.02
-    most = BRICK
+    most = CHUNK
 
     def __init__(self, side_by_side: int, workers: Callable[[], int]):
         self.side_by_side = side_by_side
@@ -48,9 +48,9 @@ class Pace(Generic[Measured]):
         self.largest = side_by_side
 
     def learn(self, finished: Measured) -> Measured:
-        """Take note of what a chunk has cost; returns it."""
+        """Take note of what a task has cost; returns it."""
         cells, seconds = len(finished.positions), finished.seconds
-        logger.debug("a chunk of %d cells: %s", cells, "compiling" if seconds is None else f"{seconds:.3g} s")
+        logger.debug("a task of %d cells: %s", cells, "compiling" if seconds is None else f"{seconds:.3g} s")
         if seconds is not None:
             self.spent += seconds
             cost = max(seconds, 1e-9) / cells
@@ -60,7 +60,7 @@ class Pace(Generic[Measured]):
         return finished
 
     def next(self, left: int) -> int:
-        """Cells of the next chunk where so many are left."""
+        """Cells of the next task where so many are left."""
         if math.isnan(self.cost):
             return self.side_by_side
         seconds = min(max(0.01 * self.spent, self.shortest), self.longest)
@@ -69,14 +69,14 @@ class Pace(Generic[Measured]):
         return self.side_by_side * max(1, round(size / self.side_by_side))
 
 
-def chunks(done: NDArray[np.bool_], left: int, pace: Pace, stopped: Event) -> Iterator[NDArray[np.integer]]:
+def tasks(done: NDArray[np.bool_], left: int, pace: Pace, stopped: Event) -> Iterator[NDArray[np.integer]]:
     """Positions of the `left` cells that are not done, ascending, as many at a time as `pace` says, until `stopped`."""
     begin = 0
     while left and not stopped.is_set():
         size = min(pace.next(left), left)
         found: list[NDArray[np.integer]] = []
         while size:
-            end = begin + max(size, BRICK)
+            end = begin + max(size, CHUNK)
             free = begin + np.flatnonzero(~done[begin:end])[:size]
             found.append(free)
             size -= len(free)

@@ -12,11 +12,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ringsweep.cells import laws_at, values_at
 from ringsweep.config import Config, load
 from ringsweep.errors import InputError
 from ringsweep.models import parameters
 from ringsweep.models.scene import LAW
+from ringsweep.runs.cells import laws_at, values_at
 from ringsweep.storage import netcdf
 from ringsweep.storage.chunks import Layout
 from ringsweep.storage.provenance import differences, fingerprint, identity
@@ -99,7 +99,7 @@ class Earlier:
         """Hand over all cells of the new sweep that the file holds and that are not there yet; returns how many."""
         count = 0
         with netcdf.open_dataset(self.path) as ds:
-            for begin, end, _ in layout.bricks():
+            for begin, end, _ in layout.chunks():
                 positions = begin + np.flatnonzero(~keeper.done[begin:end])
                 place = dict(zip(config.axes.sizes, layout.indices(positions), strict=True))
                 shared, there = self._find(config, place, len(positions))

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from ringsweep.compile import take
 from ringsweep.config import Config, with_values
 from ringsweep.config.solver import read_solver
-from ringsweep.engine import compute
 from ringsweep.models import MODELS, batch
 from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import turn
 from ringsweep.quantities.variables import HISTORY, REGIMES
+from ringsweep.runs.sweep import compute
 from ringsweep.storage.provenance import attributes
 
 #: Instants that a history keeps, about.

@@ -2,61 +2,48 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from statistics import median
-from time import get_clock_info, perf_counter, thread_time
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsweep.cells import cells as values_of
 from ringsweep.compile import take
 from ringsweep.config import Config, load
 from ringsweep.config.axes import COUNT
 from ringsweep.config.scene import sweepable
-from ringsweep.engine import progress_bar
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, batch
 from ringsweep.models.scene import LAW
-from ringsweep.physics.friction import LAWS, SET_VALUED
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity
 from ringsweep.quantities.variables import FAILED, PRECISION, Variable
+from ringsweep.runs.cells import cells as values_of
+from ringsweep.runs.contenders import Timed, contenders_of, race, setting, yaml
+from ringsweep.runs.executors import progress_bar
 from ringsweep.solvers.certificate import agree
 from ringsweep.solvers.event import Event, Implicit
 from ringsweep.solvers.method import Result
-from ringsweep.solvers.rk4 import RK4
 from ringsweep.storage.provenance import attributes
 
 #: What is asked of a setting, unless the user says otherwise: largest error in rad or m, and in s.
 TARGET = 1e-6
+
+
 CELLS = 16
+
+
 ROUNDS = 3
 
-# Down to two digits above the tolerances of the reference.
-_TOLERANCES: dict[type, tuple[float, ...]] = {
-    Event: (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12),
-    Implicit: (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9),
-}
-_STEPS = tuple(10**k for k in range(2, 8))
 
 # Tightest first: the reference, and what tells how far it can be trusted.
 _TIGHTEST: dict[type, tuple[float, float]] = {Event: (1e-15, 1e-14), Implicit: (1e-11, 1e-10)}
 
-# Seconds in a round that one setting may take.
-_BUDGET = 10.0
-
-# Seconds below which a clock measures itself: shorter calls are repeated.
-_LEAST = 0.01
-
-# A thread's own time leaves out what a busy machine does meanwhile; some systems count it in ticks too coarse for that.
-_clock = thread_time if get_clock_info("thread_time").resolution < 1e-4 else perf_counter
 
 _WANTED = Parameter("1", "target", lower=0.0, open_lower=True)
 
@@ -143,7 +130,7 @@ def measure(
         )
     structure = scene.structure
     names = MODELS[structure.model].outcomes
-    contenders, left_out = _contenders(config)
+    contenders, left_out = contenders_of(config)
     best = type(contenders[0])
     total = math.prod(config.axes.sizes.values())
     sample = np.arange(total)
@@ -164,11 +151,11 @@ def measure(
                 "fails, or its two tightest runs disagree about the regime",
             )
         part = take(part, known)
-        raced, slow = _race(contenders, run, rounds, bar)
+        raced, slow = race(contenders, run, rounds, bar)
         certified = [_ticked(bar, replace(one.method, certify=True), run) for one in raced]
 
     dataset = _dataset(config, sample[known], raced, certified, tight[known], looser[known])
-    words = {"reference": _yaml(best(rtol=_TIGHTEST[best][0])), "sampled": f"{len(known)} of {total} cells"}
+    words = {"reference": yaml(best(rtol=_TIGHTEST[best][0])), "sampled": f"{len(known)} of {total} cells"}
     if dropped := len(sample) - len(known):
         words["sampled"] += (
             f"; {dropped} more were drawn that have no reference: its two tightest runs disagree, or fail"
@@ -178,7 +165,7 @@ def measure(
     dataset = dataset.assign_attrs({"target": target, **words})
 
     chosen, met = _choose(dataset)
-    pair = [_Timed(replace(raced[chosen].method, certify=certify)) for certify in (False, True)]
+    pair = [Timed(replace(raced[chosen].method, certify=certify)) for certify in (False, True)]
     for k in range(rounds):
         for one in pair[:: 1 if k % 2 == 0 else -1]:
             one.turn(run)
@@ -187,170 +174,11 @@ def measure(
     return dataset.assign_attrs({"recommended" if met else "closest": name, "certificate_cost": cost})
 
 
-def report(ds: xr.Dataset) -> str:
-    """What :func:`precision` found, as text: an aligned table, and what to put into the configuration.
-
-    Parameters
-    ----------
-    ds : xarray.Dataset
-        Result of :func:`precision`.
-
-    Returns
-    -------
-    str
-        Several lines.
-    """
-    unit = ds["error_end"].attrs["units"]
-    separating = "error_separation" in ds and bool(np.isfinite(ds["error_separation"]).any())
-    header = ["", "ms per run", "steps", f"median error, {unit}", f"largest, {unit}"]
-    header += ["largest of separation, s"] * separating + ["wrong regimes", "of these silent"]
-    lines = []
-    for k in range(ds.sizes["contender"]):
-        one = ds.isel(contender=k)
-        end, wrong = one["error_end"].values, one["regime_wrong"].values == 1
-        silent = one["flagged"].values[wrong] == 0
-        line = [f"{one['method'].item()}, {one['setting'].item()}", f"{1e3 * one['time_per_run'].item():.3g}"]
-        line += [f"{one['steps'].item():.0f}", f"{np.median(end):.1e}", f"{end.max():.1e}"]
-        if separating:
-            apart = one["error_separation"].values
-            line.append(f"{np.nanmax(apart):.1e}" if np.isfinite(apart).any() else "-")
-        lines.append([*line, f"{wrong.mean():.0%}", f"{silent.mean():.0%}" if wrong.any() else "-"])
-    return "\n".join([*_aligned(header, lines), "", *_verdict(ds, unit)])
-
-
-def _verdict(ds: xr.Dataset, unit: str) -> list[str]:
-    """Against what was measured, what it came to, and what certificates cost."""
-    attributes = ds.attrs
-    off = [f"{ds['reference_error_end'].values.max():.1e} {unit}"]
-    if "reference_error_separation" in ds and np.isfinite(ds["reference_error_separation"]).any():
-        off.append(f"{np.nanmax(ds['reference_error_separation'].values):.1e} s")
-    words = [
-        f"sampled: {attributes['sampled']}",
-        f"reference: {attributes['reference']}; a run ten times looser differs from it by {' and '.join(off)} at most",
-    ]
-    if "left_out" in attributes:
-        words.append(f"left out: {attributes['left_out']}")
-    name = attributes.get("recommended", attributes.get("closest"))
-    k = ds["solver"].values.tolist().index(name)
-    worst, wrong = _bounds(ds).max(axis=1)[k], int((ds["regime_wrong"][k] == 1).sum())
-    errors = f"errors up to {worst:.1e} (the reference's included)" if np.isfinite(worst) else "runs that failed"
-    reached = f"{wrong or 'no'} wrong regime{'s' * (wrong != 1)}, {errors}"
-    words.append(
-        f"certificates, on unless told otherwise, make a run take {attributes['certificate_cost']:.2g} times as long"
-    )
-    target = f"target {attributes['target']:g} ({unit} at the end{', s at separation' * ('error_separation' in ds)})"
-    if "recommended" in attributes:
-        words.append(f"{target} in every cell sampled is met fastest by this one: {reached}")
-        return [*words, f"solver: {{{name}}}"]
-    return [*words, f"{target} in every cell sampled is met by none; closest is `{name}`: {reached}"]
-
-
-def _aligned(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    widths = [max(map(len, column)) for column in zip(header, *rows, strict=True)]
-    return [
-        "  ".join([line[0].ljust(widths[0]), *map(str.rjust, line[1:], widths[1:])]).rstrip()
-        for line in (header, *rows)
-    ]
-
-
 def _count(given: int, path: str) -> int:
     number = quantity(given, COUNT, path)
     if not number.is_integer():
         raise InputError(path, f"{number:g} is not a whole number")
     return int(number)
-
-
-# ---- contenders ----------------------------------------------------------------------------
-
-
-def _contenders(config: Config) -> tuple[list[Any], list[str]]:
-    """Methods with settings, each from cheap to dear, without certificates; and in words what does not compete."""
-    structure, own = config.scene.structure, config.solver
-    best: Any = Event if LAWS[structure.law] in SET_VALUED else Implicit
-    tolerances = {*_TOLERANCES[best], best.rtol} | ({own.rtol} if isinstance(own, best) else set())
-    limit = getattr(own, "max_steps", best.max_steps)
-    found = [best(rtol=rtol, max_steps=limit, certify=False) for rtol in sorted(tolerances, reverse=True)]
-    steps = {*_STEPS} | ({own.steps} if isinstance(own, RK4) else set())
-    fixed = [RK4(steps=n, certify=False) for n in sorted(steps)]
-    try:
-        fixed[0].check(structure)
-    except InputError as error:
-        return found, [error.problem]
-    return found + fixed, []
-
-
-def _setting(method: Any) -> str:
-    return f"{method.steps} steps" if isinstance(method, RK4) else f"rtol {method.rtol!r}"
-
-
-def _yaml(method: Any) -> str:
-    """What stands under ``solver`` in a configuration, defaults left out but for the setting."""
-    options = {"steps": method.steps} if isinstance(method, RK4) else {"rtol": method.rtol}
-    options |= {
-        option.name: getattr(method, option.name)
-        for option in dataclasses.fields(method)
-        if option.name not in (*options, "certify") and getattr(method, option.name) != option.default
-    }
-    return ", ".join([f"method: {method.name}", *(f"{name}: {value!r}" for name, value in options.items())])
-
-
-@dataclass
-class _Timed:
-    """A contender: its method, seconds of each turn, and what it returned last."""
-
-    method: Any
-    seconds: list[float] = field(default_factory=list)
-    result: Any = None
-    repeats: int = 1
-
-    def turn(self, run: Callable[[Any], Result]) -> None:
-        """Run and time once; the first turn finds how often that must be for the clock to tell."""
-        elapsed = self._lap(run)
-        while not self.seconds and elapsed < _LEAST:
-            self.repeats *= 4
-            elapsed = self._lap(run)
-        self.seconds.append(elapsed / self.repeats)
-
-    def _lap(self, run: Callable[[Any], Result]) -> float:
-        begin = _clock()
-        for _ in range(self.repeats):
-            self.result = run(self.method)
-        return _clock() - begin
-
-
-def _race(
-    methods: Sequence[Any], run: Callable[[Any], Result], rounds: int, bar: Any
-) -> tuple[list[_Timed], list[str]]:
-    """Time methods in turn, forwards and backwards, so that a noisy neighbour troubles all of them alike.
-
-    Also tells in words which were left out, by the time of the one before.
-    """
-    raced: list[_Timed] = []
-    left_out = []
-    latest: dict[type, _Timed] = {}
-    for method in methods:
-        before = latest.get(type(method))
-        if before is None:
-            # Compiles.
-            run(method)
-        else:
-            more = method.steps / before.method.steps if isinstance(method, RK4) else 1.0
-            expected = more * before.seconds[0]
-            if expected > _BUDGET:
-                left_out.append(
-                    f"{method.name}, {_setting(method)} (some {expected:.0f} s a round; {_BUDGET:g} are allowed)"
-                )
-                bar.update(rounds + 1)
-                continue
-        latest[type(method)] = _Timed(method)
-        latest[type(method)].turn(run)
-        bar.update()
-        raced.append(latest[type(method)])
-    for k in range(1, rounds):
-        for one in raced[:: 1 if k % 2 == 0 else -1]:
-            one.turn(run)
-            bar.update()
-    return raced, left_out
 
 
 def _ticked(bar: Any, method: Any, run: Callable[[Any], Result]) -> Result:
@@ -383,7 +211,7 @@ def _end(names: tuple[str, ...]) -> str:
 def _dataset(
     config: Config,
     sample: NDArray[np.intp],
-    raced: Sequence[_Timed],
+    raced: Sequence[Timed],
     certified: Sequence[Result],
     tight: NDArray[np.float64],
     looser: NDArray[np.float64],
@@ -417,10 +245,10 @@ def _dataset(
         },
         coords={
             "method": ("contender", [one.method.name for one in raced], {"long_name": "method"}),
-            "setting": ("contender", [_setting(one.method) for one in raced], {"long_name": "its setting"}),
+            "setting": ("contender", [setting(one.method) for one in raced], {"long_name": "its setting"}),
             "solver": (
                 "contender",
-                [_yaml(one.method) for one in raced],
+                [yaml(one.method) for one in raced],
                 {"long_name": "what stands under solver in a configuration"},
             ),
             "cell": ("cell", sample, {"long_name": "number of the cell in the sweep, last dimension fastest"}),
@@ -439,7 +267,7 @@ def _described(name: str, names: tuple[str, ...]) -> Variable:
     return variable
 
 
-def _bounds(ds: xr.Dataset) -> NDArray[np.float64]:
+def error_bounds(ds: xr.Dataset) -> NDArray[np.float64]:
     """What an error can be at most, given how far the reference is to be trusted; shape ``(contender, cell)``."""
     bounds = (ds["error_end"] + ds["reference_error_end"]).values
     if "error_separation" in ds:
@@ -449,7 +277,7 @@ def _bounds(ds: xr.Dataset) -> NDArray[np.float64]:
 
 def _choose(ds: xr.Dataset) -> tuple[int, bool]:
     """The fastest contender that meets the target, else the one that comes closest; and whether it does."""
-    wrong, worst = (ds["regime_wrong"] == 1).sum("cell").values, _bounds(ds).max(axis=1)
+    wrong, worst = (ds["regime_wrong"] == 1).sum("cell").values, error_bounds(ds).max(axis=1)
     met = np.flatnonzero((wrong == 0) & (worst <= ds.attrs["target"]))
     if len(met):
         return int(met[np.argmin(ds["time_per_run"].values[met])]), True

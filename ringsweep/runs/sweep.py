@@ -1,40 +1,36 @@
-"""Sweeps: cells to chunks, chunks to workers, outcomes to a dataset in memory or on disk."""
+"""Sweeps: cells to tasks, tasks to workers, outcomes to a dataset in memory or on disk."""
 
 from __future__ import annotations
 
 import logging
 import math
 import os
-import secrets
-import signal
-import sys
-import threading
-from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from collections.abc import Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-import joblib
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from tqdm.auto import tqdm
 
-from ringsweep.cells import Chunk, Finished
 from ringsweep.config import Axes, Config, load, read_axes, read_scene
 from ringsweep.config.scene import sweepable
 from ringsweep.config.solver import read_solver
 from ringsweep.errors import InputError
-from ringsweep.pace import Pace
-from ringsweep.pace import chunks as chunks_of
 from ringsweep.quantities.variables import OUTCOMES, linked
-from ringsweep.reuse import Earlier
+from ringsweep.runs.cells import ComputeCells, Finished
+from ringsweep.runs.executors import executor, progress_bar, stop_on_interrupt
+from ringsweep.runs.pace import Pace
+from ringsweep.runs.pace import tasks as tasks_of
+from ringsweep.runs.reuse import Earlier
 from ringsweep.storage import netcdf
 from ringsweep.storage.chunks import Layout
-from ringsweep.storage.partial import Chunks, Columns, Damaged, owned
+from ringsweep.storage.partial import Columns, Damaged, Partial, owned
 from ringsweep.storage.provenance import attributes, differences, environment, identity
 
 logger = logging.getLogger("ringsweep")
+
 
 #: Cells of a sweep that has no file to go to: some gigabytes.
 MOST_IN_MEMORY = 10_000_000
@@ -80,7 +76,7 @@ def run(
     ------
     InputError
         If the configuration is wrong, the output cannot be written or is being computed by another process, or the
-        chunks beside it are of another sweep.
+        tasks beside it are of another sweep.
 
     Examples
     --------
@@ -207,7 +203,7 @@ def compute(
     """Run a validated configuration in memory; see :func:`run`."""
     config, earlier = _earlier(config, reuse)
     sizes = tuple(config.axes.sizes.values())
-    layout = Layout(sizes, brick=sizes)
+    layout = Layout(sizes, chunk=sizes)
     if layout.total > MOST_IN_MEMORY:
         raise InputError("sweep", f"{layout.total:.3g} cells do not fit into memory: name a file as output")
     kept = _InMemory(layout.total)
@@ -247,49 +243,49 @@ def write(
         netcdf.check_kind(target, "regime", "sweep")
     layout = Layout(tuple(config.axes.sizes.values()))
     described = identity(config)
-    with owned(target, described, layout, fresh=fresh) as chunks:
-        if not fresh and _holds(target, chunks):
-            chunks.clear()
+    with owned(target, described, layout, fresh=fresh) as partial:
+        if not fresh and _holds(target, partial):
+            partial.clear()
             return False
-        if resumed := int(chunks.done.sum()):
+        if resumed := int(partial.done.sum()):
             logger.info("going on: %d of %d cells are done", resumed, layout.total)
         try:
-            _fill(config, layout, chunks, earlier, jobs, scheduler, progress)
+            _fill(config, layout, partial, earlier, jobs, scheduler, progress)
             try:
-                _merge(config, target, layout, chunks)
+                _merge(config, target, layout, partial)
             except Damaged as damage:
                 logger.warning("%s: looking for what is missing", damage)
-                chunks.take_stock()
-                _fill(config, layout, chunks, earlier, jobs, scheduler, progress)
-                _merge(config, target, layout, chunks)
+                partial.take_stock()
+                _fill(config, layout, partial, earlier, jobs, scheduler, progress)
+                _merge(config, target, layout, partial)
         except BaseException as error:
-            if (kept := int(chunks.done.sum())) and chunks.folder.exists():
+            if (kept := int(partial.done.sum())) and partial.folder.exists():
                 again = "the same command without --fresh" if fresh else "the same command"
                 error.add_note(
-                    f"{kept} of {layout.total} cells are kept in {chunks.folder}: {again} goes on from there"
+                    f"{kept} of {layout.total} cells are kept in {partial.folder}: {again} goes on from there"
                 )
             raise
-        chunks.clear()
+        partial.clear()
     return True
 
 
-def _merge(config: Config, target: Path, layout: Layout, chunks: Chunks) -> None:
-    """Make the file of finished chunks."""
+def _merge(config: Config, target: Path, layout: Layout, partial: Partial) -> None:
+    """Make the file of finished partial."""
     frame = _frame(config)
-    frame.attrs["processors"] = ", ".join(sorted(chunks.processors))
-    netcdf.write(target, chunks.folder, frame, OUTCOMES, layout, chunks.bricks())
+    frame.attrs["processors"] = ", ".join(sorted(partial.processors))
+    netcdf.write(target, partial.folder, frame, OUTCOMES, layout, partial.chunks())
 
 
-def _holds(target: Path, chunks: Chunks) -> bool:
+def _holds(target: Path, partial: Partial) -> bool:
     """Whether a file holds this very sweep; how another differs from it is told."""
     if not target.exists():
         return False
     with netcdf.open_dataset(target) as ds:
         found = dict(ds.attrs)
-    if found.get("fingerprint") == chunks.key:
+    if found.get("fingerprint") == partial.key:
         return True
     try:
-        changes = differences(identity(load(target)), chunks.identity) or "the version of ringsweep"
+        changes = differences(identity(load(target)), partial.identity) or "the version of ringsweep"
     except InputError:
         changes = "what a configuration may say"
     logger.warning("%s is replaced when this sweep is done; what changed: %s", target, changes)
@@ -313,17 +309,14 @@ class _InMemory:
 def _fill(
     config: Config,
     layout: Layout,
-    kept: Chunks | _InMemory,
+    kept: Partial | _InMemory,
     earlier: Earlier | None,
     jobs: int | None,
     scheduler: str | None,
     progress: bool,
 ) -> None:
-    """Compute every cell that is not there yet, chunk after chunk."""
-    if jobs is not None and jobs < 1:
-        raise InputError("jobs", f"{jobs} threads compute nothing: give at least 1")
-    if jobs is not None and scheduler is not None:
-        raise InputError("--jobs", "is for threads of this machine: Dask's workers have their own number of threads")
+    """Compute every cell that is not there yet, task after task."""
+    computing = executor(jobs, scheduler)
     if earlier is not None:
         count = earlier.give(config, layout, kept)
         tell = logger.info if count else logger.warning
@@ -331,28 +324,12 @@ def _fill(
     left = layout.total - int(kept.done.sum())
     if not left:
         return
-    task = Chunk(config, layout)
-    pace: Pace[Finished]
-    results: Iterator[Finished]
     with ExitStack() as stack:
-        stopped = stack.enter_context(_stop_on_interrupt())
-        if scheduler is None:
-            threads = jobs or joblib.cpu_count()
-            pace = Pace(config.solver.side_by_side, lambda: threads)
-            chunks = chunks_of(kept.done, left, pace, stopped)
-            parallel = joblib.Parallel(n_jobs=threads, prefer="threads", return_as="generator_unordered")
-            # What a chunk has cost is known before joblib hands it over, which it does in ticks.
-            results = parallel(joblib.delayed(lambda chunk: pace.learn(task(chunk)))(chunk) for chunk in chunks)
-        else:
-            try:
-                from ringsweep import remote
-            except ImportError:
-                raise InputError("--scheduler", "Dask is not installed: pip install distributed") from None
-            client = stack.enter_context(remote.connect(scheduler))
-            workers = remote.Workers(client)
-            pace = Pace(config.solver.side_by_side, workers.threads)
-            chunks = chunks_of(kept.done, left, pace, stopped)
-            results = map(pace.learn, workers.compute(task, chunks, secrets.token_hex(8), stopped))
+        stopped = stack.enter_context(stop_on_interrupt())
+        workers = stack.enter_context(computing)
+        pace: Pace[Finished] = Pace(config.solver.side_by_side, workers.threads)
+        tasks = tasks_of(kept.done, left, pace, stopped)
+        results = workers.results(ComputeCells(config, layout), tasks, pace.learn, stopped)
         bar = stack.enter_context(progress_bar(layout.total, progress, layout.total - left))
         try:
             for finished in results:
@@ -362,42 +339,12 @@ def _fill(
                 kept.put(finished.positions, finished.columns, finished.processor)
                 bar.update(len(finished.positions))
         finally:
-            # Chunks under way cannot be interrupted; nobody is to wait for what comes after them.
+            # Partial under way cannot be interrupted; nobody is to wait for what comes after them.
             stopped.set()
             for _ in results:
                 pass
         if not kept.done.all():
             raise KeyboardInterrupt
-
-
-@contextmanager
-def _stop_on_interrupt() -> Iterator[threading.Event]:
-    """An event that the first Ctrl-C within the block sets; the second raises `KeyboardInterrupt` as ever."""
-    stopped = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
-        # Signals are a matter of the main thread.
-        yield stopped
-        return
-    before = signal.getsignal(signal.SIGINT)
-
-    def interrupt(number: int, frame: Any) -> None:
-        signal.signal(signal.SIGINT, before)
-        stopped.set()
-        logger.info("stopping when the chunks under way are done (Ctrl-C again: at once, without them)")
-
-    signal.signal(signal.SIGINT, interrupt)
-    try:
-        yield stopped
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-def progress_bar(total: int, progress: bool, done: int = 0) -> Any:
-    """A bar of so many runs, some of them done, where there is a terminal or a notebook to show it."""
-    # tqdm takes a notebook's stream for a pipe and would stay silent there.
-    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
-    notebook = hasattr(shell, "kernel")
-    return tqdm(total=total, initial=done, unit="run", disable=(False if notebook else None) if progress else True)
 
 
 def _frame(config: Config) -> xr.Dataset:

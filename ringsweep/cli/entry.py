@@ -1,0 +1,73 @@
+"""The command line: from arguments to an exit status, with one readable message for each error."""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+from contextlib import nullcontext, redirect_stdout
+from typing import Any
+
+from ringsweep.cli.parser import parser_of_commands
+from ringsweep.errors import InputError
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command; the exit status is 0 if done, 2 if the input is wrong, 1 for anything else."""
+    parser = parser_of_commands()
+    given = sys.argv[1:] if argv is None else list(argv)
+    if not given:
+        parser.print_help()
+        return 2
+    arguments, unknown = parser.parse_known_args(given)
+    if unknown:
+        takes_values = any(option in given for option in ("--set", "--sel"))
+        hint = "; what has a space wants quotes: --set 'drive.amplitude=2 rad/s'" if takes_values else ""
+        parser.error(f"unrecognized arguments: {' '.join(unknown)}{hint}")
+    told = logging.getLogger("ringsweep")
+    logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
+    logging.getLogger().handlers[0].setFormatter(_Words(_is_coloured(sys.stderr)))
+    told.setLevel(logging.DEBUG if arguments.verbose else logging.WARNING if arguments.quiet else logging.INFO)
+    try:
+        with redirect_stdout(None) if arguments.quiet else nullcontext():
+            arguments.verb(arguments)
+    except InputError as error:
+        return _fail(str(error), 2)
+    except KeyboardInterrupt as error:
+        return _fail("interrupted", 130, error)
+    except BrokenPipeError:
+        # What reads the output, as `head` does, has enough.
+        sys.stdout = None
+        return 0
+    except Exception as error:
+        if arguments.verbose:
+            traceback.print_exception(error)
+        return _fail(f"{type(error).__name__}: {error}", 1, error)
+    return 0
+
+
+def _fail(message: str, status: int, error: BaseException | None = None) -> int:
+    notes = getattr(error, "__notes__", [])
+    prefix = "\033[1;31mringsweep:\033[0m" if _is_coloured(sys.stderr) else "ringsweep:"
+    print(prefix, " ".join("; ".join([message, *notes]).split()), file=sys.stderr)
+    return status
+
+
+def _is_coloured(stream: Any) -> bool:
+    return stream.isatty() and "NO_COLOR" not in os.environ and os.environ.get("TERM") != "dumb"
+
+
+class _Words(logging.Formatter):
+    """What is told besides results: one line each, warnings in colour on a terminal."""
+
+    def __init__(self, coloured: bool):
+        super().__init__("ringsweep: %(message)s")
+        self.coloured = coloured
+
+    def format(self, record: logging.LogRecord) -> str:
+        text = super().format(record)
+        if self.coloured and record.levelno >= logging.WARNING:
+            return text.replace("ringsweep:", "\033[33mringsweep:\033[0m", 1)
+        return text

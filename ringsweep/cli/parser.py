@@ -1,0 +1,192 @@
+"""What can be asked on the command line."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import shutil
+from contextlib import suppress
+from textwrap import dedent, indent
+from typing import Any
+
+from ringsweep.cli.commands import (
+    animate_command,
+    info_command,
+    init_command,
+    map_command,
+    precision_command,
+    run_command,
+    schema_command,
+    simulate_command,
+)
+
+
+def parser_of_commands() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="ringsweep",
+        description="Regime maps of dry-friction systems whose friction coefficient jumps.",
+        epilog="ringsweep COMMAND --help tells more, with examples.",
+        formatter_class=_formatter,
+    )
+    parser.add_argument("--version", action=_Version)
+    _loudness(parser)
+    parser.set_defaults(quiet=False, verbose=False)
+    verbs = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    init = _verb(verbs, "init", init_command, "write a configuration to start from", """
+        ringsweep init                     my-sweep.yaml: two balls in a ring
+        ringsweep init --model belt belt.yaml
+        """)  # fmt: skip
+    init.add_argument("config", nargs="?", default="my-sweep.yaml", metavar="NEW.yaml", help="default: my-sweep.yaml")
+    init.add_argument("--model", choices=["ring", "belt"], default="ring", help="what it describes (default: ring)")
+
+    run = _verb(verbs, "run", run_command, "run a sweep: NetCDF, and a regime map beside it", """
+        ringsweep run my.yaml              my.nc and my.png; the same again goes on after a stop
+        ringsweep run my.yaml --jobs 1 -o results/one.nc
+        ringsweep run finer.yaml --reuse my.nc
+        ringsweep run my.nc -o again.nc    the sweep that my.nc holds
+        ringsweep run my.yaml --backend dask --scheduler tcp://host:8786
+        """)  # fmt: skip
+    run.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose sweep is repeated")
+    run.add_argument("-o", "--output", metavar="OUT.nc", help="default: the configuration's name, in this folder")
+    run.add_argument("--jobs", type=whole_number, metavar="N", help="threads (default: all cores)")
+    run.add_argument("--fresh", action="store_true", help="start over: discard what an earlier run has left")
+    run.add_argument("--reuse", metavar="OLD.nc", help="take the cells that it shares with this earlier sweep")
+    run.add_argument("--backend", choices=["threads", "dask"], help="who computes (default: threads of this machine)")
+    run.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers compute, as tcp://host:8786")
+
+    draw = _verb(verbs, "map", map_command, "draw a variable of a sweep", """
+        ringsweep map my.nc                my.png: the regimes
+        ringsweep map my.nc --var t_separation --x zone.half_angle
+        ringsweep map my.nc --sel "zone.half_angle=15 deg" -o line.pdf
+        """)  # fmt: skip
+    draw.add_argument("dataset", metavar="OUT.nc")
+    draw.add_argument("-o", "--output", metavar="MAP.png", help="default: beside OUT.nc; .pdf and .svg too")
+    draw.add_argument("--x", metavar="DIM", help="coordinate across")
+    draw.add_argument("--y", metavar="DIM", help="coordinate up")
+    draw.add_argument("--var", default="regime", metavar="V", help="variable to draw (default: regime)")
+    draw.add_argument(
+        "--sel", action="append", default=[], metavar="DIM=VALUE", help="hold at the nearest value; units allowed"
+    )
+
+    simulate = _verb(verbs, "simulate", simulate_command,
+        "run once, or under each law of a sweep: history and a picture of it", """
+        ringsweep simulate my.yaml         my-run.nc and my-run.png
+        ringsweep simulate my.yaml --set drive.amplitude=4 --set "zone.half_angle=20 deg"
+        ringsweep simulate my.nc --set drive.amplitude=4     the scene that my.nc holds, with this amplitude
+        """)  # fmt: skip
+    simulate.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose scene is run")
+    simulate.add_argument("-o", "--output", metavar="RUN.nc", help="default: the configuration's name with -run")
+    _settings(simulate)
+
+    animate = _verb(verbs, "animate", animate_command, "run once: a film of the body in the ring", """
+        ringsweep animate my.yaml          my-run.gif
+        ringsweep animate my.yaml -o run.mp4 --set drive.amplitude=4
+        ringsweep animate my.nc -o run.html  a page with buttons, of the scene that my.nc holds
+        """)  # fmt: skip
+    animate.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose scene is run")
+    animate.add_argument(
+        "-o", "--output", metavar="RUN.gif", help="default: the configuration's name with -run; .mp4 and .html too"
+    )
+    _settings(animate)
+
+    precision = _verb(verbs, "precision", precision_command,
+        "error against run time for this scene, and the cheapest solver", """
+        ringsweep precision my.yaml
+        ringsweep precision my.yaml --target 1e-9 --cells 64
+        """)  # fmt: skip
+    precision.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose sweep is taken")
+    precision.add_argument("-o", "--output", metavar="OUT.nc", help="default: the configuration's name with -precision")
+    precision.add_argument(
+        "--target",
+        type=positive_number,
+        metavar="E",
+        help="largest error allowed: rad or m at the end, s at separation (default: 1e-6)",
+    )
+    precision.add_argument("--cells", type=whole_number, metavar="N", help="cells to draw from the sweep (default: 16)")
+    precision.add_argument("--rounds", type=whole_number, metavar="N", help="timings of each setting (default: 3)")
+
+    info = _verb(verbs, "info", info_command, "tell what a result file holds", "ringsweep info my.nc")
+    info.add_argument("dataset", metavar="OUT.nc")
+
+    _verb(verbs, "schema", schema_command, "print the JSON schema of the configuration, for editors", """
+        ringsweep schema > schema.json
+        Editors that know YAML's language server then check what begins with
+            # yaml-language-server: $schema=schema.json
+        """)  # fmt: skip
+
+    completion = _verb(verbs, "completion", completion_command, "print what lets a shell complete these commands", """
+        ringsweep completion bash > ~/.local/share/bash-completion/completions/ringsweep
+        ringsweep completion zsh > ~/.zfunc/_ringsweep
+        """)  # fmt: skip
+    completion.add_argument("shell", choices=["bash", "zsh", "tcsh"])
+    return parser
+
+
+def completion_command(arguments: argparse.Namespace) -> None:
+    import shtab
+
+    print(shtab.complete(parser_of_commands(), arguments.shell))
+
+
+def _verb(verbs: Any, name: str, function: Any, words: str, examples: str) -> argparse.ArgumentParser:
+    """A command with what all have in common."""
+    parser: argparse.ArgumentParser = verbs.add_parser(
+        name,
+        help=words,
+        description=f"{words[0].upper()}{words[1:]}.",
+        epilog="examples:\n" + indent(dedent(examples).strip(), "  "),
+        formatter_class=_formatter,
+    )
+    _loudness(parser)
+    parser.set_defaults(verb=function)
+    return parser
+
+
+def _loudness(parser: argparse.ArgumentParser) -> None:
+    """May be asked for before the command and after it: where it is not, what was said before stands."""
+    loudness = parser.add_mutually_exclusive_group()
+    for letter, name, words in (
+        ("-q", "--quiet", "tell only what is wrong"),
+        ("-v", "--verbose", "tell more, and where an unexpected error arose"),
+    ):
+        loudness.add_argument(letter, name, action="store_true", default=argparse.SUPPRESS, help=words)
+
+
+def _formatter(prog: str) -> argparse.HelpFormatter:
+    return argparse.RawDescriptionHelpFormatter(
+        prog, max_help_position=28, width=min(shutil.get_terminal_size().columns - 2, 100)
+    )
+
+
+def _settings(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="PATH=VALUE", help="change a value, as drive.amplitude=3"
+    )
+
+
+class _Version(argparse.Action):
+    """Prints the version; it is looked up when asked for."""
+
+    def __init__(self, **options: Any):
+        super().__init__(**options, nargs=0, help="print the version")
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        from importlib.metadata import version
+
+        parser.exit(message=f"ringsweep {version('ringsweep')}\n")
+
+
+def whole_number(text: str) -> int:
+    # Of a bare ValueError argparse would show the name of this function.
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least 1")
+    return int(text)
+
+
+def positive_number(text: str) -> float:
+    # "nan" compares as false.
+    with suppress(ValueError):
+        if 0.0 < float(text) < math.inf:
+            return float(text)
+    raise argparse.ArgumentTypeError(f"{text!r} is not a number greater than 0")
