@@ -298,7 +298,7 @@ class TestFile:
             "friction.law": ["coulomb", "stiction"],
         }
         found = ringsweep.sweep(scene, axes, tmp_path / "out.nc", progress=False)
-        assert found["t_end"].encoding["chunkssizes"] == (1, 2, 2)
+        assert found["t_end"].encoding["chunksizes"] == (1, 2, 2)
         assert {"drive_amplitude", "body_mass"} <= set(found.coords)
         in_memory = ringsweep.sweep(scene, axes, progress=False)
         xr.testing.assert_equal(found.load(), in_memory)
