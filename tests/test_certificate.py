@@ -7,9 +7,9 @@ import pytest
 from solutions import HISTORY, solve
 
 import ringsweep
-from ringsweep import hooks
 from ringsweep.compile import take
 from ringsweep.models import MODELS
+from ringsweep.models.interface import audit, implicit, modes
 from ringsweep.quantities.variables import FAILED, JAMMED, RESTING, SEPARATING
 from ringsweep.solvers import automaton, event
 from ringsweep.solvers.certificate import with_errors
@@ -152,7 +152,7 @@ class TestLaunch:
 
     @staticmethod
     def bristles(batch):
-        _, state = hooks.embark(take(batch, 0))
+        _, state = modes.initial_state(take(batch, 0))
         return state[2:]
 
     LUGRE: ClassVar = {"friction.sigma0": 1e3, "friction.v_s": 1e-3, "drive.amplitude": 0.3}
@@ -177,7 +177,7 @@ class TestLaunch:
         """But one whose drive begins with an infinite acceleration is left behind at once."""
         for exponent, law in ((3.0, "stiction"), (1.5, "stiction")):
             scene = take(cells({"drive.amplitude": 0.3, "drive.exponent": exponent}, law=law, drive="power"), 0)
-            _, (_, v) = hooks.embark(scene)
+            _, (_, v) = modes.initial_state(scene)
             assert (v < 0.0) == (exponent < 2.0)
 
     def test_a_drive_that_begins_with_an_infinite_acceleration_leaves_the_body_behind(self, cells):
@@ -232,12 +232,12 @@ class TestLaw:
     def test_knows_by_itself_where_the_arcs_are(self, cells, law):
         """A mode that names another segment than the one under the contact is found out, whatever else is right."""
         scene = take(self.scene(cells, law), 0)
-        t, y = hooks.embark(scene)
-        _, mode = hooks.enter(scene, t, y)
-        force = hooks.forcing(scene, 0.0)
+        t, y = modes.initial_state(scene)
+        _, mode = modes.initial_mode(scene, t, y)
+        force = implicit.forcing(scene, 0.0)
 
         def breach(mode):
-            return hooks.breach(scene, mode, force, y, (0.0, 0.0), 0.1, 1e-10)[0]
+            return audit.violation(scene, mode, force, y, (0.0, 0.0), 0.1, 1e-10)[0]
 
         segment, turn = mode.place_1
         assert np.isfinite(breach(mode))

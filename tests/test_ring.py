@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from ringsweep.compile import kernel, take
 from ringsweep.errors import InputError
-from ringsweep.hooks import inspect
+from ringsweep.models.interface.constant_step import inspect
 from ringsweep.physics import ring
 from ringsweep.physics.friction.regularised import BengisuAkay
 from ringsweep.physics.ring import OneContact, Ring, TwoContacts, acceleration, acceleration_slope, reactions

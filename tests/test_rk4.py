@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ringsweep.compile import take
-from ringsweep.hooks import verdict
+from ringsweep.models.interface.constant_step import verdict
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2
 from ringsweep.models.ring.record import Outcome
 from ringsweep.models.ring.rk4 import Inspection

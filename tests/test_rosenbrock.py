@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from ringsweep.hooks import forcing, linearise, stiff_rates
+from ringsweep.models.interface import implicit
 from ringsweep.solvers import rosenbrock
 from ringsweep.solvers.rosenbrock import DENSE, DRIFT, GAMMA, STAGES, TIMES, A, C
 
@@ -111,19 +111,19 @@ class Kaps(NamedTuple):
         return exp(-2 * t) + sin(t), exp(-t)
 
 
-@forcing.implements(Kaps)
+@implicit.forcing.implements(Kaps)
 def _forcing(scene, t):
     return sin(t), cos(t)
 
 
-@stiff_rates.implements(Kaps)
+@implicit.rates.implements(Kaps)
 def _rates(scene, mode, force, x):
     (lift, rate), k = force, scene.stiffness
     fast, slow = x[0] - lift, x[1]
     return -(k + 2) * fast + k * slow * slow + rate, fast - slow - slow * slow
 
 
-@linearise.implements(Kaps)
+@implicit.linearise.implements(Kaps)
 def _linearise(scene, mode, t, x):
     k, slow = scene.stiffness, x[1]
     rates = _rates(scene, mode, _forcing(scene, t), x)
@@ -139,18 +139,18 @@ class Pursuit(NamedTuple):
         return sin(t), exp(-t)
 
 
-@forcing.implements(Pursuit)
+@implicit.forcing.implements(Pursuit)
 def _pursuit_forcing(scene, t):
     return sin(t), cos(t)
 
 
-@stiff_rates.implements(Pursuit)
+@implicit.rates.implements(Pursuit)
 def _pursuit_rates(scene, mode, force, x):
     lag = x[0] - force[0]
     return -scene.stiffness * lag + force[1], lag - x[1]
 
 
-@linearise.implements(Pursuit)
+@implicit.linearise.implements(Pursuit)
 def _pursuit_linearise(scene, mode, t, x):
     k = scene.stiffness
     rates = _pursuit_rates(scene, mode, _pursuit_forcing(scene, t), x)
@@ -166,7 +166,7 @@ def integrate(scene, steps, end=1.0):
     within = estimate = 0.0
     for n in range(steps):
         t = n * h
-        after, error = step(scene, None, t, state, linearise(scene, None, t, state), h, stages)
+        after, error = step(scene, None, t, state, implicit.linearise(scene, None, t, state), h, stages)
         for fraction in (0.3, 0.5, 0.8):
             found = dense(state, after, stages, fraction)
             within = max(within, distance(found, scene.solution(t + fraction * h)))
@@ -231,6 +231,6 @@ class TestOrder:
         scene = Kaps(1e8)
         stages = np.empty((STAGES, 2))
         start = (1.0 + scene.solution(0.0)[0], 1.0)
-        line = linearise(scene, None, 0.0, start)
+        line = implicit.linearise(scene, None, 0.0, start)
         (x, y), _ = rosenbrock.step(scene, None, 0.0, start, line, 0.01, stages)
         assert x - sin(0.01) == pytest.approx(y * y, abs=1e-4)

@@ -6,7 +6,7 @@ touches Numba.
 """
 
 from ringsweep.compile.cache import SOURCES_DIGEST, kernel
-from ringsweep.compile.dispatch import absorbed_hook, hook
+from ringsweep.compile.dispatch import hook, lacking
 from ringsweep.compile.options import KERNEL_OPTIONS, absorbed, inlined, specialise
 from ringsweep.compile.tuples import add_scaled, borrowed, generated, map_leaves, take, unrolled, written
 
@@ -14,13 +14,13 @@ __all__ = [
     "KERNEL_OPTIONS",
     "SOURCES_DIGEST",
     "absorbed",
-    "absorbed_hook",
     "add_scaled",
     "borrowed",
     "generated",
     "hook",
     "inlined",
     "kernel",
+    "lacking",
     "map_leaves",
     "specialise",
     "take",

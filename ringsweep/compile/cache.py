@@ -22,7 +22,7 @@ logger = logging.getLogger("ringsweep")
 OWN_LAWS = [Path(name) for name in os.environ.get("RINGSWEEP_LAWS", "").split(os.pathsep) if name]
 
 # All that decides the bits of a result. An edit elsewhere, in plots say, leaves kernels and results as they are.
-_DECIDE_BITS = ("compile", "numerics", "physics", "models", "solvers", "quantities", "hooks.py", "runs/cells.py")
+_DECIDE_BITS = ("compile", "numerics", "physics", "models", "solvers", "quantities", "runs/cells.py")
 
 
 def sources_digest(root: Path, own_laws: Iterable[Path] = ()) -> str:

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-from ringsweep.models import shared  # noqa: F401
 from ringsweep.models.belt import Belt
 from ringsweep.models.ring import Ring, SingleContactRing
 from ringsweep.models.scene import Structure, Values

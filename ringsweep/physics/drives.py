@@ -12,7 +12,7 @@ from __future__ import annotations
 from math import atan, cos, inf, log1p, pi, sin
 from typing import Annotated, Any, NamedTuple
 
-from ringsweep.compile import absorbed_hook, hook, inlined
+from ringsweep.compile import hook, inlined
 from ringsweep.quantities.parameters import Leaf, Parameter
 
 
@@ -155,7 +155,7 @@ def _turn(drive, t):
     return a * theta, a * omega, a * epsilon if a != 0.0 else 0.0
 
 
-@absorbed_hook
+@hook(absorb=True)
 def lookup(drive, table, k):
     """Angle (rad) and angular velocity (rad/s) of the drive from row `k` of a table of its shape."""
 

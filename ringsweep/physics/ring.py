@@ -31,7 +31,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ringsweep.compile import absorbed, absorbed_hook, hook, inlined
+from ringsweep.compile import absorbed, hook, inlined
 from ringsweep.numerics.functions import opposing
 from ringsweep.physics import drives
 from ringsweep.physics.friction.velocity import weights
@@ -148,7 +148,7 @@ def _one_about_axis(body):
     return 1.0
 
 
-@absorbed_hook
+@hook(absorb=True)
 def acceleration(body, K1, K2, sin_phi, cos_phi, omega):
     """Angular acceleration, and what tells whether it exists.
 
@@ -183,7 +183,7 @@ def _one_acceleration(body, K1, K2, sin_phi, cos_phi, omega):
     return phi_dd, 1.0, 1.0
 
 
-@absorbed_hook
+@hook(absorb=True)
 def acceleration_slope(body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega):
     """Derivative of the angular acceleration along ``(dK1, dK2) = (slope_1, slope_2)``."""
 
@@ -208,7 +208,7 @@ def _one_slope(body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega):
     return slope_1 * (body.gravity / body.radius * cos_phi + omega * omega)
 
 
-@absorbed_hook
+@hook(absorb=True)
 def acceleration_gradient(body, K1, K2, sin_phi, cos_phi, omega):
     """Derivatives of the angular acceleration by angle and by angular velocity, friction K held; 1/s^2 and 1/s."""
 
@@ -227,7 +227,7 @@ def _one_gradient(body, K1, K2, sin_phi, cos_phi, omega):
     return -body.gravity / body.radius * (cos_phi + K1 * sin_phi), 2.0 * omega * K1
 
 
-@absorbed_hook
+@hook(absorb=True)
 def grip(body, cos_phi, omega):
     """Derivative of the angular acceleration by the K of all contacts together, where there is no friction."""
 
@@ -258,7 +258,7 @@ def _one_support(body):
     return 1.0
 
 
-@absorbed_hook
+@hook(absorb=True)
 def reactions(body, K1, K2, sin_phi, cos_phi, omega, phi_dd):
     """Normal reactions ``(N1, N2)``, N (the paper's Eq. 17); with one contact N2 repeats N1."""
 

@@ -13,7 +13,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from numba import types
 
-from ringsweep.compile import absorbed_hook, hook, inlined, specialise, written
+from ringsweep.compile import hook, inlined, specialise, written
 from ringsweep.numerics.functions import floor, select
 from ringsweep.quantities.parameters import Leaf, Parameter
 
@@ -172,7 +172,7 @@ def _unrolled_under(values: Any, edges: Any, x: Any) -> Any:
 specialise(under, _unrolled_under)
 
 
-@absorbed_hook
+@hook(absorb=True)
 def roughness(surface, turns):
     """Static and kinetic coefficient under a contact at an angle in the ring's frame, in turns."""
 

@@ -6,16 +6,8 @@ from math import inf, isfinite, sqrt
 from typing import NamedTuple
 
 from ringsweep.compile import hook, inlined
-from ringsweep.hooks import (
-    breach,
-    drift,
-    energy,
-    forcing,
-    from_stiff,
-    land,
-    stiff_view,
-    to_stiff,
-)
+from ringsweep.models.interface import audit as law
+from ringsweep.models.interface import implicit, series
 from ringsweep.numerics.series import slope
 from ringsweep.physics.friction import DYNAMIC, SET_VALUED, SMOOTH
 from ringsweep.solvers import rosenbrock
@@ -24,11 +16,12 @@ from ringsweep.solvers import rosenbrock
 class Audit(NamedTuple):
     """What a run has shown of its law at instants that the solver did not choose.
 
-    ``breach`` is the largest violation, measured by what the tolerance of a step makes of it; ``unexplained`` what of
+    ``violation`` is the largest violation, measured by what the tolerance of a step makes of it; ``unexplained`` what
+    of
     the changes of the mechanical energy is not work of friction, J; ``turnover`` the sum of the magnitudes of both.
     """
 
-    breach: float
+    violation: float
     unexplained: float
     turnover: float
 
@@ -54,8 +47,8 @@ def is_checked(n):
 @inlined
 def _entered(audit, first, second, begins, ends, s):
     """Audit after a step of length `s`, checked at two instants; `begins` and `ends` are energies."""
-    (breach_1, power_1), (breach_2, power_2) = first, second
-    worst = max(audit.breach, max(breach_1, breach_2))
+    (violation_1, power_1), (violation_2, power_2) = first, second
+    worst = max(audit.violation, max(violation_1, violation_2))
     work, change = 0.5 * s * (power_1 + power_2), ends - begins
     return Audit(
         worst if isfinite(work) else inf,
@@ -67,82 +60,90 @@ def _entered(audit, first, second, begins, ends, s):
 @inlined
 def _audit_series(scene, mode, c, t, s, y, y_next, tolerance, audit):
     """Audit after a step of length `s` along the series `c`, from the state `y` at time `t` to the state `y_next`."""
-    first = _breach_along(scene, mode, c, t, s, tolerance, _EARLY * s)
-    second = _breach_along(scene, mode, c, t, s, tolerance, _LATE * s)
-    begins, ends = energy(scene, forcing(scene, t), y), energy(scene, forcing(scene, t + s), y_next)
+    first = _violation_along(scene, mode, c, t, s, tolerance, _EARLY * s)
+    second = _violation_along(scene, mode, c, t, s, tolerance, _LATE * s)
+    begins, ends = (
+        law.energy(scene, implicit.forcing(scene, t), y),
+        law.energy(scene, implicit.forcing(scene, t + s), y_next),
+    )
     return _entered(audit, first, second, begins, ends, s)
 
 
 @inlined
-def _breach_along(scene, mode, c, t, s, tolerance, at):
-    state, rates = land(scene, mode, c, t + at, at), drift(scene, mode, c, at)
-    return breach(scene, mode, forcing(scene, t + at), state, rates, s, tolerance)
+def _violation_along(scene, mode, c, t, s, tolerance, at):
+    state, rates = series.state_at(scene, c, at), series.rates_at(scene, c, at)
+    return law.violation(scene, mode, implicit.forcing(scene, t + at), state, rates, s, tolerance)
 
 
 @inlined
 def _audit_creep(scene, mode, t, s, y, y_next, stages, tolerance, audit):
     """The same of an implicit step from the state `y` to `y_next`."""
-    begin, end = forcing(scene, t), forcing(scene, t + s)
-    x, x_next = to_stiff(scene, begin, y), to_stiff(scene, end, y_next)
-    first = _breach_within(scene, mode, t, s, x, x_next, stages, tolerance, _EARLY)
-    second = _breach_within(scene, mode, t, s, x, x_next, stages, tolerance, _LATE)
-    return _entered(audit, first, second, energy(scene, begin, y), energy(scene, end, y_next), s)
+    begin, end = implicit.forcing(scene, t), implicit.forcing(scene, t + s)
+    x, x_next = implicit.to_implicit(scene, begin, y), implicit.to_implicit(scene, end, y_next)
+    first = _violation_within(scene, mode, t, s, x, x_next, stages, tolerance, _EARLY)
+    second = _violation_within(scene, mode, t, s, x, x_next, stages, tolerance, _LATE)
+    return _entered(audit, first, second, law.energy(scene, begin, y), law.energy(scene, end, y_next), s)
 
 
 @inlined
-def _breach_within(scene, mode, t, s, x, x_next, stages, tolerance, fraction):
-    force = forcing(scene, t + fraction * s)
-    state = from_stiff(scene, force, rosenbrock.dense(x, x_next, stages, fraction))
-    return breach(scene, mode, force, state, rosenbrock.dense_rates(x, x_next, stages, fraction, s), s, tolerance)
+def _violation_within(scene, mode, t, s, x, x_next, stages, tolerance, fraction):
+    force = implicit.forcing(scene, t + fraction * s)
+    state = implicit.from_implicit(scene, force, rosenbrock.dense(x, x_next, stages, fraction))
+    return law.violation(
+        scene, mode, force, state, rosenbrock.dense_rates(x, x_next, stages, fraction, s), s, tolerance
+    )
 
 
 @inlined
 def _fall_of_creep(scene, mode, t, s, y, y_next, stages, guard):
     """How fast a guard falls as an implicit step ends by it, 1/s times its unit."""
-    x, x_next = to_stiff(scene, forcing(scene, t), y), to_stiff(scene, forcing(scene, t + s), y_next)
-    late = stiff_view(scene, mode, t + 0.9 * s, rosenbrock.dense(x, x_next, stages, 0.9))
+    x, x_next = (
+        implicit.to_implicit(scene, implicit.forcing(scene, t), y),
+        implicit.to_implicit(scene, implicit.forcing(scene, t + s), y_next),
+    )
+    late = implicit.guards_and_motion(scene, mode, t + 0.9 * s, rosenbrock.dense(x, x_next, stages, 0.9))
     return late[0][guard] / (0.1 * s)
 
 
 @hook
-def audit_step(law, scene, mode, implicit, c, t, s, y, y_next, stages, tolerance, audit):
+def audit_step(law, scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerance, audit):
     """Audit after a step of length `s` from the state `y` at time `t`."""
 
 
 @audit_step.implements(*SET_VALUED)
-def _series_audited(law, scene, mode, implicit, c, t, s, y, y_next, stages, tolerance, audit):
+def _series_audited(law, scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerance, audit):
     return _audit_series(scene, mode, c, t, s, y, y_next, tolerance, audit)
 
 
 @audit_step.implements(*SMOOTH)
-def _either_audited(law, scene, mode, implicit, c, t, s, y, y_next, stages, tolerance, audit):
-    if implicit:
+def _either_audited(law, scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerance, audit):
+    if is_implicit:
         return _audit_creep(scene, mode, t, s, y, y_next, stages, tolerance, audit)
     return _audit_series(scene, mode, c, t, s, y, y_next, tolerance, audit)
 
 
 @audit_step.implements(*DYNAMIC)
-def _implicit_audited(law, scene, mode, implicit, c, t, s, y, y_next, stages, tolerance, audit):
+def _implicit_audited(law, scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerance, audit):
     return _audit_creep(scene, mode, t, s, y, y_next, stages, tolerance, audit)
 
 
 @hook
-def fall_rate(law, scene, mode, implicit, c, t, s, y, y_next, stages, guard, first):
+def fall_rate(law, scene, mode, is_implicit, c, t, s, y, y_next, stages, guard, first):
     """How fast a guard falls as a step ends by it; `first` is the first guard."""
 
 
 @fall_rate.implements(*SET_VALUED)
-def _series_fall(law, scene, mode, implicit, c, t, s, y, y_next, stages, guard, first):
+def _series_fall(law, scene, mode, is_implicit, c, t, s, y, y_next, stages, guard, first):
     return -slope(c[guard], s)
 
 
 @fall_rate.implements(*SMOOTH)
-def _either_fall(law, scene, mode, implicit, c, t, s, y, y_next, stages, guard, first):
-    if implicit:
+def _either_fall(law, scene, mode, is_implicit, c, t, s, y, y_next, stages, guard, first):
+    if is_implicit:
         return _fall_of_creep(scene, mode, t, s, y, y_next, stages, guard - first)
     return -slope(c[guard], s)
 
 
 @fall_rate.implements(*DYNAMIC)
-def _implicit_fall(law, scene, mode, implicit, c, t, s, y, y_next, stages, guard, first):
+def _implicit_fall(law, scene, mode, is_implicit, c, t, s, y, y_next, stages, guard, first):
     return _fall_of_creep(scene, mode, t, s, y, y_next, stages, guard - first)

@@ -12,25 +12,7 @@ from math import isfinite
 import numpy as np
 
 from ringsweep.compile import borrowed, hook, inlined, kernel, take
-from ringsweep.hooks import (
-    creeps,
-    embark,
-    enter,
-    expand,
-    finish,
-    forcing,
-    impasse,
-    is_stiff,
-    linearise,
-    onward,
-    rows,
-    sample,
-    start,
-    stiff_sample,
-    stiff_start,
-    switch,
-    to_stiff,
-)
+from ringsweep.models.interface import implicit, modes, recorder, series
 from ringsweep.models.interface.status import BROKEN, COMPLETE, RUNNING
 from ringsweep.numerics.series import ORDER, STACK
 from ringsweep.physics.drives import next_knot
@@ -51,7 +33,7 @@ def _stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c, guard
     Returns
     -------
     tuple
-        Whether the step was implicit, guard or -1, length of the step, state, record, next implicit step to try.
+        Whether the step was is_implicit, guard or -1, length of the step, state, record, next implicit step to try.
     """
 
 
@@ -63,10 +45,10 @@ def _series_stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c
 
 @_stride.implements(*SMOOTH)
 def _either_stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages, seen):
-    if creeps(scene, mode):
-        x = to_stiff(scene, forcing(scene, t), y)
-        line = linearise(scene, mode, t, x)
-        if is_stiff(scene, mode, y, line):
+    if implicit.may_creep(scene, mode):
+        x = implicit.to_implicit(scene, implicit.forcing(scene, t), y)
+        line = implicit.linearise(scene, mode, t, x)
+        if implicit.is_stiff(scene, mode, y, line):
             if trial.last == 0.0:
                 # What is left of the way in ends at the rate of the decay.
                 trial = Trial(min(trial.h, -1.0 / line[1][3]), 0.0, 0.0)
@@ -80,8 +62,8 @@ def _either_stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c
 
 @_stride.implements(*DYNAMIC)
 def _implicit_stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages, seen):
-    x = to_stiff(scene, forcing(scene, t), y)
-    line = linearise(scene, mode, t, x)
+    x = implicit.to_implicit(scene, implicit.forcing(scene, t), y)
+    line = implicit.linearise(scene, mode, t, x)
     guard, s, y, record, trial = implicit_step(
         scene, record, mode, t, y, x, line, trial, horizon, tolerances[1], guards, stages, seen, work
     )
@@ -95,35 +77,35 @@ def _outset(law, scene, mode, t, y, tolerances, c):
 
 @_outset.implements(*SET_VALUED, *SMOOTH)
 def _series_outset(law, scene, mode, t, y, tolerances, c):
-    expand(scene, mode, t, y, tolerances[0], c)
-    return start(scene, c)
+    series.expand(scene, mode, t, y, tolerances[0], c)
+    return recorder.begin(scene, t, series.seen_at(scene, c, 0.0, 0.0))
 
 
 @_outset.implements(*DYNAMIC)
 def _implicit_outset(law, scene, mode, t, y, tolerances, c):
-    return stiff_start(scene, mode, t, y)
+    return recorder.begin(scene, t, implicit.seen(scene, implicit.guards_and_motion(scene, mode, t, y)))
 
 
 @hook
-def _row(law, scene, mode, implicit, c, t, s, y):
+def _row(law, scene, mode, is_implicit, c, t, s, y):
     """One row of a time history, after the part `s` of a step that began in the state `y` if it was a series."""
 
 
 @_row.implements(*SET_VALUED)
-def _series_row(law, scene, mode, implicit, c, t, s, y):
-    return sample(scene, mode, c, t, s)
+def _series_row(law, scene, mode, is_implicit, c, t, s, y):
+    return series.row(scene, mode, c, t, s)
 
 
 @_row.implements(*SMOOTH)
-def _either_row(law, scene, mode, implicit, c, t, s, y):
-    if implicit:
-        return stiff_sample(scene, mode, t, to_stiff(scene, forcing(scene, t), y))
-    return sample(scene, mode, c, t, s)
+def _either_row(law, scene, mode, is_implicit, c, t, s, y):
+    if is_implicit:
+        return implicit.row(scene, mode, t, implicit.to_implicit(scene, implicit.forcing(scene, t), y))
+    return series.row(scene, mode, c, t, s)
 
 
 @_row.implements(*DYNAMIC)
-def _implicit_row(law, scene, mode, implicit, c, t, s, y):
-    return stiff_sample(scene, mode, t, to_stiff(scene, forcing(scene, t), y))
+def _implicit_row(law, scene, mode, is_implicit, c, t, s, y):
+    return implicit.row(scene, mode, t, implicit.to_implicit(scene, implicit.forcing(scene, t), y))
 
 
 @inlined
@@ -135,13 +117,13 @@ def _arrive(scene, mode, guard, t, s, horizon, y):
     if not (isfinite(y[0]) and isfinite(y[1])):
         return t, BROKEN, mode, y
     if not s >= 0.0:
-        return t, impasse(scene, mode, t, y), mode, y
+        return t, modes.status_without_way_on(scene, mode, t, y), mode, y
     if guard >= 0:
-        status, mode, y = switch(scene, mode, guard, t, y)
+        status, mode, y = modes.switch(scene, mode, guard, t, y)
         return t, status, mode, y
     if t >= scene.span:
         return t, COMPLETE, mode, y
-    return t, RUNNING, onward(mode) if s > 0.0 else mode, y
+    return t, RUNNING, series.after_first_step(mode) if s > 0.0 else mode, y
 
 
 @inlined
@@ -151,11 +133,11 @@ def _store(row, values):
 
 
 @inlined
-def _keep(scene, mode, implicit, c, t, s, y, times, table, kept):
+def _keep(scene, mode, is_implicit, c, t, s, y, times, table, kept):
     """Store the state after the part `s` of a step as row `kept` of a history that has room; the number of rows."""
     if kept == len(times):
         return kept
-    _store(table[kept], _row(scene.law, scene, mode, implicit, c, t + s, s, y))
+    _store(table[kept], _row(scene.law, scene, mode, is_implicit, c, t + s, s, y))
     # Sums that should be equal differ by rounding.
     times[kept] = max(t + s, times[kept - 1]) if kept > 0 else t
     return kept + 1
@@ -195,10 +177,10 @@ def integrate(batch, tolerances, limit, out, steps, shown, spacing, times, table
         Number of rows.
     """
     first = take(batch, 0)
-    count, guards = rows(first)
+    count, guards = series.table_shape(first)
     c = np.zeros((count, ORDER + 3))
     work = np.empty((STACK, ORDER + 3))
-    stages = np.empty((rosenbrock.STAGES, len(embark(first)[1])))
+    stages = np.empty((rosenbrock.STAGES, len(modes.initial_state(first)[1])))
     seen = np.empty((MOST_GUARDS, INSTANTS + 1))
     return _integrate(batch, tolerances, limit, out, steps, shown, spacing, times, table, guards, c, work, stages, seen)
 
@@ -211,55 +193,59 @@ def _integrate(batch, tolerances, limit, out, steps, shown, spacing, times, tabl
     kept = 0
     for i in range(len(steps)):
         scene = take(batch, i)
-        t, y = embark(scene)
-        status, mode = enter(scene, t, y)
+        t, y = modes.initial_state(scene)
+        status, mode = modes.initial_mode(scene, t, y)
         record = _outset(scene.law, scene, mode, t, y, tolerances, c)
         trial = Trial(1e-6 * scene.span, 0.0, 0.0)
         audit, fall = Audit(0.0, 0.0, 0.0), 0.0
         n = stalled = 0
         before = -1.0
         entered = True
-        implicit = False
+        is_implicit = False
         while status == RUNNING:
             # Steps below the rounding of time do move the state, on the way into a jam, but not for ever.
             stalled = stalled + 1 if t == before else 0
             if n == limit or stalled == _STALLED:
-                status = impasse(scene, mode, t, y) if stalled == _STALLED else BROKEN
+                status = modes.status_without_way_on(scene, mode, t, y) if stalled == _STALLED else BROKEN
                 break
             before = t
             n += 1
             horizon = min(scene.span, next_knot(scene.drive, t)) - t
             trial = Trial(min(trial.h, spacing), trial.last, trial.size)
-            implicit, guard, s, y_next, record, trial = _stride(
+            is_implicit, guard, s, y_next, record, trial = _stride(
                 scene.law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages, seen
             )
             if len(times) > 0:
                 if kept == len(times):
                     return kept
                 if s > 0.0:
-                    parts = 1 if implicit else int(s / spacing) + 1
+                    parts = 1 if is_implicit else int(s / spacing) + 1
                     for part in range(0 if entered else 1, parts + 1):
                         state = y if part == 0 else y_next
-                        kept = _keep(scene, mode, implicit, c, t, s * part / parts, state, times, table, kept)
+                        kept = _keep(scene, mode, is_implicit, c, t, s * part / parts, state, times, table, kept)
                 entered = guard >= 0 or (entered and s == 0.0)
             if audited and s > 0.0 and is_checked(n):
-                audit = audit_step(scene.law, scene, mode, implicit, c, t, s, y, y_next, stages, tolerances[0], audit)
+                audit = audit_step(
+                    scene.law, scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerances[0], audit
+                )
             last, begun = mode, y
             t, status, mode, y = _arrive(scene, mode, guard, t, s, horizon, y_next)
             if audited and status != RUNNING and guard >= 0 and s > 0.0:
-                fall = fall_rate(scene.law, scene, last, implicit, c, before, s, begun, y_next, stages, guard, guards)
+                fall = fall_rate(
+                    scene.law, scene, last, is_implicit, c, before, s, begun, y_next, stages, guard, guards
+                )
             if s == 0.0 and status != RUNNING:
                 # What a mode ends by that is over as it is entered is to be seen.
-                kept = _keep(scene, last, implicit, c, t, 0.0, y, times, table, kept)
+                kept = _keep(scene, last, is_implicit, c, t, 0.0, y, times, table, kept)
         if kept == 0:
             # A run that ends as it begins was somewhere all the same.
-            kept = _keep(scene, mode, implicit, c, t, 0.0, y, times, table, kept)
-        outcome = finish(scene, record, status, t, y)
+            kept = _keep(scene, mode, is_implicit, c, t, 0.0, y, times, table, kept)
+        outcome = recorder.conclude(scene, record, status, t, *modes.in_space(scene, t, y))
         for k in range(min(len(outcome), out.shape[1])):
             out[i, k] = outcome[k]
         steps[i] = n
         if audited:
-            shown[i, 0] = audit.breach
+            shown[i, 0] = audit.violation
             shown[i, 1] = abs(audit.unexplained) / audit.turnover if audit.turnover > 0.0 else 0.0
             shown[i, 2] = fall
     return kept

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.hooks import undecided
+from ringsweep.models.interface.audit import undecided
 from ringsweep.quantities.variables import FAILED, OUTCOMES
 
 #: What two resolutions must agree on for a certificate.

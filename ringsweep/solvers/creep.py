@@ -8,15 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ringsweep.compile import inlined
-from ringsweep.hooks import (
-    forcing,
-    from_stiff,
-    stiff_motion,
-    stiff_near,
-    stiff_scales,
-    stiff_view,
-    stiff_watch,
-)
+from ringsweep.models.interface import implicit, modes, recorder
 from ringsweep.numerics.series import ORDER, ascending, first_root, value
 from ringsweep.solvers import rosenbrock
 
@@ -40,7 +32,7 @@ _PUSH = 100.0
 def _guard_after(scene, mode, t, x, line, h, g, stages):
     """Guard `g` after a step `h`."""
     x_next, _ = rosenbrock.step(scene, mode, t, x, line, h, stages)
-    return stiff_view(scene, mode, t + h, x_next)[0][g]
+    return implicit.guards_and_motion(scene, mode, t + h, x_next)[0][g]
 
 
 @inlined
@@ -50,7 +42,7 @@ def _locate(scene, mode, t, x, line, h, f_high, g, stages):
     The method itself, not an interpolant of it, is solved for the event.
     """
     low, high = 0.0, h
-    f_low = stiff_view(scene, mode, t, x)[0][g]
+    f_low = implicit.guards_and_motion(scene, mode, t, x)[0][g]
     if f_low <= 0.0:
         # Zero as the mode was entered: find a step before the event, if there is one.
         s = h
@@ -113,9 +105,9 @@ def _first_creep_event(scene, mode, t, x, x_next, line, s, before, within, after
     is isolated as that of a series is, so that no dip between two instants is missed. `before`, `within` and `after`
     are the views of the step's beginning, middle and end; `seen` is filled with the guards at the five instants.
     """
-    early = stiff_view(scene, mode, t + 0.25 * s, rosenbrock.dense(x, x_next, stages, 0.25))
-    late = stiff_view(scene, mode, t + 0.75 * s, rosenbrock.dense(x, x_next, stages, 0.75))
-    nearness = stiff_near(scene, within[1])
+    early = implicit.guards_and_motion(scene, mode, t + 0.25 * s, rosenbrock.dense(x, x_next, stages, 0.25))
+    late = implicit.guards_and_motion(scene, mode, t + 0.75 * s, rosenbrock.dense(x, x_next, stages, 0.75))
+    nearness = implicit.near_zero(scene, within[1])
     for g in range(len(nearness)):
         seen[g, 0], seen[g, 1], seen[g, 2] = before[0][g], early[0][g], within[0][g]
         seen[g, 3], seen[g, 4] = late[0][g], after[0][g]
@@ -197,19 +189,19 @@ def implicit_step(scene, record, mode, t, y, x, line, trial, horizon, tolerance,
     tuple
         Guard or -1, length of the step (negative if none was found), state, record, next :class:`Trial`.
     """
-    scales = stiff_scales(scene, tolerance, x)
+    scales = implicit.error_scales(scene, tolerance, x)
     s = min(trial.h, horizon)
     event, end, near = -1, s, False
-    before = stiff_view(scene, mode, t, x)
+    before = implicit.guards_and_motion(scene, mode, t, x)
     within, after = before, before
     for _ in range(200):
         x_next, error = rosenbrock.step(scene, mode, t, x, line, s, stages)
         size = _size(error, scales, line)
         if size <= 1.0:
-            within = stiff_view(scene, mode, t + 0.5 * s, rosenbrock.dense(x, x_next, stages, 0.5))
-            after = stiff_view(scene, mode, t + s, x_next)
+            within = implicit.guards_and_motion(scene, mode, t + 0.5 * s, rosenbrock.dense(x, x_next, stages, 0.5))
+            after = implicit.guards_and_motion(scene, mode, t + s, x_next)
             event, end = -1, s
-            near, nearness = False, stiff_near(scene, within[1])
+            near, nearness = False, implicit.near_zero(scene, within[1])
             for g in range(len(nearness)):
                 near = near or _may_vanish(nearness[g], before[0][g], within[0][g], after[0][g])
             if near:
@@ -235,10 +227,10 @@ def implicit_step(scene, record, mode, t, y, x, line, trial, horizon, tolerance,
         if end == 0.0:
             return guards + event, 0.0, y, record, trial
         event += guards
-        within = stiff_view(scene, mode, t + 0.5 * end, rosenbrock.dense(x, x_next, stages, 0.5))
-        after = stiff_view(scene, mode, t + end, x_next)
+        within = implicit.guards_and_motion(scene, mode, t + 0.5 * end, rosenbrock.dense(x, x_next, stages, 0.5))
+        after = implicit.guards_and_motion(scene, mode, t + end, x_next)
     moments, count = work[0], 0
-    velocity, acceleration = stiff_motion(scene, t, x, line)
+    velocity, acceleration = implicit.motion(scene, t, x, line)
     for half, right in ((0.0, within), (0.5, after)):
         # Where the motion or its acceleration turns within this half there is an extreme: a moment of its own.
         if velocity * right[1][1] < 0.0:
@@ -256,15 +248,18 @@ def implicit_step(scene, record, mode, t, y, x, line, trial, horizon, tolerance,
         moments[count] = 0.5
         count += 1
     ascending(moments, count)
-    done = 0.0
+    done, stuck = 0.0, modes.sticks(scene, mode)
     for j in range(count):
         view = within
         if moments[j] != 0.5:
-            view = stiff_view(scene, mode, t + moments[j] * end, rosenbrock.dense(x, x_next, stages, moments[j]))
-        record = stiff_watch(scene, record, mode, view, t + moments[j] * end, (moments[j] - done) * end)
+            view = implicit.guards_and_motion(
+                scene, mode, t + moments[j] * end, rosenbrock.dense(x, x_next, stages, moments[j])
+            )
+        duration = (moments[j] - done) * end
+        record = recorder.observe(scene, record, t + moments[j] * end, duration, stuck, implicit.seen(scene, view))
         done = moments[j]
-    record = stiff_watch(scene, record, mode, after, t + end, (1.0 - done) * end)
-    return event, end, from_stiff(scene, forcing(scene, t + end), x_next), record, trial
+    record = recorder.observe(scene, record, t + end, (1.0 - done) * end, stuck, implicit.seen(scene, after))
+    return event, end, implicit.from_implicit(scene, implicit.forcing(scene, t + end), x_next), record, trial
 
 
 @inlined
@@ -273,7 +268,7 @@ def _turning(scene, mode, t, x, x_next, h, stages, half, which, start):
     low, high = half, half + 0.5
     for _ in range(40):
         middle = 0.5 * (low + high)
-        view = stiff_view(scene, mode, t + middle * h, rosenbrock.dense(x, x_next, stages, middle))
+        view = implicit.guards_and_motion(scene, mode, t + middle * h, rosenbrock.dense(x, x_next, stages, middle))
         if view[1][which] * start > 0.0:
             low = middle
         else:

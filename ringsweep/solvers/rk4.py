@@ -13,24 +13,9 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.compile import absorbed, absorbed_hook, add_scaled, hook, inlined, kernel, take
+from ringsweep.compile import absorbed, add_scaled, hook, inlined, kernel, take
 from ringsweep.errors import InputError
-from ringsweep.hooks import (
-    begin,
-    conclude,
-    describe,
-    falls,
-    holds,
-    inspect,
-    lanes,
-    launch,
-    observe,
-    rates,
-    slack,
-    stiffness,
-    stride,
-    verdict,
-)
+from ringsweep.models.interface import constant_step, recorder
 from ringsweep.models.interface.status import COMPLETE, RUNNING
 from ringsweep.models.scene import Structure
 from ringsweep.numerics.functions import any_of, select
@@ -119,7 +104,7 @@ class RK4(Method):
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         rows = np.empty((len(batch.span), width))
         report = np.empty((len(batch.span), 5))
-        kind, account = lanes(batch), Kept() if self.diagnose else Dropped()
+        kind, account = constant_step.side_by_side(batch), Kept() if self.diagnose else Dropped()
         # What the kernels are compiled for knows no shape of the drive: that of its table is a kernel of its own.
         scenes = side_by_side(batch._replace(drive=scaled(batch.drive))) if isinstance(kind, Several) else batch
         for group in same_drive(batch, cells):
@@ -155,7 +140,7 @@ class Trust(NamedTuple):
     stride: Any
 
 
-@absorbed_hook
+@hook(absorb=True)
 def _trusted(account, scene, trust, before, now, h):
     """Trust in a run after a step that its guards outlast, given what it was."""
 
@@ -163,9 +148,9 @@ def _trusted(account, scene, trust, before, now, h):
 @_trusted.implements(Kept)
 def _keep(account, scene, trust, before, now, h):
     return Trust(
-        max(trust.stiffness, stiffness(scene, before, now, h)),
-        min(trust.slack, slack(scene, before, now)),
-        max(trust.stride, stride(scene, now, h)),
+        max(trust.stiffness, constant_step.stiffness(scene, before, now, h)),
+        min(trust.slack, constant_step.margin(scene, before, now)),
+        max(trust.stride, constant_step.arc_share(scene, now, h)),
     )
 
 
@@ -196,10 +181,10 @@ def _step(scene, y, now, table, k, h):
     """State one step after `y`, inspected; row `k` of `table` holds the drive at its beginning."""
     k1 = now.rates
     theta, ring_omega = lookup(scene.drive, table, k + 1)
-    k2 = rates(scene, now, add_scaled(y, 0.5 * h, k1), theta, ring_omega)
-    k3 = rates(scene, now, add_scaled(y, 0.5 * h, k2), theta, ring_omega)
+    k2 = constant_step.rates(scene, now, add_scaled(y, 0.5 * h, k1), theta, ring_omega)
+    k3 = constant_step.rates(scene, now, add_scaled(y, 0.5 * h, k2), theta, ring_omega)
     theta, ring_omega = lookup(scene.drive, table, k + 2)
-    k4 = rates(scene, now, add_scaled(y, h, k3), theta, ring_omega)
+    k4 = constant_step.rates(scene, now, add_scaled(y, h, k3), theta, ring_omega)
     total = add_scaled(add_scaled(add_scaled(k1, 2.0, k2), 2.0, k3), 1.0, k4)
     return add_scaled(y, h / 6.0, total)
 
@@ -259,13 +244,14 @@ def _advance(kind, account, batch, memory, at, seated, sample, table, first, k, 
     while k < steps:
         y_next = _step(scene, y, now, table, 2 * k, h)
         theta, ring_omega = lookup(scene.drive, table, 2 * k + 2)
-        after = conform(inspect(scene, y_next, theta, ring_omega), now)
-        ended = live > select(holds(scene, after), 1.0, 0.0)
+        after = conform(constant_step.inspect(scene, y_next, theta, ring_omega), now)
+        ended = live > select(constant_step.holds(scene, after), 1.0, 0.0)
         if any_of(ended):
             live = select(ended, ENDING, live)
             break
         trust = conform(_trusted(account, scene, trust, now, after, h), trust)
-        record = conform(observe(scene, record, y_next, now, after, (first + k + 1) * h, h), record)
+        stuck, seen = constant_step.sticks(scene, now, after), constant_step.seen(scene, y_next, after)
+        record = conform(recorder.observe(scene, record, (first + k + 1) * h, h, stuck, seen), record)
         y, now, live = y_next, after, abs(live)
         k += 1
     write(memory, runs_at, width(kind), _Run(y, now, record, trust, live))
@@ -284,8 +270,8 @@ def _part(kind, account, batch, memory, at, seated, sample, table, first, k, h, 
         if live == ENDING:
             y_next = _step(scene, run.y, run.now, table, 2 * k, h)
             theta, ring_omega = lookup(scene.drive, table, 2 * k + 2)
-            after = inspect(scene, y_next, theta, ring_omega)
-            status, fraction = verdict(scene, run.now, after)
+            after = constant_step.inspect(scene, y_next, theta, ring_omega)
+            status, fraction = constant_step.verdict(scene, run.now, after)
             # By the last bit it may hold after all: then it is not asked again in this step.
             live = EXCUSED
             if status != RUNNING:
@@ -293,10 +279,11 @@ def _part(kind, account, batch, memory, at, seated, sample, table, first, k, h, 
                 trust = _trusted(account, scene, run.trust, run.now, after, h)
                 y_end = _hermite(run.y, run.now.rates, y_next, after.rates, h, fraction)
                 t = (first + k + fraction) * h
-                record = observe(scene, run.record, y_end, run.now, after, t, fraction * h)
+                stuck, seen = constant_step.sticks(scene, run.now, after), constant_step.seen(scene, y_end, after)
+                record = recorder.observe(scene, run.record, t, fraction * h, stuck, seen)
                 # Of a contact that is lost there is no slack to speak of.
                 trust = Trust(trust.stiffness, run.trust.slack, trust.stride)
-                fall = falls(scene, run.now, after, h)
+                fall = constant_step.fall_rate(scene, run.now, after, h)
                 _conclude(scene, record, status, t, y_end, first + k + 1.0, trust, fall, seated[lane], rows, report)
             write(memory, place, width(kind), _Run(run.y, run.now, run.record, run.trust, live))
         left += int(live != GONE)
@@ -306,7 +293,7 @@ def _part(kind, account, batch, memory, at, seated, sample, table, first, k, h, 
 @inlined
 def _conclude(scene, record, status, t, y, steps, trust, fall, cell, rows, report):
     """Enter the outcome of a run."""
-    outcome = conclude(scene, record, status, t, y)
+    outcome = recorder.conclude(scene, record, status, t, y[0], y[1])
     for column in range(len(outcome)):
         rows[cell, column] = outcome[column]
     report[cell, 0], report[cell, 1], report[cell, 2] = steps, trust.stiffness, trust.slack
@@ -375,7 +362,7 @@ def _begin(kind, batch, cells, table, rows, report):
         scene = take(batch, i)
         theta, ring_omega = lookup(scene.drive, table, 0)
         run = _begun(scene, theta, ring_omega)
-        status, _ = verdict(scene, run.now, run.now)
+        status, _ = constant_step.verdict(scene, run.now, run.now)
         if status != RUNNING:
             _conclude(scene, run.record, status, 0.0, run.y, 0.0, run.trust, 0.0, i, rows, report)
             continue
@@ -429,9 +416,10 @@ def _complete(kind, batch, memory, seated, live, steps, rows, report):
 @inlined
 def _begun(scene, theta, ring_omega):
     """A run at its launch; with the drive anywhere, a sample of what runs of such scenes are made of."""
-    y = launch(scene)
-    now = inspect(scene, y, theta, ring_omega)
-    return _Run(y, now, begin(scene, y, now), Trust(0.0, inf, 0.0), LIVE)
+    y = constant_step.initial_state(scene)
+    now = constant_step.inspect(scene, y, theta, ring_omega)
+    record = recorder.begin(scene, 0.0, constant_step.seen(scene, y, now))
+    return _Run(y, now, record, Trust(0.0, inf, 0.0), LIVE)
 
 
 @kernel
@@ -440,16 +428,16 @@ def _history(batch, steps, stride, times, rows):
     scene = take(batch, 0)
     h = scene.span / steps
     table = np.empty((3, 2))
-    y = launch(scene)
+    y = constant_step.initial_state(scene)
     _tabulate(table, scene.drive, 0, 1, h)
     theta, ring_omega = lookup(scene.drive, table, 0)
-    now = inspect(scene, y, theta, ring_omega)
-    status, _ = verdict(scene, now, now)
+    now = constant_step.inspect(scene, y, theta, ring_omega)
+    status, _ = constant_step.verdict(scene, now, now)
     count = 0
     for k in range(steps + 1):
         if k % stride == 0 or k == steps or status != RUNNING:
             times[count] = k * h if k < steps else scene.span
-            row = describe(scene, y, theta, ring_omega)
+            row = constant_step.row(scene, y, theta, ring_omega)
             for column in range(len(row)):
                 rows[count, column] = row[column]
             count += 1
@@ -458,13 +446,13 @@ def _history(batch, steps, stride, times, rows):
         _tabulate(table, scene.drive, k, 1, h)
         y_next = _step(scene, y, now, table, 0, h)
         theta, ring_omega = lookup(scene.drive, table, 2)
-        after = inspect(scene, y_next, theta, ring_omega)
-        status, fraction = verdict(scene, now, after)
+        after = constant_step.inspect(scene, y_next, theta, ring_omega)
+        status, fraction = constant_step.verdict(scene, now, after)
         if status != RUNNING:
             # The history ends where the run does, within the step.
             times[count] = (k + fraction) * h
             theta, ring_omega, _ = turn(scene.drive, times[count])
-            row = describe(scene, _hermite(y, now.rates, y_next, after.rates, h, fraction), theta, ring_omega)
+            row = constant_step.row(scene, _hermite(y, now.rates, y_next, after.rates, h, fraction), theta, ring_omega)
             for column in range(len(row)):
                 rows[count, column] = row[column]
             return count + 1

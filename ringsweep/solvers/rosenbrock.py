@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ringsweep.compile import add_scaled, inlined, unrolled
-from ringsweep.hooks import forcing, stiff_rates
+from ringsweep.models.interface import implicit
 
 STAGES = 8
 GAMMA = 0.21193756319429014
@@ -107,20 +107,21 @@ def step(scene, mode, t, x, line, h, stages):
     """One step of length `h` from the state `x` at time `t`, where the system is linearised as `line`.
 
     `stages`, of shape ``(STAGES, components)``, is filled with the stages. Returns the new state and the
-    estimate of its error; for dense output see :func:`dense`. For `line` see :func:`ringsweep.hooks.linearise`.
+    estimate of its error; for dense output see :func:`dense`. For `line` see
+    :func:`ringsweep.models.interface.implicit.linearise`.
     """
     rates, core, bristles, drift = line
     shift = 1.0 / (GAMMA * h)
     over_h = 1.0 / h
-    force = forcing(scene, t + TIMES[1] * h)
+    force = implicit.forcing(scene, t + TIMES[1] * h)
     y = x
     for i in range(STAGES):
         if i > 0:
             y, coupling = combine_twice(x, A[i], C[i], stages, i)
             # The last three stages are at the same time.
             if 1 < i < STAGES - 2:
-                force = forcing(scene, t + TIMES[i] * h)
-            rates = stiff_rates(scene, mode, force, y)
+                force = implicit.forcing(scene, t + TIMES[i] * h)
+            rates = implicit.rates(scene, mode, force, y)
             rates = add_scaled(rates, over_h, coupling)
         solve(bristles, core, shift, add_scaled(rates, h * DRIFT[i], drift), stages[i])
     # Stiffly accurate: the last stage is the correction, and the error estimate, of the one before.

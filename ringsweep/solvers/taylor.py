@@ -9,12 +9,8 @@ from __future__ import annotations
 from math import isnan, nan
 
 from ringsweep.compile import inlined
-from ringsweep.hooks import (
-    expand,
-    land,
-    watch,
-)
-from ringsweep.numerics.series import ORDER, first_root
+from ringsweep.models.interface import modes, recorder, series
+from ringsweep.numerics.series import ORDER, ascending, first_root
 
 
 @inlined
@@ -46,10 +42,25 @@ def _first_event(c, guards, fresh, h, work):
 
 
 @inlined
+def _observe(scene, record, mode, c, t, s, work):
+    """Record after a step of length `s` along the series `c`, the extremes within it included."""
+    count = series.extremes(scene, record, mode, c, s, work)
+    instants = work[0]
+    ascending(instants, count)
+    stuck = modes.sticks(scene, mode)
+    before = 0.0
+    for j in range(count + 1):
+        now = instants[j] if j < count else s
+        record = recorder.observe(scene, record, t + now, now - before, stuck, series.seen_at(scene, c, now, s))
+        before = now
+    return record
+
+
+@inlined
 def series_step(scene, record, mode, t, y, horizon, tolerance, c, guards, work):
     """One step of the series, cut at the first event: guard or -1, length, state, record."""
-    h = min(expand(scene, mode, t, y, tolerance, c), horizon)
+    h = min(series.expand(scene, mode, t, y, tolerance, c), horizon)
     guard, s = _first_event(c, guards, mode.fresh, h, work)
     if s > 0.0:
-        record = watch(scene, record, mode, c, t, s, work)
-    return guard, s, land(scene, mode, c, t, s), record
+        record = _observe(scene, record, mode, c, t, s, work)
+    return guard, s, series.state_at(scene, c, s), record

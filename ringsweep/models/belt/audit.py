@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from math import inf
 
-from ringsweep import hooks
 from ringsweep.models.belt.bristles import contact_force
 from ringsweep.models.belt.force import friction_force, holds_in_band, length_scale
+from ringsweep.models.interface import audit, implicit
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.friction.velocity import BAND, stiction_band
 
@@ -17,7 +17,7 @@ _ROUNDING = 1e-12
 _IMPLICIT = 1e3
 
 
-@hooks.breach.implements(Belt)
+@audit.violation.implements(Belt)
 def _breach(scene, mode, force, y, rates, s, tolerance):
     x, v = y
     _, belt_velocity, belt_acceleration = force
@@ -43,18 +43,18 @@ def _breach(scene, mode, force, y, rates, s, tolerance):
     return (max(worst, off) if worst + off < inf else inf), -drag * (v + belt_velocity)
 
 
-@hooks.energy.implements(Belt, BristleBelt)
+@audit.energy.implements(Belt, BristleBelt)
 def _energy(scene, force, y):
     x, velocity = y[0], y[1] + force[1]
     return 0.5 * (scene.mass * velocity * velocity + scene.stiffness * x * x)
 
 
-@hooks.breach.implements(BristleBelt)
+@audit.violation.implements(BristleBelt)
 def _bristle_breach(scene, mode, force, y, rates, s, tolerance):
     x, v, z = y
     _, belt_velocity, belt_acceleration = force
     rate, rate_v, rate_z, drag, by_v, by_z = contact_force(scene, v, z, 1.0 if v >= 0.0 else -1.0, mode.region)
-    _, speed, deflection, _ = hooks.stiff_scales(scene, _IMPLICIT * tolerance, y)
+    _, speed, deflection, _ = implicit.error_scales(scene, _IMPLICIT * tolerance, y)
     swing = scene.stiffness / scene.mass
     terms = swing * abs(x) + abs(drag) / scene.mass + abs(belt_acceleration)
     allowed = speed / s + (abs(by_v) * speed + abs(by_z) * deflection) / scene.mass + _ROUNDING * terms

@@ -6,13 +6,13 @@ for implicit steps; z is the deflection of the bristles.
 
 from __future__ import annotations
 
-from math import isfinite, sqrt
+from math import sqrt
 from typing import NamedTuple
 
-from ringsweep import hooks
 from ringsweep.compile import inlined
-from ringsweep.models.belt.record import begin, conclude, observe
-from ringsweep.models.interface.status import BROKEN, RUNNING
+from ringsweep.models.belt.record import conclude, observe
+from ringsweep.models.interface import constant_step, implicit, modes, recorder
+from ringsweep.models.interface.status import RUNNING
 from ringsweep.models.parts import largest_eigenvalue
 from ringsweep.physics import drives
 from ringsweep.physics.belt import BristleBelt
@@ -46,9 +46,6 @@ def _play(scene):
     return 2.0 * scene.mu_s / scene.law.sigma0
 
 
-# ---- constant step ---------------------------------------------------------------------------
-
-
 class Inspection(NamedTuple):
     """A state of the belt seen from within; ``eigenvalue`` is the largest magnitude of one of the contact, 1/s."""
 
@@ -58,13 +55,13 @@ class Inspection(NamedTuple):
     stuck: bool
 
 
-@hooks.launch.implements(BristleBelt)
-def _launch(scene):
+@constant_step.initial_state.implements(BristleBelt)
+def _initial_state_in_space(scene):
     velocity = scene.initial_v + drives.turn(scene.drive, 0.0)[1]
     return scene.initial_x, velocity, made(scene.law, scene.mu_s, scene.mu_k)
 
 
-@hooks.rates.implements(BristleBelt)
+@constant_step.rates.implements(BristleBelt)
 def _rates(scene, now, y, drive_at, drive_rate):
     v = y[1] - drive_rate
     sign = 1.0 if v >= 0.0 else -1.0
@@ -72,7 +69,7 @@ def _rates(scene, now, y, drive_at, drive_rate):
     return y[1], -(scene.stiffness * y[0] + force) / scene.mass, rate
 
 
-@hooks.inspect.implements(BristleBelt)
+@constant_step.inspect.implements(BristleBelt)
 def _inspect(scene, y, drive_at, drive_rate):
     v = y[1] - drive_rate
     sign = 1.0 if v >= 0.0 else -1.0
@@ -84,39 +81,32 @@ def _inspect(scene, y, drive_at, drive_rate):
     return Inspection(rates, force, eigenvalue, region == BAND)
 
 
-@hooks.verdict.implements(BristleBelt)
-def _verdict(scene, before, now):
-    x, velocity, z = now.rates
-    return (RUNNING if isfinite(x) and isfinite(velocity) and isfinite(z) else BROKEN), 1.0
-
-
-@hooks.stiffness.implements(BristleBelt)
+@constant_step.stiffness.implements(BristleBelt)
 def _stiffness(scene, before, now, h):
     return max(before.eigenvalue, now.eigenvalue) * h
 
 
-@hooks.begin.implements(BristleBelt)
-def _begin(scene, y, now):
-    return begin(scene, 0.0, y[0], y[1], now.force)
+@constant_step.sticks.implements(BristleBelt)
+def _sticks(scene, before, now):
+    return before.stuck
 
 
-@hooks.observe.implements(BristleBelt)
-def _observe(scene, record, y, before, now, t, h):
-    return observe(record, scene, t, h, y[0], y[1], now.force, before.stuck, _play(scene))
+@recorder.observe.implements(BristleBelt)
+def _observe(scene, record, t, duration, stuck, seen):
+    x, velocity, force = seen
+    return observe(record, scene, t, duration, x, velocity, force, stuck, _play(scene))
 
 
-@hooks.conclude.implements(BristleBelt)
-def _conclude(scene, record, status, t, y):
-    return conclude(record, scene, status, t, y[0], y[1], crawl(scene.law, _recoil(scene)))
+@recorder.conclude.implements(BristleBelt)
+def _conclude(scene, record, status, t, place, velocity):
+    return conclude(record, scene, status, t, place, velocity, crawl(scene.law, _recoil(scene)))
 
 
-@hooks.describe.implements(BristleBelt)
-def _describe(scene, y, drive_at, drive_rate):
-    now = hooks.inspect(scene, y, drive_at, drive_rate)
+@constant_step.row.implements(BristleBelt)
+def _row(scene, y, drive_at, drive_rate):
+    now = constant_step.inspect(scene, y, drive_at, drive_rate)
     return y[0], y[1], now.force, y[2], 0.0 if now.stuck else 1.0 if y[1] > drive_rate else -1.0
 
-
-# ---- implicit steps --------------------------------------------------------------------------
 
 # Guards.
 SLOW, FAST = range(2)
@@ -129,19 +119,14 @@ class Mode(NamedTuple):
     region: int
 
 
-@hooks.onward.implements(Mode)
-def _onward(mode):
-    return mode
-
-
-@hooks.embark.implements(BristleBelt)
-def _embark(scene):
+@modes.initial_state.implements(BristleBelt)
+def _initial_state(scene):
     z = made(scene.law, scene.mu_s, scene.mu_k)
     return drives.beginning(scene.drive), (scene.initial_x, drives.launched(scene.drive, scene.initial_v), z)
 
 
-@hooks.enter.implements(BristleBelt)
-def _enter(scene, t, y):
+@modes.initial_mode.implements(BristleBelt)
+def _initial_mode(scene, t, y):
     x, v, z = y
     sign = 1 if v > 0.0 else -1
     if v == 0.0:
@@ -152,7 +137,7 @@ def _enter(scene, t, y):
     return RUNNING, Mode(sign, _region(scene, v, z, float(sign)))
 
 
-@hooks.switch.implements(BristleBelt)
+@modes.switch.implements(BristleBelt)
 def _switch(scene, mode, guard, t, y):
     x, v, z = y
     if guard == SLOW:
@@ -161,14 +146,14 @@ def _switch(scene, mode, guard, t, y):
     return RUNNING, Mode(mode.sign, region), (x, v, z)
 
 
-@hooks.stiff_rates.implements(BristleBelt)
-def _stiff_rates(scene, mode, force, x):
+@implicit.rates.implements(BristleBelt)
+def _implicit_rates(scene, mode, force, x):
     _, belt_velocity, belt_acceleration = force
     rate, _, _, drag, _, _ = contact_force(scene, x[1], x[2], float(mode.sign), mode.region)
     return x[1] + belt_velocity, -(scene.stiffness * x[0] + drag) / scene.mass - belt_acceleration, rate
 
 
-@hooks.linearise.implements(BristleBelt)
+@implicit.linearise.implements(BristleBelt)
 def _linearise(scene, mode, t, x):
     _, belt_velocity, belt_acceleration = drives.turn(scene.drive, t)
     rate, rate_v, rate_z, drag, by_v, by_z = contact_force(scene, x[1], x[2], float(mode.sign), mode.region)
@@ -180,8 +165,8 @@ def _linearise(scene, mode, t, x):
     )
 
 
-@hooks.stiff_scales.implements(BristleBelt)
-def _stiff_scales(scene, tolerance, x):
+@implicit.error_scales.implements(BristleBelt)
+def _error_scales(scene, tolerance, x):
     deflection = scene.mu_s / scene.law.sigma0
     return (
         tolerance * (abs(x[0]) + deflection),
@@ -191,8 +176,8 @@ def _stiff_scales(scene, tolerance, x):
     )
 
 
-@hooks.stiff_view.implements(BristleBelt)
-def _stiff_view(scene, mode, t, x):
+@implicit.guards_and_motion.implements(BristleBelt)
+def _guards_and_motion(scene, mode, t, x):
     _, belt_velocity, _ = drives.turn(scene.drive, t)
     sign = float(mode.sign)
     _, _, _, force, _, _ = contact_force(scene, x[1], x[2], sign, mode.region)
@@ -200,26 +185,7 @@ def _stiff_view(scene, mode, t, x):
     return guards, (x[0], x[1] + belt_velocity, -(scene.stiffness * x[0] + force) / scene.mass, force)
 
 
-@hooks.stiff_start.implements(BristleBelt)
-def _stiff_start(scene, mode, t, y):
-    _, (x, velocity, _, force) = hooks.stiff_view(scene, mode, t, y)
-    return begin(scene, t, x, velocity, force)
-
-
-@hooks.stiff_watch.implements(BristleBelt)
-def _stiff_watch(scene, record, mode, view, t, duration):
-    _, (x, velocity, _, force) = view
-    return observe(record, scene, t, duration, x, velocity, force, mode.region == BAND, _play(scene))
-
-
-@hooks.stiff_sample.implements(BristleBelt)
-def _stiff_sample(scene, mode, t, x):
-    _, (place, velocity, _, force) = hooks.stiff_view(scene, mode, t, x)
+@implicit.row.implements(BristleBelt)
+def _implicit_row(scene, mode, t, x):
+    _, (place, velocity, _, force) = implicit.guards_and_motion(scene, mode, t, x)
     return place, velocity, force, x[2], 0.0 if mode.region == BAND else float(mode.sign)
-
-
-@hooks.finish.implements(BristleBelt)
-def _finish(scene, record, status, t, y):
-    return conclude(
-        record, scene, status, t, y[0], y[1] + drives.turn(scene.drive, t)[1], crawl(scene.law, _recoil(scene))
-    )

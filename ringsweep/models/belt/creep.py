@@ -2,38 +2,46 @@
 
 from __future__ import annotations
 
-from ringsweep import hooks
 from ringsweep.models.belt.force import friction_force, length_scale
-from ringsweep.models.belt.record import observe
+from ringsweep.models.interface import implicit
 from ringsweep.physics import belt, drives
 from ringsweep.physics.friction.velocity import (
     stiction_band,
 )
 
-# ---- creep in the stiction band --------------------------------------------------------------
+
+# The place relative to the drive, so that nothing large cancels in a creep.
+@implicit.to_implicit.implements(belt.Belt)
+def _to_implicit(scene, force, y):
+    return y[0] - force[0], y[1]
 
 
-@hooks.is_stiff.implements(belt.Belt)
+@implicit.from_implicit.implements(belt.Belt)
+def _from_implicit(scene, force, x):
+    return x[0] + force[0], x[1]
+
+
+@implicit.is_stiff.implements(belt.Belt)
 def _is_stiff(scene, mode, y, line):
     (_, push), (_, _, _, decay), _, _ = line
     own = (scene.stiffness / scene.mass) ** 0.5
     return -decay > 50.0 * own and abs(push) < 0.01 * -decay * stiction_band(scene.law)
 
 
-@hooks.stiff_scales.implements(belt.Belt)
-def _stiff_scales(scene, tolerance, x):
+@implicit.error_scales.implements(belt.Belt)
+def _error_scales(scene, tolerance, x):
     length = length_scale(scene, abs(drives.turn(scene.drive, scene.span)[1]))
     return tolerance * length, tolerance * stiction_band(scene.law)
 
 
-@hooks.stiff_rates.implements(belt.Belt)
-def _stiff_rates(scene, mode, force, x):
+@implicit.rates.implements(belt.Belt)
+def _rates(scene, mode, force, x):
     shift, _, belt_acceleration = force
     drag, _ = friction_force(scene, x[0] + shift, x[1])
     return x[1], -(scene.stiffness * (x[0] + shift) + drag) / scene.mass - belt_acceleration
 
 
-@hooks.linearise.implements(belt.Belt)
+@implicit.linearise.implements(belt.Belt)
 def _linearise(scene, mode, t, x):
     shift, belt_velocity, belt_acceleration = drives.turn(scene.drive, t)
     drag, slope = friction_force(scene, x[0] + shift, x[1])
@@ -47,8 +55,8 @@ def _linearise(scene, mode, t, x):
     )
 
 
-@hooks.stiff_view.implements(belt.Belt)
-def _stiff_view(scene, mode, t, x):
+@implicit.guards_and_motion.implements(belt.Belt)
+def _guards_and_motion(scene, mode, t, x):
     shift, belt_velocity, _ = drives.turn(scene.drive, t)
     place = x[0] + shift
     force, _ = friction_force(scene, place, x[1])
@@ -58,19 +66,24 @@ def _stiff_view(scene, mode, t, x):
     return (speed, stiction_band(scene.law) - speed), (place, x[1] + belt_velocity, acceleration, force)
 
 
-@hooks.stiff_motion.implements(belt.Belt, belt.BristleBelt)
-def _stiff_motion(scene, t, x, line):
+@implicit.motion.implements(belt.Belt, belt.BristleBelt)
+def _motion(scene, t, x, line):
     _, belt_velocity, belt_acceleration = drives.turn(scene.drive, t)
     return x[1] + belt_velocity, line[0][1] + belt_acceleration
 
 
-@hooks.stiff_watch.implements(belt.Belt)
-def _stiff_watch(scene, record, mode, view, t, duration):
+@implicit.seen.implements(belt.Belt, belt.BristleBelt)
+def _seen(scene, view):
     _, (x, velocity, _, force) = view
-    return observe(record, scene, t, duration, x, velocity, force, True, 0.0)
+    return x, velocity, force
 
 
-@hooks.stiff_sample.implements(belt.Belt)
-def _stiff_sample(scene, mode, t, x):
-    _, (position, velocity, _, force) = hooks.stiff_view(scene, mode, t, x)
+@implicit.near_zero.implements(belt.Belt, belt.BristleBelt)
+def _near_zero(scene, motion):
+    return 0.0, 0.0
+
+
+@implicit.row.implements(belt.Belt)
+def _row(scene, mode, t, x):
+    _, (position, velocity, _, force) = implicit.guards_and_motion(scene, mode, t, x)
     return position, velocity, force, 0.0, 0.0

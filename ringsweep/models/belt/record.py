@@ -6,8 +6,11 @@ from math import isfinite, nan, sqrt
 from typing import NamedTuple
 
 from ringsweep.compile import inlined
+from ringsweep.models.interface import recorder
 from ringsweep.models.interface.status import BROKEN
 from ringsweep.physics import drives
+from ringsweep.physics.belt import Belt, BristleBelt
+from ringsweep.physics.friction.velocity import stiction_band
 from ringsweep.quantities.variables import FAILED, OSCILLATORY, RESTING, STICK_SLIP
 
 
@@ -253,3 +256,20 @@ def _swings_on(r):
     seen = r.third_swing > 0.0 and r.fourth_swing > 0.0
     before, after = (r.third_swing, r.fourth_swing) if seen else (r.first_swing, r.last_swing)
     return r.extremes >= 3 and after >= _LASTING * before and after > _ROUNDING * max(abs(r.x_min), abs(r.x_max))
+
+
+@recorder.begin.implements(Belt, BristleBelt)
+def _begin(scene, t, seen):
+    x, velocity, force = seen
+    return begin(scene, t, x, velocity, force)
+
+
+@recorder.observe.implements(Belt)
+def _observe(scene, record, t, duration, stuck, seen):
+    x, velocity, force = seen
+    return observe(record, scene, t, duration, x, velocity, force, stuck, 0.0)
+
+
+@recorder.conclude.implements(Belt)
+def _conclude(scene, record, status, t, place, velocity):
+    return conclude(record, scene, status, t, place, velocity, stiction_band(scene.law))

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from math import inf, isfinite
+from math import inf
 from typing import NamedTuple
 
-from ringsweep import hooks
 from ringsweep.models.belt.force import friction_force, holds_in_band
-from ringsweep.models.belt.record import begin, conclude, observe
-from ringsweep.models.interface.status import BROKEN, RUNNING
+from ringsweep.models.interface import constant_step
 from ringsweep.models.parts import largest_eigenvalue
 from ringsweep.physics import belt, drives
 from ringsweep.physics.friction.velocity import (
     met,
     stiction_band,
 )
-
-# ---- constant step ---------------------------------------------------------------------------
 
 
 class Inspection(NamedTuple):
@@ -28,30 +24,25 @@ class Inspection(NamedTuple):
     slope: float
 
 
-@hooks.launch.implements(belt.Belt)
-def _launch(scene):
+@constant_step.initial_state.implements(belt.Belt)
+def _initial_state(scene):
     return scene.initial_x, scene.initial_v + drives.turn(scene.drive, 0.0)[1]
 
 
-@hooks.rates.implements(belt.Belt)
+@constant_step.rates.implements(belt.Belt)
 def _rates(scene, now, y, drive_at, drive_rate):
     force, _ = friction_force(scene, y[0], y[1] - drive_rate)
     return y[1], -(scene.stiffness * y[0] + force) / scene.mass
 
 
-@hooks.inspect.implements(belt.Belt)
+@constant_step.inspect.implements(belt.Belt)
 def _inspect(scene, y, drive_at, drive_rate):
     v = y[1] - drive_rate
     force, slope = friction_force(scene, y[0], v)
     return Inspection((y[1], -(scene.stiffness * y[0] + force) / scene.mass), v, force, slope)
 
 
-@hooks.verdict.implements(belt.Belt)
-def _verdict(scene, before, now):
-    return (RUNNING if isfinite(now.rates[1]) and isfinite(now.rates[0]) else BROKEN), 1.0
-
-
-@hooks.stiffness.implements(belt.Belt)
+@constant_step.stiffness.implements(belt.Belt)
 def _stiffness(scene, before, now, h):
     # The stages reach about as far as the acceleration at the beginning takes the body in one step.
     belt_gains = (now.rates[0] - now.v) - (before.rates[0] - before.v)
@@ -70,24 +61,18 @@ def _stiffness(scene, before, now, h):
     return largest_eigenvalue(steepest / scene.mass, swing) * h
 
 
-@hooks.begin.implements(belt.Belt)
-def _begin(scene, y, now):
-    return begin(scene, 0.0, y[0], y[1], now.force)
+@constant_step.seen.implements(belt.Belt, belt.BristleBelt)
+def _seen(scene, y, now):
+    return y[0], y[1], now.force
 
 
-@hooks.observe.implements(belt.Belt)
-def _observe(scene, record, y, before, now, t, h):
-    stuck = abs(before.v) < stiction_band(scene.law) or before.v * now.v < 0.0
-    return observe(record, scene, t, h, y[0], y[1], now.force, stuck, 0.0)
+@constant_step.sticks.implements(belt.Belt)
+def _sticks(scene, before, now):
+    return abs(before.v) < stiction_band(scene.law) or before.v * now.v < 0.0
 
 
-@hooks.conclude.implements(belt.Belt)
-def _conclude(scene, record, status, t, y):
-    return conclude(record, scene, status, t, y[0], y[1], stiction_band(scene.law))
-
-
-@hooks.describe.implements(belt.Belt)
-def _describe(scene, y, drive_at, drive_rate):
+@constant_step.row.implements(belt.Belt)
+def _row(scene, y, drive_at, drive_rate):
     v = y[1] - drive_rate
     mode = 0.0 if abs(v) < stiction_band(scene.law) or v == 0.0 else 1.0 if v > 0.0 else -1.0
     return y[0], y[1], friction_force(scene, y[0], v)[0], 0.0, mode

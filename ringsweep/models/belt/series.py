@@ -7,12 +7,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ringsweep import hooks
 from ringsweep.compile import inlined
 from ringsweep.models.belt.force import _bound, holds_in_band, length_scale
-from ringsweep.models.belt.record import begin, conclude, observe
-from ringsweep.models.interface.status import BROKEN, RUNNING
-from ringsweep.numerics.series import INVERSE, ORDER, ascending, crossings, reach, slope, value, variation
+from ringsweep.models.interface import modes, series
+from ringsweep.models.interface.status import RUNNING
+from ringsweep.numerics.series import INVERSE, ORDER, crossings, reach, slope, value, variation
 from ringsweep.physics import belt, drives
 from ringsweep.physics.friction.velocity import (
     BAND,
@@ -25,8 +24,6 @@ from ringsweep.physics.friction.velocity import (
     stiction_band,
     tail_reach,
 )
-
-# ---- piecewise-smooth system -----------------------------------------------------------------
 
 # Rows of the series; the guards last.
 X, V, VELOCITY, EXCESS, BASIS, STATIC, KINETIC, FORCE, SHIFT = range(9)
@@ -46,18 +43,18 @@ class Mode(NamedTuple):
     fresh: int
 
 
-@hooks.onward.implements(Mode)
-def _onward(mode):
+@series.after_first_step.implements(Mode)
+def _after_first_step(mode):
     return Mode(mode.sign, mode.region, -1)
 
 
-@hooks.embark.implements(belt.Belt)
-def _embark(scene):
+@modes.initial_state.implements(belt.Belt)
+def _initial_state(scene):
     return drives.beginning(scene.drive), (scene.initial_x, drives.launched(scene.drive, scene.initial_v))
 
 
-@hooks.rows.implements(belt.Belt)
-def _rows(scene):
+@series.table_shape.implements(belt.Belt)
+def _table_shape(scene):
     return FAST + 1, SLOW
 
 
@@ -67,8 +64,8 @@ def _pull(scene, t, x):
     return -scene.stiffness * x - scene.mass * drives.turn(scene.drive, t)[2]
 
 
-@hooks.enter.implements(belt.Belt)
-def _enter(scene, t, y):
+@modes.initial_mode.implements(belt.Belt)
+def _initial_mode(scene, t, y):
     x, v = y
     if holds_in_band(scene.law) and abs(v) <= stiction_band(scene.law):
         return RUNNING, _settle(scene, t, x)
@@ -93,7 +90,7 @@ def _settle(scene, t, x):
     return Mode(1 if pull >= 0.0 else -1, region_at(scene.law, 0.0), fresh)
 
 
-@hooks.switch.implements(belt.Belt)
+@modes.switch.implements(belt.Belt)
 def _switch(scene, mode, guard, t, y):
     x, _ = y
     sign, region = mode.sign, mode.region
@@ -115,7 +112,7 @@ def _switch(scene, mode, guard, t, y):
     return RUNNING, _settle(scene, t, x), (x, 0.0)
 
 
-@hooks.expand.implements(belt.Belt)
+@series.expand.implements(belt.Belt)
 def _expand(scene, mode, t, y, tolerance, c):
     drives.expand(scene.drive, t, ORDER + 2, c[SHIFT])
     load = scene.mass * scene.gravity
@@ -173,57 +170,44 @@ def _expand(scene, mode, t, y, tolerance, c):
     return h if mode.sign == 0 else tail_reach(scene.law, mode.region, c[V], h)
 
 
-@hooks.start.implements(belt.Belt)
-def _start(scene, c):
-    return begin(scene, drives.beginning(scene.drive), c[X, 0], c[VELOCITY, 0], c[FORCE, 0])
-
-
-@hooks.land.implements(belt.Belt)
-def _land(scene, mode, c, t, s):
+@series.state_at.implements(belt.Belt)
+def _state_at(scene, c, s):
     return value(c[X], s), value(c[V], s)
 
 
-@hooks.drift.implements(belt.Belt)
-def _drift(scene, mode, c, s):
+@series.rates_at.implements(belt.Belt)
+def _rates_at(scene, c, s):
     return slope(c[X], s), slope(c[V], s)
 
 
-@hooks.watch.implements(belt.Belt)
-def _watch(scene, record, mode, c, t, s, work):
+@series.seen_at.implements(belt.Belt)
+def _seen_at(scene, c, s, h):
+    velocity = value(c[VELOCITY], s)
+    if abs(velocity) <= 1e-15 * (abs(c[VELOCITY, 0]) + variation(c[VELOCITY], h)):
+        # A maximum is met where the velocity vanishes, not where its rounding changes sign.
+        velocity = 0.0
+    return value(c[X], s), velocity, value(c[FORCE], s)
+
+
+@series.extremes.implements(belt.Belt)
+def _extremes(scene, record, mode, c, h, work):
     count = 0
-    if abs(c[VELOCITY, 0]) <= variation(c[VELOCITY], s):
-        count = crossings(c[VELOCITY], s, work, count)
+    if abs(c[VELOCITY, 0]) <= variation(c[VELOCITY], h):
+        count = crossings(c[VELOCITY], h, work, count)
     if mode.sign != 0:
         # Extremes of the velocity are zeros of the net force.
         for k in range(ORDER + 1):
             c[SHIFT, k] = scene.stiffness * c[X, k] + c[FORCE, k]
-        count = crossings(c[SHIFT], s, work, count)
-    ascending(work[0], count)
-    before = 0.0
-    stuck = mode.sign == 0 or mode.region == BAND
-    for j in range(count + 1):
-        now = work[0, j] if j < count else s
-        velocity = value(c[VELOCITY], now)
-        if abs(velocity) <= 1e-15 * (abs(c[VELOCITY, 0]) + variation(c[VELOCITY], s)):
-            # A maximum is met where the velocity vanishes, not where its rounding changes sign.
-            velocity = 0.0
-        x, force = value(c[X], now), value(c[FORCE], now)
-        record = observe(record, scene, t + now, now - before, x, velocity, force, stuck, 0.0)
-        before = now
-    return record
+        count = crossings(c[SHIFT], h, work, count)
+    return count
 
 
-@hooks.sample.implements(belt.Belt)
-def _sample(scene, mode, c, t, s):
+@series.row.implements(belt.Belt)
+def _row(scene, mode, c, t, s):
     mode_now = 0.0 if mode.region == BAND else float(mode.sign)
     return value(c[X], s), value(c[VELOCITY], s), value(c[FORCE], s), 0.0, mode_now
 
 
-@hooks.impasse.implements(belt.Belt, belt.BristleBelt)
-def _impasse(scene, mode, t, y):
-    return BROKEN
-
-
-@hooks.finish.implements(belt.Belt)
-def _finish(scene, record, status, t, y):
-    return conclude(record, scene, status, t, y[0], y[1] + drives.turn(scene.drive, t)[1], stiction_band(scene.law))
+@modes.in_space.implements(belt.Belt, belt.BristleBelt)
+def _in_space(scene, t, y):
+    return y[0], y[1] + drives.turn(scene.drive, t)[1]

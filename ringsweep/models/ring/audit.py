@@ -10,9 +10,9 @@ from math import cos, inf, sin
 
 import numpy as np
 
-from ringsweep import hooks
 from ringsweep.compile import inlined, take
-from ringsweep.models.ring import record as regimes
+from ringsweep.models.interface import audit, implicit
+from ringsweep.models.ring.record import Outcome
 from ringsweep.models.ring.series import coefficients_under
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction import SET_VALUED
@@ -62,7 +62,7 @@ def _worst(a, b):
     return max(a, b) if b < inf else inf
 
 
-@hooks.breach.implements(ring.Ring)
+@audit.violation.implements(ring.Ring)
 def _breach(scene, mode, force, y, rates, s, tolerance):
     body = scene.body
     phi, v = y
@@ -101,12 +101,12 @@ def _breach(scene, mode, force, y, rates, s, tolerance):
     return worst, ring.friction_power(body, K1, K2, normal_1, normal_2, omega)
 
 
-@hooks.energy.implements(ring.Ring)
+@audit.energy.implements(ring.Ring)
 def _energy(scene, force, y):
     return ring.energy(scene.body, cos(y[0]), y[1] / scene.body.radius + force[1])
 
 
-@hooks.breach.implements(ring.BristleRing)
+@audit.violation.implements(ring.BristleRing)
 def _bristle_breach(scene, mode, force, y, rates, s, tolerance):
     body = scene.body
     rho, v, z_1, z_2 = y
@@ -124,7 +124,7 @@ def _bristle_breach(scene, mode, force, y, rates, s, tolerance):
     if not (determinant > 0.0 and inertia > 0.0):
         worst = inf
     terms = body.gravity + body.radius * (omega * omega + abs(ring_epsilon))
-    _, speed, deflection, _, _ = hooks.stiff_scales(scene, _LOADS * tolerance, y)
+    _, speed, deflection, _, _ = implicit.error_scales(scene, _LOADS * tolerance, y)
     by_v = ring.acceleration_slope(body, -pull_1, -pull_2, -v_1, -v_2, sin_phi, cos_phi, omega)
     by_1 = ring.acceleration_slope(body, -pull_1, -pull_2, -stretch_1, 0.0, sin_phi, cos_phi, omega)
     by_2 = ring.acceleration_slope(body, -pull_1, -pull_2, 0.0, -stretch_2, sin_phi, cos_phi, omega)
@@ -139,7 +139,7 @@ def _bristle_breach(scene, mode, force, y, rates, s, tolerance):
     return worst, ring.friction_power(body, -pull_1, -pull_2, normal_1, normal_2, omega)
 
 
-@hooks.energy.implements(ring.BristleRing)
+@audit.energy.implements(ring.BristleRing)
 def _bristle_energy(scene, force, y):
     return ring.energy(scene.body, cos(y[0] + force[0]), y[1] / scene.body.radius + force[1])
 
@@ -154,11 +154,11 @@ _AT_LAUNCH = 1e-13
 _SINKS = 5.0
 
 
-@hooks.undecided.implements(ring.Ring, ring.BristleRing)
+@audit.undecided.implements(ring.Ring, ring.BristleRing)
 def _undecided(batch, rows, witness, fall):
     # Of what is not a number every comparison is false.
     with np.errstate(invalid="ignore", over="ignore"):
-        return _hangs(batch, regimes.Outcome(*rows.T), regimes.Outcome(*witness.T), fall) | _rests_on_edge(batch)
+        return _hangs(batch, Outcome(*rows.T), Outcome(*witness.T), fall) | _rests_on_edge(batch)
 
 
 def _rests_on_edge(batch):

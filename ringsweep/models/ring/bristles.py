@@ -11,11 +11,11 @@ from __future__ import annotations
 from math import cos, isnan, sin, sqrt
 from typing import NamedTuple
 
-from ringsweep import hooks
 from ringsweep.compile import inlined
+from ringsweep.models.interface import constant_step, implicit, modes
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
 from ringsweep.models.parts import largest_eigenvalue
-from ringsweep.models.ring import record as regimes
+from ringsweep.models.ring.creep import FAST, INERTIA, NORMAL_1, NORMAL_2, SLOW
 from ringsweep.models.ring.record import ENDS
 from ringsweep.models.ring.series import AT_ONCE, NEARLY_JAMMED, coefficients_under
 from ringsweep.physics import contact, drives, ring
@@ -80,9 +80,6 @@ def _launched(scene):
     return steady(scene.law, mu_s1, mu_k1, v), steady(scene.law, mu_s2, mu_k2, v)
 
 
-# ---- constant step ---------------------------------------------------------------------------
-
-
 class Inspection(NamedTuple):
     """A state of the ring seen from within; ``eigenvalue`` is about the largest magnitude of one, 1/s."""
 
@@ -97,13 +94,13 @@ class Inspection(NamedTuple):
     stuck: bool
 
 
-@hooks.launch.implements(BristleRing)
-def _launch(scene):
+@constant_step.initial_state.implements(BristleRing)
+def _initial_state_in_space(scene):
     z_1, z_2 = _launched(scene)
     return scene.initial_phi, scene.initial_omega, z_1, z_2
 
 
-@hooks.rates.implements(BristleRing)
+@constant_step.rates.implements(BristleRing)
 def _rates(scene, now, y, drive_at, drive_rate):
     phi, omega, z_1, z_2 = y
     v = (omega - drive_rate) * scene.body.radius
@@ -113,7 +110,7 @@ def _rates(scene, now, y, drive_at, drive_rate):
     return omega, epsilon, now.rates[0], now.rates[1]
 
 
-@hooks.inspect.implements(BristleRing)
+@constant_step.inspect.implements(BristleRing)
 def _inspect(scene, y, drive_at, drive_rate):
     phi, omega, z_1, z_2 = y
     b = scene.body
@@ -148,32 +145,25 @@ def _by_contacts(scene, now, sin_phi, cos_phi, omega):
     return b.radius * by_v, b.radius * by_1, b.radius * by_2
 
 
-@hooks.stiffness.implements(BristleRing)
+@constant_step.stiffness.implements(BristleRing)
 def _stiffness(scene, before, now, h):
     return max(before.eigenvalue, now.eigenvalue) * h
 
 
-@hooks.observe.implements(BristleRing)
-def _observe(scene, record, y, before, now, t, h):
-    stuck_for = h if before.stuck else 0.0
-    return regimes.observe(record, y[0], y[1], now.normal_1, now.normal_2, stuck_for, scene.epsilon_omega)
+@constant_step.sticks.implements(BristleRing)
+def _sticks(scene, before, now):
+    return before.stuck
 
 
-@hooks.describe.implements(BristleRing)
-def _describe(scene, y, drive_at, drive_rate):
-    now = hooks.inspect(scene, y, drive_at, drive_rate)
+@constant_step.row.implements(BristleRing)
+def _row(scene, y, drive_at, drive_rate):
+    now = constant_step.inspect(scene, y, drive_at, drive_rate)
     mode = 0.0 if now.stuck else 1.0 if now.v > 0.0 else -1.0
     offset = ring.contact_offset(scene.body)
     rho = y[0] - drive_at
     _, _, zone_1 = coefficients(scene.surface, segment(scene.surface, rho - offset))
     _, _, zone_2 = coefficients(scene.surface, segment(scene.surface, rho + offset))
     return y[0], y[1], now.rates[1], now.normal_1, now.normal_2, drive_rate, zone_1, zone_2, mode, y[2], y[3]
-
-
-# ---- implicit steps --------------------------------------------------------------------------
-
-# Guards.
-INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(6)
 
 
 class Mode(NamedTuple):
@@ -185,21 +175,16 @@ class Mode(NamedTuple):
     place_2: tuple[int, int]
 
 
-@hooks.onward.implements(Mode)
-def _onward(mode):
-    return mode
-
-
-@hooks.embark.implements(BristleRing)
-def _embark(scene):
+@modes.initial_state.implements(BristleRing)
+def _initial_state(scene):
     t = drives.beginning(scene.drive)
     v = drives.launched(scene.drive, ring.launch_velocity(scene)) * scene.body.radius
     z_1, z_2 = _launched(scene)
     return t, (scene.initial_phi - drives.turn(scene.drive, t)[0], v, z_1, z_2)
 
 
-@hooks.enter.implements(BristleRing)
-def _enter(scene, t, y):
+@modes.initial_mode.implements(BristleRing)
+def _initial_mode(scene, t, y):
     rho, v, z_1, z_2 = y
     offset = ring.contact_offset(scene.body)
     place_1, place_2 = locate(scene.surface, rho - offset), locate(scene.surface, rho + offset)
@@ -251,14 +236,14 @@ def _lose(scene, mode, guard, t, y):
     return ENDS[contact.lost(body, guard == NORMAL_1 or normal_1 <= least, guard == NORMAL_2 or normal_2 <= least)]
 
 
-@hooks.impasse.implements(BristleRing)
-def _impasse(scene, mode, t, y):
+@modes.status_without_way_on.implements(BristleRing)
+def _status_without_way_on(scene, mode, t, y):
     K1, K2, sin_phi, cos_phi, omega = _sliding_at(scene, mode, t, y)
     _, D, inertia = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
     return BROKEN if D > 0.0 and inertia > NEARLY_JAMMED * ring.about_axis(scene.body) * D else JAM
 
 
-@hooks.switch.implements(BristleRing)
+@modes.switch.implements(BristleRing)
 def _switch(scene, mode, guard, t, y):
     rho, _, z_1, z_2 = y
     sign, place_1, place_2 = mode.sign, mode.place_1, mode.place_2
@@ -281,8 +266,8 @@ def _switch(scene, mode, guard, t, y):
     return _after_jump(scene, mode, t, y), mode, y
 
 
-@hooks.stiff_rates.implements(BristleRing)
-def _stiff_rates(scene, mode, force, x):
+@implicit.rates.implements(BristleRing)
+def _implicit_rates(scene, mode, force, x):
     rho, v, z_1, z_2 = x
     radius = scene.body.radius
     theta, ring_omega, ring_epsilon = force
@@ -292,7 +277,7 @@ def _stiff_rates(scene, mode, force, x):
     return v / radius, radius * (epsilon - ring_epsilon), now.rates[0], now.rates[1]
 
 
-@hooks.linearise.implements(BristleRing)
+@implicit.linearise.implements(BristleRing)
 def _linearise(scene, mode, t, x):
     rho, v, z_1, z_2 = x
     b = scene.body
@@ -316,8 +301,8 @@ def _linearise(scene, mode, t, x):
     )
 
 
-@hooks.stiff_scales.implements(BristleRing)
-def _stiff_scales(scene, tolerance, x):
+@implicit.error_scales.implements(BristleRing)
+def _error_scales(scene, tolerance, x):
     mu, _ = roughest(scene.surface)
     deflection = mu / scene.law.sigma0
     # Without weight the load is that of turning at about 1 rad/s.
@@ -326,8 +311,8 @@ def _stiff_scales(scene, tolerance, x):
     return tolerance, tolerance * speed, tolerance * deflection, tolerance * deflection, tolerance * mu * load
 
 
-@hooks.stiff_view.implements(BristleRing)
-def _stiff_view(scene, mode, t, x):
+@implicit.guards_and_motion.implements(BristleRing)
+def _guards_and_motion(scene, mode, t, x):
     rho, v, z_1, z_2 = x
     b = scene.body
     theta, ring_omega, _ = drives.turn(scene.drive, t)
@@ -352,29 +337,16 @@ def _stiff_view(scene, mode, t, x):
     return guards, (phi, omega, epsilon, ring_omega)
 
 
-@hooks.stiff_start.implements(BristleRing)
-def _stiff_start(scene, mode, t, y):
-    guards, (phi, omega, _, _) = hooks.stiff_view(scene, mode, t, y)
-    return regimes.begin(phi, omega, guards[NORMAL_1], guards[NORMAL_2], scene.epsilon_omega)
-
-
-@hooks.stiff_watch.implements(BristleRing)
-def _stiff_watch(scene, record, mode, view, t, duration):
-    guards, (phi, omega, _, _) = view
-    stuck_for = duration if mode.region == BAND else 0.0
-    return regimes.observe(record, phi, omega, guards[NORMAL_1], guards[NORMAL_2], stuck_for, scene.epsilon_omega)
-
-
-@hooks.stiff_sample.implements(BristleRing)
-def _stiff_sample(scene, mode, t, x):
-    guards, (phi, omega, epsilon, ring_omega) = hooks.stiff_view(scene, mode, t, x)
+@implicit.row.implements(BristleRing)
+def _implicit_row(scene, mode, t, x):
+    guards, (phi, omega, epsilon, ring_omega) = implicit.guards_and_motion(scene, mode, t, x)
     _, _, zone_1 = coefficients(scene.surface, mode.place_1[0])
     _, _, zone_2 = coefficients(scene.surface, mode.place_2[0])
     state = 0.0 if mode.region == BAND else float(mode.sign)
     return phi, omega, epsilon, guards[NORMAL_1], guards[NORMAL_2], ring_omega, zone_1, zone_2, state, x[2], x[3]
 
 
-@hooks.finish.implements(BristleRing)
-def _finish(scene, record, status, t, y):
+@modes.in_space.implements(BristleRing)
+def _in_space(scene, t, y):
     theta, ring_omega, _ = drives.turn(scene.drive, t)
-    return regimes.conclude(record, status, t, y[0] + theta, y[1] / scene.body.radius + ring_omega)
+    return y[0] + theta, y[1] / scene.body.radius + ring_omega

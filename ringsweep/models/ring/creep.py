@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from math import cos, sin, sqrt
 
-from ringsweep import hooks
 from ringsweep.compile import inlined
-from ringsweep.models.ring import record as regimes
+from ringsweep.models.interface import implicit
 from ringsweep.models.ring.series import coefficients_under
 from ringsweep.physics import drives, ring
 from ringsweep.physics.friction.velocity import stiction_band, weights_in
 from ringsweep.physics.zones import coefficients, edge_ahead
+
+#: Guards, in the order of the rows of the series.
+INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(6)
 
 
 @inlined
@@ -32,7 +34,18 @@ def _friction(scene, mode, v):
     )
 
 
-@hooks.is_stiff.implements(ring.Ring)
+# The place relative to the drive, so that nothing large cancels in a creep.
+@implicit.to_implicit.implements(ring.Ring)
+def _to_implicit(scene, force, y):
+    return y[0] - force[0], y[1]
+
+
+@implicit.from_implicit.implements(ring.Ring)
+def _from_implicit(scene, force, x):
+    return x[0] + force[0], x[1]
+
+
+@implicit.is_stiff.implements(ring.Ring)
 def _is_stiff(scene, mode, y, line):
     (_, push), (_, _, _, decay), _, _ = line
     # Fast against the body's own motion, and settled: what is left of the way in, and the way out
@@ -41,13 +54,13 @@ def _is_stiff(scene, mode, y, line):
     return -decay > 50.0 * own and abs(push) < 0.01 * -decay * stiction_band(scene.law)
 
 
-@hooks.stiff_scales.implements(ring.Ring)
-def _stiff_scales(scene, tolerance, x):
+@implicit.error_scales.implements(ring.Ring)
+def _error_scales(scene, tolerance, x):
     return tolerance, tolerance * stiction_band(scene.law) * ring.support(scene.body)
 
 
-@hooks.stiff_rates.implements(ring.Ring)
-def _stiff_rates(scene, mode, force, x):
+@implicit.rates.implements(ring.Ring)
+def _rates(scene, mode, force, x):
     radius = scene.body.radius
     theta, ring_omega, ring_epsilon = force
     phi, omega = x[0] + theta, x[1] / radius + ring_omega
@@ -56,7 +69,7 @@ def _stiff_rates(scene, mode, force, x):
     return x[1] / radius, radius * (epsilon - ring_epsilon)
 
 
-@hooks.linearise.implements(ring.Ring)
+@implicit.linearise.implements(ring.Ring)
 def _linearise(scene, mode, t, x):
     b = scene.body
     radius = b.radius
@@ -79,8 +92,8 @@ def _linearise(scene, mode, t, x):
     )
 
 
-@hooks.stiff_view.implements(ring.Ring)
-def _stiff_view(scene, mode, t, x):
+@implicit.guards_and_motion.implements(ring.Ring)
+def _guards_and_motion(scene, mode, t, x):
     theta, ring_omega, _ = drives.turn(scene.drive, t)
     phi, omega = x[0] + theta, x[1] / scene.body.radius + ring_omega
     K1, K2, _, _ = _friction(scene, mode, x[1])
@@ -91,7 +104,6 @@ def _stiff_view(scene, mode, t, x):
     ahead_1 = mode.sign * (edge_ahead(scene.surface, mode.place_1, mode.sign) - (x[0] - offset))
     ahead_2 = mode.sign * (edge_ahead(scene.surface, mode.place_2, mode.sign) - (x[0] + offset))
     speed = mode.sign * x[1]
-    # In the order of the rows of the series: INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST.
     guards = (
         min(determinant, inertia),
         speed,
@@ -103,8 +115,8 @@ def _stiff_view(scene, mode, t, x):
     return guards, (phi, omega, epsilon, ring_omega)
 
 
-@hooks.stiff_near.implements(ring.Ring, ring.BristleRing)
-def _stiff_near(scene, motion):
+@implicit.near_zero.implements(ring.Ring, ring.BristleRing)
+def _near_zero(scene, motion):
     b = scene.body
     _, omega, _, _ = motion
     load = 0.05 * b.mass * (b.gravity + b.radius * omega * omega)
@@ -112,21 +124,21 @@ def _stiff_near(scene, motion):
     return inertia, 0.0, load, load, 0.0, 0.0
 
 
-@hooks.stiff_motion.implements(ring.Ring, ring.BristleRing)
-def _stiff_motion(scene, t, x, line):
+@implicit.motion.implements(ring.Ring, ring.BristleRing)
+def _motion(scene, t, x, line):
     _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     return x[1] / scene.body.radius + ring_omega, line[0][1] / scene.body.radius + ring_epsilon
 
 
-@hooks.stiff_watch.implements(ring.Ring)
-def _stiff_watch(scene, record, mode, view, t, duration):
+@implicit.seen.implements(ring.Ring, ring.BristleRing)
+def _seen(scene, view):
     guards, (phi, omega, _, _) = view
-    return regimes.observe(record, phi, omega, guards[2], guards[3], duration, scene.epsilon_omega)
+    return phi, omega, guards[NORMAL_1], guards[NORMAL_2]
 
 
-@hooks.stiff_sample.implements(ring.Ring)
-def _stiff_sample(scene, mode, t, x):
-    guards, (phi, omega, epsilon, ring_omega) = hooks.stiff_view(scene, mode, t, x)
+@implicit.row.implements(ring.Ring)
+def _row(scene, mode, t, x):
+    guards, (phi, omega, epsilon, ring_omega) = implicit.guards_and_motion(scene, mode, t, x)
     _, _, zone_1 = coefficients(scene.surface, mode.place_1[0])
     _, _, zone_2 = coefficients(scene.surface, mode.place_2[0])
-    return phi, omega, epsilon, guards[2], guards[3], ring_omega, zone_1, zone_2, 0.0
+    return phi, omega, epsilon, guards[NORMAL_1], guards[NORMAL_2], ring_omega, zone_1, zone_2, 0.0

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ringsweep.models.parts import GRAVITY, MASS, SPAN, drive_of, law_of, pair
-from ringsweep.models.ring import record as regimes
+from ringsweep.models.ring import record
 from ringsweep.models.scene import Structure, Values, require
 from ringsweep.physics import drives, friction, ring, zones
 from ringsweep.quantities.parameters import Parameter, declared
@@ -22,7 +22,7 @@ class SingleContactRing:
 
     name: ClassVar[str] = "ring-single-contact"
     doc: ClassVar[str] = "a small body in a rotating ring, one contact"
-    outcomes: ClassVar[tuple[str, ...]] = regimes.Outcome._fields
+    outcomes: ClassVar[tuple[str, ...]] = record.Outcome._fields
     laws: ClassVar[dict[str, type]] = {
         name: law for name, law in friction.LAWS.items() if name not in ("karnopp", "reset-integrator", "bristle")
     }

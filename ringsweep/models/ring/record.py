@@ -8,9 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ringsweep.compile import inlined
+from ringsweep.models.interface import recorder
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2, SEPARATED_BOTH
 from ringsweep.numerics.functions import any_of, select
 from ringsweep.physics import contact
+from ringsweep.physics.ring import BristleRing, Ring
 from ringsweep.quantities.variables import FAILED, JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 
 #: How a run goes on or ended, by the mode of :mod:`ringsweep.physics.contact`.
@@ -141,3 +143,20 @@ def conclude(record, status, t, phi, omega):
         0.0 if status in (SEPARATED_1, SEPARATED_BOTH) else max(r.normal_min_1, 0.0),
         0.0 if status in (SEPARATED_2, SEPARATED_BOTH) else max(r.normal_min_2, 0.0),
     )
+
+
+@recorder.begin.implements(Ring, BristleRing)
+def _begin(scene, t, seen):
+    phi, omega, normal_1, normal_2 = seen
+    return begin(phi, omega, normal_1, normal_2, scene.epsilon_omega)
+
+
+@recorder.observe.implements(Ring, BristleRing)
+def _observe(scene, record, t, duration, stuck, seen):
+    phi, omega, normal_1, normal_2 = seen
+    return observe(record, phi, omega, normal_1, normal_2, select(stuck, duration, 0.0), scene.epsilon_omega)
+
+
+@recorder.conclude.implements(Ring, BristleRing)
+def _conclude(scene, record, status, t, place, velocity):
+    return conclude(record, status, t, place, velocity)

@@ -5,11 +5,10 @@ from __future__ import annotations
 from math import inf, isfinite, isnan
 from typing import NamedTuple
 
-from ringsweep import hooks
 from ringsweep.compile import inlined
+from ringsweep.models.interface import constant_step
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
 from ringsweep.models.parts import largest_eigenvalue
-from ringsweep.models.ring import record as regimes
 from ringsweep.models.ring.record import ENDS
 from ringsweep.numerics.functions import any_of, select, sine_cosine, sine_cosine_near
 from ringsweep.numerics.memory import Several
@@ -39,17 +38,17 @@ class Inspection(NamedTuple):
     omega: float
 
 
-@hooks.lanes.implements(ring.Ring)
+@constant_step.side_by_side.implements(ring.Ring)
 def _lanes(scene):
     return Several()
 
 
-@hooks.launch.implements(ring.Ring)
+@constant_step.initial_state.implements(ring.Ring)
 def _launch(scene):
     return scene.initial_phi, scene.initial_omega
 
 
-@hooks.rates.implements(ring.Ring)
+@constant_step.rates.implements(ring.Ring)
 def _rates(scene, now, y, drive_at, drive_rate):
     phi, omega = y
     _, K1, K2, _, _ = ring.friction(scene, phi, omega, drive_at, drive_rate)
@@ -57,7 +56,7 @@ def _rates(scene, now, y, drive_at, drive_rate):
     return omega, ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)[0]
 
 
-@hooks.inspect.implements(ring.Ring)
+@constant_step.inspect.implements(ring.Ring)
 def _inspect(scene, y, drive_at, drive_rate):
     phi, omega = y
     v, K1, K2, slope_1, slope_2 = ring.friction(scene, phi, omega, drive_at, drive_rate)
@@ -71,14 +70,14 @@ def _inspect(scene, y, drive_at, drive_rate):
     )
 
 
-@hooks.holds.implements(ring.Ring, ring.BristleRing)
+@constant_step.holds.implements(ring.Ring, ring.BristleRing)
 def _holds(scene, now):
     # Of a NaN every comparison is false.
     supported = (now.D > 0.0) & (now.inertia > 0.0) & (now.normal_1 > 0.0) & (now.normal_2 > 0.0)
     return supported & (abs(now.rates[1]) < inf) & (abs(now.omega) < inf)
 
 
-@hooks.verdict.implements(ring.Ring, ring.BristleRing)
+@constant_step.verdict.implements(ring.Ring, ring.BristleRing)
 def _verdict(scene, before, now):
     if not (now.D > 0.0 and now.inertia > 0.0):
         return (BROKEN if isnan(now.inertia) else JAM), 1.0
@@ -99,7 +98,7 @@ def _zero(before, now):
     return before / (before - now) if before > now else 0.0
 
 
-@hooks.stiffness.implements(ring.Ring)
+@constant_step.stiffness.implements(ring.Ring)
 def _stiffness(scene, before, now, h):
     # The stages reach about as far as the acceleration at the beginning takes the body in one step.
     radius = scene.body.radius
@@ -127,46 +126,39 @@ def _steeper(a, b):
     return select(abs(b) > abs(a), b, a)
 
 
-@hooks.slack.implements(ring.Ring, ring.BristleRing)
+@constant_step.margin.implements(ring.Ring, ring.BristleRing)
 def _slack(scene, before, now):
     first = min(before.normal_1, now.normal_1) - 0.25 * abs(now.normal_1 - before.normal_1)
     second = min(before.normal_2, now.normal_2) - 0.25 * abs(now.normal_2 - before.normal_2)
     return min(first, second)
 
 
-@hooks.stride.implements(ring.Ring, ring.BristleRing)
+@constant_step.arc_share.implements(ring.Ring, ring.BristleRing)
 def _stride(scene, now, h):
     return abs(now.v) * h / (scene.body.radius * zones.narrowest(scene.surface))
 
 
-@hooks.falls.implements(ring.Ring, ring.BristleRing)
+@constant_step.fall_rate.implements(ring.Ring, ring.BristleRing)
 def _falls(scene, before, now, h):
     first = before.normal_1 - now.normal_1 if now.normal_1 <= 0.0 else 0.0
     second = before.normal_2 - now.normal_2 if now.normal_2 <= 0.0 else 0.0
     return max(first, second) / h
 
 
-@hooks.begin.implements(ring.Ring, ring.BristleRing)
-def _begin(scene, y, now):
-    return regimes.begin(y[0], y[1], now.normal_1, now.normal_2, scene.epsilon_omega)
+@constant_step.seen.implements(ring.Ring, ring.BristleRing)
+def _seen(scene, y, now):
+    return y[0], y[1], now.normal_1, now.normal_2
 
 
-@hooks.observe.implements(ring.Ring)
-def _observe(scene, record, y, before, now, t, h):
+@constant_step.sticks.implements(ring.Ring)
+def _sticks(scene, before, now):
     # Whether the step lay in the stiction band or jumped across it.
-    stuck = (abs(before.v) < stiction_band(scene.law)) | (before.v * now.v < 0.0)
-    stuck_for = select(stuck, h, 0.0)
-    return regimes.observe(record, y[0], y[1], now.normal_1, now.normal_2, stuck_for, scene.epsilon_omega)
+    return (abs(before.v) < stiction_band(scene.law)) | (before.v * now.v < 0.0)
 
 
-@hooks.conclude.implements(ring.Ring, ring.BristleRing)
-def _conclude(scene, record, status, t, y):
-    return regimes.conclude(record, status, t, y[0], y[1])
-
-
-@hooks.describe.implements(ring.Ring)
+@constant_step.row.implements(ring.Ring)
 def _describe(scene, y, drive_at, drive_rate):
-    now = hooks.inspect(scene, y, drive_at, drive_rate)
+    now = constant_step.inspect(scene, y, drive_at, drive_rate)
     band = stiction_band(scene.law)
     mode = 0.0 if abs(now.v) < band or now.v == 0.0 else 1.0 if now.v > 0.0 else -1.0
     offset = ring.contact_offset(scene.body)

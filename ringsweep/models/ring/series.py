@@ -14,15 +14,13 @@ from __future__ import annotations
 from math import cos, inf, isnan, sin, sqrt
 from typing import NamedTuple
 
-from ringsweep import hooks
 from ringsweep.compile import hook, inlined
+from ringsweep.models.interface import modes, series
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
-from ringsweep.models.ring import record as regimes
 from ringsweep.models.ring.record import ENDS
 from ringsweep.numerics.series import (
     INVERSE,
     ORDER,
-    ascending,
     crossings,
     may_fall_below,
     product,
@@ -83,19 +81,19 @@ def coefficients_under(scene, mode):
     return mu_s1, mu_k1, mu_s2, mu_k2
 
 
-@hooks.embark.implements(ring.Ring)
-def _embark(scene):
+@modes.initial_state.implements(ring.Ring)
+def _initial_state(scene):
     v = drives.launched(scene.drive, ring.launch_velocity(scene)) * scene.body.radius
     return drives.beginning(scene.drive), (scene.initial_phi, v)
 
 
-@hooks.rows.implements(ring.Ring)
-def _rows(scene):
+@series.table_shape.implements(ring.Ring)
+def _table_shape(scene):
     return FAST + 1, INERTIA
 
 
-@hooks.enter.implements(ring.Ring)
-def _enter(scene, t, y):
+@modes.initial_mode.implements(ring.Ring)
+def _initial_mode(scene, t, y):
     phi, v = y
     theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     offset = ring.contact_offset(scene.body)
@@ -221,8 +219,8 @@ def _lose(scene, mode, guard, t, y):
     return ENDS[contact.lost(scene.body, lost_1, lost_2)], mode, y
 
 
-@hooks.impasse.implements(ring.Ring)
-def _impasse(scene, mode, t, y):
+@modes.status_without_way_on.implements(ring.Ring)
+def _status_without_way_on(scene, mode, t, y):
     if mode.sign == 0:
         return BROKEN
     # A sharp tail brings the singularity nearer than the inertia tells: what friction rises to may jam the body.
@@ -231,7 +229,7 @@ def _impasse(scene, mode, t, y):
     return JAM if _is_jamming(scene, mode, t, y) or not (determinant > 0.0 and inertia > 0.0) else BROKEN
 
 
-@hooks.switch.implements(ring.Ring)
+@modes.switch.implements(ring.Ring)
 def _switch(scene, mode, guard, t, y):
     phi, v = y
     sign, region, place_1, place_2 = mode.sign, mode.region, mode.place_1, mode.place_2
@@ -286,7 +284,7 @@ def _next_state(scene, c, k):
     c[V, k + 1] = scene.body.radius * (c[OMEGA, k + 1] - (k + 2.0) * c[THETA, k + 2])
 
 
-@hooks.expand.implements(ring.Ring)
+@series.expand.implements(ring.Ring)
 def _expand(scene, mode, t, y, tolerance, c):
     drives.expand(scene.drive, t, ORDER + 2, c[THETA])
     c[PHI, 0] = y[0]
@@ -523,55 +521,44 @@ def _one_hold(body, m1, m2, c):
         c[SLOW, k], c[FAST, k] = m1 * c[NORMAL_1, k] + friction, m1 * c[NORMAL_1, k] - friction
 
 
-@hooks.land.implements(ring.Ring)
-def _land(scene, mode, c, t, s):
+@series.state_at.implements(ring.Ring)
+def _state_at(scene, c, s):
     return value(c[PHI], s), value(c[V], s)
 
 
-@hooks.drift.implements(ring.Ring)
-def _drift(scene, mode, c, s):
+@series.rates_at.implements(ring.Ring)
+def _rates_at(scene, c, s):
     return slope(c[PHI], s), slope(c[V], s)
 
 
-@hooks.watch.implements(ring.Ring)
-def _watch(scene, record, mode, c, t, s, work):
-    instants = work[0]
+@series.seen_at.implements(ring.Ring)
+def _seen_at(scene, c, s, h):
+    return value(c[PHI], s), value(c[OMEGA], s), value(c[NORMAL_1], s), value(c[NORMAL_2], s)
+
+
+@series.extremes.implements(ring.Ring)
+def _extremes(scene, record, mode, c, h, work):
     count = 0
-    omega, sway, shift = c[OMEGA, 0], variation(c[OMEGA], s), variation(c[PHI], s)
+    omega, sway, shift = c[OMEGA, 0], variation(c[OMEGA], h), variation(c[PHI], h)
     turning = abs(omega) <= sway
     # An extreme is looked for where it could be a new one, or a reversal within the step.
     if turning and not (c[PHI, 0] - shift >= record.lowest and c[PHI, 0] + shift <= record.highest):
-        count = crossings(c[OMEGA], s, work, count)
+        count = crossings(c[OMEGA], h, work, count)
     if turning or omega - sway < record.omega_min or omega + sway > record.omega_max:
-        count = crossings(c[EPSILON], s, work, count)
+        count = crossings(c[EPSILON], h, work, count)
     for row, lowest in ((NORMAL_1, record.normal_min_1), (NORMAL_2, record.normal_min_2)):
-        if may_fall_below(c[row], s, lowest):
+        if may_fall_below(c[row], h, lowest):
             for k in range(ORDER):
                 c[SPARE, k] = (k + 1.0) * c[row, k + 1]
             c[SPARE, ORDER] = 0.0
-            count = crossings(c[SPARE], s, work, count)
-    ascending(instants, count)
+            count = crossings(c[SPARE], h, work, count)
     # The reactions may have jumped as the mode was entered.
-    record = regimes.observe(record, c[PHI, 0], c[OMEGA, 0], c[NORMAL_1, 0], c[NORMAL_2, 0], 0.0, scene.epsilon_omega)
-    before = 0.0
-    stuck = mode.sign == 0 or mode.region == BAND
-    for j in range(count + 1):
-        now = instants[j] if j < count else s
-        record = regimes.observe(
-            record,
-            value(c[PHI], now),
-            value(c[OMEGA], now),
-            value(c[NORMAL_1], now),
-            value(c[NORMAL_2], now),
-            now - before if stuck else 0.0,
-            scene.epsilon_omega,
-        )
-        before = now
-    return record
+    work[0, count] = 0.0
+    return count + 1
 
 
-@hooks.sample.implements(ring.Ring)
-def _sample(scene, mode, c, t, s):
+@series.row.implements(ring.Ring)
+def _row(scene, mode, c, t, s):
     _, _, zone_1 = coefficients(scene.surface, mode.place_1[0])
     _, _, zone_2 = coefficients(scene.surface, mode.place_2[0])
     return (
@@ -587,17 +574,11 @@ def _sample(scene, mode, c, t, s):
     )
 
 
-@hooks.start.implements(ring.Ring)
-def _start(scene, c):
-    return regimes.begin(c[PHI, 0], c[OMEGA, 0], c[NORMAL_1, 0], c[NORMAL_2, 0], scene.epsilon_omega)
+@modes.in_space.implements(ring.Ring)
+def _in_space(scene, t, y):
+    return y[0], y[1] / scene.body.radius + drives.turn(scene.drive, t)[1]
 
 
-@hooks.finish.implements(ring.Ring)
-def _finish(scene, record, status, t, y):
-    _, ring_omega, _ = drives.turn(scene.drive, t)
-    return regimes.conclude(record, status, t, y[0], y[1] / scene.body.radius + ring_omega)
-
-
-@hooks.onward.implements(Mode)
-def _onward(mode):
+@series.after_first_step.implements(Mode)
+def _after_first_step(mode):
     return Mode(mode.sign, mode.region, -1, mode.place_1, mode.place_2)

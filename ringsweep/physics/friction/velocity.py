@@ -15,7 +15,7 @@ from __future__ import annotations
 from math import exp, sqrt
 from typing import NamedTuple
 
-from ringsweep.compile import absorbed_hook, hook, inlined
+from ringsweep.compile import hook, inlined
 from ringsweep.numerics.functions import either
 from ringsweep.quantities.parameters import Parameter
 
@@ -50,7 +50,7 @@ def piece(law, region):
     """Weights of both coefficients in a region of the sliding speed, a :class:`Piece`."""
 
 
-@absorbed_hook
+@hook(absorb=True)
 def stiction_band(law):
     """Speed below which a contact counts as stuck, m/s: where BAND ends; 0 for laws that stick exactly or never."""
 
@@ -91,13 +91,13 @@ def constant_weights(law, region):
     return s1 == 0.0 and s2 == 0.0 and s3 == 0.0 and k1 == 0.0 and k2 == 0.0 and k3 == 0.0
 
 
-@absorbed_hook
+@hook(absorb=True)
 def blend(law, speed):
     """:func:`weights` where the speed is :mod:`ringsweep.numerics.lanes`, each in a region of its own: hence without
     ``if``."""
 
 
-@absorbed_hook
+@hook(absorb=True)
 def steepest(law):
     """Slopes of both weights at rest, and where the band ends, on its far side: there friction is steepest, s/m."""
 
