@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 from ringsweep.compile import SOURCES_DIGEST, take
 from ringsweep.config import load
 from ringsweep.errors import InputError
-from ringsweep.physics.friction import SET_VALUED, SMOOTH
+from ringsweep.physics.friction import LAWS, Dynamic, family_of
 from ringsweep.physics.friction.coulomb import Coulomb, Karnopp, Stiction, Tustin
 from ringsweep.physics.friction.regularised import BengisuAkay, PiecewiseCubic, PiecewiseLinear, Threlfall
 from ringsweep.physics.friction.velocity import (
     BAND,
-    CLEAN,
-    TAIL,
+    KINETIC,
+    STRIBECK,
     expand_weights,
     faster,
     piece,
@@ -63,7 +63,7 @@ every = st.tuples(threlfall, linear, cubic, bengisu_akay, tustin, karnopp, const
 
 def pieces(law):
     """Pieces of a law from the slowest to the fastest, by region."""
-    found = {region: piece(law, region) for region in (BAND, TAIL, CLEAN)}
+    found = {region: piece(law, region) for region in (BAND, STRIBECK, KINETIC)}
     return {region: p for region, p in found.items() if p.low < p.high}
 
 
@@ -86,7 +86,7 @@ def slope(law, speed, region=None):
 
 def test_there_is_a_test_for_every_law():
     tested = {Threlfall, PiecewiseLinear, PiecewiseCubic, BengisuAkay, Tustin, Karnopp, Coulomb, Stiction}
-    assert {*SMOOTH, *SET_VALUED} == tested
+    assert {law for law in LAWS.values() if family_of(law) is not Dynamic} == tested
 
 
 class TestRegions:
@@ -258,7 +258,7 @@ class TestPiecewiseCubic:
     def test_is_the_papers_law(self, v0, share, relative):
         v1 = v0 * (1 + share)
         law = PiecewiseCubic(v0, v1)
-        rise, fall = weights_in(law, BAND, relative * v0), weights_in(law, TAIL, v0 + relative * (v1 - v0))
+        rise, fall = weights_in(law, BAND, relative * v0), weights_in(law, STRIBECK, v0 + relative * (v1 - v0))
         step = relative**2 * (3 - 2 * relative)
         assert rise[:2] == pytest.approx((relative * (3 - relative**2) / 2, 0.0), abs=1e-14)
         assert fall[:2] == pytest.approx((1 - step, step), abs=1e-11)
@@ -307,7 +307,7 @@ class TestTustin:
     @given(powers(1.0, 1e9), powers(1e-6, 1.0), st.floats(0.0, 30.0))
     def test_is_the_tail_of_bengisu_and_akay(self, alpha, v0, x):
         one, other = made(Tustin, alpha), made(BengisuAkay, alpha, v0)
-        for a, b in zip(weights_in(one, TAIL, x / alpha), weights_in(other, TAIL, v0 + x / alpha), strict=True):
+        for a, b in zip(weights_in(one, STRIBECK, x / alpha), weights_in(other, STRIBECK, v0 + x / alpha), strict=True):
             assert a == pytest.approx(b, rel=1e-12 + 2 * alpha * np.spacing(v0 + x / alpha))
 
 
@@ -318,7 +318,7 @@ class TestTailWithoutDecay:
         assert law.end == inf
         assert weights(law, v0 * (1 + times)) == (1.0, 0.0, 0.0, 0.0)
         assert weights(made(Tustin, 0.0), times) == (1.0, 0.0, 0.0, 0.0)
-        assert CLEAN not in pieces(law)
+        assert KINETIC not in pieces(law)
 
     @given(alphas)
     def test_is_what_a_slow_one_tends_to(self, alpha):
@@ -379,8 +379,8 @@ OWN = """
 from typing import Annotated, NamedTuple
 from ringsweep.numerics.functions import select
 from ringsweep.quantities.parameters import Leaf
-from ringsweep.physics.friction import regularised
-from ringsweep.physics.friction.velocity import BAND, CLEAN, ONE, TAIL, ZERO, Piece, piece, stiction_band
+from ringsweep.physics.friction import Smooth, Traits, add_law, regularised
+from ringsweep.physics.friction.velocity import BAND, KINETIC, ONE, STRIBECK, ZERO, Piece, piece, stiction_band
 
 
 class Ramp(NamedTuple):
@@ -389,9 +389,9 @@ class Ramp(NamedTuple):
 
 @piece.implements(Ramp)
 def _ramp(law, region):
-    if region == TAIL:
+    if region == STRIBECK:
         return regularised.absent()
-    if region == CLEAN:
+    if region == KINETIC:
         return Piece(law.v0, float("inf"), 0.0, ZERO, ONE)
     return Piece(0.0, law.v0, 0.0, ZERO, (0.0, 1.0 / law.v0, 0.0, 0.0))
 
@@ -401,20 +401,20 @@ def _band(law):
     return law.v0
 
 
-regularised.LAWS["ramp"] = Ramp
+add_law("ramp", Ramp, Traits(Smooth))
 """
 
 USE = """
 from ringsweep.config import load
 from ringsweep.compile import SOURCES_DIGEST
-from ringsweep.physics.friction import LAWS, SMOOTH
+from ringsweep.physics.friction import LAWS, Smooth, family_of
 from ringsweep.physics.friction.velocity import weights
 from ringsweep.solvers.event import Auto
 scene = {"model": "belt", "body": {"mass": 1}, "spring": {"stiffness": 2}, "belt": {"velocity": 0.1},
          "friction": {"law": "ramp", "mu_s": 0.2, "mu_k": 0.1, "v0": "1 cm/s"}, "time": {"span": 1}}
 structure = load({"scene": scene}).scene.structure
 law = LAWS[structure.law]
-assert law in SMOOTH and Auto().resolved(structure).name == "implicit"
+assert family_of(law) is Smooth and Auto().resolved(structure).name == "implicit"
 print(weights(law(0.01), 0.005)[1], SOURCES_DIGEST)
 """
 

@@ -26,11 +26,11 @@ def draw(rng, count=COUNT, high=0.4):
         "time.span": rng.uniform(0.3, 2.0, count),
     }
     values["zone.half_angle"] *= np.where(values["zone.half_angle"] == 1.0, rng.uniform(0.05, 3.0, count), 1.0)
-    grip = rng.choice([0.02, 1.0, 3.0], count, p=[0.15, 0.75, 0.1])
+    level = rng.choice([0.02, 1.0, 3.0], count, p=[0.15, 0.75, 0.1])
     for place in PLACES:
-        kinetic = rng.uniform(0.02, high, count) * grip
+        kinetic = rng.uniform(0.02, high, count) * level
         values[f"friction.{place}.mu_k"] = kinetic
-        values[f"friction.{place}.mu_s"] = kinetic + rng.choice([0.0, 1.0], count) * rng.uniform(0, 0.3, count) * grip
+        values[f"friction.{place}.mu_s"] = kinetic + rng.choice([0.0, 1.0], count) * rng.uniform(0, 0.3, count) * level
     return values
 
 

@@ -42,7 +42,7 @@ def laid(arcs):
     return cut([Arc(*arc, float(k), 0.5 * k) for k, arc in enumerate(arcs, start=1)], *REST)
 
 
-def met(surface, angle):
+def found_at(surface, angle):
     return coefficients(surface, segment(surface, angle))
 
 
@@ -51,7 +51,7 @@ class TestMembership:
     def test_the_last_arc_that_holds_an_angle_gives_its_coefficients(self, arcs, angle):
         assume(clear_of_edges(arcs, angle))
         last = max((k for k, arc in enumerate(arcs, start=1) if on(arc, angle)), default=0)
-        assert met(laid(arcs), angle) == ((float(last), 0.5 * last, last) if last else (*REST, 0))
+        assert found_at(laid(arcs), angle) == ((float(last), 0.5 * last, last) if last else (*REST, 0))
 
     @given(half_angles, angles, angles, st.floats(0.0, 1.5))
     def test_contacts_behind_and_ahead_of_the_body_on_a_turned_ring(self, half_angle, phi, theta, beta):
@@ -60,25 +60,25 @@ class TestMembership:
         for contact in (-beta, beta):
             angle = phi - theta + contact
             assume(clear_of_edges([(0.0, half_angle)], angle))
-            assert met(surface, angle)[2] == (0.0 <= psi(angle + half_angle) < 2 * half_angle)
+            assert found_at(surface, angle)[2] == (0.0 <= psi(angle + half_angle) < 2 * half_angle)
 
     @given(centers, half_angles, angles, st.integers(-10_000, 10_000))
     def test_whole_turns_change_nothing(self, center, half_angle, angle, turns):
         assume(clear_of_edges([(center, half_angle)], angle))
         surface = laid([(center, half_angle)])
-        assert met(surface, angle + 2 * pi * turns) == met(surface, angle)
+        assert found_at(surface, angle + 2 * pi * turns) == found_at(surface, angle)
 
     @given(centers, angles)
     def test_no_opening_covers_nothing_and_a_full_one_everything(self, center, angle):
         assume(clear_of_edges([(center, 0.0), (center, pi)], angle))
-        assert met(laid([(center, 0.0)]), angle)[2] == 0
-        assert met(laid([(center, pi)]), angle)[2] == 1
+        assert found_at(laid([(center, 0.0)]), angle)[2] == 0
+        assert found_at(laid([(center, pi)]), angle)[2] == 1
 
     @given(angles)
     def test_without_arcs_the_ring_is_uniform(self, angle):
         surface = cut([], *REST)
         assert isinstance(surface, Uniform)
-        assert met(surface, angle) == (*REST, 0.0)
+        assert found_at(surface, angle) == (*REST, 0.0)
         assert roughest(surface) == REST
 
 
@@ -90,16 +90,16 @@ class TestEdges:
         [(nextafter(0.5, 0), 0), (0.5, 1), (nextafter(1.5, 0), 1), (1.5, 2), (nextafter(2.5, 0), 2), (2.5, 0)],
     )
     def test_an_edge_belongs_to_what_follows_it(self, angle, arc):
-        assert met(laid([(1.0, 0.5), (2.0, 0.5)]), angle)[2] == arc
+        assert found_at(laid([(1.0, 0.5), (2.0, 0.5)]), angle)[2] == arc
 
     @pytest.mark.parametrize(("angle", "arc"), [(0.0, 1), (nextafter(0.25, 0), 1), (0.25, 0), (-0.125, 1), (-0.5, 0)])
     def test_an_arc_across_the_seam_of_the_circle(self, angle, arc):
-        assert met(laid([(0.0, 0.25)]), angle)[2] == arc
+        assert found_at(laid([(0.0, 0.25)]), angle)[2] == arc
 
     def test_of_overlapping_arcs_the_later_holds(self):
         narrow, wide = (1.0, 0.25), (1.0, 0.5)
-        assert [met(laid([wide, narrow]), x)[2] for x in (0.6, 1.0, 1.4)] == [1, 2, 1]
-        assert [met(laid([narrow, wide]), x)[2] for x in (0.6, 1.0, 1.4)] == [2, 2, 2]
+        assert [found_at(laid([wide, narrow]), x)[2] for x in (0.6, 1.0, 1.4)] == [1, 2, 1]
+        assert [found_at(laid([narrow, wide]), x)[2] for x in (0.6, 1.0, 1.4)] == [2, 2, 2]
 
     @given(st.floats(-1e6, 1e6, allow_subnormal=False))
     def test_wrap_stays_within_the_circle(self, x):
@@ -109,7 +109,7 @@ class TestEdges:
     @pytest.mark.parametrize("x", [-1e-300, -1e-17, -0.0])
     def test_the_smallest_negative_angle_does_not_round_to_a_full_turn(self, x):
         assert 0.0 <= wrap(x) < 2 * pi
-        assert met(laid([(1.0, 1.0)]), x)[2] in (0, 1)
+        assert found_at(laid([(1.0, 1.0)]), x)[2] in (0, 1)
 
 
 def test_each_cell_of_a_batch_is_cut_by_its_own_arcs():

@@ -47,8 +47,8 @@ def law_of(law: type, values: Values) -> Any:
         If parameters that must ascend do not.
     """
     columns = {name: values[f"friction.{name}"] for name in declared(law)}
-    if law in friction.ASCENDING:
-        low, high = friction.ASCENDING[law]
+    if ascending := friction.TRAITS[law].ascending:
+        low, high = ascending
         unit = declared(law)[high].unit
         problem = f"{{}} {unit} is not greater than friction.{low}"
         require(columns[high] > columns[low], f"friction.{high}", columns[high], problem)

@@ -12,7 +12,7 @@ from __future__ import annotations
 from math import atan, cos, inf, log1p, pi, sin
 from typing import Annotated, Any, NamedTuple
 
-from ringsweep.compile import hook, inlined
+from ringsweep.compile import hook, inlined, lacking
 from ringsweep.quantities.parameters import Leaf, Parameter
 
 
@@ -68,16 +68,6 @@ def scaled(drive: Any) -> Any:
 
 # A power law has no series at t = 0. What happens before this time is below rounding.
 _BEGINNING = 1e-14
-
-#: Drives by the name that the configuration gives them.
-DRIVES: dict[str, type] = {
-    "none": Still,
-    "constant": Constant,
-    "arctan": Arctan,
-    "power": Power,
-    "sinusoidal": Sinusoidal,
-    "table": Table,
-}
 
 
 @hook
@@ -137,9 +127,13 @@ def _table(drive, t):
     return c0 + x * (c1 + x * (c2 + x * c3)), c1 + x * (2.0 * c2 + 3.0 * x * c3), 2.0 * c2 + 6.0 * x * c3
 
 
-@hook
+@hook(optional=True)
 def turn(drive, t):
     """Angle of the ring and its first two derivatives at time `t` (s); rad, rad/s, rad/s^2."""
+    theta, omega, epsilon = shape(drive, t)
+    a = drive.amplitude
+    # An amplitude of zero stills a drive whose acceleration is infinite.
+    return a * theta, a * omega, a * epsilon if a != 0.0 else 0.0
 
 
 @turn.implements(Still)
@@ -147,27 +141,15 @@ def _no_turn(drive, t):
     return 0.0, 0.0, 0.0
 
 
-@turn.implements(Constant, Arctan, Power, Sinusoidal, Table)
-def _turn(drive, t):
-    theta, omega, epsilon = shape(drive, t)
-    a = drive.amplitude
-    # An amplitude of zero stills a drive whose acceleration is infinite.
-    return a * theta, a * omega, a * epsilon if a != 0.0 else 0.0
-
-
-@hook(absorb=True)
+@hook(absorb=True, optional=True)
 def lookup(drive, table, k):
     """Angle (rad) and angular velocity (rad/s) of the drive from row `k` of a table of its shape."""
+    return drive.amplitude * table[k, 0], drive.amplitude * table[k, 1]
 
 
 @lookup.implements(Still)
 def _no_lookup(drive, table, k):
     return 0.0, 0.0
-
-
-@lookup.implements(Constant, Arctan, Power, Sinusoidal, Table, Scaled)
-def _lookup(drive, table, k):
-    return drive.amplitude * table[k, 0], drive.amplitude * table[k, 1]
 
 
 @hook
@@ -245,13 +227,9 @@ def _expand_table(drive, t, order, theta):
     theta[3] = drive.amplitude * c3
 
 
-@hook
+@hook(optional=True)
 def next_knot(drive, t):
     """Time after `t` (s) beyond which no series about `t` holds, as where the drive is not smooth; infinite if none."""
-
-
-@next_knot.implements(Still, Constant, Arctan, Sinusoidal)
-def _no_knot(drive, t):
     return inf
 
 
@@ -301,13 +279,9 @@ def _table_jerk(drive, t):
     return 6.0 * drive.amplitude * drive.coefficients[_piece(drive.knots, t)][0]
 
 
-@hook
+@hook(optional=True)
 def beginning(drive):
     """Time at which the drive's series can begin, s: 0 unless it is singular there."""
-
-
-@beginning.implements(Still, Constant, Arctan, Sinusoidal, Table)
-def _at_zero(drive):
     return 0.0
 
 
@@ -316,13 +290,9 @@ def _after_zero(drive):
     return _BEGINNING
 
 
-@hook
+@hook(optional=True)
 def top_speed(drive):
-    """What the rounding of the drive's speed at t = 0 is measured by."""
-
-
-@top_speed.implements(Still, Constant, Arctan, Power, Table)
-def _first_speed(drive):
+    """Speed by which the rounding of the drive's speed at t = 0 is measured: by default that speed itself."""
     return abs(turn(drive, 0.0)[1])
 
 
@@ -353,3 +323,32 @@ def launched(drive, velocity):
     if velocity == 0.0 and abs(acceleration) < inf:
         return 0.0
     return velocity - (turn(drive, beginning(drive))[1] - before)
+
+
+#: Functions that a solver of constant step needs of a drive, and those that the others need.
+CONSTANT_STEP_MEMBERS = (shape, turn, lookup)
+MEMBERS = (turn, expand, jerk, next_knot, beginning, top_speed)
+
+#: Drives by the name that the configuration gives them.
+DRIVES: dict[str, type] = {
+    "none": Still,
+    "constant": Constant,
+    "arctan": Arctan,
+    "power": Power,
+    "sinusoidal": Sinusoidal,
+    "table": Table,
+}
+
+
+def add_drive(name: str, drive: type) -> None:
+    """Make a drive known under a name.
+
+    Raises
+    ------
+    TypeError
+        If a function that a drive needs has no body for it, or if the name is taken.
+    """
+    if missing := lacking(drive, (shape, *MEMBERS)):
+        raise TypeError(f"drive {name} has no {', '.join(missing)}: every drive needs one")
+    if DRIVES.setdefault(name, drive) is not drive:
+        raise TypeError(f"there is a drive {name} already: choose another name")

@@ -228,32 +228,32 @@ def _one_gradient(body, K1, K2, sin_phi, cos_phi, omega):
 
 
 @hook(absorb=True)
-def grip(body, cos_phi, omega):
+def friction_gain(body, cos_phi, omega):
     """Derivative of the angular acceleration by the K of all contacts together, where there is no friction."""
 
 
-@grip.implements(TwoContacts)
+@friction_gain.implements(TwoContacts)
 def _two_grip(body, cos_phi, omega):
     l_0, l_1 = body.lift
     return 2.0 * (l_0 * cos_phi + l_1 * (omega * omega)) / body.effective[0]
 
 
-@grip.implements(OneContact)
+@friction_gain.implements(OneContact)
 def _one_grip(body, cos_phi, omega):
     return body.gravity / body.radius * cos_phi + omega * omega
 
 
 @hook
-def support(body):
+def reaction_determinant(body):
     """Determinant of the reactions without friction: the less it is, the more they make of an error of friction."""
 
 
-@support.implements(TwoContacts)
+@reaction_determinant.implements(TwoContacts)
 def _two_support(body):
     return body.determinant[0]
 
 
-@support.implements(OneContact)
+@reaction_determinant.implements(OneContact)
 def _one_support(body):
     return 1.0
 

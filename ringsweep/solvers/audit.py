@@ -9,7 +9,7 @@ from ringsweep.compile import hook, inlined
 from ringsweep.models.interface import audit as law
 from ringsweep.models.interface import implicit, series
 from ringsweep.numerics.series import slope
-from ringsweep.physics.friction import DYNAMIC, SET_VALUED, SMOOTH
+from ringsweep.physics.friction import Dynamic, SetValued, Smooth
 from ringsweep.solvers import rosenbrock
 
 
@@ -106,44 +106,44 @@ def _fall_of_creep(scene, mode, t, s, y, y_next, stages, guard):
 
 
 @hook
-def audit_step(law, scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerance, audit):
+def audit_step(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerance, audit):
     """Audit after a step of length `s` from the state `y` at time `t`."""
 
 
-@audit_step.implements(*SET_VALUED)
-def _series_audited(law, scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerance, audit):
+@audit_step.implements(SetValued)
+def _series_audited(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerance, audit):
     return _audit_series(scene, mode, c, t, s, y, y_next, tolerance, audit)
 
 
-@audit_step.implements(*SMOOTH)
-def _either_audited(law, scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerance, audit):
+@audit_step.implements(Smooth)
+def _either_audited(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerance, audit):
     if is_implicit:
         return _audit_creep(scene, mode, t, s, y, y_next, stages, tolerance, audit)
     return _audit_series(scene, mode, c, t, s, y, y_next, tolerance, audit)
 
 
-@audit_step.implements(*DYNAMIC)
-def _implicit_audited(law, scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerance, audit):
+@audit_step.implements(Dynamic)
+def _implicit_audited(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerance, audit):
     return _audit_creep(scene, mode, t, s, y, y_next, stages, tolerance, audit)
 
 
 @hook
-def fall_rate(law, scene, mode, is_implicit, c, t, s, y, y_next, stages, guard, first):
+def fall_rate(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, guard, first):
     """How fast a guard falls as a step ends by it; `first` is the first guard."""
 
 
-@fall_rate.implements(*SET_VALUED)
-def _series_fall(law, scene, mode, is_implicit, c, t, s, y, y_next, stages, guard, first):
+@fall_rate.implements(SetValued)
+def _series_fall(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, guard, first):
     return -slope(c[guard], s)
 
 
-@fall_rate.implements(*SMOOTH)
-def _either_fall(law, scene, mode, is_implicit, c, t, s, y, y_next, stages, guard, first):
+@fall_rate.implements(Smooth)
+def _either_fall(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, guard, first):
     if is_implicit:
         return _fall_of_creep(scene, mode, t, s, y, y_next, stages, guard - first)
     return -slope(c[guard], s)
 
 
-@fall_rate.implements(*DYNAMIC)
-def _implicit_fall(law, scene, mode, is_implicit, c, t, s, y, y_next, stages, guard, first):
+@fall_rate.implements(Dynamic)
+def _implicit_fall(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, guard, first):
     return _fall_of_creep(scene, mode, t, s, y, y_next, stages, guard - first)

@@ -16,7 +16,7 @@ from ringsweep.models.interface import implicit, modes, recorder, series
 from ringsweep.models.interface.status import BROKEN, COMPLETE, RUNNING
 from ringsweep.numerics.series import ORDER, STACK
 from ringsweep.physics.drives import next_knot
-from ringsweep.physics.friction import DYNAMIC, SET_VALUED, SMOOTH
+from ringsweep.physics.friction import Dynamic, SetValued, Smooth, family
 from ringsweep.solvers import rosenbrock
 from ringsweep.solvers.audit import Audit, audit_step, fall_rate, is_checked
 from ringsweep.solvers.creep import INSTANTS, MOST_GUARDS, Trial, implicit_step
@@ -27,7 +27,7 @@ _STALLED = 400
 
 
 @hook
-def _stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages, seen):
+def _stride(family, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages, seen):
     """One step in the way that the family of the law wants.
 
     Returns
@@ -37,14 +37,14 @@ def _stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c, guard
     """
 
 
-@_stride.implements(*SET_VALUED)
-def _series_stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages, seen):
+@_stride.implements(SetValued)
+def _series_stride(family, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages, seen):
     guard, s, y, record = series_step(scene, record, mode, t, y, horizon, tolerances[0], c, guards, work)
     return False, guard, s, y, record, trial
 
 
-@_stride.implements(*SMOOTH)
-def _either_stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages, seen):
+@_stride.implements(Smooth)
+def _either_stride(family, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages, seen):
     if implicit.may_creep(scene, mode):
         x = implicit.to_implicit(scene, implicit.forcing(scene, t), y)
         line = implicit.linearise(scene, mode, t, x)
@@ -60,8 +60,8 @@ def _either_stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c
     return False, guard, s, y, record, Trial(1e-6 * scene.span, 0.0, 0.0)
 
 
-@_stride.implements(*DYNAMIC)
-def _implicit_stride(law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages, seen):
+@_stride.implements(Dynamic)
+def _implicit_stride(family, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages, seen):
     x = implicit.to_implicit(scene, implicit.forcing(scene, t), y)
     line = implicit.linearise(scene, mode, t, x)
     guard, s, y, record, trial = implicit_step(
@@ -71,40 +71,40 @@ def _implicit_stride(law, scene, record, mode, t, y, trial, horizon, tolerances,
 
 
 @hook
-def _outset(law, scene, mode, t, y, tolerances, c):
+def _outset(family, scene, mode, t, y, tolerances, c):
     """Record of a run that begins."""
 
 
-@_outset.implements(*SET_VALUED, *SMOOTH)
-def _series_outset(law, scene, mode, t, y, tolerances, c):
+@_outset.implements(SetValued, Smooth)
+def _series_outset(family, scene, mode, t, y, tolerances, c):
     series.expand(scene, mode, t, y, tolerances[0], c)
     return recorder.begin(scene, t, series.seen_at(scene, c, 0.0, 0.0))
 
 
-@_outset.implements(*DYNAMIC)
-def _implicit_outset(law, scene, mode, t, y, tolerances, c):
+@_outset.implements(Dynamic)
+def _implicit_outset(family, scene, mode, t, y, tolerances, c):
     return recorder.begin(scene, t, implicit.seen(scene, implicit.guards_and_motion(scene, mode, t, y)))
 
 
 @hook
-def _row(law, scene, mode, is_implicit, c, t, s, y):
+def _row(family, scene, mode, is_implicit, c, t, s, y):
     """One row of a time history, after the part `s` of a step that began in the state `y` if it was a series."""
 
 
-@_row.implements(*SET_VALUED)
-def _series_row(law, scene, mode, is_implicit, c, t, s, y):
+@_row.implements(SetValued)
+def _series_row(family, scene, mode, is_implicit, c, t, s, y):
     return series.row(scene, mode, c, t, s)
 
 
-@_row.implements(*SMOOTH)
-def _either_row(law, scene, mode, is_implicit, c, t, s, y):
+@_row.implements(Smooth)
+def _either_row(family, scene, mode, is_implicit, c, t, s, y):
     if is_implicit:
         return implicit.row(scene, mode, t, implicit.to_implicit(scene, implicit.forcing(scene, t), y))
     return series.row(scene, mode, c, t, s)
 
 
-@_row.implements(*DYNAMIC)
-def _implicit_row(law, scene, mode, is_implicit, c, t, s, y):
+@_row.implements(Dynamic)
+def _implicit_row(family, scene, mode, is_implicit, c, t, s, y):
     return implicit.row(scene, mode, t, implicit.to_implicit(scene, implicit.forcing(scene, t), y))
 
 
@@ -137,7 +137,7 @@ def _keep(scene, mode, is_implicit, c, t, s, y, times, table, kept):
     """Store the state after the part `s` of a step as row `kept` of a history that has room; the number of rows."""
     if kept == len(times):
         return kept
-    _store(table[kept], _row(scene.law, scene, mode, is_implicit, c, t + s, s, y))
+    _store(table[kept], _row(family(scene.law), scene, mode, is_implicit, c, t + s, s, y))
     # Sums that should be equal differ by rounding.
     times[kept] = max(t + s, times[kept - 1]) if kept > 0 else t
     return kept + 1
@@ -195,7 +195,7 @@ def _integrate(batch, tolerances, limit, out, steps, shown, spacing, times, tabl
         scene = take(batch, i)
         t, y = modes.initial_state(scene)
         status, mode = modes.initial_mode(scene, t, y)
-        record = _outset(scene.law, scene, mode, t, y, tolerances, c)
+        record = _outset(family(scene.law), scene, mode, t, y, tolerances, c)
         trial = Trial(1e-6 * scene.span, 0.0, 0.0)
         audit, fall = Audit(0.0, 0.0, 0.0), 0.0
         n = stalled = 0
@@ -213,7 +213,7 @@ def _integrate(batch, tolerances, limit, out, steps, shown, spacing, times, tabl
             horizon = min(scene.span, next_knot(scene.drive, t)) - t
             trial = Trial(min(trial.h, spacing), trial.last, trial.size)
             is_implicit, guard, s, y_next, record, trial = _stride(
-                scene.law, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages, seen
+                family(scene.law), scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages, seen
             )
             if len(times) > 0:
                 if kept == len(times):
@@ -226,13 +226,13 @@ def _integrate(batch, tolerances, limit, out, steps, shown, spacing, times, tabl
                 entered = guard >= 0 or (entered and s == 0.0)
             if audited and s > 0.0 and is_checked(n):
                 audit = audit_step(
-                    scene.law, scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerances[0], audit
+                    family(scene.law), scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerances[0], audit
                 )
             last, begun = mode, y
             t, status, mode, y = _arrive(scene, mode, guard, t, s, horizon, y_next)
             if audited and status != RUNNING and guard >= 0 and s > 0.0:
                 fall = fall_rate(
-                    scene.law, scene, last, is_implicit, c, before, s, begun, y_next, stages, guard, guards
+                    family(scene.law), scene, last, is_implicit, c, before, s, begun, y_next, stages, guard, guards
                 )
             if s == 0.0 and status != RUNNING:
                 # What a mode ends by that is over as it is entered is to be seen.

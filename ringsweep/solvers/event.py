@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 
 from ringsweep.compile import take
 from ringsweep.errors import InputError
+from ringsweep.models.interface import audit, implicit, modes, recorder, series
 from ringsweep.models.scene import Structure
-from ringsweep.physics.friction import DYNAMIC, LAWS, SET_VALUED, SMOOTH
+from ringsweep.physics import drives
+from ringsweep.physics.friction import LAWS, Dynamic, SetValued, Smooth, family_of, presliding, velocity
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.solvers.automaton import integrate
 from ringsweep.solvers.certificate import errors, repeated, vouched, with_errors
-from ringsweep.solvers.method import Method, Result
+from ringsweep.solvers.method import Method, Needs, Result
 
 LIMIT = Parameter("1", "steps after which a run is given up as failed", lower=1, upper=1e10)
 
@@ -39,7 +41,7 @@ def _some(batch: Any, cells: NDArray[np.intp]) -> Any:
 class _Piecewise(Method):
     """What both methods share: integration of the piecewise-smooth system, and its certificate."""
 
-    laws: ClassVar[tuple[type, ...]]
+    families: ClassVar[tuple[type, ...]]
     safety: ClassVar[float]
     """Error of a run in units of its difference from one at the looser tolerance, at most; half of runs: a fiftieth."""
 
@@ -47,14 +49,25 @@ class _Piecewise(Method):
     max_steps: int = 1_000_000
     certify: bool = True
 
+    def needs(self, structure: Structure) -> Needs:
+        """What modes need, with series, implicit steps or both, whichever the law's family takes."""
+        family = family_of(LAWS[structure.law])
+        of_model = recorder.MEMBERS + modes.MEMBERS + audit.MEMBERS
+        of_model += () if family is Dynamic else series.MEMBERS
+        of_model += () if family is SetValued else implicit.MEMBERS
+        of_model += (implicit.is_stiff,) if family is Smooth else ()
+        of_law = presliding.MEMBERS if family is Dynamic else velocity.MEMBERS
+        return Needs(of_law, drives.MEMBERS, of_model)
+
     def check(self, structure: Structure) -> None:
-        """Refuse a friction law that the method cannot take."""
-        if LAWS[structure.law] not in self.laws:
-            able = ", ".join(name for name, law in LAWS.items() if law in self.laws)
+        """Refuse a friction law of a family that the method does not take; see :meth:`Method.check` too."""
+        if family_of(LAWS[structure.law]) not in self.families:
+            able = ", ".join(name for name, law in LAWS.items() if family_of(law) in self.families)
             raise InputError(
                 "solver.method",
                 f"{self.name} does not take friction law {structure.law}: it takes {able}; auto takes all",
             )
+        super().check(structure)
 
     @abstractmethod
     def tolerances(self) -> tuple[float, float]:
@@ -119,7 +132,7 @@ class _Piecewise(Method):
         outcomes: tuple[str, ...],
     ) -> NDArray[np.float64]:
         """Bounds on the errors of runs at this tolerance, given runs at a looser one."""
-        tolerance = self.tolerances()[type(batch.law) in DYNAMIC]
+        tolerance = self.tolerances()[family_of(type(batch.law)) is Dynamic]
         return errors(rows, witness, outcomes, safety=self.safety, tolerance=tolerance, steps=steps)
 
     def integrate(
@@ -154,7 +167,7 @@ class Event(_Piecewise):
     """Stick and slip of set-valued laws, every switching point located."""
 
     name: ClassVar[str] = "event"
-    laws: ClassVar[tuple[type, ...]] = SET_VALUED
+    families: ClassVar[tuple[type, ...]] = (SetValued,)
     safety: ClassVar[float] = 0.7
 
     rtol: Annotated[float, Parameter("1", "error allowed to a step", lower=1e-15, upper=1e-3)] = 1e-10
@@ -171,7 +184,7 @@ class Implicit(_Piecewise):
     """Smooth and dynamic laws as they are written: power series where they are not stiff, else L-stable steps."""
 
     name: ClassVar[str] = "implicit"
-    laws: ClassVar[tuple[type, ...]] = (*SMOOTH, *DYNAMIC)
+    families: ClassVar[tuple[type, ...]] = (Smooth, Dynamic)
     safety: ClassVar[float] = 1.5
 
     rtol: Annotated[float, Parameter("1", "error allowed to a step", lower=1e-13, upper=1e-3)] = 3e-6
@@ -202,10 +215,18 @@ class Auto(Method):
         """Times and rows of the history of cell 0; see :class:`ringsweep.solvers.method.Method`."""
         return self._method(type(batch.law)).history(batch, samples, width)
 
+    def needs(self, structure: Structure) -> Needs:
+        """What the method that takes the law needs."""
+        return self.resolved(structure).needs(structure)
+
+    def check(self, structure: Structure) -> None:
+        """Errors as for the method that takes the law."""
+        self.resolved(structure).check(structure)
+
     def resolved(self, structure: Structure) -> Method:
         """The method that a scene is run by."""
         return self._method(LAWS[structure.law])
 
     def _method(self, law: type) -> Method:
-        method = Event if law in SET_VALUED else Implicit
+        method = Event if family_of(law) is SetValued else Implicit
         return method(max_steps=self.max_steps, certify=self.certify)

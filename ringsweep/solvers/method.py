@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsweep.compile import lacking
+from ringsweep.errors import InputError
+from ringsweep.models import MODELS
 from ringsweep.models.scene import Structure
+from ringsweep.physics.drives import DRIVES
+from ringsweep.physics.friction import LAWS
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,14 @@ class Result:
     errors: NDArray[np.float64] | None = None
 
 
+class Needs(NamedTuple):
+    """Functions that a method needs of a friction law, of a drive, and of a model's type of scene."""
+
+    law: tuple[Any, ...]
+    drive: tuple[Any, ...]
+    model: tuple[Any, ...]
+
+
 class Method(ABC):
     """A way to advance time. Its options are the fields of the dataclass that derives from it."""
 
@@ -43,8 +55,30 @@ class Method(ABC):
     side_by_side: ClassVar[int] = 1
     """Cells that it runs at once: fewer take as long."""
 
-    def check(self, structure: Structure) -> None:  # noqa: B027  most methods take every scene
-        """Raise an `InputError` if the method cannot take such a scene."""
+    @abstractmethod
+    def needs(self, structure: Structure) -> Needs:
+        """Functions that the method needs of law, drive and model of such a scene."""
+
+    def check(self, structure: Structure) -> None:
+        """Make sure that the method can take such a scene.
+
+        Raises
+        ------
+        InputError
+            If the method does not take the law, or if law, drive or model lack a function that it needs.
+        """
+        needs = self.needs(structure)
+        scene = MODELS[structure.model].scene_type(structure)
+        for key, name, cls, members in (
+            ("friction.law", structure.law, LAWS[structure.law], needs.law),
+            ("drive.law", structure.drive, DRIVES[structure.drive], needs.drive),
+            ("model", structure.model, scene, needs.model),
+        ):
+            if missing := lacking(cls, members):
+                kind = key.split(".")[0]
+                raise InputError(
+                    f"scene.{key}", f"{kind} {name} has no function `{missing[0]}`, which solver {self.name} needs"
+                )
 
     def resolved(self, structure: Structure) -> Method:
         """The method, with its tolerances, that such a scene is run by."""
@@ -57,16 +91,3 @@ class Method(ABC):
     @abstractmethod
     def history(self, batch: Any, samples: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Time history of cell 0 in about `samples` rows of `width` columns."""
-
-
-def same_drive(batch: Any, cells: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
-    """Groups of `cells` that share span and shape of the drive, whatever its amplitude."""
-    shape = [
-        leaf
-        for name, leaf in zip(batch.drive._fields, batch.drive, strict=True)
-        if name != "amplitude" and leaf.ndim == 1
-    ]
-    keys = np.stack([batch.span, *shape], axis=1)[cells]
-    _, group = np.unique(keys, axis=0, return_inverse=True)
-    order = np.argsort(group, kind="stable")
-    yield from np.split(cells[order], np.flatnonzero(np.diff(group[order])) + 1)

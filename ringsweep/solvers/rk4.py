@@ -6,6 +6,7 @@ right-hand side were smooth. ``stiffness`` tells where that is beyond the limit 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import inf
 from typing import Annotated, Any, ClassVar, NamedTuple
@@ -33,12 +34,13 @@ from ringsweep.numerics.memory import (
     width,
     write,
 )
+from ringsweep.physics import drives
 from ringsweep.physics.drives import lookup, scaled, shape, turn
-from ringsweep.physics.friction import LAWS, WITH_SNAPS
+from ringsweep.physics.friction import LAWS, TRAITS, Dynamic, family_of, presliding, velocity
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.variables import SEPARATING
 from ringsweep.solvers.certificate import errors, vouched, with_errors
-from ringsweep.solvers.method import Method, Result, same_drive
+from ringsweep.solvers.method import Method, Needs, Result
 
 #: Radius of the largest half disc of the left half plane in which the method is stable: 2.616 where an eigenvalue is
 #: complex; on the real axis alone it would be 2.785.
@@ -69,12 +71,21 @@ class RK4(Method):
     diagnose: bool = True
     """Whether the stiffness of each run is kept; without it none can be certified."""
 
+    def needs(self, structure: Structure) -> Needs:
+        """What a step of constant length needs; vector lanes need more of a law of the velocity."""
+        bristles = family_of(LAWS[structure.law]) is Dynamic
+        of_law = (
+            (presliding.bristle, presliding.region_guard) if bristles else velocity.MEMBERS + velocity.LANES_MEMBERS
+        )
+        return Needs(of_law, drives.CONSTANT_STEP_MEMBERS, recorder.MEMBERS + constant_step.MEMBERS)
+
     def check(self, structure: Structure) -> None:
-        """Refuse a law that changes at instants which no constant step meets."""
-        if LAWS[structure.law] in WITH_SNAPS:
+        """Refuse a law that changes at instants which no constant step meets; see :meth:`Method.check` too."""
+        if TRAITS[LAWS[structure.law]].snaps:
             raise InputError(
                 "solver.method", f"rk4 does not take friction law {structure.law}, whose bonds snap: auto takes it"
             )
+        super().check(structure)
 
     def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:
         """Outcomes of every cell; see :class:`ringsweep.solvers.method.Method`."""
@@ -107,7 +118,7 @@ class RK4(Method):
         kind, account = constant_step.side_by_side(batch), Kept() if self.diagnose else Dropped()
         # What the kernels are compiled for knows no shape of the drive: that of its table is a kernel of its own.
         scenes = side_by_side(batch._replace(drive=scaled(batch.drive))) if isinstance(kind, Several) else batch
-        for group in same_drive(batch, cells):
+        for group in _same_drive(batch, cells):
             integrate(kind, account, scenes, take(batch.drive, group[0]), group, steps, rows, report)
         return rows[cells], report[cells]
 
@@ -118,6 +129,19 @@ class RK4(Method):
         times = np.empty(len(rows))
         count = _history(batch, self.steps, stride, times, rows)
         return times[:count], rows[:count]
+
+
+def _same_drive(batch: Any, cells: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
+    """Groups of `cells` that share span and shape of the drive, whatever its amplitude."""
+    shape = [
+        leaf
+        for name, leaf in zip(batch.drive._fields, batch.drive, strict=True)
+        if name != "amplitude" and leaf.ndim == 1
+    ]
+    keys = np.stack([batch.span, *shape], axis=1)[cells]
+    _, group = np.unique(keys, axis=0, return_inverse=True)
+    order = np.argsort(group, kind="stable")
+    yield from np.split(cells[order], np.flatnonzero(np.diff(group[order])) + 1)
 
 
 # Whether a run goes on, was seen off, ends in the step ahead, or goes on through that whatever it looks like.

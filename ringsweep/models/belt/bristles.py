@@ -16,8 +16,8 @@ from ringsweep.models.interface.status import RUNNING
 from ringsweep.models.parts import largest_eigenvalue
 from ringsweep.physics import drives
 from ringsweep.physics.belt import BristleBelt
-from ringsweep.physics.friction.bristles import bristle, crawl, lasts, made, yields
-from ringsweep.physics.friction.velocity import BAND, CLEAN
+from ringsweep.physics.friction.bristles import after_yield, bristle, initial_deflection, region_guard, stick_speed
+from ringsweep.physics.friction.velocity import BAND, KINETIC
 
 
 @inlined
@@ -30,8 +30,8 @@ def contact_force(scene, v, z, sign, region):
 
 @inlined
 def _region(scene, v, z, sign):
-    """Whether the contact counts as stuck (BAND) or slips (CLEAN)."""
-    return BAND if lasts(scene.law, scene.mu_s, scene.mu_k, v, z, sign, BAND) > 0.0 else CLEAN
+    """Whether the contact counts as stuck (BAND) or slips (KINETIC)."""
+    return BAND if region_guard(scene.law, scene.mu_s, scene.mu_k, v, z, sign, BAND) > 0.0 else KINETIC
 
 
 @inlined
@@ -58,7 +58,7 @@ class Inspection(NamedTuple):
 @constant_step.initial_state.implements(BristleBelt)
 def _initial_state_in_space(scene):
     velocity = scene.initial_v + drives.turn(scene.drive, 0.0)[1]
-    return scene.initial_x, velocity, made(scene.law, scene.mu_s, scene.mu_k)
+    return scene.initial_x, velocity, initial_deflection(scene.law, scene.mu_s, scene.mu_k)
 
 
 @constant_step.rates.implements(BristleBelt)
@@ -99,7 +99,7 @@ def _observe(scene, record, t, duration, stuck, seen):
 
 @recorder.conclude.implements(BristleBelt)
 def _conclude(scene, record, status, t, place, velocity):
-    return conclude(record, scene, status, t, place, velocity, crawl(scene.law, _recoil(scene)))
+    return conclude(record, scene, status, t, place, velocity, stick_speed(scene.law, _recoil(scene)))
 
 
 @constant_step.row.implements(BristleBelt)
@@ -113,7 +113,7 @@ SLOW, FAST = range(2)
 
 
 class Mode(NamedTuple):
-    """Sign of the sliding velocity, and whether the contact counts as stuck (BAND) or slips (CLEAN)."""
+    """Sign of the sliding velocity, and whether the contact counts as stuck (BAND) or slips (KINETIC)."""
 
     sign: int
     region: int
@@ -121,7 +121,7 @@ class Mode(NamedTuple):
 
 @modes.initial_state.implements(BristleBelt)
 def _initial_state(scene):
-    z = made(scene.law, scene.mu_s, scene.mu_k)
+    z = initial_deflection(scene.law, scene.mu_s, scene.mu_k)
     return drives.beginning(scene.drive), (scene.initial_x, drives.launched(scene.drive, scene.initial_v), z)
 
 
@@ -142,7 +142,7 @@ def _switch(scene, mode, guard, t, y):
     x, v, z = y
     if guard == SLOW:
         return RUNNING, Mode(-mode.sign, BAND), (x, 0.0, z)
-    z, region = yields(scene.law, scene.mu_s, scene.mu_k, z, float(mode.sign), mode.region)
+    z, region = after_yield(scene.law, scene.mu_s, scene.mu_k, z, float(mode.sign), mode.region)
     return RUNNING, Mode(mode.sign, region), (x, v, z)
 
 
@@ -181,7 +181,7 @@ def _guards_and_motion(scene, mode, t, x):
     _, belt_velocity, _ = drives.turn(scene.drive, t)
     sign = float(mode.sign)
     _, _, _, force, _, _ = contact_force(scene, x[1], x[2], sign, mode.region)
-    guards = sign * x[1], lasts(scene.law, scene.mu_s, scene.mu_k, x[1], x[2], sign, mode.region)
+    guards = sign * x[1], region_guard(scene.law, scene.mu_s, scene.mu_k, x[1], x[2], sign, mode.region)
     return guards, (x[0], x[1] + belt_velocity, -(scene.stiffness * x[0] + force) / scene.mass, force)
 
 

@@ -10,20 +10,24 @@ import numpy as np
 from ringsweep.compile import take
 from ringsweep.errors import InputError
 from ringsweep.models.belt.record import Outcome
+from ringsweep.models.model import Model
 from ringsweep.models.parts import GRAVITY, MASS, SPAN, drive_of, law_of, pair
 from ringsweep.models.scene import Structure, Values, require
 from ringsweep.physics import belt, drives, friction
 from ringsweep.quantities.parameters import Parameter, declared
 
 
-class Belt:
+class Belt(Model):
     """A mass on a spring on a moving belt (the paper's Fig. 1)."""
 
     name: ClassVar[str] = "belt"
     doc: ClassVar[str] = "a mass on a spring on a moving belt"
     outcomes: ClassVar[tuple[str, ...]] = Outcome._fields
-    laws: ClassVar[dict[str, type]] = friction.LAWS
-    absent: ClassVar[frozenset[str]] = frozenset()
+    place: ClassVar[str] = "x"
+
+    def scene_type(self, structure: Structure) -> type:
+        """With bristles a belt of its own kind."""
+        return belt.BristleBelt if friction.family_of(self.laws[structure.law]) is friction.Dynamic else belt.Belt
 
     def history(self, structure: Structure) -> tuple[str, ...]:
         """Quantities of a time history, in the order of their columns."""
@@ -42,7 +46,7 @@ class Belt:
             # What bristles have per unit of the load, they have here under the weight of the body.
             absolute = {"1/m": "N/m", "s/m": "N s/m"} if name.startswith("sigma") else {}
             found[f"friction.{name}"] = replace(p, unit=absolute.get(p.unit, p.unit))
-        if law not in friction.DYNAMIC:
+        if friction.family_of(law) is not friction.Dynamic:
             found["friction.viscous"] = Parameter("N s/m", "viscous friction", lower=0.0, default=0.0)
         for name, p in declared(drives.DRIVES[structure.drive]).items():
             found[f"drive.{name}"] = p.along_a_line()
@@ -78,9 +82,9 @@ class Belt:
             "initial_v": sliding,
             "span": values["time.span"],
         }
-        if law not in friction.DYNAMIC:
+        if friction.family_of(law) is not friction.Dynamic:
             viscous, load = values["friction.viscous"], mass * gravity
-            if structure.law == "karnopp":
+            if friction.TRAITS[law].dead_band:
                 require(
                     mu_k * load + viscous * values["friction.dead_band"] <= mu_s * load,
                     "friction.viscous",
@@ -102,6 +106,6 @@ class Belt:
             raise InputError("scene.belt.velocity", what)
         if given:
             return drives.Constant(values["belt.velocity"])
-        if structure.law == "karnopp" and structure.drive != "constant":
-            raise InputError("scene.drive", "the dead band of law karnopp needs a belt of constant velocity")
+        if friction.TRAITS[self.laws[structure.law]].dead_band and structure.drive != "constant":
+            raise InputError("scene.drive", f"the dead band of law {structure.law} needs a belt of constant velocity")
         return drive_of(structure, values)

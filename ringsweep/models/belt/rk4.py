@@ -10,7 +10,7 @@ from ringsweep.models.interface import constant_step
 from ringsweep.models.parts import largest_eigenvalue
 from ringsweep.physics import belt, drives
 from ringsweep.physics.friction.velocity import (
-    met,
+    passes_band,
     stiction_band,
 )
 
@@ -47,7 +47,7 @@ def _stiffness(scene, before, now, h):
     # The stages reach about as far as the acceleration at the beginning takes the body in one step.
     belt_gains = (now.rates[0] - now.v) - (before.rates[0] - before.v)
     ahead = before.v + h * before.rates[1] - belt_gains
-    rest, edge, jumped = met(scene.law, before.v, now.v, ahead)
+    rest, edge, jumped = passes_band(scene.law, before.v, now.v, ahead)
     steepest = max(abs(before.slope), abs(now.slope))
     swing = scene.stiffness / scene.mass
     if holds_in_band(scene.law):

@@ -15,7 +15,7 @@ from ringsweep.numerics.series import INVERSE, ORDER, crossings, reach, slope, v
 from ringsweep.physics import belt, drives
 from ringsweep.physics.friction.velocity import (
     BAND,
-    CLEAN,
+    KINETIC,
     expand_weights,
     faster,
     region_at,
@@ -26,7 +26,7 @@ from ringsweep.physics.friction.velocity import (
 )
 
 # Rows of the series; the guards last.
-X, V, VELOCITY, EXCESS, BASIS, STATIC, KINETIC, FORCE, SHIFT = range(9)
+X, V, VELOCITY, EXCESS, BASIS, STATIC_WEIGHT, KINETIC_WEIGHT, FORCE, SHIFT = range(9)
 
 
 SLOW, FAST = range(9, 11)
@@ -80,7 +80,7 @@ def _settle(scene, t, x):
     pull = _pull(scene, t, x)
     bound = _bound(scene)
     if abs(pull) <= bound and bound > 0.0:
-        return Mode(0, CLEAN, -1)
+        return Mode(0, KINETIC, -1)
     if pull == 0.0:
         # What the pull will be in a moment, as the belt takes the body along.
         _, belt_velocity, _ = drives.turn(scene.drive, t)
@@ -106,7 +106,7 @@ def _switch(scene, mode, guard, t, y):
         return RUNNING, Mode(sign, entered, FAST), (x, sign * low)
     if holds_in_band(scene.law) and region == BAND:
         # The pull has fallen to what the contact holds.
-        return RUNNING, Mode(0, CLEAN, SLOW if sign > 0 else FAST), y
+        return RUNNING, Mode(0, KINETIC, SLOW if sign > 0 else FAST), y
     if region == BAND:
         return RUNNING, Mode(-sign, BAND, SLOW), (x, 0.0)
     return RUNNING, _settle(scene, t, x), (x, 0.0)
@@ -138,8 +138,8 @@ def _expand(scene, mode, t, y, tolerance, c):
         viscous = 0.0 if yielding else scene.viscous
         for k in range(ORDER + 1):
             c[EXCESS, k] = mode.sign * c[V, k] - (low if k == 0 else 0.0)
-            expand_weights(scene.law, mode.region, c[EXCESS], k, c[BASIS], c[STATIC], c[KINETIC])
-            c[FORCE, k] = mode.sign * load * (c[STATIC, k] * scene.mu_s + c[KINETIC, k] * scene.mu_k)
+            expand_weights(scene.law, mode.region, c[EXCESS], k, c[BASIS], c[STATIC_WEIGHT], c[KINETIC_WEIGHT])
+            c[FORCE, k] = mode.sign * load * (c[STATIC_WEIGHT, k] * scene.mu_s + c[KINETIC_WEIGHT, k] * scene.mu_k)
             c[FORCE, k] += viscous * c[V, k]
             if k < ORDER:
                 c[X, k + 1] = c[VELOCITY, k] * INVERSE[k + 1]

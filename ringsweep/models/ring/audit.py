@@ -12,10 +12,10 @@ import numpy as np
 
 from ringsweep.compile import inlined, take
 from ringsweep.models.interface import audit, implicit
+from ringsweep.models.ring.contacts import coefficients_under
 from ringsweep.models.ring.record import Outcome
-from ringsweep.models.ring.series import coefficients_under
 from ringsweep.physics import contact, drives, ring
-from ringsweep.physics.friction import SET_VALUED
+from ringsweep.physics.friction import SetValued, family_of
 from ringsweep.physics.friction.bristles import bristle
 from ringsweep.physics.friction.velocity import BAND, stiction_band, weights
 from ringsweep.physics.zones import PER_TURN, Segments, edge_ahead, roughest, roughness
@@ -163,7 +163,7 @@ def _undecided(batch, rows, witness, fall):
 
 def _rests_on_edge(batch):
     """Which bodies are launched at rest with a contact on an edge, where rounding tells which side of it holds them."""
-    if not isinstance(batch.surface, Segments) or type(batch.law) not in SET_VALUED:
+    if not isinstance(batch.surface, Segments) or family_of(type(batch.law)) is not SetValued:
         return np.zeros(len(batch.span), dtype=bool)
     drive = batch.drive
     if isinstance(drive, drives.Table):

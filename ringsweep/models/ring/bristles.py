@@ -15,14 +15,24 @@ from ringsweep.compile import inlined
 from ringsweep.models.interface import constant_step, implicit, modes
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
 from ringsweep.models.parts import largest_eigenvalue
+from ringsweep.models.ring.contacts import (
+    coefficients_at,
+    coefficients_under,
+    edges_ahead,
+    places_after_edge,
+    places_at,
+    places_beyond,
+    zones_at,
+    zones_under,
+)
 from ringsweep.models.ring.creep import FAST, INERTIA, NORMAL_1, NORMAL_2, SLOW
 from ringsweep.models.ring.record import ENDS
-from ringsweep.models.ring.series import AT_ONCE, NEARLY_JAMMED, coefficients_under
+from ringsweep.models.ring.series import AT_ONCE, NEARLY_JAMMED
 from ringsweep.physics import contact, drives, ring
-from ringsweep.physics.friction.bristles import bristle, lasts, steady
-from ringsweep.physics.friction.velocity import BAND, CLEAN
+from ringsweep.physics.friction.bristles import bristle, region_guard, steady_deflection
+from ringsweep.physics.friction.velocity import BAND, KINETIC
 from ringsweep.physics.ring import BristleRing
-from ringsweep.physics.zones import beyond, coefficients, cross, edge_ahead, locate, roughest, segment
+from ringsweep.physics.zones import roughest
 
 
 class Contacts(NamedTuple):
@@ -58,26 +68,17 @@ def _contacts(scene, under, v, z_1, z_2, sign, region):
 def _lasts(scene, under, v, z_1, z_2, sign, region):
     """Positive while the region lasts: the body counts as stuck while both contacts do."""
     mu_s1, mu_k1, mu_s2, mu_k2 = under
-    first = lasts(scene.law, mu_s1, mu_k1, v, z_1, sign, region)
-    second = lasts(scene.law, mu_s2, mu_k2, v, z_2, sign, region)
+    first = region_guard(scene.law, mu_s1, mu_k1, v, z_1, sign, region)
+    second = region_guard(scene.law, mu_s2, mu_k2, v, z_2, sign, region)
     return min(first, second) if region == BAND else max(first, second)
-
-
-@inlined
-def _under_at(scene, rho):
-    """Coefficients under the contacts at an angle in the ring's frame."""
-    offset = ring.contact_offset(scene.body)
-    mu_s1, mu_k1, _ = coefficients(scene.surface, segment(scene.surface, rho - offset))
-    mu_s2, mu_k2, _ = coefficients(scene.surface, segment(scene.surface, rho + offset))
-    return mu_s1, mu_k1, mu_s2, mu_k2
 
 
 @inlined
 def _launched(scene):
     """Deflections at launch."""
     v = ring.launch_velocity(scene) * scene.body.radius
-    mu_s1, mu_k1, mu_s2, mu_k2 = _under_at(scene, scene.initial_phi - drives.turn(scene.drive, 0.0)[0])
-    return steady(scene.law, mu_s1, mu_k1, v), steady(scene.law, mu_s2, mu_k2, v)
+    mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_at(scene, scene.initial_phi - drives.turn(scene.drive, 0.0)[0])
+    return steady_deflection(scene.law, mu_s1, mu_k1, v), steady_deflection(scene.law, mu_s2, mu_k2, v)
 
 
 class Inspection(NamedTuple):
@@ -105,7 +106,7 @@ def _rates(scene, now, y, drive_at, drive_rate):
     phi, omega, z_1, z_2 = y
     v = (omega - drive_rate) * scene.body.radius
     sign = 1.0 if v >= 0.0 else -1.0
-    now = _contacts(scene, _under_at(scene, phi - drive_at), v, z_1, z_2, sign, BAND)
+    now = _contacts(scene, coefficients_at(scene, phi - drive_at), v, z_1, z_2, sign, BAND)
     epsilon, _, _ = ring.acceleration(scene.body, now.K1, now.K2, sin(phi), cos(phi), omega)
     return omega, epsilon, now.rates[0], now.rates[1]
 
@@ -116,7 +117,7 @@ def _inspect(scene, y, drive_at, drive_rate):
     b = scene.body
     v = (omega - drive_rate) * b.radius
     sign = 1.0 if v >= 0.0 else -1.0
-    under = _under_at(scene, phi - drive_at)
+    under = coefficients_at(scene, phi - drive_at)
     stuck = _lasts(scene, under, v, z_1, z_2, sign, BAND) > 0.0
     now = _contacts(scene, under, v, z_1, z_2, sign, BAND)
     sin_phi, cos_phi = sin(phi), cos(phi)
@@ -159,10 +160,7 @@ def _sticks(scene, before, now):
 def _row(scene, y, drive_at, drive_rate):
     now = constant_step.inspect(scene, y, drive_at, drive_rate)
     mode = 0.0 if now.stuck else 1.0 if now.v > 0.0 else -1.0
-    offset = ring.contact_offset(scene.body)
-    rho = y[0] - drive_at
-    _, _, zone_1 = coefficients(scene.surface, segment(scene.surface, rho - offset))
-    _, _, zone_2 = coefficients(scene.surface, segment(scene.surface, rho + offset))
+    zone_1, zone_2 = zones_at(scene, y[0] - drive_at)
     return y[0], y[1], now.rates[1], now.normal_1, now.normal_2, drive_rate, zone_1, zone_2, mode, y[2], y[3]
 
 
@@ -186,8 +184,7 @@ def _initial_state(scene):
 @modes.initial_mode.implements(BristleRing)
 def _initial_mode(scene, t, y):
     rho, v, z_1, z_2 = y
-    offset = ring.contact_offset(scene.body)
-    place_1, place_2 = locate(scene.surface, rho - offset), locate(scene.surface, rho + offset)
+    place_1, place_2 = places_at(scene, rho)
     theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     phi, omega = rho + theta, ring_omega + v / scene.body.radius
     sign = 1 if v > 0.0 else -1
@@ -196,11 +193,10 @@ def _initial_mode(scene, t, y):
         now = _contacts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(sign), BAND)
         epsilon, _, _ = ring.acceleration(scene.body, now.K1, now.K2, sin(phi), cos(phi), omega)
         sign = 1 if epsilon > ring_epsilon else -1
-    place_1 = beyond(scene.surface, place_1, rho - offset, sign)
-    place_2 = beyond(scene.surface, place_2, rho + offset, sign)
+    place_1, place_2 = places_beyond(scene, place_1, place_2, rho, sign)
     mode = Mode(sign, BAND, place_1, place_2)
     if not _lasts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(sign), BAND) > 0.0:
-        mode = Mode(sign, CLEAN, place_1, place_2)
+        mode = Mode(sign, KINETIC, place_1, place_2)
     return _after_jump(scene, mode, t, y), mode
 
 
@@ -254,14 +250,8 @@ def _switch(scene, mode, guard, t, y):
     if guard == SLOW:
         return RUNNING, Mode(-sign, BAND, place_1, place_2), (rho, 0.0, z_1, z_2)
     if guard == FAST:
-        return RUNNING, Mode(sign, CLEAN if mode.region == BAND else BAND, place_1, place_2), y
-    offset = ring.contact_offset(scene.body)
-    ahead_1 = sign * (edge_ahead(scene.surface, place_1, sign) - (rho - offset))
-    ahead_2 = sign * (edge_ahead(scene.surface, place_2, sign) - (rho + offset))
-    if ahead_1 <= ahead_2:
-        place_1 = cross(scene.surface, place_1, sign)
-    else:
-        place_2 = cross(scene.surface, place_2, sign)
+        return RUNNING, Mode(sign, KINETIC if mode.region == BAND else BAND, place_1, place_2), y
+    place_1, place_2 = places_after_edge(scene, mode, rho)
     mode = Mode(sign, mode.region, place_1, place_2)
     return _after_jump(scene, mode, t, y), mode, y
 
@@ -323,9 +313,7 @@ def _guards_and_motion(scene, mode, t, x):
     sin_phi, cos_phi = sin(phi), cos(phi)
     epsilon, determinant, inertia = ring.acceleration(b, now.K1, now.K2, sin_phi, cos_phi, omega)
     normal_1, normal_2 = ring.reactions(b, now.K1, now.K2, sin_phi, cos_phi, omega, epsilon)
-    offset = ring.contact_offset(b)
-    ahead_1 = sign * (edge_ahead(scene.surface, mode.place_1, mode.sign) - (rho - offset))
-    ahead_2 = sign * (edge_ahead(scene.surface, mode.place_2, mode.sign) - (rho + offset))
+    ahead_1, ahead_2 = edges_ahead(scene, mode, rho)
     guards = (
         min(determinant, inertia),
         sign * v,
@@ -340,8 +328,7 @@ def _guards_and_motion(scene, mode, t, x):
 @implicit.row.implements(BristleRing)
 def _implicit_row(scene, mode, t, x):
     guards, (phi, omega, epsilon, ring_omega) = implicit.guards_and_motion(scene, mode, t, x)
-    _, _, zone_1 = coefficients(scene.surface, mode.place_1[0])
-    _, _, zone_2 = coefficients(scene.surface, mode.place_2[0])
+    zone_1, zone_2 = zones_under(scene, mode)
     state = 0.0 if mode.region == BAND else float(mode.sign)
     return phi, omega, epsilon, guards[NORMAL_1], guards[NORMAL_2], ring_omega, zone_1, zone_2, state, x[2], x[3]
 

@@ -10,10 +10,9 @@ from math import cos, sin, sqrt
 
 from ringsweep.compile import inlined
 from ringsweep.models.interface import implicit
-from ringsweep.models.ring.series import coefficients_under
+from ringsweep.models.ring.contacts import coefficients_under, edges_ahead, zones_under
 from ringsweep.physics import drives, ring
 from ringsweep.physics.friction.velocity import stiction_band, weights_in
-from ringsweep.physics.zones import coefficients, edge_ahead
 
 #: Guards, in the order of the rows of the series.
 INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(6)
@@ -56,7 +55,7 @@ def _is_stiff(scene, mode, y, line):
 
 @implicit.error_scales.implements(ring.Ring)
 def _error_scales(scene, tolerance, x):
-    return tolerance, tolerance * stiction_band(scene.law) * ring.support(scene.body)
+    return tolerance, tolerance * stiction_band(scene.law) * ring.reaction_determinant(scene.body)
 
 
 @implicit.rates.implements(ring.Ring)
@@ -100,9 +99,7 @@ def _guards_and_motion(scene, mode, t, x):
     sin_phi, cos_phi = sin(phi), cos(phi)
     epsilon, determinant, inertia = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
     normal_1, normal_2 = ring.reactions(scene.body, K1, K2, sin_phi, cos_phi, omega, epsilon)
-    offset = ring.contact_offset(scene.body)
-    ahead_1 = mode.sign * (edge_ahead(scene.surface, mode.place_1, mode.sign) - (x[0] - offset))
-    ahead_2 = mode.sign * (edge_ahead(scene.surface, mode.place_2, mode.sign) - (x[0] + offset))
+    ahead_1, ahead_2 = edges_ahead(scene, mode, x[0])
     speed = mode.sign * x[1]
     guards = (
         min(determinant, inertia),
@@ -120,7 +117,7 @@ def _near_zero(scene, motion):
     b = scene.body
     _, omega, _, _ = motion
     load = 0.05 * b.mass * (b.gravity + b.radius * omega * omega)
-    inertia = 0.02 * ring.support(b) * min(1.0, ring.about_axis(b))
+    inertia = 0.02 * ring.reaction_determinant(b) * min(1.0, ring.about_axis(b))
     return inertia, 0.0, load, load, 0.0, 0.0
 
 
@@ -139,6 +136,5 @@ def _seen(scene, view):
 @implicit.row.implements(ring.Ring)
 def _row(scene, mode, t, x):
     guards, (phi, omega, epsilon, ring_omega) = implicit.guards_and_motion(scene, mode, t, x)
-    _, _, zone_1 = coefficients(scene.surface, mode.place_1[0])
-    _, _, zone_2 = coefficients(scene.surface, mode.place_2[0])
+    zone_1, zone_2 = zones_under(scene, mode)
     return phi, omega, epsilon, guards[NORMAL_1], guards[NORMAL_2], ring_omega, zone_1, zone_2, 0.0

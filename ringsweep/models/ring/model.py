@@ -8,31 +8,44 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ringsweep.models.model import Model
 from ringsweep.models.parts import GRAVITY, MASS, SPAN, drive_of, law_of, pair
 from ringsweep.models.ring import record
 from ringsweep.models.scene import Structure, Values, require
 from ringsweep.physics import drives, friction, ring, zones
+from ringsweep.physics.friction.presliding import steady_deflection
 from ringsweep.quantities.parameters import Parameter, declared
 
 RADIUS = Parameter("m", "radius of the inner race", lower=0.0, open_lower=True)
 
 
-class SingleContactRing:
+class SingleContactRing(Model):
     """A small body on one contact with the ring (the paper's Fig. 13)."""
 
     name: ClassVar[str] = "ring-single-contact"
     doc: ClassVar[str] = "a small body in a rotating ring, one contact"
     outcomes: ClassVar[tuple[str, ...]] = record.Outcome._fields
-    laws: ClassVar[dict[str, type]] = {
-        name: law for name, law in friction.LAWS.items() if name not in ("karnopp", "reset-integrator", "bristle")
-    }
+    place: ClassVar[str] = "phi"
+    rotates: ClassVar[bool] = True
     absent: ClassVar[frozenset[str]] = frozenset({"normal_min_2", "normal_2", "zone_2", "deflection_2"})
     body: ClassVar[dict[str, Parameter]] = {"body.mass": MASS, "ring.radius": RADIUS}
+
+    def takes(self, law: type) -> bool:
+        """Laws without a dead band; bristles must know how far they are deflected after long sliding."""
+        traits = friction.TRAITS[law]
+        return not traits.dead_band and (traits.family is not friction.Dynamic or steady_deflection.is_defined_for(law))
+
+    def scene_type(self, structure: Structure) -> type:
+        """With bristles a ring of its own kind."""
+        return ring.BristleRing if self._has_bristles(structure) else ring.Ring
+
+    def _has_bristles(self, structure: Structure) -> bool:
+        return friction.family_of(self.laws[structure.law]) is friction.Dynamic
 
     def history(self, structure: Structure) -> tuple[str, ...]:
         """Quantities of a time history, in the order of their columns."""
         names = "phi", "omega", "epsilon", "normal_1", "normal_2", "ring_omega", "zone_1", "zone_2", "mode"
-        return (*names, "deflection_1", "deflection_2") if self.laws[structure.law] in friction.DYNAMIC else names
+        return (*names, "deflection_1", "deflection_2") if self._has_bristles(structure) else names
 
     def parameters(self, structure: Structure) -> dict[str, Parameter]:
         """Every numeric path of a scene of this structure."""
@@ -71,7 +84,7 @@ class SingleContactRing:
             for arc in structure.arcs
         ]
         surface = zones.cut(arcs, *pair(law, "friction.rest", values))
-        return (ring.BristleRing if law in friction.DYNAMIC else ring.Ring)(
+        return self.scene_type(structure)(
             body=self.build_body(values),
             surface=surface,
             law=law_of(law, values),

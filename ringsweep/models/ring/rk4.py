@@ -9,11 +9,12 @@ from ringsweep.compile import inlined
 from ringsweep.models.interface import constant_step
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
 from ringsweep.models.parts import largest_eigenvalue
+from ringsweep.models.ring.contacts import zones_at
 from ringsweep.models.ring.record import ENDS
 from ringsweep.numerics.functions import any_of, select, sine_cosine, sine_cosine_near
 from ringsweep.numerics.memory import Several
 from ringsweep.physics import contact, ring, zones
-from ringsweep.physics.friction.velocity import met, steepest, stiction_band
+from ringsweep.physics.friction.velocity import passes_band, steepest, stiction_band
 
 
 class Inspection(NamedTuple):
@@ -110,10 +111,10 @@ def _stiffness(scene, before, now, h):
     # wrong in kind: it has met it all the same.
     low, high = min(min(before.v, now.v), ahead), max(max(before.v, now.v), ahead)
     if any_of((low <= band) & (high >= -band)):
-        rest, edge, _ = met(scene.law, before.v, now.v, ahead)
+        rest, edge, _ = passes_band(scene.law, before.v, now.v, ahead)
         mu_s, mu_k = zones.roughest(scene.surface)
         (rest_s, rest_k), (edge_s, edge_k) = steepest(scene.law)
-        scale = -radius * ring.grip(scene.body, now.cos_phi, now.omega)
+        scale = -radius * ring.friction_gain(scene.body, now.cos_phi, now.omega)
         friction = _steeper(friction, select(rest, scale * (rest_s * mu_s + rest_k * mu_k), 0.0))
         friction = _steeper(friction, select(edge, scale * (edge_s * mu_s + edge_k * mu_k), 0.0))
     # Even without friction the body swings, and under friction its speed loads the contacts.
@@ -161,8 +162,5 @@ def _describe(scene, y, drive_at, drive_rate):
     now = constant_step.inspect(scene, y, drive_at, drive_rate)
     band = stiction_band(scene.law)
     mode = 0.0 if abs(now.v) < band or now.v == 0.0 else 1.0 if now.v > 0.0 else -1.0
-    offset = ring.contact_offset(scene.body)
-    rho = y[0] - drive_at
-    zone_1 = zones.coefficients(scene.surface, zones.segment(scene.surface, rho - offset))[2]
-    zone_2 = zones.coefficients(scene.surface, zones.segment(scene.surface, rho + offset))[2]
+    zone_1, zone_2 = zones_at(scene, y[0] - drive_at)
     return y[0], y[1], now.rates[1], now.normal_1, now.normal_2, drive_rate, zone_1, zone_2, mode

@@ -17,6 +17,15 @@ from typing import NamedTuple
 from ringsweep.compile import hook, inlined
 from ringsweep.models.interface import modes, series
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
+from ringsweep.models.ring.contacts import (
+    coefficients_under,
+    edges_ahead,
+    friction_under,
+    places_after_edge,
+    places_at,
+    places_beyond,
+    zones_under,
+)
 from ringsweep.models.ring.record import ENDS
 from ringsweep.numerics.series import (
     INVERSE,
@@ -32,7 +41,7 @@ from ringsweep.numerics.series import (
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction.velocity import (
     BAND,
-    CLEAN,
+    KINETIC,
     constant_weights,
     expand_weights,
     faster,
@@ -43,11 +52,10 @@ from ringsweep.physics.friction.velocity import (
     tail_reach,
     weights_in,
 )
-from ringsweep.physics.zones import beyond, coefficients, cross, edge_ahead, locate
 
 # Rows of the series; the guards last, and first of them the one without which the others mean nothing.
-PHI, V, OMEGA, EPSILON, SIN, COS, SQUARE, THETA, EXCESS, BASIS, STATIC, KINETIC = range(12)
-K1, K2, SPARE = range(12, 15)
+PHI, V, OMEGA, EPSILON, SIN, COS, SQUARE, THETA, EXCESS, BASIS, STATIC_WEIGHT, KINETIC_WEIGHT = range(12)
+FRICTION_1, FRICTION_2, SPARE = range(12, 15)
 INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(15, 21)
 
 
@@ -73,14 +81,6 @@ class Mode(NamedTuple):
     place_2: tuple[int, int]
 
 
-@inlined
-def coefficients_under(scene, mode):
-    """Static and kinetic coefficient under each contact."""
-    mu_s1, mu_k1, _ = coefficients(scene.surface, mode.place_1[0])
-    mu_s2, mu_k2, _ = coefficients(scene.surface, mode.place_2[0])
-    return mu_s1, mu_k1, mu_s2, mu_k2
-
-
 @modes.initial_state.implements(ring.Ring)
 def _initial_state(scene):
     v = drives.launched(scene.drive, ring.launch_velocity(scene)) * scene.body.radius
@@ -96,8 +96,7 @@ def _table_shape(scene):
 def _initial_mode(scene, t, y):
     phi, v = y
     theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
-    offset = ring.contact_offset(scene.body)
-    place_1, place_2 = locate(scene.surface, phi - theta - offset), locate(scene.surface, phi - theta + offset)
+    place_1, place_2 = places_at(scene, phi - theta)
     if v == 0.0 and stiction_band(scene.law) == 0.0:
         return _settle(scene, t, phi, place_1, place_2, 0)
     sign = 1 if v > 0.0 else -1
@@ -106,17 +105,8 @@ def _initial_mode(scene, t, y):
         # Friction is zero here: the way the body goes is the way that it is pushed.
         push, _, _ = ring.acceleration(scene.body, 0.0, 0.0, sin(phi), cos(phi), ring_omega)
         sign, fresh = (1 if push >= ring_epsilon else -1), SLOW
-    mode = Mode(sign, region, fresh, place_1, place_2)
-    mode = Mode(sign, region, fresh, *_moving(scene, mode, phi - theta, sign))
+    mode = Mode(sign, region, fresh, *places_beyond(scene, place_1, place_2, phi - theta, sign))
     return _after_jump(scene, mode, t, y), mode
-
-
-@inlined
-def _moving(scene, mode, rho, sign):
-    """Places of contacts that move from the angle `rho` in the ring's frame, forwards or backwards."""
-    offset = ring.contact_offset(scene.body)
-    first = beyond(scene.surface, mode.place_1, rho - offset, sign)
-    return first, beyond(scene.surface, mode.place_2, rho + offset, sign)
 
 
 @inlined
@@ -132,9 +122,9 @@ def _settle(scene, t, phi, place_1, place_2, released):
     """Status and mode of a set-valued law where the sliding velocity is zero; see :func:`contact.at_rest`."""
     theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     region = region_at(scene.law, 0.0)
-    still = Mode(0, CLEAN, -1, place_1, place_2)
-    forward = Mode(1, region, SLOW, *_moving(scene, still, phi - theta, 1))
-    backward = Mode(-1, region, SLOW, *_moving(scene, still, phi - theta, -1))
+    still = Mode(0, KINETIC, -1, place_1, place_2)
+    forward = Mode(1, region, SLOW, *places_beyond(scene, place_1, place_2, phi - theta, 1))
+    backward = Mode(-1, region, SLOW, *places_beyond(scene, place_1, place_2, phi - theta, -1))
     mu_s1, _, mu_s2, _ = coefficients_under(scene, still)
     breakaway = _at_breakaway(scene, forward), _at_breakaway(scene, backward)
     motion = sin(phi), cos(phi), ring_omega, ring_epsilon
@@ -145,7 +135,7 @@ def _settle(scene, t, phi, place_1, place_2, released):
             mu_s1, _, mu_s2, _ = coefficients_under(scene, moving)
             on_edge = moving.place_1 != place_1 or moving.place_2 != place_2
             if on_edge and contact.at_rest(scene.body, (mu_s1, mu_s2), *breakaway, *motion, 0) == contact.STICK:
-                return RUNNING, Mode(0, CLEAN, -1, moving.place_1, moving.place_2)
+                return RUNNING, Mode(0, KINETIC, -1, moving.place_1, moving.place_2)
     if found == contact.FORWARD:
         return RUNNING, forward
     if found == contact.BACKWARD:
@@ -168,9 +158,7 @@ def _after_jump(scene, mode, t, y):
 @inlined
 def _friction_at(scene, mode, t, v):
     """Friction at each contact per unit of its reaction, and angular velocity of the body, at a sliding velocity."""
-    mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
-    w_s, w_k, _, _ = weights_in(scene.law, mode.region, abs(v))
-    K1, K2 = -mode.sign * (w_s * mu_s1 + w_k * mu_k1), -mode.sign * (w_s * mu_s2 + w_k * mu_k2)
+    K1, K2 = friction_under(scene, mode, abs(v))
     return K1, K2, v / scene.body.radius + drives.turn(scene.drive, t)[1]
 
 
@@ -243,13 +231,7 @@ def _switch(scene, mode, guard, t, y):
         return status, mode, (phi, 0.0)
     if guard == EDGE:
         theta, _, _ = drives.turn(scene.drive, t)
-        offset = ring.contact_offset(scene.body)
-        ahead_1 = sign * (edge_ahead(scene.surface, place_1, sign) - (phi - theta - offset))
-        ahead_2 = sign * (edge_ahead(scene.surface, place_2, sign) - (phi - theta + offset))
-        if ahead_1 <= ahead_2:
-            place_1 = cross(scene.surface, place_1, sign)
-        else:
-            place_2 = cross(scene.surface, place_2, sign)
+        place_1, place_2 = places_after_edge(scene, mode, phi - theta)
         mode = Mode(sign, region, SLOW if v == 0.0 else -1, place_1, place_2)
         return _after_jump(scene, mode, t, y), mode, y
     low, high = region_bounds(scene.law, region)
@@ -322,10 +304,8 @@ def _expand(scene, mode, t, y, tolerance, c):
 def _expand_sliding(scene, mode, c):
     """Slip with constant K: the flow is autonomous."""
     body = scene.body
-    mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
     # Kinetic but in a tail that does not decay.
-    w_s, w_k, _, _ = weights_in(scene.law, mode.region, 0.0)
-    k1, k2 = -mode.sign * (w_s * mu_s1 + w_k * mu_k1), -mode.sign * (w_s * mu_s2 + w_k * mu_k2)
+    k1, k2 = friction_under(scene, mode, 0.0)
     p, determinant, inertia = ring.acceleration(body, k1, k2, 0.0, 0.0, 1.0)
     q, _, _ = ring.acceleration(body, k1, k2, 0.0, 1.0, 0.0)
     r, _, _ = ring.acceleration(body, k1, k2, 1.0, 0.0, 0.0)
@@ -348,18 +328,16 @@ def _expand_sliding(scene, mode, c):
 @inlined
 def _expand_blended(scene, mode, c):
     """Slip in which the friction coefficients vary with the sliding speed."""
-    under = coefficients_under(scene, mode)
+    mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
     low, _ = region_bounds(scene.law, mode.region)
-    w_s, w_k, _, _ = weights_in(scene.law, mode.region, max(abs(c[V, 0]), low))
-    mu_s1, mu_k1, mu_s2, mu_k2 = under
-    k1, k2 = -mode.sign * (w_s * mu_s1 + w_k * mu_k1), -mode.sign * (w_s * mu_s2 + w_k * mu_k2)
+    k1, k2 = friction_under(scene, mode, max(abs(c[V, 0]), low))
     answer = _answer(scene.body, k1, k2)
     for k in range(ORDER + 1):
         _sine(c, k)
         c[EXCESS, k] = mode.sign * c[V, k] - (low if k == 0 else 0.0)
-        expand_weights(scene.law, mode.region, c[EXCESS], k, c[BASIS], c[STATIC], c[KINETIC])
-        c[K1, k] = -mode.sign * (c[STATIC, k] * mu_s1 + c[KINETIC, k] * mu_k1)
-        c[K2, k] = -mode.sign * (c[STATIC, k] * mu_s2 + c[KINETIC, k] * mu_k2)
+        expand_weights(scene.law, mode.region, c[EXCESS], k, c[BASIS], c[STATIC_WEIGHT], c[KINETIC_WEIGHT])
+        c[FRICTION_1, k] = -mode.sign * (c[STATIC_WEIGHT, k] * mu_s1 + c[KINETIC_WEIGHT, k] * mu_k1)
+        c[FRICTION_2, k] = -mode.sign * (c[STATIC_WEIGHT, k] * mu_s2 + c[KINETIC_WEIGHT, k] * mu_k2)
         _balance_term(scene.body, answer, c, k)
         if k < ORDER:
             _next_state(scene, c, k)
@@ -404,7 +382,7 @@ def _two_balance_term(body, answer, c, k):
     lever, k1, k2, a1, a2, b1, b2 = answer
     about_axis = ring.about_axis(b)
     # Friction but for what the reactions of this order make of it.
-    f1, f2 = product(c[K1, 1:], c[NORMAL_1], k - 1), product(c[K2, 1:], c[NORMAL_2], k - 1)
+    f1, f2 = product(c[FRICTION_1, 1:], c[NORMAL_1], k - 1), product(c[FRICTION_2, 1:], c[NORMAL_2], k - 1)
     radial = b.mass * (b.gravity * c[COS, k] + b.xi * c[SQUARE, k]) + (f1 - f2) * sb
     tangential = b.mass * b.gravity * (1.0 - b.mass * b.xi * b.xi / about_axis) * c[SIN, k] - (f1 + f2) * lever
     c[NORMAL_1, k] = b2 * radial + a2 * tangential
@@ -412,8 +390,8 @@ def _two_balance_term(body, answer, c, k):
     friction = (f1 + k1 * c[NORMAL_1, k]) + (f2 + k2 * c[NORMAL_2, k])
     c[EPSILON, k] = (b.radius * friction - b.mass * b.gravity * b.xi * c[SIN, k]) / about_axis
     one = 1.0 if k == 0 else 0.0
-    both = product(c[K1], c[K2], k)
-    difference = (cb * lever - sb * sb) * (c[K1, k] - c[K2, k])
+    both = product(c[FRICTION_1], c[FRICTION_2], k)
+    difference = (cb * lever - sb * sb) * (c[FRICTION_1, k] - c[FRICTION_2, k])
     c[INERTIA, k] = about_axis * (2.0 * sb * (one * cb + both * lever) + difference)
 
 
@@ -422,7 +400,7 @@ def _one_balance_term(body, answer, c, k):
     c[INERTIA, k] = 1.0 if k == 0 else 0.0
     load = body.mass * (body.gravity * c[COS, k] + body.radius * c[SQUARE, k])
     c[NORMAL_1, k] = c[NORMAL_2, k] = load
-    friction = product(c[K1], c[NORMAL_1], k)
+    friction = product(c[FRICTION_1], c[NORMAL_1], k)
     c[EPSILON, k] = (friction / body.mass - body.gravity * c[SIN, k]) / body.radius
 
 
@@ -430,10 +408,7 @@ def _one_balance_term(body, answer, c, k):
 def _guard_sliding(scene, mode, c):
     """Guards of slip: both bounds of the region of speed, and the nearer edge."""
     low, high = region_bounds(scene.law, mode.region)
-    offset = ring.contact_offset(scene.body)
-    rho = c[PHI, 0] - c[THETA, 0]
-    ahead_1 = mode.sign * (edge_ahead(scene.surface, mode.place_1, mode.sign) - (rho - offset))
-    ahead_2 = mode.sign * (edge_ahead(scene.surface, mode.place_2, mode.sign) - (rho + offset))
+    ahead_1, ahead_2 = edges_ahead(scene, mode, c[PHI, 0] - c[THETA, 0])
     for k in range(1, ORDER + 1):
         c[SLOW, k] = mode.sign * c[V, k]
         c[FAST, k] = -c[SLOW, k]
@@ -488,7 +463,14 @@ def _two_hold(body, m1, m2, c):
     mean, half = 0.5 * (m1 + m2), 0.5 * (m1 - m2)
     moment = b.inertia + b.mass * b.xi * b.xi
     # Rows that only slip needs.
-    friction, difference, load, total, linear, share = c[K1], c[K2], c[STATIC], c[KINETIC], c[SPARE], c[BASIS]
+    friction, difference, load, total, linear, share = (
+        c[FRICTION_1],
+        c[FRICTION_2],
+        c[STATIC_WEIGHT],
+        c[KINETIC_WEIGHT],
+        c[SPARE],
+        c[BASIS],
+    )
     for k in range(ORDER + 1):
         friction[k] = (moment * c[EPSILON, k] + b.mass * b.gravity * b.xi * c[SIN, k]) / b.radius
         difference[k] = (b.mass * (b.xi * c[EPSILON, k] + b.gravity * c[SIN, k]) - friction[k] * cb) / sb
@@ -559,8 +541,7 @@ def _extremes(scene, record, mode, c, h, work):
 
 @series.row.implements(ring.Ring)
 def _row(scene, mode, c, t, s):
-    _, _, zone_1 = coefficients(scene.surface, mode.place_1[0])
-    _, _, zone_2 = coefficients(scene.surface, mode.place_2[0])
+    zone_1, zone_2 = zones_under(scene, mode)
     return (
         value(c[PHI], s),
         value(c[OMEGA], s),

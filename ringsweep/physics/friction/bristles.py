@@ -2,7 +2,7 @@
 
 Stiffness and damping are per unit of the normal load here: 1/m and s/m, so that the traction, the force per unit of
 the load, is :math:`\\sigma_0 z + \\sigma_1 \\dot z + \\sigma_2 v`. To add a law: a class with its parameters, its
-formula, :func:`bristle`, and what tells stick from slip, :func:`lasts`.
+formula, :func:`bristle`, and what tells stick from slip, :func:`region_guard`.
 """
 
 from __future__ import annotations
@@ -12,68 +12,23 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from ringsweep.compile import hook, inlined
-from ringsweep.physics.friction.velocity import BAND, CLEAN
+from ringsweep.compile import inlined
+from ringsweep.physics.friction.presliding import (
+    NEARLY,
+    SIGMA_0,
+    SIGMA_1,
+    SIGMA_2,
+    V_S,
+    after_yield,
+    bristle,
+    initial_deflection,
+    region_guard,
+    steady_deflection,
+    stick_speed,
+)
+from ringsweep.physics.friction.registry import Dynamic, Traits
+from ringsweep.physics.friction.velocity import BAND, KINETIC
 from ringsweep.quantities.parameters import Leaf, Parameter
-
-MU_K = Parameter("1", "kinetic friction coefficient", lower=0.0, open_lower=True)
-
-#: Share of the deflection of steady sliding from which on a contact counts as slipping.
-NEARLY = 0.999
-
-SIGMA_0 = Parameter("1/m", "stiffness of the bristles", lower=0.0, open_lower=True)
-SIGMA_1 = Parameter("s/m", "damping of the bristles", lower=0.0, default=0.0)
-SIGMA_2 = Parameter("s/m", "viscous friction", lower=0.0, default=0.0)
-V_S = Parameter("m/s", "Stribeck velocity", lower=0.0, open_lower=True)
-
-
-@hook
-def bristle(law, mu_s, mu_k, v, z, sign, region):
-    """Rate of the deflection and traction, each with its partial derivatives.
-
-    Parameters
-    ----------
-    law : NamedTuple
-        A law of this kind.
-    mu_s, mu_k : float
-        Static and kinetic coefficient of the surface under the contact.
-    v, z : float
-        Sliding velocity, m/s, and deflection, m.
-    sign : float
-        Sign of the sliding velocity, +1 or -1; a formula in \\|v\\| is continued smoothly through zero by it.
-    region : int
-        BAND where the contact counts as stuck, CLEAN where it slips.
-
-    Returns
-    -------
-    tuple of float
-        ``(rate, by v, by z, traction, by v, by z)``; m/s, 1, 1/s, 1, s/m, 1/m.
-    """
-
-
-@hook
-def lasts(law, mu_s, mu_k, v, z, sign, region):
-    """A guard: positive while the region lasts, for the arguments of :func:`bristle`."""
-
-
-@hook
-def yields(law, mu_s, mu_k, z, sign, region):
-    """Deflection and region after that guard has reached zero, while sliding in the direction `sign`."""
-
-
-@hook
-def crawl(law, recoil):
-    """Speed by which to tell stick from a graze, m/s, where `recoil` is that of a body let go by its bristles."""
-
-
-@hook
-def made(law, mu_s, mu_k):
-    """Deflection of a contact that has just been made, m."""
-
-
-@hook
-def steady(law, mu_s, mu_k, v):
-    """Deflection of bristles that have slid at the velocity `v` for long, m; zero at rest."""
 
 
 class Dahl(NamedTuple):
@@ -93,13 +48,13 @@ def _dahl(law, mu_s, mu_k, v, z, sign, region):
     return v * rate_v, rate_v, rate_z, law.sigma0 * z, 0.0, law.sigma0
 
 
-@lasts.implements(Dahl)
+@region_guard.implements(Dahl)
 def _dahl_lasts(law, mu_s, mu_k, v, z, sign, region):
     slack = NEARLY - law.sigma0 * sign * z / mu_k
     return slack if region == BAND else -slack
 
 
-@steady.implements(Dahl)
+@steady_deflection.implements(Dahl)
 def _dahl_steady(law, mu_s, mu_k, v):
     return (1.0 if v > 0.0 else -1.0 if v < 0.0 else 0.0) * mu_k / law.sigma0
 
@@ -190,30 +145,30 @@ def _elasto_plastic(law, mu_s, mu_k, v, z, sign, region):
     return viscoelastic(law, v, z, v * (1.0 - plastic * load / g), rate_v, rate_z)
 
 
-@lasts.implements(LuGre, ElastoPlastic)
+@region_guard.implements(LuGre, ElastoPlastic)
 def _loading(law, mu_s, mu_k, v, z, sign, region):
     g, _ = stribeck(law, mu_s, mu_k, v)
     slack = min(NEARLY - law.sigma0 * sign * z / g, 1.0 - sign * v / law.v_s)
     return slack if region == BAND else -slack
 
 
-@steady.implements(LuGre, ElastoPlastic)
+@steady_deflection.implements(LuGre, ElastoPlastic)
 def _stribeck_steady(law, mu_s, mu_k, v):
     g, _ = stribeck(law, mu_s, mu_k, v)
     return (1.0 if v > 0.0 else -1.0 if v < 0.0 else 0.0) * g / law.sigma0
 
 
-@yields.implements(Dahl, LuGre, ElastoPlastic)
+@after_yield.implements(Dahl, LuGre, ElastoPlastic)
 def _passes(law, mu_s, mu_k, z, sign, region):
-    return z, CLEAN if region == BAND else BAND
+    return z, KINETIC if region == BAND else BAND
 
 
-@crawl.implements(LuGre, ElastoPlastic)
+@stick_speed.implements(LuGre, ElastoPlastic)
 def _stribeck_or_recoil(law, recoil):
     return min(law.v_s, recoil)
 
 
-@made.implements(Dahl, LuGre, ElastoPlastic)
+@initial_deflection.implements(Dahl, LuGre, ElastoPlastic)
 def _undeflected(law, mu_s, mu_k):
     return 0.0
 
@@ -236,17 +191,17 @@ def _reset_integrator(law, mu_s, mu_k, v, z, sign, region):
     return 0.0, 0.0, 0.0, sign * mu_k, 0.0, 0.0
 
 
-@lasts.implements(ResetIntegrator)
+@region_guard.implements(ResetIntegrator)
 def _until_saturated(law, mu_s, mu_k, v, z, sign, region):
     return mu_s - law.sigma0 * sign * z if region == BAND else 1.0
 
 
-@yields.implements(ResetIntegrator)
+@after_yield.implements(ResetIntegrator)
 def _saturates(law, mu_s, mu_k, z, sign, region):
-    return sign * mu_s / law.sigma0, CLEAN
+    return sign * mu_s / law.sigma0, KINETIC
 
 
-@made.implements(ResetIntegrator)
+@initial_deflection.implements(ResetIntegrator)
 def _reset_made(law, mu_s, mu_k):
     return 0.0
 
@@ -298,7 +253,7 @@ def _bristles(law, mu_s, mu_k, v, z, sign, region):
     return v, 1.0, 0.0, law.sigma0 * z, 0.0, law.sigma0
 
 
-@lasts.implements(Bristles)
+@region_guard.implements(Bristles)
 def _until_snap(law, mu_s, mu_k, v, z, sign, region):
     longest = sign * law.bonds[0]
     for i in range(1, BONDS):
@@ -306,7 +261,7 @@ def _until_snap(law, mu_s, mu_k, v, z, sign, region):
     return 1.0 - (sign * z + longest) / _snapping(law, mu_k)
 
 
-@yields.implements(Bristles)
+@after_yield.implements(Bristles)
 def _snap(law, mu_s, mu_k, z, sign, region):
     bonds = law.bonds
     longest = 0
@@ -321,10 +276,10 @@ def _snap(law, mu_s, mu_k, z, sign, region):
     for i in range(BONDS):
         bonds[i] -= mean
     bonds[BONDS + 1] = sign + (bonds[BONDS + 1] if sign * bonds[BONDS + 1] > 0.0 else 0.0)
-    return z + mean, CLEAN if region == CLEAN or abs(bonds[BONDS + 1]) >= BONDS else BAND
+    return z + mean, KINETIC if region == KINETIC or abs(bonds[BONDS + 1]) >= BONDS else BAND
 
 
-@made.implements(Bristles)
+@initial_deflection.implements(Bristles)
 def _random_bonds(law, mu_s, mu_k):
     law.bonds[BONDS] = 1.0 + (48271.0 * (law.seed + 1.0)) % (_MODULUS - 1.0)
     law.bonds[BONDS + 1] = 0.0
@@ -337,22 +292,16 @@ def _random_bonds(law, mu_s, mu_k):
     return 0.0
 
 
-@crawl.implements(Dahl, ResetIntegrator, Bristles)
+@stick_speed.implements(Dahl, ResetIntegrator, Bristles)
 def _recoil(law, recoil):
     return recoil
 
 
-#: Laws that know no static friction.
-WITHOUT_STATIC = {Dahl, Bristles}
-
-#: Laws whose memory changes in jumps.
-WITH_SNAPS = {Bristles}
-
 #: Laws by the name that the configuration gives them.
-LAWS: dict[str, type] = {
-    "dahl": Dahl,
-    "lugre": LuGre,
-    "elasto-plastic": ElastoPlastic,
-    "reset-integrator": ResetIntegrator,
-    "bristle": Bristles,
+LAWS = {
+    "dahl": (Dahl, Traits(Dynamic, static=False)),
+    "lugre": (LuGre, Traits(Dynamic)),
+    "elasto-plastic": (ElastoPlastic, Traits(Dynamic)),
+    "reset-integrator": (ResetIntegrator, Traits(Dynamic)),
+    "bristle": (Bristles, Traits(Dynamic, static=False, snaps=True)),
 }

@@ -9,11 +9,12 @@ import numpy as np
 
 from ringsweep.compile import inlined
 from ringsweep.numerics.functions import decay, select
+from ringsweep.physics.friction.registry import SetValued, Traits
 from ringsweep.physics.friction.velocity import (
     BAND,
-    CLEAN,
+    KINETIC,
     ONE,
-    TAIL,
+    STRIBECK,
     ZERO,
     Piece,
     blend,
@@ -35,7 +36,7 @@ def absent():
 @inlined
 def tail(region, low, high, alpha):
     """Weights that pass from static to kinetic friction as ``exp(-alpha (speed - low))``, and beyond."""
-    if region == CLEAN:
+    if region == KINETIC:
         return Piece(high, inf, 0.0, ZERO, ONE)
     if alpha == 0.0:
         return Piece(low, high, 0.0, ONE, ZERO)
@@ -62,7 +63,7 @@ class Coulomb(NamedTuple):
 
 @piece.implements(Coulomb)
 def _coulomb(law, region):
-    return Piece(0.0, inf, 0.0, ZERO, ONE) if region == CLEAN else absent()
+    return Piece(0.0, inf, 0.0, ZERO, ONE) if region == KINETIC else absent()
 
 
 class Stiction(NamedTuple):
@@ -77,7 +78,7 @@ def _kinetic(law, speed):
 
 @piece.implements(Stiction)
 def _stiction(law, region):
-    return Piece(0.0, inf, 0.0, ZERO, ONE) if region == CLEAN else absent()
+    return Piece(0.0, inf, 0.0, ZERO, ONE) if region == KINETIC else absent()
 
 
 class Tustin(NamedTuple):
@@ -136,9 +137,9 @@ class Karnopp(NamedTuple):
 
 @piece.implements(Karnopp)
 def _karnopp(law, region):
-    if region == TAIL:
+    if region == STRIBECK:
         return absent()
-    if region == CLEAN:
+    if region == KINETIC:
         return Piece(law.dead_band, inf, 0.0, ZERO, ONE)
     return Piece(0.0, law.dead_band, 0.0, ONE, ZERO)
 
@@ -148,8 +149,10 @@ def _dead_band(law):
     return law.dead_band
 
 
-#: Laws that know no static friction.
-WITHOUT_STATIC = {Coulomb}
-
 #: Laws by the name that the configuration gives them.
-LAWS: dict[str, type] = {"coulomb": Coulomb, "stiction": Stiction, "tustin": Tustin, "karnopp": Karnopp}
+LAWS = {
+    "coulomb": (Coulomb, Traits(SetValued, static=False)),
+    "stiction": (Stiction, Traits(SetValued)),
+    "tustin": (Tustin, Traits(SetValued)),
+    "karnopp": (Karnopp, Traits(SetValued, dead_band=True)),
+}

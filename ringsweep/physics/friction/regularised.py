@@ -7,11 +7,12 @@ from typing import Annotated, Any, NamedTuple
 
 from ringsweep.numerics.functions import decay, select
 from ringsweep.physics.friction.coulomb import ALPHA, absent, decaying, end_of_tail, tail
+from ringsweep.physics.friction.registry import Smooth, Traits
 from ringsweep.physics.friction.velocity import (
     BAND,
-    CLEAN,
+    KINETIC,
     ONE,
-    TAIL,
+    STRIBECK,
     ZERO,
     Piece,
     blend,
@@ -41,9 +42,9 @@ class Threlfall(NamedTuple):
 
 @piece.implements(Threlfall)
 def _threlfall(law, region):
-    if region == TAIL:
+    if region == STRIBECK:
         return absent()
-    if region == CLEAN:
+    if region == KINETIC:
         return Piece(law.v0, inf, 0.0, ZERO, ONE)
     full = 1.0 / (1.0 - exp(-3.0))
     return Piece(0.0, law.v0, 3.0 / law.v0, ZERO, (full, 0.0, -full, 0.0))
@@ -74,7 +75,7 @@ class PiecewiseLinear(NamedTuple):
 
 @piece.implements(PiecewiseLinear)
 def _piecewise_linear(law, region):
-    if region == CLEAN:
+    if region == KINETIC:
         return Piece(law.v1, inf, 0.0, ZERO, ONE)
     if region == BAND:
         return Piece(0.0, law.v0, 0.0, (0.0, 1.0 / law.v0, 0.0, 0.0), ZERO)
@@ -114,7 +115,7 @@ class PiecewiseCubic(NamedTuple):
 
 @piece.implements(PiecewiseCubic)
 def _piecewise_cubic(law, region):
-    if region == CLEAN:
+    if region == KINETIC:
         return Piece(law.v1, inf, 0.0, ZERO, ONE)
     if region == BAND:
         rate = 1.0 / law.v0
@@ -191,16 +192,10 @@ def _band(law):
     return law.v0
 
 
-#: Laws that know no static friction.
-WITHOUT_STATIC = {Threlfall}
-
-#: Parameters of which the first must be less than the second.
-ASCENDING: dict[Any, tuple[str, str]] = {PiecewiseLinear: ("v0", "v1"), PiecewiseCubic: ("v0", "v1")}
-
 #: Laws by the name that the configuration gives them.
-LAWS: dict[str, type] = {
-    "threlfall": Threlfall,
-    "piecewise-linear": PiecewiseLinear,
-    "piecewise-cubic": PiecewiseCubic,
-    "bengisu-akay": BengisuAkay,
+LAWS = {
+    "threlfall": (Threlfall, Traits(Smooth, static=False)),
+    "piecewise-linear": (PiecewiseLinear, Traits(Smooth, ascending=("v0", "v1"))),
+    "piecewise-cubic": (PiecewiseCubic, Traits(Smooth, ascending=("v0", "v1"))),
+    "bengisu-akay": (BengisuAkay, Traits(Smooth)),
 }

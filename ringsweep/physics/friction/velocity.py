@@ -23,7 +23,7 @@ MU_S = Parameter("1", "static friction coefficient", lower=0.0)
 MU_K = Parameter("1", "kinetic friction coefficient", lower=0.0)
 
 #: Regions of the sliding speed, from the fastest to the slowest. In the last a contact counts as stuck.
-CLEAN, TAIL, BAND = 0, 1, 2
+KINETIC, STRIBECK, BAND = 0, 1, 2
 
 
 class Piece(NamedTuple):
@@ -65,22 +65,22 @@ def region_bounds(law, region):
 @inlined
 def region_at(law, speed):
     """Region that holds a sliding speed, m/s; a boundary belongs to the region above it."""
-    if speed >= piece(law, CLEAN).low:
-        return CLEAN
-    tail = piece(law, TAIL)
-    return TAIL if tail.low < tail.high and speed >= tail.low else BAND
+    if speed >= piece(law, KINETIC).low:
+        return KINETIC
+    tail = piece(law, STRIBECK)
+    return STRIBECK if tail.low < tail.high and speed >= tail.low else BAND
 
 
 @inlined
 def faster(law, region):
     """Region beyond the upper bound of one."""
-    return TAIL if region == BAND and piece(law, TAIL).low < piece(law, TAIL).high else CLEAN
+    return STRIBECK if region == BAND and piece(law, STRIBECK).low < piece(law, STRIBECK).high else KINETIC
 
 
 @inlined
 def slower(law, region):
     """Region below the lower bound of one."""
-    return TAIL if region == CLEAN and piece(law, TAIL).low < piece(law, TAIL).high else BAND
+    return STRIBECK if region == KINETIC and piece(law, STRIBECK).low < piece(law, STRIBECK).high else BAND
 
 
 @inlined
@@ -148,7 +148,7 @@ def weights_in(law, region, speed):
 
 
 @inlined
-def met(law, before, after, ahead):
+def passes_band(law, before, after, ahead):
     """What a step meets whose sliding velocity is `before` at its beginning, `after` at its end, `ahead` in its stages.
 
     Returns
@@ -217,3 +217,10 @@ def tail_reach(law, region, v, h):
     """A step not above `h`, short enough for the series of the weights; `v` is the series of the sliding velocity."""
     decay = piece(law, region).decay
     return min(h, min(0.5 * _POWERS / (decay * abs(v[1])), sqrt(0.5 * _POWERS / (decay * abs(v[2])))))
+
+
+#: Functions without which no solver takes a law.
+MEMBERS = (piece, stiction_band)
+
+#: Functions that runs side by side in vector lanes need besides.
+LANES_MEMBERS = (blend, steepest)

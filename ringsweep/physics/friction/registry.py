@@ -1,0 +1,117 @@
+"""The friction laws by name, and what tells one kind of law from another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from ringsweep.compile import hook, lacking
+from ringsweep.physics.friction import presliding, velocity
+from ringsweep.quantities.parameters import Parameter
+
+
+class SetValued(NamedTuple):
+    """Family of laws whose friction at rest is whatever holds the contact, up to a bound."""
+
+
+class Smooth(NamedTuple):
+    """Family of laws whose friction is a continuous function of the sliding velocity."""
+
+
+class Dynamic(NamedTuple):
+    """Family of laws with a memory: friction depends on the deflection of bristles."""
+
+
+@dataclass(frozen=True)
+class Traits:
+    """What is particular about a law.
+
+    Attributes
+    ----------
+    family : type
+        :class:`SetValued`, :class:`Smooth` or :class:`Dynamic`.
+    static : bool
+        Whether the law needs a static coefficient beside the kinetic one.
+    ascending : tuple of str, optional
+        Two parameters of which the first must be less than the second.
+    snaps : bool
+        Whether its memory changes in jumps, at instants that only a method with events meets.
+    dead_band : bool
+        Whether a contact slower than the stiction band keeps its speed; the drive must be steady then.
+    """
+
+    family: type
+    static: bool = True
+    ascending: tuple[str, str] | None = None
+    snaps: bool = False
+    dead_band: bool = False
+
+
+#: Laws by the name that the configuration gives them.
+LAWS: dict[str, type] = {}
+
+#: What is particular about each law.
+TRAITS: dict[type, Traits] = {}
+
+# Functions without which no solver takes a law, by its family.
+_NEEDED: dict[type, tuple[Any, ...]] = {
+    SetValued: velocity.MEMBERS,
+    Smooth: velocity.MEMBERS,
+    Dynamic: presliding.MEMBERS,
+}
+
+
+@hook
+def family(law):
+    """Family of a law, an instance of :class:`SetValued`, :class:`Smooth` or :class:`Dynamic`."""
+
+
+def _set_valued(law):
+    return SetValued()
+
+
+def _smooth(law):
+    return Smooth()
+
+
+def _dynamic(law):
+    return Dynamic()
+
+
+_FAMILY_BODIES: dict[type, Any] = {SetValued: _set_valued, Smooth: _smooth, Dynamic: _dynamic}
+
+
+def add_law(name: str, law: type, traits: Traits) -> None:
+    """Make a friction law known under a name.
+
+    Parameters
+    ----------
+    name : str
+        Name in configurations.
+    law : type
+        ``NamedTuple`` of the law's parameters; the functions of its family have bodies for it.
+    traits : Traits
+        Its family, and what is particular about it.
+
+    Raises
+    ------
+    TypeError
+        If a function that the family needs has no body for the law, or if the name is taken.
+    """
+    if missing := lacking(law, _NEEDED[traits.family]):
+        raise TypeError(f"friction law {name} has no {', '.join(missing)}: every law of its family needs one")
+    if LAWS.setdefault(name, law) is not law:
+        raise TypeError(f"there is a friction law {name} already: choose another name")
+    TRAITS[law] = traits
+    family.implements(law)(_FAMILY_BODIES[traits.family])
+
+
+def family_of(law: type) -> type:
+    """Family of a class of laws."""
+    return TRAITS[law].family
+
+
+def coefficients_of(law: type) -> dict[str, Parameter]:
+    """Coefficients that a law needs of each surface."""
+    mu_k = presliding.MU_K if family_of(law) is Dynamic else velocity.MU_K
+    return {"mu_s": velocity.MU_S, "mu_k": mu_k} if TRAITS[law].static else {"mu_k": mu_k}
