@@ -379,18 +379,19 @@ OWN = """
 from typing import Annotated, NamedTuple
 from ringsweep.numerics.functions import select
 from ringsweep.quantities.parameters import Leaf
-from ringsweep.physics.friction import Smooth, Traits, add_law, regularised
-from ringsweep.physics.friction.velocity import BAND, KINETIC, ONE, STRIBECK, ZERO, Piece, piece, stiction_band
+from ringsweep.physics.friction import Smooth, Traits, add_law
+from ringsweep.physics.friction.regularised import V0
+from ringsweep.physics.friction.velocity import BAND, KINETIC, ONE, STRIBECK, ZERO, Piece, absent, piece, stiction_band
 
 
 class Ramp(NamedTuple):
-    v0: Annotated[Leaf, regularised.V0]
+    v0: Annotated[Leaf, V0]
 
 
 @piece.implements(Ramp)
 def _ramp(law, region):
     if region == STRIBECK:
-        return regularised.absent()
+        return absent()
     if region == KINETIC:
         return Piece(law.v0, float("inf"), 0.0, ZERO, ONE)
     return Piece(0.0, law.v0, 0.0, ZERO, (0.0, 1.0 / law.v0, 0.0, 0.0))

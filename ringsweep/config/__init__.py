@@ -1,8 +1,13 @@
 """Configurations: YAML text to a validated scene, axes and solver in SI units."""
 
+from ringsweep.compile.cache import OWN_LAWS
 from ringsweep.config.axes import Axes
 from ringsweep.config.configuration import Config, load, read_axes, read_scene, with_values
+from ringsweep.config.own_files import load_own_files
 from ringsweep.config.scene import sweepable
 from ringsweep.config.solver import read_solver
 
 __all__ = ["Axes", "Config", "load", "read_axes", "read_scene", "read_solver", "sweepable", "with_values"]
+
+# All that these files may build on is known by now.
+load_own_files(OWN_LAWS)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import Any, ClassVar
 
+from ringsweep.models.interface import recorder
 from ringsweep.models.scene import Structure, Values
 from ringsweep.physics import friction
 from ringsweep.quantities.parameters import Parameter
@@ -49,6 +50,10 @@ class Model(ABC):
     @abstractmethod
     def scene_type(self, structure: Structure) -> type:
         """Type of the cells that kernels take: a ``NamedTuple`` for which families of functions have bodies."""
+
+    def required(self, structure: Structure) -> dict[type, tuple[Any, ...]]:
+        """Functions that must have bodies for the types of such a scene: the recorder's, and what a model adds."""
+        return {self.scene_type(structure): recorder.MEMBERS}
 
     @abstractmethod
     def history(self, structure: Structure) -> tuple[str, ...]:

@@ -94,7 +94,7 @@ def _one_stick(body, m1, m2, sin_phi, cos_phi, omega, epsilon):
     return -friction / capacity if capacity != 0.0 else 0.0, capacity - abs(friction), normal, normal
 
 
-@hook
+@hook(optional=True)
 def opening(body, k1, k2, m1, m2, sense, sin_phi, cos_phi, omega, epsilon):
     """Which contacts open, of a body whose contacts cannot both stay closed.
 
@@ -115,7 +115,9 @@ def opening(body, k1, k2, m1, m2, sense, sin_phi, cos_phi, omega, epsilon):
     -------
     int
         OPEN_1, OPEN_2, OPEN_BOTH or IMPOSSIBLE. If either contact could open alone it is OPEN_BOTH: neither is blamed.
+        By default OPEN_1: there is one contact.
     """
+    return OPEN_1
 
 
 @inlined
@@ -168,24 +170,18 @@ def _two_opening(body, k1, k2, m1, m2, sense, sin_phi, cos_phi, omega, epsilon):
     return OPEN_2 if second else IMPOSSIBLE
 
 
-@opening.implements(ring.OneContact)
-def _one_opening(body, k1, k2, m1, m2, sense, sin_phi, cos_phi, omega, epsilon):
-    return OPEN_1
-
-
-@hook
+@hook(optional=True)
 def lost(body, first, second):
-    """Which contacts open, given whether the reaction of each has vanished; one of them at least has."""
+    """Which contacts open, given whether the reaction of each has vanished; one of them at least has.
+
+    By default OPEN_1: there is one contact.
+    """
+    return OPEN_1
 
 
 @lost.implements(ring.TwoContacts)
 def _two_lost(body, first, second):
     return OPEN_BOTH if first and second else OPEN_1 if first else OPEN_2
-
-
-@lost.implements(ring.OneContact)
-def _one_lost(body, first, second):
-    return OPEN_1
 
 
 @inlined
@@ -275,3 +271,7 @@ def sliding(body, K1, K2, sin_phi, cos_phi, omega):
     if n1 > 0.0 and n2 > 0.0:
         return CLOSED
     return opening(body, K1, K2, 0.0, 0.0, 1, sin_phi, cos_phi, omega, 0.0)
+
+
+#: Functions that the contact problem needs of a body.
+BODY_MEMBERS = (stick, opening, lost)

@@ -118,9 +118,13 @@ def launch_velocity(scene):
     return drives.relative(scene.drive, scene.initial_omega)
 
 
-@hook
+@hook(optional=True)
 def contact_offset(body):
-    """Half the angle between the contacts, rad; contact 1 is at ``phi - offset``, 2 at ``phi + offset``."""
+    """Half the angle between the contacts, rad; contact 1 is at ``phi - offset``, 2 at ``phi + offset``.
+
+    By default 0: one contact.
+    """
+    return 0.0
 
 
 @contact_offset.implements(TwoContacts)
@@ -128,24 +132,15 @@ def _two_offset(body):
     return body.beta
 
 
-@contact_offset.implements(OneContact)
-def _one_offset(body):
-    return 0.0
-
-
-@hook
+@hook(optional=True)
 def about_axis(body):
     """What the effective inertia is measured by: the moment of inertia about the axis, kg m^2."""
+    return 1.0
 
 
 @about_axis.implements(TwoContacts)
 def _two_about_axis(body):
     return body.inertia + body.mass * body.xi * body.xi
-
-
-@about_axis.implements(OneContact)
-def _one_about_axis(body):
-    return 1.0
 
 
 @hook(absorb=True)
@@ -243,19 +238,15 @@ def _one_grip(body, cos_phi, omega):
     return body.gravity / body.radius * cos_phi + omega * omega
 
 
-@hook
+@hook(optional=True)
 def reaction_determinant(body):
     """Determinant of the reactions without friction: the less it is, the more they make of an error of friction."""
+    return 1.0
 
 
 @reaction_determinant.implements(TwoContacts)
 def _two_support(body):
     return body.determinant[0]
-
-
-@reaction_determinant.implements(OneContact)
-def _one_support(body):
-    return 1.0
 
 
 @hook(absorb=True)
@@ -298,19 +289,15 @@ def _one_energy(body, cos_phi, omega):
     return b.mass * b.radius * (0.5 * b.radius * omega * omega - b.gravity * cos_phi)
 
 
-@hook
+@hook(optional=True)
 def friction_power(body, K1, K2, normal_1, normal_2, omega):
     """Power of friction on the body, W."""
+    return body.radius * omega * K1 * normal_1
 
 
 @friction_power.implements(TwoContacts)
 def _two_power(body, K1, K2, normal_1, normal_2, omega):
     return body.radius * omega * (K1 * normal_1 + K2 * normal_2)
-
-
-@friction_power.implements(OneContact)
-def _one_power(body, K1, K2, normal_1, normal_2, omega):
-    return body.radius * omega * K1 * normal_1
 
 
 @absorbed
@@ -361,3 +348,19 @@ def _two_tractions(body, sin_phi, cos_phi, omega, phi_dd, normal_1, normal_2):
 def _one_traction(body, sin_phi, cos_phi, omega, phi_dd, normal_1, normal_2):
     friction = body.mass * (body.radius * phi_dd + body.gravity * sin_phi)
     return friction, friction
+
+
+#: Functions that the ring needs of a body.
+BODY_MEMBERS = (
+    contact_offset,
+    about_axis,
+    acceleration,
+    acceleration_slope,
+    acceleration_gradient,
+    friction_gain,
+    reaction_determinant,
+    reactions,
+    energy,
+    friction_power,
+    tractions,
+)

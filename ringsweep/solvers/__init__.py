@@ -1,7 +1,25 @@
 """Methods by the name that the configuration gives them."""
 
 from ringsweep.solvers.event import Auto, Event, Implicit
-from ringsweep.solvers.method import Method
+from ringsweep.solvers.method import Method, Needs, Result
 from ringsweep.solvers.rk4 import RK4
 
-METHODS: dict[str, type[Method]] = {method.name: method for method in (Auto, RK4, Event, Implicit)}
+__all__ = ["METHODS", "Method", "Needs", "Result", "add_method"]
+
+METHODS: dict[str, type[Method]] = {}
+
+
+def add_method(method: type[Method]) -> None:
+    """Make a method known under its name.
+
+    Raises
+    ------
+    TypeError
+        If the name is taken.
+    """
+    if METHODS.setdefault(method.name, method) is not method:
+        raise TypeError(f"there is a method {method.name} already: choose another name")
+
+
+for _method in (Auto, RK4, Event, Implicit):
+    add_method(_method)

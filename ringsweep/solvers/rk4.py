@@ -1,7 +1,7 @@
-"""Runge-Kutta 4 with a constant step: what the paper used, as a kernel over a batch of cells.
+"""Runge-Kutta 4 with a constant step, the method of the paper, over a batch of cells.
 
-It knows no events: a step across an arc edge, a reversal or the stiction band is taken as if the
-right-hand side were smooth. ``stiffness`` tells where that is beyond the limit of stability.
+The method knows no events: it takes a step across an arc edge, a reversal or the stiction band as if the right-hand
+side were smooth. ``stiffness`` shows where a step goes beyond the limit of stability.
 """
 
 from __future__ import annotations
@@ -53,8 +53,7 @@ _SAFETY = 5.0
 # Share of the narrowest segment of the surface that a step may slide across, for the arc to be seen.
 _LONGEST = 0.5
 
-# Steps between two visits of a cell: the drive's table of so many steps stays in the cache, and so few are lost on a
-# run that ends among others that go on.
+# Steps that a run takes before the next one has its turn. The table of the drive for so many steps stays in the cache.
 _BLOCK = 512
 
 
@@ -96,15 +95,15 @@ class RK4(Method):
             return Result(rows, steps=report[:, 0], certified=certified)
         if self.certify:
             bounds = np.full((cells, len(with_errors(outcomes))), np.nan)
-            # Beyond the limit of stability a second run agrees with the first for the wrong reason, and a run that ends
-            # at its launch has shown nothing.
+            # Beyond the limit of stability a second run agrees with the first for the wrong reason. A run that ends at
+            # t = 0 has taken no step that could be checked.
             stable = np.flatnonzero((report[:, 1] <= STABILITY_LIMIT) & (report[:, 0] > 0.0))
             if len(stable):
                 half, finer = self._integrate(batch, stable, 2 * self.steps, len(outcomes))
                 some, ours = (batch, rows) if len(stable) == cells else (take(batch, stable), rows[stable])
-                # What may have vanished between two steps has not been held.
+                # A reaction may have vanished between two steps.
                 held = (finer[:, 2] > 0.0) | (half[:, outcomes.index("regime")] == SEPARATING)
-                # So has an arc that may lie between two steps.
+                # A narrow arc may lie between two steps.
                 sure = held & (finer[:, 1] <= STABILITY_LIMIT) & (finer[:, 4] <= _LONGEST)
                 certified[stable] = sure & vouched(some, ours, half, finer[:, 3], outcomes)
                 bounds[stable] = errors(ours, half, outcomes, safety=_SAFETY, steps=report[stable, 0])
@@ -115,19 +114,19 @@ class RK4(Method):
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         rows = np.empty((len(batch.span), width))
         report = np.empty((len(batch.span), 5))
-        kind, account = constant_step.side_by_side(batch), Kept() if self.diagnose else Dropped()
-        # What the kernels are compiled for knows no shape of the drive: that of its table is a kernel of its own.
+        kind, diagnosed = constant_step.side_by_side(batch), Diagnosed() if self.diagnose else NotDiagnosed()
+        # The kernels take the shape of the drive from a table, so that they are compiled once for all drives.
         scenes = side_by_side(batch._replace(drive=scaled(batch.drive))) if isinstance(kind, Several) else batch
         for group in _same_drive(batch, cells):
-            integrate(kind, account, scenes, take(batch.drive, group[0]), group, steps, rows, report)
+            integrate(kind, diagnosed, scenes, take(batch.drive, group[0]), group, steps, rows, report)
         return rows[cells], report[cells]
 
     def history(self, batch: Any, samples: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Times and rows of the history of cell 0; see :class:`ringsweep.solvers.method.Method`."""
-        stride = max(1, self.steps // samples)
-        rows = np.empty((self.steps // stride + 2, width))
+        arc_share = max(1, self.steps // samples)
+        rows = np.empty((self.steps // arc_share + 2, width))
         times = np.empty(len(rows))
-        count = _history(batch, self.steps, stride, times, rows)
+        count = _history(batch, self.steps, arc_share, times, rows)
         return times[:count], rows[:count]
 
 
@@ -144,52 +143,52 @@ def _same_drive(batch: Any, cells: NDArray[np.intp]) -> Iterator[NDArray[np.intp
     yield from np.split(cells[order], np.flatnonzero(np.diff(group[order])) + 1)
 
 
-# Whether a run goes on, was seen off, ends in the step ahead, or goes on through that whatever it looks like.
-LIVE, GONE, ENDING, EXCUSED = 1.0, 0.0, 2.0, -1.0
+# State of a run: it goes on; it is finished; it ends in the step ahead; it was found to go on through that step.
+LIVE, FINISHED, ENDING, EXCUSED = 1.0, 0.0, 2.0, -1.0
 
 
-class Kept(NamedTuple):
-    """What tells whether a run can be trusted is kept."""
+class Diagnosed(NamedTuple):
+    """The stiffness, the least margin and the largest share of an arc are kept for each run."""
 
 
-class Dropped(NamedTuple):
-    """It is not."""
+class NotDiagnosed(NamedTuple):
+    """They are not kept."""
 
 
-class Trust(NamedTuple):
-    """What tells whether a run can be trusted: the largest stiffness, least slack, and longest stride of its steps."""
+class Diagnosis(NamedTuple):
+    """Largest stiffness, least margin of the guards and largest share of an arc over the steps of a run."""
 
     stiffness: Any
-    slack: Any
-    stride: Any
+    margin: Any
+    arc_share: Any
 
 
 @hook(absorb=True)
-def _trusted(account, scene, trust, before, now, h):
-    """Trust in a run after a step that its guards outlast, given what it was."""
+def _diagnose(diagnosed, scene, diagnosis, before, now, h):
+    """Diagnosis of a run after a further step in which no guard vanished."""
 
 
-@_trusted.implements(Kept)
-def _keep(account, scene, trust, before, now, h):
-    return Trust(
-        max(trust.stiffness, constant_step.stiffness(scene, before, now, h)),
-        min(trust.slack, constant_step.margin(scene, before, now)),
-        max(trust.stride, constant_step.arc_share(scene, now, h)),
+@_diagnose.implements(Diagnosed)
+def _diagnose_step(diagnosed, scene, diagnosis, before, now, h):
+    return Diagnosis(
+        max(diagnosis.stiffness, constant_step.stiffness(scene, before, now, h)),
+        min(diagnosis.margin, constant_step.margin(scene, before, now)),
+        max(diagnosis.arc_share, constant_step.arc_share(scene, now, h)),
     )
 
 
-@_trusted.implements(Dropped)
-def _drop(account, scene, trust, before, now, h):
-    return trust
+@_diagnose.implements(NotDiagnosed)
+def _diagnose_nothing(diagnosed, scene, diagnosis, before, now, h):
+    return diagnosis
 
 
 class _Run(NamedTuple):
-    """Where the runs of a value stand."""
+    """A run, or several side by side: state, its inspection, record, diagnosis, and whether it goes on."""
 
     y: Any
     now: Any
     record: Any
-    trust: Any
+    diagnosis: Any
     live: Any
 
 
@@ -226,7 +225,7 @@ def _hermite(y, rate, y_next, rate_next, h, x):
 
 @hook
 def _scene(kind, batch, cell, memory, at):
-    """Scenes of the runs in a value: in memory, where runs stand side by side, else in the batch."""
+    """The scene of a run, from the batch; or of several side by side, from memory."""
 
 
 @_scene.implements(Single)
@@ -240,31 +239,31 @@ def _several_scenes(kind, batch, cell, memory, at):
 
 
 @hook
-def _seat(kind, memory, at, scene, run):
-    """Give a run a seat in memory."""
+def _store(kind, memory, at, scene, run):
+    """Store a run in memory."""
 
 
-@_seat.implements(Single)
-def _seat_one(kind, memory, at, scene, run):
+@_store.implements(Single)
+def _store_one(kind, memory, at, scene, run):
     write(memory, at + size_of(scene), 1, run)
 
 
-@_seat.implements(Several)
-def _seat_among_several(kind, memory, at, scene, run):
+@_store.implements(Several)
+def _store_among_several(kind, memory, at, scene, run):
     write(memory, at, width(kind), scene)
     write(memory, at + width(kind) * size_of(scene), width(kind), run)
 
 
 @inlined
-def _advance(kind, account, batch, memory, at, seated, sample, table, first, k, steps, h):
-    """Take the runs of a value from step `k` of a block to its end, or to where one of them ends.
+def _advance(kind, diagnosed, batch, memory, at, occupants, sample, table, first, k, steps, h):
+    """Advance runs side by side from step `k` of a block to its end, or to the step in which one of them ends.
 
     Returns the step that was not taken.
     """
     align_stack()
-    runs_at = at + width(kind) * size_of(take(batch, seated[0]))
-    scene = _scene(kind, batch, seated[0], memory, at)
-    y, now, record, trust, live = gather(kind, memory, runs_at, sample)
+    runs_at = at + width(kind) * size_of(take(batch, occupants[0]))
+    scene = _scene(kind, batch, occupants[0], memory, at)
+    y, now, record, diagnosis, live = gather(kind, memory, runs_at, sample)
     while k < steps:
         y_next = _step(scene, y, now, table, 2 * k, h)
         theta, ring_omega = lookup(scene.drive, table, 2 * k + 2)
@@ -273,21 +272,21 @@ def _advance(kind, account, batch, memory, at, seated, sample, table, first, k, 
         if any_of(ended):
             live = select(ended, ENDING, live)
             break
-        trust = conform(_trusted(account, scene, trust, now, after, h), trust)
+        diagnosis = conform(_diagnose(diagnosed, scene, diagnosis, now, after, h), diagnosis)
         stuck, seen = constant_step.sticks(scene, now, after), constant_step.seen(scene, y_next, after)
         record = conform(recorder.observe(scene, record, (first + k + 1) * h, h, stuck, seen), record)
         y, now, live = y_next, after, abs(live)
         k += 1
-    write(memory, runs_at, width(kind), _Run(y, now, record, trust, live))
+    write(memory, runs_at, width(kind), _Run(y, now, record, diagnosis, live))
     return k
 
 
 @inlined
-def _part(kind, account, batch, memory, at, seated, sample, table, first, k, h, rows, report):
-    """See off the runs of a value that end in a step, one by one by the plain formulas; returns how many are left."""
+def _finish_ended(kind, diagnosed, batch, memory, at, occupants, sample, table, first, k, h, rows, report):
+    """Finish the runs that end in a step, one by one with floats; returns the number of runs that go on."""
     left = 0
-    for lane in range(len(seated)):
-        scene = take(batch, seated[lane])
+    for lane in range(len(occupants)):
+        scene = take(batch, occupants[lane])
         place = at + width(kind) * size_of(scene) + lane
         run = read(memory, place, width(kind), sample)
         live = run.live
@@ -296,37 +295,39 @@ def _part(kind, account, batch, memory, at, seated, sample, table, first, k, h, 
             theta, ring_omega = lookup(scene.drive, table, 2 * k + 2)
             after = constant_step.inspect(scene, y_next, theta, ring_omega)
             status, fraction = constant_step.verdict(scene, run.now, after)
-            # By the last bit it may hold after all: then it is not asked again in this step.
+            # Vector lanes and floats differ in the last bit: by floats the run may not end in this step after all.
             live = EXCUSED
             if status != RUNNING:
-                live = GONE
-                trust = _trusted(account, scene, run.trust, run.now, after, h)
+                live = FINISHED
+                diagnosis = _diagnose(diagnosed, scene, run.diagnosis, run.now, after, h)
                 y_end = _hermite(run.y, run.now.rates, y_next, after.rates, h, fraction)
                 t = (first + k + fraction) * h
                 stuck, seen = constant_step.sticks(scene, run.now, after), constant_step.seen(scene, y_end, after)
                 record = recorder.observe(scene, run.record, t, fraction * h, stuck, seen)
-                # Of a contact that is lost there is no slack to speak of.
-                trust = Trust(trust.stiffness, run.trust.slack, trust.stride)
+                # The contact that is lost has no margin.
+                diagnosis = Diagnosis(diagnosis.stiffness, run.diagnosis.margin, diagnosis.arc_share)
                 fall = constant_step.fall_rate(scene, run.now, after, h)
-                _conclude(scene, record, status, t, y_end, first + k + 1.0, trust, fall, seated[lane], rows, report)
-            write(memory, place, width(kind), _Run(run.y, run.now, run.record, run.trust, live))
-        left += int(live != GONE)
+                _conclude(
+                    scene, record, status, t, y_end, first + k + 1.0, diagnosis, fall, occupants[lane], rows, report
+                )
+            write(memory, place, width(kind), _Run(run.y, run.now, run.record, run.diagnosis, live))
+        left += int(live != FINISHED)
     return left
 
 
 @inlined
-def _conclude(scene, record, status, t, y, steps, trust, fall, cell, rows, report):
-    """Enter the outcome of a run."""
+def _conclude(scene, record, status, t, y, steps, diagnosis, fall, cell, rows, report):
+    """Store the outcome of a run."""
     outcome = recorder.conclude(scene, record, status, t, y[0], y[1])
     for column in range(len(outcome)):
         rows[cell, column] = outcome[column]
-    report[cell, 0], report[cell, 1], report[cell, 2] = steps, trust.stiffness, trust.slack
-    report[cell, 3], report[cell, 4] = fall, trust.stride
+    report[cell, 0], report[cell, 1], report[cell, 2] = steps, diagnosis.stiffness, diagnosis.margin
+    report[cell, 3], report[cell, 4] = fall, diagnosis.arc_share
 
 
 def integrate(
     kind: Any,
-    account: Any,
+    diagnosed: Any,
     batch: Any,
     drive: Any,
     cells: NDArray[np.intp],
@@ -341,114 +342,121 @@ def integrate(
     kind : Single or Several
         How many runs stand side by side.
     account : Kept or Dropped
-        Whether stiffness and slack are kept.
+        Whether the diagnosis of each run is kept.
     batch : NamedTuple
         Scenes; where several stand side by side, :func:`ringsweep.numerics.lanes.side_by_side` and with their drive
         :func:`ringsweep.physics.drives.scaled`.
     drive : NamedTuple
         The drive of one of the cells.
     rows, report : ndarray of shape ``(cells of the batch, outcomes)`` and ``(cells of the batch, 5)``
-        Filled for these cells: outcomes; number of steps, stiffness, least slack, how fast the guard fell by which the
-        run ended, and longest stride.
+        Filled for these cells: outcomes; number of steps, largest stiffness, least margin, rate at which the guard fell
+        that ended the run, and largest share of an arc.
     """
     h = float(batch.span[cells[0]]) / steps
     table = np.empty((2 * min(_BLOCK, steps) + 1, 2))
     _tabulate(table, drive, 0, 0, h)
-    memory, seated, live = _begin(kind, batch, cells, table, rows, report)
+    memory, occupants, live = _start(kind, batch, cells, table, rows, report)
     for first in range(0, steps, _BLOCK):
         if live == 0:
             return
         size = min(_BLOCK, steps - first)
         _tabulate(table, drive, first, size, h)
-        live = _go_on(kind, account, batch, memory, seated, live, table, first, size, h, rows, report)
-    _complete(kind, batch, memory, seated, live, steps, rows, report)
+        live = _advance_block(kind, diagnosed, batch, memory, occupants, live, table, first, size, h, rows, report)
+    _finish_at_end_of_span(kind, batch, memory, occupants, live, steps, rows, report)
 
 
 @kernel
-def _begin(kind, batch, cells, table, rows, report):
-    """Seat runs side by side in memory, as many as make a value in a block, those out that end at their launch.
+def _start(kind, batch, cells, table, rows, report):
+    """Store runs in memory, side by side in blocks, and finish at once the runs that end at t = 0.
 
     Returns
     -------
     tuple
-        Memory of shape ``(blocks, numbers of a scene and of where it stands, runs in a value)``; the cells seated
-        there, in order; how many of them there are.
+        Memory of shape ``(blocks, numbers of a scene and a run, runs in a block)``; the cells stored there, in order;
+        their number.
     """
     per = width(kind)
-    sample = _begun(take(batch, cells[0]), 0.0, 0.0)
+    sample = _initial_run(take(batch, cells[0]), 0.0, 0.0)
     lines = size_of(take(batch, cells[0])) + size_of(sample)
     blocks = (len(cells) + per - 1) // per
     memory = np.zeros((blocks, lines, per))
-    seats = memory.reshape(memory.size)
-    seated = np.full(blocks * per, cells[0])
+    memory_of_runs = memory.reshape(memory.size)
+    occupants = np.full(blocks * per, cells[0])
     live = 0
     for i in cells:
         scene = take(batch, i)
         theta, ring_omega = lookup(scene.drive, table, 0)
-        run = _begun(scene, theta, ring_omega)
+        run = _initial_run(scene, theta, ring_omega)
         status, _ = constant_step.verdict(scene, run.now, run.now)
         if status != RUNNING:
-            _conclude(scene, run.record, status, 0.0, run.y, 0.0, run.trust, 0.0, i, rows, report)
+            _conclude(scene, run.record, status, 0.0, run.y, 0.0, run.diagnosis, 0.0, i, rows, report)
             continue
-        _seat(kind, seats, live // per * lines * per + live % per, scene, run)
-        seated[live] = i
+        _store(kind, memory_of_runs, live // per * lines * per + live % per, scene, run)
+        occupants[live] = i
         live += 1
-    return memory, seated, live
+    return memory, occupants, live
 
 
 @kernel
-def _go_on(kind, account, batch, memory, seated, live, table, first, steps, h, rows, report):
-    """Take all seated runs through a block of steps; those that are left move together. Returns their number."""
+def _advance_block(kind, diagnosed, batch, memory, occupants, live, table, first, steps, h, rows, report):
+    """Advance all runs by a block of steps, and close the gaps that finished runs leave; returns how many go on."""
     per, lines = width(kind), memory.shape[1]
-    seats = memory.reshape(memory.size)
-    sample = _begun(take(batch, seated[0]), 0.0, 0.0)
+    memory_of_runs = memory.reshape(memory.size)
+    sample = _initial_run(take(batch, occupants[0]), 0.0, 0.0)
     for place in range(0, live, per):
-        at, here = place * lines, seated[place : place + per]
+        at, here = place * lines, occupants[place : place + per]
         k, left = 0, per
         while left > 0:
-            k = _advance(kind, account, batch, seats, at, here, sample, table, first, k, steps, h)
+            k = _advance(kind, diagnosed, batch, memory_of_runs, at, here, sample, table, first, k, steps, h)
             if k == steps:
                 break
-            left = _part(kind, account, batch, seats, at, here, sample, table, first, k, h, rows, report)
+            left = _finish_ended(
+                kind, diagnosed, batch, memory_of_runs, at, here, sample, table, first, k, h, rows, report
+            )
     kept = 0
-    for seat in range(live):
-        if memory[seat // per, lines - 1, seat % per] != GONE:
+    for slot in range(live):
+        if memory[slot // per, lines - 1, slot % per] != FINISHED:
             # Slices would drag in what raises errors about their shapes, a second of compilation.
             for line in range(lines):
-                memory[kept // per, line, kept % per] = memory[seat // per, line, seat % per]
-            seated[kept] = seated[seat]
+                memory[kept // per, line, kept % per] = memory[slot // per, line, slot % per]
+            occupants[kept] = occupants[slot]
             kept += 1
-    # Empty seats of the last block go on with what they hold, unheard.
-    for seat in range(kept, live):
-        memory[seat // per, lines - 1, seat % per] = GONE
+    # Empty places of the last block go on with what they hold; nobody reads them.
+    for slot in range(kept, live):
+        memory[slot // per, lines - 1, slot % per] = FINISHED
     return kept
 
 
 @kernel
-def _complete(kind, batch, memory, seated, live, steps, rows, report):
-    """Enter the outcomes of the runs that reached the end of the span."""
+def _finish_at_end_of_span(kind, batch, memory, occupants, live, steps, rows, report):
+    """Store the outcomes of the runs that reached the end of the span."""
     per, lines = width(kind), memory.shape[1]
-    seats = memory.reshape(memory.size)
-    for seat in range(live):
-        cell = seated[seat]
+    memory_of_runs = memory.reshape(memory.size)
+    for slot in range(live):
+        cell = occupants[slot]
         scene = take(batch, cell)
-        run = read(seats, (seat // per * lines + size_of(scene)) * per + seat % per, per, _begun(scene, 0.0, 0.0))
+        run = read(
+            memory_of_runs,
+            (slot // per * lines + size_of(scene)) * per + slot % per,
+            per,
+            _initial_run(scene, 0.0, 0.0),
+        )
         # The end of the span, not the rounding of a sum of steps.
-        _conclude(scene, run.record, COMPLETE, scene.span, run.y, float(steps), run.trust, 0.0, cell, rows, report)
+        _conclude(scene, run.record, COMPLETE, scene.span, run.y, float(steps), run.diagnosis, 0.0, cell, rows, report)
 
 
 @inlined
-def _begun(scene, theta, ring_omega):
-    """A run at its launch; with the drive anywhere, a sample of what runs of such scenes are made of."""
+def _initial_run(scene, theta, ring_omega):
+    """A run at t = 0. With any values of the drive it serves as a sample of the type of such runs."""
     y = constant_step.initial_state(scene)
     now = constant_step.inspect(scene, y, theta, ring_omega)
     record = recorder.begin(scene, 0.0, constant_step.seen(scene, y, now))
-    return _Run(y, now, record, Trust(0.0, inf, 0.0), LIVE)
+    return _Run(y, now, record, Diagnosis(0.0, inf, 0.0), LIVE)
 
 
 @kernel
-def _history(batch, steps, stride, times, rows):
-    """Rows of every `stride`-th step of cell 0 up to its end; returns their number."""
+def _history(batch, steps, arc_share, times, rows):
+    """Rows of every `arc_share`-th step of cell 0 up to its end; returns their number."""
     scene = take(batch, 0)
     h = scene.span / steps
     table = np.empty((3, 2))
@@ -459,7 +467,7 @@ def _history(batch, steps, stride, times, rows):
     status, _ = constant_step.verdict(scene, now, now)
     count = 0
     for k in range(steps + 1):
-        if k % stride == 0 or k == steps or status != RUNNING:
+        if k % arc_share == 0 or k == steps or status != RUNNING:
             times[count] = k * h if k < steps else scene.span
             row = constant_step.row(scene, y, theta, ring_omega)
             for column in range(len(row)):

@@ -10,11 +10,14 @@ import numpy as np
 
 from ringsweep.models.model import Model
 from ringsweep.models.parts import GRAVITY, MASS, SPAN, drive_of, law_of, pair
-from ringsweep.models.ring import record
+from ringsweep.models.ring import record, series
 from ringsweep.models.scene import Structure, Values, require
-from ringsweep.physics import drives, friction, ring, zones
+from ringsweep.physics import contact, drives, friction, ring, zones
 from ringsweep.physics.friction.presliding import steady_deflection
 from ringsweep.quantities.parameters import Parameter, declared
+
+#: Functions that must have bodies for the type of a body.
+BODY_MEMBERS = ring.BODY_MEMBERS + contact.BODY_MEMBERS + series.BODY_MEMBERS
 
 RADIUS = Parameter("m", "radius of the inner race", lower=0.0, open_lower=True)
 
@@ -30,6 +33,9 @@ class SingleContactRing(Model):
     absent: ClassVar[frozenset[str]] = frozenset({"normal_min_2", "normal_2", "zone_2", "deflection_2"})
     body: ClassVar[dict[str, Parameter]] = {"body.mass": MASS, "ring.radius": RADIUS}
 
+    body_type: ClassVar[type] = ring.OneContact
+    """Type of the body; the functions of :data:`BODY_MEMBERS` have bodies for it."""
+
     def takes(self, law: type) -> bool:
         """Laws without a dead band; bristles must know how far they are deflected after long sliding."""
         traits = friction.TRAITS[law]
@@ -38,6 +44,10 @@ class SingleContactRing(Model):
     def scene_type(self, structure: Structure) -> type:
         """With bristles a ring of its own kind."""
         return ring.BristleRing if self._has_bristles(structure) else ring.Ring
+
+    def required(self, structure: Structure) -> dict[type, tuple[Any, ...]]:
+        """The recorder's functions, and those of the body."""
+        return super().required(structure) | {self.body_type: BODY_MEMBERS}
 
     def _has_bristles(self, structure: Structure) -> bool:
         return friction.family_of(self.laws[structure.law]) is friction.Dynamic
@@ -104,6 +114,7 @@ class Ring(SingleContactRing):
     """Two balls joined by a rod, sliding in the ring (the paper's Fig. 22)."""
 
     name = "ring"
+    body_type = ring.TwoContacts
     doc = "a two-contact body in a rotating ring"
     absent = frozenset()
     body: ClassVar[dict[str, Parameter]] = {

@@ -331,14 +331,14 @@ def _expand_blended(scene, mode, c):
     mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
     low, _ = region_bounds(scene.law, mode.region)
     k1, k2 = friction_under(scene, mode, max(abs(c[V, 0]), low))
-    answer = _answer(scene.body, k1, k2)
+    start = slip_start(scene.body, k1, k2)
     for k in range(ORDER + 1):
         _sine(c, k)
         c[EXCESS, k] = mode.sign * c[V, k] - (low if k == 0 else 0.0)
         expand_weights(scene.law, mode.region, c[EXCESS], k, c[BASIS], c[STATIC_WEIGHT], c[KINETIC_WEIGHT])
         c[FRICTION_1, k] = -mode.sign * (c[STATIC_WEIGHT, k] * mu_s1 + c[KINETIC_WEIGHT, k] * mu_k1)
         c[FRICTION_2, k] = -mode.sign * (c[STATIC_WEIGHT, k] * mu_s2 + c[KINETIC_WEIGHT, k] * mu_k2)
-        _balance_term(scene.body, answer, c, k)
+        slip_term(scene.body, start, c, k)
         if k < ORDER:
             _next_state(scene, c, k)
     # On the way to a jam all accelerations grow without bound: at some point it is one.
@@ -347,13 +347,14 @@ def _expand_blended(scene, mode, c):
         c[INERTIA, 0] = -1.0
 
 
-@hook
-def _answer(body, k1, k2):
-    """What :func:`_balance_term` needs of the friction at the beginning of the step."""
+@hook(optional=True)
+def slip_start(body, k1, k2):
+    """What :func:`slip_term` needs of the friction at the beginning of the step; by default nothing."""
+    return 0.0
 
 
-@_answer.implements(ring.TwoContacts)
-def _two_answer(body, k1, k2):
+@slip_start.implements(ring.TwoContacts)
+def _two_slip_start(body, k1, k2):
     # With the angular acceleration eliminated the balances are, for K_i = k_i,
     #     (cb - k1 sb) N1 + (cb + k2 sb) N2 = A,   (sb + k1 lever) N1 - (sb - k2 lever) N2 = B.
     b = body
@@ -365,21 +366,27 @@ def _two_answer(body, k1, k2):
     return lever, k1, k2, a1 * scale, a2 * scale, b1 * scale, b2 * scale
 
 
-@_answer.implements(ring.OneContact)
-def _one_answer(body, k1, k2):
-    return 0.0
-
-
 @hook
-def _balance_term(body, answer, c, k):
-    """Coefficient `k` of the angular acceleration, of the reactions and of the inertia where K1 and K2 are series."""
+def slip_term(body, start, c, k):
+    """Fill coefficient `k` of angular acceleration, reactions and inertia in slip, where friction is a series.
+
+    Parameters
+    ----------
+    body : NamedTuple
+    start : object
+        What :func:`slip_start` returned.
+    c : ndarray of shape ``(rows, columns)``
+        Rows SIN, COS, SQUARE (of the angular velocity), FRICTION_1 and FRICTION_2 (K at each contact) are known up to
+        `k`; EPSILON, NORMAL_1, NORMAL_2 and INERTIA are filled.
+    k : int
+    """
 
 
-@_balance_term.implements(ring.TwoContacts)
-def _two_balance_term(body, answer, c, k):
+@slip_term.implements(ring.TwoContacts)
+def _two_slip_term(body, start, c, k):
     b = body
     sb, cb = b.sin_beta, b.cos_beta
-    lever, k1, k2, a1, a2, b1, b2 = answer
+    lever, k1, k2, a1, a2, b1, b2 = start
     about_axis = ring.about_axis(b)
     # Friction but for what the reactions of this order make of it.
     f1, f2 = product(c[FRICTION_1, 1:], c[NORMAL_1], k - 1), product(c[FRICTION_2, 1:], c[NORMAL_2], k - 1)
@@ -395,8 +402,8 @@ def _two_balance_term(body, answer, c, k):
     c[INERTIA, k] = about_axis * (2.0 * sb * (one * cb + both * lever) + difference)
 
 
-@_balance_term.implements(ring.OneContact)
-def _one_balance_term(body, answer, c, k):
+@slip_term.implements(ring.OneContact)
+def _one_slip_term(body, start, c, k):
     c[INERTIA, k] = 1.0 if k == 0 else 0.0
     load = body.mass * (body.gravity * c[COS, k] + body.radius * c[SQUARE, k])
     c[NORMAL_1, k] = c[NORMAL_2, k] = load
@@ -436,7 +443,7 @@ def _expand_stick(scene, mode, tolerance, c):
         _sine(c, k)
     mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
     c[EDGE, 0] = inf
-    _hold(scene.body, mu_s1, mu_s2, c)
+    stick_series(scene.body, mu_s1, mu_s2, c)
     c[INERTIA, 0] = inf
     weight = 1.0 / (scene.body.mass * (scene.body.gravity + scene.body.radius * c[SQUARE, 0]))
     last, previous = 0.0, 0.0
@@ -447,17 +454,18 @@ def _expand_stick(scene, mode, tolerance, c):
 
 
 @hook
-def _hold(body, m1, m2, c):
+def stick_series(body, m1, m2, c):
     """Fill reactions, the reserves of friction forwards (SLOW) and backwards (FAST), and whether stick exists (EDGE).
 
-    The moment about the axis gives the total friction, the tangential balance the difference of
-    the reactions, the radial one, with friction shared in proportion to ``m_i N_i``, a quadratic
-    equation for their sum.
+    Rows PHI, OMEGA, EPSILON, SIN, COS and SQUARE are known; `m1` and `m2` are the static coefficients. For two contacts
+    the moment about the axis gives the total friction, the tangential balance the difference of the reactions, and the
+    radial balance, with friction shared in proportion to ``m_i N_i``, a quadratic equation for their sum. With one
+    contact EDGE stays as it is: infinite.
     """
 
 
-@_hold.implements(ring.TwoContacts)
-def _two_hold(body, m1, m2, c):
+@stick_series.implements(ring.TwoContacts)
+def _two_stick_series(body, m1, m2, c):
     b = body
     sb, cb = b.sin_beta, b.cos_beta
     mean, half = 0.5 * (m1 + m2), 0.5 * (m1 - m2)
@@ -494,8 +502,8 @@ def _two_hold(body, m1, m2, c):
         c[SLOW, k], c[FAST, k] = reserve + friction[k], reserve - friction[k]
 
 
-@_hold.implements(ring.OneContact)
-def _one_hold(body, m1, m2, c):
+@stick_series.implements(ring.OneContact)
+def _one_stick_series(body, m1, m2, c):
     for k in range(ORDER + 1):
         friction = body.mass * (body.radius * c[EPSILON, k] + body.gravity * c[SIN, k])
         c[NORMAL_1, k] = body.mass * (body.gravity * c[COS, k] + body.radius * c[SQUARE, k])
@@ -563,3 +571,7 @@ def _in_space(scene, t, y):
 @series.after_first_step.implements(Mode)
 def _after_first_step(mode):
     return Mode(mode.sign, mode.region, -1, mode.place_1, mode.place_2)
+
+
+#: Functions that the series need of a body.
+BODY_MEMBERS = (slip_start, slip_term, stick_series)

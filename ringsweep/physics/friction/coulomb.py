@@ -5,56 +5,26 @@ from __future__ import annotations
 from math import inf
 from typing import Annotated, Any, NamedTuple
 
-import numpy as np
-
-from ringsweep.compile import inlined
-from ringsweep.numerics.functions import decay, select
+from ringsweep.numerics.functions import select
 from ringsweep.physics.friction.registry import SetValued, Traits
 from ringsweep.physics.friction.velocity import (
+    ALPHA,
     BAND,
     KINETIC,
     ONE,
     STRIBECK,
     ZERO,
     Piece,
+    absent,
     blend,
+    decaying,
+    end_of_tail,
     piece,
     steepest,
     stiction_band,
+    tail,
 )
 from ringsweep.quantities.parameters import Leaf, Parameter
-
-ALPHA = Parameter("s/m", "decay of friction with sliding speed", lower=0.0)
-
-
-@inlined
-def absent():
-    """A region that a law lacks."""
-    return Piece(0.0, 0.0, 0.0, ONE, ZERO)
-
-
-@inlined
-def tail(region, low, high, alpha):
-    """Weights that pass from static to kinetic friction as ``exp(-alpha (speed - low))``, and beyond."""
-    if region == KINETIC:
-        return Piece(high, inf, 0.0, ZERO, ONE)
-    if alpha == 0.0:
-        return Piece(low, high, 0.0, ONE, ZERO)
-    return Piece(low, high, alpha, (0.0, 0.0, 1.0, 0.0), (1.0, 0.0, -1.0, 0.0))
-
-
-@inlined
-def decaying(alpha, x, lasts):
-    """:func:`~ringsweep.physics.friction.velocity.weights` in a tail, `x` beyond where it begins, while it lasts."""
-    q = select(lasts, decay(alpha * x), 0.0)
-    return q, 1.0 - q, -alpha * q, alpha * q
-
-
-def end_of_tail(alpha: Any, low: Any) -> Any:
-    """Speed beyond which an exponential tail changes the sliding velocity by less than 1e-17 m/s, m/s."""
-    with np.errstate(divide="ignore"):
-        length = np.clip(39.1 - np.log(alpha), 10.0, 40.0) / alpha
-    return np.where(np.asarray(alpha) > 0.0, low + length, inf)
 
 
 class Coulomb(NamedTuple):

@@ -6,19 +6,23 @@ from math import exp, inf
 from typing import Annotated, Any, NamedTuple
 
 from ringsweep.numerics.functions import decay, select
-from ringsweep.physics.friction.coulomb import ALPHA, absent, decaying, end_of_tail, tail
 from ringsweep.physics.friction.registry import Smooth, Traits
 from ringsweep.physics.friction.velocity import (
+    ALPHA,
     BAND,
     KINETIC,
     ONE,
     STRIBECK,
     ZERO,
     Piece,
+    absent,
     blend,
+    decaying,
+    end_of_tail,
     piece,
     steepest,
     stiction_band,
+    tail,
 )
 from ringsweep.quantities.parameters import Leaf, Parameter
 

@@ -12,11 +12,13 @@ and values, slopes, power series and regions all follow from it.
 
 from __future__ import annotations
 
-from math import exp, sqrt
-from typing import NamedTuple
+from math import exp, inf, sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from ringsweep.compile import hook, inlined
-from ringsweep.numerics.functions import either
+from ringsweep.numerics.functions import decay, either, select
 from ringsweep.quantities.parameters import Parameter
 
 MU_S = Parameter("1", "static friction coefficient", lower=0.0)
@@ -217,6 +219,41 @@ def tail_reach(law, region, v, h):
     """A step not above `h`, short enough for the series of the weights; `v` is the series of the sliding velocity."""
     decay = piece(law, region).decay
     return min(h, min(0.5 * _POWERS / (decay * abs(v[1])), sqrt(0.5 * _POWERS / (decay * abs(v[2])))))
+
+
+# ---- what several laws share: an exponential tail ----------------------------------------------
+
+ALPHA = Parameter("s/m", "decay of friction with sliding speed", lower=0.0)
+
+
+@inlined
+def absent():
+    """A region that a law lacks."""
+    return Piece(0.0, 0.0, 0.0, ONE, ZERO)
+
+
+@inlined
+def tail(region, low, high, alpha):
+    """Weights that pass from static to kinetic friction as ``exp(-alpha (speed - low))``, and beyond."""
+    if region == KINETIC:
+        return Piece(high, inf, 0.0, ZERO, ONE)
+    if alpha == 0.0:
+        return Piece(low, high, 0.0, ONE, ZERO)
+    return Piece(low, high, alpha, (0.0, 0.0, 1.0, 0.0), (1.0, 0.0, -1.0, 0.0))
+
+
+@inlined
+def decaying(alpha, x, lasts):
+    """:func:`weights` in a tail, at a speed `x` beyond its beginning, while it lasts."""
+    q = select(lasts, decay(alpha * x), 0.0)
+    return q, 1.0 - q, -alpha * q, alpha * q
+
+
+def end_of_tail(alpha: Any, low: Any) -> Any:
+    """Speed beyond which an exponential tail changes the sliding velocity by less than 1e-17 m/s, m/s."""
+    with np.errstate(divide="ignore"):
+        length = np.clip(39.1 - np.log(alpha), 10.0, 40.0) / alpha
+    return np.where(np.asarray(alpha) > 0.0, low + length, inf)
 
 
 #: Functions without which no solver takes a law.
