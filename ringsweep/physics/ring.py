@@ -178,6 +178,15 @@ def _one_acceleration(body, K1, K2, sin_phi, cos_phi, omega):
     return phi_dd, 1.0, 1.0
 
 
+@hook(optional=True)
+def constant_terms(body, K1, K2):
+    """Parts of the angular acceleration (rad/s^2) and of both reactions (N) that do not depend on the state.
+
+    The rest of each is a sum of terms in sine, cosine and square of the angular velocity. By default these parts are 0.
+    """
+    return 0.0, 0.0, 0.0
+
+
 @hook(absorb=True)
 def acceleration_slope(body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega):
     """Derivative of the angular acceleration along ``(dK1, dK2) = (slope_1, slope_2)``."""
@@ -355,6 +364,7 @@ BODY_MEMBERS = (
     contact_offset,
     about_axis,
     acceleration,
+    constant_terms,
     acceleration_slope,
     acceleration_gradient,
     friction_gain,

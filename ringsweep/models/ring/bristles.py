@@ -277,9 +277,11 @@ def _linearise(scene, mode, t, x):
     now = _contacts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(mode.sign), mode.region)
     sin_phi, cos_phi = sin(phi), cos(phi)
     epsilon, _, _ = ring.acceleration(b, now.K1, now.K2, sin_phi, cos_phi, omega)
-    # epsilon = p omega^2 + q cos phi + r sin phi
+    # epsilon = p omega^2 + q cos phi + r sin phi + epsilon_0
+    epsilon_0, _, _ = ring.constant_terms(b, now.K1, now.K2)
     p, _, _ = ring.acceleration(b, now.K1, now.K2, 0.0, 0.0, 1.0)
     by_phi, _, _ = ring.acceleration(b, now.K1, now.K2, cos_phi, -sin_phi, 0.0)
+    p, by_phi = p - epsilon_0, by_phi - epsilon_0
     by_omega = 2.0 * p * omega
     by_v, by_1, by_2 = _by_contacts(scene, now, sin_phi, cos_phi, omega)
     push = radius * (by_phi * ring_omega + by_omega * ring_epsilon - drives.jerk(scene.drive, t))

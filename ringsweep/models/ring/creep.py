@@ -78,9 +78,11 @@ def _linearise(scene, mode, t, x):
     K1, K2, slope_1, slope_2 = _friction(scene, mode, x[1])
     sin_phi, cos_phi = sin(phi), cos(phi)
     epsilon, _, _ = ring.acceleration(b, K1, K2, sin_phi, cos_phi, omega)
-    # epsilon = p omega^2 + q cos phi + r sin phi
+    # epsilon = p omega^2 + q cos phi + r sin phi + epsilon_0
+    epsilon_0, _, _ = ring.constant_terms(b, K1, K2)
     p, _, _ = ring.acceleration(b, K1, K2, 0.0, 0.0, 1.0)
     by_phi, _, _ = ring.acceleration(b, K1, K2, cos_phi, -sin_phi, 0.0)
+    p, by_phi = p - epsilon_0, by_phi - epsilon_0
     by_omega = 2.0 * p * omega
     friction = ring.acceleration_slope(b, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega)
     return (

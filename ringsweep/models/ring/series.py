@@ -309,9 +309,13 @@ def _expand_sliding(scene, mode, c):
     p, determinant, inertia = ring.acceleration(body, k1, k2, 0.0, 0.0, 1.0)
     q, _, _ = ring.acceleration(body, k1, k2, 0.0, 1.0, 0.0)
     r, _, _ = ring.acceleration(body, k1, k2, 1.0, 0.0, 0.0)
+    epsilon_0, normal_10, normal_20 = ring.constant_terms(body, k1, k2)
+    p, q, r = p - epsilon_0, q - epsilon_0, r - epsilon_0
     for k in range(ORDER + 1):
         _sine(c, k)
         c[EPSILON, k] = p * c[SQUARE, k] + q * c[COS, k] + r * c[SIN, k]
+        if k == 0:
+            c[EPSILON, 0] += epsilon_0
         if k < ORDER:
             _next_state(scene, c, k)
     # Reactions are linear in sine, cosine, square and acceleration.
@@ -319,9 +323,13 @@ def _expand_sliding(scene, mode, c):
     c1, c2 = ring.reactions(body, k1, k2, 0.0, 1.0, 0.0, 0.0)
     w1, w2 = ring.reactions(body, k1, k2, 0.0, 0.0, 1.0, 0.0)
     e1, e2 = ring.reactions(body, k1, k2, 0.0, 0.0, 0.0, 1.0)
+    s1, c1, w1, e1 = s1 - normal_10, c1 - normal_10, w1 - normal_10, e1 - normal_10
+    s2, c2, w2, e2 = s2 - normal_20, c2 - normal_20, w2 - normal_20, e2 - normal_20
     for k in range(ORDER + 1):
         c[NORMAL_1, k] = s1 * c[SIN, k] + c1 * c[COS, k] + w1 * c[SQUARE, k] + e1 * c[EPSILON, k]
         c[NORMAL_2, k] = s2 * c[SIN, k] + c2 * c[COS, k] + w2 * c[SQUARE, k] + e2 * c[EPSILON, k]
+    c[NORMAL_1, 0] += normal_10
+    c[NORMAL_2, 0] += normal_20
     c[INERTIA, 0] = inf if determinant > 0.0 and inertia > 0.0 else min(determinant, inertia)
 
 

@@ -1,0 +1,135 @@
+"""The examples of docs/extending.md: each runs as it stands there, and does what its page says."""
+
+import os
+import re
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+PAGE = (Path(__file__).parents[1] / "docs" / "extending.md").read_text(encoding="utf-8")
+
+#: Files that the page shows, by name.
+FILES = {name: text for text, name in re.findall(r"```python\n(# (my_\w+\.py)\n.*?)```", PAGE, re.DOTALL)}
+
+#: What the scripts below share.
+RUN = """
+import numpy as np, ringsweep
+from ringsweep.errors import InputError
+
+def run(scene, solver="auto"):
+    return ringsweep.simulate(scene, solver=solver)
+
+belt = {"model": "belt", "body": {"mass": 1.0}, "spring": {"stiffness": 2.0}, "belt": {"velocity": 0.1},
+        "time": {"span": 30.0}}
+disc = {"model": "disc", "body": {"mass": 0.1}, "ring": {"radius": 0.2}, "disc": {"slope": "40 deg"},
+        "friction": {"law": "coulomb", "rest": {"mu_k": 0.3}}, "time": {"span": 20.0}}
+equilibrium = np.arcsin(0.3 / np.tan(np.radians(40.0)))
+"""
+
+
+def files_in(folder, changes=()):
+    """Paths of the example files, written to a folder; each of `changes` is ``(name, old text, new text)``."""
+    paths = []
+    for name, text in FILES.items():
+        for changed, old, new in changes:
+            if changed == name:
+                assert old in text
+                text = text.replace(old, new)
+        paths.append(folder / name)
+        paths[-1].write_text(text, encoding="utf-8")
+    return paths
+
+
+def in_a_process(script, paths, cache):
+    """Run a script with own files; their kernels go to a cache of their own, since their types exist nowhere else."""
+    environment = {
+        **os.environ,
+        "RINGSWEEP_LAWS": os.pathsep.join(map(str, paths)),
+        "NUMBA_CACHE_DIR": str(cache),
+        "PYTHONPATH": str(Path(__file__).parents[1]),
+    }
+    script = RUN + textwrap.dedent(script)
+    return subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=False)
+
+
+def test_the_page_shows_a_file_for_each_thing_that_can_be_added():
+    assert list(FILES) == ["my_ramp.py", "my_weakening.py", "my_run_up.py", "my_disc.py", "my_heun.py"]
+
+
+CLAIMS = {
+    "a body under the smooth law of the page settles where its friction balances the spring": """
+        found = run({**belt, "friction": {"law": "ramp", "mu_k": 0.1, "v0": 0.05, "viscous": 1.0}})
+        assert found["certified"] == 1
+        assert abs(found["x_end"] - (0.1 * 9.81 + 0.1) / 2.0) < 1e-3, found["x_end"].item()
+    """,
+    "a set-valued law that weakens at once is stiction": """
+        weak = run({**belt, "friction": {"law": "weakening", "mu_s": 0.15, "mu_k": 0.1, "v1": 1e-9}})
+        known = run({**belt, "friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.1}})
+        assert weak["certified"] == 1 and weak["regime"] == known["regime"]
+        assert abs(weak["x_end"] - known["x_end"]) < 1e-6
+    """,
+    "a disc that has run up holds a body where friction balances the weight": """
+        drive = {"law": "run-up", "amplitude": 30.0, "tau": 0.01}
+        initial = {"phi": equilibrium, "omega": 0.0}
+        found = run({**disc, "drive": drive, "initial": initial}, {"method": "event"})
+        assert found["certified"] == 1
+        assert np.abs(found["phi"] - equilibrium).max() < 0.05
+        assert found["normal_1"].std() < 1e-12
+    """,
+    "rk4 and event agree on a body that swings on a disc at rest": """
+        scene = {**disc, "initial": {"phi": 1.0, "omega": -0.5}, "time": {"span": 0.2}}
+        exact, fixed = run(scene, "event"), run(scene, {"method": "rk4", "steps": 2000})
+        assert abs(exact["phi_end"] - fixed["phi_end"]) < 1e-9
+    """,
+    "the method of the page is of order two": """
+        initial = {"x": 0.5, "velocity": 0.0}
+        scene = {**belt, "friction": {"law": "coulomb", "mu_k": 0.1}, "initial": initial, "time": {"span": 2.0}}
+        exact = run(scene, "event")["x_end"]
+        coarse, fine = (run(scene, {"method": "heun", "steps": n})["x_end"] - exact for n in (200, 400))
+        assert 3.8 < coarse / fine < 4.2, (coarse.item(), fine.item())
+    """,
+    "rk4 refuses a law that lacks a function by the names of both": """
+        try:
+            friction = {"law": "weakening", "mu_s": 0.15, "mu_k": 0.1, "v1": 0.1}
+            run({**belt, "friction": friction}, {"method": "rk4", "steps": 10})
+        except InputError as error:
+            assert error.path == "scene.friction.law"
+            assert error.problem == "friction weakening has no function `blend`, which solver rk4 needs"
+        else:
+            raise AssertionError("not refused")
+    """,
+}
+
+
+def test_examples_do_what_the_page_claims(tmp_path):
+    """In one process, so that each kernel is compiled once."""
+    script = "".join(f"\n# {claim}\n{textwrap.dedent(body)}" for claim, body in CLAIMS.items())
+    done = in_a_process(script, files_in(tmp_path), tmp_path / "cache")
+    assert done.returncode == 0, done.stderr[-2000:]
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "message"),
+    [
+        ("my_ramp.py", "@stiction_band.implements(Ramp)", "", "friction law ramp has no stiction_band"),
+        ("my_run_up.py", "@jerk.implements(RunUp)", "", "drive run-up has no jerk"),
+        ("my_disc.py", "@ring.energy.implements(OnDisc)", "", "model disc: OnDisc has no energy"),
+        ("my_ramp.py", '"ramp"', '"lugre"', "there is a friction law lugre already"),
+        (
+            "my_disc.py",
+            "(body, K1, K2, sin_phi, cos_phi, omega, phi_dd)",
+            "(body, K1, K2)",
+            "the arguments of reactions are",
+        ),
+    ],
+)
+def test_a_file_that_lacks_something_is_refused_by_name_in_one_line(tmp_path, name, old, new, message):
+    paths = [path for path in files_in(tmp_path, [(name, old, new)]) if path.name == name]
+    script = "from ringsweep.cli import main; raise SystemExit(main(['schema']))"
+    done = in_a_process(script, paths, tmp_path / "cache")
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert message in done.stderr
