@@ -1,4 +1,4 @@
-"""The drawing of docs/scenes.md, an instant of the README's run with its angles named: `python docs/ring.py [FILE]`."""
+"""Draw the picture of docs/scenes.md, one instant of the run in the README: `python docs/ring.py [FILE]`."""
 
 import sys
 from math import degrees
@@ -11,19 +11,19 @@ from matplotlib.patches import Arc
 
 import ringsweep
 from ringsweep import plots
-from ringsweep.plots.ring import Rig
+from ringsweep.plots.rig import Rig
 
 CONFIG = Path(__file__).parents[1] / "configs" / "regime_map.yaml"
 TIME = 1.1
 
 
 def place(radius: float, angle: float) -> np.ndarray:
-    """Point at an angle from the downward vertical, counter-clockwise."""
+    """Point at a radius and at an angle from the downward vertical, counter-clockwise, rad."""
     return radius * np.array([np.sin(angle), -np.cos(angle)])
 
 
 def name(ax: Axes, text: str, low: float, high: float, radius: float) -> None:
-    """An arc between two angles, an arrow at its end, and what it is called."""
+    """Draw an arc between two angles (rad), with an arrow at its end and a name."""
     ax.add_patch(Arc((0, 0), 2 * radius, 2 * radius, theta1=degrees(low) - 90, theta2=degrees(high) - 90, zorder=8))
     tip, before = place(radius, high), place(radius, high - 0.04)
     ax.annotate("", tip, before, arrowprops={"arrowstyle": "-|>", "color": "black", "shrinkA": 0, "shrinkB": 0})
@@ -31,7 +31,7 @@ def name(ax: Axes, text: str, low: float, high: float, radius: float) -> None:
 
 
 def draw() -> Figure:
-    """The body in the ring with phi, beta, theta, R and r."""
+    """Draw the body in the ring with phi, beta, theta, R and r."""
     run = ringsweep.simulate(CONFIG)
     figure = Figure(figsize=(6.6, 5.0), layout="constrained")
     ax = plots.polar_view(run, TIME, figure.add_subplot())

@@ -1,4 +1,4 @@
-"""Friction laws side by side: as an axis of a sweep, as runs in one dataset, as lines in one picture."""
+"""Comparison of friction laws: an axis of a sweep, runs in one dataset, lines in one picture."""
 
 import copy
 import json
@@ -36,7 +36,7 @@ CONFIG = {
 
 
 def changed(**changes):
-    """The configuration with paths (dots as double underscores) replaced; None takes a key away."""
+    """The configuration with changed paths, dots written as double underscores; None deletes a key."""
     config = copy.deepcopy(CONFIG)
     for path, value in changes.items():
         *parents, last = path.split("__")
@@ -71,36 +71,36 @@ def compared():
 
 
 class TestSweep:
-    def test_laws_are_an_axis_of_words(self, swept):
+    def test_sweep_has_friction_laws_as_a_coordinate_of_names(self, swept):
         assert dict(swept.sizes) == {"friction_law": 3, "belt_velocity": 2}
         assert swept.friction_law.values.tolist() == LAWS
         assert swept.friction_law.attrs == {"long_name": "friction law", "path": "friction.law"}
 
     @pytest.mark.parametrize("law", LAWS)
-    def test_each_cell_is_the_run_under_its_law(self, swept, law):
+    def test_cell_of_a_law_equals_the_run_with_that_law(self, swept, law):
         for speed in (0.05, 0.1):
             run = ringsweep.simulate(changed(scene__friction__law=law, scene__belt__velocity=speed, sweep=None))
             cell = swept.sel(friction_law=law, belt_velocity=speed)
             for name in swept.data_vars:
                 np.testing.assert_array_equal(cell[name], run[name], err_msg=name)
 
-    def test_the_order_of_axes_changes_no_cell(self, swept):
+    def test_order_of_axes_changes_no_cell(self, swept):
         turned = ringsweep.run(grid(belt__velocity=[0.05, 0.1], friction__law=LAWS[::-1]), jobs=1, progress=False)
         assert turned.regime.dims == ("belt_velocity", "friction_law")
         xr.testing.assert_equal(turned.transpose(*swept.dims).sel(friction_law=LAWS), swept)
 
-    def test_a_parameter_of_one_law_repeats_the_cells_of_the_others(self):
+    def test_parameter_of_one_law_does_not_change_cells_of_others(self):
         found = ringsweep.run(grid(friction__alpha=[1.0, 10.0], friction__law=["stiction", "tustin"]), progress=False)
         first, second = (found.x_end.sel(friction_alpha=alpha) for alpha in (1.0, 10.0))
         assert (first == second).values.tolist() == [True, False]
 
-    def test_python_takes_laws_beside_numbers(self, swept):
+    def test_sweep_in_python_accepts_laws_and_numbers_as_axes(self, swept):
         found = ringsweep.sweep(CONFIG["scene"], {"friction.law": LAWS, "belt.velocity": [0.05, 0.1]}, progress=False)
         xr.testing.assert_equal(found, swept)
         again = ringsweep.run(json.loads(found.attrs["configuration"]), progress=False)
         xr.testing.assert_equal(again.transpose(*found.dims), found)
 
-    def test_a_law_can_be_paired_with_a_number(self, swept):
+    def test_law_and_number_may_vary_together(self, swept):
         law = xr.DataArray(["tustin", "coulomb"], dims="rig")
         speed = xr.DataArray([0.05, 0.1], dims="rig")
         found = ringsweep.sweep(CONFIG["scene"], {"friction.law": law, "belt.velocity": speed}, progress=False)
@@ -108,7 +108,7 @@ class TestSweep:
         again = ringsweep.run(json.loads(found.attrs["configuration"]), progress=False)
         np.testing.assert_array_equal(again.x_end, found.x_end)
 
-    def test_the_file_is_read_back_and_drawn(self, swept, tmp_path):
+    def test_saved_sweep_over_laws_is_loaded_unchanged_and_drawn(self, swept, tmp_path):
         netcdf.save(swept, tmp_path / "laws.nc")
         loaded = netcdf.load(tmp_path / "laws.nc")
         xr.testing.assert_identical(loaded, swept)
@@ -128,48 +128,48 @@ class TestConfiguration:
             ({"linspace": [1, 2, 3]}, "sweep.grid.friction.law", "list"),
         ],
     )
-    def test_wrong_names_are_refused_where_they_stand(self, laws, path, problem):
+    def test_wrong_law_is_refused_with_its_path(self, laws, path, problem):
         error = refusal(load, grid(friction__law=laws))
         assert error.path == path
         assert problem in error.problem
         assert not Draft202012Validator(schema()).is_valid(grid(friction__law=laws))
 
-    def test_a_misspelt_law_of_the_scene_is_refused_though_it_is_swept(self):
+    def test_misspelt_law_of_the_scene_is_refused_even_if_laws_are_swept(self):
         assert refusal(load, changed(scene__friction__law="colomb")).path == "scene.friction.law"
 
-    def test_what_any_law_needs_must_be_given_or_swept(self):
+    def test_parameter_that_one_law_needs_must_be_given_or_swept(self):
         missing = changed(scene__friction__alpha=None)
         assert refusal(load, missing).path == "scene.friction.alpha"
         missing["sweep"]["grid"]["friction.alpha"] = [5.0, 10.0]
         assert load(missing).axes.sizes["friction_alpha"] == 2
         assert load(changed(scene__friction={"mu_k": 0.1}, sweep={"grid": {"friction.law": ["coulomb"]}}))
 
-    def test_only_what_no_law_uses_is_said_to_be_unused(self, caplog):
+    def test_warning_names_only_parameters_that_no_law_uses(self, caplog):
         with caplog.at_level(logging.WARNING, logger="ringsweep"):
             load(CONFIG)
             assert not caplog.records
             load(grid(friction__law=["coulomb", "stiction"]))
         assert [record.args[0] for record in caplog.records] == ["friction.alpha"]
 
-    def test_the_method_must_take_each_law(self):
+    def test_method_that_refuses_one_law_refuses_the_sweep(self):
         config = changed(solver={"method": "event"}, scene__friction__v0=1e-3)
         load(config)
         config["sweep"]["grid"]["friction.law"] = ["coulomb", "bengisu-akay"]
         assert "does not take friction law bengisu-akay" in refusal(load, config).problem
 
-    def test_values_are_checked_under_each_law(self):
-        """Coulomb friction knows no static coefficient that the kinetic one could exceed."""
+    def test_values_are_checked_for_each_law(self):
+        """Only laws with a static coefficient require that the kinetic one is not greater."""
         load(grid(friction__law=["coulomb"], friction__mu_k=[0.1, 0.2]))
         assert "exceeds mu_s" in refusal(load, grid(friction__law=LAWS, friction__mu_k=[0.1, 0.2])).problem
 
-    def test_a_sweep_is_not_blamed_for_what_is_wrong_without_it(self):
+    def test_message_mentions_the_sweep_only_if_swept_values_are_wrong(self):
         wrong = changed(scene__friction__mu_k=0.2)
         assert refusal(load, wrong).problem.endswith("static friction")
         wrong["scene"]["belt"].clear()
         assert refusal(load, wrong).problem.endswith("static friction")
         assert refusal(load, grid(friction__law=LAWS, friction__mu_s=[0.05, 0.2])).problem.endswith("of the sweep)")
 
-    def test_the_schema_accepts_laws_as_an_axis(self):
+    def test_schema_accepts_laws_as_an_axis(self):
         Draft202012Validator(schema()).validate(CONFIG)
         points = {"points": {"friction.law": ["coulomb", "coulomb"], "belt.velocity": [0.1, 0.2]}}
         Draft202012Validator(schema()).validate(changed(sweep=points))
@@ -177,14 +177,14 @@ class TestConfiguration:
 
 
 class TestRuns:
-    def test_each_history_is_that_of_its_law_alone(self, compared):
+    def test_history_of_each_law_equals_a_run_with_that_law_only(self, compared):
         assert compared.x.dims == ("friction_law", "time")
         assert (compared.time.diff("time") > 0).all()
         for law in LAWS:
             alone = ringsweep.simulate(changed(scene__friction__law=law, sweep=None))
             own = compared.sel(friction_law=law)
             assert np.isin(alone.time, compared.time).all()
-            # At an event the state after it is kept.
+            # Of the two states of an event, the comparison has the second.
             last = alone.isel(time=np.append(np.diff(alone.time) > 0, True))
             for name in ("x", "velocity", "friction_force", "mode"):
                 np.testing.assert_array_equal(own[name].sel(time=last.time), last[name], err_msg=name)
@@ -193,30 +193,30 @@ class TestRuns:
             for name in ("regime", "x_end", "slips"):
                 assert own[name] == alone[name]
 
-    def test_between_samples_numbers_are_interpolated_and_modes_held(self, compared):
-        """Stuck to the belt the body moves at its speed, whether or not its own run had a sample there."""
+    def test_compared_histories_interpolate_numbers_and_hold_modes(self, compared):
+        """While the body sticks it has the speed of the belt, also at samples of other runs."""
         stuck = compared.where(compared["mode"] == 0)
         np.testing.assert_allclose(stuck.velocity.where(stuck.velocity.notnull(), 0.1), 0.1, atol=1e-9)
         assert set(np.unique(compared["mode"])) <= {-1, 0, 1}
 
-    def test_the_outcome_is_told_for_each_law(self, compared):
+    def test_outcome_has_a_line_for_each_law(self, compared):
         lines = compared.attrs["outcome"].split("\n")
         assert [line.split(":")[0] for line in lines] == LAWS
         assert lines[0].startswith("coulomb: oscillatory")
         assert lines[1].startswith("stiction: stick-slip")
 
-    def test_the_file_is_enough_to_run_again(self, compared, tmp_path):
+    def test_saved_comparison_can_be_run_again_with_the_same_result(self, compared, tmp_path):
         netcdf.save(compared, tmp_path / "laws-run.nc")
         loaded = netcdf.load(tmp_path / "laws-run.nc")
         xr.testing.assert_identical(loaded, compared)
         xr.testing.assert_equal(ringsweep.simulate(json.loads(loaded.attrs["configuration"])), compared)
 
-    def test_a_law_that_is_set_is_the_only_one(self):
+    def test_setting_a_law_replaces_the_sweep_over_laws(self):
         config = with_values(CONFIG, ["friction.law=stiction"])
         assert not config.axes.sizes
         assert config.scene.structure.law == "stiction"
 
-    def test_what_else_is_swept_still_needs_a_value(self):
+    def test_other_swept_parameters_need_a_value_in_a_single_run(self):
         missing = changed(scene__belt={}, sweep__grid__gravity=[9.81])
         missing["scene"]["body"].clear()
         missing["sweep"]["grid"]["body.mass"] = [1.0, 2.0]
@@ -224,9 +224,9 @@ class TestRuns:
         settled = with_values(missing, ["body.mass=1", "belt.velocity=0.1"])
         assert settled.axes.sizes == {"friction_law": 3}
 
-    def test_a_run_that_ends_early_has_no_numbers_afterwards(self):
+    def test_numbers_after_the_end_of_a_shorter_run_are_missing(self):
         ring = load(CONFIGS / "regime_map.yaml").source["scene"]
-        # A body that is let go in a wide band creeps instead, and stays on the ring.
+        # With this wide regularisation the body creeps and stays on the ring.
         scene = ring | {"friction": ring["friction"] | {"alpha": 100.0, "v0": 0.2}, "time": {"span": 4.0}}
         del scene["friction"]["law"]
         laws = ["stiction", "bengisu-akay"]
@@ -241,7 +241,7 @@ class TestRuns:
 
 
 class TestPicture:
-    def test_each_panel_has_a_line_for_each_law_and_no_shading(self, compared):
+    def test_panels_of_compared_laws_have_a_line_for_each_law_and_no_shading(self, compared):
         figure = plots.history(compared)
         assert len(figure.axes) == 4
         for axes in figure.axes:
@@ -255,24 +255,24 @@ class TestPicture:
             "tustin: stick-slip",
         ]
 
-    def test_the_legend_covers_no_panel(self, compared):
+    def test_legend_of_compared_laws_covers_no_panel(self, compared):
         figure = plots.history(compared)
         figure.draw_without_rendering()
         legend = figure.legends[0].get_window_extent()
         assert not any(legend.overlaps(axes.get_window_extent()) for axes in figure.axes)
 
-    def test_one_law_is_drawn_as_ever(self, compared):
+    def test_comparison_of_one_law_is_drawn_as_a_single_run(self, compared):
         figure = plots.history(compared.isel(friction_law=[1]))
         assert not figure.legends
         assert figure.axes[0].collections
 
-    def test_many_laws_are_told_apart(self, compared):
+    def test_lines_of_nine_laws_look_different(self, compared):
         many = compared.isel(friction_law=[0, 1, 2] * 3).assign_coords(friction_law=list("abcdefghi"))
         lines = plots.history(many).axes[0].lines
         assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == 9
 
-    def test_the_detail_ends_when_the_first_differences_have_been_over_for_as_long(self, compared):
-        """Tustin's body is caught by the belt before the others; then all stick until the first breaks loose."""
+    def test_panel_of_the_start_is_twice_as_long_as_the_first_differences(self, compared):
+        """Under law `tustin` the body sticks to the belt first. Then all stick until the first breakaway."""
         caught = 0.1 / (0.1 * 9.81)
         start, end = plots.history(compared).axes[-1].get_xlim()
         assert start == 0.0
@@ -280,7 +280,7 @@ class TestPicture:
         force = compared.friction_force.sel(time=slice(caught * 1.05, end))
         assert float((force.max("friction_law") - force.min("friction_law")).max()) < 0.02
 
-    def test_transients_of_two_scales_are_drawn_over_logarithmic_time(self, compared):
+    def test_transients_of_two_time_scales_have_a_logarithmic_axis(self, compared):
         time = np.concatenate([np.linspace(0, 1e-3, 1000), np.linspace(2e-3, 10, 20_000)])
         bristle = 1 - np.exp(-time / 1e-4) + np.where(time > 0.1, np.exp(-5 * (time - 0.1)) * np.sin(200 * time), 0)
         force = ("friction_law", "time"), np.array([np.ones_like(time), bristle]), compared.friction_force.attrs
@@ -302,7 +302,7 @@ class TestCommands:
         (tmp_path / "laws.yaml").write_text(yaml.safe_dump(CONFIG))
         return tmp_path
 
-    def test_a_sweep_is_run_drawn_and_told(self, folder, capsys):
+    def test_commands_run_map_and_info_accept_a_sweep_over_laws(self, folder, capsys):
         assert main(["run", "laws.yaml"]) == 0
         assert main(["run", "laws.yaml"]) == 0
         assert main(["map", "laws.nc", "--sel", "friction.law=tustin"]) == 0
@@ -313,7 +313,7 @@ class TestCommands:
         assert "friction_law: coulomb, stiction, tustin\n" in out
         assert (folder / "laws-friction.law=tustin.png").exists()
 
-    def test_a_comparison_tells_a_line_for_each_law(self, folder, capsys):
+    def test_simulate_prints_a_line_for_each_law(self, folder, capsys):
         assert main(["simulate", "laws.yaml"]) == 0
         out, _ = capsys.readouterr()
         assert [line.split(":")[0] for line in out.splitlines()[:3]] == LAWS
@@ -321,7 +321,7 @@ class TestCommands:
         assert main(["info", "laws-run.nc"]) == 0
         assert "friction_law 3" in capsys.readouterr().out
 
-    def test_a_number_of_threads_in_words_is_refused_readably(self, capsys):
+    def test_wrong_number_of_threads_is_refused_with_a_readable_message(self, capsys):
         for jobs in ("two", "0", "-1", "1.5"):
             with pytest.raises(SystemExit):
                 main(["run", "laws.yaml", f"--jobs={jobs}"])

@@ -1,4 +1,4 @@
-"""A click on a map asks for the cell that is drawn there, and for no other."""
+"""Cells of a sweep as configurations, and the map that draws the history of the cell clicked."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ AXES = {"drive.amplitude": [0.5, 2.0, 8.0], "zone.half_angle": ["10 deg", "20 de
 
 
 def mapped(scene, axes, points=False):
-    """What a sweep over axes gives, without its having been run."""
+    """Dataset of a sweep with invented regimes, without computing it."""
     config = load({"scene": scene, "sweep": {"points" if points else "grid": axes}})
     ds = sweep._frame(config)
     shape = tuple(config.axes.sizes.values())
@@ -32,7 +32,7 @@ def maps(scene):
 
 @pytest.fixture
 def asked(monkeypatch):
-    """Configurations of which histories are asked for; all of them are one and the same."""
+    """Values of the scenes that are simulated; every simulation returns one invented history."""
     found = []
     time = np.linspace(0.0, 1.0, 20)
     history = xr.Dataset(dict.fromkeys(("phi", "omega", "epsilon", "normal_1"), ("time", time)), {"time": time})
@@ -53,24 +53,24 @@ def click(figure, x, y, button=1, ax=None):
 
 
 class TestCell:
-    def test_is_the_configuration_with_the_values_of_the_cell(self, maps):
+    def test_cell_is_the_configuration_with_the_values_of_the_cell(self, maps):
         found = plots.cell(maps, {"drive.amplitude": 1.9, "zone_half_angle": np.radians(39.0)})
         assert "sweep" not in found
         values = load(found).scene.values
         assert values["drive.amplitude"] == 2.0
         assert values["zone.half_angle"] == float(maps["zone_half_angle"][2])
 
-    def test_may_have_been_chosen_as_xarray_does(self, maps):
+    def test_cell_accepts_a_dataset_already_selected_with_xarray(self, maps):
         found = plots.cell(maps.isel(drive_amplitude=2).sel(zone_half_angle=0.3, method="nearest"))
         values = load(found).scene.values
         assert (values["drive.amplitude"], values["zone.half_angle"]) == (8.0, float(maps["zone_half_angle"][1]))
 
-    def test_of_points_is_one_of_them(self, scene):
+    def test_cell_of_points_is_selected_by_number(self, scene):
         ds = mapped(scene, {"drive.amplitude": [0.5, 2.0, 8.0], "initial.omega": [3.0, 1.0, 2.0]}, points=True)
         values = load(plots.cell(ds, {"point": 1})).scene.values
         assert (values["drive.amplitude"], values["initial.omega"]) == (2.0, 1.0)
 
-    def test_may_lie_on_an_axis_of_laws_or_in_a_list_of_arcs(self, scene):
+    def test_cell_may_be_selected_by_law_and_by_a_number_of_an_arc(self, scene):
         bare = {name: part for name, part in scene.items() if name != "zone"}
         bare["friction"] = {"rest": scene["friction"]["rest"]}
         bare["zones"] = [{"half_angle": "10 deg", "mu_s": 0.5, "mu_k": 0.3}]
@@ -79,7 +79,7 @@ class TestCell:
         assert found["scene"]["friction"]["law"] == "coulomb"
         assert found["scene"]["zones"][0]["mu_k"] == 0.25
 
-    def test_runs_as_it_did_in_the_sweep(self, scene):
+    def test_run_of_a_cell_gives_the_result_of_the_sweep(self, scene):
         ds = ringsweep.sweep(scene, {"drive.amplitude": [0.5, 8.0], "zone.half_angle": ["15 deg", "40 deg"]})
         for i, j in ((0, 1), (1, 0)):
             one = ds.isel(drive_amplitude=i, zone_half_angle=j)
@@ -87,7 +87,7 @@ class TestCell:
             assert REGIMES[int(run["regime"])] == REGIMES[int(one["regime"])]
             assert float(run["phi_end"]) == float(one["phi_end"])
 
-    def test_more_than_one_is_refused_with_what_is_left(self, maps):
+    def test_cell_refuses_incomplete_selections_and_datasets_without_configuration(self, maps):
         with pytest.raises(InputError, match=r"zone_half_angle \(4\) is left"):
             plots.cell(maps, {"drive.amplitude": 2.0})
         with pytest.raises(InputError, match="did you mean drive_amplitude"):
@@ -97,7 +97,7 @@ class TestCell:
 
 
 class TestExplore:
-    def test_draws_the_map_and_the_history_of_the_cell_in_the_middle(self, maps, asked):
+    def test_explore_draws_the_map_and_the_history_of_the_middle_cell(self, maps, asked):
         figure = plots.explore(maps)
         assert [axes.get_ylabel().replace("\n", " ") for axes in figure.axes[:2]] == [
             "half-angle of the rough zone (°)",
@@ -107,13 +107,13 @@ class TestExplore:
         assert asked[0]["zone.half_angle"] == pytest.approx(np.radians(40.0))
         assert figure.subfigs[1].get_suptitle().endswith("history 1")
 
-    def test_begins_with_the_cell_that_is_named(self, maps, asked):
+    def test_explore_starts_with_the_cell_given(self, maps, asked):
         plots.explore(maps, at={"drive.amplitude": 8.0, "zone.half_angle": 0.18})
         assert asked[0]["drive.amplitude"] == 8.0
         assert asked[0]["zone.half_angle"] == pytest.approx(np.radians(10.0))
 
     @pytest.mark.parametrize(("x", "y"), [(0.5, 10.0), (8.0, 20.0), (1.3, 48.0)])
-    def test_a_click_draws_the_cell_under_it_and_marks_it(self, maps, asked, x, y):
+    def test_click_draws_and_marks_the_cell_under_the_pointer(self, maps, asked, x, y):
         figure = plots.explore(maps)
         click(figure, x, y)
         near = min(AXES["drive.amplitude"], key=lambda value: abs(np.log(value / x)))
@@ -125,14 +125,14 @@ class TestExplore:
         mark = figure.axes[0].lines[-1].get_xydata()[0]
         np.testing.assert_allclose(mark, [near, np.degrees(asked[1]["zone.half_angle"])])
 
-    def test_other_clicks_are_not_for_it(self, maps, asked):
+    def test_other_buttons_and_clicks_outside_the_map_draw_nothing(self, maps, asked):
         figure = plots.explore(maps)
         click(figure, 2.0, 20.0, button=3)
         click(figure, 0.5, 0.5, ax=figure.axes[1])
         figure.canvas.callbacks.process("button_press_event", MouseEvent("button_press_event", figure.canvas, 1, 1, 1))
         assert len(asked) == 1
 
-    def test_where_clicks_are_heard_the_figure_is_pyplots_and_elsewhere_a_picture(self, maps, asked, monkeypatch):
+    def test_explore_uses_pyplot_only_with_an_interactive_backend(self, maps, asked, monkeypatch):
         from matplotlib import pyplot
 
         plots.explore(maps)
@@ -144,7 +144,7 @@ class TestExplore:
         finally:
             pyplot.close("all")
 
-    def test_axes_may_be_exchanged_and_others_held(self, scene, asked):
+    def test_explore_may_exchange_axes_and_hold_others(self, scene, asked):
         maps = mapped(scene, AXES | {"friction.rough.mu_k": [0.25, 0.3]})
         with pytest.raises(InputError, match="friction_rough_mu_k"):
             plots.explore(maps)
@@ -153,19 +153,19 @@ class TestExplore:
         assert asked[1]["friction.rough.mu_k"] == 0.25
         assert asked[1]["drive.amplitude"] == 8.0
 
-    def test_of_points_the_nearest_to_the_eye_is_meant(self, scene, asked):
+    def test_click_among_points_draws_the_nearest_on_the_screen(self, scene, asked):
         axes = {"drive.amplitude": [0.5, 2.0, 8.0, 8.0], "initial.omega": [3.0, 1.0, 2.0, 0.0]}
         figure = plots.explore(mapped(scene, axes, points=True))
         click(figure, 7.0, 1.8)
         assert (asked[1]["drive.amplitude"], asked[1]["initial.omega"]) == (8.0, 2.0)
 
-    def test_laws_are_an_axis_too(self, scene, asked):
+    def test_click_on_an_axis_of_laws_draws_the_run_of_that_law(self, scene, asked):
         ds = mapped(scene, {"drive.amplitude": [0.5, 2.0], "friction.law": ["coulomb", "stiction"]})
         figure = plots.explore(ds)
         click(figure, 2.0, 0.0)
         assert "friction law = coulomb" in figure.subfigs[1].get_suptitle()
 
-    def test_one_axis_is_enough(self, scene, asked):
+    def test_explore_accepts_a_sweep_over_one_axis(self, scene, asked):
         figure = plots.explore(mapped(scene, {"drive.amplitude": [0.5, 2.0, 8.0]}))
         click(figure, 8.0, 0.5)
         assert asked[1]["drive.amplitude"] == 8.0

@@ -1,4 +1,4 @@
-"""What a reader takes from a picture is what the dataset says."""
+"""Maps, histories and work-precision diagrams show what the dataset holds."""
 
 import os
 import time
@@ -21,7 +21,7 @@ FRICTION = {"units": "1", "long_name": "coefficient of kinetic friction"}
 
 
 def make_sweep(shape: tuple[int, ...] = (12, 9)) -> xr.Dataset:
-    """Regimes in diagonal bands, without warnings."""
+    """A sweep with regimes in diagonal bands and no warnings."""
     dims = ("drive_amplitude", "zone_half_angle", "friction_rough_mu_k", "friction_rest_mu_k", "initial_omega")
     values = [np.geomspace(0.1, 10, shape[0]), np.radians(np.linspace(2, 60, shape[1] if len(shape) > 1 else 1))]
     values += [np.linspace(0.1, 0.5, n) for n in shape[2:]]
@@ -62,7 +62,7 @@ def make_history(count: int = 2000, ring: bool = True) -> xr.Dataset:
 
 
 def make_work(methods: int = 3, settings: int = 4, cells: int = 5) -> xr.Dataset:
-    """Errors that fall as runs take longer, under methods that nobody has heard of."""
+    """Errors of invented methods, which fall as run time grows."""
     k, j, i = np.meshgrid(range(methods), range(settings), range(cells), indexing="ij")
     error = 10.0 ** (-1.0 - 2 * j - 0.1 * k) * (1 + i)
     return xr.Dataset(
@@ -88,7 +88,7 @@ def drawn_colours(figure: Figure, meaning: str) -> set[tuple[float, ...]]:
 
 
 def hatched(figure: Figure) -> int:
-    """Cells under hatching of the first panel, whatever its ink."""
+    """Number of hatched cells in the first panel, white and black hatching together."""
     x, y = mesh(figure).get_coordinates()[0, :, 0], mesh(figure).get_coordinates()[:, 0, 1]
     area = 0
     for patch in figure.axes[0].patches:
@@ -99,7 +99,7 @@ def hatched(figure: Figure) -> int:
     return int(area)
 
 
-def test_every_regime_has_a_colour_of_its_own_that_survives_greyscale():
+def test_regimes_of_one_model_differ_in_greyscale():
     assert plots.REGIME_COLOURS.keys() == set(REGIMES)
 
     def lightness(colour):
@@ -111,7 +111,7 @@ def test_every_regime_has_a_colour_of_its_own_that_survives_greyscale():
         assert min(np.diff(shades)) > 10
 
 
-def test_cells_tile_the_plane_each_around_its_own_value():
+def test_cells_of_a_map_tile_the_plane_around_their_values():
     ds = make_sweep()
     corners = mesh(plots.regime_map(ds)).get_coordinates()
     x, y = corners[0, :, 0], corners[:, 0, 1]
@@ -121,7 +121,7 @@ def test_cells_tile_the_plane_each_around_its_own_value():
     assert len(y) == 10
 
 
-def test_a_cell_shows_its_regime_where_its_coordinates_are():
+def test_map_shows_each_regime_at_the_coordinates_of_its_cell():
     ds = make_sweep().isel(drive_amplitude=[3, 0, 2, 1])
     drawn = mesh(plots.regime_map(ds)).get_array()
     np.testing.assert_array_equal(drawn, ds["regime"].sortby("drive_amplitude").transpose())
@@ -129,7 +129,7 @@ def test_a_cell_shows_its_regime_where_its_coordinates_are():
     np.testing.assert_array_equal(swapped, drawn.T)
 
 
-def test_axes_are_logarithmic_exactly_where_the_grid_is_geometric():
+def test_map_axis_is_logarithmic_only_for_a_geometric_grid():
     axes = plots.regime_map(make_sweep()).axes[0]
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "linear")
     for values in ([1, 2], [1, 2, 3], [-1, -2, -4], [0, 1, 10]):
@@ -137,7 +137,7 @@ def test_axes_are_logarithmic_exactly_where_the_grid_is_geometric():
         assert plots.regime_map(ds).axes[0].get_xscale() == "linear"
 
 
-def test_labels_carry_names_and_units_and_angles_are_in_degrees():
+def test_map_labels_have_names_and_units_with_angles_in_degrees():
     figure = plots.regime_map(make_sweep(), var="t_separation")
     assert figure.axes[0].get_xlabel() == "amplitude of the drive (rad s$^{-1}$)"
     assert figure.axes[0].get_ylabel() == "half-angle of the rough arc (°)"
@@ -148,19 +148,19 @@ def test_labels_carry_names_and_units_and_angles_are_in_degrees():
     ("units", "shown"),
     [("rad/s", "rad s$^{-1}$"), ("m/s^2", "m s$^{-2}$"), ("kg m^2", "kg m$^{2}$"), ("s/m", "s m$^{-1}$"), ("kg", "kg")],
 )
-def test_units_of_parameters_are_written_like_those_of_variables(units, shown):
+def test_units_of_parameters_look_like_units_of_variables(units, shown):
     ds = make_sweep()
     ds["drive_amplitude"].attrs["units"] = units
     assert plots.regime_map(ds).axes[0].get_xlabel() == f"amplitude of the drive ({shown})"
 
 
-def test_coordinates_of_one_long_name_are_told_apart():
+def test_label_has_the_path_if_two_coordinates_share_a_long_name():
     ds = make_sweep((3, 3, 3, 3))
     figure = plots.regime_map(ds.isel(drive_amplitude=0, zone_half_angle=0))
     assert figure.axes[0].get_xlabel() == "coefficient of kinetic friction, friction_rough_mu_k"
 
 
-def test_the_colour_of_a_regime_is_the_same_in_every_figure():
+def test_regime_has_the_same_colour_in_every_figure():
     ds = make_sweep()
     few = ds.where(ds["regime"] == 3, drop=True).assign(regime=lambda d: d["regime"].fillna(1))
     few["regime"].attrs = ds["regime"].attrs
@@ -172,14 +172,14 @@ def test_the_colour_of_a_regime_is_the_same_in_every_figure():
     }
 
 
-def test_the_legend_lists_what_occurs_with_its_share():
+def test_map_legend_lists_the_regimes_present_with_their_shares():
     ds = make_sweep((10, 10))
     ds["regime"][:] = 1
     ds["regime"][0, 0] = 3
     assert entries(plots.regime_map(ds)) == ["oscillatory, 99.0 %", "separating, 1.0 %"]
 
 
-def test_missing_values_are_grey_and_said_to_be():
+def test_missing_values_are_grey_and_in_the_legend():
     figure = plots.regime_map(make_sweep((10, 10)), var="t_separation")
     share = 100 * float(make_sweep((10, 10))["t_separation"].isnull().mean())
     assert entries(figure) == [f"no value, {share:.1f} %"]
@@ -189,7 +189,7 @@ def test_missing_values_are_grey_and_said_to_be():
     assert entries(plots.regime_map(nothing, var="t_separation")) == ["no value, 100.0 %"]
 
 
-def test_exactly_the_cells_that_are_not_certified_are_hatched():
+def test_map_hatches_only_cells_that_are_not_certified():
     ds = make_sweep((10, 10))
     ds["certified"][2:5, 3:7] = 0
     ds["certified"][9, 9] = 0
@@ -199,7 +199,7 @@ def test_exactly_the_cells_that_are_not_certified_are_hatched():
     assert not plots.regime_map(ds, var="t_separation").axes[0].patches
 
 
-def test_steps_beyond_the_stability_limit_have_a_mark_of_their_own():
+def test_cells_beyond_the_stability_limit_have_another_hatch():
     ds = make_sweep((10, 10))
     ds["certified"][:3] = 0
     ds["stiffness"][:2] = 2.8
@@ -212,7 +212,7 @@ def test_steps_beyond_the_stability_limit_have_a_mark_of_their_own():
     assert entries(figure)[-1] == "not certified: step beyond stability limit, 30.0 %"
 
 
-def test_hatching_a_large_map_does_not_take_long(tmp_path):
+def test_hatching_a_large_map_takes_less_than_five_seconds(tmp_path):
     ds = make_sweep((512, 512))
     ds["certified"][:] = np.random.default_rng(0).integers(0, 2, (512, 512))
     begin = time.perf_counter()
@@ -220,14 +220,14 @@ def test_hatching_a_large_map_does_not_take_long(tmp_path):
     assert time.perf_counter() - begin < 5
 
 
-def test_a_single_value_still_makes_an_axis():
+def test_map_axis_may_have_a_single_value():
     for ds in (make_sweep((1, 5)), make_sweep((5, 1)), make_sweep((1, 1))):
         assert mesh(plots.regime_map(ds)).get_array().shape == ds["regime"].transpose().shape
     at_zero = make_sweep((1, 3)).assign_coords(drive_amplitude=[0.0])
     assert np.ptp(mesh(plots.regime_map(at_zero)).get_coordinates()[0, :, 0]) == 1
 
 
-def test_one_swept_quantity_becomes_a_strip_or_a_line():
+def test_map_of_one_swept_quantity_is_a_strip_or_a_line():
     ds = make_sweep((12,))
     np.testing.assert_array_equal(mesh(plots.regime_map(ds)).get_array()[0], ds["regime"])
     axes = plots.regime_map(ds, var="t_separation").axes[0]
@@ -235,15 +235,15 @@ def test_one_swept_quantity_becomes_a_strip_or_a_line():
     assert axes.get_xscale() == "log"
 
 
-def test_quantities_that_vary_together_make_one_axis_of_a_grid():
-    """Two arcs that widen alike: the cells tile, as with one."""
+def test_quantities_that_vary_together_make_one_map_axis():
+    """Two arcs of equal, varying width: the map is that of one arc."""
     ds = make_sweep((12, 9)).rename(zone_half_angle="width")
     widths = {f"zones_{k}_half_angle": ("width", ds["width"].values, ANGLE) for k in range(2)}
     together = ds.drop_vars("width").assign_coords(widths)
     np.testing.assert_array_equal(mesh(plots.regime_map(together)).get_array(), ds["regime"].transpose())
 
 
-def test_words_make_an_axis_too():
+def test_map_axis_may_consist_of_friction_laws():
     ds = make_sweep((3, 4)).assign_coords(drive_amplitude=["stiction", "coulomb", "dahl"])
     figure = plots.regime_map(ds)
     assert [label.get_text() for label in figure.axes[0].get_xticklabels()] == ["stiction", "coulomb", "dahl"]
@@ -251,7 +251,7 @@ def test_words_make_an_axis_too():
     assert " = dahl" in plots.regime_map(ds, sel={"drive_amplitude": "dahl"}).get_suptitle()
 
 
-def test_selecting_holds_the_nearest_value_and_says_so():
+def test_map_holds_the_nearest_value_and_names_it_in_the_title():
     ds = make_sweep((12, 9, 3))
     figure = plots.regime_map(ds, sel={"friction.rough.mu_k": 0.32, "zone_half_angle": 0.04})
     np.testing.assert_array_equal(mesh(figure).get_array()[0], ds["regime"][:, 0, 1])
@@ -260,7 +260,7 @@ def test_selecting_holds_the_nearest_value_and_says_so():
 
 
 @pytest.mark.parametrize("value", ["30 deg", "0.5236", 0.5236, "0.08333 turn"])
-def test_a_value_to_hold_may_have_a_unit(value):
+def test_held_value_may_have_a_unit(value):
     ds = make_sweep((12, 30))
     title = plots.regime_map(ds, sel={"zone.half_angle": value}).get_suptitle()
     assert "half-angle of the rough arc = 30°" in title
@@ -276,32 +276,32 @@ def test_a_value_to_hold_may_have_a_unit(value):
         ({"drive_amplitude": float("nan")}, "not finite"),
     ],
 )
-def test_a_value_beyond_the_axis_is_not_taken_for_its_end(held, problem):
+def test_held_value_outside_the_axis_is_refused(held, problem):
     with pytest.raises(InputError, match=problem) as refused:
         plots.regime_map(make_sweep(), sel=held)
     assert refused.value.path == f"sel.{next(iter(held))}"
 
 
-def test_a_count_has_whole_numbers_beside_its_colours():
+def test_colour_bar_of_a_count_has_whole_numbers():
     ds = make_sweep().assign(reversals=(("drive_amplitude", "zone_half_angle"), np.arange(108).reshape(12, 9) % 4))
     figure = plots.regime_map(ds, var="reversals")
     figure.draw_without_rendering()
     assert all(tick == round(tick) for tick in figure.axes[1].get_yticks())
 
 
-def test_a_long_title_is_laid_in_lines():
+def test_long_title_is_broken_into_lines():
     held = {"friction.rough.mu_k": 0.1, "friction.rest.mu_k": 0.1, "initial.omega": 0.1}
     title = plots.regime_map(make_sweep((3, 3, 2, 2, 2)), sel=held).get_suptitle()
     assert "initial_omega = 0.1" in title
     assert max(map(len, title.split("\n"))) < 70
 
 
-def test_pictures_have_an_opaque_ground_on_dark_pages_too():
+def test_pictures_have_an_opaque_white_background():
     for figure in (plots.regime_map(make_sweep()), plots.history(make_history()), plots.work_precision(make_work())):
         assert figure.get_facecolor() == (1.0, 1.0, 1.0, 1.0)
 
 
-def test_more_dimensions_become_panels_of_one_scale():
+def test_further_dimensions_become_panels_with_one_colour_scale():
     ds = make_sweep((6, 5, 2, 3))
     figure = plots.regime_map(ds, var="t_separation")
     panels = [axes for axes in figure.axes if axes.get_title()]
@@ -311,69 +311,69 @@ def test_more_dimensions_become_panels_of_one_scale():
     assert len({mesh(figure, k).get_clim() for k in range(6)}) == 1
 
 
-def test_too_many_panels_are_refused_with_the_way_out():
+def test_too_many_panels_are_refused_and_the_message_says_what_to_hold():
     with pytest.raises(InputError, match=r"small multiples.*50 panels.*--sel friction_rough_mu_k=VALUE"):
         plots.regime_map(make_sweep((3, 3, 5, 5, 2)))
 
 
-def test_of_a_large_grid_no_more_is_drawn_than_a_page_shows_and_the_title_says_so():
+def test_large_grid_is_thinned_and_the_title_says_so():
     ds = make_sweep((3000, 1500))
     ds["regime"][:] = 1
     ds["regime"][0, 0] = 3
     figure = plots.regime_map(ds)
     assert mesh(figure).get_array().shape == (750, 1000)
     assert figure.get_suptitle() == "regime of the run; 1 cell in 6 drawn"
-    # Shares are those of all cells.
+    # Shares count the cells that are not drawn too.
     assert entries(figure) == ["oscillatory, > 99.9 %", "separating, < 0.1 %"]
     corners = mesh(figure).get_coordinates()
     assert corners[0, 0, 0] == pytest.approx(0.1, rel=0.01)
     assert corners[0, -1, 0] == pytest.approx(10.0, rel=0.01)
 
 
-def test_a_line_is_drawn_with_all_its_values():
+def test_line_is_drawn_with_all_values_of_a_long_axis():
     assert len(plots.regime_map(make_sweep((5000,)), var="t_separation").axes[0].lines[0].get_xdata()) == 5000
 
 
 class TestPanels:
-    """What draws one picture draws it where it is told, and returns that."""
+    """Functions that draw one picture draw in the axes given, and return them."""
 
-    def test_a_map(self):
+    def test_map_panel_draws_in_the_axes_given(self):
         left, right = Figure().subplots(1, 2)
         assert plots.map_panel(make_sweep(), ax=right) is right
         assert not left.collections
         assert right.get_xlabel() == "amplitude of the drive (rad s$^{-1}$)"
         assert [text.get_text().split(",")[0] for text in right.get_legend().get_texts()] == list(REGIMES[:5])
 
-    def test_a_map_of_numbers_has_a_scale(self):
+    def test_map_panel_of_numbers_has_a_colour_bar(self):
         ax = Figure().add_subplot()
         plots.map_panel(make_sweep(), var="t_separation", ax=ax)
         assert ax.figure.axes[1].get_ylabel() == "time of separation (s)"
 
-    def test_a_map_of_more_dimensions_is_refused_with_the_way_out(self):
+    def test_map_panel_of_three_dimensions_is_refused_and_the_message_says_what_to_hold(self):
         with pytest.raises(InputError, match="friction_rough_mu_k: hold it, or draw regime_map"):
             plots.map_panel(make_sweep((3, 3, 2)), ax=Figure().add_subplot())
         held = plots.map_panel(make_sweep((3, 3, 2)), sel={"friction.rough.mu_k": 0.1}, ax=Figure().add_subplot())
         assert "coefficient of kinetic friction = 0.1" in held.get_title()
 
     @pytest.mark.parametrize(("var", "lines"), [("phi", 1), ("ring_omega", 2), ("normal_2", 2), ("epsilon", 1)])
-    def test_a_panel_of_a_history_has_what_belongs_together(self, var, lines):
+    def test_history_panel_also_shows_the_related_quantity(self, var, lines):
         ax = Figure().add_subplot()
         assert plots.history_panel(make_history(), var, ax) is ax
         assert len(ax.lines) == lines
         assert ax.get_xlabel() == "time (s)"
         assert "(" in ax.get_ylabel()
 
-    def test_a_panel_of_several_laws_has_a_line_for_each(self):
+    def test_history_panel_of_several_laws_has_a_line_for_each(self):
         one = make_history().drop_vars(["mode", "zone_1", "zone_2"])
         ds = xr.concat([one, one], "friction_law").assign_coords(friction_law=["coulomb", "stiction"])
         ax = plots.history_panel(ds, "phi", Figure().add_subplot())
         assert [text.get_text() for text in ax.get_legend().get_texts()] == ["coulomb", "stiction"]
 
-    def test_an_unknown_quantity_is_refused_with_the_right_one(self):
+    def test_unknown_variable_is_refused_and_the_message_suggests_another(self):
         with pytest.raises(InputError, match="did you mean omega"):
             plots.history_panel(make_history(), "omeg", Figure().add_subplot())
 
-    def test_without_axes_the_current_ones_are_drawn_in(self):
+    def test_panels_without_axes_draw_in_the_current_axes(self):
         from matplotlib import pyplot
 
         try:
@@ -384,7 +384,7 @@ class TestPanels:
             pyplot.close("all")
 
 
-def test_points_are_scattered_over_their_coordinates():
+def test_points_are_drawn_at_their_coordinates_in_the_colours_of_their_regimes():
     ds = make_points()
     ds["certified"][:4] = 0
     figure = plots.regime_map(ds, x="zone_half_angle", y="drive_amplitude")
@@ -396,7 +396,7 @@ def test_points_are_scattered_over_their_coordinates():
     assert sum(len(cloud.get_offsets()) for cloud in clouds[1:]) == 4
 
 
-def test_points_beside_a_grid_can_be_scattered_against_it():
+def test_points_and_a_grid_axis_make_a_scatter_plot():
     ds = make_sweep((6, 5)).isel(drive_amplitude=xr.DataArray([0, 3, 5], dims="point"))
     cloud = plots.regime_map(ds).axes[0].collections[0]
     assert len(cloud.get_offsets()) == 15
@@ -415,19 +415,24 @@ def test_points_beside_a_grid_can_be_scattered_against_it():
         ({"sel": {"zone_half_angle": 1, "drive_amplitude": 1}}, "a single cell has no map"),
     ],
 )
-def test_wrong_names_are_answered_with_the_right_ones(arguments, problem):
+def test_wrong_map_arguments_are_refused_and_the_message_names_valid_ones(arguments, problem):
     with pytest.raises(InputError, match=problem):
         plots.regime_map(make_sweep(), **arguments)
 
 
-def test_a_sweep_and_a_history_are_not_mistaken_for_each_other():
+def test_map_of_a_history_and_history_of_a_sweep_are_refused():
     with pytest.raises(InputError, match="history"):
         plots.regime_map(make_history())
     with pytest.raises(InputError, match="regime_map"):
         plots.history(make_sweep())
 
 
-def test_a_history_has_the_four_panels_of_the_paper_over_one_time_axis():
+def test_history_without_a_variable_to_show_is_refused():
+    with pytest.raises(InputError, match="no variable that a history shows"):
+        plots.history(make_history()[["mode"]])
+
+
+def test_ring_history_has_the_four_panels_of_the_paper_over_one_time_axis():
     ds = make_history().assign_attrs(outcome="separating (oscillatory), contact 2, t = 3.58236 s")
     figure = plots.history(ds)
     assert [axes.get_ylabel().replace("\n", " ") for axes in figure.axes[:4]] == [
@@ -442,26 +447,26 @@ def test_a_history_has_the_four_panels_of_the_paper_over_one_time_axis():
     assert figure.get_suptitle() == ds.attrs["outcome"]
 
 
-def test_stick_is_shaded_for_as_long_as_it_lasts():
+def test_history_shades_stick_for_its_duration():
     axes = plots.history(make_history()).axes[3]
     widths = [np.ptp(path.vertices[:, 0]) for path in axes.collections[0].get_paths()]
     np.testing.assert_allclose(widths, 1, atol=0.02)
 
 
-def test_the_strip_shows_the_arc_under_each_contact():
+def test_strip_shows_the_arc_under_each_contact():
     ds = make_history()
     strip = mesh(plots.history(ds), -1).get_array()
     np.testing.assert_allclose((strip > 0).mean(axis=1), [(ds[z] > 0).mean() for z in ("zone_1", "zone_2")], atol=2e-3)
     assert set(np.unique(strip[1])) == {0, 2}
 
 
-def test_one_contact_and_a_single_sample_are_histories_too():
+def test_history_may_have_one_contact_or_one_sample():
     single = plots.history(make_history().drop_vars(["normal_2", "zone_2"]))
     assert len(single.axes[3].lines) == 1
     plots.history(make_history(1))
 
 
-def test_spikes_do_not_flatten_the_acceleration_and_the_clipping_is_said():
+def test_acceleration_axis_is_clipped_at_outliers_and_its_title_says_so():
     ds = make_history()
     ds["epsilon"][::400] = 1e6
     axes = plots.history(ds).axes[2]
@@ -470,7 +475,7 @@ def test_spikes_do_not_flatten_the_acceleration_and_the_clipping_is_said():
     assert not plots.history(make_history()).axes[2].get_title(loc="right")
 
 
-def test_a_long_history_is_condensed_without_losing_its_extremes(tmp_path):
+def test_long_history_is_condensed_and_keeps_its_extremes(tmp_path):
     ds = make_history(1_000_000)
     ds["normal_2"][123_456] = -7
     begin = time.perf_counter()
@@ -482,7 +487,7 @@ def test_a_long_history_is_condensed_without_losing_its_extremes(tmp_path):
     assert line[:, 1].min() == -7
 
 
-def test_a_belt_has_panels_of_its_own_and_bristles_one_for_their_bending():
+def test_belt_history_has_three_panels_and_one_more_for_bristles():
     rigid = make_history(ring=False)
     assert len(plots.history(rigid.drop_vars("deflection")).axes) == 3
     figure = plots.history(rigid)
@@ -496,7 +501,7 @@ def test_a_belt_has_panels_of_its_own_and_bristles_one_for_their_bending():
 
 
 class TestWorkPrecision:
-    def test_a_curve_for_each_method_shows_the_median_and_a_bar_the_largest(self):
+    def test_curve_of_a_method_shows_the_median_error_and_bars_the_largest(self):
         ds = make_work()
         axes = plots.work_precision(ds).axes[0]
         assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
@@ -509,12 +514,12 @@ class TestWorkPrecision:
         np.testing.assert_allclose(tops, ds["error_end"].max("cell"))
         assert axes.get_ylabel() == "error (rad)"
 
-    def test_a_dozen_methods_are_told_apart(self):
+    def test_curves_of_thirteen_methods_look_different(self):
         axes = plots.work_precision(make_work(13)).axes[0]
         looks = {(line.get_color(), line.get_marker()) for line in axes.lines if "method" in str(line.get_label())}
         assert len(looks) == 13
 
-    def test_no_error_lies_on_a_marked_floor_and_a_failure_on_a_ceiling(self):
+    def test_zero_error_lies_on_a_floor_and_failure_on_a_ceiling(self):
         ds = make_work(1)
         ds["error_end"][3], ds["error_end"][0] = 0.0, np.inf
         axes = plots.work_precision(ds).axes[0]
@@ -526,12 +531,12 @@ class TestWorkPrecision:
         words = [text.get_text() for text in axes.get_legend().get_texts()]
         assert words == ["method 0", "no error (at the floor)", "failed (at the ceiling)"]
 
-    def test_all_may_be_free_of_error(self):
+    def test_diagram_accepts_errors_that_are_all_zero(self):
         ds = make_work(1)
         ds["error_end"][:] = 0.0
         assert (plots.work_precision(ds).axes[0].lines[0].get_ydata() > 0.0).all()
 
-    def test_a_cell_without_such_an_error_does_not_count_and_a_contender_without_any_is_not_drawn(self):
+    def test_missing_errors_are_ignored_and_a_method_without_errors_is_not_drawn(self):
         ds = make_work(2)
         ds["error_end"][4:] = np.nan
         ds["error_end"][0, 1:] = np.nan
@@ -540,7 +545,7 @@ class TestWorkPrecision:
         with pytest.raises(InputError, match="no value"):
             plots.work_precision(ds.isel(contender=slice(4, None)))
 
-    def test_target_recommendation_and_wrong_regimes_are_shown_where_there_are_any(self):
+    def test_target_recommendation_and_wrong_regimes_are_shown_if_present(self):
         ds = make_work()
         plain = [text.get_text() for text in plots.work_precision(ds).axes[0].get_legend().get_texts()]
         assert plain == ["method 0", "method 1", "method 2"]
@@ -555,13 +560,13 @@ class TestWorkPrecision:
         (ring,) = (line for line in axes.lines if line.get_markerfacecolor() == "none" and line.get_markersize() > 10)
         np.testing.assert_array_equal(ring.get_xdata(), [ds["time_per_run"].values[6]])
 
-    def test_axes_that_are_given_are_drawn_in(self):
+    def test_precision_panel_draws_in_the_axes_given(self):
         figure = Figure()
         _, right = figure.subplots(1, 2)
         assert plots.precision_panel(make_work(), ax=right) is right
         assert right.lines
 
-    def test_other_datasets_and_unknown_errors_are_refused(self):
+    def test_other_datasets_and_unknown_error_variables_are_refused(self):
         with pytest.raises(InputError, match="has no contender, cell"):
             plots.work_precision(make_sweep())
         with pytest.raises(InputError, match="did you mean error_end"):
@@ -571,7 +576,7 @@ class TestWorkPrecision:
 
 
 @pytest.mark.parametrize("name", ["map.png", "map.PDF", "map.svg"])
-def test_a_figure_is_saved_as_its_suffix_says(tmp_path, name):
+def test_suffix_decides_the_format_of_a_saved_figure(tmp_path, name):
     plots.save(plots.regime_map(make_sweep()), tmp_path / name)
     magic = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}[name[-3:].lower()]
     assert (tmp_path / name).read_bytes().startswith(magic)
@@ -579,12 +584,12 @@ def test_a_figure_is_saved_as_its_suffix_says(tmp_path, name):
 
 
 @pytest.mark.parametrize("name", ["map.xyz", "map"])
-def test_an_unknown_suffix_is_refused(tmp_path, name):
+def test_unknown_suffix_of_a_picture_is_refused(tmp_path, name):
     with pytest.raises(InputError, match=r"\.png"):
         plots.save(Figure(), tmp_path / name)
 
 
-def test_a_failing_save_leaves_the_old_picture_intact(tmp_path, monkeypatch):
+def test_failed_save_leaves_the_old_picture_unchanged(tmp_path, monkeypatch):
     (tmp_path / "map.png").write_text("old")
 
     def fail(self, target, **_):
@@ -598,7 +603,7 @@ def test_a_failing_save_leaves_the_old_picture_intact(tmp_path, monkeypatch):
     assert os.listdir(tmp_path) == ["map.png"]
 
 
-def test_drawing_touches_no_global_state():
+def test_drawing_changes_no_global_setting():
     before = dict(matplotlib.rcParams)
     plots.regime_map(make_sweep())
     plots.history(make_history())

@@ -1,4 +1,4 @@
-"""What the pictures of the body in the ring show is where things are, and what acts on them."""
+"""Polar view, phase portrait and animation show positions and forces of the run."""
 
 import io
 import json
@@ -18,8 +18,9 @@ import ringsweep
 from ringsweep import plots
 from ringsweep.cli import main
 from ringsweep.errors import InputError
-from ringsweep.plots import motion
-from ringsweep.plots.ring import TIMES
+from ringsweep.plots import films
+from ringsweep.plots.polar import TIMES
+from ringsweep.plots.rig import ring_history
 
 RADIUS, BALL, HALF_DISTANCE = 0.043378, 0.010, 0.025
 BETA = np.arcsin(HALF_DISTANCE / (RADIUS - BALL))
@@ -28,13 +29,13 @@ WEIGHT = 0.076 * 9.81
 
 @pytest.fixture(scope="module")
 def run(scene):
-    """The scene of the paper's Fig. 29 with the limit law: sticks and slips until contact 2 separates."""
+    """Run of the paper's Fig. 29 with law `stiction`: it sticks and slips until contact 2 separates."""
     return ringsweep.simulate(scene)
 
 
 @pytest.fixture
 def other(run):
-    """The run with another scene in its attributes."""
+    """The run with a changed scene in its attribute `configuration`."""
 
     def change(**changes):
         scene = json.loads(run.attrs["configuration"])["scene"]
@@ -50,13 +51,13 @@ def ax():
 
 
 def at(run, time):
-    """State of a run at one of its samples, by name."""
+    """Values of the first sample at or after a time, by variable."""
     k = int(np.searchsorted(run["time"], time))
     return {name: float(data[k]) for name, data in run.items() if data.dims == ("time",)} | {"time": float(run.time[k])}
 
 
 def arrows(ax):
-    """Reactions, frictions, weight: where each begins, and how far it goes."""
+    """Starts and vectors of the arrows of reactions, friction forces and weight."""
     found = [artist for artist in ax.collections if isinstance(artist, Quiver)]
     return [(np.asarray(q.get_offsets()), np.column_stack([q.U, q.V])) for q in found]
 
@@ -66,19 +67,19 @@ def place(angle, radius=RADIUS):
 
 
 class TestHistory:
-    def test_has_the_angle_of_the_ring(self, run):
+    def test_history_has_the_angle_of_the_ring(self, run):
         t = run["time"].values
         np.testing.assert_allclose(run["theta"], 2.0 * (t * np.arctan(t) - 0.5 * np.log1p(t * t)), rtol=1e-12)
         assert run["theta"].attrs["units"] == "rad"
 
-    def test_tells_the_friction_which_in_slip_is_that_of_the_law(self, run):
-        found = plots.ring.run_of(run)
+    def test_friction_forces_obey_the_law_in_slip_and_in_stick(self, run):
+        found, _ = ring_history(run)
         for k in (1, 2):
             zone, mode = found[f"zone_{k}"].values, found["mode"].values
             friction, normal = found[f"friction_{k}"].values, found[f"normal_{k}"].values
             slips = mode != 0
             expected = -mode * np.where(zone > 0, 0.3, 0.1) * normal
-            # Where an event stores two states of an instant, the mode is that of one of them.
+            # An event may store two states of one instant, but only one of them has the mode.
             agrees = np.isclose(friction, expected, rtol=1e-6, atol=1e-9)[slips]
             assert agrees.mean() > 0.99
             sticks = np.abs(friction)[~slips] <= (np.where(zone > 0, 0.5, 0.2) * normal)[~slips] + 1e-9
@@ -89,7 +90,7 @@ class TestPolarView:
     TIMES = (0.3, 1.2, 2.6, 3.4)
 
     @pytest.mark.parametrize("time", TIMES)
-    def test_has_the_balls_where_the_body_is_touching_the_ring(self, run, ax, time):
+    def test_balls_are_at_the_body_and_touch_the_ring(self, run, ax, time):
         now = at(run, time)
         plots.polar_view(run, now["time"], ax)
         balls = [patch for patch in ax.patches if isinstance(patch, Circle)]
@@ -98,16 +99,16 @@ class TestPolarView:
             assert ball.radius == BALL
 
     @pytest.mark.parametrize("time", TIMES)
-    def test_arcs_turn_with_the_ring(self, run, ax, time):
+    def test_drawn_arcs_turn_with_the_ring(self, run, ax, time):
         now = at(run, time)
         plots.polar_view(run, now["time"], ax)
         *_, arc = (patch for patch in ax.patches if isinstance(patch, Wedge))
-        # Matplotlib's angles count from the right, ours from below.
+        # Matplotlib counts angles from the horizontal.
         ends = np.degrees(now["theta"]) + np.array([-15.0, 15.0])
         np.testing.assert_allclose([arc.theta1 + 90.0, arc.theta2 + 90.0], ends, atol=1e-9)
 
     @pytest.mark.parametrize("time", TIMES)
-    def test_reactions_begin_at_the_contacts_point_inwards_and_are_to_scale_with_the_weight(self, run, ax, time):
+    def test_reactions_start_at_the_contacts_point_inwards_and_have_the_scale_of_the_weight(self, run, ax, time):
         now = at(run, time)
         plots.polar_view(run, now["time"], ax)
         (begin, reach), (same, friction), (centre, weight) = arrows(ax)
@@ -121,7 +122,7 @@ class TestPolarView:
             np.testing.assert_allclose(reach[k - 1], -place(angle, scale * now[f"normal_{k}"]), atol=1e-9)
             assert friction[k - 1] @ reach[k - 1] == pytest.approx(0.0, abs=1e-12)
 
-    def test_friction_opposes_slip_and_its_magnification_is_told(self, run, ax):
+    def test_friction_arrows_oppose_slip_and_the_legend_gives_their_magnification(self, run, ax):
         backward = at(run.isel(time=run["mode"] == -1), 1.0)
         plots.polar_view(run, backward["time"], ax)
         (begin, _), (_, friction), (_, weight) = arrows(ax)
@@ -134,7 +135,7 @@ class TestPolarView:
         newtons = np.linalg.norm(friction[0]) / (-weight[0, 1] / WEIGHT) / enlarged
         assert newtons == pytest.approx(mu * backward["normal_1"], rel=1e-6)
 
-    def test_scales_are_given(self, run, ax):
+    def test_scale_bars_have_the_scale_of_arrows_and_lengths(self, run, ax):
         plots.polar_view(run, 1.0, ax)
         (_, _), _, (_, weight) = arrows(ax)
         words = {text.get_text(): text for text in ax.texts}
@@ -144,18 +145,18 @@ class TestPolarView:
         assert lengths[0] == pytest.approx(float(force.split()[0]) * -weight[0, 1] / WEIGHT)
         assert lengths[1] == pytest.approx(float(length.split()[0]) / 1000)
 
-    def test_title_has_time_and_mode(self, run, ax):
+    def test_title_of_a_polar_view_has_time_and_mode(self, run, ax):
         stick = at(run.isel(time=run["mode"] == 0), 0.5)
         plots.polar_view(run, stick["time"], ax)
         assert ax.get_title() == f"t = {stick['time']:.4f} s, stick"
 
-    def test_a_single_contact_has_one_ball_and_one_reaction(self, other, ax):
+    def test_polar_view_of_a_single_contact_has_one_ball_and_one_reaction(self, other, ax):
         ds = other(model="ring-single-contact", body={"mass": 0.05}).drop_vars(["normal_2", "zone_2"])
         plots.polar_view(ds, 1.0, ax)
         assert sum(isinstance(patch, Circle) for patch in ax.patches) == 1
         assert [len(begin) for begin, _ in arrows(ax)] == [1, 1, 1]
 
-    def test_every_arc_has_its_colour_and_a_ring_may_have_none(self, other, ax):
+    def test_each_arc_has_another_colour_and_a_ring_may_have_no_arc(self, other, ax):
         arcs = [{"center": f"{100 * k} deg", "half_angle": "20 deg", "mu_s": 0.4, "mu_k": 0.3} for k in range(3)]
         friction = {"law": "stiction", "rest": {"mu_s": 0.2, "mu_k": 0.1}}
         plots.polar_view(other(zone=None, zones=arcs, friction=friction), 1.0, ax)
@@ -166,13 +167,13 @@ class TestPolarView:
         assert sum(isinstance(patch, Wedge) for patch in smooth.patches) == 1
 
     @pytest.mark.parametrize("time", [-0.1, 3.9, np.nan])
-    def test_an_instant_beyond_the_run_is_refused(self, run, ax, time):
+    def test_polar_view_refuses_an_instant_outside_the_run(self, run, ax, time):
         with pytest.raises(InputError, match="not within the run"):
             plots.polar_view(run, time, ax)
 
 
 class TestPhasePortrait:
-    def test_shows_speed_over_angle_and_the_ring_beside(self, run, ax):
+    def test_portrait_shows_the_curves_of_ring_and_body(self, run, ax):
         assert plots.phase_portrait(run, ax=ax) is ax
         lines = {line.get_label(): line for line in ax.get_legend().get_lines()}
         assert {"speed of the ring", "slip backward", "stick", "a contact on rough arc", "start", "end"} <= set(lines)
@@ -184,12 +185,12 @@ class TestPhasePortrait:
         shown = stick.get_xydata()[~np.isnan(stick.get_xydata()[:, 1])]
         assert {tuple(point) for point in body} <= {tuple(point) for point in shown}
 
-    def test_seen_from_the_ring_arcs_are_bands_for_each_contact(self, run, ax):
+    def test_portrait_in_the_frame_of_the_ring_has_a_band_for_each_arc_and_contact(self, run, ax):
         plots.phase_portrait(run, "ring", ax)
         bands = {tuple(np.round(np.sort([p.get_x(), p.get_x() + p.get_width()]), 6)) for p in ax.patches}
         low, high = ax.get_xlim()
         for side in (-1, 1):
-            # Contact 1 lags behind the body by beta: it is there when the body is beyond.
+            # Contact 1 is beta behind the body, so it is on the arc when the body is beta ahead.
             middle = -side * np.degrees(BETA)
             images = [(middle - 15 + turn, middle + 15 + turn) for turn in (-720, -360, 0, 360)]
             seen = {(round(max(a, low), 6), round(min(b, high), 6)) for a, b in images if b > low and a < high}
@@ -197,7 +198,7 @@ class TestPhasePortrait:
             assert seen <= bands
         assert all(isinstance(patch, Rectangle) for patch in ax.patches)
 
-    def test_the_strip_of_the_history_agrees_with_the_bands(self, run, ax):
+    def test_bands_of_a_portrait_agree_with_the_zones_of_the_history(self, run, ax):
         plots.phase_portrait(run, "ring", ax)
         psi = np.degrees(run["phi"] - run["theta"]).values
         under = np.zeros((2, len(psi)), dtype=bool)
@@ -208,7 +209,7 @@ class TestPhasePortrait:
         for row, zone in zip(under, ("zone_1", "zone_2"), strict=True):
             assert np.mean(row == (run[zone].values > 0)) > 0.995
 
-    def test_axes_have_names_and_units_in_either_frame(self, run):
+    def test_portrait_axes_have_names_and_units_in_both_frames(self, run):
         for frame in ("space", "ring"):
             ax = plots.phase_portrait(run, frame, Figure().add_subplot())
             assert "(°)" in ax.get_xlabel()
@@ -216,7 +217,7 @@ class TestPhasePortrait:
         (slide,) = ax.child_axes
         assert slide.get_ylabel() == "sliding velocity (m s$^{-1}$)"
 
-    def test_many_turns_are_laid_over_one_another_without_a_stroke_across(self, run, ax):
+    def test_portrait_of_many_turns_is_wrapped_without_lines_across(self, run, ax):
         spun = run.assign(phi=run["phi"] * 20.0)
         plots.phase_portrait(spun, ax=ax)
         assert ax.get_xlim() == (-180.0, 180.0)
@@ -225,13 +226,13 @@ class TestPhasePortrait:
                 steps = np.abs(np.diff(line.get_xdata()))
                 assert not (steps > 180.0).any()
 
-    def test_a_ring_at_rest_has_bands_in_space_too(self, run, other, ax):
+    def test_portrait_of_a_ring_at_rest_has_bands_in_space(self, run, other, ax):
         still = other().assign(theta=run["theta"] * 0.0, ring_omega=run["ring_omega"] * 0.0)
         plots.phase_portrait(still, ax=ax)
         assert any(patch.get_hatch() for patch in ax.patches)
         assert not any(isinstance(artist, PolyCollection) for artist in ax.collections)
 
-    def test_an_unknown_frame_is_refused(self, run, ax):
+    def test_portrait_refuses_an_unknown_frame(self, run, ax):
         with pytest.raises(InputError, match="neither 'space' nor 'ring'"):
             plots.phase_portrait(run, "body", ax)
 
@@ -242,78 +243,78 @@ class TestPhasePortrait:
     ids=["phase", "polar", "film"],
 )
 class TestRefused:
-    def test_a_belt(self, run, draw):
+    def test_picture_of_the_ring_refuses_a_belt(self, run, draw):
         with pytest.raises(InputError, match="belt"):
             draw(run.drop_vars("phi"))
 
-    def test_a_sweep(self, run, draw):
+    def test_picture_of_the_ring_refuses_a_sweep(self, run, draw):
         with pytest.raises(InputError, match="history of a run"):
             draw(run.isel(time=0))
 
-    def test_a_file_without_the_angle_of_the_ring(self, run, draw):
+    def test_picture_of_the_ring_refuses_a_dataset_without_theta(self, run, draw):
         with pytest.raises(InputError, match=r"theta.*run it again"):
             draw(run.drop_vars("theta"))
 
-    def test_a_file_without_its_configuration(self, run, draw):
+    def test_picture_of_the_ring_refuses_a_dataset_without_configuration(self, run, draw):
         with pytest.raises(InputError, match="configuration"):
             draw(run.drop_attrs())
 
-    def test_several_laws_at_once(self, run, draw):
+    def test_picture_of_the_ring_refuses_several_friction_laws(self, run, draw):
         both = run.expand_dims(friction_law=["coulomb", "stiction"])
         with pytest.raises(InputError, match=r"coulomb, stiction: choose one.*sel\(friction_law"):
             draw(both)
 
 
 class Recorder(AbstractMovieWriter):
-    """Notes what each frame shows."""
+    """Keeps title, reactions and time covered of each frame."""
 
     def setup(self, fig, outfile, dpi=None):
         super().setup(fig, outfile, dpi)
-        self.noted = []
+        self.frames = []
 
     def grab_frame(self, **_):
         (ax,) = (axes for axes in self.fig.axes if axes.get_title())
         (_, reach), *_ = arrows(ax)
-        veil = self.fig.axes[-1].patches[-1]
-        self.noted.append((ax.get_title(), reach.copy(), veil.get_x()))
+        cover = self.fig.axes[-1].patches[-1]
+        self.frames.append((ax.get_title(), reach.copy(), cover.get_x()))
 
     def finish(self):
         pass
 
 
 class TestAnimation:
-    def test_has_frames_at_equal_times_from_the_beginning_to_the_end(self, run, tmp_path):
+    def test_animation_has_frames_at_equal_times_over_the_whole_run(self, run, tmp_path):
         film, recorder = plots.animation(run, fps=5, duration=2.0), Recorder()
         film.save(tmp_path / "film", writer=recorder)
         times = np.linspace(0.0, float(run["time"][-1]), 10)
-        assert len(recorder.noted) == 10
-        scale = np.linalg.norm(recorder.noted[0][1][0]) / float(run["normal_1"][0])
-        for (title, reach, veil), time in zip(recorder.noted, times, strict=True):
+        assert len(recorder.frames) == 10
+        scale = np.linalg.norm(recorder.frames[0][1][0]) / float(run["normal_1"][0])
+        for (title, reach, covered), time in zip(recorder.frames, times, strict=True):
             assert title.startswith(f"t = {time:.4f} s, ")
-            assert veil == time
+            assert covered == time
             assert np.linalg.norm(reach[0]) / scale == pytest.approx(np.interp(time, run["time"], run["normal_1"]))
 
-    def test_says_how_much_slower_than_the_run_it_is(self, run):
-        film = motion._Film(run, 25.0, 2.0 * float(run["time"][-1]))
+    def test_animation_says_how_much_slower_or_faster_than_the_run_it_is(self, run):
+        film = films._Film(run, 25.0, 2.0 * float(run["time"][-1]))
         assert film.figure.subfigs[0].get_suptitle() == "2 times slower than real"
-        assert motion._pace(4.0, 4.0) == "real time"
-        assert motion._pace(30.0, 10.0) == "3 times faster than real"
+        assert films._speed(4.0, 4.0) == "real time"
+        assert films._speed(30.0, 10.0) == "3 times faster than real"
 
-    def test_a_frame_on_the_painted_ground_is_the_whole_picture(self, run):
-        film = motion._Film(run, 25.0, 1.0)
+    def test_frame_on_a_fixed_background_equals_the_whole_picture(self, run):
+        film = films._Film(run, 25.0, 1.0)
         pictures = []
         film.show(12)
-        with film.painted():
+        with film.fixed_background():
             pictures.append(pixels(film.figure))
         pictures.append(pixels(film.figure))
         assert np.mean(np.abs(pictures[0] - pictures[1]) > 40) < 2e-3
 
-    def test_needs_no_pyplot(self, run):
+    def test_animation_changes_no_global_setting(self, run):
         before = dict(matplotlib.rcParams)
-        motion._Film(run, 25.0, 1.0)
+        films._Film(run, 25.0, 1.0)
         assert dict(matplotlib.rcParams) == before
 
-    def test_is_written_as_gif(self, run, tmp_path):
+    def test_animation_is_written_as_gif(self, run, tmp_path):
         plots.save_animation(run, tmp_path / "run.gif", fps=10, duration=0.4)
         with Image.open(tmp_path / "run.gif") as film:
             assert film.n_frames == 4
@@ -321,7 +322,7 @@ class TestAnimation:
             assert film.convert("RGB").getpixel((0, 0)) == (255, 255, 255)
         assert os.listdir(tmp_path) == ["run.gif"]
 
-    def test_is_written_as_a_page_that_needs_nothing_else(self, run, tmp_path):
+    def test_animation_is_written_as_a_page_that_needs_no_other_file(self, run, tmp_path):
         plots.save_animation(run, tmp_path / "run.HTML", fps=10, duration=0.3)
         page = (tmp_path / "run.HTML").read_text(encoding="utf-8")
         frames = json.loads(page.partition("const frames = ")[2].partition(";\n")[0])
@@ -330,32 +331,32 @@ class TestAnimation:
         assert os.listdir(tmp_path) == ["run.HTML"]
 
     @pytest.mark.skipif(not FFMpegWriter.isAvailable(), reason="ffmpeg is not installed")
-    def test_is_written_as_mp4(self, run, tmp_path):
+    def test_animation_is_written_as_mp4(self, run, tmp_path):
         plots.save_animation(run, tmp_path / "run.mp4", fps=10, duration=0.3)
         assert (tmp_path / "run.mp4").read_bytes()[4:8] == b"ftyp"
 
-    def test_without_ffmpeg_mp4_is_refused_with_what_does_without(self, run, tmp_path, monkeypatch):
+    def test_mp4_without_ffmpeg_is_refused_and_the_message_names_other_formats(self, run, tmp_path, monkeypatch):
         monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
         with pytest.raises(InputError, match=r"ffmpeg.*not installed; \.gif and \.html"):
             plots.save_animation(run, tmp_path / "run.mp4")
 
     @pytest.mark.parametrize("name", ["run.avi", "run", "nowhere/run.gif"])
-    def test_a_wrong_name_is_refused(self, run, tmp_path, name):
+    def test_animation_refuses_a_wrong_file_name(self, run, tmp_path, name):
         with pytest.raises(InputError, match=r"run"):
             plots.save_animation(run, tmp_path / name)
 
     @pytest.mark.parametrize("wrong", [{"fps": 0}, {"duration": -1.0}, {"duration": np.inf}])
-    def test_a_wrong_number_is_refused(self, run, wrong):
+    def test_animation_refuses_a_wrong_rate_or_duration(self, run, wrong):
         with pytest.raises(InputError, match="not a number greater than 0"):
             plots.animation(run, **wrong)
 
-    def test_a_failing_save_leaves_the_old_film_intact(self, run, tmp_path, monkeypatch):
+    def test_failed_save_leaves_the_old_animation_unchanged(self, run, tmp_path, monkeypatch):
         (tmp_path / "run.gif").write_text("old")
 
         def fail(self):
             raise KeyboardInterrupt
 
-        monkeypatch.setattr(motion._Gif, "finish", fail)
+        monkeypatch.setattr(films._GifWriter, "finish", fail)
         with pytest.raises(KeyboardInterrupt):
             plots.save_animation(run, tmp_path / "run.gif", fps=5, duration=0.4)
         assert (tmp_path / "run.gif").read_text() == "old"
@@ -375,7 +376,7 @@ class TestCommand:
         (tmp_path / "case.yaml").write_text(json.dumps({"scene": scene}))
         return tmp_path
 
-    def test_writes_a_film_named_after_the_configuration(self, run, folder, monkeypatch, capsys):
+    def test_animate_names_the_file_after_the_configuration(self, run, folder, monkeypatch, capsys):
         asked = []
         monkeypatch.setattr("ringsweep.runs.simulate.history", lambda config: asked.append(config) or run)
         monkeypatch.setattr("ringsweep.plots.save_animation", lambda ds, path: asked.append((ds, path)), raising=False)
@@ -387,19 +388,19 @@ class TestCommand:
         assert "wrote case-run.gif" in capsys.readouterr().out
 
     @pytest.mark.parametrize("output", ["run.avi", "nowhere/run.gif"])
-    def test_refuses_a_wrong_output_before_any_work(self, folder, monkeypatch, capsys, output):
+    def test_animate_refuses_a_wrong_output_before_the_run(self, folder, monkeypatch, capsys, output):
         monkeypatch.setattr("ringsweep.runs.simulate.history", lambda config: pytest.fail("the run was made"))
         assert main(["animate", "case.yaml", "-o", output]) == 2
         assert output in capsys.readouterr().err
         assert os.listdir(folder) == ["case.yaml"]
 
-    def test_refuses_a_belt_before_any_work(self, folder, monkeypatch, capsys):
+    def test_animate_refuses_a_belt_before_the_run(self, folder, monkeypatch, capsys):
         monkeypatch.setattr("ringsweep.runs.simulate.history", lambda config: pytest.fail("the run was made"))
         assert main(["init", "--model", "belt", "belt.yaml"]) == 0
         assert main(["animate", "belt.yaml"]) == 2
         assert "there is no ring" in capsys.readouterr().err
 
-    def test_refuses_several_laws_before_any_work(self, scene, folder, monkeypatch, capsys):
+    def test_animate_refuses_several_friction_laws_before_the_run(self, scene, folder, monkeypatch, capsys):
         monkeypatch.setattr("ringsweep.runs.simulate.history", lambda config: pytest.fail("the run was made"))
         laws = {"sweep": {"grid": {"friction.law": ["stiction", "coulomb"]}}}
         (folder / "laws.yaml").write_text(json.dumps({"scene": scene} | laws))

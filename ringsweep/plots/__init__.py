@@ -1,8 +1,8 @@
-"""Datasets into pictures.
+"""Pictures of datasets.
 
-``regime_map``, ``history`` and ``work_precision`` make a figure of their own and return it, without pyplot: no global
-state, no display, safe in threads. Functions that take an ``ax`` draw one picture there and return it, as seaborn's
-do; without it they draw in pyplot's current axes. Every picture has an opaque white ground, in dark notebooks too.
+``regime_map``, ``history`` and ``work_precision`` return a new figure. They do not use pyplot: no global state, no
+display, safe in threads. A function with an argument ``ax`` draws one picture in these axes and returns them. Without
+``ax`` it draws in pyplot's current axes. Every picture has an opaque white background, in dark notebooks too.
 """
 
 from __future__ import annotations
@@ -10,15 +10,18 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from ringsweep.plots.style import REGIME_COLOURS, SUFFIXES, save
+from ringsweep.plots.saving import SUFFIXES, save
+from ringsweep.plots.style import REGIME_COLOURS
 
 if TYPE_CHECKING:
+    from ringsweep.plots.films import animation, save_animation
     from ringsweep.plots.histories import history, history_panel
-    from ringsweep.plots.interactive import cell, explore
+    from ringsweep.plots.interactive import explore
     from ringsweep.plots.maps import map_panel, regime_map
-    from ringsweep.plots.motion import animation, save_animation
+    from ringsweep.plots.phase import phase_portrait
+    from ringsweep.plots.polar import polar_view
     from ringsweep.plots.precision import precision_panel, work_precision
-    from ringsweep.plots.ring import phase_portrait, polar_view
+    from ringsweep.plots.selection import cell
 
 __all__ = [
     "REGIME_COLOURS",
@@ -38,28 +41,28 @@ __all__ = [
     "work_precision",
 ]
 
-_HOMES = {
+_MODULES = {
     "regime_map": "maps",
     "map_panel": "maps",
     "history": "histories",
     "history_panel": "histories",
     "work_precision": "precision",
     "precision_panel": "precision",
-    "phase_portrait": "ring",
-    "polar_view": "ring",
-    "animation": "motion",
-    "save_animation": "motion",
-    "cell": "interactive",
+    "phase_portrait": "phase",
+    "polar_view": "polar",
+    "animation": "films",
+    "save_animation": "films",
+    "cell": "selection",
     "explore": "interactive",
 }
 
 
 def __getattr__(name: str) -> Any:
-    # A map needs neither the ring's geometry nor what writes films.
-    if name in _HOMES:
-        return getattr(import_module(f"ringsweep.plots.{_HOMES[name]}"), name)
+    # A map needs neither the geometry of the ring nor the writers of animations, which are slow to import.
+    if name in _MODULES:
+        return getattr(import_module(f"ringsweep.plots.{_MODULES[name]}"), name)
     raise AttributeError(f"module 'ringsweep.plots' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return [*globals(), *_HOMES]
+    return [*globals(), *_MODULES]

@@ -1,7 +1,8 @@
-"""Histories of single runs over time."""
+"""Time histories of runs."""
 
 from __future__ import annotations
 
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -13,10 +14,11 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from ringsweep.errors import InputError
+from ringsweep.plots.datasets import PANELS, compares_laws, on_ring, panels_of, present, require_history, resolve, zones
+from ringsweep.plots.labels import axis_label, long_name, unit_text
 from ringsweep.plots.style import (
-    LAW_COLOURS,
-    LAW_STYLES,
+    CURVE_COLOURS,
+    CURVE_STYLES,
     PAIR_COLOURS,
     PAIR_STYLES,
     REST,
@@ -25,42 +27,53 @@ from ringsweep.plots.style import (
     arc_colour,
     arc_names,
     axes_or_current,
-    beside,
-    known,
-    label_of,
-    long_name,
-    runs,
-    units_of,
+    legend_beside,
+    true_ranges,
 )
+from ringsweep.quantities.variables import words
 
-# Fraction of a run that the detail of its start shows, before which what happens can count as part of the
-# start, and fraction of the force that counts as a difference.
-_DETAIL = 0.02
+# Share of a run in the panel that shows the bending of bristles after its start.
+_START = 0.02
 
+# Share of a run in which differences between friction laws belong to its start.
 _LATEST = 0.1
 
-_APART = 0.05
+# Share of the friction force above which two laws differ.
+_DIFFERENT = 0.05
 
-# Columns into which a history is condensed: finer than the pixels of a printed panel.
-_COLUMNS = 4000
+# Intervals of time into which a long history is condensed: more than a printed panel has pixels.
+_INTERVALS = 4000
 
-# Quantities that share a panel.
-TOGETHER = (("omega", "ring_omega"), ("normal_1", "normal_2"))
+_SHORT_NAMES = {
+    "phi": "angle",
+    "omega": "angular velocity",
+    "epsilon": "angular\nacceleration",
+    "normal_1": "normal reaction",
+    "normal_2": "normal reaction",
+    "x": "displacement",
+    "velocity": "velocity",
+    "friction_force": "friction force",
+}
+
+_LEGEND = {"omega": "body", "ring_omega": "ring", "normal_1": "contact 1", "normal_2": "contact 2"}
 
 
 def history(ds: xr.Dataset) -> Figure:
-    """Draw the time history of one run, or of one under each of several friction laws: the paper's panels.
+    """Draw the time history of one run, or of a run under each of several friction laws.
 
-    For a ring these are angle, angular velocity, angular acceleration and normal reactions, above a strip
-    that shows which arc lies under each contact; for a belt displacement, velocity and friction force, and for laws
-    with bristles the force just after the start. Stick is shaded. Of several laws each is a line, and neither arcs
-    nor stick are shown; where their forces differ at the start a last panel goes on for as long again as that lasts,
-    over a logarithmic time if the differences are of more than one scale.
+    The panels are those of the paper. For a ring they show angle, angular velocity, angular acceleration and normal
+    reactions; a strip below shows which arc lies under each contact. For a belt they show displacement, velocity and
+    friction force. Times at which the body sticks are shaded. If the law has bristles, a last panel shows the friction
+    force just after the start.
+
+    Several friction laws are a line each, without strip and shading. On a belt, if their friction forces differ at the
+    start, a last panel shows the start for twice as long as they differ. Its time axis is logarithmic if differences
+    end at times of different orders of magnitude.
 
     Parameters
     ----------
     ds : xarray.Dataset
-        Result of a simulation.
+        Result of :func:`ringsweep.simulate`.
 
     Returns
     -------
@@ -69,7 +82,7 @@ def history(ds: xr.Dataset) -> Figure:
     Raises
     ------
     InputError
-        If the dataset has no dimension ``time``.
+        If the dataset has no dimension ``time``, or no variable of any panel.
 
     Examples
     --------
@@ -80,27 +93,27 @@ def history(ds: xr.Dataset) -> Figure:
     >>> len(history(ds).axes)
     4
     """
-    ds = _run(ds)
+    ds = require_history(ds)
     figure = Figure(figsize=(8.5, 1.9 * sum(_heights(ds)) + 0.8), layout="constrained")
     draw_history(figure, ds)
     return figure
 
 
 def history_panel(ds: xr.Dataset, var: str = "phi", ax: Axes | None = None) -> Axes:
-    """Draw one quantity of a run over time, stick shaded; what belongs together is drawn together.
+    """Draw one quantity of a run over time; times at which the body sticks are shaded.
 
-    With ``omega`` goes the angular velocity of the ring, with a normal reaction that of the other contact. Of several
-    friction laws each is a line.
+    The panel of ``omega`` also shows the angular velocity of the ring, and the panel of a normal reaction also shows
+    that of the other contact. Several friction laws are a line each.
 
     Parameters
     ----------
     ds : xarray.Dataset
-        Result of a simulation.
+        Result of :func:`ringsweep.simulate`.
     var : str
         Variable to draw.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; pyplot's current axes unless given. For the legend beside them a figure with
-        ``layout="constrained"`` makes room.
+        Axes to draw in, by default pyplot's current ones. The legend stands beside them: a figure with
+        ``layout="constrained"`` makes room for it.
 
     Returns
     -------
@@ -121,135 +134,119 @@ def history_panel(ds: xr.Dataset, var: str = "phi", ax: Axes | None = None) -> A
     >>> history_panel(ds, "phi", Figure().add_subplot()).get_xlabel()
     'time (s)'
     """
-    ds = _run(ds)
-    var = known("var", var, [name for name, data in ds.items() if "time" in data.dims])
+    ds = require_history(ds)
+    var = resolve("var", var, [name for name, data in ds.items() if "time" in data.dims])
     ax = axes_or_current(ax, (7.6, 2.6))
-    if "friction_law" in ds.dims:
-        _draw_laws(ax, ds, [var])
-        beside(ax, handlelength=4)
+    if compares_laws(ds):
+        _draw_laws(ax, ds, (var,))
+        legend_beside(ax, handlelength=4)
     else:
-        together = next((pair for pair in TOGETHER if var in pair), (var,))
-        draw_panel(ax, ds, [name for name in together if name in ds], told=True)
-    ax.set_xlabel(label_of(ds["time"], ds))
+        names = next((panel for panel in chain(*PANELS.values()) if var in panel), (var,))
+        draw_panel(ax, ds, names, explain_shading=True)
+    ax.set_xlabel(axis_label(ds["time"], ds))
     return ax
 
 
 def draw_history(figure: Figure | SubFigure, ds: xr.Dataset) -> None:
-    """Fill a figure, or a part of one, with the panels of :func:`history`."""
-    ds = _run(ds)
-    compared = "friction_law" in ds.dims
-    panels = _panels(ds)
-    zones = _zones(ds)
-    detail = _start(ds)
+    """Fill a figure, or a subfigure, with the panels of :func:`history`."""
+    ds = require_history(ds)
+    panels = panels_of(ds)
+    start = _start(ds)
     time = ds["time"].values
     heights = _heights(ds)
     axes = list(figure.subplots(len(heights), 1, gridspec_kw={"height_ratios": heights}))
-    timed = axes[:-1] if detail else axes
-    for ax in timed[1:]:
-        ax.sharex(timed[0])
-    for ax in timed[:-1]:
+    whole = axes[:-1] if start else axes
+    for ax in whole[1:]:
+        ax.sharex(whole[0])
+    for ax in whole[:-1]:
         ax.tick_params(labelbottom=False)
-    draw = _draw_laws if compared else draw_panel
+    draw = _draw_laws if compares_laws(ds) else draw_panel
     for ax, names in zip(axes, panels, strict=False):
         draw(ax, ds, names)
-    if zones:
-        _draw_zones(axes[-1], ds, zones)
-    if detail:
-        first, last = detail
-        start = ds.isel(time=slice(0, max(20, int(np.searchsorted(time, time[0] + 2.0 * last)))))
-        draw(axes[-1], start, ["friction_force"])
+    if strip := zones(ds):
+        _draw_zones(axes[-1], ds, strip)
+    if start:
+        first, last = start
+        until = max(20, int(np.searchsorted(time, time[0] + 2.0 * last)))
+        draw(axes[-1], ds.isel(time=slice(0, until)), ("friction_force",))
         if 0.0 < first < 0.05 * last:
             axes[-1].set_xscale("log")
             axes[-1].set_xlim(left=first / 20.0)
         axes[-1].set_title("friction force just after the start", fontsize=SMALL, loc="left")
-        timed[-1].set_xlabel(label_of(ds["time"], ds))
+        whole[-1].set_xlabel(axis_label(ds["time"], ds))
     if time[-1] > time[0]:
-        timed[0].set_xlim(time[0], time[-1])
-    axes[-1].set_xlabel(label_of(ds["time"], ds))
+        whole[0].set_xlim(time[0], time[-1])
+    axes[-1].set_xlabel(axis_label(ds["time"], ds))
     figure.align_ylabels(axes)
-    if compared:
+    if compares_laws(ds):
         lines = axes[0].get_legend_handles_labels()
-        look: dict[str, Any] = {"fontsize": SMALL, "frameon": False, "handlelength": 4}
-        figure.legend(*lines, loc="outside upper center", ncols=4 if len(lines[0]) == 4 else 3, **look)
+        style: dict[str, Any] = {"fontsize": SMALL, "frameon": False, "handlelength": 4}
+        figure.legend(*lines, loc="outside upper center", ncols=4 if len(lines[0]) == 4 else 3, **style)
     elif outcome := ds.attrs.get("outcome"):
         figure.suptitle(str(outcome), fontsize=11)
 
 
-def _run(ds: xr.Dataset) -> xr.Dataset:
-    if "time" not in ds.dims or not ds.sizes["time"]:
-        raise InputError("ds", "has no dimension time: it is not the history of a run; draw a sweep with regime_map")
-    return ds.isel(friction_law=0) if ds.sizes.get("friction_law") == 1 else ds
-
-
-def _panels(ds: xr.Dataset) -> list[list[str]]:
-    """Quantities of each panel."""
-    if "phi" not in ds:
-        return [["x"], ["velocity"], ["friction_force"]]
-    if "friction_law" in ds.dims:
-        return [[name] for name in ("phi", "omega", "epsilon", "normal_1", "normal_2") if name in ds]
-    panels: list[tuple[str, ...]] = [("phi",), TOGETHER[0], ("epsilon",), TOGETHER[1]]
-    return [[name for name in panel if name in ds] for panel in panels]
-
-
-def _zones(ds: xr.Dataset) -> list[str]:
-    return [] if "friction_law" in ds.dims else [name for name in ("zone_1", "zone_2") if name in ds]
-
-
 def _heights(ds: xr.Dataset) -> list[float]:
-    """Of all panels, the detail of a belt's start and the strip of a ring's arcs among them."""
-    zones = len(_zones(ds))
-    return [1.0] * (len(_panels(ds)) + (_start(ds) is not None)) + [0.13 * zones] * bool(zones)
+    """Relative heights of all panels, with the panel of the start and the strip of the zones."""
+    strip = len(zones(ds))
+    return [1.0] * (len(panels_of(ds)) + (_start(ds) is not None)) + [0.13 * strip] * bool(strip)
 
 
 def _start(ds: xr.Dataset) -> tuple[float, float] | None:
-    """When what a belt's start has of its own begins and ends: the bending of bristles, or how several laws differ."""
-    if "phi" in ds:
+    """When the first and the last transients at the start of a run on a belt end, s; None if there are none.
+
+    Transients are the bending of bristles, or differences between friction laws.
+    """
+    if on_ring(ds):
         return None
-    if "friction_law" in ds.dims:
-        return _transients(ds)
-    return (0.0, _DETAIL / 2 * float(np.ptp(ds["time"].values))) if "deflection" in ds else None
+    if compares_laws(ds):
+        return _differences(ds)
+    return (0.0, _START / 2 * float(np.ptp(ds["time"].values))) if "deflection" in ds else None
 
 
-def draw_panel(axes: Axes, ds: xr.Dataset, names: list[str], told: bool = False) -> None:
-    """Draw quantities of one run in one panel; the first of several tells what the shading is, others if `told`."""
-    time = ds["time"].values
-    # One panel explains the shading for all.
-    first = told or names[0] in ("phi", "x")
+def draw_panel(axes: Axes, ds: xr.Dataset, names: tuple[str, ...], explain_shading: bool = False) -> None:
+    """Draw quantities of one run in one panel; those that the dataset does not have are left out.
+
+    The legend explains the shading in the panel that shows where the body is, elsewhere if `explain_shading`.
+    """
+    time, names = ds["time"].values, tuple(present(ds, names))
+    explain_shading = explain_shading or names[0] in PANELS
     if "mode" in ds:
-        at, mode = _sampled(time, ds["mode"].values)
-        spans = [(at[i], at[j] - at[i]) for i, j in runs(mode == 0)]
+        at, mode = _by_interval(time, ds["mode"].values)
+        sticks = [(at[i], at[j] - at[i]) for i, j in true_ranges(mode == 0)]
         axes.broken_barh(
-            spans,
+            sticks,
             (0, 1),
             transform=axes.get_xaxis_transform(),
             color=STICK,
             linewidth=0,
-            label="stick" if first and spans else None,
+            label="stick" if explain_shading and sticks else None,
         )
-    labels = {"omega": "body", "ring_omega": "ring", "normal_1": "contact 1", "normal_2": "contact 2"}
     for name, colour, style in zip(names, PAIR_COLOURS, PAIR_STYLES, strict=False):
-        axes.plot(*envelope(time, ds[name].values), color=colour, linestyle=style, linewidth=1, label=labels.get(name))
-    beside(axes)
-    axes.set_ylabel(_symbol(ds, names))
+        curve = _envelope(time, ds[name].values)
+        axes.plot(*curve, color=colour, linestyle=style, linewidth=1, label=_LEGEND.get(name))
+    legend_beside(axes)
+    axes.set_ylabel(_short_label(ds, names[0]))
     axes.margins(x=0)
-    if names == ["epsilon"]:
+    if names == ("epsilon",):
         _clip(axes, ds["epsilon"].values)
 
 
-def _draw_laws(axes: Axes, ds: xr.Dataset, names: list[str]) -> None:
-    """One quantity under each friction law."""
+def _draw_laws(axes: Axes, ds: xr.Dataset, names: tuple[str, ...]) -> None:
+    """Draw one quantity under each friction law."""
     (name,) = names
     numbers = ds[name].transpose("friction_law", "time").values
+    regimes = words(ds["regime"]).values if "regime" in ds else None
     for k, law in enumerate(ds["friction_law"].values):
         axes.plot(
-            *envelope(ds["time"].values, numbers[k]),
-            color=LAW_COLOURS[k % len(LAW_COLOURS)],
-            linestyle=LAW_STYLES[k % len(LAW_STYLES)],
-            # Of lines that coincide the earlier are seen on both sides of the later.
+            *_envelope(ds["time"].values, numbers[k]),
+            color=CURVE_COLOURS[k % len(CURVE_COLOURS)],
+            linestyle=CURVE_STYLES[k % len(CURVE_STYLES)],
+            # Where lines coincide, the earlier ones show on both sides of the later ones.
             linewidth=max(1.2, 3.0 - 0.6 * k),
-            label=f"{law}: {_regime(ds, k)}" if "regime" in ds else str(law),
+            label=str(law) if regimes is None else f"{law}: {regimes[k]}",
         )
-    axes.set_ylabel(_symbol(ds, names))
+    axes.set_ylabel(_short_label(ds, name))
     axes.margins(x=0)
     if name.startswith("normal"):
         axes.set_title(f"contact {name[-1]}", fontsize=SMALL, loc="left")
@@ -257,53 +254,42 @@ def _draw_laws(axes: Axes, ds: xr.Dataset, names: list[str]) -> None:
         _clip(axes, numbers)
 
 
-def _regime(ds: xr.Dataset, k: int) -> str:
-    """Regime under the friction law at place `k`, in words."""
-    flags = np.atleast_1d(ds["regime"].attrs["flag_values"]).tolist()
-    meanings = str(ds["regime"].attrs["flag_meanings"]).split()
-    return meanings[flags.index(int(ds["regime"][k]))]
+def _differences(ds: xr.Dataset) -> tuple[float, float] | None:
+    """When the first and the last differences between friction laws end at the start of a run, s.
 
-
-def _transients(ds: xr.Dataset) -> tuple[float, float] | None:
-    """When the first and the last of the differences at the start of runs under several friction laws are over.
-
-    None if there are no such differences.
-
-    A difference between their forces is over if they agree for as long again as has gone by then. The
-    bristles of a law bend within milliseconds, and the body rings on them for longer.
+    A difference between the forces ends at a time t if the forces agree from t to 2 t. There can be several: bristles
+    bend within milliseconds, and the body vibrates on them for longer. None if there are none.
     """
     since = ds["time"].values - ds["time"].values[0]
     force = ds["friction_force"].transpose("friction_law", "time").values
     spread = np.fmax.reduce(force) - np.fmin.reduce(force)
-    # Not of the greatest force: it may be a spike.
-    apart = np.flatnonzero((spread > _APART * np.nanpercentile(np.abs(force), 95)) & (since > 0.0))
+    # Relative to the 95th percentile of the force, since the greatest may be an outlier.
+    apart = np.flatnonzero((spread > _DIFFERENT * np.nanpercentile(np.abs(force), 95)) & (since > 0.0))
     again = np.append(apart[1:], len(since) - 1)
     ends = since[apart[(since[again] > 2.0 * since[apart]) & (again > apart + 1)]]
     ends = ends[ends < _LATEST * since[-1]]
     return (float(ends[0]), float(ends[-1])) if len(ends) else None
 
 
-def _draw_zones(axes: Axes, ds: xr.Dataset, zones: list[str]) -> None:
-    rows = []
-    for name in zones:
-        at, row = _sampled(ds["time"].values, ds[name].values)
-        rows.append(row)
-    strip = np.array(rows)
+def _draw_zones(axes: Axes, ds: xr.Dataset, names: list[str]) -> None:
+    """Draw the strip that shows which arc lies under each contact."""
+    at = _by_interval(ds["time"].values, ds[names[0]].values)[0]
+    strip = np.array([_by_interval(ds["time"].values, ds[name].values)[1] for name in names])
     arcs = int(max(1, strip.max()))
     colours = [REST, *(arc_colour(k + 1) for k in range(arcs))]
     norm = BoundaryNorm(np.arange(arcs + 2) - 0.5, arcs + 1)
-    axes.pcolormesh(at, np.arange(len(zones) + 1), strip, cmap=ListedColormap(colours), norm=norm, rasterized=True)
-    axes.hlines(range(1, len(zones)), at[0], at[-1], color="white", linewidth=2)
-    axes.set_yticks(np.arange(len(zones)) + 0.5, labels=[f"contact {name[-1]}" for name in zones], fontsize=SMALL)
+    axes.pcolormesh(at, np.arange(len(names) + 1), strip, cmap=ListedColormap(colours), norm=norm, rasterized=True)
+    axes.hlines(range(1, len(names)), at[0], at[-1], color="white", linewidth=2)
+    axes.set_yticks(np.arange(len(names)) + 0.5, labels=[f"contact {name[-1]}" for name in names], fontsize=SMALL)
     axes.tick_params(axis="y", length=0)
     axes.invert_yaxis()
-    names = ["elsewhere", *arc_names(arcs)]
-    handles: list[Artist] = [Patch(facecolor=c, edgecolor="0.7", label=n) for c, n in zip(colours, names, strict=True)]
-    beside(axes, handles, bbox_to_anchor=(1.0, 1.2))
+    surfaces = zip(colours, ["elsewhere", *arc_names(arcs)], strict=True)
+    handles: list[Artist] = [Patch(facecolor=colour, edgecolor="0.7", label=name) for colour, name in surfaces]
+    legend_beside(axes, handles, bbox_to_anchor=(1.0, 1.2))
 
 
 def _clip(axes: Axes, numbers: NDArray[Any]) -> None:
-    """Limit an axis to the bulk of its data where a few spikes would flatten it, and say so."""
+    """Limit the axis to the bulk of its values if a few outliers would flatten the curve, and say so above it."""
     finite = numbers[np.isfinite(numbers)]
     if not finite.size:
         return
@@ -316,35 +302,25 @@ def _clip(axes: Axes, numbers: NDArray[Any]) -> None:
         )
 
 
-def envelope(time: NDArray[Any], numbers: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Least and greatest value per column of a long history, which draws the same in a fraction of the time."""
-    if len(time) <= 4 * _COLUMNS:
+def _envelope(time: NDArray[Any], numbers: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Least and greatest value in each short interval of a long history, which looks the same and draws faster."""
+    if len(time) <= 4 * _INTERVALS:
         return time, numbers
-    starts = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], _COLUMNS, endpoint=False)))
+    starts = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], _INTERVALS, endpoint=False)))
     low, high = np.fmin.reduceat(numbers, starts), np.fmax.reduceat(numbers, starts)
-    # A line that went back and forth where it falls would fill the gaps between its dashes.
+    # Least value first where the curve falls would make the line zigzag and fill the gaps between dashes.
     falls = numbers[starts] > numbers[np.append(starts[1:], len(time)) - 1]
-    columns = np.where(falls, (high, low), (low, high))
-    return np.repeat(time[starts], 2), columns.T.ravel()
+    extremes = np.where(falls, (high, low), (low, high))
+    return np.repeat(time[starts], 2), extremes.T.ravel()
 
 
-def _sampled(time: NDArray[Any], states: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Edges of the columns of a history, and the state that holds in each."""
-    edges = np.linspace(time[0], time[-1], _COLUMNS + 1)
+def _by_interval(time: NDArray[Any], states: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Edges of equal intervals of time, and the state in the middle of each."""
+    edges = np.linspace(time[0], time[-1], _INTERVALS + 1)
     middles = (edges[1:] + edges[:-1]) / 2
     return edges, states[np.clip(np.searchsorted(time, middles, side="right") - 1, 0, None)]
 
 
-def _symbol(ds: xr.Dataset, names: list[str]) -> str:
-    short = {
-        "phi": "angle",
-        "omega": "angular velocity",
-        "epsilon": "angular\nacceleration",
-        "normal_1": "normal reaction",
-        "normal_2": "normal reaction",
-        "x": "displacement",
-        "velocity": "velocity",
-        "friction_force": "friction force",
-    }
-    name, units = short.get(names[0], long_name(ds[names[0]])), units_of(ds[names[0]], "rad")
-    return f"{name}\n({units})" if units else name
+def _short_label(ds: xr.Dataset, name: str) -> str:
+    short, unit = _SHORT_NAMES.get(name, long_name(ds[name])), unit_text(ds[name])
+    return f"{short}\n({unit})" if unit else short

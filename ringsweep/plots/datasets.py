@@ -1,0 +1,131 @@
+"""What a dataset holds. Only this module tells kinds of datasets and of bodies apart.
+
+A dataset made by hand has no attributes. So names of dimensions and variables decide.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Iterable
+from itertools import chain
+from typing import Any
+
+import xarray as xr
+
+from ringsweep.errors import InputError
+
+#: Panels of a history by the variable that says where the body is: ``phi`` in a ring, ``x`` on a belt.
+#: Variables of one tuple share a panel.
+PANELS: dict[str, tuple[tuple[str, ...], ...]] = {
+    "phi": (("phi",), ("omega", "ring_omega"), ("epsilon",), ("normal_1", "normal_2")),
+    "x": (("x",), ("velocity",), ("friction_force",)),
+}
+
+
+def require_sweep(ds: xr.Dataset) -> None:
+    """Refuse a dataset that is no sweep.
+
+    Raises
+    ------
+    InputError
+        If the dataset holds the history of a run, or error against run time.
+    """
+    if "time" in ds.dims:
+        raise InputError("ds", "is the time history of one run, not a sweep; draw it with history")
+    if "contender" in ds.dims:
+        raise InputError("ds", "is error against run time, not a sweep; draw it with work_precision")
+
+
+def require_history(ds: xr.Dataset) -> xr.Dataset:
+    """The history of a run, or of one run under each of several friction laws.
+
+    Returns
+    -------
+    xarray.Dataset
+        `ds`; without the dimension ``friction_law`` if that has one value.
+
+    Raises
+    ------
+    InputError
+        If the dataset has no dimension ``time``, or no instant.
+    """
+    if not ds.sizes.get("time"):
+        raise InputError("ds", "has no dimension time: it is not the history of a run; draw a sweep with regime_map")
+    return ds.isel(friction_law=0) if ds.sizes.get("friction_law") == 1 else ds
+
+
+def compares_laws(ds: xr.Dataset) -> bool:
+    """Whether a history has a run under each of several friction laws."""
+    return "friction_law" in ds.dims
+
+
+def on_ring(ds: xr.Dataset) -> bool:
+    """Whether a history is that of a body in a ring; else the body is on a belt."""
+    return "phi" in ds
+
+
+def panels_of(ds: xr.Dataset) -> list[tuple[str, ...]]:
+    """Variables of each panel of a history; panels of which the dataset has no variable are left out.
+
+    Raises
+    ------
+    InputError
+        If the dataset has no variable of any panel.
+    """
+    panels = [panel for panel in PANELS["phi" if on_ring(ds) else "x"] if present(ds, panel)]
+    if not panels:
+        raise InputError("ds", f"has no variable that a history shows: {', '.join(chain(*chain(*PANELS.values())))}")
+    if not compares_laws(ds):
+        return panels
+    # The ring moves alike under all laws.
+    return [(name,) for name in present(ds, chain(*panels)) if name != "ring_omega"]
+
+
+def zones(ds: xr.Dataset) -> list[str]:
+    """Variables that say which arc lies under each contact; a history of several laws has no such strip."""
+    return [] if compares_laws(ds) else present(ds, ("zone_1", "zone_2"))
+
+
+def present(ds: xr.Dataset, names: Iterable[str]) -> list[str]:
+    """Those of the names that are in the dataset."""
+    return [name for name in names if name in ds]
+
+
+def swept(ds: xr.Dataset) -> list[xr.DataArray]:
+    """Coordinates that stand for paths of the configuration."""
+    return [coordinate for coordinate in ds.coords.values() if "path" in coordinate.attrs]
+
+
+def is_numeric(data: xr.DataArray) -> bool:
+    """Whether the values are numbers; names of friction laws are not."""
+    return data.dtype.kind in "iuf"
+
+
+def configuration(ds: xr.Dataset) -> dict[str, Any]:
+    """The configuration that a dataset was made from.
+
+    Raises
+    ------
+    InputError
+        If the dataset has no attribute ``configuration``.
+    """
+    if "configuration" not in ds.attrs:
+        raise InputError("ds", "has no attribute configuration, so its scene is not known")
+    return dict(json.loads(ds.attrs["configuration"]))
+
+
+def resolve(argument: str, name: str, available: Iterable[Any]) -> str:
+    """The name in the dataset that the user means; the user may write dots for underscores.
+
+    Raises
+    ------
+    InputError
+        If there is no such name. The message suggests the most similar one.
+    """
+    wanted, names = name.replace(".", "_"), [str(one) for one in available]
+    if wanted in names:
+        return wanted
+    close = difflib.get_close_matches(wanted, names, n=1)
+    hint = f"; did you mean {close[0]}?" if close else ""
+    raise InputError(argument, f"{name!r} is not in the dataset, which has {', '.join(names) or 'none'}{hint}")

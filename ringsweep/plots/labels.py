@@ -1,0 +1,49 @@
+"""Names, units and values of quantities as text for a picture."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import xarray as xr
+
+from ringsweep.plots.datasets import is_numeric
+
+
+def display_factor(coordinate: xr.DataArray) -> float:
+    """Factor from the numbers of a coordinate to the numbers on its axis: axes show radians as degrees."""
+    return 180 / math.pi if coordinate.attrs.get("units") == "rad" else 1.0
+
+
+def long_name(data: xr.DataArray) -> str:
+    """Name of a quantity for readers."""
+    return str(data.attrs.get("long_name", data.name))
+
+
+def axis_label(data: xr.DataArray, ds: xr.Dataset, angle: str = "rad") -> str:
+    """Name of a quantity with its unit; `angle` stands for the radian."""
+    name = long_name(data)
+    # Coefficients of two arcs, for example, have the same long name.
+    if sum(long_name(other) == name for other in ds.coords.values()) > 1:
+        name = f"{name}, {data.name}"
+    unit = unit_text(data, angle)
+    return f"{name} ({unit})" if unit else name
+
+
+def unit_text(data: xr.DataArray, angle: str = "rad") -> str:
+    """Unit of a quantity, empty if it has none; `angle` stands for the radian."""
+    units = str(data.attrs.get("units", "1"))
+    units = angle if units == "rad" else "" if units == "1" else units
+    # Parameters have "m/s^2" where variables have "m s-2".
+    units = re.sub(r"/([A-Za-z]+)\^?(\d*)", lambda unit: f" {unit[1]}-{unit[2] or 1}", units)
+    return re.sub(r"(?<=[A-Za-z])\^?(-?\d+)", r"$^{\1}$", units)
+
+
+def value_text(value: xr.DataArray) -> str:
+    """One value of a coordinate with its name and unit."""
+    name = long_name(value)
+    if not is_numeric(value):
+        return f"{name} = {value.item()}"
+    unit = unit_text(value, "°")
+    number = f"{value.item() * display_factor(value):.4g}"
+    return f"{name} = {number}{unit if unit == '°' else f' {unit}'.rstrip()}"

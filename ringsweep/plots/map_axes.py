@@ -1,0 +1,160 @@
+"""Axes of a regime map: values, order and scale of the coordinates along them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.ticker import LogFormatterSciNotation
+from numpy.typing import NDArray
+
+from ringsweep.errors import InputError
+from ringsweep.plots.datasets import is_numeric, resolve
+from ringsweep.plots.labels import axis_label, display_factor
+
+
+class _PlainNumbers(LogFormatterSciNotation):
+    """Ticks of a logarithmic axis as plain numbers."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        return f"{x:g}" if super().__call__(x, pos) else ""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A coordinate as an axis of a map.
+
+    Attributes
+    ----------
+    name : str
+        Name of the coordinate.
+    dims : tuple of str
+        Its dimensions.
+    label : str
+        Text beside the axis.
+    values : ndarray of shape ``(size,)``
+        Sorted values as displayed, angles in degrees. A name has its position among `names` as value.
+    order : ndarray of shape ``(size,)``
+        Index in the dataset of each value.
+    scale : str
+        ``"log"`` or ``"linear"``.
+    names : tuple of str
+        Values that are names, friction laws for example, in the order of the dataset; empty for numbers.
+    """
+
+    name: str
+    dims: tuple[str, ...]
+    label: str
+    values: NDArray[Any]
+    order: NDArray[np.intp]
+    scale: str
+    names: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, coordinate: xr.DataArray, ds: xr.Dataset) -> Axis:
+        """The axis of a coordinate of a dataset."""
+        names: tuple[str, ...] = ()
+        if is_numeric(coordinate):
+            values = coordinate.values * display_factor(coordinate)
+        else:
+            given = coordinate.values.astype(str).tolist()
+            names = tuple(dict.fromkeys(given))
+            values = np.array([names.index(name) for name in given], dtype=float)
+        order = np.argsort(values, kind="stable")
+        scale = "log" if _is_geometric(np.unique(values)) else "linear"
+        dims = tuple(map(str, coordinate.dims))
+        return cls(str(coordinate.name), dims, axis_label(coordinate, ds, "°"), values[order], order, scale, names)
+
+    @property
+    def is_gridded(self) -> bool:
+        """Whether the axis can be an edge of a grid: one dimension, no value twice, and not a list of points."""
+        return len(self.dims) == 1 and self.dims != ("point",) and len(np.unique(self.values)) == len(self.values)
+
+    @property
+    def edges(self) -> NDArray[Any]:
+        """Edges of the cells, shape ``(size + 1,)``: halfway between neighbours in the scale of the axis."""
+        if len(self.values) == 1:
+            half = 0.5 * abs(self.values[0]) or 0.5
+            return np.array([self.values[0] - half, self.values[0] + half])
+        at = np.log(self.values) if self.scale == "log" else self.values
+        middles = (at[1:] + at[:-1]) / 2
+        edges = np.concatenate([[2 * at[0] - middles[0]], middles, [2 * at[-1] - middles[-1]]])
+        return np.exp(edges) if self.scale == "log" else edges
+
+    def value_of(self, cell: xr.Dataset) -> float:
+        """Value as displayed of a single cell."""
+        value = cell[self.name]
+        return float(self.names.index(str(value.item()))) if self.names else value.item() * display_factor(value)
+
+    def values_at(self, data: xr.DataArray) -> NDArray[Any]:
+        """Value at every element of `data`, shape ``(data.size,)``."""
+        unsorted = np.empty_like(self.values)
+        unsorted[self.order] = self.values
+        return xr.DataArray(unsorted, dims=self.dims).broadcast_like(data).transpose(*data.dims).values.ravel()
+
+    def apply(self, set_scale: Any, axis: Any) -> None:
+        """Give scale and ticks to an axis of matplotlib; `set_scale` is ``Axes.set_xscale`` or ``set_yscale``."""
+        set_scale(self.scale)
+        if self.scale == "log" and self.values[0] >= 1e-3 and self.values[-1] < 1e5:
+            axis.set_major_formatter(_PlainNumbers())
+            axis.set_minor_formatter(_PlainNumbers(labelOnlyBase=False))
+        if self.names:
+            axis.set_ticks(range(len(self.names)), labels=self.names)
+
+
+def choose_axes(ds: xr.Dataset, data: xr.DataArray, x: str | None, y: str | None) -> tuple[Axis, Axis | None]:
+    """The horizontal axis, and the vertical one if a second quantity was swept.
+
+    Raises
+    ------
+    InputError
+        If `x` or `y` is no coordinate of `data`, or both are the same.
+    """
+    candidates: list[str] = []
+    for dim in data.dims:
+        along = [str(name) for name, c in data.coords.items() if c.dims == (dim,)]
+        # The number of a point is only a label: the coordinates of the points are the axes.
+        others = [name for name in along if name != dim]
+        candidates += others or [str(dim)]
+    available = [*dict.fromkeys([*candidates, *map(str, data.dims)])]
+    x = resolve("x", x, available) if x else None
+    y = resolve("y", y, available) if y else None
+    x = x or next((name for name in candidates if name != y), None)
+    y = y or next((name for name in candidates if name != x), None)
+    if x is None or x == y:
+        raise InputError("x", f"x and y must differ; choose from {', '.join(available)}")
+    return Axis.of(ds[x], ds), Axis.of(ds[y], ds) if y else None
+
+
+def is_scattered(horizontal: Axis, vertical: Axis | None) -> bool:
+    """Whether a map shows points; else it shows the cells of a grid."""
+    if vertical is None:
+        return horizontal.dims != (horizontal.name,)
+    return horizontal.dims == vertical.dims or not (horizontal.is_gridded and vertical.is_gridded)
+
+
+def thinned(axes: list[Axis], most: int) -> dict[str, NDArray[np.intp]]:
+    """Indices by dimension that are drawn of axes with more than `most` values, in ascending order of the values."""
+    indices = {}
+    for axis in axes:
+        step = math.ceil(len(axis.values) / most)
+        if step > 1:
+            indices[axis.dims[0]] = axis.order[step // 2 :: step]
+    return indices
+
+
+def as_matrix(data: xr.DataArray, horizontal: Axis, vertical: Axis | None) -> NDArray[Any]:
+    """Values in the order of the axes, shape ``(rows, columns)``; one row if there is no vertical axis."""
+    if vertical is None:
+        return data.values[np.newaxis, horizontal.order]
+    return data.transpose(*vertical.dims, *horizontal.dims).values[np.ix_(vertical.order, horizontal.order)]
+
+
+def _is_geometric(values: NDArray[Any]) -> bool:
+    if len(values) < 3 or not np.isfinite(values).all() or values[0] <= 0:
+        return False
+    steps, ratios = np.diff(values), values[1:] / values[:-1]
+    return bool(np.ptp(ratios) <= 1e-6 * ratios.mean() and np.ptp(steps) > 1e-6 * steps.mean())

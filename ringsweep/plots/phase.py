@@ -1,0 +1,191 @@
+"""Phase portraits of runs on a ring."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import partial
+from typing import Any, Literal
+
+import numpy as np
+import xarray as xr
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from ringsweep.errors import InputError
+from ringsweep.plots.datasets import zones
+from ringsweep.plots.rig import Rig, mode_name, ring_history
+from ringsweep.plots.style import (
+    PAIR_COLOURS,
+    PAIR_STYLES,
+    arc_colour,
+    arc_names,
+    axes_or_current,
+    legend_beside,
+    true_ranges,
+)
+
+# Slip has the hue of the body; slip forward is darker.
+_MODE_STYLES: dict[int, dict[str, Any]] = {
+    1: {"color": PAIR_COLOURS[0], "linewidth": 1.1},
+    -1: {"color": "#56B4E9", "linewidth": 1.1},
+    0: {"color": "black", "linewidth": 2.6, "solid_capstyle": "round"},
+}
+
+# Range of an angle above which it is shown modulo a full turn, degrees.
+_LONGEST = 720.0
+
+
+def phase_portrait(ds: xr.Dataset, frame: Literal["space", "ring"] = "space", ax: Axes | None = None) -> Axes:
+    """Draw angular velocity over angle, with stick, slip, the speed of the ring and the rough arcs.
+
+    In space the angular velocity of the ring is a curve of its own, which the body follows while it sticks. A broad
+    line lies under the curve of the body while a contact is on a rough arc. In the frame of the ring the arcs are
+    fixed: a band shows where a contact is on an arc. There the body sticks at zero velocity. Angles of more than two
+    turns are shown modulo a full turn.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        Result of :func:`ringsweep.simulate` on a ring.
+    frame : {"space", "ring"}
+        Frame of reference.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw in, by default pyplot's current ones. The legend stands beside them: a figure with
+        ``layout="constrained"`` makes room for it.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InputError
+        If the dataset is not the history of one run on a ring, or `frame` is unknown.
+
+    Examples
+    --------
+    >>> import ringsweep
+    >>> from matplotlib.figure import Figure
+    >>> run = ringsweep.simulate("my-sweep.yaml")
+    >>> phase_portrait(run, ax=Figure().add_subplot()).get_xlabel()
+    'angle of the body (°)'
+    """
+    if frame not in ("space", "ring"):
+        raise InputError("frame", f"{frame!r} is neither 'space' nor 'ring'")
+    run, rig = ring_history(ds)
+    ax = axes_or_current(ax, (7.6, 4.8))
+    relative = frame == "ring"
+    fixed_arcs = relative or not run["theta"].values.any()
+    angle = np.degrees(run["phi"].values - run["theta"].values if relative else run["phi"].values)
+    speed = run["omega"].values - run["ring_omega"].values if relative else run["omega"].values
+    wrapped = bool(np.ptp(angle) > _LONGEST)
+    entries = _draw_bands(ax, rig, angle, wrapped) if fixed_arcs else []
+    if not entries:
+        entries = _draw_broad_lines(ax, run, angle, speed, wrapped)
+    # Translucent and below the curve of the body, which covers it in stick.
+    ring_style: dict[str, Any] = {"color": PAIR_COLOURS[1], "linewidth": 0.8, "alpha": 0.7, "zorder": 1.8}
+    if fixed_arcs:
+        ring_style |= {"linestyle": PAIR_STYLES[1], "linewidth": 1.2, "alpha": 1.0}
+        ax.axhline(0.0, **ring_style)
+    else:
+        ax.plot(*_curve(angle, run["ring_omega"].values, wrapped), **ring_style)
+    entries.append(Line2D([], [], **ring_style, label="speed of the ring" + (", stick" if relative else "")))
+    mode = run["mode"].values
+    # From one sample to the next the body slips if it slips at either of them.
+    between = np.where(mode[:-1] != 0, mode[:-1], mode[1:])
+    for value, style in _MODE_STYLES.items():
+        if not (mode == value).any():
+            continue
+        ax.plot(*_curve(*_segments(between == value, angle, speed), wrapped), **style)
+        # In the frame of the ring the curve of a stick has no length.
+        dot: dict[str, Any] = {"marker": "o", "markersize": 3.5} if value == 0 else {}
+        if dot:
+            first = [i for i, _ in true_ranges(mode == value)]
+            ax.plot(_wrap(angle[first], wrapped), speed[first], color=style["color"], linestyle="", **dot)
+        entries.append(Line2D([], [], **style, **dot, label=mode_name(value)))
+    for k, label, colour in ((0, "start", "white"), (-1, "end", "black")):
+        square: dict[str, Any] = {"marker": "s", "markersize": 5.5, "color": "black", "linestyle": ""}
+        square["markerfacecolor"] = colour
+        ax.plot(_wrap(angle[[k]], wrapped), speed[[k]], zorder=4, **square)
+        entries.append(Line2D([], [], label=label, **square))
+    ax.set_xlabel("angle of the body on the ring (°)" if relative else "angle of the body (°)")
+    ax.set_ylabel(f"angular velocity{' relative to the ring' if relative else ''} (rad s$^{{-1}}$)")
+    if wrapped:
+        ax.set_xlim(-180.0, 180.0)
+        ax.set_xticks(np.arange(-180.0, 181.0, 60.0))
+    if relative:
+        to_sliding, to_angular = partial(np.multiply, rig.radius), partial(np.multiply, 1.0 / rig.radius)
+        ax.secondary_yaxis("right", functions=(to_sliding, to_angular)).set_ylabel("sliding velocity (m s$^{-1}$)")
+    legend_beside(ax, entries, bbox_to_anchor=(1.16 if relative else 1.0, 1.0), handleheight=1.2)
+    return ax
+
+
+def _wrap(angle: NDArray[Any], wrapped: bool) -> NDArray[Any]:
+    """Angles from -180 to 180 degrees if `wrapped`."""
+    return (angle + 180.0) % 360.0 - 180.0 if wrapped else angle
+
+
+def _curve(angle: NDArray[Any], speed: NDArray[Any], wrapped: bool) -> tuple[NDArray[Any], NDArray[Any]]:
+    """A curve with NaN wherever its angle jumps by a full turn if `wrapped`."""
+    if not wrapped:
+        return angle, speed
+    turns = np.floor((angle + 180.0) / 360.0)
+    jumps = np.flatnonzero(np.diff(turns)) + 1
+    return np.insert(_wrap(angle, True), jumps, np.nan), np.insert(speed, jumps, np.nan)
+
+
+def _segments(kept: NDArray[Any], angle: NDArray[Any], speed: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Parts of a curve with NaN between them; `kept`, shape ``(samples - 1,)``, says from which sample to the next."""
+    pieces = [np.append(np.arange(i, j + 1), -1) for i, j in true_ranges(kept)]
+    index = np.concatenate([*pieces, np.array([-1])])
+    return np.where(index < 0, np.nan, angle[index]), np.where(index < 0, np.nan, speed[index])
+
+
+def _draw_bands(ax: Axes, rig: Rig, angle: NDArray[Any], wrapped: bool) -> list[Artist]:
+    """Draw bands where a contact is on a rough arc, in all turns shown; returns their legend entries."""
+    low, high = (-180.0, 180.0) if wrapped else (float(angle.min()), float(angle.max()))
+    margin = 0.0 if wrapped else 0.05 * (high - low) or 5.0
+    low, high = low - margin, high + margin
+    entries: list[Artist] = []
+    for number, (name, (center, half_angle)) in enumerate(
+        zip(arc_names(len(rig.arcs)), rig.arcs, strict=True), start=1
+    ):
+        for contact in rig.contacts:
+            lines = ("///", "\\\\\\")[contact - 1] if len(rig.contacts) > 1 else None
+            fill: dict[str, Any] = {"facecolor": arc_colour(number), "alpha": 0.35, "linewidth": 0}
+            hatch: dict[str, Any] = {"facecolor": "none", "edgecolor": "0.45", "linewidth": 0, "hatch": lines}
+            middle, half = math.degrees(center - rig.offset(contact)), math.degrees(half_angle)
+            for left, right in _every_turn(middle - half, middle + half, low, high):
+                ax.axvspan(left, right, zorder=0.5, **fill)
+                ax.axvspan(left, right, zorder=0.6, **hatch).set(hatch_linewidth=0.4)
+            entry = Patch(facecolor=arc_colour(number), alpha=0.55, hatch=lines, edgecolor="0.3", linewidth=0)
+            entry.set(label=f"contact {contact} on {name}", hatch_linewidth=0.4)
+            entries.append(entry)
+    ax.set_xlim(low, high)
+    return entries
+
+
+def _every_turn(left: float, right: float, low: float, high: float) -> Iterator[tuple[float, float]]:
+    """Copies of an interval at every full turn, cut to the range from `low` to `high`, degrees."""
+    for turn in range(math.floor((low - right) / 360.0), math.ceil((high - left) / 360.0) + 1):
+        a, b = max(left + 360.0 * turn, low), min(right + 360.0 * turn, high)
+        if a < b:
+            yield a, b
+
+
+def _draw_broad_lines(
+    ax: Axes, run: xr.Dataset, angle: NDArray[Any], speed: NDArray[Any], wrapped: bool
+) -> list[Artist]:
+    """Draw a broad line under the curve where a contact is on a rough arc; returns the legend entries."""
+    arcs = np.array([run[name].values for name in zones(run)])
+    entries: list[Artist] = []
+    for number, name in enumerate(arc_names(int(arcs.max())), start=1):
+        here = np.where((arcs == number).any(axis=0), 0.0, np.nan)
+        style: dict[str, Any] = {"color": arc_colour(number), "linewidth": 6, "alpha": 0.45, "solid_capstyle": "butt"}
+        ax.plot(*_curve(angle, speed + here, wrapped), zorder=1.5, **style)
+        entries.append(Line2D([], [], label=f"a contact on {name}", **style))
+    return entries

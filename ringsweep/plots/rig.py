@@ -1,0 +1,95 @@
+"""The ring and the body of a run: their measures, and the run with the friction forces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ringsweep.compile import take
+from ringsweep.config import load
+from ringsweep.errors import InputError
+from ringsweep.models import MODELS
+from ringsweep.physics import ring
+from ringsweep.plots.datasets import compares_laws, configuration, on_ring, present, require_history
+from ringsweep.quantities.variables import MODES
+
+
+@dataclass(frozen=True)
+class Rig:
+    """Measures of ring and body in SI units.
+
+    Attributes
+    ----------
+    body : NamedTuple
+        The body as :mod:`ringsweep.physics.ring` has it.
+    radius, ball : float
+        Radius of the inner race and of the balls, m.
+    beta : float
+        Half the angle between the contacts, rad; 0 for a single contact.
+    contacts : tuple of int
+        ``(1,)`` or ``(1, 2)``.
+    arcs : tuple of (float, float)
+        Centre and half-angle of each rough arc in the frame of the ring, rad. Where arcs overlap, the later one holds.
+    """
+
+    body: Any
+    radius: float
+    ball: float
+    beta: float
+    contacts: tuple[int, ...]
+    arcs: tuple[tuple[float, float], ...]
+
+    @classmethod
+    def of(cls, ds: xr.Dataset) -> Rig:
+        """Measures of the scene in the attribute ``configuration`` of a dataset."""
+        scene = load(configuration(ds)).scene
+        model: Any = MODELS[scene.structure.model]
+        body = take(model.build_body({path: np.array([value]) for path, value in scene.values.items()}), 0)
+        arcs = tuple((scene.values[f"{a}.center"], scene.values[f"{a}.half_angle"]) for a in scene.structure.arcs)
+        beta = float(ring.contact_offset(body))
+        # A body without a radius, or with a tiny one, is drawn as a ball that can be seen.
+        ball = max(scene.values.get("body.ball_radius", 0.07 * body.radius), 0.02 * body.radius)
+        return cls(body, float(body.radius), float(ball), beta, (1, 2) if beta else (1,), arcs)
+
+    def offset(self, contact: int) -> float:
+        """Angle from the body to a contact, rad."""
+        return -self.beta if contact == 1 else self.beta
+
+
+def ring_history(ds: xr.Dataset) -> tuple[xr.Dataset, Rig]:
+    """The history of one run on a ring, and its rig.
+
+    Returns
+    -------
+    xarray.Dataset
+        The history up to the end of the run, with the friction forces ``friction_1`` and ``friction_2``, N, positive
+        the way phi grows.
+    Rig
+
+    Raises
+    ------
+    InputError
+        If the dataset is not the history of one run on a ring, or has no ``theta`` or no ``configuration``.
+    """
+    ds = require_history(ds)
+    if not on_ring(ds):
+        raise InputError("ds", "is the history of a body on a belt: there is no ring to draw; draw it with history")
+    if compares_laws(ds):
+        laws = ", ".join(map(str, ds["friction_law"].values))
+        raise InputError("ds", f"holds a run under each of {laws}: choose one, for example ds.sel(friction_law=...)")
+    if "theta" not in ds:
+        raise InputError("ds", "has no theta, the angle of the ring: an earlier version wrote it; run it again")
+    ds = ds.isel(time=np.isfinite(ds["phi"].values))
+    rig = Rig.of(ds)
+    phi, (first, *others) = ds["phi"].values, [ds[name].values for name in present(ds, ("normal_1", "normal_2"))]
+    state = np.sin(phi), np.cos(phi), ds["omega"].values, ds["epsilon"].values, first, *(others or [first])
+    forces = ring.tractions(rig.body, *state)
+    return ds.assign({f"friction_{k}": ("time", values) for k, values in enumerate(forces, start=1)}), rig
+
+
+def mode_name(mode: float) -> str:
+    """Name of a mode for readers: stick, slip forward or slip backward."""
+    return MODES[int(mode)].replace("_", " ")
