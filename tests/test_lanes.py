@@ -126,7 +126,7 @@ def integrate(kind, batch, steps, order=None):
     order = np.arange(len(batch.span)) if order is None else order
     rows, report = np.empty((len(batch.span), len(NAMES))), np.empty((len(batch.span), 5))
     scenes = side_by_side(batch._replace(drive=scaled(batch.drive))) if isinstance(kind, Several) else batch
-    rk4.integrate(kind, rk4.Kept(), scenes, take(batch.drive, 0), order, steps, rows, report)
+    rk4.integrate(kind, rk4.Diagnosed(), scenes, take(batch.drive, 0), order, steps, rows, report)
     columns = zip(("steps", "stiffness", "slack", "fall", "stride"), report.T, strict=True)
     return dict(zip(NAMES, rows.T, strict=True)) | dict(columns)
 

@@ -11,8 +11,8 @@ from typing import Any
 
 import llvmlite.ir as ir
 from numba.core import cgutils, types
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import lower_builtin, lower_cast, models, register_model
+from numba.core.typing import signature
+from numba.extending import lower_builtin, lower_cast, models, register_model, type_callable
 
 #: Runs in one value.
 WIDTH = 16
@@ -78,12 +78,14 @@ def _teach(function: Any, taken: Any, given: Any, arity: int, instruction: Any) 
     """Give `function` a meaning for arguments of type `taken`, plain ones among them spread over the lanes."""
     alike = types.Boolean if taken is MASK else types.Number
 
-    @infer_global(function)
-    class Template(AbstractTemplate):
-        def generic(self, args: Any, kws: Any) -> Any:
+    @type_callable(function)
+    def typer(context):
+        def typed(*args):
             if len(args) == arity and taken in args and all(a == taken or isinstance(a, alike) for a in args):
                 return signature(given, *[taken] * arity)
             return None
+
+        return typed
 
     @lower_builtin(function, *[taken] * arity)
     def lower(context, builder, sig, args):

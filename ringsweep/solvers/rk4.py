@@ -123,10 +123,10 @@ class RK4(Method):
 
     def history(self, batch: Any, samples: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Times and rows of the history of cell 0; see :class:`ringsweep.solvers.method.Method`."""
-        arc_share = max(1, self.steps // samples)
-        rows = np.empty((self.steps // arc_share + 2, width))
+        spacing = max(1, self.steps // samples)
+        rows = np.empty((self.steps // spacing + 2, width))
         times = np.empty(len(rows))
-        count = _history(batch, self.steps, arc_share, times, rows)
+        count = _history(batch, self.steps, spacing, times, rows)
         return times[:count], rows[:count]
 
 
@@ -455,8 +455,8 @@ def _initial_run(scene, theta, ring_omega):
 
 
 @kernel
-def _history(batch, steps, arc_share, times, rows):
-    """Rows of every `arc_share`-th step of cell 0 up to its end; returns their number."""
+def _history(batch, steps, spacing, times, rows):
+    """Rows of every `spacing`-th step of cell 0 up to its end; returns their number."""
     scene = take(batch, 0)
     h = scene.span / steps
     table = np.empty((3, 2))
@@ -467,7 +467,7 @@ def _history(batch, steps, arc_share, times, rows):
     status, _ = constant_step.verdict(scene, now, now)
     count = 0
     for k in range(steps + 1):
-        if k % arc_share == 0 or k == steps or status != RUNNING:
+        if k % spacing == 0 or k == steps or status != RUNNING:
             times[count] = k * h if k < steps else scene.span
             row = constant_step.row(scene, y, theta, ring_omega)
             for column in range(len(row)):
