@@ -1,1 +1,1 @@
-"""Measurements, each a module to run from the repository's root: ``python -m benchmarks.NAME``."""
+"""Benchmarks. Run each module from the root of the repository: ``python -m benchmarks.NAME``."""

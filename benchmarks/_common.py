@@ -1,4 +1,4 @@
-"""What the benchmarks share: scenes of the package, fair timing, printing."""
+"""Shared by the benchmarks: scenes of the package, timing of contenders in turn, printing."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from ringsweep.models import MODELS, batch
 from ringsweep.runs import cells, sweep
 from ringsweep.solvers.method import Result
 
-#: The ring of the paper's Fig. 29 (SI units) but for its law.
+#: The ring of the paper's Fig. 29 (SI units), without its friction law.
 SPAN = 10.0
 PAPER_STEPS = 5000
 BODY = {"mass": 0.076, "inertia": 4.47e-5, "half_distance": 0.025, "ball_radius": 0.01}
 RADIUS, GRAVITY = 0.043378, 9.81
 ROUGH, REST = {"mu_s": 0.5, "mu_k": 0.3}, {"mu_s": 0.2, "mu_k": 0.1}
-#: Its law.
+#: Parameters of the Bengisu-Akay law in Fig. 29.
 ALPHA, V0 = 1e5, 2e-6
 _RING: dict[str, Any] = {
     "model": "ring",
@@ -45,46 +45,46 @@ Cell = tuple[float, float]
 
 
 def ring(law: Mapping[str, Any]) -> dict[str, Any]:
-    """The scene of Fig. 29 with another law of friction."""
+    """Scene of Fig. 29 under a friction law, given as the keys of `friction`."""
     return _RING | {"friction": {**law, "rough": ROUGH, "rest": REST}}
 
 
 def family(side: int) -> list[Cell]:
-    """The Fig. 29 family: `side` amplitudes, 0.1 to 10 rad/s, by `side` half-angles, 2 to 60 degrees."""
+    """Cells around Fig. 29: `side` amplitudes from 0.1 to 10 rad/s by `side` half-angles from 2 to 60 degrees."""
     amplitudes, half_angles = np.geomspace(0.1, 10.0, side), np.radians(np.linspace(2.0, 60.0, side))
     return [(float(a), float(h)) for a in amplitudes for h in half_angles]
 
 
 def configure(scene: Mapping[str, Any], points: Mapping[str, Sequence[float]], method: str, **options: Any) -> Any:
-    """Configuration of a sweep over points, without certificates: a peer has none, and one more run makes it."""
+    """Configuration of a sweep over points. It has no certificates: they cost a second run, and peers have none."""
     solver = {"method": method, "certify": False, **options}
     return config.load({"scene": scene, "solver": solver, "sweep": {"points": points}})
 
 
 def bare(configuration: Any) -> Callable[[], Result]:
-    """A call that runs a configuration in this thread, and nothing else (no engine, no dataset)."""
+    """A function that runs the solver on a configuration in this thread, without tasks and without a dataset."""
     structure = configuration.scene.structure
     names = MODELS[structure.model].outcomes
     count = len(next(iter(configuration.source["sweep"]["points"].values())))
-    prepared = batch(structure, cells.cells(configuration.scene, configuration.axes, np.arange(count)))
+    prepared = batch(structure, cells.values_of_cells(configuration.scene, configuration.axes, np.arange(count)))
     return lambda: configuration.solver.run(prepared, names)
 
 
 def on_one_core(configuration: Any) -> Callable[[], dict[str, Any]]:
-    """The same: its outcomes by name."""
+    """A function as :func:`bare` gives it, which returns outcomes by name."""
     names = MODELS[configuration.scene.structure.model].outcomes
     run = bare(configuration)
     return lambda: dict(zip(names, run().rows.T, strict=True))
 
 
 def on_all_cores(configuration: Any) -> Any:
-    """Run a configuration through the sweep engine: its dataset."""
+    """Run a configuration as a sweep on all cores; returns its dataset."""
     return sweep.compute(configuration, jobs=None, progress=False)
 
 
 @contextmanager
 def one_core() -> Iterator[None]:
-    """Pin this process to one of its cores, with what threads a library may start."""
+    """Pin this process, and the threads that libraries start in it, to one core."""
     if not hasattr(os, "sched_setaffinity"):
         yield
         return
@@ -98,7 +98,7 @@ def one_core() -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Times:
-    """Seconds of a call in each round."""
+    """Time of one contender in each round, s."""
 
     wall: list[float]
 
@@ -108,17 +108,33 @@ class Times:
         return median(self.wall)
 
     def ratio(self, other: Times) -> float:
-        """How many times longer this took than `other`: median over the rounds that both have, side by side."""
+        """How many times longer this took than `other`: median over the rounds that both have."""
         return median(a / b for a, b in zip(self.wall, other.wall, strict=False))
 
 
 def alternate(
     contenders: Mapping[Any, Callable[[], Any]], rounds: int, shortest: float = 0.05, patience: float = 5.0
 ) -> tuple[dict[Any, Times], dict[Any, Any]]:
-    """Time contenders in turn, forwards and backwards, so that a noisy neighbour troubles all of them alike.
+    """Time contenders in turn, forwards and backwards, so that other load on the machine slows all of them alike.
 
-    A call shorter than `shortest` seconds is repeated until it is not, and one longer than `patience` is timed in the
-    first round alone. Returns their times and what they returned last. They must be warm.
+    Contenders must be compiled before.
+
+    Parameters
+    ----------
+    contenders : mapping
+        Functions by name.
+    rounds : int
+    shortest : float
+        Least time of a measurement, s: a call that is shorter is repeated.
+    patience : float
+        A call that is longer than this (s) is timed only in the first round.
+
+    Returns
+    -------
+    times : dict
+        :class:`Times` by name.
+    results : dict
+        The last return value of each contender by name.
     """
     times: dict[Any, Times] = {name: Times([]) for name in contenders}
     repeats: dict[Any, int] = {}
@@ -149,7 +165,7 @@ def heading(text: str) -> None:
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table, columns aligned to the right but for the first."""
+    """Print a table. All columns but the first are aligned to the right."""
     lines = [header, *rows]
     widths = [max(len(line[k]) for line in lines) for k in range(len(header))]
     for line in lines:
@@ -158,13 +174,13 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 
 def markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """The same as a table in Markdown, columns aligned to the right but for the first two."""
+    """A table in Markdown. All columns but the first two are aligned to the right."""
     rule = ["---" if k < 2 else "---:" for k in range(len(header))]
     return "".join(f"| {' | '.join(line)} |\n" for line in (header, rule, *rows))
 
 
 def machine(also: Sequence[str] = ()) -> str:
-    """What the figures are measured on, and the versions, those of `also` where they are installed."""
+    """Processor, cores and load of this machine, and versions of the packages, with those named in `also`."""
     info = Path("/proc/cpuinfo")
     lines = info.read_text().splitlines() if info.exists() else []
     models = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]

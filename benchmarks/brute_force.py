@@ -1,29 +1,30 @@
 """Certified answers against an independent reference, over the whole space of scenes.
 
-    python -m benchmarks.brute_force [--count 20000] [--families stiction belt-dahl ...] [--out TABLE.md]
+    python -m benchmarks.brute_force [--count 20000] [--families stiction "belt dahl" ...] [--out TABLE.md]
 
-draws random scenes by families, has `ringsweep.sweep` answer them in batches and :mod:`benchmarks.reference` one by
-one, and prints a table per family:
+Draws random scenes by families. `ringsweep.sweep` answers them in batches, :mod:`benchmarks.reference` answers them
+one by one. The benchmark prints a table with a row for each family:
 
-- contradicted: certified, but of another kind than the reference finds (regime, motion, separating contact). Each is
-  printed as a scene that can be run again, with what the reference finds;
-- off: certified and of the right kind, but the end is elsewhere (radians or seconds) by more than 1e-3, and by more
-  than the error that is stated;
-- uncertified: the sweep says itself that it is not sure;
-- ambiguous: the reference's own runs, at other tolerances or with everything that the verdict may hang by moved by a
-  millionth, do not agree; or several contacts could leave. Not compared;
-- unresolved: the reference did not finish within its budget. Not compared;
-- bounded: of the certified numbers whose stated error is ten times what the reference itself is sure of, the share
-  where the true one is no larger, and the median of stated over true.
+- contradicted: certified, but the reference finds another regime, motion or separating contact. Each such scene is
+  printed so that it can be run again, with the answer of the reference;
+- off: certified, and regime, motion and contact are right, but the error at the end (radians or seconds) exceeds both
+  1e-3 and the stated bound;
+- uncertified: the sweep gives no certificate;
+- ambiguous: the runs of the reference, at other tolerances or with all thresholds shifted by a millionth, do not agree,
+  or several contacts could separate. Not compared;
+- unresolved: the reference did not finish within its limits. Not compared;
+- bounded: among certified numbers whose stated bound is at least ten times the error of the reference itself, the share
+  whose true error is within the bound;
+- stated/true: the median of bound over true error, for the same numbers.
 
-On the belt trajectories are compared, not the words for them: contradicted is where the end is off by more than a
-thousandth of the stick scale mu_s m g / k and the way of the belt together, and by more than the error that is stated;
-ambiguous where the reference's own two tolerances differ by more than a hundredth of that. The law `bristle` is left
-out: its random bonds cannot be repeated independently.
+On the belt, displacements at the end are compared and not regimes. A scene is contradicted if the error exceeds both
+the stated bound and a thousandth of the length scale (stick length mu_s m g / k, plus the path of the belt in a short
+run). It is ambiguous if the two tolerances of the reference differ by more than a hundredth of that. The law
+`bristle` is left out, because its random bonds cannot be repeated independently.
 
-``--csv PATH`` writes the 500 scenes of ``tests/test_brute_force.py`` instead: the scene (SI units, on the rig of the
-paper); regime, motion, contact and time of separation; smallest reaction in weights of the body; whether the
-reference's runs agree in kind.
+``--csv PATH`` writes the 500 scenes of ``tests/test_brute_force.py`` instead: the scene (SI units, on the paper's
+rig); regime, motion, contact and time of separation; least reaction in weights of the body; whether the runs of the
+reference agree in kind.
 """
 
 import argparse
@@ -46,7 +47,7 @@ from benchmarks.reference.problem import problem
 from benchmarks.reference.run import drive
 
 COUNT, SEED = 20_000, 181
-#: What the reference is sure of at best, rad, s, m: it looks at contacts an instant after an event.
+#: Least error of the reference (rad, s, m): it looks at contacts an instant after an event.
 SURE = 1e-9
 RIG = {
     "body.mass": 0.076,
@@ -57,7 +58,7 @@ RIG = {
 }
 ONE = ("mu_k",)
 BOTH = ("mu_s", "mu_k")
-#: Laws: coefficients and parameters.
+#: Friction coefficients and parameters of each law.
 LAWS = {
     "coulomb": (ONE, ()),
     "stiction": (BOTH, ()),
@@ -82,7 +83,7 @@ TABLE_THETA = np.round(0.4 * np.sin(2.1 * TABLE_TIME) + 0.15 * np.sin(5.3 * TABL
 
 @dataclass(frozen=True)
 class Kind:
-    """What a batch has in common: it compiles to one kernel."""
+    """Common properties of the scenes of a batch, which share one compiled kernel."""
 
     model: str
     law: str
@@ -131,7 +132,7 @@ def log(rng, low, high):
 
 
 def parameters(rng, law, belt, weight=1.0):
-    """Parameters of a law, on the belt per weight of the body."""
+    """Random parameters of a law; on the belt, per weight of the body."""
     v0 = log(rng, -9, 0)
     values = {
         "alpha": log(rng, 0, 7),
@@ -150,14 +151,14 @@ def parameters(rng, law, belt, weight=1.0):
 
 
 def coefficients(rng, law, prefix, scale):
-    """Coefficients of friction under a path."""
+    """Random friction coefficients by path."""
     mu_k = rng.uniform(0.02, 0.5) * scale
     mu_s = mu_k + pick(rng, (1, 0.0), (9, rng.uniform(0.0, 0.4))) * scale
     return {f"{prefix}.{name}": {"mu_s": mu_s, "mu_k": mu_k}[name] for name in LAWS[law][0]}
 
 
 def driven(rng, name, belt):
-    """Parameters of a drive."""
+    """Random parameters of a drive by path."""
     sign = rng.choice([-1.0, 1.0])
     values = {
         "none": {},
@@ -191,7 +192,7 @@ def ring_scene(rng, kind):
             "body.ball_radius": radius * ball,
             "ring.radius": radius,
         }
-    # Some on ice, where the body revolves; some so rough that they can jam.
+    # Some scenes almost without friction, so that the body revolves; some so rough that it can jam.
     scale = pick(rng, (2, 0.02), (8, 1.0), (1, 2.2))
     if kind.grip == "high":
         scale = pick(rng, (1, 1.0), (3, 2.2))
@@ -232,7 +233,7 @@ def belt_scene(rng, kind):
     if kind.law in BRISTLES:
         values["time.span"] = min(span, 8.0)
     else:
-        # Karnopp's body must not meet more friction at the edge of the dead band than holds it within.
+        # Under Karnopp's law friction at the edge of the dead band must not exceed friction within it.
         most = math.inf
         if kind.law == "karnopp":
             grip = values["friction.mu_s"] - values["friction.mu_k"]
@@ -244,7 +245,7 @@ def belt_scene(rng, kind):
 
 
 def nest(kind, values):
-    """The scene of values by paths, with what its kind adds."""
+    """Scene of a kind, from values by path."""
     scene = {"model": kind.model, "friction": {"law": kind.law}}
     if kind.model != "belt" or kind.drive:
         scene["drive"] = {"law": kind.drive}
@@ -264,13 +265,13 @@ def nest(kind, values):
 
 
 def draw(rng, kind):
-    """A random scene of a kind by paths, rounded to what can be read."""
+    """A random scene of a kind by paths, rounded to six digits."""
     values = (belt_scene if kind.model == "belt" else ring_scene)(rng, kind)
     values = {k: v if v == "ring" or abs(v) == math.pi or v == 0.5 * math.pi else float(f"{v:.6g}")
               for k, v in values.items()}  # fmt: skip
     for path, value in values.items():
         if value == "ring":
-            # At the speed of the ring (belt) at launch.
+            # The body starts at the speed of the ring or belt.
             values[path] = 0.0
             values[path] = float(drive(problem(nest(kind, values)), 0.0)[1]) + 0.0
     return values
@@ -278,7 +279,7 @@ def draw(rng, kind):
 
 @dataclass
 class Count:
-    """What became of a family."""
+    """Counts of one family."""
 
     tally: Counter = field(default_factory=Counter)
     bounded: list = field(default_factory=list)
@@ -286,19 +287,19 @@ class Count:
 
 
 def answers(kind, batch, solver):
-    """What the package says of a batch of scenes of one kind."""
+    """Dataset of the package for a batch of scenes of one kind."""
     axes = {path: xr.DataArray([values[path] for values in batch], dims="run") for path in batch[0]}
     return ringsweep.sweep(nest(kind, batch[0]), axes, solver=solver, progress=False)
 
 
 def scales(scene):
-    """Length of the belt's stick and way, m."""
+    """Length scale of a belt scene, m: stick length, plus the path of the belt in a run shorter than 1 s."""
     p = problem(scene)
     return p.mu_s[0] / p.stiffness + abs(drive(p, p.span)[0] - drive(p, 0.0)[0]) * (p.span < 1.0)
 
 
 def compare(kind, batch, data, count, report):
-    """Enter a batch into the count of its family; contradictions go to `report`."""
+    """Add a batch to the count of its family; contradictions go to `report`."""
     belt = kind.model == "belt"
     words = [] if belt else list(zip(*(ringsweep.words(data[n]).values for n in ("regime", "motion")), strict=True))
     for i, values in enumerate(batch):
@@ -348,19 +349,19 @@ def compare(kind, batch, data, count, report):
 
 
 class Report:
-    """Prints what is wrong as it is found."""
+    """Prints wrong answers as they are found."""
 
     def __init__(self, verbose):
         self.verbose = verbose
 
     def scene(self, word, scene, why, said):
-        """A scene, what the reference finds and what the package says."""
+        """Print a scene with the answers of the reference and of the package."""
         listing = pprint.pformat(scene, width=120, sort_dicts=False)
         tqdm.write(f"\n# {word}; reference: {why}\n# ringsweep: {said}\n{listing}")
 
 
 def run_family(name, kinds, many, seed, solver, report):
-    """Count of a family of about so many scenes."""
+    """Count of a family of about `many` scenes."""
     count, batches = Count(), []
     for k, kind in enumerate(kinds):
         rng = np.random.default_rng([seed, *name.encode(), k])
@@ -378,7 +379,7 @@ HEADER = ["family", "runs", "certified", "compared", "contradicted", "off", "unc
 
 
 def row(name, count):
-    """A line of the table."""
+    """Row of the table for one family."""
     tally = count.tally
     share = 100.0 * tally["uncertified"] / max(tally["runs"], 1)
     bounded = [b for b, _ in count.bounded]
@@ -396,7 +397,7 @@ def main():
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--families", nargs="+", metavar="NAME", help=", ".join(families()))
     parser.add_argument("--solver", default="auto")
-    parser.add_argument("--verbose", action="store_true", help="print what the reference could not resolve, too")
+    parser.add_argument("--verbose", action="store_true", help="also print scenes that the reference could not resolve")
     parser.add_argument("--out", type=Path, help="Markdown file to write")
     parser.add_argument("--csv", type=Path, help="write the 500 scenes of the tests instead")
     arguments = parser.parse_args()
@@ -436,13 +437,13 @@ CSV_OUTCOME = ["method", "regime", "motion", "contact", "t_separation", "normal_
 
 
 def draw_csv(rng):
-    """A random scene on the rig of the paper, rounded to what the file holds."""
+    """A random scene on the paper's rig, rounded to six digits."""
 
     def pair():
         mu_k = rng.uniform(0.02, 0.4) * grip
         return mu_k + rng.choice([0.0, rng.uniform(0.0, 0.4)], p=[0.1, 0.9]) * grip, mu_k
 
-    # Some on ice, where the body revolves; some so rough that they can jam.
+    # Some scenes almost without friction, so that the body revolves; some so rough that it can jam.
     grip = rng.choice([0.1, 1.0, 3.0], p=[0.15, 0.8, 0.05])
     rough, rest = pair(), pair()
     scene = {
@@ -464,7 +465,7 @@ def draw_csv(rng):
 
 
 def from_csv(values):
-    """The scene of a line of the file."""
+    """Scene of a row of the file."""
     number = {name: float(values[name]) for name in CSV_SCENE[1:]}
     paths = RIG | {
         "friction.alpha": number["alpha"],
@@ -484,7 +485,7 @@ def from_csv(values):
 
 
 def write_csv(path):
-    """Write the 500 scenes and what the reference finds."""
+    """Write the 500 scenes and the answers of the reference."""
     rng = np.random.default_rng(CSV_SEED)
     with open(path, "w", newline="") as file:
         writer = csv.DictWriter(file, CSV_SCENE + CSV_OUTCOME, lineterminator="\n")

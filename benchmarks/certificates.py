@@ -1,14 +1,14 @@
-"""What a certificate costs: a run, the run that is its witness, and the law that it must obey.
+"""The cost of a certificate: a run, a second run at a looser tolerance, and the check of the law.
 
     python -m benchmarks.certificates            # a minute, most of it compilation
     python -m benchmarks.certificates --quick    # fewer cells and rounds
 
-The map of `configs/regime_map.yaml` under its own law and under the law that it tends to, on one core, warm. A run, a
-run that is held to its law, and a run at the looser tolerance take turns within rounds; ratios are medians of those
-within the rounds. With each time comes the error that it buys: the largest of the angle at the end, against a run at a
-tolerance a thousand times tighter.
+Runs the map of `configs/regime_map.yaml` under its own law and under stiction, its limit, on one core, compiled
+before. Three runs alternate within each round: a run, a run with the check of the law, and a run at the looser
+tolerance. Ratios are medians of the ratios within the rounds. The table also gives the largest error of the angle at
+the end, against a run at a tolerance a thousand times tighter.
 
-Writes `certificates.md` to `benchmarks/results/`; `--quick`, to the current folder.
+Writes `certificates.md` to `benchmarks/results/`, or to the current folder with `--quick`.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ HEADER = ["law", "", "us per run", "largest error, rad", "bound, median, rad", "
 
 
 def measure(law: str, side: int, rounds: int) -> list[str]:
-    """A row of the table."""
+    """Row of the table for one law."""
     friction, method = LAWS[law]
     amplitudes, half_angles = map(list, zip(*family(side), strict=True))
     points = {"drive.amplitude": amplitudes, "zone.half_angle": half_angles}
     made = config.load({"scene": ring(friction), "sweep": {"points": points}})
-    prepared = batch(made.scene.structure, cells.cells(made.scene, made.axes, np.arange(side * side)))
+    prepared = batch(made.scene.structure, cells.values_of_cells(made.scene, made.axes, np.arange(side * side)))
     width, looser = len(NAMES), replace(method, rtol=method.rtol * FACTOR)
     calls = {
         "run": lambda: method.integrate(prepared, width, audit=False),

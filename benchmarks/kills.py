@@ -1,12 +1,13 @@
-"""A sweep that is killed over and over, and goes on each time: is its file that of a sweep never stopped?
+"""Kill a sweep many times, continue it each time, and compare its file with the file of a sweep that never stopped.
 
     python -m benchmarks.kills            # two minutes
     python -m benchmarks.kills --quick    # fewer kills
 
-`ringsweep run` is killed (SIGKILL: no handler, no clean-up) at random: after so many seconds, or at the n-th time that
-it flushes a task, is about to rename one, has just renamed one, writes a chunk of the final file or reads one back.
-After each kill the same command is given again; when it ends, its file is compared, bit for bit in all variables,
-with that of a run never stopped, and the sweep begins anew until there have been enough kills.
+`ringsweep run` is killed (SIGKILL: no handler, no clean-up) at a random time, or at a random pass of one of these
+points: it flushes a task file, is about to rename a task file, has just renamed one, writes a chunk of the final
+file, reads the final file back, or cleans up. After each kill the same command runs again. When it ends, its file is
+compared, bit for bit in all variables, with the file of a run that was never stopped. Then the sweep starts again,
+until there have been enough kills.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ SEED = 20241121
 
 
 def _before(owner: Any, name: str, die: Callable[[], None]) -> None:
-    """Let a function of a module or class die when it is called."""
+    """Call `die` whenever a function of a module or class is called."""
     function = getattr(owner, name)
 
     def dying(*args: Any, **kwargs: Any) -> Any:
@@ -46,7 +47,7 @@ def _before(owner: Any, name: str, die: Callable[[], None]) -> None:
 
 
 def _after(owner: Any, name: str, die: Callable[[], None]) -> None:
-    """Let a function of a module or class die when it has done its work."""
+    """Call `die` whenever a function of a module or class has returned."""
     function = getattr(owner, name)
 
     def dying(*args: Any, **kwargs: Any) -> Any:
@@ -58,9 +59,9 @@ def _after(owner: Any, name: str, die: Callable[[], None]) -> None:
 
 
 def _points() -> dict[str, Callable[[Callable[[], None]], None]]:
-    """Where a run can be made to die, by name."""
+    """Points at which a run can be killed, by name; each value installs the kill."""
     from ringsweep.storage import netcdf
-    from ringsweep.storage.partial import Partial
+    from ringsweep.storage.checkpoint import Checkpoint
 
     return {
         "flush": lambda die: _before(os, "fsync", die),
@@ -68,16 +69,16 @@ def _points() -> dict[str, Callable[[Callable[[], None]], None]]:
         "after a rename": lambda die: _after(Path, "replace", die),
         "merge": lambda die: _before(netcdf.zlib, "crc32", die),
         "read back": lambda die: _before(netcdf, "_checksums", die),
-        "clean-up": lambda die: _before(Partial, "clear", die),
+        "clean-up": lambda die: _before(Checkpoint, "clear", die),
     }
 
 
-#: How often a point may be passed before the run dies there, at most.
+#: Largest number of passes of each point before the run is killed there.
 POINTS = {"flush": 12, "before a rename": 12, "after a rename": 12, "merge": 60, "read back": 1, "clean-up": 1}
 
 
 def child(point: str, count: int, arguments: list[str]) -> int:
-    """Run the command line and die at the `count`-th pass of a point."""
+    """Run the command line in this process and kill it at the `count`-th pass of a point."""
     from ringsweep.cli import main
 
     left = count
@@ -85,7 +86,7 @@ def child(point: str, count: int, arguments: list[str]) -> int:
 
     def die() -> None:
         nonlocal left
-        # Numba's cache is written in the threads that compile.
+        # Numba writes its cache in other threads, which pass the same points.
         if threading.get_ident() == own:
             left -= 1
             if not left:
@@ -96,13 +97,13 @@ def child(point: str, count: int, arguments: list[str]) -> int:
 
 
 def killed_at(point: str, count: int, arguments: list[str], **options: Any) -> subprocess.CompletedProcess[str]:
-    """Run the command line in a process that dies at the `count`-th pass of a point."""
+    """Run the command line in a new process, which is killed at the `count`-th pass of a point."""
     command = [sys.executable, "-m", "benchmarks.kills", "--child", point, str(count), *arguments]
     return subprocess.run(command, capture_output=True, text=True, check=False, **options)
 
 
 def killed_after(seconds: float, arguments: list[str]) -> int:
-    """Run the command line in a process that dies after so many seconds; returns its status."""
+    """Run the command line in a new process, kill it after some seconds, and return its exit status."""
     process = subprocess.Popen(
         [sys.executable, "-m", "ringsweep", *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )
@@ -114,7 +115,7 @@ def killed_after(seconds: float, arguments: list[str]) -> int:
 
 
 def same_bits(one: Path, other: Path) -> bool:
-    """Whether all variables of two files are the same, bit for bit."""
+    """Whether all variables of two files are equal, bit for bit."""
     with xr.open_dataset(one, decode_times=False) as a, xr.open_dataset(other, decode_times=False) as b:
         return list(a.variables) == list(b.variables) and all(
             a[name].dtype == b[name].dtype and a[name].values.tobytes() == b[name].values.tobytes()
@@ -123,7 +124,7 @@ def same_bits(one: Path, other: Path) -> bool:
 
 
 def main() -> None:
-    """Kill, go on, compare, print."""
+    """Kill, continue, compare, print."""
     if "--child" in sys.argv:
         point, count, *arguments = sys.argv[sys.argv.index("--child") + 1 :]
         sys.exit(child(point, int(count), arguments))
@@ -156,19 +157,19 @@ def main() -> None:
             if status == -signal.SIGKILL:
                 kills[point] += 1
             elif status != 0:
-                sys.exit(f"a run ended with status {status} ({point})")
+                sys.exit(f"a run failed with exit status {status} (to be killed at: {point})")
             if target.exists():
                 ends["the same" if same_bits(reference, target) else "different"] += 1
                 left = sorted(path.name for path in folder.iterdir() if path.name.startswith("out"))
-                print(f"{kills.total():3d} kills, last: {point}; the file is there; in the folder: {', '.join(left)}")
+                print(
+                    f"{kills.total():3d} kills, last: {point}; the file is complete; in the folder: {', '.join(left)}"
+                )
                 if status == 0:
                     target.unlink()
                     shutil.rmtree(folder / "out.nc.partial", ignore_errors=True)
         heading(f"{kills.total()} kills of a sweep of 300 x 300 cells")
         table(["killed", "times"], [[point, str(count)] for point, count in sorted(kills.items())])
-        print(
-            f"\nfinal files the same as that of a run never stopped: {ends['the same']}, different: {ends['different']}"
-        )
+        print(f"\nfiles equal to the file of a run never stopped: {ends['the same']}, different: {ends['different']}")
 
 
 if __name__ == "__main__":

@@ -1,18 +1,19 @@
-"""What a second core is worth: throughput of the sweep engine with one job and with two.
+"""The gain of a second core: throughput of a sweep with one job and with two.
 
     python -m benchmarks.scaling            # about three minutes
     python -m benchmarks.scaling --quick    # fewer cells and rounds
 
-Grids of the ring of the paper's Fig. 29, under a law that the method takes. On the *even* one all cells are nearly
-alike. On the *uneven* one cells that separate early stand beside cells that run to the end, and those that cost most
-come last, where a core that has nothing left to do would wait for the other. Both counts of jobs run in turn within
-rounds, forwards and backwards, and a ratio is the median of those within the rounds. What the machine itself gives is
-measured in the same way: two processes of plain arithmetic against one. What the sweep engine would make of two cores
-of its
-own follows from CPU seconds, which other work on the machine does not lengthen: its tasks, as they are and in the order
-that they are in, dealt to two cores, and all that is done outside of them by one.
+The grids are over the ring of the paper's Fig. 29, under a law that the method handles. On the *even* grid all cells
+are nearly alike. On the *uneven* grid some cells separate early and some run to the end, and the most expensive cells
+come last, where an idle core would have to wait for the other.
 
-Writes `scaling.md` to `benchmarks/results/`; `--quick`, to the current folder.
+One job and two jobs run in turn within each round, forwards and backwards. A ratio is the median of the ratios within
+the rounds. The same method measures what the machine itself gives: two processes of plain arithmetic against one.
+
+CPU seconds do not grow with other load on the machine. They tell what two free cores would give: the tasks, in their
+order, are assigned to two cores, and everything outside the tasks is done by one core.
+
+Writes `scaling.md` to `benchmarks/results/`, or to the current folder with `--quick`.
 """
 
 from __future__ import annotations
@@ -32,11 +33,11 @@ import numpy as np
 
 from benchmarks._common import PAPER_STEPS, alternate, bare, configure, family, heading, machine, markdown, ring, table
 from ringsweep.runs import sweep
-from ringsweep.runs.cells import ComputeCells
+from ringsweep.runs.cells import compute_task
 
 RESULTS = Path(__file__).parent / "results"
 TARGET = 1.9
-#: What the machine must give for the target to say something about the sweep engine.
+#: Least ratio of plain arithmetic at which a missed target says something about the sweep.
 FREE = 1.95
 
 SMOOTH, STIFF = ({"law": "bengisu-akay", "alpha": alpha, "v0": v0} for alpha, v0 in ((100.0, 0.2), (1e5, 2e-6)))
@@ -56,7 +57,7 @@ def even(method: str, cells: int) -> Any:
 
 
 def uneven(method: str, cells: int) -> Any:
-    """Configuration of a grid of the whole family whose dearest cells come last."""
+    """Configuration of the whole family of cells, the most expensive cells last."""
     law, options = METHODS[method]
     amplitudes, half_angles = map(np.array, zip(*family(round(cells**0.5)), strict=True))
     points = {"drive.amplitude": amplitudes.tolist(), "zone.half_angle": half_angles.tolist()}
@@ -67,7 +68,7 @@ def uneven(method: str, cells: int) -> Any:
 
 
 def spin(count: int) -> float:
-    """Plain arithmetic, so much of it."""
+    """Do `count` steps of plain arithmetic."""
     total = 0.0
     for k in range(count):
         total += k * 0.5
@@ -75,7 +76,7 @@ def spin(count: int) -> float:
 
 
 def what_the_machine_gives(rounds: int, count: int = 5_000_000) -> float:
-    """How much more two processes do than one, of work that shares nothing."""
+    """Speed of two processes that share nothing over the speed of one."""
     with multiprocessing.get_context("spawn").Pool(2) as pool:
         pool.map(spin, [1000] * 4)
         runs = {jobs: partial(pool.map, spin, [count * 2 // jobs] * jobs, 1) for jobs in (1, 2)}
@@ -85,22 +86,21 @@ def what_the_machine_gives(rounds: int, count: int = 5_000_000) -> float:
 
 @contextmanager
 def timed_tasks() -> Iterator[list[float]]:
-    """CPU seconds of every task of the sweep engine, in the order in which they end."""
+    """List that collects the CPU seconds of every task of a sweep, in the order in which tasks end."""
     seconds: list[float] = []
-    compute = ComputeCells.__call__
 
     def timed(*args: Any) -> Any:
         begin = time.thread_time()
-        result = compute(*args)
+        result = compute_task(*args)
         seconds.append(time.thread_time() - begin)
         return result
 
-    with mock.patch.object(ComputeCells, "__call__", timed):
+    with mock.patch.object(sweep, "compute_task", timed):
         yield seconds
 
 
 def on_free_cores(configuration: Any) -> float:
-    """How much faster two cores would be than one, from CPU seconds of one run with two jobs."""
+    """Speed of two free cores over the speed of one, from the CPU seconds of one run with two jobs."""
     with timed_tasks() as tasks:
         begin = time.process_time()
         sweep.compute(configuration, jobs=2, progress=False)
@@ -146,12 +146,11 @@ def main() -> None:
     report = "# One core and two\n\n`python -m benchmarks.scaling` on\n\n"
     report += "".join(f"- {line}\n" for line in where.splitlines())
     report += f"""
-{cells} cells through the sweep engine, without certificates; medians over {rounds} rounds in which both alternate.
-*Plain
-arithmetic* is what a second process adds to work that shares nothing, measured right before and after: a machine that
-gives less than {FREE} is at work on something else, and says little about the sweep engine. *By CPU seconds* is what
-two free
-cores would give: the tasks dealt to both in their order, all else done by one.
+Sweeps of {cells} cells without certificates; medians over {rounds} rounds, in which one job and two jobs alternate.
+*Plain arithmetic* is the speed of two processes that share nothing over the speed of one, measured right before and
+after. If it is less than {FREE}, the machine was busy with something else, and the ratio says little about the sweep.
+*By CPU seconds* is the ratio that two free cores would give: the tasks assigned to both cores in their order, and
+everything else done by one core.
 
 """
     folder = Path() if quick else RESULTS

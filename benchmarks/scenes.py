@@ -1,15 +1,15 @@
-"""What each thing that a scene may hold costs: from the leanest scene to the fullest, every row adds one.
+"""The cost of each thing in a scene: from the simplest scene to the fullest, each row of the table adds one thing.
 
     python -m benchmarks.scenes            # about ten minutes, most of it compilation
     python -m benchmarks.scenes --quick    # fewer cells and rounds
 
-Each row is measured under `rk4` and under whichever of `event` and `implicit` takes its law, on one core, warm, without
-certificates, all rows in turn within rounds; a ratio is the median of those within the rounds. *Idle* pairs run the
-very same motion twice: with a thing that is there and does nothing (a drive of amplitude 0, an arc as rough as the
-rest), and without it. Compilation is measured in CPU seconds, in a process of its own for each kernel: other work on
-the machine does not count there.
+Each row is measured under `rk4`, and under `event` or `implicit`, whichever handles its law, on one core, compiled
+before, without certificates. All rows run in turn within each round. A ratio is the median of the ratios within the
+rounds. *Idle* pairs compute the same motion twice: with a thing that has no effect (a drive of amplitude 0, an arc as
+rough as the rest), and without it. Compilation is measured in CPU seconds, which do not grow with other load on the
+machine, in a new process for each kernel.
 
-Writes `scenes.md` to `benchmarks/results/`; `--quick`, to the current folder.
+Writes `scenes.md` to `benchmarks/results/`, or to the current folder with `--quick`.
 """
 
 from __future__ import annotations
@@ -44,18 +44,18 @@ from benchmarks._common import (
     one_core,
     table,
 )
-from ringsweep.physics.friction import LAWS, SET_VALUED, WITHOUT_STATIC
+from ringsweep.physics.friction import LAWS, TRAITS, SetValued, family_of
 from ringsweep.runs import sweep
 from ringsweep.solvers import automaton, rk4
 
 ROOT = Path(__file__).parent.parent
 RESULTS = Path(__file__).parent / "results"
 
-#: Functions of the C library that a kernel may call, and the feature that each speaks for.
+#: Functions of the C library that a kernel may call.
 CALLS = ("exp", "atan", "log1p", "log", "pow", "sin", "cos")
 
 
-#: What times are kept under: `rk4`, and whichever of the others takes the law.
+#: Names under which times are stored: `rk4`, and `event` or `implicit`, whichever handles the law.
 METHODS = ("rk4", "piecewise")
 
 
@@ -63,7 +63,7 @@ METHODS = ("rk4", "piecewise")
 
 
 class Rung(NamedTuple):
-    """A scene, what it is compared with, and what is swept."""
+    """A scene, the name of the scene that it is compared with, and the swept path with its limits."""
 
     scene: dict[str, Any]
     before: str | None
@@ -72,21 +72,21 @@ class Rung(NamedTuple):
 
     @property
     def piecewise(self) -> str:
-        """Which of the piecewise methods takes the law."""
-        return "event" if LAWS[self.scene["friction"]["law"]] in SET_VALUED else "implicit"
+        """`event` or `implicit`, whichever handles the law."""
+        return "event" if family_of(LAWS[self.scene["friction"]["law"]]) is SetValued else "implicit"
 
     def configuration(self, method: str, cells: int, **options: Any) -> Any:
-        """Configuration of a run over so many cells."""
+        """Configuration of a sweep over `cells` cells."""
         if method == "rk4":
             options.setdefault("steps", PAPER_STEPS)
         return configure(self.scene, {self.swept: np.linspace(*self.between, cells).tolist()}, method, **options)
 
 
 def on_ring(law: str = "coulomb", *, contacts: int = 2, drive: Any = None, arcs: int = 0, rough: Any = None) -> Any:
-    """A ring with so many contacts and arcs; `rough` are their coefficients."""
+    """Scene of a ring; `rough` holds the friction coefficients of its arcs."""
     pair = {"mu_s": 0.2, "mu_k": 0.1}
     rough = rough or {"mu_s": 0.3, "mu_k": 0.15}
-    if LAWS[law] in WITHOUT_STATIC:
+    if not TRAITS[LAWS[law]].static:
         pair, rough = {"mu_k": pair["mu_k"]}, {"mu_k": rough["mu_k"]}
     more = {"tustin": {"alpha": 100.0}, "bengisu-akay": {"alpha": 100.0, "v0": 0.2}}.get(law, {})
     body = {"mass": 0.076}
@@ -108,8 +108,8 @@ def on_ring(law: str = "coulomb", *, contacts: int = 2, drive: Any = None, arcs:
 
 
 def on_belt(law: str) -> Any:
-    """A mass on a belt."""
-    pair = {"mu_k": 0.1} if LAWS[law] in WITHOUT_STATIC else {"mu_s": 0.15, "mu_k": 0.1}
+    """Scene of a mass on a belt."""
+    pair = {"mu_k": 0.1} if not TRAITS[LAWS[law]].static else {"mu_s": 0.15, "mu_k": 0.1}
     more = {"sigma0": 1e3, "sigma1": 30.0, "sigma2": 0.1, "v_s": 1e-2} if law == "lugre" else {}
     return {
         "model": "belt",
@@ -145,7 +145,7 @@ _ALL_ALIKE = {"mu_s": 0.1, "mu_k": 0.1}
 
 
 def _level(law: str) -> dict[str, Any]:
-    """A law whose static coefficient is its kinetic one."""
+    """Scene of a ring under a law with mu_s = mu_k."""
     scene = on_ring(law, drive=_ARCTAN)
     scene["friction"]["rest"] = _ALL_ALIKE if law != "coulomb" else {"mu_k": 0.1}
     scene["zones"] = on_ring(drive=_ARCTAN, arcs=3, rough={"mu_k": 0.1})["zones"]
@@ -154,7 +154,7 @@ def _level(law: str) -> dict[str, Any]:
     return scene
 
 
-#: What is there and does nothing, beside the same motion without it: structures of the ladder, with other numbers.
+#: Scenes with a thing that has no effect, each with the scene that gives the same motion without it.
 IDLE: dict[str, tuple[Rung, Rung]] = {
     "constant drive of amplitude 0": (
         Rung(on_ring(drive=_CONSTANT | {"amplitude": 0.0}), None),
@@ -177,40 +177,40 @@ IDLE: dict[str, tuple[Rung, Rung]] = {
 }
 
 
-# ---- what a process of its own measures: each returns what JSON can hold -------------------
+# ---- measurements in a new process; each returns what JSON can hold ------------------------
 
 
 def compile_one(name: str, method: str) -> dict[str, Any]:
-    """CPU seconds and code of one kernel, of which there is nothing in the cache yet."""
+    """CPU seconds to compile one kernel that is not in the cache, and facts about its code."""
     rung = LADDER[name]
     run = bare(rung.configuration(method, 2, **({"steps": 4} if method == "rk4" else {})))
     begin = time.process_time(), time.perf_counter()
     run()
     took = time.process_time() - begin[0], time.perf_counter() - begin[1]
-    rk4_kernels = (rk4._tabulate, rk4._begin, rk4._go_on, rk4._complete)
+    rk4_kernels = (rk4._tabulate, rk4._start, rk4._advance_block, rk4._finish_at_end_of_span)
     kernels = rk4_kernels if method == "rk4" else (automaton.integrate,)
     found = {"cpu": took[0], "wall": took[1]}
     if any(kernel.stats.cache_hits for kernel in kernels[-2:]):
-        # Another scene has the very same types, and what is loaded has no text.
+        # Another scene has the same types, and a kernel loaded from the cache has no assembly text.
         return found | {"instructions": "the same", "calls": ["the same"]}
     return found | code_of("".join(kernel.inspect_asm(kernel.signatures[-1]) for kernel in kernels))
 
 
 def codes(names: Sequence[str], method: str) -> dict[str, Any]:
-    """Code of the kernels of several scenes, compiled in turn."""
+    """Facts about the code of the kernels of several scenes, compiled in turn."""
     return {name: compile_one(name, method) for name in names}
 
 
 def code_of(assembly: str) -> dict[str, Any]:
-    """How many instructions there are, and which functions of the C library they call."""
+    """Number of instructions in an assembly text, and the functions of the C library that they call."""
     instructions = re.findall(r"^\t[a-z].*", assembly, re.MULTILINE)
-    # A function may be called by name or, far away, through its address: "movabsq $exp, %rax".
+    # A function may be called by its name, or through its address: "movabsq $exp, %rax".
     named = {name for line in instructions for name in re.findall(r"[\s$](\w+)", line)}
     return {"instructions": len(instructions), "calls": [name for name in CALLS if name in named]}
 
 
 def step_times(cells: int, few: int, rounds: int) -> dict[str, Any]:
-    """Seconds of every scene under both methods in each round, and the steps taken."""
+    """Seconds of every scene under both methods in each round, and numbers of steps and runs."""
     rungs = LADDER | {f"idle: {name}": pair[0] for name, pair in IDLE.items()}
     rungs |= {f"without: {name}": pair[1] for name, pair in IDLE.items()}
     found: dict[str, Any] = {}
@@ -233,7 +233,7 @@ def step_times(cells: int, few: int, rounds: int) -> dict[str, Any]:
 
 
 def diagnostics(cells: int, rounds: int) -> float:
-    """Time of the fullest ring under `rk4` over that without its stiffness."""
+    """Time of the fullest ring under `rk4` over the time with `diagnose: false`."""
     rung = LADDER["+ stiction band (bengisu-akay)"]
     calls = {keep: bare(rung.configuration("rk4", cells, diagnose=keep)) for keep in (True, False)}
     for call in calls.values():
@@ -244,7 +244,7 @@ def diagnostics(cells: int, rounds: int) -> float:
 
 
 def memory(cells: int) -> dict[str, float]:
-    """Peak resident memory, MiB: after the import, after a small sweep, and after one of so many cells."""
+    """Peak resident memory, MiB: after the import, after a small sweep, and after a sweep of `cells` cells."""
     rung = LADDER["one contact, Coulomb, immobile uniform ring"]
 
     def peak() -> float:
@@ -261,14 +261,14 @@ def memory(cells: int) -> dict[str, float]:
 
 
 def in_child(function: Callable[..., Any], *args: Any, cache: Path) -> Any:
-    """Call a function of this module in a process of its own, with that folder for compiled code."""
+    """Call a function of this module in a new process, with a folder for compiled code."""
     code = f"import json; from benchmarks import scenes; print(json.dumps(scenes.{function.__name__}(*{args!r})))"
     done = subprocess.run([sys.executable, "-c", code], env=environment(cache), stdout=subprocess.PIPE, check=True)
     return json.loads(done.stdout.splitlines()[-1])
 
 
 def environment(cache: Path) -> dict[str, str]:
-    """That of a process which finds the package, and keeps what it compiles in a folder."""
+    """Environment of a process that finds the package and keeps compiled code in a folder."""
     found = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
     return {**os.environ, "NUMBA_CACHE_DIR": str(cache), "PYTHONPATH": found}
 
@@ -279,7 +279,7 @@ def size_of(folder: Path) -> int:
 
 
 def best_of(command: Sequence[str], rounds: int, cache: Path) -> float:
-    """Least seconds that a command takes."""
+    """Least time that a command takes, s."""
     walls = []
     for _ in range(rounds):
         begin = time.perf_counter()
@@ -290,7 +290,7 @@ def best_of(command: Sequence[str], rounds: int, cache: Path) -> float:
 
 def first_and_last(config: Path, folder: Path, cache: Path) -> tuple[float, float]:
     """Seconds until the progress bar of `ringsweep run` first moves, and until the command is done."""
-    # The bar shows itself to a terminal alone.
+    # The progress bar appears only in a terminal.
     bar, terminal = os.openpty()
     termios.tcsetwinsize(terminal, (24, 80))
     command = [sys.executable, "-m", "ringsweep", "run", str(config), "--fresh", "-o", str(folder / "map.nc")]
@@ -302,7 +302,7 @@ def first_and_last(config: Path, folder: Path, cache: Path) -> tuple[float, floa
             try:
                 said += os.read(bar, 4096)
             except OSError:
-                # So Linux tells that nobody writes any more.
+                # On Linux this error means that no process writes to the terminal any more.
                 break
             if not first and re.search(rb"[1-9]\d*/\d+ \[", said):
                 first = time.perf_counter() - begin
@@ -322,7 +322,7 @@ HEADER = [
 
 
 def ladder(found: Mapping[str, Any], compiled: Mapping[tuple[str, str], Any]) -> list[list[str]]:
-    """Lines of the table of scenes."""
+    """Rows of the table of scenes."""
     lines = []
     for name, rung in LADDER.items():
 
@@ -343,13 +343,13 @@ def ladder(found: Mapping[str, Any], compiled: Mapping[tuple[str, str], Any]) ->
 
 
 def over(found: Mapping[str, Any], name: str, other: str, method: str, per: str = "runs") -> float:
-    """Time of a scene over that of another, of a run or of a step."""
+    """Time of a scene over the time of another scene, for each run or for each step."""
     one, two = found[f"{name}, {method}"], found[f"{other}, {method}"]
     return Times(one["wall"]).ratio(Times(two["wall"])) * two[per] / one[per]
 
 
 def judge(value: float, target: float, unit: str) -> list[str]:
-    """Value, target and word of a line of the targets."""
+    """Value, target and verdict of a row in the table of targets."""
     return [f"{value:.2f}{unit}", f"{target:g}{unit}", "met" if value <= target else "MISSED"]
 
 
@@ -371,17 +371,17 @@ def main() -> None:
         shared.mkdir()
         for rung_name, rung in LADDER.items():
             for method in ("rk4", rung.piecewise):
-                # One folder serves all: what a scene shares with one before costs nothing.
+                # One cache for all scenes: code that a scene shares with an earlier scene is not compiled again.
                 before = size_of(shared)
                 one = in_child(compile_one, rung_name, method, cache=shared)
                 compiled[rung_name, method] = one | {"cache": size_of(shared) - before}
                 print(f"{rung_name}, {method}: compiled in {one['cpu']:.1f} s ({one['wall']:.1f} s)", flush=True)
 
         found = in_child(step_times, cells, few, rounds, cache=shared)
-        sections.append(("From the leanest scene to the fullest", HEADER, ladder(found, compiled)))
+        sections.append(("From the simplest scene to the fullest", HEADER, ladder(found, compiled)))
         idle = [[thing, *(f"{over(found, f'idle: {thing}', f'without: {thing}', method):.2f}" for method in METHODS)]
                 for thing in IDLE]  # fmt: skip
-        sections.append(("There, and idle: time over that without it", ["", "rk4", "event"], idle))
+        sections.append(("Things without effect: time with the thing over time without it", ["", "rk4", "event"], idle))
         kept = in_child(diagnostics, cells, rounds, cache=shared)
 
         python = [sys.executable, "-c"]
@@ -395,27 +395,28 @@ def main() -> None:
         cold = first_and_last(config, folder, cache)
         print(f"cold: {cold[0]:.1f} s, {cold[1]:.1f} s", flush=True)
         warm = min(first_and_last(config, folder, cache) for _ in range(3))
-        idle.append(["stiffness kept, over `diagnose: false`", f"{kept:.2f}", "-"])
+        idle.append(["stiffness recorded, over `diagnose: false`", f"{kept:.2f}", "-"])
+        command = "`ringsweep run configs/regime_map.yaml`"
         sections.append(("Start and memory", ["", ""], [
             ["python alone", f"{bare_start:.2f} s"],
             ["`import ringsweep`", f"{imported:.2f} s"],
-            ["`import ringsweep.runs.sweep`, Numba and xarray with it", f"{everything:.2f} s"],
+            ["`import ringsweep.runs.sweep`, with Numba and xarray", f"{everything:.2f} s"],
             ["`ringsweep --help`", f"{helped:.2f} s"],
-            ["`ringsweep run configs/regime_map.yaml`, cold: first cells, all", f"{cold[0]:.1f} s, {cold[1]:.1f} s"],
-            ["the same, warm", f"{warm[0]:.1f} s, {warm[1]:.1f} s"],
-            ["its cache", f"{size_of(cache) / 1024:.0f} KiB"],
+            [f"{command}, cold: time to the first cells, total", f"{cold[0]:.1f} s, {cold[1]:.1f} s"],
+            [f"{command}, warm: time to the first cells, total", f"{warm[0]:.1f} s, {warm[1]:.1f} s"],
+            ["size of its cache", f"{size_of(cache) / 1024:.0f} KiB"],
             ["peak memory after the import", f"{peaks['imported']:.0f} MiB"],
-            ["after a sweep of 64 cells", f"{peaks['small']:.0f} MiB"],
-            [f"more for {many} cells", f"{peaks['large'] - peaks['small']:.0f} MiB"],
+            ["peak memory after a sweep of 64 cells", f"{peaks['small']:.0f} MiB"],
+            [f"additional memory for {many} cells", f"{peaks['large'] - peaks['small']:.0f} MiB"],
         ]))  # fmt: skip
         contacts = 1.0 / over(found, "+ second contact", "one contact, Coulomb, immobile uniform ring", "rk4", "steps")
         sections.append(("Targets", ["target", "measured", "at most", ""], [
             ["first result of a cold `ringsweep run`", *judge(cold[0], 20.0, " s")],
-            ["the same, warm", *judge(warm[0], 2.0, " s")],
+            ["first result of a warm `ringsweep run`", *judge(warm[0], 2.0, " s")],
             ["a step of `rk4` with one contact over one with two", *judge(contacts, 1.0, "")],
         ]))  # fmt: skip
 
-    report = "# What each thing costs\n\n`python -m benchmarks.scenes` on\n\n"
+    report = "# The cost of each thing in a scene\n\n`python -m benchmarks.scenes` on\n\n"
     report += "".join(f"- {line}\n" for line in where.splitlines()) + ABOUT
     for title, header, rows in sections:
         heading(title)
@@ -427,13 +428,13 @@ def main() -> None:
     print(f"\nscenes.md is in {target.resolve()}; {time.perf_counter() - begin:.0f} s in all")
 
 
-#: What the report says of itself.
+#: Explanation at the head of the report.
 ABOUT = f"""
-One core, warm, no certificates, T = {SPAN:g} s, {PAPER_STEPS} steps of `rk4`; x is the ratio to the row whose scene
-this one adds to. A run with more in it may also move otherwise: where it takes more or fewer steps, the ratio per step
-tells what the thing itself costs. Instructions are those of the whole kernel, its set-up and its ends included; calls
-are those to the C library, and the drive's table is made with them once for all the cells of a task. What is absent is
-not in the code: `tests/test_scenes.py` looks there.
+One core, compiled before, no certificates, T = {SPAN:g} s, {PAPER_STEPS} steps of `rk4`. x is the ratio to the row that
+this row adds something to. An addition may also change the motion: if the number of steps changes, the ratio per step
+gives the cost of the addition itself. Instructions are those of the whole kernel, with its set-up and its ends. Calls
+are calls of the C library; they make the table of the drive, once for all cells of a task. The kernel has no code for
+what a scene lacks: `tests/test_scenes.py` checks this.
 """
 
 

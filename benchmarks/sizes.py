@@ -1,13 +1,14 @@
-"""What the size of a sweep costs: cells per second, memory and disk at 1e5, 1e6 and 1e7 cells.
+"""The cost of large sweeps: cells per second, memory and disk at 1e5, 1e6 and 1e7 cells.
 
     python -m benchmarks.sizes            # a quarter of an hour
-    python -m benchmarks.sizes --quick    # without the largest
+    python -m benchmarks.sizes --quick    # without the largest sweep
 
-`ringsweep run` of a grid over five axes (drive, width of the zone, two coefficients of friction, launch) of the ring
-of the paper's Fig. 29 under stiction for 2 s, with certificates, each size in a process of its own: start, tasks,
-merge, verification and all. Memory is the greatest resident set of that process. Then one map is drawn of each file.
+Runs `ringsweep run` on a grid over five axes (drive, width of the zone, two coefficients of friction, initial angular
+velocity) of the ring of the paper's Fig. 29, under stiction, for 2 s, with certificates. Each size runs in a new
+process, measured as a whole: start, tasks, merge and verification. Memory is the greatest resident set of that
+process. Then one map is drawn from each file.
 
-Writes `sizes.md` to `benchmarks/results/`; `--quick`, to the current folder.
+Writes `sizes.md` to `benchmarks/results/`, or to the current folder with `--quick`.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ SIDES = (10, 16, 25)
 
 @dataclass(frozen=True)
 class Cost:
-    """What a process took: seconds, CPU seconds and bytes of memory."""
+    """Cost of a process: wall time (s), CPU time (s), greatest resident memory (bytes)."""
 
     wall: float
     cpu: float
@@ -41,7 +42,7 @@ class Cost:
 
 
 def configuration(side: int) -> str:
-    """YAML of a sweep of so many values along each of five axes."""
+    """YAML of a sweep with `side` values along each of five axes."""
     spans = {
         "drive.amplitude": (0.5, 10.0),
         "zone.half_angle": (0.05, 1.0),
@@ -49,7 +50,7 @@ def configuration(side: int) -> str:
         "friction.rest.mu_s": (0.11, 0.25),
         "initial.omega": (0.0, 5.0),
     }
-    # The middles of equal parts: with the ends a coarse grid would have more of the extremes than a fine one.
+    # Middles of equal intervals: with the ends, a coarse grid would have a larger share of extreme cells.
     shares = (np.arange(side) + 0.5) / side
     grid = {path: (low + (high - low) * shares).tolist() for path, (low, high) in spans.items()}
     scene = ring({"law": "stiction"}) | {"time": {"span": 2.0}}
@@ -57,7 +58,7 @@ def configuration(side: int) -> str:
 
 
 def cost(*arguments: str) -> Cost:
-    """Run the command line and take its measure."""
+    """Run the command line and measure its cost."""
     begin = time.perf_counter()
     process = subprocess.Popen([sys.executable, "-m", "ringsweep", *arguments], stdout=subprocess.DEVNULL)
     _, status, usage = os.wait4(process.pid, 0)
@@ -72,7 +73,7 @@ def cost(*arguments: str) -> Cost:
 def main() -> None:
     """Measure, print, write."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="without the largest")
+    parser.add_argument("--quick", action="store_true", help="without the largest sweep")
     quick = parser.parse_args().quick
     where = machine()
     print(where)
@@ -81,7 +82,7 @@ def main() -> None:
         folder = Path(name)
         config, target = folder / "sweep.yaml", folder / "sweep.nc"
         config.write_text(configuration(3))
-        # Twice: the first compiles.
+        # The first run compiles: the cost of the second is the cost of the start.
         start = [cost("run", str(config), "-o", str(folder / name)) for name in ("first.nc", "second.nc")][1]
         for side in SIDES[: 2 if quick else 3]:
             cells = side**5
@@ -114,8 +115,8 @@ def main() -> None:
     report = "# Size of a sweep\n\n`python -m benchmarks.sizes` on\n\n"
     report += "".join(f"- {line}\n" for line in where.splitlines())
     report += f"""
-A grid over five axes, two seconds of stiction a cell, with certificates, from start to finished file;
-{start.wall:.1f} s and {start.memory / 2**20:.0f} MiB are for a sweep of {3**5} cells; rates are of what comes on top.
+A grid over five axes, 2 s under stiction for each cell, with certificates, from start to finished file. A sweep of
+{3**5} cells takes {start.wall:.1f} s and {start.memory / 2**20:.0f} MiB; rates count only the time beyond that.
 
 """
     out = Path() if quick else RESULTS

@@ -1,20 +1,20 @@
-"""Where each solver is right, says that it is not sure, or is wrong without a word: stiff and extreme cases.
+"""Where each solver is right, wrong and not certified, or wrong and certified: stiff and extreme cases.
 
     python -m benchmarks.stability            # about five minutes
     python -m benchmarks.stability --quick    # coarser maps, the same extremes
 
 Every run is put into one of four classes against a reference:
 
-- ``right``: regime, motion and separating contact are the reference's, angle at the end and time of separation
-  within 1e-3 rad and 1e-3 s of it (on the belt: displacement within 1e-3 of the largest);
-- ``wrong_and_flagged``: not so, and not certified;
-- ``wrong_and_silent``: not so, and certified all the same;
+- ``right``: regime, motion and separating contact agree with the reference, the angle at the end to 1e-3 rad, the time
+  of separation to 1e-3 s (on the belt: the displacement to 1e-3 of the largest displacement);
+- ``wrong_and_flagged``: not right, and not certified;
+- ``wrong_and_silent``: not right, but certified;
 - ``failed``: the solver gave up and said so.
 
-Maps take the worst class of three scenes in each cell, so that none is one lucky scene. Their reference is the
-piecewise method at a tolerance five decades below its default, itself held against Runge-Kutta at a step within its
-limit and against ``benchmarks.brute_force``, which shares no code with the package. Results go to
-``benchmarks/results``: ``stability.nc``, ``stability.png`` and ``stability.md``.
+A cell of a map has the worst class of three scenes, so that no result depends on one lucky scene. The reference of
+the maps is the piecewise method at a tolerance five decades below its default. This reference is compared with
+Runge-Kutta at a step within its limit of stability, and with ``benchmarks.reference``, which shares no code with
+the package. Results go to ``benchmarks/results``: ``stability.nc``, ``stability.png`` and ``stability.md``.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ import copy
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import asin, cos, pi, radians, sqrt
+from math import asin, cos, pi, radians, sin, sqrt
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from benchmarks import brute_force
+from benchmarks import reference
 from benchmarks._common import ALPHA, BODY, GRAVITY, RADIUS, REST, ROUGH, V0, machine
 from ringsweep import config
 from ringsweep.quantities.variables import REGIMES
@@ -42,12 +42,12 @@ from ringsweep.storage import netcdf
 RESULTS = Path(__file__).parent / "results"
 SEED = 29
 
-#: How far phi_end (rad) and t_separation (s) may be off, and x_end relative to the largest displacement.
+#: Allowed error of phi_end (rad), of t_separation (s), and of x_end relative to the largest displacement.
 CLOSE = 1e-3
 
 CLASSES = ("right", "wrong_and_flagged", "wrong_and_silent", "failed")
 RIGHT, FLAGGED, SILENT, FAILED = range(4)
-#: Okabe and Ito's palette, in the order of the classes.
+#: Colours of the classes (palette of Okabe and Ito).
 COLOURS = ("#56B4E9", "#F0E442", "#D55E00", "#7F7F7F")
 
 BETA = asin(BODY["half_distance"] / (RADIUS - BODY["ball_radius"]))
@@ -59,7 +59,7 @@ ABOUT_AXIS = BODY["inertia"] + BODY["mass"] * XI * XI
 
 
 def changed(scene: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """A scene with other values by dotted path; None takes one away."""
+    """A scene with other values by dotted path; None removes a value."""
     found = copy.deepcopy(dict(scene))
     for path, value in changes.items():
         *parents, last = path.split(".")
@@ -84,7 +84,7 @@ FIG_29: dict[str, Any] = {
     "time": {"span": 10.0},
     "gravity": GRAVITY,
 }
-#: Scenes of the maps, by name. All have one structure, so that one kernel serves them.
+#: Scenes of the maps, by name. They share one structure, and so one kernel.
 SCENES: dict[str, dict[str, Any]] = {
     "fig29": FIG_29,
     "fig25": changed(FIG_29, {"drive.amplitude": 0.2, "friction.rest": {"mu_s": 0.3, "mu_k": 0.1}}),
@@ -108,7 +108,7 @@ def with_law(scene: Mapping[str, Any], law: str, **parameters: float | None) -> 
 
 
 def run(scene: Mapping[str, Any], solver: Mapping[str, Any], points: Mapping[str, Any] | None = None) -> xr.Dataset:
-    """Outcomes of one run, or of one for each of the `points`."""
+    """Outcomes of one run, or of a run for each of the `points`."""
     tree: dict[str, Any] = {"scene": copy.deepcopy(dict(scene)), "solver": dict(solver)}
     if points:
         tree["sweep"] = {"points": {path: np.asarray(column).tolist() for path, column in points.items()}}
@@ -116,9 +116,9 @@ def run(scene: Mapping[str, Any], solver: Mapping[str, Any], points: Mapping[str
 
 
 def difference(found: xr.Dataset, reference: Mapping[str, Any]) -> tuple[Any, Any]:
-    """Whether each run is another in kind than the reference, and its largest error in units of what is allowed.
+    """Whether each run differs in kind from the reference, and its largest error in units of the allowed error.
 
-    A reference may be silent about a quantity.
+    A quantity that the reference lacks is not compared.
     """
     kinds = [found[name] != reference[name] for name in ("regime", "motion", "separating_contact") if name in reference]
     errors = [np.zeros(found["regime"].shape)]
@@ -136,7 +136,7 @@ def classify(found: xr.Dataset, reference: Mapping[str, Any]) -> Any:
     kind, error = difference(found, reference)
     wrong = kind | (error > 1.0)
     classes = np.where(wrong, np.where(found["certified"] == 1, SILENT, FLAGGED), RIGHT)
-    # A failure that the reference shares is what there is to find.
+    # If the reference fails too, failure is the right answer.
     gave_up = (found["regime"] == REGIMES.index("failed")) & wrong
     return np.where(gave_up, FAILED, classes).astype(np.int8)
 
@@ -153,9 +153,9 @@ class Axis:
     values: Any
     units: str = "1"
     option: str = ""
-    """Name of the solver's option, if it is one."""
+    """Name of the option of the solver, if the axis is one."""
     paths: Callable[[Any], dict[str, Any]] | None = None
-    """What it changes in the scene."""
+    """Values by path that the axis changes in the scene."""
 
 
 @dataclass(frozen=True)
@@ -172,7 +172,7 @@ class Map:
 
 
 def axis(name: str, label: str, values: Any, units: str) -> Axis:
-    """An axis that is one path of the friction law."""
+    """An axis over one parameter of the friction law."""
     return Axis(name, label, values, units, paths=lambda column: {f"friction.{name}": column})
 
 
@@ -208,7 +208,7 @@ def maps(quick: bool) -> list[Map]:
 
 
 def cells_of(map_: Map) -> dict[str, Any]:
-    """Values by path of every cell, `y` outermost; an axis that is an option of the solver has none."""
+    """Values by path of every cell, `y` outermost; an axis over an option of the solver has no path."""
     y, x = (grid.ravel() for grid in np.meshgrid(map_.y.values, map_.x.values, indexing="ij"))
     return {
         path: column
@@ -219,7 +219,7 @@ def cells_of(map_: Map) -> dict[str, Any]:
 
 
 def settle(map_: Map, scene: Mapping[str, Any], known: dict[Any, Any]) -> tuple[xr.Dataset, xr.Dataset]:
-    """What the method makes of every cell of a map in one scene, and the reference."""
+    """Outcomes of the method, and of the reference, in every cell of a map in one scene."""
     shape = {"y": len(map_.y.values), "x": len(map_.x.values)}
     law = {"alpha": ALPHA} if map_.law == "tustin" else {"alpha": ALPHA, "v0": V0}
     scene = with_law(scene, map_.law, **law)
@@ -243,7 +243,7 @@ def settle(map_: Map, scene: Mapping[str, Any], known: dict[Any, Any]) -> tuple[
 
 
 def _grid(flat: xr.Dataset, shape: Mapping[str, int]) -> xr.Dataset:
-    """Points in a row as cells of a map."""
+    """Reshape points in a row to cells of a map."""
     sizes = tuple(shape.values())
     return xr.Dataset({name: (tuple(shape), data.values.reshape(sizes)) for name, data in flat.items()})
 
@@ -284,32 +284,26 @@ def draw_maps(quick: bool) -> tuple[xr.Dataset, list[Map]]:
 
 
 def crosscheck(quick: bool) -> list[list[str]]:
-    """The reference of the smooth maps against Runge-Kutta within its limit, and against brute force."""
+    """Compare the reference of the smooth maps with Runge-Kutta within its limit, and with brute force."""
     rng = np.random.default_rng(SEED)
     rows = []
     for name, scene in SCENES.items():
-        # Bands that a step of Runge-Kutta resolves at a bearable price, and one that only LSODA does.
+        # Bands that Runge-Kutta resolves in a reasonable number of steps, and one that only LSODA resolves.
         bands = [*10.0 ** rng.uniform(-4.0, 0.0, 1 if quick else 3), 10.0 ** rng.uniform(-9.0, -7.0)]
         for v0, alpha in zip(bands, 10.0 ** rng.uniform(0.0, 5.0, len(bands)), strict=True):
             one = changed(scene, {"friction.v0": float(v0), "friction.alpha": float(alpha)})
             ours = run(one, {"method": "implicit", "rtol": 1e-11})
-            plain = {
-                "drive": "arctan", "amplitude": one["drive"]["amplitude"], "exponent": 1.1, "center": 0.0,
-                "half_angle": one["zone"]["half_angle"], "alpha": float(alpha), "v0": float(v0),
-                **{f"{place}_{k}": one["friction"][place][f"mu_{k}"] for place in ("rough", "rest") for k in "sk"},
-                "omega": one["initial"]["omega"], "span": one["time"]["span"],
-            }  # fmt: skip
-            theirs = brute_force.resolve(plain)
+            theirs = reference.judge(one)
             kind = (REGIMES[int(ours["regime"])], REGIMES[int(ours["motion"])], int(ours["separating_contact"]))
-            same = kind == (theirs["regime"], theirs["motion"], theirs["contact"])
-            late = abs(float(ours["t_separation"]) - float(theirs["t_separation"])) if theirs["t_separation"] else 0.0
+            same = kind == theirs.kind
+            late = np.nan_to_num(abs(float(ours["t_separation"]) - theirs.numbers.get("t_separation", np.nan)))
             stiff = float(run(one, {"method": "rk4", "steps": 15000, "certify": False})["stiffness"])
             steps = int(max(1e5, 15000 * stiff / 1.0))
             off = "-"
             if steps <= 3e6:
                 fixed = run(one, {"method": "rk4", "steps": steps, "certify": False})
                 off = f"{abs(float(fixed['phi_end'] - ours['phi_end'])):.0e}"
-            rows.append([name, f"{v0:.2g}", f"{alpha:.2g}", "/".join(map(str, kind)), theirs["method"],
+            rows.append([name, f"{v0:.2g}", f"{alpha:.2g}", "/".join(map(str, kind)), theirs.state,
                          "yes" if same else "NO", f"{late:.0e}", off])  # fmt: skip
     return rows
 
@@ -319,18 +313,18 @@ def crosscheck(quick: bool) -> list[list[str]]:
 
 @dataclass(frozen=True)
 class Extreme:
-    """An extreme scene, what is expected of it, and where that comes from."""
+    """An extreme scene, its expected outcomes, and their source."""
 
     name: str
     scene: Mapping[str, Any]
     check: str = "tighter"
-    """Words for the table; ``tighter``: the same method at its tightest useful tolerance."""
+    """Source of the expected outcomes; ``tighter``: the same method at its tightest useful tolerance."""
     expected: Mapping[str, Any] = field(default_factory=dict)
-    """A closed form's outcomes; or a solver's, where there is none."""
+    """Outcomes from a closed form; if empty, a run of `solver` gives them."""
     twin: Mapping[str, Any] | None = None
-    """A scene that must end alike, if the check is a run of another."""
+    """Another scene that must have the same outcomes, if the check is a run of that scene."""
     solver: Mapping[str, Any] = field(default_factory=dict)
-    """The method that checks, if another one."""
+    """Solver of the checking run, if it is not the default."""
 
 
 def _regime(regime: str, motion: str | None = None, contact: int = 0, **more: float) -> dict[str, Any]:
@@ -343,7 +337,7 @@ def _regime(regime: str, motion: str | None = None, contact: int = 0, **more: fl
 
 
 def _pendulum(omega: float, span: float) -> float:
-    """Angle of the body as a pendulum from the bottom, by Jacobi's elliptic function."""
+    """Angle of the body, launched from the bottom as a pendulum, from Jacobi's elliptic function, rad."""
     from scipy.special import ellipj
 
     own = sqrt(BODY["mass"] * GRAVITY * XI / ABOUT_AXIS)
@@ -353,7 +347,7 @@ def _pendulum(omega: float, span: float) -> float:
 
 
 def extremes() -> list[Extreme]:
-    """The list, smooth law first; each name says what is extreme."""
+    """The extreme scenes, smooth law first; each name says what is extreme."""
     smooth, stick = FIG_29, with_law(FIG_29, "stiction")
     bare = {"friction.rough": {"mu_s": 0.0, "mu_k": 0.0}, "friction.rest": {"mu_s": 0.0, "mu_k": 0.0}}
     level = {"friction.rough": {"mu_s": 0.3, "mu_k": 0.3}, "friction.rest": {"mu_s": 0.1, "mu_k": 0.1}}
@@ -361,7 +355,7 @@ def extremes() -> list[Extreme]:
     power = {"drive.law": "power", "drive.exponent": 1.1}
     on_edge = {"initial.phi": radians(15.0) - BETA}
     tiny = {"body.inertia": 4.47e-17, "body.half_distance": 2.5e-8, "body.ball_radius": 1e-8, "ring.radius": 4.3378e-8}
-    # Friction all round at which the effective inertia vanishes (two contacts under the same coefficient).
+    # Uniform friction coefficient at which the effective inertia vanishes.
     jam = sqrt(ABOUT_AXIS * cos(BETA) / (BODY["mass"] * RADIUS * XI - ABOUT_AXIS * cos(BETA)))
     round_ = {"zone.half_angle": 0.0, "initial.omega": 10.0, "time.span": 1e-3, **still}
 
@@ -428,30 +422,42 @@ def extremes() -> list[Extreme]:
 
 
 def _breakaways(stick: Mapping[str, Any]) -> list[Extreme]:
-    """Stiction at its very bound, and a reaction that touches zero."""
+    """Stick at its limit, and a reaction that touches zero."""
     found = []
-    # The same coefficient under both contacts holds the body at rest up to this angle.
+    # With one coefficient under both contacts the body stays at rest up to this angle.
     mu = 0.2
-    repose = _root(lambda phi: brute_force.balances(phi, 0.0, mu, mu)[0], 0.0, 0.7)
+    repose = _root(lambda phi: _balances(phi, 0.0, mu, mu)[0], 0.0, 0.7)
     slope = {"zone.half_angle": 0.0, "drive.amplitude": 0.0, "friction.rest": {"mu_s": mu, "mu_k": 0.1}}
     for side, phi in (("below", repose - 1e-9), ("above", repose + 1e-9)):
         expected = _regime("resting", phi_end=phi) if side == "below" else {}
         scene = changed(stick, slope | {"initial.phi": phi})
         check = "balance of forces" if expected else "tighter"
         found.append(Extreme(f"stiction: at rest 1e-9 rad {side} the angle of repose", scene, check, expected))
-    # The launch without friction at which a reaction touches zero on the way up.
+    # Initial angular velocity, without friction, at which a reaction touches zero on the way up.
     touch = _root(_least_reaction, 1.0, 30.0)
     bare = {f"friction.{place}": {"mu_s": 0.0, "mu_k": 0.0} for place in ("rough", "rest")}
     for side, omega in (("below", touch * (1.0 - 1e-6)), ("above", touch * (1.0 + 1e-6))):
         expected = _regime("oscillatory") if side == "below" else _regime("separating", "resting", 2)
         scene = changed(stick, bare | {"drive.amplitude": 0.0, "initial.omega": omega})
-        name = f"mu = 0: launch 1e-6 {side} that at which a reaction touches zero"
+        name = f"mu = 0: launch a millionth {side} the speed at which a reaction touches zero"
         found.append(Extreme(name, scene, "energy and balances", expected))
     return found
 
 
+def _balances(phi: Any, omega: Any, K1: float, K2: float) -> tuple[Any, Any, Any]:
+    """Angular acceleration and both reactions, from the balances of momentum, in closed form."""
+    mass, sine, cosine = BODY["mass"], sin(BETA), cos(BETA)
+    lever = mass * XI * RADIUS / ABOUT_AXIS - cosine
+    a11, a12, b1 = cosine - K1 * sine, cosine + K2 * sine, mass * (GRAVITY * np.cos(phi) + XI * omega * omega)
+    a21, a22 = K1 * lever - sine, K2 * lever + sine
+    b2 = -mass * GRAVITY * np.sin(phi) * (1.0 - mass * XI * XI / ABOUT_AXIS)
+    determinant = a11 * a22 - a12 * a21
+    N1, N2 = (b1 * a22 - a12 * b2) / determinant, (a11 * b2 - a21 * b1) / determinant
+    return (RADIUS * (K1 * N1 + K2 * N2) - mass * GRAVITY * XI * np.sin(phi)) / ABOUT_AXIS, N1, N2
+
+
 def _root(falling: Callable[[float], float], low: float, high: float) -> float:
-    """Where a function falls through zero, by bisection."""
+    """Zero of a falling function, by bisection."""
     for _ in range(100):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if falling(middle) > 0.0 else (low, middle)
@@ -464,11 +470,11 @@ def _least_reaction(omega: float) -> float:
     highest = np.arccos(max(-1.0, 1.0 - omega**2 / (2.0 * own)))
     way = highest * np.sin(np.linspace(0.0, 0.5 * pi, 20_001))
     speeds = np.sqrt(np.maximum(omega**2 - 2.0 * own * (1.0 - np.cos(way)), 0.0))
-    return min(brute_force.balances(phi, speed, 0.0, 0.0)[2] for phi, speed in zip(way, speeds, strict=True))
+    return float(_balances(way, speeds, 0.0, 0.0)[2].min())
 
 
 def _belts() -> list[Extreme]:
-    """The paper's belt, and what is extreme about it."""
+    """Extreme scenes of the paper's belt."""
     belt: dict[str, Any] = {
         "model": "belt",
         "body": {"mass": 1.0},
@@ -500,7 +506,7 @@ _TIGHT = {"event": {"method": "event", "rtol": 1e-14}, "implicit": {"method": "i
 
 
 def _reference(extreme: Extreme) -> Mapping[str, Any]:
-    """What is expected of an extreme, from its closed form or from the run that checks it."""
+    """Expected outcomes of an extreme scene, from its closed form or from the checking run."""
     if extreme.expected:
         return extreme.expected
     smooth = extreme.scene["friction"]["law"] not in ("stiction", "coulomb", "tustin")
@@ -522,7 +528,7 @@ def _said(found: xr.Dataset) -> str:
 
 
 def try_extremes() -> tuple[xr.Dataset, list[list[str]]]:
-    """Every extreme under `auto` and `rk4`, as a dataset and as lines of a table."""
+    """Run every extreme scene under `auto` and `rk4`; returns a dataset and the rows of a table."""
     chosen = extremes()
     classes = np.full((len(chosen), 2), -1, dtype=np.int8)
     numbers = {name: np.full((len(chosen), 2), np.nan) for name in ("certified", "steps", "seconds", "error")}
@@ -572,7 +578,7 @@ def energy_drift(found: xr.Dataset, omega: float) -> Any:
 
 
 def drifts(quick: bool) -> tuple[xr.Dataset, list[list[str]], float]:
-    """Drift of the energy without friction and drive, for spans up to 1e4 s; the order of that of rk4 in the step."""
+    """Drift of the energy without friction and drive, for spans up to 1e4 s, and the order of the drift of rk4."""
     omega = 10.0
     spans = np.array([1e1, 1e2, 1e3] if quick else [1e1, 1e2, 1e3, 1e4])
     bare = {"friction.rough": {"mu_s": 0.0, "mu_k": 0.0}, "friction.rest": {"mu_s": 0.0, "mu_k": 0.0}}
@@ -596,7 +602,7 @@ def drifts(quick: bool) -> tuple[xr.Dataset, list[list[str]], float]:
     lines = [
         [name, *(f"{drift[i, k]:.1e} ({steps[i, k]:.2g})" for k in range(len(spans)))] for i, name in enumerate(methods)
     ]
-    # Over ten seconds the loss is small enough to be proportional to the rate of it.
+    # Over ten seconds the loss is so small that it is proportional to its rate.
     first = [list(methods).index(f"rk4, step {1.0 / n:g} s") for n in (100, 200, 400)]
     order = float(np.polyfit(np.log([0.01, 0.005, 0.0025]), np.log(np.abs(drift[first, 0])), 1)[0])
     ds = xr.Dataset(
@@ -619,7 +625,7 @@ def drifts(quick: bool) -> tuple[xr.Dataset, list[list[str]], float]:
 
 
 def picture(ds: xr.Dataset, chosen: Sequence[Map], path: Path) -> None:
-    """The six maps, worst class of the scenes in each cell."""
+    """Draw the six maps; each cell has the worst class of the scenes."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -628,7 +634,7 @@ def picture(ds: xr.Dataset, chosen: Sequence[Map], path: Path) -> None:
     from matplotlib.patches import Patch
 
     figure, axes = plt.subplots(2, 3, figsize=(13.5, 8.2), layout="constrained")
-    # The worst is to be silent about it; a failure that is admitted is less bad than that.
+    # Wrong and certified is worst, worse than a failure that the solver reports.
     badness = np.array([0, 1, 3, 2])
     for panel, map_ in zip(axes.flat, chosen, strict=True):
         classes = ds[f"{map_.name}_class"].values
@@ -655,13 +661,13 @@ def picture(ds: xr.Dataset, chosen: Sequence[Map], path: Path) -> None:
 
 
 def markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table."""
+    """A table in Markdown."""
     lines = [header, ["---"] * len(header), *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
 def counts(ds: xr.Dataset, chosen: Sequence[Map]) -> list[list[str]]:
-    """How many runs of each map fall into each class; the last column: certified beyond the limit of stability."""
+    """Rows with the number of runs of each map in each class, and of runs certified beyond the limit of stability."""
     rows = []
     for map_ in chosen:
         classes = ds[f"{map_.name}_class"].values
@@ -677,7 +683,7 @@ def counts(ds: xr.Dataset, chosen: Sequence[Map]) -> list[list[str]]:
 
 
 def main() -> None:
-    """Run what the command line asks for."""
+    """Run the benchmark and write its results."""
     parser = argparse.ArgumentParser(description="Solvers on stiff and extreme cases.")
     parser.add_argument("--quick", action="store_true", help="coarser maps: under a minute once compiled")
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder of the results (default %(default)s)")
@@ -716,7 +722,7 @@ def main() -> None:
          + f"\n\nThe loss of rk4 over 10 s falls with the power {order:.2f} of the step (theory: 5)."),
     ]  # fmt: skip
     text = "# Numerical stability\n\n" + "  \n".join(where.splitlines())
-    text += f"\n\nWrong: another regime, motion or contact, or off by more than {CLOSE:g} rad or s; see the module.\n"
+    text += f"\n\nWrong: another regime, motion or contact, or an error of more than {CLOSE:g} rad or s.\n"
     text += "".join(f"\n## {title}\n\n{body}\n" for title, body in sections)
     text += f"\n{time.perf_counter() - begin:.0f} s in all.\n"
     (arguments.out / "stability.md").write_text(text)

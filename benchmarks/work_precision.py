@@ -1,16 +1,17 @@
-"""Error against run time on four scenes: `rk4`, `event`, `implicit`, and what a specialist would use instead.
+"""Error against run time on four scenes: `rk4`, `event`, `implicit`, and other libraries (peers).
 
     python -m benchmarks.work_precision                  all, about ten minutes
     python -m benchmarks.work_precision --quick          fewer cells and settings, under two minutes
     python -m benchmarks.work_precision --scene stiff    one scene (smooth, stiff, limit, lugre); repeatable
 
-Scenes: a seeded sample of the Fig. 29 family (two-contact ring, T = 10 s) under Bengisu and Akay's law, smooth
-(alpha 100, v0 0.2) and stiff (alpha 1e5, v0 2e-6), and under its limit, stiction; and the belt under LuGre's law.
-Peers share no formula with the package; one that is not installed is skipped with a word (`pip install '.[bench]'`).
-Everything runs warm, pinned to one core, in turn within rounds, forwards and backwards; times are medians over the
-rounds and ratios medians of the ratios within them. No certificates: a peer has none.
+Scenes: a seeded sample of the Fig. 29 family (two-contact ring, T = 10 s) under Bengisu and Akay's law, smooth (alpha
+100, v0 0.2) and stiff (alpha 1e5, v0 2e-6), and under its limit, stiction; and the belt under LuGre's law. Peers
+share no formula with the package. If a peer is not installed, the benchmark says so and skips it (`pip install
+'.[bench]'`). All contenders are compiled before, pinned to one core, and run in turn within each round, forwards and
+backwards. Times are medians over the rounds, ratios are medians of the ratios within the rounds. There are no
+certificates, because peers have none.
 
-Writes `work_precision.{md,nc,png}` to `benchmarks/results/`; `--quick` or `--scene`, to the current folder.
+Writes `work_precision.{md,nc,png}` to `benchmarks/results/`, or to the current folder with `--quick` or `--scene`.
 """
 
 from __future__ import annotations
@@ -75,7 +76,7 @@ _BELT = {
 
 
 class Outcome(NamedTuple):
-    """What a method made of some cells; the regime of the package's own methods only."""
+    """Outcomes of a method in some cells; `regime` only for methods of the package."""
 
     end: Any
     separation: Any
@@ -84,18 +85,18 @@ class Outcome(NamedTuple):
 
 @dataclass(frozen=True)
 class Scene:
-    """One of the four: what its methods are given."""
+    """One of the four scenes."""
 
     title: str
     scene: dict[str, Any]
     method: str
-    """That of ours, beside `rk4`, which takes the law."""
+    """The method of the package, besides `rk4`, that handles the law."""
     law: Law | None
-    """For the peers; None on the belt."""
+    """Law for the peers; None on the belt."""
     unit: str = "rad"
 
     def cells(self, count: int) -> list[Any]:
-        """A sample of the scene: the same at every call, and a longer one begins with a shorter."""
+        """A sample of cells. Every call gives the same cells, and a longer sample starts with the shorter one."""
         if self.law is None:
             # From the slowest and the fastest inwards.
             return np.geomspace(0.05, 0.4, 8)[[0, 7, 3, 5, 1, 6, 2, 4]][:count].tolist()
@@ -104,7 +105,7 @@ class Scene:
         return [everything[k] for k in order[:count]]
 
     def configuration(self, cells: Sequence[Any], method: str, **options: Any) -> Any:
-        """Configuration of a run of our own over cells."""
+        """Configuration of a run of the package over cells."""
         if self.law is None:
             return configure(self.scene, {"belt.velocity": list(cells)}, method, **options)
         amplitudes, half_angles = (list(column) for column in zip(*cells, strict=True))
@@ -133,7 +134,7 @@ SCENES = {
 
 @dataclass(frozen=True)
 class Effort:
-    """How much to measure."""
+    """Amount of measurement."""
 
     cells: int
     few: int
@@ -142,11 +143,11 @@ class Effort:
     """Cells of the slowest."""
     rounds: int
     finest: int
-    """Decades of steps of `rk4` beyond the coarsest."""
+    """Decades of steps of `rk4` above the coarsest setting."""
     every: int
-    """One in so many of the tolerances."""
+    """Every how many of the tolerances is measured."""
     side: int
-    """Of the family whose throughput is measured."""
+    """Side of the family of cells whose throughput is measured."""
 
 
 FULL = Effort(cells=32, few=8, fewest=4, rounds=3, finest=5, every=1, side=SIDE)
@@ -155,21 +156,21 @@ QUICK = Effort(cells=4, few=2, fewest=1, rounds=2, finest=3, every=2, side=16)
 
 @dataclass(frozen=True)
 class Contender:
-    """A method at a setting. `make` prepares, compilation included, a call that runs cells."""
+    """A method at a setting. `make` compiles, and returns a function that runs cells."""
 
     method: str
     setting: str
     make: Callable[[Sequence[Any]], Callable[[], Any]]
     cells: int
     lanes: int
-    """Runs that one call makes: more than `cells` where it repeats them."""
+    """Runs in one call: more than `cells` if the call repeats cells."""
 
 
 # ---- contenders ----------------------------------------------------------------------------
 
 
 def own(scene: Scene, method: str, cells: Sequence[Any], **options: Any) -> Callable[[], Outcome]:
-    """A call of a method of the package."""
+    """Function that runs a method of the package on cells."""
     call = on_one_core(scene.configuration(cells, method, **options))
 
     def outcome() -> Outcome:
@@ -182,7 +183,7 @@ def own(scene: Scene, method: str, cells: Sequence[Any], **options: Any) -> Call
 
 
 def contenders(scene: Scene, effort: Effort) -> tuple[list[Contender], list[str]]:
-    """Those of a scene, and a word on those left out."""
+    """Contenders of a scene, and notes on those that are left out."""
     entered: list[Contender] = []
     skipped: list[str] = []
     belt = scene.law is None
@@ -207,7 +208,7 @@ def contenders(scene: Scene, effort: Effort) -> tuple[list[Contender], list[str]
     }
     for rtol in tolerances[scene.method]:
         enter(scene.method, f"rtol {rtol:.0e}", partial(own_of, scene, scene.method, rtol=rtol), everything)
-    # Each scene has the decades in which `rk4` goes from hopeless to as good as it gets.
+    # The decades in which `rk4` goes from useless to its best accuracy, which differ between scenes.
     coarsest = 1e3 if scene is SCENES["stiff"] else 1e4 if belt else 1e2
     for steps in [round(coarsest * 10**k) for k in range(effort.finest + 1)]:
         if belt and steps > 10**7:
@@ -217,41 +218,41 @@ def contenders(scene: Scene, effort: Effort) -> tuple[list[Contender], list[str]
         if scene.law is not None and scene.law.v0 > 0.0 and steps <= 10**7 and in_c.compiler():
             enter("C, rk4", f"{steps:.0e} steps", lambda c, n=steps: in_c.ring(scene.law, c, n), count)
     if not in_c.compiler():
-        skipped.append("C: there is no compiler (cc) here")
+        skipped.append("C: no compiler (cc) is installed")
 
     loose, tight = [1e-4, 1e-6, 1e-8], [1e-6, 1e-8, 1e-10]
     stiff = scene is SCENES["stiff"] or belt
     if stiff:
-        skipped.append("SciPy DOP853, diffrax Tsit5: explicit, and the scene is stiff")
+        skipped.append("SciPy DOP853, diffrax Tsit5: these methods are explicit, and the scene is stiff")
     else:
         peer("scipy", "SciPy DOP853", tight, few, "DOP853")
     peer("scipy", "SciPy LSODA", tight, few, "LSODA")
     peer("scipy", "SciPy Radau", loose[:2] if belt else loose, fewest, "Radau")
     if scene is SCENES["limit"]:
-        skipped.append("numbalsoda, diffrax: they cannot switch between pieces, as a set-valued law requires")
+        skipped.append("numbalsoda, diffrax: they cannot switch between modes, which a set-valued law requires")
     else:
         peer("numbalsoda", "numbalsoda LSODA", [1e-6, 1e-8, 1e-9, 1e-10], everything)
         method, cells = ("Kvaerno5", few) if stiff else ("Tsit5", everything)
         peer("diffrax", f"diffrax {method}", loose[: 2 if scene is SCENES["stiff"] else 3], cells, method)
     if scene is SCENES["stiff"]:
-        skipped.append("heyoka: Taylor's method is explicit; a creep would take it millions of steps")
+        skipped.append("heyoka: its Taylor method is explicit, and a creeping contact would take millions of steps")
     else:
-        # On the belt it is wrong by 1e-6 m at 1e-14 and beyond, and right at 1e-13.
+        # On the belt heyoka has an error of 1e-6 m at tolerances of 1e-14 and below, and is right at 1e-13.
         tightest = 1e-13 if belt else 1e-15
         peer("heyoka", "heyoka", [1e-3, 1e-6, 1e-9, 1e-12, tightest], few if belt else everything)
     return entered, skipped
 
 
 def own_of(scene: Scene, method: str, cells: Sequence[Any], **options: Any) -> Callable[[], Outcome]:
-    """As :func:`own`, with the compilation behind it."""
+    """As :func:`own`, compiled before."""
     call = own(scene, method, cells, **options)
-    # What is compiled depends on types alone: the longest run need not be made to warm up.
+    # Compiled code depends on types alone, so a short run is enough to compile.
     own(scene, method, cells[:1], **({"steps": 100} if method == "rk4" else options))()
     return call
 
 
 def of_peer(peer: Any, scene: Scene, *given: Any) -> Callable[[], Any]:
-    """A call of a peer, compiled behind it; the last of `given` are the cells."""
+    """Function that runs a peer, compiled before; the last of `given` are the cells."""
     *options, cells = given
 
     def prepare(chosen: Sequence[Any]) -> Callable[[], Any]:
@@ -267,22 +268,22 @@ def of_peer(peer: Any, scene: Scene, *given: Any) -> Callable[[], Any]:
 
 @dataclass(frozen=True)
 class Measured:
-    """A scene's figures: errors in a dataset, times as they were taken, words on reference and absentees."""
+    """Results of a scene: errors in a dataset, times, and notes on the reference and on absent peers."""
 
     data: xr.Dataset
     times: dict[tuple[str, str], Times]
     words: list[str]
 
     def largest(self, key: tuple[str, str]) -> float:
-        """Largest error at the end of a contender."""
+        """Largest error of a contender at the end."""
         return float(self._row(key).error_end.max())
 
     def per_run(self, key: tuple[str, str]) -> float:
-        """Seconds of a run."""
+        """Time of one run, s."""
         return float(self._row(key).time_per_run)
 
     def ratio(self, slow: tuple[str, str], fast: tuple[str, str]) -> float:
-        """How many times longer a run of the first takes: median over the rounds."""
+        """How many times longer a run of `slow` takes than a run of `fast`: median over the rounds."""
         lanes = float(self._row(fast).lanes) / float(self._row(slow).lanes)
         return self.times[slow].ratio(self.times[fast]) * lanes
 
@@ -292,7 +293,7 @@ class Measured:
 
 
 def reference(scene: Scene, cells: Sequence[Any], effort: Effort) -> tuple[Outcome, str]:
-    """The tightest run of ours, and how far a peer's tightest, which shares no formula with it, is from it."""
+    """The package's run at the tightest tolerance, and its difference from the tightest run of a peer."""
     rtol = {"event": 1e-15, "implicit": 1e-12}[scene.method]
     found = own(scene, scene.method, cells, rtol=rtol)()
     words = f"Reference: `{scene.method}` at rtol {rtol:.0e}"
@@ -340,7 +341,7 @@ def measure(scene: Scene, effort: Effort) -> Measured:
         if found.regime is not None:
             columns["regime_wrong"][row, :count] = found.regime != regime
         elif scene.law is not None:
-            # A peer tells whether the body separates, and not how it moves.
+            # A peer tells only whether the body separates, not how it moves.
             separates = np.isfinite(found.separation) != (regime == SEPARATING)
             columns["regime_wrong"][row, :count] = separates | ~np.isfinite(found.end)
     data = xr.Dataset(
@@ -366,7 +367,7 @@ HEADER = ["method", "setting", "cells", "ms per run", "error at T: median", "max
 
 
 def lines(data: xr.Dataset) -> list[list[str]]:
-    """Rows of a scene's table."""
+    """Rows of the table of a scene."""
     found = []
     for k in range(data.sizes["contender"]):
         row = data.isel(contender=k)
@@ -381,7 +382,7 @@ def lines(data: xr.Dataset) -> list[list[str]]:
 
 
 def draw(measured: dict[str, Measured]) -> Figure:
-    """Scenes down, the three errors across."""
+    """Figure with a row for each scene and a column for each of the three errors."""
     figure = Figure(figsize=(19.0, 5.2 * len(measured)), layout="constrained")
     axes = figure.subplots(len(measured), 3, squeeze=False)
     methods = list(dict.fromkeys(str(name) for found in measured.values() for name in found.data.method.values))
@@ -395,7 +396,7 @@ def draw(measured: dict[str, Measured]) -> Figure:
             second.text(0.5, 0.5, "nothing separates here", ha="center", transform=second.transAxes)
         else:
             plots.precision_panel(data, "error_separation", second)
-            # The first has it already.
+            # The first panel has the same legend.
             second.get_legend().remove()
         for method, line in styles.items():
             own_rows = data.isel(contender=data.method.values == method)
@@ -411,13 +412,13 @@ def draw(measured: dict[str, Measured]) -> Figure:
 
 
 def cheapest(found: Measured, method: str, error: float) -> tuple[str, str] | None:
-    """Fastest setting of a method whose largest error at the end is no larger than that."""
+    """Fastest setting of a method whose largest error at the end is at most `error`."""
     keys = [key for key in found.times if key[0] == method and found.largest(key) <= error]
     return min(keys, key=found.per_run, default=None)
 
 
 def against_peer(found: Measured, peer: tuple[str, str], factor: float, least: float) -> list[str]:
-    """Line of a target of the kind 'so many times faster than a peer, at its error over a factor'."""
+    """Row of a target of the form '`least` times faster than a peer, with `factor` times less error'."""
     words = f"`implicit` ≥ {least:g}x {peer[0]}, {peer[1]}"
     words += f", with {factor:g} times less error" if factor > 1.0 else ", at its error"
     if peer not in found.times:
@@ -435,7 +436,7 @@ def against_peer(found: Measured, peer: tuple[str, str], factor: float, least: f
 
 
 def throughput(effort: Effort) -> tuple[list[list[str]], list[list[str]]]:
-    """Lines of the targets about whole families, and of the runs per second on all cores."""
+    """Rows of the targets about whole families, and rows of the runs per second on all cores."""
     cells = family(effort.side)
     smooth, stiff, limit = SCENES["smooth"], SCENES["stiff"], SCENES["limit"]
     cores = joblib.cpu_count()
@@ -488,11 +489,11 @@ def throughput(effort: Effort) -> tuple[list[list[str]], list[list[str]]]:
     return targets, [[name, f"{rate:.0f}"] for name, rate in rates.items()]
 
 
-#: What the report says of itself.
+#: Explanation at the head of the report.
 ABOUT = """
-One core, warm, no certificates; medians over rounds in which contenders alternate. Errors are those of φ(T), or x(T) on
-the belt, and of the time of separation; the regime of a peer is whether the body separates. diffrax's time is that of a
-lane of a full solve.
+One core, compiled before, no certificates; medians over rounds in which contenders alternate. The table has the errors
+of φ(T), or of x(T) on the belt, and of the time of separation. The regime of a peer only says whether the body
+separates. The time of diffrax is the time of one lane of a full solve.
 
 ![error against run time](work_precision.png)
 """
@@ -507,9 +508,9 @@ def main() -> None:
     parser.add_argument("--scene", action="append", choices=SCENES, help="only this scene; repeatable")
     arguments = parser.parse_args()
     effort = QUICK if arguments.quick else FULL
-    # Read by XLA as JAX is imported, which is not before a scene asks for diffrax.
+    # XLA reads this when JAX is imported, which happens when a scene asks for diffrax.
     os.environ["XLA_FLAGS"] = "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"
-    # LSODA warns where a tolerance is loose; the table shows what came of it.
+    # LSODA warns if a tolerance is loose; the table shows the resulting error.
     warnings.filterwarnings("ignore", message="lsoda", category=UserWarning)
     begin = time.perf_counter()
 
@@ -529,7 +530,7 @@ def main() -> None:
             print(f"({time.perf_counter() - begin:.0f} s so far)")
             report += f"\n## {SCENES[name].title}\n\n" + "".join(f"- {words}\n" for words in found.words)
             report += "\n" + markdown(HEADER, lines(found.data))
-            # Scene by scene: what an interrupted run has measured is there.
+            # Written after each scene, so that an interrupted run keeps its results.
             write(folder, report, measured, where)
     targets = []
     if "smooth" in measured:
@@ -553,7 +554,7 @@ def main() -> None:
 
 
 def write(folder: Path, report: str, measured: dict[str, Measured], where: str) -> None:
-    """Write the report, the figures in groups named after the scenes, and the picture."""
+    """Write the report, the numbers (one NetCDF group for each scene) and the picture."""
     (folder / "work_precision.md").write_text(report)
     for k, (name, found) in enumerate(measured.items()):
         found.data.attrs["machine"] = where

@@ -1,4 +1,4 @@
-"""The API reference as HTML, from the docstrings: `python docs/api.py [FOLDER]`, after `pip install '.[docs]'`."""
+"""Build the API reference as HTML from the docstrings: `python docs/api.py [FOLDER]`, after `pip install '.[docs]'`."""
 
 import sys
 import warnings
@@ -8,20 +8,20 @@ import pdoc
 
 import ringsweep
 
-# Reference pages for what users call; the rest is for those who read the code.
+# Modules with public names.
 MODULES = ("ringsweep", "ringsweep.plots", "ringsweep.quantities.variables")
 
 
 def build(folder: Path) -> None:
-    """Write the pages; whatever is amiss in a docstring is an error."""
+    """Write the pages to a folder; a warning about a docstring is an error."""
     for module in (ringsweep, ringsweep.plots):
         for name in module.__all__:
-            # They are imported when first asked for, and pdoc does not ask.
+            # Public names are imported on first access, and pdoc does not access them.
             setattr(module, name, getattr(module, name))
     pdoc.render.configure(docformat="numpy", math=True, search=False)
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)
-        # In a clone there is a folder of the same name: the installed package is the one that is meant.
+        # In a clone a folder has the name of the package. pdoc takes the installed package, and warns of the folder.
         warnings.filterwarnings("ignore", "'ringsweep' may refer to", RuntimeWarning)
         pdoc.pdoc(*MODULES, output_directory=folder)
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 __all__ = ["InputError", "precision", "run", "simulate", "sweep", "words"]
 
-_HOMES = {
+_MODULES = {
     "run": "runs.sweep",
     "sweep": "runs.sweep",
     "simulate": "runs.simulate",
@@ -25,15 +25,15 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
-    # Compilers and plotting are slow to import; `--help` and a misspelt key should not wait for them.
+    # Numba and Matplotlib are slow to import: `ringsweep --help` and errors in the input should not wait for them.
     if name == "__version__":
         from importlib.metadata import version
 
         return version("ringsweep")
     if name == "plots":
         return import_module("ringsweep.plots")
-    if name in _HOMES:
-        return getattr(import_module(f"ringsweep.{_HOMES[name]}"), name)
+    if name in _MODULES:
+        return getattr(import_module(f"ringsweep.{_MODULES[name]}"), name)
     raise AttributeError(f"module 'ringsweep' has no attribute {name!r}")
 
 

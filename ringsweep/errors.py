@@ -1,19 +1,19 @@
-"""Errors that a user can cause and mend."""
+"""Errors in the input of a user."""
 
 from __future__ import annotations
 
 
 class InputError(ValueError):
-    """Something in the input is wrong: what, where, and what would be right.
+    """Something in the input is wrong: it says where, what, and what is allowed.
 
     Parameters
     ----------
     path : str
         Dotted path in the configuration (``scene.body.mass``), or the name of an argument or file.
     problem : str
-        What is wrong and what is allowed, with the value.
+        The wrong value and what is allowed.
     file, line : str, int, optional
-        Where it stands, if it came from a file.
+        File and line of the wrong value, if it came from a file.
 
     Examples
     --------
@@ -33,7 +33,7 @@ class InputError(ValueError):
         super().__init__(path, problem)
 
     def __str__(self) -> str:
-        place = ""
+        location = ""
         if self.file is not None:
-            place = f"{self.file}, line {self.line}: " if self.line is not None else f"{self.file}: "
-        return f"{place}{self.path}: {self.problem}" if self.path else f"{place}{self.problem}"
+            location = f"{self.file}, line {self.line}: " if self.line is not None else f"{self.file}: "
+        return f"{location}{self.path}: {self.problem}" if self.path else f"{location}{self.problem}"

@@ -1,6 +1,6 @@
-"""500 random scenes over nine decades of v0 and seven of alpha, each settled by brute force beforehand.
+"""500 random scenes over nine decades of v0 and seven of alpha, compared with brute force.
 
-The file holds what ``benchmarks/brute_force.py`` found, with nothing of the package.
+``benchmarks/brute_force.py --csv`` computed the file ``data/brute_force.csv`` without anything of the package.
 """
 
 import csv
@@ -40,28 +40,28 @@ def column(rows, name):
 
 @pytest.fixture(scope="module", params=["arctan", "power"])
 def both(request, scenes, cells):
-    """Scenes of one drive, and what `auto` makes of them in one batch."""
+    """Scenes of one drive, and the outcomes of `auto` for them, in one batch."""
     rows = [row for row in scenes if row["drive"] == request.param]
     paths = PATHS | ({"exponent": "drive.exponent"} if request.param == "power" else {})
     batch = cells({path: column(rows, name) for name, path in paths.items()}, drive=request.param)
     return rows, solve(Auto(), batch)
 
 
-def test_scenes_cover_what_they_should(scenes):
+def test_scenes_cover_all_regimes_and_the_ranges_of_v0_and_alpha(scenes):
     assert len(scenes) == 500
     assert {row["regime"] for row in scenes} == {"resting", "oscillatory", "revolving", "separating", "jammed"}
     v0, alpha = column(scenes, "v0"), column(scenes, "alpha")
     assert (v0.min() < 2e-9, v0.max() > 0.5, alpha.min() < 2, alpha.max() > 5e6) == (True,) * 4
-    # Brute force is sure of itself: its own two resolutions agree, and no contact that held was close to lost.
+    # Brute force is clear about each scene: its runs agree, and no contact that held came close to separation.
     assert all(row["agrees"] == "1" for row in scenes)
     assert np.nanmin(column(scenes, "normal_min")) > 1e-4
 
 
-def test_nearly_all_are_certified(both):
+def test_at_least_98_percent_of_the_scenes_are_certified(both):
     assert both[1].certified.mean() >= 0.98
 
 
-def test_every_certified_one_is_right(both):
+def test_every_certified_scene_has_the_kind_of_brute_force(both):
     rows, found = both
     wrong = []
     for i in np.flatnonzero(found.certified):
@@ -71,8 +71,8 @@ def test_every_certified_one_is_right(both):
     assert wrong == []
 
 
-def test_separations_are_where_brute_force_finds_them(both):
-    """To the few microseconds that its steps leave open."""
+def test_times_of_separation_agree_with_brute_force(both):
+    """The steps of brute force leave an error of a few microseconds."""
     rows, found = both
     error = abs(found.t_separation - column(rows, "t_separation"))
     assert np.isfinite(error).sum() > 60

@@ -1,4 +1,4 @@
-"""Configurations: what is read, and what is said where it is wrong."""
+"""Reading of configurations, and the messages about errors in them."""
 
 import contextlib
 import copy
@@ -15,13 +15,18 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
+import ringsweep
 from ringsweep.config import load, read_axes, read_scene, with_values
 from ringsweep.config import scene as scenes
-from ringsweep.config.schema import schema
+from ringsweep.config.axes import _read_spacing
+from ringsweep.config.schema import _number, schema
 from ringsweep.config.solver import read_solver
 from ringsweep.errors import InputError
-from ringsweep.quantities.parameters import Parameter
+from ringsweep.quantities.parameters import Parameter, declared
+from ringsweep.quantities.quantity import cf_units
 from ringsweep.quantities.units import quantity
+from ringsweep.quantities.variables import Variable
+from ringsweep.solvers.rk4 import RK4
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 
@@ -68,7 +73,7 @@ SOLVER = {"method": "rk4", "steps": 1000}
 
 
 def edited(**changes):
-    """The scene with paths (dots as double underscores) replaced; None takes a key away."""
+    """The scene with some paths (double underscores for dots) replaced; None removes a key."""
     scene = copy.deepcopy(SCENE)
     for path, value in changes.items():
         *parents, last = path.split("__")
@@ -99,7 +104,7 @@ def refusal(call, *arguments, **options):
     return caught.value
 
 
-def test_the_example_of_the_contract_is_read_in_si_units(write):
+def test_example_configuration_is_read_in_si_units(write):
     config = load(write(TEXT))
     assert config.name == "case"
     assert config.scene.values["body.inertia"] == pytest.approx(4.47e-5)
@@ -114,7 +119,7 @@ def test_the_example_of_the_contract_is_read_in_si_units(write):
     np.testing.assert_allclose(values, [math.radians(2), 0.5])
 
 
-def test_the_source_of_a_configuration_is_json_and_reads_the_same(write):
+def test_source_of_a_configuration_is_json_and_reads_the_same(write):
     config = load(write(TEXT))
     again = load(json.loads(json.dumps(config.source)))
     assert again.scene.values == config.scene.values
@@ -163,7 +168,7 @@ def test_units_are_converted(text, unit, expected):
         ([1], "m", "is not a number"),
     ],
 )
-def test_what_is_no_quantity_of_the_unit_is_refused(text, unit, problem):
+def test_value_without_a_number_or_with_a_wrong_unit_is_refused(text, unit, problem):
     assert problem in refusal(quantity, text, Parameter(unit, "something"), "path").problem
 
 
@@ -201,7 +206,7 @@ BAD_LINES = {
 
 
 @pytest.mark.parametrize(("old", "new", "path", "line", "problem"), BAD_LINES.values(), ids=BAD_LINES)
-def test_wrong_input_is_refused_with_path_line_and_remedy(write, old, new, path, line, problem):
+def test_error_in_a_configuration_names_path_line_and_remedy(write, old, new, path, line, problem):
     assert TEXT.count(old) == 1 or old in ("15 deg", "[0.1, 10, 5]")
     file = write(TEXT.replace(old, new))
     error = refusal(load, file)
@@ -209,7 +214,7 @@ def test_wrong_input_is_refused_with_path_line_and_remedy(write, old, new, path,
     assert problem in error.problem
 
 
-def test_values_that_contradict_each_other_only_in_some_cell_are_refused(write):
+def test_contradiction_in_a_single_cell_of_the_sweep_is_refused(write):
     file = write(TEXT.replace("drive.amplitude: {geomspace: [0.1, 10, 5]}", "friction.rough.mu_s: [0.5, 0.6, 0.25]"))
     error = refusal(load, file)
     assert error.path == "scene.friction.rough.mu_k"
@@ -217,7 +222,7 @@ def test_values_that_contradict_each_other_only_in_some_cell_are_refused(write):
     assert "in a cell of the sweep" in error.problem
 
 
-def test_a_contradiction_in_a_swept_value_points_at_the_axis(write):
+def test_contradiction_in_a_swept_value_names_the_line_of_its_axis(write):
     file = write(TEXT.replace("drive.amplitude: {geomspace: [0.1, 10, 5]}", "ring.radius: [30 mm, 50 mm]"))
     error = refusal(load, file)
     assert (error.path, error.line) == ("scene.ring.radius", 20)
@@ -255,11 +260,11 @@ def test_text_that_is_no_configuration_is_refused(tmp_path, content, problem):
 
 
 @pytest.mark.parametrize("name", ["nowhere.yaml", ".", "nul\0.yaml"])
-def test_what_cannot_be_read_is_refused(tmp_path, name):
+def test_file_that_cannot_be_read_is_refused(tmp_path, name):
     assert "cannot be read" in refusal(load, f"{tmp_path}/{name}").problem
 
 
-def test_a_value_may_be_left_to_the_sweep_but_not_to_a_single_run(write):
+def test_swept_value_may_be_missing_from_the_scene_but_not_in_a_single_run(write):
     file = write(TEXT.replace("    amplitude: 2.0\n", ""))
     assert "drive.amplitude" not in load(file).scene.values
     assert "--set drive.amplitude=VALUE" in refusal(with_values, file).problem
@@ -286,12 +291,12 @@ def test_settings_change_scene_and_solver_and_drop_the_sweep(write):
         ("scene=1", "a section with keys"),
     ],
 )
-def test_a_wrong_setting_is_refused_by_its_own_text(write, setting, problem):
+def test_wrong_setting_is_refused(write, setting, problem):
     assert problem in str(refusal(with_values, write(TEXT), [setting]))
 
 
-def test_values_of_another_law_are_dropped_with_a_warning_each(caplog):
-    scenes.tell_of_unused.cache_clear()
+def test_each_unused_parameter_of_another_law_gives_one_warning(caplog):
+    scenes.warn_of_unused.cache_clear()
     with caplog.at_level(logging.WARNING, logger="ringsweep"):
         scene = read_scene(edited(friction__law="coulomb"))
         assert read_scene(edited(friction__law="coulomb")).values == scene.values
@@ -305,7 +310,7 @@ def test_values_of_another_law_are_dropped_with_a_warning_each(caplog):
     assert "friction.rest.mu_k" in refusal(read_axes, scene, {"friction.rest.mu_s": [0.1]}).problem
 
 
-def test_several_arcs_stand_in_place_of_one_zone():
+def test_list_of_arcs_replaces_the_single_zone():
     arcs = [{"center": f"{i} deg", "half_angle": "0.5 deg", "mu_s": 0.5, "mu_k": 0.3} for i in range(0, 200, 2)]
     scene = read_scene(edited(zone=None, friction__rough=None, zones=arcs))
     assert scene.structure.arcs == tuple(f"zones.{i}" for i in range(100))
@@ -333,13 +338,13 @@ def test_several_arcs_stand_in_place_of_one_zone():
         ({"initial__phi": {"deg": 3}}, "scene.initial.phi", "is not a number"),
     ],
 )
-def test_a_scene_that_cannot_be_is_refused(changes, path, problem):
+def test_wrong_scene_is_refused(changes, path, problem):
     error = refusal(read_scene, edited(**changes))
     assert error.path == path
     assert problem in error.problem
 
 
-def test_a_missing_drive_is_a_ring_at_rest():
+def test_scene_without_a_drive_has_a_ring_at_rest():
     assert read_scene(edited(drive=None)).structure.drive == "none"
 
 
@@ -351,7 +356,7 @@ def table(write, rows, header="t (s), theta (rad)"):
 ROWS = ["-0.1, 0", "0.1, 0.5", "", "0.2, 0.8", "0.4, 0.9"]
 
 
-def test_a_tabulated_drive_moves_into_the_configuration(write):
+def test_table_of_a_drive_replaces_its_file_name_in_the_source(write):
     scene, file = table(write, ROWS)
     first = read_scene(scene)
     file.unlink()
@@ -365,7 +370,7 @@ def test_a_tabulated_drive_moves_into_the_configuration(write):
     assert again.values["drive.amplitude"] == 1.0
 
 
-def test_units_in_the_header_of_a_table_are_heeded(write):
+def test_units_in_the_header_of_a_table_are_converted(write):
     scene, _ = table(write, ["0, 0", "100, 30", "200, 60", "400, 90"], header="time (ms), theta (deg)")
     times, angles = read_scene(scene).structure.table
     np.testing.assert_allclose(times, [0, 0.1, 0.2, 0.4])
@@ -378,14 +383,14 @@ def test_units_in_the_header_of_a_table_are_heeded(write):
         ([*ROWS, "0.3, 1"], "t, theta", 7, "does not come after"),
         (["0, 0", "0.1, x", "0.2, 0", "0.4, 0"], "t, theta", 3, "is not a number"),
         (["0, 0", "0.1, nan", "0.2, 0", "0.4, 0"], "t, theta", 3, "not finite"),
-        (["0, 0", "0.1", "0.2, 0", "0.4, 0"], "t, theta", 3, "1 cells under 2 columns"),
+        (["0, 0", "0.1", "0.2, 0", "0.4, 0"], "t, theta", 3, "1 values under 2 columns"),
         (["0.1, 0", "0.2, 0", "0.3, 0", "0.4, 0"], "t, theta", 2, "begins at 0.1 s"),
         (ROWS[:3], "t, theta", None, "too few"),
         (ROWS, "t, phi", None, "columns t, theta"),
-        (ROWS, "t, t", 1, "taken"),
+        (ROWS, "t, t", 1, "name of another column"),
     ],
 )
-def test_a_wrong_table_is_refused_with_its_line(write, rows, header, line, problem):
+def test_error_in_a_table_names_its_line(write, rows, header, line, problem):
     scene, file = table(write, rows, header)
     error = refusal(load, {"scene": scene, "solver": SOLVER})
     assert problem in error.problem
@@ -393,13 +398,13 @@ def test_a_wrong_table_is_refused_with_its_line(write, rows, header, line, probl
         assert (error.file, error.line) == (str(file), line)
 
 
-def test_a_table_that_is_not_there_is_refused_at_its_name(write):
+def test_missing_table_file_is_refused_with_the_line_of_its_name(write):
     error = refusal(load, write(TEXT.replace("law: arctan", "law: table\n    file: nowhere.csv")))
     assert (error.path, error.line) == ("scene.drive.file", 15)
     assert "nowhere.csv cannot be read" in error.problem
 
 
-def test_a_table_shorter_than_the_run_is_refused(write):
+def test_table_shorter_than_the_run_is_refused(write):
     scene, _ = table(write, ROWS)
     scene["time"]["span"] = 1
     assert "table of the drive" in refusal(read_scene, scene).problem
@@ -415,19 +420,19 @@ def test_points_share_one_dimension_and_combine_with_a_grid(write):
     assert load(json.loads(json.dumps(config.source))).axes.sizes == config.axes.sizes
 
 
-def test_points_are_checked_row_by_row(write):
+def test_error_in_a_csv_file_of_points_names_its_line(write):
     file = write("drive.amplitude, ring.radius\n1, 50 mm\n2, 60 deg\n", "cells.csv")
     config = write(TEXT.split("  grid:")[0] + "  points: cells.csv\n")
     error = refusal(load, config)
     assert (error.file, error.line, error.path) == (str(file), 3, "sweep.points.ring.radius.1")
 
 
-def test_a_path_varies_in_one_place_only(write):
+def test_path_in_both_grid_and_points_is_refused(write):
     write("drive.amplitude\n1\n", "cells.csv")
     assert "one place only" in refusal(load, write(TEXT + "  points: cells.csv\n")).problem
 
 
-def test_sequences_make_grid_axes_and_dataarrays_share_their_dimensions():
+def test_sequences_make_grid_axes_and_dataarrays_share_dimensions():
     scene = read_scene(SCENE, swept=("ring.radius",))
     axes = read_axes(
         scene,
@@ -468,12 +473,12 @@ def test_wrong_axes_are_refused(axes, problem):
     assert problem in refusal(read_axes, read_scene(SCENE), axes).problem
 
 
-def test_a_million_cells_are_checked_at_the_corners_of_the_grid():
+def test_consistency_of_a_million_cells_is_checked_at_the_corners():
     axes = {path: np.linspace(0.1, 0.2, 1000) for path in ("friction.rough.mu_k", "friction.rough.mu_s")}
     assert "exceeds mu_s" in refusal(read_axes, read_scene(SCENE), axes).problem
 
 
-def test_a_method_is_read_with_its_options():
+def test_solver_is_read_with_its_options():
     solver = read_solver({"method": "rk4", "steps": 10, "certify": False})
     assert (solver.steps, solver.certify) == (10, False)
     assert "needs it" in refusal(read_solver, "rk4").problem
@@ -481,7 +486,7 @@ def test_a_method_is_read_with_its_options():
     assert "true or false" in refusal(read_solver, {"method": "rk4", "steps": 10, "certify": "yes"}).problem
 
 
-def test_the_schema_is_one_and_accepts_what_is_accepted(write):
+def test_schema_is_valid_and_accepts_valid_configurations(write):
     Draft202012Validator.check_schema(schema())
     validator = Draft202012Validator(schema())
     scene, _ = table(write, ROWS)
@@ -498,14 +503,14 @@ def test_the_schema_is_one_and_accepts_what_is_accepted(write):
 
 
 @pytest.mark.parametrize("file", sorted(CONFIGS.rglob("*.yaml")), ids=lambda file: file.stem)
-def test_every_configuration_of_the_package_is_valid(file):
+def test_every_configuration_in_configs_satisfies_the_schema(file):
     Draft202012Validator(schema()).validate(load(file).source)
 
 
 @pytest.mark.parametrize(
     "changes", [{"body__mas": 1}, {"friction__law": "bengisu"}, {"body__mass": -1}, {"zones": []}, {"body": 3}]
 )
-def test_the_schema_refuses_what_an_editor_can_see(changes):
+def test_schema_refuses_wrong_keys_names_and_types(changes):
     assert not Draft202012Validator(schema()).is_valid({"scene": edited(**changes)})
 
 
@@ -530,7 +535,7 @@ def accepted_or_refused(call, *arguments):
 
 @settings(max_examples=75, deadline=None)
 @given(st.dictionaries(PATHS, JUNK.filter(lambda value: value is not None), max_size=3), JUNK, JUNK)
-def test_junk_in_a_configuration_is_accepted_or_refused_but_never_crashes(changes, solver, sweep):
+def test_random_values_in_a_configuration_never_crash_the_reader(changes, solver, sweep):
     scene = copy.deepcopy(SCENE)
     for path, value in changes.items():
         section, _, key = path.partition("__")
@@ -554,7 +559,7 @@ def test_junk_in_a_configuration_is_accepted_or_refused_but_never_crashes(change
         )
     )
 )
-def test_any_text_is_accepted_or_refused_but_never_crashes(tmp_path, text):
+def test_random_text_never_crashes_the_reader(tmp_path, text):
     file = tmp_path / "any.yaml"
     file.write_bytes(text.encode("utf-8", "surrogatepass"))
     accepted_or_refused(load, file)
@@ -562,6 +567,63 @@ def test_any_text_is_accepted_or_refused_but_never_crashes(tmp_path, text):
 
 @settings(max_examples=300, deadline=None)
 @given(st.text(max_size=12) | st.from_regex(r"[0-9]{1,2} ?[a-zA-Zµ°%^*/·0-9 -]{0,8}", fullmatch=True))
-def test_any_text_is_a_quantity_or_refused(text):
+def test_random_text_never_crashes_the_conversion_of_units(text):
     accepted_or_refused(quantity, text, Parameter("m/s", "speed"), "path")
     accepted_or_refused(quantity, text, Parameter("1", "ratio"), "path")
+
+
+@pytest.mark.parametrize(
+    ("unit", "expected"),
+    [
+        ("rad/s", "rad s-1"),
+        ("m/s^2", "m s-2"),
+        ("kg m^2", "kg m2"),
+        ("kg*m**2", "kg m2"),
+        ("N s/m", "N s m-1"),
+        ("1/m", "m-1"),
+        ("Hz", "Hz"),
+        ("rad s-1", "rad s-1"),
+        ("1", "1"),
+        ("", "1"),
+    ],
+)
+def test_units_of_files_have_the_spelling_of_cf(unit, expected):
+    assert cf_units(unit) == expected
+    assert Parameter(unit, "something").attributes["units"] == expected
+    assert Variable(unit, "something").attributes["units"] == expected
+
+
+def test_value_in_the_spelling_of_cf_is_not_rounded():
+    for value in np.random.default_rng(0).uniform(-1e3, 1e3, 100).tolist():
+        assert quantity(f"{value!r} rad s-1", Parameter("rad/s", "speed"), "path") == value
+        assert quantity(f"{value!r} rad/s", Parameter("rad s-1", "speed"), "path") == value
+
+
+def test_units_in_the_schema_and_in_messages_are_everyday_ones():
+    assert "angular velocity of the body at launch, rad/s" in json.dumps(schema())
+    assert "must be greater than 0 m/s" in refusal(read_scene, edited(friction__v0=0.0)).problem
+
+
+def test_whole_parameter_refuses_a_fraction_and_is_an_integer_in_the_schema():
+    whole = Parameter("1", "seed", default=0.0, whole=True)
+    assert quantity("3", whole, "path") == 3.0
+    assert "2.5 is not a whole number: seed must be one" in refusal(quantity, 2.5, whole, "path").problem
+    assert _number(whole)["anyOf"][0]["type"] == "integer"
+    assert _number(Parameter("1", "seed"))["anyOf"][0]["type"] == "number"
+
+
+def test_spacing_of_a_whole_parameter_must_give_whole_numbers():
+    whole = Parameter("1", "seed", whole=True)
+    assert _read_spacing({"linspace": [0, 9, 4]}, whole, "axis").tolist() == [0.0, 3.0, 6.0, 9.0]
+    error = refusal(_read_spacing, {"linspace": [0, 9, 3]}, whole, "axis")
+    assert "makes 4.5, but seed must be a whole number" in error.problem
+
+
+def test_annotated_int_declares_a_whole_parameter():
+    assert declared(RK4)["steps"].whole
+
+
+@pytest.mark.parametrize("call", [read_scene, lambda config: ringsweep.sweep(config, {"drive.amplitude": [1.0]})])
+def test_whole_configuration_in_place_of_a_scene_is_refused_with_a_hint(call):
+    error = refusal(call, {"scene": SCENE, "solver": SOLVER})
+    assert "pass config['scene']" in error.problem

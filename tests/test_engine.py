@@ -1,4 +1,4 @@
-"""Sweeps and single runs as a user calls them."""
+"""Sweeps and single runs, called from Python."""
 
 import json
 from pathlib import Path
@@ -24,7 +24,7 @@ def grid(scene):
 
 
 class TestDataset:
-    def test_has_a_dimension_for_each_path_and_every_variable_of_the_contract(self, grid):
+    def test_dataset_has_a_dimension_per_path_and_all_declared_variables(self, grid):
         assert dict(grid.sizes) == {"drive_amplitude": 3, "zone_half_angle": 3}
         bounded = {f"{name}_error" for name in with_errors(Outcome._fields)}
         assert set(grid.data_vars) == {*Outcome._fields, *bounded, "steps", "certified"}
@@ -35,12 +35,12 @@ class TestDataset:
         assert grid.zone_half_angle.attrs["units"] == "rad"
         assert grid.drive_amplitude.attrs["long_name"]
 
-    def test_flags_are_int8_with_values_of_the_same_type(self, grid):
+    def test_flags_are_int8_like_their_flag_values(self, grid):
         for name in ("regime", "motion", "certified", "separating_contact"):
             assert grid[name].dtype == grid[name].attrs["flag_values"].dtype == np.int8
             assert set(np.unique(grid[name])) <= set(grid[name].attrs["flag_values"].tolist())
 
-    def test_a_separation_has_a_time_and_a_contact_and_nothing_else_has(self, grid):
+    def test_only_separating_cells_have_a_time_of_separation_and_a_contact(self, grid):
         separating = grid.regime == REGIMES.index("separating")
         assert separating.any()
         assert not separating.all()
@@ -48,14 +48,14 @@ class TestDataset:
         assert (np.isfinite(grid.t_separation) == separating).all()
         np.testing.assert_array_equal(grid.t_end, xr.where(separating, grid.t_separation, 4.0))
 
-    def test_alone_is_enough_to_run_it_again(self, grid):
+    def test_attributes_of_a_dataset_are_enough_to_run_it_again(self, grid):
         again = ringsweep.run(json.loads(grid.attrs["configuration"]), progress=False)
         undated = {"date_created": ""}
         xr.testing.assert_identical(again.assign_attrs(undated), grid.assign_attrs(undated))
 
 
 class TestAxes:
-    def test_a_cell_of_a_batch_equals_the_run_alone(self, scene, grid):
+    def test_cell_of_a_sweep_equals_a_single_run(self, scene, grid):
         for i, j in ((0, 0), (1, 1), (2, 0), (2, 2)):
             changed = scene | {
                 "drive": {"law": "arctan", "amplitude": AMPLITUDES[i]},
@@ -65,7 +65,7 @@ class TestAxes:
             for name in alone.data_vars:
                 np.testing.assert_array_equal(alone[name], grid[name][i, j])
 
-    def test_the_number_of_threads_changes_nothing(self, scene, grid):
+    def test_number_of_threads_does_not_change_results(self, scene, grid):
         serial = ringsweep.sweep(scene, {"drive.amplitude": AMPLITUDES, "zone.half_angle": WIDTHS}, jobs=1)
         xr.testing.assert_equal(serial, grid)
 
@@ -78,7 +78,7 @@ class TestAxes:
         again = ringsweep.run(json.loads(points.attrs["configuration"]), progress=False)
         np.testing.assert_array_equal(again.t_end, points.t_end)
 
-    def test_points_stand_beside_a_grid(self, scene, grid):
+    def test_points_combine_with_a_grid(self, scene, grid):
         config = {
             "scene": scene,
             "sweep": {"points": {"drive.amplitude": AMPLITUDES}, "grid": {"zone.half_angle": WIDTHS}},
@@ -87,7 +87,7 @@ class TestAxes:
         assert dict(found.sizes) == {"point": 3, "zone_half_angle": 3}
         np.testing.assert_array_equal(found.t_end, grid.t_end)
 
-    def test_five_axes(self, scene):
+    def test_sweep_over_five_axes_is_certified(self, scene):
         axes = {
             "drive.amplitude": [1.0, 6.0],
             "zone.half_angle": [0.1, 0.5],
@@ -99,8 +99,8 @@ class TestAxes:
         assert found.regime.shape == (2, 2, 2, 2, 2)
         assert (found.certified == 1).all()
 
-    def test_mass_and_inertia_scale_together(self, scene):
-        """Forces are proportional to the mass: trebling mass and inertia changes no motion."""
+    def test_motion_does_not_change_if_mass_and_inertia_scale_together(self, scene):
+        """Forces are proportional to the mass, so three times the mass and inertia give the same motion."""
         rig = {"body.mass": xr.DataArray([0.076, 0.228], dims="rig")}
         rig["body.inertia"] = xr.DataArray([4.47e-5, 13.41e-5], dims="rig")
         light, heavy = (found for _, found in ringsweep.sweep(scene, rig).groupby("rig"))
@@ -109,7 +109,7 @@ class TestAxes:
 
 
 class TestSingleRun:
-    def test_history_and_outcome_agree(self, scene):
+    def test_history_and_outcome_of_a_run_agree(self, scene):
         run = ringsweep.simulate(scene)
         assert run.phi.dims == ("time",)
         assert float(run.time[0]) == 0.0
@@ -120,14 +120,14 @@ class TestSingleRun:
         assert float(run.normal_2[-1]) == pytest.approx(0.0, abs=1e-9)
         assert run.attrs["outcome"].startswith("separating (oscillatory), contact 2")
 
-    def test_sticks_where_the_body_turns_with_the_ring(self, scene):
+    def test_mode_is_stick_where_the_body_turns_with_the_ring(self, scene):
         run = ringsweep.simulate(scene)
         stuck = run["mode"] == 0
         assert stuck.any()
         np.testing.assert_allclose(run.omega[stuck], run.ring_omega[stuck], atol=1e-12)
 
-    def test_shows_the_jump_by_which_a_contact_is_lost(self, scene):
-        """As the body turns in the ring's frame friction changes its sign at once, and with it the reactions."""
+    def test_history_shows_the_jump_of_the_reaction_that_opens_a_contact(self, scene):
+        """Friction changes its sign at once when the body reverses relative to the ring, and the reactions jump."""
         run = ringsweep.simulate(scene | {"drive": {"law": "arctan", "amplitude": 0.5}, "zone": {"half_angle": 0.9}})
         assert run.separating_contact == 2
         assert run.time[-2] == run.time[-1] == run.t_separation
@@ -135,7 +135,7 @@ class TestSingleRun:
         assert run.normal_2[-1] == 0.0
         assert run.normal_2.min() == run.normal_min_2
 
-    def test_one_contact_has_no_second(self, scene):
+    def test_model_with_one_contact_has_no_variables_of_contact_2(self, scene):
         alone = scene | {"model": "ring-single-contact", "body": {"mass": 0.076}, "drive": {"law": "none"}}
         run = ringsweep.simulate(alone | {"initial": {"omega": 5.0}})
         assert "normal_1" in run
@@ -143,18 +143,18 @@ class TestSingleRun:
 
 
 class TestProgress:
-    def test_is_silent_in_a_pipe(self, scene, capfd):
+    def test_progress_bar_is_not_shown_in_a_pipe(self, scene, capfd):
         ringsweep.sweep(scene, {"drive.amplitude": [1.0]})
         assert capfd.readouterr().err == ""
 
 
 class TestConfigurations:
     @pytest.mark.parametrize("path", sorted(CONFIGS.rglob("*.yaml")), ids=lambda path: path.stem)
-    def test_every_one_that_is_shipped_is_valid(self, path):
+    def test_every_configuration_in_configs_is_valid(self, path):
         config = load(path)
         assert config.axes.sizes or path.parent.name == "paper"
 
-    def test_the_main_job_is_the_one_described(self):
+    def test_axes_of_the_regime_map_are_those_documented(self):
         axes = load(CONFIGS / "regime_map.yaml").axes
         assert axes.sizes == {"drive_amplitude": 64, "zone_half_angle": 64}
         amplitude, width = (values for _, values in axes.columns.values())

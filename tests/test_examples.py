@@ -1,4 +1,4 @@
-"""What the docstrings show is what happens, and the reference is built from them without a warning."""
+"""Examples in docstrings are correct, and the API reference is built from them without a warning."""
 
 import doctest
 import importlib.util
@@ -21,14 +21,14 @@ PUBLIC = {
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """A folder with what `ringsweep init` writes."""
+    """Working folder with the configuration that `ringsweep init` writes."""
     monkeypatch.chdir(tmp_path)
     assert cli.main(["init", "-q"]) == 0
     return tmp_path
 
 
 @pytest.mark.parametrize("name", PUBLIC)
-def test_every_public_name_has_an_example_that_holds(name, folder):
+def test_examples_in_public_docstrings_are_correct(name, folder):
     drawing = {name: getattr(plots, name) for name in plots.__all__}
     (test,) = doctest.DocTestFinder(recurse=False).find(PUBLIC[name], name, globs=drawing)
     assert test.examples
@@ -36,13 +36,13 @@ def test_every_public_name_has_an_example_that_holds(name, folder):
     assert doctest.DocTestRunner().run(test, out=report.append).failed == 0, "".join(report)
 
 
-def test_every_public_name_tells_what_it_takes():
+def test_public_docstrings_describe_every_parameter():
     for name, function in PUBLIC.items():
         for parameter in inspect.signature(function).parameters:
             assert parameter in (function.__doc__ or ""), f"{name}: {parameter}"
 
 
-def test_the_reference_is_built_without_a_warning(tmp_path):
+def test_api_reference_is_built_with_every_public_name(tmp_path):
     spec = importlib.util.spec_from_file_location("api", ROOT / "docs" / "api.py")
     api = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(api)

@@ -1,4 +1,4 @@
-"""Order of cells and size of tasks: every cell once, neighbours together."""
+"""Order of the cells of a sweep, and division into tasks."""
 
 import math
 from threading import Event
@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringsweep.runs.pace import Pace, tasks
+from ringsweep.runs.task_sizes import TaskSizes, divide_into_tasks
 from ringsweep.storage.chunks import CHUNK, Layout
 
 
-class Took:
-    """So many cells that took so many seconds."""
+class FinishedTask:
+    """A task of some cells that took some seconds."""
 
     def __init__(self, cells, seconds):
         self.positions, self.seconds = range(cells), seconds
@@ -34,7 +34,7 @@ def test_every_cell_has_one_position_and_lies_in_its_chunk(sizes, data):
         here = np.zeros(sizes, dtype=bool)
         here[place] = True
         assert here[indices].all()
-        # In the order of the chunk's own array.
+        # Positions within a chunk follow the order of its array.
         if sizes:
             np.testing.assert_array_equal(np.transpose(indices), np.argwhere(here))
         seen[place] += 1
@@ -44,7 +44,7 @@ def test_every_cell_has_one_position_and_lies_in_its_chunk(sizes, data):
 
 
 @given(sizes=st.lists(st.integers(1, 300), min_size=1, max_size=5))
-def test_a_chunk_is_small_and_no_smaller_than_needed(sizes):
+def test_chunk_is_not_larger_than_allowed_and_not_needlessly_small(sizes):
     chunk = Layout(sizes).chunk
     assert math.prod(chunk) <= CHUNK
     assert all(1 <= edge <= size for edge, size in zip(chunk, sizes, strict=True))
@@ -52,58 +52,58 @@ def test_a_chunk_is_small_and_no_smaller_than_needed(sizes):
         assert math.prod(chunk) > CHUNK / 4
 
 
-def test_a_map_of_a_sweep_over_five_axes_lies_in_few_chunks():
+def test_map_of_a_sweep_over_five_axes_reads_few_chunks():
     layout = Layout([25] * 5)
     chunks = [place for _, _, place in layout.chunks()]
     passed = sum(all(place[dim].start <= 12 < place[dim].stop for dim in (1, 2, 4)) for place in chunks)
     assert passed * math.prod(layout.chunk) < 0.06 * layout.total
 
 
-class TestPace:
-    def test_a_task_takes_a_hundredth_of_the_time_before_within_bounds(self):
-        pace = Pace(1, lambda: 2)
-        assert pace.next(10**9) == 1
-        pace.learn(Took(100, 0.1))
-        assert pace.next(10**9) == 100
-        pace.learn(Took(99_000, 99.0))
-        assert pace.next(10**9) == pytest.approx(1000, rel=0.02)
-        pace.learn(Took(10**6, 1e3))
-        assert pace.next(10**9) == pytest.approx(2000, rel=0.02)
+class TestTaskSizes:
+    def test_task_takes_a_hundredth_of_the_time_spent_within_bounds(self):
+        sizes = TaskSizes(1, lambda: 2)
+        assert sizes.next(10**9) == 1
+        sizes.learn(FinishedTask(100, 0.1))
+        assert sizes.next(10**9) == 100
+        sizes.learn(FinishedTask(99_000, 99.0))
+        assert sizes.next(10**9) == pytest.approx(1000, rel=0.02)
+        sizes.learn(FinishedTask(10**6, 1e3))
+        assert sizes.next(10**9) == pytest.approx(2000, rel=0.02)
 
-    def test_a_task_grows_no_faster_than_what_is_known_of_the_cost(self):
-        pace = Pace(1, lambda: 2)
-        pace.learn(Took(1, 1e-6))
-        assert pace.next(10**9) == 8
+    def test_task_is_at_most_eight_times_as_large_as_the_largest_before(self):
+        sizes = TaskSizes(1, lambda: 2)
+        sizes.learn(FinishedTask(1, 1e-6))
+        assert sizes.next(10**9) == 8
 
-    def test_runs_that_go_side_by_side_are_not_parted(self):
-        pace = Pace(16, lambda: 2)
-        assert pace.next(10**9) == 16
-        pace.learn(Took(16, 100.0))
-        assert pace.next(10**9) == 16
-        pace.learn(Took(1600, 1.6))
-        assert pace.next(10**9) % 16 == 0
+    def test_task_size_is_a_multiple_of_the_runs_side_by_side(self):
+        sizes = TaskSizes(16, lambda: 2)
+        assert sizes.next(10**9) == 16
+        sizes.learn(FinishedTask(16, 100.0))
+        assert sizes.next(10**9) == 16
+        sizes.learn(FinishedTask(1600, 1.6))
+        assert sizes.next(10**9) % 16 == 0
 
     @given(done=st.lists(st.booleans(), min_size=1, max_size=200), cost=st.floats(1e-5, 10.0))
-    def test_tasks_hold_every_open_cell_once_and_shrink_to_the_end(self, done, cost):
+    def test_tasks_contain_every_open_cell_once(self, done, cost):
         done = np.array(done)
-        pace = Pace(1, lambda: 2)
-        pace.learn(Took(4, 4 * cost))
-        found = list(tasks(done, int((~done).sum()), pace, Event()))
+        sizes = TaskSizes(1, lambda: 2)
+        sizes.learn(FinishedTask(4, 4 * cost))
+        found = list(divide_into_tasks(done, sizes, Event()))
         if not found:
             assert done.all()
             return
         np.testing.assert_array_equal(np.concatenate(found), np.flatnonzero(~done))
         assert all(len(task) for task in found)
-        if cost > Pace.longest:
+        if cost > TaskSizes.max_seconds:
             assert {len(task) for task in found} == {1}
 
 
 @pytest.mark.parametrize("total", [1, 40_000])
-def test_gaps_wider_than_a_task_are_passed_over(total):
+def test_tasks_skip_long_runs_of_finished_cells(total):
     done = np.ones(total + 100_000, dtype=bool)
     done[-total:] = False
-    pace = Pace(1, lambda: 1)
-    pace.learn(Took(1000, 0.001))
+    sizes = TaskSizes(1, lambda: 1)
+    sizes.learn(FinishedTask(1000, 0.001))
     np.testing.assert_array_equal(
-        np.concatenate(list(tasks(done, total, pace, Event()))), np.arange(100_000, 100_000 + total)
+        np.concatenate(list(divide_into_tasks(done, sizes, Event()))), np.arange(100_000, 100_000 + total)
     )

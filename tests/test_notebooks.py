@@ -1,4 +1,4 @@
-"""Every notebook runs from top to bottom, elsewhere too, and shows what a reader sees."""
+"""Every notebook runs from top to bottom on any machine, and gives the kinds of output that it stores."""
 
 import os
 import re
@@ -12,19 +12,19 @@ from nbclient import NotebookClient
 FOLDER = Path(__file__).parents[1] / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 
-#: What only one machine would say: its folders, its times, its warnings.
+#: Text that depends on the machine or shows a problem: folders, progress bars, warnings, tracebacks.
 FOREIGN = re.compile(r"""(^|[\s'"(])(/\w+/|[A-Z]:\\)|site-packages|Warning\b|it/s\]|Traceback""", re.M)
 
 
 def texts(output):
-    """Every text of an output; pictures have none."""
+    """Texts of an output; a picture has none."""
     if output.output_type == "stream":
         return [output.text]
     return [data for kind, data in output.get("data", {}).items() if kind.startswith("text/")]
 
 
 def kinds(cell):
-    """What a cell shows: streams once each, and data by their kinds."""
+    """Names of the streams and MIME types of the data in the outputs of a cell."""
     found = {output.name for output in cell.outputs if output.output_type == "stream"}
     return found | {kind for output in cell.outputs for kind in output.get("data", {})}
 
@@ -34,7 +34,7 @@ def code(notebook):
 
 
 def check(notebook):
-    """No cell fails, grumbles, or tells where it ran."""
+    """Check that no cell failed, wrote to stderr, or shows where it ran."""
     for cell in code(notebook):
         for output in cell.outputs:
             assert output.output_type != "error", output.evalue
@@ -43,18 +43,18 @@ def check(notebook):
                 assert not FOREIGN.search(text), text
 
 
-def test_there_are_notebooks():
+def test_folder_holds_notebooks():
     assert NOTEBOOKS
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=[path.stem for path in NOTEBOOKS])
-def test_a_notebook_shows_again_what_it_shows(path, tmp_path, monkeypatch):
+def test_notebook_runs_and_gives_the_stored_kinds_of_output(path, tmp_path, monkeypatch):
     kept = nbformat.read(path, as_version=4)
     nbformat.validate(kept)
     check(kept)
     assert [cell.execution_count for cell in code(kept)] == list(range(1, len(code(kept)) + 1))
 
-    # Commands are those of this environment, whether or not it is activated.
+    # Shell commands must come from this environment, also if it is not activated.
     monkeypatch.setenv("PATH", os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]))
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path / "ipython"))
     monkeypatch.setenv("JUPYTER_RUNTIME_DIR", str(tmp_path / "runtime"))
@@ -67,4 +67,5 @@ def test_a_notebook_shows_again_what_it_shows(path, tmp_path, monkeypatch):
     check(again)
     for cell, before in zip(code(again), code(kept), strict=True):
         assert kinds(cell) == kinds(before), cell.source
-    assert not [left for left in tmp_path.iterdir() if left.name not in ("ipython", "runtime")], "left behind"
+    left = [path.name for path in tmp_path.iterdir() if path.name not in ("ipython", "runtime")]
+    assert not left, "the notebook left files behind"

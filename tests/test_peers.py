@@ -1,4 +1,4 @@
-"""Peers of the benchmarks find what the package finds, though they share no formula with it."""
+"""Peers of the benchmarks, which share no formula with the package, agree with it."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from benchmarks.work_precision import SCENES, own
 
 
 @pytest.mark.parametrize("name", ["smooth", "limit"])
-def test_events_and_restarts_of_scipy(name):
+def test_scipy_with_events_and_restarts_agrees_with_the_package(name):
     scene = SCENES[name]
     cells = scene.cells(6)
     ours = own(scene, scene.method, cells, rtol=1e-11)()
@@ -19,7 +19,7 @@ def test_events_and_restarts_of_scipy(name):
 
 
 @pytest.mark.skipif(in_c.compiler() is None, reason="no C compiler")
-def test_runge_kutta_in_c_is_ours():
+def test_runge_kutta_in_c_agrees_with_rk4():
     scene = SCENES["smooth"]
     cells = scene.cells(4)
     ours, theirs = own(scene, "rk4", cells, steps=5000)(), in_c.ring(scene.law, cells, 5000)()

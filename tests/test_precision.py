@@ -1,4 +1,4 @@
-"""Error against run time: what is measured is true, and what is recommended holds."""
+"""Measurement of error against run time, and the recommended solver."""
 
 from math import acos, pi, sqrt
 from pathlib import Path
@@ -32,7 +32,7 @@ BELT = {
 
 @pytest.fixture(scope="module", autouse=True)
 def short():
-    """Few steps of rk4 are as instructive as many."""
+    """Use few settings of rk4, to save time."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(contenders, "_STEPS", (100, 1000, 10_000))
         yield
@@ -63,7 +63,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def rerun(found, config, solver):
-    """Outcomes of the sampled cells under a solver as the dataset names it, certificates and all."""
+    """Outcomes of the sampled cells with a solver of the dataset, certificates included."""
     points = {found[name].attrs["path"]: found[name].values for name in ("drive_amplitude", "zone_half_angle")}
     return ringsweep.run(
         {"scene": config["scene"], "sweep": {"points": points}, "solver": yaml.safe_load(f"{{{solver}}}")},
@@ -72,7 +72,7 @@ def rerun(found, config, solver):
 
 
 class TestDataset:
-    def test_names_units_and_flags_are_those_declared(self, found):
+    def test_variables_units_and_flags_are_those_declared(self, found):
         assert set(found.data_vars) == set(PRECISION)
         assert found.sizes["cell"] == 8
         for name, data in found.data_vars.items():
@@ -81,17 +81,17 @@ class TestDataset:
         for name in ("regime_wrong", "flagged"):
             assert found[name].dtype == found[name].attrs["flag_values"].dtype == np.int8
 
-    def test_a_cell_carries_what_was_swept_there(self, found, config):
+    def test_cells_have_their_swept_values_as_coordinates(self, found, config):
         axes = load(config).axes.columns
         grid = np.meshgrid(*(values for _, values in axes.values()), indexing="ij")
         for name, values in zip(("drive_amplitude", "zone_half_angle"), grid, strict=True):
             np.testing.assert_array_equal(found[name], values.ravel()[found["cell"]])
 
-    def test_the_method_of_auto_competes_with_rk4_and_the_default_is_among_its_settings(self, found):
+    def test_contenders_are_rk4_and_the_method_of_auto_with_its_default(self, found):
         assert set(found["method"].values) == {"event", "rk4"}
         assert "method: event, rtol: 1e-10" in found["solver"].values
 
-    def test_survives_a_file(self, found, tmp_path):
+    def test_dataset_is_unchanged_after_saving_and_loading(self, found, tmp_path):
         netcdf.save(found, tmp_path / "found.nc")
         again = netcdf.load(tmp_path / "found.nc")
         assert again.equals(found)
@@ -100,20 +100,20 @@ class TestDataset:
 
 
 class TestErrors:
-    def test_fall_with_the_tolerance_and_come_down_to_rounding(self, found):
+    def test_errors_of_event_fall_with_rtol_to_rounding(self, found):
         event = found.isel(contender=found["method"].values == "event")
         median = event["error_end"].median("cell").values
         assert (median[2:] < median[:-2]).all()
         assert median[-1] < 1e-11
         assert (event["error_end"].max("cell")[-1] < 1e-8).all()
 
-    def test_of_rk4_do_not_fall_where_static_friction_escapes_it_and_it_is_not_silent(self, found):
+    def test_rk4_misses_static_friction_and_its_errors_are_flagged(self, found):
         rk4 = found.isel(contender=found["method"].values == "rk4")
         assert rk4["error_end"].max("cell").min() > 1e-3
         assert (rk4["regime_wrong"] == 1).any("cell").all()
         assert (rk4["flagged"] == 1).all()
 
-    def test_of_separation_are_there_exactly_where_both_separate(self, found, config):
+    def test_errors_of_separation_are_given_where_both_runs_separate(self, found, config):
         reference = rerun(found, config, found.attrs["reference"])
         separating = np.isfinite(reference["t_separation"].values)
         assert separating.any()
@@ -122,18 +122,18 @@ class TestErrors:
         np.testing.assert_array_equal(np.isfinite(best["error_separation"]), separating)
         np.testing.assert_array_equal(np.isfinite(best["reference_error_separation"]), separating)
 
-    def test_are_those_of_the_state_that_a_run_reports(self, found, config):
+    def test_errors_equal_differences_of_reported_states(self, found, config):
         reference = rerun(found, config, found.attrs["reference"])
         for k in (0, 4):
             plain = rerun(found, config, f"{found['solver'].values[k]}, certify: false")
             np.testing.assert_array_equal(found["error_end"][k], abs(plain["phi_end"] - reference["phi_end"]))
 
-    def test_the_reference_agrees_with_the_closed_form_and_its_uncertainty_is_honest(self):
+    def test_reference_agrees_with_the_closed_form_within_its_uncertainty(self):
         found = ringsweep.precision({"scene": BELT}, rounds=1, progress=False)
         solver = yaml.safe_load(f"{{{found.attrs['reference']}}}")
         x = float(ringsweep.run({"scene": BELT, "solver": solver}, progress=False)["x_end"])
-        # It sticks until the spring pulls with the friction at rest, slips on a circle about the kinetic one's
-        # deflection until it moves with the belt again, and is carried on.
+        # The body sticks until the spring force equals static friction. It slips on a circle in the phase plane, about
+        # the deflection under kinetic friction, until it has the velocity of the belt, and sticks again.
         rate, far, middle = sqrt(2.0), 0.15 * 9.81 / 2.0, 0.1 * 9.81 / 2.0
         slip = 2.0 * (pi - acos((far - middle) / np.hypot(far - middle, 0.1 / rate))) / rate
         after = 9.0 - far / 0.1
@@ -146,7 +146,7 @@ class TestErrors:
 
 
 class TestRecommendation:
-    def test_meets_the_target_when_it_is_run_again(self, found, config):
+    def test_recommended_solver_meets_the_target_when_run_again(self, found, config):
         line = report(found).splitlines()[-1]
         solver = yaml.safe_load(line)["solver"]
         assert line == f"solver: {{{found.attrs['recommended']}}}"
@@ -157,7 +157,7 @@ class TestRecommendation:
         assert abs(again["phi_end"] - reference["phi_end"]).max() <= TARGET
         assert abs(again["t_separation"] - reference["t_separation"]).max() <= TARGET
 
-    def test_is_the_fastest_that_meets_it(self, found):
+    def test_recommended_solver_is_the_fastest_that_meets_the_target(self, found):
         bound = (found["error_end"] + found["reference_error_end"]).max("cell")
         apart = (found["error_separation"] + found["reference_error_separation"]).max("cell")
         met = (bound <= TARGET) & ~(apart > TARGET) & (found["regime_wrong"] == 0).all("cell")
@@ -166,14 +166,14 @@ class TestRecommendation:
         fastest = found["time_per_run"].where(met).argmin("contender")
         assert found.attrs["recommended"] == found["solver"].values[fastest]
 
-    def test_a_target_out_of_reach_is_said_to_be_and_the_closest_is_named(self, folder, capsys):
+    def test_unreachable_target_is_reported_with_the_closest_solver(self, folder, capsys):
         assert main(["precision", "belt.yaml", "--target", "1e-40", "--rounds", "1"]) == 0
         out = capsys.readouterr().out
         closest = netcdf.load("belt-precision.nc").attrs["closest"]
         assert f"met by none; closest is `{closest}`: no wrong regimes, errors up to" in out
         assert "\nsolver:" not in out
 
-    def test_a_setting_of_ones_own_competes_and_keeps_its_limit_of_work(self):
+    def test_configured_setting_competes_and_keeps_its_max_steps(self):
         solver = {"method": "event", "rtol": 2.5e-7, "max_steps": 1}
         found = ringsweep.precision({"scene": BELT, "solver": solver}, rounds=1, progress=False)
         own = found["solver"].values == "method: event, rtol: 2.5e-07, max_steps: 1"
@@ -185,7 +185,7 @@ class TestRecommendation:
 
 
 class TestSample:
-    def test_is_the_same_at_every_call_and_all_if_there_are_no_more(self, config, found):
+    def test_sample_is_the_same_at_every_call_and_complete_for_small_sweeps(self, config, found):
         again = ringsweep.precision(config, cells=8, rounds=1, progress=False)
         np.testing.assert_array_equal(again["cell"], found["cell"])
         few = {"scene": BELT, "sweep": {"grid": {"belt.velocity": [0.05, 0.1], "friction.law": ["stiction"]}}}
@@ -193,7 +193,7 @@ class TestSample:
         np.testing.assert_array_equal(found["belt_velocity"], [0.05, 0.1])
         np.testing.assert_array_equal(found["friction_law"], ["stiction", "stiction"])
 
-    def test_a_cell_whose_reference_disagrees_with_itself_is_not_measured_and_that_is_said(self, config, monkeypatch):
+    def test_cells_without_a_reference_are_left_out_and_counted(self, config, monkeypatch):
         monkeypatch.setattr(contenders, "_STEPS", (100,))
         monkeypatch.setattr(precision, "_TIGHTEST", {precision.Event: (1e-15, 1e-3)})
         found = ringsweep.precision(CONFIGS / "belt_viscous.yaml", rounds=1, progress=False)
@@ -201,7 +201,7 @@ class TestSample:
         dropped = 16 - found.sizes["cell"]
         assert f"{found.sizes['cell']} of 4096 cells; {dropped} more were drawn" in found.attrs["sampled"]
 
-    def test_what_would_take_too_long_is_left_out_and_named(self, monkeypatch):
+    def test_settings_that_would_take_too_long_are_left_out_and_named(self, monkeypatch):
         monkeypatch.setattr(contenders, "_BUDGET", 0.0)
         found = ringsweep.precision({"scene": BELT}, rounds=1, progress=False)
         assert found["setting"].values.tolist() == ["rtol 0.0001", "100 steps"]
@@ -209,7 +209,7 @@ class TestSample:
             assert name in found.attrs["left_out"]
         assert found.attrs["left_out"] in report(found)
 
-    def test_a_law_that_rk4_does_not_take_is_measured_without_it(self):
+    def test_law_that_rk4_does_not_take_is_measured_without_rk4(self):
         friction = {"law": "bristle", "mu_k": 0.1, "sigma0": 100.0, "seed": 1}
         found = ringsweep.precision({"scene": BELT | {"friction": friction}}, rounds=1, progress=False)
         assert set(found["method"].values) == {"implicit"}
@@ -228,12 +228,12 @@ class TestInput:
             ({"rounds": None}, "rounds: nothing is not a number"),
         ],
     )
-    def test_arguments_out_of_range_are_refused_before_any_work(self, arguments, problem):
+    def test_arguments_out_of_range_are_refused(self, arguments, problem):
         with pytest.raises(InputError, match=problem):
             ringsweep.precision({"scene": BELT}, **arguments)
 
     @pytest.mark.parametrize("part", ["grid", "points"])
-    def test_several_laws_are_refused_where_they_stand(self, part):
+    def test_sweep_over_several_laws_is_refused_with_its_path(self, part):
         sweep = {part: {"friction.law": ["coulomb", "stiction"]}}
         with pytest.raises(InputError, match=rf"sweep\.{part}\.friction\.law: each of coulomb, stiction"):
             ringsweep.precision({"scene": BELT, "sweep": sweep})
@@ -241,18 +241,18 @@ class TestInput:
     @pytest.mark.parametrize(
         "arguments", [["--target", "0"], ["--target", "nan"], ["--target", "x"], ["--cells", "0"], ["--rounds", "-1"]]
     )
-    def test_a_wrong_option_has_status_2(self, folder, arguments):
+    def test_wrong_option_of_the_command_has_status_2(self, folder, arguments):
         with pytest.raises(SystemExit) as ended:
             main(["precision", "belt.yaml", *arguments])
         assert ended.value.code == 2
 
     @pytest.mark.parametrize("output", ["nowhere/out.nc", ".", "out.png"])
-    def test_an_output_that_cannot_be_written_is_refused_before_any_work(self, folder, capsys, output):
+    def test_unwritable_output_is_refused(self, folder, capsys, output):
         assert main(["precision", "belt.yaml", "-o", output]) == 2
         assert output in capsys.readouterr().err
 
 
-def test_the_command_leaves_dataset_picture_table_and_a_line_to_paste(folder, capsys):
+def test_command_writes_dataset_and_picture_and_prints_table_and_solver(folder, capsys):
     assert main(["precision", "belt.yaml", "-o", "out.nc", "--rounds", "1"]) == 0
     out = capsys.readouterr().out
     found = netcdf.load("out.nc")
@@ -269,7 +269,7 @@ def test_the_command_leaves_dataset_picture_table_and_a_line_to_paste(folder, ca
     assert pasted in capsys.readouterr().out
 
 
-def test_a_result_of_another_kind_is_not_replaced_or_misread(folder, capsys):
+def test_result_of_another_kind_is_neither_replaced_nor_drawn(folder, capsys):
     assert main(["run", "belt.yaml", "-o", "sweep.nc"]) == 0
     assert main(["precision", "belt.yaml", "-o", "belt.nc", "--rounds", "1"]) == 0
     kept = {name: (folder / name).read_bytes() for name in ("sweep.nc", "belt.nc")}
@@ -283,7 +283,7 @@ def test_a_result_of_another_kind_is_not_replaced_or_misread(folder, capsys):
     assert {name: (folder / name).read_bytes() for name in kept} == kept
 
 
-def test_the_picture_shows_what_was_found(found):
+def test_picture_shows_the_measured_errors_and_the_target(found):
     axes = plots.work_precision(found).axes[0]
     (event,) = (line for line in axes.lines if line.get_label() == "event")
     rows = found["method"].values == "event"

@@ -1,4 +1,4 @@
-"""The same tasks, files and bits from the workers of a Dask scheduler."""
+"""Sweeps on the workers of a Dask scheduler."""
 
 import logging
 import os
@@ -12,10 +12,10 @@ from distributed import LocalCluster
 import ringsweep
 from benchmarks.kills import same_bits
 from ringsweep import cli
-from ringsweep.runs.pace import Pace
-from ringsweep.storage.partial import Partial
+from ringsweep.runs.task_sizes import TaskSizes
+from ringsweep.storage.checkpoint import Checkpoint
 
-# Of what a scheduler leaves behind when its workers are killed.
+# Killed workers leave resources open, and Python warns of them.
 pytestmark = pytest.mark.filterwarnings("ignore")
 
 
@@ -28,11 +28,11 @@ def cluster():
         yield cluster
 
 
-def test_a_worker_that_dies_costs_its_task_and_nothing_else(cluster, scene, tmp_path, monkeypatch):
+def test_task_of_a_killed_worker_is_computed_by_another(cluster, scene, tmp_path, monkeypatch):
     axes = {"drive.amplitude": np.geomspace(0.5, 8.0, 12), "zone.half_angle": np.radians(np.linspace(5.0, 40.0, 10))}
     ringsweep.sweep(scene, axes, tmp_path / "threads.nc", progress=False).close()
-    monkeypatch.setattr(Pace, "most", 4)
-    put, killed = Partial.put, []
+    monkeypatch.setattr(TaskSizes, "max_cells", 4)
+    put, killed = Checkpoint.put, []
 
     def kill_one(self, *rest):
         put(self, *rest)
@@ -40,19 +40,19 @@ def test_a_worker_that_dies_costs_its_task_and_nothing_else(cluster, scene, tmp_
             killed.append(next(iter(cluster.workers.values())).pid)
             os.kill(killed[0], signal.SIGKILL)
 
-    monkeypatch.setattr(Partial, "put", kill_one)
+    monkeypatch.setattr(Checkpoint, "put", kill_one)
     ringsweep.sweep(scene, axes, tmp_path / "dask.nc", scheduler=cluster.scheduler_address, progress=False).close()
     assert killed
     assert same_bits(tmp_path / "threads.nc", tmp_path / "dask.nc")
 
 
-def test_a_worker_of_another_version_is_refused(cluster, scene, monkeypatch):
+def test_worker_of_another_version_is_refused(cluster, scene, monkeypatch):
     monkeypatch.setattr("ringsweep.runs.sweep.environment", lambda: {"numba": "99.0"})
     with pytest.raises(ringsweep.InputError, match=r"a worker has other versions.*numba was 99\.0"):
         ringsweep.sweep(scene, {"drive.amplitude": [1.0]}, scheduler=cluster.scheduler_address, progress=False)
 
 
-def test_a_stop_while_no_worker_is_there_is_heeded(scene, tmp_path, monkeypatch):
+def test_interrupt_while_waiting_for_a_worker_stops_the_sweep(scene, tmp_path, monkeypatch):
     with LocalCluster(n_workers=0, dashboard_address=None, silence_logs=logging.CRITICAL) as empty:
         looks = iter(range(3))
 
@@ -61,7 +61,7 @@ def test_a_stop_while_no_worker_is_there_is_heeded(scene, tmp_path, monkeypatch)
                 signal.raise_signal(signal.SIGINT)
             return 0
 
-        monkeypatch.setattr("ringsweep.runs.dask.Workers.threads", none_yet)
+        monkeypatch.setattr("ringsweep.runs.dask.Workers.concurrency", none_yet)
         with pytest.raises(KeyboardInterrupt):
             ringsweep.sweep(scene, {"drive.amplitude": [1.0]}, scheduler=empty.scheduler_address, progress=False)
 
@@ -76,8 +76,8 @@ def test_a_stop_while_no_worker_is_there_is_heeded(scene, tmp_path, monkeypatch)
         (["--scheduler", "tcp://127.0.0.1:1", "--jobs", "2"], "--jobs"),
     ],
 )
-def test_what_cannot_be_connected_is_refused_in_one_line(scene, tmp_path, monkeypatch, capsys, options, problem):
-    monkeypatch.setattr("ringsweep.runs.dask._PATIENCE", 0.5)
+def test_wrong_options_for_dask_are_refused_in_one_line(scene, tmp_path, monkeypatch, capsys, options, problem):
+    monkeypatch.setattr("ringsweep.runs.dask._TIMEOUT", 0.5)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a.yaml").write_text(yaml.safe_dump({"scene": scene}))
     assert cli.main(["run", "a.yaml", *options]) == 2

@@ -1,13 +1,17 @@
-"""Cells that an earlier sweep holds are taken from there, and no others are."""
+"""Reuse of the cells of an earlier sweep."""
 
+import shutil
+
+import netCDF4
 import numpy as np
 import pytest
+import xarray as xr
 
 import ringsweep
-from ringsweep import cli
+from ringsweep import cli, plots
 from ringsweep.errors import InputError
 from ringsweep.storage import netcdf
-from ringsweep.storage.partial import Partial
+from ringsweep.storage.checkpoint import Checkpoint
 
 AMPLITUDES, WIDTHS = np.linspace(0.5, 4.5, 5), np.radians([10.0, 20.0, 30.0])
 COARSE = {"drive.amplitude": AMPLITUDES, "zone.half_angle": WIDTHS}
@@ -15,7 +19,7 @@ COARSE = {"drive.amplitude": AMPLITUDES, "zone.half_angle": WIDTHS}
 
 @pytest.fixture(scope="module")
 def earlier(scene, tmp_path_factory):
-    """File of a sweep of 5 x 3 cells."""
+    """File of an earlier sweep of 5 x 3 cells."""
     path = tmp_path_factory.mktemp("earlier") / "coarse.nc"
     ringsweep.sweep(scene, COARSE, path, progress=False).close()
     return path
@@ -23,15 +27,15 @@ def earlier(scene, tmp_path_factory):
 
 @pytest.fixture
 def computed(monkeypatch):
-    """How many cells were handed over at a time, computed or taken."""
+    """Number of cells in each call that stores cells."""
     counts = []
-    put = Partial.put
-    monkeypatch.setattr(Partial, "put", lambda self, p, *rest: (counts.append(len(p)), put(self, p, *rest)))
+    put = Checkpoint.put
+    monkeypatch.setattr(Checkpoint, "put", lambda self, p, *rest: (counts.append(len(p)), put(self, p, *rest)))
     return counts
 
 
 def taken(scene, axes, earlier, tmp_path, caplog, **options):
-    """How many cells of a sweep are taken from the earlier file; the sweep must be what it is without."""
+    """Number of cells that a sweep takes from the earlier file. The results must equal those without reuse."""
     with caplog.at_level("INFO", logger="ringsweep"):
         found = ringsweep.sweep(scene, axes, tmp_path / "new.nc", reuse=earlier, progress=False, **options)
     alone = ringsweep.sweep(scene, {name: found[name.replace(".", "_")].values for name in axes}, progress=False)
@@ -42,28 +46,28 @@ def taken(scene, axes, earlier, tmp_path, caplog, **options):
     return int(line.split()[0])
 
 
-def test_a_finer_grid_takes_the_cells_that_it_shares(scene, earlier, tmp_path, caplog):
+def test_finer_grid_takes_its_shared_cells(scene, earlier, tmp_path, caplog):
     finer = {"drive.amplitude": np.linspace(0.5, 4.5, 9), "zone.half_angle": WIDTHS}
     assert taken(scene, finer, earlier, tmp_path, caplog) == 15
 
 
-def test_a_wider_grid_does_in_whatever_order(scene, earlier, tmp_path, caplog):
+def test_wider_grid_in_another_order_takes_its_shared_cells(scene, earlier, tmp_path, caplog):
     wider = {"zone.half_angle": [np.radians(25.0), *WIDTHS[::-1]], "drive.amplitude": [9.0, *AMPLITUDES[1:]]}
     assert taken(scene, wider, earlier, tmp_path, caplog) == 12
 
 
-def test_a_grid_with_a_further_axis_does_where_that_has_the_value_of_the_scene(scene, earlier, tmp_path, caplog):
+def test_grid_with_another_axis_takes_cells_at_the_value_of_the_scene(scene, earlier, tmp_path, caplog):
     further = {"drive.amplitude": AMPLITUDES[:2], "initial.omega": [0.0, 1.0], "zone.half_angle": WIDTHS}
     assert taken(scene, further, earlier, tmp_path, caplog) == 6
 
 
-def test_a_line_through_the_earlier_grid_does(scene, earlier, tmp_path, caplog):
+def test_line_through_the_earlier_grid_takes_all_its_cells(scene, earlier, tmp_path, caplog):
     along = scene | {"zone": {"half_angle": WIDTHS[1]}}
     assert taken(along, {"drive.amplitude": AMPLITUDES}, earlier, tmp_path, caplog) == 5
 
 
-def test_values_that_differ_by_rounding_are_those_of_the_earlier_file(scene, earlier, tmp_path):
-    """Else two spacings of one axis would share hardly a cell; the file then says which values they are."""
+def test_axis_that_differs_by_rounding_gets_the_values_of_the_earlier_file(scene, earlier, tmp_path):
+    """Without this two spacings of one axis would share few cells. The file holds the values that were computed."""
     nudged = AMPLITUDES * (1.0 + 4e-16)
     assert (nudged != AMPLITUDES).any()
     found = ringsweep.sweep(
@@ -75,7 +79,7 @@ def test_values_that_differ_by_rounding_are_those_of_the_earlier_file(scene, ear
     np.testing.assert_array_equal(again["drive_amplitude"], AMPLITUDES)
 
 
-def test_points_take_cells_of_a_grid_and_a_grid_those_of_points(scene, earlier, tmp_path, caplog):
+def test_points_take_cells_of_a_grid_and_a_grid_takes_points(scene, earlier, tmp_path, caplog):
     points = {"drive.amplitude": [0.5, 1.5, 1.6], "zone.half_angle": [*WIDTHS[:2], WIDTHS[2]]}
     config = {"scene": scene, "sweep": {"points": points}}
     with caplog.at_level("INFO", logger="ringsweep"):
@@ -85,13 +89,13 @@ def test_points_take_cells_of_a_grid_and_a_grid_those_of_points(scene, earlier, 
     assert [line.split(" cells")[0] for line in lines] == ["2 of 3", "2 of 15"]
 
 
-def test_a_sweep_through_laws_does_whatever_only_the_others_need(scene, earlier, tmp_path, caplog):
+def test_sweep_over_laws_takes_cells_of_one_law_despite_parameters_of_others(scene, earlier, tmp_path, caplog):
     laws = scene | {"friction": scene["friction"] | {"alpha": 1e3}}
     axes = COARSE | {"friction.law": ["stiction", "coulomb"]}
     assert taken(laws, axes, earlier, tmp_path, caplog) == 15
 
 
-def test_one_law_takes_its_cells_of_a_sweep_through_laws(scene, tmp_path, caplog):
+def test_sweep_of_one_law_takes_its_cells_of_a_sweep_over_laws(scene, tmp_path, caplog):
     friction = {"friction": scene["friction"] | {"alpha": 1e3}}
     axes = {"drive.amplitude": AMPLITUDES, "friction.law": ["coulomb", "stiction"], "friction.alpha": [1e3, 2e3]}
     with pytest.raises(InputError, match="no such number"):
@@ -102,7 +106,7 @@ def test_one_law_takes_its_cells_of_a_sweep_through_laws(scene, tmp_path, caplog
     assert taken(scene, COARSE, tmp_path / "l.nc", tmp_path, caplog) == 15
 
 
-def test_nothing_is_computed_that_the_file_holds(scene, earlier, tmp_path, computed):
+def test_shared_cells_are_not_computed_again(scene, earlier, tmp_path, computed):
     ringsweep.sweep(scene, COARSE, tmp_path / "new.nc", reuse=earlier, progress=False).close()
     assert computed == [15]
 
@@ -115,13 +119,13 @@ def test_nothing_is_computed_that_the_file_holds(scene, earlier, tmp_path, compu
         ({}, {"method": "event", "rtol": 1e-8}, "solver was"),
     ],
 )
-def test_a_file_of_another_scene_or_solver_is_refused_by_what_differs(scene, earlier, change, solver, problem):
+def test_file_of_another_scene_or_solver_is_refused_with_the_difference(scene, earlier, change, solver, problem):
     with pytest.raises(InputError, match="has no cell of this sweep") as refusal:
         ringsweep.sweep(scene | change, COARSE, solver=solver, reuse=earlier, progress=False)
     assert problem in str(refusal.value)
 
 
-def test_a_file_of_another_version_is_refused(scene, earlier, tmp_path, monkeypatch):
+def test_file_of_another_version_is_refused(scene, earlier, tmp_path, monkeypatch):
     from ringsweep.runs import reuse
 
     known = reuse.identity
@@ -130,7 +134,26 @@ def test_a_file_of_another_version_is_refused(scene, earlier, tmp_path, monkeypa
         ringsweep.sweep(scene, COARSE, reuse=earlier, progress=False)
 
 
-def test_a_history_is_refused(scene, tmp_path, earlier, capsys):
+def test_file_with_units_of_earlier_versions_is_reused_repeated_and_drawn(scene, earlier, tmp_path, caplog):
+    """Coordinates had "rad/s" where they now have "rad s-1"."""
+    old = tmp_path / "old.nc"
+    shutil.copy(earlier, old)
+    with netCDF4.Dataset(old, "a") as file:
+        assert file["drive_amplitude"].units == "rad s-1"
+        file["drive_amplitude"].units = "rad/s"
+    assert taken(scene, COARSE, old, tmp_path, caplog) == 15
+    loaded, new = netcdf.load(old), netcdf.load(earlier)
+    xr.testing.assert_equal(ringsweep.run(old, progress=False), new)
+    assert ringsweep.run(old, progress=False)["drive_amplitude"].attrs["units"] == "rad s-1"
+    from_coordinates = ringsweep.sweep(scene, {name: loaded[name.replace(".", "_")] for name in COARSE}, progress=False)
+    xr.testing.assert_equal(from_coordinates, new)
+    labels = [plots.regime_map(ds).axes[0].get_xlabel() for ds in (loaded, new)]
+    assert labels[0] == labels[1]
+    cells = [plots.cell(ds, {"drive.amplitude": "1.5 rad/s", "zone.half_angle": "10 deg"}) for ds in (loaded, new)]
+    assert cells[0] == cells[1]
+
+
+def test_history_file_is_refused_as_an_earlier_sweep(scene, tmp_path, earlier, capsys):
     netcdf.save(ringsweep.simulate(scene), tmp_path / "history.nc")
     output = ["-o", str(tmp_path / "new.nc")]
     assert cli.main(["run", str(earlier), *output, "--reuse", str(tmp_path / "history.nc")]) == 2

@@ -1,4 +1,4 @@
-"""A scene compiles to what it uses: what it lacks is not in the code, and a sweep keeps nothing but outcomes."""
+"""A kernel has no code for what its scene lacks, and a sweep stores nothing but outcomes."""
 
 import tracemalloc
 
@@ -13,24 +13,24 @@ LEANEST, CUT = "one contact, Coulomb, immobile uniform ring", "+ an arc"
 
 @pytest.fixture(scope="module")
 def code(tmp_path_factory: pytest.TempPathFactory):
-    """Code of the `rk4` kernel of scenes, compiled where nothing is cached: what comes from there has no text."""
+    """Code of the `rk4` kernels of two scenes, compiled with an empty cache: a cached kernel has no assembly text."""
     cache = tmp_path_factory.mktemp("cache")
     return scenes.in_child(scenes.codes, (LEANEST, CUT), "rk4", cache=cache)
 
 
-def test_calls_are_found_in_code():
+def test_calls_by_name_and_by_address_are_found_in_assembly_code():
     text = "\tmovabsq\t$exp, %rax\n\tcallq\t*%rax\n\tcallq\tatan@PLT\n\t.globl\tlog\n_exponent:\n"
     assert scenes.code_of(text) == {"instructions": 3, "calls": ["exp", "atan"]}
 
 
-def test_kernel_holds_what_the_scene_uses(code):
+def test_kernel_calls_only_functions_that_its_scene_uses(code):
     assert code[LEANEST]["calls"] == []
-    # Of its drive.
+    # Calls of the arctan drive.
     assert set(code[CUT]["calls"]) == {"atan", "log1p"}
     assert code[LEANEST]["instructions"] < code[CUT]["instructions"]
 
 
-def test_sweep_stores_outcomes_alone():
+def test_memory_of_a_sweep_does_not_grow_with_its_steps():
     def most(steps: int) -> int:
         smooth = SCENES["smooth"]
         configuration = smooth.configuration(smooth.cells(256), "rk4", steps=steps)
@@ -42,6 +42,6 @@ def test_sweep_stores_outcomes_alone():
         finally:
             tracemalloc.stop()
 
-    most(20)  # Modules that are imported late.
-    # A state of 256 cells at each of 2000 steps would be eight megabytes.
+    most(20)  # Imports late modules.
+    # The states of 256 cells at 2000 steps would take eight megabytes.
     assert most(2000) < most(20) + 100_000

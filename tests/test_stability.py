@@ -1,4 +1,4 @@
-"""Extremes: `auto` is never wrong without a word, `rk4` never certified beyond its limit, energy is kept."""
+"""Extreme scenes: `auto` certifies no wrong run, `rk4` certifies no run beyond its limit, energy is conserved."""
 
 from math import pi, sqrt
 
@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from solutions import solve
 
+from benchmarks import stability
 from ringsweep.models import MODELS
 from ringsweep.models.ring.record import Outcome
 from ringsweep.quantities.variables import JAMMED, OSCILLATORY, RESTING, SEPARATING
@@ -19,7 +20,7 @@ OWN = sqrt(0.076 * XI / (4.47e-5 + 0.076 * XI**2))
 
 
 def draw(count, seed):
-    """Extreme scenes by path: twelve decades of the band, ten of the decay, masses and inertias far apart."""
+    """Random extreme scenes by path, over many decades of v0, alpha, masses and inertias."""
     rng = np.random.default_rng(seed)
 
     def often(usual, low, high):
@@ -46,7 +47,7 @@ def draw(count, seed):
 
 
 @pytest.mark.parametrize(("law", "fine"), [("bengisu-akay", Implicit(1e-10)), ("tustin", Event(1e-13))])
-def test_auto_is_never_wrong_and_silent(cells, law, fine):
+def test_auto_certifies_no_wrong_run_in_extreme_scenes(cells, law, fine):
     columns = draw(600, seed=17)
     if law == "tustin":
         del columns["friction.v0"]
@@ -62,8 +63,8 @@ def test_auto_is_never_wrong_and_silent(cells, law, fine):
 
 
 @pytest.mark.parametrize("law", ["bengisu-akay", "tustin"])
-def test_a_body_too_inert_to_be_moved_by_friction_keeps_its_contacts(cells, law):
-    """Friction that varies loads the contacts all the same: a step too long for it sees reactions that are not."""
+def test_body_with_very_large_inertia_keeps_its_contacts(cells, law):
+    """Friction hardly moves the body, but it still loads the contacts: too long a step would see false reactions."""
     changes = {"body.inertia": 1e6, "drive.amplitude": 2.0, "friction.alpha": 1e5}
     changes |= {"friction.v0": np.geomspace(1e-9, 1e-3, 7)} if law == "bengisu-akay" else {}
     found = solve(Auto(), cells(changes, law=law, drive="arctan"))
@@ -72,8 +73,8 @@ def test_a_body_too_inert_to_be_moved_by_friction_keeps_its_contacts(cells, law)
 
 
 @pytest.mark.parametrize("law", ["bengisu-akay", "stiction"])
-def test_an_arc_that_goes_all_round_has_no_seam(cells, law):
-    """Rounding leaves a sliver of the rest of the ring, on which this body would jam."""
+def test_arc_all_round_the_ring_has_no_gap(cells, law):
+    """Rounding leaves a very narrow rest of the ring, on which this body would jam."""
     changes = {"zone.half_angle": pi, "zone.center": np.linspace(-3.0, 3.0, 9), "initial.omega": 60.0}
     changes |= {"friction.rough.mu_s": 0.1, "friction.rough.mu_k": 0.1}
     jammed = {"friction.rest.mu_s": 3.0, "friction.rest.mu_k": 3.0}
@@ -83,8 +84,8 @@ def test_an_arc_that_goes_all_round_has_no_seam(cells, law):
     np.testing.assert_allclose(seamed.t_separation, seamless.t_separation, rtol=1e-12)
 
 
-def test_the_way_into_a_jam_is_no_separation(cells):
-    """Both reactions grow without bound there, and the series of either meets a singularity."""
+def test_run_that_approaches_a_jam_is_jammed_and_not_separating(cells):
+    """Both reactions grow without bound near the jam, and their power series come to a singularity."""
     changes = {
         "gravity": 1658.5181940544094,
         "friction.alpha": 398303945.4118323,
@@ -105,7 +106,7 @@ def test_the_way_into_a_jam_is_no_separation(cells):
 
 
 @pytest.mark.parametrize("law", ["bengisu-akay", "tustin"])
-def test_a_tail_that_does_not_decay_is_static_friction_throughout(cells, law):
+def test_alpha_zero_is_static_friction_at_all_speeds(cells, law):
     changes = {"friction.alpha": 0.0, "drive.amplitude": 2.0, "time.span": 5.0}
     changes |= {"friction.v0": 1e-6} if law == "bengisu-akay" else {}
     level = {"friction.rough.mu_k": 0.5, "friction.rest.mu_k": 0.2}
@@ -115,7 +116,7 @@ def test_a_tail_that_does_not_decay_is_static_friction_throughout(cells, law):
 
 
 @pytest.mark.parametrize("law", ["bengisu-akay", "tustin", "stiction"])
-def test_a_body_at_rest_on_top_falls_off(cells, law):
+def test_body_at_rest_on_top_of_the_ring_separates_at_once(cells, law):
     found = solve(Auto(), cells({"initial.phi": pi}, law=law, drive="arctan"))
     assert found.regime == SEPARATING
     assert found.t_separation == 0.0
@@ -123,8 +124,8 @@ def test_a_body_at_rest_on_top_falls_off(cells, law):
 
 
 @pytest.mark.parametrize("rtol", [1e-3, 1e-4])
-def test_a_loose_tolerance_makes_no_reaction_vanish(cells, rtol):
-    """The series of a reaction has roots of its own and, if it is poor, others."""
+def test_loose_tolerance_causes_no_false_separation(cells, rtol):
+    """An inaccurate power series of a reaction has roots that the reaction does not have."""
     static = {f"friction.{place}.mu_s": np.linspace(1.0, 5.0, 19) * mu for place, mu in (("rough", 0.3), ("rest", 0.1))}
     batch = cells(
         static | {"drive.amplitude": 2.0, "time.span": 10.0, "friction.alpha": 1e5}, law="tustin", drive="arctan"
@@ -135,15 +136,15 @@ def test_a_loose_tolerance_makes_no_reaction_vanish(cells, rtol):
 
 
 class TestRungeKutta:
-    """Beyond the limit of stability nothing is certified, whatever makes the system fast."""
+    """`rk4` certifies no run beyond its limit of stability, whatever makes the system fast."""
 
     @staticmethod
     def run(batch, steps):
         result = RK4(steps).run(batch, MODELS["ring"].outcomes)
         return result, dict(zip(Outcome._fields, result.rows.T, strict=True))
 
-    def test_a_swing_too_fast_for_the_step(self, cells):
-        """Without any friction the eigenvalue is that of a pendulum, on the imaginary axis."""
+    def test_rk4_does_not_certify_a_swing_too_fast_for_its_step(self, cells):
+        """Without friction the eigenvalue is that of a pendulum, on the imaginary axis."""
         gravity = np.array([1e3, 1e5, 7e5, 9e5, 1e6, 1.2e6, 2e6])
         changes = {"gravity": gravity, "initial.phi": 1e-3, "time.span": 10.0}
         batch = cells(FRICTIONLESS | changes, drive="arctan")
@@ -153,14 +154,14 @@ class TestRungeKutta:
         assert not result.certified[true > STABILITY_LIMIT].any()
         assert result.certified[true < 2.0].all()
 
-    def test_a_launch_too_fast_for_the_step(self, cells):
-        """Friction grows with the square of the speed: the launch decays at a rate proportional to it."""
+    def test_rk4_does_not_certify_a_launch_too_fast_for_its_step(self, cells):
+        """Friction grows with the square of the speed, so the speed decays at a rate proportional to itself."""
         result, _ = self.run(cells({"initial.omega": np.array([1e2, 1e5]), "time.span": 0.02}, drive="arctan"), 20)
         slow, fast = result.stiffness
         assert 0.0 < slow < STABILITY_LIMIT < fast
         assert not result.certified[1]
 
-    def test_of_bands_narrower_and_narrower(self, cells):
+    def test_rk4_does_not_certify_a_stiction_band_too_narrow_for_its_step(self, cells):
         v0 = np.geomspace(1e-12, 1.0, 25)
         result, _ = self.run(cells({"friction.v0": v0, "drive.amplitude": 2.0}, drive="arctan"), 1500)
         assert not result.certified[result.stiffness > STABILITY_LIMIT].any()
@@ -169,7 +170,7 @@ class TestRungeKutta:
 
 
 class TestEnergy:
-    """Without friction and drive a body launched from the bottom keeps its energy."""
+    """Without friction and drive a body launched from the bottom conserves its energy."""
 
     OMEGA = 10.0
 
@@ -182,14 +183,23 @@ class TestEnergy:
         return abs(kinetic + potential - 1.0)[0], found.steps[0]
 
     @pytest.mark.parametrize(("law", "method"), [("bengisu-akay", Implicit), ("stiction", Event)])
-    def test_piecewise(self, cells, law, method):
-        """No more than the tolerance of each step, summed up."""
+    def test_energy_drift_of_event_and_implicit_is_within_the_sum_of_tolerances(self, cells, law, method):
+        """The drift is less than the tolerance of a step times the number of steps."""
         for rtol in (1e-7, 1e-10):
             drift, steps = self.drift(cells, method(rtol, certify=False), law, 1000.0)
             assert drift < steps * rtol
 
-    def test_constant_step(self, cells):
-        """Runge-Kutta 4 loses energy with the fifth power of the step."""
+    def test_energy_loss_of_rk4_is_of_fifth_order_in_the_step(self, cells):
         steps = np.array([1000, 2000, 4000])
         losses = [self.drift(cells, RK4(int(n), certify=False), "bengisu-akay", 10.0)[0] for n in steps]
         assert -np.polyfit(np.log(steps), np.log(losses), 1)[0] == pytest.approx(5.0, abs=0.3)
+
+
+def test_extreme_scenes_and_their_closed_forms_can_be_made():
+    """The benchmark takes the reference's functions: an edit there must not leave it broken."""
+    names = [extreme.name for extreme in stability.extremes()]
+    assert len(names) == len(set(names))
+    epsilon, first, second = stability._balances(0.0, 0.0, 0.0, 0.0)
+    weight = stability.BODY["mass"] * stability.GRAVITY
+    assert epsilon == 0.0
+    assert (first + second) * np.cos(stability.BETA) == pytest.approx(weight)

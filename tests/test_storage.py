@@ -1,4 +1,4 @@
-"""Results reach the disk whole or not at all, and come back as they were."""
+"""Result files: written completely or not at all, and read back unchanged."""
 
 import json
 import os
@@ -35,7 +35,7 @@ def sweep() -> xr.Dataset:
     )
 
 
-def test_what_is_loaded_is_what_was_saved(sweep, tmp_path):
+def test_loaded_dataset_equals_the_saved_one(sweep, tmp_path):
     netcdf.save(sweep, tmp_path / "out.nc")
     loaded = netcdf.load(tmp_path / "out.nc")
     xr.testing.assert_identical(loaded, sweep)
@@ -44,7 +44,7 @@ def test_what_is_loaded_is_what_was_saved(sweep, tmp_path):
     assert loaded["regime"].attrs["flag_values"].dtype == np.int8
 
 
-def test_no_variable_has_a_fill_value_and_large_ones_are_compressed(sweep, tmp_path):
+def test_no_variable_has_a_fill_value_and_large_variables_are_compressed(sweep, tmp_path):
     netcdf.save(sweep, tmp_path / "out.nc")
     with netCDF4.Dataset(tmp_path / "out.nc") as file:
         assert not [name for name, variable in file.variables.items() if "_FillValue" in variable.ncattrs()]
@@ -66,7 +66,7 @@ def test_attributes_without_a_netcdf_type_are_written_as_json(sweep, tmp_path):
 
 
 @pytest.mark.parametrize("failure", [OSError("disk full"), KeyboardInterrupt()])
-def test_a_failing_save_leaves_the_old_file_intact_and_nothing_else(sweep, tmp_path, monkeypatch, failure):
+def test_failing_save_leaves_the_old_file_and_no_temporary_file(sweep, tmp_path, monkeypatch, failure):
     path = tmp_path / "out.nc"
     netcdf.save(sweep, path)
     before = path.read_bytes()
@@ -82,7 +82,7 @@ def test_a_failing_save_leaves_the_old_file_intact_and_nothing_else(sweep, tmp_p
     assert os.listdir(tmp_path) == ["out.nc"]
 
 
-def test_a_file_that_reads_back_differently_does_not_count(sweep, tmp_path, monkeypatch):
+def test_file_that_reads_back_differently_is_removed(sweep, tmp_path, monkeypatch):
     write = xr.Dataset.to_netcdf
     monkeypatch.setattr(
         xr.Dataset, "to_netcdf", lambda self, *a, **k: write(self.assign(steps=self.steps + 1), *a, **k)
@@ -109,7 +109,7 @@ def test_saving_follows_a_symbolic_link_and_keeps_usual_permissions(sweep, tmp_p
         ("n" * 300 + ".nc", "cannot be written"),
     ],
 )
-def test_a_place_that_cannot_be_written_is_refused_before_any_work(tmp_path, name, problem):
+def test_unwritable_path_is_refused(tmp_path, name, problem):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match=problem) as caught:
         netcdf.check_writable(tmp_path / name)
@@ -117,7 +117,7 @@ def test_a_place_that_cannot_be_written_is_refused_before_any_work(tmp_path, nam
     assert os.listdir(tmp_path) == ["file"]
 
 
-def test_a_folder_that_refuses_files_is_found_by_trying(tmp_path, monkeypatch):
+def test_folder_without_permission_to_write_is_refused(tmp_path, monkeypatch):
     def refuse(*_, **__):
         raise PermissionError(13, "Permission denied")
 
@@ -126,14 +126,14 @@ def test_a_folder_that_refuses_files_is_found_by_trying(tmp_path, monkeypatch):
         netcdf.check_writable(tmp_path / "out.nc")
 
 
-def test_checking_leaves_an_existing_file_alone(tmp_path):
+def test_check_of_a_path_does_not_change_an_existing_file(tmp_path):
     (tmp_path / "out.nc").write_text("old")
     netcdf.check_writable(tmp_path / "out.nc")
     assert (tmp_path / "out.nc").read_text() == "old"
     assert os.listdir(tmp_path) == ["out.nc"]
 
 
-def test_load_says_what_is_wrong_with_a_file(tmp_path):
+def test_load_names_the_problem_of_a_file(tmp_path):
     (tmp_path / "text.nc").write_text("time,phi\n0,0\n")
     xr.Dataset({"a": 1}, attrs={"Conventions": "CF-1.11"}).to_netcdf(tmp_path / "foreign.nc")
     for name, problem in {
@@ -146,7 +146,7 @@ def test_load_says_what_is_wrong_with_a_file(tmp_path):
             netcdf.load(tmp_path / name)
 
 
-def test_a_truncated_file_is_damaged_not_short(sweep, tmp_path):
+def test_truncated_file_is_reported_as_damaged(sweep, tmp_path):
     netcdf.save(sweep, tmp_path / "out.nc")
     whole = (tmp_path / "out.nc").read_bytes()
     (tmp_path / "out.nc").write_bytes(whole[: len(whole) // 2])
@@ -154,7 +154,7 @@ def test_a_truncated_file_is_damaged_not_short(sweep, tmp_path):
         netcdf.load(tmp_path / "out.nc")
 
 
-def test_flags_are_told_in_words_and_what_has_none_is_refused():
+def test_words_replace_flags_and_a_variable_without_flags_is_refused():
     flags = {"long_name": "regime", "flag_values": np.array([0, 3], "int8"), "flag_meanings": "resting separating"}
     told = ringsweep.words(xr.DataArray([[3, 0, 7]], dims=("a", "b"), attrs=flags))
     assert told.values.tolist() == [["separating", "resting", ""]]

@@ -1,4 +1,4 @@
-"""A sweep on disk goes on after whatever stopped it, and its file is that of a sweep never stopped."""
+"""A stopped sweep continues, and its file equals the file of a sweep that was never stopped."""
 
 import errno
 import json
@@ -16,11 +16,11 @@ import ringsweep
 from benchmarks.kills import POINTS, killed_at, same_bits
 from ringsweep import cli
 from ringsweep.config import load
-from ringsweep.runs.pace import Pace
 from ringsweep.runs.sweep import write
+from ringsweep.runs.task_sizes import TaskSizes
 from ringsweep.storage import netcdf
+from ringsweep.storage.checkpoint import Checkpoint, open_checkpoint
 from ringsweep.storage.chunks import Layout
-from ringsweep.storage.partial import Partial, owned
 from ringsweep.storage.provenance import identity
 
 SWEEP = {
@@ -30,7 +30,7 @@ SWEEP = {
 
 @pytest.fixture(scope="module")
 def config(scene, tmp_path_factory):
-    """A file that describes a sweep of 72 cells."""
+    """Configuration file of a sweep of 72 cells."""
     path = tmp_path_factory.mktemp("never") / "sweep.yaml"
     path.write_text(yaml.safe_dump({"scene": scene, "sweep": SWEEP}, sort_keys=False))
     return path
@@ -38,7 +38,7 @@ def config(scene, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def never_stopped(config):
-    """The file of a run that nothing stopped."""
+    """Result file of a sweep that was never stopped."""
     path = config.with_name("never.nc")
     ringsweep.run(config, path, progress=False).close()
     return path
@@ -46,17 +46,17 @@ def never_stopped(config):
 
 @pytest.fixture
 def small_tasks(monkeypatch):
-    """Partial of at most three cells, so that a small sweep has many."""
-    monkeypatch.setattr(Pace, "most", 3)
+    """Limit tasks to three cells, so that a small sweep has many tasks."""
+    monkeypatch.setattr(TaskSizes, "max_cells", 3)
 
 
 class Stopped(BaseException):
-    """What stops a sweep in these tests."""
+    """Raised in these tests to stop a sweep."""
 
 
 @contextmanager
 def stopping(monkeypatch, owner, name, after):
-    """Let a method raise `Stopped` instead of its work once it has been called so often."""
+    """Let a method raise `Stopped` after it has been called `after` times."""
     method, count = getattr(owner, name), iter(range(after))
 
     def stop(*args, **kwargs):
@@ -71,9 +71,9 @@ def stopping(monkeypatch, owner, name, after):
 
 @pytest.fixture
 def half_done(config, tmp_path, monkeypatch, small_tasks):
-    """Where a sweep was to be written that was stopped after ten tasks."""
+    """Path of the result file of a sweep that was stopped after ten tasks."""
     target = tmp_path / "out.nc"
-    with stopping(monkeypatch, Partial, "put", 10), pytest.raises(Stopped):
+    with stopping(monkeypatch, Checkpoint, "put", 10), pytest.raises(Stopped):
         ringsweep.run(config, target, progress=False)
     return target
 
@@ -83,13 +83,13 @@ def tasks_of(target):
 
 
 def left(target):
-    """Everything in the folder of a file."""
+    """Names of all files in the folder of a file."""
     return sorted(path.name for path in target.parent.iterdir())
 
 
-class TestGoingOn:
+class TestContinuation:
     @pytest.mark.parametrize("point", POINTS)
-    def test_a_killed_process_costs_nothing_but_time(self, config, never_stopped, tmp_path, point):
+    def test_killed_sweep_continues_to_the_same_bits(self, config, never_stopped, tmp_path, point):
         target = tmp_path / "out.nc"
         arguments = ["run", str(config), "-o", str(target)]
         assert killed_at(point, min(2, POINTS[point]), arguments).returncode == -9
@@ -100,31 +100,33 @@ class TestGoingOn:
 
     def test_finished_tasks_are_not_computed_again(self, config, half_done, monkeypatch, caplog):
         assert len(tasks_of(half_done)) == 10
-        put, computed = Partial.put, []
-        monkeypatch.setattr(Partial, "put", lambda self, p, *rest: (computed.extend(p), put(self, p, *rest)))
+        put, computed = Checkpoint.put, []
+        monkeypatch.setattr(Checkpoint, "put", lambda self, p, *rest: (computed.extend(p), put(self, p, *rest)))
         with caplog.at_level("INFO", logger="ringsweep"):
             ringsweep.run(config, half_done, progress=False).close()
         assert f"going on: {72 - len(computed)} of 72 cells are done" in caplog.text
         assert 0 < len(computed) < 72
 
-    def test_a_stop_tells_how_to_go_on(self, config, tmp_path, monkeypatch, capsys, caplog, small_tasks):
-        put = Partial.put
+    def test_interrupted_sweep_reports_how_to_continue(
+        self, config, tmp_path, monkeypatch, capsys, caplog, small_tasks
+    ):
+        put = Checkpoint.put
 
         def interrupted(*arguments):
             put(*arguments)
             signal.raise_signal(signal.SIGINT)
 
-        monkeypatch.setattr(Partial, "put", interrupted)
+        monkeypatch.setattr(Checkpoint, "put", interrupted)
         assert cli.main(["run", str(config), "-o", str(tmp_path / "out.nc")]) == 130
         message = capsys.readouterr().err
         assert message.count("\n") == 1
         assert "stopping when the tasks under way are done" in caplog.text
         assert "interrupted" in message
         assert "cells are kept in" in message
-        assert "the same command goes on from there" in message
+        assert "the same command goes on" in message
 
-    def test_what_decides_no_bit_may_change_meanwhile(self, scene, half_done, never_stopped):
-        """Units as typed, the order of keys, the value of what is swept."""
+    def test_sweep_continues_after_a_change_that_does_not_affect_its_bits(self, scene, half_done, never_stopped):
+        """Units as typed, the order of keys, and the value of a swept path may change."""
         scene = dict(reversed(scene.items())) | {"drive": {"amplitude": "3 rad/s", "law": "arctan"}}
         grid = {"drive.amplitude": SWEEP["grid"]["drive.amplitude"]}
         grid["zone.half_angle"] = {"linspace": [np.radians(5), np.radians(40), 8]}
@@ -132,8 +134,8 @@ class TestGoingOn:
         assert same_bits(half_done, never_stopped)
 
 
-class TestNeverMixed:
-    def test_another_sweep_is_refused_by_what_changed(self, config, half_done, capsys):
+class TestCheckpoint:
+    def test_checkpoint_of_another_sweep_is_refused_with_the_difference(self, config, half_done, capsys):
         text = config.read_text().replace("mu_k: 0.3", "mu_k: 0.31")
         other = half_done.with_name("other.yaml")
         other.write_text(text)
@@ -144,26 +146,24 @@ class TestNeverMixed:
         assert "--fresh" in message
         assert tasks_of(half_done) == before
 
-    def test_another_version_is_refused(self, config, half_done, monkeypatch):
+    def test_checkpoint_of_another_version_is_refused(self, config, half_done, monkeypatch):
         now = identity(load(config)) | {"numba": "99.0"}
         monkeypatch.setattr("ringsweep.runs.sweep.identity", lambda _: now)
         with pytest.raises(ringsweep.InputError, match=r"numba was .*, is 99\.0"):
             ringsweep.run(config, half_done, progress=False)
 
-    def test_fresh_starts_over(self, config, half_done, never_stopped):
+    def test_fresh_discards_the_checkpoint(self, config, half_done, never_stopped):
         damaged = tasks_of(half_done)[0]
         damaged.write_bytes(b"")
         ringsweep.run(config, half_done, fresh=True, progress=False).close()
         assert same_bits(half_done, never_stopped)
 
     @pytest.mark.parametrize("damage", ["truncated", "empty", "one bit", "directory", "of another sweep", "no archive"])
-    def test_a_damaged_or_foreign_task_is_noticed_and_computed_again(
-        self, config, half_done, never_stopped, caplog, damage
-    ):
+    def test_damaged_or_foreign_task_file_is_computed_again(self, config, half_done, never_stopped, caplog, damage):
         path = tasks_of(half_done)[4]
         content = bytearray(path.read_bytes())
         if damage == "of another sweep":
-            with owned(half_done.with_name("b.nc"), {"a": "b"}, Layout([72])) as others:
+            with open_checkpoint(half_done.with_name("b.nc"), {"a": "b"}, Layout([72])) as others:
                 others.put(np.arange(3), {"regime": np.zeros(3, dtype="int8")}, "none")
                 path = path.with_name(next(iter(others.files)).name)
                 shutil.copy(next(iter(others.files)), path)
@@ -171,7 +171,7 @@ class TestNeverMixed:
             with np.load(path) as members:
                 content[content.index(members["cells"].tobytes())] ^= 4
             changed = bytearray(path.read_bytes())
-            # The name of a member, where an archive has no checksum.
+            # The directory of an archive, which has the names of its members, has no checksum.
             changed[changed.rindex(b"cells.npy")] ^= 1
             cut = {
                 "truncated": content[:-200],
@@ -187,12 +187,12 @@ class TestNeverMixed:
         assert same_bits(half_done, never_stopped)
 
     @pytest.mark.parametrize("text", ["", "[1]", "5", "null", '{"scene.model": 1}', "\xff"])
-    def test_a_damaged_list_of_what_decides_is_no_obstacle(self, config, half_done, never_stopped, text):
+    def test_sweep_continues_with_a_damaged_manifest(self, config, half_done, never_stopped, text):
         half_done.with_name("out.nc.partial").joinpath("sweep.json").write_bytes(text.encode("latin-1"))
         ringsweep.run(config, half_done, progress=False).close()
         assert same_bits(half_done, never_stopped)
 
-    def test_tasks_that_vanish_meanwhile_are_computed_again(
+    def test_task_files_that_vanish_before_the_merge_are_computed_again(
         self, config, half_done, never_stopped, monkeypatch, caplog
     ):
         merge = netcdf.write
@@ -205,25 +205,25 @@ class TestNeverMixed:
 
         monkeypatch.setattr(netcdf, "write", vanish)
         ringsweep.run(config, half_done, progress=False).close()
-        assert "looking for what is missing" in caplog.text
+        assert "the missing cells are computed again" in caplog.text
         assert same_bits(half_done, never_stopped)
 
     @pytest.mark.parametrize("fresh", [False, True])
-    def test_a_file_of_something_else_is_not_replaced(self, config, tmp_path, fresh):
+    def test_file_that_is_no_sweep_is_not_replaced(self, config, tmp_path, fresh):
         (tmp_path / "notes.txt").write_text("precious")
         with pytest.raises(ringsweep.InputError, match=r"notes\.txt"):
             ringsweep.run(config, tmp_path / "notes.txt", fresh=fresh, progress=False)
         assert (tmp_path / "notes.txt").read_text() == "precious"
 
-    def test_two_at_once_are_one(self, config, tmp_path, capsys):
+    def test_second_process_on_the_same_output_is_refused(self, config, tmp_path, capsys):
         target = tmp_path / "out.nc"
         loaded = load(config)
-        with owned(target, identity(loaded), Layout([9, 8])):
+        with open_checkpoint(target, identity(loaded), Layout([9, 8])):
             assert cli.main(["run", str(config), "-o", str(target)]) == 2
         assert "another ringsweep is computing it" in capsys.readouterr().err
         assert left(target) == []
 
-    def test_a_finished_file_is_not_computed_again_and_one_of_another_sweep_is_named(
+    def test_finished_sweep_is_not_computed_again_and_another_sweep_is_replaced_with_a_warning(
         self, config, never_stopped, tmp_path, caplog
     ):
         target = tmp_path / "out.nc"
@@ -234,9 +234,11 @@ class TestNeverMixed:
         assert "scene.time.span was 4.0, is 3.0" in caplog.text
 
 
-class TestWhereTheDiskFails:
+class TestFullDisk:
     @pytest.mark.parametrize("name", ["fsync", "replace"])
-    def test_one_message_and_nothing_half_written(self, config, never_stopped, tmp_path, monkeypatch, capsys, name):
+    def test_full_disk_gives_one_message_and_no_incomplete_file(
+        self, config, never_stopped, tmp_path, monkeypatch, capsys, name
+    ):
         target = tmp_path / "out.nc"
         calls = iter(range(5))
         function = getattr(os, name)
@@ -247,7 +249,7 @@ class TestWhereTheDiskFails:
             return function(*args, **kwargs)
 
         with monkeypatch.context() as patch:
-            patch.setattr(Pace, "most", 3)
+            patch.setattr(TaskSizes, "max_cells", 3)
             patch.setattr(f"os.{name}", full)
             assert cli.main(["run", str(config), "-o", str(target)]) == 1
         message = capsys.readouterr().err.splitlines()[-1]
@@ -259,7 +261,7 @@ class TestWhereTheDiskFails:
         assert cli.main(["run", str(config), "-o", str(target)]) == 0
         assert same_bits(target, never_stopped)
 
-    def test_a_file_that_does_not_read_back_is_not_left(self, config, tmp_path, monkeypatch, capsys):
+    def test_file_that_does_not_read_back_is_removed(self, config, tmp_path, monkeypatch, capsys):
         target = tmp_path / "out.nc"
         monkeypatch.setattr(netcdf, "_checksums", lambda *_: {})
         assert cli.main(["run", str(config), "-o", str(target)]) == 1
@@ -267,13 +269,13 @@ class TestWhereTheDiskFails:
         assert left(target) == ["out.nc.partial"]
 
 
-class TestFile:
-    def test_holds_what_a_sweep_in_memory_gives(self, config, never_stopped):
+class TestResultFile:
+    def test_file_equals_the_sweep_in_memory(self, config, never_stopped):
         undated = {"date_created": ""}
         in_memory = ringsweep.run(config, progress=False)
         xr.testing.assert_identical(netcdf.load(never_stopped).assign_attrs(undated), in_memory.assign_attrs(undated))
 
-    def test_is_enough_to_run_it_again(self, never_stopped, tmp_path, monkeypatch, capsys):
+    def test_file_is_enough_to_repeat_its_sweep(self, never_stopped, tmp_path, monkeypatch, capsys):
         monkeypatch.chdir(tmp_path)
         again = tmp_path / "again.nc"
         assert cli.main(["run", str(never_stopped), "-o", str(again)]) == 0
@@ -287,8 +289,7 @@ class TestFile:
         assert cli.main(["run", str(again)]) == 0
         assert "holds this sweep already" in capsys.readouterr().out
 
-    def test_is_made_of_chunks_that_are_read_alone(self, scene, tmp_path, monkeypatch):
-        """Of points and laws beside a grid too, whatever the chunks are."""
+    def test_file_is_compressed_in_chunks_of_the_layout(self, scene, tmp_path, monkeypatch):
         monkeypatch.setattr("ringsweep.storage.chunks.CHUNK", 6)
         monkeypatch.setattr(netcdf, "COMPRESSED_FROM", 1)
         axes = {
@@ -304,8 +305,8 @@ class TestFile:
         xr.testing.assert_equal(found.load(), in_memory)
         found.close()
 
-    def test_of_shared_dimensions_is_repeated_with_them(self, scene, tmp_path, caplog):
-        """A configuration cannot name them; the coordinates of the file do."""
+    def test_file_with_shared_dimensions_is_repeated_with_them(self, scene, tmp_path, caplog):
+        """A configuration cannot name shared dimensions; the coordinates of the file do."""
         axes = {
             "drive.amplitude": xr.DataArray([[0.5, 1.0], [2.0, 8.0]], dims=("i", "j")),
             "body.mass": xr.DataArray([0.05, 0.06], dims="j"),
@@ -318,18 +319,18 @@ class TestFile:
         assert not write(load(two), one, progress=False)
         assert "replaced" not in caplog.text
 
-    def test_a_single_run_has_no_dimension(self, scene, tmp_path):
+    def test_file_of_a_single_run_has_no_dimension(self, scene, tmp_path):
         with ringsweep.run({"scene": scene}, tmp_path / "out.nc", progress=False) as found:
             assert not found.sizes
             xr.testing.assert_equal(found.load(), ringsweep.run({"scene": scene}, progress=False))
 
 
 @pytest.mark.parametrize("solver", ["auto", {"method": "rk4", "steps": 300}], ids=["event", "rk4"])
-def test_the_order_of_computation_changes_no_bit(scene, monkeypatch, solver):
+def test_order_of_computation_does_not_change_bits(scene, monkeypatch, solver):
     axes = {"drive.amplitude": np.geomspace(0.5, 8.0, 9), "zone.half_angle": np.radians([5.0, 20.0, 40.0])}
     whole = ringsweep.sweep(scene, axes, solver=solver, progress=False, jobs=1)
     for size, jobs in ((1, 2), (5, 1), (20, 2)):
-        monkeypatch.setattr(Pace, "next", lambda self, left, size=size: size)
+        monkeypatch.setattr(TaskSizes, "next", lambda self, left, size=size: size)
         parted = ringsweep.sweep(scene, axes, solver=solver, progress=False, jobs=jobs)
         for name in whole.data_vars:
             assert parted[name].values.tobytes() == whole[name].values.tobytes(), name

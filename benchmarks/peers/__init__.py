@@ -1,1 +1,1 @@
-"""What a specialist would use instead: each peer with its own physics, and events as it offers them."""
+"""Other libraries (peers), with physics of their own, and with events as each library offers them."""

@@ -1,4 +1,4 @@
-"""`rk4.c`, Runge-Kutta 4 by hand in scalar C, compiled at run time."""
+"""`rk4.c`, Runge-Kutta 4 in scalar C, compiled at run time."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ from benchmarks.peers.physics import (
 )
 
 FLAGS = ("-O3", "-march=native", "-ffast-math")
-#: Angular velocity below which a reversal does not count, as the package has it.
+#: Angular velocity below which a reversal does not count; the package has the same value.
 _EPSILON_OMEGA = 1e-3
-#: Columns of its outcomes.
+#: Number of columns of the outcomes of `rk4.c`, and the columns used here.
 _COLUMNS, _T_END, _PHI_END, _CONTACT = 14, 0, 1, 3
 
 
@@ -48,7 +48,7 @@ class _Scene(ctypes.Structure):
 
 
 def compiler() -> str | None:
-    """What the compiler calls itself, or None if there is none."""
+    """First line of `cc --version`, or None if there is no compiler."""
     found = shutil.which("cc")
     if found is None:
         return None
@@ -62,7 +62,7 @@ def _library() -> Any:
         target = Path(directory) / "rk4.so"
         compiled = target.with_suffix(".o")
         subprocess.run(["cc", *FLAGS, "-fPIC", "-c", str(source), "-o", str(compiled)], check=True)
-        # Linked with -ffast-math it would have the whole process that loads it take the smallest numbers for zero.
+        # Linked without -ffast-math, which would make the whole process flush denormal numbers to zero.
         subprocess.run(["cc", "-shared", str(compiled), "-o", str(target), "-lm"], check=True)
         run = ctypes.CDLL(str(target)).run
     vector = np.ctypeslib.ndpointer(dtype=np.float64, flags="C_CONTIGUOUS")
@@ -74,7 +74,7 @@ def _library() -> Any:
 
 
 def ring(law: Law, cells: Sequence[Cell], steps: int) -> Callable[[], Found]:
-    """A call that runs cells of the ring."""
+    """Function that runs cells of the ring with `steps` steps."""
     run = _library()
     amplitudes, half_angles = (np.array(column) for column in zip(*cells, strict=True))
     scene = _Scene(MASS, INERTIA, HALF_DISTANCE, BALL, RADIUS, GRAVITY, *ROUGH, *REST, *law, _EPSILON_OMEGA)

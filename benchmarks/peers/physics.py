@@ -1,9 +1,9 @@
-"""The scenes of the benchmarks as a user of another library would write them; nothing of ringsweep is used.
+"""The scenes of the benchmarks as a user of another library would write them, without anything of ringsweep.
 
-Formulas are arithmetic on whatever they are given, so that floats, JAX arrays and heyoka's expressions share them: a
-*language* is a namespace with ``sin``, ``cos``, ``exp``, ``atan`` and ``log1p`` for its kind of numbers.
-The state on the ring is (rho, u): angle and angular velocity relative to the ring, so that a creep far below the
-ring's own velocity is resolved. On the belt it is (x, velocity, z), of which z is the deflection of the bristles.
+Floats, JAX arrays and heyoka's expressions share the formulas. A *language* is a namespace with ``sin``, ``cos``,
+``exp``, ``atan`` and ``log1p`` for one kind of numbers. The state on the ring is (rho, u), angle and angular velocity
+relative to the ring, which resolves creep far below the velocity of the ring. The state on the belt is (x, velocity,
+z); z is the deflection of the bristles.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ S2B, C2B = 2.0 * SB * CB, CB * CB - SB * SB
 XI = (RADIUS - BALL) * CB
 ABOUT_AXIS = INERTIA + MASS * XI * XI
 
-BELT_SPAN, STIFFNESS, WEIGHT = 30.0, 2.0, 9.81  # of a body of 1 kg
+BELT_SPAN, STIFFNESS, WEIGHT = 30.0, 2.0, 9.81  # WEIGHT of 1 kg, N
 SIGMA = (1e5, 1e5**0.5, 0.1)
 MU_S, MU_K, V_S = 0.15, 0.1, 1e-3
 
 
 class Law(NamedTuple):
-    """Bengisu and Akay's law; stiction, its limit, if `v0` is 0."""
+    """Bengisu-Akay law; if `v0` is 0, its limit stiction."""
 
     alpha: float
     v0: float
@@ -47,7 +47,7 @@ FLOATS = SimpleNamespace(sin=sin, cos=cos, exp=exp, atan=atan, log1p=log1p)
 
 
 class Found(NamedTuple):
-    """What a peer found in some cells: value at the end, and time of separation or NaN."""
+    """Outcomes of a peer in some cells: value at the end, and time of separation or NaN."""
 
     end: Any
     separation: Any
@@ -58,10 +58,10 @@ def _same(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class Formulas(NamedTuple):
-    """The ring in some language."""
+    """Formulas of the ring in a language."""
 
     ring: Callable[..., Any]
-    """(t, amplitude) -> angle, velocity and acceleration of the ring."""
+    """(t, amplitude) -> angle (rad), angular velocity and angular acceleration of the ring."""
     band: Callable[..., Any]
     """(u, sign, mu_s, mu_k) -> K of a contact slower than v0 in the direction `sign`."""
     slip: Callable[..., Any]
@@ -69,11 +69,11 @@ class Formulas(NamedTuple):
     balance: Callable[..., Any]
     """(phi, omega, K1, K2) -> angular acceleration, both reactions times the positive D / M."""
     stuck: Callable[..., Any]
-    """(phi, omega, epsilon, mu_s1, mu_s2) -> both reactions, reserves against breaking away backward, forward."""
+    """(phi, omega, epsilon, mu_s1, mu_s2) -> both reactions, reserves against breakaway backward and forward."""
 
 
 def formulas(language: Any, law: Law, compiled: Callable[..., Any] = _same) -> Formulas:
-    """The ring in a language, each formula passed through `compiled`."""
+    """Formulas of the ring in a language; `compiled` is applied to each formula."""
     sin, cos, exp, atan, log1p = language.sin, language.cos, language.exp, language.atan, language.log1p
     alpha, v0 = law
 
@@ -108,8 +108,9 @@ def formulas(language: Any, law: Law, compiled: Callable[..., Any] = _same) -> F
 
     @compiled
     def stuck(phi, omega, epsilon, mu_1, mu_2):
-        # The acceleration is the ring's, so the moment gives the friction F, the tangential balance the difference d of
-        # the reactions, and the radial one a quadratic for their sum: both contacts share one saturation of mu_s.
+        # The acceleration is that of the ring. So the moment gives the friction F, the tangential balance gives the
+        # difference d of the reactions, and the radial balance gives a quadratic equation for their sum, because both
+        # contacts share one saturation of mu_s.
         F = (ABOUT_AXIS * epsilon + MASS * GRAVITY * XI * sin(phi)) / RADIUS
         d = (MASS * XI * epsilon + MASS * GRAVITY * sin(phi) - F * CB) / SB
         Q = MASS * (GRAVITY * cos(phi) + XI * omega * omega)
@@ -124,7 +125,7 @@ def formulas(language: Any, law: Law, compiled: Callable[..., Any] = _same) -> F
 
 
 def lugre(language: Any, compiled: Callable[..., Any] = _same) -> Callable[..., Any]:
-    """(x, velocity, z, v_b, way) -> their rates on the belt; `way` is the sign of the sliding velocity."""
+    """(x, velocity, z, v_b, way) -> rates of x, velocity and z; `way` is the sign of the sliding velocity."""
     exp = language.exp
 
     @compiled
@@ -141,7 +142,7 @@ def lugre(language: Any, compiled: Callable[..., Any] = _same) -> Callable[..., 
 
 BAND, SLIP, STICK = range(3)
 
-#: Guards of each kind of piece, which end it as they fall to zero.
+#: Guards of each kind of piece. A piece ends when one of its guards falls to zero.
 GUARDS = {
     BAND: ("lost_1", "lost_2", "lower", "upper", "turns", "leaves"),
     SLIP: ("lost_1", "lost_2", "lower", "upper", "slows"),
@@ -150,7 +151,7 @@ GUARDS = {
 
 
 class Piece(NamedTuple):
-    """What is held between two restarts, so that the right-hand side is smooth there."""
+    """Parameters that are constant between two restarts, so that the right-hand side is smooth."""
 
     amplitude: float
     sign: float
@@ -163,16 +164,16 @@ class Piece(NamedTuple):
 
 
 class Smooth(NamedTuple):
-    """A piece's right-hand side and guards in some language."""
+    """Right-hand side and guards of a piece in a language."""
 
     rates: Callable[..., Any]
-    """(t, rho, u, *piece) -> their rates."""
+    """(t, rho, u, *piece) -> rates of rho and u."""
     guards: Callable[..., Any]
     """(t, rho, u, *piece) -> guards, in the order of `GUARDS`."""
 
 
 def pieces(f: Formulas, law: Law, compiled: Callable[..., Any] = _same) -> dict[int, Smooth]:
-    """Right-hand side and guards of each kind of piece that the law has."""
+    """Right-hand side and guards, by kind of piece."""
     ring, balance, stuck, limit = f.ring, f.balance, f.stuck, law.v0 / RADIUS
 
     def moving(friction: Callable[..., Any], reserves: Callable[..., Any]) -> Smooth:
@@ -206,27 +207,27 @@ def pieces(f: Formulas, law: Law, compiled: Callable[..., Any] = _same) -> dict[
     return {SLIP: slipping, BAND: moving(f.band, compiled(lambda speed: (speed, limit - speed)))}
 
 
-#: (kind, piece, t, (rho, u)) -> time, state and the guard that ended the piece, or None at the end of the span.
+#: (kind, piece, t, (rho, u)) -> time, state, and the guard that ended the piece, or None at the end of the span.
 Advance = Callable[[int, Piece, float, Any], tuple[float, Any, str | None]]
 
 _MOST_PIECES = 10_000
 
 
 class Automaton:
-    """Pieces one after another: what a specialist writes around an integrator that has terminal events."""
+    """A hybrid automaton: runs pieces one after another with an integrator that has terminal events."""
 
     def __init__(self, law: Law, smooth: dict[int, Smooth]) -> None:
         """`smooth` holds the pieces in floats."""
         self._law, self._smooth = law, smooth
 
     def run(self, cell: Cell, advance: Advance) -> tuple[float, float]:
-        """Angle at the end, and time of separation or NaN; NaN twice for a run that does not end."""
+        """Angle at the end, and time of separation or NaN; both are NaN for a run that does not end."""
         t, y = 0.0, np.zeros(2)
         kind, piece = BAND, place(cell, 0.0, 0.0, -1.0)
         if self._law.v0 == 0.0:
             kind, piece = self._stop(cell, t, 0.0)
         for _ in range(_MOST_PIECES):
-            # Reactions jump with mu: no guard falls to zero that starts below it.
+            # Reactions jump with mu, and a guard that starts below zero does not fall to zero.
             reactions = self._smooth[kind].guards(t, y[0], y[1], *piece)[:2]
             if min(reactions) <= 0.0:
                 event: str | None = "lost_1" if reactions[0] <= 0.0 else "lost_2"
@@ -252,7 +253,7 @@ class Automaton:
         return np.nan, np.nan
 
     def _stop(self, cell: Cell, t: float, rho: float) -> tuple[int, Piece]:
-        """What follows once sliding has ceased, under the limit of the law."""
+        """Kind and piece after sliding has stopped, under stiction."""
         piece = place(cell, rho, 0.0, 1.0)
         backward, forward = self._smooth[STICK].guards(t, rho, 0.0, *piece)[2:]
         if backward > 0.0 and forward > 0.0:
@@ -261,7 +262,7 @@ class Automaton:
 
 
 def place(cell: Cell, rho: float, crossing: float, sign: float) -> Piece:
-    """Piece that holds at `rho`, beyond the edge there if it is being crossed in the direction `crossing`."""
+    """Piece at `rho`; if an edge there is crossed in the direction `crossing`, the piece beyond the edge."""
     amplitude, half_angle = cell
     rho += 1e-9 * crossing
     near = 2.0 * pi * round(rho / (2.0 * pi))

@@ -1,6 +1,6 @@
-"""diffrax: all cells in one vmapped solve, separation a terminating event with a root find.
+"""diffrax: all cells in one vmapped solve; separation is a terminating event with a root find.
 
-It runs in one thread: set XLA_FLAGS before JAX is imported, as the command does.
+To run in one thread, set XLA_FLAGS before JAX is imported, as the command does.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from benchmarks.peers.physics import BELT_SPAN, BETA, RADIUS, REST, ROUGH, SIGMA
 
 jax.config.update("jax_enable_x64", True)
 
-#: Lanes of an explicit solve: many share what an iteration costs, though it lasts as long as the longest run.
+#: Lanes of an explicit solve. Many lanes share the cost of an iteration, though all wait for the longest run.
 LANES = 256
-#: Steps after which a lane gives up and counts as failed: all lanes wait for the last.
+#: Steps after which a lane gives up and counts as failed, because all lanes wait for the last one.
 _MOST_STEPS = {"ring": 20_000, "belt": 100_000}
 
 
@@ -34,12 +34,12 @@ def _solve(method: str, slopes: Any, y: Any, args: Any, rtol: Any, atol: Any, **
     )  # fmt: skip
 
 
-#: Compiled ahead of time, once for all tolerances.
+#: False: compiled ahead of time, once for all tolerances.
 LAZY = False
 
 
 def lanes_of(method: str, cells: int) -> int:
-    """Lanes of one solve of so many cells."""
+    """Number of lanes of one solve of `cells` cells."""
     return max(cells, LANES) if method == "Tsit5" else cells
 
 
@@ -58,7 +58,7 @@ def _ring(law: Law, method: str, lanes: int) -> Callable[..., Any]:
         rough = jnp.mod(rho + half_angle, 2.0 * jnp.pi) < 2.0 * half_angle
         mu_s, mu_k = (jnp.where(rough, *pair) for pair in zip(ROUGH, REST, strict=True))
         sign = jnp.where(u > 0.0, 1.0, -1.0)
-        # The branch not taken must stay finite.
+        # `where` computes both branches, and both must stay finite.
         fast = sign * jnp.maximum(jnp.abs(u), v0 / RADIUS)
         return jnp.where(jnp.abs(u) * RADIUS < v0, f.band(u, sign, mu_s, mu_k), f.slip(fast, sign, mu_s, mu_k))
 
@@ -75,7 +75,7 @@ def _ring(law: Law, method: str, lanes: int) -> Callable[..., Any]:
     def reaction(t: Any, y: Any, args: Any, **_: Any) -> Any:
         return motion(t, y, args)[1]
 
-    # Reactions jump where mu does, which Newton's method does not survive. Lanes without an event bisect to the end.
+    # Reactions jump where mu jumps, and Newton's method fails there. Lanes without an event bisect to the end.
     finder = optimistix.Bisection(rtol=1e-13, atol=1e-13, flip=True)
     scale = jnp.array([1.0, min(1.0, v0 / RADIUS)])
 
@@ -85,7 +85,7 @@ def _ring(law: Law, method: str, lanes: int) -> Callable[..., Any]:
             max_steps=_MOST_STEPS["ring"],
         )  # fmt: skip
         t, y = run.ts[-1], run.ys[-1]
-        # Not `is_successful`: a bisection of a jump ends with a small interval but never with a small value.
+        # Not `is_successful`: a bisection of a jump ends with a small interval, but not with a small value.
         good = run.result != diffrax.RESULTS.max_steps_reached
         end = y[0] + f.ring(t, cell[0])[0]
         return jnp.where(good, end, jnp.nan), jnp.where(good & run.event_mask, t, jnp.nan)
@@ -99,7 +99,7 @@ def _belt(method: str, lanes: int) -> Callable[..., Any]:
     rates = physics.lugre(jnp)
 
     def slopes(t: Any, y: Any, v_b: Any) -> Any:
-        # The deflection counts as the force that it makes.
+        # The state holds the force of the bristles in place of their deflection.
         dx, dw, dz = rates(y[0], y[1], y[2] / SIGMA[0], v_b, jnp.where(y[1] > v_b, 1.0, -1.0))
         return jnp.stack([dx, dw, SIGMA[0] * dz])
 
@@ -112,13 +112,13 @@ def _belt(method: str, lanes: int) -> Callable[..., Any]:
 
 
 def ring(law: Law, cells: Sequence[Cell], method: str, rtol: float) -> Callable[[], Found]:
-    """A call that runs cells of the ring, repeated to fill the lanes."""
+    """Function that runs cells of the ring; cells are repeated to fill the lanes."""
     count = lanes_of(method, len(cells))
     solve, lanes = _ring(law, method, count), jnp.asarray(np.resize(np.array(cells), (count, 2)))
     return lambda: Found(*(np.asarray(column)[: len(cells)] for column in solve(lanes, rtol)))
 
 
 def belt(speeds: Sequence[float], method: str, rtol: float) -> Callable[[], Found]:
-    """A call that runs speeds of the belt."""
+    """Function that runs velocities of the belt."""
     solve, lanes = _belt(method, len(speeds)), jnp.asarray(speeds)
     return lambda: Found(np.asarray(solve(lanes, rtol)), np.full(len(speeds), np.nan))

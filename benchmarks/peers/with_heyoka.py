@@ -1,4 +1,4 @@
-"""heyoka: Taylor series compiled for each kind of piece, terminal events, restarts between."""
+"""heyoka: a Taylor integrator for each kind of piece, with terminal events and a restart after each event."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import numpy as np
 from benchmarks.peers import physics
 from benchmarks.peers.physics import BELT_SPAN, FLOATS, GUARDS, SIGMA, SPAN, STICK, Automaton, Cell, Found, Law, Piece
 
-#: An integrator is compiled as it is made.
+#: False: an integrator is compiled when it is constructed.
 LAZY = False
 
 
 def ring(law: Law, cells: Sequence[Cell], rtol: float) -> Callable[[], Found]:
-    """A call that runs cells of the ring."""
+    """Function that runs cells of the ring."""
     automaton = Automaton(law, physics.pieces(physics.formulas(FLOATS, law), law))
     smooth = physics.pieces(physics.formulas(hy, law), law)
     rho, u, angle = hy.make_vars("rho", "u", "angle")
@@ -26,7 +26,7 @@ def ring(law: Law, cells: Sequence[Cell], rtol: float) -> Callable[[], Found]:
         rates = piece.rates(hy.time, rho, u, *held)
         system = [(rho, hy.expression(rates[0])), (u, hy.expression(rates[1]))]
         if kind == STICK:
-            # Nothing moves but the ring, whose angle then tells how long a step of the guards' series may be.
+            # The state is constant in stick, so heyoka needs the angle of the ring to choose its step for the guards.
             system.append((angle, held[0] * hy.atan(hy.time)))
         events = [
             hy.t_event(guard, direction=hy.event_direction.negative) for guard in piece.guards(hy.time, rho, u, *held)
@@ -35,12 +35,12 @@ def ring(law: Law, cells: Sequence[Cell], rtol: float) -> Callable[[], Found]:
 
     def advance(kind: int, piece: Piece, t: float, y: Any) -> tuple[float, Any, str | None]:
         integrator = integrators[kind]
-        # It has no more parameters than its formulas name.
+        # An integrator has only the parameters that its formulas use.
         held = piece[: len(integrator.pars)]
         integrator.time, integrator.state[:2], integrator.pars[:] = t, y[:2], held
         integrator.reset_cooldowns()
         code = int(integrator.propagate_until(SPAN)[0])
-        # A terminal event that stops is reported as -1 less its number.
+        # heyoka reports terminal event number k as -1 - k.
         event = GUARDS[kind][-1 - code] if -1 - code in range(len(GUARDS[kind])) else None
         return integrator.time, integrator.state[:2].copy(), event
 
@@ -48,8 +48,8 @@ def ring(law: Law, cells: Sequence[Cell], rtol: float) -> Callable[[], Found]:
 
 
 def belt(speeds: Sequence[float], rtol: float) -> Callable[[], Found]:
-    """A call that runs speeds of the belt; the sign of the sliding velocity is held between events."""
-    # The tolerance is relative to the largest variable: the deflection counts as the force that it makes.
+    """Function that runs velocities of the belt; the sign of the sliding velocity is constant between events."""
+    # The tolerance is relative to the largest variable, so the state holds the force of the bristles.
     x, w, push = hy.make_vars("x", "w", "push")
     v_b, way = hy.par[0], hy.par[1]
     rates = physics.lugre(hy)(x, w, push / SIGMA[0], v_b, way)

@@ -1,4 +1,4 @@
-"""numbalsoda's LSODA, compiled from end to end; it has no events, so separation is found from samples."""
+"""LSODA of numbalsoda, compiled from end to end. It has no events, so samples locate the separation."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from numba import cfunc
 
 try:
     from numbalsoda import lsoda, lsoda_sig
-except ModuleNotFoundError:  # as releases before 0.2, which need no Fortran, are called
+except ModuleNotFoundError:  # name before release 0.2; those releases need no Fortran
     from NumbaLSODA import lsoda, lsoda_sig
 
 from benchmarks.peers import physics
@@ -22,29 +22,29 @@ from benchmarks.peers.physics import BELT_SPAN, BETA, RADIUS, REST, ROUGH, SPAN,
 
 _compiled = numba.njit(error_model="numpy", nogil=True)
 _LANGUAGE = SimpleNamespace(sin=sin, cos=cos, exp=exp, atan=atan, log1p=log1p)
-#: Stretches of the span between which a run can end, and samples of the whole.
+#: Number of intervals of the span, after each of which a run can end, and number of samples of the whole span.
 _STRETCHES, _SAMPLES = 5, 4000
-#: Samples soon after a start: it gives up after 500 steps without one, and begins with short ones.
+#: Samples soon after a start: LSODA starts with short steps, and gives up after 500 steps without a sample.
 _FIRST = np.geomspace(1e-4, 1.0, 20)
-#: Samples of the interval that holds the separation, sampled closer and closer.
+#: Number of samples of the interval that holds the separation, in each refinement.
 _CLOSER = 100
 
 
-#: Numba compiles at the first call.
+#: True: Numba compiles at the first call.
 LAZY = True
 
 
 @_compiled
 def _after(times):
-    """Times with more of them between the first two."""
+    """Times, with more samples between the first two."""
     return np.concatenate((times[:1], times[0] + _FIRST * (times[1] - times[0]), times[2:]))
 
 
 def ring(law: Law, cells: Sequence[Cell], rtol: float) -> Callable[[], Found]:
-    """A call that runs cells of the ring."""
+    """Function that runs cells of the ring."""
     sample = _sampler(law)
     table = np.array(cells)
-    # One absolute tolerance serves angle and velocity; the smaller scale is that of the creep.
+    # LSODA has one absolute tolerance for angle and velocity, so the smaller scale, of the creep, decides.
     atol = rtol * min(1.0, law.v0 / RADIUS)
     return lambda: Found(*sample(table, rtol, atol).T)
 
@@ -95,7 +95,7 @@ def _sampler(law: Law) -> Callable[..., Any]:
                 return np.nan, np.nan
             k = first_loss(times, states, cell)
             if k < len(times):
-                # The interval before.
+                # Refine the interval before sample k, which holds the separation.
                 for _ in range(3):
                     k = max(k, 1)
                     times = np.linspace(times[k - 1], times[k], _CLOSER + 1)
@@ -116,11 +116,11 @@ def _sampler(law: Law) -> Callable[..., Any]:
         for i in range(len(cells)):
             found[i, 0], found[i, 1] = run(cells[i], rtol, atol, _STRETCHES)
             if np.isnan(found[i, 0]):
-                # It can fail to start amid a creep, where another stretch begins.
+                # LSODA can fail to start while a contact creeps, so try again without restarts.
                 found[i, 0], found[i, 1] = run(cells[i], rtol, atol, 1)
         return found
 
-    # The compiled function knows the callback by its address only.
+    # Keep the callback alive: the compiled function knows only its address.
     sample.keep = slopes
     return sample
 
@@ -137,9 +137,9 @@ def _belt_slopes() -> Any:
 
 
 def belt(speeds: Sequence[float], rtol: float) -> Callable[[], Found]:
-    """A call that runs speeds of the belt."""
+    """Function that runs velocities of the belt."""
     slopes = _belt_slopes()
-    # Many, because it gives up after 500 steps without one.
+    # Many samples, because LSODA gives up after 500 steps without one.
     times = np.linspace(0.0, BELT_SPAN, 3001)
 
     def one(speed: float) -> float:

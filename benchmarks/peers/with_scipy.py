@@ -1,4 +1,4 @@
-"""SciPy's `solve_ivp`, right-hand sides and events compiled by Numba; on the ring restarts at every event."""
+"""`solve_ivp` of SciPy, with right-hand sides and events compiled by Numba; the ring restarts at every event."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ _compiled = numba.njit(error_model="numpy")
 
 @_compiled
 def _bounded_exp(x: float) -> float:
-    # Trial states of an implicit step can lie far on the other side of the branch.
+    # Trial states of an implicit step can lie far outside the region of the formula.
     return exp(min(x, 1.0))
 
 
 _LANGUAGE = SimpleNamespace(sin=sin, cos=cos, exp=_bounded_exp, atan=atan, log1p=log1p)
-#: Longest step while nothing moves: an event is seen only by the signs at a step's ends.
+#: Longest step in stick, s: SciPy detects an event only from the signs at the ends of a step.
 _LOOK = 0.05
 
 
-#: Numba compiles at the first call.
+#: True: Numba compiles at the first call.
 LAZY = True
 
 
@@ -58,7 +58,7 @@ def _event(guards: Callable[..., Any], k: int) -> Callable[..., Any]:
 
 
 def ring(law: Law, cells: Sequence[Cell], method: str, rtol: float) -> Callable[[], Found]:
-    """A call that runs cells of the ring."""
+    """Function that runs cells of the ring."""
     smooth = _smooth(law)
     scale = law.v0 / RADIUS if law.v0 > 0.0 else 1.0
     slopes = {kind: lambda t, y, *p, f=piece.rates: f(t, y[0], y[1], *p) for kind, piece in smooth.items()}
@@ -66,7 +66,7 @@ def ring(law: Law, cells: Sequence[Cell], method: str, rtol: float) -> Callable[
 
     def jacobian(kind: int) -> Callable[..., Any]:
         def differences(t: float, y: Any, *piece: float) -> Any:
-            # Of lengths that know the width of the band, which SciPy's own could only guess.
+            # Differences scaled to the width of the band, which SciPy's own differences do not know.
             rates, (rho, u) = smooth[kind].rates, y
             here = rates(t, rho, u, *piece)[1]
             by_rho = (rates(t, rho + 1e-6, u, *piece)[1] - here) / 1e-6
@@ -92,7 +92,7 @@ def ring(law: Law, cells: Sequence[Cell], method: str, rtol: float) -> Callable[
 
 
 def belt(speeds: Sequence[float], method: str, rtol: float) -> Callable[[], Found]:
-    """A call that runs speeds of the belt."""
+    """Function that runs velocities of the belt."""
     slopes = _belt_slopes()
 
     def one(speed: float) -> float:

@@ -1,11 +1,17 @@
-"""An independent answer to a scene, and how sure it is: nothing of the package is used.
+"""An independent answer to a scene, and how reliable it is. This package uses nothing of ringsweep.
 
-The balances of momentum are solved anew and integrated by Radau IIA; at rest and wherever friction jumps the
-contact problem is a choice among all of its modes. Each scene is run four times: with tight tolerances, with
-tolerances a hundred times as wide, and twice more with all friction, all thresholds of the reactions (in weights of
-the body), the full turn and (a thousand times that) the threshold of a reversal moved up or down by a millionth
-(once, contacts under a drive whose acceleration is infinite at 0 are looked at then, instead of an instant later).
-Where these do not agree on the kind, the problem itself is ambiguous.
+It has its own balances of momentum and integrates them with Radau IIA. At rest, and wherever friction jumps, it tries
+all modes of the contacts. It runs each scene on the ring four times:
+
+- with tight tolerances;
+- with tolerances a hundred times as wide;
+- twice more with these wide tolerances and with shifted thresholds, up and down by a millionth: all friction
+  coefficients, the reaction at which a contact is lost (in weights of the body), the full turn and, shifted by a
+  thousandth, the angular velocity of a reversal.
+
+If the drive has an infinite acceleration at t = 0, the upward shift looks at the contacts at t = 0, the other runs an
+instant later. If the runs do not agree in kind, the scene is ambiguous. A scene on the belt is run twice, at the two
+tolerances.
 """
 
 from dataclasses import dataclass, field
@@ -16,16 +22,28 @@ from benchmarks.reference.run import RESULT, UNRESOLVED, run
 
 TIGHT, LOOSE, SHIFT = 1e-9, 1e-7, 1e-6
 MOST_STEPS = 60_000
-#: Variations of a scene: tolerance and shift of everything that a verdict may hang by.
+#: Variations of a scene: tolerance, and shift of all thresholds.
 VARIATIONS = ((TIGHT, 0.0), (LOOSE, 0.0), (LOOSE, SHIFT), (LOOSE, -SHIFT))
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the reference says of a scene.
+    """Answer of the reference to a scene.
 
-    `state` is ``clear``, ``ambiguous`` or ``unresolved``; `kind` regime, motion and separating contact (None on the
-    belt); `numbers` the outcomes, and `spread` by how much the two tolerances differ in each; `why` is for a reader.
+    Attributes
+    ----------
+    state : str
+        ``clear``, ``ambiguous`` or ``unresolved``.
+    kind : tuple or None
+        Regime, motion and separating contact; None on the belt.
+    numbers : dict
+        Outcomes by name.
+    spread : dict
+        Difference between the runs at the two tolerances, by name.
+    why : str
+        Explanation for a reader.
+    runs : list
+        Results of all runs, see :data:`benchmarks.reference.run.RESULT`.
     """
 
     state: str
@@ -57,7 +75,7 @@ def _numbers(found, belt):
 
 
 def judge(scene):
-    """Verdict on a scene (a mapping as the package takes it, numbers only)."""
+    """Verdict on a scene, a mapping as in a configuration, but with numbers only (SI)."""
     belt = scene["model"] == "belt"
     runs = []
     for rtol, shift in VARIATIONS[: 2 if belt else 4]:
@@ -73,14 +91,14 @@ def judge(scene):
         return Verdict("clear", None, numbers, spread, f"ends at {numbers['x_end']:.9g} m", runs)
     kinds = [_kind(found) for found in runs]
     if first["end"] in (OPEN_1, OPEN_2, OPEN_BOTH):
-        why = f"contact {kinds[0][2]} leaves at {first['t_end']:.9g} s, {first['position']:.6g} rad"
-        why = why.replace("contact 3 leaves", "both contacts leave")
+        why = f"contact {kinds[0][2]} separates at {first['t_end']:.9g} s, {first['position']:.6g} rad"
+        why = why.replace("contact 3 separates", "both contacts separate")
     elif first["end"] in (JAMMED, SEVERAL):
         why = f"jams at {first['t_end']:.9g} s, {first['position']:.6g} rad"
     else:
-        why = f"holds, least reactions in sliding {first['least_1']:.3g} and {first['least_2']:.3g} weights"
+        why = f"both contacts hold, least reactions in slip {first['least_1']:.3g} and {first['least_2']:.3g} weights"
     if any(kind != kinds[0] for kind in kinds):
         return Verdict("ambiguous", kinds[0], numbers, spread, " / ".join(map(str, dict.fromkeys(kinds))), runs)
     if any(found["end"] == SEVERAL for found in runs):
-        return Verdict("ambiguous", kinds[0], numbers, spread, "several contacts could leave", runs)
+        return Verdict("ambiguous", kinds[0], numbers, spread, "several contacts could separate", runs)
     return Verdict("clear", kinds[0], numbers, spread, f"{why}; {first['reversals']:.0f} reversals", runs)

@@ -1,8 +1,9 @@
-"""Newton and Euler for the body in the ring and on the belt, and the contact problem wherever friction jumps.
+"""Newton-Euler equations of the body in the ring and on the belt, and the contact problem wherever friction jumps.
 
-The state is y = (rho, v, z1, z2): the place in the frame of the ring or belt, the sliding velocity, and the bristles.
-K is the friction at a contact per unit of its reaction, positive along the angle. A `piece` is a stretch of sliding
-velocities on which the law is one smooth formula: its sign is the sense of sliding, its size counts outwards from rest.
+The state is y = (rho, v, z1, z2): position in the frame of the ring or belt, sliding velocity, deflections of the
+bristles. K is the friction force at a contact over its reaction, positive in the direction of the angle. A `piece` is
+an interval of sliding velocities on which the law is one smooth formula. Its sign is the direction of sliding, its
+magnitude counts the intervals from rest outwards.
 """
 
 import math
@@ -32,9 +33,9 @@ from benchmarks.reference.problem import (
     TUSTIN,
 )
 
-#: What a contact problem may say: stuck, sliding backward or forward, contacts that leave, no motion.
+#: Solutions of a contact problem: stick, slip backward or forward, contacts that separate, no solution, several.
 STICK, BACKWARD, FORWARD, OPEN_1, OPEN_2, OPEN_BOTH, JAMMED, SEVERAL = 0, -1, 1, 2, 3, 4, 5, 6
-#: Share of the moment of inertia below which an effective inertia counts as none.
+#: An effective inertia below this share of the moment of inertia counts as zero.
 LEAST_INERTIA = 1e-6
 
 
@@ -68,7 +69,7 @@ def drive(p, t):
 
 @njit(cache=True, error_model="numpy")
 def coefficient(p, piece, speed, mu_s, mu_k):
-    """Coefficient of friction of a law without bristles at a sliding speed, by the formula of a piece."""
+    """Friction coefficient of a law without bristles at a sliding speed, by the formula of a piece."""
     size = abs(piece)
     if p.law == TUSTIN:
         return mu_k + (mu_s - mu_k) * math.exp(-max(p.alpha * speed, -50.0))
@@ -94,7 +95,7 @@ def coefficient(p, piece, speed, mu_s, mu_k):
 
 @njit(cache=True, error_model="numpy")
 def steady(p, v, mu_s, mu_k):
-    """Traction of bristles in steady sliding but for its viscous part."""
+    """Traction of bristles in steady sliding, without its viscous part."""
     if p.law == DAHL or p.law == RESET:
         return mu_k
     x = v / p.v_s
@@ -103,7 +104,7 @@ def steady(p, v, mu_s, mu_k):
 
 @njit(cache=True, error_model="numpy")
 def bristle(p, piece, v, z, mu_s, mu_k):
-    """Rate of bristles deflected by z, and their traction."""
+    """Rate of the deflection z of bristles, and their traction."""
     sign = 1.0 if piece > 0 else -1.0
     if p.law == RESET:
         if abs(piece) == 2:
@@ -134,7 +135,7 @@ def corners(p, piece):
             return 0.0, p.v0
         return (p.v0, p.v1) if size == 2 else (p.v1, math.inf)
     if p.law == KARNOPP:
-        # Within the dead band either sense is one piece: 1 where friction holds the load, 3 where it gives way.
+        # The dead band has two pieces: 1 while friction holds the load, 3 while the load exceeds mu_s.
         return (p.dead_band, math.inf) if size == 2 else (-p.dead_band, p.dead_band)
     return 0.0, math.inf
 
@@ -150,14 +151,14 @@ def piece_of(p, v):
 
 @njit(cache=True, error_model="numpy")
 def bound(p, k):
-    """Lower edge of segment k, counted on over the turns."""
+    """Lower edge of segment k; k counts segments over all turns."""
     m = p.edges.size
     return p.edges[k % m] + TURN * (k // m)
 
 
 @njit(cache=True, error_model="numpy")
 def segment(p, x):
-    """Segment of an angle in the ring's frame; an edge belongs to what lies above it."""
+    """Segment of an angle in the frame of the ring; an edge belongs to the segment above it."""
     turns = math.floor(x / TURN)
     k = np.searchsorted(p.edges, x - TURN * turns, side="right") - 1 + int(turns) * p.edges.size
     while bound(p, k) > x:
@@ -171,8 +172,8 @@ def segment(p, x):
 def closed(p, phi, omega, K1, K2):
     """Both contacts closed and sliding: acceleration, reactions, determinant of the reactions, effective inertia.
 
-    Two balances of force give the reactions as functions of the acceleration, that of moments about the axis the
-    acceleration.
+    Two balances of forces give the reactions as functions of the acceleration. The balance of moments about the axis
+    gives the acceleration.
     """
     g, M, R = p.gravity, p.mass, p.radius
     if p.model == SINGLE:
@@ -204,21 +205,24 @@ def friction(p, k, piece, v, z):
 
 @njit(cache=True, error_model="numpy")
 def load_on_band(p, t, y):
-    """What friction must carry for a body on the belt to keep its sliding velocity."""
+    """Friction force with which a body on the belt keeps its sliding velocity."""
     theta, _, ring_epsilon = drive(p, t)
     return -p.stiffness * (y[0] + theta) - p.mass * ring_epsilon
 
 
 @njit(cache=True, error_model="numpy")
 def state(p, k1, k2, piece, t, y):
-    """Angle, its rate and acceleration, both reactions, determinant, effective inertia, acceleration of the ring,
-    rates of the bristles."""
+    """Kinematics, reactions and rates of the bristles.
+
+    Returns angle, angular velocity and angular acceleration of the body, both reactions, determinant, effective
+    inertia, angular acceleration of the ring, and both rates of the bristles.
+    """
     theta, ring_omega, ring_epsilon = drive(p, t)
     phi, omega = y[0] + theta, y[1] / p.radius + ring_omega
     K1, rate1 = friction(p, k1, piece, y[1], y[2])
     if p.model == BELT:
         if p.law == KARNOPP and abs(piece) != 2:
-            # In the dead band friction, the viscous part included, holds what it can; the velocity stays what it was.
+            # In the dead band all friction, viscous friction too, balances the load up to mu_s.
             K1 = -load_on_band(p, t, y) if abs(piece) == 1 else -math.copysign(p.mu_s[0], piece)
         else:
             K1 -= p.viscous * y[1]
@@ -231,7 +235,7 @@ def state(p, k1, k2, piece, t, y):
 
 @njit(cache=True, error_model="numpy")
 def rates(p, k1, k2, piece, t, y, f):
-    """Rates of the state, into f."""
+    """Write the rates of the state to f."""
     _, _, epsilon, _, _, _, _, ring_epsilon, f[2], f[3] = state(p, k1, k2, piece, t, y)
     f[0] = y[1] / p.radius
     f[1] = p.radius * (epsilon - ring_epsilon)
@@ -239,7 +243,7 @@ def rates(p, k1, k2, piece, t, y, f):
 
 @njit(cache=True, error_model="numpy")
 def factor(A, order, n):
-    """LU factors of the leading n by n block of A, in place."""
+    """LU factorisation of the leading n by n block of A, in place."""
     for i in range(n):
         pivot = i
         for r in range(i + 1, n):
@@ -257,7 +261,7 @@ def factor(A, order, n):
 
 @njit(cache=True, error_model="numpy")
 def substitute(A, order, b, n):
-    """Solve with the factors, in place."""
+    """Solve for b with the LU factors, in place."""
     for i in range(n):
         b[i], b[order[i]] = b[order[i]], b[i]
     for i in range(n):
@@ -271,19 +275,19 @@ def substitute(A, order, b, n):
 
 @njit(cache=True, error_model="numpy")
 def one_open(p, phi, omega, ring_epsilon, held, K, stuck):
-    """Contact `held` (-1: the first, 1: the second) alone closed, stuck or with friction K.
+    """Only contact `held` (-1: the first, 1: the second) is closed; it sticks, or slides with friction K.
 
-    Unknowns are the radial, tangential and angular acceleration of the free body, reaction and friction of the contact.
-    Returns both, its sliding acceleration, and the acceleration at which the gap of the other opens.
+    The unknowns are the radial, tangential and angular acceleration of the free body, and reaction and friction of the
+    contact. Returns reaction, friction, sliding acceleration of this contact, and acceleration of the other gap.
     """
     sb, cb, M, g = math.sin(p.beta), math.cos(p.beta), p.mass, p.gravity
     a, w2, s = p.half_distance, omega * omega, float(held)
     A, b, order = np.zeros((5, 5)), np.zeros(5), np.zeros(5, np.int64)
-    # Momentum along the radius and the tangent of the centre of mass, then about it.
+    # Linear momentum along the radius and the tangent of the centre of mass, angular momentum about it.
     A[0, 0], A[0, 3], A[0, 4], b[0] = M, cb, s * sb, M * g * math.cos(phi)
     A[1, 1], A[1, 3], A[1, 4], b[1] = M, s * sb, -cb, -M * g * math.sin(phi)
     A[2, 2], A[2, 3], A[2, 4] = p.inertia, -p.xi * s * sb, p.xi * cb - p.radius
-    # The ball that is held neither leaves the race nor enters it.
+    # The ball of the closed contact stays on the race.
     reach = p.radius - p.ball_radius
     A[3, 0], A[3, 1], A[3, 2], b[3] = cb, s * sb, -s * a * cb, a * w2 * sb - w2 * reach
     slide = np.array([-s * sb, cb, a * sb + p.ball_radius])
@@ -301,13 +305,13 @@ def one_open(p, phi, omega, ring_epsilon, held, K, stuck):
 
 @njit(cache=True, error_model="numpy")
 def opening(p, phi, omega, ring_epsilon, K1, K2, least, at_rest, s1, s2):
-    """Which contacts can leave while the other holds, or both at once.
+    """Which contact can separate while the other holds, or whether both can at once.
 
-    With `at_rest` the contact that holds may stick (up to s1, s2) or slide either way (K1, K2 are sizes then);
-    otherwise it slides with friction K1 or K2.
+    With `at_rest` the contact that holds may stick (up to s1, s2) or slide in either direction (K1, K2 are magnitudes
+    then). Otherwise it slides with friction K1 or K2.
     """
     weight = p.mass * p.gravity
-    # A reaction lost early by `least` belongs to a gap that does not open yet.
+    # With `least` > 0 a contact is lost early, at a gap that does not open yet.
     yet = -20.0 * max(least, 0.0) * p.gravity
     found, several = JAMMED, 0
     for held in (1, -1):
@@ -324,7 +328,7 @@ def opening(p, phi, omega, ring_epsilon, K1, K2, least, at_rest, s1, s2):
             possible = least * weight < N and gap > yet
         if possible:
             found, several = (OPEN_1 if held == 1 else OPEN_2), several + 1
-    # Both in free flight.
+    # Free flight of both contacts.
     sb, cb, w2, g = math.sin(p.beta), math.cos(p.beta), omega * omega, p.gravity
     pull = cb * g * math.cos(phi) - w2 * p.half_distance * sb + w2 * (p.radius - p.ball_radius)
     if pull + sb * g * math.sin(phi) < 0.0 and pull - sb * g * math.sin(phi) < 0.0:
@@ -334,7 +338,7 @@ def opening(p, phi, omega, ring_epsilon, K1, K2, least, at_rest, s1, s2):
 
 @njit(cache=True, error_model="numpy")
 def sliding_problem(p, k1, k2, piece, t, y, least):
-    """The contact problem at a sliding velocity that is not zero: the sense of sliding, or how it ends."""
+    """Contact problem at a sliding velocity that is not zero: the direction of slip, or how slip ends."""
     phi, omega, _, N1, N2, D, effective, ring_epsilon, _, _ = state(p, k1, k2, piece, t, y)
     sense = FORWARD if piece > 0 else BACKWARD
     if p.model == BELT:
@@ -350,7 +354,7 @@ def sliding_problem(p, k1, k2, piece, t, y, least):
 
 @njit(cache=True, error_model="numpy")
 def stick_reserve(p, k1, k2, t, rho, least):
-    """How far the body is from breaking away or leaving: positive where it can stick."""
+    """Distance of a body in stick from breakaway and from separation; positive if it can stick."""
     theta, ring_omega, ring_epsilon = drive(p, t)
     phi, M, g = rho + theta, p.mass, p.gravity
     weight, m1, m2 = M * g, p.mu_s[k1 % p.edges.size], p.mu_s[k2 % p.edges.size]
@@ -361,8 +365,8 @@ def stick_reserve(p, k1, k2, t, rho, least):
         N = M * (g * math.cos(phi) + p.radius * ring_omega * ring_omega)
         need = abs(M * (p.radius * ring_epsilon + g * math.sin(phi)))
         return min((m1 * N - need) / weight, N / weight - least)
-    # Frictions T = -kappa mu_s N; the moment about the axis gives their sum q, the tangent the difference of the
-    # reactions d, the radius a quadratic in the sum of the reactions.
+    # Friction forces are T = -kappa mu_s N. The moment about the axis gives their sum q, the tangential balance gives
+    # the difference d of the reactions, and the radial balance gives a quadratic equation for the sum of the reactions.
     sb, cb = math.sin(p.beta), math.cos(p.beta)
     radial = M * (g * math.cos(phi) + p.xi * ring_omega * ring_omega)
     tangential = M * (p.xi * ring_epsilon + g * math.sin(phi))
@@ -385,7 +389,7 @@ def stick_reserve(p, k1, k2, t, rho, least):
 
 @njit(cache=True, error_model="numpy")
 def lower_segments(p, k1, k2, rho):
-    """Segments of both contacts once they move backward: a contact on an edge is on what lies below it."""
+    """Segments of both contacts in slip backward: a contact on an edge belongs to the segment below it."""
     if rho - p.beta - bound(p, k1) <= 1e-14 * max(1.0, abs(rho)):
         k1 -= 1
     if rho + p.beta - bound(p, k2) <= 1e-14 * max(1.0, abs(rho)):
@@ -395,7 +399,7 @@ def lower_segments(p, k1, k2, rho):
 
 @njit(cache=True, error_model="numpy")
 def resting_problem(p, k1, k2, t, rho, least):
-    """The contact problem at rest on the ring, under a set-valued law: the mode that follows."""
+    """Contact problem at rest on the ring under a set-valued law: the mode that follows."""
     if stick_reserve(p, k1, k2, t, rho, least) >= 0.0:
         return STICK
     y = np.array([rho, 0.0, 0.0, 0.0])
@@ -419,11 +423,11 @@ def resting_problem(p, k1, k2, t, rho, least):
 
 @njit(cache=True, error_model="numpy")
 def is_set_valued(p):
-    """Whether the law holds what it must at rest."""
+    """Whether the law is set-valued at rest."""
     return p.law <= TUSTIN
 
 
 @njit(cache=True, error_model="numpy")
 def falls_at_rest(p):
-    """Whether friction drops at once when the body breaks away."""
+    """Whether friction falls at once at breakaway."""
     return p.law == STICTION

@@ -1,4 +1,4 @@
-"""A scene as the numbers that the compiled reference takes."""
+"""A scene as numbers for the compiled reference."""
 
 import math
 from typing import NamedTuple
@@ -11,7 +11,7 @@ TURN = 2.0 * math.pi
 RING, SINGLE, BELT = range(3)
 MODELS = ("ring", "ring-single-contact", "belt")
 
-# Set-valued at rest (the first three), functions of the sliding speed, with bristles.
+# The first three laws are set-valued at rest. From DAHL on, laws have bristles.
 COULOMB, STICTION, TUSTIN, KARNOPP, THRELFALL, LINEAR, CUBIC, BENGISU, DAHL, LUGRE, ELASTO, RESET = range(12)
 LAWS = (
     "coulomb", "stiction", "tustin", "karnopp", "threlfall", "piecewise-linear", "piecewise-cubic", "bengisu-akay",
@@ -25,8 +25,9 @@ DRIVES = ("none", "constant", "arctan", "power", "sinusoidal", "table")
 class Problem(NamedTuple):
     """A scene in SI units.
 
-    Angles `edges` part the ring into segments with coefficients `mu_s` and `mu_k`, each from its edge to the next.
-    On the belt there is one segment, both coefficients are forces, and the radius is 1.
+    The angles `edges` divide the ring into segments. Each segment reaches from its edge to the next edge and has the
+    friction coefficients `mu_s` and `mu_k`. On the belt there is one segment, both coefficients are forces in N, and
+    the radius is 1.
     """
 
     model: int
@@ -68,7 +69,7 @@ class Problem(NamedTuple):
 
 
 def segments(arcs, rest):
-    """Edges of the ring's segments, and coefficients on each; where arcs overlap the later one holds.
+    """Edges of the segments of the ring, and friction coefficients on each. Where arcs overlap, the later arc holds.
 
     Parameters
     ----------
@@ -90,18 +91,18 @@ def segments(arcs, rest):
 
 
 def coefficients(values):
-    """Static and kinetic coefficient; laws that know one take it for both."""
+    """Static and kinetic friction coefficient; laws without `mu_s` have `mu_k` for both."""
     mu_k = float(values["mu_k"])
     return float(values.get("mu_s", mu_k)), mu_k
 
 
 def problem(scene, grip=1.0):
-    """Problem of a scene, all coefficients of friction times `grip`.
+    """Problem of a scene, with all friction coefficients times `grip`.
 
     Parameters
     ----------
     scene : mapping
-        As the package takes it, numbers only (SI).
+        As in a configuration, but with numbers only (SI).
     grip : float
 
     """

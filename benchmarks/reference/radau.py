@@ -1,4 +1,4 @@
-"""One step of Radau IIA, order 5, with its collocation polynomial and an estimate of its error."""
+"""One step of Radau IIA (order 5), with its collocation polynomial and an error estimate."""
 
 import math
 
@@ -16,14 +16,14 @@ WEIGHTS = np.array(
         [(16.0 - _S) / 36.0, (16.0 + _S) / 36.0, 1.0 / 9.0],
     ]
 )
-# Real eigenvalue of the inverse of WEIGHTS, and the combination of stages that estimates the error with it.
+# Real eigenvalue of WEIGHTS, and the weights of the stages in the error estimate.
 GAMMA = 1.0 / (3.0 + 3.0 ** (2.0 / 3.0) - 3.0 ** (1.0 / 3.0))
 ESTIMATE = np.array([-13.0 - 7.0 * _S, -13.0 + 7.0 * _S, -1.0]) / 3.0
 
 
 @njit(cache=True, error_model="numpy")
 def interpolate(y, Z, x, n, out):
-    """The collocation polynomial at a share x of the step, into out."""
+    """Write the collocation polynomial at a share x of the step to out."""
     c1, c2, c3 = NODES
     l1 = x * (x - c2) * (x - c3) / (c1 * (c1 - c2) * (c1 - c3))
     l2 = x * (x - c1) * (x - c3) / (c2 * (c2 - c1) * (c2 - c3))
@@ -34,7 +34,7 @@ def interpolate(y, Z, x, n, out):
 
 @njit(cache=True, error_model="numpy")
 def jacobian(p, k1, k2, piece, t, y, f, scale, n, J, work):
-    """Jacobian of the rates by differences, into J."""
+    """Write the Jacobian of the rates, by differences, to J."""
     y_, f_ = work[0], work[1]
     for j in range(n):
         y_[:] = y
@@ -48,7 +48,7 @@ def jacobian(p, k1, k2, piece, t, y, f, scale, n, J, work):
 
 @njit(cache=True, error_model="numpy")
 def norm(b, rtol, scale, n):
-    """Size of an error in units of the tolerance; not a number where one of its parts is none."""
+    """Norm of an error in units of the tolerance; NaN if one of its components is NaN."""
     total = 0.0
     for i in range(n):
         total += (b[i] / (rtol * scale[i])) ** 2
@@ -57,9 +57,9 @@ def norm(b, rtol, scale, n):
 
 @njit(cache=True, error_model="numpy")
 def attempt(p, k1, k2, piece, t, h, y, f, J, scale, rtol, n, Z, A, order, b, work):
-    """Stages of a step of h from y, whose rates are f, into Z (which comes with a guess).
+    """Compute the stages Z of a step of length h from y, whose rates are f. Z holds a first guess.
 
-    Returns the error in units of the tolerance; infinite where Newton's iteration does not converge.
+    Returns the error in units of the tolerance; infinite if Newton's iteration does not converge.
     """
     m = 3 * n
     for r in range(3):
@@ -92,7 +92,7 @@ def attempt(p, k1, k2, piece, t, h, y, f, J, scale, rtol, n, Z, A, order, b, wor
         size = math.sqrt(size)
         if not size < 1e30:
             return math.inf
-        # To a thousandth of the tolerance, or as far as rounding lets it.
+        # Converged to a thousandth of the tolerance, or as far as rounding allows.
         if size < 1e-3 or (iteration > 3 and size > 0.5 * last and size < 0.1):
             done = True
             break
@@ -110,7 +110,7 @@ def attempt(p, k1, k2, piece, t, h, y, f, J, scale, rtol, n, Z, A, order, b, wor
         b[i] = GAMMA * (h * f[i] + ESTIMATE[0] * Z[0, i] + ESTIMATE[1] * Z[1, i] + ESTIMATE[2] * Z[2, i])
     substitute(A, order, b, n)
     error = norm(b, rtol, scale, n)
-    # Where the problem is stiff the first estimate is too large: once more, from the state that it moves to.
+    # In a stiff problem the first estimate is too large: estimate again from the corrected state.
     if not error <= 1.0:
         for i in range(n):
             y_[i] = y[i] + b[i]

@@ -1,4 +1,4 @@
-"""A run: modes one after the other, every inequality watched at twenty instants of each step, every event located."""
+"""A run of the reference: it watches every inequality at twenty instants of each step and locates every event."""
 
 import math
 
@@ -33,20 +33,20 @@ from benchmarks.reference.physics import (
 from benchmarks.reference.problem import BELT, DAHL, KARNOPP, POWER, RESET, RING, SINUSOIDAL, TABLE, TURN
 from benchmarks.reference.radau import NODES, attempt, interpolate, jacobian
 
-#: How a run may end, besides the contact problem's own words; and a reaction that sinks on, but opens no gap.
+#: Ends of a run, in addition to the solutions of the contact problem.
 HELD, UNRESOLVED = 0, 7
 SAMPLES = 20
-#: What :func:`run` returns, in this order.
+#: Return values of :func:`run`, in this order.
 RESULT = (
     "end", "t_end", "position", "speed", "reversals", "turned", "least_1", "least_2", "steps", "events",
 )  # fmt: skip
-# The guards: reactions, determinant, effective inertia, edges of the piece, edges of both segments, bristles.
+# Guards: reactions, determinant, effective inertia, ends of the piece, edges of both segments, bristles.
 _N1, _N2, _D, _INERTIA, _SLOWER, _FASTER, _EDGE_1, _EDGE_2, _BRISTLE, _COUNT = range(10)
 
 
 @njit(cache=True, error_model="numpy")
 def observe(p, track, phi, omega, slack):
-    """Follow sense and reversals, and how far the body has turned since the last; slack moves the thresholds."""
+    """Track direction, reversals, and the angle turned since the last reversal; `slack` shifts the thresholds."""
     before, last = track[4], track[5]
     peak = omega
     bend = before - 2.0 * last + omega
@@ -70,7 +70,7 @@ def observe(p, track, phi, omega, slack):
 
 @njit(cache=True, error_model="numpy")
 def guard(p, k1, k2, piece, t, y, least, g):
-    """What must stay positive within a mode, into g."""
+    """Write to g the guards, which must stay positive within a mode."""
     _, _, _, N1, N2, D, effective, _, _, _ = state(p, k1, k2, piece, t, y)
     weight = p.mass * p.gravity
     g[:] = 1.0
@@ -87,7 +87,7 @@ def guard(p, k1, k2, piece, t, y, least, g):
             g[_N2] = g[_EDGE_2] = 1.0
     speed = y[1] if piece > 0 else -y[1]
     low, high = corners(p, piece)
-    # A law that is continuous at a corner may be looked at a rounding too far.
+    # Where a law is continuous at a corner, the guard may pass the corner by the size of rounding.
     slack = 0.0 if is_set_valued(p) else 1e-12 * (abs(low) if low != 0.0 else (high if high < math.inf else 1e-6))
     g[_SLOWER] = speed - low + slack
     if high < math.inf:
@@ -103,7 +103,7 @@ def guard(p, k1, k2, piece, t, y, least, g):
 
 @njit(cache=True, error_model="numpy")
 def root(p, k1, k2, piece, t, h, y, Z, n, least, low, high, which, g, y_):
-    """Share of a step at which a guard (any, if `which` is negative) comes to zero between two shares."""
+    """Share of a step, between two shares, at which a guard (any guard if `which` is negative) reaches zero."""
     y_[:] = y
     for _ in range(60):
         middle = 0.5 * (low + high)
@@ -120,9 +120,9 @@ def root(p, k1, k2, piece, t, h, y, Z, n, least, low, high, which, g, y_):
 
 @njit(cache=True, error_model="numpy")
 def passage(p, k1, k2, t, y, least):
-    """A launch whose sliding velocity is left at once (the drive's acceleration is infinite at 0): what it meets.
+    """Contact problem while the sliding velocity jumps at launch, because the drive's acceleration is infinite at 0.
 
-    The velocity goes from that of the launch to that at `t` in no time, and the friction with it.
+    The velocity passes from its value at launch to its value at `t` in no time, and friction changes with it.
     """
     y_, last = y.copy(), y[1]
     y_[1] = 0.0
@@ -140,7 +140,7 @@ def passage(p, k1, k2, t, y, least):
 
 @njit(cache=True, error_model="numpy")
 def after_stick(p, k1, k2, t, rho, least):
-    """What follows where the body can stick no more: the mode, and the instant at which it is plain."""
+    """Mode after the end of stick, and the instant at which the contact problem has a solution."""
     if falls_at_rest(p):
         found = resting_problem(p, k1, k2, t, rho, least)
         if found != STICK and found != JAMMED:
@@ -161,11 +161,11 @@ def run(p, rtol, least, slack, most_steps):
     ----------
     p : Problem
     rtol : float
-        Tolerance of a step's embedded estimate, which is two orders lower than the step.
+        Tolerance of the error estimate of a step. The estimate is of lower order than the step.
     least : float
         Reaction at which a contact is lost, in weights of the body.
     slack : float
-        By how much the thresholds of a turn (a share) and of a reversal (a thousand times that) are moved.
+        Relative shift of the full turn, and a thousandth of the relative shift of the threshold of a reversal.
     most_steps : int
 
     Returns
@@ -182,8 +182,8 @@ def run(p, rtol, least, slack, most_steps):
     G, g, scale = np.zeros((SAMPLES + 2, _COUNT)), np.zeros(_COUNT), np.ones(4)
     least_1 = least_2 = math.inf
 
-    # Launch. Where the drive's acceleration is infinite at 0, what it does before an instant is below notice; only
-    # one variation, that with positive slack, asks what contacts can do at 0 itself.
+    # Launch. If the acceleration of the drive is infinite at 0, the motion before `instant` is negligible. Only the
+    # variation with positive slack solves the contact problem at 0 itself.
     t, instant = 0.0, 0.0
     if p.drive == POWER and p.exponent < 2.0:
         instant = 1e-14 if p.exponent < 1.5 else 1e-10
@@ -191,7 +191,7 @@ def run(p, rtol, least, slack, most_steps):
     y[0] = p.position - theta
     speed = ring_omega if p.at_rest else p.speed
     y[1] = (speed - ring_omega) * p.radius
-    # Where a rocking drive turns back its speed is the rounding of a cosine.
+    # Where a sinusoidal drive turns back, its velocity is the rounding error of a cosine.
     rocking = abs(p.amplitude) * TURN * p.frequency if p.drive == SINUSOIDAL else 0.0
     if abs(speed - ring_omega) <= 4e-16 * max(abs(speed), abs(ring_omega), rocking):
         y[1] = 0.0
@@ -225,7 +225,7 @@ def run(p, rtol, least, slack, most_steps):
     if mode == BACKWARD and p.model != BELT:
         k1, k2 = lower_segments(p, k1, k2, y[0])
 
-    # Scales of the tolerance: radians (metres), sliding velocity, bristles.
+    # Scales of the tolerance: position (rad or m), sliding velocity, bristles.
     slow = 1e-2 * p.radius
     if p.v0 > 0.0:
         slow = min(slow, p.v0)
@@ -248,7 +248,7 @@ def run(p, rtol, least, slack, most_steps):
             end = UNRESOLVED
             break
         if mode == STICK:
-            # The body goes with the ring; nothing is left but to look how long.
+            # The body moves with the ring: only the end of stick is unknown.
             y[1] = 0.0
             dt, low, broke = longest / SAMPLES, t, False
             older, old = math.inf, stick_reserve(p, k1, k2, t, y[0], least)
@@ -258,7 +258,7 @@ def run(p, rtol, least, slack, most_steps):
                 if new <= 0.0:
                     low, broke = t, True
                 elif old < older and old < new:
-                    # A least value between the looks: it may dip below zero. Golden section.
+                    # A minimum between two samples may lie below zero: find it by golden section.
                     a_, b_ = max(t - dt, low), high
                     for _ in range(40):
                         c_, d_ = b_ - 0.6180339887 * (b_ - a_), a_ + 0.6180339887 * (b_ - a_)
@@ -330,11 +330,11 @@ def run(p, rtol, least, slack, most_steps):
             before = 0.0
             h = step * (0.1 if error == math.inf else max(0.1, 0.9 * error**-0.25))
         if not error <= 1.0:
-            # The acceleration grows without bound as the body comes to where it jams: closer than rounding.
+            # The acceleration grows without bound near a jam, and the step falls below rounding.
             _, _, _, _, _, D, effective, _, _, _ = state(p, k1, k2, piece, t, y)
             end = JAMMED if step < 1e-17 and min(D, effective) < 1e-2 else UNRESOLVED
             break
-        # Watch the inequalities, the last sample beyond the end for least values at the end.
+        # Watch the inequalities. The last sample lies beyond the end of the step, to see a minimum at the end.
         hit, at = -1, 1.0
         y_[:] = y
         for i in range(SAMPLES + 2):
@@ -373,7 +373,7 @@ def run(p, rtol, least, slack, most_steps):
             t = limit if last else t + step
             h = step * min(4.0, max(0.3, 0.9 * max(error, 1e-12) ** -0.25)) if not last else h
             continue
-        # Step anew to the event itself, so that no interpolation is left in its place.
+        # Repeat the step up to the event, so that its position has no interpolation error.
         part = at * step
         for _ in range(3):
             if part <= 1e-16 * t:
@@ -411,7 +411,7 @@ def run(p, rtol, least, slack, most_steps):
             break
         theta, ring_omega, _ = drive(p, t)
         observe(p, track, y[0] + theta, y[1] / p.radius + ring_omega, slack)
-        track[5] = math.nan  # the acceleration may jump here: no peak across it
+        track[5] = math.nan  # the acceleration may jump here, so no peak is fitted across it
         if hit in (_EDGE_1, _EDGE_2):
             way = 1 if piece > 0 else -1
             guard(p, k1, k2, piece, t, y, least, g)

@@ -1,4 +1,8 @@
-"""The commands, each a few lines over the Python calls."""
+"""Commands of the command line.
+
+Modules that are slow to import are imported where they are needed, so that ``--help`` and errors in the input come
+quickly.
+"""
 
 from __future__ import annotations
 
@@ -8,18 +12,18 @@ import logging
 from contextlib import suppress
 from pathlib import Path
 
-from ringsweep.cli.report import summarise, warn_of_launch, warn_of_stiffness
 from ringsweep.errors import InputError
 
 
 def init_command(arguments: argparse.Namespace) -> None:
+    """Write a configuration from a template."""
     from importlib.resources import files
 
     target = Path(arguments.config)
     if target.exists():
-        raise InputError(str(target), "is there already: name another file")
+        raise InputError(str(target), "exists already: name another file")
     if target.suffix not in (".yaml", ".yml"):
-        raise InputError(str(target), "is no name for a configuration: name it *.yaml")
+        raise InputError(str(target), "is not the name of a configuration: name it *.yaml")
     text = (files("ringsweep.cli") / "templates" / f"{arguments.model}.yaml").read_text(encoding="utf-8")
     try:
         target.write_text(text.replace("{name}", str(target)), encoding="utf-8")
@@ -29,6 +33,7 @@ def init_command(arguments: argparse.Namespace) -> None:
 
 
 def run_command(arguments: argparse.Namespace) -> None:
+    """Run a sweep into a file, print a summary and draw the regime map."""
     from ringsweep.config import load
 
     if arguments.backend == "dask" and arguments.scheduler is None:
@@ -39,6 +44,7 @@ def run_command(arguments: argparse.Namespace) -> None:
     target, picture = _outputs(f"{config.name}.nc" if arguments.output is None else arguments.output, "regime", "sweep")
 
     from ringsweep import plots
+    from ringsweep.cli.report import summarise
     from ringsweep.runs.sweep import write
     from ringsweep.storage import netcdf
 
@@ -48,48 +54,48 @@ def run_command(arguments: argparse.Namespace) -> None:
     if computed := write(config, target, **options, progress=not arguments.quiet):
         print(f"wrote {target}")
     else:
-        print(f"{target} holds this sweep already (--fresh runs it again)")
+        print(f"{target} holds this sweep already (--fresh computes it again)")
     with netcdf.open_dataset(target) as result:
         summarise(result)
-        warn_of_stiffness(result, config)
-        warn_of_launch(result)
         if not config.axes.sizes or (not computed and _is_newer(picture, target)):
             return
         try:
             plots.save(plots.regime_map(result), picture)
         except InputError as error:
-            # The sweep is sound and saved; only what to hold fixed in a picture is open.
-            print(f"no map yet: {error.problem} (ringsweep map {target})")
+            # The sweep is saved. Only a choice for the picture is missing.
+            print(f"no map: {error.problem} (draw one with ringsweep map {target})")
         else:
             print(f"wrote {picture}")
 
 
 def _is_newer(one: Path, other: Path) -> bool:
+    """Whether a file exists and is not older than another."""
     return one.exists() and one.stat().st_mtime >= other.stat().st_mtime
 
 
 def _silence_dask() -> None:
-    """Of a connection that is lost Dask tells with tracebacks what is told here in one line."""
+    """Suppress the tracebacks that Dask logs when a connection is lost: ringsweep reports it in one line."""
     with suppress(ImportError):
-        # It sets the levels of its loggers when it is imported.
+        # The import sets the levels of its loggers, so it must come first.
         import distributed  # noqa: F401
     for name in ("distributed", "tornado", "asyncio"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
 def map_command(arguments: argparse.Namespace) -> None:
+    """Draw a variable of a sweep."""
     from ringsweep import plots
     from ringsweep.storage import netcdf
 
     dataset = Path(arguments.dataset)
     result = netcdf.open_dataset(dataset)
-    # Beside the regime map of the sweep, not in its place.
+    # The name differs from that of the regime map of the sweep, which must not be replaced.
     shown = [arguments.var] * (arguments.var != "regime") + [held.replace(" ", "") for held in arguments.sel]
     target = Path(arguments.output or dataset.with_name("-".join([dataset.stem, *shown]) + ".png"))
     netcdf.check_writable(target)
-    held = dict(_selection(text) for text in arguments.sel)
+    selection = dict(_selection(text) for text in arguments.sel)
     try:
-        figure = plots.regime_map(result, arguments.x, arguments.y, arguments.var, held)
+        figure = plots.regime_map(result, arguments.x, arguments.y, arguments.var, selection)
     except InputError as error:
         if error.path == "ds":
             raise InputError(str(dataset), error.problem) from error
@@ -99,6 +105,7 @@ def map_command(arguments: argparse.Namespace) -> None:
 
 
 def simulate_command(arguments: argparse.Namespace) -> None:
+    """Run once, write the history and draw it."""
     from ringsweep.config import with_values
 
     config = with_values(arguments.config, arguments.set)
@@ -112,12 +119,11 @@ def simulate_command(arguments: argparse.Namespace) -> None:
     netcdf.save(result, target)
     plots.save(plots.history(result), picture)
     print(result.attrs["outcome"])
-    warn_of_stiffness(result, config)
-    warn_of_launch(result)
     print(f"wrote {target}\nwrote {picture}")
 
 
 def animate_command(arguments: argparse.Namespace) -> None:
+    """Run once and write an animation."""
     from ringsweep.config import with_values
     from ringsweep.models import MODELS
 
@@ -125,12 +131,14 @@ def animate_command(arguments: argparse.Namespace) -> None:
     target = arguments.output or f"{config.name}-run.gif"
     model = config.scene.structure.model
     if "phi_end" not in MODELS[model].outcomes:
-        raise InputError("scene.model", f"{model}: there is no ring to film; ringsweep simulate draws its history")
+        raise InputError("scene.model", f"{model}: there is no ring to animate; ringsweep simulate draws the history")
     if config.axes.sizes:
-        raise InputError("sweep", "several friction laws: a film is of one run; give its law by --set friction.law=...")
+        raise InputError(
+            "sweep", "several friction laws, but an animation shows one run: name its law by --set friction.law=..."
+        )
 
     from ringsweep import plots
-    from ringsweep.plots.motion import check_animation
+    from ringsweep.plots.films import check_animation
     from ringsweep.runs.simulate import history
 
     check_animation(target)
@@ -141,6 +149,7 @@ def animate_command(arguments: argparse.Namespace) -> None:
 
 
 def precision_command(arguments: argparse.Namespace) -> None:
+    """Measure error against run time, print a table and draw it."""
     from ringsweep.config import load
 
     config = load(arguments.config)
@@ -161,6 +170,7 @@ def precision_command(arguments: argparse.Namespace) -> None:
 
 
 def info_command(arguments: argparse.Namespace) -> None:
+    """Print a summary of a result file."""
     from ringsweep.storage import netcdf
 
     result = netcdf.open_dataset(arguments.dataset)
@@ -181,6 +191,8 @@ def info_command(arguments: argparse.Namespace) -> None:
 
         print(report(result))
     else:
+        from ringsweep.cli.report import summarise
+
         summarise(result)
     configuration = json.loads(result.attrs.get("configuration", "{}"))
     print("solver:", json.dumps(configuration.get("solver", result.attrs.get("method"))))
@@ -188,13 +200,14 @@ def info_command(arguments: argparse.Namespace) -> None:
 
 
 def schema_command(arguments: argparse.Namespace) -> None:
+    """Print the JSON schema of the configuration."""
     from ringsweep.config.schema import schema
 
     print(json.dumps(schema(), indent=2, ensure_ascii=False))
 
 
 def _selection(text: str) -> tuple[str, str]:
-    """A coordinate and a value, from ``DIM=VALUE``."""
+    """Coordinate and value of ``DIM=VALUE``."""
     name, equals, value = (part.strip() for part in text.partition("="))
     if not equals:
         raise InputError("--sel", f"{text!r} is not of the form DIM=VALUE")
@@ -202,10 +215,19 @@ def _selection(text: str) -> tuple[str, str]:
 
 
 def _outputs(name: str, mark: str, content: str) -> tuple[Path, Path]:
-    """Dataset and picture to be written, both known to be writable before any work is done.
+    """Paths of the dataset and of its picture, checked before any computation.
 
-    A file that is there is replaced if it is a result of the same kind, known by a variable or dimension, and
-    refused otherwise.
+    Parameters
+    ----------
+    name : str
+        Path of the dataset.
+    mark, content : str
+        Kind of the result; see :func:`ringsweep.storage.netcdf.check_kind`.
+
+    Raises
+    ------
+    InputError
+        If one of them cannot be written, or would replace a file that is no result of this kind.
     """
     from ringsweep.storage import netcdf
 
@@ -213,7 +235,7 @@ def _outputs(name: str, mark: str, content: str) -> tuple[Path, Path]:
     netcdf.check_writable(target)
     picture = target.with_suffix(".png")
     if target == picture:
-        raise InputError(name, "is where the picture goes: name the dataset *.nc")
+        raise InputError(name, "is the name of the picture: name the dataset *.nc")
     netcdf.check_writable(picture)
     if target.exists():
         netcdf.check_kind(target, mark, content)

@@ -1,4 +1,4 @@
-"""The command line: from arguments to an exit status, with one readable message for each error."""
+"""Entry point of the command line: runs a command, reports errors in one line, returns the exit status."""
 
 from __future__ import annotations
 
@@ -10,13 +10,24 @@ from collections.abc import Sequence
 from contextlib import nullcontext, redirect_stdout
 from typing import Any
 
-from ringsweep.cli.parser import parser_of_commands
+from ringsweep.cli.parser import build_parser
 from ringsweep.errors import InputError
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; the exit status is 0 if done, 2 if the input is wrong, 1 for anything else."""
-    parser = parser_of_commands()
+    """Run one command.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Arguments; those of the process by default.
+
+    Returns
+    -------
+    int
+        Exit status: 0 if done, 2 if the input is wrong, 130 after Ctrl-C, 1 for any other error.
+    """
+    parser = build_parser()
     given = sys.argv[1:] if argv is None else list(argv)
     if not given:
         parser.print_help()
@@ -24,21 +35,22 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments, unknown = parser.parse_known_args(given)
     if unknown:
         takes_values = any(option in given for option in ("--set", "--sel"))
-        hint = "; what has a space wants quotes: --set 'drive.amplitude=2 rad/s'" if takes_values else ""
+        hint = "; a value with a space needs quotes: --set 'drive.amplitude=2 rad/s'" if takes_values else ""
         parser.error(f"unrecognized arguments: {' '.join(unknown)}{hint}")
-    told = logging.getLogger("ringsweep")
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
-    logging.getLogger().handlers[0].setFormatter(_Words(_is_coloured(sys.stderr)))
-    told.setLevel(logging.DEBUG if arguments.verbose else logging.WARNING if arguments.quiet else logging.INFO)
+    logging.getLogger().handlers[0].setFormatter(_Formatter(_is_coloured(sys.stderr)))
+    logging.getLogger("ringsweep").setLevel(
+        logging.DEBUG if arguments.verbose else logging.WARNING if arguments.quiet else logging.INFO
+    )
     try:
         with redirect_stdout(None) if arguments.quiet else nullcontext():
-            arguments.verb(arguments)
+            arguments.command(arguments)
     except InputError as error:
         return _fail(str(error), 2)
     except KeyboardInterrupt as error:
         return _fail("interrupted", 130, error)
     except BrokenPipeError:
-        # What reads the output, as `head` does, has enough.
+        # The reader of the output, such as `head`, has closed it.
         sys.stdout = None
         return 0
     except Exception as error:
@@ -59,8 +71,8 @@ def _is_coloured(stream: Any) -> bool:
     return stream.isatty() and "NO_COLOR" not in os.environ and os.environ.get("TERM") != "dumb"
 
 
-class _Words(logging.Formatter):
-    """What is told besides results: one line each, warnings in colour on a terminal."""
+class _Formatter(logging.Formatter):
+    """Log messages with the prefix ``ringsweep:``, which is coloured for warnings on a terminal."""
 
     def __init__(self, coloured: bool):
         super().__init__("ringsweep: %(message)s")

@@ -1,4 +1,4 @@
-"""What can be asked on the command line."""
+"""Parser of the command line."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ from ringsweep.cli.commands import (
 )
 
 
-def parser_of_commands() -> argparse.ArgumentParser:
+def build_parser() -> argparse.ArgumentParser:
+    """Parser of all commands; the parsed arguments have the function of the command as ``command``."""
     parser = argparse.ArgumentParser(
         prog="ringsweep",
         description="Regime maps of dry-friction systems whose friction coefficient jumps.",
@@ -29,33 +30,33 @@ def parser_of_commands() -> argparse.ArgumentParser:
         formatter_class=_formatter,
     )
     parser.add_argument("--version", action=_Version)
-    _loudness(parser)
+    _add_verbosity(parser)
     parser.set_defaults(quiet=False, verbose=False)
-    verbs = parser.add_subparsers(required=True, metavar="COMMAND")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
-    init = _verb(verbs, "init", init_command, "write a configuration to start from", """
+    init = _add_command(commands, "init", init_command, "write a first configuration, to be edited", """
         ringsweep init                     my-sweep.yaml: two balls in a ring
         ringsweep init --model belt belt.yaml
         """)  # fmt: skip
     init.add_argument("config", nargs="?", default="my-sweep.yaml", metavar="NEW.yaml", help="default: my-sweep.yaml")
     init.add_argument("--model", choices=["ring", "belt"], default="ring", help="what it describes (default: ring)")
 
-    run = _verb(verbs, "run", run_command, "run a sweep: NetCDF, and a regime map beside it", """
-        ringsweep run my.yaml              my.nc and my.png; the same again goes on after a stop
+    run = _add_command(commands, "run", run_command, "run a sweep: NetCDF, and a regime map beside it", """
+        ringsweep run my.yaml              my.nc and my.png; after a stop the same command goes on
         ringsweep run my.yaml --jobs 1 -o results/one.nc
         ringsweep run finer.yaml --reuse my.nc
-        ringsweep run my.nc -o again.nc    the sweep that my.nc holds
+        ringsweep run my.nc -o again.nc    repeat the sweep of my.nc
         ringsweep run my.yaml --backend dask --scheduler tcp://host:8786
         """)  # fmt: skip
     run.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose sweep is repeated")
     run.add_argument("-o", "--output", metavar="OUT.nc", help="default: the configuration's name, in this folder")
     run.add_argument("--jobs", type=whole_number, metavar="N", help="threads (default: all cores)")
-    run.add_argument("--fresh", action="store_true", help="start over: discard what an earlier run has left")
-    run.add_argument("--reuse", metavar="OLD.nc", help="take the cells that it shares with this earlier sweep")
-    run.add_argument("--backend", choices=["threads", "dask"], help="who computes (default: threads of this machine)")
-    run.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers compute, as tcp://host:8786")
+    run.add_argument("--fresh", action="store_true", help="start over: discard what an earlier run computed")
+    run.add_argument("--reuse", metavar="OLD.nc", help="take cells that this earlier sweep has too")
+    run.add_argument("--backend", choices=["threads", "dask"], help="what computes (default: threads of this machine)")
+    run.add_argument("--scheduler", metavar="ADDRESS", help="address of a Dask scheduler, such as tcp://host:8786")
 
-    draw = _verb(verbs, "map", map_command, "draw a variable of a sweep", """
+    draw = _add_command(commands, "map", map_command, "draw a variable of a sweep", """
         ringsweep map my.nc                my.png: the regimes
         ringsweep map my.nc --var t_separation --x zone.half_angle
         ringsweep map my.nc --sel "zone.half_angle=15 deg" -o line.pdf
@@ -66,32 +67,36 @@ def parser_of_commands() -> argparse.ArgumentParser:
     draw.add_argument("--y", metavar="DIM", help="coordinate up")
     draw.add_argument("--var", default="regime", metavar="V", help="variable to draw (default: regime)")
     draw.add_argument(
-        "--sel", action="append", default=[], metavar="DIM=VALUE", help="hold at the nearest value; units allowed"
+        "--sel",
+        action="append",
+        default=[],
+        metavar="DIM=VALUE",
+        help="fix a coordinate at its value nearest to VALUE; units allowed",
     )
 
-    simulate = _verb(verbs, "simulate", simulate_command,
-        "run once, or under each law of a sweep: history and a picture of it", """
+    simulate = _add_command(commands, "simulate", simulate_command,
+        "run once, or under each law of a sweep: history and its picture", """
         ringsweep simulate my.yaml         my-run.nc and my-run.png
         ringsweep simulate my.yaml --set drive.amplitude=4 --set "zone.half_angle=20 deg"
-        ringsweep simulate my.nc --set drive.amplitude=4     the scene that my.nc holds, with this amplitude
+        ringsweep simulate my.nc --set drive.amplitude=4     the scene of my.nc, with this amplitude
         """)  # fmt: skip
     simulate.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose scene is run")
     simulate.add_argument("-o", "--output", metavar="RUN.nc", help="default: the configuration's name with -run")
-    _settings(simulate)
+    _add_settings(simulate)
 
-    animate = _verb(verbs, "animate", animate_command, "run once: a film of the body in the ring", """
+    animate = _add_command(commands, "animate", animate_command, "run once: animation of the body in the ring", """
         ringsweep animate my.yaml          my-run.gif
         ringsweep animate my.yaml -o run.mp4 --set drive.amplitude=4
-        ringsweep animate my.nc -o run.html  a page with buttons, of the scene that my.nc holds
+        ringsweep animate my.nc -o run.html  a page with buttons, for the scene of my.nc
         """)  # fmt: skip
     animate.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose scene is run")
     animate.add_argument(
         "-o", "--output", metavar="RUN.gif", help="default: the configuration's name with -run; .mp4 and .html too"
     )
-    _settings(animate)
+    _add_settings(animate)
 
-    precision = _verb(verbs, "precision", precision_command,
-        "error against run time for this scene, and the cheapest solver", """
+    precision = _add_command(commands, "precision", precision_command,
+        "measure error against run time, and recommend a solver", """
         ringsweep precision my.yaml
         ringsweep precision my.yaml --target 1e-9 --cells 64
         """)  # fmt: skip
@@ -103,19 +108,19 @@ def parser_of_commands() -> argparse.ArgumentParser:
         metavar="E",
         help="largest error allowed: rad or m at the end, s at separation (default: 1e-6)",
     )
-    precision.add_argument("--cells", type=whole_number, metavar="N", help="cells to draw from the sweep (default: 16)")
+    precision.add_argument("--cells", type=whole_number, metavar="N", help="number of cells to measure (default: 16)")
     precision.add_argument("--rounds", type=whole_number, metavar="N", help="timings of each setting (default: 3)")
 
-    info = _verb(verbs, "info", info_command, "tell what a result file holds", "ringsweep info my.nc")
+    info = _add_command(commands, "info", info_command, "print a summary of a result file", "ringsweep info my.nc")
     info.add_argument("dataset", metavar="OUT.nc")
 
-    _verb(verbs, "schema", schema_command, "print the JSON schema of the configuration, for editors", """
+    _add_command(commands, "schema", schema_command, "print the JSON schema of the configuration, for editors", """
         ringsweep schema > schema.json
-        Editors that know YAML's language server then check what begins with
+        Editors with the YAML language server then check files whose first line is
             # yaml-language-server: $schema=schema.json
         """)  # fmt: skip
 
-    completion = _verb(verbs, "completion", completion_command, "print what lets a shell complete these commands", """
+    completion = _add_command(commands, "completion", completion_command, "print a completion script for a shell", """
         ringsweep completion bash > ~/.local/share/bash-completion/completions/ringsweep
         ringsweep completion zsh > ~/.zfunc/_ringsweep
         """)  # fmt: skip
@@ -124,33 +129,34 @@ def parser_of_commands() -> argparse.ArgumentParser:
 
 
 def completion_command(arguments: argparse.Namespace) -> None:
+    """Print a completion script for a shell."""
     import shtab
 
-    print(shtab.complete(parser_of_commands(), arguments.shell))
+    print(shtab.complete(build_parser(), arguments.shell))
 
 
-def _verb(verbs: Any, name: str, function: Any, words: str, examples: str) -> argparse.ArgumentParser:
-    """A command with what all have in common."""
-    parser: argparse.ArgumentParser = verbs.add_parser(
+def _add_command(commands: Any, name: str, function: Any, summary: str, examples: str) -> argparse.ArgumentParser:
+    """Add a command with its summary, examples, and the options of all commands."""
+    parser: argparse.ArgumentParser = commands.add_parser(
         name,
-        help=words,
-        description=f"{words[0].upper()}{words[1:]}.",
+        help=summary,
+        description=f"{summary[0].upper()}{summary[1:]}.",
         epilog="examples:\n" + indent(dedent(examples).strip(), "  "),
         formatter_class=_formatter,
     )
-    _loudness(parser)
-    parser.set_defaults(verb=function)
+    _add_verbosity(parser)
+    parser.set_defaults(command=function)
     return parser
 
 
-def _loudness(parser: argparse.ArgumentParser) -> None:
-    """May be asked for before the command and after it: where it is not, what was said before stands."""
-    loudness = parser.add_mutually_exclusive_group()
-    for letter, name, words in (
-        ("-q", "--quiet", "tell only what is wrong"),
-        ("-v", "--verbose", "tell more, and where an unexpected error arose"),
+def _add_verbosity(parser: argparse.ArgumentParser) -> None:
+    """Options that may stand before and after the command; without a default the one does not reset the other."""
+    verbosity = parser.add_mutually_exclusive_group()
+    for letter, name, summary in (
+        ("-q", "--quiet", "print only warnings and errors"),
+        ("-v", "--verbose", "print more, with the traceback of an unexpected error"),
     ):
-        loudness.add_argument(letter, name, action="store_true", default=argparse.SUPPRESS, help=words)
+        verbosity.add_argument(letter, name, action="store_true", default=argparse.SUPPRESS, help=summary)
 
 
 def _formatter(prog: str) -> argparse.HelpFormatter:
@@ -159,14 +165,14 @@ def _formatter(prog: str) -> argparse.HelpFormatter:
     )
 
 
-def _settings(parser: argparse.ArgumentParser) -> None:
+def _add_settings(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--set", action="append", default=[], metavar="PATH=VALUE", help="change a value, as drive.amplitude=3"
+        "--set", action="append", default=[], metavar="PATH=VALUE", help="change a value: drive.amplitude=3"
     )
 
 
 class _Version(argparse.Action):
-    """Prints the version; it is looked up when asked for."""
+    """Prints the version, which is looked up only then."""
 
     def __init__(self, **options: Any):
         super().__init__(**options, nargs=0, help="print the version")
@@ -178,14 +184,14 @@ class _Version(argparse.Action):
 
 
 def whole_number(text: str) -> int:
-    # Of a bare ValueError argparse would show the name of this function.
+    """A whole number of at least 1, from an argument."""
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least 1")
     return int(text)
 
 
 def positive_number(text: str) -> float:
-    # "nan" compares as false.
+    """A finite number greater than 0, from an argument."""
     with suppress(ValueError):
         if 0.0 < float(text) < math.inf:
             return float(text)

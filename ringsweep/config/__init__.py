@@ -1,4 +1,4 @@
-"""Configurations: YAML text to a validated scene, axes and solver in SI units."""
+"""Configurations: from YAML text to a validated scene, axes and solver in SI units."""
 
 from ringsweep.compile.cache import OWN_LAWS
 from ringsweep.config.axes import Axes
@@ -9,5 +9,5 @@ from ringsweep.config.solver import read_solver
 
 __all__ = ["Axes", "Config", "load", "read_axes", "read_scene", "read_solver", "sweepable", "with_values"]
 
-# All that these files may build on is known by now.
+# These files may use everything that is imported above.
 load_own_files(OWN_LAWS)

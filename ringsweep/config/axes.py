@@ -1,4 +1,4 @@
-"""The section ``sweep`` of a configuration, or the axes given in Python: what a sweep varies."""
+"""Axes of a sweep: the section ``sweep`` of a configuration, or the axes given in Python."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsweep.config.scene import sweepable
+from ringsweep.config.sections import read_values, section_of, suggestion
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
 from ringsweep.models.scene import Scene
@@ -19,38 +21,35 @@ from ringsweep.quantities.variables import OUTCOMES
 
 if TYPE_CHECKING:
     import xarray as xr
-from ringsweep.config.scene import sweepable
-from ringsweep.config.sections import number_of, section_of, suggestion, values_of
 
-COUNT = Parameter("1", "number of values", lower=1, upper=1_000_000)
+COUNT = Parameter("1", "number of values", lower=1, upper=1_000_000, whole=True)
 
+#: Largest number of cells of a sweep. With 24 variables each they take some ten gigabytes on a disk.
+MAX_CELLS = 100_000_000
 
-#: Cells of a sweep at most: what 24 variables of them take on a disk is some ten gigabytes.
-MOST_CELLS = 100_000_000
+#: A swept path, its place in the configuration (for messages), its dimensions and its values.
+Column = tuple[str, str, tuple[str, ...], NDArray[Any]]
 
 
 @dataclass(frozen=True)
 class Axes:
-    """What a sweep varies.
+    """Dimensions and values of everything that a sweep varies.
 
     Attributes
     ----------
     sizes : dict of str to int
         Length of each dimension, in order.
     columns : dict of str to tuple
-        For each swept path its dimensions, and its values with a shape to match: numbers in SI units,
-        or names of friction laws.
+        Dimensions and values of each swept path. The values are numbers in SI units or names of friction laws; their
+        shape matches the dimensions.
     """
 
     sizes: dict[str, int] = field(default_factory=dict)
     columns: dict[str, tuple[tuple[str, ...], NDArray[Any]]] = field(default_factory=dict)
 
 
-Entry = tuple[str, str, tuple[str, ...], NDArray[Any]]
-
-
 def sweep_section(doc: Document) -> dict[str, Any]:
-    """The section ``sweep``, its files inlined; empty if there is none."""
+    """The section ``sweep`` with the contents of its CSV files; empty if there is no such section."""
     if "sweep" not in doc.tree:
         return {}
     sweep = section_of(doc.tree, "sweep", "")
@@ -67,41 +66,47 @@ def sweep_section(doc: Document) -> dict[str, Any]:
     return sweep
 
 
-def swept_paths(sweep: dict[str, Any]) -> set[str]:
-    return set(sweep.get("grid", ())) | set(sweep.get("points", ()))
+def swept_paths(sweep: dict[str, Any]) -> dict[str, str]:
+    """Every path that the section ``sweep`` varies, with its place in the configuration."""
+    return {path: f"sweep.{kind}.{path}" for kind in ("points", "grid") for path in sweep.get(kind, ())}
 
 
 def sweep_axes(scene: Scene, sweep: dict[str, Any]) -> Axes:
+    """Axes from the section ``sweep`` of a configuration."""
     known = sweepable(scene)
     points = sweep.get("points", {})
 
-    def entries() -> Iterator[Entry]:
+    def columns() -> Iterator[Column]:
         for path, given in points.items():
             where = f"sweep.points.{path}"
-            yield path, where, ("point",), values_of(given, axis(known, path, where), where)
+            yield path, where, ("point",), read_values(given, swept_parameter(known, path, where), where)
         for path, given in sweep.get("grid", {}).items():
             where = f"sweep.grid.{path}"
-            parameter = axis(known, path, where)
+            parameter = swept_parameter(known, path, where)
             if path in points:
                 raise InputError(where, "also a column of sweep.points: a path can vary in one place only")
-            spaced = isinstance(given, dict)
-            yield path, where, (dimension(path),), (_spaced if spaced else values_of)(given, parameter, where)
+            read = _read_spacing if isinstance(given, dict) else read_values
+            yield path, where, (dimension(path),), read(given, parameter, where)
 
-    return axes_of(entries())
+    return build_axes(columns())
 
 
-def axis(known: Mapping[str, Parameter | Choice], path: object, where: str) -> Parameter | Choice:
+def swept_parameter(known: Mapping[str, Parameter | Choice], path: object, where: str) -> Parameter | Choice:
+    """The parameter at a swept path, which must be one of the known paths."""
     if not isinstance(path, str) or path not in known:
         raise InputError(where, "the scene has no such number to vary" + suggestion(path, known))
     return known[path]
 
 
 def dimension(path: str) -> str:
+    """Name that a path has in datasets."""
     return path.replace(".", "_")
 
 
-def array(given: xr.DataArray, parameter: Parameter | Choice, where: str) -> tuple[tuple[str, ...], NDArray[Any]]:
-    """Dimensions and values of a DataArray."""
+def read_data_array(
+    given: xr.DataArray, parameter: Parameter | Choice, where: str
+) -> tuple[tuple[str, ...], NDArray[Any]]:
+    """Dimensions and values of a DataArray, converted from its ``units``."""
     dims = tuple(map(str, given.dims))
     if not dims:
         raise InputError(where, "a DataArray without dimensions varies nothing")
@@ -109,11 +114,11 @@ def array(given: xr.DataArray, parameter: Parameter | Choice, where: str) -> tup
     flat: Any = given.values.ravel()
     if unit != "1" and given.dtype.kind in "iuf":
         flat = [f"{value!r} {unit}" for value in flat.tolist()]
-    return dims, values_of(flat, parameter, where).reshape(given.shape)
+    return dims, read_values(flat, parameter, where).reshape(given.shape)
 
 
-def _spaced(given: dict[str, Any], parameter: Parameter | Choice, where: str) -> NDArray[np.float64]:
-    """Values from ``{linspace: [first, last, count]}`` or ``geomspace``."""
+def _read_spacing(given: dict[str, Any], parameter: Parameter | Choice, where: str) -> NDArray[np.float64]:
+    """Values from ``{linspace: [first, last, count]}`` or ``{geomspace: ...}``."""
     if isinstance(parameter, Choice):
         raise InputError(where, f"a list of names is expected, got {show(given)}")
     if len(given) != 1 or next(iter(given)) not in ("linspace", "geomspace"):
@@ -123,16 +128,28 @@ def _spaced(given: dict[str, Any], parameter: Parameter | Choice, where: str) ->
     if not isinstance(bounds, list) or len(bounds) != 3:
         raise InputError(where, f"[first, last, count] is expected, got {show(bounds)}")
     first, last = (quantity(bound, parameter, f"{where}.{i}") for i, bound in enumerate(bounds[:2]))
-    count = int(number_of(bounds[2], COUNT, int, f"{where}.2"))
+    count = int(quantity(bounds[2], COUNT, f"{where}.2"))
     if kind == "geomspace" and min(first, last) <= 0.0:
         raise InputError(where, f"both ends of geomspace must be greater than 0, got {first:g} and {last:g}")
-    return np.linspace(first, last, count) if kind == "linspace" else np.geomspace(first, last, count)
+    values = np.linspace(first, last, count) if kind == "linspace" else np.geomspace(first, last, count)
+    if parameter.whole:
+        for value in values[values % 1.0 != 0.0][:1]:
+            raise InputError(
+                where, f"makes {value:g}, but {parameter.long_name} must be a whole number: list the values"
+            )
+    return values
 
 
-def axes_of(entries: Iterable[Entry]) -> Axes:
-    """Axes from columns, in their order."""
+def build_axes(columns: Iterable[Column]) -> Axes:
+    """Axes from columns, in their order.
+
+    Raises
+    ------
+    InputError
+        If the columns contradict each other, repeat a value, or make too many cells.
+    """
     found = Axes()
-    for path, where, dims, values in entries:
+    for path, where, dims, values in columns:
         for dim, size in zip(dims, values.shape, strict=True):
             if dim in OUTCOMES:
                 raise InputError(where, f"the dimension {dim} has the name of a variable of the result")
@@ -141,15 +158,19 @@ def axes_of(entries: Iterable[Entry]) -> Axes:
         found.columns[path] = dims, values
         if dims == (dimension(path),):
             _, first = np.unique(values, return_index=True)
-            again = np.setdiff1d(np.arange(len(values)), first)
-            if len(again):
-                raise InputError(f"{where}.{again[0]}", f"{show(values[again[0]].item())} stands twice on this axis")
+            repeated = np.setdiff1d(np.arange(len(values)), first)
+            if len(repeated):
+                value = values[repeated[0]].item()
+                raise InputError(f"{where}.{repeated[0]}", f"{show(value)} stands twice on this axis")
     total = math.prod(found.sizes.values())
-    if total > MOST_CELLS:
+    if total > MAX_CELLS:
         sizes = " x ".join(map(str, found.sizes.values()))
-        raise InputError("sweep", f"{sizes} makes {total:.3g} cells: at most {MOST_CELLS:.3g} fit into one sweep")
+        raise InputError("sweep", f"{sizes} makes {total:.3g} cells: at most {MAX_CELLS:.3g} fit into one sweep")
     for path, (dims, _) in found.columns.items():
         name = dimension(path)
         if name in found.sizes and dims != (name,):
-            raise InputError(path, f"the dimension {name} has the name of this path, but does not index it alone")
+            raise InputError(
+                path,
+                f"the dimension {name} has the name of this path, but the path has other dimensions: rename it",
+            )
     return found

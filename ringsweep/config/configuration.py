@@ -1,7 +1,7 @@
-"""Configuration text to validated scene, axes and solver in SI units.
+"""Whole configurations: from text to a validated scene, axes and solver in SI units.
 
-Every message about wrong input starts here, from what physics and solvers declare about their
-parameters; :mod:`ringsweep.config.yaml_text` knows the lines, :mod:`ringsweep.quantities.units` the units.
+Physics and solvers declare their parameters; error messages are made from these declarations.
+:mod:`ringsweep.config.yaml_text` knows the lines, :mod:`ringsweep.quantities.units` the units.
 """
 
 from __future__ import annotations
@@ -13,10 +13,20 @@ from dataclasses import dataclass
 from typing import Any
 
 from ringsweep.config import yaml_text
-from ringsweep.config.axes import Axes, Entry, array, axes_of, axis, dimension, sweep_axes, sweep_section, swept_paths
+from ringsweep.config.axes import (
+    Axes,
+    Column,
+    build_axes,
+    dimension,
+    read_data_array,
+    sweep_axes,
+    sweep_section,
+    swept_parameter,
+    swept_paths,
+)
 from ringsweep.config.consistency import check_consistency
-from ringsweep.config.scene import scene_of, sweepable
-from ringsweep.config.sections import suggestion, values_of
+from ringsweep.config.scene import parse_scene, sweepable
+from ringsweep.config.sections import read_values, suggestion
 from ringsweep.config.solver import read_solver
 from ringsweep.config.yaml_text import Document, scalar
 from ringsweep.errors import InputError
@@ -31,15 +41,16 @@ class Config:
     Attributes
     ----------
     scene : Scene
-        A value that is only swept may be missing from it.
+        It may lack values that the sweep gives.
     solver : Method
         A method with its options.
     axes : Axes
         Without dimensions if nothing is swept.
     source : dict
-        The configuration as plain values, units as typed, files inlined: enough to run it again.
+        The configuration as plain values, with units as typed and the contents of its CSV files. It is enough to run
+        the configuration again.
     name : str
-        Stem of the file that it came from.
+        Name of its file without suffix.
     """
 
     scene: Scene
@@ -55,44 +66,49 @@ def load(config: str | os.PathLike[str] | Mapping[str, Any]) -> Config:
     Parameters
     ----------
     config : path-like or mapping
-        A YAML file, what one would hold, or a result file, whose sweep it is.
+        A YAML file, the mapping that it would hold, or a result file, which holds its configuration.
 
     Raises
     ------
     InputError
-        With what is wrong, where, and what is allowed.
+        If something in it is wrong. The message names the place, the value and what is allowed.
     """
     doc = yaml_text.read(config)
-    with doc.placing():
-        found = _config(doc)
-    if doc.swept is None:
+    with doc.locating_errors():
+        found = _validate(doc)
+    if doc.result_axes is None:
         return found
-    # The very axes that were run, by dimensions that a configuration cannot name.
-    given = ((path, path, dims, values) for path, (dims, values) in doc.swept.items())
-    return dataclasses.replace(found, axes=axes_of(given))
+    # A configuration cannot name the dimensions that axes share; the coordinates of a result file can.
+    columns = ((path, path, dims, values) for path, (dims, values) in doc.result_axes.items())
+    return dataclasses.replace(found, axes=build_axes(columns))
 
 
 def with_values(config: str | os.PathLike[str] | Mapping[str, Any], settings: Iterable[str] = ()) -> Config:
-    """The configuration of a single run: axes left out, some values changed.
+    """Configuration of a single run: without axes, and with some values changed.
 
-    If the grid goes through friction laws, and none is set, it is that of a run under each of them.
+    If the grid has an axis of friction laws and no setting names a law, that axis stays: there is a run under each law.
 
     Parameters
     ----------
     config : path-like or mapping
-        As in :func:`load`; what else it sweeps is ignored.
+        As for :func:`load`. Its other axes are ignored.
     settings : iterable of str
-        ``"PATH=VALUE"`` with a path in the scene (``drive.amplitude=3``) or ``solver.steps=...``.
+        ``"PATH=VALUE"`` with a path in the scene (``drive.amplitude=3``) or in the solver (``solver.steps=100``).
+
+    Raises
+    ------
+    InputError
+        If configuration or settings are wrong, or a value is missing that only the sweep gives.
     """
     doc = yaml_text.read(config)
-    with doc.placing():
-        settled = {_set(doc, setting) for setting in settings}
+    with doc.locating_errors():
+        changed = {_apply_setting(doc, setting) for setting in settings}
         sweep = sweep_section(doc)
         doc.tree.pop("sweep", None)
-        if LAW in sweep.get("grid", {}) and f"scene.{LAW}" not in settled:
+        if LAW in sweep.get("grid", {}) and f"scene.{LAW}" not in changed:
             doc.tree["sweep"] = {"grid": {LAW: sweep["grid"][LAW]}}
         try:
-            return _config(doc)
+            return _validate(doc)
         except InputError as error:
             path = error.path.removeprefix("scene.")
             if path in swept_paths(sweep) and error.problem.startswith("missing"):
@@ -101,42 +117,49 @@ def with_values(config: str | os.PathLike[str] | Mapping[str, Any], settings: It
 
 
 def read_scene(scene: Mapping[str, Any], swept: Collection[str] = ()) -> Scene:
-    """Read and validate the mapping that stands under ``scene`` in a configuration.
+    """Read and validate the mapping under ``scene`` in a configuration.
 
     Parameters
     ----------
     scene : mapping
     swept : collection of str, or mapping of str to sequence
-        Paths that a sweep will fill; their values may be missing, and contradictions between
-        values are left to :func:`read_axes`. Which friction laws these are only a mapping can tell.
+        Paths that a sweep will fill. Their values may be missing, and :func:`read_axes` looks for contradictions
+        between values. If friction laws are swept, `swept` must be a mapping that names them.
+
+    Raises
+    ------
+    InputError
+        If something in it is wrong, or it is a whole configuration.
     """
+    if isinstance(scene, Mapping) and "scene" in scene:
+        raise InputError("scene", "this is a whole configuration: pass config['scene']")
     laws = (f"axes[{LAW!r}]", swept[LAW]) if isinstance(swept, Mapping) and LAW in swept else None
-    found = scene_of(Document(yaml_text.read({"scene": scene}).tree), swept, laws)
+    found = parse_scene(Document(yaml_text.read({"scene": scene}).tree), swept, laws)
     if not swept:
         check_consistency(found, Axes())
     return found
 
 
-def _config(doc: Document) -> Config:
+def _validate(doc: Document) -> Config:
     tree = doc.tree
     for key in tree:
         if key not in ("scene", "solver", "sweep"):
             raise InputError(key, "unknown section" + suggestion(key, ("scene", "solver", "sweep")))
     sweep = sweep_section(doc)
-    laws = [(f"sweep.{part}.{LAW}", columns[LAW]) for part, columns in sweep.items() if LAW in columns]
-    scene = scene_of(doc, swept_paths(sweep), laws[0] if laws else None)
+    swept = swept_paths(sweep)
+    laws = [(f"sweep.{kind}.{LAW}", columns[LAW]) for kind, columns in sweep.items() if LAW in columns]
+    scene = parse_scene(doc, swept, laws[0] if laws else None)
     solver = read_solver(tree.get("solver", "auto"), scene)
     axes = sweep_axes(scene, sweep)
-    for path in axes.columns:
-        place = f"sweep.grid.{path}" if path in sweep.get("grid", {}) else f"sweep.points.{path}"
-        if place in doc.marks:
-            doc.marks[f"scene.{path}"] = doc.marks[place]
+    for path, where in swept.items():
+        if where in doc.locations:
+            doc.locations[f"scene.{path}"] = doc.locations[where]
     check_consistency(scene, axes)
     return Config(scene, solver, axes, tree, doc.name)
 
 
-def _set(doc: Document, setting: str) -> str:
-    """Put one ``PATH=VALUE`` into the tree, and tell where; whether it means anything shows when it is read."""
+def _apply_setting(doc: Document, setting: str) -> str:
+    """Put one ``PATH=VALUE`` into the tree and return its full path. The path is checked later, with the tree."""
     path, equals, text = (part.strip() for part in setting.partition("="))
     if not equals or not path:
         raise InputError("--set", f"{show(setting)} is not of the form PATH=VALUE")
@@ -154,7 +177,7 @@ def _set(doc: Document, setting: str) -> str:
         node[last] = scalar(text)
     else:
         raise InputError(full, f"cannot be set: {'.'.join(parents)} is {show(node)}")
-    doc.marks[full] = f"--set {setting}", None
+    doc.locations[full] = f"--set {setting}", None
     return full
 
 
@@ -163,7 +186,7 @@ def _child(node: Any, key: str, full: str) -> Any:
         return node[key]
     if isinstance(node, list) and key.isdecimal() and int(key) < len(node):
         return node[int(key)]
-    raise InputError(full, f"cannot be set: there is no `{key}` to go through")
+    raise InputError(full, f"cannot be set: there is no `{key}` on this path")
 
 
 def read_axes(scene: Scene, axes: Mapping[str, Any]) -> Axes:
@@ -173,31 +196,30 @@ def read_axes(scene: Scene, axes: Mapping[str, Any]) -> Axes:
     ----------
     scene : Scene
     axes : mapping of str to sequence or DataArray
-        For each path a sequence of shape ``(n,)``, which makes a dimension of its own, or a
-        DataArray, whose dimensions it shares with others of the same name. A DataArray's ``units``
-        are heeded.
+        A sequence of shape ``(n,)`` makes a dimension for its path. A DataArray brings its dimensions, which it shares
+        with other DataArrays, and its ``units``.
 
     Raises
     ------
     InputError
         If a path or value is wrong, or values contradict each other in some cell.
     """
-    # Reading a configuration does not need it, and should not wait for it.
+    # xarray is slow to import; an error in a configuration should not wait for it.
     import xarray as xr
 
     if not isinstance(axes, Mapping):
         raise InputError("axes", f"a mapping of paths to values is expected, got {show(axes)}")
     known = sweepable(scene)
 
-    def entries() -> Iterator[Entry]:
+    def columns() -> Iterator[Column]:
         for path, given in axes.items():
             where = f"axes[{path!r}]"
-            parameter = axis(known, path, where)
+            parameter = swept_parameter(known, path, where)
             if isinstance(given, xr.DataArray):
-                yield path, where, *array(given, parameter, where)
+                yield path, where, *read_data_array(given, parameter, where)
             else:
-                yield path, where, (dimension(path),), values_of(given, parameter, where)
+                yield path, where, (dimension(path),), read_values(given, parameter, where)
 
-    found = axes_of(entries())
+    found = build_axes(columns())
     check_consistency(scene, found)
     return found

@@ -1,4 +1,4 @@
-"""Whether the values of a scene contradict each other, in any cell of a sweep."""
+"""Check that the values of a scene do not contradict each other in any cell of a sweep."""
 
 from __future__ import annotations
 
@@ -11,53 +11,59 @@ from ringsweep.errors import InputError
 from ringsweep.models import batch
 from ringsweep.models.scene import LAW, Scene, Structure
 
-# Cells whose consistency is checked at once: many arcs over many points must not fill the memory.
-_BLOCK = 4096
+# Cells that are checked at once: many arcs over many points must not fill the memory.
+_CELLS_AT_ONCE = 4096
 
 
 def check_consistency(scene: Scene, axes: Axes) -> None:
-    """Let the model find values that contradict each other, in any cell of a sweep."""
-    # Each condition is monotone in each value: of a grid axis the two extremes decide for all of it.
-    picks = []
+    """Let the model look for contradictions between values, in all cells of a sweep.
+
+    Raises
+    ------
+    InputError
+        If values contradict each other, such as a ring too small for its body.
+    """
+    # Each condition is monotone in each value, so the two extremes of a grid axis decide for the whole axis.
+    checked = []
     for dim, size in axes.sizes.items():
         along = [values for dims, values in axes.columns.values() if dim in dims]
-        alone = len(along) == 1 and along[0].ndim == 1 and along[0].dtype.kind == "f"
-        picks.append(np.unique([along[0].argmin(), along[0].argmax()]) if alone else np.arange(size))
-    shape = (1, *map(len, picks))
+        monotone = len(along) == 1 and along[0].ndim == 1 and along[0].dtype.kind == "f"
+        checked.append(np.unique([along[0].argmin(), along[0].argmax()]) if monotone else np.arange(size))
+    shape = (1, *map(len, checked))
     total = math.prod(shape)
-    for start in range(0, total, _BLOCK):
-        flat = np.arange(start, min(start + _BLOCK, total))
-        cells = np.unravel_index(flat, shape)[1:]
-        place = {dim: pick[cell] for dim, pick, cell in zip(axes.sizes, picks, cells, strict=True)}
+    for start in range(0, total, _CELLS_AT_ONCE):
+        flat = np.arange(start, min(start + _CELLS_AT_ONCE, total))
+        numbers = np.unravel_index(flat, shape)[1:]
+        indices = {dim: along[number] for dim, along, number in zip(axes.sizes, checked, numbers, strict=True)}
         values = {path: np.full(len(flat), value) for path, value in scene.values.items()}
-        values |= {path: column[tuple(place[dim] for dim in dims)] for path, (dims, column) in axes.columns.items()}
+        values |= {path: column[tuple(indices[dim] for dim in dims)] for path, (dims, column) in axes.columns.items()}
         laws = values.pop(LAW, np.full(len(flat), scene.structure.law))
         for law, structure in scene.structures.items():
-            own = laws == law
-            if not own.any():
+            cells = laws == law
+            if not cells.any():
                 continue
             try:
-                batch(structure, {path: column[own] for path, column in values.items()})
+                batch(structure, {path: column[cells] for path, column in values.items()})
             except InputError as error:
-                if _is_swept(structure, scene, axes, error):
+                if _comes_from_sweep(structure, scene, axes, error):
                     error.problem += " (in a cell of the sweep)"
                 raise
 
 
-def _is_swept(structure: Structure, scene: Scene, axes: Axes, error: InputError) -> bool:
-    """Whether a contradiction comes from values of a sweep.
+def _comes_from_sweep(structure: Structure, scene: Scene, axes: Axes, error: InputError) -> bool:
+    """Whether a contradiction comes from swept values.
 
-    It does not if the scene by itself says the same, with the least as with the greatest of the
-    values that only the sweep gives.
+    It does not if the scene alone has the same contradiction. Values that only the sweep gives are tried at their least
+    and at their greatest.
     """
     if error.path.removeprefix("scene.") in axes.columns:
         return True
-    for end in (np.min, np.max):
-        swept = {path: end(column) for path, (_, column) in axes.columns.items() if path != LAW}
+    for extreme in (np.min, np.max):
+        swept = {path: extreme(column) for path, (_, column) in axes.columns.items() if path != LAW}
         try:
             batch(structure, {path: np.array([value]) for path, value in {**swept, **scene.values}.items()})
-        except InputError as alone:
-            if str(alone) == str(error):
+        except InputError as without_sweep:
+            if str(without_sweep) == str(error):
                 continue
         return True
     return False

@@ -1,4 +1,4 @@
-"""The section ``scene`` of a configuration, validated, in SI units."""
+"""The section ``scene`` of a configuration: read, validated, in SI units."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.config.sections import choose, missing_text, section_of, suggestion, values_of
+from ringsweep.config.sections import choose, missing_text, read_values, section_of, suggestion
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, parameters
@@ -22,34 +22,48 @@ from ringsweep.quantities.units import quantity, show
 
 logger = logging.getLogger("ringsweep")
 
-#: Columns of the table of a drive.
+#: Columns of the table of a measured drive.
 TABLE = {"time": Parameter("s", "time in the table of the drive"), "theta": Parameter("rad", "angle of the drive")}
 
 
 def sweepable(scene: Scene) -> dict[str, Parameter | Choice]:
-    """Every path of a scene that a sweep can vary, with what it is."""
+    """Every path of a scene that a sweep can vary, with its parameter."""
     return {**numbers_of(scene.structures), LAW: law_choice(scene.structure.model)}
 
 
-def scene_of(doc: Document, swept: Collection[str], laws: tuple[str, Any] | None) -> Scene:
-    """The scene, under its own friction law or those that a sweep gives: their place, and what stands there."""
+def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | None) -> Scene:
+    """The scene of a configuration.
+
+    Parameters
+    ----------
+    doc : Document
+    swept : collection of str
+        Paths that the sweep gives, and that the scene may lack.
+    laws : tuple of str and sequence, optional
+        Friction laws that the sweep gives: their place in the configuration, and their names.
+
+    Raises
+    ------
+    InputError
+        If something in the scene is wrong. Contradictions between values are not looked for.
+    """
     scene = section_of(doc.tree, "scene", "")
     model = choose(MODELS, scene, "scene.model", "model")
     arcs = scene.get("zones", [])
     if not isinstance(arcs, list) or ("zones" in scene and not arcs):
         raise InputError("scene.zones", f"a list of arcs is expected, got {show(arcs)}")
     zones = tuple(f"zones.{i}" for i in range(len(arcs)))
-    named = scene.get("friction")
-    if isinstance(named, dict) and "law" in named:
-        # A law that the model does not take is found before the parameters that only it has.
-        choose(MODELS[model].laws, named, f"scene.{LAW}", f"friction law of model {model}")
-    # A misspelt key is found before the key that it leaves missing.
-    leaves = dict(_leaves(scene, "", _Names(_all_paths(model, zones or ("zones.0",)))))
+    friction = scene.get("friction")
+    if isinstance(friction, dict) and "law" in friction:
+        # Name a wrong law, rather than the parameters that only this law has.
+        choose(MODELS[model].laws, friction, f"scene.{LAW}", f"friction law of model {model}")
+    # Name a misspelt key, rather than the key that is missing because of it.
+    leaves = dict(_leaves(scene, "", _Paths(_all_paths(model, zones or ("zones.0",)))))
     names = []
     if laws is None or LAW in leaves:
         names = [choose(MODELS[model].laws, section_of(scene, "friction", "scene."), f"scene.{LAW}", "friction law")]
     if laws is not None:
-        names = values_of(laws[1], law_choice(model), laws[0]).tolist()
+        names = read_values(laws[1], law_choice(model), laws[0]).tolist()
     drive = "none"
     if "drive" in scene:
         drive = choose(DRIVES, section_of(scene, "drive", "scene."), "scene.drive.law", "drive law")
@@ -57,12 +71,12 @@ def scene_of(doc: Document, swept: Collection[str], laws: tuple[str, Any] | None
     if "zones" in scene:
         for other in ("zone", *rough):
             if other in scene or other in leaves:
-                raise InputError(f"scene.{other}", "given beside zones: each of the zones has its own values")
+                raise InputError(f"scene.{other}", "cannot stand beside zones, each of which has its own values")
     elif "zone" in scene:
         zones = ("zone",)
     elif rough:
         raise InputError(f"scene.{rough[0]}", "there is no rough zone: give zone, or leave friction.rough out")
-    table = table_of(doc, scene["drive"]) if drive == "table" else None
+    table = _read_table(doc, scene["drive"]) if drive == "table" else None
     structures = {law: Structure(model, law, drive, zones, table) for law in names}
     known = numbers_of(structures)
     values = {}
@@ -78,18 +92,18 @@ def scene_of(doc: Document, swept: Collection[str], laws: tuple[str, Any] | None
     for path in leaves:
         if path not in known and path not in _structural(drive):
             where, name = ("drive", drive) if path.startswith("drive.") else ("friction", " or ".join(structures))
-            tell_of_unused(path, where, name)
+            warn_of_unused(path, where, name)
     return Scene(structures, values, scene)
 
 
 @cache
-def tell_of_unused(path: str, where: str, name: str) -> None:
-    """Once: a run, its picture and its file read one configuration several times."""
+def warn_of_unused(path: str, where: str, name: str) -> None:
+    """Warn once per process: one command reads its configuration several times."""
     logger.warning("scene.%s is not used: %s law %s has no such parameter", path, where, name)
 
 
 def numbers_of(structures: Mapping[str, Structure]) -> dict[str, Parameter]:
-    """Every numeric path that a scene has under any of its laws."""
+    """Every numeric path that a scene has under at least one of its laws."""
     found: dict[str, Parameter] = {}
     for structure in structures.values():
         found |= parameters(structure)
@@ -97,27 +111,28 @@ def numbers_of(structures: Mapping[str, Structure]) -> dict[str, Parameter]:
 
 
 def law_choice(model: str) -> Choice:
+    """Friction laws that a model takes."""
     return Choice("friction law", tuple(MODELS[model].laws))
 
 
 def _structural(drive: str) -> tuple[str, ...]:
-    """Paths that choose the structure and carry no number."""
+    """Paths of a scene that are no numeric parameters."""
     return ("model", LAW, "drive.law", *(f"drive.{name}" for name in (*TABLE, "file") if drive == "table"))
 
 
 def _all_paths(model: str, zones: tuple[str, ...]) -> list[str]:
-    """Every path that some scene of this model has, whatever its laws."""
+    """Every path that a scene of this model can have, under all laws and drives."""
     paths = dict.fromkeys(_structural("table"))
     for law, drive, arcs in product(MODELS[model].laws, DRIVES, {(), ("zone",), zones}):
         paths |= dict.fromkeys(parameters(Structure(model, law, drive, arcs)))
     return list(paths)
 
 
-class _Names:
-    """Dotted paths, and the sections on the way to them."""
+class _Paths:
+    """Dotted paths, and the keys below each section."""
 
     def __init__(self, paths: list[str]):
-        self.paths = set(paths)
+        self.known = set(paths)
         self.children: dict[str, dict[str, None]] = {}
         for path in paths:
             while path:
@@ -126,41 +141,41 @@ class _Names:
                 path = parent
 
 
-def _leaves(node: Any, path: str, names: _Names) -> Iterator[tuple[str, Any]]:
-    """Every path below `node` that stands for a value, with that value."""
+def _leaves(node: Any, path: str, paths: _Paths) -> Iterator[tuple[str, Any]]:
+    """Path and value of every leaf below `node`."""
     where = f"scene.{path}".rstrip(".")
     items = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else None
-    children = names.children[path.rstrip(".")]
+    children = paths.children[path.rstrip(".")]
     if items is None:
         raise InputError(where, f"a section is expected, got {show(node)} (known keys: {', '.join(children)})")
     for key, value in items:
-        here = f"{path}{key}"
-        # The key itself, not the path: `body.mass: 1` in one key would pass for `mass` under `body`.
+        full = f"{path}{key}"
+        # Check the key, not the path: the single key "body.mass" would pass for `mass` under `body`.
         if str(key) not in children:
-            raise InputError(f"scene.{here}", "unknown key" + suggestion(key, children))
-        if here in names.paths:
-            yield here, value
+            raise InputError(f"scene.{full}", "unknown key" + suggestion(key, children))
+        if full in paths.known:
+            yield full, value
         else:
-            yield from _leaves(value, f"{here}.", names)
+            yield from _leaves(value, f"{full}.", paths)
 
 
-def table_of(doc: Document, drive: dict[str, Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Samples of a tabulated drive; those of a file move into the configuration."""
+def _read_table(doc: Document, drive: dict[str, Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Times and angles of a measured drive. If they come from a file, they replace its name in the configuration."""
     if "file" in drive:
         if "time" in drive or "theta" in drive:
             raise InputError("scene.drive.file", "give a file, or time and theta, not both")
         columns = doc.inline_csv(drive["file"], "scene.drive.file", "scene.drive")
         renamed = {"time" if name == "t" else name: cells for name, cells in columns.items()}
         if set(renamed) != {"time", "theta"} or len(columns) != 2:
-            hint = ": parted by commas" if len(columns) == 1 else ""
-            raise InputError("scene.drive.file", f"columns t, theta are expected{hint}, got {', '.join(columns)}")
-        doc.marks |= {k.replace("drive.t.", "drive.time."): v for k, v in doc.marks.items()}
+            hint = ", separated by commas" if len(columns) == 1 else ""
+            raise InputError("scene.drive.file", f"columns t, theta are expected{hint}; got {', '.join(columns)}")
+        doc.locations |= {k.replace("drive.t.", "drive.time."): v for k, v in doc.locations.items()}
         del drive["file"]
         drive |= renamed
     for name in TABLE:
         if name not in drive:
-            raise InputError(f"scene.drive.{name}", "missing: a table needs a file, or lists time and theta")
-    times, angles = (values_of(drive[name], parameter, f"scene.drive.{name}") for name, parameter in TABLE.items())
+            raise InputError(f"scene.drive.{name}", "missing: a table needs a file, or the lists time and theta")
+    times, angles = (read_values(drive[name], parameter, f"scene.drive.{name}") for name, parameter in TABLE.items())
     if len(times) != len(angles):
         raise InputError("scene.drive.theta", f"{len(angles)} angles for {len(times)} times")
     if len(times) < 4:

@@ -7,7 +7,7 @@ import math
 import re
 from collections.abc import Mapping
 from itertools import product
-from typing import Any, get_type_hints
+from typing import Any
 
 from ringsweep.config.axes import COUNT
 from ringsweep.config.scene import TABLE
@@ -22,14 +22,14 @@ from ringsweep.solvers import METHODS
 def schema() -> dict[str, Any]:
     """JSON Schema (2020-12) that every valid configuration satisfies.
 
-    Editors complete and explain keys from it. It does not know what depends on several values at
-    once, nor units; :func:`ringsweep.config.configuration.load` does.
+    Editors complete and explain keys from it. It checks no units and no contradictions between values, as
+    :func:`ringsweep.config.configuration.load` does.
     """
     known: dict[str, list[Parameter]] = {}
     for model, drive, arcs in product(MODELS, DRIVES, ((), ("zone",), ("zones.0",))):
         for law in MODELS[model].laws:
             for path, parameter in parameters(Structure(model, law, drive, arcs)).items():
-                # One description serves all arcs of a list.
+                # All arcs of a list have one description.
                 parameter = dataclasses.replace(
                     parameter, long_name=parameter.long_name.replace("rough arc 1", "the rough arc")
                 )
@@ -57,13 +57,13 @@ def schema() -> dict[str, Any]:
     }
 
 
-def _number(parameter: Parameter, kind: str = "number") -> dict[str, Any]:
+def _number(parameter: Parameter) -> dict[str, Any]:
     about = parameter.long_name
     if parameter.unit not in ("", "1"):
         about += f", {parameter.unit}"
     if parameter.default is not None:
         about += f" (default {parameter.default:g})"
-    bounds: dict[str, Any] = {"type": kind}
+    bounds: dict[str, Any] = {"type": "integer" if parameter.whole else "number"}
     if math.isfinite(parameter.lower):
         bounds["exclusiveMinimum" if parameter.open_lower else "minimum"] = parameter.lower
     if math.isfinite(parameter.upper):
@@ -77,7 +77,7 @@ def _names(registry: Mapping[str, Any], about: str) -> dict[str, Any]:
 
 
 def _first_line(documented: Any) -> str:
-    """What it is, as an editor shows it."""
+    """First line of a docstring, without markup, for editors to show."""
     line: str = (documented.__doc__ or "").split("\n")[0]
     return re.sub(r":math:`([^`]*)`", lambda formula: formula[1].replace("\\", ""), line)
 
@@ -108,12 +108,11 @@ def _solver() -> dict[str, Any]:
     methods: list[dict[str, Any]] = [{"type": "string", "enum": list(METHODS)}]
     method: Any
     for name, method in METHODS.items():
-        numbers, hints = declared(method), get_type_hints(method)
+        numbers = declared(method)
         options: dict[str, Any] = {"method": {"const": name, "description": _first_line(method)}}
         for option in dataclasses.fields(method):
             if option.name in numbers:
-                kind = "integer" if hints[option.name] is int else "number"
-                options[option.name] = _number(numbers[option.name], kind)
+                options[option.name] = _number(numbers[option.name])
             else:
                 options[option.name] = {"type": "boolean"}
         methods.append({**_section(options), "required": ["method"]})
@@ -125,7 +124,7 @@ def _sweep(paths: list[str]) -> dict[str, Any]:
     arcs = "|".join(path.removeprefix("zones.0.") for path in paths if path.startswith("zones.0."))
     laws = {LAW: _list(_names(LAWS, "friction law"))}
     names = {"anyOf": [{"enum": [*laws, *paths]}, {"pattern": rf"^zones\.[0-9]+\.({arcs})$"}]}
-    bounds = {"type": "array", "prefixItems": [value, value, _number(COUNT, "integer")], "minItems": 3, "maxItems": 3}
+    bounds = {"type": "array", "prefixItems": [value, value, _number(COUNT)], "minItems": 3, "maxItems": 3}
     axis = {"anyOf": [_list(value), *(_section({kind: bounds}) for kind in ("linspace", "geomspace"))]}
     return _section(
         {

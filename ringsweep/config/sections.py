@@ -1,4 +1,4 @@
-"""Sections and values of a configuration, and the messages about what is wrong in them."""
+"""Sections, names and lists of values of a configuration, and the error messages about them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ringsweep.quantities.units import quantity, show
 
 
 def suggestion(word: object, known: Iterable[str]) -> str:
-    """The end of a message about an unknown name: the nearest known one, and all of them."""
+    """End of a message about an unknown name: the nearest known name, and all known names."""
     names = list(dict.fromkeys(known))
     near = difflib.get_close_matches(str(word)[:100], names, n=1)
     rest = "" if len(names) <= 40 else f", ... ({len(names)} in all)"
@@ -23,23 +23,21 @@ def suggestion(word: object, known: Iterable[str]) -> str:
 
 
 def missing_text(path: str, parameter: Parameter) -> str:
+    """Message about a missing value: what it means, its unit and an example."""
     examples = {"rad": "15 deg", "m": "10 mm", "1": "0.2", "": "1"}
     unit = f", in {parameter.unit}" if parameter.unit not in ("", "1") else ""
-    example = "5000" if path.endswith(("steps", ".max_steps")) else examples.get(parameter.unit, f"1 {parameter.unit}")
+    example = "5000" if parameter.whole else examples.get(parameter.unit, f"1 {parameter.unit}")
     return f"missing: {parameter.long_name}{unit} (for example `{path.rpartition('.')[2]}: {example}`)"
 
 
-def number_of(given: Any, parameter: Parameter, kind: type, path: str) -> float | int:
-    value = quantity(given, parameter, path)
-    if kind is not int:
-        return value
-    if not value.is_integer():
-        raise InputError(path, f"{show(given)} is not a whole number: {parameter.long_name} must be one")
-    return int(value)
+def read_values(given: Any, parameter: Parameter | Choice, where: str) -> NDArray[Any]:
+    """Quantities or names from a sequence, shape ``(n,)``.
 
-
-def values_of(given: Any, parameter: Parameter | Choice, where: str) -> NDArray[Any]:
-    """A sequence of quantities, or of names, shape ``(n,)``."""
+    Raises
+    ------
+    InputError
+        If `given` is no such sequence, or one of its values is wrong.
+    """
     if hasattr(given, "__array__"):
         array = np.asarray(given)
         if array.ndim != 1 or array.dtype.kind not in "iufOU":
@@ -50,18 +48,18 @@ def values_of(given: Any, parameter: Parameter | Choice, where: str) -> NDArray[
         raise InputError(where, f"a list of values is expected, got {show(given)}")
     if not given:
         raise InputError(where, "empty: give at least one value")
-    read: Any = name_of if isinstance(parameter, Choice) else quantity
+    read: Any = _read_name if isinstance(parameter, Choice) else quantity
     return np.array([read(value, parameter, f"{where}.{i}") for i, value in enumerate(given)])
 
 
-def name_of(given: object, choice: Choice, path: str) -> str:
-    """One of the names that there are to choose from."""
+def _read_name(given: object, choice: Choice, path: str) -> str:
     if not isinstance(given, str) or given not in choice.names:
         raise InputError(path, f"{show(given)} is not a {choice.long_name}" + suggestion(given, choice.names))
     return given
 
 
 def section_of(parent: dict[str, Any], key: str, prefix: str) -> dict[str, Any]:
+    """The section under `key`; `prefix` is the path of `parent` with a dot, for messages."""
     if key not in parent:
         raise InputError(f"{prefix}{key}", "missing")
     if not isinstance(parent[key], dict):
@@ -70,7 +68,7 @@ def section_of(parent: dict[str, Any], key: str, prefix: str) -> dict[str, Any]:
 
 
 def choose(registry: Mapping[str, Any], section: dict[str, Any], path: str, what: str) -> str:
-    """The name under the last key of `path`, which must be one of a registry."""
+    """The name under the last key of `path`, which must be a name of the registry."""
     key = path.rpartition(".")[2]
     if key not in section:
         raise InputError(path, f"missing: name a {what}: {', '.join(registry)}")

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any, get_type_hints
+from typing import Any
 
 from ringsweep.config import yaml_text
-from ringsweep.config.sections import choose, missing_text, number_of, section_of, suggestion
+from ringsweep.config.sections import choose, missing_text, section_of, suggestion
 from ringsweep.errors import InputError
 from ringsweep.models.scene import Scene
 from ringsweep.quantities.parameters import declared
-from ringsweep.quantities.units import show
+from ringsweep.quantities.units import quantity, show
 from ringsweep.solvers import METHODS
 
 
@@ -34,7 +34,7 @@ def solver_of(given: Any) -> Any:
     section = {"method": given} if isinstance(given, str) else section_of({"solver": given}, "solver", "")
     method: Any = METHODS[choose(METHODS, section, "solver.method", "method")]
     options = {f.name: f for f in dataclasses.fields(method) if f.init}
-    numbers, hints = declared(method), get_type_hints(method)
+    numbers = declared(method)
     for key in section:
         if key != "method" and key not in options:
             problem = f"no option of {section['method']}" + suggestion(key, ("method", *options))
@@ -46,7 +46,8 @@ def solver_of(given: Any) -> Any:
             if option.default is dataclasses.MISSING and option.default_factory is dataclasses.MISSING:
                 raise InputError(path, missing_text(name, numbers[name]) + f"; method {section['method']} needs it")
         elif name in numbers:
-            values[name] = number_of(section[name], numbers[name], hints[name], path)
+            number = quantity(section[name], numbers[name], path)
+            values[name] = int(number) if numbers[name].whole else number
         elif isinstance(section[name], bool):
             values[name] = section[name]
         else:

@@ -1,4 +1,4 @@
-"""Configuration text as plain values, with the line that each of them stands on."""
+"""Configuration text as plain values, with the line of each value."""
 
 from __future__ import annotations
 
@@ -15,18 +15,19 @@ from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
+import netCDF4
 import numpy as np
 import yaml
 
 from ringsweep.errors import InputError
 from ringsweep.quantities.units import NUMBER, show
 
-#: Nodes that a configuration may have after its aliases are expanded.
-LIMIT = 100_000
+#: Largest number of values in a configuration after its aliases are expanded.
+MAX_VALUES = 100_000
 
-_DEEPEST = 30
+_MAX_DEPTH = 30
 _TAGS = {f"tag:yaml.org,2002:{name}" for name in ("null", "bool", "int", "float", "str", "timestamp", "map", "seq")}
-# What YAML resolves these plain scalars to; everywhere here they are text.
+# YAML gives "<<" and "=" tags of their own; here they are text.
 _TAGS |= {"tag:yaml.org,2002:merge", "tag:yaml.org,2002:value"}
 
 
@@ -37,47 +38,52 @@ class Document:
     Attributes
     ----------
     tree : dict
-        Nested dicts and lists of numbers, booleans, None and strings, as they were given.
+        Nested dicts and lists of numbers, booleans, None and strings, as given.
     folder : Path
-        Folder that file names in it are relative to.
+        Folder to which file names in the configuration are relative.
     name : str
-        Stem of the file.
-    marks : dict of str to tuple
-        File and line of what stands at a dotted path.
-    swept : dict of str to tuple, optional
-        Of a result file, dimensions and values of each swept path: its `tree` may know them by fewer dimensions.
+        Name of the file without suffix.
+    locations : dict of str to tuple
+        File and line of each dotted path.
+    result_axes : dict of str to tuple, optional
+        Only from a result file: dimensions and values of each swept path. The tree lists points along one dimension.
     """
 
     tree: dict[str, Any]
     folder: Path = field(default_factory=Path)
     name: str = "ringsweep"
-    marks: dict[str, tuple[str, int | None]] = field(default_factory=dict)
-    swept: dict[str, tuple[tuple[str, ...], Any]] | None = None
+    locations: dict[str, tuple[str, int | None]] = field(default_factory=dict)
+    result_axes: dict[str, tuple[tuple[str, ...], Any]] | None = None
 
     @contextmanager
-    def placing(self) -> Iterator[None]:
-        """Give errors raised within the block the file and line that their path stands on."""
+    def locating_errors(self) -> Iterator[None]:
+        """Add file and line to errors that are raised within the block, from their path."""
         try:
             yield
         except InputError as error:
             if error.file is None:
                 path = error.path
-                while path not in self.marks and path:
+                while path not in self.locations and path:
                     path = path.rpartition(".")[0]
-                error.file, error.line = self.marks.get(path, (None, None))
+                error.file, error.line = self.locations.get(path, (None, None))
             raise
 
     def inline_csv(self, name: Any, path: str, section: str) -> dict[str, list[Any]]:
-        """Columns of a CSV file, by its header; a unit in the header is appended to each cell.
+        """Columns of a CSV file by their names in its header. A unit in the header is appended to each value.
 
         Parameters
         ----------
         name : object
             File name as the configuration gives it.
         path : str
-            Where the name stands.
+            Path of the file name in the configuration.
         section : str
-            Where the columns will stand: cells are marked as ``section.column.row``.
+            Path that the columns will have. Values are located as ``section.column.row``.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read, or is no table with a header.
         """
         if not isinstance(name, str):
             raise InputError(path, f"a file name is expected, got {show(name)}")
@@ -93,7 +99,9 @@ class Document:
             for cell in header:
                 match = re.fullmatch(r"([^\s(\[]+)\s*(?:[(\[](.*)[)\]])?", cell.strip())
                 if match is None or match[1] in columns:
-                    raise InputError(path, f"column {show(cell)} has no name, or one taken", file=str(file), line=1)
+                    raise InputError(
+                        path, f"column {show(cell)} has no name, or the name of another column", file=str(file), line=1
+                    )
                 columns[match[1]] = match[2] or "", []
             if not columns:
                 raise InputError(path, "the file is empty", file=str(file))
@@ -102,42 +110,42 @@ class Document:
                 if not any(cell.strip() for cell in row):
                     continue
                 if len(row) != len(columns):
-                    problem = f"{len(row)} cells under {len(columns)} columns"
+                    problem = f"{len(row)} values under {len(columns)} columns"
                     raise InputError(path, problem, file=str(file), line=rows.line_num)
                 for (column, (unit, cells)), cell in zip(columns.items(), row, strict=True):
                     cells.append(scalar(f"{cell.strip()} {unit}".strip()))
-                    self.marks[f"{section}.{column}.{count}"] = str(file), rows.line_num
+                    self.locations[f"{section}.{column}.{count}"] = str(file), rows.line_num
                 count += 1
         except csv.Error as error:
             raise InputError(path, f"not a CSV file: {error}", file=str(file), line=rows.line_num) from None
         for column in columns:
-            self.marks[f"{section}.{column}"] = str(file), 1
+            self.locations[f"{section}.{column}"] = str(file), 1
         return {column: cells for column, (_, cells) in columns.items()}
 
 
 def read(config: str | os.PathLike[str] | Mapping[str, Any]) -> Document:
-    """Read a configuration from a YAML file or the attributes of a result file, or take it as a mapping.
+    """Read a configuration from a YAML file, from a result file or from a mapping.
 
     Raises
     ------
     InputError
-        If it is not one YAML mapping of plain values, or the result file holds no configuration.
+        If it is no YAML mapping of plain values, or a result file without a configuration.
     """
     if isinstance(config, Mapping):
-        return Document(_plain(config, "", 0))
+        return Document(_plain_copy(config, "", 0))
     if not isinstance(config, str | os.PathLike):
         raise InputError("config", f"a path or a mapping is expected, got {show(config)}")
     file = Path(config)
     if _is_result(file):
-        return _of_result(file)
+        return _read_result(file)
     text = _read(file)
-    expansion = _Expansion(str(file))
+    reader = _NodeReader(str(file))
     try:
         node = yaml.compose(text, Loader=yaml.SafeLoader)
         if not isinstance(node, yaml.MappingNode):
             found = "is empty" if node is None else "holds no mapping"
             raise InputError("", f"{found}: a configuration has the sections scene, solver and sweep", file=str(file))
-        tree = expansion.value(node, "")
+        tree = reader.value(node, "")
     except InputError:
         raise
     except yaml.MarkedYAMLError as error:
@@ -146,9 +154,9 @@ def read(config: str | os.PathLike[str] | Mapping[str, Any]) -> Document:
     except RecursionError:
         raise InputError("", "nested too deeply", file=str(file)) from None
     except (yaml.YAMLError, ValueError, OverflowError) as error:
-        # PyYAML lets go of bare errors on escapes of characters that do not exist.
+        # On escapes of characters that do not exist PyYAML raises such errors.
         raise InputError("", f"not valid YAML: {' '.join(str(error).split())}", file=str(file)) from None
-    return Document(tree, file.parent, file.stem, expansion.marks)
+    return Document(tree, file.parent, file.stem, reader.locations)
 
 
 def _is_result(file: Path) -> bool:
@@ -159,33 +167,31 @@ def _is_result(file: Path) -> bool:
         return False
 
 
-def _of_result(file: Path) -> Document:
-    """The configuration that a result file carries."""
-    import netCDF4
-
+def _read_result(file: Path) -> Document:
+    """The configuration in the attributes of a result file."""
     try:
         with netCDF4.Dataset(file) as content:
             tree = json.loads(content.getncattr("configuration"))
-            swept = None
+            axes = None
             if "regime" in content.variables and not {"time", "contender"} & set(content.dimensions):
-                swept = {
+                axes = {
                     variable.path: (variable.dimensions, np.array(variable[:].tolist()))
                     for variable in content.variables.values()
                     if "path" in variable.ncattrs()
                 }
                 dims = content["regime"].dimensions
-                swept = dict(sorted(swept.items(), key=lambda one: dims.index(one[1][0][0])))
+                axes = dict(sorted(axes.items(), key=lambda item: dims.index(item[1][0][0])))
     except (OSError, RuntimeError, AttributeError, ValueError, IndexError) as error:
         raise InputError(
-            "", "is damaged, or no result of ringsweep: it carries no configuration", file=str(file)
+            "", "is damaged, or not a result of ringsweep: it holds no configuration", file=str(file)
         ) from error
-    return Document(_plain(tree, "", 0), file.parent, file.stem, {"": (str(file), None)}, swept)
+    return Document(_plain_copy(tree, "", 0), file.parent, file.stem, {"": (str(file), None)}, axes)
 
 
 def scalar(text: str) -> Any:
     """A plain scalar: None, a boolean, a number, or the text itself.
 
-    YAML 1.1 reads ``1.0e5`` as text, ``010`` as eight and ``1:30`` as ninety; here they are what they look like.
+    YAML 1.1 reads ``1.0e5`` as text, ``010`` as eight and ``1:30`` as ninety. Here they are 100000, 10 and text.
     """
     if text in ("", "~", "null", "Null", "NULL"):
         return None
@@ -200,25 +206,25 @@ def scalar(text: str) -> Any:
 
 
 @dataclass
-class _Expansion:
-    """Nodes of YAML on their way to plain values."""
+class _NodeReader:
+    """Turns YAML nodes into plain values and records their lines."""
 
     file: str
-    marks: dict[str, tuple[str, int | None]] = field(default_factory=dict)
+    locations: dict[str, tuple[str, int | None]] = field(default_factory=dict)
     count: int = 0
     ancestors: set[int] = field(default_factory=set)
 
     def value(self, node: yaml.Node, path: str) -> Any:
         line = node.start_mark.line + 1
-        self.marks.setdefault(path, (self.file, line))
+        self.locations.setdefault(path, (self.file, line))
         self.count += 1
-        if self.count > LIMIT:
-            raise InputError("", f"more than {LIMIT} values after expanding aliases", file=self.file, line=line)
+        if self.count > MAX_VALUES:
+            raise InputError("", f"more than {MAX_VALUES} values after expanding aliases", file=self.file, line=line)
         if node.tag not in _TAGS:
             raise InputError(path, f"the tag {node.tag} is not allowed", file=self.file, line=line)
         if isinstance(node, yaml.ScalarNode):
             return scalar(node.value) if node.style is None else node.value
-        if id(node) in self.ancestors or len(self.ancestors) >= _DEEPEST:
+        if id(node) in self.ancestors or len(self.ancestors) >= _MAX_DEPTH:
             raise InputError(path, "nested too deeply, or an alias within itself", file=self.file, line=line)
         self.ancestors.add(id(node))
         value = self.mapping(node, path) if isinstance(node, yaml.MappingNode) else self.sequence(node, path)
@@ -231,11 +237,11 @@ class _Expansion:
             line = key.start_mark.line + 1
             if not isinstance(key, yaml.ScalarNode) or key.tag not in _TAGS:
                 raise InputError(path, "a key must be plain text", file=self.file, line=line)
-            here = _join(path, key.value)
+            child_path = _join(path, key.value)
             if key.value in found:
-                raise InputError(here, "given twice", file=self.file, line=line)
-            self.marks[here] = self.file, line
-            found[key.value] = self.value(child, here)
+                raise InputError(child_path, "given twice", file=self.file, line=line)
+            self.locations[child_path] = self.file, line
+            found[key.value] = self.value(child, child_path)
         return found
 
     def sequence(self, node: yaml.Node, path: str) -> list[Any]:
@@ -246,17 +252,17 @@ def _join(path: str, key: object) -> str:
     return f"{path}.{key}" if path else str(key)
 
 
-def _plain(value: Any, path: str, depth: int) -> Any:
-    """A copy of nothing but dicts, lists, numbers, booleans, None and strings."""
-    if depth > _DEEPEST:
+def _plain_copy(value: Any, path: str, depth: int) -> Any:
+    """A copy made of dicts, lists, numbers, booleans, None and strings only."""
+    if depth > _MAX_DEPTH:
         raise InputError(path, "nested too deeply")
     if isinstance(value, Mapping):
         for key in value:
             if not isinstance(key, str):
                 raise InputError(path, f"keys are text, got {show(key)}")
-        return {key: _plain(child, _join(path, key), depth + 1) for key, child in value.items()}
+        return {key: _plain_copy(child, _join(path, key), depth + 1) for key, child in value.items()}
     if isinstance(value, list | tuple | range) or (isinstance(value, np.ndarray) and value.ndim):
-        return [_plain(child, _join(path, i), depth + 1) for i, child in enumerate(value)]
+        return [_plain_copy(child, _join(path, i), depth + 1) for i, child in enumerate(value)]
     if value is None or isinstance(value, str):
         return value
     if isinstance(value, bool | np.bool_):
@@ -265,7 +271,7 @@ def _plain(value: Any, path: str, depth: int) -> Any:
         return int(value)
     if isinstance(value, Real):
         return float(value)
-    raise InputError(path, f"{show(value)} cannot stand in a configuration")
+    raise InputError(path, f"{show(value)} is no value for a configuration: give text, a number, a list or a mapping")
 
 
 def _read(file: Path) -> str:

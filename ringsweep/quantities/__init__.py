@@ -1,1 +1,1 @@
-"""What a number is: its unit, its meaning, its admissible interval; and how people write it."""
+"""Physical quantities: parameters of scenes, variables of datasets, units."""

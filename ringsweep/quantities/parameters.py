@@ -1,8 +1,7 @@
-"""What a number of the scene is: unit, meaning, admissible interval.
+"""Numbers of a scene: unit, meaning, admissible interval.
 
-Physics declares its parameters where it defines them, as annotated fields of a
-``NamedTuple``; configuration, schema, coordinates of a dataset and messages about
-wrong input are all derived from these declarations.
+Physics declares its parameters where it defines them, as annotated fields of a ``NamedTuple``. Configuration, schema,
+coordinates of a dataset and error messages are derived from these declarations.
 """
 
 from __future__ import annotations
@@ -17,38 +16,39 @@ from typing import get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsweep.quantities.quantity import Quantity
+
 #: A number of one cell, or of every cell of a batch: shape ``(cells,)``.
 Leaf = float | NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Parameter:
-    """One numeric parameter of a scene.
+class Parameter(Quantity):
+    """One numeric parameter of a scene or of a solver.
 
     Attributes
     ----------
-    unit : str
-        SI unit; ``"1"`` if it has none, ``""`` if it depends on another parameter.
-    long_name : str
-        What it is, for documentation and coordinate attributes.
+    unit, long_name : str
+        As for :class:`ringsweep.quantities.quantity.Quantity`.
     lower, upper : float
         Ends of the admissible interval.
     open_lower, open_upper : bool
         Whether the end itself is excluded.
     default : float or None
-        Value where the configuration is silent; None if it must be given.
+        Value if the configuration gives none; None if it must give one.
     optional : bool
-        True where silence is allowed and means "derived from the others".
+        Whether the configuration may leave it out although it has no default: it then follows from other parameters.
+    whole : bool
+        Whether it must be a whole number.
     """
 
-    unit: str
-    long_name: str
     lower: float = -math.inf
     upper: float = math.inf
     open_lower: bool = False
     open_upper: bool = False
     default: float | None = None
     optional: bool = False
+    whole: bool = False
 
     def allows(self, value: float) -> bool:
         """Whether a finite `value` lies within the interval."""
@@ -56,13 +56,8 @@ class Parameter:
         below = value < self.upper if self.open_upper else value <= self.upper
         return math.isfinite(value) and above and below
 
-    @property
-    def attributes(self) -> dict[str, str]:
-        """CF attributes."""
-        return {"long_name": self.long_name, "units": self.unit or "1"}
-
     def along_a_line(self) -> Parameter:
-        """The same quantity where what turns on a ring moves along a line: m in place of rad."""
+        """The parameter for a belt, where the drive moves along a line: m in place of rad."""
         name = self.long_name.replace("angular velocity of the ring", "velocity of the belt")
         name = name.replace("ring's angular velocity", "belt's velocity").replace("rocking angle", "displacement")
         name = name.replace("angle of the ring", "displacement of the belt")
@@ -82,14 +77,14 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Choice:
-    """One of several names, where a parameter is a number.
+    """A parameter that is one of several names.
 
     Attributes
     ----------
     long_name : str
         What is chosen.
     names : tuple of str
-        What there is to choose from.
+        Names to choose from.
     """
 
     long_name: str
@@ -103,10 +98,10 @@ class Choice:
 
 @cache
 def declared(cls: type) -> Mapping[str, Parameter]:
-    """Parameters that a ``NamedTuple`` class declares by ``Annotated`` fields."""
+    """Parameters that a class declares by ``Annotated`` fields; ``Annotated[int, ...]`` makes a whole number."""
     found = {}
     for name, hint in get_type_hints(cls, include_extras=True).items():
         for note in getattr(hint, "__metadata__", ()):
             if isinstance(note, Parameter):
-                found[name] = note
+                found[name] = replace(note, whole=True) if hint.__origin__ is int else note
     return MappingProxyType(found)

@@ -1,4 +1,4 @@
-"""Numbers as people write them: plain ones are SI, strings may carry a unit."""
+"""Numbers of a configuration: a plain number is SI, a string may have a unit."""
 
 from __future__ import annotations
 
@@ -11,15 +11,18 @@ from typing import Any
 
 from ringsweep.errors import InputError
 from ringsweep.quantities.parameters import Parameter
+from ringsweep.quantities.quantity import cf_units
 
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 
 _NOT_FINITE = re.compile(r"[-+]?\.?(nan|inf|infinity)", re.IGNORECASE)
 _WORD = r"[A-Za-zµμ°%]+(?:(?:\^|\*\*)?-?[0-9])?"
 _UNIT = re.compile(rf"(?:1\s*/\s*)?{_WORD}(?:(?:\s*[*/·]\s*|\s+){_WORD})*")
+
+# Longest text, in characters, that can be a number with a unit.
 _LONGEST = 100
 
-# Pint's own registry takes the radian for a pure number: 5 Hz would become 5 rad/s, and 30 rpm 3.14 Hz.
+# Pint's own registry takes the radian as dimensionless: 5 Hz would become 5 rad/s, and 30 rpm 3.14 Hz.
 _UNITS = """
 kilo- = 1e3 = k-
 mega- = 1e6 = M-
@@ -47,35 +50,38 @@ pound = 0.45359237 kilogram = lb
 
 
 def quantity(value: Any, parameter: Parameter, path: str) -> float:
-    """A value as it was given, in the unit of its parameter.
+    """A value of a configuration, in the unit of its parameter.
 
     Parameters
     ----------
     value : object
-        A plain number (SI), or a string with a number and, where it has one, a unit.
+        A plain number (SI), or a string with a number and possibly a unit.
     parameter : Parameter
-        Gives the unit, and the interval that the result must lie in.
+        Gives the unit and the allowed values.
     path : str
-        Where the value stands, for messages.
+        Path of the value in the configuration, for messages.
 
     Raises
     ------
     InputError
-        If `value` is not a finite number, its unit does not fit, or it lies outside the interval.
+        If `value` is not a finite number, has a wrong unit, lies outside the interval of the parameter, or is not whole
+        although the parameter is.
     """
     number = _convert(value, parameter, path)
     if parameter.allows(number):
+        if parameter.whole and not number.is_integer():
+            raise InputError(path, f"{show(value)} is not a whole number: {parameter.long_name} must be one")
         return number
     unit = f" {parameter.unit}" if parameter.unit not in ("", "1") else ""
     plain = not isinstance(value, str) or NUMBER.fullmatch(value.strip())
     if plain and parameter.unit == "rad" and abs(number) > parameter.upper > 0.0:
-        raise InputError(path, f"{number:g} rad is beyond {_in_turns(parameter.upper)}: was `{number:g} deg` meant?")
+        raise InputError(path, f"{number:g} rad is beyond {_in_pi(parameter.upper)}: was `{number:g} deg` meant?")
     shown = f"{number:g}{unit}" if plain else f"{show(value)} ({number:g}{unit})"
     raise InputError(path, f"{shown} is not allowed: {parameter.long_name} must be {parameter.interval}{unit}")
 
 
 def show(value: Any) -> str:
-    """A value as messages quote it: on one line and not long."""
+    """A value as messages quote it: one short line."""
     return "nothing" if value is None else reprlib.repr(value)
 
 
@@ -98,13 +104,13 @@ def _convert(value: Any, parameter: Parameter, path: str) -> float:
     else:
         raise InputError(path, f"{show(value)} is not a number: {wanted}")
     if unit:
-        number *= _factor_or_refusal(unit, value, parameter, path)
+        number *= _factor_or_error(unit, value, parameter, path)
     if not math.isfinite(number):
         raise InputError(path, f"{show(value)} is not finite: {wanted}")
     return number
 
 
-def _factor_or_refusal(unit: str, value: str, parameter: Parameter, path: str) -> float:
+def _factor_or_error(unit: str, value: str, parameter: Parameter, path: str) -> float:
     if not parameter.unit:
         raise InputError(path, f"{show(value)} has a unit, but {parameter.long_name} takes a plain number")
     target = "has no unit" if parameter.unit == "1" else f"is in {parameter.unit}"
@@ -120,16 +126,18 @@ def _factor_or_refusal(unit: str, value: str, parameter: Parameter, path: str) -
 
 @lru_cache(maxsize=256)
 def _factor(unit: str, target: str) -> float:
-    """Factor from `unit` to `target`; LookupError if it is unknown, ValueError if it does not fit."""
+    """Factor from `unit` to `target`; LookupError if `unit` is unknown, ValueError if it has another dimension."""
     if unit == target:
         return 1.0
     if not _UNIT.fullmatch(unit):
         raise LookupError
+    if cf_units(unit) == cf_units(target):
+        return 1.0
     registry = _registry()
     try:
         source = registry.Quantity(1.0, _parsed(unit))
     except Exception:
-        # On text that is no unit pint fails in more ways than its own errors cover.
+        # If the text is no unit, pint does not always raise its own errors.
         raise LookupError from None
     if not source.is_compatible_with(_parsed(target)):
         raise ValueError
@@ -137,20 +145,20 @@ def _factor(unit: str, target: str) -> float:
 
 
 def _parsed(unit: str) -> Any:
-    # CF writes powers as "rad s-1".
+    # Pint wants "^" before a power, which CF leaves out: "rad s-1".
     powers = re.sub(r"(?<=[A-Za-zµμ°%])(-?[0-9])", r"^\1", unit)
     return _registry().parse_units("" if powers == "1" else powers)
 
 
 @cache
 def _registry() -> Any:
-    # Most configurations do without: pint takes longer to import than a small sweep to run.
+    # Importing pint takes longer than a small sweep, and many configurations have no unit to convert.
     import pint
 
     return pint.UnitRegistry(_UNITS.strip().splitlines())
 
 
-def _in_turns(angle: float) -> str:
-    """An angle as a multiple of pi, where it is a simple one."""
+def _in_pi(angle: float) -> str:
+    """An angle, as a simple multiple of pi if it is one."""
     names = {0.5: "pi/2", 1.0: "pi", 2.0: "2 pi"}
     return names.get(angle / math.pi, f"{angle:g}")

@@ -1,4 +1,4 @@
-"""Every quantity of a dataset once: name, type, unit, meaning and flags."""
+"""Variables of every dataset: name, type, unit, meaning and flags, each declared once."""
 
 from __future__ import annotations
 
@@ -6,12 +6,15 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ringsweep.errors import InputError
+from ringsweep.quantities.quantity import Quantity
 
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Regimes in the order of their flag values; motions are the ones that can precede an end.
+#: Regimes in the order of their flag values.
 REGIMES = ("resting", "oscillatory", "revolving", "separating", "jammed", "failed", "stick-slip")
 RESTING, OSCILLATORY, REVOLVING, SEPARATING, JAMMED, FAILED, STICK_SLIP = range(7)
 
@@ -19,20 +22,26 @@ MODES = {-1: "slip_backward", 0: "stick", 1: "slip_forward"}
 
 
 @dataclass(frozen=True)
-class Variable:
-    """A quantity of a dataset; `flags` maps the values of a classification to their meanings."""
+class Variable(Quantity):
+    """One variable of a dataset.
 
-    long_name: str
-    units: str = "1"
+    Attributes
+    ----------
+    unit, long_name : str
+        As for :class:`ringsweep.quantities.quantity.Quantity`.
+    dtype : str
+        NumPy type in files.
+    flags : dict of int to str, optional
+        Values of a classification, and their meanings.
+    """
+
     dtype: str = "float64"
     flags: dict[int, str] | None = None
 
     @property
     def attributes(self) -> dict[str, Any]:
         """CF attributes."""
-        import numpy as np
-
-        attributes: dict[str, Any] = {"long_name": self.long_name, "units": self.units}
+        attributes = super().attributes
         if self.flags:
             attributes["flag_values"] = np.array(list(self.flags), dtype=self.dtype)
             attributes["flag_meanings"] = " ".join(meaning.replace(" ", "_") for meaning in self.flags.values())
@@ -41,48 +50,51 @@ class Variable:
 
 _regimes = dict(enumerate(REGIMES))
 
+
 OUTCOMES: dict[str, Variable] = {
-    "regime": Variable("regime of the run", dtype="int8", flags=_regimes),
+    "regime": Variable("1", "regime of the run", dtype="int8", flags=_regimes),
     "motion": Variable(
+        "1",
         "motion up to the end of the run",
         dtype="int8",
         flags={k: v for k, v in _regimes.items() if k not in (SEPARATING, JAMMED)},
     ),
     "separating_contact": Variable(
-        "contact that separates", dtype="int8", flags={0: "none", 1: "contact_1", 2: "contact_2", 3: "both"}
+        "1", "contact that separates", dtype="int8", flags={0: "none", 1: "contact_1", 2: "contact_2", 3: "both"}
     ),
-    "t_separation": Variable("time of separation", "s"),
-    "t_end": Variable("time at which the run ends", "s"),
-    "phi_end": Variable("angle of the body at the end", "rad"),
-    "omega_end": Variable("angular velocity of the body at the end", "rad s-1"),
-    "phi_min": Variable("least angle of the body", "rad"),
-    "phi_max": Variable("greatest angle of the body", "rad"),
-    "omega_min": Variable("least angular velocity of the body", "rad s-1"),
-    "omega_max": Variable("greatest angular velocity of the body", "rad s-1"),
-    "reversals": Variable("reversals of the motion", dtype="int32"),
-    "turns": Variable("full turns since the last reversal or the start", dtype="int32"),
-    "stick_time": Variable("time for which the body sticks to the ring", "s"),
-    "normal_min_1": Variable("least normal reaction at contact 1", "N"),
-    "normal_min_2": Variable("least normal reaction at contact 2", "N"),
-    "x_end": Variable("displacement of the body at the end", "m"),
-    "velocity_end": Variable("velocity of the body at the end", "m s-1"),
-    "x_min": Variable("least displacement of the body", "m"),
-    "x_max": Variable("greatest displacement of the body", "m"),
-    "velocity_max": Variable("greatest velocity of the body", "m s-1"),
-    "slips": Variable("slips that follow a stick", dtype="int32"),
-    "first_slip": Variable("time at which the first slip begins", "s"),
-    "period": Variable("mean period of the complete cycles after the first", "s"),
-    "force_max": Variable("greatest magnitude of the friction force", "N"),
-    "steps": Variable("steps of the integration", dtype="int64"),
-    "stiffness": Variable("largest stiffness met: magnitude of the eigenvalue times the step"),
+    "t_separation": Variable("s", "time of separation"),
+    "t_end": Variable("s", "time at which the run ends"),
+    "phi_end": Variable("rad", "angle of the body at the end"),
+    "omega_end": Variable("rad/s", "angular velocity of the body at the end"),
+    "phi_min": Variable("rad", "least angle of the body"),
+    "phi_max": Variable("rad", "greatest angle of the body"),
+    "omega_min": Variable("rad/s", "least angular velocity of the body"),
+    "omega_max": Variable("rad/s", "greatest angular velocity of the body"),
+    "reversals": Variable("1", "reversals of the motion", dtype="int32"),
+    "turns": Variable("1", "full turns since the last reversal or the start", dtype="int32"),
+    "stick_time": Variable("s", "time for which the body sticks to the ring"),
+    "normal_min_1": Variable("N", "least normal reaction at contact 1"),
+    "normal_min_2": Variable("N", "least normal reaction at contact 2"),
+    "x_end": Variable("m", "displacement of the body at the end"),
+    "velocity_end": Variable("m/s", "velocity of the body at the end"),
+    "x_min": Variable("m", "least displacement of the body"),
+    "x_max": Variable("m", "greatest displacement of the body"),
+    "velocity_max": Variable("m/s", "greatest velocity of the body"),
+    "slips": Variable("1", "slips that follow a stick", dtype="int32"),
+    "first_slip": Variable("s", "time at which the first slip begins"),
+    "period": Variable("s", "mean period of the complete cycles after the first"),
+    "force_max": Variable("N", "greatest magnitude of the friction force"),
+    "steps": Variable("1", "steps of the integration", dtype="int64"),
+    "stiffness": Variable("1", "largest stiffness met: magnitude of the eigenvalue times the step"),
     "certified": Variable(
+        "1",
         "whether two resolutions agree on regime, motion and separating contact, and the run obeys its law",
         dtype="int8",
         flags={0: "not_certified", 1: "certified"},
     ),
 }
 
-# Bounds on errors, of which two digits are enough.
+# Bounds on errors: two digits are enough.
 OUTCOMES |= {
     f"{name}_error": replace(
         OUTCOMES[name], long_name=f"bound on the error: {OUTCOMES[name].long_name}", dtype="float32"
@@ -94,59 +106,61 @@ OUTCOMES |= {
 }
 
 
-def linked(name: str, columns: Collection[str]) -> dict[str, str]:
-    """CF attribute that leads from a quantity to the bound on its error, if that is among the columns of a dataset."""
+def error_attribute(name: str, columns: Collection[str]) -> dict[str, str]:
+    """CF attribute that links a variable to the bound on its error, if the dataset has that column."""
     error = f"{name}_error"
     return {"ancillary_variables": error} if error in columns else {}
 
 
 HISTORY: dict[str, Variable] = {
-    "phi": Variable("angle of the body", "rad"),
-    "omega": Variable("angular velocity of the body", "rad s-1"),
-    "epsilon": Variable("angular acceleration of the body", "rad s-2"),
-    "normal_1": Variable("normal reaction at contact 1", "N"),
-    "normal_2": Variable("normal reaction at contact 2", "N"),
-    "ring_omega": Variable("angular velocity of the ring", "rad s-1"),
-    "theta": Variable("angle of the ring", "rad"),
-    "zone_1": Variable("segment of the ring under contact 1", dtype="int32"),
-    "zone_2": Variable("segment of the ring under contact 2", dtype="int32"),
-    "x": Variable("displacement of the body", "m"),
-    "velocity": Variable("velocity of the body", "m s-1"),
-    "friction_force": Variable("friction force", "N"),
-    "deflection": Variable("deflection of the bristles", "m"),
-    "deflection_1": Variable("deflection of the bristles at contact 1", "m"),
-    "deflection_2": Variable("deflection of the bristles at contact 2", "m"),
-    "mode": Variable("friction mode", dtype="int8", flags=MODES),
+    "phi": Variable("rad", "angle of the body"),
+    "omega": Variable("rad/s", "angular velocity of the body"),
+    "epsilon": Variable("rad/s^2", "angular acceleration of the body"),
+    "normal_1": Variable("N", "normal reaction at contact 1"),
+    "normal_2": Variable("N", "normal reaction at contact 2"),
+    "ring_omega": Variable("rad/s", "angular velocity of the ring"),
+    "theta": Variable("rad", "angle of the ring"),
+    "zone_1": Variable("1", "segment of the ring under contact 1", dtype="int32"),
+    "zone_2": Variable("1", "segment of the ring under contact 2", dtype="int32"),
+    "x": Variable("m", "displacement of the body"),
+    "velocity": Variable("m/s", "velocity of the body"),
+    "friction_force": Variable("N", "friction force"),
+    "deflection": Variable("m", "deflection of the bristles"),
+    "deflection_1": Variable("m", "deflection of the bristles at contact 1"),
+    "deflection_2": Variable("m", "deflection of the bristles at contact 2"),
+    "mode": Variable("1", "friction mode", dtype="int8", flags=MODES),
 }
 
-#: Of what `ringsweep.runs.precision` measures; a length stands in for the angle where the body moves along a line.
+#: Variables of :func:`ringsweep.precision`. For a belt a displacement replaces the angle.
 PRECISION: dict[str, Variable] = {
-    "time_per_run": Variable("time per run in one thread", "s"),
-    "steps": Variable("steps of the integration, mean over the cells"),
-    "error_end": Variable("error of the angle of the body at the end", "rad"),
-    "error_separation": Variable("error of the time of separation, where both separate", "s"),
+    "time_per_run": Variable("s", "time per run in one thread"),
+    "steps": Variable("1", "steps of the integration, mean over the cells"),
+    "error_end": Variable("rad", "error of the angle of the body at the end"),
+    "error_separation": Variable("s", "error of the time of separation, where both separate"),
     "regime_wrong": Variable(
+        "1",
         "whether regime, motion or separating contact differ from those of the reference",
         dtype="int8",
         flags={0: "right", 1: "wrong"},
     ),
     "flagged": Variable(
+        "1",
         "whether the certificate of this setting does not pass the answer: not certified, or replaced by a finer run's",
         dtype="int8",
         flags={0: "passed", 1: "flagged"},
     ),
-    "reference_error_end": Variable("difference of the two tightest runs in the angle of the body at the end", "rad"),
-    "reference_error_separation": Variable("difference of the two tightest runs in the time of separation", "s"),
+    "reference_error_end": Variable("rad", "difference of the two tightest runs in the angle of the body at the end"),
+    "reference_error_separation": Variable("s", "difference of the two tightest runs in the time of separation"),
 }
 
 
 def words(data: xr.DataArray) -> xr.DataArray:
-    """The names that the flags of a classification stand for.
+    """Names in place of the flags of a classification.
 
     Parameters
     ----------
     data : xarray.DataArray
-        A classification as datasets have it, ``regime`` or ``certified`` say, or a part of one.
+        A classification of a dataset, such as ``regime`` or ``certified``, or a selection from it.
 
     Returns
     -------
@@ -156,7 +170,7 @@ def words(data: xr.DataArray) -> xr.DataArray:
     Raises
     ------
     InputError
-        If it is not a classification.
+        If `data` is not a classification.
 
     Examples
     --------
@@ -167,15 +181,12 @@ def words(data: xr.DataArray) -> xr.DataArray:
     >>> ringsweep.words(maps.regime).values.tolist()
     ['oscillatory', 'separating']
     """
-    import numpy as np
-
     if not {"flag_values", "flag_meanings"} <= data.attrs.keys():
         raise InputError(str(data.name), "is not a classification: it has no flag_values and flag_meanings")
     meanings = dict(zip(np.atleast_1d(data.attrs["flag_values"]), data.attrs["flag_meanings"].split(), strict=True))
-    named = np.full(data.shape, "", dtype=f"<U{max(map(len, meanings.values()))}")
+    text = np.full(data.shape, "", dtype=f"<U{max(map(len, meanings.values()))}")
     for value, meaning in meanings.items():
-        named[data.values == value] = meaning
-    kept = {name: text for name, text in data.attrs.items() if not name.startswith("flag_")}
-    found = data.copy(data=named)
-    found.attrs = kept
+        text[data.values == value] = meaning
+    found = data.copy(data=text)
+    found.attrs = {name: value for name, value in data.attrs.items() if not name.startswith("flag_")}
     return found

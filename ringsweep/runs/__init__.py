@@ -1,1 +1,1 @@
-"""Runs: sweeps over many cells, single runs with their history, error against run time."""
+"""Runs: sweeps over many cells, single runs with their history, measurements of error against run time."""

@@ -1,4 +1,4 @@
-"""Partial on the workers of a Dask scheduler."""
+"""Execution of tasks by the workers of a Dask scheduler."""
 
 from __future__ import annotations
 
@@ -27,57 +27,53 @@ logger = logging.getLogger("ringsweep")
 Result = TypeVar("Result")
 Positions = NDArray[np.integer[Any]]
 
-# Seconds to wait for a scheduler.
-_PATIENCE = 10.0
+# Seconds to wait for an answer of the scheduler.
+_TIMEOUT = 10.0
 
-# Seconds between counts of the workers.
-_TICK = 0.5
+# Seconds between two counts of the workers.
+_COUNT_INTERVAL = 0.5
 
-# In a worker: tasks by their key.
-_tasks: dict[str, Callable[[Positions], Any]] = {}
+# In a worker: functions that compute tasks, by key of their sweep.
+_compute: dict[str, Callable[[Positions], Any]] = {}
 
 
-class _Shared(WorkerPlugin):
-    """Hands a task to every worker once, and to those that come later."""
+class _SendCompute(WorkerPlugin):
+    """Sends the function that computes tasks to every worker once, also to workers that come later."""
 
-    def __init__(self, key: str, task: Callable[[Positions], Any]):
+    def __init__(self, key: str, compute: Callable[[Positions], Any]):
         self.name = f"ringsweep-{key}"
         self.key = key
-        self.task = task
+        self.compute = compute
 
     def setup(self, worker: Any) -> None:
-        _tasks[self.key] = self.task
+        _compute[self.key] = self.compute
 
     def teardown(self, worker: Any) -> None:
-        _tasks.pop(self.key, None)
+        _compute.pop(self.key, None)
 
 
-def _run(key: str, task: Positions) -> Any:
-    return _tasks[key](task)
-
-
-def connect(address: str) -> Client:
-    """A client of the scheduler at this address.
-
-    Raises
-    ------
-    InputError
-        If nothing answers there.
-    """
-    try:
-        # A client that finds nobody goes on trying in the background, and complains there.
-        protocol, place = parse_address(address)
-        if protocol in ("tcp", "tls"):
-            socket.create_connection(parse_host_port(place, 8786), timeout=_PATIENCE).close()
-        return Client(address, timeout=_PATIENCE, set_as_default=False, name="ringsweep")
-    except (OSError, ValueError, TypeError) as error:
-        raise InputError("--scheduler", f"no Dask scheduler answers at {address!r}: {error}") from error
+def _run_task(key: str, task: Positions) -> Any:
+    return _compute[key](task)
 
 
 @contextmanager
 def workers(address: str) -> Iterator[Workers]:
-    """The workers of the scheduler at this address, until the end of the block; errors as for :func:`connect`."""
-    with connect(address) as client:
+    """The workers of the scheduler at this address; the connection is closed at the end of the block.
+
+    Raises
+    ------
+    InputError
+        If no scheduler answers at the address.
+    """
+    try:
+        # A Client would go on trying in the background, and log errors there.
+        protocol, location = parse_address(address)
+        if protocol in ("tcp", "tls"):
+            socket.create_connection(parse_host_port(location, 8786), timeout=_TIMEOUT).close()
+        client = Client(address, timeout=_TIMEOUT, set_as_default=False, name="ringsweep")
+    except (OSError, ValueError, TypeError) as error:
+        raise InputError("--scheduler", f"no Dask scheduler answers at {address!r}: {error}") from error
+    with client:
         yield Workers(client)
 
 
@@ -86,13 +82,13 @@ class Workers:
 
     def __init__(self, client: Client):
         self.client = client
-        self._count, self._counted = 0, -math.inf
+        self._threads, self._counted = 0, -math.inf
 
-    def threads(self) -> int:
-        """Threads that the workers have; the scheduler, which is far away, is asked now and then."""
-        if monotonic() - self._counted > _TICK:
-            self._count, self._counted = sum(self.client.nthreads().values()), monotonic()
-        return self._count
+    def concurrency(self) -> int:
+        """Number of threads of all workers, counted again from time to time."""
+        if monotonic() - self._counted > _COUNT_INTERVAL:
+            self._threads, self._counted = sum(self.client.nthreads().values()), monotonic()
+        return self._threads
 
     def results(
         self,
@@ -101,34 +97,33 @@ class Workers:
         learn: Callable[[Result], Result],
         stopped: Event,
     ) -> Generator[Result]:
-        """Results as they come.
+        """Results in the order in which they are finished; see :class:`ringsweep.runs.executors.Executor`.
 
-        A task whose worker dies goes to another worker; a task that takes several workers with it raises
-        `distributed.KilledWorker`. (joblib's backend for Dask waits for ever then, and counts workers at the start
-        only.)
+        If a worker dies, its task goes to another worker. A task that kills several workers raises
+        `distributed.KilledWorker`. (joblib's Dask backend would then wait for ever, and counts the workers only once.)
         """
         key = secrets.token_hex(8)
-        plugin = _Shared(key, compute)
+        plugin = _SendCompute(key, compute)
         self.client.register_plugin(plugin)
         try:
             futures = as_completed(loop=self.client.loop, with_results=True)
 
-            def fill() -> None:
-                # One more than each thread computes, so that none waits for the next.
-                for task in islice(tasks, max(0, max(2, 2 * self.threads()) - futures.count())):
-                    futures.add(self.client.submit(_run, key, task, pure=False))
+            def submit() -> None:
+                # Two tasks per thread, so that no thread waits for its next task.
+                for task in islice(tasks, max(0, max(2, 2 * self.concurrency()) - futures.count())):
+                    futures.add(self.client.submit(_run_task, key, task, pure=False))
 
-            fill()
-            if not self.threads():
+            submit()
+            if not self.concurrency():
                 logger.warning("the scheduler has no worker yet: waiting for one")
-                while not self.threads():
-                    if stopped.wait(_TICK):
+                while not self.concurrency():
+                    if stopped.wait(_COUNT_INTERVAL):
                         return
             for _, result in futures:
                 yield learn(result)
-                fill()
+                submit()
         except (OSError, CancelledError) as error:
-            raise ConnectionError(f"the Dask scheduler is gone ({error})") from error
+            raise ConnectionError(f"the connection to the Dask scheduler is lost ({error})") from error
         finally:
             with suppress(OSError):
                 self.client.unregister_worker_plugin(plugin.name)

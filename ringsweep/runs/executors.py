@@ -1,4 +1,4 @@
-"""Who computes the tasks of a sweep: threads of this machine, or the workers of a Dask scheduler."""
+"""Executors of the tasks of a sweep: threads of this machine, or the workers of a Dask scheduler."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ Positions = NDArray[np.integer[Any]]
 
 
 class Executor(Protocol):
-    """Who computes tasks, each of them the cells at some positions."""
+    """Computes tasks; each task is given by the positions of its cells."""
 
-    def threads(self) -> int:
-        """How many tasks are computed at once, at this moment."""
+    def concurrency(self) -> int:
+        """Number of tasks that are computed at once, at this moment."""
 
     def results(
         self,
@@ -36,7 +36,7 @@ class Executor(Protocol):
         learn: Callable[[Result], Result],
         stopped: threading.Event,
     ) -> Iterator[Result]:
-        """Results as they come. A task is asked for when there is a thread for it.
+        """Results in the order in which they are finished. The next task is taken when a thread is free for it.
 
         Parameters
         ----------
@@ -45,9 +45,9 @@ class Executor(Protocol):
         tasks : iterator of ndarray
             Positions of the cells of each task.
         learn : callable
-            Called with each result as soon as it is there; returns it.
+            Called with each result at once, before the next task is taken; returns the result.
         stopped : Event
-            Once it is set no more results are waited for than those under way.
+            Once it is set, waiting for workers ends.
         """
 
 
@@ -57,14 +57,14 @@ class Threads:
     Parameters
     ----------
     jobs : int, optional
-        How many; all cores unless given.
+        Number of threads; all cores by default.
     """
 
     def __init__(self, jobs: int | None):
         self._jobs: int = jobs or joblib.cpu_count()
 
-    def threads(self) -> int:
-        """How many there are."""
+    def concurrency(self) -> int:
+        """Number of threads."""
         return self._jobs
 
     def results(
@@ -74,10 +74,10 @@ class Threads:
         learn: Callable[[Result], Result],
         stopped: threading.Event,
     ) -> Iterator[Result]:
-        """Results as they come; see :class:`Executor`."""
+        """Results in the order in which they are finished; see :class:`Executor`."""
         parallel = joblib.Parallel(n_jobs=self._jobs, prefer="threads", return_as="generator_unordered")
 
-        # joblib hands results over in ticks: the next task is sized before that.
+        # joblib takes the next task before it hands over this result.
         def compute_and_learn(task: Positions) -> Result:
             return learn(compute(task))
 
@@ -94,7 +94,7 @@ def executor(jobs: int | None, scheduler: str | None) -> AbstractContextManager[
         If the number of threads is not positive, if both are given, or if no scheduler answers.
     """
     if jobs is not None and jobs < 1:
-        raise InputError("jobs", f"{jobs} threads compute nothing: give at least 1")
+        raise InputError("jobs", f"{jobs} threads cannot compute anything: give at least 1")
     if scheduler is None:
         return nullcontext(Threads(jobs))
     if jobs is not None:
@@ -108,10 +108,10 @@ def executor(jobs: int | None, scheduler: str | None) -> AbstractContextManager[
 
 @contextmanager
 def stop_on_interrupt() -> Iterator[threading.Event]:
-    """An event that the first Ctrl-C within the block sets; the second raises `KeyboardInterrupt` as ever."""
+    """Event that the first Ctrl-C within the block sets. The second Ctrl-C raises `KeyboardInterrupt`."""
     stopped = threading.Event()
     if threading.current_thread() is not threading.main_thread():
-        # Signals are a matter of the main thread.
+        # Only the main thread can handle signals.
         yield stopped
         return
     before = signal.getsignal(signal.SIGINT)
@@ -119,7 +119,7 @@ def stop_on_interrupt() -> Iterator[threading.Event]:
     def interrupt(number: int, frame: Any) -> None:
         signal.signal(signal.SIGINT, before)
         stopped.set()
-        logger.info("stopping when the tasks under way are done (Ctrl-C again: at once, without them)")
+        logger.info("stopping when the tasks under way are done (Ctrl-C again: stop now and lose them)")
 
     signal.signal(signal.SIGINT, interrupt)
     try:
@@ -129,8 +129,8 @@ def stop_on_interrupt() -> Iterator[threading.Event]:
 
 
 def progress_bar(total: int, progress: bool, done: int = 0) -> Any:
-    """A bar of so many runs, some of them done, where there is a terminal or a notebook to show it."""
-    # tqdm takes a notebook's stream for a pipe and would stay silent there.
+    """Progress bar over `total` runs, shown only in a terminal or a notebook, and only if `progress` is true."""
+    # tqdm would hide the bar in a notebook, whose output is no terminal.
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
     notebook = hasattr(shell, "kernel")
     return tqdm(total=total, initial=done, unit="run", disable=(False if notebook else None) if progress else True)

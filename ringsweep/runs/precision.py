@@ -1,4 +1,4 @@
-"""Error against run time: which setting of which method is the cheapest that is right, for a scene of one's own."""
+"""Error against run time of methods and settings for a scene, and the cheapest setting that meets a target."""
 
 from __future__ import annotations
 
@@ -14,38 +14,33 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.compile import take
-from ringsweep.config import Config, load
-from ringsweep.config.axes import COUNT
-from ringsweep.config.scene import sweepable
+from ringsweep.config import Config, load, sweepable
+from ringsweep.config.axes import COUNT, dimension
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, batch
 from ringsweep.models.scene import LAW
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity
 from ringsweep.quantities.variables import FAILED, PRECISION, Variable
-from ringsweep.runs.cells import cells as values_of
-from ringsweep.runs.contenders import Timed, contenders_of, race, setting, yaml
+from ringsweep.runs.cells import values_of_cells
+from ringsweep.runs.contenders import TimedMethod, contenders_for, setting_of, solver_yaml, time_methods
 from ringsweep.runs.executors import progress_bar
 from ringsweep.solvers.certificate import agree
 from ringsweep.solvers.event import Event, Implicit
 from ringsweep.solvers.method import Result
 from ringsweep.storage.provenance import attributes
 
-#: What is asked of a setting, unless the user says otherwise: largest error in rad or m, and in s.
+#: Default of the largest error allowed: rad or m at the end, s at separation.
 TARGET = 1e-6
-
 
 CELLS = 16
 
-
 ROUNDS = 3
 
-
-# Tightest first: the reference, and what tells how far it can be trusted.
+# Tolerances of the reference, and of the run from which its uncertainty follows.
 _TIGHTEST: dict[type, tuple[float, float]] = {Event: (1e-15, 1e-14), Implicit: (1e-11, 1e-10)}
 
-
-_WANTED = Parameter("1", "target", lower=0.0, open_lower=True)
+_TARGET = Parameter("1", "target", lower=0.0, open_lower=True)
 
 
 def precision(
@@ -56,13 +51,13 @@ def precision(
     rounds: int = ROUNDS,
     progress: bool = True,
 ) -> xr.Dataset:
-    """Measure error against run time of every method that takes a scene's friction law, and recommend a setting.
+    """Measure error against run time of the methods that take the friction law of a scene, and recommend a setting.
 
-    `event` or `implicit`, whichever `auto` picks for the law, runs over a range of `rtol`, and `rk4` over
-    five decades of `steps`; what would take longer than 10 s a round is left out and named. A setting meets the
-    target if in every sampled cell regime, motion and separating contact are right, and the errors
-    of the state at the end and of the time of separation, each enlarged by the uncertainty of the reference,
-    are at most `target`. Recommended is the fastest of those.
+    The method that `auto` uses for the law, `event` or `implicit`, runs with a range of `rtol`, and `rk4` with five
+    decades of `steps`. Settings that would take longer than 10 s a round are left out and named. A setting meets the
+    target if regime, motion and separating contact are right in every sampled cell, and if the errors of the state at
+    the end and of the time of separation, plus the uncertainty of the reference, are at most `target`. The fastest of
+    these settings is recommended.
 
     Parameters
     ----------
@@ -71,30 +66,29 @@ def precision(
     target : float
         Largest error allowed: of the angle (rad) or displacement (m) at the end, and of the time of separation (s).
     cells : int
-        Cells of the sweep to measure at most, drawn at random, the same at every call; a scene without a
-        sweep is one cell.
+        Largest number of cells to measure. They are drawn from the sweep at random, the same cells at every call. A
+        scene without a sweep is one cell.
     rounds : int
         How often each setting is timed; the median counts.
     progress : bool
-        Whether to show a progress bar where there is a terminal or a notebook.
+        Whether to show a progress bar, if there is a terminal or a notebook.
 
     Returns
     -------
     xarray.Dataset
-        Dimensions ``contender`` and ``cell``; the variables are those of
-        :data:`ringsweep.quantities.variables.PRECISION`; coordinates ``method``, ``setting`` and ``solver`` (what
-        stands under ``solver`` in a configuration) of each contender, and
-        those of each cell. Run times are processor times of one thread, without certificates and
-        compilation; the error of a run that failed is infinite.
-        Attributes: ``target``; ``recommended``, one of ``solver``, or ``closest`` where none meets the
-        target; ``certificate_cost``, the factor by which certificates lengthen the runs of that one; ``reference``,
+        Dimensions ``contender`` (a method with its setting) and ``cell``. Variables are those of
+        :data:`ringsweep.quantities.variables.PRECISION`. Coordinates are ``method``, ``setting`` and ``solver`` (the
+        text under ``solver`` in a configuration) of each contender, and the swept values of each cell. Run times are
+        processor times of one thread, without certificates and compilation. The error of a failed run is infinite.
+        Attributes: ``target``; ``recommended``, a value of ``solver``, or ``closest`` if no setting meets the target;
+        ``certificate_cost``, the factor by which certificates lengthen runs with this setting; ``reference``,
         ``sampled`` and ``left_out`` in words.
 
     Raises
     ------
     InputError
-        If the configuration is wrong, sweeps over several friction laws, or has no cell in which the
-        two tightest runs agree about the regime; or if another argument is out of range.
+        If the configuration is wrong, sweeps over several friction laws, or has no cell in which the two tightest runs
+        agree on the regime; or if another argument is out of range.
 
     Examples
     --------
@@ -118,82 +112,71 @@ def measure(
     config: Config, *, target: float = TARGET, cells: int = CELLS, rounds: int = ROUNDS, progress: bool = True
 ) -> xr.Dataset:
     """Measure a validated configuration; see :func:`precision`."""
-    target = quantity(target, _WANTED, "target")
-    cells, rounds = _count(cells, "cells"), _count(rounds, "rounds")
+    target = quantity(target, _TARGET, "target")
+    cells, rounds = int(quantity(cells, COUNT, "cells")), int(quantity(rounds, COUNT, "rounds"))
     scene = config.scene
     if len(scene.structures) > 1:
-        place = "points" if LAW in config.source["sweep"].get("points", {}) else "grid"
+        kind = "points" if LAW in config.source["sweep"].get("points", {}) else "grid"
         raise InputError(
-            f"sweep.{place}.{LAW}",
-            f"each of {', '.join(scene.structures)} has methods and a truth of its own: measure one law at a time, "
-            "with a single name here",
+            f"sweep.{kind}.{LAW}",
+            f"each of {', '.join(scene.structures)} needs methods and a reference of its own: give one law here",
         )
     structure = scene.structure
     names = MODELS[structure.model].outcomes
-    contenders, left_out = contenders_of(config)
+    contenders, left_out = contenders_for(config)
     best = type(contenders[0])
     total = math.prod(config.axes.sizes.values())
     sample = np.arange(total)
     if cells < total:
         sample = np.sort(np.random.default_rng(0).choice(total, cells, replace=False))
-    part = batch(structure, values_of(scene, config.axes, sample))
+    sampled = batch(structure, values_of_cells(scene, config.axes, sample))
 
     def run(method: Any) -> Result:
-        return method.run(part, names)
+        return method.run(sampled, names)
 
     with progress_bar(2 + len(contenders) * (rounds + 1), progress) as bar:
-        tight, looser = (_ticked(bar, best(rtol=rtol, certify=False), run).rows for rtol in _TIGHTEST[best])
+        tight, looser = (_run_one(bar, best(rtol=rtol, certify=False), run).rows for rtol in _TIGHTEST[best])
         known = np.flatnonzero(agree(tight, looser, names))
         if not len(known):
             raise InputError(
                 "scene",
-                f"there is nothing to measure errors against: in all of the {len(sample)} cells tried {best.name} "
-                "fails, or its two tightest runs disagree about the regime",
+                f"there is no reference to measure errors: in all of the {len(sample)} cells tried {best.name} fails, "
+                "or its two tightest runs disagree on the regime",
             )
-        part = take(part, known)
-        raced, slow = race(contenders, run, rounds, bar)
-        certified = [_ticked(bar, replace(one.method, certify=True), run) for one in raced]
+        sampled = take(sampled, known)
+        timed, slow = time_methods(contenders, run, rounds, bar)
+        certified = [_run_one(bar, replace(one.method, certify=True), run) for one in timed]
 
-    dataset = _dataset(config, sample[known], raced, certified, tight[known], looser[known])
-    words = {"reference": yaml(best(rtol=_TIGHTEST[best][0])), "sampled": f"{len(known)} of {total} cells"}
+    dataset = _dataset(config, sample[known], timed, certified, tight[known], looser[known])
+    words = {"reference": solver_yaml(best(rtol=_TIGHTEST[best][0])), "sampled": f"{len(known)} of {total} cells"}
     if dropped := len(sample) - len(known):
         words["sampled"] += (
-            f"; {dropped} more were drawn that have no reference: its two tightest runs disagree, or fail"
+            f"; {dropped} more were drawn, but have no reference: its two tightest runs disagree, or fail"
         )
     if left_out or slow:
         words["left_out"] = "; ".join([*left_out, *slow])
     dataset = dataset.assign_attrs({"target": target, **words})
 
     chosen, met = _choose(dataset)
-    pair = [Timed(replace(raced[chosen].method, certify=certify)) for certify in (False, True)]
+    plain, with_certificate = (TimedMethod(replace(timed[chosen].method, certify=certify)) for certify in (False, True))
     for k in range(rounds):
-        for one in pair[:: 1 if k % 2 == 0 else -1]:
-            one.turn(run)
-    cost = median(b / a for a, b in zip(pair[0].seconds, pair[1].seconds, strict=True))
+        for one in (plain, with_certificate)[:: 1 if k % 2 == 0 else -1]:
+            one.measure(run)
+    cost = median(b / a for a, b in zip(plain.seconds, with_certificate.seconds, strict=True))
     name = str(dataset["solver"].values[chosen])
     return dataset.assign_attrs({"recommended" if met else "closest": name, "certificate_cost": cost})
 
 
-def _count(given: int, path: str) -> int:
-    number = quantity(given, COUNT, path)
-    if not number.is_integer():
-        raise InputError(path, f"{number:g} is not a whole number")
-    return int(number)
-
-
-def _ticked(bar: Any, method: Any, run: Callable[[Any], Result]) -> Result:
+def _run_one(bar: Any, method: Any, run: Callable[[Any], Result]) -> Result:
     result = run(method)
     bar.update()
     return result
 
 
-# ---- errors --------------------------------------------------------------------------------
-
-
 def _errors(
     rows: NDArray[np.float64], reference: NDArray[np.float64], names: tuple[str, ...]
 ) -> dict[str, NDArray[np.float64]]:
-    """Errors of each cell, shape ``(cells,)``: infinite if it failed, NaN where there is nothing to compare."""
+    """Errors in each cell, shape ``(cells,)``: infinite if the run failed, NaN if one of the two runs has no number."""
     failed = rows[:, names.index("regime")] == FAILED
     found = {}
     for name, outcome in {"error_end": _end(names), "error_separation": "t_separation"}.items():
@@ -211,32 +194,32 @@ def _end(names: tuple[str, ...]) -> str:
 def _dataset(
     config: Config,
     sample: NDArray[np.intp],
-    raced: Sequence[Timed],
+    timed: Sequence[TimedMethod],
     certified: Sequence[Result],
     tight: NDArray[np.float64],
     looser: NDArray[np.float64],
 ) -> xr.Dataset:
-    """Times, errors and flags of the contenders in the cells with these flat indices, labelled."""
+    """Run times, errors and flags of the contenders in the cells with these numbers, labelled."""
     scene, axes = config.scene, config.axes
     names = MODELS[scene.structure.model].outcomes
     columns: dict[str, tuple[tuple[str, ...], Any]] = {
-        "time_per_run": (("contender",), [median(one.seconds) / len(sample) for one in raced]),
-        "steps": (("contender",), [one.result.steps.mean() for one in raced]),
+        "time_per_run": (("contender",), [median(one.seconds) / len(sample) for one in timed]),
+        "steps": (("contender",), [one.result.steps.mean() for one in timed]),
     }
-    each = [_errors(one.result.rows, tight, names) for one in raced]
+    each = [_errors(one.result.rows, tight, names) for one in timed]
     for name in each[0]:
         columns[name] = ("contender", "cell"), [errors[name] for errors in each]
-    # A certificate vouches for an answer that it left as it was.
+    # With certificates a method may replace an answer by that of a finer run: it does not certify the first.
     passed = [
-        witness.certified & agree(one.result.rows, witness.rows, names)
-        for one, witness in zip(raced, certified, strict=True)
+        certificate.certified & agree(one.result.rows, certificate.rows, names)
+        for one, certificate in zip(timed, certified, strict=True)
     ]
-    right = [agree(one.result.rows, tight, names) for one in raced]
+    right = [agree(one.result.rows, tight, names) for one in timed]
     columns["regime_wrong"] = ("contender", "cell"), ~np.array(right)
     columns["flagged"] = ("contender", "cell"), ~np.array(passed)
     columns |= {f"reference_{name}": (("cell",), error) for name, error in _errors(looser, tight, names).items()}
 
-    known, values = sweepable(scene), values_of(scene, axes, sample)
+    known, values = sweepable(scene), values_of_cells(scene, axes, sample)
     along = {path: values[path] if path != LAW else [scene.structure.law] * len(sample) for path in axes.columns}
     return xr.Dataset(
         {
@@ -244,16 +227,16 @@ def _dataset(
             for name, (dims, column) in columns.items()
         },
         coords={
-            "method": ("contender", [one.method.name for one in raced], {"long_name": "method"}),
-            "setting": ("contender", [setting(one.method) for one in raced], {"long_name": "its setting"}),
+            "method": ("contender", [one.method.name for one in timed], {"long_name": "method"}),
+            "setting": ("contender", [setting_of(one.method) for one in timed], {"long_name": "its setting"}),
             "solver": (
                 "contender",
-                [yaml(one.method) for one in raced],
-                {"long_name": "what stands under solver in a configuration"},
+                [solver_yaml(one.method) for one in timed],
+                {"long_name": "text under solver in a configuration"},
             ),
             "cell": ("cell", sample, {"long_name": "number of the cell in the sweep, last dimension fastest"}),
             **{
-                path.replace(".", "_"): ("cell", column, {**known[path].attributes, "path": path})
+                dimension(path): ("cell", column, {**known[path].attributes, "path": path})
                 for path, column in along.items()
             },
         },
@@ -263,12 +246,12 @@ def _dataset(
 def _described(name: str, names: tuple[str, ...]) -> Variable:
     variable = PRECISION[name]
     if name.endswith("error_end") and _end(names) == "x_end":
-        return replace(variable, long_name=variable.long_name.replace("angle", "displacement"), units="m")
+        return replace(variable, long_name=variable.long_name.replace("angle", "displacement"), unit="m")
     return variable
 
 
 def error_bounds(ds: xr.Dataset) -> NDArray[np.float64]:
-    """What an error can be at most, given how far the reference is to be trusted; shape ``(contender, cell)``."""
+    """Errors plus the uncertainty of the reference, shape ``(contender, cell)``."""
     bounds = (ds["error_end"] + ds["reference_error_end"]).values
     if "error_separation" in ds:
         bounds = np.fmax(bounds, (ds["error_separation"] + ds["reference_error_separation"]).values)
@@ -276,7 +259,7 @@ def error_bounds(ds: xr.Dataset) -> NDArray[np.float64]:
 
 
 def _choose(ds: xr.Dataset) -> tuple[int, bool]:
-    """The fastest contender that meets the target, else the one that comes closest; and whether it does."""
+    """The fastest contender that meets the target, or else the one that comes closest; and whether it meets it."""
     wrong, worst = (ds["regime_wrong"] == 1).sum("cell").values, error_bounds(ds).max(axis=1)
     met = np.flatnonzero((wrong == 0) & (worst <= ds.attrs["target"]))
     if len(met):

@@ -1,12 +1,12 @@
-"""Cells of an earlier sweep that are those of a new one."""
+"""Cells of an earlier sweep that a new sweep shares."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from copy import deepcopy
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,26 +16,17 @@ from ringsweep.config import Config, load
 from ringsweep.errors import InputError
 from ringsweep.models import parameters
 from ringsweep.models.scene import LAW
-from ringsweep.runs.cells import laws_at, values_at
+from ringsweep.runs.cells import Indices, laws_at, values_at
 from ringsweep.storage import netcdf
 from ringsweep.storage.chunks import Layout
 from ringsweep.storage.provenance import differences, fingerprint, identity
 
-# Two ways of spacing an axis differ by so many units in the last place.
+# Two spacings of one axis differ by rounding, at most by this relative difference.
 _ROUNDING = 8 * np.finfo(float).eps
 
 
-class Keeper(Protocol):
-    """What takes finished cells."""
-
-    done: NDArray[np.bool_]
-
-    def put(self, positions: NDArray[np.integer], columns: Mapping[str, NDArray[Any]], processor: str) -> None:
-        """Keep the columns of the cells at these positions."""
-
-
-class Earlier:
-    """A file of an earlier sweep under the scene and solver of a new one, whatever either varies.
+class EarlierSweep:
+    """File of an earlier sweep with the same scene and solver as a new one, except for what either varies.
 
     Parameters
     ----------
@@ -47,7 +38,12 @@ class Earlier:
     Raises
     ------
     InputError
-        If the file is none of a sweep, or if what both hold fixed, the solver or the version are not the same.
+        If the file holds no sweep, or was computed by another version, or another solver or scene.
+
+    Attributes
+    ----------
+    processors : str
+        Names of the processors that computed the file.
     """
 
     def __init__(self, path: str | os.PathLike[str], config: Config):
@@ -55,104 +51,122 @@ class Earlier:
         with netcdf.open_dataset(path) as ds:
             if "regime" not in ds or "time" in ds.dims:
                 raise InputError(str(path), "holds no sweep whose cells could be reused")
-            self.attributes = dict(ds.attrs)
+            self.processors = str(ds.attrs.get("processors"))
+            stored_fingerprint = ds.attrs.get("fingerprint")
         self.config = load(path)
         self.axes = self.config.axes
-        self._check(config)
-
-    def _check(self, config: Config) -> None:
-        """Refuse a file whose cells have no bits in common with those of a new sweep."""
-        old, new = identity(self.config), identity(config)
-        if self.attributes.get("fingerprint") != fingerprint(old):
-            raise InputError(str(self.path), "was computed by another version: its cells cannot be reused")
+        if stored_fingerprint != fingerprint(identity(self.config)):
+            raise InputError(str(path), "was computed by another version: its cells cannot be reused")
         if any(len(dims) > 1 for dims, _ in self.axes.columns.values()):
-            raise InputError(str(self.path), "has an axis of several dimensions: its cells cannot be reused")
-        varied = {path for axes in (self.axes, config.axes) for path in axes.columns}
-        # A parameter that only some laws have says nothing about the cells of the others.
+            raise InputError(str(path), "has an axis of several dimensions: its cells cannot be reused")
+        if changes := self._changes(config):
+            raise InputError(str(path), f"has no cell of this sweep: {changes}")
+
+    def _changes(self, config: Config) -> str:
+        """Differences between what both sweeps hold fixed, in words."""
+        swept = {path for axes in (self.axes, config.axes) for path in axes.columns}
+        # Cells of a law do not depend on parameters that only other laws have.
         needed: list[set[str]] = [set(parameters(structure)) for structure in config.scene.structures.values()]
-        apart = (
-            varied
+        not_fixed = (
+            swept
             | (set().union(*needed) - needed[0].intersection(*needed))
             | (set(config.scene.values) ^ set(self.config.scene.values))
         )
-        ignored = {f"scene.{path}" for path in apart}
-        fixed = [{k: v for k, v in one.items() if k not in ignored and not k.startswith("sweep")} for one in (old, new)]
-        if changes := differences(*fixed):
-            raise InputError(str(self.path), f"has no cell of this sweep: {changes}")
+        ignored = {f"scene.{path}" for path in not_fixed}
+        old, new = (
+            {
+                name: value
+                for name, value in identity(one).items()
+                if name not in ignored and not name.startswith("sweep")
+            }
+            for one in (self.config, config)
+        )
+        return differences(old, new)
 
-    def aligned(self, config: Config) -> Config:
-        """The new sweep with the very values of the earlier one where its axes differ from them by rounding."""
+    def align_axes(self, config: Config) -> Config:
+        """The new sweep, with the values of the earlier sweep where its own values differ by rounding only."""
         columns, sweep = dict(config.axes.columns), deepcopy(config.source.get("sweep", {}))
         for path, (dims, column) in columns.items():
             section = next((section for section in sweep.values() if path in section), None)
             if path == LAW or len(dims) > 1 or section is None:
                 continue
             _, known = self.axes.columns.get(path, ((), np.array(self.config.scene.values.get(path, np.nan))))
-            found = _aligned(column, np.unique(known))
-            if (found != column).any():
-                columns[path] = dims, found
-                section[path] = found.tolist()
+            aligned = _align(column, np.unique(known))
+            if (aligned != column).any():
+                columns[path] = dims, aligned
+                section[path] = aligned.tolist()
         source = config.source | {"sweep": sweep} if sweep else config.source
         return replace(config, axes=replace(config.axes, columns=columns), source=source)
 
-    def give(self, config: Config, layout: Layout, keeper: Keeper) -> int:
-        """Hand over all cells of the new sweep that the file holds and that are not there yet; returns how many."""
-        count = 0
+    def shared_cells(
+        self, config: Config, layout: Layout, done: NDArray[np.bool_]
+    ) -> Iterator[tuple[NDArray[np.intp], dict[str, NDArray[Any]]]]:
+        """Positions and columns of the cells that both sweeps have, chunk by chunk of the new sweep.
+
+        Parameters
+        ----------
+        config : Config
+            The new sweep.
+        layout : Layout
+            Order of its cells.
+        done : ndarray of bool, shape ``(cells,)``
+            Cells that are not looked for.
+        """
         with netcdf.open_dataset(self.path) as ds:
-            for begin, end, _ in layout.chunks():
-                positions = begin + np.flatnonzero(~keeper.done[begin:end])
-                place = dict(zip(config.axes.sizes, layout.indices(positions), strict=True))
-                shared, there = self._find(config, place, len(positions))
-                if shared.any():
-                    part = ds.isel({dim: slice(at.min(), at.max() + 1) for dim, at in there.items()}).load()
-                    within = tuple(there[dim] - there[dim].min() for dim in there)
-                    found = positions[shared]
-                    columns = {
-                        str(name): np.broadcast_to(data.transpose(*there).values[within], found.shape)
+            for start, stop, _ in layout.chunks():
+                positions = start + np.flatnonzero(~done[start:stop])
+                indices = dict(zip(config.axes.sizes, layout.indices(positions), strict=True))
+                shared, in_file = self._locate(config, indices, len(positions))
+                if not shared.any():
+                    continue
+                part = ds.isel({dim: slice(along.min(), along.max() + 1) for dim, along in in_file.items()}).load()
+                within = tuple(along - along.min() for along in in_file.values())
+                yield (
+                    positions[shared],
+                    {
+                        str(name): np.broadcast_to(data.transpose(*in_file).values[within], shared.sum())
                         for name, data in part.data_vars.items()
-                    }
-                    keeper.put(found, columns, str(self.attributes["processors"]))
-                    count += len(found)
-        return count
+                    },
+                )
 
-    def _find(
-        self, config: Config, place: Mapping[str, NDArray[np.intp]], count: int
-    ) -> tuple[NDArray[np.bool_], dict[str, NDArray[np.intp]]]:
-        """Which of the new cells the file holds, and where along its dimensions those lie."""
-        values: dict[str, NDArray[Any]] = {**values_at(config.scene, config.axes, place, count)}
-        values[LAW] = laws_at(config.scene, config.axes, place, count)
+    def _locate(self, config: Config, indices: Indices, count: int) -> tuple[NDArray[np.bool_], Indices]:
+        """Which of `count` cells of the new sweep the file holds, and the indices of these in the file."""
+        values, laws = (
+            values_at(config.scene, config.axes, indices, count),
+            laws_at(config.scene, config.axes, indices, count),
+        )
         shared = np.zeros(count, dtype=bool)
-        there = {dim: np.zeros(count, dtype=np.intp) for dim in self.axes.sizes}
+        in_file = {dim: np.zeros(count, dtype=np.intp) for dim in self.axes.sizes}
         for law, structure in config.scene.structures.items():
-            own = np.flatnonzero(values[LAW] == law)
-            # Of what other laws need, a cell is independent.
-            needed = {path: values[path][own] for path in (LAW, *parameters(structure)) if path in values}
-            shared[own] = self._find_alike(needed, {dim: (at, own) for dim, at in there.items()})
-        return shared, {dim: at[shared] for dim, at in there.items()}
+            own = np.flatnonzero(laws == law)
+            needed = {path: values[path][own] for path in parameters(structure) if path in values}
+            shared[own], found = self._locate_under_law({**needed, LAW: laws[own]})
+            for dim, along in found.items():
+                in_file[dim][own] = along
+        return shared, {dim: along[shared] for dim, along in in_file.items()}
 
-    def _find_alike(
-        self, needed: Mapping[str, NDArray[Any]], there: Mapping[str, tuple[NDArray[np.intp], NDArray[np.intp]]]
-    ) -> NDArray[np.bool_]:
-        """Which cells under one law the file holds; enters where, into the places given of the arrays given."""
+    def _locate_under_law(self, needed: Mapping[str, NDArray[Any]]) -> tuple[NDArray[np.bool_], Indices]:
+        """Which cells of one law the file holds, and their indices there; `needed` holds all that determines them."""
         shared = np.ones(len(needed[LAW]), dtype=bool)
+        in_file: dict[str, NDArray[np.intp]] = {}
         fixed = {**self.config.scene.values, LAW: self.config.scene.structure.law}
         for path, column in needed.items():
             if path not in self.axes.columns:
                 shared &= column == fixed[path] if path in fixed else False
-        for dim, (at, own) in there.items():
+        for dim in self.axes.sizes:
             paths = [path for path, (dims, _) in self.axes.columns.items() if dims == (dim,) and path in needed]
-            if not paths:
-                continue
-            known = pd.MultiIndex.from_arrays([self.axes.columns[path][1] for path in paths])
-            first = np.flatnonzero(~known.duplicated())
-            found = known[first].get_indexer(pd.MultiIndex.from_arrays([needed[path] for path in paths]))
-            shared &= found >= 0
-            at[own] = first[found]
-        return shared
+            # Without such a path the cells do not depend on this dimension.
+            if paths:
+                known = pd.MultiIndex.from_arrays([self.axes.columns[path][1] for path in paths])
+                first = np.flatnonzero(~known.duplicated())
+                number = known[first].get_indexer(pd.MultiIndex.from_arrays([needed[path] for path in paths]))
+                shared &= number >= 0
+                in_file[dim] = first[number]
+        return shared, in_file
 
 
-def _aligned(column: NDArray[np.float64], known: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values, each replaced by the known one that it equals but for rounding, if there is such."""
+def _align(column: NDArray[np.float64], known: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values, each replaced by the known value from which it differs by rounding only, if there is one."""
     after = np.clip(np.searchsorted(known, column), 1, max(len(known) - 1, 1))
     candidates = known[np.stack([after - 1, np.minimum(after, len(known) - 1)])]
     nearest = np.where(np.abs(candidates[0] - column) <= np.abs(candidates[1] - column), *candidates)

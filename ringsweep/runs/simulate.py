@@ -1,4 +1,4 @@
-"""Single runs: one cell, with its history, under one friction law or several."""
+"""Single runs with their history, under one friction law or several."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.compile import take
-from ringsweep.config import Config, with_values
-from ringsweep.config.solver import read_solver
+from ringsweep.config import Config, read_solver, with_values
 from ringsweep.models import MODELS, batch
 from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import turn
@@ -21,7 +20,7 @@ from ringsweep.quantities.variables import HISTORY, REGIMES
 from ringsweep.runs.sweep import compute
 from ringsweep.storage.provenance import attributes
 
-#: Instants that a history keeps, about.
+#: Approximate number of instants of a history.
 SAMPLES = 20_000
 
 
@@ -31,30 +30,35 @@ def simulate(
     solver: str | Mapping[str, Any] | None = None,
     samples: int = SAMPLES,
 ) -> xr.Dataset:
-    """Run one scene and keep its history; a sweep over friction laws makes it a run under each.
+    """Run one scene and keep its history. If a configuration sweeps over friction laws, run it under each law.
 
     Parameters
     ----------
     scene : mapping or path
-        The configuration's ``scene``, or a whole configuration, or the path of one; what it sweeps,
-        other than a grid of friction laws, is ignored.
+        The mapping under ``scene`` in a configuration, or a whole configuration, or the path of one. Axes other than
+        a grid axis of friction laws are ignored.
     solver : str or mapping, optional
-        A method's name, or the configuration's ``solver``; by default the configuration's own.
+        Name of a method, or the mapping under ``solver`` in a configuration; by default the solver of the
+        configuration.
     samples : int
-        About how many instants to keep of a run.
+        Approximate number of instants to keep.
 
     Returns
     -------
     xarray.Dataset
-        Dimension ``time``, variables as in :data:`ringsweep.quantities.variables.HISTORY`, and the outcomes of
-        the run as scalars. If laws are compared these have the dimension ``friction_law``, and the
-        histories both: at the instants of all runs, NaN after the end of a run that ends early (where a
-        classification stays as it was).
+        The history along the dimension ``time``, with variables of :data:`ringsweep.quantities.variables.HISTORY`,
+        and the outcomes of the run as scalars. For several laws both also have the dimension ``friction_law``, and
+        ``time`` holds the instants of all runs. After the end of a run numbers are NaN, and classifications keep their
+        last value.
 
     Raises
     ------
     InputError
         If scene or solver are wrong.
+
+    Warns
+    -----
+    Through the logger ``"ringsweep"``, as :func:`ringsweep.run` does.
 
     Examples
     --------
@@ -73,10 +77,10 @@ def simulate(
     >>> run.x.max().round(6).item()
     0.74574
     """
-    return history(_alone(scene, solver), samples=samples)
+    return history(_single_run(scene, solver), samples=samples)
 
 
-def _alone(scene: str | os.PathLike[str] | Mapping[str, Any], solver: str | Mapping[str, Any] | None) -> Config:
+def _single_run(scene: str | os.PathLike[str] | Mapping[str, Any], solver: str | Mapping[str, Any] | None) -> Config:
     """Configuration of a single run from a scene or a whole configuration."""
     if isinstance(scene, Mapping) and "scene" not in scene:
         scene = {"scene": scene}
@@ -93,19 +97,19 @@ def history(config: Config, *, samples: int = SAMPLES) -> xr.Dataset:
     runs = {}
     for law, structure in config.scene.structures.items():
         own = outcome.sel(friction_law=law) if config.axes.sizes else outcome
-        runs[law] = _with_jump(_trace(config, structure, samples), own)
+        runs[law] = _open_contact_at_end(_trace(config, structure, samples), own)
     if not config.axes.sizes:
-        (kept,) = runs.values()
-        words = describe(outcome)
+        (joined,) = runs.values()
+        words = _describe(outcome)
     else:
         times = np.unique(np.concatenate([run["time"] for run in runs.values()]))
-        kept = xr.concat([_resampled(run, times) for run in runs.values()], "friction_law")
-        words = "\n".join(f"{law}: {describe(outcome.sel(friction_law=law))}" for law in runs)
-    return kept.merge(outcome).assign_attrs(attributes(config) | {"outcome": words})
+        joined = xr.concat([_resample(run, times) for run in runs.values()], "friction_law")
+        words = "\n".join(f"{law}: {_describe(outcome.sel(friction_law=law))}" for law in runs)
+    return joined.merge(outcome).assign_attrs(attributes(config) | {"outcome": words})
 
 
 def _trace(config: Config, structure: Structure, samples: int) -> xr.Dataset:
-    """History under one friction law, as the method stores it."""
+    """History under one friction law."""
     model = MODELS[structure.model]
     cell = batch(structure, {path: np.array([value]) for path, value in config.scene.values.items()})
     names = model.history(structure)
@@ -113,7 +117,7 @@ def _trace(config: Config, structure: Structure, samples: int) -> xr.Dataset:
     columns = dict(zip(names, rows.T, strict=True))
     for name in columns:
         if name.startswith("normal_"):
-            # Where friction jumps a contact may be asked to pull: there it lets go, and the run ends.
+            # Where friction jumps, a normal reaction may jump below zero. There the contact opens and the run ends.
             columns[name][-1:] = np.maximum(columns[name][-1:], 0.0)
     if "ring_omega" in columns:
         drive = take(cell.drive, 0)
@@ -128,24 +132,24 @@ def _trace(config: Config, structure: Structure, samples: int) -> xr.Dataset:
     )
 
 
-# Share of the largest reaction of the run from which on a contact has not been lost gradually.
-_AT_ONCE = 1e-6
+# A last normal reaction above this share of the largest of the run means that the reaction jumped to zero.
+_JUMP = 1e-6
 
 
-def _with_jump(run: xr.Dataset, outcome: xr.Dataset) -> xr.Dataset:
-    """A history that ends with the contact open, where a jump of friction opened it: that instant stands twice."""
-    lost = int(outcome.get("separating_contact", 0))
-    names = [name for k, name in ((1, "normal_1"), (2, "normal_2")) if lost & k and name in run]
+def _open_contact_at_end(run: xr.Dataset, outcome: xr.Dataset) -> xr.Dataset:
+    """A history whose last instant stands twice if a jump of friction opened a contact: before and after the jump."""
+    separating = int(outcome.get("separating_contact", 0))
+    names = [name for k, name in ((1, "normal_1"), (2, "normal_2")) if separating & k and name in run]
     largest = max((float(run[name].max()) for name in ("normal_1", "normal_2") if name in run), default=0.0)
-    if not any(run[name][-1] > max(_AT_ONCE * largest, 1e-15) for name in names):
+    if not any(run[name][-1] > max(_JUMP * largest, 1e-15) for name in names):
         return run
     after = run.isel(time=[-1]).assign({name: 0.0 * run[name][-1:] for name in names})
     return xr.concat([run, after], "time", data_vars="all", combine_attrs="override")
 
 
-def _resampled(run: xr.Dataset, times: NDArray[np.float64]) -> xr.Dataset:
-    """A history at other times: numbers from the line between two samples, classifications from the one before."""
-    # Where an event stores two states of one instant, the second is the one that goes on.
+def _resample(run: xr.Dataset, times: NDArray[np.float64]) -> xr.Dataset:
+    """A history at other times. Numbers are interpolated; classifications have the value of the sample before."""
+    # An event stores the states before and after it at one instant: interpolation needs the second.
     run = run.isel(time=np.append(np.diff(run["time"]) > 0.0, True))
     own = run["time"].values
     before = np.maximum(np.searchsorted(own, times, side="right") - 1, 0)
@@ -156,14 +160,14 @@ def _resampled(run: xr.Dataset, times: NDArray[np.float64]) -> xr.Dataset:
     return found
 
 
-def describe(outcome: xr.Dataset) -> str:
-    """A run's outcome in words."""
+def _describe(outcome: xr.Dataset) -> str:
+    """Outcome of a run in words."""
     regime = REGIMES[int(outcome["regime"])]
-    doubt = "" if outcome["certified"] == 1 else ", not certified"
+    certificate = "" if outcome["certified"] == 1 else ", not certified"
     if "t_separation" in outcome and np.isfinite(outcome["t_separation"]):
         contact = ("no contact", "contact 1", "contact 2", "both contacts")[int(outcome["separating_contact"])]
         return (
             f"{regime} ({REGIMES[int(outcome['motion'])]}), {contact}, "
-            f"t = {float(outcome['t_separation']):.6g} s{doubt}"
+            f"t = {float(outcome['t_separation']):.6g} s{certificate}"
         )
-    return f"{regime}, t = {float(outcome['t_end']):.6g} s{doubt}"
+    return f"{regime}, t = {float(outcome['t_end']):.6g} s{certificate}"

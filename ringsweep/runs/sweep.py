@@ -1,4 +1,4 @@
-"""Sweeps: cells to tasks, tasks to workers, outcomes to a dataset in memory or on disk."""
+"""Sweeps: tasks are computed by an executor, and their outcomes become a dataset in memory or on disk."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 import os
 from collections.abc import Mapping
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,26 +15,24 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsweep.config import Axes, Config, load, read_axes, read_scene
-from ringsweep.config.scene import sweepable
-from ringsweep.config.solver import read_solver
+from ringsweep.config import Axes, Config, load, read_axes, read_scene, read_solver, sweepable
+from ringsweep.config.axes import dimension
 from ringsweep.errors import InputError
-from ringsweep.quantities.variables import OUTCOMES, linked
-from ringsweep.runs.cells import ComputeCells, Finished
+from ringsweep.quantities.variables import OUTCOMES, error_attribute
+from ringsweep.runs.cells import compute_task
 from ringsweep.runs.executors import executor, progress_bar, stop_on_interrupt
-from ringsweep.runs.pace import Pace
-from ringsweep.runs.pace import tasks as tasks_of
-from ringsweep.runs.reuse import Earlier
+from ringsweep.runs.reuse import EarlierSweep
+from ringsweep.runs.task_sizes import TaskSizes, divide_into_tasks
+from ringsweep.runs.warnings import warn_of_results
 from ringsweep.storage import netcdf
+from ringsweep.storage.checkpoint import Checkpoint, Columns, DamagedTask, open_checkpoint
 from ringsweep.storage.chunks import Layout
-from ringsweep.storage.partial import Columns, Damaged, Partial, owned
 from ringsweep.storage.provenance import attributes, differences, environment, identity
 
 logger = logging.getLogger("ringsweep")
 
-
-#: Cells of a sweep that has no file to go to: some gigabytes.
-MOST_IN_MEMORY = 10_000_000
+#: Largest number of cells of a sweep in memory, where they take some gigabytes.
+MAX_CELLS_IN_MEMORY = 10_000_000
 
 
 def run(
@@ -53,30 +52,34 @@ def run(
     config : path or mapping
         A YAML file, the mapping that it would hold, or a result file, whose sweep is repeated.
     output : path-like, optional
-        NetCDF file to write. Finished cells are kept beside it meanwhile, in memory they are not: the same call goes
-        on after whatever stopped it, and the number of cells is bounded by the disk.
+        NetCDF file to write. Until it is complete, finished cells are kept in a folder beside it, and not in memory. If
+        the sweep is stopped, the same call continues it.
     jobs : int, optional
-        Threads; all cores unless given.
+        Number of threads; all cores by default.
     fresh : bool
-        Whether to start over, whatever is there.
+        Whether to discard what an earlier call computed.
     reuse : path-like, optional
-        File of an earlier sweep, some of whose cells are those of this one: they are taken from there.
+        File of an earlier sweep. Cells that both sweeps have are taken from it.
     scheduler : str, optional
         Address of a Dask scheduler whose workers compute the cells, in place of threads.
     progress : bool
-        Whether to show a progress bar where there is a terminal or a notebook.
+        Whether to show a progress bar, if there is a terminal or a notebook.
 
     Returns
     -------
     xarray.Dataset
-        One dimension per swept path; see :data:`ringsweep.quantities.variables.OUTCOMES`. The dataset of an output
-        file reads values when they are asked for; ``.load()`` reads all.
+        One dimension per swept path; see :data:`ringsweep.quantities.variables.OUTCOMES`. With an output file, values
+        are read when they are needed; ``.load()`` reads all.
 
     Raises
     ------
     InputError
-        If the configuration is wrong, the output cannot be written or is being computed by another process, or the
-        tasks beside it are of another sweep.
+        If the configuration is wrong, the output cannot be written, another process computes it, or the folder beside
+        it holds cells of another sweep.
+
+    Warns
+    -----
+    Through the logger ``"ringsweep"``: if steps of rk4 exceed its limit of stability, and if most runs end at t = 0.
 
     Examples
     --------
@@ -129,12 +132,12 @@ def sweep(
     Parameters
     ----------
     scene : mapping
-        The configuration's ``scene``.
+        The mapping under ``scene`` in a configuration.
     axes : mapping of str to sequence or xarray.DataArray
-        Values for paths of the scene, such as ``"drive.amplitude"``, and names for ``"friction.law"``.
-        A 1-D sequence is a grid axis; ``DataArray`` that share a dimension vary together along it.
+        Values for paths of the scene, such as ``"drive.amplitude"``, or names for ``"friction.law"``.
+        A 1-D sequence is a grid axis. DataArrays that share a dimension vary together along it.
     solver : str or mapping
-        A method's name, or the configuration's ``solver``.
+        Name of a method, or the mapping under ``solver`` in a configuration.
     output, jobs, fresh, reuse, scheduler, progress
         As for :func:`run`.
 
@@ -145,11 +148,11 @@ def sweep(
     Raises
     ------
     InputError
-        If scene, axes or solver are wrong; see :func:`run` too.
+        If scene, axes or solver are wrong; see also :func:`run`.
 
     Examples
     --------
-    A mass on a spring; a grid over the speed of the belt and static friction:
+    A mass on a spring; a grid over the speed of the belt and the static friction coefficient:
 
     >>> import numpy as np, ringsweep
     >>> scene = {
@@ -169,27 +172,26 @@ def sweep(
     parsed = read_scene(scene, swept=axes)
     found = read_axes(parsed, axes)
     method = {"method": solver} if isinstance(solver, str) else dict(solver)
-    source = {"scene": dict(parsed.source), "solver": method, "sweep": _as_sweep(found)}
-    chosen = read_solver(method, parsed)
-    config = Config(scene=parsed, solver=chosen, axes=found, source=source, name="ringsweep")
+    source = {"scene": dict(parsed.source), "solver": method, "sweep": _sweep_section(found)}
+    config = Config(parsed, read_solver(method, parsed), found, source, name="ringsweep")
     return _run(config, output, fresh, jobs=jobs, reuse=reuse, scheduler=scheduler, progress=progress)
 
 
-def _as_sweep(axes: Axes) -> dict[str, Any]:
-    """Axes as the configuration would give them; what varies over several dimensions becomes points."""
+def _sweep_section(axes: Axes) -> dict[str, Any]:
+    """Axes as the section ``sweep`` of a configuration. Paths over shared or several dimensions become points."""
     shared = {dim for dims, _ in axes.columns.values() if len(dims) > 1 for dim in dims}
     names = [dims for dims, _ in axes.columns.values()]
     shared |= {dims[0] for dims in names if names.count(dims) > 1}
     grid = {path: values.tolist() for path, (dims, values) in axes.columns.items() if shared.isdisjoint(dims)}
     sizes = {dim: size for dim, size in axes.sizes.items() if dim in shared}
     index = np.unravel_index(np.arange(math.prod(sizes.values())), tuple(sizes.values())) if sizes else ()
-    place = dict(zip(sizes, index, strict=True))
+    indices = dict(zip(sizes, index, strict=True))
     points = {
-        path: values[tuple(place[dim] for dim in dims)].tolist()
+        path: values[tuple(indices[dim] for dim in dims)].tolist()
         for path, (dims, values) in axes.columns.items()
         if not shared.isdisjoint(dims)
     }
-    return {name: part for name, part in (("points", points), ("grid", grid)) if part}
+    return {kind: columns for kind, columns in (("points", points), ("grid", grid)) if columns}
 
 
 def compute(
@@ -201,23 +203,25 @@ def compute(
     progress: bool = True,
 ) -> xr.Dataset:
     """Run a validated configuration in memory; see :func:`run`."""
-    config, earlier = _earlier(config, reuse)
+    config, earlier = _earlier_sweep(config, reuse)
     sizes = tuple(config.axes.sizes.values())
     layout = Layout(sizes, chunk=sizes)
-    if layout.total > MOST_IN_MEMORY:
+    if layout.total > MAX_CELLS_IN_MEMORY:
         raise InputError("sweep", f"{layout.total:.3g} cells do not fit into memory: name a file as output")
-    kept = _InMemory(layout.total)
-    _fill(config, layout, kept, earlier, jobs, scheduler, progress)
-    return _frame(config).assign(
+    store = MemoryStore(layout.total)
+    _compute_cells(config, layout, store, earlier, jobs, scheduler, progress)
+    results = _frame(config).assign(
         {
             name: (
                 tuple(config.axes.sizes),
                 column.reshape(sizes),
-                OUTCOMES[name].attributes | linked(name, kept.columns),
+                OUTCOMES[name].attributes | error_attribute(name, store.columns),
             )
-            for name, column in kept.columns.items()
+            for name, column in store.columns.items()
         }
     )
+    warn_of_results(results, config)
+    return results
 
 
 def write(
@@ -230,138 +234,157 @@ def write(
     scheduler: str | None = None,
     progress: bool = True,
 ) -> bool:
-    """Run a validated configuration into a file, going on from where an earlier run was stopped; see :func:`run`.
+    """Run a validated configuration into a file, or continue such a run; see :func:`run`.
 
     Returns
     -------
     bool
         False if the file held this sweep already.
     """
-    config, earlier = _earlier(config, reuse)
+    config, earlier = _earlier_sweep(config, reuse)
     target = target.resolve()
     if target.exists():
         netcdf.check_kind(target, "regime", "sweep")
     layout = Layout(tuple(config.axes.sizes.values()))
-    described = identity(config)
-    with owned(target, described, layout, fresh=fresh) as partial:
-        if not fresh and _holds(target, partial):
-            partial.clear()
-            return False
-        if resumed := int(partial.done.sum()):
-            logger.info("going on: %d of %d cells are done", resumed, layout.total)
-        try:
-            _fill(config, layout, partial, earlier, jobs, scheduler, progress)
+    with open_checkpoint(target, identity(config), layout, fresh=fresh) as checkpoint:
+        computed = fresh or not _holds_sweep(target, checkpoint)
+        if computed:
             try:
-                _merge(config, target, layout, partial)
-            except Damaged as damage:
-                logger.warning("%s: looking for what is missing", damage)
-                partial.take_stock()
-                _fill(config, layout, partial, earlier, jobs, scheduler, progress)
-                _merge(config, target, layout, partial)
-        except BaseException as error:
-            if (kept := int(partial.done.sum())) and partial.folder.exists():
-                again = "the same command without --fresh" if fresh else "the same command"
-                error.add_note(
-                    f"{kept} of {layout.total} cells are kept in {partial.folder}: {again} goes on from there"
-                )
-            raise
-        partial.clear()
-    return True
+                _compute_file(config, target, layout, checkpoint, earlier, jobs, scheduler, progress)
+            except BaseException as error:
+                if (finished := int(checkpoint.done.sum())) and checkpoint.folder.exists():
+                    again = "the same command without --fresh" if fresh else "the same command"
+                    error.add_note(
+                        f"{finished} of {layout.total} cells are kept in {checkpoint.folder}: {again} goes on"
+                    )
+                raise
+        checkpoint.clear()
+    with netcdf.open_dataset(target) as results:
+        warn_of_results(results, config)
+    return computed
 
 
-def _merge(config: Config, target: Path, layout: Layout, partial: Partial) -> None:
-    """Make the file of finished partial."""
+def _compute_file(config: Config, target: Path, layout: Layout, checkpoint: Checkpoint, *options: Any) -> None:
+    """Compute the cells that the checkpoint lacks, and write the file from it."""
+    if finished := int(checkpoint.done.sum()):
+        logger.info("going on: %d of %d cells are done", finished, layout.total)
+    _compute_cells(config, layout, checkpoint, *options)
+    try:
+        _write_file(config, target, layout, checkpoint)
+    except DamagedTask as damage:
+        logger.warning("%s: the missing cells are computed again", damage)
+        checkpoint.scan()
+        _compute_cells(config, layout, checkpoint, *options)
+        _write_file(config, target, layout, checkpoint)
+
+
+def _write_file(config: Config, target: Path, layout: Layout, checkpoint: Checkpoint) -> None:
+    """Write the file of a sweep whose cells are all in the checkpoint."""
     frame = _frame(config)
-    frame.attrs["processors"] = ", ".join(sorted(partial.processors))
-    netcdf.write(target, partial.folder, frame, OUTCOMES, layout, partial.chunks())
+    frame.attrs["processors"] = ", ".join(sorted(checkpoint.processors))
+    netcdf.write(target, checkpoint.folder, frame, OUTCOMES, layout, checkpoint.chunks())
 
 
-def _holds(target: Path, partial: Partial) -> bool:
-    """Whether a file holds this very sweep; how another differs from it is told."""
+def _holds_sweep(target: Path, checkpoint: Checkpoint) -> bool:
+    """Whether a file holds the sweep of a checkpoint. Warns if it holds another sweep."""
     if not target.exists():
         return False
     with netcdf.open_dataset(target) as ds:
-        found = dict(ds.attrs)
-    if found.get("fingerprint") == partial.key:
+        stored_fingerprint = ds.attrs.get("fingerprint")
+    if stored_fingerprint == checkpoint.fingerprint:
         return True
     try:
-        changes = differences(identity(load(target)), partial.identity) or "the version of ringsweep"
+        changes = differences(identity(load(target)), checkpoint.identity) or "the version of ringsweep"
     except InputError:
-        changes = "what a configuration may say"
+        changes = "the keys that a configuration can have"
     logger.warning("%s is replaced when this sweep is done; what changed: %s", target, changes)
     return False
 
 
-class _InMemory:
-    """Finished cells as whole columns."""
+class MemoryStore:
+    """Finished cells in memory, as whole columns.
+
+    Attributes
+    ----------
+    done : ndarray of bool, shape ``(cells,)``
+        Whether the cell at each position of the layout is finished.
+    columns : dict of str to ndarray of shape ``(cells,)``
+    """
 
     def __init__(self, total: int):
         self.done = np.zeros(total, dtype=bool)
         self.columns: dict[str, NDArray[Any]] = {}
 
     def put(self, positions: NDArray[np.integer], columns: Columns, processor: str) -> None:
-        """Keep the columns of the cells at these positions."""
+        """Store the columns of the cells at these positions."""
         for name, column in columns.items():
             self.columns.setdefault(name, np.empty(len(self.done), dtype=column.dtype))[positions] = column
         self.done[positions] = True
 
 
-def _fill(
+def _compute_cells(
     config: Config,
     layout: Layout,
-    kept: Partial | _InMemory,
-    earlier: Earlier | None,
+    store: Checkpoint | MemoryStore,
+    earlier: EarlierSweep | None,
     jobs: int | None,
     scheduler: str | None,
     progress: bool,
 ) -> None:
-    """Compute every cell that is not there yet, task after task."""
-    computing = executor(jobs, scheduler)
+    """Compute every cell that the store lacks, task after task."""
+    context = executor(jobs, scheduler)
     if earlier is not None:
-        count = earlier.give(config, layout, kept)
-        tell = logger.info if count else logger.warning
-        tell("%d of %d cells are taken from %s", count, layout.total, earlier.path)
-    left = layout.total - int(kept.done.sum())
-    if not left:
+        taken = 0
+        for positions, columns in earlier.shared_cells(config, layout, store.done):
+            store.put(positions, columns, earlier.processors)
+            taken += len(positions)
+        logger.log(
+            logging.INFO if taken else logging.WARNING,
+            "%d of %d cells are taken from %s",
+            taken,
+            layout.total,
+            earlier.path,
+        )
+    if store.done.all():
         return
     with ExitStack() as stack:
         stopped = stack.enter_context(stop_on_interrupt())
-        workers = stack.enter_context(computing)
-        pace: Pace[Finished] = Pace(config.solver.side_by_side, workers.threads)
-        tasks = tasks_of(kept.done, left, pace, stopped)
-        results = workers.results(ComputeCells(config, layout), tasks, pace.learn, stopped)
-        bar = stack.enter_context(progress_bar(layout.total, progress, layout.total - left))
+        workers = stack.enter_context(context)
+        sizes = TaskSizes(config.solver.side_by_side, workers.concurrency)
+        tasks = divide_into_tasks(store.done, sizes, stopped)
+        results = workers.results(partial(compute_task, config, layout), tasks, sizes.learn, stopped)
+        bar = stack.enter_context(progress_bar(layout.total, progress, int(store.done.sum())))
         try:
-            for finished in results:
-                if finished.environment != environment():
-                    changes = differences(environment(), finished.environment)
+            for result in results:
+                if result.environment != environment():
+                    changes = differences(environment(), result.environment)
                     raise InputError("--scheduler", f"a worker has other versions than this process: {changes}")
-                kept.put(finished.positions, finished.columns, finished.processor)
-                bar.update(len(finished.positions))
+                store.put(result.positions, result.columns, result.processor)
+                bar.update(len(result.positions))
         finally:
-            # Partial under way cannot be interrupted; nobody is to wait for what comes after them.
+            # Tasks under way cannot be interrupted. Start no others, and wait for their end.
             stopped.set()
             for _ in results:
                 pass
-        if not kept.done.all():
+        if not store.done.all():
             raise KeyboardInterrupt
 
 
 def _frame(config: Config) -> xr.Dataset:
-    """Coordinates and attributes of a sweep's dataset."""
+    """Coordinates and attributes of the dataset of a sweep."""
     known = sweepable(config.scene)
     return xr.Dataset(
         coords={
-            path.replace(".", "_"): (dims, column, {**known[path].attributes, "path": path})
+            dimension(path): (dims, column, {**known[path].attributes, "path": path})
             for path, (dims, column) in config.axes.columns.items()
         },
         attrs=attributes(config),
     )
 
 
-def _earlier(config: Config, reuse: str | os.PathLike[str] | None) -> tuple[Config, Earlier | None]:
-    """The configuration, its axes at the very values of an earlier file's where these differ by rounding alone."""
+def _earlier_sweep(config: Config, reuse: str | os.PathLike[str] | None) -> tuple[Config, EarlierSweep | None]:
+    """The configuration, with its axes aligned to those of the earlier sweep, and that sweep."""
     if reuse is None:
         return config, None
-    earlier = Earlier(reuse, config)
-    return earlier.aligned(config), earlier
+    earlier = EarlierSweep(reuse, config)
+    return earlier.align_axes(config), earlier

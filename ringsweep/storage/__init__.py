@@ -1,1 +1,1 @@
-"""Files: NetCDF written whole or not at all, finished cells of a sweep under way, and where a result comes from."""
+"""Files: NetCDF results, the checkpoint of a running sweep, and the provenance of results."""

@@ -1,4 +1,4 @@
-"""NetCDF files: written whole or not at all, and read back before they count."""
+"""NetCDF files: written completely or not at all, and read back for comparison."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
-from ringsweep.quantities.variables import Variable, linked
+from ringsweep.quantities.variables import Variable, error_attribute
 from ringsweep.storage.chunks import Layout
 
-#: Attributes that tell a file of this package from any other NetCDF file.
+#: Attributes that every file of this package has.
 SIGNATURE = ("Conventions", "ringsweep_version")
 
-#: Below this many elements the chunk index of a compressed variable costs more than compression saves.
+#: Variables with fewer elements are not compressed: the index of their chunks would take more than compression saves.
 COMPRESSED_FROM = 1024
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
-    """Make sure that a file can be put at `path`, before hours are spent on its contents.
+    """Check that a file can be written at `path`, before its contents are computed.
 
     Parameters
     ----------
     path : path-like
-        File to be written later; it may exist.
+        File that is written later; it may exist.
 
     Raises
     ------
@@ -51,10 +51,10 @@ def check_writable(path: str | os.PathLike[str]) -> None:
             raise InputError(str(path), f"the folder {folder} does not exist; create it or choose another")
         if not folder.is_dir():
             raise InputError(str(path), f"{folder} is not a folder")
-        # A name that the file system refuses (too long, say) shows only when it is asked for.
+        # Raises if the file system does not accept the name.
         with suppress(FileNotFoundError):
             target.stat()
-        # Permission bits do not tell on network drives, read-only mounts or for root: only trying does.
+        # Permission bits are not reliable on network drives, on read-only mounts, or for root.
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
@@ -63,14 +63,14 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 
 @contextmanager
 def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Give a temporary name beside `path`; what was written there takes the place of `path` at the end.
+    """Give a temporary name beside `path`. At the end of the block the temporary file replaces `path`.
 
-    If the block fails or is interrupted, `path` stays as it was and the temporary file is removed.
+    If the block fails or is interrupted, `path` stays unchanged and the temporary file is removed.
 
     Parameters
     ----------
     path : path-like
-        File to be written or replaced. A symbolic link is followed.
+        File to write or replace. A symbolic link is followed.
 
     Yields
     ------
@@ -84,7 +84,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     """
     check_writable(path)
     target = Path(path).resolve()
-    temporary = _sibling(target)
+    temporary = target.with_name(f".ringsweep-{secrets.token_hex(8)}{target.suffix}")
     try:
         yield temporary
         os.replace(temporary, target)
@@ -93,7 +93,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
-    """Write a dataset as NetCDF4, whole or not at all.
+    """Write a dataset as NetCDF4, completely or not at all.
 
     Parameters
     ----------
@@ -101,14 +101,14 @@ def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
         Result of a sweep or a simulation. Attributes other than text, numbers and arrays of numbers are
         written as JSON.
     path : path-like
-        File to be written or replaced.
+        File to write or replace.
 
     Raises
     ------
     InputError
         If `path` cannot be written.
     OSError
-        If writing fails, or the file does not read back as it was written.
+        If writing fails, or the file differs from the dataset when it is read back.
     """
     with replacing(path) as temporary:
         _to_netcdf(ds, temporary)
@@ -124,27 +124,27 @@ def write(
     layout: Layout,
     chunks: Iterable[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]],
 ) -> None:
-    """Write the dataset of a sweep chunk by chunk, whole or not at all, and no more than a few chunks in memory.
+    """Write the dataset of a sweep chunk by chunk, completely or not at all. Memory holds a few chunks at a time.
 
     Parameters
     ----------
     target : Path
-        File to be written or replaced.
+        File to write or replace.
     folder : Path
-        Folder on the same disk, to write in meanwhile.
+        Folder on the same disk, for the temporary file.
     frame : xarray.Dataset
         Coordinates and attributes.
     variables : mapping of str to Variable
-        What the columns are.
+        Declarations of the columns.
     layout : Layout
-        Chunks of the grid; they are what is compressed, and read, as one.
+        Chunks of the grid.
     chunks : iterable of tuple
-        The place of each chunk in the grid, and its columns in the shape of that place.
+        Slices of each chunk in the grid, and its columns in the shape of the chunk.
 
     Raises
     ------
     OSError
-        If writing fails, or the file does not read back as it was written.
+        If writing fails, or the file differs from the dataset when it is read back.
     """
     temporary = folder / f"{secrets.token_hex(4)}.tmp"
     try:
@@ -157,7 +157,7 @@ def write(
         temporary.replace(target)
         _flush_folder(target.parent)
     except (OSError, RuntimeError) as error:
-        # Of a full disk the NetCDF library says no more than "HDF error".
+        # If the disk is full, the NetCDF library only reports "HDF error".
         raise OSError(f"{target} could not be written ({error}); is the disk full, or faulty?") from error
     finally:
         temporary.unlink(missing_ok=True)
@@ -179,38 +179,38 @@ def _write_chunks(
     layout: Layout,
     chunks: Iterable[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]],
 ) -> dict[str, int]:
-    """Add the columns to a file; returns a checksum of each."""
+    """Add the columns to a file and return a checksum of each."""
     dims = tuple(map(str, frame.sizes))
     others = " ".join(str(name) for name in frame.coords if name not in dims)
     sums: dict[str, int] = {}
     with netCDF4.Dataset(path, "a") as file:
-        for place, columns in chunks:
+        for region, columns in chunks:
             for name, column in columns.items():
                 if name not in sums:
                     variable = file.createVariable(name, column.dtype, dims, fill_value=False, **_chunked(layout))
                     _cache_one_chunk(variable, layout)
-                    described = variables[name].attributes | linked(name, columns)
+                    described = variables[name].attributes | error_attribute(name, columns)
                     variable.setncatts(described | ({"coordinates": others} if others else {}))
-                file[name][place] = column
+                file[name][region] = column
                 sums[name] = zlib.crc32(column.tobytes(), sums.get(name, 0))
     return sums
 
 
 def _checksums(path: Path, names: Iterable[str], layout: Layout) -> dict[str, int]:
-    """Checksums of variables of a file, as :func:`_write_chunks` takes them."""
+    """Checksums of variables of a file, as :func:`_write_chunks` computes them."""
     found = {}
     with netCDF4.Dataset(path) as file:
         file.set_auto_maskandscale(False)
         for name in names:
             found[name] = 0
             _cache_one_chunk(file[name], layout)
-            for _, _, place in layout.chunks():
-                found[name] = zlib.crc32(file[name][place].tobytes(), found[name])
+            for _, _, region in layout.chunks():
+                found[name] = zlib.crc32(file[name][region].tobytes(), found[name])
     return found
 
 
 def _cache_one_chunk(variable: Any, layout: Layout) -> None:
-    # Each is passed once; by default some 64 MiB of each variable would be kept.
+    # Each chunk is used once, but NetCDF would by default keep 64 MiB of each variable in memory.
     if layout.total >= COMPRESSED_FROM:
         size = math.prod(layout.chunk) * variable.dtype.itemsize
         variable.set_var_chunk_cache(size=2 * size, nelems=11, preemption=1.0)
@@ -223,7 +223,7 @@ def _chunked(layout: Layout) -> dict[str, Any]:
 
 
 def _flush_folder(folder: Path) -> None:
-    # What Windows neither needs nor allows.
+    # Windows neither needs this nor allows it.
     if hasattr(os, "O_DIRECTORY"):
         descriptor = os.open(folder, os.O_DIRECTORY)
         try:
@@ -233,26 +233,26 @@ def _flush_folder(folder: Path) -> None:
 
 
 def check_kind(path: str | os.PathLike[str], mark: str, content: str) -> None:
-    """Make sure that a file is a result of one kind, which a new one may replace.
+    """Check that a file is a result of a given kind, so that a new result of this kind may replace it.
 
     Parameters
     ----------
     path : path-like
         File that exists.
     mark : {"regime", "time", "contender"}
-        What tells the kind: a dimension, or for sweeps a variable.
+        Dimension or variable by which the kind is known: sweep, history, or error against run time.
     content : str
-        What the new file holds.
+        Contents of the new file, for the message.
 
     Raises
     ------
     InputError
-        If it is none of this package, or of another kind.
+        If it is no file of this package, or a result of another kind.
     """
-    with open_dataset(path) as there:
-        kinds = [kind for kind in ("contender", "time", "regime") if kind in there.dims or kind in there]
+    with open_dataset(path) as existing:
+        kinds = [kind for kind in ("contender", "time", "regime") if kind in existing.dims or kind in existing]
     if kinds[:1] != [mark]:
-        raise InputError(str(path), f"holds something else: name another file for this {content}")
+        raise InputError(str(path), f"holds a result of another kind: name another file for this {content}")
 
 
 def load(path: str | os.PathLike[str]) -> xr.Dataset:
@@ -261,7 +261,7 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
     Parameters
     ----------
     path : path-like
-        File written by `save` or `write`.
+        File written by :func:`save` or :func:`write`.
 
     Returns
     -------
@@ -277,17 +277,17 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
 
 
 def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
-    """A file of this package, of which no more is read than is asked for; the rest as for :func:`load`.
+    """Open a file of this package. Values are read when they are needed.
 
-    It is a context manager, and closes the file at the end.
+    The dataset is a context manager that closes the file. Parameters and errors are those of :func:`load`.
     """
     if not Path(path).is_file():
         raise InputError(str(path), "is not a file" if Path(path).exists() else "does not exist")
     try:
-        # Seconds are numbers here; decoding would turn them into timedelta64 wherever a unit spells them out.
+        # Decoding would turn numbers of seconds into timedelta64.
         ds = xr.open_dataset(Path(path).resolve(), engine="netcdf4", decode_times=False)
     except PermissionError as error:
-        raise InputError(str(path), "may not be read: permission denied") from error
+        raise InputError(str(path), "cannot be read: permission denied") from error
     except (OSError, RuntimeError, ValueError) as error:
         raise InputError(str(path), "is not a NetCDF file, or is damaged") from error
     missing = [name for name in SIGNATURE if name not in ds.attrs]
@@ -299,12 +299,8 @@ def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     return ds
 
 
-def _sibling(target: Path) -> Path:
-    return target.with_name(f".ringsweep-{secrets.token_hex(8)}{target.suffix}")
-
-
 def _encoding(variable: xr.Variable) -> dict[str, Any]:
-    # A fill value would make xarray read integers as floats, and NaN is a value of its own here.
+    # With a fill value xarray would read integers as floats.
     encoding: dict[str, Any] = {"_FillValue": None}
     if variable.dtype.kind in "iuf" and variable.size >= COMPRESSED_FROM:
         encoding |= {"zlib": True, "complevel": 1}

@@ -1,4 +1,4 @@
-"""Where a result comes from: what determines its bits, and what its file says about it."""
+"""Provenance of results: what determines their bits, and the attributes of their files."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from ringsweep.models.scene import LAW
 
 @cache
 def environment() -> dict[str, str]:
-    """Versions that decide the bits of a result."""
+    """Versions that determine the bits of a result."""
     return {"ringsweep": version("ringsweep"), "sources": SOURCES_DIGEST} | {
         name: version(name) for name in ("numba", "llvmlite", "numpy", "scipy")
     }
@@ -31,14 +31,14 @@ def environment() -> dict[str, str]:
 
 @cache
 def processor() -> str:
-    """Name of the processor that kernels are compiled for; another may round sums of products otherwise."""
+    """Name of the processor for which kernels are compiled. Another may round sums of products differently."""
     return str(llvmlite.binding.get_host_cpu_name())
 
 
 def identity(config: Config) -> dict[str, str]:
-    """All that decides the bits of a sweep, by name: numbers in SI units, defaults filled in, versions.
+    """All that determines the bits of a sweep, by name: numbers in SI units, defaults, solver, versions.
 
-    What does not decide them (units as typed, the order of keys, values that a sweep replaces) leaves it as it is.
+    Units as typed, the order of keys and values that the sweep replaces do not change it.
     """
     scene, axes = config.scene, config.axes
     structure = scene.structure
@@ -59,27 +59,27 @@ def identity(config: Config) -> dict[str, str]:
     return found | {"solver": repr(config.solver)} | environment()
 
 
-# Differences that are told one by one.
-_MOST = 4
+# Differences that are named one by one.
+_MAX_NAMED = 4
 
 
 def fingerprint(identity: Mapping[str, str]) -> str:
-    """A digest of an identity, the same for all that give the same bits."""
+    """Digest of an identity: equal for sweeps that give the same bits."""
     return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
 
 
 def differences(old: Mapping[str, str], new: Mapping[str, str]) -> str:
-    """In words, what of an identity is not as it was."""
+    """Differences between two identities in words."""
     names = [name for name in {**new, **old} if old.get(name) != new.get(name)]
     if "sources" in names:
-        # Versions of a checkout stay while its sources change.
+        # The sources tell more than the version, which stays the same in a checkout.
         names = [name for name in names if name != "ringsweep"]
-    words = [f"{name} was {_short(old.get(name))}, is {_short(new.get(name))}" for name in names[:_MOST]]
-    return "; ".join(words + [f"and {len(names) - _MOST} more"] * (len(names) > _MOST))
+    words = [f"{name} was {_short(old.get(name))}, is {_short(new.get(name))}" for name in names[:_MAX_NAMED]]
+    return "; ".join(words + [f"and {len(names) - _MAX_NAMED} more"] * (len(names) > _MAX_NAMED))
 
 
 def attributes(config: Config) -> dict[str, Any]:
-    """Attributes of a file, from which its contents can be computed again."""
+    """Attributes of a result. They are enough to compute it again."""
     model = MODELS[config.scene.structure.model]
     versions = {"python": platform.python_version(), **environment(), "xarray": version("xarray")}
     digest = versions.pop("sources")
@@ -105,7 +105,7 @@ def attributes(config: Config) -> dict[str, Any]:
 def _digest(*arrays: Any) -> str:
     digest = hashlib.sha256()
     for array in arrays:
-        # Texts are digested as such: their width in an array says nothing.
+        # As lists: equal names must have equal digests, whatever the width of their array.
         digest.update(json.dumps(np.asarray(array).tolist()).encode())
     return digest.hexdigest()[:12]
 

@@ -1,0 +1,266 @@
+"""Checkpoint of a running sweep: its finished cells, in a folder beside the file that they will become.
+
+The folder of ``OUT.nc`` is ``OUT.nc.partial``, with one file for each finished task. A task file is complete or absent:
+it is written under another name, flushed and renamed. It holds the fingerprint of its sweep
+(:func:`ringsweep.storage.provenance.fingerprint`), and its name ends with a checksum. One process at a time uses the
+folder.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import logging
+import os
+import secrets
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from filelock import FileLock, Timeout
+from numpy.typing import NDArray
+
+from ringsweep.errors import InputError
+from ringsweep.storage.chunks import Layout
+from ringsweep.storage.provenance import differences, fingerprint
+
+logger = logging.getLogger("ringsweep")
+
+Columns = Mapping[str, NDArray[Any]]
+
+# Unusable task files that are named one by one.
+_MAX_NAMED = 3
+
+_MANIFEST, _LOCK = "sweep.json", "lock"
+
+
+@contextmanager
+def open_checkpoint(
+    target: Path, identity: Mapping[str, str], layout: Layout, *, fresh: bool = False
+) -> Iterator[Checkpoint]:
+    """Checkpoint of the sweep that becomes `target`, locked for this process. An empty one is removed at the end.
+
+    Parameters
+    ----------
+    target : Path
+        File that the sweep becomes.
+    identity : mapping of str to str
+        All that determines the bits of the sweep.
+    layout : Layout
+        Order of its cells.
+    fresh : bool
+        Whether to discard what an earlier run left.
+
+    Raises
+    ------
+    InputError
+        If another process uses the folder, or it holds cells of another sweep, or it cannot be written.
+    """
+    folder = target.with_name(f"{target.name}.partial")
+    if folder.exists() and not folder.is_dir():
+        raise InputError(str(target), f"cannot be computed: finished cells go to the folder {folder}, but it is a file")
+    try:
+        folder.mkdir(exist_ok=True)
+        lock = FileLock(folder / _LOCK, timeout=0)
+        lock.acquire()
+    except Timeout:
+        raise InputError(str(target), f"another ringsweep is computing it (it uses {folder})") from None
+    except OSError as error:
+        raise InputError(str(target), f"cannot be written: {error.strerror or error}") from error
+    checkpoint = Checkpoint(folder, identity, layout)
+    try:
+        if fresh:
+            checkpoint.clear()
+        checkpoint.resume()
+        yield checkpoint
+    finally:
+        empty = not checkpoint.task_files()
+        if empty:
+            checkpoint.clear()
+        lock.release()
+        if empty:
+            with suppress(OSError):
+                (folder / _LOCK).unlink(missing_ok=True)
+                folder.rmdir()
+
+
+class Checkpoint:
+    """Finished cells of a sweep on disk, one file for each task; made by :func:`open_checkpoint`.
+
+    Attributes
+    ----------
+    folder : Path
+    done : ndarray of bool, shape ``(cells,)``
+        Whether the cell at each position of the layout is finished.
+    files : dict of Path to tuple of int
+        Task files, with the first and the last position in each.
+    processors : set of str
+        Names of the processors that computed the cells.
+    """
+
+    def __init__(self, folder: Path, identity: Mapping[str, str], layout: Layout):
+        self.folder = folder
+        self.identity = dict(identity)
+        self.layout = layout
+        self.fingerprint = fingerprint(identity)
+        self.done = np.zeros(layout.total, dtype=bool)
+        self.files: dict[Path, tuple[int, int]] = {}
+        self.processors: set[str] = set()
+
+    def resume(self) -> None:
+        """Read what an earlier run left.
+
+        Raises
+        ------
+        InputError
+            If it left cells of another sweep.
+        """
+        manifest = self.folder / _MANIFEST
+        for path in self.folder.glob("*.tmp"):
+            path.unlink()
+        before = _read_manifest(manifest)
+        if before and before != self.identity and self.task_files():
+            changes = differences(before, self.identity)
+            raise InputError(
+                str(self.folder),
+                f"holds finished cells of another sweep: {changes}. --fresh starts over, -o keeps both",
+            )
+        if before != self.identity:
+            _write_durably(manifest, json.dumps(self.identity, indent=1).encode())
+        self.scan()
+
+    def task_files(self) -> list[Path]:
+        """All task files in the folder, usable or not."""
+        return sorted(path for path in self.folder.glob("*.npz") if path.is_file())
+
+    def scan(self) -> None:
+        """Find out which cells are finished. Warns of damaged task files and of those of another sweep."""
+        self.done[:] = False
+        self.files.clear()
+        unusable = 0
+        for path in self.task_files():
+            try:
+                positions, _ = self.read(path)
+            except DamagedTask as damage:
+                unusable += 1
+                if unusable <= _MAX_NAMED:
+                    logger.warning("%s: its cells are computed again", damage)
+            else:
+                self.done[positions] = True
+                self.files[path] = int(positions[0]), int(positions[-1])
+        if unusable > _MAX_NAMED:
+            logger.warning("the cells of %d more such files are computed again too", unusable - _MAX_NAMED)
+
+    def put(self, positions: NDArray[np.integer], columns: Columns, processor: str) -> None:
+        """Store the columns of the cells at these positions, which ascend."""
+        # One structured array: each member of an archive takes longer to write than a few hundred cells.
+        cells = np.empty(len(positions), dtype=[(name, column.dtype) for name, column in columns.items()])
+        for name, column in columns.items():
+            cells[name] = column
+        members = {
+            "key": np.array(self.fingerprint),
+            "processor": np.array(processor),
+            "positions": positions.astype(np.uint32),
+        }
+        content = io.BytesIO()
+        np.savez(content, allow_pickle=False, cells=cells, **members)
+        stem = f"{self.fingerprint[:12]}-{positions[0]:010d}-{len(positions)}"
+        path = self.folder / f"{stem}-{_checksum(content.getvalue())}.npz"
+        _write_durably(path, content.getvalue())
+        self.processors.add(processor)
+        self.done[positions] = True
+        self.files[path] = int(positions[0]), int(positions[-1])
+
+    def read(self, path: Path) -> tuple[NDArray[np.intp], dict[str, NDArray[Any]]]:
+        """Positions and columns of a task file.
+
+        Raises
+        ------
+        DamagedTask
+            If the file is damaged, or belongs to another sweep.
+        """
+        try:
+            content = path.read_bytes()
+        except OSError as error:
+            raise DamagedTask(f"{path} cannot be read ({error.strerror or error})") from error
+        # The members of an archive have checksums, but its directory has none.
+        if not path.stem.endswith(f"-{_checksum(content)}"):
+            raise DamagedTask(f"{path} is damaged")
+        with np.load(io.BytesIO(content), allow_pickle=False) as archive:
+            members = dict(archive)
+        if str(members["key"]) != self.fingerprint:
+            raise DamagedTask(f"{path} is not of this sweep")
+        self.processors.add(str(members["processor"]))
+        cells = members["cells"]
+        return members["positions"].astype(np.intp), {name: cells[name] for name in cells.dtype.names}
+
+    def chunks(self) -> Iterator[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]]:
+        """Slices in the grid of every chunk, in order, and its columns in the shape of the chunk.
+
+        Raises
+        ------
+        DamagedTask
+            If a task file has changed, or some cells are in no file.
+        """
+        waiting = sorted(self.files, key=lambda path: self.files[path], reverse=True)
+        read: dict[Path, tuple[NDArray[np.intp], dict[str, NDArray[Any]]]] = {}
+        for start, stop, region in self.layout.chunks():
+            while waiting and self.files[waiting[-1]][0] < stop:
+                path = waiting.pop()
+                read[path] = self.read(path)
+            chunk: dict[str, NDArray[Any]] = {}
+            missing = np.ones(stop - start, dtype=bool)
+            for positions, columns in read.values():
+                part = slice(*np.searchsorted(positions, (start, stop)))
+                within = positions[part] - start
+                missing[within] = False
+                for name, column in columns.items():
+                    chunk.setdefault(name, np.empty(stop - start, dtype=column.dtype))[within] = column[part]
+            if missing.any():
+                raise DamagedTask(f"{missing.sum()} cells are in no task file of {self.folder}")
+            yield region, {name: column.reshape([s.stop - s.start for s in region]) for name, column in chunk.items()}
+            for path in [path for path in read if self.files[path][1] < stop]:
+                del read[path]
+
+    def clear(self) -> None:
+        """Remove all files but the lock."""
+        for path in [*self.task_files(), *self.folder.glob("*.tmp"), self.folder / _MANIFEST]:
+            path.unlink(missing_ok=True)
+        self.files.clear()
+        self.done[:] = False
+
+
+class DamagedTask(Exception):
+    """A task file is damaged, missing, or of another sweep."""
+
+
+def _checksum(content: bytes) -> str:
+    return hashlib.blake2b(content, digest_size=8).hexdigest()
+
+
+def _read_manifest(path: Path) -> dict[str, str]:
+    """Identity of the sweep in a folder; empty if the file is missing or damaged."""
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) and all(isinstance(value, str) for value in found.values()) else {}
+
+
+def _write_durably(path: Path, content: bytes) -> None:
+    """Write a file under another name, flush it to the disk, and rename it."""
+    temporary = path.with_name(f"{secrets.token_hex(4)}.tmp")
+    try:
+        with temporary.open("xb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path.parent)) from error
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)

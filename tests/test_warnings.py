@@ -1,0 +1,136 @@
+"""Warnings about results reach users of Python and of the command line, once for each call."""
+
+import logging
+import subprocess
+import sys
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+import yaml
+
+import ringsweep
+from ringsweep import cli
+from ringsweep.config import load
+from ringsweep.runs.warnings import warn_of_results
+from ringsweep.storage import netcdf
+
+SCENE = load(Path(__file__).parents[1] / "configs" / "regime_map.yaml").source["scene"] | {"time": {"span": "0.5 s"}}
+RK4 = {"method": "rk4", "steps": 100}
+AXES = {"drive.amplitude": [0.5, 2.0]}
+#: Friction jumps at once, so the body falls off at the top.
+AT_THE_TOP = SCENE | {"initial": {"phi": "180 deg"}}
+
+STIFF, LAUNCH = "limit of stability of rk4", "at t = 0"
+
+
+def config(scene=SCENE, solver=RK4, **sweep):
+    return {"scene": scene, "solver": solver} | ({"sweep": {"grid": AXES}} if sweep.get("sweep") else {})
+
+
+CALLS = {
+    "run": lambda folder, **given: ringsweep.run(config(**given, sweep=True), progress=False),
+    "run into a file": lambda folder, **given: ringsweep.run(
+        config(**given, sweep=True), folder / "out.nc", progress=False
+    ).close(),
+    "sweep": lambda folder, scene=SCENE, solver=RK4: ringsweep.sweep(scene, AXES, solver=solver, progress=False),
+    "simulate": lambda folder, **given: ringsweep.simulate(config(**given)),
+}
+
+
+@pytest.fixture
+def warned(caplog):
+    """Number of warnings that contain a text, since the test began."""
+    caplog.set_level(logging.WARNING, logger="ringsweep")
+    return lambda text: sum(text in record.getMessage() for record in caplog.records)
+
+
+@pytest.mark.parametrize("call", CALLS.values(), ids=CALLS)
+class TestPython:
+    def test_steps_beyond_the_limit_of_stability_give_one_warning(self, call, tmp_path, warned):
+        call(tmp_path)
+        assert (warned(STIFF), warned(LAUNCH)) == (1, 0)
+
+    def test_runs_that_end_at_t_0_give_one_warning(self, call, tmp_path, warned):
+        call(tmp_path, scene=AT_THE_TOP, solver="auto")
+        assert (warned(STIFF), warned(LAUNCH)) == (0, 1)
+
+    def test_good_runs_give_no_warning(self, call, tmp_path, warned):
+        call(tmp_path, solver="auto")
+        assert (warned(STIFF), warned(LAUNCH)) == (0, 0)
+
+
+def test_finished_file_gives_the_warning_again_without_computation(tmp_path, warned):
+    for count in (1, 2):
+        CALLS["run into a file"](tmp_path)
+        assert warned(STIFF) == count
+
+
+def test_reused_cells_give_the_warning_again(tmp_path, warned):
+    CALLS["run into a file"](tmp_path)
+    ringsweep.run(config(sweep=True), tmp_path / "again.nc", reuse=tmp_path / "out.nc", progress=False).close()
+    assert warned(STIFF) == 2
+
+
+@pytest.mark.parametrize("command", [["run", "case.yaml"], ["simulate", "case.yaml"]])
+def test_command_prints_the_warning_once(tmp_path, command):
+    (tmp_path / "case.yaml").write_text(yaml.safe_dump(config(sweep=True)))
+    done = subprocess.run(
+        [sys.executable, "-m", "ringsweep", *command], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert done.stderr.count(STIFF) == 1
+    assert done.stderr.startswith("ringsweep: ")
+
+
+def test_plain_script_without_logging_prints_the_warning_once(tmp_path):
+    (tmp_path / "case.yaml").write_text(yaml.safe_dump(config(sweep=True)))
+    script = "import ringsweep; ringsweep.run('case.yaml', progress=False)"
+    done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert done.stderr.count(STIFF) == 1
+    assert done.stderr.count("\n") == 1
+
+
+def test_quiet_command_still_prints_the_warning(tmp_path, monkeypatch, warned):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "case.yaml").write_text(yaml.safe_dump(config()))
+    assert cli.main(["simulate", "case.yaml", "-q"]) == 0
+    assert warned(STIFF) == 1
+
+
+def results(stiffness, t_end=1.0):
+    """Outcomes of four million cells with a few values of the stiffness, and one time of the end."""
+    values = np.resize(np.asarray(stiffness, dtype=float), (2000, 2000))
+    return xr.Dataset(
+        {"stiffness": (("a", "b"), values), "t_end": (("a", "b"), np.full_like(values, t_end))},
+        attrs={"Conventions": "CF-1.11", "ringsweep_version": "0"},
+    )
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "message"),
+    [
+        ([0.0, 2.61], None),
+        ([0.0, 5.22, 2.0, 2.0], "25.0 % of the cells exceed .* about 2e+02 steps are needed"),
+        ([np.inf, 2.0], "50.0 % of the cells exceed .* no step is small enough"),
+        ([5.22, np.nan], "100.0 % of the cells exceed .* no step is small enough"),
+    ],
+)
+def test_warning_names_the_share_of_cells_and_the_remedy(caplog, stiffness, message):
+    warn_of_results(results(stiffness), load(config()))
+    (found,) = [record.getMessage() for record in caplog.records] or [None]
+    assert found is message or all(part in found for part in message.split(".*"))
+
+
+def test_results_on_disk_are_read_chunk_by_chunk(tmp_path, caplog):
+    netcdf.save(results([5.22, 2.0]), tmp_path / "out.nc")
+    loaded = load(config())
+    with netcdf.open_dataset(tmp_path / "out.nc") as ds:
+        tracemalloc.start()
+        warn_of_results(ds, loaded)
+        _, peak = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+    assert "50.0 % of the cells" in caplog.text
+    # A variable has 32 MB.
+    assert peak < 4e6
