@@ -1,4 +1,4 @@
-"""The paper's rig, its figures, and the shortest way from values to a run."""
+"""Fixtures: the paper's rig, its figures, batches of cells and runs."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -19,13 +19,13 @@ settings.load_profile("ringsweep")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Keep the tests of a file, which share kernels and fixtures, in one process; each notebook is its own world."""
+    """Run the tests of a file in one process, since they share kernels and fixtures; but each notebook on its own."""
     for item in items:
         alone = item.path.name == "test_notebooks.py"
         item.add_marker(pytest.mark.xdist_group(item.name if alone else item.path.name))
 
 
-#: Values of the rig by path; the friction is that of Figs. 29 and 30.
+#: Values of the rig by path, with the friction of Figs. 29 and 30.
 RIG: Mapping[str, float] = MappingProxyType(
     {
         "body.mass": 0.076,
@@ -48,7 +48,7 @@ RIG: Mapping[str, float] = MappingProxyType(
 
 
 class Figure(NamedTuple):
-    """Setting of one of the paper's figures: drive, values other than the rig's, number of steps."""
+    """Setting of one of the paper's figures: drive, changes of the rig's values, number of steps."""
 
     drive: str
     changes: dict[str, float]
@@ -81,7 +81,7 @@ FIGURES: Mapping[int, Figure] = MappingProxyType(
 
 @pytest.fixture(scope="session")
 def scene() -> dict[str, Any]:
-    """The scene of the paper's Fig. 29 with the limit law, for 4 s."""
+    """Scene of the paper's Fig. 29 with stiction in place of Bengisu-Akay friction, for 4 s."""
     given = dict(load(Path(__file__).parents[1] / "configs" / "regime_map.yaml").source["scene"])
     friction = {"law": "stiction", "rough": given["friction"]["rough"], "rest": given["friction"]["rest"]}
     return given | {"friction": friction, "time": {"span": "4 s"}}
@@ -89,15 +89,15 @@ def scene() -> dict[str, Any]:
 
 @pytest.fixture(scope="session")
 def figure() -> Callable[[int], Figure]:
-    """Setting of a figure by its number."""
+    """Function that returns the setting of a figure by its number."""
     return FIGURES.__getitem__
 
 
 @pytest.fixture(scope="session")
 def cells() -> Callable[..., Any]:
-    """Batch of the rig with `changes` by path; arrays among them make several cells.
+    """Function that returns a batch of the rig with `changes` by path; arrays make several cells.
 
-    A ring at rest has a drive without amplitude: it needs no kernel of its own.
+    A ring at rest has a drive with amplitude 0, so that no other kernel is compiled.
     """
 
     def build(
@@ -121,7 +121,7 @@ def cells() -> Callable[..., Any]:
 
 @pytest.fixture(scope="session")
 def setting(cells: Callable[..., Any]) -> Callable[..., Any]:
-    """Batch of a figure's setting with `changes`, dots as double underscores."""
+    """Function that returns a batch of a figure's setting with `changes`; double underscores stand for dots."""
 
     def build(number: int, law: str = "bengisu-akay", **changes: float) -> Any:
         drive, values, _ = FIGURES[number]
@@ -134,7 +134,7 @@ def setting(cells: Callable[..., Any]) -> Callable[..., Any]:
 
 @pytest.fixture(scope="session")
 def run() -> Callable[..., Any]:
-    """Outcomes of a batch under RK4: one array for each outcome, besides those of `Result`."""
+    """Function that returns the outcomes of a batch by RK4: one array for each outcome, and the fields of `Result`."""
     names = MODELS["ring"].outcomes
 
     def integrate(batch: Any, steps: int, *, certify: bool = False) -> Any:
@@ -146,7 +146,7 @@ def run() -> Callable[..., Any]:
 
 @pytest.fixture(scope="session")
 def history() -> Callable[..., Any]:
-    """History of a batch's first cell under RK4, at every step: ``t`` and one array for each quantity."""
+    """Function that returns the history of the first cell of a batch by RK4, one array for each variable."""
     names = MODELS["ring"].history(Structure("ring", "bengisu-akay"))
 
     def integrate(batch: Any, steps: int) -> Any:

@@ -1,4 +1,4 @@
-"""Solutions that tests hold the solvers to, from the balances of momentum alone, and the shortest way to a run."""
+"""Closed-form solutions from the balances of momentum, and functions that run a batch."""
 
 from math import cos, inf, pi, sin
 from types import SimpleNamespace
@@ -14,7 +14,7 @@ from ringsweep.solvers.automaton import integrate
 
 
 def solve(method, batch):
-    """Outcomes of a batch: one array for each, besides those of `Result`."""
+    """Outcomes of a batch: one array for each outcome, and the fields of `Result`."""
     result = method.run(batch, Outcome._fields)
     return SimpleNamespace(**vars(result), **dict(zip(Outcome._fields, result.rows.T, strict=True)))
 
@@ -23,7 +23,7 @@ HISTORY = ("phi", "omega", "epsilon", "normal_1", "normal_2", "ring_omega", "zon
 
 
 def trail(method, batch, spacing):
-    """History of the first cell: every end of a step, and instants `spacing` apart."""
+    """History of the first cell: the end of every step, and instants `spacing` apart, s."""
     times, rows = np.empty(2_000_000), np.empty((2_000_000, len(HISTORY)))
     batch = take(batch, [0])
     out, steps = np.empty((1, 0)), np.empty(1)
@@ -32,7 +32,7 @@ def trail(method, batch, spacing):
 
 
 def motion(body, K1, K2):
-    """What multiplies ``(omega^2, cos phi, sin phi)`` in the angular acceleration and in both reactions."""
+    """Coefficients of ``(omega^2, cos phi, sin phi)`` in the angular acceleration and in both reactions."""
     if not hasattr(body, "xi"):
         g, R, M = body.gravity, body.radius, body.mass
         return np.array([[K1, K1 * g / R, -g / R], [M * R, M * g, 0.0], [M * R, M * g, 0.0]])
@@ -48,15 +48,15 @@ def motion(body, K1, K2):
     return np.linalg.solve(balances, loads)
 
 
-#: Nodes and weights of Gauss's quadrature.
+#: Nodes and weights of Gaussian quadrature.
 NODES, NODE_WEIGHTS = np.polynomial.legendre.leggauss(120)
 
 
 class Fall:
-    """Coulomb friction with stiction on an immobile ring with one rough arc: orbit by orbit, in closed form.
+    """Closed form of the motion under Coulomb friction with stiction, on a ring at rest with one rough arc.
 
-    Between two edges ``u = omega^2 = C e^(2 p phi) + A cos phi + B sin phi``, and the reactions are
-    combinations of u, cosine and sine.
+    Between two edges ``u = omega^2 = C e^(2 p phi) + A cos phi + B sin phi``. The reactions are linear combinations of
+    u, cosine and sine.
     """
 
     def __init__(self, body, center, half_angle, rough, rest):
@@ -71,7 +71,7 @@ class Fall:
         return self.friction(phi - self.offset, kind), self.friction(phi + self.offset, kind)
 
     def edge(self, phi, sense):
-        """Nearest angle of the body ahead at which a contact meets an edge."""
+        """Next angle of the body at which a contact meets an edge."""
         ahead = []
         for side in (-1, 1):
             for edge in (self.start, self.start + self.width):
@@ -80,13 +80,13 @@ class Fall:
         return phi + sense * min(ahead)
 
     def holds(self, phi):
-        """Whether friction at rest can carry the body: full friction of either sense would move it that way."""
+        """Whether the body sticks at rest: static friction can balance its weight."""
         m1, m2 = self.coefficients(phi, 0)
         place = np.array([0.0, cos(phi), sin(phi)])
         return motion(self.body, -m1, -m2)[0] @ place <= 0.0 <= motion(self.body, m1, m2)[0] @ place
 
     def run(self, phi, omega):
-        """Angle at which the body rests for good or loses a contact, that contact or 0, and the time taken."""
+        """Angle at which the body stops for good or loses a contact; that contact, or 0; and the time, s."""
         sense, u, t = (1 if omega > 0 else -1), omega * omega, 0.0
         for _ in range(200):
             end = self.edge(phi, sense)
@@ -101,7 +101,7 @@ class Fall:
                 return C * np.exp(2 * p * (x - origin)) + A * np.cos(x) + B * np.sin(x)
 
             def gain(x, way, p=p, A=A, B=B, C=C, origin=phi):
-                """What the square gains on the way to x, without the cancellation of a difference."""
+                """Increase of `square` over the last `way` before x, without cancellation."""
                 middle, half = x - 0.5 * way, np.sin(0.5 * way)
                 exponential = C * np.exp(2 * p * (x - way - origin)) * np.expm1(2 * p * way)
                 return exponential + 2.0 * half * (B * np.cos(middle) - A * np.sin(middle))
@@ -122,11 +122,11 @@ class Fall:
                 return stop, 0, t
             else:
                 phi, u, sense = stop, 0.0, -sense
-        raise AssertionError("no end")
+        raise AssertionError("the motion does not end")
 
     @staticmethod
     def first(f, start, end, skip=0.0):
-        """First zero of a function positive at `start`, or infinity."""
+        """First zero of a function that is positive at `start`, or infinity."""
         x = np.linspace(start + skip * np.sign(end - start), end, 4001)
         below = np.flatnonzero(f(x) <= 0.0)
         if not len(below):
@@ -136,13 +136,13 @@ class Fall:
 
     @staticmethod
     def duration(square, gain, start, end, rests, rested):
-        """Time from angle to angle by quadrature; at rest, in the root of the distance from there."""
+        """Time between two angles by quadrature, s."""
         middle, sense = 0.5 * (start + end), np.sign(end - start)
         total = 0.0
         for place, still in ((start, rested), (end, rests)):
             way = middle - place
             fraction = 0.5 * (NODES + 1)
-            # phi = place + way z^2 takes away the root that u has at rest.
+            # At rest u has a zero; the substitution phi = place + way z^2 removes the singularity of 1/omega.
             part, rate = (way * fraction**2, 2 * fraction) if still else (way * fraction, 1.0)
             speed = np.sqrt(gain(place + part, part) if still else square(place + part))
             total += 0.5 * abs(way) * (NODE_WEIGHTS * rate / speed).sum()
@@ -150,10 +150,10 @@ class Fall:
 
 
 def imbalance(batch, run, coefficients):
-    """Largest difference of energy and work up to any instant of a history, relative to all work done.
+    """Largest difference between energy and work in a history, as a share of the work.
 
-    `coefficients` are ``(mu_s, mu_k)`` of the rest of the ring and of its arcs. Where the law is
-    set-valued, what friction does in stick follows from the ring's motion.
+    `coefficients` are ``(mu_s, mu_k)`` of the rest of the ring and of its arcs. In stick of a set-valued law, friction
+    follows from the motion of the ring.
     """
     scene = take(batch, 0)
     body = scene.body
@@ -171,7 +171,7 @@ def imbalance(batch, run, coefficients):
         force[k] = -sense * load
     power = body.radius * run.omega * force
     energy = 0.5 * inertia * run.omega**2 - weight * np.cos(run.phi)
-    # An instant that appears twice parts two modes, between which the power may jump.
+    # At an instant that appears twice the mode changes, and the power may jump.
     parts = np.split(np.arange(len(run.t)), np.flatnonzero(np.diff(run.t) <= 0.0) + 1)
     work = np.zeros(len(run.t))
     done = 0.0

@@ -1,4 +1,4 @@
-"""The default method: what its certificate means, and what it makes of the ends of every range."""
+"""The default method: its certificate, and parameters at the ends of their ranges."""
 
 from math import acos, pi, sqrt
 
@@ -32,7 +32,7 @@ def law(request):
 
 @pytest.fixture
 def scenes(cells, law):
-    """Batch under a set-valued or a smooth law; on a ring at rest unless it is driven."""
+    """Batch under a set-valued or a smooth law; the ring is at rest unless it is driven."""
 
     def build(changes, drive="arctan", **more):
         return cells({"time.span": 3.0} | changes, law=law, drive=drive, **more)
@@ -41,28 +41,27 @@ def scenes(cells, law):
 
 
 class TestChoice:
-    def test_never_replaces_the_law(self, cells):
-        """Each law goes to the method that takes it as it is."""
+    def test_auto_runs_each_law_by_the_method_that_takes_it(self, cells):
         changes = {"drive.amplitude": 2.0, "time.span": 3.0}
         for law, method in (("stiction", Event()), ("tustin", Event()), ("bengisu-akay", Implicit())):
             scene = cells(changes, law=law, drive="arctan")
-            auto, own = solve(Auto(), scene), solve(method, scene)
-            np.testing.assert_array_equal(auto.rows, own.rows)
-            np.testing.assert_array_equal(auto.steps, own.steps)
+            auto, direct = solve(Auto(), scene), solve(method, scene)
+            np.testing.assert_array_equal(auto.rows, direct.rows)
+            np.testing.assert_array_equal(auto.steps, direct.steps)
 
-    def test_nor_does_a_history(self, scenes, law):
+    def test_history_of_auto_equals_that_of_the_method_that_takes_the_law(self, scenes, law):
         scene = scenes({"drive.amplitude": 2.0})
-        own = Event() if law == "stiction" else Implicit()
-        (times, rows), expected = (method.history(scene, 100, len(HISTORY)) for method in (Auto(), own))
+        direct = Event() if law == "stiction" else Implicit()
+        (times, rows), expected = (method.history(scene, 100, len(HISTORY)) for method in (Auto(), direct))
         np.testing.assert_array_equal(times, expected[0])
         np.testing.assert_array_equal(rows, expected[1])
 
 
 class TestCertificate:
-    """A cell is certified where two resolutions agree in kind; where they do not, it is tried again, tighter."""
+    """A cell is certified if two resolutions agree on the regime; if not, it is run again at tighter tolerances."""
 
-    def test_is_no_false_witness(self, figure, cells):
-        """Fig. 29: steps of 2 ms and of 0.1 ms agree with their halves, and with each other, on the wrong regime."""
+    def test_wrong_runs_of_rk4_that_agree_have_no_certificate(self, figure, cells):
+        """Fig. 29: steps of 2 ms, 1 ms, 0.1 ms and 0.05 ms agree on the wrong regime."""
         drive, changes, _ = figure(29)
         scene = cells(changes, drive=drive)
         for steps in (5000, 100_000):
@@ -76,14 +75,14 @@ class TestCertificate:
     @pytest.fixture
     def calls(self, monkeypatch):
         """Tolerance and number of cells of every integration."""
-        seen = []
+        recorded = []
 
         def spy(batch, tolerances, *rest, integrate=event.integrate):
-            seen.append((tolerances[0], len(batch.span)))
+            recorded.append((tolerances[0], len(batch.span)))
             return integrate(batch, tolerances, *rest)
 
         monkeypatch.setattr(event, "integrate", spy)
-        return seen
+        return recorded
 
     @pytest.fixture
     def launches(self, cells):
@@ -93,42 +92,42 @@ class TestCertificate:
             drive="arctan",
         )
 
-    def test_is_given_at_once_where_both_tolerances_agree(self, calls, launches):
+    def test_certificate_needs_two_runs_where_both_tolerances_agree(self, calls, launches):
         found = solve(Event(), launches)
         assert found.certified.all()
         assert calls[:2] == [(1e-10, 200), (pytest.approx(3e-9), 200)]
-        # But for a few whose steps no tolerance has shortened, so that both runs are one.
+        # A few cells are run again, because both runs took the same steps.
         assert sum(cells for _, cells in calls[2:]) < 20
 
-    def test_is_sought_at_tighter_tolerances_where_they_do_not(self, calls, launches):
-        """From a tolerance so loose that runs differ in kind, the doubtful ones come out right."""
+    def test_cells_whose_tolerances_disagree_are_run_again_at_tighter_tolerances(self, calls, launches):
+        """At a very loose tolerance some regimes differ; the cells that are certified later have the right regime."""
         loose = Event(rtol=1.0)
-        first, witness = (solve(Event(rtol=rtol, certify=False), launches) for rtol in (1.0, 30.0))
-        doubtful = (kinds(first) != kinds(witness)).any(axis=0)
+        first, second = (solve(Event(rtol=rtol, certify=False), launches) for rtol in (1.0, 30.0))
+        disagree = (kinds(first) != kinds(second)).any(axis=0)
         calls.clear()
         found = solve(loose, launches)
-        assert 0 < doubtful.sum() < 200
-        # Those besides that break their law, or hang by less than their error.
+        assert 0 < disagree.sum() < 200
+        # Cells that violate their law, or whose error could change the regime, are run again too.
         assert [cells for _, cells in calls[:2]] == [200, 200]
-        assert doubtful.sum() <= calls[2][1] < 200
+        assert disagree.sum() <= calls[2][1] < 200
         tolerances = [tolerance for tolerance, _ in calls]
         assert tolerances == pytest.approx([1.0, 30.0, *(30.0**-k for k in range(1, len(calls) - 1))])
         right = kinds(solve(Event(), launches))
-        retried = doubtful & found.certified
-        assert retried.any()
-        np.testing.assert_array_equal(kinds(found)[:, retried], right[:, retried])
-        assert (found.steps[doubtful] > first.steps[doubtful] + witness.steps[doubtful]).all()
+        certified_later = disagree & found.certified
+        assert certified_later.any()
+        np.testing.assert_array_equal(kinds(found)[:, certified_later], right[:, certified_later])
+        assert (found.steps[disagree] > first.steps[disagree] + second.steps[disagree]).all()
 
-    def test_is_withheld_after_so_many_tries(self, monkeypatch, calls, launches):
-        monkeypatch.setattr(event, "vouched", lambda batch, rows, *_: np.zeros(len(rows), dtype=bool))
+    def test_cells_without_certificate_are_run_again_a_limited_number_of_times(self, monkeypatch, calls, launches):
+        monkeypatch.setattr(event, "certifiable", lambda batch, rows, *_: np.zeros(len(rows), dtype=bool))
         assert not solve(Event(), launches).certified.any()
         assert 3 <= len(calls) <= 6
 
-    def test_is_given_only_where_it_was_sought(self, calls, launches):
+    def test_no_certificate_is_given_with_certify_false(self, calls, launches):
         assert not solve(Auto(certify=False), launches).certified.any()
         assert len(calls) == 1
 
-    def test_is_withheld_from_a_run_that_reached_the_limit_of_work(self, scenes, law):
+    def test_run_that_reaches_max_steps_is_failed_without_certificate(self, scenes, law):
         method = Event(max_steps=10) if law == "stiction" else Implicit(max_steps=10)
         found = solve(method, scenes({"drive.amplitude": np.array([2.0, 5.0])}))
         np.testing.assert_array_equal(found.regime, FAILED)
@@ -138,15 +137,14 @@ class TestCertificate:
     @pytest.mark.parametrize(
         "path", ["initial.omega", "initial.phi", "drive.amplitude", "zone.half_angle", "body.mass", "time.span"]
     )
-    def test_is_withheld_from_what_is_not_a_number(self, scenes, law, path):
+    def test_run_with_a_nan_parameter_is_failed_without_certificate(self, scenes, law, path):
         method = Event(max_steps=2000) if law == "stiction" else Implicit(max_steps=2000)
         good = {"drive.amplitude": 2.0, **{path: np.array([np.nan, 1.0])}}
         found = solve(method, scenes(good))
         np.testing.assert_array_equal(found.regime == FAILED, [True, False])
         np.testing.assert_array_equal(found.certified, [False, True])
 
-    def test_failing_is_quick(self, scenes, law):
-        """What is no number is seen at once, not after all the work that is allowed."""
+    def test_run_with_a_launch_that_is_not_finite_fails_after_few_steps(self, scenes, law):
         method = Event(max_steps=5000) if law == "stiction" else Implicit(max_steps=5000)
         found = solve(method, scenes({"initial.omega": np.array([np.nan, np.inf, 1e200, 1e20])}))
         np.testing.assert_array_equal(found.regime, FAILED)
@@ -154,7 +152,7 @@ class TestCertificate:
 
 
 class TestSurface:
-    """Zones at the ends of their range."""
+    """Arcs at the ends of their ranges."""
 
     AMPLITUDES = np.array([0.2, 2.0, 5.0, -5.0])
 
@@ -163,8 +161,8 @@ class TestSurface:
         np.testing.assert_allclose(one.phi_end, other.phi_end, atol=1e-7)
         np.testing.assert_allclose(one.stick_time, other.stick_time, atol=1e-7)
 
-    def test_no_arc_all_arc_and_an_arc_like_the_rest_are_one(self, scenes):
-        own, other = (0.2, 0.1), (0.9, 0.8)
+    def test_uniform_surface_gives_the_same_run_without_arc_with_a_full_arc_and_with_an_equal_arc(self, scenes):
+        direct, other = (0.2, 0.1), (0.9, 0.8)
         found = [
             solve(
                 Auto(),
@@ -173,13 +171,13 @@ class TestSurface:
                     | {"zone.half_angle": half_angle, "drive.amplitude": self.AMPLITUDES}
                 ),
             )
-            for half_angle, rough, rest in ((0.0, other, own), (pi, own, other), (1.0, own, own))
+            for half_angle, rough, rest in ((0.0, other, direct), (pi, direct, other), (1.0, direct, direct))
         ]
         assert {RESTING, OSCILLATORY} <= set(found[0].regime)
         for one in found[1:]:
             self.agree(one, found[0])
 
-    def test_where_arcs_overlap_the_later_holds(self, scenes):
+    def test_later_arc_holds_where_arcs_overlap(self, scenes):
         def arcs(*given):
             names = ("center", "half_angle", "mu_s", "mu_k")
             changes = {
@@ -198,15 +196,15 @@ class TestSurface:
 
     @pytest.mark.parametrize("contact", [-1, 1])
     @pytest.mark.parametrize("end", [-1, 1])
-    def test_an_edge_exactly_under_a_contact_belongs_to_one_side_of_it(self, scenes, contact, end):
-        """Whichever way the body goes, it goes as it would with the edge a little to one side or to the other."""
+    def test_contact_exactly_on_an_edge_behaves_as_on_one_of_its_sides(self, scenes, contact, end):
+        """The run equals one of the runs with the edge shifted by 1e-9 rad to either side."""
         center = contact * BETA + end * RIG["zone.half_angle"]
-        ways = {"drive.amplitude": np.array([2.0, -2.0, 0.0, 0.0, 0.0]), "time.span": 0.6}
+        drives = {"drive.amplitude": np.array([2.0, -2.0, 0.0, 0.0, 0.0]), "time.span": 0.6}
         launch = {"initial.omega": np.array([0.0, 0.0, 10.0, -10.0, 0.0])}
         below, on, above = (
-            solve(Auto(), scenes(ways | launch | {"zone.center": center + shift})) for shift in (-1e-9, 0.0, 1e-9)
+            solve(Auto(), scenes(drives | launch | {"zone.center": center + shift})) for shift in (-1e-9, 0.0, 1e-9)
         )
-        # Which side of the edge holds a body at rest is rounding, and has no certificate.
+        # Rounding decides which side of an edge holds a body at rest, so that such a run has no certificate.
         assert on.certified[2:4].all()
         for i in range(5):
             assert min(abs(on.phi_end[i] - side.phi_end[i]) for side in (below, above)) < 1e-7
@@ -215,8 +213,8 @@ class TestSurface:
 
 class TestBody:
     @pytest.mark.parametrize("half_distance", [1e-4, 1e-2, 0.0333, 0.033377])
-    def test_contacts_close_together_and_opposite_each_other(self, cells, half_distance):
-        """From beta = 0.2 deg to 89.6 deg, against closed forms."""
+    def test_bodies_with_extreme_distance_of_contacts_agree_with_closed_forms(self, cells, half_distance):
+        """The angle beta goes from 0.2 deg to 89.6 deg."""
         omega = np.array([0.5, 5.0, -5.0, 30.0, 80.0])
         changes = {"body.half_distance": half_distance, "initial.omega": omega, "time.span": 50.0}
         scene = cells(changes | {"drive.amplitude": 0.0, "zone.center": 0.5}, law="stiction", drive="arctan")
@@ -227,8 +225,8 @@ class TestBody:
             assert found.separating_contact[i] == contact
             assert found.phi_end[i] == pytest.approx(phi, abs=1e-9)
 
-    def test_without_friction_it_is_a_pendulum(self, scenes, law):
-        """Amplitude and period by energy and by the complete elliptic integral, however the ring turns."""
+    def test_body_without_friction_is_a_pendulum(self, scenes, law):
+        """Energy and the complete elliptic integral give amplitude and period, for any motion of the ring."""
         omega = np.array([0.5, 5.0, -8.0, 100.0])
         scene = scenes(
             dict.fromkeys(COEFFICIENTS, 0.0) | {"initial.omega": omega, "drive.amplitude": 2.0, "time.span": 10.0}
@@ -248,8 +246,8 @@ class TestBody:
             assert found.reversals[i] == int(10.0 / period * 2 + 0.5)
         assert found.certified.all()
 
-    def test_friction_up_to_two(self, scenes):
-        """None of it fails; where it is far from jamming both kinds of law have the same regimes."""
+    def test_friction_coefficients_up_to_two_do_not_fail(self, scenes):
+        """No run fails. Far from jamming both laws have the same regimes."""
         mu = np.linspace(0.0, 2.0, 21)
         found = solve(
             Auto(),
@@ -263,8 +261,8 @@ class TestBody:
         np.testing.assert_array_equal(found.regime[:4], OSCILLATORY)
         np.testing.assert_array_equal(found.regime[6:14], SEPARATING)
 
-    def test_launched_at_ten_thousand_radians_a_second(self, scenes, law):
-        """It slips through seven turns and more until a contact lifts; how friction begins does not matter."""
+    def test_launch_at_ten_thousand_radians_per_second_agrees_with_closed_forms(self, scenes, law):
+        """The body slips for more than three turns until a contact separates, so that stiction does not matter."""
         omega = np.array([1e4, -1e4])
         scene = scenes({"initial.omega": omega, "drive.amplitude": 0.0})
         method = Event(rtol=1e-12) if law == "stiction" else Implicit(rtol=1e-9)
@@ -277,8 +275,8 @@ class TestBody:
             assert found.phi_end[i] == pytest.approx(phi, abs=1e-8)
             assert found.motion[i] == REVOLVING
 
-    def test_launched_exactly_at_the_speed_of_the_ring(self, scenes):
-        """As a little faster and as a little slower: a power law of exponent 1 turns at once."""
+    def test_launch_exactly_at_the_velocity_of_the_ring_agrees_with_launches_nearby(self, scenes):
+        """The neighbours are slower and faster by 1e-9. A power law with exponent 1 moves at once."""
         rate = np.array([5.0, -5.0])
         slow, same, fast = (
             solve(
@@ -297,7 +295,7 @@ class TestBody:
 
 
 class TestTime:
-    def test_a_microsecond(self, scenes):
+    def test_span_of_a_microsecond_is_computed(self, scenes):
         found = solve(
             Auto(), scenes({"initial.omega": np.array([0.0, 5.0, -5.0]), "drive.amplitude": 2.0, "time.span": 1e-6})
         )
@@ -306,8 +304,8 @@ class TestTime:
         np.testing.assert_array_equal(found.regime, RESTING)
         np.testing.assert_allclose(found.stick_time, [1e-6, 0.0, 0.0], rtol=1e-12)
 
-    def test_three_hours(self, scenes):
-        """The ring turns steadily by then, and each time it carries the body up again."""
+    def test_span_of_three_hours_is_computed_and_certified(self, scenes):
+        """The ring soon turns steadily, and carries the body up again and again."""
         found = solve(Auto(), scenes({"drive.amplitude": 0.02, "time.span": 1e4}))
         assert found.t_end == 1e4
         assert found.regime == OSCILLATORY
@@ -315,8 +313,8 @@ class TestTime:
         assert 500 < found.reversals < 2000
         assert 0.9e4 < found.stick_time < 1e4
 
-    def test_a_drive_whose_acceleration_is_infinite_at_the_start(self, scenes):
-        """Neither reversed nor resolved more finely does it come out otherwise."""
+    def test_drive_with_infinite_initial_acceleration_is_symmetric_and_converged(self, scenes):
+        """The run with the opposite drive is its mirror image, and a tighter tolerance gives the same run."""
         amplitude = np.array([1e-3, 1.0, 20.0, -20.0, -1.0, 0.0])
         scene = scenes({"drive.amplitude": amplitude, "drive.exponent": 1.1, "time.span": 1.0}, drive="power")
         found = solve(Auto(), scene)
@@ -327,8 +325,8 @@ class TestTime:
         np.testing.assert_allclose(found.phi_end[[2, 1]], -found.phi_end[[3, 4]], atol=1e-7)
         assert found.phi_end[5] == 0.0
 
-    def test_a_ring_that_rocks_and_is_let_go_thousands_of_times(self, cells):
-        """Two reversals in each period, a stick in every half of it, no drift in between."""
+    def test_oscillating_drive_gives_two_reversals_in_each_of_thousands_of_periods(self, cells):
+        """Reversals and the share of stick are the same in a short and in a long run."""
         changes = {"drive.amplitude": 0.2, "drive.frequency": 4.5, "zone.half_angle": 0.0}
         spans = np.array([10.0, 1000.0])
         found = solve(Auto(), cells(changes | {"time.span": spans}, law="stiction", drive="sinusoidal"))
@@ -339,8 +337,8 @@ class TestTime:
         assert share[0] == pytest.approx(share[1], rel=0.05)
         assert found.certified.all()
 
-    def test_a_measured_ring_without_arcs(self, cells):
-        """A spline through samples of a drive is that drive, to the spline's own error; no arc is one of no width."""
+    def test_drive_from_a_table_agrees_with_the_drive_that_it_samples(self, cells):
+        """They agree to the error of the spline. The scene without arcs equals the one with an arc of zero width."""
         t, amplitude = np.linspace(0.0, 3.0, 1201), np.array([0.2, 2.0, 5.0, -5.0])
         table = t, t * np.arctan(t) - 0.5 * np.log1p(t * t)
         structure = Structure("ring", "stiction", "table", (), table)

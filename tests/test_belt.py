@@ -1,4 +1,4 @@
-"""The mass on a spring on a belt against what is known of it in closed form."""
+"""The mass on a spring on a belt, against closed forms and known limits."""
 
 from math import acos, atan, cos, pi, sin, sqrt
 from pathlib import Path
@@ -17,7 +17,7 @@ G = 9.81
 
 
 def belt(law="stiction", *, m=1.0, k=2.0, v_b=0.1, mu_s=0.15, mu_k=0.1, span=60.0, start=None, **of_law):
-    """Scene of the paper's belt, by default launched at the speed of the belt."""
+    """Scene of the belt in the paper, launched at the velocity of the belt unless `start` is given."""
     friction = {"law": law, "mu_s": mu_s, "mu_k": mu_k, **of_law}
     if law in ("coulomb", "threlfall", "dahl", "bristle"):
         del friction["mu_s"]
@@ -45,7 +45,7 @@ class TestStickSlipCycle:
         ("m", "k", "v_b", "mu_s", "mu_k"),
         [(1, 2, 0.1, 0.15, 0.1), (0.3, 50, 0.02, 0.6, 0.25), (12, 900, 0.5, 0.3, 0.29), (1e-6, 1e-3, 0.01, 0.4, 0.1)],
     )
-    def test_is_that_of_theory(self, m, k, v_b, mu_s, mu_k):
+    def test_stick_slip_cycle_agrees_with_theory(self, m, k, v_b, mu_s, mu_k):
         omega, drop = sqrt(k / m), (mu_s - mu_k) * m * G
         stick, slip = 2 * drop / (k * v_b), 2 / omega * (pi - atan(drop * omega / (k * v_b)))
         first = mu_s * m * G / (k * v_b)
@@ -62,19 +62,19 @@ class TestStickSlipCycle:
             mu_k * m * G / k + sqrt((drop / k) ** 2 + (v_b / omega) ** 2), rel=1e-10
         )
 
-    def test_of_the_paper_in_numbers(self):
+    def test_stick_slip_cycle_of_the_paper_has_its_known_period(self):
         found = outcome(belt(span=100))
         assert float(found.first_slip) == pytest.approx(7.3575, rel=1e-10)
         assert float(found.period) == pytest.approx(7.523422, abs=5e-7)
 
-    def test_sticks_again_where_theory_says(self):
+    def test_body_sticks_again_at_the_place_of_theory(self):
         run = ringsweep.simulate(belt(span=12.0))
         end_of_slip = np.flatnonzero(np.diff(run["mode"].values) == 1)[0]
         assert float(run.x[end_of_slip]) == pytest.approx(0.24525, abs=1e-10)
-        # The greatest velocity against the belt; a history has it to its spacing.
+        # Largest sliding speed; the history is sampled, so that the tolerance is larger.
         assert float(0.1 - run.velocity.min()) == pytest.approx(0.460964, abs=1e-5)
 
-    def test_from_rest_slides_first(self):
+    def test_body_launched_at_rest_slides_before_it_sticks(self):
         """From rest on a moving belt the body slips until it has the belt's speed, then sticks."""
         omega, mu = sqrt(2.0), 0.981 / 2
         t = atan(0.1 / omega / mu / sqrt(1 - (0.1 / omega / mu) ** 2)) / omega
@@ -85,25 +85,25 @@ class TestStickSlipCycle:
 
 
 class TestCoulomb:
-    def test_is_an_undamped_harmonic(self):
+    def test_coulomb_friction_gives_an_undamped_harmonic_oscillation(self):
         found = outcome(belt("coulomb", span=40.0))
         assert REGIMES[int(found.regime)] == "oscillatory"
         assert float(found.period) == pytest.approx(2 * pi / sqrt(2.0), rel=1e-10)
         assert float(found.x_max) == pytest.approx(0.4905 + 0.1 / sqrt(2.0), rel=1e-10)
 
-    def test_oscillation_on_a_belt_at_rest_decays_by_a_fixed_step_and_rests(self):
-        """The amplitude falls by 4F/k a cycle; at 3 F_c/k and a half it comes to rest."""
+    def test_oscillation_on_a_belt_at_rest_decays_by_a_constant_amount_and_ends_at_rest(self):
+        """The amplitude falls by 4 F_c/k in each cycle."""
         scene = belt("coulomb", v_b=0.0, k=1.0, mu_k=0.4 / G, span=30.0) | {"initial": {"x": 3.0, "velocity": 0.0}}
         run, found = ringsweep.simulate(scene), outcome(scene)
-        turning = run.x.values[np.flatnonzero(np.abs(run.velocity.values) < 1e-12)]
+        turning_points = run.x.values[np.flatnonzero(np.abs(run.velocity.values) < 1e-12)]
         for expected in (3.0, -2.2, 1.4, -0.6):
-            assert np.abs(turning - expected).min() < 1e-10
+            assert np.abs(turning_points - expected).min() < 1e-10
         assert float(found.x_end) == pytest.approx(-0.2, abs=1e-10)
         assert float(found.velocity_end) == 0.0
 
 
 class TestLaunch:
-    def test_is_at_rest_on_the_belt_unless_told_otherwise(self):
+    def test_launch_without_initial_values_is_at_rest_on_the_belt(self):
         scene = belt(span=10.0)
         del scene["initial"]
         assert float(outcome(scene).first_slip) == pytest.approx(7.3575, rel=1e-12)
@@ -115,13 +115,13 @@ class TestLaunch:
 class TestViscous:
     """Under stiction and viscous friction c, slip is a damped oscillation about (F_c + c v_b)/k."""
 
-    def test_steady_sliding_is_where_the_forces_balance(self):
+    def test_steady_sliding_is_at_the_place_where_forces_balance(self):
         found = outcome(belt("coulomb", viscous=0.5, span=200.0))
         assert REGIMES[int(found.regime)] == "resting"
         assert float(found.x_end) == pytest.approx((0.981 + 0.5 * 0.1) / 2, rel=1e-10)
 
-    def test_stick_slip_ends_at_the_speed_of_theory(self):
-        """It goes on while the damped swing after breakaway catches up with the belt again."""
+    def test_stick_slip_ends_at_the_belt_velocity_of_theory(self):
+        """Stick-slip lasts while the body reaches the velocity of the belt again after breakaway."""
         m, k, c, mu_k = 1.0, 2.0, 0.2, 0.1
         speeds, mu_s = np.geomspace(0.02, 2.0, 15), np.linspace(0.11, 0.2, 12)
         maps = ringsweep.sweep(
@@ -144,7 +144,7 @@ class TestViscous:
         assert clear.mean() > 0.99
         np.testing.assert_array_equal(sticks[clear], (ratio > 1)[clear])
         assert 0.3 < sticks.mean() < 0.7
-        # For light damping the critical speed is (F_s - F_c)/sqrt(4 pi zeta k m).
+        # For light damping the critical velocity is (F_s - F_c)/sqrt(4 pi zeta k m).
         zeta = decay / sqrt(k / m)
         critical = (mu_s - mu_k) * m * G / sqrt(4 * pi * zeta * k * m)
         last = np.array([speeds[column].max(initial=0.0) for column in sticks.T])
@@ -153,10 +153,10 @@ class TestViscous:
 
 
 class TestKarnopp:
-    """Within the dead band D_v the body keeps the speed at which it came in: the cycle is that of a slower belt."""
+    """Within the dead band D_v the body keeps its sliding velocity, as on a belt that is slower by D_v."""
 
     @pytest.mark.parametrize("dead_band", [1e-6, 1e-3, 0.02])
-    def test_cycle_is_that_of_a_belt_slower_by_the_dead_band(self, dead_band):
+    def test_karnopp_cycle_equals_the_cycle_on_a_belt_slower_by_the_dead_band(self, dead_band):
         found = outcome(belt("karnopp", dead_band=dead_band, span=100.0, start=0.1 - dead_band))
         v, drop, omega = 0.1 - dead_band, 0.05 * G, sqrt(2.0)
         expected = drop / v + 2 / omega * (pi - atan(drop * omega / (2 * v)))
@@ -164,7 +164,7 @@ class TestKarnopp:
         assert float(found.period) == pytest.approx(expected, rel=1e-10)
 
     @pytest.mark.parametrize("dead_band", [1e-6, 1e-3, 0.02])
-    def test_first_slip_comes_when_the_yielding_body_has_left_the_band(self, dead_band):
+    def test_first_slip_begins_when_the_body_leaves_the_dead_band(self, dead_band):
         found = outcome(belt("karnopp", dead_band=dead_band, span=20.0))
         assert float(found.first_slip) == pytest.approx(7.3575 + acos(1 - dead_band / 0.1) / sqrt(2.0), rel=1e-10)
 
@@ -173,7 +173,10 @@ TIGHT = {"method": "implicit", "rtol": 1e-9, "certify": False}
 
 
 def exponent(law, of, values, limit, quantity, **fixed):
-    """Power of its parameters, `values` times the factors `of` each, with which a law's distance to a `limit` falls."""
+    """Powers of `values` with which the difference between a law and its `limit` falls.
+
+    `of` has a factor for each parameter of the law: the parameter is the factor times each of `values`.
+    """
     axes = {f"friction.{name}": xr.DataArray(factor * np.array(values), dims="cell") for name, factor in of.items()}
     found = ringsweep.sweep(belt(law, **fixed), axes, solver=TIGHT)[quantity].values
     errors = np.abs(found - float(outcome(belt(limit))[quantity]))
@@ -182,51 +185,51 @@ def exponent(law, of, values, limit, quantity, **fixed):
 
 
 class TestLimits:
-    """Every regularised law tends to the law that it regularises as theory says."""
+    """Every regularised law tends to its limit with the power that theory gives."""
 
-    def test_threlfall_to_coulomb_as_the_width_of_the_band(self):
+    def test_threlfall_tends_to_coulomb_with_the_width_of_the_band(self):
         slopes = exponent("threlfall", {"v0": 1}, [1e-3, 1e-4, 1e-5], "coulomb", "x_max")
         np.testing.assert_allclose(slopes, 1.0, atol=0.01)
 
-    def test_straight_lines_to_stiction_as_the_width_of_the_band(self):
-        """At the corner of the law the body is let go at once: what is left is the creep before."""
+    def test_piecewise_linear_tends_to_stiction_with_the_width_of_the_band(self):
+        """The body breaks away at once at the corner of the law, so that only the creep before delays the slip."""
         slopes = exponent("piecewise-linear", {"v0": 1, "v1": 2}, [1e-4, 1e-5, 1e-6], "stiction", "first_slip")
         np.testing.assert_allclose(slopes, 1.0, atol=0.01)
 
-    def test_cubics_to_stiction_as_the_passage_of_a_fold(self):
-        """Where the law is flat at its top, the way over it takes two thirds of a power."""
+    def test_piecewise_cubic_tends_to_stiction_with_the_power_two_thirds_of_the_width(self):
+        """The law is flat at its top: the passage over such a fold takes a time proportional to the power 2/3."""
         slopes = exponent("piecewise-cubic", {"v0": 1, "v1": 2}, [1e-4, 1e-5, 1e-6], "stiction", "x_max")
         np.testing.assert_allclose(slopes, 2 / 3, atol=0.02)
 
-    def test_karnopp_to_stiction_as_the_root_of_the_dead_band(self):
+    def test_karnopp_tends_to_stiction_with_the_root_of_the_dead_band(self):
         widths = [1e-4, 1e-5, 1e-6]
         found = [float(outcome(belt("karnopp", dead_band=width)).x_max) for width in widths]
         errors = np.abs(np.array(found) - float(outcome(belt()).x_max))
         np.testing.assert_allclose(np.diff(np.log(errors)) / np.diff(np.log(widths)), 0.5, atol=0.01)
 
-    def test_dahl_to_coulomb_as_two_thirds_of_the_compliance(self):
+    def test_dahl_tends_to_coulomb_with_the_power_two_thirds_of_the_compliance(self):
         slopes = exponent("dahl", {"sigma0": 1}, [1e4, 1e5, 1e6], "coulomb", "x_max")
         np.testing.assert_allclose(slopes, -2 / 3, atol=0.01)
 
-    def test_the_reset_integrator_to_stiction_as_the_compliance(self):
+    def test_reset_integrator_tends_to_stiction_with_the_compliance(self):
         slopes = exponent("reset-integrator", {"sigma0": 1}, [1e4, 1e5, 1e6], "stiction", "period", sigma1=300.0)
         np.testing.assert_allclose(slopes, -1.0, atol=0.01)
 
-    def test_lugre_to_stiction_as_its_stribeck_velocity_once_bristles_are_stiff(self):
-        """The top of Stribeck's curve is another fold."""
+    def test_lugre_with_stiff_bristles_tends_to_stiction_with_the_power_two_thirds_of_v_s(self):
+        """The top of the Stribeck curve is a fold too."""
         fixed = {"sigma0": 1e9, "sigma1": 300.0}
         slopes = exponent("lugre", {"v_s": 1}, [3e-3, 1e-3, 3e-4], "stiction", "x_max", **fixed)
         np.testing.assert_allclose(slopes, 2 / 3, atol=0.04)
 
-    def test_bengisu_akay_to_tustin_as_the_width_of_the_band(self):
-        """Linearly: the creep of stick is as fast as the band is wide."""
+    def test_bengisu_akay_tends_to_tustin_with_the_width_of_the_band(self):
+        """The velocity of creep in stick is proportional to the width of the band."""
         limit = float(outcome(belt("tustin", alpha=1e3)).period)
         widths = np.array([1e-4, 1e-5, 1e-6])
         errors = [abs(float(outcome(belt("bengisu-akay", alpha=1e3, v0=v0)).period) - limit) for v0 in widths]
         slopes = np.diff(np.log(errors)) / np.diff(np.log(widths))
         np.testing.assert_allclose(slopes, 1.0, atol=0.35)
 
-    def test_a_steeper_tail_tends_to_stiction(self):
+    def test_tustin_tends_to_stiction_as_its_tail_steepens(self):
         limit = float(outcome(belt("stiction")).period)
         errors = [abs(float(outcome(belt("tustin", alpha=alpha)).period) - limit) for alpha in (1e4, 1e5, 1e6)]
         assert np.log(errors[0] / errors[1]) / np.log(10) == pytest.approx(1.0, abs=0.2)
@@ -243,23 +246,23 @@ MILD = {
 
 
 class TestTwoMethods:
-    """Where a constant step can follow, it finds the same run; the order of its error is that of its events."""
+    """Methods agree where a constant step resolves the law; events set the order of its error."""
 
     @pytest.mark.parametrize(("law", "error"), [("lugre", 1e-4), ("piecewise-cubic", 1e-7), ("karnopp", 0.1)])
-    def test_agree(self, law, error):
+    def test_auto_and_rk4_agree(self, law, error):
         scene = belt(law, span=20.0, start=0.0, **MILD[law])
-        own = outcome(scene)
+        found = outcome(scene)
         fixed = outcome(scene, method="rk4", steps=100_000)
         assert fixed.stiffness < STABILITY_LIMIT
-        assert own.regime == fixed.regime
-        assert own.certified == fixed.certified == 1
+        assert found.regime == fixed.regime
+        assert found.certified == fixed.certified == 1
         for name in ("x_end", "x_max", "velocity_end"):
-            assert float(own[name]) == pytest.approx(float(fixed[name]), abs=error)
-        # A constant step knows to a step when a slip begins.
-        assert float(own.period) == pytest.approx(float(fixed.period), abs=max(error, 2e-4))
+            assert float(found[name]) == pytest.approx(float(fixed[name]), abs=error)
+        # A constant step gives the beginning of a slip only to the length of a step.
+        assert float(found.period) == pytest.approx(float(fixed.period), abs=max(error, 2e-4))
 
-    def test_error_falls_with_the_tolerance(self):
-        """Also where the body is caught, and Stribeck's curve rises within a thousandth of the step before."""
+    def test_error_of_lugre_falls_with_the_tolerance(self):
+        """This holds also where the body begins to stick, and the Stribeck curve rises within 1/1000 of a step."""
         scene = belt("lugre", sigma0=1e5, sigma1=sqrt(1e5), sigma2=0.1, v_s=0.001)
         speeds = np.geomspace(0.05, 0.5, 8)
 
@@ -271,21 +274,21 @@ class TestTwoMethods:
         for rtol in (1e-5, 1e-6, 1e-7):
             assert (abs(periods(rtol) - exact) < 20 * rtol * exact).all()
 
-    def test_a_step_too_long_for_bristles_is_flagged(self):
-        """LuGre at 2e-4 s: a wrong trajectory without a NaN."""
+    def test_rk4_step_too_long_for_bristles_has_no_certificate(self):
+        """LuGre with steps of 5e-4 s: the trajectory is wrong, but finite."""
         scene = belt("lugre", span=20.0, sigma0=1e5, sigma1=sqrt(1e5), sigma2=0.1, v_s=0.001)
-        fixed, own = outcome(scene, method="rk4", steps=40_000), outcome(scene)
+        fixed, found = outcome(scene, method="rk4", steps=40_000), outcome(scene)
         assert fixed.stiffness > STABILITY_LIMIT
         assert fixed.certified == 0
-        assert own.certified == 1
+        assert found.certified == 1
 
-    def test_bonds_that_snap_are_no_matter_for_a_constant_step(self):
+    def test_rk4_refuses_the_law_whose_bonds_snap(self):
         with pytest.raises(ringsweep.InputError, match="rk4 does not take friction law bristle"):
             outcome(belt("bristle", sigma0=1e3), method="rk4", steps=1000)
 
 
 class TestPaper:
-    """The paper's Figs. 9-12: what it says of its four laws, in numbers."""
+    """Statements of the paper about Figs. 9-12 and their four laws."""
 
     @pytest.fixture(scope="class")
     @staticmethod
@@ -293,25 +296,25 @@ class TestPaper:
         found = ringsweep.simulate(CONFIGS / "paper" / "fig09-12.yaml")
         return found.interp(time=np.linspace(0.0, 20.0, 20_001))
 
-    def test_in_motion_coulomb_is_like_dahl_and_stiction_like_lugre(self, runs):
-        def apart(one, other):
+    def test_motion_under_coulomb_is_near_dahl_and_under_stiction_near_lugre(self, runs):
+        def distance(one, other):
             return float(np.sqrt(((runs.x.sel(friction_law=one) - runs.x.sel(friction_law=other)) ** 2).mean()))
 
-        assert apart("coulomb", "dahl") < 0.01 * apart("coulomb", "stiction")
-        assert apart("stiction", "lugre") < 0.5 * min(apart("coulomb", "stiction"), apart("coulomb", "lugre"))
+        assert distance("coulomb", "dahl") < 0.01 * distance("coulomb", "stiction")
+        assert distance("stiction", "lugre") < 0.5 * min(distance("coulomb", "stiction"), distance("coulomb", "lugre"))
         assert [REGIMES[int(regime)] for regime in runs.regime] == ["oscillatory", "stick-slip"] * 2
 
-    def test_forces_differ_most_just_after_the_start(self, runs):
+    def test_forces_of_the_four_laws_differ_most_just_after_the_start(self, runs):
         spread = runs.friction_force.max("friction_law") - runs.friction_force.min("friction_law")
         assert float(spread.idxmax()) < 0.001
-        # Bristles at rest under a sliding body: sigma1 v.
+        # The bristles are not deflected yet: their force is (sigma1 + sigma2) v.
         assert float(spread.max()) == pytest.approx(0.1 * 316.2278 + 0.1 * 0.1, rel=1e-3)
         assert float(spread.sel(time=slice(0.2, None)).max()) < 1.0
 
 
 class TestSteadySliding:
-    def test_under_lugre_is_lost_where_linear_theory_says(self):
-        """Eigenvalues of the three equations linearised about it; away from them the sweep agrees cell by cell."""
+    def test_steady_sliding_under_lugre_is_unstable_where_linear_theory_says(self):
+        """Eigenvalues of the linearised equations decide stability; cells with growth near zero are left out."""
         sigma_1, sigma_2, v_s, k = 2.0, 0.2, 0.1, 2.0
         stiffness, speeds = np.geomspace(15, 1e5, 9), np.geomspace(0.02, 1.0, 14)
         drop = 0.5 * 0.981 * np.exp(-((speeds / v_s) ** 2))
@@ -337,10 +340,10 @@ class TestSteadySliding:
         clear = abs(growth) > 0.02
         assert clear.mean() > 0.8
         assert not steady[clear & (growth > 0)].any()
-        # On soft bristles a large swing goes on beside steady sliding, and a contact just made is kick enough for it.
+        # On soft bristles a large oscillation coexists with stable steady sliding, and the launch may start it.
         stiff = (stiffness >= 100.0)[:, np.newaxis]
         assert steady[clear & (growth < 0) & stiff].all()
-        # They also steady it at low speeds.
+        # Soft bristles also stabilise steady sliding at low velocities.
         assert steady[0, 0]
         assert not steady[1:, 0].any()
         assert 0.2 < steady.mean() < 0.8
@@ -370,7 +373,7 @@ class TestExtremes:
     ]
 
     @pytest.mark.parametrize("law", SMALL)
-    def test_give_numbers_or_say_that_they_have_none(self, law):
+    def test_extreme_parameters_give_finite_outcomes(self, law):
         scene = belt(law, span=20.0, start=0.0, **self.SMALL[law])
         usual = {
             "belt.velocity": 0.1,
@@ -392,34 +395,34 @@ class TestExtremes:
         assert abs(float(at_rest.x_end)) < 1e-9
 
     @pytest.mark.parametrize("law", ["coulomb", "stiction"])
-    def test_without_friction_the_spring_swings_the_body(self, law):
+    def test_body_without_friction_oscillates_with_the_period_of_the_spring(self, law):
         found = outcome(belt(law, mu_s=0.0, mu_k=0.0, span=60.0))
         assert REGIMES[int(found.regime)] == "oscillatory"
         assert float(found.period) == pytest.approx(2 * pi / sqrt(2.0), rel=1e-10)
 
-    def test_the_force_of_stiff_bristles_is_that_of_friction(self):
+    def test_largest_force_of_stiff_bristles_is_the_breakaway_force(self):
         for sigma_0 in (1e7, 1e9):
             of_law = {"sigma0": sigma_0, "sigma1": sqrt(sigma_0), "sigma2": 0.1, "v_s": 1e-3}
             assert float(outcome(belt("lugre", span=20.0, **of_law)).force_max) == pytest.approx(1.4715, rel=2e-2)
 
-    def test_the_limit_of_work_is_flagged(self):
+    def test_run_that_reaches_max_steps_is_failed_without_certificate(self):
         found = outcome(belt("lugre", **self.SMALL["lugre"]), method="implicit", max_steps=50)
         assert REGIMES[int(found.regime)] == "failed"
         assert found.certified == 0
 
-    def test_without_spring_the_body_ends_at_the_speed_of_the_belt(self):
+    def test_body_without_spring_ends_at_the_velocity_of_the_belt(self):
         found = outcome(belt(k=0.0, start=0.0))
         assert float(found.velocity_end) == pytest.approx(0.1, rel=1e-12)
         assert float(found.x_end) == pytest.approx(0.1 * 60 - 0.5 * 0.1**2 / 0.981, rel=1e-10)
         assert REGIMES[int(found.regime)] == "resting"
 
 
-class TestNames:
-    """Stick-slip goes on, a swing lasts; what decays, slides or sticks for good is at rest."""
+class TestRegimes:
+    """Stick-slip and oscillation last to the end; decay, steady sliding and permanent stick are resting."""
 
     @pytest.mark.parametrize("law", ["stiction", "karnopp"])
-    def test_friction_never_exceeds_what_holds(self, law):
-        """Thrown from far off, the body passes the speed of the belt many times before it can stick."""
+    def test_friction_force_never_exceeds_the_breakaway_force(self, law):
+        """From a distant launch the sliding velocity is zero many times before the body sticks."""
         of_law = {"dead_band": 1e-3} if law == "karnopp" else {}
         for v_b, x, velocity in ((0.0, 10.0, 0.0), (0.1, -5.0, 0.0), (0.1, 5.0, 0.1)):
             found = outcome(belt(law, v_b=v_b, span=20.0, **of_law) | {"initial": {"x": x, "velocity": velocity}})
@@ -427,12 +430,12 @@ class TestNames:
             assert float(found.x_min) < -0.8 * abs(x)
 
     @pytest.mark.parametrize("cycles", [2.4, 3.4, 5.4, 8.4])
-    def test_a_swing_that_decays_is_not_oscillatory(self, cycles):
+    def test_decaying_oscillation_is_resting(self, cycles):
         scene = belt("coulomb", viscous=0.3, start=0.0, span=cycles * 2 * pi / sqrt(2.0))
         assert REGIMES[int(outcome(scene).regime)] == "resting"
 
     @pytest.mark.parametrize("law", ["stiction", "bengisu-akay", "lugre", "dahl"])
-    def test_a_body_that_sticks_for_good_rests(self, law):
+    def test_body_that_sticks_to_the_end_is_resting(self, law):
         of_law = TestExtremes.SMALL[law]
         without_spring = belt(law, k=0.0, start=-1.0, span=60.0, **of_law)
         still = belt(law, v_b=0.0, span=60.0, **of_law) | {"initial": {"x": 1.0, "velocity": 0.0}}
@@ -440,24 +443,24 @@ class TestNames:
             assert REGIMES[int(outcome(scene).regime)] == "resting"
 
     @pytest.mark.parametrize("law", ["reset-integrator", "lugre"])
-    def test_bristles_that_ring_as_the_body_sticks_make_no_slips(self, law):
-        """On a belt slower than their ringing the velocity changes sign again and again within one stick."""
+    def test_vibration_of_bristles_during_stick_does_not_count_as_slip(self, law):
+        """On a slow belt the vibration of the bristles changes the sign of the velocity many times in one stick."""
         bristles = {"sigma0": 1000.0, "sigma1": 5.0} | ({"v_s": 0.001} if law == "lugre" else {})
         scene = belt(law, v_b=0.01, mu_s=0.2, start=0.01, **bristles)
         found = ringsweep.sweep(scene, {"time.span": [300.0, 710.0, 1000.0]}, progress=False)
         assert (found.regime == REGIMES.index("stick-slip")).all()
-        # Nearly 2 (F_s - F_c)/(k v_b), and whatever the span.
+        # The period is nearly 2 (F_s - F_c)/(k v_b), for any span.
         assert float(found.period[2]) == pytest.approx(98.1, rel=0.25)
         np.testing.assert_allclose(found.period, found.period[2], rtol=1e-4)
         np.testing.assert_allclose(found.slips, (found.time_span - found.first_slip) // found.period + 1, atol=1)
 
-    def test_a_body_that_creeps_home_rests(self):
+    def test_body_that_creeps_to_equilibrium_is_resting(self):
         scene = belt("bengisu-akay", v_b=0.0, v0=0.01, alpha=100.0) | {"initial": {"x": 1.5, "velocity": 0.0}}
         found = ringsweep.sweep(scene, {"time.span": [20.0, 60.0, 240.0, 1000.0]}, progress=False)
         assert (found.regime == REGIMES.index("resting")).all()
         assert found.period.isnull().all()
 
-    def test_a_constant_step_that_misses_the_stick_at_the_start_is_flagged(self):
+    def test_rk4_run_that_misses_the_first_stick_has_no_certificate(self):
         scene = belt(span=30.0) | {"initial": {"x": 0.5}}
         assert REGIMES[int(outcome(scene).regime)] == "stick-slip"
         for steps in (500, 2000, 10_000):
@@ -465,7 +468,7 @@ class TestNames:
             assert REGIMES[int(fixed.regime)] == "oscillatory"
             assert fixed.certified == 0
 
-    def test_a_body_carried_to_and_fro_rests_on_the_belt(self):
+    def test_body_that_sticks_to_an_oscillating_belt_is_resting(self):
         scene = belt(k=0.5, span=60.0)
         del scene["belt"], scene["initial"]
         scene["drive"] = {"law": "sinusoidal", "amplitude": 0.1, "frequency": 0.1}
@@ -474,8 +477,8 @@ class TestNames:
         assert REGIMES[int(found.regime)] == "resting"
 
     @pytest.mark.parametrize("law", ["stiction", "bengisu-akay", "dahl", "lugre"])
-    def test_are_those_of_the_mirror_image(self, law):
-        """A belt that runs the other way, and all else with it."""
+    def test_regimes_equal_those_of_the_mirror_image(self, law):
+        """Belt, place and velocity have the opposite sign."""
         rng = np.random.default_rng(5)
         cases = {
             "belt.velocity": rng.uniform(0.02, 0.4, 12),
@@ -494,7 +497,7 @@ class TestNames:
         np.testing.assert_allclose(one.period, other.period, rtol=1e-5)
         np.testing.assert_array_equal(one.slips, other.slips)
 
-    def test_a_step_whose_stages_meet_rest_is_flagged_though_its_ends_do_not(self):
+    def test_rk4_step_whose_stages_cross_zero_velocity_has_no_certificate(self):
         scene = belt(v_b=0.45, mu_k=0.139, mu_s=0.2245, k=5.19, start=0.0, span=20.0)
         fixed = outcome(scene, method="rk4", steps=20_000)
         assert fixed.stiffness == np.inf
@@ -503,16 +506,16 @@ class TestNames:
 
 
 class TestInput:
-    def test_a_dead_band_that_cannot_hold_is_refused(self):
+    def test_dead_band_with_too_much_viscous_friction_is_refused(self):
         with pytest.raises(ringsweep.InputError, match=r"friction\.viscous.*dead band"):
             outcome(belt("karnopp", dead_band=0.01, viscous=100.0))
 
-    def test_a_belt_has_a_velocity_or_a_drive(self):
+    def test_belt_needs_either_a_velocity_or_a_drive(self):
         scene = belt()
         del scene["belt"]
         with pytest.raises(ringsweep.InputError, match="velocity: missing"):
             ringsweep.simulate(scene)
         rocking = scene | {"drive": {"law": "sinusoidal", "amplitude": "0.2 m", "frequency": 1.0}}
         assert REGIMES[int(ringsweep.simulate(rocking | {"time": {"span": 5}}).regime)] != "failed"
-        with pytest.raises(ringsweep.InputError, match="given beside drive"):
+        with pytest.raises(ringsweep.InputError, match="given together with drive"):
             ringsweep.simulate(rocking | {"belt": {"velocity": 0.1}})

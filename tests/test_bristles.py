@@ -1,4 +1,4 @@
-"""Laws with a memory: the properties by which the literature tells them apart."""
+"""Friction laws of bristles: the properties that the literature reports."""
 
 from itertools import pairwise
 from math import cos, log, pi, sqrt, tanh
@@ -30,12 +30,12 @@ from ringsweep.physics.friction.velocity import BAND, KINETIC
 
 MU_S, MU_K = 0.6, 0.4
 SIGMA_0, V_S = 1e3, 1e-2
-#: Deflection beyond which no bristles are brought by sliding, m.
+#: Largest deflection that sliding can produce, m.
 LONGEST = MU_S / SIGMA_0
 
 
 def random_bonds(seed=0.0, sigma0=SIGMA_0):
-    """The law with memory of its own, of a contact that has just been made."""
+    """Law of random bonds with memory of its own, at the launch."""
     law = take(Bristles.of(np.array([sigma0]), np.array([seed])), 0)
     assert initial_deflection(law, MU_K, MU_K) == 0.0
     return law
@@ -46,6 +46,7 @@ LUGRE = LuGre(SIGMA_0, V_S, 2.0, 0.5)
 ELASTO_PLASTIC = ElastoPlastic(SIGMA_0, V_S, 2.0, 0.5, 0.7)
 RESET = ResetIntegrator(SIGMA_0, 2.0)
 EVERY = {"dahl": DAHL, "lugre": LUGRE, "elasto-plastic": ELASTO_PLASTIC, "reset": RESET, "bonds": random_bonds()}
+#: Laws whose bristles creep in stick.
 CREEPING = {name: EVERY[name] for name in ("dahl", "lugre", "elasto-plastic")}
 
 velocities = st.floats(-5.0, 5.0).map(lambda x: x * V_S)
@@ -55,16 +56,17 @@ regions = st.sampled_from([BAND, KINETIC])
 
 
 def static(law):
-    """The static coefficient as models give it: laws that know none have that of motion."""
+    """Static coefficient that a model passes to the law: mu_k if the law has no static coefficient."""
     return MU_K if isinstance(law, Dahl | Bristles) else MU_S
 
 
 def stribeck(v):
+    """Friction coefficient of steady sliding of LuGre bristles."""
     return MU_K + (MU_S - MU_K) * np.exp(-((v / V_S) ** 2))
 
 
-def drawn(law, path, z=0.0, mu_s=MU_S, mu_k=MU_K, speed=1.0):
-    """Deflection at the turning points of a body drawn along them at a given speed, m."""
+def deflections_along(law, path, z=0.0, mu_s=MU_S, mu_k=MU_K, speed=1.0):
+    """Deflection at the turning points of a path, for a body that moves along it at a constant speed, m."""
     found = [z]
     for start, end in pairwise(path):
         v = speed * float(np.sign(end - start))
@@ -79,18 +81,19 @@ def drawn(law, path, z=0.0, mu_s=MU_S, mu_k=MU_K, speed=1.0):
 
 
 def traction(law, v, z, mu_s=MU_S, mu_k=MU_K):
+    """Traction of a law in stick."""
     return bristle(law, mu_s, mu_k, v, z, 1.0 if v >= 0.0 else -1.0, BAND)[3]
 
 
-def test_there_is_a_test_for_every_law():
+def test_every_law_of_bristles_is_tested():
     assert {type(law) for law in EVERY.values()} == {law for law in LAWS.values() if family_of(law) is Dynamic}
 
 
 @pytest.mark.parametrize("law", EVERY.values(), ids=EVERY)
 class TestEveryLaw:
     @given(velocities, deflections, signs, regions)
-    def test_states_its_own_derivatives(self, law, v, z, sign, region):
-        """By the velocity and by the deflection, continued to velocities of the other sign."""
+    def test_derivatives_of_rate_and_traction_are_finite_differences(self, law, v, z, sign, region):
+        """By the velocity and by the deflection; also at velocities of the other sign."""
         small_v, small_z = 1e-6 * V_S, 1e-6 * LONGEST
         _, rate_v, rate_z, _, by_v, by_z = bristle(law, MU_S, MU_K, v, z, sign, region)
 
@@ -99,7 +102,7 @@ class TestEveryLaw:
             behind = bristle(law, MU_S, MU_K, v - small_v, z - small_z, sign, region)
             return (ahead[0] - behind[0]) / 2, (ahead[3] - behind[3]) / 2
 
-        # The half sine of the elasto-plastic law has kinks in its second derivative.
+        # The second derivative of the elasto-plastic law has kinks, hence the tolerance.
         by_velocity, by_deflection = difference(small_v, 0.0), difference(0.0, small_z)
         assert rate_v == pytest.approx(by_velocity[0] / small_v, abs=1e-4)
         assert rate_z == pytest.approx(by_deflection[0] / small_z, abs=1e-4 * V_S / LONGEST)
@@ -107,7 +110,7 @@ class TestEveryLaw:
         assert by_z == pytest.approx(by_deflection[1] / small_z, abs=1e-4 * SIGMA_0)
 
     @given(velocities, deflections, signs, regions)
-    def test_is_the_same_in_a_mirror(self, law, v, z, sign, region):
+    def test_law_is_equal_in_a_mirror_image(self, law, v, z, sign, region):
         rate, rate_v, rate_z, mu, by_v, by_z = bristle(law, MU_S, MU_K, v, z, sign, region)
         mirrored = bristle(law, MU_S, MU_K, -v, -z, -sign, region)
         assert mirrored == (-rate, rate_v, rate_z, -mu, by_v, by_z)
@@ -118,16 +121,16 @@ class TestEveryLaw:
             deflection, following = after_yield(law, MU_S, MU_K, z, sign, region)
             assert after_yield(law, MU_S, MU_K, -z, -sign, region) == (-deflection, following)
 
-    def test_is_a_spring_before_it_slides(self, law):
-        """With the stiffness sigma0, but for what creeps: at most x sigma0/mu_k of it."""
+    def test_bristles_are_a_spring_of_stiffness_sigma0_in_presliding(self, law):
+        """Creep takes at most the share x sigma0/mu_k of a displacement x."""
         for x in (1e-2 * LONGEST, 1e-4 * LONGEST):
             for towards in (x, -x):
-                (_, z), mu_s = drawn(law, (0.0, towards)), static(law)
+                (_, z), mu_s = deflections_along(law, (0.0, towards)), static(law)
                 assert 0.0 <= (towards - z) / towards + 1e-9 < x * SIGMA_0 / MU_K
                 assert region_guard(law, mu_s, MU_K, 0.0, z, np.sign(towards), BAND) > 0.0
                 assert traction(law, 0.0, z) == SIGMA_0 * z
 
-    def test_begins_undeflected_and_stuck(self, law):
+    def test_bristles_are_undeflected_and_stuck_at_the_launch(self, law):
         z = initial_deflection(law, static(law), MU_K)
         assert (z, traction(law, 0.0, z)) == (0.0, 0.0)
         assert region_guard(law, static(law), MU_K, 0.0, z, 1.0, BAND) > 0.0
@@ -136,8 +139,8 @@ class TestEveryLaw:
 @pytest.mark.parametrize("law", CREEPING.values(), ids=CREEPING)
 class TestLawsThatCreep:
     @given(velocities)
-    def test_slide_steadily_by_their_curve_of_friction(self, law, v):
-        """Coulomb's in Dahl's law, Stribeck's in the others, whose bristles damp nothing then."""
+    def test_traction_in_steady_sliding_is_the_steady_friction_curve(self, law, v):
+        """It is mu_k in Dahl's law; in the others the Stribeck curve plus viscous friction."""
         z = steady_deflection(law, MU_S, MU_K, v)
         rate, _, rate_z, mu, _, _ = bristle(law, MU_S, MU_K, v, z, 1.0 if v >= 0.0 else -1.0, BAND)
         assert rate == pytest.approx(0.0, abs=1e-15 * V_S)
@@ -148,24 +151,23 @@ class TestLawsThatCreep:
 
     @pytest.mark.parametrize("speed", [1e-2 * V_S, V_S, 10 * V_S])
     @pytest.mark.parametrize("start", [-1.0, 0.0, 1.2])
-    def test_come_to_slide_steadily_from_anywhere(self, law, speed, start):
-        _, z = drawn(law, (0.0, 40 * LONGEST), start * LONGEST, speed=speed)
+    def test_deflection_converges_to_that_of_steady_sliding(self, law, speed, start):
+        _, z = deflections_along(law, (0.0, 40 * LONGEST), start * LONGEST, speed=speed)
         assert z == pytest.approx(steady_deflection(law, MU_S, MU_K, speed), rel=1e-8)
 
     @given(velocities, signs)
-    def test_keep_their_deflection_within_bounds(self, law, v, side):
-        """At the greatest deflection of steady sliding no motion deflects bristles further."""
+    def test_deflection_stays_below_the_largest_of_steady_sliding(self, law, v, side):
         rate, *_ = bristle(law, MU_S, MU_K, v, side * LONGEST, 1.0 if v >= 0.0 else -1.0, BAND)
         assert side * rate <= 1e-18
 
     @given(velocities, deflections)
-    def test_take_more_work_than_they_store(self, law, v, z):
-        """Bristles without dampers are passive wherever sliding brings them."""
+    def test_bristles_without_damping_are_passive(self, law, v, z):
+        """They store at most the work that is done on them."""
         z = float(np.clip(z, -steady_deflection(law, MU_S, MU_K, 1e-9), steady_deflection(law, MU_S, MU_K, 1e-9)))
         rate, *_ = bristle(law, MU_S, MU_K, v, z, 1.0 if v >= 0.0 else -1.0, BAND)
         assert SIGMA_0 * z * rate <= SIGMA_0 * z * v + 1e-18
 
-    def test_a_region_of_stick_begins_where_that_of_slip_ends(self, law):
+    def test_guards_of_stick_and_slip_have_opposite_signs(self, law):
         for v in np.linspace(0.0, 3 * V_S, 20):
             for z in np.linspace(-LONGEST, LONGEST, 21):
                 stuck, slips = (region_guard(law, MU_S, MU_K, v, z, 1.0, region) for region in (BAND, KINETIC))
@@ -177,48 +179,49 @@ class TestLawsThatCreep:
 class TestHysteresis:
     """Dahl's loop under a triangular displacement of amplitude a, u = sigma0 a/mu_k.
 
-    On the way there d mu/dx = sigma0 (1 - mu/mu_k), on the way back sigma0 (1 + mu/mu_k): the loop runs between
-    -mu_k tanh u and mu_k tanh u, and its area is 4 mu_k^2/sigma0 (u - tanh u).
+    Forwards d mu/dx = sigma0 (1 - mu/mu_k), backwards d mu/dx = sigma0 (1 + mu/mu_k). The loop has the extremes
+    -mu_k tanh u and mu_k tanh u, and the area 4 mu_k^2/sigma0 (u - tanh u).
     """
 
     @staticmethod
     def area(amplitude, speed=1.0, points=64):
-        """Area of the loop that a body has come to after some periods, and its extremes."""
+        """Area of the loop after some periods; its lowest and highest traction; and the lowest again."""
         corners = [0.0, *(8 if amplitude * SIGMA_0 / MU_K > 0.3 else 0) * [amplitude, -amplitude]]
         u = amplitude * SIGMA_0 / MU_K
-        z = drawn(DAHL, corners, speed=speed)[-1] if len(corners) > 1 else -MU_K * tanh(u) / SIGMA_0
+        z = deflections_along(DAHL, corners, speed=speed)[-1] if len(corners) > 1 else -MU_K * tanh(u) / SIGMA_0
         x, weights = np.polynomial.legendre.leggauss(points)
         there = amplitude * np.array([-1.0, *x, 1.0])
-        up = drawn(DAHL, there, z, speed=speed)
-        down = drawn(DAHL, -there, up[-1], speed=speed)
+        up = deflections_along(DAHL, there, z, speed=speed)
+        down = deflections_along(DAHL, -there, up[-1], speed=speed)
         work = amplitude * SIGMA_0 * (weights @ up[1:-1] - weights @ down[1:-1])
         return work, SIGMA_0 * up[[0, -1]], SIGMA_0 * down[-1]
 
     @pytest.mark.parametrize("u", [0.01, 0.1, 1.0, 5.0, 20.0])
-    def test_closes_on_the_area_of_theory(self, u):
+    def test_loop_of_dahl_closes_with_the_area_of_theory(self, u):
         work, (low, high), again = self.area(u * MU_K / SIGMA_0)
         assert (low, high) == pytest.approx((-MU_K * tanh(u), MU_K * tanh(u)), rel=1e-6)
         assert again == pytest.approx(low, rel=1e-6)
         assert work == pytest.approx(4 * MU_K**2 / SIGMA_0 * (u - tanh(u)), rel=1e-4)
 
-    def test_vanishes_cubically_and_grows_to_that_of_coulomb(self):
+    def test_area_of_dahls_loop_is_cubic_for_small_and_coulombs_for_large_amplitudes(self):
         small, smaller = (self.area(u * MU_K / SIGMA_0)[0] for u in (0.04, 0.02))
         assert log(small / smaller) / log(2) == pytest.approx(3.0, abs=0.01)
         large = 200 * MU_K / SIGMA_0
         assert self.area(large, points=400)[0] == pytest.approx(4 * MU_K * large, rel=1 / 150)
 
-    def test_does_not_depend_on_the_rate(self):
+    def test_loop_of_dahl_does_not_depend_on_the_speed(self):
         one, other = (self.area(MU_K / SIGMA_0, speed)[0] for speed in (1e-4, 10.0))
         assert one == pytest.approx(other, rel=1e-9)
 
-    def test_of_bristles_with_dampers_does(self):
-        """The same path, slowly and fast: LuGre's bristles reach the static, or the kinetic coefficient."""
-        slow, fast = (drawn(LUGRE, (0.0, 20 * LONGEST), speed=speed)[-1] for speed in (1e-3 * V_S, 10 * V_S))
+    def test_lugre_reaches_mu_s_at_low_and_mu_k_at_high_speed(self):
+        slow, fast = (
+            deflections_along(LUGRE, (0.0, 20 * LONGEST), speed=speed)[-1] for speed in (1e-3 * V_S, 10 * V_S)
+        )
         assert (SIGMA_0 * slow, SIGMA_0 * fast) == pytest.approx((MU_S, MU_K), rel=1e-5)
 
 
 class TestResetIntegrator:
-    def test_gives_way_at_mu_s_and_then_drags_with_mu_k(self):
+    def test_reset_integrator_yields_at_mu_s_and_slips_at_mu_k(self):
         assert region_guard(RESET, MU_S, MU_K, 0.0, 0.999 * LONGEST, 1.0, BAND) > 0.0
         assert region_guard(RESET, MU_S, MU_K, 0.0, LONGEST, 1.0, BAND) == pytest.approx(0.0, abs=1e-15)
         for sign in (1.0, -1.0):
@@ -231,11 +234,14 @@ class TestResetIntegrator:
 
 
 def slide(law, snaps, sign=1.0, z=0.0, region=BAND):
-    """Way, mean traction over it and deflection after it, from each snap of a bond to the next; the last region."""
+    """Slide until a number of bonds have snapped.
+
+    Returns displacement, mean traction and final deflection between every two snaps, and the final region.
+    """
     found = np.empty((snaps, 3))
     snapping = 24 / 11 * MU_K / law.sigma0
     for k in range(snaps):
-        # Between two snaps all bonds are drawn out alike.
+        # Between two snaps all bonds stretch equally.
         way = region_guard(law, MU_K, MU_K, sign, z, sign, region) * snapping
         z += sign * way
         _, _, _, mu, _, _ = bristle(law, MU_K, MU_K, sign, z, sign, region)
@@ -246,39 +252,38 @@ def slide(law, snaps, sign=1.0, z=0.0, region=BAND):
 
 
 class TestRandomBonds:
-    def test_mean_friction_of_sliding_is_mu_k(self):
-        """Within the statistical error, which the means of 40 stretches tell."""
+    def test_mean_friction_of_random_bonds_is_mu_k(self):
+        """Within the statistical error, estimated from the means of 40 parts of the run."""
         run, _ = slide(random_bonds(7.0), 20_000)
-        stretches = run[400:].reshape(40, -1, 3)
-        means = (stretches[..., 0] * stretches[..., 1]).sum(axis=1) / stretches[..., 0].sum(axis=1)
+        parts = run[400:].reshape(40, -1, 3)
+        means = (parts[..., 0] * parts[..., 1]).sum(axis=1) / parts[..., 0].sum(axis=1)
         error = means.std(ddof=1) / sqrt(len(means))
         assert error < 3e-3 * MU_K
         assert means.mean() == pytest.approx(MU_K, abs=4 * error)
 
-    def test_friction_of_sliding_varies_by_its_bonds(self):
-        """Less than that of a bond alone by the root of their number, about: each is anywhere within its range."""
+    def test_friction_of_random_bonds_varies_within_bounds(self):
+        """The standard deviation is about that of one bond divided by the root of their number."""
         run, _ = slide(random_bonds(3.0), 4000)
         assert 0.03 < run[200:, 1].std() / MU_K < 0.3
         assert (np.abs(SIGMA_0 * run[:, 2]) < 24 / 11 * MU_K).all()
 
-    def test_slides_as_slowly_as_fast(self):
-        """A bond forms where it is, not when: there is no time in the law."""
+    def test_friction_of_random_bonds_does_not_depend_on_the_speed(self):
         for v in (1e-9, 1.0):
             assert bristle(random_bonds(), MU_K, MU_K, v, 1e-4, 1.0, BAND)[::3] == (v, SIGMA_0 * 1e-4)
 
-    def test_a_bond_lives_as_long_as_it_takes_to_stretch_it(self):
-        """On the average the snapping deflection: bonds form with a mean deflection of zero."""
+    def test_mean_stretch_of_a_bond_is_the_deflection_at_which_it_snaps(self):
+        """Because the mean deflection of new bonds is zero."""
         run, _ = slide(random_bonds(11.0), 20_000)
         assert run[400:, 0].mean() * BONDS == pytest.approx(24 / 11 * MU_K / SIGMA_0, rel=0.01)
 
-    def test_first_bond_snaps_after_about_half_of_its_way(self):
-        """None begins further out but for their mean, which is taken off: a contact begins without traction."""
+    def test_first_bond_snaps_after_about_half_the_snapping_deflection(self):
+        """Bonds start at most at half of it, apart from their mean, which is subtracted: traction starts at zero."""
         for seed in range(30):
             run, _ = slide(random_bonds(float(seed)), 1)
             assert 0.35 < run[0, 0] / (24 / 11 * MU_K / SIGMA_0) < 0.8
 
     @pytest.mark.parametrize("sign", [1.0, -1.0])
-    def test_counts_as_slipping_once_as_many_have_snapped_as_there_are(self, sign):
+    def test_contact_counts_as_slipping_after_as_many_snaps_as_bonds(self, sign):
         law = random_bonds(5.0)
         run, region = slide(law, BONDS - 1, sign)
         assert region == BAND
@@ -289,22 +294,22 @@ class TestRandomBonds:
         _, region = slide(law, BONDS - 1, -sign, run[-1, 2])
         assert region == BAND
 
-    def test_a_seed_is_a_run(self):
+    def test_equal_seeds_give_equal_runs_and_others_do_not(self):
         one, again, other = (slide(random_bonds(seed), 500)[0] for seed in (1.0, 1.0, 2.0))
         np.testing.assert_array_equal(one, again)
         assert (one != other).any(axis=1).all()
 
-    def test_every_seed_is_another_run(self):
+    def test_hundred_seeds_give_a_hundred_runs(self):
         first = {slide(random_bonds(float(seed)), 1)[0][0, 0] for seed in (*range(50), *range(2**31 - 53, 2**31 - 3))}
         assert len(first) == 100
 
-    def test_a_contact_made_anew_begins_anew(self):
+    def test_initial_deflection_resets_the_memory_of_bonds(self):
         law = random_bonds(1.0)
         one, _ = slide(law, 100)
         assert initial_deflection(law, MU_K, MU_K) == 0.0
         np.testing.assert_array_equal(slide(law, 100)[0], one)
 
-    def test_bonds_stay_beyond_their_mean(self):
+    def test_mean_of_the_stored_deflections_stays_zero(self):
         law = random_bonds(1.0)
         slide(law, 5000)
         assert abs(law.bonds[:BONDS].sum()) < 1e-12 * LONGEST
@@ -312,14 +317,14 @@ class TestRandomBonds:
 
 # ---- a body on bristles ----------------------------------------------------------------------
 
-#: Canudas de Wit et al. 1995, on a body of 1 kg.
+#: Static and kinetic coefficient, and parameters, of Canudas de Wit et al. 1995, for a body of 1 kg.
 G = 9.81
-HOLDS, DRAGS = 1.5 / G, 1.0 / G
+STATIC, KINETIC_1995 = 1.5 / G, 1.0 / G
 OF_1995 = {"sigma0": 1e5, "sigma1": sqrt(1e5), "sigma2": 0.4, "v_s": 1e-3}
 
 
-def pushed(law, push, span, mu_s=HOLDS, mu_k=DRAGS, start=(0.0, 0.0, 0.0), times=None):
-    """Place, velocity and deflection of a body of 1 kg under a push, N: the same law in another integrator."""
+def pushed(law, push, span, mu_s=STATIC, mu_k=KINETIC_1995, start=(0.0, 0.0, 0.0), times=None):
+    """Displacement, velocity and deflection of a body of 1 kg under a force `push`, N, by SciPy's LSODA."""
 
     def rates(t, y):
         _, v, z = map(float, y)
@@ -332,25 +337,25 @@ def pushed(law, push, span, mu_s=HOLDS, mu_k=DRAGS, start=(0.0, 0.0, 0.0), times
 
 
 def of_1995(kind, *more):
-    """A law with those numbers, per unit of the load of 1 kg."""
+    """Law with the parameters of 1995, per unit of the load of 1 kg."""
     return kind(OF_1995["sigma0"] / G, OF_1995["v_s"], OF_1995["sigma1"] / G, OF_1995["sigma2"] / G, *more)
 
 
-#: Rates of loading, N/s, and the stiffness of the spring that loads, N/m: a hundredth of that of the bristles.
+#: Rates of the load, N/s, and stiffness of the spring that loads the body, N/m: 1 % of the bristles' stiffness.
 RATES, STIFFNESS = np.array([1.0, 2.0, 5.0, 10.0, 20.0, 50.0]), 1000.0
 
 
 @pytest.fixture(scope="module")
 def breakaways():
-    """Greatest force of friction on a body that a belt draws against its spring, at each of the rates, N.
+    """Largest friction force on a body that a belt pulls against its spring, at each of the rates, N.
 
-    The span ends soon after the body has slipped, slowly enough for the viscous force to be small.
+    The span ends soon after the body begins to slip, so that the viscous force stays small.
     """
     scene = {
         "model": "belt",
         "body": {"mass": 1.0},
         "spring": {"stiffness": STIFFNESS},
-        "friction": {"law": "lugre", "mu_s": HOLDS, "mu_k": DRAGS, **OF_1995},
+        "friction": {"law": "lugre", "mu_s": STATIC, "mu_k": KINETIC_1995, **OF_1995},
         "time": {"span": 1.0},
     }
     axes = {
@@ -363,29 +368,29 @@ def breakaways():
 
 
 class TestBreakaway:
-    """The faster the load grows, the earlier it breaks away (Canudas de Wit et al. 1995, Fig. 4)."""
+    """The faster the load grows, the smaller is the breakaway force (Canudas de Wit et al. 1995, Fig. 4)."""
 
-    def test_force_falls_with_the_rate_of_the_load(self, breakaways):
+    def test_breakaway_force_falls_with_the_rate_of_the_load(self, breakaways):
         assert (np.diff(breakaways) < 0.0).all()
         assert (breakaways < 1.5).all()
         assert breakaways[0] > 1.4
         assert 1.0 < breakaways[-1] < 1.25
 
-    def test_force_is_that_of_another_integrator(self, breakaways):
+    def test_breakaway_force_agrees_with_scipy(self, breakaways):
         law = of_1995(LuGre)
         for rate, force in zip(RATES[3:], breakaways[3:], strict=True):
             t = np.linspace(0.0, 1.5 / rate + 0.1, 4001)
             found = pushed(law, lambda t, x, rate=rate: -STIFFNESS * (x + rate / STIFFNESS * t), t[-1], times=t)
-            felt = [G * traction(law, v, z, HOLDS, DRAGS) for _, v, z in found.y.T]
+            felt = [G * traction(law, v, z, STATIC, KINETIC_1995) for _, v, z in found.y.T]
             assert force == pytest.approx(np.abs(felt).max(), rel=1e-4)
 
 
-#: Ends between which a load oscillates once a second, N.
+#: Extremes of a load that oscillates with 1 Hz, N.
 LOW, HIGH = 0.1, 0.5
 
 
 def drift(law, low=LOW, high=HIGH, periods=4):
-    """Displacement over each period of a load, m, without the first, in which bristles settle."""
+    """Displacement in each period of the load, m, except the first, in which the bristles settle."""
     middle, half = (high + low) / 2, (high - low) / 2
     start = (low / 1e5, 0.0, low / 1e5)
     run = pushed(
@@ -399,20 +404,20 @@ def drift(law, low=LOW, high=HIGH, periods=4):
 
 
 class TestDrift:
-    """Under a load that oscillates below breakaway (Dupont et al. 2002): LuGre's bristles creep, others need not."""
+    """Drift under a load that oscillates below breakaway (Dupont et al. 2002)."""
 
     @pytest.mark.parametrize(("low", "high"), [(LOW, HIGH), (0.1, 1.0), (-0.2, 0.6)])
-    def test_of_lugre_goes_on_as_theory_says(self, low, high):
-        """Bristles that carry F lag by dF/sigma0 (1/(1 - F/F_s) - 1/(1 + F/F_s)) over a period."""
+    def test_drift_of_lugre_agrees_with_theory(self, low, high):
+        """The integral of dF/sigma0 (1/(1 - F/F_s) - 1/(1 + F/F_s)) from the least to the largest load F."""
         expected = 1.5e-5 * log((1 - (low / 1.5) ** 2) / (1 - (high / 1.5) ** 2))
         np.testing.assert_allclose(drift(of_1995(LuGre), low, high), expected, rtol=0.01)
 
-    def test_of_dahl_is_the_same_with_the_kinetic_coefficient(self):
+    def test_drift_of_dahl_agrees_with_theory_for_the_kinetic_coefficient(self):
         expected = 1e-5 * log((1 - LOW**2) / (1 - HIGH**2))
         np.testing.assert_allclose(drift(Dahl(1e5 / G)), expected, rtol=0.01)
 
-    def test_of_elasto_plastic_is_none_within_its_elastic_range(self):
-        """0.7 F_c here; a load that passes it drifts too."""
+    def test_drift_of_elasto_plastic_is_zero_in_its_elastic_range(self):
+        """The elastic range ends at 0.7 F_c; under a load above it the contact drifts."""
         law = of_1995(ElastoPlastic, 0.7)
         assert np.abs(drift(law)).max() < 1e-10
         assert np.abs(drift(law, high=0.69)).max() < 1e-10
@@ -420,19 +425,19 @@ class TestDrift:
 
 
 class TestConstantLoad:
-    """A load below breakaway, put on and taken off."""
+    """A load below breakaway is applied and removed."""
 
     @staticmethod
     def load(t, x):
         return 0.6 * min(t / 0.2, 1.0, max(0.0, (1.2 - t) / 0.2))
 
-    def test_an_elasto_plastic_contact_gives_and_comes_back(self):
+    def test_elasto_plastic_contact_returns_after_a_load(self):
         path = pushed(of_1995(ElastoPlastic, 0.7), self.load, 2.0, times=(0.6, 0.8, 0.95, 2.0))
         np.testing.assert_allclose(path.y[0], [6e-6, 6e-6, 6e-6, 0.0], atol=1e-9)
         np.testing.assert_allclose(path.y[0], path.y[2], atol=1e-12)
 
-    def test_a_contact_of_lugre_stays_but_does_not_come_back(self):
-        """It creeps while the load grows: by F_s/sigma0 (-ln(1 - F/F_s)) in all, and back by ln(1 + F/F_s)."""
+    def test_lugre_contact_does_not_return_after_a_load(self):
+        """It moves by -F_s/sigma0 ln(1 - F/F_s) while the load grows, and back by F_s/sigma0 ln(1 + F/F_s)."""
         path = pushed(of_1995(LuGre), self.load, 2.0, times=(0.6, 0.8, 0.95, 2.0))
         there, back = -log(1 - 0.6 / 1.5), log(1 + 0.6 / 1.5)
         np.testing.assert_allclose(path.y[0][:3], 1.5e-5 * there, rtol=0.01)

@@ -1,4 +1,4 @@
-"""What a certificate vouches for, on scenes where two resolutions agree and both are wrong, or nearly so."""
+"""Certificates, on scenes where two resolutions agree and both are wrong or nearly wrong."""
 
 from typing import ClassVar
 
@@ -11,7 +11,8 @@ from ringsweep.compile import take
 from ringsweep.models import MODELS
 from ringsweep.models.interface import audit, implicit, modes
 from ringsweep.quantities.variables import FAILED, JAMMED, RESTING, SEPARATING
-from ringsweep.solvers import automaton, event
+from ringsweep.solvers import audit as run_audit
+from ringsweep.solvers import event
 from ringsweep.solvers.certificate import with_errors
 from ringsweep.solvers.event import Auto, Event, Implicit
 from ringsweep.solvers.rk4 import RK4
@@ -22,7 +23,7 @@ COEFFICIENTS = [f"friction.{place}.{name}" for place in ("rough", "rest") for na
 
 @pytest.fixture
 def rocking(cells):
-    """A body that creeps with a rocking ring; how far that goes decides whether a contact is lost on the way."""
+    """A body that creeps on an oscillating ring, whose amplitude decides whether a contact separates."""
 
     def build(amplitude, law="bengisu-akay"):
         values = dict.fromkeys(COEFFICIENTS, 0.5) | {
@@ -32,33 +33,33 @@ def rocking(cells):
             "drive.phase": np.pi / 2,
             "time.span": 0.438,
         }
-        own = {"friction.alpha": 0.0, "friction.v0": 1e-5} if law == "bengisu-akay" else {}
-        return cells(values | own, law=law, drive="sinusoidal")
+        of_law = {"friction.alpha": 0.0, "friction.v0": 1e-5} if law == "bengisu-akay" else {}
+        return cells(values | of_law, law=law, drive="sinusoidal")
 
     return build
 
 
 class TestDips:
-    """A reaction that vanishes for a moment, between two instants at which a solver looks."""
+    """A reaction that is negative only for a short time, within a step."""
 
-    def test_in_a_creep_are_seen(self, rocking):
+    def test_dip_of_a_reaction_during_creep_is_found(self, rocking):
         found = solve(Auto(), rocking(0.6017))
         assert (found.regime, found.separating_contact, found.certified) == (SEPARATING, 1, 1)
         assert found.t_separation == pytest.approx(0.21415, abs=1e-5)
 
-    def test_are_those_of_the_law_that_sticks(self, rocking):
-        """From amplitudes that leave the contact closed to such as open it for long."""
+    def test_dips_under_a_smooth_law_agree_with_those_under_stiction(self, rocking):
+        """The amplitudes go from values that keep the contact closed to values that open it for long."""
         amplitude = np.linspace(0.55, 0.65, 101)
         smooth, limit = (solve(Auto(), rocking(amplitude, law)) for law in ("bengisu-akay", "stiction"))
         certain = (smooth.certified == 1) & (limit.certified == 1)
-        # The rounded law is not that of the limit: just at the boundary they may differ.
+        # The smooth law differs a little from its limit, so that regimes may differ at the boundary.
         differ = certain & (smooth.regime != limit.regime)
         assert certain.mean() > 0.95
         assert differ.sum() <= 1
         assert 10 < (smooth.regime == SEPARATING).sum() < 91
 
-    def test_between_the_steps_of_rk4_leave_it_without_a_certificate(self, cells):
-        """Contact 2 holds by 2e-5 N at one launch, and is lost at the next: rk4 is not to know which."""
+    def test_dip_between_two_steps_of_rk4_leaves_no_certificate(self, cells):
+        """Contact 2 holds by 2e-5 N at one launch and separates at the next: rk4 cannot certify its regime."""
         values = {"drive.amplitude": 2.0, "friction.v0": 0.2, "friction.alpha": 100.0, "time.span": 3.0}
         edge = 20.516495473
         omega = edge + np.array([-1e-2, -1e-3, -1e-4, -1e-5, 1e-5, 1e-4, 1e-3, 1e-2])
@@ -73,8 +74,8 @@ class TestDips:
 
 
 class TestContactProblem:
-    def test_a_body_that_simply_sticks_rests(self, cells):
-        """At the bottom, with a rough arc under one contact: what it does not meet, friction at mu_s, jams nothing."""
+    def test_stuck_body_with_one_contact_on_a_rough_arc_is_not_jammed(self, cells):
+        """Slip at mu_s of the rough arc would jam, but the body does not slip."""
         found = solve(
             Auto(),
             cells(
@@ -94,8 +95,8 @@ class TestContactProblem:
         )
         assert (found.regime, found.certified, found.stick_time) == (RESTING, 1, 5.0)
 
-    def test_a_slip_whose_contact_would_have_to_pull_is_not_taken(self, cells):
-        """Half-way up, stick is the only mode: a saturation of 0.465, both reactions positive."""
+    def test_slip_with_a_negative_reaction_is_not_admissible(self, cells):
+        """Stick is the only admissible mode: its saturation is 0.465, and both reactions are positive."""
         found = solve(
             Auto(),
             cells(
@@ -118,8 +119,8 @@ class TestContactProblem:
         assert found.normal_min_2 == pytest.approx(0.139, abs=1e-3)
 
     @pytest.mark.parametrize("law", ["stiction", "bengisu-akay"])
-    def test_both_contacts_may_leave_at_once(self, cells, law):
-        """At the top of a ring at rest: the mirror image of the run is the run."""
+    def test_both_contacts_separate_at_the_top_of_a_ring_at_rest(self, cells, law):
+        """A run that is its own mirror image cannot separate at one contact alone."""
         found = solve(Auto(), cells({"initial.phi": np.array([np.pi, 2.9, -2.9])}, law=law, drive="arctan"))
         np.testing.assert_array_equal(found.regime, SEPARATING)
         assert found.separating_contact[0] == 3
@@ -127,15 +128,14 @@ class TestContactProblem:
         assert found.normal_min_1[0] == found.normal_min_2[0] == 0.0
 
     @pytest.mark.parametrize("amplitude", [0.0, 2.0])
-    def test_without_a_load_there_is_no_contact(self, cells, amplitude):
-        """Nothing jams that nothing presses together."""
+    def test_body_without_load_separates_at_both_contacts(self, cells, amplitude):
         found = solve(Auto(), cells({"gravity": 0.0, "drive.amplitude": amplitude}, law="stiction", drive="arctan"))
         assert (found.regime, found.separating_contact, found.t_end) == (SEPARATING, 3, 0.0)
 
-    def test_a_contact_on_an_edge_is_on_either_side_of_it(self, cells):
-        """With contact 1 just where an icy arc begins: held by the rest as it would slide there, as in the mirror.
+    def test_contact_on_an_edge_may_be_on_either_side_and_has_no_certificate(self, cells):
+        """Contact 1 is on the edge of an icy arc. The rest of the ring holds it, and the mirror image likewise.
 
-        But which side of an edge holds a body at rest is rounding, and nothing to certify.
+        Rounding decides which side of an edge holds a body at rest, so that there is no certificate.
         """
         edge = 0.546545997641859
         values = dict(zip(COEFFICIENTS, (0.1, 0.1, 0.8, 0.6), strict=True)) | {"zone.half_angle": 0.3}
@@ -148,7 +148,7 @@ class TestContactProblem:
 
 
 class TestLaunch:
-    """What a body is at launch does not depend on how its speed, or that of the ring, is rounded."""
+    """The state at launch does not depend on the rounding of the velocities of body and ring."""
 
     @staticmethod
     def bristles(batch):
@@ -157,31 +157,31 @@ class TestLaunch:
 
     LUGRE: ClassVar = {"friction.sigma0": 1e3, "friction.v_s": 1e-3, "drive.amplitude": 0.3}
 
-    def test_bristles_of_a_body_at_rest_are_not_bent(self, cells):
-        """Under a drive that has not yet begun to move, but moves an instant later."""
+    def test_bristles_of_a_body_launched_at_rest_are_not_deflected(self, cells):
+        """The drive is at rest at t = 0 and moves later."""
         batch = cells(self.LUGRE | {"drive.exponent": 3.0}, law="lugre", drive="power")
         assert self.bristles(batch) == (0.0, 0.0)
 
     @pytest.mark.parametrize("rounding", [-3e-16, 0.0, 3e-16])
-    def test_nor_those_of_a_body_launched_at_the_speed_of_the_ring(self, cells, rounding):
+    def test_bristles_of_a_body_launched_at_the_velocity_of_the_ring_are_not_deflected(self, cells, rounding):
         speed = 0.3 * 2 * np.pi * 1.7 * np.cos(0.4)
         rocking = {"drive.frequency": 1.7, "drive.phase": 0.4, "initial.omega": speed * (1.0 + rounding)}
         assert self.bristles(cells(self.LUGRE | rocking, law="lugre", drive="sinusoidal")) == (0.0, 0.0)
 
-    def test_nor_those_of_a_body_at_rest_on_a_ring_that_turns_back(self, cells):
-        """Its speed there is the rounding of a cosine."""
+    def test_bristles_of_a_body_at_rest_on_a_ring_at_its_reversal_are_not_deflected(self, cells):
+        """The velocity of the ring there is the rounding error of a cosine."""
         rocking = {"drive.frequency": 0.9, "drive.phase": np.pi / 2}
         assert self.bristles(cells(self.LUGRE | rocking, law="lugre", drive="sinusoidal")) == (0.0, 0.0)
 
-    def test_a_body_at_rest_stays_at_rest_until_the_drive_moves_it(self, cells):
-        """But one whose drive begins with an infinite acceleration is left behind at once."""
+    def test_only_infinite_initial_acceleration_leaves_a_body_at_rest_behind(self, cells):
+        """A power law with an exponent below 2 begins with infinite acceleration."""
         for exponent, law in ((3.0, "stiction"), (1.5, "stiction")):
             scene = take(cells({"drive.amplitude": 0.3, "drive.exponent": exponent}, law=law, drive="power"), 0)
             _, (_, v) = modes.initial_state(scene)
             assert (v < 0.0) == (exponent < 2.0)
 
-    def test_a_drive_that_begins_with_an_infinite_acceleration_leaves_the_body_behind(self, cells):
-        """No friction keeps up with it: the body lags from the first instant, though its lag is below the tolerance."""
+    def test_body_lags_from_the_first_instant_under_infinite_initial_acceleration(self, cells):
+        """No friction gives this acceleration. The body lags even if its lag is below the tolerance."""
         rng = np.random.default_rng(5)
         count = 60
         values = {
@@ -200,12 +200,12 @@ class TestLaunch:
 
 
 class TestNumbers:
-    def test_without_a_number_where_one_must_be_nothing_is_certified(self, cells):
+    def test_run_with_an_outcome_that_is_not_finite_has_no_certificate(self, cells):
         found = solve(Auto(), cells({"gravity": np.array([8e211, 9.81])}, law="stiction", drive="arctan"))
         np.testing.assert_array_equal(found.certified, [0, 1])
         assert found.regime[0] == FAILED
 
-    def test_the_limit_of_work_is_that_of_all_tries(self, cells):
+    def test_max_steps_limits_the_steps_of_all_runs_of_a_cell(self, cells):
         batch = cells({"drive.amplitude": 2.0, "time.span": 10.0}, law="stiction", drive="arctan")
         limit = 10
         found = solve(Event(max_steps=limit), batch)
@@ -214,59 +214,59 @@ class TestNumbers:
 
 
 class TestLaw:
-    """A certificate asks for a witness that shares nothing with the solver: the law itself, where it did not look."""
+    """A certificate asks that the run obey its law at instants that the solver did not choose."""
 
     def scene(self, cells, law):
         values = {"drive.amplitude": np.linspace(0.5, 8.0, 40), "time.span": 3.0}
         return cells(values, law=law, drive="arctan")
 
     @pytest.mark.parametrize("law", ["stiction", "bengisu-akay"])
-    def test_is_obeyed_to_the_tolerance_by_what_is_certified(self, cells, law):
+    def test_violations_of_certified_runs_are_within_the_tolerance(self, cells, law):
         method = Event() if law == "stiction" else Implicit()
         batch = self.scene(cells, law)
-        _, _, shown = method.integrate(batch, len(NAMES), audit=True)
-        assert shown[:, 0].max() < 0.2 * event._BREACH
-        assert shown[:, 1].max() < 0.2 * event._ENERGY
+        _, _, audits = method.integrate(batch, len(NAMES), audit=True)
+        assert audits[:, 0].max() < 0.2 * event._MOST_VIOLATION
+        assert audits[:, 1].max() < 0.2 * event._MOST_UNEXPLAINED
 
     @pytest.mark.parametrize("law", ["stiction", "bengisu-akay"])
-    def test_knows_by_itself_where_the_arcs_are(self, cells, law):
-        """A mode that names another segment than the one under the contact is found out, whatever else is right."""
+    def test_mode_with_a_wrong_segment_is_a_violation(self, cells, law):
+        """The audit takes the segment under the contact from the surface, not from the mode."""
         scene = take(self.scene(cells, law), 0)
         t, y = modes.initial_state(scene)
         _, mode = modes.initial_mode(scene, t, y)
-        force = implicit.forcing(scene, 0.0)
+        forcing = implicit.forcing(scene, 0.0)
 
-        def breach(mode):
-            return audit.violation(scene, mode, force, y, (0.0, 0.0), 0.1, 1e-10)[0]
+        def violation(mode):
+            return audit.violation(scene, mode, forcing, y, (0.0, 0.0), 0.1, 1e-10)[0]
 
         segment, turn = mode.place_1
-        assert np.isfinite(breach(mode))
-        assert np.isinf(breach(mode._replace(place_1=(1 - segment, turn))))
+        assert np.isfinite(violation(mode))
+        assert np.isinf(violation(mode._replace(place_1=(1 - segment, turn))))
 
-    def test_two_instants_a_step_are_gauss_s(self):
-        """The work of friction is integrated to third order."""
-        early, late = automaton._EARLY, automaton._LATE
+    def test_instants_of_the_audit_are_the_nodes_of_gauss(self):
+        """The quadrature is exact for polynomials of degree 3."""
+        early, late = run_audit.EARLY, run_audit.LATE
         for power in range(4):
             assert 0.5 * (early**power + late**power) == pytest.approx(1.0 / (power + 1))
 
-    def test_of_an_arc_that_rk4_steps_over_is_no_certificate(self, cells):
-        """A scratch a thousandth of a radian wide, so rough that it jams the body: no step of rk4 ends on it."""
+    def test_rk4_run_that_steps_over_a_narrow_arc_has_no_certificate(self, cells):
+        """The arc is 2e-3 rad wide and so rough that the body jams. No step of rk4 ends on it."""
         values = {"zone.half_angle": 1e-3, "zone.center": 2.0, "initial.omega": 60.0, "time.span": 0.5}
         values |= dict(zip(COEFFICIENTS, (2.0, 2.0, 0.1, 0.1), strict=True)) | {
             "friction.v0": 0.1,
             "friction.alpha": 0.0,
         }
         batch = cells(values, drive="arctan")
-        truth, stepped = solve(Auto(), batch), solve(RK4(500), batch)
+        truth, by_rk4 = solve(Auto(), batch), solve(RK4(500), batch)
         assert (truth.regime, truth.certified) == (JAMMED, 1)
-        assert (stepped.regime, stepped.certified) == (SEPARATING, 0)
+        assert (by_rk4.regime, by_rk4.certified) == (SEPARATING, 0)
 
 
 class TestErrors:
-    """Numbers come with bounds on their errors."""
+    """Bounds on the errors of outcomes."""
 
-    def test_of_two_runs_that_are_one_say_nothing(self, cells):
-        """Two steps that no tolerance shortens: the second resolution repeats the first, and a third must tell."""
+    def test_two_runs_with_the_same_steps_do_not_bound_the_error(self, cells):
+        """No tolerance shortens the two steps of this run, so that a third run is needed."""
         values = dict(zip(COEFFICIENTS, (1.7, 1.5, 0.2, 0.0), strict=True)) | {
             "body.inertia": 0.01,
             "drive.amplitude": -2.0,
@@ -282,7 +282,7 @@ class TestErrors:
     @pytest.mark.parametrize(
         ("law", "drive"), [("stiction", "arctan"), ("bengisu-akay", "arctan"), ("bengisu-akay", "power")]
     )
-    def test_are_covered_by_what_is_stated(self, cells, law, drive):
+    def test_error_bounds_cover_the_true_errors(self, cells, law, drive):
         rng = np.random.default_rng(8)
         count = 400
         values = {
@@ -297,28 +297,28 @@ class TestErrors:
                 "friction.v0": 10 ** rng.uniform(-6, -0.5, count),
             }
         if drive == "power":
-            # Below 2 the acceleration is infinite at first, and the first steps are as short at any tolerance.
+            # Below 2 the initial acceleration is infinite, and the first steps are equally short at any tolerance.
             values["drive.exponent"] = rng.uniform(1.05, 1.95, count)
         batch = cells(values, law=law, drive=drive)
         found = Auto().run(batch, NAMES)
         exact = solve(Event(rtol=1e-14) if law == "stiction" else Implicit(rtol=3e-10), batch)
-        held, ratios = [], []
+        covered, ratios = [], []
         for k, name in enumerate(with_errors(NAMES)):
             error = np.abs(found.rows[:, NAMES.index(name)] - getattr(exact, name))
             stated = found.errors[:, k]
             known = np.isfinite(error) & np.isfinite(stated) & (found.rows[:, 0] == exact.regime)
-            held.append((stated >= error)[known])
+            covered.append((stated >= error)[known])
             ratios.append((stated / np.where(error > 0.0, error, np.nan))[known])
-        assert np.concatenate(held).mean() > (0.98 if drive == "power" else 0.99)
+        assert np.concatenate(covered).mean() > (0.98 if drive == "power" else 0.99)
         assert np.nanmedian(np.concatenate(ratios)) < 100
 
-    def test_are_linked_to_their_numbers_and_absent_without_certificates(self, scene):
+    def test_error_bounds_are_linked_to_their_variables_and_absent_without_certificates(self, scene):
         axes = {"drive.amplitude": [0.1, 2.0]}
         found = ringsweep.sweep(scene, axes)
         assert found.phi_end.attrs["ancillary_variables"] == "phi_end_error"
         assert found.phi_end_error.attrs["units"] == "rad"
         assert (found.phi_end_error > 0.0).all()
-        # What separates has no exact end; what does not has one.
+        # A run that does not separate ends exactly at the span.
         np.testing.assert_array_equal(found.t_end_error > 0.0, found.regime == SEPARATING)
         without = ringsweep.sweep(scene, axes, solver={"method": "auto", "certify": False})
         assert not [name for name in without.data_vars if str(name).endswith("_error")]

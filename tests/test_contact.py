@@ -1,4 +1,4 @@
-"""The contact problem: every mode by the balances of a rigid body that may leave either contact, solved anew."""
+"""The contact problem: the mode against the balances of a rigid body that may leave either contact."""
 
 from math import cos, sin
 
@@ -13,7 +13,7 @@ MIRRORED = {OPEN_1: OPEN_2, OPEN_2: OPEN_1, FORWARD: BACKWARD, BACKWARD: FORWARD
 
 
 def draw(rng):
-    """A body at rest on a ring, somewhere, under friction that may be great."""
+    """Random body at rest on the ring, static and kinetic friction, angle, angular velocity and acceleration."""
     beta, radius = np.radians(rng.uniform(5, 85)), rng.uniform(0.03, 0.1)
     centre = radius * rng.uniform(0.5, 0.95)
     body = TwoContacts.of(
@@ -31,15 +31,16 @@ def draw(rng):
 
 
 def balances(body, phi):
-    """Accelerations of a free body, and what a unit of each reaction and of each friction adds to them.
+    """Acceleration of the body without contact forces, and its change by a unit of each contact force.
 
-    Outwards and along the race at the centre of mass, and angular; the second array has a column for each force.
+    Components: radially outwards and along the race at the centre of mass, and angular. The second array has one column
+    for each of the forces N1, F1, N2, F2.
     """
     b = body
     free = np.array([b.gravity * cos(phi), -b.gravity * sin(phi), 0.0])
     units = []
     for side in (-1, 1):
-        # Where the contact is seen from the centre of mass, its normal and its tangent, in radial and tangential parts.
+        # Normal, tangent and lever arm of the contact in radial and tangential components at the centre of mass.
         out, along = np.array([b.cos_beta, side * b.sin_beta]), np.array([-side * b.sin_beta, b.cos_beta])
         arm = b.radius * out - np.array([b.xi, 0.0])
         for force in (-out, along):
@@ -47,8 +48,8 @@ def balances(body, phi):
     return free, np.array(units).T
 
 
-def relative(body, motion, omega):
-    """Of both contacts: how the gap and the place on the race accelerate."""
+def contact_accelerations(body, motion, omega):
+    """Acceleration of the gap and of the place along the race, at both contacts."""
     b = body
     radial, tangential, angular = motion
     centre = b.xi / b.cos_beta
@@ -64,7 +65,7 @@ def relative(body, motion, omega):
 
 
 def admissible(body, static, kinetic, phi, omega, epsilon):
-    """Every mode whose equations and inequalities hold, and by how much the nearest one to hang does."""
+    """Set of all admissible modes, and the least margin of any inequality."""
     free, units = balances(body, phi)
     scale = body.mass * (body.gravity + body.radius * (omega**2 + abs(epsilon)))
     found, margins = set(), []
@@ -75,19 +76,21 @@ def admissible(body, static, kinetic, phi, omega, epsilon):
             found.add(mode)
 
     def response(columns):
-        """Gaps and places as affine functions of unknown factors of combinations of the four forces."""
-        base = relative(body, free, omega)
-        parts = [np.array(relative(body, free + units @ np.asarray(c), omega)) - np.array(base) for c in columns]
+        """Accelerations at the contacts as affine functions of the factors of some combinations of forces."""
+        base = contact_accelerations(body, free, omega)
+        parts = [
+            np.array(contact_accelerations(body, free + units @ np.asarray(c), omega)) - np.array(base) for c in columns
+        ]
         return np.array(base), parts
 
-    # Slip of both, either way.
+    # Both contacts slip, forwards or backwards.
     for mode, sign in ((FORWARD, 1), (BACKWARD, -1)):
         columns = [(1, -sign * kinetic[0], 0, 0), (0, 0, 1, -sign * kinetic[1])]
         base, parts = response(columns)
         normals = np.linalg.solve(np.array([p[:, 0] for p in parts]).T, -base[:, 0])
         places = base[:, 1] + sum(n * p[:, 1] for n, p in zip(normals, parts, strict=True))
         enter(mode, *normals / scale, sign * (places.mean() - body.radius * epsilon) * body.mass / scale)
-    # Stick of both, with one saturation: looked for between its bounds.
+    # Both contacts stick with one saturation, which is searched between its bounds.
     kappas = np.linspace(-1, 1, 2001)
     base, (n1, f1, n2, f2) = response(np.eye(4))
     one, two = (n - np.multiply.outer(kappas, mu * f) for n, f, mu in ((n1, f1, static[0]), (n2, f2, static[1])))
@@ -98,7 +101,7 @@ def admissible(body, static, kinetic, phi, omega, epsilon):
     turns = np.flatnonzero((away[:-1] * away[1:] <= 0) & (np.abs(np.diff(away)) < scale / body.mass))
     for k in turns:
         enter(STICK, *normals[k : k + 2].min(axis=0) / scale, 1 - abs(kappas[k]) + 1e-3)
-    # One open, the other sticks or slips.
+    # One contact opens, the other one sticks or slips.
     for mode, own, other in ((OPEN_1, 1, 0), (OPEN_2, 0, 1)):
         base, (normal, friction) = response(np.eye(4)[[2 * own, 2 * own + 1]])
         matrix = np.array([normal[own], friction[own]]).T
@@ -111,12 +114,12 @@ def admissible(body, static, kinetic, phi, omega, epsilon):
             place, gap = base[own, 1] + load * part[own, 1], base[other, 0] + load * part[other, 0]
             slides = sign * (place - body.radius * epsilon)
             enter(mode, load / scale, slides * body.mass / scale, gap * body.mass / scale, part[own, 0] * body.mass)
-    enter(OPEN_BOTH, *np.array(relative(body, free, omega))[:, 0] * body.mass / scale)
+    enter(OPEN_BOTH, *np.array(contact_accelerations(body, free, omega))[:, 0] * body.mass / scale)
     return found, np.abs(margins).min()
 
 
 def chosen(found):
-    """The rule: stick, else the only slip, else what opens."""
+    """Mode by the rule of priority: stick, then a single slip, then open contacts."""
     slips, opens = found & {FORWARD, BACKWARD}, found & {OPEN_1, OPEN_2, OPEN_BOTH}
     if STICK in found:
         return STICK
@@ -138,7 +141,7 @@ class TestAtRest:
     def mode(body, static, kinetic, phi, omega, epsilon):
         return contact.at_rest(body, static, kinetic, kinetic, sin(phi), cos(phi), omega, epsilon, 0)
 
-    def test_the_mode_is_the_one_whose_inequalities_hold(self, problems):
+    def test_mode_at_rest_is_the_admissible_one(self, problems):
         seen = set()
         for problem in problems:
             found, margin = admissible(*problem)
@@ -147,22 +150,21 @@ class TestAtRest:
                 seen.add(self.mode(*problem))
         assert seen == {STICK, FORWARD, BACKWARD, OPEN_1, OPEN_2, OPEN_BOTH}
 
-    def test_where_no_mode_is_admissible_none_is_taken(self):
-        """One problem in thirty thousand: too little friction to stick, too much to slip, and no gap opens."""
+    def test_state_without_an_admissible_mode_is_impossible(self):
+        """A rare state: too little friction to stick, too much friction to slip, and no gap opens."""
         beta = np.radians(75.9)
         body = TwoContacts.of(0.0806, 7.78e-4, 0.0379, 0.0266 * cos(beta), sin(beta), cos(beta), 9.81)
         problem = body, (0.98, 0.68), (0.54, 0.66), -0.08, -9.31, -85.5
         assert admissible(*problem)[0] == set()
         assert self.mode(*problem) == IMPOSSIBLE
 
-    def test_of_a_mirror_image_is_the_mirror_image(self, problems):
+    def test_mode_of_a_mirror_image_is_mirrored(self, problems):
         for body, (s1, s2), (k1, k2), phi, omega, epsilon in problems:
             one = self.mode(body, (s1, s2), (k1, k2), phi, omega, epsilon)
             other = self.mode(body, (s2, s1), (k2, k1), -phi, -omega, -epsilon)
             assert other == MIRRORED.get(one, one)
 
-    def test_stick_is_as_strong_as_it_can_be(self, problems):
-        """Of the saturations that give the acceleration of the ring, the one with the largest reactions."""
+    def test_stick_has_positive_reactions_and_a_saturation_of_at_most_one(self, problems):
         for body, static, kinetic, phi, omega, epsilon in problems:
             if self.mode(body, static, kinetic, phi, omega, epsilon) == STICK:
                 kappa, reserve, n1, n2 = contact.stick(body, *static, sin(phi), cos(phi), omega, epsilon)
@@ -172,13 +174,12 @@ class TestAtRest:
 
 
 class TestSliding:
-    def test_a_contact_that_would_pull_opens(self):
-        """On ice at the top a body that turns slowly leaves the race with both contacts, a fast one with none."""
+    def test_slow_body_without_friction_at_the_top_loses_both_contacts_and_fast_body_none(self):
         body = TwoContacts.of(0.076, 4.47e-5, 0.043378, 0.022, 0.75, np.sqrt(1 - 0.75**2), 9.81)
         modes = [contact.sliding(body, 0.0, 0.0, sin(3.1), cos(3.1), omega) for omega in (0.0, 50.0)]
         assert modes == [OPEN_BOTH, CLOSED]
 
-    def test_one_contact_has_no_other(self):
+    def test_body_with_one_contact_can_only_open_that_contact(self):
         body = OneContact(0.076, 0.043378, 9.81)
         assert contact.sliding(body, 0.1, 0.1, sin(3.0), cos(3.0), 1.0) == OPEN_1
         assert contact.at_rest(body, (0.5, 0.5), (0.3, 0.3), (0.3, 0.3), sin(3.0), cos(3.0), 0.0, 0.0, 0) == OPEN_1

@@ -1,4 +1,4 @@
-"""How the ring is turned: angle, rate and acceleration belong together in every drive."""
+"""Drives: angle, angular velocity and angular acceleration are consistent."""
 
 from math import atan, inf, log, radians
 
@@ -38,19 +38,19 @@ SAMPLES = [
 ]
 
 
-def test_every_drive_is_sampled():
+def test_every_drive_is_tested():
     assert {type(drive) for drive in SAMPLES} == set(DRIVES.values())
 
 
 @pytest.mark.parametrize("drive", SAMPLES, ids=lambda drive: type(drive).__name__)
 class TestDerivatives:
-    """Rate and acceleration are what finite differences of angle and rate say."""
+    """Derivatives of the shape against finite differences."""
 
     TIMES = np.linspace(0.05, 2.95, 30)
     STEP = 1e-5
 
     @pytest.mark.parametrize("order", [1, 2])
-    def test_each_is_the_derivative_of_the_one_before(self, drive, order):
+    def test_rate_and_acceleration_of_a_shape_are_its_derivatives(self, drive, order):
         for t in self.TIMES:
             before, after = shape(drive, t - self.STEP), shape(drive, t + self.STEP)
             difference = (after[order - 1] - before[order - 1]) / (2 * self.STEP)
@@ -60,12 +60,12 @@ class TestDerivatives:
 class TestArctan:
     """The paper's run-up."""
 
-    def test_angle_is_h(self):
+    def test_shape_of_arctan_is_the_papers_h(self):
         for t in (0.0, 0.3, 1.0, 10.0):
             assert shape(Arctan(1.0), t)[0] == pytest.approx(t * atan(t) - 0.5 * log(1 + t * t), abs=1e-15)
             assert shape(Arctan(1.0), t)[0] == pytest.approx(quad(atan, 0.0, t)[0], abs=1e-12)
 
-    def test_rate_is_arctan(self):
+    def test_rate_of_arctan_is_the_arctangent(self):
         assert shape(Arctan(1.0), 5.0)[1] == atan(5.0)
 
 
@@ -74,10 +74,10 @@ class TestPowerAtTheStart:
         ("exponent", "at_rest"),
         [(1.0, (0.0, 1.0, 0.0)), (1.1, (0.0, 0.0, inf)), (2.0, (0.0, 0.0, 2.0)), (2.5, (0.0, 0.0, 0.0))],
     )
-    def test_limits(self, exponent, at_rest):
+    def test_power_law_has_its_limits_at_zero(self, exponent, at_rest):
         assert shape(Power(1.0, exponent), 0.0) == at_rest
 
-    def test_acceleration_of_the_papers_law_grows_without_bound(self):
+    def test_acceleration_of_the_papers_power_law_is_unbounded_near_zero(self):
         accelerations = [shape(Power(1.0, 1.1), t)[2] for t in (1e-2, 1e-6, 1e-12)]
         assert accelerations == sorted(accelerations)
         assert accelerations[-1] > 1e9
@@ -85,13 +85,13 @@ class TestPowerAtTheStart:
 
 class TestTable:
     @given(st.lists(st.floats(-5, 5), min_size=4, max_size=4), st.floats(0.0, 3.0))
-    def test_reproduces_a_cubic(self, coefficients, t):
+    def test_table_reproduces_a_cubic(self, coefficients, t):
         cubic = np.polynomial.Polynomial(coefficients)
         expected = [cubic(t), cubic.deriv(1)(t), cubic.deriv(2)(t)]
         np.testing.assert_allclose(shape(tabulated(cubic(KNOTS)), t), expected, rtol=1e-10, atol=1e-9)
 
     @given(st.lists(st.floats(-3, 3), min_size=len(KNOTS), max_size=len(KNOTS)))
-    def test_passes_smoothly_to_second_order_through_every_knot(self, angles):
+    def test_table_is_smooth_to_second_order_at_every_knot(self, angles):
         drive = tabulated(angles)
         for knot, angle in zip(KNOTS, angles, strict=True):
             here = shape(drive, knot)
@@ -99,17 +99,17 @@ class TestTable:
             for side in (-1e-10, 1e-10):
                 np.testing.assert_allclose(shape(drive, knot + side), here, rtol=1e-6, atol=1e-6)
 
-    def test_a_span_beyond_the_table_is_an_input_error(self):
+    def test_span_longer_than_the_table_is_an_input_error(self):
         values = {"drive.amplitude": np.ones(2), "time.span": np.array([3.0, 3.5])}
         with pytest.raises(InputError, match=r"time\.span.*3\.5 s is longer than the table.*3 s"):
             drive_of(table(KNOTS, np.zeros(len(KNOTS))), values)
 
 
 class TestAmplitude:
-    """Cells that differ only in amplitude share one table of the drive's shape."""
+    """Cells that differ only in amplitude share one table of the shape."""
 
     @pytest.mark.parametrize("drive", SAMPLES, ids=lambda drive: type(drive).__name__)
-    def test_angle_and_rate_are_amplitude_times_shape(self, drive):
+    def test_lookup_is_amplitude_times_shape(self, drive):
         t = radians(70.0)
         table = np.array([shape(drive, t)[:2]])
         amplitude = getattr(drive, "amplitude", 0.0)

@@ -1,4 +1,4 @@
-"""Set-valued laws, every switching point located: against closed forms, against themselves, and in their limits."""
+"""Set-valued laws with located events, against closed forms, tighter tolerances and limits."""
 
 from math import atan, cos, log1p, sin
 
@@ -16,7 +16,7 @@ EXACT = Event(rtol=1e-14, certify=False)
 
 @pytest.fixture
 def stiction(cells):
-    """Batch with set-valued friction; still unless a drive is named."""
+    """Batch with set-valued friction; without an amplitude of the drive the ring is at rest."""
 
     def build(changes, drive="arctan", law="stiction", **more):
         return cells(dict(changes), law=law, drive=drive, **more)
@@ -25,23 +25,23 @@ def stiction(cells):
 
 
 class TestFigures:
-    """The paper's figures in the limit of a vanishing stiction band, with the tail and without it."""
+    """Figures of the paper in the limit of a vanishing stiction band, with and without the tail."""
 
     @pytest.mark.parametrize(
         ("number", "law", "motion", "t", "phi"),
-        # With the band as it is printed: 3.58236 s, 1.28477 s, 0.14977 s, 0.1727 s.
+        # With the stiction band of the paper: 3.58236 s, 1.28477 s, 0.14977 s, 0.1727 s.
         [
             (29, "stiction", OSCILLATORY, 3.5822, 1.2445),
             (29, "tustin", OSCILLATORY, 3.5822, 1.2445),
             (30, "stiction", OSCILLATORY, 1.2848, 1.2911),
             (30, "tustin", OSCILLATORY, 1.2848, 1.2911),
-            # With its tail too in the tests of smooth laws.
+            # The tests of smooth laws have this figure with its tail.
             (31, "stiction", RESTING, 0.14977, 2.0436),
             (33, "stiction", REVOLVING, 0.17274, 8.5540),
             (33, "tustin", REVOLVING, 0.17274, 8.5540),
         ],
     )
-    def test_contact_2_separates(self, setting, number, law, motion, t, phi):
+    def test_contact_2_separates_at_the_known_instant(self, setting, number, law, motion, t, phi):
         batch = setting(number, law)
         found, exact = solve(Event(), batch), solve(EXACT, batch)
         assert (found.regime, found.motion, found.separating_contact) == (SEPARATING, motion, 2)
@@ -52,7 +52,7 @@ class TestFigures:
         assert exact.phi_end == pytest.approx(phi, abs=2e-4)
 
     @pytest.mark.parametrize("law", ["stiction", "tustin"])
-    def test_32_swings_once_and_rests(self, setting, law):
+    def test_figure_32_oscillates_once_and_rests(self, setting, law):
         batch = setting(32, law)
         found, exact = solve(Event(), batch), solve(EXACT, batch)
         assert found.regime == found.motion == OSCILLATORY
@@ -61,7 +61,7 @@ class TestFigures:
         for name in ("phi_end", "phi_max", "stick_time"):
             assert getattr(found, name) == pytest.approx(getattr(exact, name), abs=1e-10)
 
-    def test_error_falls_with_the_tolerance(self, setting):
+    def test_error_of_event_falls_with_the_tolerance(self, setting):
         batch = setting(30, "tustin")
         exact = solve(EXACT, batch).t_end
         tolerances = 10.0 ** -np.arange(6, 13)
@@ -71,9 +71,9 @@ class TestFigures:
 
 
 class TestClosedForms:
-    """On an immobile ring every edge is known, and between two of them the orbit is too."""
+    """On a ring at rest the places of edges, and the orbits between them, are known in closed form."""
 
-    def test_of_launches_into_rough_arcs(self, stiction):
+    def test_launches_into_rough_arcs_agree_with_closed_forms(self, stiction):
         rng = np.random.default_rng(3)
         n = 60
         omega = rng.uniform(5, 60, n) * rng.choice([-1, 1], n)
@@ -104,7 +104,7 @@ class TestClosedForms:
         assert {RESTING, OSCILLATORY, REVOLVING} <= set(found.motion)
         assert found.reversals.max() >= 3
 
-    def test_of_a_single_contact(self, stiction):
+    def test_launches_on_a_single_contact_agree_with_closed_forms(self, stiction):
         rng = np.random.default_rng(5)
         n = 20
         omega, half_angle = rng.uniform(5, 80, n), rng.uniform(0.05, 3, n)
@@ -124,21 +124,21 @@ class TestClosedForms:
 
 
 class TestStick:
-    """Where it sticks the body moves with the ring, and friction is what the balances of momentum ask for."""
+    """In stick the body moves with the ring, and the balances of momentum give the friction."""
 
     @pytest.fixture
     def run(self, setting):
         batch = setting(29, "stiction")
         return take(batch, 0), trail(Event(), batch, 1e-3)
 
-    def test_moves_with_the_ring(self, run):
+    def test_stuck_body_moves_with_the_ring(self, run):
         _, run = run
         stuck = run.mode == 0
         assert 0.3 < stuck.mean() < 0.9
         np.testing.assert_allclose(run.omega[stuck], run.ring_omega[stuck], rtol=1e-8)
         np.testing.assert_allclose(run.epsilon[stuck], 2 / (1 + run.t[stuck] ** 2), rtol=1e-7)
 
-    def test_friction_stays_within_its_bounds_and_ends_at_one_of_them(self, run):
+    def test_friction_in_stick_stays_within_its_bounds_and_reaches_one_at_the_end(self, run):
         scene, run = run
         body = scene.body
         needed = (
@@ -152,7 +152,7 @@ class TestStick:
         ends = np.flatnonzero(stuck[:-1] & ~stuck[1:])
         assert len(ends) >= 5
         np.testing.assert_allclose(np.abs(kappa[ends]), 1.0, atol=1e-9)
-        # The reactions are those that share the friction in the same measure.
+        # At both contacts friction is the same share of its bound.
         for k in np.flatnonzero(stuck)[::100]:
             K1, K2 = kappa[k] * mu[int(run.zone_1[k])], kappa[k] * mu[int(run.zone_2[k])]
             place = np.array([run.omega[k] ** 2, cos(run.phi[k]), sin(run.phi[k])])
@@ -160,14 +160,14 @@ class TestStick:
             np.testing.assert_allclose([run.epsilon[k], run.normal_1[k], run.normal_2[k]], expected, rtol=1e-9)
 
     @pytest.mark.parametrize("amplitude", [0.02, 0.1, -0.5, 3.0])
-    def test_breaks_away_where_full_friction_no_longer_holds(self, stiction, amplitude):
-        """Solved for the instant at which friction is used up, with both reactions, from the balances as printed."""
+    def test_breakaway_is_where_full_friction_no_longer_suffices(self, stiction, amplitude):
+        """The balances of the paper are solved for the instant of breakaway and for both reactions."""
         batch = stiction({"drive.amplitude": amplitude, "zone.half_angle": 0.0, "time.span": 60.0})
         body = take(batch.body, 0)
         M, J, g, R, xi, s, c = (
             getattr(body, name) for name in ("mass", "inertia", "gravity", "radius", "xi", "sin_beta", "cos_beta")
         )
-        # Friction pulls the way that the ring turns; no contact is on an arc.
+        # Friction has the direction in which the ring turns; no contact is on an arc.
         K = 0.2 * np.sign(amplitude)
 
         def balances(unknown):
@@ -189,26 +189,26 @@ class TestStick:
         assert run.mode[slips] == -np.sign(amplitude)
         assert run.normal_1[slips - 1] == pytest.approx(N1, rel=1e-8)
         assert run.normal_2[slips - 1] == pytest.approx(N2, rel=1e-8)
-        short = stiction({"drive.amplitude": amplitude, "zone.half_angle": 0.0, "time.span": t + 1e-3})
-        assert solve(Event(), short).stick_time == pytest.approx(t, abs=1e-9)
-        held = stiction({"drive.amplitude": amplitude, "zone.half_angle": 0.0, "time.span": t - 1e-6})
-        assert solve(Event(), held).stick_time == t - 1e-6
+        slips_at_the_end = stiction({"drive.amplitude": amplitude, "zone.half_angle": 0.0, "time.span": t + 1e-3})
+        assert solve(Event(), slips_at_the_end).stick_time == pytest.approx(t, abs=1e-9)
+        stuck_to_the_end = stiction({"drive.amplitude": amplitude, "zone.half_angle": 0.0, "time.span": t - 1e-6})
+        assert solve(Event(), stuck_to_the_end).stick_time == t - 1e-6
 
 
 class TestEnergy:
-    """What the body gains in energy is the work of friction."""
+    """The energy of the body changes by the work of friction."""
 
     @pytest.mark.parametrize("number", [29, 30, 32, 33])
-    def test_balances_to_the_tolerance(self, setting, number):
-        """As well as the work can be summed from a history."""
+    def test_energy_changes_by_the_work_of_friction(self, setting, number):
+        """The tolerance covers the quadrature of the work over a sampled history."""
         rough, rest = ((0.5, 0.3), (0.2, 0.1)) if number < 32 else ((0.2, 0.15), (0.15, 0.1))
         batch = setting(number, "stiction")
         assert imbalance(batch, trail(Event(), batch, 2e-4), (rest, rough)) < 1e-9
 
 
 class TestLimit:
-    def test_tustin_tends_to_stiction_as_the_tail_steepens(self, setting, cells, figure):
-        """The way out of the tail is exponential: it takes a time of log(alpha) / alpha."""
+    def test_tustin_tends_to_stiction_as_its_tail_steepens(self, setting, cells, figure):
+        """The body leaves the tail exponentially, which takes a time proportional to log(alpha) / alpha."""
         for number in (29, 30):
             drive, changes, _ = figure(number)
             alpha = 10.0 ** np.arange(3, 8)
@@ -221,7 +221,7 @@ class TestLimit:
 
 
 class TestEnds:
-    def test_jamming_at_launch_is_where_the_effective_inertia_vanishes(self, stiction):
+    def test_launch_jams_where_the_effective_inertia_is_not_positive(self, stiction):
         body = take(stiction({}).body, 0)
         about_axis = (body.inertia / body.mass + body.xi**2) * body.cos_beta
         limit = np.sqrt(about_axis / (body.radius * body.xi - about_axis))
@@ -231,7 +231,7 @@ class TestEnds:
         np.testing.assert_array_equal(found.regime == JAMMED, [False, True])
         np.testing.assert_array_equal(found.t_end == 0.0, [False, True])
 
-    def test_jamming_where_a_contact_reaches_a_rough_arc(self, stiction):
+    def test_body_jams_where_a_contact_reaches_a_rough_arc(self, stiction):
         rough = {"friction.rough.mu_s": 3.0, "friction.rough.mu_k": 3.0}
         batch = stiction(rough | {"zone.center": 1.5, "initial.omega": 30.0})
         found = solve(Event(), batch)
@@ -239,7 +239,7 @@ class TestEnds:
         assert found.motion == RESTING
         assert found.phi_end == pytest.approx(1.5 - np.radians(15.0) - take(batch.body, 0).beta, abs=1e-13)
 
-    def test_separation_is_where_the_reaction_vanishes(self, stiction):
+    def test_separation_is_located_where_the_reaction_vanishes(self, stiction):
         batch = stiction({"initial.omega": np.linspace(30, 60, 20), "zone.half_angle": 0.0})
         found = solve(Event(), batch)
         assert (found.regime == SEPARATING).all()

@@ -1,4 +1,4 @@
-"""The examples of docs/extending.md: each runs as it stands there, and does what its page says."""
+"""The examples of docs/extending.md run, and do what the page claims."""
 
 import os
 import re
@@ -11,10 +11,10 @@ import pytest
 
 PAGE = (Path(__file__).parents[1] / "docs" / "extending.md").read_text(encoding="utf-8")
 
-#: Files that the page shows, by name.
+#: Example files of the page, by name.
 FILES = {name: text for text, name in re.findall(r"```python\n(# (my_\w+\.py)\n.*?)```", PAGE, re.DOTALL)}
 
-#: What the scripts below share.
+#: Beginning of the scripts below.
 RUN = """
 import numpy as np, ringsweep
 from ringsweep.errors import InputError
@@ -31,7 +31,7 @@ equilibrium = np.arcsin(0.3 / np.tan(np.radians(40.0)))
 
 
 def files_in(folder, changes=()):
-    """Paths of the example files, written to a folder; each of `changes` is ``(name, old text, new text)``."""
+    """Write the example files to a folder and return their paths. A change is ``(name, old text, new text)``."""
     paths = []
     for name, text in FILES.items():
         for changed, old, new in changes:
@@ -44,7 +44,7 @@ def files_in(folder, changes=()):
 
 
 def in_a_process(script, paths, cache):
-    """Run a script with own files; their kernels go to a cache of their own, since their types exist nowhere else."""
+    """Run a script in a new process, with own files and with a cache of its own."""
     environment = {
         **os.environ,
         "RINGSWEEP_LAWS": os.pathsep.join(map(str, paths)),
@@ -55,23 +55,24 @@ def in_a_process(script, paths, cache):
     return subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=False)
 
 
-def test_the_page_shows_a_file_for_each_thing_that_can_be_added():
+def test_page_has_one_example_for_each_kind_of_extension():
     assert list(FILES) == ["my_ramp.py", "my_weakening.py", "my_run_up.py", "my_disc.py", "my_heun.py"]
 
 
+#: Claims of the page, each with a script that checks it.
 CLAIMS = {
-    "a body under the smooth law of the page settles where its friction balances the spring": """
+    "a body under the smooth law settles where friction balances the spring": """
         found = run({**belt, "friction": {"law": "ramp", "mu_k": 0.1, "v0": 0.05, "viscous": 1.0}})
         assert found["certified"] == 1
         assert abs(found["x_end"] - (0.1 * 9.81 + 0.1) / 2.0) < 1e-3, found["x_end"].item()
     """,
-    "a set-valued law that weakens at once is stiction": """
+    "the set-valued law with a very small v1 is stiction": """
         weak = run({**belt, "friction": {"law": "weakening", "mu_s": 0.15, "mu_k": 0.1, "v1": 1e-9}})
         known = run({**belt, "friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.1}})
         assert weak["certified"] == 1 and weak["regime"] == known["regime"]
         assert abs(weak["x_end"] - known["x_end"]) < 1e-6
     """,
-    "a disc that has run up holds a body where friction balances the weight": """
+    "a body on the disc settles where friction balances the weight": """
         drive = {"law": "run-up", "amplitude": 30.0, "tau": 0.01}
         initial = {"phi": equilibrium, "omega": 0.0}
         found = run({**disc, "drive": drive, "initial": initial}, {"method": "event"})
@@ -79,19 +80,19 @@ CLAIMS = {
         assert np.abs(found["phi"] - equilibrium).max() < 0.05
         assert found["normal_1"].std() < 1e-12
     """,
-    "rk4 and event agree on a body that swings on a disc at rest": """
+    "rk4 and event agree on a body that swings on the disc at rest": """
         scene = {**disc, "initial": {"phi": 1.0, "omega": -0.5}, "time": {"span": 0.2}}
         exact, fixed = run(scene, "event"), run(scene, {"method": "rk4", "steps": 2000})
         assert abs(exact["phi_end"] - fixed["phi_end"]) < 1e-9
     """,
-    "the method of the page is of order two": """
+    "the method heun has order two": """
         initial = {"x": 0.5, "velocity": 0.0}
         scene = {**belt, "friction": {"law": "coulomb", "mu_k": 0.1}, "initial": initial, "time": {"span": 2.0}}
         exact = run(scene, "event")["x_end"]
         coarse, fine = (run(scene, {"method": "heun", "steps": n})["x_end"] - exact for n in (200, 400))
         assert 3.8 < coarse / fine < 4.2, (coarse.item(), fine.item())
     """,
-    "rk4 refuses a law that lacks a function by the names of both": """
+    "rk4 refuses a law without blend, and names both": """
         try:
             friction = {"law": "weakening", "mu_s": 0.15, "mu_k": 0.1, "v1": 0.1}
             run({**belt, "friction": friction}, {"method": "rk4", "steps": 10})
@@ -105,7 +106,7 @@ CLAIMS = {
 
 
 def test_examples_do_what_the_page_claims(tmp_path):
-    """In one process, so that each kernel is compiled once."""
+    """All claims in one process, so that each kernel is compiled once."""
     script = "".join(f"\n# {claim}\n{textwrap.dedent(body)}" for claim, body in CLAIMS.items())
     done = in_a_process(script, files_in(tmp_path), tmp_path / "cache")
     assert done.returncode == 0, done.stderr[-2000:]
@@ -126,7 +127,7 @@ def test_examples_do_what_the_page_claims(tmp_path):
         ),
     ],
 )
-def test_a_file_that_lacks_something_is_refused_by_name_in_one_line(tmp_path, name, old, new, message):
+def test_incomplete_file_is_refused_in_one_line_that_names_what_is_missing(tmp_path, name, old, new, message):
     paths = [path for path in files_in(tmp_path, [(name, old, new)]) if path.name == name]
     script = "from ringsweep.cli import main; raise SystemExit(main(['schema']))"
     done = in_a_process(script, paths, tmp_path / "cache")

@@ -1,4 +1,4 @@
-"""Smooth laws as they are written: against brute force, against converged references, and in their limits."""
+"""Smooth laws, against brute force, converged references and limits."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ LIMIT = Event(rtol=1e-14, certify=False)
 
 
 class TestFigures:
-    """The law as printed, v0 = 2e-6 m/s and all: what a step of 0.2 us of Runge-Kutta 4 gives."""
+    """Figures with the law of the paper, v0 = 2e-6 m/s: the same results as Runge-Kutta 4 with steps of 0.2 us."""
 
     @pytest.mark.parametrize(
         ("number", "motion", "t", "phi"),
@@ -24,7 +24,7 @@ class TestFigures:
             (33, REVOLVING, (0.1727, 5e-5), (8.554, 5e-4)),
         ],
     )
-    def test_contact_2_separates(self, setting, number, motion, t, phi):
+    def test_contact_2_separates_at_the_known_instant(self, setting, number, motion, t, phi):
         found, exact = solve(Implicit(), setting(number)), solve(EXACT, setting(number))
         for run in (found, exact):
             assert (run.regime, run.motion, run.separating_contact) == (SEPARATING, motion, 2)
@@ -34,7 +34,7 @@ class TestFigures:
         assert found.t_separation == pytest.approx(exact.t_separation, abs=1e-6)
 
     @pytest.mark.parametrize(("number", "phi_max"), [(28, 0.69946), (32, 0.82937)])
-    def test_no_contact_separates(self, setting, number, phi_max):
+    def test_no_contact_separates_in_figures_28_and_32(self, setting, number, phi_max):
         found, exact = solve(Implicit(), setting(number)), solve(EXACT, setting(number))
         assert found.regime == found.motion == OSCILLATORY
         assert found.certified
@@ -43,7 +43,7 @@ class TestFigures:
         assert found.phi_end == pytest.approx(exact.phi_end, abs=1e-6)
 
     @pytest.mark.parametrize("number", [25, 27])
-    def test_of_a_wide_band_agree_with_runge_kutta(self, setting, number):
+    def test_figures_with_a_wide_band_agree_with_rk4(self, setting, number):
         """At v0 = 0.2 m/s nothing is stiff, and a small step converges."""
         batch = setting(number)
         found, other = solve(EXACT, batch), solve(RK4(2_000_000, certify=False), batch)
@@ -53,8 +53,8 @@ class TestFigures:
         assert found.phi_max == pytest.approx(other.phi_max, abs=1e-8)
         assert solve(Implicit(), batch).phi_end == pytest.approx(other.phi_end, abs=1e-6)
 
-    def test_error_falls_with_the_tolerance(self, setting):
-        """Over six decades, down to rounding."""
+    def test_error_of_implicit_falls_with_the_tolerance(self, setting):
+        """The error falls over six decades, down to rounding."""
         batch = setting(30)
         exact = solve(Implicit(rtol=1e-12, certify=False), batch).t_end
         tolerances = 10.0 ** -np.arange(4, 11)
@@ -65,7 +65,7 @@ class TestFigures:
 
 
 class TestLimit:
-    """As v0 vanishes the law becomes set-valued, with the tail that it has."""
+    """As v0 tends to zero the law becomes set-valued and keeps its tail."""
 
     V0 = 2.0 * 10.0 ** -np.arange(5, 10)
 
@@ -73,8 +73,8 @@ class TestLimit:
         return np.polyfit(np.log(x), np.log(error), 1)[0]
 
     @pytest.mark.parametrize("number", [29, 30])
-    def test_a_flat_tail_is_left_with_an_error_proportional_to_v0(self, setting, number):
-        """The creep of a stuck contact, and the velocity with which it leaves the band."""
+    def test_separation_with_a_flat_tail_differs_from_the_limit_in_proportion_to_v0(self, setting, number):
+        """Both the creep of a stuck contact and its velocity at the end of the band are proportional to v0."""
         exact = solve(LIMIT, setting(number, "tustin", friction__alpha=10.0))
         found = solve(EXACT, setting(number, friction__alpha=10.0, friction__v0=self.V0))
         error = abs(found.t_separation - exact.t_separation)
@@ -83,8 +83,8 @@ class TestLimit:
 
     @pytest.mark.parametrize("alpha", [10.0, 1e5])
     @pytest.mark.parametrize("number", [29, 30])
-    def test_the_passage_over_the_top_of_the_band_takes_v0_to_the_two_thirds(self, setting, number, alpha):
-        """At the top the parabola is flat: ``v0 x' = -(c t + x^2)`` has the time scale v0^(2/3)."""
+    def test_passage_over_the_top_of_the_band_takes_a_time_of_v0_to_the_two_thirds(self, setting, number, alpha):
+        """The law is flat at its top: ``v0 x' = -(c t + x^2)`` has the time scale v0^(2/3)."""
         exact = solve(LIMIT, setting(number, "tustin", friction__alpha=alpha))
         found = solve(EXACT, setting(number, friction__alpha=alpha, friction__v0=self.V0))
         error = found.stick_time - exact.stick_time
@@ -92,26 +92,26 @@ class TestLimit:
         assert self.slope(self.V0, error) == pytest.approx(2 / 3, abs=0.02)
 
     @pytest.mark.parametrize("number", [29, 30])
-    def test_a_drop_is_left_late_by_that_passage(self, setting, number):
-        """With a tail far shorter than the band, separation is late by as much as every breakaway is."""
+    def test_separation_with_a_sudden_drop_is_late_by_v0_to_the_two_thirds(self, setting, number):
+        """With a tail much shorter than the band, separation is as late as breakaway."""
         exact = solve(LIMIT, setting(number, "stiction"))
         found = solve(EXACT, setting(number, friction__alpha=1e12, friction__v0=self.V0))
         error = abs(found.t_separation - exact.t_separation)
         assert self.slope(self.V0, error) == pytest.approx(2 / 3, abs=0.03)
 
-    def test_v0_is_not_replaced_by_its_limit(self, setting):
-        """What 2e-6 m/s of band change is small, and is there."""
+    def test_law_is_not_replaced_by_its_limit_of_small_v0(self, setting):
+        """A band of 2e-6 m/s changes the instant of separation by a small but known amount."""
         exact = solve(LIMIT, setting(29, "tustin"))
         found = solve(Implicit(), setting(29))
         assert found.t_separation - exact.t_separation == pytest.approx(5.9e-5, rel=0.05)
 
 
 class TestEnergy:
-    """What the body gains in energy is the work of friction."""
+    """The energy of the body changes by the work of friction."""
 
     @pytest.mark.parametrize(("alpha", "v0"), [(100.0, 0.2), (10.0, 1e-2), (100.0, 1e-3)])
-    def test_balances_to_the_tolerance(self, setting, alpha, v0):
-        """As well as the work can be summed from a history."""
+    def test_energy_changes_by_the_work_of_friction(self, setting, alpha, v0):
+        """The tolerance covers the quadrature of the work over a sampled history."""
         batch = setting(30, friction__alpha=alpha, friction__v0=v0)
         coarse, fine = (
             imbalance(batch, trail(Implicit(rtol), batch, 1e-5), ((0.2, 0.1), (0.5, 0.3))) for rtol in (1e-4, 1e-8)
@@ -121,10 +121,10 @@ class TestEnergy:
 
 
 class TestCreep:
-    """A stuck contact creeps: slowly, and the way that it is pushed."""
+    """A stuck contact creeps slowly, in the direction of the load."""
 
-    def test_is_as_fast_as_friction_is_short_of_the_load(self, setting):
-        """Ever less friction is needed of a band ever narrower: the fraction of it that is used stays the same."""
+    def test_creep_velocity_is_the_same_fraction_of_v0_for_any_v0(self, setting):
+        """The load needs the same friction for any v0, and so the same fraction of the band."""
         fractions = []
         for v0 in (1e-4, 1e-6, 1e-8):
             run = trail(Implicit(), setting(29, friction__v0=v0, time__span=0.5), 1e-2)
@@ -135,8 +135,7 @@ class TestCreep:
         assert np.ptp(fractions) < 1e-3
         assert -0.9 < fractions[0] < -0.1
 
-    def test_at_rest_on_a_ring_at_rest(self, setting):
-        """Nothing pushes and nothing moves."""
+    def test_body_at_rest_on_a_ring_at_rest_does_not_move(self, setting):
         found = solve(Implicit(max_steps=2000), setting(29, drive__amplitude=0.0))
         assert found.regime == RESTING
         assert found.certified
@@ -149,7 +148,7 @@ JAM_PATHS = (
     "friction.rest.mu_s", "friction.rest.mu_k", "friction.alpha", "friction.v0", "initial.omega", "time.span",
 )  # fmt: skip
 
-#: Scenes that jam, or might be thought to; their paths in the order of `JAM_PATHS`.
+#: Scenes that jam or nearly jam; values in the order of `JAM_PATHS`.
 JAMS = {
     "tail of 1e-6 m/s": "0.196958 -0.674266 0.690522 1.8017 0.694367 1.04223 0.819171 1293490 7.22657e-8 -8.15013 2",
     "tail of 2e-7 m/s": "-9.808 0 0.888738 0.979616 0.944569 1.85271 1.19351 5207650 0.0864945 -24.9425 1",
@@ -162,7 +161,7 @@ JAMS = {
 
 
 class TestJam:
-    """Where friction rises as the body slows down it may jam; what brute force finds there, to 1e-12 in LSODA."""
+    """A body may jam where friction rises as it slows down. The references are from LSODA with tolerance 1e-12."""
 
     @staticmethod
     def changes(name):
@@ -173,8 +172,8 @@ class TestJam:
         ("name", "t"),
         [("tail of 1e-6 m/s", 0.015409496), ("tail of 2e-7 m/s", 0.012403025), ("top of the band", 0.175363621)],
     )
-    def test_is_no_separation(self, cells, name, t, rtol):
-        """Both reactions grow without bound as the effective inertia vanishes: neither contact lifts."""
+    def test_jam_is_not_taken_for_separation(self, cells, name, t, rtol):
+        """Both reactions grow without bound as the effective inertia vanishes, and no contact separates."""
         found = solve(Implicit(rtol, max_steps=20_000), cells(self.changes(name), drive="arctan"))
         assert found.regime == JAMMED
         assert found.separating_contact == 0
@@ -185,8 +184,8 @@ class TestJam:
         ("name", "exponent"),
         [("ice", 1.24144), ("alpha of 1e5", 1.13513), ("alpha of 2e6", 1.2062), ("rough", 1.10451)],
     )
-    def test_is_not_seen_where_a_ring_starts_with_infinite_acceleration(self, cells, name, exponent, rtol):
-        """The tail of the law is passed in 1e-12 s, far from any jam."""
+    def test_start_with_infinite_acceleration_is_not_taken_for_a_jam(self, cells, name, exponent, rtol):
+        """The body passes the tail of the law within 1e-12 s, far from a jam."""
         changes = self.changes(name) | {"drive.exponent": exponent}
         found = solve(Implicit(rtol), cells(changes, drive="power"))
         assert found.t_end == changes["time.span"]

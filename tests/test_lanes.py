@@ -1,4 +1,4 @@
-"""Runs side by side: the functions of lanes are those of the C library, and each lane is its run alone."""
+"""Runs side by side in vector lanes: functions against the C library, and runs against single runs."""
 
 from math import radians
 
@@ -11,7 +11,7 @@ from ringsweep.models import MODELS
 from ringsweep.numerics.functions import any_of, decay, floor, opposing, select, sine_cosine, sine_cosine_near
 from ringsweep.numerics.lanes import WIDTH
 from ringsweep.numerics.memory import Several, Single, conform, read_lanes, side_by_side, write
-from ringsweep.physics.drives import scaled
+from ringsweep.physics.drives import without_shape
 from ringsweep.physics.friction import LAWS
 from ringsweep.physics.friction.velocity import BAND, piece, steepest, stiction_band, weights
 from ringsweep.quantities.parameters import declared
@@ -38,11 +38,11 @@ def _weights(law, memory, at, speed, out):
 
 
 class TestFunctions:
-    """In every lane what NumPy says, to the last digits."""
+    """Mathematical functions of every lane against NumPy."""
 
     @pytest.mark.parametrize("scale", [1e-3, 1.0, 30.0, 1e6])
     @pytest.mark.parametrize("apart", [0.0, 1e-4, 0.03, 0.04, 1.0, 1e3])
-    def test_are_those_of_the_c_library(self, scale, apart):
+    def test_functions_of_lanes_agree_with_numpy_to_rounding(self, scale, apart):
         rng = np.random.default_rng(4)
         out = np.empty((10, WIDTH))
         for _ in range(200):
@@ -60,28 +60,27 @@ class TestFunctions:
             np.testing.assert_array_equal(out[6:8], [np.minimum(x, near), np.maximum(x, near)])
             np.testing.assert_allclose(out[8:], [np.sin(near), np.cos(near)], rtol=0, atol=6e-16)
 
-    def test_a_number_that_is_none_is_not_heard(self):
+    def test_min_and_max_of_lanes_ignore_nan_in_the_second_argument(self):
         x = np.linspace(-1.0, 1.0, WIDTH)
         near = x.copy()
         near[3] = np.nan
         out = np.empty((10, WIDTH))
         _functions(x, near, out.reshape(-1))
-        # Extremes keep what they held, as Python's do.
         np.testing.assert_array_equal(out[6:8], [x, x])
 
 
-def test_what_is_written_for_types_is_not_for_python():
-    with pytest.raises(TypeError, match="write is for kernels alone"):
+def test_generated_function_called_in_python_raises_type_error():
+    with pytest.raises(TypeError, match="write can only be called in a kernel"):
         write(np.empty(1), 0, 1, (0.0,))
 
 
 class TestWeights:
-    """Each law has a formula without a branch beside its pieces."""
+    """Each law has a formula without branches, `blend`, beside its pieces."""
 
     @pytest.mark.parametrize(
         "name", ["coulomb", "stiction", "tustin", "threlfall", "piecewise-linear", "piecewise-cubic", "bengisu-akay"]
     )
-    def test_of_both_formulas_agree(self, name):
+    def test_blend_of_a_law_agrees_with_its_pieces(self, name):
         rng = np.random.default_rng(2)
         cls = LAWS[name]
         out = np.empty((4, WIDTH))
@@ -97,8 +96,7 @@ class TestWeights:
             np.testing.assert_allclose(out / scale, exact / scale, rtol=0, atol=1e-14)
 
     @pytest.mark.parametrize("name", ["threlfall", "piecewise-linear", "piecewise-cubic", "bengisu-akay"])
-    def test_are_steepest_where_the_law_says(self, name):
-        """At rest as declared; nowhere beyond the band steeper than declared for its edge."""
+    def test_steepest_of_a_law_is_its_slope_at_rest_and_its_largest_outside_the_band(self, name):
         cls = LAWS[name]
         given = {"v0": 0.1, "v1": 0.4, "alpha": 7.0}
         law = cls(*map(float, getattr(cls, "of", cls)(**{key: given[key] for key in declared(cls)})))
@@ -110,7 +108,7 @@ class TestWeights:
 
 
 def family(cells, model="ring", count=40):
-    """Cells over amplitude, half-angle and launch, which slip, stick, reverse and separate."""
+    """Cells with random amplitudes, half-angles and launches, which slip, stick, reverse and separate."""
     rng = np.random.default_rng(7)
     values = {
         "drive.amplitude": rng.uniform(0.1, 8.0, count),
@@ -122,10 +120,10 @@ def family(cells, model="ring", count=40):
 
 
 def integrate(kind, batch, steps, order=None):
-    """Outcomes of a batch's cells, taken in an order, by the kernel for one run or for several side by side."""
+    """Outcomes of the cells of a batch, computed in a given order, one by one or side by side."""
     order = np.arange(len(batch.span)) if order is None else order
     rows, report = np.empty((len(batch.span), len(NAMES))), np.empty((len(batch.span), 5))
-    scenes = side_by_side(batch._replace(drive=scaled(batch.drive))) if isinstance(kind, Several) else batch
+    scenes = side_by_side(batch._replace(drive=without_shape(batch.drive))) if isinstance(kind, Several) else batch
     rk4.integrate(kind, rk4.Diagnosed(), scenes, take(batch.drive, 0), order, steps, rows, report)
     columns = zip(("steps", "stiffness", "slack", "fall", "stride"), report.T, strict=True)
     return dict(zip(NAMES, rows.T, strict=True)) | dict(columns)
@@ -133,8 +131,8 @@ def integrate(kind, batch, steps, order=None):
 
 class TestEachLane:
     @pytest.mark.parametrize("model", ["ring", "ring-single-contact"])
-    def test_is_its_run_alone(self, cells, model):
-        """A smooth law, short steps: what is left between the two is rounding."""
+    def test_run_side_by_side_agrees_with_the_single_run_to_rounding(self, cells, model):
+        """A smooth law and short steps, so that rounding does not grow."""
         batch = family(cells, model=model)
         alone, together = (integrate(kind, batch, 6000) for kind in (Single(), Several()))
         assert alone["reversals"].max() > 1
@@ -145,8 +143,8 @@ class TestEachLane:
         for name in regimes:
             np.testing.assert_array_equal(together[name], alone[name])
 
-    def test_does_not_depend_on_its_neighbours(self, cells):
-        """Bit for bit, whoever sits beside it and in whichever order they came."""
+    def test_run_does_not_depend_on_the_runs_beside_it(self, cells):
+        """Bit for bit, for other runs beside it and another order."""
         batch = family(cells)
         whole = integrate(Several(), batch, 2000)
         shuffled = integrate(Several(), batch, 2000, np.random.default_rng(1).permutation(len(batch.span)))
@@ -158,7 +156,7 @@ class TestEachLane:
                 np.testing.assert_array_equal(one[name][0], whole[name][i], err_msg=name)
 
 
-def test_a_run_is_the_same_whether_or_not_its_stiffness_is_kept(cells):
+def test_outcomes_do_not_depend_on_diagnosis(cells):
     batch = family(cells)
     kept, dropped = (RK4(1000, certify=False, diagnose=diagnose).run(batch, NAMES) for diagnose in (True, False))
     np.testing.assert_array_equal(dropped.rows, kept.rows)

@@ -1,4 +1,4 @@
-"""Friction as a function of the sliding velocity: each law against its own statement, all against what they share."""
+"""Friction laws of the sliding velocity: formulas of each law, and properties of all laws."""
 
 import os
 import subprocess
@@ -36,12 +36,12 @@ MU_S, MU_K = 0.5, 0.3
 
 
 def made(law, *columns):
-    """A law of one cell, made as a sweep makes it."""
+    """Law of one cell, made in the same way as in a sweep."""
     return take(getattr(law, "of", law)(*(np.array([value]) for value in columns)), 0)
 
 
 def powers(low, high):
-    """Numbers spread evenly over orders of magnitude."""
+    """Numbers that are uniformly distributed over orders of magnitude."""
     return st.floats(log(low), log(high)).map(exp)
 
 
@@ -56,7 +56,7 @@ tustin = st.builds(lambda alpha: made(Tustin, alpha), st.just(0.0) | alphas)
 karnopp = st.builds(lambda band: made(Karnopp, band), widths)
 constant = st.sampled_from([Coulomb(), Stiction()])
 
-# One of each kind together: no choice of examples misses a law.
+# One law of each kind together, so that no random choice omits a law.
 smooth = st.tuples(threlfall, linear, cubic, bengisu_akay)
 every = st.tuples(threlfall, linear, cubic, bengisu_akay, tustin, karnopp, constant)
 
@@ -67,31 +67,32 @@ def pieces(law):
     return {region: p for region, p in found.items() if p.low < p.high}
 
 
-def reach(p):
-    """Sliding speed over which the weights of a piece change, m/s."""
+def width_of(p):
+    """Interval of the sliding speed in which the weights of a piece change, m/s."""
     ends = [length for length in (p.high - p.low, 1 / p.decay if p.decay else inf) if length < inf]
     return min(ends, default=1.0)
 
 
 def mu(law, speed):
+    """Friction coefficient of a law."""
     w_s, w_k, _, _ = weights(law, speed)
     return w_s * MU_S + w_k * MU_K
 
 
 def slope(law, speed, region=None):
-    """Slope of the coefficient of friction, s/m; by the formula of a region if one is named."""
+    """Slope of the friction coefficient, s/m; by the formula of a region if one is given."""
     _, _, dw_s, dw_k = weights(law, speed) if region is None else weights_in(law, region, speed)
     return dw_s * MU_S + dw_k * MU_K
 
 
-def test_there_is_a_test_for_every_law():
+def test_every_law_of_the_velocity_is_tested():
     tested = {Threlfall, PiecewiseLinear, PiecewiseCubic, BengisuAkay, Tustin, Karnopp, Coulomb, Stiction}
     assert {law for law in LAWS.values() if family_of(law) is not Dynamic} == tested
 
 
 class TestRegions:
     @given(every)
-    def test_tile_the_half_line(self, laws):
+    def test_regions_cover_all_speeds_without_overlap(self, laws):
         for law in laws:
             found = list(pieces(law).values())
             assert found[0].low == 0.0
@@ -100,15 +101,15 @@ class TestRegions:
                 assert one.high == other.low
 
     @given(every, st.floats(0.0, 3.0))
-    def test_hold_the_speeds_between_their_bounds(self, laws, relative):
+    def test_region_at_a_speed_has_bounds_around_it(self, laws, relative):
         for law in laws:
             for p in pieces(law).values():
-                speed = p.low + relative * reach(p)
+                speed = p.low + relative * width_of(p)
                 low, high = region_bounds(law, region_at(law, speed))
                 assert low <= speed < high
 
     @given(every)
-    def test_a_boundary_belongs_to_the_region_above_it(self, laws):
+    def test_bound_belongs_to_the_region_above_it(self, laws):
         for law in laws:
             for below, above in pairwise(pieces(law)):
                 edge = piece(law, above).low
@@ -116,14 +117,14 @@ class TestRegions:
                 assert region_at(law, nextafter(edge, 0.0)) == below
 
     @given(every)
-    def test_follow_each_other_up_and_down(self, laws):
+    def test_faster_and_slower_regions_are_neighbours(self, laws):
         for law in laws:
             for below, above in pairwise(pieces(law)):
                 assert faster(law, below) == above
                 assert slower(law, above) == below
 
     @given(widths)
-    def test_a_contact_counts_as_stuck_within_the_band(self, v0):
+    def test_stiction_band_of_a_law_is_its_parameter_or_zero(self, v0):
         for law in (Threlfall(v0), PiecewiseLinear(v0, 2 * v0), PiecewiseCubic(v0, 2 * v0), Karnopp(v0)):
             assert stiction_band(law) == v0
         assert stiction_band(made(BengisuAkay, 10.0, v0)) == v0
@@ -133,35 +134,33 @@ class TestRegions:
 
 class TestWeights:
     @given(smooth)
-    def test_of_a_smooth_law_are_continuous(self, laws):
-        """Beyond the end of a tail the sliding velocity changes by less than 1e-17 m/s, or by rounding."""
+    def test_weights_of_a_smooth_law_are_continuous(self, laws):
+        """At the end of a tail they may jump by what changes the sliding velocity by 1e-17 m/s, or by rounding."""
         for law in laws:
             for below, above in pairwise(pieces(law)):
                 edge = piece(law, above).low
-                left = max(1.1e-17 * piece(law, below).decay, 1e-14)
+                jump = max(1.1e-17 * piece(law, below).decay, 1e-14)
                 one, other = weights_in(law, below, edge), weights_in(law, above, edge)
-                # Where a piece is steep, a rounding of the edge itself is felt.
-                left += np.spacing(edge) * max(map(abs, one[2:] + other[2:]))
-                assert other[:2] == pytest.approx(one[:2], abs=left)
+                # Where a piece is steep, rounding of the edge changes the weights.
+                jump += np.spacing(edge) * max(map(abs, one[2:] + other[2:]))
+                assert other[:2] == pytest.approx(one[:2], abs=jump)
 
     @given(cubic)
-    def test_of_cubics_have_continuous_slopes(self, law):
-        """And a smooth top: both slopes vanish where regions meet."""
+    def test_slopes_of_piecewise_cubic_are_zero_where_regions_meet(self, law):
         for below, above in pairwise(pieces(law)):
             edge = piece(law, above).low
             for region in (below, above):
                 p = piece(law, region)
-                spread = 1e-13 + 10 * np.spacing(edge) / reach(p)
-                assert weights_in(law, region, edge)[2:] == pytest.approx((0.0, 0.0), abs=spread / reach(p))
+                spread = 1e-13 + 10 * np.spacing(edge) / width_of(p)
+                assert weights_in(law, region, edge)[2:] == pytest.approx((0.0, 0.0), abs=spread / width_of(p))
 
     @given(every, st.floats(0.0, 1.0, exclude_max=True))
-    def test_never_leave_what_friction_can_be(self, laws, relative):
-        """However steep the law: a blend of both coefficients, at most mu_s, and above mu_k beyond the band."""
+    def test_friction_lies_between_zero_and_mu_s_and_above_mu_k_outside_the_band(self, laws, relative):
         for law in laws:
             for region, p in pieces(law).items():
                 speed = p.low + relative * (p.high - p.low if p.high < inf else 1.0)
                 w_s, w_k, _, _ = weights(law, speed)
-                rounding = 1e-14 + 10 * np.spacing(speed) / reach(p)
+                rounding = 1e-14 + 10 * np.spacing(speed) / width_of(p)
                 assert -rounding <= w_s <= 1 + rounding
                 assert -rounding <= w_k <= 1 + rounding
                 assert 0.0 <= mu(law, speed) <= MU_S * (1 + rounding)
@@ -169,10 +168,10 @@ class TestWeights:
                     assert w_s + w_k == pytest.approx(1.0, abs=rounding)
 
     @given(every, st.floats(0.0, 1.0))
-    def test_have_slopes_that_are_derivatives(self, laws, relative):
+    def test_slopes_of_weights_are_their_derivatives(self, laws, relative):
         for law in laws:
             for region, p in pieces(law).items():
-                length = reach(p)
+                length = width_of(p)
                 speed = p.low + relative * length
                 after, before = speed + 1e-5 * length, speed - 1e-5 * length
                 _, _, *slopes = weights_in(law, region, speed)
@@ -182,11 +181,10 @@ class TestWeights:
                     assert slopes[k] == pytest.approx((ahead[k] - behind[k]) / (after - before), abs=spread)
 
     @given(every, st.floats(0.0, 1.0), st.lists(st.floats(-1.0, 1.0), min_size=8, max_size=8))
-    def test_follow_a_speed_that_is_a_series(self, laws, relative, coefficients):
-        """The series of the weights, summed a little later, are the weights at the speed of then."""
+    def test_series_of_weights_equals_weights_of_the_series_of_the_speed(self, laws, relative, coefficients):
         for law in laws:
             for region, p in pieces(law).items():
-                length, s = reach(p), 0.02
+                length, s = width_of(p), 0.02
                 x = length * np.array([relative, *coefficients])
                 basis, static, kinetic = np.zeros((3, len(x)))
                 for k in range(len(x)):
@@ -200,7 +198,7 @@ class TestWeights:
 
 class TestThrelfall:
     @given(widths)
-    def test_rises_from_zero_to_mu_k_at_v0_and_stays(self, v0):
+    def test_threlfall_rises_from_zero_to_mu_k_at_v0_and_stays(self, v0):
         law = Threlfall(v0)
         assert mu(law, 0.0) == pytest.approx(0.0, abs=1e-16)
         for times in (1.0, 1.5, 1e6):
@@ -208,26 +206,26 @@ class TestThrelfall:
         assert mu(law, nextafter(v0, 0.0)) == pytest.approx(MU_K, rel=1e-14)
 
     @given(widths)
-    def test_has_the_slope_of_its_exponential(self, v0):
-        """At rest three times the secant over 1 - e^-3; a twentieth of that is left at v0."""
+    def test_slope_of_threlfall_decays_by_exp_minus_3_in_the_band(self, v0):
+        """At rest the slope is 3/(1 - e^-3) times that of the secant."""
         assert slope(Threlfall(v0), 0.0) == pytest.approx(3 / (1 - exp(-3)) * MU_K / v0, rel=1e-14)
         left = slope(Threlfall(v0), v0, BAND) / slope(Threlfall(v0), 0.0)
         assert left == pytest.approx(exp(-3), rel=1e-13)
 
     @given(widths, st.floats(0.0, 1.0))
-    def test_is_threlfalls_law(self, v0, relative):
-        """With 0.95 for the denominator, as it is often printed, it is the same to 3 parts in 10,000."""
+    def test_threlfall_is_the_published_formula(self, v0, relative):
+        """With the denominator 0.95, as it is often printed, the formula differs by up to 3 parts in 10,000."""
         exact = MU_K * (1 - exp(-3 * relative)) / (1 - exp(-3))
         assert mu(Threlfall(v0), relative * v0) == pytest.approx(exact, rel=1e-13, abs=1e-15)
         assert exact == pytest.approx(MU_K * (1 - exp(-3 * relative)) / 0.95, rel=3e-4)
 
-    def test_knows_no_static_friction(self):
+    def test_threlfall_has_no_static_friction(self):
         assert {weights(Threlfall(0.1), speed)[0] for speed in np.linspace(0, 0.3, 50)} == {0.0}
 
 
 class TestPiecewiseLinear:
     @given(widths, powers(1e-3, 1e3))
-    def test_goes_through_its_corners_by_straight_lines(self, v0, share):
+    def test_piecewise_linear_goes_through_its_corners_by_straight_lines(self, v0, share):
         v1 = v0 * (1 + share)
         law = PiecewiseLinear(v0, v1)
         assert mu(law, 0.0) == 0.0
@@ -242,7 +240,7 @@ class TestPiecewiseLinear:
 
 class TestPiecewiseCubic:
     @given(widths, powers(1e-3, 1e3))
-    def test_goes_through_its_characteristic_values(self, v0, share):
+    def test_piecewise_cubic_has_its_characteristic_values(self, v0, share):
         v1 = v0 * (1 + share)
         law = PiecewiseCubic(v0, v1)
         assert mu(law, 0.0) == 0.0
@@ -255,7 +253,7 @@ class TestPiecewiseCubic:
         assert slope(law, v1) == 0.0
 
     @given(widths, powers(1e-3, 1e3), st.floats(0.0, 1.0))
-    def test_is_the_papers_law(self, v0, share, relative):
+    def test_piecewise_cubic_is_the_papers_formula(self, v0, share, relative):
         v1 = v0 * (1 + share)
         law = PiecewiseCubic(v0, v1)
         rise, fall = weights_in(law, BAND, relative * v0), weights_in(law, STRIBECK, v0 + relative * (v1 - v0))
@@ -266,7 +264,7 @@ class TestPiecewiseCubic:
 
 class TestBengisuAkay:
     @given(alphas, powers(1e-6, 1.0))
-    def test_goes_through_its_characteristic_values(self, alpha, v0):
+    def test_bengisu_akay_has_its_characteristic_values(self, alpha, v0):
         law = made(BengisuAkay, alpha, v0)
         assert mu(law, v0 / 2) == pytest.approx(0.75 * MU_S, rel=1e-14)
         assert mu(law, v0) == MU_S
@@ -278,26 +276,26 @@ class TestBengisuAkay:
         assert slope(law, v0) == pytest.approx(alpha * (MU_K - MU_S), rel=1e-14)
 
     @given(bengisu_akay, st.floats(0.0, 3.0))
-    def test_is_the_papers_law(self, law, relative):
+    def test_bengisu_akay_is_the_papers_formula(self, law, relative):
         speed = relative * law.v0
         inside = MU_S * (1 - (1 - speed / law.v0) ** 2)
         outside = MU_K * (1 + (MU_S / MU_K - 1) * exp(-law.alpha * max(speed - law.v0, 0.0)))
         assert mu(law, speed) == pytest.approx(inside if speed < law.v0 else outside, rel=1e-12, abs=1e-15)
 
     @given(bengisu_akay, st.floats(0.0, 3.0), st.floats(0.0, 3.0))
-    def test_rises_within_the_band_and_falls_beyond(self, law, one, other):
+    def test_bengisu_akay_rises_in_the_band_and_falls_outside(self, law, one, other):
         slow, fast = sorted((one * law.v0, other * law.v0))
         assert mu(law, min(slow, law.v0)) <= mu(law, min(fast, law.v0)) <= MU_S
         assert MU_K <= mu(law, max(fast, law.v0)) <= mu(law, max(slow, law.v0))
 
     @given(st.floats(1e-3, 3.0))
-    def test_tends_to_coulomb_as_the_band_shrinks(self, speed):
+    def test_bengisu_akay_tends_to_coulomb_for_a_narrow_band(self, speed):
         assert weights(made(BengisuAkay, 1e5, 2e-6), speed) == pytest.approx(weights(Coulomb(), speed), abs=1e-12)
 
 
 class TestTustin:
     @given(alphas, st.floats(0.0, 30.0))
-    def test_decays_from_mu_s_at_rest(self, alpha, x):
+    def test_tustin_decays_from_mu_s_at_rest_to_mu_k(self, alpha, x):
         law = made(Tustin, alpha)
         assert mu(law, 0.0) == MU_S
         if x / alpha < law.end:
@@ -305,7 +303,7 @@ class TestTustin:
         assert mu(law, law.end) == mu(law, 2 * law.end) == MU_K
 
     @given(powers(1.0, 1e9), powers(1e-6, 1.0), st.floats(0.0, 30.0))
-    def test_is_the_tail_of_bengisu_and_akay(self, alpha, v0, x):
+    def test_tustin_equals_the_tail_of_bengisu_akay(self, alpha, v0, x):
         one, other = made(Tustin, alpha), made(BengisuAkay, alpha, v0)
         for a, b in zip(weights_in(one, STRIBECK, x / alpha), weights_in(other, STRIBECK, v0 + x / alpha), strict=True):
             assert a == pytest.approx(b, rel=1e-12 + 2 * alpha * np.spacing(v0 + x / alpha))
@@ -313,7 +311,7 @@ class TestTustin:
 
 class TestTailWithoutDecay:
     @given(widths, powers(1e-9, 1e9))
-    def test_is_a_constant_mu_s(self, v0, times):
+    def test_tail_with_alpha_zero_stays_at_mu_s(self, v0, times):
         law = made(BengisuAkay, 0.0, v0)
         assert law.end == inf
         assert weights(law, v0 * (1 + times)) == (1.0, 0.0, 0.0, 0.0)
@@ -321,16 +319,15 @@ class TestTailWithoutDecay:
         assert KINETIC not in pieces(law)
 
     @given(alphas)
-    def test_is_what_a_slow_one_tends_to(self, alpha):
-        """At a given speed, linearly in alpha."""
+    def test_tail_with_small_alpha_falls_linearly_in_alpha(self, alpha):
         fall = MU_S - mu(made(Tustin, alpha), 1e-4 / alpha)
         assert fall == pytest.approx(1e-4 * (MU_S - MU_K), rel=1e-4)
 
 
 class TestEndOfATail:
     @given(powers(1.0, 1e9), st.just(0.0) | powers(1e-6, 1.0))
-    def test_is_where_the_rest_changes_the_velocity_by_nothing(self, alpha, low):
-        """The integral of what is left of it, 1e-17 m/s; and not much before."""
+    def test_rest_of_a_tail_beyond_its_end_changes_the_velocity_by_1e_17(self, alpha, low):
+        """The integral of the tail from its end on is at most 1e-17 m/s, and not much less."""
         length = (made(BengisuAkay, alpha, low).end if low else made(Tustin, alpha).end) - low
         rounding = 1 + 3 * alpha * np.spacing(low)
         assert 1e-18 < exp(-alpha * length) / alpha < 1.1e-17 * rounding
@@ -338,23 +335,24 @@ class TestEndOfATail:
 
 class TestSetValued:
     @given(powers(1e-12, 1e6))
-    def test_kinetic_friction_does_not_depend_on_the_speed(self, speed):
+    def test_friction_of_coulomb_and_stiction_does_not_depend_on_the_speed(self, speed):
         for law in (Coulomb(), Stiction()):
             assert weights(law, speed) == (0.0, 1.0, 0.0, 0.0)
 
     @given(widths, st.floats(0.0, 3.0))
-    def test_a_dead_band_is_bounded_by_mu_s_and_mu_k_follows_it(self, band, relative):
+    def test_karnopp_has_mu_s_in_the_dead_band_and_mu_k_outside(self, band, relative):
         expected = (1.0, 0.0, 0.0, 0.0) if relative * band < band else (0.0, 1.0, 0.0, 0.0)
         assert weights(Karnopp(band), relative * band) == expected
 
 
-def scene(law, **of_law):
+def scene(law, **parameters):
+    """A belt scene with parameters of its friction law."""
     return {
         "model": "belt",
         "body": {"mass": 1.0},
         "spring": {"stiffness": 2.0},
         "belt": {"velocity": 0.1},
-        "friction": {"law": law, "mu_s": MU_S, "mu_k": MU_K, **of_law},
+        "friction": {"law": law, "mu_s": MU_S, "mu_k": MU_K, **parameters},
         "time": {"span": 1.0},
     }
 
@@ -362,19 +360,20 @@ def scene(law, **of_law):
 @pytest.mark.parametrize("law", ["piecewise-linear", "piecewise-cubic"])
 class TestOrderOfSpeeds:
     @pytest.mark.parametrize("v1", [0.1, 0.2])
-    def test_kinetic_friction_before_the_top_is_refused(self, law, v1):
+    def test_v1_not_above_v0_is_refused(self, law, v1):
         with pytest.raises(InputError, match=rf"friction\.v1: {v1} m/s is not greater than friction\.v0"):
             load({"scene": scene(law, v0=0.2, v1=v1)})
 
-    def test_in_one_cell_of_a_sweep_too(self, law):
+    def test_v1_not_above_v0_in_one_cell_of_a_sweep_is_refused(self, law):
         with pytest.raises(InputError, match=r"friction\.v1.* is not greater than friction\.v0.*in a cell"):
             load({"scene": scene(law, v0=0.2), "sweep": {"grid": {"friction.v1": [0.5, 0.3, 0.15]}}})
 
-    def test_in_order_they_are_taken(self, law):
+    def test_v1_above_v0_is_accepted(self, law):
         found = load({"scene": scene(law, v0="1 mm/s", v1="2 mm/s")})
         assert (found.scene.values["friction.v0"], found.scene.values["friction.v1"]) == (1e-3, 2e-3)
 
 
+#: A file with a user's own friction law.
 OWN = """
 from typing import Annotated, NamedTuple
 from ringsweep.numerics.functions import select
@@ -405,6 +404,7 @@ def _band(law):
 add_law("ramp", Ramp, Traits(Smooth))
 """
 
+#: A script that uses this law and prints one of its weights and the digest of the sources.
 USE = """
 from ringsweep.config import load
 from ringsweep.compile import SOURCES_DIGEST
@@ -426,15 +426,15 @@ def in_a_process(script, **environment):
 
 
 class TestOwnLaws:
-    def test_a_file_named_by_the_environment_adds_a_law(self, tmp_path):
+    def test_file_named_by_ringsweep_laws_adds_a_law(self, tmp_path):
         (tmp_path / "my_law.py").write_text(OWN)
         done = in_a_process(USE, RINGSWEEP_LAWS=str(tmp_path / "my_law.py"))
         assert done.stdout.startswith("0.5 "), done.stderr
-        # What was compiled or computed with it is not taken for what is without.
+        # Kernels and results with the file have another key than those without it.
         assert SOURCES_DIGEST not in done.stdout
 
     @pytest.mark.parametrize("name", ["nowhere.py", "json.py"])
-    def test_a_file_that_cannot_be_taken_is_refused_in_one_line(self, tmp_path, name):
+    def test_unusable_file_in_ringsweep_laws_is_refused_in_one_line(self, tmp_path, name):
         if name == "json.py":
             (tmp_path / name).write_text(OWN)
         (tmp_path / "a.yaml").write_text("scene: {}")

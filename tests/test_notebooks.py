@@ -29,16 +29,20 @@ def kinds(cell):
     return found | {kind for output in cell.outputs for kind in output.get("data", {})}
 
 
+#: What rk4 warns of, beyond its limit.
+STABILITY = "exceed the limit of stability of rk4"
+
+
 def code(notebook):
     return [cell for cell in notebook.cells if cell.cell_type == "code"]
 
 
 def check(notebook):
-    """Check that no cell failed, wrote to stderr, or shows where it ran."""
+    """Check that no cell failed, shows where it ran, or wrote to stderr but for the warning of rk4."""
     for cell in code(notebook):
         for output in cell.outputs:
             assert output.output_type != "error", output.evalue
-            assert output.get("name") != "stderr", output.text
+            assert output.get("name") != "stderr" or STABILITY in output.text, output.text
             for text in texts(output):
                 assert not FOREIGN.search(text), text
 

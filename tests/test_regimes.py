@@ -1,4 +1,4 @@
-"""Which motion a run is: counted on synthetic motions, without a solver."""
+"""Regime and motion of synthetic runs, without a solver."""
 
 from itertools import pairwise
 from math import inf, isnan, nan, pi
@@ -9,15 +9,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ringsweep.models.interface.status import BROKEN, COMPLETE, JAM, SEPARATED_1, SEPARATED_2
-from ringsweep.models.ring import record as regimes
+from ringsweep.models.ring import record as record_module
 from ringsweep.quantities.variables import FAILED, JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 
 EPSILON = 1e-3
-begin, observe, conclude = regimes.begin, regimes.observe, regimes.conclude
+begin, observe, conclude = record_module.begin, record_module.observe, record_module.conclude
 
 
 def outcome(phi, omega, status=COMPLETE, normal_1=1.0, normal_2=1.0, stuck_for=0.0):
-    """Outcome of a run that passes through these states."""
+    """Outcome of a run through the states `phi` and `omega`."""
     record = begin(phi[0], omega[0], normal_1, normal_2, EPSILON)
     for x, w in zip(phi[1:], omega[1:], strict=True):
         record = observe(record, x, w, normal_1, normal_2, stuck_for, EPSILON)
@@ -25,7 +25,7 @@ def outcome(phi, omega, status=COMPLETE, normal_1=1.0, normal_2=1.0, stuck_for=0
 
 
 def path(*angles, speed=1.0):
-    """Angles and angular velocities of a body that visits `angles` in turn at constant speed."""
+    """Angles and angular velocities of a body that moves from angle to angle at constant speed."""
     phi, omega = [angles[0]], [0.0]
     for start, end in pairwise(angles):
         leg = np.linspace(start, end, 50)[1:]
@@ -46,7 +46,7 @@ class TestMotion:
             ((0.0, 2 * pi + 0.01), REVOLVING, 0, 1),
             ((0.0, -2 * pi - 0.01), REVOLVING, 0, 1),
             ((1.0, 1.0 + 6.5 * pi), REVOLVING, 0, 3),
-            # A turn that a reversal follows counts no more, unless another turn follows that.
+            # Full turns before the last reversal do not count.
             ((0.0, 8.0, 7.0), OSCILLATORY, 1, 0),
             ((0.0, 8.0, 1.0), REVOLVING, 1, 1),
             ((0.0, 3.0, -3.0, 3.0), OSCILLATORY, 2, 0),
@@ -54,35 +54,35 @@ class TestMotion:
             ((0.0, -1.0, 12.0), REVOLVING, 1, 2),
         ],
     )
-    def test_of_a_path(self, angles, motion, reversals, turns):
+    def test_motion_along_a_path_is_named(self, angles, motion, reversals, turns):
         for mirror in (1, -1):
             found = outcome(*path(*(mirror * angle for angle in angles)))
             assert (found.regime, found.motion, found.reversals, found.turns) == (motion, motion, reversals, turns)
 
-    def test_a_turn_is_measured_from_the_turning_point(self):
-        """The threshold is passed a little after the body has turned; that angle belongs to the new leg."""
+    def test_full_turn_is_measured_from_the_turning_point(self):
+        """The velocity passes the threshold a little after the turning point; the turn is counted from the point."""
         phi = [0.0, 3.0, 3.1, 3.0, 3.1 - 2 * pi - 0.01]
         omega = [0.0, 1.0, 0.5 * EPSILON, -1.0, -1.0]
         assert outcome(phi, omega).motion == REVOLVING
 
 
 class TestReversals:
-    def test_chatter_within_the_threshold_is_none(self):
+    def test_chatter_within_the_threshold_is_no_reversal(self):
         omega = 0.999 * EPSILON * np.resize([1.0, -1.0], 100)
         assert outcome(np.zeros(100), omega).reversals == 0
         assert outcome(np.zeros(100), 1.01 * omega).reversals == 99
 
-    def test_chatter_between_two_passes_counts_once(self):
+    def test_chatter_between_two_passes_of_the_threshold_counts_as_one_reversal(self):
         omega = [1.0, *(0.9 * EPSILON * np.resize([1.0, -1.0], 20)), -1.0, 0.0, -1.0]
         assert outcome(np.zeros(len(omega)), omega).reversals == 1
 
-    def test_touching_zero_is_none(self):
+    def test_touching_zero_is_no_reversal(self):
         assert outcome(np.zeros(5), [1.0, 0.0, 1.0, -EPSILON, 1.0]).reversals == 0
 
     @given(st.lists(st.floats(-3 * EPSILON, 3 * EPSILON), min_size=1, max_size=50))
-    def test_are_the_changes_of_sign_beyond_the_threshold(self, omega):
-        senses = [np.sign(w) for w in omega if abs(w) > EPSILON]
-        assert outcome(np.zeros(len(omega)), omega).reversals == sum(a != b for a, b in pairwise(senses))
+    def test_reversals_are_changes_of_sign_beyond_the_threshold(self, omega):
+        signs = [np.sign(w) for w in omega if abs(w) > EPSILON]
+        assert outcome(np.zeros(len(omega)), omega).reversals == sum(a != b for a, b in pairwise(signs))
 
 
 states = st.lists(st.tuples(st.floats(-20, 20), st.floats(-5, 5)), min_size=1, max_size=30)
@@ -90,7 +90,7 @@ states = st.lists(st.tuples(st.floats(-20, 20), st.floats(-5, 5)), min_size=1, m
 
 class TestRecord:
     @given(states)
-    def test_extremes_bound_every_state(self, states):
+    def test_recorded_extremes_bound_every_state(self, states):
         phi, omega = zip(*states, strict=True)
         found = outcome(phi, omega)
         assert (found.phi_min, found.phi_max) == (min(phi), max(phi))
@@ -98,16 +98,16 @@ class TestRecord:
         assert (found.phi_end, found.omega_end) == (phi[-1], omega[-1])
 
     @given(states)
-    def test_a_mirrored_run_is_the_same_motion(self, states):
+    def test_mirrored_run_has_the_same_motion(self, states):
         phi, omega = np.transpose(states)
-        here, there = outcome(phi, omega), outcome(-phi, -omega)
+        run, mirrored = outcome(phi, omega), outcome(-phi, -omega)
         for name in ("regime", "motion", "reversals", "turns"):
-            assert getattr(here, name) == getattr(there, name)
+            assert getattr(run, name) == getattr(mirrored, name)
 
-    def test_times_of_sticking_add_up(self):
+    def test_stick_time_is_the_sum_over_intervals(self):
         assert outcome(np.zeros(5), np.zeros(5), stuck_for=0.25).stick_time == 1.0
 
-    def test_a_reaction_that_a_step_carried_below_zero_is_zero(self):
+    def test_least_reaction_of_a_separating_contact_is_zero(self):
         found = outcome([0.0, 0.1], [1.0, 1.0], SEPARATED_2, normal_1=0.3, normal_2=-0.01)
         assert (found.normal_min_1, found.normal_min_2) == (0.3, 0.0)
 
@@ -117,7 +117,7 @@ class TestEnd:
         ("status", "regime", "contact"),
         [(COMPLETE, OSCILLATORY, 0), (SEPARATED_1, SEPARATING, 1), (SEPARATED_2, SEPARATING, 2), (JAM, JAMMED, 0)],
     )
-    def test_regime_says_how_and_motion_what_came_before(self, status, regime, contact):
+    def test_regime_is_the_end_and_motion_is_what_came_before(self, status, regime, contact):
         phi, omega = path(0.0, 1.0, 0.0)
         found = outcome(phi, omega, status)
         assert (found.regime, found.motion, found.separating_contact) == (regime, OSCILLATORY, contact)
@@ -126,10 +126,10 @@ class TestEnd:
 
     @pytest.mark.parametrize("status", [COMPLETE, SEPARATED_1, JAM, BROKEN])
     @pytest.mark.parametrize(("phi", "omega"), [(nan, 0.0), (0.0, inf), (-inf, nan)])
-    def test_a_state_that_is_no_number_has_failed_whatever_else_is_said(self, status, phi, omega):
+    def test_run_that_ends_in_a_state_that_is_not_finite_is_failed(self, status, phi, omega):
         found = conclude(begin(0.0, 1.0, 1.0, 1.0, EPSILON), status, 1.0, phi, omega)
         assert (found.regime, found.motion, found.separating_contact) == (FAILED, FAILED, 0)
         assert isnan(found.t_separation)
 
-    def test_a_broken_run_has_failed_though_its_last_state_was_sound(self):
+    def test_broken_run_with_a_finite_last_state_is_failed(self):
         assert outcome([0.0, 1.0], [1.0, 1.0], BROKEN).regime == FAILED

@@ -1,4 +1,4 @@
-"""The ring's equations: balances, symmetries, limits; friction laws; the compiled model against plain formulas."""
+"""Equations of the ring: balances, symmetries, limits; and compiled functions against plain formulas."""
 
 from math import cos, exp, pi, radians, sin
 
@@ -13,17 +13,17 @@ from ringsweep.models.interface.constant_step import inspect
 from ringsweep.physics import ring
 from ringsweep.physics.friction.regularised import BengisuAkay
 from ringsweep.physics.ring import OneContact, Ring, TwoContacts, acceleration, acceleration_slope, reactions
-from ringsweep.physics.zones import Arc, cut
+from ringsweep.physics.zones import Arc, surface_of
 
 angles = st.floats(-20.0, 20.0)
 friction_ratios = st.floats(-1.2, 1.2)
-#: Centripetal acceleration over g.
+#: Centripetal acceleration divided by g.
 lifts = st.floats(0.0, 100.0)
 
 
 @st.composite
 def two_contacts(draw):
-    """Bodies of any size that fit into their ring."""
+    """Bodies of any size that fit into the ring."""
     radius, beta = draw(st.floats(0.01, 10.0)), draw(st.floats(0.1, 1.5))
     mass, gravity = draw(st.floats(1e-3, 1e3)), draw(st.floats(0.1, 30.0))
     xi = radius * (1.0 - draw(st.floats(0.0, 0.7))) * cos(beta)
@@ -33,7 +33,7 @@ def two_contacts(draw):
 
 @st.composite
 def states(draw):
-    """A body, its K1 and K2, angle and angular velocity, not close to jamming."""
+    """Body, K1, K2, angle and angular velocity, not close to jamming."""
     body = draw(two_contacts())
     K1, K2, phi = draw(friction_ratios), draw(friction_ratios), draw(angles)
     omega = (draw(lifts) * body.gravity / body.radius) ** 0.5
@@ -50,13 +50,13 @@ def motion(body, K1, K2, phi, omega):
 
 
 def force_scale(body, omega, epsilon, *normals):
-    """Size of the terms that a balance adds up."""
+    """Size of the terms in a balance of forces, N."""
     return body.mass * (body.gravity + body.radius * (omega**2 + abs(epsilon))) + sum(map(abs, normals))
 
 
 class TestTwoContactBalances:
     @given(states())
-    def test_momentum_and_moment_of_momentum(self, state):
+    def test_momentum_and_moment_of_momentum_are_balanced(self, state):
         body, K1, K2, phi, omega = state
         M, J, R, xi, beta, g = body.mass, body.inertia, body.radius, body.xi, body.beta, body.gravity
         epsilon, N1, N2 = motion(*state)
@@ -69,7 +69,7 @@ class TestTwoContactBalances:
         assert abs(about_axis) < 1e-12 * scale * R
 
     @given(states())
-    def test_reactions_are_the_papers_closed_expressions(self, state):
+    def test_reactions_are_those_of_the_papers_eq_17(self, state):
         body, K1, K2, phi, omega = state
         M, xi, beta, g = body.mass, body.xi, body.beta, body.gravity
         epsilon, N1, N2 = motion(*state)
@@ -109,10 +109,10 @@ class TestTwoContactBalances:
 
 
 class TestSlope:
-    """How fast friction changes the acceleration: what decides on the stiffness of a step."""
+    """Derivative of the acceleration by way of friction, from which the stiffness of a step is computed."""
 
     @given(states(), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
-    def test_is_the_derivative_of_the_acceleration(self, state, slope_1, slope_2):
+    def test_acceleration_slope_is_the_derivative_of_the_acceleration(self, state, slope_1, slope_2):
         body, K1, K2, phi, omega = state
         where = (sin(phi), cos(phi), omega)
         tiny = 1e-40j
@@ -123,7 +123,7 @@ class TestSlope:
         assert abs(slope - complex_step) < 1e-12 * scale * (1 + body.mass * body.radius**2 / abs(inertia))
 
     @given(lifts, friction_ratios, angles, st.floats(-1.0, 1.0))
-    def test_of_one_contact(self, lift, K, phi, slope):
+    def test_acceleration_slope_of_one_contact_is_the_derivative(self, lift, K, phi, slope):
         body = OneContact(0.1, 0.05, 9.81)
         where = (sin(phi), cos(phi), (lift * 9.81 / 0.05) ** 0.5)
         complex_step = acceleration(body, K + 1e-40j * slope, 0.0, *where)[0].imag / 1e-40
@@ -132,7 +132,7 @@ class TestSlope:
 
 class TestOneContact:
     @given(friction_ratios, angles, st.floats(-50.0, 50.0))
-    def test_balances(self, K, phi, omega):
+    def test_forces_on_a_body_with_one_contact_are_balanced(self, K, phi, omega):
         body = OneContact(mass=0.3, radius=0.2, gravity=9.81)
         epsilon, normal, repeated = motion(body, K, 0.7, phi, omega)
         assert normal == repeated
@@ -140,7 +140,7 @@ class TestOneContact:
         assert 0.3 * 0.2 * epsilon == pytest.approx(-0.3 * 9.81 * sin(phi) + K * normal, rel=1e-12, abs=1e-11)
 
     @given(friction_ratios, angles, st.floats(-50.0, 50.0))
-    def test_is_the_limit_of_two_contacts_that_close_up(self, K, phi, omega):
+    def test_one_contact_is_the_limit_of_two_close_contacts(self, K, phi, omega):
         M, R, g = 0.3, 0.2, 9.81
         epsilon, N, _ = motion(OneContact(M, R, g), K, K, phi, omega)
         scale = g + R * omega**2
@@ -154,10 +154,10 @@ class TestOneContact:
 
 
 class TestMirror:
-    """Left and right are alike: phi, omega, theta, K change sign, and contact 1 becomes contact 2."""
+    """In a mirror image phi, omega, theta and K change sign, and contacts 1 and 2 are exchanged."""
 
     @given(states())
-    def test_of_acceleration_and_reactions(self, state):
+    def test_acceleration_and_reactions_of_a_mirror_image_are_mirrored(self, state):
         body, K1, K2, phi, omega = state
         epsilon, N1, N2 = motion(*state)
         scale = force_scale(body, omega, epsilon, N1, N2)
@@ -167,9 +167,9 @@ class TestMirror:
         assert abs(M2 - N1) < 1e-13 * scale
 
     @given(angles, angles, st.floats(-30, 30), st.floats(-30, 30), st.floats(-3, 3), st.floats(0.1, 1.5))
-    def test_of_friction(self, cells, phi, theta, omega, ring_omega, center, half_angle):
+    def test_friction_of_a_mirror_image_is_mirrored(self, cells, phi, theta, omega, ring_omega, center, half_angle):
         def at(sign):
-            surface = cut([Arc(sign * center, half_angle, 0.5, 0.3)], 0.2, 0.1)
+            surface = surface_of([Arc(sign * center, half_angle, 0.5, 0.3)], 0.2, 0.1)
             scene = Ring(body, surface, BengisuAkay(1.0, 0.5), None, 0.0, 0.0, 1.0, 0.0)
             return ring.friction(scene, sign * phi, sign * omega, sign * theta, sign * ring_omega)
 
@@ -180,8 +180,8 @@ class TestMirror:
         assert at(-1) == (-v, -K2, -K1, slope_2, slope_1)
 
     @pytest.mark.parametrize("number", [30, 33])
-    def test_of_a_figure(self, number, figure, cells, run):
-        """Launched, driven and cut the other way round, the body loses the other contact at the same time."""
+    def test_run_of_a_figure_in_a_mirror_image_loses_the_other_contact(self, number, figure, cells, run):
+        """Launch, drive and zone are mirrored; the separation is at the same time."""
         drive, changes, steps = figure(number)
         found = run(cells(mirrored(changes | {"zone.center": 0.3}), drive=drive), steps)
         self.assert_mirrored(found)
@@ -190,7 +190,7 @@ class TestMirror:
     @given(
         st.floats(-20, 20), st.floats(-20, 20), st.floats(-0.5, 0.5), st.floats(-3, 3), st.floats(0.01, 3), st.data()
     )
-    def test_of_any_run(self, cells, run, amplitude, omega, phi, center, half_angle, data):
+    def test_any_run_in_a_mirror_image_is_mirrored(self, cells, run, amplitude, omega, phi, center, half_angle, data):
         changes = {
             "drive.amplitude": amplitude,
             "initial.omega": omega,
@@ -220,19 +220,19 @@ class TestMirror:
         assert found.separating_contact[1] == contact[found.separating_contact[0]]
 
 
-#: Quantities that change sign in a mirror.
+#: Parameters that change sign in a mirror image.
 ODD = {"drive.amplitude", "zone.center", "initial.phi", "initial.omega"}
 
 
 def mirrored(changes):
-    """Two cells: the values themselves and their mirror image."""
+    """Two cells: the given values, and their mirror image."""
     return {path: np.array([value, -value if path in ODD else value]) for path, value in changes.items()}
 
 
 class TestGeometry:
-    """The paper's rig: R is not printed, beta is."""
+    """Geometry of the paper's rig. The paper gives beta, but not the radius of the ring."""
 
-    def test_radius_and_angle_say_the_same(self, cells):
+    def test_radius_and_beta_give_the_same_body(self, cells):
         from_radius = take(cells().body, 0)
         from_beta = take(cells({"ring.radius": None, "body.beta": radians(48.504)}).body, 0)
         assert np.degrees(from_radius.beta) == pytest.approx(48.504, abs=1e-3)
@@ -249,7 +249,7 @@ class TestGeometry:
             ({"friction.rough.mu_k": 0.6}, r"friction\.rough\.mu_k.*0\.6 exceeds mu_s"),
         ],
     )
-    def test_values_that_contradict_each_other_are_input_errors(self, cells, changes, message):
+    def test_contradictory_geometry_is_an_input_error(self, cells, changes, message):
         with pytest.raises(InputError, match=message):
             cells(changes)
 
@@ -260,12 +260,12 @@ def compiled_inspect(batch, i, y, theta, ring_omega):
 
 
 class TestCompiledModel:
-    """What a kernel sees of a state, against the balances solved as three linear equations in plain Python."""
+    """A compiled inspection against the balances, solved as three linear equations in Python."""
 
     #: Angle and angular velocity of the body, angle of the ring.
     STATES = np.random.default_rng(22).uniform((-9, -40, -9), (9, 40, 9), (200, 3))
 
-    def test_agrees_with_plain_formulas(self, cells):
+    def test_compiled_inspection_agrees_with_the_balances(self, cells):
         batch = cells({"friction.alpha": 2.0, "friction.v0": 0.3, "zone.half_angle": 1.0}, drive="arctan")
         body = take(batch.body, 0)
         M, J, R, xi, beta, g = body.mass, body.inertia, body.radius, body.xi, body.beta, body.gravity
@@ -297,18 +297,18 @@ class TestCompiledModel:
             np.testing.assert_allclose(now.D, determinant, rtol=1e-12)
         assert len(met) == 8
 
-    def test_slope_is_the_derivative_through_friction_alone(self, cells):
+    def test_compiled_slope_is_the_derivative_by_way_of_friction_only(self, cells):
         batch = cells({"friction.alpha": 2.0, "friction.v0": 0.3, "zone.half_angle": 1.0}, drive="arctan")
         body, scene = take(batch.body, 0), take(batch, 0)
         for phi, omega, theta in self.STATES:
-            ring_omega, reach = 0.5 * omega + 1.0, 1e-6
+            ring_omega, step = 0.5 * omega + 1.0, 1e-6
             speed = abs(omega - ring_omega) * body.radius
             if min(speed, abs(speed - 0.3)) < 1e-4:
                 continue
             ends = []
-            for sliding in (omega - reach, omega + reach):
+            for sliding in (omega - step, omega + step):
                 _, K1, K2, _, _ = ring.friction(scene, phi, sliding, theta, ring_omega)
                 ends.append(acceleration(body, K1, K2, sin(phi), cos(phi), omega)[0])
-            difference = (ends[1] - ends[0]) / (2 * reach)
+            difference = (ends[1] - ends[0]) / (2 * step)
             slope = compiled_inspect(batch, 0, (phi, omega), theta, ring_omega).slope
             assert slope == pytest.approx(difference, rel=1e-5, abs=1e-3)

@@ -1,4 +1,4 @@
-"""The ring on Dahl's bristles: what it has in common with Coulomb's friction, and what is its own."""
+"""The ring under the Dahl law, against Coulomb friction and against its own balances."""
 
 from types import SimpleNamespace
 
@@ -17,7 +17,7 @@ from ringsweep.solvers.rk4 import RK4
 EXACT = Implicit(rtol=1e-9, certify=False)
 LIMIT = Event(rtol=1e-14, certify=False)
 
-#: Thrown up along a ring at rest, out of a smooth place into a rougher one and back to rest.
+#: A launch on a ring at rest: the body slides onto the rough arc, back, and sticks.
 LAUNCH = {
     "initial.omega": 16.0,
     "friction.rough.mu_k": 0.15,
@@ -25,20 +25,20 @@ LAUNCH = {
     "zone.half_angle": 0.8,
     "time.span": 0.5,
 }
-#: Thrown so fast that it goes round, and falls off.
+#: A launch so fast that the body revolves and separates.
 FAST = {"initial.omega": 100.0, "friction.rough.mu_k": 0.15, "friction.rest.mu_k": 0.1}
-#: Stick and slip on a ring that runs up, for ever or until it falls off.
+#: Stick-slip on a ring that runs up, without separation and with separation.
 DRIVEN = {"drive.amplitude": 0.2, "time.span": 10.0}
 DRIVEN_OFF = {"drive.amplitude": 10.0, "time.span": 8.0}
-#: A smooth ring with a place so rough that the body jams on it.
+#: A ring with an arc that is so rough that the body jams on it.
 ROUGH = {"friction.rough.mu_k": 1.9, "friction.rest.mu_k": 0.2, "zone.half_angle": 1.0}
-#: Stiffness of the bristles that a constant step can follow, 1/m.
+#: Stiffness of bristles that a constant step resolves, 1/m.
 MILD = 3e3
 
 
 @pytest.fixture
 def dahl(cells):
-    """Cells with Dahl's bristles; a ring at rest has a drive without amplitude."""
+    """Batch under the Dahl law; without an amplitude of the drive the ring is at rest."""
 
     def build(values, sigma0, **changes):
         changes = {path.replace("__", "."): value for path, value in changes.items()}
@@ -49,7 +49,7 @@ def dahl(cells):
 
 @pytest.fixture
 def rigid(cells):
-    """The same under Coulomb's friction: stiction without a drop."""
+    """Batch under Coulomb friction: stiction with equal static and kinetic coefficients."""
 
     def build(values):
         place = {"friction.rough": 0.3, "friction.rest": 0.1}
@@ -60,7 +60,7 @@ def rigid(cells):
 
 
 def history(batch, steps):
-    """History under RK4 at every step: ``t`` and one array for each quantity."""
+    """History under RK4 at every step: ``t`` and one array for each history variable."""
     names = MODELS["ring"].history(Structure("ring", "dahl"))
     t, rows = RK4(steps).history(batch, steps, len(names))
     return SimpleNamespace(t=t, **dict(zip(names, rows.T, strict=True)))
@@ -77,10 +77,10 @@ def order(x, error):
 
 
 class TestLimit:
-    """The stiffer the bristles, the nearer they are to Coulomb's friction."""
+    """With increasing stiffness the Dahl law tends to Coulomb friction."""
 
-    def test_in_sliding_the_error_is_as_small_as_the_deflection(self, dahl, rigid):
-        """Of first order in 1/sigma0: bristles take their deflection in length to follow an edge."""
+    def test_difference_from_coulomb_in_sliding_is_of_first_order_in_the_compliance(self, dahl, rigid):
+        """Beyond an edge the traction changes over a distance proportional to 1/sigma0."""
         sigma0 = 10.0 ** np.arange(3, 8)
         exact, found = solve(LIMIT, rigid(FAST)), solve(EXACT, dahl(FAST, sigma0))
         assert (found.regime == exact.regime).all()
@@ -89,15 +89,15 @@ class TestLimit:
         assert order(sigma0, abs(found.t_separation - exact.t_separation)) == pytest.approx(-1.0, abs=0.02)
         assert order(sigma0, abs(found.phi_end - exact.phi_end)) == pytest.approx(-1.0, abs=0.02)
 
-    def test_at_a_reversal_too(self, dahl, rigid):
-        """The way of the bristles to the other side."""
+    def test_difference_from_coulomb_at_a_reversal_is_of_first_order_in_the_compliance(self, dahl, rigid):
+        """At a reversal the bristles move over a distance proportional to 1/sigma0."""
         sigma0 = 10.0 ** np.arange(4, 9)
         exact, found = solve(LIMIT, rigid(LAUNCH)), solve(EXACT, dahl(LAUNCH, sigma0))
         assert order(sigma0, abs(found.phi_max - exact.phi_max)) == pytest.approx(-1.0, abs=0.02)
         assert order(sigma0, abs(found.phi_end - exact.phi_end)) == pytest.approx(-1.0, abs=0.1)
 
-    def test_in_stick_and_slip_it_falls_with_the_power_of_two_thirds(self, dahl, rigid):
-        """A breakaway under a load that grows as t has the time scale sigma0^(-1/3), and is late by its square."""
+    def test_difference_from_coulomb_in_stick_slip_has_the_power_two_thirds_of_the_compliance(self, dahl, rigid):
+        """Breakaway under a load proportional to t has the time scale sigma0^(-1/3); its delay is the square of it."""
         sigma0 = 10.0 ** np.arange(4, 8)
         exact, found = solve(LIMIT, rigid(DRIVEN)), solve(EXACT, dahl(DRIVEN, sigma0))
         assert (found.regime == exact.regime).all()
@@ -106,10 +106,10 @@ class TestLimit:
 
 
 class TestMethods:
-    """At a mild stiffness a constant step can follow."""
+    """Methods agree at a stiffness that a constant step resolves."""
 
     @pytest.mark.parametrize("scene", [LAUNCH, {**DRIVEN_OFF, "time.span": 1.0}], ids=["launched", "driven"])
-    def test_agree(self, dahl, scene):
+    def test_implicit_and_rk4_agree(self, dahl, scene):
         batch = dahl(scene, MILD)
         found, run = solve(EXACT, batch), history(batch, 200_000)
         assert run.t[-1] == found.t_end
@@ -120,20 +120,20 @@ class TestMethods:
         assert found.normal_min_2 == pytest.approx(run.normal_2.min(), rel=1e-3)
         assert found.stick_time == pytest.approx(np.diff(run.t)[run.mode[:-1] == 0].sum(), abs=1e-3)
 
-    def test_agree_on_a_certificate(self, dahl):
+    def test_run_that_separates_is_certified(self, dahl):
         assert solve(Implicit(), dahl(FAST, 1e5)).certified
 
 
 class TestMirror:
-    """Seen from behind the ring, the other contact leads."""
+    """The mirror image exchanges the contacts."""
 
-    def test_exchanges_the_contacts(self, dahl):
-        one_and_other = np.array([1.0, -1.0])
+    def test_mirrored_scene_exchanges_the_contacts(self, dahl):
+        both_signs = np.array([1.0, -1.0])
         for scene in (DRIVEN_OFF, FAST):
-            turned = {
-                path: scene[path] * one_and_other for path in ("drive.amplitude", "initial.omega") if path in scene
+            mirrored = {
+                path: scene[path] * both_signs for path in ("drive.amplitude", "initial.omega") if path in scene
             }
-            found = solve(EXACT, dahl({**scene, **turned}, 1e5, zone__center=0.3 * one_and_other))
+            found = solve(EXACT, dahl({**scene, **mirrored}, 1e5, zone__center=0.3 * both_signs))
             assert found.regime.tolist() == [SEPARATING, SEPARATING]
             assert found.separating_contact.tolist() == [2, 1]
             assert found.t_end[0] == pytest.approx(found.t_end[1], rel=1e-9)
@@ -148,7 +148,7 @@ class TestMirror:
             ):
                 assert getattr(found, one)[0] == pytest.approx(sign * getattr(found, other)[1], rel=1e-7, abs=1e-9)
 
-    def test_exchanges_their_deflections(self, dahl):
+    def test_mirrored_scene_exchanges_the_deflections(self, dahl):
         one, other = (
             history(dahl(LAUNCH, MILD, initial__omega=16.0 * side, zone__center=0.3 * side), 20_000)
             for side in (1.0, -1.0)
@@ -163,38 +163,38 @@ class TestMirror:
 
 
 class TestEnergy:
-    """On a ring at rest friction only takes."""
+    """On a ring at rest friction dissipates energy."""
 
     @staticmethod
     def balance(scene, run):
-        """Energy of motion and height, J; what each contact's bristles have taken up, J; force of friction, N."""
+        """Energy of the body, J; energy stored in the bristles, J; friction force, N."""
         body = scene.body
         energy = 0.5 * (body.inertia + body.mass * body.xi**2) * run.omega**2
         energy = energy - body.mass * body.gravity * body.xi * np.cos(run.phi)
         stored, force = np.zeros(len(run.t)), np.zeros(len(run.t))
         for normal, z in ((run.normal_1, run.deflection_1), (run.normal_2, run.deflection_2)):
-            taken = 0.5 * (normal[1:] + normal[:-1]) * 0.5 * scene.law.sigma0 * np.diff(z**2)
-            stored[1:] += np.cumsum(taken)
+            change = 0.5 * (normal[1:] + normal[:-1]) * 0.5 * scene.law.sigma0 * np.diff(z**2)
+            stored[1:] += np.cumsum(change)
             force += normal * scene.law.sigma0 * z
         return energy, stored, force
 
-    def test_never_grows_with_that_of_the_bristles(self, launched):
+    def test_energy_of_body_and_bristles_never_grows(self, launched):
         scene, run = launched
         energy, stored, _ = self.balance(scene, run)
         total = energy + stored
-        lost = total[0] - total[-1]
-        assert np.diff(total).max() < 1e-10 * lost
-        assert lost > 0.1 * (energy.max() - energy.min())
+        dissipated = total[0] - total[-1]
+        assert np.diff(total).max() < 1e-10 * dissipated
+        assert dissipated > 0.1 * (energy.max() - energy.min())
 
-    def test_is_lost_by_the_work_of_friction(self, launched):
+    def test_energy_of_the_body_falls_by_the_work_of_friction(self, launched):
         scene, run = launched
         energy, _, force = self.balance(scene, run)
         power = force * run.omega * scene.body.radius
         work = np.append(0.0, np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(run.t)))
         assert np.abs(energy[0] - energy - work).max() < 1e-6 * work.max()
 
-    def test_comes_back_from_bristles_in_part(self, launched):
-        """Once the body is held, it swings on them: its energy of motion goes to them and returns."""
+    def test_stuck_body_exchanges_energy_with_the_bristles(self, launched):
+        """The stuck body vibrates on the bristles, so that energy goes back and forth."""
         scene, run = launched
         energy, stored, _ = self.balance(scene, run)
         held = np.flatnonzero(run.t > 0.45)
@@ -203,32 +203,32 @@ class TestEnergy:
 
 
 class TestZones:
-    """Where the coefficient of friction jumps, deflections do not."""
+    """At an edge the coefficient of friction jumps, but the deflections do not."""
 
-    def test_bristles_pass_an_edge_as_they_are(self, launched):
-        """They follow at most as fast as the contact slides, and as a smoother place lets them go."""
+    def test_deflections_are_continuous_at_an_edge(self, launched):
+        """The rate of a deflection is at most the sliding speed times 1 + the ratio of the coefficients."""
         scene, run = launched
         speed = scene.body.radius * np.abs(run.omega)
         for z in (run.deflection_1, run.deflection_2):
-            most = (1.0 + 0.15 / 0.1) * np.maximum(speed[1:], speed[:-1]) * np.diff(run.t)
-            assert (np.abs(np.diff(z)) <= most + 1e-15).all()
+            bound = (1.0 + 0.15 / 0.1) * np.maximum(speed[1:], speed[:-1]) * np.diff(run.t)
+            assert (np.abs(np.diff(z)) <= bound + 1e-15).all()
 
-    def test_traction_goes_over_to_what_the_place_can_bear(self, launched):
-        """Within a few deflections of the bristles, exponentially in the distance; but for the step over the edge."""
+    def test_traction_tends_exponentially_to_the_coefficient_beyond_an_edge(self, launched):
+        """The length of the transition is the steady deflection. The step over the edge is left out."""
         scene, run = launched
         (entry,) = np.flatnonzero(np.diff(run.zone_1) != 0)[:1]
         assert run.omega[entry] > 0.0
-        # Contact 1 is behind the body by beta, the edge behind the lowest point by the half-angle of the zone.
-        way = scene.body.radius * (run.phi - (scene.body.beta - LAUNCH["zone.half_angle"]))
-        after = slice(entry + 1, entry + 1 + np.argmax(way[entry + 1 :] > 10 * 0.15 / MILD))
+        # Contact 1 is at phi - beta, and the edge is at minus the half-angle of the zone.
+        distance = scene.body.radius * (run.phi - (scene.body.beta - LAUNCH["zone.half_angle"]))
+        after = slice(entry + 1, entry + 1 + np.argmax(distance[entry + 1 :] > 10 * 0.15 / MILD))
         traction = MILD * run.deflection_1[after]
         assert MILD * run.deflection_1[entry] == pytest.approx(0.1, rel=1e-9)
-        np.testing.assert_allclose(traction, 0.15 - 0.05 * np.exp(-way[after] * MILD / 0.15), atol=1e-3)
+        np.testing.assert_allclose(traction, 0.15 - 0.05 * np.exp(-distance[after] * MILD / 0.15), atol=1e-3)
         assert traction[-1] == pytest.approx(0.15, abs=1e-4)
         np.testing.assert_allclose(MILD * run.deflection_2[after], 0.1, rtol=1e-9)
 
-    def test_the_body_counts_as_stuck_while_both_contacts_do(self, launched):
-        """Each within a thousandth of what its own place can bear."""
+    def test_body_counts_as_stuck_while_both_contacts_do(self, launched):
+        """A contact counts as stuck below 99.9 % of the deflection of steady sliding."""
         _, run = launched
         side = np.where(run.omega >= 0.0, 1.0, -1.0)
         held = [
@@ -240,22 +240,22 @@ class TestZones:
 
 
 class TestEnds:
-    """Are named as under the other laws."""
+    """Ends of runs agree with those under Coulomb friction."""
 
-    def test_a_contact_that_lifts_is_named(self, dahl, rigid):
+    def test_separating_contact_is_that_of_the_limit(self, dahl, rigid):
         exact, found = solve(LIMIT, rigid(DRIVEN_OFF)), solve(EXACT, dahl(DRIVEN_OFF, 1e6))
         assert (found.regime, found.motion, found.separating_contact) == (SEPARATING, OSCILLATORY, 2)
         assert found.t_separation == found.t_end == pytest.approx(exact.t_separation, abs=1e-5)
         assert found.normal_min_2 == 0.0
-        thrown = solve(EXACT, dahl(FAST, 1e5))
-        assert (thrown.regime, thrown.motion, thrown.separating_contact) == (SEPARATING, REVOLVING, 2)
+        fast = solve(EXACT, dahl(FAST, 1e5))
+        assert (fast.regime, fast.motion, fast.separating_contact) == (SEPARATING, REVOLVING, 2)
 
-    def test_a_body_that_slides_where_it_cannot_is_jammed_at_once(self, dahl, rigid):
+    def test_body_launched_on_a_rough_arc_is_jammed_at_launch(self, dahl, rigid):
         values = {**ROUGH, "initial.phi": 1.0, "initial.omega": -20.0}
         for found in (solve(LIMIT, rigid(values)), solve(EXACT, dahl(values, 1e5))):
             assert (found.regime, found.t_end, found.separating_contact) == (JAMMED, 0.0, 0)
 
-    def test_a_body_that_slides_there_jams_as_its_bristles_stretch(self, dahl, rigid):
+    def test_body_that_slides_onto_a_rough_arc_jams_at_the_instant_of_the_limit(self, dahl, rigid):
         values = {**ROUGH, "initial.omega": 30.0, "zone.center": 2.0}
         exact, found = solve(LIMIT, rigid(values)), solve(Implicit(), dahl(values, 1e5))
         assert exact.regime == found.regime == JAMMED

@@ -1,4 +1,4 @@
-"""Runge-Kutta 4 at constant step: closed-form orbits, order, the paper's figures, and how runs end."""
+"""Runge-Kutta 4 with a constant step: closed-form orbits, order, figures of the paper, and ends of runs."""
 
 from math import atan2, cos, exp, inf, nan, pi, sin
 
@@ -18,13 +18,13 @@ from ringsweep.quantities.variables import FAILED, JAMMED, OSCILLATORY, REGIMES,
 from ringsweep.solvers.rk4 import RK4, STABILITY_LIMIT
 
 MU = 0.1
-#: Turned so fast that the body slips backward whatever it does.
+#: Velocity of the ring that is so large that the body always slips backward, rad/s.
 FAST = 200.0
 
 
 @pytest.fixture
 def coulomb(cells):
-    """Batch on a uniform ring with Coulomb friction; at rest unless told otherwise."""
+    """Batch on a uniform ring with Coulomb friction; the ring is at rest unless it is driven."""
 
     def build(changes, mu=MU, model="ring"):
         return cells({"friction.rest.mu_k": mu} | changes, model=model, law="coulomb", drive="constant", arcs=())
@@ -35,12 +35,12 @@ def coulomb(cells):
 def coefficients(batch, K):
     """p, q, r of ``phi_dd = p omega^2 + q cos phi + r sin phi`` while K1 = K2 = K."""
     body = take(batch.body, 0)
-    # omega^2, cos phi and sin phi stand one at a time.
+    # Each call has one of sin phi, cos phi and omega equal to 1 and the others equal to 0.
     return tuple(acceleration(body, K, K, *term)[0] for term in ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)))
 
 
 def orbit(p, q, r, phi_0, omega_0):
-    """u = omega^2 as a function of phi."""
+    """omega^2 as a function of phi, in closed form."""
     A = -(4 * p * q + 2 * r) / (1 + 4 * p * p)
     B = 2 * p * A + 2 * q
     C = (omega_0**2 - A * cos(phi_0) - B * sin(phi_0)) * exp(-2 * p * phi_0)
@@ -48,10 +48,10 @@ def orbit(p, q, r, phi_0, omega_0):
 
 
 class TestOrbit:
-    """In slip of constant sense the orbit in the plane of phi and omega is known in closed form."""
+    """In slip of constant sign the orbit in the plane of phi and omega is known in closed form."""
 
     @pytest.mark.parametrize(("mu", "omega"), [(0.1, 60.0), (0.3, 80.0), (0.1, -60.0)])
-    def test_is_followed_on_an_immobile_ring(self, coulomb, history, mu, omega):
+    def test_orbit_on_a_ring_at_rest_agrees_with_the_closed_form(self, coulomb, history, mu, omega):
         batch = coulomb({"initial.omega": omega, "time.span": 0.06}, mu)
         p, q, r = coefficients(batch, -mu * np.sign(omega))
         assert p == pytest.approx(q * take(batch.body, 0).xi / 9.81, rel=1e-12)
@@ -61,7 +61,7 @@ class TestOrbit:
         np.testing.assert_allclose(run.omega**2, orbit(p, q, r, 0.0, omega)(run.phi), rtol=1e-10)
         assert abs(run.phi[-1]) > 2.0
 
-    def test_does_not_depend_on_how_fast_the_ring_turns(self, coulomb, history):
+    def test_orbit_in_slip_does_not_depend_on_the_velocity_of_the_ring(self, coulomb, history):
         runs = [
             history(coulomb({"initial.omega": 60.0, "time.span": 0.1, "drive.amplitude": rate}), 500)
             for rate in (0.0, -1.0, -FAST)
@@ -72,9 +72,9 @@ class TestOrbit:
 
 
 class TestSteadySliding:
-    """Under a ring that turns faster than the body ever does, friction pulls one way only."""
+    """On a ring that is always faster than the body, friction has one sign."""
 
-    def test_rests_where_friction_carries_the_weight(self, coulomb, run):
+    def test_body_rests_where_friction_balances_the_weight(self, coulomb, run):
         batch = coulomb({"drive.amplitude": FAST})
         _, q, r = coefficients(batch, MU)
         at = atan2(q, -r)
@@ -83,8 +83,8 @@ class TestSteadySliding:
         np.testing.assert_allclose([found.phi_min, found.phi_max], at, atol=1e-12)
         assert found.motion == RESTING
 
-    def test_swings_about_that_angle_without_loss(self, coulomb, history):
-        """The orbit is closed: Coulomb friction of one sense does not damp."""
+    def test_body_oscillates_about_equilibrium_without_loss(self, coulomb, history):
+        """The orbit is closed, since Coulomb friction of one sign does not damp."""
         batch = coulomb({"drive.amplitude": FAST, "time.span": 5.0})
         p, q, r = coefficients(batch, MU)
         run = history(batch, 20000)
@@ -97,10 +97,10 @@ class TestSteadySliding:
 
 
 class TestOrder:
-    """On a smooth stretch, without edges or reversal, the error falls with the fourth power of the step."""
+    """Without edges and reversals, the error falls with the fourth power of the step."""
 
     @pytest.mark.parametrize("law", ["coulomb", "bengisu-akay"])
-    def test_is_four(self, cells, coulomb, run, law):
+    def test_order_of_convergence_is_four(self, cells, coulomb, run, law):
         if law == "coulomb":
             batch = coulomb({"initial.omega": 60.0, "time.span": 0.1})
         else:
@@ -114,9 +114,9 @@ class TestOrder:
 
 
 class TestEnergy:
-    """What the body gains in energy is the work of friction, across edges and reversals."""
+    """The energy of the body changes by the work of friction, also across edges and reversals."""
 
-    def test_balances_along_a_run(self, cells, history):
+    def test_energy_changes_by_the_work_of_friction(self, cells, history):
         changes = {
             "drive.amplitude": 5.0,
             "initial.omega": 10.0,
@@ -131,7 +131,7 @@ class TestEnergy:
 
     @staticmethod
     def residual(batch, run):
-        """Largest imbalance up to any instant, relative to all work that friction has done."""
+        """Largest imbalance of energy at any instant, relative to the largest work of friction."""
         scene = take(batch, 0)
         body, (rest, rough) = scene.body, ((0.2, 0.1), (0.5, 0.3))
         force = np.zeros_like(run.t)
@@ -150,11 +150,11 @@ class TestEnergy:
 
 
 class TestSingleContact:
-    """Looping the loop without friction."""
+    """A loop without friction."""
 
     @pytest.mark.parametrize("launch", [2.5, 3.0, 4.0, 4.9])
-    def test_leaves_the_ring_where_weight_exceeds_what_the_curve_needs(self, coulomb, run, launch):
-        """From R omega_0^2 = `launch` g the reaction vanishes at cos phi = (2 - launch) / 3."""
+    def test_single_contact_separates_where_the_weight_exceeds_the_centripetal_force(self, coulomb, run, launch):
+        """With R omega_0^2 = `launch` g the reaction vanishes at cos phi = (2 - launch) / 3."""
         omega = np.sqrt(launch * 9.81 / 0.043378)
         found = run(coulomb({"initial.omega": omega}, mu=0.0, model="ring-single-contact"), 20000)
         assert found.regime == SEPARATING
@@ -162,17 +162,17 @@ class TestSingleContact:
         assert np.cos(found.phi_end) == pytest.approx((2 - launch) / 3, abs=1e-6)
 
     @pytest.mark.parametrize(("launch", "motion"), [(1.9, OSCILLATORY), (5.1, REVOLVING)])
-    def test_stays_on_it_below_the_axis_or_fast_enough(self, coulomb, run, launch, motion):
+    def test_single_contact_holds_below_the_axis_or_at_high_speed(self, coulomb, run, launch, motion):
         omega = np.sqrt(launch * 9.81 / 0.043378)
         found = run(coulomb({"initial.omega": omega}, mu=0.0, model="ring-single-contact"), 20000)
         assert found.regime == found.motion == motion
 
 
 class TestFigures:
-    """Figs. 25-33 at the paper's own step: what this method finds, right or wrong.
+    """Figs. 25-33 at the step of the paper: results of this method, right or wrong.
 
-    The comments say where the paper claims something else, and what a step of 0.2 us gives, which resolves the
-    stiction band.
+    The comments give other claims of the paper, and results of a step of 0.2 us, which resolves the stiction band
+    ("resolved").
     """
 
     @pytest.mark.parametrize(
@@ -182,26 +182,28 @@ class TestFigures:
             pytest.param(25, OSCILLATORY, OSCILLATORY, 0, 10.0, (0.13265, 1e-5), False, id="fig25"),
             # The angle is not converged: 0.68 at half the step, 0.70 at a tenth.
             pytest.param(26, OSCILLATORY, OSCILLATORY, 0, 10.0, (0.67, 0.05), True, id="fig26"),
-            # Never leaves the band. What exceeds the limit is the tail beyond it, which the run does not meet.
+            # The run stays in the band. Only the tail beyond the band, which it does not reach, exceeds the limit.
             pytest.param(27, OSCILLATORY, OSCILLATORY, 0, 10.0, (0.11438, 1e-5), None, id="fig27"),
-            # The paper: the same as Coulomb, which holds for chatter at mu_k only. Resolved: 0.69946.
+            # The paper: same result as Coulomb, which is true only for chatter at mu_k. Resolved: 0.69946.
             pytest.param(28, OSCILLATORY, OSCILLATORY, 0, 10.0, (0.464, 0.003), True, id="fig28"),
             # Resolved: contact 2 separates at 3.58236 s, 1.24458 rad.
             pytest.param(29, OSCILLATORY, OSCILLATORY, 0, 10.0, (0.94, 0.02), True, id="fig29"),
-            # Resolved: separates at 1.28477 s, 1.29125 rad, on the first swings.
+            # Resolved: contact 2 separates at 1.28477 s, 1.29125 rad, on the first swings.
             pytest.param(30, SEPARATING, OSCILLATORY, 2, 4.884, (1.44, 0.03), True, id="fig30"),
             # The paper: revolves and keeps both contacts. Resolved: separates at 0.14977 s, 2.04373 rad.
             pytest.param(31, SEPARATING, RESTING, 2, 0.1473, (1.99, 0.01), True, id="fig31"),
             # Resolved: the same regime.
             pytest.param(32, OSCILLATORY, OSCILLATORY, 0, 1.0, (0.8294, 1e-4), True, id="fig32"),
-            # The paper: about 0.2 s and 9 rad. Slips throughout, so that nothing is stiff. Resolved: 8.554 rad.
+            # The paper: about 0.2 s and 9 rad. The body always slips, so that nothing is stiff. Resolved: 8.554 rad.
             pytest.param(33, SEPARATING, REVOLVING, 2, 0.1727, (8.555, 0.002), False, id="fig33"),
         ],
     )
-    def test_at_the_papers_step(self, figure, cells, run, number, regime, motion, contact, t_end, phi_max, stiff):
+    def test_figure_at_the_step_of_the_paper(
+        self, figure, cells, run, number, regime, motion, contact, t_end, phi_max, stiff
+    ):
         drive, changes, steps = figure(number)
         batch = cells(changes, drive=drive)
-        # Half the step agrees in kind every time: convergence of that sort proves nothing where the step is stiff.
+        # Half the step gives the same regime every time: such agreement proves nothing where the step is stiff.
         for n in (steps, 2 * steps):
             found = run(batch, n)
             assert (found.regime, found.motion, found.separating_contact) == (regime, motion, contact)
@@ -217,7 +219,7 @@ class TestFigures:
         ("number", "step", "t_end", "phi_end"),
         [(30, 2e-7, 1.28477, 1.29125), (31, 1e-7, 0.14977, 2.04373), (33, 2e-7, 0.1727, 8.554)],
     )
-    def test_at_a_step_that_resolves_the_band(self, figure, cells, run, number, step, t_end, phi_end):
+    def test_figure_at_a_step_that_resolves_the_band(self, figure, cells, run, number, step, t_end, phi_end):
         drive, changes, _ = figure(number)
         found = run(cells(changes, drive=drive), round(changes["time.span"] / step))
         assert found.stiffness < STABILITY_LIMIT
@@ -227,7 +229,7 @@ class TestFigures:
 
 
 def serial(run, build, columns, steps):
-    """Outcomes of each cell run by itself."""
+    """Outcomes of each cell, run alone."""
     count = len(next(iter(columns.values())))
     return [
         run(build({path: column[i] for path, column in columns.items()}), steps, certify=True) for i in range(count)
@@ -242,9 +244,9 @@ def assert_equal_to_serial(together, alone):
 
 
 class TestBatch:
-    """A cell's outcome does not depend, by a single bit, on the company in which it is run."""
+    """The outcome of a cell does not depend, in any bit, on the cells that run beside it."""
 
-    def test_of_amplitudes_zones_launches_and_spans(self, cells, run):
+    def test_cells_with_other_parameters_do_not_change_an_outcome(self, cells, run):
         rng = np.random.default_rng(4)
         n = 32
         columns = {
@@ -265,7 +267,7 @@ class TestBatch:
         assert {OSCILLATORY, SEPARATING, FAILED} <= set(together.regime)
         assert len(set(together.certified)) == 2
 
-    def test_of_drives_of_different_shape(self, cells, run):
+    def test_cells_with_other_drives_do_not_change_an_outcome(self, cells, run):
         columns = {
             "drive.exponent": np.array([1.1, 2.0, 1.1, 3.0, 2.0, 1.1]),
             "drive.amplitude": np.array([20.0, 20.0, 3.0, 20.0, 20.0, 20.0]),
@@ -279,8 +281,7 @@ class TestBatch:
         assert_equal_to_serial(together, serial(run, build, columns, 1500))
         assert len(set(together.phi_end)) == 6
 
-    def test_steps_end_with_the_run(self, cells, run):
-        """A cell that has separated takes no more steps, while those beside it go on."""
+    def test_separated_run_takes_no_more_steps_while_others_go_on(self, cells, run):
         batch = cells({"initial.omega": np.array([16.0, 100.0, 16.0])})
         found = run(batch, 5000)
         np.testing.assert_array_equal(found.regime == SEPARATING, [False, True, False])
@@ -289,14 +290,14 @@ class TestBatch:
 
 
 class TestCertificate:
-    """A cell is certified where two resolutions agree in kind and both stay within the limit of stability."""
+    """A cell is certified if two resolutions agree on the regime and both are within the limit of stability."""
 
     @pytest.fixture
     def coarse(self, coulomb):
-        """Launches so coarsely resolved that some change their regime at half the step."""
+        """Launches for which a coarse step and half of it often give different regimes."""
         return coulomb({"initial.omega": np.linspace(5.0, 100.0, 200), "drive.amplitude": -FAST, "time.span": 0.3})
 
-    def test_needs_agreement(self, coarse, run):
+    def test_certificate_needs_agreement_with_half_the_step(self, coarse, run):
         one, other = run(coarse, 12, certify=True), run(coarse, 24)
         agree = np.ones(200, dtype=bool)
         for name in ("regime", "motion", "separating_contact"):
@@ -306,7 +307,7 @@ class TestCertificate:
         assert one.certified.any()
         assert not one.certified[~agree].any()
 
-    def test_needs_stability(self, cells, run):
+    def test_certificate_needs_stability(self, cells, run):
         batch = cells(
             {"drive.amplitude": 0.2, "friction.v0": np.geomspace(1e-5, 0.3, 40), "friction.alpha": 1.0}, drive="arctan"
         )
@@ -314,10 +315,10 @@ class TestCertificate:
         assert 0 < found.certified.sum() < 40
         assert (found.stiffness[found.certified] <= STABILITY_LIMIT).all()
 
-    def test_is_given_only_where_it_was_sought(self, coarse):
+    def test_no_certificate_is_given_with_certify_false(self, coarse):
         assert not RK4(12, certify=False).run(coarse, Outcome._fields).certified.any()
 
-    def test_a_discontinuous_law_that_reverses_is_beyond_any_step(self, coulomb, run):
+    def test_reversal_under_a_discontinuous_law_has_infinite_stiffness(self, coulomb, run):
         found = run(coulomb({"initial.omega": np.array([10.0, 60.0]), "time.span": 0.1}), 1000, certify=True)
         np.testing.assert_array_equal(found.reversals > 0, [True, False])
         assert found.stiffness[0] == np.inf
@@ -326,21 +327,21 @@ class TestCertificate:
 
 
 class TestVerdict:
-    """How a run stands after a step, from what was seen at both ends of it."""
+    """Status of a run after a step, from the inspections at both ends."""
 
-    SOUND = Inspection((1.0, 0.0), 0.1, 1.0, 1.0, 1.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0, 1.0)
+    VALID = Inspection((1.0, 0.0), 0.1, 1.0, 1.0, 1.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0, 1.0)
 
     @pytest.mark.parametrize(
-        ("change", "standing"),
+        ("change", "expected"),
         [
             ({}, (RUNNING, 1.0)),
             ({"normal_1": -1.0}, (SEPARATED_1, 0.5)),
             ({"normal_2": -3.0}, (SEPARATED_2, 0.25)),
             ({"normal_2": 0.0}, (SEPARATED_2, 1.0)),
-            # Both vanish within the step: the first to do so separates.
+            # Both reactions vanish within the step: the contact that is first separates.
             ({"normal_1": -1.0, "normal_2": -3.0}, (SEPARATED_2, 0.25)),
             ({"normal_1": -3.0, "normal_2": -1.0}, (SEPARATED_1, 0.25)),
-            # A jam has no reactions, so that their signs say nothing.
+            # In a jam the signs of the reactions mean nothing.
             ({"D": 0.0, "normal_2": -1.0}, (JAM, 1.0)),
             ({"inertia": -1.0, "normal_2": -1.0}, (JAM, 1.0)),
             ({"inertia": nan}, (BROKEN, 1.0)),
@@ -350,12 +351,12 @@ class TestVerdict:
             ({"omega": -inf}, (BROKEN, 1.0)),
         ],
     )
-    def test_after_a_sound_state(self, coulomb, change, standing):
-        assert verdict(take(coulomb({}), 0), self.SOUND, self.SOUND._replace(**change)) == standing
+    def test_verdict_after_a_valid_state(self, coulomb, change, expected):
+        assert verdict(take(coulomb({}), 0), self.VALID, self.VALID._replace(**change)) == expected
 
 
 class TestEnd:
-    def test_a_contact_that_would_have_to_pull_at_launch_is_off_at_once(self, coulomb, run):
+    def test_contact_with_negative_reaction_at_launch_separates_at_once(self, coulomb, run):
         phi = np.linspace(-3.1, 3.1, 63)
         batch = coulomb({"initial.phi": phi})
         found = run(batch, 10)
@@ -363,16 +364,16 @@ class TestEnd:
             body = take(batch.body, i)
             epsilon = acceleration(body, 0.0, 0.0, sin(phi[i]), cos(phi[i]), 0.0)[0]
             normals = reactions(body, 0.0, 0.0, sin(phi[i]), cos(phi[i]), 0.0, epsilon)
-            lost = {k for k, normal in enumerate(normals, start=1) if normal <= 0.0}
-            assert (found.steps[i] == 0) == bool(lost)
-            if lost:
+            separated = {k for k, normal in enumerate(normals, start=1) if normal <= 0.0}
+            assert (found.steps[i] == 0) == bool(separated)
+            if separated:
                 assert found.regime[i] == SEPARATING
-                assert found.separating_contact[i] == sum(lost)
+                assert found.separating_contact[i] == sum(separated)
                 assert found.t_separation[i] == found.t_end[i] == 0.0
         assert {0, 1, 2, 3} == set(found.separating_contact)
 
-    def test_separation_is_where_the_reaction_vanishes(self, coulomb, run):
-        """Found between the steps: ten times the step moves the instant by far less than a step."""
+    def test_separation_is_located_where_the_reaction_vanishes(self, coulomb, run):
+        """It is located within a step: with a step 100 times longer the instant changes by much less than a step."""
         batch = coulomb({"initial.omega": 40.0}, mu=0.3)
         coarse, fine = run(batch, 1000), run(batch, 100_000)
         assert coarse.regime == fine.regime == SEPARATING
@@ -382,8 +383,8 @@ class TestEnd:
         normals = reactions(scene.body, -0.3, -0.3, sin(phi), cos(phi), omega, epsilon)
         assert normals[int(fine.separating_contact[0]) - 1] == pytest.approx(0.0, abs=1e-6)
 
-    def test_jamming_at_launch(self, coulomb, run):
-        """With K1 = K2 the effective inertia vanishes where mu^2 (R xi - (J/M + xi^2) cos b) = (J/M + xi^2) cos b."""
+    def test_launch_jams_where_the_effective_inertia_is_not_positive(self, coulomb, run):
+        """With K1 = K2 the inertia is 0 where mu^2 (R xi - (J/M + xi^2) cos beta) = (J/M + xi^2) cos beta."""
         body = take(coulomb({}).body, 0)
         about_axis = (body.inertia / body.mass + body.xi**2) * body.cos_beta
         limit = np.sqrt(about_axis / (body.radius * body.xi - about_axis))
@@ -392,7 +393,7 @@ class TestEnd:
             assert (found.regime == JAMMED) == jammed
             assert (found.t_end == 0.0) == jammed
 
-    def test_jamming_where_a_contact_reaches_a_rough_arc(self, cells, run):
+    def test_body_jams_where_a_contact_reaches_a_rough_arc(self, cells, run):
         changes = {"friction.rough.mu_s": 3.0, "friction.rough.mu_k": 3.0, "zone.center": 1.5, "initial.omega": 30.0}
         batch = cells(changes)
         body = take(batch.body, 0)
@@ -403,7 +404,7 @@ class TestEnd:
         assert found.phi_end == pytest.approx(1.5 - np.radians(15.0) - body.beta, abs=2e-3)
         assert np.isnan(found.t_separation)
 
-    def test_a_run_that_overflows_has_failed(self, cells, coulomb, run):
+    def test_run_that_overflows_is_failed(self, cells, coulomb, run):
         omega = np.array([1e150, 1e160, -1e200, nan])
         for batch in (coulomb({"initial.omega": omega}), cells({"initial.omega": omega})):
             found = run(batch, 100)
@@ -411,7 +412,7 @@ class TestEnd:
             np.testing.assert_array_equal(found.motion, FAILED)
             np.testing.assert_array_equal(np.isnan(found.t_separation), True)
 
-    def test_a_failed_run_is_not_certified(self, coulomb, run):
+    def test_failed_run_has_no_certificate(self, coulomb, run):
         found = run(coulomb({"initial.omega": 1e160}), 100, certify=True)
         assert found.regime == FAILED
         assert not found.certified
@@ -422,7 +423,7 @@ class TestEnd:
         st.floats(0, 5),
         st.integers(1, 50),
     )
-    def test_no_run_that_counts_ends_in_a_number_that_is_none(self, cells, run, omega, size, mu, steps):
+    def test_outcomes_of_a_run_that_has_not_failed_are_finite(self, cells, run, omega, size, mu, steps):
         changes = {"initial.omega": omega, "initial.phi": size, "friction.rough.mu_s": mu, "friction.rough.mu_k": mu}
         found = run(cells(changes), steps)
         assert found.regime[0] in range(len(REGIMES))
@@ -435,7 +436,7 @@ class TestEnd:
 
 
 class TestHistory:
-    def test_ends_as_the_run_does(self, figure, cells, run, history):
+    def test_history_ends_in_the_final_state_of_the_run(self, figure, cells, run, history):
         drive, changes, steps = figure(25)
         batch = cells(changes | {"time.span": 3.0, "drive.amplitude": 2.0}, drive=drive)
         found, rows = run(batch, steps), history(batch, steps)
@@ -445,7 +446,7 @@ class TestHistory:
         assert rows.normal_2.min() == pytest.approx(found.normal_min_2[0], abs=1e-11)
         np.testing.assert_allclose(rows.ring_omega, 2 * np.arctan(rows.t), rtol=1e-14)
 
-    def test_of_a_run_that_separates_ends_within_the_step_that_lost_contact(self, figure, cells, run, history):
+    def test_history_of_a_separating_run_ends_within_the_last_step(self, figure, cells, run, history):
         drive, changes, steps = figure(33)
         batch = cells(changes, drive=drive)
         found, rows = run(batch, steps), history(batch, steps)
@@ -454,11 +455,11 @@ class TestHistory:
         assert (rows.normal_2[:-1] > 0).all()
 
     @pytest.mark.parametrize(("steps", "samples"), [(10, 10), (10, 3), (7, 100), (1000, 7)])
-    def test_keeps_the_first_and_the_last_state(self, coulomb, steps, samples):
+    def test_history_contains_the_first_and_the_last_state(self, coulomb, steps, samples):
         batch = coulomb({"initial.omega": 60.0, "time.span": 0.1})
         t, rows = RK4(steps).history(batch, samples, 9)
         everything, all_rows = RK4(steps).history(batch, steps, 9)
         assert (t[0], t[-1]) == (0.0, pytest.approx(0.1))
         assert len(t) <= 2 * samples + 2
-        kept = np.isin(everything, t)
-        np.testing.assert_array_equal(all_rows[kept], rows)
+        sampled = np.isin(everything, t)
+        np.testing.assert_array_equal(all_rows[sampled], rows)

@@ -1,4 +1,4 @@
-"""Power series on a step: the first root is found, however it lies, and every change of sign."""
+"""Power series within a step: first root, sign changes, sums and bounds."""
 
 from math import cos, exp, factorial, inf, pi
 
@@ -16,8 +16,8 @@ from ringsweep.numerics.series import (
     first_root,
     may_fall_below,
     product,
-    reach,
     slope,
+    step_size,
     value,
     variation,
 )
@@ -32,16 +32,18 @@ def series(coefficients):
 
 
 def from_roots(roots, scale=1.0):
-    """Series with these roots and no others, positive before the first positive one."""
+    """Series with these roots only, positive before the first positive root."""
     c = np.atleast_1d(np.poly(roots))[::-1]
     return series(scale * c / (c[0] if c[0] != 0.0 else 1.0))
 
 
 def first(c, h):
+    """First root of a series within a step, and whether there is one."""
     return first_root(c, h, np.empty((STACK, ORDER + 3)))
 
 
-def noted(c, h, count=0):
+def sign_changes(c, h, count=0):
+    """Sorted instants of the sign changes of a series within a step."""
     work = np.empty((STACK, ORDER + 3))
     count = crossings(c, h, work, count)
     ascending(work[0], count)
@@ -63,8 +65,8 @@ class TestFirstRoot:
     @example(1.0, [-1.0], 1.0)
     @example(1.0, [-2.0, 1.0], 2.0)
     @example(0.5, [0.0] * 15 + [-1.0], 1.0)
-    def test_is_a_zero_with_none_before_it(self, constant, rest, h):
-        # In units of the step, so that every term counts.
+    def test_first_root_is_a_zero_without_another_before_it(self, constant, rest, h):
+        # Coefficients in units of the step, so that every term matters.
         c = series(np.array([constant, *rest]) / h ** np.arange(len(rest) + 1))
         s, found = first(c, h)
         assert 0 < s <= h
@@ -79,11 +81,11 @@ class TestFirstRoot:
 
     @settings(max_examples=300)
     @given(st.floats(1e-6, 1), coefficients)
-    def test_is_the_least_of_numpys(self, constant, rest):
-        # A companion matrix bears no leading coefficient that is next to nothing.
+    def test_first_root_is_the_least_root_of_numpy(self, constant, rest):
+        # The companion matrix of np.roots cannot have a tiny leading coefficient.
         c = series([constant, *np.round(rest, 3)])
         everywhere = np.roots(np.trim_zeros(c[: ORDER + 1], "b")[::-1])
-        # Where a double root all but exists, the two may differ on whether it does.
+        # At a nearly double root the two methods may differ in whether there is a root.
         assume((np.abs(everywhere.imag) < 1e-12).sum() == (np.abs(everywhere.imag) < 1e-4 * np.abs(everywhere)).sum())
         real = everywhere[np.abs(everywhere.imag) < 1e-12].real
         inside = np.sort(real[(real > 0) & (real < 1.001)])
@@ -94,7 +96,7 @@ class TestFirstRoot:
             assert s == pytest.approx(inside[0], rel=1e-7)
 
     @given(st.lists(st.floats(0.05, 3), min_size=1, max_size=6), st.lists(st.floats(-3, -0.05), max_size=4))
-    def test_is_the_least_of_those_given(self, ahead, behind):
+    def test_first_root_is_the_least_of_the_given_roots(self, ahead, behind):
         ahead = sorted(ahead)
         assume(min(np.diff(ahead), default=1) > 0.05)
         c = from_roots(ahead + behind)
@@ -106,8 +108,8 @@ class TestFirstRoot:
 
     @pytest.mark.parametrize("where", [1e-6, 0.1, 1 / 3, 0.5, 0.7, 0.999])
     @pytest.mark.parametrize("depth", [1e-3, 1e-8, 1e-13])
-    def test_two_close_together_are_not_stepped_over(self, where, depth):
-        """A dip to `depth` below zero is found at its near side; one that stops as far above it is not."""
+    def test_two_close_roots_are_found_and_a_minimum_above_zero_is_not(self, where, depth):
+        """The minimum lies the relative distance `depth` below or above zero."""
         for sign in (-1, 1):
             c = series(np.array([where**2 + sign * depth * where**2, -2 * where, 1.0]) / where**2)
             s, found = first(c, 1.0)
@@ -116,27 +118,26 @@ class TestFirstRoot:
                 assert s == pytest.approx(where * (1 - depth**0.5), rel=1e-2 * depth**0.5)
 
     @pytest.mark.parametrize("where", [0.125, 0.25, 0.5, 0.75])
-    def test_a_graze_counts(self, where):
-        """A double root, exact in binary, touches zero and does not change sign."""
+    def test_double_root_is_found(self, where):
+        """The root is an exact binary fraction: the series touches zero without a sign change."""
         s, found = first(from_roots([where, where]), 1.0)
         assert found
         assert s == pytest.approx(where, abs=1e-7)
 
     @pytest.mark.parametrize("order", [3, 5])
-    def test_a_multiple_root_is_one(self, order):
+    def test_multiple_root_is_found_once(self, order):
         s, found = first(from_roots([0.5] * order), 1.0)
         assert found
         assert s == pytest.approx(0.5, abs=1e-15 ** (1 / order))
 
-    def test_at_the_end_of_the_step_is_within_it(self):
+    def test_root_at_the_end_of_the_step_is_found(self):
         c = series([1.0, -1.0])
         s, found = first(c, 1.0)
         assert found
         assert s == pytest.approx(1.0, rel=1e-15)
         assert first(c, 1.0 - 1e-15) == (1.0 - 1e-15, False)
 
-    def test_of_a_cosine(self):
-        """Cut off at the step, as a solver would."""
+    def test_first_root_of_a_truncated_cosine_is_half_pi(self):
         c = series([(-1) ** (k // 2) / factorial(k) if k % 2 == 0 else 0.0 for k in K])
         assert first(c, 1.5) == (1.5, False)
         s, found = first(c, 1.6)
@@ -144,12 +145,12 @@ class TestFirstRoot:
         assert s == pytest.approx(pi / 2, abs=1e-12)
 
     @given(st.floats(-100, 100).map(lambda e: 10.0**e), st.floats(0.01, 0.99))
-    def test_does_not_depend_on_the_unit(self, unit, where):
+    def test_first_root_does_not_depend_on_the_unit(self, unit, where):
         plain, scaled = first(from_roots([where, 1.5]), 1.0), first(from_roots([where, 1.5], unit), 1.0)
         assert plain[1] == scaled[1] == 1
         assert scaled[0] == pytest.approx(plain[0], rel=1e-14)
 
-    def test_of_what_never_changes(self):
+    def test_constant_series_has_no_root(self):
         assert first(series([inf]), 2.0) == (2.0, False)
         assert first(series([1.0]), 2.0) == (2.0, False)
 
@@ -160,21 +161,21 @@ class TestCrossings:
         st.lists(st.floats(0.02, 2), max_size=5), st.lists(st.floats(-3, -0.05), max_size=4), st.sampled_from([-1, 1])
     )
     @example([0.25, 0.5, 0.75], [], -1)
-    def test_are_all_of_them(self, ahead, behind, sign):
+    def test_crossings_are_all_roots_in_the_step(self, ahead, behind, sign):
         ahead = np.sort(ahead)
         assume(min(np.diff(ahead), default=1) > 0.05)
         assume((abs(ahead - 1) > 1e-3).all())
-        found = noted(sign * from_roots([*ahead, *behind]), 1.0)
+        found = sign_changes(sign * from_roots([*ahead, *behind]), 1.0)
         np.testing.assert_allclose(found, ahead[ahead < 1], atol=1e-6)
 
-    def test_a_root_at_the_beginning_or_beyond_the_end_is_none(self):
-        assert noted(series([0.0, 1.0, -2.0]), 1.0) == pytest.approx([0.5], rel=1e-15)
-        assert len(noted(series([1.0, -1.0]), 1.0 - 1e-15)) == 0
+    def test_root_at_the_beginning_or_after_the_end_is_not_a_crossing(self):
+        assert sign_changes(series([0.0, 1.0, -2.0]), 1.0) == pytest.approx([0.5], rel=1e-15)
+        assert len(sign_changes(series([1.0, -1.0]), 1.0 - 1e-15)) == 0
 
-    def test_of_a_quantity_that_is_zero_throughout(self):
-        assert len(noted(series([0.0]), 1.0)) == 0
+    def test_zero_series_has_no_crossings(self):
+        assert len(sign_changes(series([0.0]), 1.0)) == 0
 
-    def test_stand_behind_those_noted_before(self):
+    def test_crossings_are_appended_to_earlier_instants(self):
         work = np.empty((STACK, ORDER + 3))
         work[0, 0] = 0.125
         count = crossings(from_roots([0.75]), 1.0, work, 1)
@@ -185,7 +186,7 @@ class TestCrossings:
 
 class TestSums:
     @given(coefficients, coefficients, st.floats(0, 2))
-    def test_agree_with_polynomials(self, a, b, s):
+    def test_value_slope_and_product_agree_with_numpy(self, a, b, s):
         one, other = series(a), series(b)
         assert value(one, s) == pytest.approx(np.polyval(one[ORDER::-1], s), rel=1e-13, abs=1e-12)
         derivative = np.polynomial.Polynomial(one[: ORDER + 1]).deriv()
@@ -194,23 +195,23 @@ class TestSums:
         np.testing.assert_allclose([product(one, other, k) for k in K], whole[: ORDER + 1], atol=1e-12)
 
     @given(coefficients, st.floats(0.01, 2), st.floats(0, 1))
-    def test_a_series_strays_no_further_than_its_bound(self, a, h, fraction):
+    def test_change_of_a_series_is_at_most_its_variation(self, a, h, fraction):
         c = series(a)
         bound = variation(c, h)
         assert abs(value(c, fraction * h) - c[0]) <= bound * (1 + 1e-12)
         assert not may_fall_below(c, h, c[0] - bound - 1.0)
         assert may_fall_below(c, h, c[0] - bound + 1e-3)
 
-    def test_reach_is_where_a_geometric_series_meets_its_tolerance(self):
-        """Terms ``(s / r)^k`` of tolerance t: ``s = r t^(1/k)`` for the last two, the smaller of which counts."""
+    def test_step_size_is_where_a_geometric_series_meets_its_tolerance(self):
+        """The terms ``(s / r)^k`` equal the tolerance t at ``s = r t^(1/k)``; the smaller of the last two counts."""
         r, t = 3.0, 1e-10
-        h = reach(r**-ORDER / t, r ** -(ORDER - 1) / t)
+        h = step_size(r**-ORDER / t, r ** -(ORDER - 1) / t)
         assert h == pytest.approx(r * t ** (1 / (ORDER - 1)), rel=1e-12)
         assert (h / r) ** ORDER < t
-        assert reach(0.0, 0.0) == inf
-        assert reach(exp(-ORDER), 0.0) == pytest.approx(exp(1.0))
+        assert step_size(0.0, 0.0) == inf
+        assert step_size(exp(-ORDER), 0.0) == pytest.approx(exp(1.0))
 
-    def test_inverses(self):
+    def test_inverse_table_holds_reciprocals(self):
         np.testing.assert_allclose(INVERSE[1:] * np.arange(1, len(INVERSE)), 1.0, rtol=1e-15)
 
     @given(st.lists(st.floats(allow_nan=False), max_size=10))

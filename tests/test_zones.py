@@ -1,4 +1,4 @@
-"""Which coefficients a contact meets: arcs, their edges and their order."""
+"""Surfaces: friction coefficients by arcs, their edges and their order."""
 
 from math import floor, nextafter, pi
 
@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from ringsweep.compile import take
-from ringsweep.physics.zones import Arc, Uniform, coefficients, cut, roughest, segment, wrap
+from ringsweep.physics.zones import Arc, Uniform, coefficients, roughest, segment, surface_of, wrap
 
 REST = (0.2, 0.1)
 
@@ -23,13 +23,13 @@ def psi(x):
 
 
 def on(arc, angle):
-    """The paper's half-open rule for a contact at `angle` in the ring's frame."""
+    """Whether a contact at `angle` in the frame of the ring is on the arc, by the paper's half-open rule."""
     center, half_angle = arc
     return 0.0 <= psi(angle - center + half_angle) < 2 * half_angle
 
 
 def clear_of_edges(arcs, angle):
-    """Whether rounding cannot put `angle` on the wrong side of an edge."""
+    """Whether `angle` is farther from every edge than rounding."""
     return all(
         1e-9 < psi(angle - center - side * half_angle) < 2 * pi - 1e-9
         for center, half_angle in arcs
@@ -37,9 +37,9 @@ def clear_of_edges(arcs, angle):
     )
 
 
-def laid(arcs):
-    """Surface on which the k-th arc, counted from one, has mu_s = k and mu_k = k / 2."""
-    return cut([Arc(*arc, float(k), 0.5 * k) for k, arc in enumerate(arcs, start=1)], *REST)
+def surface_with(arcs):
+    """Surface on which arc number k, counted from 1, has mu_s = k and mu_k = k / 2."""
+    return surface_of([Arc(*arc, float(k), 0.5 * k) for k, arc in enumerate(arcs, start=1)], *REST)
 
 
 def found_at(surface, angle):
@@ -48,79 +48,81 @@ def found_at(surface, angle):
 
 class TestMembership:
     @given(arcs, angles)
-    def test_the_last_arc_that_holds_an_angle_gives_its_coefficients(self, arcs, angle):
+    def test_last_arc_at_an_angle_gives_the_coefficients(self, arcs, angle):
         assume(clear_of_edges(arcs, angle))
         last = max((k for k, arc in enumerate(arcs, start=1) if on(arc, angle)), default=0)
-        assert found_at(laid(arcs), angle) == ((float(last), 0.5 * last, last) if last else (*REST, 0))
+        assert found_at(surface_with(arcs), angle) == ((float(last), 0.5 * last, last) if last else (*REST, 0))
 
     @given(half_angles, angles, angles, st.floats(0.0, 1.5))
-    def test_contacts_behind_and_ahead_of_the_body_on_a_turned_ring(self, half_angle, phi, theta, beta):
-        """The rule as the paper writes it, with phi, theta and beta apart."""
-        surface = laid([(0.0, half_angle)])
+    def test_both_contacts_on_a_turned_ring_obey_the_papers_rule(self, half_angle, phi, theta, beta):
+        """The paper's rule in phi, theta and beta."""
+        surface = surface_with([(0.0, half_angle)])
         for contact in (-beta, beta):
             angle = phi - theta + contact
             assume(clear_of_edges([(0.0, half_angle)], angle))
             assert found_at(surface, angle)[2] == (0.0 <= psi(angle + half_angle) < 2 * half_angle)
 
     @given(centers, half_angles, angles, st.integers(-10_000, 10_000))
-    def test_whole_turns_change_nothing(self, center, half_angle, angle, turns):
+    def test_coefficients_do_not_depend_on_whole_turns(self, center, half_angle, angle, turns):
         assume(clear_of_edges([(center, half_angle)], angle))
-        surface = laid([(center, half_angle)])
+        surface = surface_with([(center, half_angle)])
         assert found_at(surface, angle + 2 * pi * turns) == found_at(surface, angle)
 
     @given(centers, angles)
-    def test_no_opening_covers_nothing_and_a_full_one_everything(self, center, angle):
+    def test_arc_of_half_angle_zero_covers_nothing_and_of_pi_everything(self, center, angle):
         assume(clear_of_edges([(center, 0.0), (center, pi)], angle))
-        assert found_at(laid([(center, 0.0)]), angle)[2] == 0
-        assert found_at(laid([(center, pi)]), angle)[2] == 1
+        assert found_at(surface_with([(center, 0.0)]), angle)[2] == 0
+        assert found_at(surface_with([(center, pi)]), angle)[2] == 1
 
     @given(angles)
-    def test_without_arcs_the_ring_is_uniform(self, angle):
-        surface = cut([], *REST)
+    def test_ring_without_arcs_is_uniform(self, angle):
+        surface = surface_of([], *REST)
         assert isinstance(surface, Uniform)
         assert found_at(surface, angle) == (*REST, 0.0)
         assert roughest(surface) == REST
 
 
 class TestEdges:
-    """Edges at binary fractions, where no rounding blurs which side is which."""
+    """Edges at binary fractions, which are free of rounding."""
 
     @pytest.mark.parametrize(
         ("angle", "arc"),
         [(nextafter(0.5, 0), 0), (0.5, 1), (nextafter(1.5, 0), 1), (1.5, 2), (nextafter(2.5, 0), 2), (2.5, 0)],
     )
-    def test_an_edge_belongs_to_what_follows_it(self, angle, arc):
-        assert found_at(laid([(1.0, 0.5), (2.0, 0.5)]), angle)[2] == arc
+    def test_edge_belongs_to_the_segment_after_it(self, angle, arc):
+        assert found_at(surface_with([(1.0, 0.5), (2.0, 0.5)]), angle)[2] == arc
 
     @pytest.mark.parametrize(("angle", "arc"), [(0.0, 1), (nextafter(0.25, 0), 1), (0.25, 0), (-0.125, 1), (-0.5, 0)])
-    def test_an_arc_across_the_seam_of_the_circle(self, angle, arc):
-        assert found_at(laid([(0.0, 0.25)]), angle)[2] == arc
+    def test_arc_across_angle_zero_is_one_arc(self, angle, arc):
+        assert found_at(surface_with([(0.0, 0.25)]), angle)[2] == arc
 
-    def test_of_overlapping_arcs_the_later_holds(self):
+    def test_later_of_two_overlapping_arcs_holds(self):
         narrow, wide = (1.0, 0.25), (1.0, 0.5)
-        assert [found_at(laid([wide, narrow]), x)[2] for x in (0.6, 1.0, 1.4)] == [1, 2, 1]
-        assert [found_at(laid([narrow, wide]), x)[2] for x in (0.6, 1.0, 1.4)] == [2, 2, 2]
+        assert [found_at(surface_with([wide, narrow]), x)[2] for x in (0.6, 1.0, 1.4)] == [1, 2, 1]
+        assert [found_at(surface_with([narrow, wide]), x)[2] for x in (0.6, 1.0, 1.4)] == [2, 2, 2]
 
     @given(st.floats(-1e6, 1e6, allow_subnormal=False))
-    def test_wrap_stays_within_the_circle(self, x):
+    def test_wrapped_angle_is_the_same_angle_within_one_turn(self, x):
         assert 0.0 <= wrap(x) < 2 * pi
         assert np.cos(wrap(x)) == pytest.approx(np.cos(x), abs=1e-9)
 
     @pytest.mark.parametrize("x", [-1e-300, -1e-17, -0.0])
-    def test_the_smallest_negative_angle_does_not_round_to_a_full_turn(self, x):
+    def test_tiny_negative_angle_does_not_round_to_a_full_turn(self, x):
         assert 0.0 <= wrap(x) < 2 * pi
-        assert found_at(laid([(1.0, 1.0)]), x)[2] in (0, 1)
+        assert found_at(surface_with([(1.0, 1.0)]), x)[2] in (0, 1)
 
 
-def test_each_cell_of_a_batch_is_cut_by_its_own_arcs():
+def test_surface_of_a_batch_equals_the_surfaces_of_its_cells():
     rng = np.random.default_rng(1)
     center, half_angle = rng.uniform(-6, 6, (2, 20)), rng.uniform(0, pi, (2, 20))
-    batch = cut([Arc(c, h, np.full(20, 0.9), np.full(20, 0.8)) for c, h in zip(center, half_angle, strict=True)], *REST)
+    batch = surface_of(
+        [Arc(c, h, np.full(20, 0.9), np.full(20, 0.8)) for c, h in zip(center, half_angle, strict=True)], *REST
+    )
     for i in range(20):
-        alone = cut([Arc(center[k, i], half_angle[k, i], 0.9, 0.8) for k in range(2)], *REST)
-        for ours, theirs in zip(take(batch, i), alone, strict=True):
-            np.testing.assert_array_equal(ours, theirs)
+        alone = surface_of([Arc(center[k, i], half_angle[k, i], 0.9, 0.8) for k in range(2)], *REST)
+        for found, expected in zip(take(batch, i), alone, strict=True):
+            np.testing.assert_array_equal(found, expected)
 
 
-def test_the_roughest_is_the_highest_static_over_the_lowest_kinetic_coefficient():
-    assert roughest(cut([Arc(0.0, 0.3, 0.5, 0.4), Arc(2.0, 0.3, 0.3, 0.05)], *REST)) == (0.5, 0.05)
+def test_roughest_is_the_largest_static_and_the_least_kinetic_coefficient():
+    assert roughest(surface_of([Arc(0.0, 0.3, 0.5, 0.4), Arc(2.0, 0.3, 0.3, 0.05)], *REST)) == (0.5, 0.05)

@@ -130,7 +130,7 @@ def animate_command(arguments: argparse.Namespace) -> None:
     config = with_values(arguments.config, arguments.set)
     target = arguments.output or f"{config.name}-run.gif"
     model = config.scene.structure.model
-    if "phi_end" not in MODELS[model].outcomes:
+    if not MODELS[model].rotates:
         raise InputError("scene.model", f"{model}: there is no ring to animate; ringsweep simulate draws the history")
     if config.axes.sizes:
         raise InputError(

@@ -1,14 +1,14 @@
-"""Compilation: the one place that sets Numba's options, keeps its cache and chooses bodies by type.
+"""Compilation with Numba: options, cache, and the choice of function bodies by type.
 
-Kernels are decorated with :func:`kernel`; formulas with :func:`inlined` or, in the innermost loop, :func:`absorbed`;
-functions with one body for each type with :func:`hook`. Nothing outside this package and :mod:`ringsweep.numerics`
-touches Numba.
+:func:`kernel` decorates a function that Python calls. :func:`inlined` decorates a formula that kernels call, and
+:func:`absorbed` a formula in the innermost loop. :func:`hook` decorates a function with one body for each type. Only
+this package and :mod:`ringsweep.numerics` use Numba.
 """
 
 from ringsweep.compile.cache import SOURCES_DIGEST, kernel
 from ringsweep.compile.dispatch import hook, lacking
 from ringsweep.compile.options import KERNEL_OPTIONS, absorbed, inlined, specialise
-from ringsweep.compile.tuples import add_scaled, borrowed, generated, map_leaves, take, unrolled, written
+from ringsweep.compile.tuples import add_scaled, borrowed, function_from_lines, generated, map_leaves, take, unrolled
 
 __all__ = [
     "KERNEL_OPTIONS",
@@ -16,6 +16,7 @@ __all__ = [
     "absorbed",
     "add_scaled",
     "borrowed",
+    "function_from_lines",
     "generated",
     "hook",
     "inlined",
@@ -25,5 +26,4 @@ __all__ = [
     "specialise",
     "take",
     "unrolled",
-    "written",
 ]

@@ -1,4 +1,4 @@
-"""Kernels, and the key under which their machine code is kept on disk."""
+"""Kernels, and the key of their machine code in the cache on disk."""
 
 from __future__ import annotations
 
@@ -18,30 +18,35 @@ from ringsweep.errors import InputError
 
 logger = logging.getLogger("ringsweep")
 
-#: Files of the user's own friction laws, from the environment; they are compiled with the package's laws.
+#: The user's own files (friction laws, drives, models, methods), from the environment variable RINGSWEEP_LAWS.
 OWN_LAWS = [Path(name) for name in os.environ.get("RINGSWEEP_LAWS", "").split(os.pathsep) if name]
 
-# All that decides the bits of a result. An edit elsewhere, in plots say, leaves kernels and results as they are.
-_DECIDE_BITS = ("compile", "numerics", "physics", "models", "solvers", "quantities", "runs/cells.py")
+# The sources that determine results. An edit elsewhere, such as in plots, keeps the cached kernels and results valid.
+_DETERMINE_RESULTS = ("compile", "numerics", "physics", "models", "solvers", "quantities", "runs/cells.py")
 
 
 def sources_digest(root: Path, own_laws: Iterable[Path] = ()) -> str:
-    """Digest of the sources in a folder of the package that decide the bits of a result.
+    """Digest of the sources that determine results.
 
     Parameters
     ----------
     root : Path
         Folder of the package.
     own_laws : iterable of Path
-        Files of friction laws that are the user's own.
+        The user's own files, see :data:`OWN_LAWS`.
+
+    Returns
+    -------
+    str
+        SHA-256 digest in hexadecimal digits.
 
     Raises
     ------
     InputError
-        If a file of own laws cannot be read.
+        If one of the user's own files cannot be read.
     """
     digest = hashlib.sha256()
-    for place in _DECIDE_BITS:
+    for place in _DETERMINE_RESULTS:
         path = root / place
         for source in [path] if path.suffix else sorted(path.rglob("*.py")):
             digest.update(str(source.relative_to(root)).encode())
@@ -58,16 +63,17 @@ SOURCES_DIGEST = sources_digest(Path(__file__).parents[1], OWN_LAWS)
 
 
 def kernel(function: Callable[..., Any]) -> Any:
-    """Compile a function lazily, without the interpreter lock, and keep it on disk.
+    """Compile a function when it is first called, and keep its machine code on disk.
 
-    The key of the cache covers all sources that decide bits, so that an edit in a callee is never missed.
+    It runs without the global interpreter lock. The key of the cache covers all sources that determine results, so an
+    edit in a called function compiles the kernel anew.
     """
     dispatcher = numba.njit(**KERNEL_OPTIONS)(function)
-    # Without a suffix, kernels compiled with own laws and kernels compiled without would replace each other.
-    keep_on_disk(dispatcher, SOURCES_DIGEST, SOURCES_DIGEST[:12] if OWN_LAWS else "", _tell_of_compilation)
+    # Without the suffix, kernels with own files and kernels without them would replace each other in the cache.
+    keep_on_disk(dispatcher, SOURCES_DIGEST, SOURCES_DIGEST[:12] if OWN_LAWS else "", _announce_compilation)
     return dispatcher
 
 
 @cache
-def _tell_of_compilation() -> None:
-    logger.info("compiling for a kind of scene that is new here: some ten to twenty seconds, once")
+def _announce_compilation() -> None:
+    logger.info("compiling for a new kind of scene: this takes 10 to 20 seconds, once")

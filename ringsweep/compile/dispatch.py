@@ -1,4 +1,4 @@
-"""Functions with one body for each type of their first argument: a scene compiles to what it needs and no more."""
+"""Hooks: functions with one body for each type of their first argument."""
 
 from __future__ import annotations
 
@@ -11,24 +11,31 @@ from ringsweep.compile.options import specialise
 
 
 def hook(stub: Callable[..., Any] | None = None, *, absorb: bool = False, optional: bool = False) -> Any:
-    """A function whose body is chosen by the type of its first argument: ``@hook``, or ``@hook(absorb=True)``.
+    """Make a function whose body is chosen by the type of its first argument: ``@hook``, or ``@hook(absorb=True)``.
 
-    `stub` gives name, signature and docstring. Bodies are added by ``@name.implements(SomeNamedTuple)``. Within a
-    kernel Numba picks the body while compiling, so that a scene holds the code of the law, drive and model that it
-    names and no other. Called from Python it dispatches in the same way.
+    Bodies are added by ``@name.implements(SomeNamedTuple)``. In a kernel, Numba chooses the body while it compiles. So
+    the kernel contains only the code of the law, the drive and the model of its scene. In Python, each call chooses the
+    body.
 
     Parameters
     ----------
     stub : callable
+        Gives name, signature and docstring.
     absorb : bool
-        Whether bodies are inlined whatever their size, as the innermost loop of a kernel needs it.
+        Whether bodies of any size are inlined; see :func:`ringsweep.compile.absorbed`.
     optional : bool
-        Whether the stub is the body for types that have none of their own.
+        Whether the stub is the body for types without a body.
+
+    Returns
+    -------
+    callable
+        The hook. ``hook.implements(*types)`` decorates a body; ``hook.is_defined_for(type)`` tells whether there is
+        one.
 
     Raises
     ------
     TypeError
-        If a body has other arguments than the stub; or when the function is called with a type that has no body.
+        If the arguments of a body differ from those of the stub, or if a call has a type without a body.
     """
     if stub is None:
         return partial(hook, absorb=absorb, optional=optional)

@@ -1,7 +1,7 @@
-"""All that this package uses of Numba's private interfaces, each with a fallback on public ones.
+"""Everything that this package uses of Numba's private interfaces, with fallbacks on public ones.
 
-Without them kernels take longer to compile, and are compiled anew in each process. Their results are the same bit for
-bit. A release of Numba that moves one of these names costs time, not correctness.
+Without the private interfaces kernels take longer to compile, and each process compiles its own. Results are equal bit
+for bit. So a release of Numba that moves one of these names costs time, not correctness.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from typing import Any
 
 logger = logging.getLogger("ringsweep")
 
-# A function that calls this many others, directly or not, leaves the optimisation of all of them to its caller. Else
-# each level between the innermost formulas and the kernel would optimise the same code again.
-_LEFT_TO_THE_CALLER = 28
+# A function that calls at least this many others, directly or not, is optimised only as a part of its caller. Else each
+# level of calls would optimise the same code again.
+_OPTIMISED_BY_CALLER = 28
 
 try:
     from numba._dynfunc import make_function
@@ -36,17 +36,17 @@ else:
 if AVAILABLE:
 
     class _AbsorbedLibrary(JITCodeLibrary):
-        """Code of a function that its callers absorb: it never becomes machine code of its own."""
+        """Code of a function that is compiled into its callers; no machine code is made of the function itself."""
 
         def _optimize_final_module(self) -> None:
-            if len(self._beneath()) < _LEFT_TO_THE_CALLER:
+            if len(self._callees()) < _OPTIMISED_BY_CALLER:
                 super()._optimize_final_module()
 
-        def _beneath(self) -> set[Any]:
+        def _callees(self) -> set[Any]:
             found = set(self._linking_libraries)
             for library in self._linking_libraries:
                 if isinstance(library, _AbsorbedLibrary):
-                    found |= library._beneath()
+                    found |= library._callees()
             return found
 
         def _finalize_final_module(self) -> None:
@@ -64,7 +64,7 @@ if AVAILABLE:
             state.flags.no_compile = True
             super().run_pass(state)
             made, library = state["cr"], state.library
-            # Callers know the function by this name; it cannot be called from Python.
+            # Callers find the function by this object; Python cannot call it.
             name = make_function(made.fndesc.lookup_module(), made.fndesc.qualname, "", 0, made.env, (library,))
             state.targetctx.insert_user_function(name, made.fndesc, [library])
             state.reload_init.extend(library._reload_init)
@@ -72,7 +72,7 @@ if AVAILABLE:
             return True
 
     class _CalleeCompiler(CompilerBase):
-        """Numba's own passes without machine code: a kernel compiles in two thirds of the time, to the same code."""
+        """Numba's passes, but without machine code for callees: kernels compile in two thirds of the time."""
 
         def define_pipelines(self) -> list[Any]:
             passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
@@ -84,10 +84,10 @@ if AVAILABLE:
 
     @intrinsic
     def _borrowed(typingctx: Any, array: Any) -> Any:
-        """The same array without a count of references, for as long as its owner lives.
+        """View of an array without a reference count; valid while the array lives.
 
-        Every call that is given an array, or a tuple that holds one, counts up and down again. Each of these atomic
-        operations costs more than a coefficient of a series.
+        Each call with an array, or with a tuple that holds one, increments and decrements the count. Each of these
+        atomic operations costs more than a coefficient of a series.
         """
 
         def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -114,22 +114,22 @@ else:
     CALLEE_OPTIONS = {}
 
 
-def keep_on_disk(dispatcher: Any, digest: str, suffix: str, tell: Callable[[], None]) -> None:
-    """Keep the compiled code of a function on disk, under a key that covers more sources than its own file.
+def keep_on_disk(dispatcher: Any, digest: str, suffix: str, announce: Callable[[], None]) -> None:
+    """Keep the compiled code of a function on disk, under a key that covers the sources of all functions it calls.
 
-    Numba notices an edit only in the file that holds the function. Without its private interfaces, or where no folder
-    can be written, the function is compiled anew in each process.
+    Numba itself notices an edit only in the file of the function. Without Numba's private interfaces, or if no folder
+    for the cache is writable, each process compiles the function anew.
 
     Parameters
     ----------
     dispatcher : Dispatcher
-        What ``numba.njit`` returned.
+        The result of ``numba.njit``.
     digest : str
-        Digest of all sources that decide the code.
+        Digest of the sources.
     suffix : str
-        Added to the name of the index; functions of different suffixes do not replace each other.
-    tell : callable
-        Called before a compilation.
+        Added to the name of the cache's index. Functions with different suffixes do not replace each other.
+    announce : callable
+        Called before each compilation.
     """
     if not AVAILABLE:
         return
@@ -144,27 +144,27 @@ def keep_on_disk(dispatcher: Any, digest: str, suffix: str, tell: Callable[[], N
             index._index_name, index._data_name_pattern = f"{name}.nbi", f"{name}.{{number:d}}.nbc"
             index._index_path = str(Path(kept._cache_path) / index._index_name)
     except RuntimeError:
-        # No folder can be written.
+        # No folder for the cache is writable.
         return
     except AttributeError:
-        _tell_of_no_cache()
+        _warn_of_no_cache()
         dispatcher._cache = _no_cache()
         return
 
     def load_index() -> Any:
-        # An index left by other sources may name types that do not exist any more: it is stale, not an error.
+        # An index of earlier sources may name types that no longer exist: it is stale, not an error.
         try:
             return load()
         except (AttributeError, ImportError, EOFError, pickle.UnpicklingError):
             return {}
 
-    def load_or_tell(*arguments: Any) -> Any:
+    def load_or_announce(*arguments: Any) -> Any:
         found = load_overload(*arguments)
         if found is None:
-            tell()
+            announce()
         return found
 
-    index._load_index, kept.load_overload = load_index, load_or_tell
+    index._load_index, kept.load_overload = load_index, load_or_announce
 
 
 def _no_cache() -> Any:
@@ -174,5 +174,5 @@ def _no_cache() -> Any:
 
 
 @cache
-def _tell_of_no_cache() -> None:
-    logger.warning("this version of Numba keeps compiled kernels in another way: each process compiles its own")
+def _warn_of_no_cache() -> None:
+    logger.warning("this version of Numba has another cache: each process compiles its own kernels")

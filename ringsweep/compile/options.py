@@ -1,4 +1,4 @@
-"""Options of all compiled code, and the decorators of formulas."""
+"""Numba's options for all compiled code, and the decorators of formulas."""
 
 from __future__ import annotations
 
@@ -10,48 +10,48 @@ from numba.extending import overload, register_jitable
 
 from ringsweep.compile.numba_private import CALLEE_OPTIONS
 
-# Contraction to fused multiply-add is the only liberty taken with IEEE arithmetic. "nnan" and "ninf" would delete the
-# checks by which a run is flagged as failed, and "reassoc" would undo the care taken over cancellation.
+# Fused multiply-add ("contract") is the only deviation from IEEE arithmetic. "nnan" and "ninf" would delete the checks
+# that find failed runs. "reassoc" would reorder sums that are ordered against cancellation.
 #: Options of kernels.
 KERNEL_OPTIONS: Any = {
     "nogil": True,
     "error_model": "numpy",
     "fastmath": {"contract"},
-    # A second entry point for callers in C, of whom there are none.
+    # Nobody calls kernels from C.
     "no_cfunc_wrapper": True,
 }
 
-#: Options of all that is compiled into a kernel.
-_WITHIN = KERNEL_OPTIONS | CALLEE_OPTIONS
+# Options of functions that are compiled into a kernel.
+_CALLED_BY_KERNELS = KERNEL_OPTIONS | CALLEE_OPTIONS
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """Compile a formula into its callers; it needs no cache entry of its own.
+    """Compile a formula into the kernels that call it.
 
-    Called from Python it stays the Python function. An entry from Python, through which a whole scene is unpacked,
-    takes longer to compile than most formulas, and there would be one for each.
+    In Python it stays a Python function. A compiled entry point for Python would have to unpack a whole scene; for most
+    formulas that takes longer to compile than the formula.
     """
-    return register_jitable(**_WITHIN)(function)
+    return register_jitable(**_CALLED_BY_KERNELS)(function)
 
 
 def absorbed(function: Callable[..., Any]) -> Any:
-    """Compile a formula of any size into its callers, as the innermost loop of a kernel needs it.
+    """Compile a formula into the kernels that call it, and inline it whatever its size.
 
-    There a call would pass its arguments through memory.
+    For the innermost loop of a kernel, where a call would pass its arguments through memory.
     """
-    return register_jitable(**_WITHIN, forceinline=True)(function)
+    return register_jitable(**_CALLED_BY_KERNELS, forceinline=True)(function)
 
 
 def specialise(function: Callable[..., Any], choose: Callable[..., Any], *, absorb: bool = False) -> None:
-    """Give a function bodies for kernels, which `choose` picks by the types of the arguments.
+    """Give a function bodies for kernels, chosen by the types of the arguments.
 
     Parameters
     ----------
     function : callable
-        What kernels call.
+        The function that kernels call.
     choose : callable
-        Takes the Numba types of the arguments; returns a function with the same arguments, or None if there is no
-        body for these types.
+        Takes the Numba types of the arguments. Returns the body, a function with the same arguments; or None if there
+        is no body for these types.
     absorb : bool
         Whether bodies of any size are inlined; see :func:`absorbed`.
     """
@@ -59,10 +59,10 @@ def specialise(function: Callable[..., Any], choose: Callable[..., Any], *, abso
     def typed(*kinds: Any) -> Any:
         return choose(*kinds)
 
-    # Numba compares the signatures of an overload and of its bodies, which have no annotations.
+    # Numba compares this signature with the signatures of the bodies, which have no annotations.
     plain = [
         inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD)
         for name in inspect.signature(function).parameters
     ]
     typed.__signature__ = inspect.Signature(plain)  # type: ignore[attr-defined]
-    overload(function, jit_options=_WITHIN | {"forceinline": absorb})(typed)
+    overload(function, jit_options=_CALLED_BY_KERNELS | {"forceinline": absorb})(typed)

@@ -1,4 +1,4 @@
-"""Tuples of any length within kernels: code that is written out for the types or the length of an argument."""
+"""Functions of nested tuples in kernels: their code is generated for the types or the length of an argument."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from numba import types
 from ringsweep.compile.numba_private import borrowed
 from ringsweep.compile.options import specialise
 
-__all__ = ["add_scaled", "borrowed", "generated", "map_leaves", "take", "unrolled", "written"]
+__all__ = ["add_scaled", "borrowed", "function_from_lines", "generated", "map_leaves", "take", "unrolled"]
 
 
-def written(names: str, lines: list[str], scope: dict[str, Any]) -> Any:
-    """A function with these arguments and these lines of a body, which may use the names in `scope`."""
+def function_from_lines(names: str, lines: list[str], scope: dict[str, Any]) -> Any:
+    """Function with arguments `names` and a body of `lines`; the body may use the names in `scope`."""
     scope = dict(scope)
     exec(f"def body({names}):\n    " + "\n    ".join(lines), scope)
     return scope["body"]
 
 
 def _stub(function: Callable[..., Any], names: list[str], call: Callable[..., Any]) -> Any:
-    """A function with these arguments that does `call`; name and docstring are those of another one."""
+    """Function that passes its arguments, `names`, to `call`; with name and docstring of `function`."""
 
     def found(*arguments: Any) -> Any:
         return call(*arguments)
@@ -34,14 +34,17 @@ def _stub(function: Callable[..., Any], names: list[str], call: Callable[..., An
 
 
 def unrolled(write: Callable[..., Any]) -> Any:
-    """A function whose body is written out for the length of its first argument, a tuple.
+    """Make a function whose body is generated for the length of its first argument, a tuple.
 
-    `write` takes that length, then the names of the arguments; it returns the lines of the body.
+    Parameters
+    ----------
+    write : callable
+        Takes the length, then the names of the arguments; returns the lines of the body.
     """
     names = list(inspect.signature(write).parameters)[1:]
 
     def body(first: Any) -> Any:
-        return written(", ".join(names), write(len(first), *names), write.__globals__)
+        return function_from_lines(", ".join(names), write(len(first), *names), write.__globals__)
 
     found = _stub(write, names, lambda *arguments: body(arguments[0])(*arguments))
     specialise(found, lambda *kinds: body(kinds[0]))
@@ -49,19 +52,22 @@ def unrolled(write: Callable[..., Any]) -> Any:
 
 
 def generated(write: Callable[..., Any]) -> Any:
-    """A function for kernels alone, whose body is written out for the types of its arguments.
+    """Make a function for kernels whose body is generated for the types of its arguments.
 
-    `write` takes these types under the names of the arguments; it returns the lines of the body, and what they name;
-    or a function with the same arguments.
+    Parameters
+    ----------
+    write : callable
+        Takes the Numba types of the arguments, under the names of the arguments. Returns either the lines of the body
+        and a dictionary of the names that they use, or a function with the same arguments.
     """
     names = list(inspect.signature(write).parameters)
 
     def refuse(*arguments: Any) -> Any:
-        raise TypeError(f"{write.__name__} is for kernels alone")
+        raise TypeError(f"{write.__name__} can only be called in a kernel")
 
     def body(*kinds: Any) -> Any:
         made = write(*kinds)
-        return written(", ".join(names), *made) if isinstance(made, tuple) else made
+        return function_from_lines(", ".join(names), *made) if isinstance(made, tuple) else made
 
     found = _stub(write, names, refuse)
     specialise(found, body)
@@ -69,7 +75,7 @@ def generated(write: Callable[..., Any]) -> Any:
 
 
 def map_leaves(change: Callable[[Any], Any], nested: Any) -> Any:
-    """A nested tuple with each of its leaves changed."""
+    """Apply `change` to each leaf of a nested tuple."""
     if not isinstance(nested, tuple):
         return change(nested)
     leaves = (map_leaves(change, part) for part in nested)
@@ -77,7 +83,20 @@ def map_leaves(change: Callable[[Any], Any], nested: Any) -> Any:
 
 
 def take(batch: Any, i: Any) -> Any:
-    """Cell `i` of a batch: the same nested tuple with each array replaced by its row; in Python several cells too."""
+    """Cell `i` of a batch.
+
+    Parameters
+    ----------
+    batch : nested tuple of ndarray
+        First dimension of each array: cells.
+    i : int
+        Number of the cell. In Python also a slice, or an array of numbers: then the result is a batch.
+
+    Returns
+    -------
+    nested tuple
+        `batch` with each array replaced by its row `i`.
+    """
     return map_leaves(lambda leaf: leaf[i], batch)
 
 
@@ -86,7 +105,7 @@ def _take_one(batch: Any, i: Any) -> Any:
         return (lambda batch, i: batch[i]) if batch.ndim == 1 else (lambda batch, i: borrowed(batch[i]))
     leaves = "".join(f"take(batch[{k}], i), " for k in range(len(batch)))
     cls = getattr(batch, "instance_class", None)
-    return written("batch, i", [f"return {'cls' if cls else ''}({leaves})"], {"cls": cls, "take": take})
+    return function_from_lines("batch, i", [f"return {'cls' if cls else ''}({leaves})"], {"cls": cls, "take": take})
 
 
 specialise(take, _take_one)
@@ -94,5 +113,5 @@ specialise(take, _take_one)
 
 @unrolled
 def add_scaled(length, y, factor, k):
-    """``y + factor * k``."""
+    """``y + factor * k`` for tuples `y` and `k` of equal length and a number `factor`."""
     return ["return (" + "".join(f"y[{i}] + factor * k[{i}], " for i in range(length)) + ")"]

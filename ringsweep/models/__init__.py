@@ -1,4 +1,4 @@
-"""Models by name: which parameters a scene of each kind has, and how they become what kernels take."""
+"""Models by name, the parameters of their scenes, and the cells that kernels run over."""
 
 from typing import Any
 
@@ -11,12 +11,12 @@ from ringsweep.quantities.parameters import Parameter
 
 __all__ = ["MODELS", "Model", "Structure", "Values", "add_model", "batch", "parameters"]
 
-#: Models by the name that the configuration gives them.
+#: Models, by their names in configurations.
 MODELS: dict[str, Model] = {}
 
 
 def add_model(model: Model) -> None:
-    """Make a model known under its name.
+    """Register a model under its name.
 
     Raises
     ------
@@ -37,10 +37,10 @@ for _model in (Ring(), SingleContactRing(), Belt()):
 
 
 def parameters(structure: Structure) -> dict[str, Parameter]:
-    """Every numeric path that a scene of this structure has, in the order of the documentation."""
+    """Parameters of a scene of this structure by path, in the order of the documentation."""
     return MODELS[structure.model].parameters(structure)
 
 
 def batch(structure: Structure, values: Values) -> Any:
-    """Cells as a kernel takes them; see :meth:`Model.build`."""
+    """Cells that kernels run over; see :meth:`Model.build`."""
     return MODELS[structure.model].build(structure, values)

@@ -1,4 +1,4 @@
-"""What every model declares: its parameters, its outcomes, and the types of its scenes."""
+"""Base class of all models: parameters, outcomes, and types of scenes."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from ringsweep.quantities.parameters import Parameter
 
 
 class Model(ABC):
-    """A kind of system.
+    """A model of a mechanical system.
 
     Attributes
     ----------
     name : str
         Name in configurations.
     doc : str
-        What it is, in a few words.
+        Short description, for the titles of datasets.
     outcomes : tuple of str
-        Outcomes of a run, in the order in which its recorder concludes them; each is a key of
+        Names of the outcomes, in the order in which ``recorder.conclude`` returns them. Each is a key of
         :data:`ringsweep.quantities.variables.OUTCOMES`.
     place : str
-        The history variable that says where the body is; its outcome at the end is that name with ``_end``.
+        History variable for the place of the body. The outcome for the place at the end is this name with ``_end``.
     rotates : bool
-        Whether the body moves round an axis, so that it can be drawn in a ring.
+        Whether the body moves round an axis, so that pictures can show it in a ring.
     absent : frozenset of str
-        Outcomes and history variables that mean nothing for this model; datasets leave them out.
+        Outcomes and history variables that have no meaning for this model. Datasets leave them out.
     """
 
     name: ClassVar[str]
@@ -40,41 +40,46 @@ class Model(ABC):
 
     @property
     def laws(self) -> dict[str, type]:
-        """Friction laws that the model takes, by name."""
+        """Friction laws that the model accepts, by name."""
         return {name: law for name, law in friction.LAWS.items() if self.takes(law)}
 
     def takes(self, law: type) -> bool:
-        """Whether the model takes a friction law; unless a model says otherwise it takes all."""
+        """Whether the model accepts a friction law; by default it accepts all."""
         return True
 
     @abstractmethod
     def scene_type(self, structure: Structure) -> type:
-        """Type of the cells that kernels take: a ``NamedTuple`` for which families of functions have bodies."""
+        """Type of the cells: a ``NamedTuple`` for which functions of :mod:`ringsweep.models.interface` have bodies."""
 
     def required(self, structure: Structure) -> dict[type, tuple[Any, ...]]:
-        """Functions that must have bodies for the types of such a scene: the recorder's, and what a model adds."""
+        """Functions that must have bodies, by type; by default those of the recorder, for the type of the scene."""
         return {self.scene_type(structure): recorder.MEMBERS}
 
     @abstractmethod
     def history(self, structure: Structure) -> tuple[str, ...]:
-        """Variables of a time history, in the order of their columns."""
+        """Names of the history variables, in the order of their columns."""
 
     @abstractmethod
     def parameters(self, structure: Structure) -> dict[str, Parameter]:
-        """Every numeric path of a scene of this structure, with what it is."""
+        """Parameters of a scene of this structure, by path."""
 
     @abstractmethod
     def build(self, structure: Structure, values: Values) -> Any:
-        """Cells as a kernel takes them: a nested ``NamedTuple`` of arrays of shape ``(cells, ...)``.
+        """Cells that kernels run over.
 
         Parameters
         ----------
         structure : Structure
         values : mapping of str to ndarray of shape ``(cells,)``
-            One array for each path that is given, in SI units.
+            Values in SI units, by path. Optional parameters may be absent.
+
+        Returns
+        -------
+        NamedTuple
+            Of the type :meth:`scene_type`, nested, with arrays of shape ``(cells, ...)``.
 
         Raises
         ------
         InputError
-            If values contradict each other, as a ring too small for its body.
+            If values contradict each other, for instance if the ring is too small for the body.
         """

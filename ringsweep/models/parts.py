@@ -1,4 +1,4 @@
-"""What several models share: parameters, friction coefficients of a place, drives."""
+"""Parts that models share: parameters, friction coefficients, friction laws and drives."""
 
 from __future__ import annotations
 
@@ -20,14 +20,22 @@ SPAN = Parameter("s", "span of time", lower=0.0, open_lower=True)
 
 @absorbed
 def largest_eigenvalue(trace, determinant):
-    """Largest magnitude of an eigenvalue of two equations whose Jacobian has this trace and determinant."""
+    """Largest magnitude of an eigenvalue of a 2 x 2 matrix with this trace and determinant."""
     square = trace * trace - 4.0 * determinant
     root = square_root(select(square > 0.0, square, determinant))
     return select(square > 0.0, 0.5 * (abs(trace) + root), root)
 
 
-def pair(law: type, place: str, values: Values) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Static and kinetic coefficient at a place, checked against each other."""
+def friction_coefficients(law: type, place: str, values: Values) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Static and kinetic coefficients at a path such as ``friction.rest``, each of shape ``(cells,)``.
+
+    A law without a static coefficient has the kinetic one in its place.
+
+    Raises
+    ------
+    InputError
+        If the kinetic coefficient exceeds the static one.
+    """
     mu_k = values[f"{place}.mu_k"]
     if "mu_s" not in friction.coefficients_of(law):
         return mu_k, mu_k
@@ -39,12 +47,12 @@ def pair(law: type, place: str, values: Values) -> tuple[NDArray[np.float64], ND
 
 
 def law_of(law: type, values: Values) -> Any:
-    """A friction law whose leaves have shape ``(cells, ...)``; `values` holds its parameters by path.
+    """Friction law with fields of shape ``(cells, ...)``, from the values by path.
 
     Raises
     ------
     InputError
-        If parameters that must ascend do not.
+        If one parameter must exceed another and does not.
     """
     columns = {name: values[f"friction.{name}"] for name in declared(law)}
     if ascending := friction.TRAITS[law].ascending:
@@ -52,19 +60,17 @@ def law_of(law: type, values: Values) -> Any:
         unit = declared(law)[high].unit
         problem = f"{{}} {unit} is not greater than friction.{low}"
         require(columns[high] > columns[low], f"friction.{high}", columns[high], problem)
-    if "seed" in columns:
-        require(columns["seed"] % 1.0 == 0.0, "friction.seed", columns["seed"], "{} is not a whole number")
-    made: Any = getattr(law, "of", law)
-    return made(**columns)
+    make: Any = getattr(law, "of", law)
+    return make(**columns)
 
 
 def drive_of(structure: Structure, values: Values) -> Any:
-    """A drive whose leaves have shape ``(cells, ...)``.
+    """Drive with fields of shape ``(cells, ...)``, from the values by path.
 
     Raises
     ------
     InputError
-        If a table ends before the span of time does.
+        If the table of a drive ends before the span of time.
     """
     law = drives.DRIVES[structure.drive]
     columns: dict[str, Any] = {field: values[f"drive.{field}"] for field in declared(law)}
@@ -81,7 +87,7 @@ def drive_of(structure: Structure, values: Values) -> Any:
     # Few drives are tables, and this import takes longer than a small sweep.
     from scipy.interpolate import CubicSpline
 
-    # A spline of third degree is the smoothest that a few noisy samples bear, and is C2.
+    # A cubic spline has continuous second derivatives; a spline of higher degree would amplify noise in the table.
     pieces = np.ascontiguousarray(CubicSpline(times, angles).c.T)
     return drives.Table(
         **columns,

@@ -1,7 +1,6 @@
-"""A scene: which model, law and drive it is made of, and the numbers that fill them.
+"""A scene: its model, friction law and drive, and their numbers.
 
-The *structure* of a scene decides what is compiled; its *values*, keyed by dotted path, are what a
-sweep varies.
+The *structure* of a scene decides which code is compiled. A sweep varies the *values*: numbers by dotted path.
 """
 
 from __future__ import annotations
@@ -17,22 +16,22 @@ from ringsweep.errors import InputError
 
 Values = Mapping[str, NDArray[np.float64]]
 
-#: Path of the friction law: the one choice, among numbers, that a sweep can go through.
+#: Path of the friction law: the only path without a number that a sweep can vary.
 LAW = "friction.law"
 
 
 @dataclass(frozen=True)
 class Structure:
-    """Everything of a scene that is not a number.
+    """The parts of a scene that are not numbers.
 
     Attributes
     ----------
     model, law, drive : str
-        Names in the registries of models, friction laws and drives.
+        Names of the model, the friction law and the drive.
     arcs : tuple of str
-        Paths under which the rough arcs stand: ``()``, ``("zone",)`` or ``("zones.0", "zones.1", ...)``.
+        Paths of the rough arcs: ``()``, ``("zone",)`` or ``("zones.0", "zones.1", ...)``.
     table : tuple of ndarray, optional
-        Times (s) and angles (rad), each of shape ``(samples,)``, of a tabulated drive.
+        Times (s) and angles (rad) of a drive from a table, each of shape ``(samples,)``.
     """
 
     model: str
@@ -44,16 +43,17 @@ class Structure:
 
 @dataclass(frozen=True)
 class Scene:
-    """What a configuration describes.
+    """The scene of a configuration.
 
     Attributes
     ----------
     structures : dict of str to Structure
-        By the name of the friction law; several, alike in all else, where a sweep goes through laws.
+        Structures by the name of the friction law. There are several if a sweep varies the law; they differ in nothing
+        else.
     values : mapping of str to float
-        In SI units by dotted path. Where there are several laws, each finds its own among them.
+        Values in SI units, by dotted path, with the parameters of all friction laws.
     source : mapping
-        What they came from.
+        The scene as the configuration has it.
     """
 
     structures: dict[str, Structure]
@@ -62,12 +62,27 @@ class Scene:
 
     @property
     def structure(self) -> Structure:
-        """The structure; the first, where a sweep goes through laws."""
+        """The structure; the first one if a sweep varies the friction law."""
         return next(iter(self.structures.values()))
 
 
 def require(allowed: Any, path: str, values: Any, problem: str) -> None:
-    """Raise an `InputError` that names the first of `values` for which `allowed` is false."""
+    """Raise an `InputError` unless all `values` are allowed.
+
+    Parameters
+    ----------
+    allowed : bool or ndarray of bool
+        Whether each value is allowed.
+    path : str
+        Path of the values in the scene.
+    values : float or ndarray
+    problem : str
+        Message; ``{}`` stands for the first value that is not allowed.
+
+    Raises
+    ------
+    InputError
+    """
     allowed, values = np.broadcast_arrays(np.atleast_1d(allowed), np.atleast_1d(values))
     if not allowed.all():
         raise InputError(f"scene.{path}", problem.format(f"{values[~allowed][0]:.6g}"))

@@ -1,1 +1,1 @@
-"""What formulas and solvers compute with: vector lanes, and power series."""
+"""Vector lanes and power series."""

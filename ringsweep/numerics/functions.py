@@ -1,15 +1,15 @@
-"""Functions that take a float or vector lanes alike.
+"""Mathematical functions for floats and for vector lanes.
 
-A formula that is written with these functions, and without ``if``, serves one run (a float, with the mathematical
-functions of the C library) and sixteen runs side by side (``Lanes``, with the polynomials below).
+A formula without ``if`` that calls only these functions can compute one run (floats, C library) or sixteen runs side by
+side (``Lanes``, polynomials below). The polynomials need arguments close to zero:
 
 .. math::
 
     e^{-x} = 2^n e^r,\\ |r| \\le \\tfrac12 \\ln 2; \\qquad
-    \\sin(x), \\cos(x) \\text{ from those of } r = x - n\\tfrac{\\pi}{2},\\ |r| \\le \\tfrac{\\pi}{4}
+    \\sin(x), \\cos(x) \\text{ from } \\sin(r), \\cos(r),\\ r = x - n\\tfrac{\\pi}{2},\\ |r| \\le \\tfrac{\\pi}{4}
 
-with :math:`n` the nearest integer. They are within 6e-16 of the C library's, sine and cosine up to arguments of 1e6.
-The numbers of a run never depend on its neighbours: a branch only saves work that changes no lane.
+with :math:`n` the nearest integer. The results differ from the C library by at most 6e-16; sine and cosine up to
+arguments of 1e6. The numbers of a run do not depend on the runs in the other lanes.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from numba.core import types
 from numba.extending import intrinsic
 
 from ringsweep.compile import specialise
-from ringsweep.numerics.lanes import LANES, MASK, VECTOR, WIDTH, WORDS, named
+from ringsweep.numerics.lanes import LANES, MASK, VECTOR, WIDTH, WORDS, llvm_function
 
 
 @intrinsic
@@ -43,8 +43,8 @@ def _any(typingctx, mask):
 
 
 def _unary(name: str) -> Any:
-    """An operation of the processor on every lane."""
-    instruction = named(name)
+    """Function that applies an LLVM intrinsic to every lane."""
+    instruction = llvm_function(name)
 
     @intrinsic
     def function(typingctx, x):
@@ -55,8 +55,7 @@ def _unary(name: str) -> Any:
 
 _floor, _sqrt = _unary("llvm.floor"), _unary("llvm.sqrt")
 
-
-_copy = named("llvm.copysign")
+_copy = llvm_function("llvm.copysign")
 
 
 @intrinsic
@@ -66,7 +65,7 @@ def _copysign(typingctx, x, sign):
 
 @intrinsic
 def _times_power_of_two(typingctx, x, shifted):
-    """``x * 2**n``, where `shifted` is n + 1.5 * 2**52: its last bits hold n, which is added to the exponent of x."""
+    """``x * 2**n`` where `shifted` is n + 1.5 * 2**52: the last bits of `shifted` hold n."""
 
     def lower(context, builder, sig, args):
         x, shifted = (builder.bitcast(a, WORDS) for a in args)
@@ -77,7 +76,7 @@ def _times_power_of_two(typingctx, x, shifted):
 
 @intrinsic
 def _bit(typingctx, shifted, place):
-    """Whether the bit of that place is set in n, where `shifted` is n + 1.5 * 2**52."""
+    """Whether bit number `place` of n is set, where `shifted` is n + 1.5 * 2**52."""
     if not isinstance(place, types.IntegerLiteral):
         return None
     bit = 1 << place.literal_value
@@ -89,23 +88,21 @@ def _bit(typingctx, shifted, place):
     return MASK(LANES, place), lower
 
 
+# A float of this size has no fraction bits: adding it rounds to the nearest integer.
 _SHIFT = 1.5 * 2.0**52
-
 
 _PER_LN2, _PER_HALF_PI = 1.0 / math.log(2.0), 2.0 / math.pi
 
-
 _LN2 = math.log(2.0)
 
-
-# A sum of which the first two terms end in zeros, so that their products with whole numbers are exact.
+# pi/2 is the sum of these three numbers. The first two end in zero bits, so their products with n are exact.
 _HALF_PI_1, _HALF_PI_2, _HALF_PI_3 = map(
     float.fromhex, ("0x1.921fb54400000p+0", "0x1.0b4611a600000p-34", "0x1.3198a2e037073p-69")
 )
 
 
-def either(scalar: Any) -> Any:
-    """A function of numbers whose body for lanes is given by the decorator ``@either(scalar)``."""
+def lanes_body(scalar: Any) -> Any:
+    """Decorate the body for Lanes of a function of numbers, `scalar`: ``@lanes_body(scalar)``."""
 
     def register(lanes: Any) -> Any:
         specialise(scalar, lambda *kinds: lanes if LANES in kinds or MASK in kinds else scalar)
@@ -115,11 +112,11 @@ def either(scalar: Any) -> Any:
 
 
 def select(condition, a, b):
-    """`a` where the condition holds, else `b`; both are evaluated."""
+    """`a` where the condition holds, else `b`. Both are evaluated."""
     return a if condition else b
 
 
-@either(select)
+@lanes_body(select)
 def _lanes_select(condition, a, b):
     return _select(condition, a, b)
 
@@ -129,17 +126,17 @@ def any_of(condition):
     return condition
 
 
-@either(any_of)
+@lanes_body(any_of)
 def _lanes_any_of(condition):
     return _any(condition)
 
 
 def floor(x):
-    """Greatest whole number not above `x`, as a float."""
+    """Largest integer not above `x`, as a float."""
     return np.floor(x)
 
 
-@either(floor)
+@lanes_body(floor)
 def _lanes_floor(x):
     return _floor(x)
 
@@ -149,24 +146,24 @@ def square_root(x):
     return math.sqrt(x)
 
 
-@either(square_root)
+@lanes_body(square_root)
 def _lanes_square_root(x):
     return _sqrt(x)
 
 
 def decay(x):
-    """``exp(-x)`` for `x` not below 0; of other Lanes anything may come, and must not be heard."""
+    """``exp(-x)`` for `x` from 0 to 700. For other `x` the result of Lanes is undefined."""
     return math.exp(-x)
 
 
-@either(decay)
+@lanes_body(decay)
 def _lanes_decay(x):
     shifted = _SHIFT - x * _PER_LN2
     n = shifted - _SHIFT
     r = -x - n * _LN2
     s = r * r
     f = s * s
-    # Of degree 10, as near to e^r as can be, in pairs: products need not wait for one another.
+    # Minimax polynomial of degree 10 for e^r, in pairs of terms: so the processor computes products in parallel.
     low = (1.0 + r * 1.0000000000000064) + s * (0.49999999999997263 + r * 0.16666666666558028)
     middle = (0.04166666666844455 + r * 0.008333333384564497) + s * (0.0013888888493793516 + r * 0.00019841171513760236)
     high = (2.4801923751985747e-05 + r * 2.7639713991164592e-06) + s * 2.748609738437795e-07
@@ -178,7 +175,7 @@ def sine_cosine(x):
     return math.sin(x), math.cos(x)
 
 
-@either(sine_cosine)
+@lanes_body(sine_cosine)
 def _lanes_sine_cosine(x):
     shifted = x * _PER_HALF_PI + _SHIFT
     n = shifted - _SHIFT
@@ -198,23 +195,23 @@ def _lanes_sine_cosine(x):
     )
     swap = _bit(shifted, 0)
     a, b = _select(swap, cosine, sine), _select(swap, sine, cosine)
-    # Sine is negative in the third and fourth quadrant, cosine in the second and third.
+    # Sine is negative in the third and fourth quadrants, cosine in the second and third.
     return _select(_bit(shifted, 1), -a, a), _select(_bit(shifted + 1.0, 1), -b, b)
 
 
 def sine_cosine_near(x, x_0, sine, cosine):
-    """Sine and cosine of `x`, given those of `x_0`, which is likely to be near."""
+    """Sine and cosine of `x`, given `sine` and `cosine` of a number `x_0` that is probably close to `x`."""
     return math.sin(x), math.cos(x)
 
 
-@either(sine_cosine_near)
+@lanes_body(sine_cosine_near)
 def _lanes_sine_cosine_near(x, x_0, sine, cosine):
     r = x - x_0
     s = r * r
     sine_r = r + r * s * (-1 / 6 + s * (1 / 120 - s * (1 / 5040)))
     cosine_r = 1.0 + s * (-1 / 2 + s * (1 / 24 - s * (1 / 720)))
     a, b = sine * cosine_r + cosine * sine_r, cosine * cosine_r - sine * sine_r
-    # Where the next term of the series could be seen.
+    # In these lanes the truncation error of the series exceeds rounding.
     far = s > 1.0 / 1024.0
     if any_of(far):
         sine, cosine = sine_cosine(x)
@@ -223,10 +220,10 @@ def _lanes_sine_cosine_near(x, x_0, sine, cosine):
 
 
 def opposing(x, v):
-    """`x`, which is not negative, with the sign opposite to that of `v`; where `v` is 0 a plain number is."""
+    """`x`, at least 0, with the sign opposite to the sign of `v`. If `v` is 0: for a float 0; for Lanes -`x` or `x`."""
     return -x if v > 0.0 else x if v < 0.0 else 0.0 * x
 
 
-@either(opposing)
+@lanes_body(opposing)
 def _lanes_opposing(x, v):
     return _copysign(x, -v)

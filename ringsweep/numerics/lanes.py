@@ -1,7 +1,7 @@
-"""Vector lanes: a type that holds one number for each of sixteen runs, and its arithmetic.
+"""Vector lanes: a Numba type that holds one number for each of sixteen runs, and its arithmetic.
 
-The processor takes a value of sixteen doubles in two instructions of 512 bits, or in more and narrower ones. While it
-waits for the result of one part it works on the other.
+The processor computes sixteen doubles by two instructions of 512 bits, or by more instructions of fewer bits. They are
+independent, so it need not wait for one result before it computes the next.
 """
 
 from __future__ import annotations
@@ -11,28 +11,26 @@ from typing import Any
 
 import llvmlite.ir as ir
 from numba.core import cgutils, types
-from numba.core.typing import signature
-from numba.extending import lower_builtin, lower_cast, models, register_model, type_callable
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import lower_builtin, lower_cast, models, register_model
 
-#: Runs in one value.
+#: Number of runs side by side.
 WIDTH = 16
 
-
 _DOUBLE, _WORD = ir.DoubleType(), ir.IntType(64)
-
 
 VECTOR, WORDS, _BITS = (ir.VectorType(kind, WIDTH) for kind in (_DOUBLE, _WORD, ir.IntType(1)))
 
 
 class Lanes(types.Type):
-    """Several doubles."""
+    """Numba type of sixteen doubles, one for each run."""
 
     def __init__(self) -> None:
         super().__init__("Lanes")
 
 
 class Mask(types.Type):
-    """Several truth values."""
+    """Numba type of sixteen truth values, one for each run."""
 
     def __init__(self) -> None:
         super().__init__("Mask")
@@ -57,7 +55,7 @@ class _MaskModel(models.PrimitiveModel):
 
 
 def spread_scalar(builder: Any, value: Any, kind: ir.VectorType) -> Any:
-    """A vector with `value` in every lane."""
+    """LLVM vector of type `kind` with `value` in every lane."""
     first = builder.insert_element(ir.Constant(kind, ir.Undefined), value, ir.Constant(ir.IntType(32), 0))
     everywhere = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
     return builder.shuffle_vector(first, ir.Constant(kind, ir.Undefined), everywhere)
@@ -74,25 +72,28 @@ def _from_boolean(context, builder, fromty, toty, value):
     return spread_scalar(builder, builder.trunc(value, ir.IntType(1)) if value.type.width > 1 else value, _BITS)
 
 
-def _teach(function: Any, taken: Any, given: Any, arity: int, instruction: Any) -> None:
-    """Give `function` a meaning for arguments of type `taken`, plain ones among them spread over the lanes."""
-    alike = types.Boolean if taken is MASK else types.Number
+def _define(function: Any, argument: Any, result: Any, arity: int, instruction: Any) -> None:
+    """Define `function` for `arity` arguments of type `argument`; a plain number among them is spread over the lanes.
 
-    @type_callable(function)
-    def typer(context):
-        def typed(*args):
-            if len(args) == arity and taken in args and all(a == taken or isinstance(a, alike) for a in args):
-                return signature(given, *[taken] * arity)
+    `instruction` takes an LLVM builder and the arguments as LLVM values.
+    """
+    plain = types.Boolean if argument is MASK else types.Number
+
+    @infer_global(function)
+    class Template(AbstractTemplate):
+        def generic(self, args: Any, kws: Any) -> Any:
+            if len(args) == arity and argument in args and all(a == argument or isinstance(a, plain) for a in args):
+                return signature(result, *[argument] * arity)
             return None
 
-        return typed
-
-    @lower_builtin(function, *[taken] * arity)
+    @lower_builtin(function, *[argument] * arity)
     def lower(context, builder, sig, args):
         return instruction(builder, *args)
 
 
-def named(name: str) -> Any:
+def llvm_function(name: str) -> Any:
+    """Builder of calls of an LLVM intrinsic with Lanes as arguments and result."""
+
     def instruction(builder: Any, *args: Any) -> Any:
         kind = ir.FunctionType(VECTOR, [VECTOR] * len(args))
         return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"{name}.v{WIDTH}f64"), args)
@@ -100,22 +101,12 @@ def named(name: str) -> Any:
     return instruction
 
 
-_teach(operator.add, LANES, LANES, 2, lambda builder, a, b: builder.fadd(a, b))
-
-
-_teach(operator.sub, LANES, LANES, 2, lambda builder, a, b: builder.fsub(a, b))
-
-
-_teach(operator.mul, LANES, LANES, 2, lambda builder, a, b: builder.fmul(a, b))
-
-
-_teach(operator.truediv, LANES, LANES, 2, lambda builder, a, b: builder.fdiv(a, b))
-
-
-_teach(operator.neg, LANES, LANES, 1, lambda builder, a: builder.fneg(a))
-
-
-_teach(abs, LANES, LANES, 1, named("llvm.fabs"))
+_define(operator.add, LANES, LANES, 2, lambda builder, a, b: builder.fadd(a, b))
+_define(operator.sub, LANES, LANES, 2, lambda builder, a, b: builder.fsub(a, b))
+_define(operator.mul, LANES, LANES, 2, lambda builder, a, b: builder.fmul(a, b))
+_define(operator.truediv, LANES, LANES, 2, lambda builder, a, b: builder.fdiv(a, b))
+_define(operator.neg, LANES, LANES, 1, lambda builder, a: builder.fneg(a))
+_define(abs, LANES, LANES, 1, llvm_function("llvm.fabs"))
 
 
 for _function, _sign in {
@@ -125,17 +116,13 @@ for _function, _sign in {
     operator.ge: ">=",
     operator.eq: "==",
 }.items():
-    _teach(_function, LANES, MASK, 2, lambda builder, a, b, sign=_sign: builder.fcmp_ordered(sign, a, b))
+    _define(_function, LANES, MASK, 2, lambda builder, a, b, sign=_sign: builder.fcmp_ordered(sign, a, b))
 
 
-_teach(operator.and_, MASK, MASK, 2, lambda builder, a, b: builder.and_(a, b))
+_define(operator.and_, MASK, MASK, 2, lambda builder, a, b: builder.and_(a, b))
+_define(operator.or_, MASK, MASK, 2, lambda builder, a, b: builder.or_(a, b))
 
 
-_teach(operator.or_, MASK, MASK, 2, lambda builder, a, b: builder.or_(a, b))
-
-
-# Where the second is NaN, the first: so Python's min and max choose.
-_teach(min, LANES, LANES, 2, lambda builder, a, b: builder.select(builder.fcmp_ordered("<", b, a), b, a))
-
-
-_teach(max, LANES, LANES, 2, lambda builder, a, b: builder.select(builder.fcmp_ordered(">", b, a), b, a))
+# If the second argument is NaN the first one is taken, as by Python's min and max.
+_define(min, LANES, LANES, 2, lambda builder, a, b: builder.select(builder.fcmp_ordered("<", b, a), b, a))
+_define(max, LANES, LANES, 2, lambda builder, a, b: builder.select(builder.fcmp_ordered(">", b, a), b, a))

@@ -1,4 +1,4 @@
-"""Nested tuples in memory, one by one or side by side in vector lanes."""
+"""Nested tuples of numbers in arrays: one run, or several runs side by side in vector lanes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ringsweep.numerics.lanes import LANES, VECTOR, WIDTH, spread_scalar
 
 
 def _numbers(kind: Any, name: str) -> list[tuple[str, Any]]:
-    """How the numbers in a nested tuple of that name are reached, in order, and their types."""
+    """Expressions for the numbers of a nested tuple with the name `name`, in order, and their Numba types."""
     if isinstance(kind, types.BaseTuple):
         parts: list[Any] = list(iter(kind))  # type: ignore[call-overload]
         return [number for k, part in enumerate(parts) for number in _numbers(part, f"{name}[{k}]")]
@@ -24,13 +24,13 @@ def _numbers(kind: Any, name: str) -> list[tuple[str, Any]]:
 
 @generated
 def size_of(nested):
-    """How many numbers a nested tuple holds."""
+    """Number of the numbers in a nested tuple."""
     return [f"return {len(_numbers(nested, 'nested'))}"], {}
 
 
 @intrinsic
 def _load(typingctx, memory, at):
-    """Lanes from consecutive doubles of an array."""
+    """Lanes from consecutive doubles of an array, from index `at` on."""
 
     def lower(context, builder, sig, args):
         return builder.load(_place(context, builder, sig, args), align=8)
@@ -54,17 +54,16 @@ def _place(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 
 @intrinsic
 def align_stack(typingctx):
-    """Have the stack of the function that is being compiled aligned to 64 bytes.
+    """Align the stack of the calling function to 64 bytes.
 
-    LLVM spills vectors to where the stack happens to lie, across two cache lines each, unless a variable of the
-    function asks for more.
+    Otherwise vectors that LLVM spills to the stack may lie across two cache lines each.
     """
 
     def lower(context, builder, sig, args):
         with builder.goto_entry_block():
             variable = builder.alloca(VECTOR)
         variable.align = 64
-        # Nothing is done with it, but LLVM is not told so.
+        # Empty assembly code, so that LLVM does not remove the variable.
         builder.asm(ir.FunctionType(ir.VoidType(), [variable.type]), "", "r", [variable], side_effect=True)
         return context.get_dummy_value()
 
@@ -73,7 +72,7 @@ def align_stack(typingctx):
 
 @generated
 def write(memory, at, stride, nested):
-    """Store the numbers of a nested tuple from index `at` of an array on, `stride` apart."""
+    """Store the numbers of a nested tuple in an array, from index `at` on and `stride` apart."""
     lines = ["pass"]
     for k, (name, kind) in enumerate(_numbers(nested, "nested")):
         place = f"at + {k} * stride"
@@ -82,7 +81,10 @@ def write(memory, at, stride, nested):
 
 
 def _rebuilt(like: Any, number: Any) -> tuple[str, dict[str, Any]]:
-    """Text of a nested tuple of the type `like`, its k-th number ``number(type, k)``, and the classes that it names."""
+    """Source of a nested tuple of the type `like`, with the classes that it names.
+
+    The source of the k-th number is ``number(type, k)``.
+    """
     classes: dict[str, Any] = {}
     count = itertools.count()
 
@@ -100,7 +102,7 @@ def _rebuilt(like: Any, number: Any) -> tuple[str, dict[str, Any]]:
 
 @generated
 def read(memory, at, stride, like):
-    """A nested tuple of the type of `like` from where :func:`write` stored one."""
+    """Nested tuple of the type of `like`, from an array in which :func:`write` stored it."""
     forms = {types.Float: "memory[{}]", types.Integer: "int(memory[{}])", types.Boolean: "memory[{}] != 0.0"}
 
     def number(kind: Any, k: int) -> str:
@@ -113,7 +115,7 @@ def read(memory, at, stride, like):
 
 @generated
 def read_lanes(memory, at, like):
-    """The same from where tuples stand side by side, with Lanes in place of the numbers of `like`."""
+    """Nested tuple of the type of `like`, but of Lanes, from an array where several such tuples stand side by side."""
     text, scope = _rebuilt(like, lambda kind, k: f"load(memory, at + {k * WIDTH})")
     return [f"return {text}"], scope | {"load": _load}
 
@@ -125,7 +127,7 @@ def _broadcast(typingctx, x):
 
 @generated
 def conform(nested, like):
-    """The nested tuple with a number spread over the lanes wherever `like` has Lanes."""
+    """Nested tuple in which a number becomes Lanes wherever `like` has Lanes."""
     numbers = _numbers(nested, "nested")
 
     def spread(kind: Any, k: int) -> str:
@@ -136,20 +138,20 @@ def conform(nested, like):
     return [f"return {text}"], scope | {"broadcast": _broadcast}
 
 
-# ---- runs one by one, or several side by side ------------------------------------------------
+# ---- one run, or several runs side by side ---------------------------------------------------
 
 
 class Single(NamedTuple):
-    """One run in a value, a float."""
+    """Runs are computed one by one: numbers are floats."""
 
 
 class Several(NamedTuple):
-    """Several runs in a value, Lanes."""
+    """Runs are computed side by side: numbers are Lanes."""
 
 
 @hook
 def width(kind):
-    """Runs in a value."""
+    """Number of runs side by side: 1 for :class:`Single`, :data:`WIDTH` for :class:`Several`."""
 
 
 @width.implements(Single)
@@ -164,7 +166,22 @@ def _several(kind):
 
 @hook
 def gather(kind, memory, at, like):
-    """A nested tuple from index `at` of an array on, where each number of the runs in a value stands side by side."""
+    """Nested tuple of the type of `like`, from index `at` of an array, of one run or of several runs side by side.
+
+    Parameters
+    ----------
+    kind : Single or Several
+    memory : ndarray of shape ``(numbers,)``
+        Each number of the tuple takes :func:`width` places, one for each run.
+    at : int
+    like : nested tuple
+        Any tuple of the type.
+
+    Returns
+    -------
+    nested tuple
+        Of floats or of Lanes.
+    """
 
 
 @gather.implements(Single)
@@ -178,7 +195,7 @@ def _gather_several(kind, memory, at, like):
 
 
 def side_by_side(batch: Any) -> Any:
-    """A batch in which each array of shape ``(cells, n)`` is a tuple of n arrays: every leaf is one number a cell."""
+    """Batch in which each array of shape ``(cells, n)`` is replaced by a tuple of n arrays of shape ``(cells,)``."""
     return map_leaves(
         lambda leaf: leaf if leaf.ndim == 1 else tuple(np.ascontiguousarray(column) for column in leaf.T), batch
     )

@@ -1,6 +1,6 @@
-"""Power series on a step: evaluation, size of the step, first root.
+"""Power series within a step: evaluation, size of the step, roots.
 
-A series is a row of coefficients ``c[0], c[1], ...`` in the time since the step began.
+A series is an array of coefficients: ``c[0] + c[1] s + c[2] s^2 + ...`` with s the time since the step began.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from ringsweep.compile import inlined
 #: Highest power of every series.
 ORDER = 16
 
-#: 1/k: a product is many times cheaper than a quotient.
+#: ``INVERSE[k]`` is 1/k: multiplication is many times cheaper than division.
 INVERSE = np.array([np.inf, *(1.0 / k for k in range(1, ORDER + 3))])
 
-#: Rows of scratch for noting instants and isolating roots.
+#: Rows of the scratch array for :func:`crossings` and :func:`first_root`.
 STACK = 54
 
-# Instants that a step may note at most: far above what a convergent series can have.
-_INSTANTS = ORDER
+# Largest number of instants in a step; a convergent series has far fewer.
+_MAX_INSTANTS = ORDER
 
 
 @inlined
@@ -43,8 +43,14 @@ def slope(c, s):
 
 
 @inlined
-def reach(last, previous):
-    """Step at which the last two terms of a series, scaled by their tolerance, fall to one."""
+def step_size(last, previous):
+    """Longest step within which the last two terms of a series stay within the tolerance, s.
+
+    Parameters
+    ----------
+    last, previous : float
+        Magnitudes of the coefficients of the powers ORDER and ORDER - 1, each divided by the tolerance.
+    """
     h = inf
     if last > 0.0:
         h = exp(-log(last) / ORDER)
@@ -64,7 +70,7 @@ def product(a, b, k):
 
 @inlined
 def variation(c, h):
-    """Bound on how far the series strays from its first term within the step."""
+    """Upper bound on the change of a series within a step of length `h`."""
     power = h
     total = 0.0
     for k in range(1, ORDER + 1):
@@ -74,8 +80,8 @@ def variation(c, h):
 
 
 @inlined
-def _tails(c, h):
-    """Bounds on what the terms beyond the second power add to the series, and to its derivative times `h`."""
+def _remainder_bounds(c, h):
+    """Upper bounds on the sum of the terms above the second power, in the series and in its derivative times `h`."""
     power = h * h
     value = slope = 0.0
     for k in range(3, ORDER + 1):
@@ -88,30 +94,30 @@ def _tails(c, h):
 
 @inlined
 def first_root(c, h, work):
-    """First zero in (0, h] of a series that is positive at 0; `h` is returned with False if there is none.
+    """First zero in (0, h] of a series that is positive at 0.
 
-    Cheap bounds settle most calls. What they leave open is settled in the Bernstein basis, where
-    the number of changes of sign bounds the number of roots: halving the interval isolates the
-    first one, and none can hide, however close two of them lie.
+    Cheap bounds answer most calls. The others are answered in the Bernstein basis, where the number of sign changes
+    bounds the number of roots: bisection isolates the first root, and misses none, however close two roots are.
 
     Parameters
     ----------
     c : ndarray of shape ``(ORDER + 1,)``
+        Series; infinite ``c[0]`` stands for a quantity that has no zero.
     h : float
-        Length of the step.
+        Length of the step, s.
     work : ndarray of shape ``(rows, ORDER + 3)``
-        Scratch; fifty rows let an interval shrink to rounding.
+        Scratch. With fifty rows an interval can shrink to rounding.
 
     Returns
     -------
     tuple
-        ``(s, found)``
+        ``(s, found)``: the zero and True, or `h` and False if there is none.
     """
     if c[0] == inf:
         return h, False
-    rest, rest_slope = _tails(c, h)
+    rest, rest_slope = _remainder_bounds(c, h)
     linear, square = c[1] * h, c[2] * h * h
-    # Least value of the parabola that the first three terms make.
+    # Minimum within the step of the parabola of the first three terms.
     least = c[0] + min(0.0, linear + square)
     if linear < 0.0 and -linear < 2.0 * square:
         least = c[0] - 0.25 * linear * linear / square
@@ -121,13 +127,13 @@ def first_root(c, h, work):
     if linear * steepness > 0.0 and min(abs(linear), abs(steepness)) > rest_slope:
         if value(c, h) > 0.0:
             return h, False
-        return _bracketed(c, 0.0, h), True
-    return _isolated(c, h, work)
+        return _root_in_bracket(c, 0.0, h), True
+    return _first_root_by_subdivision(c, h, work)
 
 
 @inlined
-def _bracketed(c, low, high):
-    """The one zero of a series that is positive at `low` and not at `high`: Newton, kept in the bracket."""
+def _root_in_bracket(c, low, high):
+    """Only zero of a series that is positive at `low` and not at `high`: Newton's method with bisection."""
     s = 0.5 * (low + high)
     for _ in range(80):
         f = value(c, s)
@@ -147,8 +153,8 @@ def _bracketed(c, low, high):
 
 
 @inlined
-def _isolated(c, h, work):
-    """First zero by subdivision in the Bernstein basis; see :func:`first_root`."""
+def _first_root_by_subdivision(c, h, work):
+    """First zero by bisection in the Bernstein basis; see :func:`first_root`."""
     b = work[0]
     power, choose = 1.0, 1.0
     for k in range(ORDER + 1):
@@ -160,7 +166,7 @@ def _isolated(c, h, work):
             b[k] += b[k - 1]
     work[0, ORDER + 1], work[0, ORDER + 2] = 0.0, h
     top = 0
-    # A stack of intervals, the leftmost on top.
+    # A stack of intervals; the leftmost one is on top.
     while top >= 0:
         b = work[top]
         start, width = b[ORDER + 1], b[ORDER + 2]
@@ -173,9 +179,9 @@ def _isolated(c, h, work):
         if changes == 0:
             top -= 1
         elif changes == 1:
-            return _bracketed(c, start, start + width), True
+            return _root_in_bracket(c, start, start + width), True
         elif top + 1 >= len(work) or width <= 1e-15 * h:
-            # Two roots closer than rounding: a graze. Where it truly reaches zero it is taken.
+            # Two roots closer than rounding: a graze. It counts as a zero if the series really reaches zero.
             if value(c, start + width) <= 0.0:
                 return start + width, True
             top -= 1
@@ -185,7 +191,7 @@ def _isolated(c, h, work):
                 left[k] = b[0]
                 for m in range(ORDER - k):
                     b[m] = 0.5 * (b[m] + b[m + 1])
-            # What is left in b is the right half.
+            # Now b holds the right half.
             width *= 0.5
             left[ORDER + 1], left[ORDER + 2] = start, width
             b[ORDER + 1], b[ORDER + 2] = start + width, width
@@ -195,15 +201,30 @@ def _isolated(c, h, work):
 
 @inlined
 def may_fall_below(c, h, level):
-    """Whether a bound leaves room for the series to fall below `level` within the step."""
+    """Whether the series may fall below `level` within the step; False is certain, True is not."""
     return c[0] - variation(c, h) < level
 
 
 @inlined
 def crossings(c, h, work, count):
-    """Note in ``work[0]`` every change of sign of a series in (0, h), behind `count` instants noted before.
+    """Append to ``work[0]`` every sign change of a series in (0, h).
 
-    A root found is divided out, so that the next one becomes the first. Returns the new count.
+    Each root found is divided out of the series, so that the next root becomes the first.
+
+    Parameters
+    ----------
+    c : ndarray of shape ``(ORDER + 1,)``
+    h : float
+        Length of the step, s.
+    work : ndarray of shape ``(STACK, ORDER + 3)``
+        Row 0 holds instants, s; the other rows are scratch.
+    count : int
+        Number of instants already in row 0.
+
+    Returns
+    -------
+    int
+        New number of instants in row 0. They are not sorted.
     """
     bound = variation(c, h)
     if abs(c[0]) > bound or bound == 0.0:
@@ -215,13 +236,13 @@ def crossings(c, h, work, count):
     sign = 1.0 if c[low] > 0.0 else -1.0
     for k in range(ORDER + 1):
         rest[k] = sign * c[k + low] if k + low <= ORDER else 0.0
-    while count < _INSTANTS:
+    while count < _MAX_INSTANTS:
         root, found = first_root(rest, h, work[2:])
         if not found or root >= h:
             return count
         work[0, count] = root
         count += 1
-        # Division by (root - s), from the highest power down: stable for a root within the step.
+        # Division by (root - s) from the highest power down, which is stable for a root within the step.
         carry = rest[ORDER]
         rest[ORDER] = 0.0
         for k in range(ORDER - 1, -1, -1):

@@ -13,9 +13,30 @@ from ringsweep.quantities.parameters import Leaf
 
 
 class Belt(NamedTuple):
-    """A belt with mass, spring, friction law and drive: all that a kernel needs of a cell.
+    """Belt, body, spring, friction law and drive of a cell.
 
-    The drive's angle and its rate are here the belt's displacement (m) and velocity (m/s).
+    The angle and the angular velocity of the drive are here the displacement, m, and the velocity, m/s, of the belt.
+
+    Attributes
+    ----------
+    mass : float
+        Mass of the body, kg.
+    stiffness : float
+        Stiffness of the spring, N/m.
+    gravity : float
+        Acceleration of gravity, m/s^2.
+    mu_s, mu_k : float
+        Static and kinetic friction coefficient, 1.
+    viscous : float
+        Coefficient of viscous friction, N s/m.
+    law, drive : NamedTuple
+        Friction law and drive.
+    initial_x : float
+        Displacement of the body at t = 0, m.
+    initial_v : float
+        Velocity of the body relative to the belt at t = 0, m/s.
+    span : float
+        Span of time, s.
     """
 
     mass: Leaf
@@ -32,7 +53,7 @@ class Belt(NamedTuple):
 
 
 class BristleBelt(NamedTuple):
-    """The same with a friction law that has bristles: their deflection is a third state."""
+    """Belt with a friction law of bristles: their deflection is a third state variable. Fields as for :class:`Belt`."""
 
     mass: Leaf
     stiffness: Leaf

@@ -1,19 +1,21 @@
 """The contact problem at an instant: which contacts stick, slip or open.
 
-Where the sliding velocity is zero, and wherever friction jumps, the state alone does not tell how the body goes on.
-Every mode is tried with its equations and its inequalities:
+If the sliding velocity is zero, or if friction jumps, the state does not determine the mode of the motion. So every
+mode is tested for its equations and inequalities:
 
 - stick: friction ``K_i = -kappa mu_s,i`` with one saturation ``kappa`` in [-1, 1] gives the acceleration of the ring,
   and both normal reactions are positive;
-- slip forwards or backwards: the relative acceleration has the sign of the slip, both normal reactions are positive;
-- a contact opens: its reaction is zero and its gap grows, while the other contact sticks or slips with a positive
-  reaction, or opens too.
+- slip forwards or backwards: the relative acceleration has the sign of the slip, and both normal reactions are
+  positive;
+- a contact opens: its reaction is zero and its gap grows; the other contact sticks or slips with a positive reaction,
+  or opens too.
 
-Stick goes before slip, and what is closed before what opens. Two slips without stick, or no mode at all: no motion of
-rigid bodies follows from the state (jamming).
+Stick has priority over slip, and closed contacts over open ones. If both slips but not stick are admissible, or no mode
+is, the state has no unique motion of rigid bodies (jamming).
 
-Once a contact may open the body has three degrees of freedom. Per unit of reaction ``N`` and of friction ``F`` at one
-contact alone, ``s = -1`` at contact 1 and ``+1`` at contact 2, its gap opens and its place on the race accelerates with
+If a contact may open, the body has three degrees of freedom. Let only one contact act, with the reaction ``N`` and the
+friction ``F``; ``s = -1`` for contact 1 and ``+1`` for contact 2. The accelerations of its gap g and of its place x
+along the race are
 
 .. math::
 
@@ -29,33 +31,39 @@ from math import inf, sqrt
 from ringsweep.compile import hook, inlined
 from ringsweep.physics import ring
 
-#: What the contacts do: both closed in a slip that goes on; one open, or both; both closed in a mode that begins at
-#: rest; no motion of rigid bodies.
+#: Modes of the contacts. CLOSED: slip goes on with both closed. OPEN_1, OPEN_2, OPEN_BOTH: these contacts open. STICK,
+#: FORWARD, BACKWARD: motion from rest with both closed. IMPOSSIBLE: no unique motion of rigid bodies.
 CLOSED, OPEN_1, OPEN_2, OPEN_BOTH, STICK, FORWARD, BACKWARD, IMPOSSIBLE = range(8)
 
-# Rounding of forces and accelerations, as a share of the largest terms in them: what is that close to a bound meets it.
+# Rounding of forces and accelerations, as a share of their largest terms. A value this close to a bound meets it.
 _ROUNDING = 1e-13
 
 
 @hook
 def stick(body, m1, m2, sin_phi, cos_phi, omega, epsilon):
-    """Saturation of friction, and reactions, of a body that sticks to a ring.
+    """Saturation of friction, and normal reactions, of a body that sticks to the ring.
+
+    Friction is ``K_i = -kappa mu_s,i`` at both contacts, with the saturation ``kappa`` at which the angular
+    acceleration of the body equals that of the ring.
 
     Parameters
     ----------
-    body : TwoContacts or OneContact
+    body : NamedTuple
     m1, m2 : float
-        Static friction coefficients under the contacts.
-    sin_phi, cos_phi, omega : float
-        Place and angular velocity of the body, rad/s.
+        Static friction coefficients under the contacts, 1.
+    sin_phi, cos_phi : float
+        Sine and cosine of the angle of the body.
+    omega : float
+        Angular velocity of the body, rad/s.
     epsilon : float
         Angular acceleration of the ring, rad/s^2.
 
     Returns
     -------
     tuple of float
-        ``(kappa, reserve, N1, N2)``: saturation; friction that is left before breakaway, N; reactions, N. If no
-        saturation gives that acceleration the reserve is minus infinity.
+        ``(kappa, reserve, N1, N2)``: saturation, 1; distance from breakaway, m1 N1 + m2 N2 less the friction needed,
+        N; normal reactions, N. With one contact N2 repeats N1. The reserve is minus infinity if no saturation gives
+        this acceleration.
     """
 
 
@@ -64,21 +72,21 @@ def _two_stick(body, m1, m2, sin_phi, cos_phi, omega, epsilon):
     b = body
     sb, cb = b.sin_beta, b.cos_beta
     mean, half = 0.5 * (m1 + m2), 0.5 * (m1 - m2)
-    # The moment about the axis gives the total friction, the tangential balance the difference of the reactions.
+    # The moment about the axis gives the sum of friction, the tangential balance gives the difference of the reactions.
     friction = ((b.inertia + b.mass * b.xi * b.xi) * epsilon + b.mass * b.gravity * b.xi * sin_phi) / b.radius
     difference = (b.mass * (b.xi * epsilon + b.gravity * sin_phi) - friction * cb) / sb
     load = b.mass * (b.xi * omega * omega + b.gravity * cos_phi)
     if mean == 0.0:
         total = load / cb
         return 0.0, -abs(friction), 0.5 * (total + difference), 0.5 * (total - difference)
-    # The radial balance, friction shared in proportion to m_i N_i: mean cb total^2 - linear total - constant = 0.
+    # With friction in proportion to m_i N_i the radial balance is: mean cb total^2 - linear total - constant = 0.
     linear = mean * load - cb * half * difference + sb * half * friction
     constant = difference * (half * load + mean * sb * friction)
     square = linear * linear + 4.0 * mean * cb * constant
     if not square >= 0.0:
         return 0.0, -inf, 0.0, 0.0
     root = sqrt(square)
-    # Where the smaller root is admissible the larger one is, with more of every reaction.
+    # If the smaller root is admissible the larger root is too, with larger reactions.
     total = (linear + root) / (2.0 * mean * cb) if linear >= 0.0 else 2.0 * constant / (root - linear)
     normal_1, normal_2 = 0.5 * (total + difference), 0.5 * (total - difference)
     capacity = m1 * normal_1 + m2 * normal_2
@@ -95,41 +103,45 @@ def _one_stick(body, m1, m2, sin_phi, cos_phi, omega, epsilon):
 
 
 @hook(optional=True)
-def opening(body, k1, k2, m1, m2, sense, sin_phi, cos_phi, omega, epsilon):
-    """Which contacts open, of a body whose contacts cannot both stay closed.
+def opening(body, k1, k2, m1, m2, slides, sin_phi, cos_phi, omega, epsilon):
+    """Contacts that open, of a body whose contacts cannot both stay closed.
 
     Parameters
     ----------
-    body : TwoContacts or OneContact
+    body : NamedTuple
     k1, k2 : float
-        Friction per unit of the reaction: if the body slides, with its sign, positive the way phi grows; at rest its
-        magnitude just after breakaway.
+        Friction per unit of the normal reaction, 1. If the body slides: with sign, positive in the direction of growing
+        phi. If it is at rest: the magnitude just after breakaway.
     m1, m2 : float
-        Static friction coefficients, where the body is at rest.
-    sense : int
-        0 if the body is at rest on the ring, else 1.
+        Static friction coefficients, 1; only used at rest.
+    slides : int
+        0 if the body is at rest on the ring, 1 if it slides.
     sin_phi, cos_phi, omega, epsilon : float
         As for :func:`stick`.
 
     Returns
     -------
     int
-        OPEN_1, OPEN_2, OPEN_BOTH or IMPOSSIBLE. If either contact could open alone it is OPEN_BOTH: neither is blamed.
-        By default OPEN_1: there is one contact.
+        OPEN_1, OPEN_2, OPEN_BOTH or IMPOSSIBLE. OPEN_BOTH also if each contact could open while the other one stays
+        closed: a mirror image must give the mirrored result. By default OPEN_1, for bodies with one contact.
     """
     return OPEN_1
 
 
 @inlined
-def _alone(body, side, k, m, sense, sin_phi, cos_phi, omega, epsilon):
-    """Whether the contact on a side can carry the body by itself while the other one opens."""
+def _carries_alone(body, side, k, m, slides, sin_phi, cos_phi, omega, epsilon):
+    """Whether one contact can carry the body while the other contact opens.
+
+    `side` is -1 for contact 1 and +1 for contact 2; `k` and `m` are as for :func:`opening`, for this contact.
+    """
     b = body
     sb, cb = b.sin_beta, b.cos_beta
-    # The rotational inertia may be zero: then it is a billionth of that of a ring of the body's mass.
+    # The moment of inertia may be zero; a lower bound avoids the division by zero.
     per_inertia = b.mass / max(b.inertia, 1e-9 * b.mass * b.radius * b.radius)
     lever = b.radius - b.xi * cb
-    # Accelerations times the mass: of the gap and of the place on the race, as they are without this contact and per
-    # unit of its reaction (_n) and friction (_f); `cross` is both of these; `other` is the gap of the other contact.
+    # Accelerations times the mass: of the gap (`gap`), of the place along the race (`slide`), and of the gap of the
+    # other contact (`other`). Without suffix: without this contact's forces; _n, _f: per unit of its reaction and of
+    # its friction. `cross` is both gap_f and slide_n.
     gap_n, slide_f = 1.0 + b.xi * b.xi * sb * sb * per_inertia, 1.0 + lever * lever * per_inertia
     cross = side * b.xi * lever * sb * per_inertia
     other_n = cb * cb - sb * sb * (1.0 + b.xi * b.xi * per_inertia)
@@ -138,7 +150,7 @@ def _alone(body, side, k, m, sense, sin_phi, cos_phi, omega, epsilon):
     gap, other = side * sb * along - cb * across, -side * sb * along - cb * across
     slide = -side * sb * across - cb * along - b.mass * b.radius * epsilon
     least = -_ROUNDING * (abs(across) + abs(along) + b.mass * b.radius * abs(epsilon))
-    if sense != 0:
+    if slides != 0:
         stiffness = gap_n + k * cross
         load = -gap / stiffness
         return stiffness > 0.0 and load > 0.0 and other + (other_n + k * other_f) * load > least
@@ -149,22 +161,22 @@ def _alone(body, side, k, m, sense, sin_phi, cos_phi, omega, epsilon):
     for sign in (-1.0, 1.0):
         stiffness = gap_n - sign * k * cross
         load = -gap / stiffness
-        slides = sign * (slide + (cross - sign * k * slide_f) * load) > 0.0
+        starts = sign * (slide + (cross - sign * k * slide_f) * load) > 0.0
         opens = other + (other_n - sign * k * other_f) * load > least
-        if stiffness > 0.0 and load > 0.0 and slides and opens:
+        if stiffness > 0.0 and load > 0.0 and starts and opens:
             return True
     return False
 
 
 @opening.implements(ring.TwoContacts)
-def _two_opening(body, k1, k2, m1, m2, sense, sin_phi, cos_phi, omega, epsilon):
+def _two_opening(body, k1, k2, m1, m2, slides, sin_phi, cos_phi, omega, epsilon):
     across = body.gravity * cos_phi + body.xi * omega * omega
     along = body.gravity * sin_phi
-    # Without a load no gap closes either.
+    # Without a load both gaps open.
     if body.cos_beta * across + body.sin_beta * abs(along) <= 0.0:
         return OPEN_BOTH
-    first = _alone(body, 1.0, k2, m2, sense, sin_phi, cos_phi, omega, epsilon)
-    second = _alone(body, -1.0, k1, m1, sense, sin_phi, cos_phi, omega, epsilon)
+    first = _carries_alone(body, 1.0, k2, m2, slides, sin_phi, cos_phi, omega, epsilon)
+    second = _carries_alone(body, -1.0, k1, m1, slides, sin_phi, cos_phi, omega, epsilon)
     if first:
         return OPEN_BOTH if second else OPEN_1
     return OPEN_2 if second else IMPOSSIBLE
@@ -172,9 +184,18 @@ def _two_opening(body, k1, k2, m1, m2, sense, sin_phi, cos_phi, omega, epsilon):
 
 @hook(optional=True)
 def lost(body, first, second):
-    """Which contacts open, given whether the reaction of each has vanished; one of them at least has.
+    """Contacts that open, given whether the normal reaction of each has vanished.
 
-    By default OPEN_1: there is one contact.
+    Parameters
+    ----------
+    body : NamedTuple
+    first, second : bool
+        Whether the reaction of contact 1 and of contact 2 has vanished; at least one has.
+
+    Returns
+    -------
+    int
+        OPEN_1, OPEN_2 or OPEN_BOTH. By default OPEN_1, for bodies with one contact.
     """
     return OPEN_1
 
@@ -186,16 +207,26 @@ def _two_lost(body, first, second):
 
 @inlined
 def _scale(body, sin_phi, cos_phi, omega, epsilon):
-    """Largest of the terms in the balances of momentum, per unit of mass, m/s^2; not zero, where there is no load."""
+    """Size of the terms in the balances of momentum, per unit of mass, m/s^2; greater than zero even without a load."""
     return body.gravity + body.radius * (omega * omega + abs(epsilon)) + 1e-300
 
 
 @inlined
 def _slip_margin(body, sign, friction, tangential, sin_phi, cos_phi, omega, epsilon):
-    """By how much a slip that begins at rest meets its inequalities, as a share of the terms; negative: it does not.
+    """Least margin of the inequalities of a slip that begins at rest, as a share of the terms; negative if one fails.
 
-    `tangential` is whether stick has just ended by this breakaway without a drop of friction: then there is no relative
-    acceleration yet.
+    Parameters
+    ----------
+    body : NamedTuple
+    sign : float
+        Direction of the slip, +1 or -1.
+    friction : tuple of float
+        Friction coefficients under both contacts just after breakaway, 1.
+    tangential : bool
+        Whether stick has just ended by this breakaway, and friction does not drop at breakaway. Then the relative
+        acceleration is still zero.
+    sin_phi, cos_phi, omega, epsilon : float
+        As for :func:`stick`.
     """
     K1, K2 = -sign * friction[0], -sign * friction[1]
     phi_dd, _, inertia = ring.acceleration(body, K1, K2, sin_phi, cos_phi, omega)
@@ -203,11 +234,11 @@ def _slip_margin(body, sign, friction, tangential, sin_phi, cos_phi, omega, epsi
     terms = _scale(body, sin_phi, cos_phi, omega, epsilon)
     push = sign * body.radius * (phi_dd - epsilon) / terms
     if tangential:
-        # The body starts if still more friction would be needed to hold it.
+        # The body starts to slide if even more friction than the limit would be needed to hold it.
         gain = sign * ring.acceleration_slope(body, K1, K2, K1, K2, sin_phi, cos_phi, omega)
         push = -body.radius * gain / terms if inertia > 0.0 else -1.0
     margin = min(push, min(n1, n2) / (body.mass * terms))
-    # Where there is no acceleration at all it is not a number.
+    # NaN if the acceleration does not exist.
     return margin if margin >= -1.0 else -1.0
 
 
@@ -217,14 +248,16 @@ def at_rest(body, static, forward, backward, sin_phi, cos_phi, omega, epsilon, r
 
     Parameters
     ----------
-    body : TwoContacts or OneContact
-    static, forward, backward : tuple of float
-        Friction coefficients under both contacts: greatest in stick, and just after breakaway either way.
+    body : NamedTuple
+    static : tuple of float
+        Static friction coefficients under both contacts, 1.
+    forward, backward : tuple of float
+        Friction coefficients under both contacts just after breakaway forwards and backwards, 1.
     sin_phi, cos_phi, omega, epsilon : float
         As for :func:`stick`.
     released : int
-        0 where the body may stick; else stick has just ended: +1 or -1 by friction used up, in the slip of that sign;
-        2 by a reaction.
+        0 if the body may stick. Otherwise stick has just ended: +1 or -1 by breakaway in this direction, 2 because a
+        reaction vanished.
 
     Returns
     -------
@@ -236,7 +269,7 @@ def at_rest(body, static, forward, backward, sin_phi, cos_phi, omega, epsilon, r
     if released == 0:
         _, reserve, n1, n2 = stick(body, m1, m2, sin_phi, cos_phi, omega, epsilon)
         held = min(reserve, min(n1, n2)) / (body.mass * _scale(body, sin_phi, cos_phi, omega, epsilon))
-        # Without friction, or without a load, there is nothing to stick to.
+        # Without friction or without a load the body cannot stick.
         if held >= 0.0 and m1 + m2 > 0.0 and min(n1, n2) > 0.0:
             return STICK
     tangential = released == 1 and forward == static
@@ -247,7 +280,7 @@ def at_rest(body, static, forward, backward, sin_phi, cos_phi, omega, epsilon, r
         if min(ahead, back) > 0.0:
             return IMPOSSIBLE
         return FORWARD if ahead > 0.0 else BACKWARD
-    # A tie, such as that of a body without friction in equilibrium.
+    # A tie: for example a body without friction in equilibrium.
     loaded = body.gravity > 0.0 or omega != 0.0
     if loaded and max(held, max(ahead, back)) >= -_ROUNDING:
         return FORWARD if ahead >= max(held, back) else BACKWARD if back >= held else STICK
@@ -257,7 +290,15 @@ def at_rest(body, static, forward, backward, sin_phi, cos_phi, omega, epsilon, r
 
 @inlined
 def sliding(body, K1, K2, sin_phi, cos_phi, omega):
-    """Mode of a body that slides with the friction ``K1``, ``K2`` per unit of the reactions.
+    """Mode of a body that slides.
+
+    Parameters
+    ----------
+    body : NamedTuple
+    K1, K2 : float
+        Friction per unit of the normal reaction at each contact, 1; positive in the direction of growing phi.
+    sin_phi, cos_phi, omega : float
+        As for :func:`stick`.
 
     Returns
     -------
@@ -273,5 +314,5 @@ def sliding(body, K1, K2, sin_phi, cos_phi, omega):
     return opening(body, K1, K2, 0.0, 0.0, 1, sin_phi, cos_phi, omega, 0.0)
 
 
-#: Functions that the contact problem needs of a body.
+#: Functions of a body that the contact problem needs.
 BODY_MEMBERS = (stick, opening, lost)

@@ -1,10 +1,8 @@
-"""Laws by which the ring (or the belt) is driven.
+"""Drives: prescribed motions of the ring or of the belt. ``docs/extending.md`` shows how to add one.
 
-Every law is an amplitude times a shape, :math:`\\theta(t) = A\\, s(t)`. Shapes do not depend on the
-amplitude, so cells that differ only in it share one table of the drive.
-
-To add a drive: a ``NamedTuple`` with its shape's parameters, a body for each hook below, a line
-in ``DRIVES``.
+Every drive is an amplitude times a shape, :math:`\\theta(t) = A\\, s(t)`. The shape does not depend on the amplitude.
+So cells that differ only in amplitude share one table of the shape. On the belt theta is a displacement: m in place of
+rad.
 """
 
 from __future__ import annotations
@@ -27,13 +25,13 @@ class Constant(NamedTuple):
 
 
 class Arctan(NamedTuple):
-    """Smooth run-up (the paper's h): :math:`s = t \\arctan t - \\tfrac12 \\ln(1 + t^2)`."""
+    """Smooth run-up, the paper's h(t): :math:`s = t \\arctan t - \\tfrac12 \\ln(1 + t^2)`."""
 
     amplitude: Annotated[float, Parameter("rad/s", "amplitude of the ring's angular velocity")]
 
 
 class Power(NamedTuple):
-    """Power law: :math:`s = t^n`; for n < 2 the acceleration is infinite at t = 0."""
+    """Power law: :math:`s = t^n`. For 1 < n < 2 the acceleration is infinite at t = 0."""
 
     amplitude: Annotated[float, Parameter("", "angle of the ring after one second")]
     exponent: Annotated[float, Parameter("1", "exponent of the power law", lower=1.0)]
@@ -48,31 +46,47 @@ class Sinusoidal(NamedTuple):
 
 
 class Table(NamedTuple):
-    """Measured angle: a cubic spline through (time, angle), hence smooth to second order."""
+    """Measured angle: a cubic spline through a table of times and angles; its second derivative is continuous.
+
+    ``knots``, of shape ``(n,)``, are the times, s. Row j of ``coefficients``, of shape ``(n - 1, 4)``, belongs to the
+    piece from knot j: the cubic in t - knots[j], highest power first.
+    """
 
     amplitude: Annotated[float, Parameter("1", "factor on the measured angle", default=1.0)]
     knots: Any
     coefficients: Any
 
 
-class Scaled(NamedTuple):
-    """What is left of a drive where its shape is tabulated."""
+class WithoutShape(NamedTuple):
+    """Drive whose shape is read from a table, see :func:`lookup`."""
 
     amplitude: Any
 
 
-def scaled(drive: Any) -> Any:
-    """A drive without its shape: all that :func:`lookup` needs."""
-    return Scaled(drive.amplitude) if hasattr(drive, "amplitude") else drive
+def without_shape(drive: Any) -> Any:
+    """Drive without its shape; :func:`lookup` needs nothing else."""
+    return WithoutShape(drive.amplitude) if hasattr(drive, "amplitude") else drive
 
 
-# A power law has no series at t = 0. What happens before this time is below rounding.
-_BEGINNING = 1e-14
+# Series of a power law begin at this time, s: there is none about t = 0. The motion until then is below rounding.
+_POWER_BEGINNING = 1e-14
 
 
 @hook
 def shape(drive, t):
-    """Shape of the drive and its first two derivatives at time `t` (s)."""
+    """Shape of the drive and its first two derivatives.
+
+    Parameters
+    ----------
+    drive : NamedTuple
+    t : float
+        Time, s.
+
+    Returns
+    -------
+    tuple of float
+        ``(s, ds/dt, d^2s/dt^2)``; the angle is ``theta = amplitude * s``, rad.
+    """
 
 
 @shape.implements(Still)
@@ -108,7 +122,7 @@ def _sinusoidal(drive, t):
 
 @inlined
 def _piece(knots, t):
-    """Index of the spline piece that holds `t`; the outer pieces extend to infinity."""
+    """Index of the spline's piece at time `t`, s; the first and the last piece extend to infinity."""
     low, high = 0, len(knots) - 1
     while high - low > 1:
         middle = (low + high) // 2
@@ -129,10 +143,23 @@ def _table(drive, t):
 
 @hook(optional=True)
 def turn(drive, t):
-    """Angle of the ring and its first two derivatives at time `t` (s); rad, rad/s, rad/s^2."""
+    """Angle of the ring and its first two derivatives.
+
+    By default the amplitude times :func:`shape`.
+
+    Parameters
+    ----------
+    drive, t
+        As for :func:`shape`.
+
+    Returns
+    -------
+    tuple of float
+        ``(theta, omega, epsilon)``, rad, rad/s, rad/s^2; on the belt m, m/s, m/s^2.
+    """
     theta, omega, epsilon = shape(drive, t)
     a = drive.amplitude
-    # An amplitude of zero stills a drive whose acceleration is infinite.
+    # With an amplitude of zero the ring rests, even if the shape has an infinite acceleration.
     return a * theta, a * omega, a * epsilon if a != 0.0 else 0.0
 
 
@@ -143,7 +170,23 @@ def _no_turn(drive, t):
 
 @hook(absorb=True, optional=True)
 def lookup(drive, table, k):
-    """Angle (rad) and angular velocity (rad/s) of the drive from row `k` of a table of its shape."""
+    """Angle and angular velocity of the ring from a table of the shape.
+
+    By default the amplitude times row `k`.
+
+    Parameters
+    ----------
+    drive : NamedTuple
+    table : ndarray of shape ``(instants, 2)``
+        Columns s and ds/dt of the shape.
+    k : int
+        Row.
+
+    Returns
+    -------
+    tuple of float
+        ``(theta, omega)``, rad, rad/s; on the belt m, m/s.
+    """
     return drive.amplitude * table[k, 0], drive.amplitude * table[k, 1]
 
 
@@ -154,18 +197,16 @@ def _no_lookup(drive, table, k):
 
 @hook
 def expand(drive, t, order, theta):
-    """Taylor series of the drive's angle about time `t`.
+    """Taylor series of the angle of the ring about time `t`: theta[0] + theta[1] s + theta[2] s^2 + ...
 
     Parameters
     ----------
-    drive : NamedTuple
-        One of ``DRIVES``.
-    t : float
-        Time, s.
+    drive, t
+        As for :func:`shape`.
     order : int
         Highest power.
     theta : ndarray of shape ``(order + 1,)``
-        Filled with the coefficients, rad/s^k.
+        Filled with the coefficients, rad/s^k; on the belt m/s^k.
     """
 
 
@@ -197,7 +238,7 @@ def _expand_arctan(drive, t, order, theta):
 
 @expand.implements(Power)
 def _expand_power(drive, t, order, theta):
-    t = max(t, _BEGINNING)
+    t = max(t, _POWER_BEGINNING)
     n = drive.exponent
     theta[0] = drive.amplitude * t**n
     for k in range(1, order + 1):
@@ -229,15 +270,28 @@ def _expand_table(drive, t, order, theta):
 
 @hook(optional=True)
 def next_knot(drive, t):
-    """Time after `t` (s) beyond which no series about `t` holds, as where the drive is not smooth; infinite if none."""
+    """Time up to which a series about `t` may be used, s. There the drive is not smooth, or the series converges badly.
+
+    By default infinite.
+
+    Parameters
+    ----------
+    drive, t
+        As for :func:`shape`.
+
+    Returns
+    -------
+    float
+        Time after `t`, s.
+    """
     return inf
 
 
 @next_knot.implements(Power)
 def _within_convergence(drive, t):
-    # About t a series reaches back to the singularity at 0, and as far ahead. Steps that this bounds are the same at
-    # all tolerances, which tell nothing of their error then: a fifth of the way leaves 1e-12.
-    return inf if drive.exponent % 1.0 == 0.0 else 1.2 * max(t, _BEGINNING)
+    # The radius of convergence about t is t, the distance from the singularity at 0. Steps limited by this bound do not
+    # depend on the tolerance. At a fifth of the radius the error is 1e-12.
+    return inf if drive.exponent % 1.0 == 0.0 else 1.2 * max(t, _POWER_BEGINNING)
 
 
 @next_knot.implements(Table)
@@ -248,7 +302,13 @@ def _next_knot(drive, t):
 
 @hook
 def jerk(drive, t):
-    """Third derivative of the ring's angle at time `t` (s), rad/s^3."""
+    """Third derivative of the angle of the ring, rad/s^3; on the belt m/s^3.
+
+    Parameters
+    ----------
+    drive, t
+        As for :func:`shape`.
+    """
 
 
 @jerk.implements(Still, Constant)
@@ -265,7 +325,7 @@ def _arctan_jerk(drive, t):
 @jerk.implements(Power)
 def _power_jerk(drive, t):
     n = drive.exponent
-    return drive.amplitude * n * (n - 1.0) * (n - 2.0) * max(t, _BEGINNING) ** (n - 3.0)
+    return drive.amplitude * n * (n - 1.0) * (n - 2.0) * max(t, _POWER_BEGINNING) ** (n - 3.0)
 
 
 @jerk.implements(Sinusoidal)
@@ -281,43 +341,70 @@ def _table_jerk(drive, t):
 
 @hook(optional=True)
 def beginning(drive):
-    """Time at which the drive's series can begin, s: 0 unless it is singular there."""
+    """First time at which the drive has a Taylor series, s. By default 0; later if the drive is singular at 0."""
     return 0.0
 
 
 @beginning.implements(Power)
 def _after_zero(drive):
-    return _BEGINNING
+    return _POWER_BEGINNING
 
 
 @hook(optional=True)
 def top_speed(drive):
-    """Speed by which the rounding of the drive's speed at t = 0 is measured: by default that speed itself."""
+    """Size of the terms in the speed of the drive at t = 0, in the units of :func:`turn`: its rounding scales with it.
+
+    By default the speed at t = 0.
+    """
     return abs(turn(drive, 0.0)[1])
 
 
 @top_speed.implements(Sinusoidal)
 def _greatest_speed(drive):
-    # Where a rocking ring turns back its speed is the rounding of a cosine.
+    # At an extreme of the angle the computed speed is the rounding of a cosine, not zero.
     return abs(2.0 * pi * drive.frequency * drive.amplitude)
 
 
-# Speeds that differ by less than this share of them are the same but for rounding.
-_SAME = 1e-15
+# Velocities that differ by less than this share of their size are equal but for rounding.
+_ROUNDING = 1e-15
 
 
 @inlined
-def relative(drive, speed):
-    """Speed relative to the drive at t = 0, where that is not rounding; all in units of :func:`turn`."""
-    difference = speed - turn(drive, 0.0)[1]
-    return 0.0 if abs(difference) < _SAME * (abs(speed) + top_speed(drive)) else difference
+def relative_velocity(drive, velocity):
+    """Velocity of a body relative to the drive at t = 0; exactly 0 if the two differ only by rounding.
+
+    Parameters
+    ----------
+    drive : NamedTuple
+    velocity : float
+        Velocity of the body in space, in the units of :func:`turn`.
+
+    Returns
+    -------
+    float
+        Relative velocity, in the units of :func:`turn`.
+    """
+    difference = velocity - turn(drive, 0.0)[1]
+    return 0.0 if abs(difference) < _ROUNDING * (abs(velocity) + top_speed(drive)) else difference
 
 
 @inlined
-def launched(drive, velocity):
-    """Velocity relative to the drive, of a body launched with `velocity` relative to it, where its series can begin.
+def velocity_at_beginning(drive, velocity):
+    """Velocity of a body relative to the drive at the time :func:`beginning`, given that at t = 0.
 
-    Both in units of :func:`turn`. At rest on a drive whose acceleration is finite at first, it stays there until then.
+    Between the two times the body moves uniformly in space, unless it is at rest on the drive and the acceleration of
+    the drive is finite at t = 0: then it stays at rest on the drive.
+
+    Parameters
+    ----------
+    drive : NamedTuple
+    velocity : float
+        Velocity of the body relative to the drive at t = 0, in the units of :func:`turn`.
+
+    Returns
+    -------
+    float
+        Relative velocity at the time :func:`beginning`, in the units of :func:`turn`.
     """
     _, before, acceleration = turn(drive, 0.0)
     if velocity == 0.0 and abs(acceleration) < inf:
@@ -325,7 +412,7 @@ def launched(drive, velocity):
     return velocity - (turn(drive, beginning(drive))[1] - before)
 
 
-#: Functions that a solver of constant step needs of a drive, and those that the others need.
+#: Functions of a drive that methods with a constant step need, and those that the other methods need.
 CONSTANT_STEP_MEMBERS = (shape, turn, lookup)
 MEMBERS = (turn, expand, jerk, next_knot, beginning, top_speed)
 
@@ -341,14 +428,21 @@ DRIVES: dict[str, type] = {
 
 
 def add_drive(name: str, drive: type) -> None:
-    """Make a drive known under a name.
+    """Register a drive.
+
+    Parameters
+    ----------
+    name : str
+        Name in configurations.
+    drive : type
+        ``NamedTuple`` of the drive's parameters. The hooks of this module must have bodies for it.
 
     Raises
     ------
     TypeError
-        If a function that a drive needs has no body for it, or if the name is taken.
+        If a hook has no body for the drive, or if the name is taken.
     """
     if missing := lacking(drive, (shape, *MEMBERS)):
-        raise TypeError(f"drive {name} has no {', '.join(missing)}: every drive needs one")
+        raise TypeError(f"drive {name} has no {', '.join(missing)}: every drive needs it")
     if DRIVES.setdefault(name, drive) is not drive:
         raise TypeError(f"there is a drive {name} already: choose another name")

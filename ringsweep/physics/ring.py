@@ -1,11 +1,11 @@
 """The ring: a body that slides on the inner race of a rotating ring, on two contacts or on one.
 
-Symbols: phi angle of the centre of mass from the downward vertical, omega its rate, theta angle
-of the ring, beta half the angle that the contacts subtend, xi distance of the centre of mass from
-the axis, K_i the friction along the race at contact i per unit of its normal reaction N_i:
-``K_i = -mu_i(|v|) sgn v`` with ``v = (omega - dtheta/dt) R`` at both contacts.
+Symbols: phi is the angle of the centre of mass from the downward vertical, omega its rate, theta the angle of the ring,
+beta half the angle between the contacts, xi the distance of the centre of mass from the axis. K_i is the friction along
+the race at contact i per unit of its normal reaction N_i: ``K_i = -mu_i(|v|) sgn v`` with
+``v = (omega - dtheta/dt) R`` at both contacts.
 
-Balance of momentum, radial and tangential, and of moment of momentum about the axis:
+Balance of momentum, radial and tangential, and of moment of momentum about the axis (the paper's Eqs. 14-32):
 
 .. math::
 
@@ -21,8 +21,8 @@ determinant :math:`D = D_0 + D_1 \\Delta + D_2 P`, and all three give
     \\ddot\\varphi = \\frac{(m_0 + m_1 \\Delta + m_2 P) \\sin\\varphi + (l_0 \\cos\\varphi + l_1 \\omega^2) S}
         {i_0 + i_1 \\Delta + i_2 P} ,
 
-whose coefficients :class:`TwoContacts` defines. The denominator is D times the effective inertia; where D or it is not
-positive no motion of a rigid body exists or it is not unique (jamming, Painleve).
+with the coefficients of :class:`TwoContacts`. The denominator is D times the effective inertia. If D or the denominator
+is not positive, no motion of a rigid body exists, or it is not unique (jamming, Painleve).
 """
 
 from __future__ import annotations
@@ -42,8 +42,19 @@ from ringsweep.quantities.parameters import Leaf
 class TwoContacts(NamedTuple):
     """Two balls joined by a rod (the paper's Fig. 22).
 
-    The last four are the coefficients of D, of D times the effective inertia, of the weight's moment and of what lifts
-    the body against friction; see the head of this module and :meth:`of`.
+    Attributes
+    ----------
+    mass, inertia : float
+        Mass M, kg, and moment of inertia J about the centre of mass, kg m^2.
+    radius, xi : float
+        Radius R of the race, and distance of the centre of mass from the axis, m.
+    beta, sin_beta, cos_beta : float
+        Half the angle between the contacts, rad; its sine and cosine.
+    gravity : float
+        Acceleration of gravity, m/s^2.
+    determinant, effective, weight, lift : tuple of float
+        Coefficients of the acceleration, see the head of this module: (D_0, D_1, D_2), 1; (i_0, i_1, i_2), kg m^2;
+        (m_0, m_1, m_2), N m; (l_0, l_1), N m and kg m^2.
     """
 
     mass: Leaf
@@ -63,9 +74,9 @@ class TwoContacts(NamedTuple):
     def of(
         cls, mass: Any, inertia: Any, radius: Any, xi: Any, sin_beta: Any, cos_beta: Any, gravity: Any
     ) -> TwoContacts:
-        """The body with the coefficients of its acceleration worked out."""
+        """Body with the coefficients of its acceleration computed."""
         D = 2.0 * sin_beta * cos_beta, cos_beta * cos_beta - sin_beta * sin_beta, 2.0 * sin_beta * cos_beta
-        # The tangential balance, less the part of it that the moment about the axis takes up.
+        # Coefficients of the tangential balance after the moment about the axis is eliminated.
         T = 0.0, cos_beta, 2.0 * sin_beta
         about_axis = inertia + mass * xi * xi
         lever, arm = radius * mass, mass * xi
@@ -88,7 +99,7 @@ class TwoContacts(NamedTuple):
 
 
 class OneContact(NamedTuple):
-    """A small body on one contact (the paper's Fig. 13)."""
+    """A small body on one contact (the paper's Fig. 13): mass, kg; radius of the race, m; gravity, m/s^2."""
 
     mass: Leaf
     radius: Leaf
@@ -96,7 +107,23 @@ class OneContact(NamedTuple):
 
 
 class Ring(NamedTuple):
-    """A ring with body, surface, friction law and drive: all that a kernel needs of a cell."""
+    """Ring, body, surface, friction law and drive of a cell.
+
+    Attributes
+    ----------
+    body : NamedTuple
+        :class:`TwoContacts`, :class:`OneContact`, or a type with bodies for the hooks of this module.
+    surface : Uniform or Segments
+        Friction coefficients along the race, see :mod:`ringsweep.physics.zones`.
+    law, drive : NamedTuple
+        Friction law and drive.
+    initial_phi, initial_omega : float
+        Angle, rad, and angular velocity, rad/s, of the body in space at t = 0.
+    span : float
+        Span of time, s.
+    epsilon_omega : float
+        Angular velocity beyond which a change of its sign counts as a reversal, rad/s.
+    """
 
     body: Any
     surface: Any
@@ -109,20 +136,20 @@ class Ring(NamedTuple):
 
 
 class BristleRing(Ring):
-    """The same with a friction law that has bristles: their deflections are states, one at each contact."""
+    """Ring with a friction law of bristles: their deflections, one at each contact, are state variables."""
 
 
 @inlined
 def launch_velocity(scene):
-    """Angular velocity of the body relative to the ring at launch, rad/s."""
-    return drives.relative(scene.drive, scene.initial_omega)
+    """Angular velocity of the body relative to the ring at t = 0, rad/s."""
+    return drives.relative_velocity(scene.drive, scene.initial_omega)
 
 
 @hook(optional=True)
 def contact_offset(body):
-    """Half the angle between the contacts, rad; contact 1 is at ``phi - offset``, 2 at ``phi + offset``.
+    """Half the angle between the contacts, rad. Contact 1 is at ``phi - offset``, contact 2 at ``phi + offset``.
 
-    By default 0: one contact.
+    By default 0, for bodies with one contact.
     """
     return 0.0
 
@@ -134,7 +161,7 @@ def _two_offset(body):
 
 @hook(optional=True)
 def about_axis(body):
-    """What the effective inertia is measured by: the moment of inertia about the axis, kg m^2."""
+    """Scale of the third result of :func:`acceleration`: the moment of inertia about the axis, kg m^2. By default 1."""
     return 1.0
 
 
@@ -145,13 +172,26 @@ def _two_about_axis(body):
 
 @hook(absorb=True)
 def acceleration(body, K1, K2, sin_phi, cos_phi, omega):
-    """Angular acceleration, and what tells whether it exists.
+    """Angular acceleration of the body in slip, and whether the body jams.
+
+    Bodies get vector lanes, so they are written without ``if``. Apart from :func:`constant_terms`, the acceleration is
+    linear in ``sin_phi``, ``cos_phi`` and ``omega**2``.
+
+    Parameters
+    ----------
+    body : NamedTuple
+    K1, K2 : float or Lanes
+        Friction per unit of the normal reaction at each contact, 1; positive in the direction of growing phi.
+    sin_phi, cos_phi : float or Lanes
+        Sine and cosine of the angle of the body.
+    omega : float or Lanes
+        Angular velocity of the body, rad/s.
 
     Returns
     -------
-    tuple of float
-        ``(phi_dd, D, inertia)``: rad/s^2; the determinant of the reactions; D times the effective
-        inertia, kg m^2. The motion is jammed where either of the last two is not positive.
+    tuple of float or Lanes
+        ``(phi_dd, D, inertia)``: angular acceleration, rad/s^2; determinant of the reactions, 1; D times the effective
+        inertia, kg m^2. The body jams if D or inertia is not positive. A body that cannot jam returns 1 for both.
     """
 
 
@@ -180,16 +220,39 @@ def _one_acceleration(body, K1, K2, sin_phi, cos_phi, omega):
 
 @hook(optional=True)
 def constant_terms(body, K1, K2):
-    """Parts of the angular acceleration (rad/s^2) and of both reactions (N) that do not depend on the state.
+    """Terms of the angular acceleration and of the reactions that do not depend on the state.
 
-    The rest of each is a sum of terms in sine, cosine and square of the angular velocity. By default these parts are 0.
+    The other terms are proportional to ``sin_phi``, ``cos_phi`` or ``omega**2``. By default the constant terms are 0.
+
+    Parameters
+    ----------
+    body, K1, K2
+        As for :func:`acceleration`.
+
+    Returns
+    -------
+    tuple of float
+        Constant terms of the angular acceleration, rad/s^2, and of both normal reactions, N.
     """
     return 0.0, 0.0, 0.0
 
 
 @hook(absorb=True)
 def acceleration_slope(body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega):
-    """Derivative of the angular acceleration along ``(dK1, dK2) = (slope_1, slope_2)``."""
+    """Derivative of the angular acceleration by way of friction: d phi_dd/dK1 slope_1 + d phi_dd/dK2 slope_2.
+
+    Parameters
+    ----------
+    slope_1, slope_2 : float or Lanes
+        Derivatives of K1 and K2, for example by the angular velocity, s.
+    body, K1, K2, sin_phi, cos_phi, omega
+        As for :func:`acceleration`.
+
+    Returns
+    -------
+    float or Lanes
+        In rad/s^2 times the unit of the slopes.
+    """
 
 
 @acceleration_slope.implements(TwoContacts)
@@ -214,7 +277,18 @@ def _one_slope(body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega):
 
 @hook(absorb=True)
 def acceleration_gradient(body, K1, K2, sin_phi, cos_phi, omega):
-    """Derivatives of the angular acceleration by angle and by angular velocity, friction K held; 1/s^2 and 1/s."""
+    """Derivatives of the angular acceleration by angle and by angular velocity, at constant K1 and K2.
+
+    Parameters
+    ----------
+    body, K1, K2, sin_phi, cos_phi, omega
+        As for :func:`acceleration`.
+
+    Returns
+    -------
+    tuple of float or Lanes
+        ``(d phi_dd/dphi, d phi_dd/domega)``, 1/s^2 and 1/s.
+    """
 
 
 @acceleration_gradient.implements(TwoContacts)
@@ -233,34 +307,61 @@ def _one_gradient(body, K1, K2, sin_phi, cos_phi, omega):
 
 @hook(absorb=True)
 def friction_gain(body, cos_phi, omega):
-    """Derivative of the angular acceleration by the K of all contacts together, where there is no friction."""
+    """Derivative of the angular acceleration by K, with the same K at all contacts, at K = 0.
+
+    Parameters
+    ----------
+    body, cos_phi, omega
+        As for :func:`acceleration`.
+
+    Returns
+    -------
+    float or Lanes
+        Derivative, rad/s^2.
+    """
 
 
 @friction_gain.implements(TwoContacts)
-def _two_grip(body, cos_phi, omega):
+def _two_friction_gain(body, cos_phi, omega):
     l_0, l_1 = body.lift
     return 2.0 * (l_0 * cos_phi + l_1 * (omega * omega)) / body.effective[0]
 
 
 @friction_gain.implements(OneContact)
-def _one_grip(body, cos_phi, omega):
+def _one_friction_gain(body, cos_phi, omega):
     return body.gravity / body.radius * cos_phi + omega * omega
 
 
 @hook(optional=True)
 def reaction_determinant(body):
-    """Determinant of the reactions without friction: the less it is, the more they make of an error of friction."""
+    """Determinant D of the reactions without friction, 1. Errors of friction grow in the reactions by 1/D.
+
+    By default 1.
+    """
     return 1.0
 
 
 @reaction_determinant.implements(TwoContacts)
-def _two_support(body):
+def _two_reaction_determinant(body):
     return body.determinant[0]
 
 
 @hook(absorb=True)
 def reactions(body, K1, K2, sin_phi, cos_phi, omega, phi_dd):
-    """Normal reactions ``(N1, N2)``, N (the paper's Eq. 17); with one contact N2 repeats N1."""
+    """Normal reactions (the paper's Eq. 17).
+
+    Parameters
+    ----------
+    body, K1, K2, sin_phi, cos_phi, omega
+        As for :func:`acceleration`.
+    phi_dd : float or Lanes
+        Angular acceleration of the body, rad/s^2.
+
+    Returns
+    -------
+    tuple of float or Lanes
+        ``(N1, N2)``, N, positive in compression. With one contact N2 repeats N1.
+    """
 
 
 @reactions.implements(TwoContacts)
@@ -283,7 +384,16 @@ def _one_reactions(body, K1, K2, sin_phi, cos_phi, omega, phi_dd):
 
 @hook
 def energy(body, cos_phi, omega):
-    """Mechanical energy of the body, J."""
+    """Kinetic and potential energy of the body, J. Its rate is :func:`friction_power`.
+
+    Parameters
+    ----------
+    body : NamedTuple
+    cos_phi : float
+        Cosine of the angle of the body.
+    omega : float
+        Angular velocity of the body, rad/s.
+    """
 
 
 @energy.implements(TwoContacts)
@@ -300,7 +410,15 @@ def _one_energy(body, cos_phi, omega):
 
 @hook(optional=True)
 def friction_power(body, K1, K2, normal_1, normal_2, omega):
-    """Power of friction on the body, W."""
+    """Power of friction on the body, W. By default the power of one contact, R omega K1 N1.
+
+    Parameters
+    ----------
+    body, K1, K2, omega
+        As for :func:`acceleration`.
+    normal_1, normal_2 : float
+        Normal reactions, N.
+    """
     return body.radius * omega * K1 * normal_1
 
 
@@ -311,18 +429,20 @@ def _two_power(body, K1, K2, normal_1, normal_2, omega):
 
 @absorbed
 def friction(scene, phi, omega, theta, ring_omega):
-    """Sliding velocity, K at each contact and its slope.
+    """Sliding velocity, and friction K at each contact with its slope.
 
     Parameters
     ----------
     scene : Ring
-        One cell.
-    phi, omega, theta, ring_omega : float
-        Angle and angular velocity of the body and of the ring, rad and rad/s.
+        One cell, or several in vector lanes.
+    phi, omega : float or Lanes
+        Angle, rad, and angular velocity, rad/s, of the body.
+    theta, ring_omega : float
+        Angle, rad, and angular velocity, rad/s, of the ring.
 
     Returns
     -------
-    tuple of float
+    tuple of float or Lanes
         ``(v, K1, K2, dK1/domega, dK2/domega)``; m/s, 1, 1, s, s.
     """
     radius = scene.body.radius
@@ -338,9 +458,22 @@ def friction(scene, phi, omega, theta, ring_omega):
 
 @hook
 def tractions(body, sin_phi, cos_phi, omega, phi_dd, normal_1, normal_2):
-    """Friction ``(F1, F2)`` along the race, N, positive the way phi grows, that a motion and its reactions tell.
+    """Friction at the contacts, from the balances and not from a friction law: so in stick too.
 
-    In stick too, where no law gives it; with one contact F2 repeats F1.
+    Parameters
+    ----------
+    body : NamedTuple
+    sin_phi, cos_phi : float
+        Sine and cosine of the angle of the body.
+    omega, phi_dd : float
+        Angular velocity, rad/s, and angular acceleration, rad/s^2, of the body.
+    normal_1, normal_2 : float
+        Normal reactions, N.
+
+    Returns
+    -------
+    tuple of float
+        ``(F1, F2)`` along the race, N, positive in the direction of growing phi. With one contact F2 repeats F1.
     """
 
 
@@ -354,12 +487,12 @@ def _two_tractions(body, sin_phi, cos_phi, omega, phi_dd, normal_1, normal_2):
 
 
 @tractions.implements(OneContact)
-def _one_traction(body, sin_phi, cos_phi, omega, phi_dd, normal_1, normal_2):
+def _one_tractions(body, sin_phi, cos_phi, omega, phi_dd, normal_1, normal_2):
     friction = body.mass * (body.radius * phi_dd + body.gravity * sin_phi)
     return friction, friction
 
 
-#: Functions that the ring needs of a body.
+#: Functions of a body that the model of the ring needs, besides those of :mod:`ringsweep.physics.contact`.
 BODY_MEMBERS = (
     contact_offset,
     about_axis,

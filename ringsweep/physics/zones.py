@@ -1,7 +1,7 @@
-"""Surfaces: which friction coefficients a contact meets, as a function of its place on the ring.
+"""Surfaces: friction coefficients as a function of the place on the ring.
 
-A surface is either uniform or cut into segments by the edges of its rough arcs. Angles are in
-the ring's frame, where an arc stands still.
+A surface is either uniform, or divided into segments by the edges of its rough arcs. Angles are in the frame of the
+ring, in which the arcs are fixed.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from numba import types
 
-from ringsweep.compile import hook, inlined, specialise, written
+from ringsweep.compile import function_from_lines, hook, inlined, specialise
 from ringsweep.numerics.functions import floor, select
 from ringsweep.quantities.parameters import Leaf, Parameter
 
@@ -23,25 +23,36 @@ CENTER = Parameter("rad", "centre of the rough zone in the ring's frame", lower=
 #: Turns in a radian.
 PER_TURN = 0.5 / pi
 
-
-# What rounding leaves between two ends that meet, such as those of an arc that goes all round: as a surface of its own
-# it could jam a body, or lift it, at an edge that is not there.
-_SLIVER = 1e-14
+# Two arcs that touch, or the ends of an arc of a full turn, may leave a segment of this width by rounding, rad. With
+# coefficients of its own it could jam or lift a body at an edge that does not exist.
+_NEGLIGIBLE_WIDTH = 1e-14
 
 
 class Uniform(NamedTuple):
-    """A ring with one pair of friction coefficients all round."""
+    """Ring with the same friction coefficients everywhere."""
 
     mu_s: float
     mu_k: float
 
 
 class Segments(NamedTuple):
-    """A ring cut at ``edges`` (ascending, in [0, 2 pi)); segment j runs from edge j to edge j + 1.
+    """Ring that is divided into segments. Segment j is from edge j to edge j + 1; the last one ends at edge 0.
 
-    ``arc`` is 0 where no rough arc lies and k on the k-th of them; ``roughest`` is the largest static and the least
-    kinetic coefficient, ``narrowest`` the width of the narrowest segment, rad. In memory a cell's segments are a row of
-    an array; where cells stand side by side, in :mod:`ringsweep.numerics.lanes`, they are a tuple.
+    The first four fields have one value for each segment: for one cell arrays of shape ``(segments,)``, in vector lanes
+    tuples.
+
+    Attributes
+    ----------
+    edges : ndarray or tuple
+        Lower edges of the segments in ascending order, rad, from 0 to less than 2 pi.
+    mu_s, mu_k : ndarray or tuple
+        Static and kinetic friction coefficient, 1.
+    arc : ndarray or tuple
+        Number of the rough arc, counted from 1; 0 outside the arcs.
+    roughest : tuple of float
+        Largest static and least kinetic coefficient, 1.
+    narrowest : float
+        Width of the narrowest segment, rad.
     """
 
     edges: Any
@@ -53,7 +64,7 @@ class Segments(NamedTuple):
 
 
 class Arc(NamedTuple):
-    """A rough arc as the configuration gives it."""
+    """Rough arc as in the configuration: centre and half-angle, rad; friction coefficients, 1."""
 
     center: Annotated[Any, CENTER]
     half_angle: Annotated[Any, HALF_ANGLE]
@@ -63,25 +74,25 @@ class Arc(NamedTuple):
 
 @inlined
 def wrap(x):
-    """Angle reduced to [0, 2 pi): the paper's psi (Eq. 28)."""
+    """Angle reduced to [0, 2 pi), rad: the paper's psi (Eq. 28)."""
     y = x - 2.0 * pi * floor(x * (0.5 / pi))
     return select(y < 2.0 * pi, y, 0.0)
 
 
-def cut(arcs: list[Arc], mu_s: Any, mu_k: Any) -> Uniform | Segments:
-    """Lay rough arcs on a ring whose rest has `mu_s`, `mu_k`; where arcs overlap the later one holds.
+def surface_of(arcs: list[Arc], mu_s: Any, mu_k: Any) -> Uniform | Segments:
+    """Surface of a ring with rough arcs. Where arcs overlap, the later one in the list holds.
 
     Parameters
     ----------
     arcs : list of Arc
-        Rough arcs; each field a float or an array of shape ``(cells,)``, angles in rad.
+        Rough arcs. Each field is a float or an array of shape ``(cells,)``.
     mu_s, mu_k : float or ndarray of shape ``(cells,)``
-        Coefficients outside the arcs.
+        Static and kinetic friction coefficient outside the arcs, 1.
 
     Returns
     -------
     Uniform or Segments
-        Leaves of shape ``(cells,)`` and ``(cells, segments)`` with two segments to an arc.
+        Arrays of shape ``(cells,)`` and ``(cells, segments)``; each arc gives two segments.
     """
     if not arcs:
         return Uniform(mu_s, mu_k)
@@ -101,29 +112,29 @@ def cut(arcs: list[Arc], mu_s: Any, mu_k: Any) -> Uniform | Segments:
         static = np.where(inside, rough_s, static)
         kinetic = np.where(inside, rough_k, kinetic)
         index = np.where(inside, k, index)
-    # A sliver takes after the segment before it.
-    number = np.where(width > _SLIVER, np.arange(edges.shape[-1]), -1)
+    # A segment of negligible width takes the coefficients of the segment before it.
+    number = np.where(width > _NEGLIGIBLE_WIDTH, np.arange(edges.shape[-1]), -1)
     number = np.maximum.accumulate(number, axis=-1)
     number = np.where(number < 0, number[..., -1:], number)
     static, kinetic, index = (np.take_along_axis(leaf, number, axis=-1) for leaf in (static, kinetic, index))
-    narrowest = np.where(width > _SLIVER, width, turn).min(axis=-1)
+    narrowest = np.where(width > _NEGLIGIBLE_WIDTH, width, turn).min(axis=-1)
     return Segments(edges, static, kinetic, index, (static.max(axis=-1), kinetic.min(axis=-1)), narrowest)
 
 
 @hook
 def segment(surface, angle):
-    """Index of the segment that holds `angle` (rad, in the ring's frame, any number of turns)."""
+    """Index of the segment at `angle`, rad, of any number of turns."""
 
 
 @segment.implements(Uniform)
-def _no_segment(surface, angle):
+def _uniform_segment(surface, angle):
     return 0
 
 
 @segment.implements(Segments)
-def _segment(surface, angle):
+def _segments_segment(surface, angle):
     x = wrap(angle)
-    # Below the first edge lies the last segment, which closes the ring.
+    # The last segment extends across 0 to the first edge.
     found = len(surface.edges) - 1
     for j in range(len(surface.edges)):
         if surface.edges[j] <= x:
@@ -133,25 +144,45 @@ def _segment(surface, angle):
 
 @hook
 def coefficients(surface, segment):
-    """Static and kinetic coefficient of a segment, and the rough arc that it lies on (0: none)."""
+    """Friction coefficients and rough arc of a segment.
+
+    Parameters
+    ----------
+    surface : Uniform or Segments
+    segment : int
+
+    Returns
+    -------
+    tuple of float
+        Static and kinetic coefficient, 1; number of the rough arc, 0 for none.
+    """
 
 
 @coefficients.implements(Uniform)
-def _uniform(surface, segment):
+def _uniform_coefficients(surface, segment):
     return surface.mu_s, surface.mu_k, 0.0
 
 
 @coefficients.implements(Segments)
-def _segments(surface, segment):
+def _segments_coefficients(surface, segment):
     return surface.mu_s[segment], surface.mu_k[segment], surface.arc[segment]
 
 
-def under(values, edges, x):
-    """The value at `x`, in turns from 0 to 1, of those that hold in the segments which begin at `edges` (rad).
+def value_at(values, edges, x):
+    """Value at the place `x` of a quantity that is constant in each segment.
 
-    On an edge itself the answer may go either way: it is ``abs(x - middle) < half`` that decides, rounded.
+    Exactly on an edge, rounding decides which of the two segments holds.
+
+    Parameters
+    ----------
+    values : ndarray or tuple
+        Value in each segment.
+    edges : ndarray or tuple
+        Lower edges of the segments, rad.
+    x : float or Lanes
+        Place, from 0 to 1 turn.
     """
-    # Below the first edge lies the last segment, which closes the ring.
+    # The last segment extends across 0 to the first edge.
     found = values[len(values) - 1]
     for j in range(len(edges) - 1):
         middle, half = 0.5 * PER_TURN * (edges[j + 1] + edges[j]), 0.5 * PER_TURN * (edges[j + 1] - edges[j])
@@ -159,22 +190,24 @@ def under(values, edges, x):
     return found
 
 
-def _unrolled_under(values: Any, edges: Any, x: Any) -> Any:
+def _unrolled_value_at(values: Any, edges: Any, x: Any) -> Any:
     if isinstance(values, types.Array):
-        return under
+        return value_at
     lines = [f"found = values[{len(values) - 1}]"]
     for j in range(len(values) - 1):
         lines.append(f"middle, half = (edges[{j + 1}] + edges[{j}]) * scale, (edges[{j + 1}] - edges[{j}]) * scale")
         lines.append(f"found = select(abs(x - middle) < half, values[{j}], found)")
-    return written("values, edges, x", [*lines, "return found"], {"select": select, "scale": 0.5 * PER_TURN})
+    return function_from_lines(
+        "values, edges, x", [*lines, "return found"], {"select": select, "scale": 0.5 * PER_TURN}
+    )
 
 
-specialise(under, _unrolled_under)
+specialise(value_at, _unrolled_value_at)
 
 
 @hook(absorb=True)
 def roughness(surface, turns):
-    """Static and kinetic coefficient under a contact at an angle in the ring's frame, in turns."""
+    """Static and kinetic friction coefficient at a place in turns, of any number of turns; for floats and Lanes."""
 
 
 @roughness.implements(Uniform)
@@ -185,12 +218,12 @@ def _uniform_roughness(surface, turns):
 @roughness.implements(Segments)
 def _segments_roughness(surface, turns):
     x = turns - floor(turns)
-    return under(surface.mu_s, surface.edges, x), under(surface.mu_k, surface.edges, x)
+    return value_at(surface.mu_s, surface.edges, x), value_at(surface.mu_k, surface.edges, x)
 
 
 @hook
 def roughest(surface):
-    """Largest static coefficient of the surface, and the least kinetic one: the steepest fall of friction."""
+    """Largest static and least kinetic friction coefficient of the surface, 1."""
 
 
 @roughest.implements(Uniform)
@@ -220,16 +253,16 @@ def _segments_narrowest(surface):
 
 @hook
 def locate(surface, angle):
-    """Segment that holds `angle` and the number of whole turns to its lower edge."""
+    """Place of a contact at `angle`, rad: segment, and number of whole turns to the lower edge of the segment."""
 
 
 @locate.implements(Uniform)
-def _nowhere(surface, angle):
+def _uniform_locate(surface, angle):
     return 0, 0
 
 
 @locate.implements(Segments)
-def _locate(surface, angle):
+def _segments_locate(surface, angle):
     turn = math.floor(angle / (2.0 * pi))
     x = angle - 2.0 * pi * turn
     found = -1
@@ -243,16 +276,25 @@ def _locate(surface, angle):
 
 @hook
 def edge_ahead(surface, place, direction):
-    """Angle of the edge that a contact at `place` = (segment, turn) meets in `direction` (+1, -1), rad."""
+    """Angle of the next edge of a contact, rad; infinite on a uniform surface.
+
+    Parameters
+    ----------
+    surface : Uniform or Segments
+    place : tuple of int
+        Segment and turn of the contact, see :func:`locate`.
+    direction : int
+        Direction of motion, +1 or -1.
+    """
 
 
 @edge_ahead.implements(Uniform)
-def _no_edge(surface, place, direction):
+def _uniform_edge_ahead(surface, place, direction):
     return direction * inf
 
 
 @edge_ahead.implements(Segments)
-def _edge_ahead(surface, place, direction):
+def _segments_edge_ahead(surface, place, direction):
     j, turn = place
     if direction > 0:
         j += 1
@@ -262,17 +304,17 @@ def _edge_ahead(surface, place, direction):
 
 
 @hook
-def cross(surface, place, direction):
-    """Place of a contact after it has crossed the edge ahead of it."""
+def cross_edge(surface, place, direction):
+    """Place of a contact after it has crossed the edge ahead; arguments as for :func:`edge_ahead`."""
 
 
-@cross.implements(Uniform)
-def _cross_nothing(surface, place, direction):
+@cross_edge.implements(Uniform)
+def _uniform_cross_edge(surface, place, direction):
     return place
 
 
-@cross.implements(Segments)
-def _cross(surface, place, direction):
+@cross_edge.implements(Segments)
+def _segments_cross_edge(surface, place, direction):
     j, turn = place
     j += direction
     if j == len(surface.edges):
@@ -282,12 +324,23 @@ def _cross(surface, place, direction):
     return j, turn
 
 
-# A contact that is this near to an edge is on it, rad.
+# A contact this close to an edge is on the edge, rad.
 _ON_EDGE = 1e-13
 
 
 @inlined
-def beyond(surface, place, angle, direction):
-    """Place of a contact that moves from `angle` (rad) in a direction (+1, -1): beyond the edge, if it is on one."""
+def leave_edge(surface, place, angle, direction):
+    """Place of a contact that starts to move: if it is on the edge ahead, its place after the edge.
+
+    Parameters
+    ----------
+    surface : Uniform or Segments
+    place : tuple of int
+        Segment and turn of the contact, see :func:`locate`.
+    angle : float
+        Angle of the contact, rad.
+    direction : int
+        Direction of motion, +1 or -1.
+    """
     away = direction * (edge_ahead(surface, place, direction) - angle)
-    return cross(surface, place, direction) if away <= _ON_EDGE else place
+    return cross_edge(surface, place, direction) if away <= _ON_EDGE else place

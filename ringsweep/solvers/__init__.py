@@ -1,4 +1,4 @@
-"""Methods by the name that the configuration gives them."""
+"""Methods, by their names in configurations."""
 
 from ringsweep.solvers.event import Auto, Event, Implicit
 from ringsweep.solvers.method import Method, Needs, Result
@@ -10,7 +10,7 @@ METHODS: dict[str, type[Method]] = {}
 
 
 def add_method(method: type[Method]) -> None:
-    """Make a method known under its name.
+    """Register a method under its name.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Whether a run obeys its law at instants that the solver did not choose."""
+"""Whether a run obeys its friction law at instants that the solver did not choose."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from math import inf, isfinite, sqrt
 from typing import NamedTuple
 
 from ringsweep.compile import hook, inlined
-from ringsweep.models.interface import audit as law
+from ringsweep.models.interface import audit as audit_of_model
 from ringsweep.models.interface import implicit, series
 from ringsweep.numerics.series import slope
 from ringsweep.physics.friction import Dynamic, SetValued, Smooth
@@ -14,11 +14,16 @@ from ringsweep.solvers import rosenbrock
 
 
 class Audit(NamedTuple):
-    """What a run has shown of its law at instants that the solver did not choose.
+    """Audit of a run at instants that the solver did not choose.
 
-    ``violation`` is the largest violation, measured by what the tolerance of a step makes of it; ``unexplained`` what
-    of
-    the changes of the mechanical energy is not work of friction, J; ``turnover`` the sum of the magnitudes of both.
+    Attributes
+    ----------
+    violation : float
+        Largest violation of the friction law, in units of the violation that the tolerance would explain.
+    unexplained : float
+        Change of the mechanical energy that is not work of friction, J.
+    turnover : float
+        Sum of the magnitudes of the changes of the energy and of the work of friction, J.
     """
 
     violation: float
@@ -26,124 +31,162 @@ class Audit(NamedTuple):
     turnover: float
 
 
-# Fractions of a step at which the law is checked: Gauss's, which make a quadrature of the work of friction as well.
-_EARLY, _LATE = 0.5 - 0.5 / sqrt(3.0), 0.5 + 0.5 / sqrt(3.0)
+# Fractions of a step at which the law is checked: the nodes of Gauss's rule, which integrates the work of friction too.
+EARLY, LATE = 0.5 - 0.5 / sqrt(3.0), 0.5 + 0.5 / sqrt(3.0)
 
 
-# Share of the energy itself that counts as turned over in a step: without friction what it loses is rounding.
-_STORED = 1e-5
+# Share of the energy itself that counts as turnover in a step. Without friction the energy changes by rounding alone.
+_ENERGY_SHARE = 1e-5
 
 
-# The law is checked in so many steps at first, then in this share of them, which no period of the motion can evade.
-_ALL_CHECKED, _CHECKED = 8, 0.25
+# The law is checked in each of the first steps, then in this share of the steps. The golden ratio selects them, so that
+# no period of the motion can avoid the checks.
+_ALL_CHECKED, _CHECKED_SHARE = 8, 0.25
 
 
 @inlined
 def is_checked(n):
     """Whether the law is checked in step `n`."""
-    return n <= _ALL_CHECKED or (n * 0.6180339887498949) % 1.0 < _CHECKED
+    return n <= _ALL_CHECKED or (n * 0.6180339887498949) % 1.0 < _CHECKED_SHARE
 
 
 @inlined
-def _entered(audit, first, second, begins, ends, s):
-    """Audit after a step of length `s`, checked at two instants; `begins` and `ends` are energies."""
+def _audit_after(audit, first, second, energy_before, energy_after, s):
+    """Audit after a step of length `s`.
+
+    `first` and `second` are violation and power of friction at the two instants; the energies are those at both ends.
+    """
     (violation_1, power_1), (violation_2, power_2) = first, second
-    worst = max(audit.violation, max(violation_1, violation_2))
-    work, change = 0.5 * s * (power_1 + power_2), ends - begins
+    violation = max(audit.violation, max(violation_1, violation_2))
+    work, change = 0.5 * s * (power_1 + power_2), energy_after - energy_before
     return Audit(
-        worst if isfinite(work) else inf,
+        violation if isfinite(work) else inf,
         audit.unexplained + (change - work),
-        audit.turnover + 0.5 * s * (abs(power_1) + abs(power_2)) + abs(change) + _STORED * (abs(begins) + abs(ends)),
+        audit.turnover
+        + 0.5 * s * (abs(power_1) + abs(power_2))
+        + abs(change)
+        + _ENERGY_SHARE * (abs(energy_before) + abs(energy_after)),
     )
 
 
 @inlined
-def _audit_series(scene, mode, c, t, s, y, y_next, tolerance, audit):
+def _audit_series_step(scene, mode, c, t, s, y, y_next, tolerance, audit):
     """Audit after a step of length `s` along the series `c`, from the state `y` at time `t` to the state `y_next`."""
-    first = _violation_along(scene, mode, c, t, s, tolerance, _EARLY * s)
-    second = _violation_along(scene, mode, c, t, s, tolerance, _LATE * s)
-    begins, ends = (
-        law.energy(scene, implicit.forcing(scene, t), y),
-        law.energy(scene, implicit.forcing(scene, t + s), y_next),
+    first = _violation_in_series_step(scene, mode, c, t, s, tolerance, EARLY * s)
+    second = _violation_in_series_step(scene, mode, c, t, s, tolerance, LATE * s)
+    energy_before, energy_after = (
+        audit_of_model.energy(scene, implicit.forcing(scene, t), y),
+        audit_of_model.energy(scene, implicit.forcing(scene, t + s), y_next),
     )
-    return _entered(audit, first, second, begins, ends, s)
+    return _audit_after(audit, first, second, energy_before, energy_after, s)
 
 
 @inlined
-def _violation_along(scene, mode, c, t, s, tolerance, at):
-    state, rates = series.state_at(scene, c, at), series.rates_at(scene, c, at)
-    return law.violation(scene, mode, implicit.forcing(scene, t + at), state, rates, s, tolerance)
+def _violation_in_series_step(scene, mode, c, t, s, tolerance, s_check):
+    state, rates = series.state_at(scene, c, s_check), series.rates_at(scene, c, s_check)
+    return audit_of_model.violation(scene, mode, implicit.forcing(scene, t + s_check), state, rates, s, tolerance)
 
 
 @inlined
-def _audit_creep(scene, mode, t, s, y, y_next, stages, tolerance, audit):
-    """The same of an implicit step from the state `y` to `y_next`."""
-    begin, end = implicit.forcing(scene, t), implicit.forcing(scene, t + s)
-    x, x_next = implicit.to_implicit(scene, begin, y), implicit.to_implicit(scene, end, y_next)
-    first = _violation_within(scene, mode, t, s, x, x_next, stages, tolerance, _EARLY)
-    second = _violation_within(scene, mode, t, s, x, x_next, stages, tolerance, _LATE)
-    return _entered(audit, first, second, law.energy(scene, begin, y), law.energy(scene, end, y_next), s)
-
-
-@inlined
-def _violation_within(scene, mode, t, s, x, x_next, stages, tolerance, fraction):
-    force = implicit.forcing(scene, t + fraction * s)
-    state = implicit.from_implicit(scene, force, rosenbrock.dense(x, x_next, stages, fraction))
-    return law.violation(
-        scene, mode, force, state, rosenbrock.dense_rates(x, x_next, stages, fraction, s), s, tolerance
+def _audit_implicit_step(scene, mode, t, s, y, y_next, stages, tolerance, audit):
+    """Audit after an implicit step of length `s` from the state `y` at time `t` to the state `y_next`."""
+    before, after = implicit.forcing(scene, t), implicit.forcing(scene, t + s)
+    x, x_next = implicit.to_implicit(scene, before, y), implicit.to_implicit(scene, after, y_next)
+    first = _violation_in_implicit_step(scene, mode, t, s, x, x_next, stages, tolerance, EARLY)
+    second = _violation_in_implicit_step(scene, mode, t, s, x, x_next, stages, tolerance, LATE)
+    return _audit_after(
+        audit, first, second, audit_of_model.energy(scene, before, y), audit_of_model.energy(scene, after, y_next), s
     )
 
 
 @inlined
-def _fall_of_creep(scene, mode, t, s, y, y_next, stages, guard):
-    """How fast a guard falls as an implicit step ends by it, 1/s times its unit."""
+def _violation_in_implicit_step(scene, mode, t, s, x, x_next, stages, tolerance, fraction):
+    forcing = implicit.forcing(scene, t + fraction * s)
+    state = implicit.from_implicit(scene, forcing, rosenbrock.dense(x, x_next, stages, fraction))
+    return audit_of_model.violation(
+        scene, mode, forcing, state, rosenbrock.dense_rates(x, x_next, stages, fraction, s), s, tolerance
+    )
+
+
+@inlined
+def _fall_rate_in_implicit_step(scene, mode, t, s, y, y_next, stages, guard):
+    """Rate at which a guard falls at the end of an implicit step, in its unit per second."""
     x, x_next = (
         implicit.to_implicit(scene, implicit.forcing(scene, t), y),
         implicit.to_implicit(scene, implicit.forcing(scene, t + s), y_next),
     )
-    late = implicit.guards_and_motion(scene, mode, t + 0.9 * s, rosenbrock.dense(x, x_next, stages, 0.9))
-    return late[0][guard] / (0.1 * s)
+    view = implicit.guards_and_motion(scene, mode, t + 0.9 * s, rosenbrock.dense(x, x_next, stages, 0.9))
+    return view[0][guard] / (0.1 * s)
 
 
 @hook
 def audit_step(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerance, audit):
-    """Audit after a step of length `s` from the state `y` at time `t`."""
+    """Audit after a step.
+
+    Parameters
+    ----------
+    family : SetValued, Smooth or Dynamic
+        Family of the friction law.
+    scene, mode : NamedTuple
+    is_implicit : bool
+        Whether the step is implicit.
+    c : ndarray of shape ``(rows, columns)``
+        Table of the series, if the step is not implicit.
+    t, s : float
+        Time at the beginning of the step, and length of the step, s.
+    y, y_next : tuple of float
+        States at both ends of the step.
+    stages : ndarray of shape ``(STAGES, components)``
+        Stages of the step, if it is implicit.
+    tolerance : float
+        Tolerance of the series.
+    audit : Audit
+        Audit at the beginning of the step.
+
+    Returns
+    -------
+    Audit
+    """
 
 
 @audit_step.implements(SetValued)
-def _series_audited(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerance, audit):
-    return _audit_series(scene, mode, c, t, s, y, y_next, tolerance, audit)
+def _audit_by_series(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerance, audit):
+    return _audit_series_step(scene, mode, c, t, s, y, y_next, tolerance, audit)
 
 
 @audit_step.implements(Smooth)
-def _either_audited(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerance, audit):
+def _audit_by_either(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerance, audit):
     if is_implicit:
-        return _audit_creep(scene, mode, t, s, y, y_next, stages, tolerance, audit)
-    return _audit_series(scene, mode, c, t, s, y, y_next, tolerance, audit)
+        return _audit_implicit_step(scene, mode, t, s, y, y_next, stages, tolerance, audit)
+    return _audit_series_step(scene, mode, c, t, s, y, y_next, tolerance, audit)
 
 
 @audit_step.implements(Dynamic)
-def _implicit_audited(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerance, audit):
-    return _audit_creep(scene, mode, t, s, y, y_next, stages, tolerance, audit)
+def _audit_by_implicit(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerance, audit):
+    return _audit_implicit_step(scene, mode, t, s, y, y_next, stages, tolerance, audit)
 
 
 @hook
-def fall_rate(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, guard, first):
-    """How fast a guard falls as a step ends by it; `first` is the first guard."""
+def fall_rate(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, guard, first_guard):
+    """Rate at which a guard falls at the end of a step that it ended, in its unit per second.
+
+    `guard` is the row of the guard, `first_guard` the row of the first guard. Other arguments are as in
+    :func:`audit_step`.
+    """
 
 
 @fall_rate.implements(SetValued)
-def _series_fall(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, guard, first):
+def _fall_rate_by_series(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, guard, first_guard):
     return -slope(c[guard], s)
 
 
 @fall_rate.implements(Smooth)
-def _either_fall(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, guard, first):
+def _fall_rate_by_either(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, guard, first_guard):
     if is_implicit:
-        return _fall_of_creep(scene, mode, t, s, y, y_next, stages, guard - first)
+        return _fall_rate_in_implicit_step(scene, mode, t, s, y, y_next, stages, guard - first_guard)
     return -slope(c[guard], s)
 
 
 @fall_rate.implements(Dynamic)
-def _implicit_fall(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, guard, first):
-    return _fall_of_creep(scene, mode, t, s, y, y_next, stages, guard - first)
+def _fall_rate_by_implicit(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, guard, first_guard):
+    return _fall_rate_in_implicit_step(scene, mode, t, s, y, y_next, stages, guard - first_guard)

@@ -1,8 +1,8 @@
-"""Piecewise-smooth integration: a run passes from mode to mode, each ended by the first guard that vanishes.
+"""Piecewise-smooth integration: a run passes from mode to mode, and the first guard that vanishes ends a mode.
 
-Within a mode a step is one of a power series (:mod:`taylor`) or an implicit one (:mod:`creep`). The family of the
-friction law decides which of both a kernel contains: a set-valued law takes series alone, a law with bristles implicit
-steps alone, a smooth law takes implicit steps where a mode relaxes much faster than it moves.
+Within a mode a step uses a power series (:mod:`taylor`) or is implicit (:mod:`creep`). The family of the friction law
+decides which of them a kernel contains. Set-valued laws take series only. Laws with bristles take implicit steps only.
+Smooth laws take implicit steps where a mode relaxes much faster than it moves, and series elsewhere.
 """
 
 from __future__ import annotations
@@ -19,105 +19,132 @@ from ringsweep.physics.drives import next_knot
 from ringsweep.physics.friction import Dynamic, SetValued, Smooth, family
 from ringsweep.solvers import rosenbrock
 from ringsweep.solvers.audit import Audit, audit_step, fall_rate, is_checked
-from ringsweep.solvers.creep import INSTANTS, MOST_GUARDS, Trial, implicit_step
+from ringsweep.solvers.creep import INSTANTS, MOST_GUARDS, StepControl, implicit_step
 from ringsweep.solvers.taylor import series_step
 
-# Steps and events in a row at one instant after which a run is given up.
-_STALLED = 400
+# A run ends after this many consecutive steps and events at one instant.
+_MOST_STALLED = 400
 
 
 @hook
-def _stride(family, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages, seen):
-    """One step in the way that the family of the law wants.
+def _step(family, scene, record, mode, t, y, control, h_max, tolerances, c, first, work, stages, samples):
+    """One step of the kind that the family of the friction law needs.
+
+    Parameters
+    ----------
+    family : SetValued, Smooth or Dynamic
+        Family of the friction law.
+    scene, record, mode : NamedTuple
+    t : float
+        Time, s.
+    y : tuple of float
+        State at time `t`.
+    control : StepControl
+        Length of the next implicit step.
+    h_max : float
+        Greatest length of the step, s.
+    tolerances : tuple of float
+        As in :func:`integrate`.
+    c : ndarray of shape ``(rows, columns)``
+        Table of the series, which is filled.
+    first : int
+        Row of the first guard in the table.
+    work, stages, samples : ndarray
+        Scratch.
 
     Returns
     -------
     tuple
-        Whether the step was is_implicit, guard or -1, length of the step, state, record, next implicit step to try.
+        Whether the step was implicit; the guard that ended it, or -1; its length, s; state, record and control after
+        it.
     """
 
 
-@_stride.implements(SetValued)
-def _series_stride(family, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages, seen):
-    guard, s, y, record = series_step(scene, record, mode, t, y, horizon, tolerances[0], c, guards, work)
-    return False, guard, s, y, record, trial
+@_step.implements(SetValued)
+def _step_series(family, scene, record, mode, t, y, control, h_max, tolerances, c, first, work, stages, samples):
+    guard, s, y, record = series_step(scene, record, mode, t, y, h_max, tolerances[0], c, first, work)
+    return False, guard, s, y, record, control
 
 
-@_stride.implements(Smooth)
-def _either_stride(family, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages, seen):
+@_step.implements(Smooth)
+def _step_either(family, scene, record, mode, t, y, control, h_max, tolerances, c, first, work, stages, samples):
     if implicit.may_creep(scene, mode):
         x = implicit.to_implicit(scene, implicit.forcing(scene, t), y)
-        line = implicit.linearise(scene, mode, t, x)
-        if implicit.is_stiff(scene, mode, y, line):
-            if trial.last == 0.0:
-                # What is left of the way in ends at the rate of the decay.
-                trial = Trial(min(trial.h, -1.0 / line[1][3]), 0.0, 0.0)
-            guard, s, y, record, trial = implicit_step(
-                scene, record, mode, t, y, x, line, trial, horizon, tolerances[1], guards, stages, seen, work
+        linear = implicit.linearise(scene, mode, t, x)
+        if implicit.is_stiff(scene, mode, y, linear):
+            if control.last_h == 0.0:
+                # The transient into creep decays at this rate.
+                control = StepControl(min(control.h, -1.0 / linear[1][3]), 0.0, 0.0)
+            guard, s, y, record, control = implicit_step(
+                scene, record, mode, t, y, x, linear, control, h_max, tolerances[1], first, stages, samples, work
             )
-            return True, guard, s, y, record, trial
-    guard, s, y, record = series_step(scene, record, mode, t, y, horizon, tolerances[0], c, guards, work)
-    return False, guard, s, y, record, Trial(1e-6 * scene.span, 0.0, 0.0)
+            return True, guard, s, y, record, control
+    guard, s, y, record = series_step(scene, record, mode, t, y, h_max, tolerances[0], c, first, work)
+    return False, guard, s, y, record, StepControl(1e-6 * scene.span, 0.0, 0.0)
 
 
-@_stride.implements(Dynamic)
-def _implicit_stride(family, scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages, seen):
+@_step.implements(Dynamic)
+def _step_implicit(family, scene, record, mode, t, y, control, h_max, tolerances, c, first, work, stages, samples):
     x = implicit.to_implicit(scene, implicit.forcing(scene, t), y)
-    line = implicit.linearise(scene, mode, t, x)
-    guard, s, y, record, trial = implicit_step(
-        scene, record, mode, t, y, x, line, trial, horizon, tolerances[1], guards, stages, seen, work
+    linear = implicit.linearise(scene, mode, t, x)
+    guard, s, y, record, control = implicit_step(
+        scene, record, mode, t, y, x, linear, control, h_max, tolerances[1], first, stages, samples, work
     )
-    return True, guard, s, y, record, trial
+    return True, guard, s, y, record, control
 
 
 @hook
-def _outset(family, scene, mode, t, y, tolerances, c):
-    """Record of a run that begins."""
+def _begin(family, scene, mode, t, y, tolerances, c):
+    """Record at the beginning of a run."""
 
 
-@_outset.implements(SetValued, Smooth)
-def _series_outset(family, scene, mode, t, y, tolerances, c):
+@_begin.implements(SetValued, Smooth)
+def _begin_series(family, scene, mode, t, y, tolerances, c):
     series.expand(scene, mode, t, y, tolerances[0], c)
     return recorder.begin(scene, t, series.seen_at(scene, c, 0.0, 0.0))
 
 
-@_outset.implements(Dynamic)
-def _implicit_outset(family, scene, mode, t, y, tolerances, c):
+@_begin.implements(Dynamic)
+def _begin_implicit(family, scene, mode, t, y, tolerances, c):
     return recorder.begin(scene, t, implicit.seen(scene, implicit.guards_and_motion(scene, mode, t, y)))
 
 
 @hook
-def _row(family, scene, mode, is_implicit, c, t, s, y):
-    """One row of a time history, after the part `s` of a step that began in the state `y` if it was a series."""
+def _history_row(family, scene, mode, is_implicit, c, t, s, y):
+    """Row of a time history.
+
+    After a series `t` is the time of the row and `s` the time since the step began. After an implicit step `y` is the
+    state of the row.
+    """
 
 
-@_row.implements(SetValued)
-def _series_row(family, scene, mode, is_implicit, c, t, s, y):
+@_history_row.implements(SetValued)
+def _row_series(family, scene, mode, is_implicit, c, t, s, y):
     return series.row(scene, mode, c, t, s)
 
 
-@_row.implements(Smooth)
-def _either_row(family, scene, mode, is_implicit, c, t, s, y):
+@_history_row.implements(Smooth)
+def _row_either(family, scene, mode, is_implicit, c, t, s, y):
     if is_implicit:
         return implicit.row(scene, mode, t, implicit.to_implicit(scene, implicit.forcing(scene, t), y))
     return series.row(scene, mode, c, t, s)
 
 
-@_row.implements(Dynamic)
-def _implicit_row(family, scene, mode, is_implicit, c, t, s, y):
+@_history_row.implements(Dynamic)
+def _row_implicit(family, scene, mode, is_implicit, c, t, s, y):
     return implicit.row(scene, mode, t, implicit.to_implicit(scene, implicit.forcing(scene, t), y))
 
 
 @inlined
-def _arrive(scene, mode, guard, t, s, horizon, y):
-    """Time, status, mode and state after a step `s` that ended at `guard`, or at none (-1)."""
-    # To the very end of the span or of a piece of the drive, not to the rounding of a sum.
+def _after_step(scene, mode, guard, t, s, h_max, y):
+    """Time, status, mode and state after a step of length `s` that `guard` ended (-1: none)."""
+    # The sum of steps must not miss the end of the span, or a knot of the drive, by rounding.
     if s >= 0.0:
-        t = t + s if s < horizon else t + horizon
+        t = t + s if s < h_max else t + h_max
     if not (isfinite(y[0]) and isfinite(y[1])):
         return t, BROKEN, mode, y
     if not s >= 0.0:
-        return t, modes.status_without_way_on(scene, mode, t, y), mode, y
+        return t, modes.status_when_stalled(scene, mode, t, y), mode, y
     if guard >= 0:
         status, mode, y = modes.switch(scene, mode, guard, t, y)
         return t, status, mode, y
@@ -127,125 +154,160 @@ def _arrive(scene, mode, guard, t, s, horizon, y):
 
 
 @inlined
-def _store(row, values):
+def _fill(row, values):
     for k in range(len(values)):
         row[k] = values[k]
 
 
 @inlined
-def _keep(scene, mode, is_implicit, c, t, s, y, times, table, kept):
-    """Store the state after the part `s` of a step as row `kept` of a history that has room; the number of rows."""
-    if kept == len(times):
-        return kept
-    _store(table[kept], _row(family(scene.law), scene, mode, is_implicit, c, t + s, s, y))
-    # Sums that should be equal differ by rounding.
-    times[kept] = max(t + s, times[kept - 1]) if kept > 0 else t
-    return kept + 1
+def _store_row(scene, mode, is_implicit, c, t, s, y, times, table, count):
+    """Store a row of the history, the time `s` after `t`, and return the new number of rows; a full history stays."""
+    if count == len(times):
+        return count
+    _fill(table[count], _history_row(family(scene.law), scene, mode, is_implicit, c, t + s, s, y))
+    # Rounding must not make times decrease.
+    times[count] = max(t + s, times[count - 1]) if count > 0 else t
+    return count + 1
 
 
 @kernel
-def integrate(batch, tolerances, limit, out, steps, shown, spacing, times, table):
-    """Run every cell of a batch to its end, or to `limit` steps.
+def integrate(batch, tolerances, max_steps, rows, steps, audits, spacing, times, table):
+    """Run every cell of a batch to its end, or to `max_steps` steps.
 
-    One kernel serves sweeps and histories: a user of both compiles a kind of scene once.
+    One kernel serves sweeps and histories, so that each type of scene is compiled once.
 
     Parameters
     ----------
     batch : NamedTuple
         Cells, as :func:`ringsweep.models.batch` makes them.
     tolerances : tuple of float
-        Error allowed to a step of the series and to an implicit step: rad, and rad/s relative to
-        1 rad/s + \\|omega\\| or m/s relative to the width of the stiction band.
-    limit : int
-        Steps after which a run is given up.
-    out : ndarray of shape ``(cells, outcomes)``
-        Or without columns, if outcomes are not wanted.
+        Relative error allowed to a step of the series, and to an implicit step. It applies to 1 rad, and to the
+        velocity at 1 rad/s + \\|omega\\| or at the width of the stiction band.
+    max_steps : int
+        Steps after which a run is given up as failed.
+    rows : ndarray of shape ``(cells, outcomes)``
+        Filled with outcomes. It may have no columns.
     steps : ndarray of shape ``(cells,)``
-    shown : ndarray of shape ``(cells, 3)`` or ``(0, 3)``
-        Filled, unless it is empty, with what each run has shown of its law: the largest violation, measured by what the
-        tolerance of a step makes of it; the share of the energy turned over that is not work of friction; how fast the
-        guard fell by which the run ended.
+        Filled with the number of steps.
+    audits : ndarray of shape ``(cells, 3)`` or ``(0, 3)``
+        Unless empty, filled with the audit of each run: the largest violation of the friction law, in units of the
+        violation that the tolerance would explain; the share of the energy turnover that is not work of friction; the
+        rate at which the guard that ended the run fell, in its unit per second.
     spacing : float
-        Greatest distance between rows of a history, s.
-    times, table : ndarray of shapes ``(rows,)`` and ``(rows, variables)``
-        Filled, as far as they reach, with the history of the only cell: every end of a step, and within longer ones
-        instants `spacing` apart. A run that fills them ends there. Without rows no history is kept.
+        Greatest time between two rows of the history, s.
+    times, table : ndarray of shape ``(samples,)`` and ``(samples, variables)``
+        Filled with the history of the only cell: the end of every step, and instants at most `spacing` apart within a
+        step. A run that fills them stops there. If they are empty, no history is stored.
 
     Returns
     -------
     int
-        Number of rows.
+        Number of rows of the history.
     """
-    first = take(batch, 0)
-    count, guards = series.table_shape(first)
-    c = np.zeros((count, ORDER + 3))
+    sample = take(batch, 0)
+    size, first = series.table_shape(sample)
+    c = np.zeros((size, ORDER + 3))
     work = np.empty((STACK, ORDER + 3))
-    stages = np.empty((rosenbrock.STAGES, len(modes.initial_state(first)[1])))
-    seen = np.empty((MOST_GUARDS, INSTANTS + 1))
-    return _integrate(batch, tolerances, limit, out, steps, shown, spacing, times, table, guards, c, work, stages, seen)
+    stages = np.empty((rosenbrock.STAGES, len(modes.initial_state(sample)[1])))
+    samples = np.empty((MOST_GUARDS, INSTANTS + 1))
+    return _integrate(
+        batch, tolerances, max_steps, rows, steps, audits, spacing, times, table, first, c, work, stages, samples
+    )
 
 
 @inlined
-def _integrate(batch, tolerances, limit, out, steps, shown, spacing, times, table, guards, c, work, stages, seen):
-    c, work, stages, seen = borrowed(c), borrowed(work), borrowed(stages), borrowed(seen)
-    out, steps, shown, times, table = borrowed(out), borrowed(steps), borrowed(shown), borrowed(times), borrowed(table)
-    audited = len(shown) > 0
-    kept = 0
+def _integrate(
+    batch, tolerances, max_steps, rows, steps, audits, spacing, times, table, first, c, work, stages, samples
+):
+    c, work, stages, samples = borrowed(c), borrowed(work), borrowed(stages), borrowed(samples)
+    rows, steps, audits, times, table = (
+        borrowed(rows),
+        borrowed(steps),
+        borrowed(audits),
+        borrowed(times),
+        borrowed(table),
+    )
+    audited = len(audits) > 0
+    count = 0
     for i in range(len(steps)):
         scene = take(batch, i)
         t, y = modes.initial_state(scene)
         status, mode = modes.initial_mode(scene, t, y)
-        record = _outset(family(scene.law), scene, mode, t, y, tolerances, c)
-        trial = Trial(1e-6 * scene.span, 0.0, 0.0)
-        audit, fall = Audit(0.0, 0.0, 0.0), 0.0
+        record = _begin(family(scene.law), scene, mode, t, y, tolerances, c)
+        control = StepControl(1e-6 * scene.span, 0.0, 0.0)
+        audit, guard_fall_rate = Audit(0.0, 0.0, 0.0), 0.0
         n = stalled = 0
-        before = -1.0
-        entered = True
+        t_before = -1.0
+        just_switched = True
         is_implicit = False
         while status == RUNNING:
-            # Steps below the rounding of time do move the state, on the way into a jam, but not for ever.
-            stalled = stalled + 1 if t == before else 0
-            if n == limit or stalled == _STALLED:
-                status = modes.status_without_way_on(scene, mode, t, y) if stalled == _STALLED else BROKEN
+            # Near a jam, steps shorter than the rounding of time still move the state, but not for ever.
+            stalled = stalled + 1 if t == t_before else 0
+            if n == max_steps or stalled == _MOST_STALLED:
+                status = modes.status_when_stalled(scene, mode, t, y) if stalled == _MOST_STALLED else BROKEN
                 break
-            before = t
+            t_before = t
             n += 1
-            horizon = min(scene.span, next_knot(scene.drive, t)) - t
-            trial = Trial(min(trial.h, spacing), trial.last, trial.size)
-            is_implicit, guard, s, y_next, record, trial = _stride(
-                family(scene.law), scene, record, mode, t, y, trial, horizon, tolerances, c, guards, work, stages, seen
+            h_max = min(scene.span, next_knot(scene.drive, t)) - t
+            control = StepControl(min(control.h, spacing), control.last_h, control.last_error)
+            is_implicit, guard, s, y_next, record, control = _step(
+                family(scene.law),
+                scene,
+                record,
+                mode,
+                t,
+                y,
+                control,
+                h_max,
+                tolerances,
+                c,
+                first,
+                work,
+                stages,
+                samples,
             )
             if len(times) > 0:
-                if kept == len(times):
-                    return kept
+                if count == len(times):
+                    return count
                 if s > 0.0:
                     parts = 1 if is_implicit else int(s / spacing) + 1
-                    for part in range(0 if entered else 1, parts + 1):
+                    for part in range(0 if just_switched else 1, parts + 1):
                         state = y if part == 0 else y_next
-                        kept = _keep(scene, mode, is_implicit, c, t, s * part / parts, state, times, table, kept)
-                entered = guard >= 0 or (entered and s == 0.0)
+                        count = _store_row(scene, mode, is_implicit, c, t, s * part / parts, state, times, table, count)
+                just_switched = guard >= 0 or (just_switched and s == 0.0)
             if audited and s > 0.0 and is_checked(n):
                 audit = audit_step(
                     family(scene.law), scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerances[0], audit
                 )
-            last, begun = mode, y
-            t, status, mode, y = _arrive(scene, mode, guard, t, s, horizon, y_next)
+            mode_before, y_before = mode, y
+            t, status, mode, y = _after_step(scene, mode, guard, t, s, h_max, y_next)
             if audited and status != RUNNING and guard >= 0 and s > 0.0:
-                fall = fall_rate(
-                    family(scene.law), scene, last, is_implicit, c, before, s, begun, y_next, stages, guard, guards
+                guard_fall_rate = fall_rate(
+                    family(scene.law),
+                    scene,
+                    mode_before,
+                    is_implicit,
+                    c,
+                    t_before,
+                    s,
+                    y_before,
+                    y_next,
+                    stages,
+                    guard,
+                    first,
                 )
             if s == 0.0 and status != RUNNING:
-                # What a mode ends by that is over as it is entered is to be seen.
-                kept = _keep(scene, last, is_implicit, c, t, 0.0, y, times, table, kept)
-        if kept == 0:
-            # A run that ends as it begins was somewhere all the same.
-            kept = _keep(scene, mode, is_implicit, c, t, 0.0, y, times, table, kept)
+                # The history must show the end of a mode that lasts no time.
+                count = _store_row(scene, mode_before, is_implicit, c, t, 0.0, y, times, table, count)
+        if count == 0:
+            # A run that ends at launch has a history of one row.
+            count = _store_row(scene, mode, is_implicit, c, t, 0.0, y, times, table, count)
         outcome = recorder.conclude(scene, record, status, t, *modes.in_space(scene, t, y))
-        for k in range(min(len(outcome), out.shape[1])):
-            out[i, k] = outcome[k]
+        for k in range(min(len(outcome), rows.shape[1])):
+            rows[i, k] = outcome[k]
         steps[i] = n
         if audited:
-            shown[i, 0] = audit.violation
-            shown[i, 1] = abs(audit.unexplained) / audit.turnover if audit.turnover > 0.0 else 0.0
-            shown[i, 2] = fall
-    return kept
+            audits[i, 0] = audit.violation
+            audits[i, 1] = abs(audit.unexplained) / audit.turnover if audit.turnover > 0.0 else 0.0
+            audits[i, 2] = guard_fall_rate
+    return count

@@ -1,4 +1,4 @@
-"""What two runs of a cell at different resolutions tell: whether they agree, and bounds on their errors."""
+"""Comparison of two runs of a cell at different resolutions: whether they agree, and bounds on their errors."""
 
 from __future__ import annotations
 
@@ -10,42 +10,56 @@ from numpy.typing import NDArray
 from ringsweep.models.interface.audit import undecided
 from ringsweep.quantities.variables import FAILED, OUTCOMES
 
-#: What two resolutions must agree on for a certificate.
-_WITNESSED = ("regime", "motion", "separating_contact")
+#: Outcomes on which two resolutions must agree for a certificate.
+_CERTIFIED = ("regime", "motion", "separating_contact")
 
 
-# Outcomes that a run may lack.
+# Outcomes that may be NaN in a certified run.
 _MAY_LACK = ("t_separation", "first_slip", "period")
 
 
-# Share by which ends may differ that are the same but for rounding.
+# Relative difference of two final states that rounding explains.
 _SAME = 1e-14
 
 
-# Least error stated: a share of the tolerance of a step, what rounding leaves of a step, and a share of the difference,
-# relative to its scale, of the number in which two resolutions differ most. Found by trial, see docs/accuracy.md.
-_FLOOR, _ROUNDING, _TOGETHER = 0.05, 1e-15, 0.04
+# A bound on an error is at least: a share of the tolerance of a step; the rounding of a step times the root of their
+# number; a share of the largest relative difference between both runs in any outcome. Found by experiment, see
+# docs/accuracy.md.
+_FLOOR, _ROUNDING, _SHARE_OF_LARGEST = 0.05, 1e-15, 0.04
 
 
-def agree(rows: NDArray[np.float64], witness: NDArray[np.float64], outcomes: tuple[str, ...]) -> NDArray[np.bool_]:
-    """Where two resolutions agree on what is certified, and have not both failed."""
-    columns = [outcomes.index(name) for name in _WITNESSED if name in outcomes]
-    same: NDArray[np.bool_] = (rows[:, columns] == witness[:, columns]).all(axis=1)
+def agree(rows: NDArray[np.float64], second_rows: NDArray[np.float64], outcomes: tuple[str, ...]) -> NDArray[np.bool_]:
+    """Whether two runs of each cell agree on regime, motion and separating contact, and have not failed.
+
+    Parameters
+    ----------
+    rows, second_rows : ndarray of shape ``(cells, outcomes)``
+        Outcomes of the runs, and of second runs at another resolution.
+    outcomes : tuple of str
+        Names of the columns.
+
+    Returns
+    -------
+    ndarray of bool, shape ``(cells,)``
+    """
+    columns = [outcomes.index(name) for name in _CERTIFIED if name in outcomes]
+    same: NDArray[np.bool_] = (rows[:, columns] == second_rows[:, columns]).all(axis=1)
     return same & (rows[:, outcomes.index("regime")] != FAILED)
 
 
-def vouched(
-    batch: Any, rows: NDArray[np.float64], witness: NDArray[np.float64], fall: Any, outcomes: tuple[str, ...]
+def certifiable(
+    batch: Any, rows: NDArray[np.float64], second_rows: NDArray[np.float64], fall_rates: Any, outcomes: tuple[str, ...]
 ) -> NDArray[np.bool_]:
-    """Where two resolutions agree, all numbers are numbers, and the verdict does not hang by less than they differ.
+    """Whether two runs of each cell agree, all numbers are finite, and the error is too small to change the regime.
 
     Parameters
     ----------
     batch : NamedTuple
-    rows, witness : ndarray of shape ``(cells, outcomes)``
-        What a run and a run at another resolution came to.
-    fall : ndarray of shape ``(cells,)``
-        How fast the guard fell by which each run ended.
+        Cells.
+    rows, second_rows : ndarray of shape ``(cells, outcomes)``
+        Outcomes of the runs, and of second runs at another resolution.
+    fall_rates : ndarray of shape ``(cells,)``
+        Rate at which the guard that ended each run fell, in its unit per second.
     outcomes : tuple of str
         Names of the columns.
 
@@ -54,75 +68,93 @@ def vouched(
     ndarray of bool, shape ``(cells,)``
     """
     needed = [column for column, name in enumerate(outcomes) if name not in _MAY_LACK]
-    certain: NDArray[np.bool_] = agree(rows, witness, outcomes) & ~undecided(batch, rows, witness, fall)
-    return certain & np.isfinite(rows[:, needed]).all(axis=1)
+    decided: NDArray[np.bool_] = agree(rows, second_rows, outcomes) & ~undecided(batch, rows, second_rows, fall_rates)
+    return decided & np.isfinite(rows[:, needed]).all(axis=1)
 
 
-def repeated(rows: NDArray[np.float64], witness: NDArray[np.float64], outcomes: tuple[str, ...]) -> NDArray[np.bool_]:
-    """Where two resolutions took the same steps, by their ends: they tell nothing of their error.
+def took_same_steps(
+    rows: NDArray[np.float64], second_rows: NDArray[np.float64], outcomes: tuple[str, ...]
+) -> NDArray[np.bool_]:
+    """Whether two runs of each cell took the same steps, since they end in the same state.
 
-    A body that sticks all the time is where the drive takes it, whatever the steps.
+    The difference between such runs says nothing about the error. A body that sticks all the time is no such case: the
+    drive alone decides its motion.
+
+    Parameters
+    ----------
+    rows, second_rows : ndarray of shape ``(cells, outcomes)``
+        Outcomes of the runs, and of second runs at another resolution.
+    outcomes : tuple of str
+        Names of the columns.
+
+    Returns
+    -------
+    ndarray of bool, shape ``(cells,)``
     """
     ends = [column for column, name in enumerate(outcomes) if name.endswith("_end")]
     stuck = rows[:, outcomes.index("stick_time")] == rows[:, outcomes.index("t_end")]
-    a, b = rows[:, ends], witness[:, ends]
+    a, b = rows[:, ends], second_rows[:, ends]
     with np.errstate(invalid="ignore"):
         same = (np.abs(a - b) <= _SAME * (1.0 + np.abs(a))).all(axis=1)
     return np.asarray(same & ~stuck)
 
 
 def with_errors(outcomes: tuple[str, ...]) -> tuple[str, ...]:
-    """Names of the outcomes whose errors are stated."""
+    """Names of the outcomes that have a bound on their error."""
     return tuple(name for name in outcomes if f"{name}_error" in OUTCOMES)
 
 
 def errors(
     rows: NDArray[np.float64],
-    witness: NDArray[np.float64],
+    second_rows: NDArray[np.float64],
     outcomes: tuple[str, ...],
     *,
     safety: float,
     tolerance: float = 0.0,
     steps: Any = 0.0,
 ) -> NDArray[np.float64]:
-    """Bounds on the errors of runs, from runs at another resolution.
+    """Bounds on the errors of runs, from second runs at another resolution.
 
-    Two runs may come close to each other in one number by chance, but hardly in all numbers at once.
+    Two runs may be close in one outcome by chance, but hardly in all outcomes. So a share of the largest relative
+    difference counts in every outcome.
 
     Parameters
     ----------
-    rows, witness : ndarray of shape ``(cells, outcomes)``
+    rows, second_rows : ndarray of shape ``(cells, outcomes)``
+        Outcomes of the runs, and of the second runs.
     outcomes : tuple of str
         Names of the columns.
     safety : float
-        Error of a run in units of its difference from the other one, at most.
+        Largest error of a run, in units of its difference from the second run.
     tolerance : float
         Relative error allowed to a step.
     steps : ndarray of shape ``(cells,)``
-        Number of steps, whose rounding adds up.
+        Number of steps. Their rounding accumulates.
 
     Returns
     -------
-    ndarray of shape ``(cells, numbers)``
-        For the numbers that :func:`with_errors` names; NaN where the two runs do not agree in kind.
+    ndarray of shape ``(cells, len(with_errors(outcomes)))``
+        Each in the unit of its outcome; NaN where :func:`agree` is false.
     """
     names = with_errors(outcomes)
     columns = [outcomes.index(name) for name in names]
     a = rows[:, columns]
     with np.errstate(invalid="ignore", over="ignore"):
-        apart = np.abs(a - witness[:, columns])
+        difference = np.abs(a - second_rows[:, columns])
     units = np.array([OUTCOMES[name].units for name in names])
     scale = np.empty_like(a)
     for unit in set(units.tolist()):
-        own = units == unit
-        largest = np.nanmax(np.abs(a[:, own]), axis=1, initial=0.0)
-        scale[:, own] = (largest + (0.0 if unit.startswith("m") else 1.0))[:, None]
-    least = _FLOOR * tolerance + _ROUNDING * np.sqrt(1.0 + np.asarray(steps))[..., None]
+        of_unit = units == unit
+        largest = np.nanmax(np.abs(a[:, of_unit]), axis=1, initial=0.0)
+        scale[:, of_unit] = (largest + (0.0 if unit.startswith("m") else 1.0))[:, None]
+    floor = _FLOOR * tolerance + _ROUNDING * np.sqrt(1.0 + np.asarray(steps))[..., None]
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        all_apart = np.nanmax(np.where(scale > 0.0, apart / scale, 0.0), axis=1, initial=0.0)[:, None]
-        bound: NDArray[np.float64] = safety * np.maximum(apart, _TOGETHER * all_apart * scale) + least * scale
-    # The end of the span is exact, where a run reaches it.
+        largest_difference = np.nanmax(np.where(scale > 0.0, difference / scale, 0.0), axis=1, initial=0.0)[:, None]
+        bound: NDArray[np.float64] = (
+            safety * np.maximum(difference, _SHARE_OF_LARGEST * largest_difference * scale) + floor * scale
+        )
+    # A run that reaches the end of the span has an exact time of its end.
     reached = rows[:, outcomes.index("regime")] == rows[:, outcomes.index("motion")]
-    bound[reached & (apart[:, names.index("t_end")] == 0.0), names.index("t_end")] = 0.0
-    bound[~agree(rows, witness, outcomes)] = np.nan
+    bound[reached & (difference[:, names.index("t_end")] == 0.0), names.index("t_end")] = 0.0
+    bound[~agree(rows, second_rows, outcomes)] = np.nan
     return bound

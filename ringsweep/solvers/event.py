@@ -1,4 +1,4 @@
-"""Methods that locate every switching point: `event` for set-valued laws, `implicit` for smooth ones."""
+"""Methods that locate every event: `event` for set-valued laws, `implicit` for smooth and dynamic laws."""
 
 from __future__ import annotations
 
@@ -17,40 +17,40 @@ from ringsweep.physics import drives
 from ringsweep.physics.friction import LAWS, Dynamic, SetValued, Smooth, family_of, presliding, velocity
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.solvers.automaton import integrate
-from ringsweep.solvers.certificate import errors, repeated, vouched, with_errors
+from ringsweep.solvers.certificate import certifiable, errors, took_same_steps, with_errors
 from ringsweep.solvers.method import Method, Needs, Result
 
 LIMIT = Parameter("1", "steps after which a run is given up as failed", lower=1, upper=1e10)
 
-#: The witness of a certificate runs at a tolerance looser by this factor; where it disagrees the cell
-#: is run again, tighter by it, so often at most.
+#: The second run of a certificate has a tolerance that is looser by this factor. A cell without a certificate is run
+#: again with a tolerance that is tighter by this factor, at most _MOST_RETRIES times.
 FACTOR = 30.0
-_TRIES = 3
+_MOST_RETRIES = 3
 
-# A run obeys its law if no violation exceeds so many times what the tolerance of a step makes of it, and all but this
-# share of the energy that is turned over is work of friction.
-_BREACH, _ENERGY = 1e3, 5e-3
+# Largest violation of the friction law in a certified run, in units of the violation that the tolerance would explain;
+# and largest share of the energy turnover that is not work of friction.
+_MOST_VIOLATION, _MOST_UNEXPLAINED = 1e3, 5e-3
 
 
-def _some(batch: Any, cells: NDArray[np.intp]) -> Any:
-    """Some cells of a batch; all of them are the batch itself."""
+def _select(batch: Any, cells: NDArray[np.intp]) -> Any:
+    """The given cells of a batch; the batch itself, without a copy, if these are all cells."""
     return batch if len(cells) == len(batch.span) else take(batch, cells)
 
 
 @dataclass(frozen=True)
 class _Piecewise(Method):
-    """What both methods share: integration of the piecewise-smooth system, and its certificate."""
+    """Integration of a piecewise-smooth system, and its certificate."""
 
     families: ClassVar[tuple[type, ...]]
     safety: ClassVar[float]
-    """Error of a run in units of its difference from one at the looser tolerance, at most; half of runs: a fiftieth."""
+    """Largest error of a run, in units of its difference from the run at the looser tolerance; the median is 1/50."""
 
     rtol: float
     max_steps: int = 1_000_000
     certify: bool = True
 
     def needs(self, structure: Structure) -> Needs:
-        """What modes need, with series, implicit steps or both, whichever the law's family takes."""
+        """Functions for modes and audit, and for series, implicit steps or both, as the law's family needs."""
         family = family_of(LAWS[structure.law])
         of_model = recorder.MEMBERS + modes.MEMBERS + audit.MEMBERS
         of_model += () if family is Dynamic else series.MEMBERS
@@ -60,7 +60,13 @@ class _Piecewise(Method):
         return Needs(of_law, drives.MEMBERS, of_model)
 
     def check(self, structure: Structure) -> None:
-        """Refuse a friction law of a family that the method does not take; see :meth:`Method.check` too."""
+        """Refuse friction laws of other families.
+
+        Raises
+        ------
+        InputError
+            If the method does not take the friction law; and as in :meth:`Method.check`.
+        """
         if family_of(LAWS[structure.law]) not in self.families:
             able = ", ".join(name for name, law in LAWS.items() if family_of(law) in self.families)
             raise InputError(
@@ -71,91 +77,106 @@ class _Piecewise(Method):
 
     @abstractmethod
     def tolerances(self) -> tuple[float, float]:
-        """Tolerance of the series and of the implicit steps."""
+        """Relative errors allowed to a step of the series and to an implicit step."""
 
     def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:
-        """Outcomes of every cell; see :class:`ringsweep.solvers.method.Method`.
+        """Outcomes of every cell; see :meth:`ringsweep.solvers.method.Method.run`.
 
-        A cell is certified if a run at a looser tolerance agrees with it and it obeys its law. Where it does not, or
-        where the two are one run, whose steps no tolerance has shortened, both tolerances are tightened.
+        A cell is certified if it obeys its friction law, and if a second run at a looser tolerance agrees with it. If
+        not, or if both runs took the same steps, the cell is run again at tighter tolerances.
         """
-        rows, steps, shown = self.integrate(batch, len(outcomes), audit=self.certify)
+        rows, steps, audits = self.integrate(batch, len(outcomes), audit=self.certify)
         certified = np.zeros(len(rows), dtype=bool)
         if not self.certify:
             return Result(rows, steps=steps, certified=certified)
         bounds = np.full((len(rows), len(with_errors(outcomes))), np.nan)
-        # What met the limit of work is not worked on any more.
-        live = np.flatnonzero(steps < self.max_steps)
-        if not len(live):
+        # Runs that reached the largest number of steps are not repeated.
+        open_cells = np.flatnonzero(steps < self.max_steps)
+        if not len(open_cells):
             return Result(rows, steps=steps, certified=certified, errors=bounds)
-        witness, more, _ = replace(self, rtol=self.rtol * FACTOR).integrate(
-            _some(batch, live), len(outcomes), audit=False
+        second_rows, more_steps, _ = replace(self, rtol=self.rtol * FACTOR).integrate(
+            _select(batch, open_cells), len(outcomes), audit=False
         )
-        certified[live] = self._vouched(_some(batch, live), rows[live], witness, shown[live], outcomes)
-        certified[live] &= ~repeated(rows[live], witness, outcomes)
-        bounds[live] = self._errors(batch, rows[live], witness, steps[live], outcomes)
-        steps[live] += more
+        certified[open_cells] = self._certified(
+            _select(batch, open_cells), rows[open_cells], second_rows, audits[open_cells], outcomes
+        )
+        certified[open_cells] &= ~took_same_steps(rows[open_cells], second_rows, outcomes)
+        bounds[open_cells] = self._errors(batch, rows[open_cells], second_rows, steps[open_cells], outcomes)
+        steps[open_cells] += more_steps
         finer = self
-        for _ in range(_TRIES):
-            live = live[~certified[live]]
+        for _ in range(_MOST_RETRIES):
+            open_cells = open_cells[~certified[open_cells]]
             finer = replace(finer, rtol=finer.rtol / FACTOR)
-            if not len(live) or finer.tolerances()[0] < 1e-15:
+            if not len(open_cells) or finer.tolerances()[0] < 1e-15:
                 break
-            part = _some(batch, live)
-            again, more, shown = finer.integrate(part, len(outcomes), audit=True)
-            certified[live] = self._vouched(part, again, rows[live], shown, outcomes)
-            bounds[live] = finer._errors(batch, again, rows[live], more, outcomes)
-            steps[live] += more
-            done = more < self.max_steps
-            rows[live[done]] = again[done]
-            live = live[done]
+            cells = _select(batch, open_cells)
+            finer_rows, more_steps, audits = finer.integrate(cells, len(outcomes), audit=True)
+            certified[open_cells] = self._certified(cells, finer_rows, rows[open_cells], audits, outcomes)
+            bounds[open_cells] = finer._errors(batch, finer_rows, rows[open_cells], more_steps, outcomes)
+            steps[open_cells] += more_steps
+            finished = more_steps < self.max_steps
+            rows[open_cells[finished]] = finer_rows[finished]
+            open_cells = open_cells[finished]
         return Result(rows, steps=steps, certified=certified, errors=bounds)
 
     @staticmethod
-    def _vouched(
+    def _certified(
         batch: Any,
         rows: NDArray[np.float64],
-        witness: NDArray[np.float64],
-        shown: NDArray[np.float64],
+        second_rows: NDArray[np.float64],
+        audits: NDArray[np.float64],
         outcomes: tuple[str, ...],
     ) -> NDArray[np.bool_]:
-        """Which runs are certified, given what a run at another tolerance came to and what they have shown."""
-        lawful: NDArray[np.bool_] = (shown[:, 0] <= _BREACH) & (shown[:, 1] <= _ENERGY)
-        return lawful & vouched(batch, rows, witness, shown[:, 2], outcomes)
+        """Whether each run is certified, from its audit and from the second run at another tolerance."""
+        obeys_law: NDArray[np.bool_] = (audits[:, 0] <= _MOST_VIOLATION) & (audits[:, 1] <= _MOST_UNEXPLAINED)
+        return obeys_law & certifiable(batch, rows, second_rows, audits[:, 2], outcomes)
 
     def _errors(
         self,
         batch: Any,
         rows: NDArray[np.float64],
-        witness: NDArray[np.float64],
+        second_rows: NDArray[np.float64],
         steps: NDArray[Any],
         outcomes: tuple[str, ...],
     ) -> NDArray[np.float64]:
-        """Bounds on the errors of runs at this tolerance, given runs at a looser one."""
+        """Bounds on the errors of runs at this tolerance, from second runs at a looser tolerance."""
         tolerance = self.tolerances()[family_of(type(batch.law)) is Dynamic]
-        return errors(rows, witness, outcomes, safety=self.safety, tolerance=tolerance, steps=steps)
+        return errors(rows, second_rows, outcomes, safety=self.safety, tolerance=tolerance, steps=steps)
 
     def integrate(
         self, batch: Any, width: int, *, audit: bool
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """One run of every cell at the tolerance: outcomes, steps, and under `audit` what each has shown of its law.
+        """Run every cell once.
 
-        See :func:`ringsweep.solvers.automaton.integrate`.
+        Parameters
+        ----------
+        batch : NamedTuple
+            Cells.
+        width : int
+            Number of outcomes.
+        audit : bool
+            Whether the runs are audited.
+
+        Returns
+        -------
+        tuple of ndarray
+            Outcomes of shape ``(cells, width)``; numbers of steps of shape ``(cells,)``; audits of shape ``(cells, 3)``
+            or ``(0, 3)``, see :func:`ringsweep.solvers.automaton.integrate`.
         """
         rows = np.empty((len(batch.span), width))
-        steps, shown = np.empty(len(rows)), np.empty((len(rows) if audit else 0, 3))
-        integrate(batch, self.tolerances(), self.max_steps, rows, steps, shown, np.inf, np.empty(0), np.empty((0, 0)))
-        return rows, steps, shown
+        steps, audits = np.empty(len(rows)), np.empty((len(rows) if audit else 0, 3))
+        integrate(batch, self.tolerances(), self.max_steps, rows, steps, audits, np.inf, np.empty(0), np.empty((0, 0)))
+        return rows, steps, audits
 
     def history(self, batch: Any, samples: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Times and rows of the history of cell 0; see :class:`ringsweep.solvers.method.Method`."""
+        """Times and rows of the history of cell 0; see :meth:`ringsweep.solvers.method.Method.history`."""
         spacing = float(batch.span[0]) / samples
         size = 4 * samples
         while True:
             times, table = np.empty(size), np.empty((size, width))
-            none, steps = np.empty((1, 0)), np.empty(1)
+            no_outcomes, steps = np.empty((1, 0)), np.empty(1)
             count = integrate(
-                batch, self.tolerances(), self.max_steps, none, steps, np.empty((0, 3)), spacing, times, table
+                batch, self.tolerances(), self.max_steps, no_outcomes, steps, np.empty((0, 3)), spacing, times, table
             )
             if count < size or size >= self.max_steps:
                 return times[:count], table[:count]
@@ -164,7 +185,7 @@ class _Piecewise(Method):
 
 @dataclass(frozen=True)
 class Event(_Piecewise):
-    """Stick and slip of set-valued laws, every switching point located."""
+    """Power series for set-valued laws; every event is located."""
 
     name: ClassVar[str] = "event"
     families: ClassVar[tuple[type, ...]] = (SetValued,)
@@ -175,13 +196,13 @@ class Event(_Piecewise):
     certify: bool = True
 
     def tolerances(self) -> tuple[float, float]:
-        """Tolerance of the series; there are no implicit steps."""
+        """Relative error allowed to a step of the series, twice: there are no implicit steps."""
         return self.rtol, self.rtol
 
 
 @dataclass(frozen=True)
 class Implicit(_Piecewise):
-    """Smooth and dynamic laws as they are written: power series where they are not stiff, else L-stable steps."""
+    """Power series for smooth and dynamic laws; L-stable implicit steps where these laws are stiff."""
 
     name: ClassVar[str] = "implicit"
     families: ClassVar[tuple[type, ...]] = (Smooth, Dynamic)
@@ -192,15 +213,15 @@ class Implicit(_Piecewise):
     certify: bool = True
 
     def tolerances(self) -> tuple[float, float]:
-        """Tolerance of the series and of the implicit steps."""
-        # A digit of a series is almost free, one of an implicit step is not; and the way out of the
-        # band amplifies what went before.
-        return max(1e-3 * self.rtol, 1e-15), self.rtol
+        """Relative errors allowed to a step of the series and to an implicit step."""
+        # One more digit of a series costs little, of an implicit step much. On the way out of the stiction band earlier
+        # errors grow.
+        return max(1.0 / implicit.IMPLICIT_TOLERANCE * self.rtol, 1e-15), self.rtol
 
 
 @dataclass(frozen=True)
 class Auto(Method):
-    """The cheapest method that is right for the law as given; never another law."""
+    """The method that takes the friction law: event for set-valued laws, implicit for all others."""
 
     name: ClassVar[str] = "auto"
 
@@ -208,23 +229,23 @@ class Auto(Method):
     certify: bool = True
 
     def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:
-        """Outcomes of every cell; see :class:`ringsweep.solvers.method.Method`."""
+        """Outcomes of every cell; see :meth:`ringsweep.solvers.method.Method.run`."""
         return self._method(type(batch.law)).run(batch, outcomes)
 
     def history(self, batch: Any, samples: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Times and rows of the history of cell 0; see :class:`ringsweep.solvers.method.Method`."""
+        """Times and rows of the history of cell 0; see :meth:`ringsweep.solvers.method.Method.history`."""
         return self._method(type(batch.law)).history(batch, samples, width)
 
     def needs(self, structure: Structure) -> Needs:
-        """What the method that takes the law needs."""
+        """Functions that the method for the friction law needs."""
         return self.resolved(structure).needs(structure)
 
     def check(self, structure: Structure) -> None:
-        """Errors as for the method that takes the law."""
+        """Refuse what the method for the friction law refuses."""
         self.resolved(structure).check(structure)
 
     def resolved(self, structure: Structure) -> Method:
-        """The method that a scene is run by."""
+        """The method for the friction law."""
         return self._method(LAWS[structure.law])
 
     def _method(self, law: type) -> Method:

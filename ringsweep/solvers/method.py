@@ -1,4 +1,4 @@
-"""What every method offers to a sweep."""
+"""Base class of all methods, and the results that they return to a sweep."""
 
 from __future__ import annotations
 
@@ -19,18 +19,21 @@ from ringsweep.physics.friction import LAWS
 
 @dataclass(frozen=True)
 class Result:
-    """Outcomes of a batch.
+    """Results of a batch.
 
     Attributes
     ----------
     rows : ndarray of shape ``(cells, outcomes)``
-        The model's outcomes, in the order of its columns.
-    steps, certified : ndarray of shape ``(cells,)``
+        Outcomes, in the order of the model's columns.
+    steps : ndarray of shape ``(cells,)``
+        Numbers of steps, those of second runs for a certificate included, unless the method says otherwise.
+    certified : ndarray of bool, shape ``(cells,)``
+        Whether each cell has a certificate.
     stiffness : ndarray of shape ``(cells,)``, optional
-        Only from methods of fixed step.
+        Largest stiffness of each run; only from methods of constant step.
     errors : ndarray of shape ``(cells, numbers)``, optional
-        Bounds on the errors of the numbers that :func:`with_errors` names, NaN where there is none; only where
-        certificates are sought.
+        Bounds on the errors of the outcomes that :func:`ringsweep.solvers.certificate.with_errors` names; NaN where
+        there is no bound. Only if certificates are asked for.
     """
 
     rows: NDArray[np.float64]
@@ -49,18 +52,18 @@ class Needs(NamedTuple):
 
 
 class Method(ABC):
-    """A way to advance time. Its options are the fields of the dataclass that derives from it."""
+    """A method of integration. The fields of a derived dataclass are its options in a configuration."""
 
     name: ClassVar[str]
     side_by_side: ClassVar[int] = 1
-    """Cells that it runs at once: fewer take as long."""
+    """Number of cells that it runs at once; fewer cells take as long."""
 
     @abstractmethod
     def needs(self, structure: Structure) -> Needs:
-        """Functions that the method needs of law, drive and model of such a scene."""
+        """Functions that the method needs of the law, the drive and the model of a scene of this structure."""
 
     def check(self, structure: Structure) -> None:
-        """Make sure that the method can take such a scene.
+        """Make sure that the method can run scenes of this structure.
 
         Raises
         ------
@@ -81,13 +84,40 @@ class Method(ABC):
                 )
 
     def resolved(self, structure: Structure) -> Method:
-        """The method, with its tolerances, that such a scene is run by."""
+        """The method that runs scenes of this structure: another one if this method chooses among methods."""
         return self
 
     @abstractmethod
     def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:
-        """Run every cell of `batch`; `outcomes` names the model's columns."""
+        """Run every cell.
+
+        Parameters
+        ----------
+        batch : NamedTuple
+            Cells, as :func:`ringsweep.models.batch` makes them.
+        outcomes : tuple of str
+            Names of the model's outcomes.
+
+        Returns
+        -------
+        Result
+        """
 
     @abstractmethod
     def history(self, batch: Any, samples: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Time history of cell 0 in about `samples` rows of `width` columns."""
+        """Time history of cell 0.
+
+        Parameters
+        ----------
+        batch : NamedTuple
+            Cells, as :func:`ringsweep.models.batch` makes them.
+        samples : int
+            Approximate number of rows.
+        width : int
+            Number of columns: the model's history variables.
+
+        Returns
+        -------
+        tuple of ndarray
+            Times (s) of shape ``(rows,)``, and rows of shape ``(rows, width)``.
+        """

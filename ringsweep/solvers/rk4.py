@@ -1,7 +1,7 @@
 """Runge-Kutta 4 with a constant step, the method of the paper, over a batch of cells.
 
-The method knows no events: it takes a step across an arc edge, a reversal or the stiction band as if the right-hand
-side were smooth. ``stiffness`` shows where a step goes beyond the limit of stability.
+The method does not locate events. It steps across an arc edge, a reversal or the stiction band as if the equations were
+smooth. ``stiffness`` shows which runs exceed the limit of stability.
 """
 
 from __future__ import annotations
@@ -35,25 +35,25 @@ from ringsweep.numerics.memory import (
     write,
 )
 from ringsweep.physics import drives
-from ringsweep.physics.drives import lookup, scaled, shape, turn
+from ringsweep.physics.drives import lookup, shape, turn, without_shape
 from ringsweep.physics.friction import LAWS, TRAITS, Dynamic, family_of, presliding, velocity
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.variables import SEPARATING
-from ringsweep.solvers.certificate import errors, vouched, with_errors
+from ringsweep.solvers.certificate import certifiable, errors, with_errors
 from ringsweep.solvers.method import Method, Needs, Result
 
-#: Radius of the largest half disc of the left half plane in which the method is stable: 2.616 where an eigenvalue is
-#: complex; on the real axis alone it would be 2.785.
+#: Radius of the largest half disc in the left half plane in which the method is stable (more exactly 2.616). On the
+#: real axis the method is stable up to 2.785.
 STABILITY_LIMIT = 2.61
 
-# Error of a run in units of its difference from one at half the step, at most: where friction jumps the order is one at
-# best.
+# Largest error of a run, in units of its difference from the run at half the step. Where friction jumps, the order is
+# one at best.
 _SAFETY = 5.0
 
-# Share of the narrowest segment of the surface that a step may slide across, for the arc to be seen.
-_LONGEST = 0.5
+# Largest share of the narrowest segment of the surface that a step of a certified run slides across.
+_MOST_ARC_SHARE = 0.5
 
-# Steps that a run takes before the next one has its turn. The table of the drive for so many steps stays in the cache.
+# Number of steps that a run takes before the next run continues. The table of the drive for these steps fits the cache.
 _BLOCK = 512
 
 
@@ -66,12 +66,12 @@ class RK4(Method):
 
     steps: Annotated[int, Parameter("1", "steps over the span of time", lower=1, upper=1e10)]
     certify: bool = True
-    """Whether cells within the limit of stability are run again at half the step."""
+    """Whether to run the cells within the limit of stability again at half the step, for their certificates."""
     diagnose: bool = True
-    """Whether the stiffness of each run is kept; without it none can be certified."""
+    """Whether to record the stiffness of each run; without it no run is certified."""
 
     def needs(self, structure: Structure) -> Needs:
-        """What a step of constant length needs; vector lanes need more of a law of the velocity."""
+        """Functions for steps of constant length; vector lanes need more functions of a law without bristles."""
         bristles = family_of(LAWS[structure.law]) is Dynamic
         of_law = (
             (presliding.bristle, presliding.region_guard) if bristles else velocity.MEMBERS + velocity.LANES_MEMBERS
@@ -79,7 +79,13 @@ class RK4(Method):
         return Needs(of_law, drives.CONSTANT_STEP_MEMBERS, recorder.MEMBERS + constant_step.MEMBERS)
 
     def check(self, structure: Structure) -> None:
-        """Refuse a law that changes at instants which no constant step meets; see :meth:`Method.check` too."""
+        """Refuse laws whose bonds snap, since a constant step does not locate the instants.
+
+        Raises
+        ------
+        InputError
+            If the method does not take the friction law; and as in :meth:`Method.check`.
+        """
         if TRAITS[LAWS[structure.law]].snaps:
             raise InputError(
                 "solver.method", f"rk4 does not take friction law {structure.law}, whose bonds snap: auto takes it"
@@ -87,7 +93,7 @@ class RK4(Method):
         super().check(structure)
 
     def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:
-        """Outcomes of every cell; see :class:`ringsweep.solvers.method.Method`."""
+        """Outcomes of every cell, and steps of the first run; see :meth:`ringsweep.solvers.method.Method.run`."""
         cells = len(batch.span)
         rows, report = self._integrate(batch, np.arange(cells), self.steps, len(outcomes))
         certified, bounds = np.zeros(cells, dtype=bool), None
@@ -95,18 +101,24 @@ class RK4(Method):
             return Result(rows, steps=report[:, 0], certified=certified)
         if self.certify:
             bounds = np.full((cells, len(with_errors(outcomes))), np.nan)
-            # Beyond the limit of stability a second run agrees with the first for the wrong reason. A run that ends at
-            # t = 0 has taken no step that could be checked.
+            # Beyond the limit of stability both runs may agree although both are wrong. A run that ends at t = 0 has no
+            # step to check.
             stable = np.flatnonzero((report[:, 1] <= STABILITY_LIMIT) & (report[:, 0] > 0.0))
             if len(stable):
-                half, finer = self._integrate(batch, stable, 2 * self.steps, len(outcomes))
-                some, ours = (batch, rows) if len(stable) == cells else (take(batch, stable), rows[stable])
-                # A reaction may have vanished between two steps.
-                held = (finer[:, 2] > 0.0) | (half[:, outcomes.index("regime")] == SEPARATING)
+                half_rows, half_report = self._integrate(batch, stable, 2 * self.steps, len(outcomes))
+                stable_batch, stable_rows = (
+                    (batch, rows) if len(stable) == cells else (take(batch, stable), rows[stable])
+                )
+                # A reaction may vanish between two steps.
+                contacts_held = (half_report[:, 2] > 0.0) | (half_rows[:, outcomes.index("regime")] == SEPARATING)
                 # A narrow arc may lie between two steps.
-                sure = held & (finer[:, 1] <= STABILITY_LIMIT) & (finer[:, 4] <= _LONGEST)
-                certified[stable] = sure & vouched(some, ours, half, finer[:, 3], outcomes)
-                bounds[stable] = errors(ours, half, outcomes, safety=_SAFETY, steps=report[stable, 0])
+                trusted = (
+                    contacts_held & (half_report[:, 1] <= STABILITY_LIMIT) & (half_report[:, 4] <= _MOST_ARC_SHARE)
+                )
+                certified[stable] = trusted & certifiable(
+                    stable_batch, stable_rows, half_rows, half_report[:, 3], outcomes
+                )
+                bounds[stable] = errors(stable_rows, half_rows, outcomes, safety=_SAFETY, steps=report[stable, 0])
         return Result(rows, steps=report[:, 0], stiffness=report[:, 1], certified=certified, errors=bounds)
 
     def _integrate(
@@ -115,23 +127,23 @@ class RK4(Method):
         rows = np.empty((len(batch.span), width))
         report = np.empty((len(batch.span), 5))
         kind, diagnosed = constant_step.side_by_side(batch), Diagnosed() if self.diagnose else NotDiagnosed()
-        # The kernels take the shape of the drive from a table, so that they are compiled once for all drives.
-        scenes = side_by_side(batch._replace(drive=scaled(batch.drive))) if isinstance(kind, Several) else batch
-        for group in _same_drive(batch, cells):
+        # The kernels read the drive from a table, so that they are compiled once for all drives.
+        scenes = side_by_side(batch._replace(drive=without_shape(batch.drive))) if isinstance(kind, Several) else batch
+        for group in _groups_by_drive(batch, cells):
             integrate(kind, diagnosed, scenes, take(batch.drive, group[0]), group, steps, rows, report)
         return rows[cells], report[cells]
 
     def history(self, batch: Any, samples: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Times and rows of the history of cell 0; see :class:`ringsweep.solvers.method.Method`."""
-        spacing = max(1, self.steps // samples)
-        rows = np.empty((self.steps // spacing + 2, width))
+        """Times and rows of the history of cell 0; see :meth:`ringsweep.solvers.method.Method.history`."""
+        interval = max(1, self.steps // samples)
+        rows = np.empty((self.steps // interval + 2, width))
         times = np.empty(len(rows))
-        count = _history(batch, self.steps, spacing, times, rows)
+        count = _history(batch, self.steps, interval, times, rows)
         return times[:count], rows[:count]
 
 
-def _same_drive(batch: Any, cells: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
-    """Groups of `cells` that share span and shape of the drive, whatever its amplitude."""
+def _groups_by_drive(batch: Any, cells: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
+    """Groups of `cells` with the same span and the same drive but for its amplitude."""
     shape = [
         leaf
         for name, leaf in zip(batch.drive._fields, batch.drive, strict=True)
@@ -143,20 +155,20 @@ def _same_drive(batch: Any, cells: NDArray[np.intp]) -> Iterator[NDArray[np.intp
     yield from np.split(cells[order], np.flatnonzero(np.diff(group[order])) + 1)
 
 
-# State of a run: it goes on; it is finished; it ends in the step ahead; it was found to go on through that step.
-LIVE, FINISHED, ENDING, EXCUSED = 1.0, 0.0, 2.0, -1.0
+# State of a run: it goes on; it is finished; it ends in the next step; floats have shown that it does not end there.
+LIVE, FINISHED, ENDING, CHECKED = 1.0, 0.0, 2.0, -1.0
 
 
 class Diagnosed(NamedTuple):
-    """The stiffness, the least margin and the largest share of an arc are kept for each run."""
+    """Stiffness, least margin and largest share of an arc are recorded for each run."""
 
 
 class NotDiagnosed(NamedTuple):
-    """They are not kept."""
+    """Stiffness, least margin and largest share of an arc are not recorded."""
 
 
 class Diagnosis(NamedTuple):
-    """Largest stiffness, least margin of the guards and largest share of an arc over the steps of a run."""
+    """Largest stiffness, least margin of the guards, and largest share of an arc in a step, over the steps of a run."""
 
     stiffness: Any
     margin: Any
@@ -165,7 +177,7 @@ class Diagnosis(NamedTuple):
 
 @hook(absorb=True)
 def _diagnose(diagnosed, scene, diagnosis, before, now, h):
-    """Diagnosis of a run after a further step in which no guard vanished."""
+    """Diagnosis of a run after one more step."""
 
 
 @_diagnose.implements(Diagnosed)
@@ -183,7 +195,7 @@ def _diagnose_nothing(diagnosed, scene, diagnosis, before, now, h):
 
 
 class _Run(NamedTuple):
-    """A run, or several side by side: state, its inspection, record, diagnosis, and whether it goes on."""
+    """A run, or several runs side by side: state, inspection, record, diagnosis, and whether the run goes on."""
 
     y: Any
     now: Any
@@ -194,14 +206,14 @@ class _Run(NamedTuple):
 
 @kernel
 def _tabulate(table, drive, first, steps, h):
-    """Fill `table` with the drive's shape at whole and half steps from step `first` on."""
+    """Fill `table` with the shape of the drive and its rate, at whole and half steps from step `first` on."""
     for k in range(2 * steps + 1):
         table[k, 0], table[k, 1], _ = shape(drive, (first + 0.5 * k) * h)
 
 
 @absorbed
 def _step(scene, y, now, table, k, h):
-    """State one step after `y`, inspected; row `k` of `table` holds the drive at its beginning."""
+    """State one step after `y`, whose inspection is `now`; row `k` of `table` is the drive at the beginning."""
     k1 = now.rates
     theta, ring_omega = lookup(scene.drive, table, k + 1)
     k2 = constant_step.rates(scene, now, add_scaled(y, 0.5 * h, k1), theta, ring_omega)
@@ -214,7 +226,7 @@ def _step(scene, y, now, table, k, h):
 
 @inlined
 def _hermite(y, rate, y_next, rate_next, h, x):
-    """Cubic through both ends of a step, at the fraction `x` of it."""
+    """State at the fraction `x` of a step, by the cubic through states and rates at both ends."""
     a = (1.0 + 2.0 * x) * (1.0 - x) * (1.0 - x)
     b = x * x * (3.0 - 2.0 * x)
     c = x * (1.0 - x) * (1.0 - x) * h
@@ -225,7 +237,7 @@ def _hermite(y, rate, y_next, rate_next, h, x):
 
 @hook
 def _scene(kind, batch, cell, memory, at):
-    """The scene of a run, from the batch; or of several side by side, from memory."""
+    """Scene of a run, from the batch; or of several runs side by side, from memory."""
 
 
 @_scene.implements(Single)
@@ -256,9 +268,9 @@ def _store_among_several(kind, memory, at, scene, run):
 
 @inlined
 def _advance(kind, diagnosed, batch, memory, at, occupants, sample, table, first, k, steps, h):
-    """Advance runs side by side from step `k` of a block to its end, or to the step in which one of them ends.
+    """Advance runs side by side from step `k` to the end of a block of steps, or to a step in which a run ends.
 
-    Returns the step that was not taken.
+    Returns the index of the first step that was not taken.
     """
     align_stack()
     runs_at = at + width(kind) * size_of(take(batch, occupants[0]))
@@ -283,20 +295,20 @@ def _advance(kind, diagnosed, batch, memory, at, occupants, sample, table, first
 
 @inlined
 def _finish_ended(kind, diagnosed, batch, memory, at, occupants, sample, table, first, k, h, rows, report):
-    """Finish the runs that end in a step, one by one with floats; returns the number of runs that go on."""
-    left = 0
+    """Finish the runs that end in a step, one by one with floats; return the number of runs that go on."""
+    running = 0
     for lane in range(len(occupants)):
         scene = take(batch, occupants[lane])
-        place = at + width(kind) * size_of(scene) + lane
-        run = read(memory, place, width(kind), sample)
+        start = at + width(kind) * size_of(scene) + lane
+        run = read(memory, start, width(kind), sample)
         live = run.live
         if live == ENDING:
             y_next = _step(scene, run.y, run.now, table, 2 * k, h)
             theta, ring_omega = lookup(scene.drive, table, 2 * k + 2)
             after = constant_step.inspect(scene, y_next, theta, ring_omega)
             status, fraction = constant_step.verdict(scene, run.now, after)
-            # Vector lanes and floats differ in the last bit: by floats the run may not end in this step after all.
-            live = EXCUSED
+            # Vector lanes and floats differ in the last bit, so that with floats the run may not end in this step.
+            live = CHECKED
             if status != RUNNING:
                 live = FINISHED
                 diagnosis = _diagnose(diagnosed, scene, run.diagnosis, run.now, after, h)
@@ -304,25 +316,35 @@ def _finish_ended(kind, diagnosed, batch, memory, at, occupants, sample, table, 
                 t = (first + k + fraction) * h
                 stuck, seen = constant_step.sticks(scene, run.now, after), constant_step.seen(scene, y_end, after)
                 record = recorder.observe(scene, run.record, t, fraction * h, stuck, seen)
-                # The contact that is lost has no margin.
+                # The margin does not cover the contact that separates in this step.
                 diagnosis = Diagnosis(diagnosis.stiffness, run.diagnosis.margin, diagnosis.arc_share)
-                fall = constant_step.fall_rate(scene, run.now, after, h)
+                fall_rate = constant_step.fall_rate(scene, run.now, after, h)
                 _conclude(
-                    scene, record, status, t, y_end, first + k + 1.0, diagnosis, fall, occupants[lane], rows, report
+                    scene,
+                    record,
+                    status,
+                    t,
+                    y_end,
+                    first + k + 1.0,
+                    diagnosis,
+                    fall_rate,
+                    occupants[lane],
+                    rows,
+                    report,
                 )
-            write(memory, place, width(kind), _Run(run.y, run.now, run.record, run.diagnosis, live))
-        left += int(live != FINISHED)
-    return left
+            write(memory, start, width(kind), _Run(run.y, run.now, run.record, run.diagnosis, live))
+        running += int(live != FINISHED)
+    return running
 
 
 @inlined
-def _conclude(scene, record, status, t, y, steps, diagnosis, fall, cell, rows, report):
-    """Store the outcome of a run."""
+def _conclude(scene, record, status, t, y, steps, diagnosis, fall_rate, cell, rows, report):
+    """Store outcome and report of a run."""
     outcome = recorder.conclude(scene, record, status, t, y[0], y[1])
     for column in range(len(outcome)):
         rows[cell, column] = outcome[column]
     report[cell, 0], report[cell, 1], report[cell, 2] = steps, diagnosis.stiffness, diagnosis.margin
-    report[cell, 3], report[cell, 4] = fall, diagnosis.arc_share
+    report[cell, 3], report[cell, 4] = fall_rate, diagnosis.arc_share
 
 
 def integrate(
@@ -335,22 +357,28 @@ def integrate(
     rows: NDArray[np.float64],
     report: NDArray[np.float64],
 ) -> None:
-    """Run `cells` of a batch, all with the same shape of drive and span, for `steps` steps.
+    """Run the given cells of a batch, which have the same span and the same drive but for its amplitude.
 
     Parameters
     ----------
     kind : Single or Several
-        How many runs stand side by side.
-    account : Kept or Dropped
-        Whether the diagnosis of each run is kept.
+        Whether runs are computed one by one or side by side.
+    diagnosed : Diagnosed or NotDiagnosed
+        Whether the diagnosis of each run is recorded.
     batch : NamedTuple
-        Scenes; where several stand side by side, :func:`ringsweep.numerics.lanes.side_by_side` and with their drive
-        :func:`ringsweep.physics.drives.scaled`.
+        Cells. For runs side by side, those that :func:`ringsweep.numerics.memory.side_by_side` returns, with drives
+        from :func:`ringsweep.physics.drives.without_shape`.
     drive : NamedTuple
-        The drive of one of the cells.
-    rows, report : ndarray of shape ``(cells of the batch, outcomes)`` and ``(cells of the batch, 5)``
-        Filled for these cells: outcomes; number of steps, largest stiffness, least margin, rate at which the guard fell
-        that ended the run, and largest share of an arc.
+        Drive of one of the cells.
+    cells : ndarray of int
+        Indices of the cells.
+    steps : int
+        Number of steps over the span.
+    rows : ndarray of shape ``(cells of the batch, outcomes)``
+        Filled, for these cells, with outcomes.
+    report : ndarray of shape ``(cells of the batch, 5)``
+        Filled, for these cells, with the number of steps, the largest stiffness, the least margin, the rate at which
+        the guard that ended the run fell, and the largest share of an arc.
     """
     h = float(batch.span[cells[0]]) / steps
     table = np.empty((2 * min(_BLOCK, steps) + 1, 2))
@@ -367,21 +395,21 @@ def integrate(
 
 @kernel
 def _start(kind, batch, cells, table, rows, report):
-    """Store runs in memory, side by side in blocks, and finish at once the runs that end at t = 0.
+    """Store runs in memory, side by side in blocks, and finish the runs that end at t = 0.
 
     Returns
     -------
     tuple
         Memory of shape ``(blocks, numbers of a scene and a run, runs in a block)``; the cells stored there, in order;
-        their number.
+        the number of runs that go on.
     """
-    per = width(kind)
+    per_block = width(kind)
     sample = _initial_run(take(batch, cells[0]), 0.0, 0.0)
-    lines = size_of(take(batch, cells[0])) + size_of(sample)
-    blocks = (len(cells) + per - 1) // per
-    memory = np.zeros((blocks, lines, per))
-    memory_of_runs = memory.reshape(memory.size)
-    occupants = np.full(blocks * per, cells[0])
+    numbers = size_of(take(batch, cells[0])) + size_of(sample)
+    blocks = (len(cells) + per_block - 1) // per_block
+    memory = np.zeros((blocks, numbers, per_block))
+    flat_memory = memory.reshape(memory.size)
+    occupants = np.full(blocks * per_block, cells[0])
     live = 0
     for i in cells:
         scene = take(batch, i)
@@ -391,7 +419,7 @@ def _start(kind, batch, cells, table, rows, report):
         if status != RUNNING:
             _conclude(scene, run.record, status, 0.0, run.y, 0.0, run.diagnosis, 0.0, i, rows, report)
             continue
-        _store(kind, memory_of_runs, live // per * lines * per + live % per, scene, run)
+        _store(kind, flat_memory, live // per_block * numbers * per_block + live % per_block, scene, run)
         occupants[live] = i
         live += 1
     return memory, occupants, live
@@ -399,55 +427,57 @@ def _start(kind, batch, cells, table, rows, report):
 
 @kernel
 def _advance_block(kind, diagnosed, batch, memory, occupants, live, table, first, steps, h, rows, report):
-    """Advance all runs by a block of steps, and close the gaps that finished runs leave; returns how many go on."""
-    per, lines = width(kind), memory.shape[1]
-    memory_of_runs = memory.reshape(memory.size)
+    """Advance all runs by a block of steps and close the gaps of finished runs; return the number of other runs."""
+    per_block, numbers = width(kind), memory.shape[1]
+    flat_memory = memory.reshape(memory.size)
     sample = _initial_run(take(batch, occupants[0]), 0.0, 0.0)
-    for place in range(0, live, per):
-        at, here = place * lines, occupants[place : place + per]
-        k, left = 0, per
-        while left > 0:
-            k = _advance(kind, diagnosed, batch, memory_of_runs, at, here, sample, table, first, k, steps, h)
+    for start in range(0, live, per_block):
+        at, cells = start * numbers, occupants[start : start + per_block]
+        k, running = 0, per_block
+        while running > 0:
+            k = _advance(kind, diagnosed, batch, flat_memory, at, cells, sample, table, first, k, steps, h)
             if k == steps:
                 break
-            left = _finish_ended(
-                kind, diagnosed, batch, memory_of_runs, at, here, sample, table, first, k, h, rows, report
+            running = _finish_ended(
+                kind, diagnosed, batch, flat_memory, at, cells, sample, table, first, k, h, rows, report
             )
-    kept = 0
+    remaining = 0
     for slot in range(live):
-        if memory[slot // per, lines - 1, slot % per] != FINISHED:
-            # Slices would drag in what raises errors about their shapes, a second of compilation.
-            for line in range(lines):
-                memory[kept // per, line, kept % per] = memory[slot // per, line, slot % per]
-            occupants[kept] = occupants[slot]
-            kept += 1
-    # Empty places of the last block go on with what they hold; nobody reads them.
-    for slot in range(kept, live):
-        memory[slot // per, lines - 1, slot % per] = FINISHED
-    return kept
+        if memory[slot // per_block, numbers - 1, slot % per_block] != FINISHED:
+            # A slice would add the code for errors about shapes, which takes a second to compile.
+            for number in range(numbers):
+                memory[remaining // per_block, number, remaining % per_block] = memory[
+                    slot // per_block, number, slot % per_block
+                ]
+            occupants[remaining] = occupants[slot]
+            remaining += 1
+    # Empty places of the last block are computed too, but not read.
+    for slot in range(remaining, live):
+        memory[slot // per_block, numbers - 1, slot % per_block] = FINISHED
+    return remaining
 
 
 @kernel
 def _finish_at_end_of_span(kind, batch, memory, occupants, live, steps, rows, report):
     """Store the outcomes of the runs that reached the end of the span."""
-    per, lines = width(kind), memory.shape[1]
-    memory_of_runs = memory.reshape(memory.size)
+    per_block, numbers = width(kind), memory.shape[1]
+    flat_memory = memory.reshape(memory.size)
     for slot in range(live):
         cell = occupants[slot]
         scene = take(batch, cell)
         run = read(
-            memory_of_runs,
-            (slot // per * lines + size_of(scene)) * per + slot % per,
-            per,
+            flat_memory,
+            (slot // per_block * numbers + size_of(scene)) * per_block + slot % per_block,
+            per_block,
             _initial_run(scene, 0.0, 0.0),
         )
-        # The end of the span, not the rounding of a sum of steps.
+        # The sum of the steps would miss the end of the span by rounding.
         _conclude(scene, run.record, COMPLETE, scene.span, run.y, float(steps), run.diagnosis, 0.0, cell, rows, report)
 
 
 @inlined
 def _initial_run(scene, theta, ring_omega):
-    """A run at t = 0. With any values of the drive it serves as a sample of the type of such runs."""
+    """A run at t = 0. With any values of the drive it also serves as an example of the type."""
     y = constant_step.initial_state(scene)
     now = constant_step.inspect(scene, y, theta, ring_omega)
     record = recorder.begin(scene, 0.0, constant_step.seen(scene, y, now))
@@ -455,8 +485,8 @@ def _initial_run(scene, theta, ring_omega):
 
 
 @kernel
-def _history(batch, steps, spacing, times, rows):
-    """Rows of every `spacing`-th step of cell 0 up to its end; returns their number."""
+def _history(batch, steps, interval, times, rows):
+    """Fill `times` and `rows` with every `interval`-th step of cell 0, and its end; return the number of rows."""
     scene = take(batch, 0)
     h = scene.span / steps
     table = np.empty((3, 2))
@@ -467,7 +497,7 @@ def _history(batch, steps, spacing, times, rows):
     status, _ = constant_step.verdict(scene, now, now)
     count = 0
     for k in range(steps + 1):
-        if k % spacing == 0 or k == steps or status != RUNNING:
+        if k % interval == 0 or k == steps or status != RUNNING:
             times[count] = k * h if k < steps else scene.span
             row = constant_step.row(scene, y, theta, ring_omega)
             for column in range(len(row)):
@@ -481,7 +511,7 @@ def _history(batch, steps, spacing, times, rows):
         after = constant_step.inspect(scene, y_next, theta, ring_omega)
         status, fraction = constant_step.verdict(scene, now, after)
         if status != RUNNING:
-            # The history ends where the run does, within the step.
+            # The history ends with the run, within the step.
             times[count] = (k + fraction) * h
             theta, ring_omega, _ = turn(scene.drive, times[count])
             row = constant_step.row(scene, _hermite(y, now.rates, y_next, after.rates, h, fraction), theta, ring_omega)

@@ -1,8 +1,8 @@
 """Rodas5P: an L-stable Rosenbrock method of order 5 with dense output of order 4.
 
-One linear system per stage and no iteration, which is what a stiff system of a few equations wants;
-its order does not drop on the slow manifold that a stuck contact creeps along. Coefficients:
-G. Steinebach, BIT Numerical Mathematics 63, 27 (2023).
+Each stage solves one linear system, without iteration; this suits a stiff system of a few equations. The order does not
+drop on the slow manifold along which a stuck contact creeps. Coefficients: G. Steinebach, BIT Numerical Mathematics 63,
+27 (2023).
 """
 
 from __future__ import annotations
@@ -50,9 +50,10 @@ C[7, :7] = (
     -9.48861652309627,
 )
 
-#: Times of the stages, and weights of the time derivative.
+#: Times of the stages, as fractions of a step.
 TIMES = np.array([0.0, 0.6358126895828704, 0.4095798393397535, 0.9769306725060716, 0.4288403609558664, 1.0, 1.0, 1.0])
-DRIFT = np.array(
+#: Weights of the partial derivative of the rates with respect to time, for each stage.
+TIME_DERIVATIVE_WEIGHTS = np.array(
     [
         0.21193756319429014,
         -0.42387512638858027,
@@ -65,7 +66,7 @@ DRIFT = np.array(
     ]
 )
 
-#: Dense output.
+#: Weights of the stages in the dense output, from the lowest power of the fraction of the step up.
 DENSE = np.array(
     [
         [
@@ -103,44 +104,58 @@ DENSE = np.array(
 
 
 @inlined
-def step(scene, mode, t, x, line, h, stages):
-    """One step of length `h` from the state `x` at time `t`, where the system is linearised as `line`.
+def step(scene, mode, t, x, linear, h, stages):
+    """One step of length `h`.
 
-    `stages`, of shape ``(STAGES, components)``, is filled with the stages. Returns the new state and the
-    estimate of its error; for dense output see :func:`dense`. For `line` see
-    :func:`ringsweep.models.interface.implicit.linearise`.
+    Parameters
+    ----------
+    scene, mode : NamedTuple
+    t : float
+        Time, s.
+    x : tuple of float
+        State at time `t`.
+    linear : tuple
+        What :func:`ringsweep.models.interface.implicit.linearise` returned for this state.
+    h : float
+        Length of the step, s.
+    stages : ndarray of shape ``(STAGES, components)``
+        Filled with the stages, which :func:`dense` needs.
+
+    Returns
+    -------
+    tuple
+        ``(state, error)``: state after the step, and the estimate of its error.
     """
-    rates, core, bristles, drift = line
+    rates, jacobian, bristles, by_time = linear
     shift = 1.0 / (GAMMA * h)
     over_h = 1.0 / h
-    force = implicit.forcing(scene, t + TIMES[1] * h)
+    forcing = implicit.forcing(scene, t + TIMES[1] * h)
     y = x
     for i in range(STAGES):
         if i > 0:
             y, coupling = combine_twice(x, A[i], C[i], stages, i)
             # The last three stages are at the same time.
             if 1 < i < STAGES - 2:
-                force = implicit.forcing(scene, t + TIMES[i] * h)
-            rates = implicit.rates(scene, mode, force, y)
+                forcing = implicit.forcing(scene, t + TIMES[i] * h)
+            rates = implicit.rates(scene, mode, forcing, y)
             rates = add_scaled(rates, over_h, coupling)
-        solve(bristles, core, shift, add_scaled(rates, h * DRIFT[i], drift), stages[i])
+        solve(bristles, jacobian, shift, add_scaled(rates, h * TIME_DERIVATIVE_WEIGHTS[i], by_time), stages[i])
     # Stiffly accurate: the last stage is the correction, and the error estimate, of the one before.
     error = like(x, stages[STAGES - 1])
     return add_scaled(y, 1.0, error), error
 
 
 @unrolled
-def solve(count, bristles, core, shift, right, out):
+def solve(count, bristles, jacobian, shift, right, out):
     """Fill `out` with the solution k of ``(shift I - J) k = right``.
 
-    The Jacobian J of place, velocity and bristles has the structure of a body on bristles: its `core` is that of
-    place and velocity, row by row, and each of `bristles` gives how the acceleration depends on the deflection, and
-    the rate of the deflection on the velocity and on itself. The last is never positive, so that the
-    bristles can be eliminated in any order without pivoting.
+    J is the Jacobian of place, velocity and deflections. See :func:`ringsweep.models.interface.implicit.linearise` for
+    `jacobian` and `bristles`. The derivative of a deflection's rate with respect to the deflection is never positive,
+    so that the bristles are eliminated without pivoting.
     """
     numbers = range(count)
     return [
-        "j00, j01, j10, j11 = core",
+        "j00, j01, j10, j11 = jacobian",
         "r0, r1 = right[0], right[1]",
         "w00, w11 = shift - j00, shift - j11",
         *(f"b{i}, c{i}, d{i} = bristles[{i}]; p{i} = 1.0 / (shift - d{i})" for i in numbers),
@@ -153,18 +168,18 @@ def solve(count, bristles, core, shift, right, out):
 
 
 @unrolled
-def push(count, bristles, core, error, scales):
-    """Error of the acceleration that one of velocity and bristles makes, measured by the last of `scales`.
+def acceleration_error(count, bristles, jacobian, error, scales):
+    """Error of the acceleration that follows from the `error` of velocity and deflections, in units of the last scale.
 
     Zero without bristles.
     """
     terms = "".join(f" + bristles[{i}][0] * error[{i + 2}]" for i in range(count))
-    return [f"return abs(core[3] * error[1]{terms}) / scales[{count + 2}]" if count else "return 0.0"]
+    return [f"return abs(jacobian[3] * error[1]{terms}) / scales[{count + 2}]" if count else "return 0.0"]
 
 
 @inlined
 def dense(x, x_next, stages, fraction):
-    """State within a step, from both its ends and its stages."""
+    """State at a fraction of a step, from the states at both ends and the stages."""
     rest = 1.0 - fraction
     total = zero(x)
     for row in range(2, -1, -1):
@@ -176,7 +191,7 @@ def dense(x, x_next, stages, fraction):
 
 @inlined
 def dense_rates(x, x_next, stages, fraction, h):
-    """Time derivative of :func:`dense`, of a step of length `h`."""
+    """Time derivative of :func:`dense` for a step of length `h`, in s."""
     total, rate = zero(x), zero(x)
     for row in range(2, -1, -1):
         rate = add_scaled(total, fraction, rate)
@@ -190,7 +205,7 @@ def dense_rates(x, x_next, stages, fraction, h):
 
 @unrolled
 def combine(length, y, weights, rows, count):
-    """``y`` and the first `count` of the rows of an array, each times its weight."""
+    """Sum of ``y`` and of the first `count` rows of an array, each times its weight."""
     numbers = range(length)
     return [
         "".join(f"a{i}, " for i in numbers) + "= y",
@@ -203,7 +218,7 @@ def combine(length, y, weights, rows, count):
 
 @unrolled
 def combine_twice(length, y, weights, others, rows, count):
-    """:func:`combine` of ``y`` and of zero, with two sets of weights in one pass."""
+    """:func:`combine` with ``y`` and `weights`, and with zero and `others`, in one pass."""
     numbers = range(length)
     return [
         "".join(f"a{i}, " for i in numbers) + "= y",
@@ -223,5 +238,5 @@ def zero(length, y):
 
 @unrolled
 def like(length, y, row):
-    """A row of an array as a state of the length of `y`."""
+    """A row of an array as a tuple as long as `y`."""
     return ["return (" + "".join(f"row[{i}], " for i in range(length)) + ")"]

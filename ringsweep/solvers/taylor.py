@@ -1,7 +1,6 @@
 """One step of a power series, up to the first guard that vanishes.
 
-The series of a mode is exact to the tolerance on its step, and every guard is a series on the same step: its first
-root is located to rounding, and none is stepped over.
+The guards are power series on the same step. The first root of each is located to rounding, and no root is missed.
 """
 
 from __future__ import annotations
@@ -14,28 +13,28 @@ from ringsweep.numerics.series import ORDER, ascending, first_root
 
 
 @inlined
-def _first_event(c, guards, fresh, h, work):
-    """First guard to reach zero within the step `h`, and when; -1 and `h` if none does.
+def _first_event(c, first, entry_guard, h, work):
+    """First guard to reach zero within the step `h`, and the time since the step began; -1 and `h` if none does.
 
-    A guard that is zero as its mode is entered has that root divided out.
+    `entry_guard` is zero at the beginning; that root is divided out.
     """
     event = -1
-    for g in range(guards, c.shape[0]):
+    for g in range(first, c.shape[0]):
         row = c[g]
-        if g == fresh:
-            low = 0
-            while low < ORDER and row[low] == 0.0:
-                low += 1
-            if row[low] == 0.0:
+        if g == entry_guard:
+            lowest = 0
+            while lowest < ORDER and row[lowest] == 0.0:
+                lowest += 1
+            if row[lowest] == 0.0:
                 continue
             for k in range(ORDER + 1):
-                row[k] = row[k + low] if k + low <= ORDER else 0.0
+                row[k] = row[k + lowest] if k + lowest <= ORDER else 0.0
         if row[0] <= 0.0:
             return g, 0.0
         if isnan(row[0]):
             return -1, nan
         s, found = first_root(row, h, work)
-        # Guards that vanish together, as those of one contact seen twice, go to the first of them.
+        # Of guards that vanish together the first one counts.
         if found and (event < 0 or s < h * (1.0 - 1e-14)):
             event, h = g, s
     return event, h
@@ -43,7 +42,7 @@ def _first_event(c, guards, fresh, h, work):
 
 @inlined
 def _observe(scene, record, mode, c, t, s, work):
-    """Record after a step of length `s` along the series `c`, the extremes within it included."""
+    """Record after a step of length `s` of the series `c`, with the extremes within the step."""
     count = series.extremes(scene, record, mode, c, s, work)
     instants = work[0]
     ascending(instants, count)
@@ -57,10 +56,34 @@ def _observe(scene, record, mode, c, t, s, work):
 
 
 @inlined
-def series_step(scene, record, mode, t, y, horizon, tolerance, c, guards, work):
-    """One step of the series, cut at the first event: guard or -1, length, state, record."""
-    h = min(series.expand(scene, mode, t, y, tolerance, c), horizon)
-    guard, s = _first_event(c, guards, mode.fresh, h, work)
+def series_step(scene, record, mode, t, y, h_max, tolerance, c, first, work):
+    """One step of the series, which the first event ends.
+
+    Parameters
+    ----------
+    scene, record, mode : NamedTuple
+    t : float
+        Time, s.
+    y : tuple of float
+        State at time `t`.
+    h_max : float
+        Greatest length of the step, s.
+    tolerance : float
+        Relative error allowed to the step.
+    c : ndarray of shape ``(rows, columns)``
+        Table of the series, which is filled.
+    first : int
+        Row of the first guard in the table.
+    work : ndarray of shape ``(STACK, columns)``
+        Scratch.
+
+    Returns
+    -------
+    tuple
+        The guard that ended the step, or -1; length of the step, s; state and record after it.
+    """
+    h = min(series.expand(scene, mode, t, y, tolerance, c), h_max)
+    guard, s = _first_event(c, first, mode.entry_guard, h, work)
     if s > 0.0:
         record = _observe(scene, record, mode, c, t, s, work)
     return guard, s, series.state_at(scene, c, s), record

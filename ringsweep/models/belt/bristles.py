@@ -1,7 +1,7 @@
-"""The belt with a friction law that has bristles: the hooks of all solvers.
+"""The belt with bristles, for all solvers.
 
-The state is ``(x, velocity, z)`` for steps of constant length and ``(x, v, z)``, with the sliding velocity itself,
-for implicit steps; z is the deflection of the bristles.
+The state is ``(x, velocity, z)`` for steps of constant length, with the velocity in space, and ``(x, v, z)`` for
+implicit steps, with the sliding velocity. z is the deflection of the bristles.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ringsweep.physics.friction.velocity import BAND, KINETIC
 
 @inlined
 def contact_force(scene, v, z, sign, region):
-    """Rate of the deflection, friction force (N), each with its derivatives by v and z."""
+    """Rate of the deflection (m/s) and its derivatives by v and z; friction force (N) and its derivatives."""
     rate, rate_v, rate_z, traction, by_v, by_z = bristle(scene.law, scene.mu_s, scene.mu_k, v, z, sign, region)
     load = scene.mass * scene.gravity
     return rate, rate_v, rate_z, load * traction, load * by_v, load * by_z
@@ -30,24 +30,36 @@ def contact_force(scene, v, z, sign, region):
 
 @inlined
 def _region(scene, v, z, sign):
-    """Whether the contact counts as stuck (BAND) or slips (KINETIC)."""
+    """BAND if the contact counts as stuck, KINETIC if it slips."""
     return BAND if region_guard(scene.law, scene.mu_s, scene.mu_k, v, z, sign, BAND) > 0.0 else KINETIC
 
 
 @inlined
-def _recoil(scene):
-    """Speed that bristles at their greatest deflection give the body on their way back, m/s."""
+def _recoil_speed(scene):
+    """Speed of a body that bristles drive back from their largest deflection, m/s."""
     return scene.mu_s * sqrt(scene.gravity / scene.law.sigma0)
 
 
 @inlined
 def _play(scene):
-    """Way that the body can move while its bristles swing from one end of their deflection to the other, m."""
+    """Distance that the body moves while its bristles go from one largest deflection to the other, m."""
     return 2.0 * scene.mu_s / scene.law.sigma0
 
 
 class Inspection(NamedTuple):
-    """A state of the belt seen from within; ``eigenvalue`` is the largest magnitude of one of the contact, 1/s."""
+    """Inspection of a state of the belt.
+
+    Attributes
+    ----------
+    rates : tuple of float
+        Time derivative of the state.
+    force : float
+        Friction force, N.
+    eigenvalue : float
+        Largest magnitude of an eigenvalue of the contact, 1/s.
+    stuck : bool
+        Whether the contact counts as stuck.
+    """
 
     rates: tuple[float, float, float]
     force: float
@@ -99,7 +111,7 @@ def _observe(scene, record, t, duration, stuck, seen):
 
 @recorder.conclude.implements(BristleBelt)
 def _conclude(scene, record, status, t, place, velocity):
-    return conclude(record, scene, status, t, place, velocity, stick_speed(scene.law, _recoil(scene)))
+    return conclude(record, scene, status, t, place, velocity, stick_speed(scene.law, _recoil_speed(scene)))
 
 
 @constant_step.row.implements(BristleBelt)
@@ -108,12 +120,12 @@ def _row(scene, y, drive_at, drive_rate):
     return y[0], y[1], now.force, y[2], 0.0 if now.stuck else 1.0 if y[1] > drive_rate else -1.0
 
 
-# Guards.
+# Indices of the guards.
 SLOW, FAST = range(2)
 
 
 class Mode(NamedTuple):
-    """Sign of the sliding velocity, and whether the contact counts as stuck (BAND) or slips (KINETIC)."""
+    """Mode: sign of the sliding velocity, and whether the contact counts as stuck (BAND) or slips (KINETIC)."""
 
     sign: int
     region: int
@@ -122,7 +134,8 @@ class Mode(NamedTuple):
 @modes.initial_state.implements(BristleBelt)
 def _initial_state(scene):
     z = initial_deflection(scene.law, scene.mu_s, scene.mu_k)
-    return drives.beginning(scene.drive), (scene.initial_x, drives.launched(scene.drive, scene.initial_v), z)
+    v = drives.velocity_at_beginning(scene.drive, scene.initial_v)
+    return drives.beginning(scene.drive), (scene.initial_x, v, z)
 
 
 @modes.initial_mode.implements(BristleBelt)
@@ -130,10 +143,10 @@ def _initial_mode(scene, t, y):
     x, v, z = y
     sign = 1 if v > 0.0 else -1
     if v == 0.0:
-        # The way that the body is pushed; if it is not, the belt runs away under it.
+        # The body begins to slide in the direction of the net force; without a net force the belt leaves it behind.
         _, _, _, force, _, _ = contact_force(scene, v, z, 1.0, BAND)
-        push = -scene.stiffness * x - force - scene.mass * drives.turn(scene.drive, t)[2]
-        sign = 1 if push > 0.0 else -1
+        net_force = -scene.stiffness * x - force - scene.mass * drives.turn(scene.drive, t)[2]
+        sign = 1 if net_force > 0.0 else -1
     return RUNNING, Mode(sign, _region(scene, v, z, float(sign)))
 
 
@@ -147,18 +160,18 @@ def _switch(scene, mode, guard, t, y):
 
 
 @implicit.rates.implements(BristleBelt)
-def _implicit_rates(scene, mode, force, x):
-    _, belt_velocity, belt_acceleration = force
-    rate, _, _, drag, _, _ = contact_force(scene, x[1], x[2], float(mode.sign), mode.region)
-    return x[1] + belt_velocity, -(scene.stiffness * x[0] + drag) / scene.mass - belt_acceleration, rate
+def _implicit_rates(scene, mode, forcing, x):
+    _, belt_velocity, belt_acceleration = forcing
+    rate, _, _, force, _, _ = contact_force(scene, x[1], x[2], float(mode.sign), mode.region)
+    return x[1] + belt_velocity, -(scene.stiffness * x[0] + force) / scene.mass - belt_acceleration, rate
 
 
 @implicit.linearise.implements(BristleBelt)
 def _linearise(scene, mode, t, x):
     _, belt_velocity, belt_acceleration = drives.turn(scene.drive, t)
-    rate, rate_v, rate_z, drag, by_v, by_z = contact_force(scene, x[1], x[2], float(mode.sign), mode.region)
+    rate, rate_v, rate_z, force, by_v, by_z = contact_force(scene, x[1], x[2], float(mode.sign), mode.region)
     return (
-        (x[1] + belt_velocity, -(scene.stiffness * x[0] + drag) / scene.mass - belt_acceleration, rate),
+        (x[1] + belt_velocity, -(scene.stiffness * x[0] + force) / scene.mass - belt_acceleration, rate),
         (0.0, 1.0, -scene.stiffness / scene.mass, -by_v / scene.mass),
         ((-by_z / scene.mass, rate_v, rate_z),),
         (belt_acceleration, -drives.jerk(scene.drive, t), 0.0),
@@ -170,7 +183,7 @@ def _error_scales(scene, tolerance, x):
     deflection = scene.mu_s / scene.law.sigma0
     return (
         tolerance * (abs(x[0]) + deflection),
-        tolerance * (abs(x[1]) + _recoil(scene)),
+        tolerance * (abs(x[1]) + _recoil_speed(scene)),
         tolerance * deflection,
         tolerance * scene.mu_s * scene.gravity,
     )

@@ -1,4 +1,4 @@
-"""Friction force on the belt, from a law of the sliding velocity alone."""
+"""Friction force on the belt, for laws of the sliding velocity alone."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from ringsweep.physics.friction.velocity import (
 
 @inlined
 def holds_in_band(law):
-    """Whether a contact in the band of the law is held by whatever force it takes, as at rest or in a dead band."""
+    """Whether friction in the band of the law takes any value up to the breakaway force, as in a dead band."""
     return constant_weights(law, BAND)
 
 
 @inlined
-def _bound(scene):
-    """Force up to which a stuck contact holds, N."""
+def breakaway_force(scene):
+    """Largest friction force of a stuck contact, N."""
     return scene.mu_s * scene.mass * scene.gravity
 
 
 @inlined
 def friction_force(scene, x, v):
-    """Friction force, N, and its derivative by the sliding velocity, N s/m."""
+    """Friction force (N) at the displacement `x` and the sliding velocity `v`, and its derivative by `v` (N s/m)."""
     if holds_in_band(scene.law) and abs(v) < stiction_band(scene.law):
-        return max(-_bound(scene), min(_bound(scene), -scene.stiffness * x)), 0.0
+        return max(-breakaway_force(scene), min(breakaway_force(scene), -scene.stiffness * x)), 0.0
     w_s, w_k, dw_s, dw_k = weights(scene.law, abs(v))
     load = scene.mass * scene.gravity
     sign = 1.0 if v > 0.0 else -1.0 if v < 0.0 else 0.0
@@ -39,8 +39,8 @@ def friction_force(scene, x, v):
 
 @inlined
 def length_scale(scene, velocity):
-    """A length to measure errors by, m."""
-    push = scene.mu_s * scene.gravity * scene.mass
+    """Length in units of which errors are measured, m, for a body with this velocity (m/s)."""
+    load = scene.mu_s * scene.gravity * scene.mass
     if scene.stiffness > 0.0:
-        return velocity * (scene.mass / scene.stiffness) ** 0.5 + push / scene.stiffness + 1e-300
-    return velocity + push / scene.mass + 1e-300
+        return velocity * (scene.mass / scene.stiffness) ** 0.5 + load / scene.stiffness + 1e-300
+    return velocity + load / scene.mass + 1e-300

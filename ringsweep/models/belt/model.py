@@ -1,4 +1,4 @@
-"""The belt as a model: its parameters, the cells that kernels run over, and what is remembered of a run."""
+"""The belt as a model: its parameters and its cells."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ringsweep.compile import take
 from ringsweep.errors import InputError
 from ringsweep.models.belt.record import Outcome
 from ringsweep.models.model import Model
-from ringsweep.models.parts import GRAVITY, MASS, SPAN, drive_of, law_of, pair
+from ringsweep.models.parts import GRAVITY, MASS, SPAN, drive_of, friction_coefficients, law_of
 from ringsweep.models.scene import Structure, Values, require
 from ringsweep.physics import belt, drives, friction
 from ringsweep.quantities.parameters import Parameter, declared
@@ -26,15 +26,15 @@ class Belt(Model):
     place: ClassVar[str] = "x"
 
     def scene_type(self, structure: Structure) -> type:
-        """With bristles a belt of its own kind."""
+        """``BristleBelt`` for laws with bristles, else ``Belt``."""
         return belt.BristleBelt if friction.family_of(self.laws[structure.law]) is friction.Dynamic else belt.Belt
 
     def history(self, structure: Structure) -> tuple[str, ...]:
-        """Quantities of a time history, in the order of their columns."""
+        """Names of the history variables, in the order of their columns."""
         return "x", "velocity", "friction_force", "deflection", "mode"
 
     def parameters(self, structure: Structure) -> dict[str, Parameter]:
-        """Every numeric path of a scene of this structure."""
+        """Parameters of a scene of this structure, by path."""
         law = self.laws[structure.law]
         found = {
             "body.mass": MASS,
@@ -43,7 +43,7 @@ class Belt(Model):
         }
         found |= {f"friction.{name}": p for name, p in friction.coefficients_of(law).items()}
         for name, p in declared(law).items():
-            # What bristles have per unit of the load, they have here under the weight of the body.
+            # Laws have stiffness and damping of the bristles per unit of load; a belt scene has them in N/m and N s/m.
             absolute = {"1/m": "N/m", "s/m": "N s/m"} if name.startswith("sigma") else {}
             found[f"friction.{name}"] = replace(p, unit=absolute.get(p.unit, p.unit))
         if friction.family_of(law) is not friction.Dynamic:
@@ -60,18 +60,18 @@ class Belt(Model):
         }
 
     def build(self, structure: Structure, values: Values) -> belt.Belt | belt.BristleBelt:
-        """Cells of a sweep; see :func:`ringsweep.models.batch`."""
+        """Cells that kernels run over; see :meth:`ringsweep.models.model.Model.build`."""
         if structure.arcs:
             raise InputError(f"scene.{structure.arcs[0]}", "a belt has no rough zones")
         law = self.laws[structure.law]
-        mu_s, mu_k = pair(law, "friction", values)
+        mu_s, mu_k = friction_coefficients(law, "friction", values)
         drive = self._drive(structure, values)
         sliding = np.zeros(len(mu_k))
         if "initial.velocity" in values:
             launched = values["initial.velocity"]
-            sliding = np.array([drives.relative(take(drive, i), velocity) for i, velocity in enumerate(launched)])
+            sliding = np.array([drives.relative_velocity(take(drive, i), v) for i, v in enumerate(launched)])
         mass, gravity = values["body.mass"], values["gravity"]
-        given = {
+        fields = {
             "mass": mass,
             "stiffness": values["spring.stiffness"],
             "gravity": gravity,
@@ -89,22 +89,26 @@ class Belt(Model):
                     mu_k * load + viscous * values["friction.dead_band"] <= mu_s * load,
                     "friction.viscous",
                     viscous,
-                    "{} N s/m makes friction at the edge of the dead band greater than what holds within it",
+                    "{} N s/m is too large: friction at the edge of the dead band exceeds friction within it",
                 )
-            return belt.Belt(**given, law=law_of(law, values), viscous=viscous)
-        require(gravity > 0.0, "gravity", gravity, "{} m/s^2 leaves the bristles of friction without a load")
+            return belt.Belt(**fields, law=law_of(law, values), viscous=viscous)
+        require(gravity > 0.0, "gravity", gravity, "{} m/s^2 is not allowed: a law with bristles needs a load")
         per_load = {
             path: value / (mass * gravity) for path, value in values.items() if path.startswith("friction.sigma")
         }
-        return belt.BristleBelt(**given, law=law_of(law, {**values, **per_load}))
+        return belt.BristleBelt(**fields, law=law_of(law, {**values, **per_load}))
 
     def _drive(self, structure: Structure, values: Values) -> Any:
-        """What moves the belt: a velocity of its own, or a drive."""
-        given = "belt.velocity" in values
-        if given == (structure.drive != "none"):
-            what = "given beside drive: the belt moves by one or the other" if given else "missing: give it, or a drive"
+        """Drive of the belt, from ``belt.velocity`` or from ``drive``."""
+        has_velocity = "belt.velocity" in values
+        if has_velocity == (structure.drive != "none"):
+            what = (
+                "given together with drive: give only one of them"
+                if has_velocity
+                else "missing: give it, or give a drive"
+            )
             raise InputError("scene.belt.velocity", what)
-        if given:
+        if has_velocity:
             return drives.Constant(values["belt.velocity"])
         if friction.TRAITS[self.laws[structure.law]].dead_band and structure.drive != "constant":
             raise InputError("scene.drive", f"the dead band of law {structure.law} needs a belt of constant velocity")

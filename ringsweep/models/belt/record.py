@@ -1,4 +1,4 @@
-"""What is remembered of a run on the belt, and what it makes of it: motion, slips, period."""
+"""Record and outcome of runs on the belt: motion, slips, period."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ringsweep.quantities.variables import FAILED, OSCILLATORY, RESTING, STICK_S
 
 
 class Outcome(NamedTuple):
-    """A run on the belt in the numbers that a dataset holds, in the order of their columns."""
+    """Outcomes of a run on the belt, in the order of their columns."""
 
     regime: float
     motion: float
@@ -32,20 +32,43 @@ class Outcome(NamedTuple):
     force_max: float
 
 
-# ---- what is remembered of a run -------------------------------------------------------------
-
-
 class Record(NamedTuple):
-    """What is remembered of a run on the belt; lengths in m, times in s, forces in N.
+    """Record of a run on the belt; lengths in m, velocities in m/s, times in s, forces in N.
 
-    A slip counts once it is longer than the play of the bristles, which ring as the body sticks. ``place`` is where the
-    body is on the belt, ``slip_from`` and ``slip_start`` where and when it began to slip, ``counted`` whether that is a
-    slip already; ``stuck_for`` is how long it has stuck since the last slip that counts, ``held_for`` how long without
-    any, ``last_stick`` how long before the last one that counts, which began at ``last_slip``.
+    A slip counts if it is longer than the play of the bristles, since bristles vibrate while the body sticks. The
+    extremes of the displacement that count are maxima or minima, like the first one.
 
-    A cycle of a swing runs from one extreme of the displacement to the next of its ``kind``, maxima (+1) or minima (-1)
-    as the first was (0: none yet), and a swing is the way from ``low``, the farthest place between, to that extreme:
-    the first, the last, and the greatest in the third and in the fourth quarter of the span.
+    Attributes
+    ----------
+    velocity : float
+        Velocity in space at the last observation.
+    x_min, x_max, velocity_max, force_max, stick_time : float
+        As in :class:`Outcome`.
+    slip_from, slip_start : float
+        Place on the belt and time at which the body began to slip, or stuck last.
+    slip_counted : bool
+        Whether the present slip counts.
+    stuck_since_slip : float
+        Time for which the body has stuck since the last slip that counts.
+    unbroken_stick : float
+        Time for which the body has stuck without any slip.
+    slips : int
+        Number of slips that count.
+    first_slip, last_slip : float
+        Times at which the first and the last of these slips began.
+    last_stick : float
+        Time for which the body stuck before the last of these slips.
+    extreme_sign : int
+        1 if maxima count, -1 if minima count, 0 before the first extreme.
+    extremes : int
+        Number of extremes that count.
+    first_extreme, last_extreme : float
+        Times of the first and of the last of these extremes.
+    opposite : float
+        ``extreme_sign * x`` at the farthest place on the opposite side since the last of these extremes.
+    first_swing, third_swing, fourth_swing, last_swing : float
+        Distance from the opposite side to an extreme: for the first and for the last extreme, and the largest in the
+        third and in the fourth quarter of the span.
     """
 
     velocity: float
@@ -54,48 +77,47 @@ class Record(NamedTuple):
     velocity_max: float
     force_max: float
     stick_time: float
-    place: float
     slip_from: float
     slip_start: float
-    counted: bool
-    stuck_for: float
-    held_for: float
+    slip_counted: bool
+    stuck_since_slip: float
+    unbroken_stick: float
     slips: int
     first_slip: float
     last_slip: float
     last_stick: float
-    kind: int
+    extreme_sign: int
     extremes: int
     first_extreme: float
     last_extreme: float
-    low: float
+    opposite: float
     first_swing: float
     third_swing: float
     fourth_swing: float
     last_swing: float
 
 
-# A stick shorter than this fraction of the span is a touch.
-_TOUCH = 1e-9
+# A stick that is shorter than this fraction of the span does not count.
+_SHORTEST_STICK = 1e-9
 
 
-# A stick shorter than this fraction of the cycle does not make it a cycle of stick and slip; the second is for laws
-# under which a contact is only nearly stuck.
-_SHORT, _SHORT_CREEP = 1e-6, 1e-2
+# In stick-slip, the stick lasts longer than this fraction of the cycle. The second value is for laws with a stiction
+# band, under which the contact creeps.
+_SHORT_STICK, _SHORT_STICK_IN_BAND = 1e-6, 1e-2
 
 
-# Swings must keep this much of themselves from one quarter of a run to the next for their amplitude to count as
-# lasting, and be more than the tolerance makes of the displacement.
+# An oscillation lasts if its swings keep this share of their length from one quarter of the run to the next, and if
+# they exceed this share of the displacement; errors explain smaller swings.
 _LASTING, _ROUNDING = 0.95, 1e-6
 
 
-# A body whose last slip lies so many cycles back slips no more.
-_CYCLES = 2.0
+# A body that has not slipped for more cycles than this has stopped slipping.
+_MOST_CYCLES_SINCE_SLIP = 2.0
 
 
 @inlined
 def begin(scene, t, x, velocity, force):
-    """Record of a run at its launch."""
+    """Record at the beginning of a run."""
     return Record(
         velocity=velocity,
         x_min=x,
@@ -103,21 +125,20 @@ def begin(scene, t, x, velocity, force):
         velocity_max=velocity,
         force_max=abs(force),
         stick_time=0.0,
-        place=x - drives.turn(scene.drive, t)[0],
         slip_from=x - drives.turn(scene.drive, t)[0],
         slip_start=t,
-        counted=False,
-        stuck_for=0.0,
-        held_for=0.0,
+        slip_counted=False,
+        stuck_since_slip=0.0,
+        unbroken_stick=0.0,
         slips=0,
         first_slip=nan,
         last_slip=nan,
         last_stick=0.0,
-        kind=0,
+        extreme_sign=0,
         extremes=0,
         first_extreme=nan,
         last_extreme=nan,
-        low=0.0,
+        opposite=0.0,
         first_swing=0.0,
         third_swing=0.0,
         fourth_swing=0.0,
@@ -127,40 +148,47 @@ def begin(scene, t, x, velocity, force):
 
 @inlined
 def observe(r, scene, t, duration, x, velocity, force, stuck, play):
-    """Record after `duration` seconds to the state at time `t`, in all of which the body stuck or slipped.
+    """Record after an interval of `duration` seconds that ends at time `t`, in which the body stuck or slipped.
 
-    `play` is the way that a body on bristles can move without slipping, m.
+    `play` is the distance that a body on bristles can move without slipping, m.
     """
     slips, first_slip, last_slip, last_stick = r.slips, r.first_slip, r.last_slip, r.last_stick
-    slip_from, slip_start, counted, stuck_for = r.slip_from, r.slip_start, r.counted, r.stuck_for
+    slip_from, slip_start, slip_counted, stuck_since_slip = (
+        r.slip_from,
+        r.slip_start,
+        r.slip_counted,
+        r.stuck_since_slip,
+    )
     place = x - drives.turn(scene.drive, t)[0]
     if stuck:
-        stuck_for += duration
-        # Where and when the next slip will have begun.
-        slip_from, slip_start, counted = place, t, False
-    elif not counted and abs(place - slip_from) > play:
-        counted = True
-        if stuck_for > _TOUCH * scene.span:
+        stuck_since_slip += duration
+        # The next slip begins here, unless the body sticks longer.
+        slip_from, slip_start, slip_counted = place, t, False
+    elif not slip_counted and abs(place - slip_from) > play:
+        slip_counted = True
+        if stuck_since_slip > _SHORTEST_STICK * scene.span:
             slips += 1
-            last_slip, last_stick = slip_start, stuck_for
+            last_slip, last_stick = slip_start, stuck_since_slip
             if slips == 1:
                 first_slip = last_slip
-        stuck_for = 0.0
-    kind, extremes, first_extreme, last_extreme = r.kind, r.extremes, r.first_extreme, r.last_extreme
+        stuck_since_slip = 0.0
+    extreme_sign, extremes, first_extreme, last_extreme = r.extreme_sign, r.extremes, r.first_extreme, r.last_extreme
     first_swing, third_swing, fourth_swing, last_swing = r.first_swing, r.third_swing, r.fourth_swing, r.last_swing
-    before = r.velocity
-    if kind == 0:
-        kind = 1 if before > 0.0 and velocity <= 0.0 else -1 if before < 0.0 and velocity >= 0.0 else 0
-    low = min(r.low, kind * x)
-    seen = extremes == 0 or kind * x - low > _ROUNDING * max(abs(r.x_min), abs(r.x_max))
-    if kind * before > 0.0 and kind * velocity <= 0.0 and seen:
-        # Between two states the velocity is all but linear.
-        extreme = t - duration * velocity / (velocity - before)
+    velocity_before = r.velocity
+    if extreme_sign == 0:
+        extreme_sign = (
+            1 if velocity_before > 0.0 and velocity <= 0.0 else -1 if velocity_before < 0.0 and velocity >= 0.0 else 0
+        )
+    opposite = min(r.opposite, extreme_sign * x)
+    is_swing = extremes == 0 or extreme_sign * x - opposite > _ROUNDING * max(abs(r.x_min), abs(r.x_max))
+    if extreme_sign * velocity_before > 0.0 and extreme_sign * velocity <= 0.0 and is_swing:
+        # Between two observations the velocity is nearly linear in time.
+        extreme = t - duration * velocity / (velocity - velocity_before)
         extremes += 1
         if extremes == 1:
             first_extreme = extreme
         else:
-            last_swing = kind * x - low
+            last_swing = extreme_sign * x - opposite
             if extremes == 2:
                 first_swing = last_swing
             if extreme > 0.75 * scene.span:
@@ -168,7 +196,7 @@ def observe(r, scene, t, duration, x, velocity, force, stuck, play):
             elif extreme > 0.5 * scene.span:
                 third_swing = max(third_swing, last_swing)
         last_extreme = extreme
-        low = kind * x
+        opposite = extreme_sign * x
     return Record(
         velocity,
         min(r.x_min, x),
@@ -176,21 +204,20 @@ def observe(r, scene, t, duration, x, velocity, force, stuck, play):
         max(r.velocity_max, velocity),
         max(r.force_max, abs(force)),
         r.stick_time + (duration if stuck else 0.0),
-        place,
         slip_from,
         slip_start,
-        counted,
-        stuck_for,
-        r.held_for + duration if stuck else 0.0,
+        slip_counted,
+        stuck_since_slip,
+        r.unbroken_stick + duration if stuck else 0.0,
         slips,
         first_slip,
         last_slip,
         last_stick,
-        kind,
+        extreme_sign,
         extremes,
         first_extreme,
         last_extreme,
-        low,
+        opposite,
         first_swing,
         third_swing,
         fourth_swing,
@@ -202,7 +229,7 @@ def observe(r, scene, t, duration, x, velocity, force, stuck, play):
 def conclude(r, scene, status, t, x, velocity, band):
     """Outcome of a run that ended with `status` at time `t` in the state `(x, velocity)`.
 
-    `band` is the sliding speed below which a contact counts as stuck, or zero.
+    `band` is the sliding speed below which a contact counts as stuck, m/s; 0 for set-valued laws.
     """
     cycle = (r.last_extreme - r.first_extreme) / (r.extremes - 1) if r.extremes >= 2 else nan
     if status == BROKEN or not (isfinite(x) and isfinite(velocity)):
@@ -210,7 +237,7 @@ def conclude(r, scene, status, t, x, velocity, band):
     elif _sticks_and_slips(r, scene, t, x, velocity, band):
         motion = STICK_SLIP
         cycle = (r.last_slip - r.first_slip) / (r.slips - 1) if r.slips >= 2 else nan
-    elif r.held_for < cycle and _swings_on(r):
+    elif r.unbroken_stick < cycle and _keeps_swinging(r):
         motion = OSCILLATORY
     else:
         motion = RESTING
@@ -233,28 +260,28 @@ def conclude(r, scene, status, t, x, velocity, band):
 
 @inlined
 def _sticks_and_slips(r, scene, t, x, velocity, band):
-    """Whether stick and slip go on following each other."""
+    """Whether stick and slip still alternate at the end of a run."""
     if r.slips == 0:
         return False
-    # A harmonic that grazes the velocity of the belt is slower than the band for so long, and does not stick.
+    # A harmonic oscillation that only touches the velocity of the belt stays in the band for this time without a stick.
     curvature = (scene.stiffness / scene.mass) ** 1.5 * (r.x_max - r.x_min)
     graze = sqrt(32.0 * band / curvature) if curvature > 0.0 else 0.0
     if r.slips >= 2:
         cycle = (r.last_slip - r.first_slip) / (r.slips - 1)
-        shortest = max((_SHORT_CREEP if band > 0.0 else _SHORT) * cycle, graze)
-        return r.last_stick > shortest and t - r.last_slip <= _CYCLES * cycle
-    # It has slipped once and stuck again: what the spring will be after as long again tells whether it will hold.
+        shortest = max((_SHORT_STICK_IN_BAND if band > 0.0 else _SHORT_STICK) * cycle, graze)
+        return r.last_stick > shortest and t - r.last_slip <= _MOST_CYCLES_SINCE_SLIP * cycle
+    # The body has slipped once and stuck again. It slips again if the spring force one span later exceeds breakaway.
     pull = scene.stiffness * abs(x + velocity * scene.span)
     holds = pull <= scene.mu_s * scene.mass * scene.gravity
-    return r.stuck_for > max(_SHORT * scene.span, graze) and not holds
+    return r.stuck_since_slip > max(_SHORT_STICK * scene.span, graze) and not holds
 
 
 @inlined
-def _swings_on(r):
-    """Whether the body swings at an amplitude that lasts."""
-    # Irregular swings are judged by the greatest of a quarter, few ones by the first and the last.
-    seen = r.third_swing > 0.0 and r.fourth_swing > 0.0
-    before, after = (r.third_swing, r.fourth_swing) if seen else (r.first_swing, r.last_swing)
+def _keeps_swinging(r):
+    """Whether the body oscillates without decay."""
+    # The largest swings of two quarters are compared; if there are too few swings, the first and the last.
+    has_both = r.third_swing > 0.0 and r.fourth_swing > 0.0
+    before, after = (r.third_swing, r.fourth_swing) if has_both else (r.first_swing, r.last_swing)
     return r.extremes >= 3 and after >= _LASTING * before and after > _ROUNDING * max(abs(r.x_min), abs(r.x_max))
 
 

@@ -1,4 +1,4 @@
-"""The belt for steps of constant length; the state is ``(x, velocity)``."""
+"""The belt for steps of constant length. The state is ``(x, velocity)``, in space."""
 
 from __future__ import annotations
 
@@ -9,14 +9,23 @@ from ringsweep.models.belt.force import friction_force, holds_in_band
 from ringsweep.models.interface import constant_step
 from ringsweep.models.parts import largest_eigenvalue
 from ringsweep.physics import belt, drives
-from ringsweep.physics.friction.velocity import (
-    passes_band,
-    stiction_band,
-)
+from ringsweep.physics.friction.velocity import passes_band, stiction_band
 
 
 class Inspection(NamedTuple):
-    """A state of the belt seen from within."""
+    """Inspection of a state of the belt.
+
+    Attributes
+    ----------
+    rates : tuple of float
+        Time derivative of the state.
+    v : float
+        Sliding velocity, m/s.
+    force : float
+        Friction force, N.
+    slope : float
+        Derivative of the friction force by the sliding velocity, N s/m.
+    """
 
     rates: tuple[float, float]
     v: float
@@ -44,21 +53,21 @@ def _inspect(scene, y, drive_at, drive_rate):
 
 @constant_step.stiffness.implements(belt.Belt)
 def _stiffness(scene, before, now, h):
-    # The stages reach about as far as the acceleration at the beginning takes the body in one step.
+    # The stages of the step reach about as far as the acceleration at its beginning takes the body.
     belt_gains = (now.rates[0] - now.v) - (before.rates[0] - before.v)
     ahead = before.v + h * before.rates[1] - belt_gains
     rest, edge, jumped = passes_band(scene.law, before.v, now.v, ahead)
     steepest = max(abs(before.slope), abs(now.slope))
-    swing = scene.stiffness / scene.mass
+    stiffness_per_mass = scene.stiffness / scene.mass
     if holds_in_band(scene.law):
-        # A discontinuous law has no slope that any step could follow; but one may land in a dead band.
-        return inf if jumped else largest_eigenvalue(steepest / scene.mass, swing) * h
-    # A step that jumps the band, or its edge, never samples the slope there, but has met it.
+        # A step over a discontinuity has infinite stiffness; but a step may end in the dead band.
+        return inf if jumped else largest_eigenvalue(steepest / scene.mass, stiffness_per_mass) * h
+    # A step that jumps over the band, or over its edge, does not sample the slope there; the slope counts all the same.
     if rest:
         steepest = max(steepest, abs(friction_force(scene, 0.0, 0.0)[1]))
     if edge:
         steepest = max(steepest, abs(friction_force(scene, 0.0, stiction_band(scene.law))[1]))
-    return largest_eigenvalue(steepest / scene.mass, swing) * h
+    return largest_eigenvalue(steepest / scene.mass, stiffness_per_mass) * h
 
 
 @constant_step.seen.implements(belt.Belt, belt.BristleBelt)

@@ -1,6 +1,7 @@
 """The belt as a piecewise-smooth system: modes, guards and their power series.
 
-The state is ``(x, v)``: the sliding velocity itself, not the difference of two large velocities.
+The state is ``(x, v)`` with the displacement in space and the sliding velocity. The difference of two large velocities
+would lose all its digits.
 """
 
 from __future__ import annotations
@@ -8,10 +9,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ringsweep.compile import inlined
-from ringsweep.models.belt.force import _bound, holds_in_band, length_scale
+from ringsweep.models.belt.force import breakaway_force, holds_in_band, length_scale
 from ringsweep.models.interface import modes, series
 from ringsweep.models.interface.status import RUNNING
-from ringsweep.numerics.series import INVERSE, ORDER, crossings, reach, slope, value, variation
+from ringsweep.numerics.series import INVERSE, ORDER, crossings, slope, step_size, value, variation
 from ringsweep.physics import belt, drives
 from ringsweep.physics.friction.velocity import (
     BAND,
@@ -20,27 +21,32 @@ from ringsweep.physics.friction.velocity import (
     faster,
     region_at,
     region_bounds,
+    shorten_for_decay,
     slower,
     stiction_band,
-    tail_reach,
 )
 
-# Rows of the series; the guards last.
+# Rows of the table of series; the guards are last.
 X, V, VELOCITY, EXCESS, BASIS, STATIC_WEIGHT, KINETIC_WEIGHT, FORCE, SHIFT = range(9)
-
-
 SLOW, FAST = range(9, 11)
 
 
 class Mode(NamedTuple):
-    """Sign of the sliding velocity (0: held), region of the law, guard that is zero on entry or -1.
+    """Mode of the belt.
 
-    In a dead band that does not hold any more, the sign is that of the pull.
+    Attributes
+    ----------
+    sign : int
+        Sign of the sliding velocity; 0 if the contact is stuck. In a dead band after breakaway, the sign of the pull.
+    region : int
+        Region of the friction law.
+    entry_guard : int
+        Row of the guard that is zero on entry, or -1.
     """
 
     sign: int
     region: int
-    fresh: int
+    entry_guard: int
 
 
 @series.after_first_step.implements(Mode)
@@ -50,7 +56,7 @@ def _after_first_step(mode):
 
 @modes.initial_state.implements(belt.Belt)
 def _initial_state(scene):
-    return drives.beginning(scene.drive), (scene.initial_x, drives.launched(scene.drive, scene.initial_v))
+    return drives.beginning(scene.drive), (scene.initial_x, drives.velocity_at_beginning(scene.drive, scene.initial_v))
 
 
 @series.table_shape.implements(belt.Belt)
@@ -60,7 +66,7 @@ def _table_shape(scene):
 
 @inlined
 def _pull(scene, t, x):
-    """Force that friction must overcome to hold the body to the belt, N; positive forwards."""
+    """Force that friction must balance to keep the body at rest on the belt, N; positive forwards."""
     return -scene.stiffness * x - scene.mass * drives.turn(scene.drive, t)[2]
 
 
@@ -68,26 +74,26 @@ def _pull(scene, t, x):
 def _initial_mode(scene, t, y):
     x, v = y
     if holds_in_band(scene.law) and abs(v) <= stiction_band(scene.law):
-        return RUNNING, _settle(scene, t, x)
+        return RUNNING, _mode_at_rest(scene, t, x)
     if v == 0.0:
         return RUNNING, Mode(1 if _pull(scene, t, x) >= 0.0 else -1, BAND, SLOW)
     return RUNNING, Mode(1 if v > 0.0 else -1, region_at(scene.law, abs(v)), -1)
 
 
 @inlined
-def _settle(scene, t, x):
-    """Mode of a set-valued law where the sliding velocity is zero, or within its dead band."""
+def _mode_at_rest(scene, t, x):
+    """Mode of a set-valued law at a sliding velocity of zero or within the dead band."""
     pull = _pull(scene, t, x)
-    bound = _bound(scene)
+    bound = breakaway_force(scene)
     if abs(pull) <= bound and bound > 0.0:
         return Mode(0, KINETIC, -1)
     if pull == 0.0:
-        # What the pull will be in a moment, as the belt takes the body along.
+        # The rate of the pull decides, while the belt carries the body along.
         _, belt_velocity, _ = drives.turn(scene.drive, t)
         pull = -scene.stiffness * belt_velocity - scene.mass * drives.jerk(scene.drive, t)
-    # Without a band the sliding velocity is a guard, and zero here.
-    fresh = SLOW if stiction_band(scene.law) == 0.0 else -1
-    return Mode(1 if pull >= 0.0 else -1, region_at(scene.law, 0.0), fresh)
+    # Without a dead band the sliding velocity, which is zero here, is a guard.
+    entry_guard = SLOW if stiction_band(scene.law) == 0.0 else -1
+    return Mode(1 if pull >= 0.0 else -1, region_at(scene.law, 0.0), entry_guard)
 
 
 @modes.switch.implements(belt.Belt)
@@ -100,38 +106,38 @@ def _switch(scene, mode, guard, t, y):
     if guard == FAST:
         return RUNNING, Mode(sign, faster(scene.law, region), SLOW), (x, sign * high)
     if low > 0.0:
-        entered = slower(scene.law, region)
-        if holds_in_band(scene.law) and entered == BAND:
-            return RUNNING, _settle(scene, t, x), (x, sign * low)
-        return RUNNING, Mode(sign, entered, FAST), (x, sign * low)
+        new_region = slower(scene.law, region)
+        if holds_in_band(scene.law) and new_region == BAND:
+            return RUNNING, _mode_at_rest(scene, t, x), (x, sign * low)
+        return RUNNING, Mode(sign, new_region, FAST), (x, sign * low)
     if holds_in_band(scene.law) and region == BAND:
-        # The pull has fallen to what the contact holds.
+        # The pull has fallen to the breakaway force.
         return RUNNING, Mode(0, KINETIC, SLOW if sign > 0 else FAST), y
     if region == BAND:
         return RUNNING, Mode(-sign, BAND, SLOW), (x, 0.0)
-    return RUNNING, _settle(scene, t, x), (x, 0.0)
+    return RUNNING, _mode_at_rest(scene, t, x), (x, 0.0)
 
 
 @series.expand.implements(belt.Belt)
 def _expand(scene, mode, t, y, tolerance, c):
     drives.expand(scene.drive, t, ORDER + 2, c[SHIFT])
     load = scene.mass * scene.gravity
-    rate = scene.stiffness / scene.mass
+    stiffness_per_mass = scene.stiffness / scene.mass
     c[X, 0], c[V, 0] = y
     c[VELOCITY, 0] = y[1] + c[SHIFT, 1]
     if mode.sign == 0:
-        bound = _bound(scene)
+        bound = breakaway_force(scene)
         for k in range(ORDER + 1):
-            # The sliding velocity that the body had in a dead band stays, or is zero.
-            slide = y[1] if k == 0 else 0.0
-            c[V, k] = slide
-            c[VELOCITY, k] = (k + 1.0) * c[SHIFT, k + 1] + slide
+            # The sliding velocity is constant: zero, or that on entry into the dead band.
+            v_k = y[1] if k == 0 else 0.0
+            c[V, k] = v_k
+            c[VELOCITY, k] = (k + 1.0) * c[SHIFT, k + 1] + v_k
             if k > 0:
                 c[X, k] = c[SHIFT, k] + (y[1] if k == 1 else 0.0)
             c[FORCE, k] = -scene.stiffness * c[X, k] - scene.mass * (k + 1.0) * (k + 2.0) * c[SHIFT, k + 2]
             c[SLOW, k], c[FAST, k] = -c[FORCE, k], c[FORCE, k]
-        c[SLOW, 0] = 0.0 if mode.fresh == SLOW else c[SLOW, 0] + bound
-        c[FAST, 0] = 0.0 if mode.fresh == FAST else c[FAST, 0] + bound
+        c[SLOW, 0] = 0.0 if mode.entry_guard == SLOW else c[SLOW, 0] + bound
+        c[FAST, 0] = 0.0 if mode.entry_guard == FAST else c[FAST, 0] + bound
     else:
         low, high = region_bounds(scene.law, mode.region)
         yielding = holds_in_band(scene.law) and mode.region == BAND
@@ -143,31 +149,31 @@ def _expand(scene, mode, t, y, tolerance, c):
             c[FORCE, k] += viscous * c[V, k]
             if k < ORDER:
                 c[X, k + 1] = c[VELOCITY, k] * INVERSE[k + 1]
-                c[VELOCITY, k + 1] = -(rate * c[X, k] + c[FORCE, k] / scene.mass) * INVERSE[k + 1]
+                c[VELOCITY, k + 1] = -(stiffness_per_mass * c[X, k] + c[FORCE, k] / scene.mass) * INVERSE[k + 1]
                 c[V, k + 1] = c[VELOCITY, k + 1] - (k + 2.0) * c[SHIFT, k + 2]
         for k in range(1, ORDER + 1):
             c[SLOW, k], c[FAST, k] = c[EXCESS, k], -c[EXCESS, k]
         if yielding:
             for k in range(ORDER + 1):
-                # A belt under a dead band has constant velocity.
+                # With a dead band the velocity of the belt is constant.
                 c[SLOW, k] = -mode.sign * scene.stiffness * c[X, k]
-            c[EXCESS, 0] = c[SLOW, 0] - _bound(scene)
-        c[SLOW, 0] = 0.0 if mode.fresh == SLOW else c[EXCESS, 0]
-        c[FAST, 0] = 0.0 if mode.fresh == FAST else high - mode.sign * c[V, 0]
-        # Breakaway of a law without a drop of friction is tangential: what is left of the slope is rounding.
-        terms = rate * abs(c[X, 0]) + abs(c[FORCE, 0]) / scene.mass
-        if mode.fresh == SLOW and low == 0.0 and not yielding and abs(c[V, 1]) <= 1e-12 * terms:
+            c[EXCESS, 0] = c[SLOW, 0] - breakaway_force(scene)
+        c[SLOW, 0] = 0.0 if mode.entry_guard == SLOW else c[EXCESS, 0]
+        c[FAST, 0] = 0.0 if mode.entry_guard == FAST else high - mode.sign * c[V, 0]
+        # If friction does not drop at breakaway, the slope is zero there: what is computed is rounding.
+        terms = stiffness_per_mass * abs(c[X, 0]) + abs(c[FORCE, 0]) / scene.mass
+        if mode.entry_guard == SLOW and low == 0.0 and not yielding and abs(c[V, 1]) <= 1e-12 * terms:
             c[SLOW, 1] = 0.0
-    # Lengths are measured by the way that the belt, the body or the load could go in the spring's own time.
+    # The unit of length is the distance that belt, body or load could move within a natural period of the spring.
     length = abs(c[X, 0]) + length_scale(scene, abs(c[VELOCITY, 0]) + abs(c[SHIFT, 1]))
-    speed = length * (rate**0.5 if rate > 0.0 else 1.0)
+    speed = length * (stiffness_per_mass**0.5 if stiffness_per_mass > 0.0 else 1.0)
     if mode.region == BAND and not holds_in_band(scene.law):
-        # Noise that is large for the band would keep the creep from ever settling.
+        # An error as large as the stiction band would keep the creep from becoming steady.
         speed = min(speed, 1e3 * stiction_band(scene.law))
     last = max(abs(c[X, ORDER]) / length, abs(c[V, ORDER]) / speed)
     previous = max(abs(c[X, ORDER - 1]) / length, abs(c[V, ORDER - 1]) / speed)
-    h = reach(last / tolerance, previous / tolerance)
-    return h if mode.sign == 0 else tail_reach(scene.law, mode.region, c[V], h)
+    h = step_size(last / tolerance, previous / tolerance)
+    return h if mode.sign == 0 else shorten_for_decay(scene.law, mode.region, c[V], h)
 
 
 @series.state_at.implements(belt.Belt)
@@ -184,7 +190,7 @@ def _rates_at(scene, c, s):
 def _seen_at(scene, c, s, h):
     velocity = value(c[VELOCITY], s)
     if abs(velocity) <= 1e-15 * (abs(c[VELOCITY, 0]) + variation(c[VELOCITY], h)):
-        # A maximum is met where the velocity vanishes, not where its rounding changes sign.
+        # A velocity within rounding is zero, so that an extreme of the displacement is recognised.
         velocity = 0.0
     return value(c[X], s), velocity, value(c[FORCE], s)
 
@@ -195,7 +201,7 @@ def _extremes(scene, record, mode, c, h, work):
     if abs(c[VELOCITY, 0]) <= variation(c[VELOCITY], h):
         count = crossings(c[VELOCITY], h, work, count)
     if mode.sign != 0:
-        # Extremes of the velocity are zeros of the net force.
+        # The velocity has an extreme where the net force vanishes.
         for k in range(ORDER + 1):
             c[SHIFT, k] = scene.stiffness * c[X, k] + c[FORCE, k]
         count = crossings(c[SHIFT], h, work, count)

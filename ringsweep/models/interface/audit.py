@@ -1,4 +1,4 @@
-"""Whether a run obeys its law, told by formulas that the solver did not use."""
+"""Whether a run obeys its friction law, checked with formulas that the solver did not use."""
 
 from __future__ import annotations
 
@@ -8,52 +8,71 @@ from ringsweep.compile import hook
 
 
 @hook
-def violation(scene, mode, force, y, rates, s, tolerance):
-    """How far a state, and the rate at which it changes, break the law of the scene.
+def violation(scene, mode, forcing, y, rates, s, tolerance):
+    """How far a state and its rates violate the equations of the scene.
 
     Parameters
     ----------
     scene, mode : NamedTuple
-    force : tuple of float
-        The forcing there; see :mod:`ringsweep.models.interface.implicit`.
+        One cell, and its mode.
+    forcing : tuple of float
+        What :func:`ringsweep.models.interface.implicit.forcing` returned for the time of the state.
     y, rates : tuple of float
-        State within a step, and its time derivative.
+        State of the mode within a step, and its time derivative, both from the solver's dense output.
     s : float
         Length of the step, s.
     tolerance : float
-        Error allowed to a step of the series.
+        Relative error allowed to a step of the series; implicit steps have
+        :data:`ringsweep.models.interface.implicit.IMPLICIT_TOLERANCE` times as much.
 
     Returns
     -------
     tuple of float
-        ``(violation, power)``: the largest violation of the friction law, of the balances and of the signs of the
-        reactions, as a multiple of what the error allowed to a step makes of each; and the power of friction on the
-        body, W.
+        ``(violation, power)``. ``violation`` is the largest violation of the friction law, of the balances of momentum
+        and of the signs of the reactions. Each is divided by the violation that the tolerance would explain; infinite
+        if a number is not finite. ``power`` is the power of friction on the body, W.
     """
 
 
 @hook
-def energy(scene, force, y):
-    """Mechanical energy of a state under a forcing, J."""
+def energy(scene, forcing, y):
+    """Mechanical energy of the body and of the spring if there is one.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    forcing : tuple of float
+        What :func:`ringsweep.models.interface.implicit.forcing` returned for the time of the state.
+    y : tuple of float
+        State of the mode.
+
+    Returns
+    -------
+    float
+        Energy in space, J.
+    """
 
 
 @hook(optional=True)
-def undecided(batch, rows, witness, fall):
-    """Which runs of a batch have a verdict that hangs by less than two resolutions differ; outside kernels.
+def undecided(batch, rows, second_rows, fall_rates):
+    """Which runs of a batch are so close to another regime that their error could change the regime.
+
+    It runs outside kernels and may use NumPy.
 
     Parameters
     ----------
     batch : NamedTuple
-        Scenes, whose type decides.
-    rows, witness : ndarray of shape ``(cells, outcomes)``
-        Outcomes at both resolutions.
-    fall : ndarray of shape ``(cells,)``
-        Rate at which the guard fell that ended each run, its unit times 1/s.
+        Cells. The type of the batch decides which body runs.
+    rows, second_rows : ndarray of shape ``(cells, outcomes)``
+        Outcomes of the runs, and of second runs at another resolution. Their difference estimates the error.
+    fall_rates : ndarray of shape ``(cells,)``
+        Rate at which the guard that ended each run fell, in its unit per second.
 
     Returns
     -------
     ndarray of bool, shape ``(cells,)``
-        By default none.
+        By default false for all cells.
     """
     return np.zeros(len(rows), dtype=bool)
 

@@ -1,10 +1,12 @@
 """What a solver of constant step needs: rates, what ends a run, and how far the step can be trusted.
 
-The state is that of the body in space: place, velocity, and the deflection of bristles if there are any. An inspection
-is the model's own account of a state, a ``NamedTuple`` whose field ``rates`` is the time derivative of the state.
+The state holds place and velocity of the body in space, and the deflection of each bundle of bristles if there are any.
+Units are rad and rad/s, or m and m/s; deflections are in m. An *inspection* is a ``NamedTuple`` with everything that
+the model wants to know of a state. Its field ``rates`` is the time derivative of the state.
 
-Where ``side_by_side`` is ``Several``, the bodies of the functions that a step calls get vector lanes in place of
-floats; they are written without ``if`` then, see :mod:`ringsweep.numerics.functions`.
+If ``side_by_side`` returns ``Several``, a step gets vector lanes in place of floats. The functions that a step calls
+(``rates``, ``inspect``, ``holds``, ``stiffness``, ``margin``, ``arc_share``, ``seen``, ``sticks`` and the recorder's
+``observe``) are then written without ``if``, see :mod:`ringsweep.numerics.functions`.
 """
 
 from __future__ import annotations
@@ -18,95 +20,258 @@ from ringsweep.numerics.memory import Single
 
 @hook(optional=True)
 def side_by_side(scene):
-    """Whether several runs stand side by side in vector lanes (`Several`) or not (`Single`, the default)."""
+    """Whether several runs are computed side by side in vector lanes.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell or a batch; only its type matters.
+
+    Returns
+    -------
+    Single or Several
+        Types of :mod:`ringsweep.numerics.memory`. By default ``Single()``: one run at a time.
+    """
     return Single()
 
 
 @hook
 def initial_state(scene):
-    """State at t = 0."""
-
-
-@hook(absorb=True)
-def rates(scene, now, y, drive_at, drive_rate):
-    """Time derivative of a state.
+    """State at t = 0.
 
     Parameters
     ----------
     scene : NamedTuple
+        One cell.
+
+    Returns
+    -------
+    tuple of float
+    """
+
+
+@hook(absorb=True)
+def rates(scene, now, y, drive_at, drive_rate):
+    """Time derivative of a state within a step.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
     now : NamedTuple
-        Inspection of the state in which the step began.
+        Inspection of the state at the beginning of the step. A body may take from it what changes little in a step.
     y : tuple of float
         State.
     drive_at, drive_rate : float
-        Angle (rad) or displacement (m) of the drive, and its rate.
+        Angle (rad) or displacement (m) of the drive, and its time derivative.
+
+    Returns
+    -------
+    tuple of float
+        One number for each component of the state.
     """
 
 
 @hook(absorb=True)
 def inspect(scene, y, drive_at, drive_rate):
-    """Inspection of the state `y`; the drive is at `drive_at` and moves at `drive_rate`."""
+    """Inspection of a state.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    y : tuple of float
+        State.
+    drive_at, drive_rate : float
+        Angle (rad) or displacement (m) of the drive, and its time derivative.
+
+    Returns
+    -------
+    NamedTuple
+        With the field ``rates``, a tuple like `y`; the model chooses the other fields.
+    """
 
 
 @hook(absorb=True, optional=True)
 def holds(scene, now):
-    """Whether the model still holds in an inspected state; by default, whether its rates are finite."""
+    """Whether the equations of the model hold in a state. If they do not, :func:`verdict` says how the run ended.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    now : NamedTuple
+        Inspection of the state.
+
+    Returns
+    -------
+    bool
+        By default whether the first two rates are finite.
+    """
     return isfinite(now.rates[0]) and isfinite(now.rates[1])
 
 
 @hook(optional=True)
 def verdict(scene, before, now):
-    """How a run stands after a step between two inspections.
+    """Status of a run after a step.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    before, now : NamedTuple
+        Inspections at the beginning and at the end of the step. At launch they are the same.
 
     Returns
     -------
     tuple
-        ``(status, fraction)``: a status of :mod:`ringsweep.models.interface.status`, and the fraction of the step
-        after which it was reached. By default a run goes on while the rates are finite.
+        ``(status, fraction)``: a constant of :mod:`ringsweep.models.interface.status`, and the fraction of the step
+        after which the run ended (1 if it goes on). By default the run is BROKEN unless :func:`holds`.
     """
     return (RUNNING if holds(scene, now) else BROKEN), 1.0
 
 
 @hook(absorb=True)
 def stiffness(scene, before, now, h):
-    """Largest magnitude of an eigenvalue of the linearised equations in a step, times its length `h` (s)."""
+    """Stiffness of a step: largest magnitude of an eigenvalue of the linearised equations times the length of the step.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    before, now : NamedTuple
+        Inspections at the beginning and at the end of the step.
+    h : float
+        Length of the step, s.
+
+    Returns
+    -------
+    float
+        Dimensionless. A step above ``ringsweep.solvers.rk4.STABILITY_LIMIT`` has no certificate.
+    """
 
 
 @hook(absorb=True, optional=True)
 def margin(scene, before, now):
-    """Least margin of the guards within a step, bounded from below; a run that separates ends where it is 0.
+    """Lower bound on the guards that end a run, such as the normal reactions, within a step.
 
-    A guard that turns between two instants has changed by more than four times its dip in the step before or after.
-    By default infinite: nothing but the end of the span ends a run.
+    A guard may dip below zero and recover within a step. In the step before or after, it then changes by more than four
+    times the depth of the dip. So a body subtracts a quarter of the change in the step from the smaller end value.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    before, now : NamedTuple
+        Inspections at the beginning and at the end of the step.
+
+    Returns
+    -------
+    float
+        In the unit of the guards. A run whose margin is not positive has no certificate. By default infinite: only the
+        end of the span ends a run.
     """
     return inf
 
 
 @hook(absorb=True, optional=True)
 def arc_share(scene, now, h):
-    """Share of the narrowest segment of the surface that the body slides across in a step of `h` s; by default 0."""
+    """Distance that the body slides in a step, as a share of the narrowest segment of the surface.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    now : NamedTuple
+        Inspection at the end of the step.
+    h : float
+        Length of the step, s.
+
+    Returns
+    -------
+    float
+        Dimensionless. A run in which it exceeds one half may miss a segment and has no certificate. By default 0: the
+        surface is uniform.
+    """
     return 0.0
 
 
 @hook(optional=True)
 def fall_rate(scene, before, now, h):
-    """Rate at which the guard fell that ended a run in a step of `h` s, its unit times 1/s; by default 0."""
+    """Rate at which the guard that ended a run fell.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    before, now : NamedTuple
+        Inspections at the beginning and at the end of the step in which the run ended.
+    h : float
+        Length of the step, s.
+
+    Returns
+    -------
+    float
+        Positive, in the unit of the guard per second. By default 0.
+    """
     return 0.0
 
 
 @hook(absorb=True)
 def seen(scene, y, now):
-    """What the recorder is shown of a state `y` and an inspection, see :mod:`ringsweep.models.interface.recorder`."""
+    """A state as the recorder takes it, see :mod:`ringsweep.models.interface.recorder`.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    y : tuple of float
+        State.
+    now : NamedTuple
+        Inspection of the state. At the end of a run, which lies within a step, it is the inspection at the end of the
+        step.
+
+    Returns
+    -------
+    tuple of float
+    """
 
 
 @hook(absorb=True)
 def sticks(scene, before, now):
-    """Whether the body counts as stuck in the step between two inspections."""
+    """Whether the body counts as stuck during a step.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    before, now : NamedTuple
+        Inspections at the beginning and at the end of the step.
+
+    Returns
+    -------
+    bool
+    """
 
 
 @hook
 def row(scene, y, drive_at, drive_rate):
-    """Row of a time history: one number for each of the model's history variables."""
+    """Row of a time history.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    y : tuple of float
+        State.
+    drive_at, drive_rate : float
+        Angle (rad) or displacement (m) of the drive, and its time derivative.
+
+    Returns
+    -------
+    tuple of float
+        One number for each history variable, in the order of ``Model.history``.
+    """
 
 
 MEMBERS = (

@@ -1,9 +1,11 @@
-"""The equations of a mode for implicit steps, which are taken where a mode relaxes much faster than it moves.
+"""The equations of a mode for implicit steps, which a solver takes where a mode relaxes much faster than it moves.
 
-The state of an implicit step, called ``x``, has the components of the mode's state ``y``: place, sliding velocity, and
-the deflection of each bundle of bristles if there are any. Its place is relative to the drive where ``y`` has it in
-space, so that nothing large cancels however slow the creep. A *forcing* is what the equations need of a time, and a
-*view* is the model's account of a state: its guards, and its motion.
+The state of an implicit step is called ``x``, the state of the mode (see :mod:`modes`) is called ``y``. Both hold the
+place, the sliding velocity in m/s, and the deflection (m) of each bundle of bristles if there are any. The place in
+``x`` may be relative to the drive while the place in ``y`` is in space, so that no large numbers cancel in slow creep.
+
+A *forcing* is what the equations need to know of a time. A *view* is what a solver needs to know of a state: the guards
+and the motion.
 """
 
 from __future__ import annotations
@@ -12,93 +14,269 @@ from ringsweep.compile import hook
 from ringsweep.physics import drives
 from ringsweep.physics.friction.velocity import BAND
 
+#: Tolerance of an implicit step, in units of the tolerance of the series.
+IMPLICIT_TOLERANCE = 1e3
+
 
 @hook(optional=True)
 def may_creep(scene, mode):
-    """Whether the mode is one that may want implicit steps: by default, in the stiction band of a smooth law."""
+    """Whether a mode may need implicit steps; if so, :func:`is_stiff` decides at each step.
+
+    Parameters
+    ----------
+    scene, mode : NamedTuple
+        One cell, and its mode.
+
+    Returns
+    -------
+    bool
+        By default true in the stiction band of a smooth law.
+    """
     return mode.region == BAND
 
 
 @hook
-def is_stiff(scene, mode, y, line):
-    """Whether a mode, linearised as `line`, relaxes so fast, compared with its own motion, that it wants such a
-    step."""
+def is_stiff(scene, mode, y, linear):
+    """Whether a mode relaxes so fast, compared with its own motion, that an implicit step is better than a series.
+
+    Parameters
+    ----------
+    scene, mode : NamedTuple
+        One cell, and its mode.
+    y : tuple of float
+        State of the mode.
+    linear : tuple
+        What :func:`linearise` returned for this state.
+
+    Returns
+    -------
+    bool
+    """
 
 
 @hook(optional=True)
 def forcing(scene, t):
-    """What the equations need of the time `t`: by default, the drive and its first two derivatives."""
+    """What the equations need to know of a time.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    t : float
+        Time, s.
+
+    Returns
+    -------
+    tuple of float
+        By default angle (rad) or displacement (m) of the drive, and its first two time derivatives.
+    """
     return drives.turn(scene.drive, t)
 
 
 @hook(optional=True)
-def to_implicit(scene, force, y):
-    """State of an implicit step from the state of the mode, under a :func:`forcing`; by default the same."""
+def to_implicit(scene, forcing, y):
+    """State of an implicit step from the state of the mode.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    forcing : tuple of float
+        What :func:`forcing` returned for the time of the state.
+    y : tuple of float
+        State of the mode.
+
+    Returns
+    -------
+    tuple of float
+        By default `y`.
+    """
     return y
 
 
 @hook(optional=True)
-def from_implicit(scene, force, x):
-    """State of the mode from the state of an implicit step, under a :func:`forcing`; by default the same."""
+def from_implicit(scene, forcing, x):
+    """State of the mode from the state of an implicit step.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    forcing : tuple of float
+        What :func:`forcing` returned for the time of the state.
+    x : tuple of float
+        State of an implicit step.
+
+    Returns
+    -------
+    tuple of float
+        By default `x`.
+    """
     return x
 
 
 @hook
-def rates(scene, mode, force, x):
-    """Time derivative of the state of an implicit step, under a :func:`forcing`."""
+def rates(scene, mode, forcing, x):
+    """Time derivative of the state of an implicit step.
+
+    Parameters
+    ----------
+    scene, mode : NamedTuple
+        One cell, and its mode.
+    forcing : tuple of float
+        What :func:`forcing` returned for the time of the state.
+    x : tuple of float
+        State of an implicit step.
+
+    Returns
+    -------
+    tuple of float
+        One number for each component of the state.
+    """
 
 
 @hook
 def linearise(scene, mode, t, x):
-    """Linearised equations at a state and a time.
+    """Equations of an implicit step, linearised about a state and a time.
+
+    Parameters
+    ----------
+    scene, mode : NamedTuple
+        One cell, and its mode.
+    t : float
+        Time, s.
+    x : tuple of float
+        State of an implicit step.
 
     Returns
     -------
     tuple
-        ``(rates, core, bristles, drift)``: the time derivative; the Jacobian of place and velocity, row by row; for
-        each bundle of bristles the derivative of the acceleration by its deflection, and of its rate by the velocity
-        and by its deflection; the partial derivative of the rates by time.
+        ``(rates, jacobian, bristles, by_time)``. ``rates`` is what :func:`rates` returns. ``jacobian`` has four
+        numbers: the Jacobian of place and velocity, row by row. ``bristles`` has one tuple of three numbers for each
+        bundle of bristles: derivative of the sliding acceleration (m/s^2) with respect to the deflection, and
+        derivatives of the rate of the deflection (m/s) with respect to the sliding velocity and to the deflection.
+        ``by_time`` is the partial derivative of the rates with respect to time.
     """
 
 
 @hook
 def error_scales(scene, tolerance, x):
-    """Error allowed to each component of the state `x`.
+    """Error allowed to each component of a state.
 
-    With bristles one number more: the error allowed to the acceleration.
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    tolerance : float
+        Relative error allowed to an implicit step.
+    x : tuple of float
+        State of an implicit step.
+
+    Returns
+    -------
+    tuple of float
+        One positive number for each component of the state, in the unit of the component. With bristles one number
+        more: the error allowed to the sliding acceleration, m/s^2.
     """
 
 
 @hook
 def guards_and_motion(scene, mode, t, x):
-    """Guards of the mode, positive while it holds, and motion.
+    """The view of a state: guards of the mode, and motion.
+
+    Parameters
+    ----------
+    scene, mode : NamedTuple
+        One cell, and its mode.
+    t : float
+        Time, s.
+    x : tuple of float
+        State of an implicit step.
 
     Returns
     -------
     tuple
-        ``(guards, motion)``: the guards in the order of their indices; place, velocity and acceleration of the body
-        in space, and what :func:`seen` needs.
+        ``(guards, motion)``. ``guards`` are at most six floats, positive while the mode holds. If the model has series,
+        they are in the order of the guards' rows. ``motion`` begins with place, velocity and acceleration of the body
+        in space; then comes whatever else :func:`seen`, :func:`near_zero` and :func:`row` need.
     """
 
 
 @hook
 def near_zero(scene, motion):
-    """Value of each guard below which it is watched closely in a step; `motion` is the second part of a view."""
+    """How near to zero each guard may come before the solver looks for a root within the step.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    motion : tuple of float
+        Second part of the view in the middle of the step.
+
+    Returns
+    -------
+    tuple of float
+        One number for each guard, in the unit of the guard; not negative.
+    """
 
 
 @hook
-def motion(scene, t, x, line):
-    """Velocity and acceleration of the body in space where it is linearised as `line`."""
+def motion(scene, t, x, linear):
+    """Velocity and acceleration of the body in space.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    t : float
+        Time, s.
+    x : tuple of float
+        State of an implicit step.
+    linear : tuple
+        What :func:`linearise` returned for this state.
+
+    Returns
+    -------
+    tuple of float
+        ``(velocity, acceleration)``: rad/s and rad/s^2, or m/s and m/s^2.
+    """
 
 
 @hook
 def seen(scene, view):
-    """What the recorder is shown; `view` is what :func:`guards_and_motion` returned."""
+    """A state as the recorder takes it, see :mod:`ringsweep.models.interface.recorder`.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    view : tuple
+        What :func:`guards_and_motion` returned for the state.
+
+    Returns
+    -------
+    tuple of float
+    """
 
 
 @hook
 def row(scene, mode, t, x):
-    """Row of a time history."""
+    """Row of a time history.
+
+    Parameters
+    ----------
+    scene, mode : NamedTuple
+        One cell, and its mode.
+    t : float
+        Time, s.
+    x : tuple of float
+        State of an implicit step.
+
+    Returns
+    -------
+    tuple of float
+        One number for each history variable, in the order of ``Model.history``.
+    """
 
 
 MEMBERS = (

@@ -1,9 +1,13 @@
-"""The modes of a piecewise-smooth system, and how one follows another.
+"""The modes of a piecewise-smooth system, and which mode follows another.
 
-A mode is a ``NamedTuple`` that names a smooth piece of the equations: the sign of the sliding velocity (0 in stick), a
-region of the friction law, the segment of the surface under each contact. It has the fields ``sign`` and ``region``,
-and ``fresh`` where :mod:`series` are used. It lasts while its guards, functions of the state, are positive. The state
-holds the sliding velocity, not the velocity in space: the difference of two large numbers would have no digits left.
+In a mode the equations are smooth. A mode is a ``NamedTuple`` that names the sign of the sliding velocity (0 in stick),
+the region of the friction law, and, on a ring, the segment of the surface under each contact. It has the fields
+``sign`` and ``region``; it also has the field ``entry_guard`` if the model has :mod:`series`. A mode lasts while its
+guards, which are functions of the state, are positive.
+
+The state holds the place, the sliding velocity in m/s, and the deflection (m) of each bundle of bristles if there are
+any. The place is an angle (rad) or a displacement (m). The state holds the sliding velocity, not the velocity in space,
+because the difference of two large velocities would lose all its digits.
 """
 
 from __future__ import annotations
@@ -15,43 +19,122 @@ from ringsweep.physics.friction.velocity import BAND
 
 @hook
 def initial_state(scene):
-    """Time at which the run begins, s, and the state there.
+    """Time and state at the beginning of a run.
 
-    The time is that of :func:`ringsweep.physics.drives.beginning`: just after 0 where the drive is singular at 0.
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+
+    Returns
+    -------
+    tuple
+        ``(t, state)``: time in s, and a tuple of floats. The time is
+        :func:`ringsweep.physics.drives.beginning`: just after 0 where the drive is singular at 0.
     """
 
 
 @hook
 def initial_mode(scene, t, y):
-    """Status and mode in the state `y` at time `t`."""
+    """Status and mode at the beginning of a run.
 
-
-@hook
-def switch(scene, mode, guard, t, y):
-    """What follows after the guard of that index has reached zero in the state `y` at time `t`.
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    t : float
+        Time, s.
+    y : tuple of float
+        State at time `t`.
 
     Returns
     -------
     tuple
-        ``(status, mode, state)``; the state is `y`, but for what is exact now (a sliding velocity that is 0).
+        ``(status, mode)``: a constant of :mod:`ringsweep.models.interface.status`, and the mode. A run may end at its
+        launch.
+    """
+
+
+@hook
+def switch(scene, mode, guard, t, y):
+    """What follows after a guard has reached zero.
+
+    Parameters
+    ----------
+    scene, mode : NamedTuple
+        One cell, and the mode that ends.
+    guard : int
+        Index of the guard: its row in the table of :mod:`series`, or its index among the guards of :mod:`implicit` if
+        the model has no series.
+    t : float
+        Time, s.
+    y : tuple of float
+        State at time `t`.
+
+    Returns
+    -------
+    tuple
+        ``(status, mode, state)``: a constant of :mod:`ringsweep.models.interface.status`, the next mode, and the state
+        `y` with its exact values put in, such as a sliding velocity of 0.
     """
 
 
 @hook(optional=True)
-def status_without_way_on(scene, mode, t, y):
-    """Status of a run whose steps shrink to nothing in the state `y`: jammed on the brink of a jam, else broken."""
+def status_when_stalled(scene, mode, t, y):
+    """Status of a run whose steps shrink to nothing.
+
+    Parameters
+    ----------
+    scene, mode : NamedTuple
+        One cell, and its mode.
+    t : float
+        Time, s.
+    y : tuple of float
+        State at time `t`.
+
+    Returns
+    -------
+    int
+        JAM if the body is about to jam, BROKEN otherwise. By default BROKEN.
+    """
     return BROKEN
 
 
 @hook(optional=True)
 def sticks(scene, mode):
-    """Whether the body counts as stuck: in stick, and by default in the stiction band of a smooth law."""
+    """Whether the body counts as stuck in a mode.
+
+    Parameters
+    ----------
+    scene, mode : NamedTuple
+        One cell, and its mode.
+
+    Returns
+    -------
+    bool
+        By default true in stick, and in the stiction band of a smooth law.
+    """
     return mode.sign == 0 or mode.region == BAND
 
 
 @hook
 def in_space(scene, t, y):
-    """Place and velocity of the body in space; angle (rad) or displacement (m), and its rate."""
+    """Place and velocity of the body in space.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    t : float
+        Time, s.
+    y : tuple of float
+        State at time `t`.
+
+    Returns
+    -------
+    tuple of float
+        ``(place, velocity)``: angle (rad) or displacement (m), and its time derivative (rad/s or m/s).
+    """
 
 
-MEMBERS = (initial_state, initial_mode, switch, status_without_way_on, sticks, in_space)
+MEMBERS = (initial_state, initial_mode, switch, status_when_stalled, sticks, in_space)

@@ -1,7 +1,8 @@
-"""What is remembered of a run while a solver advances it, and the outcome that it becomes.
+"""The record of a run, which grows while a solver advances the run, and the outcome of the run.
 
-What a solver shows of a state is a tuple of the model's own choice, called ``seen``: for the ring angle, angular
-velocity and both normal reactions, for the belt displacement, velocity and friction force.
+A solver passes each state to the recorder as a tuple, ``seen``. The model chooses what the tuple holds. For the ring
+these are angle, angular velocity and both normal reactions; for the belt displacement, velocity and friction force. The
+functions ``constant_step.seen``, ``series.seen_at`` and ``implicit.seen`` make the tuples.
 """
 
 from __future__ import annotations
@@ -11,37 +12,47 @@ from ringsweep.compile import hook
 
 @hook
 def begin(scene, t, seen):
-    """Record of a run that begins.
+    """Record at the beginning of a run.
 
     Parameters
     ----------
     scene : NamedTuple
+        One cell.
     t : float
         Time, s.
     seen : tuple of float
-        The initial state as a solver shows it.
+        The initial state as the recorder takes it.
 
     Returns
     -------
     NamedTuple
+        The record. The model chooses its fields, which are numbers.
     """
 
 
 @hook(absorb=True)
 def observe(scene, record, t, duration, stuck, seen):
-    """Record after a further part of a run.
+    """Record after one more interval of a run.
 
     Parameters
     ----------
-    scene, record : NamedTuple
+    scene : NamedTuple
+        One cell.
+    record : NamedTuple
+        Record at the beginning of the interval.
     t : float
-        Time at the end of that part, s.
+        Time at the end of the interval, s.
     duration : float
-        Length of that part, s; 0 where a value has jumped.
+        Length of the interval, s. It is 0 where a value has jumped.
     stuck : bool
-        Whether the body stuck all the while.
+        Whether the body stuck during the whole interval.
     seen : tuple of float
-        The state at `t` as a solver shows it.
+        The state at `t` as the recorder takes it.
+
+    Returns
+    -------
+    NamedTuple
+        Record at the end of the interval, of the same type as `record`.
     """
 
 
@@ -51,18 +62,21 @@ def conclude(scene, record, status, t, place, velocity):
 
     Parameters
     ----------
-    scene, record : NamedTuple
+    scene : NamedTuple
+        One cell.
+    record : NamedTuple
+        Record at the end of the run.
     status : int
-        How the run ended; see :mod:`ringsweep.models.interface.status`.
+        How the run ended, a constant of :mod:`ringsweep.models.interface.status`.
     t : float
         Time at the end, s.
     place, velocity : float
-        Angle (rad) or displacement (m) of the body in space, and its rate.
+        Angle (rad) or displacement (m) of the body in space at the end, and its time derivative (rad/s or m/s).
 
     Returns
     -------
     tuple of float
-        One number for each of the model's outcomes.
+        One number for each of the model's outcomes, in the order of ``Model.outcomes``.
     """
 
 

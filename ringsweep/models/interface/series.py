@@ -1,7 +1,8 @@
 """Power series within a mode.
 
-A table of shape ``(rows, columns)`` holds one series in the time since the step began in each row: coefficient k in
-column k, up to :data:`ringsweep.numerics.series.ORDER`. The last rows are the guards of the mode.
+A step fills a table of shape ``(rows, columns)``. Each row is a power series in the time since the beginning of the
+step: coefficient k is in column k, for k up to :data:`ringsweep.numerics.series.ORDER`. The model chooses the rows; the
+last ones are the guards of the mode. States are those of :mod:`modes`.
 """
 
 from __future__ import annotations
@@ -11,62 +12,123 @@ from ringsweep.compile import hook
 
 @hook(optional=True)
 def table_shape(scene):
-    """Number of rows of the table, and the first row that is a guard; by default there are no series."""
+    """Number of rows of the table, and index of the first guard.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+
+    Returns
+    -------
+    tuple of int
+        ``(rows, first_guard)``. By default ``(0, 0)``: the model has no series.
+    """
     return 0, 0
 
 
 @hook
 def expand(scene, mode, t, y, tolerance, c):
-    """Power series about a state within a mode.
+    """Fill the table with the power series about a state.
 
     Parameters
     ----------
     scene, mode : NamedTuple
+        One cell, and its mode.
     t : float
         Time, s.
     y : tuple of float
-        State.
+        State at time `t`.
     tolerance : float
-        Error allowed to a step: rad, and rad/s relative to 1 rad/s + \\|omega\\|, or relative to the scales of a belt.
+        Relative error allowed to a step. On a ring it applies to 1 rad, and to the velocity at
+        1 rad/s + \\|omega\\|; on a belt to the lengths and velocities of its motion.
     c : ndarray of shape ``(rows, columns)``
-        Filled with the series. A guard is positive while the mode holds; the guard ``mode.fresh`` is exactly zero
-        at first.
+        Table, which is filled. The guards are positive while the mode holds. The guard in row ``mode.entry_guard`` is
+        exactly zero at the beginning; with ``mode.entry_guard = -1`` there is none.
 
     Returns
     -------
     float
-        Step over which the series meets the tolerance, s.
+        Length of the step over which the series meets the tolerance, s.
     """
 
 
 @hook
 def state_at(scene, c, s):
-    """State after the time `s` (s) since the series `c` began."""
+    """State within a step.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    c : ndarray of shape ``(rows, columns)``
+        Table of the step.
+    s : float
+        Time since the beginning of the step, s.
+
+    Returns
+    -------
+    tuple of float
+    """
 
 
 @hook
 def rates_at(scene, c, s):
-    """Time derivative of that state."""
+    """Time derivative of the state within a step.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    c : ndarray of shape ``(rows, columns)``
+        Table of the step.
+    s : float
+        Time since the beginning of the step, s.
+
+    Returns
+    -------
+    tuple of float
+        One number for each component of the state.
+    """
 
 
 @hook
 def seen_at(scene, c, s, h):
-    """What the recorder is shown after the time `s` within a step `h` along the series `c`, both in s."""
+    """State within a step as the recorder takes it, see :mod:`ringsweep.models.interface.recorder`.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    c : ndarray of shape ``(rows, columns)``
+        Table of the step.
+    s : float
+        Time since the beginning of the step, s.
+    h : float
+        Length of the step, s.
+
+    Returns
+    -------
+    tuple of float
+    """
 
 
 @hook
 def extremes(scene, record, mode, c, h, work):
-    """Instants within a step `h` at which the recorder must look, since a quantity may have an extreme there.
+    """Find the instants within a step at which the recorder must look, because a quantity may have an extreme there.
 
     Parameters
     ----------
     scene, record, mode : NamedTuple
+        One cell, its record and its mode.
     c : ndarray of shape ``(rows, columns)``
-        Series of the step.
+        Table of the step. Rows that neither :func:`state_at`, :func:`rates_at`, :func:`seen_at`, :func:`row` nor the
+        guards need may be overwritten.
     h : float
         Length of the step, s.
     work : ndarray of shape ``(STACK, columns)``
-        Scratch; the instants are noted in ``work[0]`` (see :func:`ringsweep.numerics.series.crossings`).
+        Scratch of :func:`ringsweep.numerics.series.crossings`. The instants, in s since the beginning of the step, are
+        stored in ``work[0]`` in any order.
 
     Returns
     -------
@@ -77,12 +139,40 @@ def extremes(scene, record, mode, c, h, work):
 
 @hook
 def row(scene, mode, c, t, s):
-    """Row of a time history at time `t`, which is the time `s` after the series `c` began."""
+    """Row of a time history.
+
+    Parameters
+    ----------
+    scene, mode : NamedTuple
+        One cell, and its mode.
+    c : ndarray of shape ``(rows, columns)``
+        Table of the step.
+    t : float
+        Time of the row, s.
+    s : float
+        Time since the beginning of the step, s.
+
+    Returns
+    -------
+    tuple of float
+        One number for each history variable, in the order of ``Model.history``.
+    """
 
 
 @hook(optional=True)
 def after_first_step(mode):
-    """The mode after its first step, when no guard is zero any more for its having been entered."""
+    """The mode after its first step, when the guard that was zero on entry is zero no more.
+
+    Parameters
+    ----------
+    mode : NamedTuple
+        Its type decides which body runs.
+
+    Returns
+    -------
+    NamedTuple
+        `mode` with ``entry_guard = -1``. By default `mode` itself, for modes without this field.
+    """
     return mode
 
 

@@ -1,6 +1,6 @@
 """A body that slides in a rotating ring, on two contacts or on one."""
 
-# Each of these modules gives bodies to functions of `ringsweep.models.interface`.
+# Import of these modules registers bodies for functions of `ringsweep.models.interface`.
 from ringsweep.models.ring import audit, bristles, creep, rk4, series  # noqa: F401
 from ringsweep.models.ring.model import Ring, SingleContactRing
 

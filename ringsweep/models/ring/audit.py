@@ -1,7 +1,8 @@
-"""Whether a run on the ring obeys its law: violations of friction law, balances and signs, from the plain formulas.
+"""Audit of runs on the ring: violations of the friction law, of the balances and of the signs of the reactions.
 
-No series is used, and no segment that a mode names: friction is that of the surface at the angle of each contact,
-reactions and accelerations are those of :mod:`ringsweep.physics.ring`. The formulas of the law are shared, of course.
+The audit uses neither the series nor the segments of a mode. The coefficients are those of the surface at the angle of
+each contact; reactions and accelerations are those of :mod:`ringsweep.physics.ring`. Only the formulas of the friction
+law are also used by the solver.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from ringsweep.compile import inlined, take
 from ringsweep.models.interface import audit, implicit
 from ringsweep.models.ring.contacts import coefficients_under
 from ringsweep.models.ring.record import Outcome
+from ringsweep.models.ring.series import REACTION_TOLERANCE
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction import SetValued, family_of
 from ringsweep.physics.friction.bristles import bristle
@@ -21,57 +23,56 @@ from ringsweep.physics.friction.velocity import BAND, stiction_band, weights
 from ringsweep.physics.zones import PER_TURN, Segments, edge_ahead, roughest, roughness
 from ringsweep.quantities.variables import SEPARATING
 
-# Rounding of accelerations, as a share of their largest terms.
+# Rounding of an acceleration, as a share of its largest terms.
 _ROUNDING = 1e-12
 
-# Angle within which a contact counts as on the edge of an arc, where either side may hold, rad.
+# Distance from the edge of an arc within which a contact counts as on the edge, where both sides are right, rad.
 _ON_EDGE = 1e-8
-
-# Tolerance of an implicit step, and error allowed to the reactions as a share of the weight, in units of the tolerance
-# of the series.
-_LOADS = 1e3
 
 
 @inlined
-def _misplaced(scene, mode, rho, under):
-    """Whether the surface under the contacts is another than the mode says, away from any edge."""
+def _names_wrong_segment(scene, mode, rho, under):
+    """Whether the mode names another segment than the one under a contact, unless the contact is on an edge.
+
+    `under` has the static and the kinetic coefficient under each contact.
+    """
     mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
-    at_1, at_2 = under
+    under_1, under_2 = under
     offset = ring.contact_offset(scene.body)
     wrong = False
-    for place, angle, there, at in (
-        (mode.place_1, rho - offset, (mu_s1, mu_k1), at_1),
-        (mode.place_2, rho + offset, (mu_s2, mu_k2), at_2),
+    for place, angle, of_mode, of_surface in (
+        (mode.place_1, rho - offset, (mu_s1, mu_k1), under_1),
+        (mode.place_2, rho + offset, (mu_s2, mu_k2), under_2),
     ):
-        if there != at:
+        if of_mode != of_surface:
             ahead, back = edge_ahead(scene.surface, place, 1) - angle, angle - edge_ahead(scene.surface, place, -1)
             wrong = wrong or min(abs(ahead), abs(back)) > _ON_EDGE
     return wrong
 
 
 @inlined
-def _at(scene, rho):
-    """Static and kinetic coefficient under each contact, at an angle in the ring's frame."""
+def _coefficients_at(scene, rho):
+    """Static and kinetic coefficient under each contact, at the angle `rho` in the ring's frame, rad."""
     offset = ring.contact_offset(scene.body)
     return roughness(scene.surface, (rho - offset) * PER_TURN), roughness(scene.surface, (rho + offset) * PER_TURN)
 
 
 @inlined
-def _worst(a, b):
-    """The larger of two violations; one that is not a number is infinite."""
+def _larger(a, b):
+    """The larger of two violations; infinite if `b` is not a number."""
     return max(a, b) if b < inf else inf
 
 
 @audit.violation.implements(ring.Ring)
-def _breach(scene, mode, force, y, rates, s, tolerance):
+def _violation(scene, mode, forcing, y, rates, s, tolerance):
     body = scene.body
     phi, v = y
-    theta, ring_omega, ring_epsilon = force
+    theta, ring_omega, ring_epsilon = forcing
     omega = v / body.radius + ring_omega
     sin_phi, cos_phi = sin(phi), cos(phi)
-    under = _at(scene, phi - theta)
+    under = _coefficients_at(scene, phi - theta)
     (mu_s1, mu_k1), (mu_s2, mu_k2) = under
-    worst = inf if _misplaced(scene, mode, phi - theta, under) else 0.0
+    largest = inf if _names_wrong_segment(scene, mode, phi - theta, under) else 0.0
     terms = body.gravity + body.radius * (omega * omega + abs(ring_epsilon))
     speed = body.radius * (1.0 + abs(omega))
     if mode.sign == 0:
@@ -90,116 +91,123 @@ def _breach(scene, mode, force, y, rates, s, tolerance):
         relaxation = body.radius * abs(ring.acceleration_slope(body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega))
         if mode.region == BAND:
             speed = min(speed, 1e3 * stiction_band(scene.law))
-        worst = _worst(worst, -mode.sign * v / (tolerance * speed))
+        largest = _larger(largest, -mode.sign * v / (tolerance * speed))
         if not (determinant > 0.0 and inertia > 0.0):
-            worst = inf
-    # An error of the velocity makes one of its rate: over the step, and by the slope of friction.
-    pull = 1.0 / s + relaxation
-    off = abs(body.radius * (epsilon - ring_epsilon) - rates[1])
-    worst = _worst(worst, off / (pull * tolerance * speed + _ROUNDING * terms))
-    worst = _worst(worst, -least / (body.mass * terms * _LOADS * tolerance))
-    return worst, ring.friction_power(body, K1, K2, normal_1, normal_2, omega)
+            largest = inf
+    # An error of the velocity changes the acceleration through the slope of friction, and the mean rate over the step.
+    rate_factor = 1.0 / s + relaxation
+    imbalance = abs(body.radius * (epsilon - ring_epsilon) - rates[1])
+    largest = _larger(largest, imbalance / (rate_factor * tolerance * speed + _ROUNDING * terms))
+    largest = _larger(largest, -least / (body.mass * terms * REACTION_TOLERANCE * tolerance))
+    return largest, ring.friction_power(body, K1, K2, normal_1, normal_2, omega)
 
 
 @audit.energy.implements(ring.Ring)
-def _energy(scene, force, y):
-    return ring.energy(scene.body, cos(y[0]), y[1] / scene.body.radius + force[1])
+def _energy(scene, forcing, y):
+    return ring.energy(scene.body, cos(y[0]), y[1] / scene.body.radius + forcing[1])
 
 
 @audit.violation.implements(ring.BristleRing)
-def _bristle_breach(scene, mode, force, y, rates, s, tolerance):
+def _bristle_violation(scene, mode, forcing, y, rates, s, tolerance):
     body = scene.body
     rho, v, z_1, z_2 = y
-    theta, ring_omega, ring_epsilon = force
+    theta, ring_omega, ring_epsilon = forcing
     phi, omega = rho + theta, v / body.radius + ring_omega
     sin_phi, cos_phi = sin(phi), cos(phi)
-    under = _at(scene, rho)
+    under = _coefficients_at(scene, rho)
     (mu_s1, mu_k1), (mu_s2, mu_k2) = under
-    worst = inf if _misplaced(scene, mode, rho, under) else 0.0
+    largest = inf if _names_wrong_segment(scene, mode, rho, under) else 0.0
     sign = 1.0 if v >= 0.0 else -1.0
-    rate_1, rate_v1, rate_z1, pull_1, v_1, stretch_1 = bristle(scene.law, mu_s1, mu_k1, v, z_1, sign, mode.region)
-    rate_2, rate_v2, rate_z2, pull_2, v_2, stretch_2 = bristle(scene.law, mu_s2, mu_k2, v, z_2, sign, mode.region)
-    epsilon, determinant, inertia = ring.acceleration(body, -pull_1, -pull_2, sin_phi, cos_phi, omega)
-    normal_1, normal_2 = ring.reactions(body, -pull_1, -pull_2, sin_phi, cos_phi, omega, epsilon)
+    rate_1, rate_v1, rate_z1, traction_1, by_v_1, by_z_1 = bristle(scene.law, mu_s1, mu_k1, v, z_1, sign, mode.region)
+    rate_2, rate_v2, rate_z2, traction_2, by_v_2, by_z_2 = bristle(scene.law, mu_s2, mu_k2, v, z_2, sign, mode.region)
+    epsilon, determinant, inertia = ring.acceleration(body, -traction_1, -traction_2, sin_phi, cos_phi, omega)
+    normal_1, normal_2 = ring.reactions(body, -traction_1, -traction_2, sin_phi, cos_phi, omega, epsilon)
     if not (determinant > 0.0 and inertia > 0.0):
-        worst = inf
+        largest = inf
     terms = body.gravity + body.radius * (omega * omega + abs(ring_epsilon))
-    _, speed, deflection, _, _ = implicit.error_scales(scene, _LOADS * tolerance, y)
-    by_v = ring.acceleration_slope(body, -pull_1, -pull_2, -v_1, -v_2, sin_phi, cos_phi, omega)
-    by_1 = ring.acceleration_slope(body, -pull_1, -pull_2, -stretch_1, 0.0, sin_phi, cos_phi, omega)
-    by_2 = ring.acceleration_slope(body, -pull_1, -pull_2, 0.0, -stretch_2, sin_phi, cos_phi, omega)
+    _, speed, deflection, _, _ = implicit.error_scales(scene, implicit.IMPLICIT_TOLERANCE * tolerance, y)
+    by_v = ring.acceleration_slope(body, -traction_1, -traction_2, -by_v_1, -by_v_2, sin_phi, cos_phi, omega)
+    by_1 = ring.acceleration_slope(body, -traction_1, -traction_2, -by_z_1, 0.0, sin_phi, cos_phi, omega)
+    by_2 = ring.acceleration_slope(body, -traction_1, -traction_2, 0.0, -by_z_2, sin_phi, cos_phi, omega)
     allowed = speed / s + body.radius * (abs(by_v) * speed + (abs(by_1) + abs(by_2)) * deflection)
-    off = abs(body.radius * (epsilon - ring_epsilon) - rates[1])
-    worst = _worst(worst, off / (allowed + _ROUNDING * terms))
-    for rate, given, rate_v, rate_z in ((rate_1, rates[2], rate_v1, rate_z1), (rate_2, rates[3], rate_v2, rate_z2)):
+    imbalance = abs(body.radius * (epsilon - ring_epsilon) - rates[1])
+    largest = _larger(largest, imbalance / (allowed + _ROUNDING * terms))
+    for rate, dense_rate, rate_v, rate_z in (
+        (rate_1, rates[2], rate_v1, rate_z1),
+        (rate_2, rates[3], rate_v2, rate_z2),
+    ):
         allowed = (1.0 / s + abs(rate_z)) * deflection + abs(rate_v) * speed
-        worst = _worst(worst, abs(rate - given) / (allowed + _ROUNDING * abs(v)))
-    worst = _worst(worst, -mode.sign * v / speed)
-    worst = _worst(worst, -min(normal_1, normal_2) / (body.mass * terms * _LOADS * tolerance))
-    return worst, ring.friction_power(body, -pull_1, -pull_2, normal_1, normal_2, omega)
+        largest = _larger(largest, abs(rate - dense_rate) / (allowed + _ROUNDING * abs(v)))
+    largest = _larger(largest, -mode.sign * v / speed)
+    largest = _larger(largest, -min(normal_1, normal_2) / (body.mass * terms * REACTION_TOLERANCE * tolerance))
+    return largest, ring.friction_power(body, -traction_1, -traction_2, normal_1, normal_2, omega)
 
 
 @audit.energy.implements(ring.BristleRing)
-def _bristle_energy(scene, force, y):
-    return ring.energy(scene.body, cos(y[0] + force[0]), y[1] / scene.body.radius + force[1])
+def _bristle_energy(scene, forcing, y):
+    return ring.energy(scene.body, cos(y[0] + forcing[0]), y[1] / scene.body.radius + forcing[1])
 
 
-# What rounding makes of an angle at most, rad.
-_ROUNDED = 1e-12
+# Largest rounding of an angle, rad.
+_ANGLE_ROUNDING = 1e-12
 
-# Time up to which a run has ended at its launch, s.
-_AT_LAUNCH = 1e-13
+# A run that ends before this time ends at its launch, s.
+_LAUNCH_TIME = 1e-13
 
-# A separation counts where the reaction goes on to sink by several times what the resolutions differ by.
-_SINKS = 5.0
+# A separation is certain if the reaction needs more time to rise again than this multiple of the error of the instant.
+_FALL_FACTOR = 5.0
 
 
 @audit.undecided.implements(ring.Ring, ring.BristleRing)
-def _undecided(batch, rows, witness, fall):
-    # Of what is not a number every comparison is false.
+def _undecided(batch, rows, second_rows, fall_rates):
+    # Comparisons with NaN are false.
     with np.errstate(invalid="ignore", over="ignore"):
-        return _hangs(batch, Outcome(*rows.T), Outcome(*witness.T), fall) | _rests_on_edge(batch)
+        return _is_near_another_regime(
+            batch, Outcome(*rows.T), Outcome(*second_rows.T), fall_rates
+        ) | _is_launched_on_edge(batch)
 
 
-def _rests_on_edge(batch):
-    """Which bodies are launched at rest with a contact on an edge, where rounding tells which side of it holds them."""
+def _is_launched_on_edge(batch):
+    """Whether each body is launched at rest with a contact on an edge: rounding decides which side holds the body."""
     if not isinstance(batch.surface, Segments) or family_of(type(batch.law)) is not SetValued:
         return np.zeros(len(batch.span), dtype=bool)
     drive = batch.drive
     if isinstance(drive, drives.Table):
-        turned = np.array([drives.turn(take(drive, i), 0.0)[0] for i in range(len(batch.span))])
+        theta = np.array([drives.turn(take(drive, i), 0.0)[0] for i in range(len(batch.span))])
     else:
-        turned = drive.amplitude * np.sin(drive.phase) if isinstance(drive, drives.Sinusoidal) else 0.0
-    rho, offset = batch.initial_phi - turned, ring.contact_offset(batch.body)
+        theta = drive.amplitude * np.sin(drive.phase) if isinstance(drive, drives.Sinusoidal) else 0.0
+    rho, offset = batch.initial_phi - theta, ring.contact_offset(batch.body)
     found = np.zeros(len(batch.span), dtype=bool)
     for angle in (rho - offset, rho + offset):
-        away = (angle[:, None] - batch.surface.edges + np.pi) % (2.0 * np.pi) - np.pi
-        found |= (np.abs(away) < _ROUNDED).any(axis=1)
+        distance = (angle[:, None] - batch.surface.edges + np.pi) % (2.0 * np.pi) - np.pi
+        found |= (np.abs(distance) < _ANGLE_ROUNDING).any(axis=1)
     for i in np.flatnonzero(found):
         found[i] = ring.launch_velocity(take(batch, i)) == 0.0
     return found
 
 
-def _hangs(batch, a, b, fall):
-    """Which runs hang by less than the outcomes `a` and `b` of two resolutions differ."""
-    separating, moved = a.regime == SEPARATING, a.t_end > _AT_LAUNCH
-    found = np.zeros(len(fall), dtype=bool)
-    # A contact that holds by less than its reaction is uncertain.
+def _is_near_another_regime(batch, a, b, fall_rates):
+    """Whether the difference between the outcomes `a` and `b` of two runs is large enough to change the regime."""
+    separating, moved = a.regime == SEPARATING, a.t_end > _LAUNCH_TIME
+    found = np.zeros(len(fall_rates), dtype=bool)
+    # A least reaction that is smaller than its error leaves separation open.
     contacts = (1, a.normal_min_1, b.normal_min_1), (2, a.normal_min_2, b.normal_min_2)
-    for number, least, other in contacts[: 1 if isinstance(batch.body, ring.OneContact) else 2]:
-        lost = separating & ((a.separating_contact.astype(int) & number) > 0)
-        found |= moved & ~lost & (least <= 2.0 * np.abs(least - other))
-    # A contact lost in passing: a reaction that falls slowly may turn before it vanishes. Its greatest curvature is
-    # about that of the weight as the body swings or turns, and of the load of a turning that friction slows down.
+    for number, least, second_least in contacts[: 1 if isinstance(batch.body, ring.OneContact) else 2]:
+        separated = separating & ((a.separating_contact.astype(int) & number) > 0)
+        found |= moved & ~separated & (least <= 2.0 * np.abs(least - second_least))
+    # A reaction that falls slowly may rise again before it vanishes. Its second derivative is at most about that of the
+    # weight of a body that swings or revolves, plus that of the centrifugal load, which friction changes.
     body, (mu, _) = batch.body, roughest(batch.surface)
-    square = np.maximum(np.abs(a.omega_min), np.abs(a.omega_max)) ** 2
-    slowed = np.minimum(1.0, 4.0 * mu * mu) * body.radius * square * square
-    curvature = body.mass * (body.gravity * (body.gravity / body.radius + square) + slowed)
-    found |= separating & moved & (_SINKS * np.abs(a.t_separation - b.t_separation) * curvature > fall)
-    # A reversal, or a turn, that is only just one.
-    off = 2.0 * np.maximum(np.abs(a.omega_min - b.omega_min), np.abs(a.omega_max - b.omega_max))
-    above, below = a.omega_max - batch.epsilon_omega, a.omega_min + batch.epsilon_omega
-    close = ((np.abs(above) < off) & (below < off)) | ((np.abs(below) < off) & (above > -off))
+    omega_squared = np.maximum(np.abs(a.omega_min), np.abs(a.omega_max)) ** 2
+    friction_term = np.minimum(1.0, 4.0 * mu * mu) * body.radius * omega_squared * omega_squared
+    curvature = body.mass * (body.gravity * (body.gravity / body.radius + omega_squared) + friction_term)
+    found |= separating & moved & (_FALL_FACTOR * np.abs(a.t_separation - b.t_separation) * curvature > fall_rates)
+    # A reversal or a full turn that the error could undo or add.
+    difference = 2.0 * np.maximum(np.abs(a.omega_min - b.omega_min), np.abs(a.omega_max - b.omega_max))
+    over_positive, over_negative = a.omega_max - batch.epsilon_omega, a.omega_min + batch.epsilon_omega
+    close = ((np.abs(over_positive) < difference) & (over_negative < difference)) | (
+        (np.abs(over_negative) < difference) & (over_positive > -difference)
+    )
     found |= (a.reversals <= 1) & close
-    off = 2.0 * (np.abs(a.phi_min - b.phi_min) + np.abs(a.phi_max - b.phi_max))
-    return found | ((a.reversals == 0) & (np.abs(a.phi_max - a.phi_min - 2.0 * np.pi) < off))
+    difference = 2.0 * (np.abs(a.phi_min - b.phi_min) + np.abs(a.phi_max - b.phi_max))
+    return found | ((a.reversals == 0) & (np.abs(a.phi_max - a.phi_min - 2.0 * np.pi) < difference))

@@ -1,9 +1,9 @@
-"""The ring with a friction law that has bristles, one bundle at each contact: the hooks of all solvers.
+"""The ring with bristles, one bundle at each contact, for all solvers.
 
-Their traction is per unit of the normal reaction: ``K_i = -(sigma0 z_i + sigma1 dz_i/dt + sigma2 v)``, with the
-coefficients of the zone under the contact. The state is ``(phi, omega, z_1, z_2)`` for steps of constant length and
-``(rho, v, z_1, z_2)``, angle in the ring's frame and sliding velocity, for implicit steps. At launch the bristles
-are as after long sliding at that velocity.
+Friction per unit of the normal reaction is ``K_i = -(sigma0 z_i + sigma1 dz_i/dt + sigma2 v)``. The coefficients are
+those of the surface under the contact. The state is ``(phi, omega, z_1, z_2)`` for steps of constant length, and
+``(rho, v, z_1, z_2)``, with the angle in the ring's frame and the sliding velocity, for implicit steps. At launch the
+bristles are deflected as in steady sliding at the launch velocity.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from ringsweep.physics.zones import roughest
 
 
 class Contacts(NamedTuple):
-    """Both contacts at an instant: rates of deflection, K, and their derivatives by v and z."""
+    """Bristles of both contacts: rates of the deflections, K, and their derivatives by v and z."""
 
     rates: tuple[float, float]
     rates_v: tuple[float, float]
@@ -49,24 +49,24 @@ class Contacts(NamedTuple):
 
 @inlined
 def _contacts(scene, under, v, z_1, z_2, sign, region):
-    """Bristles on the surface with the coefficients `under` the contacts, as `coefficients_under` gives them."""
+    """Bristles of both contacts; `under` are the coefficients under them, as `coefficients_under` returns them."""
     mu_s1, mu_k1, mu_s2, mu_k2 = under
-    rate_1, rate_v1, rate_z1, pull_1, v_1, stretch_1 = bristle(scene.law, mu_s1, mu_k1, v, z_1, sign, region)
-    rate_2, rate_v2, rate_z2, pull_2, v_2, stretch_2 = bristle(scene.law, mu_s2, mu_k2, v, z_2, sign, region)
+    rate_1, rate_v1, rate_z1, traction_1, by_v_1, by_z_1 = bristle(scene.law, mu_s1, mu_k1, v, z_1, sign, region)
+    rate_2, rate_v2, rate_z2, traction_2, by_v_2, by_z_2 = bristle(scene.law, mu_s2, mu_k2, v, z_2, sign, region)
     return Contacts(
         (rate_1, rate_2),
         (rate_v1, rate_v2),
         (rate_z1, rate_z2),
-        -pull_1,
-        -pull_2,
-        (-v_1, -v_2),
-        (-stretch_1, -stretch_2),
+        -traction_1,
+        -traction_2,
+        (-by_v_1, -by_v_2),
+        (-by_z_1, -by_z_2),
     )
 
 
 @inlined
-def _lasts(scene, under, v, z_1, z_2, sign, region):
-    """Positive while the region lasts: the body counts as stuck while both contacts do."""
+def _region_guard(scene, under, v, z_1, z_2, sign, region):
+    """Guard of a region, positive while the region lasts. The body counts as stuck while both contacts do."""
     mu_s1, mu_k1, mu_s2, mu_k2 = under
     first = region_guard(scene.law, mu_s1, mu_k1, v, z_1, sign, region)
     second = region_guard(scene.law, mu_s2, mu_k2, v, z_2, sign, region)
@@ -74,15 +74,31 @@ def _lasts(scene, under, v, z_1, z_2, sign, region):
 
 
 @inlined
-def _launched(scene):
-    """Deflections at launch."""
+def _initial_deflections(scene):
+    """Deflections at launch, m."""
     v = ring.launch_velocity(scene) * scene.body.radius
     mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_at(scene, scene.initial_phi - drives.turn(scene.drive, 0.0)[0])
     return steady_deflection(scene.law, mu_s1, mu_k1, v), steady_deflection(scene.law, mu_s2, mu_k2, v)
 
 
 class Inspection(NamedTuple):
-    """A state of the ring seen from within; ``eigenvalue`` is about the largest magnitude of one, 1/s."""
+    """Inspection of a state of the ring.
+
+    Attributes
+    ----------
+    rates : tuple of float
+        Time derivative of the state.
+    normal_1, normal_2 : float
+        Normal reactions, N.
+    D, inertia : float
+        Determinant of the balances and effective inertia; the body jams where one of them is not positive.
+    eigenvalue : float
+        Estimate of the largest magnitude of an eigenvalue, 1/s.
+    omega, v : float
+        Angular velocity of the body, rad/s, and sliding velocity, m/s.
+    stuck : bool
+        Whether the body counts as stuck.
+    """
 
     rates: tuple[float, float, float, float]
     normal_1: float
@@ -97,7 +113,7 @@ class Inspection(NamedTuple):
 
 @constant_step.initial_state.implements(BristleRing)
 def _initial_state_in_space(scene):
-    z_1, z_2 = _launched(scene)
+    z_1, z_2 = _initial_deflections(scene)
     return scene.initial_phi, scene.initial_omega, z_1, z_2
 
 
@@ -118,16 +134,16 @@ def _inspect(scene, y, drive_at, drive_rate):
     v = (omega - drive_rate) * b.radius
     sign = 1.0 if v >= 0.0 else -1.0
     under = coefficients_at(scene, phi - drive_at)
-    stuck = _lasts(scene, under, v, z_1, z_2, sign, BAND) > 0.0
+    stuck = _region_guard(scene, under, v, z_1, z_2, sign, BAND) > 0.0
     now = _contacts(scene, under, v, z_1, z_2, sign, BAND)
     sin_phi, cos_phi = sin(phi), cos(phi)
     epsilon, D, inertia = ring.acceleration(b, now.K1, now.K2, sin_phi, cos_phi, omega)
     normal_1, normal_2 = ring.reactions(b, now.K1, now.K2, sin_phi, cos_phi, omega, epsilon)
-    by_v, by_1, by_2 = _by_contacts(scene, now, sin_phi, cos_phi, omega)
+    by_v, by_1, by_2 = _sliding_acceleration_slopes(scene, now, sin_phi, cos_phi, omega)
     decay = max(-now.rates_z[0], -now.rates_z[1])
     coupling = abs(by_1 * now.rates_v[0]) + abs(by_2 * now.rates_v[1])
     eigenvalue = largest_eigenvalue(decay - by_v, coupling - decay * by_v)
-    # With little friction left the body swings all the same.
+    # The body swings even where friction is small.
     by_phi, by_omega = ring.acceleration_gradient(b, now.K1, now.K2, sin_phi, cos_phi, omega)
     eigenvalue = max(eigenvalue, largest_eigenvalue(by_omega, -by_phi))
     rates = omega, epsilon, now.rates[0], now.rates[1]
@@ -135,8 +151,8 @@ def _inspect(scene, y, drive_at, drive_rate):
 
 
 @inlined
-def _by_contacts(scene, now, sin_phi, cos_phi, omega):
-    """How the sliding acceleration depends on the sliding velocity by way of friction, and on both deflections."""
+def _sliding_acceleration_slopes(scene, now, sin_phi, cos_phi, omega):
+    """Derivatives of the sliding acceleration by the sliding velocity through friction, and by both deflections."""
     b = scene.body
     v_1, v_2 = now.slopes_v
     z_1, z_2 = now.slopes_z
@@ -165,7 +181,17 @@ def _row(scene, y, drive_at, drive_rate):
 
 
 class Mode(NamedTuple):
-    """Sign of the sliding velocity, whether the body counts as stuck (BAND), segment and turn of each contact."""
+    """Mode of the ring with bristles.
+
+    Attributes
+    ----------
+    sign : int
+        Sign of the sliding velocity.
+    region : int
+        BAND if the body counts as stuck, else KINETIC.
+    place_1, place_2 : tuple of int
+        Segment and turn of each contact.
+    """
 
     sign: int
     region: int
@@ -176,8 +202,8 @@ class Mode(NamedTuple):
 @modes.initial_state.implements(BristleRing)
 def _initial_state(scene):
     t = drives.beginning(scene.drive)
-    v = drives.launched(scene.drive, ring.launch_velocity(scene)) * scene.body.radius
-    z_1, z_2 = _launched(scene)
+    v = drives.velocity_at_beginning(scene.drive, ring.launch_velocity(scene)) * scene.body.radius
+    z_1, z_2 = _initial_deflections(scene)
     return t, (scene.initial_phi - drives.turn(scene.drive, t)[0], v, z_1, z_2)
 
 
@@ -195,14 +221,14 @@ def _initial_mode(scene, t, y):
         sign = 1 if epsilon > ring_epsilon else -1
     place_1, place_2 = places_beyond(scene, place_1, place_2, rho, sign)
     mode = Mode(sign, BAND, place_1, place_2)
-    if not _lasts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(sign), BAND) > 0.0:
+    if not _region_guard(scene, coefficients_under(scene, mode), v, z_1, z_2, float(sign), BAND) > 0.0:
         mode = Mode(sign, KINETIC, place_1, place_2)
     return _after_jump(scene, mode, t, y), mode
 
 
 @inlined
 def _sliding_at(scene, mode, t, y):
-    """Friction at each contact per unit of its reaction; sine and cosine of the angle of the body, its rate."""
+    """K at each contact; sine and cosine of the angle of the body, and its angular velocity."""
     rho, v, z_1, z_2 = y
     theta, ring_omega, _ = drives.turn(scene.drive, t)
     phi, omega = rho + theta, ring_omega + v / scene.body.radius
@@ -212,7 +238,7 @@ def _sliding_at(scene, mode, t, y):
 
 @inlined
 def _after_jump(scene, mode, t, y):
-    """Status of a body where friction may have jumped."""
+    """Status after friction may have jumped."""
     K1, K2, sin_phi, cos_phi, omega = _sliding_at(scene, mode, t, y)
     if isnan(K1 + K2 + sin_phi + omega):
         return BROKEN
@@ -220,8 +246,8 @@ def _after_jump(scene, mode, t, y):
 
 
 @inlined
-def _lose(scene, mode, guard, t, y):
-    """Status where a reaction has vanished."""
+def _status_at_zero_reaction(scene, mode, guard, t, y):
+    """Status after a reaction has vanished: jam or separation."""
     body = scene.body
     K1, K2, sin_phi, cos_phi, omega = _sliding_at(scene, mode, t, y)
     epsilon, D, inertia = ring.acceleration(body, K1, K2, sin_phi, cos_phi, omega)
@@ -232,8 +258,8 @@ def _lose(scene, mode, guard, t, y):
     return ENDS[contact.lost(body, guard == NORMAL_1 or normal_1 <= least, guard == NORMAL_2 or normal_2 <= least)]
 
 
-@modes.status_without_way_on.implements(BristleRing)
-def _status_without_way_on(scene, mode, t, y):
+@modes.status_when_stalled.implements(BristleRing)
+def _status_when_stalled(scene, mode, t, y):
     K1, K2, sin_phi, cos_phi, omega = _sliding_at(scene, mode, t, y)
     _, D, inertia = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
     return BROKEN if D > 0.0 and inertia > NEARLY_JAMMED * ring.about_axis(scene.body) * D else JAM
@@ -246,7 +272,7 @@ def _switch(scene, mode, guard, t, y):
     if guard == INERTIA:
         return JAM, mode, y
     if guard in (NORMAL_1, NORMAL_2):
-        return _lose(scene, mode, guard, t, y), mode, y
+        return _status_at_zero_reaction(scene, mode, guard, t, y), mode, y
     if guard == SLOW:
         return RUNNING, Mode(-sign, BAND, place_1, place_2), (rho, 0.0, z_1, z_2)
     if guard == FAST:
@@ -257,10 +283,10 @@ def _switch(scene, mode, guard, t, y):
 
 
 @implicit.rates.implements(BristleRing)
-def _implicit_rates(scene, mode, force, x):
+def _implicit_rates(scene, mode, forcing, x):
     rho, v, z_1, z_2 = x
     radius = scene.body.radius
-    theta, ring_omega, ring_epsilon = force
+    theta, ring_omega, ring_epsilon = forcing
     phi, omega = rho + theta, v / radius + ring_omega
     now = _contacts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(mode.sign), mode.region)
     epsilon, _, _ = ring.acceleration(scene.body, now.K1, now.K2, sin(phi), cos(phi), omega)
@@ -283,13 +309,13 @@ def _linearise(scene, mode, t, x):
     by_phi, _, _ = ring.acceleration(b, now.K1, now.K2, cos_phi, -sin_phi, 0.0)
     p, by_phi = p - epsilon_0, by_phi - epsilon_0
     by_omega = 2.0 * p * omega
-    by_v, by_1, by_2 = _by_contacts(scene, now, sin_phi, cos_phi, omega)
-    push = radius * (by_phi * ring_omega + by_omega * ring_epsilon - drives.jerk(scene.drive, t))
+    by_v, by_1, by_2 = _sliding_acceleration_slopes(scene, now, sin_phi, cos_phi, omega)
+    by_time = radius * (by_phi * ring_omega + by_omega * ring_epsilon - drives.jerk(scene.drive, t))
     return (
         (v / radius, radius * (epsilon - ring_epsilon), now.rates[0], now.rates[1]),
         (0.0, 1.0 / radius, radius * by_phi, by_omega + by_v),
         ((by_1, now.rates_v[0], now.rates_z[0]), (by_2, now.rates_v[1], now.rates_z[1])),
-        (0.0, push, 0.0, 0.0),
+        (0.0, by_time, 0.0, 0.0),
     )
 
 
@@ -297,7 +323,7 @@ def _linearise(scene, mode, t, x):
 def _error_scales(scene, tolerance, x):
     mu, _ = roughest(scene.surface)
     deflection = mu / scene.law.sigma0
-    # Without weight the load is that of turning at about 1 rad/s.
+    # Without gravity the load is that of a rotation at about 1 rad/s.
     load = scene.body.gravity + scene.body.radius
     speed = mu * sqrt(load / scene.law.sigma0) + abs(x[1])
     return tolerance, tolerance * speed, tolerance * deflection, tolerance * deflection, tolerance * mu * load
@@ -322,7 +348,7 @@ def _guards_and_motion(scene, mode, t, x):
         normal_1,
         normal_2,
         min(ahead_1, ahead_2),
-        _lasts(scene, under, v, z_1, z_2, sign, mode.region),
+        _region_guard(scene, under, v, z_1, z_2, sign, mode.region),
     )
     return guards, (phi, omega, epsilon, ring_omega)
 

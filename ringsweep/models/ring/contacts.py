@@ -1,31 +1,31 @@
-"""The surface under both contacts of a body in the ring: coefficients, friction, zones, the edges ahead."""
+"""The surface under the contacts of a body in the ring: coefficients, friction, zones and edges."""
 
 from __future__ import annotations
 
 from ringsweep.compile import inlined
 from ringsweep.physics import ring
 from ringsweep.physics.friction.velocity import weights_in
-from ringsweep.physics.zones import beyond, coefficients, cross, edge_ahead, locate, segment
+from ringsweep.physics.zones import coefficients, cross_edge, edge_ahead, leave_edge, locate, segment
 
 
 @inlined
 def places_at(scene, rho):
-    """Segment and turn of each contact at an angle of the body in the ring's frame, rad."""
+    """Segment and turn of each contact, at the angle `rho` of the body in the ring's frame, rad."""
     offset = ring.contact_offset(scene.body)
     return locate(scene.surface, rho - offset), locate(scene.surface, rho + offset)
 
 
 @inlined
 def places_beyond(scene, place_1, place_2, rho, sign):
-    """Places of contacts that move forwards (+1) or backwards (-1): beyond an edge that they are on."""
+    """Segment and turn of each contact; a contact on an edge is put on the side to which `sign` (1 or -1) moves it."""
     offset = ring.contact_offset(scene.body)
-    first = beyond(scene.surface, place_1, rho - offset, sign)
-    return first, beyond(scene.surface, place_2, rho + offset, sign)
+    first = leave_edge(scene.surface, place_1, rho - offset, sign)
+    return first, leave_edge(scene.surface, place_2, rho + offset, sign)
 
 
 @inlined
 def edges_ahead(scene, mode, rho):
-    """Angle between each contact and the edge that it slides towards, rad."""
+    """Angle from each contact to the edge towards which it slides, rad."""
     offset = ring.contact_offset(scene.body)
     ahead_1 = mode.sign * (edge_ahead(scene.surface, mode.place_1, mode.sign) - (rho - offset))
     ahead_2 = mode.sign * (edge_ahead(scene.surface, mode.place_2, mode.sign) - (rho + offset))
@@ -34,16 +34,16 @@ def edges_ahead(scene, mode, rho):
 
 @inlined
 def places_after_edge(scene, mode, rho):
-    """Places of the contacts after the nearer edge was crossed."""
+    """Segment and turn of each contact after the nearer edge was crossed."""
     ahead_1, ahead_2 = edges_ahead(scene, mode, rho)
     if ahead_1 <= ahead_2:
-        return cross(scene.surface, mode.place_1, mode.sign), mode.place_2
-    return mode.place_1, cross(scene.surface, mode.place_2, mode.sign)
+        return cross_edge(scene.surface, mode.place_1, mode.sign), mode.place_2
+    return mode.place_1, cross_edge(scene.surface, mode.place_2, mode.sign)
 
 
 @inlined
 def coefficients_under(scene, mode):
-    """Static and kinetic coefficient under each contact, in the segments of a mode."""
+    """Static and kinetic coefficient under contact 1 and contact 2, in the segments of a mode."""
     mu_s1, mu_k1, _ = coefficients(scene.surface, mode.place_1[0])
     mu_s2, mu_k2, _ = coefficients(scene.surface, mode.place_2[0])
     return mu_s1, mu_k1, mu_s2, mu_k2
@@ -51,7 +51,7 @@ def coefficients_under(scene, mode):
 
 @inlined
 def coefficients_at(scene, rho):
-    """Static and kinetic coefficient under each contact, at an angle of the body in the ring's frame, rad."""
+    """Static and kinetic coefficient under contact 1 and contact 2, at the angle `rho` in the ring's frame, rad."""
     offset = ring.contact_offset(scene.body)
     mu_s1, mu_k1, _ = coefficients(scene.surface, segment(scene.surface, rho - offset))
     mu_s2, mu_k2, _ = coefficients(scene.surface, segment(scene.surface, rho + offset))
@@ -60,7 +60,7 @@ def coefficients_at(scene, rho):
 
 @inlined
 def zones_under(scene, mode):
-    """Rough arc under each contact (0: none), in the segments of a mode."""
+    """Number of the rough arc under each contact (0: none), in the segments of a mode."""
     _, _, zone_1 = coefficients(scene.surface, mode.place_1[0])
     _, _, zone_2 = coefficients(scene.surface, mode.place_2[0])
     return zone_1, zone_2
@@ -68,7 +68,7 @@ def zones_under(scene, mode):
 
 @inlined
 def zones_at(scene, rho):
-    """Rough arc under each contact (0: none), at an angle of the body in the ring's frame, rad."""
+    """Number of the rough arc under each contact (0: none), at the angle `rho` in the ring's frame, rad."""
     offset = ring.contact_offset(scene.body)
     _, _, zone_1 = coefficients(scene.surface, segment(scene.surface, rho - offset))
     _, _, zone_2 = coefficients(scene.surface, segment(scene.surface, rho + offset))
@@ -77,7 +77,7 @@ def zones_at(scene, rho):
 
 @inlined
 def friction_under(scene, mode, speed):
-    """Friction ``(K1, K2)`` per unit of each reaction in slip, at a magnitude of the sliding velocity, m/s."""
+    """Friction ``(K1, K2)`` per unit of each reaction in slip, at the sliding speed `speed`, m/s."""
     mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
     w_s, w_k, _, _ = weights_in(scene.law, mode.region, speed)
     return -mode.sign * (w_s * mu_s1 + w_k * mu_k1), -mode.sign * (w_s * mu_s2 + w_k * mu_k2)

@@ -1,7 +1,7 @@
-"""The ring within the stiction band of a smooth law, where it creeps on a slow manifold.
+"""Implicit steps on the ring, in the stiction band of a smooth law, where the body creeps on a slow manifold.
 
-The state is ``(rho, v)``, angle in the ring's frame and sliding velocity: neither is the difference
-of two large numbers, however slow the creep.
+The state is ``(rho, v)``: angle in the ring's frame and sliding velocity. So no state is the difference of two large
+numbers, however slow the creep.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from ringsweep.models.ring.contacts import coefficients_under, edges_ahead, zone
 from ringsweep.physics import drives, ring
 from ringsweep.physics.friction.velocity import stiction_band, weights_in
 
-#: Guards, in the order of the rows of the series.
+#: Indices of the guards, in the order of the rows of the series.
 INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(6)
 
 
 @inlined
 def _friction(scene, mode, v):
-    """K at each contact and its derivative by the angular velocity, in the segments of the mode."""
+    """K at contacts 1 and 2, and their derivatives by the angular velocity, in the segments of the mode."""
     mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
     sign = 1.0 if v >= 0.0 else -1.0
     w_s, w_k, dw_s, dw_k = weights_in(scene.law, mode.region, abs(v))
@@ -33,24 +33,24 @@ def _friction(scene, mode, v):
     )
 
 
-# The place relative to the drive, so that nothing large cancels in a creep.
+# The place is relative to the drive, so that no large numbers cancel in slow creep.
 @implicit.to_implicit.implements(ring.Ring)
-def _to_implicit(scene, force, y):
-    return y[0] - force[0], y[1]
+def _to_implicit(scene, forcing, y):
+    return y[0] - forcing[0], y[1]
 
 
 @implicit.from_implicit.implements(ring.Ring)
-def _from_implicit(scene, force, x):
-    return x[0] + force[0], x[1]
+def _from_implicit(scene, forcing, x):
+    return x[0] + forcing[0], x[1]
 
 
 @implicit.is_stiff.implements(ring.Ring)
-def _is_stiff(scene, mode, y, line):
-    (_, push), (_, _, _, decay), _, _ = line
-    # Fast against the body's own motion, and settled: what is left of the way in, and the way out
-    # through the top of the band, run at the rate of the decay itself.
-    own = sqrt(scene.body.gravity / scene.body.radius) + abs(y[1]) / scene.body.radius
-    return -decay > 50.0 * own and abs(push) < 0.01 * -decay * stiction_band(scene.law)
+def _is_stiff(scene, mode, y, linear):
+    (_, acceleration), (_, _, _, decay), _, _ = linear
+    # The decay must be fast compared with the motion of the body. And the transient must be over: transients into the
+    # band, and out of it at its top, are as fast as the decay itself.
+    natural_frequency = sqrt(scene.body.gravity / scene.body.radius) + abs(y[1]) / scene.body.radius
+    return -decay > 50.0 * natural_frequency and abs(acceleration) < 0.01 * -decay * stiction_band(scene.law)
 
 
 @implicit.error_scales.implements(ring.Ring)
@@ -59,9 +59,9 @@ def _error_scales(scene, tolerance, x):
 
 
 @implicit.rates.implements(ring.Ring)
-def _rates(scene, mode, force, x):
+def _rates(scene, mode, forcing, x):
     radius = scene.body.radius
-    theta, ring_omega, ring_epsilon = force
+    theta, ring_omega, ring_epsilon = forcing
     phi, omega = x[0] + theta, x[1] / radius + ring_omega
     K1, K2, _, _ = _friction(scene, mode, x[1])
     epsilon, _, _ = ring.acceleration(scene.body, K1, K2, sin(phi), cos(phi), omega)
@@ -84,10 +84,10 @@ def _linearise(scene, mode, t, x):
     by_phi, _, _ = ring.acceleration(b, K1, K2, cos_phi, -sin_phi, 0.0)
     p, by_phi = p - epsilon_0, by_phi - epsilon_0
     by_omega = 2.0 * p * omega
-    friction = ring.acceleration_slope(b, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega)
+    by_v = ring.acceleration_slope(b, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega)
     return (
         (x[1] / radius, radius * (epsilon - ring_epsilon)),
-        (0.0, 1.0 / radius, radius * by_phi, by_omega + friction),
+        (0.0, 1.0 / radius, radius * by_phi, by_omega + by_v),
         (),
         (0.0, radius * (by_phi * ring_omega + by_omega * ring_epsilon - ring_jerk)),
     )
@@ -124,9 +124,9 @@ def _near_zero(scene, motion):
 
 
 @implicit.motion.implements(ring.Ring, ring.BristleRing)
-def _motion(scene, t, x, line):
+def _motion(scene, t, x, linear):
     _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
-    return x[1] / scene.body.radius + ring_omega, line[0][1] / scene.body.radius + ring_epsilon
+    return x[1] / scene.body.radius + ring_omega, linear[0][1] / scene.body.radius + ring_epsilon
 
 
 @implicit.seen.implements(ring.Ring, ring.BristleRing)

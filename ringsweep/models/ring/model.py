@@ -1,4 +1,4 @@
-"""The ring as a model: its parameters, their consistency, and the cells that kernels run over."""
+"""The ring as a model: its parameters, their consistency, and its cells."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ringsweep.models.model import Model
-from ringsweep.models.parts import GRAVITY, MASS, SPAN, drive_of, law_of, pair
+from ringsweep.models.parts import GRAVITY, MASS, SPAN, drive_of, friction_coefficients, law_of
 from ringsweep.models.ring import record, series
 from ringsweep.models.scene import Structure, Values, require
 from ringsweep.physics import contact, drives, friction, ring, zones
 from ringsweep.physics.friction.presliding import steady_deflection
 from ringsweep.quantities.parameters import Parameter, declared
 
-#: Functions that must have bodies for the type of a body.
+#: Hooks that must be implemented for the type of a body.
 BODY_MEMBERS = ring.BODY_MEMBERS + contact.BODY_MEMBERS + series.BODY_MEMBERS
 
 RADIUS = Parameter("m", "radius of the inner race", lower=0.0, open_lower=True)
@@ -34,31 +34,31 @@ class SingleContactRing(Model):
     body: ClassVar[dict[str, Parameter]] = {"body.mass": MASS, "ring.radius": RADIUS}
 
     body_type: ClassVar[type] = ring.OneContact
-    """Type of the body; the functions of :data:`BODY_MEMBERS` have bodies for it."""
+    """Type of the body; the hooks of :data:`BODY_MEMBERS` are implemented for it."""
 
     def takes(self, law: type) -> bool:
-        """Laws without a dead band; bristles must know how far they are deflected after long sliding."""
+        """Laws without a dead band; laws with bristles need ``steady_deflection``."""
         traits = friction.TRAITS[law]
         return not traits.dead_band and (traits.family is not friction.Dynamic or steady_deflection.is_defined_for(law))
 
     def scene_type(self, structure: Structure) -> type:
-        """With bristles a ring of its own kind."""
+        """``BristleRing`` for laws with bristles, else ``Ring``."""
         return ring.BristleRing if self._has_bristles(structure) else ring.Ring
 
     def required(self, structure: Structure) -> dict[type, tuple[Any, ...]]:
-        """The recorder's functions, and those of the body."""
+        """Hooks of the recorder, and hooks for the type of the body."""
         return super().required(structure) | {self.body_type: BODY_MEMBERS}
 
     def _has_bristles(self, structure: Structure) -> bool:
         return friction.family_of(self.laws[structure.law]) is friction.Dynamic
 
     def history(self, structure: Structure) -> tuple[str, ...]:
-        """Quantities of a time history, in the order of their columns."""
+        """Names of the history variables, in the order of their columns."""
         names = "phi", "omega", "epsilon", "normal_1", "normal_2", "ring_omega", "zone_1", "zone_2", "mode"
         return (*names, "deflection_1", "deflection_2") if self._has_bristles(structure) else names
 
     def parameters(self, structure: Structure) -> dict[str, Parameter]:
-        """Every numeric path of a scene of this structure."""
+        """Parameters of a scene of this structure, by path."""
         law = self.laws[structure.law]
         found = dict(self.body)
         places = {"friction.rest": "the rest of the ring"}
@@ -86,14 +86,16 @@ class SingleContactRing(Model):
         }
 
     def build(self, structure: Structure, values: Values) -> ring.Ring | ring.BristleRing:
-        """Cells of a sweep; see :func:`ringsweep.models.batch`."""
+        """Cells that kernels run over; see :meth:`ringsweep.models.model.Model.build`."""
         law = self.laws[structure.law]
         rough = "friction.rough" if structure.arcs == ("zone",) else None
         arcs = [
-            zones.Arc(values[f"{arc}.center"], values[f"{arc}.half_angle"], *pair(law, rough or arc, values))
+            zones.Arc(
+                values[f"{arc}.center"], values[f"{arc}.half_angle"], *friction_coefficients(law, rough or arc, values)
+            )
             for arc in structure.arcs
         ]
-        surface = zones.cut(arcs, *pair(law, "friction.rest", values))
+        surface = zones.surface_of(arcs, *friction_coefficients(law, "friction.rest", values))
         return self.scene_type(structure)(
             body=self.build_body(values),
             surface=surface,
@@ -106,7 +108,7 @@ class SingleContactRing(Model):
         )
 
     def build_body(self, values: Values) -> Any:
-        """The body's cells."""
+        """Bodies of the cells: a ``NamedTuple`` of type :attr:`body_type` with arrays of shape ``(cells,)``."""
         return ring.OneContact(values["body.mass"], values["ring.radius"], values["gravity"])
 
 
@@ -131,18 +133,24 @@ class Ring(SingleContactRing):
     }
 
     def build_body(self, values: Values) -> ring.TwoContacts:
-        """The body's cells, from (a, r, R) or from (a, r, beta)."""
+        """Bodies of the cells, from half distance, ball radius, and either ring radius or angle beta.
+
+        Raises
+        ------
+        InputError
+            If both ring radius and beta are missing or contradict each other, or if the ring is too small.
+        """
         a, r = values["body.half_distance"], values["body.ball_radius"]
         given = "ring.radius" in values, "body.beta" in values
         if not any(given):
-            require(False, "ring.radius", np.nan, "missing: give ring.radius, or body.beta in its place")
+            require(False, "ring.radius", np.nan, "missing: give ring.radius or body.beta")
         if given[0]:
             R = values["ring.radius"]
             require(
                 r + a < R,
                 "ring.radius",
                 R,
-                "{} m is too small: the ring must be larger than ball_radius + half_distance of the body",
+                "{} m is too small: it must exceed ball_radius + half_distance of the body",
             )
             sin_beta = a / (R - r)
             if given[1]:

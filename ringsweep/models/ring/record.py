@@ -1,4 +1,4 @@
-"""What is remembered of a run on the ring, and what it makes of it: reversals, turns, extremes, motion, regime."""
+"""Record and outcome of runs on the ring: reversals, turns, extremes, motion, regime."""
 
 from __future__ import annotations
 
@@ -15,25 +15,31 @@ from ringsweep.physics import contact
 from ringsweep.physics.ring import BristleRing, Ring
 from ringsweep.quantities.variables import FAILED, JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 
-#: How a run goes on or ended, by the mode of :mod:`ringsweep.physics.contact`.
+#: Status of a run for each mode of :mod:`ringsweep.physics.contact`.
 ENDS = np.full(8, RUNNING)
-
-
 ENDS[[contact.OPEN_1, contact.OPEN_2, contact.OPEN_BOTH]] = SEPARATED_1, SEPARATED_2, SEPARATED_BOTH
-
-
 ENDS[contact.IMPOSSIBLE] = JAM
 
 
-#: What a count of turns saturates at: a diverging run of constant step makes more than an int32 holds.
+#: Largest number of turns, since datasets store an int32. A diverging run of constant step exceeds it.
 MOST_TURNS = 2.0**31 - 1.0
 
 
 class Record(NamedTuple):
-    """What is remembered of a run on the ring; angles in rad, times in s, forces in N.
+    """Record of a run on the ring; angles in rad, angular velocities in rad/s, times in s, forces in N.
 
-    ``sense`` is the sign of the last motion beyond the threshold; ``lowest`` and ``highest`` bound
-    the angle since the last reversal, or since the start, ``phi_min`` and ``phi_max`` what it was before.
+    Attributes
+    ----------
+    sense : float
+        Sign of the last angular velocity beyond the threshold of a reversal; 0 before the first.
+    reversals : float
+        Number of reversals.
+    lowest, highest : float
+        Bounds of the angle since the last reversal, or since the start.
+    phi_min, phi_max : float
+        Bounds of the angle before the last reversal.
+    omega_min, omega_max, stick_time, normal_min_1, normal_min_2 : float
+        As in :class:`Outcome`.
     """
 
     sense: float
@@ -50,7 +56,7 @@ class Record(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """A run in the numbers that a dataset holds, in the order of their columns."""
+    """Outcomes of a run on the ring, in the order of their columns."""
 
     regime: float
     motion: float
@@ -72,17 +78,17 @@ class Outcome(NamedTuple):
 
 @inlined
 def begin(phi, omega, normal_1, normal_2, epsilon_omega):
-    """Record of a run at its launch."""
+    """Record at the beginning of a run."""
     sense = 1.0 if omega > epsilon_omega else -1.0 if omega < -epsilon_omega else 0.0
     return Record(sense, 0.0, phi, phi, phi, phi, omega, omega, 0.0, normal_1, normal_2)
 
 
 @inlined
 def observe(record, phi, omega, normal_1, normal_2, stuck_for, epsilon_omega):
-    """Record after a state was met; `stuck_for` is the time for which the body has stuck since the last one.
+    """Record after one more state; `stuck_for` is the time for which the body has stuck since the last state, s.
 
-    A reversal needs the angular velocity to pass from beyond one threshold to beyond the other,
-    so that chatter about zero does not count.
+    At a reversal the angular velocity passes from beyond one threshold to beyond the other, so that chatter about zero
+    does not count.
     """
     r = record
     sense, reversals = r.sense, r.reversals
@@ -139,7 +145,7 @@ def conclude(record, status, t, phi, omega):
         r.reversals,
         float(turns),
         r.stick_time,
-        # A step ends beyond the instant at which a reaction vanishes, and at the end of an arc one may jump below zero.
+        # The last step ends after the reaction has vanished, and a reaction may jump below zero at an arc edge.
         0.0 if status in (SEPARATED_1, SEPARATED_BOTH) else max(r.normal_min_1, 0.0),
         0.0 if status in (SEPARATED_2, SEPARATED_BOTH) else max(r.normal_min_2, 0.0),
     )

@@ -1,4 +1,4 @@
-"""The ring for steps of constant length: rates, reactions, and what ends a run; for one run or several side by side."""
+"""The ring for steps of constant length: rates, reactions, and what ends a run. The state is ``(phi, omega)``."""
 
 from __future__ import annotations
 
@@ -18,10 +18,24 @@ from ringsweep.physics.friction.velocity import passes_band, steepest, stiction_
 
 
 class Inspection(NamedTuple):
-    """A state of the ring seen from within: what a step needs and what ends a run.
+    """Inspection of a state of the ring.
 
-    ``slope`` is how the acceleration depends on the angular velocity by way of the friction coefficients; ``by_phi``
-    and ``by_omega`` how it depends on angle and angular velocity with these held.
+    Attributes
+    ----------
+    rates : tuple of float
+        Angular velocity and angular acceleration of the body.
+    v : float
+        Sliding velocity, m/s.
+    normal_1, normal_2 : float
+        Normal reactions, N.
+    D, inertia : float
+        Determinant of the balances and effective inertia; the body jams where one of them is not positive.
+    slope : float
+        Derivative of the angular acceleration by the angular velocity through the friction coefficients, 1/s.
+    by_phi, by_omega : float
+        Derivatives of the angular acceleration by angle and angular velocity at constant friction coefficients.
+    phi, sin_phi, cos_phi, omega : float
+        Angle, its sine and cosine, and angular velocity of the body.
     """
 
     rates: tuple[float, float]
@@ -40,12 +54,12 @@ class Inspection(NamedTuple):
 
 
 @constant_step.side_by_side.implements(ring.Ring)
-def _lanes(scene):
+def _side_by_side(scene):
     return Several()
 
 
 @constant_step.initial_state.implements(ring.Ring)
-def _launch(scene):
+def _initial_state(scene):
     return scene.initial_phi, scene.initial_omega
 
 
@@ -73,7 +87,7 @@ def _inspect(scene, y, drive_at, drive_rate):
 
 @constant_step.holds.implements(ring.Ring, ring.BristleRing)
 def _holds(scene, now):
-    # Of a NaN every comparison is false.
+    # Comparisons with NaN are false.
     supported = (now.D > 0.0) & (now.inertia > 0.0) & (now.normal_1 > 0.0) & (now.normal_2 > 0.0)
     return supported & (abs(now.rates[1]) < inf) & (abs(now.omega) < inf)
 
@@ -84,7 +98,7 @@ def _verdict(scene, before, now):
         return (BROKEN if isnan(now.inertia) else JAM), 1.0
     if not (isfinite(now.rates[1]) and isfinite(now.omega)):
         return BROKEN, 1.0
-    first, second = _zero(before.normal_1, now.normal_1), _zero(before.normal_2, now.normal_2)
+    first, second = _root_fraction(before.normal_1, now.normal_1), _root_fraction(before.normal_2, now.normal_2)
     fraction = min(first, second)
     if fraction > 1.0:
         return RUNNING, 1.0
@@ -92,8 +106,8 @@ def _verdict(scene, before, now):
 
 
 @inlined
-def _zero(before, now):
-    """Where a straight line from `before` to `now` vanishes, as a fraction of the way; 2 if it does not."""
+def _root_fraction(before, now):
+    """Fraction of a step at which a value that changes linearly from `before` to `now` is zero; 2 if it is positive."""
     if now > 0.0:
         return 2.0
     return before / (before - now) if before > now else 0.0
@@ -101,46 +115,46 @@ def _zero(before, now):
 
 @constant_step.stiffness.implements(ring.Ring)
 def _stiffness(scene, before, now, h):
-    # The stages reach about as far as the acceleration at the beginning takes the body in one step.
+    # The stages of the step reach about as far as the acceleration at its beginning takes the body.
     radius = scene.body.radius
     ring_gains = (radius * now.omega - now.v) - (radius * before.omega - before.v)
     ahead = before.v + h * radius * before.rates[1] - ring_gains
     band = stiction_band(scene.law)
-    friction = _steeper(before.slope, now.slope)
-    # A step that jumps the band, or its edge, never samples the slope there, and is the one that is
-    # wrong in kind: it has met it all the same.
+    friction_slope = _steeper(before.slope, now.slope)
+    # A step that jumps over the band, or over its edge, does not sample the slope there. The slope counts all the same,
+    # since just such a step may lead to a wrong regime.
     low, high = min(min(before.v, now.v), ahead), max(max(before.v, now.v), ahead)
     if any_of((low <= band) & (high >= -band)):
         rest, edge, _ = passes_band(scene.law, before.v, now.v, ahead)
         mu_s, mu_k = zones.roughest(scene.surface)
         (rest_s, rest_k), (edge_s, edge_k) = steepest(scene.law)
         scale = -radius * ring.friction_gain(scene.body, now.cos_phi, now.omega)
-        friction = _steeper(friction, select(rest, scale * (rest_s * mu_s + rest_k * mu_k), 0.0))
-        friction = _steeper(friction, select(edge, scale * (edge_s * mu_s + edge_k * mu_k), 0.0))
-    # Even without friction the body swings, and under friction its speed loads the contacts.
-    return largest_eigenvalue(friction + now.by_omega, -now.by_phi) * h
+        friction_slope = _steeper(friction_slope, select(rest, scale * (rest_s * mu_s + rest_k * mu_k), 0.0))
+        friction_slope = _steeper(friction_slope, select(edge, scale * (edge_s * mu_s + edge_k * mu_k), 0.0))
+    # The body swings even without friction; with friction, its speed changes the load of the contacts.
+    return largest_eigenvalue(friction_slope + now.by_omega, -now.by_phi) * h
 
 
 @inlined
 def _steeper(a, b):
-    """The one of two slopes that is the larger in magnitude."""
+    """The slope with the larger magnitude."""
     return select(abs(b) > abs(a), b, a)
 
 
 @constant_step.margin.implements(ring.Ring, ring.BristleRing)
-def _slack(scene, before, now):
+def _margin(scene, before, now):
     first = min(before.normal_1, now.normal_1) - 0.25 * abs(now.normal_1 - before.normal_1)
     second = min(before.normal_2, now.normal_2) - 0.25 * abs(now.normal_2 - before.normal_2)
     return min(first, second)
 
 
 @constant_step.arc_share.implements(ring.Ring, ring.BristleRing)
-def _stride(scene, now, h):
+def _arc_share(scene, now, h):
     return abs(now.v) * h / (scene.body.radius * zones.narrowest(scene.surface))
 
 
 @constant_step.fall_rate.implements(ring.Ring, ring.BristleRing)
-def _falls(scene, before, now, h):
+def _fall_rate(scene, before, now, h):
     first = before.normal_1 - now.normal_1 if now.normal_1 <= 0.0 else 0.0
     second = before.normal_2 - now.normal_2 if now.normal_2 <= 0.0 else 0.0
     return max(first, second) / h
@@ -153,12 +167,12 @@ def _seen(scene, y, now):
 
 @constant_step.sticks.implements(ring.Ring)
 def _sticks(scene, before, now):
-    # Whether the step lay in the stiction band or jumped across it.
+    # The step lies in the stiction band or jumps over it.
     return (abs(before.v) < stiction_band(scene.law)) | (before.v * now.v < 0.0)
 
 
 @constant_step.row.implements(ring.Ring)
-def _describe(scene, y, drive_at, drive_rate):
+def _row(scene, y, drive_at, drive_rate):
     now = constant_step.inspect(scene, y, drive_at, drive_rate)
     band = stiction_band(scene.law)
     mode = 0.0 if abs(now.v) < band or now.v == 0.0 else 1.0 if now.v > 0.0 else -1.0

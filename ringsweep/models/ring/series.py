@@ -1,12 +1,11 @@
 """The ring as a piecewise-smooth system: modes, guards and their power series.
 
-A mode is a sign of sliding (or stick), a region of the friction law, and the segment under each
-contact. The state is ``(phi, v)``: the sliding velocity itself, not the difference of two large
-angular velocities, so that a band of 1e-9 m/s is resolved.
+A mode names the sign of the sliding velocity, the region of the friction law, and the segment under each contact. The
+state is ``(phi, v)``: angle in space and sliding velocity. The difference of two large angular velocities would not
+resolve a stiction band of 1e-9 m/s.
 
-In slip with constant K the acceleration is ``p omega^2 + q cos phi + r sin phi``; in stick the
-balances of :mod:`ringsweep.physics.ring` are solved for the reactions at the ring's own
-acceleration, and no differential equation is left.
+In slip with constant K the acceleration is ``p omega^2 + q cos phi + r sin phi``. In stick the body accelerates like
+the ring, and the balances of :mod:`ringsweep.physics.ring` give the reactions: no differential equation is left.
 """
 
 from __future__ import annotations
@@ -33,8 +32,8 @@ from ringsweep.numerics.series import (
     crossings,
     may_fall_below,
     product,
-    reach,
     slope,
+    step_size,
     value,
     variation,
 )
@@ -47,43 +46,53 @@ from ringsweep.physics.friction.velocity import (
     faster,
     region_at,
     region_bounds,
+    shorten_for_decay,
     slower,
     stiction_band,
-    tail_reach,
     weights_in,
 )
 
-# Rows of the series; the guards last, and first of them the one without which the others mean nothing.
+# Rows of the table of series. The guards are last. INERTIA is the first guard: the others mean nothing after a jam.
 PHI, V, OMEGA, EPSILON, SIN, COS, SQUARE, THETA, EXCESS, BASIS, STATIC_WEIGHT, KINETIC_WEIGHT = range(12)
 FRICTION_1, FRICTION_2, SPARE = range(12, 15)
 INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(15, 21)
 
 
-# Reactions that vanish together are both this close to zero, as a share of the weight, where one of them vanishes.
+# If one reaction vanishes and the other is smaller than this share of the load, both contacts separate.
 AT_ONCE = 1e-9
 
-# Share of the moment of inertia about the axis below which the effective inertia is that of a motion on its way into a
-# jam.
+# If the effective inertia is smaller than this share of the moment of inertia about the axis, the body is about to jam.
 NEARLY_JAMMED = 1e-4
+
+#: Error allowed to the reactions as a share of the load, in units of the tolerance of the series.
+REACTION_TOLERANCE = 1e3
 
 
 class Mode(NamedTuple):
-    """Where the ring stands among its smooth pieces.
+    """Mode of the ring.
 
-    ``sign`` of the sliding velocity, 0 in stick; ``region`` of the friction law; ``fresh`` the guard
-    that is zero as the mode is entered, or -1; ``place_1``, ``place_2`` segment and turn of each contact.
+    Attributes
+    ----------
+    sign : int
+        Sign of the sliding velocity; 0 in stick.
+    region : int
+        Region of the friction law.
+    entry_guard : int
+        Row of the guard that is zero on entry, or -1.
+    place_1, place_2 : tuple of int
+        Segment and turn of each contact.
     """
 
     sign: int
     region: int
-    fresh: int
+    entry_guard: int
     place_1: tuple[int, int]
     place_2: tuple[int, int]
 
 
 @modes.initial_state.implements(ring.Ring)
 def _initial_state(scene):
-    v = drives.launched(scene.drive, ring.launch_velocity(scene)) * scene.body.radius
+    v = drives.velocity_at_beginning(scene.drive, ring.launch_velocity(scene)) * scene.body.radius
     return drives.beginning(scene.drive), (scene.initial_phi, v)
 
 
@@ -98,56 +107,56 @@ def _initial_mode(scene, t, y):
     theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     place_1, place_2 = places_at(scene, phi - theta)
     if v == 0.0 and stiction_band(scene.law) == 0.0:
-        return _settle(scene, t, phi, place_1, place_2, 0)
+        return _mode_at_rest(scene, t, phi, place_1, place_2, 0)
     sign = 1 if v > 0.0 else -1
-    region, fresh = region_at(scene.law, abs(v)), -1
+    region, entry_guard = region_at(scene.law, abs(v)), -1
     if v == 0.0:
-        # Friction is zero here: the way the body goes is the way that it is pushed.
-        push, _, _ = ring.acceleration(scene.body, 0.0, 0.0, sin(phi), cos(phi), ring_omega)
-        sign, fresh = (1 if push >= ring_epsilon else -1), SLOW
-    mode = Mode(sign, region, fresh, *places_beyond(scene, place_1, place_2, phi - theta, sign))
+        # Friction is zero here, so that the body slides in the direction in which the other forces accelerate it.
+        epsilon, _, _ = ring.acceleration(scene.body, 0.0, 0.0, sin(phi), cos(phi), ring_omega)
+        sign, entry_guard = (1 if epsilon >= ring_epsilon else -1), SLOW
+    mode = Mode(sign, region, entry_guard, *places_beyond(scene, place_1, place_2, phi - theta, sign))
     return _after_jump(scene, mode, t, y), mode
 
 
 @inlined
 def _at_breakaway(scene, mode):
-    """Friction coefficients under each contact as it begins to slide."""
+    """Friction coefficient under each contact at the beginning of slip."""
     mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
     w_s, w_k, _, _ = weights_in(scene.law, mode.region, 0.0)
     return w_s * mu_s1 + w_k * mu_k1, w_s * mu_s2 + w_k * mu_k2
 
 
 @inlined
-def _settle(scene, t, phi, place_1, place_2, released):
-    """Status and mode of a set-valued law where the sliding velocity is zero; see :func:`contact.at_rest`."""
+def _mode_at_rest(scene, t, phi, place_1, place_2, stick_end):
+    """Status and mode of a set-valued law at zero sliding velocity; see :func:`contact.at_rest` for `stick_end`."""
     theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     region = region_at(scene.law, 0.0)
-    still = Mode(0, KINETIC, -1, place_1, place_2)
+    stick = Mode(0, KINETIC, -1, place_1, place_2)
     forward = Mode(1, region, SLOW, *places_beyond(scene, place_1, place_2, phi - theta, 1))
     backward = Mode(-1, region, SLOW, *places_beyond(scene, place_1, place_2, phi - theta, -1))
-    mu_s1, _, mu_s2, _ = coefficients_under(scene, still)
+    mu_s1, _, mu_s2, _ = coefficients_under(scene, stick)
     breakaway = _at_breakaway(scene, forward), _at_breakaway(scene, backward)
     motion = sin(phi), cos(phi), ring_omega, ring_epsilon
-    found = contact.at_rest(scene.body, (mu_s1, mu_s2), *breakaway, *motion, released)
+    found = contact.at_rest(scene.body, (mu_s1, mu_s2), *breakaway, *motion, stick_end)
     if found == contact.IMPOSSIBLE:
-        # A contact on an edge is on either side of it.
-        for moving in (forward, backward):
-            mu_s1, _, mu_s2, _ = coefficients_under(scene, moving)
-            on_edge = moving.place_1 != place_1 or moving.place_2 != place_2
+        # A contact on an edge may belong to either side.
+        for slip in (forward, backward):
+            mu_s1, _, mu_s2, _ = coefficients_under(scene, slip)
+            on_edge = slip.place_1 != place_1 or slip.place_2 != place_2
             if on_edge and contact.at_rest(scene.body, (mu_s1, mu_s2), *breakaway, *motion, 0) == contact.STICK:
-                return RUNNING, Mode(0, KINETIC, -1, moving.place_1, moving.place_2)
+                return RUNNING, Mode(0, KINETIC, -1, slip.place_1, slip.place_2)
     if found == contact.FORWARD:
         return RUNNING, forward
     if found == contact.BACKWARD:
         return RUNNING, backward
     if isnan(phi + ring_epsilon):
-        return BROKEN, still
-    return ENDS[found], still
+        return BROKEN, stick
+    return ENDS[found], stick
 
 
 @inlined
 def _after_jump(scene, mode, t, y):
-    """Status of slip where friction may have jumped."""
+    """Status in slip after friction may have jumped."""
     phi, v = y
     K1, K2, omega = _friction_at(scene, mode, t, v)
     if isnan(phi + omega):
@@ -157,14 +166,14 @@ def _after_jump(scene, mode, t, y):
 
 @inlined
 def _friction_at(scene, mode, t, v):
-    """Friction at each contact per unit of its reaction, and angular velocity of the body, at a sliding velocity."""
+    """K at each contact, and angular velocity of the body, at the sliding velocity `v`."""
     K1, K2 = friction_under(scene, mode, abs(v))
     return K1, K2, v / scene.body.radius + drives.turn(scene.drive, t)[1]
 
 
 @inlined
 def _sliding_at(scene, mode, t, y):
-    """D, inertia, both reactions and their scale in slip, from the balances themselves and not from a series."""
+    """D, effective inertia, both reactions and their scale in slip, from the balances and not from a series."""
     phi, v = y
     body = scene.body
     K1, K2, omega = _friction_at(scene, mode, t, v)
@@ -176,7 +185,7 @@ def _sliding_at(scene, mode, t, y):
 
 @inlined
 def _is_jamming(scene, mode, t, y):
-    """Whether slip is so near to a jam that its reactions, which grow without bound there, have no sign to go by."""
+    """Whether slip is so near to a jam, where reactions grow without bound, that their signs mean nothing."""
     if mode.sign == 0:
         return False
     determinant, inertia, _, _, _ = _sliding_at(scene, mode, t, y)
@@ -184,11 +193,11 @@ def _is_jamming(scene, mode, t, y):
 
 
 @inlined
-def _lose(scene, mode, guard, t, y):
-    """Status, mode and state where a reaction has vanished."""
+def _after_zero_reaction(scene, mode, guard, t, y):
+    """Status, mode and state after a reaction has vanished."""
     if mode.sign == 0:
-        # Of the modes that are closed, a slip may take over.
-        status, slip = _settle(scene, t, y[0], mode.place_1, mode.place_2, 2)
+        # Slip with both contacts closed may follow.
+        status, slip = _mode_at_rest(scene, t, y[0], mode.place_1, mode.place_2, 2)
         if status == RUNNING:
             return status, slip, (y[0], 0.0)
         _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
@@ -199,19 +208,19 @@ def _lose(scene, mode, guard, t, y):
         scale = scene.body.mass * (scene.body.gravity + scene.body.radius * ring_omega * ring_omega)
     else:
         _, _, normal_1, normal_2, scale = _sliding_at(scene, mode, t, y)
-        # On the way into a jam the series of a reaction meets its singularity, and vanishes where that does not.
+        # Near a jam the series of a reaction is inaccurate, and may vanish where the reaction does not.
         if _is_jamming(scene, mode, t, y) or (normal_1 if guard == NORMAL_1 else normal_2) > 1e-2 * scale:
             return JAM, mode, y
     least = AT_ONCE * scale
-    lost_1, lost_2 = guard == NORMAL_1 or normal_1 <= least, guard == NORMAL_2 or normal_2 <= least
-    return ENDS[contact.lost(scene.body, lost_1, lost_2)], mode, y
+    opens_1, opens_2 = guard == NORMAL_1 or normal_1 <= least, guard == NORMAL_2 or normal_2 <= least
+    return ENDS[contact.lost(scene.body, opens_1, opens_2)], mode, y
 
 
-@modes.status_without_way_on.implements(ring.Ring)
-def _status_without_way_on(scene, mode, t, y):
+@modes.status_when_stalled.implements(ring.Ring)
+def _status_when_stalled(scene, mode, t, y):
     if mode.sign == 0:
         return BROKEN
-    # A sharp tail brings the singularity nearer than the inertia tells: what friction rises to may jam the body.
+    # Where friction changes fast with the speed, the inertia does not show the jam: test with the static coefficients.
     mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
     _, determinant, inertia = ring.acceleration(scene.body, -mode.sign * mu_s1, -mode.sign * mu_s2, 0.0, 1.0, 0.0)
     return JAM if _is_jamming(scene, mode, t, y) or not (determinant > 0.0 and inertia > 0.0) else BROKEN
@@ -222,12 +231,12 @@ def _switch(scene, mode, guard, t, y):
     phi, v = y
     sign, region, place_1, place_2 = mode.sign, mode.region, mode.place_1, mode.place_2
     if guard in (NORMAL_1, NORMAL_2):
-        return _lose(scene, mode, guard, t, y)
+        return _after_zero_reaction(scene, mode, guard, t, y)
     if guard == INERTIA:
         return JAM, mode, y
     if sign == 0:
-        released = 1 if guard == SLOW else -1 if guard == FAST else 2
-        status, mode = _settle(scene, t, phi, place_1, place_2, released)
+        stick_end = 1 if guard == SLOW else -1 if guard == FAST else 2
+        status, mode = _mode_at_rest(scene, t, phi, place_1, place_2, stick_end)
         return status, mode, (phi, 0.0)
     if guard == EDGE:
         theta, _, _ = drives.turn(scene.drive, t)
@@ -241,18 +250,18 @@ def _switch(scene, mode, guard, t, y):
         return RUNNING, Mode(sign, slower(scene.law, region), FAST, place_1, place_2), (phi, sign * low)
     if region == BAND:
         return RUNNING, Mode(-sign, BAND, SLOW, place_1, place_2), (phi, 0.0)
-    status, settled = _settle(scene, t, phi, place_1, place_2, 0)
-    return status, settled, (phi, 0.0)
+    status, next_mode = _mode_at_rest(scene, t, phi, place_1, place_2, 0)
+    return status, next_mode, (phi, 0.0)
 
 
 @inlined
-def _sine(c, k):
-    """Coefficient `k` of sine, cosine and square of the angular velocity."""
+def _expand_sine(c, k):
+    """Fill coefficient `k` of sine and cosine of phi and of the square of omega."""
     if k == 0:
         c[SIN, 0], c[COS, 0] = sin(c[PHI, 0]), cos(c[PHI, 0])
         c[SQUARE, 0] = c[OMEGA, 0] * c[OMEGA, 0]
         return
-    # phi' = omega.
+    # From phi' = omega.
     c[SIN, k] = product(c[OMEGA], c[COS], k - 1) * INVERSE[k]
     c[COS, k] = -product(c[OMEGA], c[SIN], k - 1) * INVERSE[k]
     c[SQUARE, k] = product(c[OMEGA], c[OMEGA], k)
@@ -260,7 +269,7 @@ def _sine(c, k):
 
 @inlined
 def _next_state(scene, c, k):
-    """Coefficient `k` + 1 of the state from coefficient `k` of its rate."""
+    """Fill coefficient `k` + 1 of the state from coefficient `k` of its rate."""
     c[PHI, k + 1] = c[OMEGA, k] * INVERSE[k + 1]
     c[OMEGA, k + 1] = c[EPSILON, k] * INVERSE[k + 1]
     c[V, k + 1] = scene.body.radius * (c[OMEGA, k + 1] - (k + 2.0) * c[THETA, k + 2])
@@ -275,36 +284,42 @@ def _expand(scene, mode, t, y, tolerance, c):
         return _expand_stick(scene, mode, tolerance, c)
     c[OMEGA, 0] = y[1] / scene.body.radius + c[THETA, 1]
     if constant_weights(scene.law, mode.region):
-        _expand_sliding(scene, mode, c)
+        _expand_constant_slip(scene, mode, c)
     else:
-        _expand_blended(scene, mode, c)
-    _guard_sliding(scene, mode, c)
-    scale = 1.0 / tolerance
+        _expand_varying_slip(scene, mode, c)
+    _expand_slip_guards(scene, mode, c)
+    per_angle = 1.0 / tolerance
     speed = scene.body.radius * (1.0 + abs(c[OMEGA, 0]))
     if mode.region == BAND:
-        # Noise that is large for the band would keep the creep from ever settling.
+        # An error as large as the stiction band would keep the creep from becoming steady.
         speed = min(speed, 1e3 * stiction_band(scene.law))
-    rate = scale / speed
-    # An error of the reactions could make or hide a separation. They follow the acceleration, but friction that
-    # varies loads even the contacts of a body too inert to be moved by it.
-    sharpness = 1e-3 * scale
+    per_velocity = per_angle / speed
+    # An error of the reactions could add or hide a separation. A bound on the acceleration is not enough: varying
+    # friction changes the reactions even of a body that is too inert to be accelerated.
+    per_load = 1.0 / REACTION_TOLERANCE * per_angle
     if not constant_weights(scene.law, mode.region):
-        # However loose the tolerance, a root of theirs must be told from one of the error.
-        sharpness = max(sharpness, 1e3)
-    push = sharpness / (scene.body.gravity / scene.body.radius + c[SQUARE, 0] + abs(c[EPSILON, 0]))
-    load = push / (scene.body.mass * scene.body.radius)
+        # Even at a loose tolerance a root of a reaction must not be a root of its error.
+        per_load = max(per_load, 1e3)
+    per_epsilon = per_load / (scene.body.gravity / scene.body.radius + c[SQUARE, 0] + abs(c[EPSILON, 0]))
+    per_reaction = per_epsilon / (scene.body.mass * scene.body.radius)
     last = previous = 0.0
-    for row, unit in ((PHI, scale), (V, rate), (EPSILON, push), (NORMAL_1, load), (NORMAL_2, load)):
+    for row, unit in (
+        (PHI, per_angle),
+        (V, per_velocity),
+        (EPSILON, per_epsilon),
+        (NORMAL_1, per_reaction),
+        (NORMAL_2, per_reaction),
+    ):
         last = max(last, abs(c[row, ORDER]) * unit)
         previous = max(previous, abs(c[row, ORDER - 1]) * unit)
-    return tail_reach(scene.law, mode.region, c[V], reach(last, previous))
+    return shorten_for_decay(scene.law, mode.region, c[V], step_size(last, previous))
 
 
 @inlined
-def _expand_sliding(scene, mode, c):
-    """Slip with constant K: the flow is autonomous."""
+def _expand_constant_slip(scene, mode, c):
+    """Fill the series of slip with constant K."""
     body = scene.body
-    # Kinetic but in a tail that does not decay.
+    # K is kinetic, or that of a tail that does not decay.
     k1, k2 = friction_under(scene, mode, 0.0)
     p, determinant, inertia = ring.acceleration(body, k1, k2, 0.0, 0.0, 1.0)
     q, _, _ = ring.acceleration(body, k1, k2, 0.0, 1.0, 0.0)
@@ -312,13 +327,13 @@ def _expand_sliding(scene, mode, c):
     epsilon_0, normal_10, normal_20 = ring.constant_terms(body, k1, k2)
     p, q, r = p - epsilon_0, q - epsilon_0, r - epsilon_0
     for k in range(ORDER + 1):
-        _sine(c, k)
+        _expand_sine(c, k)
         c[EPSILON, k] = p * c[SQUARE, k] + q * c[COS, k] + r * c[SIN, k]
         if k == 0:
             c[EPSILON, 0] += epsilon_0
         if k < ORDER:
             _next_state(scene, c, k)
-    # Reactions are linear in sine, cosine, square and acceleration.
+    # The reactions are linear in sine, cosine, square of omega, and acceleration.
     s1, s2 = ring.reactions(body, k1, k2, 1.0, 0.0, 0.0, 0.0)
     c1, c2 = ring.reactions(body, k1, k2, 0.0, 1.0, 0.0, 0.0)
     w1, w2 = ring.reactions(body, k1, k2, 0.0, 0.0, 1.0, 0.0)
@@ -334,14 +349,14 @@ def _expand_sliding(scene, mode, c):
 
 
 @inlined
-def _expand_blended(scene, mode, c):
-    """Slip in which the friction coefficients vary with the sliding speed."""
+def _expand_varying_slip(scene, mode, c):
+    """Fill the series of slip with friction coefficients that vary with the sliding speed."""
     mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
     low, _ = region_bounds(scene.law, mode.region)
     k1, k2 = friction_under(scene, mode, max(abs(c[V, 0]), low))
     start = slip_start(scene.body, k1, k2)
     for k in range(ORDER + 1):
-        _sine(c, k)
+        _expand_sine(c, k)
         c[EXCESS, k] = mode.sign * c[V, k] - (low if k == 0 else 0.0)
         expand_weights(scene.law, mode.region, c[EXCESS], k, c[BASIS], c[STATIC_WEIGHT], c[KINETIC_WEIGHT])
         c[FRICTION_1, k] = -mode.sign * (c[STATIC_WEIGHT, k] * mu_s1 + c[KINETIC_WEIGHT, k] * mu_k1)
@@ -349,7 +364,7 @@ def _expand_blended(scene, mode, c):
         slip_term(scene.body, start, c, k)
         if k < ORDER:
             _next_state(scene, c, k)
-    # On the way to a jam all accelerations grow without bound: at some point it is one.
+    # Before a jam the accelerations grow without bound, so that a small effective inertia counts as a jam.
     _, determinant, inertia = ring.acceleration(scene.body, k1, k2, 0.0, 0.0, 0.0)
     if not (determinant > 0.0 and inertia > 1e-6 * ring.about_axis(scene.body) * determinant):
         c[INERTIA, 0] = -1.0
@@ -357,7 +372,19 @@ def _expand_blended(scene, mode, c):
 
 @hook(optional=True)
 def slip_start(body, k1, k2):
-    """What :func:`slip_term` needs of the friction at the beginning of the step; by default nothing."""
+    """Numbers that :func:`slip_term` needs, computed once for each step.
+
+    Parameters
+    ----------
+    body : NamedTuple
+    k1, k2 : float
+        K at each contact at the beginning of the step.
+
+    Returns
+    -------
+    object
+        Passed on to :func:`slip_term`. By default 0, for bodies that need no such numbers.
+    """
     return 0.0
 
 
@@ -376,7 +403,7 @@ def _two_slip_start(body, k1, k2):
 
 @hook
 def slip_term(body, start, c, k):
-    """Fill coefficient `k` of angular acceleration, reactions and inertia in slip, where friction is a series.
+    """Fill coefficient `k` of acceleration, reactions and effective inertia in slip, where friction is a series.
 
     Parameters
     ----------
@@ -384,9 +411,10 @@ def slip_term(body, start, c, k):
     start : object
         What :func:`slip_start` returned.
     c : ndarray of shape ``(rows, columns)``
-        Rows SIN, COS, SQUARE (of the angular velocity), FRICTION_1 and FRICTION_2 (K at each contact) are known up to
-        `k`; EPSILON, NORMAL_1, NORMAL_2 and INERTIA are filled.
+        Table of the series. Known up to coefficient `k`: SIN, COS, SQUARE (of omega), FRICTION_1 and FRICTION_2 (K at
+        each contact). To be filled: EPSILON, NORMAL_1, NORMAL_2 and INERTIA.
     k : int
+        Index of the coefficient.
     """
 
 
@@ -396,7 +424,7 @@ def _two_slip_term(body, start, c, k):
     sb, cb = b.sin_beta, b.cos_beta
     lever, k1, k2, a1, a2, b1, b2 = start
     about_axis = ring.about_axis(b)
-    # Friction but for what the reactions of this order make of it.
+    # Friction without the term of the unknown reactions.
     f1, f2 = product(c[FRICTION_1, 1:], c[NORMAL_1], k - 1), product(c[FRICTION_2, 1:], c[NORMAL_2], k - 1)
     radial = b.mass * (b.gravity * c[COS, k] + b.xi * c[SQUARE, k]) + (f1 - f2) * sb
     tangential = b.mass * b.gravity * (1.0 - b.mass * b.xi * b.xi / about_axis) * c[SIN, k] - (f1 + f2) * lever
@@ -420,19 +448,19 @@ def _one_slip_term(body, start, c, k):
 
 
 @inlined
-def _guard_sliding(scene, mode, c):
-    """Guards of slip: both bounds of the region of speed, and the nearer edge."""
+def _expand_slip_guards(scene, mode, c):
+    """Fill the guards of slip for both ends of the region of the friction law, and for the nearer edge."""
     low, high = region_bounds(scene.law, mode.region)
     ahead_1, ahead_2 = edges_ahead(scene, mode, c[PHI, 0] - c[THETA, 0])
     for k in range(1, ORDER + 1):
         c[SLOW, k] = mode.sign * c[V, k]
         c[FAST, k] = -c[SLOW, k]
         c[EDGE, k] = -mode.sign * (c[PHI, k] - c[THETA, k])
-    c[SLOW, 0] = 0.0 if mode.fresh == SLOW else mode.sign * c[V, 0] - low
-    c[FAST, 0] = 0.0 if mode.fresh == FAST else high - mode.sign * c[V, 0]
+    c[SLOW, 0] = 0.0 if mode.entry_guard == SLOW else mode.sign * c[V, 0] - low
+    c[FAST, 0] = 0.0 if mode.entry_guard == FAST else high - mode.sign * c[V, 0]
     c[EDGE, 0] = min(ahead_1, ahead_2)
-    # Breakaway of a law without a drop of friction is tangential: what is left of the slope is rounding.
-    if mode.fresh == SLOW and low == 0.0:
+    # If friction does not drop at breakaway, the slope is zero there: what is computed is rounding.
+    if mode.entry_guard == SLOW and low == 0.0:
         body = scene.body
         terms = body.gravity + body.radius * (c[SQUARE, 0] + abs(c[EPSILON, 0]) + 2.0 * abs(c[THETA, 2]))
         if abs(c[V, 1]) <= 1e-12 * terms:
@@ -441,34 +469,43 @@ def _guard_sliding(scene, mode, c):
 
 @inlined
 def _expand_stick(scene, mode, tolerance, c):
-    """Stick: the body moves with the ring; reactions and friction follow from the balances."""
+    """Fill the series of stick and return the length of the step; the body moves with the ring."""
     for k in range(ORDER + 1):
         c[V, k] = 0.0
         c[OMEGA, k] = (k + 1.0) * c[THETA, k + 1]
         c[EPSILON, k] = (k + 1.0) * (k + 2.0) * c[THETA, k + 2]
         if k > 0:
             c[PHI, k] = c[THETA, k]
-        _sine(c, k)
+        _expand_sine(c, k)
     mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
     c[EDGE, 0] = inf
     stick_series(scene.body, mu_s1, mu_s2, c)
     c[INERTIA, 0] = inf
-    weight = 1.0 / (scene.body.mass * (scene.body.gravity + scene.body.radius * c[SQUARE, 0]))
+    per_load = 1.0 / (scene.body.mass * (scene.body.gravity + scene.body.radius * c[SQUARE, 0]))
     last, previous = 0.0, 0.0
-    for row, unit in ((PHI, 1.0), (SIN, 1.0), (COS, 1.0), (SLOW, weight), (FAST, weight)):
+    for row, unit in ((PHI, 1.0), (SIN, 1.0), (COS, 1.0), (SLOW, per_load), (FAST, per_load)):
         last = max(last, abs(c[row, ORDER]) * unit)
         previous = max(previous, abs(c[row, ORDER - 1]) * unit)
-    return reach(last / tolerance, previous / tolerance)
+    return step_size(last / tolerance, previous / tolerance)
 
 
 @hook
 def stick_series(body, m1, m2, c):
-    """Fill reactions, the reserves of friction forwards (SLOW) and backwards (FAST), and whether stick exists (EDGE).
+    """Fill the reactions and the guards of stick.
 
-    Rows PHI, OMEGA, EPSILON, SIN, COS and SQUARE are known; `m1` and `m2` are the static coefficients. For two contacts
-    the moment about the axis gives the total friction, the tangential balance the difference of the reactions, and the
-    radial balance, with friction shared in proportion to ``m_i N_i``, a quadratic equation for their sum. With one
-    contact EDGE stays as it is: infinite.
+    For two contacts the moment about the axis gives the sum of the friction forces, and the tangential balance gives
+    the difference of the reactions. The radial balance gives a quadratic equation for the sum of the reactions, with
+    friction shared in proportion to ``m_i N_i``.
+
+    Parameters
+    ----------
+    body : NamedTuple
+    m1, m2 : float
+        Static friction coefficients under the contacts.
+    c : ndarray of shape ``(rows, columns)``
+        Table of the series. Known: PHI, OMEGA, EPSILON, SIN, COS and SQUARE (of omega). To be filled: NORMAL_1,
+        NORMAL_2, and the reserves of friction (N) before forward slip (SLOW) and before backward slip (FAST). For two
+        contacts also EDGE, the discriminant of the quadratic equation; with one contact it stays infinite.
     """
 
 
@@ -478,7 +515,7 @@ def _two_stick_series(body, m1, m2, c):
     sb, cb = b.sin_beta, b.cos_beta
     mean, half = 0.5 * (m1 + m2), 0.5 * (m1 - m2)
     moment = b.inertia + b.mass * b.xi * b.xi
-    # Rows that only slip needs.
+    # Rows that stick does not need otherwise.
     friction, difference, load, total, linear, share = (
         c[FRICTION_1],
         c[FRICTION_2],
@@ -495,7 +532,7 @@ def _two_stick_series(body, m1, m2, c):
         linear[k] = mean * load[k] - cb * half * difference[k] + sb * half * friction[k]
         share[k] = half * load[k] + mean * sb * friction[k]
         constant = product(difference, share, k)
-        # No saturation gives the acceleration of the ring any more where both roots meet.
+        # Where both roots meet, stick ends: no friction gives the acceleration of the ring.
         c[EDGE, k] = product(linear, linear, k) + 4.0 * mean * cb * constant
         if k == 0:
             root = sqrt(max(c[EDGE, 0], 0.0))
@@ -537,12 +574,12 @@ def _seen_at(scene, c, s, h):
 @series.extremes.implements(ring.Ring)
 def _extremes(scene, record, mode, c, h, work):
     count = 0
-    omega, sway, shift = c[OMEGA, 0], variation(c[OMEGA], h), variation(c[PHI], h)
-    turning = abs(omega) <= sway
-    # An extreme is looked for where it could be a new one, or a reversal within the step.
-    if turning and not (c[PHI, 0] - shift >= record.lowest and c[PHI, 0] + shift <= record.highest):
+    omega, omega_variation, phi_variation = c[OMEGA, 0], variation(c[OMEGA], h), variation(c[PHI], h)
+    may_reverse = abs(omega) <= omega_variation
+    # Look for an extreme only if it could exceed the recorded ones, or if omega may change sign within the step.
+    if may_reverse and not (c[PHI, 0] - phi_variation >= record.lowest and c[PHI, 0] + phi_variation <= record.highest):
         count = crossings(c[OMEGA], h, work, count)
-    if turning or omega - sway < record.omega_min or omega + sway > record.omega_max:
+    if may_reverse or omega - omega_variation < record.omega_min or omega + omega_variation > record.omega_max:
         count = crossings(c[EPSILON], h, work, count)
     for row, lowest in ((NORMAL_1, record.normal_min_1), (NORMAL_2, record.normal_min_2)):
         if may_fall_below(c[row], h, lowest):
@@ -550,7 +587,7 @@ def _extremes(scene, record, mode, c, h, work):
                 c[SPARE, k] = (k + 1.0) * c[row, k + 1]
             c[SPARE, ORDER] = 0.0
             count = crossings(c[SPARE], h, work, count)
-    # The reactions may have jumped as the mode was entered.
+    # The reactions may have jumped on entry into the mode.
     work[0, count] = 0.0
     return count + 1
 
@@ -581,5 +618,5 @@ def _after_first_step(mode):
     return Mode(mode.sign, mode.region, -1, mode.place_1, mode.place_2)
 
 
-#: Functions that the series need of a body.
+#: Hooks that the series need of a body.
 BODY_MEMBERS = (slip_start, slip_term, stick_series)

@@ -1,7 +1,7 @@
-"""Friction laws: to add a law is to write a class, its formula and its name in one file.
+"""Friction laws. ``docs/extending.md`` shows how to add one.
 
-Every law gives a coefficient of friction, the force per unit of the normal load. So one law serves the belt under the
-weight of its body, and the ring under reactions that vary. ``docs/extending.md`` shows how a law is written.
+Every law gives a coefficient of friction, the force per unit of the normal load. So the same law holds on the belt,
+where the load is the weight of the body, and on the ring, where the reactions vary.
 """
 
 from ringsweep.physics.friction import bristles, coulomb, regularised

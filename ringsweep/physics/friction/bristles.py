@@ -1,8 +1,7 @@
-"""Laws with a memory: friction carried by bristles, whose mean deflection z is a state of its own.
+"""Dynamic laws: friction of bristles, whose mean deflection z is a state variable.
 
-Stiffness and damping are per unit of the normal load here: 1/m and s/m, so that the traction, the force per unit of
-the load, is :math:`\\sigma_0 z + \\sigma_1 \\dot z + \\sigma_2 v`. To add a law: a class with its parameters, its
-formula, :func:`bristle`, and what tells stick from slip, :func:`region_guard`.
+Stiffness and damping are per unit of the normal load: 1/m and s/m. :mod:`ringsweep.physics.friction.presliding`
+describes the functions of a law.
 """
 
 from __future__ import annotations
@@ -34,34 +33,39 @@ from ringsweep.quantities.parameters import Leaf, Parameter
 class Dahl(NamedTuple):
     """Dahl's bristles: :math:`\\dot z = v - \\sigma_0 |v| z/\\mu_k` and the traction :math:`\\sigma_0 z` (Dahl 1968).
 
-    Coulomb friction with presliding. The contact counts as slipping where the bristles have come within a thousandth
-    of their greatest traction.
+    Coulomb friction with presliding. The contact counts as slipping if the traction exceeds :math:`0.999 \\mu_k`.
     """
 
     sigma0: Annotated[Leaf, SIGMA_0]
 
 
 @bristle.implements(Dahl)
-def _dahl(law, mu_s, mu_k, v, z, sign, region):
+def _dahl_bristle(law, mu_s, mu_k, v, z, sign, region):
     rate_v = 1.0 - law.sigma0 * sign * z / mu_k
     rate_z = -law.sigma0 * sign * v / mu_k
     return v * rate_v, rate_v, rate_z, law.sigma0 * z, 0.0, law.sigma0
 
 
 @region_guard.implements(Dahl)
-def _dahl_lasts(law, mu_s, mu_k, v, z, sign, region):
+def _dahl_region_guard(law, mu_s, mu_k, v, z, sign, region):
     slack = NEARLY - law.sigma0 * sign * z / mu_k
     return slack if region == BAND else -slack
 
 
 @steady_deflection.implements(Dahl)
-def _dahl_steady(law, mu_s, mu_k, v):
+def _dahl_steady_deflection(law, mu_s, mu_k, v):
     return (1.0 if v > 0.0 else -1.0 if v < 0.0 else 0.0) * mu_k / law.sigma0
 
 
 @inlined
 def stribeck(law, mu_s, mu_k, v):
-    """Friction coefficient of steady sliding without its viscous part, and its slope: the g(v) of LuGre."""
+    """LuGre's g(v), the friction coefficient of steady sliding without its viscous part; 1.
+
+    Returns
+    -------
+    tuple of float
+        g, 1, and its slope dg/dv, s/m.
+    """
     x = v / law.v_s
     tail = exp(-x * x) if x * x < 700.0 else 0.0
     return mu_k + (mu_s - mu_k) * tail, -2.0 * x / law.v_s * (mu_s - mu_k) * tail
@@ -69,7 +73,17 @@ def stribeck(law, mu_s, mu_k, v):
 
 @inlined
 def viscoelastic(law, v, z, rate, rate_v, rate_z):
-    """What :func:`bristle` returns, of bristles with damping and viscous friction."""
+    """Result of :func:`bristle` for bristles with damping and viscous friction.
+
+    Parameters
+    ----------
+    law : NamedTuple
+        Law with the fields ``sigma0``, ``sigma1``, ``sigma2``.
+    v, z : float
+        Sliding velocity, m/s, and deflection, m.
+    rate, rate_v, rate_z : float
+        dz/dt, m/s, and its derivatives by `v`, 1, and by `z`, 1/s.
+    """
     return (
         rate,
         rate_v,
@@ -81,15 +95,17 @@ def viscoelastic(law, v, z, rate, rate_v, rate_z):
 
 
 class LuGre(NamedTuple):
-    """Bristles with Stribeck's curve (Canudas de Wit et al., IEEE Trans. Autom. Control 40, 1995; paper, Eqs. 11-13).
+    """LuGre bristles with a Stribeck curve (Canudas de Wit et al., IEEE Trans. Autom. Control 40, 1995).
+
+    The paper's Eqs. 11-13:
 
     .. math::
 
         \\dot z = v - \\frac{\\sigma_0 |v|}{g(v)} z, \\qquad g = \\mu_k + (\\mu_s - \\mu_k) e^{-(v/v_s)^2}, \\qquad
         \\mu = \\sigma_0 z + \\sigma_1 \\dot z + \\sigma_2 v
 
-    The contact counts as stuck while it is slower than the Stribeck velocity and its bristles have not yet come within
-    a thousandth of the deflection :math:`g/\\sigma_0` of steady sliding.
+    The contact counts as stuck while it is slower than the Stribeck velocity and its deflection is less than 0.999 of
+    the deflection :math:`g/\\sigma_0` of steady sliding.
     """
 
     sigma0: Annotated[Leaf, SIGMA_0]
@@ -99,20 +115,20 @@ class LuGre(NamedTuple):
 
 
 @bristle.implements(LuGre)
-def _lugre(law, mu_s, mu_k, v, z, sign, region):
+def _lugre_bristle(law, mu_s, mu_k, v, z, sign, region):
     g, slope = stribeck(law, mu_s, mu_k, v)
     share = law.sigma0 * sign * z / g
     return viscoelastic(law, v, z, v * (1.0 - share), 1.0 - share + v * share * slope / g, -law.sigma0 * sign * v / g)
 
 
 class ElastoPlastic(NamedTuple):
-    """LuGre with a range in which bristles only deflect (Dupont et al., IEEE Trans. Autom. Control 47, 2002).
+    """LuGre bristles with an elastic range (Dupont et al., IEEE Trans. Autom. Control 47, 2002).
 
     .. math:: \\dot z = v \\left(1 - a(z, v)\\, \\frac{\\sigma_0 \\operatorname{sgn}(v)\\, z}{g(v)}\\right)
 
-    with a = 0 while the bristles are relieved or deflected by less than ``elastic_fraction``
-    times :math:`\\mu_k/\\sigma_0`, a = 1 from their steady deflection :math:`g/\\sigma_0` on, half a sine between.
-    Below that deflection a contact under an oscillating load does not drift.
+    Here a = 0 while the bristles are unloaded, or deflected by less than ``elastic_fraction`` times
+    :math:`\\mu_k/\\sigma_0`; a = 1 from the steady deflection :math:`g/\\sigma_0` on; between these deflections a is
+    half a period of a sine. In the elastic range a contact does not drift under an oscillating load.
     """
 
     sigma0: Annotated[Leaf, SIGMA_0]
@@ -126,7 +142,7 @@ class ElastoPlastic(NamedTuple):
 
 
 @bristle.implements(ElastoPlastic)
-def _elasto_plastic(law, mu_s, mu_k, v, z, sign, region):
+def _elasto_plastic_bristle(law, mu_s, mu_k, v, z, sign, region):
     g, slope = stribeck(law, mu_s, mu_k, v)
     load = law.sigma0 * sign * z
     elastic = law.elastic_fraction * mu_k
@@ -146,38 +162,34 @@ def _elasto_plastic(law, mu_s, mu_k, v, z, sign, region):
 
 
 @region_guard.implements(LuGre, ElastoPlastic)
-def _loading(law, mu_s, mu_k, v, z, sign, region):
+def _stribeck_region_guard(law, mu_s, mu_k, v, z, sign, region):
     g, _ = stribeck(law, mu_s, mu_k, v)
     slack = min(NEARLY - law.sigma0 * sign * z / g, 1.0 - sign * v / law.v_s)
     return slack if region == BAND else -slack
 
 
 @steady_deflection.implements(LuGre, ElastoPlastic)
-def _stribeck_steady(law, mu_s, mu_k, v):
+def _stribeck_steady_deflection(law, mu_s, mu_k, v):
     g, _ = stribeck(law, mu_s, mu_k, v)
     return (1.0 if v > 0.0 else -1.0 if v < 0.0 else 0.0) * g / law.sigma0
 
 
 @after_yield.implements(Dahl, LuGre, ElastoPlastic)
-def _passes(law, mu_s, mu_k, z, sign, region):
+def _same_deflection(law, mu_s, mu_k, z, sign, region):
     return z, KINETIC if region == BAND else BAND
 
 
 @stick_speed.implements(LuGre, ElastoPlastic)
-def _stribeck_or_recoil(law, recoil):
+def _stribeck_stick_speed(law, recoil):
     return min(law.v_s, recoil)
 
 
-@initial_deflection.implements(Dahl, LuGre, ElastoPlastic)
-def _undeflected(law, mu_s, mu_k):
-    return 0.0
-
-
 class ResetIntegrator(NamedTuple):
-    """A spring that gives way (Haessig and Friedland, J. Dyn. Syst. Meas. Control 113, 1991).
+    """Reset integrator (Haessig and Friedland, J. Dyn. Syst. Meas. Control 113, 1991).
 
-    The bristles follow the body, :math:`\\dot z = v` with the traction :math:`\\sigma_0 z + \\sigma_1 v`, up to
-    :math:`|z| = \\mu_s/\\sigma_0`; there they stay, with the traction :math:`\\mu_k`, until the body turns back.
+    In stick :math:`\\dot z = v`, with the traction :math:`\\sigma_0 z + \\sigma_1 v`. Slip begins at
+    :math:`|z| = \\mu_s/\\sigma_0`. Then z stays constant, with the traction :math:`\\mu_k`, until the sliding velocity
+    reverses.
     """
 
     sigma0: Annotated[Leaf, SIGMA_0]
@@ -185,76 +197,78 @@ class ResetIntegrator(NamedTuple):
 
 
 @bristle.implements(ResetIntegrator)
-def _reset_integrator(law, mu_s, mu_k, v, z, sign, region):
+def _reset_integrator_bristle(law, mu_s, mu_k, v, z, sign, region):
     if region == BAND:
         return v, 1.0, 0.0, law.sigma0 * z + law.sigma1 * v, law.sigma1, law.sigma0
     return 0.0, 0.0, 0.0, sign * mu_k, 0.0, 0.0
 
 
 @region_guard.implements(ResetIntegrator)
-def _until_saturated(law, mu_s, mu_k, v, z, sign, region):
+def _reset_integrator_region_guard(law, mu_s, mu_k, v, z, sign, region):
     return mu_s - law.sigma0 * sign * z if region == BAND else 1.0
 
 
 @after_yield.implements(ResetIntegrator)
-def _saturates(law, mu_s, mu_k, z, sign, region):
+def _reset_integrator_after_yield(law, mu_s, mu_k, z, sign, region):
     return sign * mu_s / law.sigma0, KINETIC
 
 
-@initial_deflection.implements(ResetIntegrator)
-def _reset_made(law, mu_s, mu_k):
+@initial_deflection.implements(Dahl, LuGre, ElastoPlastic, ResetIntegrator)
+def _undeflected(law, mu_s, mu_k):
     return 0.0
 
 
-#: Bonds of a contact of :class:`Bristles`; twenty to twenty-five are what its authors advise.
+#: Number of bonds of a contact of :class:`Bristles`; its authors recommend 20 to 25.
 BONDS = 20
 
-# Park and Miller's generator: its numbers are exact in double precision.
+# Park and Miller's random generator: its numbers are exact in double precision.
 _MULTIPLIER, _MODULUS = 16807.0, 2147483647.0
 
 
 class Bristles(NamedTuple):
     """Twenty bonds that snap and form anew at random (Haessig and Friedland 1991).
 
-    Each bond is a spring; at the deflection :math:`\\delta` it snaps, and a new one forms whose deflection lies between
-    :math:`-\\delta/2` and :math:`\\delta/2`, anywhere with equal chance. The traction is :math:`\\sigma_0` times the
-    mean deflection. In steady sliding its mean is :math:`\\tfrac{11}{24} \\sigma_0 \\delta`, which is set to
-    :math:`\\mu_k`. The contact counts as slipping once as many bonds have snapped in one direction as there are.
+    Each bond is a spring that snaps at the deflection :math:`\\delta`. Then a new bond forms with a random deflection,
+    uniformly distributed between :math:`-\\delta/2` and :math:`\\delta/2`. The traction is :math:`\\sigma_0` times the
+    mean deflection. Its mean in steady sliding, :math:`\\tfrac{11}{24} \\sigma_0 \\delta`, is set equal to
+    :math:`\\mu_k`. The contact counts as slipping once 20 bonds have snapped in one direction.
 
-    ``bonds`` is memory that belongs to the cell: the deflection of each bond beyond the mean, the state of the random
-    generator, and the number of bonds that have snapped in one direction, negative for backwards.
+    ``bonds``, of shape ``(cells, 22)``, is the memory of each cell: the deflections of the bonds minus their mean; the
+    state of the random generator; the number of bonds that have snapped in one direction, negative for backwards.
     """
 
     sigma0: Annotated[Leaf, SIGMA_0]
-    seed: Annotated[Leaf, Parameter("1", "seed of the random bonds", lower=0.0, upper=2.0**31 - 4.0, default=0.0)]
+    seed: Annotated[
+        Leaf, Parameter("1", "seed of the random bonds", lower=0.0, upper=2.0**31 - 4.0, default=0.0, whole=True)
+    ]
     bonds: Any = None
 
     @classmethod
     def of(cls, sigma0: Any, seed: Any) -> Bristles:
-        """The law with memory for the bonds of every cell."""
+        """Law with memory for the bonds of every cell."""
         return cls(sigma0, seed, bonds=np.zeros((*np.shape(sigma0), BONDS + 2)))
 
 
 @inlined
 def _snapping(law, mu_k):
-    """Deflection at which a bond snaps, m."""
+    """Deflection at which a bond snaps, delta, m."""
     return 24.0 / 11.0 * mu_k / law.sigma0
 
 
 @inlined
 def _new_bond(law, mu_k):
-    """Deflection of a new bond, m; moves the random generator on."""
+    """Random deflection of a new bond, m; changes the state of the random generator."""
     law.bonds[BONDS] = (_MULTIPLIER * law.bonds[BONDS]) % _MODULUS
     return (law.bonds[BONDS] / _MODULUS - 0.5) * _snapping(law, mu_k)
 
 
 @bristle.implements(Bristles)
-def _bristles(law, mu_s, mu_k, v, z, sign, region):
+def _bonds_bristle(law, mu_s, mu_k, v, z, sign, region):
     return v, 1.0, 0.0, law.sigma0 * z, 0.0, law.sigma0
 
 
 @region_guard.implements(Bristles)
-def _until_snap(law, mu_s, mu_k, v, z, sign, region):
+def _bonds_region_guard(law, mu_s, mu_k, v, z, sign, region):
     longest = sign * law.bonds[0]
     for i in range(1, BONDS):
         longest = max(longest, sign * law.bonds[i])
@@ -262,13 +276,13 @@ def _until_snap(law, mu_s, mu_k, v, z, sign, region):
 
 
 @after_yield.implements(Bristles)
-def _snap(law, mu_s, mu_k, z, sign, region):
+def _bonds_after_yield(law, mu_s, mu_k, z, sign, region):
     bonds = law.bonds
     longest = 0
     for i in range(1, BONDS):
         if sign * bonds[i] > sign * bonds[longest]:
             longest = i
-    # Bonds are kept beyond their mean, which is the state.
+    # Deflections are stored minus their mean, which is the state z.
     bonds[longest] = _new_bond(law, mu_k) - z
     mean = 0.0
     for i in range(BONDS):
@@ -280,7 +294,7 @@ def _snap(law, mu_s, mu_k, z, sign, region):
 
 
 @initial_deflection.implements(Bristles)
-def _random_bonds(law, mu_s, mu_k):
+def _bonds_initial_deflection(law, mu_s, mu_k):
     law.bonds[BONDS] = 1.0 + (48271.0 * (law.seed + 1.0)) % (_MODULUS - 1.0)
     law.bonds[BONDS + 1] = 0.0
     mean = 0.0
@@ -293,7 +307,7 @@ def _random_bonds(law, mu_s, mu_k):
 
 
 @stick_speed.implements(Dahl, ResetIntegrator, Bristles)
-def _recoil(law, recoil):
+def _recoil_stick_speed(law, recoil):
     return recoil
 
 

@@ -1,7 +1,7 @@
-"""What friction laws with bristles offer: rate and traction of the bristles, and what tells stick from slip.
+"""Hooks of friction laws with bristles: rate of the deflection, traction, and transitions between stick and slip.
 
-Stiffness and damping are per unit of the normal load: 1/m and s/m. The traction, the force per unit of the load, is
-:math:`\\sigma_0 z + \\sigma_1 \\dot z + \\sigma_2 v`, where z is the mean deflection of the bristles.
+Stiffness and damping are per unit of the normal load: 1/m and s/m. The traction is the force per unit of the load,
+:math:`\\mu = \\sigma_0 z + \\sigma_1 \\dot z + \\sigma_2 v`, where z is the mean deflection of the bristles.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from ringsweep.quantities.parameters import Parameter
 
 MU_K = Parameter("1", "kinetic friction coefficient", lower=0.0, open_lower=True)
 
-#: Share of the deflection of steady sliding from which on a contact counts as slipping.
+#: A contact counts as slipping if its deflection exceeds this share of the deflection of steady sliding.
 NEARLY = 0.999
 
 SIGMA_0 = Parameter("1/m", "stiffness of the bristles", lower=0.0, open_lower=True)
@@ -22,51 +22,112 @@ V_S = Parameter("m/s", "Stribeck velocity", lower=0.0, open_lower=True)
 
 @hook
 def bristle(law, mu_s, mu_k, v, z, sign, region):
-    """Rate of the deflection and traction, each with its partial derivatives.
+    """Rate of the deflection, and traction, with their partial derivatives by `v` and `z`.
+
+    For LuGre bristles (the paper's Eqs. 11-13) with the steady friction g(v),
+
+    .. math:: \\dot z = v - \\frac{\\sigma_0 |v|}{g(v)} z, \\quad \\mu = \\sigma_0 z + \\sigma_1 \\dot z + \\sigma_2 v .
 
     Parameters
     ----------
     law : NamedTuple
-        A law of this kind.
+        Friction law with bristles.
     mu_s, mu_k : float
-        Static and kinetic coefficient of the surface under the contact.
+        Static and kinetic coefficient of the surface under the contact, 1; equal if the law has no static coefficient.
     v, z : float
         Sliding velocity, m/s, and deflection, m.
     sign : float
-        Sign of the sliding velocity, +1 or -1; a formula in \\|v\\| is continued smoothly through zero by it.
+        Sign of the sliding velocity, +1 or -1. Write ``sign * v`` for \\|v\\|: then the formulas are smooth through
+        zero.
     region : int
-        BAND where the contact counts as stuck, KINETIC where it slips.
+        BAND if the contact counts as stuck, KINETIC if it slips.
 
     Returns
     -------
     tuple of float
-        ``(rate, by v, by z, traction, by v, by z)``; m/s, 1, 1/s, 1, s/m, 1/m.
+        Rate dz/dt, m/s; its derivatives by `v`, 1, and by `z`, 1/s; traction, 1; its derivatives by `v`, s/m, and by
+        `z`, 1/m.
     """
 
 
 @hook
 def region_guard(law, mu_s, mu_k, v, z, sign, region):
-    """A guard: positive while the region lasts, for the arguments of :func:`bristle`."""
+    """Guard of a region: positive while the contact stays in it, zero where it leaves it.
+
+    Parameters
+    ----------
+    law, mu_s, mu_k, v, z, sign, region
+        As for :func:`bristle`.
+
+    Returns
+    -------
+    float
+        Guard, 1.
+    """
 
 
 @hook
 def after_yield(law, mu_s, mu_k, z, sign, region):
-    """Deflection and region after that guard has reached zero, while sliding in the direction `sign`."""
+    """Deflection and region after :func:`region_guard` has reached zero.
+
+    Parameters
+    ----------
+    law, mu_s, mu_k, z, sign, region
+        As for :func:`bristle`; `z` and `region` are those before the change.
+
+    Returns
+    -------
+    tuple
+        ``(z, region)``: deflection, m; and BAND or KINETIC.
+    """
 
 
 @hook
 def stick_speed(law, recoil):
-    """Speed by which to tell stick from a graze, m/s, where `recoil` is that of a body let go by its bristles."""
+    """Sliding speed below which a contact counts as stuck, m/s.
+
+    The belt needs it to tell stick from a harmonic motion that touches zero sliding velocity without sticking.
+
+    Parameters
+    ----------
+    law : NamedTuple
+    recoil : float
+        Speed that bristles at their largest deflection give to the body when they relax, m/s.
+
+    Returns
+    -------
+    float
+        `recoil`, or a smaller characteristic speed of the law, m/s.
+    """
 
 
 @hook
 def initial_deflection(law, mu_s, mu_k):
-    """Deflection of a contact that has just been made, m."""
+    """Deflection at the launch, m. A law with memory of its own sets it here.
+
+    Parameters
+    ----------
+    law : NamedTuple
+    mu_s, mu_k : float
+        As for :func:`bristle`.
+    """
 
 
 @hook
 def steady_deflection(law, mu_s, mu_k, v):
-    """Deflection of bristles that have slid at the velocity `v` for long, m; zero at rest."""
+    """Deflection in steady sliding at the velocity `v`, m; zero at rest. Only the ring needs it.
+
+    It solves dz/dt = 0: :math:`z = \\operatorname{sgn}(v)\\, g(v)/\\sigma_0` for LuGre bristles.
+
+    Parameters
+    ----------
+    law : NamedTuple
+    mu_s, mu_k : float
+        As for :func:`bristle`.
+    v : float
+        Sliding velocity, m/s.
+    """
 
 
+#: Functions that every law with bristles must have.
 MEMBERS = (bristle, region_guard, after_yield, stick_speed, initial_deflection)

@@ -1,4 +1,4 @@
-"""The friction laws by name, and what tells one kind of law from another."""
+"""Registry of the friction laws: names, families and traits."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from ringsweep.quantities.parameters import Parameter
 
 
 class SetValued(NamedTuple):
-    """Family of laws whose friction at rest is whatever holds the contact, up to a bound."""
+    """Family of laws that are set-valued at rest: friction takes any value up to a bound."""
 
 
 class Smooth(NamedTuple):
-    """Family of laws whose friction is a continuous function of the sliding velocity."""
+    """Family of laws that are continuous functions of the sliding velocity."""
 
 
 class Dynamic(NamedTuple):
@@ -24,20 +24,20 @@ class Dynamic(NamedTuple):
 
 @dataclass(frozen=True)
 class Traits:
-    """What is particular about a law.
+    """Traits of a law.
 
     Attributes
     ----------
     family : type
         :class:`SetValued`, :class:`Smooth` or :class:`Dynamic`.
     static : bool
-        Whether the law needs a static coefficient beside the kinetic one.
+        Whether the law has a static coefficient beside the kinetic one.
     ascending : tuple of str, optional
-        Two parameters of which the first must be less than the second.
+        Names of two parameters; the first value must be less than the second.
     snaps : bool
-        Whether its memory changes in jumps, at instants that only a method with events meets.
+        Whether its memory jumps at certain instants; only methods with events find these.
     dead_band : bool
-        Whether a contact slower than the stiction band keeps its speed; the drive must be steady then.
+        Whether a contact within the stiction band keeps its speed. Then the drive must be steady.
     """
 
     family: type
@@ -50,10 +50,10 @@ class Traits:
 #: Laws by the name that the configuration gives them.
 LAWS: dict[str, type] = {}
 
-#: What is particular about each law.
+#: Traits of each law.
 TRAITS: dict[type, Traits] = {}
 
-# Functions without which no solver takes a law, by its family.
+# Functions that every law of a family must have.
 _NEEDED: dict[type, tuple[Any, ...]] = {
     SetValued: velocity.MEMBERS,
     Smooth: velocity.MEMBERS,
@@ -63,7 +63,7 @@ _NEEDED: dict[type, tuple[Any, ...]] = {
 
 @hook
 def family(law):
-    """Family of a law, an instance of :class:`SetValued`, :class:`Smooth` or :class:`Dynamic`."""
+    """Family of a law: an instance of :class:`SetValued`, :class:`Smooth` or :class:`Dynamic`."""
 
 
 def _set_valued(law):
@@ -82,24 +82,24 @@ _FAMILY_BODIES: dict[type, Any] = {SetValued: _set_valued, Smooth: _smooth, Dyna
 
 
 def add_law(name: str, law: type, traits: Traits) -> None:
-    """Make a friction law known under a name.
+    """Register a friction law.
 
     Parameters
     ----------
     name : str
         Name in configurations.
     law : type
-        ``NamedTuple`` of the law's parameters; the functions of its family have bodies for it.
+        ``NamedTuple`` of the law's parameters. The hooks of its family must have bodies for it.
     traits : Traits
-        Its family, and what is particular about it.
+        Family and other traits.
 
     Raises
     ------
     TypeError
-        If a function that the family needs has no body for the law, or if the name is taken.
+        If a hook of the family has no body for the law, or if the name is taken.
     """
     if missing := lacking(law, _NEEDED[traits.family]):
-        raise TypeError(f"friction law {name} has no {', '.join(missing)}: every law of its family needs one")
+        raise TypeError(f"friction law {name} has no {', '.join(missing)}: every law of its family needs it")
     if LAWS.setdefault(name, law) is not law:
         raise TypeError(f"there is a friction law {name} already: choose another name")
     TRAITS[law] = traits
@@ -107,11 +107,11 @@ def add_law(name: str, law: type, traits: Traits) -> None:
 
 
 def family_of(law: type) -> type:
-    """Family of a class of laws."""
+    """Family of a type of law: SetValued, Smooth or Dynamic."""
     return TRAITS[law].family
 
 
 def coefficients_of(law: type) -> dict[str, Parameter]:
-    """Coefficients that a law needs of each surface."""
+    """Parameters of the friction coefficients that a law needs of each surface."""
     mu_k = presliding.MU_K if family_of(law) is Dynamic else velocity.MU_K
     return {"mu_s": velocity.MU_S, "mu_k": mu_k} if TRAITS[law].static else {"mu_k": mu_k}

@@ -1,4 +1,4 @@
-"""Laws whose friction is a continuous function of the sliding velocity: a formula each, :func:`piece`."""
+"""Smooth laws: continuous functions of the sliding velocity."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from ringsweep.physics.friction.velocity import (
     Piece,
     absent,
     blend,
-    decaying,
     end_of_tail,
+    exponential_tail,
+    exponential_weights,
     piece,
     steepest,
     stiction_band,
-    tail,
 )
 from ringsweep.quantities.parameters import Leaf, Parameter
 
@@ -31,21 +31,21 @@ V1 = Parameter("m/s", "sliding speed from which friction is kinetic", lower=0.0,
 
 
 class Threlfall(NamedTuple):
-    """Coulomb friction rounded off by an exponential (Threlfall, Mech. Mach. Theory 13, 1978).
+    """Coulomb friction regularised by an exponential (Threlfall, Mech. Mach. Theory 13, 1978).
 
     .. math::
 
         \\mu = \\mu_k\\, \\frac{1 - e^{-3|v|/v_0}}{1 - e^{-3}} \\quad (|v| < v_0), \\qquad
         \\mu = \\mu_k \\quad (|v| \\ge v_0)
 
-    The denominator, often rounded to 0.95, makes it continuous.
+    The denominator, often rounded to 0.95, makes the law continuous.
     """
 
     v0: Annotated[Leaf, V0]
 
 
 @piece.implements(Threlfall)
-def _threlfall(law, region):
+def _threlfall_piece(law, region):
     if region == STRIBECK:
         return absent()
     if region == KINETIC:
@@ -55,7 +55,7 @@ def _threlfall(law, region):
 
 
 @blend.implements(Threlfall)
-def _threlfall_everywhere(law, speed):
+def _threlfall_blend(law, speed):
     full, rate = 1.0 / (1.0 - exp(-3.0)), 3.0 / law.v0
     q = full * decay(rate * speed)
     within = speed < law.v0
@@ -70,7 +70,7 @@ def _threlfall_steepest(law):
 class PiecewiseLinear(NamedTuple):
     """Stiction regularised by straight lines (the paper's Fig. 5).
 
-    From 0 to :math:`\\mu_s` at v0, down to :math:`\\mu_k` at v1, constant beyond.
+    From 0 at rest to :math:`\\mu_s` at v0, then down to :math:`\\mu_k` at v1, constant above v1.
     """
 
     v0: Annotated[Leaf, V0]
@@ -78,7 +78,7 @@ class PiecewiseLinear(NamedTuple):
 
 
 @piece.implements(PiecewiseLinear)
-def _piecewise_linear(law, region):
+def _piecewise_linear_piece(law, region):
     if region == KINETIC:
         return Piece(law.v1, inf, 0.0, ZERO, ONE)
     if region == BAND:
@@ -88,7 +88,7 @@ def _piecewise_linear(law, region):
 
 
 @blend.implements(PiecewiseLinear)
-def _piecewise_linear_everywhere(law, speed):
+def _piecewise_linear_blend(law, speed):
     up, down = 1.0 / law.v0, 1.0 / (law.v1 - law.v0)
     x = min(max((speed - law.v0) * down, 0.0), 1.0)
     within = speed < law.v0
@@ -103,14 +103,14 @@ def _piecewise_linear_steepest(law):
 
 
 class PiecewiseCubic(NamedTuple):
-    """Stiction regularised by cubics whose slopes meet (the paper's Fig. 6; STEP functions of multibody codes).
+    """Stiction regularised by cubics with a continuous slope (the paper's Fig. 6; STEP of multibody codes).
 
     .. math::
 
         \\mu = \\tfrac12 \\mu_s (3\\eta - \\eta^3),\\ \\eta = \\tfrac{|v|}{v_0} \\ (|v| < v_0), \\qquad
         \\mu = \\mu_s + (\\mu_k - \\mu_s)(3\\xi^2 - 2\\xi^3),\\ \\xi = \\tfrac{|v| - v_0}{v_1 - v_0} \\ (|v| < v_1)
 
-    and :math:`\\mu_k` beyond.
+    and :math:`\\mu_k` above v1.
     """
 
     v0: Annotated[Leaf, V0]
@@ -118,7 +118,7 @@ class PiecewiseCubic(NamedTuple):
 
 
 @piece.implements(PiecewiseCubic)
-def _piecewise_cubic(law, region):
+def _piecewise_cubic_piece(law, region):
     if region == KINETIC:
         return Piece(law.v1, inf, 0.0, ZERO, ONE)
     if region == BAND:
@@ -130,7 +130,7 @@ def _piecewise_cubic(law, region):
 
 
 @blend.implements(PiecewiseCubic)
-def _piecewise_cubic_everywhere(law, speed):
+def _piecewise_cubic_blend(law, speed):
     up, down = 1.0 / law.v0, 1.0 / (law.v1 - law.v0)
     eta, x = speed * up, min(max((speed - law.v0) * down, 0.0), 1.0)
     within = speed < law.v0
@@ -141,18 +141,20 @@ def _piecewise_cubic_everywhere(law, speed):
 
 @steepest.implements(PiecewiseCubic)
 def _piecewise_cubic_steepest(law):
-    # In the middle of the fall, which begins with none.
+    # Steepest in the middle of the fall; at v0 its slope is zero.
     rate = 1.5 / (law.v1 - law.v0)
     return (1.5 / law.v0, 0.0), (-rate, rate)
 
 
 class BengisuAkay(NamedTuple):
-    """Bengisu-Akay friction: a parabola up to v0, an exponential tail beyond (the paper's Eqs. 23-24).
+    """Bengisu-Akay friction: a parabola up to v0, an exponential tail above (the paper's Eqs. 23-24).
 
     .. math::
 
         \\mu = \\mu_s [1 - (1 - |v|/v_0)^2] \\quad (|v| < v_0), \\qquad
         \\mu = \\mu_k [1 + (\\mu_s/\\mu_k - 1) e^{-\\alpha(|v| - v_0)}] \\quad (|v| \\ge v_0)
+
+    ``end`` is the speed at which the tail ends, m/s.
     """
 
     alpha: Annotated[Leaf, ALPHA]
@@ -161,21 +163,21 @@ class BengisuAkay(NamedTuple):
 
     @classmethod
     def of(cls, alpha: Any, v0: Any) -> BengisuAkay:
-        """The law with the end of its tail worked out."""
+        """Law with the end of its tail computed."""
         return cls(alpha, v0, end_of_tail(alpha, v0))
 
 
 @piece.implements(BengisuAkay)
-def _bengisu_akay(law, region):
+def _bengisu_akay_piece(law, region):
     if region != BAND:
-        return tail(region, law.v0, law.end, law.alpha)
+        return exponential_tail(region, law.v0, law.end, law.alpha)
     rate = 1.0 / law.v0
     return Piece(0.0, law.v0, 0.0, (0.0, 2.0 * rate, -rate * rate, 0.0), ZERO)
 
 
 @blend.implements(BengisuAkay)
-def _bengisu_akay_everywhere(law, speed):
-    w_s, w_k, dw_s, dw_k = decaying(law.alpha, speed - law.v0, speed < law.end)
+def _bengisu_akay_blend(law, speed):
+    w_s, w_k, dw_s, dw_k = exponential_weights(law.alpha, speed - law.v0, speed < law.end)
     rate = 1.0 / law.v0
     eta, within = speed * rate, speed < law.v0
     return (

@@ -1,13 +1,11 @@
-"""Friction as a function of the sliding velocity alone: what every such law offers, from one formula.
+"""Friction laws that are functions of the sliding velocity alone: values, slopes, power series and regions.
 
-A law gives the magnitude of the friction coefficient as a blend of the static and the kinetic
-coefficient of the surface under the contact,
+A law gives the friction coefficient as a weighted sum of the static and the kinetic coefficient of the surface,
 
-.. math:: \\mu(|v|) = w_s(|v|)\\, \\mu_s + w_k(|v|)\\, \\mu_k ,
+.. math:: \\mu(|v|) = w_s(|v|)\\, \\mu_s + w_k(|v|)\\, \\mu_k .
 
-so that one evaluation of the weights serves every contact, whatever surface it stands on. The weights
-are analytic within each of at most three regions of the sliding speed; :func:`piece` gives them there,
-and values, slopes, power series and regions all follow from it.
+Both contacts of a body have the same weights, even on different surfaces. The weights are analytic within each of up to
+three regions of the sliding speed. :func:`piece` gives them there; all else is derived from it.
 """
 
 from __future__ import annotations
@@ -18,21 +16,31 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ringsweep.compile import hook, inlined
-from ringsweep.numerics.functions import decay, either, select
+from ringsweep.numerics.functions import decay, lanes_body, select
 from ringsweep.quantities.parameters import Parameter
 
 MU_S = Parameter("1", "static friction coefficient", lower=0.0)
 MU_K = Parameter("1", "kinetic friction coefficient", lower=0.0)
 
-#: Regions of the sliding speed, from the fastest to the slowest. In the last a contact counts as stuck.
+#: Regions of the sliding speed, from the fastest to the slowest. In BAND a contact counts as stuck.
 KINETIC, STRIBECK, BAND = 0, 1, 2
 
 
 class Piece(NamedTuple):
-    """Weights between the sliding speeds ``low`` and ``high``, m/s; where both are zero the law lacks the region.
+    """Weights of both friction coefficients in a region of the sliding speed.
 
-    With ``x = speed - low`` and ``q = exp(-decay x)``, or ``q = x**2`` where ``decay`` is zero, a weight with the
+    With ``x = speed - low`` and ``q = exp(-decay x)``, or ``q = x**2`` if ``decay`` is zero, a weight with the
     coefficients ``(a0, a1, a2, a3)`` is ``a0 + a1 x + a2 q + a3 x q``.
+
+    Attributes
+    ----------
+    low, high : float
+        Bounds of the region, m/s. Both are zero if the law lacks the region.
+    decay : float
+        Decay of q, s/m.
+    static, kinetic : tuple of float
+        Coefficients of the weights of the static and of the kinetic coefficient: a0 in 1, a1 in s/m; a2 in 1 and a3 in
+        s/m, or a2 in s^2/m^2 and a3 in s^3/m^3 if ``decay`` is zero.
     """
 
     low: float
@@ -42,52 +50,64 @@ class Piece(NamedTuple):
     kinetic: tuple[float, float, float, float]
 
 
-#: Coefficients of weights that are constant.
+#: Coefficients of constant weights.
 ZERO = (0.0, 0.0, 0.0, 0.0)
 ONE = (1.0, 0.0, 0.0, 0.0)
 
 
 @hook
 def piece(law, region):
-    """Weights of both coefficients in a region of the sliding speed, a :class:`Piece`."""
+    """Weights of both friction coefficients in a region of the sliding speed.
+
+    Parameters
+    ----------
+    law : NamedTuple
+    region : int
+        KINETIC, STRIBECK or BAND.
+
+    Returns
+    -------
+    Piece
+        :func:`absent` if the law lacks the region.
+    """
 
 
 @hook(absorb=True)
 def stiction_band(law):
-    """Speed below which a contact counts as stuck, m/s: where BAND ends; 0 for laws that stick exactly or never."""
+    """Sliding speed below which a contact counts as stuck, m/s: the upper bound of BAND; 0 for laws without BAND."""
 
 
 @inlined
 def region_bounds(law, region):
-    """Speeds between which a region lies, m/s."""
+    """Lower and upper bound of a region, m/s."""
     p = piece(law, region)
     return p.low, p.high
 
 
 @inlined
 def region_at(law, speed):
-    """Region that holds a sliding speed, m/s; a boundary belongs to the region above it."""
+    """Region of a sliding speed, m/s; a bound belongs to the region above it."""
     if speed >= piece(law, KINETIC).low:
         return KINETIC
-    tail = piece(law, STRIBECK)
-    return STRIBECK if tail.low < tail.high and speed >= tail.low else BAND
+    p = piece(law, STRIBECK)
+    return STRIBECK if p.low < p.high and speed >= p.low else BAND
 
 
 @inlined
 def faster(law, region):
-    """Region beyond the upper bound of one."""
+    """Region above the upper bound of `region`."""
     return STRIBECK if region == BAND and piece(law, STRIBECK).low < piece(law, STRIBECK).high else KINETIC
 
 
 @inlined
 def slower(law, region):
-    """Region below the lower bound of one."""
+    """Region below the lower bound of `region`."""
     return STRIBECK if region == KINETIC and piece(law, STRIBECK).low < piece(law, STRIBECK).high else BAND
 
 
 @inlined
 def constant_weights(law, region):
-    """Whether the friction coefficients are constant in a region."""
+    """Whether both weights are constant in a region."""
     p = piece(law, region)
     (_, s1, s2, s3), (_, k1, k2, k3) = p.static, p.kinetic
     return s1 == 0.0 and s2 == 0.0 and s3 == 0.0 and k1 == 0.0 and k2 == 0.0 and k3 == 0.0
@@ -95,13 +115,38 @@ def constant_weights(law, region):
 
 @hook(absorb=True)
 def blend(law, speed):
-    """:func:`weights` where the speed is :mod:`ringsweep.numerics.lanes`, each in a region of its own: hence without
-    ``if``."""
+    """Body of :func:`weights` for vector lanes. Each lane may be in another region, so it is written without ``if``.
+
+    Parameters
+    ----------
+    law : NamedTuple
+        Its fields are Lanes.
+    speed : Lanes
+        Magnitude of the sliding velocity, m/s.
+
+    Returns
+    -------
+    tuple of Lanes
+        ``(w_s, w_k, dw_s/dspeed, dw_k/dspeed)``; weights in 1, slopes in s/m.
+    """
 
 
 @hook(absorb=True)
 def steepest(law):
-    """Slopes of both weights at rest, and where the band ends, on its far side: there friction is steepest, s/m."""
+    """Slopes of the weights where friction is steepest: at rest, and outside the stiction band.
+
+    ``rk4`` takes the stiffness of a step that meets one of these speeds from them.
+
+    Parameters
+    ----------
+    law : NamedTuple
+
+    Returns
+    -------
+    tuple of tuple of float
+        ``((dw_s/dspeed, dw_k/dspeed) at rest, (dw_s/dspeed, dw_k/dspeed) outside the band)``, s/m. The latter are the
+        steepest ones, usually at the upper bound of the band.
+    """
 
 
 def weights(law, speed):
@@ -110,7 +155,6 @@ def weights(law, speed):
     Parameters
     ----------
     law : NamedTuple
-        A law of this kind.
     speed : float
         Magnitude of the sliding velocity, m/s.
 
@@ -122,20 +166,20 @@ def weights(law, speed):
     return weights_in(law, region_at(law, speed), speed)
 
 
-@either(weights)
+@lanes_body(weights)
 def _lanes_weights(law, speed):
     return blend(law, speed)
 
 
 @inlined
 def weights_in(law, region, speed):
-    """:func:`weights` by the formula of a region, beyond its bounds too."""
+    """:func:`weights` by the formula of a region, even if the speed lies outside the region."""
     p = piece(law, region)
     if constant_weights(law, region):
         return p.static[0], p.kinetic[0], 0.0, 0.0
     x = speed - p.low
     if p.decay > 0.0:
-        # exp(-40) is below the rounding of the sum: spare the call.
+        # exp(-40) is less than the rounding of the sum.
         q = exp(-p.decay * x) if p.decay * x < 40.0 else 0.0
         q_x = -p.decay * q
     else:
@@ -151,35 +195,44 @@ def weights_in(law, region, speed):
 
 @inlined
 def passes_band(law, before, after, ahead):
-    """What a step meets whose sliding velocity is `before` at its beginning, `after` at its end, `ahead` in its stages.
+    """Whether a step meets rest, or the upper bound of the stiction band.
+
+    Parameters
+    ----------
+    law : NamedTuple
+    before, after, ahead : float or Lanes
+        Sliding velocity at the beginning of the step, at its end, and in its stages, m/s.
 
     Returns
     -------
     tuple of bool
-        Whether it meets rest, whether the edge of the band, and whether it jumps across the whole band.
+        Whether the step meets rest; whether it meets rest or the bound of the band; whether it jumps across the whole
+        band.
     """
     band = stiction_band(law)
     slow = min(min(abs(before), abs(after)), abs(ahead))
     fast = max(max(abs(before), abs(after)), abs(ahead))
     rest = (before * after < 0.0) | (before * ahead < 0.0)
-    # At rest a law without a band has every value at once.
+    # A law without a band is set-valued at rest.
     rest = rest | ((band == 0.0) & (before * after == 0.0))
     return rest, rest | ((slow < band) & (band <= fast)), rest & (slow >= band)
 
 
 @inlined
 def expand_weights(law, region, x, k, basis, static, kinetic):
-    """Coefficient `k` of the series of both weights, given those of the speed up to `k`.
+    """Compute coefficient `k` of the power series of both weights, from the series of the speed.
 
     Parameters
     ----------
     law : NamedTuple
     region : int
-    x : ndarray
-        Series of the speed in excess of the lower bound of the region, m/s.
+        KINETIC, STRIBECK or BAND.
+    x : ndarray of shape ``(more than k,)``
+        Series of the speed minus the lower bound of the region, m/s^(j + 1).
     k : int
-    basis, static, kinetic : ndarray
-        Series of what :class:`Piece` calls q, and of the weights; coefficient `k` is filled.
+        Coefficients 0 ... k - 1 are known.
+    basis, static, kinetic : ndarray of shape ``(more than k,)``
+        Series of q, see :class:`Piece`, and of the weights; coefficient `k` is filled.
     """
     p = piece(law, region)
     (s0, s1, s2, s3), (k0, k1, k2, k3) = p.static, p.kinetic
@@ -209,32 +262,52 @@ def expand_weights(law, region, x, k, basis, static, kinetic):
         kinetic[0] += k0
 
 
-# Powers of e by which an exponential may change within a step of its series: of more the terms still grow where the
-# series ends, and say nothing of what is left out.
-_POWERS = 8.0
+# Largest change of the exponent of an exponential within a step. For a larger change the terms still grow at the end of
+# the series, so the last terms give no estimate of the error.
+_MAX_EXPONENT = 8.0
 
 
 @inlined
-def tail_reach(law, region, v, h):
-    """A step not above `h`, short enough for the series of the weights; `v` is the series of the sliding velocity."""
+def shorten_for_decay(law, region, v, h):
+    """Step shortened from `h`, s, so that the series of the weights converges within it.
+
+    Parameters
+    ----------
+    law : NamedTuple
+    region : int
+    v : ndarray of shape ``(3 or more,)``
+        Series of the sliding velocity, m/s^(k + 1).
+    h : float
+        Step, s.
+    """
     decay = piece(law, region).decay
-    return min(h, min(0.5 * _POWERS / (decay * abs(v[1])), sqrt(0.5 * _POWERS / (decay * abs(v[2])))))
+    return min(h, min(0.5 * _MAX_EXPONENT / (decay * abs(v[1])), sqrt(0.5 * _MAX_EXPONENT / (decay * abs(v[2])))))
 
 
-# ---- what several laws share: an exponential tail ----------------------------------------------
+# ---- exponential tails ------------------------------------------------------------------------
 
 ALPHA = Parameter("s/m", "decay of friction with sliding speed", lower=0.0)
 
 
 @inlined
 def absent():
-    """A region that a law lacks."""
+    """Piece for a region that a law lacks."""
     return Piece(0.0, 0.0, 0.0, ONE, ZERO)
 
 
 @inlined
-def tail(region, low, high, alpha):
-    """Weights that pass from static to kinetic friction as ``exp(-alpha (speed - low))``, and beyond."""
+def exponential_tail(region, low, high, alpha):
+    """Piece of an exponential tail: from static to kinetic friction as ``exp(-alpha (speed - low))``.
+
+    Parameters
+    ----------
+    region : int
+        STRIBECK for the tail, KINETIC for the region above it.
+    low, high : float
+        Bounds of the tail, m/s.
+    alpha : float
+        Decay, s/m; with 0 friction stays static.
+    """
     if region == KINETIC:
         return Piece(high, inf, 0.0, ZERO, ONE)
     if alpha == 0.0:
@@ -243,21 +316,39 @@ def tail(region, low, high, alpha):
 
 
 @inlined
-def decaying(alpha, x, lasts):
-    """:func:`weights` in a tail, at a speed `x` beyond its beginning, while it lasts."""
+def exponential_weights(alpha, x, lasts):
+    """:func:`weights` of an exponential tail, without ``if``.
+
+    Parameters
+    ----------
+    alpha : float or Lanes
+        Decay, s/m.
+    x : float or Lanes
+        Speed minus the lower bound of the tail, m/s.
+    lasts : bool or Mask
+        Whether the speed is below the upper bound of the tail.
+    """
     q = select(lasts, decay(alpha * x), 0.0)
     return q, 1.0 - q, -alpha * q, alpha * q
 
 
 def end_of_tail(alpha: Any, low: Any) -> Any:
-    """Speed beyond which an exponential tail changes the sliding velocity by less than 1e-17 m/s, m/s."""
+    """Upper bound of an exponential tail, m/s: the rest of it changes the sliding velocity by less than 1e-17 m/s.
+
+    Parameters
+    ----------
+    alpha : float or ndarray
+        Decay, s/m. With 0 the tail does not end.
+    low : float or ndarray
+        Lower bound of the tail, m/s.
+    """
     with np.errstate(divide="ignore"):
         length = np.clip(39.1 - np.log(alpha), 10.0, 40.0) / alpha
     return np.where(np.asarray(alpha) > 0.0, low + length, inf)
 
 
-#: Functions without which no solver takes a law.
+#: Functions that every law of the sliding velocity must have.
 MEMBERS = (piece, stiction_band)
 
-#: Functions that runs side by side in vector lanes need besides.
+#: Functions that ``rk4`` needs besides.
 LANES_MEMBERS = (blend, steepest)

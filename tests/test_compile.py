@@ -1,0 +1,87 @@
+"""Compilation: fallbacks on Numba's public interfaces, and the digest of sources in the key of the cache."""
+
+import ast
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import ringsweep
+from ringsweep.compile.cache import sources_digest
+from ringsweep.compile.numba_private import AVAILABLE
+
+PACKAGE = Path(ringsweep.__file__).parent
+
+#: A sweep that runs in a process in which the import of one of Numba's private interfaces fails.
+WITHOUT_PRIVATE_INTERFACES = """
+import sys
+import numba
+
+sys.modules["numba._dynfunc"] = None
+
+import ringsweep
+from ringsweep.compile.numba_private import AVAILABLE
+
+assert not AVAILABLE
+found = ringsweep.sweep({scene!r}, {axes!r}, solver="event", jobs=1, progress=False)
+print(dict((name, repr(found[name].values.tolist())) for name in found))
+"""
+
+
+@pytest.mark.skipif(not AVAILABLE, reason="this version of Numba lacks the private interfaces")
+def test_outcomes_without_private_interfaces_of_numba_are_equal_bit_for_bit(scene, tmp_path):
+    axes = {"drive.amplitude": [0.5, 2.0]}
+    script = WITHOUT_PRIVATE_INTERFACES.format(scene=scene, axes=axes)
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(PACKAGE.parent)}
+    done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    expected = ringsweep.sweep(scene, axes, solver="event", progress=False)
+    # Lists of floats are printed with all digits.
+    assert ast.literal_eval(done.stdout) == {name: repr(expected[name].values.tolist()) for name in expected}
+    assert (expected["certified"] == 1).all()
+    assert len(set(expected["regime"].values)) == 2
+    assert not list(tmp_path.rglob("*.nb*")), "without private interfaces no kernel is kept on disk"
+
+
+@pytest.fixture
+def package(tmp_path):
+    """Copy of the package's sources."""
+    return shutil.copytree(PACKAGE, tmp_path / "ringsweep", ignore=shutil.ignore_patterns("__pycache__", "*.nb*"))
+
+
+def edited(path):
+    """Append a comment to a file."""
+    path.write_text(path.read_text(encoding="utf-8") + "\n# An edit.\n", encoding="utf-8")
+
+
+@pytest.mark.parametrize("folder", ["plots", "cli", "config", "storage"])
+def test_edit_outside_the_kernels_keeps_the_digest_of_sources(package, folder):
+    before = sources_digest(package)
+    edited(next((package / folder).glob("*.py")))
+    assert sources_digest(package) == before
+
+
+@pytest.mark.parametrize("folder", ["compile", "numerics", "physics", "models", "solvers", "quantities"])
+def test_edit_in_the_kernels_changes_the_digest_of_sources(package, folder):
+    before = sources_digest(package)
+    assert before == sources_digest(PACKAGE)
+    edited(max((package / folder).rglob("*.py")))
+    assert sources_digest(package) != before
+
+
+def test_new_file_of_a_law_changes_the_digest_of_sources(package):
+    before = sources_digest(package)
+    (package / "physics" / "friction" / "new.py").write_text("")
+    assert sources_digest(package) != before
+
+
+@pytest.mark.parametrize("text", ["", "# A law."])
+def test_own_file_changes_the_digest_of_sources_by_its_content(package, tmp_path, text):
+    own = tmp_path / "own.py"
+    own.write_text("# Another law.")
+    other = sources_digest(package, [own])
+    own.write_text(text)
+    assert sources_digest(package, [own]) != other
