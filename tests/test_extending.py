@@ -94,11 +94,11 @@ CLAIMS = {
     """,
     "rk4 refuses a law without blend, and names both": """
         try:
-            friction = {"law": "weakening", "mu_s": 0.15, "mu_k": 0.1, "v1": 0.1}
-            run({**belt, "friction": friction}, {"method": "rk4", "steps": 10})
+            friction = {"law": "weakening", "rest": {"mu_s": 0.15, "mu_k": 0.1}, "v1": 0.1}
+            run({**disc, "friction": friction}, {"method": "rk4", "steps": 10})
         except InputError as error:
             assert error.path == "scene.friction.law"
-            assert error.problem == "friction weakening has no function `blend`, which solver rk4 needs"
+            assert error.problem == "friction weakening has no velocity.blend, velocity.steepest: solver rk4 needs it"
         else:
             raise AssertionError("not refused")
     """,
@@ -115,9 +115,9 @@ def test_examples_do_what_the_page_claims(tmp_path):
 @pytest.mark.parametrize(
     ("name", "old", "new", "message"),
     [
-        ("my_ramp.py", "@stiction_band.implements(Ramp)", "", "friction law ramp has no stiction_band"),
-        ("my_run_up.py", "@jerk.implements(RunUp)", "", "drive run-up has no jerk"),
-        ("my_disc.py", "@ring.energy.implements(OnDisc)", "", "model disc: OnDisc has no energy"),
+        ("my_ramp.py", "@stiction_band.implements(Ramp)", "", "friction law ramp has no velocity.stiction_band"),
+        ("my_run_up.py", "@jerk.implements(RunUp)", "", "drive run-up has no drives.jerk"),
+        ("my_disc.py", "@ring.energy.implements(OnDisc)", "", "model disc: OnDisc has no ring.energy"),
         ("my_ramp.py", '"ramp"', '"lugre"', "there is a friction law lugre already"),
         (
             "my_disc.py",
@@ -134,3 +134,28 @@ def test_incomplete_file_is_refused_in_one_line_that_names_what_is_missing(tmp_p
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert message in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "solver", "message"),
+    [
+        ("body.press - body.pull", "body.pres - body.pull", '"event"', "Unknown attribute 'pres' of type OnDisc"),
+        (
+            "def _acceleration(body, K1, K2, sin_phi, cos_phi, omega):\n",
+            "def _acceleration(body, K1, K2, sin_phi, cos_phi, omega):\n    if omega > 0.0:\n        K1 = 0.0 * K1\n",
+            '{"method": "rk4", "steps": 10}',
+            "use select in place of if",
+        ),
+    ],
+)
+def test_function_that_does_not_compile_is_told_in_one_line_by_file_and_line(tmp_path, old, new, solver, message):
+    script = f"""
+        try:
+            run({{**disc, "initial": {{"phi": 1.0}}}}, {solver})
+        except InputError as error:
+            print(error)
+    """
+    done = in_a_process(script, files_in(tmp_path, [("my_disc.py", old, new)]), tmp_path / "cache")
+    assert done.stdout.startswith("RINGSWEEP_LAWS: does not compile: my_disc.py, line"), done.stderr[-2000:]
+    assert done.stdout.count("\n") == 1
+    assert message in done.stdout

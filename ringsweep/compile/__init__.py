@@ -7,6 +7,7 @@ this package and :mod:`ringsweep.numerics` use Numba.
 
 from ringsweep.compile.cache import SOURCES_DIGEST, kernel
 from ringsweep.compile.dispatch import hook, lacking
+from ringsweep.compile.errors import readable_compile_errors
 from ringsweep.compile.options import KERNEL_OPTIONS, absorbed, inlined, specialise
 from ringsweep.compile.tuples import add_scaled, borrowed, function_from_lines, generated, map_leaves, take, unrolled
 
@@ -23,6 +24,7 @@ __all__ = [
     "kernel",
     "lacking",
     "map_leaves",
+    "readable_compile_errors",
     "specialise",
     "take",
     "unrolled",

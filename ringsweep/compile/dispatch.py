@@ -29,8 +29,7 @@ def hook(stub: Callable[..., Any] | None = None, *, absorb: bool = False, option
     Returns
     -------
     callable
-        The hook. ``hook.implements(*types)`` decorates a body; ``hook.is_defined_for(type)`` tells whether there is
-        one.
+        The hook. ``hook.implements(*types)`` decorates a body; ``hook.body_of(type)`` is the body for a type, or None.
 
     Raises
     ------
@@ -45,13 +44,13 @@ def hook(stub: Callable[..., Any] | None = None, *, absorb: bool = False, option
 
     @wraps(stub)
     def function(*arguments: Any) -> Any:
-        body = bodies.get(type(arguments[0]), default)
+        body = body_of(type(arguments[0]))
         if body is None:
             raise TypeError(f"{type(arguments[0]).__name__} has no {name}")
         return body(*arguments)
 
     def typed(*kinds: Any) -> Callable[..., Any] | None:
-        return bodies.get(getattr(kinds[0], "instance_class", type(None)), default)
+        return body_of(getattr(kinds[0], "instance_class", type(None)))
 
     specialise(function, typed, absorb=absorb)
 
@@ -65,14 +64,15 @@ def hook(stub: Callable[..., Any] | None = None, *, absorb: bool = False, option
 
         return register
 
-    def is_defined_for(cls: type) -> bool:
-        return optional or cls in bodies
+    def body_of(cls: type) -> Callable[..., Any] | None:
+        return bodies.get(cls, default)
 
     function.implements = implements  # type: ignore[attr-defined]
-    function.is_defined_for = is_defined_for  # type: ignore[attr-defined]
+    function.body_of = body_of  # type: ignore[attr-defined]
     return function
 
 
 def lacking(cls: type, functions: tuple[Any, ...]) -> list[str]:
-    """Names of the hooks that have no body for a type."""
-    return [function.__name__ for function in functions if not function.is_defined_for(cls)]
+    """Hooks that have no body for a type, as ``module.name``."""
+    missing = [function for function in functions if function.body_of(cls) is None]
+    return [f"{function.__module__.rpartition('.')[2]}.{function.__name__}" for function in missing]

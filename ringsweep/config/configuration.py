@@ -83,7 +83,11 @@ def load(config: str | os.PathLike[str] | Mapping[str, Any]) -> Config:
     return dataclasses.replace(found, axes=build_axes(columns))
 
 
-def with_values(config: str | os.PathLike[str] | Mapping[str, Any], settings: Iterable[str] = ()) -> Config:
+def with_values(
+    config: str | os.PathLike[str] | Mapping[str, Any],
+    settings: Iterable[str] = (),
+    solver: Mapping[str, Any] | None = None,
+) -> Config:
     """Configuration of a single run: without axes, and with some values changed.
 
     If the grid has an axis of friction laws and no setting names a law, that axis stays: there is a run under each law.
@@ -94,6 +98,8 @@ def with_values(config: str | os.PathLike[str] | Mapping[str, Any], settings: It
         As for :func:`load`. Its other axes are ignored.
     settings : iterable of str
         ``"PATH=VALUE"`` with a path in the scene (``drive.amplitude=3``) or in the solver (``solver.steps=100``).
+    solver : mapping, optional
+        Section ``solver`` that takes the place of the configuration's.
 
     Raises
     ------
@@ -101,6 +107,9 @@ def with_values(config: str | os.PathLike[str] | Mapping[str, Any], settings: It
         If configuration or settings are wrong, or a value is missing that only the sweep gives.
     """
     doc = yaml_text.read(config)
+    if solver is not None:
+        doc.tree["solver"] = yaml_text.read({"solver": solver}).tree["solver"]
+        doc.locations = {path: line for path, line in doc.locations.items() if path.partition(".")[0] != "solver"}
     with doc.locating_errors():
         changed = {_apply_setting(doc, setting) for setting in settings}
         sweep = sweep_section(doc)

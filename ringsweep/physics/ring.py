@@ -222,7 +222,9 @@ def _one_acceleration(body, K1, K2, sin_phi, cos_phi, omega):
 def constant_terms(body, K1, K2):
     """Terms of the angular acceleration and of the reactions that do not depend on the state.
 
-    The other terms are proportional to ``sin_phi``, ``cos_phi`` or ``omega**2``. By default the constant terms are 0.
+    The other terms are proportional to ``sin_phi``, ``cos_phi`` or ``omega**2``. By default they are found as what is
+    left
+    where these three are 0.
 
     Parameters
     ----------
@@ -234,7 +236,25 @@ def constant_terms(body, K1, K2):
     tuple of float
         Constant terms of the angular acceleration, rad/s^2, and of both normal reactions, N.
     """
+    phi_dd, _, _ = acceleration(body, K1, K2, 0.0, 0.0, 0.0)
+    normal_1, normal_2 = reactions(body, K1, K2, 0.0, 0.0, 0.0, 0.0)
+    return phi_dd, normal_1, normal_2
+
+
+@constant_terms.implements(TwoContacts, OneContact)
+def _no_constant_terms(body, K1, K2):
     return 0.0, 0.0, 0.0
+
+
+@hook(optional=True)
+def contact_count(body):
+    """Number of contacts of a body; by default 1."""
+    return 1
+
+
+@contact_count.implements(TwoContacts)
+def _two_contacts(body):
+    return 2
 
 
 @hook(absorb=True)
@@ -494,6 +514,7 @@ def _one_tractions(body, sin_phi, cos_phi, omega, phi_dd, normal_1, normal_2):
 
 #: Functions of a body that the model of the ring needs, besides those of :mod:`ringsweep.physics.contact`.
 BODY_MEMBERS = (
+    contact_count,
     contact_offset,
     about_axis,
     acceleration,

@@ -56,14 +56,6 @@ class Parameter(Quantity):
         below = value < self.upper if self.open_upper else value <= self.upper
         return math.isfinite(value) and above and below
 
-    def along_a_line(self) -> Parameter:
-        """The parameter for a belt, where the drive moves along a line: m in place of rad."""
-        name = self.long_name.replace("angular velocity of the ring", "velocity of the belt")
-        name = name.replace("ring's angular velocity", "belt's velocity").replace("rocking angle", "displacement")
-        name = name.replace("angle of the ring", "displacement of the belt")
-        unit = {"rad": "m", "rad/s": "m/s"}.get(self.unit, self.unit)
-        return replace(self, long_name=name, unit=unit if "phase" not in name else self.unit)
-
     @property
     def interval(self) -> str:
         """The admissible interval in words, such as ``"greater than 0"``."""

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsweep.compile import readable_compile_errors
 from ringsweep.config import Axes, Config
 from ringsweep.models import MODELS, batch
 from ringsweep.models.scene import LAW, Scene
@@ -96,7 +97,8 @@ def compute_task(config: Config, layout: Layout, positions: NDArray[np.integer])
         if not len(own):
             continue
         values = values_at(scene, axes, {dim: along[own] for dim, along in indices.items()}, len(own))
-        result = config.solver.run(batch(structure, values), model.outcomes)
+        with readable_compile_errors():
+            result = config.solver.run(batch(structure, values), model.outcomes)
         for name, column in _columns(model.outcomes, result):
             if name not in model.absent:
                 columns.setdefault(name, np.empty(len(positions), dtype=OUTCOMES[name].dtype))[own] = column

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.compile import take
-from ringsweep.config import Config, read_solver, with_values
+from ringsweep.config import Config, with_values
 from ringsweep.models import MODELS, batch
 from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import turn
@@ -84,11 +83,9 @@ def _single_run(scene: str | os.PathLike[str] | Mapping[str, Any], solver: str |
     """Configuration of a single run from a scene or a whole configuration."""
     if isinstance(scene, Mapping) and "scene" not in scene:
         scene = {"scene": scene}
-    config = with_values(scene)
     if solver is None:
-        return config
-    method = {"method": solver} if isinstance(solver, str) else dict(solver)
-    return replace(config, solver=read_solver(method, config.scene), source=config.source | {"solver": method})
+        return with_values(scene)
+    return with_values(scene, solver={"method": solver} if isinstance(solver, str) else solver)
 
 
 def history(config: Config, *, samples: int = SAMPLES) -> xr.Dataset:

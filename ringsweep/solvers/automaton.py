@@ -101,7 +101,7 @@ def _begin(family, scene, mode, t, y, tolerances, c):
 @_begin.implements(SetValued, Smooth)
 def _begin_series(family, scene, mode, t, y, tolerances, c):
     series.expand(scene, mode, t, y, tolerances[0], c)
-    return recorder.begin(scene, t, series.seen_at(scene, c, 0.0, 0.0))
+    return recorder.begin(scene, t, series.seen_at_start(scene, c))
 
 
 @_begin.implements(Dynamic)

@@ -80,7 +80,7 @@ class Method(ABC):
             if missing := lacking(cls, members):
                 kind = key.split(".")[0]
                 raise InputError(
-                    f"scene.{key}", f"{kind} {name} has no function `{missing[0]}`, which solver {self.name} needs"
+                    f"scene.{key}", f"{kind} {name} has no {', '.join(missing)}: solver {self.name} needs it"
                 )
 
     def resolved(self, structure: Structure) -> Method:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ringsweep.compile import absorbed, add_scaled, hook, inlined, kernel, take
 from ringsweep.errors import InputError
+from ringsweep.models import MODELS
 from ringsweep.models.interface import constant_step, recorder
 from ringsweep.models.interface.status import COMPLETE, RUNNING
 from ringsweep.models.scene import Structure
@@ -72,11 +73,18 @@ class RK4(Method):
 
     def needs(self, structure: Structure) -> Needs:
         """Functions for steps of constant length; vector lanes need more functions of a law without bristles."""
-        bristles = family_of(LAWS[structure.law]) is Dynamic
-        of_law = (
-            (presliding.bristle, presliding.region_guard) if bristles else velocity.MEMBERS + velocity.LANES_MEMBERS
-        )
+        of_law: tuple[Any, ...] = velocity.MEMBERS
+        if family_of(LAWS[structure.law]) is Dynamic:
+            of_law = (presliding.bristle, presliding.region_guard)
+        elif self._uses_lanes(structure):
+            of_law += velocity.LANES_MEMBERS
         return Needs(of_law, drives.CONSTANT_STEP_MEMBERS, recorder.MEMBERS + constant_step.MEMBERS)
+
+    @staticmethod
+    def _uses_lanes(structure: Structure) -> bool:
+        """Whether runs of such a scene stand side by side in vector lanes; the type of the scene decides it."""
+        side_by_side = constant_step.side_by_side.body_of(MODELS[structure.model].scene_type(structure))
+        return isinstance(side_by_side(None), Several)
 
     def check(self, structure: Structure) -> None:
         """Refuse laws whose bonds snap, since a constant step does not locate the instants.

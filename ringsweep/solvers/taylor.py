@@ -50,7 +50,8 @@ def _observe(scene, record, mode, c, t, s, work):
     before = 0.0
     for j in range(count + 1):
         now = instants[j] if j < count else s
-        record = recorder.observe(scene, record, t + now, now - before, stuck, series.seen_at(scene, c, now, s))
+        seen = series.seen_at(scene, c, now, s) if now > 0.0 else series.seen_at_start(scene, c)
+        record = recorder.observe(scene, record, t + now, now - before, stuck, seen)
         before = now
     return record
 

@@ -49,7 +49,7 @@ class Belt(Model):
         if friction.family_of(law) is not friction.Dynamic:
             found["friction.viscous"] = Parameter("N s/m", "viscous friction", lower=0.0, default=0.0)
         for name, p in declared(drives.DRIVES[structure.drive]).items():
-            found[f"drive.{name}"] = p.along_a_line()
+            found[f"drive.{name}"] = _along_a_line(p)
         return found | {
             "initial.x": Parameter("m", "displacement of the body at the start", default=0.0),
             "initial.velocity": Parameter(
@@ -113,3 +113,12 @@ class Belt(Model):
         if friction.TRAITS[self.laws[structure.law]].dead_band and structure.drive != "constant":
             raise InputError("scene.drive", f"the dead band of law {structure.law} needs a belt of constant velocity")
         return drive_of(structure, values)
+
+
+def _along_a_line(parameter: Parameter) -> Parameter:
+    """A parameter of a drive for the belt, which moves along a line: m in place of rad."""
+    name = parameter.long_name.replace("angular velocity of the ring", "velocity of the belt")
+    name = name.replace("ring's angular velocity", "belt's velocity").replace("rocking angle", "displacement")
+    name = name.replace("angle of the ring", "displacement of the belt")
+    unit = {"rad": "m", "rad/s": "m/s"}.get(parameter.unit, parameter.unit)
+    return replace(parameter, long_name=name, unit=unit if "phase" not in name else parameter.unit)

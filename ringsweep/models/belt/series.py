@@ -186,6 +186,11 @@ def _rates_at(scene, c, s):
     return slope(c[X], s), slope(c[V], s)
 
 
+@series.seen_at_start.implements(belt.Belt)
+def _seen_at_start(scene, c):
+    return c[X, 0], c[VELOCITY, 0], c[FORCE, 0]
+
+
 @series.seen_at.implements(belt.Belt)
 def _seen_at(scene, c, s, h):
     velocity = value(c[VELOCITY], s)

@@ -93,6 +93,23 @@ def rates_at(scene, c, s):
 
 
 @hook
+def seen_at_start(scene, c):
+    """What the recorder is shown as a step begins, from the first coefficients alone.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+    c : ndarray of shape ``(rows, columns)``
+        Table of the step. Its other coefficients need not be finite, as those of a body without a load are not.
+
+    Returns
+    -------
+    tuple of float
+        See :mod:`ringsweep.models.interface.recorder`.
+    """
+
+
+@hook
 def seen_at(scene, c, s, h):
     """State within a step as the recorder takes it, see :mod:`ringsweep.models.interface.recorder`.
 
@@ -176,4 +193,4 @@ def after_first_step(mode):
     return mode
 
 
-MEMBERS = (table_shape, expand, state_at, rates_at, seen_at, extremes, row)
+MEMBERS = (table_shape, expand, state_at, rates_at, seen_at_start, seen_at, extremes, row)

@@ -192,7 +192,7 @@ def _is_near_another_regime(batch, a, b, fall_rates):
     found = np.zeros(len(fall_rates), dtype=bool)
     # A least reaction that is smaller than its error leaves separation open.
     contacts = (1, a.normal_min_1, b.normal_min_1), (2, a.normal_min_2, b.normal_min_2)
-    for number, least, second_least in contacts[: 1 if isinstance(batch.body, ring.OneContact) else 2]:
+    for number, least, second_least in contacts[: ring.contact_count(batch.body)]:
         separated = separating & ((a.separating_contact.astype(int) & number) > 0)
         found |= moved & ~separated & (least <= 2.0 * np.abs(least - second_least))
     # A reaction that falls slowly may rise again before it vanishes. Its second derivative is at most about that of the

@@ -39,7 +39,9 @@ class SingleContactRing(Model):
     def takes(self, law: type) -> bool:
         """Laws without a dead band; laws with bristles need ``steady_deflection``."""
         traits = friction.TRAITS[law]
-        return not traits.dead_band and (traits.family is not friction.Dynamic or steady_deflection.is_defined_for(law))
+        return not traits.dead_band and (
+            traits.family is not friction.Dynamic or steady_deflection.body_of(law) is not None
+        )
 
     def scene_type(self, structure: Structure) -> type:
         """``BristleRing`` for laws with bristles, else ``Ring``."""

@@ -566,6 +566,11 @@ def _rates_at(scene, c, s):
     return slope(c[PHI], s), slope(c[V], s)
 
 
+@series.seen_at_start.implements(ring.Ring)
+def _seen_at_start(scene, c):
+    return c[PHI, 0], c[OMEGA, 0], c[NORMAL_1, 0], c[NORMAL_2, 0]
+
+
 @series.seen_at.implements(ring.Ring)
 def _seen_at(scene, c, s, h):
     return value(c[PHI], s), value(c[OMEGA], s), value(c[NORMAL_1], s), value(c[NORMAL_2], s)
