@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import textwrap
@@ -43,16 +44,19 @@ def files_in(folder, changes=()):
     return paths
 
 
-def in_a_process(script, paths, cache):
+def in_a_process(script, paths, cache, package_folder=Path(__file__).parents[1]):
     """Run a script in a new process, with own files and with a cache of its own."""
     environment = {
         **os.environ,
         "RINGSWEEP_LAWS": os.pathsep.join(map(str, paths)),
         "NUMBA_CACHE_DIR": str(cache),
-        "PYTHONPATH": str(Path(__file__).parents[1]),
+        "PYTHONPATH": str(package_folder),
     }
     script = RUN + textwrap.dedent(script)
-    return subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=False)
+    # Elsewhere than in the checkout, whose package Python would find first.
+    return subprocess.run(
+        [sys.executable, "-c", script], env=environment, cwd=cache.parent, capture_output=True, text=True, check=False
+    )
 
 
 def test_page_has_one_example_for_each_kind_of_extension():
@@ -159,3 +163,29 @@ def test_function_that_does_not_compile_is_told_in_one_line_by_file_and_line(tmp
     assert done.stdout.startswith("RINGSWEEP_LAWS: does not compile: my_disc.py, line"), done.stderr[-2000:]
     assert done.stdout.count("\n") == 1
     assert message in done.stdout
+
+
+def test_files_moved_into_the_package_register_what_they_hold(tmp_path):
+    package = tmp_path / "ringsweep"
+    shutil.copytree(Path(__file__).parents[1] / "ringsweep", package, ignore=shutil.ignore_patterns("__pycache__"))
+    folders = {"my_ramp.py": "physics/friction", "my_weakening.py": "physics/friction"}
+    folders |= {"my_disc.py": "models", "my_heun.py": "solvers"}
+    for name, folder in folders.items():
+        (package / folder / name).write_text(FILES[name], encoding="utf-8")
+    script = """
+        from ringsweep.config import schema
+        from ringsweep.models import MODELS
+        from ringsweep.physics.friction import LAWS
+        from ringsweep.solvers import METHODS
+        print(schema.__file__, "ramp" in LAWS, "weakening" in LAWS, "disc" in MODELS, "heun" in METHODS)
+    """
+    done = in_a_process(script, [], tmp_path / "cache", tmp_path)
+    assert done.stdout == f"{package / 'config' / 'schema.py'} True True True True\n", done.stderr[-2000:]
+
+
+def test_law_of_an_imported_file_is_refused_since_edits_of_it_would_go_unnoticed(tmp_path):
+    """The key of the cache of compiled code covers the package and the files of RINGSWEEP_LAWS."""
+    (path,) = (path for path in files_in(tmp_path) if path.name == "my_ramp.py")
+    done = in_a_process(f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import my_ramp", [], tmp_path / "cache")
+    assert done.returncode == 1
+    assert f"TypeError: Ramp comes from {path}, which RINGSWEEP_LAWS does not name" in done.stderr

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import logging
 import os
+import sys
 from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
@@ -57,6 +58,23 @@ def sources_digest(root: Path, own_laws: Iterable[Path] = ()) -> str:
         except OSError as error:
             raise InputError("RINGSWEEP_LAWS", f"{path} cannot be read: {error.strerror or error}") from error
     return digest.hexdigest()
+
+
+def require_known_source(cls: type) -> None:
+    """Make sure that the key of the cache covers the file of a class.
+
+    Raises
+    ------
+    TypeError
+        If the file is neither in the package nor named by ``RINGSWEEP_LAWS``.
+    """
+    file = getattr(sys.modules.get(cls.__module__), "__file__", None)
+    known = {path.resolve() for path in OWN_LAWS}
+    if cls.__module__.split(".")[0] != __name__.split(".")[0] and (file is None or Path(file).resolve() not in known):
+        raise TypeError(
+            f"{cls.__name__} comes from {file or cls.__module__}, which RINGSWEEP_LAWS does not name: "
+            "edits of it would go unnoticed"
+        )
 
 
 SOURCES_DIGEST = sources_digest(Path(__file__).parents[1], OWN_LAWS)

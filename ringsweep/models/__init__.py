@@ -1,8 +1,10 @@
 """Models by name, the parameters of their scenes, and the cells that kernels run over."""
 
+from importlib import import_module
+from pkgutil import iter_modules
 from typing import Any
 
-from ringsweep.compile import lacking
+from ringsweep.compile import lacking, require_known_source
 from ringsweep.models.belt import Belt
 from ringsweep.models.model import Model
 from ringsweep.models.ring import Ring, SingleContactRing
@@ -23,6 +25,7 @@ def add_model(model: Model) -> None:
     TypeError
         If the name is taken, or if a function that the model needs has no body for one of its types.
     """
+    require_known_source(type(model))
     if model.name in MODELS:
         raise TypeError(f"there is a model {model.name} already: choose another name")
     for law in model.laws:
@@ -44,3 +47,8 @@ def parameters(structure: Structure) -> dict[str, Parameter]:
 def batch(structure: Structure, values: Values) -> Any:
     """Cells that kernels run over; see :meth:`Model.build`."""
     return MODELS[structure.model].build(structure, values)
+
+
+# A file that is put into this folder registers what it holds.
+for _module in iter_modules(__path__):
+    import_module(f"{__name__}.{_module.name}")

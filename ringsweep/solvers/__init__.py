@@ -1,5 +1,9 @@
 """Methods, by their names in configurations."""
 
+from importlib import import_module
+from pkgutil import iter_modules
+
+from ringsweep.compile import require_known_source
 from ringsweep.solvers.event import Auto, Event, Implicit
 from ringsweep.solvers.method import Method, Needs, Result
 from ringsweep.solvers.rk4 import RK4
@@ -17,9 +21,14 @@ def add_method(method: type[Method]) -> None:
     TypeError
         If the name is taken.
     """
+    require_known_source(method)
     if METHODS.setdefault(method.name, method) is not method:
         raise TypeError(f"there is a method {method.name} already: choose another name")
 
 
 for _method in (Auto, RK4, Event, Implicit):
     add_method(_method)
+
+# A file that is put into this folder registers what it holds.
+for _module in iter_modules(__path__):
+    import_module(f"{__name__}.{_module.name}")

@@ -4,6 +4,9 @@ Every law gives a coefficient of friction, the force per unit of the normal load
 where the load is the weight of the body, and on the ring, where the reactions vary.
 """
 
+from importlib import import_module
+from pkgutil import iter_modules
+
 from ringsweep.physics.friction import bristles, coulomb, regularised
 from ringsweep.physics.friction.registry import (
     LAWS,
@@ -34,3 +37,7 @@ __all__ = [
     "family",
     "family_of",
 ]
+
+# A file that is put into this folder registers what it holds.
+for _module in iter_modules(__path__):
+    import_module(f"{__name__}.{_module.name}")
