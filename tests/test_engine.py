@@ -46,7 +46,7 @@ class TestDataset:
         assert not separating.all()
         assert ((grid.separating_contact > 0) == separating).all()
         assert (np.isfinite(grid.t_separation) == separating).all()
-        np.testing.assert_array_equal(grid.t_end, xr.where(separating, grid.t_separation, 4.0))
+        np.testing.assert_array_equal(grid.t_end, grid.t_separation.where(separating, 4.0))
 
     def test_attributes_of_a_dataset_are_enough_to_run_it_again(self, grid):
         again = ringsweep.run(json.loads(grid.attrs["configuration"]), progress=False)
