@@ -305,7 +305,7 @@ class TestTustin:
     @given(powers(1.0, 1e9), powers(1e-6, 1.0), st.floats(0.0, 30.0))
     def test_tustin_equals_the_tail_of_bengisu_akay(self, alpha, v0, x):
         one, other = made(Tustin, alpha), made(BengisuAkay, alpha, v0)
-        # What rounding of the speed makes of the exponent changes weights by as much, and slopes by alpha times as much.
+        # Rounding of the speed changes the exponent and the weights by as much, the slopes by alpha times as much.
         off = 1e-12 + 2 * alpha * np.spacing(v0 + x / alpha)
         found, known = weights_in(one, STRIBECK, x / alpha), weights_in(other, STRIBECK, v0 + x / alpha)
         for a, b, unit in zip(found, known, (1.0, 1.0, alpha, alpha), strict=True):
