@@ -90,7 +90,7 @@ class Kind:
     drive: str
     arcs: int = 0
     launch: str = "mixed"
-    grip: str = "usual"
+    friction: str = "usual"
     shape: str = "usual"
 
 
@@ -105,7 +105,7 @@ def families():
         table.setdefault("one contact", []).append(Kind("ring-single-contact", law, drives[i % 6], i % 2))
     for law in ("coulomb", "stiction", "tustin", "piecewise-linear", "bengisu-akay", "lugre"):
         table.setdefault("several arcs", []).extend(Kind("ring", law, "arctan", n) for n in (2, 5))
-        table.setdefault("high friction", []).append(Kind("ring", law, "arctan", 1, grip="high"))
+        table.setdefault("high friction", []).append(Kind("ring", law, "arctan", 1, friction="high"))
         table.setdefault("geometry", []).append(Kind("ring", law, "arctan", 1, shape="any"))
     for law in ("stiction", "bengisu-akay"):
         table.setdefault("drives", []).extend(Kind("ring", law, name, 1) for name in DRIVES)
@@ -113,8 +113,8 @@ def families():
             Kind("ring", law, name, 1, launch=how) for name in ("none", "constant") for how in ("at rest", "any")
         )
     for law in ("coulomb", "stiction"):
-        table["launches"].append(Kind("ring", law, "none", 0, launch="at rest", grip="high", shape="any"))
-        table["launches"].append(Kind("ring", law, "arctan", 1, launch="at rest", grip="high", shape="any"))
+        table["launches"].append(Kind("ring", law, "none", 0, launch="at rest", friction="high", shape="any"))
+        table["launches"].append(Kind("ring", law, "arctan", 1, launch="at rest", friction="high", shape="any"))
     for i, law in enumerate(LAWS):
         table[f"belt {law}"] = [Kind("belt", law, ""), Kind("belt", law, DRIVES[1:][i % 5])]
     return table
@@ -194,7 +194,7 @@ def ring_scene(rng, kind):
         }
     # Some scenes almost without friction, so that the body revolves; some so rough that it can jam.
     scale = pick(rng, (2, 0.02), (8, 1.0), (1, 2.2))
-    if kind.grip == "high":
+    if kind.friction == "high":
         scale = pick(rng, (1, 1.0), (3, 2.2))
     values |= coefficients(rng, kind.law, "friction.rest", scale)
     values |= parameters(rng, kind.law, False)
@@ -236,8 +236,8 @@ def belt_scene(rng, kind):
         # Under Karnopp's law friction at the edge of the dead band must not exceed friction within it.
         most = math.inf
         if kind.law == "karnopp":
-            grip = values["friction.mu_s"] - values["friction.mu_k"]
-            most = 0.9 * grip * 9.81 * mass / values["friction.dead_band"]
+            drop = values["friction.mu_s"] - values["friction.mu_k"]
+            most = 0.9 * drop * 9.81 * mass / values["friction.dead_band"]
         values["friction.viscous"] = min(most, pick(rng, (1, 0.0), (1, log(rng, -2, 0))))
     values["initial.x"] = pick(rng, (1, 0.0), (2, rng.uniform(-1.0, 1.0)))
     values["initial.velocity"] = pick(rng, (1, "ring"), (1, rng.uniform(-1.0, 1.0)))
@@ -440,11 +440,11 @@ def draw_csv(rng):
     """A random scene on the paper's rig, rounded to six digits."""
 
     def pair():
-        mu_k = rng.uniform(0.02, 0.4) * grip
-        return mu_k + rng.choice([0.0, rng.uniform(0.0, 0.4)], p=[0.1, 0.9]) * grip, mu_k
+        mu_k = rng.uniform(0.02, 0.4) * level
+        return mu_k + rng.choice([0.0, rng.uniform(0.0, 0.4)], p=[0.1, 0.9]) * level, mu_k
 
     # Some scenes almost without friction, so that the body revolves; some so rough that it can jam.
-    grip = rng.choice([0.1, 1.0, 3.0], p=[0.15, 0.8, 0.05])
+    level = rng.choice([0.1, 1.0, 3.0], p=[0.15, 0.8, 0.05])
     rough, rest = pair(), pair()
     scene = {
         "amplitude": rng.choice([-1, 1]) * 10.0 ** rng.uniform(-1, 1.3),

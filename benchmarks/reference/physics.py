@@ -381,8 +381,8 @@ def stick_reserve(p, k1, k2, t, rho, least):
     big = -0.5 * (b + math.copysign(math.sqrt(disc), b))
     best = -math.inf
     for root in (big / a, c / big if big != 0.0 else 0.0):
-        N1, N2, grip = 0.5 * (root + d), 0.5 * (root - d), m * root + n * d
-        kappa = q / grip if grip != 0.0 else (0.0 if q == 0.0 else math.inf)
+        N1, N2, capacity = 0.5 * (root + d), 0.5 * (root - d), m * root + n * d
+        kappa = q / capacity if capacity != 0.0 else (0.0 if q == 0.0 else math.inf)
         best = max(best, min(1.0 - abs(kappa), N1 / weight - least, N2 / weight - least))
     return best
 

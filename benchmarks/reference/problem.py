@@ -96,14 +96,14 @@ def coefficients(values):
     return float(values.get("mu_s", mu_k)), mu_k
 
 
-def problem(scene, grip=1.0):
-    """Problem of a scene, with all friction coefficients times `grip`.
+def problem(scene, factor=1.0):
+    """Problem of a scene, with all friction coefficients times `factor`.
 
     Parameters
     ----------
     scene : mapping
         As in a configuration, but with numbers only (SI).
-    grip : float
+    factor : float
 
     """
     body, friction, drive = scene["body"], scene["friction"], dict(scene.get("drive", {"law": "none"}))
@@ -147,7 +147,7 @@ def problem(scene, grip=1.0):
     return Problem(
         model=model, law=law, mass=mass, inertia=inertia, xi=xi, beta=beta, radius=radius, half_distance=half,
         ball_radius=ball, gravity=gravity, stiffness=stiffness, viscous=float(friction.get("viscous", 0.0)),
-        edges=edges, mu_s=mu_s * grip, mu_k=mu_k * grip, **number, **bristles,
+        edges=edges, mu_s=mu_s * factor, mu_k=mu_k * factor, **number, **bristles,
         elastic=float(friction.get("elastic_fraction", 0.7)), drive=DRIVES.index(drive["law"]),
         amplitude=float(drive.get("amplitude", 1.0)), exponent=float(drive.get("exponent", 0.0)),
         frequency=float(drive.get("frequency", 0.0)), phase=float(drive.get("phase", 0.0)), knots=knots, pieces=pieces,
