@@ -183,9 +183,17 @@ def test_files_moved_into_the_package_register_what_they_hold(tmp_path):
     assert done.stdout == f"{package / 'config' / 'schema.py'} True True True True\n", done.stderr[-2000:]
 
 
-def test_law_of_an_imported_file_is_refused_since_edits_of_it_would_go_unnoticed(tmp_path):
+def test_law_of_an_imported_file_is_refused_by_runs_since_edits_of_it_would_go_unnoticed(tmp_path):
     """The key of the cache of compiled code covers the package and the files of RINGSWEEP_LAWS."""
     (path,) = (path for path in files_in(tmp_path) if path.name == "my_ramp.py")
-    done = in_a_process(f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import my_ramp", [], tmp_path / "cache")
-    assert done.returncode == 1
-    assert f"TypeError: Ramp comes from {path}, which RINGSWEEP_LAWS does not name" in done.stderr
+    script = f"""
+        import sys
+        sys.path.insert(0, {str(path.parent)!r})
+        import my_ramp
+        try:
+            run({{**belt, "friction": {{"law": "ramp", "mu_k": 0.1, "v0": 0.05}}}})
+        except InputError as error:
+            print(error)
+    """
+    done = in_a_process(script, [], tmp_path / "cache")
+    assert done.stdout.startswith("scene.friction.law: ramp comes from the module my_ramp, whose file"), done.stderr

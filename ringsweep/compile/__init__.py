@@ -5,7 +5,7 @@
 this package and :mod:`ringsweep.numerics` use Numba.
 """
 
-from ringsweep.compile.cache import SOURCES_DIGEST, kernel, require_known_source
+from ringsweep.compile.cache import SOURCES_DIGEST, has_known_source, kernel
 from ringsweep.compile.dispatch import hook, lacking
 from ringsweep.compile.errors import readable_compile_errors
 from ringsweep.compile.options import KERNEL_OPTIONS, absorbed, inlined, specialise
@@ -19,13 +19,13 @@ __all__ = [
     "borrowed",
     "function_from_lines",
     "generated",
+    "has_known_source",
     "hook",
     "inlined",
     "kernel",
     "lacking",
     "map_leaves",
     "readable_compile_errors",
-    "require_known_source",
     "specialise",
     "take",
     "unrolled",

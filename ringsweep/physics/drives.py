@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import atan, cos, inf, log1p, pi, sin
 from typing import Annotated, Any, NamedTuple
 
-from ringsweep.compile import hook, inlined, lacking, require_known_source
+from ringsweep.compile import hook, inlined, lacking
 from ringsweep.quantities.parameters import Leaf, Parameter
 
 
@@ -442,7 +442,6 @@ def add_drive(name: str, drive: type) -> None:
     TypeError
         If a hook has no body for the drive, or if the name is taken.
     """
-    require_known_source(drive)
     if missing := lacking(drive, (shape, *MEMBERS)):
         raise TypeError(f"drive {name} has no {', '.join(missing)}: every drive needs it")
     if DRIVES.setdefault(name, drive) is not drive:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.compile import lacking
+from ringsweep.compile import has_known_source, lacking
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS
 from ringsweep.models.scene import Structure
@@ -72,6 +72,19 @@ class Method(ABC):
         """
         needs = self.needs(structure)
         scene = MODELS[structure.model].scene_type(structure)
+        model = type(MODELS[structure.model])
+        for path, name, source in (
+            ("scene.friction.law", structure.law, LAWS[structure.law]),
+            ("scene.drive.law", structure.drive, DRIVES[structure.drive]),
+            ("scene.model", structure.model, model),
+            ("solver.method", self.name, type(self)),
+        ):
+            if not has_known_source(source):
+                raise InputError(
+                    path,
+                    f"{name} comes from the module {source.__module__}, whose file RINGSWEEP_LAWS does not name: "
+                    "edits of it would go unnoticed",
+                )
         for key, name, cls, members in (
             ("friction.law", structure.law, LAWS[structure.law], needs.law),
             ("drive.law", structure.drive, DRIVES[structure.drive], needs.drive),

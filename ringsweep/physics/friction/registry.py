@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from ringsweep.compile import hook, lacking, require_known_source
+from ringsweep.compile import hook, lacking
 from ringsweep.physics.friction import presliding, velocity
 from ringsweep.quantities.parameters import Parameter
 
@@ -98,7 +98,6 @@ def add_law(name: str, law: type, traits: Traits) -> None:
     TypeError
         If a hook of the family has no body for the law, or if the name is taken.
     """
-    require_known_source(law)
     if missing := lacking(law, _NEEDED[traits.family]):
         raise TypeError(f"friction law {name} has no {', '.join(missing)}: every law of its family needs it")
     if LAWS.setdefault(name, law) is not law:
