@@ -13,15 +13,15 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsweep.compile import take
+from ringsweep.compile import readable_compile_errors, take
 from ringsweep.config import Config, load, sweepable
 from ringsweep.config.axes import COUNT, dimension
 from ringsweep.errors import InputError
-from ringsweep.models import MODELS, batch
+from ringsweep.models import MODELS, Model, batch
 from ringsweep.models.scene import LAW
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity
-from ringsweep.quantities.variables import FAILED, PRECISION, Variable
+from ringsweep.quantities.variables import FAILED, OUTCOMES, PRECISION, Variable
 from ringsweep.runs.cells import values_of_cells
 from ringsweep.runs.contenders import TimedMethod, contenders_for, setting_of, solver_yaml, time_methods
 from ringsweep.runs.executors import progress_bar
@@ -132,7 +132,8 @@ def measure(
     sampled = batch(structure, values_of_cells(scene, config.axes, sample))
 
     def run(method: Any) -> Result:
-        return method.run(sampled, names)
+        with readable_compile_errors():
+            return method.run(sampled, names)
 
     with progress_bar(2 + len(contenders) * (rounds + 1), progress) as bar:
         tight, looser = (_run_one(bar, best(rtol=rtol, certify=False), run).rows for rtol in _TIGHTEST[best])
@@ -173,22 +174,17 @@ def _run_one(bar: Any, method: Any, run: Callable[[Any], Result]) -> Result:
     return result
 
 
-def _errors(
-    rows: NDArray[np.float64], reference: NDArray[np.float64], names: tuple[str, ...]
-) -> dict[str, NDArray[np.float64]]:
+def _errors(rows: NDArray[np.float64], reference: NDArray[np.float64], model: Model) -> dict[str, NDArray[np.float64]]:
     """Errors in each cell, shape ``(cells,)``: infinite if the run failed, NaN if one of the two runs has no number."""
+    names = model.outcomes
     failed = rows[:, names.index("regime")] == FAILED
     found = {}
-    for name, outcome in {"error_end": _end(names), "error_separation": "t_separation"}.items():
+    for name, outcome in {"error_end": f"{model.place}_end", "error_separation": "t_separation"}.items():
         if outcome in names:
             column = names.index(outcome)
             found[name] = np.abs(rows[:, column] - reference[:, column])
     found["error_end"] = np.where(failed, np.inf, found["error_end"])
     return found
-
-
-def _end(names: tuple[str, ...]) -> str:
-    return "phi_end" if "phi_end" in names else "x_end"
 
 
 def _dataset(
@@ -201,12 +197,13 @@ def _dataset(
 ) -> xr.Dataset:
     """Run times, errors and flags of the contenders in the cells with these numbers, labelled."""
     scene, axes = config.scene, config.axes
-    names = MODELS[scene.structure.model].outcomes
+    model = MODELS[scene.structure.model]
+    names = model.outcomes
     columns: dict[str, tuple[tuple[str, ...], Any]] = {
         "time_per_run": (("contender",), [median(one.seconds) / len(sample) for one in timed]),
         "steps": (("contender",), [one.result.steps.mean() for one in timed]),
     }
-    each = [_errors(one.result.rows, tight, names) for one in timed]
+    each = [_errors(one.result.rows, tight, model) for one in timed]
     for name in each[0]:
         columns[name] = ("contender", "cell"), [errors[name] for errors in each]
     # With certificates a method may replace an answer by that of a finer run: it does not certify the first.
@@ -217,13 +214,13 @@ def _dataset(
     right = [agree(one.result.rows, tight, names) for one in timed]
     columns["regime_wrong"] = ("contender", "cell"), ~np.array(right)
     columns["flagged"] = ("contender", "cell"), ~np.array(passed)
-    columns |= {f"reference_{name}": (("cell",), error) for name, error in _errors(looser, tight, names).items()}
+    columns |= {f"reference_{name}": (("cell",), error) for name, error in _errors(looser, tight, model).items()}
 
     known, values = sweepable(scene), values_of_cells(scene, axes, sample)
     along = {path: values[path] if path != LAW else [scene.structure.law] * len(sample) for path in axes.columns}
     return xr.Dataset(
         {
-            name: (dims, np.asarray(column, dtype=PRECISION[name].dtype), _described(name, names).attributes)
+            name: (dims, np.asarray(column, dtype=PRECISION[name].dtype), _described(name, model).attributes)
             for name, (dims, column) in columns.items()
         },
         coords={
@@ -243,11 +240,13 @@ def _dataset(
     ).assign_attrs(attributes(config))
 
 
-def _described(name: str, names: tuple[str, ...]) -> Variable:
-    variable = PRECISION[name]
-    if name.endswith("error_end") and _end(names) == "x_end":
-        return replace(variable, long_name=variable.long_name.replace("angle", "displacement"), unit="m")
-    return variable
+def _described(name: str, model: Model) -> Variable:
+    """Variable of the dataset; where it is about the end, in the words and the unit of the model's place."""
+    variable, place = PRECISION[name], OUTCOMES[f"{model.place}_end"]
+    if not name.endswith("error_end"):
+        return variable
+    words = variable.long_name.replace(OUTCOMES["phi_end"].long_name, place.long_name)
+    return replace(variable, long_name=words, unit=place.unit)
 
 
 def error_bounds(ds: xr.Dataset) -> NDArray[np.float64]:

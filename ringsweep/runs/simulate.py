@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsweep.compile import take
+from ringsweep.compile import readable_compile_errors, take
 from ringsweep.config import Config, with_values
 from ringsweep.models import MODELS, batch
 from ringsweep.models.scene import Structure
@@ -110,7 +110,8 @@ def _trace(config: Config, structure: Structure, samples: int) -> xr.Dataset:
     model = MODELS[structure.model]
     cell = batch(structure, {path: np.array([value]) for path, value in config.scene.values.items()})
     names = model.history(structure)
-    times, rows = config.solver.history(cell, samples, len(names))
+    with readable_compile_errors():
+        times, rows = config.solver.history(cell, samples, len(names))
     columns = dict(zip(names, rows.T, strict=True))
     for name in columns:
         if name.startswith("normal_"):
