@@ -31,7 +31,10 @@ print(dict((name, repr(found[name].values.tolist())) for name in found))
 """
 
 
-@pytest.mark.skipif(not AVAILABLE, reason="this version of Numba lacks the private interfaces")
+def test_supported_versions_of_numba_have_the_private_interfaces():
+    assert AVAILABLE
+
+
 def test_outcomes_without_private_interfaces_of_numba_are_equal_bit_for_bit(scene, tmp_path):
     axes = {"drive.amplitude": [0.5, 2.0]}
     script = WITHOUT_PRIVATE_INTERFACES.format(scene=scene, axes=axes)

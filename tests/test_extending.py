@@ -102,7 +102,9 @@ CLAIMS = {
             run({**disc, "friction": friction}, {"method": "rk4", "steps": 10})
         except InputError as error:
             assert error.path == "scene.friction.law"
-            assert error.problem == "friction weakening has no velocity.blend, velocity.steepest: solver rk4 needs it"
+            assert error.problem == (
+                "friction law weakening has no velocity.blend, velocity.steepest, which solver rk4 needs"
+            )
         else:
             raise AssertionError("not refused")
     """,
@@ -196,4 +198,5 @@ def test_law_of_an_imported_file_is_refused_by_runs_since_edits_of_it_would_go_u
             print(error)
     """
     done = in_a_process(script, [], tmp_path / "cache")
-    assert done.stdout.startswith("scene.friction.law: ramp comes from the module my_ramp, whose file"), done.stderr
+    expected = "scene.friction.law: friction law ramp comes from the module my_ramp, whose file"
+    assert done.stdout.startswith(expected), done.stderr

@@ -20,21 +20,21 @@ from ringsweep.errors import InputError
 logger = logging.getLogger("ringsweep")
 
 #: The user's own files (friction laws, drives, models, methods), from the environment variable RINGSWEEP_LAWS.
-OWN_LAWS = [Path(name) for name in os.environ.get("RINGSWEEP_LAWS", "").split(os.pathsep) if name]
+OWN_FILES = [Path(name) for name in os.environ.get("RINGSWEEP_LAWS", "").split(os.pathsep) if name]
 
 # The sources that determine results. An edit elsewhere, such as in plots, keeps the cached kernels and results valid.
 _DETERMINE_RESULTS = ("compile", "numerics", "physics", "models", "solvers", "quantities", "runs/cells.py")
 
 
-def sources_digest(root: Path, own_laws: Iterable[Path] = ()) -> str:
+def sources_digest(root: Path, own_files: Iterable[Path] = ()) -> str:
     """Digest of the sources that determine results.
 
     Parameters
     ----------
     root : Path
         Folder of the package.
-    own_laws : iterable of Path
-        The user's own files, see :data:`OWN_LAWS`.
+    own_files : iterable of Path
+        The user's own files, see :data:`OWN_FILES`.
 
     Returns
     -------
@@ -52,7 +52,7 @@ def sources_digest(root: Path, own_laws: Iterable[Path] = ()) -> str:
         for source in [path] if path.suffix else sorted(path.rglob("*.py")):
             digest.update(str(source.relative_to(root)).encode())
             digest.update(source.read_bytes())
-    for path in own_laws:
+    for path in own_files:
         try:
             digest.update(path.read_bytes())
         except OSError as error:
@@ -65,10 +65,10 @@ def has_known_source(cls: type) -> bool:
     if cls.__module__.split(".")[0] == __name__.split(".")[0]:
         return True
     file = getattr(sys.modules.get(cls.__module__), "__file__", None)
-    return file is not None and Path(file).resolve() in {path.resolve() for path in OWN_LAWS}
+    return file is not None and Path(file).resolve() in {path.resolve() for path in OWN_FILES}
 
 
-SOURCES_DIGEST = sources_digest(Path(__file__).parents[1], OWN_LAWS)
+SOURCES_DIGEST = sources_digest(Path(__file__).parents[1], OWN_FILES)
 
 
 def kernel(function: Callable[..., Any]) -> Any:
@@ -79,7 +79,7 @@ def kernel(function: Callable[..., Any]) -> Any:
     """
     dispatcher = numba.njit(**KERNEL_OPTIONS)(function)
     # Without the suffix, kernels with own files and kernels without them would replace each other in the cache.
-    keep_on_disk(dispatcher, SOURCES_DIGEST, SOURCES_DIGEST[:12] if OWN_LAWS else "", _announce_compilation)
+    keep_on_disk(dispatcher, SOURCES_DIGEST, SOURCES_DIGEST[:12] if OWN_FILES else "", _announce_compilation)
     return dispatcher
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from numba.core.errors import NumbaError
 
-from ringsweep.compile.cache import OWN_LAWS
+from ringsweep.compile.cache import OWN_FILES
 from ringsweep.errors import InputError
 
 _STEP = re.compile(r"Failed in nopython mode pipeline \(step: [^)]*\)\s*")
@@ -29,13 +29,13 @@ def readable_compile_errors() -> Iterator[None]:
     try:
         yield
     except NumbaError as error:
-        if not OWN_LAWS:
+        if not OWN_FILES:
             raise
         # Numba tells the cause last, after the way to it.
         text = re.sub(r"\x1b\[[0-9;]*m", "", str(error))
         innermost = _STEP.split(text)[-1]
         cause = " ".join(innermost.split("\n", 1)[0].split())[:_MOST]
-        own = {path.name for path in OWN_LAWS}
+        own = {path.name for path in OWN_FILES}
         places = [(Path(name).name, line) for name, line in _PLACE.findall(innermost)]
         name, line = next((place for place in places if place[0] in own), places[0] if places else ("", ""))
         hint = "; under rk4 numbers are vector lanes: use select in place of if" if "class 'bool'" in cause else ""

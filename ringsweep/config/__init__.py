@@ -1,6 +1,6 @@
 """Configurations: from YAML text to a validated scene, axes and solver in SI units."""
 
-from ringsweep.compile.cache import OWN_LAWS
+from ringsweep.compile.cache import OWN_FILES
 from ringsweep.config.axes import Axes
 from ringsweep.config.configuration import Config, load, read_axes, read_scene, with_values
 from ringsweep.config.own_files import load_own_files
@@ -10,4 +10,4 @@ from ringsweep.config.solver import read_solver
 __all__ = ["Axes", "Config", "load", "read_axes", "read_scene", "read_solver", "sweepable", "with_values"]
 
 # These files may use everything that is imported above.
-load_own_files(OWN_LAWS)
+load_own_files(OWN_FILES)

@@ -23,14 +23,13 @@ def read_solver(solver: str | Mapping[str, Any], scene: Scene | None = None) -> 
     solver : str or mapping
     scene : Scene, optional
         What the method must be able to take.
+
+    Raises
+    ------
+    InputError
+        If the method or an option is wrong, or if the method cannot run the scene.
     """
-    found = solver_of(yaml_text.read({"solver": solver}).tree["solver"])
-    for structure in scene.structures.values() if scene else ():
-        found.check(structure)
-    return found
-
-
-def solver_of(given: Any) -> Any:
+    given = yaml_text.read({"solver": solver}).tree["solver"]
     section = {"method": given} if isinstance(given, str) else section_of({"solver": given}, "solver", "")
     method: Any = METHODS[choose(METHODS, section, "solver.method", "method")]
     options = {f.name: f for f in dataclasses.fields(method) if f.init}
@@ -52,4 +51,7 @@ def solver_of(given: Any) -> Any:
             values[name] = section[name]
         else:
             raise InputError(path, f"true or false is expected, got {show(section[name])}")
-    return method(**values)
+    found = method(**values)
+    for structure in scene.structures.values() if scene else ():
+        found.check(structure)
+    return found

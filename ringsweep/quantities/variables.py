@@ -50,7 +50,6 @@ class Variable(Quantity):
 
 _regimes = dict(enumerate(REGIMES))
 
-
 OUTCOMES: dict[str, Variable] = {
     "regime": Variable("1", "regime of the run", dtype="int8", flags=_regimes),
     "motion": Variable(

@@ -131,10 +131,8 @@ class EarlierSweep:
 
     def _locate(self, config: Config, indices: Indices, count: int) -> tuple[NDArray[np.bool_], Indices]:
         """Which of `count` cells of the new sweep the file holds, and the indices of these in the file."""
-        values, laws = (
-            values_at(config.scene, config.axes, indices, count),
-            laws_at(config.scene, config.axes, indices, count),
-        )
+        values = values_at(config.scene, config.axes, indices, count)
+        laws = laws_at(config.scene, config.axes, indices, count)
         shared = np.zeros(count, dtype=bool)
         in_file = {dim: np.zeros(count, dtype=np.intp) for dim in self.axes.sizes}
         for law, structure in config.scene.structures.items():

@@ -34,10 +34,8 @@ class Audit(NamedTuple):
 # Fractions of a step at which the law is checked: the nodes of Gauss's rule, which integrates the work of friction too.
 EARLY, LATE = 0.5 - 0.5 / sqrt(3.0), 0.5 + 0.5 / sqrt(3.0)
 
-
 # Share of the energy itself that counts as turnover in a step. Without friction the energy changes by rounding alone.
 _ENERGY_SHARE = 1e-5
-
 
 # The law is checked in each of the first steps, then in this share of the steps. The golden ratio selects them, so that
 # no period of the motion can avoid the checks.

@@ -13,14 +13,11 @@ from ringsweep.quantities.variables import FAILED, OUTCOMES
 #: Outcomes on which two resolutions must agree for a certificate.
 _CERTIFIED = ("regime", "motion", "separating_contact")
 
-
 # Outcomes that may be NaN in a certified run.
 _MAY_LACK = ("t_separation", "first_slip", "period")
 
-
 # Relative difference of two final states that rounding explains.
 _SAME = 1e-14
-
 
 # A bound on an error is at least: a share of the tolerance of a step; the rounding of a step times the root of their
 # number; a share of the largest relative difference between both runs in any outcome. Found by experiment, see

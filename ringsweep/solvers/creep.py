@@ -15,14 +15,11 @@ from ringsweep.solvers import rosenbrock
 # Parts into which a step is divided to look for roots of the guards.
 INSTANTS = 4
 
-
 # Matrix that turns the values at the ends of these parts into the coefficients of a polynomial.
 _INTERPOLATION = np.ascontiguousarray(np.linalg.inv(np.vander(np.linspace(0.0, 1.0, INSTANTS + 1), increasing=True)))
 
-
 # Largest number of guards of an implicit step.
 MOST_GUARDS = 6
-
 
 # Factor by which the relative error of the acceleration on bristles may exceed the relative error of the state.
 _ACCELERATION_FACTOR = 100.0

@@ -68,33 +68,25 @@ class Method(ABC):
         Raises
         ------
         InputError
-            If the method does not take the law, or if law, drive or model lack a function that it needs.
+            If the method does not take the law; if law, drive or model lack a function that it needs; or if the file of
+            one of them is not known to the cache of compiled code.
         """
-        needs = self.needs(structure)
-        scene = MODELS[structure.model].scene_type(structure)
-        model = type(MODELS[structure.model])
-        for path, name, source in (
-            ("scene.friction.law", structure.law, LAWS[structure.law]),
-            ("scene.drive.law", structure.drive, DRIVES[structure.drive]),
-            ("scene.model", structure.model, model),
-            ("solver.method", self.name, type(self)),
+        needs, model = self.needs(structure), MODELS[structure.model]
+        law, drive = LAWS[structure.law], DRIVES[structure.drive]
+        for path, kind, name, source, cls, members in (
+            ("scene.friction.law", "friction law", structure.law, law, law, needs.law),
+            ("scene.drive.law", "drive", structure.drive, drive, drive, needs.drive),
+            ("scene.model", "model", structure.model, type(model), model.scene_type(structure), needs.model),
+            ("solver.method", "method", self.name, type(self), type(self), ()),
         ):
             if not has_known_source(source):
                 raise InputError(
                     path,
-                    f"{name} comes from the module {source.__module__}, whose file RINGSWEEP_LAWS does not name: "
-                    "edits of it would go unnoticed",
+                    f"{kind} {name} comes from the module {source.__module__}, "
+                    "whose file RINGSWEEP_LAWS does not name: edits of it would go unnoticed",
                 )
-        for key, name, cls, members in (
-            ("friction.law", structure.law, LAWS[structure.law], needs.law),
-            ("drive.law", structure.drive, DRIVES[structure.drive], needs.drive),
-            ("model", structure.model, scene, needs.model),
-        ):
             if missing := lacking(cls, members):
-                kind = key.split(".")[0]
-                raise InputError(
-                    f"scene.{key}", f"{kind} {name} has no {', '.join(missing)}: solver {self.name} needs it"
-                )
+                raise InputError(path, f"{kind} {name} has no {', '.join(missing)}, which solver {self.name} needs")
 
     def resolved(self, structure: Structure) -> Method:
         """The method that runs scenes of this structure: another one if this method chooses among methods."""

@@ -100,16 +100,13 @@ class Record(NamedTuple):
 # A stick that is shorter than this fraction of the span does not count.
 _SHORTEST_STICK = 1e-9
 
-
 # In stick-slip, the stick lasts longer than this fraction of the cycle. The second value is for laws with a stiction
 # band, under which the contact creeps.
 _SHORT_STICK, _SHORT_STICK_IN_BAND = 1e-6, 1e-2
 
-
 # An oscillation lasts if its swings keep this share of their length from one quarter of the run to the next, and if
 # they exceed this share of the displacement; errors explain smaller swings.
 _LASTING, _ROUNDING = 0.95, 1e-6
-
 
 # A body that has not slipped for more cycles than this has stopped slipping.
 _MOST_CYCLES_SINCE_SLIP = 2.0

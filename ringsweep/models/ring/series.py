@@ -57,7 +57,6 @@ PHI, V, OMEGA, EPSILON, SIN, COS, SQUARE, THETA, EXCESS, BASIS, STATIC_WEIGHT, K
 FRICTION_1, FRICTION_2, SPARE = range(12, 15)
 INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(15, 21)
 
-
 # If one reaction vanishes and the other is smaller than this share of the load, both contacts separate.
 AT_ONCE = 1e-9
 
