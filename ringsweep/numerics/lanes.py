@@ -19,36 +19,38 @@ WIDTH = 16
 
 _DOUBLE, _WORD = ir.DoubleType(), ir.IntType(64)
 
-VECTOR, WORDS, _BITS = (ir.VectorType(kind, WIDTH) for kind in (_DOUBLE, _WORD, ir.IntType(1)))
+VECTOR, WORDS = (ir.VectorType(kind, WIDTH) for kind in (_DOUBLE, _WORD))
 
 
 class Lanes(types.Type):
-    """Numba type of sixteen doubles, one for each run."""
+    """Numba type of `width` doubles; for runs side by side, one for each run."""
 
-    def __init__(self) -> None:
-        super().__init__("Lanes")
+    def __init__(self, width: int) -> None:
+        self.width = width
+        super().__init__(f"Lanes({width})")
 
 
 class Mask(types.Type):
-    """Numba type of sixteen truth values, one for each run."""
+    """Numba type of `width` truth values."""
 
-    def __init__(self) -> None:
-        super().__init__("Mask")
+    def __init__(self, width: int) -> None:
+        self.width = width
+        super().__init__(f"Mask({width})")
 
 
-LANES, MASK = Lanes(), Mask()
+LANES, MASK = Lanes(WIDTH), Mask(WIDTH)
 
 
 @register_model(Lanes)
 class _LanesModel(models.PrimitiveModel):
     def __init__(self, dmm: Any, fe_type: Any) -> None:
-        super().__init__(dmm, fe_type, VECTOR)
+        super().__init__(dmm, fe_type, ir.VectorType(_DOUBLE, fe_type.width))
 
 
 @register_model(Mask)
 class _MaskModel(models.PrimitiveModel):
     def __init__(self, dmm: Any, fe_type: Any) -> None:
-        super().__init__(dmm, fe_type, _BITS)
+        super().__init__(dmm, fe_type, ir.VectorType(ir.IntType(1), fe_type.width))
 
 
 # ---- arithmetic ------------------------------------------------------------------------------
@@ -57,33 +59,35 @@ class _MaskModel(models.PrimitiveModel):
 def spread_scalar(builder: Any, value: Any, kind: ir.VectorType) -> Any:
     """LLVM vector of type `kind` with `value` in every lane."""
     first = builder.insert_element(ir.Constant(kind, ir.Undefined), value, ir.Constant(ir.IntType(32), 0))
-    everywhere = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
+    everywhere = ir.Constant(ir.VectorType(ir.IntType(32), kind.count), [0] * kind.count)
     return builder.shuffle_vector(first, ir.Constant(kind, ir.Undefined), everywhere)
 
 
-@lower_cast(types.Float, LANES)
-@lower_cast(types.Integer, LANES)
+@lower_cast(types.Float, Lanes)
+@lower_cast(types.Integer, Lanes)
 def _from_number(context, builder, fromty, toty, value):
-    return spread_scalar(builder, context.cast(builder, value, fromty, types.float64), VECTOR)
+    return spread_scalar(builder, context.cast(builder, value, fromty, types.float64), context.get_value_type(toty))
 
 
-@lower_cast(types.Boolean, MASK)
+@lower_cast(types.Boolean, Mask)
 def _from_boolean(context, builder, fromty, toty, value):
-    return spread_scalar(builder, builder.trunc(value, ir.IntType(1)) if value.type.width > 1 else value, _BITS)
+    bit = builder.trunc(value, ir.IntType(1)) if value.type.width > 1 else value
+    return spread_scalar(builder, bit, context.get_value_type(toty))
 
 
 def _define(function: Any, argument: Any, result: Any, arity: int, instruction: Any) -> None:
-    """Define `function` for `arity` arguments of type `argument`; a plain number among them is spread over the lanes.
+    """Define `function` for `arity` arguments of the class `argument`; a plain number among them is spread.
 
-    `instruction` takes an LLVM builder and the arguments as LLVM values.
+    `result` is the class of the result. `instruction` takes an LLVM builder and the arguments as LLVM values.
     """
-    plain = types.Boolean if argument is MASK else types.Number
+    plain = types.Boolean if argument is Mask else types.Number
 
     @infer_global(function)
     class Template(AbstractTemplate):
         def generic(self, args: Any, kws: Any) -> Any:
-            if len(args) == arity and argument in args and all(a == argument or isinstance(a, plain) for a in args):
-                return signature(result, *[argument] * arity)
+            vector = next((a for a in args if isinstance(a, argument)), None)
+            if len(args) == arity and vector and all(a == vector or isinstance(a, plain) for a in args):
+                return signature(result(vector.width), *[vector] * arity)
             return None
 
     @lower_builtin(function, *[argument] * arity)
@@ -95,18 +99,20 @@ def llvm_function(name: str) -> Any:
     """Builder of calls of an LLVM intrinsic with Lanes as arguments and result."""
 
     def instruction(builder: Any, *args: Any) -> Any:
-        kind = ir.FunctionType(VECTOR, [VECTOR] * len(args))
-        return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"{name}.v{WIDTH}f64"), args)
+        vector = args[0].type
+        kind = ir.FunctionType(vector, [vector] * len(args))
+        name_of_type = f"{name}.v{vector.count}f64"
+        return builder.call(cgutils.get_or_insert_function(builder.module, kind, name_of_type), args)
 
     return instruction
 
 
-_define(operator.add, LANES, LANES, 2, lambda builder, a, b: builder.fadd(a, b))
-_define(operator.sub, LANES, LANES, 2, lambda builder, a, b: builder.fsub(a, b))
-_define(operator.mul, LANES, LANES, 2, lambda builder, a, b: builder.fmul(a, b))
-_define(operator.truediv, LANES, LANES, 2, lambda builder, a, b: builder.fdiv(a, b))
-_define(operator.neg, LANES, LANES, 1, lambda builder, a: builder.fneg(a))
-_define(abs, LANES, LANES, 1, llvm_function("llvm.fabs"))
+_define(operator.add, Lanes, Lanes, 2, lambda builder, a, b: builder.fadd(a, b))
+_define(operator.sub, Lanes, Lanes, 2, lambda builder, a, b: builder.fsub(a, b))
+_define(operator.mul, Lanes, Lanes, 2, lambda builder, a, b: builder.fmul(a, b))
+_define(operator.truediv, Lanes, Lanes, 2, lambda builder, a, b: builder.fdiv(a, b))
+_define(operator.neg, Lanes, Lanes, 1, lambda builder, a: builder.fneg(a))
+_define(abs, Lanes, Lanes, 1, llvm_function("llvm.fabs"))
 
 
 for _function, _sign in {
@@ -116,13 +122,13 @@ for _function, _sign in {
     operator.ge: ">=",
     operator.eq: "==",
 }.items():
-    _define(_function, LANES, MASK, 2, lambda builder, a, b, sign=_sign: builder.fcmp_ordered(sign, a, b))
+    _define(_function, Lanes, Mask, 2, lambda builder, a, b, sign=_sign: builder.fcmp_ordered(sign, a, b))
 
 
-_define(operator.and_, MASK, MASK, 2, lambda builder, a, b: builder.and_(a, b))
-_define(operator.or_, MASK, MASK, 2, lambda builder, a, b: builder.or_(a, b))
+_define(operator.and_, Mask, Mask, 2, lambda builder, a, b: builder.and_(a, b))
+_define(operator.or_, Mask, Mask, 2, lambda builder, a, b: builder.or_(a, b))
 
 
 # If the second argument is NaN the first one is taken, as by Python's min and max.
-_define(min, LANES, LANES, 2, lambda builder, a, b: builder.select(builder.fcmp_ordered("<", b, a), b, a))
-_define(max, LANES, LANES, 2, lambda builder, a, b: builder.select(builder.fcmp_ordered(">", b, a), b, a))
+_define(min, Lanes, Lanes, 2, lambda builder, a, b: builder.select(builder.fcmp_ordered("<", b, a), b, a))
+_define(max, Lanes, Lanes, 2, lambda builder, a, b: builder.select(builder.fcmp_ordered(">", b, a), b, a))

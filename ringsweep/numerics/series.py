@@ -5,17 +5,28 @@ A series is an array of coefficients: ``c[0] + c[1] s + c[2] s^2 + ...`` with s 
 
 from __future__ import annotations
 
-from math import exp, inf, log
+from math import ceil, comb, exp, inf, log, sqrt
 
 import numpy as np
 
-from ringsweep.compile import inlined
+from ringsweep.compile import absorbed, inlined
+from ringsweep.numerics.terms import NUMBERS, ORDER, PRODUCTS, numbers_from, powers, set_terms, terms, total
 
-#: Highest power of every series.
-ORDER = 16
+#: Columns of a table of series: ORDER + 3 numbers, rounded up so that rows begin at multiples of 64 bytes.
+COLUMNS = 24
+
+#: Rows of a table for PRODUCTS factors, see :func:`ringsweep.numerics.terms.set_factors`.
+FACTOR_ROWS = ceil((ORDER + 1) * PRODUCTS / COLUMNS)
 
 #: ``INVERSE[k]`` is 1/k: multiplication is many times cheaper than division.
 INVERSE = np.array([np.inf, *(1.0 / k for k in range(1, ORDER + 3))])
+
+# Weights of the terms in bounds on the terms above the second power: of a series, and of its derivative.
+_ABOVE = np.where(NUMBERS > 2.0, 1.0, 0.0)
+_ABOVE_IN_SLOPE = NUMBERS * _ABOVE
+
+# Row k - 1 holds the Bernstein coefficients 1 ... ORDER of the power k on [0, 1]; coefficient 0 is 0.
+_BERNSTEIN = np.array([[comb(j, k) / comb(ORDER, k) for j in range(1, ORDER + 1)] for k in range(1, ORDER + 1)]).ravel()
 
 #: Rows of the scratch array for :func:`crossings` and :func:`first_root`.
 STACK = 54
@@ -24,22 +35,16 @@ STACK = 54
 _MAX_INSTANTS = ORDER
 
 
-@inlined
+@absorbed
 def value(c, s):
     """Value of the series at `s`."""
-    total = c[ORDER]
-    for k in range(ORDER - 1, -1, -1):
-        total = total * s + c[k]
-    return total
+    return c[0] + s * total(terms(c) * powers(s))
 
 
-@inlined
+@absorbed
 def slope(c, s):
     """Derivative of the series at `s`."""
-    total = ORDER * c[ORDER]
-    for k in range(ORDER - 1, 0, -1):
-        total = total * s + k * c[k]
-    return total
+    return total(terms(c) * powers(s) * numbers_from(NUMBERS, 0))
 
 
 @inlined
@@ -62,34 +67,16 @@ def step_size(last, previous):
 @inlined
 def product(a, b, k):
     """Coefficient `k` of the product of two series."""
-    total = 0.0
+    found = 0.0
     for j in range(k + 1):
-        total += a[j] * b[k - j]
-    return total
+        found += a[j] * b[k - j]
+    return found
 
 
-@inlined
+@absorbed
 def variation(c, h):
     """Upper bound on the change of a series within a step of length `h`."""
-    power = h
-    total = 0.0
-    for k in range(1, ORDER + 1):
-        total += abs(c[k]) * power
-        power *= h
-    return total
-
-
-@inlined
-def _remainder_bounds(c, h):
-    """Upper bounds on the sum of the terms above the second power, in the series and in its derivative times `h`."""
-    power = h * h
-    value = slope = 0.0
-    for k in range(3, ORDER + 1):
-        power *= h
-        term = abs(c[k]) * power
-        value += term
-        slope += k * term
-    return value, slope
+    return h * total(abs(terms(c)) * powers(h))
 
 
 @inlined
@@ -105,7 +92,7 @@ def first_root(c, h, work):
         Series; infinite ``c[0]`` stands for a quantity that has no zero.
     h : float
         Length of the step, s.
-    work : ndarray of shape ``(rows, ORDER + 3)``
+    work : ndarray of shape ``(rows, COLUMNS)``
         Scratch. With fifty rows an interval can shrink to rounding.
 
     Returns
@@ -115,7 +102,10 @@ def first_root(c, h, work):
     """
     if c[0] == inf:
         return h, False
-    rest, rest_slope = _remainder_bounds(c, h)
+    sizes = abs(terms(c)) * powers(h)
+    if c[0] > h * total(sizes):
+        return h, False
+    rest, rest_slope = h * total(sizes * numbers_from(_ABOVE, 0)), h * total(sizes * numbers_from(_ABOVE_IN_SLOPE, 0))
     linear, square = c[1] * h, c[2] * h * h
     # Minimum within the step of the parabola of the first three terms.
     least = c[0] + min(0.0, linear + square)
@@ -134,7 +124,13 @@ def first_root(c, h, work):
 @inlined
 def _root_in_bracket(c, low, high):
     """Only zero of a series that is positive at `low` and not at `high`: Newton's method with bisection."""
-    s = 0.5 * (low + high)
+    # The zero of the parabola of the first three terms, if it lies in the bracket.
+    square = c[1] * c[1] - 4.0 * c[0] * c[2]
+    root = sqrt(max(square, 0.0))
+    s = 2.0 * c[0] / (root - c[1]) if square >= 0.0 and root > c[1] else low
+    if not (low < s < high):
+        s = 0.5 * (low + high)
+    step_before = inf
     for _ in range(80):
         f = value(c, s)
         if f > 0.0:
@@ -143,12 +139,15 @@ def _root_in_bracket(c, low, high):
             high = s
         rate = slope(c, s)
         step = -f / rate if rate != 0.0 else inf
+        # Small steps that shrink no more are rounding.
+        if abs(step) <= 4e-16 * high or (step_before < 1e-10 * high and abs(step) >= 0.5 * step_before):
+            return min(max(s + step, low), high)
         new = s + step
         if not (low < new < high):
             new = 0.5 * (low + high)
-        if abs(new - s) <= 4e-16 * high or not (low < new < high):
-            return new
-        s = new
+            if not (low < new < high):
+                return new
+        s, step_before = new, abs(new - s)
     return s
 
 
@@ -156,14 +155,13 @@ def _root_in_bracket(c, low, high):
 def _first_root_by_subdivision(c, h, work):
     """First zero by bisection in the Bernstein basis; see :func:`first_root`."""
     b = work[0]
-    power, choose = 1.0, 1.0
-    for k in range(ORDER + 1):
-        b[k] = c[k] * power / choose
+    power = h
+    b[0] = c[0]
+    bernstein = (c[1] * h) * numbers_from(_BERNSTEIN, 0) + c[0]
+    for k in range(2, ORDER + 1):
         power *= h
-        choose = choose * (ORDER - k) / (k + 1.0)
-    for level in range(1, ORDER + 1):
-        for k in range(ORDER, level - 1, -1):
-            b[k] += b[k - 1]
+        bernstein = bernstein + (c[k] * power) * numbers_from(_BERNSTEIN, (k - 1) * ORDER)
+    set_terms(b, bernstein)
     work[0, ORDER + 1], work[0, ORDER + 2] = 0.0, h
     top = 0
     # A stack of intervals; the leftmost one is on top.
@@ -216,7 +214,7 @@ def crossings(c, h, work, count):
     c : ndarray of shape ``(ORDER + 1,)``
     h : float
         Length of the step, s.
-    work : ndarray of shape ``(STACK, ORDER + 3)``
+    work : ndarray of shape ``(STACK, COLUMNS)``
         Row 0 holds instants, s; the other rows are scratch.
     count : int
         Number of instants already in row 0.

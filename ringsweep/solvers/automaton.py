@@ -14,7 +14,7 @@ import numpy as np
 from ringsweep.compile import borrowed, hook, inlined, kernel, take
 from ringsweep.models.interface import implicit, modes, recorder, series
 from ringsweep.models.interface.status import BROKEN, COMPLETE, RUNNING
-from ringsweep.numerics.series import ORDER, STACK
+from ringsweep.numerics.series import COLUMNS, STACK
 from ringsweep.physics.drives import next_knot
 from ringsweep.physics.friction import Dynamic, SetValued, Smooth, family
 from ringsweep.solvers import rosenbrock
@@ -206,8 +206,8 @@ def integrate(batch, tolerances, max_steps, rows, steps, audits, spacing, times,
     """
     sample = take(batch, 0)
     size, first = series.table_shape(sample)
-    c = np.zeros((size, ORDER + 3))
-    work = np.empty((STACK, ORDER + 3))
+    c = np.zeros((size, COLUMNS))
+    work = np.empty((STACK, COLUMNS))
     stages = np.empty((rosenbrock.STAGES, len(modes.initial_state(sample)[1])))
     samples = np.empty((MOST_GUARDS, INSTANTS + 1))
     return _integrate(

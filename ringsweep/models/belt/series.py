@@ -12,7 +12,8 @@ from ringsweep.compile import inlined
 from ringsweep.models.belt.force import breakaway_force, holds_in_band, length_scale
 from ringsweep.models.interface import modes, series
 from ringsweep.models.interface.status import RUNNING
-from ringsweep.numerics.series import INVERSE, ORDER, crossings, slope, step_size, value, variation
+from ringsweep.numerics.series import FACTOR_ROWS, INVERSE, ORDER, crossings, slope, step_size, value, variation
+from ringsweep.numerics.terms import inner_products, set_factors
 from ringsweep.physics import belt, drives
 from ringsweep.physics.friction.velocity import (
     BAND,
@@ -24,11 +25,13 @@ from ringsweep.physics.friction.velocity import (
     shorten_for_decay,
     slower,
     stiction_band,
+    weight_factors,
 )
 
 # Rows of the table of series; the guards are last.
-X, V, VELOCITY, EXCESS, BASIS, STATIC_WEIGHT, KINETIC_WEIGHT, FORCE, SHIFT = range(9)
-SLOW, FAST = range(9, 11)
+X, V, VELOCITY, EXCESS, BASIS, STATIC_WEIGHT, KINETIC_WEIGHT, FORCE, SHIFT, LEFT = range(10)
+RIGHT = LEFT + FACTOR_ROWS
+SLOW, FAST = RIGHT + FACTOR_ROWS, RIGHT + FACTOR_ROWS + 1
 
 
 class Mode(NamedTuple):
@@ -144,7 +147,13 @@ def _expand(scene, mode, t, y, tolerance, c):
         viscous = 0.0 if yielding else scene.viscous
         for k in range(ORDER + 1):
             c[EXCESS, k] = mode.sign * c[V, k] - (low if k == 0 else 0.0)
-            expand_weights(scene.law, mode.region, c[EXCESS], k, c[BASIS], c[STATIC_WEIGHT], c[KINETIC_WEIGHT])
+            weights, cube, _, _, _, _, _, _ = inner_products(c, LEFT, RIGHT, k)
+            expand_weights(
+                scene.law, mode.region, c[EXCESS], k, (weights, cube), c[BASIS], c[STATIC_WEIGHT], c[KINETIC_WEIGHT]
+            )
+            (a1, a2), (b1, b2) = weight_factors(scene.law, mode.region, c[EXCESS], k, c[BASIS])
+            set_factors(c, LEFT, k, (a1, a2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+            set_factors(c, RIGHT, k, (b1, b2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
             c[FORCE, k] = mode.sign * load * (c[STATIC_WEIGHT, k] * scene.mu_s + c[KINETIC_WEIGHT, k] * scene.mu_k)
             c[FORCE, k] += viscous * c[V, k]
             if k < ORDER:

@@ -27,16 +27,17 @@ from ringsweep.models.ring.contacts import (
 )
 from ringsweep.models.ring.record import ENDS
 from ringsweep.numerics.series import (
+    FACTOR_ROWS,
     INVERSE,
     ORDER,
     crossings,
     may_fall_below,
-    product,
     slope,
     step_size,
     value,
     variation,
 )
+from ringsweep.numerics.terms import inner_products, set_factors, set_terms, terms
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction.velocity import (
     BAND,
@@ -49,13 +50,17 @@ from ringsweep.physics.friction.velocity import (
     shorten_for_decay,
     slower,
     stiction_band,
+    weight_factors,
     weights_in,
 )
 
 # Rows of the table of series. The guards are last. INERTIA is the first guard: the others mean nothing after a jam.
 PHI, V, OMEGA, EPSILON, SIN, COS, SQUARE, THETA, EXCESS, BASIS, STATIC_WEIGHT, KINETIC_WEIGHT = range(12)
 FRICTION_1, FRICTION_2, SPARE = range(12, 15)
-INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(15, 21)
+# Factors of the products that grow side by side. They take several rows each.
+LEFT = 15
+RIGHT = LEFT + FACTOR_ROWS
+INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(RIGHT + FACTOR_ROWS, RIGHT + FACTOR_ROWS + 6)
 
 # If one reaction vanishes and the other is smaller than this share of the load, both contacts separate.
 AT_ONCE = 1e-9
@@ -254,16 +259,19 @@ def _switch(scene, mode, guard, t, y):
 
 
 @inlined
-def _expand_sine(c, k):
-    """Fill coefficient `k` of sine and cosine of phi and of the square of omega."""
+def _expand_sine(c, k, sine, cosine, square):
+    """Fill coefficient `k` of sine and cosine of phi and of the square of omega.
+
+    `sine`, `cosine` and `square` are the inner products of dphi/dt and cosine, dphi/dt and sine, omega and omega, see
+    :func:`ringsweep.numerics.terms.inner_products`.
+    """
     if k == 0:
         c[SIN, 0], c[COS, 0] = sin(c[PHI, 0]), cos(c[PHI, 0])
         c[SQUARE, 0] = c[OMEGA, 0] * c[OMEGA, 0]
         return
-    # From phi' = omega.
-    c[SIN, k] = product(c[OMEGA], c[COS], k - 1) * INVERSE[k]
-    c[COS, k] = -product(c[OMEGA], c[SIN], k - 1) * INVERSE[k]
-    c[SQUARE, k] = product(c[OMEGA], c[OMEGA], k)
+    c[SIN, k] = (sine + c[OMEGA, k - 1] * c[COS, 0]) * INVERSE[k]
+    c[COS, k] = -(cosine + c[OMEGA, k - 1] * c[SIN, 0]) * INVERSE[k]
+    c[SQUARE, k] = square + 2.0 * c[OMEGA, 0] * c[OMEGA, k]
 
 
 @inlined
@@ -282,10 +290,7 @@ def _expand(scene, mode, t, y, tolerance, c):
     if mode.sign == 0:
         return _expand_stick(scene, mode, tolerance, c)
     c[OMEGA, 0] = y[1] / scene.body.radius + c[THETA, 1]
-    if constant_weights(scene.law, mode.region):
-        _expand_constant_slip(scene, mode, c)
-    else:
-        _expand_varying_slip(scene, mode, c)
+    _expand_slip(scene, mode, c)
     _expand_slip_guards(scene, mode, c)
     per_angle = 1.0 / tolerance
     speed = scene.body.radius * (1.0 + abs(c[OMEGA, 0]))
@@ -315,57 +320,43 @@ def _expand(scene, mode, t, y, tolerance, c):
 
 
 @inlined
-def _expand_constant_slip(scene, mode, c):
-    """Fill the series of slip with constant K."""
+def _expand_slip(scene, mode, c):
+    """Fill the series of slip."""
     body = scene.body
-    # K is kinetic, or that of a tail that does not decay.
-    k1, k2 = friction_under(scene, mode, 0.0)
-    p, determinant, inertia = ring.acceleration(body, k1, k2, 0.0, 0.0, 1.0)
-    q, _, _ = ring.acceleration(body, k1, k2, 0.0, 1.0, 0.0)
-    r, _, _ = ring.acceleration(body, k1, k2, 1.0, 0.0, 0.0)
-    epsilon_0, normal_10, normal_20 = ring.constant_terms(body, k1, k2)
-    p, q, r = p - epsilon_0, q - epsilon_0, r - epsilon_0
-    for k in range(ORDER + 1):
-        _expand_sine(c, k)
-        c[EPSILON, k] = p * c[SQUARE, k] + q * c[COS, k] + r * c[SIN, k]
-        if k == 0:
-            c[EPSILON, 0] += epsilon_0
-        if k < ORDER:
-            _next_state(scene, c, k)
-    # The reactions are linear in sine, cosine, square of omega, and acceleration.
-    s1, s2 = ring.reactions(body, k1, k2, 1.0, 0.0, 0.0, 0.0)
-    c1, c2 = ring.reactions(body, k1, k2, 0.0, 1.0, 0.0, 0.0)
-    w1, w2 = ring.reactions(body, k1, k2, 0.0, 0.0, 1.0, 0.0)
-    e1, e2 = ring.reactions(body, k1, k2, 0.0, 0.0, 0.0, 1.0)
-    s1, c1, w1, e1 = s1 - normal_10, c1 - normal_10, w1 - normal_10, e1 - normal_10
-    s2, c2, w2, e2 = s2 - normal_20, c2 - normal_20, w2 - normal_20, e2 - normal_20
-    for k in range(ORDER + 1):
-        c[NORMAL_1, k] = s1 * c[SIN, k] + c1 * c[COS, k] + w1 * c[SQUARE, k] + e1 * c[EPSILON, k]
-        c[NORMAL_2, k] = s2 * c[SIN, k] + c2 * c[COS, k] + w2 * c[SQUARE, k] + e2 * c[EPSILON, k]
-    c[NORMAL_1, 0] += normal_10
-    c[NORMAL_2, 0] += normal_20
-    c[INERTIA, 0] = inf if determinant > 0.0 and inertia > 0.0 else min(determinant, inertia)
-
-
-@inlined
-def _expand_varying_slip(scene, mode, c):
-    """Fill the series of slip with friction coefficients that vary with the sliding speed."""
     mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
     low, _ = region_bounds(scene.law, mode.region)
     k1, k2 = friction_under(scene, mode, max(abs(c[V, 0]), low))
-    start = slip_start(scene.body, k1, k2)
+    start = slip_start(body, k1, k2)
     for k in range(ORDER + 1):
-        _expand_sine(c, k)
+        sine, cosine, square, weights, cube, loaded_1, loaded_2, both = inner_products(c, LEFT, RIGHT, k)
+        _expand_sine(c, k, sine, cosine, square)
         c[EXCESS, k] = mode.sign * c[V, k] - (low if k == 0 else 0.0)
-        expand_weights(scene.law, mode.region, c[EXCESS], k, c[BASIS], c[STATIC_WEIGHT], c[KINETIC_WEIGHT])
+        expand_weights(
+            scene.law, mode.region, c[EXCESS], k, (weights, cube), c[BASIS], c[STATIC_WEIGHT], c[KINETIC_WEIGHT]
+        )
         c[FRICTION_1, k] = -mode.sign * (c[STATIC_WEIGHT, k] * mu_s1 + c[KINETIC_WEIGHT, k] * mu_k1)
         c[FRICTION_2, k] = -mode.sign * (c[STATIC_WEIGHT, k] * mu_s2 + c[KINETIC_WEIGHT, k] * mu_k2)
-        slip_term(scene.body, start, c, k)
+        both += c[FRICTION_1, 0] * c[FRICTION_2, k]
+        if k > 0:
+            loaded_1 += c[FRICTION_1, k] * c[NORMAL_1, 0]
+            loaded_2 += c[FRICTION_2, k] * c[NORMAL_2, 0]
+            both += c[FRICTION_1, k] * c[FRICTION_2, 0]
+        slip_term(body, start, c, k, loaded_1, loaded_2, both)
         if k < ORDER:
             _next_state(scene, c, k)
+        if k > 0:
+            (weight_1, weight_2), (weight_3, weight_4) = weight_factors(
+                scene.law, mode.region, c[EXCESS], k, c[BASIS]
+            )
+            before, omega, K1, K2 = c[OMEGA, k - 1], c[OMEGA, k], c[FRICTION_1, k], c[FRICTION_2, k]
+            set_factors(c, LEFT, k, (before, before, omega, weight_1, weight_2, K1, K2, K1))
+            set_factors(
+                c, RIGHT, k, (c[COS, k], c[SIN, k], omega, weight_3, weight_4, c[NORMAL_1, k], c[NORMAL_2, k], K2)
+            )
     # Before a jam the accelerations grow without bound, so that a small effective inertia counts as a jam.
-    _, determinant, inertia = ring.acceleration(scene.body, k1, k2, 0.0, 0.0, 0.0)
-    if not (determinant > 0.0 and inertia > 1e-6 * ring.about_axis(scene.body) * determinant):
+    _, determinant, inertia = ring.acceleration(body, k1, k2, 0.0, 0.0, 0.0)
+    least = 0.0 if constant_weights(scene.law, mode.region) else 1e-6 * ring.about_axis(body) * determinant
+    if not (determinant > 0.0 and inertia > least):
         c[INERTIA, 0] = -1.0
 
 
@@ -401,7 +392,7 @@ def _two_slip_start(body, k1, k2):
 
 
 @hook
-def slip_term(body, start, c, k):
+def slip_term(body, start, c, k, loaded_1, loaded_2, both):
     """Fill coefficient `k` of acceleration, reactions and effective inertia in slip, where friction is a series.
 
     Parameters
@@ -414,35 +405,37 @@ def slip_term(body, start, c, k):
         each contact). To be filled: EPSILON, NORMAL_1, NORMAL_2 and INERTIA.
     k : int
         Index of the coefficient.
+    loaded_1, loaded_2 : float
+        Coefficient `k` of the friction K_i N_i at each contact, but for the term with coefficient `k` of N_i.
+    both : float
+        Coefficient `k` of K_1 K_2.
     """
 
 
 @slip_term.implements(ring.TwoContacts)
-def _two_slip_term(body, start, c, k):
+def _two_slip_term(body, start, c, k, loaded_1, loaded_2, both):
     b = body
     sb, cb = b.sin_beta, b.cos_beta
     lever, k1, k2, a1, a2, b1, b2 = start
     about_axis = ring.about_axis(b)
-    # Friction without the term of the unknown reactions.
-    f1, f2 = product(c[FRICTION_1, 1:], c[NORMAL_1], k - 1), product(c[FRICTION_2, 1:], c[NORMAL_2], k - 1)
-    radial = b.mass * (b.gravity * c[COS, k] + b.xi * c[SQUARE, k]) + (f1 - f2) * sb
-    tangential = b.mass * b.gravity * (1.0 - b.mass * b.xi * b.xi / about_axis) * c[SIN, k] - (f1 + f2) * lever
+    radial = b.mass * (b.gravity * c[COS, k] + b.xi * c[SQUARE, k]) + (loaded_1 - loaded_2) * sb
+    tangential = b.mass * b.gravity * (1.0 - b.mass * b.xi * b.xi / about_axis) * c[SIN, k]
+    tangential -= (loaded_1 + loaded_2) * lever
     c[NORMAL_1, k] = b2 * radial + a2 * tangential
     c[NORMAL_2, k] = b1 * radial - a1 * tangential
-    friction = (f1 + k1 * c[NORMAL_1, k]) + (f2 + k2 * c[NORMAL_2, k])
+    friction = (loaded_1 + k1 * c[NORMAL_1, k]) + (loaded_2 + k2 * c[NORMAL_2, k])
     c[EPSILON, k] = (b.radius * friction - b.mass * b.gravity * b.xi * c[SIN, k]) / about_axis
     one = 1.0 if k == 0 else 0.0
-    both = product(c[FRICTION_1], c[FRICTION_2], k)
     difference = (cb * lever - sb * sb) * (c[FRICTION_1, k] - c[FRICTION_2, k])
     c[INERTIA, k] = about_axis * (2.0 * sb * (one * cb + both * lever) + difference)
 
 
 @slip_term.implements(ring.OneContact)
-def _one_slip_term(body, start, c, k):
+def _one_slip_term(body, start, c, k, loaded_1, loaded_2, both):
     c[INERTIA, k] = 1.0 if k == 0 else 0.0
     load = body.mass * (body.gravity * c[COS, k] + body.radius * c[SQUARE, k])
     c[NORMAL_1, k] = c[NORMAL_2, k] = load
-    friction = product(c[FRICTION_1], c[NORMAL_1], k)
+    friction = loaded_1 + c[FRICTION_1, 0] * load
     c[EPSILON, k] = (friction / body.mass - body.gravity * c[SIN, k]) / body.radius
 
 
@@ -451,18 +444,18 @@ def _expand_slip_guards(scene, mode, c):
     """Fill the guards of slip for both ends of the region of the friction law, and for the nearer edge."""
     low, high = region_bounds(scene.law, mode.region)
     ahead_1, ahead_2 = edges_ahead(scene, mode, c[PHI, 0] - c[THETA, 0])
-    for k in range(1, ORDER + 1):
-        c[SLOW, k] = mode.sign * c[V, k]
-        c[FAST, k] = -c[SLOW, k]
-        c[EDGE, k] = -mode.sign * (c[PHI, k] - c[THETA, k])
+    forward = float(mode.sign)
+    set_terms(c[SLOW], terms(c[V]) * forward)
+    set_terms(c[FAST], terms(c[V]) * -forward)
+    set_terms(c[EDGE], (terms(c[THETA]) - terms(c[PHI])) * forward)
     c[SLOW, 0] = 0.0 if mode.entry_guard == SLOW else mode.sign * c[V, 0] - low
     c[FAST, 0] = 0.0 if mode.entry_guard == FAST else high - mode.sign * c[V, 0]
     c[EDGE, 0] = min(ahead_1, ahead_2)
     # If friction does not drop at breakaway, the slope is zero there: what is computed is rounding.
     if mode.entry_guard == SLOW and low == 0.0:
         body = scene.body
-        terms = body.gravity + body.radius * (c[SQUARE, 0] + abs(c[EPSILON, 0]) + 2.0 * abs(c[THETA, 2]))
-        if abs(c[V, 1]) <= 1e-12 * terms:
+        size = body.gravity + body.radius * (c[SQUARE, 0] + abs(c[EPSILON, 0]) + 2.0 * abs(c[THETA, 2]))
+        if abs(c[V, 1]) <= 1e-12 * size:
             c[SLOW, 1] = 0.0
 
 
@@ -475,7 +468,12 @@ def _expand_stick(scene, mode, tolerance, c):
         c[EPSILON, k] = (k + 1.0) * (k + 2.0) * c[THETA, k + 2]
         if k > 0:
             c[PHI, k] = c[THETA, k]
-        _expand_sine(c, k)
+        sine, cosine, square, _, _, _, _, _ = inner_products(c, LEFT, RIGHT, k)
+        _expand_sine(c, k, sine, cosine, square)
+        if k > 0:
+            before, omega = c[OMEGA, k - 1], c[OMEGA, k]
+            set_factors(c, LEFT, k, (before, before, omega, 0.0, 0.0, 0.0, 0.0, 0.0))
+            set_factors(c, RIGHT, k, (c[COS, k], c[SIN, k], omega, 0.0, 0.0, 0.0, 0.0, 0.0))
     mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
     c[EDGE, 0] = inf
     stick_series(scene.body, mu_s1, mu_s2, c)
@@ -514,36 +512,31 @@ def _two_stick_series(body, m1, m2, c):
     sb, cb = b.sin_beta, b.cos_beta
     mean, half = 0.5 * (m1 + m2), 0.5 * (m1 - m2)
     moment = b.inertia + b.mass * b.xi * b.xi
-    # Rows that stick does not need otherwise.
-    friction, difference, load, total, linear, share = (
-        c[FRICTION_1],
-        c[FRICTION_2],
-        c[STATIC_WEIGHT],
-        c[KINETIC_WEIGHT],
-        c[SPARE],
-        c[BASIS],
-    )
+    first_difference = first_share = first_linear = first_total = 0.0
     for k in range(ORDER + 1):
-        friction[k] = (moment * c[EPSILON, k] + b.mass * b.gravity * b.xi * c[SIN, k]) / b.radius
-        difference[k] = (b.mass * (b.xi * c[EPSILON, k] + b.gravity * c[SIN, k]) - friction[k] * cb) / sb
-        load[k] = b.mass * (b.xi * c[SQUARE, k] + b.gravity * c[COS, k])
+        friction = (moment * c[EPSILON, k] + b.mass * b.gravity * b.xi * c[SIN, k]) / b.radius
+        difference = (b.mass * (b.xi * c[EPSILON, k] + b.gravity * c[SIN, k]) - friction * cb) / sb
+        load = b.mass * (b.xi * c[SQUARE, k] + b.gravity * c[COS, k])
         # mean cb total^2 - linear total - constant = 0
-        linear[k] = mean * load[k] - cb * half * difference[k] + sb * half * friction[k]
-        share[k] = half * load[k] + mean * sb * friction[k]
-        constant = product(difference, share, k)
+        linear = mean * load - cb * half * difference + sb * half * friction
+        share = half * load + mean * sb * friction
+        constant, square, mixed, total, _, _, _, _ = inner_products(c, LEFT, RIGHT, k)
         # Where both roots meet, stick ends: no friction gives the acceleration of the ring.
-        c[EDGE, k] = product(linear, linear, k) + 4.0 * mean * cb * constant
         if k == 0:
-            root = sqrt(max(c[EDGE, 0], 0.0))
-            total[0] = (linear[0] + root) / (2.0 * mean * cb)
+            first_difference, first_share, first_linear = difference, share, linear
+            c[EDGE, 0] = linear * linear + 4.0 * mean * cb * difference * share
+            total = first_total = (linear + sqrt(max(c[EDGE, 0], 0.0))) / (2.0 * mean * cb)
         else:
-            total[k] = 0.0
-            rest = constant + product(linear, total, k) - mean * cb * product(total, total, k)
-            total[k] = rest / (2.0 * mean * cb * total[0] - linear[0])
-        c[NORMAL_1, k] = 0.5 * (total[k] + difference[k])
-        c[NORMAL_2, k] = 0.5 * (total[k] - difference[k])
+            constant += first_difference * share + difference * first_share
+            c[EDGE, k] = square + 2.0 * first_linear * linear + 4.0 * mean * cb * constant
+            rest = constant + mixed + linear * first_total - mean * cb * total
+            total = rest / (2.0 * mean * cb * first_total - first_linear)
+            set_factors(c, LEFT, k, (difference, linear, linear, total, 0.0, 0.0, 0.0, 0.0))
+            set_factors(c, RIGHT, k, (share, linear, total, total, 0.0, 0.0, 0.0, 0.0))
+        c[NORMAL_1, k] = 0.5 * (total + difference)
+        c[NORMAL_2, k] = 0.5 * (total - difference)
         reserve = m1 * c[NORMAL_1, k] + m2 * c[NORMAL_2, k]
-        c[SLOW, k], c[FAST, k] = reserve + friction[k], reserve - friction[k]
+        c[SLOW, k], c[FAST, k] = reserve + friction, reserve - friction
 
 
 @stick_series.implements(ring.OneContact)

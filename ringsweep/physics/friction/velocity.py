@@ -17,6 +17,7 @@ import numpy as np
 
 from ringsweep.compile import hook, inlined
 from ringsweep.numerics.functions import decay, lanes_body, select
+from ringsweep.numerics.series import INVERSE
 from ringsweep.quantities.parameters import Parameter
 
 MU_S = Parameter("1", "static friction coefficient", lower=0.0)
@@ -219,7 +220,7 @@ def passes_band(law, before, after, ahead):
 
 
 @inlined
-def expand_weights(law, region, x, k, basis, static, kinetic):
+def expand_weights(law, region, x, k, products, basis, static, kinetic):
     """Compute coefficient `k` of the power series of both weights, from the series of the speed.
 
     Parameters
@@ -231,35 +232,35 @@ def expand_weights(law, region, x, k, basis, static, kinetic):
         Series of the speed minus the lower bound of the region, m/s^(j + 1).
     k : int
         Coefficients 0 ... k - 1 are known.
+    products : tuple of float
+        Inner products of the factors that :func:`weight_factors` returned for the coefficients 1 ... k - 1, see
+        :func:`ringsweep.numerics.terms.inner_products`.
     basis, static, kinetic : ndarray of shape ``(more than k,)``
         Series of q, see :class:`Piece`, and of the weights; coefficient `k` is filled.
     """
     p = piece(law, region)
     (s0, s1, s2, s3), (k0, k1, k2, k3) = p.static, p.kinetic
+    inner, cube = products
     if k == 0:
         basis[0] = exp(-p.decay * max(x[0], 0.0)) if p.decay > 0.0 else x[0] * x[0]
+        cube = x[0] * basis[0]
     else:
-        total = 0.0
-        if p.decay > 0.0:
-            # q' = -decay x' q
-            for j in range(1, k + 1):
-                total += j * x[j] * basis[k - j]
-            total *= -p.decay / k
-        else:
-            for j in range(k + 1):
-                total += x[j] * x[k - j]
-        basis[k] = total
-    static[k] = s1 * x[k] + s2 * basis[k]
-    kinetic[k] = k1 * x[k] + k2 * basis[k]
-    if s3 != 0.0 or k3 != 0.0:
-        cube = 0.0
-        for j in range(k + 1):
-            cube += x[j] * basis[k - j]
-        static[k] += s3 * cube
-        kinetic[k] += k3 * cube
+        # q' = -decay x' q, or q = x^2
+        basis[k] = -p.decay * (x[k] * basis[0] + INVERSE[k] * inner) if p.decay > 0.0 else 2.0 * x[0] * x[k] + inner
+        cube += x[0] * basis[k] + x[k] * basis[0]
+    static[k] = s1 * x[k] + s2 * basis[k] + s3 * cube
+    kinetic[k] = k1 * x[k] + k2 * basis[k] + k3 * cube
     if k == 0:
         static[0] += s0
         kinetic[0] += k0
+
+
+@inlined
+def weight_factors(law, region, x, k, basis):
+    """Coefficient `k` of the factors whose products :func:`expand_weights` needs: two left ones and two right ones."""
+    if piece(law, region).decay > 0.0:
+        return (k * x[k], x[k]), (basis[k], basis[k])
+    return (x[k], x[k]), (x[k], basis[k])
 
 
 # Largest change of the exponent of an exponential within a step. For a larger change the terms still grow at the end of
