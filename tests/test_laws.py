@@ -21,8 +21,11 @@ from ringsweep.physics.friction.velocity import (
     BAND,
     KINETIC,
     STRIBECK,
-    expand_weights,
+    basis_at,
+    basis_factor,
+    basis_term,
     faster,
+    friction_terms,
     piece,
     region_at,
     region_bounds,
@@ -77,6 +80,19 @@ def mu(law, speed):
     """Friction coefficient of a law."""
     w_s, w_k, _, _ = weights(law, speed)
     return w_s * MU_S + w_k * MU_K
+
+
+def series_of_friction(p, mu_s, mu_k, x):
+    """Series of the friction coefficient in a region, from the series of the speed above its lower bound."""
+    q_0, factor_0 = basis_at(p, x[0])
+    mu_0, by_x, by_q, by_cube = friction_terms(p, mu_s, mu_k, x[0])
+    q, factors, found = [q_0], [factor_0], [mu_0]
+    for k in range(1, len(x)):
+        inner = sum(j * x[j] * factors[k - j] for j in range(1, k))
+        q.append(basis_term(p, k, factor_0, x[k], inner))
+        factors.append(basis_factor(p, x[k], q[k]))
+        found.append(by_x * x[k] + by_q * q[k] + by_cube * sum(x[j] * q[k - j] for j in range(1, k)))
+    return found
 
 
 def slope(law, speed, region=None):
@@ -186,9 +202,7 @@ class TestWeights:
             for region, p in pieces(law).items():
                 length, s = width_of(p), 0.02
                 x = length * np.array([relative, *coefficients])
-                basis, static, kinetic = np.zeros((3, len(x)))
-                for k in range(len(x)):
-                    expand_weights(law, region, x, k, basis, static, kinetic)
+                static, kinetic = series_of_friction(p, 1.0, 0.0, x), series_of_friction(p, 0.0, 1.0, x)
                 now = p.low + np.polynomial.polynomial.polyval(s, x)
                 spread = 1e-11 + 10 * np.spacing(p.low) / length
                 w_s, w_k, _, _ = weights_in(law, region, now)

@@ -7,7 +7,10 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
+from ringsweep.compile import inlined, kernel
 from ringsweep.numerics.series import (
+    COLUMNS,
+    FACTOR_ROWS,
     INVERSE,
     ORDER,
     STACK,
@@ -15,18 +18,18 @@ from ringsweep.numerics.series import (
     crossings,
     first_root,
     may_fall_below,
-    product,
     slope,
     step_size,
     value,
     variation,
 )
+from ringsweep.numerics.terms import PRODUCTS, inner_products, no_factors, set_factors
 
 K = np.arange(ORDER + 1)
 
 
 def series(coefficients):
-    c = np.zeros(ORDER + 3)
+    c = np.zeros(COLUMNS)
     c[: len(coefficients)] = coefficients
     return c
 
@@ -39,12 +42,12 @@ def from_roots(roots, scale=1.0):
 
 def first(c, h):
     """First root of a series within a step, and whether there is one."""
-    return first_root(c, h, np.empty((STACK, ORDER + 3)))
+    return first_root(c, h, np.empty((STACK, COLUMNS)))
 
 
 def sign_changes(c, h, count=0):
     """Sorted instants of the sign changes of a series within a step."""
-    work = np.empty((STACK, ORDER + 3))
+    work = np.empty((STACK, COLUMNS))
     count = crossings(c, h, work, count)
     ascending(work[0], count)
     return work[0, :count]
@@ -53,6 +56,29 @@ def sign_changes(c, h, count=0):
 def noise(c, s):
     """Bound on the rounding error of the series at `s`."""
     return 64 * np.finfo(float).eps * (np.abs(c[: ORDER + 1]) * s**K).sum()
+
+
+@kernel
+def sums_in_kernel(c, s):
+    """Value, slope and variation of a series, from vector lanes."""
+    return value(c, s), slope(c, s), variation(c, s)
+
+
+@kernel
+def products_in_kernel(c, left, right):
+    """Fill `c` with products of series that grow side by side: row i is the product of rows i of `left` and `right`."""
+    first = newest = no_factors()
+    for k in range(1, ORDER + 1):
+        inner = inner_products(c, PRODUCTS, k, first, newest)
+        for i in range(PRODUCTS):
+            c[i, k] = inner[i] + left[i, 0] * right[i, k] + left[i, k] * right[i, 0]
+        newest = set_factors(c, PRODUCTS, k, eight(left, k), eight(right, k))
+        first = newest if k == 1 else first
+
+
+@inlined
+def eight(rows, k):
+    return rows[0, k], rows[1, k], rows[2, k], rows[3, k], rows[4, k], rows[5, k], rows[6, k], rows[7, k]
 
 
 coefficients = st.lists(st.floats(-10, 10), min_size=1, max_size=ORDER)
@@ -176,7 +202,7 @@ class TestCrossings:
         assert len(sign_changes(series([0.0]), 1.0)) == 0
 
     def test_crossings_are_appended_to_earlier_instants(self):
-        work = np.empty((STACK, ORDER + 3))
+        work = np.empty((STACK, COLUMNS))
         work[0, 0] = 0.125
         count = crossings(from_roots([0.75]), 1.0, work, 1)
         count = crossings(from_roots([0.25, 0.5]), 1.0, work, count)
@@ -185,14 +211,13 @@ class TestCrossings:
 
 
 class TestSums:
-    @given(coefficients, coefficients, st.floats(0, 2))
-    def test_value_slope_and_product_agree_with_numpy(self, a, b, s):
-        one, other = series(a), series(b)
+    @given(coefficients, st.floats(0, 2))
+    def test_value_and_slope_agree_with_numpy(self, a, s):
+        one = series(a)
         assert value(one, s) == pytest.approx(np.polyval(one[ORDER::-1], s), rel=1e-13, abs=1e-12)
         derivative = np.polynomial.Polynomial(one[: ORDER + 1]).deriv()
         assert slope(one, s) == pytest.approx(derivative(s), rel=1e-12, abs=1e-9 * 2.0**ORDER)
-        whole = np.convolve(one[: ORDER + 1], other[: ORDER + 1])
-        np.testing.assert_allclose([product(one, other, k) for k in K], whole[: ORDER + 1], atol=1e-12)
+        assert sums_in_kernel(one, s) == pytest.approx((value(one, s), slope(one, s), variation(one, s)), rel=1e-13)
 
     @given(coefficients, st.floats(0.01, 2), st.floats(0, 1))
     def test_change_of_a_series_is_at_most_its_variation(self, a, h, fraction):
@@ -219,3 +244,13 @@ class TestSums:
         x = np.array([*values, cos(1.0)])
         ascending(x, len(values))
         assert list(x) == [*sorted(values), cos(1.0)]
+
+
+def test_products_that_grow_side_by_side_agree_with_numpy():
+    left, right = np.random.default_rng(16).normal(size=(2, PRODUCTS, ORDER + 1))
+    expected = np.array([np.convolve(a, b)[1 : ORDER + 1] for a, b in zip(left, right, strict=True)])
+    for products in (products_in_kernel, products_in_kernel.py_func):
+        # Numbers of an earlier step must not count.
+        c = np.full((PRODUCTS + FACTOR_ROWS, COLUMNS), np.nan)
+        products(c, left, right)
+        np.testing.assert_allclose(c[:PRODUCTS, 1 : ORDER + 1], expected, atol=1e-13)

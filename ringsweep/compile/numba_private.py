@@ -26,6 +26,7 @@ try:
     from numba.core.codegen import JITCodeLibrary
     from numba.core.compiler import CompilerBase, DefaultPassBuilder
     from numba.core.compiler_machinery import register_pass
+    from numba.core.runtime.context import NRTContext
     from numba.core.typed_passes import NativeLowering
     from numba.extending import intrinsic
 except ImportError:
@@ -72,6 +73,16 @@ if AVAILABLE:
             state["cr"] = made._replace(cfunc=name)
             return True
 
+    class _Uncounted(NRTContext):
+        """References to arrays are not counted.
+
+        The kernel holds them while its callees run. Each count is a call, and keeps LLVM from holding numbers in
+        registers.
+        """
+
+        def get_meminfos(self, builder: Any, ty: Any, val: Any) -> list[Any]:
+            return []
+
     class _CalleeCompiler(CompilerBase):
         """Numba's passes, but without machine code for callees: kernels compile in two thirds of the time."""
 
@@ -81,6 +92,8 @@ if AVAILABLE:
                 (_AbsorbedLowering, why) if one is NativeLowering else (one, why) for one, why in passes.passes
             ]
             passes.finalize()
+            context = self.state.targetctx
+            context.__dict__["nrt"] = _Uncounted(context, context.enable_nrt)
             return [passes]
 
     @intrinsic

@@ -15,8 +15,8 @@ from ringsweep.numerics.terms import NUMBERS, ORDER, PRODUCTS, numbers_from, pow
 #: Columns of a table of series: ORDER + 3 numbers, rounded up so that rows begin at multiples of 64 bytes.
 COLUMNS = 24
 
-#: Rows of a table for PRODUCTS factors, see :func:`ringsweep.numerics.terms.set_factors`.
-FACTOR_ROWS = ceil((ORDER + 1) * PRODUCTS / COLUMNS)
+#: Rows of a table for PRODUCTS pairs of factors, see :func:`ringsweep.numerics.terms.set_factors`.
+FACTOR_ROWS = ceil(2 * (ORDER + 1) * PRODUCTS / COLUMNS)
 
 #: ``INVERSE[k]`` is 1/k: multiplication is many times cheaper than division.
 INVERSE = np.array([np.inf, *(1.0 / k for k in range(1, ORDER + 3))])
@@ -25,8 +25,9 @@ INVERSE = np.array([np.inf, *(1.0 / k for k in range(1, ORDER + 3))])
 _ABOVE = np.where(NUMBERS > 2.0, 1.0, 0.0)
 _ABOVE_IN_SLOPE = NUMBERS * _ABOVE
 
-# Row k - 1 holds the Bernstein coefficients 1 ... ORDER of the power k on [0, 1]; coefficient 0 is 0.
-_BERNSTEIN = np.array([[comb(j, k) / comb(ORDER, k) for j in range(1, ORDER + 1)] for k in range(1, ORDER + 1)]).ravel()
+# Binomial coefficients, which are exact: of ORDER and k; row k - 1 of the second has those of j and k.
+_CHOOSE = np.array([float(comb(ORDER, k)) for k in range(1, ORDER + 1)])
+_CHOOSE_ALL = np.array([float(comb(j, k)) for k in range(1, ORDER + 1) for j in range(1, ORDER + 1)])
 
 #: Rows of the scratch array for :func:`crossings` and :func:`first_root`.
 STACK = 54
@@ -62,15 +63,6 @@ def step_size(last, previous):
     if previous > 0.0:
         h = min(h, exp(-log(previous) / (ORDER - 1)))
     return h
-
-
-@inlined
-def product(a, b, k):
-    """Coefficient `k` of the product of two series."""
-    found = 0.0
-    for j in range(k + 1):
-        found += a[j] * b[k - j]
-    return found
 
 
 @absorbed
@@ -155,12 +147,13 @@ def _root_in_bracket(c, low, high):
 def _first_root_by_subdivision(c, h, work):
     """First zero by bisection in the Bernstein basis; see :func:`first_root`."""
     b = work[0]
-    power = h
     b[0] = c[0]
-    bernstein = (c[1] * h) * numbers_from(_BERNSTEIN, 0) + c[0]
+    # A coefficient within rounding of zero may belong to a double root.
+    rounding = 1e-15 * (c[0] + variation(c, h))
+    set_terms(b, terms(c) * powers(h) * h / numbers_from(_CHOOSE, 0))
+    bernstein = b[1] * numbers_from(_CHOOSE_ALL, 0) + c[0]
     for k in range(2, ORDER + 1):
-        power *= h
-        bernstein = bernstein + (c[k] * power) * numbers_from(_BERNSTEIN, (k - 1) * ORDER)
+        bernstein = bernstein + b[k] * numbers_from(_CHOOSE_ALL, (k - 1) * ORDER)
     set_terms(b, bernstein)
     work[0, ORDER + 1], work[0, ORDER + 2] = 0.0, h
     top = 0
@@ -171,7 +164,7 @@ def _first_root_by_subdivision(c, h, work):
         changes = 0
         positive = True
         for k in range(1, ORDER + 1):
-            if (b[k] > 0.0) != positive:
+            if (b[k] > rounding) != positive:
                 positive = not positive
                 changes += 1
         if changes == 0:

@@ -32,7 +32,7 @@ _TERMS_VECTOR = ir.VectorType(ir.DoubleType(), ORDER)
 
 def _compiled(body: Any, function: Any) -> None:
     """Let kernels call `body` in place of `function`."""
-    specialise(function, lambda *kinds: body)
+    specialise(function, lambda *kinds: body, absorb=True)
 
 
 def _place(context: Any, builder: Any, sig: Any, args: Any, lanes: Lanes) -> Any:
@@ -161,21 +161,45 @@ _compiled(_total_in_kernel, total)
 # ---- products of several series ---------------------------------------------------------------
 
 
-def set_factors(c, row, k, values):
-    """Store coefficient `k` of PRODUCTS factors.
+def no_factors():
+    """Factors before the first ones, see :func:`set_factors`."""
+    return np.zeros(PRODUCTS), np.zeros(PRODUCTS)
+
+
+@intrinsic
+def _no_factor(typingctx):
+    zeros = ir.Constant(ir.VectorType(ir.DoubleType(), PRODUCTS), [0.0] * PRODUCTS)
+    return _FACTORS(), lambda context, builder, sig, args: zeros
+
+
+def _no_factors_in_kernel():
+    return _no_factor(), _no_factor()
+
+
+_compiled(_no_factors_in_kernel, no_factors)
+
+
+def set_factors(c, row, k, left, right):
+    """Store coefficient `k` of PRODUCTS pairs of factors.
 
     Parameters
     ----------
     c : ndarray of shape ``(rows, columns)``
-        Table of the series.
+        Table of series.
     row : int
         Row of the table from which on the factors stand.
     k : int
-    values : tuple of float
-        PRODUCTS numbers.
+    left, right : tuple of float
+        PRODUCTS numbers each.
+
+    Returns
+    -------
+    tuple
+        The same numbers side by side, for :func:`inner_products`; in Python arrays.
     """
-    at = row * c.shape[1] + k * PRODUCTS
-    c.reshape(-1)[at : at + PRODUCTS] = values
+    pairs = c.reshape(-1)[row * c.shape[1] :][: (k + 1) * 2 * PRODUCTS].reshape(k + 1, 2, PRODUCTS)
+    pairs[k] = left, right
+    return np.array(left), np.array(right)
 
 
 @intrinsic
@@ -190,39 +214,40 @@ def _packed(typingctx, values):
     return _FACTORS(types.UniTuple(types.float64, PRODUCTS)), lower
 
 
-def _set_factors_in_kernel(c, row, k, values):
-    _store_factors(c, row * c.shape[1] + k * PRODUCTS, _packed(values))
+def _set_factors_in_kernel(c, row, k, left, right):
+    at = row * c.shape[1] + k * (2 * PRODUCTS)
+    a, b = _packed(left), _packed(right)
+    _store_factors(c, at, a)
+    _store_factors(c, at + PRODUCTS, b)
+    return a, b
 
 
 _compiled(_set_factors_in_kernel, set_factors)
 
 
-def inner_products(c, left, right, k):
+def inner_products(c, row, k, first, newest):
     """Coefficient `k` of PRODUCTS products of two series, without the terms that contain a coefficient 0 or `k`.
 
     Parameters
     ----------
     c : ndarray of shape ``(rows, columns)``
-        Table of the series.
-    left, right : int
-        Rows of the table from which on the factors stand, see :func:`set_factors`.
+        Table of series.
+    row : int
+        Row of the table from which on the factors stand, see :func:`set_factors`.
     k : int
         The coefficients 1 ... `k` - 1 of the factors are known.
+    first, newest : tuple
+        What :func:`set_factors` returned for the coefficients 1 and `k` - 1, or :func:`no_factors`.
 
     Returns
     -------
     tuple of float
         For each pair of factors a and b the sum of ``a[j] b[k - j]`` over j = 1 ... k - 1.
     """
-    a, b = (c.reshape(-1)[row * c.shape[1] :][: k * PRODUCTS].reshape(k, PRODUCTS) for row in (left, right))
-    return tuple((a[1:] * b[:0:-1]).sum(axis=0)) if k > 1 else (0.0,) * PRODUCTS
-
-
-@intrinsic
-def _zero(typingctx):
-    return _FACTORS(), lambda context, builder, sig, args: ir.Constant(
-        ir.VectorType(ir.DoubleType(), PRODUCTS), [0.0] * PRODUCTS
-    )
+    if k < 2:
+        return (0.0,) * PRODUCTS
+    pairs = c.reshape(-1)[row * c.shape[1] :][: k * 2 * PRODUCTS].reshape(k, 2, PRODUCTS)
+    return tuple((pairs[1:, 0] * pairs[:0:-1, 1]).sum(axis=0))
 
 
 @intrinsic
@@ -236,18 +261,23 @@ def _unpacked(typingctx, vector):
     return result(_FACTORS), lower
 
 
-def _inner_products_in_kernel(c, left, right, k):
-    a, b = left * c.shape[1], right * c.shape[1] + k * PRODUCTS
-    even = odd = _zero()
-    # Two sums: each waits only for every second product.
-    for j in range(1, k - 1, 2):
-        at = j * PRODUCTS
+def _inner_products_in_kernel(c, row, k, first, newest):
+    a = row * c.shape[1]
+    b = a + (2 * k + 1) * PRODUCTS
+    even = odd = _no_factor()
+    # Of two sums each waits only for every second product. The newest factors come last, from registers, so that
+    # nothing waits for the memory.
+    for j in range(2, k - 2, 2):
+        at = 2 * j * PRODUCTS
         even = even + _load_factors(c, a + at) * _load_factors(c, b - at)
-        odd = odd + _load_factors(c, a + at + PRODUCTS) * _load_factors(c, b - at - PRODUCTS)
-    if k % 2 == 0 and k > 0:
-        at = (k - 1) * PRODUCTS
+        at += 2 * PRODUCTS
+        odd = odd + _load_factors(c, a + at) * _load_factors(c, b - at)
+    if k % 2 == 0 and k > 2:
+        at = 2 * (k - 2) * PRODUCTS
         even = even + _load_factors(c, a + at) * _load_factors(c, b - at)
-    return _unpacked(even + odd)
+    if k > 2:
+        odd = odd + newest[0] * first[1]
+    return _unpacked(even + first[0] * newest[1] + odd)
 
 
 _compiled(_inner_products_in_kernel, inner_products)

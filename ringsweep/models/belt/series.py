@@ -13,25 +13,27 @@ from ringsweep.models.belt.force import breakaway_force, holds_in_band, length_s
 from ringsweep.models.interface import modes, series
 from ringsweep.models.interface.status import RUNNING
 from ringsweep.numerics.series import FACTOR_ROWS, INVERSE, ORDER, crossings, slope, step_size, value, variation
-from ringsweep.numerics.terms import inner_products, set_factors
+from ringsweep.numerics.terms import inner_products, no_factors, set_factors, set_terms, terms
 from ringsweep.physics import belt, drives
 from ringsweep.physics.friction.velocity import (
     BAND,
     KINETIC,
-    expand_weights,
+    basis_at,
+    basis_factor,
+    basis_term,
     faster,
+    friction_terms,
+    piece,
     region_at,
     region_bounds,
     shorten_for_decay,
     slower,
     stiction_band,
-    weight_factors,
 )
 
 # Rows of the table of series; the guards are last.
-X, V, VELOCITY, EXCESS, BASIS, STATIC_WEIGHT, KINETIC_WEIGHT, FORCE, SHIFT, LEFT = range(10)
-RIGHT = LEFT + FACTOR_ROWS
-SLOW, FAST = RIGHT + FACTOR_ROWS, RIGHT + FACTOR_ROWS + 1
+X, V, VELOCITY, FORCE, SHIFT, FACTORS = range(6)
+SLOW, FAST = FACTORS + FACTOR_ROWS, FACTORS + FACTOR_ROWS + 1
 
 
 class Mode(NamedTuple):
@@ -142,36 +144,42 @@ def _expand(scene, mode, t, y, tolerance, c):
         c[SLOW, 0] = 0.0 if mode.entry_guard == SLOW else c[SLOW, 0] + bound
         c[FAST, 0] = 0.0 if mode.entry_guard == FAST else c[FAST, 0] + bound
     else:
-        low, high = region_bounds(scene.law, mode.region)
+        p, sign = piece(scene.law, mode.region), float(mode.sign)
+        low, high = p.low, p.high
         yielding = holds_in_band(scene.law) and mode.region == BAND
         viscous = 0.0 if yielding else scene.viscous
-        for k in range(ORDER + 1):
-            c[EXCESS, k] = mode.sign * c[V, k] - (low if k == 0 else 0.0)
-            weights, cube, _, _, _, _, _, _ = inner_products(c, LEFT, RIGHT, k)
-            expand_weights(
-                scene.law, mode.region, c[EXCESS], k, (weights, cube), c[BASIS], c[STATIC_WEIGHT], c[KINETIC_WEIGHT]
-            )
-            (a1, a2), (b1, b2) = weight_factors(scene.law, mode.region, c[EXCESS], k, c[BASIS])
-            set_factors(c, LEFT, k, (a1, a2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-            set_factors(c, RIGHT, k, (b1, b2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-            c[FORCE, k] = mode.sign * load * (c[STATIC_WEIGHT, k] * scene.mu_s + c[KINETIC_WEIGHT, k] * scene.mu_k)
-            c[FORCE, k] += viscous * c[V, k]
-            if k < ORDER:
-                c[X, k + 1] = c[VELOCITY, k] * INVERSE[k + 1]
-                c[VELOCITY, k + 1] = -(stiffness_per_mass * c[X, k] + c[FORCE, k] / scene.mass) * INVERSE[k + 1]
-                c[V, k + 1] = c[VELOCITY, k + 1] - (k + 2.0) * c[SHIFT, k + 2]
+        x_0 = sign * c[V, 0] - low
+        _, factor_0 = basis_at(p, x_0)
+        force, by_x, by_q, by_cube = friction_terms(p, sign * load * scene.mu_s, sign * load * scene.mu_k, x_0)
+        force += viscous * c[V, 0]
+        c[FORCE, 0], place, velocity = force, c[X, 0], c[VELOCITY, 0]
+        first = newest = no_factors()
         for k in range(1, ORDER + 1):
-            c[SLOW, k], c[FAST, k] = c[EXCESS, k], -c[EXCESS, k]
+            place, velocity = (
+                velocity * INVERSE[k],
+                -(stiffness_per_mass * place + force * (1.0 / scene.mass)) * INVERSE[k],
+            )
+            v = velocity - (k + 1.0) * c[SHIFT, k + 1]
+            x = sign * v
+            inner, inner_cube, _, _, _, _, _, _ = inner_products(c, FACTORS, k, first, newest)
+            q = basis_term(p, k, factor_0, x, inner)
+            force = by_x * x + by_q * q + by_cube * inner_cube + viscous * v
+            right = basis_factor(p, x, q), q, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            newest = set_factors(c, FACTORS, k, (k * x, x, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), right)
+            first = newest if k == 1 else first
+            c[X, k], c[VELOCITY, k], c[V, k], c[FORCE, k] = place, velocity, v, force
+        set_terms(c[SLOW], terms(c[V]) * sign)
+        set_terms(c[FAST], terms(c[V]) * -sign)
+        excess = x_0
         if yielding:
-            for k in range(ORDER + 1):
-                # With a dead band the velocity of the belt is constant.
-                c[SLOW, k] = -mode.sign * scene.stiffness * c[X, k]
-            c[EXCESS, 0] = c[SLOW, 0] - breakaway_force(scene)
-        c[SLOW, 0] = 0.0 if mode.entry_guard == SLOW else c[EXCESS, 0]
+            # With a dead band the velocity of the belt is constant.
+            set_terms(c[SLOW], terms(c[X]) * (-sign * scene.stiffness))
+            excess = -sign * scene.stiffness * c[X, 0] - breakaway_force(scene)
+        c[SLOW, 0] = 0.0 if mode.entry_guard == SLOW else excess
         c[FAST, 0] = 0.0 if mode.entry_guard == FAST else high - mode.sign * c[V, 0]
         # If friction does not drop at breakaway, the slope is zero there: what is computed is rounding.
-        terms = stiffness_per_mass * abs(c[X, 0]) + abs(c[FORCE, 0]) / scene.mass
-        if mode.entry_guard == SLOW and low == 0.0 and not yielding and abs(c[V, 1]) <= 1e-12 * terms:
+        size = stiffness_per_mass * abs(c[X, 0]) + abs(c[FORCE, 0]) / scene.mass
+        if mode.entry_guard == SLOW and low == 0.0 and not yielding and abs(c[V, 1]) <= 1e-12 * size:
             c[SLOW, 1] = 0.0
     # The unit of length is the distance that belt, body or load could move within a natural period of the spring.
     length = abs(c[X, 0]) + length_scale(scene, abs(c[VELOCITY, 0]) + abs(c[SHIFT, 1]))

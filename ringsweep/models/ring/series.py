@@ -13,7 +13,7 @@ from __future__ import annotations
 from math import cos, inf, isnan, sin, sqrt
 from typing import NamedTuple
 
-from ringsweep.compile import hook, inlined
+from ringsweep.compile import absorbed, hook, inlined
 from ringsweep.models.interface import modes, series
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
 from ringsweep.models.ring.contacts import (
@@ -37,30 +37,31 @@ from ringsweep.numerics.series import (
     value,
     variation,
 )
-from ringsweep.numerics.terms import inner_products, set_factors, set_terms, terms
+from ringsweep.numerics.terms import inner_products, no_factors, set_factors, set_terms, terms
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction.velocity import (
     BAND,
     KINETIC,
+    basis_at,
+    basis_factor,
+    basis_term,
     constant_weights,
-    expand_weights,
     faster,
+    friction_terms,
+    piece,
     region_at,
     region_bounds,
     shorten_for_decay,
     slower,
     stiction_band,
-    weight_factors,
     weights_in,
 )
 
 # Rows of the table of series. The guards are last. INERTIA is the first guard: the others mean nothing after a jam.
-PHI, V, OMEGA, EPSILON, SIN, COS, SQUARE, THETA, EXCESS, BASIS, STATIC_WEIGHT, KINETIC_WEIGHT = range(12)
-FRICTION_1, FRICTION_2, SPARE = range(12, 15)
-# Factors of the products that grow side by side. They take several rows each.
-LEFT = 15
-RIGHT = LEFT + FACTOR_ROWS
-INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(RIGHT + FACTOR_ROWS, RIGHT + FACTOR_ROWS + 6)
+PHI, V, OMEGA, EPSILON, SIN, COS, SQUARE, THETA, SPARE = range(9)
+# Factors of the products that grow side by side, in several rows.
+FACTORS = 9
+INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(FACTORS + FACTOR_ROWS, FACTORS + FACTOR_ROWS + 6)
 
 # If one reaction vanishes and the other is smaller than this share of the load, both contacts separate.
 AT_ONCE = 1e-9
@@ -258,30 +259,6 @@ def _switch(scene, mode, guard, t, y):
     return status, next_mode, (phi, 0.0)
 
 
-@inlined
-def _expand_sine(c, k, sine, cosine, square):
-    """Fill coefficient `k` of sine and cosine of phi and of the square of omega.
-
-    `sine`, `cosine` and `square` are the inner products of dphi/dt and cosine, dphi/dt and sine, omega and omega, see
-    :func:`ringsweep.numerics.terms.inner_products`.
-    """
-    if k == 0:
-        c[SIN, 0], c[COS, 0] = sin(c[PHI, 0]), cos(c[PHI, 0])
-        c[SQUARE, 0] = c[OMEGA, 0] * c[OMEGA, 0]
-        return
-    c[SIN, k] = (sine + c[OMEGA, k - 1] * c[COS, 0]) * INVERSE[k]
-    c[COS, k] = -(cosine + c[OMEGA, k - 1] * c[SIN, 0]) * INVERSE[k]
-    c[SQUARE, k] = square + 2.0 * c[OMEGA, 0] * c[OMEGA, k]
-
-
-@inlined
-def _next_state(scene, c, k):
-    """Fill coefficient `k` + 1 of the state from coefficient `k` of its rate."""
-    c[PHI, k + 1] = c[OMEGA, k] * INVERSE[k + 1]
-    c[OMEGA, k + 1] = c[EPSILON, k] * INVERSE[k + 1]
-    c[V, k + 1] = scene.body.radius * (c[OMEGA, k + 1] - (k + 2.0) * c[THETA, k + 2])
-
-
 @series.expand.implements(ring.Ring)
 def _expand(scene, mode, t, y, tolerance, c):
     drives.expand(scene.drive, t, ORDER + 2, c[THETA])
@@ -321,122 +298,160 @@ def _expand(scene, mode, t, y, tolerance, c):
 
 @inlined
 def _expand_slip(scene, mode, c):
-    """Fill the series of slip."""
-    body = scene.body
-    mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
-    low, _ = region_bounds(scene.law, mode.region)
-    k1, k2 = friction_under(scene, mode, max(abs(c[V, 0]), low))
-    start = slip_start(body, k1, k2)
-    for k in range(ORDER + 1):
-        sine, cosine, square, weights, cube, loaded_1, loaded_2, both = inner_products(c, LEFT, RIGHT, k)
-        _expand_sine(c, k, sine, cosine, square)
-        c[EXCESS, k] = mode.sign * c[V, k] - (low if k == 0 else 0.0)
-        expand_weights(
-            scene.law, mode.region, c[EXCESS], k, (weights, cube), c[BASIS], c[STATIC_WEIGHT], c[KINETIC_WEIGHT]
-        )
-        c[FRICTION_1, k] = -mode.sign * (c[STATIC_WEIGHT, k] * mu_s1 + c[KINETIC_WEIGHT, k] * mu_k1)
-        c[FRICTION_2, k] = -mode.sign * (c[STATIC_WEIGHT, k] * mu_s2 + c[KINETIC_WEIGHT, k] * mu_k2)
-        both += c[FRICTION_1, 0] * c[FRICTION_2, k]
-        if k > 0:
-            loaded_1 += c[FRICTION_1, k] * c[NORMAL_1, 0]
-            loaded_2 += c[FRICTION_2, k] * c[NORMAL_2, 0]
-            both += c[FRICTION_1, k] * c[FRICTION_2, 0]
-        slip_term(body, start, c, k, loaded_1, loaded_2, both)
-        if k < ORDER:
-            _next_state(scene, c, k)
-        if k > 0:
-            (weight_1, weight_2), (weight_3, weight_4) = weight_factors(
-                scene.law, mode.region, c[EXCESS], k, c[BASIS]
-            )
-            before, omega, K1, K2 = c[OMEGA, k - 1], c[OMEGA, k], c[FRICTION_1, k], c[FRICTION_2, k]
-            set_factors(c, LEFT, k, (before, before, omega, weight_1, weight_2, K1, K2, K1))
-            set_factors(
-                c, RIGHT, k, (c[COS, k], c[SIN, k], omega, weight_3, weight_4, c[NORMAL_1, k], c[NORMAL_2, k], K2)
-            )
-    # Before a jam the accelerations grow without bound, so that a small effective inertia counts as a jam.
-    _, determinant, inertia = ring.acceleration(body, k1, k2, 0.0, 0.0, 0.0)
-    least = 0.0 if constant_weights(scene.law, mode.region) else 1e-6 * ring.about_axis(body) * determinant
-    if not (determinant > 0.0 and inertia > least):
-        c[INERTIA, 0] = -1.0
+    """Fill the series of slip.
 
-
-@hook(optional=True)
-def slip_start(body, k1, k2):
-    """Numbers that :func:`slip_term` needs, computed once for each step.
-
-    Parameters
-    ----------
-    body : NamedTuple
-    k1, k2 : float
-        K at each contact at the beginning of the step.
-
-    Returns
-    -------
-    object
-        Passed on to :func:`slip_term`. By default 0, for bodies that need no such numbers.
+    Each coefficient is computed from numbers that are still in registers; the table only keeps it.
     """
-    return 0.0
+    body = scene.body
+    sign = float(mode.sign)
+    speed = sign * body.radius
+    mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
+    p = piece(scene.law, mode.region)
+    omega_0 = c[OMEGA, 0]
+    sin_0, cos_0, square_0 = sin(c[PHI, 0]), cos(c[PHI, 0]), omega_0 * omega_0
+    x_0 = sign * c[V, 0] - p.low
+    _, factor_0 = basis_at(p, x_0)
+    K1_0, by_x1, by_q1, by_cube1 = friction_terms(p, -sign * mu_s1, -sign * mu_k1, x_0)
+    K2_0, by_x2, by_q2, by_cube2 = friction_terms(p, -sign * mu_s2, -sign * mu_k2, x_0)
+    acceleration, reaction_1, reaction_2 = slip_balance(body, K1_0, K2_0)
+    epsilon = _constant_term(acceleration, sin_0, cos_0, square_0)
+    N1_0 = _constant_term(reaction_1, sin_0, cos_0, square_0)
+    N2_0 = _constant_term(reaction_2, sin_0, cos_0, square_0)
+    c[SIN, 0], c[COS, 0], c[SQUARE, 0], c[EPSILON, 0] = sin_0, cos_0, square_0, epsilon
+    c[NORMAL_1, 0], c[NORMAL_2, 0] = N1_0, N2_0
+    before = omega_0
+    first = newest = no_factors()
+    for k in range(1, ORDER + 1):
+        omega = epsilon * INVERSE[k]
+        x = speed * omega - speed * ((k + 1.0) * c[THETA, k + 1])
+        sine, cosine, square, inner, inner_cube, loaded_1, loaded_2, both = inner_products(c, FACTORS, k, first, newest)
+        q = basis_term(p, k, factor_0, x, inner)
+        K1 = by_x1 * x + by_q1 * q + by_cube1 * inner_cube
+        K2 = by_x2 * x + by_q2 * q + by_cube2 * inner_cube
+        sine, cosine = (sine + before * cos_0) * INVERSE[k], -(cosine + before * sin_0) * INVERSE[k]
+        square += 2.0 * omega_0 * omega
+        loaded_1, loaded_2 = loaded_1 + K1 * N1_0, loaded_2 + K2 * N2_0
+        epsilon = _term(acceleration, sine, cosine, square, loaded_1, loaded_2)
+        N1 = _term(reaction_1, sine, cosine, square, loaded_1, loaded_2)
+        N2 = _term(reaction_2, sine, cosine, square, loaded_1, loaded_2)
+        left = before, before, omega, k * x, x, K1, K2, K1
+        right = cosine, sine, omega, basis_factor(p, x, q), q, N1, N2, K2
+        newest = set_factors(c, FACTORS, k, left, right)
+        first = newest if k == 1 else first
+        c[PHI, k], c[OMEGA, k], c[V, k] = before * INVERSE[k], omega, sign * x
+        c[SIN, k], c[COS, k], c[SQUARE, k], c[EPSILON, k] = sine, cosine, square, epsilon
+        c[NORMAL_1, k], c[NORMAL_2, k] = N1, N2
+        c[INERTIA, k] = effective_inertia(body, 0.0, K1 - K2, both + K1_0 * K2 + K1 * K2_0)
+        before = omega
+    # Before a jam the accelerations grow without bound, so that a small effective inertia counts as a jam.
+    _, determinant, inertia = ring.acceleration(body, K1_0, K2_0, 0.0, 0.0, 0.0)
+    least = 0.0 if constant_weights(scene.law, mode.region) else 1e-6 * ring.about_axis(body) * determinant
+    c[INERTIA, 0] = inertia if determinant > 0.0 and inertia > least else -1.0
 
 
-@slip_start.implements(ring.TwoContacts)
-def _two_slip_start(body, k1, k2):
-    # With the angular acceleration eliminated the balances are, for K_i = k_i,
-    #     (cb - k1 sb) N1 + (cb + k2 sb) N2 = A,   (sb + k1 lever) N1 - (sb - k2 lever) N2 = B.
-    b = body
-    sb, cb = b.sin_beta, b.cos_beta
-    lever = cb - b.mass * b.xi * b.radius / ring.about_axis(b)
-    a1, a2 = cb - k1 * sb, cb + k2 * sb
-    b1, b2 = sb + k1 * lever, sb - k2 * lever
-    scale = 1.0 / (a2 * b1 + a1 * b2)
-    return lever, k1, k2, a1 * scale, a2 * scale, b1 * scale, b2 * scale
+@inlined
+def _constant_term(balance, sine, cosine, square):
+    """Coefficient 0 of a series from a row of :func:`slip_balance`."""
+    return balance[0] + balance[1] * sine + balance[2] * cosine + balance[3] * square
+
+
+@absorbed
+def _term(balance, sine, cosine, square, loaded_1, loaded_2):
+    """Coefficient 1 or higher of a series from a row of :func:`slip_balance`; the newest numbers come last."""
+    return ((balance[1] * sine + balance[2] * cosine + balance[3] * square) + balance[4] * loaded_1) + balance[
+        5
+    ] * loaded_2
 
 
 @hook
-def slip_term(body, start, c, k, loaded_1, loaded_2, both):
-    """Fill coefficient `k` of acceleration, reactions and effective inertia in slip, where friction is a series.
+def slip_balance(body, K1, K2):
+    """Solution of the balances in slip, where friction is K_i N_i plus a given force.
+
+    Angular acceleration and reactions are linear in sine and cosine of the angle, in the square of the angular
+    velocity and in the given forces. The series need it because coefficient k of the product of two series K_i and N_i
+    is ``K_i[0] N_i[k]`` plus terms that are known.
 
     Parameters
     ----------
     body : NamedTuple
-    start : object
-        What :func:`slip_start` returned.
-    c : ndarray of shape ``(rows, columns)``
-        Table of the series. Known up to coefficient `k`: SIN, COS, SQUARE (of omega), FRICTION_1 and FRICTION_2 (K at
-        each contact). To be filled: EPSILON, NORMAL_1, NORMAL_2 and INERTIA.
-    k : int
-        Index of the coefficient.
-    loaded_1, loaded_2 : float
-        Coefficient `k` of the friction K_i N_i at each contact, but for the term with coefficient `k` of N_i.
-    both : float
-        Coefficient `k` of K_1 K_2.
+    K1, K2 : float
+        Friction per unit of the normal reaction at each contact, 1.
+
+    Returns
+    -------
+    tuple of tuple of float
+        Three rows: for the angular acceleration, rad/s^2, and for N_1 and N_2, N. Each row has six numbers: the
+        constant term, and the factors of sine, cosine, square of the angular velocity, and force at contact 1 and 2.
     """
 
 
-@slip_term.implements(ring.TwoContacts)
-def _two_slip_term(body, start, c, k, loaded_1, loaded_2, both):
+@slip_balance.implements(ring.TwoContacts)
+def _two_slip_balance(body, K1, K2):
+    # With the angular acceleration eliminated the balances are, with the given forces F1 and F2,
+    #     (cb - K1 sb) N1 + (cb + K2 sb) N2 = M (g cos phi + xi omega^2) + (F1 - F2) sb
+    #     (sb + K1 lever) N1 - (sb - K2 lever) N2 = M g (1 - M xi^2/I) sin phi - (F1 + F2) lever
     b = body
     sb, cb = b.sin_beta, b.cos_beta
-    lever, k1, k2, a1, a2, b1, b2 = start
     about_axis = ring.about_axis(b)
-    radial = b.mass * (b.gravity * c[COS, k] + b.xi * c[SQUARE, k]) + (loaded_1 - loaded_2) * sb
-    tangential = b.mass * b.gravity * (1.0 - b.mass * b.xi * b.xi / about_axis) * c[SIN, k]
-    tangential -= (loaded_1 + loaded_2) * lever
-    c[NORMAL_1, k] = b2 * radial + a2 * tangential
-    c[NORMAL_2, k] = b1 * radial - a1 * tangential
-    friction = (loaded_1 + k1 * c[NORMAL_1, k]) + (loaded_2 + k2 * c[NORMAL_2, k])
-    c[EPSILON, k] = (b.radius * friction - b.mass * b.gravity * b.xi * c[SIN, k]) / about_axis
-    one = 1.0 if k == 0 else 0.0
-    difference = (cb * lever - sb * sb) * (c[FRICTION_1, k] - c[FRICTION_2, k])
-    c[INERTIA, k] = about_axis * (2.0 * sb * (one * cb + both * lever) + difference)
+    lever = cb - b.mass * b.xi * b.radius / about_axis
+    a1, a2 = cb - K1 * sb, cb + K2 * sb
+    b1, b2 = sb + K1 * lever, sb - K2 * lever
+    scale = 1.0 / (a2 * b1 + a1 * b2)
+    a1, a2, b1, b2 = a1 * scale, a2 * scale, b1 * scale, b2 * scale
+    along, across = b.mass * b.gravity * (1.0 - b.mass * b.xi * b.xi / about_axis), b.mass * b.gravity
+    lift = b.mass * b.xi
+    sine_1, cosine_1, square_1 = a2 * along, b2 * across, b2 * lift
+    sine_2, cosine_2, square_2 = -a1 * along, b1 * across, b1 * lift
+    first_1, second_1 = b2 * sb - a2 * lever, -b2 * sb - a2 * lever
+    first_2, second_2 = b1 * sb + a1 * lever, -b1 * sb + a1 * lever
+    # Friction alone turns the body about the axis, and weight.
+    k1, k2 = K1 * b.radius / about_axis, K2 * b.radius / about_axis
+    return (
+        (
+            0.0,
+            k1 * sine_1 + k2 * sine_2 - b.mass * b.gravity * b.xi / about_axis,
+            k1 * cosine_1 + k2 * cosine_2,
+            k1 * square_1 + k2 * square_2,
+            k1 * first_1 + k2 * first_2 + b.radius / about_axis,
+            k1 * second_1 + k2 * second_2 + b.radius / about_axis,
+        ),
+        (0.0, sine_1, cosine_1, square_1, first_1, second_1),
+        (0.0, sine_2, cosine_2, square_2, first_2, second_2),
+    )
 
 
-@slip_term.implements(ring.OneContact)
-def _one_slip_term(body, start, c, k, loaded_1, loaded_2, both):
-    c[INERTIA, k] = 1.0 if k == 0 else 0.0
-    load = body.mass * (body.gravity * c[COS, k] + body.radius * c[SQUARE, k])
-    c[NORMAL_1, k] = c[NORMAL_2, k] = load
-    friction = loaded_1 + c[FRICTION_1, 0] * load
-    c[EPSILON, k] = (friction / body.mass - body.gravity * c[SIN, k]) / body.radius
+@slip_balance.implements(ring.OneContact)
+def _one_slip_balance(body, K1, K2):
+    g, radius = body.gravity / body.radius, body.radius
+    reaction = 0.0, 0.0, body.mass * body.gravity, body.mass * radius, 0.0, 0.0
+    return (0.0, -g, K1 * g, K1, 1.0 / (body.mass * radius), 0.0), reaction, reaction
+
+
+@hook(optional=True)
+def effective_inertia(body, one, difference, both):
+    """Effective inertia times D, which a jam makes zero, as a linear function of K_1 - K_2 and K_1 K_2.
+
+    Parameters
+    ----------
+    body : NamedTuple
+    one : float
+        Factor of the constant term.
+    difference, both : float
+        K_1 - K_2 and K_1 K_2, or coefficients of their series.
+
+    Returns
+    -------
+    float
+        In the unit of the third result of :func:`ringsweep.physics.ring.acceleration`. By default `one`: the body
+        cannot jam.
+    """
+    return one
+
+
+@effective_inertia.implements(ring.TwoContacts)
+def _two_effective_inertia(body, one, difference, both):
+    i_0, i_1, i_2 = body.effective
+    return i_0 * one + i_1 * difference + i_2 * both
 
 
 @inlined
@@ -462,18 +477,23 @@ def _expand_slip_guards(scene, mode, c):
 @inlined
 def _expand_stick(scene, mode, tolerance, c):
     """Fill the series of stick and return the length of the step; the body moves with the ring."""
-    for k in range(ORDER + 1):
-        c[V, k] = 0.0
-        c[OMEGA, k] = (k + 1.0) * c[THETA, k + 1]
+    phi_0, omega_0 = c[PHI, 0], c[THETA, 1]
+    sin_0, cos_0 = sin(phi_0), cos(phi_0)
+    c[V, 0], c[OMEGA, 0], c[EPSILON, 0] = 0.0, omega_0, 2.0 * c[THETA, 2]
+    c[SIN, 0], c[COS, 0], c[SQUARE, 0] = sin_0, cos_0, omega_0 * omega_0
+    before = omega_0
+    first = newest = no_factors()
+    for k in range(1, ORDER + 1):
+        omega = (k + 1.0) * c[THETA, k + 1]
+        sine, cosine, square, _, _, _, _, _ = inner_products(c, FACTORS, k, first, newest)
+        sine, cosine = (sine + before * cos_0) * INVERSE[k], -(cosine + before * sin_0) * INVERSE[k]
+        left, right = (before, before, omega, 0.0, 0.0, 0.0, 0.0, 0.0), (cosine, sine, omega, 0.0, 0.0, 0.0, 0.0, 0.0)
+        newest = set_factors(c, FACTORS, k, left, right)
+        first = newest if k == 1 else first
+        c[PHI, k], c[V, k], c[OMEGA, k] = c[THETA, k], 0.0, omega
         c[EPSILON, k] = (k + 1.0) * (k + 2.0) * c[THETA, k + 2]
-        if k > 0:
-            c[PHI, k] = c[THETA, k]
-        sine, cosine, square, _, _, _, _, _ = inner_products(c, LEFT, RIGHT, k)
-        _expand_sine(c, k, sine, cosine, square)
-        if k > 0:
-            before, omega = c[OMEGA, k - 1], c[OMEGA, k]
-            set_factors(c, LEFT, k, (before, before, omega, 0.0, 0.0, 0.0, 0.0, 0.0))
-            set_factors(c, RIGHT, k, (c[COS, k], c[SIN, k], omega, 0.0, 0.0, 0.0, 0.0, 0.0))
+        c[SIN, k], c[COS, k], c[SQUARE, k] = sine, cosine, square + 2.0 * omega_0 * omega
+        before = omega
     mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
     c[EDGE, 0] = inf
     stick_series(scene.body, mu_s1, mu_s2, c)
@@ -513,6 +533,7 @@ def _two_stick_series(body, m1, m2, c):
     mean, half = 0.5 * (m1 + m2), 0.5 * (m1 - m2)
     moment = b.inertia + b.mass * b.xi * b.xi
     first_difference = first_share = first_linear = first_total = 0.0
+    first = newest = no_factors()
     for k in range(ORDER + 1):
         friction = (moment * c[EPSILON, k] + b.mass * b.gravity * b.xi * c[SIN, k]) / b.radius
         difference = (b.mass * (b.xi * c[EPSILON, k] + b.gravity * c[SIN, k]) - friction * cb) / sb
@@ -520,7 +541,7 @@ def _two_stick_series(body, m1, m2, c):
         # mean cb total^2 - linear total - constant = 0
         linear = mean * load - cb * half * difference + sb * half * friction
         share = half * load + mean * sb * friction
-        constant, square, mixed, total, _, _, _, _ = inner_products(c, LEFT, RIGHT, k)
+        constant, square, mixed, total, _, _, _, _ = inner_products(c, FACTORS, k, first, newest)
         # Where both roots meet, stick ends: no friction gives the acceleration of the ring.
         if k == 0:
             first_difference, first_share, first_linear = difference, share, linear
@@ -531,8 +552,9 @@ def _two_stick_series(body, m1, m2, c):
             c[EDGE, k] = square + 2.0 * first_linear * linear + 4.0 * mean * cb * constant
             rest = constant + mixed + linear * first_total - mean * cb * total
             total = rest / (2.0 * mean * cb * first_total - first_linear)
-            set_factors(c, LEFT, k, (difference, linear, linear, total, 0.0, 0.0, 0.0, 0.0))
-            set_factors(c, RIGHT, k, (share, linear, total, total, 0.0, 0.0, 0.0, 0.0))
+            left = difference, linear, linear, total, 0.0, 0.0, 0.0, 0.0
+            newest = set_factors(c, FACTORS, k, left, (share, linear, total, total, 0.0, 0.0, 0.0, 0.0))
+            first = newest if k == 1 else first
         c[NORMAL_1, k] = 0.5 * (total + difference)
         c[NORMAL_2, k] = 0.5 * (total - difference)
         reserve = m1 * c[NORMAL_1, k] + m2 * c[NORMAL_2, k]
@@ -616,4 +638,4 @@ def _after_first_step(mode):
 
 
 #: Hooks that the series need of a body.
-BODY_MEMBERS = (slip_start, slip_term, stick_series)
+BODY_MEMBERS = (slip_balance, effective_inertia, stick_series)

@@ -220,47 +220,60 @@ def passes_band(law, before, after, ahead):
 
 
 @inlined
-def expand_weights(law, region, x, k, products, basis, static, kinetic):
-    """Compute coefficient `k` of the power series of both weights, from the series of the speed.
-
-    Parameters
-    ----------
-    law : NamedTuple
-    region : int
-        KINETIC, STRIBECK or BAND.
-    x : ndarray of shape ``(more than k,)``
-        Series of the speed minus the lower bound of the region, m/s^(j + 1).
-    k : int
-        Coefficients 0 ... k - 1 are known.
-    products : tuple of float
-        Inner products of the factors that :func:`weight_factors` returned for the coefficients 1 ... k - 1, see
-        :func:`ringsweep.numerics.terms.inner_products`.
-    basis, static, kinetic : ndarray of shape ``(more than k,)``
-        Series of q, see :class:`Piece`, and of the weights; coefficient `k` is filled.
-    """
-    p = piece(law, region)
-    (s0, s1, s2, s3), (k0, k1, k2, k3) = p.static, p.kinetic
-    inner, cube = products
-    if k == 0:
-        basis[0] = exp(-p.decay * max(x[0], 0.0)) if p.decay > 0.0 else x[0] * x[0]
-        cube = x[0] * basis[0]
-    else:
-        # q' = -decay x' q, or q = x^2
-        basis[k] = -p.decay * (x[k] * basis[0] + INVERSE[k] * inner) if p.decay > 0.0 else 2.0 * x[0] * x[k] + inner
-        cube += x[0] * basis[k] + x[k] * basis[0]
-    static[k] = s1 * x[k] + s2 * basis[k] + s3 * cube
-    kinetic[k] = k1 * x[k] + k2 * basis[k] + k3 * cube
-    if k == 0:
-        static[0] += s0
-        kinetic[0] += k0
+def basis_at(p, x):
+    """q at the speed `x` (m/s) above the lower bound of a region, and its factor in q'; see :func:`basis_term`."""
+    q = exp(-p.decay * max(x, 0.0)) if p.decay > 0.0 else x * x
+    return q, basis_factor(p, x, q)
 
 
 @inlined
-def weight_factors(law, region, x, k, basis):
-    """Coefficient `k` of the factors whose products :func:`expand_weights` needs: two left ones and two right ones."""
-    if piece(law, region).decay > 0.0:
-        return (k * x[k], x[k]), (basis[k], basis[k])
-    return (x[k], x[k]), (x[k], basis[k])
+def basis_factor(p, x, q):
+    """Coefficient of the factor of x' in q': that of q for an exponential, that of x for a square."""
+    return q if p.decay > 0.0 else x
+
+
+@inlined
+def basis_term(p, k, factor_0, x, inner):
+    """Coefficient `k`, 1 or more, of the power series of q, from ``q' = -decay x' q`` or ``q' = 2 x' x``.
+
+    Parameters
+    ----------
+    p : Piece
+    k : int
+    factor_0 : float
+        Coefficient 0 of the factor, see :func:`basis_factor`.
+    x : float
+        Coefficient `k` of x.
+    inner : float
+        Inner product of x' and the factor, see :func:`ringsweep.numerics.terms.inner_products`.
+    """
+    return (-p.decay if p.decay > 0.0 else 2.0) * (x * factor_0 + INVERSE[k] * inner)
+
+
+@inlined
+def friction_terms(p, mu_s, mu_k, x_0):
+    """Friction coefficient in a region as a power series, given those of x and q.
+
+    Parameters
+    ----------
+    p : Piece
+    mu_s, mu_k : float
+        Static and kinetic friction coefficient of the surface, 1.
+    x_0 : float
+        Coefficient 0 of x, m/s.
+
+    Returns
+    -------
+    tuple of float
+        Coefficient 0 of the friction coefficient, and its derivatives by the coefficient k of x, by that of q, and by
+        the inner product of x and q in that of x q.
+    """
+    s0, s1, s2, s3 = p.static
+    k0, k1, k2, k3 = p.kinetic
+    a0, a1, a2, a3 = s0 * mu_s + k0 * mu_k, s1 * mu_s + k1 * mu_k, s2 * mu_s + k2 * mu_k, s3 * mu_s + k3 * mu_k
+    q_0, _ = basis_at(p, x_0)
+    by_q = a2 + a3 * x_0
+    return a0 + a1 * x_0 + by_q * q_0, a1 + a3 * q_0, by_q, a3
 
 
 # Largest change of the exponent of an exponential within a step. For a larger change the terms still grow at the end of
