@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ringsweep.compile import absorbed
 from ringsweep.models.scene import Structure, Values, require
-from ringsweep.numerics.functions import select, square_root
+from ringsweep.numerics.functions import any_of, select, square_root
 from ringsweep.physics import drives, friction
 from ringsweep.quantities.parameters import Parameter, declared
 
@@ -24,6 +24,25 @@ def largest_eigenvalue(trace, determinant):
     square = trace * trace - 4.0 * determinant
     root = square_root(select(square > 0.0, square, determinant))
     return select(square > 0.0, 0.5 * (abs(trace) + root), root)
+
+
+@absorbed
+def may_exceed(most, trace, determinant):
+    """Whether an eigenvalue of a 2 x 2 matrix with this trace and determinant may exceed `most` in magnitude.
+
+    The eigenvalues obey ``|x|^2 <= |trace| |x| + |determinant|``.
+    """
+    # The factor is for rounding, the small number for an infinite trace at the first step.
+    return abs(trace) * (most + 1e-300) + abs(determinant) > 0.999999 * (most * most)
+
+
+@absorbed
+def larger_eigenvalue(most, trace, determinant):
+    """`most`, or the largest magnitude of an eigenvalue of a 2 x 2 matrix where that is larger."""
+    exceeds = may_exceed(most, trace, determinant)
+    if any_of(exceeds):
+        most = select(exceeds, max(most, largest_eigenvalue(trace, determinant)), most)
+    return most
 
 
 def friction_coefficients(law: type, place: str, values: Values) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

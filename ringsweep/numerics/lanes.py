@@ -1,7 +1,7 @@
-"""Vector lanes: a Numba type that holds one number for each of sixteen runs, and its arithmetic.
+"""Vector lanes: a Numba type that holds one number for each of 32 runs, and its arithmetic.
 
-The processor computes sixteen doubles by two instructions of 512 bits, or by more instructions of fewer bits. They are
-independent, so it need not wait for one result before it computes the next.
+The processor computes 32 doubles by four instructions of 512 bits, or by more instructions of fewer bits. They are
+independent, so it need not wait for one result before it computes the next: a step is one long chain of results.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numba.core.typing.templates import AbstractTemplate, infer_global, signatur
 from numba.extending import lower_builtin, lower_cast, models, register_model
 
 #: Number of runs side by side.
-WIDTH = 16
+WIDTH = 32
 
 _DOUBLE, _WORD = ir.DoubleType(), ir.IntType(64)
 
@@ -23,14 +23,14 @@ VECTOR, WORDS, _BITS = (ir.VectorType(kind, WIDTH) for kind in (_DOUBLE, _WORD, 
 
 
 class Lanes(types.Type):
-    """Numba type of sixteen doubles, one for each run."""
+    """Numba type of 32 doubles, one for each run."""
 
     def __init__(self) -> None:
         super().__init__("Lanes")
 
 
 class Mask(types.Type):
-    """Numba type of sixteen truth values, one for each run."""
+    """Numba type of 32 truth values, one for each run."""
 
     def __init__(self) -> None:
         super().__init__("Mask")
