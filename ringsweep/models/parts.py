@@ -27,21 +27,23 @@ def largest_eigenvalue(trace, determinant):
 
 
 @absorbed
-def may_exceed(most, trace, determinant):
-    """Whether an eigenvalue of a 2 x 2 matrix with this trace and determinant may exceed `most` in magnitude.
+def exceeds(most, trace, determinant):
+    """Whether an eigenvalue of a 2 x 2 matrix with this trace and determinant exceeds `most` in magnitude.
 
-    The eigenvalues obey ``|x|^2 <= |trace| |x| + |determinant|``.
+    It does if the characteristic polynomial of ``|trace|`` is negative at `most`, or if the product of both eigenvalues
+    exceeds the square of `most`.
     """
-    # The factor is for rounding, the small number for an infinite trace at the first step.
-    return abs(trace) * (most + 1e-300) + abs(determinant) > 0.999999 * (most * most)
+    # By more than rounding. The small number is for an infinite trace at the first step.
+    square = most * (most * (1.0 + 1e-12))
+    return (abs(trace) * (most + 1e-300) > square + determinant) | (determinant > square)
 
 
 @absorbed
 def larger_eigenvalue(most, trace, determinant):
     """`most`, or the largest magnitude of an eigenvalue of a 2 x 2 matrix where that is larger."""
-    exceeds = may_exceed(most, trace, determinant)
-    if any_of(exceeds):
-        most = select(exceeds, max(most, largest_eigenvalue(trace, determinant)), most)
+    more = exceeds(most, trace, determinant)
+    if any_of(more):
+        most = select(more, max(most, largest_eigenvalue(trace, determinant)), most)
     return most
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from ringsweep.models.belt.force import acceleration, friction_force, holds_in_band
 from ringsweep.models.interface import constant_step
-from ringsweep.models.parts import larger_eigenvalue, may_exceed
+from ringsweep.models.parts import exceeds, larger_eigenvalue
 from ringsweep.numerics.functions import any_of, select
 from ringsweep.physics import belt, drives
 from ringsweep.physics.friction.velocity import passes_band, steepest, stiction_band
@@ -63,7 +63,7 @@ def _eigenvalue(scene, before, now, h, most):
     at_edge = abs(load * (edge_s * scene.mu_s + edge_k * scene.mu_k) + scene.viscous)
     per_mass = 1.0 / scene.mass
     swing = scene.stiffness * per_mass
-    if holds_in_band(scene.law) or any_of(may_exceed(most, max(at_rest, at_edge) * per_mass, swing)):
+    if holds_in_band(scene.law) or any_of(exceeds(most, max(at_rest, at_edge) * per_mass, swing)):
         # The stages of the step reach about as far as the acceleration at its beginning takes the body.
         belt_gains = (now.rates[0] - now.v) - (before.rates[0] - before.v)
         ahead = before.v + h * before.rates[1] - belt_gains

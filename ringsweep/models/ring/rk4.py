@@ -8,7 +8,7 @@ from typing import NamedTuple
 from ringsweep.compile import inlined
 from ringsweep.models.interface import constant_step
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
-from ringsweep.models.parts import larger_eigenvalue, may_exceed
+from ringsweep.models.parts import exceeds, larger_eigenvalue
 from ringsweep.models.ring.contacts import zones_at
 from ringsweep.models.ring.record import ENDS
 from ringsweep.numerics.functions import any_of, select, sine_cosine, sine_cosine_near
@@ -118,13 +118,14 @@ def _eigenvalue(scene, before, now, h, most):
     at_rest, at_edge = rest_s * mu_s + rest_k * mu_k, edge_s * mu_s + edge_k * mu_k
     scale = -radius * ring.friction_gain(scene.body, now.cos_phi, now.omega)
     bound = max(abs(at_rest), abs(at_edge)) * abs(scale) + abs(now.by_omega)
-    if any_of(may_exceed(most, bound, now.by_phi)):
+    if any_of(exceeds(most, bound, -now.by_phi)):
         # The stages of the step reach about as far as the acceleration at its beginning takes the body.
         ring_gains = (radius * now.omega - now.v) - (radius * before.omega - before.v)
         ahead = before.v + h * radius * before.rates[1] - ring_gains
         rest, edge, _ = passes_band(scene.law, before.v, now.v, ahead)
-        friction_slope = _steeper(friction_slope, select(rest, scale * at_rest, 0.0))
-        friction_slope = _steeper(friction_slope, select(edge, scale * at_edge, 0.0))
+        if any_of(edge):
+            friction_slope = _steeper(friction_slope, select(rest, scale * at_rest, 0.0))
+            friction_slope = _steeper(friction_slope, select(edge, scale * at_edge, 0.0))
     # The body swings even without friction; with friction, its speed changes the load of the contacts.
     return larger_eigenvalue(most, friction_slope + now.by_omega, -now.by_phi)
 
@@ -144,7 +145,7 @@ def _margin(scene, before, now):
 
 @constant_step.arc_share.implements(ring.Ring, ring.BristleRing)
 def _arc_share(scene, now, h):
-    return abs(now.v) * h / (scene.body.radius * zones.narrowest(scene.surface))
+    return abs(now.v) * (h / (scene.body.radius * zones.narrowest(scene.surface)))
 
 
 @constant_step.fall_rate.implements(ring.Ring, ring.BristleRing)
