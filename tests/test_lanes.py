@@ -1,15 +1,18 @@
 """Runs side by side in vector lanes: functions against the C library, and runs against single runs."""
 
-from math import radians
+from math import inf, radians
 
 import numba
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from ringsweep.compile import KERNEL_OPTIONS, take
 from ringsweep.models import MODELS
 from ringsweep.models.interface import constant_step, recorder
 from ringsweep.models.interface.status import COMPLETE, RUNNING
+from ringsweep.models.parts import exceeds, larger_eigenvalue
 from ringsweep.numerics.functions import any_of, decay, floor, opposing, select, sine_cosine, sine_cosine_near
 from ringsweep.numerics.lanes import WIDTH
 from ringsweep.numerics.memory import conform, read_lanes, write
@@ -70,6 +73,16 @@ class TestFunctions:
         out = np.empty((10, WIDTH))
         _functions(x, near, out.reshape(-1))
         np.testing.assert_array_equal(out[6:8], [x, x])
+
+
+@given(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0), st.floats(0.0, 20.0))
+def test_eigenvalue_of_a_matrix_counts_where_it_exceeds_the_largest_so_far(trace, determinant, most):
+    largest = np.abs(np.roots([1.0, -trace, determinant])).max()
+    if abs(largest - most) > 1e-6 * (1.0 + largest):
+        assert exceeds(most, trace, determinant) == (largest > most)
+        assert larger_eigenvalue(most, trace, determinant) == pytest.approx(max(most, largest), rel=1e-7)
+    # The first step may jump over a discontinuity.
+    assert larger_eigenvalue(0.0, inf, determinant) == inf
 
 
 def test_generated_function_called_in_python_raises_type_error():

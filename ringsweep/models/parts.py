@@ -30,8 +30,8 @@ def largest_eigenvalue(trace, determinant):
 def exceeds(most, trace, determinant):
     """Whether an eigenvalue of a 2 x 2 matrix with this trace and determinant exceeds `most` in magnitude.
 
-    It does if the characteristic polynomial of ``|trace|`` is negative at `most`, or if the product of both eigenvalues
-    exceeds the square of `most`.
+    It does if one of two real eigenvalues does, so that ``most^2 - |trace| most + determinant`` is negative, or if both
+    do: then their product exceeds the square of `most`.
     """
     # By more than rounding. The small number is for an infinite trace at the first step.
     square = most * (most * (1.0 + 1e-12))

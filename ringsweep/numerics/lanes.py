@@ -1,7 +1,7 @@
-"""Vector lanes: a Numba type that holds one number for each of 32 runs, and its arithmetic.
+"""Vector lanes: a Numba type that holds one number for each of several runs, and its arithmetic.
 
-The processor computes 32 doubles by four instructions of 512 bits, or by more instructions of fewer bits. They are
-independent, so it need not wait for one result before it computes the next: a step is one long chain of results.
+The processor computes 32 doubles by four instructions of 512 bits. They are independent, so it need not wait for one
+result before it computes the next: a step is one long chain of results.
 """
 
 from __future__ import annotations
@@ -10,12 +10,13 @@ import operator
 from typing import Any
 
 import llvmlite.ir as ir
+from llvmlite.binding import get_host_cpu_features
 from numba.core import cgutils, types
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import lower_builtin, lower_cast, models, register_model
 
-#: Number of runs side by side.
-WIDTH = 32
+#: Number of runs side by side. Without AVX-512 registers hold fewer numbers. Results do not depend on it.
+WIDTH = 32 if get_host_cpu_features().get("avx512f") else 16
 
 _DOUBLE, _WORD = ir.DoubleType(), ir.IntType(64)
 
@@ -23,14 +24,14 @@ VECTOR, WORDS, _BITS = (ir.VectorType(kind, WIDTH) for kind in (_DOUBLE, _WORD, 
 
 
 class Lanes(types.Type):
-    """Numba type of 32 doubles, one for each run."""
+    """Numba type of :data:`WIDTH` doubles, one for each run."""
 
     def __init__(self) -> None:
         super().__init__("Lanes")
 
 
 class Mask(types.Type):
-    """Numba type of 32 truth values, one for each run."""
+    """Numba type of :data:`WIDTH` truth values, one for each run."""
 
     def __init__(self) -> None:
         super().__init__("Mask")

@@ -183,10 +183,9 @@ def _sliding_acceleration_slopes(scene, now, sin_phi, cos_phi, omega):
     b = scene.body
     v_1, v_2 = now.slopes_v
     z_1, z_2 = now.slopes_z
-    by_v = ring.acceleration_slope(b, now.K1, now.K2, v_1, v_2, sin_phi, cos_phi, omega)
-    by_1 = ring.acceleration_slope(b, now.K1, now.K2, z_1, 0.0, sin_phi, cos_phi, omega)
-    by_2 = ring.acceleration_slope(b, now.K1, now.K2, 0.0, z_2, sin_phi, cos_phi, omega)
-    return b.radius * by_v, b.radius * by_1, b.radius * by_2
+    by_K1 = b.radius * ring.acceleration_slope(b, now.K1, now.K2, 1.0, 0.0, sin_phi, cos_phi, omega)
+    by_K2 = b.radius * ring.acceleration_slope(b, now.K1, now.K2, 0.0, 1.0, sin_phi, cos_phi, omega)
+    return by_K1 * v_1 + by_K2 * v_2, by_K1 * z_1, by_K2 * z_2
 
 
 @constant_step.eigenvalue.implements(BristleRing)
