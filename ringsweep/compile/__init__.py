@@ -9,7 +9,16 @@ from ringsweep.compile.cache import SOURCES_DIGEST, has_known_source, kernel
 from ringsweep.compile.dispatch import hook, lacking
 from ringsweep.compile.errors import readable_compile_errors
 from ringsweep.compile.options import KERNEL_OPTIONS, absorbed, inlined, specialise
-from ringsweep.compile.tuples import add_scaled, borrowed, function_from_lines, generated, map_leaves, take, unrolled
+from ringsweep.compile.tuples import (
+    add_scaled,
+    borrowed,
+    function_from_lines,
+    generated,
+    map_leaves,
+    put,
+    take,
+    unrolled,
+)
 
 __all__ = [
     "KERNEL_OPTIONS",
@@ -25,6 +34,7 @@ __all__ = [
     "kernel",
     "lacking",
     "map_leaves",
+    "put",
     "readable_compile_errors",
     "specialise",
     "take",

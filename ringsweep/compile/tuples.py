@@ -11,7 +11,7 @@ from numba import types
 from ringsweep.compile.numba_private import borrowed
 from ringsweep.compile.options import specialise
 
-__all__ = ["add_scaled", "borrowed", "function_from_lines", "generated", "map_leaves", "take", "unrolled"]
+__all__ = ["add_scaled", "borrowed", "function_from_lines", "generated", "map_leaves", "put", "take", "unrolled"]
 
 
 def function_from_lines(names: str, lines: list[str], scope: dict[str, Any]) -> Any:
@@ -109,6 +109,12 @@ def _take_one(batch: Any, i: Any) -> Any:
 
 
 specialise(take, _take_one)
+
+
+@unrolled
+def put(length, arrays, i, numbers):
+    """Store each of a tuple of numbers at index `i` of one of a tuple of arrays."""
+    return [f"arrays[{k}][i] = numbers[{k}]" for k in range(length)]
 
 
 @unrolled

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ringsweep.compile import absorbed
 from ringsweep.models.scene import Structure, Values, require
-from ringsweep.numerics.functions import select, square_root
+from ringsweep.numerics.functions import any_of, select, square_root
 from ringsweep.physics import drives, friction
 from ringsweep.quantities.parameters import Parameter, declared
 
@@ -24,6 +24,27 @@ def largest_eigenvalue(trace, determinant):
     square = trace * trace - 4.0 * determinant
     root = square_root(select(square > 0.0, square, determinant))
     return select(square > 0.0, 0.5 * (abs(trace) + root), root)
+
+
+@absorbed
+def exceeds(most, trace, determinant):
+    """Whether an eigenvalue of a 2 x 2 matrix with this trace and determinant exceeds `most` in magnitude.
+
+    It does if one of two real eigenvalues does, so that ``most^2 - |trace| most + determinant`` is negative, or if both
+    do: then their product exceeds the square of `most`.
+    """
+    # By more than rounding. The small number is for an infinite trace at the first step.
+    square = most * (most * (1.0 + 1e-12))
+    return (abs(trace) * (most + 1e-300) > square + determinant) | (determinant > square)
+
+
+@absorbed
+def larger_eigenvalue(most, trace, determinant):
+    """`most`, or the largest magnitude of an eigenvalue of a 2 x 2 matrix where that is larger."""
+    more = exceeds(most, trace, determinant)
+    if any_of(more):
+        most = select(more, max(most, largest_eigenvalue(trace, determinant)), most)
+    return most
 
 
 def friction_coefficients(law: type, place: str, values: Values) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -1,6 +1,6 @@
 """Mathematical functions for floats and for vector lanes.
 
-A formula without ``if`` that calls only these functions can compute one run (floats, C library) or sixteen runs side by
+A formula without ``if`` that calls only these functions can compute one run (floats, C library) or several runs side by
 side (``Lanes``, polynomials below). The polynomials need arguments close to zero:
 
 .. math::
@@ -55,12 +55,17 @@ def _unary(name: str) -> Any:
 
 _floor, _sqrt = _unary("llvm.floor"), _unary("llvm.sqrt")
 
-_copy = llvm_function("llvm.copysign")
-
 
 @intrinsic
-def _copysign(typingctx, x, sign):
-    return LANES(LANES, LANES), lambda context, builder, sig, args: _copy(builder, *args)
+def _opposed(typingctx, x, v):
+    """`x`, whose sign bit is not set, with the sign bit that `v` does not have."""
+
+    def lower(context, builder, sig, args):
+        x, v = (builder.bitcast(a, WORDS) for a in args)
+        signs = builder.and_(builder.not_(v), ir.Constant(WORDS, [1 << 63] * WIDTH))
+        return builder.bitcast(builder.or_(x, signs), VECTOR)
+
+    return LANES(LANES, LANES), lower
 
 
 @intrinsic
@@ -226,4 +231,4 @@ def opposing(x, v):
 
 @lanes_body(opposing)
 def _lanes_opposing(x, v):
-    return _copysign(x, -v)
+    return _opposed(x, v)

@@ -1,7 +1,8 @@
-"""Vector lanes: a Numba type that holds one number for each of sixteen runs, and its arithmetic.
+"""Vector lanes: a Numba type that holds several numbers side by side, and its arithmetic.
 
-The processor computes sixteen doubles by two instructions of 512 bits, or by more instructions of fewer bits. They are
-independent, so it need not wait for one result before it computes the next.
+``rk4`` puts one number of each of several runs side by side; power series put their terms side by side, see
+:mod:`ringsweep.numerics.terms`. The processor computes 32 doubles by four instructions of 512 bits. They are independent,
+so it need not wait for one result before it computes the next: a step is one long chain of results.
 """
 
 from __future__ import annotations
@@ -10,12 +11,13 @@ import operator
 from typing import Any
 
 import llvmlite.ir as ir
+from llvmlite.binding import get_host_cpu_features
 from numba.core import cgutils, types
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import lower_builtin, lower_cast, models, register_model
 
-#: Number of runs side by side.
-WIDTH = 16
+#: Number of runs side by side. Without AVX-512 registers hold fewer numbers. Results do not depend on it.
+WIDTH = 32 if get_host_cpu_features().get("avx512f") else 16
 
 _DOUBLE, _WORD = ir.DoubleType(), ir.IntType(64)
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from typing import Any, NamedTuple
+from typing import Any
 
 import llvmlite.ir as ir
 import numpy as np
 from numba.core import types
 from numba.extending import intrinsic
 
-from ringsweep.compile import generated, hook, map_leaves
+from ringsweep.compile import generated, map_leaves
 from ringsweep.numerics.lanes import LANES, VECTOR, WIDTH, spread_scalar
 
 
@@ -136,62 +136,6 @@ def conform(nested, like):
 
     text, scope = _rebuilt(like, spread)
     return [f"return {text}"], scope | {"broadcast": _broadcast}
-
-
-# ---- one run, or several runs side by side ---------------------------------------------------
-
-
-class Single(NamedTuple):
-    """Runs are computed one by one: numbers are floats."""
-
-
-class Several(NamedTuple):
-    """Runs are computed side by side: numbers are Lanes."""
-
-
-@hook
-def width(kind):
-    """Number of runs side by side: 1 for :class:`Single`, :data:`WIDTH` for :class:`Several`."""
-
-
-@width.implements(Single)
-def _one(kind):
-    return 1
-
-
-@width.implements(Several)
-def _several(kind):
-    return WIDTH
-
-
-@hook
-def gather(kind, memory, at, like):
-    """Nested tuple of the type of `like`, from index `at` of an array, of one run or of several runs side by side.
-
-    Parameters
-    ----------
-    kind : Single or Several
-    memory : ndarray of shape ``(numbers,)``
-        Each number of the tuple takes :func:`width` places, one for each run.
-    at : int
-    like : nested tuple
-        Any tuple of the type.
-
-    Returns
-    -------
-    nested tuple
-        Of floats or of Lanes.
-    """
-
-
-@gather.implements(Single)
-def _gather_one(kind, memory, at, like):
-    return read(memory, at, 1, like)
-
-
-@gather.implements(Several)
-def _gather_several(kind, memory, at, like):
-    return read_lanes(memory, at, like)
 
 
 def side_by_side(batch: Any) -> Any:

@@ -344,7 +344,7 @@ def friction_gain(body, cos_phi, omega):
 @friction_gain.implements(TwoContacts)
 def _two_friction_gain(body, cos_phi, omega):
     l_0, l_1 = body.lift
-    return 2.0 * (l_0 * cos_phi + l_1 * (omega * omega)) / body.effective[0]
+    return (l_0 * cos_phi + l_1 * (omega * omega)) * (2.0 / body.effective[0])
 
 
 @friction_gain.implements(OneContact)

@@ -14,27 +14,14 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.compile import absorbed, add_scaled, hook, inlined, kernel, take
+from ringsweep.compile import absorbed, add_scaled, hook, inlined, kernel, put, take
 from ringsweep.errors import InputError
-from ringsweep.models import MODELS
 from ringsweep.models.interface import constant_step, recorder
 from ringsweep.models.interface.status import COMPLETE, RUNNING
 from ringsweep.models.scene import Structure
 from ringsweep.numerics.functions import any_of, select
 from ringsweep.numerics.lanes import WIDTH
-from ringsweep.numerics.memory import (
-    Several,
-    Single,
-    align_stack,
-    conform,
-    gather,
-    read,
-    read_lanes,
-    side_by_side,
-    size_of,
-    width,
-    write,
-)
+from ringsweep.numerics.memory import align_stack, conform, read, read_lanes, side_by_side, size_of, write
 from ringsweep.physics import drives
 from ringsweep.physics.drives import lookup, shape, turn, without_shape
 from ringsweep.physics.friction import LAWS, TRAITS, Dynamic, family_of, presliding, velocity
@@ -72,19 +59,11 @@ class RK4(Method):
     """Whether to record the stiffness of each run; without it no run is certified."""
 
     def needs(self, structure: Structure) -> Needs:
-        """Functions for steps of constant length; vector lanes need more functions of a law without bristles."""
-        of_law: tuple[Any, ...] = velocity.MEMBERS
+        """Functions for steps of constant length, in vector lanes."""
+        of_law: tuple[Any, ...] = velocity.MEMBERS + velocity.LANES_MEMBERS
         if family_of(LAWS[structure.law]) is Dynamic:
             of_law = (presliding.bristle, presliding.region_guard)
-        elif self._uses_lanes(structure):
-            of_law += velocity.LANES_MEMBERS
         return Needs(of_law, drives.CONSTANT_STEP_MEMBERS, recorder.MEMBERS + constant_step.MEMBERS)
-
-    @staticmethod
-    def _uses_lanes(structure: Structure) -> bool:
-        """Whether runs of such a scene stand side by side in vector lanes; the type of the scene decides it."""
-        side_by_side = constant_step.side_by_side.body_of(MODELS[structure.model].scene_type(structure))
-        return isinstance(side_by_side(None), Several)
 
     def check(self, structure: Structure) -> None:
         """Refuse laws whose bonds snap, since a constant step does not locate the instants.
@@ -134,11 +113,10 @@ class RK4(Method):
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         rows = np.empty((len(batch.span), width))
         report = np.empty((len(batch.span), 5))
-        kind, diagnosed = constant_step.side_by_side(batch), Diagnosed() if self.diagnose else NotDiagnosed()
-        # The kernels read the drive from a table, so that they are compiled once for all drives.
-        scenes = side_by_side(batch._replace(drive=without_shape(batch.drive))) if isinstance(kind, Several) else batch
+        diagnosed = Diagnosed() if self.diagnose else NotDiagnosed()
+        scenes, launches = prepare(batch)
         for group in _groups_by_drive(batch, cells):
-            integrate(kind, diagnosed, scenes, take(batch.drive, group[0]), group, steps, rows, report)
+            integrate(diagnosed, scenes, launches, take(batch.drive, group[0]), group, steps, rows, report)
         return rows[cells], report[cells]
 
     def history(self, batch: Any, samples: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -176,9 +154,9 @@ class NotDiagnosed(NamedTuple):
 
 
 class Diagnosis(NamedTuple):
-    """Largest stiffness, least margin of the guards, and largest share of an arc in a step, over the steps of a run."""
+    """Largest eigenvalue, 1/s, least margin of the guards, and largest share of an arc in a step, over a run."""
 
-    stiffness: Any
+    eigenvalue: Any
     margin: Any
     arc_share: Any
 
@@ -191,7 +169,7 @@ def _diagnose(diagnosed, scene, diagnosis, before, now, h):
 @_diagnose.implements(Diagnosed)
 def _diagnose_step(diagnosed, scene, diagnosis, before, now, h):
     return Diagnosis(
-        max(diagnosis.stiffness, constant_step.stiffness(scene, before, now, h)),
+        constant_step.eigenvalue(scene, before, now, h, diagnosis.eigenvalue),
         min(diagnosis.margin, constant_step.margin(scene, before, now)),
         max(diagnosis.arc_share, constant_step.arc_share(scene, now, h)),
     )
@@ -243,47 +221,17 @@ def _hermite(y, rate, y_next, rate_next, h, x):
     return add_scaled(add_scaled(add_scaled(add_scaled(zero, a, y), b, y_next), c, rate), d, rate_next)
 
 
-@hook
-def _scene(kind, batch, cell, memory, at):
-    """Scene of a run, from the batch; or of several runs side by side, from memory."""
-
-
-@_scene.implements(Single)
-def _one_scene(kind, batch, cell, memory, at):
-    return take(batch, cell)
-
-
-@_scene.implements(Several)
-def _several_scenes(kind, batch, cell, memory, at):
-    return read_lanes(memory, at, take(batch, cell))
-
-
-@hook
-def _store(kind, memory, at, scene, run):
-    """Store a run in memory."""
-
-
-@_store.implements(Single)
-def _store_one(kind, memory, at, scene, run):
-    write(memory, at + size_of(scene), 1, run)
-
-
-@_store.implements(Several)
-def _store_among_several(kind, memory, at, scene, run):
-    write(memory, at, width(kind), scene)
-    write(memory, at + width(kind) * size_of(scene), width(kind), run)
-
-
 @inlined
-def _advance(kind, diagnosed, batch, memory, at, occupants, sample, table, first, k, steps, h):
+def _advance(diagnosed, batch, memory, at, occupants, sample, table, first, k, steps, h):
     """Advance runs side by side from step `k` to the end of a block of steps, or to a step in which a run ends.
 
     Returns the index of the first step that was not taken.
     """
     align_stack()
-    runs_at = at + width(kind) * size_of(take(batch, occupants[0]))
-    scene = _scene(kind, batch, occupants[0], memory, at)
-    y, now, record, diagnosis, live = gather(kind, memory, runs_at, sample)
+    one = take(batch, occupants[0])
+    runs_at = at + WIDTH * size_of(one)
+    scene = read_lanes(memory, at, one)
+    y, now, record, diagnosis, live = read_lanes(memory, runs_at, sample)
     while k < steps:
         y_next = _step(scene, y, now, table, 2 * k, h)
         theta, ring_omega = lookup(scene.drive, table, 2 * k + 2)
@@ -297,18 +245,18 @@ def _advance(kind, diagnosed, batch, memory, at, occupants, sample, table, first
         record = conform(recorder.observe(scene, record, (first + k + 1) * h, h, stuck, seen), record)
         y, now, live = y_next, after, abs(live)
         k += 1
-    write(memory, runs_at, width(kind), _Run(y, now, record, diagnosis, live))
+    write(memory, runs_at, WIDTH, _Run(y, now, record, diagnosis, live))
     return k
 
 
 @inlined
-def _finish_ended(kind, diagnosed, batch, memory, at, occupants, sample, table, first, k, h, rows, report):
+def _finish_ended(diagnosed, batch, memory, at, occupants, sample, table, first, k, h, rows, report):
     """Finish the runs that end in a step, one by one with floats; return the number of runs that go on."""
     running = 0
     for lane in range(len(occupants)):
         scene = take(batch, occupants[lane])
-        start = at + width(kind) * size_of(scene) + lane
-        run = read(memory, start, width(kind), sample)
+        start = at + WIDTH * size_of(scene) + lane
+        run = read(memory, start, WIDTH, sample)
         live = run.live
         if live == ENDING:
             y_next = _step(scene, run.y, run.now, table, 2 * k, h)
@@ -325,7 +273,7 @@ def _finish_ended(kind, diagnosed, batch, memory, at, occupants, sample, table, 
                 stuck, seen = constant_step.sticks(scene, run.now, after), constant_step.seen(scene, y_end, after)
                 record = recorder.observe(scene, run.record, t, fraction * h, stuck, seen)
                 # The margin does not cover the contact that separates in this step.
-                diagnosis = Diagnosis(diagnosis.stiffness, run.diagnosis.margin, diagnosis.arc_share)
+                diagnosis = Diagnosis(diagnosis.eigenvalue, run.diagnosis.margin, diagnosis.arc_share)
                 fall_rate = constant_step.fall_rate(scene, run.now, after, h)
                 _conclude(
                     scene,
@@ -336,29 +284,53 @@ def _finish_ended(kind, diagnosed, batch, memory, at, occupants, sample, table, 
                     first + k + 1.0,
                     diagnosis,
                     fall_rate,
+                    h,
                     occupants[lane],
                     rows,
                     report,
                 )
-            write(memory, start, width(kind), _Run(run.y, run.now, run.record, run.diagnosis, live))
+            write(memory, start, WIDTH, _Run(run.y, run.now, run.record, run.diagnosis, live))
         running += int(live != FINISHED)
     return running
 
 
 @inlined
-def _conclude(scene, record, status, t, y, steps, diagnosis, fall_rate, cell, rows, report):
+def _conclude(scene, record, status, t, y, steps, diagnosis, fall_rate, h, cell, rows, report):
     """Store outcome and report of a run."""
     outcome = recorder.conclude(scene, record, status, t, y[0], y[1])
     for column in range(len(outcome)):
         rows[cell, column] = outcome[column]
-    report[cell, 0], report[cell, 1], report[cell, 2] = steps, diagnosis.stiffness, diagnosis.margin
+    report[cell, 0], report[cell, 1], report[cell, 2] = steps, diagnosis.eigenvalue * h, diagnosis.margin
     report[cell, 3], report[cell, 4] = fall_rate, diagnosis.arc_share
 
 
+def prepare(batch: Any) -> tuple[Any, Any]:
+    """Cells as :func:`integrate` takes them.
+
+    Returns
+    -------
+    tuple
+        The cells, each number in an array of its own, with drives from which the shape is removed: so the kernels are
+        compiled once for all drives. And the initial states: a tuple with an array of shape ``(cells,)`` for each
+        component.
+    """
+    components = len(constant_step.initial_state(take(batch, 0)))
+    launches = tuple(np.empty(len(batch.span)) for _ in range(components))
+    _launch(batch, launches)
+    return side_by_side(batch._replace(drive=without_shape(batch.drive))), launches
+
+
+@kernel
+def _launch(batch, launches):
+    """Fill `launches` with the initial states."""
+    for cell in range(len(launches[0])):
+        put(launches, cell, constant_step.initial_state(take(batch, cell)))
+
+
 def integrate(
-    kind: Any,
     diagnosed: Any,
     batch: Any,
+    launches: Any,
     drive: Any,
     cells: NDArray[np.intp],
     steps: int,
@@ -369,13 +341,10 @@ def integrate(
 
     Parameters
     ----------
-    kind : Single or Several
-        Whether runs are computed one by one or side by side.
     diagnosed : Diagnosed or NotDiagnosed
         Whether the diagnosis of each run is recorded.
-    batch : NamedTuple
-        Cells. For runs side by side, those that :func:`ringsweep.numerics.memory.side_by_side` returns, with drives
-        from :func:`ringsweep.physics.drives.without_shape`.
+    batch, launches : nested tuple of ndarray
+        Cells and their initial states, from :func:`prepare`.
     drive : NamedTuple
         Drive of one of the cells.
     cells : ndarray of int
@@ -391,18 +360,18 @@ def integrate(
     h = float(batch.span[cells[0]]) / steps
     table = np.empty((2 * min(_BLOCK, steps) + 1, 2))
     _tabulate(table, drive, 0, 0, h)
-    memory, occupants, live = _start(kind, batch, cells, table, rows, report)
+    memory, occupants, live = _start(batch, launches, cells, table, rows, report)
     for first in range(0, steps, _BLOCK):
         if live == 0:
             return
         size = min(_BLOCK, steps - first)
         _tabulate(table, drive, first, size, h)
-        live = _advance_block(kind, diagnosed, batch, memory, occupants, live, table, first, size, h, rows, report)
-    _finish_at_end_of_span(kind, batch, memory, occupants, live, steps, rows, report)
+        live = _advance_block(diagnosed, batch, launches, memory, occupants, live, table, first, size, h, rows, report)
+    _finish_at_end_of_span(batch, launches, memory, occupants, live, steps, h, rows, report)
 
 
 @kernel
-def _start(kind, batch, cells, table, rows, report):
+def _start(batch, launches, cells, table, rows, report):
     """Store runs in memory, side by side in blocks, and finish the runs that end at t = 0.
 
     Returns
@@ -411,82 +380,78 @@ def _start(kind, batch, cells, table, rows, report):
         Memory of shape ``(blocks, numbers of a scene and a run, runs in a block)``; the cells stored there, in order;
         the number of runs that go on.
     """
-    per_block = width(kind)
-    sample = _initial_run(take(batch, cells[0]), 0.0, 0.0)
-    numbers = size_of(take(batch, cells[0])) + size_of(sample)
-    blocks = (len(cells) + per_block - 1) // per_block
-    memory = np.zeros((blocks, numbers, per_block))
+    sample = _initial_run(batch, launches, cells[0], table)
+    in_scene = size_of(take(batch, cells[0]))
+    numbers = in_scene + size_of(sample)
+    blocks = (len(cells) + WIDTH - 1) // WIDTH
+    memory = np.zeros((blocks, numbers, WIDTH))
     flat_memory = memory.reshape(memory.size)
-    occupants = np.full(blocks * per_block, cells[0])
+    occupants = np.full(blocks * WIDTH, cells[0])
     live = 0
     for i in cells:
-        scene = take(batch, i)
-        theta, ring_omega = lookup(scene.drive, table, 0)
-        run = _initial_run(scene, theta, ring_omega)
+        scene, run = take(batch, i), _initial_run(batch, launches, i, table)
         status, _ = constant_step.verdict(scene, run.now, run.now)
         if status != RUNNING:
-            _conclude(scene, run.record, status, 0.0, run.y, 0.0, run.diagnosis, 0.0, i, rows, report)
+            _conclude(scene, run.record, status, 0.0, run.y, 0.0, run.diagnosis, 0.0, 0.0, i, rows, report)
             continue
-        _store(kind, flat_memory, live // per_block * numbers * per_block + live % per_block, scene, run)
+        at = live // WIDTH * numbers * WIDTH + live % WIDTH
+        write(flat_memory, at, WIDTH, scene)
+        write(flat_memory, at + WIDTH * in_scene, WIDTH, run)
         occupants[live] = i
         live += 1
     return memory, occupants, live
 
 
 @kernel
-def _advance_block(kind, diagnosed, batch, memory, occupants, live, table, first, steps, h, rows, report):
+def _advance_block(diagnosed, batch, launches, memory, occupants, live, table, first, steps, h, rows, report):
     """Advance all runs by a block of steps and close the gaps of finished runs; return the number of other runs."""
-    per_block, numbers = width(kind), memory.shape[1]
+    numbers = memory.shape[1]
     flat_memory = memory.reshape(memory.size)
-    sample = _initial_run(take(batch, occupants[0]), 0.0, 0.0)
-    for start in range(0, live, per_block):
-        at, cells = start * numbers, occupants[start : start + per_block]
-        k, running = 0, per_block
+    sample = _initial_run(batch, launches, occupants[0], table)
+    for start in range(0, live, WIDTH):
+        at, cells = start * numbers, occupants[start : start + WIDTH]
+        k, running = 0, WIDTH
         while running > 0:
-            k = _advance(kind, diagnosed, batch, flat_memory, at, cells, sample, table, first, k, steps, h)
+            k = _advance(diagnosed, batch, flat_memory, at, cells, sample, table, first, k, steps, h)
             if k == steps:
                 break
-            running = _finish_ended(
-                kind, diagnosed, batch, flat_memory, at, cells, sample, table, first, k, h, rows, report
-            )
+            running = _finish_ended(diagnosed, batch, flat_memory, at, cells, sample, table, first, k, h, rows, report)
     remaining = 0
     for slot in range(live):
-        if memory[slot // per_block, numbers - 1, slot % per_block] != FINISHED:
+        if memory[slot // WIDTH, numbers - 1, slot % WIDTH] != FINISHED:
             # A slice would add the code for errors about shapes, which takes a second to compile.
             for number in range(numbers):
-                memory[remaining // per_block, number, remaining % per_block] = memory[
-                    slot // per_block, number, slot % per_block
-                ]
+                memory[remaining // WIDTH, number, remaining % WIDTH] = memory[slot // WIDTH, number, slot % WIDTH]
             occupants[remaining] = occupants[slot]
             remaining += 1
     # Empty places of the last block are computed too, but not read.
     for slot in range(remaining, live):
-        memory[slot // per_block, numbers - 1, slot % per_block] = FINISHED
+        memory[slot // WIDTH, numbers - 1, slot % WIDTH] = FINISHED
     return remaining
 
 
 @kernel
-def _finish_at_end_of_span(kind, batch, memory, occupants, live, steps, rows, report):
+def _finish_at_end_of_span(batch, launches, memory, occupants, live, steps, h, rows, report):
     """Store the outcomes of the runs that reached the end of the span."""
-    per_block, numbers = width(kind), memory.shape[1]
+    numbers = memory.shape[1]
     flat_memory = memory.reshape(memory.size)
+    sample = _initial_run(batch, launches, occupants[0], np.zeros((1, 2)))
     for slot in range(live):
         cell = occupants[slot]
         scene = take(batch, cell)
-        run = read(
-            flat_memory,
-            (slot // per_block * numbers + size_of(scene)) * per_block + slot % per_block,
-            per_block,
-            _initial_run(scene, 0.0, 0.0),
-        )
+        at = (slot // WIDTH * numbers + size_of(scene)) * WIDTH + slot % WIDTH
+        run = read(flat_memory, at, WIDTH, sample)
         # The sum of the steps would miss the end of the span by rounding.
-        _conclude(scene, run.record, COMPLETE, scene.span, run.y, float(steps), run.diagnosis, 0.0, cell, rows, report)
+        _conclude(
+            scene, run.record, COMPLETE, scene.span, run.y, float(steps), run.diagnosis, 0.0, h, cell, rows, report
+        )
 
 
 @inlined
-def _initial_run(scene, theta, ring_omega):
-    """A run at t = 0. With any values of the drive it also serves as an example of the type."""
-    y = constant_step.initial_state(scene)
+def _initial_run(batch, launches, cell, table):
+    """Run of a cell at t = 0. With any table it also serves as an example of the type."""
+    scene, y = take(batch, cell), take(launches, cell)
+    theta, ring_omega = lookup(scene.drive, table, 0)
     now = constant_step.inspect(scene, y, theta, ring_omega)
     record = recorder.begin(scene, 0.0, constant_step.seen(scene, y, now))
     return _Run(y, now, record, Diagnosis(0.0, inf, 0.0), LIVE)

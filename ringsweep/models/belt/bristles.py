@@ -9,18 +9,20 @@ from __future__ import annotations
 from math import sqrt
 from typing import NamedTuple
 
-from ringsweep.compile import inlined
+from ringsweep.compile import absorbed, inlined
+from ringsweep.models.belt.force import acceleration
 from ringsweep.models.belt.record import conclude, observe
 from ringsweep.models.interface import constant_step, implicit, modes, recorder
 from ringsweep.models.interface.status import RUNNING
-from ringsweep.models.parts import largest_eigenvalue
+from ringsweep.models.parts import larger_eigenvalue
+from ringsweep.numerics.functions import any_of, select
 from ringsweep.physics import drives
 from ringsweep.physics.belt import BristleBelt
 from ringsweep.physics.friction.bristles import after_yield, bristle, initial_deflection, region_guard, stick_speed
 from ringsweep.physics.friction.velocity import BAND, KINETIC
 
 
-@inlined
+@absorbed
 def contact_force(scene, v, z, sign, region):
     """Rate of the deflection (m/s) and its derivatives by v and z; friction force (N) and its derivatives."""
     rate, rate_v, rate_z, traction, by_v, by_z = bristle(scene.law, scene.mu_s, scene.mu_k, v, z, sign, region)
@@ -31,7 +33,30 @@ def contact_force(scene, v, z, sign, region):
 @inlined
 def _region(scene, v, z, sign):
     """BAND if the contact counts as stuck, KINETIC if it slips."""
-    return BAND if region_guard(scene.law, scene.mu_s, scene.mu_k, v, z, sign, BAND) > 0.0 else KINETIC
+    return BAND if _in_band(scene, v, z, sign) else KINETIC
+
+
+@absorbed
+def _in_band(scene, v, z, sign):
+    """Whether the contact counts as stuck."""
+    return region_guard(scene.law, scene.mu_s, scene.mu_k, v, z, sign, BAND) > 0.0
+
+
+@absorbed
+def _force_in_region(scene, v, z):
+    """Whether the contact counts as stuck, and :func:`contact_force` in its region, for floats and Lanes."""
+    sign = select(v >= 0.0, 1.0, -1.0)
+    stuck = _in_band(scene, v, z, sign)
+    a = contact_force(scene, v, z, sign, BAND)
+    b = contact_force(scene, v, z, sign, KINETIC)
+    return stuck, (
+        select(stuck, a[0], b[0]),
+        select(stuck, a[1], b[1]),
+        select(stuck, a[2], b[2]),
+        select(stuck, a[3], b[3]),
+        select(stuck, a[4], b[4]),
+        select(stuck, a[5], b[5]),
+    )
 
 
 @inlined
@@ -55,16 +80,20 @@ class Inspection(NamedTuple):
         Time derivative of the state.
     force : float
         Friction force, N.
-    eigenvalue : float
-        Largest magnitude of an eigenvalue of the contact, 1/s.
-    stuck : bool
-        Whether the contact counts as stuck.
+    trace, determinant : float
+        Trace, 1/s, and determinant, 1/s^2, of the linearised contact.
+    stuck : float
+        1 if the contact counts as stuck, else 0.
+    place : float
+        Displacement relative to the belt, m.
     """
 
     rates: tuple[float, float, float]
     force: float
-    eigenvalue: float
-    stuck: bool
+    trace: float
+    determinant: float
+    stuck: float
+    place: float
 
 
 @constant_step.initial_state.implements(BristleBelt)
@@ -75,38 +104,35 @@ def _initial_state_in_space(scene):
 
 @constant_step.rates.implements(BristleBelt)
 def _rates(scene, now, y, drive_at, drive_rate):
-    v = y[1] - drive_rate
-    sign = 1.0 if v >= 0.0 else -1.0
-    rate, _, _, force, _, _ = contact_force(scene, v, y[2], sign, _region(scene, v, y[2], sign))
-    return y[1], -(scene.stiffness * y[0] + force) / scene.mass, rate
+    _, (rate, _, _, force, _, _) = _force_in_region(scene, y[1] - drive_rate, y[2])
+    return y[1], acceleration(scene, y[0], force), rate
 
 
 @constant_step.inspect.implements(BristleBelt)
 def _inspect(scene, y, drive_at, drive_rate):
-    v = y[1] - drive_rate
-    sign = 1.0 if v >= 0.0 else -1.0
-    region = _region(scene, v, y[2], sign)
-    rate, rate_v, rate_z, force, by_v, by_z = contact_force(scene, v, y[2], sign, region)
-    determinant = (scene.stiffness + by_z * rate_v - by_v * rate_z) / scene.mass
-    eigenvalue = largest_eigenvalue(rate_z - by_v / scene.mass, determinant)
-    rates = y[1], -(scene.stiffness * y[0] + force) / scene.mass, rate
-    return Inspection(rates, force, eigenvalue, region == BAND)
+    stuck, (rate, rate_v, rate_z, force, by_v, by_z) = _force_in_region(scene, y[1] - drive_rate, y[2])
+    per_mass = 1.0 / scene.mass
+    determinant = (scene.stiffness + by_z * rate_v - by_v * rate_z) * per_mass
+    rates = y[1], acceleration(scene, y[0], force), rate
+    return Inspection(rates, force, rate_z - by_v * per_mass, determinant, select(stuck, 1.0, 0.0), y[0] - drive_at)
 
 
-@constant_step.stiffness.implements(BristleBelt)
-def _stiffness(scene, before, now, h):
-    return max(before.eigenvalue, now.eigenvalue) * h
+@constant_step.eigenvalue.implements(BristleBelt)
+def _eigenvalue(scene, before, now, h, most):
+    if any_of(most == 0.0):
+        most = larger_eigenvalue(most, before.trace, before.determinant)
+    return larger_eigenvalue(most, now.trace, now.determinant)
 
 
 @constant_step.sticks.implements(BristleBelt)
 def _sticks(scene, before, now):
-    return before.stuck
+    return before.stuck > 0.0
 
 
 @recorder.observe.implements(BristleBelt)
 def _observe(scene, record, t, duration, stuck, seen):
-    x, velocity, force = seen
-    return observe(record, scene, t, duration, x, velocity, force, stuck, _play(scene))
+    x, velocity, force, place = seen
+    return observe(record, scene.span, t, duration, x, velocity, force, place, stuck, _play(scene))
 
 
 @recorder.conclude.implements(BristleBelt)
@@ -117,7 +143,7 @@ def _conclude(scene, record, status, t, place, velocity):
 @constant_step.row.implements(BristleBelt)
 def _row(scene, y, drive_at, drive_rate):
     now = constant_step.inspect(scene, y, drive_at, drive_rate)
-    return y[0], y[1], now.force, y[2], 0.0 if now.stuck else 1.0 if y[1] > drive_rate else -1.0
+    return y[0], y[1], now.force, y[2], 0.0 if now.stuck > 0.0 else 1.0 if y[1] > drive_rate else -1.0
 
 
 # Indices of the guards.
@@ -191,14 +217,15 @@ def _error_scales(scene, tolerance, x):
 
 @implicit.guards_and_motion.implements(BristleBelt)
 def _guards_and_motion(scene, mode, t, x):
-    _, belt_velocity, _ = drives.turn(scene.drive, t)
+    shift, belt_velocity, _ = drives.turn(scene.drive, t)
     sign = float(mode.sign)
     _, _, _, force, _, _ = contact_force(scene, x[1], x[2], sign, mode.region)
     guards = sign * x[1], region_guard(scene.law, scene.mu_s, scene.mu_k, x[1], x[2], sign, mode.region)
-    return guards, (x[0], x[1] + belt_velocity, -(scene.stiffness * x[0] + force) / scene.mass, force)
+    acceleration = -(scene.stiffness * x[0] + force) / scene.mass
+    return guards, (x[0], x[1] + belt_velocity, acceleration, force, x[0] - shift)
 
 
 @implicit.row.implements(BristleBelt)
 def _implicit_row(scene, mode, t, x):
-    _, (place, velocity, _, force) = implicit.guards_and_motion(scene, mode, t, x)
+    _, (place, velocity, _, force, _) = implicit.guards_and_motion(scene, mode, t, x)
     return place, velocity, force, x[2], 0.0 if mode.region == BAND else float(mode.sign)

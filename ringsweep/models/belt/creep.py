@@ -61,7 +61,8 @@ def _guards_and_motion(scene, mode, t, x):
     acceleration = -(scene.stiffness * place + friction) / scene.mass
     speed = mode.sign * x[1]
     # The order is that of the rows of the series: SLOW, FAST.
-    return (speed, stiction_band(scene.law) - speed), (place, x[1] + belt_velocity, acceleration, friction)
+    guards = speed, stiction_band(scene.law) - speed
+    return guards, (place, x[1] + belt_velocity, acceleration, friction, x[0])
 
 
 @implicit.motion.implements(belt.Belt, belt.BristleBelt)
@@ -72,8 +73,8 @@ def _motion(scene, t, x, linear):
 
 @implicit.seen.implements(belt.Belt, belt.BristleBelt)
 def _seen(scene, view):
-    _, (x, velocity, _, friction) = view
-    return x, velocity, friction
+    _, (x, velocity, _, friction, place) = view
+    return x, velocity, friction, place
 
 
 @implicit.near_zero.implements(belt.Belt, belt.BristleBelt)
@@ -83,5 +84,5 @@ def _near_zero(scene, motion):
 
 @implicit.row.implements(belt.Belt)
 def _row(scene, mode, t, x):
-    _, (position, velocity, _, friction) = implicit.guards_and_motion(scene, mode, t, x)
+    _, (position, velocity, _, friction, _) = implicit.guards_and_motion(scene, mode, t, x)
     return position, velocity, friction, 0.0, 0.0

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
-from ringsweep.compile import inlined
-from ringsweep.physics.friction.velocity import (
-    BAND,
-    constant_weights,
-    stiction_band,
-    weights,
-)
+from ringsweep.compile import absorbed, hook, inlined
+from ringsweep.numerics.functions import opposing, select
+from ringsweep.physics.friction.registry import SetValued, family
+from ringsweep.physics.friction.velocity import stiction_band, weights
+
+
+@hook(optional=True)
+def _is_set_valued(family):
+    return False
+
+
+@_is_set_valued.implements(SetValued)
+def _set_valued(family):
+    return True
 
 
 @inlined
 def holds_in_band(law):
     """Whether friction in the band of the law takes any value up to the breakaway force, as in a dead band."""
-    return constant_weights(law, BAND)
+    return _is_set_valued(family(law))
 
 
 @inlined
@@ -23,18 +30,26 @@ def breakaway_force(scene):
     return scene.mu_s * scene.mass * scene.gravity
 
 
-@inlined
+@absorbed
 def friction_force(scene, x, v):
     """Friction force (N) at the displacement `x` and the sliding velocity `v`, and its derivative by `v` (N s/m)."""
-    if holds_in_band(scene.law) and abs(v) < stiction_band(scene.law):
-        return max(-breakaway_force(scene), min(breakaway_force(scene), -scene.stiffness * x)), 0.0
     w_s, w_k, dw_s, dw_k = weights(scene.law, abs(v))
     load = scene.mass * scene.gravity
-    sign = 1.0 if v > 0.0 else -1.0 if v < 0.0 else 0.0
-    return (
-        sign * load * (w_s * scene.mu_s + w_k * scene.mu_k) + scene.viscous * v,
-        load * (dw_s * scene.mu_s + dw_k * scene.mu_k) + scene.viscous,
-    )
+    static, kinetic = load * scene.mu_s, load * scene.mu_k
+    force = scene.viscous * v - opposing(w_s * static + w_k * kinetic, v)
+    slope = dw_s * static + dw_k * kinetic + scene.viscous
+    if holds_in_band(scene.law):
+        held, bound = abs(v) < stiction_band(scene.law), breakaway_force(scene)
+        force = select(held, max(-bound, min(bound, -scene.stiffness * x)), force)
+        slope = select(held, 0.0, slope)
+    return force, slope
+
+
+@absorbed
+def acceleration(scene, x, force):
+    """Acceleration of the body in space at the displacement `x` under a friction force, m/s^2."""
+    per_mass = 1.0 / scene.mass
+    return -(scene.stiffness * per_mass) * x - force * per_mass
 
 
 @inlined

@@ -5,10 +5,10 @@ from __future__ import annotations
 from math import isfinite, nan, sqrt
 from typing import NamedTuple
 
-from ringsweep.compile import inlined
+from ringsweep.compile import absorbed, inlined
 from ringsweep.models.interface import recorder
 from ringsweep.models.interface.status import BROKEN
-from ringsweep.physics import drives
+from ringsweep.numerics.functions import any_of, select
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.friction.velocity import stiction_band
 from ringsweep.quantities.variables import FAILED, OSCILLATORY, RESTING, STICK_SLIP
@@ -45,22 +45,21 @@ class Record(NamedTuple):
     x_min, x_max, velocity_max, force_max, stick_time : float
         As in :class:`Outcome`.
     slip_from, slip_start : float
-        Place on the belt and time at which the body began to slip, or stuck last.
-    slip_counted : bool
-        Whether the present slip counts.
-    stuck_since_slip : float
-        Time for which the body has stuck since the last slip that counts.
-    unbroken_stick : float
-        Time for which the body has stuck without any slip.
-    slips : int
+        Place on the belt and time at which the body began to slip, or stuck last. The place is NaN once the present
+        slip counts.
+    slipped_at : float
+        Time of the last observation at which the body slipped.
+    stick_before : float
+        ``stick_time`` at the last slip.
+    slips : float
         Number of slips that count.
     first_slip, last_slip : float
         Times at which the first and the last of these slips began.
     last_stick : float
         Time for which the body stuck before the last of these slips.
-    extreme_sign : int
+    extreme_sign : float
         1 if maxima count, -1 if minima count, 0 before the first extreme.
-    extremes : int
+    extremes : float
         Number of extremes that count.
     first_extreme, last_extreme : float
         Times of the first and of the last of these extremes.
@@ -79,15 +78,14 @@ class Record(NamedTuple):
     stick_time: float
     slip_from: float
     slip_start: float
-    slip_counted: bool
-    stuck_since_slip: float
-    unbroken_stick: float
-    slips: int
+    slipped_at: float
+    stick_before: float
+    slips: float
     first_slip: float
     last_slip: float
     last_stick: float
-    extreme_sign: int
-    extremes: int
+    extreme_sign: float
+    extremes: float
     first_extreme: float
     last_extreme: float
     opposite: float
@@ -113,7 +111,7 @@ _MOST_CYCLES_SINCE_SLIP = 2.0
 
 
 @inlined
-def begin(scene, t, x, velocity, force):
+def begin(t, x, velocity, force, place):
     """Record at the beginning of a run."""
     return Record(
         velocity=velocity,
@@ -122,17 +120,16 @@ def begin(scene, t, x, velocity, force):
         velocity_max=velocity,
         force_max=abs(force),
         stick_time=0.0,
-        slip_from=x - drives.turn(scene.drive, t)[0],
+        slip_from=place,
         slip_start=t,
-        slip_counted=False,
-        stuck_since_slip=0.0,
-        unbroken_stick=0.0,
-        slips=0,
+        slipped_at=t,
+        stick_before=0.0,
+        slips=0.0,
         first_slip=nan,
         last_slip=nan,
         last_stick=0.0,
-        extreme_sign=0,
-        extremes=0,
+        extreme_sign=0.0,
+        extremes=0.0,
         first_extreme=nan,
         last_extreme=nan,
         opposite=0.0,
@@ -143,74 +140,61 @@ def begin(scene, t, x, velocity, force):
     )
 
 
-@inlined
-def observe(r, scene, t, duration, x, velocity, force, stuck, play):
+@absorbed
+def observe(r, span, t, duration, x, velocity, force, place, stuck, play):
     """Record after an interval of `duration` seconds that ends at time `t`, in which the body stuck or slipped.
 
-    `play` is the distance that a body on bristles can move without slipping, m.
+    `place` is the displacement relative to the belt, m; `play` the distance that a body on bristles can move without
+    slipping, m. Most steps change neither slips nor extremes.
     """
+    stick_time, stick_before = r.stick_time + select(stuck, duration, 0.0), r.stick_before
+    # The next slip begins here, unless the body sticks longer.
+    slip_from, slip_start = select(stuck, place, r.slip_from), select(stuck, t, r.slip_start)
     slips, first_slip, last_slip, last_stick = r.slips, r.first_slip, r.last_slip, r.last_stick
-    slip_from, slip_start, slip_counted, stuck_since_slip = (
-        r.slip_from,
-        r.slip_start,
-        r.slip_counted,
-        r.stuck_since_slip,
-    )
-    place = x - drives.turn(scene.drive, t)[0]
-    if stuck:
-        stuck_since_slip += duration
-        # The next slip begins here, unless the body sticks longer.
-        slip_from, slip_start, slip_counted = place, t, False
-    elif not slip_counted and abs(place - slip_from) > play:
-        slip_counted = True
-        if stuck_since_slip > _SHORTEST_STICK * scene.span:
-            slips += 1
-            last_slip, last_stick = slip_start, stuck_since_slip
-            if slips == 1:
-                first_slip = last_slip
-        stuck_since_slip = 0.0
-    extreme_sign, extremes, first_extreme, last_extreme = r.extreme_sign, r.extremes, r.first_extreme, r.last_extreme
+    slipped = abs(place - slip_from) > play
+    if any_of(slipped):
+        stick = stick_time - stick_before
+        counts = slipped & (stick > _SHORTEST_STICK * span)
+        first_slip = select(counts & (slips == 0.0), slip_start, first_slip)
+        last_slip, last_stick = select(counts, slip_start, last_slip), select(counts, stick, last_stick)
+        slips = slips + select(counts, 1.0, 0.0)
+        slip_from, stick_before = select(slipped, nan, slip_from), select(slipped, stick_time, stick_before)
+    sign, extremes, first_extreme, last_extreme = r.extreme_sign, r.extremes, r.first_extreme, r.last_extreme
     first_swing, third_swing, fourth_swing, last_swing = r.first_swing, r.third_swing, r.fourth_swing, r.last_swing
-    velocity_before = r.velocity
-    if extreme_sign == 0:
-        extreme_sign = (
-            1 if velocity_before > 0.0 and velocity <= 0.0 else -1 if velocity_before < 0.0 and velocity >= 0.0 else 0
-        )
-    opposite = min(r.opposite, extreme_sign * x)
-    is_swing = extremes == 0 or extreme_sign * x - opposite > _ROUNDING * max(abs(r.x_min), abs(r.x_max))
-    if extreme_sign * velocity_before > 0.0 and extreme_sign * velocity <= 0.0 and is_swing:
+    before, opposite = r.velocity, min(r.opposite, sign * x)
+    if any_of(before * velocity <= 0.0):
+        is_maximum, is_minimum = (before > 0.0) & (velocity <= 0.0), (before < 0.0) & (velocity >= 0.0)
+        sign = select(sign == 0.0, select(is_maximum, 1.0, select(is_minimum, -1.0, 0.0)), sign)
+        swing = sign * x - opposite
+        is_swing = (extremes == 0.0) | (swing > _ROUNDING * max(abs(r.x_min), abs(r.x_max)))
+        counts = ((is_maximum & (sign > 0.0)) | (is_minimum & (sign < 0.0))) & is_swing
         # Between two observations the velocity is nearly linear in time.
-        extreme = t - duration * velocity / (velocity - velocity_before)
-        extremes += 1
-        if extremes == 1:
-            first_extreme = extreme
-        else:
-            last_swing = extreme_sign * x - opposite
-            if extremes == 2:
-                first_swing = last_swing
-            if extreme > 0.75 * scene.span:
-                fourth_swing = max(fourth_swing, last_swing)
-            elif extreme > 0.5 * scene.span:
-                third_swing = max(third_swing, last_swing)
-        last_extreme = extreme
-        opposite = extreme_sign * x
+        last_extreme = select(counts, t - duration * velocity / (velocity - before), last_extreme)
+        first, later = counts & (extremes == 0.0), counts & (extremes > 0.0)
+        first_extreme = select(first, last_extreme, first_extreme)
+        last_swing = select(later, swing, last_swing)
+        first_swing = select(later & (extremes == 1.0), swing, first_swing)
+        in_fourth = last_extreme > 0.75 * span
+        fourth_swing = select(later & in_fourth, max(fourth_swing, swing), fourth_swing)
+        in_third = (last_extreme > 0.5 * span) & (last_extreme <= 0.75 * span)
+        third_swing = select(later & in_third, max(third_swing, swing), third_swing)
+        extremes, opposite = extremes + select(counts, 1.0, 0.0), select(counts, sign * x, opposite)
     return Record(
         velocity,
         min(r.x_min, x),
         max(r.x_max, x),
         max(r.velocity_max, velocity),
         max(r.force_max, abs(force)),
-        r.stick_time + (duration if stuck else 0.0),
+        stick_time,
         slip_from,
         slip_start,
-        slip_counted,
-        stuck_since_slip,
-        r.unbroken_stick + duration if stuck else 0.0,
+        select(stuck, r.slipped_at, t),
+        stick_before,
         slips,
         first_slip,
         last_slip,
         last_stick,
-        extreme_sign,
+        sign,
         extremes,
         first_extreme,
         last_extreme,
@@ -234,7 +218,7 @@ def conclude(r, scene, status, t, x, velocity, band):
     elif _sticks_and_slips(r, scene, t, x, velocity, band):
         motion = STICK_SLIP
         cycle = (r.last_slip - r.first_slip) / (r.slips - 1) if r.slips >= 2 else nan
-    elif r.unbroken_stick < cycle and _keeps_swinging(r):
+    elif t - r.slipped_at < cycle and _keeps_swinging(r):
         motion = OSCILLATORY
     else:
         motion = RESTING
@@ -248,7 +232,7 @@ def conclude(r, scene, status, t, x, velocity, band):
         r.x_max,
         r.velocity_max,
         r.stick_time,
-        float(r.slips),
+        r.slips,
         r.first_slip,
         cycle,
         r.force_max,
@@ -270,7 +254,7 @@ def _sticks_and_slips(r, scene, t, x, velocity, band):
     # The body has slipped once and stuck again. It slips again if the spring force one span later exceeds breakaway.
     pull = scene.stiffness * abs(x + velocity * scene.span)
     holds = pull <= scene.mu_s * scene.mass * scene.gravity
-    return r.stuck_since_slip > max(_SHORT_STICK * scene.span, graze) and not holds
+    return r.stick_time - r.stick_before > max(_SHORT_STICK * scene.span, graze) and not holds
 
 
 @inlined
@@ -284,14 +268,14 @@ def _keeps_swinging(r):
 
 @recorder.begin.implements(Belt, BristleBelt)
 def _begin(scene, t, seen):
-    x, velocity, force = seen
-    return begin(scene, t, x, velocity, force)
+    x, velocity, force, place = seen
+    return begin(t, x, velocity, force, place)
 
 
 @recorder.observe.implements(Belt)
 def _observe(scene, record, t, duration, stuck, seen):
-    x, velocity, force = seen
-    return observe(record, scene, t, duration, x, velocity, force, stuck, 0.0)
+    x, velocity, force, place = seen
+    return observe(record, scene.span, t, duration, x, velocity, force, place, stuck, 0.0)
 
 
 @recorder.conclude.implements(Belt)

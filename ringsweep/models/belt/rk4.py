@@ -5,11 +5,12 @@ from __future__ import annotations
 from math import inf
 from typing import NamedTuple
 
-from ringsweep.models.belt.force import friction_force, holds_in_band
+from ringsweep.models.belt.force import acceleration, friction_force, holds_in_band
 from ringsweep.models.interface import constant_step
-from ringsweep.models.parts import largest_eigenvalue
+from ringsweep.models.parts import exceeds, larger_eigenvalue
+from ringsweep.numerics.functions import any_of, select
 from ringsweep.physics import belt, drives
-from ringsweep.physics.friction.velocity import passes_band, stiction_band
+from ringsweep.physics.friction.velocity import passes_band, steepest, stiction_band
 
 
 class Inspection(NamedTuple):
@@ -25,12 +26,15 @@ class Inspection(NamedTuple):
         Friction force, N.
     slope : float
         Derivative of the friction force by the sliding velocity, N s/m.
+    place : float
+        Displacement relative to the belt, m.
     """
 
     rates: tuple[float, float]
     v: float
     force: float
     slope: float
+    place: float
 
 
 @constant_step.initial_state.implements(belt.Belt)
@@ -41,43 +45,48 @@ def _initial_state(scene):
 @constant_step.rates.implements(belt.Belt)
 def _rates(scene, now, y, drive_at, drive_rate):
     force, _ = friction_force(scene, y[0], y[1] - drive_rate)
-    return y[1], -(scene.stiffness * y[0] + force) / scene.mass
+    return y[1], acceleration(scene, y[0], force)
 
 
 @constant_step.inspect.implements(belt.Belt)
 def _inspect(scene, y, drive_at, drive_rate):
     v = y[1] - drive_rate
     force, slope = friction_force(scene, y[0], v)
-    return Inspection((y[1], -(scene.stiffness * y[0] + force) / scene.mass), v, force, slope)
+    return Inspection((y[1], acceleration(scene, y[0], force)), v, force, slope, y[0] - drive_at)
 
 
-@constant_step.stiffness.implements(belt.Belt)
-def _stiffness(scene, before, now, h):
-    # The stages of the step reach about as far as the acceleration at its beginning takes the body.
-    belt_gains = (now.rates[0] - now.v) - (before.rates[0] - before.v)
-    ahead = before.v + h * before.rates[1] - belt_gains
-    rest, edge, jumped = passes_band(scene.law, before.v, now.v, ahead)
-    steepest = max(abs(before.slope), abs(now.slope))
-    stiffness_per_mass = scene.stiffness / scene.mass
-    if holds_in_band(scene.law):
-        # A step over a discontinuity has infinite stiffness; but a step may end in the dead band.
-        return inf if jumped else largest_eigenvalue(steepest / scene.mass, stiffness_per_mass) * h
-    # A step that jumps over the band, or over its edge, does not sample the slope there; the slope counts all the same.
-    if rest:
-        steepest = max(steepest, abs(friction_force(scene, 0.0, 0.0)[1]))
-    if edge:
-        steepest = max(steepest, abs(friction_force(scene, 0.0, stiction_band(scene.law))[1]))
-    return largest_eigenvalue(steepest / scene.mass, stiffness_per_mass) * h
+@constant_step.eigenvalue.implements(belt.Belt)
+def _eigenvalue(scene, before, now, h, most):
+    slope, load = max(abs(before.slope), abs(now.slope)), scene.mass * scene.gravity
+    (rest_s, rest_k), (edge_s, edge_k) = steepest(scene.law)
+    at_rest = abs(load * (rest_s * scene.mu_s + rest_k * scene.mu_k) + scene.viscous)
+    at_edge = abs(load * (edge_s * scene.mu_s + edge_k * scene.mu_k) + scene.viscous)
+    per_mass = 1.0 / scene.mass
+    swing = scene.stiffness * per_mass
+    if holds_in_band(scene.law) or any_of(exceeds(most, max(at_rest, at_edge) * per_mass, swing)):
+        # The stages of the step reach about as far as the acceleration at its beginning takes the body.
+        belt_gains = (now.rates[0] - now.v) - (before.rates[0] - before.v)
+        ahead = before.v + h * before.rates[1] - belt_gains
+        rest, edge, jumped = passes_band(scene.law, before.v, now.v, ahead)
+        if holds_in_band(scene.law):
+            # A step over a discontinuity has infinite stiffness; but a step may end in the dead band.
+            slope = select(jumped, inf, slope)
+        else:
+            # A step that jumps over the band, or over its edge, does not sample the slope there; the slope counts all
+            # the same.
+            slope = max(slope, select(rest, at_rest, 0.0))
+            slope = max(slope, select(edge, at_edge, 0.0))
+    return larger_eigenvalue(most, slope * per_mass, swing)
 
 
 @constant_step.seen.implements(belt.Belt, belt.BristleBelt)
 def _seen(scene, y, now):
-    return y[0], y[1], now.force
+    return y[0], y[1], now.force, now.place
 
 
 @constant_step.sticks.implements(belt.Belt)
 def _sticks(scene, before, now):
-    return abs(before.v) < stiction_band(scene.law) or before.v * now.v < 0.0
+    return (abs(before.v) < stiction_band(scene.law)) | (before.v * now.v < 0.0)
 
 
 @constant_step.row.implements(belt.Belt)

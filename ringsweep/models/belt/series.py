@@ -205,7 +205,7 @@ def _rates_at(scene, c, s):
 
 @series.seen_at_start.implements(belt.Belt)
 def _seen_at_start(scene, c):
-    return c[X, 0], c[VELOCITY, 0], c[FORCE, 0]
+    return c[X, 0], c[VELOCITY, 0], c[FORCE, 0], c[X, 0] - c[SHIFT, 0]
 
 
 @series.seen_at.implements(belt.Belt)
@@ -214,7 +214,8 @@ def _seen_at(scene, c, s, h):
     if abs(velocity) <= 1e-15 * (abs(c[VELOCITY, 0]) + variation(c[VELOCITY], h)):
         # A velocity within rounding is zero, so that an extreme of the displacement is recognised.
         velocity = 0.0
-    return value(c[X], s), velocity, value(c[FORCE], s)
+    x = value(c[X], s)
+    return x, velocity, value(c[FORCE], s), x - value(c[SHIFT], s)
 
 
 @series.extremes.implements(belt.Belt)
@@ -225,8 +226,8 @@ def _extremes(scene, record, mode, c, h, work):
     if mode.sign != 0:
         # The velocity has an extreme where the net force vanishes.
         for k in range(ORDER + 1):
-            c[SHIFT, k] = scene.stiffness * c[X, k] + c[FORCE, k]
-        count = crossings(c[SHIFT], h, work, count)
+            c[EXCESS, k] = scene.stiffness * c[X, k] + c[FORCE, k]
+        count = crossings(c[EXCESS], h, work, count)
     return count
 
 

@@ -4,35 +4,18 @@ The state holds place and velocity of the body in space, and the deflection of e
 Units are rad and rad/s, or m and m/s; deflections are in m. An *inspection* is a ``NamedTuple`` with everything that
 the model wants to know of a state. Its field ``rates`` is the time derivative of the state.
 
-If ``side_by_side`` returns ``Several``, a step gets vector lanes in place of floats. The functions that a step calls
-(``rates``, ``inspect``, ``holds``, ``stiffness``, ``margin``, ``arc_share``, ``seen``, ``sticks`` and the recorder's
-``observe``) are then written without ``if``, see :mod:`ringsweep.numerics.functions`.
+A step advances several runs side by side: it gets vector lanes in place of floats. So the functions that it calls
+(``rates``, ``inspect``, ``holds``, ``eigenvalue``, ``margin``, ``arc_share``, ``seen``, ``sticks`` and the recorder's
+``observe``) are written without ``if``, see :mod:`ringsweep.numerics.functions`, and all numbers of an inspection and
+of a record are floats. A step in which a run ends is repeated for this run with floats.
 """
 
 from __future__ import annotations
 
-from math import inf, isfinite
+from math import inf
 
 from ringsweep.compile import hook
 from ringsweep.models.interface.status import BROKEN, RUNNING
-from ringsweep.numerics.memory import Single
-
-
-@hook(optional=True)
-def side_by_side(scene):
-    """Whether several runs are computed side by side in vector lanes.
-
-    Parameters
-    ----------
-    scene : NamedTuple
-        One cell or a batch; only its type matters.
-
-    Returns
-    -------
-    Single or Several
-        Types of :mod:`ringsweep.numerics.memory`. By default ``Single()``: one run at a time.
-    """
-    return Single()
 
 
 @hook
@@ -108,7 +91,7 @@ def holds(scene, now):
     bool
         By default whether the first two rates are finite.
     """
-    return isfinite(now.rates[0]) and isfinite(now.rates[1])
+    return (abs(now.rates[0]) < inf) & (abs(now.rates[1]) < inf)
 
 
 @hook(optional=True)
@@ -132,8 +115,8 @@ def verdict(scene, before, now):
 
 
 @hook(absorb=True)
-def stiffness(scene, before, now, h):
-    """Stiffness of a step: largest magnitude of an eigenvalue of the linearised equations times the length of the step.
+def eigenvalue(scene, before, now, h, most):
+    """Largest magnitude of an eigenvalue of the linearised equations in a run, after one more step.
 
     Parameters
     ----------
@@ -143,11 +126,14 @@ def stiffness(scene, before, now, h):
         Inspections at the beginning and at the end of the step.
     h : float
         Length of the step, s.
+    most : float
+        Largest magnitude in the steps before, 1/s. A body may return it as soon as a bound shows that this step does
+        not exceed it.
 
     Returns
     -------
     float
-        Dimensionless. A step above ``ringsweep.solvers.rk4.STABILITY_LIMIT`` has no certificate.
+        In 1/s. A run in which it exceeds ``ringsweep.solvers.rk4.STABILITY_LIMIT`` divided by `h` has no certificate.
     """
 
 
@@ -275,13 +261,12 @@ def row(scene, y, drive_at, drive_rate):
 
 
 MEMBERS = (
-    side_by_side,
     initial_state,
     rates,
     inspect,
     holds,
     verdict,
-    stiffness,
+    eigenvalue,
     margin,
     arc_share,
     fall_rate,

@@ -11,10 +11,10 @@ from __future__ import annotations
 from math import cos, isnan, sin, sqrt
 from typing import NamedTuple
 
-from ringsweep.compile import inlined
+from ringsweep.compile import absorbed, inlined
 from ringsweep.models.interface import constant_step, implicit, modes
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
-from ringsweep.models.parts import largest_eigenvalue
+from ringsweep.models.parts import larger_eigenvalue
 from ringsweep.models.ring.contacts import (
     coefficients_at,
     coefficients_under,
@@ -28,11 +28,12 @@ from ringsweep.models.ring.contacts import (
 from ringsweep.models.ring.creep import FAST, INERTIA, NORMAL_1, NORMAL_2, SLOW
 from ringsweep.models.ring.record import ENDS
 from ringsweep.models.ring.series import AT_ONCE, NEARLY_JAMMED
+from ringsweep.numerics.functions import any_of, select, sine_cosine, sine_cosine_near
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction.bristles import bristle, region_guard, steady_deflection
 from ringsweep.physics.friction.velocity import BAND, KINETIC
 from ringsweep.physics.ring import BristleRing
-from ringsweep.physics.zones import roughest
+from ringsweep.physics.zones import PER_TURN, roughest, roughness
 
 
 class Contacts(NamedTuple):
@@ -47,7 +48,7 @@ class Contacts(NamedTuple):
     slopes_z: tuple[float, float]
 
 
-@inlined
+@absorbed
 def _contacts(scene, under, v, z_1, z_2, sign, region):
     """Bristles of both contacts; `under` are the coefficients under them, as `coefficients_under` returns them."""
     mu_s1, mu_k1, mu_s2, mu_k2 = under
@@ -64,7 +65,7 @@ def _contacts(scene, under, v, z_1, z_2, sign, region):
     )
 
 
-@inlined
+@absorbed
 def _region_guard(scene, under, v, z_1, z_2, sign, region):
     """Guard of a region, positive while the region lasts. The body counts as stuck while both contacts do."""
     mu_s1, mu_k1, mu_s2, mu_k2 = under
@@ -92,12 +93,15 @@ class Inspection(NamedTuple):
         Normal reactions, N.
     D, inertia : float
         Determinant of the balances and effective inertia; the body jams where one of them is not positive.
-    eigenvalue : float
-        Estimate of the largest magnitude of an eigenvalue, 1/s.
+    creep, swing : tuple of float
+        Trace, 1/s, and determinant, 1/s^2, of two parts of the linearised equations: sliding with its bristles, and the
+        swing of the body.
     omega, v : float
         Angular velocity of the body, rad/s, and sliding velocity, m/s.
-    stuck : bool
-        Whether the body counts as stuck.
+    stuck : float
+        1 if the body counts as stuck, else 0.
+    phi, sin_phi, cos_phi : float
+        Angle of the body, rad, its sine and cosine.
     """
 
     rates: tuple[float, float, float, float]
@@ -105,10 +109,14 @@ class Inspection(NamedTuple):
     normal_2: float
     D: float
     inertia: float
-    eigenvalue: float
+    creep: tuple[float, float]
+    swing: tuple[float, float]
     omega: float
     v: float
-    stuck: bool
+    stuck: float
+    phi: float
+    sin_phi: float
+    cos_phi: float
 
 
 @constant_step.initial_state.implements(BristleRing)
@@ -117,65 +125,90 @@ def _initial_state_in_space(scene):
     return scene.initial_phi, scene.initial_omega, z_1, z_2
 
 
-@constant_step.rates.implements(BristleRing)
-def _rates(scene, now, y, drive_at, drive_rate):
+@absorbed
+def _contacts_at(scene, y, drive_at, drive_rate):
+    """Coefficients under both contacts, sliding velocity and its sign, and bristles, for floats and Lanes."""
     phi, omega, z_1, z_2 = y
     v = (omega - drive_rate) * scene.body.radius
-    sign = 1.0 if v >= 0.0 else -1.0
-    now = _contacts(scene, coefficients_at(scene, phi - drive_at), v, z_1, z_2, sign, BAND)
-    epsilon, _, _ = ring.acceleration(scene.body, now.K1, now.K2, sin(phi), cos(phi), omega)
-    return omega, epsilon, now.rates[0], now.rates[1]
+    sign = select(v >= 0.0, 1.0, -1.0)
+    turns, offset = (phi - drive_at) * PER_TURN, ring.contact_offset(scene.body) * PER_TURN
+    mu_s1, mu_k1 = roughness(scene.surface, turns - offset)
+    mu_s2, mu_k2 = roughness(scene.surface, turns + offset)
+    under = mu_s1, mu_k1, mu_s2, mu_k2
+    return under, v, sign, _contacts(scene, under, v, z_1, z_2, sign, BAND)
+
+
+@constant_step.rates.implements(BristleRing)
+def _rates(scene, now, y, drive_at, drive_rate):
+    _, _, _, contacts = _contacts_at(scene, y, drive_at, drive_rate)
+    sin_phi, cos_phi = sine_cosine_near(y[0], now.phi, now.sin_phi, now.cos_phi)
+    epsilon, _, _ = ring.acceleration(scene.body, contacts.K1, contacts.K2, sin_phi, cos_phi, y[1])
+    return y[1], epsilon, contacts.rates[0], contacts.rates[1]
 
 
 @constant_step.inspect.implements(BristleRing)
 def _inspect(scene, y, drive_at, drive_rate):
     phi, omega, z_1, z_2 = y
     b = scene.body
-    v = (omega - drive_rate) * b.radius
-    sign = 1.0 if v >= 0.0 else -1.0
-    under = coefficients_at(scene, phi - drive_at)
+    under, v, sign, now = _contacts_at(scene, y, drive_at, drive_rate)
     stuck = _region_guard(scene, under, v, z_1, z_2, sign, BAND) > 0.0
-    now = _contacts(scene, under, v, z_1, z_2, sign, BAND)
-    sin_phi, cos_phi = sin(phi), cos(phi)
+    sin_phi, cos_phi = sine_cosine(phi)
     epsilon, D, inertia = ring.acceleration(b, now.K1, now.K2, sin_phi, cos_phi, omega)
     normal_1, normal_2 = ring.reactions(b, now.K1, now.K2, sin_phi, cos_phi, omega, epsilon)
     by_v, by_1, by_2 = _sliding_acceleration_slopes(scene, now, sin_phi, cos_phi, omega)
     decay = max(-now.rates_z[0], -now.rates_z[1])
     coupling = abs(by_1 * now.rates_v[0]) + abs(by_2 * now.rates_v[1])
-    eigenvalue = largest_eigenvalue(decay - by_v, coupling - decay * by_v)
     # The body swings even where friction is small.
     by_phi, by_omega = ring.acceleration_gradient(b, now.K1, now.K2, sin_phi, cos_phi, omega)
-    eigenvalue = max(eigenvalue, largest_eigenvalue(by_omega, -by_phi))
-    rates = omega, epsilon, now.rates[0], now.rates[1]
-    return Inspection(rates, normal_1, normal_2, D, inertia, eigenvalue, omega, v, stuck)
+    return Inspection(
+        (omega, epsilon, now.rates[0], now.rates[1]),
+        normal_1,
+        normal_2,
+        D,
+        inertia,
+        (decay - by_v, coupling - decay * by_v),
+        (by_omega, -by_phi),
+        omega,
+        v,
+        select(stuck, 1.0, 0.0),
+        phi,
+        sin_phi,
+        cos_phi,
+    )
 
 
-@inlined
+@absorbed
 def _sliding_acceleration_slopes(scene, now, sin_phi, cos_phi, omega):
     """Derivatives of the sliding acceleration by the sliding velocity through friction, and by both deflections."""
     b = scene.body
     v_1, v_2 = now.slopes_v
     z_1, z_2 = now.slopes_z
-    by_v = ring.acceleration_slope(b, now.K1, now.K2, v_1, v_2, sin_phi, cos_phi, omega)
-    by_1 = ring.acceleration_slope(b, now.K1, now.K2, z_1, 0.0, sin_phi, cos_phi, omega)
-    by_2 = ring.acceleration_slope(b, now.K1, now.K2, 0.0, z_2, sin_phi, cos_phi, omega)
-    return b.radius * by_v, b.radius * by_1, b.radius * by_2
+    by_K1 = b.radius * ring.acceleration_slope(b, now.K1, now.K2, 1.0, 0.0, sin_phi, cos_phi, omega)
+    by_K2 = b.radius * ring.acceleration_slope(b, now.K1, now.K2, 0.0, 1.0, sin_phi, cos_phi, omega)
+    return by_K1 * v_1 + by_K2 * v_2, by_K1 * z_1, by_K2 * z_2
 
 
-@constant_step.stiffness.implements(BristleRing)
-def _stiffness(scene, before, now, h):
-    return max(before.eigenvalue, now.eigenvalue) * h
+@constant_step.eigenvalue.implements(BristleRing)
+def _eigenvalue(scene, before, now, h, most):
+    if any_of(most == 0.0):
+        most = _larger_eigenvalue_at(before, most)
+    return _larger_eigenvalue_at(now, most)
+
+
+@absorbed
+def _larger_eigenvalue_at(now, most):
+    return larger_eigenvalue(larger_eigenvalue(most, now.creep[0], now.creep[1]), now.swing[0], now.swing[1])
 
 
 @constant_step.sticks.implements(BristleRing)
 def _sticks(scene, before, now):
-    return before.stuck
+    return before.stuck > 0.0
 
 
 @constant_step.row.implements(BristleRing)
 def _row(scene, y, drive_at, drive_rate):
     now = constant_step.inspect(scene, y, drive_at, drive_rate)
-    mode = 0.0 if now.stuck else 1.0 if now.v > 0.0 else -1.0
+    mode = 0.0 if now.stuck > 0.0 else 1.0 if now.v > 0.0 else -1.0
     zone_1, zone_2 = zones_at(scene, y[0] - drive_at)
     return y[0], y[1], now.rates[1], now.normal_1, now.normal_2, drive_rate, zone_1, zone_2, mode, y[2], y[3]
 

@@ -8,11 +8,10 @@ from typing import NamedTuple
 from ringsweep.compile import inlined
 from ringsweep.models.interface import constant_step
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
-from ringsweep.models.parts import largest_eigenvalue
+from ringsweep.models.parts import exceeds, larger_eigenvalue
 from ringsweep.models.ring.contacts import zones_at
 from ringsweep.models.ring.record import ENDS
 from ringsweep.numerics.functions import any_of, select, sine_cosine, sine_cosine_near
-from ringsweep.numerics.memory import Several
 from ringsweep.physics import contact, ring, zones
 from ringsweep.physics.friction.velocity import passes_band, steepest, stiction_band
 
@@ -51,11 +50,6 @@ class Inspection(NamedTuple):
     sin_phi: float
     cos_phi: float
     omega: float
-
-
-@constant_step.side_by_side.implements(ring.Ring)
-def _side_by_side(scene):
-    return Several()
 
 
 @constant_step.initial_state.implements(ring.Ring)
@@ -113,26 +107,27 @@ def _root_fraction(before, now):
     return before / (before - now) if before > now else 0.0
 
 
-@constant_step.stiffness.implements(ring.Ring)
-def _stiffness(scene, before, now, h):
-    # The stages of the step reach about as far as the acceleration at its beginning takes the body.
+@constant_step.eigenvalue.implements(ring.Ring)
+def _eigenvalue(scene, before, now, h, most):
     radius = scene.body.radius
-    ring_gains = (radius * now.omega - now.v) - (radius * before.omega - before.v)
-    ahead = before.v + h * radius * before.rates[1] - ring_gains
-    band = stiction_band(scene.law)
     friction_slope = _steeper(before.slope, now.slope)
     # A step that jumps over the band, or over its edge, does not sample the slope there. The slope counts all the same,
     # since just such a step may lead to a wrong regime.
-    low, high = min(min(before.v, now.v), ahead), max(max(before.v, now.v), ahead)
-    if any_of((low <= band) & (high >= -band)):
+    mu_s, mu_k = zones.roughest(scene.surface)
+    (rest_s, rest_k), (edge_s, edge_k) = steepest(scene.law)
+    at_rest, at_edge = rest_s * mu_s + rest_k * mu_k, edge_s * mu_s + edge_k * mu_k
+    scale = -radius * ring.friction_gain(scene.body, now.cos_phi, now.omega)
+    bound = max(abs(at_rest), abs(at_edge)) * abs(scale) + abs(now.by_omega)
+    if any_of(exceeds(most, bound, -now.by_phi)):
+        # The stages of the step reach about as far as the acceleration at its beginning takes the body.
+        ring_gains = (radius * now.omega - now.v) - (radius * before.omega - before.v)
+        ahead = before.v + h * radius * before.rates[1] - ring_gains
         rest, edge, _ = passes_band(scene.law, before.v, now.v, ahead)
-        mu_s, mu_k = zones.roughest(scene.surface)
-        (rest_s, rest_k), (edge_s, edge_k) = steepest(scene.law)
-        scale = -radius * ring.friction_gain(scene.body, now.cos_phi, now.omega)
-        friction_slope = _steeper(friction_slope, select(rest, scale * (rest_s * mu_s + rest_k * mu_k), 0.0))
-        friction_slope = _steeper(friction_slope, select(edge, scale * (edge_s * mu_s + edge_k * mu_k), 0.0))
+        if any_of(edge):
+            friction_slope = _steeper(friction_slope, select(rest, scale * at_rest, 0.0))
+            friction_slope = _steeper(friction_slope, select(edge, scale * at_edge, 0.0))
     # The body swings even without friction; with friction, its speed changes the load of the contacts.
-    return largest_eigenvalue(friction_slope + now.by_omega, -now.by_phi) * h
+    return larger_eigenvalue(most, friction_slope + now.by_omega, -now.by_phi)
 
 
 @inlined
@@ -150,7 +145,7 @@ def _margin(scene, before, now):
 
 @constant_step.arc_share.implements(ring.Ring, ring.BristleRing)
 def _arc_share(scene, now, h):
-    return abs(now.v) * h / (scene.body.radius * zones.narrowest(scene.surface))
+    return abs(now.v) * (h / (scene.body.radius * zones.narrowest(scene.surface)))
 
 
 @constant_step.fall_rate.implements(ring.Ring, ring.BristleRing)

@@ -6,12 +6,13 @@ describes the functions of a law.
 
 from __future__ import annotations
 
-from math import cos, exp, pi, sin
+from math import pi
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from ringsweep.compile import inlined
+from ringsweep.compile import absorbed, inlined
+from ringsweep.numerics.functions import any_of, decay, select, sine_cosine
 from ringsweep.physics.friction.presliding import (
     NEARLY,
     SIGMA_0,
@@ -41,14 +42,15 @@ class Dahl(NamedTuple):
 
 @bristle.implements(Dahl)
 def _dahl_bristle(law, mu_s, mu_k, v, z, sign, region):
-    rate_v = 1.0 - law.sigma0 * sign * z / mu_k
-    rate_z = -law.sigma0 * sign * v / mu_k
+    pull = law.sigma0 / mu_k * sign
+    rate_v = 1.0 - pull * z
+    rate_z = -pull * v
     return v * rate_v, rate_v, rate_z, law.sigma0 * z, 0.0, law.sigma0
 
 
 @region_guard.implements(Dahl)
 def _dahl_region_guard(law, mu_s, mu_k, v, z, sign, region):
-    slack = NEARLY - law.sigma0 * sign * z / mu_k
+    slack = NEARLY - law.sigma0 / mu_k * sign * z
     return slack if region == BAND else -slack
 
 
@@ -57,7 +59,7 @@ def _dahl_steady_deflection(law, mu_s, mu_k, v):
     return (1.0 if v > 0.0 else -1.0 if v < 0.0 else 0.0) * mu_k / law.sigma0
 
 
-@inlined
+@absorbed
 def stribeck(law, mu_s, mu_k, v):
     """LuGre's g(v), the friction coefficient of steady sliding without its viscous part; 1.
 
@@ -66,12 +68,13 @@ def stribeck(law, mu_s, mu_k, v):
     tuple of float
         g, 1, and its slope dg/dv, s/m.
     """
-    x = v / law.v_s
-    tail = exp(-x * x) if x * x < 700.0 else 0.0
-    return mu_k + (mu_s - mu_k) * tail, -2.0 * x / law.v_s * (mu_s - mu_k) * tail
+    x = v * (1.0 / law.v_s)
+    square = x * x
+    tail = select(square < 700.0, decay(min(square, 700.0)), 0.0)
+    return mu_k + (mu_s - mu_k) * tail, -2.0 * x * (1.0 / law.v_s) * (mu_s - mu_k) * tail
 
 
-@inlined
+@absorbed
 def viscoelastic(law, v, z, rate, rate_v, rate_z):
     """Result of :func:`bristle` for bristles with damping and viscous friction.
 
@@ -117,8 +120,9 @@ class LuGre(NamedTuple):
 @bristle.implements(LuGre)
 def _lugre_bristle(law, mu_s, mu_k, v, z, sign, region):
     g, slope = stribeck(law, mu_s, mu_k, v)
-    share = law.sigma0 * sign * z / g
-    return viscoelastic(law, v, z, v * (1.0 - share), 1.0 - share + v * share * slope / g, -law.sigma0 * sign * v / g)
+    share, per_g = law.sigma0 * sign * z / g, 1.0 / g
+    rate_v = 1.0 - share + v * share * slope * per_g
+    return viscoelastic(law, v, z, v * (1.0 - share), rate_v, -law.sigma0 * sign * v * per_g)
 
 
 class ElastoPlastic(NamedTuple):
@@ -144,27 +148,28 @@ class ElastoPlastic(NamedTuple):
 @bristle.implements(ElastoPlastic)
 def _elasto_plastic_bristle(law, mu_s, mu_k, v, z, sign, region):
     g, slope = stribeck(law, mu_s, mu_k, v)
-    load = law.sigma0 * sign * z
-    elastic = law.elastic_fraction * mu_k
-    if load <= elastic:
-        return viscoelastic(law, v, z, v, 1.0, 0.0)
-    if load >= g:
-        plastic, by_load, by_g = 1.0, 0.0, 0.0
-    else:
-        width = g - elastic
-        angle = pi * ((load - elastic) / width - 0.5)
-        plastic = 0.5 + 0.5 * sin(angle)
-        by_load = 0.5 * pi * cos(angle) / width
-        by_g = -by_load * (load - elastic) / width
-    rate_v = 1.0 - plastic * load / g - v * slope * (by_g - plastic / g) * load / g
-    rate_z = -law.sigma0 * sign * v * (plastic + by_load * load) / g
-    return viscoelastic(law, v, z, v * (1.0 - plastic * load / g), rate_v, rate_z)
+    load, elastic, per_g = law.sigma0 * sign * z, law.elastic_fraction * mu_k, 1.0 / g
+    # Shares of load and deflection, and their derivatives by the load and by g.
+    plastic, by_load, by_g = select(load >= g, 1.0, 0.0), 0.0 * g, 0.0 * g
+    partly = (load > elastic) & (load < g)
+    if any_of(partly):
+        per_width = 1.0 / (g - elastic)
+        place = (load - elastic) * per_width
+        # In the other lanes the angle may be large.
+        sine, cosine = sine_cosine(pi * (min(max(place, 0.0), 1.0) - 0.5))
+        plastic = select(partly, 0.5 + 0.5 * sine, plastic)
+        by_load = select(partly, 0.5 * pi * cosine * per_width, by_load)
+        by_g = -by_load * place
+    share = plastic * load * per_g
+    rate_v = 1.0 - share - v * slope * (by_g - plastic * per_g) * load * per_g
+    rate_z = -law.sigma0 * sign * v * (plastic + by_load * load) * per_g
+    return viscoelastic(law, v, z, v * (1.0 - share), rate_v, rate_z)
 
 
 @region_guard.implements(LuGre, ElastoPlastic)
 def _stribeck_region_guard(law, mu_s, mu_k, v, z, sign, region):
     g, _ = stribeck(law, mu_s, mu_k, v)
-    slack = min(NEARLY - law.sigma0 * sign * z / g, 1.0 - sign * v / law.v_s)
+    slack = min(NEARLY - law.sigma0 * sign * (1.0 / g) * z, 1.0 - sign * v * (1.0 / law.v_s))
     return slack if region == BAND else -slack
 
 
@@ -198,14 +203,15 @@ class ResetIntegrator(NamedTuple):
 
 @bristle.implements(ResetIntegrator)
 def _reset_integrator_bristle(law, mu_s, mu_k, v, z, sign, region):
-    if region == BAND:
-        return v, 1.0, 0.0, law.sigma0 * z + law.sigma1 * v, law.sigma1, law.sigma0
-    return 0.0, 0.0, 0.0, sign * mu_k, 0.0, 0.0
+    sticks = 1.0 if region == BAND else 0.0
+    traction = sticks * (law.sigma0 * z + law.sigma1 * v) + (1.0 - sticks) * sign * mu_k
+    return sticks * v, sticks, 0.0, traction, sticks * law.sigma1, sticks * law.sigma0
 
 
 @region_guard.implements(ResetIntegrator)
 def _reset_integrator_region_guard(law, mu_s, mu_k, v, z, sign, region):
-    return mu_s - law.sigma0 * sign * z if region == BAND else 1.0
+    sticks = 1.0 if region == BAND else 0.0
+    return sticks * (mu_s - law.sigma0 * sign * z) + (1.0 - sticks)
 
 
 @after_yield.implements(ResetIntegrator)

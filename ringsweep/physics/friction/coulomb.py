@@ -109,6 +109,18 @@ def _karnopp_piece(law, region):
     return Piece(0.0, law.dead_band, 0.0, ONE, ZERO)
 
 
+@blend.implements(Karnopp)
+def _karnopp_blend(law, speed):
+    stuck = speed < law.dead_band
+    return select(stuck, 1.0, 0.0), select(stuck, 0.0, 1.0), 0.0, 0.0
+
+
+@steepest.implements(Karnopp)
+def _level(law):
+    # The jump at the edge of the band is no slope: a step that jumps over the whole band has infinite stiffness.
+    return (0.0, 0.0), (0.0, 0.0)
+
+
 @stiction_band.implements(Karnopp)
 def _dead_band(law):
     return law.dead_band

@@ -20,9 +20,11 @@ SIGMA_2 = Parameter("s/m", "viscous friction", lower=0.0, default=0.0)
 V_S = Parameter("m/s", "Stribeck velocity", lower=0.0, open_lower=True)
 
 
-@hook
+@hook(absorb=True)
 def bristle(law, mu_s, mu_k, v, z, sign, region):
     """Rate of the deflection, and traction, with their partial derivatives by `v` and `z`.
+
+    Under ``rk4`` the numbers are vector lanes, so bodies have no ``if`` that depends on them; `region` is an int.
 
     For LuGre bristles (the paper's Eqs. 11-13) with the steady friction g(v),
 
@@ -50,7 +52,7 @@ def bristle(law, mu_s, mu_k, v, z, sign, region):
     """
 
 
-@hook
+@hook(absorb=True)
 def region_guard(law, mu_s, mu_k, v, z, sign, region):
     """Guard of a region: positive while the contact stays in it, zero where it leaves it.
 

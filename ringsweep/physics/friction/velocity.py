@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ringsweep.compile import hook, inlined
-from ringsweep.numerics.functions import decay, lanes_body, select
+from ringsweep.numerics.functions import any_of, decay, lanes_body, select
 from ringsweep.numerics.series import INVERSE
 from ringsweep.quantities.parameters import Parameter
 
@@ -331,7 +331,7 @@ def exponential_tail(region, low, high, alpha):
 
 @inlined
 def exponential_weights(alpha, x, lasts):
-    """:func:`weights` of an exponential tail, without ``if``.
+    """:func:`weights` of an exponential tail, for floats and Lanes. Below the tail the result has no meaning.
 
     Parameters
     ----------
@@ -342,7 +342,10 @@ def exponential_weights(alpha, x, lasts):
     lasts : bool or Mask
         Whether the speed is below the upper bound of the tail.
     """
-    q = select(lasts, decay(alpha * x), 0.0)
+    q, decays = 0.0 * x, lasts & (x >= 0.0)
+    # Often no run is in the tail.
+    if any_of(decays):
+        q = select(decays, decay(alpha * x), 0.0)
     return q, 1.0 - q, -alpha * q, alpha * q
 
 
