@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import logging
 import os
 import sys
 from collections.abc import Callable, Iterable
-from functools import cache
+from functools import cache, wraps
 from pathlib import Path
 from typing import Any
 
 import numba
 
-from ringsweep.compile.numba_private import keep_on_disk
+from ringsweep.compile.numba_private import KERNEL_COMPILER, keep_on_disk
 from ringsweep.compile.options import KERNEL_OPTIONS
 from ringsweep.errors import InputError
 
@@ -77,10 +78,27 @@ def kernel(function: Callable[..., Any]) -> Any:
     It runs without the global interpreter lock. The key of the cache covers all sources that determine results, so an
     edit in a called function compiles the kernel anew.
     """
-    dispatcher = numba.njit(**KERNEL_OPTIONS)(function)
+    dispatcher = numba.njit(**KERNEL_OPTIONS, **KERNEL_COMPILER)(function)
+    dispatcher.compile = _without_collection(dispatcher.compile)
     # Without the suffix, kernels with own files and kernels without them would replace each other in the cache.
     keep_on_disk(dispatcher, SOURCES_DIGEST, SOURCES_DIGEST[:12] if OWN_FILES else "", _announce_compilation)
     return dispatcher
+
+
+def _without_collection(compiled: Callable[..., Any]) -> Callable[..., Any]:
+    """Make a function that runs without the garbage collector: it takes a sixth of the time of a compilation."""
+
+    @wraps(compiled)
+    def function(*arguments: Any) -> Any:
+        was_enabled = gc.isenabled()
+        gc.disable()
+        try:
+            return compiled(*arguments)
+        finally:
+            if was_enabled:
+                gc.enable()
+
+    return function
 
 
 @cache

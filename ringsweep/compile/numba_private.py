@@ -7,27 +7,30 @@ what lies behind the names may fail while it compiles: `pyproject.toml` has an u
 
 from __future__ import annotations
 
+import inspect
 import logging
 import pickle
 from collections.abc import Callable
-from functools import cache
+from copy import copy
+from functools import cache, cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 logger = logging.getLogger("ringsweep")
 
-# A function that calls at least this many others, directly or not, is optimised only as a part of its caller. Else each
-# level of calls would optimise the same code again.
-_OPTIMISED_BY_CALLER = 28
-
 try:
+    import numba
+    from llvmlite import binding as llvm
     from numba._dynfunc import make_function
-    from numba.core import cgutils
+    from numba.core import cgutils, types
     from numba.core.codegen import JITCodeLibrary
     from numba.core.compiler import CompilerBase, DefaultPassBuilder
-    from numba.core.compiler_machinery import register_pass
+    from numba.core.compiler_machinery import PassManager, register_pass
+    from numba.core.cpu import CPUContext
     from numba.core.runtime.context import NRTContext
-    from numba.core.typed_passes import NativeLowering
+    from numba.core.typed_passes import NativeLowering, NopythonRewrites
+    from numba.core.typing.context import Context
+    from numba.core.typing.templates import AbstractTemplate, infer, infer_global
     from numba.extending import intrinsic
 except ImportError:
     AVAILABLE = False
@@ -36,32 +39,79 @@ else:
 
 
 if AVAILABLE:
+    # ---- LLVM: each function is linked and optimised once, as a part of its kernel ---------------
 
-    class _AbsorbedLibrary(JITCodeLibrary):
-        """Code of a function that is compiled into its callers; no machine code is made of the function itself."""
+    class _CalleeLibrary(JITCodeLibrary):
+        """Code of a function that kernels call. It is neither optimised nor made into machine code on its own."""
 
-        def _optimize_final_module(self) -> None:
-            if len(self._callees()) < _OPTIMISED_BY_CALLER:
-                super()._optimize_final_module()
+        def _optimize_functions(self, ll_module: Any) -> None:
+            ll_module.data_layout = self._codegen._data_layout
 
-        def _callees(self) -> set[Any]:
-            found = set(self._linking_libraries)
+        def finalize(self) -> None:
+            self._raise_if_finalized()
             for library in self._linking_libraries:
-                if isinstance(library, _AbsorbedLibrary):
-                    found |= library._callees()
-            return found
-
-        def _finalize_final_module(self) -> None:
+                self._reload_init.update(library._reload_init)
             self._finalize_dynamic_globals()
-            self._verify_declare_only_symbols()
             self._finalized = True
 
+        def _get_module_for_linking(self) -> Any:
+            # Kernels do not come here, but functions of Numba's own that call a function of the package.
+            if self._shared_module is None:
+                _link_all(self._final_module, self._linking_libraries)
+                super()._get_module_for_linking()
+            return self._shared_module
+
+    class _KernelLibrary(JITCodeLibrary):
+        """Code of a kernel with all functions that it calls."""
+
+        def finalize(self) -> None:
+            module = self._final_module
+            own = {function.name for function in module.functions if not function.is_declaration}
+            _link_all(module, self._linking_libraries)
+            for library in self._linking_libraries:
+                self._reload_init.update(library._reload_init)
+            self._linking_libraries = []
+            # LLVM inlines a function of any size at its only call, and drops arguments without use, if it knows that
+            # there are no calls from elsewhere.
+            for function in module.functions:
+                if function.linkage == llvm.Linkage.linkonce_odr and function.name not in own:
+                    function.linkage = llvm.Linkage.internal
+            super().finalize()
+
+    def _link_all(module: Any, libraries: list[Any]) -> None:
+        """Link libraries, and all libraries that they call, into a module: each of them once."""
+        seen: set[Any] = set()
+        waiting = list(libraries)
+        while waiting:
+            library = waiting.pop()
+            if library in seen:
+                continue
+            seen.add(library)
+            if isinstance(library, _CalleeLibrary):
+                part = library._final_module.clone()
+                for function in part.functions:
+                    if function.linkage == llvm.Linkage.external and not function.is_declaration:
+                        function.linkage = llvm.Linkage.linkonce_odr
+                module.link_in(part)
+                waiting.extend(library._linking_libraries)
+            else:
+                module.link_in(library._get_module_for_linking(), preserve=True)
+
     @register_pass(mutates_CFG=True, analysis_only=False)
-    class _AbsorbedLowering(NativeLowering):
-        _name = "absorbed_lowering"
+    class _KernelLowering(NativeLowering):
+        _name = "kernel_lowering"
 
         def run_pass(self, state: Any) -> bool:
-            state.library = _AbsorbedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+            state.library = _KernelLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+            state.library.enable_object_caching()
+            return bool(super().run_pass(state))
+
+    @register_pass(mutates_CFG=True, analysis_only=False)
+    class _CalleeLowering(NativeLowering):
+        _name = "callee_lowering"
+
+        def run_pass(self, state: Any) -> bool:
+            state.library = _CalleeLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
             state.library.enable_object_caching()
             state.flags.no_compile = True
             super().run_pass(state)
@@ -73,28 +123,145 @@ if AVAILABLE:
             state["cr"] = made._replace(cfunc=name)
             return True
 
-    class _Uncounted(NRTContext):
+    # ---- lowering ---------------------------------------------------------------------------------
+
+    class _ReferenceCounts(NRTContext):
+        """Reference counts without the code that takes apart tuples of numbers in search of arrays."""
+
+        def get_meminfos(self, builder: Any, ty: Any, val: Any) -> Any:
+            if not _holds_arrays(self._context.data_model_manager, ty):
+                return []
+            return super().get_meminfos(builder, ty, val)
+
+    @cache
+    def _holds_arrays(models: Any, kind: Any) -> bool:
+        return bool(models[kind].contains_nrt_meminfo())
+
+    class _Target(CPUContext):
+        @cached_property
+        def nrt(self) -> Any:
+            return _ReferenceCounts(self, self.enable_nrt)
+
+    class _NoReferenceCounts(NRTContext):
         """References to arrays are not counted.
 
-        The kernel holds them while its callees run. Each count is a call, and keeps LLVM from holding numbers in
-        registers.
+        A kernel holds its arrays while its callees run. Each count would be a call, for which LLVM moves all numbers from
+        registers to memory.
         """
 
-        def get_meminfos(self, builder: Any, ty: Any, val: Any) -> list[Any]:
+        def get_meminfos(self, builder: Any, ty: Any, val: Any) -> Any:
             return []
 
-    class _CalleeCompiler(CompilerBase):
-        """Numba's passes, but without machine code for callees: kernels compile in two thirds of the time."""
+    class _CalleeTarget(CPUContext):
+        @cached_property
+        def nrt(self) -> Any:
+            return _NoReferenceCounts(self, self.enable_nrt)
+
+    # ---- typing -----------------------------------------------------------------------------------
+
+    _NUMBERS = {types.Float, types.Integer, types.Boolean, types.IntegerLiteral, types.BooleanLiteral}
+
+    # By function and types of the arguments: the function, and its signature.
+    _signatures: dict[Any, Any] = {}
+
+    class _Typing(Context):
+        """Numba's typing with a memory of operations on numbers. For each of them Numba tries dozens of overloads."""
+
+        def resolve_function_type(self, func: Any, args: Any, kws: Any) -> Any:
+            if kws or type(func) is not types.Function or any(type(kind) not in _NUMBERS for kind in args):
+                return super().resolve_function_type(func, args, kws)
+            key = id(func), tuple(args)
+            if key not in _signatures:
+                signature = super().resolve_function_type(func, args, kws)
+                if signature is None:
+                    return None
+                # The function is kept, so that no other object gets its id.
+                _signatures[key] = func, signature
+            return _signatures[key][1]
+
+    @cache
+    def _typing(context: Any) -> Any:
+        """Numba's context of typing, as :class:`_Typing`. Both share their contents."""
+        found = copy(context)
+        found.__class__ = _Typing
+        return found
+
+    def choose_body(function: Callable[..., Any], choose: Callable[..., Any], options: Any) -> None:
+        """Give a function bodies for kernels, like ``numba.extending.overload``.
+
+        Numba's own decorator compiles a body again for callers with other options, and compares signatures and options
+        in each call.
+
+        Parameters
+        ----------
+        function, choose : callable
+            As in :func:`ringsweep.compile.options.specialise`.
+        options : dict
+            Options of ``numba.njit``.
+        """
+        # By body: its compiler. By types of the arguments: the signature. By types of all parameters: compiled code.
+        compilers: dict[Any, Any] = {}
+        signatures: dict[Any, Any] = {}
+        compiled: dict[Any, Any] = {}
+
+        class Template(AbstractTemplate):
+            key = function
+
+            def generic(self, args: Any, kws: Any) -> Any:
+                args = tuple(args)
+                if args not in signatures:
+                    body = None if kws else choose(*args)
+                    if body is None:
+                        return None
+                    if body not in compilers:
+                        compilers[body] = numba.njit(**options)(body)
+                    pysig, parameters = compilers[body].fold_argument_types(args, {})
+                    compilers[body].compile(parameters)
+                    made = compilers[body].overloads[parameters]
+                    compiled[parameters] = made.entry_point
+                    signatures[args] = made.signature.replace(pysig=pysig)
+                return signatures[args]
+
+            def get_impl_key(self, sig: Any) -> Any:
+                return compiled[sig.args]
+
+        infer(Template)
+        infer_global(function, types.Function(Template))
+
+    # ---- passes -----------------------------------------------------------------------------------
+
+    class _Passes(PassManager):
+        """Passes without a record of each of them: it prints the types of all arguments."""
+
+        def _runPass(self, index: int, one: Any, state: Any) -> None:
+            one.analysis = self._analysis
+            one.run_initialization(state)
+            one.run_pass(state)
+            one.run_finalizer(state)
+
+    class _KernelCompiler(CompilerBase):
+        """Numba's passes, without those that kernels do not need. Kernels compile in half the time."""
+
+        lowering: ClassVar[type] = _KernelLowering
+        target: ClassVar[type] = _Target
+
+        def __init__(self, typingctx: Any, *arguments: Any) -> None:
+            super().__init__(_typing(typingctx), *arguments)
+            self.state.targetctx.__class__ = self.target
 
         def define_pipelines(self) -> list[Any]:
-            passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
-            passes.passes = [
-                (_AbsorbedLowering, why) if one is NativeLowering else (one, why) for one, why in passes.passes
-            ]
+            whole = DefaultPassBuilder.define_nopython_pipeline(self.state)
+            passes = _Passes(whole.pipeline_name)
+            for one, why in whole.passes:
+                # These rewrites fuse the loops of operations on whole arrays.
+                if one is not NopythonRewrites:
+                    passes.add_pass(self.lowering if one is NativeLowering else one, why)
             passes.finalize()
-            context = self.state.targetctx
-            context.__dict__["nrt"] = _Uncounted(context, context.enable_nrt)
             return [passes]
+
+    class _CalleeCompiler(_KernelCompiler):
+        lowering = _CalleeLowering
+        target = _CalleeTarget
 
     @intrinsic
     def _borrowed(typingctx: Any, array: Any) -> Any:
@@ -114,18 +281,33 @@ if AVAILABLE:
 
     borrowed: Any = _borrowed
 
-    #: Options of functions that are compiled into kernels.
-    CALLEE_OPTIONS: dict[str, Any] = {"pipeline_class": _CalleeCompiler}
+    #: Further options of kernels, and of functions that are compiled into kernels.
+    KERNEL_COMPILER: dict[str, Any] = {"pipeline_class": _KernelCompiler}
+    CALLEE_COMPILER: dict[str, Any] = {"pipeline_class": _CalleeCompiler}
 
 else:
-    from numba.extending import register_jitable
+    from numba.extending import overload, register_jitable
 
     @register_jitable
     def _itself(array):
         return array
 
     borrowed = _itself
-    CALLEE_OPTIONS = {}
+    KERNEL_COMPILER = CALLEE_COMPILER = {}
+
+    def choose_body(function: Callable[..., Any], choose: Callable[..., Any], options: Any) -> None:
+        """Give a function bodies for kernels."""
+
+        def typed(*kinds):
+            return choose(*kinds)
+
+        # Numba compares this signature with the signatures of the bodies, which have no annotations.
+        plain = [
+            inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+            for name in inspect.signature(function).parameters
+        ]
+        typed.__signature__ = inspect.Signature(plain)  # type: ignore[attr-defined]
+        overload(function, jit_options=options, strict=False)(typed)
 
 
 def keep_on_disk(dispatcher: Any, digest: str, suffix: str, announce: Callable[[], None]) -> None:

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable
 from typing import Any
 
-from numba.extending import overload, register_jitable
-
-from ringsweep.compile.numba_private import CALLEE_OPTIONS
+from ringsweep.compile.numba_private import CALLEE_COMPILER, choose_body
 
 # Fused multiply-add ("contract") is the only deviation from IEEE arithmetic. "nnan" and "ninf" would delete the checks
 # that find failed runs. "reassoc" would reorder sums that are ordered against cancellation.
@@ -22,7 +19,7 @@ KERNEL_OPTIONS: Any = {
 }
 
 # Options of functions that are compiled into a kernel.
-_CALLED_BY_KERNELS = KERNEL_OPTIONS | CALLEE_OPTIONS
+_CALLED_BY_KERNELS = KERNEL_OPTIONS | CALLEE_COMPILER | {"no_cpython_wrapper": True}
 
 
 def inlined(function: Callable[..., Any]) -> Any:
@@ -31,7 +28,8 @@ def inlined(function: Callable[..., Any]) -> Any:
     In Python it stays a Python function. A compiled entry point for Python would have to unpack a whole scene; for most
     formulas that takes longer to compile than the formula.
     """
-    return register_jitable(**_CALLED_BY_KERNELS)(function)
+    specialise(function, lambda *kinds: function)
+    return function
 
 
 def absorbed(function: Callable[..., Any]) -> Any:
@@ -39,7 +37,8 @@ def absorbed(function: Callable[..., Any]) -> Any:
 
     For the innermost loop of a kernel, where a call would pass its arguments through memory.
     """
-    return register_jitable(**_CALLED_BY_KERNELS, forceinline=True)(function)
+    specialise(function, lambda *kinds: function, absorb=True)
+    return function
 
 
 def specialise(function: Callable[..., Any], choose: Callable[..., Any], *, absorb: bool = False) -> None:
@@ -56,13 +55,4 @@ def specialise(function: Callable[..., Any], choose: Callable[..., Any], *, abso
         Whether bodies of any size are inlined; see :func:`absorbed`.
     """
 
-    def typed(*kinds: Any) -> Any:
-        return choose(*kinds)
-
-    # Numba compares this signature with the signatures of the bodies, which have no annotations.
-    plain = [
-        inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD)
-        for name in inspect.signature(function).parameters
-    ]
-    typed.__signature__ = inspect.Signature(plain)  # type: ignore[attr-defined]
-    overload(function, jit_options=_CALLED_BY_KERNELS | {"forceinline": absorb})(typed)
+    choose_body(function, choose, _CALLED_BY_KERNELS | {"forceinline": absorb})
