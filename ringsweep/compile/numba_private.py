@@ -145,8 +145,8 @@ if AVAILABLE:
     class _NoReferenceCounts(NRTContext):
         """References to arrays are not counted.
 
-        A kernel holds its arrays while its callees run. Each count would be a call, for which LLVM moves all numbers from
-        registers to memory.
+        A kernel holds its arrays while its callees run. Each count would be a call, for which LLVM moves all numbers
+        from registers to memory.
         """
 
         def get_meminfos(self, builder: Any, ty: Any, val: Any) -> Any:

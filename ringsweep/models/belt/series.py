@@ -32,7 +32,7 @@ from ringsweep.physics.friction.velocity import (
 )
 
 # Rows of the table of series; the guards are last.
-X, V, VELOCITY, FORCE, SHIFT, FACTORS = range(6)
+X, V, VELOCITY, FORCE, SHIFT, SPARE, FACTORS = range(7)
 SLOW, FAST = FACTORS + FACTOR_ROWS, FACTORS + FACTOR_ROWS + 1
 
 
@@ -225,9 +225,9 @@ def _extremes(scene, record, mode, c, h, work):
         count = crossings(c[VELOCITY], h, work, count)
     if mode.sign != 0:
         # The velocity has an extreme where the net force vanishes.
-        for k in range(ORDER + 1):
-            c[EXCESS, k] = scene.stiffness * c[X, k] + c[FORCE, k]
-        count = crossings(c[EXCESS], h, work, count)
+        c[SPARE, 0] = scene.stiffness * c[X, 0] + c[FORCE, 0]
+        set_terms(c[SPARE], terms(c[X]) * scene.stiffness + terms(c[FORCE]))
+        count = crossings(c[SPARE], h, work, count)
     return count
 
 
