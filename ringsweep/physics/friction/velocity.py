@@ -345,7 +345,7 @@ def exponential_weights(alpha, x, lasts):
     q, decays = 0.0 * x, lasts & (x >= 0.0)
     # Often no run is in the tail.
     if any_of(decays):
-        q = select(decays, decay(alpha * x), 0.0)
+        q = select(decays, decay(alpha * x), q)
     return q, 1.0 - q, -alpha * q, alpha * q
 
 
