@@ -273,7 +273,9 @@ def _integrate(
                     parts = 1 if is_implicit else int(s / spacing) + 1
                     for part in range(0 if just_switched else 1, parts + 1):
                         state = y if part == 0 else y_next
-                        count = _store_row(scene, mode, is_implicit, c, t, s * part / parts, state, times, table, count)
+                        # Rounded otherwise, the end of a mode would not be the instant at which the next one begins.
+                        at = s if part == parts else s * part / parts
+                        count = _store_row(scene, mode, is_implicit, c, t, at, state, times, table, count)
                 just_switched = guard >= 0 or (just_switched and s == 0.0)
             if audited and s > 0.0 and is_checked(n):
                 audit = audit_step(
