@@ -107,9 +107,10 @@ def attributes(config: Config) -> dict[str, Any]:
 
 def _digest(*arrays: Any) -> str:
     digest = hashlib.sha256()
-    for array in arrays:
-        # As lists: equal names must have equal digests, whatever the width of their array.
-        digest.update(json.dumps(np.asarray(array).tolist()).encode())
+    for array in map(np.asarray, arrays):
+        # Names as a list: equal names must have equal digests, whatever the width of their array.
+        numeric = array.dtype.kind in "fiu"
+        digest.update(array.astype("<f8").tobytes() if numeric else json.dumps(array.tolist()).encode())
     return digest.hexdigest()[:12]
 
 
