@@ -55,10 +55,12 @@ def family(side: int) -> list[Cell]:
     return [(float(a), float(h)) for a in amplitudes for h in half_angles]
 
 
-def configure(scene: Mapping[str, Any], points: Mapping[str, Sequence[float]], method: str, **options: Any) -> Any:
-    """Configuration of a sweep over points. It has no certificates: they cost a second run, and peers have none."""
+def configure(
+    scene: Mapping[str, Any], axes: Mapping[str, Sequence[float]], method: str, *, kind: str = "points", **options: Any
+) -> Any:
+    """Configuration of a sweep over points or a grid. It has no certificates: they cost a second run."""
     solver = {"method": method, "certify": False, **options}
-    return config.load({"scene": scene, "solver": solver, "sweep": {"points": points}})
+    return config.load({"scene": scene, "solver": solver, "sweep": {kind: axes}})
 
 
 def bare(configuration: Any) -> Callable[[], Result]:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from hypothesis import settings
+from xdist.scheduler import LoadScopeScheduling
 
 from ringsweep.config import load
 from ringsweep.models import MODELS, batch, parameters
@@ -18,11 +19,21 @@ settings.register_profile("ringsweep", deadline=None, derandomize=True)
 settings.load_profile("ringsweep")
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Run the tests of a file in one process, since they share kernels and fixtures; but each notebook on its own."""
-    for item in items:
-        alone = item.path.name == "test_notebooks.py"
-        item.add_marker(pytest.mark.xdist_group(item.name if alone else item.path.name))
+class ByFile(LoadScopeScheduling):
+    """Runs the tests of a file in one process, since they share kernels and fixtures; but each notebook on its own.
+
+    The groups of ``--dist loadgroup`` have no effect from pytest 9.2 on: xdist 3.8 writes them where pytest no longer
+    reads.
+    """
+
+    def _split_scope(self, nodeid: str) -> str:
+        file = nodeid.split("::")[0]
+        return nodeid if file.endswith("test_notebooks.py") else file
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> ByFile:
+    """Scheduler of the processes."""
+    return ByFile(config, log)
 
 
 #: Values of the rig by path, with the friction of Figs. 29 and 30.

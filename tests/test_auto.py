@@ -13,6 +13,7 @@ from ringsweep.models import batch, parameters
 from ringsweep.models.scene import Structure
 from ringsweep.quantities.variables import FAILED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 from ringsweep.solvers import event
+from ringsweep.solvers.automaton import PATIENCE
 from ringsweep.solvers.event import Auto, Event, Implicit
 from ringsweep.solvers.rk4 import RK4
 
@@ -312,6 +313,18 @@ class TestTime:
         assert found.certified
         assert 500 < found.reversals < 2000
         assert 0.9e4 < found.stick_time < 1e4
+
+    def test_run_of_more_than_a_million_steps_is_computed(self, cells):
+        """The ring carries the body up and drops it, thousands of times."""
+        found = solve(Auto(certify=False), cells({"drive.amplitude": 0.7, "time.span": 1.2e4}, drive="arctan"))
+        assert found.steps > 1e6
+        assert found.t_end == 1.2e4
+        assert found.regime == OSCILLATORY
+
+    def test_run_that_would_not_end_within_its_steps_is_given_up_early(self, cells):
+        found = solve(Auto(), cells({"drive.amplitude": 0.7, "time.span": 1e8}, drive="arctan"))
+        assert (found.regime, found.certified) == (FAILED, 0)
+        assert found.steps == PATIENCE
 
     def test_drive_with_infinite_initial_acceleration_is_symmetric_and_converged(self, scenes):
         """The run with the opposite drive is its mirror image, and a tighter tolerance gives the same run."""

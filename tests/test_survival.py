@@ -5,7 +5,9 @@ import json
 import os
 import shutil
 import signal
+import threading
 from contextlib import contextmanager
+from itertools import takewhile
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ import ringsweep
 from benchmarks.kills import POINTS, killed_at, same_bits
 from ringsweep import cli
 from ringsweep.config import load
+from ringsweep.runs.executors import Threads
 from ringsweep.runs.sweep import write
 from ringsweep.runs.task_sizes import TaskSizes
 from ringsweep.storage import netcdf
@@ -48,6 +51,23 @@ def never_stopped(config):
 def small_tasks(monkeypatch):
     """Limit tasks to three cells, so that a small sweep has many tasks."""
     monkeypatch.setattr(TaskSizes, "max_cells", 3)
+
+
+def test_thread_that_fails_stops_the_others_and_no_result_before_is_lost():
+    stopped, found = threading.Event(), []
+    tasks = takewhile(lambda _: not stopped.is_set(), (np.array([k]) for k in range(1_000_000)))
+
+    def compute(task):
+        if task[0] == 5:
+            raise ValueError("the fifth task")
+        return int(task[0])
+
+    results = Threads(2).results(compute, tasks, lambda result: result, stopped)
+    with pytest.raises(ValueError, match="the fifth task"):
+        found.extend(results)
+    assert {0, 1, 2, 3, 4} <= set(found)
+    assert 5 not in found
+    assert len(found) < 1_000_000
 
 
 class Stopped(BaseException):

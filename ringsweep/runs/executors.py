@@ -8,6 +8,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from queue import SimpleQueue
 from typing import Any, Protocol, TypeVar
 
 import joblib
@@ -74,15 +75,47 @@ class Threads:
         learn: Callable[[Result], Result],
         stopped: threading.Event,
     ) -> Iterator[Result]:
-        """Results in the order in which they are finished; see :class:`Executor`."""
-        parallel = joblib.Parallel(n_jobs=self._jobs, prefer="threads", return_as="generator_unordered")
+        """Results in the order in which they are finished; see :class:`Executor`.
 
-        # joblib takes the next task before it hands over this result.
-        def compute_and_learn(task: Positions) -> Result:
-            return learn(compute(task))
+        A thread that fails stops the others after their tasks; its error is raised when their results are handed over.
+        """
+        if self._jobs == 1:
+            yield from (learn(compute(task)) for task in tasks)
+            return
+        found: SimpleQueue[Result | BaseException | None] = SimpleQueue()
+        lock = threading.Lock()
 
-        found: Iterator[Result] = parallel(joblib.delayed(compute_and_learn)(task) for task in tasks)
-        return found
+        def work() -> None:
+            try:
+                while True:
+                    with lock:
+                        task = next(tasks, None)
+                    if task is None:
+                        break
+                    result = compute(task)
+                    with lock:
+                        learn(result)
+                    found.put(result)
+            except BaseException as error:
+                stopped.set()
+                found.put(error)
+            found.put(None)
+
+        # Daemons, so that a second Ctrl-C need not wait for their tasks.
+        threads = [threading.Thread(target=work, daemon=True) for _ in range(self._jobs)]
+        for thread in threads:
+            thread.start()
+        working, failure = len(threads), None
+        while working:
+            item = found.get()
+            if item is None:
+                working -= 1
+            elif isinstance(item, BaseException):
+                failure = failure or item
+            else:
+                yield item
+        if failure is not None:
+            raise failure
 
 
 def executor(jobs: int | None, scheduler: str | None) -> AbstractContextManager[Executor]:

@@ -31,7 +31,7 @@ class TaskSizes:
     """
 
     #: Bounds on the seconds of a task; the last bound holds towards the end.
-    min_seconds, max_seconds, last_seconds = 0.1, 2.0, 0.02
+    min_seconds, max_seconds, last_seconds = 0.1, 2.0, 0.005
     max_cells = CHUNK
 
     def __init__(self, side_by_side: int, workers: Callable[[], int]):

@@ -25,6 +25,9 @@ from ringsweep.solvers.taylor import series_step
 # A run ends after this many consecutive steps and events at one instant.
 _MOST_STALLED = 400
 
+#: A run is given up if, at the pace of so many steps, it would exceed its largest number of steps.
+PATIENCE = 1_000_000
+
 
 @hook
 def _step(family, scene, record, mode, t, y, control, h_max, tolerances, c, first, work, stages, samples):
@@ -184,7 +187,8 @@ def integrate(batch, tolerances, max_steps, rows, steps, audits, spacing, times,
         Relative error allowed to a step of the series, and to an implicit step. It applies to 1 rad, and to the
         velocity at 1 rad/s + \\|omega\\| or at the width of the stiction band.
     max_steps : int
-        Steps after which a run is given up as failed.
+        Steps after which a run is given up as failed. It is given up before if :data:`PATIENCE` steps gain so little
+        time that it would not end within `max_steps`.
     rows : ndarray of shape ``(cells, outcomes)``
         Filled with outcomes. It may have no columns.
     steps : ndarray of shape ``(cells,)``
@@ -238,6 +242,7 @@ def _integrate(
         audit, guard_fall_rate = Audit(0.0, 0.0, 0.0), 0.0
         n = stalled = 0
         t_before = -1.0
+        t_judged, least_gain = t, scene.span * (PATIENCE / max_steps)
         just_switched = True
         is_implicit = False
         while status == RUNNING:
@@ -246,6 +251,12 @@ def _integrate(
             if n == max_steps or stalled == _MOST_STALLED:
                 status = modes.status_when_stalled(scene, mode, t, y) if stalled == _MOST_STALLED else BROKEN
                 break
+            if n > 0 and n % PATIENCE == 0:
+                # NaN is no gain either.
+                if not t - t_judged >= least_gain:
+                    status = BROKEN
+                    break
+                t_judged = t
             t_before = t
             n += 1
             h_max = min(scene.span, next_knot(scene.drive, t)) - t

@@ -16,11 +16,13 @@ from ringsweep.models.scene import Structure
 from ringsweep.physics import drives
 from ringsweep.physics.friction import LAWS, Dynamic, SetValued, Smooth, family_of, presliding, velocity
 from ringsweep.quantities.parameters import Parameter
-from ringsweep.solvers.automaton import integrate
+from ringsweep.quantities.variables import FAILED
+from ringsweep.solvers.automaton import PATIENCE, integrate
 from ringsweep.solvers.certificate import certifiable, errors, took_same_steps, with_errors
 from ringsweep.solvers.method import Method, Needs, Result
 
 LIMIT = Parameter("1", "steps after which a run is given up as failed", lower=1, upper=1e10)
+_MOST_STEPS = 100_000_000
 
 #: The second run of a certificate has a tolerance that is looser by this factor. A cell without a certificate is run
 #: again with a tolerance that is tighter by this factor, at most _MOST_RETRIES times.
@@ -46,7 +48,7 @@ class _Piecewise(Method):
     """Largest error of a run, in units of its difference from the run at the looser tolerance; the median is 1/50."""
 
     rtol: float
-    max_steps: int = 1_000_000
+    max_steps: int = _MOST_STEPS
     certify: bool = True
 
     def needs(self, structure: Structure) -> Needs:
@@ -90,8 +92,7 @@ class _Piecewise(Method):
         if not self.certify:
             return Result(rows, steps=steps, certified=certified)
         bounds = np.full((len(rows), len(with_errors(outcomes))), np.nan)
-        # Runs that reached the largest number of steps are not repeated.
-        open_cells = np.flatnonzero(steps < self.max_steps)
+        open_cells = np.flatnonzero(~self._given_up(rows, steps, outcomes))
         if not len(open_cells):
             return Result(rows, steps=steps, certified=certified, errors=bounds)
         second_rows, more_steps, _ = replace(self, rtol=self.rtol * FACTOR).integrate(
@@ -114,10 +115,17 @@ class _Piecewise(Method):
             certified[open_cells] = self._certified(cells, finer_rows, rows[open_cells], audits, outcomes)
             bounds[open_cells] = finer._errors(batch, finer_rows, rows[open_cells], more_steps, outcomes)
             steps[open_cells] += more_steps
-            finished = more_steps < self.max_steps
+            finished = ~self._given_up(finer_rows, more_steps, outcomes)
             rows[open_cells[finished]] = finer_rows[finished]
             open_cells = open_cells[finished]
         return Result(rows, steps=steps, certified=certified, errors=bounds)
+
+    def _given_up(
+        self, rows: NDArray[np.float64], steps: NDArray[np.float64], outcomes: tuple[str, ...]
+    ) -> NDArray[np.bool_]:
+        """Whether each run was given up because of its many steps. Such a run is not repeated."""
+        failed: NDArray[np.bool_] = rows[:, outcomes.index("regime")] == FAILED
+        return failed & (steps >= min(self.max_steps, PATIENCE))
 
     @staticmethod
     def _certified(
@@ -192,7 +200,7 @@ class Event(_Piecewise):
     safety: ClassVar[float] = 0.7
 
     rtol: Annotated[float, Parameter("1", "error allowed to a step", lower=1e-15, upper=1e-3)] = 1e-10
-    max_steps: Annotated[int, LIMIT] = 1_000_000
+    max_steps: Annotated[int, LIMIT] = _MOST_STEPS
     certify: bool = True
 
     def tolerances(self) -> tuple[float, float]:
@@ -209,7 +217,7 @@ class Implicit(_Piecewise):
     safety: ClassVar[float] = 1.5
 
     rtol: Annotated[float, Parameter("1", "error allowed to a step", lower=1e-13, upper=1e-3)] = 3e-6
-    max_steps: Annotated[int, LIMIT] = 1_000_000
+    max_steps: Annotated[int, LIMIT] = _MOST_STEPS
     certify: bool = True
 
     def tolerances(self) -> tuple[float, float]:
@@ -225,7 +233,7 @@ class Auto(Method):
 
     name: ClassVar[str] = "auto"
 
-    max_steps: Annotated[int, LIMIT] = 1_000_000
+    max_steps: Annotated[int, LIMIT] = _MOST_STEPS
     certify: bool = True
 
     def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:

@@ -20,12 +20,15 @@ from ringsweep.config import Config
 from ringsweep.models import MODELS
 from ringsweep.models.scene import LAW
 
+# Reading the metadata of a package takes milliseconds.
+_version = cache(version)
+
 
 @cache
 def environment() -> dict[str, str]:
     """Versions that determine the bits of a result."""
-    return {"ringsweep": version("ringsweep"), "sources": SOURCES_DIGEST} | {
-        name: version(name) for name in ("numba", "llvmlite", "numpy", "scipy")
+    return {"ringsweep": _version("ringsweep"), "sources": SOURCES_DIGEST} | {
+        name: _version(name) for name in ("numba", "llvmlite", "numpy", "scipy")
     }
 
 
@@ -81,15 +84,15 @@ def differences(old: Mapping[str, str], new: Mapping[str, str]) -> str:
 def attributes(config: Config) -> dict[str, Any]:
     """Attributes of a result. They are enough to compute it again."""
     model = MODELS[config.scene.structure.model]
-    versions = {"python": platform.python_version(), **environment(), "xarray": version("xarray")}
+    versions = {"python": platform.python_version(), **environment(), "xarray": _version("xarray")}
     digest = versions.pop("sources")
     methods = {law: config.solver.resolved(structure) for law, structure in config.scene.structures.items()}
     options = {law: {"method": method.name, **dataclasses.asdict(method)} for law, method in methods.items()}
     return {
         "Conventions": "CF-1.11",
         "title": f"ringsweep: {model.doc}",
-        "source": f"ringsweep {version('ringsweep')}",
-        "ringsweep_version": version("ringsweep"),
+        "source": f"ringsweep {_version('ringsweep')}",
+        "ringsweep_version": _version("ringsweep"),
         "ringsweep_sources": digest,
         "fingerprint": fingerprint(identity(config)),
         "versions": json.dumps(versions),
@@ -104,9 +107,10 @@ def attributes(config: Config) -> dict[str, Any]:
 
 def _digest(*arrays: Any) -> str:
     digest = hashlib.sha256()
-    for array in arrays:
-        # As lists: equal names must have equal digests, whatever the width of their array.
-        digest.update(json.dumps(np.asarray(array).tolist()).encode())
+    for array in map(np.asarray, arrays):
+        # Names as a list: equal names must have equal digests, whatever the width of their array.
+        numeric = array.dtype.kind in "fiu"
+        digest.update(array.astype("<f8").tobytes() if numeric else json.dumps(array.tolist()).encode())
     return digest.hexdigest()[:12]
 
 
