@@ -9,7 +9,8 @@ from solutions import HISTORY, solve
 import ringsweep
 from ringsweep.compile import take
 from ringsweep.models import MODELS
-from ringsweep.models.interface import audit, implicit, modes
+from ringsweep.models.interface import audit, modes
+from ringsweep.physics import drives
 from ringsweep.quantities.variables import FAILED, JAMMED, RESTING, SEPARATING
 from ringsweep.solvers import audit as run_audit
 from ringsweep.solvers import event
@@ -234,7 +235,7 @@ class TestLaw:
         scene = take(self.scene(cells, law), 0)
         t, y = modes.initial_state(scene)
         _, mode = modes.initial_mode(scene, t, y)
-        forcing = implicit.forcing(scene, 0.0)
+        forcing = drives.turn(scene.drive, 0.0)
 
         def violation(mode):
             return audit.violation(scene, mode, forcing, y, (0.0, 0.0), 0.1, 1e-10)[0]

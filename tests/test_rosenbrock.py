@@ -111,22 +111,21 @@ class Kaps(NamedTuple):
         return exp(-2 * t) + sin(t), exp(-t)
 
 
-@implicit.forcing.implements(Kaps)
-def _forcing(scene, t):
+def _forcing(t):
     return sin(t), cos(t)
 
 
 @implicit.rates.implements(Kaps)
-def _rates(scene, mode, forcing, x):
+def _rates(scene, mode, common, forcing, x):
     (shift, rate), k = forcing, scene.stiffness
     fast, slow = x[0] - shift, x[1]
     return -(k + 2) * fast + k * slow * slow + rate, fast - slow - slow * slow
 
 
 @implicit.linearise.implements(Kaps)
-def _linearise(scene, mode, t, x):
+def _linearise(scene, mode, common, t, forcing, x):
     k, slow = scene.stiffness, x[1]
-    rates = _rates(scene, mode, _forcing(scene, t), x)
+    rates = _rates(scene, mode, common, forcing, x)
     return rates, (-(k + 2), 2 * k * slow, 1.0, -1 - 2 * slow), (), ((k + 2) * cos(t) - sin(t), -cos(t))
 
 
@@ -139,36 +138,37 @@ class ProtheroRobinson(NamedTuple):
         return sin(t), exp(-t)
 
 
-@implicit.forcing.implements(ProtheroRobinson)
-def _prothero_robinson_forcing(scene, t):
-    return sin(t), cos(t)
-
-
 @implicit.rates.implements(ProtheroRobinson)
-def _prothero_robinson_rates(scene, mode, forcing, x):
+def _prothero_robinson_rates(scene, mode, common, forcing, x):
     deviation = x[0] - forcing[0]
     return -scene.stiffness * deviation + forcing[1], deviation - x[1]
 
 
 @implicit.linearise.implements(ProtheroRobinson)
-def _prothero_robinson_linearise(scene, mode, t, x):
+def _prothero_robinson_linearise(scene, mode, common, t, forcing, x):
     k = scene.stiffness
-    rates = _prothero_robinson_rates(scene, mode, _prothero_robinson_forcing(scene, t), x)
+    rates = _prothero_robinson_rates(scene, mode, common, forcing, x)
     return rates, (-k, 0.0, 1.0, -1.0), (), (k * cos(t) - sin(t), -cos(t))
+
+
+def step(scene, t, x, h, bends):
+    """One step of length `h` from the state `x` at time `t`."""
+    linear = implicit.linearise(scene, None, (), t, _forcing(t), x)
+    forcings = tuple(_forcing(t + fraction * h) for fraction in rosenbrock.STAGE_TIMES)
+    return rosenbrock.step(x, scene, None, (), linear, h, forcings, bends)
 
 
 def integrate(scene, steps, end=1.0):
     """Error at the end, largest error of the dense output within a step, and largest error estimate."""
-    step, dense = rosenbrock.step, rosenbrock.dense
-    stages = np.empty((STAGES, 2))
+    dense, bends = rosenbrock.dense, np.empty((3, 2))
     h = end / steps
     state = scene.solution(0.0)
     within = estimate = 0.0
     for n in range(steps):
         t = n * h
-        after, error = step(scene, None, t, state, implicit.linearise(scene, None, t, state), h, stages)
+        after, error = step(scene, t, state, h, bends)
         for fraction in (0.3, 0.5, 0.8):
-            found = dense(state, after, stages, fraction)
+            found = dense(state, after, bends, fraction)
             within = max(within, distance(found, scene.solution(t + fraction * h)))
         estimate = max(estimate, abs(error[0]), abs(error[1]))
         state = after
@@ -193,14 +193,26 @@ class TestLinearSystem:
         for decay in (1.0, 1e6, 1e12):
             block, couplings = rng.normal(size=4), rng.normal(size=(count, 3))
             couplings[:, 2] = -decay * abs(couplings[:, 2])
-            right, found, shift = rng.normal(size=2 + count), np.empty(2 + count), 3.0
+            right, shift = rng.normal(size=2 + count), 3.0
             jacobian = np.zeros((2 + count, 2 + count))
             jacobian[:2, :2] = block.reshape(2, 2)
             jacobian[1, 2:], jacobian[2:, 1] = couplings[:, 0], couplings[:, 1]
             jacobian[range(2, 2 + count), range(2, 2 + count)] = couplings[:, 2]
-            rosenbrock.solve(tuple(map(tuple, couplings)), tuple(block), shift, tuple(right), found)
+            bristles = tuple(map(tuple, couplings))
+            factors = rosenbrock.factorise(bristles, tuple(block), shift)
+            found = rosenbrock.solve(bristles, factors, tuple(right))
             expected = np.linalg.solve(shift * np.eye(2 + count) - jacobian, right)
             np.testing.assert_allclose(found, expected, rtol=1e-11)
+
+
+class TestDenseOutput:
+    def test_rates_are_the_derivative_of_the_dense_output(self):
+        rng = np.random.default_rng(0)
+        before, after, bends, h, e = (1.0, 2.0), (1.5, 1.0), rng.normal(size=(3, 2)), 0.2, 1e-6
+        for fraction in (0.0, 0.3, 0.8, 1.0):
+            ahead, behind = (rosenbrock.dense(before, after, bends, fraction + side * e) for side in (1, -1))
+            found = rosenbrock.dense_rates(before, after, bends, fraction, h)
+            np.testing.assert_allclose(found, np.subtract(ahead, behind) / (2 * e * h), rtol=1e-8, atol=1e-8)
 
 
 class TestOrder:
@@ -229,8 +241,6 @@ class TestOrder:
     def test_state_off_the_slow_manifold_is_on_it_after_one_step(self):
         """The state is off the manifold by 1; the step is 1e6 relaxation times long."""
         scene = Kaps(1e8)
-        stages = np.empty((STAGES, 2))
         start = (1.0 + scene.solution(0.0)[0], 1.0)
-        linear = implicit.linearise(scene, None, 0.0, start)
-        (x, y), _ = rosenbrock.step(scene, None, 0.0, start, linear, 0.01, stages)
+        (x, y), _ = step(scene, 0.0, start, 0.01, np.empty((3, 2)))
         assert x - sin(0.01) == pytest.approx(y * y, abs=1e-4)

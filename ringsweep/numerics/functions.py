@@ -22,7 +22,7 @@ import numpy as np
 from numba.core import types
 from numba.extending import intrinsic
 
-from ringsweep.compile import specialise
+from ringsweep.compile import inlined, specialise
 from ringsweep.numerics.lanes import LANES, MASK, VECTOR, WIDTH, WORDS, llvm_function
 
 
@@ -222,6 +222,38 @@ def _lanes_sine_cosine_near(x, x_0, sine, cosine):
         sine, cosine = sine_cosine(x)
         a, b = _select(far, sine, a), _select(far, cosine, b)
     return a, b
+
+
+# Within this distance the truncation error of the series of sine and cosine is below rounding, rad.
+_CLOSE = 0.1
+
+
+@inlined
+def sine_cosine_from(x, x_0, sine, cosine):
+    """Sine and cosine of the float `x`, given `sine` and `cosine` of a number `x_0`: fast if the two are close."""
+    r = x - x_0
+    if not abs(r) < _CLOSE:
+        return math.sin(x), math.cos(x)
+    s = r * r
+    sine_r = r + r * s * (-1 / 6 + s * (1 / 120 + s * (-1 / 5040 + s * (1 / 362880))))
+    less = s * (-1 / 2 + s * (1 / 24 + s * (-1 / 720 + s * (1 / 40320))))
+    # The cosine of r is 1 + less.
+    return sine + (sine * less + cosine * sine_r), cosine + (cosine * less - sine * sine_r)
+
+
+#: Largest angle that :func:`rotated` takes, rad.
+ROTATED = 0.004
+
+
+@inlined
+def rotated(sine, cosine, r):
+    """Sine and cosine of the sum of an angle, given by its `sine` and `cosine`, and of `r`, at most ROTATED, rad."""
+    return (
+        sine
+        + r * (cosine - r * (1 / 2) * (sine + r * (1 / 3) * (cosine - r * (1 / 4) * (sine + r * (1 / 5) * cosine)))),
+        cosine
+        - r * (sine + r * (1 / 2) * (cosine - r * (1 / 3) * (sine + r * (1 / 4) * (cosine - r * (1 / 5) * sine)))),
+    )
 
 
 def opposing(x, v):

@@ -7,7 +7,7 @@ rad.
 
 from __future__ import annotations
 
-from math import atan, cos, inf, log1p, pi, sin
+from math import atan, cos, exp, inf, log, log1p, pi, sin
 from typing import Annotated, Any, NamedTuple
 
 from ringsweep.compile import hook, inlined, lacking
@@ -339,6 +339,91 @@ def _table_jerk(drive, t):
     return 6.0 * drive.amplitude * drive.coefficients[_piece(drive.knots, t)][0]
 
 
+#: Highest power of the series of a drive about a recent time.
+COURSE_ORDER = 12
+
+#: Length of an array that holds such a series: its centre and its reach, s, then the coefficients of :func:`expand`.
+COURSE_LENGTH = COURSE_ORDER + 3
+
+
+@inlined
+def new_course(course):
+    """Empty a course, so that a run depends on no other run."""
+    course[0] = course[1] = inf
+
+
+@inlined
+def follow(drive, course, t, h):
+    """Prepare a course for a step: :func:`turn_near` then takes the series at most times of the step, if it converges.
+
+    Parameters
+    ----------
+    drive : NamedTuple
+    course : ndarray of shape ``(COURSE_LENGTH,)``
+        Series of the drive about a recent time; see :func:`new_course`.
+    t, h : float
+        Time at the beginning of the step, and length of the step, s.
+    """
+    centre, reach = course[0], course[1]
+    if t >= centre and t + h <= centre + reach:
+        return
+    # A series that serves a small part of a long step is not worth its coefficients. The reach may have grown since.
+    if h <= 2.0 * reach or t > 2.0 * centre:
+        expand(drive, t, COURSE_ORDER, course[2:])
+        course[0], course[1] = t, min(_reach(course), next_knot(drive, t) - t)
+
+
+@inlined
+def _reach(course):
+    """Time within which the truncation error of the acceleration is below its rounding, s."""
+    # Coefficients of the acceleration: the first two, and the last two.
+    n = COURSE_ORDER
+    first, second = 2.0 * abs(course[4]), 6.0 * abs(course[5])
+    reach = inf
+    for k in (n - 1, n):
+        last = k * (k - 1.0) * abs(course[k + 2])
+        if last != 0.0:
+            by_first, by_second = 2.0**-54 * first / last, 2.0**-54 * second / last
+            # The acceleration itself may pass through zero; then its rate gives the scale.
+            found = exp(log(by_first) / (k - 2.0)) if by_first > 0.0 else 0.0
+            reach = min(reach, max(found, exp(log(by_second) / (k - 3.0)) if by_second > 0.0 else 0.0))
+    return reach
+
+
+@hook(optional=True)
+def turn_near(drive, course, t):
+    """What :func:`turn` returns, but faster where the series of a course reaches.
+
+    Parameters
+    ----------
+    drive : NamedTuple
+    course : ndarray of shape ``(COURSE_LENGTH,)``
+        See :func:`follow`.
+    t : float
+        Time, s.
+
+    Returns
+    -------
+    tuple of float
+        As for :func:`turn`; equal to it but for rounding.
+    """
+    s = t - course[0]
+    if not 0.0 <= s <= course[1]:
+        return turn(drive, t)
+    theta, omega, half_epsilon = course[COURSE_ORDER + 2], 0.0, 0.0
+    for k in range(COURSE_ORDER + 1, 1, -1):
+        half_epsilon = half_epsilon * s + omega
+        omega = omega * s + theta
+        theta = theta * s + course[k]
+    return theta, omega, 2.0 * half_epsilon
+
+
+@turn_near.implements(Still, Constant, Table)
+def _turn_itself(drive, course, t):
+    # These drives are as fast as a series.
+    return turn(drive, t)
+
+
 @hook(optional=True)
 def beginning(drive):
     """First time at which the drive has a Taylor series, s. By default 0; later if the drive is singular at 0."""
@@ -414,7 +499,7 @@ def velocity_at_beginning(drive, velocity):
 
 #: Functions of a drive that methods with a constant step need, and those that the other methods need.
 CONSTANT_STEP_MEMBERS = (shape, turn, lookup)
-MEMBERS = (turn, expand, jerk, next_knot, beginning, top_speed)
+MEMBERS = (turn, expand, jerk, next_knot, turn_near, beginning, top_speed)
 
 #: Drives by the name that the configuration gives them.
 DRIVES: dict[str, type] = {

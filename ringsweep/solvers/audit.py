@@ -9,6 +9,7 @@ from ringsweep.compile import hook, inlined
 from ringsweep.models.interface import audit as audit_of_model
 from ringsweep.models.interface import implicit, series
 from ringsweep.numerics.series import slope
+from ringsweep.physics import drives
 from ringsweep.physics.friction import Dynamic, SetValued, Smooth
 from ringsweep.solvers import rosenbrock
 
@@ -73,8 +74,8 @@ def _audit_series_step(scene, mode, c, t, s, y, y_next, tolerance, audit):
     first = _violation_in_series_step(scene, mode, c, t, s, tolerance, EARLY * s)
     second = _violation_in_series_step(scene, mode, c, t, s, tolerance, LATE * s)
     energy_before, energy_after = (
-        audit_of_model.energy(scene, implicit.forcing(scene, t), y),
-        audit_of_model.energy(scene, implicit.forcing(scene, t + s), y_next),
+        audit_of_model.energy(scene, drives.turn(scene.drive, t), y),
+        audit_of_model.energy(scene, drives.turn(scene.drive, t + s), y_next),
     )
     return _audit_after(audit, first, second, energy_before, energy_after, s)
 
@@ -82,43 +83,45 @@ def _audit_series_step(scene, mode, c, t, s, y, y_next, tolerance, audit):
 @inlined
 def _violation_in_series_step(scene, mode, c, t, s, tolerance, s_check):
     state, rates = series.state_at(scene, c, s_check), series.rates_at(scene, c, s_check)
-    return audit_of_model.violation(scene, mode, implicit.forcing(scene, t + s_check), state, rates, s, tolerance)
+    return audit_of_model.violation(scene, mode, drives.turn(scene.drive, t + s_check), state, rates, s, tolerance)
 
 
 @inlined
-def _audit_implicit_step(scene, mode, t, s, y, y_next, stages, tolerance, audit):
+def _audit_implicit_step(scene, mode, t, s, y, y_next, course, bends, tolerance, audit):
     """Audit after an implicit step of length `s` from the state `y` at time `t` to the state `y_next`."""
-    before, after = implicit.forcing(scene, t), implicit.forcing(scene, t + s)
+    before, after = implicit.forcing(scene, course, t), implicit.forcing(scene, course, t + s)
     x, x_next = implicit.to_implicit(scene, before, y), implicit.to_implicit(scene, after, y_next)
-    first = _violation_in_implicit_step(scene, mode, t, s, x, x_next, stages, tolerance, EARLY)
-    second = _violation_in_implicit_step(scene, mode, t, s, x, x_next, stages, tolerance, LATE)
+    first = _violation_in_implicit_step(scene, mode, t, s, x, x_next, course, bends, tolerance, EARLY)
+    second = _violation_in_implicit_step(scene, mode, t, s, x, x_next, course, bends, tolerance, LATE)
     return _audit_after(
         audit, first, second, audit_of_model.energy(scene, before, y), audit_of_model.energy(scene, after, y_next), s
     )
 
 
 @inlined
-def _violation_in_implicit_step(scene, mode, t, s, x, x_next, stages, tolerance, fraction):
-    forcing = implicit.forcing(scene, t + fraction * s)
-    state = implicit.from_implicit(scene, forcing, rosenbrock.dense(x, x_next, stages, fraction))
+def _violation_in_implicit_step(scene, mode, t, s, x, x_next, course, bends, tolerance, fraction):
+    forcing = implicit.forcing(scene, course, t + fraction * s)
+    state = implicit.from_implicit(scene, forcing, rosenbrock.dense(x, x_next, bends[0], fraction))
     return audit_of_model.violation(
-        scene, mode, forcing, state, rosenbrock.dense_rates(x, x_next, stages, fraction, s), s, tolerance
+        scene, mode, forcing, state, rosenbrock.dense_rates(x, x_next, bends[0], fraction, s), s, tolerance
     )
 
 
 @inlined
-def _fall_rate_in_implicit_step(scene, mode, t, s, y, y_next, stages, guard):
+def _fall_rate_in_implicit_step(scene, mode, t, s, y, y_next, course, bends, guard):
     """Rate at which a guard falls at the end of an implicit step, in its unit per second."""
+    before, late = implicit.forcing(scene, course, t), implicit.forcing(scene, course, t + 0.9 * s)
     x, x_next = (
-        implicit.to_implicit(scene, implicit.forcing(scene, t), y),
-        implicit.to_implicit(scene, implicit.forcing(scene, t + s), y_next),
+        implicit.to_implicit(scene, before, y),
+        implicit.to_implicit(scene, implicit.forcing(scene, course, t + s), y_next),
     )
-    view = implicit.guards_and_motion(scene, mode, t + 0.9 * s, rosenbrock.dense(x, x_next, stages, 0.9))
+    state = rosenbrock.dense(x, x_next, bends[0], 0.9)
+    view = implicit.guards_and_motion(scene, mode, implicit.common(scene, mode, before, x), late, state)
     return view[0][guard] / (0.1 * s)
 
 
 @hook
-def audit_step(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerance, audit):
+def audit_step(family, scene, mode, is_implicit, c, t, s, y, y_next, course, bends, tolerance, audit):
     """Audit after a step.
 
     Parameters
@@ -134,8 +137,8 @@ def audit_step(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, tol
         Time at the beginning of the step, and length of the step, s.
     y, y_next : tuple of float
         States at both ends of the step.
-    stages : ndarray of shape ``(STAGES, components)``
-        Stages of the step, if it is implicit.
+    course, bends : ndarray
+        As in :func:`ringsweep.solvers.creep.implicit_step`, if the step is implicit.
     tolerance : float
         Tolerance of the series.
     audit : Audit
@@ -148,24 +151,24 @@ def audit_step(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, tol
 
 
 @audit_step.implements(SetValued)
-def _audit_by_series(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerance, audit):
+def _audit_by_series(family, scene, mode, is_implicit, c, t, s, y, y_next, course, bends, tolerance, audit):
     return _audit_series_step(scene, mode, c, t, s, y, y_next, tolerance, audit)
 
 
 @audit_step.implements(Smooth)
-def _audit_by_either(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerance, audit):
+def _audit_by_either(family, scene, mode, is_implicit, c, t, s, y, y_next, course, bends, tolerance, audit):
     if is_implicit:
-        return _audit_implicit_step(scene, mode, t, s, y, y_next, stages, tolerance, audit)
+        return _audit_implicit_step(scene, mode, t, s, y, y_next, course, bends, tolerance, audit)
     return _audit_series_step(scene, mode, c, t, s, y, y_next, tolerance, audit)
 
 
 @audit_step.implements(Dynamic)
-def _audit_by_implicit(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerance, audit):
-    return _audit_implicit_step(scene, mode, t, s, y, y_next, stages, tolerance, audit)
+def _audit_by_implicit(family, scene, mode, is_implicit, c, t, s, y, y_next, course, bends, tolerance, audit):
+    return _audit_implicit_step(scene, mode, t, s, y, y_next, course, bends, tolerance, audit)
 
 
 @hook
-def fall_rate(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, guard, first_guard):
+def fall_rate(family, scene, mode, is_implicit, c, t, s, y, y_next, course, bends, guard, first_guard):
     """Rate at which a guard falls at the end of a step that it ended, in its unit per second.
 
     `guard` is the row of the guard, `first_guard` the row of the first guard. Other arguments are as in
@@ -174,17 +177,17 @@ def fall_rate(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, guar
 
 
 @fall_rate.implements(SetValued)
-def _fall_rate_by_series(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, guard, first_guard):
+def _fall_rate_by_series(family, scene, mode, is_implicit, c, t, s, y, y_next, course, bends, guard, first_guard):
     return -slope(c[guard], s)
 
 
 @fall_rate.implements(Smooth)
-def _fall_rate_by_either(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, guard, first_guard):
+def _fall_rate_by_either(family, scene, mode, is_implicit, c, t, s, y, y_next, course, bends, guard, first_guard):
     if is_implicit:
-        return _fall_rate_in_implicit_step(scene, mode, t, s, y, y_next, stages, guard - first_guard)
+        return _fall_rate_in_implicit_step(scene, mode, t, s, y, y_next, course, bends, guard - first_guard)
     return -slope(c[guard], s)
 
 
 @fall_rate.implements(Dynamic)
-def _fall_rate_by_implicit(family, scene, mode, is_implicit, c, t, s, y, y_next, stages, guard, first_guard):
-    return _fall_rate_in_implicit_step(scene, mode, t, s, y, y_next, stages, guard - first_guard)
+def _fall_rate_by_implicit(family, scene, mode, is_implicit, c, t, s, y, y_next, course, bends, guard, first_guard):
+    return _fall_rate_in_implicit_step(scene, mode, t, s, y, y_next, course, bends, guard - first_guard)

@@ -15,9 +15,8 @@ from ringsweep.compile import borrowed, hook, inlined, kernel, take
 from ringsweep.models.interface import implicit, modes, recorder, series
 from ringsweep.models.interface.status import BROKEN, COMPLETE, RUNNING
 from ringsweep.numerics.series import COLUMNS, STACK
-from ringsweep.physics.drives import next_knot
+from ringsweep.physics import drives
 from ringsweep.physics.friction import Dynamic, SetValued, Smooth, family
-from ringsweep.solvers import rosenbrock
 from ringsweep.solvers.audit import Audit, audit_step, fall_rate, is_checked
 from ringsweep.solvers.creep import INSTANTS, MOST_GUARDS, StepControl, implicit_step
 from ringsweep.solvers.taylor import series_step
@@ -30,7 +29,7 @@ PATIENCE = 1_000_000
 
 
 @hook
-def _step(family, scene, record, mode, t, y, control, h_max, tolerances, c, first, work, stages, samples):
+def _step(family, scene, record, mode, t, y, control, h_max, tolerances, c, first, work, course, bends, samples):
     """One step of the kind that the family of the friction law needs.
 
     Parameters
@@ -52,8 +51,12 @@ def _step(family, scene, record, mode, t, y, control, h_max, tolerances, c, firs
         Table of the series, which is filled.
     first : int
         Row of the first guard in the table.
-    work, stages, samples : ndarray
+    work, samples : ndarray
         Scratch.
+    course : ndarray of shape ``(COURSE_LENGTH,)``
+        Series of the drive, see :func:`ringsweep.physics.drives.follow`.
+    bends : ndarray of shape ``(2, 3, components)``
+        As in :func:`ringsweep.solvers.creep.implicit_step`.
 
     Returns
     -------
@@ -64,22 +67,40 @@ def _step(family, scene, record, mode, t, y, control, h_max, tolerances, c, firs
 
 
 @_step.implements(SetValued)
-def _step_series(family, scene, record, mode, t, y, control, h_max, tolerances, c, first, work, stages, samples):
+def _step_series(family, scene, record, mode, t, y, control, h_max, tolerances, c, first, work, course, bends, samples):
     guard, s, y, record = series_step(scene, record, mode, t, y, h_max, tolerances[0], c, first, work)
     return False, guard, s, y, record, control
 
 
 @_step.implements(Smooth)
-def _step_either(family, scene, record, mode, t, y, control, h_max, tolerances, c, first, work, stages, samples):
+def _step_either(family, scene, record, mode, t, y, control, h_max, tolerances, c, first, work, course, bends, samples):
     if implicit.may_creep(scene, mode):
-        x = implicit.to_implicit(scene, implicit.forcing(scene, t), y)
-        linear = implicit.linearise(scene, mode, t, x)
+        forcing = implicit.forcing(scene, course, t)
+        x = implicit.to_implicit(scene, forcing, y)
+        common = implicit.common(scene, mode, forcing, x)
+        linear = implicit.linearise(scene, mode, common, t, forcing, x)
         if implicit.is_stiff(scene, mode, y, linear):
             if control.last_h == 0.0:
                 # The transient into creep decays at this rate.
                 control = StepControl(min(control.h, -1.0 / linear[1][3]), 0.0, 0.0)
             guard, s, y, record, control = implicit_step(
-                scene, record, mode, t, y, x, linear, control, h_max, tolerances[1], first, stages, samples, work
+                scene,
+                record,
+                mode,
+                t,
+                y,
+                x,
+                forcing,
+                common,
+                course,
+                linear,
+                control,
+                h_max,
+                tolerances[1],
+                first,
+                bends,
+                samples,
+                work,
             )
             return True, guard, s, y, record, control
     guard, s, y, record = series_step(scene, record, mode, t, y, h_max, tolerances[0], c, first, work)
@@ -87,11 +108,31 @@ def _step_either(family, scene, record, mode, t, y, control, h_max, tolerances, 
 
 
 @_step.implements(Dynamic)
-def _step_implicit(family, scene, record, mode, t, y, control, h_max, tolerances, c, first, work, stages, samples):
-    x = implicit.to_implicit(scene, implicit.forcing(scene, t), y)
-    linear = implicit.linearise(scene, mode, t, x)
+def _step_implicit(
+    family, scene, record, mode, t, y, control, h_max, tolerances, c, first, work, course, bends, samples
+):
+    forcing = implicit.forcing(scene, course, t)
+    x = implicit.to_implicit(scene, forcing, y)
+    common = implicit.common(scene, mode, forcing, x)
+    linear = implicit.linearise(scene, mode, common, t, forcing, x)
     guard, s, y, record, control = implicit_step(
-        scene, record, mode, t, y, x, linear, control, h_max, tolerances[1], first, stages, samples, work
+        scene,
+        record,
+        mode,
+        t,
+        y,
+        x,
+        forcing,
+        common,
+        course,
+        linear,
+        control,
+        h_max,
+        tolerances[1],
+        first,
+        bends,
+        samples,
+        work,
     )
     return True, guard, s, y, record, control
 
@@ -109,7 +150,10 @@ def _begin_series(family, scene, mode, t, y, tolerances, c):
 
 @_begin.implements(Dynamic)
 def _begin_implicit(family, scene, mode, t, y, tolerances, c):
-    return recorder.begin(scene, t, implicit.seen(scene, implicit.guards_and_motion(scene, mode, t, y)))
+    forcing = drives.turn(scene.drive, t)
+    x = implicit.to_implicit(scene, forcing, y)
+    view = implicit.guards_and_motion(scene, mode, implicit.common(scene, mode, forcing, x), forcing, x)
+    return recorder.begin(scene, t, implicit.seen(scene, view))
 
 
 @hook
@@ -129,13 +173,15 @@ def _row_series(family, scene, mode, is_implicit, c, t, s, y):
 @_history_row.implements(Smooth)
 def _row_either(family, scene, mode, is_implicit, c, t, s, y):
     if is_implicit:
-        return implicit.row(scene, mode, t, implicit.to_implicit(scene, implicit.forcing(scene, t), y))
+        forcing = drives.turn(scene.drive, t)
+        return implicit.row(scene, mode, forcing, implicit.to_implicit(scene, forcing, y))
     return series.row(scene, mode, c, t, s)
 
 
 @_history_row.implements(Dynamic)
 def _row_implicit(family, scene, mode, is_implicit, c, t, s, y):
-    return implicit.row(scene, mode, t, implicit.to_implicit(scene, implicit.forcing(scene, t), y))
+    forcing = drives.turn(scene.drive, t)
+    return implicit.row(scene, mode, forcing, implicit.to_implicit(scene, forcing, y))
 
 
 @inlined
@@ -185,7 +231,8 @@ def integrate(batch, tolerances, max_steps, rows, steps, audits, spacing, times,
         Cells, as :func:`ringsweep.models.batch` makes them.
     tolerances : tuple of float
         Relative error allowed to a step of the series, and to an implicit step. It applies to 1 rad, and to the
-        velocity at 1 rad/s + \\|omega\\| or at the width of the stiction band.
+        velocity at 1 rad/s + \\|omega\\|. Of an implicit step in creep it applies to the distance and to the speed of
+        :func:`ringsweep.models.parts.creep_scales`.
     max_steps : int
         Steps after which a run is given up as failed. It is given up before if :data:`PATIENCE` steps gain so little
         time that it would not end within `max_steps`.
@@ -212,18 +259,25 @@ def integrate(batch, tolerances, max_steps, rows, steps, audits, spacing, times,
     size, first = series.table_shape(sample)
     c = np.zeros((size, COLUMNS))
     work = np.empty((STACK, COLUMNS))
-    stages = np.empty((rosenbrock.STAGES, len(modes.initial_state(sample)[1])))
+    course = np.empty(drives.COURSE_LENGTH)
+    bends = np.empty((2, 3, len(modes.initial_state(sample)[1])))
     samples = np.empty((MOST_GUARDS, INSTANTS + 1))
     return _integrate(
-        batch, tolerances, max_steps, rows, steps, audits, spacing, times, table, first, c, work, stages, samples
+        batch, tolerances, max_steps, rows, steps, audits, spacing, times, table, first, c, work, course, bends, samples
     )
 
 
 @inlined
 def _integrate(
-    batch, tolerances, max_steps, rows, steps, audits, spacing, times, table, first, c, work, stages, samples
+    batch, tolerances, max_steps, rows, steps, audits, spacing, times, table, first, c, work, course, bends, samples
 ):
-    c, work, stages, samples = borrowed(c), borrowed(work), borrowed(stages), borrowed(samples)
+    c, work, course, bends, samples = (
+        borrowed(c),
+        borrowed(work),
+        borrowed(course),
+        borrowed(bends),
+        borrowed(samples),
+    )
     rows, steps, audits, times, table = (
         borrowed(rows),
         borrowed(steps),
@@ -235,6 +289,7 @@ def _integrate(
     count = 0
     for i in range(len(steps)):
         scene = take(batch, i)
+        drives.new_course(course)
         t, y = modes.initial_state(scene)
         status, mode = modes.initial_mode(scene, t, y)
         record = _begin(family(scene.law), scene, mode, t, y, tolerances, c)
@@ -259,8 +314,8 @@ def _integrate(
                 t_judged = t
             t_before = t
             n += 1
-            h_max = min(scene.span, next_knot(scene.drive, t)) - t
-            control = StepControl(min(control.h, spacing), control.last_h, control.last_error)
+            h_max = min(scene.span, drives.next_knot(scene.drive, t)) - t
+            control = StepControl(min(control.h, spacing), control.last_h, control.last_factor)
             is_implicit, guard, s, y_next, record, control = _step(
                 family(scene.law),
                 scene,
@@ -274,7 +329,8 @@ def _integrate(
                 c,
                 first,
                 work,
-                stages,
+                course,
+                bends,
                 samples,
             )
             if len(times) > 0:
@@ -290,7 +346,7 @@ def _integrate(
                 just_switched = guard >= 0 or (just_switched and s == 0.0)
             if audited and s > 0.0 and is_checked(n):
                 audit = audit_step(
-                    family(scene.law), scene, mode, is_implicit, c, t, s, y, y_next, stages, tolerances[0], audit
+                    family(scene.law), scene, mode, is_implicit, c, t, s, y, y_next, course, bends, tolerances[0], audit
                 )
             mode_before, y_before = mode, y
             t, status, mode, y = _after_step(scene, mode, guard, t, s, h_max, y_next)
@@ -305,7 +361,8 @@ def _integrate(
                     s,
                     y_before,
                     y_next,
-                    stages,
+                    course,
+                    bends,
                     guard,
                     first,
                 )

@@ -10,6 +10,7 @@ import numpy as np
 from ringsweep.compile import inlined
 from ringsweep.models.interface import implicit, modes, recorder
 from ringsweep.numerics.series import ORDER, ascending, first_root, value
+from ringsweep.physics import drives
 from ringsweep.solvers import rosenbrock
 
 # Parts into which a step is divided to look for roots of the guards.
@@ -25,49 +26,84 @@ MOST_GUARDS = 6
 _ACCELERATION_FACTOR = 100.0
 
 
+# Fraction of a step to which the instant of an extreme is found: the error of the extreme is the square of it.
+_EXTREME_PRECISION = 1e-8
+
+
 @inlined
-def _guard_after(scene, mode, t, x, linear, h, g, stages):
+def _view_at(scene, mode, common, course, t, x):
+    """View of a state at time `t`."""
+    return implicit.guards_and_motion(scene, mode, common, implicit.forcing(scene, course, t), x)
+
+
+@inlined
+def _step(scene, mode, common, course, t, x, linear, h, end, bends):
+    """State after a step of the method, and the estimate of its error; see :func:`rosenbrock.step`.
+
+    `end` is the forcing at the end.
+    """
+    first, second, third, fourth, _ = rosenbrock.STAGE_TIMES
+    forcings = (
+        implicit.forcing(scene, course, t + first * h),
+        implicit.forcing(scene, course, t + second * h),
+        implicit.forcing(scene, course, t + third * h),
+        implicit.forcing(scene, course, t + fourth * h),
+        end,
+    )
+    return rosenbrock.step(x, scene, mode, common, linear, h, forcings, bends)
+
+
+@inlined
+def _guard_after(scene, mode, common, course, t, x, linear, h, g, bends):
     """Value of guard `g` after a step of length `h`."""
-    x_next, _ = rosenbrock.step(scene, mode, t, x, linear, h, stages)
-    return implicit.guards_and_motion(scene, mode, t + h, x_next)[0][g]
+    end = implicit.forcing(scene, course, t + h)
+    x_next, _ = _step(scene, mode, common, course, t, x, linear, h, end, bends)
+    return implicit.guards_and_motion(scene, mode, common, end, x_next)[0][g]
 
 
 @inlined
-def _locate(scene, mode, t, x, linear, h, f_high, g, stages):
+def _locate(scene, mode, common, course, t, x, linear, h, f_low, f_high, g, bends):
     """Length of the step after which guard `g` is zero.
 
-    After a step of length `h` the guard is `f_high`, which is not positive. Each value of the guard comes from a step
-    of the method, not from dense output.
+    The guard is `f_low` before the step and `f_high`, which is not positive, after a step of length `h`. Each value of
+    the guard comes from a step of the method, not from dense output.
     """
     low, high = 0.0, h
-    f_low = implicit.guards_and_motion(scene, mode, t, x)[0][g]
     if f_low <= 0.0:
         # The guard is zero at the beginning: find a step after which it is positive, if there is one.
         s = h
         for _ in range(80):
             s *= 0.5
-            f_low = _guard_after(scene, mode, t, x, linear, s, g, stages)
+            f_low = _guard_after(scene, mode, common, course, t, x, linear, s, g, bends)
             if f_low > 0.0:
                 low = s
                 break
             high, f_high = s, f_low
         if low == 0.0:
             return 0.0
-    for _ in range(60):
-        s = (low * f_high - high * f_low) / (f_high - f_low)
-        if not (low < s < high):
-            s = 0.5 * (low + high)
-        f = _guard_after(scene, mode, t, x, linear, s, g, stages)
-        if f > 0.0:
-            # Illinois algorithm: halve the value at the end of the bracket that does not move.
-            low, f_low = s, f
-            f_high *= 0.5
+    # Chandrupatla's method: a parabola through the last three points where it is safe, else bisection.
+    near, f_near, far, f_far, before, f_before = high, f_high, low, f_low, high, f_high
+    share = f_near / (f_near - f_far)
+    for _ in range(100):
+        s = near + share * (far - near)
+        f = _guard_after(scene, mode, common, course, t, x, linear, s, g, bends)
+        if (f > 0.0) == (f_near > 0.0):
+            before, f_before = near, f_near
         else:
-            high, f_high = s, f
-            f_low *= 0.5
-        if high - low <= 1e-14 * h or high - low <= 2e-16 * t:
+            before, f_before, far, f_far = far, f_far, near, f_near
+        near, f_near = s, f
+        width = abs(far - near)
+        least = 0.5 * max(1e-14 * h, 2e-16 * t)
+        if width <= 2.0 * least:
             break
-    return high
+        place, height = (near - far) / (before - far), (f_near - f_far) / (f_before - f_far)
+        share = 0.5
+        if height * height < place and (1.0 - height) * (1.0 - height) < 1.0 - place:
+            share = f_near / (f_far - f_near) * f_before / (f_far - f_before) + (
+                (before - near) / (far - near) * f_near / (f_before - f_near) * f_far / (f_before - f_far)
+            )
+        share = min(max(share, least / width), 1.0 - least / width)
+    return far if f_near > 0.0 else near
 
 
 @inlined
@@ -96,7 +132,7 @@ def _may_vanish(near_zero, first, middle, last):
 
 
 @inlined
-def _first_event(scene, mode, t, x, x_next, linear, s, before, within, after, stages, samples, work):
+def _first_event(scene, mode, common, course, t, x, x_next, linear, s, before, within, after, bends, samples, work):
     """First guard to fall below zero within an implicit step, and the length of the step up to it; -1 and `s` if none.
 
     A guard is taken as the polynomial through its values at five instants of the dense output, whose degree is four as
@@ -104,24 +140,26 @@ def _first_event(scene, mode, t, x, x_next, linear, s, before, within, after, st
     `within` and `after` are the views at the beginning, in the middle and at the end of the step. `samples` is filled
     with the guards at the five instants.
     """
-    early = implicit.guards_and_motion(scene, mode, t + 0.25 * s, rosenbrock.dense(x, x_next, stages, 0.25))
-    late = implicit.guards_and_motion(scene, mode, t + 0.75 * s, rosenbrock.dense(x, x_next, stages, 0.75))
     near_zero = implicit.near_zero(scene, within[1])
-    for g in range(len(near_zero)):
-        samples[g, 0], samples[g, 1], samples[g, 2] = before[0][g], early[0][g], within[0][g]
-        samples[g, 3], samples[g, 4] = late[0][g], after[0][g]
+    for i in range(1, INSTANTS, 2):
+        fraction = i / INSTANTS
+        state = rosenbrock.dense(x, x_next, bends[0], fraction)
+        guards = _view_at(scene, mode, common, course, t + fraction * s, state)[0]
+        for g in range(len(near_zero)):
+            samples[g, i] = guards[g]
     event, h_event = -1, s
     for g in range(len(near_zero)):
+        samples[g, 0], samples[g, 2], samples[g, 4] = before[0][g], within[0][g], after[0][g]
         if not _may_vanish(near_zero[g], before[0][g], within[0][g], after[0][g]):
             continue
         h_below = min(h_event, s * _fraction_below_zero(samples[g], work))
         if h_below == 0.0:
             continue
-        value_below = _guard_after(scene, mode, t, x, linear, h_below, g, stages)
+        value_below = _guard_after(scene, mode, common, course, t, x, linear, h_below, g, bends[1])
         # Another guard may vanish first, or the dense output may be below zero by its error alone.
         if value_below > 0.0:
             continue
-        found = _locate(scene, mode, t, x, linear, h_below, value_below, g, stages)
+        found = _locate(scene, mode, common, course, t, x, linear, h_below, before[0][g], value_below, g, bends[1])
         if event < 0 or found < h_event * (1.0 - 1e-12):
             event, h_event = g, found
     return event, h_event
@@ -158,6 +196,10 @@ def _fraction_below_zero(samples, work):
     return bottom if bottom > 0.0 else root
 
 
+# Largest factor by which the length of a step grows.
+_MOST_GROWTH = 6.0
+
+
 class StepControl(NamedTuple):
     """Control of the length of implicit steps.
 
@@ -167,13 +209,13 @@ class StepControl(NamedTuple):
         Length of the next step, s.
     last_h : float
         Length of the last accepted step, s; 0 if there is none.
-    last_error : float
-        Norm of the error of the last accepted step.
+    last_factor : float
+        Factor by which the last accepted step could have been longer.
     """
 
     h: float
     last_h: float
-    last_error: float
+    last_factor: float
 
 
 @inlined
@@ -183,18 +225,38 @@ def _next_control(control, s, error, shortened, rejected):
     `shortened` is whether the span or a knot of the drive shortened the step, `rejected` whether a longer step was
     rejected before.
     """
-    error = max(error, 1e-8)
+    factor = max(error, 1e-8) ** -0.2
     # After a rejected step the length does not grow.
-    h = s * min(1.0 if rejected else 6.0, 0.9 * error**-0.2)
+    h = s * min(1.0 if rejected else _MOST_GROWTH, 0.9 * factor)
     # Towards the end of a creep, steps shorten at a steady rate, which the last step shows (Gustafsson).
     if control.last_h > 0.0:
-        h = min(h, s * 0.9 * s / control.last_h * (control.last_error / (error * error)) ** 0.2)
+        h = min(h, s * 0.9 * s / control.last_h * (factor * factor / control.last_factor))
     # A shortened step says little about the next one.
-    return StepControl(max(control.h, h), control.last_h, control.last_error) if shortened else StepControl(h, s, error)
+    if shortened:
+        return StepControl(max(control.h, h), control.last_h, control.last_factor)
+    return StepControl(h, s, factor)
 
 
 @inlined
-def implicit_step(scene, record, mode, t, y, x, linear, control, h_max, tolerance, first, stages, samples, work):
+def implicit_step(
+    scene,
+    record,
+    mode,
+    t,
+    y,
+    x,
+    forcing,
+    common,
+    course,
+    linear,
+    control,
+    h_max,
+    tolerance,
+    first,
+    bends,
+    samples,
+    work,
+):
     """One accepted implicit step, which the first event ends.
 
     Parameters
@@ -204,8 +266,11 @@ def implicit_step(scene, record, mode, t, y, x, linear, control, h_max, toleranc
         Time, s.
     y, x : tuple of float
         State of the mode at time `t`, and the same state for implicit steps.
-    linear : tuple
-        What :func:`ringsweep.models.interface.implicit.linearise` returned for this state.
+    forcing, common, linear : tuple
+        Forcing at time `t`; what :func:`ringsweep.models.interface.implicit.common` and
+        :func:`ringsweep.models.interface.implicit.linearise` returned for this state.
+    course : ndarray of shape ``(COURSE_LENGTH,)``
+        Series of the drive, see :func:`ringsweep.physics.drives.follow`.
     control : StepControl
         Length of the step to try first.
     h_max : float
@@ -214,8 +279,8 @@ def implicit_step(scene, record, mode, t, y, x, linear, control, h_max, toleranc
         Relative error allowed to the step.
     first : int
         Index of the first guard.
-    stages : ndarray of shape ``(STAGES, components)``
-        Filled with the stages of the step.
+    bends : ndarray of shape ``(2, 3, components)``
+        ``bends[0]`` is filled with what :func:`rosenbrock.dense` needs; ``bends[1]`` is scratch.
     samples : ndarray of shape ``(MOST_GUARDS, INSTANTS + 1)``
         Scratch.
     work : ndarray of shape ``(STACK, columns)``
@@ -229,93 +294,106 @@ def implicit_step(scene, record, mode, t, y, x, linear, control, h_max, toleranc
     """
     scales = implicit.error_scales(scene, tolerance, x)
     s = min(control.h, h_max)
-    event, h_taken, near = -1, s, False
-    before = implicit.guards_and_motion(scene, mode, t, x)
-    middle, after = before, before
-    for _ in range(200):
-        x_next, error = rosenbrock.step(scene, mode, t, x, linear, s, stages)
-        error_norm = _error_norm(error, scales, linear)
-        if error_norm <= 1.0:
-            middle = implicit.guards_and_motion(scene, mode, t + 0.5 * s, rosenbrock.dense(x, x_next, stages, 0.5))
-            after = implicit.guards_and_motion(scene, mode, t + s, x_next)
-            event, h_taken = -1, s
-            near, near_zero = False, implicit.near_zero(scene, middle[1])
-            for g in range(len(near_zero)):
-                near = near or _may_vanish(near_zero[g], before[0][g], middle[0][g], after[0][g])
-            if near:
-                event, h_taken = _first_event(
-                    scene, mode, t, x, x_next, linear, s, before, middle, after, stages, samples, work
-                )
-                if event < 0:
-                    rosenbrock.step(scene, mode, t, x, linear, s, stages)
-            if event < 0 or h_taken == 0.0:
-                break
-            near = False
-            # The shorter step, up to the event, has stages of its own and may have a larger error.
-            x_next, error = rosenbrock.step(scene, mode, t, x, linear, h_taken, stages)
-            event_error_norm = _error_norm(error, scales, linear)
-            if event_error_norm <= 1.0:
-                break
-            s, error_norm = h_taken, event_error_norm
-        s *= max(0.2, 0.9 * error_norm**-0.2) if isfinite(error_norm) else 0.1
+    drives.follow(scene.drive, course, t, s)
+    # `h` is the length of the next attempt: `s`, or less up to the `event` that a step of length `s` has shown.
+    event, h, near = -1, s, False
+    before = implicit.guards_and_motion(scene, mode, common, forcing, x)
+    for _ in range(400):
+        end = implicit.forcing(scene, course, t + h)
+        x_next, error = _step(scene, mode, common, course, t, x, linear, h, end, bends[0])
+        h_norm = _error_norm(error, scales, linear)
+        if not h_norm <= 1.0:
+            # The step up to an event has stages of its own and may have a larger error.
+            s = h = h * (max(0.2, 0.9 * h_norm**-0.2) if isfinite(h_norm) else 0.1)
+            event = -1
+            continue
+        middle = _view_at(scene, mode, common, course, t + 0.5 * h, rosenbrock.dense(x, x_next, bends[0], 0.5))
+        after = implicit.guards_and_motion(scene, mode, common, end, x_next)
+        if event >= 0:
+            break
+        error_norm, near, near_zero = h_norm, False, implicit.near_zero(scene, middle[1])
+        for g in range(len(near_zero)):
+            near = near or _may_vanish(near_zero[g], before[0][g], middle[0][g], after[0][g])
+        if not near:
+            break
+        event, h = _first_event(
+            scene, mode, common, course, t, x, x_next, linear, s, before, middle, after, bends, samples, work
+        )
+        if event < 0 or h == 0.0:
+            break
+        near = False
     else:
         return -1, -1.0, y, record, control
     control = _next_control(control, s, error_norm, s == h_max, s < min(control.h, h_max))
     if event >= 0:
-        if h_taken == 0.0:
-            return first + event, 0.0, y, record, control
         event += first
-        middle = implicit.guards_and_motion(scene, mode, t + 0.5 * h_taken, rosenbrock.dense(x, x_next, stages, 0.5))
-        after = implicit.guards_and_motion(scene, mode, t + h_taken, x_next)
+        if h == 0.0:
+            return event, 0.0, y, record, control
     fractions, count = work[0], 0
-    velocity, acceleration = implicit.motion(scene, t, x, linear)
-    for start, view_after in ((0.0, middle), (0.5, after)):
+    velocity, acceleration = implicit.motion(scene, forcing, x, linear)
+    for start, view in ((0.0, middle), (0.5, after)):
         # Where velocity or acceleration change sign, place or velocity have an extreme: the recorder must look there.
-        if velocity * view_after[1][1] < 0.0:
-            fractions[count] = _sign_change(scene, mode, t, x, x_next, h_taken, stages, start, 1, velocity)
-            count += 1
-        if acceleration * view_after[1][2] < 0.0:
-            fractions[count] = _sign_change(scene, mode, t, x, x_next, h_taken, stages, start, 2, acceleration)
-            count += 1
-        velocity, acceleration = view_after[1][1], view_after[1][2]
-    if near:
-        for i in range(1, INSTANTS):
-            fractions[count] = i / INSTANTS
-            count += 1
-    else:
-        fractions[count] = 0.5
+        for component, value_before in ((1, velocity), (2, acceleration)):
+            if value_before * view[1][component] < 0.0:
+                fractions[count] = _sign_change(
+                    scene,
+                    mode,
+                    common,
+                    course,
+                    t,
+                    x,
+                    x_next,
+                    h,
+                    bends[0],
+                    start,
+                    component,
+                    value_before,
+                    view[1][component],
+                )
+                count += 1
+        velocity, acceleration = view[1][1], view[1][2]
+    for i in range(1 if near else 2, INSTANTS, 1 if near else INSTANTS):
+        fractions[count] = i / INSTANTS
         count += 1
     ascending(fractions, count)
     fraction_before, stuck = 0.0, modes.sticks(scene, mode)
-    for j in range(count):
-        view = middle
-        if fractions[j] != 0.5:
-            view = implicit.guards_and_motion(
-                scene, mode, t + fractions[j] * h_taken, rosenbrock.dense(x, x_next, stages, fractions[j])
-            )
-        duration = (fractions[j] - fraction_before) * h_taken
-        record = recorder.observe(
-            scene, record, t + fractions[j] * h_taken, duration, stuck, implicit.seen(scene, view)
-        )
-        fraction_before = fractions[j]
-    record = recorder.observe(
-        scene, record, t + h_taken, (1.0 - fraction_before) * h_taken, stuck, implicit.seen(scene, after)
-    )
-    return event, h_taken, implicit.from_implicit(scene, implicit.forcing(scene, t + h_taken), x_next), record, control
+    fractions[count] = 1.0
+    for j in range(count + 1):
+        fraction = fractions[j]
+        view = after if fraction == 1.0 else middle
+        if fraction != 0.5 and fraction != 1.0:
+            state = rosenbrock.dense(x, x_next, bends[0], fraction)
+            view = _view_at(scene, mode, common, course, t + fraction * h, state)
+        duration = (fraction - fraction_before) * h
+        record = recorder.observe(scene, record, t + fraction * h, duration, stuck, implicit.seen(scene, view))
+        fraction_before = fraction
+    return event, h, implicit.from_implicit(scene, end, x_next), record, control
 
 
 @inlined
-def _sign_change(scene, mode, t, x, x_next, h, stages, start, component, start_value):
+def _sign_change(scene, mode, common, course, t, x, x_next, h, bends, start, component, first, last):
     """Fraction of a step at which velocity (component 1) or acceleration (component 2) of the body change sign.
 
-    The sign changes in the half step that begins at the fraction `start`, where the component is `start_value`.
+    The sign changes in the half step that begins at the fraction `start`, where the component is `first`; at the end of
+    the half step it is `last`.
     """
     low, high = start, start + 0.5
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        view = implicit.guards_and_motion(scene, mode, t + middle * h, rosenbrock.dense(x, x_next, stages, middle))
-        if view[1][component] * start_value > 0.0:
-            low = middle
+    found, side = low, 0
+    for _ in range(60):
+        before, found = found, (low * last - high * first) / (last - first)
+        if not low < found < high:
+            found = 0.5 * (low + high)
+        if abs(found - before) <= _EXTREME_PRECISION:
+            break
+        state = rosenbrock.dense(x, x_next, bends, found)
+        there = _view_at(scene, mode, common, course, t + found * h, state)[1][component]
+        # Illinois algorithm: an end of the bracket that stays twice loses half its value.
+        if there * first > 0.0:
+            low, first = found, there
+            last *= 0.5 if side == 1 else 1.0
+            side = 1
         else:
-            high = middle
-    return 0.5 * (low + high)
+            high, last = found, there
+            first *= 0.5 if side == -1 else 1.0
+            side = -1
+    return found

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ringsweep.compile import add_scaled, inlined, unrolled
-from ringsweep.models.interface import implicit
+from ringsweep.compile import unrolled
+from ringsweep.models.interface import implicit  # noqa: F401 - the generated code of a step calls it
 
 STAGES = 8
 GAMMA = 0.21193756319429014
@@ -103,51 +103,68 @@ DENSE = np.array(
 )
 
 
-@inlined
-def step(scene, mode, t, x, linear, h, stages):
+#: Fractions of a step at which :func:`step` needs the forcing. The last three stages are at the end.
+STAGE_TIMES = tuple(float(time) for time in TIMES[1:6])
+
+
+@unrolled
+def step(length, x, scene, mode, common, linear, h, forcings, bends):
     """One step of length `h`.
 
     Parameters
     ----------
-    scene, mode : NamedTuple
-    t : float
-        Time, s.
     x : tuple of float
-        State at time `t`.
+        State at the beginning.
+    scene, mode : NamedTuple
+    common : tuple
+        What :func:`ringsweep.models.interface.implicit.common` returned for this state.
     linear : tuple
         What :func:`ringsweep.models.interface.implicit.linearise` returned for this state.
     h : float
         Length of the step, s.
-    stages : ndarray of shape ``(STAGES, components)``
-        Filled with the stages, which :func:`dense` needs.
+    forcings : tuple of tuple of float
+        Forcing at each of :data:`STAGE_TIMES`.
+    bends : ndarray of shape ``(3, components)``
+        Filled with what :func:`dense` needs.
 
     Returns
     -------
     tuple
         ``(state, error)``: state after the step, and the estimate of its error.
     """
-    rates, jacobian, bristles, by_time = linear
-    shift = 1.0 / (GAMMA * h)
-    over_h = 1.0 / h
-    forcing = implicit.forcing(scene, t + TIMES[1] * h)
-    y = x
+    parts = range(length)
+    lines = [
+        "f, jacobian, bristles, by_time = linear",
+        "per_h, factors = 1.0 / h, factorise(bristles, jacobian, 1.0 / (GAMMA * h))",
+    ]
     for i in range(STAGES):
-        if i > 0:
-            y, coupling = combine_twice(x, A[i], C[i], stages, i)
-            # The last three stages are at the same time.
-            if 1 < i < STAGES - 2:
-                forcing = implicit.forcing(scene, t + TIMES[i] * h)
-            rates = implicit.rates(scene, mode, forcing, y)
-            rates = add_scaled(rates, over_h, coupling)
-        solve(bristles, jacobian, shift, add_scaled(rates, h * TIME_DERIVATIVE_WEIGHTS[i], by_time), stages[i])
+        if 0 < i < 6:
+            sums = ["".join(f" + {float(A[i, j])} * k{j}_{c}" for j in range(i) if A[i, j]) for c in parts]
+            lines += [f"y{c} = x[{c}]{sums[c]}" for c in parts]
+        elif i:
+            lines += [f"y{c} += k{i - 1}_{c}" for c in parts]
+        if i:
+            state = "".join(f"y{c}, " for c in parts)
+            lines.append(f"f = implicit.rates(scene, mode, common, forcings[{min(i, 5) - 1}], ({state}))")
+        for c in parts:
+            coupling = " + ".join(f"{float(C[i, j])} * k{j}_{c}" for j in range(i))
+            by_time = f" + h * {float(TIME_DERIVATIVE_WEIGHTS[i])} * by_time[{c}]" if TIME_DERIVATIVE_WEIGHTS[i] else ""
+            lines.append(f"r{c} = f[{c}]{by_time}" + (f" + per_h * ({coupling})" if i else ""))
+        names, right = "".join(f"k{i}_{c}, " for c in parts), "".join(f"r{c}, " for c in parts)
+        lines.append(f"{names} = solve(bristles, factors, ({right}))")
+    for row in range(3):
+        for c in parts:
+            lines.append(
+                f"bends[{row}, {c}] = " + " + ".join(f"{float(DENSE[row, j])} * k{j}_{c}" for j in range(STAGES))
+            )
     # Stiffly accurate: the last stage is the correction, and the error estimate, of the one before.
-    error = like(x, stages[STAGES - 1])
-    return add_scaled(y, 1.0, error), error
+    after, error = "".join(f"y{c} + k7_{c}, " for c in parts), "".join(f"k7_{c}, " for c in parts)
+    return [*lines, f"return ({after}), ({error})"]
 
 
 @unrolled
-def solve(count, bristles, jacobian, shift, right, out):
-    """Fill `out` with the solution k of ``(shift I - J) k = right``.
+def factorise(count, bristles, jacobian, shift):
+    """Factors of ``shift I - J`` for :func:`solve`.
 
     J is the Jacobian of place, velocity and deflections. See :func:`ringsweep.models.interface.implicit.linearise` for
     `jacobian` and `bristles`. The derivative of a deflection's rate with respect to the deflection is never positive,
@@ -156,14 +173,27 @@ def solve(count, bristles, jacobian, shift, right, out):
     numbers = range(count)
     return [
         "j00, j01, j10, j11 = jacobian",
-        "r0, r1 = right[0], right[1]",
         "w00, w11 = shift - j00, shift - j11",
         *(f"b{i}, c{i}, d{i} = bristles[{i}]; p{i} = 1.0 / (shift - d{i})" for i in numbers),
-        *(f"w11 -= b{i} * c{i} * p{i}; r1 += b{i} * p{i} * right[{i + 2}]" for i in numbers),
+        *(f"w11 -= b{i} * c{i} * p{i}" for i in numbers),
         "inverse = 1.0 / (w00 * w11 - j01 * j10)",
-        "k1 = (j10 * r0 + w00 * r1) * inverse",
-        "out[0], out[1] = (w11 * r0 + j01 * r1) * inverse, k1",
-        *(f"out[{i + 2}] = (right[{i + 2}] + c{i} * k1) * p{i}" for i in numbers),
+        "eliminated = (" + "".join(f"(p{i}, b{i} * p{i}, c{i} * p{i}), " for i in numbers) + ")",
+        "return w11 * inverse, j01 * inverse, j10 * inverse, w00 * inverse, eliminated",
+    ]
+
+
+@unrolled
+def solve(count, bristles, factors, right):
+    """Solution k of ``(shift I - J) k = right``, with the result of :func:`factorise`; a tuple like `right`."""
+    numbers = range(count)
+    return [
+        "m00, m01, m10, m11, eliminated = factors",
+        "r0, r1 = right[0], right[1]",
+        *(f"r1 += eliminated[{i}][1] * right[{i + 2}]" for i in numbers),
+        "k1 = m10 * r0 + m11 * r1",
+        "return (m00 * r0 + m01 * r1, k1, "
+        + "".join(f"eliminated[{i}][0] * right[{i + 2}] + eliminated[{i}][2] * k1, " for i in numbers)
+        + ")",
     ]
 
 
@@ -177,66 +207,25 @@ def acceleration_error(count, bristles, jacobian, error, scales):
     return [f"return abs(jacobian[3] * error[1]{terms}) / scales[{count + 2}]" if count else "return 0.0"]
 
 
-@inlined
-def dense(x, x_next, stages, fraction):
-    """State at a fraction of a step, from the states at both ends and the stages."""
-    rest = 1.0 - fraction
-    total = zero(x)
-    for row in range(2, -1, -1):
-        total = add_scaled(combine(zero(x), DENSE[row], stages, STAGES), fraction, total)
-    # rest x + fraction (x_next + rest total)
-    end = add_scaled(x_next, rest, total)
-    return add_scaled(add_scaled(zero(x), rest, x), fraction, end)
+@unrolled
+def dense(length, x, x_next, bends, fraction):
+    """State at a fraction of a step, from the states at both ends and from what :func:`step` left in `bends`."""
+    bend = "bends[0, {c}] + fraction * (bends[1, {c}] + fraction * bends[2, {c}])"
+    line = f"rest * x[{{c}}] + fraction * (x_next[{{c}}] + rest * ({bend}))"
+    return ["rest = 1.0 - fraction", "return (" + "".join(line.format(c=c) + ", " for c in range(length)) + ")"]
 
 
-@inlined
-def dense_rates(x, x_next, stages, fraction, h):
+@unrolled
+def dense_rates(length, x, x_next, bends, fraction, h):
     """Time derivative of :func:`dense` for a step of length `h`, in s."""
-    total, rate = zero(x), zero(x)
-    for row in range(2, -1, -1):
-        rate = add_scaled(total, fraction, rate)
-        total = add_scaled(combine(zero(x), DENSE[row], stages, STAGES), fraction, total)
-    change = add_scaled(add_scaled(x_next, -1.0, x), 1.0 - 2.0 * fraction, total)
-    return add_scaled(zero(x), 1.0 / h, add_scaled(change, fraction * (1.0 - fraction), rate))
-
-
-# ---- states: tuples of floats -----------------------------------------------------------------
-
-
-@unrolled
-def combine(length, y, weights, rows, count):
-    """Sum of ``y`` and of the first `count` rows of an array, each times its weight."""
-    numbers = range(length)
     return [
-        "".join(f"a{i}, " for i in numbers) + "= y",
-        "for j in range(count):",
-        "    w = weights[j]",
-        *(f"    a{i} += w * rows[j, {i}]" for i in numbers),
-        "return (" + "".join(f"a{i}, " for i in numbers) + ")",
+        "rest, per_h = 1.0 - fraction, 1.0 / h",
+        *(f"d{c} = bends[1, {c}] + fraction * bends[2, {c}]" for c in range(length)),
+        "return ("
+        + "".join(
+            f"per_h * (x_next[{c}] - x[{c}] + (1.0 - 2.0 * fraction) * (bends[0, {c}] + fraction * d{c})"
+            f" + fraction * rest * (d{c} + fraction * bends[2, {c}])), "
+            for c in range(length)
+        )
+        + ")",
     ]
-
-
-@unrolled
-def combine_twice(length, y, weights, others, rows, count):
-    """:func:`combine` with ``y`` and `weights`, and with zero and `others`, in one pass."""
-    numbers = range(length)
-    return [
-        "".join(f"a{i}, " for i in numbers) + "= y",
-        " = ".join(f"b{i}" for i in numbers) + " = 0.0",
-        "for j in range(count):",
-        "    v, w = weights[j], others[j]",
-        *(f"    a{i} += v * rows[j, {i}]; b{i} += w * rows[j, {i}]" for i in numbers),
-        "return (" + "".join(f"a{i}, " for i in numbers) + "), (" + "".join(f"b{i}, " for i in numbers) + ")",
-    ]
-
-
-@unrolled
-def zero(length, y):
-    """A state of zeros."""
-    return ["return (" + "0.0, " * length + ")"]
-
-
-@unrolled
-def like(length, y, row):
-    """A row of an array as a tuple as long as `y`."""
-    return ["return (" + "".join(f"row[{i}], " for i in range(length)) + ")"]

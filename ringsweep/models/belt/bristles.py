@@ -186,15 +186,15 @@ def _switch(scene, mode, guard, t, y):
 
 
 @implicit.rates.implements(BristleBelt)
-def _implicit_rates(scene, mode, forcing, x):
+def _implicit_rates(scene, mode, common, forcing, x):
     _, belt_velocity, belt_acceleration = forcing
     rate, _, _, force, _, _ = contact_force(scene, x[1], x[2], float(mode.sign), mode.region)
     return x[1] + belt_velocity, -(scene.stiffness * x[0] + force) / scene.mass - belt_acceleration, rate
 
 
 @implicit.linearise.implements(BristleBelt)
-def _linearise(scene, mode, t, x):
-    _, belt_velocity, belt_acceleration = drives.turn(scene.drive, t)
+def _linearise(scene, mode, common, t, forcing, x):
+    _, belt_velocity, belt_acceleration = forcing
     rate, rate_v, rate_z, force, by_v, by_z = contact_force(scene, x[1], x[2], float(mode.sign), mode.region)
     return (
         (x[1] + belt_velocity, -(scene.stiffness * x[0] + force) / scene.mass - belt_acceleration, rate),
@@ -216,8 +216,8 @@ def _error_scales(scene, tolerance, x):
 
 
 @implicit.guards_and_motion.implements(BristleBelt)
-def _guards_and_motion(scene, mode, t, x):
-    shift, belt_velocity, _ = drives.turn(scene.drive, t)
+def _guards_and_motion(scene, mode, common, forcing, x):
+    shift, belt_velocity, _ = forcing
     sign = float(mode.sign)
     _, _, _, force, _, _ = contact_force(scene, x[1], x[2], sign, mode.region)
     guards = sign * x[1], region_guard(scene.law, scene.mu_s, scene.mu_k, x[1], x[2], sign, mode.region)
@@ -226,6 +226,6 @@ def _guards_and_motion(scene, mode, t, x):
 
 
 @implicit.row.implements(BristleBelt)
-def _implicit_row(scene, mode, t, x):
-    _, (place, velocity, _, force, _) = implicit.guards_and_motion(scene, mode, t, x)
+def _implicit_row(scene, mode, forcing, x):
+    _, (place, velocity, _, force, _) = implicit.guards_and_motion(scene, mode, (), forcing, x)
     return place, velocity, force, x[2], 0.0 if mode.region == BAND else float(mode.sign)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ringsweep.models.belt.force import friction_force, length_scale
 from ringsweep.models.interface import implicit
+from ringsweep.models.parts import creep_scales
 from ringsweep.physics import belt, drives
 from ringsweep.physics.friction.velocity import stiction_band
 
@@ -29,19 +30,20 @@ def _is_stiff(scene, mode, y, linear):
 @implicit.error_scales.implements(belt.Belt)
 def _error_scales(scene, tolerance, x):
     length = length_scale(scene, abs(drives.turn(scene.drive, scene.span)[1]))
-    return tolerance * length, tolerance * stiction_band(scene.law)
+    distance, speed = creep_scales(scene.law, scene.span, x[1])
+    return tolerance * min(length, distance), tolerance * speed
 
 
 @implicit.rates.implements(belt.Belt)
-def _rates(scene, mode, forcing, x):
+def _rates(scene, mode, common, forcing, x):
     shift, _, belt_acceleration = forcing
     friction, _ = friction_force(scene, x[0] + shift, x[1])
     return x[1], -(scene.stiffness * (x[0] + shift) + friction) / scene.mass - belt_acceleration
 
 
 @implicit.linearise.implements(belt.Belt)
-def _linearise(scene, mode, t, x):
-    shift, belt_velocity, belt_acceleration = drives.turn(scene.drive, t)
+def _linearise(scene, mode, common, t, forcing, x):
+    shift, belt_velocity, belt_acceleration = forcing
     friction, slope = friction_force(scene, x[0] + shift, x[1])
     stiffness_per_mass = scene.stiffness / scene.mass
     acceleration = -stiffness_per_mass * (x[0] + shift) - friction / scene.mass - belt_acceleration
@@ -54,8 +56,8 @@ def _linearise(scene, mode, t, x):
 
 
 @implicit.guards_and_motion.implements(belt.Belt)
-def _guards_and_motion(scene, mode, t, x):
-    shift, belt_velocity, _ = drives.turn(scene.drive, t)
+def _guards_and_motion(scene, mode, common, forcing, x):
+    shift, belt_velocity, _ = forcing
     place = x[0] + shift
     friction, _ = friction_force(scene, place, x[1])
     acceleration = -(scene.stiffness * place + friction) / scene.mass
@@ -66,8 +68,8 @@ def _guards_and_motion(scene, mode, t, x):
 
 
 @implicit.motion.implements(belt.Belt, belt.BristleBelt)
-def _motion(scene, t, x, linear):
-    _, belt_velocity, belt_acceleration = drives.turn(scene.drive, t)
+def _motion(scene, forcing, x, linear):
+    _, belt_velocity, belt_acceleration = forcing
     return x[1] + belt_velocity, linear[0][1] + belt_acceleration
 
 
@@ -83,6 +85,6 @@ def _near_zero(scene, motion):
 
 
 @implicit.row.implements(belt.Belt)
-def _row(scene, mode, t, x):
-    _, (position, velocity, _, friction, _) = implicit.guards_and_motion(scene, mode, t, x)
+def _row(scene, mode, forcing, x):
+    _, (position, velocity, _, friction, _) = implicit.guards_and_motion(scene, mode, (), forcing, x)
     return position, velocity, friction, 0.0, 0.0

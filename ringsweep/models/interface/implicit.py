@@ -4,13 +4,13 @@ The state of an implicit step is called ``x``, the state of the mode (see :mod:`
 place, the sliding velocity in m/s, and the deflection (m) of each bundle of bristles if there are any. The place in
 ``x`` may be relative to the drive while the place in ``y`` is in space, so that no large numbers cancel in slow creep.
 
-A *forcing* is what the equations need to know of a time. A *view* is what a solver needs to know of a state: the guards
-and the motion.
+A *forcing* is what the equations need to know of a time: angle (rad) or displacement (m) of the drive, and its first
+two time derivatives. A *view* is what a solver needs to know of a state: the guards and the motion.
 """
 
 from __future__ import annotations
 
-from ringsweep.compile import hook
+from ringsweep.compile import hook, inlined
 from ringsweep.physics import drives
 from ringsweep.physics.friction.velocity import BAND
 
@@ -54,23 +54,25 @@ def is_stiff(scene, mode, y, linear):
     """
 
 
-@hook(optional=True)
-def forcing(scene, t):
-    """What the equations need to know of a time.
+@inlined
+def forcing(scene, course, t):
+    """Forcing at a time.
 
     Parameters
     ----------
     scene : NamedTuple
         One cell.
+    course : ndarray
+        Series of the drive about a recent time, see :func:`ringsweep.physics.drives.follow`.
     t : float
         Time, s.
 
     Returns
     -------
     tuple of float
-        By default angle (rad) or displacement (m) of the drive, and its first two time derivatives.
+        What :func:`ringsweep.physics.drives.turn` returns.
     """
-    return drives.turn(scene.drive, t)
+    return drives.turn_near(scene.drive, course, t)
 
 
 @hook(optional=True)
@@ -82,7 +84,7 @@ def to_implicit(scene, forcing, y):
     scene : NamedTuple
         One cell.
     forcing : tuple of float
-        What :func:`forcing` returned for the time of the state.
+        Forcing at the time of the state.
     y : tuple of float
         State of the mode.
 
@@ -103,7 +105,7 @@ def from_implicit(scene, forcing, x):
     scene : NamedTuple
         One cell.
     forcing : tuple of float
-        What :func:`forcing` returned for the time of the state.
+        Forcing at the time of the state.
     x : tuple of float
         State of an implicit step.
 
@@ -115,16 +117,39 @@ def from_implicit(scene, forcing, x):
     return x
 
 
-@hook
-def rates(scene, mode, forcing, x):
-    """Time derivative of the state of an implicit step.
+@hook(optional=True)
+def common(scene, mode, forcing, x):
+    """What the equations have in common within a step, found once, at its beginning.
 
     Parameters
     ----------
     scene, mode : NamedTuple
         One cell, and its mode.
     forcing : tuple of float
-        What :func:`forcing` returned for the time of the state.
+        Forcing at the time of the state.
+    x : tuple of float
+        State of an implicit step.
+
+    Returns
+    -------
+    tuple
+        The model chooses what it holds: for example friction coefficients. By default it is empty.
+    """
+    return ()
+
+
+@hook(absorb=True)
+def rates(scene, mode, common, forcing, x):
+    """Time derivative of the state of an implicit step.
+
+    Parameters
+    ----------
+    scene, mode : NamedTuple
+        One cell, and its mode.
+    common : tuple
+        What :func:`common` returned for the state at the beginning of the step.
+    forcing : tuple of float
+        Forcing at the time of the state.
     x : tuple of float
         State of an implicit step.
 
@@ -136,15 +161,19 @@ def rates(scene, mode, forcing, x):
 
 
 @hook
-def linearise(scene, mode, t, x):
+def linearise(scene, mode, common, t, forcing, x):
     """Equations of an implicit step, linearised about a state and a time.
 
     Parameters
     ----------
     scene, mode : NamedTuple
         One cell, and its mode.
+    common : tuple
+        What :func:`common` returned for the state at the beginning of the step.
     t : float
         Time, s.
+    forcing : tuple of float
+        Forcing at the time of the state.
     x : tuple of float
         State of an implicit step.
 
@@ -181,15 +210,17 @@ def error_scales(scene, tolerance, x):
 
 
 @hook
-def guards_and_motion(scene, mode, t, x):
+def guards_and_motion(scene, mode, common, forcing, x):
     """The view of a state: guards of the mode, and motion.
 
     Parameters
     ----------
     scene, mode : NamedTuple
         One cell, and its mode.
-    t : float
-        Time, s.
+    common : tuple
+        What :func:`common` returned for the state at the beginning of the step.
+    forcing : tuple of float
+        Forcing at the time of the state.
     x : tuple of float
         State of an implicit step.
 
@@ -221,15 +252,15 @@ def near_zero(scene, motion):
 
 
 @hook
-def motion(scene, t, x, linear):
+def motion(scene, forcing, x, linear):
     """Velocity and acceleration of the body in space.
 
     Parameters
     ----------
     scene : NamedTuple
         One cell.
-    t : float
-        Time, s.
+    forcing : tuple of float
+        Forcing at the time of the state.
     x : tuple of float
         State of an implicit step.
     linear : tuple
@@ -260,15 +291,15 @@ def seen(scene, view):
 
 
 @hook
-def row(scene, mode, t, x):
+def row(scene, mode, forcing, x):
     """Row of a time history.
 
     Parameters
     ----------
     scene, mode : NamedTuple
         One cell, and its mode.
-    t : float
-        Time, s.
+    forcing : tuple of float
+        Forcing at the time of the state.
     x : tuple of float
         State of an implicit step.
 
@@ -281,9 +312,9 @@ def row(scene, mode, t, x):
 
 MEMBERS = (
     may_creep,
-    forcing,
     to_implicit,
     from_implicit,
+    common,
     rates,
     linearise,
     error_scales,

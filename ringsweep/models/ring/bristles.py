@@ -28,7 +28,7 @@ from ringsweep.models.ring.contacts import (
 from ringsweep.models.ring.creep import FAST, INERTIA, NORMAL_1, NORMAL_2, SLOW
 from ringsweep.models.ring.record import ENDS
 from ringsweep.models.ring.series import AT_ONCE, NEARLY_JAMMED
-from ringsweep.numerics.functions import any_of, select, sine_cosine, sine_cosine_near
+from ringsweep.numerics.functions import any_of, select, sine_cosine, sine_cosine_from, sine_cosine_near
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction.bristles import bristle, region_guard, steady_deflection
 from ringsweep.physics.friction.velocity import BAND, KINETIC
@@ -315,37 +315,58 @@ def _switch(scene, mode, guard, t, y):
     return _after_jump(scene, mode, t, y), mode, y
 
 
-@implicit.rates.implements(BristleRing)
-def _implicit_rates(scene, mode, forcing, x):
+class Common(NamedTuple):
+    """What the equations have in common within a step.
+
+    Attributes
+    ----------
+    phi, sin_phi, cos_phi : float
+        Angle of the body at the beginning, rad; its sine and cosine.
+    under : tuple of float
+        Coefficients under the contacts, as ``coefficients_under`` returns them.
+    """
+
+    phi: float
+    sin_phi: float
+    cos_phi: float
+    under: tuple[float, float, float, float]
+
+
+@implicit.common.implements(BristleRing)
+def _common(scene, mode, forcing, x):
+    phi = x[0] + forcing[0]
+    return Common(phi, sin(phi), cos(phi), coefficients_under(scene, mode))
+
+
+@inlined
+def _in_step(scene, mode, common, forcing, x):
+    """Angle and angular velocity of the body in space, sine and cosine of the angle, and the bristles."""
     rho, v, z_1, z_2 = x
+    phi, omega = rho + forcing[0], v / scene.body.radius + forcing[1]
+    sin_phi, cos_phi = sine_cosine_from(phi, common.phi, common.sin_phi, common.cos_phi)
+    return phi, omega, sin_phi, cos_phi, _contacts(scene, common.under, v, z_1, z_2, float(mode.sign), mode.region)
+
+
+@implicit.rates.implements(BristleRing)
+def _implicit_rates(scene, mode, common, forcing, x):
     radius = scene.body.radius
-    theta, ring_omega, ring_epsilon = forcing
-    phi, omega = rho + theta, v / radius + ring_omega
-    now = _contacts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(mode.sign), mode.region)
-    epsilon, _, _ = ring.acceleration(scene.body, now.K1, now.K2, sin(phi), cos(phi), omega)
-    return v / radius, radius * (epsilon - ring_epsilon), now.rates[0], now.rates[1]
+    _, omega, sin_phi, cos_phi, now = _in_step(scene, mode, common, forcing, x)
+    epsilon, _, _ = ring.acceleration(scene.body, now.K1, now.K2, sin_phi, cos_phi, omega)
+    return x[1] / radius, radius * (epsilon - forcing[2]), now.rates[0], now.rates[1]
 
 
 @implicit.linearise.implements(BristleRing)
-def _linearise(scene, mode, t, x):
-    rho, v, z_1, z_2 = x
+def _linearise(scene, mode, common, t, forcing, x):
     b = scene.body
     radius = b.radius
-    theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
-    phi, omega = rho + theta, v / radius + ring_omega
-    now = _contacts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(mode.sign), mode.region)
-    sin_phi, cos_phi = sin(phi), cos(phi)
+    _, ring_omega, ring_epsilon = forcing
+    _, omega, sin_phi, cos_phi, now = _in_step(scene, mode, common, forcing, x)
     epsilon, _, _ = ring.acceleration(b, now.K1, now.K2, sin_phi, cos_phi, omega)
-    # epsilon = p omega^2 + q cos phi + r sin phi + epsilon_0
-    epsilon_0, _, _ = ring.constant_terms(b, now.K1, now.K2)
-    p, _, _ = ring.acceleration(b, now.K1, now.K2, 0.0, 0.0, 1.0)
-    by_phi, _, _ = ring.acceleration(b, now.K1, now.K2, cos_phi, -sin_phi, 0.0)
-    p, by_phi = p - epsilon_0, by_phi - epsilon_0
-    by_omega = 2.0 * p * omega
+    by_phi, by_omega = ring.acceleration_gradient(b, now.K1, now.K2, sin_phi, cos_phi, omega)
     by_v, by_1, by_2 = _sliding_acceleration_slopes(scene, now, sin_phi, cos_phi, omega)
     by_time = radius * (by_phi * ring_omega + by_omega * ring_epsilon - drives.jerk(scene.drive, t))
     return (
-        (v / radius, radius * (epsilon - ring_epsilon), now.rates[0], now.rates[1]),
+        (x[1] / radius, radius * (epsilon - ring_epsilon), now.rates[0], now.rates[1]),
         (0.0, 1.0 / radius, radius * by_phi, by_omega + by_v),
         ((by_1, now.rates_v[0], now.rates_z[0]), (by_2, now.rates_v[1], now.rates_z[1])),
         (0.0, by_time, 0.0, 0.0),
@@ -363,15 +384,10 @@ def _error_scales(scene, tolerance, x):
 
 
 @implicit.guards_and_motion.implements(BristleRing)
-def _guards_and_motion(scene, mode, t, x):
+def _guards_and_motion(scene, mode, common, forcing, x):
     rho, v, z_1, z_2 = x
-    b = scene.body
-    theta, ring_omega, _ = drives.turn(scene.drive, t)
-    phi, omega = rho + theta, v / b.radius + ring_omega
-    under = coefficients_under(scene, mode)
-    sign = float(mode.sign)
-    now = _contacts(scene, under, v, z_1, z_2, sign, mode.region)
-    sin_phi, cos_phi = sin(phi), cos(phi)
+    b, sign = scene.body, float(mode.sign)
+    phi, omega, sin_phi, cos_phi, now = _in_step(scene, mode, common, forcing, x)
     epsilon, determinant, inertia = ring.acceleration(b, now.K1, now.K2, sin_phi, cos_phi, omega)
     normal_1, normal_2 = ring.reactions(b, now.K1, now.K2, sin_phi, cos_phi, omega, epsilon)
     ahead_1, ahead_2 = edges_ahead(scene, mode, rho)
@@ -381,14 +397,15 @@ def _guards_and_motion(scene, mode, t, x):
         normal_1,
         normal_2,
         min(ahead_1, ahead_2),
-        _region_guard(scene, under, v, z_1, z_2, sign, mode.region),
+        _region_guard(scene, common.under, v, z_1, z_2, sign, mode.region),
     )
-    return guards, (phi, omega, epsilon, ring_omega)
+    return guards, (phi, omega, epsilon, forcing[1])
 
 
 @implicit.row.implements(BristleRing)
-def _implicit_row(scene, mode, t, x):
-    guards, (phi, omega, epsilon, ring_omega) = implicit.guards_and_motion(scene, mode, t, x)
+def _implicit_row(scene, mode, forcing, x):
+    common = implicit.common(scene, mode, forcing, x)
+    guards, (phi, omega, epsilon, ring_omega) = implicit.guards_and_motion(scene, mode, common, forcing, x)
     zone_1, zone_2 = zones_under(scene, mode)
     state = 0.0 if mode.region == BAND else float(mode.sign)
     return phi, omega, epsilon, guards[NORMAL_1], guards[NORMAL_2], ring_omega, zone_1, zone_2, state, x[2], x[3]

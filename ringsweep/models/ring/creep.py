@@ -6,31 +6,106 @@ numbers, however slow the creep.
 
 from __future__ import annotations
 
-from math import cos, sin, sqrt
+from math import cos, exp, sin, sqrt
+from typing import NamedTuple
 
 from ringsweep.compile import inlined
 from ringsweep.models.interface import implicit
+from ringsweep.models.parts import creep_scales
 from ringsweep.models.ring.contacts import coefficients_under, edges_ahead, zones_under
+from ringsweep.numerics.functions import ROTATED, rotated, sine_cosine_from
 from ringsweep.physics import drives, ring
-from ringsweep.physics.friction.velocity import stiction_band, weights_in
+from ringsweep.physics.friction.velocity import piece, stiction_band
 
 #: Indices of the guards, in the order of the rows of the series.
 INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(6)
 
 
+class Common(NamedTuple):
+    """What the equations have in common within a step.
+
+    Attributes
+    ----------
+    rho, phi, sin_phi, cos_phi : float
+        Angle of the body at the beginning, in the ring's frame and in space, rad; sine and cosine of the latter.
+    low, decay : float
+        As in :class:`ringsweep.physics.friction.velocity.Piece`.
+    per_radius : float
+        Reciprocal of the radius of the ring, 1/m.
+    friction_1, friction_2 : tuple of float
+        Coefficients of the magnitude of K at contacts 1 and 2, in the order of a weight of the piece.
+    """
+
+    rho: float
+    phi: float
+    sin_phi: float
+    cos_phi: float
+    low: float
+    decay: float
+    per_radius: float
+    friction_1: tuple[float, float, float, float]
+    friction_2: tuple[float, float, float, float]
+
+
 @inlined
-def _friction(scene, mode, v):
-    """K at contacts 1 and 2, and their derivatives by the angular velocity, in the segments of the mode."""
+def _blend(static, kinetic, mu_s, mu_k):
+    """Coefficients of friction from those of the weights of both coefficients."""
+    s0, s1, s2, s3 = static
+    k0, k1, k2, k3 = kinetic
+    return mu_s * s0 + mu_k * k0, mu_s * s1 + mu_k * k1, mu_s * s2 + mu_k * k2, mu_s * s3 + mu_k * k3
+
+
+@implicit.common.implements(ring.Ring)
+def _common(scene, mode, forcing, x):
     mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
-    sign = 1.0 if v >= 0.0 else -1.0
-    w_s, w_k, dw_s, dw_k = weights_in(scene.law, mode.region, abs(v))
-    radius = scene.body.radius
-    return (
-        -sign * (w_s * mu_s1 + w_k * mu_k1),
-        -sign * (w_s * mu_s2 + w_k * mu_k2),
-        -radius * (dw_s * mu_s1 + dw_k * mu_k1),
-        -radius * (dw_s * mu_s2 + dw_k * mu_k2),
+    p = piece(scene.law, mode.region)
+    phi = x[0] + forcing[0]
+    return Common(
+        x[0],
+        phi,
+        sin(phi),
+        cos(phi),
+        p.low,
+        p.decay,
+        1.0 / scene.body.radius,
+        _blend(p.static, p.kinetic, mu_s1, mu_k1),
+        _blend(p.static, p.kinetic, mu_s2, mu_k2),
     )
+
+
+@inlined
+def _friction(common, v):
+    """K at contacts 1 and 2, and their derivatives by the sliding velocity (s/m), in the segments of the mode."""
+    sign = 1.0 if v >= 0.0 else -1.0
+    s = abs(v) - common.low
+    q, slope = s * s, 2.0 * s
+    if common.decay > 0.0:
+        # exp(-40) is less than the rounding of the sum.
+        q = exp(-common.decay * s) if common.decay * s < 40.0 else 0.0
+        slope = -common.decay * q
+    a0, a1, a2, a3 = common.friction_1
+    b0, b1, b2, b3 = common.friction_2
+    a, b = a2 + a3 * s, b2 + b3 * s
+    return (
+        -sign * (a0 + a1 * s + a * q),
+        -sign * (b0 + b1 * s + b * q),
+        -(a1 + a3 * q + a * slope),
+        -(b1 + b3 * q + b * slope),
+    )
+
+
+@inlined
+def _in_space(common, forcing, x):
+    """Angle and angular velocity of the body in space, and sine and cosine of the angle."""
+    phi, omega = x[0] + forcing[0], x[1] * common.per_radius + forcing[1]
+    # The drive turns the body by more than it creeps. A stage depends on the stage before by the creep alone, so the
+    # processor can compute this turn ahead.
+    sin_phi, cos_phi = sine_cosine_from(common.rho + forcing[0], common.phi, common.sin_phi, common.cos_phi)
+    crept = x[0] - common.rho
+    if not abs(crept) < ROTATED:
+        return phi, omega, sin(phi), cos(phi)
+    sin_phi, cos_phi = rotated(sin_phi, cos_phi, crept)
+    return phi, omega, sin_phi, cos_phi
 
 
 # The place is relative to the drive, so that no large numbers cancel in slow creep.
@@ -55,50 +130,45 @@ def _is_stiff(scene, mode, y, linear):
 
 @implicit.error_scales.implements(ring.Ring)
 def _error_scales(scene, tolerance, x):
-    return tolerance, tolerance * stiction_band(scene.law) * ring.reaction_determinant(scene.body)
+    distance, speed = creep_scales(scene.law, scene.span, x[1])
+    return (
+        tolerance * min(1.0, distance / scene.body.radius),
+        tolerance * speed * ring.reaction_determinant(scene.body),
+    )
 
 
 @implicit.rates.implements(ring.Ring)
-def _rates(scene, mode, forcing, x):
+def _rates(scene, mode, common, forcing, x):
     radius = scene.body.radius
-    theta, ring_omega, ring_epsilon = forcing
-    phi, omega = x[0] + theta, x[1] / radius + ring_omega
-    K1, K2, _, _ = _friction(scene, mode, x[1])
-    epsilon, _, _ = ring.acceleration(scene.body, K1, K2, sin(phi), cos(phi), omega)
-    return x[1] / radius, radius * (epsilon - ring_epsilon)
+    _, omega, sin_phi, cos_phi = _in_space(common, forcing, x)
+    K1, K2, _, _ = _friction(common, x[1])
+    epsilon, _, _ = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
+    return x[1] * common.per_radius, radius * (epsilon - forcing[2])
 
 
 @implicit.linearise.implements(ring.Ring)
-def _linearise(scene, mode, t, x):
+def _linearise(scene, mode, common, t, forcing, x):
     b = scene.body
     radius = b.radius
-    theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
-    ring_jerk = drives.jerk(scene.drive, t)
-    phi, omega = x[0] + theta, x[1] / radius + ring_omega
-    K1, K2, slope_1, slope_2 = _friction(scene, mode, x[1])
-    sin_phi, cos_phi = sin(phi), cos(phi)
+    _, ring_omega, ring_epsilon = forcing
+    _, omega, sin_phi, cos_phi = _in_space(common, forcing, x)
+    K1, K2, slope_1, slope_2 = _friction(common, x[1])
     epsilon, _, _ = ring.acceleration(b, K1, K2, sin_phi, cos_phi, omega)
-    # epsilon = p omega^2 + q cos phi + r sin phi + epsilon_0
-    epsilon_0, _, _ = ring.constant_terms(b, K1, K2)
-    p, _, _ = ring.acceleration(b, K1, K2, 0.0, 0.0, 1.0)
-    by_phi, _, _ = ring.acceleration(b, K1, K2, cos_phi, -sin_phi, 0.0)
-    p, by_phi = p - epsilon_0, by_phi - epsilon_0
-    by_omega = 2.0 * p * omega
+    by_phi, by_omega = ring.acceleration_gradient(b, K1, K2, sin_phi, cos_phi, omega)
     by_v = ring.acceleration_slope(b, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega)
+    jerk = drives.jerk(scene.drive, t)
     return (
-        (x[1] / radius, radius * (epsilon - ring_epsilon)),
-        (0.0, 1.0 / radius, radius * by_phi, by_omega + by_v),
+        (x[1] * common.per_radius, radius * (epsilon - ring_epsilon)),
+        (0.0, common.per_radius, radius * by_phi, by_omega + radius * by_v),
         (),
-        (0.0, radius * (by_phi * ring_omega + by_omega * ring_epsilon - ring_jerk)),
+        (0.0, radius * (by_phi * ring_omega + by_omega * ring_epsilon - jerk)),
     )
 
 
 @implicit.guards_and_motion.implements(ring.Ring)
-def _guards_and_motion(scene, mode, t, x):
-    theta, ring_omega, _ = drives.turn(scene.drive, t)
-    phi, omega = x[0] + theta, x[1] / scene.body.radius + ring_omega
-    K1, K2, _, _ = _friction(scene, mode, x[1])
-    sin_phi, cos_phi = sin(phi), cos(phi)
+def _guards_and_motion(scene, mode, common, forcing, x):
+    phi, omega, sin_phi, cos_phi = _in_space(common, forcing, x)
+    K1, K2, _, _ = _friction(common, x[1])
     epsilon, determinant, inertia = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
     normal_1, normal_2 = ring.reactions(scene.body, K1, K2, sin_phi, cos_phi, omega, epsilon)
     ahead_1, ahead_2 = edges_ahead(scene, mode, x[0])
@@ -111,7 +181,7 @@ def _guards_and_motion(scene, mode, t, x):
         min(ahead_1, ahead_2),
         stiction_band(scene.law) - speed,
     )
-    return guards, (phi, omega, epsilon, ring_omega)
+    return guards, (phi, omega, epsilon, forcing[1])
 
 
 @implicit.near_zero.implements(ring.Ring, ring.BristleRing)
@@ -124,8 +194,8 @@ def _near_zero(scene, motion):
 
 
 @implicit.motion.implements(ring.Ring, ring.BristleRing)
-def _motion(scene, t, x, linear):
-    _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
+def _motion(scene, forcing, x, linear):
+    _, ring_omega, ring_epsilon = forcing
     return x[1] / scene.body.radius + ring_omega, linear[0][1] / scene.body.radius + ring_epsilon
 
 
@@ -136,7 +206,8 @@ def _seen(scene, view):
 
 
 @implicit.row.implements(ring.Ring)
-def _row(scene, mode, t, x):
-    guards, (phi, omega, epsilon, ring_omega) = implicit.guards_and_motion(scene, mode, t, x)
+def _row(scene, mode, forcing, x):
+    common = implicit.common(scene, mode, forcing, x)
+    guards, (phi, omega, epsilon, ring_omega) = implicit.guards_and_motion(scene, mode, common, forcing, x)
     zone_1, zone_2 = zones_under(scene, mode)
     return phi, omega, epsilon, guards[NORMAL_1], guards[NORMAL_2], ring_omega, zone_1, zone_2, 0.0
