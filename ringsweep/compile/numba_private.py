@@ -14,6 +14,7 @@ from collections.abc import Callable
 from copy import copy
 from functools import cache, cached_property
 from pathlib import Path
+from types import CodeType
 from typing import Any, ClassVar
 
 logger = logging.getLogger("ringsweep")
@@ -27,11 +28,13 @@ try:
     from numba.core.compiler import CompilerBase, DefaultPassBuilder
     from numba.core.compiler_machinery import PassManager, register_pass
     from numba.core.cpu import CPUContext
+    from numba.core.datamodel.models import ArrayModel
     from numba.core.runtime.context import NRTContext
     from numba.core.typed_passes import NativeLowering, NopythonRewrites
     from numba.core.typing.context import Context
     from numba.core.typing.templates import AbstractTemplate, infer, infer_global
-    from numba.extending import intrinsic
+    from numba.core.untyped_passes import InlineClosureLikes
+    from numba.extending import intrinsic, register_model
 except ImportError:
     AVAILABLE = False
 else:
@@ -142,20 +145,14 @@ if AVAILABLE:
         def nrt(self) -> Any:
             return _ReferenceCounts(self, self.enable_nrt)
 
-    class _NoReferenceCounts(NRTContext):
-        """References to arrays are not counted.
+        def get_abi_sizeof(self, ty: Any) -> int:
+            # llvmlite parses a module for each answer, and Numba asks at each variable.
+            name = str(ty)
+            if name not in _sizes:
+                _sizes[name] = super().get_abi_sizeof(ty)
+            return _sizes[name]
 
-        A kernel holds its arrays while its callees run. Each count would be a call, for which LLVM moves all numbers
-        from registers to memory.
-        """
-
-        def get_meminfos(self, builder: Any, ty: Any, val: Any) -> Any:
-            return []
-
-    class _CalleeTarget(CPUContext):
-        @cached_property
-        def nrt(self) -> Any:
-            return _NoReferenceCounts(self, self.enable_nrt)
+    _sizes: dict[str, int] = {}
 
     # ---- typing -----------------------------------------------------------------------------------
 
@@ -243,32 +240,48 @@ if AVAILABLE:
         """Numba's passes, without those that kernels do not need. Kernels compile in half the time."""
 
         lowering: ClassVar[type] = _KernelLowering
-        target: ClassVar[type] = _Target
 
         def __init__(self, typingctx: Any, *arguments: Any) -> None:
             super().__init__(_typing(typingctx), *arguments)
-            self.state.targetctx.__class__ = self.target
+            self.state.targetctx.__class__ = _Target
 
         def define_pipelines(self) -> list[Any]:
             whole = DefaultPassBuilder.define_nopython_pipeline(self.state)
             passes = _Passes(whole.pipeline_name)
             for one, why in whole.passes:
-                # These rewrites fuse the loops of operations on whole arrays.
-                if one is not NopythonRewrites:
+                # The rewrites fuse the loops of operations on whole arrays.
+                if one is not NopythonRewrites and (one is not InlineClosureLikes or self._may_hold_closures()):
                     passes.add_pass(self.lowering if one is NativeLowering else one, why)
             passes.finalize()
             return [passes]
 
+        def _may_hold_closures(self) -> bool:
+            code = self.state.func_id.func.__code__
+            return any(isinstance(constant, CodeType) for constant in code.co_consts) or "reduce" in code.co_names
+
     class _CalleeCompiler(_KernelCompiler):
         lowering = _CalleeLowering
-        target = _CalleeTarget
+
+    class _Borrowed(types.Array):
+        """Numba type of an array without a reference count."""
+
+        def copy(self, *arguments: Any, **changes: Any) -> Any:
+            return _without_count(super().copy(*arguments, **changes))
+
+    def _without_count(array: Any) -> Any:
+        return _Borrowed(array.dtype, array.ndim, array.layout, readonly=not array.mutable, aligned=array.aligned)
+
+    @register_model(_Borrowed)
+    class _BorrowedModel(ArrayModel):
+        def contains_nrt_meminfo(self) -> bool:
+            return False
 
     @intrinsic
     def _borrowed(typingctx: Any, array: Any) -> Any:
         """View of an array without a reference count; valid while the array lives.
 
         Each call with an array, or with a tuple that holds one, increments and decrements the count. Each of these
-        atomic operations costs more than a coefficient of a series.
+        atomic operations costs more than a coefficient of a series, and the code for them takes time to compile.
         """
 
         def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -277,7 +290,7 @@ if AVAILABLE:
             view.parent = cgutils.get_null_value(view.parent.type)
             return view._getvalue()
 
-        return array(array), build
+        return _without_count(array)(array), build
 
     borrowed: Any = _borrowed
 
