@@ -103,4 +103,4 @@ def _without_collection(compiled: Callable[..., Any]) -> Callable[..., Any]:
 
 @cache
 def _announce_compilation() -> None:
-    logger.info("compiling for a new kind of scene: this takes 10 to 20 seconds, once")
+    logger.info("compiling for a new kind of scene: this takes 5 to 15 seconds, once")

@@ -1,8 +1,9 @@
 """Everything that this package uses of Numba's private interfaces, with fallbacks on public ones.
 
-Without the private interfaces kernels take longer to compile, and each process compiles its own. Results are equal bit
-for bit. So a release of Numba in which one of these imports fails costs time, not correctness. A release that changes
-what lies behind the names may fail while it compiles: `pyproject.toml` has an upper bound.
+Without the private interfaces kernels take longer to compile, and each process compiles its own. Results are equal
+within rounding: LLVM inlines other functions, and so fuses other multiplications with additions. So a release of Numba
+in which one of these imports fails costs time, not correctness. A release that changes what lies behind the names may
+fail while it compiles: `pyproject.toml` has an upper bound.
 """
 
 from __future__ import annotations
