@@ -102,8 +102,8 @@ class TestCertificate:
 
     def test_cells_whose_tolerances_disagree_are_run_again_at_tighter_tolerances(self, calls, launches):
         """At a very loose tolerance some regimes differ; the cells that are certified later have the right regime."""
-        loose = Event(rtol=1.0)
-        first, second = (solve(Event(rtol=rtol, certify=False), launches) for rtol in (1.0, 30.0))
+        loose = Event(rtol=1e-2)
+        first, second = (solve(Event(rtol=rtol, certify=False), launches) for rtol in (1e-2, 0.3))
         disagree = (kinds(first) != kinds(second)).any(axis=0)
         calls.clear()
         found = solve(loose, launches)
@@ -112,7 +112,7 @@ class TestCertificate:
         assert [cells for _, cells in calls[:2]] == [200, 200]
         assert disagree.sum() <= calls[2][1] < 200
         tolerances = [tolerance for tolerance, _ in calls]
-        assert tolerances == pytest.approx([1.0, 30.0, *(30.0**-k for k in range(1, len(calls) - 1))])
+        assert tolerances == pytest.approx([1e-2, 0.3, *(1e-2 * 30.0**-k for k in range(1, len(calls) - 1))])
         right = kinds(solve(Event(), launches))
         certified_later = disagree & found.certified
         assert certified_later.any()
@@ -316,9 +316,9 @@ class TestTime:
 
     def test_run_of_more_than_a_million_steps_is_computed(self, cells):
         """The ring carries the body up and drops it, thousands of times."""
-        found = solve(Auto(certify=False), cells({"drive.amplitude": 0.7, "time.span": 1.2e4}, drive="arctan"))
+        found = solve(Auto(certify=False), cells({"drive.amplitude": 0.7, "time.span": 1.5e4}, drive="arctan"))
         assert found.steps > 1e6
-        assert found.t_end == 1.2e4
+        assert found.t_end == 1.5e4
         assert found.regime == OSCILLATORY
 
     def test_run_that_would_not_end_within_its_steps_is_given_up_early(self, cells):
