@@ -2,13 +2,12 @@
 
 from math import inf, radians
 
-import numba
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringsweep.compile import KERNEL_OPTIONS, take
+from ringsweep.compile import kernel, take
 from ringsweep.models import MODELS
 from ringsweep.models.interface import constant_step, recorder
 from ringsweep.models.interface.status import COMPLETE, RUNNING
@@ -27,7 +26,7 @@ from ringsweep.solvers.rk4 import RK4
 NAMES = MODELS["ring"].outcomes
 
 
-@numba.njit(**KERNEL_OPTIONS)
+@kernel
 def _functions(x, near, out):
     (a,), (b,) = read_lanes(x, 0, (0.0,)), read_lanes(near, 0, (0.0,))
     sine, cosine = sine_cosine(a)
@@ -37,7 +36,7 @@ def _functions(x, near, out):
     return any_of(a > 1e5)
 
 
-@numba.njit(**KERNEL_OPTIONS)
+@kernel
 def _weights(law, memory, at, speed, out):
     (x,) = read_lanes(speed, 0, (0.0,))
     write(out, 0, WIDTH, conform(weights(read_lanes(memory, at, law), x), read_lanes(out, 0, (0.0, 0.0, 0.0, 0.0))))
@@ -176,7 +175,7 @@ def family(cells, model="ring", law="bengisu-akay", count=40):
     return cells(values, drive="arctan", model=model, law=law)
 
 
-@numba.njit(**KERNEL_OPTIONS)
+@kernel
 def _serial(batch, launches, table, steps, h, rows, report):
     """Outcomes of all cells by floats, one by one; `table` holds the drive for the whole span."""
     for cell in range(len(rows)):
