@@ -273,15 +273,31 @@ def sine_cosine_near(x, x_0, sine, cosine):
 
 @lanes_body(sine_cosine_near)
 def _lanes_sine_cosine_near(x, x_0, sine, cosine):
+    return sine_cosine_carried(x, x_0, sine, cosine, False)
+
+
+def sine_cosine_carried(x, x_0, sine, cosine, afresh):
+    """:func:`sine_cosine_near` for a series of numbers, each with the results for the one before.
+
+    Rounding errors add up: by 1e-16 each time at most, and by less as a rule. So `afresh`, a bool, is to be true now
+    and then. Then the results do not depend on `x_0`.
+    """
+    return math.sin(x), math.cos(x)
+
+
+@lanes_body(sine_cosine_carried)
+def _lanes_sine_cosine_carried(x, x_0, sine, cosine, afresh):
     r = x - x_0
     s = r * r
     sine_r = r + r * s * (-1 / 6 + s * (1 / 120 - s * (1 / 5040)))
-    cosine_r = 1.0 + s * (-1 / 2 + s * (1 / 24 - s * (1 / 720)))
-    a, b = sine * cosine_r + cosine * sine_r, cosine * cosine_r - sine * sine_r
+    # The cosine of r is 1 + less.
+    less = s * (-1 / 2 + s * (1 / 24 - s * (1 / 720)))
+    a, b = (sine + cosine * sine_r) + sine * less, (cosine - sine * sine_r) + cosine * less
     # In these lanes the truncation error of the series exceeds rounding.
     far = s > 1.0 / 1024.0
-    if any_of(far):
+    if afresh or any_of(far):
         sine, cosine = sine_cosine(x)
+        far = far | afresh
         a, b = _select(far, sine, a), _select(far, cosine, b)
     return a, b
 
