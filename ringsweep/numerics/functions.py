@@ -54,7 +54,7 @@ def _unary(name: str) -> Any:
     return function
 
 
-_floor, _sqrt = _unary("llvm.floor"), _unary("llvm.sqrt")
+_floor, _nearest, _sqrt = _unary("llvm.floor"), _unary("llvm.rint"), _unary("llvm.sqrt")
 
 
 @intrinsic
@@ -177,6 +177,16 @@ def floor(x):
 @lanes_body(floor)
 def _lanes_floor(x):
     return _floor(x)
+
+
+def nearest(x):
+    """Integer nearest to `x`, as a float."""
+    return np.rint(x)
+
+
+@lanes_body(nearest)
+def _lanes_nearest(x):
+    return _nearest(x)
 
 
 def square_root(x):

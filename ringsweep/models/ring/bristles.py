@@ -28,7 +28,14 @@ from ringsweep.models.ring.contacts import (
 from ringsweep.models.ring.creep import FAST, INERTIA, NORMAL_1, NORMAL_2, SLOW
 from ringsweep.models.ring.record import ENDS
 from ringsweep.models.ring.series import AT_ONCE, NEARLY_JAMMED
-from ringsweep.numerics.functions import any_of, select, sine_cosine, sine_cosine_carried, sine_cosine_from, sine_cosine_near
+from ringsweep.numerics.functions import (
+    any_of,
+    select,
+    sine_cosine,
+    sine_cosine_carried,
+    sine_cosine_from,
+    sine_cosine_near,
+)
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction.bristles import bristle, region_guard, steady_deflection
 from ringsweep.physics.friction.velocity import BAND, KINETIC
@@ -132,8 +139,8 @@ def _contacts_at(scene, y, drive_at, drive_rate):
     v = (omega - drive_rate) * scene.body.radius
     sign = select(v >= 0.0, 1.0, -1.0)
     turns, offset = (phi - drive_at) * PER_TURN, ring.contact_offset(scene.body) * PER_TURN
-    mu_s1, mu_k1 = roughness(scene.surface, turns - offset)
-    mu_s2, mu_k2 = roughness(scene.surface, turns + offset)
+    mu_s1, mu_k1 = roughness(scene.surface, turns, -offset)
+    mu_s2, mu_k2 = roughness(scene.surface, turns, offset)
     under = mu_s1, mu_k1, mu_s2, mu_k2
     return under, v, sign, _contacts(scene, under, v, z_1, z_2, sign, BAND)
 
