@@ -5,7 +5,7 @@ side (``Lanes``, polynomials below). The polynomials need arguments close to zer
 
 .. math::
 
-    e^{-x} = 2^n e^r,\\ |r| \\le \\tfrac12 \\ln 2; \\qquad
+    e^{-x} = 2^n e^r,\\ |r| \\le \\tfrac1{16} \\ln 2; \\qquad
     \\sin(x), \\cos(x) \\text{ from } \\sin(r), \\cos(r),\\ r = x - n\\tfrac{\\pi}{2},\\ |r| \\le \\tfrac{\\pi}{4}
 
 with :math:`n` the nearest integer. The results differ from the C library by at most 6e-16; sine and cosine up to
@@ -19,10 +19,11 @@ from typing import Any
 
 import llvmlite.ir as ir
 import numpy as np
-from numba.core import types
+from llvmlite.binding import get_host_cpu_features
+from numba.core import cgutils, types
 from numba.extending import intrinsic
 
-from ringsweep.compile import inlined, specialise
+from ringsweep.compile import inlined, specialise, unrolled
 from ringsweep.numerics.lanes import LANES, MASK, VECTOR, WIDTH, WORDS, llvm_function
 
 
@@ -53,7 +54,7 @@ def _unary(name: str) -> Any:
     return function
 
 
-_floor, _sqrt = _unary("llvm.floor"), _unary("llvm.sqrt")
+_floor, _nearest, _sqrt = _unary("llvm.floor"), _unary("llvm.rint"), _unary("llvm.sqrt")
 
 
 @intrinsic
@@ -68,15 +69,47 @@ def _opposed(typingctx, x, v):
     return LANES(LANES, LANES), lower
 
 
+# Powers of two with a fraction are found in a table of this many; without AVX-512 there are only whole powers.
+_PARTS = 8 if get_host_cpu_features().get("avx512f") else 1
+
+
 @intrinsic
-def _times_power_of_two(typingctx, x, shifted):
-    """``x * 2**n`` where `shifted` is n + 1.5 * 2**52: the last bits of `shifted` hold n."""
+def _power_of_two(typingctx, shifted):
+    """``2**n`` where `shifted` is ``n + 1.5 * 2**52 / _PARTS``: its last bits hold n in units of ``1 / _PARTS``."""
+    places = _PARTS.bit_length() - 1
+    # The bits of n in units of one are added to the exponent. Those of its fraction, which are added below, are
+    # subtracted here.
+    powers = np.exp2(np.arange(_PARTS) / _PARTS).view(np.int64) - (np.arange(_PARTS) << (52 - places))
 
     def lower(context, builder, sig, args):
-        x, shifted = (builder.bitcast(a, WORDS) for a in args)
-        return builder.bitcast(builder.add(x, builder.shl(shifted, ir.Constant(WORDS, [52] * WIDTH))), VECTOR)
+        words = builder.bitcast(args[0], WORDS)
+        exponents = builder.shl(words, ir.Constant(WORDS, [52 - places] * WIDTH))
+        return builder.bitcast(builder.add(_from_table(builder, powers.tolist(), words), exponents), VECTOR)
 
-    return LANES(LANES, LANES), lower
+    return LANES(LANES), lower
+
+
+def _from_table(builder: Any, table: list[int], words: Any) -> Any:
+    """Word of the table for each lane, by the last bits of `words`."""
+    if len(table) == 1:
+        return ir.Constant(WORDS, table * WIDTH)
+    eight, kind = len(table), ir.VectorType(ir.IntType(64), len(table))
+    permute = cgutils.get_or_insert_function(
+        builder.module, ir.FunctionType(kind, [kind, kind]), "llvm.x86.avx512.permvar.di.512"
+    )
+
+    def some(vector: Any, other: Any, first: int, count: int) -> Any:
+        places = ir.Constant(ir.VectorType(ir.IntType(32), count), list(range(first, first + count)))
+        return builder.shuffle_vector(vector, other, places)
+
+    nothing = ir.Constant(WORDS, ir.Undefined)
+    parts = [
+        builder.call(permute, [ir.Constant(kind, table), some(words, nothing, first, eight)])
+        for first in range(0, WIDTH, eight)
+    ]
+    while len(parts) > 1:
+        parts = [some(a, b, 0, 2 * a.type.count) for a, b in zip(parts[::2], parts[1::2], strict=True)]
+    return parts[0]
 
 
 @intrinsic
@@ -146,6 +179,16 @@ def _lanes_floor(x):
     return _floor(x)
 
 
+def nearest(x):
+    """Integer nearest to `x`, as a float."""
+    return np.rint(x)
+
+
+@lanes_body(nearest)
+def _lanes_nearest(x):
+    return _nearest(x)
+
+
 def square_root(x):
     """Square root of `x`."""
     return math.sqrt(x)
@@ -156,6 +199,40 @@ def _lanes_square_root(x):
     return _sqrt(x)
 
 
+@unrolled
+def _polynomial(length, c, x):
+    """Polynomial with the coefficients `c`, a tuple, by Horner's rule."""
+    return [f"p = c[{length - 1}]", *(f"p = c[{k}] + x * p" for k in reversed(range(length - 1))), "return p"]
+
+
+# Near-minimax polynomial for (e^r - 1)/r where |r| is at most ln(2)/16, or ln(2)/2 without a table.
+_GROWTH = (
+    (
+        1.0,
+        0.500000000000018,
+        0.16666666666666868,
+        0.041666666589919826,
+        0.00833333332480596,
+        0.0013889705110294549,
+        0.00019842176749636047,
+    )
+    if _PARTS == 8
+    else (
+        1.0,
+        0.5000000000000006,
+        0.1666666666666667,
+        0.04166666666657239,
+        0.008333333333326084,
+        0.0013888888932751,
+        0.0001984126987500228,
+        2.4801504014426906e-05,
+        2.755725517000089e-06,
+        2.7626495546432196e-07,
+        2.5105312729622103e-08,
+    )
+)
+
+
 def decay(x):
     """``exp(-x)`` for `x` from 0 to 700. For other `x` the result of Lanes is undefined."""
     return math.exp(-x)
@@ -163,16 +240,11 @@ def decay(x):
 
 @lanes_body(decay)
 def _lanes_decay(x):
-    shifted = _SHIFT - x * _PER_LN2
-    n = shifted - _SHIFT
+    shifted = _SHIFT / _PARTS - x * _PER_LN2
+    n = shifted - _SHIFT / _PARTS
     r = -x - n * _LN2
-    s = r * r
-    f = s * s
-    # Minimax polynomial of degree 10 for e^r, in pairs of terms: so the processor computes products in parallel.
-    low = (1.0 + r * 1.0000000000000064) + s * (0.49999999999997263 + r * 0.16666666666558028)
-    middle = (0.04166666666844455 + r * 0.008333333384564497) + s * (0.0013888888493793516 + r * 0.00019841171513760236)
-    high = (2.4801923751985747e-05 + r * 2.7639713991164592e-06) + s * 2.748609738437795e-07
-    return _times_power_of_two(low + f * (middle + f * high), shifted)
+    y = _power_of_two(shifted)
+    return y + y * r * _polynomial(_GROWTH, r)
 
 
 def sine_cosine(x):
@@ -211,15 +283,31 @@ def sine_cosine_near(x, x_0, sine, cosine):
 
 @lanes_body(sine_cosine_near)
 def _lanes_sine_cosine_near(x, x_0, sine, cosine):
+    return sine_cosine_carried(x, x_0, sine, cosine, False)
+
+
+def sine_cosine_carried(x, x_0, sine, cosine, afresh):
+    """:func:`sine_cosine_near` for a series of numbers, each with the results for the one before.
+
+    Rounding errors add up: by 1e-16 each time at most, and by less as a rule. So `afresh`, a bool, is to be true now
+    and then. Then the results do not depend on `x_0`.
+    """
+    return math.sin(x), math.cos(x)
+
+
+@lanes_body(sine_cosine_carried)
+def _lanes_sine_cosine_carried(x, x_0, sine, cosine, afresh):
     r = x - x_0
     s = r * r
     sine_r = r + r * s * (-1 / 6 + s * (1 / 120 - s * (1 / 5040)))
-    cosine_r = 1.0 + s * (-1 / 2 + s * (1 / 24 - s * (1 / 720)))
-    a, b = sine * cosine_r + cosine * sine_r, cosine * cosine_r - sine * sine_r
+    # The cosine of r is 1 + less.
+    less = s * (-1 / 2 + s * (1 / 24 - s * (1 / 720)))
+    a, b = (sine + cosine * sine_r) + sine * less, (cosine - sine * sine_r) + cosine * less
     # In these lanes the truncation error of the series exceeds rounding.
     far = s > 1.0 / 1024.0
-    if any_of(far):
+    if afresh or any_of(far):
         sine, cosine = sine_cosine(x)
+        far = far | afresh
         a, b = _select(far, sine, a), _select(far, cosine, b)
     return a, b
 

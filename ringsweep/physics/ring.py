@@ -469,9 +469,9 @@ def friction(scene, phi, omega, theta, ring_omega):
     v = (omega - ring_omega) * radius
     w_s, w_k, dw_s, dw_k = weights(scene.law, abs(v))
     turns, offset = (phi - theta) * PER_TURN, contact_offset(scene.body) * PER_TURN
-    mu_s, mu_k = roughness(scene.surface, turns - offset)
+    mu_s, mu_k = roughness(scene.surface, turns, -offset)
     K1, slope_1 = opposing(w_s * mu_s + w_k * mu_k, v), -(dw_s * mu_s + dw_k * mu_k) * radius
-    mu_s, mu_k = roughness(scene.surface, turns + offset)
+    mu_s, mu_k = roughness(scene.surface, turns, offset)
     K2, slope_2 = opposing(w_s * mu_s + w_k * mu_k, v), -(dw_s * mu_s + dw_k * mu_k) * radius
     return v, K1, K2, slope_1, slope_2
 

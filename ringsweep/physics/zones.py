@@ -14,7 +14,7 @@ import numpy as np
 from numba import types
 
 from ringsweep.compile import function_from_lines, hook, inlined, specialise
-from ringsweep.numerics.functions import floor, select
+from ringsweep.numerics.functions import floor, nearest, select
 from ringsweep.quantities.parameters import Leaf, Parameter
 
 HALF_ANGLE = Parameter("rad", "half-angle of the rough zone", lower=0.0, upper=pi)
@@ -206,19 +206,47 @@ specialise(value_at, _unrolled_value_at)
 
 
 @hook(absorb=True)
-def roughness(surface, turns):
-    """Static and kinetic friction coefficient at a place in turns, of any number of turns; for floats and Lanes."""
+def roughness(surface, turns, shift):
+    """Static and kinetic friction coefficient at a place, for floats and Lanes.
+
+    Parameters
+    ----------
+    surface : Uniform or Segments
+    turns, shift : float or Lanes
+        The place is their sum, in turns; any number of turns. What does not change in a run is best in `shift`.
+    """
 
 
 @roughness.implements(Uniform)
-def _uniform_roughness(surface, turns):
+def _uniform_roughness(surface, turns, shift):
     return surface.mu_s, surface.mu_k
 
 
 @roughness.implements(Segments)
-def _segments_roughness(surface, turns):
-    x = turns - floor(turns)
+def _segments_roughness(surface, turns, shift):
+    return _segments_coefficients_at(surface, turns, shift)
+
+
+def _segments_coefficients_at(surface, turns, shift):
+    x = turns + shift
+    x = x - floor(x)
     return value_at(surface.mu_s, surface.edges, x), value_at(surface.mu_k, surface.edges, x)
+
+
+def _two_segments_coefficients_at(surface, turns, shift):
+    (low, high), (s_1, s_2), (k_1, k_2) = surface.edges, surface.mu_s, surface.mu_k
+    from_middle = turns + (shift - 0.5 * PER_TURN * (low + high))
+    inside = abs(from_middle - nearest(from_middle)) < 0.5 * PER_TURN * (high - low)
+    return select(inside, s_1, s_2), select(inside, k_1, k_2)
+
+
+def _choose_coefficients_at(surface: Any, turns: Any, shift: Any) -> Any:
+    edges = surface[0]
+    two = isinstance(edges, types.BaseTuple) and len(edges) == 2  # type: ignore[arg-type]
+    return _two_segments_coefficients_at if two else _segments_coefficients_at
+
+
+specialise(_segments_coefficients_at, _choose_coefficients_at, absorb=True)
 
 
 @hook

@@ -44,6 +44,9 @@ _MOST_ARC_SHARE = 0.5
 # Number of steps that a run takes before the next run continues. The table of the drive for these steps fits the cache.
 _BLOCK = 512
 
+# Number of steps after which an inspection takes nothing over from the one before.
+_CARRIED = 64
+
 
 @dataclass(frozen=True)
 class RK4(Method):
@@ -235,7 +238,8 @@ def _advance(diagnosed, batch, memory, at, occupants, sample, table, first, k, s
     while k < steps:
         y_next = _step(scene, y, now, table, 2 * k, h)
         theta, ring_omega = lookup(scene.drive, table, 2 * k + 2)
-        after = conform(constant_step.inspect(scene, y_next, theta, ring_omega), now)
+        afresh = (first + k + 1) % _CARRIED == 0
+        after = conform(constant_step.inspect_next(scene, now, y_next, theta, ring_omega, afresh), now)
         ended = live > select(constant_step.holds(scene, after), 1.0, 0.0)
         if any_of(ended):
             live = select(ended, ENDING, live)

@@ -5,7 +5,7 @@ Units are rad and rad/s, or m and m/s; deflections are in m. An *inspection* is 
 the model wants to know of a state. Its field ``rates`` is the time derivative of the state.
 
 A step advances several runs side by side: it gets vector lanes in place of floats. So the functions that it calls
-(``rates``, ``inspect``, ``holds``, ``eigenvalue``, ``margin``, ``arc_share``, ``seen``, ``sticks`` and the recorder's
+(``rates``, ``inspect``, ``inspect_next``, ``holds``, ``eigenvalue``, ``margin``, ``arc_share``, ``seen``, ``sticks`` and the recorder's
 ``observe``) are written without ``if``, see :mod:`ringsweep.numerics.functions`, and all numbers of an inspection and
 of a record are floats. A step in which a run ends is repeated for this run with floats.
 """
@@ -73,6 +73,29 @@ def inspect(scene, y, drive_at, drive_rate):
     NamedTuple
         With the field ``rates``, a tuple like `y`; the model chooses the other fields.
     """
+
+
+@hook(absorb=True, optional=True)
+def inspect_next(scene, before, y, drive_at, drive_rate, afresh):
+    """Inspection of the state at the end of a step, by default that of :func:`inspect`.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    before : NamedTuple
+        Inspection of the state at the beginning of the step. A body may take from it what changes little in a step.
+    y, drive_at, drive_rate
+        As for :func:`inspect`.
+    afresh : bool
+        Whether to compute all from `y`, true every so many steps: otherwise rounding errors would add up.
+
+    Returns
+    -------
+    NamedTuple
+        Of the type that :func:`inspect` returns.
+    """
+    return inspect(scene, y, drive_at, drive_rate)
 
 
 @hook(absorb=True, optional=True)
@@ -264,6 +287,7 @@ MEMBERS = (
     initial_state,
     rates,
     inspect,
+    inspect_next,
     holds,
     verdict,
     eigenvalue,

@@ -53,8 +53,8 @@ def _names_wrong_segment(scene, mode, rho, under):
 @inlined
 def _coefficients_at(scene, rho):
     """Static and kinetic coefficient under each contact, at the angle `rho` in the ring's frame, rad."""
-    offset = ring.contact_offset(scene.body)
-    return roughness(scene.surface, (rho - offset) * PER_TURN), roughness(scene.surface, (rho + offset) * PER_TURN)
+    turns, shift = rho * PER_TURN, ring.contact_offset(scene.body) * PER_TURN
+    return roughness(scene.surface, turns, -shift), roughness(scene.surface, turns, shift)
 
 
 @inlined

@@ -28,7 +28,14 @@ from ringsweep.models.ring.contacts import (
 from ringsweep.models.ring.creep import FAST, INERTIA, NORMAL_1, NORMAL_2, SLOW
 from ringsweep.models.ring.record import ENDS
 from ringsweep.models.ring.series import AT_ONCE, NEARLY_JAMMED
-from ringsweep.numerics.functions import any_of, select, sine_cosine, sine_cosine_from, sine_cosine_near
+from ringsweep.numerics.functions import (
+    any_of,
+    select,
+    sine_cosine,
+    sine_cosine_carried,
+    sine_cosine_from,
+    sine_cosine_near,
+)
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction.bristles import bristle, region_guard, steady_deflection
 from ringsweep.physics.friction.velocity import BAND, KINETIC
@@ -132,8 +139,8 @@ def _contacts_at(scene, y, drive_at, drive_rate):
     v = (omega - drive_rate) * scene.body.radius
     sign = select(v >= 0.0, 1.0, -1.0)
     turns, offset = (phi - drive_at) * PER_TURN, ring.contact_offset(scene.body) * PER_TURN
-    mu_s1, mu_k1 = roughness(scene.surface, turns - offset)
-    mu_s2, mu_k2 = roughness(scene.surface, turns + offset)
+    mu_s1, mu_k1 = roughness(scene.surface, turns, -offset)
+    mu_s2, mu_k2 = roughness(scene.surface, turns, offset)
     under = mu_s1, mu_k1, mu_s2, mu_k2
     return under, v, sign, _contacts(scene, under, v, z_1, z_2, sign, BAND)
 
@@ -148,11 +155,22 @@ def _rates(scene, now, y, drive_at, drive_rate):
 
 @constant_step.inspect.implements(BristleRing)
 def _inspect(scene, y, drive_at, drive_rate):
-    phi, omega, z_1, z_2 = y
+    return _inspection(scene, y, drive_at, drive_rate, sine_cosine(y[0]))
+
+
+@constant_step.inspect_next.implements(BristleRing)
+def _inspect_next(scene, before, y, drive_at, drive_rate, afresh):
+    at = sine_cosine_carried(y[0], before.phi, before.sin_phi, before.cos_phi, afresh)
+    return _inspection(scene, y, drive_at, drive_rate, at)
+
+
+@absorbed
+def _inspection(scene, y, drive_at, drive_rate, at):
+    """Inspection of a state, given sine and cosine of the angle."""
+    (phi, omega, z_1, z_2), (sin_phi, cos_phi) = y, at
     b = scene.body
     under, v, sign, now = _contacts_at(scene, y, drive_at, drive_rate)
     stuck = _region_guard(scene, under, v, z_1, z_2, sign, BAND) > 0.0
-    sin_phi, cos_phi = sine_cosine(phi)
     epsilon, D, inertia = ring.acceleration(b, now.K1, now.K2, sin_phi, cos_phi, omega)
     normal_1, normal_2 = ring.reactions(b, now.K1, now.K2, sin_phi, cos_phi, omega, epsilon)
     by_v, by_1, by_2 = _sliding_acceleration_slopes(scene, now, sin_phi, cos_phi, omega)

@@ -93,7 +93,8 @@ def observe(record, phi, omega, normal_1, normal_2, stuck_for, epsilon_omega):
     r = record
     sense, reversals = r.sense, r.reversals
     lowest, highest, phi_min, phi_max = min(r.lowest, phi), max(r.highest, phi), r.phi_min, r.phi_max
-    if any_of(omega * sense <= 0.0):
+    # Some lane passes a threshold other than the last one.
+    if any_of(max(omega * sense, epsilon_omega - abs(omega)) <= 0.0):
         forth, back = omega > epsilon_omega, omega < -epsilon_omega
         turned_forth, turned_back = forth & (sense < 0.0), back & (sense > 0.0)
         phi_min, phi_max = min(phi_min, lowest), max(phi_max, highest)

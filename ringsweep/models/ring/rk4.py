@@ -5,13 +5,13 @@ from __future__ import annotations
 from math import inf, isfinite, isnan
 from typing import NamedTuple
 
-from ringsweep.compile import inlined
+from ringsweep.compile import absorbed, inlined
 from ringsweep.models.interface import constant_step
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
 from ringsweep.models.parts import exceeds, larger_eigenvalue
 from ringsweep.models.ring.contacts import zones_at
 from ringsweep.models.ring.record import ENDS
-from ringsweep.numerics.functions import any_of, select, sine_cosine, sine_cosine_near
+from ringsweep.numerics.functions import any_of, select, sine_cosine, sine_cosine_carried, sine_cosine_near
 from ringsweep.physics import contact, ring, zones
 from ringsweep.physics.friction.velocity import passes_band, steepest, stiction_band
 
@@ -67,9 +67,20 @@ def _rates(scene, now, y, drive_at, drive_rate):
 
 @constant_step.inspect.implements(ring.Ring)
 def _inspect(scene, y, drive_at, drive_rate):
-    phi, omega = y
+    return _inspection(scene, y, drive_at, drive_rate, sine_cosine(y[0]))
+
+
+@constant_step.inspect_next.implements(ring.Ring)
+def _inspect_next(scene, before, y, drive_at, drive_rate, afresh):
+    at = sine_cosine_carried(y[0], before.phi, before.sin_phi, before.cos_phi, afresh)
+    return _inspection(scene, y, drive_at, drive_rate, at)
+
+
+@absorbed
+def _inspection(scene, y, drive_at, drive_rate, at):
+    """Inspection of a state, given sine and cosine of the angle."""
+    (phi, omega), (sin_phi, cos_phi) = y, at
     v, K1, K2, slope_1, slope_2 = ring.friction(scene, phi, omega, drive_at, drive_rate)
-    sin_phi, cos_phi = sine_cosine(phi)
     epsilon, D, inertia = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
     normal_1, normal_2 = ring.reactions(scene.body, K1, K2, sin_phi, cos_phi, omega, epsilon)
     slope = ring.acceleration_slope(scene.body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega)
