@@ -6,6 +6,7 @@ this package and :mod:`ringsweep.numerics` use Numba.
 """
 
 from ringsweep.compile.cache import SOURCES_DIGEST, has_known_source, kernel
+from ringsweep.compile.cells import Cells
 from ringsweep.compile.dispatch import hook, lacking
 from ringsweep.compile.errors import readable_compile_errors
 from ringsweep.compile.options import KERNEL_OPTIONS, absorbed, inlined, specialise
@@ -23,6 +24,7 @@ from ringsweep.compile.tuples import (
 __all__ = [
     "KERNEL_OPTIONS",
     "SOURCES_DIGEST",
+    "Cells",
     "absorbed",
     "add_scaled",
     "borrowed",

@@ -267,9 +267,10 @@ if AVAILABLE:
         """Numba type of an array without a reference count."""
 
         def copy(self, *arguments: Any, **changes: Any) -> Any:
-            return _without_count(super().copy(*arguments, **changes))
+            return without_count(super().copy(*arguments, **changes))
 
-    def _without_count(array: Any) -> Any:
+    def without_count(array: Any) -> Any:
+        """Numba type of an array that :func:`borrowed` returns."""
         return _Borrowed(array.dtype, array.ndim, array.layout, readonly=not array.mutable, aligned=array.aligned)
 
     @register_model(_Borrowed)
@@ -291,7 +292,7 @@ if AVAILABLE:
             view.parent = cgutils.get_null_value(view.parent.type)
             return view._getvalue()
 
-        return _without_count(array)(array), build
+        return without_count(array)(array), build
 
     borrowed: Any = _borrowed
 
@@ -304,6 +305,10 @@ else:
 
     @register_jitable
     def _itself(array):
+        return array
+
+    def without_count(array: Any) -> Any:
+        """Numba type of an array that :func:`borrowed` returns."""
         return array
 
     borrowed = _itself

@@ -8,6 +8,7 @@ from typing import Any
 
 from numba import types
 
+from ringsweep.compile.cells import CellsType, cell_at
 from ringsweep.compile.numba_private import borrowed
 from ringsweep.compile.options import specialise
 
@@ -88,7 +89,8 @@ def take(batch: Any, i: Any) -> Any:
     Parameters
     ----------
     batch : nested tuple of ndarray
-        First dimension of each array: cells.
+        First dimension of each array: cells. In kernels also :class:`ringsweep.compile.Cells`: then the result is a
+        reference.
     i : int
         Number of the cell. In Python also a slice, or an array of numbers: then the result is a batch.
 
@@ -101,6 +103,8 @@ def take(batch: Any, i: Any) -> Any:
 
 
 def _take_one(batch: Any, i: Any) -> Any:
+    if isinstance(batch, CellsType):
+        return lambda batch, i: cell_at(batch, i)
     if isinstance(batch, types.Array):
         return (lambda batch, i: batch[i]) if batch.ndim == 1 else (lambda batch, i: borrowed(batch[i]))
     leaves = "".join(f"take(batch[{k}], i), " for k in range(len(batch)))

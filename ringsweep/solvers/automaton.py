@@ -227,7 +227,7 @@ def integrate(batch, tolerances, max_steps, rows, steps, audits, spacing, times,
 
     Parameters
     ----------
-    batch : NamedTuple
+    batch : Cells
         Cells, as :func:`ringsweep.models.batch` makes them.
     tolerances : tuple of float
         Relative error allowed to a step of the series, and to an implicit step. It applies to 1 rad, and to the

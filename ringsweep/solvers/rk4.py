@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.compile import absorbed, add_scaled, hook, inlined, kernel, put, take
+from ringsweep.compile import Cells, absorbed, add_scaled, hook, inlined, kernel, put, take
 from ringsweep.errors import InputError
 from ringsweep.models.interface import constant_step, recorder
 from ringsweep.models.interface.status import COMPLETE, RUNNING
@@ -127,7 +127,7 @@ class RK4(Method):
         interval = max(1, self.steps // samples)
         rows = np.empty((self.steps // interval + 2, width))
         times = np.empty(len(rows))
-        count = _history(batch, self.steps, interval, times, rows)
+        count = _history(Cells(batch), self.steps, interval, times, rows)
         return times[:count], rows[:count]
 
 
@@ -320,8 +320,8 @@ def prepare(batch: Any) -> tuple[Any, Any]:
     """
     components = len(constant_step.initial_state(take(batch, 0)))
     launches = tuple(np.empty(len(batch.span)) for _ in range(components))
-    _launch(batch, launches)
-    return side_by_side(batch._replace(drive=without_shape(batch.drive))), launches
+    _launch(Cells(batch), launches)
+    return Cells(side_by_side(batch._replace(drive=without_shape(batch.drive)))), launches
 
 
 @kernel
@@ -361,7 +361,7 @@ def integrate(
         Filled, for these cells, with the number of steps, the largest stiffness, the least margin, the rate at which
         the guard that ended the run fell, and the largest share of an arc.
     """
-    h = float(batch.span[cells[0]]) / steps
+    h = float(batch.batch.span[cells[0]]) / steps
     table = np.empty((2 * min(_BLOCK, steps) + 1, 2))
     _tabulate(table, drive, 0, 0, h)
     memory, occupants, live = _start(batch, launches, cells, table, rows, report)
