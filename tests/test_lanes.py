@@ -12,7 +12,16 @@ from ringsweep.models import MODELS
 from ringsweep.models.interface import constant_step, recorder
 from ringsweep.models.interface.status import COMPLETE, RUNNING
 from ringsweep.models.parts import exceeds, larger_eigenvalue
-from ringsweep.numerics.functions import any_of, decay, floor, opposing, select, sine_cosine, sine_cosine_near
+from ringsweep.numerics.functions import (
+    any_of,
+    decay,
+    floor,
+    opposing,
+    select,
+    sine_cosine,
+    sine_cosine_carried,
+    sine_cosine_near,
+)
 from ringsweep.numerics.lanes import WIDTH
 from ringsweep.numerics.memory import conform, read_lanes, write
 from ringsweep.physics.drives import lookup
@@ -34,6 +43,19 @@ def _functions(x, near, out):
     write(out, 0, WIDTH, (sine, cosine, decay(abs(a)), floor(a), opposing(abs(a), b), far, min(a, b), max(a, b)))
     write(out, 8 * WIDTH, WIDTH, sine_cosine_near(b, a, sine, cosine))
     return any_of(a > 1e5)
+
+
+@kernel
+def _carried(x, out):
+    """Sine and cosine of each row of `x`, each from those of the row before, and at the end afresh."""
+    (at,) = read_lanes(x, 0, (0.0,))
+    sine, cosine = sine_cosine(at)
+    rows = len(x) // WIDTH
+    for row in range(1, rows):
+        (to,) = read_lanes(x, row * WIDTH, (0.0,))
+        sine, cosine = sine_cosine_carried(to, at, sine, cosine, row == rows - 1)
+        at = to
+        write(out, 2 * row * WIDTH, WIDTH, (sine, cosine))
 
 
 @kernel
@@ -64,6 +86,16 @@ class TestFunctions:
             np.testing.assert_array_equal(out[5], np.where(x > near, x, -near))
             np.testing.assert_array_equal(out[6:8], [np.minimum(x, near), np.maximum(x, near)])
             np.testing.assert_allclose(out[8:], [np.sin(near), np.cos(near)], rtol=0, atol=6e-16)
+
+    @pytest.mark.parametrize("apart", [1e-4, 0.02, 0.5])
+    def test_carried_sine_and_cosine_agree_with_numpy(self, apart):
+        rng = np.random.default_rng(5)
+        x = np.cumsum(rng.uniform(-apart, apart, (64, WIDTH)), axis=0)
+        out = np.empty((64, 2, WIDTH))
+        _carried(x.reshape(-1), out.reshape(-1))
+        exact = np.stack([np.sin(x), np.cos(x)], axis=1)
+        np.testing.assert_allclose(out[1:], exact[1:], rtol=0, atol=4e-15)
+        np.testing.assert_allclose(out[-1], exact[-1], rtol=0, atol=4e-16)
 
     def test_min_and_max_of_lanes_ignore_nan_in_the_second_argument(self):
         x = np.linspace(-1.0, 1.0, WIDTH)

@@ -242,7 +242,7 @@ def _two_segments_coefficients_at(surface, turns, shift):
 
 def _choose_coefficients_at(surface: Any, turns: Any, shift: Any) -> Any:
     edges = surface[0]
-    two = isinstance(edges, types.BaseTuple) and len(edges) == 2  # type: ignore[arg-type]
+    two = isinstance(edges, types.BaseTuple) and len(edges) == 2
     return _two_segments_coefficients_at if two else _segments_coefficients_at
 
 

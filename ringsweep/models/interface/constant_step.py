@@ -5,9 +5,9 @@ Units are rad and rad/s, or m and m/s; deflections are in m. An *inspection* is 
 the model wants to know of a state. Its field ``rates`` is the time derivative of the state.
 
 A step advances several runs side by side: it gets vector lanes in place of floats. So the functions that it calls
-(``rates``, ``inspect``, ``inspect_next``, ``holds``, ``eigenvalue``, ``margin``, ``arc_share``, ``seen``, ``sticks`` and the recorder's
-``observe``) are written without ``if``, see :mod:`ringsweep.numerics.functions`, and all numbers of an inspection and
-of a record are floats. A step in which a run ends is repeated for this run with floats.
+(``rates``, ``inspect``, ``inspect_next``, ``holds``, ``eigenvalue``, ``margin``, ``arc_share``, ``seen``, ``sticks``
+and the recorder's ``observe``) are written without ``if``, see :mod:`ringsweep.numerics.functions`, and all numbers of
+an inspection and of a record are floats. A step in which a run ends is repeated for this run with floats.
 """
 
 from __future__ import annotations
