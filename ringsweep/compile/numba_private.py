@@ -83,6 +83,11 @@ if AVAILABLE:
                     function.linkage = llvm.Linkage.internal
             super().finalize()
 
+        def _optimize_final_module(self) -> None:
+            # Numba's cheap passes before these serve to remove reference counts, which kernels hardly have.
+            passes, builder = self._codegen._module_pass_manager()
+            passes.run(self._final_module, builder)
+
     def _link_all(module: Any, libraries: list[Any]) -> None:
         """Link libraries, and all libraries that they call, into a module: each of them once."""
         seen: set[Any] = set()
