@@ -203,7 +203,7 @@ if AVAILABLE:
     # Operators whose signature Numba looks for again when it writes their code.
     _OPERATORS = {one for name, one in vars(operator).items() if not name.startswith("_")}
 
-    class _Operator(types.Function):  # type: ignore[misc]
+    class _Operator(types.Function):
         """Numba type of an operator, whose signatures are remembered."""
 
         def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
