@@ -7,7 +7,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from ringsweep.compile import Cells, take
+from ringsweep.compile import take
 from ringsweep.models.ring.record import Outcome
 from ringsweep.physics.friction.velocity import weights
 from ringsweep.solvers.automaton import integrate
@@ -27,9 +27,7 @@ def trail(method, batch, spacing):
     times, rows = np.empty(2_000_000), np.empty((2_000_000, len(HISTORY)))
     batch = take(batch, [0])
     out, steps = np.empty((1, 0)), np.empty(1)
-    count = integrate(
-        Cells(batch), method.tolerances(), method.max_steps, out, steps, np.empty((0, 3)), spacing, times, rows
-    )
+    count = integrate(batch, method.tolerances(), method.max_steps, out, steps, np.empty((0, 3)), spacing, times, rows)
     return SimpleNamespace(t=times[:count], **dict(zip(HISTORY, rows[:count].T, strict=True)))
 
 

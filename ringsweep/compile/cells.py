@@ -115,7 +115,7 @@ def _words(kind: Any) -> int:
 # ---- types ------------------------------------------------------------------------------------
 
 
-class CellsType(types.Type):  # type: ignore[misc]
+class CellsType(types.Type):
     """Numba type of :class:`Cells`: a pointer to the first cell."""
 
     def __init__(self, cell: Any) -> None:
@@ -133,7 +133,7 @@ class CellsType(types.Type):  # type: ignore[misc]
         return "Cells", ()
 
 
-class Reference(types.BaseNamedTuple):  # type: ignore[misc]
+class Reference(types.BaseNamedTuple):
     """Numba type of a reference to a ``NamedTuple`` in the block.
 
     Parameters
@@ -187,7 +187,7 @@ def _cells_type(layout: Any) -> Any:
     return CellsType(_cell_type(layout))
 
 
-@unbox(CellsType)
+@unbox(CellsType)  # type: ignore[untyped-decorator]
 def _unbox_cells(kind: Any, cells: Any, c: Any) -> Any:
     number = c.pyapi.object_getattr_string(cells, "address")
     address = c.pyapi.long_as_voidptr(number)
@@ -199,7 +199,7 @@ def _unbox_cells(kind: Any, cells: Any, c: Any) -> Any:
 
 
 @intrinsic
-def cell_at(typingctx, cells, i):
+def _cell_at(typingctx, cells, i):
     """Reference to cell `i`."""
 
     def lower(context, builder, sig, args):
@@ -209,13 +209,16 @@ def cell_at(typingctx, cells, i):
     return Reference(cells.cell)(cells, types.intp), lower
 
 
+cell_at: Any = _cell_at
+
+
 def _load(context: Any, builder: Any, kind: Any, pointer: Any, offset: int) -> Any:
     """Value of the type `kind` at a place in the block."""
     if isinstance(kind, Reference):
         return _shifted(builder, pointer, offset)
     if isinstance(kind, types.BaseTuple):
         values = []
-        for part in kind:
+        for part in iter(kind):  # type: ignore[call-overload]
             values.append(_load(context, builder, part, pointer, offset))
             offset += _WORD * _words(part)
         return context.make_tuple(builder, kind, values)
@@ -240,7 +243,8 @@ def _load_word(builder: Any, kind: Any, pointer: Any, offset: int) -> Any:
 def _load_array(context: Any, builder: Any, kind: Any, pointer: Any, offset: int) -> Any:
     view = context.make_array(kind)(context, builder)
     lengths = [_load_word(builder, _INTEGER, pointer, offset + _WORD * (k + 1)) for k in range(kind.ndim)]
-    strides, size = [], ir.Constant(_INTEGER, _WORD)
+    strides: list[Any] = []
+    size = ir.Constant(_INTEGER, _WORD)
     for length in reversed(lengths):
         strides.insert(0, size)
         size = builder.mul(size, length)
@@ -254,7 +258,7 @@ def _load_array(context: Any, builder: Any, kind: Any, pointer: Any, offset: int
     return view._getvalue()
 
 
-@lower_getattr_generic(Reference)
+@lower_getattr_generic(Reference)  # type: ignore[untyped-decorator]
 def _attribute(context: Any, builder: Any, kind: Any, value: Any, name: str) -> Any:
     return _field(context, builder, kind, value, kind.fields.index(name))
 
@@ -263,8 +267,8 @@ def _field(context: Any, builder: Any, kind: Any, value: Any, k: int) -> Any:
     return _load(context, builder, kind.types[k], value, kind.offsets[k])
 
 
-@lower_builtin("static_getitem", Reference, types.IntegerLiteral)
-@lower_builtin("static_getitem", Reference, types.SliceLiteral)
+@lower_builtin("static_getitem", Reference, types.IntegerLiteral)  # type: ignore[untyped-decorator]
+@lower_builtin("static_getitem", Reference, types.SliceLiteral)  # type: ignore[untyped-decorator]
 def _item(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     kind, (value, index) = sig.args[0], args
     if isinstance(index, slice):

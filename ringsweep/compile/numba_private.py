@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import inspect
 import logging
+import operator
 import pickle
 from collections.abc import Callable
 from copy import copy
@@ -82,6 +83,11 @@ if AVAILABLE:
                     function.linkage = llvm.Linkage.internal
             super().finalize()
 
+        def _optimize_final_module(self) -> None:
+            # Numba's cheap passes before these serve to remove reference counts, which kernels hardly have.
+            passes, builder = self._codegen._module_pass_manager()
+            passes.run(self._final_module, builder)
+
     def _link_all(module: Any, libraries: list[Any]) -> None:
         """Link libraries, and all libraries that they call, into a module: each of them once."""
         seen: set[Any] = set()
@@ -146,6 +152,18 @@ if AVAILABLE:
         def nrt(self) -> Any:
             return _ReferenceCounts(self, self.enable_nrt)
 
+        def refresh(self) -> None:
+            # Numba asks for this at each function, and wherever it looks for code that does not exist.
+            contents = id(self._registries)
+            if _refreshed.get(contents) != self._registered():
+                super().refresh()
+                _refreshed[contents] = self._registered()
+
+        def _registered(self) -> int:
+            """Number of the functions, attributes and so on that Numba and its extensions have registered."""
+            registries = [*self._registries, *self.typing_context._registries]
+            return sum(len(part) for one in registries for part in vars(one).values() if isinstance(part, list))
+
         def get_abi_sizeof(self, ty: Any) -> int:
             # llvmlite parses a module for each answer, and Numba asks at each variable.
             name = str(ty)
@@ -155,18 +173,19 @@ if AVAILABLE:
 
     _sizes: dict[str, int] = {}
 
-    # ---- typing -----------------------------------------------------------------------------------
+    # By the id of what contexts share: how much of it is installed.
+    _refreshed: dict[int, int] = {}
 
-    _NUMBERS = {types.Float, types.Integer, types.Boolean, types.IntegerLiteral, types.BooleanLiteral}
+    # ---- typing -----------------------------------------------------------------------------------
 
     # By function and types of the arguments: the function, and its signature.
     _signatures: dict[Any, Any] = {}
 
     class _Typing(Context):
-        """Numba's typing with a memory of operations on numbers. For each of them Numba tries dozens of overloads."""
+        """Numba's typing with a memory of signatures. For each operation Numba tries dozens of overloads."""
 
         def resolve_function_type(self, func: Any, args: Any, kws: Any) -> Any:
-            if kws or type(func) is not types.Function or any(type(kind) not in _NUMBERS for kind in args):
+            if kws or type(func) is not types.Function:
                 return super().resolve_function_type(func, args, kws)
             key = id(func), tuple(args)
             if key not in _signatures:
@@ -175,6 +194,22 @@ if AVAILABLE:
                     return None
                 # The function is kept, so that no other object gets its id.
                 _signatures[key] = func, signature
+            return _signatures[key][1]
+
+        def resolve_value_type(self, val: Any) -> Any:
+            found = super().resolve_value_type(val)
+            return _Operator(found.templates) if type(found) is types.Function and val in _OPERATORS else found
+
+    # Operators whose signature Numba looks for again when it writes their code.
+    _OPERATORS = {one for name, one in vars(operator).items() if not name.startswith("_")}
+
+    class _Operator(types.Function):
+        """Numba type of an operator, whose signatures are remembered."""
+
+        def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
+            key = id(self), tuple(args)
+            if key not in _signatures:
+                _signatures[key] = self, super().get_call_type(context, args, kws)
             return _signatures[key][1]
 
     @cache
@@ -245,6 +280,7 @@ if AVAILABLE:
         def __init__(self, typingctx: Any, *arguments: Any) -> None:
             super().__init__(_typing(typingctx), *arguments)
             self.state.targetctx.__class__ = _Target
+            self.state.targetctx.typing_context = self.state.typingctx
 
         def define_pipelines(self) -> list[Any]:
             whole = DefaultPassBuilder.define_nopython_pipeline(self.state)

@@ -11,7 +11,7 @@ from math import isfinite
 
 import numpy as np
 
-from ringsweep.compile import borrowed, hook, inlined, kernel, take
+from ringsweep.compile import Cells, borrowed, hook, inlined, kernel, take
 from ringsweep.models.interface import implicit, modes, recorder, series
 from ringsweep.models.interface.status import BROKEN, COMPLETE, RUNNING
 from ringsweep.numerics.series import COLUMNS, STACK
@@ -219,7 +219,6 @@ def _store_row(scene, mode, is_implicit, c, t, s, y, times, table, count):
     return count + 1
 
 
-@kernel
 def integrate(batch, tolerances, max_steps, rows, steps, audits, spacing, times, table):
     """Run every cell of a batch to its end, or to `max_steps` steps.
 
@@ -227,7 +226,7 @@ def integrate(batch, tolerances, max_steps, rows, steps, audits, spacing, times,
 
     Parameters
     ----------
-    batch : Cells
+    batch : NamedTuple
         Cells, as :func:`ringsweep.models.batch` makes them.
     tolerances : tuple of float
         Relative error allowed to a step of the series, and to an implicit step. It applies to 1 rad, and to the
@@ -256,21 +255,24 @@ def integrate(batch, tolerances, max_steps, rows, steps, audits, spacing, times,
         Number of rows of the history.
     """
     sample = take(batch, 0)
-    size, first = series.table_shape(sample)
-    c = np.zeros((size, COLUMNS))
-    work = np.empty((STACK, COLUMNS))
-    course = np.empty(drives.COURSE_LENGTH)
-    bends = np.empty((2, 3, len(modes.initial_state(sample)[1])))
-    samples = np.empty((MOST_GUARDS, INSTANTS + 1))
-    return _integrate(
-        batch, tolerances, max_steps, rows, steps, audits, spacing, times, table, first, c, work, course, bends, samples
+    # NumPy's functions in a kernel would take longer to compile than a model's.
+    scratch = (
+        np.zeros((series.table_shape(sample)[0], COLUMNS)),
+        np.empty((STACK, COLUMNS)),
+        np.empty(drives.COURSE_LENGTH),
+        np.empty((2, 3, len(modes.initial_state(sample)[1]))),
+        np.empty((MOST_GUARDS, INSTANTS + 1)),
     )
+    count: int = _integrate(Cells(batch), tolerances, max_steps, rows, steps, audits, spacing, times, table, *scratch)
+    return count
 
 
-@inlined
+@kernel
 def _integrate(
-    batch, tolerances, max_steps, rows, steps, audits, spacing, times, table, first, c, work, course, bends, samples
+    batch, tolerances, max_steps, rows, steps, audits, spacing, times, table, c, work, course, bends, samples
 ):
+    """Run every cell; see :func:`integrate`. The last arguments are scratch."""
+    _, first = series.table_shape(take(batch, 0))
     c, work, course, bends, samples = (
         borrowed(c),
         borrowed(work),

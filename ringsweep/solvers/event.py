@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.compile import Cells, take
+from ringsweep.compile import take
 from ringsweep.errors import InputError
 from ringsweep.models.interface import audit, implicit, modes, recorder, series
 from ringsweep.models.scene import Structure
@@ -173,21 +173,18 @@ class _Piecewise(Method):
         """
         rows = np.empty((len(batch.span), width))
         steps, audits = np.empty(len(rows)), np.empty((len(rows) if audit else 0, 3))
-        integrate(
-            Cells(batch), self.tolerances(), self.max_steps, rows, steps, audits, np.inf, np.empty(0), np.empty((0, 0))
-        )
+        integrate(batch, self.tolerances(), self.max_steps, rows, steps, audits, np.inf, np.empty(0), np.empty((0, 0)))
         return rows, steps, audits
 
     def history(self, batch: Any, samples: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Times and rows of the history of cell 0; see :meth:`ringsweep.solvers.method.Method.history`."""
         spacing = float(batch.span[0]) / samples
         size = 4 * samples
-        cells = Cells(batch)
         while True:
             times, table = np.empty(size), np.empty((size, width))
             no_outcomes, steps = np.empty((1, 0)), np.empty(1)
             count = integrate(
-                cells, self.tolerances(), self.max_steps, no_outcomes, steps, np.empty((0, 3)), spacing, times, table
+                batch, self.tolerances(), self.max_steps, no_outcomes, steps, np.empty((0, 3)), spacing, times, table
             )
             if count < size or size >= self.max_steps:
                 return times[:count], table[:count]
