@@ -19,11 +19,11 @@ def summarise(result: xr.Dataset) -> None:
         share = float((result["certified"] == 1).mean())
         # Rounding must not turn "nearly all" into 100 %.
         print(f"certified: {share if share == 1.0 else min(share, 0.999):.1%}")
-    bounded = [str(name).removesuffix("_error") for name in result.data_vars if str(name).endswith("_error")]
-    if bounded:
-        print("bounds on errors (median, largest):")
-    for name in bounded:
+    lines = []
+    for name in (str(name).removesuffix("_error") for name in result.data_vars if str(name).endswith("_error")):
         bounds = result[f"{name}_error"].values
         bounds = bounds[np.isfinite(bounds)]
         if bounds.size:
-            print(f"  {name}: {np.median(bounds):.1e}, {bounds.max():.1e} {result[name].attrs.get('units', '')}")
+            lines.append(f"  {name}: {np.median(bounds):.1e}, {bounds.max():.1e} {result[name].attrs.get('units', '')}")
+    if lines:
+        print("bounds on errors (median, largest):", *lines, sep="\n")

@@ -528,6 +528,6 @@ def add_drive(name: str, drive: type) -> None:
         If a hook has no body for the drive, or if the name is taken.
     """
     if missing := lacking(drive, (shape, *MEMBERS)):
-        raise TypeError(f"drive {name} has no {', '.join(missing)}: every drive needs it")
+        raise TypeError(f"drive {name} has no {', '.join(missing)}: every drive needs it, before add_drive is called")
     if DRIVES.setdefault(name, drive) is not drive:
         raise TypeError(f"there is a drive {name} already: choose another name")

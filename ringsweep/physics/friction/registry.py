@@ -99,7 +99,9 @@ def add_law(name: str, law: type, traits: Traits) -> None:
         If a hook of the family has no body for the law, or if the name is taken.
     """
     if missing := lacking(law, _NEEDED[traits.family]):
-        raise TypeError(f"friction law {name} has no {', '.join(missing)}: every law of its family needs it")
+        raise TypeError(
+            f"friction law {name} has no {', '.join(missing)}: every law of its family needs it, before add_law is called"
+        )
     if LAWS.setdefault(name, law) is not law:
         raise TypeError(f"there is a friction law {name} already: choose another name")
     TRAITS[law] = traits
