@@ -298,9 +298,9 @@ ABOUT = """
 One core, compiled before; runs and units alternate. A is a step of Runge-Kutta 4 written down plainly in scalar C, B a
 step of the same method vectorised by hand; `python -m benchmarks.speed --help` says more. `event` and `implicit` run
 with certificates. `rk4` takes 5000 steps over 10 s on the ring and over 20 s on the belt; under LuGre's law 20 000 and
-100 000. Errors are the largest over the cells: of the angle at the end (rad), or of the place on the belt (m). The stiff
-law needs far smaller steps of `rk4` ([error against run time](work_precision.md)), and its row is about
-speed alone.
+100 000. Errors are the largest over the cells: of the angle at the end (rad), or of the place on the belt (m). The
+stiff law needs far smaller steps of `rk4` ([error against run time](work_precision.md)), and its row is about speed
+alone.
 """
 
 

@@ -100,7 +100,7 @@ def add_law(name: str, law: type, traits: Traits) -> None:
     """
     if missing := lacking(law, _NEEDED[traits.family]):
         raise TypeError(
-            f"friction law {name} has no {', '.join(missing)}: every law of its family needs it, before add_law is called"
+            f"friction law {name} has no {', '.join(missing)}: its family needs it, before add_law is called"
         )
     if LAWS.setdefault(name, law) is not law:
         raise TypeError(f"there is a friction law {name} already: choose another name")
