@@ -193,11 +193,17 @@ class _Run(NamedTuple):
     live: Any
 
 
-@kernel
-def _tabulate(table, drive, first, steps, h):
+@inlined
+def _fill(table, drive, first, steps, h):
     """Fill `table` with the shape of the drive and its rate, at whole and half steps from step `first` on."""
     for k in range(2 * steps + 1):
         table[k, 0], table[k, 1], _ = shape(drive, (first + 0.5 * k) * h)
+
+
+@kernel
+def _tabulate(table, drive, first, steps, h):
+    """Fill `table` for all runs; see :func:`_fill`."""
+    _fill(table, drive, first, steps, h)
 
 
 @absorbed
@@ -468,7 +474,7 @@ def _history(batch, steps, interval, times, rows):
     h = scene.span / steps
     table = np.empty((3, 2))
     y = constant_step.initial_state(scene)
-    _tabulate(table, scene.drive, 0, 1, h)
+    _fill(table, scene.drive, 0, 1, h)
     theta, ring_omega = lookup(scene.drive, table, 0)
     now = constant_step.inspect(scene, y, theta, ring_omega)
     status, _ = constant_step.verdict(scene, now, now)
@@ -482,7 +488,7 @@ def _history(batch, steps, interval, times, rows):
             count += 1
         if k == steps or status != RUNNING:
             break
-        _tabulate(table, scene.drive, k, 1, h)
+        _fill(table, scene.drive, k, 1, h)
         y_next = _step(scene, y, now, table, 0, h)
         theta, ring_omega = lookup(scene.drive, table, 2)
         after = constant_step.inspect(scene, y_next, theta, ring_omega)
