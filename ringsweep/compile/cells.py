@@ -42,6 +42,8 @@ class Cells:
     Attributes
     ----------
     batch : nested tuple of ndarray
+    layout : tuple
+        Kind of the cells. Cells of equal kinds are of one Numba type.
     address : int
         Address of the first cell.
     """

@@ -8,6 +8,7 @@ Smooth laws take implicit steps where a mode relaxes much faster than it moves, 
 from __future__ import annotations
 
 from math import isfinite
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +24,9 @@ from ringsweep.solvers.taylor import series_step
 
 # A run ends after this many consecutive steps and events at one instant.
 _MOST_STALLED = 400
+
+# By kind of cells: number of series in the table, and of components of a state.
+_SHAPES: dict[Any, tuple[int, int]] = {}
 
 #: A run is given up if, at the pace of so many steps, it would exceed its largest number of steps.
 PATIENCE = 1_000_000
@@ -254,16 +258,20 @@ def integrate(batch, tolerances, max_steps, rows, steps, audits, spacing, times,
     int
         Number of rows of the history.
     """
-    sample = take(batch, 0)
-    # NumPy's functions in a kernel would take longer to compile than a model's.
+    cells = Cells(batch)
+    if cells.layout not in _SHAPES:
+        sample = take(batch, 0)
+        _SHAPES[cells.layout] = series.table_shape(sample)[0], len(modes.initial_state(sample)[1])
+    size, components = _SHAPES[cells.layout]
+    # NumPy's functions that make arrays would have to be compiled into each kernel.
     scratch = (
-        np.zeros((series.table_shape(sample)[0], COLUMNS)),
+        np.zeros((size, COLUMNS)),
         np.empty((STACK, COLUMNS)),
         np.empty(drives.COURSE_LENGTH),
-        np.empty((2, 3, len(modes.initial_state(sample)[1]))),
+        np.empty((2, 3, components)),
         np.empty((MOST_GUARDS, INSTANTS + 1)),
     )
-    count: int = _integrate(Cells(batch), tolerances, max_steps, rows, steps, audits, spacing, times, table, *scratch)
+    count: int = _integrate(cells, tolerances, max_steps, rows, steps, audits, spacing, times, table, *scratch)
     return count
 
 
