@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.compile import absorbed, inlined
+from ringsweep.compile import absorbed
 from ringsweep.models.scene import Structure, Values, require
 from ringsweep.numerics.functions import any_of, select, square_root
 from ringsweep.physics import drives, friction
-from ringsweep.physics.friction.velocity import stiction_band
 from ringsweep.quantities.parameters import Parameter, declared
 
 MASS = Parameter("kg", "mass of the body", lower=0.0, open_lower=True)
@@ -46,38 +45,6 @@ def larger_eigenvalue(most, trace, determinant):
     if any_of(more):
         most = select(more, max(most, largest_eigenvalue(trace, determinant)), most)
     return most
-
-
-# An implicit step may misplace a contact by as much as it creeps at the top of the band in this share of the span.
-_CREEP_SHARE = 0.05
-
-# In the middle of a creep the error of the velocity may be larger by up to this factor than at the top of the band.
-_FORGIVENESS = 200.0
-
-
-@inlined
-def creep_scales(law, span, v):
-    """Distance and speed in units of which errors of a creep are measured.
-
-    A contact forgets an error of its velocity at once: there stays only the distance crept meanwhile. But near the top
-    of the band friction is flat, and errors grow on the way out.
-
-    Parameters
-    ----------
-    law : NamedTuple
-    span : float
-        Span of time, s.
-    v : float
-        Sliding velocity, m/s.
-
-    Returns
-    -------
-    tuple of float
-        In m and m/s.
-    """
-    band = stiction_band(law)
-    below_top = max(0.0, 1.0 - abs(v) / band)
-    return _CREEP_SHARE * span * band, band * max(1.0, _FORGIVENESS * below_top * below_top)
 
 
 def friction_coefficients(law: type, place: str, values: Values) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

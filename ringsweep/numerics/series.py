@@ -148,7 +148,7 @@ def _first_root_by_subdivision(c, h, work):
     """First zero by bisection in the Bernstein basis; see :func:`first_root`."""
     b = work[0]
     b[0] = c[0]
-    # A coefficient within rounding of zero may belong to a double root.
+    # A coefficient within rounding of zero may belong to a double root, which is at least 1e-7 steps wide.
     rounding = 1e-15 * (c[0] + variation(c, h))
     set_terms(b, terms(c) * powers(h) * h / numbers_from(_CHOOSE, 0))
     bernstein = b[1] * numbers_from(_CHOOSE_ALL, 0) + c[0]
@@ -162,16 +162,17 @@ def _first_root_by_subdivision(c, h, work):
         b = work[top]
         start, width = b[ORDER + 1], b[ORDER + 2]
         changes = 0
-        positive = True
+        positive, touches = True, False
         for k in range(1, ORDER + 1):
-            if (b[k] > rounding) != positive:
+            touches = touches or b[k] <= rounding
+            if (b[k] > 0.0) != positive:
                 positive = not positive
                 changes += 1
-        if changes == 0:
+        if changes == 0 and not touches:
             top -= 1
         elif changes == 1:
             return _root_in_bracket(c, start, start + width), True
-        elif top + 1 >= len(work) or width <= 1e-15 * h:
+        elif top + 1 >= len(work) or width <= (1e-15 if changes > 0 else 1e-7) * h:
             # Two roots closer than rounding: a graze. It counts as a zero if the series really reaches zero.
             if value(c, start + width) <= 0.0:
                 return start + width, True

@@ -145,6 +145,27 @@ def launch_velocity(scene):
     return drives.relative_velocity(scene.drive, scene.initial_omega)
 
 
+# An angular velocity that is smaller than this share of its terms is zero but for rounding.
+_ROUNDING = 1e-15
+
+
+@inlined
+def angular_velocity(body, v, ring_omega):
+    """Angular velocity of the body in space, rad/s; exactly 0 if it is only rounding: then the race carries no load.
+
+    Parameters
+    ----------
+    body : NamedTuple
+    v : float
+        Sliding velocity, m/s.
+    ring_omega : float
+        Angular velocity of the ring, rad/s.
+    """
+    relative = v / body.radius
+    omega = relative + ring_omega
+    return 0.0 if abs(omega) < _ROUNDING * (abs(relative) + abs(ring_omega)) else omega
+
+
 @hook(optional=True)
 def contact_offset(body):
     """Half the angle between the contacts, rad. Contact 1 is at ``phi - offset``, contact 2 at ``phi + offset``.

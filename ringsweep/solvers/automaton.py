@@ -234,8 +234,7 @@ def integrate(batch, tolerances, max_steps, rows, steps, audits, spacing, times,
         Cells, as :func:`ringsweep.models.batch` makes them.
     tolerances : tuple of float
         Relative error allowed to a step of the series, and to an implicit step. It applies to 1 rad, and to the
-        velocity at 1 rad/s + \\|omega\\|. Of an implicit step in creep it applies to the distance and to the speed of
-        :func:`ringsweep.models.parts.creep_scales`.
+        velocity at 1 rad/s + \\|omega\\| or at the width of the stiction band.
     max_steps : int
         Steps after which a run is given up as failed. It is given up before if :data:`PATIENCE` steps gain so little
         time that it would not end within `max_steps`.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from ringsweep.models.belt.force import friction_force, length_scale
 from ringsweep.models.interface import implicit
-from ringsweep.models.parts import creep_scales
 from ringsweep.physics import belt, drives
 from ringsweep.physics.friction.velocity import stiction_band
 
@@ -30,8 +29,7 @@ def _is_stiff(scene, mode, y, linear):
 @implicit.error_scales.implements(belt.Belt)
 def _error_scales(scene, tolerance, x):
     length = length_scale(scene, abs(drives.turn(scene.drive, scene.span)[1]))
-    distance, speed = creep_scales(scene.law, scene.span, x[1])
-    return tolerance * min(length, distance), tolerance * speed
+    return tolerance * length, tolerance * stiction_band(scene.law)
 
 
 @implicit.rates.implements(belt.Belt)

@@ -263,7 +263,7 @@ def _initial_mode(scene, t, y):
     rho, v, z_1, z_2 = y
     place_1, place_2 = places_at(scene, rho)
     theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
-    phi, omega = rho + theta, ring_omega + v / scene.body.radius
+    phi, omega = rho + theta, ring.angular_velocity(scene.body, v, ring_omega)
     sign = 1 if v > 0.0 else -1
     if v == 0.0:
         mode = Mode(sign, BAND, place_1, place_2)
@@ -282,7 +282,7 @@ def _sliding_at(scene, mode, t, y):
     """K at each contact; sine and cosine of the angle of the body, and its angular velocity."""
     rho, v, z_1, z_2 = y
     theta, ring_omega, _ = drives.turn(scene.drive, t)
-    phi, omega = rho + theta, ring_omega + v / scene.body.radius
+    phi, omega = rho + theta, ring.angular_velocity(scene.body, v, ring_omega)
     now = _contacts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(mode.sign), mode.region)
     return now.K1, now.K2, sin(phi), cos(phi), omega
 

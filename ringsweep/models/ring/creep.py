@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 from ringsweep.compile import inlined
 from ringsweep.models.interface import implicit
-from ringsweep.models.parts import creep_scales
 from ringsweep.models.ring.contacts import coefficients_under, edges_ahead, zones_under
 from ringsweep.numerics.functions import ROTATED, rotated, sine_cosine_from
 from ringsweep.physics import drives, ring
@@ -130,11 +129,7 @@ def _is_stiff(scene, mode, y, linear):
 
 @implicit.error_scales.implements(ring.Ring)
 def _error_scales(scene, tolerance, x):
-    distance, speed = creep_scales(scene.law, scene.span, x[1])
-    return (
-        tolerance * min(1.0, distance / scene.body.radius),
-        tolerance * speed * ring.reaction_determinant(scene.body),
-    )
+    return tolerance, tolerance * stiction_band(scene.law) * ring.reaction_determinant(scene.body)
 
 
 @implicit.rates.implements(ring.Ring)

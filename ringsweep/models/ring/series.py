@@ -173,7 +173,7 @@ def _after_jump(scene, mode, t, y):
 def _friction_at(scene, mode, t, v):
     """K at each contact, and angular velocity of the body, at the sliding velocity `v`."""
     K1, K2 = friction_under(scene, mode, abs(v))
-    return K1, K2, v / scene.body.radius + drives.turn(scene.drive, t)[1]
+    return K1, K2, ring.angular_velocity(scene.body, v, drives.turn(scene.drive, t)[1])
 
 
 @inlined
@@ -266,7 +266,7 @@ def _expand(scene, mode, t, y, tolerance, c):
     c[V, 0] = y[1]
     if mode.sign == 0:
         return _expand_stick(scene, mode, tolerance, c)
-    c[OMEGA, 0] = y[1] / scene.body.radius + c[THETA, 1]
+    c[OMEGA, 0] = ring.angular_velocity(scene.body, y[1], c[THETA, 1])
     _expand_slip(scene, mode, c)
     _expand_slip_guards(scene, mode, c)
     per_angle = 1.0 / tolerance
