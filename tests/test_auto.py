@@ -321,6 +321,14 @@ class TestTime:
         assert found.t_end == 1.5e4
         assert found.regime == OSCILLATORY
 
+    @pytest.mark.parametrize("law", ["stiction", "bengisu-akay"])
+    def test_body_at_rest_in_space_without_gravity_loses_both_contacts_at_launch(self, cells, law):
+        """The ring moves under the body: the sum of sliding velocity and speed of the ring is zero but for rounding."""
+        scene = {"gravity": 0.0, "initial.omega": 0.0, "drive.frequency": 1.3, "time.span": 1.0}
+        found = solve(Auto(), cells(scene | {"drive.amplitude": np.linspace(-3.0, 3.1, 40)}, law=law, drive="sinusoidal"))
+        np.testing.assert_array_equal(found.regime, SEPARATING)
+        np.testing.assert_array_equal(found.t_end, 0.0)
+
     def test_run_that_would_not_end_within_its_steps_is_given_up_early(self, cells):
         found = solve(Auto(), cells({"drive.amplitude": 0.7, "time.span": 1e8}, drive="arctan"))
         assert (found.regime, found.certified) == (FAILED, 0)

@@ -143,6 +143,11 @@ class TestFirstRoot:
             if found:
                 assert s == pytest.approx(where * (1 - depth**0.5), rel=1e-2 * depth**0.5)
 
+    def test_series_that_rises_from_nearly_zero_has_no_root_there(self):
+        s, found = first(series([1e-18, 1e-18, 1.0, -1.5]), 1.0)
+        assert found
+        assert s == pytest.approx(2 / 3, rel=1e-12)
+
     @pytest.mark.parametrize("where", [0.125, 0.25, 0.5, 0.75])
     def test_double_root_is_found(self, where):
         """The root is an exact binary fraction: the series touches zero without a sign change."""
