@@ -325,7 +325,8 @@ class TestTime:
     def test_body_at_rest_in_space_without_gravity_loses_both_contacts_at_launch(self, cells, law):
         """The ring moves under the body: the sum of sliding velocity and speed of the ring is zero but for rounding."""
         scene = {"gravity": 0.0, "initial.omega": 0.0, "drive.frequency": 1.3, "time.span": 1.0}
-        found = solve(Auto(), cells(scene | {"drive.amplitude": np.linspace(-3.0, 3.1, 40)}, law=law, drive="sinusoidal"))
+        scene["drive.amplitude"] = np.linspace(-3.0, 3.1, 40)
+        found = solve(Auto(), cells(scene, law=law, drive="sinusoidal"))
         np.testing.assert_array_equal(found.regime, SEPARATING)
         np.testing.assert_array_equal(found.t_end, 0.0)
 
