@@ -31,8 +31,15 @@ class ByFile(LoadScopeScheduling):
         return nodeid if file.endswith("test_notebooks.py") else file
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the notebooks: at the end one process would wait for the other."""
+    items.sort(key=lambda item: item.path.name != "test_notebooks.py")
+
+
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> ByFile:
     """Scheduler of the processes."""
+    # Newer versions of xdist would begin with the files of most tests.
+    config.option.loadscopereorder = False
     return ByFile(config, log)
 
 
