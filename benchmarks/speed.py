@@ -88,7 +88,7 @@ class Effort(NamedTuple):
     rounds: int
 
 
-FULL, QUICK = Effort(480, 256, 16384, 1.0, 9), Effort(96, 32, 1024, 0.2, 3)
+FULL, QUICK = Effort(480, 256, 131072, 1.0, 9), Effort(96, 32, 8192, 0.2, 3)
 
 
 @dataclass(frozen=True)
