@@ -9,7 +9,7 @@ from ringsweep.compile.cache import SOURCES_DIGEST, has_known_source, kernel
 from ringsweep.compile.cells import Cells
 from ringsweep.compile.dispatch import hook, lacking
 from ringsweep.compile.errors import readable_compile_errors
-from ringsweep.compile.options import KERNEL_OPTIONS, absorbed, inlined, specialise
+from ringsweep.compile.options import absorbed, inlined, specialise
 from ringsweep.compile.tuples import (
     add_scaled,
     borrowed,
@@ -22,7 +22,6 @@ from ringsweep.compile.tuples import (
 )
 
 __all__ = [
-    "KERNEL_OPTIONS",
     "SOURCES_DIGEST",
     "Cells",
     "absorbed",
