@@ -8,9 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.compile import absorbed
+from ringsweep.errors import InputError
 from ringsweep.models.scene import Structure, Values, require
 from ringsweep.numerics.functions import any_of, select, square_root
 from ringsweep.physics import drives, friction
+from ringsweep.physics.friction.formula import FormulaError
+from ringsweep.physics.friction.speeds import hidden_fields
+from ringsweep.physics.friction.velocity import EXPRESSIONS
 from ringsweep.quantities.parameters import Parameter, declared
 
 MASS = Parameter("kg", "mass of the body", lower=0.0, open_lower=True)
@@ -50,30 +54,30 @@ def larger_eigenvalue(most, trace, determinant):
 def friction_coefficients(law: type, place: str, values: Values) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Static and kinetic coefficients at a path such as ``friction.rest``, each of shape ``(cells,)``.
 
-    A law without a static coefficient has the kinetic one in its place.
+    A law with one coefficient has it in the place of both.
 
     Raises
     ------
     InputError
         If the kinetic coefficient exceeds the static one.
     """
-    mu_k = values[f"{place}.mu_k"]
-    if "mu_s" not in friction.coefficients_of(law):
-        return mu_k, mu_k
-    mu_s = values[f"{place}.mu_s"]
+    names = friction.coefficients_of(law)
+    mu_s, mu_k = (values[f"{place}.{name if name in names else next(iter(names))}"] for name in ("mu_s", "mu_k"))
     require(
         mu_s >= mu_k, f"{place}.mu_k", mu_k, "{} exceeds mu_s: kinetic friction cannot be greater than static friction"
     )
     return mu_s, mu_k
 
 
-def law_of(law: type, values: Values) -> Any:
+def law_of(law: type, values: Values, surfaces: list[Any]) -> Any:
     """Friction law with fields of shape ``(cells, ...)``, from the values by path.
+
+    `surfaces` are the pairs of friction coefficients of all surfaces of the scene.
 
     Raises
     ------
     InputError
-        If one parameter must exceed another and does not.
+        If one parameter must exceed another and does not, or if a formula has no allowed value at rest.
     """
     columns = {name: values[f"friction.{name}"] for name in declared(law)}
     if ascending := friction.TRAITS[law].ascending:
@@ -82,6 +86,11 @@ def law_of(law: type, values: Values) -> Any:
         problem = f"{{}} {unit} is not greater than friction.{low}"
         require(columns[high] > columns[low], f"friction.{high}", columns[high], problem)
     make: Any = getattr(law, "of", law)
+    if law in EXPRESSIONS:
+        try:
+            columns |= hidden_fields(EXPRESSIONS[law], columns, surfaces)
+        except FormulaError as error:
+            raise InputError("scene.friction.mu", str(error)) from None
     return make(**columns)
 
 

@@ -24,7 +24,7 @@ from numba.core import cgutils, types
 from numba.extending import intrinsic
 
 from ringsweep.compile import inlined, specialise, unrolled
-from ringsweep.numerics.lanes import LANES, MASK, VECTOR, WIDTH, WORDS, llvm_function
+from ringsweep.numerics.lanes import LANES, MASK, VECTOR, WIDTH, WORDS, llvm_function, spread_scalar
 
 
 @intrinsic
@@ -245,6 +245,100 @@ def _lanes_decay(x):
     r = -x - n * _LN2
     y = _power_of_two(shifted)
     return y + y * r * _polynomial(_GROWTH, r)
+
+
+def exponential(x):
+    """``exp(x)``; in Lanes exponents beyond 700 count as 700, and those below -700 as -700."""
+    return math.exp(x)
+
+
+@lanes_body(exponential)
+def _lanes_exponential(x):
+    return decay(min(max(-x, -700.0), 700.0))
+
+
+def hyperbolic_tangent(x):
+    """Hyperbolic tangent of `x`."""
+    return math.tanh(x)
+
+
+@lanes_body(hyperbolic_tangent)
+def _lanes_hyperbolic_tangent(x):
+    q = decay(min(2.0 * abs(x), 80.0))
+    large, square = (1.0 - q) / (1.0 + q), x * x
+    # The difference would lose the digits of a small result.
+    small = x * (1.0 + square * (-1 / 3 + square * (2 / 15 + square * (-17 / 315 + square * (62 / 2835)))))
+    return select(square < 1e-3, small, select(x < 0.0, -large, large))
+
+
+_log, _pow = llvm_function("llvm.log"), llvm_function("llvm.pow")
+
+
+@intrinsic
+def _logarithm(typingctx, x):
+    return LANES(LANES), lambda context, builder, sig, args: _log(builder, *args)
+
+
+@intrinsic
+def _raised(typingctx, x, exponent):
+    return LANES(LANES, LANES), lambda context, builder, sig, args: _pow(builder, *args)
+
+
+@intrinsic
+def _arc_tangent(typingctx, x):
+    def lower(context, builder, sig, args):
+        # LLVM has no such function of vectors: the C library computes each lane.
+        kind = ir.FunctionType(ir.DoubleType(), [ir.DoubleType()])
+        function, found = cgutils.get_or_insert_function(builder.module, kind, "atan"), args[0]
+        for lane in range(WIDTH):
+            place = ir.Constant(ir.IntType(32), lane)
+            found = builder.insert_element(found, builder.call(function, [builder.extract_element(args[0], place)]), place)
+        return found
+
+    return LANES(LANES), lower
+
+
+def logarithm(x):
+    """Natural logarithm of `x`; for Lanes the C library computes each lane."""
+    return math.log(x)
+
+
+@lanes_body(logarithm)
+def _lanes_logarithm(x):
+    return _logarithm(x)
+
+
+def raised(x, exponent):
+    """`x`, at least 0, to the power `exponent`; for Lanes the C library computes each lane."""
+    return x**exponent
+
+
+@lanes_body(raised)
+def _lanes_raised(x, exponent):
+    return _raised(spread(x), spread(exponent))
+
+
+def arc_tangent(x):
+    """Arc tangent of `x`; for Lanes the C library computes each lane."""
+    return math.atan(x)
+
+
+@lanes_body(arc_tangent)
+def _lanes_arc_tangent(x):
+    return _arc_tangent(x)
+
+
+@intrinsic
+def _spread(typingctx, x):
+    return LANES(types.float64), lambda context, builder, sig, args: spread_scalar(builder, args[0], VECTOR)
+
+
+def spread(x):
+    """The number `x` in every lane. In kernels it takes floats and Lanes, and returns Lanes."""
+    return x
+
+
+specialise(spread, lambda kind: (lambda x: x) if kind == LANES else (lambda x: _spread(x)))
 
 
 def sine_cosine(x):

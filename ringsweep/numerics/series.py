@@ -5,18 +5,12 @@ A series is an array of coefficients: ``c[0] + c[1] s + c[2] s^2 + ...`` with s 
 
 from __future__ import annotations
 
-from math import ceil, comb, exp, inf, log, sqrt
+from math import comb, exp, inf, log, sqrt
 
 import numpy as np
 
 from ringsweep.compile import absorbed, inlined
-from ringsweep.numerics.terms import NUMBERS, ORDER, PRODUCTS, numbers_from, powers, set_terms, terms, total
-
-#: Columns of a table of series: ORDER + 3 numbers, rounded up so that rows begin at multiples of 64 bytes.
-COLUMNS = 24
-
-#: Rows of a table for PRODUCTS pairs of factors, see :func:`ringsweep.numerics.terms.set_factors`.
-FACTOR_ROWS = ceil(2 * (ORDER + 1) * PRODUCTS / COLUMNS)
+from ringsweep.numerics.terms import NUMBERS, ORDER, numbers_from, powers, set_terms, terms, total
 
 #: ``INVERSE[k]`` is 1/k: multiplication is many times cheaper than division.
 INVERSE = np.array([np.inf, *(1.0 / k for k in range(1, ORDER + 3))])

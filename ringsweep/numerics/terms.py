@@ -7,6 +7,7 @@ the solution of a differential equation. But several products can grow side by s
 
 from __future__ import annotations
 
+from math import ceil
 from typing import Any
 
 import llvmlite.ir as ir
@@ -14,7 +15,7 @@ import numpy as np
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
-from ringsweep.compile import specialise
+from ringsweep.compile import absorbed, function_from_lines, specialise
 from ringsweep.numerics.lanes import Lanes, spread_scalar
 
 #: Highest power of every series.
@@ -22,6 +23,15 @@ ORDER = 16
 
 #: Number of products that grow side by side.
 PRODUCTS = 8
+
+#: Columns of a table of series: ORDER + 3 numbers, rounded up so that rows begin at multiples of 64 bytes.
+COLUMNS = 24
+
+#: Rows of a table for a group of PRODUCTS pairs of factors, see :func:`set_factors`.
+FACTOR_ROWS = ceil(2 * (ORDER + 1) * PRODUCTS / COLUMNS)
+
+#: Largest number of groups in a table.
+MOST_GROUPS = 3
 
 #: ``NUMBERS[k - 1]`` is k.
 NUMBERS = np.arange(1.0, ORDER + 1)
@@ -160,10 +170,17 @@ _compiled(_total_in_kernel, total)
 
 # ---- products of several series ---------------------------------------------------------------
 
+# Products grow side by side in groups of PRODUCTS. In Python a group of factors is a pair of arrays, in kernels a pair of
+# vectors: left factors and right factors.
 
-def no_factors():
-    """Factors before the first ones, see :func:`set_factors`."""
-    return np.zeros(PRODUCTS), np.zeros(PRODUCTS)
+
+def no_factors(like):
+    """Factors before the first ones, for as many products as the tuple `like` is long, see :func:`set_factors`."""
+    return tuple((np.zeros(PRODUCTS), np.zeros(PRODUCTS)) for _ in range(_groups(len(like))))
+
+
+def _groups(products: int) -> int:
+    return -(-products // PRODUCTS)
 
 
 @intrinsic
@@ -172,34 +189,45 @@ def _no_factor(typingctx):
     return _FACTORS(), lambda context, builder, sig, args: zeros
 
 
-def _no_factors_in_kernel():
-    return _no_factor(), _no_factor()
+def _no_factors_in_kernel(like: Any) -> Any:
+    text = "(zeros(), zeros()), " * _groups(len(like))
+    return function_from_lines("like", [f"return ({text})"], {"zeros": _no_factor})
 
 
-_compiled(_no_factors_in_kernel, no_factors)
+specialise(no_factors, _no_factors_in_kernel, absorb=True)
 
 
 def set_factors(c, row, k, left, right):
-    """Store coefficient `k` of PRODUCTS pairs of factors.
+    """Store coefficient `k` of pairs of factors.
 
     Parameters
     ----------
     c : ndarray of shape ``(rows, columns)``
         Table of series.
     row : int
-        Row of the table from which on the factors stand.
+        Row of the table from which on the factors stand, FACTOR_ROWS for each group.
     k : int
     left, right : tuple of float
-        PRODUCTS numbers each.
+        One number for each product.
 
     Returns
     -------
     tuple
-        The same numbers side by side, for :func:`inner_products`; in Python arrays.
+        The same numbers side by side, for :func:`inner_products`.
     """
-    pairs = c.reshape(-1)[row * c.shape[1] :][: (k + 1) * 2 * PRODUCTS].reshape(k + 1, 2, PRODUCTS)
-    pairs[k] = left, right
-    return np.array(left), np.array(right)
+    found = []
+    for group in range(_groups(len(left))):
+        pair = np.zeros((2, PRODUCTS))
+        part = slice(group * PRODUCTS, (group + 1) * PRODUCTS)
+        pair[0, : len(left[part])], pair[1, : len(right[part])] = left[part], right[part]
+        _pairs(c, row + group * FACTOR_ROWS, k + 1)[k] = pair
+        found.append((pair[0], pair[1]))
+    return tuple(found)
+
+
+def _pairs(c: Any, row: int, count: int) -> Any:
+    """The first factors of a group, of shape ``(count, 2, PRODUCTS)``; a view."""
+    return c.reshape(-1)[row * c.shape[1] :][: count * 2 * PRODUCTS].reshape(count, 2, PRODUCTS)
 
 
 @intrinsic
@@ -214,7 +242,8 @@ def _packed(typingctx, values):
     return _FACTORS(types.UniTuple(types.float64, PRODUCTS)), lower
 
 
-def _set_factors_in_kernel(c, row, k, left, right):
+@absorbed
+def _set_group(c, row, k, left, right):
     at = row * c.shape[1] + k * (2 * PRODUCTS)
     a, b = _packed(left), _packed(right)
     _store_factors(c, at, a)
@@ -222,11 +251,23 @@ def _set_factors_in_kernel(c, row, k, left, right):
     return a, b
 
 
-_compiled(_set_factors_in_kernel, set_factors)
+def _set_factors_in_kernel(c: Any, row: Any, k: Any, left: Any, right: Any) -> Any:
+    def part(name: str, group: int) -> str:
+        places = range(group * PRODUCTS, (group + 1) * PRODUCTS)
+        return "(" + "".join(f"{name}[{i}], " if i < len(left) else "0.0, " for i in places) + ")"
+
+    calls = (
+        f"set_group(c, row + {group * FACTOR_ROWS}, k, {part('left', group)}, {part('right', group)}), "
+        for group in range(_groups(len(left)))
+    )
+    return function_from_lines("c, row, k, left, right", [f"return ({''.join(calls)})"], {"set_group": _set_group})
+
+
+specialise(set_factors, _set_factors_in_kernel, absorb=True)
 
 
 def inner_products(c, row, k, first, newest):
-    """Coefficient `k` of PRODUCTS products of two series, without the terms that contain a coefficient 0 or `k`.
+    """Coefficient `k` of products of two series, without the terms that contain a coefficient 0 or `k`.
 
     Parameters
     ----------
@@ -242,12 +283,14 @@ def inner_products(c, row, k, first, newest):
     Returns
     -------
     tuple of float
-        For each pair of factors a and b the sum of ``a[j] b[k - j]`` over j = 1 ... k - 1.
+        For each pair of factors a and b the sum of ``a[j] b[k - j]`` over j = 1 ... k - 1. The length is a multiple of
+        PRODUCTS.
     """
-    if k < 2:
-        return (0.0,) * PRODUCTS
-    pairs = c.reshape(-1)[row * c.shape[1] :][: k * 2 * PRODUCTS].reshape(k, 2, PRODUCTS)
-    return tuple((pairs[1:, 0] * pairs[:0:-1, 1]).sum(axis=0))
+    found: tuple[float, ...] = ()
+    for group in range(len(first)):
+        pairs = _pairs(c, row + group * FACTOR_ROWS, k)
+        found += tuple((pairs[1:, 0] * pairs[:0:-1, 1]).sum(axis=0)) if k > 1 else (0.0,) * PRODUCTS
+    return found
 
 
 @intrinsic
@@ -261,7 +304,8 @@ def _unpacked(typingctx, vector):
     return result(_FACTORS), lower
 
 
-def _inner_products_in_kernel(c, row, k, first, newest):
+@absorbed
+def _inner_products_of_group(c, row, k, first, newest):
     a = row * c.shape[1]
     b = a + (2 * k + 1) * PRODUCTS
     even = odd = _no_factor()
@@ -280,4 +324,39 @@ def _inner_products_in_kernel(c, row, k, first, newest):
     return _unpacked(even + first[0] * newest[1] + odd)
 
 
-_compiled(_inner_products_in_kernel, inner_products)
+def _inner_products_in_kernel(c: Any, row: Any, k: Any, first: Any, newest: Any) -> Any:
+    lines, numbers = [], []
+    for group in range(len(first)):
+        lines.append(f"g{group} = of_group(c, row + {group * FACTOR_ROWS}, k, first[{group}], newest[{group}])")
+        numbers += [f"g{group}[{i}], " for i in range(PRODUCTS)]
+    scope = {"of_group": _inner_products_of_group}
+    return function_from_lines("c, row, k, first, newest", [*lines, f"return ({''.join(numbers)})"], scope)
+
+
+specialise(inner_products, _inner_products_in_kernel, absorb=True)
+
+
+def joined(a, b):
+    """One tuple of the numbers of two tuples."""
+    return (*a, *b)
+
+
+def _joined_in_kernel(a: Any, b: Any) -> Any:
+    numbers = [f"{name}[{i}], " for name, kind in (("a", a), ("b", b)) for i in range(len(kind))]
+    return function_from_lines("a, b", [f"return ({''.join(numbers)})"], {})
+
+
+specialise(joined, _joined_in_kernel, absorb=True)
+
+
+def part_from(values, like, after):
+    """As many numbers of a tuple as the tuple `like` is long, behind as many as the tuple `after` is long."""
+    return values[len(after) : len(after) + len(like)]
+
+
+def _part_in_kernel(values: Any, like: Any, after: Any) -> Any:
+    numbers = [f"values[{i}], " for i in range(len(after), len(after) + len(like))]
+    return function_from_lines("values, like, after", [f"return ({''.join(numbers)})"], {})
+
+
+specialise(part_from, _part_in_kernel, absorb=True)

@@ -34,7 +34,7 @@ import numpy as np
 from ringsweep.compile import absorbed, hook, inlined
 from ringsweep.numerics.functions import opposing
 from ringsweep.physics import drives
-from ringsweep.physics.friction.velocity import weights
+from ringsweep.physics.friction.velocity import friction_at
 from ringsweep.physics.zones import PER_TURN, roughness
 from ringsweep.quantities.parameters import Leaf
 
@@ -488,13 +488,11 @@ def friction(scene, phi, omega, theta, ring_omega):
     """
     radius = scene.body.radius
     v = (omega - ring_omega) * radius
-    w_s, w_k, dw_s, dw_k = weights(scene.law, abs(v))
     turns, offset = (phi - theta) * PER_TURN, contact_offset(scene.body) * PER_TURN
-    mu_s, mu_k = roughness(scene.surface, turns, -offset)
-    K1, slope_1 = opposing(w_s * mu_s + w_k * mu_k, v), -(dw_s * mu_s + dw_k * mu_k) * radius
-    mu_s, mu_k = roughness(scene.surface, turns, offset)
-    K2, slope_2 = opposing(w_s * mu_s + w_k * mu_k, v), -(dw_s * mu_s + dw_k * mu_k) * radius
-    return v, K1, K2, slope_1, slope_2
+    mu_s1, mu_k1 = roughness(scene.surface, turns, -offset)
+    mu_s2, mu_k2 = roughness(scene.surface, turns, offset)
+    mu_1, mu_2, slope_1, slope_2 = friction_at(scene.law, abs(v), (mu_s1, mu_k1, mu_s2, mu_k2))
+    return v, opposing(mu_1, v), opposing(mu_2, v), -slope_1 * radius, -slope_2 * radius
 
 
 @hook

@@ -15,7 +15,8 @@ import numpy as np
 from ringsweep.compile import Cells, borrowed, hook, inlined, kernel, take
 from ringsweep.models.interface import implicit, modes, recorder, series
 from ringsweep.models.interface.status import BROKEN, COMPLETE, RUNNING
-from ringsweep.numerics.series import COLUMNS, STACK
+from ringsweep.numerics.series import STACK
+from ringsweep.numerics.terms import COLUMNS
 from ringsweep.physics import drives
 from ringsweep.physics.friction import Dynamic, SetValued, Smooth, family
 from ringsweep.solvers.audit import Audit, audit_step, fall_rate, is_checked

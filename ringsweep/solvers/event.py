@@ -14,7 +14,7 @@ from ringsweep.errors import InputError
 from ringsweep.models.interface import audit, implicit, modes, recorder, series
 from ringsweep.models.scene import Structure
 from ringsweep.physics import drives
-from ringsweep.physics.friction import LAWS, Dynamic, SetValued, Smooth, family_of, presliding, velocity
+from ringsweep.physics.friction import LAWS, Dynamic, SetValued, Smooth, family_of, presliding
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.variables import FAILED
 from ringsweep.solvers.automaton import PATIENCE, integrate
@@ -58,7 +58,7 @@ class _Piecewise(Method):
         of_model += () if family is Dynamic else series.MEMBERS
         of_model += () if family is SetValued else implicit.MEMBERS
         of_model += (implicit.is_stiff,) if family is Smooth else ()
-        of_law = presliding.MEMBERS if family is Dynamic else velocity.MEMBERS
+        of_law = presliding.MEMBERS if family is Dynamic else ()
         return Needs(of_law, drives.MEMBERS, of_model)
 
     def check(self, structure: Structure) -> None:

@@ -24,7 +24,7 @@ from ringsweep.numerics.lanes import WIDTH
 from ringsweep.numerics.memory import align_stack, conform, read, read_lanes, side_by_side, size_of, write
 from ringsweep.physics import drives
 from ringsweep.physics.drives import lookup, shape, turn, without_shape
-from ringsweep.physics.friction import LAWS, TRAITS, Dynamic, family_of, presliding, velocity
+from ringsweep.physics.friction import LAWS, TRAITS, Dynamic, family_of, presliding
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.variables import SEPARATING
 from ringsweep.solvers.certificate import certifiable, errors, with_errors
@@ -63,7 +63,7 @@ class RK4(Method):
 
     def needs(self, structure: Structure) -> Needs:
         """Functions for steps of constant length, in vector lanes."""
-        of_law: tuple[Any, ...] = velocity.MEMBERS + velocity.LANES_MEMBERS
+        of_law: tuple[Any, ...] = ()
         if family_of(LAWS[structure.law]) is Dynamic:
             of_law = (presliding.bristle, presliding.region_guard)
         return Needs(of_law, drives.CONSTANT_STEP_MEMBERS, recorder.MEMBERS + constant_step.MEMBERS)

@@ -8,7 +8,7 @@ from ringsweep.models.belt.bristles import contact_force
 from ringsweep.models.belt.force import friction_force, holds_in_band, length_scale
 from ringsweep.models.interface import audit, implicit
 from ringsweep.physics.belt import Belt, BristleBelt
-from ringsweep.physics.friction.velocity import BAND, stiction_band
+from ringsweep.physics.friction.velocity import stiction_band
 
 # Rounding of an acceleration, as a share of its largest terms.
 _ROUNDING = 1e-12
@@ -22,7 +22,7 @@ def _violation(scene, mode, forcing, y, rates, s, tolerance):
     length = abs(x) + length_scale(scene, abs(v + belt_velocity) + abs(belt_velocity))
     speed = length * (stiffness_per_mass**0.5 if stiffness_per_mass > 0.0 else 1.0)
     # In a dead band the sliding velocity need not have the direction of the force.
-    in_dead_band, largest, relaxation = holds_in_band(scene.law) and mode.region == BAND, 0.0, 0.0
+    in_dead_band, largest, relaxation = holds_in_band(scene.law) and mode.region < 0, 0.0, 0.0
     if mode.sign == 0:
         friction = -scene.stiffness * x - scene.mass * belt_acceleration
         allowed = tolerance * (load + scene.stiffness * length + scene.mass * abs(belt_acceleration)) + 1e-300
@@ -31,7 +31,7 @@ def _violation(scene, mode, forcing, y, rates, s, tolerance):
         friction, slope = friction_force(scene, x, v)
         relaxation = abs(slope) / scene.mass
         if not in_dead_band:
-            if mode.region == BAND:
+            if mode.region < 0:
                 speed = min(speed, 1e3 * stiction_band(scene.law))
             largest = -mode.sign * v / (tolerance * speed)
     terms = stiffness_per_mass * abs(x) + abs(friction) / scene.mass + abs(belt_acceleration)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ringsweep.models.belt.force import friction_force, length_scale
 from ringsweep.models.interface import implicit
 from ringsweep.physics import belt, drives
-from ringsweep.physics.friction.velocity import stiction_band
+from ringsweep.physics.friction.velocity import region_bounds, stiction_band
 
 
 # The place is relative to the drive, so that no large numbers cancel in slow creep.
@@ -59,9 +59,10 @@ def _guards_and_motion(scene, mode, common, forcing, x):
     place = x[0] + shift
     friction, _ = friction_force(scene, place, x[1])
     acceleration = -(scene.stiffness * place + friction) / scene.mass
+    low, high = region_bounds(scene.law, mode.region)
     speed = mode.sign * x[1]
     # The order is that of the rows of the series: SLOW, FAST.
-    guards = speed, stiction_band(scene.law) - speed
+    guards = speed - low, high - speed
     return guards, (place, x[1] + belt_velocity, acceleration, friction, x[0])
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ringsweep.compile import absorbed, hook, inlined
 from ringsweep.numerics.functions import opposing, select
 from ringsweep.physics.friction.registry import SetValued, family
-from ringsweep.physics.friction.velocity import stiction_band, weights
+from ringsweep.physics.friction.velocity import friction_at, stiction_band
 
 
 @hook(optional=True)
@@ -33,11 +33,10 @@ def breakaway_force(scene):
 @absorbed
 def friction_force(scene, x, v):
     """Friction force (N) at the displacement `x` and the sliding velocity `v`, and its derivative by `v` (N s/m)."""
-    w_s, w_k, dw_s, dw_k = weights(scene.law, abs(v))
+    mu, mu_slope = friction_at(scene.law, abs(v), (scene.mu_s, scene.mu_k))
     load = scene.mass * scene.gravity
-    static, kinetic = load * scene.mu_s, load * scene.mu_k
-    force = scene.viscous * v - opposing(w_s * static + w_k * kinetic, v)
-    slope = dw_s * static + dw_k * kinetic + scene.viscous
+    force = scene.viscous * v - opposing(load * mu, v)
+    slope = load * mu_slope + scene.viscous
     if holds_in_band(scene.law):
         held, bound = abs(v) < stiction_band(scene.law), breakaway_force(scene)
         force = select(held, max(-bound, min(bound, -scene.stiffness * x)), force)

@@ -91,12 +91,12 @@ class Belt(Model):
                     viscous,
                     "{} N s/m is too large: friction at the edge of the dead band exceeds friction within it",
                 )
-            return belt.Belt(**fields, law=law_of(law, values), viscous=viscous)
+            return belt.Belt(**fields, law=law_of(law, values, [(mu_s, mu_k)]), viscous=viscous)
         require(gravity > 0.0, "gravity", gravity, "{} m/s^2 is not allowed: a law with bristles needs a load")
         per_load = {
             path: value / (mass * gravity) for path, value in values.items() if path.startswith("friction.sigma")
         }
-        return belt.BristleBelt(**fields, law=law_of(law, {**values, **per_load}))
+        return belt.BristleBelt(**fields, law=law_of(law, {**values, **per_load}, [(mu_s, mu_k)]))
 
     def _drive(self, structure: Structure, values: Values) -> Any:
         """Drive of the belt, from ``belt.velocity`` or from ``drive``."""

@@ -58,9 +58,8 @@ def _inspect(scene, y, drive_at, drive_rate):
 @constant_step.eigenvalue.implements(belt.Belt)
 def _eigenvalue(scene, before, now, h, most):
     slope, load = max(abs(before.slope), abs(now.slope)), scene.mass * scene.gravity
-    (rest_s, rest_k), (edge_s, edge_k) = steepest(scene.law)
-    at_rest = abs(load * (rest_s * scene.mu_s + rest_k * scene.mu_k) + scene.viscous)
-    at_edge = abs(load * (edge_s * scene.mu_s + edge_k * scene.mu_k) + scene.viscous)
+    at_rest, at_edge = steepest(scene.law)
+    at_rest, at_edge = load * at_rest + scene.viscous, load * at_edge + scene.viscous
     per_mass = 1.0 / scene.mass
     swing = scene.stiffness * per_mass
     if holds_in_band(scene.law) or any_of(exceeds(most, max(at_rest, at_edge) * per_mass, swing)):

@@ -12,28 +12,33 @@ from ringsweep.compile import inlined
 from ringsweep.models.belt.force import breakaway_force, holds_in_band, length_scale
 from ringsweep.models.interface import modes, series
 from ringsweep.models.interface.status import RUNNING
-from ringsweep.numerics.series import FACTOR_ROWS, INVERSE, ORDER, crossings, slope, step_size, value, variation
-from ringsweep.numerics.terms import inner_products, no_factors, set_factors, set_terms, terms
+from ringsweep.numerics.series import INVERSE, ORDER, crossings, slope, step_size, value, variation
+from ringsweep.numerics.terms import (
+    FACTOR_ROWS,
+    MOST_GROUPS,
+    inner_products,
+    no_factors,
+    part_from,
+    set_factors,
+    set_terms,
+    terms,
+)
 from ringsweep.physics import belt, drives
 from ringsweep.physics.friction.velocity import (
-    BAND,
     KINETIC,
-    basis_at,
-    basis_factor,
-    basis_term,
-    faster,
-    friction_terms,
-    piece,
+    begin_series,
+    no_products,
     region_at,
     region_bounds,
+    series_term,
     shorten_for_decay,
-    slower,
     stiction_band,
 )
 
 # Rows of the table of series; the guards are last.
 X, V, VELOCITY, FORCE, SHIFT, SPARE, FACTORS = range(7)
-SLOW, FAST = FACTORS + FACTOR_ROWS, FACTORS + FACTOR_ROWS + 1
+SLOW = FACTORS + MOST_GROUPS * FACTOR_ROWS
+FAST = SLOW + 1
 
 
 class Mode(NamedTuple):
@@ -81,7 +86,7 @@ def _initial_mode(scene, t, y):
     if holds_in_band(scene.law) and abs(v) <= stiction_band(scene.law):
         return RUNNING, _mode_at_rest(scene, t, x)
     if v == 0.0:
-        return RUNNING, Mode(1 if _pull(scene, t, x) >= 0.0 else -1, BAND, SLOW)
+        return RUNNING, Mode(1 if _pull(scene, t, x) >= 0.0 else -1, region_at(scene.law, 0.0), SLOW)
     return RUNNING, Mode(1 if v > 0.0 else -1, region_at(scene.law, abs(v)), -1)
 
 
@@ -109,17 +114,16 @@ def _switch(scene, mode, guard, t, y):
         return RUNNING, Mode(1 if guard == SLOW else -1, region_at(scene.law, 0.0), SLOW), y
     low, high = region_bounds(scene.law, region)
     if guard == FAST:
-        return RUNNING, Mode(sign, faster(scene.law, region), SLOW), (x, sign * high)
+        return RUNNING, Mode(sign, region + 1, SLOW), (x, sign * high)
     if low > 0.0:
-        new_region = slower(scene.law, region)
-        if holds_in_band(scene.law) and new_region == BAND:
+        if holds_in_band(scene.law) and region - 1 < 0:
             return RUNNING, _mode_at_rest(scene, t, x), (x, sign * low)
-        return RUNNING, Mode(sign, new_region, FAST), (x, sign * low)
-    if holds_in_band(scene.law) and region == BAND:
+        return RUNNING, Mode(sign, region - 1, FAST), (x, sign * low)
+    if holds_in_band(scene.law) and region < 0:
         # The pull has fallen to the breakaway force.
         return RUNNING, Mode(0, KINETIC, SLOW if sign > 0 else FAST), y
-    if region == BAND:
-        return RUNNING, Mode(-sign, BAND, SLOW), (x, 0.0)
+    if region < 0:
+        return RUNNING, Mode(-sign, region, SLOW), (x, 0.0)
     return RUNNING, _mode_at_rest(scene, t, x), (x, 0.0)
 
 
@@ -130,6 +134,7 @@ def _expand(scene, mode, t, y, tolerance, c):
     stiffness_per_mass = scene.stiffness / scene.mass
     c[X, 0], c[V, 0] = y
     c[VELOCITY, 0] = y[1] + c[SHIFT, 1]
+    sharpness = 0.0
     if mode.sign == 0:
         bound = breakaway_force(scene)
         for k in range(ORDER + 1):
@@ -144,16 +149,15 @@ def _expand(scene, mode, t, y, tolerance, c):
         c[SLOW, 0] = 0.0 if mode.entry_guard == SLOW else c[SLOW, 0] + bound
         c[FAST, 0] = 0.0 if mode.entry_guard == FAST else c[FAST, 0] + bound
     else:
-        p, sign = piece(scene.law, mode.region), float(mode.sign)
-        low, high = p.low, p.high
-        yielding = holds_in_band(scene.law) and mode.region == BAND
+        sign, surfaces = float(mode.sign), (scene.mu_s, scene.mu_k)
+        low, high = region_bounds(scene.law, mode.region)
+        yielding = holds_in_band(scene.law) and mode.region < 0
         viscous = 0.0 if yielding else scene.viscous
-        x_0 = sign * c[V, 0] - low
-        _, factor_0 = basis_at(p, x_0)
-        force, by_x, by_q, by_cube = friction_terms(p, sign * load * scene.mu_s, sign * load * scene.mu_k, x_0)
-        force += viscous * c[V, 0]
+        (mu,), begun, sharpness = begin_series(scene.law, mode.region, sign * c[V, 0], surfaces)
+        force = sign * load * mu + viscous * c[V, 0]
         c[FORCE, 0], place, velocity = force, c[X, 0], c[VELOCITY, 0]
-        first = newest = no_factors()
+        of_law = no_products(scene.law, surfaces)
+        first = newest = no_factors(of_law)
         for k in range(1, ORDER + 1):
             place, velocity = (
                 velocity * INVERSE[k],
@@ -161,16 +165,15 @@ def _expand(scene, mode, t, y, tolerance, c):
             )
             v = velocity - (k + 1.0) * c[SHIFT, k + 1]
             x = sign * v
-            inner, inner_cube, _, _, _, _, _, _ = inner_products(c, FACTORS, k, first, newest)
-            q = basis_term(p, k, factor_0, x, inner)
-            force = by_x * x + by_q * q + by_cube * inner_cube + viscous * v
-            right = basis_factor(p, x, q), q, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-            newest = set_factors(c, FACTORS, k, (k * x, x, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), right)
+            inner = part_from(inner_products(c, FACTORS, k, first, newest), of_law, ())
+            (mu,), left, right = series_term(scene.law, mode.region, k, x, inner, begun, surfaces)
+            force = sign * load * mu + viscous * v
+            newest = set_factors(c, FACTORS, k, left, right)
             first = newest if k == 1 else first
             c[X, k], c[VELOCITY, k], c[V, k], c[FORCE, k] = place, velocity, v, force
         set_terms(c[SLOW], terms(c[V]) * sign)
         set_terms(c[FAST], terms(c[V]) * -sign)
-        excess = x_0
+        excess = sign * c[V, 0] - low
         if yielding:
             # With a dead band the velocity of the belt is constant.
             set_terms(c[SLOW], terms(c[X]) * (-sign * scene.stiffness))
@@ -184,13 +187,13 @@ def _expand(scene, mode, t, y, tolerance, c):
     # The unit of length is the distance that belt, body or load could move within a natural period of the spring.
     length = abs(c[X, 0]) + length_scale(scene, abs(c[VELOCITY, 0]) + abs(c[SHIFT, 1]))
     speed = length * (stiffness_per_mass**0.5 if stiffness_per_mass > 0.0 else 1.0)
-    if mode.region == BAND and not holds_in_band(scene.law):
+    if mode.region < 0 and not holds_in_band(scene.law):
         # An error as large as the stiction band would keep the creep from becoming steady.
         speed = min(speed, 1e3 * stiction_band(scene.law))
     last = max(abs(c[X, ORDER]) / length, abs(c[V, ORDER]) / speed)
     previous = max(abs(c[X, ORDER - 1]) / length, abs(c[V, ORDER - 1]) / speed)
     h = step_size(last / tolerance, previous / tolerance)
-    return h if mode.sign == 0 else shorten_for_decay(scene.law, mode.region, c[V], h)
+    return h if mode.sign == 0 else shorten_for_decay(sharpness, c[V], h)
 
 
 @series.state_at.implements(belt.Belt)
@@ -233,7 +236,7 @@ def _extremes(scene, record, mode, c, h, work):
 
 @series.row.implements(belt.Belt)
 def _row(scene, mode, c, t, s):
-    mode_now = 0.0 if mode.region == BAND else float(mode.sign)
+    mode_now = 0.0 if mode.region < 0 else float(mode.sign)
     return value(c[X], s), value(c[VELOCITY], s), value(c[FORCE], s), 0.0, mode_now
 
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from ringsweep.compile import hook, inlined
 from ringsweep.physics import drives
-from ringsweep.physics.friction.velocity import BAND
 
 #: Tolerance of an implicit step, in units of the tolerance of the series.
 IMPLICIT_TOLERANCE = 1e3
@@ -32,7 +31,7 @@ def may_creep(scene, mode):
     bool
         By default true in the stiction band of a smooth law.
     """
-    return mode.region == BAND
+    return mode.region < 0
 
 
 @hook

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from ringsweep.compile import hook
 from ringsweep.models.interface.status import BROKEN
-from ringsweep.physics.friction.velocity import BAND
 
 
 @hook
@@ -114,7 +113,7 @@ def sticks(scene, mode):
     bool
         By default true in stick, and in the stiction band of a smooth law.
     """
-    return mode.sign == 0 or mode.region == BAND
+    return mode.sign == 0 or mode.region < 0
 
 
 @hook

@@ -19,7 +19,7 @@ from ringsweep.models.ring.series import REACTION_TOLERANCE
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction import SetValued, family_of
 from ringsweep.physics.friction.bristles import bristle
-from ringsweep.physics.friction.velocity import BAND, stiction_band, weights
+from ringsweep.physics.friction.velocity import friction_at, stiction_band
 from ringsweep.physics.zones import PER_TURN, Segments, edge_ahead, roughest, roughness
 from ringsweep.quantities.variables import SEPARATING
 
@@ -81,15 +81,14 @@ def _violation(scene, mode, forcing, y, rates, s, tolerance):
         epsilon, _, _ = ring.acceleration(body, K1, K2, sin_phi, cos_phi, omega)
         least, relaxation = min(reserve, min(normal_1, normal_2)), 0.0
     else:
-        w_s, w_k, dw_s, dw_k = weights(scene.law, abs(v))
         sign = 1.0 if v > 0.0 else -1.0
-        K1, K2 = -sign * (w_s * mu_s1 + w_k * mu_k1), -sign * (w_s * mu_s2 + w_k * mu_k2)
-        slope_1, slope_2 = dw_s * mu_s1 + dw_k * mu_k1, dw_s * mu_s2 + dw_k * mu_k2
+        mu_1, mu_2, slope_1, slope_2 = friction_at(scene.law, abs(v), (mu_s1, mu_k1, mu_s2, mu_k2))
+        K1, K2 = -sign * mu_1, -sign * mu_2
         epsilon, determinant, inertia = ring.acceleration(body, K1, K2, sin_phi, cos_phi, omega)
         normal_1, normal_2 = ring.reactions(body, K1, K2, sin_phi, cos_phi, omega, epsilon)
         least = min(normal_1, normal_2)
         relaxation = body.radius * abs(ring.acceleration_slope(body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega))
-        if mode.region == BAND:
+        if mode.region < 0:
             speed = min(speed, 1e3 * stiction_band(scene.law))
         largest = _larger(largest, -mode.sign * v / (tolerance * speed))
         if not (determinant > 0.0 and inertia > 0.0):

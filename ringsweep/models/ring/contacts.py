@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ringsweep.compile import inlined
 from ringsweep.physics import ring
-from ringsweep.physics.friction.velocity import weights_in
+from ringsweep.physics.friction.velocity import friction_in
 from ringsweep.physics.zones import coefficients, cross_edge, edge_ahead, leave_edge, locate, segment
 
 
@@ -78,6 +78,5 @@ def zones_at(scene, rho):
 @inlined
 def friction_under(scene, mode, speed):
     """Friction ``(K1, K2)`` per unit of each reaction in slip, at the sliding speed `speed`, m/s."""
-    mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
-    w_s, w_k, _, _ = weights_in(scene.law, mode.region, speed)
-    return -mode.sign * (w_s * mu_s1 + w_k * mu_k1), -mode.sign * (w_s * mu_s2 + w_k * mu_k2)
+    mu_1, mu_2, _, _ = friction_in(scene.law, mode.region, speed, coefficients_under(scene, mode))
+    return -mode.sign * mu_1, -mode.sign * mu_2

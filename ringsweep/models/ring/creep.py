@@ -6,7 +6,7 @@ numbers, however slow the creep.
 
 from __future__ import annotations
 
-from math import cos, exp, sin, sqrt
+from math import cos, sin, sqrt
 from typing import NamedTuple
 
 from ringsweep.compile import inlined
@@ -14,7 +14,7 @@ from ringsweep.models.interface import implicit
 from ringsweep.models.ring.contacts import coefficients_under, edges_ahead, zones_under
 from ringsweep.numerics.functions import ROTATED, rotated, sine_cosine_from
 from ringsweep.physics import drives, ring
-from ringsweep.physics.friction.velocity import piece, stiction_band
+from ringsweep.physics.friction.velocity import friction_in, region_bounds, stiction_band
 
 #: Indices of the guards, in the order of the rows of the series.
 INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(6)
@@ -27,70 +27,32 @@ class Common(NamedTuple):
     ----------
     rho, phi, sin_phi, cos_phi : float
         Angle of the body at the beginning, in the ring's frame and in space, rad; sine and cosine of the latter.
-    low, decay : float
-        As in :class:`ringsweep.physics.friction.velocity.Piece`.
     per_radius : float
         Reciprocal of the radius of the ring, 1/m.
-    friction_1, friction_2 : tuple of float
-        Coefficients of the magnitude of K at contacts 1 and 2, in the order of a weight of the piece.
+    surfaces : tuple of float
+        Coefficients of the surfaces under contacts 1 and 2.
     """
 
     rho: float
     phi: float
     sin_phi: float
     cos_phi: float
-    low: float
-    decay: float
     per_radius: float
-    friction_1: tuple[float, float, float, float]
-    friction_2: tuple[float, float, float, float]
-
-
-@inlined
-def _blend(static, kinetic, mu_s, mu_k):
-    """Coefficients of friction from those of the weights of both coefficients."""
-    s0, s1, s2, s3 = static
-    k0, k1, k2, k3 = kinetic
-    return mu_s * s0 + mu_k * k0, mu_s * s1 + mu_k * k1, mu_s * s2 + mu_k * k2, mu_s * s3 + mu_k * k3
+    surfaces: tuple[float, float, float, float]
 
 
 @implicit.common.implements(ring.Ring)
 def _common(scene, mode, forcing, x):
-    mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
-    p = piece(scene.law, mode.region)
     phi = x[0] + forcing[0]
-    return Common(
-        x[0],
-        phi,
-        sin(phi),
-        cos(phi),
-        p.low,
-        p.decay,
-        1.0 / scene.body.radius,
-        _blend(p.static, p.kinetic, mu_s1, mu_k1),
-        _blend(p.static, p.kinetic, mu_s2, mu_k2),
-    )
+    return Common(x[0], phi, sin(phi), cos(phi), 1.0 / scene.body.radius, coefficients_under(scene, mode))
 
 
 @inlined
-def _friction(common, v):
+def _friction(scene, mode, common, v):
     """K at contacts 1 and 2, and their derivatives by the sliding velocity (s/m), in the segments of the mode."""
     sign = 1.0 if v >= 0.0 else -1.0
-    s = abs(v) - common.low
-    q, slope = s * s, 2.0 * s
-    if common.decay > 0.0:
-        # exp(-40) is less than the rounding of the sum.
-        q = exp(-common.decay * s) if common.decay * s < 40.0 else 0.0
-        slope = -common.decay * q
-    a0, a1, a2, a3 = common.friction_1
-    b0, b1, b2, b3 = common.friction_2
-    a, b = a2 + a3 * s, b2 + b3 * s
-    return (
-        -sign * (a0 + a1 * s + a * q),
-        -sign * (b0 + b1 * s + b * q),
-        -(a1 + a3 * q + a * slope),
-        -(b1 + b3 * q + b * slope),
-    )
+    mu_1, mu_2, slope_1, slope_2 = friction_in(scene.law, mode.region, abs(v), common.surfaces)
+    return -sign * mu_1, -sign * mu_2, -slope_1, -slope_2
 
 
 @inlined
@@ -136,7 +98,7 @@ def _error_scales(scene, tolerance, x):
 def _rates(scene, mode, common, forcing, x):
     radius = scene.body.radius
     _, omega, sin_phi, cos_phi = _in_space(common, forcing, x)
-    K1, K2, _, _ = _friction(common, x[1])
+    K1, K2, _, _ = _friction(scene, mode, common, x[1])
     epsilon, _, _ = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
     return x[1] * common.per_radius, radius * (epsilon - forcing[2])
 
@@ -147,7 +109,7 @@ def _linearise(scene, mode, common, t, forcing, x):
     radius = b.radius
     _, ring_omega, ring_epsilon = forcing
     _, omega, sin_phi, cos_phi = _in_space(common, forcing, x)
-    K1, K2, slope_1, slope_2 = _friction(common, x[1])
+    K1, K2, slope_1, slope_2 = _friction(scene, mode, common, x[1])
     epsilon, _, _ = ring.acceleration(b, K1, K2, sin_phi, cos_phi, omega)
     by_phi, by_omega = ring.acceleration_gradient(b, K1, K2, sin_phi, cos_phi, omega)
     by_v = ring.acceleration_slope(b, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega)
@@ -163,18 +125,19 @@ def _linearise(scene, mode, common, t, forcing, x):
 @implicit.guards_and_motion.implements(ring.Ring)
 def _guards_and_motion(scene, mode, common, forcing, x):
     phi, omega, sin_phi, cos_phi = _in_space(common, forcing, x)
-    K1, K2, _, _ = _friction(common, x[1])
+    K1, K2, _, _ = _friction(scene, mode, common, x[1])
     epsilon, determinant, inertia = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
     normal_1, normal_2 = ring.reactions(scene.body, K1, K2, sin_phi, cos_phi, omega, epsilon)
     ahead_1, ahead_2 = edges_ahead(scene, mode, x[0])
+    low, high = region_bounds(scene.law, mode.region)
     speed = mode.sign * x[1]
     guards = (
         min(determinant, inertia),
-        speed,
+        speed - low,
         normal_1,
         normal_2,
         min(ahead_1, ahead_2),
-        stiction_band(scene.law) - speed,
+        high - speed,
     )
     return guards, (phi, omega, epsilon, forcing[1])
 

@@ -97,11 +97,13 @@ class SingleContactRing(Model):
             )
             for arc in structure.arcs
         ]
-        surface = zones.surface_of(arcs, *friction_coefficients(law, "friction.rest", values))
+        rest = friction_coefficients(law, "friction.rest", values)
+        surface = zones.surface_of(arcs, *rest)
+        surfaces = [rest, *((arc.mu_s, arc.mu_k) for arc in arcs)]
         return self.scene_type(structure)(
             body=self.build_body(values),
             surface=surface,
-            law=law_of(law, values),
+            law=law_of(law, values, surfaces),
             drive=drive_of(structure, values),
             initial_phi=values["initial.phi"],
             initial_omega=values["initial.omega"],

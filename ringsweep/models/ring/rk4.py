@@ -124,9 +124,7 @@ def _eigenvalue(scene, before, now, h, most):
     friction_slope = _steeper(before.slope, now.slope)
     # A step that jumps over the band, or over its edge, does not sample the slope there. The slope counts all the same,
     # since just such a step may lead to a wrong regime.
-    mu_s, mu_k = zones.roughest(scene.surface)
-    (rest_s, rest_k), (edge_s, edge_k) = steepest(scene.law)
-    at_rest, at_edge = rest_s * mu_s + rest_k * mu_k, edge_s * mu_s + edge_k * mu_k
+    at_rest, at_edge = steepest(scene.law)
     scale = -radius * ring.friction_gain(scene.body, now.cos_phi, now.omega)
     bound = max(abs(at_rest), abs(at_edge)) * abs(scale) + abs(now.by_omega)
     if any_of(exceeds(most, bound, -now.by_phi)):

@@ -27,7 +27,6 @@ from ringsweep.models.ring.contacts import (
 )
 from ringsweep.models.ring.record import ENDS
 from ringsweep.numerics.series import (
-    FACTOR_ROWS,
     INVERSE,
     ORDER,
     crossings,
@@ -37,31 +36,37 @@ from ringsweep.numerics.series import (
     value,
     variation,
 )
-from ringsweep.numerics.terms import inner_products, no_factors, set_factors, set_terms, terms
+from ringsweep.numerics.terms import (
+    FACTOR_ROWS,
+    MOST_GROUPS,
+    inner_products,
+    joined,
+    no_factors,
+    part_from,
+    set_factors,
+    set_terms,
+    terms,
+)
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction.velocity import (
-    BAND,
     KINETIC,
-    basis_at,
-    basis_factor,
-    basis_term,
-    constant_weights,
-    faster,
-    friction_terms,
-    piece,
+    begin_series,
+    friction_in,
+    no_products,
     region_at,
     region_bounds,
+    series_term,
     shorten_for_decay,
-    slower,
     stiction_band,
-    weights_in,
+    varies,
 )
 
 # Rows of the table of series. The guards are last. INERTIA is the first guard: the others mean nothing after a jam.
 PHI, V, OMEGA, EPSILON, SIN, COS, SQUARE, THETA, SPARE = range(9)
 # Factors of the products that grow side by side, in several rows.
 FACTORS = 9
-INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(FACTORS + FACTOR_ROWS, FACTORS + FACTOR_ROWS + 6)
+_GUARDS = FACTORS + MOST_GROUPS * FACTOR_ROWS
+INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(_GUARDS, _GUARDS + 6)
 
 # If one reaction vanishes and the other is smaller than this share of the load, both contacts separate.
 AT_ONCE = 1e-9
@@ -126,9 +131,8 @@ def _initial_mode(scene, t, y):
 @inlined
 def _at_breakaway(scene, mode):
     """Friction coefficient under each contact at the beginning of slip."""
-    mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
-    w_s, w_k, _, _ = weights_in(scene.law, mode.region, 0.0)
-    return w_s * mu_s1 + w_k * mu_k1, w_s * mu_s2 + w_k * mu_k2
+    mu_1, mu_2, _, _ = friction_in(scene.law, mode.region, 0.0, coefficients_under(scene, mode))
+    return mu_1, mu_2
 
 
 @inlined
@@ -250,11 +254,11 @@ def _switch(scene, mode, guard, t, y):
         return _after_jump(scene, mode, t, y), mode, y
     low, high = region_bounds(scene.law, region)
     if guard == FAST:
-        return RUNNING, Mode(sign, faster(scene.law, region), SLOW, place_1, place_2), (phi, sign * high)
+        return RUNNING, Mode(sign, region + 1, SLOW, place_1, place_2), (phi, sign * high)
     if low > 0.0:
-        return RUNNING, Mode(sign, slower(scene.law, region), FAST, place_1, place_2), (phi, sign * low)
-    if region == BAND:
-        return RUNNING, Mode(-sign, BAND, SLOW, place_1, place_2), (phi, 0.0)
+        return RUNNING, Mode(sign, region - 1, FAST, place_1, place_2), (phi, sign * low)
+    if region < 0:
+        return RUNNING, Mode(-sign, region, SLOW, place_1, place_2), (phi, 0.0)
     status, next_mode = _mode_at_rest(scene, t, phi, place_1, place_2, 0)
     return status, next_mode, (phi, 0.0)
 
@@ -267,18 +271,18 @@ def _expand(scene, mode, t, y, tolerance, c):
     if mode.sign == 0:
         return _expand_stick(scene, mode, tolerance, c)
     c[OMEGA, 0] = ring.angular_velocity(scene.body, y[1], c[THETA, 1])
-    _expand_slip(scene, mode, c)
+    sharpness = _expand_slip(scene, mode, c)
     _expand_slip_guards(scene, mode, c)
     per_angle = 1.0 / tolerance
     speed = scene.body.radius * (1.0 + abs(c[OMEGA, 0]))
-    if mode.region == BAND:
+    if mode.region < 0:
         # An error as large as the stiction band would keep the creep from becoming steady.
         speed = min(speed, 1e3 * stiction_band(scene.law))
     per_velocity = per_angle / speed
     # An error of the reactions could add or hide a separation. A bound on the acceleration is not enough: varying
     # friction changes the reactions even of a body that is too inert to be accelerated.
     per_load = 1.0 / REACTION_TOLERANCE * per_angle
-    if not constant_weights(scene.law, mode.region):
+    if varies(scene.law, mode.region):
         # Even at a loose tolerance a root of a reaction must not be a root of its error.
         per_load = max(per_load, 1e3)
     per_epsilon = per_load / (scene.body.gravity / scene.body.radius + c[SQUARE, 0] + abs(c[EPSILON, 0]))
@@ -293,26 +297,23 @@ def _expand(scene, mode, t, y, tolerance, c):
     ):
         last = max(last, abs(c[row, ORDER]) * unit)
         previous = max(previous, abs(c[row, ORDER - 1]) * unit)
-    return shorten_for_decay(scene.law, mode.region, c[V], step_size(last, previous))
+    return shorten_for_decay(sharpness, c[V], step_size(last, previous))
 
 
 @inlined
 def _expand_slip(scene, mode, c):
-    """Fill the series of slip.
+    """Fill the series of slip and return the sharpness of the friction law.
 
     Each coefficient is computed from numbers that are still in registers; the table only keeps it.
     """
     body = scene.body
     sign = float(mode.sign)
     speed = sign * body.radius
-    mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
-    p = piece(scene.law, mode.region)
+    surfaces = coefficients_under(scene, mode)
     omega_0 = c[OMEGA, 0]
     sin_0, cos_0, square_0 = sin(c[PHI, 0]), cos(c[PHI, 0]), omega_0 * omega_0
-    x_0 = sign * c[V, 0] - p.low
-    _, factor_0 = basis_at(p, x_0)
-    K1_0, by_x1, by_q1, by_cube1 = friction_terms(p, -sign * mu_s1, -sign * mu_k1, x_0)
-    K2_0, by_x2, by_q2, by_cube2 = friction_terms(p, -sign * mu_s2, -sign * mu_k2, x_0)
+    (mu_1, mu_2), begun, sharpness = begin_series(scene.law, mode.region, sign * c[V, 0], surfaces)
+    K1_0, K2_0 = -sign * mu_1, -sign * mu_2
     acceleration, reaction_1, reaction_2 = slip_balance(body, K1_0, K2_0)
     epsilon = _constant_term(acceleration, sin_0, cos_0, square_0)
     N1_0 = _constant_term(reaction_1, sin_0, cos_0, square_0)
@@ -320,23 +321,25 @@ def _expand_slip(scene, mode, c):
     c[SIN, 0], c[COS, 0], c[SQUARE, 0], c[EPSILON, 0] = sin_0, cos_0, square_0, epsilon
     c[NORMAL_1, 0], c[NORMAL_2, 0] = N1_0, N2_0
     before = omega_0
-    first = newest = no_factors()
+    own, of_law = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), no_products(scene.law, surfaces)
+    first = newest = no_factors(joined(own, of_law))
     for k in range(1, ORDER + 1):
         omega = epsilon * INVERSE[k]
         x = speed * omega - speed * ((k + 1.0) * c[THETA, k + 1])
-        sine, cosine, square, inner, inner_cube, loaded_1, loaded_2, both = inner_products(c, FACTORS, k, first, newest)
-        q = basis_term(p, k, factor_0, x, inner)
-        K1 = by_x1 * x + by_q1 * q + by_cube1 * inner_cube
-        K2 = by_x2 * x + by_q2 * q + by_cube2 * inner_cube
+        inner = inner_products(c, FACTORS, k, first, newest)
+        sine, cosine, square, loaded_1, loaded_2, both = part_from(inner, own, ())
+        (mu_1, mu_2), law_left, law_right = series_term(
+            scene.law, mode.region, k, x, part_from(inner, of_law, own), begun, surfaces
+        )
+        K1, K2 = -sign * mu_1, -sign * mu_2
         sine, cosine = (sine + before * cos_0) * INVERSE[k], -(cosine + before * sin_0) * INVERSE[k]
         square += 2.0 * omega_0 * omega
         loaded_1, loaded_2 = loaded_1 + K1 * N1_0, loaded_2 + K2 * N2_0
         epsilon = _term(acceleration, sine, cosine, square, loaded_1, loaded_2)
         N1 = _term(reaction_1, sine, cosine, square, loaded_1, loaded_2)
         N2 = _term(reaction_2, sine, cosine, square, loaded_1, loaded_2)
-        left = before, before, omega, k * x, x, K1, K2, K1
-        right = cosine, sine, omega, basis_factor(p, x, q), q, N1, N2, K2
-        newest = set_factors(c, FACTORS, k, left, right)
+        left, right = (before, before, omega, K1, K2, K1), (cosine, sine, omega, N1, N2, K2)
+        newest = set_factors(c, FACTORS, k, joined(left, law_left), joined(right, law_right))
         first = newest if k == 1 else first
         c[PHI, k], c[OMEGA, k], c[V, k] = before * INVERSE[k], omega, sign * x
         c[SIN, k], c[COS, k], c[SQUARE, k], c[EPSILON, k] = sine, cosine, square, epsilon
@@ -345,8 +348,9 @@ def _expand_slip(scene, mode, c):
         before = omega
     # Before a jam the accelerations grow without bound, so that a small effective inertia counts as a jam.
     _, determinant, inertia = ring.acceleration(body, K1_0, K2_0, 0.0, 0.0, 0.0)
-    least = 0.0 if constant_weights(scene.law, mode.region) else 1e-6 * ring.about_axis(body) * determinant
+    least = 1e-6 * ring.about_axis(body) * determinant if varies(scene.law, mode.region) else 0.0
     c[INERTIA, 0] = inertia if determinant > 0.0 and inertia > least else -1.0
+    return sharpness
 
 
 @inlined
@@ -482,13 +486,13 @@ def _expand_stick(scene, mode, tolerance, c):
     c[V, 0], c[OMEGA, 0], c[EPSILON, 0] = 0.0, omega_0, 2.0 * c[THETA, 2]
     c[SIN, 0], c[COS, 0], c[SQUARE, 0] = sin_0, cos_0, omega_0 * omega_0
     before = omega_0
-    first = newest = no_factors()
+    own = 0.0, 0.0, 0.0
+    first = newest = no_factors(own)
     for k in range(1, ORDER + 1):
         omega = (k + 1.0) * c[THETA, k + 1]
-        sine, cosine, square, _, _, _, _, _ = inner_products(c, FACTORS, k, first, newest)
+        sine, cosine, square = part_from(inner_products(c, FACTORS, k, first, newest), own, ())
         sine, cosine = (sine + before * cos_0) * INVERSE[k], -(cosine + before * sin_0) * INVERSE[k]
-        left, right = (before, before, omega, 0.0, 0.0, 0.0, 0.0, 0.0), (cosine, sine, omega, 0.0, 0.0, 0.0, 0.0, 0.0)
-        newest = set_factors(c, FACTORS, k, left, right)
+        newest = set_factors(c, FACTORS, k, (before, before, omega), (cosine, sine, omega))
         first = newest if k == 1 else first
         c[PHI, k], c[V, k], c[OMEGA, k] = c[THETA, k], 0.0, omega
         c[EPSILON, k] = (k + 1.0) * (k + 2.0) * c[THETA, k + 2]
@@ -533,7 +537,8 @@ def _two_stick_series(body, m1, m2, c):
     mean, half = 0.5 * (m1 + m2), 0.5 * (m1 - m2)
     moment = b.inertia + b.mass * b.xi * b.xi
     first_difference = first_share = first_linear = first_total = 0.0
-    first = newest = no_factors()
+    own = 0.0, 0.0, 0.0, 0.0
+    first = newest = no_factors(own)
     for k in range(ORDER + 1):
         friction = (moment * c[EPSILON, k] + b.mass * b.gravity * b.xi * c[SIN, k]) / b.radius
         difference = (b.mass * (b.xi * c[EPSILON, k] + b.gravity * c[SIN, k]) - friction * cb) / sb
@@ -541,7 +546,7 @@ def _two_stick_series(body, m1, m2, c):
         # mean cb total^2 - linear total - constant = 0
         linear = mean * load - cb * half * difference + sb * half * friction
         share = half * load + mean * sb * friction
-        constant, square, mixed, total, _, _, _, _ = inner_products(c, FACTORS, k, first, newest)
+        constant, square, mixed, total = part_from(inner_products(c, FACTORS, k, first, newest), own, ())
         # Where both roots meet, stick ends: no friction gives the acceleration of the ring.
         if k == 0:
             first_difference, first_share, first_linear = difference, share, linear
@@ -552,8 +557,8 @@ def _two_stick_series(body, m1, m2, c):
             c[EDGE, k] = square + 2.0 * first_linear * linear + 4.0 * mean * cb * constant
             rest = constant + mixed + linear * first_total - mean * cb * total
             total = rest / (2.0 * mean * cb * first_total - first_linear)
-            left = difference, linear, linear, total, 0.0, 0.0, 0.0, 0.0
-            newest = set_factors(c, FACTORS, k, left, (share, linear, total, total, 0.0, 0.0, 0.0, 0.0))
+            left, right = (difference, linear, linear, total), (share, linear, total, total)
+            newest = set_factors(c, FACTORS, k, left, right)
             first = newest if k == 1 else first
         c[NORMAL_1, k] = 0.5 * (total + difference)
         c[NORMAL_2, k] = 0.5 * (total - difference)
@@ -623,7 +628,7 @@ def _row(scene, mode, c, t, s):
         drives.turn(scene.drive, t)[1],
         zone_1,
         zone_2,
-        0.0 if mode.region == BAND else float(mode.sign),
+        0.0 if mode.region < 0 else float(mode.sign),
     )
 
 

@@ -7,7 +7,7 @@ where the load is the weight of the body, and on the ring, where the reactions v
 from importlib import import_module
 from pkgutil import iter_modules
 
-from ringsweep.physics.friction import bristles, coulomb, regularised
+from ringsweep.physics.friction import bristles, laws  # noqa: F401
 from ringsweep.physics.friction.registry import (
     LAWS,
     TRAITS,
@@ -21,9 +21,8 @@ from ringsweep.physics.friction.registry import (
     family_of,
 )
 
-for _laws in (coulomb.LAWS, regularised.LAWS, bristles.LAWS):
-    for _name, (_law, _traits) in _laws.items():
-        add_law(_name, _law, _traits)
+for _name, (_law, _traits) in bristles.LAWS.items():
+    add_law(_name, _law, _traits)
 
 __all__ = [
     "LAWS",

@@ -319,9 +319,9 @@ def _recoil_stick_speed(law, recoil):
 
 #: Laws by the name that the configuration gives them.
 LAWS = {
-    "dahl": (Dahl, Traits(Dynamic, static=False)),
+    "dahl": (Dahl, Traits(Dynamic, coefficients=("mu_k",))),
     "lugre": (LuGre, Traits(Dynamic)),
     "elasto-plastic": (ElastoPlastic, Traits(Dynamic)),
     "reset-integrator": (ResetIntegrator, Traits(Dynamic)),
-    "bristle": (Bristles, Traits(Dynamic, static=False, snaps=True)),
+    "bristle": (Bristles, Traits(Dynamic, coefficients=("mu_k",), snaps=True)),
 }

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from ringsweep.compile import hook, lacking
-from ringsweep.physics.friction import presliding, velocity
+from ringsweep.physics.friction import presliding
+from ringsweep.physics.friction.velocity import MU_K, MU_S
 from ringsweep.quantities.parameters import Parameter
 
 
@@ -30,8 +31,8 @@ class Traits:
     ----------
     family : type
         :class:`SetValued`, :class:`Smooth` or :class:`Dynamic`.
-    static : bool
-        Whether the law has a static coefficient beside the kinetic one.
+    coefficients : tuple of str
+        Friction coefficients that the law needs of each surface: ``mu_s``, ``mu_k`` or both.
     ascending : tuple of str, optional
         Names of two parameters; the first value must be less than the second.
     snaps : bool
@@ -41,7 +42,7 @@ class Traits:
     """
 
     family: type
-    static: bool = True
+    coefficients: tuple[str, ...] = ("mu_s", "mu_k")
     ascending: tuple[str, str] | None = None
     snaps: bool = False
     dead_band: bool = False
@@ -52,14 +53,6 @@ LAWS: dict[str, type] = {}
 
 #: Traits of each law.
 TRAITS: dict[type, Traits] = {}
-
-# Functions that every law of a family must have.
-_NEEDED: dict[type, tuple[Any, ...]] = {
-    SetValued: velocity.MEMBERS,
-    Smooth: velocity.MEMBERS,
-    Dynamic: presliding.MEMBERS,
-}
-
 
 @hook
 def family(law):
@@ -89,21 +82,27 @@ def add_law(name: str, law: type, traits: Traits) -> None:
     name : str
         Name in configurations.
     law : type
-        ``NamedTuple`` of the law's parameters. The hooks of its family must have bodies for it.
+        ``NamedTuple`` of the law's parameters. If it has bristles, the hooks of :mod:`presliding` must have bodies for
+        it.
     traits : Traits
         Family and other traits.
 
     Raises
     ------
     TypeError
-        If a hook of the family has no body for the law, or if the name is taken.
+        If a hook has no body for the law, or if the name is taken.
     """
-    if missing := lacking(law, _NEEDED[traits.family]):
+    if traits.family is Dynamic and (missing := lacking(law, presliding.MEMBERS)):
         raise TypeError(
             f"friction law {name} has no {', '.join(missing)}: its family needs it, before add_law is called"
         )
     if LAWS.setdefault(name, law) is not law:
         raise TypeError(f"there is a friction law {name} already: choose another name")
+    describe(law, traits)
+
+
+def describe(law: type, traits: Traits) -> None:
+    """Set the traits of a law that has no name of its own."""
     TRAITS[law] = traits
     family.implements(law)(_FAMILY_BODIES[traits.family])
 
@@ -115,5 +114,5 @@ def family_of(law: type) -> type:
 
 def coefficients_of(law: type) -> dict[str, Parameter]:
     """Parameters of the friction coefficients that a law needs of each surface."""
-    mu_k = presliding.MU_K if family_of(law) is Dynamic else velocity.MU_K
-    return {"mu_s": velocity.MU_S, "mu_k": mu_k} if TRAITS[law].static else {"mu_k": mu_k}
+    known = {"mu_s": MU_S, "mu_k": presliding.MU_K if family_of(law) is Dynamic else MU_K}
+    return {name: known[name] for name in TRAITS[law].coefficients}

@@ -1,197 +1,259 @@
-"""Friction laws that are functions of the sliding velocity alone: values, slopes, power series and regions.
+"""Friction laws that are functions of the sliding velocity alone. Each law is one expression; all else is derived from it.
 
-A law gives the friction coefficient as a weighted sum of the static and the kinetic coefficient of the surface,
+The expression gives the friction coefficient at a sliding speed, :math:`\\mu(|v|)`, from the coefficients ``mu_s`` and
+``mu_k`` of the surface and from parameters of the law. Derived are its slope, its power series, its form for vector
+lanes, and its *regions*: intervals of the sliding speed in which the expression is analytic. Regions are numbered from
+slow to fast. In the regions with negative numbers, the *stiction band*, a contact counts as stuck.
 
-.. math:: \\mu(|v|) = w_s(|v|)\\, \\mu_s + w_k(|v|)\\, \\mu_k .
-
-Both contacts of a body have the same weights, even on different surfaces. The weights are analytic within each of up to
-three regions of the sliding speed. :func:`piece` gives them there; all else is derived from it.
+*Surfaces* are the coefficients of the surfaces under the contacts, ``(mu_s, mu_k, mu_s, mu_k, ...)``.
 """
 
 from __future__ import annotations
 
-from math import exp, inf, sqrt
-from typing import Any, NamedTuple
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from math import inf, nan, sqrt
+from typing import Any
 
-import numpy as np
-
-from ringsweep.compile import hook, inlined
-from ringsweep.numerics.functions import any_of, decay, lanes_body, select
+from ringsweep.compile import function_from_lines, inlined, specialise
+from ringsweep.numerics import writer
+from ringsweep.numerics.expressions import Node, derivative, substitute, symbol
+from ringsweep.numerics.functions import (
+    any_of,
+    arc_tangent,
+    exponential,
+    hyperbolic_tangent,
+    logarithm,
+    raised,
+    select,
+    spread,
+    square_root,
+)
+from ringsweep.numerics.lanes import LANES
 from ringsweep.numerics.series import INVERSE
+from ringsweep.numerics.terms import MOST_GROUPS, PRODUCTS
+from ringsweep.physics.friction.formula import COEFFICIENTS, Threshold
 from ringsweep.quantities.parameters import Parameter
 
 MU_S = Parameter("1", "static friction coefficient", lower=0.0)
 MU_K = Parameter("1", "kinetic friction coefficient", lower=0.0)
 
-#: Regions of the sliding speed, from the fastest to the slowest. In BAND a contact counts as stuck.
-KINETIC, STRIBECK, BAND = 0, 1, 2
+#: Numbers of the regions of laws with bristles, which have two: in BAND the contact counts as stuck.
+BAND, KINETIC = -1, 0
 
 
-class Piece(NamedTuple):
-    """Weights of both friction coefficients in a region of the sliding speed.
-
-    With ``x = speed - low`` and ``q = exp(-decay x)``, or ``q = x**2`` if ``decay`` is zero, a weight with the
-    coefficients ``(a0, a1, a2, a3)`` is ``a0 + a1 x + a2 q + a3 x q``.
+@dataclass(frozen=True, eq=False)
+class Expression:
+    """What defines a friction law of the sliding velocity.
 
     Attributes
     ----------
-    low, high : float
-        Bounds of the region, m/s. Both are zero if the law lacks the region.
-    decay : float
-        Decay of q, s/m.
-    static, kinetic : tuple of float
-        Coefficients of the weights of the static and of the kinetic coefficient: a0 in 1, a1 in s/m; a2 in 1 and a3 in
-        s/m, or a2 in s^2/m^2 and a3 in s^3/m^3 if ``decay`` is zero.
+    mu : Node
+        Friction coefficient as a function of the speed, m/s.
+    thresholds : tuple of Threshold
+        Speeds at which the expression switches.
+    set_valued : bool
+        Whether friction takes any value up to ``mu_s`` at rest.
+    band : Node, optional
+        Speed at which the stiction band ends, m/s. By default the first speed at which friction no longer grows; for a
+        set-valued law zero.
+    parameters : mapping of str to Parameter
     """
 
-    low: float
-    high: float
-    decay: float
-    static: tuple[float, float, float, float]
-    kinetic: tuple[float, float, float, float]
+    mu: Node
+    thresholds: tuple[Threshold, ...]
+    set_valued: bool
+    band: Node | None
+    parameters: Mapping[str, Parameter] = field(default_factory=dict)
+
+    @property
+    def has_band(self) -> bool:
+        """Whether the law has a stiction band or a dead band."""
+        return self.band is not None or not self.set_valued
+
+    @property
+    def has_edges(self) -> bool:
+        """Whether the law has more than one region."""
+        return self.has_band or bool(self.thresholds)
 
 
-#: Coefficients of constant weights.
-ZERO = (0.0, 0.0, 0.0, 0.0)
-ONE = (1.0, 0.0, 0.0, 0.0)
+#: Expressions of the laws, by the type of the law.
+EXPRESSIONS: dict[type, Expression] = {}
 
 
-@hook
-def piece(law, region):
-    """Weights of both friction coefficients in a region of the sliding speed.
+def _per_contact(expression: Expression, surfaces: int) -> list[Node]:
+    """Friction coefficient at each contact, with the coefficients of its surface."""
+    return [
+        substitute(expression.mu, {symbol(name): symbol(f"{name} {i}") for name in COEFFICIENTS})
+        for i in range(surfaces // 2)
+    ]
 
-    Parameters
-    ----------
-    law : NamedTuple
-    region : int
-        KINETIC, STRIBECK or BAND.
 
-    Returns
-    -------
-    Piece
-        :func:`absent` if the law lacks the region.
+def _names(expression: Expression, surfaces: int) -> dict[str, str]:
+    names = {name: f"law.{name}" for name in expression.parameters}
+    for i in range(surfaces):
+        names[f"{COEFFICIENTS[i % 2]} {i // 2}"] = f"surfaces[{i}]"
+    return names
+
+
+_SCOPE = {
+    "any_of": any_of,
+    "atan_of": arc_tangent,
+    "exp_of": exponential,
+    "inf": inf,
+    "INVERSE": INVERSE,
+    "log_of": logarithm,
+    "nan": nan,
+    "power_of": raised,
+    "select": select,
+    "spread": spread,
+    "sqrt_of": square_root,
+    "tanh_of": hyperbolic_tangent,
+}
+
+# In a region the condition for the lower side of a switch compares the lower bound of the region with its threshold.
+_REGION_SIDE, _SPEED_SIDE = "low < law.thresholds[{}]", "speed < law.thresholds[{}]"
+
+
+def _derived(write: Callable[..., list[str]]) -> Any:
+    """Make a function of a law whose body is written from the expression of the law.
+
+    `write` takes the expression, the number of coefficients of surfaces, and whether numbers are vector lanes; then the
+    names of the arguments. It returns the lines of the body.
     """
+    names = [name for name in inspect.signature(write).parameters if name not in ("expression", "count", "lanes")]
+
+    @cache
+    def body(law: type, count: int, lanes: bool) -> Any:
+        expression = EXPRESSIONS.get(law)
+        if expression is None:
+            return None
+        lines = write(expression, count, lanes, *names)
+        return function_from_lines(", ".join(names), lines, _SCOPE | {"low_of": lower_bound})
+
+    def count_of(arguments: Any) -> int:
+        return len(arguments[names.index("surfaces")]) if "surfaces" in names else 0
+
+    def function(*arguments: Any) -> Any:
+        found = body(type(arguments[0]), count_of(arguments), False)
+        if found is None:
+            raise TypeError(f"{type(arguments[0]).__name__} is not a friction law of the velocity")
+        return found(*arguments)
+
+    def typed(*kinds: Any) -> Any:
+        in_lanes = LANES in kinds
+        return body(getattr(kinds[0], "instance_class", type(None)), count_of(kinds), in_lanes)
+
+    function.__name__, function.__doc__, function.__module__ = write.__name__, write.__doc__, write.__module__
+    parameters = [inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD) for name in names]
+    function.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    specialise(function, typed, absorb=True)
+    return function
 
 
-@hook(absorb=True)
-def stiction_band(law):
-    """Sliding speed below which a contact counts as stuck, m/s: the upper bound of BAND; 0 for laws without BAND."""
+# ---- regions ----------------------------------------------------------------------------------
+
+
+@_derived
+def stiction_band(expression, count, lanes, law):
+    """Sliding speed below which a contact counts as stuck, m/s; 0 for set-valued laws without a dead band."""
+    return ["return law.band" if expression.has_band else "return 0.0"]
+
+
+def _interval(expression: Expression) -> str:
+    """Source text for the number of edges below a region."""
+    return "region + law.in_band" if expression.has_band else "region"
+
+
+@_derived
+def lower_bound(expression, count, lanes, law, region):
+    """Lower bound of a region, m/s."""
+    if not expression.has_edges:
+        return ["return 0.0"]
+    return [f"i = {_interval(expression)}", "return law.edges[i - 1] if i > 0 else 0.0"]
+
+
+@_derived
+def upper_bound(expression, count, lanes, law, region):
+    """Upper bound of a region, m/s."""
+    if not expression.has_edges:
+        return ["return inf"]
+    return [f"i = {_interval(expression)}", "return law.edges[i] if i < len(law.edges) else inf"]
+
+
+@_derived
+def region_at(expression, count, lanes, law, speed):
+    """Region of a sliding speed, m/s; a bound belongs to the region above it."""
+    if not expression.has_edges:
+        return ["return 0"]
+    lines = ["i = 0", "for edge in law.edges:", "    if speed >= edge and edge < inf:", "        i += 1"]
+    return [*lines, "return i - law.in_band" if expression.has_band else "return i"]
 
 
 @inlined
 def region_bounds(law, region):
     """Lower and upper bound of a region, m/s."""
-    p = piece(law, region)
-    return p.low, p.high
+    return lower_bound(law, region), upper_bound(law, region)
 
 
-@inlined
-def region_at(law, speed):
-    """Region of a sliding speed, m/s; a bound belongs to the region above it."""
-    if speed >= piece(law, KINETIC).low:
-        return KINETIC
-    p = piece(law, STRIBECK)
-    return STRIBECK if p.low < p.high and speed >= p.low else BAND
+@_derived
+def varies(expression, count, lanes, law, region):
+    """Whether friction depends on the sliding speed within a region."""
+    return ["low = low_of(law, region)", *writer.varies_lines(expression.mu, _REGION_SIDE)]
 
 
-@inlined
-def faster(law, region):
-    """Region above the upper bound of `region`."""
-    return STRIBECK if region == BAND and piece(law, STRIBECK).low < piece(law, STRIBECK).high else KINETIC
+# ---- values -----------------------------------------------------------------------------------
 
 
-@inlined
-def slower(law, region):
-    """Region below the lower bound of `region`."""
-    return STRIBECK if region == KINETIC and piece(law, STRIBECK).low < piece(law, STRIBECK).high else BAND
+def _values(expression: Expression, count: int) -> tuple[dict[str, str], list[Node]]:
+    found = _per_contact(expression, count)
+    return _names(expression, count), [*found, *map(derivative, found)]
 
 
-@inlined
-def constant_weights(law, region):
-    """Whether both weights are constant in a region."""
-    p = piece(law, region)
-    (_, s1, s2, s3), (_, k1, k2, k3) = p.static, p.kinetic
-    return s1 == 0.0 and s2 == 0.0 and s3 == 0.0 and k1 == 0.0 and k2 == 0.0 and k3 == 0.0
-
-
-@hook(absorb=True)
-def blend(law, speed):
-    """Body of :func:`weights` for vector lanes. Each lane may be in another region, so it is written without ``if``.
+@_derived
+def friction_at(expression, count, lanes, law, speed, surfaces):
+    """Friction coefficient at each contact, 1, then its slope at each contact, s/m; for floats and Lanes.
 
     Parameters
     ----------
     law : NamedTuple
-        Its fields are Lanes.
-    speed : Lanes
+    speed : float or Lanes
         Magnitude of the sliding velocity, m/s.
+    surfaces : tuple
+        Coefficients of the surfaces.
 
     Returns
     -------
-    tuple of Lanes
-        ``(w_s, w_k, dw_s/dspeed, dw_k/dspeed)``; weights in 1, slopes in s/m.
+    tuple
+        ``(mu, ..., slope, ...)``. In lanes a set-valued law has no friction at rest, where it has no single value.
     """
+    names, outputs = _values(expression, count)
+    if not lanes:
+        return writer.float_lines(names, outputs, _SPEED_SIDE)
+    lines = writer.lanes_lines(names, outputs, "law.thresholds[{}]")
+    if expression.has_band:
+        return lines
+    half = len(outputs) // 2
+    lines[-1] = lines[-1].replace("return", "found =")
+    coefficients = "".join(f"select(speed > 0.0, found[{i}], 0.0), " for i in range(half))
+    return [*lines, f"return ({coefficients}" + "".join(f"found[{half + i}], " for i in range(half)) + ")"]
 
 
-@hook(absorb=True)
-def steepest(law):
-    """Slopes of the weights where friction is steepest: at rest, and outside the stiction band.
+@_derived
+def friction_in(expression, count, lanes, law, region, speed, surfaces):
+    """What :func:`friction_at` returns, by the formula of a region, even if the speed lies outside the region."""
+    return ["low = low_of(law, region)", *writer.float_lines(*_values(expression, count), _REGION_SIDE)]
 
-    ``rk4`` takes the stiffness of a step that meets one of these speeds from them.
 
-    Parameters
-    ----------
-    law : NamedTuple
+@_derived
+def steepest(expression, count, lanes, law):
+    """Slopes of friction where it is steepest: at rest, and outside the stiction band; s/m.
 
-    Returns
-    -------
-    tuple of tuple of float
-        ``((dw_s/dspeed, dw_k/dspeed) at rest, (dw_s/dspeed, dw_k/dspeed) outside the band)``, s/m. The latter are the
-        steepest ones, usually at the upper bound of the band.
+    They hold for the roughest surface. ``rk4`` takes the stiffness of a step that meets one of these speeds from them.
     """
-
-
-def weights(law, speed):
-    """Weights of the static and the kinetic coefficient, and their slopes.
-
-    Parameters
-    ----------
-    law : NamedTuple
-    speed : float
-        Magnitude of the sliding velocity, m/s.
-
-    Returns
-    -------
-    tuple of float
-        ``(w_s, w_k, dw_s/dspeed, dw_k/dspeed)``; weights in 1, slopes in s/m.
-    """
-    return weights_in(law, region_at(law, speed), speed)
-
-
-@lanes_body(weights)
-def _lanes_weights(law, speed):
-    return blend(law, speed)
-
-
-@inlined
-def weights_in(law, region, speed):
-    """:func:`weights` by the formula of a region, even if the speed lies outside the region."""
-    p = piece(law, region)
-    if constant_weights(law, region):
-        return p.static[0], p.kinetic[0], 0.0, 0.0
-    x = speed - p.low
-    if p.decay > 0.0:
-        # exp(-40) is less than the rounding of the sum.
-        q = exp(-p.decay * x) if p.decay * x < 40.0 else 0.0
-        q_x = -p.decay * q
-    else:
-        q, q_x = x * x, 2.0 * x
-    (s0, s1, s2, s3), (k0, k1, k2, k3) = p.static, p.kinetic
-    return (
-        s0 + s1 * x + (s2 + s3 * x) * q,
-        k0 + k1 * x + (k2 + k3 * x) * q,
-        s1 + s3 * q + (s2 + s3 * x) * q_x,
-        k1 + k3 * q + (k2 + k3 * x) * q_x,
-    )
+    return ["return law.slope_at_rest, law.slope_beyond"]
 
 
 @inlined
@@ -219,61 +281,74 @@ def passes_band(law, before, after, ahead):
     return rest, rest | ((slow < band) & (band <= fast)), rest & (slow >= band)
 
 
-@inlined
-def basis_at(p, x):
-    """q at the speed `x` (m/s) above the lower bound of a region, and its factor in q'; see :func:`basis_term`."""
-    q = exp(-p.decay * max(x, 0.0)) if p.decay > 0.0 else x * x
-    return q, basis_factor(p, x, q)
+# ---- power series -----------------------------------------------------------------------------
 
 
-@inlined
-def basis_factor(p, x, q):
-    """Coefficient of the factor of x' in q': that of q for an exponential, that of x for a square."""
-    return q if p.decay > 0.0 else x
+@cache
+def _series(expression: Expression, count: int) -> writer.SeriesSource:
+    return writer.series_source(_names(expression, count), _per_contact(expression, count), _REGION_SIDE)
 
 
-@inlined
-def basis_term(p, k, factor_0, x, inner):
-    """Coefficient `k`, 1 or more, of the power series of q, from ``q' = -decay x' q`` or ``q' = 2 x' x``.
-
-    Parameters
-    ----------
-    p : Piece
-    k : int
-    factor_0 : float
-        Coefficient 0 of the factor, see :func:`basis_factor`.
-    x : float
-        Coefficient `k` of x.
-    inner : float
-        Inner product of x' and the factor, see :func:`ringsweep.numerics.terms.inner_products`.
-    """
-    return (-p.decay if p.decay > 0.0 else 2.0) * (x * factor_0 + INVERSE[k] * inner)
+#: Largest number of products in the power series of a law: tables have places for that many besides those of a model.
+MOST_PRODUCTS = MOST_GROUPS * PRODUCTS - 8
 
 
-@inlined
-def friction_terms(p, mu_s, mu_k, x_0):
-    """Friction coefficient in a region as a power series, given those of x and q.
+def series_products(expression: Expression) -> int:
+    """Number of products in the power series of friction at two contacts."""
+    return _series(expression, 4).products
+
+
+@_derived
+def no_products(expression, count, lanes, law, surfaces):
+    """Tuple of zeros, one for each product in the power series of friction."""
+    return [f"return ({'0.0, ' * _series(expression, count).products})"]
+
+
+@_derived
+def begin_series(expression, count, lanes, law, region, speed, surfaces):
+    """Coefficient 0 of the power series of friction.
 
     Parameters
     ----------
-    p : Piece
-    mu_s, mu_k : float
-        Static and kinetic friction coefficient of the surface, 1.
-    x_0 : float
-        Coefficient 0 of x, m/s.
+    law : NamedTuple
+    region : int
+    speed : float
+        Coefficient 0 of the sliding speed, m/s.
+    surfaces : tuple of float
+        Coefficients of the surfaces.
 
     Returns
     -------
-    tuple of float
-        Coefficient 0 of the friction coefficient, and its derivatives by the coefficient k of x, by that of q, and by
-        the inner product of x and q in that of x q.
+    tuple
+        Friction coefficient at each contact; numbers for :func:`series_term`; and the sharpness of the law for
+        :func:`shorten_for_decay`, s/m.
     """
-    s0, s1, s2, s3 = p.static
-    k0, k1, k2, k3 = p.kinetic
-    a0, a1, a2, a3 = s0 * mu_s + k0 * mu_k, s1 * mu_s + k1 * mu_k, s2 * mu_s + k2 * mu_k, s3 * mu_s + k3 * mu_k
-    q_0, _ = basis_at(p, x_0)
-    by_q = a2 + a3 * x_0
-    return a0 + a1 * x_0 + by_q * q_0, a1 + a3 * q_0, by_q, a3
+    return ["low = low_of(law, region)", *_series(expression, count).start]
+
+
+@_derived
+def series_term(expression, count, lanes, law, region, k, x, inner, begun, surfaces):
+    """Coefficient `k`, 1 or more, of the power series of friction.
+
+    Parameters
+    ----------
+    law : NamedTuple
+    region, k : int
+    x : float
+        Coefficient `k` of the sliding speed.
+    inner : tuple of float
+        Inner products of the factors, see :func:`ringsweep.numerics.terms.inner_products`.
+    begun : tuple of float
+        Second result of :func:`begin_series`.
+    surfaces : tuple of float
+        Coefficients of the surfaces.
+
+    Returns
+    -------
+    tuple of tuple of float
+        Coefficient of friction at each contact; left factors and right factors of the products.
+    """
+    return ["low = low_of(law, region)", *_series(expression, count).step]
 
 
 # Largest change of the exponent of an exponential within a step. For a larger change the terms still grow at the end of
@@ -282,90 +357,19 @@ _MAX_EXPONENT = 8.0
 
 
 @inlined
-def shorten_for_decay(law, region, v, h):
-    """Step shortened from `h`, s, so that the series of the weights converges within it.
+def shorten_for_decay(sharpness, v, h):
+    """Step shortened from `h`, s, so that the series of friction converges within it.
 
     Parameters
     ----------
-    law : NamedTuple
-    region : int
+    sharpness : float
+        Third result of :func:`begin_series`, s/m.
     v : ndarray of shape ``(3 or more,)``
         Series of the sliding velocity, m/s^(k + 1).
     h : float
         Step, s.
     """
-    decay = piece(law, region).decay
-    return min(h, min(0.5 * _MAX_EXPONENT / (decay * abs(v[1])), sqrt(0.5 * _MAX_EXPONENT / (decay * abs(v[2])))))
-
-
-# ---- exponential tails ------------------------------------------------------------------------
-
-ALPHA = Parameter("s/m", "decay of friction with sliding speed", lower=0.0)
-
-
-@inlined
-def absent():
-    """Piece for a region that a law lacks."""
-    return Piece(0.0, 0.0, 0.0, ONE, ZERO)
-
-
-@inlined
-def exponential_tail(region, low, high, alpha):
-    """Piece of an exponential tail: from static to kinetic friction as ``exp(-alpha (speed - low))``.
-
-    Parameters
-    ----------
-    region : int
-        STRIBECK for the tail, KINETIC for the region above it.
-    low, high : float
-        Bounds of the tail, m/s.
-    alpha : float
-        Decay, s/m; with 0 friction stays static.
-    """
-    if region == KINETIC:
-        return Piece(high, inf, 0.0, ZERO, ONE)
-    if alpha == 0.0:
-        return Piece(low, high, 0.0, ONE, ZERO)
-    return Piece(low, high, alpha, (0.0, 0.0, 1.0, 0.0), (1.0, 0.0, -1.0, 0.0))
-
-
-@inlined
-def exponential_weights(alpha, x, lasts):
-    """:func:`weights` of an exponential tail, for floats and Lanes. Below the tail the result has no meaning.
-
-    Parameters
-    ----------
-    alpha : float or Lanes
-        Decay, s/m.
-    x : float or Lanes
-        Speed minus the lower bound of the tail, m/s.
-    lasts : bool or Mask
-        Whether the speed is below the upper bound of the tail.
-    """
-    q, decays = 0.0 * x, lasts & (x >= 0.0)
-    # Often no run is in the tail.
-    if any_of(decays):
-        q = select(decays, decay(alpha * x), q)
-    return q, 1.0 - q, -alpha * q, alpha * q
-
-
-def end_of_tail(alpha: Any, low: Any) -> Any:
-    """Upper bound of an exponential tail, m/s: the rest of it changes the sliding velocity by less than 1e-17 m/s.
-
-    Parameters
-    ----------
-    alpha : float or ndarray
-        Decay, s/m. With 0 the tail does not end.
-    low : float or ndarray
-        Lower bound of the tail, m/s.
-    """
-    with np.errstate(divide="ignore"):
-        length = np.clip(39.1 - np.log(alpha), 10.0, 40.0) / alpha
-    return np.where(np.asarray(alpha) > 0.0, low + length, inf)
-
-
-#: Functions that every law of the sliding velocity must have.
-MEMBERS = (piece, stiction_band)
-
-#: Functions that ``rk4`` needs besides.
-LANES_MEMBERS = (blend, steepest)
+    if sharpness == 0.0:
+        return h
+    longest = 0.5 * _MAX_EXPONENT / sharpness
+    return min(h, min(longest / abs(v[1]), sqrt(longest / abs(v[2]))))

@@ -1,0 +1,290 @@
+"""Expressions of one variable, the speed, with parameters: what friction laws are written in.
+
+An expression is a graph in which equal parts are one node. So common parts are computed once, in whatever language the
+expression is written out later.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """A node of an expression. Two equal expressions are the same object.
+
+    Attributes
+    ----------
+    kind : str
+        ``number``, ``symbol``, ``speed``, ``add``, ``multiply``, ``divide``, ``power``, ``exp``, ``log``, ``sqrt``,
+        ``tanh``, ``atan``, ``switch``; ``minimum`` or ``maximum`` of constant parts.
+    parts : tuple of Node
+        What the node is computed from. Of a switch, the expression below its threshold and the one above.
+    value : float, str or int, optional
+        Value of a number, name of a symbol, or index of the threshold of a switch.
+    """
+
+    kind: str
+    parts: tuple[Node, ...] = ()
+    value: Any = None
+
+    @property
+    def varies(self) -> bool:
+        """Whether the node depends on the speed."""
+        return _varies(self)
+
+
+_NODES: dict[Any, Node] = {}
+
+
+def _node(kind: str, *parts: Node, value: Any = None) -> Node:
+    key = kind, parts, value
+    if key not in _NODES:
+        _NODES[key] = Node(kind, parts, value)
+    return _NODES[key]
+
+
+@cache
+def _varies(node: Node) -> bool:
+    return node.kind in ("speed", "switch") or any(_varies(part) for part in node.parts)
+
+
+#: The speed, at least zero.
+SPEED = _node("speed")
+
+
+def number(value: float) -> Node:
+    """A constant."""
+    return _node("number", value=float(value))
+
+
+def symbol(name: str) -> Node:
+    """A parameter."""
+    return _node("symbol", value=name)
+
+
+ZERO, ONE = number(0.0), number(1.0)
+
+
+def add(a: Node, b: Node) -> Node:
+    """Sum."""
+    if a is ZERO:
+        return b
+    if b is ZERO:
+        return a
+    if a.kind == b.kind == "number":
+        return number(a.value + b.value)
+    return _node("add", a, b)
+
+
+def multiply(a: Node, b: Node) -> Node:
+    """Product; a constant factor of a varying one stands first."""
+    if a.varies and not b.varies:
+        a, b = b, a
+    if a is ZERO or b is ZERO:
+        return ZERO
+    if a is ONE:
+        return b
+    if b is ONE:
+        return a
+    if a.kind == b.kind == "number":
+        return number(a.value * b.value)
+    # Constant factors are multiplied once, not at each speed.
+    for one, other in ((b, a), (a, b)):
+        if one.kind == "multiply" and one.varies and not one.parts[0].varies:
+            return multiply(multiply(one.parts[0], other), one.parts[1]) if not other.varies else multiply(
+                one.parts[0], multiply(one.parts[1], other)
+            )
+    return _node("multiply", a, b)
+
+
+def negative(a: Node) -> Node:
+    """The expression with the other sign."""
+    return multiply(number(-1.0), a)
+
+
+def divide(a: Node, b: Node) -> Node:
+    """Quotient; a varying dividend is multiplied by the reciprocal of a constant divisor."""
+    if a is ZERO:
+        return ZERO
+    if b is ONE:
+        return a
+    if a.kind == b.kind == "number" and b.value != 0.0:
+        return number(a.value / b.value)
+    if a.varies and not b.varies:
+        return multiply(divide(ONE, b), a)
+    if b.varies and not a.varies and a is not ONE:
+        return multiply(a, divide(ONE, b))
+    if a.kind == "multiply" and a.varies and not a.parts[0].varies:
+        return multiply(a.parts[0], divide(a.parts[1], b))
+    return _node("divide", a, b)
+
+
+def power(a: Node, exponent: Node) -> Node:
+    """Power; a whole constant exponent becomes a product."""
+    if exponent.kind == "number" and float(exponent.value).is_integer() and abs(exponent.value) <= 64:
+        n = int(exponent.value)
+        if n < 0:
+            return divide(ONE, power(a, number(-n)))
+        if n <= 1:
+            return a if n else ONE
+        half = power(a, number(n // 2))
+        return multiply(multiply(half, half), a) if n % 2 else multiply(half, half)
+    if exponent.varies:
+        return function("exp", multiply(exponent, function("log", a)))
+    return function("sqrt", a) if exponent.kind == "number" and exponent.value == 0.5 else _node("power", a, exponent)
+
+
+_FUNCTIONS: dict[str, Callable[[float], float]] = {
+    "exp": math.exp,
+    "log": math.log,
+    "sqrt": math.sqrt,
+    "tanh": math.tanh,
+    "atan": math.atan,
+}
+
+
+def function(name: str, a: Node) -> Node:
+    """``exp``, ``log``, ``sqrt``, ``tanh`` or ``atan`` of an expression."""
+    if a.kind == "number":
+        try:
+            return number(_FUNCTIONS[name](a.value))
+        except (ValueError, OverflowError):
+            return number(math.nan)
+    return _node(name, a)
+
+
+def extreme(kind: str, a: Node, b: Node) -> Node:
+    """``minimum`` or ``maximum`` of two expressions that do not depend on the speed."""
+    return a if a is b else _node(kind, a, b)
+
+
+def switch(threshold: int, below: Node, above: Node) -> Node:
+    """`below` at speeds less than a threshold, `above` from the threshold on."""
+    return below if below is above else _node("switch", below, above, value=threshold)
+
+
+@cache
+def derivative(a: Node) -> Node:
+    """Derivative by the speed; at a threshold the one from above."""
+    if not a.varies:
+        return ZERO
+    if a.kind == "speed":
+        return ONE
+    rates = [derivative(part) for part in a.parts]
+    p = a.parts
+    if a.kind == "add":
+        return add(*rates)
+    if a.kind == "multiply":
+        return add(multiply(rates[0], p[1]), multiply(p[0], rates[1]))
+    if a.kind == "divide":
+        return divide(add(rates[0], negative(multiply(a, rates[1]))), p[1])
+    if a.kind == "power":
+        return multiply(multiply(p[1], divide(a, p[0])), rates[0])
+    if a.kind == "exp":
+        return multiply(a, rates[0])
+    if a.kind == "log":
+        return divide(rates[0], p[0])
+    if a.kind == "sqrt":
+        return divide(multiply(number(0.5), rates[0]), a)
+    if a.kind == "tanh":
+        return multiply(add(ONE, negative(multiply(a, a))), rates[0])
+    if a.kind == "atan":
+        return divide(rates[0], add(ONE, multiply(p[0], p[0])))
+    return switch(a.value, *rates)
+
+
+def substitute(a: Node, values: Mapping[Node, Node]) -> Node:
+    """Expression in which nodes are replaced by others."""
+    done: dict[Node, Node] = dict(values)
+
+    def visit(node: Node) -> Node:
+        if node not in done:
+            done[node] = rebuilt(node, [visit(part) for part in node.parts])
+        return done[node]
+
+    return visit(a)
+
+
+def rebuilt(node: Node, parts: list[Node]) -> Node:
+    """Node of the same kind from other parts."""
+    simple: dict[str, Callable[..., Node]] = {"add": add, "multiply": multiply, "divide": divide, "power": power}
+    if node.kind in simple:
+        return simple[node.kind](*parts)
+    if node.kind in ("minimum", "maximum"):
+        return extreme(node.kind, *parts)
+    if node.kind in _FUNCTIONS:
+        return function(node.kind, *parts)
+    return switch(node.value, *parts) if node.kind == "switch" else node
+
+
+def nodes_of(*expressions: Node) -> list[Node]:
+    """All nodes, each after its parts."""
+    found: dict[Node, None] = {}
+
+    def visit(node: Node) -> None:
+        if node not in found:
+            for part in node.parts:
+                visit(part)
+            found[node] = None
+
+    for expression in expressions:
+        visit(expression)
+    return list(found)
+
+
+def symbols_of(*expressions: Node) -> list[str]:
+    """Names of the parameters, in the order in which they occur."""
+    return [node.value for node in nodes_of(*expressions) if node.kind == "symbol"]
+
+
+def evaluate(a: Node, speed: Any, values: Mapping[str, Any], thresholds: Any = ()) -> NDArray[np.float64]:
+    """Value of an expression in NumPy.
+
+    Parameters
+    ----------
+    a : Node
+    speed : array_like
+        Speed, at least zero; broadcasts with the values.
+    values : mapping of str to array_like
+        Values of the parameters.
+    thresholds : sequence of array_like
+        Speed of each threshold.
+
+    Returns
+    -------
+    ndarray
+        NaN or infinite where the expression has no finite value.
+    """
+    found: dict[Node, Any] = {}
+    with np.errstate(all="ignore"):
+        for node in nodes_of(a):
+            found[node] = _apply(node, [found[part] for part in node.parts], speed, values, thresholds)
+    return np.asarray(found[a], dtype=np.float64)
+
+
+def _apply(node: Node, parts: list[Any], speed: Any, values: Mapping[str, Any], thresholds: Any) -> Any:
+    if node.kind == "number":
+        return np.float64(node.value)
+    if node.kind == "symbol":
+        return np.asarray(values[node.value], dtype=np.float64)
+    if node.kind == "speed":
+        return np.asarray(speed, dtype=np.float64)
+    if node.kind == "switch":
+        return np.where(np.asarray(speed) < thresholds[node.value], *parts)
+    simple: dict[str, Any] = {"add": np.add, "multiply": np.multiply, "divide": np.divide, "power": np.power}
+    return (simple[node.kind] if node.kind in simple else getattr(np, {"atan": "arctan"}.get(node.kind, node.kind)))(
+        *parts
+    )
+
+
+def switches_of(*expressions: Node) -> Iterator[Node]:
+    """All switches of expressions."""
+    return (node for node in nodes_of(*expressions) if node.kind == "switch")

@@ -1,0 +1,400 @@
+"""Source code of expressions: for floats, for vector lanes, and for power series.
+
+Expressions are those of :mod:`ringsweep.numerics.expressions`. Each function returns the lines of a function body. A
+parameter has the source text that `names` gives it; the speed is called ``speed``.
+
+In kernels an interval of the speed is known where a series is computed. There a switch is an ``if``, and only one side
+of it is computed. In vector lanes each lane may be on another side, so both sides are computed, except where no lane
+needs a side that calls functions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+from ringsweep.numerics.expressions import Node, derivative, nodes_of
+
+_CALLS = ("exp", "log", "sqrt", "power", "tanh", "atan")
+
+_OPERATORS = {"add": "+", "multiply": "*", "divide": "/"}
+
+
+@dataclass
+class _Writer:
+    """Lines of source code, and the names of the nodes that are computed so far."""
+
+    names: Mapping[str, str]
+    lines: list[str] = field(default_factory=list)
+    indent: str = ""
+    known: dict[Node, str] = field(default_factory=dict)
+    count: int = 0
+
+    def write(self, line: str) -> None:
+        self.lines.append(self.indent + line)
+
+    def new(self, text: str) -> str:
+        self.count += 1
+        self.write(f"n{self.count} = {text}")
+        return f"n{self.count}"
+
+    @contextmanager
+    def block(self, head: str) -> Iterator[None]:
+        """Lines that only run under a condition; what they compute is unknown afterwards."""
+        known, indent = dict(self.known), self.indent
+        self.write(head)
+        self.indent += "    "
+        yield
+        self.known, self.indent = known, indent
+
+    def constants(self, *outputs: Node) -> None:
+        """Compute all nodes that do not depend on the speed."""
+        for node in nodes_of(*outputs):
+            if not node.varies and node not in self.known:
+                self.known[node] = self.value(node)
+
+    def value(self, node: Node) -> str:
+        """Name of a node whose parts are known, computed now; not of a switch."""
+        if node.kind == "number":
+            return repr(node.value) if node.value == node.value else "nan"
+        if node.kind == "symbol":
+            return self.names[node.value]
+        if node.kind == "speed":
+            return "speed"
+        parts = [self.known[part] for part in node.parts]
+        if node.kind in _OPERATORS:
+            return self.new(f" {_OPERATORS[node.kind]} ".join(parts))
+        if node.kind in ("minimum", "maximum"):
+            return self.new(f"{node.kind[:3]}({', '.join(parts)})")
+        return self.new(f"{node.kind}_of({', '.join(parts)})")
+
+
+def _frontier(outputs: list[Node], known: Mapping[Node, str]) -> dict[int, list[Node]]:
+    """Unknown switches that outputs need, by threshold; without those that only other switches need."""
+    found: dict[Node, None] = {}
+    seen: set[Node] = set()
+
+    def visit(node: Node) -> None:
+        if node in known or node in seen:
+            return
+        seen.add(node)
+        if node.kind == "switch" and node.varies:
+            found[node] = None
+            return
+        for part in node.parts:
+            visit(part)
+
+    for output in outputs:
+        visit(output)
+    groups: dict[int, list[Node]] = {}
+    for node in found:
+        groups.setdefault(node.value, []).append(node)
+    return groups
+
+
+def _straight(writer: _Writer, outputs: list[Node]) -> None:
+    """Compute what outputs need; their switches are known."""
+
+    def visit(node: Node) -> None:
+        if node not in writer.known:
+            for part in node.parts:
+                visit(part)
+            writer.known[node] = writer.value(node)
+
+    for output in outputs:
+        visit(output)
+
+
+# ---- floats -----------------------------------------------------------------------------------
+
+
+def float_lines(names: Mapping[str, str], outputs: list[Node], side: str) -> list[str]:
+    """Body that returns the values of `outputs` at a speed, as a tuple.
+
+    Parameters
+    ----------
+    names : mapping of str to str
+    outputs : list of Node
+    side : str
+        Condition for the lower side of a switch; ``{}`` stands for the index of its threshold.
+    """
+    writer = _Writer(names)
+    writer.constants(*outputs)
+    _floats(writer, outputs, side)
+    writer.write("return (" + "".join(f"{writer.known[output]}, " for output in outputs) + ")")
+    return writer.lines
+
+
+def _floats(writer: _Writer, outputs: list[Node], side: str) -> None:
+    for threshold, switches in _frontier(outputs, writer.known).items():
+        targets = [writer.new("0.0") for _ in switches]
+        for k, head in enumerate((f"if {side.format(threshold)}:", "else:")):
+            parts = [node.parts[k] for node in switches]
+            with writer.block(head):
+                _floats(writer, parts, side)
+                for target, part in zip(targets, parts, strict=True):
+                    writer.write(f"{target} = {writer.known[part]}")
+        writer.known.update(zip(switches, targets, strict=True))
+    _straight(writer, outputs)
+
+
+def varies_lines(output: Node, side: str) -> list[str]:
+    """Body that returns whether an expression depends on the speed, on the present sides of its switches."""
+
+    def text(node: Node) -> str:
+        if not node.varies:
+            return "False"
+        if node.kind == "speed":
+            return "True"
+        parts = [text(part) for part in node.parts]
+        if node.kind == "switch":
+            return parts[0] if parts[0] == parts[1] else f"({parts[0]} if {side.format(node.value)} else {parts[1]})"
+        needed = [part for part in parts if part != "False"]
+        return "True" if "True" in needed else "(" + " or ".join(needed) + ")"
+
+    return [f"return {text(output)}"]
+
+
+# ---- vector lanes -----------------------------------------------------------------------------
+
+
+def lanes_lines(names: Mapping[str, str], outputs: list[Node], threshold: str) -> list[str]:
+    """Body that returns the values of `outputs` in vector lanes; ``{}`` in `threshold` stands for an index."""
+    writer = _Writer(names)
+    writer.constants(*outputs)
+    _lanes(writer, outputs, threshold, "")
+    writer.write("return (" + "".join(f"{writer.known[output]}, " for output in outputs) + ")")
+    return writer.lines
+
+
+def _calls(parts: list[Node], known: Mapping[Node, str]) -> bool:
+    """Whether parts call a function of the speed; not counting what is behind another switch."""
+    return any(
+        node.varies
+        and node not in known
+        and (node.kind in _CALLS or (node.kind != "switch" and _calls(list(node.parts), known)))
+        for node in parts
+    )
+
+
+def _lanes(writer: _Writer, outputs: list[Node], threshold: str, context: str) -> None:
+    for index, switches in _frontier(outputs, writer.known).items():
+        limit = threshold.format(index)
+        conditions = [writer.new(f"speed < {limit}"), writer.new(f"speed >= {limit}")]
+        found = []
+        for k, condition in enumerate(conditions):
+            parts = [node.parts[k] for node in switches]
+            mask = f"{context} & {condition}" if context else condition
+            if _calls(parts, writer.known):
+                # Often no lane needs this side.
+                targets = [writer.new("spread(0.0)") for _ in parts]
+                mask = writer.new(mask)
+                with writer.block(f"if any_of({mask}):"):
+                    _lanes(writer, parts, threshold, mask)
+                    for target, part in zip(targets, parts, strict=True):
+                        writer.write(f"{target} = spread({writer.known[part]})")
+                found.append(targets)
+            else:
+                _lanes(writer, parts, threshold, mask)
+                found.append([writer.known[part] for part in parts])
+        for node, below, above in zip(switches, *found, strict=True):
+            writer.known[node] = writer.new(f"select({conditions[0]}, {below}, {above})")
+    _straight(writer, outputs)
+
+
+# ---- power series -----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class SeriesSource:
+    """Source code for the power series of expressions, given that of the speed.
+
+    Attributes
+    ----------
+    start : list of str
+        Body that returns coefficient 0 of each output, the numbers that `step` needs, and the sharpness of the
+        expressions, all at the speed ``speed``.
+    step : list of str
+        Body that returns coefficient `k` of each output, then the factors of its products: left ones, right ones. It
+        needs the coefficient ``x`` of the speed, ``inner`` with the inner products, and ``begun`` from `start`.
+    products : int
+        Number of products of two series.
+    """
+
+    start: list[str]
+    step: list[str]
+    products: int
+
+
+@dataclass
+class _Step(_Writer):
+    """Writer of coefficient k of each node."""
+
+    needed: dict[tuple[Node, str], str] = field(default_factory=dict)
+    products: int = 0
+    free: int = 0
+
+    def begun(self, node: Node, what: str = "value") -> str:
+        """A number that is known from the beginning of the series."""
+        if what == "value" and node.kind == "number":
+            return repr(node.value)
+        return self.needed.setdefault((node, what), f"b{len(self.needed)}")
+
+    def product(self) -> int:
+        """Number of a new product; sides of a switch share them."""
+        self.free += 1
+        self.products = max(self.products, self.free)
+        return self.free - 1
+
+    def factors(self, number_of: int, left: str, right: str) -> None:
+        self.write(f"l{number_of} = {left}")
+        self.write(f"r{number_of} = {right}")
+
+
+def series_source(names: Mapping[str, str], outputs: list[Node], side: str) -> SeriesSource:
+    """Source code for the power series of expressions; see :func:`float_lines` for the arguments."""
+    step = _Step(names)
+    _series(step, outputs, side)
+    head = ["(" + "".join(f"{name}, " for name in step.needed.values()) + ") = begun"] if step.needed else []
+    head += [f"l{i} = r{i} = 0.0" for i in range(step.products)]
+    coefficients = "".join(f"{step.known.get(output, '0.0')}, " for output in outputs)
+    left, right = ("".join(f"{s}{i}, " for i in range(step.products)) for s in "lr")
+    step_lines = [*head, *step.lines, f"return ({coefficients}), ({left}), ({right})"]
+
+    start = _Writer(names)
+    start.constants(*outputs, *[derivative(node) for node in nodes_of(*outputs)])
+    start.write("sharpness = 0.0")
+    for (node, what), name in step.needed.items():
+        start.write(f"{name} = {start.known[node] if what == 'value' and not node.varies else '0.0'}")
+    _begin(start, step, outputs, side)
+    values = "".join(f"{start.known[output]}, " for output in outputs)
+    start.write(f"return ({values}), ({''.join(f'{name}, ' for name in step.needed.values())}), sharpness")
+    return SeriesSource(start.lines, step_lines, step.products)
+
+
+def _begin(writer: _Writer, step: _Step, outputs: list[Node], side: str) -> None:
+    """Compute coefficient 0 of outputs, and all that the steps need of it."""
+    for threshold, switches in _frontier(outputs, writer.known).items():
+        targets = [writer.new("0.0") for _ in switches]
+        for k, head in enumerate((f"if {side.format(threshold)}:", "else:")):
+            parts = [node.parts[k] for node in switches]
+            with writer.block(head):
+                _begin(writer, step, parts, side)
+                for target, part in zip(targets, parts, strict=True):
+                    writer.write(f"{target} = {writer.known[part]}")
+        writer.known.update(zip(switches, targets, strict=True))
+        for node in switches:
+            _keep(writer, step, node, side)
+    before = set(writer.known)
+    _straight(writer, outputs)
+    for node in nodes_of(*outputs):
+        if node in writer.known and node not in before:
+            _keep(writer, step, node, side)
+
+
+def _keep(writer: _Writer, step: _Step, node: Node, side: str) -> None:
+    """Store what the steps need of a node, and the rate at which it changes."""
+    value = writer.known[node]
+    if (node, "value") in step.needed:
+        writer.write(f"{step.needed[node, 'value']} = {value}")
+    if (node, "inverse") in step.needed:
+        writer.write(f"{step.needed[node, 'inverse']} = 1.0 / {value}")
+    if (node, "half_inverse") in step.needed:
+        writer.write(f"{step.needed[node, 'half_inverse']} = 0.5 / {value}")
+    if (node, "rest") in step.needed:
+        # 1 - tanh^2 without cancellation.
+        decayed = writer.new(f"exp_of(-2.0 * abs({writer.known[node.parts[0]]}))")
+        share = writer.new(f"1.0 + {decayed}")
+        writer.write(f"{step.needed[node, 'rest']} = 4.0 * {decayed} / ({share} * {share})")
+    if (node, "one_plus_square") in step.needed:
+        part = writer.known[node.parts[0]]
+        writer.write(f"{step.needed[node, 'one_plus_square']} = 1.0 / (1.0 + {part} * {part})")
+    if node.varies and node.kind in ("exp", "tanh"):
+        inner = node.parts[0]
+        rates = [derivative(inner), derivative(derivative(inner))]
+        scale = 2.0 if node.kind == "tanh" else 1.0
+        _floats(writer, rates, side)
+        first, second = (writer.known[rate] for rate in rates)
+        writer.write(f"sharpness = max(sharpness, {scale} * (abs({first}) + 2.0 * sqrt_of(0.5 * abs({second}))))")
+
+
+def _series(step: _Step, outputs: list[Node], side: str) -> None:
+    """Write coefficient k of outputs."""
+    for threshold, switches in _frontier([o for o in outputs if o.varies], step.known).items():
+        targets = [step.new("0.0") for _ in switches]
+        free = step.free
+        most = free
+        for k, head in enumerate((f"if {side.format(threshold)}:", "else:")):
+            parts = [node.parts[k] for node in switches]
+            step.free = free
+            with step.block(head):
+                _series(step, parts, side)
+                for target, part in zip(targets, parts, strict=True):
+                    step.write(f"{target} = {step.known[part] if part.varies else '0.0'}")
+            most = max(most, step.free)
+        step.free = most
+        step.known.update(zip(switches, targets, strict=True))
+
+    def visit(node: Node) -> None:
+        if node.varies and node not in step.known:
+            for part in node.parts:
+                visit(part)
+            step.known[node] = _coefficient(step, node)
+
+    for output in outputs:
+        visit(output)
+
+
+def _coefficient(step: _Step, node: Node) -> str:
+    """Name of coefficient k of a node whose parts are known."""
+    if node.kind == "speed":
+        return "x"
+    k = [step.known[part] if part.varies else "0.0" for part in node.parts]
+    p = node.parts
+    if node.kind == "add":
+        return step.new(" + ".join(name for name, part in zip(k, p, strict=True) if part.varies))
+    if node.kind == "multiply":
+        if not p[0].varies:
+            return step.new(f"{step.begun(p[0])} * {k[1]}")
+        i = step.product()
+        if p[0] is p[1]:
+            found = step.new(f"2.0 * {step.begun(p[0])} * {k[0]} + inner[{i}]")
+        else:
+            found = step.new(f"{step.begun(p[0])} * {k[1]} + {k[0]} * {step.begun(p[1])} + inner[{i}]")
+        step.factors(i, k[0], k[1])
+        return found
+    i = step.product()
+    if node.kind == "divide":
+        dividend = f"{k[0]} - " if p[0].varies else "-"
+        text = f"{step.begun(node)} * {k[1]} + inner[{i}]"
+        found = step.new(f"({dividend}({text})) * {step.begun(p[1], 'inverse')}")
+        step.factors(i, found, k[1])
+    elif node.kind == "exp":
+        found = step.new(f"{k[0]} * {step.begun(node)} + INVERSE[k] * inner[{i}]")
+        step.factors(i, f"k * {k[0]}", found)
+    elif node.kind == "log":
+        found = step.new(f"({k[0]} - INVERSE[k] * inner[{i}]) * {step.begun(p[0], 'inverse')}")
+        step.factors(i, f"k * {found}", k[0])
+    elif node.kind == "sqrt":
+        found = step.new(f"({k[0]} - inner[{i}]) * {step.begun(node, 'half_inverse')}")
+        step.factors(i, found, found)
+    elif node.kind == "power":
+        j, exponent, inverse = step.product(), step.begun(p[1]), step.begun(p[0], "inverse")
+        rest = f"INVERSE[k] * ({exponent} * inner[{i}] - inner[{j}])"
+        found = step.new(f"({exponent} * {k[0]} * {step.begun(node)} + {rest}) * {inverse}")
+        step.factors(i, f"k * {k[0]}", found)
+        step.factors(j, f"k * {found}", k[0])
+    elif node.kind == "tanh":
+        j = step.product()
+        found = step.new(f"{k[0]} * {step.begun(node, 'rest')} + INVERSE[k] * inner[{i}]")
+        rest = step.new(f"-2.0 * {step.begun(node)} * {found} - inner[{j}]")
+        step.factors(i, f"k * {k[0]}", rest)
+        step.factors(j, found, found)
+    else:
+        j = step.product()
+        square = step.new(f"2.0 * {step.begun(p[0])} * {k[0]} + inner[{i}]")
+        found = step.new(f"({k[0]} - INVERSE[k] * inner[{j}]) * {step.begun(node, 'one_plus_square')}")
+        step.factors(i, k[0], k[0])
+        step.factors(j, f"k * {found}", square)
+    return found

@@ -1,0 +1,271 @@
+"""Friction laws of the sliding velocity, each written as one formula.
+
+Set-valued laws hold a contact at rest with any force up to ``mu_s``; smooth laws vanish at v = 0.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, NamedTuple
+
+from ringsweep.numerics.expressions import number, switch, symbols_of
+from ringsweep.physics.friction.formula import COEFFICIENTS, FormulaError, Threshold, read_expression, read_formula
+from ringsweep.physics.friction.registry import SetValued, Smooth, Traits, add_law, describe
+from ringsweep.physics.friction.velocity import EXPRESSIONS, MOST_PRODUCTS, Expression, series_products
+from ringsweep.quantities.parameters import Leaf, Parameter
+
+
+@dataclass(frozen=True)
+class Definition:
+    """What a user writes to define a law.
+
+    Attributes
+    ----------
+    mu : str
+        Formula of the friction coefficient.
+    at_rest : str, optional
+        ``mu_s`` or ``mu_k`` for a set-valued law: the coefficient up to which friction holds at rest.
+    """
+
+    mu: str
+    at_rest: str | None = None
+
+
+def _make(
+    name: str, doc: str, expression: Expression, module: str = __name__, qualified: str | None = None
+) -> type:
+    """Type of the law: a ``NamedTuple`` of its parameters and of the numbers that follow from them."""
+    hidden = ["slope_at_rest", "slope_beyond"]
+    if expression.has_edges:
+        hidden.append("edges")
+    if expression.thresholds:
+        hidden.append("thresholds")
+    if expression.has_band:
+        hidden += ["band", "in_band"]
+    fields: list[Any] = [(field, Annotated[Leaf, p]) for field, p in expression.parameters.items()]
+    found: Any = NamedTuple(name, [*fields, *((field, Any) for field in hidden)])  # type: ignore[misc]
+    found.__doc__, found.__module__, found.__qualname__ = doc, module, qualified or name
+    EXPRESSIONS[found] = expression
+    return found  # type: ignore[no-any-return]
+
+
+# ---- the laws of the package ------------------------------------------------------------------
+
+
+def _law(
+    name: str,
+    doc: str,
+    mu: str,
+    *,
+    at_rest: str | None = None,
+    band: str | None = None,
+    ascending: tuple[str, str] | None = None,
+    **parameters: Parameter,
+) -> type:
+    """Define a law and register it under its name."""
+    formula = read_formula(mu)
+    used = symbols_of(formula.mu)
+    set_valued = at_rest is not None
+    expression = Expression(
+        formula.mu, tuple(formula.thresholds), set_valued, None if band is None else read_expression(band), parameters
+    )
+    law = _make(name.title().replace("-", ""), doc, expression)
+    globals()[law.__name__] = law
+    add_law(
+        name,
+        law,
+        Traits(
+            SetValued if set_valued else Smooth,
+            coefficients=_coefficients(used, at_rest),
+            ascending=ascending,
+            dead_band=set_valued and band is not None,
+        ),
+    )
+    return law
+
+
+def _coefficients(used: list[str], at_rest: str | None) -> tuple[str, ...]:
+    return tuple(name for name in COEFFICIENTS if name in used or name == at_rest)
+
+
+_ALPHA = Parameter("s/m", "decay of friction with sliding speed", lower=0.0)
+_V0 = Parameter("m/s", "half-width of the stiction band", lower=0.0, open_lower=True)
+_V1 = Parameter("m/s", "sliding speed from which friction is kinetic", lower=0.0, open_lower=True)
+_V_S = Parameter("m/s", "Stribeck velocity", lower=0.0, open_lower=True)
+
+Coulomb = _law(
+    "coulomb",
+    """Amontons-Coulomb friction: :math:`\\mu_k` against the motion (the paper's Eqs. 25-26).""",
+    mu="mu_k",
+    at_rest="mu_k",
+)
+
+Stiction = _law(
+    "stiction",
+    """Coulomb friction with stiction: up to :math:`\\mu_s` at rest, :math:`\\mu_k` in motion.""",
+    mu="mu_k",
+    at_rest="mu_s",
+)
+
+Tustin = _law(
+    "tustin",
+    """Friction that decays with the speed (Tustin, J. IEE 94, 1947): Bengisu-Akay friction with a vanishing band.""",
+    mu="mu_k + (mu_s - mu_k)*exp(-alpha*v)",
+    at_rest="mu_s",
+    alpha=_ALPHA,
+)
+
+GaussianStribeck = _law(
+    "gaussian-stribeck",
+    """Stribeck curve with a Gaussian decay (Armstrong-Helouvry, Control of Machines with Friction, 1991).""",
+    mu="mu_k + (mu_s - mu_k)*exp(-(v/v_s)**2)",
+    at_rest="mu_s",
+    v_s=_V_S,
+)
+
+Hyperbolic = _law(
+    "hyperbolic",
+    """Friction that falls along a hyperbola (Leine et al., Nonlinear Dynamics 16, 1998, with mu_k = 0).""",
+    mu="mu_k + (mu_s - mu_k)/(1 + delta*v)",
+    at_rest="mu_s",
+    delta=Parameter("s/m", "decay of friction with sliding speed", lower=0.0),
+)
+
+Karnopp = _law(
+    "karnopp",
+    """Stiction with a dead band (Karnopp, J. Dyn. Syst. Meas. Control 107, 1985; the paper's Fig. 4).
+
+    .. math::
+
+        F = \\operatorname{sgn}(F_e)\\, \\min(|F_e|, \\mu_s F_N) \\quad (|v| \\le D_v), \\qquad
+        F = \\mu_k F_N \\operatorname{sgn} v \\quad (|v| > D_v)
+
+    with :math:`F_e` the force that friction must balance. While friction balances it, the contact keeps the speed at
+    which it entered the band.
+    """,
+    mu="piecewise(v < dead_band, mu_s, mu_k)",
+    at_rest="mu_s",
+    band="dead_band",
+    dead_band=Parameter("m/s", "half-width of the dead band D_v", lower=0.0, open_lower=True),
+)
+
+Threlfall = _law(
+    "threlfall",
+    """Coulomb friction regularised by an exponential (Threlfall, Mech. Mach. Theory 13, 1978).
+
+    The denominator, often rounded to 0.95, makes the law continuous.
+    """,
+    mu="piecewise(v < v0, mu_k*(1 - exp(-3*v/v0))/(1 - exp(-3)), mu_k)",
+    band="v0",
+    v0=_V0,
+)
+
+PiecewiseLinear = _law(
+    "piecewise-linear",
+    """Stiction regularised by straight lines (the paper's Fig. 5).""",
+    mu="piecewise(v < v0, mu_s*v/v0, v < v1, mu_s - (mu_s - mu_k)*(v - v0)/(v1 - v0), mu_k)",
+    band="v0",
+    ascending=("v0", "v1"),
+    v0=_V0,
+    v1=_V1,
+)
+
+PiecewiseCubic = _law(
+    "piecewise-cubic",
+    """Stiction regularised by cubics with a continuous slope (the paper's Fig. 6; STEP of multibody codes).""",
+    mu="piecewise(v < v0, mu_s*(v/v0)*(3 - (v/v0)**2)/2,"
+    " v < v1, mu_s - (mu_s - mu_k)*((v - v0)/(v1 - v0))**2*(3 - 2*(v - v0)/(v1 - v0)), mu_k)",
+    band="v0",
+    ascending=("v0", "v1"),
+    v0=_V0,
+    v1=_V1,
+)
+
+BengisuAkay = _law(
+    "bengisu-akay",
+    """Bengisu-Akay friction: a parabola up to v0, an exponential tail above (the paper's Eqs. 23-24).""",
+    mu="piecewise(v < v0, mu_s*(v/v0)*(2 - v/v0), mu_k + (mu_s - mu_k)*exp(-alpha*(v - v0)))",
+    band="v0",
+    alpha=_ALPHA,
+    v0=_V0,
+)
+
+Tanh = _law(
+    "tanh",
+    """Smooth Coulomb friction: a hyperbolic tangent of the sliding velocity.""",
+    mu="mu_k*tanh(v/v0)",
+    band="3*v0",
+    v0=Parameter("m/s", "speed at which friction reaches 76 % of kinetic friction", lower=0.0, open_lower=True),
+)
+
+BrownMcphee = _law(
+    "brown-mcphee",
+    """Stribeck friction without a jump (Brown and McPhee, J. Comput. Nonlinear Dyn. 11, 2016, without viscous part).""",
+    mu="mu_k*tanh(4*v/v_t) + (mu_s - mu_k)*(v/v_t)/((v/(2*v_t))**2 + 3/4)**2",
+    band="v_t",
+    v_t=Parameter("m/s", "speed of the greatest friction", lower=0.0, open_lower=True),
+)
+
+Andersson = _law(
+    "andersson",
+    """Stribeck friction made smooth by a hyperbolic tangent (Andersson et al., Tribology Int. 40, 2007; exponent 2).""",
+    mu="(mu_k + (mu_s - mu_k)*exp(-(v/v_s)**2))*tanh(k_t*v)",
+    v_s=_V_S,
+    k_t=Parameter("s/m", "steepness of the law at rest", lower=0.0, open_lower=True),
+)
+
+
+# ---- laws of users ----------------------------------------------------------------------------
+
+
+def define(definition: Definition) -> type:
+    """Type of the law that a formula defines.
+
+    Raises
+    ------
+    FormulaError
+        If something in the formula is wrong.
+    """
+    text = json.dumps([definition.mu, definition.at_rest])
+    # Code on disk names the type of a law. So the name of the type tells its formula.
+    return _defined(_PREFIX + base64.urlsafe_b64encode(text.encode()).decode().rstrip("="))
+
+
+_PREFIX = "formula_"
+
+_DEFINED: dict[str, type] = {}
+
+
+def _defined(qualified: str) -> type:
+    if qualified in _DEFINED:
+        return _DEFINED[qualified]
+    encoded = qualified.removeprefix(_PREFIX).encode()
+    mu, at_rest = json.loads(base64.urlsafe_b64decode(encoded + b"=" * (-len(encoded) % 4)))
+    formula = read_formula(mu)
+    used = symbols_of(formula.mu)
+    if not any(name in used for name in COEFFICIENTS):
+        raise FormulaError("it uses neither mu_s nor mu_k, the friction coefficients of the surface: scale it by one")
+    if at_rest not in (None, *COEFFICIENTS):
+        raise FormulaError(f"at_rest is {at_rest!r}, but it can only be mu_s or mu_k, which have values for each surface")
+    # Friction that turns negative or is no number ends a run.
+    valid = Threshold(None, formula.mu, kind="valid")
+    checked = switch(len(formula.thresholds), formula.mu, number(float("nan")))
+    parameters = {name: Parameter(unit, f"parameter {name} of the friction law") for name, unit in formula.units.items()}
+    expression = Expression(checked, (*formula.thresholds, valid), at_rest is not None, None, parameters)
+    name = "Formula_" + hashlib.sha256(qualified.encode()).hexdigest()[:12]
+    if series_products(expression) > MOST_PRODUCTS:
+        raise FormulaError(f"it is too long: more than {MOST_PRODUCTS} products of varying factors")
+    law = _make(name, f"mu = {mu}" + (f", up to {at_rest} at rest" if at_rest else ""), expression, qualified=qualified)
+    describe(law, Traits(SetValued if at_rest else Smooth, coefficients=_coefficients(used, at_rest)))
+    _DEFINED[qualified] = law
+    return law
+
+
+def __getattr__(name: str) -> Any:
+    if name.startswith(_PREFIX):
+        return _defined(name)
+    raise AttributeError(f"module {__name__} has no attribute {name}")
