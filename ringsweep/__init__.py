@@ -6,19 +6,21 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from ringsweep.config.friction import friction_law
     from ringsweep.errors import InputError
     from ringsweep.quantities.variables import words
     from ringsweep.runs.precision import precision
     from ringsweep.runs.simulate import simulate
     from ringsweep.runs.sweep import run, sweep
 
-__all__ = ["InputError", "precision", "run", "simulate", "sweep", "words"]
+__all__ = ["InputError", "friction_law", "precision", "run", "simulate", "sweep", "words"]
 
 _MODULES = {
     "run": "runs.sweep",
     "sweep": "runs.sweep",
     "simulate": "runs.simulate",
     "precision": "runs.precision",
+    "friction_law": "config.friction",
     "words": "quantities.variables",
     "InputError": "errors",
 }

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsweep.config.friction import FORMULA, KEYS, keep_definitions, own_laws
 from ringsweep.config.sections import choose, missing_text, read_values, section_of, suggestion
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
@@ -28,7 +29,8 @@ TABLE = {"time": Parameter("s", "time in the table of the drive"), "theta": Para
 
 def sweepable(scene: Scene) -> dict[str, Parameter | Choice]:
     """Every path of a scene that a sweep can vary, with its parameter."""
-    return {**numbers_of(scene.structures), LAW: law_choice(scene.structure.model)}
+    own = own_laws(scene.source.get("friction", {}))
+    return {**numbers_of(scene.structures), LAW: law_choice(scene.structure.model, own)}
 
 
 def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | None) -> Scene:
@@ -53,17 +55,22 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     if not isinstance(arcs, list) or ("zones" in scene and not arcs):
         raise InputError("scene.zones", f"a list of arcs is expected, got {show(arcs)}")
     zones = tuple(f"zones.{i}" for i in range(len(arcs)))
-    friction = scene.get("friction")
-    if isinstance(friction, dict) and "law" in friction:
+    friction = section_of(scene, "friction", "scene.") if "friction" in scene else {}
+    own = own_laws(friction)
+    if friction.get("law") == FORMULA and FORMULA not in own:
+        raise InputError("scene.friction.mu", "missing: the formula of the friction coefficient")
+    known_laws = MODELS[model].laws | own
+    if "law" in friction:
         # Name a wrong law, rather than the parameters that only this law has.
-        choose(MODELS[model].laws, friction, f"scene.{LAW}", f"friction law of model {model}")
+        choose(known_laws, friction, f"scene.{LAW}", f"friction law of model {model}")
     # Name a misspelt key, rather than the key that is missing because of it.
-    leaves = dict(_leaves(scene, "", _Paths(_all_paths(model, zones or ("zones.0",)))))
+    leaves = dict(_leaves(scene, "", _Paths(_all_paths(model, zones or ("zones.0",), own))))
     names = []
     if laws is None or LAW in leaves:
-        names = [choose(MODELS[model].laws, section_of(scene, "friction", "scene."), f"scene.{LAW}", "friction law")]
+        names = [choose(known_laws, section_of(scene, "friction", "scene."), f"scene.{LAW}", "friction law")]
     if laws is not None:
-        names = read_values(laws[1], law_choice(model), laws[0]).tolist()
+        names = read_values(laws[1], law_choice(model, own), laws[0]).tolist()
+    keep_definitions(friction, names)
     drive = "none"
     if "drive" in scene:
         drive = choose(DRIVES, section_of(scene, "drive", "scene."), "scene.drive.law", "drive law")
@@ -77,7 +84,7 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     elif rough:
         raise InputError(f"scene.{rough[0]}", "there is no rough zone: give zone, or leave friction.rough out")
     table = _read_table(doc, scene["drive"]) if drive == "table" else None
-    structures = {law: Structure(model, law, drive, zones, table) for law in names}
+    structures = {law: Structure(model, law, drive, zones, table, own.get(law)) for law in names}
     known = numbers_of(structures)
     values = {}
     for path, parameter in known.items():
@@ -90,7 +97,7 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
             who = f"; law {needing[0]} needs it" if len(structures) > len(needing) else ""
             raise InputError(f"scene.{path}", missing_text(path, parameter) + who)
     for path in leaves:
-        if path not in known and path not in _structural(drive):
+        if path not in known and path not in _structural(drive, FORMULA in names):
             where, name = ("drive", drive) if path.startswith("drive.") else ("friction", " or ".join(structures))
             warn_of_unused(path, where, name)
     return Scene(structures, values, scene)
@@ -110,21 +117,27 @@ def numbers_of(structures: Mapping[str, Structure]) -> dict[str, Parameter]:
     return found
 
 
-def law_choice(model: str) -> Choice:
-    """Friction laws that a model takes."""
-    return Choice("friction law", tuple(MODELS[model].laws))
+def law_choice(model: str, own: Mapping[str, type]) -> Choice:
+    """Friction laws that a model takes, and those that the configuration defines."""
+    return Choice("friction law", tuple(MODELS[model].laws | dict(own)))
 
 
-def _structural(drive: str) -> tuple[str, ...]:
+def _structural(drive: str, by_formula: bool) -> tuple[str, ...]:
     """Paths of a scene that are no numeric parameters."""
-    return ("model", LAW, "drive.law", *(f"drive.{name}" for name in (*TABLE, "file") if drive == "table"))
+    of_drive = (*TABLE, "file") if drive == "table" else ()
+    of_friction = KEYS if by_formula else ("laws",)
+    return (
+        *("model", LAW, "drive.law"),
+        *(f"drive.{name}" for name in of_drive),
+        *(f"friction.{name}" for name in of_friction),
+    )
 
 
-def _all_paths(model: str, zones: tuple[str, ...]) -> list[str]:
+def _all_paths(model: str, zones: tuple[str, ...], own: Mapping[str, type]) -> list[str]:
     """Every path that a scene of this model can have, under all laws and drives."""
-    paths = dict.fromkeys(_structural("table"))
-    for law, drive, arcs in product(MODELS[model].laws, DRIVES, {(), ("zone",), zones}):
-        paths |= dict.fromkeys(parameters(Structure(model, law, drive, arcs)))
+    paths = dict.fromkeys(_structural("table", True))
+    for law, drive, arcs in product(MODELS[model].laws | dict(own), DRIVES, {(), ("zone",), zones}):
+        paths |= dict.fromkeys(parameters(Structure(model, law, drive, arcs, own_law=own.get(law))))
     return list(paths)
 
 

@@ -69,7 +69,7 @@ def friction_coefficients(law: type, place: str, values: Values) -> tuple[NDArra
     return mu_s, mu_k
 
 
-def law_of(law: type, values: Values, surfaces: list[Any]) -> Any:
+def law_of(structure: Structure, values: Values, surfaces: list[Any]) -> Any:
     """Friction law with fields of shape ``(cells, ...)``, from the values by path.
 
     `surfaces` are the pairs of friction coefficients of all surfaces of the scene.
@@ -79,6 +79,7 @@ def law_of(law: type, values: Values, surfaces: list[Any]) -> Any:
     InputError
         If one parameter must exceed another and does not, or if a formula has no allowed value at rest.
     """
+    law = structure.law_type
     columns = {name: values[f"friction.{name}"] for name in declared(law)}
     if ascending := friction.TRAITS[law].ascending:
         low, high = ascending
@@ -90,7 +91,7 @@ def law_of(law: type, values: Values, surfaces: list[Any]) -> Any:
         try:
             columns |= hidden_fields(EXPRESSIONS[law], columns, surfaces)
         except FormulaError as error:
-            raise InputError("scene.friction.mu", str(error)) from None
+            raise InputError("scene.friction.law", f"friction law {structure.law}: {error}") from None
     return make(**columns)
 
 

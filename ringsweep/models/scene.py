@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
+from ringsweep.physics.friction import LAWS
 
 Values = Mapping[str, NDArray[np.float64]]
 
@@ -32,6 +33,8 @@ class Structure:
         Paths of the rough arcs: ``()``, ``("zone",)`` or ``("zones.0", "zones.1", ...)``.
     table : tuple of ndarray, optional
         Times (s) and angles (rad) of a drive from a table, each of shape ``(samples,)``.
+    own_law : type, optional
+        Type of the friction law if the configuration defines it.
     """
 
     model: str
@@ -39,6 +42,12 @@ class Structure:
     drive: str = "none"
     arcs: tuple[str, ...] = ()
     table: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    own_law: type | None = None
+
+    @property
+    def law_type(self) -> type:
+        """Type of the friction law."""
+        return self.own_law or LAWS[self.law]
 
 
 @dataclass(frozen=True)

@@ -99,8 +99,10 @@ def multiply(a: Node, b: Node) -> Node:
     # Constant factors are multiplied once, not at each speed.
     for one, other in ((b, a), (a, b)):
         if one.kind == "multiply" and one.varies and not one.parts[0].varies:
-            return multiply(multiply(one.parts[0], other), one.parts[1]) if not other.varies else multiply(
-                one.parts[0], multiply(one.parts[1], other)
+            return (
+                multiply(multiply(one.parts[0], other), one.parts[1])
+                if not other.varies
+                else multiply(one.parts[0], multiply(one.parts[1], other))
             )
     return _node("multiply", a, b)
 

@@ -292,7 +292,9 @@ def _arc_tangent(typingctx, x):
         function, found = cgutils.get_or_insert_function(builder.module, kind, "atan"), args[0]
         for lane in range(WIDTH):
             place = ir.Constant(ir.IntType(32), lane)
-            found = builder.insert_element(found, builder.call(function, [builder.extract_element(args[0], place)]), place)
+            found = builder.insert_element(
+                found, builder.call(function, [builder.extract_element(args[0], place)]), place
+            )
         return found
 
     return LANES(LANES), lower

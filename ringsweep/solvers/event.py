@@ -53,7 +53,7 @@ class _Piecewise(Method):
 
     def needs(self, structure: Structure) -> Needs:
         """Functions for modes and audit, and for series, implicit steps or both, as the law's family needs."""
-        family = family_of(LAWS[structure.law])
+        family = family_of(structure.law_type)
         of_model = recorder.MEMBERS + modes.MEMBERS + audit.MEMBERS
         of_model += () if family is Dynamic else series.MEMBERS
         of_model += () if family is SetValued else implicit.MEMBERS
@@ -69,7 +69,7 @@ class _Piecewise(Method):
         InputError
             If the method does not take the friction law; and as in :meth:`Method.check`.
         """
-        if family_of(LAWS[structure.law]) not in self.families:
+        if family_of(structure.law_type) not in self.families:
             able = ", ".join(name for name, law in LAWS.items() if family_of(law) in self.families)
             raise InputError(
                 "solver.method",
@@ -254,7 +254,7 @@ class Auto(Method):
 
     def resolved(self, structure: Structure) -> Method:
         """The method for the friction law."""
-        return self._method(LAWS[structure.law])
+        return self._method(structure.law_type)
 
     def _method(self, law: type) -> Method:
         method = Event if family_of(law) is SetValued else Implicit

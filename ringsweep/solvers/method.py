@@ -14,7 +14,6 @@ from ringsweep.errors import InputError
 from ringsweep.models import MODELS
 from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import DRIVES
-from ringsweep.physics.friction import LAWS
 
 
 @dataclass(frozen=True)
@@ -72,7 +71,7 @@ class Method(ABC):
             one of them is not known to the cache of compiled code.
         """
         needs, model = self.needs(structure), MODELS[structure.model]
-        law, drive = LAWS[structure.law], DRIVES[structure.drive]
+        law, drive = structure.law_type, DRIVES[structure.drive]
         for path, kind, name, source, cls, members in (
             ("scene.friction.law", "friction law", structure.law, law, law, needs.law),
             ("scene.drive.law", "drive", structure.drive, drive, drive, needs.drive),

@@ -24,7 +24,7 @@ from ringsweep.numerics.lanes import WIDTH
 from ringsweep.numerics.memory import align_stack, conform, read, read_lanes, side_by_side, size_of, write
 from ringsweep.physics import drives
 from ringsweep.physics.drives import lookup, shape, turn, without_shape
-from ringsweep.physics.friction import LAWS, TRAITS, Dynamic, family_of, presliding
+from ringsweep.physics.friction import TRAITS, Dynamic, family_of, presliding
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.variables import SEPARATING
 from ringsweep.solvers.certificate import certifiable, errors, with_errors
@@ -64,7 +64,7 @@ class RK4(Method):
     def needs(self, structure: Structure) -> Needs:
         """Functions for steps of constant length, in vector lanes."""
         of_law: tuple[Any, ...] = ()
-        if family_of(LAWS[structure.law]) is Dynamic:
+        if family_of(structure.law_type) is Dynamic:
             of_law = (presliding.bristle, presliding.region_guard)
         return Needs(of_law, drives.CONSTANT_STEP_MEMBERS, recorder.MEMBERS + constant_step.MEMBERS)
 
@@ -76,7 +76,7 @@ class RK4(Method):
         InputError
             If the method does not take the friction law; and as in :meth:`Method.check`.
         """
-        if TRAITS[LAWS[structure.law]].snaps:
+        if TRAITS[structure.law_type].snaps:
             raise InputError(
                 "solver.method", f"rk4 does not take friction law {structure.law}, whose bonds snap: auto takes it"
             )

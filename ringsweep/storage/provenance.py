@@ -52,6 +52,9 @@ def identity(config: Config) -> dict[str, str]:
     }
     if LAW not in axes.columns:
         found[f"scene.{LAW}"] = structure.law
+    for law, own in scene.structures.items():
+        if own.own_law is not None:
+            found[f"scene.friction.laws.{law}"] = str(own.own_law.__doc__)
     if structure.table is not None:
         found["scene.drive"] = f"a table of {len(structure.table[0])} samples ({_digest(*structure.table)})"
     found |= {f"scene.{path}": repr(float(value)) for path, value in scene.values.items() if path not in axes.columns}

@@ -27,7 +27,7 @@ class Belt(Model):
 
     def scene_type(self, structure: Structure) -> type:
         """``BristleBelt`` for laws with bristles, else ``Belt``."""
-        return belt.BristleBelt if friction.family_of(self.laws[structure.law]) is friction.Dynamic else belt.Belt
+        return belt.BristleBelt if friction.family_of(structure.law_type) is friction.Dynamic else belt.Belt
 
     def history(self, structure: Structure) -> tuple[str, ...]:
         """Names of the history variables, in the order of their columns."""
@@ -35,7 +35,7 @@ class Belt(Model):
 
     def parameters(self, structure: Structure) -> dict[str, Parameter]:
         """Parameters of a scene of this structure, by path."""
-        law = self.laws[structure.law]
+        law = structure.law_type
         found = {
             "body.mass": MASS,
             "spring.stiffness": Parameter("N/m", "stiffness of the spring", lower=0.0),
@@ -63,7 +63,7 @@ class Belt(Model):
         """Cells that kernels run over; see :meth:`ringsweep.models.model.Model.build`."""
         if structure.arcs:
             raise InputError(f"scene.{structure.arcs[0]}", "a belt has no rough zones")
-        law = self.laws[structure.law]
+        law = structure.law_type
         mu_s, mu_k = friction_coefficients(law, "friction", values)
         drive = self._drive(structure, values)
         sliding = np.zeros(len(mu_k))
@@ -91,12 +91,12 @@ class Belt(Model):
                     viscous,
                     "{} N s/m is too large: friction at the edge of the dead band exceeds friction within it",
                 )
-            return belt.Belt(**fields, law=law_of(law, values, [(mu_s, mu_k)]), viscous=viscous)
+            return belt.Belt(**fields, law=law_of(structure, values, [(mu_s, mu_k)]), viscous=viscous)
         require(gravity > 0.0, "gravity", gravity, "{} m/s^2 is not allowed: a law with bristles needs a load")
         per_load = {
             path: value / (mass * gravity) for path, value in values.items() if path.startswith("friction.sigma")
         }
-        return belt.BristleBelt(**fields, law=law_of(law, {**values, **per_load}, [(mu_s, mu_k)]))
+        return belt.BristleBelt(**fields, law=law_of(structure, {**values, **per_load}, [(mu_s, mu_k)]))
 
     def _drive(self, structure: Structure, values: Values) -> Any:
         """Drive of the belt, from ``belt.velocity`` or from ``drive``."""
@@ -110,7 +110,7 @@ class Belt(Model):
             raise InputError("scene.belt.velocity", what)
         if has_velocity:
             return drives.Constant(values["belt.velocity"])
-        if friction.TRAITS[self.laws[structure.law]].dead_band and structure.drive != "constant":
+        if friction.TRAITS[structure.law_type].dead_band and structure.drive != "constant":
             raise InputError("scene.drive", f"the dead band of law {structure.law} needs a belt of constant velocity")
         return drive_of(structure, values)
 

@@ -52,7 +52,7 @@ class SingleContactRing(Model):
         return super().required(structure) | {self.body_type: BODY_MEMBERS}
 
     def _has_bristles(self, structure: Structure) -> bool:
-        return friction.family_of(self.laws[structure.law]) is friction.Dynamic
+        return friction.family_of(structure.law_type) is friction.Dynamic
 
     def history(self, structure: Structure) -> tuple[str, ...]:
         """Names of the history variables, in the order of their columns."""
@@ -61,7 +61,7 @@ class SingleContactRing(Model):
 
     def parameters(self, structure: Structure) -> dict[str, Parameter]:
         """Parameters of a scene of this structure, by path."""
-        law = self.laws[structure.law]
+        law = structure.law_type
         found = dict(self.body)
         places = {"friction.rest": "the rest of the ring"}
         if structure.arcs == ("zone",):
@@ -89,7 +89,7 @@ class SingleContactRing(Model):
 
     def build(self, structure: Structure, values: Values) -> ring.Ring | ring.BristleRing:
         """Cells that kernels run over; see :meth:`ringsweep.models.model.Model.build`."""
-        law = self.laws[structure.law]
+        law = structure.law_type
         rough = "friction.rough" if structure.arcs == ("zone",) else None
         arcs = [
             zones.Arc(
@@ -103,7 +103,7 @@ class SingleContactRing(Model):
         return self.scene_type(structure)(
             body=self.build_body(values),
             surface=surface,
-            law=law_of(law, values, surfaces),
+            law=law_of(structure, values, surfaces),
             drive=drive_of(structure, values),
             initial_phi=values["initial.phi"],
             initial_omega=values["initial.omega"],

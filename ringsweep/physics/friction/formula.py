@@ -201,7 +201,9 @@ class _Reader:
         # Beyond some speed the function is constant but for rounding: there the law has a region of its own, in which
         # steps need not resolve what has long decayed.
         if name == "exp":
-            return self._switch(Threshold(None, expressions.negative(inner), 1, "tail", within), found, expressions.ZERO)
+            return self._switch(
+                Threshold(None, expressions.negative(inner), 1, "tail", within), found, expressions.ZERO
+            )
         return self._switch(Threshold(None, inner, 2, "tail", within), found, expressions.ONE)
 
     def _switch(self, threshold: Threshold, below: Node, above: Node) -> Node:
@@ -223,9 +225,7 @@ class _Reader:
         found = a
         for order in (2, 1, 0):
             below, above = (a, found) if order % 2 == 0 else (b, found)
-            found = self._switch(
-                Threshold(None, difference, order, "root", within), below, above if order < 2 else b
-            )
+            found = self._switch(Threshold(None, difference, order, "root", within), below, above if order < 2 else b)
         return found
 
     def _piecewise(self, tree: ast.Call, within: tuple[tuple[int, bool], ...]) -> Node:
@@ -420,4 +420,3 @@ def unit_text(exponents: tuple[Fraction, Fraction]) -> str:
         return [name if power == 1 else f"{name}^{power}" for name, power in powers if power > 0]
 
     return "/".join([" ".join(factors(1)) or "1", *factors(-1)])
-

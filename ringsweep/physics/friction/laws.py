@@ -8,7 +8,6 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
@@ -35,9 +34,7 @@ class Definition:
     at_rest: str | None = None
 
 
-def _make(
-    name: str, doc: str, expression: Expression, module: str = __name__, qualified: str | None = None
-) -> type:
+def _make(name: str, doc: str, expression: Expression, module: str = __name__, qualified: str | None = None) -> type:
     """Type of the law: a ``NamedTuple`` of its parameters and of the numbers that follow from them."""
     hidden = ["slope_at_rest", "slope_beyond"]
     if expression.has_edges:
@@ -250,11 +247,15 @@ def _defined(qualified: str) -> type:
     if not any(name in used for name in COEFFICIENTS):
         raise FormulaError("it uses neither mu_s nor mu_k, the friction coefficients of the surface: scale it by one")
     if at_rest not in (None, *COEFFICIENTS):
-        raise FormulaError(f"at_rest is {at_rest!r}, but it can only be mu_s or mu_k, which have values for each surface")
+        raise FormulaError(
+            f"at_rest is {at_rest!r}, but it can only be mu_s or mu_k, which have values for each surface"
+        )
     # Friction that turns negative or is no number ends a run.
     valid = Threshold(None, formula.mu, kind="valid")
     checked = switch(len(formula.thresholds), formula.mu, number(float("nan")))
-    parameters = {name: Parameter(unit, f"parameter {name} of the friction law") for name, unit in formula.units.items()}
+    parameters = {
+        name: Parameter(unit, f"parameter {name} of the friction law") for name, unit in formula.units.items()
+    }
     expression = Expression(checked, (*formula.thresholds, valid), at_rest is not None, None, parameters)
     name = "Formula_" + hashlib.sha256(qualified.encode()).hexdigest()[:12]
     if series_products(expression) > MOST_PRODUCTS:

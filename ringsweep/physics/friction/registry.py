@@ -54,6 +54,7 @@ LAWS: dict[str, type] = {}
 #: Traits of each law.
 TRAITS: dict[type, Traits] = {}
 
+
 @hook
 def family(law):
     """Family of a law: an instance of :class:`SetValued`, :class:`Smooth` or :class:`Dynamic`."""
