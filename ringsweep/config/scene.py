@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.config.friction import FORMULA, KEYS, keep_definitions, own_laws
+from ringsweep.config.friction import FORMULA, keep_definitions, keys_of, law_of_curve, own_laws, read_curve
+from ringsweep.config.friction import TABLE as TABLE_LAW
 from ringsweep.config.sections import choose, missing_text, read_values, section_of, suggestion
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
@@ -29,7 +30,7 @@ TABLE = {"time": Parameter("s", "time in the table of the drive"), "theta": Para
 
 def sweepable(scene: Scene) -> dict[str, Parameter | Choice]:
     """Every path of a scene that a sweep can vary, with its parameter."""
-    own = own_laws(scene.source.get("friction", {}))
+    own = {law: structure.own_law for law, structure in scene.structures.items() if structure.own_law is not None}
     return {**numbers_of(scene.structures), LAW: law_choice(scene.structure.model, own)}
 
 
@@ -60,6 +61,11 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     if friction.get("law") == FORMULA and FORMULA not in own:
         raise InputError("scene.friction.mu", "missing: the formula of the friction coefficient")
     known_laws = MODELS[model].laws | own
+    curve = None
+    if friction.get("law") == TABLE_LAW or (laws is not None and TABLE_LAW in laws[1]):
+        curve = read_curve(doc, friction)
+        own[TABLE_LAW] = law_of_curve(curve)
+        known_laws = known_laws | own
     if "law" in friction:
         # Name a wrong law, rather than the parameters that only this law has.
         choose(known_laws, friction, f"scene.{LAW}", f"friction law of model {model}")
@@ -84,7 +90,10 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     elif rough:
         raise InputError(f"scene.{rough[0]}", "there is no rough zone: give zone, or leave friction.rough out")
     table = _read_table(doc, scene["drive"]) if drive == "table" else None
-    structures = {law: Structure(model, law, drive, zones, table, own.get(law)) for law in names}
+    structures = {
+        law: Structure(model, law, drive, zones, table, own.get(law), curve if law == TABLE_LAW else None)
+        for law in names
+    }
     known = numbers_of(structures)
     values = {}
     for path, parameter in known.items():
@@ -97,7 +106,7 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
             who = f"; law {needing[0]} needs it" if len(structures) > len(needing) else ""
             raise InputError(f"scene.{path}", missing_text(path, parameter) + who)
     for path in leaves:
-        if path not in known and path not in _structural(drive, FORMULA in names):
+        if path not in known and path not in _structural(drive, names):
             where, name = ("drive", drive) if path.startswith("drive.") else ("friction", " or ".join(structures))
             warn_of_unused(path, where, name)
     return Scene(structures, values, scene)
@@ -122,20 +131,19 @@ def law_choice(model: str, own: Mapping[str, type]) -> Choice:
     return Choice("friction law", tuple(MODELS[model].laws | dict(own)))
 
 
-def _structural(drive: str, by_formula: bool) -> tuple[str, ...]:
+def _structural(drive: str, laws: Collection[str]) -> tuple[str, ...]:
     """Paths of a scene that are no numeric parameters."""
     of_drive = (*TABLE, "file") if drive == "table" else ()
-    of_friction = KEYS if by_formula else ("laws",)
     return (
         *("model", LAW, "drive.law"),
         *(f"drive.{name}" for name in of_drive),
-        *(f"friction.{name}" for name in of_friction),
+        *(f"friction.{name}" for name in keys_of(laws)),
     )
 
 
 def _all_paths(model: str, zones: tuple[str, ...], own: Mapping[str, type]) -> list[str]:
     """Every path that a scene of this model can have, under all laws and drives."""
-    paths = dict.fromkeys(_structural("table", True))
+    paths = dict.fromkeys(_structural("table", (FORMULA, TABLE_LAW)))
     for law, drive, arcs in product(MODELS[model].laws | dict(own), DRIVES, {(), ("zone",), zones}):
         paths |= dict.fromkeys(parameters(Structure(model, law, drive, arcs, own_law=own.get(law))))
     return list(paths)

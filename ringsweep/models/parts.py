@@ -13,7 +13,7 @@ from ringsweep.models.scene import Structure, Values, require
 from ringsweep.numerics.functions import any_of, select, square_root
 from ringsweep.physics import drives, friction
 from ringsweep.physics.friction.formula import FormulaError
-from ringsweep.physics.friction.speeds import hidden_fields
+from ringsweep.physics.friction.speeds import hidden_fields, table_fields
 from ringsweep.physics.friction.velocity import EXPRESSIONS
 from ringsweep.quantities.parameters import Parameter, declared
 
@@ -51,17 +51,25 @@ def larger_eigenvalue(most, trace, determinant):
     return most
 
 
-def friction_coefficients(law: type, place: str, values: Values) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def friction_coefficients(
+    structure: Structure, place: str, values: Values
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Static and kinetic coefficients at a path such as ``friction.rest``, each of shape ``(cells,)``.
 
-    A law with one coefficient has it in the place of both.
+    A law with one coefficient has it in the place of both. For a law from a table the second one is the factor on the
+    table.
 
     Raises
     ------
     InputError
         If the kinetic coefficient exceeds the static one.
     """
-    names = friction.coefficients_of(law)
+    names = friction.coefficients_of(structure.law_type)
+    if structure.curve is not None:
+        scale = values[f"{place}.scale"]
+        _, mu = structure.curve
+        # At rest friction holds up to its value there. A smooth law vanishes there: its greatest value counts.
+        return scale * (mu[0] or mu.max()), scale
     mu_s, mu_k = (values[f"{place}.{name if name in names else next(iter(names))}"] for name in ("mu_s", "mu_k"))
     require(
         mu_s >= mu_k, f"{place}.mu_k", mu_k, "{} exceeds mu_s: kinetic friction cannot be greater than static friction"
@@ -87,7 +95,9 @@ def law_of(structure: Structure, values: Values, surfaces: list[Any]) -> Any:
         problem = f"{{}} {unit} is not greater than friction.{low}"
         require(columns[high] > columns[low], f"friction.{high}", columns[high], problem)
     make: Any = getattr(law, "of", law)
-    if law in EXPRESSIONS:
+    if structure.curve is not None:
+        columns |= table_fields(*structure.curve, surfaces)
+    elif law in EXPRESSIONS:
         try:
             columns |= hidden_fields(EXPRESSIONS[law], columns, surfaces)
         except FormulaError as error:

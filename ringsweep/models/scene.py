@@ -35,6 +35,8 @@ class Structure:
         Times (s) and angles (rad) of a drive from a table, each of shape ``(samples,)``.
     own_law : type, optional
         Type of the friction law if the configuration defines it.
+    curve : tuple of ndarray, optional
+        Sliding speeds (m/s) and friction coefficients of a law from a table, each of shape ``(points,)``.
     """
 
     model: str
@@ -43,6 +45,7 @@ class Structure:
     arcs: tuple[str, ...] = ()
     table: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     own_law: type | None = None
+    curve: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
 
     @property
     def law_type(self) -> type:

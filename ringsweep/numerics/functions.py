@@ -340,6 +340,22 @@ def spread(x):
     return x
 
 
+@intrinsic
+def lane_of(typingctx, x, lane):
+    """Number in one lane."""
+    return types.float64(LANES, types.intp), lambda context, builder, sig, args: builder.extract_element(*args)
+
+
+@intrinsic
+def with_lane(typingctx, x, lane, value):
+    """Lanes with another number in one lane."""
+
+    def lower(context, builder, sig, args):
+        return builder.insert_element(args[0], args[2], args[1])
+
+    return LANES(LANES, types.intp, types.float64), lower
+
+
 specialise(spread, lambda kind: (lambda x: x) if kind == LANES else (lambda x: _spread(x)))
 
 

@@ -1,4 +1,7 @@
-"""Nested tuples of numbers in arrays: one run, or several runs side by side in vector lanes."""
+"""Nested tuples of numbers in arrays: one run, or several runs side by side in vector lanes.
+
+A tuple may also hold arrays that all runs share. They are not stored: runs take those of another tuple of the type.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,7 @@ def _numbers(kind: Any, name: str) -> list[tuple[str, Any]]:
     if isinstance(kind, types.BaseTuple):
         parts: list[Any] = list(iter(kind))  # type: ignore[call-overload]
         return [number for k, part in enumerate(parts) for number in _numbers(part, f"{name}[{k}]")]
-    return [(name, kind)]
+    return [] if isinstance(kind, types.Array) else [(name, kind)]
 
 
 @generated
@@ -88,16 +91,18 @@ def _rebuilt(like: Any, number: Any) -> tuple[str, dict[str, Any]]:
     classes: dict[str, Any] = {}
     count = itertools.count()
 
-    def visit(kind: Any) -> str:
+    def visit(kind: Any, place: str) -> str:
+        if isinstance(kind, types.Array):
+            return place
         if not isinstance(kind, types.BaseTuple):
             return str(number(kind, next(count)))
         cls = getattr(kind, "instance_class", None)
         name = "" if cls is None else cls.__name__
         classes[name] = cls
         parts: list[Any] = list(iter(kind))  # type: ignore[call-overload]
-        return name + "(" + "".join(f"{visit(part)}, " for part in parts) + ")"
+        return name + "(" + "".join(f"{visit(part, f'{place}[{k}]')}, " for k, part in enumerate(parts)) + ")"
 
-    return visit(like), classes
+    return visit(like, "like"), classes
 
 
 @generated
@@ -139,7 +144,10 @@ def conform(nested, like):
 
 
 def side_by_side(batch: Any) -> Any:
-    """Batch in which each array of shape ``(cells, n)`` is replaced by a tuple of n arrays of shape ``(cells,)``."""
+    """Batch in which each array of shape ``(cells, n)`` is replaced by a tuple of n arrays of shape ``(cells,)``.
+
+    Arrays with more dimensions stay: all cells have equal ones.
+    """
     return map_leaves(
-        lambda leaf: leaf if leaf.ndim == 1 else tuple(np.ascontiguousarray(column) for column in leaf.T), batch
+        lambda leaf: leaf if leaf.ndim != 2 else tuple(np.ascontiguousarray(column) for column in leaf.T), batch
     )

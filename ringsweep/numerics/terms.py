@@ -170,8 +170,8 @@ _compiled(_total_in_kernel, total)
 
 # ---- products of several series ---------------------------------------------------------------
 
-# Products grow side by side in groups of PRODUCTS. In Python a group of factors is a pair of arrays, in kernels a pair of
-# vectors: left factors and right factors.
+# Products grow side by side in groups of PRODUCTS. The factors of a group are a pair, left ones and right ones: in
+# Python arrays, in kernels vectors.
 
 
 def no_factors(like):

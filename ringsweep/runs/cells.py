@@ -86,7 +86,7 @@ def compute_task(config: Config, layout: Layout, positions: NDArray[np.integer])
     model = MODELS[scene.structure.model]
     indices = dict(zip(axes.sizes, layout.indices(positions), strict=True))
     # Kernels do not depend on the numbers of a table.
-    compiled = config.solver, *(replace(structure, table=None) for structure in scene.structures.values())
+    compiled = config.solver, *(replace(structure, table=None, curve=None) for structure in scene.structures.values())
     compiles = compiled not in _compiled
     start = perf_counter()
     columns: dict[str, NDArray[Any]] = {}

@@ -52,6 +52,8 @@ def identity(config: Config) -> dict[str, str]:
     }
     if LAW not in axes.columns:
         found[f"scene.{LAW}"] = structure.law
+    if (curve := next((one.curve for one in scene.structures.values() if one.curve is not None), None)) is not None:
+        found["scene.friction"] = f"a table of {len(curve[0])} points ({_digest(*curve)})"
     for law, own in scene.structures.items():
         if own.own_law is not None:
             found[f"scene.friction.laws.{law}"] = str(own.own_law.__doc__)

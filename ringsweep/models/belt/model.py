@@ -64,7 +64,7 @@ class Belt(Model):
         if structure.arcs:
             raise InputError(f"scene.{structure.arcs[0]}", "a belt has no rough zones")
         law = structure.law_type
-        mu_s, mu_k = friction_coefficients(law, "friction", values)
+        mu_s, mu_k = friction_coefficients(structure, "friction", values)
         drive = self._drive(structure, values)
         sliding = np.zeros(len(mu_k))
         if "initial.velocity" in values:

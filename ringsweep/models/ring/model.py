@@ -89,15 +89,16 @@ class SingleContactRing(Model):
 
     def build(self, structure: Structure, values: Values) -> ring.Ring | ring.BristleRing:
         """Cells that kernels run over; see :meth:`ringsweep.models.model.Model.build`."""
-        law = structure.law_type
         rough = "friction.rough" if structure.arcs == ("zone",) else None
         arcs = [
             zones.Arc(
-                values[f"{arc}.center"], values[f"{arc}.half_angle"], *friction_coefficients(law, rough or arc, values)
+                values[f"{arc}.center"],
+                values[f"{arc}.half_angle"],
+                *friction_coefficients(structure, rough or arc, values),
             )
             for arc in structure.arcs
         ]
-        rest = friction_coefficients(law, "friction.rest", values)
+        rest = friction_coefficients(structure, "friction.rest", values)
         surface = zones.surface_of(arcs, *rest)
         surfaces = [rest, *((arc.mu_s, arc.mu_k) for arc in arcs)]
         return self.scene_type(structure)(

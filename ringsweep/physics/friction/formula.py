@@ -1,7 +1,7 @@
 """Formulas of friction laws: from text to expressions, and the units of their parameters.
 
-The text is read with Python's grammar, but it is never run. Names are the sliding speed ``v``, the coefficients ``mu_s``
-and ``mu_k`` of the surface, ``pi``, and parameters of the law.
+The text is read with Python's grammar, but it is never run. Names are the sliding speed ``v``, the coefficients
+``mu_s`` and ``mu_k`` of the surface, ``pi``, and parameters of the law.
 """
 
 from __future__ import annotations

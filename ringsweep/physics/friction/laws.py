@@ -11,10 +11,10 @@ import json
 from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
-from ringsweep.numerics.expressions import number, switch, symbols_of
+from ringsweep.numerics.expressions import SPEED, add, multiply, negative, number, switch, symbol, symbols_of
 from ringsweep.physics.friction.formula import COEFFICIENTS, FormulaError, Threshold, read_expression, read_formula
 from ringsweep.physics.friction.registry import SetValued, Smooth, Traits, add_law, describe
-from ringsweep.physics.friction.velocity import EXPRESSIONS, MOST_PRODUCTS, Expression, series_products
+from ringsweep.physics.friction.velocity import EXPRESSIONS, MOST_PRODUCTS, PIECE, Expression, series_products
 from ringsweep.quantities.parameters import Leaf, Parameter
 
 
@@ -39,6 +39,8 @@ def _make(name: str, doc: str, expression: Expression, module: str = __name__, q
     hidden = ["slope_at_rest", "slope_beyond"]
     if expression.has_edges:
         hidden.append("edges")
+    if expression.tabulated:
+        hidden[-1] = "pieces"
     if expression.thresholds:
         hidden.append("thresholds")
     if expression.has_band:
@@ -201,7 +203,7 @@ Tanh = _law(
 
 BrownMcphee = _law(
     "brown-mcphee",
-    """Stribeck friction without a jump (Brown and McPhee, J. Comput. Nonlinear Dyn. 11, 2016, without viscous part).""",
+    """Stribeck friction without a jump (Brown and McPhee, J. Comput. Nonlinear Dyn. 11, 2016; no viscous part).""",
     mu="mu_k*tanh(4*v/v_t) + (mu_s - mu_k)*(v/v_t)/((v/(2*v_t))**2 + 3/4)**2",
     band="v_t",
     v_t=Parameter("m/s", "speed of the greatest friction", lower=0.0, open_lower=True),
@@ -209,10 +211,37 @@ BrownMcphee = _law(
 
 Andersson = _law(
     "andersson",
-    """Stribeck friction made smooth by a hyperbolic tangent (Andersson et al., Tribology Int. 40, 2007; exponent 2).""",
+    """Stribeck friction times a hyperbolic tangent (Andersson et al., Tribology Int. 40, 2007; with exponent 2).""",
     mu="(mu_k + (mu_s - mu_k)*exp(-(v/v_s)**2))*tanh(k_t*v)",
     v_s=_V_S,
     k_t=Parameter("s/m", "steepness of the law at rest", lower=0.0, open_lower=True),
+)
+
+
+def _tabulated(name: str, doc: str, *, set_valued: bool) -> type:
+    knot, *c = (symbol(f"piece {j}") for j in range(PIECE))
+    x = add(SPEED, negative(knot))
+    cubic = c[3]
+    for coefficient in reversed(c[:3]):
+        cubic = add(coefficient, multiply(x, cubic))
+    law = _make(name, doc, Expression(multiply(symbol("mu_k"), cubic), (), set_valued, None, {}, tabulated=True))
+    describe(law, Traits(SetValued if set_valued else Smooth, coefficients=("scale",)))
+    return law
+
+
+Table = _tabulated(
+    "Table",
+    """Measured friction that is set-valued at rest, up to its value at v = 0.
+
+    A monotone cubic through each pair of points (Fritsch and Carlson, SIAM J. Numer. Anal. 17, 1980), times the factor
+    ``scale`` of the surface; constant beyond the last point. ``pieces``, of shape ``(cells, points, 5)``, has a row for
+    each cubic: its lower bound, m/s, and its coefficients from the lowest power up.
+    """,
+    set_valued=True,
+)
+
+SmoothTable = _tabulated(
+    "SmoothTable", """Measured friction that vanishes at v = 0; see :class:`Table`.""", set_valued=False
 )
 
 

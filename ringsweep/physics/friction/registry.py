@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from ringsweep.compile import hook, lacking
 from ringsweep.physics.friction import presliding
-from ringsweep.physics.friction.velocity import MU_K, MU_S
+from ringsweep.physics.friction.velocity import MU_K, MU_S, SCALE
 from ringsweep.quantities.parameters import Parameter
 
 
@@ -32,7 +32,7 @@ class Traits:
     family : type
         :class:`SetValued`, :class:`Smooth` or :class:`Dynamic`.
     coefficients : tuple of str
-        Friction coefficients that the law needs of each surface: ``mu_s``, ``mu_k`` or both.
+        What the law needs of each surface: friction coefficients ``mu_s``, ``mu_k`` or both, or the factor ``scale``.
     ascending : tuple of str, optional
         Names of two parameters; the first value must be less than the second.
     snaps : bool
@@ -115,5 +115,5 @@ def family_of(law: type) -> type:
 
 def coefficients_of(law: type) -> dict[str, Parameter]:
     """Parameters of the friction coefficients that a law needs of each surface."""
-    known = {"mu_s": MU_S, "mu_k": presliding.MU_K if family_of(law) is Dynamic else MU_K}
+    known = {"mu_s": MU_S, "scale": SCALE, "mu_k": presliding.MU_K if family_of(law) is Dynamic else MU_K}
     return {name: known[name] for name in TRAITS[law].coefficients}

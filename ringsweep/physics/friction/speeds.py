@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -56,6 +57,43 @@ def hidden_fields(
     pairs = rows[:, len(columns) :].reshape(len(rows), -1, 2)
     found = _Finder(expression, found_columns, [(pairs[:, i, 0], pairs[:, i, 1]) for i in range(pairs.shape[1])])
     return {name: np.ascontiguousarray(field[cell_row]) for name, field in found.fields().items()}
+
+
+def table_fields(
+    speeds: NDArray[np.float64], mu: NDArray[np.float64], surfaces: Sequence[_Surface]
+) -> dict[str, NDArray[Any]]:
+    """Fields of a law that is a table, see :class:`ringsweep.physics.friction.laws.Table`.
+
+    Parameters
+    ----------
+    speeds : ndarray of shape ``(n,)``
+        Sliding speeds, m/s, ascending from 0.
+    mu : ndarray of shape ``(n,)``
+        Friction coefficients.
+    surfaces : sequence of tuple of ndarray of shape ``(cells,)``
+        The second number of each is the factor on the table.
+    """
+    # This import takes longer than a small sweep.
+    from scipy.interpolate import PchipInterpolator
+
+    curve = PchipInterpolator(speeds, mu)
+    last = [speeds[-1], mu[-1], 0.0, 0.0, 0.0]
+    pieces = np.vstack([np.column_stack([speeds[:-1], curve.c[::-1].T]), last])
+    cells, scale = len(surfaces[0][1]), np.max([factor for _, factor in surfaces], axis=0)
+    slopes = abs(curve(np.concatenate([np.linspace(a, b, 33) for a, b in itertools.pairwise(speeds)]), 1))
+    found: dict[str, NDArray[Any]] = {"pieces": np.broadcast_to(pieces, (cells, *pieces.shape))}
+    if mu[0] > 0.0:
+        jump = np.where(scale > 0.0, np.inf, 0.0)
+        return found | {"slope_at_rest": jump, "slope_beyond": jump}
+    # Friction grows up to its first maximum.
+    falls = np.flatnonzero(np.diff(mu) <= 0.0)
+    top = int(falls[0]) if len(falls) else len(mu) - 1
+    return found | {
+        "slope_at_rest": scale * abs(curve(0.0, 1)),
+        "slope_beyond": scale * (slopes[33 * top :].max() if top + 1 < len(mu) else 0.0),
+        "band": np.full(cells, speeds[top]),
+        "in_band": np.full(cells, top),
+    }
 
 
 def _distinct(table: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
@@ -231,7 +269,8 @@ class _Finder:
                     )
             elif (abs(at_rest) > 1e-9).any():
                 raise FormulaError(
-                    f"without at_rest friction must vanish at v = 0, where it is {at_rest[abs(at_rest) > 1e-9][0]:.6g}: "
+                    "without at_rest friction must vanish at v = 0, where it is "
+                    f"{at_rest[abs(at_rest) > 1e-9][0]:.6g}: "
                     "give `at_rest: mu_s` for friction that holds up to mu_s at rest"
                 )
 

@@ -1,9 +1,10 @@
-"""Friction laws that are functions of the sliding velocity alone. Each law is one expression; all else is derived from it.
+"""Friction laws that are functions of the sliding velocity alone.
 
-The expression gives the friction coefficient at a sliding speed, :math:`\\mu(|v|)`, from the coefficients ``mu_s`` and
-``mu_k`` of the surface and from parameters of the law. Derived are its slope, its power series, its form for vector
-lanes, and its *regions*: intervals of the sliding speed in which the expression is analytic. Regions are numbered from
-slow to fast. In the regions with negative numbers, the *stiction band*, a contact counts as stuck.
+Each law is one expression; all else is derived from it. The expression gives the friction coefficient at a sliding
+speed, :math:`\\mu(|v|)`, from the coefficients ``mu_s`` and ``mu_k`` of the surface and from parameters of the law.
+Derived are its slope, its power series, its form for vector lanes, and its *regions*: intervals of the sliding speed in
+which the expression is analytic. Regions are numbered from slow to fast. In the regions with negative numbers, the
+*stiction band*, a contact counts as stuck.
 
 *Surfaces* are the coefficients of the surfaces under the contacts, ``(mu_s, mu_k, mu_s, mu_k, ...)``.
 """
@@ -25,13 +26,16 @@ from ringsweep.numerics.functions import (
     arc_tangent,
     exponential,
     hyperbolic_tangent,
+    lane_of,
+    lanes_body,
     logarithm,
     raised,
     select,
     spread,
     square_root,
+    with_lane,
 )
-from ringsweep.numerics.lanes import LANES
+from ringsweep.numerics.lanes import LANES, WIDTH
 from ringsweep.numerics.series import INVERSE
 from ringsweep.numerics.terms import MOST_GROUPS, PRODUCTS
 from ringsweep.physics.friction.formula import COEFFICIENTS, Threshold
@@ -39,6 +43,8 @@ from ringsweep.quantities.parameters import Parameter
 
 MU_S = Parameter("1", "static friction coefficient", lower=0.0)
 MU_K = Parameter("1", "kinetic friction coefficient", lower=0.0)
+
+SCALE = Parameter("1", "factor on the measured friction", lower=0.0, default=1.0)
 
 #: Numbers of the regions of laws with bristles, which have two: in BAND the contact counts as stuck.
 BAND, KINETIC = -1, 0
@@ -60,6 +66,9 @@ class Expression:
         Speed at which the stiction band ends, m/s. By default the first speed at which friction no longer grows; for a
         set-valued law zero.
     parameters : mapping of str to Parameter
+    tabulated : bool
+        Whether the law is a table of cubics: the expression holds for each of them. The symbols ``piece 0`` to
+        ``piece 4`` are the lower bound of a cubic, m/s, and its coefficients from the lowest power up.
     """
 
     mu: Node
@@ -67,6 +76,7 @@ class Expression:
     set_valued: bool
     band: Node | None
     parameters: Mapping[str, Parameter] = field(default_factory=dict)
+    tabulated: bool = False
 
     @property
     def has_band(self) -> bool:
@@ -76,7 +86,7 @@ class Expression:
     @property
     def has_edges(self) -> bool:
         """Whether the law has more than one region."""
-        return self.has_band or bool(self.thresholds)
+        return self.has_band or bool(self.thresholds) or self.tabulated
 
 
 #: Expressions of the laws, by the type of the law.
@@ -93,12 +103,48 @@ def _per_contact(expression: Expression, surfaces: int) -> list[Node]:
 
 def _names(expression: Expression, surfaces: int) -> dict[str, str]:
     names = {name: f"law.{name}" for name in expression.parameters}
+    if expression.tabulated:
+        names |= {f"piece {j}": f"piece[{j}]" for j in range(PIECE)}
     for i in range(surfaces):
         names[f"{COEFFICIENTS[i % 2]} {i // 2}"] = f"surfaces[{i}]"
     return names
 
 
+#: Numbers of a cubic in a table.
+PIECE = 5
+
+
+@inlined
+def _row_at(pieces, speed):
+    """Row of the cubic at a speed."""
+    low, high = 0, pieces.shape[0]
+    while high - low > 1:
+        middle = (low + high) // 2
+        if speed < pieces[middle, 0]:
+            high = middle
+        else:
+            low = middle
+    return low
+
+
+def _piece_at(pieces, speed):
+    """Cubic of a table at a speed, for floats and Lanes."""
+    i = _row_at(pieces, speed)
+    return pieces[i, 0], pieces[i, 1], pieces[i, 2], pieces[i, 3], pieces[i, 4]
+
+
+@lanes_body(_piece_at)
+def _lanes_piece_at(pieces, speed):
+    a = b = c = d = e = spread(0.0)
+    for lane in range(WIDTH):
+        i = _row_at(pieces, lane_of(speed, lane))
+        a, b = with_lane(a, lane, pieces[i, 0]), with_lane(b, lane, pieces[i, 1])
+        c, d, e = with_lane(c, lane, pieces[i, 2]), with_lane(d, lane, pieces[i, 3]), with_lane(e, lane, pieces[i, 4])
+    return a, b, c, d, e
+
+
 _SCOPE = {
+    "piece_at": _piece_at,
     "any_of": any_of,
     "atan_of": arc_tangent,
     "exp_of": exponential,
@@ -131,7 +177,7 @@ def _derived(write: Callable[..., list[str]]) -> Any:
         if expression is None:
             return None
         lines = write(expression, count, lanes, *names)
-        return function_from_lines(", ".join(names), lines, _SCOPE | {"low_of": lower_bound})
+        return function_from_lines(", ".join(names), lines, _SCOPE | {"low_of": lower_bound, "row_at": _row_at})
 
     def count_of(arguments: Any) -> int:
         return len(arguments[names.index("surfaces")]) if "surfaces" in names else 0
@@ -167,9 +213,22 @@ def _interval(expression: Expression) -> str:
     return "region + law.in_band" if expression.has_band else "region"
 
 
+def _region_prelude(expression: Expression) -> list[str]:
+    if not expression.tabulated:
+        return ["low = low_of(law, region)"]
+    coefficients = "".join(f"law.pieces[i, {j}], " for j in range(PIECE))
+    return [f"i = {_interval(expression)}", f"piece = ({coefficients})"]
+
+
+def _speed_prelude(expression: Expression) -> list[str]:
+    return ["piece = piece_at(law.pieces, speed)"] if expression.tabulated else []
+
+
 @_derived
 def lower_bound(expression, count, lanes, law, region):
     """Lower bound of a region, m/s."""
+    if expression.tabulated:
+        return [f"return law.pieces[{_interval(expression)}, 0]"]
     if not expression.has_edges:
         return ["return 0.0"]
     return [f"i = {_interval(expression)}", "return law.edges[i - 1] if i > 0 else 0.0"]
@@ -178,6 +237,11 @@ def lower_bound(expression, count, lanes, law, region):
 @_derived
 def upper_bound(expression, count, lanes, law, region):
     """Upper bound of a region, m/s."""
+    if expression.tabulated:
+        return [
+            f"i = {_interval(expression)} + 1",
+            "return law.pieces[i, 0] if i < law.pieces.shape[0] else inf",
+        ]
     if not expression.has_edges:
         return ["return inf"]
     return [f"i = {_interval(expression)}", "return law.edges[i] if i < len(law.edges) else inf"]
@@ -188,8 +252,11 @@ def region_at(expression, count, lanes, law, speed):
     """Region of a sliding speed, m/s; a bound belongs to the region above it."""
     if not expression.has_edges:
         return ["return 0"]
+    back = "i - law.in_band" if expression.has_band else "i"
+    if expression.tabulated:
+        return ["i = row_at(law.pieces, speed)", f"return {back}"]
     lines = ["i = 0", "for edge in law.edges:", "    if speed >= edge and edge < inf:", "        i += 1"]
-    return [*lines, "return i - law.in_band" if expression.has_band else "return i"]
+    return [*lines, f"return {back}"]
 
 
 @inlined
@@ -201,6 +268,9 @@ def region_bounds(law, region):
 @_derived
 def varies(expression, count, lanes, law, region):
     """Whether friction depends on the sliding speed within a region."""
+    if expression.tabulated:
+        # Beyond the table friction is constant.
+        return [f"return {_interval(expression)} + 1 < law.pieces.shape[0]"]
     return ["low = low_of(law, region)", *writer.varies_lines(expression.mu, _REGION_SIDE)]
 
 
@@ -231,8 +301,8 @@ def friction_at(expression, count, lanes, law, speed, surfaces):
     """
     names, outputs = _values(expression, count)
     if not lanes:
-        return writer.float_lines(names, outputs, _SPEED_SIDE)
-    lines = writer.lanes_lines(names, outputs, "law.thresholds[{}]")
+        return [*_speed_prelude(expression), *writer.float_lines(names, outputs, _SPEED_SIDE)]
+    lines = [*_speed_prelude(expression), *writer.lanes_lines(names, outputs, "law.thresholds[{}]")]
     if expression.has_band:
         return lines
     half = len(outputs) // 2
@@ -244,7 +314,7 @@ def friction_at(expression, count, lanes, law, speed, surfaces):
 @_derived
 def friction_in(expression, count, lanes, law, region, speed, surfaces):
     """What :func:`friction_at` returns, by the formula of a region, even if the speed lies outside the region."""
-    return ["low = low_of(law, region)", *writer.float_lines(*_values(expression, count), _REGION_SIDE)]
+    return [*_region_prelude(expression), *writer.float_lines(*_values(expression, count), _REGION_SIDE)]
 
 
 @_derived
@@ -323,7 +393,7 @@ def begin_series(expression, count, lanes, law, region, speed, surfaces):
         Friction coefficient at each contact; numbers for :func:`series_term`; and the sharpness of the law for
         :func:`shorten_for_decay`, s/m.
     """
-    return ["low = low_of(law, region)", *_series(expression, count).start]
+    return [*_region_prelude(expression), *_series(expression, count).start]
 
 
 @_derived
@@ -348,7 +418,7 @@ def series_term(expression, count, lanes, law, region, k, x, inner, begun, surfa
     tuple of tuple of float
         Coefficient of friction at each contact; left factors and right factors of the products.
     """
-    return ["low = low_of(law, region)", *_series(expression, count).step]
+    return [*_region_prelude(expression), *_series(expression, count).step]
 
 
 # Largest change of the exponent of an exponential within a step. For a larger change the terms still grow at the end of
