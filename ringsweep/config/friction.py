@@ -65,13 +65,19 @@ def friction_law(name: str, mu: str, at_rest: str | None = None) -> None:
     ... }
     >>> run = ringsweep.sweep(scene, {})
     """
-    if not isinstance(name, str) or not name or (name in LAWS and name not in _REGISTERED) or name == FORMULA:
+    if not _may_name(name):
         raise InputError("friction_law", f"{show(name)} cannot be the name of a law: choose another name")
     definition = Definition(mu, at_rest)
     law = _defined(definition, "friction_law")
     LAWS.pop(name, None)
     add_law(name, law, TRAITS[law])
     _REGISTERED[name] = definition
+
+
+def _may_name(name: object) -> bool:
+    """Whether a law of a user may have a name."""
+    free = name not in LAWS or name in _REGISTERED
+    return isinstance(name, str) and name != "" and name not in (FORMULA, TABLE) and free
 
 
 def own_laws(friction: Mapping[str, Any]) -> dict[str, type]:
@@ -95,7 +101,7 @@ def own_laws(friction: Mapping[str, Any]) -> dict[str, type]:
         for key in section:
             if key not in ("mu", "at_rest"):
                 raise InputError(f"{path}.{key}", "unknown key" + suggestion(key, ("mu", "at_rest")))
-        if not isinstance(name, str) or name == FORMULA or (name in LAWS and name not in _REGISTERED):
+        if not _may_name(name):
             raise InputError(path, f"{show(name)} cannot be the name of a law: choose another name")
         found[name] = _defined(Definition(section["mu"], section.get("at_rest")), path)
     if "mu" in friction and friction.get("law") != TABLE:

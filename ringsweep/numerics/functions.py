@@ -340,6 +340,9 @@ def spread(x):
     return x
 
 
+_spread_number: Any = _spread
+
+
 @intrinsic
 def lane_of(typingctx, x, lane):
     """Number in one lane."""
@@ -356,7 +359,7 @@ def with_lane(typingctx, x, lane, value):
     return LANES(LANES, types.intp, types.float64), lower
 
 
-specialise(spread, lambda kind: (lambda x: x) if kind == LANES else (lambda x: _spread(x)))
+specialise(spread, lambda kind: (lambda x: x) if kind == LANES else (lambda x: _spread_number(x)))
 
 
 def sine_cosine(x):

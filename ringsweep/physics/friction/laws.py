@@ -49,7 +49,8 @@ def _make(name: str, doc: str, expression: Expression, module: str = __name__, q
     found: Any = NamedTuple(name, [*fields, *((field, Any) for field in hidden)])  # type: ignore[misc]
     found.__doc__, found.__module__, found.__qualname__ = doc, module, qualified or name
     EXPRESSIONS[found] = expression
-    return found  # type: ignore[no-any-return]
+    law: type = found
+    return law
 
 
 # ---- the laws of the package ------------------------------------------------------------------

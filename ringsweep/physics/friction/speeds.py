@@ -185,29 +185,27 @@ class _Finder:
         changes = signs[:, 1:] != signs[:, :-1]
         if (changes.sum(axis=1) + signs[:, 0] > 3).any():
             raise FormulaError("min, max or abs switch more than three times: write piecewise")
-        found = np.full(self.rows, np.inf)
-        for row in range(self.rows):
-            places = list(np.flatnonzero(changes[row]))
-            wanted = order - int(signs[row, 0])
-            if wanted < 0:
-                found[row] = 0.0
-            elif wanted < len(places):
-                found[row] = self._bisect(difference, values, row, _GRID[places[wanted]], _GRID[places[wanted] + 1])
+        found, wanted = np.full(self.rows, np.inf), order - signs[:, 0]
+        found[wanted < 0] = 0.0
+        # Number of changes up to each speed of the grid.
+        place = (np.cumsum(changes, axis=1) <= wanted[:, None]).sum(axis=1)
+        rows = np.flatnonzero((wanted >= 0) & (place < changes.shape[1]))
+        found[rows] = self._bisect(difference, values, rows, _GRID[place[rows]], _GRID[place[rows] + 1])
         return found
 
-    def _bisect(self, node: Node, values: _Columns, row: int, low: float, high: float) -> float:
-        """Speed between two speeds at which the sign of a node changes."""
-        own = {name: column[row] for name, column in values.items()}
-        thresholds = [threshold[row] for threshold in self.thresholds]
-        positive = bool(evaluate(node, high, own, thresholds) > 0.0)
+    def _bisect(
+        self, node: Node, values: _Columns, rows: NDArray[np.intp], low: NDArray[Any], high: NDArray[Any]
+    ) -> NDArray[np.float64]:
+        """Speeds between two speeds at which the sign of a node changes, in some of the rows."""
+        own = {name: column[rows] for name, column in values.items()}
+        thresholds = [threshold[rows] for threshold in self.thresholds]
+        positive = evaluate(node, high, own, thresholds) > 0.0
         while True:
             middle = 0.5 * (low + high)
-            if not low < middle < high:
-                return float(high)
-            if bool(evaluate(node, middle, own, thresholds) > 0.0) == positive:
-                high = middle
-            else:
-                low = middle
+            if not ((low < middle) & (middle < high)).any():
+                return high
+            same = (evaluate(node, middle, own, thresholds) > 0.0) == positive
+            low, high = np.where(same, low, middle), np.where(same, middle, high)
 
     def _tail(self, exponent: Node, scale: int, values: _Columns) -> NDArray[np.float64]:
         """Speed beyond which ``exp(-scale * exponent)`` is negligible.
@@ -221,16 +219,11 @@ class _Finder:
                 found = (_reach(scale * slope) / scale - offset) / slope
             return np.where(slope > 0.0, np.maximum(found, 0.0), np.inf)
         on_grid, rates = self.on_grid(exponent, values), self.on_grid(rate, values)
-        found = np.full(self.rows, np.inf)
-        for row in range(self.rows):
-            # Where the exponent has grown once and for all.
-            with np.errstate(invalid="ignore"):
-                short = np.flatnonzero(~(scale * on_grid[row] > _reach(scale * rates[row])))
-            if len(short) == 0:
-                found[row] = 0.0
-            elif short[-1] + 1 < len(_GRID):
-                found[row] = _GRID[short[-1] + 1]
-        return found
+        with np.errstate(invalid="ignore"):
+            short = ~(scale * on_grid > _reach(scale * rates))
+        # The first speed from which the exponent has grown once and for all.
+        last = np.where(short.any(axis=1), short.shape[1] - short[:, ::-1].argmax(axis=1), 0)
+        return np.append(_GRID, np.inf)[last]
 
     def _first_invalid(self, mu: Node, values: _Columns) -> NDArray[np.float64]:
         """First speed at which friction is negative or no number."""
@@ -238,14 +231,15 @@ class _Finder:
         with np.errstate(invalid="ignore"):
             invalid = ~((grid >= -_ROUNDING) & (grid < np.inf))
         found = np.full(self.rows, np.inf)
-        for row in np.flatnonzero(invalid.any(axis=1)):
-            place = int(np.argmax(invalid[row]))
-            if place == 0:
-                value = grid[row, 0]
-                raise FormulaError(f"at rest it gives {value:.6g}: a friction coefficient is a number and not negative")
-            below = _GRID[place - 1]
-            negative = grid[row, place] < 0.0
-            found[row] = self._bisect(mu, values, row, below, _GRID[place]) if negative else below
+        rows = np.flatnonzero(invalid.any(axis=1))
+        place = invalid[rows].argmax(axis=1)
+        if (place == 0).any():
+            value = grid[rows[place == 0][0], 0]
+            raise FormulaError(f"at rest it gives {value:.6g}: a friction coefficient is a number and not negative")
+        found[rows] = _GRID[place - 1]
+        negative = grid[rows, place] < 0.0
+        rows, place = rows[negative], place[negative]
+        found[rows] = self._bisect(mu, values, rows, _GRID[place - 1], _GRID[place])
         return found
 
     def _check_rest(self) -> None:

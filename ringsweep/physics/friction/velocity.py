@@ -172,7 +172,7 @@ def _derived(write: Callable[..., list[str]]) -> Any:
     names = [name for name in inspect.signature(write).parameters if name not in ("expression", "count", "lanes")]
 
     @cache
-    def body(law: type, count: int, lanes: bool) -> Any:
+    def body(law: Any, count: int, lanes: bool) -> Any:
         expression = EXPRESSIONS.get(law)
         if expression is None:
             return None
@@ -183,14 +183,15 @@ def _derived(write: Callable[..., list[str]]) -> Any:
         return len(arguments[names.index("surfaces")]) if "surfaces" in names else 0
 
     def function(*arguments: Any) -> Any:
-        found = body(type(arguments[0]), count_of(arguments), False)
+        law: Any = type(arguments[0])
+        found = body(law, count_of(arguments), False)
         if found is None:
             raise TypeError(f"{type(arguments[0]).__name__} is not a friction law of the velocity")
         return found(*arguments)
 
     def typed(*kinds: Any) -> Any:
         in_lanes = LANES in kinds
-        return body(getattr(kinds[0], "instance_class", type(None)), count_of(kinds), in_lanes)
+        return body(getattr(kinds[0], "instance_class", None), count_of(kinds), in_lanes)
 
     function.__name__, function.__doc__, function.__module__ = write.__name__, write.__doc__, write.__module__
     parameters = [inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD) for name in names]
