@@ -344,19 +344,23 @@ _spread_number: Any = _spread
 
 
 @intrinsic
-def lane_of(typingctx, x, lane):
-    """Number in one lane."""
-    return types.float64(LANES, types.intp), lambda context, builder, sig, args: builder.extract_element(*args)
-
-
-@intrinsic
-def with_lane(typingctx, x, lane, value):
-    """Lanes with another number in one lane."""
+def gather(typingctx, values, places):
+    """Numbers of an array at the places in Lanes, which are whole numbers within the array."""
 
     def lower(context, builder, sig, args):
-        return builder.insert_element(args[0], args[2], args[1])
+        base = builder.ptrtoint(context.make_array(sig.args[0])(context, builder, args[0]).data, ir.IntType(64))
+        offsets = builder.shl(builder.fptosi(args[1], WORDS), ir.Constant(WORDS, [3] * WIDTH))
+        addresses = builder.add(spread_scalar(builder, base, WORDS), offsets)
+        pointers = ir.VectorType(ir.DoubleType().as_pointer(), WIDTH)
+        mask = ir.VectorType(ir.IntType(1), WIDTH)
+        kind = ir.FunctionType(VECTOR, [pointers, ir.IntType(32), mask, VECTOR])
+        name = f"llvm.masked.gather.v{WIDTH}f64.v{WIDTH}p0f64"
+        function = cgutils.get_or_insert_function(builder.module, kind, name)
+        everywhere, nothing = ir.Constant(mask, [1] * WIDTH), ir.Constant(VECTOR, ir.Undefined)
+        align = ir.Constant(ir.IntType(32), 8)
+        return builder.call(function, [builder.inttoptr(addresses, pointers), align, everywhere, nothing])
 
-    return LANES(LANES, types.intp, types.float64), lower
+    return LANES(values, LANES), lower
 
 
 specialise(spread, lambda kind: (lambda x: x) if kind == LANES else (lambda x: _spread_number(x)))

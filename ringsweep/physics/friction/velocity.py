@@ -25,17 +25,16 @@ from ringsweep.numerics.functions import (
     any_of,
     arc_tangent,
     exponential,
+    gather,
     hyperbolic_tangent,
-    lane_of,
     lanes_body,
     logarithm,
     raised,
     select,
     spread,
     square_root,
-    with_lane,
 )
-from ringsweep.numerics.lanes import LANES, WIDTH
+from ringsweep.numerics.lanes import LANES
 from ringsweep.numerics.series import INVERSE
 from ringsweep.numerics.terms import MOST_GROUPS, PRODUCTS
 from ringsweep.physics.friction.formula import COEFFICIENTS, Threshold
@@ -135,12 +134,20 @@ def _piece_at(pieces, speed):
 
 @lanes_body(_piece_at)
 def _lanes_piece_at(pieces, speed):
-    a = b = c = d = e = spread(0.0)
-    for lane in range(WIDTH):
-        i = _row_at(pieces, lane_of(speed, lane))
-        a, b = with_lane(a, lane, pieces[i, 0]), with_lane(b, lane, pieces[i, 1])
-        c, d, e = with_lane(c, lane, pieces[i, 2]), with_lane(d, lane, pieces[i, 3]), with_lane(e, lane, pieces[i, 4])
-    return a, b, c, d, e
+    low, width = spread(0.0), pieces.shape[0]
+    while width > 1:
+        # The row is one of `width` rows from `low` on.
+        half = width // 2
+        low = select(speed >= gather(pieces, low * PIECE + half * PIECE), low + half, low)
+        width -= half
+    place = low * PIECE
+    return (
+        gather(pieces, place),
+        gather(pieces, place + 1.0),
+        gather(pieces, place + 2.0),
+        gather(pieces, place + 3.0),
+        gather(pieces, place + 4.0),
+    )
 
 
 _SCOPE = {
