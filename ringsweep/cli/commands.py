@@ -130,8 +130,8 @@ def animate_command(arguments: argparse.Namespace) -> None:
     config = with_values(arguments.config, arguments.set)
     target = arguments.output or f"{config.name}-run.gif"
     model = config.scene.structure.model
-    if not MODELS[model].rotates:
-        raise InputError("scene.model", f"{model}: there is no ring to animate; ringsweep simulate draws the history")
+    if not MODELS[model].driven:
+        raise InputError("scene.model", f"{model}: no ring or belt to animate; ringsweep simulate draws the history")
     if config.axes.sizes:
         raise InputError(
             "sweep", "several friction laws, but an animation shows one run: name its law by --set friction.law=..."

@@ -9,6 +9,13 @@ import xarray as xr
 
 from ringsweep.plots.datasets import is_numeric
 
+MINUS = "\N{MINUS SIGN}"
+
+
+def number_text(value: float, form: str = ".3g") -> str:
+    """A number with a true minus sign, as ticks of axes have it."""
+    return format(value, form).replace("-", MINUS)
+
 
 def display_factor(coordinate: xr.DataArray) -> float:
     """Factor from the numbers of a coordinate to the numbers on its axis: axes show radians as degrees."""
@@ -45,5 +52,5 @@ def value_text(value: xr.DataArray) -> str:
     if not is_numeric(value):
         return f"{name} = {value.item()}"
     unit = unit_text(value, "°")
-    number = f"{value.item() * display_factor(value):.4g}"
+    number = number_text(value.item() * display_factor(value), ".4g")
     return f"{name} = {number}{unit if unit == '°' else f' {unit}'.rstrip()}"
