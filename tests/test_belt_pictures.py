@@ -1,5 +1,7 @@
 """Phase portrait, friction loop and film of a body on a belt show places, velocities and forces of the run."""
 
+import re
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -10,6 +12,9 @@ import ringsweep
 from ringsweep import plots
 from ringsweep.cli import main
 from ringsweep.errors import InputError
+from ringsweep.models import parameters
+from ringsweep.models.scene import Structure
+from ringsweep.physics.drives import DRIVES
 from ringsweep.plots import films
 from ringsweep.plots.phase import _MODE_STYLES
 
@@ -106,8 +111,12 @@ class TestPortrait:
 
     def test_portrait_has_names_and_units_and_no_frame_of_a_ring(self, run, ax):
         plots.phase_portrait(run, ax=ax)
-        assert ax.get_xlabel() == "displacement of the body (m)"
-        assert ax.get_ylabel() == "velocity of the body (m s$^{-1}$)"
+        assert ax.get_xlabel() == "displacement (m)"
+        assert ax.get_ylabel() == "velocity (m s$^{-1}$)"
+        small = run.assign({name: 1e-5 * run[name] for name in ("x", "velocity", "belt_velocity")})
+        plots.phase_portrait(small, ax=(below := Figure().add_subplot()))
+        assert below.get_xlabel() == "displacement (µm)"
+        assert below.xaxis.get_major_formatter()(5e-6, 0) == "5"
         with pytest.raises(InputError, match=r"frame: 'ring'.*belt"):
             plots.phase_portrait(run, "ring", ax)
 
@@ -213,6 +222,11 @@ class TestFilm:
         film = films._Film(free, 5.0, 1.0)
         assert not film.body.spring.get_visible()
         assert not any("spring" in text.get_text() for text in film.body.ax.texts)
+
+    @pytest.mark.parametrize("drive", DRIVES)
+    def test_axes_of_a_belt_map_speak_of_no_ring_and_no_angle(self, drive):
+        names = [parameter.long_name for parameter in parameters(Structure("belt", "stiction", drive)).values()]
+        assert not [name for name in names if re.search(r"\bring\b|\bangle\b|\bangular\b", name)]
 
     def test_picture_of_a_belt_speaks_of_no_ring(self, film):
         texts = [text.get_text() for legend in film.figure.subfigs[0].legends for text in legend.get_texts()]

@@ -174,7 +174,7 @@ def test_plot_draws_what_simulate_and_precision_wrote_and_names_the_command_for_
     assert "there is no belt to draw" in refused(capsys, "plot", "case-run.nc", "--kind", "friction")
     assert "one friction law" in refused(capsys, "plot", "case-run.nc", "--law", "coulomb")
     assert main(["run", "case.yaml", "-q"]) == 0
-    assert "draw it with ringsweep map case.nc" in refused(capsys, "plot", "case.nc")
+    assert "ringsweep map case.nc draws it" in refused(capsys, "plot", "case.nc")
     work = {"time_per_run": ("contender", [1e-4, 1e-3]), "error_end": (("contender", "cell"), [[1e-3], [1e-6]])}
     netcdf.save(
         xr.Dataset(work, {"method": ("contender", ["rk4", "rk4"])}, netcdf.load("case-run.nc").attrs), "work.nc"

@@ -115,7 +115,7 @@ def plot_command(arguments: argparse.Namespace) -> None:
     dataset = Path(arguments.dataset)
     result = netcdf.open_dataset(dataset)
     if not {"time", "contender"} & set(result.dims):
-        raise InputError(str(dataset), f"is a sweep, not a run: draw it with ringsweep map {dataset}")
+        raise InputError(str(dataset), f"is a sweep, not the history of a run: ringsweep map {dataset} draws it")
     shown = [name for name in (arguments.kind, arguments.law) if name is not None]
     target = Path(arguments.output or dataset.with_name("-".join([dataset.stem, *shown]) + ".png"))
     netcdf.check_writable(target)

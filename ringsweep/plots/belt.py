@@ -24,6 +24,8 @@ from ringsweep.plots.style import PAIR_COLOURS, REST, SMALL
 # Heights in the picture, where the body stands on the belt at 0.
 _BODY, _SPRING, _BELT, _ARROW = 0.5, 0.25, -0.18, 0.08
 
+_FRICTION = "#009E73"
+
 
 class BeltArtists:
     """Artists of the body and the belt, and a dot in the phase portrait below. :meth:`show` moves them to an instant.
@@ -40,7 +42,7 @@ class BeltArtists:
         self.range = (high - low) or 1.0
         self.half = 0.07 * self.range
         self.wall = low - 0.45 * self.range
-        self.ends = self.wall - 0.05 * self.range, high + 0.2 * self.range
+        self.ends = self.wall - 0.05 * self.range, high + 0.35 * self.range
         force = run["friction_force"].values
         self.reference = reference_force([np.abs(force)], 1.0)
         # Length of an arrow, m/N.
@@ -67,7 +69,7 @@ class BeltArtists:
         ax.add_patch(self.body)
         self.friction = ax.quiver(
             *np.zeros((4, 1)),
-            color=PAIR_COLOURS[0],
+            color=_FRICTION,
             angles="xy",
             scale_units="xy",
             scale=1.0,
@@ -109,13 +111,13 @@ class BeltArtists:
 
     def legend_entries(self) -> list[Artist]:
         """Legend entries of the arrow and of the phase portrait."""
-        return [Line2D([], [], color=PAIR_COLOURS[0], linewidth=2.5, label="friction on the body"), *self.portrait]
+        return [Line2D([], [], color=_FRICTION, linewidth=2.5, label="friction on the body"), *self.portrait]
 
     def _draw_scale_bar(self) -> None:
         """A bar of a round force."""
         force = round_down(0.75 * self.reference)
-        right, y = self.ends[1] - 0.03 * self.range, 0.7
-        left = right - force * self.scale
+        left, y = self.ends[0] + 0.03 * self.range, 0.78
+        right = left + force * self.scale
         self.ax.plot([left, right], [y, y], marker="|", color="0.3", linewidth=1.2)
         self.ax.text((left + right) / 2, y + 0.04, f"{force:g} N", ha="center", va="bottom", fontsize=SMALL)
 

@@ -89,7 +89,7 @@ def require_one_run(ds: xr.Dataset, names: tuple[str, ...]) -> xr.Dataset:
     ds = require_history(ds)
     if compares_laws(ds):
         laws = ", ".join(map(str, ds["friction_law"].values))
-        raise InputError("ds", f"holds a run under each of {laws}: choose one, for example ds.sel(friction_law=...)")
+        raise InputError("ds", f"holds a run under each of {laws}: choose one, by --law or ds.sel(friction_law=...)")
     for name in names:
         if name not in ds:
             what = HISTORY[name].long_name

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 
 from ringsweep.errors import InputError
 from ringsweep.plots.histories import clip
-from ringsweep.plots.labels import axis_label
+from ringsweep.plots.labels import label_axis
 from ringsweep.plots.phase import draw_modes
 from ringsweep.plots.rig import belt_history
 from ringsweep.plots.style import axes_or_current, legend_beside
@@ -65,14 +65,15 @@ def friction_loop(
     ax = axes_or_current(ax, (7.6, 4.8))
     if against == "velocity":
         across = (run["velocity"] - run["belt_velocity"]).values
-        ax.set_xlabel("sliding velocity (m s$^{-1}$)")
+        label = "sliding velocity", "m s$^{-1}$"
     else:
         across = (run["x"] - run["belt_x"]).values
         across -= across[0]
-        ax.set_xlabel("distance slid on the belt (m)")
+        label = "distance slid on the belt", "m"
     force = run["friction_force"].values
     entries = draw_modes(ax, run["mode"].values, across, force)
-    ax.set_ylabel(axis_label(run["friction_force"], run))
     clip(ax, run["time"].values, force)
+    label_axis(ax.xaxis, *label)
+    label_axis(ax.yaxis, "friction force", "N")
     legend_beside(ax, entries)
     return ax

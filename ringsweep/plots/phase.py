@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.plots.datasets import on_ring, require_history, zones
-from ringsweep.plots.labels import axis_label
+from ringsweep.plots.labels import label_axis
 from ringsweep.plots.rig import Rig, belt_history, mode_name, ring_history
 from ringsweep.plots.style import (
     PAIR_COLOURS,
@@ -97,9 +97,10 @@ def draw_belt_portrait(ax: Axes, run: xr.Dataset) -> list[Artist]:
     else:
         ax.plot(place, belt_speed, **_driven_style(fixed))
     entries: list[Artist] = [Line2D([], [], **_driven_style(fixed), label="speed of the belt")]
-    ax.set_xlabel(axis_label(run["x"], run))
-    ax.set_ylabel(axis_label(run["velocity"], run))
-    return entries + draw_modes(ax, run["mode"].values, place, speed)
+    entries += draw_modes(ax, run["mode"].values, place, speed)
+    label_axis(ax.xaxis, "displacement", "m")
+    label_axis(ax.yaxis, "velocity", "m s$^{-1}$")
+    return entries
 
 
 def _ring_portrait(ds: xr.Dataset, frame: str, ax: Axes | None) -> Axes:
