@@ -120,6 +120,6 @@ def _along_a_line(parameter: Parameter) -> Parameter:
     """A parameter of a drive for the belt, which moves along a line: m in place of rad."""
     name = parameter.long_name.replace("angular velocity of the ring", "velocity of the belt")
     name = name.replace("ring's angular velocity", "belt's velocity").replace("rocking angle", "displacement")
-    name = name.replace("angle of the ring", "displacement of the belt").replace("measured angle", "displacement")
+    name = name.replace("angle of the ring", "displacement of the belt")
     unit = {"rad": "m", "rad/s": "m/s"}.get(parameter.unit, parameter.unit)
     return replace(parameter, long_name=name, unit=unit if "phase" not in name else parameter.unit)
