@@ -475,6 +475,16 @@ def test_acceleration_axis_is_clipped_at_outliers_and_its_title_says_so():
     assert not plots.history(make_history()).axes[2].get_title(loc="right")
 
 
+def test_short_outliers_with_many_samples_are_clipped_too():
+    ds = make_history()
+    # Methods with variable steps take many where a value is large.
+    ds = ds.assign_coords(
+        time=("time", np.append(np.linspace(0, 1e-6, 1000), np.linspace(2e-6, 10, 1000)), ds.time.attrs)
+    )
+    ds["epsilon"][:1000] = 1e6
+    assert plots.history(ds).axes[2].get_ylim()[1] < 2
+
+
 def test_long_history_is_condensed_and_keeps_its_extremes(tmp_path):
     ds = make_history(1_000_000)
     ds["normal_2"][123_456] = -7

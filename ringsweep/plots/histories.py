@@ -187,7 +187,7 @@ def draw_history(figure: Figure | SubFigure, ds: xr.Dataset) -> None:
         if 0.0 < first < 0.05 * last:
             after.set_xscale("log")
             after.set_xlim(left=first / 20.0)
-        # The force of one law alone would flatten the others: bristles may be far above them for some microseconds.
+        # The force of one law alone would flatten the others: bristles may be far above them for a moment.
         after.set_ylim(whole[-1].get_ylim())
         after.set_title(whole[-1].get_title(loc="right"), fontsize=SMALL, loc="right")
         after.set_title("friction force just after the start", fontsize=SMALL, loc="left")
