@@ -9,6 +9,7 @@ from itertools import product
 from pathlib import Path
 
 import pytest
+import xarray as xr
 from jsonschema import Draft202012Validator
 
 from ringsweep.cli import main
@@ -21,6 +22,7 @@ from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS
 from ringsweep.quantities.variables import HISTORY, OUTCOMES
 from ringsweep.solvers import METHODS
+from ringsweep.storage import netcdf
 
 ROOT = Path(__file__).parents[1]
 
@@ -122,7 +124,7 @@ def test_single_run_asks_for_a_value_that_only_the_sweep_gives(folder, capsys):
     assert "--set drive.amplitude=VALUE" in refused(capsys, "simulate", "case.yaml")
 
 
-@pytest.mark.parametrize("verb", ["map", "info"])
+@pytest.mark.parametrize("verb", ["map", "plot", "info"])
 def test_missing_result_file_is_refused(folder, capsys, verb):
     assert "nowhere.nc" in refused(capsys, verb, "nowhere.nc")
 
@@ -157,7 +159,29 @@ def test_run_that_ends_at_t_0_gives_a_warning(folder, capsys, caplog):
 def test_map_of_a_history_is_refused_with_the_name_of_the_file(folder, capsys):
     assert main(["simulate", "case.yaml", "-q"]) == 0
     capsys.readouterr()
-    assert refused(capsys, "map", "case-run.nc").startswith("ringsweep: case-run.nc: is the time history of one run")
+    message = refused(capsys, "map", "case-run.nc")
+    assert message.startswith("ringsweep: case-run.nc: is the time history of one run, not a sweep; ringsweep plot")
+
+
+def test_plot_draws_what_simulate_and_precision_wrote_and_names_the_command_for_sweeps(folder, capsys):
+    assert main(["simulate", "case.yaml", "-q"]) == 0
+    Path("case-run.png").unlink()
+    assert main(["plot", "case-run.nc"]) == 0
+    assert main(["plot", "case-run.nc", "--kind", "phase", "-o", "portrait.svg"]) == 0
+    assert capsys.readouterr().out == "wrote case-run.png\nwrote portrait.svg\n"
+    assert Path("case-run.png").exists()
+    assert Path("portrait.svg").exists()
+    assert "there is no belt to draw" in refused(capsys, "plot", "case-run.nc", "--kind", "friction")
+    assert "one friction law" in refused(capsys, "plot", "case-run.nc", "--law", "coulomb")
+    assert main(["run", "case.yaml", "-q"]) == 0
+    assert "ringsweep map case.nc draws it" in refused(capsys, "plot", "case.nc")
+    work = {"time_per_run": ("contender", [1e-4, 1e-3]), "error_end": (("contender", "cell"), [[1e-3], [1e-6]])}
+    netcdf.save(
+        xr.Dataset(work, {"method": ("contender", ["rk4", "rk4"])}, netcdf.load("case-run.nc").attrs), "work.nc"
+    )
+    assert main(["plot", "work.nc"]) == 0
+    assert "wrote work.png" in capsys.readouterr().out
+    assert "for time histories" in refused(capsys, "plot", "work.nc", "--kind", "phase")
 
 
 @pytest.mark.parametrize("arguments", [["rum"], ["run"], ["run", "case.yaml", "--jobs", "0"]])
@@ -216,7 +240,7 @@ def test_examples_in_the_help_of_every_command_parse(capsys):
     with pytest.raises(SystemExit):
         main(["--help"])
     verbs = re.findall(r"^    (\w+)", capsys.readouterr().out, re.M)
-    assert {"init", "run", "map", "simulate", "precision", "info", "schema", "completion"} <= set(verbs)
+    assert {"init", "run", "map", "simulate", "plot", "precision", "info", "schema", "completion"} <= set(verbs)
     for verb in verbs:
         with pytest.raises(SystemExit):
             main([verb, "--help"])

@@ -243,7 +243,7 @@ class TestRuns:
 class TestPicture:
     def test_panels_of_compared_laws_have_a_line_for_each_law_and_no_shading(self, compared):
         figure = plots.history(compared)
-        assert len(figure.axes) == 4
+        assert len(figure.axes) == 5
         for axes in figure.axes:
             assert len({(line.get_color(), line.get_linestyle()) for line in axes.lines}) == 3
             assert not axes.collections
@@ -274,11 +274,39 @@ class TestPicture:
     def test_panel_of_the_start_is_twice_as_long_as_the_first_differences(self, compared):
         """Under law `tustin` the body sticks to the belt first. Then all stick until the first breakaway."""
         caught = 0.1 / (0.1 * 9.81)
-        start, end = plots.history(compared).axes[-1].get_xlim()
+        start, end = plots.history(compared).axes[3].get_xlim()
         assert start == 0.0
         assert end == pytest.approx(2 * caught, rel=0.05)
         force = compared.friction_force.sel(time=slice(caught * 1.05, end))
         assert float((force.max("friction_law") - force.min("friction_law")).max()) < 0.02
+
+    def test_force_of_one_law_at_the_start_does_not_flatten_the_others(self, compared):
+        """Bristles may push with 31 N for a moment, where all other forces are below 1.5 N."""
+        spike = xr.where((compared.time < 0.02) & (compared.friction_law == "tustin"), -30.0, 0.0)
+        ds = compared.assign(friction_force=compared.friction_force + spike.transpose(*compared.friction_force.dims))
+        for axes in plots.history(ds).axes[2:4]:
+            low, high = axes.get_ylim()
+            assert -2.5 < low < -1.4
+            assert 0.0 < high < 1.0
+            assert axes.get_title(loc="right").startswith("axis clipped; values from \N{MINUS SIGN}3")
+
+    def test_last_panel_shows_the_first_breakaway_of_each_law_at_the_same_place(self, compared):
+        detail = plots.history(compared).axes[-1]
+        for law, line in zip(LAWS, detail.lines, strict=True):
+            time, force = line.get_xydata().T
+            before, after = force[time < -0.01], force[time > 0.01]
+            assert len(before) > 20
+            assert len(after) > 20
+            # Friction rises to mu_s F_N. Then it is that of sliding.
+            static = 0.1 if law == "coulomb" else 0.15
+            assert before[-1] == pytest.approx(-static * 9.81, rel=0.02)
+            if law != "tustin":
+                assert after[-1] == pytest.approx(-0.1 * 9.81, rel=1e-9)
+        assert np.abs(detail.get_xlim()).max() < 0.2
+
+    def test_picture_of_one_of_several_laws_has_the_outcome_of_that_law(self, compared):
+        figure = plots.history(compared.sel(friction_law="stiction"))
+        assert figure.get_suptitle() == "stiction: stick-slip, t = 20 s"
 
     def test_transients_of_two_time_scales_have_a_logarithmic_axis(self, compared):
         time = np.concatenate([np.linspace(0, 1e-3, 1000), np.linspace(2e-3, 10, 20_000)])
@@ -320,6 +348,17 @@ class TestCommands:
         assert (folder / "laws-run.png").exists()
         assert main(["info", "laws-run.nc"]) == 0
         assert "friction_law 3" in capsys.readouterr().out
+
+    def test_plot_draws_one_law_of_a_stored_run(self, folder, compared, capsys):
+        netcdf.save(compared, "laws-run.nc")
+        assert main(["plot", "laws-run.nc"]) == 0
+        assert main(["plot", "laws-run.nc", "--kind", "phase", "--law", "stiction"]) == 0
+        assert capsys.readouterr().out == "wrote laws-run.png\nwrote laws-run-phase-stiction.png\n"
+        assert (folder / "laws-run-phase-stiction.png").exists()
+        assert main(["plot", "laws-run.nc", "--law", "stictoin"]) == 2
+        assert "did you mean stiction?" in capsys.readouterr().err
+        assert main(["plot", "laws-run.nc", "--kind", "friction"]) == 2
+        assert "holds a run under each of coulomb, stiction, tustin: choose one" in capsys.readouterr().err
 
     def test_wrong_number_of_threads_is_refused_with_a_readable_message(self, capsys):
         for jobs in ("two", "0", "-1", "1.5"):

@@ -471,8 +471,18 @@ def test_acceleration_axis_is_clipped_at_outliers_and_its_title_says_so():
     ds["epsilon"][::400] = 1e6
     axes = plots.history(ds).axes[2]
     assert axes.get_ylim()[1] < 2
-    assert axes.get_title(loc="right") == "axis clipped; values from -1 to 1e+06"
+    assert axes.get_title(loc="right") == "axis clipped; values from \N{MINUS SIGN}1 to 1e+06"
     assert not plots.history(make_history()).axes[2].get_title(loc="right")
+
+
+def test_short_outliers_with_many_samples_are_clipped_too():
+    ds = make_history()
+    # Methods with variable steps take many where a value is large.
+    ds = ds.assign_coords(
+        time=("time", np.append(np.linspace(0, 1e-6, 1000), np.linspace(2e-6, 10, 1000)), ds.time.attrs)
+    )
+    ds["epsilon"][:1000] = 1e6
+    assert plots.history(ds).axes[2].get_ylim()[1] < 2
 
 
 def test_long_history_is_condensed_and_keeps_its_extremes(tmp_path):
@@ -488,16 +498,20 @@ def test_long_history_is_condensed_and_keeps_its_extremes(tmp_path):
 
 
 def test_belt_history_has_three_panels_and_one_more_for_bristles():
-    rigid = make_history(ring=False)
-    assert len(plots.history(rigid.drop_vars("deflection")).axes) == 3
-    figure = plots.history(rigid)
+    bristles = make_history(ring=False).assign(first_slip=4.0)
+    assert len(plots.history(bristles.assign(deflection=0.0 * bristles.deflection)).axes) == 3
+    assert len(plots.history(bristles.assign(first_slip=np.nan)).axes) == 3
+    figure = plots.history(bristles)
     assert [axes.get_ylabel().replace("\n", " ") for axes in figure.axes] == [
         "displacement (m)",
         "velocity (m s$^{-1}$)",
         "friction force (N)",
         "friction force (N)",
     ]
-    assert figure.axes[3].get_xlim()[1] < 0.5 < figure.axes[2].get_xlim()[1]
+    # The velocity is sin t, so the body turns at 2 pi.
+    np.testing.assert_allclose(figure.axes[3].get_xlim(), np.array([-0.5, 0.5]) * (2 * np.pi - 4.0), atol=0.01)
+    drawn = figure.axes[3].lines[0].get_xydata()
+    np.testing.assert_allclose(drawn[:, 1], np.sin(4.0 + drawn[:, 0]), atol=1e-9)
 
 
 class TestWorkPrecision:

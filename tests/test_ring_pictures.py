@@ -18,6 +18,7 @@ import ringsweep
 from ringsweep import plots
 from ringsweep.cli import main
 from ringsweep.errors import InputError
+from ringsweep.models import MODELS
 from ringsweep.plots import films
 from ringsweep.plots.polar import TIMES
 from ringsweep.plots.rig import ring_history
@@ -237,14 +238,19 @@ class TestPhasePortrait:
             plots.phase_portrait(run, "body", ax)
 
 
+def test_polar_view_refuses_a_belt(run):
+    with pytest.raises(InputError, match="belt: there is no ring"):
+        plots.polar_view(run.drop_vars("phi"), 1.0)
+
+
 @pytest.mark.parametrize(
     "draw",
     [plots.phase_portrait, lambda ds: plots.polar_view(ds, 1.0), plots.animation],
     ids=["phase", "polar", "film"],
 )
 class TestRefused:
-    def test_picture_of_the_ring_refuses_a_belt(self, run, draw):
-        with pytest.raises(InputError, match="belt"):
+    def test_picture_refuses_a_run_that_has_no_place(self, run, draw):
+        with pytest.raises(InputError, match=r"has no x|belt"):
             draw(run.drop_vars("phi"))
 
     def test_picture_of_the_ring_refuses_a_sweep(self, run, draw):
@@ -394,11 +400,11 @@ class TestCommand:
         assert output in capsys.readouterr().err
         assert os.listdir(folder) == ["case.yaml"]
 
-    def test_animate_refuses_a_belt_before_the_run(self, folder, monkeypatch, capsys):
+    def test_animate_refuses_a_model_without_ring_and_belt_before_the_run(self, folder, monkeypatch, capsys):
         monkeypatch.setattr("ringsweep.runs.simulate.history", lambda config: pytest.fail("the run was made"))
-        assert main(["init", "--model", "belt", "belt.yaml"]) == 0
-        assert main(["animate", "belt.yaml"]) == 2
-        assert "there is no ring" in capsys.readouterr().err
+        monkeypatch.setattr(type(MODELS["ring"]), "driven", ())
+        assert main(["animate", "case.yaml"]) == 2
+        assert "ring: no ring or belt to animate" in capsys.readouterr().err
 
     def test_animate_refuses_several_friction_laws_before_the_run(self, scene, folder, monkeypatch, capsys):
         monkeypatch.setattr("ringsweep.runs.simulate.history", lambda config: pytest.fail("the run was made"))

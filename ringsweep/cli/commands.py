@@ -104,6 +104,45 @@ def map_command(arguments: argparse.Namespace) -> None:
     print(f"wrote {target}")
 
 
+def plot_command(arguments: argparse.Namespace) -> None:
+    """Draw a stored run, or stored errors against run time."""
+    from matplotlib.figure import Figure
+
+    from ringsweep import plots
+    from ringsweep.plots.datasets import resolve
+    from ringsweep.storage import netcdf
+
+    dataset = Path(arguments.dataset)
+    result = netcdf.open_dataset(dataset)
+    if not {"time", "contender"} & set(result.dims):
+        raise InputError(str(dataset), f"is a sweep, not the history of a run: ringsweep map {dataset} draws it")
+    shown = [name for name in (arguments.kind, arguments.law) if name is not None]
+    target = Path(arguments.output or dataset.with_name("-".join([dataset.stem, *shown]) + ".png"))
+    netcdf.check_writable(target)
+    if "contender" in result.dims and shown:
+        raise InputError(str(dataset), "holds errors against run time: --kind and --law are for time histories")
+    if arguments.law is not None:
+        if "friction_law" not in result.dims:
+            raise InputError("--law", f"{dataset} holds a run under one friction law only")
+        laws = map(str, result["friction_law"].values)
+        result = result.sel(friction_law=resolve("--law", arguments.law, laws))
+    try:
+        if "contender" in result.dims:
+            figure = plots.work_precision(result)
+        elif arguments.kind is None:
+            figure = plots.history(result)
+        else:
+            figure = Figure(figsize=(7.6, 4.8), layout="constrained")
+            draw = plots.phase_portrait if arguments.kind == "phase" else plots.friction_loop
+            draw(result, ax=figure.add_subplot())
+    except InputError as error:
+        if error.path == "ds":
+            raise InputError(str(dataset), error.problem) from error
+        raise
+    plots.save(figure, target)
+    print(f"wrote {target}")
+
+
 def simulate_command(arguments: argparse.Namespace) -> None:
     """Run once, write the history and draw it."""
     from ringsweep.config import with_values
@@ -130,8 +169,8 @@ def animate_command(arguments: argparse.Namespace) -> None:
     config = with_values(arguments.config, arguments.set)
     target = arguments.output or f"{config.name}-run.gif"
     model = config.scene.structure.model
-    if not MODELS[model].rotates:
-        raise InputError("scene.model", f"{model}: there is no ring to animate; ringsweep simulate draws the history")
+    if not MODELS[model].driven:
+        raise InputError("scene.model", f"{model}: no ring or belt to animate; ringsweep simulate draws the history")
     if config.axes.sizes:
         raise InputError(
             "sweep", "several friction laws, but an animation shows one run: name its law by --set friction.law=..."

@@ -14,6 +14,7 @@ from ringsweep.cli.commands import (
     info_command,
     init_command,
     map_command,
+    plot_command,
     precision_command,
     run_command,
     schema_command,
@@ -84,7 +85,21 @@ def build_parser() -> argparse.ArgumentParser:
     simulate.add_argument("-o", "--output", metavar="RUN.nc", help="default: the configuration's name with -run")
     _add_settings(simulate)
 
-    animate = _add_command(commands, "animate", animate_command, "run once: animation of the body in the ring", """
+    plot = _add_command(commands, "plot", plot_command, "draw a stored run, or stored errors against run time", """
+        ringsweep plot my-run.nc           my-run.png: the time history
+        ringsweep plot my-run.nc --kind phase -o portrait.pdf
+        ringsweep plot my-run.nc --kind friction --law lugre
+        """)  # fmt: skip
+    plot.add_argument("dataset", metavar="RUN.nc", help="what ringsweep simulate or ringsweep precision wrote")
+    plot.add_argument("-o", "--output", metavar="RUN.png", help="default: beside RUN.nc; .pdf and .svg too")
+    plot.add_argument(
+        "--kind",
+        choices=["phase", "friction"],
+        help="phase portrait, or friction force over sliding velocity (belt), in place of the time history",
+    )
+    plot.add_argument("--law", metavar="LAW", help="the run under this friction law, if RUN.nc has several")
+
+    animate = _add_command(commands, "animate", animate_command, "run once: film of the body", """
         ringsweep animate my.yaml          my-run.gif
         ringsweep animate my.yaml -o run.mp4 --set drive.amplitude=4
         ringsweep animate my.nc -o run.html  a page with buttons, for the scene of my.nc

@@ -25,8 +25,9 @@ class Model(ABC):
         :data:`ringsweep.quantities.variables.OUTCOMES`.
     place : str
         History variable for the place of the body. The outcome for the place at the end is this name with ``_end``.
-    rotates : bool
-        Whether the body moves round an axis, so that pictures can show it in a ring.
+    driven : tuple of str
+        History variables for the place and the velocity of the ring or belt that the drive moves, if the methods do not
+        give them. Without any there is no film of the model.
     absent : frozenset of str
         Outcomes and history variables that have no meaning for this model. Datasets leave them out.
     """
@@ -35,7 +36,7 @@ class Model(ABC):
     doc: ClassVar[str]
     outcomes: ClassVar[tuple[str, ...]]
     place: ClassVar[str]
-    rotates: ClassVar[bool] = False
+    driven: ClassVar[tuple[str, ...]] = ()
     absent: ClassVar[frozenset[str]] = frozenset()
 
     @property

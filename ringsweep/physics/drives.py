@@ -52,7 +52,7 @@ class Table(NamedTuple):
     piece from knot j: the cubic in t - knots[j], highest power first.
     """
 
-    amplitude: Annotated[float, Parameter("1", "factor on the measured angle", default=1.0)]
+    amplitude: Annotated[float, Parameter("1", "factor on the measured course", default=1.0)]
     knots: Any
     coefficients: Any
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from ringsweep.plots.films import animation, save_animation
     from ringsweep.plots.histories import history, history_panel
     from ringsweep.plots.interactive import explore
+    from ringsweep.plots.loops import friction_loop
     from ringsweep.plots.maps import map_panel, regime_map
     from ringsweep.plots.phase import phase_portrait
     from ringsweep.plots.polar import polar_view
@@ -29,6 +30,7 @@ __all__ = [
     "animation",
     "cell",
     "explore",
+    "friction_loop",
     "history",
     "history_panel",
     "map_panel",
@@ -49,6 +51,7 @@ _MODULES = {
     "work_precision": "precision",
     "precision_panel": "precision",
     "phase_portrait": "phase",
+    "friction_loop": "loops",
     "polar_view": "polar",
     "animation": "films",
     "save_animation": "films",

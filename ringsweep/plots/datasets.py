@@ -11,15 +11,17 @@ from collections.abc import Iterable
 from itertools import chain
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from ringsweep.errors import InputError
+from ringsweep.quantities.variables import HISTORY
 
 #: Panels of a history by the variable that says where the body is: ``phi`` in a ring, ``x`` on a belt.
 #: Variables of one tuple share a panel.
 PANELS: dict[str, tuple[tuple[str, ...], ...]] = {
     "phi": (("phi",), ("omega", "ring_omega"), ("epsilon",), ("normal_1", "normal_2")),
-    "x": (("x",), ("velocity",), ("friction_force",)),
+    "x": (("x",), ("velocity", "belt_velocity"), ("friction_force",)),
 }
 
 
@@ -32,9 +34,11 @@ def require_sweep(ds: xr.Dataset) -> None:
         If the dataset holds the history of a run, or error against run time.
     """
     if "time" in ds.dims:
-        raise InputError("ds", "is the time history of one run, not a sweep; draw it with history")
+        raise InputError("ds", "is the time history of one run, not a sweep; ringsweep plot draws it, or plots.history")
     if "contender" in ds.dims:
-        raise InputError("ds", "is error against run time, not a sweep; draw it with work_precision")
+        raise InputError(
+            "ds", "is error against run time, not a sweep; ringsweep plot draws it, or plots.work_precision"
+        )
 
 
 def require_history(ds: xr.Dataset) -> xr.Dataset:
@@ -51,8 +55,46 @@ def require_history(ds: xr.Dataset) -> xr.Dataset:
         If the dataset has no dimension ``time``, or no instant.
     """
     if not ds.sizes.get("time"):
-        raise InputError("ds", "has no dimension time: it is not the history of a run; draw a sweep with regime_map")
+        raise InputError(
+            "ds",
+            "has no dimension time: it is not the history of a run; ringsweep map draws a sweep, or plots.regime_map",
+        )
     return ds.isel(friction_law=0) if ds.sizes.get("friction_law") == 1 else ds
+
+
+def outcome(ds: xr.Dataset) -> str:
+    """Outcome of a run in words; empty if the dataset does not have it."""
+    lines = str(ds.attrs.get("outcome", "")).splitlines()
+    if "friction_law" in ds.coords and ds["friction_law"].ndim == 0:
+        # The run under one of several laws.
+        lines = [line for line in lines if line.startswith(f"{ds['friction_law'].item()}: ")]
+    return "\n".join(lines)
+
+
+def require_one_run(ds: xr.Dataset, names: tuple[str, ...]) -> xr.Dataset:
+    """The history of one run up to its end, with the variables that a picture needs.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        Any dataset.
+    names : tuple of str
+        Variables that must be there. The first is the place of the body.
+
+    Raises
+    ------
+    InputError
+        If the dataset is not the history of one run, or a variable is missing.
+    """
+    ds = require_history(ds)
+    if compares_laws(ds):
+        laws = ", ".join(map(str, ds["friction_law"].values))
+        raise InputError("ds", f"holds a run under each of {laws}: choose one, by --law or ds.sel(friction_law=...)")
+    for name in names:
+        if name not in ds:
+            what = HISTORY[name].long_name
+            raise InputError("ds", f"has no {name}, {what}: if an earlier version wrote it, run it again")
+    return ds.isel(time=np.isfinite(ds[names[0]].values))
 
 
 def compares_laws(ds: xr.Dataset) -> bool:
@@ -78,8 +120,8 @@ def panels_of(ds: xr.Dataset) -> list[tuple[str, ...]]:
         raise InputError("ds", f"has no variable that a history shows: {', '.join(chain(*chain(*PANELS.values())))}")
     if not compares_laws(ds):
         return panels
-    # The ring moves alike under all laws.
-    return [(name,) for name in present(ds, chain(*panels)) if name != "ring_omega"]
+    # Ring and belt move alike under all laws.
+    return [(name,) for name in present(ds, chain(*panels)) if name not in ("ring_omega", "belt_velocity")]
 
 
 def zones(ds: xr.Dataset) -> list[str]:

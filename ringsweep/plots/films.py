@@ -1,4 +1,4 @@
-"""Animations of runs on a ring: the body in the ring beside its history."""
+"""Animations of runs: the body in the ring or on the belt beside its history."""
 
 from __future__ import annotations
 
@@ -23,11 +23,12 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ringsweep.errors import InputError
-from ringsweep.plots.datasets import PANELS
+from ringsweep.plots.belt import BeltArtists
+from ringsweep.plots.datasets import on_ring, outcome, panels_of, require_history
 from ringsweep.plots.histories import draw_panel
 from ringsweep.plots.labels import axis_label
 from ringsweep.plots.polar import RingArtists, states_at
-from ringsweep.plots.rig import ring_history
+from ringsweep.plots.rig import belt_history, ring_history
 from ringsweep.plots.saving import suffix_of
 from ringsweep.plots.style import SMALL
 from ringsweep.storage import netcdf
@@ -40,8 +41,9 @@ _SIZE, _DPI = (10.8, 5.4), 100
 
 
 def animation(ds: xr.Dataset, *, fps: float = 25.0, duration: float = 10.0) -> FuncAnimation:
-    """Animate the body in the ring, with rough arcs and forces, beside its history.
+    """Animate the body beside its history.
 
+    In a ring the body is shown with rough arcs and forces, on a belt with the friction force and the phase portrait.
     Frames are at equal times from the start to the end of the run. In a notebook
     ``IPython.display.HTML(animation(ds).to_jshtml())`` shows the animation. To write a file,
     :func:`save_animation` is faster.
@@ -49,7 +51,7 @@ def animation(ds: xr.Dataset, *, fps: float = 25.0, duration: float = 10.0) -> F
     Parameters
     ----------
     ds : xarray.Dataset
-        Result of :func:`ringsweep.simulate` on a ring.
+        Result of :func:`ringsweep.simulate`.
     fps : float
         Frames per second.
     duration : float
@@ -63,7 +65,7 @@ def animation(ds: xr.Dataset, *, fps: float = 25.0, duration: float = 10.0) -> F
     Raises
     ------
     InputError
-        If the dataset is not the history of one run on a ring, or a number is not positive.
+        If the dataset is not the history of one run on a ring or a belt, or a number is not positive.
 
     Examples
     --------
@@ -83,7 +85,7 @@ def save_animation(ds: xr.Dataset, path: str | os.PathLike[str], *, fps: float =
     Parameters
     ----------
     ds : xarray.Dataset
-        Result of :func:`ringsweep.simulate` on a ring.
+        Result of :func:`ringsweep.simulate`.
     path : path-like
         File to write or replace. Its suffix decides the format: ``.mp4``, which needs ffmpeg, ``.gif``, or ``.html``,
         a page with buttons that needs no other file.
@@ -157,18 +159,24 @@ class _Film:
         for name, value in (("fps", fps), ("duration", duration)):
             if not 0.0 < value < np.inf:
                 raise InputError(name, f"{value!r} is not a number greater than 0")
-        run, rig = ring_history(ds)
         self.fps = fps
-        time = run["time"].values
-        self.states = states_at(run, np.linspace(time[0], time[-1], max(2, round(fps * duration))))
         self.figure = _FilmFigure(figsize=_SIZE, dpi=_DPI, layout="constrained")
         subfigures: Any = self.figure.subfigures(1, 2, width_ratios=[1.0, 1.15])
         left, right = subfigures
-        self.ring = RingArtists(left.add_subplot(), run, rig)
+        self.body: RingArtists | BeltArtists
+        if on_ring(require_history(ds)):
+            run, rig = ring_history(ds)
+            self.body = RingArtists(left.add_subplot(), run, rig)
+        else:
+            run = belt_history(ds)
+            above, below = left.subplots(2, 1, height_ratios=[1.0, 1.6])
+            self.body = BeltArtists(above, below, run)
+        time = run["time"].values
+        self.states = states_at(run, np.linspace(time[0], time[-1], max(2, round(fps * duration))))
         style: dict[str, Any] = {"ncols": 3, "fontsize": SMALL, "frameon": False, "columnspacing": 1}
-        left.legend(handles=self.ring.legend_entries(), loc="outside lower center", **style)
-        panels = list(right.subplots(3, 1, sharex=True))
-        shown = [names for names in PANELS["phi"] if names != ("epsilon",)]
+        left.legend(handles=self.body.legend_entries(), loc="outside lower center", **style)
+        shown = [names for names in panels_of(run) if names != ("epsilon",)]
+        panels = list(right.subplots(len(shown), 1, sharex=True))
         for panel, names in zip(panels, shown, strict=True):
             draw_panel(panel, run, names)
         panels[-1].set_xlabel(axis_label(run["time"], run))
@@ -176,9 +184,9 @@ class _Film:
         if time[-1] > time[0]:
             panels[0].set_xlim(time[0], time[-1])
         right.align_ylabels(panels)
-        right.suptitle(str(ds.attrs.get("outcome", "")), fontsize=10)
+        right.suptitle(outcome(run), fontsize=10)
         left.suptitle(_speed(float(time[-1] - time[0]), duration), fontsize=10)
-        self.figure.moving = [*self.ring.moving, *self.futures]
+        self.figure.moving = [*self.body.moving, *self.futures]
         self.show(0)
         # Texts change from frame to frame: a layout that followed them would shake.
         self.figure.draw_without_rendering()
@@ -186,7 +194,7 @@ class _Film:
 
     def show(self, k: int) -> list[Artist]:
         """Move all moving artists to the `k`-th frame."""
-        self.ring.show(self.states, k)
+        self.body.show(self.states, k)
         now = float(self.states["time"][k])
         for cover in self.futures:
             cover.set_x(now)

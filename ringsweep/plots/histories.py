@@ -14,8 +14,18 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from ringsweep.plots.datasets import PANELS, compares_laws, on_ring, panels_of, present, require_history, resolve, zones
-from ringsweep.plots.labels import axis_label, long_name, unit_text
+from ringsweep.plots.datasets import (
+    PANELS,
+    compares_laws,
+    on_ring,
+    outcome,
+    panels_of,
+    present,
+    require_history,
+    resolve,
+    zones,
+)
+from ringsweep.plots.labels import axis_label, long_name, number_text, unit_text
 from ringsweep.plots.style import (
     CURVE_COLOURS,
     CURVE_STYLES,
@@ -32,14 +42,17 @@ from ringsweep.plots.style import (
 )
 from ringsweep.quantities.variables import words
 
-# Share of a run in the panel that shows the bending of bristles after its start.
-_START = 0.02
-
 # Share of a run in which differences between friction laws belong to its start.
 _LATEST = 0.1
 
 # Share of the friction force above which two laws differ.
 _DIFFERENT = 0.05
+
+# Panels in which a few outliers must not flatten the rest.
+_CLIPPED = ("epsilon", "friction_force")
+
+# Line of a single curve.
+_ONE: dict[str, Any] = {"color": PAIR_COLOURS[0], "linewidth": 1}
 
 # Intervals of time into which a long history is condensed: more than a printed panel has pixels.
 _INTERVALS = 4000
@@ -56,6 +69,7 @@ _SHORT_NAMES = {
 }
 
 _LEGEND = {"omega": "body", "ring_omega": "ring", "normal_1": "contact 1", "normal_2": "contact 2"}
+_LEGEND |= {"velocity": "body", "belt_velocity": "belt"}
 
 
 def history(ds: xr.Dataset) -> Figure:
@@ -63,12 +77,12 @@ def history(ds: xr.Dataset) -> Figure:
 
     The panels are those of the paper. For a ring they show angle, angular velocity, angular acceleration and normal
     reactions; a strip below shows which arc lies under each contact. For a belt they show displacement, velocity and
-    friction force. Times at which the body sticks are shaded. If the law has bristles, a last panel shows the friction
-    force just after the start.
+    friction force. Times at which the body sticks are shaded. If the law has bristles and the body breaks away, a last
+    panel shows the friction force around the first break-away.
 
     Several friction laws are a line each, without strip and shading. On a belt, if their friction forces differ at the
-    start, a last panel shows the start for twice as long as they differ. Its time axis is logarithmic if differences
-    end at times of different orders of magnitude.
+    start, a panel shows the start for twice as long as they differ. Its time axis is logarithmic if differences end at
+    times of different orders of magnitude. A last panel shows the first break-away under each law, at the same place.
 
     Parameters
     ----------
@@ -151,11 +165,11 @@ def draw_history(figure: Figure | SubFigure, ds: xr.Dataset) -> None:
     """Fill a figure, or a subfigure, with the panels of :func:`history`."""
     ds = require_history(ds)
     panels = panels_of(ds)
-    start = _start(ds)
     time = ds["time"].values
     heights = _heights(ds)
     axes = list(figure.subplots(len(heights), 1, gridspec_kw={"height_ratios": heights}))
-    whole = axes[:-1] if start else axes
+    start, breakaway = _differences(ds), _first_breakaway(ds)
+    whole = axes[: len(axes) - (start is not None) - (breakaway is not None)]
     for ax in whole[1:]:
         ax.sharex(whole[0])
     for ax in whole[:-1]:
@@ -165,43 +179,37 @@ def draw_history(figure: Figure | SubFigure, ds: xr.Dataset) -> None:
         draw(ax, ds, names)
     if strip := zones(ds):
         _draw_zones(axes[-1], ds, strip)
-    if start:
+    if start is not None:
         first, last = start
         until = max(20, int(np.searchsorted(time, time[0] + 2.0 * last)))
-        draw(axes[-1], ds.isel(time=slice(0, until)), ("friction_force",))
+        after = axes[len(whole)]
+        draw(after, ds.isel(time=slice(0, until)), ("friction_force",))
         if 0.0 < first < 0.05 * last:
-            axes[-1].set_xscale("log")
-            axes[-1].set_xlim(left=first / 20.0)
-        axes[-1].set_title("friction force just after the start", fontsize=SMALL, loc="left")
-        whole[-1].set_xlabel(axis_label(ds["time"], ds))
+            after.set_xscale("log")
+            after.set_xlim(left=first / 20.0)
+        # The force of one law alone would flatten the others: bristles may be far above them for a moment.
+        after.set_ylim(whole[-1].get_ylim())
+        after.set_title(whole[-1].get_title(loc="right"), fontsize=SMALL, loc="right")
+        after.set_title("friction force just after the start", fontsize=SMALL, loc="left")
+        after.set_xlabel(axis_label(ds["time"], ds))
+    if breakaway is not None:
+        _draw_breakaway(axes[-1], ds, *breakaway)
     if time[-1] > time[0]:
         whole[0].set_xlim(time[0], time[-1])
-    axes[-1].set_xlabel(axis_label(ds["time"], ds))
+    whole[-1].set_xlabel(axis_label(ds["time"], ds))
     figure.align_ylabels(axes)
     if compares_laws(ds):
         lines = axes[0].get_legend_handles_labels()
         style: dict[str, Any] = {"fontsize": SMALL, "frameon": False, "handlelength": 4}
         figure.legend(*lines, loc="outside upper center", ncols=4 if len(lines[0]) == 4 else 3, **style)
-    elif outcome := ds.attrs.get("outcome"):
-        figure.suptitle(str(outcome), fontsize=11)
+    elif text := outcome(ds):
+        figure.suptitle(text, fontsize=11)
 
 
 def _heights(ds: xr.Dataset) -> list[float]:
-    """Relative heights of all panels, with the panel of the start and the strip of the zones."""
-    strip = len(zones(ds))
-    return [1.0] * (len(panels_of(ds)) + (_start(ds) is not None)) + [0.13 * strip] * bool(strip)
-
-
-def _start(ds: xr.Dataset) -> tuple[float, float] | None:
-    """When the first and the last transients at the start of a run on a belt end, s; None if there are none.
-
-    Transients are the bending of bristles, or differences between friction laws.
-    """
-    if on_ring(ds):
-        return None
-    if compares_laws(ds):
-        return _differences(ds)
-    return (0.0, _START / 2 * float(np.ptp(ds["time"].values))) if "deflection" in ds else None
+    """Relative heights of all panels, with those of the start and of the break-away, and the strip of the zones."""
+    strip, details = len(zones(ds)), (_differences(ds), _first_breakaway(ds))
+    return [1.0] * (len(panels_of(ds)) + sum(detail is not None for detail in details)) + [0.13 * strip] * bool(strip)
 
 
 def draw_panel(axes: Axes, ds: xr.Dataset, names: tuple[str, ...], explain_shading: bool = False) -> None:
@@ -228,8 +236,8 @@ def draw_panel(axes: Axes, ds: xr.Dataset, names: tuple[str, ...], explain_shadi
     legend_beside(axes)
     axes.set_ylabel(_short_label(ds, names[0]))
     axes.margins(x=0)
-    if names == ("epsilon",):
-        _clip(axes, ds["epsilon"].values)
+    if names[0] in _CLIPPED:
+        clip(axes, time, ds[names[0]].values)
 
 
 def _draw_laws(axes: Axes, ds: xr.Dataset, names: tuple[str, ...]) -> None:
@@ -240,26 +248,35 @@ def _draw_laws(axes: Axes, ds: xr.Dataset, names: tuple[str, ...]) -> None:
     for k, law in enumerate(ds["friction_law"].values):
         axes.plot(
             *_envelope(ds["time"].values, numbers[k]),
-            color=CURVE_COLOURS[k % len(CURVE_COLOURS)],
-            linestyle=CURVE_STYLES[k % len(CURVE_STYLES)],
-            # Where lines coincide, the earlier ones show on both sides of the later ones.
-            linewidth=max(1.2, 3.0 - 0.6 * k),
+            **_law_style(k),
             label=str(law) if regimes is None else f"{law}: {regimes[k]}",
         )
     axes.set_ylabel(_short_label(ds, name))
     axes.margins(x=0)
     if name.startswith("normal"):
         axes.set_title(f"contact {name[-1]}", fontsize=SMALL, loc="left")
-    if name in ("epsilon", "friction_force"):
-        _clip(axes, numbers)
+    if name in _CLIPPED:
+        clip(axes, ds["time"].values, numbers)
+
+
+def _law_style(k: int) -> dict[str, Any]:
+    """Line of the `k`-th friction law."""
+    return {
+        "color": CURVE_COLOURS[k % len(CURVE_COLOURS)],
+        "linestyle": CURVE_STYLES[k % len(CURVE_STYLES)],
+        # Where lines coincide, the earlier ones show on both sides of the later ones.
+        "linewidth": max(1.2, 3.0 - 0.6 * k),
+    }
 
 
 def _differences(ds: xr.Dataset) -> tuple[float, float] | None:
-    """When the first and the last differences between friction laws end at the start of a run, s.
+    """When the first and the last differences between friction laws end at the start of a run on a belt, s.
 
     A difference between the forces ends at a time t if the forces agree from t to 2 t. There can be several: bristles
     bend within milliseconds, and the body vibrates on them for longer. None if there are none.
     """
+    if on_ring(ds) or not compares_laws(ds) or "friction_force" not in ds:
+        return None
     since = ds["time"].values - ds["time"].values[0]
     force = ds["friction_force"].transpose("friction_law", "time").values
     spread = np.fmax.reduce(force) - np.fmin.reduce(force)
@@ -269,6 +286,44 @@ def _differences(ds: xr.Dataset) -> tuple[float, float] | None:
     ends = since[apart[(since[again] > 2.0 * since[apart]) & (again > apart + 1)]]
     ends = ends[ends < _LATEST * since[-1]]
     return (float(ends[0]), float(ends[-1])) if len(ends) else None
+
+
+def _first_breakaway(ds: xr.Dataset) -> tuple[NDArray[Any], float] | None:
+    """Time of the first break-away under each law, and the time to show on both sides of it, s.
+
+    None if nothing breaks away, or if there is one law only and it has no bristles: its force falls at once.
+    """
+    if on_ring(ds) or not {"first_slip", "friction_force", "velocity"} <= set(ds.variables):
+        return None
+    if not compares_laws(ds):
+        if "deflection" not in ds or not ds["deflection"].any():
+            return None
+        ds = ds.expand_dims("friction_law")
+    time, first = ds["time"].values, ds["first_slip"].values
+    turns = []
+    for velocity, start in zip(ds["velocity"].transpose("friction_law", "time").values, first, strict=True):
+        if time[0] <= start <= time[-1]:
+            k = int(np.searchsorted(time, start))
+            back = np.flatnonzero(velocity[k:] * (np.sign(velocity[k]) or 1.0) < 0.0)
+            turns.append(time[k + back[0] if len(back) else -1] - start)
+    if not turns:
+        return None
+    # The drop of friction is over before the body turns.
+    return first, max(0.5 * min(turns), 20.0 * float(np.ptp(time)) / len(time))
+
+
+def _draw_breakaway(axes: Axes, ds: xr.Dataset, first: NDArray[Any], window: float) -> None:
+    """Draw the friction force around the first break-away under each law."""
+    time = ds["time"].values
+    force = np.atleast_2d(ds["friction_force"].transpose(..., "time").values)
+    for k, (numbers, start) in enumerate(zip(force, first, strict=True)):
+        near = np.abs(time - start) <= window
+        axes.plot(time[near] - start, numbers[near], **_law_style(k) if compares_laws(ds) else _ONE)
+    where = " under each law" if compares_laws(ds) else f", t = {number_text(first[0], '.5g')} s"
+    axes.set_title(f"friction force around the first break-away{where}", fontsize=SMALL, loc="left")
+    axes.set_xlabel("time since the break-away (s)")
+    axes.set_ylabel(_short_label(ds, "friction_force"))
+    axes.margins(x=0)
 
 
 def _draw_zones(axes: Axes, ds: xr.Dataset, names: list[str]) -> None:
@@ -288,18 +343,31 @@ def _draw_zones(axes: Axes, ds: xr.Dataset, names: list[str]) -> None:
     legend_beside(axes, handles, bbox_to_anchor=(1.0, 1.2))
 
 
-def _clip(axes: Axes, numbers: NDArray[Any]) -> None:
-    """Limit the axis to the bulk of its values if a few outliers would flatten the curve, and say so above it."""
-    finite = numbers[np.isfinite(numbers)]
-    if not finite.size:
+def clip(axes: Axes, time: NDArray[Any], numbers: NDArray[Any]) -> None:
+    """Limit the vertical axis to where values are for 98 % of the time, if outliers would flatten the rest, and say so.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Axes in which the values are drawn.
+    time : ndarray of shape ``(samples,)``
+        Instants, s. They may be dense where values change fast.
+    numbers : ndarray of shape ``(..., samples)``
+        Values of one or several curves.
+    """
+    gaps = np.diff(time)
+    durations = np.broadcast_to(np.append(gaps, 0.0) + np.append(0.0, gaps), numbers.shape)
+    known = np.isfinite(numbers)
+    if not durations[known].any():
         return
-    low, high = np.percentile(finite, [1, 99])
-    if high > low and finite.max() - finite.min() > 5 * (high - low):
+    order = np.argsort(numbers[known])
+    values, share = numbers[known][order], np.cumsum(durations[known][order])
+    low, high = values[np.searchsorted(share, np.array([0.01, 0.99]) * share[-1])]
+    if high > low and values[-1] - values[0] > 5 * (high - low):
         margin = 0.15 * (high - low)
         axes.set_ylim(low - margin, high + margin)
-        axes.set_title(
-            f"axis clipped; values from {finite.min():.3g} to {finite.max():.3g}", fontsize=SMALL, loc="right"
-        )
+        ends = number_text(values[0]), number_text(values[-1])
+        axes.set_title(f"axis clipped; values from {ends[0]} to {ends[1]}", fontsize=SMALL, loc="right")
 
 
 def _envelope(time: NDArray[Any], numbers: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:

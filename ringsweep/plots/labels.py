@@ -6,8 +6,36 @@ import math
 import re
 
 import xarray as xr
+from matplotlib.axis import Axis
 
 from ringsweep.plots.datasets import is_numeric
+
+MINUS = "\N{MINUS SIGN}"
+
+# Limits above which an axis has the prefix, and the prefixes; a tenth of a unit needs none.
+_PREFIXES = ((0.05, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+
+
+def number_text(value: float, form: str = ".3g") -> str:
+    """A number with a true minus sign, as ticks of axes have it."""
+    return format(value, form).replace("-", MINUS)
+
+
+def label_axis(axis: Axis, name: str, unit: str) -> None:
+    """Label an axis of numbers in SI units; small numbers are shown in thousandths, millionths or billionths.
+
+    Parameters
+    ----------
+    axis : matplotlib.axis.Axis
+        Axis with its limits.
+    name, unit : str
+        What the label says; the unit takes the prefix.
+    """
+    largest = max(map(abs, axis.get_view_interval()))
+    factor, prefix = next((pair for pair in _PREFIXES if largest >= pair[0]), (1.0, ""))
+    if prefix:
+        axis.set_major_formatter(lambda value, _: number_text(value / factor, ".6g"))
+    axis.set_label_text(f"{name} ({prefix}{unit})")
 
 
 def display_factor(coordinate: xr.DataArray) -> float:
@@ -45,5 +73,5 @@ def value_text(value: xr.DataArray) -> str:
     if not is_numeric(value):
         return f"{name} = {value.item()}"
     unit = unit_text(value, "°")
-    number = f"{value.item() * display_factor(value):.4g}"
+    number = number_text(value.item() * display_factor(value), ".4g")
     return f"{name} = {number}{unit if unit == '°' else f' {unit}'.rstrip()}"

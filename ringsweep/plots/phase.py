@@ -1,4 +1,4 @@
-"""Phase portraits of runs on a ring."""
+"""Phase portraits of runs."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
-from ringsweep.plots.datasets import zones
-from ringsweep.plots.rig import Rig, mode_name, ring_history
+from ringsweep.plots.datasets import on_ring, require_history, zones
+from ringsweep.plots.labels import label_axis
+from ringsweep.plots.rig import Rig, belt_history, mode_name, ring_history
 from ringsweep.plots.style import (
     PAIR_COLOURS,
     PAIR_STYLES,
@@ -40,19 +41,21 @@ _LONGEST = 720.0
 
 
 def phase_portrait(ds: xr.Dataset, frame: Literal["space", "ring"] = "space", ax: Axes | None = None) -> Axes:
-    """Draw angular velocity over angle, with stick, slip, the speed of the ring and the rough arcs.
+    """Draw velocity over place, with stick, slip, and the speed of the ring or belt.
 
-    In space the angular velocity of the ring is a curve of its own, which the body follows while it sticks. A broad
-    line lies under the curve of the body while a contact is on a rough arc. In the frame of the ring the arcs are
-    fixed: a band shows where a contact is on an arc. There the body sticks at zero velocity. Angles of more than two
-    turns are shown modulo a full turn.
+    For a ring, in space, the angular velocity of the ring is a curve of its own, which the body follows while it
+    sticks. A broad line lies under the curve of the body while a contact is on a rough arc. In the frame of the ring
+    the arcs are fixed: a band shows where a contact is on an arc. There the body sticks at zero velocity. Angles of
+    more than two turns are shown modulo a full turn.
+
+    For a belt the velocity is drawn over the displacement. While the body sticks, its curve lies on that of the belt.
 
     Parameters
     ----------
     ds : xarray.Dataset
-        Result of :func:`ringsweep.simulate` on a ring.
+        Result of :func:`ringsweep.simulate`.
     frame : {"space", "ring"}
-        Frame of reference.
+        Frame of reference; on a belt always space.
     ax : matplotlib.axes.Axes, optional
         Axes to draw in, by default pyplot's current ones. The legend stands beside them: a figure with
         ``layout="constrained"`` makes room for it.
@@ -64,7 +67,7 @@ def phase_portrait(ds: xr.Dataset, frame: Literal["space", "ring"] = "space", ax
     Raises
     ------
     InputError
-        If the dataset is not the history of one run on a ring, or `frame` is unknown.
+        If the dataset is not the history of one run on a ring or a belt, or `frame` is unknown.
 
     Examples
     --------
@@ -76,6 +79,32 @@ def phase_portrait(ds: xr.Dataset, frame: Literal["space", "ring"] = "space", ax
     """
     if frame not in ("space", "ring"):
         raise InputError("frame", f"{frame!r} is neither 'space' nor 'ring'")
+    if on_ring(require_history(ds)):
+        return _ring_portrait(ds, frame, ax)
+    if frame == "ring":
+        raise InputError("frame", "'ring' is for a body in a ring; on a belt the frame is 'space'")
+    run = belt_history(ds)
+    ax = axes_or_current(ax, (7.6, 4.8))
+    legend_beside(ax, draw_belt_portrait(ax, run))
+    return ax
+
+
+def draw_belt_portrait(ax: Axes, run: xr.Dataset) -> list[Artist]:
+    """Draw velocity over displacement of a run of :func:`belt_history`; returns the legend entries."""
+    place, speed, belt_speed = (run[name].values for name in ("x", "velocity", "belt_velocity"))
+    if fixed := not np.ptp(belt_speed):
+        ax.axhline(belt_speed[0], **_driven_style(fixed))
+    else:
+        ax.plot(place, belt_speed, **_driven_style(fixed))
+    entries: list[Artist] = [Line2D([], [], **_driven_style(fixed), label="speed of the belt")]
+    entries += draw_modes(ax, run["mode"].values, place, speed)
+    label_axis(ax.xaxis, "displacement", "m")
+    label_axis(ax.yaxis, "velocity", "m s$^{-1}$")
+    return entries
+
+
+def _ring_portrait(ds: xr.Dataset, frame: str, ax: Axes | None) -> Axes:
+    """Draw angular velocity over angle."""
     run, rig = ring_history(ds)
     ax = axes_or_current(ax, (7.6, 4.8))
     relative = frame == "ring"
@@ -86,32 +115,13 @@ def phase_portrait(ds: xr.Dataset, frame: Literal["space", "ring"] = "space", ax
     entries = _draw_bands(ax, rig, angle, wrapped) if fixed_arcs else []
     if not entries:
         entries = _draw_broad_lines(ax, run, angle, speed, wrapped)
-    # Translucent and below the curve of the body, which covers it in stick.
-    ring_style: dict[str, Any] = {"color": PAIR_COLOURS[1], "linewidth": 0.8, "alpha": 0.7, "zorder": 1.8}
+    ring_style = _driven_style(fixed_arcs)
     if fixed_arcs:
-        ring_style |= {"linestyle": PAIR_STYLES[1], "linewidth": 1.2, "alpha": 1.0}
         ax.axhline(0.0, **ring_style)
     else:
         ax.plot(*_curve(angle, run["ring_omega"].values, wrapped), **ring_style)
     entries.append(Line2D([], [], **ring_style, label="speed of the ring" + (", stick" if relative else "")))
-    mode = run["mode"].values
-    # From one sample to the next the body slips if it slips at either of them.
-    between = np.where(mode[:-1] != 0, mode[:-1], mode[1:])
-    for value, style in _MODE_STYLES.items():
-        if not (mode == value).any():
-            continue
-        ax.plot(*_curve(*_segments(between == value, angle, speed), wrapped), **style)
-        # In the frame of the ring the curve of a stick has no length.
-        dot: dict[str, Any] = {"marker": "o", "markersize": 3.5} if value == 0 else {}
-        if dot:
-            first = [i for i, _ in true_ranges(mode == value)]
-            ax.plot(_wrap(angle[first], wrapped), speed[first], color=style["color"], linestyle="", **dot)
-        entries.append(Line2D([], [], **style, **dot, label=mode_name(value)))
-    for k, label, colour in ((0, "start", "white"), (-1, "end", "black")):
-        square: dict[str, Any] = {"marker": "s", "markersize": 5.5, "color": "black", "linestyle": ""}
-        square["markerfacecolor"] = colour
-        ax.plot(_wrap(angle[[k]], wrapped), speed[[k]], zorder=4, **square)
-        entries.append(Line2D([], [], label=label, **square))
+    entries += draw_modes(ax, run["mode"].values, angle, speed, wrapped)
     ax.set_xlabel("angle of the body on the ring (°)" if relative else "angle of the body (°)")
     ax.set_ylabel(f"angular velocity{' relative to the ring' if relative else ''} (rad s$^{{-1}}$)")
     if wrapped:
@@ -122,6 +132,47 @@ def phase_portrait(ds: xr.Dataset, frame: Literal["space", "ring"] = "space", ax
         ax.secondary_yaxis("right", functions=(to_sliding, to_angular)).set_ylabel("sliding velocity (m s$^{-1}$)")
     legend_beside(ax, entries, bbox_to_anchor=(1.16 if relative else 1.0, 1.0), handleheight=1.2)
     return ax
+
+
+def _driven_style(constant: bool) -> dict[str, Any]:
+    """Line of the speed of ring or belt; below the curve of the body, which covers it in stick."""
+    style: dict[str, Any] = {"color": PAIR_COLOURS[1], "linewidth": 0.8, "alpha": 0.7, "zorder": 1.8}
+    return style | {"linestyle": PAIR_STYLES[1], "linewidth": 1.2, "alpha": 1.0} if constant else style
+
+
+def draw_modes(
+    ax: Axes, mode: NDArray[Any], across: NDArray[Any], up: NDArray[Any], wrapped: bool = False
+) -> list[Artist]:
+    """Draw the curve of a run with a line for each friction mode, its start and its end; returns the legend entries.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+        Axes to draw in.
+    mode, across, up : ndarray of shape ``(samples,)``
+        Friction mode, and coordinates in the axes.
+    wrapped : bool
+        Whether `across` is an angle in degrees, shown modulo a full turn.
+    """
+    entries: list[Artist] = []
+    # From one sample to the next the body slips if it slips at either of them.
+    between = np.where(mode[:-1] != 0, mode[:-1], mode[1:])
+    for value, style in _MODE_STYLES.items():
+        if not (mode == value).any():
+            continue
+        ax.plot(*_curve(*_segments(between == value, across, up), wrapped), **style)
+        # In the frame of the ring or belt the curve of a stick may have no length.
+        dot: dict[str, Any] = {"marker": "o", "markersize": 3.5} if value == 0 else {}
+        if dot:
+            first = [i for i, _ in true_ranges(mode == value)]
+            ax.plot(_wrap(across[first], wrapped), up[first], color=style["color"], linestyle="", **dot)
+        entries.append(Line2D([], [], **style, **dot, label=mode_name(value)))
+    for k, label, colour in ((0, "start", "white"), (-1, "end", "black")):
+        square: dict[str, Any] = {"marker": "s", "markersize": 5.5, "color": "black", "linestyle": ""}
+        square["markerfacecolor"] = colour
+        ax.plot(_wrap(across[[k]], wrapped), up[[k]], zorder=4, **square)
+        entries.append(Line2D([], [], label=label, **square))
+    return entries
 
 
 def _wrap(angle: NDArray[Any], wrapped: bool) -> NDArray[Any]:

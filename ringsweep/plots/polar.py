@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.plots.datasets import present
+from ringsweep.plots.labels import number_text
 from ringsweep.plots.rig import Rig, mode_name, ring_history
 from ringsweep.plots.style import PAIR_COLOURS, REST, SMALL, arc_colour, arc_names, axes_or_current, legend_beside
 
-MINUS, TIMES = "\N{MINUS SIGN}", "\N{MULTIPLICATION SIGN}"
+TIMES = "\N{MULTIPLICATION SIGN}"
 
 
 def polar_view(ds: xr.Dataset, time: float, ax: Axes | None = None) -> Axes:
@@ -73,8 +74,9 @@ def states_at(run: xr.Dataset, times: NDArray[np.float64]) -> dict[str, NDArray[
     own = run["time"].values
     before = np.maximum(np.searchsorted(own, times, side="right") - 1, 0)
     states: dict[str, NDArray[Any]] = {"time": times, "mode": run["mode"].values[before]}
-    names = ("phi", "theta", "omega", "ring_omega", "normal_1", "normal_2", "friction_1", "friction_2")
-    return states | {name: np.interp(times, own, run[name].values) for name in present(run, names)}
+    ring = ("phi", "theta", "omega", "ring_omega", "normal_1", "normal_2", "friction_1", "friction_2")
+    belt = ("x", "velocity", "friction_force", "belt_x", "belt_velocity")
+    return states | {name: np.interp(times, own, run[name].values) for name in present(run, (*ring, *belt))}
 
 
 class RingArtists:
@@ -83,12 +85,12 @@ class RingArtists:
     def __init__(self, ax: Axes, run: xr.Dataset, rig: Rig):
         self.ax, self.rig = ax, rig
         self.weight = float(rig.body.mass * rig.body.gravity)
-        self.reference = _reference_force([run[f"normal_{k}"].values for k in rig.contacts], self.weight or 1.0)
+        self.reference = reference_force([run[f"normal_{k}"].values for k in rig.contacts], self.weight or 1.0)
         # Length of an arrow, m/N.
         self.scale = 0.75 * rig.radius / self.reference
         # Friction forces are small beside reactions, so a round factor magnifies them. Their peaks on a narrow rough
         # arc are no outliers: they must be shown.
-        friction = _reference_force([np.abs(run[f"friction_{k}"].values) for k in rig.contacts], 0.0, outlier=6.0)
+        friction = reference_force([np.abs(run[f"friction_{k}"].values) for k in rig.contacts], 0.0, outlier=6.0)
         self.magnification = max(1.0, float(f"{1.5 * self.reference / friction:.0e}")) if friction else 1.0
 
         R = rig.radius
@@ -154,7 +156,9 @@ class RingArtists:
         _set_arrows(self.frictions, contacts, forwards * (frictions * self.scale * self.magnification)[:, None])
         _set_arrows(self.gravity, centre_of_mass[None], np.array([[0.0, -self.weight * self.scale]]))
         self.ax.set_title(f"t = {states['time'][k]:.4f} s, {mode_name(states['mode'][k])}", fontsize=11)
-        self.speeds.set_text(f"body {omega:+.2f} rad s⁻¹, ring {ring_omega:+.2f} rad s⁻¹")
+        self.speeds.set_text(
+            f"body {number_text(omega, '+.2f')} rad s⁻¹, ring {number_text(ring_omega, '+.2f')} rad s⁻¹"
+        )
 
     @property
     def moving(self) -> list[Artist]:
@@ -187,7 +191,7 @@ class RingArtists:
             self.ax.plot(*zip(inner, outer, strict=True), color="0.5", linewidth=0.6, zorder=1)
         for angle in (0, 90, 180, -90):
             x, y = _point(1.3 * R, math.radians(angle))
-            text = self.ax.text(x, y, f"{angle}°".replace("-", MINUS), fontsize=SMALL, color="0.35", zorder=7)
+            text = self.ax.text(x, y, number_text(angle, "d") + "°", fontsize=SMALL, color="0.35", zorder=7)
             text.set(ha="center", va="center", bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5})
 
     def _arrows(self, colours: list[str], width: float) -> Quiver:
@@ -212,7 +216,7 @@ class RingArtists:
         """A bar of a round force and one of a round length below the ring."""
         R = self.rig.radius
         y = -1.5 * R
-        force, length = _round_down(0.75 * self.reference), _round_down(0.5 * R)
+        force, length = round_down(0.75 * self.reference), round_down(0.5 * R)
         style: dict[str, Any] = {"color": "0.3", "linewidth": 1.2}
         for x, extent, text in (
             (-1.2 * R, force * self.scale, f"{force:g} N"),
@@ -232,7 +236,7 @@ def _set_arrows(arrows: Quiver, points: NDArray[Any], vectors: NDArray[Any]) -> 
     arrows.set_UVC(*vectors.T)
 
 
-def _reference_force(forces: list[NDArray[Any]], default: float, outlier: float = 3.0) -> float:
+def reference_force(forces: list[NDArray[Any]], default: float, outlier: float = 3.0) -> float:
     """Force that sets the scale of the arrows, N: the greatest, or the 95th percentile if the greatest is an outlier.
 
     An outlier is at least `outlier` times the 95th percentile. If all forces are zero, the result is `default`.
@@ -244,7 +248,7 @@ def _reference_force(forces: list[NDArray[Any]], default: float, outlier: float 
     return (greatest if greatest < outlier * usual else usual) or default
 
 
-def _round_down(value: float) -> float:
+def round_down(value: float) -> float:
     """The greatest of 1, 2, 5, 10, ... that is not above `value`."""
     power = 10.0 ** math.floor(math.log10(value))
     return next(digit * power for digit in (5.0, 2.0, 1.0) if digit * power <= value * (1.0 + 1e-12))

@@ -1,4 +1,4 @@
-"""The ring and the body of a run: their measures, and the run with the friction forces."""
+"""The ring or belt and the body of a run: their measures, and the run as pictures of them need it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ringsweep.config import load
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS
 from ringsweep.physics import ring
-from ringsweep.plots.datasets import compares_laws, configuration, on_ring, present, require_history
+from ringsweep.plots.datasets import configuration, on_ring, present, require_history, require_one_run
 from ringsweep.quantities.variables import MODES
 
 
@@ -74,20 +74,27 @@ def ring_history(ds: xr.Dataset) -> tuple[xr.Dataset, Rig]:
     InputError
         If the dataset is not the history of one run on a ring, or has no ``theta`` or no ``configuration``.
     """
-    ds = require_history(ds)
-    if not on_ring(ds):
-        raise InputError("ds", "is the history of a body on a belt: there is no ring to draw; draw it with history")
-    if compares_laws(ds):
-        laws = ", ".join(map(str, ds["friction_law"].values))
-        raise InputError("ds", f"holds a run under each of {laws}: choose one, for example ds.sel(friction_law=...)")
-    if "theta" not in ds:
-        raise InputError("ds", "has no theta, the angle of the ring: an earlier version wrote it; run it again")
-    ds = ds.isel(time=np.isfinite(ds["phi"].values))
+    if not on_ring(require_history(ds)):
+        raise InputError("ds", "is the history of a body on a belt: there is no ring to draw")
+    ds = require_one_run(ds, ("phi", "theta"))
     rig = Rig.of(ds)
     phi, (first, *others) = ds["phi"].values, [ds[name].values for name in present(ds, ("normal_1", "normal_2"))]
     state = np.sin(phi), np.cos(phi), ds["omega"].values, ds["epsilon"].values, first, *(others or [first])
     forces = ring.tractions(rig.body, *state)
     return ds.assign({f"friction_{k}": ("time", values) for k, values in enumerate(forces, start=1)}), rig
+
+
+def belt_history(ds: xr.Dataset) -> xr.Dataset:
+    """The history of one run on a belt, up to its end.
+
+    Raises
+    ------
+    InputError
+        If the dataset is not the history of one run on a belt, or lacks a variable.
+    """
+    if on_ring(require_history(ds)):
+        raise InputError("ds", "is the history of a body in a ring: there is no belt to draw")
+    return require_one_run(ds, ("x", "velocity", "friction_force", "belt_x", "belt_velocity", "mode"))
 
 
 def mode_name(mode: float) -> str:

@@ -123,6 +123,8 @@ HISTORY: dict[str, Variable] = {
     "zone_2": Variable("1", "segment of the ring under contact 2", dtype="int32"),
     "x": Variable("m", "displacement of the body"),
     "velocity": Variable("m/s", "velocity of the body"),
+    "belt_x": Variable("m", "displacement of the belt"),
+    "belt_velocity": Variable("m/s", "velocity of the belt"),
     "friction_force": Variable("N", "friction force"),
     "deflection": Variable("m", "deflection of the bristles"),
     "deflection_1": Variable("m", "deflection of the bristles at contact 1"),

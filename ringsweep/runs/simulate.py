@@ -117,9 +117,10 @@ def _trace(config: Config, structure: Structure, samples: int) -> xr.Dataset:
         if name.startswith("normal_"):
             # Where friction jumps, a normal reaction may jump below zero. There the contact opens and the run ends.
             columns[name][-1:] = np.maximum(columns[name][-1:], 0.0)
-    if "ring_omega" in columns:
+    if model.driven:
         drive = take(cell.drive, 0)
-        columns["theta"] = np.array([turn(drive, t)[0] for t in times.tolist()])
+        course = np.array([turn(drive, t) for t in times.tolist()])
+        columns |= dict(zip(model.driven, course.T, strict=False))
     return xr.Dataset(
         {
             name: ("time", column.astype(HISTORY[name].dtype), HISTORY[name].attributes)

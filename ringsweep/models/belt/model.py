@@ -24,6 +24,7 @@ class Belt(Model):
     doc: ClassVar[str] = "a mass on a spring on a moving belt"
     outcomes: ClassVar[tuple[str, ...]] = Outcome._fields
     place: ClassVar[str] = "x"
+    driven: ClassVar[tuple[str, ...]] = ("belt_x", "belt_velocity")
 
     def scene_type(self, structure: Structure) -> type:
         """``BristleBelt`` for laws with bristles, else ``Belt``."""

@@ -29,7 +29,7 @@ class SingleContactRing(Model):
     doc: ClassVar[str] = "a small body in a rotating ring, one contact"
     outcomes: ClassVar[tuple[str, ...]] = record.Outcome._fields
     place: ClassVar[str] = "phi"
-    rotates: ClassVar[bool] = True
+    driven: ClassVar[tuple[str, ...]] = ("theta",)
     absent: ClassVar[frozenset[str]] = frozenset({"normal_min_2", "normal_2", "zone_2", "deflection_2"})
     body: ClassVar[dict[str, Parameter]] = {"body.mass": MASS, "ring.radius": RADIUS}
 

@@ -1,0 +1,247 @@
+"""Phase portrait, friction loop and film of a body on a belt show places, velocities and forces of the run."""
+
+import re
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from matplotlib.quiver import Quiver
+
+import ringsweep
+from ringsweep import plots
+from ringsweep.cli import main
+from ringsweep.errors import InputError
+from ringsweep.models import parameters
+from ringsweep.models.scene import Structure
+from ringsweep.physics.drives import DRIVES
+from ringsweep.plots import films
+from ringsweep.plots.phase import _MODE_STYLES
+
+# m = 1 kg, k = 2 N/m, so the natural frequency is sqrt(2).
+LOAD, STIFFNESS, BELT = 9.81, 2.0, 0.1
+STICK = _MODE_STYLES[0]["color"]
+
+
+def belt(friction, span=20.0, **changes):
+    return {
+        "model": "belt",
+        "body": {"mass": 1.0},
+        "spring": {"stiffness": STIFFNESS},
+        "belt": {"velocity": BELT},
+        "friction": {"mu_s": 0.15, "mu_k": 0.1} | friction,
+        "time": {"span": span},
+    } | changes
+
+
+@pytest.fixture(scope="module")
+def run():
+    """Stick-slip: slip from x = 0.73575 m, at mu_k F_N/k = 0.4905 m below the apex of the orbit."""
+    return ringsweep.simulate(belt({"law": "stiction"}))
+
+
+@pytest.fixture(scope="module")
+def rocking():
+    """A body that sticks and slips on a belt that moves to and fro."""
+    drive = {"law": "sinusoidal", "amplitude": 0.3, "frequency": 0.25}
+    return ringsweep.simulate({**belt({"law": "stiction"}), "belt": {}, "drive": drive, "spring": {"stiffness": 10.0}})
+
+
+@pytest.fixture(scope="module")
+def lugre():
+    """The paper's law with bristles, from rest: the belt hits the bristles with 31 N."""
+    law = {"law": "lugre", "v_s": 1e-3, "sigma0": 1e5, "sigma1": 316.2278, "sigma2": 0.1}
+    return ringsweep.simulate(belt(law, initial={"velocity": 0.0}))
+
+
+@pytest.fixture
+def ax():
+    return Figure(figsize=(7, 5)).add_subplot()
+
+
+def drawn(ax, colour=None):
+    """Points of the curves drawn for friction modes, without their gaps; by default of all modes."""
+    colours = [style["color"] for style in _MODE_STYLES.values()] if colour is None else [colour]
+    lines = [line for line in ax.lines if line.get_color() in colours and line.get_linestyle() == "-"]
+    points = np.concatenate([line.get_xydata() for line in lines])
+    return points[np.isfinite(points).all(axis=1)]
+
+
+def energy(run):
+    """Energy of body and spring, J."""
+    return 0.5 * run.velocity**2 + 0.5 * STIFFNESS * run.x**2
+
+
+class TestHistory:
+    def test_history_has_place_and_velocity_of_the_belt(self, run, rocking):
+        t = run.time.values
+        np.testing.assert_allclose(run.belt_x, BELT * t, rtol=1e-14)
+        np.testing.assert_allclose(run.belt_velocity, BELT, rtol=0)
+        phase = 0.5 * np.pi * rocking.time.values
+        np.testing.assert_allclose(rocking.belt_x, 0.3 * np.sin(phase), atol=1e-12)
+        np.testing.assert_allclose(rocking.belt_velocity, 0.15 * np.pi * np.cos(phase), atol=1e-12)
+        assert (run.belt_x.attrs["units"], run.belt_velocity.attrs["units"]) == ("m", "m s-1")
+
+    def test_panel_of_the_velocity_shows_that_of_the_belt_too(self, rocking):
+        _, belt = plots.history(rocking).axes[1].lines
+        np.testing.assert_allclose(belt.get_ydata(), 0.15 * np.pi * np.cos(0.5 * np.pi * belt.get_xdata()), atol=5e-3)
+        assert belt.get_label() == "belt"
+
+
+class TestPortrait:
+    def test_stick_lies_at_the_speed_of_the_belt_and_slip_on_a_circle(self, run, ax):
+        plots.phase_portrait(run, ax=ax)
+        stick = drawn(ax, STICK)
+        np.testing.assert_allclose(stick[:, 1], BELT, atol=1e-12)
+        assert stick[:, 0].max() == pytest.approx(0.15 * LOAD / STIFFNESS, rel=1e-9)
+        slip = drawn(ax, _MODE_STYLES[-1]["color"])
+        apart = np.hypot(slip[:, 0] - 0.1 * LOAD / STIFFNESS, slip[:, 1] / np.sqrt(STIFFNESS))
+        np.testing.assert_allclose(apart, np.hypot(0.05 * LOAD / STIFFNESS, BELT / np.sqrt(STIFFNESS)), rtol=1e-6)
+        (speed,) = {tuple(line.get_ydata()) for line in ax.lines if line.get_linestyle() == "--"}
+        assert speed == (BELT, BELT)
+
+    def test_stick_on_a_belt_of_changing_speed_lies_on_the_curve_of_the_belt(self, rocking, ax):
+        plots.phase_portrait(rocking, ax=ax)
+        assert {"stick", "slip forward", "slip backward"} <= {text.get_text() for text in ax.get_legend().get_texts()}
+        curve = next(line for line in ax.lines if line.get_alpha() == 0.7).get_xydata()
+        np.testing.assert_array_equal(curve, np.column_stack([rocking.x, rocking.belt_velocity]))
+        order = np.round(curve, 9).tolist()
+        stick = np.round(drawn(ax, STICK), 9).tolist()
+        assert set(map(tuple, stick)) <= set(map(tuple, order))
+
+    def test_portrait_has_names_and_units_and_no_frame_of_a_ring(self, run, ax):
+        plots.phase_portrait(run, ax=ax)
+        assert ax.get_xlabel() == "displacement (m)"
+        assert ax.get_ylabel() == "velocity (m s$^{-1}$)"
+        small = run.assign({name: 1e-5 * run[name] for name in ("x", "velocity", "belt_velocity")})
+        plots.phase_portrait(small, ax=(below := Figure().add_subplot()))
+        assert below.get_xlabel() == "displacement (µm)"
+        assert below.xaxis.get_major_formatter()(5e-6, 0) == "5"
+        with pytest.raises(InputError, match=r"frame: 'ring'.*belt"):
+            plots.phase_portrait(run, "ring", ax)
+
+
+class TestFrictionLoop:
+    def test_law_without_memory_gives_one_curve_and_a_vertical_line_in_stick(self, run, ax):
+        plots.friction_loop(run, ax=ax)
+        stick, slip = drawn(ax, STICK), drawn(ax, _MODE_STYLES[-1]["color"])
+        np.testing.assert_allclose(stick[:, 0], 0.0, atol=1e-12)
+        assert stick[:, 1].min() == pytest.approx(-0.15 * LOAD, rel=1e-9)
+        np.testing.assert_allclose(slip[slip[:, 0] < -1e-9, 1], -0.1 * LOAD, rtol=1e-12)
+        assert ax.get_xlabel() == "sliding velocity (m s$^{-1}$)"
+        assert ax.get_ylabel() == "friction force (N)"
+
+    def test_bristles_give_another_force_at_breakaway_than_at_the_return_to_stick(self, lugre, ax):
+        plots.friction_loop(lugre.sel(time=slice(5.0, 12.0)), ax=ax)
+        points = drawn(ax)
+        near = points[np.abs(points[:, 0] + 2e-3) < 1e-3]
+        # Friction lags behind the velocity: it is greater at the breakaway.
+        assert np.ptp(near[:, 1]) > 0.01 * LOAD
+
+    @pytest.mark.parametrize("name", ["run", "lugre"])
+    def test_area_under_the_force_over_the_distance_is_the_energy_that_friction_takes(self, name, request, ax):
+        run = request.getfixturevalue(name).sel(time=slice(5.0, 19.0))
+        plots.friction_loop(run, "distance", ax)
+        area = 0.0
+        for line in ax.lines:
+            if line.get_linestyle() == "-":
+                across, up = line.get_xydata().T
+                area += np.nansum(0.5 * (up[1:] + up[:-1]) * np.diff(across))
+        # The belt puts in what friction does not take: m d2x/dt2 = -k x - F.
+        work = -BELT * np.trapezoid(run.friction_force, run.time)
+        assert area == pytest.approx(work - float(energy(run)[-1] - energy(run)[0]), rel=1e-4)
+        assert area > 0.5
+        assert ax.get_xlabel() == "distance slid on the belt (m)"
+
+    def test_spike_of_bristles_does_not_flatten_the_loop(self, lugre, ax):
+        plots.friction_loop(lugre, ax=ax)
+        assert lugre.friction_force.min() < -30.0
+        assert ax.get_ylim()[0] > -3.0
+        assert "axis clipped; values from \N{MINUS SIGN}31.6" in ax.get_title(loc="right")
+
+    def test_unknown_axis_and_a_ring_are_refused(self, run, ax):
+        with pytest.raises(InputError, match="neither 'velocity' nor 'distance'"):
+            plots.friction_loop(run, "place", ax)
+        with pytest.raises(InputError, match="there is no belt"):
+            plots.friction_loop(run.rename(x="phi"), ax=ax)
+
+
+@pytest.mark.parametrize("draw", [plots.phase_portrait, plots.friction_loop, plots.animation])
+class TestRefused:
+    def test_picture_refuses_a_run_of_an_earlier_version(self, run, draw):
+        with pytest.raises(InputError, match=r"has no belt_velocity.*run it again"):
+            draw(run.drop_vars("belt_velocity"))
+
+    def test_picture_refuses_several_friction_laws(self, run, draw):
+        with pytest.raises(InputError, match="choose one"):
+            draw(run.expand_dims(friction_law=["stiction", "coulomb"]))
+
+
+@pytest.fixture(scope="module")
+def film(run):
+    """250 frames over 20 s."""
+    return films._Film(run, 25.0, 10.0)
+
+
+class TestFilm:
+    @pytest.mark.parametrize("k", [0, 60, 110, 200])
+    def test_frame_shows_body_spring_belt_and_friction_at_its_instant(self, film, run, k):
+        film.show(k)
+        time = 20.0 * k / 249
+        x, velocity, force = (np.interp(time, run.time, run[name]) for name in ("x", "velocity", "friction_force"))
+        above, below = film.body.ax, film.figure.subfigs[0].axes[1]
+        assert above.get_xlim() == below.get_xlim()
+        body = max((patch for patch in above.patches if isinstance(patch, Rectangle)), key=lambda patch: patch.zorder)
+        assert body.get_x() + 0.5 * body.get_width() == pytest.approx(x)
+        spring = film.body.spring.get_xdata()
+        assert spring[0] == film.body.wall < run.x.min()
+        assert spring[-1] == pytest.approx(body.get_x())
+        marks = film.body.marks.get_xdata()[::3]
+        offset = (marks - BELT * time) / np.diff(marks).mean()
+        np.testing.assert_allclose(offset, np.round(offset), atol=1e-9)
+        (dot,) = film.body.dot.get_xydata()
+        np.testing.assert_allclose(dot, [x, velocity], atol=1e-12)
+        (arrow,) = (artist for artist in above.collections if isinstance(artist, Quiver))
+        bar = next(line for line in above.lines if line.get_marker() == "|")
+        newtons = next(float(text.get_text().split()[0]) for text in above.texts if text.get_text().endswith(" N"))
+        assert arrow.U[0] / np.ptp(bar.get_xdata()) * newtons == pytest.approx(-force)
+        assert above.get_title().startswith(f"t = {time:.4f} s, ")
+        sign = "+" if velocity >= 0 else "\N{MINUS SIGN}"
+        assert film.body.speeds.get_text() == f"body {sign}{abs(velocity):.3f} m s⁻¹, belt +0.100 m s⁻¹"
+
+    def test_belt_carries_its_marks_along_with_a_body_that_sticks(self, film, run):
+        film.show(60)
+        first, x = film.body.marks.get_xdata()[:-1:3], film.body.body.get_x()
+        film.show(61)
+        then, now = film.body.marks.get_xdata()[:-1:3], film.body.body.get_x()
+        step = (then[:5, None] - first[None]).ravel()
+        assert np.abs(step - (now - x)).min() < 1e-12
+
+    def test_body_without_a_spring_is_drawn_without_one(self):
+        free = ringsweep.simulate(belt({"law": "stiction"}, span=1.0, spring={"stiffness": 0.0}))
+        film = films._Film(free, 5.0, 1.0)
+        assert not film.body.spring.get_visible()
+        assert not any("spring" in text.get_text() for text in film.body.ax.texts)
+
+    @pytest.mark.parametrize("drive", DRIVES)
+    def test_axes_of_a_belt_map_speak_of_no_ring_and_no_angle(self, drive):
+        names = [parameter.long_name for parameter in parameters(Structure("belt", "stiction", drive)).values()]
+        assert not [name for name in names if re.search(r"\bring\b|\bangle\b|\bangular\b", name)]
+
+    def test_picture_of_a_belt_speaks_of_no_ring(self, film):
+        texts = [text.get_text() for legend in film.figure.subfigs[0].legends for text in legend.get_texts()]
+        for axes in film.figure.axes:
+            texts += [axes.get_title(), axes.get_xlabel(), axes.get_ylabel(), *(text.get_text() for text in axes.texts)]
+        assert "friction on the body" in texts
+        assert not [text for text in texts if "ring" in text.replace("spring", "")]
+
+    def test_animate_writes_a_film_of_a_belt(self, tmp_path, monkeypatch, run):
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr("ringsweep.runs.simulate.history", lambda config: run)
+        save = plots.save_animation
+        monkeypatch.setattr(
+            "ringsweep.plots.save_animation", lambda ds, path: save(ds, path, fps=5, duration=0.6), raising=False
+        )
+        assert main(["init", "--model", "belt", "belt.yaml"]) == 0
+        assert main(["animate", "belt.yaml", "-o", "run.html"]) == 0
+        assert "<img" in (tmp_path / "run.html").read_text()
