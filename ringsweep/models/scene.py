@@ -32,6 +32,8 @@ class Structure:
         Paths of the rough arcs: ``()``, ``("zone",)`` or ``("zones.0", "zones.1", ...)``.
     table : tuple of ndarray, optional
         Times (s) and angles (rad) of a drive from a table, each of shape ``(samples,)``.
+    force : tuple of ndarray, optional
+        Times (s) and forces (N) of a force from a table, each of shape ``(samples,)``.
     """
 
     model: str
@@ -39,6 +41,7 @@ class Structure:
     drive: str = "none"
     arcs: tuple[str, ...] = ()
     table: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    force: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
 
 
 @dataclass(frozen=True)
