@@ -217,8 +217,7 @@ def _serial(batch, launches, table, steps, h, rows, report):
         k, t, fall_rate = 0, 0.0, 0.0
         while status == RUNNING and k < steps:
             y_next = rk4._step(scene, y, now, table, 2 * k, h)
-            theta, ring_omega = lookup(scene.drive, table, 2 * k + 2)
-            after = constant_step.inspect(scene, y_next, theta, ring_omega)
+            after = constant_step.inspect(scene, y_next, lookup(scene.drive, table, 2 * k + 2))
             status, fraction = constant_step.verdict(scene, now, after)
             least = diagnosis.margin
             diagnosis = rk4._diagnose(rk4.Diagnosed(), scene, diagnosis, now, after, h)

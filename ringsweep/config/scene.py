@@ -24,8 +24,14 @@ from ringsweep.quantities.units import quantity, show
 
 logger = logging.getLogger("ringsweep")
 
-#: Columns of the table of a measured drive.
-TABLE = {"time": Parameter("s", "time in the table of the drive"), "theta": Parameter("rad", "angle of the drive")}
+#: Columns of the tables of a measured drive and of a measured force, by section.
+TABLES = {
+    "drive": {
+        "time": Parameter("s", "time in the table of the drive"),
+        "theta": Parameter("rad", "angle of the drive"),
+    },
+    "force": {"time": Parameter("s", "time in the table of the force"), "force": Parameter("N", "force on the body")},
+}
 
 
 def sweepable(scene: Scene) -> dict[str, Parameter | Choice]:
@@ -89,9 +95,12 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
         zones = ("zone",)
     elif rough:
         raise InputError(f"scene.{rough[0]}", "there is no rough zone: give zone, or leave friction.rough out")
-    table = _read_table(doc, scene["drive"]) if drive == "table" else None
+    table = _read_table(doc, scene["drive"], "drive") if drive == "table" else None
+    force = scene.get("force")
+    measured = force is not None and any(name in force for name in (*TABLES["force"], "file"))
+    forces = _read_table(doc, scene["force"], "force") if measured else None
     structures = {
-        law: Structure(model, law, drive, zones, table, own.get(law), curve if law == TABLE_LAW else None)
+        law: Structure(model, law, drive, zones, table, own.get(law), curve if law == TABLE_LAW else None, forces)
         for law in names
     }
     known = numbers_of(structures)
@@ -106,7 +115,9 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
             who = f"; law {needing[0]} needs it" if len(structures) > len(needing) else ""
             raise InputError(f"scene.{path}", missing_text(path, parameter) + who)
     for path in leaves:
-        if path not in known and path not in _structural(drive, names):
+        if path not in known and path not in _structural(model, drive, names):
+            if path.startswith("force."):
+                raise InputError(f"scene.{path}", "cannot stand beside a table, which gives the force at all times")
             where, name = ("drive", drive) if path.startswith("drive.") else ("friction", " or ".join(structures))
             warn_of_unused(path, where, name)
     return Scene(structures, values, scene)
@@ -131,19 +142,21 @@ def law_choice(model: str, own: Mapping[str, type]) -> Choice:
     return Choice("friction law", tuple(MODELS[model].laws | dict(own)))
 
 
-def _structural(drive: str, laws: Collection[str]) -> tuple[str, ...]:
+def _structural(model: str, drive: str, laws: Collection[str]) -> tuple[str, ...]:
     """Paths of a scene that are no numeric parameters."""
-    of_drive = (*TABLE, "file") if drive == "table" else ()
+    sections = ["drive"] if drive == "table" else []
+    if "force.constant" in parameters(Structure(model, next(iter(MODELS[model].laws)))):
+        sections.append("force")
     return (
         *("model", LAW, "drive.law"),
-        *(f"drive.{name}" for name in of_drive),
+        *(f"{section}.{name}" for section in sections for name in (*TABLES[section], "file")),
         *(f"friction.{name}" for name in keys_of(laws)),
     )
 
 
 def _all_paths(model: str, zones: tuple[str, ...], own: Mapping[str, type]) -> list[str]:
     """Every path that a scene of this model can have, under all laws and drives."""
-    paths = dict.fromkeys(_structural("table", (FORMULA, TABLE_LAW)))
+    paths = dict.fromkeys(_structural(model, "table", (FORMULA, TABLE_LAW)))
     for law, drive, arcs in product(MODELS[model].laws | dict(own), DRIVES, {(), ("zone",), zones}):
         paths |= dict.fromkeys(parameters(Structure(model, law, drive, arcs, own_law=own.get(law))))
     return list(paths)
@@ -180,31 +193,37 @@ def _leaves(node: Any, path: str, paths: _Paths) -> Iterator[tuple[str, Any]]:
             yield from _leaves(value, f"{full}.", paths)
 
 
-def _read_table(doc: Document, drive: dict[str, Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Times and angles of a measured drive. If they come from a file, they replace its name in the configuration."""
-    if "file" in drive:
-        if "time" in drive or "theta" in drive:
-            raise InputError("scene.drive.file", "give a file, or time and theta, not both")
-        columns = doc.inline_csv(drive["file"], "scene.drive.file", "scene.drive")
-        renamed = {"time" if name == "t" else name: cells for name, cells in columns.items()}
-        if set(renamed) != {"time", "theta"} or len(columns) != 2:
-            hint = ", separated by commas" if len(columns) == 1 else ""
-            raise InputError("scene.drive.file", f"columns t, theta are expected{hint}; got {', '.join(columns)}")
-        doc.locations |= {k.replace("drive.t.", "drive.time."): v for k, v in doc.locations.items()}
-        del drive["file"]
-        drive |= renamed
-    for name in TABLE:
-        if name not in drive:
-            raise InputError(f"scene.drive.{name}", "missing: a table needs a file, or the lists time and theta")
-    times, angles = (read_values(drive[name], parameter, f"scene.drive.{name}") for name, parameter in TABLE.items())
-    if len(times) != len(angles):
-        raise InputError("scene.drive.theta", f"{len(angles)} angles for {len(times)} times")
+def _read_table(doc: Document, given: dict[str, Any], section: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Times and values of a measured drive or force.
+
+    If they come from a file, they replace its name in the configuration.
+    """
+    where, columns = f"scene.{section}", TABLES[section]
+    _, what = columns
+    if "file" in given:
+        if any(name in given for name in columns):
+            raise InputError(f"{where}.file", f"give a file, or time and {what}, not both")
+        found = doc.inline_csv(given["file"], f"{where}.file", where)
+        renamed = {"time" if name == "t" else name: cells for name, cells in found.items()}
+        if set(renamed) != set(columns) or len(found) != 2:
+            hint = ", separated by commas" if len(found) == 1 else ""
+            raise InputError(f"{where}.file", f"columns t, {what} are expected{hint}; got {', '.join(found)}")
+        doc.locations |= {k.replace(f"{section}.t.", f"{section}.time."): v for k, v in doc.locations.items()}
+        del given["file"]
+        given |= renamed
+    for name in columns:
+        if name not in given:
+            raise InputError(f"{where}.{name}", f"missing: a table needs a file, or the lists time and {what}")
+    times, values = (read_values(given[name], parameter, f"{where}.{name}") for name, parameter in columns.items())
+    if len(times) != len(values):
+        plural = "angles" if what == "theta" else "forces"
+        raise InputError(f"{where}.{what}", f"{len(values)} {plural} for {len(times)} times")
     if len(times) < 4:
-        raise InputError("scene.drive.time", f"{len(times)} samples are too few: a table needs at least 4")
+        raise InputError(f"{where}.time", f"{len(times)} samples are too few: a table needs at least 4")
     backward = np.flatnonzero(np.diff(times) <= 0.0)
     if len(backward):
         i = int(backward[0]) + 1
-        raise InputError(f"scene.drive.time.{i}", f"{times[i]:g} s does not come after {times[i - 1]:g} s")
+        raise InputError(f"{where}.time.{i}", f"{times[i]:g} s does not come after {times[i - 1]:g} s")
     if times[0] > 0.0:
-        raise InputError("scene.drive.time.0", f"the table begins at {times[0]:g} s, but the run at 0 s")
-    return times, angles
+        raise InputError(f"{where}.time.0", f"the table begins at {times[0]:g} s, but the run at 0 s")
+    return times, values

@@ -10,7 +10,7 @@ from itertools import product
 from typing import Any
 
 from ringsweep.config.axes import COUNT
-from ringsweep.config.scene import TABLE
+from ringsweep.config.scene import TABLES
 from ringsweep.models import MODELS, parameters
 from ringsweep.models.scene import LAW, Structure
 from ringsweep.physics.drives import DRIVES
@@ -43,7 +43,12 @@ def schema() -> dict[str, Any]:
             LAW: _names(LAWS, "friction law; may be missing where sweep goes through laws"),
             "drive.law": _names(DRIVES, "how the ring is driven"),
             "drive.file": {"type": "string", "description": "CSV file with columns t (s), theta (rad)"},
-            **{f"drive.{name}": _list(_number(parameter)) for name, parameter in TABLE.items()},
+            "force.file": {"type": "string", "description": "CSV file with columns t (s), force (N)"},
+            **{
+                f"{section}.{name}": _list(_number(parameter))
+                for section, columns in TABLES.items()
+                for name, parameter in columns.items()
+            },
             **leaves,
         }
     )

@@ -117,21 +117,44 @@ def drive_of(structure: Structure, values: Values) -> Any:
     columns: dict[str, Any] = {field: values[f"drive.{field}"] for field in declared(law)}
     if structure.table is None:
         return law(**columns)
-    times, angles = structure.table
+    return table_of(*structure.table, columns["amplitude"], "drive", values)
+
+
+def table_of(
+    times: NDArray[np.float64], samples: NDArray[np.float64], amplitude: NDArray[np.float64], what: str, values: Values
+) -> drives.Table:
+    """Drive from a table, with fields of shape ``(cells, ...)``.
+
+    Parameters
+    ----------
+    times, samples : ndarray of shape ``(samples,)``
+        Times, s, and the measured quantity.
+    amplitude : ndarray of shape ``(cells,)``
+        Factor on the measured quantity.
+    what : str
+        Section of the configuration that has the table.
+    values : mapping of str to ndarray
+        Values by path.
+
+    Raises
+    ------
+    InputError
+        If the table ends before the span of time.
+    """
     cells = len(values["time.span"])
     require(
         values["time.span"] <= times[-1],
         "time.span",
         values["time.span"],
-        f"{{}} s is longer than the table of the drive, which ends at {times[-1]:.6g} s",
+        f"{{}} s is longer than the table of the {what}, which ends at {times[-1]:.6g} s",
     )
     # Few drives are tables, and this import takes longer than a small sweep.
     from scipy.interpolate import CubicSpline
 
     # A cubic spline has continuous second derivatives; a spline of higher degree would amplify noise in the table.
-    pieces = np.ascontiguousarray(CubicSpline(times, angles).c.T)
+    pieces = np.ascontiguousarray(CubicSpline(times, samples).c.T)
     return drives.Table(
-        **columns,
+        amplitude,
         knots=np.broadcast_to(times, (cells, *times.shape)),
         coefficients=np.broadcast_to(pieces, (cells, *pieces.shape)),
     )

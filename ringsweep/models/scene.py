@@ -37,6 +37,8 @@ class Structure:
         Type of the friction law if the configuration defines it.
     curve : tuple of ndarray, optional
         Sliding speeds (m/s) and friction coefficients of a law from a table, each of shape ``(points,)``.
+    force : tuple of ndarray, optional
+        Times (s) and forces (N) of a force from a table, each of shape ``(samples,)``.
     """
 
     model: str
@@ -46,6 +48,7 @@ class Structure:
     table: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     own_law: type | None = None
     curve: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    force: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
 
     @property
     def law_type(self) -> type:

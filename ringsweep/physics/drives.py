@@ -40,9 +40,9 @@ class Power(NamedTuple):
 class Sinusoidal(NamedTuple):
     """Rocking ring: :math:`s = \\sin(2 \\pi f t + \\psi)`."""
 
-    amplitude: Annotated[float, Parameter("rad", "amplitude of the rocking angle")]
-    frequency: Annotated[float, Parameter("Hz", "frequency of rocking", lower=0.0)]
-    phase: Annotated[float, Parameter("rad", "phase of rocking at t = 0", default=0.0)]
+    amplitude: Annotated[Leaf, Parameter("rad", "amplitude of the rocking angle")]
+    frequency: Annotated[Leaf, Parameter("Hz", "frequency of rocking", lower=0.0)]
+    phase: Annotated[Leaf, Parameter("rad", "phase of rocking at t = 0", default=0.0)]
 
 
 class Table(NamedTuple):
@@ -52,7 +52,7 @@ class Table(NamedTuple):
     piece from knot j: the cubic in t - knots[j], highest power first.
     """
 
-    amplitude: Annotated[float, Parameter("1", "factor on the measured course", default=1.0)]
+    amplitude: Annotated[Leaf, Parameter("1", "factor on the measured course", default=1.0)]
     knots: Any
     coefficients: Any
 
@@ -64,8 +64,21 @@ class WithoutShape(NamedTuple):
 
 
 def without_shape(drive: Any) -> Any:
-    """Drive without its shape; :func:`lookup` needs nothing else."""
-    return WithoutShape(drive.amplitude) if hasattr(drive, "amplitude") else drive
+    """Drive without its shape, and without those of the drives in it; :func:`lookup` needs nothing else."""
+    if hasattr(drive, "amplitude"):
+        return WithoutShape(drive.amplitude)
+    return type(drive)(*(without_shape(part) if isinstance(part, tuple) else part for part in drive))
+
+
+def shape_numbers(drive: Any) -> list[Any]:
+    """Numbers of a drive, and of the drives in it, on which :func:`table_row` depends: arrays of shape ``(cells,)``."""
+    found = []
+    for name, part in zip(drive._fields, drive, strict=True):
+        if isinstance(part, tuple):
+            found += shape_numbers(part)
+        elif hasattr(drive, "amplitude") and name != "amplitude" and part.ndim == 1:
+            found.append(part)
+    return found
 
 
 # Series of a power law begin at this time, s: there is none about t = 0. The motion until then is below rounding.
@@ -168,6 +181,23 @@ def _no_turn(drive, t):
     return 0.0, 0.0, 0.0
 
 
+@hook(optional=True)
+def table_row(drive, t):
+    """Row of the table from which :func:`lookup` reads: by default the first two numbers of :func:`shape`.
+
+    Parameters
+    ----------
+    drive, t
+        As for :func:`shape`.
+
+    Returns
+    -------
+    tuple of float
+    """
+    s, rate, _ = shape(drive, t)
+    return s, rate
+
+
 @hook(absorb=True, optional=True)
 def lookup(drive, table, k):
     """Angle and angular velocity of the ring from a table of the shape.
@@ -178,7 +208,7 @@ def lookup(drive, table, k):
     ----------
     drive : NamedTuple
     table : ndarray of shape ``(instants, 2)``
-        Columns s and ds/dt of the shape.
+        Columns s and ds/dt of the shape; see :func:`table_row`.
     k : int
         Row.
 
@@ -425,6 +455,17 @@ def _turn_itself(drive, course, t):
 
 
 @hook(optional=True)
+def period(drive):
+    """Period of the drive, s; by default infinite: the drive does not repeat itself, or does not vary."""
+    return inf
+
+
+@period.implements(Sinusoidal)
+def _rocking_period(drive):
+    return 1.0 / drive.frequency if drive.frequency > 0.0 and drive.amplitude != 0.0 else inf
+
+
+@hook(optional=True)
 def beginning(drive):
     """First time at which the drive has a Taylor series, s. By default 0; later if the drive is singular at 0."""
     return 0.0
@@ -491,7 +532,7 @@ def velocity_at_beginning(drive, velocity):
     float
         Relative velocity at the time :func:`beginning`, in the units of :func:`turn`.
     """
-    _, before, acceleration = turn(drive, 0.0)
+    before, acceleration = turn(drive, 0.0)[1:3]
     if velocity == 0.0 and abs(acceleration) < inf:
         return 0.0
     return velocity - (turn(drive, beginning(drive))[1] - before)

@@ -85,8 +85,9 @@ def compute_task(config: Config, layout: Layout, positions: NDArray[np.integer])
     scene, axes = config.scene, config.axes
     model = MODELS[scene.structure.model]
     indices = dict(zip(axes.sizes, layout.indices(positions), strict=True))
-    # Kernels do not depend on the numbers of a table.
-    compiled = config.solver, *(replace(structure, table=None, curve=None) for structure in scene.structures.values())
+    # Kernels depend on the paths that have a value, but not on the numbers of a table.
+    structures = (replace(one, table=None, force=None, curve=None) for one in scene.structures.values())
+    compiled = config.solver, frozenset((*scene.values, *axes.columns)), *structures
     compiles = compiled not in _compiled
     start = perf_counter()
     columns: dict[str, NDArray[Any]] = {}

@@ -23,7 +23,7 @@ from ringsweep.numerics.functions import any_of, select
 from ringsweep.numerics.lanes import WIDTH
 from ringsweep.numerics.memory import align_stack, conform, read, read_lanes, side_by_side, size_of, write
 from ringsweep.physics import drives
-from ringsweep.physics.drives import lookup, shape, turn, without_shape
+from ringsweep.physics.drives import lookup, shape_numbers, table_row, turn, without_shape
 from ringsweep.physics.friction import TRAITS, Dynamic, family_of, presliding
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.variables import SEPARATING
@@ -43,6 +43,9 @@ _MOST_ARC_SHARE = 0.5
 
 # Number of steps that a run takes before the next run continues. The table of the drive for these steps fits the cache.
 _BLOCK = 512
+
+# Largest number of columns of the table of a drive.
+_MOST_COLUMNS = 3
 
 # Number of steps after which an inspection takes nothing over from the one before.
 _CARRIED = 64
@@ -133,12 +136,7 @@ class RK4(Method):
 
 def _groups_by_drive(batch: Any, cells: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
     """Groups of `cells` with the same span and the same drive but for its amplitude."""
-    shape = [
-        leaf
-        for name, leaf in zip(batch.drive._fields, batch.drive, strict=True)
-        if name != "amplitude" and leaf.ndim == 1
-    ]
-    keys = np.stack([batch.span, *shape], axis=1)[cells]
+    keys = np.stack([batch.span, *shape_numbers(batch.drive)], axis=1)[cells]
     _, group = np.unique(keys, axis=0, return_inverse=True)
     order = np.argsort(group, kind="stable")
     yield from np.split(cells[order], np.flatnonzero(np.diff(group[order])) + 1)
@@ -197,7 +195,9 @@ class _Run(NamedTuple):
 def _fill(table, drive, first, steps, h):
     """Fill `table` with the shape of the drive and its rate, at whole and half steps from step `first` on."""
     for k in range(2 * steps + 1):
-        table[k, 0], table[k, 1], _ = shape(drive, (first + 0.5 * k) * h)
+        row = table_row(drive, (first + 0.5 * k) * h)
+        for column in range(len(row)):
+            table[k, column] = row[column]
 
 
 @kernel
@@ -210,11 +210,10 @@ def _tabulate(table, drive, first, steps, h):
 def _step(scene, y, now, table, k, h):
     """State one step after `y`, whose inspection is `now`; row `k` of `table` is the drive at the beginning."""
     k1 = now.rates
-    theta, ring_omega = lookup(scene.drive, table, k + 1)
-    k2 = constant_step.rates(scene, now, add_scaled(y, 0.5 * h, k1), theta, ring_omega)
-    k3 = constant_step.rates(scene, now, add_scaled(y, 0.5 * h, k2), theta, ring_omega)
-    theta, ring_omega = lookup(scene.drive, table, k + 2)
-    k4 = constant_step.rates(scene, now, add_scaled(y, h, k3), theta, ring_omega)
+    forcing = lookup(scene.drive, table, k + 1)
+    k2 = constant_step.rates(scene, now, add_scaled(y, 0.5 * h, k1), forcing)
+    k3 = constant_step.rates(scene, now, add_scaled(y, 0.5 * h, k2), forcing)
+    k4 = constant_step.rates(scene, now, add_scaled(y, h, k3), lookup(scene.drive, table, k + 2))
     total = add_scaled(add_scaled(add_scaled(k1, 2.0, k2), 2.0, k3), 1.0, k4)
     return add_scaled(y, h / 6.0, total)
 
@@ -243,9 +242,9 @@ def _advance(diagnosed, batch, memory, at, occupants, sample, table, first, k, s
     y, now, record, diagnosis, live = read_lanes(memory, runs_at, sample)
     while k < steps:
         y_next = _step(scene, y, now, table, 2 * k, h)
-        theta, ring_omega = lookup(scene.drive, table, 2 * k + 2)
+        forcing = lookup(scene.drive, table, 2 * k + 2)
         afresh = (first + k + 1) % _CARRIED == 0
-        after = conform(constant_step.inspect_next(scene, now, y_next, theta, ring_omega, afresh), now)
+        after = conform(constant_step.inspect_next(scene, now, y_next, forcing, afresh), now)
         ended = live > select(constant_step.holds(scene, after), 1.0, 0.0)
         if any_of(ended):
             live = select(ended, ENDING, live)
@@ -270,8 +269,7 @@ def _finish_ended(diagnosed, batch, memory, at, occupants, sample, table, first,
         live = run.live
         if live == ENDING:
             y_next = _step(scene, run.y, run.now, table, 2 * k, h)
-            theta, ring_omega = lookup(scene.drive, table, 2 * k + 2)
-            after = constant_step.inspect(scene, y_next, theta, ring_omega)
+            after = constant_step.inspect(scene, y_next, lookup(scene.drive, table, 2 * k + 2))
             status, fraction = constant_step.verdict(scene, run.now, after)
             # Vector lanes and floats differ in the last bit, so that with floats the run may not end in this step.
             live = CHECKED
@@ -368,7 +366,7 @@ def integrate(
         the guard that ended the run fell, and the largest share of an arc.
     """
     h = float(batch.batch.span[cells[0]]) / steps
-    table = np.empty((2 * min(_BLOCK, steps) + 1, 2))
+    table = np.empty((2 * min(_BLOCK, steps) + 1, len(table_row(drive, 0.0))))
     _tabulate(table, drive, 0, 0, h)
     memory, occupants, live = _start(batch, launches, cells, table, rows, report)
     for first in range(0, steps, _BLOCK):
@@ -445,7 +443,7 @@ def _finish_at_end_of_span(batch, launches, memory, occupants, live, steps, h, r
     """Store the outcomes of the runs that reached the end of the span."""
     numbers = memory.shape[1]
     flat_memory = memory.reshape(memory.size)
-    sample = _initial_run(batch, launches, occupants[0], np.zeros((1, 2)))
+    sample = _initial_run(batch, launches, occupants[0], np.zeros((1, _MOST_COLUMNS)))
     for slot in range(live):
         cell = occupants[slot]
         scene = take(batch, cell)
@@ -461,8 +459,7 @@ def _finish_at_end_of_span(batch, launches, memory, occupants, live, steps, h, r
 def _initial_run(batch, launches, cell, table):
     """Run of a cell at t = 0. With any table it also serves as an example of the type."""
     scene, y = take(batch, cell), take(launches, cell)
-    theta, ring_omega = lookup(scene.drive, table, 0)
-    now = constant_step.inspect(scene, y, theta, ring_omega)
+    now = constant_step.inspect(scene, y, lookup(scene.drive, table, 0))
     record = recorder.begin(scene, 0.0, constant_step.seen(scene, y, now))
     return _Run(y, now, record, Diagnosis(0.0, inf, 0.0), LIVE)
 
@@ -472,17 +469,17 @@ def _history(batch, steps, interval, times, rows):
     """Fill `times` and `rows` with every `interval`-th step of cell 0, and its end; return the number of rows."""
     scene = take(batch, 0)
     h = scene.span / steps
-    table = np.empty((3, 2))
+    table = np.empty((3, _MOST_COLUMNS))
     y = constant_step.initial_state(scene)
     _fill(table, scene.drive, 0, 1, h)
-    theta, ring_omega = lookup(scene.drive, table, 0)
-    now = constant_step.inspect(scene, y, theta, ring_omega)
+    forcing = lookup(scene.drive, table, 0)
+    now = constant_step.inspect(scene, y, forcing)
     status, _ = constant_step.verdict(scene, now, now)
     count = 0
     for k in range(steps + 1):
         if k % interval == 0 or k == steps or status != RUNNING:
             times[count] = k * h if k < steps else scene.span
-            row = constant_step.row(scene, y, theta, ring_omega)
+            row = constant_step.row(scene, y, forcing)
             for column in range(len(row)):
                 rows[count, column] = row[column]
             count += 1
@@ -490,14 +487,14 @@ def _history(batch, steps, interval, times, rows):
             break
         _fill(table, scene.drive, k, 1, h)
         y_next = _step(scene, y, now, table, 0, h)
-        theta, ring_omega = lookup(scene.drive, table, 2)
-        after = constant_step.inspect(scene, y_next, theta, ring_omega)
+        forcing = lookup(scene.drive, table, 2)
+        after = constant_step.inspect(scene, y_next, forcing)
         status, fraction = constant_step.verdict(scene, now, after)
         if status != RUNNING:
             # The history ends with the run, within the step.
             times[count] = (k + fraction) * h
-            theta, ring_omega, _ = turn(scene.drive, times[count])
-            row = constant_step.row(scene, _hermite(y, now.rates, y_next, after.rates, h, fraction), theta, ring_omega)
+            y_end = _hermite(y, now.rates, y_next, after.rates, h, fraction)
+            row = constant_step.row(scene, y_end, turn(scene.drive, times[count]))
             for column in range(len(row)):
                 rows[count, column] = row[column]
             return count + 1

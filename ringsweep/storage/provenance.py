@@ -59,6 +59,8 @@ def identity(config: Config) -> dict[str, str]:
             found[f"scene.friction.laws.{law}"] = str(own.own_law.__doc__)
     if structure.table is not None:
         found["scene.drive"] = f"a table of {len(structure.table[0])} samples ({_digest(*structure.table)})"
+    if structure.force is not None:
+        found["scene.force"] = f"a table of {len(structure.force[0])} samples ({_digest(*structure.force)})"
     found |= {f"scene.{path}": repr(float(value)) for path, value in scene.values.items() if path not in axes.columns}
     found["sweep"] = ", ".join(f"{name} {size}" for name, size in axes.sizes.items()) or "a single run"
     for path, (dims, column) in axes.columns.items():

@@ -5,9 +5,21 @@ from __future__ import annotations
 from math import inf
 
 from ringsweep.models.belt.bristles import contact_force
-from ringsweep.models.belt.force import friction_force, holds_in_band, length_scale
+from ringsweep.models.belt.force import (
+    damping,
+    friction_force,
+    holds_in_band,
+    length_scale,
+    pull,
+    speed_scale,
+    stuck_pull,
+    with_cubic_energy,
+    with_loads,
+    with_sizes,
+)
 from ringsweep.models.interface import audit, implicit
 from ringsweep.physics.belt import Belt, BristleBelt
+from ringsweep.physics.forces import force_in
 from ringsweep.physics.friction.velocity import stiction_band
 
 # Rounding of an acceleration, as a share of its largest terms.
@@ -17,45 +29,56 @@ _ROUNDING = 1e-12
 @audit.violation.implements(Belt)
 def _violation(scene, mode, forcing, y, rates, s, tolerance):
     x, v = y
-    _, belt_velocity, belt_acceleration = forcing
+    belt_velocity, belt_acceleration, push = forcing[1], forcing[2], force_in(scene.drive, forcing)
+    velocity, cube = v + belt_velocity, x * x * x
     stiffness_per_mass, load = scene.stiffness / scene.mass, scene.mass * scene.gravity
-    length = abs(x) + length_scale(scene, abs(v + belt_velocity) + abs(belt_velocity))
-    speed = length * (stiffness_per_mass**0.5 if stiffness_per_mass > 0.0 else 1.0)
+    length = abs(x) + length_scale(scene, abs(velocity) + abs(belt_velocity))
+    speed = speed_scale(scene, length)
     # In a dead band the sliding velocity need not have the direction of the force.
     in_dead_band, largest, relaxation = holds_in_band(scene.law) and mode.region < 0, 0.0, 0.0
     if mode.sign == 0:
-        friction = -scene.stiffness * x - scene.mass * belt_acceleration
-        allowed = tolerance * (load + scene.stiffness * length + scene.mass * abs(belt_acceleration)) + 1e-300
+        friction = stuck_pull(scene, x, v, forcing)
+        sizes = load + scene.stiffness * length + scene.mass * abs(belt_acceleration)
+        allowed = tolerance * with_sizes(scene, sizes, 1.0, velocity, length * length * length, push) + 1e-300
         largest = (abs(friction) - scene.mu_s * load) / allowed
     else:
-        friction, slope = friction_force(scene, x, v)
-        relaxation = abs(slope) / scene.mass
+        friction, slope = friction_force(scene, pull(scene, x, velocity, forcing), v)
+        relaxation = abs(damping(scene, slope)) / scene.mass
         if not in_dead_band:
             if mode.region < 0:
                 speed = min(speed, 1e3 * stiction_band(scene.law))
             largest = -mode.sign * v / (tolerance * speed)
+    per_mass = 1.0 / scene.mass
     terms = stiffness_per_mass * abs(x) + abs(friction) / scene.mass + abs(belt_acceleration)
-    imbalance = abs(-stiffness_per_mass * x - friction / scene.mass - belt_acceleration - rates[1])
+    terms = with_sizes(scene, terms, per_mass, velocity, cube, push)
+    balance = -stiffness_per_mass * x - friction / scene.mass - belt_acceleration - rates[1]
+    imbalance = abs(with_loads(scene, balance, per_mass, velocity, cube, push))
     imbalance = imbalance / ((1.0 / s + relaxation) * tolerance * speed + _ROUNDING * terms)
-    return (max(largest, imbalance) if largest + imbalance < inf else inf), -friction * (v + belt_velocity)
+    power = with_loads(scene, -friction * velocity, velocity, velocity, 0.0, push)
+    return (max(largest, imbalance) if largest + imbalance < inf else inf), power
 
 
 @audit.energy.implements(Belt, BristleBelt)
 def _energy(scene, forcing, y):
     x, velocity = y[0], y[1] + forcing[1]
-    return 0.5 * (scene.mass * velocity * velocity + scene.stiffness * x * x)
+    found = 0.5 * (scene.mass * velocity * velocity + scene.stiffness * x * x)
+    return with_cubic_energy(scene, found, x)
 
 
 @audit.violation.implements(BristleBelt)
 def _bristle_violation(scene, mode, forcing, y, rates, s, tolerance):
     x, v, z = y
-    _, belt_velocity, belt_acceleration = forcing
+    belt_velocity, belt_acceleration, push = forcing[1], forcing[2], force_in(scene.drive, forcing)
+    velocity, cube, per_mass = v + belt_velocity, x * x * x, 1.0 / scene.mass
     rate, rate_v, rate_z, friction, by_v, by_z = contact_force(scene, v, z, 1.0 if v >= 0.0 else -1.0, mode.region)
     _, speed, deflection, _ = implicit.error_scales(scene, implicit.IMPLICIT_TOLERANCE * tolerance, y)
     stiffness_per_mass = scene.stiffness / scene.mass
     terms = stiffness_per_mass * abs(x) + abs(friction) / scene.mass + abs(belt_acceleration)
-    allowed = speed / s + (abs(by_v) * speed + abs(by_z) * deflection) / scene.mass + _ROUNDING * terms
-    imbalance = abs(-stiffness_per_mass * x - friction / scene.mass - belt_acceleration - rates[1]) / allowed
+    terms = with_sizes(scene, terms, per_mass, velocity, cube, push)
+    allowed = speed / s + (abs(damping(scene, by_v)) * speed + abs(by_z) * deflection) / scene.mass + _ROUNDING * terms
+    balance = -stiffness_per_mass * x - friction / scene.mass - belt_acceleration - rates[1]
+    imbalance = abs(with_loads(scene, balance, per_mass, velocity, cube, push)) / allowed
     allowed = (1.0 / s + abs(rate_z)) * deflection + abs(rate_v) * speed + _ROUNDING * abs(v)
     imbalance = max(imbalance, abs(rate - rates[2]) / allowed)
-    return (max(-mode.sign * v / speed, imbalance) if imbalance < inf else inf), -friction * (v + belt_velocity)
+    power = with_loads(scene, -friction * velocity, velocity, velocity, 0.0, push)
+    return (max(-mode.sign * v / speed, imbalance) if imbalance < inf else inf), power

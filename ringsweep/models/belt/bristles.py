@@ -10,7 +10,15 @@ from math import sqrt
 from typing import NamedTuple
 
 from ringsweep.compile import absorbed, inlined
-from ringsweep.models.belt.force import acceleration
+from ringsweep.models.belt.force import (
+    acceleration,
+    bend,
+    damping,
+    net_force,
+    steepest_spring,
+    with_load_derivatives,
+    with_loads,
+)
 from ringsweep.models.belt.record import conclude, observe
 from ringsweep.models.interface import constant_step, implicit, modes, recorder
 from ringsweep.models.interface.status import RUNNING
@@ -18,6 +26,7 @@ from ringsweep.models.parts import larger_eigenvalue
 from ringsweep.numerics.functions import any_of, select
 from ringsweep.physics import drives
 from ringsweep.physics.belt import BristleBelt
+from ringsweep.physics.forces import force_in
 from ringsweep.physics.friction.bristles import after_yield, bristle, initial_deflection, region_guard, stick_speed
 from ringsweep.physics.friction.velocity import BAND, KINETIC
 
@@ -103,18 +112,20 @@ def _initial_state_in_space(scene):
 
 
 @constant_step.rates.implements(BristleBelt)
-def _rates(scene, now, y, drive_at, drive_rate):
-    _, (rate, _, _, force, _, _) = _force_in_region(scene, y[1] - drive_rate, y[2])
-    return y[1], acceleration(scene, y[0], force), rate
+def _rates(scene, now, y, forcing):
+    _, (rate, _, _, force, _, _) = _force_in_region(scene, y[1] - forcing[1], y[2])
+    return y[1], acceleration(scene, y[0], y[1], forcing, force), rate
 
 
 @constant_step.inspect.implements(BristleBelt)
-def _inspect(scene, y, drive_at, drive_rate):
-    stuck, (rate, rate_v, rate_z, force, by_v, by_z) = _force_in_region(scene, y[1] - drive_rate, y[2])
+def _inspect(scene, y, forcing):
+    stuck, (rate, rate_v, rate_z, force, by_v, by_z) = _force_in_region(scene, y[1] - forcing[1], y[2])
     per_mass = 1.0 / scene.mass
-    determinant = (scene.stiffness + by_z * rate_v - by_v * rate_z) * per_mass
-    rates = y[1], acceleration(scene, y[0], force), rate
-    return Inspection(rates, force, rate_z - by_v * per_mass, determinant, select(stuck, 1.0, 0.0), y[0] - drive_at)
+    stiffness = steepest_spring(scene.cubic, scene.stiffness, bend(scene.cubic, y[0]), bend(scene.cubic, y[0]))
+    by_v = damping(scene, by_v)
+    determinant = (stiffness + by_z * rate_v - by_v * rate_z) * per_mass
+    rates = y[1], acceleration(scene, y[0], y[1], forcing, force), rate
+    return Inspection(rates, force, rate_z - by_v * per_mass, determinant, select(stuck, 1.0, 0.0), y[0] - forcing[0])
 
 
 @constant_step.eigenvalue.implements(BristleBelt)
@@ -141,9 +152,9 @@ def _conclude(scene, record, status, t, place, velocity):
 
 
 @constant_step.row.implements(BristleBelt)
-def _row(scene, y, drive_at, drive_rate):
-    now = constant_step.inspect(scene, y, drive_at, drive_rate)
-    return y[0], y[1], now.force, y[2], 0.0 if now.stuck > 0.0 else 1.0 if y[1] > drive_rate else -1.0
+def _row(scene, y, forcing):
+    now = constant_step.inspect(scene, y, forcing)
+    return y[0], y[1], now.force, y[2], 0.0 if now.stuck > 0.0 else 1.0 if y[1] > forcing[1] else -1.0
 
 
 # Indices of the guards.
@@ -171,8 +182,10 @@ def _initial_mode(scene, t, y):
     if v == 0.0:
         # The body begins to slide in the direction of the net force; without a net force the belt leaves it behind.
         _, _, _, force, _, _ = contact_force(scene, v, z, 1.0, BAND)
-        net_force = -scene.stiffness * x - force - scene.mass * drives.turn(scene.drive, t)[2]
-        sign = 1 if net_force > 0.0 else -1
+        forcing = drives.turn(scene.drive, t)
+        total = -scene.stiffness * x - force - scene.mass * forcing[2]
+        push = force_in(scene.drive, forcing)
+        sign = 1 if with_loads(scene, total, 1.0, forcing[1], x * x * x, push) > 0.0 else -1
     return RUNNING, Mode(sign, _region(scene, v, z, float(sign)))
 
 
@@ -187,20 +200,22 @@ def _switch(scene, mode, guard, t, y):
 
 @implicit.rates.implements(BristleBelt)
 def _implicit_rates(scene, mode, common, forcing, x):
-    _, belt_velocity, belt_acceleration = forcing
     rate, _, _, force, _, _ = contact_force(scene, x[1], x[2], float(mode.sign), mode.region)
-    return x[1] + belt_velocity, -(scene.stiffness * x[0] + force) / scene.mass - belt_acceleration, rate
+    velocity = x[1] + forcing[1]
+    return velocity, net_force(scene, x[0], velocity, forcing, force) / scene.mass - forcing[2], rate
 
 
 @implicit.linearise.implements(BristleBelt)
 def _linearise(scene, mode, common, t, forcing, x):
-    _, belt_velocity, belt_acceleration = forcing
     rate, rate_v, rate_z, force, by_v, by_z = contact_force(scene, x[1], x[2], float(mode.sign), mode.region)
+    velocity = x[1] + forcing[1]
+    derivatives = -scene.stiffness / scene.mass, -by_v / scene.mass, -drives.jerk(scene.drive, t)
+    by_place, by_velocity, by_time = with_load_derivatives(scene, derivatives, x[0], 0.0, forcing)
     return (
-        (x[1] + belt_velocity, -(scene.stiffness * x[0] + force) / scene.mass - belt_acceleration, rate),
-        (0.0, 1.0, -scene.stiffness / scene.mass, -by_v / scene.mass),
+        (velocity, net_force(scene, x[0], velocity, forcing, force) / scene.mass - forcing[2], rate),
+        (0.0, 1.0, by_place, by_velocity),
         ((-by_z / scene.mass, rate_v, rate_z),),
-        (belt_acceleration, -drives.jerk(scene.drive, t), 0.0),
+        (forcing[2], by_time, 0.0),
     )
 
 
@@ -217,12 +232,11 @@ def _error_scales(scene, tolerance, x):
 
 @implicit.guards_and_motion.implements(BristleBelt)
 def _guards_and_motion(scene, mode, common, forcing, x):
-    shift, belt_velocity, _ = forcing
-    sign = float(mode.sign)
+    sign, velocity = float(mode.sign), x[1] + forcing[1]
     _, _, _, force, _, _ = contact_force(scene, x[1], x[2], sign, mode.region)
     guards = sign * x[1], region_guard(scene.law, scene.mu_s, scene.mu_k, x[1], x[2], sign, mode.region)
-    acceleration = -(scene.stiffness * x[0] + force) / scene.mass
-    return guards, (x[0], x[1] + belt_velocity, acceleration, force, x[0] - shift)
+    acceleration = net_force(scene, x[0], velocity, forcing, force) / scene.mass
+    return guards, (x[0], velocity, acceleration, force, x[0] - forcing[0])
 
 
 @implicit.row.implements(BristleBelt)

@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
-from ringsweep.models.belt.force import friction_force, length_scale
+from ringsweep.models.belt.force import (
+    friction_force,
+    length_scale,
+    net_force,
+    pull,
+    with_load_derivatives,
+    with_loads,
+)
 from ringsweep.models.interface import implicit
 from ringsweep.physics import belt, drives
+from ringsweep.physics.forces import force_in
 from ringsweep.physics.friction.velocity import region_bounds, stiction_band
 
 
@@ -34,42 +42,40 @@ def _error_scales(scene, tolerance, x):
 
 @implicit.rates.implements(belt.Belt)
 def _rates(scene, mode, common, forcing, x):
-    shift, _, belt_acceleration = forcing
-    friction, _ = friction_force(scene, x[0] + shift, x[1])
-    return x[1], -(scene.stiffness * (x[0] + shift) + friction) / scene.mass - belt_acceleration
+    place, velocity = x[0] + forcing[0], x[1] + forcing[1]
+    friction, _ = friction_force(scene, pull(scene, place, velocity, forcing), x[1])
+    return x[1], net_force(scene, place, velocity, forcing, friction) / scene.mass - forcing[2]
 
 
 @implicit.linearise.implements(belt.Belt)
 def _linearise(scene, mode, common, t, forcing, x):
-    shift, belt_velocity, belt_acceleration = forcing
-    friction, slope = friction_force(scene, x[0] + shift, x[1])
+    place, velocity, belt_velocity = x[0] + forcing[0], x[1] + forcing[1], forcing[1]
+    friction, slope = friction_force(scene, pull(scene, place, velocity, forcing), x[1])
     stiffness_per_mass = scene.stiffness / scene.mass
-    acceleration = -stiffness_per_mass * (x[0] + shift) - friction / scene.mass - belt_acceleration
-    return (
-        (x[1], acceleration),
-        (0.0, 1.0, -stiffness_per_mass, -slope / scene.mass),
-        (),
-        (0.0, -stiffness_per_mass * belt_velocity - drives.jerk(scene.drive, t)),
-    )
+    acceleration = -stiffness_per_mass * place - friction / scene.mass
+    cube, push = place * place * place, force_in(scene.drive, forcing)
+    acceleration = with_loads(scene, acceleration, 1.0 / scene.mass, velocity, cube, push) - forcing[2]
+    by_time = -stiffness_per_mass * belt_velocity - drives.jerk(scene.drive, t)
+    derivatives = -stiffness_per_mass, -slope / scene.mass, by_time
+    by_place, by_v, by_time = with_load_derivatives(scene, derivatives, place, belt_velocity, forcing)
+    return (x[1], acceleration), (0.0, 1.0, by_place, by_v), (), (0.0, by_time)
 
 
 @implicit.guards_and_motion.implements(belt.Belt)
 def _guards_and_motion(scene, mode, common, forcing, x):
-    shift, belt_velocity, _ = forcing
-    place = x[0] + shift
-    friction, _ = friction_force(scene, place, x[1])
-    acceleration = -(scene.stiffness * place + friction) / scene.mass
+    place, velocity = x[0] + forcing[0], x[1] + forcing[1]
+    friction, _ = friction_force(scene, pull(scene, place, velocity, forcing), x[1])
+    acceleration = net_force(scene, place, velocity, forcing, friction) / scene.mass
     low, high = region_bounds(scene.law, mode.region)
     speed = mode.sign * x[1]
     # The order is that of the rows of the series: SLOW, FAST.
     guards = speed - low, high - speed
-    return guards, (place, x[1] + belt_velocity, acceleration, friction, x[0])
+    return guards, (place, velocity, acceleration, friction, x[0])
 
 
 @implicit.motion.implements(belt.Belt, belt.BristleBelt)
 def _motion(scene, forcing, x, linear):
-    _, belt_velocity, belt_acceleration = forcing
-    return x[1] + belt_velocity, linear[0][1] + belt_acceleration
+    return x[1] + forcing[1], linear[0][1] + forcing[2]
 
 
 @implicit.seen.implements(belt.Belt, belt.BristleBelt)

@@ -11,9 +11,9 @@ from ringsweep.compile import take
 from ringsweep.errors import InputError
 from ringsweep.models.belt.record import Outcome
 from ringsweep.models.model import Model
-from ringsweep.models.parts import GRAVITY, MASS, SPAN, drive_of, friction_coefficients, law_of
+from ringsweep.models.parts import GRAVITY, MASS, SPAN, drive_of, friction_coefficients, law_of, table_of
 from ringsweep.models.scene import Structure, Values, require
-from ringsweep.physics import belt, drives, friction
+from ringsweep.physics import belt, drives, forces, friction
 from ringsweep.quantities.parameters import Parameter, declared
 
 
@@ -40,17 +40,28 @@ class Belt(Model):
         found = {
             "body.mass": MASS,
             "spring.stiffness": Parameter("N/m", "stiffness of the spring", lower=0.0),
+            "spring.cubic": Parameter("N/m^3", "cubic stiffness of the spring (default: 0)", optional=True),
+            "damper.coefficient": Parameter(
+                "N s/m", "coefficient of the damper to the wall (default: 0)", lower=0.0, optional=True
+            ),
             "belt.velocity": Parameter("m/s", "velocity of the belt", optional=True),
         }
         found |= {f"friction.{name}": p for name, p in friction.coefficients_of(law).items()}
         for name, p in declared(law).items():
             # Laws have stiffness and damping of the bristles per unit of load; a belt scene has them in N/m and N s/m.
-            absolute = {"1/m": "N/m", "s/m": "N s/m"} if name.startswith("sigma") else {}
+            per_load = name.startswith("sigma") and friction.family_of(law) is friction.Dynamic
+            absolute = {"1/m": "N/m", "s/m": "N s/m"} if per_load else {}
             found[f"friction.{name}"] = replace(p, unit=absolute.get(p.unit, p.unit))
         if friction.family_of(law) is not friction.Dynamic:
             found["friction.viscous"] = Parameter("N s/m", "viscous friction", lower=0.0, default=0.0)
         for name, p in declared(drives.DRIVES[structure.drive]).items():
             found[f"drive.{name}"] = _along_a_line(p)
+        found["force.constant"] = forces.CONSTANT
+        if structure.force is None:
+            found |= {"force.amplitude": forces.AMPLITUDE, "force.frequency": forces.FREQUENCY}
+            found["force.phase"] = forces.PHASE
+        else:
+            found["force.amplitude"] = forces.FACTOR
         return found | {
             "initial.x": Parameter("m", "displacement of the body at the start", default=0.0),
             "initial.velocity": Parameter(
@@ -75,10 +86,12 @@ class Belt(Model):
         fields = {
             "mass": mass,
             "stiffness": values["spring.stiffness"],
+            "cubic": belt.Cubic(values["spring.cubic"]) if "spring.cubic" in values else belt.Absent(),
+            "damper": belt.Damper(values["damper.coefficient"]) if "damper.coefficient" in values else belt.Absent(),
             "gravity": gravity,
             "mu_s": mu_s,
             "mu_k": mu_k,
-            "drive": drive,
+            "drive": self._with_force(drive, structure, values),
             "initial_x": values["initial.x"],
             "initial_v": sliding,
             "span": values["time.span"],
@@ -114,6 +127,29 @@ class Belt(Model):
         if friction.TRAITS[structure.law_type].dead_band and structure.drive != "constant":
             raise InputError("scene.drive", f"the dead band of law {structure.law} needs a belt of constant velocity")
         return drive_of(structure, values)
+
+    def _with_force(self, drive: Any, structure: Structure, values: Values) -> Any:
+        """Drive with the force on the body, if the scene has one."""
+        given = [name for name in ("amplitude", "frequency", "phase") if f"force.{name}" in values]
+        zero = np.zeros(len(values["time.span"]))
+        constant = values.get("force.constant", zero)
+        if structure.force is not None:
+            factor = values["force.amplitude"]
+            force: Any = table_of(*structure.force, factor, "force", values)
+            largest = abs(factor) * np.abs(structure.force[1]).max()
+        elif given:
+            for name, example in (("amplitude", "1 N"), ("frequency", "1 Hz")):
+                if name not in given:
+                    problem = f"missing: a force with {given[0]} needs it (for example `{name}: {example}`)"
+                    raise InputError(f"scene.force.{name}", problem)
+            amplitude = values["force.amplitude"]
+            force = drives.Sinusoidal(amplitude, values["force.frequency"], values.get("force.phase", zero))
+            largest = abs(amplitude)
+        elif "force.constant" in values:
+            force, largest = drives.Still(), zero
+        else:
+            return drive
+        return forces.Forced(drive, force, constant, abs(constant) + largest)
 
 
 def _along_a_line(parameter: Parameter) -> Parameter:

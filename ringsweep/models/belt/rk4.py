@@ -5,7 +5,15 @@ from __future__ import annotations
 from math import inf
 from typing import NamedTuple
 
-from ringsweep.models.belt.force import acceleration, friction_force, holds_in_band
+from ringsweep.models.belt.force import (
+    acceleration,
+    bend,
+    damping,
+    friction_force,
+    holds_in_band,
+    pull,
+    steepest_spring,
+)
 from ringsweep.models.interface import constant_step
 from ringsweep.models.parts import exceeds, larger_eigenvalue
 from ringsweep.numerics.functions import any_of, select
@@ -25,9 +33,11 @@ class Inspection(NamedTuple):
     force : float
         Friction force, N.
     slope : float
-        Derivative of the friction force by the sliding velocity, N s/m.
+        Derivative of the forces of friction and damper by the velocity, N s/m.
     place : float
         Displacement relative to the belt, m.
+    bend : tuple of float
+        Displacement in space, m, if the spring has a cubic part; else empty.
     """
 
     rates: tuple[float, float]
@@ -35,6 +45,7 @@ class Inspection(NamedTuple):
     force: float
     slope: float
     place: float
+    bend: tuple[float, ...]
 
 
 @constant_step.initial_state.implements(belt.Belt)
@@ -43,25 +54,27 @@ def _initial_state(scene):
 
 
 @constant_step.rates.implements(belt.Belt)
-def _rates(scene, now, y, drive_at, drive_rate):
-    force, _ = friction_force(scene, y[0], y[1] - drive_rate)
-    return y[1], acceleration(scene, y[0], force)
+def _rates(scene, now, y, forcing):
+    force, _ = friction_force(scene, pull(scene, y[0], y[1], forcing), y[1] - forcing[1])
+    return y[1], acceleration(scene, y[0], y[1], forcing, force)
 
 
 @constant_step.inspect.implements(belt.Belt)
-def _inspect(scene, y, drive_at, drive_rate):
-    v = y[1] - drive_rate
-    force, slope = friction_force(scene, y[0], v)
-    return Inspection((y[1], acceleration(scene, y[0], force)), v, force, slope, y[0] - drive_at)
+def _inspect(scene, y, forcing):
+    v = y[1] - forcing[1]
+    force, slope = friction_force(scene, pull(scene, y[0], y[1], forcing), v)
+    rates = y[1], acceleration(scene, y[0], y[1], forcing, force)
+    return Inspection(rates, v, force, damping(scene, slope), y[0] - forcing[0], bend(scene.cubic, y[0]))
 
 
 @constant_step.eigenvalue.implements(belt.Belt)
 def _eigenvalue(scene, before, now, h, most):
     slope, load = max(abs(before.slope), abs(now.slope)), scene.mass * scene.gravity
     at_rest, at_edge = steepest(scene.law)
-    at_rest, at_edge = load * at_rest + scene.viscous, load * at_edge + scene.viscous
+    viscous = damping(scene, scene.viscous)
+    at_rest, at_edge = load * at_rest + viscous, load * at_edge + viscous
     per_mass = 1.0 / scene.mass
-    swing = scene.stiffness * per_mass
+    swing = steepest_spring(scene.cubic, scene.stiffness, before.bend, now.bend) * per_mass
     if holds_in_band(scene.law) or any_of(exceeds(most, max(at_rest, at_edge) * per_mass, swing)):
         # The stages of the step reach about as far as the acceleration at its beginning takes the body.
         belt_gains = (now.rates[0] - now.v) - (before.rates[0] - before.v)
@@ -89,7 +102,7 @@ def _sticks(scene, before, now):
 
 
 @constant_step.row.implements(belt.Belt)
-def _row(scene, y, drive_at, drive_rate):
-    v = y[1] - drive_rate
+def _row(scene, y, forcing):
+    v = y[1] - forcing[1]
     mode = 0.0 if abs(v) < stiction_band(scene.law) or v == 0.0 else 1.0 if v > 0.0 else -1.0
-    return y[0], y[1], friction_force(scene, y[0], v)[0], 0.0, mode
+    return y[0], y[1], friction_force(scene, pull(scene, y[0], y[1], forcing), v)[0], 0.0, mode

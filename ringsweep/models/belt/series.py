@@ -8,8 +8,18 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ringsweep.compile import inlined
-from ringsweep.models.belt.force import breakaway_force, holds_in_band, length_scale
+from ringsweep.compile import hook, inlined
+from ringsweep.models.belt.force import (
+    breakaway_force,
+    has_loads,
+    holds_in_band,
+    length_scale,
+    speed_scale,
+    stuck_pull,
+    stuck_pull_rate,
+    with_loads,
+    with_sizes,
+)
 from ringsweep.models.interface import modes, series
 from ringsweep.models.interface.status import RUNNING
 from ringsweep.numerics.series import INVERSE, ORDER, crossings, slope, step_size, value, variation
@@ -24,6 +34,7 @@ from ringsweep.numerics.terms import (
     terms,
 )
 from ringsweep.physics import belt, drives
+from ringsweep.physics.forces import expand_force, largest_force
 from ringsweep.physics.friction.velocity import (
     KINETIC,
     begin_series,
@@ -36,7 +47,7 @@ from ringsweep.physics.friction.velocity import (
 )
 
 # Rows of the table of series; the guards are last.
-X, V, VELOCITY, FORCE, SHIFT, SPARE, FACTORS = range(7)
+X, V, VELOCITY, FORCE, SHIFT, SPARE, PUSH, SQUARE, CUBE, FACTORS = range(10)
 SLOW = FACTORS + MOST_GROUPS * FACTOR_ROWS
 FAST = SLOW + 1
 
@@ -74,33 +85,28 @@ def _table_shape(scene):
     return FAST + 1, SLOW
 
 
-@inlined
-def _pull(scene, t, x):
-    """Force that friction must balance to keep the body at rest on the belt, N; positive forwards."""
-    return -scene.stiffness * x - scene.mass * drives.turn(scene.drive, t)[2]
-
-
 @modes.initial_mode.implements(belt.Belt)
 def _initial_mode(scene, t, y):
     x, v = y
     if holds_in_band(scene.law) and abs(v) <= stiction_band(scene.law):
-        return RUNNING, _mode_at_rest(scene, t, x)
+        return RUNNING, _mode_at_rest(scene, t, x, v)
     if v == 0.0:
-        return RUNNING, Mode(1 if _pull(scene, t, x) >= 0.0 else -1, region_at(scene.law, 0.0), SLOW)
+        pull = stuck_pull(scene, x, v, drives.turn(scene.drive, t))
+        return RUNNING, Mode(1 if pull >= 0.0 else -1, region_at(scene.law, 0.0), SLOW)
     return RUNNING, Mode(1 if v > 0.0 else -1, region_at(scene.law, abs(v)), -1)
 
 
 @inlined
-def _mode_at_rest(scene, t, x):
+def _mode_at_rest(scene, t, x, v):
     """Mode of a set-valued law at a sliding velocity of zero or within the dead band."""
-    pull = _pull(scene, t, x)
+    forcing = drives.turn(scene.drive, t)
+    pull = stuck_pull(scene, x, v, forcing)
     bound = breakaway_force(scene)
     if abs(pull) <= bound and bound > 0.0:
         return Mode(0, KINETIC, -1)
     if pull == 0.0:
         # The rate of the pull decides, while the belt carries the body along.
-        _, belt_velocity, _ = drives.turn(scene.drive, t)
-        pull = -scene.stiffness * belt_velocity - scene.mass * drives.jerk(scene.drive, t)
+        pull = stuck_pull_rate(scene, t, x, forcing)
     # Without a dead band the sliding velocity, which is zero here, is a guard.
     entry_guard = SLOW if stiction_band(scene.law) == 0.0 else -1
     return Mode(1 if pull >= 0.0 else -1, region_at(scene.law, 0.0), entry_guard)
@@ -117,19 +123,41 @@ def _switch(scene, mode, guard, t, y):
         return RUNNING, Mode(sign, region + 1, SLOW), (x, sign * high)
     if low > 0.0:
         if holds_in_band(scene.law) and region - 1 < 0:
-            return RUNNING, _mode_at_rest(scene, t, x), (x, sign * low)
+            return RUNNING, _mode_at_rest(scene, t, x, sign * low), (x, sign * low)
         return RUNNING, Mode(sign, region - 1, FAST), (x, sign * low)
     if holds_in_band(scene.law) and region < 0:
         # The pull has fallen to the breakaway force.
         return RUNNING, Mode(0, KINETIC, SLOW if sign > 0 else FAST), y
     if region < 0:
         return RUNNING, Mode(-sign, region, SLOW), (x, 0.0)
-    return RUNNING, _mode_at_rest(scene, t, x), (x, 0.0)
+    return RUNNING, _mode_at_rest(scene, t, x, 0.0), (x, 0.0)
+
+
+@hook(optional=True)
+def cube_term(cubic, c, k):
+    """Coefficient `k` of the third power of the displacement, from those up to `k` of the displacement.
+
+    It is stored, with that of the square; the coefficients before must have been. 0 for a linear spring.
+    """
+    return 0.0
+
+
+@cube_term.implements(belt.Cubic)
+def _cube_term(cubic, c, k):
+    square = cube = 0.0
+    for j in range(k + 1):
+        square += c[X, j] * c[X, k - j]
+    c[SQUARE, k] = square
+    for j in range(k + 1):
+        cube += c[X, j] * c[SQUARE, k - j]
+    c[CUBE, k] = cube
+    return cube
 
 
 @series.expand.implements(belt.Belt)
 def _expand(scene, mode, t, y, tolerance, c):
     drives.expand(scene.drive, t, ORDER + 2, c[SHIFT])
+    expand_force(scene.drive, t, ORDER, c[PUSH])
     load = scene.mass * scene.gravity
     stiffness_per_mass = scene.stiffness / scene.mass
     c[X, 0], c[V, 0] = y
@@ -144,7 +172,9 @@ def _expand(scene, mode, t, y, tolerance, c):
             c[VELOCITY, k] = (k + 1.0) * c[SHIFT, k + 1] + v_k
             if k > 0:
                 c[X, k] = c[SHIFT, k] + (y[1] if k == 1 else 0.0)
-            c[FORCE, k] = -scene.stiffness * c[X, k] - scene.mass * (k + 1.0) * (k + 2.0) * c[SHIFT, k + 2]
+            cube = cube_term(scene.cubic, c, k)
+            pull = -scene.stiffness * c[X, k] - scene.mass * (k + 1.0) * (k + 2.0) * c[SHIFT, k + 2]
+            c[FORCE, k] = with_loads(scene, pull, 1.0, c[VELOCITY, k], cube, c[PUSH, k])
             c[SLOW, k], c[FAST, k] = -c[FORCE, k], c[FORCE, k]
         c[SLOW, 0] = 0.0 if mode.entry_guard == SLOW else c[SLOW, 0] + bound
         c[FAST, 0] = 0.0 if mode.entry_guard == FAST else c[FAST, 0] + bound
@@ -159,10 +189,10 @@ def _expand(scene, mode, t, y, tolerance, c):
         of_law = no_products(scene.law, surfaces)
         first = newest = no_factors(of_law)
         for k in range(1, ORDER + 1):
-            place, velocity = (
-                velocity * INVERSE[k],
-                -(stiffness_per_mass * place + force * (1.0 / scene.mass)) * INVERSE[k],
-            )
+            cube, per_mass = cube_term(scene.cubic, c, k - 1), 1.0 / scene.mass
+            acceleration = -(stiffness_per_mass * place + force * per_mass)
+            acceleration = with_loads(scene, acceleration, per_mass, velocity, cube, c[PUSH, k - 1])
+            place, velocity = velocity * INVERSE[k], acceleration * INVERSE[k]
             v = velocity - (k + 1.0) * c[SHIFT, k + 1]
             x = sign * v
             inner = part_from(inner_products(c, FACTORS, k, first, newest), of_law, ())
@@ -176,22 +206,34 @@ def _expand(scene, mode, t, y, tolerance, c):
         excess = sign * c[V, 0] - low
         if yielding:
             # With a dead band the velocity of the belt is constant.
-            set_terms(c[SLOW], terms(c[X]) * (-sign * scene.stiffness))
+            cube_term(scene.cubic, c, ORDER)
+            pull = terms(c[X]) * (-sign * scene.stiffness)
+            pull = with_loads(scene, pull, sign, terms(c[VELOCITY]), terms(c[CUBE]), terms(c[PUSH]))
+            set_terms(c[SLOW], pull)
             excess = -sign * scene.stiffness * c[X, 0] - breakaway_force(scene)
+            excess = with_loads(scene, excess, sign, c[VELOCITY, 0], c[CUBE, 0], c[PUSH, 0])
         c[SLOW, 0] = 0.0 if mode.entry_guard == SLOW else excess
         c[FAST, 0] = 0.0 if mode.entry_guard == FAST else high - mode.sign * c[V, 0]
         # If friction does not drop at breakaway, the slope is zero there: what is computed is rounding.
         size = stiffness_per_mass * abs(c[X, 0]) + abs(c[FORCE, 0]) / scene.mass
+        size = with_sizes(scene, size, 1.0 / scene.mass, c[VELOCITY, 0], c[CUBE, 0], c[PUSH, 0])
         if mode.entry_guard == SLOW and low == 0.0 and not yielding and abs(c[V, 1]) <= 1e-12 * size:
             c[SLOW, 1] = 0.0
     # The unit of length is the distance that belt, body or load could move within a natural period of the spring.
     length = abs(c[X, 0]) + length_scale(scene, abs(c[VELOCITY, 0]) + abs(c[SHIFT, 1]))
-    speed = length * (stiffness_per_mass**0.5 if stiffness_per_mass > 0.0 else 1.0)
+    speed = speed_scale(scene, length)
     if mode.region < 0 and not holds_in_band(scene.law):
         # An error as large as the stiction band would keep the creep from becoming steady.
         speed = min(speed, 1e3 * stiction_band(scene.law))
     last = max(abs(c[X, ORDER]) / length, abs(c[V, ORDER]) / speed)
     previous = max(abs(c[X, ORDER - 1]) / length, abs(c[V, ORDER - 1]) / speed)
+    if has_loads(scene) and (mode.sign == 0 or (holds_in_band(scene.law) and mode.region < 0)):
+        # The guards are forces, whose series may converge more slowly than that of the motion.
+        scale = breakaway_force(scene) + scene.stiffness * length + 1e-300
+        cube, push = length * length * length, largest_force(scene.drive)
+        scale = with_sizes(scene, scale, 1.0, c[VELOCITY, 0], cube, push)
+        last = max(last, abs(c[SLOW, ORDER]) / scale)
+        previous = max(previous, abs(c[SLOW, ORDER - 1]) / scale)
     h = step_size(last / tolerance, previous / tolerance)
     return h if mode.sign == 0 else shorten_for_decay(sharpness, c[V], h)
 
@@ -228,8 +270,11 @@ def _extremes(scene, record, mode, c, h, work):
         count = crossings(c[VELOCITY], h, work, count)
     if mode.sign != 0:
         # The velocity has an extreme where the net force vanishes.
-        c[SPARE, 0] = scene.stiffness * c[X, 0] + c[FORCE, 0]
-        set_terms(c[SPARE], terms(c[X]) * scene.stiffness + terms(c[FORCE]))
+        cube_term(scene.cubic, c, ORDER)
+        net = scene.stiffness * c[X, 0] + c[FORCE, 0]
+        c[SPARE, 0] = with_loads(scene, net, -1.0, c[VELOCITY, 0], c[CUBE, 0], c[PUSH, 0])
+        net = terms(c[X]) * scene.stiffness + terms(c[FORCE])
+        set_terms(c[SPARE], with_loads(scene, net, -1.0, terms(c[VELOCITY]), terms(c[CUBE]), terms(c[PUSH])))
         count = crossings(c[SPARE], h, work, count)
     return count
 

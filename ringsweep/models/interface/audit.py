@@ -30,13 +30,14 @@ def violation(scene, mode, forcing, y, rates, s, tolerance):
     tuple of float
         ``(violation, power)``. ``violation`` is the largest violation of the friction law, of the balances of momentum
         and of the signs of the reactions. Each is divided by the violation that the tolerance would explain; infinite
-        if a number is not finite. ``power`` is the power of friction on the body, W.
+        if a number is not finite. ``power`` is the power, W, of friction and of all forces on the body that
+        :func:`energy` leaves out.
     """
 
 
 @hook
 def energy(scene, forcing, y):
-    """Mechanical energy of the body and of the spring if there is one.
+    """Mechanical energy of the body, and of the spring if there is one.
 
     Parameters
     ----------

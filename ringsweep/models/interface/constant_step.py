@@ -4,6 +4,10 @@ The state holds place and velocity of the body in space, and the deflection of e
 Units are rad and rad/s, or m and m/s; deflections are in m. An *inspection* is a ``NamedTuple`` with everything that
 the model wants to know of a state. Its field ``rates`` is the time derivative of the state.
 
+A *forcing* is what the equations need to know of a time, as :func:`ringsweep.physics.drives.lookup` or
+:func:`ringsweep.physics.drives.turn` returns it. It begins with angle (rad) or displacement (m) of the drive, and its
+time derivative.
+
 A step advances several runs side by side: it gets vector lanes in place of floats. So the functions that it calls
 (``rates``, ``inspect``, ``inspect_next``, ``holds``, ``eigenvalue``, ``margin``, ``arc_share``, ``seen``, ``sticks``
 and the recorder's ``observe``) are written without ``if``, see :mod:`ringsweep.numerics.functions`, and all numbers of
@@ -34,7 +38,7 @@ def initial_state(scene):
 
 
 @hook(absorb=True)
-def rates(scene, now, y, drive_at, drive_rate):
+def rates(scene, now, y, forcing):
     """Time derivative of a state within a step.
 
     Parameters
@@ -45,8 +49,8 @@ def rates(scene, now, y, drive_at, drive_rate):
         Inspection of the state at the beginning of the step. A body may take from it what changes little in a step.
     y : tuple of float
         State.
-    drive_at, drive_rate : float
-        Angle (rad) or displacement (m) of the drive, and its time derivative.
+    forcing : tuple of float
+        Forcing at the time of the state.
 
     Returns
     -------
@@ -56,7 +60,7 @@ def rates(scene, now, y, drive_at, drive_rate):
 
 
 @hook(absorb=True)
-def inspect(scene, y, drive_at, drive_rate):
+def inspect(scene, y, forcing):
     """Inspection of a state.
 
     Parameters
@@ -65,8 +69,8 @@ def inspect(scene, y, drive_at, drive_rate):
         One cell.
     y : tuple of float
         State.
-    drive_at, drive_rate : float
-        Angle (rad) or displacement (m) of the drive, and its time derivative.
+    forcing : tuple of float
+        Forcing at the time of the state.
 
     Returns
     -------
@@ -76,7 +80,7 @@ def inspect(scene, y, drive_at, drive_rate):
 
 
 @hook(absorb=True, optional=True)
-def inspect_next(scene, before, y, drive_at, drive_rate, afresh):
+def inspect_next(scene, before, y, forcing, afresh):
     """Inspection of the state at the end of a step, by default that of :func:`inspect`.
 
     Parameters
@@ -85,7 +89,7 @@ def inspect_next(scene, before, y, drive_at, drive_rate, afresh):
         One cell.
     before : NamedTuple
         Inspection of the state at the beginning of the step. A body may take from it what changes little in a step.
-    y, drive_at, drive_rate
+    y, forcing
         As for :func:`inspect`.
     afresh : bool
         Whether to compute all from `y`, true every so many steps: otherwise rounding errors would add up.
@@ -95,7 +99,7 @@ def inspect_next(scene, before, y, drive_at, drive_rate, afresh):
     NamedTuple
         Of the type that :func:`inspect` returns.
     """
-    return inspect(scene, y, drive_at, drive_rate)
+    return inspect(scene, y, forcing)
 
 
 @hook(absorb=True, optional=True)
@@ -264,7 +268,7 @@ def sticks(scene, before, now):
 
 
 @hook
-def row(scene, y, drive_at, drive_rate):
+def row(scene, y, forcing):
     """Row of a time history.
 
     Parameters
@@ -273,8 +277,8 @@ def row(scene, y, drive_at, drive_rate):
         One cell.
     y : tuple of float
         State.
-    drive_at, drive_rate : float
-        Angle (rad) or displacement (m) of the drive, and its time derivative.
+    forcing : tuple of float
+        Forcing at the time of the state.
 
     Returns
     -------

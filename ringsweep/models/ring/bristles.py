@@ -133,12 +133,12 @@ def _initial_state_in_space(scene):
 
 
 @absorbed
-def _contacts_at(scene, y, drive_at, drive_rate):
+def _contacts_at(scene, y, forcing):
     """Coefficients under both contacts, sliding velocity and its sign, and bristles, for floats and Lanes."""
     phi, omega, z_1, z_2 = y
-    v = (omega - drive_rate) * scene.body.radius
+    v = (omega - forcing[1]) * scene.body.radius
     sign = select(v >= 0.0, 1.0, -1.0)
-    turns, offset = (phi - drive_at) * PER_TURN, ring.contact_offset(scene.body) * PER_TURN
+    turns, offset = (phi - forcing[0]) * PER_TURN, ring.contact_offset(scene.body) * PER_TURN
     mu_s1, mu_k1 = roughness(scene.surface, turns, -offset)
     mu_s2, mu_k2 = roughness(scene.surface, turns, offset)
     under = mu_s1, mu_k1, mu_s2, mu_k2
@@ -146,30 +146,30 @@ def _contacts_at(scene, y, drive_at, drive_rate):
 
 
 @constant_step.rates.implements(BristleRing)
-def _rates(scene, now, y, drive_at, drive_rate):
-    _, _, _, contacts = _contacts_at(scene, y, drive_at, drive_rate)
+def _rates(scene, now, y, forcing):
+    _, _, _, contacts = _contacts_at(scene, y, forcing)
     sin_phi, cos_phi = sine_cosine_near(y[0], now.phi, now.sin_phi, now.cos_phi)
     epsilon, _, _ = ring.acceleration(scene.body, contacts.K1, contacts.K2, sin_phi, cos_phi, y[1])
     return y[1], epsilon, contacts.rates[0], contacts.rates[1]
 
 
 @constant_step.inspect.implements(BristleRing)
-def _inspect(scene, y, drive_at, drive_rate):
-    return _inspection(scene, y, drive_at, drive_rate, sine_cosine(y[0]))
+def _inspect(scene, y, forcing):
+    return _inspection(scene, y, forcing, sine_cosine(y[0]))
 
 
 @constant_step.inspect_next.implements(BristleRing)
-def _inspect_next(scene, before, y, drive_at, drive_rate, afresh):
+def _inspect_next(scene, before, y, forcing, afresh):
     at = sine_cosine_carried(y[0], before.phi, before.sin_phi, before.cos_phi, afresh)
-    return _inspection(scene, y, drive_at, drive_rate, at)
+    return _inspection(scene, y, forcing, at)
 
 
 @absorbed
-def _inspection(scene, y, drive_at, drive_rate, at):
+def _inspection(scene, y, forcing, at):
     """Inspection of a state, given sine and cosine of the angle."""
     (phi, omega, z_1, z_2), (sin_phi, cos_phi) = y, at
     b = scene.body
-    under, v, sign, now = _contacts_at(scene, y, drive_at, drive_rate)
+    under, v, sign, now = _contacts_at(scene, y, forcing)
     stuck = _region_guard(scene, under, v, z_1, z_2, sign, BAND) > 0.0
     epsilon, D, inertia = ring.acceleration(b, now.K1, now.K2, sin_phi, cos_phi, omega)
     normal_1, normal_2 = ring.reactions(b, now.K1, now.K2, sin_phi, cos_phi, omega, epsilon)
@@ -224,11 +224,11 @@ def _sticks(scene, before, now):
 
 
 @constant_step.row.implements(BristleRing)
-def _row(scene, y, drive_at, drive_rate):
-    now = constant_step.inspect(scene, y, drive_at, drive_rate)
+def _row(scene, y, forcing):
+    now = constant_step.inspect(scene, y, forcing)
     mode = 0.0 if now.stuck > 0.0 else 1.0 if now.v > 0.0 else -1.0
-    zone_1, zone_2 = zones_at(scene, y[0] - drive_at)
-    return y[0], y[1], now.rates[1], now.normal_1, now.normal_2, drive_rate, zone_1, zone_2, mode, y[2], y[3]
+    zone_1, zone_2 = zones_at(scene, y[0] - forcing[0])
+    return y[0], y[1], now.rates[1], now.normal_1, now.normal_2, forcing[1], zone_1, zone_2, mode, y[2], y[3]
 
 
 class Mode(NamedTuple):

@@ -58,29 +58,29 @@ def _initial_state(scene):
 
 
 @constant_step.rates.implements(ring.Ring)
-def _rates(scene, now, y, drive_at, drive_rate):
+def _rates(scene, now, y, forcing):
     phi, omega = y
-    _, K1, K2, _, _ = ring.friction(scene, phi, omega, drive_at, drive_rate)
+    _, K1, K2, _, _ = ring.friction(scene, phi, omega, forcing[0], forcing[1])
     sin_phi, cos_phi = sine_cosine_near(phi, now.phi, now.sin_phi, now.cos_phi)
     return omega, ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)[0]
 
 
 @constant_step.inspect.implements(ring.Ring)
-def _inspect(scene, y, drive_at, drive_rate):
-    return _inspection(scene, y, drive_at, drive_rate, sine_cosine(y[0]))
+def _inspect(scene, y, forcing):
+    return _inspection(scene, y, forcing, sine_cosine(y[0]))
 
 
 @constant_step.inspect_next.implements(ring.Ring)
-def _inspect_next(scene, before, y, drive_at, drive_rate, afresh):
+def _inspect_next(scene, before, y, forcing, afresh):
     at = sine_cosine_carried(y[0], before.phi, before.sin_phi, before.cos_phi, afresh)
-    return _inspection(scene, y, drive_at, drive_rate, at)
+    return _inspection(scene, y, forcing, at)
 
 
 @absorbed
-def _inspection(scene, y, drive_at, drive_rate, at):
+def _inspection(scene, y, forcing, at):
     """Inspection of a state, given sine and cosine of the angle."""
     (phi, omega), (sin_phi, cos_phi) = y, at
-    v, K1, K2, slope_1, slope_2 = ring.friction(scene, phi, omega, drive_at, drive_rate)
+    v, K1, K2, slope_1, slope_2 = ring.friction(scene, phi, omega, forcing[0], forcing[1])
     epsilon, D, inertia = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
     normal_1, normal_2 = ring.reactions(scene.body, K1, K2, sin_phi, cos_phi, omega, epsilon)
     slope = ring.acceleration_slope(scene.body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega)
@@ -176,9 +176,9 @@ def _sticks(scene, before, now):
 
 
 @constant_step.row.implements(ring.Ring)
-def _row(scene, y, drive_at, drive_rate):
-    now = constant_step.inspect(scene, y, drive_at, drive_rate)
+def _row(scene, y, forcing):
+    now = constant_step.inspect(scene, y, forcing)
     band = stiction_band(scene.law)
     mode = 0.0 if abs(now.v) < band or now.v == 0.0 else 1.0 if now.v > 0.0 else -1.0
-    zone_1, zone_2 = zones_at(scene, y[0] - drive_at)
-    return y[0], y[1], now.rates[1], now.normal_1, now.normal_2, drive_rate, zone_1, zone_2, mode
+    zone_1, zone_2 = zones_at(scene, y[0] - forcing[0])
+    return y[0], y[1], now.rates[1], now.normal_1, now.normal_2, forcing[1], zone_1, zone_2, mode

@@ -1,0 +1,196 @@
+"""A force on the body beside the motion of the belt.
+
+The force has the laws of the drives: :math:`P(t) = P_0 + A\\, s(t)`, with a shape s of :mod:`ringsweep.physics.drives`
+and an amplitude A in N.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Any, NamedTuple
+
+from ringsweep.compile import hook
+from ringsweep.physics import drives
+from ringsweep.quantities.parameters import Leaf, Parameter
+
+CONSTANT = Parameter("N", "constant force on the body (default: 0)", optional=True)
+AMPLITUDE = Parameter("N", "amplitude of the harmonic force on the body", optional=True)
+FREQUENCY = Parameter("Hz", "frequency of the harmonic force", lower=0.0, optional=True)
+PHASE = Parameter("rad", "phase of the harmonic force at t = 0 (default: 0, a sine)", optional=True)
+FACTOR = Parameter("1", "factor on the force of the table", default=1.0)
+
+
+class Forced(NamedTuple):
+    """Drive with a force on the body.
+
+    In place of the three numbers of a drive, :func:`ringsweep.physics.drives.turn` returns five: two more are the rate
+    of the force, N/s, and the force, N. :func:`ringsweep.physics.drives.lookup` returns the force as a third number.
+
+    Attributes
+    ----------
+    motion : NamedTuple
+        Drive that moves the belt.
+    force : NamedTuple
+        Drive whose "angle" is the part of the force that varies, N.
+    constant : float
+        The constant part, N.
+    largest : float
+        Bound on the magnitude of the force, N.
+    """
+
+    motion: Any
+    force: Any
+    constant: Leaf
+    largest: Leaf
+
+
+@hook(absorb=True, optional=True)
+def force_in(drive, forcing):
+    """Force on the body, N.
+
+    Parameters
+    ----------
+    drive : NamedTuple
+    forcing : tuple of float
+        What :func:`ringsweep.physics.drives.turn` or :func:`ringsweep.physics.drives.lookup` returned.
+
+    Returns
+    -------
+    float
+        0 for a drive without a force.
+    """
+    return 0.0
+
+
+@force_in.implements(Forced)
+def _force_in(drive, forcing):
+    return forcing[-1]
+
+
+@hook(optional=True)
+def force_rate(drive, forcing):
+    """Time derivative of the force, N/s; 0 without a force.
+
+    Parameters
+    ----------
+    drive : NamedTuple
+    forcing : tuple of float
+        What :func:`ringsweep.physics.drives.turn` returned.
+    """
+    return 0.0
+
+
+@force_rate.implements(Forced)
+def _force_rate(drive, forcing):
+    return forcing[3]
+
+
+@hook(optional=True)
+def largest_force(drive):
+    """Bound on the magnitude of the force, N; 0 without a force."""
+    return 0.0
+
+
+@largest_force.implements(Forced)
+def _largest_force(drive):
+    return drive.largest
+
+
+@hook(optional=True)
+def expand_force(drive, t, order, force):
+    """Taylor series of the force about time `t`; without a force nothing is filled.
+
+    Parameters
+    ----------
+    drive, t
+        As for :func:`ringsweep.physics.drives.expand`.
+    order : int
+        Highest power.
+    force : ndarray of shape ``(order + 1,)``
+        Filled with the coefficients, N/s^k.
+    """
+
+
+@expand_force.implements(Forced)
+def _expand_force(drive, t, order, force):
+    drives.expand(drive.force, t, order, force)
+    force[0] += drive.constant
+
+
+# ---- the functions of a drive -----------------------------------------------------------------
+
+
+@drives.turn.implements(Forced)
+def _turn(drive, t):
+    theta, omega, epsilon = drives.turn(drive.motion, t)
+    force, rate, _ = drives.turn(drive.force, t)
+    return theta, omega, epsilon, rate, force + drive.constant
+
+
+@drives.turn_near.implements(Forced)
+def _turn_near(drive, course, t):
+    # The course is that of the motion.
+    theta, omega, epsilon = drives.turn_near(drive.motion, course, t)
+    force, rate, _ = drives.turn(drive.force, t)
+    return theta, omega, epsilon, rate, force + drive.constant
+
+
+@drives.table_row.implements(Forced)
+def _table_row(drive, t):
+    s, rate = drives.table_row(drive.motion, t)
+    return s, rate, drives.shape(drive.force, t)[0]
+
+
+@drives.lookup.implements(Forced)
+def _lookup(drive, table, k):
+    theta, omega = drives.lookup(drive.motion, table, k)
+    return theta, omega, _varying(drive.force, table, k) + drive.constant
+
+
+@hook(absorb=True, optional=True)
+def _varying(force, table, k):
+    """Part of the force that varies, N, from the third column of a table of shapes."""
+    return force.amplitude * table[k, 2]
+
+
+@_varying.implements(drives.Still)
+def _not_varying(force, table, k):
+    return 0.0
+
+
+@drives.expand.implements(Forced)
+def _expand(drive, t, order, theta):
+    drives.expand(drive.motion, t, order, theta)
+
+
+@drives.jerk.implements(Forced)
+def _jerk(drive, t):
+    return drives.jerk(drive.motion, t)
+
+
+@drives.next_knot.implements(Forced)
+def _next_knot(drive, t):
+    return min(drives.next_knot(drive.motion, t), drives.next_knot(drive.force, t))
+
+
+@drives.beginning.implements(Forced)
+def _beginning(drive):
+    return drives.beginning(drive.motion)
+
+
+@drives.period.implements(Forced)
+def _period(drive):
+    motion, force = drives.period(drive.motion), drives.period(drive.force)
+    shorter, longer = min(motion, force), max(motion, force)
+    if longer == inf:
+        return shorter
+    # The least common multiple, if it is a few periods.
+    for n in range(1, _MOST_PERIODS + 1):
+        ratio = n * longer / shorter
+        if abs(ratio - round(ratio)) <= 1e-9 * ratio:
+            return n * longer
+    return inf
+
+
+# Largest number of periods, of the slower of two oscillations, that make a common period.
+_MOST_PERIODS = 20

@@ -1,0 +1,473 @@
+"""A damper, a cubic spring and forces on the belt, against closed forms, published numbers and other integrators."""
+
+import json
+from math import asin, cos, pi, sin, sqrt
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq
+from scipy.special import ellipj, ellipk
+
+import ringsweep
+from ringsweep.compile import take
+from ringsweep.config import load
+from ringsweep.errors import InputError
+from ringsweep.models import batch
+from ringsweep.models.belt.series import Mode
+from ringsweep.models.interface import audit, series
+from ringsweep.numerics.series import COLUMNS
+from ringsweep.physics import belt, drives
+from ringsweep.physics.forces import Forced
+from ringsweep.physics.friction import SetValued
+from ringsweep.physics.friction.velocity import KINETIC
+from ringsweep.solvers.audit import Audit, audit_step
+
+G = 9.81
+SMALL_STEPS = {"method": "rk4", "steps": 20_000}
+EXACT = {"method": "event", "rtol": 1e-13, "certify": False}
+
+
+def forced(law="stiction", *, friction=0.0, load=0.0, v_b=0.0, span=10.0, force=None, **parts):
+    """Scene with mass, stiffness and weight in units of 1; `friction` is F_s = F_k, `load` is added to F_s.
+
+    A part that is not given has the coefficient 0, so that all scenes of a law have one kernel.
+    """
+    of_law = {"bengisu-akay": {"v0": 1e-6, "alpha": 10.0}, "karnopp": {"dead_band": 0.05}}.get(law, {})
+    return {
+        "model": "belt",
+        "body": {"mass": 1.0},
+        "spring": {"stiffness": parts.get("k", 1.0), "cubic": parts.get("cubic", 0.0)},
+        "damper": {"coefficient": parts.get("c", 0.0)},
+        "force": {"amplitude": 0.0, "frequency": 0.0, "phase": 0.0, "constant": 0.0} | (force or {}),
+        "belt": {"velocity": v_b},
+        "friction": {"law": law, "mu_s": friction + load, "mu_k": friction, **of_law},
+        "gravity": 1.0,
+        "initial": {"x": parts.get("x", 0.0), "velocity": parts.get("v", v_b)},
+        "time": {"span": span},
+    }
+
+
+def end(scene, solver="auto"):
+    """Displacement and velocity at the end of a certified run."""
+    run = ringsweep.simulate(scene, solver=solver, samples=50)
+    assert run.certified == 1 or "certify" in solver
+    return float(run.x_end), float(run.velocity_end)
+
+
+def outcome(scene, solver="auto"):
+    """Outcomes of a run."""
+    return ringsweep.sweep(scene, {"time.span": [scene["time"]["span"]]}, solver=solver, progress=False).isel(
+        time_span=0
+    )
+
+
+class TestClosedForms:
+    """Without friction each part has a known motion."""
+
+    @pytest.mark.parametrize("c", [0.1, 1.9, 5.0])
+    def test_free_damped_vibration_decays_as_the_roots_of_its_polynomial_say(self, c):
+        run = ringsweep.simulate(forced(c=c, x=0.7, v=-0.4, span=12.0), samples=100)
+        roots = np.roots([1.0, c, 1.0])
+        weights = np.linalg.solve([[1.0, 1.0], roots], [0.7, -0.4])
+        t, x, velocity = run.time.values, run.x.values, run.velocity.values
+        modes = weights[:, None] * np.exp(np.outer(roots, t))
+        np.testing.assert_allclose(x, modes.sum(axis=0).real, atol=1e-10)
+        np.testing.assert_allclose(velocity, (roots[:, None] * modes).sum(axis=0).real, atol=1e-10)
+        assert run.certified == 1
+
+    @pytest.mark.parametrize(("frequency", "c"), [(0.05, 0.3), (0.4, 0.0), (3.0, 0.1)])
+    def test_forced_vibration_is_the_transient_and_the_response_to_the_force(self, frequency, c):
+        force = {"amplitude": 2.5, "frequency": frequency, "phase": "40 deg", "constant": -0.6}
+        run = ringsweep.simulate(forced(c=c, x=0.3, v=0.2, span=30.0, force=force), samples=200)
+        rate = 2.0 * pi * frequency
+        gain = 2.5 * np.exp(1j * np.radians(40.0)) / (1.0 - rate**2 + 1j * c * rate)
+        roots = np.roots([1.0, c, 1.0])
+        weights = np.linalg.solve([[1, 1], roots], [0.9 - gain.imag, 0.2 - (1j * rate * gain).imag])
+        t, x = run.time.values, run.x.values
+        expected = (
+            (gain * np.exp(1j * rate * t)).imag - 0.6 + (weights[:, None] * np.exp(np.outer(roots, t))).sum(0).real
+        )
+        np.testing.assert_allclose(x, expected, atol=2e-9 * abs(expected).max())
+        assert run.certified == 1
+
+    @pytest.mark.parametrize(("k", "cubic", "amplitude"), [(1.0, 0.5, 2.0), (0.0, 1.0, 0.4), (1.0, -0.2, 1.9)])
+    def test_cubic_spring_swings_as_an_elliptic_function_and_keeps_its_energy(self, k, cubic, amplitude):
+        """The Duffing oscillator, hardening, without a linear part, and softening."""
+        rate = sqrt(k + cubic * amplitude**2 if cubic > 0.0 else k + 0.5 * cubic * amplitude**2)
+        modulus = 0.5 * abs(cubic) * amplitude**2 / rate**2
+        quarter = ellipk(modulus) / rate
+        run = ringsweep.simulate(forced(k=k, cubic=cubic, x=amplitude, span=13.0 * quarter), samples=100)
+        t, x, velocity = run.time.values, run.x.values, run.velocity.values
+        cosine, sine = ellipj(rate * t, modulus)[1], ellipj(rate * (t + quarter), modulus)[0]
+        np.testing.assert_allclose(x, amplitude * (cosine if cubic > 0.0 else sine), atol=2e-9 * amplitude)
+        energy = 0.5 * velocity**2 + 0.5 * k * x**2 + 0.25 * cubic * x**4
+        np.testing.assert_allclose(energy, energy[0], rtol=1e-9)
+        # On a belt at rest the body turns at an event, here after three periods.
+        assert abs(t - 12.0 * quarter).min() == pytest.approx(0.0, abs=1e-8 * quarter)
+        assert run.certified == 1
+
+    def test_softening_spring_without_an_equilibrium_fails_and_does_not_stop_the_sweep(self):
+        found = ringsweep.sweep(forced(cubic=-1.0, span=50.0), {"initial.x": [0.5, 2.0]}, progress=False)
+        assert ringsweep.words(found.regime).values[1] == "failed"
+        assert found.certified.values.tolist() == [1, 0]
+
+
+class TestStick:
+    """A stuck body breaks away when the sum of the other forces reaches the breakaway force."""
+
+    def test_harmonic_force_breaks_the_body_loose_at_the_arcsine(self):
+        run = ringsweep.simulate(forced(friction=1.0, load=0.5, force={"amplitude": 2.0, "frequency": 0.1}))
+        slips = np.flatnonzero(run["mode"].values)[0]
+        assert float(run.time[slips]) == pytest.approx(asin(1.5 / 2.0) / (0.2 * pi), rel=1e-12)
+        assert (run.x.values[:slips] == 0.0).all()
+        # While it sticks, friction balances the force.
+        np.testing.assert_allclose(run.friction_force[:slips], 2.0 * np.sin(0.2 * pi * run.time[:slips]), atol=1e-12)
+
+    def test_body_on_a_moving_belt_breaks_loose_where_spring_and_damper_pull_with_all_friction(self):
+        run = ringsweep.simulate(forced(friction=1.0, load=0.5, v_b=0.3, c=0.8, cubic=2.0, force={"constant": 0.25}))
+        slips = np.flatnonzero(run["mode"].values)[0]
+        place = brentq(lambda x: x + 2.0 * x**3 + 0.8 * 0.3 - 0.25 - 1.5, 0.0, 2.0, xtol=1e-15)
+        assert float(run.time[slips]) == pytest.approx(place / 0.3, rel=1e-12)
+
+    def test_cubic_spring_on_a_rocking_belt_breaks_loose_where_its_force_does(self):
+        """The third power oscillates three times as fast as the belt, and the series of the guard with it."""
+        scene = forced(friction=0.5, k=0.0, cubic=8.0)
+        del scene["belt"], scene["initial"]
+        scene["drive"] = {"law": "sinusoidal", "amplitude": 0.5, "frequency": 0.05}
+        run = ringsweep.simulate(scene)
+        rate = 0.1 * pi
+
+        def pull(t):
+            return -8.0 * (0.5 * sin(rate * t)) ** 3 + 0.5 * rate**2 * sin(rate * t) + 0.5
+
+        slips = np.flatnonzero(run["mode"].values)[0]
+        assert float(run.time[slips]) == pytest.approx(brentq(pull, 0.0, 5.0, xtol=1e-14), rel=1e-11)
+
+    def test_body_in_a_dead_band_is_held_while_friction_can_balance_the_force(self):
+        """Karnopp's law: the body leaves the dead band when the excess of the force has made it fast enough."""
+        rate = 0.2 * pi
+        run = ringsweep.simulate(
+            forced("karnopp", friction=1.0, load=0.5, k=0.0, force={"amplitude": 2.0, "frequency": 0.1})
+        )
+        loose = asin(1.5 / 2.0) / rate
+
+        def speed(t):
+            return 2.0 / rate * (cos(rate * loose) - cos(rate * t)) - 1.5 * (t - loose)
+
+        slips = np.flatnonzero(run["mode"].values)[0]
+        assert float(run.time[slips]) == pytest.approx(
+            brentq(lambda t: speed(t) - 0.05, loose + 1e-3, loose + 2.0, xtol=1e-14), rel=1e-11
+        )
+        assert float(run.velocity[slips]) == pytest.approx(0.05, rel=1e-10)
+
+
+class TestPublished:
+    """Numbers that others published."""
+
+    @pytest.mark.parametrize(("r", "beta"), [(0.6, 0.2), (0.8, 0.5), (1.25, 0.5), (1.5, 0.4), (2.0, 0.3), (3.0, 0.3)])
+    def test_forced_coulomb_oscillator_has_the_steady_amplitude_of_den_hartog(self, r, beta):
+        """J. P. Den Hartog, Trans. ASME 53 (1931): motions without stops."""
+        V, U = 1.0 / (1.0 - r**2), sin(pi / r) / (r * (1.0 + cos(pi / r)))
+        period = 2.0 * pi / r
+        force = {"amplitude": 1.0, "frequency": 1.0 / period}
+        run = ringsweep.simulate(forced(friction=beta, span=100.0 * period, force=force), solver="event", samples=10)
+        x = run.x.values[run.time.values > 97.0 * period]
+        for turn in (x.max(), -x.min()):
+            assert turn == pytest.approx(sqrt(V**2 - beta**2 * U**2), abs=1e-9)
+        assert run.certified == 1
+
+    def test_friction_oscillator_of_siconos_comes_to_rest_at_the_known_place_and_time(self):
+        run = ringsweep.simulate(forced(friction=1.0, x=12.0, v=6.0, span=30.0), solver="event")
+        rests = np.flatnonzero(run["mode"].values == 0)[0]
+        assert float(run.time[rests]) == pytest.approx(22.42355635, abs=1e-9)
+        assert float(run.x_end) == pytest.approx(0.6821789367, abs=1e-9)
+
+    @pytest.mark.parametrize(("t", "x", "velocity"), [(3.0, -2.1740, -0.3669), (12.4, -0.2028, 0.0331)])
+    def test_free_oscillation_with_dry_friction_is_where_it_was_published(self, t, x, velocity):
+        """y'' = -y - 0.4 sgn y' from (3, 0)."""
+        found = end(forced(friction=0.4, x=3.0, span=t))
+        np.testing.assert_allclose(found, (x, velocity), atol=1e-4)
+
+
+def reference(scene, span):
+    """State at the end under stiction, by SciPy; events are located by SciPy too."""
+    k, cubic, c = scene["spring"]["stiffness"], scene["spring"]["cubic"], scene["damper"]["coefficient"]
+    given, v_b = scene["force"], scene["belt"]["velocity"]
+    static, kinetic = scene["friction"]["mu_s"], scene["friction"]["mu_k"]
+
+    def pull(t, x, v):
+        if "time" in given:
+            push = given["amplitude"] * CubicSpline(given["time"], given["force"])(t)
+        else:
+            push = given["amplitude"] * sin(2.0 * pi * given["frequency"] * t + given["phase"])
+        return push + given["constant"] - k * x - cubic * x**3 - c * (v + v_b)
+
+    def holds(t, y):
+        return static - abs(pull(t, y[0], 0.0))
+
+    t, y = 0.0, (scene["initial"]["x"], scene["initial"]["velocity"] - v_b)
+    while t < span:
+        sticks = y[1] == 0.0 and holds(t, y) > 1e-9
+        sign = 0.0 if sticks else np.sign(y[1] or pull(t, y[0], 0.0))
+
+        def rates(t, y, sign=sign):
+            return y[1] + v_b, (pull(t, *y) - sign * kinetic) if sign else 0.0
+
+        def event(t, y, sign=sign):
+            return sign * y[1] if sign else holds(t, y)
+
+        event.terminal, event.direction = True, -1
+        found = solve_ivp(rates, (t, span), y, "DOP853", rtol=1e-12, atol=1e-13, events=event, max_step=0.05)
+        t, y = found.t[-1], (found.y[0, -1], 0.0 if found.status == 1 else found.y[1, -1])
+    return y[0], y[1] + v_b
+
+
+def everything(rng, law="stiction", *, table=False):
+    """Random scene with all parts together."""
+    constant = rng.uniform(-0.5, 0.5)
+    if table:
+        times = np.linspace(0.0, 6.0, 13).tolist()
+        force = {"time": times, "force": rng.normal(size=13).tolist(), "amplitude": 2.0, "constant": constant}
+    else:
+        frequency, phase = rng.uniform(0.1, 1.0), rng.uniform(0.0, 6.0)
+        force = {"amplitude": rng.uniform(1.0, 4.0), "frequency": frequency, "phase": phase, "constant": constant}
+    scene = forced(
+        law,
+        friction=rng.uniform(0.1, 0.5),
+        load=rng.uniform(0.0, 0.3),
+        v_b=rng.choice([-0.3, 0.0, 0.2]),
+        span=6.0,
+        **{"k": rng.uniform(0.5, 4.0), "cubic": rng.uniform(0.5, 8.0), "c": rng.uniform(0.02, 0.5)},
+        **{"x": rng.uniform(-0.5, 0.5), "v": rng.uniform(-0.5, 0.5)},
+    )
+    return scene | {"force": force}
+
+
+class TestMethods:
+    """All parts together, by all methods and by SciPy."""
+
+    @pytest.mark.parametrize("table", [False, True], ids=["harmonic", "table"])
+    def test_event_agrees_with_an_independent_integration(self, table):
+        rng = np.random.default_rng(17)
+        for _ in range(4):
+            scene = everything(rng, table=table)
+            np.testing.assert_allclose(end(scene), reference(scene, 6.0), atol=1e-9)
+
+    def test_event_and_implicit_and_rk4_agree_without_friction(self):
+        scene = forced(c=0.2, cubic=3.0, x=0.5, force={"amplitude": 1.5, "frequency": 0.3, "constant": 0.2})
+        exact = end(scene, EXACT)
+        smooth = scene | {"friction": forced("bengisu-akay")["friction"]}
+        np.testing.assert_allclose(end(scene), exact, atol=1e-9)
+        np.testing.assert_allclose(end(smooth, {"method": "implicit", "rtol": 1e-6}), exact, atol=1e-8)
+        errors = [
+            abs(float(outcome(scene, {"method": "rk4", "steps": steps}).x_end) - exact[0]) for steps in (200, 400, 800)
+        ]
+        np.testing.assert_allclose(np.diff(np.log2(errors)), -4.0, atol=0.3)
+
+    def test_rk4_takes_the_force_of_a_table(self):
+        scene = everything(np.random.default_rng(2), table=True)
+        scene["friction"] |= {"mu_s": 0.0, "mu_k": 0.0}
+        solver = {"method": "rk4", "steps": 6000, "certify": False}
+        np.testing.assert_allclose(end(scene, solver), end(scene, EXACT), atol=1e-9)
+
+    def test_cells_with_different_forces_are_the_same_alone_and_side_by_side(self):
+        """`rk4` groups cells by the shape of the force."""
+        scene, solver = everything(np.random.default_rng(3)), {"method": "rk4", "steps": 500, "certify": False}
+        axes = {"force.frequency": [0.2, 0.5], "force.amplitude": [1.0, 2.0], "force.constant": [0.0, 0.4]}
+        together = ringsweep.sweep(scene, axes, solver=solver, progress=False)
+        for point in ({"force_frequency": i, "force_amplitude": i, "force_constant": 1 - i} for i in (0, 1)):
+            cell = together.isel(point)
+            force = scene["force"] | {
+                name: float(cell[f"force_{name}"]) for name in ("frequency", "amplitude", "constant")
+            }
+            alone = outcome(scene | {"force": force}, solver)
+            assert float(cell.x_end) == pytest.approx(float(alone.x_end), abs=1e-12)
+
+    def test_smooth_law_tends_to_its_limit_with_all_parts(self):
+        """Bengisu-Akay friction creeps, in implicit steps, where tustin sticks."""
+        scene = forced(
+            "bengisu-akay",
+            friction=0.5,
+            load=0.3,
+            v_b=0.2,
+            c=0.2,
+            cubic=2.0,
+            force={"amplitude": 0.6, "frequency": 0.2},
+        )
+        tail = {name: scene["friction"][name] for name in ("mu_s", "mu_k", "alpha")}
+        limit = outcome(scene | {"friction": {"law": "tustin"} | tail})
+        assert 2.0 < float(limit.stick_time) < 9.0
+        bands, errors = np.array([1e-4, 1e-5, 1e-6]), []
+        for v0 in bands:
+            found = outcome(scene | {"friction": scene["friction"] | {"v0": v0}})
+            assert found.certified == 1
+            errors.append(abs(float(found.x_end - limit.x_end)))
+        assert np.polyfit(np.log(bands), np.log(errors), 1)[0] == pytest.approx(1.0, abs=0.2)
+
+    def test_bristles_agree_between_implicit_and_rk4_with_all_parts(self):
+        scene = everything(np.random.default_rng(7), "lugre")
+        scene["friction"] |= {"sigma0": 300.0, "sigma1": 10.0, "sigma2": 0.1, "v_s": 0.05, "mu_s": 0.4, "mu_k": 0.3}
+        tight = end(scene, {"method": "implicit", "rtol": 1e-9})
+        np.testing.assert_allclose(end(scene), tight, atol=1e-5)
+        np.testing.assert_allclose(end(scene, SMALL_STEPS), tight, atol=1e-6)
+
+    @pytest.mark.parametrize(("part", "expected"), [({"c": 50.0}, 50.0), ({"cubic": 600.0, "x": 1.0}, sqrt(1801.0))])
+    def test_rk4_counts_damper_and_cubic_spring_in_the_stiffness(self, part, expected):
+        """Eigenvalues are about c/m, and sqrt((k + 3 cubic x^2)/m). The belt is faster than the body."""
+        found = outcome(forced(v_b=100.0, **part, v=0.0), {"method": "rk4", "steps": 1000})
+        assert float(found.stiffness) == pytest.approx(expected * 0.01, rel=0.01)
+
+
+class TestAudit:
+    """The audit knows the forces from the scene, not from the solver."""
+
+    def cell(self, **changes):
+        scene = forced(friction=0.4, v_b=0.1, c=0.5, cubic=2.0, force={"amplitude": 1.5, "frequency": 0.3}, **changes)
+        found = load({"scene": scene}).scene
+        cells = batch(found.structure, {path: np.array([value]) for path, value in found.values.items()})
+        return take(cells, 0)
+
+    def violation(self, scene, t, error=0.0):
+        """Violation of a state in slip whose acceleration belongs to a force that is wrong by `error`."""
+        forcing = drives.turn(scene.drive, t)
+        x, v = 0.3, 0.7
+        push = 1.5 * sin(0.6 * pi * t) + error
+        rate = -x - 2.0 * x**3 - 0.5 * (v + 0.1) + push - 0.4
+        found, power = audit.violation(scene, Mode(1, KINETIC, -1), forcing, (x, v), (v + 0.1, rate), 0.1, 1e-10)
+        assert power == pytest.approx((v + 0.1) * (push - error - 0.4 - 0.5 * (v + 0.1)), rel=1e-12)
+        return found
+
+    def test_wrong_force_is_a_violation(self):
+        scene = self.cell()
+        for t in (0.0, 0.7, 3.1):
+            assert self.violation(scene, t) < 1e-3
+            assert self.violation(scene, t, 1e-3) > 1e3
+
+    def test_energy_has_the_cubic_spring(self):
+        scene = self.cell()
+        forcing = drives.turn(scene.drive, 0.0)
+        assert audit.energy(scene, forcing, (0.3, 0.7)) == pytest.approx(0.5 * 0.8**2 + 0.5 * 0.09 + 0.5 * 0.3**4)
+
+    def test_work_of_a_wrong_force_does_not_explain_the_energy(self):
+        """A series about a wrong time has a wrong force."""
+        scene, mode, y = self.cell(), Mode(1, KINETIC, -1), (0.3, 0.7)
+        audits = []
+        for late in (0.0, 0.01):
+            c = np.zeros((series.table_shape(scene)[0], COLUMNS))
+            with np.errstate(divide="ignore"):
+                h = 0.5 * series.expand(scene, mode, 0.2 + late, y, 1e-10, c)
+            empty, after = Audit(0.0, 0.0, 0.0), series.state_at(scene, c, h)
+            found = audit_step(SetValued(), scene, mode, False, c, 0.2, h, y, after, c, c, 1e-10, empty)
+            audits.append((found.violation, abs(found.unexplained) / found.turnover))
+        (violation, share), (wrong_violation, wrong_share) = audits
+        assert violation < 1.0
+        assert wrong_violation > 1e4
+        assert 10.0 * share < wrong_share
+
+
+class TestParts:
+    """A scene has the parts that it names, or that a sweep gives."""
+
+    def plain(self, **sections):
+        scene = forced(friction=0.4, load=0.1)
+        del scene["force"], scene["damper"], scene["spring"]["cubic"]
+        return scene | sections
+
+    def cells(self, scene, swept=()):
+        found = load({"scene": scene} | ({"sweep": {"grid": {path: [0.5] for path in swept}}} if swept else {}))
+        values = found.scene.values | dict.fromkeys(swept, 0.5)
+        return batch(found.scene.structure, {path: np.array([value]) for path, value in values.items()})
+
+    def test_scene_without_the_parts_has_no_place_for_their_numbers(self):
+        cells = self.cells(self.plain())
+        assert cells.cubic == cells.damper == belt.Absent()
+        assert type(cells.drive) is drives.Constant
+
+    @pytest.mark.parametrize(
+        ("swept", "part"),
+        [("damper.coefficient", "damper"), ("spring.cubic", "cubic"), ("force.constant", "drive")],
+    )
+    def test_swept_part_is_present_and_the_others_are_not(self, swept, part):
+        cells = self.cells(self.plain(), (swept,))
+        present = {
+            "damper": cells.damper != belt.Absent(),
+            "cubic": cells.cubic != belt.Absent(),
+            "drive": isinstance(cells.drive, Forced),
+        }
+        assert [name for name, found in present.items() if found] == [part]
+
+    def test_parts_without_effect_change_nothing(self):
+        plain, zero = self.plain(), forced(friction=0.4, load=0.1)
+        for scene in (plain, zero):
+            scene |= {"belt": {"velocity": 0.3}, "initial": {"x": 0.2, "velocity": 1.0}}
+        np.testing.assert_allclose(end(plain), end(zero), rtol=0.0, atol=1e-12)
+
+    def test_period_of_the_forcing_is_the_common_one_of_belt_and_force(self):
+        def period(belt, force):
+            motion = drives.Sinusoidal(0.1, belt, 0.0) if belt else drives.Constant(0.1)
+            return drives.period(Forced(motion, drives.Sinusoidal(1.0, force, 0.0), 0.0, 1.0))
+
+        assert drives.period(drives.Constant(0.1)) == np.inf
+        assert period(None, 0.5) == 2.0
+        assert period(0.5, 0.5) == 2.0
+        assert period(0.25, 1.5) == pytest.approx(4.0)
+        assert period(0.2, 0.3) == pytest.approx(10.0)
+        assert period(1.0, sqrt(2.0)) == np.inf
+        assert period(0.4, 0.0) == 2.5
+
+    @pytest.mark.parametrize(
+        ("force", "message"),
+        [
+            ({"amplitude": 1.0}, r"force\.frequency: missing: a force with amplitude needs it"),
+            ({"phase": 1.0, "frequency": 1.0}, r"force\.amplitude: missing"),
+            ({"amplitude": "1 m", "frequency": 1.0}, r"force\.amplitude.*wrong unit.*is in N"),
+            ({"amplitude": 1.0, "frequency": -1.0}, r"force\.frequency.*at least 0"),
+            ({"law": "harmonic"}, r"force\.law: unknown key"),
+            (3.0, r"force: a section is expected"),
+            ({"time": [0.0, 1.0, 2.0, 20.0]}, r"force\.force: missing"),
+            (
+                {"time": [0.0, 1.0, 2.0, 3.0], "force": [1.0] * 4},
+                r"time\.span: 10 s is longer than the table of the force",
+            ),
+            ({"time": [0.0, 1.0, 2.0, 20.0], "force": [1.0] * 3}, r"force\.force: 3 forces for 4 times"),
+            (
+                {"time": [0.0, 1.0, 2.0, 20.0], "force": [1.0] * 4, "frequency": 1.0},
+                r"force\.frequency: cannot stand beside",
+            ),
+            ({"file": "no.csv"}, r"force\.file.*no\.csv"),
+        ],
+    )
+    def test_force_that_makes_no_sense_is_refused_by_its_path(self, force, message):
+        with pytest.raises(InputError, match=message):
+            ringsweep.simulate(self.plain(force=force))
+
+    def test_ring_has_no_such_parts(self, scene):
+        for section in ("force", "damper"):
+            with pytest.raises(InputError, match=f"scene.{section}: unknown key"):
+                ringsweep.simulate(scene | {section: {"constant": 1.0}})
+
+    def test_force_from_a_file_is_stored_with_the_run_and_repeats_it(self, tmp_path):
+        times = np.linspace(0.0, 12.0, 25)
+        samples = np.sin(times)
+        rows = "\n".join(f"{t!r},{f!r}" for t, f in zip(times.tolist(), samples.tolist(), strict=True))
+        (tmp_path / "force.csv").write_text(f"t,force (kN)\n{rows}\n")
+        scene = self.plain(force={"file": str(tmp_path / "force.csv"), "amplitude": 1e-3}, damper={"coefficient": 0.1})
+        scene["spring"]["cubic"] = 0.0
+        listed = scene | {"force": {"time": times.tolist(), "force": samples.tolist()}}
+        first = ringsweep.run({"scene": scene}, tmp_path / "first.nc", progress=False)
+        (tmp_path / "force.csv").unlink()
+        again = ringsweep.run(tmp_path / "first.nc", tmp_path / "again.nc", progress=False)
+        assert float(first.x_end) == float(again.x_end)
+        assert float(first.x_end) == pytest.approx(float(ringsweep.simulate(listed).x_end), abs=1e-12)
+        assert "force" in json.loads(first.attrs["configuration"])["scene"]["force"]
+
+    def test_swept_force_is_a_coordinate_with_its_unit(self):
+        scene = forced(friction=0.4, force={"frequency": 0.2})
+        del scene["force"]["amplitude"]
+        axes = {"force.amplitude": ["1 N", "0.002 kN"], "force.phase": ["0 deg", "90 deg"]}
+        found = ringsweep.sweep(scene, axes, progress=False)
+        assert found.force_amplitude.values.tolist() == [1.0, 2.0]
+        assert found.force_amplitude.attrs["units"] == "N"
+        assert found.force_phase.attrs["units"] == "rad"
