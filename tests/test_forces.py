@@ -17,7 +17,7 @@ from ringsweep.errors import InputError
 from ringsweep.models import batch
 from ringsweep.models.belt.series import Mode
 from ringsweep.models.interface import audit, series
-from ringsweep.numerics.series import COLUMNS
+from ringsweep.numerics.terms import COLUMNS
 from ringsweep.physics import belt, drives
 from ringsweep.physics.forces import Forced
 from ringsweep.physics.friction import SetValued
