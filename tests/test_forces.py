@@ -262,7 +262,8 @@ class TestMethods:
         np.testing.assert_allclose(end(scene), exact, atol=1e-9)
         np.testing.assert_allclose(end(smooth, {"method": "implicit", "rtol": 1e-6}), exact, atol=1e-8)
         errors = [
-            abs(float(outcome(scene, {"method": "rk4", "steps": steps}).x_end) - exact[0]) for steps in (200, 400, 800)
+            abs(float(outcome(scene, {"method": "rk4", "steps": steps}).x_end) - exact[0])
+            for steps in (800, 1600, 3200)
         ]
         np.testing.assert_allclose(np.diff(np.log2(errors)), -4.0, atol=0.3)
 
