@@ -140,6 +140,13 @@ class TestStick:
         # While it sticks, friction balances the force.
         np.testing.assert_allclose(run.friction_force[:slips], 2.0 * np.sin(0.2 * pi * run.time[:slips]), atol=1e-12)
 
+    def test_stuck_body_waits_for_a_force_that_first_falls(self):
+        """More than half a period passes, which no single series spans."""
+        force = {"amplitude": 1.0, "frequency": 2.0, "phase": pi, "constant": 1.0}
+        run = ringsweep.simulate(forced(friction=1.0, load=0.5, force=force))
+        slips = np.flatnonzero(run["mode"].values)[0]
+        assert float(run.time[slips]) == pytest.approx(7.0 / 24.0, rel=1e-11)
+
     def test_body_on_a_moving_belt_breaks_loose_where_spring_and_damper_pull_with_all_friction(self):
         run = ringsweep.simulate(forced(friction=1.0, load=0.5, v_b=0.3, c=0.8, cubic=2.0, force={"constant": 0.25}))
         slips = np.flatnonzero(run["mode"].values)[0]
