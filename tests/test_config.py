@@ -9,6 +9,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import pint
 import pytest
 import xarray as xr
 from hypothesis import HealthCheck, given, settings
@@ -145,6 +146,70 @@ def test_source_of_a_configuration_is_json_and_reads_the_same(write):
 )
 def test_units_are_converted(text, unit, expected):
     assert quantity(text, Parameter(unit, "something"), "path") == pytest.approx(expected)
+
+
+class TestPint:
+    """A quantity of pint is converted as its text would be, whatever its registry and the registry's format."""
+
+    REGISTRIES = pint.UnitRegistry(), pint.UnitRegistry()
+    # Old versions of pint have no formatter.
+    getattr(REGISTRIES[1], "formatter", REGISTRIES[1]).default_format = "~P"
+
+    @pytest.mark.parametrize("registry", REGISTRIES, ids=["plain", "abbreviated"])
+    @pytest.mark.parametrize(
+        ("text", "unit", "expected"),
+        [
+            ("20 rpm", "rad/s", 20 * 2 * math.pi / 60),
+            ("90 deg", "rad", math.pi / 2),
+            ("5 kHz", "Hz", 5000.0),
+            ("3 N/mm**3", "N/m^3", 3e9),
+            ("0.5 kg*cm**2", "kg m^2", 5e-5),
+            ("30 percent", "1", 0.3),
+            ("36 km/hour", "m/s", 10.0),
+            ("2 force_pound", "N", 8.896443230521),
+            ("1 chain", "m", 20.1168402),
+        ],
+    )
+    def test_quantity_is_converted_to_the_unit_of_the_parameter(self, registry, text, unit, expected):
+        assert quantity(registry(text), Parameter(unit, "something"), "path") == pytest.approx(expected, rel=1e-8)
+
+    @pytest.mark.parametrize(
+        ("text", "unit"),
+        [("5 Hz", "rad/s"), ("30 rpm", "Hz"), ("3 m", "kg"), ("0.3 dimensionless", "rad"), ("1 N**0.5", "N")],
+    )
+    def test_quantity_of_another_dimension_is_refused(self, text, unit):
+        """Pint itself takes the first two for the same dimension."""
+        problem = refusal(quantity, self.REGISTRIES[0](text), Parameter(unit, "something"), "path").problem
+        assert "wrong unit" in problem or "not a known unit" in problem
+
+    def test_quantities_make_axes_like_texts(self, write):
+        u = self.REGISTRIES[0]
+        scene = read_scene(load(write(TEXT)).source["scene"])
+        expected = read_axes(scene, {"drive.amplitude": ["20 rpm", "40 rpm"]}).columns["drive.amplitude"][1]
+        speeds = [20, 40] * u("rpm")
+        for axis in (speeds, list(speeds), (20 * u.rpm, "40 rpm")):
+            found = read_axes(scene, {"drive.amplitude": axis}).columns["drive.amplitude"]
+            np.testing.assert_array_equal(found[1], expected)
+        for array in (
+            xr.DataArray(speeds, dims="case"),
+            xr.DataArray(np.array(list(speeds), dtype=object), dims="case"),
+        ):
+            dims, values = read_axes(scene, {"drive.amplitude": array}).columns["drive.amplitude"]
+            assert dims == ("case",)
+            np.testing.assert_array_equal(values, expected)
+        refusal(read_axes, scene, {"drive.amplitude": [20, 40] * u.Hz})
+        refusal(read_axes, scene, {"drive.amplitude": 20 * u.rpm})
+
+    def test_quantities_in_a_scene_are_stored_as_text(self, write):
+        u = self.REGISTRIES[1]
+        source = load(write(TEXT)).source
+        source["scene"]["zone"]["half_angle"] = 15 * u.deg
+        source["sweep"] = {"grid": {"drive.amplitude": [20, 40] * u("rpm")}}
+        found = load(source)
+        assert found.scene.values["zone.half_angle"] == math.radians(15)
+        assert found.axes.columns["drive.amplitude"][1].tolist() == pytest.approx([2.0943951, 4.1887902])
+        again = load(json.loads(json.dumps(found.source)))
+        assert again.scene.values == found.scene.values
 
 
 @pytest.mark.parametrize(

@@ -15,13 +15,14 @@ from ringsweep.compile import take
 from ringsweep.config import load
 from ringsweep.errors import InputError
 from ringsweep.models import batch
+from ringsweep.models.belt.bristles import Mode as BristleMode
 from ringsweep.models.belt.series import Mode
-from ringsweep.models.interface import audit, series
+from ringsweep.models.interface import audit, implicit, series
 from ringsweep.numerics.terms import COLUMNS
 from ringsweep.physics import belt, drives
 from ringsweep.physics.forces import Forced
 from ringsweep.physics.friction import SetValued
-from ringsweep.physics.friction.velocity import KINETIC
+from ringsweep.physics.friction.velocity import BAND, KINETIC
 from ringsweep.solvers.audit import Audit, audit_step
 
 G = 9.81
@@ -47,6 +48,12 @@ def forced(law="stiction", *, friction=0.0, load=0.0, v_b=0.0, span=10.0, force=
         "initial": {"x": parts.get("x", 0.0), "velocity": parts.get("v", v_b)},
         "time": {"span": span},
     }
+
+
+def cell_of(scene):
+    """The only cell of a scene."""
+    found = load({"scene": scene}).scene
+    return take(batch(found.structure, {path: np.array([value]) for path, value in found.values.items()}), 0)
 
 
 def end(scene, solver="auto"):
@@ -108,6 +115,14 @@ class TestClosedForms:
         assert abs(t - 12.0 * quarter).min() == pytest.approx(0.0, abs=1e-8 * quarter)
         assert run.certified == 1
 
+    @pytest.mark.parametrize("side", [1.0, -1.0])
+    def test_body_at_rest_without_friction_follows_the_force_that_begins_to_act(self, side):
+        """Force and sliding velocity are zero at first: the rate of the force decides where the body goes."""
+        rate = 0.2 * pi
+        scene = forced(span=6.0, force={"amplitude": side, "frequency": 0.1})
+        expected = side / (1.0 - rate**2) * (sin(rate * 6.0) - rate * sin(6.0))
+        assert end(scene)[0] == pytest.approx(expected, rel=1e-9)
+
     def test_softening_spring_without_an_equilibrium_fails_and_does_not_stop_the_sweep(self):
         found = ringsweep.sweep(forced(cubic=-1.0, span=50.0), {"initial.x": [0.5, 2.0]}, progress=False)
         assert ringsweep.words(found.regime).values[1] == "failed"
@@ -124,6 +139,13 @@ class TestStick:
         assert (run.x.values[:slips] == 0.0).all()
         # While it sticks, friction balances the force.
         np.testing.assert_allclose(run.friction_force[:slips], 2.0 * np.sin(0.2 * pi * run.time[:slips]), atol=1e-12)
+
+    def test_stuck_body_waits_for_a_force_that_first_falls(self):
+        """More than half a period passes, which no single series spans."""
+        force = {"amplitude": 1.0, "frequency": 2.0, "phase": pi, "constant": 1.0}
+        run = ringsweep.simulate(forced(friction=1.0, load=0.5, force=force))
+        slips = np.flatnonzero(run["mode"].values)[0]
+        assert float(run.time[slips]) == pytest.approx(7.0 / 24.0, rel=1e-11)
 
     def test_body_on_a_moving_belt_breaks_loose_where_spring_and_damper_pull_with_all_friction(self):
         run = ringsweep.simulate(forced(friction=1.0, load=0.5, v_b=0.3, c=0.8, cubic=2.0, force={"constant": 0.25}))
@@ -262,7 +284,8 @@ class TestMethods:
         np.testing.assert_allclose(end(scene), exact, atol=1e-9)
         np.testing.assert_allclose(end(smooth, {"method": "implicit", "rtol": 1e-6}), exact, atol=1e-8)
         errors = [
-            abs(float(outcome(scene, {"method": "rk4", "steps": steps}).x_end) - exact[0]) for steps in (200, 400, 800)
+            abs(float(outcome(scene, {"method": "rk4", "steps": steps}).x_end) - exact[0])
+            for steps in (800, 1600, 3200)
         ]
         np.testing.assert_allclose(np.diff(np.log2(errors)), -4.0, atol=0.3)
 
@@ -320,14 +343,44 @@ class TestMethods:
         assert float(found.stiffness) == pytest.approx(expected * 0.01, rel=0.01)
 
 
+class TestLinearisation:
+    """Implicit steps need the derivatives of the rates by state and time."""
+
+    @pytest.mark.parametrize("law", ["bengisu-akay", "lugre"])
+    def test_derivatives_equal_differences_of_the_rates(self, law):
+        scene = forced(law, friction=0.3, load=0.2, cubic=2.0, c=0.7, force={"amplitude": 1.5, "frequency": 0.3})
+        del scene["belt"]
+        scene["drive"] = {"law": "sinusoidal", "amplitude": 0.4, "frequency": 0.2}
+        of_law = {"v0": 0.1} if law == "bengisu-akay" else {"sigma0": 30.0, "sigma1": 2.0, "sigma2": 0.1, "v_s": 0.1}
+        scene["friction"] |= of_law
+        cell = cell_of(scene)
+        mode = Mode(1, BAND, -1) if law == "bengisu-akay" else BristleMode(1, KINETIC)
+        t, x = 0.6, (0.4, 0.05, 0.003)[: 2 if law == "bengisu-akay" else 3]
+
+        def rates(t, x):
+            return np.array(implicit.rates(cell, mode, (), drives.turn(cell.drive, t), tuple(x)))
+
+        def difference(k):
+            step = 1e-6 * np.eye(len(x))[k]
+            return (rates(t, x + step) - rates(t, x - step)) / 2e-6
+
+        linear = implicit.linearise(cell, mode, (), t, drives.turn(cell.drive, t), x)
+        found, (by_place_0, by_v_0, by_place_1, by_v_1), bristles, by_time = linear
+        np.testing.assert_allclose(found, rates(t, x), rtol=1e-12)
+        np.testing.assert_allclose(difference(0)[:2], (by_place_0, by_place_1), rtol=1e-6, atol=1e-8)
+        np.testing.assert_allclose(difference(1)[:2], (by_v_0, by_v_1), rtol=1e-6, atol=1e-8)
+        for by_z, *of_rate in bristles:
+            np.testing.assert_allclose((difference(1)[2], difference(2)[2]), of_rate, rtol=1e-6)
+            assert difference(2)[1] == pytest.approx(by_z, rel=1e-6)
+        np.testing.assert_allclose((rates(t + 1e-6, x) - rates(t - 1e-6, x)) / 2e-6, by_time, rtol=1e-6, atol=1e-8)
+
+
 class TestAudit:
     """The audit knows the forces from the scene, not from the solver."""
 
     def cell(self, **changes):
         scene = forced(friction=0.4, v_b=0.1, c=0.5, cubic=2.0, force={"amplitude": 1.5, "frequency": 0.3}, **changes)
-        found = load({"scene": scene}).scene
-        cells = batch(found.structure, {path: np.array([value]) for path, value in found.values.items()})
-        return take(cells, 0)
+        return cell_of(scene)
 
     def violation(self, scene, t, error=0.0):
         """Violation of a state in slip whose acceleration belongs to a force that is wrong by `error`."""

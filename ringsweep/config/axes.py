@@ -16,7 +16,7 @@ from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
 from ringsweep.models.scene import Scene
 from ringsweep.quantities.parameters import Choice, Parameter
-from ringsweep.quantities.units import quantity, show
+from ringsweep.quantities.units import is_quantity, quantity, show
 from ringsweep.quantities.variables import OUTCOMES
 
 if TYPE_CHECKING:
@@ -106,13 +106,14 @@ def dimension(path: str) -> str:
 def read_data_array(
     given: xr.DataArray, parameter: Parameter | Choice, where: str
 ) -> tuple[tuple[str, ...], NDArray[Any]]:
-    """Dimensions and values of a DataArray, converted from its ``units``."""
+    """Dimensions and values of a DataArray, converted from its ``units``, or from those of pint's quantities in it."""
     dims = tuple(map(str, given.dims))
     if not dims:
         raise InputError(where, "a DataArray without dimensions varies nothing")
     unit = str(given.attrs.get("units", "1"))
-    flat: Any = given.values.ravel()
-    if unit != "1" and given.dtype.kind in "iuf":
+    # The values of quantities would be stripped of their units.
+    flat: Any = given.data.ravel() if is_quantity(given.data) else given.values.ravel()
+    if unit != "1" and given.dtype.kind in "iuf" and not is_quantity(flat):
         flat = [f"{value!r} {unit}" for value in flat.tolist()]
     return dims, read_values(flat, parameter, where).reshape(given.shape)
 

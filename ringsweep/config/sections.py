@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.quantities.parameters import Choice, Parameter
-from ringsweep.quantities.units import quantity, show
+from ringsweep.quantities.units import quantity, show, spelled
 
 
 def suggestion(word: object, known: Iterable[str]) -> str:
@@ -38,6 +38,7 @@ def read_values(given: Any, parameter: Parameter | Choice, where: str) -> NDArra
     InputError
         If `given` is no such sequence, or one of its values is wrong.
     """
+    given = spelled(given)
     if hasattr(given, "__array__"):
         array = np.asarray(given)
         if array.ndim != 1 or array.dtype.kind not in "iufOU":

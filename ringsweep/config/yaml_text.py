@@ -20,7 +20,7 @@ import numpy as np
 import yaml
 
 from ringsweep.errors import InputError
-from ringsweep.quantities.units import NUMBER, show
+from ringsweep.quantities.units import NUMBER, show, spelled
 
 #: Largest number of values in a configuration after its aliases are expanded.
 MAX_VALUES = 100_000
@@ -253,9 +253,10 @@ def _join(path: str, key: object) -> str:
 
 
 def _plain_copy(value: Any, path: str, depth: int) -> Any:
-    """A copy made of dicts, lists, numbers, booleans, None and strings only."""
+    """A copy made of dicts, lists, numbers, booleans, None and strings only; quantities of pint become strings."""
     if depth > _MAX_DEPTH:
         raise InputError(path, "nested too deeply")
+    value = spelled(value)
     if isinstance(value, Mapping):
         for key in value:
             if not isinstance(key, str):

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-_FACTOR = re.compile(r"([\s*/·]*)([A-Za-zµμ°%]+)(?:\^|\*\*)?(-?[0-9]*)")
+_FACTOR = re.compile(r"([\s*/·]*)([A-Za-zµμ°%_]+)(?:\^|\*\*)?(-?[0-9]*)")
 
 
 @dataclass(frozen=True)

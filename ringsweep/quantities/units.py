@@ -1,7 +1,8 @@
-"""Numbers of a configuration: a plain number is SI, a string may have a unit."""
+"""Numbers of a configuration: a plain number is SI, a string or a quantity of pint may have a unit."""
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
 import reprlib
@@ -16,7 +17,7 @@ from ringsweep.quantities.quantity import cf_units
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 
 _NOT_FINITE = re.compile(r"[-+]?\.?(nan|inf|infinity)", re.IGNORECASE)
-_WORD = r"[A-Za-zµμ°%]+(?:(?:\^|\*\*)?-?[0-9])?"
+_WORD = r"[A-Za-zµμ°%_]+(?:(?:\^|\*\*)?-?[0-9])?"
 _UNIT = re.compile(rf"(?:1\s*/\s*)?{_WORD}(?:(?:\s*[*/·]\s*|\s+){_WORD})*")
 
 # Longest text, in characters, that can be a number with a unit.
@@ -55,7 +56,7 @@ def quantity(value: Any, parameter: Parameter, path: str) -> float:
     Parameters
     ----------
     value : object
-        A plain number (SI), or a string with a number and possibly a unit.
+        A plain number (SI), a string with a number and possibly a unit, or a quantity of pint.
     parameter : Parameter
         Gives the unit and the allowed values.
     path : str
@@ -67,6 +68,7 @@ def quantity(value: Any, parameter: Parameter, path: str) -> float:
         If `value` is not a finite number, has a wrong unit, lies outside the interval of the parameter, or is not whole
         although the parameter is.
     """
+    value = spelled(value)
     number = _convert(value, parameter, path)
     if parameter.allows(number):
         if parameter.whole and not number.is_integer():
@@ -78,6 +80,44 @@ def quantity(value: Any, parameter: Parameter, path: str) -> float:
         raise InputError(path, f"{number:g} rad is beyond {_in_pi(parameter.upper)}: was `{number:g} deg` meant?")
     shown = f"{number:g}{unit}" if plain else f"{show(value)} ({number:g}{unit})"
     raise InputError(path, f"{shown} is not allowed: {parameter.long_name} must be {parameter.interval}{unit}")
+
+
+def is_quantity(value: Any) -> bool:
+    """Whether a value is a quantity of pint, from whatever registry."""
+    return all(hasattr(value, name) for name in ("magnitude", "units", "to_root_units"))
+
+
+def spelled(value: Any) -> Any:
+    """A quantity of pint as text with its unit, such as ``"20 rpm"``; an array of them as nested lists of texts.
+
+    Any other value is returned as it is. The text keeps the difference between Hz and rad/s, which the registries of
+    pint do not know.
+    """
+    if not is_quantity(value):
+        return value
+    if not _is_known(unit := f"{value.units:C}"):
+        # Units that are not known here, such as pounds-force, have roots that are: gram, meter, second, radian.
+        with contextlib.suppress(Exception):
+            value = value.to_root_units()
+            unit = f"{value.units:C}"
+    magnitude = value.magnitude
+
+    def text(number: Any) -> Any:
+        return [text(part) for part in number] if isinstance(number, list) else f"{number} {unit or 'dimensionless'}"
+
+    return text(magnitude.tolist() if hasattr(magnitude, "tolist") else magnitude)
+
+
+@lru_cache(maxsize=256)
+def _is_known(unit: str) -> bool:
+    """Whether a unit is one that configurations may use."""
+    try:
+        _factor(unit, "1")
+    except ValueError:
+        return True
+    except LookupError:
+        return False
+    return True
 
 
 def show(value: Any) -> str:
@@ -146,7 +186,7 @@ def _factor(unit: str, target: str) -> float:
 
 def _parsed(unit: str) -> Any:
     # Pint wants "^" before a power, which CF leaves out: "rad s-1".
-    powers = re.sub(r"(?<=[A-Za-zµμ°%])(-?[0-9])", r"^\1", unit)
+    powers = re.sub(r"(?<=[A-Za-zµμ°%_])(-?[0-9])", r"^\1", unit)
     return _registry().parse_units("" if powers == "1" else powers)
 
 
