@@ -55,14 +55,14 @@ def _linearise(scene, mode, common, t, forcing, x):
 
 @implicit.guards_and_motion.implements(belt.Belt)
 def _guards_and_motion(scene, mode, common, forcing, x):
-    shift, belt_velocity, _ = forcing
+    shift, belt_velocity, belt_acceleration = forcing
     place = x[0] + shift
     friction, _ = friction_force(scene, place, x[1])
     acceleration = -(scene.stiffness * place + friction) / scene.mass
     speed = mode.sign * x[1]
     # The order is that of the rows of the series: SLOW, FAST.
     guards = speed, stiction_band(scene.law) - speed
-    return guards, (place, x[1] + belt_velocity, acceleration, friction, x[0])
+    return guards, (place, x[1] + belt_velocity, acceleration, friction, x[0], x[1], belt_acceleration)
 
 
 @implicit.motion.implements(belt.Belt, belt.BristleBelt)
@@ -73,8 +73,8 @@ def _motion(scene, forcing, x, linear):
 
 @implicit.seen.implements(belt.Belt, belt.BristleBelt)
 def _seen(scene, view):
-    _, (x, velocity, _, friction, place) = view
-    return x, velocity, friction, place
+    _, (x, velocity, acceleration, friction, place, v, belt_acceleration) = view
+    return x, velocity, friction, place, v, acceleration - belt_acceleration
 
 
 @implicit.near_zero.implements(belt.Belt, belt.BristleBelt)
@@ -84,5 +84,5 @@ def _near_zero(scene, motion):
 
 @implicit.row.implements(belt.Belt)
 def _row(scene, mode, forcing, x):
-    _, (position, velocity, _, friction, _) = implicit.guards_and_motion(scene, mode, (), forcing, x)
+    _, (position, velocity, _, friction, _, _, _) = implicit.guards_and_motion(scene, mode, (), forcing, x)
     return position, velocity, friction, 0.0, 0.0

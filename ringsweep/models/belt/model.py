@@ -81,6 +81,7 @@ class Belt(Model):
             "initial_x": values["initial.x"],
             "initial_v": sliding,
             "span": values["time.span"],
+            "forcing_period": np.broadcast_to(forcing_period(drive), mass.shape).copy(),
         }
         if friction.family_of(law) is not friction.Dynamic:
             viscous, load = values["friction.viscous"], mass * gravity
@@ -113,6 +114,11 @@ class Belt(Model):
         if friction.TRAITS[self.laws[structure.law]].dead_band and structure.drive != "constant":
             raise InputError("scene.drive", f"the dead band of law {structure.law} needs a belt of constant velocity")
         return drive_of(structure, values)
+
+
+def forcing_period(drive: Any) -> Any:
+    """Period of what drives the body, s, for each cell; infinite if nothing does so periodically."""
+    return drives.period(drive)
 
 
 def _along_a_line(parameter: Parameter) -> Parameter:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from ringsweep.compile import inlined
 from ringsweep.models.belt.force import breakaway_force, holds_in_band, length_scale
+from ringsweep.models.belt.record import due_within
 from ringsweep.models.interface import modes, series
 from ringsweep.models.interface.status import RUNNING
 from ringsweep.numerics.series import FACTOR_ROWS, INVERSE, ORDER, crossings, slope, step_size, value, variation
@@ -205,7 +206,7 @@ def _rates_at(scene, c, s):
 
 @series.seen_at_start.implements(belt.Belt)
 def _seen_at_start(scene, c):
-    return c[X, 0], c[VELOCITY, 0], c[FORCE, 0], c[X, 0] - c[SHIFT, 0]
+    return c[X, 0], c[VELOCITY, 0], c[FORCE, 0], c[X, 0] - c[SHIFT, 0], c[V, 0], c[V, 1]
 
 
 @series.seen_at.implements(belt.Belt)
@@ -215,7 +216,7 @@ def _seen_at(scene, c, s, h):
         # A velocity within rounding is zero, so that an extreme of the displacement is recognised.
         velocity = 0.0
     x = value(c[X], s)
-    return x, velocity, value(c[FORCE], s), x - value(c[SHIFT], s)
+    return x, velocity, value(c[FORCE], s), x - value(c[SHIFT], s), value(c[V], s), slope(c[V], s)
 
 
 @series.extremes.implements(belt.Belt)
@@ -228,6 +229,10 @@ def _extremes(scene, record, mode, c, h, work):
         c[SPARE, 0] = scene.stiffness * c[X, 0] + c[FORCE, 0]
         set_terms(c[SPARE], terms(c[X]) * scene.stiffness + terms(c[FORCE]))
         count = crossings(c[SPARE], h, work, count)
+    rest = due_within(scene, record, h)
+    if rest > 0.0:
+        work[0][count] = rest
+        count += 1
     return count
 
 
