@@ -12,7 +12,7 @@ from __future__ import annotations
 from math import inf, isfinite, isnan, nan, pi, sqrt
 from typing import Any, NamedTuple
 
-from ringsweep.compile import absorbed, inlined
+from ringsweep.compile import absorbed, hook, inlined
 from ringsweep.models.interface import recorder
 from ringsweep.models.interface.status import BROKEN
 from ringsweep.numerics.functions import any_of, floor, select, square_root
@@ -66,13 +66,15 @@ class Stops(NamedTuple):
 
     Attributes
     ----------
+    side : float
+        1 if the contact counts as stuck, -1 if it slips.
     since : float
-        Time since when the contact counts as stuck, s; -1 if it slips.
+        Time at which that began, s.
     stick_time : float
         Time for which it counted as stuck before, s.
     start, least : float
-        Time at which the present stop began, NaN in slip; and how long it must be to count, s: -1 if it began with the
-        run.
+        Time at which the present stop began, NaN in slip; and how long it must be to count, s: negative if it began
+        with the run.
     slip_from, slip_start : float
         Place on the belt, m, and time, s, at which the contact last counted as stuck. The place is NaN in stick, and
         once the slip is longer than the play of the bristles.
@@ -82,6 +84,7 @@ class Stops(NamedTuple):
         Time at which the first of these slips began, s.
     """
 
+    side: Any
     since: Any
     stick_time: Any
     start: Any
@@ -108,8 +111,8 @@ class Cycles(NamedTuple):
 
     Attributes
     ----------
-    count : float
-        Number of the last cycle.
+    count, next : float
+        Number of the last cycle, and time at which the forcing ends its next period, s.
     low, high : float
         Least and greatest displacement at turns since its end, m.
     swing, swing_before : float
@@ -126,6 +129,7 @@ class Cycles(NamedTuple):
     """
 
     count: Any
+    next: Any
     low: Any
     high: Any
     swing: Any
@@ -192,6 +196,10 @@ def begin(scene, t, seen, band, play):
     """Record at the beginning of a run."""
     x, velocity, force, place, v, v_rate = seen
     start = Mark(t, x, velocity, 0.0, 0.0)
+    # The body counts as stuck until it slips: the first stop begins with the run. From a launch within the stiction
+    # band it may slip at once.
+    slowing = max(abs(v_rate), abs(scene.stiffness * x + force) / scene.mass)
+    least = min(_LONGEST_PASSAGE * _pace(scene), _PASSAGE * band / slowing) if band > 0.0 else 0.0
     return Record(
         band,
         play,
@@ -200,9 +208,8 @@ def begin(scene, t, seen, band, play):
         x,
         velocity,
         abs(force),
-        # The body counts as stuck until it slips, so that the first stop begins with the run.
-        Stops(-1.0, 0.0, t, -1.0, place, t, 0.0, 0.0, nan),
-        Cycles(0.0, x, x, 0.0, 0.0, start, start, 0.0, 1.0, 0.0, nan, nan, nan),
+        Stops(-1.0, t, 0.0, t, -max(least, 1e-300), place, t, 0.0, 0.0, nan),
+        Cycles(0.0, scene.forcing_period, x, x, 0.0, 0.0, start, start, 0.0, 1.0, 0.0, nan, nan, nan),
     )
 
 
@@ -214,17 +221,17 @@ def observe(scene, r, t, duration, stuck, seen):
     """
     x, velocity, force, place, v, v_rate = seen
     stops, cycles, x_min, x_max = r.stops, r.cycles, r.x_min, r.x_max
-    was_stuck = stops.since >= 0.0
-    begins, ends = stuck & _not(was_stuck), was_stuck & _not(stuck)
-    slips = abs(place - stops.slip_from) > r.play
-    up, down = (r.last.velocity <= 0.0) & (velocity > 0.0), (r.last.velocity > 0.0) & (velocity <= 0.0)
-    due = t >= (cycles.count + 1.0) * scene.forcing_period
-    if any_of(begins | ends | slips | up | down | due):
+    place = _place(scene, r, place)
+    side = select(stuck, 1.0, -1.0)
+    if any_of((side * stops.side < 0.0) | _leaves(scene, r, place)):
+        span = max(x_max, x) - min(x_min, x)
+        stops = _stops(scene, r, t, duration, stuck, side, place, v, span)
+    if any_of((r.last.velocity * velocity <= 0.0) | (t >= cycles.next)):
+        up, down = (r.last.velocity <= 0.0) & (velocity > 0.0), (r.last.velocity > 0.0) & (velocity <= 0.0)
         turn = _turn(r.last, duration, velocity)
         x_min, x_max = select(up, min(x_min, turn.x), x_min), select(down, max(x_max, turn.x), x_max)
         span = max(x_max, x) - min(x_min, x)
-        stops = _stops(scene, r, t, duration, stuck, begins, ends, place, v, span)
-        cycles = _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, due, turn, span)
+        cycles = _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span)
     return Record(
         r.band,
         r.play,
@@ -244,6 +251,36 @@ def _not(condition):
     return select(condition, 0.0, 1.0) > 0.0
 
 
+@hook(absorb=True)
+def _place(scene, r, place):
+    """Place to remember, m: without bristles none is needed."""
+
+
+@_place.implements(Belt)
+def _no_place(scene, r, place):
+    return r.last.place
+
+
+@_place.implements(BristleBelt)
+def _same_place(scene, r, place):
+    return place
+
+
+@hook(absorb=True)
+def _leaves(scene, r, place):
+    """Whether the body leaves the play of the bristles, after stick has ended."""
+
+
+@_leaves.implements(Belt)
+def _leaves_at_once(scene, r, place):
+    return False
+
+
+@_leaves.implements(BristleBelt)
+def _leaves_play(scene, r, place):
+    return abs(place - r.stops.slip_from) > r.play
+
+
 class _Turn(NamedTuple):
     """Time, s, and displacement, m, of a turn."""
 
@@ -260,11 +297,12 @@ def _turn(last, duration, velocity):
 
 
 @absorbed
-def _stops(scene, r, t, duration, stuck, begins, ends, place, v, span):
+def _stops(scene, r, t, duration, stuck, side, place, v, span):
     """Stops after an interval in which stick began or ended, or a slip became longer than the play."""
     s, before = r.stops, t - duration
+    begins, ends = stuck & (s.side < 0.0), (side < 0.0) & (s.side > 0.0)
     stick_time = s.stick_time + select(ends, before - s.since, 0.0)
-    since = select(begins, before, select(ends, -1.0, s.since))
+    since = select(begins | ends, before, s.since)
     # Within the play of the bristles a stop goes on.
     resumed = s.slip_from == s.slip_from
     anew = begins & _not(resumed)
@@ -277,8 +315,9 @@ def _stops(scene, r, t, duration, stuck, begins, ends, place, v, span):
     slip_start = select(ends, before, s.slip_start)
     slipped = _not(stuck) & (abs(place - slip_from) > r.play)
     stop = slip_start - start
-    counts = slipped & (stop > max(least, 0.0))
+    counts = slipped & (stop > abs(least))
     return Stops(
+        side,
         since,
         stick_time,
         select(slipped, nan, start),
@@ -298,9 +337,10 @@ def _pace(scene):
 
 
 @absorbed
-def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, due, turn, span):
+def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
     """Cycles after an interval in which the velocity changed its sign or a period of the forcing ended."""
     c, last, period = r.cycles, r.last, scene.forcing_period
+    due = t >= c.next
     low, high = select(up, min(c.low, turn.x), c.low), select(down, max(c.high, turn.x), c.high)
     # Without forcing a cycle ends where the body is farthest against the motion of the belt: no vibration of bristles
     # in stick disturbs this turn.
@@ -326,7 +366,7 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, due, turn, s
         low, high = select(ended, min(low, x_mark), low), select(ended, max(high, x_mark), high)
         swing = high - low
         stop = select(stops.slip_from == stops.slip_from, min(stops.slip_start, t_mark), t_mark) - stops.start
-        total = stops.total + select(stop > max(stops.least, 0.0), stop, 0.0)
+        total = stops.total + select(stop > abs(stops.least), stop, 0.0)
         near, fast = RETURN * swing, RETURN * swing * (2.0 * pi) / _pace(scene)
         # Without forcing the launch is not the end of a cycle.
         known = due | (c.count > 0.0)
@@ -349,6 +389,7 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, due, turn, s
         mark = Mark(t_mark, x_mark, v_mark, total, stops.slips)
         new = Cycles(
             count,
+            (count + 1.0) * period,
             x_mark,
             x_mark,
             swing,
@@ -363,12 +404,12 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, due, turn, s
             select(keeps, c.stops, (stops.slips - slips_from) / cycles),
         )
         old = Cycles(
-            c.count, low, high, c.swing, c.swing_before, c.last, c.reference, c.since, c.most, c.lap, c.period,
+            c.count, c.next, low, high, c.swing, c.swing_before, c.last, c.reference, c.since, c.most, c.lap, c.period,
             c.share, c.stops,
         )  # fmt: skip
         return _chosen_cycles(ended, new, old)
     return Cycles(
-        count, low, high, c.swing, c.swing_before, c.last, c.reference, c.since, c.most, c.lap, c.period, c.share,
+        count, c.next, low, high, c.swing, c.swing_before, c.last, c.reference, c.since, c.most, c.lap, c.period, c.share,
         c.stops,
     )  # fmt: skip
 
@@ -390,6 +431,7 @@ def _chosen_cycles(condition, a, b):
     """Cycles `a` where the condition holds, else `b`."""
     return Cycles(
         select(condition, a.count, b.count),
+        select(condition, a.next, b.next),
         select(condition, a.low, b.low),
         select(condition, a.high, b.high),
         select(condition, a.swing, b.swing),
@@ -411,7 +453,6 @@ def conclude(scene, r, status, t, x, velocity):
     motion, period, share, stops, settled = _settles_to(scene, r, t)
     if status == BROKEN or not (isfinite(x) and isfinite(velocity)):
         motion = FAILED
-    since = r.stops.since
     return Outcome(
         float(motion),
         float(motion),
@@ -421,7 +462,7 @@ def conclude(scene, r, status, t, x, velocity):
         min(r.x_min, x),
         max(r.x_max, x),
         r.velocity_max,
-        r.stops.stick_time + (t - since if since >= 0.0 else 0.0),
+        r.stops.stick_time + (t - r.stops.since if r.stops.side > 0.0 else 0.0),
         r.stops.slips,
         r.stops.first_slip,
         period,
@@ -438,7 +479,7 @@ def _settles_to(scene, r, t):
     c, stops = r.cycles, r.stops
     forced, returned = scene.forcing_period < inf, not isnan(c.period)
     stop = t - stops.start
-    in_stop = stop > max(stops.least, 0.0)
+    in_stop = stop > abs(stops.least)
     # On a belt at rest, or without a spring, the load on a stuck body does not grow.
     belt_velocity = r.last.velocity - r.last.v
     breakaway = scene.mu_s * scene.mass * scene.gravity
@@ -468,7 +509,7 @@ def _settles_to(scene, r, t):
 @inlined
 def due_within(scene, r, h):
     """Time until the forcing ends its next period, s, or a negative number if that is beyond a step of length `h`."""
-    rest = (r.cycles.count + 1.0) * scene.forcing_period - r.last.t
+    rest = r.cycles.next - r.last.t
     return rest if rest < h else -1.0
 
 
