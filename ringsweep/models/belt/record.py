@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from ringsweep.compile import absorbed, hook, inlined
 from ringsweep.models.interface import recorder
 from ringsweep.models.interface.status import BROKEN
-from ringsweep.numerics.functions import any_of, floor, select, square_root
+from ringsweep.numerics.functions import any_of, floor, lanes_body, select, square_root
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.friction.velocity import stiction_band
 from ringsweep.quantities.variables import FAILED, OSCILLATORY, RIDING, SLIDING, STICK_SLIP, STICKING
@@ -228,14 +228,14 @@ def observe(scene, r, t, duration, stuck, seen):
         stops = _stops(scene, r, t, duration, stuck, side, place, v, span)
     if any_of((r.last.velocity * velocity <= 0.0) | (t >= cycles.next)):
         up, down = (r.last.velocity <= 0.0) & (velocity > 0.0), (r.last.velocity > 0.0) & (velocity <= 0.0)
-        turn = _turn(r.last, duration, velocity)
+        turn = _turn(r.last, t, duration, velocity)
         x_min, x_max = select(up, min(x_min, turn.x), x_min), select(down, max(x_max, turn.x), x_max)
         span = max(x_max, x) - min(x_min, x)
         cycles = _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span)
     return Record(
         r.band,
         r.play,
-        Last(t, x, velocity, place, v, v_rate),
+        Last(_located(r.last.t, t), x, velocity, place, v, _located(r.last.v_rate, v_rate)),
         x_min,
         x_max,
         max(r.velocity_max, velocity),
@@ -281,6 +281,16 @@ def _leaves_play(scene, r, place):
     return abs(place - r.stops.slip_from) > r.play
 
 
+def _located(before, now):
+    """`now`, for methods that locate events; they run with floats."""
+    return now
+
+
+@lanes_body(_located)
+def _not_located(before, now):
+    return before
+
+
 class _Turn(NamedTuple):
     """Time, s, and displacement, m, of a turn."""
 
@@ -289,11 +299,11 @@ class _Turn(NamedTuple):
 
 
 @absorbed
-def _turn(last, duration, velocity):
+def _turn(last, t, duration, velocity):
     """Turn within an interval in which the velocity changes its sign. There it is nearly linear in time."""
     change = last.velocity - velocity
     share = select(abs(change) > 0.0, last.velocity / select(abs(change) > 0.0, change, 1.0), 0.0)
-    return _Turn(last.t + share * duration, last.x + 0.5 * share * duration * last.velocity)
+    return _Turn(t - (1.0 - share) * duration, last.x + 0.5 * share * duration * last.velocity)
 
 
 @absorbed
@@ -351,7 +361,7 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
     count = select(due, max(c.count + 1.0, floor(t / period)), c.count + select(turns, 1.0, 0.0))
     ended = due | turns
     if any_of(ended):
-        share = select(duration > 0.0, (count * period - last.t) / duration, 1.0)
+        share = select(duration > 0.0, 1.0 - (t - count * period) / duration, 1.0)
         share = select(due, min(max(share, 0.0), 1.0), 1.0)
         rest = 1.0 - share
         # The cubic through displacements and velocities at both ends.
