@@ -115,8 +115,8 @@ class Cycles(NamedTuple):
         Number of the last cycle, and time at which the forcing ends its next period, s.
     low, high : float
         Least and greatest displacement at turns since its end, m.
-    swing, swing_before : float
-        Distance between the extremes of the last cycle, and of the cycle before, m.
+    swing, swing_before, drift : float
+        Distance between the extremes of the last cycle, and of the cycle before, and displacement in it, m.
     last, reference : Mark
         End of the last cycle, and the state with which later states are compared.
     since, most : float
@@ -134,6 +134,7 @@ class Cycles(NamedTuple):
     high: Any
     swing: Any
     swing_before: Any
+    drift: Any
     last: Mark
     reference: Mark
     since: Any
@@ -208,8 +209,8 @@ def begin(scene, t, seen, band, play):
         x,
         velocity,
         abs(force),
-        Stops(-1.0, t, 0.0, t, -max(least, 1e-300), place, t, 0.0, 0.0, nan),
-        Cycles(0.0, scene.forcing_period, x, x, 0.0, 0.0, start, start, 0.0, 1.0, 0.0, nan, nan, nan),
+        Stops(1.0, t, 0.0, t, -max(least, 1e-300), nan, t, 0.0, 0.0, nan),
+        Cycles(0.0, scene.forcing_period, x, x, 0.0, 0.0, 0.0, start, start, 0.0, 1.0, 0.0, nan, nan, nan),
     )
 
 
@@ -404,6 +405,7 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
             x_mark,
             swing,
             c.swing,
+            (x_mark - c.last.x) / (count - c.count),
             mark,
             _chosen(renew, mark, c.reference),
             select(renew, 0.0, since),
@@ -414,12 +416,12 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
             select(keeps, c.stops, (stops.slips - slips_from) / cycles),
         )
         old = Cycles(
-            c.count, c.next, low, high, c.swing, c.swing_before, c.last, c.reference, c.since, c.most, c.lap, c.period,
+            c.count, c.next, low, high, c.swing, c.swing_before, c.drift, c.last, c.reference, c.since, c.most, c.lap, c.period,
             c.share, c.stops,
         )  # fmt: skip
         return _chosen_cycles(ended, new, old)
     return Cycles(
-        count, c.next, low, high, c.swing, c.swing_before, c.last, c.reference, c.since, c.most, c.lap, c.period, c.share,
+        count, c.next, low, high, c.swing, c.swing_before, c.drift, c.last, c.reference, c.since, c.most, c.lap, c.period, c.share,
         c.stops,
     )  # fmt: skip
 
@@ -446,6 +448,7 @@ def _chosen_cycles(condition, a, b):
         select(condition, a.high, b.high),
         select(condition, a.swing, b.swing),
         select(condition, a.swing_before, b.swing_before),
+        select(condition, a.drift, b.drift),
         _chosen(condition, a.last, b.last),
         _chosen(condition, a.reference, b.reference),
         select(condition, a.since, b.since),
@@ -494,11 +497,15 @@ def _settles_to(scene, r, t):
     belt_velocity = r.last.velocity - r.last.v
     breakaway = scene.mu_s * scene.mass * scene.gravity
     loads = scene.stiffness * abs(belt_velocity) * scene.span > _ROUNDING * 1e-3 * breakaway
-    for_good = returned and c.share > 1.0 - 1e-9 if forced else not loads
+    if forced:
+        # In stick the body may creep, but the belt does not carry it away.
+        for_good = c.share > 1.0 - 1e-9 and abs(c.drift) <= max(RETURN * c.swing, r.band * scene.forcing_period)
+    else:
+        for_good = not loads
     if in_stop and stops.least < 0.0:
-        return RIDING, c.period if forced else nan, 1.0, 0.0, for_good
+        return RIDING, c.period, 1.0, 0.0, returned if forced else for_good
     if in_stop and for_good:
-        return STICKING, c.period if forced else nan, 1.0, 0.0, True
+        return STICKING, c.period if forced else nan, 1.0, 0.0, returned if forced else True
     natural = 2.0 * pi / sqrt(scene.stiffness / scene.mass) if scene.stiffness > 0.0 else inf
     slips_since = t - stops.slip_start
     if not forced and not in_stop and min(slips_since, t - c.last.t) > 2.0 * natural or isnan(c.share):
