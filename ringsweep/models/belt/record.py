@@ -2,9 +2,9 @@
 
 A *stop* is an interval in which the body sticks to the belt, and stays longer than a motion that only passes or grazes
 the speed of the belt. A *cycle* is a period of the forcing; without forcing, it lasts from one turn of the displacement
-to the next of its kind. At the end of each cycle the state is compared with that one cycle before, and with a reference,
-which is replaced after ever more cycles (Brent's cycle detection). The first state that equals one of them closes a
-*lap*: the time since then is the period of the motion.
+to the next of its kind. At the end of each cycle the state is compared with that one cycle before, and with a
+reference, which is replaced after ever more cycles (Brent's cycle detection). The first state that equals one of them
+closes a *lap*: the time since then is the period of the motion.
 """
 
 from __future__ import annotations
@@ -229,7 +229,7 @@ def observe(scene, r, t, duration, stuck, seen):
         stops = _stops(scene, r, t, duration, stuck, side, place, v, span)
     if any_of((r.last.velocity * velocity <= 0.0) | (t >= cycles.next)):
         up, down = (r.last.velocity <= 0.0) & (velocity > 0.0), (r.last.velocity > 0.0) & (velocity <= 0.0)
-        turn = _turn(r.last, t, duration, velocity)
+        turn = _turn(r.last, t, duration, x, velocity)
         x_min, x_max = select(up, min(x_min, turn.x), x_min), select(down, max(x_max, turn.x), x_max)
         span = max(x_max, x) - min(x_min, x)
         cycles = _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span)
@@ -300,11 +300,20 @@ class _Turn(NamedTuple):
 
 
 @absorbed
-def _turn(last, t, duration, velocity):
+def _turn(last, t, duration, x, velocity):
     """Turn within an interval in which the velocity changes its sign. There it is nearly linear in time."""
     change = last.velocity - velocity
-    share = select(abs(change) > 0.0, last.velocity / select(abs(change) > 0.0, change, 1.0), 0.0)
-    return _Turn(t - (1.0 - share) * duration, last.x + 0.5 * share * duration * last.velocity)
+    changes = abs(change) > 0.0
+    share = select(changes, last.velocity / select(changes, change, 1.0), 0.0)
+    return _Turn(t - (1.0 - share) * duration, _between(last, duration, x, velocity, share))
+
+
+@absorbed
+def _between(last, duration, x, velocity, share):
+    """Displacement at a share of an interval: the cubic through displacements and velocities at both ends."""
+    rest = 1.0 - share
+    ends = (1.0 + 2.0 * share) * rest * rest * last.x + share * share * (3.0 - 2.0 * share) * x
+    return ends + share * rest * duration * (rest * last.velocity - share * velocity)
 
 
 @absorbed
@@ -359,21 +368,32 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
     backward = v - velocity > 1e-6 * frequency * (high - low)
     far = high - low > max(r.play, _ROUNDING * span)
     turns = far & select(backward, down, up) & (period == inf)
+    old = Cycles(
+        c.count,
+        c.next,
+        low,
+        high,
+        c.swing,
+        c.swing_before,
+        c.drift,
+        c.last,
+        c.reference,
+        c.since,
+        c.most,
+        c.lap,
+        c.period,
+        c.share,
+        c.stops,
+    )
     count = select(due, max(c.count + 1.0, floor(t / period)), c.count + select(turns, 1.0, 0.0))
     ended = due | turns
     if any_of(ended):
         share = select(duration > 0.0, 1.0 - (t - count * period) / duration, 1.0)
         share = select(due, min(max(share, 0.0), 1.0), 1.0)
-        rest = 1.0 - share
-        # The cubic through displacements and velocities at both ends.
-        x_due = (
-            (1.0 + 2.0 * share) * rest * rest * last.x
-            + share * share * (3.0 - 2.0 * share) * x
-            + share * rest * duration * (rest * last.velocity - share * velocity)
-        )
+        x_due = _between(last, duration, x, velocity, share)
         t_mark = select(due, count * period, turn.t)
         x_mark = select(due, x_due, turn.x)
-        v_mark = select(due, rest * last.velocity + share * velocity, 0.0)
+        v_mark = select(due, (1.0 - share) * last.velocity + share * velocity, 0.0)
         low, high = select(ended, min(low, x_mark), low), select(ended, max(high, x_mark), high)
         swing = high - low
         stop = select(stops.slip_from == stops.slip_from, min(stops.slip_start, t_mark), t_mark) - stops.start
@@ -415,15 +435,8 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
             select(keeps, c.share, (total - total_from) / (t_mark - t_from)),
             select(keeps, c.stops, (stops.slips - slips_from) / cycles),
         )
-        old = Cycles(
-            c.count, c.next, low, high, c.swing, c.swing_before, c.drift, c.last, c.reference, c.since, c.most, c.lap, c.period,
-            c.share, c.stops,
-        )  # fmt: skip
         return _chosen_cycles(ended, new, old)
-    return Cycles(
-        count, c.next, low, high, c.swing, c.swing_before, c.drift, c.last, c.reference, c.since, c.most, c.lap, c.period, c.share,
-        c.stops,
-    )  # fmt: skip
+    return old
 
 
 @absorbed
@@ -508,11 +521,13 @@ def _settles_to(scene, r, t):
         return STICKING, c.period if forced else nan, 1.0, 0.0, returned if forced else True
     natural = 2.0 * pi / sqrt(scene.stiffness / scene.mass) if scene.stiffness > 0.0 else inf
     slips_since = t - stops.slip_start
-    if not forced and not in_stop and min(slips_since, t - c.last.t) > 2.0 * natural or isnan(c.share):
+    if isnan(c.share) or (not forced and not in_stop and min(slips_since, t - c.last.t) > 2.0 * natural):
         # There is no cycle, or none any more.
         if stops.slips > 0.0 and (in_stop or slips_since < natural):
             return STICK_SLIP, nan, (stops.total + (stop if in_stop else 0.0)) / t, nan, False
-        steady = abs(r.last.velocity) * min(natural, scene.span) <= RETURN * (max(r.x_max, r.last.x) - min(r.x_min, r.last.x))
+        steady = abs(r.last.velocity) * min(natural, scene.span) <= RETURN * (
+            max(r.x_max, r.last.x) - min(r.x_min, r.last.x)
+        )
         return SLIDING, nan, 0.0, 0.0, steady
     if c.stops > 0.0 or c.share > 0.0 or (in_stop and not forced):
         return STICK_SLIP, c.period, c.share, c.stops, returned
