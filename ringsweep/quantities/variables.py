@@ -74,7 +74,7 @@ OUTCOMES: dict[str, Variable] = {
     "omega_max": Variable("rad/s", "greatest angular velocity of the body"),
     "reversals": Variable("1", "reversals of the motion", dtype="int32"),
     "turns": Variable("1", "full turns since the last reversal or the start", dtype="int32"),
-    "stick_time": Variable("s", "time for which the body sticks to the ring"),
+    "stick_time": Variable("s", "time for which the body sticks to the ring or belt"),
     "normal_min_1": Variable("N", "least normal reaction at contact 1"),
     "normal_min_2": Variable("N", "least normal reaction at contact 2"),
     "x_end": Variable("m", "displacement of the body at the end"),

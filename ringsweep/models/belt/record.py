@@ -51,6 +51,8 @@ class Last(NamedTuple):
         Time, s, displacement, m, and velocity in space, m/s.
     place, v, v_rate : float
         Displacement relative to the belt, m, sliding velocity, m/s, and its rate, m/s^2 (0 if unknown).
+    pull : float
+        Force that would keep the body at rest on the belt, N.
     """
 
     t: Any
@@ -59,6 +61,7 @@ class Last(NamedTuple):
     place: Any
     v: Any
     v_rate: Any
+    pull: Any
 
 
 class Stops(NamedTuple):
@@ -204,7 +207,7 @@ def begin(scene, t, seen, band, play):
     return Record(
         band,
         play,
-        Last(t, x, velocity, place, v, v_rate),
+        Last(t, x, velocity, place, v, v_rate, scene.mass * v_rate + force),
         x,
         x,
         velocity,
@@ -226,7 +229,7 @@ def observe(scene, r, t, duration, stuck, seen):
     side = select(stuck, 1.0, -1.0)
     if any_of((side * stops.side < 0.0) | _leaves(scene, r, place)):
         span = max(x_max, x) - min(x_min, x)
-        stops = _stops(scene, r, t, duration, stuck, side, place, v, span)
+        stops = _stops(scene, r, t, duration, stuck, side, place, v, force, span)
     if any_of((r.last.velocity * velocity <= 0.0) | (t >= cycles.next)):
         up, down = (r.last.velocity <= 0.0) & (velocity > 0.0), (r.last.velocity > 0.0) & (velocity <= 0.0)
         turn = _turn(r.last, t, duration, x, velocity)
@@ -236,7 +239,15 @@ def observe(scene, r, t, duration, stuck, seen):
     return Record(
         r.band,
         r.play,
-        Last(_located(r.last.t, t), x, velocity, place, v, _located(r.last.v_rate, v_rate)),
+        Last(
+            _located(r.last.t, t),
+            x,
+            velocity,
+            place,
+            v,
+            _located(r.last.v_rate, v_rate),
+            _located(r.last.pull, scene.mass * v_rate + force),
+        ),
         x_min,
         x_max,
         max(r.velocity_max, velocity),
@@ -317,7 +328,7 @@ def _between(last, duration, x, velocity, share):
 
 
 @absorbed
-def _stops(scene, r, t, duration, stuck, side, place, v, span):
+def _stops(scene, r, t, duration, stuck, side, place, v, force, span):
     """Stops after an interval in which stick began or ended, or a slip became longer than the play."""
     s, before = r.stops, t - duration
     begins, ends = stuck & (s.side < 0.0), (side < 0.0) & (s.side > 0.0)
@@ -327,8 +338,13 @@ def _stops(scene, r, t, duration, stuck, side, place, v, span):
     resumed = s.slip_from == s.slip_from
     anew = begins & _not(resumed)
     scale = _AT_REST * square_root(scene.stiffness / scene.mass) * span
-    slowing = max(abs(r.last.v_rate), select(duration > 0.0, abs(v - r.last.v) / duration, 0.0))
+    rate = select(duration > 0.0, (v - r.last.v) / duration, 0.0)
+    slowing = max(abs(r.last.v_rate), abs(rate))
     passage = _PASSAGE * max(max(r.band, scale), abs(r.last.v)) / slowing
+    # Under a greater pull than that of breakaway a set-valued law would let the body pass, maybe slowly.
+    pull = _located(scene.mass * rate + force, r.last.pull)
+    passes = abs(pull) > (1.0 + 1e-9) * scene.mu_s * scene.mass * scene.gravity
+    passage = max(passage, select(passes, square_root(r.band * _pace(scene) / slowing), 0.0))
     start = select(anew, before, s.start)
     least = select(anew, min(_LONGEST_PASSAGE * _pace(scene), passage), s.least)
     slip_from = select(begins, nan, select(ends, r.last.place, s.slip_from))
@@ -523,7 +539,7 @@ def _settles_to(scene, r, t):
     slips_since = t - stops.slip_start
     if isnan(c.share) or (not forced and not in_stop and min(slips_since, t - c.last.t) > 2.0 * natural):
         # There is no cycle, or none any more.
-        if stops.slips > 0.0 and (in_stop or slips_since < natural):
+        if in_stop or (stops.slips > 0.0 and slips_since < natural):
             return STICK_SLIP, nan, (stops.total + (stop if in_stop else 0.0)) / t, nan, False
         steady = abs(r.last.velocity) * min(natural, scene.span) <= RETURN * (
             max(r.x_max, r.last.x) - min(r.x_min, r.last.x)
