@@ -1,6 +1,7 @@
 """The word for what a motion on the belt settles to, and the numbers from its last cycles."""
 
 from math import pi, sqrt
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -69,7 +70,7 @@ class TestRiding:
 class TestRounding:
     """Rounded laws have the word of the law that they round."""
 
-    LAWS = {
+    LAWS: ClassVar = {
         "threlfall": ("coulomb", {"mu_k": 0.3}),
         "bengisu-akay": ("tustin", {"mu_s": 0.4, "mu_k": 0.3, "alpha": 20.0}),
     }
@@ -118,7 +119,7 @@ class TestRounding:
 class TestSpan:
     """Where the span ends does not matter."""
 
-    CASES = {
+    CASES: ClassVar = {
         "bengisu-akay on an oscillating belt": scene(
             "bengisu-akay", mu_s=0.5, mu_k=0.3, alpha=20.0, v0=0.03, k=100.0, drive=(0.5, 0.43)
         ),
@@ -126,7 +127,7 @@ class TestSpan:
         "stiction": scene("stiction", mu_s=0.15, mu_k=0.1, belt=0.1),
         "coulomb": scene("coulomb", mu_k=0.1, belt=0.1),
     }
-    SPANS = {
+    SPANS: ClassVar = {
         "bengisu-akay on an oscillating belt": [20.0, 21.0, 21.94, 60.0, 61.1],
         "slow belt": [60.0, 90.0, 100.0, 400.0, 431.0],
         "stiction": [40.0, 43.0, 45.1, 100.0, 103.3],

@@ -21,7 +21,7 @@ REGIME_COLOURS: dict[str, str] = {
     "stick-slip": "#008C66",
     "sliding": "#F0E442",
     "sticking": "#6A3D9A",
-    "riding": "#D9D2E9",
+    "riding": "#B48FD0",
 }
 
 #: Curves of friction laws and of methods, which may cover each other. The numbers of colours and of styles have no
