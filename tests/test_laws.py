@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from ringsweep.physics.friction.coulomb import Coulomb, Karnopp, Stiction, Tustin
+from ringsweep.physics.friction.regularised import BengisuAkay, PiecewiseCubic, PiecewiseLinear, Threlfall
 
 from ringsweep.compile import SOURCES_DIGEST, take
 from ringsweep.config import load
 from ringsweep.errors import InputError
 from ringsweep.physics.friction import LAWS, Dynamic, family_of
-from ringsweep.physics.friction.coulomb import Coulomb, Karnopp, Stiction, Tustin
-from ringsweep.physics.friction.regularised import BengisuAkay, PiecewiseCubic, PiecewiseLinear, Threlfall
 from ringsweep.physics.friction.velocity import (
     BAND,
     KINETIC,

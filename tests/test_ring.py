@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from ringsweep.physics.friction.regularised import BengisuAkay
 
 from ringsweep.compile import kernel, take
 from ringsweep.errors import InputError
 from ringsweep.models.interface.constant_step import inspect
 from ringsweep.physics import ring
-from ringsweep.physics.friction.regularised import BengisuAkay
 from ringsweep.physics.ring import OneContact, Ring, TwoContacts, acceleration, acceleration_slope, reactions
 from ringsweep.physics.zones import Arc, surface_of
 

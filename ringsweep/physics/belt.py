@@ -58,6 +58,8 @@ class Belt(NamedTuple):
         Velocity of the body relative to the belt at t = 0, m/s.
     span : float
         Span of time, s.
+    forcing_period : float
+        Period of the forcing, s; infinite without a period.
     """
 
     mass: Leaf
@@ -73,6 +75,7 @@ class Belt(NamedTuple):
     initial_x: Leaf
     initial_v: Leaf
     span: Leaf
+    forcing_period: Leaf
 
 
 class BristleBelt(NamedTuple):
@@ -90,3 +93,4 @@ class BristleBelt(NamedTuple):
     initial_x: Leaf
     initial_v: Leaf
     span: Leaf
+    forcing_period: Leaf

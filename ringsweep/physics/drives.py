@@ -10,6 +10,8 @@ from __future__ import annotations
 from math import atan, cos, exp, inf, log, log1p, pi, sin
 from typing import Annotated, Any, NamedTuple
 
+import numpy as np
+
 from ringsweep.compile import hook, inlined, lacking
 from ringsweep.quantities.parameters import Leaf, Parameter
 
@@ -455,17 +457,6 @@ def _turn_itself(drive, course, t):
 
 
 @hook(optional=True)
-def period(drive):
-    """Period of the drive, s; by default infinite: the drive does not repeat itself, or does not vary."""
-    return inf
-
-
-@period.implements(Sinusoidal)
-def _rocking_period(drive):
-    return 1.0 / drive.frequency if drive.frequency > 0.0 and drive.amplitude != 0.0 else inf
-
-
-@hook(optional=True)
 def beginning(drive):
     """First time at which the drive has a Taylor series, s. By default 0; later if the drive is singular at 0."""
     return 0.0
@@ -489,6 +480,31 @@ def top_speed(drive):
 def _greatest_speed(drive):
     # At an extreme of the angle the computed speed is the rounding of a cosine, not zero.
     return abs(2.0 * pi * drive.frequency * drive.amplitude)
+
+
+@hook(optional=True)
+def period(drive):
+    """Period of the drive, s.
+
+    Outside kernels.
+
+    Parameters
+    ----------
+    drive : NamedTuple
+        Its fields may be arrays, with a number for each cell.
+
+    Returns
+    -------
+    float or ndarray
+        By default infinite: the drive does not repeat.
+    """
+    return inf
+
+
+@period.implements(Sinusoidal)
+def _rocking_period(drive):
+    rocks = (drive.frequency > 0.0) & (drive.amplitude != 0.0)
+    return np.where(rocks, 1.0 / np.where(rocks, drive.frequency, 1.0), inf)
 
 
 # Velocities that differ by less than this share of their size are equal but for rounding.

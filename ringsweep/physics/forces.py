@@ -9,6 +9,8 @@ from __future__ import annotations
 from math import inf
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ringsweep.compile import hook
 from ringsweep.physics import drives
 from ringsweep.quantities.parameters import Leaf, Parameter
@@ -180,16 +182,16 @@ def _beginning(drive):
 
 @drives.period.implements(Forced)
 def _period(drive):
-    motion, force = drives.period(drive.motion), drives.period(drive.force)
-    shorter, longer = min(motion, force), max(motion, force)
-    if longer == inf:
-        return shorter
+    motion, force = np.broadcast_arrays(drives.period(drive.motion), drives.period(drive.force))
+    shorter, longer = np.minimum(motion, force), np.maximum(motion, force)
+    found = np.where(longer == inf, shorter, inf)
     # The least common multiple, if it is a few periods.
-    for n in range(1, _MOST_PERIODS + 1):
-        ratio = n * longer / shorter
-        if abs(ratio - round(ratio)) <= 1e-9 * ratio:
-            return n * longer
-    return inf
+    for n in range(_MOST_PERIODS, 0, -1):
+        with np.errstate(invalid="ignore"):
+            ratio = n * longer / shorter
+            repeats = (longer < inf) & (abs(ratio - np.round(ratio)) <= 1e-9 * ratio)
+        found = np.where(repeats, n * longer, found)
+    return found
 
 
 # Largest number of periods, of the slower of two oscillations, that make a common period.

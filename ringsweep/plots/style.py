@@ -19,6 +19,9 @@ REGIME_COLOURS: dict[str, str] = {
     "jammed": "#D086B1",
     "failed": "#1A1A1A",
     "stick-slip": "#008C66",
+    "sliding": "#F0E442",
+    "sticking": "#6A3D9A",
+    "riding": "#B48FD0",
 }
 
 #: Curves of friction laws and of methods, which may cover each other. The numbers of colours and of styles have no

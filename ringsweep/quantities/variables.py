@@ -15,8 +15,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
 #: Regimes in the order of their flag values.
-REGIMES = ("resting", "oscillatory", "revolving", "separating", "jammed", "failed", "stick-slip")
-RESTING, OSCILLATORY, REVOLVING, SEPARATING, JAMMED, FAILED, STICK_SLIP = range(7)
+REGIMES = (
+    *("resting", "oscillatory", "revolving", "separating", "jammed", "failed", "stick-slip"),
+    *("sliding", "sticking", "riding"),
+)
+RESTING, OSCILLATORY, REVOLVING, SEPARATING, JAMMED, FAILED, STICK_SLIP, SLIDING, STICKING, RIDING = range(10)
 
 MODES = {-1: "slip_backward", 0: "stick", 1: "slip_forward"}
 
@@ -71,7 +74,7 @@ OUTCOMES: dict[str, Variable] = {
     "omega_max": Variable("rad/s", "greatest angular velocity of the body"),
     "reversals": Variable("1", "reversals of the motion", dtype="int32"),
     "turns": Variable("1", "full turns since the last reversal or the start", dtype="int32"),
-    "stick_time": Variable("s", "time for which the body sticks to the ring"),
+    "stick_time": Variable("s", "time for which the body sticks to the ring or belt"),
     "normal_min_1": Variable("N", "least normal reaction at contact 1"),
     "normal_min_2": Variable("N", "least normal reaction at contact 2"),
     "x_end": Variable("m", "displacement of the body at the end"),
@@ -81,7 +84,12 @@ OUTCOMES: dict[str, Variable] = {
     "velocity_max": Variable("m/s", "greatest velocity of the body"),
     "slips": Variable("1", "slips that follow a stick", dtype="int32"),
     "first_slip": Variable("s", "time at which the first slip begins"),
-    "period": Variable("s", "mean period of the complete cycles after the first"),
+    "period": Variable("s", "time in which the motion returns"),
+    "stick_share": Variable("1", "share of a cycle in which the body sticks to the belt"),
+    "stops_per_cycle": Variable("1", "stops in a cycle"),
+    "settled": Variable(
+        "1", "whether the last cycles repeat each other", dtype="int8", flags={0: "not_settled", 1: "settled"}
+    ),
     "force_max": Variable("N", "greatest magnitude of the friction force"),
     "steps": Variable("1", "steps of the integration", dtype="int64"),
     "stiffness": Variable("1", "largest stiffness met: magnitude of the eigenvalue times the step"),

@@ -6,8 +6,13 @@ import logging
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from ringsweep.config import Config
+from ringsweep.models import batch
+from ringsweep.physics.drives import Constant
+from ringsweep.quantities.variables import FAILED, RIDING
+from ringsweep.runs.cells import laws_at, values_at
 from ringsweep.solvers.rk4 import STABILITY_LIMIT
 from ringsweep.storage.chunks import Layout
 
@@ -15,7 +20,7 @@ logger = logging.getLogger("ringsweep")
 
 
 def warn_of_results(results: xr.Dataset, config: Config) -> None:
-    """Warn if steps of rk4 exceed its limit of stability, and if most runs end at t = 0.
+    """Warn of steps beyond the limit of stability, of motions that have not settled, and of runs that end at t = 0.
 
     Parameters
     ----------
@@ -49,6 +54,60 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
             STABILITY_LIMIT,
             remedy,
         )
+    if "settled" in results:
+        _warn_of_belt(results, config)
     if ended_at_start > 0.5 * ended.size:
         runs = "the run ends" if ended.size == 1 else f"{ended_at_start / ended.size:.0%} of the runs end"
         logger.warning("%s at t = 0: is a unit or the initial state wrong?", runs)
+
+
+def _warn_of_belt(results: xr.Dataset, config: Config) -> None:
+    """Warn of motions on the belt that have not settled, and of bodies that have not broken loose."""
+    regime, settled = results["regime"].variable, results["settled"].variable
+    unsettled = riding = 0
+    soonest, latest = np.inf, 0.0
+    for _, _, region in Layout(regime.shape).chunks():
+        words = regime[region].values
+        rides = words == RIDING
+        unsettled += int(np.count_nonzero((settled[region].values == 0) & ~rides & (words != FAILED)))
+        riding += int(np.count_nonzero(rides))
+        if rides.any():
+            firsts = np.array([part.start for part in region], dtype=np.intp)
+            spans = _spans_of_first_slip(config, np.argwhere(np.atleast_1d(rides)) + firsts if region else None)
+            spans = spans[np.isfinite(spans)]
+            soonest, latest = min(soonest, spans.min(initial=np.inf)), max(latest, spans.max(initial=0.0))
+    if unsettled:
+        logger.warning(
+            "%.1f %% of the cells have not settled: a longer span may change their regimes, shares of stick and stops",
+            100.0 * unsettled / regime.size,
+        )
+    if riding:
+        remedy = "on their belts no span would let them slip"
+        if latest > 0.0:
+            remedy = f"the first slip, at k v t = mu_s F_N, needs a span of {soonest:.3g} s"
+            remedy += f" to {latest:.3g} s" if latest > 1.01 * soonest else ""
+        logger.warning(
+            "%.1f %% of the cells are riding, they have not broken loose: %s", 100.0 * riding / regime.size, remedy
+        )
+
+
+def _spans_of_first_slip(config: Config, cells: NDArray[np.intp] | None) -> NDArray[np.float64]:
+    """Times at which bodies that ride on belts of constant velocity would slip, s; otherwise infinite.
+
+    `cells` are indices along each dimension, shape ``(cells, dimensions)``; None for a single run.
+    """
+    scene, axes = config.scene, config.axes
+    count = 1 if cells is None else len(cells)
+    indices = {} if cells is None else dict(zip(axes.sizes, cells.T, strict=True))
+    laws, spans = laws_at(scene, axes, indices, count), np.full(count, np.inf)
+    for law, structure in scene.structures.items():
+        own = np.flatnonzero(laws == law)
+        if not len(own):
+            continue
+        body = batch(structure, values_at(scene, axes, {dim: along[own] for dim, along in indices.items()}, len(own)))
+        if isinstance(body.drive, Constant):
+            velocity = body.drive.amplitude
+            with np.errstate(divide="ignore", invalid="ignore"):
+                holds = body.mu_s * body.mass * body.gravity / body.stiffness - np.sign(velocity) * body.initial_x
+                spans[own] = np.where(velocity * body.stiffness != 0.0, holds / np.abs(velocity), np.inf)
+    return spans

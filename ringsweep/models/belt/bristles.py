@@ -19,7 +19,7 @@ from ringsweep.models.belt.force import (
     with_load_derivatives,
     with_loads,
 )
-from ringsweep.models.belt.record import conclude, observe
+from ringsweep.models.belt.record import begin
 from ringsweep.models.interface import constant_step, implicit, modes, recorder
 from ringsweep.models.interface.status import RUNNING
 from ringsweep.models.parts import larger_eigenvalue
@@ -93,8 +93,8 @@ class Inspection(NamedTuple):
         Trace, 1/s, and determinant, 1/s^2, of the linearised contact.
     stuck : float
         1 if the contact counts as stuck, else 0.
-    place : float
-        Displacement relative to the belt, m.
+    place, v : float
+        Displacement relative to the belt, m, and sliding velocity, m/s.
     """
 
     rates: tuple[float, float, float]
@@ -103,6 +103,7 @@ class Inspection(NamedTuple):
     determinant: float
     stuck: float
     place: float
+    v: float
 
 
 @constant_step.initial_state.implements(BristleBelt)
@@ -119,13 +120,15 @@ def _rates(scene, now, y, forcing):
 
 @constant_step.inspect.implements(BristleBelt)
 def _inspect(scene, y, forcing):
-    stuck, (rate, rate_v, rate_z, force, by_v, by_z) = _force_in_region(scene, y[1] - forcing[1], y[2])
+    v = y[1] - forcing[1]
+    stuck, (rate, rate_v, rate_z, force, by_v, by_z) = _force_in_region(scene, v, y[2])
     per_mass = 1.0 / scene.mass
     stiffness = steepest_spring(scene.cubic, scene.stiffness, bend(scene.cubic, y[0]), bend(scene.cubic, y[0]))
     by_v = damping(scene, by_v)
     determinant = (stiffness + by_z * rate_v - by_v * rate_z) * per_mass
     rates = y[1], acceleration(scene, y[0], y[1], forcing, force), rate
-    return Inspection(rates, force, rate_z - by_v * per_mass, determinant, select(stuck, 1.0, 0.0), y[0] - forcing[0])
+    place = y[0] - forcing[0]
+    return Inspection(rates, force, rate_z - by_v * per_mass, determinant, select(stuck, 1.0, 0.0), place, v)
 
 
 @constant_step.eigenvalue.implements(BristleBelt)
@@ -140,15 +143,9 @@ def _sticks(scene, before, now):
     return before.stuck > 0.0
 
 
-@recorder.observe.implements(BristleBelt)
-def _observe(scene, record, t, duration, stuck, seen):
-    x, velocity, force, place = seen
-    return observe(record, scene.span, t, duration, x, velocity, force, place, stuck, _play(scene))
-
-
-@recorder.conclude.implements(BristleBelt)
-def _conclude(scene, record, status, t, place, velocity):
-    return conclude(record, scene, status, t, place, velocity, stick_speed(scene.law, _recoil_speed(scene)))
+@recorder.begin.implements(BristleBelt)
+def _begin(scene, t, seen):
+    return begin(scene, t, seen, stick_speed(scene.law, _recoil_speed(scene)), _play(scene))
 
 
 @constant_step.row.implements(BristleBelt)
@@ -236,10 +233,10 @@ def _guards_and_motion(scene, mode, common, forcing, x):
     _, _, _, force, _, _ = contact_force(scene, x[1], x[2], sign, mode.region)
     guards = sign * x[1], region_guard(scene.law, scene.mu_s, scene.mu_k, x[1], x[2], sign, mode.region)
     acceleration = net_force(scene, x[0], velocity, forcing, force) / scene.mass
-    return guards, (x[0], velocity, acceleration, force, x[0] - forcing[0])
+    return guards, (x[0], velocity, acceleration, force, x[0] - forcing[0], x[1], forcing[2])
 
 
 @implicit.row.implements(BristleBelt)
 def _implicit_row(scene, mode, forcing, x):
-    _, (place, velocity, _, force, _) = implicit.guards_and_motion(scene, mode, (), forcing, x)
+    _, (place, velocity, _, force, _, _, _) = implicit.guards_and_motion(scene, mode, (), forcing, x)
     return place, velocity, force, x[2], 0.0 if mode.region == BAND else float(mode.sign)

@@ -70,7 +70,7 @@ def _guards_and_motion(scene, mode, common, forcing, x):
     speed = mode.sign * x[1]
     # The order is that of the rows of the series: SLOW, FAST.
     guards = speed - low, high - speed
-    return guards, (place, velocity, acceleration, friction, x[0])
+    return guards, (place, velocity, acceleration, friction, x[0], x[1], forcing[2])
 
 
 @implicit.motion.implements(belt.Belt, belt.BristleBelt)
@@ -80,8 +80,8 @@ def _motion(scene, forcing, x, linear):
 
 @implicit.seen.implements(belt.Belt, belt.BristleBelt)
 def _seen(scene, view):
-    _, (x, velocity, _, friction, place) = view
-    return x, velocity, friction, place
+    _, (x, velocity, acceleration, friction, place, v, belt_acceleration) = view
+    return x, velocity, friction, place, v, acceleration - belt_acceleration
 
 
 @implicit.near_zero.implements(belt.Belt, belt.BristleBelt)
@@ -91,5 +91,5 @@ def _near_zero(scene, motion):
 
 @implicit.row.implements(belt.Belt)
 def _row(scene, mode, forcing, x):
-    _, (position, velocity, _, friction, _) = implicit.guards_and_motion(scene, mode, (), forcing, x)
+    _, (position, velocity, _, friction, _, _, _) = implicit.guards_and_motion(scene, mode, (), forcing, x)
     return position, velocity, friction, 0.0, 0.0

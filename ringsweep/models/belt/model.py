@@ -96,6 +96,7 @@ class Belt(Model):
             "initial_v": sliding,
             "span": values["time.span"],
         }
+        fields["forcing_period"] = np.broadcast_to(drives.period(fields["drive"]), mass.shape).copy()
         if friction.family_of(law) is not friction.Dynamic:
             viscous, load = values["friction.viscous"], mass * gravity
             if friction.TRAITS[law].dead_band:

@@ -1,17 +1,24 @@
-"""Record and outcome of runs on the belt: motion, slips, period."""
+"""Record and outcome of runs on the belt: extremes, stops, cycles, and the word for what the motion settles to.
+
+A *stop* is an interval in which the body sticks to the belt, and stays longer than a motion that only passes or grazes
+the speed of the belt. A *cycle* is a period of the forcing; without forcing, it lasts from one turn of the displacement
+to the next of its kind. At the end of each cycle the state is compared with that one cycle before, and with a
+reference, which is replaced after ever more cycles (Brent's cycle detection). The first state that equals one of them
+closes a *lap*: the time since then is the period of the motion.
+"""
 
 from __future__ import annotations
 
-from math import isfinite, nan, sqrt
-from typing import NamedTuple
+from math import inf, isfinite, isnan, nan, pi, sqrt
+from typing import Any, NamedTuple
 
-from ringsweep.compile import absorbed, inlined
+from ringsweep.compile import absorbed, hook, inlined
 from ringsweep.models.interface import recorder
 from ringsweep.models.interface.status import BROKEN
-from ringsweep.numerics.functions import any_of, select
+from ringsweep.numerics.functions import any_of, floor, lanes_body, select, square_root
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.friction.velocity import stiction_band
-from ringsweep.quantities.variables import FAILED, OSCILLATORY, RESTING, STICK_SLIP
+from ringsweep.quantities.variables import FAILED, OSCILLATORY, RIDING, SLIDING, STICK_SLIP, STICKING
 
 
 class Outcome(NamedTuple):
@@ -29,255 +36,541 @@ class Outcome(NamedTuple):
     slips: float
     first_slip: float
     period: float
+    stick_share: float
+    stops_per_cycle: float
+    settled: float
     force_max: float
+
+
+class Last(NamedTuple):
+    """The last observation.
+
+    Attributes
+    ----------
+    t, x, velocity : float
+        Time, s, displacement, m, and velocity in space, m/s.
+    place, v, v_rate : float
+        Displacement relative to the belt, m, sliding velocity, m/s, and its rate, m/s^2 (0 if unknown).
+    pull : float
+        Force that would keep the body at rest on the belt, N.
+    """
+
+    t: Any
+    x: Any
+    velocity: Any
+    place: Any
+    v: Any
+    v_rate: Any
+    pull: Any
+
+
+class Stops(NamedTuple):
+    """Stops up to now.
+
+    Attributes
+    ----------
+    side : float
+        1 if the contact counts as stuck, -1 if it slips.
+    since : float
+        Time at which that began, s.
+    stick_time : float
+        Time for which it counted as stuck before, s.
+    start, least : float
+        Time at which the present stop began, NaN in slip; and how long it must be to count, s: negative if it began
+        with the run.
+    slip_from, slip_start : float
+        Place on the belt, m, and time, s, at which the contact last counted as stuck. The place is NaN in stick, and
+        once the slip is longer than the play of the bristles.
+    total, slips : float
+        Duration, s, and number of the stops that count and that a slip has ended.
+    first_slip : float
+        Time at which the first of these slips began, s.
+    """
+
+    side: Any
+    since: Any
+    stick_time: Any
+    start: Any
+    least: Any
+    slip_from: Any
+    slip_start: Any
+    total: Any
+    slips: Any
+    first_slip: Any
+
+
+class Mark(NamedTuple):
+    """State at the end of a cycle: time, displacement, velocity, and `total` and `slips` of the stops until then."""
+
+    t: Any
+    x: Any
+    velocity: Any
+    total: Any
+    slips: Any
+
+
+class Cycles(NamedTuple):
+    """Cycles up to now.
+
+    Attributes
+    ----------
+    count, next : float
+        Number of the last cycle, and time at which the forcing ends its next period, s.
+    low, high : float
+        Least and greatest displacement at turns since its end, m.
+    swing, swing_before, drift : float
+        Distance between the extremes of the last cycle, and of the cycle before, and displacement in it, m.
+    last, reference : Mark
+        End of the last cycle, and the state with which later states are compared.
+    since, most : float
+        Cycles since the reference, and cycles after which it is replaced.
+    lap : float
+        Cycles in a lap; 0 if the motion did not return.
+    period, share, stops : float
+        Duration of the last lap, s, NaN if the motion did not return. Share of stick and stops in a cycle, of the last
+        lap or of the cycles since the reference.
+    """
+
+    count: Any
+    next: Any
+    low: Any
+    high: Any
+    swing: Any
+    swing_before: Any
+    drift: Any
+    last: Mark
+    reference: Mark
+    since: Any
+    most: Any
+    lap: Any
+    period: Any
+    share: Any
+    stops: Any
 
 
 class Record(NamedTuple):
     """Record of a run on the belt; lengths in m, velocities in m/s, times in s, forces in N.
 
-    A slip counts if it is longer than the play of the bristles, since bristles vibrate while the body sticks. The
-    extremes of the displacement that count are maxima or minima, like the first one.
-
     Attributes
     ----------
-    velocity : float
-        Velocity in space at the last observation.
-    x_min, x_max, velocity_max, force_max, stick_time : float
-        As in :class:`Outcome`.
-    slip_from, slip_start : float
-        Place on the belt and time at which the body began to slip, or stuck last. The place is NaN once the present
-        slip counts.
-    slipped_at : float
-        Time of the last observation at which the body slipped.
-    stick_before : float
-        ``stick_time`` at the last slip.
-    slips : float
-        Number of slips that count.
-    first_slip, last_slip : float
-        Times at which the first and the last of these slips began.
-    last_stick : float
-        Time for which the body stuck before the last of these slips.
-    extreme_sign : float
-        1 if maxima count, -1 if minima count, 0 before the first extreme.
-    extremes : float
-        Number of extremes that count.
-    first_extreme, last_extreme : float
-        Times of the first and of the last of these extremes.
-    opposite : float
-        ``extreme_sign * x`` at the farthest place on the opposite side since the last of these extremes.
-    first_swing, third_swing, fourth_swing, last_swing : float
-        Distance from the opposite side to an extreme: for the first and for the last extreme, and the largest in the
-        third and in the fourth quarter of the span.
+    band : float
+        Sliding speed below which a contact counts as stuck; 0 for set-valued laws.
+    play : float
+        Distance that a body on bristles can move without slipping; negative for other laws.
+    last : Last
+    x_min, x_max, velocity_max, force_max : float
+        As in :class:`Outcome`, but the displacement only at turns.
+    stops : Stops
+    cycles : Cycles
     """
 
-    velocity: float
-    x_min: float
-    x_max: float
-    velocity_max: float
-    force_max: float
-    stick_time: float
-    slip_from: float
-    slip_start: float
-    slipped_at: float
-    stick_before: float
-    slips: float
-    first_slip: float
-    last_slip: float
-    last_stick: float
-    extreme_sign: float
-    extremes: float
-    first_extreme: float
-    last_extreme: float
-    opposite: float
-    first_swing: float
-    third_swing: float
-    fourth_swing: float
-    last_swing: float
+    band: Any
+    play: Any
+    last: Last
+    x_min: Any
+    x_max: Any
+    velocity_max: Any
+    force_max: Any
+    stops: Stops
+    cycles: Cycles
 
 
-# A stick that is shorter than this fraction of the span does not count.
-_SHORTEST_STICK = 1e-9
+#: The motion has returned if displacement and velocity differ by less than this share of their swing in a cycle.
+RETURN = 1e-3
 
-# In stick-slip, the stick lasts longer than this fraction of the cycle. The second value is for laws with a stiction
-# band, under which the contact creeps.
-_SHORT_STICK, _SHORT_STICK_IN_BAND = 1e-6, 1e-2
+# Laps of more cycles are not looked for.
+_MOST_CYCLES = 64.0
 
-# An oscillation lasts if its swings keep this share of their length from one quarter of the run to the next, and if
-# they exceed this share of the displacement; errors explain smaller swings.
-_LASTING, _ROUNDING = 0.95, 1e-6
+# A stop that counts lasts longer than this factor times the time in which the body would lose its sliding velocity. A
+# motion that grazes the speed of the belt stays in the stiction band for four times this time, one that passes for two.
+_PASSAGE = 8.0
 
-# A body that has not slipped for more cycles than this has stopped slipping.
-_MOST_CYCLES_SINCE_SLIP = 2.0
+# Largest such time, in natural periods or periods of the forcing.
+_LONGEST_PASSAGE = 0.1
+
+# The sliding velocity is zero within this share of its scale.
+_AT_REST = 1e-8
+
+# A turn counts if the body has moved farther than this share of the range of its displacement.
+_ROUNDING = 1e-6
 
 
 @inlined
-def begin(t, x, velocity, force, place):
+def begin(scene, t, seen, band, play):
     """Record at the beginning of a run."""
+    x, velocity, force, place, v, v_rate = seen
+    start = Mark(t, x, velocity, 0.0, 0.0)
+    # The body counts as stuck until it slips: the first stop begins with the run. From a launch within the stiction
+    # band it may slip at once.
+    slowing = max(abs(v_rate), abs(scene.stiffness * x + force) / scene.mass)
+    least = min(_LONGEST_PASSAGE * _pace(scene), _PASSAGE * band / slowing) if band > 0.0 else 0.0
     return Record(
-        velocity=velocity,
-        x_min=x,
-        x_max=x,
-        velocity_max=velocity,
-        force_max=abs(force),
-        stick_time=0.0,
-        slip_from=place,
-        slip_start=t,
-        slipped_at=t,
-        stick_before=0.0,
-        slips=0.0,
-        first_slip=nan,
-        last_slip=nan,
-        last_stick=0.0,
-        extreme_sign=0.0,
-        extremes=0.0,
-        first_extreme=nan,
-        last_extreme=nan,
-        opposite=0.0,
-        first_swing=0.0,
-        third_swing=0.0,
-        fourth_swing=0.0,
-        last_swing=0.0,
+        band,
+        play,
+        Last(t, x, velocity, place, v, v_rate, scene.mass * v_rate + force),
+        x,
+        x,
+        velocity,
+        abs(force),
+        Stops(1.0, t, 0.0, t, -max(least, 1e-300), nan, t, 0.0, 0.0, nan),
+        Cycles(0.0, scene.forcing_period, x, x, 0.0, 0.0, 0.0, start, start, 0.0, 1.0, 0.0, nan, nan, nan),
     )
 
 
 @absorbed
-def observe(r, span, t, duration, x, velocity, force, place, stuck, play):
+def observe(scene, r, t, duration, stuck, seen):
     """Record after an interval of `duration` seconds that ends at time `t`, in which the body stuck or slipped.
 
-    `place` is the displacement relative to the belt, m; `play` the distance that a body on bristles can move without
-    slipping, m. Most steps change neither slips nor extremes.
+    In most steps nothing turns, begins or ends.
     """
-    stick_time, stick_before = r.stick_time + select(stuck, duration, 0.0), r.stick_before
-    # The next slip begins here, unless the body sticks longer.
-    slip_from, slip_start = select(stuck, place, r.slip_from), select(stuck, t, r.slip_start)
-    slips, first_slip, last_slip, last_stick = r.slips, r.first_slip, r.last_slip, r.last_stick
-    slipped = abs(place - slip_from) > play
-    if any_of(slipped):
-        stick = stick_time - stick_before
-        counts = slipped & (stick > _SHORTEST_STICK * span)
-        first_slip = select(counts & (slips == 0.0), slip_start, first_slip)
-        last_slip, last_stick = select(counts, slip_start, last_slip), select(counts, stick, last_stick)
-        slips = slips + select(counts, 1.0, 0.0)
-        slip_from, stick_before = select(slipped, nan, slip_from), select(slipped, stick_time, stick_before)
-    sign, extremes, first_extreme, last_extreme = r.extreme_sign, r.extremes, r.first_extreme, r.last_extreme
-    first_swing, third_swing, fourth_swing, last_swing = r.first_swing, r.third_swing, r.fourth_swing, r.last_swing
-    before, opposite = r.velocity, min(r.opposite, sign * x)
-    if any_of(before * velocity <= 0.0):
-        is_maximum, is_minimum = (before > 0.0) & (velocity <= 0.0), (before < 0.0) & (velocity >= 0.0)
-        sign = select(sign == 0.0, select(is_maximum, 1.0, select(is_minimum, -1.0, 0.0)), sign)
-        swing = sign * x - opposite
-        is_swing = (extremes == 0.0) | (swing > _ROUNDING * max(abs(r.x_min), abs(r.x_max)))
-        counts = ((is_maximum & (sign > 0.0)) | (is_minimum & (sign < 0.0))) & is_swing
-        # Between two observations the velocity is nearly linear in time.
-        last_extreme = select(counts, t - duration * velocity / (velocity - before), last_extreme)
-        first, later = counts & (extremes == 0.0), counts & (extremes > 0.0)
-        first_extreme = select(first, last_extreme, first_extreme)
-        last_swing = select(later, swing, last_swing)
-        first_swing = select(later & (extremes == 1.0), swing, first_swing)
-        in_fourth = last_extreme > 0.75 * span
-        fourth_swing = select(later & in_fourth, max(fourth_swing, swing), fourth_swing)
-        in_third = (last_extreme > 0.5 * span) & (last_extreme <= 0.75 * span)
-        third_swing = select(later & in_third, max(third_swing, swing), third_swing)
-        extremes, opposite = extremes + select(counts, 1.0, 0.0), select(counts, sign * x, opposite)
+    x, velocity, force, place, v, v_rate = seen
+    stops, cycles, x_min, x_max = r.stops, r.cycles, r.x_min, r.x_max
+    place = _place(scene, r, place)
+    side = select(stuck, 1.0, -1.0)
+    if any_of((side * stops.side < 0.0) | _leaves(scene, r, place)):
+        span = max(x_max, x) - min(x_min, x)
+        stops = _stops(scene, r, t, duration, stuck, side, place, v, force, span)
+    if any_of((r.last.velocity * velocity <= 0.0) | (t >= cycles.next)):
+        up, down = (r.last.velocity <= 0.0) & (velocity > 0.0), (r.last.velocity > 0.0) & (velocity <= 0.0)
+        turn = _turn(r.last, t, duration, x, velocity)
+        x_min, x_max = select(up, min(x_min, turn.x), x_min), select(down, max(x_max, turn.x), x_max)
+        span = max(x_max, x) - min(x_min, x)
+        cycles = _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span)
     return Record(
-        velocity,
-        min(r.x_min, x),
-        max(r.x_max, x),
+        r.band,
+        r.play,
+        Last(
+            _located(r.last.t, t),
+            x,
+            velocity,
+            place,
+            v,
+            _located(r.last.v_rate, v_rate),
+            _located(r.last.pull, scene.mass * v_rate + force),
+        ),
+        x_min,
+        x_max,
         max(r.velocity_max, velocity),
         max(r.force_max, abs(force)),
+        stops,
+        cycles,
+    )
+
+
+@absorbed
+def _not(condition):
+    """Whether a condition does not hold, for floats and Lanes."""
+    return select(condition, 0.0, 1.0) > 0.0
+
+
+@hook(absorb=True)
+def _place(scene, r, place):
+    """Place to remember, m: without bristles none is needed."""
+
+
+@_place.implements(Belt)
+def _no_place(scene, r, place):
+    return r.last.place
+
+
+@_place.implements(BristleBelt)
+def _same_place(scene, r, place):
+    return place
+
+
+@hook(absorb=True)
+def _leaves(scene, r, place):
+    """Whether the body leaves the play of the bristles, after stick has ended."""
+
+
+@_leaves.implements(Belt)
+def _leaves_at_once(scene, r, place):
+    return False
+
+
+@_leaves.implements(BristleBelt)
+def _leaves_play(scene, r, place):
+    return abs(place - r.stops.slip_from) > r.play
+
+
+def _located(before, now):
+    """`now`, for methods that locate events; they run with floats."""
+    return now
+
+
+@lanes_body(_located)
+def _not_located(before, now):
+    return before
+
+
+class _Turn(NamedTuple):
+    """Time, s, and displacement, m, of a turn."""
+
+    t: Any
+    x: Any
+
+
+@absorbed
+def _turn(last, t, duration, x, velocity):
+    """Turn within an interval in which the velocity changes its sign. There it is nearly linear in time."""
+    change = last.velocity - velocity
+    changes = abs(change) > 0.0
+    share = select(changes, last.velocity / select(changes, change, 1.0), 0.0)
+    return _Turn(t - (1.0 - share) * duration, _between(last, duration, x, velocity, share))
+
+
+@absorbed
+def _between(last, duration, x, velocity, share):
+    """Displacement at a share of an interval: the cubic through displacements and velocities at both ends."""
+    rest = 1.0 - share
+    ends = (1.0 + 2.0 * share) * rest * rest * last.x + share * share * (3.0 - 2.0 * share) * x
+    return ends + share * rest * duration * (rest * last.velocity - share * velocity)
+
+
+@absorbed
+def _stops(scene, r, t, duration, stuck, side, place, v, force, span):
+    """Stops after an interval in which stick began or ended, or a slip became longer than the play."""
+    s, before = r.stops, t - duration
+    begins, ends = stuck & (s.side < 0.0), (side < 0.0) & (s.side > 0.0)
+    stick_time = s.stick_time + select(ends, before - s.since, 0.0)
+    since = select(begins | ends, before, s.since)
+    # Within the play of the bristles a stop goes on.
+    resumed = s.slip_from == s.slip_from
+    anew = begins & _not(resumed)
+    scale = _AT_REST * square_root(scene.stiffness / scene.mass) * span
+    rate = select(duration > 0.0, (v - r.last.v) / duration, 0.0)
+    slowing = max(abs(r.last.v_rate), abs(rate))
+    passage = _PASSAGE * max(max(r.band, scale), abs(r.last.v)) / slowing
+    # Under a greater pull than that of breakaway a set-valued law would let the body pass, maybe slowly.
+    pull = _located(scene.mass * rate + force, r.last.pull)
+    passes = abs(pull) > (1.0 + 1e-9) * scene.mu_s * scene.mass * scene.gravity
+    passage = max(passage, select(passes, square_root(r.band * _pace(scene) / slowing), 0.0))
+    start = select(anew, before, s.start)
+    least = select(anew, min(_LONGEST_PASSAGE * _pace(scene), passage), s.least)
+    slip_from = select(begins, nan, select(ends, r.last.place, s.slip_from))
+    slip_start = select(ends, before, s.slip_start)
+    slipped = _not(stuck) & (abs(place - slip_from) > r.play)
+    stop = slip_start - start
+    counts = slipped & (stop > abs(least))
+    return Stops(
+        side,
+        since,
         stick_time,
-        slip_from,
+        select(slipped, nan, start),
+        least,
+        select(slipped, nan, slip_from),
         slip_start,
-        select(stuck, r.slipped_at, t),
-        stick_before,
-        slips,
-        first_slip,
-        last_slip,
-        last_stick,
-        sign,
-        extremes,
-        first_extreme,
-        last_extreme,
-        opposite,
-        first_swing,
-        third_swing,
-        fourth_swing,
-        last_swing,
+        s.total + select(counts, stop, 0.0),
+        s.slips + select(counts, 1.0, 0.0),
+        select(counts & (s.slips == 0.0), slip_start, s.first_slip),
+    )
+
+
+@absorbed
+def _pace(scene):
+    """Natural period or period of the forcing, whichever is shorter, s."""
+    return min(2.0 * pi / square_root(scene.stiffness / scene.mass), scene.forcing_period)
+
+
+@absorbed
+def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
+    """Cycles after an interval in which the velocity changed its sign or a period of the forcing ended."""
+    c, last, period = r.cycles, r.last, scene.forcing_period
+    due = t >= c.next
+    low, high = select(up, min(c.low, turn.x), c.low), select(down, max(c.high, turn.x), c.high)
+    # Without forcing a cycle ends where the body is farthest against the motion of the belt: no vibration of bristles
+    # in stick disturbs this turn.
+    frequency = square_root(scene.stiffness / scene.mass)
+    backward = v - velocity > 1e-6 * frequency * (high - low)
+    far = high - low > max(r.play, _ROUNDING * span)
+    turns = far & select(backward, down, up) & (period == inf)
+    old = Cycles(
+        c.count,
+        c.next,
+        low,
+        high,
+        c.swing,
+        c.swing_before,
+        c.drift,
+        c.last,
+        c.reference,
+        c.since,
+        c.most,
+        c.lap,
+        c.period,
+        c.share,
+        c.stops,
+    )
+    count = select(due, max(c.count + 1.0, floor(t / period)), c.count + select(turns, 1.0, 0.0))
+    ended = due | turns
+    if any_of(ended):
+        share = select(duration > 0.0, 1.0 - (t - count * period) / duration, 1.0)
+        share = select(due, min(max(share, 0.0), 1.0), 1.0)
+        x_due = _between(last, duration, x, velocity, share)
+        t_mark = select(due, count * period, turn.t)
+        x_mark = select(due, x_due, turn.x)
+        v_mark = select(due, (1.0 - share) * last.velocity + share * velocity, 0.0)
+        low, high = select(ended, min(low, x_mark), low), select(ended, max(high, x_mark), high)
+        swing = high - low
+        stop = select(stops.slip_from == stops.slip_from, min(stops.slip_start, t_mark), t_mark) - stops.start
+        total = stops.total + select(stop > abs(stops.least), stop, 0.0)
+        near, fast = RETURN * swing, RETURN * swing * (2.0 * pi) / _pace(scene)
+        # Without forcing the launch is not the end of a cycle.
+        known = due | (c.count > 0.0)
+        repeats = known & (abs(x_mark - c.last.x) <= near) & (abs(v_mark - c.last.velocity) <= fast)
+        since = c.since + (count - c.count)
+        returns = known & (abs(x_mark - c.reference.x) <= near) & (abs(v_mark - c.reference.velocity) <= fast)
+        returns = returns | repeats
+        # A lap of several cycles need not be closed before its end.
+        open_lap = _not(returns) & (since < c.lap)
+        lap = select(repeats, 1.0, select(returns, since, select(open_lap, c.lap, 0.0)))
+        t_from = select(repeats, c.last.t, c.reference.t)
+        total_from = select(repeats, c.last.total, c.reference.total)
+        slips_from = select(repeats, c.last.slips, c.reference.slips)
+        cycles = select(repeats, count - c.count, since)
+        keeps = open_lap | _not(known)
+        lost = _not(returns | keeps)
+        late = lost & (since >= c.most)
+        renew = returns | late | _not(known)
+        most = select(late, min(2.0 * c.most, _MOST_CYCLES), c.most)
+        mark = Mark(t_mark, x_mark, v_mark, total, stops.slips)
+        new = Cycles(
+            count,
+            (count + 1.0) * period,
+            x_mark,
+            x_mark,
+            swing,
+            c.swing,
+            (x_mark - c.last.x) / (count - c.count),
+            mark,
+            _chosen(renew, mark, c.reference),
+            select(renew, 0.0, since),
+            most,
+            lap,
+            select(returns, (t_mark - t_from) * lap / cycles, select(keeps, c.period, nan)),
+            select(keeps, c.share, (total - total_from) / (t_mark - t_from)),
+            select(keeps, c.stops, (stops.slips - slips_from) / cycles),
+        )
+        return _chosen_cycles(ended, new, old)
+    return old
+
+
+@absorbed
+def _chosen(condition, a, b):
+    """Mark `a` where the condition holds, else `b`."""
+    return Mark(
+        select(condition, a.t, b.t),
+        select(condition, a.x, b.x),
+        select(condition, a.velocity, b.velocity),
+        select(condition, a.total, b.total),
+        select(condition, a.slips, b.slips),
+    )
+
+
+@absorbed
+def _chosen_cycles(condition, a, b):
+    """Cycles `a` where the condition holds, else `b`."""
+    return Cycles(
+        select(condition, a.count, b.count),
+        select(condition, a.next, b.next),
+        select(condition, a.low, b.low),
+        select(condition, a.high, b.high),
+        select(condition, a.swing, b.swing),
+        select(condition, a.swing_before, b.swing_before),
+        select(condition, a.drift, b.drift),
+        _chosen(condition, a.last, b.last),
+        _chosen(condition, a.reference, b.reference),
+        select(condition, a.since, b.since),
+        select(condition, a.most, b.most),
+        select(condition, a.lap, b.lap),
+        select(condition, a.period, b.period),
+        select(condition, a.share, b.share),
+        select(condition, a.stops, b.stops),
     )
 
 
 @inlined
-def conclude(r, scene, status, t, x, velocity, band):
-    """Outcome of a run that ended with `status` at time `t` in the state `(x, velocity)`.
-
-    `band` is the sliding speed below which a contact counts as stuck, m/s; 0 for set-valued laws.
-    """
-    cycle = (r.last_extreme - r.first_extreme) / (r.extremes - 1) if r.extremes >= 2 else nan
+def conclude(scene, r, status, t, x, velocity):
+    """Outcome of a run that ended with `status` at time `t` in the state `(x, velocity)`."""
+    motion, period, share, stops, settled = _settles_to(scene, r, t)
     if status == BROKEN or not (isfinite(x) and isfinite(velocity)):
         motion = FAILED
-    elif _sticks_and_slips(r, scene, t, x, velocity, band):
-        motion = STICK_SLIP
-        cycle = (r.last_slip - r.first_slip) / (r.slips - 1) if r.slips >= 2 else nan
-    elif t - r.slipped_at < cycle and _keeps_swinging(r):
-        motion = OSCILLATORY
-    else:
-        motion = RESTING
     return Outcome(
         float(motion),
         float(motion),
         t,
         x,
         velocity,
-        r.x_min,
-        r.x_max,
+        min(r.x_min, x),
+        max(r.x_max, x),
         r.velocity_max,
-        r.stick_time,
-        r.slips,
-        r.first_slip,
-        cycle,
+        r.stops.stick_time + (t - r.stops.since if r.stops.side > 0.0 else 0.0),
+        r.stops.slips,
+        r.stops.first_slip,
+        period,
+        share,
+        stops,
+        1.0 if settled else 0.0,
         r.force_max,
     )
 
 
 @inlined
-def _sticks_and_slips(r, scene, t, x, velocity, band):
-    """Whether stick and slip still alternate at the end of a run."""
-    if r.slips == 0:
-        return False
-    # A harmonic oscillation that only touches the velocity of the belt stays in the band for this time without a stick.
-    curvature = (scene.stiffness / scene.mass) ** 1.5 * (r.x_max - r.x_min)
-    graze = sqrt(32.0 * band / curvature) if curvature > 0.0 else 0.0
-    if r.slips >= 2:
-        cycle = (r.last_slip - r.first_slip) / (r.slips - 1)
-        shortest = max((_SHORT_STICK_IN_BAND if band > 0.0 else _SHORT_STICK) * cycle, graze)
-        return r.last_stick > shortest and t - r.last_slip <= _MOST_CYCLES_SINCE_SLIP * cycle
-    # The body has slipped once and stuck again. It slips again if the spring force one span later exceeds breakaway.
-    pull = scene.stiffness * abs(x + velocity * scene.span)
-    holds = pull <= scene.mu_s * scene.mass * scene.gravity
-    return r.stick_time - r.stick_before > max(_SHORT_STICK * scene.span, graze) and not holds
+def _settles_to(scene, r, t):
+    """Word for what the motion settles to, period, share of stick and stops in a cycle, and whether it has settled."""
+    c, stops = r.cycles, r.stops
+    forced, returned = scene.forcing_period < inf, not isnan(c.period)
+    stop = t - stops.start
+    in_stop = stop > abs(stops.least)
+    # On a belt at rest, or without a spring, the load on a stuck body does not grow.
+    belt_velocity = r.last.velocity - r.last.v
+    breakaway = scene.mu_s * scene.mass * scene.gravity
+    loads = scene.stiffness * abs(belt_velocity) * scene.span > _ROUNDING * 1e-3 * breakaway
+    if forced:
+        # In stick the body may creep, but the belt does not carry it away.
+        for_good = c.share > 1.0 - 1e-9 and abs(c.drift) <= max(RETURN * c.swing, r.band * scene.forcing_period)
+    else:
+        for_good = not loads
+    if in_stop and stops.least < 0.0:
+        return RIDING, c.period, 1.0, 0.0, returned if forced else for_good
+    if in_stop and for_good:
+        return STICKING, c.period if forced else nan, 1.0, 0.0, returned if forced else True
+    natural = 2.0 * pi / sqrt(scene.stiffness / scene.mass) if scene.stiffness > 0.0 else inf
+    slips_since = t - stops.slip_start
+    if isnan(c.share) or (not forced and not in_stop and min(slips_since, t - c.last.t) > 2.0 * natural):
+        # There is no cycle, or none any more.
+        if in_stop or (stops.slips > 0.0 and slips_since < natural):
+            return STICK_SLIP, nan, (stops.total + (stop if in_stop else 0.0)) / t, nan, False
+        steady = abs(r.last.velocity) * min(natural, scene.span) <= RETURN * (
+            max(r.x_max, r.last.x) - min(r.x_min, r.last.x)
+        )
+        return SLIDING, nan, 0.0, 0.0, steady
+    if c.stops > 0.0 or c.share > 0.0 or (in_stop and not forced):
+        return STICK_SLIP, c.period, c.share, c.stops, returned
+    if c.swing <= _ROUNDING * (r.x_max - r.x_min):
+        return SLIDING, nan, 0.0, 0.0, True
+    if returned or forced or c.swing >= c.swing_before:
+        return OSCILLATORY, c.period, 0.0, 0.0, returned
+    return SLIDING, nan, 0.0, 0.0, c.swing <= RETURN * (r.x_max - r.x_min)
 
 
 @inlined
-def _keeps_swinging(r):
-    """Whether the body oscillates without decay."""
-    # The largest swings of two quarters are compared; if there are too few swings, the first and the last.
-    has_both = r.third_swing > 0.0 and r.fourth_swing > 0.0
-    before, after = (r.third_swing, r.fourth_swing) if has_both else (r.first_swing, r.last_swing)
-    return r.extremes >= 3 and after >= _LASTING * before and after > _ROUNDING * max(abs(r.x_min), abs(r.x_max))
+def due_within(scene, r, h):
+    """Time until the forcing ends its next period, s, or a negative number if that is beyond a step of length `h`."""
+    rest = r.cycles.next - r.last.t
+    return rest if rest < h else -1.0
 
 
-@recorder.begin.implements(Belt, BristleBelt)
+@recorder.begin.implements(Belt)
 def _begin(scene, t, seen):
-    x, velocity, force, place = seen
-    return begin(t, x, velocity, force, place)
+    return begin(scene, t, seen, stiction_band(scene.law), -1.0)
 
 
-@recorder.observe.implements(Belt)
+@recorder.observe.implements(Belt, BristleBelt)
 def _observe(scene, record, t, duration, stuck, seen):
-    x, velocity, force, place = seen
-    return observe(record, scene.span, t, duration, x, velocity, force, place, stuck, 0.0)
+    return observe(scene, record, t, duration, stuck, seen)
 
 
-@recorder.conclude.implements(Belt)
+@recorder.conclude.implements(Belt, BristleBelt)
 def _conclude(scene, record, status, t, place, velocity):
-    return conclude(record, scene, status, t, place, velocity, stiction_band(scene.law))
+    return conclude(scene, record, status, t, place, velocity)

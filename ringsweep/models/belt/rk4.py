@@ -93,7 +93,8 @@ def _eigenvalue(scene, before, now, h, most):
 
 @constant_step.seen.implements(belt.Belt, belt.BristleBelt)
 def _seen(scene, y, now):
-    return y[0], y[1], now.force, now.place
+    # The record takes the rate of the sliding velocity from the differences of short steps.
+    return y[0], y[1], now.force, now.place, now.v, 0.0
 
 
 @constant_step.sticks.implements(belt.Belt)

@@ -20,6 +20,7 @@ from ringsweep.models.belt.force import (
     with_loads,
     with_sizes,
 )
+from ringsweep.models.belt.record import due_within
 from ringsweep.models.interface import modes, series
 from ringsweep.models.interface.status import RUNNING
 from ringsweep.numerics.series import INVERSE, ORDER, crossings, slope, step_size, value, variation
@@ -250,7 +251,7 @@ def _rates_at(scene, c, s):
 
 @series.seen_at_start.implements(belt.Belt)
 def _seen_at_start(scene, c):
-    return c[X, 0], c[VELOCITY, 0], c[FORCE, 0], c[X, 0] - c[SHIFT, 0]
+    return c[X, 0], c[VELOCITY, 0], c[FORCE, 0], c[X, 0] - c[SHIFT, 0], c[V, 0], c[V, 1]
 
 
 @series.seen_at.implements(belt.Belt)
@@ -260,7 +261,7 @@ def _seen_at(scene, c, s, h):
         # A velocity within rounding is zero, so that an extreme of the displacement is recognised.
         velocity = 0.0
     x = value(c[X], s)
-    return x, velocity, value(c[FORCE], s), x - value(c[SHIFT], s)
+    return x, velocity, value(c[FORCE], s), x - value(c[SHIFT], s), value(c[V], s), slope(c[V], s)
 
 
 @series.extremes.implements(belt.Belt)
@@ -276,6 +277,10 @@ def _extremes(scene, record, mode, c, h, work):
         net = terms(c[X]) * scene.stiffness + terms(c[FORCE])
         set_terms(c[SPARE], with_loads(scene, net, -1.0, terms(c[VELOCITY]), terms(c[CUBE]), terms(c[PUSH])))
         count = crossings(c[SPARE], h, work, count)
+    rest = due_within(scene, record, h)
+    if rest > 0.0:
+        work[0][count] = rest
+        count += 1
     return count
 
 

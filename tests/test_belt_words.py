@@ -1,0 +1,205 @@
+"""The word for what a motion on the belt settles to, and the numbers from its last cycles."""
+
+from math import pi, sqrt
+from typing import ClassVar
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import ringsweep
+from ringsweep.quantities.variables import REGIMES
+
+
+def scene(law, *, k=2.0, drive=None, belt=None, x=0.0, velocity=None, span=60.0, **friction):
+    """A body of 1 kg on a belt of constant velocity, or on one that moves as amplitude (m) times sin(2 pi f t)."""
+    found = {
+        "model": "belt",
+        "body": {"mass": 1.0},
+        "spring": {"stiffness": k},
+        "friction": {"law": law, **friction},
+        "initial": {"x": x} | ({} if velocity is None else {"velocity": velocity}),
+        "time": {"span": span},
+    }
+    if drive is not None:
+        found["drive"] = {"law": "sinusoidal", "amplitude": drive[0], "frequency": drive[1]}
+    else:
+        found["belt"] = {"velocity": belt}
+    return found
+
+
+def runs(of, spans):
+    return ringsweep.sweep(of, {"time.span": np.atleast_1d(spans).tolist()}, progress=False)
+
+
+def words(found):
+    return [REGIMES[int(regime)] for regime in found.regime]
+
+
+class TestSticking:
+    def test_body_that_sticks_for_good_to_an_oscillating_belt_is_sticking(self):
+        """The load of a stuck body is largest at the extremes of the belt, and stays below breakaway there."""
+        of = scene(
+            *("tustin",), mu_s=0.5, mu_k=0.3, alpha=10.0, k=100.0, drive=(0.005, 0.5), x=0.1, velocity=0.0157079633
+        )
+        found = runs(of, [4.5, 10.0, 1000.0])
+        assert words(found) == ["sticking"] * 3
+        assert (found.slips == 1).all()
+        assert (found.certified == 1).all()
+        np.testing.assert_array_equal(found.stick_share, 1.0)
+        np.testing.assert_allclose(found.stick_time - found.time_span, found.stick_time[2] - 1000.0, atol=1e-9)
+
+    @pytest.mark.parametrize(("law", "of_law"), [("stiction", {}), ("bengisu-akay", {"v0": 1e-4, "alpha": 1e4})])
+    def test_body_on_a_belt_at_rest_comes_to_stick_and_on_a_moving_belt_slips_again(self, law, of_law):
+        of = scene(law, mu_s=0.15, mu_k=0.1, belt=0.0, x=2.0, velocity=0.0, **of_law)
+        found = ringsweep.sweep(of, {"belt.velocity": [0.0, 1e-3, -1e-3]}, progress=False)
+        assert words(found) == ["sticking", "stick-slip", "stick-slip"]
+        np.testing.assert_array_equal(found.settled, [1, 0, 0])
+
+
+class TestRiding:
+    def test_body_that_has_not_broken_loose_is_riding(self):
+        """It breaks loose at k v_b t = mu_s F_N."""
+        needed = 0.15 * 9.81 / (2.0 * 0.1)
+        found = runs(scene("stiction", mu_s=0.15, mu_k=0.1, belt=0.1), [0.999 * needed, 1.001 * needed])
+        assert words(found) == ["riding", "stick-slip"]
+        np.testing.assert_array_equal(found.settled, 0)
+        assert found.first_slip.isnull().values.tolist() == [True, False]
+
+
+class TestRounding:
+    """Rounded laws have the word of the law that they round."""
+
+    LAWS: ClassVar = {
+        "threlfall": ("coulomb", {"mu_k": 0.3}),
+        "bengisu-akay": ("tustin", {"mu_s": 0.4, "mu_k": 0.3, "alpha": 20.0}),
+    }
+
+    @pytest.mark.parametrize("law", LAWS)
+    def test_rounding_never_changes_the_word(self, law):
+        limit, friction = self.LAWS[law]
+        rng = np.random.default_rng(3)
+        speeds, places = 10.0 ** rng.uniform(-1.5, 0.5, 16), rng.uniform(-0.3, 0.3, 16)
+        axes = {
+            "drive.frequency": xr.DataArray(frequencies := 10.0 ** rng.uniform(-0.5, 0.8, 16), dims="case"),
+            "drive.amplitude": xr.DataArray(speeds / (2.0 * pi * frequencies), dims="case"),
+            "time.span": xr.DataArray(25.3 / frequencies, dims="case"),
+            "initial.x": xr.DataArray(places, dims="case"),
+        }
+        exact = ringsweep.sweep(scene(limit, k=30.0, drive=(0.1, 1.0), **friction), axes, progress=False)
+        assert {"stick-slip", "oscillatory", "sticking"} <= set(words(exact))
+        for share in (1e-3, 1e-4, 1e-6):
+            rounded = ringsweep.sweep(
+                scene(law, k=30.0, drive=(0.1, 1.0), v0=0.1, **friction),
+                axes | {"friction.v0": xr.DataArray(share * speeds, dims="case")},
+                progress=False,
+            )
+            assert words(rounded) == words(exact)
+            np.testing.assert_array_equal(rounded.stops_per_cycle, exact.stops_per_cycle)
+            np.testing.assert_allclose(rounded.stick_share, exact.stick_share, atol=5.0 * share + 1e-3)
+
+    def test_body_that_sticks_two_fifths_of_the_time_is_in_stick_slip(self):
+        drive = {"k": 100.0, "drive": (0.01, 3.4), "span": 50.0, "mu_k": 0.3}
+        rounded, exact = runs(scene("threlfall", v0=0.003, **drive), 50.0), runs(scene("coulomb", **drive), 50.0)
+        for found, share in ((rounded, 0.435), (exact, 0.407)):
+            assert words(found) == ["stick-slip"]
+            assert float(found.stick_share[0]) == pytest.approx(share, abs=1e-3)
+            assert float(found.stops_per_cycle[0]) == 2.0
+            # Two stops a cycle do not halve the period.
+            assert float(found.period[0]) == pytest.approx(1 / 3.4, rel=1e-12)
+
+    @pytest.mark.parametrize("share", [1e-3, 1e-6])
+    def test_motion_that_grazes_the_speed_of_the_belt_does_not_stop(self, share):
+        found = runs(scene("threlfall", mu_k=0.1, v0=0.1 * share, belt=0.1), [40.0])
+        assert words(found) == ["oscillatory"]
+        assert float(found.stops_per_cycle[0]) == 0.0
+        assert float(found.period[0]) == pytest.approx(2.0 * pi / sqrt(2.0), rel=1e-3)
+
+
+class TestSpan:
+    """Where the span ends does not matter."""
+
+    CASES: ClassVar = {
+        "bengisu-akay on an oscillating belt": scene(
+            "bengisu-akay", mu_s=0.5, mu_k=0.3, alpha=20.0, v0=0.03, k=100.0, drive=(0.5, 0.43)
+        ),
+        "slow belt": scene("bengisu-akay", mu_s=0.5, mu_k=0.3, alpha=100.0, v0=1e-5, x=0.3, k=100.0, belt=1e-3),
+        "stiction": scene("stiction", mu_s=0.15, mu_k=0.1, belt=0.1),
+        "coulomb": scene("coulomb", mu_k=0.1, belt=0.1),
+    }
+    SPANS: ClassVar = {
+        "bengisu-akay on an oscillating belt": [20.0, 21.0, 21.94, 60.0, 61.1],
+        "slow belt": [60.0, 90.0, 100.0, 400.0, 431.0],
+        "stiction": [40.0, 43.0, 45.1, 100.0, 103.3],
+        "coulomb": [20.0, 21.2, 22.1, 40.0, 41.7],
+    }
+
+    @pytest.mark.parametrize("case", CASES)
+    def test_neither_word_nor_first_slip_depend_on_the_span(self, case):
+        found = runs(self.CASES[case], self.SPANS[case])
+        assert len(set(words(found))) == 1
+        np.testing.assert_allclose(found.first_slip, found.first_slip[0], rtol=1e-9)
+        assert found.settled[-2:].all()
+        np.testing.assert_allclose(found.period[-1], found.period[-2], rtol=1e-5)
+
+    @pytest.mark.parametrize("law", ["stiction", "threlfall"])
+    def test_longer_settled_runs_have_the_same_word_and_numbers(self, law):
+        """Each of the random scenes is run again, longer by fractions of a period of the belt."""
+        of_law = {"mu_s": 0.4} if law == "stiction" else {"v0": 1e-3}
+        rng = np.random.default_rng(7)
+        frequencies, speeds = 10.0 ** rng.uniform(-0.8, 0.2, 10), 10.0 ** rng.uniform(-0.5, 0.5, 10)
+        fractions = np.linspace(0.0, 1.0, 5)
+        spans = (40.0 + fractions[:, np.newaxis]) / frequencies
+        found = ringsweep.sweep(
+            scene(law, mu_k=0.3, k=30.0, drive=(0.1, 1.0), **of_law),
+            {
+                "drive.frequency": xr.DataArray(frequencies, dims="case"),
+                "drive.amplitude": xr.DataArray(speeds / (2.0 * pi * frequencies), dims="case"),
+                "time.span": xr.DataArray(spans, dims=("more", "case")),
+            },
+            progress=False,
+        ).transpose("more", "case")
+        assert {"stick-slip", "oscillatory"} <= set(words(found.isel(more=0)))
+        settled = found.settled.values[0] == 1
+        assert settled.all()
+        for name in ("regime", "period", "stick_share", "stops_per_cycle", "settled"):
+            values = found[name].values[:, settled]
+            np.testing.assert_allclose(values, values[:1].repeat(len(values), axis=0), rtol=5e-3, atol=5e-3)
+
+
+class TestPeriod:
+    def test_undamped_body_that_is_driven_beside_its_resonance_does_not_return(self):
+        """Without friction the free oscillation stays beside the forced one: no cycle repeats another."""
+        found = runs(scene("coulomb", mu_k=0.0, k=2.0, drive=(0.1, 0.37), x=1.0), [40.0, 80.0])
+        assert words(found) == ["oscillatory"] * 2
+        np.testing.assert_array_equal(found.settled, 0)
+        assert found.period.isnull().all()
+
+    def test_motion_without_a_cycle_has_no_period(self):
+        found = runs(scene("coulomb", mu_k=0.1, viscous=0.5, belt=0.1, velocity=0.0), [30.0, 200.0])
+        assert words(found) == ["sliding"] * 2
+        assert found.period.isnull().all()
+        assert found.settled.values.tolist() == [0, 1]
+
+    def test_transient_leaves_no_trace_in_the_period(self):
+        """A large swing decays by reversals of friction, until the body oscillates with the period of the spring."""
+        found = runs(scene("coulomb", mu_k=0.1, belt=0.1, x=7.0, velocity=0.0), [60.0, 120.0])
+        assert words(found)[1] == "oscillatory"
+        assert float(found.period[1]) == pytest.approx(2.0 * pi / sqrt(2.0), rel=1e-9)
+
+
+def test_rk4_has_the_words_and_numbers_of_located_steps():
+    rng = np.random.default_rng(11)
+    of = scene("bengisu-akay", mu_s=0.2, mu_k=0.15, alpha=10.0, v0=0.02, drive=(0.1, 0.3), span=60.0)
+    axes = {
+        "drive.amplitude": xr.DataArray(rng.uniform(0.1, 2.0, 8), dims="case"),
+        "spring.stiffness": xr.DataArray(rng.uniform(1.0, 8.0, 8), dims="case"),
+    }
+    located = ringsweep.sweep(of, axes, progress=False)
+    fixed = ringsweep.sweep(of, axes, solver={"method": "rk4", "steps": 60_000}, progress=False)
+    assert (fixed.certified == 1).all()
+    assert words(fixed) == words(located)
+    for name in ("period", "stops_per_cycle", "settled"):
+        np.testing.assert_allclose(fixed[name], located[name], rtol=1e-3)
+    np.testing.assert_allclose(fixed.stick_share, located.stick_share, atol=5e-3)
+    np.testing.assert_allclose(fixed.x_max, located.x_max, rtol=1e-6)
