@@ -53,6 +53,10 @@ SLOW = FACTORS + MOST_GROUPS * FACTOR_ROWS
 FAST = SLOW + 1
 
 
+# A pull that differs by less than this share from the breakaway force is equal to it.
+_ON_BOUND = 1e-12
+
+
 class Mode(NamedTuple):
     """Mode of the belt.
 
@@ -103,8 +107,15 @@ def _mode_at_rest(scene, t, x, v):
     forcing = drives.turn(scene.drive, t)
     pull = stuck_pull(scene, x, v, forcing)
     bound = breakaway_force(scene)
-    if abs(pull) <= bound and bound > 0.0:
-        return Mode(0, KINETIC, -1)
+    if bound > 0.0:
+        if abs(pull) <= bound * (1.0 - _ON_BOUND):
+            return Mode(0, KINETIC, -1)
+        if abs(pull) <= bound * (1.0 + _ON_BOUND):
+            # The pull only touches the breakaway force unless it still grows.
+            forward = pull > 0.0
+            rate = stuck_pull_rate(scene, t, x, forcing)
+            if (rate if forward else -rate) <= 0.0:
+                return Mode(0, KINETIC, SLOW if forward else FAST)
     if pull == 0.0:
         # The rate of the pull decides, while the belt carries the body along.
         pull = stuck_pull_rate(scene, t, x, forcing)
