@@ -532,9 +532,9 @@ def _settles_to(scene, r, t):
     else:
         for_good = not loads
     if in_stop and stops.least < 0.0:
-        return RIDING, c.period, 1.0, 0.0, returned if forced else for_good
+        return RIDING, c.period, 1.0, 0.0, for_good
     if in_stop and for_good:
-        return STICKING, c.period if forced else nan, 1.0, 0.0, returned if forced else True
+        return STICKING, c.period if forced else nan, 1.0, 0.0, True
     natural = 2.0 * pi / sqrt(scene.stiffness / scene.mass) if scene.stiffness > 0.0 else inf
     slips_since = t - stops.slip_start
     if isnan(c.share) or (not forced and not in_stop and min(slips_since, t - c.last.t) > 2.0 * natural):
