@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ringsweep.config import Config
 from ringsweep.models import batch
+from ringsweep.physics.belt import Damper
 from ringsweep.physics.drives import Constant
 from ringsweep.quantities.variables import FAILED, RIDING
 from ringsweep.runs.cells import laws_at, values_at
@@ -56,9 +57,24 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
         )
     if "settled" in results:
         _warn_of_belt(results, config)
+    failed = _share_failed(results) if any(one.own_law for one in config.scene.structures.values()) else 0.0
+    if failed > 0.0:
+        logger.warning(
+            "%.1f %% of the cells have failed: the friction law of the configuration may be negative, or no number, "
+            "at a speed that the body reached",
+            100.0 * failed,
+        )
     if ended_at_start > 0.5 * ended.size:
         runs = "the run ends" if ended.size == 1 else f"{ended_at_start / ended.size:.0%} of the runs end"
         logger.warning("%s at t = 0: is a unit or the initial state wrong?", runs)
+
+
+def _share_failed(results: xr.Dataset) -> float:
+    regime = results["regime"].variable
+    count = sum(
+        int(np.count_nonzero(regime[region].values == FAILED)) for _, _, region in Layout(regime.shape).chunks()
+    )
+    return count / regime.size
 
 
 def _warn_of_belt(results: xr.Dataset, config: Config) -> None:
@@ -94,6 +110,8 @@ def _warn_of_belt(results: xr.Dataset, config: Config) -> None:
 def _spans_of_first_slip(config: Config, cells: NDArray[np.intp] | None) -> NDArray[np.float64]:
     """Times at which bodies that ride on belts of constant velocity would slip, s; otherwise infinite.
 
+    They are for a linear spring and a damper, and for no force.
+
     `cells` are indices along each dimension, shape ``(cells, dimensions)``; None for a single run.
     """
     scene, axes = config.scene, config.axes
@@ -108,6 +126,9 @@ def _spans_of_first_slip(config: Config, cells: NDArray[np.intp] | None) -> NDAr
         if isinstance(body.drive, Constant):
             velocity = body.drive.amplitude
             with np.errstate(divide="ignore", invalid="ignore"):
-                holds = body.mu_s * body.mass * body.gravity / body.stiffness - np.sign(velocity) * body.initial_x
+                load = body.mu_s * body.mass * body.gravity
+                if isinstance(body.damper, Damper):
+                    load = load - body.damper.coefficient * np.abs(velocity)
+                holds = load / body.stiffness - np.sign(velocity) * body.initial_x
                 spans[own] = np.where(velocity * body.stiffness != 0.0, holds / np.abs(velocity), np.inf)
     return spans
