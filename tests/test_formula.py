@@ -22,7 +22,14 @@ from ringsweep.models import batch
 from ringsweep.numerics.expressions import evaluate
 from ringsweep.physics.friction.formula import FormulaError, read_formula
 from ringsweep.physics.friction.laws import Definition, define
-from ringsweep.physics.friction.velocity import EXPRESSIONS, friction_at, region_at, region_bounds, stiction_band
+from ringsweep.physics.friction.velocity import (
+    EXPRESSIONS,
+    friction_at,
+    region_at,
+    region_bounds,
+    stiction_band,
+    varies,
+)
 from ringsweep.quantities.variables import FAILED
 
 LEINE = {"law": "formula", "mu": "mu_s/(1 + delta*v)", "at_rest": "mu_s", "mu_s": 1.0, "delta": "3 s/m"}
@@ -381,7 +388,17 @@ class TestRegions:
         assert law.thresholds[-1] == pytest.approx(0.5 / 0.3, rel=1e-11)
         assert math.isnan(friction_at(law, 1.7, (0.5, 0.3))[0])
         law = made(define(Definition("mu_s*sqrt(1 - v/w)", "mu_s")), w=1.0)
+        assert law.thresholds[-1] == pytest.approx(1.0, rel=1e-14)
         assert math.isnan(friction_at(law, 1.01, (0.5, 0.3))[0])
+        # Before a pole.
+        law = made(define(Definition("mu_s/(1 + v/w)/(1 - v/w)**2/2", "mu_s")), w=1.0)
+        assert 0.8 < law.thresholds[-1] <= 1.0
+
+    def test_law_of_steps_does_not_vary_within_a_region(self):
+        law = made(define(Definition("mu_k + (mu_s - mu_k)*piecewise(v < w, 1, v < 2*w, 0.5, v/w)", "mu_s")), w=0.1)
+        assert [varies(law, region_at(law, v)) for v in (0.05, 0.15, 0.25)] == [False, False, True]
+        law = made(define(Definition("mu_k + (mu_s - mu_k)*piecewise(v < w, 1, v < 2*w, 0.5, 0.3)", "mu_s")), w=0.1)
+        assert [varies(law, region_at(law, v)) for v in (0.05, 0.15, 0.25)] == [False, False, False]
 
 
 # ---- motion -----------------------------------------------------------------------------------
