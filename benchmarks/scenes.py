@@ -44,7 +44,7 @@ from benchmarks._common import (
     one_core,
     table,
 )
-from ringsweep.physics.friction import LAWS, TRAITS, SetValued, family_of
+from ringsweep.physics.friction import LAWS, SetValued, coefficients_of, family_of
 from ringsweep.runs import sweep
 from ringsweep.solvers import automaton, rk4
 
@@ -86,7 +86,7 @@ def on_ring(law: str = "coulomb", *, contacts: int = 2, drive: Any = None, arcs:
     """Scene of a ring; `rough` holds the friction coefficients of its arcs."""
     pair = {"mu_s": 0.2, "mu_k": 0.1}
     rough = rough or {"mu_s": 0.3, "mu_k": 0.15}
-    if not TRAITS[LAWS[law]].static:
+    if "mu_s" not in coefficients_of(LAWS[law]):
         pair, rough = {"mu_k": pair["mu_k"]}, {"mu_k": rough["mu_k"]}
     more = {"tustin": {"alpha": 100.0}, "bengisu-akay": {"alpha": 100.0, "v0": 0.2}}.get(law, {})
     body = {"mass": 0.076}
@@ -109,7 +109,7 @@ def on_ring(law: str = "coulomb", *, contacts: int = 2, drive: Any = None, arcs:
 
 def on_belt(law: str) -> Any:
     """Scene of a mass on a belt."""
-    pair = {"mu_k": 0.1} if not TRAITS[LAWS[law]].static else {"mu_s": 0.15, "mu_k": 0.1}
+    pair = {"mu_k": 0.1} if "mu_s" not in coefficients_of(LAWS[law]) else {"mu_s": 0.15, "mu_k": 0.1}
     more = {"sigma0": 1e3, "sigma1": 30.0, "sigma2": 0.1, "v_s": 1e-2} if law == "lugre" else {}
     return {
         "model": "belt",

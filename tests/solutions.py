@@ -9,8 +9,16 @@ from scipy.optimize import brentq
 
 from ringsweep.compile import take
 from ringsweep.models.ring.record import Outcome
-from ringsweep.physics.friction.velocity import weights
+from ringsweep.physics.friction.speeds import hidden_fields
+from ringsweep.physics.friction.velocity import EXPRESSIONS, friction_at
 from ringsweep.solvers.automaton import integrate
+
+
+def made(law, surfaces=((0.5, 0.3),), **parameters):
+    """Friction law of one cell, made in the same way as in a sweep."""
+    columns = {name: np.array([float(value)]) for name, value in parameters.items()}
+    pairs = [tuple(np.array([float(mu)]) for mu in pair) for pair in surfaces]
+    return take(law(**columns, **hidden_fields(EXPRESSIONS[law], columns, pairs)), 0)
 
 
 def solve(method, batch):
@@ -162,10 +170,8 @@ def imbalance(batch, run, coefficients):
     force = (inertia * run.epsilon + weight * np.sin(run.phi)) / body.radius
     v = body.radius * (run.omega - run.ring_omega)
     slips = run.mode != 0 if not hasattr(scene.law, "v0") else np.ones(len(run.t), dtype=bool)
-    table = np.array(coefficients)
     for k in np.flatnonzero(slips):
-        w_s, w_k, _, _ = weights(scene.law, abs(v[k]))
-        mu = table @ (w_s, w_k)
+        mu = [friction_at(scene.law, abs(v[k]), tuple(pair))[0] for pair in coefficients]
         load = mu[int(run.zone_1[k])] * run.normal_1[k] + mu[int(run.zone_2[k])] * run.normal_2[k]
         sense = run.mode[k] or np.sign(v[k])
         force[k] = -sense * load

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from ringsweep.physics.friction.regularised import BengisuAkay
+from solutions import made
 
 from ringsweep.compile import kernel, take
 from ringsweep.errors import InputError
 from ringsweep.models.interface.constant_step import inspect
 from ringsweep.physics import ring
+from ringsweep.physics.friction.laws import BengisuAkay
 from ringsweep.physics.ring import OneContact, Ring, TwoContacts, acceleration, acceleration_slope, reactions
 from ringsweep.physics.zones import Arc, surface_of
 
@@ -170,7 +171,7 @@ class TestMirror:
     def test_friction_of_a_mirror_image_is_mirrored(self, cells, phi, theta, omega, ring_omega, center, half_angle):
         def at(sign):
             surface = surface_of([Arc(sign * center, half_angle, 0.5, 0.3)], 0.2, 0.1)
-            scene = Ring(body, surface, BengisuAkay(1.0, 0.5), None, 0.0, 0.0, 1.0, 0.0)
+            scene = Ring(body, surface, made(BengisuAkay, alpha=1.0, v0=0.5), None, 0.0, 0.0, 1.0, 0.0)
             return ring.friction(scene, sign * phi, sign * omega, sign * theta, sign * ring_omega)
 
         body = take(cells().body, 0)

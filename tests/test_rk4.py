@@ -12,7 +12,7 @@ from ringsweep.models.interface.constant_step import verdict
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2
 from ringsweep.models.ring.record import Outcome
 from ringsweep.models.ring.rk4 import Inspection
-from ringsweep.physics.friction.velocity import weights
+from ringsweep.physics.friction.velocity import friction_at
 from ringsweep.physics.ring import acceleration, reactions
 from ringsweep.quantities.variables import FAILED, JAMMED, OSCILLATORY, REGIMES, RESTING, REVOLVING, SEPARATING
 from ringsweep.solvers.rk4 import RK4, STABILITY_LIMIT
@@ -137,9 +137,8 @@ class TestEnergy:
         force = np.zeros_like(run.t)
         for zone, normal in ((run.zone_1, run.normal_1), (run.zone_2, run.normal_2)):
             for k, v in enumerate(body.radius * (run.omega - run.ring_omega)):
-                w_s, w_k, _, _ = weights(scene.law, abs(v))
-                mu_s, mu_k = rough if zone[k] else rest
-                force[k] -= np.sign(v) * (w_s * mu_s + w_k * mu_k) * normal[k]
+                mu, _ = friction_at(scene.law, abs(v), rough if zone[k] else rest)
+                force[k] -= np.sign(v) * mu * normal[k]
         power = body.radius * run.omega * force
         work = np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(run.t))])
         inertia = body.inertia + body.mass * body.xi**2

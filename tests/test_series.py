@@ -9,8 +9,6 @@ from hypothesis import strategies as st
 
 from ringsweep.compile import inlined, kernel
 from ringsweep.numerics.series import (
-    COLUMNS,
-    FACTOR_ROWS,
     INVERSE,
     ORDER,
     STACK,
@@ -23,7 +21,7 @@ from ringsweep.numerics.series import (
     value,
     variation,
 )
-from ringsweep.numerics.terms import PRODUCTS, inner_products, no_factors, set_factors
+from ringsweep.numerics.terms import COLUMNS, FACTOR_ROWS, PRODUCTS, inner_products, no_factors, set_factors
 
 K = np.arange(ORDER + 1)
 
@@ -67,7 +65,7 @@ def sums_in_kernel(c, s):
 @kernel
 def products_in_kernel(c, left, right):
     """Fill `c` with products of series that grow side by side: row i is the product of rows i of `left` and `right`."""
-    first = newest = no_factors()
+    first = newest = no_factors(eight(left, 0))
     for k in range(1, ORDER + 1):
         inner = inner_products(c, PRODUCTS, k, first, newest)
         for i in range(PRODUCTS):

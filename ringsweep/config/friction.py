@@ -45,7 +45,7 @@ def friction_law(name: str, mu: str, at_rest: str | None = None) -> None:
         Name of the law in scenes: ``friction: {law: NAME}``. A law of your own with this name is replaced.
     mu : str
         Friction coefficient as a formula of the sliding speed ``v`` (m/s), of the coefficients ``mu_s`` and ``mu_k`` of
-        the surface, and of parameters, which the scene gives; see ``docs/friction.md``.
+        the surface, and of parameters, which the scene gives; see ``docs/laws.md``.
     at_rest : str, optional
         ``"mu_s"`` or ``"mu_k"``: at rest friction holds up to this coefficient. Without it the law is smooth, and
         friction vanishes at v = 0.

@@ -83,6 +83,8 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     if laws is not None:
         names = read_values(laws[1], law_choice(model, own), laws[0]).tolist()
     keep_definitions(friction, names)
+    # Laws of this process too: other processes know only what the structure holds.
+    own |= own_laws(friction)
     drive = "none"
     if "drive" in scene:
         drive = choose(DRIVES, section_of(scene, "drive", "scene."), "scene.drive.law", "drive law")

@@ -10,11 +10,15 @@ from itertools import product
 from typing import Any
 
 from ringsweep.config.axes import COUNT
+from ringsweep.config.friction import CURVE, FORMULA
+from ringsweep.config.friction import TABLE as TABLE_LAW
 from ringsweep.config.scene import TABLES
 from ringsweep.models import MODELS, parameters
 from ringsweep.models.scene import LAW, Structure
 from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS
+from ringsweep.physics.friction.formula import COEFFICIENTS
+from ringsweep.physics.friction.laws import Table
 from ringsweep.quantities.parameters import Parameter, declared
 from ringsweep.solvers import METHODS
 
@@ -27,8 +31,9 @@ def schema() -> dict[str, Any]:
     """
     known: dict[str, list[Parameter]] = {}
     for model, drive, arcs in product(MODELS, DRIVES, ((), ("zone",), ("zones.0",))):
-        for law in MODELS[model].laws:
-            for path, parameter in parameters(Structure(model, law, drive, arcs)).items():
+        for law in (*MODELS[model].laws, TABLE_LAW):
+            own = Table if law == TABLE_LAW else None
+            for path, parameter in parameters(Structure(model, law, drive, arcs, own_law=own)).items():
                 # All arcs of a list have one description.
                 parameter = dataclasses.replace(
                     parameter, long_name=parameter.long_name.replace("rough arc 1", "the rough arc")
@@ -40,7 +45,16 @@ def schema() -> dict[str, Any]:
     scene = _nest(
         {
             "model": _names(MODELS, "what moves"),
-            LAW: _names(LAWS, "friction law; may be missing where sweep goes through laws"),
+            LAW: _laws("friction law; may be missing where sweep goes through laws"),
+            "friction.laws": {
+                "description": "friction laws by formula: name -> mu, at_rest",
+                "type": "object",
+                "additionalProperties": {**_section({"mu": _formula(), "at_rest": _at_rest()}), "required": ["mu"]},
+            },
+            "friction.mu": _any_of([_formula(), _list(_number(CURVE["mu"]))]),
+            "friction.at_rest": _at_rest(),
+            "friction.v": _list(_number(CURVE["v"])),
+            "friction.file": {"type": "string", "description": "CSV file with columns v (m/s), mu"},
             "drive.law": _names(DRIVES, "how the ring is driven"),
             "drive.file": {"type": "string", "description": "CSV file with columns t (s), theta (rad)"},
             "force.file": {"type": "string", "description": "CSV file with columns t (s), force (N)"},
@@ -54,6 +68,9 @@ def schema() -> dict[str, Any]:
     )
     scene["required"] = ["model"]
     scene["properties"]["drive"]["required"] = ["law"]
+    scene["properties"]["friction"]["additionalProperties"] = _number(
+        Parameter("", "parameter of a friction law by formula")
+    )
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "ringsweep configuration",
@@ -79,6 +96,26 @@ def _number(parameter: Parameter) -> dict[str, Any]:
 def _names(registry: Mapping[str, Any], about: str) -> dict[str, Any]:
     choices = [{"const": name, "description": _first_line(entry)} for name, entry in registry.items()]
     return {"description": about, "type": "string", "oneOf": choices}
+
+
+def _laws(about: str) -> dict[str, Any]:
+    """Names of friction laws: those of the package, `formula`, `table`, and names that a user gives."""
+    known = _names(LAWS, about)
+    known["oneOf"] += [
+        {"const": FORMULA, "description": "A formula of the sliding speed, under mu"},
+        {"const": TABLE_LAW, "description": "Measured friction: a file, or lists v and mu"},
+    ]
+    own = {"description": "a law of the section laws, or of the Python session", "minLength": 1}
+    return {"description": about, "type": "string", "anyOf": [*known["oneOf"], own]}
+
+
+def _formula() -> dict[str, Any]:
+    return {"description": "friction coefficient as a formula of the sliding speed v", "type": "string"}
+
+
+def _at_rest() -> dict[str, Any]:
+    about = "coefficient up to which friction holds at rest; without it the law is smooth"
+    return {"description": about, "enum": [*COEFFICIENTS]}
 
 
 def _first_line(documented: Any) -> str:
@@ -127,8 +164,9 @@ def _solver() -> dict[str, Any]:
 def _sweep(paths: list[str]) -> dict[str, Any]:
     value = {"type": ["number", "string"]}
     arcs = "|".join(path.removeprefix("zones.0.") for path in paths if path.startswith("zones.0."))
-    laws = {LAW: _list(_names(LAWS, "friction law"))}
-    names = {"anyOf": [{"enum": [*laws, *paths]}, {"pattern": rf"^zones\.[0-9]+\.({arcs})$"}]}
+    laws = {LAW: _list(_laws("friction law"))}
+    own = r"^friction\.[A-Za-z][A-Za-z0-9_]*$"
+    names = {"anyOf": [{"enum": [*laws, *paths]}, {"pattern": rf"^zones\.[0-9]+\.({arcs})$"}, {"pattern": own}]}
     bounds = {"type": "array", "prefixItems": [value, value, _number(COUNT)], "minItems": 3, "maxItems": 3}
     axis = {"anyOf": [_list(value), *(_section({kind: bounds}) for kind in ("linspace", "geomspace"))]}
     return _section(

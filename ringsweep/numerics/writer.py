@@ -151,6 +151,8 @@ def varies_lines(output: Node, side: str) -> list[str]:
         if node.kind == "switch":
             return parts[0] if parts[0] == parts[1] else f"({parts[0]} if {side.format(node.value)} else {parts[1]})"
         needed = [part for part in parts if part != "False"]
+        if not needed:
+            return "False"
         return "True" if "True" in needed else "(" + " or ".join(needed) + ")"
 
     return [f"return {text(output)}"]

@@ -17,7 +17,7 @@ from ringsweep.numerics import expressions
 from ringsweep.numerics.expressions import SPEED, Node, number, symbol
 
 #: Names that no parameter can have: those of the formula, and the keys of the section ``friction``.
-RESERVED = frozenset({"v", "pi", "mu", "law", "laws", "at_rest", "rough", "rest", "file"})
+RESERVED = frozenset({"v", "pi", "mu", "law", "laws", "at_rest", "rough", "rest", "file", "viscous"})
 
 #: Coefficients of the surface.
 COEFFICIENTS = ("mu_s", "mu_k")

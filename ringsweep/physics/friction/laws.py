@@ -280,6 +280,8 @@ def _defined(qualified: str) -> type:
         raise FormulaError(
             f"at_rest is {at_rest!r}, but it can only be mu_s or mu_k, which have values for each surface"
         )
+    if at_rest == "mu_k" and "mu_s" in used:
+        raise FormulaError("at_rest is mu_k, but the formula uses mu_s, which is never less: write at_rest: mu_s")
     # Friction that turns negative or is no number ends a run.
     valid = Threshold(None, formula.mu, kind="valid")
     checked = switch(len(formula.thresholds), formula.mu, number(float("nan")))

@@ -237,8 +237,9 @@ class _Finder:
             value = grid[rows[place == 0][0], 0]
             raise FormulaError(f"at rest it gives {value:.6g}: a friction coefficient is a number and not negative")
         found[rows] = _GRID[place - 1]
-        negative = grid[rows, place] < 0.0
-        rows, place = rows[negative], place[negative]
+        # A pole is not bisected: friction is positive on both sides.
+        bounded = grid[rows, place] != np.inf
+        rows, place = rows[bounded], place[bounded]
         found[rows] = self._bisect(mu, values, rows, _GRID[place - 1], _GRID[place])
         return found
 
