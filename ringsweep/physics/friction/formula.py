@@ -16,8 +16,13 @@ from typing import Any
 from ringsweep.numerics import expressions
 from ringsweep.numerics.expressions import SPEED, Node, number, symbol
 
-#: Names that no parameter can have: those of the formula, and the keys of the section ``friction``.
-RESERVED = frozenset({"v", "pi", "mu", "law", "laws", "at_rest", "rough", "rest", "file", "viscous"})
+#: Fields of a law that follow from its parameters.
+HIDDEN = ("slope_at_rest", "slope_beyond", "edges", "thresholds", "pieces", "band", "in_band")
+
+#: Names that no parameter can have: those of the formula, keys of the section ``friction``, and what a law has besides.
+RESERVED = frozenset(
+    {"v", "pi", "mu", "law", "laws", "at_rest", "rough", "rest", "file", "viscous", "count", "index", *HIDDEN}
+)
 
 #: Coefficients of the surface.
 COEFFICIENTS = ("mu_s", "mu_k")
