@@ -132,7 +132,8 @@ class TestConfiguration:
         error = refusal(load, grid(friction__law=laws))
         assert error.path == path
         assert problem in error.problem
-        assert not Draft202012Validator(schema()).is_valid(grid(friction__law=laws))
+        # The schema does not know the names that a scene or a session gives to laws of its own.
+        assert Draft202012Validator(schema()).is_valid(grid(friction__law=laws)) == ("did you mean" in problem)
 
     def test_misspelt_law_of_the_scene_is_refused_even_if_laws_are_swept(self):
         assert refusal(load, changed(scene__friction__law="colomb")).path == "scene.friction.law"

@@ -551,6 +551,14 @@ def test_solver_is_read_with_its_options():
     assert "true or false" in refusal(read_solver, {"method": "rk4", "steps": 10, "certify": "yes"}).problem
 
 
+def own_law(friction, swept):
+    """Configuration with a law that the package does not have, and a sweep of one of its parameters."""
+    rest = {"scale": 1.0} if friction["law"] == "table" else {"mu_s": 0.4, "mu_k": 0.3}
+    rest = {"mu_k": 0.3} if "laws" in friction else {"mu_s": 0.4} if "at_rest" in friction else rest
+    scene = edited(zone=None, friction={**friction, "rest": rest})
+    return {"scene": scene, "sweep": {"grid": {swept: [1, 2]}}}
+
+
 def test_schema_is_valid_and_accepts_valid_configurations(write):
     Draft202012Validator.check_schema(schema())
     validator = Draft202012Validator(schema())
@@ -562,6 +570,9 @@ def test_schema_is_valid_and_accepts_valid_configurations(write):
         {"scene": dict(read_scene(scene).source), "solver": SOLVER},
         {"scene": edited(zone=None, zones=arcs, friction__rough=None), "solver": SOLVER},
         {"scene": SCENE, "solver": SOLVER, "sweep": {"points": {"drive.amplitude": [1, "2"]}}},
+        own_law({"law": "formula", "mu": "mu_s/(1 + delta*v)", "at_rest": "mu_s", "delta": "3 s/m"}, "friction.delta"),
+        own_law({"law": "leine", "laws": {"leine": {"mu": "mu_k/(1 + d*v)", "at_rest": "mu_k"}}, "d": 3}, "friction.d"),
+        own_law({"law": "table", "v": [0, "1 m/s"], "mu": [0.4, 0.3]}, "friction.rest.scale"),
     ):
         load(config)
         validator.validate(config)
@@ -573,7 +584,7 @@ def test_every_configuration_in_configs_satisfies_the_schema(file):
 
 
 @pytest.mark.parametrize(
-    "changes", [{"body__mas": 1}, {"friction__law": "bengisu"}, {"body__mass": -1}, {"zones": []}, {"body": 3}]
+    "changes", [{"body__mas": 1}, {"friction__law": 3}, {"body__mass": -1}, {"zones": []}, {"body": 3}]
 )
 def test_schema_refuses_wrong_keys_names_and_types(changes):
     assert not Draft202012Validator(schema()).is_valid({"scene": edited(**changes)})
