@@ -257,7 +257,7 @@ class TestGeometry:
 
 @kernel
 def compiled_inspect(batch, i, y, theta, ring_omega):
-    return inspect(take(batch, i), y, theta, ring_omega)
+    return inspect(take(batch, i), y, (theta, ring_omega))
 
 
 class TestCompiledModel:

@@ -74,6 +74,9 @@ AT_ONCE = 1e-9
 # If the effective inertia is smaller than this share of the moment of inertia about the axis, the body is about to jam.
 NEARLY_JAMMED = 1e-4
 
+# Friction coefficients that differ by less than this share are equal.
+_EQUAL = 1e-14
+
 #: Error allowed to the reactions as a share of the load, in units of the tolerance of the series.
 REACTION_TOLERANCE = 1e3
 
@@ -131,8 +134,13 @@ def _initial_mode(scene, t, y):
 @inlined
 def _at_breakaway(scene, mode):
     """Friction coefficient under each contact at the beginning of slip."""
-    mu_1, mu_2, _, _ = friction_in(scene.law, mode.region, 0.0, coefficients_under(scene, mode))
-    return mu_1, mu_2
+    mu_s1, _, mu_s2, _ = surfaces = coefficients_under(scene, mode)
+    mu_1, mu_2, _, _ = friction_in(scene.law, mode.region, 0.0, surfaces)
+    # Friction that does not drop at breakaway is static friction, without the rounding of the formula.
+    return (
+        mu_s1 if abs(mu_1 - mu_s1) <= _EQUAL * mu_s1 else mu_1,
+        mu_s2 if abs(mu_2 - mu_s2) <= _EQUAL * mu_s2 else mu_2,
+    )
 
 
 @inlined
