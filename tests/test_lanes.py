@@ -132,7 +132,7 @@ FORMULAS = {
     "logarithm": Definition("mu_k + (mu_s - mu_k)/(1 + log(1 + (alpha*v)**2))", "mu_s"),
     "arc": Definition("mu_k*2/pi*atan(v/v0)"),
     "root": Definition("mu_s*v/sqrt(v*v + v0*v0)"),
-    "corners": Definition("max(min(mu_s*v/v0, mu_s + mu_k - mu_k*v/v0), mu_k*(1 - exp(-v/v0)))"),
+    "corners": Definition("mu_s*max(min(v/v0, 1.6 - 0.6*v/v0), 0.6*(1 - exp(-v/v0)))"),
     "bump": Definition("piecewise(v < v0, mu_s*tanh(alpha*v), v < 3*v0, mu_k + (mu_s - mu_k)*exp(-v/v0), mu_k)"),
 }
 
