@@ -30,7 +30,7 @@ def kinds(cell):
 
 
 #: What runs warn of: rk4 beyond its limit, and belts whose motion has not settled.
-KNOWN = ("exceed the limit of stability of rk4", "have not settled")
+KNOWN = ("exceed the limit of stability of rk4", "not settled")
 
 
 def code(notebook):

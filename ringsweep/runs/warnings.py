@@ -93,18 +93,19 @@ def _warn_of_belt(results: xr.Dataset, config: Config) -> None:
             spans = spans[np.isfinite(spans)]
             soonest, latest = min(soonest, spans.min(initial=np.inf)), max(latest, spans.max(initial=0.0))
     if unsettled:
-        logger.warning(
-            "%.1f %% of the cells have not settled: a longer span may change their regimes, shares of stick and stops",
-            100.0 * unsettled / regime.size,
-        )
+        who = "the motion has" if regime.size == 1 else f"{unsettled / regime.size:.1%} of the motions have"
+        logger.warning("%s not settled: a longer span may change regime, share of stick and stops", who)
     if riding:
         remedy = "on their belts no span would let them slip"
         if latest > 0.0:
             remedy = f"the first slip, at k v t = mu_s F_N, needs a span of {soonest:.3g} s"
             remedy += f" to {latest:.3g} s" if latest > 1.01 * soonest else ""
-        logger.warning(
-            "%.1f %% of the cells are riding, they have not broken loose: %s", 100.0 * riding / regime.size, remedy
+        who = (
+            "the body rides: it has"
+            if regime.size == 1
+            else f"{riding / regime.size:.1%} of the bodies ride: they have"
         )
+        logger.warning("%s not broken loose; %s", who, remedy)
 
 
 def _spans_of_first_slip(config: Config, cells: NDArray[np.intp] | None) -> NDArray[np.float64]:
