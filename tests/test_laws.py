@@ -197,7 +197,9 @@ def series_of_friction(law, region, surfaces, x):
 
 
 def test_every_law_of_the_velocity_is_tested():
-    assert {name for name, law in LAWS.items() if family_of(law) is not Dynamic} == set(PUBLISHED)
+    # Other tests of the process may have defined laws of their own.
+    own = {name for name, law in LAWS.items() if law.__qualname__.startswith("formula_")}
+    assert {name for name, law in LAWS.items() if family_of(law) is not Dynamic} - own == set(PUBLISHED)
     for name, known in PUBLISHED.items():
         assert family_of(LAWS[name]) is known.family
 
