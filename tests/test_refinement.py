@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from ringsweep.runs.refinement import AUDITED, COMPUTED, INFERRED, Answer, largest_number, refine
+from ringsweep.quantities.variables import AUDITED, COMPUTED, INFERRED
+from ringsweep.runs.refinement import Answer, largest_number, refine
 
 SIZE = 257
 

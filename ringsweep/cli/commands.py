@@ -34,13 +34,13 @@ def init_command(arguments: argparse.Namespace) -> None:
 
 def run_command(arguments: argparse.Namespace) -> None:
     """Run a sweep into a file, print a summary and draw the regime map."""
-    from ringsweep.config import load
+    from ringsweep.config import load, refined
 
     if arguments.backend == "dask" and arguments.scheduler is None:
         raise InputError("--backend", "dask needs the address of its scheduler: --scheduler ADDRESS")
     if arguments.backend == "threads" and arguments.scheduler is not None:
         raise InputError("--scheduler", "is for --backend dask")
-    config = load(arguments.config)
+    config = refined(load(arguments.config), arguments.refine or None)
     target, picture = _outputs(f"{config.name}.nc" if arguments.output is None else arguments.output, "regime", "sweep")
 
     from ringsweep import plots

@@ -46,6 +46,7 @@ def build_parser() -> argparse.ArgumentParser:
         ringsweep run my.yaml              my.nc and my.png; after a stop the same command goes on
         ringsweep run my.yaml --jobs 1 -o results/one.nc
         ringsweep run finer.yaml --reuse my.nc
+        ringsweep run my.yaml --refine     compute only the boundaries of the map
         ringsweep run my.nc -o again.nc    repeat the sweep of my.nc
         ringsweep run my.yaml --backend dask --scheduler tcp://host:8786
         """)  # fmt: skip
@@ -54,6 +55,9 @@ def build_parser() -> argparse.ArgumentParser:
     run.add_argument("--jobs", type=whole_number, metavar="N", help="threads (default: all cores)")
     run.add_argument("--fresh", action="store_true", help="start over: discard what an earlier run computed")
     run.add_argument("--reuse", metavar="OLD.nc", help="take cells that this earlier sweep has too")
+    run.add_argument(
+        "--refine", action="store_true", help="compute only the boundaries, audit the rest (see sweep.refine)"
+    )
     run.add_argument("--backend", choices=["threads", "dask"], help="what computes (default: threads of this machine)")
     run.add_argument("--scheduler", metavar="ADDRESS", help="address of a Dask scheduler, such as tcp://host:8786")
 

@@ -2,9 +2,9 @@
 
 The cells of a coarse lattice come first. Each level halves the intervals of the lattice. A new point of the lattice
 takes the label of the points around it if these agree, and is computed if they do not. Then every pair of neighbours in
-the lattice that differ is computed, until no new pair appears. So a boundary is followed from point to point, even if it
-leaves a block through an edge whose ends agree. Around what is thinner than the lattice more points are computed, since
-its parts may lie between the points. On the last level the lattice is the grid. What it infers is audited.
+the lattice that differ is computed, until no new pair appears. So a boundary is followed from point to point, even
+if it leaves a block through an edge whose ends agree. Around what is thinner than the lattice more points are computed,
+since its parts may lie between the points. On the last level the lattice is the grid. What it infers is audited.
 """
 
 from __future__ import annotations
@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import hypergeom
 
-#: Flags of the variable ``origin``.
-COMPUTED, INFERRED, AUDITED = range(3)
+from ringsweep.quantities.variables import AUDITED, COMPUTED, INFERRED
 
 #: Confidence of the bound on wrong cells.
 CONFIDENCE = 0.95
