@@ -12,10 +12,11 @@ from __future__ import annotations
 import math
 from collections.abc import Generator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import hypergeom
+from scipy.special import gammaln
 
 from ringsweep.quantities.variables import AUDITED, COMPUTED, INFERRED
 
@@ -370,8 +371,19 @@ def largest_number(total: int, drawn: int, wrong: int) -> int:
     low, high = wrong, total - (drawn - wrong)
     while low < high:
         middle = (low + high + 1) // 2
-        if hypergeom.cdf(wrong, total, middle, drawn) > 1.0 - CONFIDENCE:
+        if _probability(wrong, total, middle, drawn) > 1.0 - CONFIDENCE:
             low = middle
         else:
             high = middle - 1
     return low
+
+
+def _probability(most: int, total: int, marked: int, drawn: int) -> float:
+    """Probability that at most `most` of `drawn` cells are among the `marked` ones of `total` (hypergeometric)."""
+    number = np.arange(max(0, drawn - (total - marked)), min(most, marked, drawn) + 1)
+
+    def choices(of: Any, some: Any) -> Any:
+        return gammaln(of + 1) - gammaln(some + 1) - gammaln(of - some + 1)
+
+    ways = choices(marked, number) + choices(total - marked, drawn - number) - choices(total, drawn)
+    return float(np.exp(ways).sum())

@@ -10,6 +10,7 @@ from contextlib import AbstractContextManager, contextmanager
 from functools import partial
 from pathlib import Path
 from threading import Event
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,9 @@ logger = logging.getLogger("ringsweep")
 
 #: Largest number of cells of a sweep in memory, where they take some gigabytes.
 MAX_CELLS_IN_MEMORY = 10_000_000
+
+# Seconds of a refined sweep that are lost if it is killed.
+_WRITE_INTERVAL = 1.0
 
 
 def run(
@@ -432,7 +436,11 @@ def _open_tasks(
     with stop_on_interrupt() as stopped, context as workers:
         sizes = TaskSizes(config.solver.side_by_side, workers.concurrency)
         with progress_bar(total, progress, int(store.done.sum())) as bar:
-            yield _Tasks(partial(compute_task, config, layout), store, workers, sizes, stopped, bar)
+            tasks = _Tasks(partial(compute_task, config, layout), store, workers, sizes, stopped, bar)
+            try:
+                yield tasks
+            finally:
+                tasks.store_waiting()
 
 
 class _Tasks:
@@ -444,7 +452,7 @@ class _Tasks:
     stopped : Event
         Set once the user has interrupted.
     notice : callable, optional
-        Called with positions and columns of each result.
+        Called with positions and columns of each result; then results of small tasks are stored together.
     """
 
     def __init__(
@@ -454,6 +462,8 @@ class _Tasks:
         self._compute, self._store, self._workers, self._bar = compute, store, workers, bar
         self.sizes, self.stopped = sizes, stopped
         self.notice: Callable[[NDArray[np.integer], dict[str, NDArray[Any]]], None] | None = None
+        self._waiting: list[TaskResult] = []
+        self._written = monotonic()
 
     def run(self, tasks: Iterator[NDArray[np.integer]]) -> None:
         """Run tasks, each given by the positions of its cells."""
@@ -463,9 +473,13 @@ class _Tasks:
                 if result.environment != environment():
                     changes = differences(environment(), result.environment)
                     raise InputError("--scheduler", f"a worker has other versions than this process: {changes}")
-                self._store.put(result.positions, result.columns, result.processor)
-                if self.notice is not None:
+                if self.notice is None:
+                    self._store.put(result.positions, result.columns, result.processor)
+                else:
                     self.notice(result.positions, result.columns)
+                    self._waiting.append(result)
+                    if monotonic() - self._written > _WRITE_INTERVAL:
+                        self.store_waiting()
                 self._bar.update(len(result.positions))
         except BaseException:
             self.stopped.set()
@@ -474,6 +488,19 @@ class _Tasks:
             # Tasks under way cannot be interrupted. Wait for their end.
             for _ in results:
                 pass
+
+    def store_waiting(self) -> None:
+        """Store the results of small tasks together: a file for each would take longer than its cells."""
+        waiting, self._waiting = self._waiting, []
+        self._written = monotonic()
+        for processor in sorted({result.processor for result in waiting}):
+            some = [result for result in waiting if result.processor == processor]
+            positions = np.concatenate([result.positions for result in some])
+            order = np.argsort(positions)
+            columns = {
+                name: np.concatenate([result.columns[name] for result in some])[order] for name in some[0].columns
+            }
+            self._store.put(positions[order], columns, processor)
 
 
 def _frame(config: Config, found: Refined | None) -> xr.Dataset:
