@@ -94,8 +94,20 @@ def map_command(arguments: argparse.Namespace) -> None:
     target = Path(arguments.output or dataset.with_name("-".join([dataset.stem, *shown]) + ".png"))
     netcdf.check_writable(target)
     selection = dict(_selection(text) for text in arguments.sel)
+    if arguments.tolerance is not None and arguments.boundaries is None:
+        raise InputError("--tolerance", "is that of --boundaries REGIME")
+    curves = None
     try:
-        figure = plots.regime_map(result, arguments.x, arguments.y, arguments.var, selection)
+        if arguments.boundaries is not None:
+            from ringsweep.plots.selection import select
+            from ringsweep.runs.boundaries import boundary
+
+            tolerance = 1e-6 if arguments.tolerance is None else arguments.tolerance
+            curves = boundary(select(result, selection)[0], arguments.boundaries, tolerance)
+            written = dataset.with_name(f"{target.stem}-{arguments.boundaries}.nc")
+            netcdf.save(curves, written)
+            print(f"wrote {written}")
+        figure = plots.regime_map(result, arguments.x, arguments.y, arguments.var, selection, curves)
     except InputError as error:
         if error.path == "ds":
             raise InputError(str(dataset), error.problem) from error

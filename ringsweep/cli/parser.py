@@ -65,6 +65,8 @@ def build_parser() -> argparse.ArgumentParser:
         ringsweep map my.nc                my.png: the regimes
         ringsweep map my.nc --var t_separation --x zone.half_angle
         ringsweep map my.nc --sel "zone.half_angle=15 deg" -o line.pdf
+        ringsweep map my.nc --var origin   which cells of a refined sweep were run
+        ringsweep map my.nc --boundaries separating --tolerance 1e-6
         """)  # fmt: skip
     draw.add_argument("dataset", metavar="OUT.nc")
     draw.add_argument("-o", "--output", metavar="MAP.png", help="default: beside OUT.nc; .pdf and .svg too")
@@ -77,6 +79,11 @@ def build_parser() -> argparse.ArgumentParser:
         default=[],
         metavar="DIM=VALUE",
         help="fix a coordinate at its value nearest to VALUE; units allowed",
+    )
+
+    draw.add_argument("--boundaries", metavar="REGIME", help="locate the boundary of a regime: curves, also as NetCDF")
+    draw.add_argument(
+        "--tolerance", type=positive_number, metavar="T", help="error of these, in SI units (default: 1e-6)"
     )
 
     simulate = _add_command(commands, "simulate", simulate_command,
