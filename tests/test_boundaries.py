@@ -109,8 +109,8 @@ class TestUncertaintyExponent:
         assert float(found.exponent) == pytest.approx(1.0, abs=0.05)
         assert found.uncertain.values[0] > found.uncertain.values[-1]
 
-    def test_koch_like_boundary_has_its_dimension(self):
-        """The boundary of a Cantor set of stripes has the dimension 1 + log 2 / log 3."""
+    def test_stripes_over_a_cantor_set_have_their_dimension(self):
+        """It is 1 + log 2 / log 3."""
         cells = np.arange(3**6)
         cantor = np.ones(3**6, dtype=bool)
         for k in range(6):

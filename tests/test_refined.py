@@ -68,11 +68,14 @@ class TestFile:
                 expected = whole[name].values[run]
                 assert ds[name].values[run].astype(expected.dtype).tobytes() == expected.tobytes(), name
 
-    def test_labels_are_those_of_the_full_grid(self, ds, full):
+    def test_inferred_labels_differ_from_the_full_grid_in_no_more_cells_than_the_bound_says(self, ds, full):
+        wrong = np.zeros(ds.regime.shape, dtype=bool)
         with xr.open_dataset(full, decode_times=False) as whole:
             for name in LABELS:
                 assert ds[name].dtype == np.int8
-                np.testing.assert_array_equal(ds[name], whole[name])
+                wrong |= ds[name].values != whole[name].values
+        assert wrong.sum() <= ds.attrs["audit_bound"] * (ds.origin == INFERRED).sum()
+        assert wrong.mean() < 0.005
 
     def test_numbers_and_certificates_are_missing_where_a_cell_is_inferred(self, ds):
         inferred = ds.origin.values == INFERRED
@@ -87,8 +90,8 @@ class TestFile:
         assert ds.origin.attrs["flag_meanings"] == "computed inferred audited"
         assert ds.attrs["audit_cells"] == (ds.origin == AUDITED).sum() > 0
         assert ds.attrs["cells_computed"] == (ds.origin != INFERRED).sum()
-        assert ds.attrs["audit_wrong_before"] == ds.attrs["audit_wrong_after"] == 0
-        assert ds.attrs["audit_bound"] == pytest.approx(3 / ds.attrs["audit_cells"], rel=0.05)
+        assert ds.attrs["audit_corrected"] >= ds.attrs["audit_wrong_before"]
+        assert 0.0 < ds.attrs["audit_bound"] < 0.2
         assert "at 95 % confidence" in ds.attrs["audit"]
 
     def test_file_equals_the_sweep_in_memory(self, config, ds):

@@ -237,15 +237,19 @@ def uncertainty_exponent(ds: xr.Dataset) -> xr.Dataset:
     for name in ("motion", "separating_contact"):
         if name in ds:
             labels = labels * 32 + ds[name].values
+    # Boxes have cells at their corners and share their edges, so that every boundary lies in a box.
+    least = np.minimum.reduce([labels[:-1, :-1], labels[:-1, 1:], labels[1:, :-1], labels[1:, 1:]])
+    greatest = np.maximum.reduce([labels[:-1, :-1], labels[:-1, 1:], labels[1:, :-1], labels[1:, 1:]])
     sizes, boxes, uncertain = [], [], []
-    for side in (2**k for k in range(1, 12)):
-        rows, columns = (size // side for size in labels.shape)
-        if min(rows, columns) < 4:
-            break
-        parts = labels[: rows * side, : columns * side].reshape(rows, side, columns, side)
-        sizes.append(side)
-        boxes.append(rows * columns)
-        uncertain.append(int((parts.max(axis=(1, 3)) != parts.min(axis=(1, 3))).sum()))
+    while min(least.shape) >= 4:
+        sizes.append(2 ** len(sizes))
+        boxes.append(least.size)
+        uncertain.append(int((least != greatest).sum()))
+        rows, columns = (size // 2 for size in least.shape)
+        least, greatest = (
+            reduce(one[: 2 * rows, : 2 * columns].reshape(rows, 2, columns, 2), axis=(1, 3))
+            for one, reduce in ((least, np.min), (greatest, np.max))
+        )
     epsilon, total, count = np.array(sizes), np.array(boxes), np.array(uncertain)
     fitted = (count >= FEWEST_BOXES) & (count < 0.5 * total)
     exponent, error = np.nan, np.nan
