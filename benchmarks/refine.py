@@ -127,8 +127,21 @@ def scaling(sides: list[int], folder: str) -> str:
     return f"{text}\nCells run grow like side^{slope:.2f}.\n"
 
 
+def densest(labels: Any, side: int) -> tuple[int, int]:
+    """A cell beside a boundary, in the middle of that square in which most cells lie beside one."""
+    edges = np.zeros(labels.shape, dtype=int)
+    edges[1:] |= labels[1:] != labels[:-1]
+    edges[:, 1:] |= labels[:, 1:] != labels[:, :-1]
+    sums = np.pad(edges, ((1, 0), (1, 0))).cumsum(axis=0).cumsum(axis=1)
+    squares = sums[side:, side:] - sums[:-side, side:] - sums[side:, :-side] + sums[:-side, :-side]
+    middle = np.array(np.unravel_index(squares.argmax(), squares.shape)) + side // 2
+    cells = np.argwhere(edges)
+    row, column = cells[np.argmin(((cells - middle) ** 2).sum(axis=1))]
+    return int(row), int(column)
+
+
 def zoom(side: int) -> str:
-    """Uncertainty exponent of ever smaller windows around a boundary in the lower right corner."""
+    """Uncertainty exponent of ever smaller windows in the lower right corner, each where boundaries are densest."""
     rows = []
     place = list(CORNER)
     for decade in range(7):
@@ -144,13 +157,8 @@ def zoom(side: int) -> str:
                      f"{100 * float((ds.certified == 1).mean()):.1f} %",
                      f"{float(ds.reversals.median()):.0f}, {float(ds.reversals.max()):.0f}"])  # fmt: skip
         print(*rows[-1], flush=True)
-        # The next window lies around the boundary that is nearest to the middle.
-        labels = labels_of(ds)
-        edges = np.argwhere(labels[:, 1:] != labels[:, :-1])
-        if not len(edges):
-            break
-        row, column = edges[np.argmin(((edges - side / 2) ** 2).sum(axis=1))]
-        place = [axes["drive.amplitude"][row], 0.5 * sum(axes["zone.half_angle"][column : column + 2])]
+        row, column = densest(labels_of(ds), side // 10)
+        place = [axes["drive.amplitude"][row], axes["zone.half_angle"][column]]
     header = [
         "relative width",
         "boxes of each side with two labels",
