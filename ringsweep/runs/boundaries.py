@@ -59,7 +59,7 @@ def boundary(ds: xr.Dataset, regime: str, tolerance: float = 1e-6, *, jobs: int 
     >>> from ringsweep.config import load
     >>> scene = load("my-sweep.yaml").source["scene"]
     >>> maps = ringsweep.sweep(scene, {"drive.amplitude": [0.1, 1.0, 2.0]})
-    >>> found = boundary(maps, "separating", 1e-3)
+    >>> found = ringsweep.boundary(maps, "separating", 1e-3)
     >>> bool((found.error <= 1e-3).all())
     True
     """
@@ -230,6 +230,16 @@ def uncertainty_exponent(ds: xr.Dataset) -> xr.Dataset:
     ------
     InputError
         If the dataset is no sweep over two dimensions.
+
+    Examples
+    --------
+    A boundary along a circle:
+
+    >>> import numpy as np, ringsweep, xarray as xr
+    >>> y, x = np.indices((512, 512)) / 512
+    >>> maps = xr.Dataset({"regime": (("y", "x"), (x**2 + y**2 < 0.5).astype("int8"))})
+    >>> ringsweep.uncertainty_exponent(maps).exponent.round(1).item()
+    1.0
     """
     if "regime" not in ds or ds["regime"].ndim != 2:
         raise InputError("ds", "is no map of regimes over two dimensions: hold further ones by ds.isel")
