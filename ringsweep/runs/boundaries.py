@@ -250,7 +250,9 @@ def uncertainty_exponent(ds: xr.Dataset) -> xr.Dataset:
     # Boxes have cells at their corners and share their edges, so that every boundary lies in a box.
     least = np.minimum.reduce([labels[:-1, :-1], labels[:-1, 1:], labels[1:, :-1], labels[1:, 1:]])
     greatest = np.maximum.reduce([labels[:-1, :-1], labels[:-1, 1:], labels[1:, :-1], labels[1:, 1:]])
-    sizes, boxes, uncertain = [], [], []
+    sizes: list[int] = []
+    boxes: list[int] = []
+    uncertain: list[int] = []
     while min(least.shape) >= 4:
         sizes.append(2 ** len(sizes))
         boxes.append(least.size)
