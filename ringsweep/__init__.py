@@ -9,17 +9,30 @@ if TYPE_CHECKING:
     from ringsweep.config.friction import friction_law
     from ringsweep.errors import InputError
     from ringsweep.quantities.variables import words
+    from ringsweep.runs.boundaries import boundary, uncertainty_exponent
     from ringsweep.runs.precision import precision
     from ringsweep.runs.simulate import simulate
     from ringsweep.runs.sweep import run, sweep
 
-__all__ = ["InputError", "friction_law", "precision", "run", "simulate", "sweep", "words"]
+__all__ = [
+    "InputError",
+    "boundary",
+    "friction_law",
+    "precision",
+    "run",
+    "simulate",
+    "sweep",
+    "uncertainty_exponent",
+    "words",
+]
 
 _MODULES = {
     "run": "runs.sweep",
     "sweep": "runs.sweep",
     "simulate": "runs.simulate",
     "precision": "runs.precision",
+    "boundary": "runs.boundaries",
+    "uncertainty_exponent": "runs.boundaries",
     "friction_law": "config.friction",
     "words": "quantities.variables",
     "InputError": "errors",

@@ -34,13 +34,13 @@ def init_command(arguments: argparse.Namespace) -> None:
 
 def run_command(arguments: argparse.Namespace) -> None:
     """Run a sweep into a file, print a summary and draw the regime map."""
-    from ringsweep.config import load
+    from ringsweep.config import load, refined
 
     if arguments.backend == "dask" and arguments.scheduler is None:
         raise InputError("--backend", "dask needs the address of its scheduler: --scheduler ADDRESS")
     if arguments.backend == "threads" and arguments.scheduler is not None:
         raise InputError("--scheduler", "is for --backend dask")
-    config = load(arguments.config)
+    config = refined(load(arguments.config), arguments.refine or None)
     target, picture = _outputs(f"{config.name}.nc" if arguments.output is None else arguments.output, "regime", "sweep")
 
     from ringsweep import plots
@@ -94,8 +94,20 @@ def map_command(arguments: argparse.Namespace) -> None:
     target = Path(arguments.output or dataset.with_name("-".join([dataset.stem, *shown]) + ".png"))
     netcdf.check_writable(target)
     selection = dict(_selection(text) for text in arguments.sel)
+    if arguments.tolerance is not None and arguments.boundaries is None:
+        raise InputError("--tolerance", "is that of --boundaries REGIME")
+    curves = None
     try:
-        figure = plots.regime_map(result, arguments.x, arguments.y, arguments.var, selection)
+        if arguments.boundaries is not None:
+            from ringsweep.plots.selection import select
+            from ringsweep.runs.boundaries import boundary
+
+            tolerance = 1e-6 if arguments.tolerance is None else arguments.tolerance
+            curves = boundary(select(result, selection)[0], arguments.boundaries, tolerance)
+            written = dataset.with_name(f"{target.stem}-{arguments.boundaries}.nc")
+            netcdf.save(curves, written)
+            print(f"wrote {written}")
+        figure = plots.regime_map(result, arguments.x, arguments.y, arguments.var, selection, curves)
     except InputError as error:
         if error.path == "ds":
             raise InputError(str(dataset), error.problem) from error

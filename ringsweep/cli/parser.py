@@ -46,6 +46,7 @@ def build_parser() -> argparse.ArgumentParser:
         ringsweep run my.yaml              my.nc and my.png; after a stop the same command goes on
         ringsweep run my.yaml --jobs 1 -o results/one.nc
         ringsweep run finer.yaml --reuse my.nc
+        ringsweep run my.yaml --refine     compute only the boundaries of the map
         ringsweep run my.nc -o again.nc    repeat the sweep of my.nc
         ringsweep run my.yaml --backend dask --scheduler tcp://host:8786
         """)  # fmt: skip
@@ -54,6 +55,9 @@ def build_parser() -> argparse.ArgumentParser:
     run.add_argument("--jobs", type=whole_number, metavar="N", help="threads (default: all cores)")
     run.add_argument("--fresh", action="store_true", help="start over: discard what an earlier run computed")
     run.add_argument("--reuse", metavar="OLD.nc", help="take cells that this earlier sweep has too")
+    run.add_argument(
+        "--refine", action="store_true", help="compute only the boundaries, audit the rest (see sweep.refine)"
+    )
     run.add_argument("--backend", choices=["threads", "dask"], help="what computes (default: threads of this machine)")
     run.add_argument("--scheduler", metavar="ADDRESS", help="address of a Dask scheduler, such as tcp://host:8786")
 
@@ -61,6 +65,8 @@ def build_parser() -> argparse.ArgumentParser:
         ringsweep map my.nc                my.png: the regimes
         ringsweep map my.nc --var t_separation --x zone.half_angle
         ringsweep map my.nc --sel "zone.half_angle=15 deg" -o line.pdf
+        ringsweep map my.nc --var origin   which cells of a refined sweep were run
+        ringsweep map my.nc --boundaries separating --tolerance 1e-6
         """)  # fmt: skip
     draw.add_argument("dataset", metavar="OUT.nc")
     draw.add_argument("-o", "--output", metavar="MAP.png", help="default: beside OUT.nc; .pdf and .svg too")
@@ -73,6 +79,11 @@ def build_parser() -> argparse.ArgumentParser:
         default=[],
         metavar="DIM=VALUE",
         help="fix a coordinate at its value nearest to VALUE; units allowed",
+    )
+
+    draw.add_argument("--boundaries", metavar="REGIME", help="locate the boundary of a regime: curves, also as NetCDF")
+    draw.add_argument(
+        "--tolerance", type=positive_number, metavar="T", help="error of these, in SI units (default: 1e-6)"
     )
 
     simulate = _add_command(commands, "simulate", simulate_command,

@@ -16,9 +16,13 @@ def summarise(result: xr.Dataset) -> None:
         if count:
             print(f"  {meaning}: {count} ({count / regime.size:.1%})")
     if "certified" in result:
-        share = float((result["certified"] == 1).mean())
+        # NaN in a refined sweep, where no cell was run.
+        certified = result["certified"].values
+        share = float((certified[~np.isnan(certified)] == 1).mean())
         # Rounding must not turn "nearly all" into 100 %.
         print(f"certified: {share if share == 1.0 else min(share, 0.999):.1%}")
+    if "audit" in result.attrs:
+        print("refined:", result.attrs["audit"])
     lines = []
     for name in (str(name).removesuffix("_error") for name in result.data_vars if str(name).endswith("_error")):
         bounds = result[f"{name}_error"].values

@@ -49,17 +49,18 @@ class Axes:
 
 
 def sweep_section(doc: Document) -> dict[str, Any]:
-    """The section ``sweep`` with the contents of its CSV files; empty if there is no such section."""
+    """The axes in the section ``sweep``, with the contents of CSV files; empty if there is no such section."""
     if "sweep" not in doc.tree:
         return {}
-    sweep = section_of(doc.tree, "sweep", "")
-    for key in sweep:
-        if key not in ("grid", "points"):
-            raise InputError(f"sweep.{key}", "unknown key" + suggestion(key, ("grid", "points")))
+    section = section_of(doc.tree, "sweep", "")
+    for key in section:
+        if key not in ("grid", "points", "refine"):
+            raise InputError(f"sweep.{key}", "unknown key" + suggestion(key, ("grid", "points", "refine")))
+    if isinstance(section.get("points"), str):
+        section["points"] = doc.inline_csv(section["points"], "sweep.points", "sweep.points")
+    sweep = {key: columns for key, columns in section.items() if key != "refine"}
     if not sweep:
         raise InputError("sweep", "empty: give grid or points, or leave sweep out")
-    if isinstance(sweep.get("points"), str):
-        sweep["points"] = doc.inline_csv(sweep["points"], "sweep.points", "sweep.points")
     for key in sweep:
         if not section_of(sweep, key, "sweep."):
             raise InputError(f"sweep.{key}", "empty: name at least one path, or leave it out")

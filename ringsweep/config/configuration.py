@@ -25,6 +25,7 @@ from ringsweep.config.axes import (
     swept_paths,
 )
 from ringsweep.config.consistency import check_consistency
+from ringsweep.config.refinement import Refinement, read_refinement
 from ringsweep.config.scene import parse_scene, sweepable
 from ringsweep.config.sections import read_values, suggestion
 from ringsweep.config.solver import read_solver
@@ -51,6 +52,8 @@ class Config:
         the configuration again.
     name : str
         Name of its file without suffix.
+    refine : Refinement, optional
+        How the grid is refined; None if every cell is computed.
     """
 
     scene: Scene
@@ -58,6 +61,7 @@ class Config:
     axes: Axes
     source: dict[str, Any]
     name: str
+    refine: Refinement | None = None
 
 
 def load(config: str | os.PathLike[str] | Mapping[str, Any]) -> Config:
@@ -81,6 +85,24 @@ def load(config: str | os.PathLike[str] | Mapping[str, Any]) -> Config:
     # A configuration cannot name the dimensions that axes share; the coordinates of a result file can.
     columns = ((path, path, dims, values) for path, (dims, values) in doc.result_axes.items())
     return dataclasses.replace(found, axes=build_axes(columns))
+
+
+def refined(config: Config, refine: Mapping[str, Any] | bool | None) -> Config:
+    """A configuration with `refine` in the place of its ``sweep.refine``; None and True keep one that it has.
+
+    Raises
+    ------
+    InputError
+        If `refine` is wrong, or the sweep is no grid.
+    """
+    if refine is None or (refine is True and config.refine is not None):
+        return config
+    given = yaml_text.read({"refine": refine}).tree["refine"]
+    found = read_refinement(given, config.scene, config.axes)
+    sweep = {key: value for key, value in config.source.get("sweep", {}).items() if key != "refine"}
+    if found is not None:
+        sweep["refine"] = given
+    return dataclasses.replace(config, refine=found, source=config.source | ({"sweep": sweep} if sweep else {}))
 
 
 def with_values(
@@ -163,8 +185,9 @@ def _validate(doc: Document) -> Config:
     for path, where in swept.items():
         if where in doc.locations:
             doc.locations[f"scene.{path}"] = doc.locations[where]
+    refine = read_refinement(tree.get("sweep", {}).get("refine"), scene, axes)
     check_consistency(scene, axes)
-    return Config(scene, solver, axes, tree, doc.name)
+    return Config(scene, solver, axes, tree, doc.name, refine)
 
 
 def _apply_setting(doc: Document, setting: str) -> str:

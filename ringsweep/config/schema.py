@@ -12,6 +12,7 @@ from typing import Any
 from ringsweep.config.axes import COUNT
 from ringsweep.config.friction import CURVE, FORMULA
 from ringsweep.config.friction import TABLE as TABLE_LAW
+from ringsweep.config.refinement import NUMBERS
 from ringsweep.config.scene import TABLES
 from ringsweep.models import MODELS, parameters
 from ringsweep.models.scene import LAW, Structure
@@ -177,6 +178,26 @@ def _sweep(paths: list[str]) -> dict[str, Any]:
                 "propertyNames": names,
                 "properties": {LAW: {**laws[LAW], "uniqueItems": True}},
                 "additionalProperties": axis,
+            },
+            "refine": {
+                "description": "compute only the boundaries of the map: every 32nd cell, then where neighbours differ",
+                "anyOf": [
+                    {"type": "boolean"},
+                    _section(
+                        {
+                            **{key: _number(parameter) for key, parameter in NUMBERS.items()},
+                            "also": {"description": "number that is interpolated where not run", "type": "string"},
+                            "within": {"description": "largest error of that", **value},
+                            "axes": {
+                                "description": "one or two paths that are refined (default: the longest two)",
+                                "type": "array",
+                                "items": names,
+                                "minItems": 1,
+                                "maxItems": 2,
+                            },
+                        }
+                    ),
+                ],
             },
             "points": {
                 "description": "CSV file whose columns are paths and whose rows are runs, or its columns",

@@ -14,6 +14,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 from matplotlib.ticker import MaxNLocator
@@ -21,17 +22,20 @@ from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.plots.datasets import is_numeric, require_sweep, resolve, swept
-from ringsweep.plots.labels import axis_label, long_name, value_text
+from ringsweep.plots.labels import axis_label, display_factor, long_name, value_text
 from ringsweep.plots.map_axes import Axis, as_matrix, choose_axes, is_scattered, thinned
 from ringsweep.plots.map_colours import CellWarning, ColourScale, cell_warnings, legend_entries
 from ringsweep.plots.selection import select
 from ringsweep.plots.style import NO_VALUE, SMALL, axes_or_current, is_dark, legend_beside, true_ranges
+from ringsweep.quantities.variables import INFERRED
 
 _MOST_PANELS = 25
 
 # Greatest number of cells drawn along an axis: more than a printed page has pixels. Drawing all of millions takes
 # gigabytes.
 _MOST_CELLS = 1200
+
+_CURVE: dict[str, Any] = {"color": "black", "linewidth": 0.8}
 
 # Letters in a line of the title of a figure, and of the title of a small panel.
 _TITLE_WIDTH, _PANEL_WIDTH = 60, 30
@@ -43,6 +47,7 @@ def regime_map(
     y: str | None = None,
     var: str = "regime",
     sel: Mapping[str, float | str] | None = None,
+    boundaries: xr.Dataset | None = None,
 ) -> Figure:
     """Draw one variable of a sweep over the swept quantities, as a new figure.
 
@@ -62,6 +67,8 @@ def regime_map(
     sel : mapping of str to float or str, optional
         Coordinates held at the value nearest to the one given, which must lie within the axis: a plain number is SI,
         text may have a unit.
+    boundaries : xarray.Dataset, optional
+        Curves of :func:`ringsweep.boundary`, which are drawn over a map of one panel.
 
     Returns
     -------
@@ -85,6 +92,8 @@ def regime_map(
     'angle (°)'
     """
     found = Map.of(ds, x, y, var, sel or {})
+    if boundaries is not None:
+        found.entries.append(found.curve_entry(boundaries))
     panels, columns = found.panels, found.columns
     rows = math.ceil(len(panels) / columns)
     if len(panels) > 1:
@@ -102,6 +111,8 @@ def regime_map(
         axes.set_title(title, fontsize=SMALL)
         axes.tick_params(labelsize=SMALL if len(panels) > 1 else None)
         found.draw(axes, index)
+        if boundaries is not None:
+            found.draw_curves(axes, boundaries)
     if len(panels) > 1:
         figure.supxlabel(found.horizontal.label, fontsize=10)
         figure.supylabel(found.vertical_label, fontsize=10)
@@ -249,7 +260,7 @@ class Map:
             columns,
             drawn,
             legend_entries(scale, data, warnings, scattered),
-            _title(["" if scale.meanings is None else long_name(data), *held, *held_now, *thinning]),
+            _title(["" if scale.meanings is None else long_name(data), *held, *held_now, *thinning, *_audit(ds)]),
         )
 
     @property
@@ -272,6 +283,26 @@ class Map:
             self._draw_points(axes, self.vertical, numbers, warnings)
         else:
             self._draw_cells(axes, numbers, warnings)
+
+    def draw_curves(self, axes: Axes, boundaries: xr.Dataset) -> None:
+        """Draw the curves of boundaries over a panel."""
+        for _, line in boundaries.groupby("line"):
+            x, *y = (
+                line[axis.name].values * display_factor(line[axis.name])
+                for axis in (self.horizontal, self.vertical)
+                if axis is not None
+            )
+            if y:
+                axes.plot(x, y[0], marker="." if len(x) == 1 else "", **_CURVE)
+            else:
+                axes.axvline(x[0], **_CURVE)
+
+    def curve_entry(self, boundaries: xr.Dataset) -> Artist:
+        """Entry of the legend for the curves of boundaries."""
+        if self.scattered or len(self.panels) > 1:
+            raise InputError("boundaries", "are drawn over one map of a grid: hold the other axes")
+        regime, tolerance = boundaries.attrs["boundary_of"], boundaries.attrs["boundary_tolerance"]
+        return Line2D([], [], label=f"boundary of {regime}\n± {tolerance:g} (SI units)", **_CURVE)
 
     def _draw_line(self, axes: Axes, data: xr.DataArray) -> None:
         numbers, edges = data.values[self.horizontal.order], self.horizontal.edges
@@ -357,6 +388,15 @@ class Map:
         if self.vertical:
             return self.horizontal.value_of(cell), self.vertical.value_of(cell)
         return self.horizontal.value_of(cell), 0.5 if self.scale.meanings else float(cell[self.data.name])
+
+
+def _audit(ds: xr.Dataset) -> list[str]:
+    """What a refined sweep says of itself, for the title."""
+    if "origin" not in ds or "audit_bound" not in ds.attrs:
+        return []
+    run = float((ds["origin"].values != INFERRED).mean())
+    bound = f"of the others at most {100 * ds.attrs['audit_bound']:.2g} % are wrong (at 95 % confidence)"
+    return [f"{100 * run:.3g} % of the cells run", bound if ds.attrs["audit_cells"] else "the others are not audited"]
 
 
 def _title(texts: list[str]) -> str:

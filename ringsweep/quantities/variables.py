@@ -21,6 +21,9 @@ REGIMES = (
 )
 RESTING, OSCILLATORY, REVOLVING, SEPARATING, JAMMED, FAILED, STICK_SLIP, SLIDING, STICKING, RIDING = range(10)
 
+#: Origin of a cell of a refined sweep. An audited cell was inferred, and then run.
+COMPUTED, INFERRED, AUDITED = range(3)
+
 MODES = {-1: "slip_backward", 0: "stick", 1: "slip_forward"}
 
 
@@ -99,7 +102,20 @@ OUTCOMES: dict[str, Variable] = {
         dtype="int8",
         flags={0: "not_certified", 1: "certified"},
     ),
+    "origin": Variable(
+        "1",
+        "whether the cell was run, or inferred from its neighbours",
+        dtype="int8",
+        flags={COMPUTED: "computed", INFERRED: "inferred", AUDITED: "audited"},
+    ),
+    "level": Variable("1", "halvings of the blocks of the map around the cell", dtype="int8"),
 }
+
+#: Classifications that a refined sweep infers.
+LABELS = ("regime", "motion", "separating_contact")
+
+#: Value in files where a whole number is missing, because its cell is inferred.
+MISSING = -1
 
 # Bounds on errors: two digits are enough.
 OUTCOMES |= {

@@ -161,8 +161,11 @@ def stop_on_interrupt() -> Iterator[threading.Event]:
         signal.signal(signal.SIGINT, before)
 
 
-def progress_bar(total: int, progress: bool, done: int = 0) -> Any:
-    """Progress bar over `total` runs, shown only in a terminal or a notebook, and only if `progress` is true."""
+def progress_bar(total: int | None, progress: bool, done: int = 0) -> Any:
+    """Progress bar over `total` runs, or a count of runs if their number is not known.
+
+    It is shown only in a terminal or a notebook, and only if `progress` is true.
+    """
     # tqdm would hide the bar in a notebook, whose output is no terminal.
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
     notebook = hasattr(shell, "kernel")

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.config import Config, load
 from ringsweep.errors import InputError
 from ringsweep.models import parameters
 from ringsweep.models.scene import LAW
+from ringsweep.quantities.variables import INFERRED, OUTCOMES
 from ringsweep.runs.cells import Indices, laws_at, values_at
 from ringsweep.storage import netcdf
 from ringsweep.storage.chunks import Layout
@@ -99,7 +101,7 @@ class EarlierSweep:
         return replace(config, axes=replace(config.axes, columns=columns), source=source)
 
     def shared_cells(
-        self, config: Config, layout: Layout, done: NDArray[np.bool_]
+        self, config: Config, layout: Layout, done: NDArray[np.bool_], names: Collection[str] | None = None
     ) -> Iterator[tuple[NDArray[np.intp], dict[str, NDArray[Any]]]]:
         """Positions and columns of the cells that both sweeps have, chunk by chunk of the new sweep.
 
@@ -111,23 +113,32 @@ class EarlierSweep:
             Order of its cells.
         done : ndarray of bool, shape ``(cells,)``
             Cells that are not looked for.
+        names : collection of str, optional
+            Variables to read; all by default.
         """
         with netcdf.open_dataset(self.path) as ds:
+            known = [str(name) for name in ds.data_vars if name not in ("origin", "level")]
+            wanted = [name for name in known if names is None or name in names]
             for start, stop, _ in layout.chunks():
                 positions = start + np.flatnonzero(~done[start:stop])
+                if not len(positions):
+                    continue
                 indices = dict(zip(config.axes.sizes, layout.indices(positions), strict=True))
                 shared, in_file = self._locate(config, indices, len(positions))
                 if not shared.any():
                     continue
-                part = ds.isel({dim: slice(along.min(), along.max() + 1) for dim, along in in_file.items()}).load()
+                part = ds.isel({dim: slice(along.min(), along.max() + 1) for dim, along in in_file.items()})
                 within = tuple(along - along.min() for along in in_file.values())
-                yield (
-                    positions[shared],
-                    {
-                        str(name): np.broadcast_to(data.transpose(*in_file).values[within], shared.sum())
-                        for name, data in part.data_vars.items()
-                    },
-                )
+                count = int(shared.sum())
+
+                def read(name: str, part: xr.Dataset = part, within: Any = within, count: int = count) -> NDArray[Any]:
+                    return np.broadcast_to(part[name].transpose(*in_file).values[within], count)  # noqa: B023
+
+                # What an earlier refined sweep has inferred is no cell of it.
+                run = read("origin") != INFERRED if "origin" in ds else np.ones(count, dtype=bool)
+                if run.any():
+                    columns = {name: read(name)[run].astype(OUTCOMES[name].dtype) for name in wanted}
+                    yield positions[shared][run], columns
 
     def _locate(self, config: Config, indices: Indices, count: int) -> tuple[NDArray[np.bool_], Indices]:
         """Which of `count` cells of the new sweep the file holds, and the indices of these in the file."""

@@ -5,24 +5,29 @@ from __future__ import annotations
 import logging
 import math
 import os
-from collections.abc import Mapping
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from functools import partial
 from pathlib import Path
+from threading import Event
+from time import monotonic
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsweep.config import Axes, Config, load, read_axes, read_scene, read_solver, sweepable
+from ringsweep.config import Axes, Config, load, read_axes, read_scene, read_solver, refined, sweepable
 from ringsweep.config.axes import dimension
 from ringsweep.errors import InputError
-from ringsweep.quantities.variables import OUTCOMES, error_attribute
-from ringsweep.runs.cells import compute_task
-from ringsweep.runs.executors import executor, progress_bar, stop_on_interrupt
+from ringsweep.quantities.variables import INFERRED, OUTCOMES, error_attribute
+from ringsweep.runs.cells import TaskResult, compute_task
+from ringsweep.runs.executors import Executor, executor, progress_bar, stop_on_interrupt
+from ringsweep.runs.refined import KnownLabels, complete, decide, gaps, with_nan
+from ringsweep.runs.refined import attributes as refinement_attributes
+from ringsweep.runs.refinement import Refined
 from ringsweep.runs.reuse import EarlierSweep
-from ringsweep.runs.task_sizes import TaskSizes, divide_into_tasks
+from ringsweep.runs.task_sizes import TaskSizes, divide_cells, divide_into_tasks
 from ringsweep.runs.warnings import warn_of_results
 from ringsweep.storage import netcdf
 from ringsweep.storage.checkpoint import Checkpoint, Columns, DamagedTask, open_checkpoint
@@ -34,6 +39,9 @@ logger = logging.getLogger("ringsweep")
 #: Largest number of cells of a sweep in memory, where they take some gigabytes.
 MAX_CELLS_IN_MEMORY = 10_000_000
 
+# Seconds of a refined sweep that are lost if it is killed.
+_WRITE_INTERVAL = 1.0
+
 
 def run(
     config: str | os.PathLike[str] | Mapping[str, Any],
@@ -42,6 +50,7 @@ def run(
     jobs: int | None = None,
     fresh: bool = False,
     reuse: str | os.PathLike[str] | None = None,
+    refine: Mapping[str, Any] | bool | None = None,
     scheduler: str | None = None,
     progress: bool = True,
 ) -> xr.Dataset:
@@ -60,6 +69,9 @@ def run(
         Whether to discard what an earlier call computed.
     reuse : path-like, optional
         File of an earlier sweep. Cells that both sweeps have are taken from it.
+    refine : mapping or bool, optional
+        What stands under ``sweep.refine`` in a configuration; True stands for the defaults. Then only the boundaries
+        of the map are computed, and the other cells are inferred.
     scheduler : str, optional
         Address of a Dask scheduler whose workers compute the cells, in place of threads.
     progress : bool
@@ -105,7 +117,8 @@ def run(
     >>> bool((ds.certified == 1).all())
     True
     """
-    return _run(load(config), output, fresh, jobs=jobs, reuse=reuse, scheduler=scheduler, progress=progress)
+    loaded = refined(load(config), refine)
+    return _run(loaded, output, fresh, jobs=jobs, reuse=reuse, scheduler=scheduler, progress=progress)
 
 
 def _run(config: Config, output: str | os.PathLike[str] | None, fresh: bool, **options: Any) -> xr.Dataset:
@@ -124,6 +137,7 @@ def sweep(
     jobs: int | None = None,
     fresh: bool = False,
     reuse: str | os.PathLike[str] | None = None,
+    refine: Mapping[str, Any] | bool | None = None,
     scheduler: str | None = None,
     progress: bool = True,
 ) -> xr.Dataset:
@@ -138,7 +152,7 @@ def sweep(
         A 1-D sequence is a grid axis. DataArrays that share a dimension vary together along it.
     solver : str or mapping
         Name of a method, or the mapping under ``solver`` in a configuration.
-    output, jobs, fresh, reuse, scheduler, progress
+    output, jobs, fresh, reuse, refine, scheduler, progress
         As for :func:`run`.
 
     Returns
@@ -173,7 +187,7 @@ def sweep(
     found = read_axes(parsed, axes)
     method = {"method": solver} if isinstance(solver, str) else dict(solver)
     source = {"scene": dict(parsed.source), "solver": method, "sweep": _sweep_section(found)}
-    config = Config(parsed, read_solver(method, parsed), found, source, name="ringsweep")
+    config = refined(Config(parsed, read_solver(method, parsed), found, source, name="ringsweep"), refine)
     return _run(config, output, fresh, jobs=jobs, reuse=reuse, scheduler=scheduler, progress=progress)
 
 
@@ -209,15 +223,16 @@ def compute(
     if layout.total > MAX_CELLS_IN_MEMORY:
         raise InputError("sweep", f"{layout.total:.3g} cells do not fit into memory: name a file as output")
     store = MemoryStore(layout.total)
-    _compute_cells(config, layout, store, earlier, jobs, scheduler, progress)
-    results = _frame(config).assign(
+    found = _compute_cells(config, layout, store, earlier, jobs, scheduler, progress)
+    columns = {name: column.reshape(sizes) for name, column in store.columns.items()}
+    results = _frame(config, found)
+    if found is not None and config.refine is not None:
+        complete(config.refine, found, tuple(slice(None) for _ in sizes), columns)
+        columns |= {name: with_nan(columns[name]) for name in gaps(columns)}
+    results = results.assign(
         {
-            name: (
-                tuple(config.axes.sizes),
-                column.reshape(sizes),
-                OUTCOMES[name].attributes | error_attribute(name, store.columns),
-            )
-            for name, column in store.columns.items()
+            name: (tuple(config.axes.sizes), column, OUTCOMES[name].attributes | error_attribute(name, columns))
+            for name, column in columns.items()
         }
     )
     warn_of_results(results, config)
@@ -268,21 +283,30 @@ def _compute_file(config: Config, target: Path, layout: Layout, checkpoint: Chec
     """Compute the cells that the checkpoint lacks, and write the file from it."""
     if finished := int(checkpoint.done.sum()):
         logger.info("going on: %d of %d cells are done", finished, layout.total)
-    _compute_cells(config, layout, checkpoint, *options)
+    found = _compute_cells(config, layout, checkpoint, *options)
     try:
-        _write_file(config, target, layout, checkpoint)
+        _write_file(config, target, layout, checkpoint, found)
     except DamagedTask as damage:
         logger.warning("%s: the missing cells are computed again", damage)
         checkpoint.scan()
-        _compute_cells(config, layout, checkpoint, *options)
-        _write_file(config, target, layout, checkpoint)
+        found = _compute_cells(config, layout, checkpoint, *options)
+        _write_file(config, target, layout, checkpoint, found)
 
 
-def _write_file(config: Config, target: Path, layout: Layout, checkpoint: Checkpoint) -> None:
-    """Write the file of a sweep whose cells are all in the checkpoint."""
-    frame = _frame(config)
+def _write_file(config: Config, target: Path, layout: Layout, checkpoint: Checkpoint, found: Refined | None) -> None:
+    """Write the file of a sweep whose cells are all in the checkpoint, but for those that were inferred."""
+    frame = _frame(config, found)
     frame.attrs["processors"] = ", ".join(sorted(checkpoint.processors))
-    netcdf.write(target, checkpoint.folder, frame, OUTCOMES, layout, checkpoint.chunks())
+    if found is None or config.refine is None:
+        netcdf.write(target, checkpoint.folder, frame, OUTCOMES, layout, checkpoint.chunks())
+        return
+    refine = config.refine
+
+    def fill(region: tuple[slice, ...], missing: NDArray[np.bool_], columns: dict[str, NDArray[Any]]) -> bool:
+        complete(refine, found, region, columns)
+        return not (missing & (found.origin[region] != INFERRED)).any()
+
+    netcdf.write(target, checkpoint.folder, frame, OUTCOMES, layout, checkpoint.chunks(fill), gaps(OUTCOMES))
 
 
 def _holds_sweep(target: Path, checkpoint: Checkpoint) -> bool:
@@ -315,6 +339,12 @@ class MemoryStore:
         self.done = np.zeros(total, dtype=bool)
         self.columns: dict[str, NDArray[Any]] = {}
 
+    def finished(self) -> Iterator[tuple[NDArray[np.intp], Columns]]:
+        """Positions and columns of finished cells."""
+        positions = np.flatnonzero(self.done)
+        if len(positions):
+            yield positions, {name: column[positions] for name, column in self.columns.items()}
+
     def put(self, positions: NDArray[np.integer], columns: Columns, processor: str) -> None:
         """Store the columns of the cells at these positions."""
         for name, column in columns.items():
@@ -330,55 +360,159 @@ def _compute_cells(
     jobs: int | None,
     scheduler: str | None,
     progress: bool,
-) -> None:
-    """Compute every cell that the store lacks, task after task."""
+) -> Refined | None:
+    """Compute the cells that the store lacks, task after task: every cell, or those that a refinement asks for."""
     context = executor(jobs, scheduler)
+    if config.refine is not None:
+        return _refine_cells(config, layout, store, earlier, context, progress)
     if earlier is not None:
-        taken = 0
-        for positions, columns in earlier.shared_cells(config, layout, store.done):
-            store.put(positions, columns, earlier.processors)
-            taken += len(positions)
-        logger.log(
-            logging.INFO if taken else logging.WARNING,
-            "%d of %d cells are taken from %s",
-            taken,
-            layout.total,
-            earlier.path,
-        )
-    if store.done.all():
-        return
-    with ExitStack() as stack:
-        stopped = stack.enter_context(stop_on_interrupt())
-        workers = stack.enter_context(context)
+        _take_shared(config, layout, store, earlier, store.done)
+    if not store.done.all():
+        with _open_tasks(config, layout, store, context, progress, layout.total) as tasks:
+            tasks.run(divide_into_tasks(store.done, tasks.sizes, tasks.stopped))
+            if not store.done.all():
+                raise KeyboardInterrupt
+    return None
+
+
+def _refine_cells(
+    config: Config,
+    layout: Layout,
+    store: Checkpoint | MemoryStore,
+    earlier: EarlierSweep | None,
+    context: AbstractContextManager[Executor],
+    progress: bool,
+) -> Refined:
+    """Compute the cells that a refinement asks for."""
+    labels = KnownLabels(config, layout.total)
+    for positions, columns in store.finished():
+        labels.put(positions, dict(columns))
+    # Which cells an earlier sweep must give is known at the end: until then its labels are enough.
+    if earlier is not None:
+        for positions, columns in earlier.shared_cells(config, layout, labels.known, labels.names):
+            labels.put(positions, columns)
+    with _open_tasks(config, layout, store, context, progress, None) as tasks:
+        tasks.notice = labels.put
+
+        def run(cells: NDArray[np.intp]) -> None:
+            tasks.run(divide_cells(cells, tasks.sizes, tasks.stopped))
+            if not labels.known[cells].all():
+                raise KeyboardInterrupt
+
+        found = decide(config, layout, labels, run)
+    if earlier is not None:
+        needed = np.zeros(layout.total, dtype=bool)
+        needed[layout.positions(np.nonzero(found.origin != INFERRED))] = True
+        _take_shared(config, layout, store, earlier, store.done | ~needed)
+    return found
+
+
+def _take_shared(
+    config: Config,
+    layout: Layout,
+    store: Checkpoint | MemoryStore,
+    earlier: EarlierSweep,
+    done: NDArray[np.bool_],
+) -> None:
+    """Take the cells that are not done from an earlier sweep, as far as it has them."""
+    taken = 0
+    for positions, columns in earlier.shared_cells(config, layout, done):
+        store.put(positions, columns, earlier.processors)
+        taken += len(positions)
+    level = logging.INFO if taken else logging.WARNING
+    logger.log(level, "%d of %d cells are taken from %s", taken, layout.total, earlier.path)
+
+
+@contextmanager
+def _open_tasks(
+    config: Config,
+    layout: Layout,
+    store: Checkpoint | MemoryStore,
+    context: AbstractContextManager[Executor],
+    progress: bool,
+    total: int | None,
+) -> Iterator[_Tasks]:
+    """Tasks that compute cells of a sweep; `total` is the number of its cells, if all of them are computed."""
+    with stop_on_interrupt() as stopped, context as workers:
         sizes = TaskSizes(config.solver.side_by_side, workers.concurrency)
-        tasks = divide_into_tasks(store.done, sizes, stopped)
-        results = workers.results(partial(compute_task, config, layout), tasks, sizes.learn, stopped)
-        bar = stack.enter_context(progress_bar(layout.total, progress, int(store.done.sum())))
+        with progress_bar(total, progress, int(store.done.sum())) as bar:
+            tasks = _Tasks(partial(compute_task, config, layout), store, workers, sizes, stopped, bar)
+            try:
+                yield tasks
+            finally:
+                tasks.store_waiting()
+
+
+class _Tasks:
+    """Runs tasks and stores their results; made by :func:`_open_tasks`.
+
+    Attributes
+    ----------
+    sizes : TaskSizes
+    stopped : Event
+        Set once the user has interrupted.
+    notice : callable, optional
+        Called with positions and columns of each result; then results of small tasks are stored together.
+    """
+
+    def __init__(
+        self, compute: Callable[..., TaskResult], store: Checkpoint | MemoryStore, workers: Executor, sizes: TaskSizes,
+        stopped: Event, bar: Any,
+    ):  # fmt: skip
+        self._compute, self._store, self._workers, self._bar = compute, store, workers, bar
+        self.sizes, self.stopped = sizes, stopped
+        self.notice: Callable[[NDArray[np.integer], dict[str, NDArray[Any]]], None] | None = None
+        self._waiting: list[TaskResult] = []
+        self._written = monotonic()
+
+    def run(self, tasks: Iterator[NDArray[np.integer]]) -> None:
+        """Run tasks, each given by the positions of its cells."""
+        results = self._workers.results(self._compute, tasks, self.sizes.learn, self.stopped)
         try:
             for result in results:
                 if result.environment != environment():
                     changes = differences(environment(), result.environment)
                     raise InputError("--scheduler", f"a worker has other versions than this process: {changes}")
-                store.put(result.positions, result.columns, result.processor)
-                bar.update(len(result.positions))
+                if self.notice is None:
+                    self._store.put(result.positions, result.columns, result.processor)
+                else:
+                    self.notice(result.positions, result.columns)
+                    self._waiting.append(result)
+                    if monotonic() - self._written > _WRITE_INTERVAL:
+                        self.store_waiting()
+                self._bar.update(len(result.positions))
+        except BaseException:
+            self.stopped.set()
+            raise
         finally:
-            # Tasks under way cannot be interrupted. Start no others, and wait for their end.
-            stopped.set()
+            # Tasks under way cannot be interrupted. Wait for their end.
             for _ in results:
                 pass
-        if not store.done.all():
-            raise KeyboardInterrupt
+
+    def store_waiting(self) -> None:
+        """Store the results of small tasks together: a file for each would take longer than its cells."""
+        waiting, self._waiting = self._waiting, []
+        self._written = monotonic()
+        for processor in sorted({result.processor for result in waiting}):
+            some = [result for result in waiting if result.processor == processor]
+            positions = np.concatenate([result.positions for result in some])
+            order = np.argsort(positions)
+            columns = {
+                name: np.concatenate([result.columns[name] for result in some])[order] for name in some[0].columns
+            }
+            self._store.put(positions[order], columns, processor)
 
 
-def _frame(config: Config) -> xr.Dataset:
+def _frame(config: Config, found: Refined | None) -> xr.Dataset:
     """Coordinates and attributes of the dataset of a sweep."""
+    refinement = {} if found is None or config.refine is None else refinement_attributes(config.refine, found)
     known = sweepable(config.scene)
     return xr.Dataset(
         coords={
             dimension(path): (dims, column, {**known[path].attributes, "path": path})
             for path, (dims, column) in config.axes.columns.items()
         },
-        attrs=attributes(config),
+        attrs=attributes(config) | refinement,
     )
 
 

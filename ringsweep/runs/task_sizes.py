@@ -63,6 +63,15 @@ class TaskSizes:
         return self.side_by_side * max(1, round(size / self.side_by_side))
 
 
+def divide_cells(cells: NDArray[np.integer], sizes: TaskSizes, stopped: Event) -> Iterator[NDArray[np.integer]]:
+    """Parts of some cells, which ascend; see :func:`divide_into_tasks`."""
+    start = 0
+    while start < len(cells) and not stopped.is_set():
+        stop = start + min(sizes.next(len(cells) - start), len(cells) - start)
+        yield cells[start:stop]
+        start = stop
+
+
 def divide_into_tasks(done: NDArray[np.bool_], sizes: TaskSizes, stopped: Event) -> Iterator[NDArray[np.integer]]:
     """Positions of the cells of one task after another, ascending.
 

@@ -12,7 +12,7 @@ from ringsweep.config import Config
 from ringsweep.models import batch
 from ringsweep.physics.belt import Damper
 from ringsweep.physics.drives import Constant
-from ringsweep.quantities.variables import FAILED, RIDING
+from ringsweep.quantities.variables import FAILED, INFERRED, RIDING
 from ringsweep.runs.cells import laws_at, values_at
 from ringsweep.solvers.rk4 import STABILITY_LIMIT
 from ringsweep.storage.chunks import Layout
@@ -33,13 +33,17 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
     ended = results["t_end"].variable
     stiffness = results["stiffness"].variable if "stiffness" in results else None
     ended_at_start = unstable = 0
+    count = ended.size
     largest = 0.0
+    origin = results["origin"].variable if "origin" in results else None
     for _, _, region in Layout(ended.shape).chunks():
+        inferred = np.zeros((), dtype=bool) if origin is None else origin[region].values == INFERRED
+        count -= int(np.count_nonzero(inferred))
         ended_at_start += int(np.count_nonzero(ended[region].values == 0.0))
         if stiffness is not None:
             values = stiffness[region].values
             # NaN is not within the limit either.
-            beyond = values[~(values <= STABILITY_LIMIT)]
+            beyond = values[~((values <= STABILITY_LIMIT) | inferred)]
             unstable += beyond.size
             # Unlike max(), this keeps NaN.
             largest = float(np.maximum(largest, beyond.max(initial=0.0)))
@@ -51,7 +55,7 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
         logger.warning(
             "%.1f %% of the cells exceed the limit of stability of rk4 (stiffness above %.4g), "
             "and their regimes may be wrong: %s; solver auto has no such limit",
-            100.0 * unstable / ended.size,
+            100.0 * unstable / count,
             STABILITY_LIMIT,
             remedy,
         )
@@ -64,8 +68,8 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
             "at a speed that the body reached",
             100.0 * failed,
         )
-    if ended_at_start > 0.5 * ended.size:
-        runs = "the run ends" if ended.size == 1 else f"{ended_at_start / ended.size:.0%} of the runs end"
+    if ended_at_start > 0.5 * count:
+        runs = "the run ends" if count == 1 else f"{ended_at_start / count:.0%} of the runs end"
         logger.warning("%s at t = 0: is a unit or the initial state wrong?", runs)
 
 

@@ -14,7 +14,7 @@ import json
 import logging
 import os
 import secrets
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -197,8 +197,21 @@ class Checkpoint:
         cells = members["cells"]
         return members["positions"].astype(np.intp), {name: cells[name] for name in cells.dtype.names}
 
-    def chunks(self) -> Iterator[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]]:
+    def finished(self) -> Iterator[tuple[NDArray[np.intp], dict[str, NDArray[Any]]]]:
+        """Positions and columns of every task file."""
+        for path in list(self.files):
+            yield self.read(path)
+
+    def chunks(
+        self, complete: Callable[[tuple[slice, ...], NDArray[np.bool_], dict[str, NDArray[Any]]], bool] | None = None
+    ) -> Iterator[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]]:
         """Slices in the grid of every chunk, in order, and its columns in the shape of the chunk.
+
+        Parameters
+        ----------
+        complete : callable, optional
+            Gets the slices of a chunk, a mask of the cells that are in no file, and the columns, both in the shape of
+            the chunk. It fills these cells, adds columns, and returns whether it knows all of them.
 
         Raises
         ------
@@ -207,11 +220,15 @@ class Checkpoint:
         """
         waiting = sorted(self.files, key=lambda path: self.files[path], reverse=True)
         read: dict[Path, tuple[NDArray[np.intp], dict[str, NDArray[Any]]]] = {}
+        dtypes: dict[str, Any] = {}
+        if waiting and complete is not None:
+            dtypes = {name: column.dtype for name, column in self.read(waiting[-1])[1].items()}
         for start, stop, region in self.layout.chunks():
             while waiting and self.files[waiting[-1]][0] < stop:
                 path = waiting.pop()
                 read[path] = self.read(path)
-            chunk: dict[str, NDArray[Any]] = {}
+            # A chunk without a computed cell has the columns of the others.
+            chunk = {name: np.empty(stop - start, dtype=dtype) for name, dtype in dtypes.items()}
             missing = np.ones(stop - start, dtype=bool)
             for positions, columns in read.values():
                 part = slice(*np.searchsorted(positions, (start, stop)))
@@ -219,9 +236,12 @@ class Checkpoint:
                 missing[within] = False
                 for name, column in columns.items():
                     chunk.setdefault(name, np.empty(stop - start, dtype=column.dtype))[within] = column[part]
-            if missing.any():
+            shape = [s.stop - s.start for s in region]
+            chunk = {name: column.reshape(shape) for name, column in chunk.items()}
+            known = complete is not None and complete(region, missing.reshape(shape), chunk)
+            if missing.any() and not known:
                 raise DamagedTask(f"{missing.sum()} cells are in no task file of {self.folder}")
-            yield region, {name: column.reshape([s.stop - s.start for s in region]) for name, column in chunk.items()}
+            yield region, chunk
             for path in [path for path in read if self.files[path][1] < stop]:
                 del read[path]
 

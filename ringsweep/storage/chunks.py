@@ -55,6 +55,18 @@ class Layout:
             found.append(origins[which, dim] + within)
         return tuple(found[::-1])
 
+    def positions(self, indices: Sequence[NDArray[np.integer]]) -> NDArray[np.intp]:
+        """Positions of the cells at these indices along each dimension; the inverse of :meth:`indices`."""
+        if not self.sizes:
+            return np.zeros(1, dtype=np.intp)
+        _, shapes, starts = self._chunks
+        counts = [-(-size // edge) for size, edge in zip(self.sizes, self.chunk, strict=True)]
+        which = np.ravel_multi_index([i // edge for i, edge in zip(indices, self.chunk, strict=True)], counts)
+        place = np.zeros(len(which), dtype=np.intp)
+        for dim, (index, edge) in enumerate(zip(indices, self.chunk, strict=True)):
+            place = place * shapes[which, dim] + index % edge
+        return starts[which] + place
+
     def chunks(self) -> Iterator[tuple[int, int, tuple[slice, ...]]]:
         """First position, last position plus one, and slices in the grid of every chunk, in order."""
         if not self.sizes:

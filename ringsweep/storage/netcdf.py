@@ -8,7 +8,7 @@ import os
 import secrets
 import tempfile
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
-from ringsweep.quantities.variables import Variable, error_attribute
+from ringsweep.quantities.variables import MISSING, Variable, error_attribute
 from ringsweep.storage.chunks import Layout
 
 #: Attributes that every file of this package has.
@@ -123,6 +123,7 @@ def write(
     variables: Mapping[str, Variable],
     layout: Layout,
     chunks: Iterable[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]],
+    gaps: Collection[str] = (),
 ) -> None:
     """Write the dataset of a sweep chunk by chunk, completely or not at all. Memory holds a few chunks at a time.
 
@@ -140,6 +141,8 @@ def write(
         Chunks of the grid.
     chunks : iterable of tuple
         Slices of each chunk in the grid, and its columns in the shape of the chunk.
+    gaps : collection of str
+        Columns of whole numbers in which `MISSING` stands for no value: xarray reads them as floats with NaN.
 
     Raises
     ------
@@ -149,7 +152,7 @@ def write(
     temporary = folder / f"{secrets.token_hex(4)}.tmp"
     try:
         _to_netcdf(frame, temporary)
-        written = _write_chunks(temporary, frame, variables, layout, chunks)
+        written = _write_chunks(temporary, frame, variables, layout, chunks, gaps)
         if written != _checksums(temporary, written, layout):
             raise OSError("the file does not read back as it was written")
         with temporary.open("r+b") as file:
@@ -178,6 +181,7 @@ def _write_chunks(
     variables: Mapping[str, Variable],
     layout: Layout,
     chunks: Iterable[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]],
+    gaps: Collection[str],
 ) -> dict[str, int]:
     """Add the columns to a file and return a checksum of each."""
     dims = tuple(map(str, frame.sizes))
@@ -187,7 +191,9 @@ def _write_chunks(
         for region, columns in chunks:
             for name, column in columns.items():
                 if name not in sums:
-                    variable = file.createVariable(name, column.dtype, dims, fill_value=False, **_chunked(layout))
+                    fill = MISSING if name in gaps else False
+                    variable = file.createVariable(name, column.dtype, dims, fill_value=fill, **_chunked(layout))
+                    variable.set_auto_maskandscale(False)
                     _cache_one_chunk(variable, layout)
                     described = variables[name].attributes | error_attribute(name, columns)
                     variable.setncatts(described | ({"coordinates": others} if others else {}))

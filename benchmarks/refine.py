@@ -1,0 +1,202 @@
+"""Refined maps against full ones: cost, wrong cells, the bound of the audit; cost against resolution; PhaseMap.
+
+    python -m benchmarks.refine                # half an hour: full maps of 512 and 1024 cells a side
+    python -m benchmarks.refine --part scaling # or full, zoom
+    python -m benchmarks.refine --quick        # smaller maps
+
+The scene is the map of the README. A full and a refined map are computed one after the other in one run. CPU seconds
+do not grow with other load on the machine; they contain everything: runs, decisions, files. PhaseMap is optional
+(pip install phasemap); it gets the labels of the full map, since only its evaluations count.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+import ringsweep
+from benchmarks._common import ALPHA, V0, heading, machine, markdown, ring, table
+from ringsweep.quantities.variables import INFERRED, LABELS
+
+RESULTS = Path(__file__).parent / "results"
+SCENE = ring({"law": "bengisu-akay", "alpha": ALPHA, "v0": V0})
+#: A ragged place in the lower right corner of the map: amplitude (rad/s), half-angle (rad).
+CORNER = (3.6, np.radians(3.2))
+
+
+def grid(side: int) -> dict[str, Any]:
+    """The axes of the map of the README, with `side` cells along each."""
+    return {
+        "drive.amplitude": np.geomspace(0.1, 10.0, side).tolist(),
+        "zone.half_angle": np.radians(np.linspace(2.0, 60.0, side)).tolist(),
+    }
+
+
+def timed(axes: dict[str, Any], folder: str, **options: Any) -> tuple[xr.Dataset, float, float]:
+    """The dataset of a sweep, its wall-clock time and its CPU time."""
+    begin, cpu = time.perf_counter(), time.process_time()
+    path = Path(folder) / f"{time.time_ns()}.nc"
+    ringsweep.sweep(SCENE, axes, path, progress=False, **options).close()
+    wall, cpu = time.perf_counter() - begin, time.process_time() - cpu
+    return xr.open_dataset(path, decode_times=False), wall, cpu
+
+
+def labels_of(ds: xr.Dataset) -> Any:
+    """One number for regime, motion and separating contact."""
+    return sum(ds[name].values.astype(int) * 32**k for k, name in enumerate(LABELS))
+
+
+def against_full(sides: list[int], folder: str) -> str:
+    """Refined and full maps of some sizes."""
+    rows = []
+    peers = []
+    for side in sides:
+        refined, wall, cpu = timed(grid(side), folder, refine=True)
+        whole, full_wall, full_cpu = timed(grid(side), folder)
+        wrong = labels_of(refined) != labels_of(whole)
+        inferred = int((refined.origin == INFERRED).sum())
+        run = (refined.origin != INFERRED).values
+        same = all(np.array_equal(refined[n].values[run], whole[n].values[run], equal_nan=True) for n in whole)
+        rows.append([
+            f"{side}²", f"{wall:.0f} s, {full_wall:.0f} s", f"{100 * run.mean():.2f} %", f"{full_wall / wall:.1f}x",
+            f"{full_cpu / cpu:.1f}x", f"{wrong.sum()} ({100 * wrong.mean():.3f} %)",
+            f"{100 * wrong.sum() / inferred:.3f} %", f"{100 * refined.attrs['audit_bound']:.3f} %", str(same),
+        ])  # fmt: skip
+        print(*rows[-1], flush=True)
+        peers += against_phasemap(labels_of(whole), refined)
+    header = ["map", "refined, full", "cells run", "wall clock", "CPU", "cells wrong", "of those inferred",
+              "bound on these", "the others equal bit for bit"]  # fmt: skip
+    heading("Refined against full")
+    table(header, rows)
+    text = "## Refined against full\n\n" + markdown(header, rows)
+    header = ["evaluations and cells whose label is wrong or open", "", "evaluations", "cells"]
+    table(header, peers)
+    return text + "\n## PhaseMap on the same labels\n\n" + markdown(header, peers)
+
+
+def against_phasemap(labels: Any, refined: xr.Dataset) -> list[list[str]]:
+    """Evaluations of PhaseMap and of the refinement, and the cells that each leaves wrong or without a label."""
+    from ringsweep.runs.refined import SEED
+    from ringsweep.runs.refinement import Answer, refine
+
+    rows = []
+    for audit in (0.0, 0.02):
+        decisions = refine((1, *labels.shape), 32, audit, seed=SEED)
+        flat, count, cells = labels.ravel(), 0, None
+        try:
+            cells = next(decisions)
+            while True:
+                count += len(cells)
+                cells = decisions.send(Answer(flat[cells], np.ones(len(cells), dtype=bool)))
+        except StopIteration as end:
+            wrong = int((end.value.labels[0] != labels).sum())
+        rows.append([f"{len(labels)}²", f"refined, audit {audit:g}", str(count), str(wrong)])
+    try:
+        from benchmarks.peers.with_phasemap import evaluations
+
+        for halvings, all_corners in ((5, False), (5, True), (6, False)):
+            count, wrong = evaluations(labels, 32, halvings, all_corners=all_corners)
+            name = f"PhaseMap, {halvings} halvings{', all corners' if all_corners else ''}"
+            rows.append([f"{len(labels)}²", name, str(count), str(wrong)])
+    except ImportError:
+        print("PhaseMap is not installed")
+    return rows
+
+
+def scaling(sides: list[int], folder: str) -> str:
+    """Cost against resolution."""
+    rows = []
+    for side in sides:
+        found, wall, cpu = timed(grid(side), folder, refine={"audit": 0.0})
+        count = int((found.origin != INFERRED).sum())
+        rows.append([str(side), f"{wall:.1f}", f"{cpu:.1f}", str(count), f"{count / side:.1f}",
+                     f"{100 * count / side**2:.2f} %", f"{0.02 * (side**2 - count):.0f}"])  # fmt: skip
+        print(*rows[-1], flush=True)
+    header = ["side", "wall, s", "CPU, s", "cells run", "per cell of the side", "share", "an audit of 2 % adds"]
+    heading("Cost against resolution, without an audit")
+    table(header, rows)
+    counts = [float(row[3]) for row in rows]
+    slope = np.polyfit(np.log(sides), np.log(counts), 1)[0]
+    text = "## Cost against resolution, without an audit\n\n" + markdown(header, rows)
+    return f"{text}\nCells run grow like side^{slope:.2f}.\n"
+
+
+def densest(labels: Any, side: int) -> tuple[int, int]:
+    """A cell beside a boundary, in the middle of that square in which most cells lie beside one."""
+    edges = np.zeros(labels.shape, dtype=int)
+    edges[1:] |= labels[1:] != labels[:-1]
+    edges[:, 1:] |= labels[:, 1:] != labels[:, :-1]
+    sums = np.pad(edges, ((1, 0), (1, 0))).cumsum(axis=0).cumsum(axis=1)
+    squares = sums[side:, side:] - sums[:-side, side:] - sums[side:, :-side] + sums[:-side, :-side]
+    middle = np.array(np.unravel_index(squares.argmax(), squares.shape)) + side // 2
+    cells = np.argwhere(edges)
+    row, column = cells[np.argmin(((cells - middle) ** 2).sum(axis=1))]
+    return int(row), int(column)
+
+
+def zoom(side: int) -> str:
+    """Uncertainty exponent of ever smaller windows in the lower right corner, each where boundaries are densest."""
+    rows = []
+    place = list(CORNER)
+    for decade in range(7):
+        half = 0.3 * 10.0**-decade
+        axes = {
+            "drive.amplitude": (place[0] * np.exp(np.linspace(-half, half, side))).tolist(),
+            "zone.half_angle": (place[1] * np.exp(np.linspace(-half, half, side))).tolist(),
+        }
+        ds = ringsweep.sweep(SCENE, axes, progress=False)
+        found = ringsweep.uncertainty_exponent(ds)
+        counts = ", ".join(f"{e}: {c}" for e, c in zip(found.epsilon.values, found.uncertain.values, strict=True))
+        rows.append([f"{2 * half:.0e}", counts, f"{float(found.exponent):.2f} ± {float(found.exponent_error):.2f}",
+                     f"{100 * float((ds.certified == 1).mean()):.1f} %",
+                     f"{float(ds.reversals.median()):.0f}, {float(ds.reversals.max()):.0f}"])  # fmt: skip
+        print(*rows[-1], flush=True)
+        row, column = densest(labels_of(ds), side // 10)
+        place = [axes["drive.amplitude"][row], axes["zone.half_angle"][column]]
+    header = [
+        "relative width",
+        "boxes of each side with two labels",
+        "exponent",
+        "certified",
+        "reversals: median, most",
+    ]
+    heading("Zoom")
+    table(header, rows)
+    return "## Zoom into the lower right corner\n\n" + markdown(header, rows)
+
+
+def main() -> None:
+    """Measure, print, write."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="smaller maps")
+    parser.add_argument("--part", choices=["full", "scaling", "zoom"], help="only this part, which is only printed")
+    parser.add_argument("--sides", type=int, nargs="+", help="cells along a side of the maps of this part")
+    given = parser.parse_args()
+    where = machine(["phasemap"])
+    print(where)
+    ringsweep.sweep(SCENE, grid(2), progress=False)
+    full, resolutions, window = (
+        ([128], [64, 128], 64) if given.quick else ([512, 1024], [2**k for k in range(6, 13)], 128)
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        parts = {
+            "full": lambda: against_full(given.sides or full, folder),
+            "scaling": lambda: scaling(given.sides or resolutions, folder),
+            "zoom": lambda: zoom((given.sides or [window])[0]),
+        }
+        texts = [part() for name, part in parts.items() if given.part in (None, name)]
+    if given.part is None:
+        report = "# Refined maps\n\n`python -m benchmarks.refine` on\n\n"
+        report += "".join(f"- {line}\n" for line in where.splitlines()) + "\n" + "\n".join(texts)
+        target = Path() if given.quick else RESULTS
+        (target / "refine.md").write_text(report)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,133 @@
+"""The key ``sweep.refine``: which cells of a grid are computed, and which are inferred."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ringsweep.config.axes import Axes, dimension
+from ringsweep.config.sections import suggestion
+from ringsweep.errors import InputError
+from ringsweep.models import MODELS
+from ringsweep.models.scene import Scene
+from ringsweep.quantities.parameters import Parameter
+from ringsweep.quantities.units import quantity, show
+from ringsweep.quantities.variables import OUTCOMES
+
+#: Keys of ``sweep.refine`` with a number.
+NUMBERS = {
+    "stride": Parameter("1", "cells from one cell of the first round to the next", lower=1, upper=1024, whole=True,
+                        default=32),
+    "audit": Parameter("1", "share of the inferred cells that is computed after all", lower=0, upper=1, default=0.02),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """How a grid is refined.
+
+    Attributes
+    ----------
+    dims : tuple of str
+        Dimensions that are refined, one or two; along the others the map is a stack.
+    stride : int
+        Cells from one cell of the first round to the next.
+    audit : float
+        Share of the inferred cells that is computed after all.
+    also : str, optional
+        Variable that is interpolated where a cell is inferred.
+    within : float, optional
+        Largest error of that, in the unit of the variable.
+    """
+
+    dims: tuple[str, ...]
+    stride: int
+    audit: float
+    also: str | None = None
+    within: float | None = None
+
+
+def read_refinement(given: Any, scene: Scene, axes: Axes) -> Refinement | None:
+    """Read and validate the value under ``sweep.refine``, or under ``refine`` in Python.
+
+    Parameters
+    ----------
+    given : mapping or bool or None
+        True stands for the defaults.
+    scene : Scene
+    axes : Axes
+
+    Raises
+    ------
+    InputError
+        If a key or value is wrong, or the sweep is no grid.
+    """
+    if given is None or given is False:
+        return None
+    section = {} if given is True else given
+    if not isinstance(section, dict):
+        raise InputError("sweep.refine", f"a section with keys, or true, is expected, got {show(given)}")
+    known = (*NUMBERS, "also", "within", "axes")
+    for key in section:
+        if key not in known:
+            raise InputError(f"sweep.refine.{key}", "unknown key" + suggestion(key, known))
+    values = {
+        key: quantity(section.get(key, parameter.default), parameter, f"sweep.refine.{key}")
+        for key, parameter in NUMBERS.items()
+    }
+    also, within = _also(section, scene)
+    return Refinement(_dims(section.get("axes"), axes), int(values["stride"]), values["audit"], also, within)
+
+
+def _dims(given: Any, axes: Axes) -> tuple[str, ...]:
+    """The dimensions that are refined: those named, or the two longest."""
+    columns = axes.columns.items()
+    for path, (dims, _) in columns:
+        if dims != (dimension(path),):
+            raise InputError(
+                "sweep.refine",
+                f"{path} varies along {' x '.join(dims)}, but only a grid can be refined: a point has no neighbours",
+            )
+    names = {path: values for path, (_, values) in columns if values.dtype.kind == "f" and len(values) > 1}
+    if not names:
+        raise InputError("sweep.refine", "the sweep has no grid axis of two or more numbers: nothing can be refined")
+    if given is None:
+        chosen = sorted(names, key=lambda path: -len(names[path]))[:2]
+    else:
+        if not isinstance(given, list) or not 1 <= len(given) <= 2 or len(set(map(str, given))) != len(given):
+            raise InputError("sweep.refine.axes", f"one or two paths of sweep.grid are expected, got {show(given)}")
+        chosen = given
+        for k, path in enumerate(chosen):
+            if path not in names:
+                raise InputError(
+                    f"sweep.refine.axes.{k}", f"{show(path)} is no axis of numbers" + suggestion(path, names)
+                )
+    for path in chosen:
+        steps = np.diff(names[path])
+        if not ((steps > 0).all() or (steps < 0).all()):
+            raise InputError(
+                f"sweep.grid.{path}", "values go up and down: along an axis that is refined they must ascend or descend"
+            )
+    # In the order of the grid.
+    return tuple(dimension(path) for path in names if path in chosen)
+
+
+def _also(section: dict[str, Any], scene: Scene) -> tuple[str | None, float | None]:
+    """The variable that is interpolated, and its largest error."""
+    if ("also" in section) != ("within" in section):
+        there, lacks = ("also", "within") if "also" in section else ("within", "also")
+        raise InputError(
+            f"sweep.refine.{lacks}", f"missing: `{there}` needs it, for example `also: t_separation, within: 1e-3`"
+        )
+    if "also" not in section:
+        return None, None
+    model = MODELS[scene.structure.model]
+    numbers = [name for name in model.outcomes if OUTCOMES[name].dtype == "float64" and name not in model.absent]
+    also = section["also"]
+    if also not in numbers:
+        raise InputError("sweep.refine.also", f"{show(also)} is no number of this model" + suggestion(also, numbers))
+    unit = OUTCOMES[also].unit
+    error = Parameter(unit, f"largest error of {also} where it is interpolated", lower=0, open_lower=True)
+    return also, quantity(section["within"], error, "sweep.refine.within")

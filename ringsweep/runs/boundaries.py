@@ -1,0 +1,290 @@
+"""Boundaries of a map as curves, and whether they are fractal."""
+
+from __future__ import annotations
+
+import json
+import logging
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ringsweep.config import Axes, Config, load
+from ringsweep.errors import InputError
+from ringsweep.quantities.units import show
+from ringsweep.quantities.variables import INFERRED
+from ringsweep.runs.sweep import compute
+
+logger = logging.getLogger("ringsweep")
+
+#: Least number of boxes with more than one regime for a size to count in the fit of an exponent.
+FEWEST_BOXES = 30
+
+
+def boundary(ds: xr.Dataset, regime: str, tolerance: float = 1e-6, *, jobs: int | None = None) -> xr.Dataset:
+    """Curves between the cells of one regime and the others, located by bisection.
+
+    Between two neighbouring cells of the map, of which one has the regime and the other has not, runs are made halfway
+    until the place is known to the tolerance. Only certified runs count: where a run is not certified the place stays
+    as uncertain as it is then.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        Result of a sweep over a grid, refined or not, of one or two dimensions. Hold further ones by ``ds.isel`` or
+        ``ds.sel``.
+    regime : str
+        Name of the regime, such as ``"separating"``.
+    tolerance : float
+        Largest distance of a point from the boundary along its axis, in the unit of that axis (rad for angles).
+    jobs : int, optional
+        Number of threads; all cores by default.
+
+    Returns
+    -------
+    xarray.Dataset
+        Along the dimension ``vertex``: the swept coordinates, ``line`` (the number of the curve), ``error`` (the
+        boundary lies within ± this), ``axis`` (along which of the two) and ``beyond`` (the regime on the other side).
+
+    Raises
+    ------
+    InputError
+        If the regime is unknown, the dataset has not one or two grid dimensions, or the tolerance is not positive.
+
+    Examples
+    --------
+    >>> import ringsweep
+    >>> from ringsweep.config import load
+    >>> scene = load("my-sweep.yaml").source["scene"]
+    >>> maps = ringsweep.sweep(scene, {"drive.amplitude": [0.1, 1.0, 2.0]})
+    >>> found = ringsweep.boundary(maps, "separating", 1e-3)
+    >>> bool((found.error <= 1e-3).all())
+    True
+    """
+    flag, dims = _checked(ds, regime, tolerance)
+    configuration = _config(ds)
+    inside = ds["regime"].values == flag
+    usable = ds["certified"].values == 1 if getattr(configuration.solver, "certify", True) else _was_run(ds)
+    sides = [_crossings(inside, usable, axis) for axis in range(len(dims))]
+    low = np.concatenate([one for one, _ in sides])
+    high = np.concatenate([other for _, other in sides])
+    axis = np.repeat(np.arange(len(dims)), [len(one) for one, _ in sides])
+    columns = {str(name): c for name, c in ds.coords.items() if "path" in c.attrs}
+    place = {name: _values(c, dims, low) for name, c in columns.items()}
+    ends = np.zeros((2, len(low)))
+    for k, dim in enumerate(dims):
+        along = ds[dim].values
+        ends[:, axis == k] = along[low[axis == k, k]], along[high[axis == k, k]]
+    within = inside[tuple(low.T)]
+    beyond = ds["regime"].values[tuple(np.where(within[:, None], high, low).T)].copy()
+    open_ = np.ones(len(low), dtype=bool)
+    while True:
+        middle = 0.5 * (ends[0] + ends[1])
+        open_ &= np.abs(ends[1] - ends[0]) > 2.0 * tolerance
+        open_ &= (middle != ends[0]) & (middle != ends[1])
+        if not open_.any():
+            break
+        values = {
+            name: np.where(axis == dims.index(name), middle, column)[open_] if name in dims else column[open_]
+            for name, column in place.items()
+        }
+        found = _run(configuration, {columns[name].attrs["path"]: column for name, column in values.items()}, jobs)
+        certified = found["certified"].values == 1 if getattr(configuration.solver, "certify", True) else True
+        here = found["regime"].values == flag
+        which = np.flatnonzero(open_)
+        side = (here == within[which]) & certified
+        other = (here != within[which]) & certified
+        ends[0, which[side]], ends[1, which[other]] = middle[which[side]], middle[which[other]]
+        outside = ~here & certified
+        beyond[which[outside]] = found["regime"].values[outside]
+        open_[which[~(side | other)]] = False
+    for k, dim in enumerate(dims):
+        place[dim] = np.where(axis == k, 0.5 * (ends[0] + ends[1]), place[dim])
+    order, line = _joined(low, axis, ds["regime"].shape)
+    error = 0.5 * np.abs(ends[1] - ends[0])
+    if count := int((error > tolerance).sum()):
+        logger.warning("%d of %d points are less certain than asked for: runs there are not certified", count, len(low))
+    axes = {"flag_values": np.arange(len(dims), dtype=np.int8), "flag_meanings": " ".join(dims)}
+    return xr.Dataset(
+        {
+            "line": ("vertex", line, {"long_name": "number of the curve"}),
+            "error": ("vertex", error[order], {"long_name": "largest distance of the boundary along its axis"}),
+            "axis": ("vertex", axis[order].astype(np.int8), {"long_name": "axis along which it is located", **axes}),
+            "beyond": ("vertex", beyond[order].astype(np.int8), ds["regime"].attrs | {"long_name": "regime beyond"}),
+        },
+        coords={name: ("vertex", column[order], columns[name].attrs) for name, column in place.items()},
+        attrs={**ds.attrs, "boundary_of": regime, "boundary_tolerance": tolerance},
+    )
+
+
+def _checked(ds: xr.Dataset, regime: str, tolerance: float) -> tuple[int, list[str]]:
+    """Flag of the regime and the dimensions of the map."""
+    if "regime" not in ds or "time" in ds.dims:
+        raise InputError("ds", "is no sweep: it has no regimes")
+    meanings = str(ds["regime"].attrs["flag_meanings"]).split()
+    if regime not in meanings:
+        raise InputError("regime", f"{show(regime)} is none of {', '.join(meanings)}")
+    if not 0.0 < tolerance < np.inf:
+        raise InputError("tolerance", f"{show(tolerance)} is not a number greater than 0")
+    dims = [str(dim) for dim in ds["regime"].dims]
+    swept = [dim for dim in dims if dim in ds.coords and "path" in ds[dim].attrs and ds[dim].dtype.kind == "f"]
+    if dims != swept or not 1 <= len(dims) <= 2:
+        raise InputError(
+            "ds", f"has the dimensions {', '.join(dims) or 'none'}: one or two axes of numbers are needed; hold others"
+        )
+    return int(np.atleast_1d(ds["regime"].attrs["flag_values"])[meanings.index(regime)]), dims
+
+
+def _was_run(ds: xr.Dataset) -> NDArray[np.bool_]:
+    return ds["origin"].values != INFERRED if "origin" in ds else np.ones(ds["regime"].shape, dtype=bool)
+
+
+def _crossings(inside: NDArray[np.bool_], usable: NDArray[np.bool_], axis: int) -> tuple[Any, Any]:
+    """Indices of neighbouring cells along an axis of which one is inside, both of shape ``(edges, dimensions)``."""
+    first = (slice(None),) * axis + (slice(None, -1),)
+    second = (slice(None),) * axis + (slice(1, None),)
+    low = np.argwhere((inside[first] != inside[second]) & usable[first] & usable[second])
+    return low, low + np.eye(inside.ndim, dtype=int)[axis]
+
+
+def _values(coordinate: xr.DataArray, dims: list[str], cells: NDArray[np.intp]) -> NDArray[Any]:
+    """Values of a coordinate in cells that are given by their indices."""
+    index = tuple(cells[:, dims.index(str(dim))] for dim in coordinate.dims)
+    return np.array(np.broadcast_to(coordinate.values[index], len(cells)))
+
+
+def _config(ds: xr.Dataset) -> Config:
+    if "configuration" not in ds.attrs:
+        raise InputError("ds", "has no attribute configuration, so its scene is not known")
+    return load(json.loads(ds.attrs["configuration"]))
+
+
+def _run(config: Config, values: dict[str, NDArray[Any]], jobs: int | None) -> xr.Dataset:
+    """Run points; the progress of each of many rounds is not shown."""
+    count = len(next(iter(values.values())))
+    axes = Axes({"point": count}, {path: (("point",), column) for path, column in values.items()})
+    return compute(replace(config, axes=axes, refine=None), jobs=jobs, progress=False)
+
+
+def _joined(low: NDArray[np.intp], axis: NDArray[np.intp], shape: tuple[int, ...]) -> tuple[NDArray[np.intp], Any]:
+    """Order of edges along curves, and the number of the curve of each.
+
+    A curve enters a square of four cells through one of its edges and leaves it through another.
+    """
+    if len(shape) == 1:
+        return np.arange(len(low)), np.arange(len(low), dtype=np.int32)
+    squares: dict[tuple[int, int], list[int]] = {}
+    for edge, ((i, j), along) in enumerate(zip(low.tolist(), axis.tolist(), strict=True)):
+        for square in ((i, j), (i, j - 1)) if along == 0 else ((i, j), (i - 1, j)):
+            squares.setdefault(square, []).append(edge)
+    neighbours: dict[int, list[int]] = {edge: [] for edge in range(len(low))}
+    for (i, j), edges in squares.items():
+        pairs = [edges]
+        if len(edges) == 4:
+            # Both diagonals are possible; the curves part the first cell from the last.
+            known = {(int(axis[e]), int(low[e, 0]) - i, int(low[e, 1]) - j): e for e in edges}
+            pairs = [[known[0, 0, 0], known[1, 0, 0]], [known[0, 0, 1], known[1, 1, 0]]]
+        for pair in pairs:
+            if len(pair) == 2:
+                neighbours[pair[0]].append(pair[1])
+                neighbours[pair[1]].append(pair[0])
+    order: list[int] = []
+    line: list[int] = []
+    left = set(neighbours)
+    # First from the ends of open curves, then around closed ones.
+    for start in sorted(neighbours, key=lambda edge: len(neighbours[edge])):
+        at: int | None = start if start in left else None
+        number = line[-1] + 1 if line else 0
+        while at is not None:
+            left.discard(at)
+            order.append(at)
+            line.append(number)
+            at = next((one for one in neighbours[at] if one in left), None)
+    return np.array(order, dtype=np.intp), np.array(line, dtype=np.int32)
+
+
+def uncertainty_exponent(ds: xr.Dataset) -> xr.Dataset:
+    """How fast the part of a map that lies near a boundary shrinks with the distance.
+
+    The map is divided into square boxes. The share of boxes that hold more than one regime, motion or separating
+    contact goes like a power of the side of a box. The exponent 1 belongs to a smooth boundary, of dimension 1. A
+    smaller exponent belongs to a boundary of dimension 2 minus the exponent, on which more digits in the parameters
+    hardly help to foretell the regime (Grebogi, McDonald, Ott and Yorke 1983). As in Attractors.jl the result has the
+    counts, so that a reader can judge the fit.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        Result of a sweep over two dimensions.
+
+    Returns
+    -------
+    xarray.Dataset
+        Along the dimension ``epsilon``, the side of the boxes in cells: ``boxes``, ``uncertain`` (their number with
+        more than one label) and ``fitted`` (whether the size counts in the fit). ``exponent``, its standard error
+        ``exponent_error``, and ``dimension`` of the boundary. NaN if there are too few counts, which a warning tells.
+
+    Raises
+    ------
+    InputError
+        If the dataset is no sweep over two dimensions.
+
+    Examples
+    --------
+    A boundary along a circle:
+
+    >>> import numpy as np, ringsweep, xarray as xr
+    >>> y, x = np.indices((512, 512)) / 512
+    >>> maps = xr.Dataset({"regime": (("y", "x"), (x**2 + y**2 < 0.5).astype("int8"))})
+    >>> ringsweep.uncertainty_exponent(maps).exponent.round(1).item()
+    1.0
+    """
+    if "regime" not in ds or ds["regime"].ndim != 2:
+        raise InputError("ds", "is no map of regimes over two dimensions: hold further ones by ds.isel")
+    labels = ds["regime"].values.astype(np.int64)
+    for name in ("motion", "separating_contact"):
+        if name in ds:
+            labels = labels * 32 + ds[name].values
+    # Boxes have cells at their corners and share their edges, so that every boundary lies in a box.
+    least = np.minimum.reduce([labels[:-1, :-1], labels[:-1, 1:], labels[1:, :-1], labels[1:, 1:]])
+    greatest = np.maximum.reduce([labels[:-1, :-1], labels[:-1, 1:], labels[1:, :-1], labels[1:, 1:]])
+    sizes: list[int] = []
+    boxes: list[int] = []
+    uncertain: list[int] = []
+    while min(least.shape) >= 4:
+        sizes.append(2 ** len(sizes))
+        boxes.append(least.size)
+        uncertain.append(int((least != greatest).sum()))
+        rows, columns = (size // 2 for size in least.shape)
+        least, greatest = (
+            reduce(one[: 2 * rows, : 2 * columns].reshape(rows, 2, columns, 2), axis=(1, 3))
+            for one, reduce in ((least, np.min), (greatest, np.max))
+        )
+    epsilon, total, count = np.array(sizes), np.array(boxes), np.array(uncertain)
+    fitted = (count >= FEWEST_BOXES) & (count < 0.5 * total)
+    exponent, error = np.nan, np.nan
+    if fitted.sum() >= 3:
+        fit, covariance = np.polyfit(np.log(epsilon[fitted]), np.log(count[fitted] / total[fitted]), 1, cov="unscaled")
+        exponent = float(fit[0])
+        rest = np.log(count[fitted] / total[fitted]) - np.polyval(fit, np.log(epsilon[fitted]))
+        error = float(np.sqrt(covariance[0, 0] * (rest**2).sum() / (fitted.sum() - 2)))
+    else:
+        logger.warning(
+            "too few counts for an uncertainty exponent: %d sizes of boxes have %d or more with two labels, and less "
+            "than half of all; three are needed: a finer map has more",
+            fitted.sum(),
+            FEWEST_BOXES,
+        )
+    return xr.Dataset(
+        {
+            "boxes": ("epsilon", total, {"long_name": "number of boxes"}),
+            "uncertain": ("epsilon", count, {"long_name": "number of boxes with more than one label"}),
+            "fitted": ("epsilon", fitted, {"long_name": "whether the size counts in the fit"}),
+            "exponent": ((), exponent, {"long_name": "uncertainty exponent"}),
+            "exponent_error": ((), error, {"long_name": "standard error of the uncertainty exponent"}),
+            "dimension": ((), 2.0 - exponent, {"long_name": "dimension of the boundary"}),
+        },
+        coords={"epsilon": ("epsilon", epsilon, {"long_name": "side of a box in cells"})},
+    )

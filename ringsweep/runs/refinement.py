@@ -1,0 +1,389 @@
+"""Which cells of a map come next: decisions on labels alone, without solver, scene or files.
+
+The cells of a coarse lattice come first. Each level halves the intervals of the lattice. A new point of the lattice
+takes the label of the points around it if these agree, and is computed if they do not. Then every pair of neighbours in
+the lattice that differ is computed, until no new pair appears. So a boundary is followed from point to point, even
+if it leaves a block through an edge whose ends agree. Around what is thinner than the lattice more points are computed,
+since its parts may lie between the points. On the last level the lattice is the grid. What it infers is audited.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaln
+
+from ringsweep.quantities.variables import AUDITED, COMPUTED, INFERRED
+
+#: Confidence of the bound on wrong cells.
+CONFIDENCE = 0.95
+
+#: How often the lattice of a coarse block is halved when it is first reopened, and that of its neighbours.
+_REOPENED, _BESIDE = 3, 2
+
+_BESIDES = ((-1, 0), (1, 0), (0, -1), (0, 1))
+_INNER = slice(1, -1), slice(None, -2), slice(2, None)
+_WITHIN_TWO = tuple((down, right) for down in range(-2, 3) for right in range(-2, 3))
+
+Cells = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What was computed in some cells, each array of shape ``(cells,)``.
+
+    Attributes
+    ----------
+    labels : ndarray of int
+        Classification of each cell, at least 0.
+    certain : ndarray of bool
+        Whether a neighbour may take the label. Beside a cell that is not certain every cell is computed.
+    values : ndarray of float, optional
+        Numbers that shall be interpolated; NaN where there is none.
+    """
+
+    labels: NDArray[np.integer]
+    certain: NDArray[np.bool_]
+    values: NDArray[np.float64] | None = None
+
+
+@dataclass(frozen=True)
+class Audit:
+    """Statement of an audit.
+
+    Attributes
+    ----------
+    cells : int
+        Inferred cells that were drawn at random and computed.
+    wrong : int
+        How many of them had been inferred wrongly.
+    wrong_after : int
+        How many cells were found wrong in the last pass over the blocks that were reopened.
+    corrected : int
+        Cells inferred wrongly that were found, the drawn ones and those that following them has found.
+    bound : float
+        Upper bound, at 95 % confidence, on the share of wrong cells among those that are still inferred.
+    """
+
+    cells: int
+    wrong: int
+    wrong_after: int
+    corrected: int
+    bound: float
+
+
+@dataclass(frozen=True)
+class Refined:
+    """A refined map; arrays have the shape of the grid.
+
+    Attributes
+    ----------
+    labels : ndarray of int16
+    origin : ndarray of int8
+        `COMPUTED`, `INFERRED` or `AUDITED`.
+    level : ndarray of int8
+        How often the coarse block around the cell was halved when the cell was computed or inferred.
+    values : ndarray of float, optional
+        Numbers that were interpolated where a cell is inferred.
+    audit : Audit
+    """
+
+    labels: NDArray[np.int16]
+    origin: NDArray[np.int8]
+    level: NDArray[np.int8]
+    values: NDArray[np.float64] | None
+    audit: Audit
+
+
+def refine(
+    shape: tuple[int, int, int], stride: int, audit: float, *, within: float | None = None, seed: int = 0
+) -> Generator[Cells, Answer, Refined]:
+    """Refine the last two axes of a grid.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Number of maps, and rows and columns of each.
+    stride : int
+        Rows and columns from one point of the coarse lattice to the next.
+    audit : float
+        Share of the inferred cells that are audited.
+    within : float, optional
+        Largest error of numbers that are interpolated between computed cells.
+    seed : int
+        Seed of the audit.
+
+    Yields
+    ------
+    ndarray of int
+        Flat indices of the cells whose :class:`Answer` must be sent, ascending. None is asked for twice.
+
+    Returns
+    -------
+    Refined
+    """
+    grid = _Grid(shape, stride, within)
+    yield from grid.coarse()
+    while grid.can_be_halved:
+        yield from grid.halve()
+    return (yield from _audited(grid, audit, np.random.default_rng(seed)))
+
+
+class _Grid:
+    """A lattice in a grid that becomes finer; `labels`, `known` and `values` are those of its points.
+
+    A label of a cell that is not certain is stored as its complement, which is negative.
+    """
+
+    def __init__(self, shape: tuple[int, int, int], stride: int, within: float | None):
+        self.shape, self.stride, self.within = shape, stride, within
+        self.rows, self.columns = (_coarse(size, stride) for size in shape[1:])
+        self.depth = 0
+        lattice = shape[0], len(self.rows), len(self.columns)
+        self.labels = np.zeros(lattice, dtype=np.int16)
+        self.known = np.zeros(lattice, dtype=bool)
+        self.level = np.zeros(lattice, dtype=np.int8)
+        self.values = None if within is None else np.full(lattice, np.nan)
+        # Whether the numbers around a point are too far from linear to be interpolated.
+        self.rough = None if within is None else np.ones(lattice, dtype=bool)
+
+    @property
+    def can_be_halved(self) -> bool:
+        """Whether the lattice is coarser than the grid."""
+        return self.labels.shape != self.shape
+
+    def coarse(self) -> Generator[Cells, Answer]:
+        """Compute all points of the coarse lattice."""
+        yield from self.compute(np.arange(self.labels.size))
+
+    def halve(self) -> Generator[Cells, Answer]:
+        """Halve all intervals, and compute what cannot be inferred."""
+        self.depth += 1
+        (rows, *row_parents), (columns, *column_parents) = _halved(self.rows), _halved(self.columns)
+        corners = [(r, c) for r in row_parents for c in column_parents]
+        around = [self.labels[:, r][:, :, c] for r, c in corners]
+        is_old = (row_parents[0] == row_parents[1])[:, None] & (column_parents[0] == column_parents[1])
+        agree = around[0] >= 0
+        for other in around[1:]:
+            agree &= around[0] == other
+        level = np.where(is_old, self.level[:, corners[0][0]][:, :, corners[0][1]], self.depth)
+        # Within a block whose corners agree a point belongs to that block, however small the lattice has become.
+        ancestor = np.minimum.reduce([self.level[:, r][:, :, c] for r, c in corners])
+        inferred = [~self.known[:, r][:, :, c] for r, c in corners]
+        level = np.where(~is_old & agree & np.logical_or.reduce(inferred), ancestor, level)
+        needed = ~agree & ~is_old
+        if self.values is not None and self.rough is not None:
+            rough = np.logical_or.reduce([self.rough[:, r][:, :, c] for r, c in corners])
+            values = self._interpolated(rows, columns, row_parents, column_parents)
+            needed |= ~is_old & rough & np.isfinite(values)
+            self.values, self.rough = values, np.zeros(agree.shape, dtype=bool)
+        self.known = self.known[:, row_parents[0]][:, :, column_parents[0]] & is_old
+        self.labels, self.level = around[0], level.astype(np.int8)
+        self.rows, self.columns = rows, columns
+        yield from self.compute(np.flatnonzero(needed))
+        yield from self.follow(self._beside_others())
+        while self.can_be_halved and len(beside_thin := self._beside_thin()):
+            yield from self.follow(beside_thin)
+
+    def follow(self, cells: Cells) -> Generator[Cells, Answer]:
+        """Compute points, and the neighbours of those that turn out to differ from what was inferred."""
+        while len(cells):
+            surprising = yield from self.compute(cells)
+            cells = self._differing_neighbours(cells[surprising])
+
+    def compute(self, points: Cells) -> Generator[Cells, Answer, NDArray[np.bool_]]:
+        """Compute points of the lattice that are not known; returns which differ from what was inferred."""
+        if not len(points):
+            return np.zeros(0, dtype=bool)
+        layer, row, column = np.unravel_index(points, self.labels.shape)
+        answer = yield np.ravel_multi_index((layer, self.rows[row], self.columns[column]), self.shape)
+        labels = np.where(answer.certain, answer.labels, ~answer.labels.astype(np.int16))
+        surprising = self.labels.flat[points] != labels
+        self.labels.flat[points], self.known.flat[points], self.level.flat[points] = labels, True, self.depth
+        if self.values is not None and self.rough is not None and answer.values is not None:
+            # Not <=, so that NaN on one side is too far.
+            far = ~(np.abs(self.values.flat[points] - answer.values) <= self.within)
+            far &= ~(np.isnan(self.values.flat[points]) & np.isnan(answer.values))
+            self.values.flat[points], self.rough.flat[points] = answer.values, far
+            surprising |= far & (not self.can_be_halved)
+        return surprising
+
+    def _beside_others(self) -> Cells:
+        """Points that are not known and have a neighbour with another label."""
+        found = np.zeros(self.labels.shape, dtype=bool)
+        for axis in (1, 2):
+            low = (slice(None),) * axis + (slice(None, -1),)
+            high = (slice(None),) * axis + (slice(1, None),)
+            differ = (self.labels[low] != self.labels[high]) | (self.labels[low] < 0)
+            found[low] |= differ
+            found[high] |= differ
+        return np.flatnonzero(found & ~self.known)
+
+    def _beside_thin(self) -> Cells:
+        """Points that are not known, within two of a point that differs from those on both sides of it."""
+        thin = np.zeros(self.labels.shape, dtype=bool)
+        for axis in (1, 2):
+            inner, low, high = ((slice(None),) * axis + (part,) for part in _INNER)
+            thin[inner] |= (self.labels[inner] != self.labels[low]) & (self.labels[inner] != self.labels[high])
+        cells, _ = self._around(np.flatnonzero(thin), _WITHIN_TWO)
+        return np.unique(cells[~self.known.flat[cells]])
+
+    def _differing_neighbours(self, points: Cells) -> Cells:
+        """Neighbours of some points that are not known and have another label, or numbers that are too far."""
+        cells, which = self._around(points, _BESIDES)
+        differ = self.labels.flat[cells] != self.labels.flat[points[which]]
+        if self.rough is not None:
+            differ |= self.rough.flat[points[which]]
+        return np.unique(cells[differ & ~self.known.flat[cells]])
+
+    def _around(self, points: Cells, offsets: tuple[tuple[int, int], ...]) -> tuple[Cells, Cells]:
+        """Points of the lattice at some offsets from each point, and the index of that point."""
+        layer, row, column = np.unravel_index(points, self.labels.shape)
+        cells, which = [], []
+        for down, right in offsets:
+            there = row + down, column + right
+            inside = (there[0] >= 0) & (there[0] < len(self.rows)) & (there[1] >= 0) & (there[1] < len(self.columns))
+            place = layer[inside], there[0][inside], there[1][inside]
+            cells.append(np.ravel_multi_index(place, self.labels.shape))
+            which.append(np.flatnonzero(inside))
+        return np.concatenate(cells), np.concatenate(which)
+
+    def _interpolated(
+        self, rows: Cells, columns: Cells, row_parents: list[Cells], column_parents: list[Cells]
+    ) -> NDArray[np.float64]:
+        """Numbers of the finer lattice, linear between the points of this one."""
+        assert self.values is not None
+        values = self.values
+        for axis, fine, coarse, (low, high) in (
+            (1, rows, self.rows, row_parents),
+            (2, columns, self.columns, column_parents),
+        ):
+            gap = np.maximum(coarse[high] - coarse[low], 1)
+            weight = ((fine - coarse[low]) / gap).reshape((-1, 1) if axis == 1 else (-1,))
+            before, after = np.take(values, low, axis), np.take(values, high, axis)
+            # Where both are equal a weight must not make NaN of them or change their bits.
+            values = np.where(weight == 0.0, before, before + weight * (after - before))
+        return values
+
+
+def _audited(grid: _Grid, share: float, random: np.random.Generator) -> Generator[Cells, Answer, Refined]:
+    """Compute a sample of the inferred cells, follow what was wrong, and state how much may still be wrong.
+
+    One sample is drawn, before anything is known of it, so the bound holds for the labels of that moment. From then on
+    no cell changes its label unless it is computed: the number of wrong cells falls by those that are found.
+    """
+    inferred = np.flatnonzero(~grid.known)
+    before = grid.labels.copy()
+    count = min(len(inferred), math.ceil(share * len(inferred)))
+    sample = np.sort(random.choice(inferred, count, replace=False))
+    surprising = yield from grid.compute(sample)
+    wrong = _differ(grid.labels.flat[sample], before.flat[sample])
+    blocks = _Blocks(grid)
+    found = sample[surprising]
+    yield from grid.follow(grid._differing_neighbours(found))
+    wrong_after = 0
+    while len(found):
+        opened = blocks.reopened(found)
+        surprising = yield from grid.compute(opened)
+        found = opened[surprising]
+        wrong_after = int(_differ(grid.labels.flat[found], before.flat[found]).sum())
+        yield from grid.follow(grid._differing_neighbours(found))
+    followed = inferred[grid.known.flat[inferred]]
+    corrected = int(_differ(grid.labels.flat[followed], before.flat[followed]).sum())
+    origin = np.where(grid.known, np.int8(COMPUTED), np.int8(INFERRED))
+    origin.flat[sample] = AUDITED
+    left = len(inferred) - len(followed)
+    most = largest_number(len(inferred), count, int(wrong.sum()))
+    bound = max(most - corrected, 0) / left if left else 0.0
+    statement = Audit(count, int(wrong.sum()), wrong_after, corrected, bound)
+    labels = np.where(grid.labels < 0, ~grid.labels, grid.labels)
+    return Refined(labels, origin, grid.level, grid.values, statement)
+
+
+class _Blocks:
+    """Coarse blocks, and how often the lattice of each was halved when it was reopened."""
+
+    def __init__(self, grid: _Grid):
+        self.grid = grid
+        self.counts = [max(-(-(size - 1) // grid.stride), 1) for size in grid.shape[1:]]
+        self.halvings = np.zeros((grid.shape[0], *self.counts), dtype=np.int8)
+
+    def reopened(self, cells: Cells) -> Cells:
+        """Inferred cells that are computed next, in the blocks of some cells and beside these blocks."""
+        layer, row, column = np.unravel_index(cells, self.grid.shape)
+        before = self.halvings.copy()
+        own = np.zeros(before.shape, dtype=bool)
+        for down in (-1, 0, 1):
+            for right in (-1, 0, 1):
+                rows = np.clip(row // self.grid.stride + down, 0, self.counts[0] - 1)
+                columns = np.clip(column // self.grid.stride + right, 0, self.counts[1] - 1)
+                self.halvings[layer, rows, columns] = np.maximum(self.halvings[layer, rows, columns], _BESIDE)
+                if down == right == 0:
+                    own[layer, rows, columns] = True
+        self.halvings[own] = np.maximum(before[own] + 1, _REOPENED)
+        found = [np.empty(0, dtype=np.intp)]
+        for k, i, j in np.argwhere(self.halvings != before):
+            step = max(self.grid.stride >> int(self.halvings[k, i, j]), 1)
+            rows, columns = (
+                np.arange(n * self.grid.stride, min((n + 1) * self.grid.stride + 1, size), step)
+                for n, size in ((i, self.grid.shape[1]), (j, self.grid.shape[2]))
+            )
+            found.append(np.ravel_multi_index(np.ix_([k], rows, columns), self.grid.shape).ravel())
+        points = np.unique(np.concatenate(found))
+        return points[~self.grid.known.flat[points]]
+
+
+def _differ(one: NDArray[np.int16], other: NDArray[np.int16]) -> NDArray[np.bool_]:
+    """Whether labels differ, certain or not."""
+    return np.where(one < 0, ~one, one) != np.where(other < 0, ~other, other)
+
+
+def _coarse(size: int, stride: int) -> Cells:
+    """Every `stride`-th index, and the last one."""
+    return np.unique(np.append(np.arange(0, size, stride), size - 1))
+
+
+def _halved(points: Cells) -> tuple[Cells, Cells, Cells]:
+    """Indices with those between them, and the place among `points` of the last before and the first after each."""
+    between = (points[:-1] + points[1:]) // 2
+    fine = np.union1d(points, between)
+    return fine, np.searchsorted(points, fine, side="right") - 1, np.searchsorted(points, fine)
+
+
+def largest_number(total: int, drawn: int, wrong: int) -> int:
+    """Largest number of wrong cells that a sample does not contradict.
+
+    The bound of Clopper and Pearson, one-sided at 95 %, for a sample drawn without replacement; a share of about 3/n
+    for a sample of n cells of which none is wrong.
+
+    Parameters
+    ----------
+    total, drawn : int
+        Cells, and how many of them were drawn at random.
+    wrong : int
+        How many of the drawn ones are wrong.
+    """
+    low, high = wrong, total - (drawn - wrong)
+    while low < high:
+        middle = (low + high + 1) // 2
+        if _probability(wrong, total, middle, drawn) > 1.0 - CONFIDENCE:
+            low = middle
+        else:
+            high = middle - 1
+    return low
+
+
+def _probability(most: int, total: int, marked: int, drawn: int) -> float:
+    """Probability that at most `most` of `drawn` cells are among the `marked` ones of `total` (hypergeometric)."""
+    number = np.arange(max(0, drawn - (total - marked)), min(most, marked, drawn) + 1)
+
+    def choices(of: Any, some: Any) -> Any:
+        return gammaln(of + 1) - gammaln(some + 1) - gammaln(of - some + 1)
+
+    ways = choices(marked, number) + choices(total - marked, drawn - number) - choices(total, drawn)
+    return float(np.exp(ways).sum())

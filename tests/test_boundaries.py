@@ -1,0 +1,124 @@
+"""Boundaries of a map as curves, and their uncertainty exponent."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import ringsweep
+from ringsweep import cli, plots
+from ringsweep.errors import InputError
+from ringsweep.runs import boundaries
+
+AXES = {"drive.amplitude": np.geomspace(0.5, 8.0, 17), "zone.half_angle": np.radians(np.linspace(5.0, 40.0, 13))}
+
+
+@pytest.fixture(scope="module")
+def ds(scene):
+    return ringsweep.sweep(scene, AXES, refine={"stride": 4, "audit": 0.0}, progress=False)
+
+
+@pytest.fixture(scope="module")
+def curves(ds):
+    return ringsweep.boundary(ds, "separating", 1e-4)
+
+
+def labelled(labels):
+    """A map of some labels, without runs."""
+    return xr.Dataset({"regime": (("a", "b"), np.asarray(labels, dtype="int8"))})
+
+
+class TestBoundary:
+    def test_regime_changes_within_the_stated_error(self, scene, ds, curves):
+        assert curves.sizes["vertex"] > 10
+        assert (curves.error <= 1e-4).all()
+        flag = ds.regime.attrs["flag_meanings"].split().index("separating")
+        for k in range(0, curves.sizes["vertex"], 5):
+            one = curves.isel(vertex=k)
+            name = curves.axis.attrs["flag_meanings"].split()[int(one.axis)]
+            found = []
+            for sign in (-1.0, 1.0):
+                at = {path: [float(one[path.replace(".", "_")])] for path in AXES}
+                at[name.replace("_", ".", 1)][0] += sign * float(one.error) * (1 + 1e-9)
+                found.append(ringsweep.sweep(scene, at, progress=False).regime.item())
+            assert (found[0] == flag) != (found[1] == flag)
+            assert int(one.beyond) in found
+
+    def test_every_edge_between_the_regimes_is_on_one_curve(self, ds, curves):
+        separating = ds.regime.values == ds.regime.attrs["flag_meanings"].split().index("separating")
+        edges = (separating[1:] != separating[:-1]).sum() + (separating[:, 1:] != separating[:, :-1]).sum()
+        assert curves.sizes["vertex"] == edges
+        assert (np.diff(curves.line) >= 0).all()
+        # Neighbours along a curve lie in one square of four cells.
+        rows = np.interp(curves.drive_amplitude, ds.drive_amplitude, np.arange(17))
+        columns = np.interp(curves.zone_half_angle, ds.zone_half_angle, np.arange(13))
+        together = np.diff(curves.line) == 0
+        assert (np.abs(np.diff(rows))[together] <= 1.0 + 1e-9).all()
+        assert (np.abs(np.diff(columns))[together] <= 1.0 + 1e-9).all()
+
+    def test_line_of_cells_has_points_in_place_of_curves(self, ds):
+        one = ringsweep.boundary(ds.isel(zone_half_angle=4), "separating", 1e-6)
+        assert one.sizes["vertex"] >= 1
+        assert (one.error <= 1e-6).all()
+        assert (one.zone_half_angle == ds.zone_half_angle[4]).all()
+
+    def test_cell_that_is_not_certified_never_pins_a_boundary(self, ds, curves):
+        beside = ds.copy(deep=True)
+        beside["certified"][:, 4] = 0
+        fewer = ringsweep.boundary(beside, "separating", 1e-1)
+        assert 0 < fewer.sizes["vertex"] < curves.sizes["vertex"]
+        assert not np.isclose(fewer.zone_half_angle[fewer.axis == 0], ds.zone_half_angle[4].item()).any()
+
+    def test_run_that_is_not_certified_leaves_the_place_uncertain(self, ds, monkeypatch, caplog):
+        run = boundaries._run
+
+        def uncertified(*arguments):
+            found = run(*arguments)
+            return found.assign(certified=found.certified * 0)
+
+        monkeypatch.setattr(boundaries, "_run", uncertified)
+        found = ringsweep.boundary(ds, "separating", 1e-4)
+        assert (found.error > 1e-4).all()
+        assert "not certified" in caplog.text
+
+    @pytest.mark.parametrize(
+        ("regime", "tolerance", "path"), [("separated", 1e-3, "regime"), ("separating", 0.0, "tolerance")]
+    )
+    def test_mistake_is_refused(self, ds, regime, tolerance, path):
+        with pytest.raises(InputError) as caught:
+            ringsweep.boundary(ds, regime, tolerance)
+        assert caught.value.path == path
+
+    def test_curves_are_drawn_over_the_map_and_written(self, ds, curves, tmp_path, capsys):
+        from ringsweep.storage import netcdf
+
+        figure = plots.regime_map(ds, boundaries=curves)
+        lines = figure.axes[0].lines
+        assert sum(len(line.get_xdata()) for line in lines) == curves.sizes["vertex"]
+        assert "boundary of separating" in " ".join(text.get_text() for text in figure.legends[0].get_texts())
+        netcdf.save(ds, tmp_path / "my.nc")
+        assert cli.main(["map", str(tmp_path / "my.nc"), "--boundaries", "separating", "--tolerance", "1e-2"]) == 0
+        written = netcdf.load(tmp_path / "my-separating.nc")
+        assert written.sizes == curves.sizes
+        assert cli.main(["map", str(tmp_path / "my.nc"), "--tolerance", "1e-2"]) == 2
+
+
+class TestUncertaintyExponent:
+    def test_smooth_boundary_has_the_exponent_one(self):
+        y, x = np.indices((512, 512)) / 512
+        found = ringsweep.uncertainty_exponent(labelled(x**2 + y**2 < 0.5))
+        assert float(found.exponent) == pytest.approx(1.0, abs=0.05)
+        assert found.uncertain.values[0] > found.uncertain.values[-1]
+
+    def test_stripes_over_a_cantor_set_have_their_dimension(self):
+        """It is 1 + log 2 / log 3."""
+        cells = np.arange(3**6)
+        cantor = np.ones(3**6, dtype=bool)
+        for k in range(6):
+            cantor &= cells // 3**k % 3 != 1
+        found = ringsweep.uncertainty_exponent(labelled(np.tile(cantor, (3**6, 1))))
+        assert float(found.dimension) == pytest.approx(1.0 + np.log(2) / np.log(3), abs=0.1)
+
+    def test_too_few_counts_give_a_warning_and_no_number(self, caplog):
+        found = ringsweep.uncertainty_exponent(labelled(np.arange(64).reshape(8, 8) < 30))
+        assert np.isnan(found.exponent)
+        assert "too few counts" in caplog.text

@@ -1,0 +1,239 @@
+"""Refined sweeps: files, resumption, reuse and curves, against the full grid."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+import yaml
+
+import ringsweep
+from benchmarks.kills import killed_at, same_bits
+from ringsweep import cli, plots
+from ringsweep.errors import InputError
+from ringsweep.quantities.variables import AUDITED, INFERRED, LABELS, REGIMES
+from ringsweep.runs import sweep
+from ringsweep.storage.checkpoint import Checkpoint
+
+AXES = {"drive.amplitude": np.geomspace(0.5, 8.0, 41), "zone.half_angle": np.radians(np.linspace(5.0, 40.0, 37))}
+REFINE = {"stride": 8, "audit": 0.05}
+
+
+@pytest.fixture(scope="module")
+def config(scene, tmp_path_factory):
+    """Configuration file of a refined sweep."""
+    grid = {path: values.tolist() for path, values in AXES.items()}
+    path = tmp_path_factory.mktemp("refined") / "sweep.yaml"
+    path.write_text(yaml.safe_dump({"scene": scene, "sweep": {"grid": grid, "refine": REFINE}}))
+    return path
+
+
+@pytest.fixture(scope="module")
+def full(scene, config):
+    """File of the full grid."""
+    path = config.with_name("full.nc")
+    ringsweep.sweep(scene, AXES, path, progress=False).close()
+    return path
+
+
+@pytest.fixture(scope="module")
+def refined(config):
+    """File of the refined sweep."""
+    path = config.with_name("refined.nc")
+    ringsweep.run(config, path, progress=False).close()
+    return path
+
+
+@pytest.fixture
+def ds(refined):
+    with xr.open_dataset(refined, decode_times=False) as found:
+        yield found.load()
+
+
+@pytest.fixture
+def stored(monkeypatch):
+    """Positions of the cells that are stored."""
+    cells = []
+    put = Checkpoint.put
+    monkeypatch.setattr(Checkpoint, "put", lambda self, p, *rest: (cells.extend(p), put(self, p, *rest)))
+    return cells
+
+
+class TestFile:
+    def test_computed_cells_equal_those_of_the_full_grid_bit_for_bit(self, ds, full):
+        run = ds.origin.values != INFERRED
+        assert 0.1 < run.mean() < 0.6
+        with xr.open_dataset(full, decode_times=False) as whole:
+            for name in whole.data_vars:
+                expected = whole[name].values[run]
+                assert ds[name].values[run].astype(expected.dtype).tobytes() == expected.tobytes(), name
+
+    def test_inferred_labels_differ_from_the_full_grid_in_no_more_cells_than_the_bound_says(self, ds, full):
+        wrong = np.zeros(ds.regime.shape, dtype=bool)
+        with xr.open_dataset(full, decode_times=False) as whole:
+            for name in LABELS:
+                assert ds[name].dtype == np.int8
+                wrong |= ds[name].values != whole[name].values
+        assert wrong.sum() <= ds.attrs["audit_bound"] * (ds.origin == INFERRED).sum()
+        assert wrong.mean() < 0.005
+
+    def test_numbers_and_certificates_are_missing_where_a_cell_is_inferred(self, ds):
+        inferred = ds.origin.values == INFERRED
+        others = set(ds.data_vars) - {*LABELS, "origin", "level"}
+        assert {"t_end", "steps", "reversals", "certified", "t_end_error"} <= others
+        for name in others:
+            assert np.isnan(ds[name].values[inferred]).all(), name
+        assert (ds.certified.values[~inferred] == 1).all()
+
+    def test_origin_and_level_have_flags_and_the_audit_is_in_the_attributes(self, ds):
+        assert ds.origin.dtype == ds.level.dtype == np.int8
+        assert ds.origin.attrs["flag_meanings"] == "computed inferred audited"
+        assert ds.attrs["audit_cells"] == (ds.origin == AUDITED).sum() > 0
+        assert ds.attrs["cells_computed"] == (ds.origin != INFERRED).sum()
+        assert ds.attrs["audit_corrected"] >= ds.attrs["audit_wrong_before"]
+        assert 0.0 < ds.attrs["audit_bound"] < 0.2
+        assert "at 95 % confidence" in ds.attrs["audit"]
+
+    def test_file_equals_the_sweep_in_memory(self, config, ds):
+        undated = {"date_created": ""}
+        in_memory = ringsweep.run(config, progress=False)
+        xr.testing.assert_identical(ds.drop_attrs(deep=False), in_memory.drop_attrs(deep=False))
+        assert in_memory.assign_attrs(undated).attrs == ds.assign_attrs(undated).attrs
+
+    def test_file_is_enough_to_repeat_its_sweep(self, refined, tmp_path):
+        ringsweep.run(refined, tmp_path / "again.nc", progress=False).close()
+        assert same_bits(refined, tmp_path / "again.nc")
+
+    def test_further_axis_makes_a_stack_of_refined_maps(self, scene):
+        axes = {"zone.half_angle": AXES["zone.half_angle"], "friction.law": ["coulomb", "stiction"]}
+        axes["drive.amplitude"] = AXES["drive.amplitude"]
+        found = ringsweep.sweep(scene, axes, refine=REFINE | {"audit": 0.0}, progress=False)
+        alone = ringsweep.sweep(
+            scene, {name: axes[name] for name in axes if name != "friction.law"}, refine=REFINE | {"audit": 0.0}
+        )
+        assert found.regime.dims == ("zone_half_angle", "friction_law", "drive_amplitude")
+        for name in (*LABELS, "origin", "t_end"):
+            np.testing.assert_array_equal(found[name].sel(friction_law="stiction"), alone[name])
+
+    def test_number_asked_for_is_interpolated_within_its_error(self, scene, full):
+        asked = REFINE | {"also": "t_separation", "within": 1e-2}
+        found = ringsweep.sweep(scene, AXES, refine=asked, progress=False)
+        inferred = found.origin.values == INFERRED
+        with xr.open_dataset(full, decode_times=False) as whole:
+            error = np.abs(found.t_separation - whole.t_separation).values
+        assert (np.isfinite(found.t_separation) == (found.regime == REGIMES.index("separating"))).all()
+        assert np.isfinite(error[inferred]).any()
+        assert np.nanquantile(error[inferred], 0.95) < 1e-2
+        assert np.isnan(found.t_end.values[inferred]).all()
+
+    def test_info_and_map_tell_the_audit(self, refined, ds, capsys, tmp_path):
+        assert cli.main(["info", str(refined)]) == 0
+        out = capsys.readouterr().out
+        assert ds.attrs["audit"] in out
+        assert "certified: 100.0%" in out
+        figure = plots.regime_map(ds)
+        assert "of the cells run" in figure.get_suptitle()
+        assert "at 95 % confidence" in figure.get_suptitle()
+        assert cli.main(["map", str(refined), "--var", "origin", "-o", str(tmp_path / "origin.png")]) == 0
+
+
+class TestContinuation:
+    @pytest.mark.parametrize("count", [2, 9])
+    def test_killed_sweep_continues_to_the_same_bits(self, config, refined, tmp_path, count):
+        arguments = ["run", str(config), "-o", str(tmp_path / "out.nc")]
+        point = "after a rename" if count == 2 else "merge"
+        assert killed_at(point, count, arguments).returncode == -9
+        assert cli.main(arguments) == 0
+        assert same_bits(tmp_path / "out.nc", refined)
+
+    def test_stopped_sweep_computes_no_cell_twice(self, config, refined, tmp_path, monkeypatch, stored):
+        monkeypatch.setattr(sweep, "_WRITE_INTERVAL", 0.0)
+        put, calls = Checkpoint.put, iter(range(5))
+
+        def stop(*arguments):
+            if next(calls, None) is None:
+                raise KeyboardInterrupt
+            put(*arguments)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(Checkpoint, "put", stop)
+            with pytest.raises(KeyboardInterrupt):
+                ringsweep.run(config, tmp_path / "out.nc", progress=False)
+        before = len(stored)
+        ringsweep.run(config, tmp_path / "out.nc", progress=False).close()
+        assert 0 < before < len(stored)
+        assert len(set(stored)) == len(stored)
+        assert same_bits(tmp_path / "out.nc", refined)
+
+    def test_checkpoint_of_the_full_grid_is_not_continued_as_a_refined_one(self, config, refined, tmp_path, caplog):
+        target = tmp_path / "out.nc"
+        target.write_bytes(refined.read_bytes())
+        assert cli.main(["run", str(config), "-o", str(target)]) == 0
+        given = yaml.safe_load(config.read_text())
+        del given["sweep"]["refine"]
+        ringsweep.run(given, target, progress=False).close()
+        assert "sweep.refine was Refinement" in caplog.text
+
+
+class TestReuse:
+    def test_finer_refined_sweep_takes_computed_cells_of_a_coarser_one(self, scene, refined, ds, tmp_path, stored):
+        finer = AXES | {"drive.amplitude": np.geomspace(0.5, 8.0, 81)}
+        alone = ringsweep.sweep(scene, finer, refine=REFINE, progress=False)
+        found = ringsweep.sweep(scene, finer, tmp_path / "new.nc", refine=REFINE, reuse=refined, progress=False)
+        xr.testing.assert_equal(found.load().drop_vars("drive_amplitude"), alone.drop_vars("drive_amplitude"))
+        found.close()
+        assert len(stored) == alone.attrs["cells_computed"]
+
+    @pytest.mark.parametrize("source", ["refined", "full"])
+    def test_full_and_refined_sweeps_take_cells_of_each_other(
+        self, scene, source, refined, full, tmp_path, caplog, request
+    ):
+        options = {} if source == "refined" else {"refine": REFINE}
+        other = full if source == "refined" else refined
+        with caplog.at_level("INFO", logger="ringsweep"):
+            ringsweep.sweep(
+                scene, AXES, tmp_path / "new.nc", reuse=request.getfixturevalue(source), progress=False, **options
+            ).close()
+        assert same_bits(tmp_path / "new.nc", other)
+        with xr.open_dataset(refined, decode_times=False) as ds:
+            run = int((ds.origin != INFERRED).sum())
+        assert f"{run} of {41 * 37} cells are taken from" in caplog.text
+
+
+class TestConfiguration:
+    @pytest.mark.parametrize(
+        ("refine", "path", "problem"),
+        [
+            ({"strid": 8}, "sweep.refine.strid", "did you mean `stride`"),
+            ({"stride": 0}, "sweep.refine.stride", "at least 1"),
+            ({"audit": 2}, "sweep.refine.audit", "at most 1"),
+            ({"also": "t_separation"}, "sweep.refine.within", "missing"),
+            ({"also": "steps", "within": 1}, "sweep.refine.also", "no number of this model"),
+            ({"also": "t_end", "within": "1 m"}, "sweep.refine.within", "m"),
+            ({"axes": ["body.mass"]}, "sweep.refine.axes.0", "no axis of numbers"),
+            (3, "sweep.refine", "a section with keys"),
+        ],
+    )
+    def test_mistake_is_refused_with_its_place(self, scene, refine, path, problem):
+        grid = {name: values.tolist() for name, values in AXES.items()}
+        with pytest.raises(InputError, match=problem) as caught:
+            ringsweep.run({"scene": scene, "sweep": {"grid": grid, "refine": refine}})
+        assert caught.value.path == path
+
+    def test_points_and_shared_dimensions_are_refused(self, scene):
+        points = {"points": {"drive.amplitude": [1.0, 2.0]}, "grid": {"zone.half_angle": [0.1, 0.2]}, "refine": True}
+        with pytest.raises(InputError, match="only a grid can be refined"):
+            ringsweep.run({"scene": scene, "sweep": points})
+        shared = {"drive.amplitude": xr.DataArray([1.0, 2.0], dims="rig"), "zone.half_angle": [0.1, 0.2]}
+        with pytest.raises(InputError, match="only a grid can be refined"):
+            ringsweep.sweep(scene, shared, refine=True)
+        with pytest.raises(InputError, match="values go up and down"):
+            ringsweep.sweep(scene, {"drive.amplitude": [1.0, 3.0, 2.0]}, refine=True)
+        with pytest.raises(InputError, match="nothing can be refined"):
+            ringsweep.run({"scene": scene}, refine=True)
+
+    def test_option_of_the_command_line_gives_the_defaults_and_keeps_what_is_configured(self, config, tmp_path):
+        output = tmp_path / "out.nc"
+        assert cli.main(["run", str(config), "--refine", "-o", str(output)]) == 0
+        with xr.open_dataset(output, decode_times=False) as found:
+            assert json.loads(found.attrs["configuration"])["sweep"]["refine"] == REFINE
