@@ -19,7 +19,7 @@ AXES = {"drive.amplitude": [0.5, 2.0, 8.0], "zone.half_angle": ["10 deg", "20 de
 def mapped(scene, axes, points=False):
     """Dataset of a sweep with invented regimes, without computing it."""
     config = load({"scene": scene, "sweep": {"points" if points else "grid": axes}})
-    ds = sweep._frame(config)
+    ds = sweep._frame(config, None)
     shape = tuple(config.axes.sizes.values())
     regime = (np.arange(np.prod(shape)) % 3).astype("int8").reshape(shape)
     return ds.assign(regime=(tuple(config.axes.sizes), regime, OUTCOMES["regime"].attributes))
