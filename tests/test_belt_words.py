@@ -203,3 +203,53 @@ def test_rk4_has_the_words_and_numbers_of_located_steps():
         np.testing.assert_allclose(fixed[name], located[name], rtol=1e-3)
     np.testing.assert_allclose(fixed.stick_share, located.stick_share, atol=5e-3)
     np.testing.assert_allclose(fixed.x_max, located.x_max, rtol=1e-6)
+
+
+class TestBreakingLoose:
+    """A body launched at the belt's speed rides until k v t = mu_s F_N, at 0.5 s."""
+
+    @pytest.mark.parametrize(
+        "friction",
+        [
+            {"law": "coulomb", "mu_k": 0.5},
+            {"law": "threlfall", "mu_k": 0.5, "v0": 1e-6},
+            {"law": "lugre", "mu_s": 0.5, "mu_k": 0.3, "sigma0": 1e6, "sigma1": 100.0, "v_s": 0.01},
+        ],
+        ids=lambda friction: friction["law"],
+    )
+    def test_first_stick_counts_however_short_it_is(self, friction):
+        of = oscillator(friction, belt={"velocity": 1.0})
+        run = ringsweep.sweep(of, {"time.span": [0.3, 0.49, 3.0]}, progress=False)
+        assert words(run) == ["riding", "riding", "stick-slip"]
+        np.testing.assert_array_equal(np.isnan(run.first_slip), [True, True, False])
+        assert float(run.first_slip[-1]) == pytest.approx(0.5, abs=0.02)
+
+    @pytest.mark.parametrize("phase", ["-90 deg", "0 deg", "90 deg"])
+    def test_force_that_only_touches_breakaway_lets_nothing_slip(self, phase):
+        force = {"amplitude": 0.5, "frequency": 0.1, "phase": phase}
+        run = ringsweep.sweep(oscillator(STICTION, force=force), {"time.span": [10.0, 100.0]}, progress=False)
+        assert words(run) == ["riding", "riding"]
+
+
+STICTION = {"law": "stiction", "mu_s": 0.5, "mu_k": 0.3}
+
+
+def oscillator(friction, **changes):
+    """A belt with a mass, a stiffness and a gravity of 1."""
+    ones = {"model": "belt", "body": {"mass": 1.0}, "spring": {"stiffness": 1.0}, "gravity": 1.0}
+    return ones | {"belt": {"velocity": 0.0}, "friction": friction, "time": {"span": 1.0}} | changes
+
+
+def test_cubic_spring_alone_pulls_a_stuck_body_loose_again_and_again():
+    of = oscillator(STICTION, spring={"stiffness": 0.0, "cubic": 1.0}, belt={"velocity": 0.1})
+    run = ringsweep.sweep(of, {"time.span": [5.0, 100.0, 103.0, 106.0]}, progress=False)
+    assert words(run) == ["riding", *["stick-slip"] * 3]
+    np.testing.assert_allclose(run.period[1:], 6.44443, atol=1e-5)
+
+
+def test_body_that_slides_steadily_below_the_end_of_the_stiction_band_is_sliding():
+    """Friction that grows with the speed cannot cause stick-slip."""
+    friction = {"law": "formula", "mu": "mu_k*v/(w + v)", "mu_k": 0.1, "w": 0.1}
+    run = ringsweep.sweep(oscillator(friction, belt={"velocity": 0.2}), {"time.span": [300.0, 400.0]}, progress=False)
+    assert words(run) == ["sliding", "sliding"]
+    assert run.settled[-1] == 1

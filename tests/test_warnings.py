@@ -110,10 +110,10 @@ def test_belts_give_the_share_of_riding_bodies_and_the_span_of_their_first_slip(
     ringsweep.sweep(of | {"belt": {"velocity": 0.1}}, {"belt.velocity": [0.1, 0.05, 5.0]}, progress=False)
     text = caplog.text
     assert "66.7% of the bodies ride" in text
-    assert "needs a span of 7.36 s to 14.7 s" in text
+    assert "needs a span of more than 7.3575 s to 14.715 s" in text
     ringsweep.simulate(of | {"belt": {"velocity": 0.1}})
     assert "the body rides" in caplog.text or "100.0% of the bodies ride" in caplog.text
-    assert caplog.text.count("needs a span of 7.36 s\n") == 1
+    assert caplog.text.count("needs a span of more than 7.3575 s\n") == 1
 
 
 def test_belts_give_the_share_of_motions_that_have_not_settled(caplog):

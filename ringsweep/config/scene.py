@@ -141,7 +141,7 @@ def numbers_of(structures: Mapping[str, Structure]) -> dict[str, Parameter]:
 
 def law_choice(model: str, own: Mapping[str, type]) -> Choice:
     """Friction laws that a model takes, and those that the configuration defines."""
-    return Choice("friction law", tuple(MODELS[model].laws | dict(own)))
+    return Choice("friction law", tuple(dict.fromkeys([*MODELS[model].laws, *own, FORMULA, TABLE_LAW])))
 
 
 def _structural(model: str, drive: str, laws: Collection[str]) -> tuple[str, ...]:

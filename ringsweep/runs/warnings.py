@@ -63,10 +63,11 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
         _warn_of_belt(results, config)
     failed = _share_failed(results) if any(one.own_law for one in config.scene.structures.values()) else 0.0
     if failed > 0.0:
+        who = "the run has" if ended.size == 1 else f"{failed:.1%} of the runs have"
         logger.warning(
-            "%.1f %% of the cells have failed: the friction law of the configuration may be negative, or no number, "
-            "at a speed that the body reached",
-            100.0 * failed,
+            "%s failed: the friction law of the configuration may be negative, or no number, "
+            "at a sliding speed that the body reached",
+            who,
         )
     if ended_at_start > 0.5 * count:
         runs = "the run ends" if count == 1 else f"{ended_at_start / count:.0%} of the runs end"
@@ -83,7 +84,7 @@ def _share_failed(results: xr.Dataset) -> float:
 
 def _warn_of_belt(results: xr.Dataset, config: Config) -> None:
     """Warn of motions on the belt that have not settled, and of bodies that have not broken loose."""
-    regime, settled = results["regime"].variable, results["settled"].variable
+    regime, settled, ended = (results[name].variable for name in ("regime", "settled", "t_end"))
     unsettled = riding = 0
     soonest, latest = np.inf, 0.0
     for _, _, region in Layout(regime.shape).chunks():
@@ -94,16 +95,16 @@ def _warn_of_belt(results: xr.Dataset, config: Config) -> None:
         if rides.any():
             firsts = np.array([part.start for part in region], dtype=np.intp)
             spans = _spans_of_first_slip(config, np.argwhere(np.atleast_1d(rides)) + firsts if region else None)
-            spans = spans[np.isfinite(spans)]
+            spans = spans[np.isfinite(spans) & (spans > ended[region].values[rides])]
             soonest, latest = min(soonest, spans.min(initial=np.inf)), max(latest, spans.max(initial=0.0))
     if unsettled:
         who = "the motion has" if regime.size == 1 else f"{unsettled / regime.size:.1%} of the motions have"
         logger.warning("%s not settled: a longer span may change regime, share of stick and stops", who)
     if riding:
-        remedy = "on their belts no span would let them slip"
+        remedy = "what pulls them does not reach breakaway"
         if latest > 0.0:
-            remedy = f"the first slip, at k v t = mu_s F_N, needs a span of {soonest:.3g} s"
-            remedy += f" to {latest:.3g} s" if latest > 1.01 * soonest else ""
+            remedy = f"the first slip, at k v t = mu_s F_N, needs a span of more than {soonest:.5g} s"
+            remedy += f" to {latest:.5g} s" if latest > 1.01 * soonest else ""
         who = (
             "the body rides: it has"
             if regime.size == 1

@@ -13,6 +13,7 @@ from math import inf, isfinite, isnan, nan, pi, sqrt
 from typing import Any, NamedTuple
 
 from ringsweep.compile import absorbed, hook, inlined
+from ringsweep.models.belt.force import bend, steepest_spring
 from ringsweep.models.interface import recorder
 from ringsweep.models.interface.status import BROKEN
 from ringsweep.numerics.functions import any_of, floor, lanes_body, select, square_root
@@ -200,10 +201,11 @@ def begin(scene, t, seen, band, play):
     """Record at the beginning of a run."""
     x, velocity, force, place, v, v_rate = seen
     start = Mark(t, x, velocity, 0.0, 0.0)
-    # The body counts as stuck until it slips: the first stop begins with the run. From a launch within the stiction
-    # band it may slip at once.
-    slowing = max(abs(v_rate), abs(scene.stiffness * x + force) / scene.mass)
-    least = min(_LONGEST_PASSAGE * _pace(scene), _PASSAGE * band / slowing) if band > 0.0 else 0.0
+    # The body counts as stuck until it slips: the first stop begins with the run. If the pull exceeds breakaway, it may
+    # pass the stiction band at once.
+    pull = max(abs(scene.mass * v_rate + force), abs(scene.stiffness * x))
+    passes = band > 0.0 and pull > (1.0 + 1e-9) * scene.mu_s * scene.mass * scene.gravity
+    least = min(_LONGEST_PASSAGE * _pace(scene), _PASSAGE * band * scene.mass / pull) if passes else 0.0
     return Record(
         band,
         play,
@@ -290,7 +292,13 @@ def _leaves_at_once(scene, r, place):
 
 @_leaves.implements(BristleBelt)
 def _leaves_play(scene, r, place):
-    return abs(place - r.stops.slip_from) > r.play
+    return abs(place - r.stops.slip_from) > _least_slip(r)
+
+
+@absorbed
+def _least_slip(r):
+    """Distance that a slip is longer than, m; negative without bristles, which creep a little before they hold."""
+    return select(r.play < 0.0, r.play, max(r.play, RETURN * (r.x_max - r.x_min)))
 
 
 def _located(before, now):
@@ -349,7 +357,7 @@ def _stops(scene, r, t, duration, stuck, side, place, v, force, span):
     least = select(anew, min(_LONGEST_PASSAGE * _pace(scene), passage), s.least)
     slip_from = select(begins, nan, select(ends, r.last.place, s.slip_from))
     slip_start = select(ends, before, s.slip_start)
-    slipped = _not(stuck) & (abs(place - slip_from) > r.play)
+    slipped = _not(stuck) & (abs(place - slip_from) > _least_slip(r))
     stop = slip_start - start
     counts = slipped & (stop > abs(least))
     return Stops(
@@ -525,12 +533,18 @@ def _settles_to(scene, r, t):
     # On a belt at rest, or without a spring, the load on a stuck body does not grow.
     belt_velocity = r.last.velocity - r.last.v
     breakaway = scene.mu_s * scene.mass * scene.gravity
-    loads = scene.stiffness * abs(belt_velocity) * scene.span > _ROUNDING * 1e-3 * breakaway
+    travel = abs(belt_velocity) * scene.span
+    ahead = bend(scene.cubic, abs(r.last.x) + travel)
+    loads = abs(steepest_spring(scene.cubic, scene.stiffness, ahead, ahead)) * travel > _ROUNDING * 1e-3 * breakaway
     if forced:
         # In stick the body may creep, but the belt does not carry it away.
         for_good = c.share > 1.0 - 1e-9 and abs(c.drift) <= max(RETURN * c.swing, r.band * scene.forcing_period)
     else:
         for_good = not loads
+    rests = max(abs(r.last.velocity), abs(r.last.v_rate) * _pace(scene)) <= RETURN * abs(belt_velocity)
+    if not forced and in_stop and rests and belt_velocity != 0.0:
+        # The belt slides along under a body at rest, below the speed at which its friction no longer grows.
+        return SLIDING, nan, 0.0, 0.0, True
     if in_stop and stops.least < 0.0:
         return RIDING, c.period, 1.0, 0.0, for_good
     if in_stop and for_good:
@@ -541,9 +555,11 @@ def _settles_to(scene, r, t):
         # There is no cycle, or none any more.
         if in_stop or (stops.slips > 0.0 and slips_since < natural):
             return STICK_SLIP, nan, (stops.total + (stop if in_stop else 0.0)) / t, nan, False
-        steady = abs(r.last.velocity) * min(natural, scene.span) <= RETURN * (
-            max(r.x_max, r.last.x) - min(r.x_min, r.last.x)
-        )
+        if natural < inf:
+            swing = max(r.x_max, r.last.x) - min(r.x_min, r.last.x)
+            steady = abs(r.last.velocity) * min(natural, scene.span) <= RETURN * swing
+        else:
+            steady = abs(r.last.v_rate) * scene.span <= RETURN * abs(r.last.v)
         return SLIDING, nan, 0.0, 0.0, steady
     if c.stops > 0.0 or c.share > 0.0 or (in_stop and not forced):
         return STICK_SLIP, c.period, c.share, c.stops, returned

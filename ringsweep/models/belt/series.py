@@ -56,6 +56,10 @@ FAST = SLOW + 1
 # A pull that differs by less than this share from the breakaway force is equal to it.
 _ON_BOUND = 1e-12
 
+# A pull whose rate is less than this share of the breakaway force times the frequency is at its extreme: until then it
+# grows by less than the share above.
+_LEVEL = 1e-6
+
 
 class Mode(NamedTuple):
     """Mode of the belt.
@@ -114,7 +118,8 @@ def _mode_at_rest(scene, t, x, v):
             # The pull only touches the breakaway force unless it still grows.
             forward = pull > 0.0
             rate = stuck_pull_rate(scene, t, x, forcing)
-            if (rate if forward else -rate) <= 0.0:
+            per_period = max(1.0 / scene.forcing_period, (scene.stiffness / scene.mass) ** 0.5)
+            if (rate if forward else -rate) <= _LEVEL * bound * per_period:
                 return Mode(0, KINETIC, SLOW if forward else FAST)
     if pull == 0.0:
         # The rate of the pull decides, while the belt carries the body along.
@@ -129,6 +134,10 @@ def _switch(scene, mode, guard, t, y):
     x, _ = y
     sign, region = mode.sign, mode.region
     if sign == 0:
+        held = _mode_at_rest(scene, t, x, y[1])
+        # A pull that does not only touch the breakaway force reaches it twice at the same time.
+        if held.sign == 0 and mode.entry_guard != guard:
+            return RUNNING, held, y
         return RUNNING, Mode(1 if guard == SLOW else -1, region_at(scene.law, 0.0), SLOW), y
     low, high = region_bounds(scene.law, region)
     if guard == FAST:
@@ -190,6 +199,10 @@ def _expand(scene, mode, t, y, tolerance, c):
             c[SLOW, k], c[FAST, k] = -c[FORCE, k], c[FORCE, k]
         c[SLOW, 0] = 0.0 if mode.entry_guard == SLOW else c[SLOW, 0] + bound
         c[FAST, 0] = 0.0 if mode.entry_guard == FAST else c[FAST, 0] + bound
+        # A pull that only touches the breakaway force is at its extreme.
+        level = _LEVEL * bound * max(1.0 / scene.forcing_period, stiffness_per_mass**0.5)
+        if mode.entry_guard in (SLOW, FAST) and abs(c[mode.entry_guard, 1]) <= level:
+            c[mode.entry_guard, 1] = 0.0
     else:
         sign, surfaces = float(mode.sign), (scene.mu_s, scene.mu_k)
         low, high = region_bounds(scene.law, mode.region)
