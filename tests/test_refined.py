@@ -133,7 +133,7 @@ class TestFile:
         assert "certified: 100.0%" in out
         figure = plots.regime_map(ds)
         assert "of the cells run" in figure.get_suptitle()
-        assert "at 95 % confidence" in figure.get_suptitle()
+        assert "95 % confidence" in figure.get_suptitle()
         assert cli.main(["map", str(refined), "--var", "origin", "-o", str(tmp_path / "origin.png")]) == 0
 
 

@@ -395,7 +395,7 @@ def _audit(ds: xr.Dataset) -> list[str]:
     if "origin" not in ds or "audit_bound" not in ds.attrs:
         return []
     run = float((ds["origin"].values != INFERRED).mean())
-    bound = f"of the others at most {100 * ds.attrs['audit_bound']:.2g} % are wrong (at 95 % confidence)"
+    bound = f"others: at most {100 * ds.attrs['audit_bound']:.2g} % wrong (95 % confidence)"
     return [f"{100 * run:.3g} % of the cells run", bound if ds.attrs["audit_cells"] else "the others are not audited"]
 
 
