@@ -434,6 +434,22 @@ def distance(one, other, names):
     return max(float(abs(one[name] - other[name])) for name in names)
 
 
+@pytest.mark.parametrize(
+    ("laws", "message"),
+    [
+        (["stiction", "formula"], "scene.friction.mu: missing: the formula of the friction coefficient"),
+        (["stiction", "table"], "scene.friction.v: missing: a table needs a file, or the lists v and mu"),
+        (3, "sweep.grid.friction.law: a list of values is expected, got 3"),
+        (["tabel"], "did you mean `table`?"),
+    ],
+)
+def test_sweep_over_laws_that_nothing_defines_is_refused(laws, message):
+    scene = belt({"law": "stiction", "mu_s": 0.4, "mu_k": 0.3})
+    with pytest.raises(InputError) as refusal:
+        load({"scene": scene, "sweep": {"grid": {"friction.law": laws}}})
+    assert message in str(refusal.value)
+
+
 class TestMotion:
     @pytest.mark.parametrize(
         ("law", "method", "build"),

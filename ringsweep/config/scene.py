@@ -64,24 +64,23 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     zones = tuple(f"zones.{i}" for i in range(len(arcs)))
     friction = section_of(scene, "friction", "scene.") if "friction" in scene else {}
     own = own_laws(friction)
-    if friction.get("law") == FORMULA and FORMULA not in own:
-        raise InputError("scene.friction.mu", "missing: the formula of the friction coefficient")
-    known_laws = MODELS[model].laws | own
-    curve = None
-    if friction.get("law") == TABLE_LAW or (laws is not None and TABLE_LAW in laws[1]):
-        curve = read_curve(doc, friction)
-        own[TABLE_LAW] = law_of_curve(curve)
-        known_laws = known_laws | own
+    known_laws = law_choice(model, own)
+    names = []
     if "law" in friction:
         # Name a wrong law, rather than the parameters that only this law has.
-        choose(known_laws, friction, f"scene.{LAW}", f"friction law of model {model}")
+        names = [choose(dict.fromkeys(known_laws.names), friction, f"scene.{LAW}", f"friction law of model {model}")]
+    if laws is not None:
+        names = read_values(laws[1], known_laws, laws[0]).tolist()
+    if FORMULA in names and FORMULA not in own:
+        raise InputError("scene.friction.mu", "missing: the formula of the friction coefficient")
+    curve = read_curve(doc, friction) if TABLE_LAW in names else None
+    if curve is not None:
+        own[TABLE_LAW] = law_of_curve(curve)
     # Name a misspelt key, rather than the key that is missing because of it.
     leaves = dict(_leaves(scene, "", _Paths(_all_paths(model, zones or ("zones.0",), own))))
-    names = []
-    if laws is None or LAW in leaves:
-        names = [choose(known_laws, section_of(scene, "friction", "scene."), f"scene.{LAW}", "friction law")]
-    if laws is not None:
-        names = read_values(laws[1], law_choice(model, own), laws[0]).tolist()
+    if not names:
+        section_of(scene, "friction", "scene.")
+        raise InputError(f"scene.{LAW}", "missing: name a friction law: " + ", ".join(known_laws.names))
     keep_definitions(friction, names)
     # Laws of this process too: other processes know only what the structure holds.
     own |= own_laws(friction)
