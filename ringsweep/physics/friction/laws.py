@@ -34,20 +34,18 @@ class Definition:
     at_rest: str | None = None
 
 
-def _make(name: str, doc: str, expression: Expression, module: str = __name__, qualified: str | None = None) -> type:
+def _make(name: str, doc: str, expression: Expression, qualified: str | None = None) -> type:
     """Type of the law: a ``NamedTuple`` of its parameters and of the numbers that follow from them."""
     hidden = ["slope_at_rest", "slope_beyond"]
     if expression.has_edges:
-        hidden.append("edges")
-    if expression.tabulated:
-        hidden[-1] = "pieces"
+        hidden.append("pieces" if expression.tabulated else "edges")
     if expression.thresholds:
         hidden.append("thresholds")
     if expression.has_band:
         hidden += ["band", "in_band"]
     fields: list[Any] = [(field, Annotated[Leaf, p]) for field, p in expression.parameters.items()]
     found: Any = NamedTuple(name, [*fields, *((field, Any) for field in hidden)])  # type: ignore[misc]
-    found.__doc__, found.__module__, found.__qualname__ = doc, module, qualified or name
+    found.__doc__, found.__module__, found.__qualname__ = doc, __name__, qualified or name
     EXPRESSIONS[found] = expression
     law: type = found
     return law

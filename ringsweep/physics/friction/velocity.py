@@ -325,13 +325,13 @@ def friction_in(expression, count, lanes, law, region, speed, surfaces):
     return [*_region_prelude(expression), *writer.float_lines(*_values(expression, count), _REGION_SIDE)]
 
 
-@_derived
-def steepest(expression, count, lanes, law):
+@inlined
+def steepest(law):
     """Slopes of friction where it is steepest: at rest, and outside the stiction band; s/m.
 
     They hold for the roughest surface. ``rk4`` takes the stiffness of a step that meets one of these speeds from them.
     """
-    return ["return law.slope_at_rest, law.slope_beyond"]
+    return law.slope_at_rest, law.slope_beyond
 
 
 @inlined
