@@ -13,7 +13,8 @@ import numpy as np
 from numba.core import types
 from numba.extending import intrinsic
 
-from ringsweep.compile import generated, map_leaves
+from ringsweep.compile import function_from_lines, generated, map_leaves, specialise
+from ringsweep.numerics.functions import select
 from ringsweep.numerics.lanes import LANES, VECTOR, WIDTH, spread_scalar
 
 
@@ -141,6 +142,23 @@ def conform(nested, like):
 
     text, scope = _rebuilt(like, spread)
     return [f"return {text}"], scope | {"broadcast": _broadcast}
+
+
+def select_all(condition, a, b):
+    """Nested tuple `a` where the condition holds, else `b`, which is of the same shape; for floats and Lanes."""
+    if not isinstance(a, tuple):
+        return select(condition, a, b)
+    return type(a)(*(select_all(condition, one, other) for one, other in zip(a, b, strict=True)))
+
+
+def _select_all_in_kernel(condition: Any, a: Any, b: Any) -> Any:
+    others = [name for name, _ in _numbers(b, "b")]
+    ones = [name for name, _ in _numbers(a, "a")]
+    text, scope = _rebuilt(a, lambda kind, k: f"select(condition, {ones[k]}, {others[k]})")
+    return function_from_lines("condition, a, b", [f"return {text}"], scope | {"select": select})
+
+
+specialise(select_all, _select_all_in_kernel, absorb=True)
 
 
 def side_by_side(batch: Any) -> Any:

@@ -10,41 +10,33 @@ from ringsweep.physics.forces import Forced, force_in, force_rate, largest_force
 from ringsweep.physics.friction.registry import SetValued, family
 from ringsweep.physics.friction.velocity import friction_at, stiction_band
 
-# A part that a belt may lack adds its term in one of these functions. Without the part the function returns what it is
-# given, so that the code is as if the part did not exist. Arguments are floats, Lanes or terms of a series.
+# A part that a belt may lack adds its term in this function. Without the part the function returns what it is given, so
+# that the code is as if the part did not exist. Arguments are floats, Lanes or terms of a series.
 
 
 @hook(absorb=True, optional=True)
-def _damped(damper, total, factor, velocity):
-    """`total` with `factor` times the force of the damper."""
+def _with(part, total, factor, by):
+    """`total` with `factor` times the force of a part.
+
+    `by` is what the force depends on: the velocity for a damper, the cube of the displacement for the cubic part of the
+    spring, and the force itself for an external force.
+    """
     return total
 
 
-@_damped.implements(Damper)
-def _with_damper(damper, total, factor, velocity):
-    return total - velocity * (factor * damper.coefficient)
+@_with.implements(Damper)
+def _with_damper(part, total, factor, by):
+    return total - by * (factor * part.coefficient)
 
 
-@hook(absorb=True, optional=True)
-def _stiffened(cubic, total, factor, cube):
-    """`total` with `factor` times the force of the cubic part of the spring."""
-    return total
+@_with.implements(Cubic)
+def _with_cubic(part, total, factor, by):
+    return total - by * (factor * part.stiffness)
 
 
-@_stiffened.implements(Cubic)
-def _with_cubic(cubic, total, factor, cube):
-    return total - cube * (factor * cubic.stiffness)
-
-
-@hook(absorb=True, optional=True)
-def _pushed(drive, total, factor, push):
-    """`total` with `factor` times the external force."""
-    return total
-
-
-@_pushed.implements(Forced)
-def _with_push(drive, total, factor, push):
-    return total + push * factor
+@_with.implements(Forced)
+def _with_push(part, total, factor, by):
+    return total + by * factor
 
 
 @absorbed
@@ -69,9 +61,9 @@ def with_loads(scene, total, factor, velocity, cube, push):
         ``total + factor (push - c velocity - k3 cube)``, as far as the scene has these parts. The forces are linear in
         the last three arguments, so that their derivatives in place of them give that of the sum.
     """
-    total = _damped(scene.damper, total, factor, velocity)
-    total = _stiffened(scene.cubic, total, factor, cube)
-    return _pushed(scene.drive, total, factor, push)
+    total = _with(scene.damper, total, factor, velocity)
+    total = _with(scene.cubic, total, factor, cube)
+    return _with(scene.drive, total, factor, push)
 
 
 @hook(optional=True)
@@ -146,7 +138,7 @@ def stuck_pull_rate(scene, t, x, forcing):
 @absorbed
 def damping(scene, slope):
     """`slope`, the derivative of the friction force by the velocity, and the coefficient of the damper, N s/m."""
-    return _damped(scene.damper, slope, -1.0, 1.0)
+    return _with(scene.damper, slope, -1.0, 1.0)
 
 
 @hook(absorb=True, optional=True)
@@ -223,7 +215,7 @@ def acceleration(scene, x, velocity, forcing, force):
 @inlined
 def with_cubic_energy(scene, energy, x):
     """`energy` with that of the cubic part of the spring, J, at the displacement `x`, m."""
-    return _stiffened(scene.cubic, energy, -1.0, 0.25 * (x * x) * (x * x))
+    return _with(scene.cubic, energy, -1.0, 0.25 * (x * x) * (x * x))
 
 
 @inlined
@@ -234,17 +226,6 @@ def with_sizes(scene, total, factor, velocity, cube, push):
         total += abs(with_loads(scene, 0.0, factor, 0.0, cube, 0.0))
         total += abs(with_loads(scene, 0.0, factor, 0.0, 0.0, push))
     return total
-
-
-@hook(optional=True)
-def _with_largest_force(drive, load):
-    """`load` and the largest external force, N."""
-    return load
-
-
-@_with_largest_force.implements(Forced)
-def _and_largest_force(drive, load):
-    return load + largest_force(drive)
 
 
 @hook(optional=True)
@@ -265,7 +246,7 @@ def _reach_of_cubic(cubic, mass, velocity, load, by_velocity, by_load):
 @inlined
 def length_scale(scene, velocity):
     """Length in units of which errors are measured, m, for a body with this velocity (m/s)."""
-    load = _with_largest_force(scene.drive, scene.mu_s * scene.gravity * scene.mass)
+    load = scene.mu_s * scene.gravity * scene.mass + largest_force(scene.drive)
     if scene.stiffness > 0.0:
         by_velocity, by_load = velocity * (scene.mass / scene.stiffness) ** 0.5, load / scene.stiffness
     else:

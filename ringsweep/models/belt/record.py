@@ -17,6 +17,7 @@ from ringsweep.models.belt.force import bend, steepest_spring
 from ringsweep.models.interface import recorder
 from ringsweep.models.interface.status import BROKEN
 from ringsweep.numerics.functions import any_of, floor, lanes_body, select, square_root
+from ringsweep.numerics.memory import select_all
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.friction.velocity import stiction_band
 from ringsweep.quantities.variables import FAILED, OSCILLATORY, RIDING, SLIDING, STICK_SLIP, STICKING
@@ -451,7 +452,7 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
             c.swing,
             (x_mark - c.last.x) / (count - c.count),
             mark,
-            _chosen(renew, mark, c.reference),
+            select_all(renew, mark, c.reference),
             select(renew, 0.0, since),
             most,
             lap,
@@ -459,42 +460,8 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
             select(keeps, c.share, (total - total_from) / (t_mark - t_from)),
             select(keeps, c.stops, (stops.slips - slips_from) / cycles),
         )
-        return _chosen_cycles(ended, new, old)
+        return select_all(ended, new, old)
     return old
-
-
-@absorbed
-def _chosen(condition, a, b):
-    """Mark `a` where the condition holds, else `b`."""
-    return Mark(
-        select(condition, a.t, b.t),
-        select(condition, a.x, b.x),
-        select(condition, a.velocity, b.velocity),
-        select(condition, a.total, b.total),
-        select(condition, a.slips, b.slips),
-    )
-
-
-@absorbed
-def _chosen_cycles(condition, a, b):
-    """Cycles `a` where the condition holds, else `b`."""
-    return Cycles(
-        select(condition, a.count, b.count),
-        select(condition, a.next, b.next),
-        select(condition, a.low, b.low),
-        select(condition, a.high, b.high),
-        select(condition, a.swing, b.swing),
-        select(condition, a.swing_before, b.swing_before),
-        select(condition, a.drift, b.drift),
-        _chosen(condition, a.last, b.last),
-        _chosen(condition, a.reference, b.reference),
-        select(condition, a.since, b.since),
-        select(condition, a.most, b.most),
-        select(condition, a.lap, b.lap),
-        select(condition, a.period, b.period),
-        select(condition, a.share, b.share),
-        select(condition, a.stops, b.stops),
-    )
 
 
 @inlined
