@@ -17,12 +17,15 @@ import time
 from pathlib import Path
 from typing import Any
 
+import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
 
 import ringsweep
 from benchmarks._common import ALPHA, V0, heading, machine, markdown, ring, table
 from ringsweep.quantities.variables import INFERRED, LABELS
+from ringsweep.runs.refined import SEED
+from ringsweep.runs.refinement import Answer, refine
 
 RESULTS = Path(__file__).parent / "results"
 SCENE = ring({"law": "bengisu-akay", "alpha": ALPHA, "v0": V0})
@@ -80,23 +83,26 @@ def against_full(sides: list[int], folder: str) -> str:
     return text + "\n## PhaseMap on the same labels\n\n" + markdown(header, peers)
 
 
+def decisions(labels: Any, audit: float, seed: int) -> tuple[int, int]:
+    """Evaluations of the refinement on a map of labels that is known, and how many cells it leaves wrong."""
+    rounds = refine((1, *labels.shape), 32, audit, seed=seed)
+    flat, count = labels.ravel(), 0
+    cells = next(rounds)
+    try:
+        while True:
+            count += len(cells)
+            cells = rounds.send(Answer(flat[cells], np.ones(len(cells), dtype=bool)))
+    except StopIteration as end:
+        return count, int((end.value.labels[0] != labels).sum())
+
+
 def against_phasemap(labels: Any, refined: xr.Dataset) -> list[list[str]]:
     """Evaluations of PhaseMap and of the refinement, and the cells that each leaves wrong or without a label."""
-    from ringsweep.runs.refined import SEED
-    from ringsweep.runs.refinement import Answer, refine
-
     rows = []
-    for audit in (0.0, 0.02):
-        decisions = refine((1, *labels.shape), 32, audit, seed=SEED)
-        flat, count, cells = labels.ravel(), 0, None
-        try:
-            cells = next(decisions)
-            while True:
-                count += len(cells)
-                cells = decisions.send(Answer(flat[cells], np.ones(len(cells), dtype=bool)))
-        except StopIteration as end:
-            wrong = int((end.value.labels[0] != labels).sum())
-        rows.append([f"{len(labels)}²", f"refined, audit {audit:g}", str(count), str(wrong)])
+    for audit, seeds in ((0.0, [SEED]), (0.02, [SEED]), (0.02, list(range(12)))):
+        counts, wrong = np.transpose([decisions(labels, audit, seed) for seed in seeds])
+        name = f"refined, audit {audit:g}" + (f", mean of {len(seeds)} seeds" if len(seeds) > 1 else "")
+        rows.append([f"{len(labels)}²", name, f"{counts.mean():.0f}", f"{wrong.mean():.0f}"])
     try:
         from benchmarks.peers.with_phasemap import evaluations
 
@@ -109,22 +115,35 @@ def against_phasemap(labels: Any, refined: xr.Dataset) -> list[list[str]]:
     return rows
 
 
-def scaling(sides: list[int], folder: str) -> str:
-    """Cost against resolution."""
+def scaling(sides: list[int], folder: str, picture: Path) -> str:
+    """Cost against resolution, with a picture."""
     rows = []
+    cells, seconds = [], []
     for side in sides:
         found, wall, cpu = timed(grid(side), folder, refine={"audit": 0.0})
         count = int((found.origin != INFERRED).sum())
         rows.append([str(side), f"{wall:.1f}", f"{cpu:.1f}", str(count), f"{count / side:.1f}",
                      f"{100 * count / side**2:.2f} %", f"{0.02 * (side**2 - count):.0f}"])  # fmt: skip
+        cells.append(count)
+        seconds.append(cpu)
+        found.close()
         print(*rows[-1], flush=True)
     header = ["side", "wall, s", "CPU, s", "cells run", "per cell of the side", "share", "an audit of 2 % adds"]
     heading("Cost against resolution, without an audit")
     table(header, rows)
-    counts = [float(row[3]) for row in rows]
-    slope = np.polyfit(np.log(sides), np.log(counts), 1)[0]
+    slope = np.polyfit(np.log(sides), np.log(cells), 1)[0]
+    figure, axes = plt.subplots(figsize=(5.0, 3.5), layout="constrained")
+    axes.loglog(sides, cells, "o-", label=f"refined: side$^{{{slope:.2f}}}$")
+    axes.loglog(sides, np.square(sides), "k--", label="full: side$^2$")
+    axes.loglog(sides, 0.02 * np.square(sides), "k:", label="what an audit of 2 % adds")
+    axes.set(xlabel="cells along a side", ylabel="cells run", xticks=sides, xticklabels=[str(side) for side in sides])
+    axes.minorticks_off()
+    axes.legend()
+    figure.savefig(picture, dpi=150)
     text = "## Cost against resolution, without an audit\n\n" + markdown(header, rows)
-    return f"{text}\nCells run grow like side^{slope:.2f}.\n"
+    return (
+        f"{text}\nCells run grow like side^{slope:.2f}.\n\n![Cells run against the side of the map]({picture.name})\n"
+    )
 
 
 def densest(labels: Any, side: int) -> tuple[int, int]:
@@ -184,17 +203,17 @@ def main() -> None:
     full, resolutions, window = (
         ([128], [64, 128], 64) if given.quick else ([512, 1024], [2**k for k in range(6, 13)], 128)
     )
+    target = Path() if given.quick or given.part else RESULTS
     with tempfile.TemporaryDirectory() as folder:
         parts = {
             "full": lambda: against_full(given.sides or full, folder),
-            "scaling": lambda: scaling(given.sides or resolutions, folder),
+            "scaling": lambda: scaling(given.sides or resolutions, folder, target / "refine.png"),
             "zoom": lambda: zoom((given.sides or [window])[0]),
         }
         texts = [part() for name, part in parts.items() if given.part in (None, name)]
     if given.part is None:
         report = "# Refined maps\n\n`python -m benchmarks.refine` on\n\n"
         report += "".join(f"- {line}\n" for line in where.splitlines()) + "\n" + "\n".join(texts)
-        target = Path() if given.quick else RESULTS
         (target / "refine.md").write_text(report)
 
 

@@ -2,9 +2,11 @@
 
 The cells of a coarse lattice come first. Each level halves the intervals of the lattice. A new point of the lattice
 takes the label of the points around it if these agree, and is computed if they do not. Then every pair of neighbours in
-the lattice that differ is computed, until no new pair appears. So a boundary is followed from point to point, even
-if it leaves a block through an edge whose ends agree. Around what is thinner than the lattice more points are computed,
-since its parts may lie between the points. On the last level the lattice is the grid. What it infers is audited.
+the lattice that differ is computed. Around each point that differs from what was inferred, the points within three
+steps that differ from it are computed too, until no new one appears. So a boundary is followed from point to point, even
+if it leaves a block through an edge whose ends agree. Around what is thinner than the lattice all points within three
+steps are computed, since its parts may lie between the points. On the last level the lattice is the grid. What it infers
+is audited.
 """
 
 from __future__ import annotations
@@ -23,12 +25,9 @@ from ringsweep.quantities.variables import AUDITED, COMPUTED, INFERRED
 #: Confidence of the bound on wrong cells.
 CONFIDENCE = 0.95
 
-#: How often the lattice of a coarse block is halved when it is first reopened, and that of its neighbours.
-_REOPENED, _BESIDE = 3, 2
-
 _BESIDES = ((-1, 0), (1, 0), (0, -1), (0, 1))
 _INNER = slice(1, -1), slice(None, -2), slice(2, None)
-_WITHIN_TWO = tuple((down, right) for down in range(-2, 3) for right in range(-2, 3))
+_NEAR = tuple((down, right) for down in range(-3, 4) for right in range(-3, 4) if 0 < abs(down) + abs(right) <= 3)
 
 Cells = NDArray[np.intp]
 
@@ -187,14 +186,14 @@ class _Grid:
         self.rows, self.columns = rows, columns
         yield from self.compute(np.flatnonzero(needed))
         yield from self.follow(self._beside_others())
-        while self.can_be_halved and len(beside_thin := self._beside_thin()):
-            yield from self.follow(beside_thin)
+        while len(near_thin := self._near_thin()):
+            yield from self.follow(near_thin)
 
     def follow(self, cells: Cells) -> Generator[Cells, Answer]:
-        """Compute points, and the neighbours of those that turn out to differ from what was inferred."""
+        """Compute points, and those near them that differ from them where they differ from what was inferred."""
         while len(cells):
             surprising = yield from self.compute(cells)
-            cells = self._differing_neighbours(cells[surprising])
+            cells = self._differing_near(cells[surprising])
 
     def compute(self, points: Cells) -> Generator[Cells, Answer, NDArray[np.bool_]]:
         """Compute points of the lattice that are not known; returns which differ from what was inferred."""
@@ -224,22 +223,23 @@ class _Grid:
             found[high] |= differ
         return np.flatnonzero(found & ~self.known)
 
-    def _beside_thin(self) -> Cells:
-        """Points that are not known, within two of a point that differs from those on both sides of it."""
+    def _near_thin(self) -> Cells:
+        """Points that are not known, near a point that differs from those on both sides of it."""
         thin = np.zeros(self.labels.shape, dtype=bool)
         for axis in (1, 2):
             inner, low, high = ((slice(None),) * axis + (part,) for part in _INNER)
             thin[inner] |= (self.labels[inner] != self.labels[low]) & (self.labels[inner] != self.labels[high])
-        cells, _ = self._around(np.flatnonzero(thin), _WITHIN_TWO)
-        return np.unique(cells[~self.known.flat[cells]])
+        points = np.flatnonzero(thin)
+        cells = np.union1d(points, self._around(points, _NEAR)[0])
+        return cells[~self.known.flat[cells]]
 
-    def _differing_neighbours(self, points: Cells) -> Cells:
-        """Neighbours of some points that are not known and have another label, or numbers that are too far."""
-        cells, which = self._around(points, _BESIDES)
-        differ = self.labels.flat[cells] != self.labels.flat[points[which]]
+    def _differing_near(self, points: Cells) -> Cells:
+        """Points near some points that are not known and have another label, and those beside numbers too far off."""
+        cells, which = self._around(points, _NEAR)
+        cells = cells[self.labels.flat[cells] != self.labels.flat[points[which]]]
         if self.rough is not None:
-            differ |= self.rough.flat[points[which]]
-        return np.unique(cells[differ & ~self.known.flat[cells]])
+            cells = np.append(cells, self._around(points[self.rough.flat[points]], _BESIDES)[0])
+        return np.unique(cells[~self.known.flat[cells]])
 
     def _around(self, points: Cells, offsets: tuple[tuple[int, int], ...]) -> tuple[Cells, Cells]:
         """Points of the lattice at some offsets from each point, and the index of that point."""
@@ -285,14 +285,14 @@ def _audited(grid: _Grid, share: float, random: np.random.Generator) -> Generato
     wrong = _differ(grid.labels.flat[sample], before.flat[sample])
     blocks = _Blocks(grid)
     found = sample[surprising]
-    yield from grid.follow(grid._differing_neighbours(found))
+    yield from grid.follow(grid._differing_near(found))
     wrong_after = 0
     while len(found):
         opened = blocks.reopened(found)
         surprising = yield from grid.compute(opened)
         found = opened[surprising]
         wrong_after = int(_differ(grid.labels.flat[found], before.flat[found]).sum())
-        yield from grid.follow(grid._differing_neighbours(found))
+        yield from grid.follow(grid._differing_near(found))
     followed = inferred[grid.known.flat[inferred]]
     corrected = int(_differ(grid.labels.flat[followed], before.flat[followed]).sum())
     origin = np.where(grid.known, np.int8(COMPUTED), np.int8(INFERRED))
@@ -322,10 +322,10 @@ class _Blocks:
             for right in (-1, 0, 1):
                 rows = np.clip(row // self.grid.stride + down, 0, self.counts[0] - 1)
                 columns = np.clip(column // self.grid.stride + right, 0, self.counts[1] - 1)
-                self.halvings[layer, rows, columns] = np.maximum(self.halvings[layer, rows, columns], _BESIDE)
+                self.halvings[layer, rows, columns] = np.maximum(self.halvings[layer, rows, columns], 1)
                 if down == right == 0:
                     own[layer, rows, columns] = True
-        self.halvings[own] = np.maximum(before[own] + 1, _REOPENED)
+        self.halvings[own] = before[own] + 1
         found = [np.empty(0, dtype=np.intp)]
         for k, i, j in np.argwhere(self.halvings != before):
             step = max(self.grid.stride >> int(self.halvings[k, i, j]), 1)
