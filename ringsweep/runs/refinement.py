@@ -3,10 +3,10 @@
 The cells of a coarse lattice come first. Each level halves the intervals of the lattice. A new point of the lattice
 takes the label of the points around it if these agree, and is computed if they do not. Then every pair of neighbours in
 the lattice that differ is computed. Around each point that differs from what was inferred, the points within three
-steps that differ from it are computed too, until no new one appears. So a boundary is followed from point to point, even
-if it leaves a block through an edge whose ends agree. Around what is thinner than the lattice all points within three
-steps are computed, since its parts may lie between the points. On the last level the lattice is the grid. What it infers
-is audited.
+steps that differ from it are computed too, until no new one appears. So a boundary is followed from point to point,
+even if it leaves a block through an edge whose ends agree. Around what is thinner than the lattice all points within
+three steps are computed, since its parts may lie between the points. On the last level the lattice is the grid. What it
+infers is audited.
 """
 
 from __future__ import annotations
