@@ -166,6 +166,17 @@ class TestRecommendation:
         fastest = found["time_per_run"].where(met).argmin("contender")
         assert found.attrs["recommended"] == found["solver"].values[fastest]
 
+    @pytest.mark.parametrize(("rtol", "meets"), [(1e-4, "misses"), (1e-11, "meets")])
+    def test_report_says_whether_the_solver_of_the_configuration_meets_the_target(self, found, rtol, meets):
+        solver = next(name for name in found["solver"].values if name.endswith(f"rtol: {rtol!r}"))
+        text = report(found.assign_attrs(configured=solver))
+        assert f"the solver of this configuration, `{solver}`, {meets} the target: " in text
+        text = report(found.assign_attrs(configured=found.attrs["recommended"]))
+        assert "it is the solver of this configuration already: nothing needs to change" in text
+
+    def test_solver_of_the_configuration_is_named_even_if_it_is_the_default(self, found):
+        assert found.attrs["configured"] in found["solver"].values
+
     def test_unreachable_target_is_reported_with_the_closest_solver(self, folder, capsys):
         assert main(["precision", "belt.yaml", "--target", "1e-40", "--rounds", "1"]) == 0
         out = capsys.readouterr().out

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from ringsweep.runs.precision import error_bounds
+from ringsweep.runs.precision import wrong_and_worst
 
 
 def report(ds: xr.Dataset) -> str:
@@ -54,21 +54,36 @@ def _verdict(ds: xr.Dataset, unit: str) -> list[str]:
     ]
     if "left_out" in attributes:
         words.append(f"left out: {attributes['left_out']}")
-    name = attributes.get("recommended", attributes.get("closest"))
-    k = ds["solver"].values.tolist().index(name)
-    worst, wrong = error_bounds(ds).max(axis=1)[k], int((ds["regime_wrong"][k] == 1).sum())
-    errors = (
-        f"errors up to {worst:.1e} (with the uncertainty of the reference)"
-        if np.isfinite(worst)
-        else "runs that failed"
-    )
-    reached = f"{wrong or 'no'} wrong regime{'s' * (wrong != 1)}, {errors}"
+    solvers = ds["solver"].values.tolist()
+    wrong, worst, meets = wrong_and_worst(ds)
+
+    def reached(k: int) -> str:
+        errors = (
+            f"errors up to {worst[k]:.1e} (with the uncertainty of the reference)"
+            if np.isfinite(worst[k])
+            else "runs that failed"
+        )
+        return f"{wrong[k] or 'no'} wrong regime{'' if wrong[k] == 1 else 's'}, {errors}"
+
     words.append(f"with certificates, the default, a run takes {attributes['certificate_cost']:.2g} times as long")
     target = f"target {attributes['target']:g} ({unit} at the end{', s at separation' * ('error_separation' in ds)})"
-    if "recommended" in attributes:
-        words.append(f"{target} in every sampled cell is met fastest by this solver: {reached}")
-        return [*words, f"solver: {{{name}}}"]
-    return [*words, f"{target} in every sampled cell is met by none; closest is `{name}`: {reached}"]
+    name = attributes.get("recommended", attributes.get("closest"))
+    chosen = solvers.index(name)
+    if attributes.get("configured", name) != name:
+        own = solvers.index(attributes["configured"])
+        factor = ds["time_per_run"].values[own] / ds["time_per_run"].values[chosen]
+        words.append(
+            f"the solver of this configuration, `{solvers[own]}`, {'meets' if meets[own] else 'misses'} the target: "
+            f"{reached(own)}"
+        )
+        if meets[own]:
+            words[-1] += f"; it takes {factor:.2g} times as long as the solver below"
+    if "recommended" not in attributes:
+        return [*words, f"{target} in every sampled cell is met by none; closest is `{name}`: {reached(chosen)}"]
+    words.append(f"{target} in every sampled cell is met fastest by this solver: {reached(chosen)}")
+    if attributes.get("configured") == name:
+        words.append("it is the solver of this configuration already: nothing needs to change")
+    return [*words, f"solver: {{{name}}}"]
 
 
 def _aligned(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

@@ -81,6 +81,7 @@ def precision(
         text under ``solver`` in a configuration) of each contender, and the swept values of each cell. Run times are
         processor times of one thread, without certificates and compilation. The error of a failed run is infinite.
         Attributes: ``target``; ``recommended``, a value of ``solver``, or ``closest`` if no setting meets the target;
+        ``configured``, the value of ``solver`` that the configuration has or that is its default, if it was measured;
         ``certificate_cost``, the factor by which certificates lengthen runs with this setting; ``reference``,
         ``sampled`` and ``left_out`` in words.
 
@@ -164,8 +165,12 @@ def measure(
         for one in (plain, with_certificate)[:: 1 if k % 2 == 0 else -1]:
             one.measure(run)
     cost = median(b / a for a, b in zip(plain.seconds, with_certificate.seconds, strict=True))
-    name = str(dataset["solver"].values[chosen])
-    return dataset.assign_attrs({"recommended" if met else "closest": name, "certificate_cost": cost})
+    names_of_solvers = dataset["solver"].values.tolist()
+    found: dict[str, Any] = {"recommended" if met else "closest": names_of_solvers[chosen], "certificate_cost": cost}
+    configured = solver_yaml(config.solver.resolved(structure))
+    if configured in names_of_solvers:
+        found["configured"] = configured
+    return dataset.assign_attrs(found)
 
 
 def _run_one(bar: Any, method: Any, run: Callable[[Any], Result]) -> Result:
@@ -257,10 +262,16 @@ def error_bounds(ds: xr.Dataset) -> NDArray[np.float64]:
     return np.asarray(bounds)
 
 
+def wrong_and_worst(ds: xr.Dataset) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.bool_]]:
+    """Of each contender the number of wrong regimes, the largest error, and whether it meets the target."""
+    wrong, worst = (ds["regime_wrong"] == 1).sum("cell").values, error_bounds(ds).max(axis=1)
+    return wrong, worst, (wrong == 0) & (worst <= ds.attrs["target"])
+
+
 def _choose(ds: xr.Dataset) -> tuple[int, bool]:
     """The fastest contender that meets the target, or else the one that comes closest; and whether it meets it."""
-    wrong, worst = (ds["regime_wrong"] == 1).sum("cell").values, error_bounds(ds).max(axis=1)
-    met = np.flatnonzero((wrong == 0) & (worst <= ds.attrs["target"]))
+    wrong, worst, meets = wrong_and_worst(ds)
+    met = np.flatnonzero(meets)
     if len(met):
         return int(met[np.argmin(ds["time_per_run"].values[met])]), True
     return int(np.lexsort([worst, wrong])[0]), False
