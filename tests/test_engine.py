@@ -12,6 +12,7 @@ from ringsweep.config import load
 from ringsweep.models.ring.record import Outcome
 from ringsweep.quantities.variables import OUTCOMES, REGIMES
 from ringsweep.solvers.certificate import with_errors
+from ringsweep.storage.provenance import attributes, identity
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 AMPLITUDES = [0.5, 2.0, 8.0]
@@ -50,7 +51,7 @@ class TestDataset:
 
     def test_attributes_of_a_dataset_are_enough_to_run_it_again(self, grid):
         again = ringsweep.run(json.loads(grid.attrs["configuration"]), progress=False)
-        undated = {"date_created": ""}
+        undated = {"date_created": "", "history": ""}
         xr.testing.assert_identical(again.assign_attrs(undated), grid.assign_attrs(undated))
 
 
@@ -153,6 +154,13 @@ class TestConfigurations:
     def test_every_configuration_in_configs_is_valid(self, path):
         config = load(path)
         assert config.axes.sizes or path.parent.name == "paper"
+
+    @pytest.mark.parametrize("path", sorted(CONFIGS.glob("*.yaml")), ids=lambda path: path.stem)
+    def test_stored_configuration_has_the_defaults_and_means_the_same(self, path):
+        config = load(path)
+        stored = json.loads(attributes(config)["configuration"])
+        assert stored["scene"]["gravity"] == 9.81
+        assert identity(load(stored)) == identity(config)
 
     def test_axes_of_the_regime_map_are_those_documented(self):
         axes = load(CONFIGS / "regime_map.yaml").axes

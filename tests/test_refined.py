@@ -95,7 +95,7 @@ class TestFile:
         assert "at 95 % confidence" in ds.attrs["audit"]
 
     def test_file_equals_the_sweep_in_memory(self, config, ds):
-        undated = {"date_created": ""}
+        undated = {"date_created": "", "history": ""}
         in_memory = ringsweep.run(config, progress=False)
         xr.testing.assert_identical(ds.drop_attrs(deep=False), in_memory.drop_attrs(deep=False))
         assert in_memory.assign_attrs(undated).attrs == ds.assign_attrs(undated).attrs

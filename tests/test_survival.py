@@ -291,7 +291,7 @@ class TestFullDisk:
 
 class TestResultFile:
     def test_file_equals_the_sweep_in_memory(self, config, never_stopped):
-        undated = {"date_created": ""}
+        undated = {"date_created": "", "history": ""}
         in_memory = ringsweep.run(config, progress=False)
         xr.testing.assert_identical(netcdf.load(never_stopped).assign_attrs(undated), in_memory.assign_attrs(undated))
 

@@ -43,7 +43,7 @@ def cell(ds: xr.Dataset, sel: Mapping[str, float | str] | None = None) -> dict[s
     >>> scene = load("my-sweep.yaml").source["scene"]
     >>> maps = ringsweep.sweep(scene, {"drive.amplitude": [1.0, 2.0], "zone.half_angle": ["10 deg", "20 deg"]})
     >>> cell(maps, {"drive.amplitude": 1.9, "zone.half_angle": 0.2})["scene"]["drive"]
-    {'amplitude': 2.0, 'law': 'arctan'}
+    {'law': 'arctan', 'amplitude': 2.0}
     """
     # Models are slow to import, and a map, which uses `select`, needs none.
     from ringsweep.config import with_values

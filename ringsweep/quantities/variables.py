@@ -21,6 +21,21 @@ REGIMES = (
 )
 RESTING, OSCILLATORY, REVOLVING, SEPARATING, JAMMED, FAILED, STICK_SLIP, SLIDING, STICKING, RIDING = range(10)
 
+#: What each regime says, of the ring or of the belt.
+DEFINITIONS = {
+    "resting": "neither a reversal nor a full turn",
+    "oscillatory": "ring: at least one reversal, and less than a full turn since the last; "
+    "belt: slips at all times, and its amplitude does not decay",
+    "revolving": "a full turn since the last reversal or the start",
+    "separating": "a normal reaction reached zero",
+    "jammed": "rigid-body dynamics had no solution, or more than one",
+    "failed": "a number was not finite, or the limit of the work was reached",
+    "stick-slip": "sticks and slips by turns",
+    "sliding": "keeps to steady slip, or settles to it",
+    "sticking": "came to stick for good",
+    "riding": "has stuck since the launch",
+}
+
 #: Origin of a cell of a refined sweep. An audited cell was inferred, and then run.
 COMPUTED, INFERRED, AUDITED = range(3)
 
@@ -39,15 +54,20 @@ class Variable(Quantity):
         NumPy type in files.
     flags : dict of int to str, optional
         Values of a classification, and their meanings.
+    comment : str
+        What the meanings are, if their names do not tell.
     """
 
     dtype: str = "float64"
     flags: dict[int, str] | None = None
+    comment: str = ""
 
     @property
     def attributes(self) -> dict[str, Any]:
         """CF attributes."""
         attributes = super().attributes
+        if self.comment:
+            attributes["comment"] = self.comment
         if self.flags:
             attributes["flag_values"] = np.array(list(self.flags), dtype=self.dtype)
             attributes["flag_meanings"] = " ".join(meaning.replace(" ", "_") for meaning in self.flags.values())
@@ -55,14 +75,23 @@ class Variable(Quantity):
 
 
 _regimes = dict(enumerate(REGIMES))
+_motions = {k: v for k, v in _regimes.items() if k not in (SEPARATING, JAMMED)}
+
+
+def _defined(names: Collection[str]) -> str:
+    """Definitions of regimes as one text."""
+    words = "; ".join(f"{name}: {DEFINITIONS[name]}" for name in names)
+    return f"a statement about the span of the run, not about all times; {words}"
+
 
 OUTCOMES: dict[str, Variable] = {
-    "regime": Variable("1", "regime of the run", dtype="int8", flags=_regimes),
+    "regime": Variable("1", "regime of the run", dtype="int8", flags=_regimes, comment=_defined(REGIMES)),
     "motion": Variable(
         "1",
         "motion up to the end of the run",
         dtype="int8",
-        flags={k: v for k, v in _regimes.items() if k not in (SEPARATING, JAMMED)},
+        flags=_motions,
+        comment=_defined(_motions.values()),
     ),
     "separating_contact": Variable(
         "1", "contact that separates", dtype="int8", flags={0: "none", 1: "contact_1", 2: "contact_2", 3: "both"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import hashlib
 import json
@@ -19,6 +20,12 @@ from ringsweep.compile import SOURCES_DIGEST
 from ringsweep.config import Config
 from ringsweep.models import MODELS
 from ringsweep.models.scene import LAW
+
+#: What a paper that uses a result can cite.
+REFERENCES = (
+    "S. Alaci et al., Some Aspects of the Effects of Dry Friction Discontinuities on the Behaviour of Dynamic Systems, "
+    "Computation 2024, 12(9), 181, https://doi.org/10.3390/computation12090181"
+)
 
 # Reading the metadata of a package takes milliseconds.
 _version = cache(version)
@@ -97,10 +104,15 @@ def attributes(config: Config) -> dict[str, Any]:
     digest = versions.pop("sources")
     methods = {law: config.solver.resolved(structure) for law, structure in config.scene.structures.items()}
     options = {law: {"method": method.name, **dataclasses.asdict(method)} for law, method in methods.items()}
+    source = f"ringsweep {_version('ringsweep')}"
+    now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     return {
         "Conventions": "CF-1.11",
         "title": f"ringsweep: {model.doc}",
-        "source": f"ringsweep {_version('ringsweep')}",
+        "source": source,
+        "history": f"{now} computed by {source}",
+        "references": REFERENCES,
+        "comment": "angles are in radians; a number is missing (NaN) where the run has none, for example no separation",
         "ringsweep_version": _version("ringsweep"),
         "ringsweep_sources": digest,
         "fingerprint": fingerprint(identity(config)),
@@ -109,9 +121,23 @@ def attributes(config: Config) -> dict[str, Any]:
         "processors": processor(),
         "method": config.solver.name,
         "solver": json.dumps(options if len(options) > 1 else next(iter(options.values()))),
-        "configuration": json.dumps(config.source, sort_keys=True),
-        "date_created": datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
+        "configuration": json.dumps({**config.source, "scene": _with_defaults(config)}),
+        "date_created": now,
     }
+
+
+def _with_defaults(config: Config) -> dict[str, Any]:
+    """The scene as the configuration has it, with the default of each number that it leaves out."""
+    scene: dict[str, Any] = copy.deepcopy(config.source["scene"])
+    for path, value in config.scene.values.items():
+        if path in config.axes.columns:
+            continue
+        *sections, name = path.split(".")
+        section: Any = scene
+        for key in sections:
+            section = section[int(key)] if isinstance(section, list) else section.setdefault(key, {})
+        section.setdefault(name, value)
+    return scene
 
 
 def _digest(*arrays: Any) -> str:
