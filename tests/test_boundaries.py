@@ -81,7 +81,38 @@ class TestBoundary:
         assert "not certified" in caplog.text
 
     @pytest.mark.parametrize(
-        ("regime", "tolerance", "path"), [("separated", 1e-3, "regime"), ("separating", 0.0, "tolerance")]
+        ("change", "problem"),
+        [
+            (lambda ds: ds.isel(zone_half_angle=4, drop=True), "no coordinate for zone.half_angle"),
+            (lambda ds: ds.assign_coords(zone_half_angle=np.degrees(ds.zone_half_angle)), "which its sweep has not"),
+            (lambda ds: ds.assign(regime=ds.regime[:, ::-1].variable), "other regimes than runs of its configuration"),
+        ],
+        ids=["dropped", "other units", "other scene"],
+    )
+    def test_dataset_whose_cells_are_not_those_of_its_configuration_is_refused(self, ds, change, problem):
+        changed = change(ds)
+        if "zone_half_angle" in changed.coords:
+            changed["zone_half_angle"].attrs = ds["zone_half_angle"].attrs
+        with pytest.raises(InputError, match=problem):
+            ringsweep.boundary(changed, "separating")
+
+    def test_regime_without_cells_has_no_curve_and_a_warning(self, ds, tmp_path, capsys, caplog):
+        from ringsweep.storage import netcdf
+
+        netcdf.save(ds, tmp_path / "my.nc")
+        assert cli.main(["map", str(tmp_path / "my.nc"), "--boundaries", "jammed"]) == 0
+        assert "the map has no boundary of jammed" in capsys.readouterr().err + caplog.text
+        assert cli.main(["info", str(tmp_path / "my-jammed.nc")]) == 0
+        assert "boundary of jammed: 0 curves, 0 points" in capsys.readouterr().out
+
+    @pytest.mark.parametrize(
+        ("regime", "tolerance", "path"),
+        [
+            ("separated", 1e-3, "regime"),
+            ("separating", 0.0, "tolerance"),
+            ("separating", True, "tolerance"),
+            ("separating", "narrow", "tolerance"),
+        ],
     )
     def test_mistake_is_refused(self, ds, regime, tolerance, path):
         with pytest.raises(InputError) as caught:
@@ -99,6 +130,8 @@ class TestBoundary:
         assert cli.main(["map", str(tmp_path / "my.nc"), "--boundaries", "separating", "--tolerance", "1e-2"]) == 0
         written = netcdf.load(tmp_path / "my-separating.nc")
         assert written.sizes == curves.sizes
+        assert cli.main(["info", str(tmp_path / "my-separating.nc")]) == 0
+        assert "boundary of separating: " in capsys.readouterr().out
         assert cli.main(["map", str(tmp_path / "my.nc"), "--tolerance", "1e-2"]) == 2
 
 
@@ -108,6 +141,21 @@ class TestUncertaintyExponent:
         found = ringsweep.uncertainty_exponent(labelled(x**2 + y**2 < 0.5))
         assert float(found.exponent) == pytest.approx(1.0, abs=0.05)
         assert found.uncertain.values[0] > found.uncertain.values[-1]
+
+    @pytest.mark.parametrize("side", [257, 512, 1000])
+    def test_straight_lines_have_the_exponent_one_at_any_size_of_the_map(self, side):
+        y, x = np.indices((side, side)) / side
+        random = np.random.default_rng(0)
+        found = []
+        for angle in random.uniform(0.0, np.pi, 20):
+            lines = (x - 0.5) * np.cos(angle) + (y - 0.5) * np.sin(angle) > random.uniform(-0.2, 0.2)
+            found.append(float(ringsweep.uncertainty_exponent(labelled(lines)).exponent))
+        assert np.mean(found) == pytest.approx(1.0, abs=0.01)
+
+    def test_single_cells_that_differ_are_no_boundary_and_give_a_warning(self, caplog):
+        dust = np.random.default_rng(0).random((1024, 1024)) < 1e-3
+        assert float(ringsweep.uncertainty_exponent(labelled(dust)).exponent) > 1.2
+        assert "single cells differ from all around them" in caplog.text
 
     def test_stripes_over_a_cantor_set_have_their_dimension(self):
         """It is 1 + log 2 / log 3."""

@@ -134,6 +134,8 @@ class TestFile:
         figure = plots.regime_map(ds)
         assert "of the cells run" in figure.get_suptitle()
         assert "95 % confidence" in figure.get_suptitle()
+        # What is known of the whole is not known of a part.
+        assert "confidence" not in plots.regime_map(ds.isel(drive_amplitude=slice(3, None))).get_suptitle()
         assert cli.main(["map", str(refined), "--var", "origin", "-o", str(tmp_path / "origin.png")]) == 0
 
 

@@ -158,7 +158,7 @@ class TestAudit:
 
     def test_bound_without_a_wrong_cell_is_three_over_the_sample(self):
         found, _ = refined(np.zeros((SIZE, SIZE), dtype=int))
-        assert found.audit.wrong == found.audit.wrong_after == found.audit.corrected == 0
+        assert found.audit.wrong == found.audit.corrected == 0
         assert found.audit.bound == pytest.approx(3 / found.audit.cells, rel=0.02)
 
     def test_island_that_the_audit_meets_is_followed_to_its_shore(self):
@@ -167,7 +167,6 @@ class TestAudit:
         found, _ = refined(truth)
         assert found.audit.wrong > 0
         assert found.audit.corrected == 400
-        assert found.audit.wrong_after == 0
         assert not wrong(found, truth).any()
 
     def test_neighbouring_blocks_of_a_wrong_cell_are_looked_at_too(self):
@@ -187,6 +186,13 @@ class TestAudit:
         found, _ = refined(np.zeros((40, 40), dtype=int), audit=0.0)
         assert found.audit.cells == 0
         assert found.audit.bound == 1.0
+
+    @pytest.mark.parametrize("period", [2, 31, 33])
+    def test_bound_is_a_share_even_if_most_cells_were_found_wrong(self, period):
+        stripes = (np.arange(SIZE) % period == 1)[:, None] & np.ones(SIZE, dtype=bool)
+        for seed in range(5):
+            found, _ = refined(stripes.astype(int), audit=0.1, seed=seed)
+            assert 0.0 <= found.audit.bound <= 1.0
 
     def test_bound_is_exact_in_small_cases(self):
         # With nine wrong cells of ten, one that is drawn is right with a probability of 10 %.
@@ -224,6 +230,23 @@ class TestNumbers:
         assert np.array_equal(np.isnan(found.values[0]), np.isnan(values))
         assert audited.any()
         assert sum(asked) < 0.25 * truth.size
+
+    def test_audit_counts_the_numbers_that_are_further_off_than_allowed(self):
+        """Waves of the length of a coarse block look flat on the coarse lattice."""
+        y, x = np.indices((257, 257))
+        values = np.sin(2 * np.pi * x / 32) * np.sin(2 * np.pi * y / 32)
+        found, _ = refined(np.zeros((257, 257), dtype=int), values=values, within=1e-2)
+        inferred = found.origin[0] == INFERRED
+        far = (np.abs(found.values[0] - values) > 1e-2)[inferred].mean()
+        assert found.audit.wrong == 0
+        assert found.audit.far > 0
+        assert far <= found.audit.far_bound
+
+    def test_end_of_the_numbers_within_one_label_is_followed(self):
+        y, x = plane(200)
+        values = np.where(x**2 + y**2 < 0.4, x + y, np.nan)
+        found, _ = refined(np.zeros((200, 200), dtype=int), values=values, within=1e-2, audit=0.0)
+        np.testing.assert_array_equal(np.isnan(found.values[0]), np.isnan(values))
 
     def test_smaller_error_costs_more_cells(self):
         y, x = plane(200)

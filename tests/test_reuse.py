@@ -106,6 +106,13 @@ def test_sweep_of_one_law_takes_its_cells_of_a_sweep_over_laws(scene, tmp_path, 
     assert taken(scene, COARSE, tmp_path / "l.nc", tmp_path, caplog) == 15
 
 
+@pytest.mark.parametrize("refine", [True, False])
+def test_refine_may_stand_before_the_grid(scene, earlier, refine):
+    sweep = {"refine": refine, "grid": {path: list(values) for path, values in COARSE.items()}}
+    found = ringsweep.run({"scene": scene, "sweep": sweep}, reuse=earlier, progress=False)
+    assert dict(found.sizes) == {"drive_amplitude": 5, "zone_half_angle": 3}
+
+
 def test_shared_cells_are_not_computed_again(scene, earlier, tmp_path, computed):
     ringsweep.sweep(scene, COARSE, tmp_path / "new.nc", reuse=earlier, progress=False).close()
     assert computed == [15]

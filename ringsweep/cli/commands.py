@@ -234,6 +234,8 @@ def info_command(arguments: argparse.Namespace) -> None:
             print(f"  {name}: {', '.join(dict.fromkeys(map(str, axis.values.flat)))}")
             continue
         unit = axis.attrs.get("units", "1")
+        if not axis.size:
+            continue
         print(f"  {name}: {axis.values.min():g} to {axis.values.max():g}{'' if unit == '1' else f' {unit}'}")
     if not {"contender", "time"} & set(result.dims):
         print("variables:", ", ".join(map(str, result.data_vars)))

@@ -7,7 +7,15 @@ import xarray as xr
 
 
 def summarise(result: xr.Dataset) -> None:
-    """Print the number of cells, the share of each regime, the share of certified cells and the bounds on errors."""
+    """Print the number of cells, the share of each regime, the share of certified cells and the bounds on errors.
+
+    Of the curves of a boundary, print their number and the largest distance of the boundary from them.
+    """
+    if "vertex" in result.dims:
+        curves, points = len(np.unique(result["line"])), result.sizes["vertex"]
+        print(f"boundary of {result.attrs['boundary_of']}: {curves} curves, {points} points", end="")
+        print(f", each within {result['error'].values.max():.2g} along its axis" if points else "")
+        return
     regime = result["regime"]
     print("cells:", regime.size)
     meanings = str(regime.attrs["flag_meanings"]).split()

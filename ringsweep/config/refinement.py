@@ -83,14 +83,14 @@ def read_refinement(given: Any, scene: Scene, axes: Axes) -> Refinement | None:
 
 def _dims(given: Any, axes: Axes) -> tuple[str, ...]:
     """The dimensions that are refined: those named, or the two longest."""
-    columns = axes.columns.items()
-    for path, (dims, _) in columns:
+    columns = {path: values for path, (_, values) in axes.columns.items() if values.dtype.kind == "f"}
+    for path, (dims, _) in axes.columns.items():
         if dims != (dimension(path),):
             raise InputError(
                 "sweep.refine",
                 f"{path} varies along {' x '.join(dims)}, but only a grid can be refined: a point has no neighbours",
             )
-    names = {path: values for path, (_, values) in columns if values.dtype.kind == "f" and len(values) > 1}
+    names = {path: values for path, values in columns.items() if len(values) > 1}
     if not names:
         raise InputError("sweep.refine", "the sweep has no grid axis of two or more numbers: nothing can be refined")
     if given is None:
@@ -101,9 +101,8 @@ def _dims(given: Any, axes: Axes) -> tuple[str, ...]:
         chosen = given
         for k, path in enumerate(chosen):
             if path not in names:
-                raise InputError(
-                    f"sweep.refine.axes.{k}", f"{show(path)} is no axis of numbers" + suggestion(path, names)
-                )
+                problem = "is an axis of one value" if path in columns else "is no axis of numbers"
+                raise InputError(f"sweep.refine.axes.{k}", f"{show(path)} {problem}" + suggestion(path, names))
     for path in chosen:
         steps = np.diff(names[path])
         if not ((steps > 0).all() or (steps < 0).all()):

@@ -27,6 +27,7 @@ from ringsweep.plots.map_axes import Axis, as_matrix, choose_axes, is_scattered,
 from ringsweep.plots.map_colours import CellWarning, ColourScale, cell_warnings, legend_entries
 from ringsweep.plots.selection import select
 from ringsweep.plots.style import NO_VALUE, SMALL, axes_or_current, is_dark, legend_beside, true_ranges
+from ringsweep.quantities.units import percent_at_most
 from ringsweep.quantities.variables import INFERRED
 
 _MOST_PANELS = 25
@@ -286,7 +287,8 @@ class Map:
 
     def draw_curves(self, axes: Axes, boundaries: xr.Dataset) -> None:
         """Draw the curves of boundaries over a panel."""
-        for _, line in boundaries.groupby("line"):
+        for number in np.unique(boundaries["line"]):
+            line = boundaries.isel(vertex=boundaries["line"].values == number)
             x, *y = (
                 line[axis.name].values * display_factor(line[axis.name])
                 for axis in (self.horizontal, self.vertical)
@@ -394,9 +396,14 @@ def _audit(ds: xr.Dataset) -> list[str]:
     """What a refined sweep says of itself, for the title."""
     if "origin" not in ds or "audit_bound" not in ds.attrs:
         return []
-    run = float((ds["origin"].values != INFERRED).mean())
-    bound = f"others: at most {100 * ds.attrs['audit_bound']:.2g} % wrong (95 % confidence)"
-    return [f"{100 * run:.3g} % of the cells run", bound if ds.attrs["audit_cells"] else "the others are not audited"]
+    run = ds["origin"].values != INFERRED
+    words = [f"{100 * run.mean():.3g} % of the cells run"]
+    if not ds.attrs["audit_cells"]:
+        return [*words, "the others are not audited"]
+    # The bound is on the whole sweep, and says nothing of a part.
+    if run.sum() != ds.attrs["cells_computed"]:
+        return words
+    return [*words, f"others: at most {percent_at_most(ds.attrs['audit_bound'])} wrong (95 % confidence)"]
 
 
 def _title(texts: list[str]) -> str:

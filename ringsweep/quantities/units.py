@@ -120,6 +120,16 @@ def _is_known(unit: str) -> bool:
     return True
 
 
+def percent_at_most(share: float) -> str:
+    """An upper bound on a share, in per cent with two digits, rounded up.
+
+    >>> percent_at_most(0.0050159), percent_at_most(0.25), percent_at_most(0.0)
+    ('0.51 %', '25 %', '0 %')
+    """
+    digits = 3 - math.floor(math.log10(share)) if share > 0.0 else 0
+    return f"{100 * math.ceil(share * 10.0 ** (digits - 2) - 1e-9) / 10.0 ** (digits - 2):.3g} %"
+
+
 def show(value: Any) -> str:
     """A value as messages quote it: one short line."""
     return "nothing" if value is None else reprlib.repr(value)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ringsweep.config import Config
 from ringsweep.config.refinement import Refinement
+from ringsweep.quantities.units import percent_at_most
 from ringsweep.quantities.variables import INFERRED, LABELS, MISSING, OUTCOMES
 from ringsweep.runs.refinement import Answer, Audit, Refined, refine
 from ringsweep.storage.chunks import Layout
@@ -163,24 +164,32 @@ def attributes(config: Refinement, refined: Refined) -> dict[str, Any]:
     """Attributes of a refined dataset: what was run, and what the audit says."""
     audit, total = refined.audit, refined.origin.size
     computed = total - int(np.count_nonzero(refined.origin == INFERRED))
-    return {
+    found = {
         "cells_computed": computed,
         "audit_cells": audit.cells,
         "audit_wrong_before": audit.wrong,
-        "audit_wrong_after": audit.wrong_after,
         "audit_corrected": audit.corrected,
         "audit_bound": audit.bound,
         "audit_seed": SEED,
         "audit": f"{computed} of {total} cells are run ({100 * computed / total:.3g} %), the others are inferred; "
-        + _in_words(audit),
+        + _in_words(audit, config),
         "refined_dimensions": json.dumps(config.dims),
     }
+    if audit.far is not None:
+        found |= {"audit_far_before": audit.far, "audit_far_bound": audit.far_bound}
+    return found
 
 
-def _in_words(audit: Audit) -> str:
+def _in_words(audit: Audit, config: Refinement) -> str:
     if not audit.cells:
         return "none of them is audited"
     words = f"{audit.cells} of the inferred cells are audited: {audit.wrong} had been inferred wrongly"
     if audit.wrong or audit.corrected:
-        words += f", {audit.corrected} were corrected in following these, {audit.wrong_after} in the last pass"
-    return f"{words}; of the cells still inferred at most {100 * audit.bound:.2g} % are wrong (at 95 % confidence)"
+        words += f", {audit.corrected} were corrected in following these"
+    words += f"; of the cells still inferred at most {percent_at_most(audit.bound)} are wrong"
+    if audit.far is not None and audit.far_bound is not None:
+        words += (
+            f"; {audit.far} audited cells had lacked {config.also}, or were off by more than {config.within:g}, "
+            f"and of those still inferred at most {percent_at_most(audit.far_bound)} do or are"
+        )
+    return f"{words} (at 95 % confidence)"

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -61,19 +61,22 @@ class Audit:
         Inferred cells that were drawn at random and computed.
     wrong : int
         How many of them had been inferred wrongly.
-    wrong_after : int
-        How many cells were found wrong in the last pass over the blocks that were reopened.
     corrected : int
         Cells inferred wrongly that were found, the drawn ones and those that following them has found.
     bound : float
         Upper bound, at 95 % confidence, on the share of wrong cells among those that are still inferred.
+    far : int, optional
+        How many of the drawn cells had a number that was missing, or further off than allowed; None without numbers.
+    far_bound : float, optional
+        Upper bound on the share of such cells among those that are still inferred.
     """
 
     cells: int
     wrong: int
-    wrong_after: int
     corrected: int
     bound: float
+    far: int | None = None
+    far_bound: float | None = None
 
 
 @dataclass(frozen=True)
@@ -179,7 +182,10 @@ class _Grid:
         if self.values is not None and self.rough is not None:
             rough = np.logical_or.reduce([self.rough[:, r][:, :, c] for r, c in corners])
             values = self._interpolated(rows, columns, row_parents, column_parents)
-            needed |= ~is_old & rough & np.isfinite(values)
+            numbers = [np.isfinite(self.values[:, r][:, :, c]) for r, c in corners]
+            # Where only some corners have a number, the place where numbers end lies between them.
+            ends = np.logical_or.reduce(numbers) & ~np.logical_and.reduce(numbers)
+            needed |= ~is_old & (ends | rough & np.isfinite(values))
             self.values, self.rough = values, np.zeros(agree.shape, dtype=bool)
         self.known = self.known[:, row_parents[0]][:, :, column_parents[0]] & is_old
         self.labels, self.level = around[0], level.astype(np.int8)
@@ -284,23 +290,28 @@ def _audited(grid: _Grid, share: float, random: np.random.Generator) -> Generato
     surprising = yield from grid.compute(sample)
     wrong = _differ(grid.labels.flat[sample], before.flat[sample])
     blocks = _Blocks(grid)
+    far = None if grid.rough is None else grid.rough.flat[sample].copy()
     found = sample[surprising]
     yield from grid.follow(grid._differing_near(found))
-    wrong_after = 0
     while len(found):
         opened = blocks.reopened(found)
         surprising = yield from grid.compute(opened)
         found = opened[surprising]
-        wrong_after = int(_differ(grid.labels.flat[found], before.flat[found]).sum())
         yield from grid.follow(grid._differing_near(found))
     followed = inferred[grid.known.flat[inferred]]
     corrected = int(_differ(grid.labels.flat[followed], before.flat[followed]).sum())
     origin = np.where(grid.known, np.int8(COMPUTED), np.int8(INFERRED))
     origin.flat[sample] = AUDITED
     left = len(inferred) - len(followed)
-    most = largest_number(len(inferred), count, int(wrong.sum()))
-    bound = max(most - corrected, 0) / left if left else 0.0
-    statement = Audit(count, int(wrong.sum()), wrong_after, corrected, bound)
+
+    def bound(drawn: int, found: int) -> float:
+        most = largest_number(len(inferred), count, drawn) - found
+        return min(max(most, 0), left) / left if left else 0.0
+
+    statement = Audit(count, int(wrong.sum()), corrected, bound(int(wrong.sum()), corrected))
+    if far is not None and grid.rough is not None:
+        all_far = bound(int(far.sum()), int(grid.rough.flat[followed].sum()))
+        statement = replace(statement, far=int(far.sum()), far_bound=all_far)
     labels = np.where(grid.labels < 0, ~grid.labels, grid.labels)
     return Refined(labels, origin, grid.level, grid.values, statement)
 

@@ -89,7 +89,8 @@ class EarlierSweep:
         """The new sweep, with the values of the earlier sweep where its own values differ by rounding only."""
         columns, sweep = dict(config.axes.columns), deepcopy(config.source.get("sweep", {}))
         for path, (dims, column) in columns.items():
-            section = next((section for section in sweep.values() if path in section), None)
+            sections = (sweep[kind] for kind in sweep if kind != "refine")
+            section = next((section for section in sections if path in section), None)
             if path == LAW or len(dims) > 1 or section is None:
                 continue
             _, known = self.axes.columns.get(path, ((), np.array(self.config.scene.values.get(path, np.nan))))

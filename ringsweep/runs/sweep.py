@@ -215,8 +215,9 @@ def compute(
     reuse: str | os.PathLike[str] | None = None,
     scheduler: str | None = None,
     progress: bool = True,
+    warn: bool = True,
 ) -> xr.Dataset:
-    """Run a validated configuration in memory; see :func:`run`."""
+    """Run a validated configuration in memory, with or without warnings about the results; see :func:`run`."""
     config, earlier = _earlier_sweep(config, reuse)
     sizes = tuple(config.axes.sizes.values())
     layout = Layout(sizes, chunk=sizes)
@@ -235,7 +236,8 @@ def compute(
             for name, column in columns.items()
         }
     )
-    warn_of_results(results, config)
+    if warn:
+        warn_of_results(results, config)
     return results
 
 

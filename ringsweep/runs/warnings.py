@@ -60,7 +60,7 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
             remedy,
         )
     if "settled" in results:
-        _warn_of_belt(results, config)
+        _warn_of_belt(results, config, count)
     failed = _share_failed(results) if any(one.own_law for one in config.scene.structures.values()) else 0.0
     if failed > 0.0:
         who = "the run has" if ended.size == 1 else f"{failed:.1%} of the runs have"
@@ -82,8 +82,11 @@ def _share_failed(results: xr.Dataset) -> float:
     return count / regime.size
 
 
-def _warn_of_belt(results: xr.Dataset, config: Config) -> None:
-    """Warn of motions on the belt that have not settled, and of bodies that have not broken loose."""
+def _warn_of_belt(results: xr.Dataset, config: Config, count: int) -> None:
+    """Warn of motions on the belt that have not settled, and of bodies that have not broken loose.
+
+    `count` is the number of cells that were run. No others have a value of `settled`.
+    """
     regime, settled, ended = (results[name].variable for name in ("regime", "settled", "t_end"))
     unsettled = riding = 0
     soonest, latest = np.inf, 0.0
@@ -98,7 +101,7 @@ def _warn_of_belt(results: xr.Dataset, config: Config) -> None:
             spans = spans[np.isfinite(spans) & (spans > ended[region].values[rides])]
             soonest, latest = min(soonest, spans.min(initial=np.inf)), max(latest, spans.max(initial=0.0))
     if unsettled:
-        who = "the motion has" if regime.size == 1 else f"{unsettled / regime.size:.1%} of the motions have"
+        who = "the motion has" if regime.size == 1 else f"{unsettled / count:.1%} of the motions have"
         logger.warning("%s not settled: a longer span may change regime, share of stick and stops", who)
     if riding:
         remedy = "what pulls them does not reach breakaway"
