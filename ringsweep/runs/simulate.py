@@ -169,4 +169,7 @@ def _describe(outcome: xr.Dataset) -> str:
             f"{regime} ({REGIMES[int(outcome['motion'])]}), {contact}, "
             f"t = {float(outcome['t_separation']):.6g} s{certificate}"
         )
-    return f"{regime}, t = {float(outcome['t_end']):.6g} s{certificate}"
+    period = ""
+    if "period" in outcome and np.isfinite(outcome["period"]):
+        period = f", period {float(outcome['period']):.6g} s"
+    return f"{regime}, t = {float(outcome['t_end']):.6g} s{period}{certificate}"
