@@ -48,6 +48,8 @@ def __getattr__(name: str) -> Any:
     if name == "plots":
         return import_module("ringsweep.plots")
     if name in _MODULES:
+        if name != "InputError":
+            import_module("ringsweep.accessor")
         return getattr(import_module(f"ringsweep.{_MODULES[name]}"), name)
     raise AttributeError(f"module 'ringsweep' has no attribute {name!r}")
 

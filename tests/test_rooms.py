@@ -20,6 +20,7 @@ ROOMS = (
     "storage",
     "runs",
     "plots",
+    "accessor",
     "cli",
 )
 

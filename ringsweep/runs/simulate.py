@@ -72,7 +72,7 @@ def simulate(
     ... }
     >>> run = ringsweep.simulate(scene)
     >>> run.attrs["outcome"]
-    'stick-slip, t = 60 s'
+    'stick-slip, t = 60 s, period 7.52342 s'
     >>> run.x.max().round(6).item()
     0.74574
     """

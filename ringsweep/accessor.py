@@ -1,0 +1,58 @@
+"""The functions that take a dataset, as ``ds.ringsweep`` of xarray.
+
+Any use of :mod:`ringsweep` registers it. Before one, for example if xarray alone opens a file, import this module.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import xarray as xr
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@xr.register_dataset_accessor("ringsweep")
+class Accessor:
+    """What ringsweep does with a dataset of a sweep.
+
+    Examples
+    --------
+    >>> import ringsweep
+    >>> from ringsweep.config import load
+    >>> scene = load("my-sweep.yaml").source["scene"]
+    >>> maps = ringsweep.sweep(scene, {"drive.amplitude": [0.1, 2.0]})
+    >>> maps.ringsweep.words().values.tolist()
+    ['oscillatory', 'separating']
+    >>> maps.ringsweep.simulate(drive_amplitude=2).attrs["outcome"].split(",")[0]
+    'separating (oscillatory)'
+    """
+
+    def __init__(self, ds: xr.Dataset):
+        self._ds = ds
+
+    def words(self, var: str = "regime") -> xr.DataArray:
+        """Names in place of the flags of a classification; see :func:`ringsweep.words`."""
+        from ringsweep.quantities.variables import words
+
+        return words(self._ds[var])
+
+    def map(self, **options: Any) -> Figure:
+        """A map; arguments as for :func:`ringsweep.plots.regime_map`."""
+        from ringsweep.plots.maps import regime_map
+
+        return regime_map(self._ds, **options)
+
+    def boundary(self, regime: str, tolerance: float = 1e-6) -> xr.Dataset:
+        """Curves around the cells of a regime; see :func:`ringsweep.boundary`."""
+        from ringsweep.runs.boundaries import boundary
+
+        return boundary(self._ds, regime, tolerance)
+
+    def simulate(self, **cell: float | str) -> xr.Dataset:
+        """Time history of the cell nearest to some values of the coordinates; see :func:`ringsweep.plots.cell`."""
+        from ringsweep.plots.selection import cell as configuration_of
+        from ringsweep.runs.simulate import simulate
+
+        return simulate(configuration_of(self._ds, cell))

@@ -1,0 +1,40 @@
+"""The functions of ringsweep as ``ds.ringsweep``: the same results as the functions."""
+
+import subprocess
+import sys
+
+import pytest
+import xarray as xr
+
+import ringsweep
+from ringsweep import plots
+
+
+@pytest.fixture(scope="module")
+def ds(scene):
+    return ringsweep.sweep(scene, {"drive.amplitude": [0.5, 2.0, 8.0], "zone.half_angle": ["5 deg", "15 deg"]})
+
+
+def test_words_and_boundary_are_those_of_the_functions(ds):
+    xr.testing.assert_identical(ds.ringsweep.words(), ringsweep.words(ds.regime))
+    xr.testing.assert_identical(ds.ringsweep.words("certified"), ringsweep.words(ds.certified))
+    xr.testing.assert_identical(
+        ds.ringsweep.boundary("separating", 1e-2), ringsweep.boundary(ds, "separating", tolerance=1e-2)
+    )
+
+
+def test_run_of_a_cell_has_the_outcome_of_that_cell(ds):
+    run = ds.ringsweep.simulate(drive_amplitude=2, zone_half_angle="15 deg")
+    here = ds.sel(drive_amplitude=2.0).isel(zone_half_angle=1)
+    assert float(run.phi_end) == float(here.phi_end)
+
+
+def test_map_has_the_title_of_the_function(ds):
+    assert (
+        ds.ringsweep.map(var="t_end").axes[-1].get_ylabel() == plots.regime_map(ds, var="t_end").axes[-1].get_ylabel()
+    )
+
+
+def test_accessor_is_there_for_a_file_that_xarray_alone_has_opened():
+    code = "import ringsweep.accessor, xarray as xr; print(xr.Dataset().ringsweep.words.__name__)"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "words"
