@@ -40,7 +40,7 @@ _RING: dict[str, Any] = {
     "gravity": GRAVITY,
 }
 
-#: A cell of the family: amplitude of the drive (rad/s), half-angle of the rough zone (rad).
+#: A cell of the family: amplitude of the drive (rad/s), half-angle of the zone (rad).
 Cell = tuple[float, float]
 
 

@@ -104,7 +104,7 @@ def families():
         drives = ("arctan", "none", "sinusoidal", "power", "constant", "table")
         table.setdefault("one contact", []).append(Kind("ring-single-contact", law, drives[i % 6], i % 2))
     for law in ("coulomb", "stiction", "tustin", "piecewise-linear", "bengisu-akay", "lugre"):
-        table.setdefault("several arcs", []).extend(Kind("ring", law, "arctan", n) for n in (2, 5))
+        table.setdefault("several zones", []).extend(Kind("ring", law, "arctan", n) for n in (2, 5))
         table.setdefault("high friction", []).append(Kind("ring", law, "arctan", 1, friction="high"))
         table.setdefault("geometry", []).append(Kind("ring", law, "arctan", 1, shape="any"))
     for law in ("stiction", "bengisu-akay"):

@@ -5,7 +5,7 @@
 
 Each row is measured under `rk4`, and under `event` or `implicit`, whichever handles its law, on one core, compiled
 before, without certificates. All rows run in turn within each round. A ratio is the median of the ratios within the
-rounds. *Idle* pairs compute the same motion twice: with a thing that has no effect (a drive of amplitude 0, an arc as
+rounds. *Idle* pairs compute the same motion twice: with a thing that has no effect (a drive of amplitude 0, a zone as
 rough as the rest), and without it. Compilation is measured in CPU seconds, which do not grow with other load on the
 machine, in a new process for each kernel.
 
@@ -83,7 +83,7 @@ class Rung(NamedTuple):
 
 
 def on_ring(law: str = "coulomb", *, contacts: int = 2, drive: Any = None, arcs: int = 0, rough: Any = None) -> Any:
-    """Scene of a ring; `rough` holds the friction coefficients of its arcs."""
+    """Scene of a ring; `rough` holds the friction coefficients of its zones."""
     pair = {"mu_s": 0.2, "mu_k": 0.1}
     rough = rough or {"mu_s": 0.3, "mu_k": 0.15}
     if "mu_s" not in coefficients_of(LAWS[law]):
@@ -128,9 +128,9 @@ LADDER: dict[str, Rung] = {
     "+ second contact": Rung(on_ring(), "one contact, Coulomb, immobile uniform ring"),
     "+ constant drive": Rung(on_ring(drive=_CONSTANT), "+ second contact"),
     "+ arctan drive in its place": Rung(on_ring(drive=_ARCTAN), "+ constant drive"),
-    "+ an arc": Rung(on_ring(drive=_ARCTAN, arcs=1), "+ arctan drive in its place"),
-    "+ two more arcs": Rung(on_ring(drive=_ARCTAN, arcs=3), "+ an arc"),
-    "+ stiction": Rung(on_ring("stiction", drive=_ARCTAN, arcs=3), "+ two more arcs"),
+    "+ a zone": Rung(on_ring(drive=_ARCTAN, arcs=1), "+ arctan drive in its place"),
+    "+ two more zones": Rung(on_ring(drive=_ARCTAN, arcs=3), "+ a zone"),
+    "+ stiction": Rung(on_ring("stiction", drive=_ARCTAN, arcs=3), "+ two more zones"),
     "+ exponential tail (tustin)": Rung(on_ring("tustin", drive=_ARCTAN, arcs=3), "+ stiction"),
     "+ stiction band (bengisu-akay)": Rung(
         on_ring("bengisu-akay", drive=_ARCTAN, arcs=3), "+ exponential tail (tustin)"
@@ -164,11 +164,11 @@ IDLE: dict[str, tuple[Rung, Rung]] = {
         Rung(on_ring(drive=_ARCTAN | {"amplitude": 0.0}), None),
         LADDER["+ second contact"],
     ),
-    "an arc like the rest": (
+    "a zone like the rest": (
         Rung(on_ring(drive=_ARCTAN, arcs=1, rough=_REST), None),
         LADDER["+ arctan drive in its place"],
     ),
-    "three arcs like the rest": (
+    "three zones like the rest": (
         Rung(on_ring(drive=_ARCTAN, arcs=3, rough=_REST), None),
         LADDER["+ arctan drive in its place"],
     ),

@@ -61,7 +61,7 @@ NODES, NODE_WEIGHTS = np.polynomial.legendre.leggauss(120)
 
 
 class Fall:
-    """Closed form of the motion under Coulomb friction with stiction, on a ring at rest with one rough arc.
+    """Closed form of the motion under Coulomb friction with stiction, on a ring at rest with one zone.
 
     Between two edges ``u = omega^2 = C e^(2 p phi) + A cos phi + B sin phi``. The reactions are linear combinations of
     u, cosine and sine.
@@ -160,7 +160,7 @@ class Fall:
 def imbalance(batch, run, coefficients):
     """Largest difference between energy and work in a history, as a share of the work.
 
-    `coefficients` are ``(mu_s, mu_k)`` of the rest of the ring and of its arcs. In stick of a set-valued law, friction
+    `coefficients` are ``(mu_s, mu_k)`` of the rest of the ring and of its zones. In stick of a set-valued law, friction
     follows from the motion of the ring.
     """
     scene = take(batch, 0)

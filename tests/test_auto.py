@@ -153,7 +153,7 @@ class TestCertificate:
 
 
 class TestSurface:
-    """Arcs at the ends of their ranges."""
+    """Zones at the ends of their ranges."""
 
     AMPLITUDES = np.array([0.2, 2.0, 5.0, -5.0])
 
@@ -360,7 +360,7 @@ class TestTime:
         assert found.certified.all()
 
     def test_drive_from_a_table_agrees_with_the_drive_that_it_samples(self, cells):
-        """They agree to the error of the spline. The scene without arcs equals the one with an arc of zero width."""
+        """They agree to the error of the spline. The scene without zones equals the one with a zone of zero width."""
         t, amplitude = np.linspace(0.0, 3.0, 1201), np.array([0.2, 2.0, 5.0, -5.0])
         table = t, t * np.arctan(t) - 0.5 * np.log1p(t * t)
         structure = Structure("ring", "stiction", "table", (), table)

@@ -76,7 +76,7 @@ class TestDips:
 
 class TestContactProblem:
     def test_stuck_body_with_one_contact_on_a_rough_arc_is_not_jammed(self, cells):
-        """Slip at mu_s of the rough arc would jam, but the body does not slip."""
+        """Slip at mu_s of the zone would jam, but the body does not slip."""
         found = solve(
             Auto(),
             cells(
@@ -134,7 +134,7 @@ class TestContactProblem:
         assert (found.regime, found.separating_contact, found.t_end) == (SEPARATING, 3, 0.0)
 
     def test_contact_on_an_edge_may_be_on_either_side_and_has_no_certificate(self, cells):
-        """Contact 1 is on the edge of an icy arc. The rest of the ring holds it, and the mirror image likewise.
+        """Contact 1 is on the edge of an icy zone. The rest of the ring holds it, and the mirror image likewise.
 
         Rounding decides which side of an edge holds a body at rest, so that there is no certificate.
         """
@@ -251,7 +251,7 @@ class TestLaw:
             assert 0.5 * (early**power + late**power) == pytest.approx(1.0 / (power + 1))
 
     def test_rk4_run_that_steps_over_a_narrow_arc_has_no_certificate(self, cells):
-        """The arc is 2e-3 rad wide and so rough that the body jams. No step of rk4 ends on it."""
+        """The zone is 2e-3 rad wide and so rough that the body jams. No step of rk4 ends on it."""
         values = {"zone.half_angle": 1e-3, "zone.center": 2.0, "initial.omega": 60.0, "time.span": 0.5}
         values |= dict(zip(COEFFICIENTS, (2.0, 2.0, 0.1, 0.1), strict=True)) | {
             "friction.v0": 0.1,

@@ -352,7 +352,7 @@ def test_settings_change_scene_and_solver_and_drop_the_sweep(write):
         ("drive.amplitud=3", "did you mean `amplitude`?"),
         ("body.mass=-1", "greater than 0"),
         ("body.mass.kg=1", "cannot be set"),
-        ("zones.3.mu_s=1", "list of arcs"),
+        ("zones.3.mu_s=1", "list of zones"),
         ("scene=1", "a section with keys"),
     ],
 )
@@ -388,9 +388,9 @@ def test_list_of_arcs_replaces_the_single_zone():
     ("changes", "path", "problem"),
     [
         ({"zones": [{"half_angle": 0.1, "mu_s": 0.5, "mu_k": 0.3}]}, "scene.zone", "beside zones"),
-        ({"zone": None, "zones": []}, "scene.zones", "list of arcs"),
+        ({"zone": None, "zones": []}, "scene.zones", "list of zones"),
         ({"zone": None, "zones": [{"mu_s": 0.5}], "friction__rough": None}, "scene.zones.0.mu_k", "missing"),
-        ({"zone": None}, "scene.friction.rough.mu_s", "no rough zone"),
+        ({"zone": None}, "scene.friction.rough.mu_s", "no zone"),
         ({"friction__rough": None}, "scene.friction.rough.mu_s", "missing"),
         ({"friction": None}, "scene.friction", "missing"),
         ({"model": None}, "scene.model", "missing: name a model"),

@@ -167,7 +167,7 @@ class TestStick:
         M, J, g, R, xi, s, c = (
             getattr(body, name) for name in ("mass", "inertia", "gravity", "radius", "xi", "sin_beta", "cos_beta")
         )
-        # Friction has the direction in which the ring turns; no contact is on an arc.
+        # Friction has the direction in which the ring turns; no contact is on a zone.
         K = 0.2 * np.sign(amplitude)
 
         def balances(unknown):

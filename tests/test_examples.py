@@ -1,8 +1,8 @@
-"""Examples in docstrings are correct, and the API reference is built from them without a warning."""
+"""Examples in docstrings are correct, and the API reference lists every public name."""
 
 import doctest
-import importlib.util
 import inspect
+import re
 from pathlib import Path
 
 import pytest
@@ -42,11 +42,8 @@ def test_public_docstrings_describe_every_parameter():
             assert parameter in (function.__doc__ or ""), f"{name}: {parameter}"
 
 
-def test_api_reference_is_built_with_every_public_name(tmp_path):
-    spec = importlib.util.spec_from_file_location("api", ROOT / "docs" / "api.py")
-    api = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(api)
-    api.build(tmp_path)
-    page = (tmp_path / "ringsweep.html").read_text()
-    for name in ringsweep.__all__:
-        assert f'id="{name}"' in page
+def test_api_reference_lists_every_public_name():
+    page = (ROOT / "docs" / "api.md").read_text()
+    for module in (ringsweep, plots):
+        for name in module.__all__:
+            assert re.search(rf"^( {{3}}|\.\. autodata:: .*\.){name}$", page, re.M), name

@@ -100,7 +100,7 @@ class TestExplore:
     def test_explore_draws_the_map_and_the_history_of_the_middle_cell(self, maps, asked):
         figure = plots.explore(maps)
         assert [axes.get_ylabel().replace("\n", " ") for axes in figure.axes[:2]] == [
-            "half-angle of the rough zone (°)",
+            "half-angle of the zone (°)",
             "angle",
         ]
         assert asked[0]["drive.amplitude"] == 2.0

@@ -414,7 +414,7 @@ RING = {
 
 
 def on_ring(friction):
-    """Two contacts on a ring with a rough arc."""
+    """Two contacts on a ring with a zone."""
     surfaces = {"rough": {"mu_s": 0.5, "mu_k": 0.3}, "rest": {"mu_s": 0.2, "mu_k": 0.1}}
     return RING | {"friction": friction | surfaces}
 

@@ -16,7 +16,7 @@ from ringsweep.errors import InputError
 from ringsweep.quantities.variables import HISTORY, OUTCOMES, REGIMES
 
 DRIVE = {"units": "rad s-1", "long_name": "amplitude of the drive"}
-ANGLE = {"units": "rad", "long_name": "half-angle of the rough arc"}
+ANGLE = {"units": "rad", "long_name": "half-angle of the zone"}
 FRICTION = {"units": "1", "long_name": "coefficient of kinetic friction"}
 
 
@@ -143,7 +143,7 @@ def test_map_axis_is_logarithmic_only_for_a_geometric_grid():
 def test_map_labels_have_names_and_units_with_angles_in_degrees():
     figure = plots.regime_map(make_sweep(), var="t_separation")
     assert figure.axes[0].get_xlabel() == "amplitude of the drive (rad s$^{-1}$)"
-    assert figure.axes[0].get_ylabel() == "half-angle of the rough arc (°)"
+    assert figure.axes[0].get_ylabel() == "half-angle of the zone (°)"
     assert figure.axes[1].get_ylabel() == "time of separation (s)"
 
 
@@ -239,7 +239,7 @@ def test_map_of_one_swept_quantity_is_a_strip_or_a_line():
 
 
 def test_quantities_that_vary_together_make_one_map_axis():
-    """Two arcs of equal, varying width: the map is that of one arc."""
+    """Two zones of equal, varying width: the map is that of one zone."""
     ds = make_sweep((12, 9)).rename(zone_half_angle="width")
     widths = {f"zones_{k}_half_angle": ("width", ds["width"].values, ANGLE) for k in range(2)}
     together = ds.drop_vars("width").assign_coords(widths)
@@ -259,14 +259,14 @@ def test_map_holds_the_nearest_value_and_names_it_in_the_title():
     figure = plots.regime_map(ds, sel={"friction.rough.mu_k": 0.32, "zone_half_angle": 0.04})
     np.testing.assert_array_equal(mesh(figure).get_array()[0], ds["regime"][:, 0, 1])
     assert "coefficient of kinetic friction = 0.3" in figure.get_suptitle()
-    assert "half-angle of the rough arc = 2°" in figure.get_suptitle()
+    assert "half-angle of the zone = 2°" in figure.get_suptitle()
 
 
 @pytest.mark.parametrize("value", ["30 deg", "0.5236", 0.5236, "0.08333 turn"])
 def test_held_value_may_have_a_unit(value):
     ds = make_sweep((12, 30))
     title = plots.regime_map(ds, sel={"zone.half_angle": value}).get_suptitle()
-    assert "half-angle of the rough arc = 30°" in title
+    assert "half-angle of the zone = 30°" in title
 
 
 @pytest.mark.parametrize(

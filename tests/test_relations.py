@@ -16,7 +16,7 @@ PLACES = ("rough", "rest")
 
 
 def draw(rng, count=COUNT, high=0.4):
-    """Random values by path: friction, a rough arc, a drive and a launch; some with very low or high friction."""
+    """Random values by path: friction, a zone, a drive and a launch; some with very low or high friction."""
     values = {
         "zone.center": rng.uniform(-np.pi, np.pi, count),
         "zone.half_angle": rng.choice([0.0, np.pi, 0.01, 1.0], count, p=[0.05, 0.05, 0.1, 0.8]),
@@ -74,7 +74,7 @@ class TestMirror:
 
     def test_mirrored_scene_gives_the_mirrored_run(self, scenes):
         values = draw(np.random.default_rng(21))
-        # One tenth of the bodies are launched with contact 2 on an edge of the arc, and not at rest.
+        # One tenth of the bodies are launched with contact 2 on an edge of the zone, and not at rest.
         edge = values["zone.center"] + values["zone.half_angle"] - np.arcsin(0.025 / 0.033378)
         on_edge = (np.arange(COUNT) % 10 == 0) & (values["initial.omega"] != 0.0)
         values["initial.phi"] = np.where(on_edge, edge, values["initial.phi"])
@@ -171,7 +171,7 @@ class TestEquivalentScenes:
 
     @staticmethod
     def with_arcs(values, arcs):
-        """Values with the rough arc replaced by other arcs, each a pair ``(center, half_angle)``."""
+        """Values with the zone replaced by other zones, each a pair ``(center, half_angle)``."""
         changed = {path: x for path, x in values.items() if not path.startswith(("zone.", "friction.rough."))}
         for k, (center, half_angle) in enumerate(arcs):
             changed |= {f"zones.{k}.center": center, f"zones.{k}.half_angle": half_angle}

@@ -17,7 +17,7 @@ from ringsweep.solvers.rk4 import RK4
 EXACT = Implicit(rtol=1e-9, certify=False)
 LIMIT = Event(rtol=1e-14, certify=False)
 
-#: A launch on a ring at rest: the body slides onto the rough arc, back, and sticks.
+#: A launch on a ring at rest: the body slides onto the zone, back, and sticks.
 LAUNCH = {
     "initial.omega": 16.0,
     "friction.rough.mu_k": 0.15,
@@ -30,7 +30,7 @@ FAST = {"initial.omega": 100.0, "friction.rough.mu_k": 0.15, "friction.rest.mu_k
 #: Stick-slip on a ring that runs up, without separation and with separation.
 DRIVEN = {"drive.amplitude": 0.2, "time.span": 10.0}
 DRIVEN_OFF = {"drive.amplitude": 10.0, "time.span": 8.0}
-#: A ring with an arc that is so rough that the body jams on it.
+#: A ring with a zone that is so rough that the body jams on it.
 ROUGH = {"friction.rough.mu_k": 1.9, "friction.rest.mu_k": 0.2, "zone.half_angle": 1.0}
 #: Stiffness of bristles that a constant step resolves, 1/m.
 MILD = 3e3

@@ -177,7 +177,7 @@ class TestPhasePortrait:
     def test_portrait_shows_the_curves_of_ring_and_body(self, run, ax):
         assert plots.phase_portrait(run, ax=ax) is ax
         lines = {line.get_label(): line for line in ax.get_legend().get_lines()}
-        assert {"speed of the ring", "slip backward", "stick", "a contact on rough arc", "start", "end"} <= set(lines)
+        assert {"speed of the ring", "slip backward", "stick", "a contact on zone", "start", "end"} <= set(lines)
         drawn = [line.get_xydata() for line in ax.lines]
         ring = np.column_stack([np.degrees(run["phi"]), run["ring_omega"]])
         assert any(len(points) == len(ring) and np.allclose(points, ring) for points in drawn)
@@ -191,7 +191,7 @@ class TestPhasePortrait:
         bands = {tuple(np.round(np.sort([p.get_x(), p.get_x() + p.get_width()]), 6)) for p in ax.patches}
         low, high = ax.get_xlim()
         for side in (-1, 1):
-            # Contact 1 is beta behind the body, so it is on the arc when the body is beta ahead.
+            # Contact 1 is beta behind the body, so it is on the zone when the body is beta ahead.
             middle = -side * np.degrees(BETA)
             images = [(middle - 15 + turn, middle + 15 + turn) for turn in (-720, -360, 0, 360)]
             seen = {(round(max(a, low), 6), round(min(b, high), 6)) for a, b in images if b > low and a < high}

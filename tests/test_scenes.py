@@ -8,7 +8,7 @@ from benchmarks import scenes
 from benchmarks.work_precision import SCENES
 from ringsweep.runs import sweep
 
-LEANEST, CUT = "one contact, Coulomb, immobile uniform ring", "+ an arc"
+LEANEST, CUT = "one contact, Coulomb, immobile uniform ring", "+ a zone"
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""Surfaces: friction coefficients by arcs, their edges and their order."""
+"""Surfaces: friction coefficients by zones, their edges and their order."""
 
 from math import floor, nextafter, pi
 
@@ -23,7 +23,7 @@ def psi(x):
 
 
 def on(arc, angle):
-    """Whether a contact at `angle` in the frame of the ring is on the arc, by the paper's half-open rule."""
+    """Whether a contact at `angle` in the frame of the ring is on the zone, by the paper's half-open rule."""
     center, half_angle = arc
     return 0.0 <= psi(angle - center + half_angle) < 2 * half_angle
 
@@ -38,7 +38,7 @@ def clear_of_edges(arcs, angle):
 
 
 def surface_with(arcs):
-    """Surface on which arc number k, counted from 1, has mu_s = k and mu_k = k / 2."""
+    """Surface on which zone number k, counted from 1, has mu_s = k and mu_k = k / 2."""
     return surface_of([Arc(*arc, float(k), 0.5 * k) for k, arc in enumerate(arcs, start=1)], *REST)
 
 

@@ -38,7 +38,7 @@ class Law(NamedTuple):
     v0: float
 
 
-#: A cell of the ring: amplitude of the drive (rad/s), half-angle of the rough zone (rad).
+#: A cell of the ring: amplitude of the drive (rad/s), half-angle of the zone (rad).
 Cell = tuple[float, float]
 
 

@@ -69,7 +69,7 @@ class Problem(NamedTuple):
 
 
 def segments(arcs, rest):
-    """Edges of the segments of the ring, and friction coefficients on each. Where arcs overlap, the later arc holds.
+    """Edges of the segments of the ring, and friction coefficients on each. Where zones overlap, the later zone holds.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from ringsweep.errors import InputError
 from ringsweep.models import batch
 from ringsweep.models.scene import LAW, Scene, Structure
 
-# Cells that are checked at once: many arcs over many points must not fill the memory.
+# Cells that are checked at once: many zones over many points must not fill the memory.
 _CELLS_AT_ONCE = 4096
 
 

@@ -60,7 +60,7 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     model = choose(MODELS, scene, "scene.model", "model")
     arcs = scene.get("zones", [])
     if not isinstance(arcs, list) or ("zones" in scene and not arcs):
-        raise InputError("scene.zones", f"a list of arcs is expected, got {show(arcs)}")
+        raise InputError("scene.zones", f"a list of zones is expected, got {show(arcs)}")
     zones = tuple(f"zones.{i}" for i in range(len(arcs)))
     friction = section_of(scene, "friction", "scene.") if "friction" in scene else {}
     own = own_laws(friction)
@@ -95,7 +95,7 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     elif "zone" in scene:
         zones = ("zone",)
     elif rough:
-        raise InputError(f"scene.{rough[0]}", "there is no rough zone: give zone, or leave friction.rough out")
+        raise InputError(f"scene.{rough[0]}", "there is no zone: give zone, or leave friction.rough out")
     table = _read_table(doc, scene["drive"], "drive") if drive == "table" else None
     force = scene.get("force")
     measured = force is not None and any(name in force for name in (*TABLES["force"], "file"))

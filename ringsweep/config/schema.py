@@ -35,10 +35,8 @@ def schema() -> dict[str, Any]:
         for law in (*MODELS[model].laws, TABLE_LAW):
             own = Table if law == TABLE_LAW else None
             for path, parameter in parameters(Structure(model, law, drive, arcs, own_law=own)).items():
-                # All arcs of a list have one description.
-                parameter = dataclasses.replace(
-                    parameter, long_name=parameter.long_name.replace("rough arc 1", "the rough arc")
-                )
+                # All zones of a list have one description.
+                parameter = dataclasses.replace(parameter, long_name=parameter.long_name.replace("zone 1", "the zone"))
                 meanings = known.setdefault(path, [])
                 if parameter not in meanings:
                     meanings.append(parameter)

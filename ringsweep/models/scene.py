@@ -30,7 +30,7 @@ class Structure:
     model, law, drive : str
         Names of the model, the friction law and the drive.
     arcs : tuple of str
-        Paths of the rough arcs: ``()``, ``("zone",)`` or ``("zones.0", "zones.1", ...)``.
+        Paths of the zones: ``()``, ``("zone",)`` or ``("zones.0", "zones.1", ...)``.
     table : tuple of ndarray, optional
         Times (s) and angles (rad) of a drive from a table, each of shape ``(samples,)``.
     own_law : type, optional

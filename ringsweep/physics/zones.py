@@ -1,7 +1,7 @@
 """Surfaces: friction coefficients as a function of the place on the ring.
 
-A surface is either uniform, or divided into segments by the edges of its rough arcs. Angles are in the frame of the
-ring, in which the arcs are fixed.
+A surface is either uniform, or divided into segments by the edges of its zones. Angles are in the frame of the
+ring, in which the zones are fixed.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from ringsweep.compile import function_from_lines, hook, inlined, specialise
 from ringsweep.numerics.functions import floor, nearest, select
 from ringsweep.quantities.parameters import Leaf, Parameter
 
-HALF_ANGLE = Parameter("rad", "half-angle of the rough zone", lower=0.0, upper=pi)
-CENTER = Parameter("rad", "centre of the rough zone in the ring's frame", lower=-2 * pi, upper=2 * pi, default=0.0)
+HALF_ANGLE = Parameter("rad", "half-angle of the zone", lower=0.0, upper=pi)
+CENTER = Parameter("rad", "centre of the zone in the ring's frame", lower=-2 * pi, upper=2 * pi, default=0.0)
 
 #: Turns in a radian.
 PER_TURN = 0.5 / pi
 
-# Two arcs that touch, or the ends of an arc of a full turn, may leave a segment of this width by rounding, rad. With
+# Two zones that touch, or the ends of a zone of a full turn, may leave a segment of this width by rounding, rad. With
 # coefficients of its own it could jam or lift a body at an edge that does not exist.
 _NEGLIGIBLE_WIDTH = 1e-14
 
@@ -48,7 +48,7 @@ class Segments(NamedTuple):
     mu_s, mu_k : ndarray or tuple
         Static and kinetic friction coefficient, 1.
     arc : ndarray or tuple
-        Number of the rough arc, counted from 1; 0 outside the arcs.
+        Number of the zone, counted from 1; 0 outside the zones.
     roughest : tuple of float
         Largest static and least kinetic coefficient, 1.
     narrowest : float
@@ -64,7 +64,7 @@ class Segments(NamedTuple):
 
 
 class Arc(NamedTuple):
-    """Rough arc as in the configuration: centre and half-angle, rad; friction coefficients, 1."""
+    """Zone as in the configuration: centre and half-angle, rad; friction coefficients, 1."""
 
     center: Annotated[Any, CENTER]
     half_angle: Annotated[Any, HALF_ANGLE]
@@ -80,19 +80,19 @@ def wrap(x):
 
 
 def surface_of(arcs: list[Arc], mu_s: Any, mu_k: Any) -> Uniform | Segments:
-    """Surface of a ring with rough arcs. Where arcs overlap, the later one in the list holds.
+    """Surface of a ring with zones. Where zones overlap, the later one in the list holds.
 
     Parameters
     ----------
     arcs : list of Arc
-        Rough arcs. Each field is a float or an array of shape ``(cells,)``.
+        Zones. Each field is a float or an array of shape ``(cells,)``.
     mu_s, mu_k : float or ndarray of shape ``(cells,)``
-        Static and kinetic friction coefficient outside the arcs, 1.
+        Static and kinetic friction coefficient outside the zones, 1.
 
     Returns
     -------
     Uniform or Segments
-        Arrays of shape ``(cells,)`` and ``(cells, segments)``; each arc gives two segments.
+        Arrays of shape ``(cells,)`` and ``(cells, segments)``; each zone gives two segments.
     """
     if not arcs:
         return Uniform(mu_s, mu_k)
@@ -144,7 +144,7 @@ def _segments_segment(surface, angle):
 
 @hook
 def coefficients(surface, segment):
-    """Friction coefficients and rough arc of a segment.
+    """Friction coefficients and zone of a segment.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def coefficients(surface, segment):
     Returns
     -------
     tuple of float
-        Static and kinetic coefficient, 1; number of the rough arc, 0 for none.
+        Static and kinetic coefficient, 1; number of the zone, 0 for none.
     """
 
 

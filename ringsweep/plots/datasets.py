@@ -125,7 +125,7 @@ def panels_of(ds: xr.Dataset) -> list[tuple[str, ...]]:
 
 
 def zones(ds: xr.Dataset) -> list[str]:
-    """Variables that say which arc lies under each contact; a history of several laws has no such strip."""
+    """Variables that say which zone lies under each contact; a history of several laws has no such strip."""
     return [] if compares_laws(ds) else present(ds, ("zone_1", "zone_2"))
 
 

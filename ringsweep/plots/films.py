@@ -43,7 +43,7 @@ _SIZE, _DPI = (10.8, 5.4), 100
 def animation(ds: xr.Dataset, *, fps: float = 25.0, duration: float = 10.0) -> FuncAnimation:
     """Animate the body beside its history.
 
-    In a ring the body is shown with rough arcs and forces, on a belt with the friction force and the phase portrait.
+    In a ring the body is shown with zones and forces, on a belt with the friction force and the phase portrait.
     Frames are at equal times from the start to the end of the run. In a notebook
     ``IPython.display.HTML(animation(ds).to_jshtml())`` shows the animation. To write a file,
     :func:`save_animation` is faster.

@@ -76,7 +76,7 @@ def history(ds: xr.Dataset) -> Figure:
     """Draw the time history of one run, or of a run under each of several friction laws.
 
     The panels are those of the paper. For a ring they show angle, angular velocity, angular acceleration and normal
-    reactions; a strip below shows which arc lies under each contact. For a belt they show displacement, velocity and
+    reactions; a strip below shows which zone lies under each contact. For a belt they show displacement, velocity and
     friction force. Times at which the body sticks are shaded. If the law has bristles and the body breaks away, a last
     panel shows the friction force around the first break-away.
 
@@ -327,7 +327,7 @@ def _draw_breakaway(axes: Axes, ds: xr.Dataset, first: NDArray[Any], window: flo
 
 
 def _draw_zones(axes: Axes, ds: xr.Dataset, names: list[str]) -> None:
-    """Draw the strip that shows which arc lies under each contact."""
+    """Draw the strip that shows which zone lies under each contact."""
     at = _by_interval(ds["time"].values, ds[names[0]].values)[0]
     strip = np.array([_by_interval(ds["time"].values, ds[name].values)[1] for name in names])
     arcs = int(max(1, strip.max()))

@@ -51,7 +51,7 @@ def long_name(data: xr.DataArray) -> str:
 def axis_label(data: xr.DataArray, ds: xr.Dataset, angle: str = "rad") -> str:
     """Name of a quantity with its unit; `angle` stands for the radian."""
     name = long_name(data)
-    # Coefficients of two arcs, for example, have the same long name.
+    # Coefficients of two zones, for example, have the same long name.
     if sum(long_name(other) == name for other in ds.coords.values()) > 1:
         name = f"{name}, {data.name}"
     unit = unit_text(data, angle)

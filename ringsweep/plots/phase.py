@@ -44,8 +44,8 @@ def phase_portrait(ds: xr.Dataset, frame: Literal["space", "ring"] = "space", ax
     """Draw velocity over place, with stick, slip, and the speed of the ring or belt.
 
     For a ring, in space, the angular velocity of the ring is a curve of its own, which the body follows while it
-    sticks. A broad line lies under the curve of the body while a contact is on a rough arc. In the frame of the ring
-    the arcs are fixed: a band shows where a contact is on an arc. There the body sticks at zero velocity. Angles of
+    sticks. A broad line lies under the curve of the body while a contact is on a zone. In the frame of the ring
+    the zones are fixed: a band shows where a contact is on a zone. There the body sticks at zero velocity. Angles of
     more than two turns are shown modulo a full turn.
 
     For a belt the velocity is drawn over the displacement. While the body sticks, its curve lies on that of the belt.
@@ -197,7 +197,7 @@ def _segments(kept: NDArray[Any], angle: NDArray[Any], speed: NDArray[Any]) -> t
 
 
 def _draw_bands(ax: Axes, rig: Rig, angle: NDArray[Any], wrapped: bool) -> list[Artist]:
-    """Draw bands where a contact is on a rough arc, in all turns shown; returns their legend entries."""
+    """Draw bands where a contact is on a zone, in all turns shown; returns their legend entries."""
     low, high = (-180.0, 180.0) if wrapped else (float(angle.min()), float(angle.max()))
     margin = 0.0 if wrapped else 0.05 * (high - low) or 5.0
     low, high = low - margin, high + margin
@@ -231,7 +231,7 @@ def _every_turn(left: float, right: float, low: float, high: float) -> Iterator[
 def _draw_broad_lines(
     ax: Axes, run: xr.Dataset, angle: NDArray[Any], speed: NDArray[Any], wrapped: bool
 ) -> list[Artist]:
-    """Draw a broad line under the curve where a contact is on a rough arc; returns the legend entries."""
+    """Draw a broad line under the curve where a contact is on a zone; returns the legend entries."""
     arcs = np.array([run[name].values for name in zones(run)])
     entries: list[Artist] = []
     for number, name in enumerate(arc_names(int(arcs.max())), start=1):

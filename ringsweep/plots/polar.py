@@ -88,8 +88,8 @@ class RingArtists:
         self.reference = reference_force([run[f"normal_{k}"].values for k in rig.contacts], self.weight or 1.0)
         # Length of an arrow, m/N.
         self.scale = 0.75 * rig.radius / self.reference
-        # Friction forces are small beside reactions, so a round factor magnifies them. Their peaks on a narrow rough
-        # arc are no outliers: they must be shown.
+        # Friction forces are small beside reactions, so a round factor magnifies them. Their peaks on a narrow
+        # zone are no outliers: they must be shown.
         friction = reference_force([np.abs(run[f"friction_{k}"].values) for k in rig.contacts], 0.0, outlier=6.0)
         self.magnification = max(1.0, float(f"{1.5 * self.reference / friction:.0e}")) if friction else 1.0
 

@@ -32,7 +32,7 @@ class Rig:
     contacts : tuple of int
         ``(1,)`` or ``(1, 2)``.
     arcs : tuple of (float, float)
-        Centre and half-angle of each rough arc in the frame of the ring, rad. Where arcs overlap, the later one holds.
+        Centre and half-angle of each zone in the frame of the ring, rad. Where zones overlap, the later one holds.
     """
 
     body: Any

@@ -9,8 +9,8 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-# The colours of Okabe and Ito, which colour-blind readers tell apart. Their lightness is changed so that the regimes
-# of one model differ in greyscale too.
+#: The colour of each regime in every picture. These are the colours of Okabe and Ito, which colour-blind readers tell
+#: apart. Their lightness is changed so that the regimes of one model differ in greyscale too.
 REGIME_COLOURS: dict[str, str] = {
     "resting": "#F0E442",
     "oscillatory": "#84CAF2",
@@ -32,7 +32,7 @@ CURVE_STYLES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (8, 3)))
 #: Cells without a value.
 NO_VALUE = "#DDDDDD"
 
-#: Classes that are not regimes, and rough arcs.
+#: Classes that are not regimes, and zones.
 CLASS_COLOURS = ("#BBBBBB", "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#F0E442")
 
 #: The body and the ring, or contact 1 and contact 2.
@@ -42,7 +42,7 @@ PAIR_STYLES = ("-", "--")
 #: Shading of times at which the body sticks.
 STICK = "#E6E6E6"
 
-#: Surface of the ring outside the rough arcs.
+#: Surface of the ring outside the zones.
 REST = "#F2F2F2"
 
 #: Font size of legends and of titles above panels, points.
@@ -50,13 +50,13 @@ SMALL = 8
 
 
 def arc_colour(number: int) -> str:
-    """Colour of a rough arc in every picture; `number` counts from 1."""
+    """Colour of a zone in every picture; `number` counts from 1."""
     return CLASS_COLOURS[2 + (number - 1) % (len(CLASS_COLOURS) - 2)]
 
 
 def arc_names(count: int) -> list[str]:
-    """Names of `count` rough arcs in a legend."""
-    return ["rough arc"] if count == 1 else [f"rough arc {k + 1}" for k in range(count)]
+    """Names of `count` zones in a legend."""
+    return ["zone"] if count == 1 else [f"zone {k + 1}" for k in range(count)]
 
 
 def axes_or_current(ax: Axes | None, size: tuple[float, float]) -> Axes:

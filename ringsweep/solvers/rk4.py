@@ -1,7 +1,7 @@
 """Runge-Kutta 4 with a constant step, the method of the paper, over a batch of cells.
 
-The method does not locate events. It steps across an arc edge, a reversal or the stiction band as if the equations were
-smooth. ``stiffness`` shows which runs exceed the limit of stability.
+The method does not locate events. It steps across the edge of a zone, a reversal or the stiction band as if the
+equations were smooth. ``stiffness`` shows which runs exceed the limit of stability.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ class RK4(Method):
                 )
                 # A reaction may vanish between two steps.
                 contacts_held = (half_report[:, 2] > 0.0) | (half_rows[:, outcomes.index("regime")] == SEPARATING)
-                # A narrow arc may lie between two steps.
+                # A narrow zone may lie between two steps.
                 trusted = (
                     contacts_held & (half_report[:, 1] <= STABILITY_LIMIT) & (half_report[:, 4] <= _MOST_ARC_SHARE)
                 )
@@ -147,15 +147,15 @@ LIVE, FINISHED, ENDING, CHECKED = 1.0, 0.0, 2.0, -1.0
 
 
 class Diagnosed(NamedTuple):
-    """Stiffness, least margin and largest share of an arc are recorded for each run."""
+    """Stiffness, least margin and largest share of a zone are recorded for each run."""
 
 
 class NotDiagnosed(NamedTuple):
-    """Stiffness, least margin and largest share of an arc are not recorded."""
+    """Stiffness, least margin and largest share of a zone are not recorded."""
 
 
 class Diagnosis(NamedTuple):
-    """Largest eigenvalue, 1/s, least margin of the guards, and largest share of an arc in a step, over a run."""
+    """Largest eigenvalue, 1/s, least margin of the guards, and largest share of a zone in a step, over a run."""
 
     eigenvalue: Any
     margin: Any
@@ -363,7 +363,7 @@ def integrate(
         Filled, for these cells, with outcomes.
     report : ndarray of shape ``(cells of the batch, 5)``
         Filled, for these cells, with the number of steps, the largest stiffness, the least margin, the rate at which
-        the guard that ended the run fell, and the largest share of an arc.
+        the guard that ended the run fell, and the largest share of a zone.
     """
     h = float(batch.batch.span[cells[0]]) / steps
     table = np.empty((2 * min(_BLOCK, steps) + 1, len(table_row(drive, 0.0))))

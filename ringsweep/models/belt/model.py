@@ -74,7 +74,7 @@ class Belt(Model):
     def build(self, structure: Structure, values: Values) -> belt.Belt | belt.BristleBelt:
         """Cells that kernels run over; see :meth:`ringsweep.models.model.Model.build`."""
         if structure.arcs:
-            raise InputError(f"scene.{structure.arcs[0]}", "a belt has no rough zones")
+            raise InputError(f"scene.{structure.arcs[0]}", "a belt has no zones")
         law = structure.law_type
         mu_s, mu_k = friction_coefficients(structure, "friction", values)
         drive = self._drive(structure, values)

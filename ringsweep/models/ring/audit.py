@@ -26,7 +26,7 @@ from ringsweep.quantities.variables import SEPARATING
 # Rounding of an acceleration, as a share of its largest terms.
 _ROUNDING = 1e-12
 
-# Distance from the edge of an arc within which a contact counts as on the edge, where both sides are right, rad.
+# Distance from the edge of a zone within which a contact counts as on the edge, where both sides are right, rad.
 _ON_EDGE = 1e-8
 
 

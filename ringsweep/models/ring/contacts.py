@@ -60,7 +60,7 @@ def coefficients_at(scene, rho):
 
 @inlined
 def zones_under(scene, mode):
-    """Number of the rough arc under each contact (0: none), in the segments of a mode."""
+    """Number of the zone under each contact (0: none), in the segments of a mode."""
     _, _, zone_1 = coefficients(scene.surface, mode.place_1[0])
     _, _, zone_2 = coefficients(scene.surface, mode.place_2[0])
     return zone_1, zone_2
@@ -68,7 +68,7 @@ def zones_under(scene, mode):
 
 @inlined
 def zones_at(scene, rho):
-    """Number of the rough arc under each contact (0: none), at the angle `rho` in the ring's frame, rad."""
+    """Number of the zone under each contact (0: none), at the angle `rho` in the ring's frame, rad."""
     offset = ring.contact_offset(scene.body)
     _, _, zone_1 = coefficients(scene.surface, segment(scene.surface, rho - offset))
     _, _, zone_2 = coefficients(scene.surface, segment(scene.surface, rho + offset))

@@ -65,17 +65,17 @@ class SingleContactRing(Model):
         found = dict(self.body)
         places = {"friction.rest": "the rest of the ring"}
         if structure.arcs == ("zone",):
-            places["friction.rough"] = "the rough zone"
+            places["friction.rough"] = "the zone"
         else:
-            places |= {arc: f"rough arc {number}" for number, arc in enumerate(structure.arcs, start=1)}
+            places |= {arc: f"zone {number}" for number, arc in enumerate(structure.arcs, start=1)}
         for place, where in places.items():
             for name, p in friction.coefficients_of(law).items():
                 found[f"{place}.{name}"] = replace(p, long_name=f"{p.long_name} of {where}")
         found |= {f"friction.{name}": p for name, p in declared(law).items()}
         for arc in structure.arcs:
             for name, p in declared(zones.Arc).items():
-                whose = places.get(arc, "the rough zone")
-                found[f"{arc}.{name}"] = replace(p, long_name=p.long_name.replace("the rough zone", whose))
+                whose = places.get(arc, "the zone")
+                found[f"{arc}.{name}"] = replace(p, long_name=p.long_name.replace("the zone", whose))
         found |= {f"drive.{name}": p for name, p in declared(drives.DRIVES[structure.drive]).items()}
         return found | {
             "initial.phi": Parameter("rad", "angle of the body at launch", default=0.0),

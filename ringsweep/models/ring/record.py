@@ -146,7 +146,7 @@ def conclude(record, status, t, phi, omega):
         r.reversals,
         float(turns),
         r.stick_time,
-        # The last step ends after the reaction has vanished, and a reaction may jump below zero at an arc edge.
+        # The last step ends after the reaction has vanished, and a reaction may jump below zero at the edge of a zone.
         0.0 if status in (SEPARATED_1, SEPARATED_BOTH) else max(r.normal_min_1, 0.0),
         0.0 if status in (SEPARATED_2, SEPARATED_BOTH) else max(r.normal_min_2, 0.0),
     )

@@ -1,0 +1,37 @@
+"""Extension of Sphinx: figures for the gallery, and what must be there before a build."""
+
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+from sphinx_gallery.scrapers import figure_rst
+
+import ringsweep
+from ringsweep import cli
+
+GALLERY = Path(__file__).parent / "gallery"
+
+
+def collect_figures(block: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any]) -> str:
+    """Save the figures and films that a block of a gallery script made; `ringsweep.plots` makes them without pyplot."""
+    names, paths = block_vars["example_globals"], []
+    for name in [name for name, value in names.items() if isinstance(value, Figure)]:
+        paths.append(next(block_vars["image_path_iterator"]))
+        # A figure is shown once, after the block that made it.
+        names.pop(name).savefig(paths[-1], dpi=140)
+    for film in GALLERY.glob("*.gif"):
+        paths.append(str(Path(next(block_vars["image_path_iterator"])).with_suffix(".gif")))
+        film.rename(paths[-1])
+    return figure_rst(paths, gallery_conf["src_dir"])
+
+
+def setup(app: Any) -> dict[str, Any]:
+    """Write the files that the gallery reads, and import all public names."""
+    for model, name in (("ring", "my-sweep.yaml"), ("belt", "belt.yaml")):
+        if not (path := GALLERY / name).exists():
+            cli.main(["init", "-q", "--model", model, str(path)])
+    for module in (ringsweep, ringsweep.plots):
+        for name in module.__all__:
+            # They are imported on first access, and autosummary looks into the module before.
+            setattr(module, name, getattr(module, name))
+    return {"parallel_read_safe": True}
