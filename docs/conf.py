@@ -23,7 +23,6 @@ extensions = [
     "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
     "sphinx-mathjax-offline",
-    "sphinx_argparse_cli",
     "sphinx_copybutton",
     "sphinx_gallery.gen_gallery",
 ]
@@ -57,6 +56,8 @@ sphinx_gallery_conf = {
 # All pages stand in one table of contents, which is always in view. Nothing is loaded from elsewhere.
 html_theme = "furo"
 html_title = f"ringsweep {release}"
+html_static_path = ["static"]
+html_css_files = ["site.css"]
 html_extra_path = ["root/index.html"]
 html_copy_source = False
 html_show_sphinx = False

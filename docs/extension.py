@@ -1,15 +1,33 @@
-"""Extension of Sphinx: figures for the gallery, and what must be there before a build."""
+"""Extension of Sphinx: help of the commands, figures for the gallery, and what must be there before a build."""
 
+import os
 from pathlib import Path
 from typing import Any
 
+from docutils import nodes
 from matplotlib.figure import Figure
+from sphinx.util.docutils import SphinxDirective
 from sphinx_gallery.scrapers import figure_rst
 
 import ringsweep
 from ringsweep import cli
+from ringsweep.cli.parser import build_parser
 
 GALLERY = Path(__file__).parent / "gallery"
+
+
+class CommandHelp(SphinxDirective):
+    """The help of every command, each in a section of its own."""
+
+    def run(self) -> list[Any]:
+        os.environ["COLUMNS"] = "100"
+        (commands,) = (action for action in build_parser()._actions if isinstance(action.choices, dict))
+        found = []
+        for name, parser in commands.choices.items():
+            section = nodes.section(ids=[name])
+            section += [nodes.title(text=name), nodes.literal_block(text=parser.format_help(), language="none")]
+            found.append(section)
+        return found
 
 
 def collect_figures(block: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any]) -> str:
@@ -26,7 +44,8 @@ def collect_figures(block: Any, block_vars: dict[str, Any], gallery_conf: dict[s
 
 
 def setup(app: Any) -> dict[str, Any]:
-    """Write the files that the gallery reads, and import all public names."""
+    """Add the directive, write the files that the gallery reads, and import all public names."""
+    app.add_directive("command-help", CommandHelp)
     for model, name in (("ring", "my-sweep.yaml"), ("belt", "belt.yaml")):
         if not (path := GALLERY / name).exists():
             cli.main(["init", "-q", "--model", model, str(path)])
