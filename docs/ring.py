@@ -1,4 +1,4 @@
-"""Draw the picture of docs/scenes.md, one instant of the run in the README: `python docs/ring.py [FILE]`."""
+"""Draw the picture of docs/physics.md, one instant of the run in the README: `python docs/ring.py [FILE]`."""
 
 import sys
 from math import degrees
