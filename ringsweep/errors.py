@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 
+def shortened(text: str, most: int) -> str:
+    """A text as messages hold it: of a long one the start and the length."""
+    return text if len(text) <= most else f"{text[:most]}... ({len(text)} characters)"
+
+
 class InputError(ValueError):
     """Something in the input is wrong: it says where, what, and what is allowed.
 
@@ -35,5 +40,6 @@ class InputError(ValueError):
     def __str__(self) -> str:
         location = ""
         if self.file is not None:
-            location = f"{self.file}, line {self.line}: " if self.line is not None else f"{self.file}: "
-        return f"{location}{self.path}: {self.problem}" if self.path else f"{location}{self.problem}"
+            location = shortened(self.file, 300) + (f", line {self.line}: " if self.line is not None else ": ")
+        problem = shortened(self.problem, 1200)
+        return f"{location}{shortened(self.path, 200)}: {problem}" if self.path else f"{location}{problem}"

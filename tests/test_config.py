@@ -5,8 +5,10 @@ import copy
 import json
 import logging
 import math
+import os
 from itertools import pairwise
 from pathlib import Path
+from threading import Thread
 
 import numpy as np
 import pint
@@ -324,6 +326,83 @@ def test_text_that_is_no_configuration_is_refused(tmp_path, content, problem):
     assert problem in error.problem
 
 
+@pytest.mark.parametrize("kind", ["pipe", "device", "folder", "endless"])
+@pytest.mark.parametrize("table", [False, True])
+def test_only_regular_files_of_a_bounded_size_are_read(tmp_path, kind, table):
+    """Reading a pipe would never end, and reading a device would fill the memory."""
+    file = tmp_path / "given"
+    if kind == "pipe":
+        os.mkfifo(file)
+    elif kind == "folder":
+        file.mkdir()
+    elif kind == "endless":
+        # It has holes in place of bytes.
+        file.touch()
+        os.truncate(file, 10**12)
+    else:
+        file = Path("/dev/zero")
+    config = {"scene": edited(drive={"law": "table", "file": str(file)})} if table else file
+    refused = []
+    reader = Thread(target=lambda: refused.append(refusal(load, config)), daemon=True)
+    reader.start()
+    reader.join(60.0)
+    (error,) = refused
+    assert "cannot be read: " + ("it is larger than " if kind == "endless" else "a folder, a pipe or a device") in (
+        error.problem
+    )
+
+
+class TestLimits:
+    def test_shared_lists_count_as_often_as_they_occur(self):
+        shared = [0.0] * 1000
+        for _ in range(2):
+            shared = [shared] * 1000
+        for section in (shared, {"a": tuple(shared)}, range(10**9), range(10**30), np.broadcast_to(1.0, 10**9)):
+            assert "more than 1000000 values" in refusal(load, {"scene": section}).problem
+
+    def test_list_within_itself_is_refused(self):
+        inner = []
+        inner.append(inner)
+        assert "nested too deeply" in refusal(load, {"scene": inner}).problem
+
+    def test_axis_whose_ends_are_too_far_apart_is_refused_with_its_line(self, write):
+        error = refusal(load, write(TEXT.replace("geomspace: [0.1, 10, 5]", "linspace: [-1.7e308, 1.7e308, 3]")))
+        assert (error.path, error.line) == ("sweep.grid.drive.amplitude.linspace", 20)
+        assert "too far apart" in error.problem
+
+    def test_integer_of_thousands_of_digits_is_refused_with_its_path(self, write):
+        digits = "1" * 5000
+        error = refusal(load, write(TEXT.replace("amplitude: 2.0", f"amplitude: {digits}")))
+        assert (error.path, error.line) == ("scene.drive.amplitude", 15)
+        assert refusal(load, {"scene": edited(drive__amplitude=10**5000)}).path == "scene.drive.amplitude"
+        for setting in (f"drive.amplitude={digits}", f"zones.{digits}.center=1", f"{digits}=1"):
+            assert len(str(refusal(with_values, {"scene": SCENE}, [setting]))) < 2000
+
+    @pytest.mark.parametrize(
+        "wrong",
+        ["x" * 10**5, 10**5000, [[[["x" * 90] * 9] * 9] * 9] * 9, {"x" * 10**5: 1}, {"a": {"b": "y" * 10**5}}],
+        ids=["text", "integer", "lists", "key", "mapping"],
+    )
+    def test_no_message_about_a_long_value_is_long(self, wrong):
+        for scene in (
+            edited(drive__amplitude=wrong),
+            edited(drive=wrong),
+            edited(friction__law=wrong),
+            edited(friction={"law": "formula", "mu": wrong}),
+            edited(friction={"law": wrong, "laws": wrong}),
+            edited(zones=wrong),
+            edited(model=wrong),
+            edited(drive={"law": "table", "file": wrong}),
+        ):
+            assert len(str(refusal(load, {"scene": scene}))) < 2000
+            assert len(str(refusal(load, {"scene": SCENE, "solver": wrong, "sweep": wrong}))) < 2000
+
+    def test_message_about_a_long_text_tells_its_start_and_its_length(self):
+        error = refusal(load, {"scene": edited(drive__amplitude="two" * 1000)})
+        assert "'twotwotwo" in error.problem
+        assert "(3000 characters)" in error.problem
+
+
 @pytest.mark.parametrize("name", ["nowhere.yaml", ".", "nul\0.yaml"])
 def test_file_that_cannot_be_read_is_refused(tmp_path, name):
     assert "cannot be read" in refusal(load, f"{tmp_path}/{name}").problem
@@ -532,6 +611,11 @@ def test_sequences_make_grid_axes_and_dataarrays_share_dimensions():
         ),
         ({"friction.rough.mu_k": [0.1, 0.7]}, "exceeds mu_s"),
         ({3: [1]}, "no such number"),
+        ({"drive.amplitude": range(10**9)}, "more than 1000000 values"),
+        ({"drive.amplitude": range(10**30)}, "more than 1000000 values"),
+        ({"drive.amplitude": np.broadcast_to(1.0, 10**9)}, "more than 1000000 values"),
+        ({"drive.amplitude": xr.DataArray(np.broadcast_to(1.0, 10**9), dims="p")}, "more than 100000000 values"),
+        ({"drive.amplitude": [10**5000]}, "an integer of more than 100 digits is not finite"),
     ],
 )
 def test_wrong_axes_are_refused(axes, problem):

@@ -308,6 +308,18 @@ class TestUnits:
     def test_unknown_parameter_is_refused_with_a_suggestion(self):
         assert "did you mean `delta`?" in refused(LEINE | {"detla": 3})
 
+    def test_unknown_key_is_compared_with_the_keys_of_this_law(self):
+        message = refused(LEINE | {"extra": 3})
+        assert "(known: law, laws, mu, at_rest, mu_s, delta, viscous)" in message
+
+    def test_parameter_that_differs_from_a_name_of_the_formula_in_its_capital_is_questioned(self):
+        message = refused(formula("mu_s/(1 + V/w)", w="1 m/s"))
+        assert message.startswith("scene.friction.V: missing")
+        assert "did you mean `v` in the formula, the sliding speed?" in message
+
+    def test_formula_without_a_coefficient_of_the_surface_is_refused_with_an_example(self):
+        assert "Multiply the formula by one of them" in refused(formula("0.3*exp(-v/w)", w=1.0))
+
 
 # ---- values and regions -----------------------------------------------------------------------
 
@@ -317,6 +329,11 @@ class TestRest:
         message = refused(formula("mu_s/(1 + delta*v)", None, delta=3.0))
         assert "without at_rest friction must vanish at v = 0, where it is 0.4: give `at_rest: mu_s`" in message
 
+    def test_missing_at_rest_is_named_at_its_place(self):
+        assert refused(formula("mu_s/(1 + delta*v)", None, delta=3.0)).startswith("scene.friction.at_rest: ")
+        own = {"law": "mine", "laws": {"mine": {"mu": "mu_s/(1 + delta*v)"}}, "mu_s": 0.4, "delta": 3.0}
+        assert refused(own).startswith("scene.friction.laws.mine.at_rest: ")
+
     def test_law_that_breaks_away_with_more_than_it_holds_is_refused(self):
         assert "begins to slip with friction 0.8, more than the 0.4" in refused(formula("2*mu_s"))
 
@@ -325,7 +342,8 @@ class TestRest:
 
     @pytest.mark.parametrize("at_rest", ["alpha", 0.4, True, ["mu_s"]])
     def test_at_rest_can_only_be_a_coefficient_of_the_surface(self, at_rest):
-        assert refused(formula("mu_s", at_rest)).startswith("scene.friction.at_rest: ")
+        message = f"scene.friction.at_rest: {at_rest!r}: at_rest can only be mu_s or mu_k"
+        assert refused(formula("mu_s", at_rest)).startswith(message)
 
     @pytest.mark.parametrize("text", ["mu_k*sqrt(v/w)", "mu_k*(v/w)**p", "mu_k*(v/w)**1.5"])
     def test_root_of_the_speed_at_rest_is_refused(self, text):
@@ -650,7 +668,7 @@ class TestTable:
         [
             ({"law": "table"}, "scene.friction.v: missing: a table needs a file, or the lists v and mu"),
             (table([0, 1], [0.4]), "scene.friction.mu: 1 coefficients for 2 speeds"),
-            (table([0], [0.4]), "scene.friction.v: one point is too few"),
+            (table([0], [0.4]), "scene.friction.v: 1 rows are too few"),
             (table([0, 1, 1], [0.4, 0.3, 0.2]), "scene.friction.v.2: 1 m/s does not come after 1 m/s"),
             (table([0.1, 1], [0.4, 0.3]), "scene.friction.v.0: the table begins at 0.1 m/s"),
             (table([0, 1], [0.4, -0.3]), "scene.friction.mu.1: "),
@@ -668,12 +686,14 @@ class TestTable:
     @pytest.mark.parametrize(
         ("text", "problem"),
         [
-            ("v;mu\n0;0.4\n1;0.3\n", "columns v, mu are expected, separated by commas"),
+            ("v;mu\n0;0.4\n1;0.3\n", "the columns are separated by ';': separate them by commas"),
             ("v,mu\n0,0.4\n1,x\n", "mu_v.csv"),
             ("v,mu\n0,0.4\n1\n", "mu_v.csv"),
             ("v,mu\n", "mu_v.csv"),
             ("", "mu_v.csv"),
+            ("v (m/s)\tmu\n0\t0.4\n1\t0.3\n", "the columns are separated by '\\t'"),
             ("0,0.4\n1,0.3\n", "columns v, mu are expected"),
+            ("V,mu,extra\n0,0.4,1\n1,0.3,1\n", "got V, mu, extra; did you mean `v` by V?"),
         ],
     )
     def test_wrong_file_of_a_table_is_refused(self, tmp_path, text, problem):

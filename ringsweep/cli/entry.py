@@ -11,7 +11,7 @@ from contextlib import nullcontext, redirect_stdout
 from typing import Any
 
 from ringsweep.cli.parser import build_parser
-from ringsweep.errors import InputError
+from ringsweep.errors import InputError, shortened
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -56,7 +56,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except Exception as error:
         if arguments.verbose:
             traceback.print_exception(error)
-        return _fail(f"{type(error).__name__}: {error}", 1, error)
+        return _fail(shortened(f"{type(error).__name__}: {error}", 1500), 1, error)
     return 0
 
 

@@ -7,7 +7,7 @@ import math
 import shutil
 from contextlib import suppress
 from textwrap import dedent, indent
-from typing import Any
+from typing import Any, NoReturn
 
 from ringsweep.cli.commands import (
     animate_command,
@@ -20,11 +20,12 @@ from ringsweep.cli.commands import (
     schema_command,
     simulate_command,
 )
+from ringsweep.errors import shortened
 
 
 def build_parser() -> argparse.ArgumentParser:
     """Parser of all commands; the parsed arguments have the function of the command as ``command``."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="ringsweep",
         description="Regime maps of dry-friction systems whose friction coefficient jumps.",
         epilog="ringsweep COMMAND --help tells more, with examples.",
@@ -197,6 +198,14 @@ def _add_settings(parser: argparse.ArgumentParser) -> None:
     )
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser whose messages quote only the start of a long argument."""
+
+    def error(self, message: str) -> NoReturn:
+        """End the process with a message."""
+        super().error(shortened(message, 1000))
+
+
 class _Version(argparse.Action):
     """Prints the version, which is looked up only then."""
 
@@ -211,7 +220,7 @@ class _Version(argparse.Action):
 
 def whole_number(text: str) -> int:
     """A whole number of at least 1, from an argument."""
-    if not text.isdecimal() or int(text) < 1:
+    if not text.isdecimal() or len(text) > 18 or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least 1")
     return int(text)
 

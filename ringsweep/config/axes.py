@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.config.scene import sweepable
-from ringsweep.config.sections import read_values, section_of, suggestion
+from ringsweep.config.sections import MAX_LENGTH, read_values, section_of, suggestion
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
 from ringsweep.models.scene import Scene
@@ -22,7 +22,7 @@ from ringsweep.quantities.variables import OUTCOMES
 if TYPE_CHECKING:
     import xarray as xr
 
-COUNT = Parameter("1", "number of values", lower=1, upper=1_000_000, whole=True)
+COUNT = Parameter("1", "number of values", lower=1, upper=MAX_LENGTH, whole=True)
 
 #: Largest number of cells of a sweep. With 24 variables each they take some ten gigabytes on a disk.
 MAX_CELLS = 100_000_000
@@ -111,12 +111,14 @@ def read_data_array(
     dims = tuple(map(str, given.dims))
     if not dims:
         raise InputError(where, "a DataArray without dimensions varies nothing")
+    if given.size > MAX_CELLS:
+        raise InputError(where, f"more than {MAX_CELLS} values are too many")
     unit = str(given.attrs.get("units", "1"))
     # The values of quantities would be stripped of their units.
     flat: Any = given.data.ravel() if is_quantity(given.data) else given.values.ravel()
     if unit != "1" and given.dtype.kind in "iuf" and not is_quantity(flat):
         flat = [f"{value!r} {unit}" for value in flat.tolist()]
-    return dims, read_values(flat, parameter, where).reshape(given.shape)
+    return dims, read_values(flat, parameter, where, MAX_CELLS).reshape(given.shape)
 
 
 def _read_spacing(given: dict[str, Any], parameter: Parameter | Choice, where: str) -> NDArray[np.float64]:
@@ -133,7 +135,10 @@ def _read_spacing(given: dict[str, Any], parameter: Parameter | Choice, where: s
     count = int(quantity(bounds[2], COUNT, f"{where}.2"))
     if kind == "geomspace" and min(first, last) <= 0.0:
         raise InputError(where, f"both ends of geomspace must be greater than 0, got {first:g} and {last:g}")
-    values = np.linspace(first, last, count) if kind == "linspace" else np.geomspace(first, last, count)
+    with np.errstate(over="ignore", invalid="ignore"):
+        values = np.linspace(first, last, count) if kind == "linspace" else np.geomspace(first, last, count)
+    if not np.isfinite(values).all():
+        raise InputError(where, f"{first:g} and {last:g} are too far apart: the values between them overflow")
     if parameter.whole:
         for value in values[values % 1.0 != 0.0][:1]:
             raise InputError(

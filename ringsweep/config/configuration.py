@@ -216,7 +216,7 @@ def _apply_setting(doc: Document, setting: str) -> str:
 def _child(node: Any, key: str, full: str) -> Any:
     if isinstance(node, dict):
         return node[key]
-    if isinstance(node, list) and key.isdecimal() and int(key) < len(node):
+    if isinstance(node, list) and key.isdecimal() and len(key) < 10 and int(key) < len(node):
         return node[int(key)]
     raise InputError(full, f"cannot be set: there is no `{key}` on this path")
 

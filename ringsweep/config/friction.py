@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.config.sections import read_values, suggestion
+from ringsweep.config.sections import suggestion
+from ringsweep.config.tables import TABLES, read_table
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
 from ringsweep.physics.friction import LAWS, TRAITS, add_law, laws
 from ringsweep.physics.friction.formula import FormulaError
 from ringsweep.physics.friction.laws import Definition, define
-from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import show
 
 #: Name of the law that the section ``friction`` itself defines by the keys ``mu`` and ``at_rest``.
@@ -23,12 +23,6 @@ FORMULA = "formula"
 
 #: Name of the law that is a table of measured friction.
 TABLE = "table"
-
-#: Columns of this table.
-CURVE = {
-    "v": Parameter("m/s", "sliding speed in the table of friction", lower=0.0),
-    "mu": Parameter("1", "friction coefficient", lower=0.0),
-}
 
 # Laws that a Python session has defined.
 _REGISTERED: dict[str, Definition] = {}
@@ -111,41 +105,19 @@ def own_laws(friction: Mapping[str, Any]) -> dict[str, type]:
 
 def keys_of(laws: Collection[str]) -> tuple[str, ...]:
     """Keys of the section ``friction`` that define some laws."""
-    of_formula, of_table = ("mu", "at_rest"), ("file", *CURVE)
+    of_formula, of_table = ("mu", "at_rest"), ("file", *TABLES["friction"])
     return ("laws", *(of_formula if FORMULA in laws else ()), *(of_table if TABLE in laws else ()))
 
 
 def read_curve(doc: Document, friction: dict[str, Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Speeds and friction coefficients of a table. If they come from a file, they replace its name.
+    """Speeds and friction coefficients of a table; see :func:`ringsweep.config.tables.read_table`.
 
     Raises
     ------
     InputError
         If the table is missing, or cannot be a friction law.
     """
-    if "file" in friction:
-        if "v" in friction or "mu" in friction:
-            raise InputError("scene.friction.file", "give a file, or v and mu, not both")
-        columns = doc.inline_csv(friction["file"], "scene.friction.file", "scene.friction")
-        if set(columns) != set(CURVE):
-            hint = ", separated by commas" if len(columns) == 1 else ""
-            raise InputError("scene.friction.file", f"columns v, mu are expected{hint}; got {', '.join(columns)}")
-        del friction["file"]
-        friction |= columns
-    for name in CURVE:
-        if name not in friction:
-            raise InputError(f"scene.friction.{name}", "missing: a table needs a file, or the lists v and mu")
-    speeds, mu = (read_values(friction[name], p, f"scene.friction.{name}") for name, p in CURVE.items())
-    if len(speeds) != len(mu):
-        raise InputError("scene.friction.mu", f"{len(mu)} coefficients for {len(speeds)} speeds")
-    if len(speeds) < 2:
-        raise InputError("scene.friction.v", "one point is too few: a table needs at least 2")
-    backward = np.flatnonzero(np.diff(speeds) <= 0.0)
-    if len(backward):
-        i = int(backward[0]) + 1
-        raise InputError(f"scene.friction.v.{i}", f"{speeds[i]:g} m/s does not come after {speeds[i - 1]:g} m/s")
-    if speeds[0] > 0.0:
-        raise InputError("scene.friction.v.0", f"the table begins at {speeds[0]:g} m/s: it must begin at rest, with 0")
+    speeds, mu = read_table(doc, friction, "friction", 2)
     if not mu.any():
         raise InputError("scene.friction.mu", "all coefficients are 0")
     return speeds, mu
@@ -164,8 +136,8 @@ def _defined(definition: Definition, path: str) -> type:
     try:
         return define(definition)
     except FormulaError as error:
-        where = "at_rest" if str(error).startswith("at_rest") else "mu"
-        raise InputError(f"{path}.{where}", f"{show(definition.mu)}: {error}") from None
+        quoted = definition.at_rest if error.key == "at_rest" else definition.mu
+        raise InputError(f"{path}.{error.key}", f"{show(quoted)}: {error}") from None
 
 
 def keep_definitions(friction: dict[str, Any], names: list[str]) -> None:

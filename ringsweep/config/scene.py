@@ -8,30 +8,20 @@ from functools import cache
 from itertools import product
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ringsweep.config.friction import FORMULA, keep_definitions, keys_of, law_of_curve, own_laws, read_curve
 from ringsweep.config.friction import TABLE as TABLE_LAW
 from ringsweep.config.sections import choose, missing_text, read_values, section_of, suggestion
+from ringsweep.config.tables import TABLES, read_table
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, parameters
 from ringsweep.models.scene import LAW, Scene, Structure
 from ringsweep.physics.drives import DRIVES
+from ringsweep.physics.friction.formula import NAMES
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.units import quantity, show
 
 logger = logging.getLogger("ringsweep")
-
-#: Columns of the tables of a measured drive and of a measured force, by section.
-TABLES = {
-    "drive": {
-        "time": Parameter("s", "time in the table of the drive"),
-        "theta": Parameter("rad", "angle of the drive"),
-    },
-    "force": {"time": Parameter("s", "time in the table of the force"), "force": Parameter("N", "force on the body")},
-}
 
 
 def sweepable(scene: Scene) -> dict[str, Parameter | Choice]:
@@ -77,7 +67,9 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     if curve is not None:
         own[TABLE_LAW] = law_of_curve(curve)
     # Name a misspelt key, rather than the key that is missing because of it.
-    leaves = dict(_leaves(scene, "", _Paths(_all_paths(model, zones or ("zones.0",), own))))
+    all_laws = MODELS[model].laws | own
+    near = _Paths(_all_paths(model, zones or ("zones.0",), {law: all_laws[law] for law in names} or all_laws, own))
+    leaves = dict(_leaves(scene, "", _Paths(_all_paths(model, zones or ("zones.0",), all_laws, own)), near))
     if not names:
         section_of(scene, "friction", "scene.")
         raise InputError(f"scene.{LAW}", "missing: name a friction law: " + ", ".join(known_laws.names))
@@ -96,10 +88,10 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
         zones = ("zone",)
     elif rough:
         raise InputError(f"scene.{rough[0]}", "there is no zone: give zone, or leave friction.rough out")
-    table = _read_table(doc, scene["drive"], "drive") if drive == "table" else None
+    table = read_table(doc, scene["drive"], "drive", 4) if drive == "table" else None
     force = scene.get("force")
     measured = force is not None and any(name in force for name in (*TABLES["force"], "file"))
-    forces = _read_table(doc, scene["force"], "force") if measured else None
+    forces = read_table(doc, scene["force"], "force", 4) if measured else None
     structures = {
         law: Structure(model, law, drive, zones, table, own.get(law), curve if law == TABLE_LAW else None, forces)
         for law in names
@@ -114,6 +106,9 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
         elif not parameter.optional and path not in swept:
             needing = [law for law, structure in structures.items() if path in parameters(structure)]
             who = f"; law {needing[0]} needs it" if len(structures) > len(needing) else ""
+            name = path.rpartition(".")[2]
+            if name != name.lower() and name.lower() in NAMES:
+                who += f"; or did you mean `{name.lower()}` in the formula, {NAMES[name.lower()]}?"
             raise InputError(f"scene.{path}", missing_text(path, parameter) + who)
     for path in leaves:
         if path not in known and path not in _structural(model, drive, names):
@@ -155,10 +150,10 @@ def _structural(model: str, drive: str, laws: Collection[str]) -> tuple[str, ...
     )
 
 
-def _all_paths(model: str, zones: tuple[str, ...], own: Mapping[str, type]) -> list[str]:
-    """Every path that a scene of this model can have, under all laws and drives."""
-    paths = dict.fromkeys(_structural(model, "table", (FORMULA, TABLE_LAW)))
-    for law, drive, arcs in product(MODELS[model].laws | dict(own), DRIVES, {(), ("zone",), zones}):
+def _all_paths(model: str, zones: tuple[str, ...], laws: Collection[str], own: Mapping[str, type]) -> list[str]:
+    """Every path that a scene of this model can have, under some laws and all drives."""
+    paths = dict.fromkeys(_structural(model, "table", laws))
+    for law, drive, arcs in product(laws, DRIVES, {(), ("zone",), zones}):
         paths |= dict.fromkeys(parameters(Structure(model, law, drive, arcs, own_law=own.get(law))))
     return list(paths)
 
@@ -176,8 +171,8 @@ class _Paths:
                 path = parent
 
 
-def _leaves(node: Any, path: str, paths: _Paths) -> Iterator[tuple[str, Any]]:
-    """Path and value of every leaf below `node`."""
+def _leaves(node: Any, path: str, paths: _Paths, near: _Paths) -> Iterator[tuple[str, Any]]:
+    """Path and value of every leaf below `node`; `near` are the paths that a message about a wrong one suggests."""
     where = f"scene.{path}".rstrip(".")
     items = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else None
     children = paths.children[path.rstrip(".")]
@@ -187,44 +182,10 @@ def _leaves(node: Any, path: str, paths: _Paths) -> Iterator[tuple[str, Any]]:
         full = f"{path}{key}"
         # Check the key, not the path: the single key "body.mass" would pass for `mass` under `body`.
         if str(key) not in children:
-            raise InputError(f"scene.{full}", "unknown key" + suggestion(key, children))
+            raise InputError(
+                f"scene.{full}", "unknown key" + suggestion(key, near.children.get(path.rstrip("."), children))
+            )
         if full in paths.known:
             yield full, value
         else:
-            yield from _leaves(value, f"{full}.", paths)
-
-
-def _read_table(doc: Document, given: dict[str, Any], section: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Times and values of a measured drive or force.
-
-    If they come from a file, they replace its name in the configuration.
-    """
-    where, columns = f"scene.{section}", TABLES[section]
-    _, what = columns
-    if "file" in given:
-        if any(name in given for name in columns):
-            raise InputError(f"{where}.file", f"give a file, or time and {what}, not both")
-        found = doc.inline_csv(given["file"], f"{where}.file", where)
-        renamed = {"time" if name == "t" else name: cells for name, cells in found.items()}
-        if set(renamed) != set(columns) or len(found) != 2:
-            hint = ", separated by commas" if len(found) == 1 else ""
-            raise InputError(f"{where}.file", f"columns t, {what} are expected{hint}; got {', '.join(found)}")
-        doc.locations |= {k.replace(f"{section}.t.", f"{section}.time."): v for k, v in doc.locations.items()}
-        del given["file"]
-        given |= renamed
-    for name in columns:
-        if name not in given:
-            raise InputError(f"{where}.{name}", f"missing: a table needs a file, or the lists time and {what}")
-    times, values = (read_values(given[name], parameter, f"{where}.{name}") for name, parameter in columns.items())
-    if len(times) != len(values):
-        plural = "angles" if what == "theta" else "forces"
-        raise InputError(f"{where}.{what}", f"{len(values)} {plural} for {len(times)} times")
-    if len(times) < 4:
-        raise InputError(f"{where}.time", f"{len(times)} samples are too few: a table needs at least 4")
-    backward = np.flatnonzero(np.diff(times) <= 0.0)
-    if len(backward):
-        i = int(backward[0]) + 1
-        raise InputError(f"{where}.time.{i}", f"{times[i]:g} s does not come after {times[i - 1]:g} s")
-    if times[0] > 0.0:
-        raise InputError(f"{where}.time.0", f"the table begins at {times[0]:g} s, but the run at 0 s")
-    return times, values
+            yield from _leaves(value, f"{full}.", paths, near)

@@ -10,10 +10,10 @@ from itertools import product
 from typing import Any
 
 from ringsweep.config.axes import COUNT
-from ringsweep.config.friction import CURVE, FORMULA
+from ringsweep.config.friction import FORMULA
 from ringsweep.config.friction import TABLE as TABLE_LAW
 from ringsweep.config.refinement import NUMBERS
-from ringsweep.config.scene import TABLES
+from ringsweep.config.tables import TABLES
 from ringsweep.models import MODELS, parameters
 from ringsweep.models.scene import LAW, Structure
 from ringsweep.physics.drives import DRIVES
@@ -50,17 +50,17 @@ def schema() -> dict[str, Any]:
                 "type": "object",
                 "additionalProperties": {**_section({"mu": _formula(), "at_rest": _at_rest()}), "required": ["mu"]},
             },
-            "friction.mu": _any_of([_formula(), _list(_number(CURVE["mu"]))]),
+            "friction.mu": _any_of([_formula(), _list(_number(TABLES["friction"]["mu"]))]),
             "friction.at_rest": _at_rest(),
-            "friction.v": _list(_number(CURVE["v"])),
+            "friction.v": _list(_number(TABLES["friction"]["v"])),
             "friction.file": {"type": "string", "description": "CSV file with columns v (m/s), mu"},
             "drive.law": _names(DRIVES, "how the ring is driven"),
             "drive.file": {"type": "string", "description": "CSV file with columns t (s), theta (rad)"},
             "force.file": {"type": "string", "description": "CSV file with columns t (s), force (N)"},
             **{
                 f"{section}.{name}": _list(_number(parameter))
-                for section, columns in TABLES.items()
-                for name, parameter in columns.items()
+                for section in ("drive", "force")
+                for name, parameter in TABLES[section].items()
             },
             **leaves,
         }

@@ -11,7 +11,10 @@ from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.quantities.parameters import Choice, Parameter
-from ringsweep.quantities.units import quantity, show, spelled
+from ringsweep.quantities.units import length_of, quantity, show, spelled
+
+#: Largest number of values on an axis or in a table.
+MAX_LENGTH = 1_000_000
 
 
 def suggestion(word: object, known: Iterable[str]) -> str:
@@ -30,14 +33,16 @@ def missing_text(path: str, parameter: Parameter) -> str:
     return f"missing: {parameter.long_name}{unit} (for example `{path.rpartition('.')[2]}: {example}`)"
 
 
-def read_values(given: Any, parameter: Parameter | Choice, where: str) -> NDArray[Any]:
+def read_values(given: Any, parameter: Parameter | Choice, where: str, most: int = MAX_LENGTH) -> NDArray[Any]:
     """Quantities or names from a sequence, shape ``(n,)``.
 
     Raises
     ------
     InputError
-        If `given` is no such sequence, or one of its values is wrong.
+        If `given` is no such sequence, has more than `most` values, or one of its values is wrong.
     """
+    if length_of(given) > most:
+        raise InputError(where, f"more than {most} values are too many")
     given = spelled(given)
     if hasattr(given, "__array__"):
         array = np.asarray(given)

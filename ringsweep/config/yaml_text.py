@@ -8,24 +8,28 @@ import json
 import math
 import os
 import re
+import stat
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import netCDF4
 import numpy as np
 import yaml
 
 from ringsweep.errors import InputError
-from ringsweep.quantities.units import NUMBER, show, spelled
+from ringsweep.quantities.units import LONG_INTEGER, NUMBER, length_of, show, spelled
 
-#: Largest number of values in a configuration after its aliases are expanded.
-MAX_VALUES = 100_000
+#: Largest number of values in a configuration, with each value counted as often as it occurs.
+MAX_VALUES = 1_000_000
 
 _MAX_DEPTH = 30
+
+# Sizes of files, in bytes. A configuration is read at some 100 kB/s.
+_LARGEST_CONFIGURATION, _LARGEST_TABLE = 5_000_000, 500_000_000
 _TAGS = {f"tag:yaml.org,2002:{name}" for name in ("null", "bool", "int", "float", "str", "timestamp", "map", "seq")}
 # YAML gives "<<" and "=" tags of their own; here they are text.
 _TAGS |= {"tag:yaml.org,2002:merge", "tag:yaml.org,2002:value"}
@@ -89,12 +93,15 @@ class Document:
             raise InputError(path, f"a file name is expected, got {show(name)}")
         file = self.folder / name
         try:
-            text = _read(file)
+            text = _read(file, _LARGEST_TABLE)
         except InputError as error:
             raise InputError(path, f"{file} {error.problem}") from None
         rows = csv.reader(io.StringIO(text, newline=""), strict=True)
         try:
             header = next(rows, [])
+            if len(header) == 1 and (mark := next((mark for mark in ";\t|" if mark in header[0]), None)):
+                problem = f"the columns are separated by {mark!r}: separate them by commas"
+                raise InputError(path, problem, file=str(file), line=1)
             columns: dict[str, tuple[str, list[Any]]] = {}
             for cell in header:
                 match = re.fullmatch(r"([^\s(\[]+)\s*(?:[(\[](.*)[)\]])?", cell.strip())
@@ -132,19 +139,23 @@ def read(config: str | os.PathLike[str] | Mapping[str, Any]) -> Document:
         If it is no YAML mapping of plain values, or a result file without a configuration.
     """
     if isinstance(config, Mapping):
+        if _count(config, {}, 0) > MAX_VALUES:
+            raise InputError("", _TOO_MANY)
         return Document(_plain_copy(config, "", 0))
     if not isinstance(config, str | os.PathLike):
         raise InputError("config", f"a path or a mapping is expected, got {show(config)}")
     file = Path(config)
     if _is_result(file):
         return _read_result(file)
-    text = _read(file)
+    text = _read(file, _LARGEST_CONFIGURATION)
     reader = _NodeReader(str(file))
     try:
         node = yaml.compose(text, Loader=yaml.SafeLoader)
         if not isinstance(node, yaml.MappingNode):
             found = "is empty" if node is None else "holds no mapping"
             raise InputError("", f"{found}: a configuration has the sections scene, solver and sweep", file=str(file))
+        if _count(node, {}, 0) > MAX_VALUES:
+            raise InputError("", _TOO_MANY, file=str(file))
         tree = reader.value(node, "")
     except InputError:
         raise
@@ -161,10 +172,17 @@ def read(config: str | os.PathLike[str] | Mapping[str, Any]) -> Document:
 
 def _is_result(file: Path) -> bool:
     try:
-        with file.open("rb") as content:
+        with _opened(file) as content:
             return content.read(8) == b"\x89HDF\r\n\x1a\n"
     except (OSError, ValueError):
         return False
+
+
+def _opened(file: Path) -> BinaryIO:
+    """An open file; OSError if it is no regular file: reading a pipe or a device might never end."""
+    if not stat.S_ISREG(file.stat().st_mode):
+        raise OSError("a folder, a pipe or a device is no file to read")
+    return file.open("rb")
 
 
 def _read_result(file: Path) -> Document:
@@ -211,15 +229,11 @@ class _NodeReader:
 
     file: str
     locations: dict[str, tuple[str, int | None]] = field(default_factory=dict)
-    count: int = 0
     ancestors: set[int] = field(default_factory=set)
 
     def value(self, node: yaml.Node, path: str) -> Any:
         line = node.start_mark.line + 1
         self.locations.setdefault(path, (self.file, line))
-        self.count += 1
-        if self.count > MAX_VALUES:
-            raise InputError("", f"more than {MAX_VALUES} values after expanding aliases", file=self.file, line=line)
         if node.tag not in _TAGS:
             raise InputError(path, f"the tag {node.tag} is not allowed", file=self.file, line=line)
         if isinstance(node, yaml.ScalarNode):
@@ -252,6 +266,28 @@ def _join(path: str, key: object) -> str:
     return f"{path}.{key}" if path else str(key)
 
 
+_TOO_MANY = f"more than {MAX_VALUES} values after expanding aliases; put long columns into a CSV file"
+
+
+def _count(value: Any, known: dict[int, int], depth: int) -> int:
+    """Number of values of YAML nodes or of nested containers, in a time that parts which occur often do not prolong."""
+    if isinstance(value, Mapping):
+        parts: Any = value.values()
+    elif isinstance(value, yaml.MappingNode):
+        parts = [child for _, child in value.value]
+    elif isinstance(value, yaml.SequenceNode):
+        parts = value.value
+    elif isinstance(value, list | tuple):
+        parts = value
+    else:
+        return length_of(value) if isinstance(value, np.ndarray | range) else 1
+    if id(value) not in known:
+        # A part that contains itself is refused later, as one that is nested too deeply.
+        known[id(value)] = 1
+        known[id(value)] += sum(_count(part, known, depth + 1) for part in parts) if depth <= _MAX_DEPTH else 0
+    return known[id(value)]
+
+
 def _plain_copy(value: Any, path: str, depth: int) -> Any:
     """A copy made of dicts, lists, numbers, booleans, None and strings only; quantities of pint become strings."""
     if depth > _MAX_DEPTH:
@@ -269,15 +305,20 @@ def _plain_copy(value: Any, path: str, depth: int) -> Any:
     if isinstance(value, bool | np.bool_):
         return bool(value)
     if isinstance(value, Integral):
+        if abs(int(value)) >= LONG_INTEGER:
+            raise InputError(path, f"{show(int(value))} is no value for a configuration")
         return int(value)
     if isinstance(value, Real):
         return float(value)
     raise InputError(path, f"{show(value)} is no value for a configuration: give text, a number, a list or a mapping")
 
 
-def _read(file: Path) -> str:
+def _read(file: Path, largest: int) -> str:
     try:
-        return file.read_bytes().decode("utf-8-sig")
+        with _opened(file) as content:
+            if os.fstat(content.fileno()).st_size > largest:
+                raise OSError(f"it is larger than {largest / 1e6:g} MB")
+            return content.read(largest).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError("", "cannot be read: not a text file in UTF-8", file=str(file)) from None
     except OSError as error:

@@ -101,7 +101,9 @@ def law_of(structure: Structure, values: Values, surfaces: list[Any]) -> Any:
         try:
             columns |= hidden_fields(EXPRESSIONS[law], columns, surfaces)
         except FormulaError as error:
-            raise InputError("scene.friction.law", f"friction law {structure.law}: {error}") from None
+            own = "" if structure.law == "formula" else f"laws.{structure.law}."
+            path = f"{own}at_rest" if structure.own_law is not None and error.key == "at_rest" else "law"
+            raise InputError(f"scene.friction.{path}", f"friction law {structure.law}: {error}") from None
     return make(**columns)
 
 

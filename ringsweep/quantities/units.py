@@ -6,11 +6,12 @@ import contextlib
 import math
 import re
 import reprlib
+import sys
 from functools import cache, lru_cache
 from numbers import Real
 from typing import Any
 
-from ringsweep.errors import InputError
+from ringsweep.errors import InputError, shortened
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.quantity import cf_units
 
@@ -22,6 +23,9 @@ _UNIT = re.compile(rf"(?:1\s*/\s*)?{_WORD}(?:(?:\s*[*/·]\s*|\s+){_WORD})*")
 
 # Longest text, in characters, that can be a number with a unit.
 _LONGEST = 100
+
+#: Integers from here on are no values of a configuration.
+LONG_INTEGER = 10**_LONGEST
 
 # Pint's own registry takes the radian as dimensionless: 5 Hz would become 5 rad/s, and 30 rpm 3.14 Hz.
 _UNITS = """
@@ -97,7 +101,8 @@ def spelled(value: Any) -> Any:
         return value
     if not _is_known(unit := f"{value.units:C}"):
         # Units that are not known here, such as pounds-force, have roots that are: gram, meter, second, radian.
-        with contextlib.suppress(Exception):
+        # Logarithmic units may have none, and huge integers no conversion: both are refused later.
+        with contextlib.suppress(_pint().PintError, OverflowError):
             value = value.to_root_units()
             unit = f"{value.units:C}"
     magnitude = value.magnitude
@@ -106,6 +111,19 @@ def spelled(value: Any) -> Any:
         return [text(part) for part in number] if isinstance(number, list) else f"{number} {unit or 'dimensionless'}"
 
     return text(magnitude.tolist() if hasattr(magnitude, "tolist") else magnitude)
+
+
+def length_of(value: Any) -> int:
+    """Number of values in a sequence or an array; 1 for anything else."""
+    if hasattr(value, "shape"):
+        return math.prod(value.shape)
+    try:
+        return len(value)
+    except TypeError:
+        return 1
+    except OverflowError:
+        # A range that is longer than any sequence may be.
+        return sys.maxsize
 
 
 @lru_cache(maxsize=256)
@@ -130,9 +148,24 @@ def percent_at_most(share: float) -> str:
     return f"{100 * math.ceil(share * 10.0 ** (digits - 2) - 1e-9) / 10.0 ** (digits - 2):.3g} %"
 
 
+class _Quotes(reprlib.Repr):
+    """Short texts of values: of a long text the start and the length."""
+
+    def repr_str(self, value: str, level: int) -> str:
+        return repr(value) if len(value) <= 60 else f"{value[:40]!r}... ({len(value)} characters)"
+
+    def repr_int(self, value: int, level: int) -> str:
+        # Python refuses to write an integer of thousands of digits.
+        return repr(value) if abs(value) < LONG_INTEGER else f"an integer of more than {_LONGEST} digits"
+
+
+_QUOTES = _Quotes()
+_QUOTES.maxlevel = 2
+
+
 def show(value: Any) -> str:
     """A value as messages quote it: one short line."""
-    return "nothing" if value is None else reprlib.repr(value)
+    return "nothing" if value is None else shortened(_QUOTES.repr(value), 300)
 
 
 def _convert(value: Any, parameter: Parameter, path: str) -> float:
@@ -200,12 +233,16 @@ def _parsed(unit: str) -> Any:
     return _registry().parse_units("" if powers == "1" else powers)
 
 
-@cache
-def _registry() -> Any:
+def _pint() -> Any:
     # Importing pint takes longer than a small sweep, and many configurations have no unit to convert.
     import pint
 
-    return pint.UnitRegistry(_UNITS.strip().splitlines())
+    return pint
+
+
+@cache
+def _registry() -> Any:
+    return _pint().UnitRegistry(_UNITS.strip().splitlines())
 
 
 def _in_pi(angle: float) -> str:

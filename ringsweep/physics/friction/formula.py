@@ -35,8 +35,24 @@ _ONE_ARGUMENT = ("exp", "log", "sqrt", "tanh", "atan", "abs")
 _GRAMMAR = "numbers, v, names of parameters, + - * / **, exp log sqrt tanh atan abs min max, piecewise(v < v1, a, b)"
 
 
+#: What a name with a meaning of its own stands for in a formula.
+NAMES = {"v": "the sliding speed", "mu_s": "static friction", "mu_k": "kinetic friction", "pi": "3.14159"}
+
+
 class FormulaError(ValueError):
-    """Something in a formula is wrong; the message says what, and what is allowed."""
+    """Something in the definition of a law is wrong; the message says what, and what is allowed.
+
+    Parameters
+    ----------
+    problem : str
+        The message.
+    key : str
+        ``mu`` if the formula is wrong, or ``at_rest``.
+    """
+
+    def __init__(self, problem: str, key: str = "mu"):
+        self.key = key
+        super().__init__(problem)
 
 
 @dataclass(frozen=True)

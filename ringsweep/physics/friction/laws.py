@@ -273,13 +273,14 @@ def _defined(qualified: str) -> type:
     formula = read_formula(mu)
     used = symbols_of(formula.mu)
     if not any(name in used for name in COEFFICIENTS):
-        raise FormulaError("it uses neither mu_s nor mu_k, the friction coefficients of the surface: scale it by one")
-    if at_rest not in (None, *COEFFICIENTS):
         raise FormulaError(
-            f"at_rest is {at_rest!r}, but it can only be mu_s or mu_k, which have values for each surface"
+            "it uses neither mu_s nor mu_k, the friction coefficients of the surface. Multiply the formula by one of "
+            "them, and give the friction coefficient there: mu_k*(...), mu_k: 0.3"
         )
+    if at_rest not in (None, *COEFFICIENTS):
+        raise FormulaError("at_rest can only be mu_s or mu_k, which have values for each surface", "at_rest")
     if at_rest == "mu_k" and "mu_s" in used:
-        raise FormulaError("at_rest is mu_k, but the formula uses mu_s, which is never less: write at_rest: mu_s")
+        raise FormulaError("the formula uses mu_s, which is never less than mu_k: write at_rest: mu_s", "at_rest")
     # Friction that turns negative or is no number ends a run.
     valid = Threshold(None, formula.mu, kind="valid")
     checked = switch(len(formula.thresholds), formula.mu, number(float("nan")))

@@ -266,7 +266,8 @@ class _Finder:
                 raise FormulaError(
                     "without at_rest friction must vanish at v = 0, where it is "
                     f"{at_rest[abs(at_rest) > 1e-9][0]:.6g}: "
-                    "give `at_rest: mu_s` for friction that holds up to mu_s at rest"
+                    "give `at_rest: mu_s` for friction that holds up to mu_s at rest",
+                    "at_rest",
                 )
 
     def _band(self) -> NDArray[np.float64]:

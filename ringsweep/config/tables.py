@@ -1,0 +1,91 @@
+"""Tables of measurements in a configuration: two columns, in lists or in a CSV file."""
+
+from __future__ import annotations
+
+import difflib
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsweep.config.sections import read_values
+from ringsweep.config.yaml_text import Document
+from ringsweep.errors import InputError, shortened
+from ringsweep.quantities.parameters import Parameter
+
+#: Columns of the tables of a measured drive, force and friction curve, by section. The first column ascends.
+TABLES = {
+    "drive": {
+        "time": Parameter("s", "time in the table of the drive"),
+        "theta": Parameter("rad", "angle of the drive"),
+    },
+    "force": {"time": Parameter("s", "time in the table of the force"), "force": Parameter("N", "force on the body")},
+    "friction": {
+        "v": Parameter("m/s", "sliding speed in the table of friction", lower=0.0),
+        "mu": Parameter("1", "friction coefficient", lower=0.0),
+    },
+}
+
+_PLURAL = {"time": "times", "theta": "angles", "force": "forces", "v": "speeds", "mu": "coefficients"}
+
+
+def read_table(
+    doc: Document, given: dict[str, Any], section: str, least: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Both columns of a table. If they come from a file, they replace its name in the configuration.
+
+    Parameters
+    ----------
+    doc : Document
+    given : dict
+        The section.
+    section : str
+        Its name, a key of :data:`TABLES`.
+    least : int
+        Least number of rows.
+
+    Raises
+    ------
+    InputError
+        If the table is missing, is too short, begins after 0, or its first column does not ascend.
+    """
+    where, columns = f"scene.{section}", TABLES[section]
+    first, second = columns
+    if "file" in given:
+        if any(name in given for name in columns):
+            raise InputError(f"{where}.file", f"give a file, or {first} and {second}, not both")
+        found = doc.inline_csv(given["file"], f"{where}.file", where)
+        renamed = {"time" if name == "t" else name: cells for name, cells in found.items()}
+        if set(renamed) != set(columns) or len(found) != 2:
+            names = ["t" if name == "time" else name for name in columns]
+            raise InputError(f"{where}.file", _wrong_columns(list(found), names))
+        doc.locations |= {k.replace(f"{section}.t.", f"{section}.time."): v for k, v in doc.locations.items()}
+        del given["file"]
+        given |= renamed
+    for name in columns:
+        if name not in given:
+            raise InputError(f"{where}.{name}", f"missing: a table needs a file, or the lists {first} and {second}")
+    x, y = (read_values(given[name], parameter, f"{where}.{name}") for name, parameter in columns.items())
+    if len(x) != len(y):
+        raise InputError(f"{where}.{second}", f"{len(y)} {_PLURAL[second]} for {len(x)} {_PLURAL[first]}")
+    if len(x) < least:
+        raise InputError(f"{where}.{first}", f"{len(x)} rows are too few: a table needs at least {least}")
+    unit = columns[first].unit
+    backward = np.flatnonzero(np.diff(x) <= 0.0)
+    if len(backward):
+        i = int(backward[0]) + 1
+        raise InputError(f"{where}.{first}.{i}", f"{x[i]:g} {unit} does not come after {x[i - 1]:g} {unit}")
+    if x[0] > 0.0:
+        raise InputError(f"{where}.{first}.0", f"the table begins at {x[0]:g} {unit}: it must begin at 0 {unit}")
+    return x, y
+
+
+def _wrong_columns(found: list[str], names: list[str]) -> str:
+    """Message about the header of a file."""
+    missing = [name for name in names if name not in found]
+    hints = (
+        f"; did you mean `{near[0]}` by {shortened(name, 40)}?"
+        for name in found
+        if name not in names and (near := difflib.get_close_matches(name[:100].lower(), missing, n=1))
+    )
+    return f"columns {', '.join(names)} are expected; got {', '.join(found)}{next(hints, '')}"
