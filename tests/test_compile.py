@@ -7,9 +7,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numba.core import caching
 
 import ringsweep
+from ringsweep.compile import cache, numba_private
 from ringsweep.compile.cache import sources_digest
 from ringsweep.compile.numba_private import AVAILABLE
 
@@ -88,3 +91,81 @@ def test_own_file_changes_the_digest_of_sources_by_its_content(package, tmp_path
     other = sources_digest(package, [own])
     own.write_text(text)
     assert sources_digest(package, [own]) != other
+
+
+class TestCacheOnDisk:
+    @pytest.fixture
+    def folder(self, tmp_path, monkeypatch):
+        """An empty cache, and a process that has told nothing of its cache yet."""
+        monkeypatch.setattr(caching.config, "CACHE_DIR", str(tmp_path))
+        for told in (cache._announce_compilation, cache._announce_damage, numba_private._warn_of_no_cache):
+            told.cache_clear()
+        return tmp_path
+
+    @staticmethod
+    def doubled():
+        """What a kernel returns that is new in each call, as in a new process."""
+
+        def double(x):
+            return 2.0 * x
+
+        return cache.kernel(double)(np.float64(21.0))
+
+    def test_kernel_is_compiled_once(self, folder, caplog):
+        assert self.doubled() == self.doubled() == 42.0
+        assert caplog.text.count("compiling") == 1
+        assert len(list(folder.rglob("*.nb*"))) == 2
+
+    @pytest.mark.parametrize("damage", ["truncated", "empty", "one bit", "other content"])
+    @pytest.mark.parametrize("suffix", ["nbi", "nbc"])
+    def test_damaged_file_is_compiled_again_and_replaced(self, folder, caplog, suffix, damage):
+        self.doubled()
+        (file,) = folder.rglob(f"*.{suffix}")
+        content = bytearray(file.read_bytes())
+        content[len(content) // 2] ^= 1
+        file.write_bytes({"truncated": content[:40], "empty": b"", "one bit": content}.get(damage, b"cos\nsystem\n."))
+        cache._announce_compilation.cache_clear()
+        caplog.clear()
+        assert self.doubled() == 42.0
+        assert len(caplog.messages) == 1
+        if suffix == "nbc":
+            assert caplog.messages == [f"compiled code in {file.parent} is damaged: compiling it again"]
+        caplog.clear()
+        assert self.doubled() == 42.0
+        assert not caplog.messages
+
+    @pytest.mark.parametrize("suffix", ["nbi", "nbc"])
+    def test_file_that_cannot_be_read_is_compiled_again(self, folder, caplog, monkeypatch, suffix):
+        """Another user may own it."""
+        self.doubled()
+        read = Path.read_bytes
+
+        def refused(path):
+            if path.suffix == f".{suffix}":
+                raise PermissionError(13, "Permission denied")
+            return read(path)
+
+        monkeypatch.setattr(Path, "read_bytes", refused)
+        cache._announce_compilation.cache_clear()
+        caplog.clear()
+        assert self.doubled() == 42.0
+        assert caplog.text.count("compiling") == len(caplog.messages) == 1
+
+    def test_cache_that_takes_no_file_is_told_once(self, folder, caplog, monkeypatch):
+        def refused(*arguments):
+            raise OSError(28, "No space left on device")
+
+        monkeypatch.setattr(os, "replace", refused)
+        assert self.doubled() == self.doubled() == 42.0
+        assert [message.partition(" ")[0] for message in caplog.messages] == ["compiling", "compiled"]
+        assert "No space left on device): each process compiles its own" in caplog.text
+        assert not list(folder.rglob("*.nb*"))
+
+    def test_compilation_without_a_writable_folder_is_announced(self, folder, caplog, monkeypatch):
+        def refused(locator):
+            raise PermissionError(13, "Permission denied")
+
+        monkeypatch.setattr(caching._CacheLocator, "ensure_cache_path", refused)
+        assert self.doubled() == 42.0
+        assert [message.partition(" ")[0] for message in caplog.messages] == ["compiling", "compiled"]
+        assert "NUMBA_CACHE_DIR" in caplog.text

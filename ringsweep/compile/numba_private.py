@@ -8,6 +8,7 @@ fail while it compiles: `pyproject.toml` has an upper bound.
 
 from __future__ import annotations
 
+import hashlib
 import inspect
 import logging
 import operator
@@ -26,6 +27,7 @@ try:
     from llvmlite import binding as llvm
     from numba._dynfunc import make_function
     from numba.core import cgutils, types
+    from numba.core.caching import IndexDataCacheFile, NullCache
     from numba.core.codegen import JITCodeLibrary
     from numba.core.compiler import CompilerBase, DefaultPassBuilder
     from numba.core.compiler_machinery import PassManager, register_pass
@@ -332,6 +334,48 @@ if AVAILABLE:
 
     borrowed: Any = _borrowed
 
+    # ---- compiled code on disk --------------------------------------------------------------------
+
+    class _DamagedFile(Exception):
+        """A file of the cache that is not what was written."""
+
+    class _SealedFiles(IndexDataCacheFile):
+        """Files of the cache, each with a digest in front, which also covers the sources and the version of Numba."""
+
+        def _seal(self, body: bytes) -> bytes:
+            return hashlib.sha256(repr((self._version, self._source_stamp)).encode() + body).digest()
+
+        def _save(self, path: str, content: Any) -> None:
+            body = self._dump(content)
+            with self._open_for_write(path) as file:
+                file.write(self._seal(body) + body)
+
+        def _load(self, path: str) -> Any:
+            content = Path(path).read_bytes()
+            seal, body = content[:_DIGEST], content[_DIGEST:]
+            if seal != self._seal(body):
+                raise _DamagedFile(Path(path).parent)
+            return pickle.loads(body)
+
+        def _save_index(self, overloads: Any) -> None:
+            self._save(self._index_path, overloads)
+
+        def _load_index(self) -> Any:
+            # An index that does not fit is most often one of earlier sources. One that cannot be read may belong to
+            # another user, and one that cannot be unpickled may name types that this process does not have.
+            try:
+                return self._load(self._index_path)
+            except (OSError, _DamagedFile, AttributeError, ImportError):
+                return {}
+
+        def _save_data(self, name: str, data: Any) -> None:
+            self._save(self._data_path(name), data)
+
+        def _load_data(self, name: str) -> Any:
+            return self._load(self._data_path(name))
+
+    _DIGEST = hashlib.sha256().digest_size
+
     #: Further options of kernels, and of functions that are compiled into kernels.
     KERNEL_COMPILER: dict[str, Any] = {"pipeline_class": _KernelCompiler}
     CALLEE_COMPILER: dict[str, Any] = {"pipeline_class": _CalleeCompiler}
@@ -365,11 +409,14 @@ else:
         overload(function, jit_options=options, strict=False)(typed)
 
 
-def keep_on_disk(dispatcher: Any, digest: str, suffix: str, announce: Callable[[], None]) -> None:
+def keep_on_disk(
+    dispatcher: Any, digest: str, suffix: str, announce: Callable[[], None], damaged: Callable[[str], None]
+) -> None:
     """Keep the compiled code of a function on disk, under a key that covers the sources of all functions it calls.
 
-    Numba itself notices an edit only in the file of the function. Without Numba's private interfaces, or if no folder
-    for the cache is writable, each process compiles the function anew.
+    Numba itself notices an edit only in the file of the function, and trusts what the files of its cache hold. Here
+    each file is read only if it is whole. Without Numba's private interfaces, or if no folder for the cache is
+    writable, each process compiles the function anew.
 
     Parameters
     ----------
@@ -381,49 +428,46 @@ def keep_on_disk(dispatcher: Any, digest: str, suffix: str, announce: Callable[[
         Added to the name of the cache's index. Functions with different suffixes do not replace each other.
     announce : callable
         Called before each compilation.
+    damaged : callable
+        Called in place of it with the name of a folder, if there is a damaged file in it.
     """
     if not AVAILABLE:
         return
     try:
         dispatcher.enable_caching()
         kept = dispatcher._cache
-        index = kept._cache_file
-        load, load_overload = index._load_index, kept.load_overload
-        index._source_stamp = (index._source_stamp, digest)
-        if suffix:
-            name = f"{index._index_name.removesuffix('.nbi')}-{suffix}"
-            index._index_name, index._data_name_pattern = f"{name}.nbi", f"{name}.{{number:d}}.nbc"
-            index._index_path = str(Path(kept._cache_path) / index._index_name)
-    except RuntimeError:
-        # No folder for the cache is writable.
-        return
-    except AttributeError:
-        _warn_of_no_cache()
-        dispatcher._cache = _no_cache()
-        return
-
-    def load_index() -> Any:
-        # An index of earlier sources may name types that no longer exist: it is stale, not an error.
-        try:
-            return load()
-        except (AttributeError, ImportError, EOFError, pickle.UnpicklingError):
-            return {}
+        old = kept._cache_file
+        name = old._index_name.removesuffix(".nbi") + (f"-{suffix}" if suffix else "")
+        kept._cache_file = _SealedFiles(kept._cache_path, name, (old._source_stamp, digest))
+        problem = ""
+    except (RuntimeError, AttributeError) as error:
+        kept = dispatcher._cache = NullCache()
+        problem = "no folder for it is writable: NUMBA_CACHE_DIR can name one"
+        if isinstance(error, AttributeError):
+            problem = "this version of Numba has another cache"
+    load_overload, save_overload = kept.load_overload, kept.save_overload
 
     def load_or_announce(*arguments: Any) -> Any:
-        found = load_overload(*arguments)
+        try:
+            found = load_overload(*arguments)
+        except _DamagedFile as error:
+            damaged(str(error))
+            return None
         if found is None:
             announce()
+            if problem:
+                _warn_of_no_cache(problem)
         return found
 
-    index._load_index, kept.load_overload = load_index, load_or_announce
+    def save_or_warn(*arguments: Any) -> None:
+        try:
+            save_overload(*arguments)
+        except OSError as error:
+            _warn_of_no_cache(f"{kept._cache_path}: {error.strerror or error}")
 
-
-def _no_cache() -> Any:
-    from numba.core.caching import NullCache
-
-    return NullCache()
+    kept.load_overload, kept.save_overload = load_or_announce, save_or_warn
 
 
 @cache
-def _warn_of_no_cache() -> None:
-    logger.warning("this version of Numba has another cache: each process compiles its own kernels")
+def _warn_of_no_cache(why: str) -> None:
+    logger.warning("compiled code cannot be kept (%s): each process compiles its own", why)
