@@ -6,13 +6,15 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import FunctionType
 
 import numpy as np
 import pytest
 from numba.core import caching
+from numba.core.errors import NumbaError, UnsupportedBytecodeError
 
 import ringsweep
-from ringsweep.compile import cache, numba_private
+from ringsweep.compile import cache, numba_private, readable_compile_errors
 from ringsweep.compile.cache import sources_digest
 from ringsweep.compile.numba_private import AVAILABLE
 
@@ -91,6 +93,23 @@ def test_own_file_changes_the_digest_of_sources_by_its_content(package, tmp_path
     other = sources_digest(package, [own])
     own.write_text(text)
     assert sources_digest(package, [own]) != other
+
+
+@pytest.mark.parametrize("error", [NumbaError("a\n" * 5000), UnsupportedBytecodeError("op code\n" * 5000)])
+def test_failure_of_numba_in_the_package_itself_is_told_in_short(error, monkeypatch):
+    def failing():
+        raise error
+
+    # Numba also raises errors that are not of its own class.
+    failing = FunctionType(failing.__code__, {"__name__": "numba.core.compiler"}, closure=failing.__closure__)
+    message = r"^ringsweep does not compile with numba [0-9.]+: (a|op code)$"
+    with pytest.raises(RuntimeError, match=message), readable_compile_errors():
+        failing()
+
+
+def test_errors_of_python_are_not_taken_for_those_of_numba():
+    with pytest.raises(ZeroDivisionError), readable_compile_errors():
+        raise ZeroDivisionError
 
 
 class TestCacheOnDisk:

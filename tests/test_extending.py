@@ -182,6 +182,42 @@ def test_function_that_does_not_compile_is_told_in_one_line_by_file_and_line(tmp
     assert message in done.stdout
 
 
+#: Changes of the examples that Python takes and Numba does not, and what is told of them.
+NOT_COMPILED = {
+    "my_dahl.py": ("law.sigma0 / mu_k * sign\n    rest", "law.sigma / mu_k * sign\n    rest", "_bristle"),
+    "my_run_up.py": ("rest = exp(-t / drive.tau)\n", "rest = exp(-t / drive.tau) * len(format('x'))\n", "_shape"),
+    "my_disc.py": ("(K1 * body.press - body.pull", "(K1 * body.press - len(format('x')) - body.pull", "_acceleration"),
+}
+
+
+def test_no_message_of_numba_reaches_a_user(tmp_path):
+    """A law, a drive and a model that do not compile are told in one short line, under each method that takes them."""
+    changes = [(name, old, new) for name, (old, new, _) in NOT_COMPILED.items()]
+    script = """
+        coulomb = {"law": "coulomb", "mu_k": 0.1}
+        driven = {name: section for name, section in belt.items() if name != "belt"}
+        scenes = [
+            {**belt, "friction": {"law": "dahl-ductile", "mu_k": 0.1, "sigma0": 1e3}},
+            {**driven, "friction": coulomb, "drive": {"law": "run-up", "amplitude": 0.1, "tau": 1.0}},
+            disc,
+        ]
+        for scene, methods in zip(scenes, (["implicit"], ["event"], ["event"])):
+            for method in (*methods, "auto", {"method": "rk4", "steps": 10}):
+                try:
+                    run(scene, method)
+                except InputError as error:
+                    print(error)
+    """
+    done = in_a_process(script, files_in(tmp_path, changes), tmp_path / "cache")
+    assert done.returncode == 0, done.stderr[-2000:]
+    lines = done.stdout.splitlines()
+    assert len(lines) == 9
+    for k, (name, (_, _, function)) in enumerate(NOT_COMPILED.items()):
+        for line in lines[3 * k : 3 * k + 3]:
+            assert re.match(rf"RINGSWEEP_LAWS: does not compile: {name}, line \d+: {function}: ", line), line
+            assert len(line) < 400
+
+
 def test_files_moved_into_the_package_register_what_they_hold(tmp_path):
     package = tmp_path / "ringsweep"
     shutil.copytree(Path(__file__).parents[1] / "ringsweep", package, ignore=shutil.ignore_patterns("__pycache__"))
