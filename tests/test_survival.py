@@ -7,6 +7,8 @@ import shutil
 import signal
 import threading
 from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
 from itertools import takewhile
 
 import numpy as np
@@ -18,7 +20,8 @@ import ringsweep
 from benchmarks.kills import POINTS, killed_at, same_bits
 from ringsweep import cli
 from ringsweep.config import load
-from ringsweep.runs.executors import Threads
+from ringsweep.runs.cells import compute_task
+from ringsweep.runs.executors import Threads, stop_on_interrupt
 from ringsweep.runs.sweep import write
 from ringsweep.runs.task_sizes import TaskSizes
 from ringsweep.storage import netcdf
@@ -144,6 +147,71 @@ class TestContinuation:
         assert "interrupted" in message
         assert "cells are kept in" in message
         assert "the same command goes on" in message
+
+    @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+    @pytest.mark.parametrize("jobs", ["1", "2"])
+    def test_second_interrupt_does_not_wait_for_the_task_under_way(
+        self, config, never_stopped, tmp_path, monkeypatch, capsys, caplog, small_tasks, number, jobs
+    ):
+        """The first one is answered at once, also while compiled code runs. What is finished is kept."""
+        done, ended, events = iter(range(6)), threading.Event(), []
+
+        @contextmanager
+        def watched(under_way):
+            with stop_on_interrupt(under_way) as stopped:
+                events.append(stopped)
+                yield stopped
+
+        def endless(*arguments):
+            if (count := next(done, None)) is None or count == 5:
+                if count == 5:
+                    os.kill(os.getpid(), number)
+                    events[0].wait(60.0)
+                    os.kill(os.getpid(), number)
+                ended.wait(60.0)
+                raise SystemExit
+            return compute_task(*arguments)
+
+        target = tmp_path / "out.nc"
+        command = ["run", str(config), "-o", str(target), "--jobs", jobs]
+        with monkeypatch.context() as patch:
+            patch.setattr("ringsweep.runs.sweep.stop_on_interrupt", watched)
+            patch.setattr("ringsweep.runs.sweep.compute_task", endless)
+            assert cli.main(command) == 130
+        ended.set()
+        assert "stopping when the tasks under way are done (Ctrl-C again: stop now" in caplog.text
+        assert "interrupted" in capsys.readouterr().err
+        # The other thread may not have finished its task.
+        assert len(tasks_of(target)) >= 6 - int(jobs)
+        assert cli.main(command) == 0
+        assert same_bits(target, never_stopped)
+
+    def test_interrupt_during_the_first_tasks_tells_that_it_waits_for_compilation(
+        self, config, tmp_path, monkeypatch, caplog, small_tasks
+    ):
+        def interrupted(*arguments):
+            os.kill(os.getpid(), signal.SIGINT)
+            return replace(compute_task(*arguments), seconds=None)
+
+        monkeypatch.setattr("ringsweep.runs.sweep.compute_task", interrupted)
+        assert cli.main(["run", str(config), "-o", str(tmp_path / "out.nc"), "--jobs", "1"]) == 130
+        assert "stopping when compilation and the first cells are done" in caplog.text
+
+    @pytest.mark.parametrize("call", ["sweep", "simulate", "precision"])
+    def test_interrupt_ends_at_once_what_keeps_nothing(self, scene, monkeypatch, call):
+        ended = threading.Event()
+
+        def endless(*arguments):
+            os.kill(os.getpid(), signal.SIGINT)
+            ended.wait(60.0)
+            raise SystemExit
+
+        monkeypatch.setattr("ringsweep.solvers.event.Auto.run", endless)
+        monkeypatch.setattr("ringsweep.solvers.event.Event.run", endless)
+        calls = {"sweep": partial(ringsweep.sweep, axes={}), "simulate": ringsweep.simulate}
+        with pytest.raises(KeyboardInterrupt):
+            calls.get(call, lambda scene: ringsweep.precision({"scene": scene}))(scene)
+        ended.set()
 
     def test_sweep_continues_after_a_change_that_does_not_affect_its_bits(self, scene, half_done, never_stopped):
         """Units as typed, the order of keys, and the value of a swept path may change."""

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import logging
 import os
+import signal
 import sys
+import threading
 import traceback
-from collections.abc import Sequence
-from contextlib import nullcontext, redirect_stdout
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext, redirect_stdout, suppress
 from typing import Any
 
 from ringsweep.cli.parser import build_parser
@@ -25,7 +27,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit status: 0 if done, 2 if the input is wrong, 130 after Ctrl-C, 1 for any other error.
+        Exit status: 0 if done, 2 if the input is wrong, 130 after Ctrl-C or SIGTERM, 1 for any other error.
     """
     parser = build_parser()
     given = sys.argv[1:] if argv is None else list(argv)
@@ -43,12 +45,18 @@ def main(argv: Sequence[str] | None = None) -> int:
         logging.DEBUG if arguments.verbose else logging.WARNING if arguments.quiet else logging.INFO
     )
     try:
-        with redirect_stdout(None) if arguments.quiet else nullcontext():
+        with _terminable(), redirect_stdout(None) if arguments.quiet else nullcontext():
             arguments.command(arguments)
     except InputError as error:
         return _fail(str(error), 2)
     except KeyboardInterrupt as error:
-        return _fail("interrupted", 130, error)
+        _fail("interrupted", 130, error)
+        if argv is None:
+            # A regular exit would wait for a compilation that other threads have begun.
+            with suppress(OSError):
+                sys.stdout.flush()
+            os._exit(130)
+        return 130
     except BrokenPipeError:
         # The reader of the output, such as `head`, has closed it.
         sys.stdout = None
@@ -58,6 +66,20 @@ def main(argv: Sequence[str] | None = None) -> int:
             traceback.print_exception(error)
         return _fail(shortened(f"{type(error).__name__}: {error}", 1500), 1, error)
     return 0
+
+
+@contextmanager
+def _terminable() -> Iterator[None]:
+    """Let SIGTERM do what Ctrl-C does."""
+    if threading.current_thread() is not threading.main_thread():
+        # Only the main thread can handle signals.
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _fail(message: str, status: int, error: BaseException | None = None) -> int:

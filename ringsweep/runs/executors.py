@@ -6,7 +6,7 @@ import logging
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from queue import SimpleQueue
 from typing import Any, Protocol, TypeVar
@@ -36,7 +36,7 @@ class Executor(Protocol):
         tasks: Iterator[Positions],
         learn: Callable[[Result], Result],
         stopped: threading.Event,
-    ) -> Iterator[Result]:
+    ) -> Generator[Result]:
         """Results in the order in which they are finished. The next task is taken when a thread is free for it.
 
         Parameters
@@ -74,14 +74,13 @@ class Threads:
         tasks: Iterator[Positions],
         learn: Callable[[Result], Result],
         stopped: threading.Event,
-    ) -> Iterator[Result]:
+    ) -> Generator[Result]:
         """Results in the order in which they are finished; see :class:`Executor`.
 
-        A thread that fails stops the others after their tasks; its error is raised when their results are handed over.
+        The calling thread only waits: compilation and kernels would hold up its reaction to Ctrl-C. A thread that
+        fails stops the others after their tasks; its error is raised when their results are handed over. If Ctrl-C
+        ends the wait, or is thrown into the generator, what is finished is still handed over.
         """
-        if self._jobs == 1:
-            yield from (learn(compute(task)) for task in tasks)
-            return
         found: SimpleQueue[Result | BaseException | None] = SimpleQueue()
         lock = threading.Lock()
 
@@ -106,14 +105,20 @@ class Threads:
         for thread in threads:
             thread.start()
         working, failure = len(threads), None
-        while working:
-            item = found.get()
-            if item is None:
-                working -= 1
-            elif isinstance(item, BaseException):
-                failure = failure or item
-            else:
-                yield item
+        try:
+            while working:
+                item = found.get()
+                if item is None:
+                    working -= 1
+                elif isinstance(item, BaseException):
+                    failure = failure or item
+                else:
+                    yield item
+        except KeyboardInterrupt:
+            while not found.empty():
+                if (item := found.get()) is not None and not isinstance(item, BaseException):
+                    yield item
+            raise
         if failure is not None:
             raise failure
 
@@ -139,26 +144,44 @@ def executor(jobs: int | None, scheduler: str | None) -> AbstractContextManager[
     return dask.workers(scheduler)
 
 
+def interruptible(function: Callable[[], Result]) -> Result:
+    """Result of a function that runs in another thread, so that Ctrl-C ends the wait for it at once."""
+    tasks = iter([np.empty(0, dtype=np.intp)])
+    (result,) = Threads(1).results(lambda _: function(), tasks, lambda result: result, threading.Event())
+    return result
+
+
 @contextmanager
-def stop_on_interrupt() -> Iterator[threading.Event]:
-    """Event that the first Ctrl-C within the block sets. The second Ctrl-C raises `KeyboardInterrupt`."""
+def stop_on_interrupt(under_way: Callable[[], str]) -> Iterator[threading.Event]:
+    """Event that the first Ctrl-C or SIGTERM within the block sets. The second one acts as it does elsewhere.
+
+    Parameters
+    ----------
+    under_way : callable
+        Returns what the sweep waits for after the first one.
+    """
     stopped = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         # Only the main thread can handle signals.
         yield stopped
         return
-    before = signal.getsignal(signal.SIGINT)
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    def restore() -> None:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
     def interrupt(number: int, frame: Any) -> None:
-        signal.signal(signal.SIGINT, before)
+        restore()
         stopped.set()
-        logger.info("stopping when the tasks under way are done (Ctrl-C again: stop now and lose them)")
+        logger.info("stopping when %s (Ctrl-C again: stop now and lose that)", under_way())
 
-    signal.signal(signal.SIGINT, interrupt)
+    for number in before:
+        signal.signal(number, interrupt)
     try:
         yield stopped
     finally:
-        signal.signal(signal.SIGINT, before)
+        restore()
 
 
 def progress_bar(total: int | None, progress: bool, done: int = 0) -> Any:

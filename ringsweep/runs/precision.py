@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from statistics import median
 from typing import Any
 
@@ -24,7 +25,7 @@ from ringsweep.quantities.units import quantity
 from ringsweep.quantities.variables import FAILED, OUTCOMES, PRECISION, Variable
 from ringsweep.runs.cells import values_of_cells
 from ringsweep.runs.contenders import TimedMethod, contenders_for, setting_of, solver_yaml, time_methods
-from ringsweep.runs.executors import progress_bar
+from ringsweep.runs.executors import interruptible, progress_bar
 from ringsweep.solvers.certificate import agree
 from ringsweep.solvers.event import Event, Implicit
 from ringsweep.solvers.method import Result
@@ -113,6 +114,10 @@ def measure(
     config: Config, *, target: float = TARGET, cells: int = CELLS, rounds: int = ROUNDS, progress: bool = True
 ) -> xr.Dataset:
     """Measure a validated configuration; see :func:`precision`."""
+    return interruptible(partial(_measure, config, target, cells, rounds, progress))
+
+
+def _measure(config: Config, target: float, cells: int, rounds: int, progress: bool) -> xr.Dataset:
     target = quantity(target, _TARGET, "target")
     cells, rounds = int(quantity(cells, COUNT, "cells")), int(quantity(rounds, COUNT, "rounds"))
     scene = config.scene

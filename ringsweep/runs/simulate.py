@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from ringsweep.models import MODELS, batch
 from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import turn
 from ringsweep.quantities.variables import HISTORY, REGIMES
+from ringsweep.runs.executors import interruptible
 from ringsweep.runs.sweep import compute
 from ringsweep.storage.provenance import attributes
 
@@ -90,6 +92,10 @@ def _single_run(scene: str | os.PathLike[str] | Mapping[str, Any], solver: str |
 
 def history(config: Config, *, samples: int = SAMPLES) -> xr.Dataset:
     """Run a configuration with no axis but friction laws and keep the history; see :func:`simulate`."""
+    return interruptible(partial(_history, config, samples))
+
+
+def _history(config: Config, samples: int) -> xr.Dataset:
     outcome = compute(config, jobs=1, progress=False)
     runs = {}
     for law, structure in config.scene.structures.items():

@@ -6,7 +6,7 @@ import logging
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
 from threading import Event
@@ -435,9 +435,16 @@ def _open_tasks(
     total: int | None,
 ) -> Iterator[_Tasks]:
     """Tasks that compute cells of a sweep; `total` is the number of its cells, if all of them are computed."""
-    with stop_on_interrupt() as stopped, context as workers:
+
+    def under_way() -> str:
+        learnt = not math.isnan(sizes.seconds_per_cell)
+        return "the tasks under way are done" if learnt else "compilation and the first cells are done"
+
+    with context as workers:
         sizes = TaskSizes(config.solver.side_by_side, workers.concurrency)
-        with progress_bar(total, progress, int(store.done.sum())) as bar:
+        # What is in memory is lost anyway: there the first Ctrl-C ends the sweep.
+        stopping = stop_on_interrupt(under_way) if isinstance(store, Checkpoint) else nullcontext(Event())
+        with stopping as stopped, progress_bar(total, progress, int(store.done.sum())) as bar:
             tasks = _Tasks(partial(compute_task, config, layout), store, workers, sizes, stopped, bar)
             try:
                 yield tasks
@@ -465,31 +472,44 @@ class _Tasks:
         self.sizes, self.stopped = sizes, stopped
         self.notice: Callable[[NDArray[np.integer], dict[str, NDArray[Any]]], None] | None = None
         self._waiting: list[TaskResult] = []
+        self._last: TaskResult | None = None
         self._written = monotonic()
 
     def run(self, tasks: Iterator[NDArray[np.integer]]) -> None:
         """Run tasks, each given by the positions of its cells."""
         results = self._workers.results(self._compute, tasks, self.sizes.learn, self.stopped)
         try:
-            for result in results:
-                if result.environment != environment():
-                    changes = differences(environment(), result.environment)
-                    raise InputError("--scheduler", f"a worker has other versions than this process: {changes}")
-                if self.notice is None:
-                    self._store.put(result.positions, result.columns, result.processor)
-                else:
-                    self.notice(result.positions, result.columns)
-                    self._waiting.append(result)
-                    if monotonic() - self._written > _WRITE_INTERVAL:
-                        self.store_waiting()
-                self._bar.update(len(result.positions))
+            for self._last in results:
+                self._keep(self._last)
+        except KeyboardInterrupt as interrupt:
+            self.stopped.set()
+            # What is finished is kept; what is under way is not waited for.
+            if self._last is not None:
+                self._keep(self._last)
+            self._last = results.throw(interrupt)
+            while True:
+                self._keep(self._last)
+                self._last = next(results)
         except BaseException:
             self.stopped.set()
-            raise
-        finally:
             # Tasks under way cannot be interrupted. Wait for their end.
             for _ in results:
                 pass
+            raise
+
+    def _keep(self, result: TaskResult) -> None:
+        if result.environment != environment():
+            changes = differences(environment(), result.environment)
+            raise InputError("--scheduler", f"a worker has other versions than this process: {changes}")
+        if self.notice is None:
+            self._store.put(result.positions, result.columns, result.processor)
+        else:
+            self.notice(result.positions, result.columns)
+            self._waiting.append(result)
+            if monotonic() - self._written > _WRITE_INTERVAL:
+                self.store_waiting()
+        self._bar.update(len(result.positions))
+        self._last = None
 
     def store_waiting(self) -> None:
         """Store the results of small tasks together: a file for each would take longer than its cells."""
