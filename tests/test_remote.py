@@ -3,6 +3,8 @@
 import logging
 import os
 import signal
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -43,6 +45,43 @@ def test_task_of_a_killed_worker_is_computed_by_another(cluster, scene, tmp_path
     monkeypatch.setattr(Checkpoint, "put", kill_one)
     ringsweep.sweep(scene, axes, tmp_path / "dask.nc", scheduler=cluster.scheduler_address, progress=False).close()
     assert killed
+    assert same_bits(tmp_path / "threads.nc", tmp_path / "dask.nc")
+
+
+#: A scheduler with one worker, in one process.
+ALONE = """
+from distributed import LocalCluster
+cluster = LocalCluster(n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address=None)
+print(cluster.scheduler_address, flush=True)
+input()
+"""
+
+
+def test_killed_scheduler_is_told_in_one_line_and_what_is_finished_is_kept(scene, tmp_path, monkeypatch, capsys):
+    axes = {"drive.amplitude": [0.5, 1.0, 2.0, 4.0], "zone.half_angle": [0.1, 0.2, 0.3, 0.4]}
+    ringsweep.sweep(scene, axes, tmp_path / "threads.nc", progress=False).close()
+    config = tmp_path / "sweep.yaml"
+    config.write_text(yaml.safe_dump({"scene": scene, "sweep": {"grid": axes}}))
+    monkeypatch.setattr(TaskSizes, "max_cells", 1)
+    put = Checkpoint.put
+
+    def kill_scheduler(self, *rest):
+        put(self, *rest)
+        if len(self.files) == 3:
+            process.kill()
+            process.wait()
+
+    command = ["run", str(config), "-o", str(tmp_path / "dask.nc")]
+    with subprocess.Popen([sys.executable, "-c", ALONE], stdin=-1, stdout=-1, stderr=-1, text=True) as process:
+        address = process.stdout.readline().strip()
+        with monkeypatch.context() as patch:
+            patch.setattr(Checkpoint, "put", kill_scheduler)
+            assert cli.main([*command, "--backend", "dask", "--scheduler", address]) == 1
+    message = capsys.readouterr().err
+    assert message.count("\n") == 1
+    assert "the connection to the Dask scheduler is lost; " in message
+    assert "of 16 cells are kept in" in message
+    assert cli.main(command) == 0
     assert same_bits(tmp_path / "threads.nc", tmp_path / "dask.nc")
 
 

@@ -78,8 +78,9 @@ def _silence_dask() -> None:
     with suppress(ImportError):
         # The import sets the levels of its loggers, so it must come first.
         import distributed  # noqa: F401
-    for name in ("distributed", "tornado", "asyncio"):
-        logging.getLogger(name).setLevel(logging.CRITICAL)
+    for name in ("distributed", "tornado", "asyncio", *logging.root.manager.loggerDict):
+        if name.partition(".")[0] in ("distributed", "tornado", "asyncio"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
 def map_command(arguments: argparse.Namespace) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import math
 import secrets
@@ -73,8 +74,13 @@ def workers(address: str) -> Iterator[Workers]:
         client = Client(address, timeout=_TIMEOUT, set_as_default=False, name="ringsweep")
     except (OSError, ValueError, TypeError) as error:
         raise InputError("--scheduler", f"no Dask scheduler answers at {address!r}: {error}") from error
-    with client:
-        yield Workers(client)
+    workers = Workers(client)
+    try:
+        yield workers
+    finally:
+        # To close a client that has lost its scheduler, Dask would use an event loop that it has closed.
+        if workers.is_connected():
+            client.close()
 
 
 class Workers:
@@ -120,10 +126,21 @@ class Workers:
                     if stopped.wait(_COUNT_INTERVAL):
                         return
             for _, result in futures:
+                # Tasks that the client gives up have an error in place of a result.
+                if isinstance(result, BaseException):
+                    raise result
                 yield learn(result)
                 submit()
-        except (OSError, CancelledError) as error:
-            raise ConnectionError(f"the connection to the Dask scheduler is lost ({error})") from error
+        except (Exception, asyncio.CancelledError) as error:
+            # Dask raises errors of many kinds once its connection is lost.
+            if isinstance(error, OSError | CancelledError | asyncio.CancelledError) or not self.is_connected():
+                raise ConnectionError("the connection to the Dask scheduler is lost") from error
+            raise
         finally:
-            with suppress(OSError):
-                self.client.unregister_worker_plugin(plugin.name)
+            if self.is_connected():
+                with suppress(OSError):
+                    self.client.unregister_worker_plugin(plugin.name)
+
+    def is_connected(self) -> bool:
+        """Whether the client has not lost its scheduler."""
+        return self.client.status == "running"
