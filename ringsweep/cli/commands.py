@@ -43,6 +43,14 @@ def run_command(arguments: argparse.Namespace) -> None:
     config = refined(load(arguments.config), arguments.refine or None)
     target, picture = _outputs(f"{config.name}.nc" if arguments.output is None else arguments.output, "regime", "sweep")
 
+    if arguments.dry_run:
+        from ringsweep.runs.plan import describe
+
+        if arguments.scheduler is not None:
+            raise InputError("--dry-run", "measures threads of this machine: leave --backend dask out")
+        print(describe(config, target, arguments.jobs))
+        return
+
     from ringsweep import plots
     from ringsweep.cli.report import summarise
     from ringsweep.runs.sweep import write

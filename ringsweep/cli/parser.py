@@ -45,6 +45,7 @@ def build_parser() -> argparse.ArgumentParser:
 
     run = _add_command(commands, "run", run_command, "run a sweep: NetCDF, and a regime map beside it", """
         ringsweep run my.yaml              my.nc and my.png; after a stop the same command goes on
+        ringsweep run my.yaml --dry-run    cells, memory, disk, time; writes nothing
         ringsweep run my.yaml --jobs 1 -o results/one.nc
         ringsweep run finer.yaml --reuse my.nc
         ringsweep run my.yaml --refine     compute only the boundaries of the map
@@ -54,6 +55,9 @@ def build_parser() -> argparse.ArgumentParser:
     run.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose sweep is repeated")
     run.add_argument("-o", "--output", metavar="OUT.nc", help="default: the configuration's name, in this folder")
     run.add_argument("--jobs", type=whole_number, metavar="N", help="threads (default: all cores)")
+    run.add_argument(
+        "--dry-run", action="store_true", help="tell how much memory, disk and time it will take; write nothing"
+    )
     run.add_argument("--fresh", action="store_true", help="start over: discard what an earlier run computed")
     run.add_argument("--reuse", metavar="OLD.nc", help="take cells that this earlier sweep has too")
     run.add_argument(

@@ -165,10 +165,9 @@ def build_axes(columns: Iterable[Column]) -> Axes:
         found.columns[path] = dims, values
         if dims == (dimension(path),):
             _, first = np.unique(values, return_index=True)
-            repeated = np.setdiff1d(np.arange(len(values)), first)
-            if len(repeated):
-                value = values[repeated[0]].item()
-                raise InputError(f"{where}.{repeated[0]}", f"{show(value)} stands twice on this axis")
+            if len(first) < len(values):
+                repeated = np.setdiff1d(np.arange(len(values)), first)[0]
+                raise InputError(f"{where}.{repeated}", f"{show(values[repeated].item())} stands twice on this axis")
     total = math.prod(found.sizes.values())
     if total > MAX_CELLS:
         sizes = " x ".join(map(str, found.sizes.values()))

@@ -68,8 +68,14 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
         own[TABLE_LAW] = law_of_curve(curve)
     # Name a misspelt key, rather than the key that is missing because of it.
     all_laws = MODELS[model].laws | own
-    near = _Paths(_all_paths(model, zones or ("zones.0",), {law: all_laws[law] for law in names} or all_laws, own))
-    leaves = dict(_leaves(scene, "", _Paths(_all_paths(model, zones or ("zones.0",), all_laws, own)), near))
+    paths = _Paths(_all_paths(model, zones or ("zones.0",), dict.fromkeys([*all_laws, FORMULA, TABLE_LAW]), own))
+    try:
+        leaves = dict(_leaves(scene, "", paths))
+    except _UnknownKey as error:
+        near = _Paths(_all_paths(model, zones[:1] or ("zones.0",), names, own)).children if names else {}
+        keys = near.get(error.section, paths.children[error.section])
+        path = f"scene.{error.section}.{error.key}" if error.section else f"scene.{error.key}"
+        raise InputError(path, "unknown key" + suggestion(error.key, keys)) from None
     if not names:
         section_of(scene, "friction", "scene.")
         raise InputError(f"scene.{LAW}", "missing: name a friction law: " + ", ".join(known_laws.names))
@@ -153,7 +159,10 @@ def _structural(model: str, drive: str, laws: Collection[str]) -> tuple[str, ...
 def _all_paths(model: str, zones: tuple[str, ...], laws: Collection[str], own: Mapping[str, type]) -> list[str]:
     """Every path that a scene of this model can have, under some laws and all drives."""
     paths = dict.fromkeys(_structural(model, "table", laws))
-    for law, drive, arcs in product(laws, DRIVES, {(), ("zone",), zones}):
+    known = [law for law in laws if law in MODELS[model].laws or law in own]
+    # Laws bring parameters of each arc, drives do not: a thousand arcs under every law and drive would take a minute.
+    kinds = [*product(known, ("none",), ((), ("zone",), zones)), *product(known[:1], DRIVES, ((),))]
+    for law, drive, arcs in kinds:
         paths |= dict.fromkeys(parameters(Structure(model, law, drive, arcs, own_law=own.get(law))))
     return list(paths)
 
@@ -171,8 +180,16 @@ class _Paths:
                 path = parent
 
 
-def _leaves(node: Any, path: str, paths: _Paths, near: _Paths) -> Iterator[tuple[str, Any]]:
-    """Path and value of every leaf below `node`; `near` are the paths that a message about a wrong one suggests."""
+class _UnknownKey(Exception):
+    """A key that no section of this path has in scenes of the model."""
+
+    def __init__(self, section: str, key: object):
+        self.section, self.key = section, key
+        super().__init__(section, key)
+
+
+def _leaves(node: Any, path: str, paths: _Paths) -> Iterator[tuple[str, Any]]:
+    """Path and value of every leaf below `node`."""
     where = f"scene.{path}".rstrip(".")
     items = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else None
     children = paths.children[path.rstrip(".")]
@@ -182,10 +199,8 @@ def _leaves(node: Any, path: str, paths: _Paths, near: _Paths) -> Iterator[tuple
         full = f"{path}{key}"
         # Check the key, not the path: the single key "body.mass" would pass for `mass` under `body`.
         if str(key) not in children:
-            raise InputError(
-                f"scene.{full}", "unknown key" + suggestion(key, near.children.get(path.rstrip("."), children))
-            )
+            raise _UnknownKey(path.rstrip("."), key)
         if full in paths.known:
             yield full, value
         else:
-            yield from _leaves(value, f"{full}.", paths, near)
+            yield from _leaves(value, f"{full}.", paths)

@@ -23,6 +23,7 @@ from ringsweep.errors import InputError
 from ringsweep.quantities.variables import INFERRED, OUTCOMES, error_attribute
 from ringsweep.runs.cells import TaskResult, compute_task
 from ringsweep.runs.executors import Executor, executor, progress_bar, stop_on_interrupt
+from ringsweep.runs.plan import check_room
 from ringsweep.runs.refined import KnownLabels, complete, decide, gaps, with_nan
 from ringsweep.runs.refined import attributes as refinement_attributes
 from ringsweep.runs.refinement import Refined
@@ -223,6 +224,7 @@ def compute(
     layout = Layout(sizes, chunk=sizes)
     if layout.total > MAX_CELLS_IN_MEMORY:
         raise InputError("sweep", f"{layout.total:.3g} cells do not fit into memory: name a file as output")
+    check_room(config, layout.total, None)
     store = MemoryStore(layout.total)
     found = _compute_cells(config, layout, store, earlier, jobs, scheduler, progress)
     columns = {name: column.reshape(sizes) for name, column in store.columns.items()}
@@ -283,7 +285,9 @@ def write(
 
 def _compute_file(config: Config, target: Path, layout: Layout, checkpoint: Checkpoint, *options: Any) -> None:
     """Compute the cells that the checkpoint lacks, and write the file from it."""
-    if finished := int(checkpoint.done.sum()):
+    finished = int(checkpoint.done.sum())
+    check_room(config, layout.total - finished, target.parent)
+    if finished:
         logger.info("going on: %d of %d cells are done", finished, layout.total)
     found = _compute_cells(config, layout, checkpoint, *options)
     try:

@@ -1,0 +1,180 @@
+"""What a sweep needs: cells, memory, disk and time, before it runs."""
+
+from __future__ import annotations
+
+import math
+import os
+import shutil
+from contextlib import suppress
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from threading import Thread
+from time import monotonic
+
+import joblib
+import numpy as np
+
+from ringsweep.config import Config
+from ringsweep.errors import InputError
+from ringsweep.models import MODELS
+from ringsweep.quantities.variables import OUTCOMES
+from ringsweep.runs.cells import TaskResult, compute_task
+from ringsweep.solvers.certificate import with_errors
+from ringsweep.storage.chunks import Layout
+
+# Bytes of this process without cells, and for each cell of the grid; from benchmarks/results/sizes.md.
+_PROCESS, _BOOKKEEPING = 300e6, 33.0
+
+# Share of the size of the columns that compression leaves in the finished file, from the same table.
+_COMPRESSED = 0.45
+
+# Seconds to measure cells, seconds to wait for the first ones (they may be compiled), and the most cells to measure.
+_MEASURING, _FIRST, _MOST = 1.0, 120.0, 100_000
+
+
+def bytes_of_cell(config: Config) -> int:
+    """Size of the columns of a cell; variables that some solvers leave out are counted."""
+    model = MODELS[config.scene.structure.model]
+    names = {*model.outcomes, "steps", "certified", "stiffness"} - set(model.absent)
+    errors = (
+        [f"{name}_error" for name in with_errors(model.outcomes)] if getattr(config.solver, "certify", False) else []
+    )
+    return sum(np.dtype(OUTCOMES[name].dtype).itemsize for name in (*names, *errors))
+
+
+def check_room(config: Config, cells: int, folder: Path | None) -> None:
+    """Make sure that a sweep fits into the memory, and onto the disk.
+
+    Parameters
+    ----------
+    config : Config
+    cells : int
+        Number of cells that are still to be computed.
+    folder : Path, optional
+        Where the file is written; None for a sweep in memory.
+
+    Raises
+    ------
+    InputError
+        If it does not fit.
+    """
+    needed, there = memory_needed(config, folder is None), memory_of_machine()
+    if needed > there:
+        raise InputError("sweep", f"the grid needs {size(needed)} of memory, and this machine has {size(there)}")
+    # How many cells a refined sweep runs is not known before.
+    if folder is None or config.refine is not None:
+        return
+    needed, there = float(cells * bytes_of_cell(config)), shutil.disk_usage(folder).free
+    if needed > there:
+        raise InputError(
+            "sweep", f"{cells} cells need {size(needed)} on the disk, and {size(there)} are free in {folder}"
+        )
+
+
+def memory_needed(config: Config, in_memory: bool) -> float:
+    """Bytes of memory that a sweep takes at most."""
+    total = Layout(tuple(config.axes.sizes.values())).total
+    return _PROCESS + total * (_BOOKKEEPING + (2.0 * bytes_of_cell(config) if in_memory else 0.0))
+
+
+def memory_of_machine() -> float:
+    """Bytes of memory that this process may use at most."""
+    found = math.inf
+    # Some systems do not tell.
+    with suppress(AttributeError, OSError, ValueError):
+        found = float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    # A container may have less.
+    with suppress(OSError, ValueError):
+        found = min(found, float(Path("/sys/fs/cgroup/memory.max").read_text()))
+    return found
+
+
+def describe(config: Config, target: Path, jobs: int | None) -> str:
+    """Cells, memory, disk and estimated time of a sweep, as lines of text. Some of its cells are run for it.
+
+    Raises
+    ------
+    InputError
+        If it fits neither into the memory nor onto the disk.
+    """
+    folder = target.resolve().parent
+    layout = Layout(tuple(config.axes.sizes.values()))
+    check_room(config, layout.total, folder)
+    shape = f" ({', '.join(f'{name} {length}' for name, length in config.axes.sizes.items())})" * bool(layout.sizes)
+    columns = float(layout.total * bytes_of_cell(config))
+    free = shutil.disk_usage(folder).free
+    threads = jobs or joblib.cpu_count()
+    most = "at most " if config.refine is not None else ""
+    return "\n".join(
+        (
+            f"cells: {most}{layout.total}{shape}",
+            f"memory: some {size(memory_needed(config, False))} of {size(memory_of_machine())}",
+            f"disk: {most}{size(columns * (1.0 + _COMPRESSED))} while it runs, then {most}{size(columns * _COMPRESSED)}"
+            f"; {size(free)} are free in {folder}",
+            f"time: {most}{_time(config, layout, threads)}",
+            "nothing was written",
+        )
+    )
+
+
+def _time(config: Config, layout: Layout, threads: int) -> str:
+    """Estimated time of a sweep in words."""
+    results = _measure(config, layout)
+    if results is None:
+        return f"not known: the first cells took more than {_FIRST:.0f} s, compilation included"
+    cells = sum(len(result.positions) for result in results)
+    cost = sum(result.seconds or 0.0 for result in results) / cells if cells else _MEASURING
+    seconds = cost * layout.total / min(threads, layout.total)
+    basis = f"measured on {cells} cells spread over the grid" if cells else "one cell takes longer than the measurement"
+    about = "about" if cells else "more than"
+    return f"{about} {duration(seconds)} on {threads} threads, once the kernels are compiled ({basis})"
+
+
+def _measure(config: Config, layout: Layout) -> list[TaskResult] | None:
+    """Results of cells spread over the grid, without the first ones; None if these do not come."""
+    drawn = np.random.default_rng(0).integers(layout.total, size=min(_MOST, layout.total))
+    answers: SimpleQueue[TaskResult | BaseException | None] = SimpleQueue()
+    side = config.solver.side_by_side
+
+    def work() -> None:
+        try:
+            # The first ones may compile or load kernels. They are run again.
+            answers.put(compute_task(config, layout, drawn[:side]))
+            start, stop, began = 0, side, monotonic()
+            while start < len(drawn) and monotonic() - began < _MEASURING / 2:
+                answers.put(compute_task(config, layout, drawn[start:stop]))
+                start, stop = stop, 2 * stop
+            answers.put(None)
+        except BaseException as error:
+            answers.put(error)
+
+    # A thread, since cells may run longer than anyone waits.
+    Thread(target=work, daemon=True).start()
+    results: list[TaskResult] = []
+    deadline = monotonic() + _FIRST
+    while True:
+        try:
+            answer = answers.get(timeout=max(deadline - monotonic(), 0.0))
+        except Empty:
+            return results[1:] if results else None
+        if isinstance(answer, BaseException):
+            raise answer
+        if answer is None:
+            return results[1:]
+        if not results:
+            deadline = monotonic() + 2.0 * _MEASURING
+        results.append(answer)
+
+
+def size(number: float) -> str:
+    """A number of bytes in words."""
+    power = min(int(math.log10(max(number, 1.0)) / 3.0), 4)
+    return f"{number / 1000.0**power:.3g} {('B', 'kB', 'MB', 'GB', 'TB')[power]}"
+
+
+def duration(seconds: float) -> str:
+    """A time in words."""
+    for unit, length in (("days", 86400.0), ("h", 3600.0), ("min", 60.0)):
+        if seconds >= 2.0 * length:
+            return f"{seconds / length:.2g} {unit}"
+    return f"{max(seconds, 0.1):.2g} s"
