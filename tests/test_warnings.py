@@ -116,6 +116,13 @@ def test_belts_give_the_share_of_riding_bodies_and_the_span_of_their_first_slip(
     assert caplog.text.count("needs a span of more than 7.3575 s\n") == 1
 
 
+def test_warnings_of_a_belt_whose_weight_overflows_are_the_only_ones():
+    """NumPy's own warnings are errors in these tests."""
+    of = BELT | {"body": {"mass": 1e308}, "spring": {"stiffness": 2.0}, "belt": {"velocity": 0.1}}
+    found = ringsweep.sweep(of, {"belt.velocity": [0.1]}, progress=False)
+    assert found["regime"].size == 1
+
+
 def test_belts_give_the_share_of_motions_that_have_not_settled(caplog):
     of = BELT | {"body": {"mass": 1.0}, "spring": {"stiffness": 2.0}, "belt": {"velocity": 0.1}, "initial": {"x": 0.0}}
     ringsweep.sweep(of, {"time.span": [12.0, 60.0]}, progress=False)

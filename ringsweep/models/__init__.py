@@ -4,6 +4,8 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any
 
+import numpy as np
+
 from ringsweep.compile import lacking
 from ringsweep.models.belt import Belt
 from ringsweep.models.model import Model
@@ -45,7 +47,9 @@ def parameters(structure: Structure) -> dict[str, Parameter]:
 
 def batch(structure: Structure, values: Values) -> Any:
     """Cells that kernels run over; see :meth:`Model.build`."""
-    return MODELS[structure.model].build(structure, values)
+    # Products of values that a double can hold may overflow. Runs of such cells fail.
+    with np.errstate(over="ignore", invalid="ignore"):
+        return MODELS[structure.model].build(structure, values)
 
 
 # A file that is put into this folder registers what it holds.

@@ -134,7 +134,7 @@ def _spans_of_first_slip(config: Config, cells: NDArray[np.intp] | None) -> NDAr
         body = batch(structure, values_at(scene, axes, {dim: along[own] for dim, along in indices.items()}, len(own)))
         if isinstance(body.drive, Constant):
             velocity = body.drive.amplitude
-            with np.errstate(divide="ignore", invalid="ignore"):
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
                 load = body.mu_s * body.mass * body.gravity
                 if isinstance(body.damper, Damper):
                     load = load - body.damper.coefficient * np.abs(velocity)

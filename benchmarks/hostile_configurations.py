@@ -1,0 +1,484 @@
+"""Random configurations by grammar: each is refused in one line that names the place, or runs to finite numbers.
+
+    python -m benchmarks.hostile_configurations                  # 10 000 configurations
+    python -m benchmarks.hostile_configurations --count 100 --seed 7
+
+A configuration begins as one that runs, with one to four cells. Then up to three mutations change values, units, types,
+names, formulas, tables, axes, refinement and solver, or its text. The command line runs it in this process. What must
+hold: exit status 0 or 2; no traceback and no warning of Python; a message is one line of at most 2000 characters that
+names a path or a line; numbers of runs that did not fail are finite; nothing is left behind but the files asked for.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import copy
+import io
+import logging
+import math
+import random
+import re
+import sys
+import tempfile
+import time
+import warnings
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+import yaml
+
+from benchmarks._common import machine, markdown
+
+SEED = 20241121
+
+_BELT: dict[str, Any] = {
+    "model": "belt",
+    "body": {"mass": "1 kg"},
+    "spring": {"stiffness": 2.0},
+    "belt": {"velocity": "10 cm/s"},
+    "time": {"span": "5 s"},
+}
+_RING: dict[str, Any] = {
+    "model": "ring",
+    "body": {"mass": 0.076, "inertia": "4.47e-5 kg m^2", "half_distance": "25 mm", "ball_radius": 0.01},
+    "ring": {"radius": "43.378 mm"},
+    "zone": {"half_angle": "15 deg"},
+    "drive": {"law": "arctan", "amplitude": 2.0},
+    "time": {"span": 1.0},
+}
+_PAIRS = {"rough": {"mu_s": 0.5, "mu_k": 0.3}, "rest": {"mu_s": 0.2, "mu_k": 0.1}}
+
+#: Scenes that run, with the paths that are swept and two values for each.
+KINDS: dict[str, tuple[dict[str, Any], dict[str, list[Any]]]] = {
+    "ring": (
+        _RING | {"friction": {"law": "stiction", **_PAIRS}},
+        {"drive.amplitude": [0.5, 8.0], "zone.half_angle": ["5 deg", 0.6], "initial.omega": [0, 10]},
+    ),
+    "belt": (
+        _BELT | {"friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.1}},
+        {"belt.velocity": [0.05, 0.3], "friction.mu_s": [0.1, "30 %"], "body.mass": [0.5, "2 kg"]},
+    ),
+    "creep": (
+        _RING | {"friction": {"law": "bengisu-akay", "alpha": 1e5, "v0": 2e-6, **_PAIRS}},
+        {"drive.amplitude": [0.5, 8.0], "friction.v0": [1e-6, "1 mm/s"], "friction.alpha": [10, 1e5]},
+    ),
+    "formula": (
+        _BELT
+        | {
+            "friction": {
+                "law": "formula",
+                "mu": "mu_k + (mu_s - mu_k)/(1 + delta*v)",
+                "at_rest": "mu_s",
+                "delta": "3 s/m",
+                "mu_s": 0.4,
+                "mu_k": 0.3,
+            }
+        },
+        {"belt.velocity": [0.05, 0.3], "friction.delta": [1.0, "1 s/m", 20]},
+    ),
+    "table": (
+        _BELT | {"friction": {"law": "table", "v": [0, 0.1, "1 m/s"], "mu": [0.4, 0.3, 0.25]}},
+        {"belt.velocity": [0.05, 0.3], "friction.scale": [0.5, 1.0]},
+    ),
+    "arcs": (
+        {name: part for name, part in _RING.items() if name != "zone"}
+        | {
+            "friction": {"law": "stiction", "rest": {"mu_s": 0.2, "mu_k": 0.1}},
+            "zones": [
+                {"center": 0, "half_angle": "15 deg", "mu_s": 0.5, "mu_k": 0.3},
+                {"center": "90 deg", "half_angle": 0.2, "mu_s": 0.4, "mu_k": 0.4},
+            ],
+        },
+        {"drive.amplitude": [0.5, 8.0], "zones.1.center": [1.0, "180 deg"]},
+    ),
+    "measured": (
+        {name: part for name, part in _RING.items() if name != "drive"}
+        | {
+            "model": "ring-single-contact",
+            "body": {"mass": "76 g"},
+            "friction": {"law": "coulomb", "rough": {"mu_k": 0.5}, "rest": {"mu_k": 0.2}},
+            "drive": {"law": "table", "time": [0, 0.5, 1, "2 s", 3], "theta": [0, 0.1, "20 deg", 0.6, 0.5]},
+        },
+        {"zone.half_angle": ["5 deg", 0.6], "initial.phi": [0.1, "1 rad"]},
+    ),
+}
+
+#: The kinds whose kernels most tests compile too.
+COMMON = ("ring", "belt")
+
+_NUMBERS = [0, -1, 1, 3, 1e-300, 5e-324, 1e300, -1e308, 1.7e308, 0.5, 1e6, 1e-9, math.nan, math.inf, 10**30, 7**6000]
+_WORDS = ["", "x", "0x1F", "1e5", "1_000", "010", "1:30", "nan", "-.inf", "~", "yes", "15deg", "3 kg", "5 s/m", "2 m/s"]
+_WORDS += [
+    "1e400",
+    "10 %",
+    "1/0",
+    "five",
+    "µ",
+    "\N{DEGREE SIGN}",
+    "5 5",
+    "--",
+    "1 m^2 kg/s",
+    "x" * 5000,
+    "{",
+    "a: b",
+    "*a",
+]
+_OTHERS = [None, True, False, [], {}, [1], [1, 2, 3], {"a": 1}, [[1, 2], [3, 4]], {"linspace": [0, 1, 2]}]
+_KEYS = [
+    "law",
+    "mu_s",
+    "mu_k",
+    "alpha",
+    "extra",
+    "mass",
+    "span",
+    "velocity",
+    "file",
+    "mu",
+    "at_rest",
+    "gravity",
+    "x",
+    "",
+]
+_KEYS += ["viscous", "center", "1", "stiffness", "classify", "initial", "drive", "zone", "zones", "force", "damper"]
+_FORMULAS = [
+    "mu_k",
+    "mu_s/(1 + delta*v)",
+    "mu_k*exp(-v*delta)",
+    "min(mu_s, mu_k + delta*v)",
+    "piecewise(v < w, mu_s, mu_k)",
+]
+_TOKENS = [
+    "v",
+    "mu_s",
+    "mu_k",
+    "delta",
+    "+",
+    "-",
+    "*",
+    "/",
+    "**",
+    "(",
+    ")",
+    "exp(",
+    "1",
+    "0",
+    "2.5",
+    "sqrt(",
+    ",",
+    "^",
+    "=",
+]
+_SOLVERS: list[Any] = [
+    {"method": "auto", "max_steps": 1000},
+    {"method": "auto", "max_steps": 100_000, "certify": False},
+    {"method": "event", "max_steps": 100_000, "rtol": 1e-9},
+    {"method": "implicit", "max_steps": 100_000, "rtol": 1e-5},
+    {"method": "rk4", "steps": 50},
+    {"method": "rk4", "steps": 200, "certify": False},
+    {"method": "rk4"},
+    "auto",
+    "rk4",
+    {"method": "event", "max_steps": 1000, "rtol": -1},
+    {"method": "auto", "steps": 10},
+]
+_REFINEMENTS = [True, {}, {"stride": 2}, {"stride": 2, "audit": 1.0}, {"stride": 0}, {"audit": 2}, {"axes": ["x"]}, 3]
+_SPACINGS: list[Any] = [
+    {"linspace": [0.1, 1.0, 2]},
+    {"geomspace": [0.1, 1.0, 2]},
+    {"linspace": [1, 1, 2]},
+    {"geomspace": [-1, 1, 2]},
+    {"linspace": [-1.7e308, 1.7e308, 3]},
+    {"linspace": [0, 1, 0]},
+    {"linspace": [0, 1, 1e9]},
+    {"linspace": [0, 1]},
+    {"linspace": ["1 deg", "2 kg", 2]},
+    {"logspace": [0, 1, 2]},
+]
+
+# Variables that have no number where something did not happen, or was not bounded. Under a law that jumps the stiffness
+# is infinite.
+_MAY_BE_MISSING = {
+    "t_separation",
+    "first_slip",
+    "period",
+    "stiffness",
+    "stops_per_cycle",
+    "stick_share",
+    "normal_min_2",
+}
+
+
+@dataclass
+class Report:
+    """What an attack found: how often each outcome came, and what did not hold, with its seed and number."""
+
+    counts: Counter[str] = field(default_factory=Counter)
+    broken: list[str] = field(default_factory=list)
+
+
+def random_configuration(draw: random.Random, kinds: Collection[str]) -> str:
+    """Text of a configuration: one that runs, with up to three mutations."""
+    scene, swept = copy.deepcopy(KINDS[draw.choice(list(kinds))])
+    solver: Any = {"method": "auto", "max_steps": 100_000}
+    paths = draw.sample(list(swept), draw.randint(0, 2))
+    tree: dict[str, Any] = {"scene": scene, "solver": solver}
+    if paths:
+        tree["sweep"] = {draw.choice(["grid", "grid", "points"]): {p: swept[p][: draw.randint(1, 2)] for p in paths}}
+    for _ in range(draw.choice([0, 0, 1, 1, 2, 3])):
+        draw.choice(_MUTATIONS)(tree, draw)
+    with contextlib.suppress(ValueError):
+        # Python writes no integers of thousands of digits.
+        text = yaml.safe_dump(tree, sort_keys=False, allow_unicode=True)
+        return _changed_text(text, draw) if draw.random() < 0.1 else text
+    return yaml.safe_dump(_without_long_integers(tree), sort_keys=False).replace("LONG", "7" * 5000)
+
+
+def _without_long_integers(node: Any) -> Any:
+    if isinstance(node, dict):
+        return {key: _without_long_integers(child) for key, child in node.items()}
+    if isinstance(node, list):
+        return [_without_long_integers(child) for child in node]
+    return "LONG" if isinstance(node, int) and abs(node) > 10**100 else node
+
+
+def _places(node: Any) -> Iterator[tuple[Any, Any]]:
+    """Every container below a node with each of its keys."""
+    for key, child in list(node.items() if isinstance(node, dict) else enumerate(node)):
+        yield node, key
+        if isinstance(child, dict | list):
+            yield from _places(child)
+
+
+def _place(tree: Any, draw: random.Random) -> tuple[Any, Any]:
+    return draw.choice(list(_places(tree)) or [(tree, "scene")])
+
+
+def _junk(draw: random.Random) -> Any:
+    return copy.deepcopy(draw.choice(draw.choice([_NUMBERS, _WORDS, _OTHERS])))
+
+
+def _replace(tree: Any, draw: random.Random) -> None:
+    node, key = _place(tree, draw)
+    node[key] = _junk(draw)
+
+
+def _scale(tree: Any, draw: random.Random) -> None:
+    numbers = [(node, key) for node, key in _places(tree) if isinstance(node[key], int | float)]
+    for node, key in draw.sample(numbers, min(len(numbers), 2)):
+        with contextlib.suppress(OverflowError):
+            node[key] = node[key] * 10.0 ** draw.uniform(-3.0, 3.0) * draw.choice([1.0, 1.0, 1.0, -1.0])
+
+
+def _respell(tree: Any, draw: random.Random) -> None:
+    node, key = _place(tree, draw)
+    if isinstance(node[key], int | float) and not isinstance(node[key], bool) and abs(node[key]) < 1e300:
+        node[key] = (
+            f"{node[key]} {draw.choice(['', 'm', 'mm', 'kg', 's', 'deg', 'rad/s', 'm/s', 'rpm', '%', 'N/m', 'q'])}"
+        )
+
+
+def _misspell(tree: Any, draw: random.Random) -> None:
+    node, key = _place(tree, draw)
+    if isinstance(node, dict) and isinstance(key, str) and key:
+        i = draw.randrange(len(key))
+        node[draw.choice([key[:i] + key[i + 1 :], key[:i] + key[i] * 2 + key[i + 1 :], key.upper()])] = node.pop(key)
+
+
+def _remove(tree: Any, draw: random.Random) -> None:
+    node, key = _place(tree, draw)
+    del node[key]
+
+
+def _add(tree: Any, draw: random.Random) -> None:
+    sections = [node for node, _ in _places(tree) if isinstance(node, dict)] or [tree]
+    draw.choice(sections)[draw.choice(_KEYS)] = _junk(draw)
+
+
+def _resolve(tree: Any, draw: random.Random) -> None:
+    tree["solver"] = copy.deepcopy(draw.choice(_SOLVERS))
+
+
+def _resweep(tree: Any, draw: random.Random) -> None:
+    sweep = tree.setdefault("sweep", {})
+    if not isinstance(sweep, dict):
+        return
+    if draw.random() < 0.3:
+        sweep["refine"] = copy.deepcopy(draw.choice(_REFINEMENTS))
+    grid = sweep.setdefault("grid", {})
+    if isinstance(grid, dict):
+        path = draw.choice(
+            [*grid, "drive.amplitude", "friction.mu_k", "friction.law", "body.mass", "nothing", "time.span"]
+        )
+        grid[path] = copy.deepcopy(draw.choice([*_SPACINGS, _junk(draw)]))
+
+
+def _reformulate(tree: Any, draw: random.Random) -> None:
+    friction = tree.get("scene", {}).get("friction") if isinstance(tree.get("scene"), dict) else None
+    if not isinstance(friction, dict) or "at_rest" not in friction:
+        return
+    tokens = [draw.choice(_TOKENS) for _ in range(draw.randint(1, 9))]
+    friction["mu"] = draw.choice([*_FORMULAS[:2], " ".join(tokens), f"mu_k*({' '.join(tokens)})"])
+    friction["at_rest"] = draw.choice(["mu_s", "mu_s", "mu_k", None, "v", 3])
+
+
+_MUTATIONS: list[Callable[[Any, random.Random], None]] = [
+    *(_replace, _scale, _scale, _respell, _misspell, _remove, _add, _resolve, _resweep, _reformulate)
+]
+
+
+def _changed_text(text: str, draw: random.Random) -> str:
+    i = draw.randrange(len(text))
+    piece = draw.choice(
+        ["", " ", "\t", "\n", ":", "- ", "&a ", "*a", "!!int ", '"', "[", "}", "#", "\x00", "\ufffe", "é"]
+    )
+    return text[:i] + piece + text[i + draw.randint(0, 5) :]
+
+
+def configurations(folder: Path, count: int, seed: int, kinds: Collection[str] = tuple(KINDS)) -> Report:
+    """Run random configurations.
+
+    Parameters
+    ----------
+    folder : Path
+        An empty folder.
+    count, seed : int
+        Number of configurations; number `k` of a seed is the same for every count.
+    kinds : collection of str
+        Names in :data:`KINDS`: fewer kinds compile less.
+
+    Returns
+    -------
+    Report
+    """
+    report = Report()
+    slowest = 0.0
+    for number in range(count):
+        draw = random.Random(f"{seed} {number}")
+        text = random_configuration(draw, kinds)
+        config, target = folder / "a.yaml", folder / "a.nc"
+        config.write_bytes(text.encode("utf-8", "surrogatepass"))
+        verb = draw.choices(["run", "simulate", "dry-run"], [18, 1, 1])[0]
+        command = [verb if verb != "dry-run" else "run", str(config), "-o", str(target)]
+        command += ["--dry-run"] if verb == "dry-run" else []
+        began = time.monotonic()
+        status, output, problems = _call(command)
+        slowest = max(slowest, time.monotonic() - began)
+        problems += _wrong(status, output, target, wrote=verb != "dry-run")
+        left = {path.name for path in folder.iterdir()} - {"a.yaml", "a.nc", "a.png"}
+        problems += [f"left behind: {', '.join(sorted(left))}"] if left else []
+        outcome = f"{verb}: exit status {status}"
+        if verb == "run" and status == 0 and not problems:
+            outcome = "run: some cells failed" if _failed(target) else "run: all cells have a regime"
+        report.counts[outcome if not problems else "BROKEN"] += 1
+        if problems:
+            report.broken.append(f"configurations, seed {seed}, number {number}: {'; '.join(problems)}")
+            print("BROKEN:", report.broken[-1], flush=True)
+            (folder.parent / f"hostile-{seed}-{number}.yaml").write_bytes(config.read_bytes())
+        for path in folder.iterdir():
+            path.unlink()
+    print(f"the slowest took {slowest:.1f} s", flush=True)
+    return report
+
+
+def _call(command: list[str]) -> tuple[int, str, list[str]]:
+    """Exit status, what the command line printed, and what it should not have done."""
+    from ringsweep import cli, plots
+
+    output = io.StringIO()
+    handler = logging.StreamHandler(output)
+    saved, plots.save = plots.save, _save_nothing
+    logging.getLogger("ringsweep").addHandler(handler)
+    status, problems = -1, []
+    try:
+        with (
+            contextlib.redirect_stdout(io.StringIO()),
+            contextlib.redirect_stderr(output),
+            warnings.catch_warnings(record=True) as warned,
+        ):
+            warnings.simplefilter("always")
+            status = cli.main(command)
+        problems = [f"{one.category.__name__}: {one.message} ({one.filename}:{one.lineno})" for one in warned[:3]]
+    except BaseException as error:
+        if isinstance(error, KeyboardInterrupt):
+            raise
+        problems = [f"{type(error).__name__}: {str(error)[:300]}"]
+    finally:
+        plots.save = saved
+        logging.getLogger("ringsweep").removeHandler(handler)
+    return status, output.getvalue(), problems
+
+
+def _save_nothing(figure: Any, path: Path) -> None:
+    # Pictures take longer than runs.
+    Path(path).touch()
+
+
+def _wrong(status: int, output: str, target: Path, *, wrote: bool) -> list[str]:
+    """What does not hold after a command."""
+    if "Traceback" in output:
+        return [f"traceback: {output[-800:]}"]
+    message = output.strip().rpartition("\n")[2]
+    if status == 2:
+        named = re.search(r"scene|solver|sweep|line \d+|a\.yaml", message)
+        return [f"no place is named: {message}"] * (not named) + (
+            [f"{len(message)} characters: {message[:200]}"] if len(message) > 2000 else []
+        )
+    if status:
+        return [f"exit status {status}: {message[:500]}"]
+    if target.exists() != wrote:
+        return ["the file is missing" if wrote else "a dry run wrote a file"]
+    return _not_finite(target) if wrote else []
+
+
+def _not_finite(target: Path) -> list[str]:
+    """Variables of a result that hold no finite number although their run did not fail."""
+    with xr.open_dataset(target, decode_times=False) as found:
+        good = found["regime"].values != _flag(found["regime"], "failed")
+        if "origin" in found:
+            good &= found["origin"].values != _flag(found["origin"], "inferred")
+        problems = []
+        for name, variable in found.data_vars.items():
+            if variable.dtype.kind != "f" or "time" in variable.dims:
+                continue
+            values = variable.values[good] if variable.shape == good.shape else variable.values
+            missing = name in _MAY_BE_MISSING or str(name).endswith("_error")
+            if (np.isinf(values).any() and name != "stiffness") or (np.isnan(values).any() and not missing):
+                problems.append(f"{name} is not finite in a cell that did not fail")
+        return problems
+
+
+def _failed(target: Path) -> bool:
+    with xr.open_dataset(target, decode_times=False) as found:
+        return bool((found["regime"] == _flag(found["regime"], "failed")).any())
+
+
+def _flag(variable: xr.DataArray, meaning: str) -> int:
+    meanings = str(variable.attrs["flag_meanings"]).split()
+    return int(np.atleast_1d(variable.attrs["flag_values"])[meanings.index(meaning)])
+
+
+def main() -> int:
+    """Run random configurations and print a table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--count", type=int, default=10_000)
+    parser.add_argument("--seed", type=int, default=SEED)
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="hostile-") as name:
+        folder = Path(name) / "configurations"
+        folder.mkdir()
+        report = configurations(folder, arguments.count, arguments.seed)
+    print(f"{machine()}\nseed {arguments.seed}\n")
+    print(markdown(["outcome", "times"], [[outcome, str(times)] for outcome, times in sorted(report.counts.items())]))
+    print("\n".join(["what did not hold:", *report.broken]) if report.broken else "everything held")
+    return 1 if report.broken else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
