@@ -23,6 +23,9 @@ class _PlainNumbers(LogFormatterSciNotation):
         return f"{x:g}" if super().__call__(x, pos) else ""
 
 
+_LARGEST = 1e300
+
+
 @dataclass(frozen=True)
 class Axis:
     """A coordinate as an axis of a map.
@@ -55,10 +58,14 @@ class Axis:
 
     @classmethod
     def of(cls, coordinate: xr.DataArray, ds: xr.Dataset) -> Axis:
-        """The axis of a coordinate of a dataset."""
+        """The axis of a coordinate of a dataset; InputError if its values are too large."""
         names: tuple[str, ...] = ()
         if is_numeric(coordinate):
-            values = coordinate.values * display_factor(coordinate)
+            with np.errstate(over="ignore"):
+                values = coordinate.values * display_factor(coordinate)
+            # The edges of its cells lie beyond the values.
+            if not (np.abs(values) < _LARGEST).all():
+                raise InputError("ds", f"values of {coordinate.name} are too large to be drawn")
         else:
             given = coordinate.values.astype(str).tolist()
             names = tuple(dict.fromkeys(given))

@@ -100,9 +100,11 @@ def compute_task(config: Config, layout: Layout, positions: NDArray[np.integer])
         values = values_at(scene, axes, {dim: along[own] for dim, along in indices.items()}, len(own))
         with readable_compile_errors():
             result = config.solver.run(batch(structure, values), model.outcomes)
-        for name, column in _columns(model.outcomes, result):
-            if name not in model.absent:
-                columns.setdefault(name, np.empty(len(positions), dtype=OUTCOMES[name].dtype))[own] = column
+        # A bound beyond the range of a float of 32 bits is infinite.
+        with np.errstate(over="ignore"):
+            for name, column in _columns(model.outcomes, result):
+                if name not in model.absent:
+                    columns.setdefault(name, np.empty(len(positions), dtype=OUTCOMES[name].dtype))[own] = column
     seconds = perf_counter() - start
     _compiled.add(compiled)
     return TaskResult(positions, columns, None if compiles else seconds, environment(), processor())

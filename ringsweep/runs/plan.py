@@ -132,7 +132,9 @@ def _time(config: Config, layout: Layout, threads: int) -> str:
 
 def _measure(config: Config, layout: Layout) -> list[TaskResult] | None:
     """Results of cells spread over the grid, without the first ones; None if these do not come."""
-    drawn = np.random.default_rng(0).integers(layout.total, size=min(_MOST, layout.total))
+    draw = np.random.default_rng(0)
+    few = layout.total <= _MOST
+    drawn = draw.permutation(layout.total) if few else draw.integers(layout.total, size=_MOST)
     answers: SimpleQueue[TaskResult | BaseException | None] = SimpleQueue()
     side = config.solver.side_by_side
 
