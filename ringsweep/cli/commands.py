@@ -85,14 +85,14 @@ def _silence_dask() -> None:
 def map_command(arguments: argparse.Namespace) -> None:
     """Draw a variable of a sweep."""
     from ringsweep import plots
-    from ringsweep.storage import netcdf
+    from ringsweep.storage import files, netcdf
 
     dataset = Path(arguments.dataset)
     result = netcdf.open_dataset(dataset)
     # The name differs from that of the regime map of the sweep, which must not be replaced.
     shown = [arguments.var] * (arguments.var != "regime") + [held.replace(" ", "") for held in arguments.sel]
     target = Path(arguments.output or dataset.with_name("-".join([dataset.stem, *shown]) + ".png"))
-    netcdf.check_writable(target)
+    files.check_writable(target)
     selection = dict(_selection(text) for text in arguments.sel)
     if arguments.tolerance is not None and arguments.boundaries is None:
         raise InputError("--tolerance", "is that of --boundaries REGIME")
@@ -122,7 +122,7 @@ def plot_command(arguments: argparse.Namespace) -> None:
 
     from ringsweep import plots
     from ringsweep.plots.datasets import resolve
-    from ringsweep.storage import netcdf
+    from ringsweep.storage import files, netcdf
 
     dataset = Path(arguments.dataset)
     result = netcdf.open_dataset(dataset)
@@ -130,7 +130,7 @@ def plot_command(arguments: argparse.Namespace) -> None:
         raise InputError(str(dataset), f"is a sweep, not the history of a run: ringsweep map {dataset} draws it")
     shown = [name for name in (arguments.kind, arguments.law) if name is not None]
     target = Path(arguments.output or dataset.with_name("-".join([dataset.stem, *shown]) + ".png"))
-    netcdf.check_writable(target)
+    files.check_writable(target)
     if "contender" in result.dims and shown:
         raise InputError(str(dataset), "holds errors against run time: --kind and --law are for time histories")
     if arguments.law is not None:
@@ -282,14 +282,14 @@ def _outputs(name: str, mark: str, content: str) -> tuple[Path, Path]:
     InputError
         If one of them cannot be written, or would replace a file that is no result of this kind.
     """
-    from ringsweep.storage import netcdf
+    from ringsweep.storage import files, netcdf
 
     target = Path(name)
-    netcdf.check_writable(target)
+    files.check_writable(target)
     picture = target.with_suffix(".png")
     if target == picture:
         raise InputError(name, "is the name of the picture: name the dataset *.nc")
-    netcdf.check_writable(picture)
+    files.check_writable(picture)
     if target.exists():
         netcdf.check_kind(target, mark, content)
     return target, picture

@@ -5,11 +5,9 @@ from __future__ import annotations
 import json
 import math
 import os
-import secrets
-import tempfile
 import zlib
-from collections.abc import Collection, Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Collection, Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -21,75 +19,13 @@ from numpy.typing import NDArray
 from ringsweep.errors import InputError
 from ringsweep.quantities.variables import MISSING, Variable, error_attribute
 from ringsweep.storage.chunks import Layout
+from ringsweep.storage.files import WorkingFolder, check_name, put_in_place, replacing
 
 #: Attributes that every file of this package has.
 SIGNATURE = ("Conventions", "ringsweep_version")
 
 #: Variables with fewer elements are not compressed: the index of their chunks would take more than compression saves.
 COMPRESSED_FROM = 1024
-
-
-def check_writable(path: str | os.PathLike[str]) -> None:
-    """Check that a file can be written at `path`, before its contents are computed.
-
-    Parameters
-    ----------
-    path : path-like
-        File that is written later; it may exist.
-
-    Raises
-    ------
-    InputError
-        If `path` is a folder, or its folder does not exist or cannot be written.
-    """
-    target = Path(path).resolve()
-    folder = target.parent
-    try:
-        if target.is_dir():
-            raise InputError(str(path), "is a folder; give the name of a file")
-        if not folder.exists():
-            raise InputError(str(path), f"the folder {folder} does not exist; create it or choose another")
-        if not folder.is_dir():
-            raise InputError(str(path), f"{folder} is not a folder")
-        # Raises if the file system does not accept the name.
-        with suppress(FileNotFoundError):
-            target.stat()
-        # Permission bits are not reliable on network drives, on read-only mounts, or for root.
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise InputError(str(path), f"cannot be written: {error.strerror or error}") from error
-
-
-@contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Give a temporary name beside `path`. At the end of the block the temporary file replaces `path`.
-
-    If the block fails or is interrupted, `path` stays unchanged and the temporary file is removed.
-
-    Parameters
-    ----------
-    path : path-like
-        File to write or replace. A symbolic link is followed.
-
-    Yields
-    ------
-    Path
-        Name to write to, in the same folder and with the same suffix.
-
-    Raises
-    ------
-    InputError
-        If `path` cannot be written.
-    """
-    check_writable(path)
-    target = Path(path).resolve()
-    temporary = target.with_name(f".ringsweep-{secrets.token_hex(8)}{target.suffix}")
-    try:
-        yield temporary
-        os.replace(temporary, target)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
@@ -118,7 +54,7 @@ def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
 
 def write(
     target: Path,
-    folder: Path,
+    folder: WorkingFolder,
     frame: xr.Dataset,
     variables: Mapping[str, Variable],
     layout: Layout,
@@ -131,8 +67,8 @@ def write(
     ----------
     target : Path
         File to write or replace.
-    folder : Path
-        Folder on the same disk, for the temporary file.
+    folder : WorkingFolder
+        Folder for the temporary file.
     frame : xarray.Dataset
         Coordinates and attributes.
     variables : mapping of str to Variable
@@ -149,21 +85,20 @@ def write(
     OSError
         If writing fails, or the file differs from the dataset when it is read back.
     """
-    temporary = folder / f"{secrets.token_hex(4)}.tmp"
+    temporary = folder.temporary()
     try:
         _to_netcdf(frame, temporary)
         written = _write_chunks(temporary, frame, variables, layout, chunks, gaps)
         if written != _checksums(temporary, written, layout):
             raise OSError("the file does not read back as it was written")
-        with temporary.open("r+b") as file:
-            os.fsync(file.fileno())
-        temporary.replace(target)
-        _flush_folder(target.parent)
+        put_in_place(temporary, target)
     except (OSError, RuntimeError) as error:
+        folder.check()
         # If the disk is full, the NetCDF library only reports "HDF error".
         raise OSError(f"{target} could not be written ({error}); is the disk full, or faulty?") from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def _to_netcdf(ds: xr.Dataset, path: Path) -> None:
@@ -228,16 +163,6 @@ def _chunked(layout: Layout) -> dict[str, Any]:
     return {"compression": "zlib", "complevel": 1, "shuffle": True, "fletcher32": True, "chunksizes": layout.chunk}
 
 
-def _flush_folder(folder: Path) -> None:
-    # Windows neither needs this nor allows it.
-    if hasattr(os, "O_DIRECTORY"):
-        descriptor = os.open(folder, os.O_DIRECTORY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
-
-
 def check_kind(path: str | os.PathLike[str], mark: str, content: str) -> None:
     """Check that a file is a result of a given kind, so that a new result of this kind may replace it.
 
@@ -289,6 +214,7 @@ def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     """
     if not Path(path).is_file():
         raise InputError(str(path), "is not a file" if Path(path).exists() else "does not exist")
+    check_name(path)
     try:
         # Decoding would turn numbers of seconds into timedelta64.
         ds = xr.open_dataset(Path(path).resolve(), engine="netcdf4", decode_times=False)
