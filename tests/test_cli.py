@@ -199,7 +199,7 @@ def test_unexpected_error_and_interrupt_are_reported_in_one_line(monkeypatch, ca
     def fail(path):
         raise error
 
-    monkeypatch.setattr("ringsweep.storage.netcdf.open_dataset", fail)
+    monkeypatch.setattr("ringsweep.storage.netcdf.check", fail)
     assert main(["info", "out.nc"]) == status
     assert capsys.readouterr().err == f"ringsweep: {message}\n"
 

@@ -9,8 +9,10 @@ from __future__ import annotations
 import argparse
 import json
 import logging
+import sys
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from ringsweep.errors import InputError
 
@@ -55,7 +57,7 @@ def run_command(arguments: argparse.Namespace) -> None:
         print(f"wrote {target}")
     else:
         print(f"{target} holds this sweep already (--fresh computes it again)")
-    with netcdf.open_dataset(target) as result:
+    with netcdf.reading(target) as result:
         summarise(result)
         if not config.axes.sizes or (not computed and _is_newer(picture, target)):
             return
@@ -84,11 +86,17 @@ def _silence_dask() -> None:
 
 def map_command(arguments: argparse.Namespace) -> None:
     """Draw a variable of a sweep."""
+    from ringsweep.storage import netcdf
+
+    dataset = Path(arguments.dataset)
+    with netcdf.reading(dataset) as result:
+        _draw_map(arguments, dataset, result)
+
+
+def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
     from ringsweep import plots
     from ringsweep.storage import files, netcdf
 
-    dataset = Path(arguments.dataset)
-    result = netcdf.open_dataset(dataset)
     # The name differs from that of the regime map of the sweep, which must not be replaced.
     shown = [arguments.var] * (arguments.var != "regime") + [held.replace(" ", "") for held in arguments.sel]
     target = Path(arguments.output or dataset.with_name("-".join([dataset.stem, *shown]) + ".png"))
@@ -118,14 +126,20 @@ def map_command(arguments: argparse.Namespace) -> None:
 
 def plot_command(arguments: argparse.Namespace) -> None:
     """Draw a stored run, or stored errors against run time."""
+    from ringsweep.storage import netcdf
+
+    dataset = Path(arguments.dataset)
+    with netcdf.reading(dataset) as result:
+        _plot(arguments, dataset, result)
+
+
+def _plot(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
     from matplotlib.figure import Figure
 
     from ringsweep import plots
     from ringsweep.plots.datasets import resolve
-    from ringsweep.storage import files, netcdf
+    from ringsweep.storage import files
 
-    dataset = Path(arguments.dataset)
-    result = netcdf.open_dataset(dataset)
     if not {"time", "contender"} & set(result.dims):
         raise InputError(str(dataset), f"is a sweep, not the history of a run: ringsweep map {dataset} draws it")
     shown = [name for name in (arguments.kind, arguments.law) if name is not None]
@@ -224,8 +238,30 @@ def info_command(arguments: argparse.Namespace) -> None:
     """Print a summary of a result file."""
     from ringsweep.storage import netcdf
 
-    result = netcdf.open_dataset(arguments.dataset)
-    print(result.attrs.get("title", arguments.dataset))
+    has_digest = netcdf.check(arguments.dataset)
+    with netcdf.reading(arguments.dataset) as result:
+        _print_summary(arguments.dataset, result)
+    print("digest:", "the file is what ringsweep wrote" if has_digest else "none, so damage would not be noticed")
+
+
+def verify_command(arguments: argparse.Namespace) -> int:
+    """Print whether files are what was written."""
+    from ringsweep.storage import netcdf
+
+    status = 0
+    for file in arguments.files:
+        try:
+            netcdf.verify(file)
+        except InputError as error:
+            status = 2
+            print("ringsweep:", error, file=sys.stderr)
+        else:
+            print(f"{file}: is what ringsweep wrote")
+    return status
+
+
+def _print_summary(name: str, result: Any) -> None:
+    print(result.attrs.get("title", name))
     print("dimensions:", ", ".join(f"{name} {size}" for name, size in result.sizes.items()) or "none: a single run")
     for name, axis in result.coords.items():
         if "contender" in axis.dims:

@@ -44,7 +44,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     try:
         with redirect_stdout(None) if arguments.quiet else nullcontext():
-            arguments.command(arguments)
+            status = arguments.command(arguments)
     except InputError as error:
         return _fail(str(error), 2)
     except KeyboardInterrupt as error:
@@ -57,7 +57,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if arguments.verbose:
             traceback.print_exception(error)
         return _fail(f"{type(error).__name__}: {error}", 1, error)
-    return 0
+    return status or 0
 
 
 def _fail(message: str, status: int, error: BaseException | None = None) -> int:

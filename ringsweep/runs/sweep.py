@@ -276,7 +276,7 @@ def write(
                     )
                 raise
         checkpoint.clear()
-    with netcdf.open_dataset(target) as results:
+    with netcdf.reading(target) as results:
         warn_of_results(results, config)
     return computed
 
