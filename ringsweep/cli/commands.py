@@ -10,11 +10,14 @@ import argparse
 import json
 import logging
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from ringsweep.errors import InputError
+
+logger = logging.getLogger("ringsweep")
 
 
 def init_command(arguments: argparse.Namespace) -> None:
@@ -61,13 +64,21 @@ def run_command(arguments: argparse.Namespace) -> None:
         summarise(result)
         if not config.axes.sizes or (not computed and _is_newer(picture, target)):
             return
-        try:
-            plots.save(plots.regime_map(result), picture)
-        except InputError as error:
-            # The sweep is saved. Only a choice for the picture is missing.
-            print(f"no map: {error.problem} (draw one with ringsweep map {target})")
-        else:
-            print(f"wrote {picture}")
+        _draw(lambda: plots.regime_map(result), picture, f"ringsweep map {target}")
+
+
+def _draw(figure: Callable[[], Any], picture: Path, command: str) -> None:
+    """Draw the picture of a dataset. The dataset is complete, so a picture that fails is only a warning."""
+    from ringsweep import plots
+
+    try:
+        plots.save(figure(), picture)
+    except Exception as error:
+        reason = error.problem if isinstance(error, InputError) else error
+        logger.warning("%s is not drawn: %s (draw one with %s)", picture, reason, command)
+        logger.debug("where the picture failed", exc_info=True)
+    else:
+        print(f"wrote {picture}")
 
 
 def _is_newer(one: Path, other: Path) -> bool:
@@ -182,9 +193,9 @@ def simulate_command(arguments: argparse.Namespace) -> None:
 
     result = history(config)
     netcdf.save(result, target)
-    plots.save(plots.history(result), picture)
     print(result.attrs["outcome"])
-    print(f"wrote {target}\nwrote {picture}")
+    print(f"wrote {target}")
+    _draw(lambda: plots.history(result), picture, f"ringsweep plot {target}")
 
 
 def animate_command(arguments: argparse.Namespace) -> None:
@@ -229,9 +240,9 @@ def precision_command(arguments: argparse.Namespace) -> None:
     options = {name: value for name, value in given.items() if value is not None}
     result = measure(config, **options, progress=not arguments.quiet)
     netcdf.save(result, target)
-    plots.save(plots.work_precision(result), picture)
     print(report(result))
-    print(f"wrote {target}\nwrote {picture}")
+    print(f"wrote {target}")
+    _draw(lambda: plots.work_precision(result), picture, f"ringsweep plot {target}")
 
 
 def info_command(arguments: argparse.Namespace) -> None:
