@@ -140,6 +140,15 @@ class TestKilledWriter:
         assert (tmp_path / "run.nc").read_bytes() == b"first"
         assert os.listdir(tmp_path) == ["run.nc"]
 
+    def test_folder_that_could_not_be_removed_is_removed_before_the_next_run(self, tmp_path, monkeypatch):
+        with monkeypatch.context() as patch:
+            patch.setattr(os, "rmdir", lambda path: os.listdir(f"{path}/not there"))
+            with replacing(tmp_path / "out.png") as temporary:
+                temporary.touch()
+        assert sorted(os.listdir(tmp_path)) == ["out.png", "out.png.partial"]
+        files.check_writable(tmp_path / "out.png")
+        assert os.listdir(tmp_path) == ["out.png"]
+
     def test_history_beside_unfinished_cells_keeps_them(self, tmp_path):
         folder = put_cells(tmp_path / "out.nc")
         before = sorted(os.listdir(folder))

@@ -8,7 +8,8 @@ import xarray as xr
 import yaml
 
 import ringsweep
-from benchmarks.kills import killed_at, same_bits
+from benchmarks.hostile.attack import same_bits
+from benchmarks.hostile.kills import killed_at
 from ringsweep import cli, plots
 from ringsweep.errors import InputError
 from ringsweep.quantities.variables import AUDITED, INFERRED, LABELS, REGIMES

@@ -15,7 +15,8 @@ import xarray as xr
 import yaml
 
 import ringsweep
-from benchmarks.kills import POINTS, killed_at, same_bits
+from benchmarks.hostile.attack import same_bits
+from benchmarks.hostile.kills import POINTS, killed_at
 from ringsweep import cli
 from ringsweep.config import load
 from ringsweep.runs.executors import Threads

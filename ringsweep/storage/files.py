@@ -59,6 +59,10 @@ def check_writable(path: str | os.PathLike[str]) -> None:
         # Raises if the file system does not accept the name.
         with suppress(FileNotFoundError):
             _folder_of(target).stat()
+        if _folder_of(target).exists():
+            # Removes what a killed process left. Whatever forbids it is told by the writer.
+            with suppress(InputError), working_folder(target):
+                pass
         # Permission bits are not reliable on network drives, on read-only mounts, or for root.
         with tempfile.TemporaryFile(dir=folder):
             pass

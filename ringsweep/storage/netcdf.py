@@ -53,7 +53,7 @@ def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
     """
     with replacing(path) as temporary, _naming_the_cause(Path(path)):
         _to_netcdf(ds, temporary)
-        with netCDF4.Dataset(temporary, "a") as file:
+        with _appending(temporary) as file:
             _record_digests(file, ds)
         _read_back(temporary)
 
@@ -115,6 +115,20 @@ def _naming_the_cause(target: Path) -> Iterator[None]:
         raise OSError(f"{target} could not be written ({error}); is the disk full, or faulty?") from error
 
 
+@contextmanager
+def _appending(path: Path) -> Iterator[Any]:
+    file = netCDF4.Dataset(path, "a")
+    try:
+        yield file
+    finally:
+        try:
+            file.close()
+        except BaseException:
+            # The library has freed the file although closing failed. To close it once more would end this process.
+            file._isopen = 0
+            raise
+
+
 def _read_back(path: Path) -> None:
     if altered(path, whole=True):
         raise OSError("the file does not read back as it was written")
@@ -141,7 +155,7 @@ def _write_chunks(
     dims = tuple(map(str, frame.sizes))
     others = " ".join(str(name) for name in frame.coords if name not in dims)
     digests: dict[str, Any] = {}
-    with netCDF4.Dataset(path, "a") as file:
+    with _appending(path) as file:
         for region, columns in chunks:
             for name, column in columns.items():
                 if name not in digests:
