@@ -177,6 +177,17 @@ def test_folder_that_is_deleted_while_a_sweep_runs_is_named_as_the_cause(config,
     assert cli.main(["run", str(config), "-o", str(target)]) == 0
 
 
+def test_history_whose_folder_is_deleted_meanwhile_names_the_cause(tmp_path):
+    def write():
+        with replacing(tmp_path / "run.nc") as file:
+            (file.parent / "lock").unlink()
+            file.parent.rmdir()
+            file.write_bytes(b"lost")
+
+    with pytest.raises(OSError, match="was deleted while this process used it"):
+        write()
+
+
 def test_names_are_on_the_disk_before_what_relies_on_them(config, monkeypatch):
     """A power cut must not undo the renaming of a task file, nor that of the result before the task files are gone."""
     monkeypatch.setattr(TaskSizes, "next", lambda self, left: 3)

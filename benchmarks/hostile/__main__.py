@@ -42,7 +42,7 @@ class Part:
 PARTS = {
     "files": Part(damaged_files, 1000, 4),
     "faults": Part(faults, 100_000, 4),
-    "writers": Part(writers, 100, 2),
+    "writers": Part(writers, 100, 1),
     "kills": Part(kills, 500, 3),
 }
 

@@ -109,6 +109,14 @@ def command(*arguments: object) -> Ended:
     return end(start(lambda: main([str(argument) for argument in arguments])))
 
 
+def here(*arguments: object) -> None:
+    """Run the command line in this process, so that its copies have loaded and compiled all that it needs."""
+    from ringsweep.cli import main
+
+    if main([*(str(argument) for argument in arguments), "--quiet"]):
+        raise RuntimeError(f"{arguments} failed")
+
+
 def configuration(path: Path, *sizes: int) -> Path:
     """Write the configuration of a sweep of the ring over amplitudes and half-angles."""
     grid = {

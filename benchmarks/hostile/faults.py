@@ -11,7 +11,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from benchmarks.hostile.attack import Report, command, configuration, end, same_bits, start
+from benchmarks.hostile.attack import Report, command, configuration, end, here, same_bits, start
 
 #: Faults: error, and whether all later calls that need space fail as well.
 FAULTS = {"EIO once": (errno.EIO, 0), "full disk from here on": (errno.ENOSPC, 1)}
@@ -41,7 +41,7 @@ def faults(folder: Path, count: int, seed: int) -> Report:
     for verb, given in verbs.items():
         arguments = [verb, *given, "-o", str(target)]
         reference = folder / f"{verb}.nc"
-        assert not main([verb, *given, "-o", str(reference), "--quiet"])
+        here(verb, *given, "-o", reference)
 
         def armed(at: int, code: int, onwards: int, arguments: list[str] = arguments) -> int:
             library.arm(prefix, at, code, onwards)

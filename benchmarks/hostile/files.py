@@ -6,7 +6,7 @@ import random
 import re
 from pathlib import Path
 
-from benchmarks.hostile.attack import Ended, Report, command, configuration, contents, end, start
+from benchmarks.hostile.attack import Ended, Report, command, configuration, contents, end, here, start
 
 #: What a command may say of a damaged file.
 _TOLD = re.compile(r"damaged|no digest|was not written by ringsweep")
@@ -41,8 +41,8 @@ def damaged_files(folder: Path, count: int, seed: int) -> Report:
         "large": configuration(folder / "large.yaml", 40, 30),
     }
     for name, config in configs.items():
-        assert not command("run", config, "-o", folder / f"{name}.nc").status
-    assert not command("simulate", configs["small"], "-o", folder / "history.nc").status
+        here("run", config, "-o", folder / f"{name}.nc")
+    here("simulate", configs["small"], "-o", folder / "history.nc")
     names = ["small", "large", "history"]
     whole = {name: (folder / f"{name}.nc").read_bytes() for name in names}
     stored = {name: contents(folder / f"{name}.nc") for name in names}

@@ -21,7 +21,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks.hostile.attack import Report, command, configuration, end, same_bits, start
+from benchmarks.hostile.attack import Report, command, configuration, end, here, same_bits, start
 
 
 def _before(owner: Any, name: str, die: Callable[[], None]) -> None:
@@ -118,7 +118,7 @@ def kills(folder: Path, count: int, seed: int) -> Report:
     """Kill, continue, compare."""
     draw, report = random.Random(seed), Report()
     config, reference, target = configuration(folder / "sweep.yaml", 80, 60), folder / "reference.nc", folder / "out.nc"
-    assert not command("run", config, "-o", reference).status
+    here("run", config, "-o", reference)
     arguments = ["run", str(config), "-o", str(target)]
     # Tasks of a few cells, so that there are many.
     small: Callable[[Any, int], int] = lambda self, left: 400  # noqa: E731

@@ -8,7 +8,7 @@ import shutil
 import time
 from pathlib import Path
 
-from benchmarks.hostile.attack import Report, command, configuration, end, same_bits, start
+from benchmarks.hostile.attack import Report, command, configuration, end, here, same_bits, start
 
 
 def writers(folder: Path, count: int, seed: int) -> Report:
@@ -21,7 +21,7 @@ def writers(folder: Path, count: int, seed: int) -> Report:
     work = folder / "work"
     target = work / "out.nc"
     for verb in ("run", "simulate"):
-        assert not main([verb, str(config), "-o", str(folder / f"{verb}.nc"), "--quiet"])
+        here(verb, config, "-o", folder / f"{verb}.nc")
     span = {}
     for verb in ("run", "simulate"):
         work.mkdir()

@@ -135,6 +135,10 @@ def working_folder(target: Path, patience: float = 0.0) -> Iterator[WorkingFolde
             folder.chmod(_permissions(folder) & mode)
         used.remove_temporary()
         yield used
+    except OSError:
+        # The folder may be the cause.
+        used.check()
+        raise
     finally:
         removable = used.is_own() and not used.finished_cells()
         if removable:
@@ -206,7 +210,6 @@ class WorkingFolder:
             # Without this a power cut can undo the renaming.
             flush_folder(self.path)
         except OSError as error:
-            self.check()
             raise OSError(error.errno, error.strerror, str(self.path)) from error
         finally:
             with suppress(OSError):
@@ -240,7 +243,6 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     with working_folder(target, _PATIENCE) as folder:
         temporary = folder.temporary(target.suffix)
         yield temporary
-        folder.check()
         put_in_place(temporary, target)
 
 

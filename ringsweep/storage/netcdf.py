@@ -98,9 +98,6 @@ def write(
             _write_chunks(temporary, frame, variables, layout, chunks, gaps)
             _read_back(temporary)
             put_in_place(temporary, target)
-    except OSError:
-        folder.check()
-        raise
     finally:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
