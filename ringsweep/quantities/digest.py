@@ -19,6 +19,9 @@ from numpy.typing import ArrayLike
 #: Attribute that holds the digests.
 ATTRIBUTE = "digest"
 
+#: Attributes of a file that have no digest: every program that changes a file adds a line to its history.
+FREE = ("history",)
+
 _BYTES = 16
 
 _MEANING = ("long_name", "units", "path", "flag_values", "flag_meanings", "ancillary_variables")

@@ -173,9 +173,10 @@ def _record_digests(
 ) -> None:
     """Write the digests of a dataset into its file, together with those of columns that were written chunk by chunk."""
     own = {name: digest.of_variable(file[name], [ds[name].values]) for name in map(str, ds.variables)}
+    covered = [name for name in file.ncattrs() if name not in digest.FREE]
     recorded = Digests(
         dimensions={name: len(dimension) for name, dimension in file.dimensions.items()},
-        attributes={name: digest.of_attribute(file.getncattr(name)) for name in file.ncattrs()},
+        attributes={name: digest.of_attribute(file.getncattr(name)) for name in covered},
         variables={name: one.hexdigest() for name, one in {**own, **digests}.items()},
         block=None if layout is None else list(layout.chunk),
     )
