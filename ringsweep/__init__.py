@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from ringsweep.runs.precision import precision
     from ringsweep.runs.simulate import simulate
     from ringsweep.runs.sweep import run, sweep
+    from ringsweep.storage.netcdf import verify
 
 __all__ = [
     "InputError",
@@ -23,6 +24,7 @@ __all__ = [
     "simulate",
     "sweep",
     "uncertainty_exponent",
+    "verify",
     "words",
 ]
 
@@ -34,6 +36,7 @@ _MODULES = {
     "boundary": "runs.boundaries",
     "uncertainty_exponent": "runs.boundaries",
     "friction_law": "config.friction",
+    "verify": "storage.netcdf",
     "words": "quantities.variables",
     "InputError": "errors",
 }

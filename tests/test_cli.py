@@ -107,6 +107,24 @@ def test_unwritable_output_is_refused_before_any_computation(folder, capsys, ver
     assert [file.name for file in folder.iterdir()] == ["case.yaml"]
 
 
+@pytest.mark.parametrize(("verb", "draws"), [("run", "map"), ("simulate", "plot")])
+def test_picture_that_cannot_be_written_does_not_undo_the_dataset(folder, monkeypatch, capsys, caplog, verb, draws):
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("matplotlib.figure.Figure.savefig", full)
+        assert main([verb, "case.yaml", "-o", "out.nc"]) == 0
+    assert "wrote out.nc\n" in capsys.readouterr().out
+    (warning,) = [record.getMessage() for record in caplog.records if "not drawn" in record.getMessage()]
+    assert warning == (
+        f"out.png is not drawn: [Errno 28] No space left on device (draw one with ringsweep {draws} out.nc)"
+    )
+    assert sorted(file.name for file in folder.iterdir()) == ["case.yaml", "out.nc"]
+    assert main([draws, "out.nc"]) == 0
+    assert (folder / "out.png").exists()
+
+
 def test_file_that_is_no_result_is_not_replaced(folder, capsys):
     (folder / "notes.nc").write_text("mine")
     for options in ([], ["--fresh"]):
@@ -199,7 +217,7 @@ def test_unexpected_error_and_interrupt_are_reported_in_one_line(monkeypatch, ca
     def fail(path):
         raise error
 
-    monkeypatch.setattr("ringsweep.storage.netcdf.open_dataset", fail)
+    monkeypatch.setattr("ringsweep.storage.netcdf.check", fail)
     assert main(["info", "out.nc"]) == status
     assert capsys.readouterr().err == f"ringsweep: {message}\n"
 

@@ -8,11 +8,13 @@ import xarray as xr
 import yaml
 
 import ringsweep
-from benchmarks.kills import killed_at, same_bits
+from benchmarks.hostile.attack import same_bits
+from benchmarks.hostile.kills import killed_at
 from ringsweep import cli, plots
 from ringsweep.errors import InputError
 from ringsweep.quantities.variables import AUDITED, INFERRED, LABELS, REGIMES
 from ringsweep.runs import sweep
+from ringsweep.storage import netcdf
 from ringsweep.storage.checkpoint import Checkpoint
 
 AXES = {"drive.amplitude": np.geomspace(0.5, 8.0, 41), "zone.half_angle": np.radians(np.linspace(5.0, 40.0, 37))}
@@ -46,8 +48,7 @@ def refined(config):
 
 @pytest.fixture
 def ds(refined):
-    with xr.open_dataset(refined, decode_times=False) as found:
-        yield found.load()
+    return netcdf.load(refined)
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ import yaml
 from distributed import LocalCluster
 
 import ringsweep
-from benchmarks.kills import same_bits
+from benchmarks.hostile.attack import same_bits
 from ringsweep import cli
 from ringsweep.runs.task_sizes import TaskSizes
 from ringsweep.storage.checkpoint import Checkpoint

@@ -11,7 +11,7 @@ import xarray as xr
 import ringsweep
 from ringsweep.errors import InputError
 from ringsweep.quantities.variables import OUTCOMES
-from ringsweep.storage import netcdf
+from ringsweep.storage import files, netcdf
 
 
 @pytest.fixture
@@ -112,7 +112,7 @@ def test_saving_follows_a_symbolic_link_and_keeps_usual_permissions(sweep, tmp_p
 def test_unwritable_path_is_refused(tmp_path, name, problem):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match=problem) as caught:
-        netcdf.check_writable(tmp_path / name)
+        files.check_writable(tmp_path / name)
     assert caught.value.path == str(tmp_path / name)
     assert os.listdir(tmp_path) == ["file"]
 
@@ -123,12 +123,12 @@ def test_folder_without_permission_to_write_is_refused(tmp_path, monkeypatch):
 
     monkeypatch.setattr("tempfile.TemporaryFile", refuse)
     with pytest.raises(InputError, match="Permission denied"):
-        netcdf.check_writable(tmp_path / "out.nc")
+        files.check_writable(tmp_path / "out.nc")
 
 
 def test_check_of_a_path_does_not_change_an_existing_file(tmp_path):
     (tmp_path / "out.nc").write_text("old")
-    netcdf.check_writable(tmp_path / "out.nc")
+    files.check_writable(tmp_path / "out.nc")
     assert (tmp_path / "out.nc").read_text() == "old"
     assert os.listdir(tmp_path) == ["out.nc"]
 

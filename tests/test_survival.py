@@ -17,7 +17,8 @@ import xarray as xr
 import yaml
 
 import ringsweep
-from benchmarks.kills import POINTS, killed_at, same_bits
+from benchmarks.hostile.attack import same_bits
+from benchmarks.hostile.kills import POINTS, killed_at
 from ringsweep import cli
 from ringsweep.config import load
 from ringsweep.runs.cells import compute_task
@@ -351,7 +352,7 @@ class TestFullDisk:
 
     def test_file_that_does_not_read_back_is_removed(self, config, tmp_path, monkeypatch, capsys):
         target = tmp_path / "out.nc"
-        monkeypatch.setattr(netcdf, "_checksums", lambda *_: {})
+        monkeypatch.setattr(netcdf, "altered", lambda *_, **__: ["regime"])
         assert cli.main(["run", str(config), "-o", str(target)]) == 1
         assert "does not read back" in capsys.readouterr().err
         assert left(target) == ["out.nc.partial"]

@@ -9,10 +9,15 @@ from __future__ import annotations
 import argparse
 import json
 import logging
+import sys
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from ringsweep.errors import InputError
+
+logger = logging.getLogger("ringsweep")
 
 
 def init_command(arguments: argparse.Namespace) -> None:
@@ -63,17 +68,25 @@ def run_command(arguments: argparse.Namespace) -> None:
         print(f"wrote {target}")
     else:
         print(f"{target} holds this sweep already (--fresh computes it again)")
-    with netcdf.open_dataset(target) as result:
+    with netcdf.reading(target) as result:
         summarise(result)
         if not config.axes.sizes or (not computed and _is_newer(picture, target)):
             return
-        try:
-            plots.save(plots.regime_map(result), picture)
-        except InputError as error:
-            # The sweep is saved. Only a choice for the picture is missing.
-            print(f"no map: {error.problem} (draw one with ringsweep map {target})")
-        else:
-            print(f"wrote {picture}")
+        _draw(lambda: plots.regime_map(result), picture, f"ringsweep map {target}")
+
+
+def _draw(figure: Callable[[], Any], picture: Path, command: str) -> None:
+    """Draw the picture of a dataset. The dataset is complete, so a picture that fails is only a warning."""
+    from ringsweep import plots
+
+    try:
+        plots.save(figure(), picture)
+    except Exception as error:
+        reason = error.problem if isinstance(error, InputError) else error
+        logger.warning("%s is not drawn: %s (draw one with %s)", picture, reason, command)
+        logger.debug("where the picture failed", exc_info=True)
+    else:
+        print(f"wrote {picture}")
 
 
 def _is_newer(one: Path, other: Path) -> bool:
@@ -93,15 +106,21 @@ def _silence_dask() -> None:
 
 def map_command(arguments: argparse.Namespace) -> None:
     """Draw a variable of a sweep."""
-    from ringsweep import plots
     from ringsweep.storage import netcdf
 
     dataset = Path(arguments.dataset)
-    result = netcdf.open_dataset(dataset)
+    with netcdf.reading(dataset) as result:
+        _draw_map(arguments, dataset, result)
+
+
+def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
+    from ringsweep import plots
+    from ringsweep.storage import files, netcdf
+
     # The name differs from that of the regime map of the sweep, which must not be replaced.
     shown = [arguments.var] * (arguments.var != "regime") + [held.replace(" ", "") for held in arguments.sel]
     target = Path(arguments.output or dataset.with_name("-".join([dataset.stem, *shown]) + ".png"))
-    netcdf.check_writable(target)
+    files.check_writable(target)
     selection = dict(_selection(text) for text in arguments.sel)
     if arguments.tolerance is not None and arguments.boundaries is None:
         raise InputError("--tolerance", "is that of --boundaries REGIME")
@@ -127,19 +146,25 @@ def map_command(arguments: argparse.Namespace) -> None:
 
 def plot_command(arguments: argparse.Namespace) -> None:
     """Draw a stored run, or stored errors against run time."""
+    from ringsweep.storage import netcdf
+
+    dataset = Path(arguments.dataset)
+    with netcdf.reading(dataset) as result:
+        _plot(arguments, dataset, result)
+
+
+def _plot(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
     from matplotlib.figure import Figure
 
     from ringsweep import plots
     from ringsweep.plots.datasets import resolve
-    from ringsweep.storage import netcdf
+    from ringsweep.storage import files
 
-    dataset = Path(arguments.dataset)
-    result = netcdf.open_dataset(dataset)
     if not {"time", "contender"} & set(result.dims):
         raise InputError(str(dataset), f"is a sweep, not the history of a run: ringsweep map {dataset} draws it")
     shown = [name for name in (arguments.kind, arguments.law) if name is not None]
     target = Path(arguments.output or dataset.with_name("-".join([dataset.stem, *shown]) + ".png"))
-    netcdf.check_writable(target)
+    files.check_writable(target)
     if "contender" in result.dims and shown:
         raise InputError(str(dataset), "holds errors against run time: --kind and --law are for time histories")
     if arguments.law is not None:
@@ -177,9 +202,9 @@ def simulate_command(arguments: argparse.Namespace) -> None:
 
     result = history(config)
     netcdf.save(result, target)
-    plots.save(plots.history(result), picture)
     print(result.attrs["outcome"])
-    print(f"wrote {target}\nwrote {picture}")
+    print(f"wrote {target}")
+    _draw(lambda: plots.history(result), picture, f"ringsweep plot {target}")
 
 
 def animate_command(arguments: argparse.Namespace) -> None:
@@ -224,17 +249,39 @@ def precision_command(arguments: argparse.Namespace) -> None:
     options = {name: value for name, value in given.items() if value is not None}
     result = measure(config, **options, progress=not arguments.quiet)
     netcdf.save(result, target)
-    plots.save(plots.work_precision(result), picture)
     print(report(result))
-    print(f"wrote {target}\nwrote {picture}")
+    print(f"wrote {target}")
+    _draw(lambda: plots.work_precision(result), picture, f"ringsweep plot {target}")
 
 
 def info_command(arguments: argparse.Namespace) -> None:
     """Print a summary of a result file."""
     from ringsweep.storage import netcdf
 
-    result = netcdf.open_dataset(arguments.dataset)
-    print(result.attrs.get("title", arguments.dataset))
+    has_digest = netcdf.check(arguments.dataset)
+    with netcdf.reading(arguments.dataset) as result:
+        _print_summary(arguments.dataset, result)
+    print("digest:", "the file is what ringsweep wrote" if has_digest else "none, so damage would not be noticed")
+
+
+def verify_command(arguments: argparse.Namespace) -> int:
+    """Print whether files are what was written."""
+    from ringsweep.storage import netcdf
+
+    status = 0
+    for file in arguments.files:
+        try:
+            netcdf.verify(file)
+        except InputError as error:
+            status = 2
+            print("ringsweep:", error, file=sys.stderr)
+        else:
+            print(f"{file}: is what ringsweep wrote")
+    return status
+
+
+def _print_summary(name: str, result: Any) -> None:
+    print(result.attrs.get("title", name))
     print("dimensions:", ", ".join(f"{name} {size}" for name, size in result.sizes.items()) or "none: a single run")
     for name, axis in result.coords.items():
         if "contender" in axis.dims:
@@ -291,14 +338,14 @@ def _outputs(name: str, mark: str, content: str) -> tuple[Path, Path]:
     InputError
         If one of them cannot be written, or would replace a file that is no result of this kind.
     """
-    from ringsweep.storage import netcdf
+    from ringsweep.storage import files, netcdf
 
     target = Path(name)
-    netcdf.check_writable(target)
+    files.check_writable(target)
     picture = target.with_suffix(".png")
     if target == picture:
         raise InputError(name, "is the name of the picture: name the dataset *.nc")
-    netcdf.check_writable(picture)
+    files.check_writable(picture)
     if target.exists():
         netcdf.check_kind(target, mark, content)
     return target, picture

@@ -46,7 +46,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     try:
         with _terminable(), redirect_stdout(None) if arguments.quiet else nullcontext():
-            arguments.command(arguments)
+            status = arguments.command(arguments)
     except InputError as error:
         return _fail(str(error), 2)
     except KeyboardInterrupt as error:
@@ -65,7 +65,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if arguments.verbose:
             traceback.print_exception(error)
         return _fail(shortened(f"{type(error).__name__}: {error}", 1500), 1, error)
-    return 0
+    return status or 0
 
 
 @contextmanager

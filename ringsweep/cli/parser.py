@@ -19,6 +19,7 @@ from ringsweep.cli.commands import (
     run_command,
     schema_command,
     simulate_command,
+    verify_command,
 )
 from ringsweep.errors import shortened
 
@@ -144,6 +145,12 @@ def build_parser() -> argparse.ArgumentParser:
 
     info = _add_command(commands, "info", info_command, "print a summary of a result file", "ringsweep info my.nc")
     info.add_argument("dataset", metavar="OUT.nc")
+
+    verify = _add_command(commands, "verify", verify_command, "check that files are what ringsweep wrote", """
+        ringsweep verify my.nc             exit status 0, or 2 if it is damaged, was changed, or has no digest
+        ringsweep verify results/*.nc
+        """)  # fmt: skip
+    verify.add_argument("files", nargs="+", metavar="FILE.nc")
 
     _add_command(commands, "schema", schema_command, "print the JSON schema of the configuration, for editors", """
         ringsweep schema > schema.json

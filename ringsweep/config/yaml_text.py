@@ -21,7 +21,9 @@ import numpy as np
 import yaml
 
 from ringsweep.errors import InputError
+from ringsweep.quantities.digest import Digests
 from ringsweep.quantities.units import LONG_INTEGER, NUMBER, length_of, show, spelled
+from ringsweep.quantities.variables import OUTCOMES
 
 #: Largest number of values in a configuration, with each value counted as often as it occurs.
 MAX_VALUES = 1_000_000
@@ -189,9 +191,16 @@ def _read_result(file: Path) -> Document:
     """The configuration in the attributes of a result file."""
     try:
         with netCDF4.Dataset(file) as content:
+            is_sweep = "regime" in content.variables and not {"time", "contender"} & set(content.dimensions)
+            recorded = Digests.read(content)
+            if recorded is not None:
+                axes_of_sweep = [name for name in recorded.variables if is_sweep and name not in OUTCOMES]
+                if changed := recorded.altered(content, ["configuration"], axes_of_sweep):
+                    problem = f"is damaged, or another program changed it: {', '.join(changed)}"
+                    raise InputError("", problem, file=str(file))
             tree = json.loads(content.getncattr("configuration"))
             axes = None
-            if "regime" in content.variables and not {"time", "contender"} & set(content.dimensions):
+            if is_sweep:
                 axes = {
                     variable.path: (variable.dimensions, np.array(variable[:].tolist()))
                     for variable in content.variables.values()
@@ -199,7 +208,10 @@ def _read_result(file: Path) -> Document:
                 }
                 dims = content["regime"].dimensions
                 axes = dict(sorted(axes.items(), key=lambda item: dims.index(item[1][0][0])))
-    except (OSError, RuntimeError, AttributeError, ValueError, IndexError) as error:
+    except InputError:
+        raise
+    except Exception as error:
+        # On a damaged file the NetCDF library raises errors of many kinds.
         raise InputError(
             "", "is damaged, or not a result of ringsweep: it holds no configuration", file=str(file)
         ) from error

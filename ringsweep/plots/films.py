@@ -31,7 +31,7 @@ from ringsweep.plots.polar import RingArtists, states_at
 from ringsweep.plots.rig import belt_history, ring_history
 from ringsweep.plots.saving import suffix_of
 from ringsweep.plots.style import SMALL
-from ringsweep.storage import netcdf
+from ringsweep.storage.files import check_writable, replacing
 
 #: Suffixes of the files that `save_animation` writes.
 FILMS = (".mp4", ".gif", ".html")
@@ -109,7 +109,7 @@ def save_animation(ds: xr.Dataset, path: str | os.PathLike[str], *, fps: float =
     """
     check_animation(path)
     film = _Film(ds, fps, duration)
-    with netcdf.replacing(path) as temporary, film.fixed_background():
+    with replacing(path) as temporary, film.fixed_background():
         film.animation().save(temporary, writer=_writer(Path(path).suffix.lower(), fps), dpi=_DPI)
 
 
@@ -123,7 +123,7 @@ def check_animation(path: str | os.PathLike[str]) -> None:
     """
     if suffix_of(path, FILMS, "animations") == ".mp4" and not FFMpegWriter.isAvailable():
         raise InputError(str(path), "ffmpeg, which writes .mp4, is not installed; .gif and .html need no ffmpeg")
-    netcdf.check_writable(path)
+    check_writable(path)
 
 
 class _FilmFigure(Figure):

@@ -8,7 +8,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from ringsweep.errors import InputError
-from ringsweep.storage import netcdf
+from ringsweep.storage.files import replacing
 
 #: Suffixes of the files that `save` writes.
 SUFFIXES = (".pdf", ".png", ".svg")
@@ -37,7 +37,7 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
     ringsweep.errors.InputError: my.txt: pictures end in .pdf, .png, .svg, not in '.txt'
     """
     suffix = suffix_of(path, SUFFIXES, "pictures")
-    with netcdf.replacing(path) as temporary:
+    with replacing(path) as temporary:
         figure.savefig(temporary, dpi=150, format=suffix[1:])
 
 

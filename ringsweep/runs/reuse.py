@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Collection, Iterator, Mapping
 from copy import deepcopy
@@ -22,6 +23,8 @@ from ringsweep.runs.cells import Indices, laws_at, values_at
 from ringsweep.storage import netcdf
 from ringsweep.storage.chunks import Layout
 from ringsweep.storage.provenance import differences, fingerprint, identity
+
+logger = logging.getLogger("ringsweep")
 
 # Two spacings of one axis differ by rounding, at most by this relative difference.
 _ROUNDING = 8 * np.finfo(float).eps
@@ -50,6 +53,8 @@ class EarlierSweep:
 
     def __init__(self, path: str | os.PathLike[str], config: Config):
         self.path = path
+        if not netcdf.check(path):
+            logger.warning("%s has no digest: damage to its cells would not be noticed", path)
         with netcdf.open_dataset(path) as ds:
             if "regime" not in ds or "time" in ds.dims:
                 raise InputError(str(path), "holds no sweep whose cells could be reused")
@@ -117,7 +122,7 @@ class EarlierSweep:
         names : collection of str, optional
             Variables to read; all by default.
         """
-        with netcdf.open_dataset(self.path) as ds:
+        with netcdf.reading(self.path) as ds:
             known = [str(name) for name in ds.data_vars if name not in ("origin", "level")]
             wanted = [name for name in known if names is None or name in names]
             for start, stop, _ in layout.chunks():

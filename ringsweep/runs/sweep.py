@@ -278,7 +278,7 @@ def write(
                     )
                 raise
         checkpoint.clear()
-    with netcdf.open_dataset(target) as results:
+    with netcdf.reading(target) as results:
         warn_of_results(results, config)
     return computed
 
@@ -304,7 +304,7 @@ def _write_file(config: Config, target: Path, layout: Layout, checkpoint: Checkp
     frame = _frame(config, found)
     frame.attrs["processors"] = ", ".join(sorted(checkpoint.processors))
     if found is None or config.refine is None:
-        netcdf.write(target, checkpoint.folder, frame, OUTCOMES, layout, checkpoint.chunks())
+        netcdf.write(target, checkpoint.working_folder, frame, OUTCOMES, layout, checkpoint.chunks())
         return
     refine = config.refine
 
@@ -312,7 +312,7 @@ def _write_file(config: Config, target: Path, layout: Layout, checkpoint: Checkp
         complete(refine, found, region, columns)
         return not (missing & (found.origin[region] != INFERRED)).any()
 
-    netcdf.write(target, checkpoint.folder, frame, OUTCOMES, layout, checkpoint.chunks(fill), gaps(OUTCOMES))
+    netcdf.write(target, checkpoint.working_folder, frame, OUTCOMES, layout, checkpoint.chunks(fill), gaps(OUTCOMES))
 
 
 def _holds_sweep(target: Path, checkpoint: Checkpoint) -> bool:

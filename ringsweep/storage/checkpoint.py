@@ -1,9 +1,9 @@
 """Checkpoint of a running sweep: its finished cells, in a folder beside the file that they will become.
 
 The folder of ``OUT.nc`` is ``OUT.nc.partial``, with one file for each finished task. A task file is complete or absent:
-it is written under another name, flushed and renamed. It holds the fingerprint of its sweep
-(:func:`ringsweep.storage.provenance.fingerprint`), and its name ends with a checksum. One process at a time uses the
-folder.
+it is written under another name, flushed and renamed (:mod:`ringsweep.storage.files`). It holds the fingerprint of its
+sweep (:func:`ringsweep.storage.provenance.fingerprint`), and its name ends with a checksum. One process at a time uses
+the folder.
 """
 
 from __future__ import annotations
@@ -12,19 +12,17 @@ import hashlib
 import io
 import json
 import logging
-import os
-import secrets
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.storage.chunks import Layout
+from ringsweep.storage.files import MANIFEST, WorkingFolder, working_folder
 from ringsweep.storage.provenance import differences, fingerprint
 
 logger = logging.getLogger("ringsweep")
@@ -34,14 +32,12 @@ Columns = Mapping[str, NDArray[Any]]
 # Unusable task files that are named one by one.
 _MAX_NAMED = 3
 
-_MANIFEST, _LOCK = "sweep.json", "lock"
-
 
 @contextmanager
 def open_checkpoint(
     target: Path, identity: Mapping[str, str], layout: Layout, *, fresh: bool = False
 ) -> Iterator[Checkpoint]:
-    """Checkpoint of the sweep that becomes `target`, locked for this process. An empty one is removed at the end.
+    """Checkpoint of the sweep that becomes `target`, locked for this process.
 
     Parameters
     ----------
@@ -57,34 +53,15 @@ def open_checkpoint(
     Raises
     ------
     InputError
-        If another process uses the folder, or it holds cells of another sweep, or it cannot be written.
+        If another process uses the folder, it was not made by this package, it holds cells of another sweep, or it
+        cannot be written.
     """
-    folder = target.with_name(f"{target.name}.partial")
-    if folder.exists() and not folder.is_dir():
-        raise InputError(str(target), f"cannot be computed: finished cells go to the folder {folder}, but it is a file")
-    try:
-        folder.mkdir(exist_ok=True)
-        lock = FileLock(folder / _LOCK, timeout=0)
-        lock.acquire()
-    except Timeout:
-        raise InputError(str(target), f"another ringsweep is computing it (it uses {folder})") from None
-    except OSError as error:
-        raise InputError(str(target), f"cannot be written: {error.strerror or error}") from error
-    checkpoint = Checkpoint(folder, identity, layout)
-    try:
+    with working_folder(target) as folder:
+        checkpoint = Checkpoint(folder, identity, layout)
         if fresh:
             checkpoint.clear()
         checkpoint.resume()
         yield checkpoint
-    finally:
-        empty = not checkpoint.task_files()
-        if empty:
-            checkpoint.clear()
-        lock.release()
-        if empty:
-            with suppress(OSError):
-                (folder / _LOCK).unlink(missing_ok=True)
-                folder.rmdir()
 
 
 class Checkpoint:
@@ -92,6 +69,7 @@ class Checkpoint:
 
     Attributes
     ----------
+    working_folder : WorkingFolder
     folder : Path
     done : ndarray of bool, shape ``(cells,)``
         Whether the cell at each position of the layout is finished.
@@ -101,8 +79,9 @@ class Checkpoint:
         Names of the processors that computed the cells.
     """
 
-    def __init__(self, folder: Path, identity: Mapping[str, str], layout: Layout):
-        self.folder = folder
+    def __init__(self, folder: WorkingFolder, identity: Mapping[str, str], layout: Layout):
+        self.working_folder = folder
+        self.folder = folder.path
         self.identity = dict(identity)
         self.layout = layout
         self.fingerprint = fingerprint(identity)
@@ -118,10 +97,7 @@ class Checkpoint:
         InputError
             If it left cells of another sweep.
         """
-        manifest = self.folder / _MANIFEST
-        for path in self.folder.glob("*.tmp"):
-            path.unlink()
-        before = _read_manifest(manifest)
+        before = _read_manifest(self.folder / MANIFEST)
         if before and before != self.identity and self.task_files():
             changes = differences(before, self.identity)
             raise InputError(
@@ -129,12 +105,12 @@ class Checkpoint:
                 f"holds finished cells of another sweep: {changes}. --fresh starts over, -o keeps both",
             )
         if before != self.identity:
-            _write_durably(manifest, json.dumps(self.identity, indent=1).encode())
+            self.working_folder.write(MANIFEST, json.dumps(self.identity, indent=1).encode())
         self.scan()
 
     def task_files(self) -> list[Path]:
         """All task files in the folder, usable or not."""
-        return sorted(path for path in self.folder.glob("*.npz") if path.is_file())
+        return self.working_folder.finished_cells()
 
     def scan(self) -> None:
         """Find out which cells are finished. Warns of damaged task files and of those of another sweep."""
@@ -168,11 +144,12 @@ class Checkpoint:
         content = io.BytesIO()
         np.savez(content, allow_pickle=False, cells=cells, **members)
         stem = f"{self.fingerprint[:12]}-{positions[0]:010d}-{len(positions)}"
-        path = self.folder / f"{stem}-{_checksum(content.getvalue())}.npz"
-        _write_durably(path, content.getvalue())
+        name = f"{stem}-{_checksum(content.getvalue())}.npz"
+        self.working_folder.check()
+        self.working_folder.write(name, content.getvalue())
         self.processors.add(processor)
         self.done[positions] = True
-        self.files[path] = int(positions[0]), int(positions[-1])
+        self.files[self.folder / name] = int(positions[0]), int(positions[-1])
 
     def read(self, path: Path) -> tuple[NDArray[np.intp], dict[str, NDArray[Any]]]:
         """Positions and columns of a task file.
@@ -247,8 +224,11 @@ class Checkpoint:
 
     def clear(self) -> None:
         """Remove all files but the lock."""
-        for path in [*self.task_files(), *self.folder.glob("*.tmp"), self.folder / _MANIFEST]:
+        if not self.working_folder.is_own():
+            return
+        for path in [*self.task_files(), self.folder / MANIFEST]:
             path.unlink(missing_ok=True)
+        self.working_folder.remove_temporary()
         self.files.clear()
         self.done[:] = False
 
@@ -268,19 +248,3 @@ def _read_manifest(path: Path) -> dict[str, str]:
     except (OSError, ValueError):
         return {}
     return found if isinstance(found, dict) and all(isinstance(value, str) for value in found.values()) else {}
-
-
-def _write_durably(path: Path, content: bytes) -> None:
-    """Write a file under another name, flush it to the disk, and rename it."""
-    temporary = path.with_name(f"{secrets.token_hex(4)}.tmp")
-    try:
-        with temporary.open("xb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(path)
-    except OSError as error:
-        raise OSError(error.errno, error.strerror, str(path.parent)) from error
-    finally:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)

@@ -5,12 +5,10 @@ from __future__ import annotations
 import json
 import math
 import os
-import secrets
-import tempfile
-import zlib
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import netCDF4
@@ -19,8 +17,11 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
-from ringsweep.quantities.variables import MISSING, Variable, error_attribute
+from ringsweep.quantities import digest
+from ringsweep.quantities.digest import Digests
+from ringsweep.quantities.variables import MISSING, OUTCOMES, Variable, error_attribute
 from ringsweep.storage.chunks import Layout
+from ringsweep.storage.files import WorkingFolder, check_name, put_in_place, replacing
 
 #: Attributes that every file of this package has.
 SIGNATURE = ("Conventions", "ringsweep_version")
@@ -28,68 +29,8 @@ SIGNATURE = ("Conventions", "ringsweep_version")
 #: Variables with fewer elements are not compressed: the index of their chunks would take more than compression saves.
 COMPRESSED_FROM = 1024
 
-
-def check_writable(path: str | os.PathLike[str]) -> None:
-    """Check that a file can be written at `path`, before its contents are computed.
-
-    Parameters
-    ----------
-    path : path-like
-        File that is written later; it may exist.
-
-    Raises
-    ------
-    InputError
-        If `path` is a folder, or its folder does not exist or cannot be written.
-    """
-    target = Path(path).resolve()
-    folder = target.parent
-    try:
-        if target.is_dir():
-            raise InputError(str(path), "is a folder; give the name of a file")
-        if not folder.exists():
-            raise InputError(str(path), f"the folder {folder} does not exist; create it or choose another")
-        if not folder.is_dir():
-            raise InputError(str(path), f"{folder} is not a folder")
-        # Raises if the file system does not accept the name.
-        with suppress(FileNotFoundError):
-            target.stat()
-        # Permission bits are not reliable on network drives, on read-only mounts, or for root.
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise InputError(str(path), f"cannot be written: {error.strerror or error}") from error
-
-
-@contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Give a temporary name beside `path`. At the end of the block the temporary file replaces `path`.
-
-    If the block fails or is interrupted, `path` stays unchanged and the temporary file is removed.
-
-    Parameters
-    ----------
-    path : path-like
-        File to write or replace. A symbolic link is followed.
-
-    Yields
-    ------
-    Path
-        Name to write to, in the same folder and with the same suffix.
-
-    Raises
-    ------
-    InputError
-        If `path` cannot be written.
-    """
-    check_writable(path)
-    target = Path(path).resolve()
-    temporary = target.with_name(f".ringsweep-{secrets.token_hex(8)}{target.suffix}")
-    try:
-        yield temporary
-        os.replace(temporary, target)
-    finally:
-        temporary.unlink(missing_ok=True)
+# Names of what differs that are told one by one.
+_MAX_NAMED = 4
 
 
 def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
@@ -110,15 +51,16 @@ def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
     OSError
         If writing fails, or the file differs from the dataset when it is read back.
     """
-    with replacing(path) as temporary:
+    with replacing(path) as temporary, _naming_the_cause(Path(path)):
         _to_netcdf(ds, temporary)
-        if not load(temporary).equals(ds):
-            raise OSError(f"{path}: the file does not read back as it was written; the disk may be full or faulty")
+        with _appending(temporary) as file:
+            _record_digests(file, ds)
+        _read_back(temporary)
 
 
 def write(
     target: Path,
-    folder: Path,
+    folder: WorkingFolder,
     frame: xr.Dataset,
     variables: Mapping[str, Variable],
     layout: Layout,
@@ -131,8 +73,8 @@ def write(
     ----------
     target : Path
         File to write or replace.
-    folder : Path
-        Folder on the same disk, for the temporary file.
+    folder : WorkingFolder
+        Folder for the temporary file.
     frame : xarray.Dataset
         Coordinates and attributes.
     variables : mapping of str to Variable
@@ -149,21 +91,44 @@ def write(
     OSError
         If writing fails, or the file differs from the dataset when it is read back.
     """
-    temporary = folder / f"{secrets.token_hex(4)}.tmp"
+    temporary = folder.temporary()
     try:
-        _to_netcdf(frame, temporary)
-        written = _write_chunks(temporary, frame, variables, layout, chunks, gaps)
-        if written != _checksums(temporary, written, layout):
-            raise OSError("the file does not read back as it was written")
-        with temporary.open("r+b") as file:
-            os.fsync(file.fileno())
-        temporary.replace(target)
-        _flush_folder(target.parent)
+        with _naming_the_cause(target):
+            _to_netcdf(frame, temporary)
+            _write_chunks(temporary, frame, variables, layout, chunks, gaps)
+            _read_back(temporary)
+            put_in_place(temporary, target)
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def _naming_the_cause(target: Path) -> Iterator[None]:
+    try:
+        yield
     except (OSError, RuntimeError) as error:
         # If the disk is full, the NetCDF library only reports "HDF error".
         raise OSError(f"{target} could not be written ({error}); is the disk full, or faulty?") from error
+
+
+@contextmanager
+def _appending(path: Path) -> Iterator[Any]:
+    file = netCDF4.Dataset(path, "a")
+    try:
+        yield file
     finally:
-        temporary.unlink(missing_ok=True)
+        try:
+            file.close()
+        except BaseException:
+            # The library has freed the file although closing failed. To close it once more would end this process.
+            file._isopen = 0
+            raise
+
+
+def _read_back(path: Path) -> None:
+    if altered(path, whole=True):
+        raise OSError("the file does not read back as it was written")
 
 
 def _to_netcdf(ds: xr.Dataset, path: Path) -> None:
@@ -182,43 +147,79 @@ def _write_chunks(
     layout: Layout,
     chunks: Iterable[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]],
     gaps: Collection[str],
-) -> dict[str, int]:
-    """Add the columns to a file and return a checksum of each."""
+) -> None:
+    """Add the columns and the digests to a file."""
     dims = tuple(map(str, frame.sizes))
     others = " ".join(str(name) for name in frame.coords if name not in dims)
-    sums: dict[str, int] = {}
-    with netCDF4.Dataset(path, "a") as file:
+    digests: dict[str, Any] = {}
+    with _appending(path) as file:
         for region, columns in chunks:
             for name, column in columns.items():
-                if name not in sums:
+                if name not in digests:
                     fill = MISSING if name in gaps else False
                     variable = file.createVariable(name, column.dtype, dims, fill_value=fill, **_chunked(layout))
                     variable.set_auto_maskandscale(False)
-                    _cache_one_chunk(variable, layout)
+                    _cache_one_chunk(variable)
                     described = variables[name].attributes | error_attribute(name, columns)
                     variable.setncatts(described | ({"coordinates": others} if others else {}))
+                    digests[name] = digest.of_variable(variable)
                 file[name][region] = column
-                sums[name] = zlib.crc32(column.tobytes(), sums.get(name, 0))
-    return sums
+                digest.add(digests[name], column)
+        _record_digests(file, frame, digests, layout)
 
 
-def _checksums(path: Path, names: Iterable[str], layout: Layout) -> dict[str, int]:
-    """Checksums of variables of a file, as :func:`_write_chunks` computes them."""
-    found = {}
-    with netCDF4.Dataset(path) as file:
-        file.set_auto_maskandscale(False)
-        for name in names:
-            found[name] = 0
-            _cache_one_chunk(file[name], layout)
-            for _, _, region in layout.chunks():
-                found[name] = zlib.crc32(file[name][region].tobytes(), found[name])
-    return found
+def _record_digests(
+    file: Any, ds: xr.Dataset, digests: Mapping[str, Any] = MappingProxyType({}), layout: Layout | None = None
+) -> None:
+    """Write the digests of a dataset into its file, together with those of columns that were written chunk by chunk."""
+    own = {name: digest.of_variable(file[name], [ds[name].values]) for name in map(str, ds.variables)}
+    covered = [name for name in file.ncattrs() if name not in digest.FREE]
+    recorded = Digests(
+        dimensions={name: len(dimension) for name, dimension in file.dimensions.items()},
+        attributes={name: digest.of_attribute(file.getncattr(name)) for name in covered},
+        variables={name: one.hexdigest() for name, one in {**own, **digests}.items()},
+        block=None if layout is None else list(layout.chunk),
+    )
+    file.setncattr(digest.ATTRIBUTE, recorded.text)
 
 
-def _cache_one_chunk(variable: Any, layout: Layout) -> None:
+def altered(path: str | os.PathLike[str], *, whole: bool) -> list[str] | None:
+    """Names of what is not as it was written in a file; None if the file has no digests.
+
+    Parameters
+    ----------
+    path : path-like
+    whole : bool
+        Whether to read all variables, or only those whose values have no checksums of their own.
+
+    Raises
+    ------
+    InputError
+        If the file is no NetCDF file, or is damaged.
+    """
+    with _reading_file(path), netCDF4.Dataset(Path(path).resolve()) as file:
+        recorded = Digests.read(file)
+        if recorded is None:
+            return None
+        checked = set()
+        for name, variable in file.variables.items():
+            _cache_one_chunk(variable)
+            filters: Any = variable.filters()
+            if not whole and filters and filters["fletcher32"]:
+                checked.add(name)
+        names = [name for name in recorded.variables if name not in checked]
+        return recorded.altered(file, recorded.attributes, names, _blocks)
+
+
+def _blocks(shape: Sequence[int], block: list[int]) -> Iterator[tuple[slice, ...]]:
+    for _, _, region in Layout(shape, block).chunks():
+        yield region
+
+
+def _cache_one_chunk(variable: Any) -> None:
     # Each chunk is used once, but NetCDF would by default keep 64 MiB of each variable in memory.
-    if layout.total >= COMPRESSED_FROM:
-        size = math.prod(layout.chunk) * variable.dtype.itemsize
+    if variable.dtype is not str and variable.chunking() not in (None, "contiguous"):
+        size = math.prod(variable.chunking()) * np.dtype(variable.dtype).itemsize
         variable.set_var_chunk_cache(size=2 * size, nelems=11, preemption=1.0)
 
 
@@ -226,16 +227,6 @@ def _chunked(layout: Layout) -> dict[str, Any]:
     if layout.total < COMPRESSED_FROM:
         return {}
     return {"compression": "zlib", "complevel": 1, "shuffle": True, "fletcher32": True, "chunksizes": layout.chunk}
-
-
-def _flush_folder(folder: Path) -> None:
-    # Windows neither needs this nor allows it.
-    if hasattr(os, "O_DIRECTORY"):
-        descriptor = os.open(folder, os.O_DIRECTORY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
 
 
 def check_kind(path: str | os.PathLike[str], mark: str, content: str) -> None:
@@ -278,38 +269,142 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
     InputError
         If the file is missing, is not NetCDF, or was not written by this package.
     """
-    with open_dataset(path) as ds:
+    with reading(path) as ds:
         return ds.load()
 
 
 def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     """Open a file of this package. Values are read when they are needed.
 
-    The dataset is a context manager that closes the file. Parameters and errors are those of :func:`load`.
+    Attributes, and values that have no checksum of their own, are compared with the digests in the file. The dataset
+    does not have these, because they do not hold for what is made of it. It is a context manager that closes the file.
+    Parameters and errors are those of :func:`load`.
     """
-    if not Path(path).is_file():
-        raise InputError(str(path), "is not a file" if Path(path).exists() else "does not exist")
-    try:
+    _check_exists(path)
+    if changed := altered(path, whole=False):
+        raise InputError(str(path), _difference(changed))
+    with _reading_file(path):
         # Decoding would turn numbers of seconds into timedelta64.
         ds = xr.open_dataset(Path(path).resolve(), engine="netcdf4", decode_times=False)
+    try:
+        missing = [name for name in SIGNATURE if name not in ds.attrs]
+        if missing:
+            raise InputError(
+                str(path),
+                f"was not written by ringsweep: its attributes lack {' and '.join(missing)}; give a result file",
+            )
+        with _reading_file(path):
+            _check_attributes(ds)
+    except InputError:
+        ds.close()
+        raise
+    ds.attrs.pop(digest.ATTRIBUTE, None)
+    return ds
+
+
+@contextmanager
+def reading(path: str | os.PathLike[str]) -> Iterator[xr.Dataset]:
+    """A file of this package, open for a block in which an error of the NetCDF library means that it is damaged."""
+    with open_dataset(path) as ds:
+        try:
+            yield ds
+        except (OSError, RuntimeError) as error:
+            if "NetCDF: " not in str(error):
+                raise
+            raise InputError(str(path), _DAMAGED) from error
+
+
+def check(path: str | os.PathLike[str]) -> bool:
+    """Compare all that a file holds with its digests.
+
+    Returns
+    -------
+    bool
+        Whether it has digests. Files of versions before 0.1 have none.
+
+    Raises
+    ------
+    InputError
+        If the file is not what was written, or as for :func:`load`.
+    """
+    _check_exists(path)
+    changed = altered(path, whole=True)
+    if changed:
+        raise InputError(str(path), _difference(changed))
+    open_dataset(path).close()
+    return changed is not None
+
+
+def verify(path: str | os.PathLike[str]) -> None:
+    """Check that a file holds what ringsweep wrote: every value, its unit and meaning, and every attribute.
+
+    The digests that a file holds cover neither compression and chunks, nor attributes and variables that other programs
+    add. They tell of damage and of changes, but they are no signature: who wants to deceive can compute them too.
+
+    Parameters
+    ----------
+    path : path-like
+        File that ringsweep wrote.
+
+    Raises
+    ------
+    InputError
+        If the file is damaged, was changed, or has no digest because an older version wrote it.
+
+    Examples
+    --------
+    >>> import ringsweep
+    >>> ds = ringsweep.run("my-sweep.yaml", "my-sweep.nc")
+    >>> ringsweep.verify("my-sweep.nc")
+    """
+    if not check(path):
+        raise InputError(str(path), "no digest: an older version wrote it, or it was removed. Nothing is known")
+
+
+_DAMAGED = "is not a NetCDF file, or is damaged"
+
+
+def _difference(names: Sequence[str]) -> str:
+    listed = ", ".join(names[:_MAX_NAMED]) + f" and {len(names) - _MAX_NAMED} more" * (len(names) > _MAX_NAMED)
+    return (
+        f"is damaged, or another program changed it: not as ringsweep wrote them are {listed} "
+        f"(if the change is wanted, remove the attribute {digest.ATTRIBUTE})"
+    )
+
+
+def _check_exists(path: str | os.PathLike[str]) -> None:
+    if not Path(path).is_file():
+        raise InputError(str(path), "is not a file" if Path(path).exists() else "does not exist")
+    check_name(path)
+
+
+@contextmanager
+def _reading_file(path: str | os.PathLike[str]) -> Iterator[None]:
+    try:
+        yield
     except PermissionError as error:
         raise InputError(str(path), "cannot be read: permission denied") from error
-    except (OSError, RuntimeError, ValueError) as error:
-        raise InputError(str(path), "is not a NetCDF file, or is damaged") from error
-    missing = [name for name in SIGNATURE if name not in ds.attrs]
-    if missing:
-        ds.close()
-        raise InputError(
-            str(path), f"was not written by ringsweep: its attributes lack {' and '.join(missing)}; give a result file"
-        )
-    return ds
+    except Exception as error:
+        # On a damaged file the libraries raise errors of many kinds.
+        raise InputError(str(path), _DAMAGED) from error
+
+
+def _check_attributes(ds: xr.Dataset) -> None:
+    """Raise an error of any kind if attributes that are read later are missing or have another form."""
+    for name, variable in ds.variables.items():
+        if str(name) in OUTCOMES and OUTCOMES[str(name)].flags:
+            values, meanings = np.atleast_1d(variable.attrs["flag_values"]), variable.attrs["flag_meanings"].split()
+            if values.dtype.kind not in "iu" or len(values) != len(meanings):
+                raise ValueError(f"{name} has {len(values)} flags and {len(meanings)} meanings")
+    for name in ("configuration", "versions", "solver"):
+        json.loads(ds.attrs.get(name, "{}"))
 
 
 def _encoding(variable: xr.Variable) -> dict[str, Any]:
     # With a fill value xarray would read integers as floats.
     encoding: dict[str, Any] = {"_FillValue": None}
     if variable.dtype.kind in "iuf" and variable.size >= COMPRESSED_FROM:
-        encoding |= {"zlib": True, "complevel": 1}
+        encoding |= {"zlib": True, "complevel": 1, "fletcher32": True}
     return encoding
 
 

@@ -1,0 +1,295 @@
+"""Files that are written completely or not at all.
+
+While ``OUT.nc`` is written, the folder ``OUT.nc.partial`` beside it belongs to one process, which holds the lock in it.
+What a killed process left there is removed by the next one.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import secrets
+import stat
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from filelock import FileLock, Timeout
+
+from ringsweep.errors import InputError
+
+MANIFEST = "sweep.json"
+
+#: Names of task files.
+TASK = re.compile(r"[0-9a-f]{12}-\d{10}-\d+-[0-9a-f]{16}\.npz")
+
+_LOCK = "lock"
+_TEMPORARY = re.compile(r"[0-9a-f]{8}\.tmp(\.\w+)?")
+
+# A file is complete within seconds of the computation that precedes it.
+_PATIENCE = 20.0
+
+
+def check_writable(path: str | os.PathLike[str]) -> None:
+    """Check that a file can be written at `path`, before its contents are computed.
+
+    Parameters
+    ----------
+    path : path-like
+        File that is written later; it may exist.
+
+    Raises
+    ------
+    InputError
+        If `path` is a folder, its folder does not exist or cannot be written, or the locale does not have its
+        characters.
+    """
+    check_name(path)
+    target = Path(path).resolve()
+    folder = target.parent
+    try:
+        if target.is_dir():
+            raise InputError(str(path), "is a folder; give the name of a file")
+        if not folder.exists():
+            raise InputError(str(path), f"the folder {folder} does not exist; create it or choose another")
+        if not folder.is_dir():
+            raise InputError(str(path), f"{folder} is not a folder")
+        # Raises if the file system does not accept the name.
+        with suppress(FileNotFoundError):
+            _folder_of(target).stat()
+        if _folder_of(target).exists():
+            # Removes what a killed process left. Whatever forbids it is told by the writer.
+            with suppress(InputError), working_folder(target):
+                pass
+        # Permission bits are not reliable on network drives, on read-only mounts, or for root.
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise InputError(str(path), f"cannot be written: {error.strerror or error}") from error
+
+
+def check_name(path: str | os.PathLike[str]) -> None:
+    """Check that the NetCDF library can be given the name of a file.
+
+    Raises
+    ------
+    InputError
+        If the locale does not have its characters.
+    """
+    encoding = sys.getfilesystemencoding()
+    try:
+        str(Path(path).resolve()).encode(encoding)
+    except UnicodeEncodeError as error:
+        shown = os.fsencode(path).decode("utf-8", "replace")
+        raise InputError(
+            ascii(shown)[1:-1],
+            f"the name, or that of a folder above it, has characters that the locale ({encoding}) does not have: "
+            "set LC_ALL=C.UTF-8 or PYTHONUTF8=1, or choose another name",
+        ) from error
+
+
+@contextmanager
+def working_folder(target: Path, patience: float = 0.0) -> Iterator[WorkingFolder]:
+    """The folder beside `target`, locked for this process. It is removed at the end if it holds no finished cells.
+
+    Parameters
+    ----------
+    target : Path
+        File that is written.
+    patience : float
+        How long to wait for another process that uses the folder, s.
+
+    Raises
+    ------
+    InputError
+        If another process uses the folder, it was not made by this package, or it cannot be written.
+    """
+    check_name(target)
+    folder = _folder_of(target)
+    mode = 0o777
+    with suppress(FileNotFoundError):
+        # Who may not read the file may not read its cells either.
+        mode = _permissions(target)
+        mode |= 0o700 | (mode & 0o444) >> 2
+    lock = FileLock(folder / _LOCK, timeout=patience)
+    try:
+        while True:
+            with suppress(FileExistsError):
+                folder.mkdir(mode=mode)
+                flush_folder(folder.parent)
+            # Another process may remove the folder meanwhile, because it has finished.
+            with suppress(FileNotFoundError):
+                _refuse_foreign(target, folder)
+                lock.acquire()
+                used = WorkingFolder(folder)
+                break
+            lock.release()
+    except Timeout:
+        raise InputError(str(target), f"another ringsweep is computing it (it uses {folder})") from None
+    except OSError as error:
+        raise InputError(str(target), f"cannot be written: {error.strerror or error}") from error
+    try:
+        if _permissions(folder) & ~mode:
+            folder.chmod(_permissions(folder) & mode)
+        used.remove_temporary()
+        yield used
+    except OSError:
+        # The folder may be the cause.
+        used.check()
+        raise
+    finally:
+        removable = used.is_own() and not used.finished_cells()
+        if removable:
+            used.remove_temporary()
+            with suppress(OSError):
+                (folder / MANIFEST).unlink(missing_ok=True)
+                # Windows does not remove a file that is open.
+                (folder / _LOCK).unlink(missing_ok=True)
+        lock.release()
+        if removable:
+            with suppress(OSError):
+                (folder / _LOCK).unlink(missing_ok=True)
+                folder.rmdir()
+
+
+class WorkingFolder:
+    """Folder beside a file that is written; made by :func:`working_folder`.
+
+    Attributes
+    ----------
+    path : Path
+    """
+
+    def __init__(self, path: Path):
+        self.path = path
+        self._lock = (path / _LOCK).lstat()
+
+    def is_own(self) -> bool:
+        """Whether the folder is still the one that this process locked."""
+        try:
+            return os.path.samestat(self._lock, (self.path / _LOCK).lstat())
+        except OSError:
+            return False
+
+    def check(self) -> None:
+        """Raise an `OSError` that names the cause if the folder was deleted, or replaced by another process."""
+        if not self.is_own():
+            raise OSError(f"{self.path} was deleted while this process used it; what it held is lost")
+
+    def temporary(self, suffix: str = "") -> Path:
+        """A new name in the folder. A file of this name is removed by the next process, if this one does not."""
+        return self.path / f"{secrets.token_hex(4)}.tmp{suffix}"
+
+    def remove_temporary(self) -> None:
+        """Remove what was not finished."""
+        for path in self._named(_TEMPORARY):
+            with suppress(OSError):
+                path.unlink(missing_ok=True)
+
+    def finished_cells(self) -> list[Path]:
+        """All task files, usable or not."""
+        return self._named(TASK)
+
+    def _named(self, pattern: re.Pattern[str]) -> list[Path]:
+        try:
+            return sorted(path for path in self.path.iterdir() if pattern.fullmatch(path.name))
+        except OSError:
+            return []
+
+    def write(self, name: str, content: bytes) -> None:
+        """Write a file so that it is on the disk, completely or not at all."""
+        temporary = self.temporary()
+        try:
+            with temporary.open("xb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            temporary.replace(self.path / name)
+            # Without this a power cut can undo the renaming.
+            flush_folder(self.path)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(self.path)) from error
+        finally:
+            with suppress(OSError):
+                temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Give a temporary name. At the end of the block the file of that name replaces `path`.
+
+    If the block fails or is interrupted, `path` stays unchanged and the temporary file is removed. If the process is
+    killed, the next one that writes `path` removes it.
+
+    Parameters
+    ----------
+    path : path-like
+        File to write or replace. A symbolic link is followed.
+
+    Yields
+    ------
+    Path
+        Name to write to, on the same disk and with the same suffix.
+
+    Raises
+    ------
+    InputError
+        If `path` cannot be written.
+    """
+    check_writable(path)
+    target = Path(path).resolve()
+    with working_folder(target, _PATIENCE) as folder:
+        temporary = folder.temporary(target.suffix)
+        yield temporary
+        put_in_place(temporary, target)
+
+
+def put_in_place(temporary: Path, target: Path) -> None:
+    """Let a complete file take the place of `target`, whose permissions it gets, so that no power cut can undo it."""
+    with temporary.open("r+b") as file:
+        os.fsync(file.fileno())
+    with suppress(FileNotFoundError):
+        temporary.chmod(_permissions(target))
+    temporary.replace(target)
+    flush_folder(target.parent)
+
+
+def flush_folder(folder: Path) -> None:
+    """Write the names of the files in a folder to the disk."""
+    # Windows neither needs this nor allows it.
+    if hasattr(os, "O_DIRECTORY"):
+        descriptor = os.open(folder, os.O_DIRECTORY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def _folder_of(target: Path) -> Path:
+    return target.with_name(f"{target.name}.partial")
+
+
+def _permissions(path: Path) -> int:
+    return path.stat().st_mode & 0o777
+
+
+def _refuse_foreign(target: Path, folder: Path) -> None:
+    """Refuse a folder that this package has not made, and links, which would lead out of it."""
+    refusal = f"cannot be written: unfinished files go to the folder {folder}, but"
+    if not stat.S_ISDIR(folder.lstat().st_mode):
+        kind = "a symbolic link" if folder.is_symlink() else "a file"
+        raise InputError(str(target), f"{refusal} it is {kind}: remove it, or name another output")
+    names = sorted(os.listdir(folder))
+    own = [name for name in names if name in (_LOCK, MANIFEST) or TASK.fullmatch(name) or _TEMPORARY.fullmatch(name)]
+    for name in own:
+        # Another process may have removed a file in the meantime.
+        with suppress(FileNotFoundError):
+            if not stat.S_ISREG((folder / name).lstat().st_mode):
+                raise InputError(str(target), f"{refusal} {name} in it is a link or no file: remove it")
+    if MANIFEST not in names and len(own) < len(names):
+        other = next(name for name in names if name not in own)
+        raise InputError(
+            str(target), f"{refusal} it is not of ringsweep: it holds {other}. Rename it, or name another output"
+        )

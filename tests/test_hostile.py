@@ -1,0 +1,23 @@
+"""Attacks in a short version: damaged files, faults of the disk, two writers. test_survival.py kills."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from benchmarks.hostile.__main__ import PARTS
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="attacks need fork and SIGKILL")
+@pytest.mark.parametrize("part", [part for part in PARTS if part != "kills"])
+def test_short_attack_finds_nothing(part):
+    found = subprocess.run(
+        [sys.executable, "-m", "benchmarks.hostile", part, "--short"],
+        cwd=Path(__file__).parents[1],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert found.returncode == 0, found.stdout + found.stderr
+    assert "everything held" in found.stdout
