@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import json
 import logging
+import re
 from contextlib import suppress
 from pathlib import Path
 
@@ -90,7 +91,7 @@ def map_command(arguments: argparse.Namespace) -> None:
     dataset = Path(arguments.dataset)
     result = netcdf.open_dataset(dataset)
     # The name differs from that of the regime map of the sweep, which must not be replaced.
-    shown = [arguments.var] * (arguments.var != "regime") + [held.replace(" ", "") for held in arguments.sel]
+    shown = [arguments.var] * (arguments.var != "regime") + [_name_part(held) for held in arguments.sel]
     target = Path(arguments.output or dataset.with_name("-".join([dataset.stem, *shown]) + ".png"))
     netcdf.check_writable(target)
     selection = dict(_selection(text) for text in arguments.sel)
@@ -114,6 +115,11 @@ def map_command(arguments: argparse.Namespace) -> None:
         raise
     plots.save(figure, target)
     print(f"wrote {target}")
+
+
+def _name_part(held: str) -> str:
+    """A setting as part of a file name, with no character that means something to a shell or to LaTeX."""
+    return re.sub(r"[^A-Za-z0-9_-]+", "-", held.replace(" ", "").replace("+", ""))
 
 
 def plot_command(arguments: argparse.Namespace) -> None:
