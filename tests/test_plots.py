@@ -151,7 +151,7 @@ def legends(figure: Figure) -> list:
 
 
 def title(figure: Figure) -> str:
-    return figure.axes[0].get_title(loc="left").replace("\n", " ")
+    return figure.axes[0].get_title().replace("\n", " ")
 
 
 def drawn_colours(figure: Figure, meaning: str) -> set[tuple[float, ...]]:
@@ -411,9 +411,9 @@ def test_colour_bar_of_a_count_has_whole_numbers():
 
 def test_long_title_is_broken_into_lines():
     held = {"friction.rough.mu_k": 0.1, "friction.rest.mu_k": 0.1, "initial.omega": 0.1}
-    text = plots.regime_map(make_sweep((3, 3, 2, 2, 2)), sel=held).axes[0].get_title(loc="left")
+    text = plots.regime_map(make_sweep((3, 3, 2, 2, 2)), sel=held).axes[0].get_title()
     assert "initial_omega = 0.1" in text
-    assert text.count("\n") == 1
+    assert text.count("\n") > 1
 
 
 def test_pictures_have_an_opaque_white_background():
@@ -626,7 +626,7 @@ class TestPanels:
         with pytest.raises(InputError, match="friction_rough_mu_k: hold it, or draw regime_map"):
             plots.map_panel(make_sweep((3, 3, 2)), ax=Figure().add_subplot())
         held = plots.map_panel(make_sweep((3, 3, 2)), sel={"friction.rough.mu_k": 0.1}, ax=Figure().add_subplot())
-        assert "coefficient of kinetic friction = 0.1" in held.get_title(loc="left").replace("\n", " ")
+        assert "coefficient of kinetic friction = 0.1" in held.get_title().replace("\n", " ")
 
     @pytest.mark.parametrize(("var", "lines"), [("phi", 1), ("ring_omega", 2), ("normal_2", 2), ("epsilon", 1)])
     def test_history_panel_also_shows_the_related_quantity(self, var, lines):

@@ -131,7 +131,7 @@ class TestFile:
         out = capsys.readouterr().out
         assert ds.attrs["audit"] in out
         assert "certified: 100.0%" in out
-        title = plots.regime_map(ds).axes[0].get_title(loc="left").replace("\n", " ")
+        title = plots.regime_map(ds).axes[0].get_title().replace("\n", " ")
         assert "of the cells run" in title
         assert "95 % confidence" in title
         # What is known of the whole is not known of a part.

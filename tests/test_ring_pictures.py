@@ -273,6 +273,47 @@ class TestPhasePortrait:
             plots.phase_portrait(run, "body", ax)
 
 
+class TestStyle:
+    @pytest.fixture(autouse=True)
+    def usual_style(self):
+        yield
+        plots.style()
+
+    @pytest.mark.parametrize("turns", [1.0, 20.0])
+    def test_angles_of_the_ring_may_be_in_radians(self, run, turns):
+        plots.style(angles="rad")
+        spun = run.assign(phi=run["phi"] * turns)
+        for frame in ("space", "ring"):
+            ax = plots.phase_portrait(spun, frame, Figure().add_subplot())
+            assert ax.get_xlabel().endswith("(rad)")
+            start = next(line for line in ax.lines if line.get_marker() == "s").get_xdata()[0]
+            assert start == pytest.approx(float(spun["phi"][0] - (spun["theta"][0] if frame == "ring" else 0.0)))
+        if turns > 1.0:
+            assert ax.get_xlim() == (-np.pi, np.pi)
+        view = plots.polar_view(run, 1.0, Figure().add_subplot())
+        assert {"0", "π/2", "π"} <= {text.get_text() for text in view.texts}
+
+    def test_dark_film_has_a_dark_page_and_covers_the_future_with_it(self, run, tmp_path):
+        plots.style("dark")
+        plots.save_animation(run, tmp_path / "run.gif", fps=5, duration=0.4)
+        with Image.open(tmp_path / "run.gif") as film:
+            assert film.convert("RGB").getpixel((0, 0)) == (30, 30, 30)
+        cover = films._Film(run, 5.0, 1.0).futures[0]
+        assert cover.get_facecolor()[:3] == pytest.approx(np.array([30, 30, 30]) / 255)
+
+    @pytest.mark.parametrize("width", [85, 170])
+    def test_legend_of_a_ring_picture_is_on_the_page(self, run, width):
+        plots.style("print", width=width)
+        size = (width / 25.4, width / 25.4)
+        for draw in (plots.phase_portrait, lambda ds, ax: plots.polar_view(ds, 1.0, ax)):
+            figure = Figure(figsize=size, layout="constrained")
+            ax = draw(run, ax=figure.add_subplot())
+            figure.draw_without_rendering()
+            box, page = ax.get_legend().get_window_extent(), figure.bbox
+            assert page.x0 <= box.x0 < box.x1 <= page.x1 + 1
+            assert page.y0 - 1 <= box.y0 < box.y1 <= page.y1
+
+
 def test_polar_view_refuses_a_belt(run):
     with pytest.raises(InputError, match="belt: there is no ring"):
         plots.polar_view(run.drop_vars("phi"), 1.0)

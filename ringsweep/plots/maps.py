@@ -40,6 +40,7 @@ from ringsweep.plots.style import (
     is_dark,
     is_narrow,
     label_axes,
+    legend_width,
     on_page,
     place_legend,
     small_ticks,
@@ -215,7 +216,7 @@ def map_panel(
     >>> from matplotlib.figure import Figure
     >>> ds = xr.Dataset({"phi_max": ("speed", [0.1, 0.3, 0.2], {"units": "rad"})}, coords={"speed": [1.0, 2.0, 3.0]})
     >>> map_panel(ds, var="phi_max", ax=Figure().add_subplot()).get_ylabel()
-    'phi_max (rad)'
+    'phi_max (°)'
     """
     found = Map.of(ds, x, y, var, sel or {})
     ax = axes_or_current(ax, 0.65)
@@ -399,11 +400,15 @@ class Map:
             )
         self.draw(axes, self.panels[0][1])
         self.label_axes(axes)
-        # From the left end it may reach over a legend beside the axes.
-        axes.set_title(self.title_text(title, width_of(axes) - MARGIN), fontsize="medium", loc="left")
-        if self.scale.meanings is None and self.vertical:
+        bar = self.scale.meanings is None and self.vertical is not None
+        if bar:
             self.add_colour_bar([axes])
-            legend = "below" if legend is True else legend
+        if legend is True:
+            legend = "below" if bar or is_narrow(width_of(axes)) else "beside"
+        beside = legend_width(self.entries) if legend == "beside" else MARGIN * bar
+        # A title above the axes alone meets no legend.
+        text = self.title_text(title, width_of(axes) - MARGIN - beside)
+        axes.set_title(text, fontsize="medium")
         place_legend(axes, self.entries, legend, handleheight=1.4)
 
     def label_axes(self, axes: Axes) -> None:

@@ -114,7 +114,7 @@ def style(
         shows through.
     width : float, optional
         Width of a figure, mm, for example 85 or 170 for one or two columns of a journal; by default 162.56 mm, the 6.4
-        inches of matplotlib.
+        inches of matplotlib. In pictures of 85 mm all text can be read; small multiples need 170 mm.
     angles : {"deg", "rad"}
         Unit of angles. Angular velocities and accelerations are always in rad s⁻¹ and rad s⁻².
 
@@ -294,6 +294,12 @@ def columns_of(handles: list[Artist], inches: float) -> int:
     longest = max(_length(str(handle.get_label())) for handle in handles)
     # Letters of a legend are smaller than those of the text.
     return max(1, min(len(handles), int(1.2 * letters(inches)) // (longest + 6)))
+
+
+def legend_width(handles: list[Artist]) -> float:
+    """Width of a legend of one column, inches."""
+    longest = max((_length(line) for handle in handles for line in str(handle.get_label()).split("\n")), default=-8)
+    return 10.0 * (longest + 8) / letters(10.0) / 1.2
 
 
 def legend_above(ax: Axes, handles: list[Artist] | None = None) -> None:
