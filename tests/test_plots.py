@@ -89,7 +89,7 @@ def named_sweep(shape: tuple[int, ...] = (12, 9)) -> xr.Dataset:
 
 
 def refined_sweep() -> xr.Dataset:
-    ds = named_sweep().assign_attrs(audit_bound=0.068, audit_cells=100)
+    ds = named_sweep().assign_attrs(audit_bound=0.068, audit_cells=100, cells_computed=36)
     origin = np.arange(ds["regime"].size).reshape(ds["regime"].shape) % 3 == 0
     return ds.assign(origin=(ds["regime"].dims, origin.astype("int8"), OUTCOMES["origin"].attributes))
 

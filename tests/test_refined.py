@@ -136,7 +136,7 @@ class TestFile:
         assert "95 % confidence" in title
         # What is known of the whole is not known of a part.
         part = plots.regime_map(ds.isel(drive_amplitude=slice(3, None)))
-        assert "confidence" not in part.axes[0].get_title(loc="left")
+        assert "confidence" not in part.axes[0].get_title()
         assert cli.main(["map", str(refined), "--var", "origin", "-o", str(tmp_path / "origin.png")]) == 0
 
 
