@@ -2,6 +2,7 @@
 
     python -m benchmarks.stability            # about five minutes
     python -m benchmarks.stability --quick    # coarser maps, the same extremes
+    python -m benchmarks.stability --redraw   # only the picture, from the stored numbers
 
 Every run is put into one of four classes against a reference:
 
@@ -21,6 +22,7 @@ from __future__ import annotations
 
 import argparse
 import copy
+import textwrap
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -30,6 +32,10 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.artist import Artist
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from benchmarks import reference
 from benchmarks._common import ALPHA, BODY, GRAVITY, RADIUS, REST, ROUGH, V0, machine
@@ -625,39 +631,71 @@ def drifts(quick: bool) -> tuple[xr.Dataset, list[list[str]], float]:
 
 
 def picture(ds: xr.Dataset, chosen: Sequence[Map], path: Path) -> None:
-    """Draw the six maps; each cell has the worst class of the scenes."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-    from matplotlib.colors import ListedColormap
-    from matplotlib.patches import Patch
-
-    figure, axes = plt.subplots(2, 3, figsize=(13.5, 8.2), layout="constrained")
+    """Draw the maps in which a run is wrong; each cell has its worst scene. A sentence names the other maps."""
     # Wrong and certified is worst, worse than a failure that the solver reports.
     badness = np.array([0, 1, 3, 2])
-    for panel, map_ in zip(axes.flat, chosen, strict=True):
+    plain = [one for one in chosen if (ds[f"{one.name}_class"] == RIGHT).all()]
+    drawn = [one for one in chosen if one not in plain]
+    columns = 2
+    rows = -(-(len(drawn) + 1) // columns)
+    figure = Figure(figsize=(6.69, 2.7 * rows), layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    for panel, map_ in zip(axes, drawn, strict=False):
         classes = ds[f"{map_.name}_class"].values
-        worst = np.take(np.argsort(badness), badness[classes].max(axis=0))
         x, y = map_.x.values, map_.y.values
+        # Of several scenes of the same class the one with the largest step in units of its limit.
+        stiff = ds[f"{map_.name}_stiffness"].values if f"{map_.name}_stiffness" in ds else np.zeros(classes.shape)
+        shown = np.argmax(badness[classes] + 0.5 * (stiff > STABILITY_LIMIT), axis=0)[None]
+        worst, stiff = (np.take_along_axis(one, shown, axis=0)[0] for one in (classes, stiff))
         panel.pcolormesh(
             x, y, worst, cmap=ListedColormap(COLOURS), vmin=-0.5, vmax=3.5, shading="nearest",
-            edgecolors="white", linewidth=0.4,
+            edgecolors="white", linewidth=0.3,
         )  # fmt: skip
-        if f"{map_.name}_stiffness" in ds:
-            beyond = ds[f"{map_.name}_stiffness"].max("scene").values
-            panel.contour(x, y, np.minimum(beyond, 1e9), [STABILITY_LIMIT], colors="black", linewidths=1.6)
-        panel.set(
-            xscale="linear" if map_.x.name == "mu_ratio" else "log", yscale="log",
-            xlabel=map_.x.label, ylabel=map_.y.label, title=map_.title,
-        )  # fmt: skip
-    names = ["right", "wrong and flagged", "wrong and silent", "failed"]
-    handles = [Patch(facecolor=colour, label=name) for colour, name in zip(COLOURS, names, strict=True)]
-    handles.append(plt.Line2D([], [], color="black", lw=1.6, label=f"|λ|h = {STABILITY_LIMIT}"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=5, frameon=False)
+        beyond = np.ma.masked_where(stiff <= STABILITY_LIMIT, stiff)
+        panel.pcolor(x, y, beyond, shading="nearest", hatch=".....", facecolor="none", edgecolor="black", linewidth=0)
+        panel.set_title(_typeset(map_.title), fontsize="medium")
+        panel.set(xscale="linear" if map_.x.name == "mu_ratio" else "log", yscale="log")
+        panel.set(xlabel=map_.x.label, ylabel=map_.y.label)
+        panel.tick_params(labelsize="small")
+    text, *unused = axes[len(drawn) :]
+    for panel in (text, *unused):
+        panel.set_axis_off()
+    style: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (-0.05, 1.0), "fontsize": "small", "frameon": False}
+    text.legend(handles=_legend(ds, drawn), **style)
+    if plain:
+        names = "; ".join(f"{_typeset(one.title)} ({ds[f'{one.name}_class'].size} runs)" for one in plain)
+        words = textwrap.fill(f"Right in every cell, so not drawn: {names}.", 52)
+        text.text(0.0, 0.0, words, fontsize="small", transform=text.transAxes, va="bottom")
     figure.suptitle("Worst class of three scenes (Figs. 25, 29, 33) in every cell")
-    figure.savefig(path, dpi=130, metadata={"Software": None})
-    plt.close(figure)
+    figure.savefig(path, dpi=150, metadata={"Software": None})
+
+
+def _typeset(title: str) -> str:
+    """A title with symbols."""
+    return title.replace("1e5", "10⁵").replace("alpha", "\N{GREEK SMALL LETTER ALPHA}")
+
+
+def _legend(ds: xr.Dataset, drawn: Sequence[Map]) -> list[Artist]:
+    """Entries for the classes, with what a silent error is here, and for the limit of stability."""
+    silent = [ds[f"{one.name}_class"].values == SILENT for one in drawn]
+    errors = np.concatenate([ds[f"{one.name}_error"].values[where] for one, where in zip(drawn, silent, strict=True)])
+    kinds = (ds[f"{one.name}_wrong_in_kind"].values[where] for one, where in zip(drawn, silent, strict=True))
+    in_kind = sum(int((kind == 1).sum()) for kind in kinds)
+    if len(errors):
+        what = f"regime wrong in {in_kind} of {len(errors)} runs" if in_kind else "regime right"
+        what += f",\nerror above {CLOSE:g}, up to {np.nanmax(errors):.1g} (rad, s)"
+    else:
+        what = ""
+    names = ["right", "wrong and flagged: not certified", f"wrong and silent: certified; {what}", "failed"]
+    entries: list[Artist] = [
+        Patch(facecolor=colour, label=name)
+        for k, (colour, name) in enumerate(zip(COLOURS, names, strict=True))
+        if any((ds[f"{one.name}_class"] == k).any() for one in drawn)
+    ]
+    beyond = Patch(facecolor="white", edgecolor="black", hatch=".....", linewidth=0.0)
+    limit = f"|λ|h > {STABILITY_LIMIT:g}"
+    beyond.set_label(f"dotted: beyond the limit of stability of rk4,\n{limit}; without dots: within it")
+    return [*entries, beyond]
 
 
 def markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -687,7 +725,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Solvers on stiff and extreme cases.")
     parser.add_argument("--quick", action="store_true", help="coarser maps: under a minute once compiled")
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder of the results (default %(default)s)")
+    parser.add_argument("--redraw", action="store_true", help="only draw the stored numbers again")
     arguments = parser.parse_args()
+    if arguments.redraw:
+        picture(xr.load_dataset(arguments.out / "stability.nc"), maps(quick=False), arguments.out / "stability.png")
+        return
     begin = time.perf_counter()
     where = machine()
     print(where, flush=True)

@@ -3,6 +3,7 @@
     python -m benchmarks.work_precision                  all, about ten minutes
     python -m benchmarks.work_precision --quick          fewer cells and settings, under two minutes
     python -m benchmarks.work_precision --scene stiff    one scene (smooth, stiff, limit, lugre); repeatable
+    python -m benchmarks.work_precision --redraw         only the pictures, from the stored numbers
 
 Scenes: a seeded sample of the Fig. 29 family (two-contact ring, T = 10 s) under Bengisu and Akay's law, smooth (alpha
 100, v0 0.2) and stiff (alpha 1e5, v0 2e-6), and under its limit, stiction; and the belt under LuGre's law. Peers
@@ -11,7 +12,8 @@ share no formula with the package. If a peer is not installed, the benchmark say
 backwards. Times are medians over the rounds, ratios are medians of the ratios within the rounds. There are no
 certificates, because peers have none.
 
-Writes `work_precision.{md,nc,png}` to `benchmarks/results/`, or to the current folder with `--quick` or `--scene`.
+Writes `work_precision.{md,nc}` and a picture of each scene, `work_precision_smooth.png` for example, to
+`benchmarks/results/`, or to the current folder with `--quick` or `--scene`.
 """
 
 from __future__ import annotations
@@ -56,6 +58,9 @@ from ringsweep.quantities.variables import SEPARATING
 
 SEED, SIDE = 181, 64
 RESULTS = Path(__file__).parent / "results"
+
+#: Width of a picture, inches: that of a page.
+WIDTH = 6.69
 PEERS = ("scipy", "numbalsoda", "diffrax", "heyoka")
 
 _BELT = {
@@ -381,31 +386,57 @@ def lines(data: xr.Dataset) -> list[list[str]]:
     return found
 
 
-def draw(measured: dict[str, Measured]) -> Figure:
-    """Figure with a row for each scene and a column for each of the three errors."""
-    figure = Figure(figsize=(19.0, 5.2 * len(measured)), layout="constrained")
-    axes = figure.subplots(len(measured), 3, squeeze=False)
-    methods = list(dict.fromkeys(str(name) for found in measured.values() for name in found.data.method.values))
-    for (first, second, third), found in zip(axes, measured.values(), strict=True):
-        data = found.data.assign_attrs(methods=methods)
-        plots.precision_panel(data, "error_end", first)
-        first.set_title(data.attrs["title"], loc="left")
-        styles = {line.get_label(): line for line in first.get_lines() if not str(line.get_label()).startswith("_")}
-        if data.error_separation.isnull().all():
-            second.set_axis_off()
-            second.text(0.5, 0.5, "nothing separates here", ha="center", transform=second.transAxes)
-        else:
-            plots.precision_panel(data, "error_separation", second)
-            # The first panel has the same legend.
-            second.get_legend().remove()
-        for method, line in styles.items():
-            own_rows = data.isel(contender=data.method.values == method)
-            share = 100.0 * own_rows.regime_wrong.mean("cell")
-            third.plot(own_rows.time_per_run, share, color=line.get_color(), marker=line.get_marker(), label=method)
-        third.set(xscale="log", xlabel="time per run, one core (s)", ylabel="cells whose regime is wrong (%)")
-        third.set_ylim(-4.0, 104.0)
-        third.grid(True, color="#E6E6E6", linewidth=0.6)
+def draw(data: xr.Dataset, methods: list[str]) -> Figure:
+    """Figure of a scene: the error at the end, that of the separation if there is one, and the share of wrong regimes.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        Numbers of one scene.
+    methods : list of str
+        Methods of all scenes, so that a colour stands for the same method in all figures.
+    """
+    data = data.assign_attrs(methods=methods)
+    errors = [name for name in ("error_end", "error_separation") if data[name].notnull().any()]
+    columns = 2
+    rows = -(-(len(errors) + 1) // columns)
+    figure = Figure(figsize=(WIDTH, 2.5 * rows + 1.2), layout="constrained")
+    axes = figure.subplots(rows, columns).ravel()
+    for panel, error in zip(axes, errors, strict=False):
+        plots.precision_panel(data, error, panel)
+        panel.set_title("", loc="left")
+    legend = axes[0].get_legend()
+    handles, styles = legend.legend_handles, {line.get_label(): line for line in axes[0].get_lines()}
+    labels = [text.get_text() for text in legend.get_texts()]
+    for panel in axes[: len(errors)]:
+        panel.get_legend().remove()
+    shares = axes[len(errors)]
+    for method in dict.fromkeys(map(str, data.method.values)):
+        own_rows = data.isel(contender=data.method.values == method)
+        share = 100.0 * own_rows.regime_wrong.mean("cell")
+        line = styles[method]
+        shares.plot(own_rows.time_per_run, share, color=line.get_color(), marker=line.get_marker(), markersize=4)
+    shares.set(xscale="log", xlabel=axes[0].get_xlabel(), ylabel="regime wrong (% of cells)")
+    shares.set_ylim(-4.0, 104.0)
+    shares.tick_params(labelsize="small")
+    shares.grid(True, color="#E6E6E6", linewidth=0.6)
+    what = f"points: median of {data.sizes['cell']} cells; bars: up to the largest"
+    figure.suptitle(f"{data.attrs['title']}\n{what}", fontsize="medium")
+    figure.align_ylabels(axes)
+    style: dict[str, Any] = {"fontsize": "small", "frameon": False, "handlelength": 3}
+    if free := axes[len(errors) + 1 :].tolist():
+        free[0].set_axis_off()
+        free[0].legend(handles, labels, loc="center", **style)
+    else:
+        figure.legend(handles, labels, loc="outside lower center", ncols=3, **style)
     return figure
+
+
+def draw_all(scenes: dict[str, xr.Dataset], folder: Path) -> None:
+    """Write a picture of each scene."""
+    methods = list(dict.fromkeys(str(name) for data in scenes.values() for name in data.method.values))
+    for name, data in scenes.items():
+        draw(data, methods).savefig(folder / f"work_precision_{name}.png", dpi=150, metadata={"Software": None})
 
 
 # ---- targets -------------------------------------------------------------------------------
@@ -494,8 +525,6 @@ ABOUT = """
 One core, compiled before, no certificates; medians over rounds in which contenders alternate. The table has the errors
 of φ(T), or of x(T) on the belt, and of the time of separation. The regime of a peer only says whether the body
 separates. The time of diffrax is the time of one lane of a full solve.
-
-![error against run time](work_precision.png)
 """
 
 # ---- the command ---------------------------------------------------------------------------
@@ -506,7 +535,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="fewer cells and settings")
     parser.add_argument("--scene", action="append", choices=SCENES, help="only this scene; repeatable")
+    parser.add_argument("--redraw", action="store_true", help="only draw the stored numbers again")
     arguments = parser.parse_args()
+    if arguments.redraw:
+        stored = RESULTS / "work_precision.nc"
+        draw_all({name: xr.load_dataset(stored, group=name) for name in SCENES}, RESULTS)
+        return
     effort = QUICK if arguments.quick else FULL
     # XLA reads this when JAX is imported, which happens when a scene asks for diffrax.
     os.environ["XLA_FLAGS"] = "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"
@@ -528,7 +562,8 @@ def main() -> None:
             print("\n".join(found.words))
             table(HEADER, lines(found.data))
             print(f"({time.perf_counter() - begin:.0f} s so far)")
-            report += f"\n## {SCENES[name].title}\n\n" + "".join(f"- {words}\n" for words in found.words)
+            report += f"\n## {SCENES[name].title}\n\n![error against run time](work_precision_{name}.png)\n\n"
+            report += "".join(f"- {words}\n" for words in found.words)
             report += "\n" + markdown(HEADER, lines(found.data))
             # Written after each scene, so that an interrupted run keeps its results.
             write(folder, report, measured, where)
@@ -550,16 +585,16 @@ def main() -> None:
             table(header, rows)
             report += f"\n## {title}\n\n{markdown(header, rows)}"
     write(folder, report, measured, where)
-    print(f"\nwork_precision.md, .nc and .png are in {folder.resolve()}; {time.perf_counter() - begin:.0f} s in all")
+    print(f"\nwork_precision.md, .nc, and pictures: {folder.resolve()}; {time.perf_counter() - begin:.0f} s in all")
 
 
 def write(folder: Path, report: str, measured: dict[str, Measured], where: str) -> None:
-    """Write the report, the numbers (one NetCDF group for each scene) and the picture."""
+    """Write the report, the numbers (one NetCDF group for each scene) and the pictures."""
     (folder / "work_precision.md").write_text(report)
     for k, (name, found) in enumerate(measured.items()):
         found.data.attrs["machine"] = where
         found.data.to_netcdf(folder / "work_precision.nc", group=name, mode="a" if k else "w")
-    draw(measured).savefig(folder / "work_precision.png", dpi=80)
+    draw_all({name: found.data for name, found in measured.items()}, folder)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from ringsweep import plots
 from ringsweep.plots.rig import Rig
 
 CONFIG = Path(__file__).parents[1] / "configs" / "regime_map.yaml"
-TIME = 1.1
+TIME = 2.05
 
 
 def place(radius: float, angle: float) -> np.ndarray:
@@ -27,13 +27,14 @@ def name(ax: Axes, text: str, low: float, high: float, radius: float) -> None:
     ax.add_patch(Arc((0, 0), 2 * radius, 2 * radius, theta1=degrees(low) - 90, theta2=degrees(high) - 90, zorder=8))
     tip, before = place(radius, high), place(radius, high - 0.04)
     ax.annotate("", tip, before, arrowprops={"arrowstyle": "-|>", "color": "black", "shrinkA": 0, "shrinkB": 0})
-    ax.text(*place(0.87 * radius, (low + high) / 2), text, ha="center", va="center", fontsize=12, zorder=8)
+    beside = place(radius + 0.055 * ax.get_xlim()[1], (low + high) / 2)
+    ax.text(*beside, text, ha="center", va="center", fontsize=12, zorder=8)
 
 
 def draw() -> Figure:
     """Draw the body in the ring with phi, beta, theta, R and r."""
     run = ringsweep.simulate(CONFIG)
-    figure = Figure(figsize=(6.6, 5.0), layout="constrained")
+    figure = Figure(figsize=(5.0, 5.6), layout="constrained")
     ax = plots.polar_view(run, TIME, figure.add_subplot())
     now = run.drop_duplicates("time").interp(time=TIME)
     rig = Rig.of(run)
@@ -41,9 +42,9 @@ def draw() -> Figure:
     thin = {"color": "black", "linewidth": 0.7, "linestyle": "--", "zorder": 7}
     for angle, reach in ((0.0, 0.9), (phi, 0.8), (phi + beta, 1.0), (theta, 1.0)):
         ax.plot(*zip((0, 0), place(reach * R, angle), strict=True), **thin)
-    name(ax, r"$\varphi$", 0.0, phi, 0.62 * R)
-    name(ax, r"$\beta$", phi, phi + beta, 0.5 * R)
-    name(ax, r"$\theta$", 0.0, theta, 0.28 * R)
+    name(ax, r"$\varphi$", 0.0, phi, 0.38 * R)
+    name(ax, r"$\beta$", phi, phi + beta, 0.38 * R)
+    name(ax, r"$\theta$", 0.0, theta, 0.2 * R)
     straight = {"arrowprops": {"arrowstyle": "-|>", "color": "black", "shrinkA": 0, "shrinkB": 0}}
     ax.annotate("", place(R, -2.2), (0, 0), **straight)
     ax.text(*place(0.6 * R, -2.3), "$R$", fontsize=12)

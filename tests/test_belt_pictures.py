@@ -203,7 +203,7 @@ class TestFilm:
         np.testing.assert_allclose(dot, [x, velocity], atol=1e-12)
         (arrow,) = (artist for artist in above.collections if isinstance(artist, Quiver))
         bar = next(line for line in above.lines if line.get_marker() == "|")
-        newtons = next(float(text.get_text().split()[0]) for text in above.texts if text.get_text().endswith(" N"))
+        newtons = next(float(text.get_text().split()[1]) for text in above.texts if text.get_text().endswith(" N"))
         assert arrow.U[0] / np.ptp(bar.get_xdata()) * newtons == pytest.approx(-force)
         assert above.get_title().startswith(f"t = {time:.4f} s, ")
         sign = "+" if velocity >= 0 else "\N{MINUS SIGN}"
@@ -232,7 +232,8 @@ class TestFilm:
         texts = [text.get_text() for legend in film.figure.subfigs[0].legends for text in legend.get_texts()]
         for axes in film.figure.axes:
             texts += [axes.get_title(), axes.get_xlabel(), axes.get_ylabel(), *(text.get_text() for text in axes.texts)]
-        assert "friction on the body" in texts
+        assert "$F$" in texts
+        assert "friction on the body" not in texts
         assert not [text for text in texts if "ring" in text.replace("spring", "")]
 
     def test_animate_writes_a_film_of_a_belt(self, tmp_path, monkeypatch, run):

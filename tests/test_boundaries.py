@@ -125,7 +125,7 @@ class TestBoundary:
         figure = plots.regime_map(ds, boundaries=curves)
         lines = figure.axes[0].lines
         assert sum(len(line.get_xdata()) for line in lines) == curves.sizes["vertex"]
-        assert "boundary of separating" in " ".join(text.get_text() for text in figure.legends[0].get_texts())
+        assert "boundary of separating" in " ".join(text.get_text() for text in figure.axes[0].get_legend().get_texts())
         netcdf.save(ds, tmp_path / "my.nc")
         assert cli.main(["map", str(tmp_path / "my.nc"), "--boundaries", "separating", "--tolerance", "1e-2"]) == 0
         written = netcdf.load(tmp_path / "my-separating.nc")

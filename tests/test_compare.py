@@ -289,7 +289,8 @@ class TestPicture:
             low, high = axes.get_ylim()
             assert -2.5 < low < -1.4
             assert 0.0 < high < 1.0
-            assert axes.get_title(loc="right").startswith("axis clipped; values from \N{MINUS SIGN}3")
+            said = axes.get_title(loc="right") or axes.get_title(loc="left")
+            assert "axis clipped; values from \N{MINUS SIGN}3" in said
 
     def test_last_panel_shows_the_first_breakaway_of_each_law_at_the_same_place(self, compared):
         detail = plots.history(compared).axes[-1]
@@ -341,7 +342,7 @@ class TestCommands:
         assert err == ""
         assert "holds this sweep already" in out
         assert "friction_law: coulomb, stiction, tustin\n" in out
-        assert (folder / "laws-friction.law=tustin.png").exists()
+        assert (folder / "laws-friction-law-tustin.png").exists()
 
     def test_simulate_prints_a_line_for_each_law(self, folder, capsys):
         assert main(["simulate", "laws.yaml"]) == 0

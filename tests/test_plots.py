@@ -1,19 +1,25 @@
 """Maps, histories and work-precision diagrams show what the dataset holds."""
 
+import json
 import os
 import time
+from pathlib import Path
 
 import matplotlib
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection, QuadMesh
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
+from PIL import Image
 
 from ringsweep import plots
 from ringsweep.errors import InputError
-from ringsweep.quantities.variables import HISTORY, OUTCOMES, REGIMES
+from ringsweep.quantities.variables import HISTORY, OUTCOMES, REGIMES, words
 
 DRIVE = {"units": "rad s-1", "long_name": "amplitude of the drive"}
 ANGLE = {"units": "rad", "long_name": "half-angle of the zone"}
@@ -74,16 +80,82 @@ def make_work(methods: int = 3, settings: int = 4, cells: int = 5) -> xr.Dataset
     )
 
 
+def named_sweep(shape: tuple[int, ...] = (12, 9)) -> xr.Dataset:
+    """A sweep with the long names of a true one, and what its file says of its runs."""
+    ds = make_sweep(shape).assign_attrs(configuration=json.dumps({"scene": {"time": {"span": "10 s"}}}))
+    ds["drive_amplitude"].attrs["long_name"] = "amplitude of the ring's angular velocity"
+    ds["regime"] = ds["regime"].clip(max=3)
+    return ds
+
+
+def refined_sweep() -> xr.Dataset:
+    ds = named_sweep().assign_attrs(audit_bound=0.068, audit_cells=100, cells_computed=36)
+    origin = np.arange(ds["regime"].size).reshape(ds["regime"].shape) % 3 == 0
+    return ds.assign(origin=(ds["regime"].dims, origin.astype("int8"), OUTCOMES["origin"].attributes))
+
+
+def separated() -> xr.Dataset:
+    """A history that contact 2 ends."""
+    ds = make_history()
+    ds["normal_2"][:] = np.linspace(1.0, 0.0, ds.sizes["time"])
+    scalars = {"regime": REGIMES.index("separating"), "separating_contact": 2, "t_separation": 10.0}
+    outcome = "separating (oscillatory), contact 2, t = 10.0000 s"
+    return ds.assign({name: ((), value) for name, value in scalars.items()}).assign_attrs(outcome=outcome)
+
+
+def panel() -> Axes:
+    return Figure(layout="constrained").add_subplot()
+
+
+def luminance(colour) -> float:
+    channels = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in to_rgb(colour)]
+    return float(np.dot([0.2126, 0.7152, 0.0722], channels))
+
+
+def texts_drawn(figure: Figure) -> list[Text]:
+    """Texts that a reader sees; ticks outside the limits of their axis are not drawn."""
+    figure.draw_without_rendering()
+    hidden = set()
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            slack = 1e-9 * (high - low)
+            for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks()):
+                if not low - slack <= tick.get_loc() <= high + slack:
+                    hidden |= {tick.label1, tick.label2}
+    seen = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip()]
+    return [text for text in seen if text not in hidden]
+
+
+def assert_readable(figure: Figure) -> None:
+    boxes = [(text.get_text(), text.get_window_extent()) for text in texts_drawn(figure)]
+    page = figure.bbox
+    for k, (text, box) in enumerate(boxes):
+        over = max(page.x0 - box.x0, box.x1 - page.x1, page.y0 - box.y0, box.y1 - page.y1)
+        assert over < 1, f"{text!r} is cut off"
+        for other, place in boxes[k + 1 :]:
+            across = min(box.x1, place.x1) - max(box.x0, place.x0)
+            assert across <= 1 or min(box.y1, place.y1) - max(box.y0, place.y0) <= 1, f"{text!r} and {other!r} collide"
+
+
 def mesh(figure: Figure, panel: int = 0) -> QuadMesh:
     return next(artist for artist in figure.axes[panel].collections if isinstance(artist, QuadMesh))
 
 
 def entries(figure: Figure) -> list[str]:
-    return [text.get_text().replace("\n", " ") for legend in figure.legends for text in legend.get_texts()]
+    return [text.get_text().replace("\n", " ") for legend in legends(figure) for text in legend.get_texts()]
+
+
+def legends(figure: Figure) -> list:
+    return [*figure.legends, *(axes.get_legend() for axes in figure.axes if axes.get_legend())]
+
+
+def title(figure: Figure) -> str:
+    return figure.axes[0].get_title().replace("\n", " ")
 
 
 def drawn_colours(figure: Figure, meaning: str) -> set[tuple[float, ...]]:
-    handles = [h for h in figure.legends[0].get_patches() if h.get_label().startswith(meaning)]
+    handles = [h for h in legends(figure)[0].get_patches() if h.get_label().startswith(meaning)]
     return {to_rgb(h.get_facecolor()) for h in handles}
 
 
@@ -185,11 +257,50 @@ def test_map_legend_lists_the_regimes_present_with_their_shares():
 def test_missing_values_are_grey_and_in_the_legend():
     figure = plots.regime_map(make_sweep((10, 10)), var="t_separation")
     share = 100 * float(make_sweep((10, 10))["t_separation"].isnull().mean())
-    assert entries(figure) == [f"no value, {share:.1f} %"]
+    assert entries(figure) == [f"no separation, {share:.1f} %"]
     assert to_rgb(mesh(figure).get_cmap().get_bad()) == to_rgb("#DDDDDD")
     nothing = make_sweep()
     nothing["t_separation"][:] = np.nan
-    assert entries(plots.regime_map(nothing, var="t_separation")) == ["no value, 100.0 %"]
+    assert entries(plots.regime_map(nothing, var="t_separation")) == ["no separation, 100.0 %"]
+
+
+@pytest.mark.parametrize(("span", "told"), [("10 s", "10 s"), (2.5, "2.5 s"), ("1 min", "1 min")])
+def test_missing_time_of_separation_is_told_with_the_span(span, told):
+    ds = make_sweep((10, 10)).assign_attrs(configuration=json.dumps({"scene": {"time": {"span": span}}}))
+    ds["regime"] = ds["regime"].clip(max=3)
+    (entry,) = entries(plots.regime_map(ds, var="t_separation"))
+    assert entry.startswith(f"no separation within {told}, ")
+    # A run that jams or fails does not reach its span.
+    ds["regime"][0, 0] = REGIMES.index("failed")
+    assert entries(plots.regime_map(ds, var="t_separation"))[0].startswith("no separation, ")
+    # Runs of several spans have no common one.
+    swept = ds["drive_amplitude"].assign_attrs(path="time.span")
+    (entry,) = entries(plots.regime_map(ds.assign_coords(drive_amplitude=swept), var="t_separation"))
+    assert entry.startswith("no separation, ")
+
+
+def test_missing_values_of_inferred_cells_and_bounds_are_told_as_such():
+    ds = make_sweep((4, 4))
+    ds["origin"] = ds["regime"].dims, np.full((4, 4), 1, "int8"), OUTCOMES["origin"].attributes
+    ds["phi_max"] = ds["t_separation"] * np.nan
+    ds["phi_max_error"] = ds["t_separation"]
+    assert entries(plots.regime_map(ds, var="phi_max")) == ["inferred, not run, 100.0 %"]
+    ds["origin"][:2] = 0
+    assert entries(plots.regime_map(ds, var="phi_max")) == ["no value, or inferred, not run, 100.0 %"]
+    assert entries(plots.regime_map(ds.drop_vars("origin"), var="phi_max_error"))[0].startswith("no bound, ")
+
+
+def test_map_without_any_certificate_is_not_hatched_but_says_so():
+    ds = make_sweep((10, 10))
+    ds["certified"][:] = 0
+    figure = plots.regime_map(ds)
+    assert not figure.axes[0].patches
+    assert entries(figure)[-1] == "not certified, 100.0 %"
+    off = ds.assign_attrs(solver=json.dumps({"method": "implicit", "certify": False}))
+    assert entries(plots.regime_map(off))[-1] == "no cell is certified: certify is false"
+    points = make_points()
+    points["certified"][:] = 0
+    assert len(plots.regime_map(points).axes[0].collections) == 1
 
 
 def test_map_hatches_only_cells_that_are_not_certified():
@@ -223,6 +334,13 @@ def test_hatching_a_large_map_takes_less_than_five_seconds(tmp_path):
     assert time.perf_counter() - begin < 5
 
 
+def test_share_of_a_regime_has_no_label_of_a_regime():
+    share = (words(make_sweep()["regime"]) == "separating").mean("drive_amplitude").rename("share that separates")
+    ax = panel()
+    share.plot(ax=ax)
+    assert ax.get_ylabel() == "share that separates"
+
+
 def test_map_axis_may_have_a_single_value():
     for ds in (make_sweep((1, 5)), make_sweep((5, 1)), make_sweep((1, 1))):
         assert mesh(plots.regime_map(ds)).get_array().shape == ds["regime"].transpose().shape
@@ -251,22 +369,21 @@ def test_map_axis_may_consist_of_friction_laws():
     figure = plots.regime_map(ds)
     assert [label.get_text() for label in figure.axes[0].get_xticklabels()] == ["stiction", "coulomb", "dahl"]
     np.testing.assert_array_equal(mesh(figure).get_array()[:, 2], ds["regime"].sel(drive_amplitude="dahl"))
-    assert " = dahl" in plots.regime_map(ds, sel={"drive_amplitude": "dahl"}).get_suptitle()
+    assert " = dahl" in title(plots.regime_map(ds, sel={"drive_amplitude": "dahl"}))
 
 
 def test_map_holds_the_nearest_value_and_names_it_in_the_title():
     ds = make_sweep((12, 9, 3))
     figure = plots.regime_map(ds, sel={"friction.rough.mu_k": 0.32, "zone_half_angle": 0.04})
     np.testing.assert_array_equal(mesh(figure).get_array()[0], ds["regime"][:, 0, 1])
-    assert "coefficient of kinetic friction = 0.3" in figure.get_suptitle()
-    assert "half-angle of the zone = 2°" in figure.get_suptitle()
+    assert "coefficient of kinetic friction = 0.3" in title(figure)
+    assert "half-angle of the zone = 2°" in title(figure)
 
 
 @pytest.mark.parametrize("value", ["30 deg", "0.5236", 0.5236, "0.08333 turn"])
 def test_held_value_may_have_a_unit(value):
     ds = make_sweep((12, 30))
-    title = plots.regime_map(ds, sel={"zone.half_angle": value}).get_suptitle()
-    assert "half-angle of the zone = 30°" in title
+    assert "half-angle of the zone = 30°" in title(plots.regime_map(ds, sel={"zone.half_angle": value}))
 
 
 @pytest.mark.parametrize(
@@ -294,9 +411,9 @@ def test_colour_bar_of_a_count_has_whole_numbers():
 
 def test_long_title_is_broken_into_lines():
     held = {"friction.rough.mu_k": 0.1, "friction.rest.mu_k": 0.1, "initial.omega": 0.1}
-    title = plots.regime_map(make_sweep((3, 3, 2, 2, 2)), sel=held).get_suptitle()
-    assert "initial_omega = 0.1" in title
-    assert max(map(len, title.split("\n"))) < 70
+    text = plots.regime_map(make_sweep((3, 3, 2, 2, 2)), sel=held).axes[0].get_title()
+    assert "initial_omega = 0.1" in text
+    assert text.count("\n") > 1
 
 
 def test_pictures_have_an_opaque_white_background():
@@ -309,7 +426,8 @@ def test_further_dimensions_become_panels_with_one_colour_scale():
     figure = plots.regime_map(ds, var="t_separation")
     panels = [axes for axes in figure.axes if axes.get_title()]
     assert len(panels) == 6
-    assert panels[4].get_title() == "coefficient of kinetic\nfriction = 0.5\ncoefficient of kinetic\nfriction = 0.3"
+    held = panels[4].get_title().replace("\n", " ")
+    assert held == "coefficient of kinetic friction = 0.5 coefficient of kinetic friction = 0.3"
     np.testing.assert_array_equal(mesh(figure, 4).get_array(), ds["t_separation"][:, :, 1, 1].transpose())
     assert len({mesh(figure, k).get_clim() for k in range(6)}) == 1
 
@@ -325,7 +443,7 @@ def test_large_grid_is_thinned_and_the_title_says_so():
     ds["regime"][0, 0] = 3
     figure = plots.regime_map(ds)
     assert mesh(figure).get_array().shape == (750, 1000)
-    assert figure.get_suptitle() == "regime of the run; 1 cell in 6 drawn"
+    assert title(figure) == "regime of the run; 1 cell in 6 drawn"
     # Shares count the cells that are not drawn too.
     assert entries(figure) == ["oscillatory, > 99.9 %", "separating, < 0.1 %"]
     corners = mesh(figure).get_coordinates()
@@ -335,6 +453,158 @@ def test_large_grid_is_thinned_and_the_title_says_so():
 
 def test_line_is_drawn_with_all_values_of_a_long_axis():
     assert len(plots.regime_map(make_sweep((5000,)), var="t_separation").axes[0].lines[0].get_xdata()) == 5000
+
+
+PICTURES = {
+    "map": lambda: plots.regime_map(named_sweep()),
+    "map of numbers": lambda: plots.regime_map(named_sweep(), var="t_separation"),
+    "map with values held": lambda: plots.regime_map(named_sweep((5, 5, 2)), sel={"friction.rough.mu_k": 0.5}),
+    "map of a refined sweep": lambda: plots.regime_map(refined_sweep()),
+    "strip": lambda: plots.regime_map(named_sweep((12,))),
+    "line": lambda: plots.regime_map(named_sweep((12,)), var="t_separation"),
+    "points": lambda: plots.regime_map(make_points()),
+    "small multiples": lambda: plots.regime_map(named_sweep((6, 5, 2, 2))),
+    "small multiples of numbers": lambda: plots.regime_map(named_sweep((6, 5, 2, 2)), var="t_separation"),
+    "history": lambda: plots.history(separated()),
+    "history on a belt": lambda: plots.history(make_history(ring=False).assign(first_slip=4.0)),
+    "work-precision": lambda: plots.work_precision(make_work()),
+}
+
+
+class TestPaper:
+    """Pictures for a page: nothing collides or is cut off, and all of them have one look."""
+
+    @pytest.fixture(autouse=True)
+    def usual_style(self):
+        yield
+        plots.style()
+
+    @pytest.mark.parametrize("width", [85, 170])
+    @pytest.mark.parametrize("picture", PICTURES)
+    def test_texts_are_on_the_page_and_apart_from_each_other(self, picture, width):
+        plots.style("print", width=width)
+        figure = PICTURES[picture]()
+        assert figure.get_figwidth() == pytest.approx(width / 25.4)
+        assert_readable(figure)
+
+    @pytest.mark.parametrize("var", ["regime", "t_separation"])
+    def test_two_map_panels_fit_into_one_figure(self, var):
+        figure = Figure(figsize=(7, 3), layout="constrained")
+        for ax in figure.subplots(1, 2):
+            plots.map_panel(named_sweep((5, 5, 2)), var=var, sel={"friction.rough.mu_k": 0.5}, ax=ax)
+        assert_readable(figure)
+
+    @pytest.mark.parametrize("picture", PICTURES)
+    def test_legends_are_no_smaller_than_ticks(self, picture):
+        figure = PICTURES[picture]()
+        figure.draw_without_rendering()
+        ticks = [label for axes in figure.axes for axis in (axes.xaxis, axes.yaxis) for label in axis.get_ticklabels()]
+        least = min(text.get_fontsize() for legend in legends(figure) for text in legend.get_texts())
+        assert least >= max(label.get_fontsize() for label in ticks)
+
+    def test_title_and_legend_of_a_map_can_be_replaced_placed_and_left_out(self):
+        for draw in (plots.regime_map, lambda ds, **options: plots.map_panel(ds, ax=panel(), **options).figure):
+            assert title(draw(make_sweep())) == "regime of the run"
+            assert title(draw(make_sweep(), title="my map")) == "my map"
+            assert title(draw(make_sweep(), title=False)) == ""
+            assert not legends(draw(make_sweep(), legend=False))
+            for place in ("beside", "below", "upper left"):
+                figure = draw(make_sweep(), legend=place)
+                figure.draw_without_rendering()
+                ax, (legend,) = figure.axes[0].get_window_extent(), legends(figure)
+                box = legend.get_window_extent()
+                assert (box.x0 > ax.x1, box.y1 < ax.y0) == (place == "beside", place == "below")
+            with pytest.raises(InputError, match=r"legend: 'nowhere'.*below.*upper left"):
+                draw(make_sweep(), legend="nowhere")
+
+    def test_small_multiples_have_a_title_and_a_legend_or_not(self):
+        ds = make_sweep((4, 4, 2))
+        (legend,) = plots.regime_map(ds).legends
+        assert legend.get_title().get_text() == "regime of the run"
+        plain = plots.regime_map(ds, title="my maps", legend=False)
+        assert (plain.get_suptitle(), plain.legends) == ("my maps", [])
+
+    def test_numbers_in_pictures_have_true_minus_signs(self):
+        ds = make_sweep((12, 9, 2)).assign_coords(friction_rough_mu_k=[-2e-6, 0.1])
+        text = title(plots.regime_map(ds, sel={"friction.rough.mu_k": -2e-6}))
+        assert "= \N{MINUS SIGN}2\N{MULTIPLICATION SIGN}10⁻⁶" in text
+        steps = make_work().assign_attrs(target=1e-6)
+        assert "target, 10⁻⁶" in entries(plots.work_precision(steps))
+
+
+class TestStyle:
+    @pytest.fixture(autouse=True)
+    def usual_style(self):
+        yield
+        plots.style()
+
+    def test_style_can_be_taken_back(self):
+        before = dict(matplotlib.rcParams)
+        for name in ("dark", "print", "transparent"):
+            plots.style(name, width=85, angles="rad")
+            assert dict(matplotlib.rcParams) != before
+        plots.style()
+        assert dict(matplotlib.rcParams) == before
+        assert plots.history(make_history()).axes[0].get_ylabel() == "angle\n(°)"
+
+    def test_angles_are_in_degrees_in_all_pictures_or_in_radians_in_all(self):
+        for unit, factor, name in (("deg", 180 / np.pi, "°"), ("rad", 1.0, "rad")):
+            plots.style(angles=unit)
+            ds = make_sweep().assign(phi_max=lambda ds: ds["t_separation"].assign_attrs(units="rad", long_name="angle"))
+            figure = plots.regime_map(ds, var="phi_max")
+            assert figure.axes[0].get_ylabel() == f"half-angle of the zone ({name})"
+            assert figure.axes[1].get_ylabel() == f"angle ({name})"
+            np.testing.assert_allclose(mesh(figure).get_array(), factor * ds["phi_max"].T)
+            held = title(plots.regime_map(ds, sel={"zone.half_angle": "30 deg"}))
+            nearest = float(ds["zone_half_angle"].sel(zone_half_angle=np.pi / 6, method="nearest"))
+            assert f"= {factor * nearest:.4g}{name if name == '°' else ' rad'}" in held
+            run = make_history()
+            line = plots.history(run).axes[0].lines[0]
+            np.testing.assert_allclose(line.get_ydata(), factor * run["phi"])
+
+    @pytest.mark.parametrize("name", ["dark", "transparent"])
+    @pytest.mark.parametrize("picture", PICTURES)
+    def test_lines_and_texts_stand_out_from_the_page(self, name, picture):
+        plots.style(name)
+        figure = PICTURES[picture]()
+        assert figure.get_facecolor()[3] == (0.0 if name == "transparent" else 1.0)
+        page = luminance("#1E1E1E" if name == "dark" else "white")
+        for artist in (*figure.findobj(Text), *figure.findobj(Line2D)):
+            colour = artist.get_color()
+            if artist.get_visible() and isinstance(colour, str | tuple):
+                lighter, darker = sorted((luminance(colour), page), reverse=True)
+                least = 1.1 if isinstance(artist, Line2D) and artist.get_linewidth() < 0.7 else 2.0
+                assert (lighter + 0.05) / (darker + 0.05) > least, (artist, colour)
+
+    def test_saved_picture_has_the_page_of_its_style(self, tmp_path):
+        for name, corner in (("light", (255, 255, 255, 255)), ("dark", (30, 30, 30, 255)), ("transparent", None)):
+            plots.style(name)
+            plots.save(plots.regime_map(make_sweep()), tmp_path / "map.png")
+            with Image.open(tmp_path / "map.png") as picture:
+                pixel = picture.convert("RGBA").getpixel((0, 0))
+                assert pixel == corner if corner else pixel[3] == 0
+
+    def test_print_style_has_text_of_eight_points_and_fine_dots(self, tmp_path):
+        plots.style("print", width=85)
+        figure = plots.regime_map(make_sweep())
+        assert figure.axes[0].xaxis.label.get_fontsize() == 8
+        plots.save(figure, tmp_path / "map.png")
+        with Image.open(tmp_path / "map.png") as picture:
+            assert picture.width == pytest.approx(85 / 25.4 * 300, abs=1)
+
+    @pytest.mark.parametrize(
+        ("arguments", "problem"),
+        [
+            ({"name": "bright"}, "name: 'bright' is no style; choose from light, print, dark, transparent"),
+            ({"angles": "grad"}, "angles: 'grad' is neither"),
+            ({"width": 3.35}, "width: 3.35 is not between 20 and 2000"),
+        ],
+    )
+    def test_unknown_style_is_refused(self, arguments, problem):
+        before = dict(matplotlib.rcParams)
+        with pytest.raises(InputError, match=problem):
+            plots.style(**arguments)
+        assert dict(matplotlib.rcParams) == before
 
 
 class TestPanels:
@@ -356,7 +626,7 @@ class TestPanels:
         with pytest.raises(InputError, match="friction_rough_mu_k: hold it, or draw regime_map"):
             plots.map_panel(make_sweep((3, 3, 2)), ax=Figure().add_subplot())
         held = plots.map_panel(make_sweep((3, 3, 2)), sel={"friction.rough.mu_k": 0.1}, ax=Figure().add_subplot())
-        assert "coefficient of kinetic friction = 0.1" in held.get_title()
+        assert "coefficient of kinetic friction = 0.1" in held.get_title().replace("\n", " ")
 
     @pytest.mark.parametrize(("var", "lines"), [("phi", 1), ("ring_omega", 2), ("normal_2", 2), ("epsilon", 1)])
     def test_history_panel_also_shows_the_related_quantity(self, var, lines):
@@ -439,7 +709,7 @@ def test_ring_history_has_the_four_panels_of_the_paper_over_one_time_axis():
     ds = make_history().assign_attrs(outcome="separating (oscillatory), contact 2, t = 3.58236 s")
     figure = plots.history(ds)
     assert [axes.get_ylabel().replace("\n", " ") for axes in figure.axes[:4]] == [
-        "angle (rad)",
+        "angle (°)",
         "angular velocity (rad s$^{-1}$)",
         "angular acceleration (rad s$^{-2}$)",
         "normal reaction (N)",
@@ -448,6 +718,21 @@ def test_ring_history_has_the_four_panels_of_the_paper_over_one_time_axis():
     assert {axes.get_xlim() for axes in figure.axes} == {(0, 10)}
     assert figure.axes[-1].get_xlabel() == "time (s)"
     assert figure.get_suptitle() == ds.attrs["outcome"]
+
+
+def test_history_marks_the_separation_within_its_frame():
+    figure = plots.history(separated())
+    axes = figure.axes[3]
+    (mark,) = (line for line in axes.lines if line.get_marker() == "o")
+    assert mark.get_xydata().tolist() == [[10.0, 0.0]]
+    assert [text.get_text() for text in axes.texts] == ["contact 2 separates, t = 10 s"]
+    assert all(other.get_xlim()[1] > 10.1 for other in figure.axes)
+    assert axes.get_ylim()[0] < 0.0
+    alone = plots.history_panel(separated(), "normal_1", Figure().add_subplot())
+    assert alone.get_xlim()[1] > 10.1
+    assert len(alone.texts) == 1
+    # A part of the run that ends earlier does not separate.
+    assert not plots.history(separated().sel(time=slice(0, 5))).axes[3].texts
 
 
 def test_history_shades_stick_for_its_duration():
@@ -474,7 +759,7 @@ def test_acceleration_axis_is_clipped_at_outliers_and_its_title_says_so():
     ds["epsilon"][::400] = 1e6
     axes = plots.history(ds).axes[2]
     assert axes.get_ylim()[1] < 2
-    assert axes.get_title(loc="right") == "axis clipped; values from \N{MINUS SIGN}1 to 1e+06"
+    assert axes.get_title(loc="right") == "axis clipped; values from \N{MINUS SIGN}1 to 10⁶"
     assert not plots.history(make_history()).axes[2].get_title(loc="right")
 
 
@@ -536,6 +821,17 @@ class TestWorkPrecision:
         looks = {(line.get_color(), line.get_marker()) for line in axes.lines if "method" in str(line.get_label())}
         assert len(looks) == 13
 
+    def test_method_has_the_same_colour_whatever_it_is_compared_with(self):
+        colours = []
+        for names in (["rk4"], ["event", "rk4"], ["implicit", "rk4", "heyoka"]):
+            ds = make_work(len(names))
+            ds["method"] = "contender", np.repeat(names, 4)
+            axes = plots.work_precision(ds).axes[0]
+            colours.append({line.get_label(): line.get_color() for line in axes.lines})
+        assert len({found["rk4"] for found in colours}) == 1
+        all_methods = plots.work_precision(make_work(13)).axes[0].lines
+        assert len({line.get_color() for line in all_methods if "method" in str(line.get_label())}) == 13
+
     def test_zero_error_lies_on_a_floor_and_failure_on_a_ceiling(self):
         ds = make_work(1)
         ds["error_end"][3], ds["error_end"][0] = 0.0, np.inf
@@ -590,6 +886,47 @@ class TestWorkPrecision:
             plots.work_precision(make_work(), "error_and")
         with pytest.raises(InputError, match="work_precision"):
             plots.regime_map(make_work())
+
+
+class TestBenchmarks:
+    """Pictures of the stored results of the benchmarks."""
+
+    RESULTS = Path(__file__).parents[1] / "benchmarks" / "results"
+
+    def test_one_colour_is_one_method_in_the_pictures_of_all_scenes(self):
+        from benchmarks.work_precision import SCENES, draw
+
+        scenes = {name: xr.load_dataset(self.RESULTS / "work_precision.nc", group=name) for name in SCENES}
+        methods = list(dict.fromkeys(name for data in scenes.values() for name in data["method"].values.tolist()))
+        looks = {}
+        for data in scenes.values():
+            figure = draw(data, methods)
+            for axes in figure.axes:
+                assert axes.lines or axes.get_legend(), "an empty panel"
+            for line in figure.axes[0].lines:
+                if line.get_label() in methods:
+                    looks.setdefault(line.get_label(), set()).add(line.get_color())
+            assert_readable(figure)
+        assert all(len(colours) == 1 for colours in looks.values())
+        assert len(set.union(*looks.values())) == len(methods) == len(looks)
+
+    def test_maps_that_are_right_everywhere_are_named_and_not_drawn(self, tmp_path, monkeypatch):
+        from benchmarks.stability import CLASSES, maps, picture
+
+        drawn = []
+        monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
+        ds = xr.load_dataset(self.RESULTS / "stability.nc")
+        picture(ds, maps(quick=False), tmp_path / "stability.png")
+        (figure,) = drawn
+        wrong = [one.name for one in maps(quick=False) if (ds[f"{one.name}_class"] > CLASSES.index("right")).any()]
+        assert len([axes for axes in figure.axes if axes.get_title()]) == len(wrong)
+        (sentence,) = (text.get_text().replace("\n", " ") for axes in figure.axes for text in axes.texts)
+        assert sentence.startswith("Right in every cell, so not drawn: auto,")
+        said = " ".join(entries(figure))
+        assert "wrong and silent: certified; regime right, error above 0.001" in said
+        assert "beyond the limit of stability" in said
+        assert "without dots: within it" in said
+        assert_readable(figure)
 
 
 @pytest.mark.parametrize("name", ["map.png", "map.PDF", "map.svg"])

@@ -132,11 +132,12 @@ class TestFile:
         out = capsys.readouterr().out
         assert ds.attrs["audit"] in out
         assert "certified: 100.0%" in out
-        figure = plots.regime_map(ds)
-        assert "of the cells run" in figure.get_suptitle()
-        assert "95 % confidence" in figure.get_suptitle()
+        title = plots.regime_map(ds).axes[0].get_title().replace("\n", " ")
+        assert "of the cells run" in title
+        assert "95 % confidence" in title
         # What is known of the whole is not known of a part.
-        assert "confidence" not in plots.regime_map(ds.isel(drive_amplitude=slice(3, None))).get_suptitle()
+        part = plots.regime_map(ds.isel(drive_amplitude=slice(3, None)))
+        assert "confidence" not in part.axes[0].get_title()
         assert cli.main(["map", str(refined), "--var", "origin", "-o", str(tmp_path / "origin.png")]) == 0
 
 

@@ -10,7 +10,7 @@ import pytest
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Rectangle, Wedge
+from matplotlib.patches import Circle, Polygon, Rectangle, Wedge
 from matplotlib.quiver import Quiver
 from PIL import Image
 
@@ -20,7 +20,6 @@ from ringsweep.cli import main
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS
 from ringsweep.plots import films
-from ringsweep.plots.polar import TIMES
 from ringsweep.plots.rig import ring_history
 
 RADIUS, BALL, HALF_DISTANCE = 0.043378, 0.010, 0.025
@@ -61,6 +60,17 @@ def arrows(ax):
     """Starts and vectors of the arrows of reactions, friction forces and weight."""
     found = [artist for artist in ax.collections if isinstance(artist, Quiver)]
     return [(np.asarray(q.get_offsets()), np.column_stack([q.U, q.V])) for q in found]
+
+
+def scale_bars(ax):
+    """What each scale bar is for, and newtons or millimetres for each metre of the picture."""
+    for line in ax.lines:
+        if line.get_marker() == "|":
+            (left, right), (y, _) = line.get_data()
+            near = [text for text in ax.texts if text.get_position()[0] == pytest.approx((left + right) / 2)]
+            above, below = sorted(near, key=lambda text: -text.get_position()[1])
+            assert above.get_position()[1] > y > below.get_position()[1]
+            yield below.get_text(), float(above.get_text().split()[0]) / (right - left)
 
 
 def place(angle, radius=RADIUS):
@@ -123,28 +133,53 @@ class TestPolarView:
             np.testing.assert_allclose(reach[k - 1], -place(angle, scale * now[f"normal_{k}"]), atol=1e-9)
             assert friction[k - 1] @ reach[k - 1] == pytest.approx(0.0, abs=1e-12)
 
-    def test_friction_arrows_oppose_slip_and_the_legend_gives_their_magnification(self, run, ax):
+    def test_friction_arrows_oppose_slip_and_have_the_scale_of_their_bar(self, run, ax):
         backward = at(run.isel(time=run["mode"] == -1), 1.0)
         plots.polar_view(run, backward["time"], ax)
-        (begin, _), (_, friction), (_, weight) = arrows(ax)
-        (told,) = (text.get_text() for text in ax.get_legend().get_texts() if "friction at 1" in text.get_text())
-        enlarged = float(told.rpartition(TIMES)[2]) if TIMES in told else 1.0
+        (begin, _), (_, friction), _ = arrows(ax)
+        (_, bar), *_ = (one for one in scale_bars(ax) if one[0] == "$F$")
         for k in (0, 1):
             forwards = np.array([-begin[k, 1], begin[k, 0]]) / RADIUS
             assert friction[k] @ forwards > 0.0
         mu = 0.3 if backward["zone_1"] else 0.1
-        newtons = np.linalg.norm(friction[0]) / (-weight[0, 1] / WEIGHT) / enlarged
+        newtons = np.linalg.norm(friction[0]) * bar
         assert newtons == pytest.approx(mu * backward["normal_1"], rel=1e-6)
 
     def test_scale_bars_have_the_scale_of_arrows_and_lengths(self, run, ax):
         plots.polar_view(run, 1.0, ax)
         (_, _), _, (_, weight) = arrows(ax)
-        words = {text.get_text(): text for text in ax.texts}
-        bars = [line for line in ax.lines if line.get_marker() == "|"]
-        lengths = [np.ptp(bar.get_xdata()) for bar in bars]
-        force, length = (name for name in words if name.endswith((" N", " mm")))
-        assert lengths[0] == pytest.approx(float(force.split()[0]) * -weight[0, 1] / WEIGHT)
-        assert lengths[1] == pytest.approx(float(length.split()[0]) / 1000)
+        bars = dict(scale_bars(ax))
+        assert bars["$N$, $Mg$"] == pytest.approx(WEIGHT / -weight[0, 1])
+        assert bars[""] == pytest.approx(1000.0)
+
+    @pytest.mark.parametrize("time", TIMES)
+    def test_each_arrow_has_its_name_beside_it_and_the_legend_names_no_arrow(self, run, ax, time):
+        plots.polar_view(run, time, ax)
+        starts, reach = map(np.concatenate, zip(*arrows(ax), strict=True))
+        names = {text.get_text(): np.array(text.get_position()) for text in ax.texts if text.get_visible()}
+        for k, name in enumerate(("$N_1$", "$N_2$", "$F_1$", "$F_2$", "$Mg$")):
+            if np.hypot(*reach[k]) < 0.04 * RADIUS:
+                assert name not in names
+            else:
+                along = np.clip((names[name] - starts[k]) @ reach[k] / (reach[k] @ reach[k]), 0.0, 1.0)
+                assert np.hypot(*(names[name] - starts[k] - along * reach[k])) < 0.14 * RADIUS
+        told = {text.get_text() for text in ax.get_legend().get_texts()}
+        assert told == {"zone", "elsewhere", "angle θ of the ring"}
+
+    def test_mark_is_at_the_angle_of_the_ring_and_an_arrow_shows_the_sense_of_rotation(self, run, ax):
+        for time, sense in ((1.2, 1.0), (1.2, -1.0), (1.2, 0.0)):
+            ax.clear()
+            plots.polar_view(run.assign(ring_omega=abs(run["ring_omega"]) * sense), time, ax)
+            theta = float(np.interp(time, run["time"], run["theta"]))
+            mark, head = (patch for patch in ax.patches if isinstance(patch, Polygon))
+            corners = mark.get_xy()[:3]
+            np.testing.assert_allclose(corners[0], place(theta, 1.12 * RADIUS), atol=1e-12)
+            # The mark is symmetric: it does not lean.
+            np.testing.assert_allclose(*(np.hypot(*(corners[0] - corner)) for corner in corners[1:]), rtol=1e-9)
+            assert head.get_visible() == (sense != 0.0)
+            if sense:
+                ahead = place(theta + np.pi / 2) @ head.get_xy()[0]
+                assert np.sign(ahead) == sense
 
     def test_title_of_a_polar_view_has_time_and_mode(self, run, ax):
         stick = at(run.isel(time=run["mode"] == 0), 0.5)
@@ -236,6 +271,47 @@ class TestPhasePortrait:
     def test_portrait_refuses_an_unknown_frame(self, run, ax):
         with pytest.raises(InputError, match="neither 'space' nor 'ring'"):
             plots.phase_portrait(run, "body", ax)
+
+
+class TestStyle:
+    @pytest.fixture(autouse=True)
+    def usual_style(self):
+        yield
+        plots.style()
+
+    @pytest.mark.parametrize("turns", [1.0, 20.0])
+    def test_angles_of_the_ring_may_be_in_radians(self, run, turns):
+        plots.style(angles="rad")
+        spun = run.assign(phi=run["phi"] * turns)
+        for frame in ("space", "ring"):
+            ax = plots.phase_portrait(spun, frame, Figure().add_subplot())
+            assert ax.get_xlabel().endswith("(rad)")
+            start = next(line for line in ax.lines if line.get_marker() == "s").get_xdata()[0]
+            assert start == pytest.approx(float(spun["phi"][0] - (spun["theta"][0] if frame == "ring" else 0.0)))
+        if turns > 1.0:
+            assert ax.get_xlim() == (-np.pi, np.pi)
+        view = plots.polar_view(run, 1.0, Figure().add_subplot())
+        assert {"0", "π/2", "π"} <= {text.get_text() for text in view.texts}
+
+    def test_dark_film_has_a_dark_page_and_covers_the_future_with_it(self, run, tmp_path):
+        plots.style("dark")
+        plots.save_animation(run, tmp_path / "run.gif", fps=5, duration=0.4)
+        with Image.open(tmp_path / "run.gif") as film:
+            assert film.convert("RGB").getpixel((0, 0)) == (30, 30, 30)
+        cover = films._Film(run, 5.0, 1.0).futures[0]
+        assert cover.get_facecolor()[:3] == pytest.approx(np.array([30, 30, 30]) / 255)
+
+    @pytest.mark.parametrize("width", [85, 170])
+    def test_legend_of_a_ring_picture_is_on_the_page(self, run, width):
+        plots.style("print", width=width)
+        size = (width / 25.4, width / 25.4)
+        for draw in (plots.phase_portrait, lambda ds, ax: plots.polar_view(ds, 1.0, ax)):
+            figure = Figure(figsize=size, layout="constrained")
+            ax = draw(run, ax=figure.add_subplot())
+            figure.draw_without_rendering()
+            box, page = ax.get_legend().get_window_extent(), figure.bbox
+            assert page.x0 <= box.x0 < box.x1 <= page.x1 + 1
+            assert page.y0 - 1 <= box.y0 < box.y1 <= page.y1
 
 
 def test_polar_view_refuses_a_belt(run):

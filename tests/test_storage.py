@@ -159,6 +159,6 @@ def test_words_replace_flags_and_a_variable_without_flags_is_refused():
     told = ringsweep.words(xr.DataArray([[3, 0, 7]], dims=("a", "b"), attrs=flags))
     assert told.values.tolist() == [["separating", "resting", ""]]
     assert told.dims == ("a", "b")
-    assert told.attrs == {"long_name": "regime"}
+    assert not told.attrs, "a comparison would inherit them"
     with pytest.raises(InputError, match="phi_end"):
         ringsweep.words(xr.DataArray([0.5], name="phi_end"))

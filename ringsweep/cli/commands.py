@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import json
 import logging
+import re
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -118,7 +119,7 @@ def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None
     from ringsweep.storage import files, netcdf
 
     # The name differs from that of the regime map of the sweep, which must not be replaced.
-    shown = [arguments.var] * (arguments.var != "regime") + [held.replace(" ", "") for held in arguments.sel]
+    shown = [arguments.var] * (arguments.var != "regime") + [_name_part(held) for held in arguments.sel]
     target = Path(arguments.output or dataset.with_name("-".join([dataset.stem, *shown]) + ".png"))
     files.check_writable(target)
     selection = dict(_selection(text) for text in arguments.sel)
@@ -142,6 +143,11 @@ def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None
         raise
     plots.save(figure, target)
     print(f"wrote {target}")
+
+
+def _name_part(held: str) -> str:
+    """A setting as part of a file name, with no character that means something to a shell or to LaTeX."""
+    return re.sub(r"[^A-Za-z0-9_-]+", "-", held.replace(" ", "").replace("+", ""))
 
 
 def plot_command(arguments: argparse.Namespace) -> None:

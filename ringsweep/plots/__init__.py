@@ -2,7 +2,8 @@
 
 ``regime_map``, ``history`` and ``work_precision`` return a new figure. They do not use pyplot: no global state, no
 display, safe in threads. A function with an argument ``ax`` draws one picture in these axes and returns them. Without
-``ax`` it draws in pyplot's current axes. Every picture has an opaque white background, in dark notebooks too.
+``ax`` it draws in pyplot's current axes. Every picture has an opaque white background, in dark notebooks too, unless
+``style`` chooses another look.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from ringsweep.plots.saving import SUFFIXES, save
-from ringsweep.plots.style import REGIME_COLOURS
+from ringsweep.plots.style import REGIME_COLOURS, style
 
 if TYPE_CHECKING:
     from ringsweep.plots.films import animation, save_animation
@@ -40,6 +41,7 @@ __all__ = [
     "regime_map",
     "save",
     "save_animation",
+    "style",
     "work_precision",
 ]
 

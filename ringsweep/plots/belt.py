@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
+from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from ringsweep.config import load
@@ -19,7 +19,7 @@ from ringsweep.plots.labels import number_text
 from ringsweep.plots.phase import draw_belt_portrait
 from ringsweep.plots.polar import reference_force, round_down
 from ringsweep.plots.rig import mode_name
-from ringsweep.plots.style import PAIR_COLOURS, REST, SMALL
+from ringsweep.plots.style import PAIR_COLOURS, REST, SMALL, on_page, page_colour
 
 # Heights in the picture, where the body stands on the belt at 0.
 _BODY, _SPRING, _BELT, _ARROW = 0.5, 0.25, -0.18, 0.08
@@ -55,21 +55,23 @@ class BeltArtists:
         for axes in (ax, below):
             axes.set_xlim(*self.ends)
         left, width = self.ends[0], self.ends[1] - self.ends[0]
-        ax.add_patch(Rectangle((left, _BELT), width, -_BELT, facecolor=REST, edgecolor="0.3", zorder=1))
-        ax.add_patch(Rectangle((left, 0.0), self.wall - left, 0.7, facecolor="0.8", edgecolor="0.3", zorder=1))
-        (self.marks,) = ax.plot([], [], color="0.2", linewidth=1.4, zorder=2)
-        (self.spring,) = ax.plot([], [], color="0.3", linewidth=1.2, zorder=3)
+        fixed: dict[str, Any] = {"edgecolor": on_page("0.3"), "zorder": 1}
+        ax.add_patch(Rectangle((left, _BELT), width, -_BELT, facecolor=on_page(REST), **fixed))
+        ax.add_patch(Rectangle((left, 0.0), self.wall - left, 0.7, facecolor=on_page("0.8"), **fixed))
+        (self.marks,) = ax.plot([], [], color=on_page("0.2"), linewidth=1.4, zorder=2)
+        (self.spring,) = ax.plot([], [], color=on_page("0.3"), linewidth=1.2, zorder=3)
         scene = load(configuration(run)).scene
         if any(value for path, value in scene.values.items() if path.startswith("spring.")):
-            ax.plot([0.0, 0.0], [0.0, 0.66], color="0.5", linewidth=0.8, linestyle=":", zorder=1)
-            ax.text(0.0, 0.68, "spring relaxed", ha="center", va="bottom", fontsize=SMALL, color="0.35")
+            ax.plot([0.0, 0.0], [0.0, 0.66], color=on_page("0.5"), linewidth=0.8, linestyle=":", zorder=1)
+            ax.text(0.0, 0.68, "spring relaxed", ha="center", va="bottom", fontsize=SMALL, color=on_page("0.35"))
         else:
             self.spring.set_visible(False)
-        self.body = Rectangle((0.0, 0.0), 2 * self.half, _BODY, facecolor="0.85", edgecolor="0.2", zorder=4)
+        self.body = Rectangle((0.0, 0.0), 2 * self.half, _BODY, facecolor=on_page("0.85"), zorder=4)
+        self.body.set_edgecolor(on_page("0.2"))
         ax.add_patch(self.body)
         self.friction = ax.quiver(
             *np.zeros((4, 1)),
-            color=_FRICTION,
+            color=on_page(_FRICTION),
             angles="xy",
             scale_units="xy",
             scale=1.0,
@@ -78,12 +80,15 @@ class BeltArtists:
             minlength=0.1,
             zorder=6,
         )
+        halo = withStroke(linewidth=2.0, foreground=page_colour())
+        self.name = ax.text(0.0, 0.0, "$F$", color=on_page(_FRICTION), va="center", zorder=7, path_effects=[halo])
         self._draw_scale_bar()
         self.spacing = 0.125 * (self.ends[1] - self.ends[0])
-        self.speeds = ax.text(0.5, 0.0, "", transform=ax.transAxes, ha="center", va="bottom", fontsize=9)
-        ax.set_title(" ", fontsize=11)
-        dot: dict[str, Any] = {"marker": "o", "markersize": 8, "markeredgewidth": 1.5, "zorder": 7}
-        (self.dot,) = below.plot([], [], color="black", markerfacecolor=PAIR_COLOURS[0], linestyle="", **dot)
+        self.speeds = ax.text(0.5, 0.0, "", transform=ax.transAxes, ha="center", va="bottom", fontsize=SMALL)
+        ax.set_title(" ", fontsize="medium")
+        dot: dict[str, Any] = {"marker": "o", "markersize": 8, "markeredgewidth": 1.5, "linestyle": "", "zorder": 7}
+        dot["markerfacecolor"] = on_page(PAIR_COLOURS[0])
+        (self.dot,) = below.plot([], [], color=on_page("black"), **dot)
 
     def show(self, states: dict[str, NDArray[Any]], k: int) -> None:
         """Move all artists to the `k`-th state of :func:`ringsweep.plots.polar.states_at`."""
@@ -99,7 +104,10 @@ class BeltArtists:
         # The force counts positive against x.
         self.friction.set_offsets([(x, _ARROW)])
         self.friction.set_UVC([-force * self.scale], [0.0])
-        self.ax.set_title(f"t = {states['time'][k]:.4f} s, {mode_name(states['mode'][k])}", fontsize=11)
+        # Beyond the tip of the arrow.
+        self.name.set(x=x - force * self.scale - 0.03 * self.range * np.sign(force), y=_ARROW, visible=force != 0.0)
+        self.name.set_horizontalalignment("right" if force > 0.0 else "left")
+        self.ax.set_title(f"t = {states['time'][k]:.4f} s, {mode_name(states['mode'][k])}", fontsize="medium")
         body, belt = (number_text(speed, f"+.{self.digits}f") for speed in (velocity, belt_velocity))
         self.speeds.set_text(f"body {body} m s⁻¹, belt {belt} m s⁻¹")
         self.dot.set_data([x], [velocity])
@@ -107,19 +115,19 @@ class BeltArtists:
     @property
     def moving(self) -> list[Artist]:
         """Artists that :meth:`show` changes."""
-        return [self.marks, self.spring, self.body, self.friction, self.speeds, self.dot, self.ax.title]
+        return [self.marks, self.spring, self.body, self.friction, self.name, self.speeds, self.dot, self.ax.title]
 
     def legend_entries(self) -> list[Artist]:
-        """Legend entries of the arrow and of the phase portrait."""
-        return [Line2D([], [], color=_FRICTION, linewidth=2.5, label="friction on the body"), *self.portrait]
+        """Legend entries of the phase portrait; the arrow has its name beside it."""
+        return self.portrait
 
     def _draw_scale_bar(self) -> None:
         """A bar of a round force."""
         force = round_down(0.75 * self.reference)
         left, y = self.ends[0] + 0.03 * self.range, 0.78
         right = left + force * self.scale
-        self.ax.plot([left, right], [y, y], marker="|", color="0.3", linewidth=1.2)
-        self.ax.text((left + right) / 2, y + 0.04, f"{force:g} N", ha="center", va="bottom", fontsize=SMALL)
+        self.ax.plot([left, right], [y, y], marker="|", color=on_page("0.3"), linewidth=1.2)
+        self.ax.text((left + right) / 2, y + 0.04, f"$F$: {force:g} N", ha="center", va="bottom", fontsize=SMALL)
 
 
 def _zigzag(left: float, right: float) -> tuple[NDArray[Any], NDArray[Any]]:

@@ -25,12 +25,12 @@ from PIL import Image
 from ringsweep.errors import InputError
 from ringsweep.plots.belt import BeltArtists
 from ringsweep.plots.datasets import on_ring, outcome, panels_of, require_history
-from ringsweep.plots.histories import draw_panel
+from ringsweep.plots.histories import draw_panel, time_limits
 from ringsweep.plots.labels import axis_label
 from ringsweep.plots.polar import RingArtists, states_at
 from ringsweep.plots.rig import belt_history, ring_history
 from ringsweep.plots.saving import suffix_of
-from ringsweep.plots.style import SMALL
+from ringsweep.plots.style import SMALL, on_page, page_colour
 from ringsweep.storage.files import check_writable, replacing
 
 #: Suffixes of the files that `save_animation` writes.
@@ -182,10 +182,11 @@ class _Film:
         panels[-1].set_xlabel(axis_label(run["time"], run))
         self.futures = [_cover_of_future(panel) for panel in panels]
         if time[-1] > time[0]:
-            panels[0].set_xlim(time[0], time[-1])
+            panels[0].set_xlim(*time_limits(run))
+        self.until = time_limits(run)[1]
         right.align_ylabels(panels)
-        right.suptitle(outcome(run), fontsize=10)
-        left.suptitle(_speed(float(time[-1] - time[0]), duration), fontsize=10)
+        right.suptitle(outcome(run), fontsize="medium")
+        left.suptitle(_speed(float(time[-1] - time[0]), duration), fontsize="medium")
         self.figure.moving = [*self.body.moving, *self.futures]
         self.show(0)
         # Texts change from frame to frame: a layout that followed them would shake.
@@ -198,7 +199,7 @@ class _Film:
         now = float(self.states["time"][k])
         for cover in self.futures:
             cover.set_x(now)
-            cover.set_width(float(self.states["time"][-1]) - now)
+            cover.set_width(self.until - now)
         return self.figure.moving
 
     def animation(self) -> FuncAnimation:
@@ -233,8 +234,9 @@ def _rgba(figure: Figure, dpi: float, **options: Any) -> bytes:
 
 def _cover_of_future(panel: Axes) -> Rectangle:
     """Translucent cover of the part of a history that comes after the frame."""
-    cover = Rectangle((0.0, 0.0), 0.0, 1.0, transform=panel.get_xaxis_transform(), facecolor="white", alpha=0.8)
-    cover.set(zorder=3, edgecolor="0.2", linewidth=1.0)
+    cover = Rectangle((0.0, 0.0), 0.0, 1.0, transform=panel.get_xaxis_transform(), facecolor=page_colour(), alpha=0.8)
+    # Above the marks of a history.
+    cover.set(zorder=6, edgecolor=on_page("0.2"), linewidth=1.0)
     panel.add_patch(cover)
     return cover
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from itertools import chain
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
+from matplotlib import rcParams
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
@@ -25,7 +26,7 @@ from ringsweep.plots.datasets import (
     resolve,
     zones,
 )
-from ringsweep.plots.labels import axis_label, long_name, number_text, unit_text
+from ringsweep.plots.labels import axis_label, displayed, long_name, number_text, unit_text
 from ringsweep.plots.style import (
     CURVE_COLOURS,
     CURVE_STYLES,
@@ -37,10 +38,18 @@ from ringsweep.plots.style import (
     arc_colour,
     arc_names,
     axes_or_current,
-    legend_beside,
+    figure_width,
+    folded,
+    legend_above,
+    letters,
+    on_page,
+    page_colour,
+    place_legend,
+    small_ticks,
     true_ranges,
+    width_of,
 )
-from ringsweep.quantities.variables import words
+from ringsweep.quantities.variables import JAMMED, SEPARATING, words
 
 # Share of a run in which differences between friction laws belong to its start.
 _LATEST = 0.1
@@ -50,9 +59,6 @@ _DIFFERENT = 0.05
 
 # Panels in which a few outliers must not flatten the rest.
 _CLIPPED = ("epsilon", "friction_force")
-
-# Line of a single curve.
-_ONE: dict[str, Any] = {"color": PAIR_COLOURS[0], "linewidth": 1}
 
 # Intervals of time into which a long history is condensed: more than a printed panel has pixels.
 _INTERVALS = 4000
@@ -76,9 +82,9 @@ def history(ds: xr.Dataset) -> Figure:
     """Draw the time history of one run, or of a run under each of several friction laws.
 
     The panels are those of the paper. For a ring they show angle, angular velocity, angular acceleration and normal
-    reactions; a strip below shows which zone lies under each contact. For a belt they show displacement, velocity and
-    friction force. Times at which the body sticks are shaded. If the law has bristles and the body breaks away, a last
-    panel shows the friction force around the first break-away.
+    reactions, with a mark where a contact separates; a strip below shows which zone lies under each contact. For a belt
+    they show displacement, velocity and friction force. Times at which the body sticks are shaded. If the law has
+    bristles and the body breaks away, a last panel shows the friction force around the first break-away.
 
     Several friction laws are a line each, without strip and shading. On a belt, if their friction forces differ at the
     start, a panel shows the start for twice as long as they differ. Its time axis is logarithmic if differences end at
@@ -108,7 +114,10 @@ def history(ds: xr.Dataset) -> Figure:
     4
     """
     ds = require_history(ds)
-    figure = Figure(figsize=(8.5, 1.9 * sum(_heights(ds)) + 0.8), layout="constrained")
+    width = figure_width()
+    # Panels must be as high as their labels.
+    height = min(max(0.2 * width, 13.5 * rcParams["font.size"] / 100.0), 1.9)
+    figure = Figure(figsize=(width, height * sum(_heights(ds)) + 0.8), layout="constrained")
     draw_history(figure, ds)
     return figure
 
@@ -126,7 +135,7 @@ def history_panel(ds: xr.Dataset, var: str = "phi", ax: Axes | None = None) -> A
     var : str
         Variable to draw.
     ax : matplotlib.axes.Axes, optional
-        Axes to draw in, by default pyplot's current ones. The legend stands beside them: a figure with
+        Axes to draw in, by default pyplot's current ones. The legend stands above them: a figure with
         ``layout="constrained"`` makes room for it.
 
     Returns
@@ -150,10 +159,11 @@ def history_panel(ds: xr.Dataset, var: str = "phi", ax: Axes | None = None) -> A
     """
     ds = require_history(ds)
     var = resolve("var", var, [name for name, data in ds.items() if "time" in data.dims])
-    ax = axes_or_current(ax, (7.6, 2.6))
+    ax = axes_or_current(ax, 0.34)
     if compares_laws(ds):
         _draw_laws(ax, ds, (var,))
-        legend_beside(ax, handlelength=4)
+        ax.set_xlabel(axis_label(ds["time"], ds))
+        place_legend(ax, list(ax.get_legend_handles_labels()[0]), handlelength=4)
     else:
         names = next((panel for panel in chain(*PANELS.values()) if var in panel), (var,))
         draw_panel(ax, ds, names, explain_shading=True)
@@ -189,21 +199,28 @@ def draw_history(figure: Figure | SubFigure, ds: xr.Dataset) -> None:
             after.set_xlim(left=first / 20.0)
         # The force of one law alone would flatten the others: bristles may be far above them for a moment.
         after.set_ylim(whole[-1].get_ylim())
-        after.set_title(whole[-1].get_title(loc="right"), fontsize=SMALL, loc="right")
-        after.set_title("friction force just after the start", fontsize=SMALL, loc="left")
+        small_ticks(after)
+        texts = ["friction force just after the start", whole[-1].get_title(loc="right")]
+        after.set_title("", loc="right")
+        after.set_title(folded(texts, 0.9 * width_of(after)), fontsize=SMALL, loc="left")
         after.set_xlabel(axis_label(ds["time"], ds))
     if breakaway is not None:
         _draw_breakaway(axes[-1], ds, *breakaway)
     if time[-1] > time[0]:
-        whole[0].set_xlim(time[0], time[-1])
+        whole[0].set_xlim(*time_limits(ds))
     whole[-1].set_xlabel(axis_label(ds["time"], ds))
     figure.align_ylabels(axes)
     if compares_laws(ds):
         lines = axes[0].get_legend_handles_labels()
+        most = 4 if len(lines[0]) == 4 else 3
+        # A line of each entry, its label, and the space around them.
+        longest = max(map(len, lines[1])) + 11
+        columns = max(1, min(most, letters(figure.bbox.width / float(figure.dpi)) // longest))
         style: dict[str, Any] = {"fontsize": SMALL, "frameon": False, "handlelength": 4}
-        figure.legend(*lines, loc="outside upper center", ncols=4 if len(lines[0]) == 4 else 3, **style)
+        figure.legend(*lines, loc="outside upper center", ncols=columns, **style)
     elif text := outcome(ds):
-        figure.suptitle(text, fontsize=11)
+        inches = figure.bbox.width / float(figure.dpi)
+        figure.suptitle("\n".join(folded([line], inches) for line in text.splitlines()), fontsize="medium")
 
 
 def _heights(ds: xr.Dataset) -> list[float]:
@@ -217,6 +234,7 @@ def draw_panel(axes: Axes, ds: xr.Dataset, names: tuple[str, ...], explain_shadi
 
     The legend explains the shading in the panel that shows where the body is, elsewhere if `explain_shading`.
     """
+    small_ticks(axes)
     time, names = ds["time"].values, tuple(present(ds, names))
     explain_shading = explain_shading or names[0] in PANELS
     if "mode" in ds:
@@ -226,24 +244,61 @@ def draw_panel(axes: Axes, ds: xr.Dataset, names: tuple[str, ...], explain_shadi
             sticks,
             (0, 1),
             transform=axes.get_xaxis_transform(),
-            color=STICK,
+            color=on_page(STICK),
             linewidth=0,
             label="stick" if explain_shading and sticks else None,
         )
     for name, colour, style in zip(names, PAIR_COLOURS, PAIR_STYLES, strict=False):
-        curve = _envelope(time, ds[name].values)
-        axes.plot(*curve, color=colour, linestyle=style, linewidth=1, label=_LEGEND.get(name))
-    legend_beside(axes)
+        curve = _envelope(time, displayed(ds[name]).values)
+        axes.plot(*curve, color=on_page(colour), linestyle=style, linewidth=1, label=_LEGEND.get(name))
+    legend_above(axes)
     axes.set_ylabel(_short_label(ds, names[0]))
     axes.margins(x=0)
+    if time_limits(ds)[1] > time[-1]:
+        axes.set_xlim(*time_limits(ds))
     if names[0] in _CLIPPED:
-        clip(axes, time, ds[names[0]].values)
+        clip(axes, time, displayed(ds[names[0]]).values, "left" if explain_shading else "right")
+    _mark_separation(axes, ds, names)
+
+
+def time_limits(ds: xr.Dataset) -> tuple[float, float]:
+    """Limits of the time axis of a history, s: with a margin behind an end that comes before the end of the span."""
+    first, last = map(float, ds["time"].values[[0, -1]])
+    ends_early = "regime" in ds and bool(ds["regime"].isin([SEPARATING, JAMMED]).any())
+    return first, last + 0.03 * (last - first) * ends_early
+
+
+def _mark_separation(axes: Axes, ds: xr.Dataset, names: tuple[str, ...]) -> None:
+    """Mark the end of a run at which a contact separates, in the panel of the normal reactions."""
+    if not {"separating_contact", "t_separation"} <= set(ds.variables):
+        return
+    which, instant = int(ds["separating_contact"]), float(ds["t_separation"])
+    ending = [name for name in names if name in (f"normal_{which}", *("normal_1", "normal_2")[: 2 * (which == 3)])]
+    # A part of a run may end before the separation.
+    if not ending or not instant <= ds["time"].values[-1] * (1.0 + 1e-9):
+        return
+    for name in ending:
+        reaction = ds[name].values[np.isfinite(ds[name].values)][-1]
+        style: dict[str, Any] = {"marker": "o", "markersize": 5, "markerfacecolor": "none", "clip_on": False}
+        axes.plot([instant], [reaction], color=on_page("black"), linestyle="", zorder=5, **style)
+    contact = "both contacts separate" if which == 3 else f"contact {which} separates"
+    axes.annotate(
+        f"{contact}, t = {number_text(instant, '.4g')} s",
+        (instant, reaction),
+        xytext=(-8.0, 0.0),
+        textcoords="offset points",
+        ha="right",
+        va="bottom",
+        fontsize=SMALL,
+        bbox={"facecolor": page_colour(), "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
+    )
 
 
 def _draw_laws(axes: Axes, ds: xr.Dataset, names: tuple[str, ...]) -> None:
     """Draw one quantity under each friction law."""
     (name,) = names
-    numbers = ds[name].transpose("friction_law", "time").values
+    small_ticks(axes)
+    numbers = displayed(ds[name]).transpose("friction_law", "time").values
     regimes = words(ds["regime"]).values if "regime" in ds else None
     for k, law in enumerate(ds["friction_law"].values):
         axes.plot(
@@ -262,7 +317,7 @@ def _draw_laws(axes: Axes, ds: xr.Dataset, names: tuple[str, ...]) -> None:
 def _law_style(k: int) -> dict[str, Any]:
     """Line of the `k`-th friction law."""
     return {
-        "color": CURVE_COLOURS[k % len(CURVE_COLOURS)],
+        "color": on_page(CURVE_COLOURS[k % len(CURVE_COLOURS)]),
         "linestyle": CURVE_STYLES[k % len(CURVE_STYLES)],
         # Where lines coincide, the earlier ones show on both sides of the later ones.
         "linewidth": max(1.2, 3.0 - 0.6 * k),
@@ -316,11 +371,15 @@ def _draw_breakaway(axes: Axes, ds: xr.Dataset, first: NDArray[Any], window: flo
     """Draw the friction force around the first break-away under each law."""
     time = ds["time"].values
     force = np.atleast_2d(ds["friction_force"].transpose(..., "time").values)
+    small_ticks(axes)
+    one: dict[str, Any] = {"color": on_page(PAIR_COLOURS[0]), "linewidth": 1}
     for k, (numbers, start) in enumerate(zip(force, first, strict=True)):
         near = np.abs(time - start) <= window
-        axes.plot(time[near] - start, numbers[near], **_law_style(k) if compares_laws(ds) else _ONE)
+        axes.plot(time[near] - start, numbers[near], **_law_style(k) if compares_laws(ds) else one)
     where = " under each law" if compares_laws(ds) else f", t = {number_text(first[0], '.5g')} s"
-    axes.set_title(f"friction force around the first break-away{where}", fontsize=SMALL, loc="left")
+    text = f"friction force around the first break-away{where}"
+    axes.set_title(folded([text], 0.9 * width_of(axes)), fontsize=SMALL, loc="left")
+    axes.locator_params(axis="x", nbins=max(4, int(1.4 * width_of(axes))))
     axes.set_xlabel("time since the break-away (s)")
     axes.set_ylabel(_short_label(ds, "friction_force"))
     axes.margins(x=0)
@@ -331,19 +390,20 @@ def _draw_zones(axes: Axes, ds: xr.Dataset, names: list[str]) -> None:
     at = _by_interval(ds["time"].values, ds[names[0]].values)[0]
     strip = np.array([_by_interval(ds["time"].values, ds[name].values)[1] for name in names])
     arcs = int(max(1, strip.max()))
-    colours = [REST, *(arc_colour(k + 1) for k in range(arcs))]
+    colours = [on_page(REST), *(arc_colour(k + 1) for k in range(arcs))]
     norm = BoundaryNorm(np.arange(arcs + 2) - 0.5, arcs + 1)
     axes.pcolormesh(at, np.arange(len(names) + 1), strip, cmap=ListedColormap(colours), norm=norm, rasterized=True)
-    axes.hlines(range(1, len(names)), at[0], at[-1], color="white", linewidth=2)
+    axes.hlines(range(1, len(names)), at[0], at[-1], color=page_colour(), linewidth=2)
     axes.set_yticks(np.arange(len(names)) + 0.5, labels=[f"contact {name[-1]}" for name in names], fontsize=SMALL)
     axes.tick_params(axis="y", length=0)
     axes.invert_yaxis()
     surfaces = zip(colours, ["elsewhere", *arc_names(arcs)], strict=True)
     handles: list[Artist] = [Patch(facecolor=colour, edgecolor="0.7", label=name) for colour, name in surfaces]
-    legend_beside(axes, handles, bbox_to_anchor=(1.0, 1.2))
+    legend_above(axes, handles)
+    axes.tick_params(axis="x", labelsize=SMALL)
 
 
-def clip(axes: Axes, time: NDArray[Any], numbers: NDArray[Any]) -> None:
+def clip(axes: Axes, time: NDArray[Any], numbers: NDArray[Any], loc: Literal["left", "right"] = "right") -> None:
     """Limit the vertical axis to where values are for 98 % of the time, if outliers would flatten the rest, and say so.
 
     Parameters
@@ -354,6 +414,8 @@ def clip(axes: Axes, time: NDArray[Any], numbers: NDArray[Any]) -> None:
         Instants, s. They may be dense where values change fast.
     numbers : ndarray of shape ``(..., samples)``
         Values of one or several curves.
+    loc : {"left", "right"}
+        Where above the axes it says so.
     """
     gaps = np.diff(time)
     durations = np.broadcast_to(np.append(gaps, 0.0) + np.append(0.0, gaps), numbers.shape)
@@ -367,7 +429,7 @@ def clip(axes: Axes, time: NDArray[Any], numbers: NDArray[Any]) -> None:
         margin = 0.15 * (high - low)
         axes.set_ylim(low - margin, high + margin)
         ends = number_text(values[0]), number_text(values[-1])
-        axes.set_title(f"axis clipped; values from {ends[0]} to {ends[1]}", fontsize=SMALL, loc="right")
+        axes.set_title(f"axis clipped; values from {ends[0]} to {ends[1]}", fontsize=SMALL, loc=loc)
 
 
 def _envelope(time: NDArray[Any], numbers: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:

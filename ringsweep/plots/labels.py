@@ -2,23 +2,38 @@
 
 from __future__ import annotations
 
-import math
 import re
 
 import xarray as xr
 from matplotlib.axis import Axis
 
 from ringsweep.plots.datasets import is_numeric
+from ringsweep.plots.style import angle_unit
 
 MINUS = "\N{MINUS SIGN}"
+TIMES = "\N{MULTIPLICATION SIGN}"
 
 # Limits above which an axis has the prefix, and the prefixes; a tenth of a unit needs none.
 _PREFIXES = ((0.05, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
 
+_SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+
+
 def number_text(value: float, form: str = ".3g") -> str:
-    """A number with a true minus sign, as ticks of axes have it."""
-    return format(value, form).replace("-", MINUS)
+    """A number with a true minus sign and a power of ten in place of ``e``, as ticks of axes have them.
+
+    Examples
+    --------
+    >>> number_text(1e6), number_text(1e-6)
+    ('10⁶', '10⁻⁶')
+    """
+    digits, _, power = format(value, form).partition("e")
+    text = digits.replace("-", MINUS)
+    if power:
+        ten = "10" + str(int(power)).translate(_SUPERSCRIPTS)
+        text = f"{text}{TIMES}{ten}" if digits.lstrip("-") != "1" else text[:-1] + ten
+    return text
 
 
 def label_axis(axis: Axis, name: str, unit: str) -> None:
@@ -38,9 +53,15 @@ def label_axis(axis: Axis, name: str, unit: str) -> None:
     axis.set_label_text(f"{name} ({prefix}{unit})")
 
 
-def display_factor(coordinate: xr.DataArray) -> float:
-    """Factor from the numbers of a coordinate to the numbers on its axis: axes show radians as degrees."""
-    return 180 / math.pi if coordinate.attrs.get("units") == "rad" else 1.0
+def display_factor(data: xr.DataArray) -> float:
+    """Factor from the numbers of a quantity to the numbers in a picture, which has the unit of angles of the style."""
+    return angle_unit()[0] if data.attrs.get("units") == "rad" else 1.0
+
+
+def displayed(data: xr.DataArray) -> xr.DataArray:
+    """A quantity in the unit that pictures show."""
+    factor = display_factor(data)
+    return data if factor == 1.0 else (data * factor).assign_attrs(data.attrs)
 
 
 def long_name(data: xr.DataArray) -> str:
@@ -48,20 +69,20 @@ def long_name(data: xr.DataArray) -> str:
     return str(data.attrs.get("long_name", data.name))
 
 
-def axis_label(data: xr.DataArray, ds: xr.Dataset, angle: str = "rad") -> str:
-    """Name of a quantity with its unit; `angle` stands for the radian."""
+def axis_label(data: xr.DataArray, ds: xr.Dataset) -> str:
+    """Name of a quantity with its unit."""
     name = long_name(data)
     # Coefficients of two zones, for example, have the same long name.
     if sum(long_name(other) == name for other in ds.coords.values()) > 1:
         name = f"{name}, {data.name}"
-    unit = unit_text(data, angle)
+    unit = unit_text(data)
     return f"{name} ({unit})" if unit else name
 
 
-def unit_text(data: xr.DataArray, angle: str = "rad") -> str:
-    """Unit of a quantity, empty if it has none; `angle` stands for the radian."""
+def unit_text(data: xr.DataArray) -> str:
+    """Unit of a quantity in a picture, empty if it has none."""
     units = str(data.attrs.get("units", "1"))
-    units = angle if units == "rad" else "" if units == "1" else units
+    units = angle_unit()[1] if units == "rad" else "" if units == "1" else units
     # Parameters have "m/s^2" where variables have "m s-2".
     units = re.sub(r"/([A-Za-z]+)\^?(\d*)", lambda unit: f" {unit[1]}-{unit[2] or 1}", units)
     return re.sub(r"(?<=[A-Za-z])\^?(-?\d+)", r"$^{\1}$", units)
@@ -72,6 +93,6 @@ def value_text(value: xr.DataArray) -> str:
     name = long_name(value)
     if not is_numeric(value):
         return f"{name} = {value.item()}"
-    unit = unit_text(value, "°")
+    unit = unit_text(value)
     number = number_text(value.item() * display_factor(value), ".4g")
     return f"{name} = {number}{unit if unit == '°' else f' {unit}'.rstrip()}"

@@ -12,7 +12,7 @@ from ringsweep.plots.histories import clip
 from ringsweep.plots.labels import label_axis
 from ringsweep.plots.phase import draw_modes
 from ringsweep.plots.rig import belt_history
-from ringsweep.plots.style import axes_or_current, legend_beside
+from ringsweep.plots.style import axes_or_current, place_legend, small_ticks
 
 
 def friction_loop(
@@ -32,7 +32,7 @@ def friction_loop(
         Whether the horizontal axis has the sliding velocity, or the distance slid on the belt since the first instant
         of `ds`. Forwards is positive for both.
     ax : matplotlib.axes.Axes, optional
-        Axes to draw in, by default pyplot's current ones. The legend stands beside them: a figure with
+        Axes to draw in, by default pyplot's current ones. The legend stands outside them: a figure with
         ``layout="constrained"`` makes room for it.
 
     Returns
@@ -62,7 +62,8 @@ def friction_loop(
     if against not in ("velocity", "distance"):
         raise InputError("against", f"{against!r} is neither 'velocity' nor 'distance'")
     run = belt_history(ds)
-    ax = axes_or_current(ax, (7.6, 4.8))
+    ax = axes_or_current(ax, 0.63)
+    small_ticks(ax)
     if against == "velocity":
         across = (run["velocity"] - run["belt_velocity"]).values
         label = "sliding velocity", "m s$^{-1}$"
@@ -75,5 +76,5 @@ def friction_loop(
     clip(ax, run["time"].values, force)
     label_axis(ax.xaxis, *label)
     label_axis(ax.yaxis, "friction force", "N")
-    legend_beside(ax, entries)
+    place_legend(ax, entries)
     return ax

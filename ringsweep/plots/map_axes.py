@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.plots.datasets import is_numeric, resolve
-from ringsweep.plots.labels import axis_label, display_factor
+from ringsweep.plots.labels import axis_label, display_factor, number_text
 
 
 class _PlainNumbers(LogFormatterSciNotation):
     """Ticks of a logarithmic axis as plain numbers."""
 
     def __call__(self, x: float, pos: int | None = None) -> str:
-        return f"{x:g}" if super().__call__(x, pos) else ""
+        return number_text(x, "g") if super().__call__(x, pos) else ""
 
 
 _LARGEST = 1e300
@@ -73,7 +73,7 @@ class Axis:
         order = np.argsort(values, kind="stable")
         scale = "log" if _is_geometric(np.unique(values)) else "linear"
         dims = tuple(map(str, coordinate.dims))
-        return cls(str(coordinate.name), dims, axis_label(coordinate, ds, "°"), values[order], order, scale, names)
+        return cls(str(coordinate.name), dims, axis_label(coordinate, ds), values[order], order, scale, names)
 
     @property
     def is_gridded(self) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +15,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from ringsweep.plots.style import CLASS_COLOURS, NO_VALUE, REGIME_COLOURS
+from ringsweep.plots.datasets import configuration
+from ringsweep.plots.labels import number_text
+from ringsweep.plots.style import CLASS_COLOURS, NO_VALUE, REGIME_COLOURS, on_page
+from ringsweep.quantities.variables import FAILED, INFERRED, JAMMED
 
 
 @dataclass(frozen=True)
@@ -63,12 +67,16 @@ class ColourScale:
 
 @dataclass(frozen=True)
 class CellWarning:
-    """A warning and the cells that have it: in a grid they are hatched, among points they have a marker."""
+    """A warning and the cells that have it: in a grid they are hatched, among points they have a marker.
+
+    If all cells have it, only the legend says so: hatching everywhere would hide the map.
+    """
 
     label: str
     hatch: str
     marker: str
     cells: xr.DataArray
+    everywhere: bool = False
 
 
 def cell_warnings(ds: xr.Dataset, data: xr.DataArray) -> list[CellWarning]:
@@ -77,20 +85,52 @@ def cell_warnings(ds: xr.Dataset, data: xr.DataArray) -> list[CellWarning]:
         return []
     found = []
     if "certified" in ds:
-        found.append(CellWarning("not certified", "//////", "x", (ds["certified"] == 0).broadcast_like(data)))
+        cells = (ds["certified"] == 0).broadcast_like(data)
+        everywhere = bool(cells.any() and not (ds["certified"] == 1).any())
+        off = everywhere and not json.loads(ds.attrs.get("solver", "{}")).get("certify", True)
+        label = "no cell is certified:\ncertify is false" if off else "not certified"
+        found.append(CellWarning(label, "//////", "x", cells, everywhere))
     if "stiffness" in ds:
         # Solvers are slow to import, and only maps of rk4 need this one.
         from ringsweep.solvers.rk4 import STABILITY_LIMIT
 
         beyond = (ds["stiffness"] > STABILITY_LIMIT).broadcast_like(data)
-        found.append(CellWarning("step beyond\nstability limit", "..", "+", beyond))
-    if len(found) == 2 and found[0].cells.equals(found[1].cells):
-        found = [CellWarning("not certified: step\nbeyond stability limit", "//////", "x", found[0].cells)]
+        found.append(CellWarning("step beyond\nstability limit", "..", "+", beyond, bool(beyond.all())))
+    if len(found) == 2 and found[0].cells.equals(found[1].cells) and "false" not in found[0].label:
+        both = "not certified: step\nbeyond stability limit"
+        found = [CellWarning(both, "//////", "x", found[0].cells, found[0].everywhere)]
     return [warning for warning in found if warning.cells.any()]
 
 
+def missing_text(ds: xr.Dataset, data: xr.DataArray) -> str:
+    """What it means that cells have no value, as far as the dataset tells."""
+    name, missing = str(data.name), data.isnull()
+    text = "no bound" if name.endswith("_error") else _ABSENT.get(name, "no value")
+    # A run that jams or fails ends before its span.
+    ended_early = "regime" in ds and bool((missing & ds["regime"].isin([JAMMED, FAILED])).any())
+    if name in _EVENTS and not ended_early and (span := _span(ds)):
+        text += f"\nwithin {span}"
+    inferred = missing & (ds["origin"] == INFERRED) if "origin" in ds else missing & False
+    if inferred.any():
+        text = "inferred, not run" if inferred.equals(missing) else f"{text}, or\ninferred, not run"
+    return text
+
+
+# Events that a run may lack, and what it lacks if another variable is missing.
+_EVENTS = {"t_separation": "no separation", "first_slip": "no slip"}
+_ABSENT = _EVENTS | dict.fromkeys(("period", "stick_share", "stops_per_cycle"), "no cycle")
+
+
+def _span(ds: xr.Dataset) -> str:
+    """Span of the runs as text; empty if the dataset does not tell it, or if it was swept."""
+    if "configuration" not in ds.attrs or any(c.attrs.get("path") == "time.span" for c in ds.coords.values()):
+        return ""
+    span = configuration(ds).get("scene", {}).get("time", {}).get("span", "")
+    return str(span) if isinstance(span, str) else f"{number_text(span, 'g')} s"
+
+
 def legend_entries(
-    scale: ColourScale, data: xr.DataArray, warnings: list[CellWarning], scattered: bool
+    scale: ColourScale, ds: xr.Dataset, data: xr.DataArray, warnings: list[CellWarning], scattered: bool
 ) -> list[Artist]:
     """Entries of the legend for classes, missing values and warnings, each with its share of the cells."""
     entries: list[Artist] = []
@@ -102,20 +142,23 @@ def legend_entries(
             if where.any():
                 entries.append(Patch(color=scale.colours(k), label=f"{meaning}, {_share(where)}"))
     if not shown.all():
-        entries.append(Patch(color=NO_VALUE, label=f"no value, {_share(~shown)}"))
+        entries.append(Patch(color=on_page(NO_VALUE), label=f"{missing_text(ds, data)}, {_share(~shown)}"))
+    ink = on_page("black")
     for warning in warnings:
         label = f"{warning.label}, {_share(warning.cells.values)}"
-        if scattered:
-            entries.append(Line2D([], [], color="black", linestyle="", marker=warning.marker, label=label))
+        if warning.everywhere:
+            entries.append(Line2D([], [], linestyle="", label=warning.label if "certify is" in label else label))
+        elif scattered:
+            entries.append(Line2D([], [], color=ink, linestyle="", marker=warning.marker, label=label))
         else:
-            entries.append(Patch(facecolor="white", edgecolor="black", hatch=warning.hatch, linewidth=0.5, label=label))
+            entries.append(Patch(facecolor="none", edgecolor=ink, hatch=warning.hatch, linewidth=0.5, label=label))
             entries[-1].set(hatch_linewidth=0.5)
     return entries
 
 
 def _with_grey(colours: str | Colormap) -> Colormap:
     """A colour map with grey for missing values."""
-    return (colormaps[colours] if isinstance(colours, str) else colours).with_extremes(bad=to_rgb(NO_VALUE))
+    return (colormaps[colours] if isinstance(colours, str) else colours).with_extremes(bad=to_rgb(on_page(NO_VALUE)))
 
 
 def _share(mask: NDArray[Any]) -> str:

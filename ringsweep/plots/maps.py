@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib import rcParams
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
@@ -17,16 +17,36 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.plots.datasets import is_numeric, require_sweep, resolve, swept
-from ringsweep.plots.labels import axis_label, display_factor, long_name, value_text
+from ringsweep.plots.labels import axis_label, display_factor, displayed, long_name, number_text, value_text
 from ringsweep.plots.map_axes import Axis, as_matrix, choose_axes, is_scattered, thinned
 from ringsweep.plots.map_colours import CellWarning, ColourScale, cell_warnings, legend_entries
 from ringsweep.plots.selection import select
-from ringsweep.plots.style import NO_VALUE, SMALL, axes_or_current, is_dark, legend_beside, true_ranges
+from ringsweep.plots.style import (
+    MARGIN,
+    NO_VALUE,
+    PAIR_COLOURS,
+    SMALL,
+    axes_or_current,
+    columns_of,
+    figure_width,
+    folded,
+    height_of,
+    is_dark,
+    is_narrow,
+    label_axes,
+    legend_width,
+    on_page,
+    place_legend,
+    small_ticks,
+    true_ranges,
+    width_of,
+)
 from ringsweep.quantities.units import percent_at_most
 from ringsweep.quantities.variables import INFERRED
 
@@ -36,10 +56,12 @@ _MOST_PANELS = 25
 # gigabytes.
 _MOST_CELLS = 1200
 
-_CURVE: dict[str, Any] = {"color": "black", "linewidth": 0.8}
-
-# Letters in a line of the title of a figure, and of the title of a small panel.
-_TITLE_WIDTH, _PANEL_WIDTH = 60, 30
+_CURVE: dict[str, Any] = {
+    "color": "black",
+    "linewidth": 0.8,
+    # Visible on dark cells too.
+    "path_effects": [withStroke(linewidth=2.0, foreground="white")],
+}
 
 
 def regime_map(
@@ -49,6 +71,8 @@ def regime_map(
     var: str = "regime",
     sel: Mapping[str, float | str] | None = None,
     boundaries: xr.Dataset | None = None,
+    title: bool | str = True,
+    legend: bool | str = True,
 ) -> Figure:
     """Draw one variable of a sweep over the swept quantities, as a new figure.
 
@@ -70,6 +94,12 @@ def regime_map(
         text may have a unit.
     boundaries : xarray.Dataset, optional
         Curves of :func:`ringsweep.boundary`, which are drawn over a map of one panel.
+    title : bool or str
+        Whether the map has its title, or the title in its place.
+    legend : bool or str
+        Whether the map has a legend, or its place: ``"beside"``, ``"below"``, or a location of matplotlib within the
+        axes, such as ``"upper left"``. By default it stands beside the map, and below one that is
+        narrower than 117 mm. The legend of several panels always stands above them.
 
     Returns
     -------
@@ -78,7 +108,7 @@ def regime_map(
     Raises
     ------
     InputError
-        If a name is unknown, a single cell is left, or more than 25 panels would be needed.
+        If a name or a place is unknown, a single cell is left, or more than 25 panels would be needed.
 
     Examples
     --------
@@ -95,43 +125,46 @@ def regime_map(
     found = Map.of(ds, x, y, var, sel or {})
     if boundaries is not None:
         found.entries.append(found.curve_entry(boundaries))
-    panels, columns = found.panels, found.columns
+    width = figure_width()
+    if len(found.panels) == 1:
+        height = 0.62 if found.vertical else 0.3 if found.scale.meanings else 0.45
+        figure = Figure(figsize=(width, height * width + (0.7 if is_narrow(width) else 0.3)), layout="constrained")
+        ax = figure.add_subplot()
+        found.draw_alone(ax, title, legend)
+        if boundaries is not None:
+            found.draw_curves(ax, boundaries)
+        return figure
+    panels = found.panels
+    # Narrower panels have no room for ticks and titles.
+    columns = max(1, min(found.columns, int((width - MARGIN) / 1.2)))
     rows = math.ceil(len(panels) / columns)
-    if len(panels) > 1:
-        size = (2.4 * columns + 2.2, 2.1 * rows + 0.9)
-    else:
-        size = (7.6, 4.8 if found.vertical else 2.2 if found.scale.meanings else 3.6)
-    figure = Figure(figsize=size, layout="constrained")
+    bar = found.scale.meanings is None and found.vertical is not None
+    each = (width - MARGIN * (2 if bar else 1)) / columns
+    titles = ["\n".join(folded([text], each) for text in texts) for texts, _ in panels]
+    lines = max(title.count("\n") + 1 for title in titles)
+    height = rows * (0.75 * each + 0.0175 * rcParams["font.size"] * lines) + 1.3
+    figure = Figure(figsize=(width, height), layout="constrained")
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     for axes in grid.flat[len(panels) :]:
         axes.remove()
     # If the last row is short, panels of the row above it need tick labels.
-    for axes in grid.flat[max(0, len(panels) - columns) : len(panels)]:
+    for axes in grid.flat[len(panels) - columns : len(panels)]:
         axes.xaxis.set_tick_params(labelbottom=True)
-    for axes, (title, index) in zip(grid.flat, panels, strict=False):
-        axes.set_title(title, fontsize=SMALL)
-        axes.tick_params(labelsize=SMALL if len(panels) > 1 else None)
+    for axes, words, (_, index) in zip(grid.flat, titles, panels, strict=False):
+        axes.set_title(words, fontsize=SMALL)
         found.draw(axes, index)
-        if boundaries is not None:
-            found.draw_curves(axes, boundaries)
-    if len(panels) > 1:
-        figure.supxlabel(found.horizontal.label, fontsize=10)
-        figure.supylabel(found.vertical_label, fontsize=10)
-    else:
-        found.label_axes(grid[0, 0])
-    if found.title:
-        figure.suptitle(found.title, fontsize=11)
-    if found.scale.meanings is None and found.vertical:
+    figure.supxlabel(found.horizontal.label, fontsize="medium")
+    figure.supylabel(found.vertical_label, fontsize="medium")
+    if bar:
         found.add_colour_bar(list(grid.flat[: len(panels)]))
-    if found.entries:
-        figure.legend(
-            handles=found.entries,
-            # Below several panels is the label of their common axis.
-            loc="outside right upper" if found.scale.meanings or len(panels) > 1 else "outside lower center",
-            fontsize=SMALL,
-            frameon=False,
-            handleheight=1.4,
-        )
+    text = found.title_text(title, width)
+    if found.entries and legend is not False:
+        # A legend above the panels would cover a title of the figure, and one below them the label of the axis.
+        style: dict[str, Any] = {"fontsize": SMALL, "frameon": False, "handleheight": 1.4, "columnspacing": 1.2}
+        style |= {"title": text, "title_fontsize": "medium", "ncols": columns_of(found.entries, width)}
+        figure.legend(handles=found.entries, loc="outside upper center", **style)
+    elif text:
+        figure.suptitle(text, fontsize="medium")
     return figure
 
 
@@ -142,6 +175,8 @@ def map_panel(
     var: str = "regime",
     sel: Mapping[str, float | str] | None = None,
     ax: Axes | None = None,
+    title: bool | str = True,
+    legend: bool | str = True,
 ) -> Axes:
     """Draw one variable of a sweep over one or two swept quantities; see :func:`regime_map`.
 
@@ -157,8 +192,13 @@ def map_panel(
         Coordinates held at the value nearest to the one given, which must lie within the axis: a plain number is SI,
         text may have a unit.
     ax : matplotlib.axes.Axes, optional
-        Axes to draw in, by default pyplot's current ones. The legend stands beside them: a figure with
+        Axes to draw in, by default pyplot's current ones. The legend stands outside them: a figure with
         ``layout="constrained"`` makes room for it.
+    title : bool or str
+        Whether the map has its title, or the title in its place.
+    legend : bool or str
+        Whether the map has a legend, or its place: ``"beside"``, ``"below"``, or a location of matplotlib within the
+        axes, such as ``"upper left"``.
 
     Returns
     -------
@@ -167,7 +207,7 @@ def map_panel(
     Raises
     ------
     InputError
-        If a name is unknown, a single cell is left, or more than two dimensions are left.
+        If a name or a place is unknown, a single cell is left, or more than two dimensions are left.
 
     Examples
     --------
@@ -176,11 +216,11 @@ def map_panel(
     >>> from matplotlib.figure import Figure
     >>> ds = xr.Dataset({"phi_max": ("speed", [0.1, 0.3, 0.2], {"units": "rad"})}, coords={"speed": [1.0, 2.0, 3.0]})
     >>> map_panel(ds, var="phi_max", ax=Figure().add_subplot()).get_ylabel()
-    'phi_max (rad)'
+    'phi_max (°)'
     """
     found = Map.of(ds, x, y, var, sel or {})
-    ax = axes_or_current(ax, (7.6, 4.8))
-    found.draw_alone(ax)
+    ax = axes_or_current(ax, 0.65)
+    found.draw_alone(ax, title, legend)
     return ax
 
 
@@ -200,15 +240,16 @@ class Map:
         Whether points are drawn; else the cells of a grid.
     scale : ColourScale
     warnings : list of CellWarning
-    panels : list of (str, dict)
-        Title of each panel, and its index along the dimensions that are not axes.
+    panels : list of (list of str, dict)
+        Texts of the title of each panel, and its index along the dimensions that are not axes.
     columns : int
         Columns of panels.
     drawn : dict of str to ndarray
         By dimension the indices in `ds` that are drawn, if these are not all.
     entries : list of Artist
         Entries of the legend.
-    title : str
+    texts : list of str
+        What the title says: the variable, values held, cells left out.
     """
 
     ds: xr.Dataset
@@ -218,11 +259,11 @@ class Map:
     scattered: bool
     scale: ColourScale
     warnings: list[CellWarning]
-    panels: list[tuple[str, dict[str, int]]]
+    panels: list[tuple[list[str], dict[str, int]]]
     columns: int
     drawn: dict[str, NDArray[np.intp]]
     entries: list[Artist]
-    title: str
+    texts: list[str]
 
     @classmethod
     def of(cls, ds: xr.Dataset, x: str | None, y: str | None, var: str, sel: Mapping[str, float | str]) -> Map:
@@ -232,7 +273,7 @@ class Map:
         # The title also names what was held before, by `ds.isel` for example.
         held = [value_text(coordinate) for coordinate in swept(ds) if not coordinate.dims]
         ds, held_now = select(ds, sel)
-        data = ds[var]
+        data = displayed(ds[var])
         if not data.dims:
             raise InputError(
                 "sel" if sel else "ds", "a single cell has no map; at least one swept dimension must remain"
@@ -251,7 +292,7 @@ class Map:
         thinning = [f"1 cell in {share:.0f} drawn"] if drawn else []
         return cls(
             ds,
-            thin[var],
+            displayed(thin[var]),
             Axis.of(thin[horizontal.name], thin),
             Axis.of(thin[vertical.name], thin) if vertical else None,
             scattered,
@@ -260,8 +301,8 @@ class Map:
             panels,
             columns,
             drawn,
-            legend_entries(scale, data, warnings, scattered),
-            _title(["" if scale.meanings is None else long_name(data), *held, *held_now, *thinning, *_audit(ds)]),
+            legend_entries(scale, ds, data, warnings, scattered),
+            ["" if scale.meanings is None else long_name(data), *held, *held_now, *thinning, *_audit(ds)],
         )
 
     @property
@@ -271,13 +312,22 @@ class Map:
             return self.vertical.label
         return "" if self.scale.meanings else axis_label(self.data, self.ds)
 
+    def title_text(self, title: bool | str, inches: float) -> str:
+        """The title in lines of at most this width; empty if the user wants none."""
+        if isinstance(title, str):
+            return title
+        return folded(self.texts, inches) if title else ""
+
     def draw(self, axes: Axes, index: Mapping[str, int]) -> None:
         """Draw the panel at an index along the dimensions that are not axes."""
+        small_ticks(axes)
         self.horizontal.apply(axes.set_xscale, axes.xaxis)
         if self.vertical:
             self.vertical.apply(axes.set_yscale, axes.yaxis)
         numbers = self.scale.numbers(self.data.isel(index))
-        warnings = [replace(warning, cells=warning.cells.isel(index)) for warning in self.warnings]
+        warnings = [
+            replace(warning, cells=warning.cells.isel(index)) for warning in self.warnings if not warning.everywhere
+        ]
         if self.vertical is None and self.scale.meanings is None:
             self._draw_line(axes, numbers)
         elif self.scattered and self.vertical:
@@ -304,15 +354,14 @@ class Map:
         if self.scattered or len(self.panels) > 1:
             raise InputError("boundaries", "are drawn over one map of a grid: hold the other axes")
         regime, tolerance = boundaries.attrs["boundary_of"], boundaries.attrs["boundary_tolerance"]
-        return Line2D([], [], label=f"boundary of {regime}\n± {tolerance:g} (SI units)", **_CURVE)
+        return Line2D([], [], label=f"boundary of {regime}\n± {number_text(tolerance)} (SI units)", **_CURVE)
 
     def _draw_line(self, axes: Axes, data: xr.DataArray) -> None:
         numbers, edges = data.values[self.horizontal.order], self.horizontal.edges
         gaps = [(edges[i], edges[j] - edges[i]) for i, j in true_ranges(np.isnan(numbers))]
-        axes.broken_barh(gaps, (0, 1), transform=axes.get_xaxis_transform(), color=NO_VALUE, linewidth=0)
+        axes.broken_barh(gaps, (0, 1), transform=axes.get_xaxis_transform(), color=on_page(NO_VALUE), linewidth=0)
         marker = "o" if len(numbers) <= 100 else "."
-        axes.plot(self.horizontal.values, numbers, marker=marker, markersize=4, color="#0072B2")
-        axes.set_ylabel(self.vertical_label)
+        axes.plot(self.horizontal.values, numbers, marker=marker, markersize=4, color=on_page(PAIR_COLOURS[0]))
 
     def _draw_points(self, axes: Axes, vertical: Axis, data: xr.DataArray, warnings: list[CellWarning]) -> None:
         x, y = self.horizontal.values_at(data), vertical.values_at(data)
@@ -342,7 +391,7 @@ class Map:
         if self.vertical is None:
             axes.set_yticks([])
 
-    def draw_alone(self, axes: Axes) -> None:
+    def draw_alone(self, axes: Axes, title: bool | str = True, legend: bool | str = True) -> None:
         """Draw a map of one panel with labels, title, colour bar and legend."""
         if len(self.panels) > 1:
             left = ", ".join(self.panels[0][1])
@@ -351,23 +400,29 @@ class Map:
             )
         self.draw(axes, self.panels[0][1])
         self.label_axes(axes)
-        axes.set_title(self.title, fontsize=11)
-        if self.scale.meanings is None and self.vertical:
+        bar = self.scale.meanings is None and self.vertical is not None
+        if bar:
             self.add_colour_bar([axes])
-            legend_beside(axes, self.entries, loc="upper right", bbox_to_anchor=(1.0, -0.1))
-        else:
-            legend_beside(axes, self.entries, handleheight=1.4)
+        if legend is True:
+            legend = "below" if bar or is_narrow(width_of(axes)) else "beside"
+        beside = legend_width(self.entries) if legend == "beside" else MARGIN * bar
+        # A title above the axes alone meets no legend.
+        text = self.title_text(title, width_of(axes) - MARGIN - beside)
+        axes.set_title(text, fontsize="medium")
+        place_legend(axes, self.entries, legend, handleheight=1.4)
 
     def label_axes(self, axes: Axes) -> None:
         """Write the labels of both axes."""
-        axes.set_xlabel(self.horizontal.label)
-        axes.set_ylabel(self.vertical_label)
+        label_axes(axes, self.horizontal.label, self.vertical_label)
 
     def add_colour_bar(self, panels: list[Axes]) -> None:
         """Draw one colour bar beside the panels."""
         bar = ScalarMappable(self.scale.norm, self.scale.colours)
         ticks = MaxNLocator(integer=True) if self.data.dtype.kind in "iu" else None
-        panels[0].figure.colorbar(bar, ax=panels, label=axis_label(self.data, self.ds), ticks=ticks)
+        figure: Any = panels[0].figure
+        label = folded([axis_label(self.data, self.ds)], 0.75 * height_of(panels[0]) * (1 + (len(panels) > 1)))
+        added = figure.colorbar(bar, ax=panels, label=label, ticks=ticks)
+        small_ticks(added.ax)
 
     def cell_at(self, axes: Axes, x: float, y: float) -> xr.Dataset:
         """The cell that a map of one panel shows at a position, which is in the units of its axes."""
@@ -389,7 +444,8 @@ class Map:
         """Position of a single cell in a map of one panel, in the units of its axes."""
         if self.vertical:
             return self.horizontal.value_of(cell), self.vertical.value_of(cell)
-        return self.horizontal.value_of(cell), 0.5 if self.scale.meanings else float(cell[self.data.name])
+        height = 0.5 if self.scale.meanings else float(displayed(cell[self.data.name]))
+        return self.horizontal.value_of(cell), height
 
 
 def _audit(ds: xr.Dataset) -> list[str]:
@@ -406,18 +462,8 @@ def _audit(ds: xr.Dataset) -> list[str]:
     return [*words, f"others: at most {percent_at_most(ds.attrs['audit_bound'])} wrong (95 % confidence)"]
 
 
-def _title(texts: list[str]) -> str:
-    """Texts separated by semicolons, in lines that are no wider than a map."""
-    lines = [""]
-    for text in filter(None, texts):
-        if len(lines[-1]) + len(text) > _TITLE_WIDTH and lines[-1]:
-            lines.append("")
-        lines[-1] += ("; " if lines[-1] else "") + text
-    return ";\n".join(lines)
-
-
-def _panels(ds: xr.Dataset, dims: list[str]) -> list[tuple[str, dict[str, int]]]:
-    """Title and index of a panel for each combination of values along the dimensions."""
+def _panels(ds: xr.Dataset, dims: list[str]) -> list[tuple[list[str], dict[str, int]]]:
+    """Texts of the title, and index of a panel for each combination of values along the dimensions."""
     sizes = [ds.sizes[dim] for dim in dims]
     if math.prod(sizes) > _MOST_PANELS:
         left = ", ".join(f"{dim} ({size})" for dim, size in zip(dims, sizes, strict=True))
@@ -429,8 +475,7 @@ def _panels(ds: xr.Dataset, dims: list[str]) -> list[tuple[str, dict[str, int]]]
     panels = []
     for position in np.ndindex(*sizes):
         index = dict(zip(dims, map(int, position), strict=True))
-        values = [textwrap.fill(value_text(ds[dim][k]), _PANEL_WIDTH) for dim, k in index.items()]
-        panels.append(("\n".join(values), index))
+        panels.append(([value_text(ds[dim][k]) for dim, k in index.items()], index))
     return panels
 
 

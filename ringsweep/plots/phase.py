@@ -9,10 +9,12 @@ from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
+from matplotlib import rcParams
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.transforms import ScaledTranslation
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
@@ -22,10 +24,16 @@ from ringsweep.plots.rig import Rig, belt_history, mode_name, ring_history
 from ringsweep.plots.style import (
     PAIR_COLOURS,
     PAIR_STYLES,
+    SMALL,
+    angle_unit,
     arc_colour,
     arc_names,
     axes_or_current,
-    legend_beside,
+    label_axes,
+    on_page,
+    page_colour,
+    place_legend,
+    small_ticks,
     true_ranges,
 )
 
@@ -36,8 +44,8 @@ _MODE_STYLES: dict[int, dict[str, Any]] = {
     0: {"color": "black", "linewidth": 2.6, "solid_capstyle": "round"},
 }
 
-# Range of an angle above which it is shown modulo a full turn, degrees.
-_LONGEST = 720.0
+# Range of an angle above which it is shown modulo a full turn, turns.
+_LONGEST = 2.0
 
 
 def phase_portrait(ds: xr.Dataset, frame: Literal["space", "ring"] = "space", ax: Axes | None = None) -> Axes:
@@ -57,7 +65,7 @@ def phase_portrait(ds: xr.Dataset, frame: Literal["space", "ring"] = "space", ax
     frame : {"space", "ring"}
         Frame of reference; on a belt always space.
     ax : matplotlib.axes.Axes, optional
-        Axes to draw in, by default pyplot's current ones. The legend stands beside them: a figure with
+        Axes to draw in, by default pyplot's current ones. The legend stands outside them: a figure with
         ``layout="constrained"`` makes room for it.
 
     Returns
@@ -84,13 +92,14 @@ def phase_portrait(ds: xr.Dataset, frame: Literal["space", "ring"] = "space", ax
     if frame == "ring":
         raise InputError("frame", "'ring' is for a body in a ring; on a belt the frame is 'space'")
     run = belt_history(ds)
-    ax = axes_or_current(ax, (7.6, 4.8))
-    legend_beside(ax, draw_belt_portrait(ax, run))
+    ax = axes_or_current(ax, 0.63)
+    place_legend(ax, draw_belt_portrait(ax, run))
     return ax
 
 
 def draw_belt_portrait(ax: Axes, run: xr.Dataset) -> list[Artist]:
     """Draw velocity over displacement of a run of :func:`belt_history`; returns the legend entries."""
+    small_ticks(ax)
     place, speed, belt_speed = (run[name].values for name in ("x", "velocity", "belt_velocity"))
     if fixed := not np.ptp(belt_speed):
         ax.axhline(belt_speed[0], **_driven_style(fixed))
@@ -106,12 +115,14 @@ def draw_belt_portrait(ax: Axes, run: xr.Dataset) -> list[Artist]:
 def _ring_portrait(ds: xr.Dataset, frame: str, ax: Axes | None) -> Axes:
     """Draw angular velocity over angle."""
     run, rig = ring_history(ds)
-    ax = axes_or_current(ax, (7.6, 4.8))
+    ax = axes_or_current(ax, 0.63)
+    small_ticks(ax)
+    factor, unit = angle_unit()
     relative = frame == "ring"
     fixed_arcs = relative or not run["theta"].values.any()
-    angle = np.degrees(run["phi"].values - run["theta"].values if relative else run["phi"].values)
+    angle = factor * (run["phi"].values - run["theta"].values if relative else run["phi"].values)
     speed = run["omega"].values - run["ring_omega"].values if relative else run["omega"].values
-    wrapped = bool(np.ptp(angle) > _LONGEST)
+    wrapped = bool(np.ptp(angle) > _LONGEST * _turn())
     entries = _draw_bands(ax, rig, angle, wrapped) if fixed_arcs else []
     if not entries:
         entries = _draw_broad_lines(ax, run, angle, speed, wrapped)
@@ -122,21 +133,30 @@ def _ring_portrait(ds: xr.Dataset, frame: str, ax: Axes | None) -> Axes:
         ax.plot(*_curve(angle, run["ring_omega"].values, wrapped), **ring_style)
     entries.append(Line2D([], [], **ring_style, label="speed of the ring" + (", stick" if relative else "")))
     entries += draw_modes(ax, run["mode"].values, angle, speed, wrapped)
-    ax.set_xlabel("angle of the body on the ring (°)" if relative else "angle of the body (°)")
-    ax.set_ylabel(f"angular velocity{' relative to the ring' if relative else ''} (rad s$^{{-1}}$)")
+    label_axes(
+        ax,
+        f"angle of the body{' on the ring' if relative else ''} ({unit})",
+        f"angular velocity{' relative to the ring' if relative else ''} (rad s$^{{-1}}$)",
+    )
     if wrapped:
-        ax.set_xlim(-180.0, 180.0)
-        ax.set_xticks(np.arange(-180.0, 181.0, 60.0))
+        ax.set_xlim(-0.5 * _turn(), 0.5 * _turn())
+        if unit == "°":
+            ax.set_xticks(np.arange(-180.0, 181.0, 60.0))
     if relative:
         to_sliding, to_angular = partial(np.multiply, rig.radius), partial(np.multiply, 1.0 / rig.radius)
-        ax.secondary_yaxis("right", functions=(to_sliding, to_angular)).set_ylabel("sliding velocity (m s$^{-1}$)")
-    legend_beside(ax, entries, bbox_to_anchor=(1.16 if relative else 1.0, 1.0), handleheight=1.2)
+        second = ax.secondary_yaxis("right", functions=(to_sliding, to_angular))
+        second.set_ylabel("sliding velocity (m s$^{-1}$)")
+        second.tick_params(labelsize=SMALL)
+    figure: Any = ax.figure
+    # The second axis has its labels between axes and legend.
+    labels = ScaledTranslation(0.065 * rcParams["font.size"] * relative, 0.0, figure.dpi_scale_trans)
+    place_legend(ax, entries, bbox_transform=ax.transAxes + labels, handleheight=1.2)
     return ax
 
 
 def _driven_style(constant: bool) -> dict[str, Any]:
     """Line of the speed of ring or belt; below the curve of the body, which covers it in stick."""
-    style: dict[str, Any] = {"color": PAIR_COLOURS[1], "linewidth": 0.8, "alpha": 0.7, "zorder": 1.8}
+    style: dict[str, Any] = {"color": on_page(PAIR_COLOURS[1]), "linewidth": 0.8, "alpha": 0.7, "zorder": 1.8}
     return style | {"linestyle": PAIR_STYLES[1], "linewidth": 1.2, "alpha": 1.0} if constant else style
 
 
@@ -152,14 +172,15 @@ def draw_modes(
     mode, across, up : ndarray of shape ``(samples,)``
         Friction mode, and coordinates in the axes.
     wrapped : bool
-        Whether `across` is an angle in degrees, shown modulo a full turn.
+        Whether `across` is an angle, shown modulo a full turn.
     """
     entries: list[Artist] = []
     # From one sample to the next the body slips if it slips at either of them.
     between = np.where(mode[:-1] != 0, mode[:-1], mode[1:])
-    for value, style in _MODE_STYLES.items():
+    for value, look in _MODE_STYLES.items():
         if not (mode == value).any():
             continue
+        style = look | {"color": on_page(look["color"])}
         ax.plot(*_curve(*_segments(between == value, across, up), wrapped), **style)
         # In the frame of the ring or belt the curve of a stick may have no length.
         dot: dict[str, Any] = {"marker": "o", "markersize": 3.5} if value == 0 else {}
@@ -167,8 +188,9 @@ def draw_modes(
             first = [i for i, _ in true_ranges(mode == value)]
             ax.plot(_wrap(across[first], wrapped), up[first], color=style["color"], linestyle="", **dot)
         entries.append(Line2D([], [], **style, **dot, label=mode_name(value)))
-    for k, label, colour in ((0, "start", "white"), (-1, "end", "black")):
-        square: dict[str, Any] = {"marker": "s", "markersize": 5.5, "color": "black", "linestyle": ""}
+    ink = on_page("black")
+    for k, label, colour in ((0, "start", page_colour()), (-1, "end", ink)):
+        square: dict[str, Any] = {"marker": "s", "markersize": 5.5, "color": ink, "linestyle": ""}
         square["markerfacecolor"] = colour
         ax.plot(_wrap(across[[k]], wrapped), up[[k]], zorder=4, **square)
         entries.append(Line2D([], [], label=label, **square))
@@ -176,15 +198,20 @@ def draw_modes(
 
 
 def _wrap(angle: NDArray[Any], wrapped: bool) -> NDArray[Any]:
-    """Angles from -180 to 180 degrees if `wrapped`."""
-    return (angle + 180.0) % 360.0 - 180.0 if wrapped else angle
+    """Angles from minus half a turn to half a turn if `wrapped`."""
+    return (angle + 0.5 * _turn()) % _turn() - 0.5 * _turn() if wrapped else angle
+
+
+def _turn() -> float:
+    """A full turn in the unit of angles."""
+    return 2.0 * math.pi * angle_unit()[0]
 
 
 def _curve(angle: NDArray[Any], speed: NDArray[Any], wrapped: bool) -> tuple[NDArray[Any], NDArray[Any]]:
     """A curve with NaN wherever its angle jumps by a full turn if `wrapped`."""
     if not wrapped:
         return angle, speed
-    turns = np.floor((angle + 180.0) / 360.0)
+    turns = np.floor((angle + 0.5 * _turn()) / _turn())
     jumps = np.flatnonzero(np.diff(turns)) + 1
     return np.insert(_wrap(angle, True), jumps, np.nan), np.insert(speed, jumps, np.nan)
 
@@ -198,8 +225,8 @@ def _segments(kept: NDArray[Any], angle: NDArray[Any], speed: NDArray[Any]) -> t
 
 def _draw_bands(ax: Axes, rig: Rig, angle: NDArray[Any], wrapped: bool) -> list[Artist]:
     """Draw bands where a contact is on a zone, in all turns shown; returns their legend entries."""
-    low, high = (-180.0, 180.0) if wrapped else (float(angle.min()), float(angle.max()))
-    margin = 0.0 if wrapped else 0.05 * (high - low) or 5.0
+    low, high = (-0.5 * _turn(), 0.5 * _turn()) if wrapped else (float(angle.min()), float(angle.max()))
+    margin = 0.0 if wrapped else 0.05 * (high - low) or _turn() / 72.0
     low, high = low - margin, high + margin
     entries: list[Artist] = []
     for number, (name, (center, half_angle)) in enumerate(
@@ -208,12 +235,12 @@ def _draw_bands(ax: Axes, rig: Rig, angle: NDArray[Any], wrapped: bool) -> list[
         for contact in rig.contacts:
             lines = ("///", "\\\\\\")[contact - 1] if len(rig.contacts) > 1 else None
             fill: dict[str, Any] = {"facecolor": arc_colour(number), "alpha": 0.35, "linewidth": 0}
-            hatch: dict[str, Any] = {"facecolor": "none", "edgecolor": "0.45", "linewidth": 0, "hatch": lines}
-            middle, half = math.degrees(center - rig.offset(contact)), math.degrees(half_angle)
+            hatch: dict[str, Any] = {"facecolor": "none", "edgecolor": on_page("0.45"), "linewidth": 0, "hatch": lines}
+            middle, half = angle_unit()[0] * (center - rig.offset(contact)), angle_unit()[0] * half_angle
             for left, right in _every_turn(middle - half, middle + half, low, high):
                 ax.axvspan(left, right, zorder=0.5, **fill)
                 ax.axvspan(left, right, zorder=0.6, **hatch).set(hatch_linewidth=0.4)
-            entry = Patch(facecolor=arc_colour(number), alpha=0.55, hatch=lines, edgecolor="0.3", linewidth=0)
+            entry = Patch(facecolor=arc_colour(number), alpha=0.55, hatch=lines, edgecolor=on_page("0.3"), linewidth=0)
             entry.set(label=f"contact {contact} on {name}", hatch_linewidth=0.4)
             entries.append(entry)
     ax.set_xlim(low, high)
@@ -221,9 +248,10 @@ def _draw_bands(ax: Axes, rig: Rig, angle: NDArray[Any], wrapped: bool) -> list[
 
 
 def _every_turn(left: float, right: float, low: float, high: float) -> Iterator[tuple[float, float]]:
-    """Copies of an interval at every full turn, cut to the range from `low` to `high`, degrees."""
-    for turn in range(math.floor((low - right) / 360.0), math.ceil((high - left) / 360.0) + 1):
-        a, b = max(left + 360.0 * turn, low), min(right + 360.0 * turn, high)
+    """Copies of an interval at every full turn, cut to the range from `low` to `high`."""
+    full = _turn()
+    for turn in range(math.floor((low - right) / full), math.ceil((high - left) / full) + 1):
+        a, b = max(left + full * turn, low), min(right + full * turn, high)
         if a < b:
             yield a, b
 

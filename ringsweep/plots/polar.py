@@ -11,25 +11,40 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, Polygon, Wedge
+from matplotlib.patheffects import withStroke
 from matplotlib.quiver import Quiver
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.plots.datasets import present
-from ringsweep.plots.labels import number_text
+from ringsweep.plots.labels import MINUS, number_text
 from ringsweep.plots.rig import Rig, mode_name, ring_history
-from ringsweep.plots.style import PAIR_COLOURS, REST, SMALL, arc_colour, arc_names, axes_or_current, legend_beside
+from ringsweep.plots.style import (
+    PAIR_COLOURS,
+    REST,
+    SMALL,
+    angle_unit,
+    arc_colour,
+    arc_names,
+    axes_or_current,
+    figure_width,
+    is_narrow,
+    on_page,
+    page_colour,
+    place_legend,
+)
 
-TIMES = "\N{MULTIPLICATION SIGN}"
+# Length of an arrow below which it has no name, as a multiple of the radius of the ring: the name would hide it.
+_SHORTEST = 0.04
 
 
 def polar_view(ds: xr.Dataset, time: float, ax: Axes | None = None) -> Axes:
     """Draw the body in the ring at one instant, to scale, with all forces.
 
-    Angles count from the downward vertical, counter-clockwise. A mark on the ring shows its angle and the direction
-    in which it turns. Arrows of reactions and of the weight have one scale in all pictures of a run. Arrows of
-    friction forces are longer by a factor that the legend gives. The friction forces follow from the balances of
-    momentum, in stick too.
+    Angles count from the downward vertical, counter-clockwise. A mark shows the angle θ of the ring, and an arrow
+    beside it the sense in which the ring turns. Arrows have the names of their forces: normal reactions N, friction
+    forces F, weight Mg. Reactions and weight have one scale in all pictures of a run; friction forces, which are
+    smaller, have another one. The friction forces follow from the balances of momentum, in stick too.
 
     Parameters
     ----------
@@ -38,7 +53,7 @@ def polar_view(ds: xr.Dataset, time: float, ax: Axes | None = None) -> Axes:
     time : float
         Instant, s.
     ax : matplotlib.axes.Axes, optional
-        Axes to draw in, by default pyplot's current ones. The legend stands beside them: a figure with
+        Axes to draw in, by default pyplot's current ones. The legend stands below them: a figure with
         ``layout="constrained"`` makes room for it.
 
     Returns
@@ -62,10 +77,10 @@ def polar_view(ds: xr.Dataset, time: float, ax: Axes | None = None) -> Axes:
     first, last = run["time"].values[[0, -1]]
     if not first <= time <= last:
         raise InputError("time", f"{time:g} s is not within the run, from {first:g} s to {last:.6g} s")
-    ax = axes_or_current(ax, (6.6, 5.2))
+    ax = axes_or_current(ax, 1.2 if is_narrow(figure_width()) else 0.8)
     artists = RingArtists(ax, run, rig)
     artists.show(states_at(run, np.array([time])), 0)
-    legend_beside(ax, artists.legend_entries())
+    place_legend(ax, artists.legend_entries(), "below")
     return ax
 
 
@@ -96,34 +111,49 @@ class RingArtists:
         R = rig.radius
         ax.set_aspect("equal")
         ax.set_axis_off()
-        ax.set_xlim(-1.45 * R, 1.45 * R)
-        ax.set_ylim(-1.75 * R, 1.4 * R)
-        ax.add_patch(Wedge((0.0, 0.0), 1.1 * R, 0.0, 360.0, width=0.1 * R, facecolor=REST, edgecolor="0.3", zorder=1))
+        ax.set_xlim(-1.55 * R, 1.55 * R)
+        ax.set_ylim(-2.0 * R, 1.5 * R)
+        edge, ink = on_page("0.3"), on_page("black")
+        surface: dict[str, Any] = {"width": 0.1 * R, "edgecolor": edge}
+        ax.add_patch(Wedge((0.0, 0.0), 1.1 * R, 0.0, 360.0, facecolor=on_page(REST), zorder=1, **surface))
         self._draw_angles()
         self.arcs = []
         for k, (_, half_angle) in enumerate(rig.arcs, start=1):
-            wedge = Wedge((0.0, 0.0), 1.1 * R, 0.0, 1.0, width=0.1 * R, facecolor=arc_colour(k), edgecolor="0.3")
+            wedge = Wedge((0.0, 0.0), 1.1 * R, 0.0, 1.0, facecolor=arc_colour(k), **surface)
             wedge.set(zorder=2, visible=half_angle > 0.0)
             self.arcs.append(wedge)
-        self.mark = Polygon(np.zeros((3, 2)), facecolor="0.2", edgecolor="none", zorder=3)
-        (self.rod,) = ax.plot([], [], color="0.45", linewidth=4, solid_capstyle="round", zorder=3)
+        self.mark = Polygon(np.zeros((3, 2)), facecolor=on_page("0.2"), edgecolor="none", zorder=3)
+        self.turning = Polygon(np.zeros((3, 2)), facecolor=on_page("0.2"), edgecolor="none", zorder=3)
+        (self.turn,) = ax.plot([], [], color=on_page("0.2"), linewidth=1.2, zorder=3)
+        (self.rod,) = ax.plot([], [], color=on_page("0.45"), linewidth=4, solid_capstyle="round", zorder=3)
         self.balls = []
         for _ in rig.contacts:
-            ball = Circle((0.0, 0.0), rig.ball, facecolor="0.85", edgecolor="0.2", linewidth=1.2, zorder=4)
+            ball = Circle((0.0, 0.0), rig.ball, facecolor=on_page("0.85"), edgecolor=on_page("0.2"), zorder=4)
+            ball.set_linewidth(1.2)
             self.balls.append(ball)
-        for patch in (*self.arcs, self.mark, *self.balls):
+        for patch in (*self.arcs, self.mark, self.turning, *self.balls):
             ax.add_patch(patch)
         # A single contact needs no number.
         texts = [str(k) if len(rig.contacts) > 1 else "" for k in rig.contacts]
         self.numbers = [ax.text(0.0, 0.0, text, ha="center", va="center", fontsize=SMALL, zorder=5) for text in texts]
-        (self.centre,) = ax.plot([], [], marker="o", markersize=4, color="black", linestyle="", zorder=5)
-        colours = [PAIR_COLOURS[k - 1] for k in rig.contacts]
+        (self.centre,) = ax.plot([], [], marker="o", markersize=4, color=ink, linestyle="", zorder=5)
+        halo = withStroke(linewidth=2.0, foreground=page_colour())
+        colours = [on_page(PAIR_COLOURS[k - 1]) for k in rig.contacts]
         self.reactions = self._arrows(colours, 0.032)
         self.frictions = self._arrows(colours, 0.016)
-        self.gravity = self._arrows(["black"], 0.016)
+        self.gravity = self._arrows([ink], 0.016)
+        marks = [f"_{k}" if text else "" for k, text in zip(rig.contacts, texts, strict=True)]
+        self.names = [
+            ax.text(0.0, 0.0, name, color=colour, ha="center", va="center", zorder=8, path_effects=[halo])
+            for name, colour in (
+                *((f"$N{mark}$", colour) for mark, colour in zip(marks, colours, strict=True)),
+                *((f"$F{mark}$", colour) for mark, colour in zip(marks, colours, strict=True)),
+                ("$Mg$", ink),
+            )
+        ]
         self._draw_scale_bars()
-        self.speeds = ax.text(0.5, 0.0, "", transform=ax.transAxes, ha="center", va="bottom", fontsize=9)
-        ax.set_title(" ", fontsize=11)
+        self.speeds = ax.text(0.5, 0.0, "", transform=ax.transAxes, ha="center", va="bottom", fontsize=SMALL)
+        ax.set_title(" ", fontsize="medium")
 
     def show(self, states: dict[str, NDArray[Any]], k: int) -> None:
         """Move all artists to the `k`-th state of :func:`states_at`."""
@@ -135,10 +165,15 @@ class RingArtists:
             # Matplotlib counts angles from the horizontal.
             wedge.set_theta1(math.degrees(middle - half_angle) - 90.0)
             wedge.set_theta2(math.degrees(middle + half_angle) - 90.0)
-        lean = 0.07 * np.sign(ring_omega)
-        self.mark.set_xy(
-            [_point(1.11 * R, theta - 0.03), _point(1.2 * R, theta + lean), _point(1.11 * R, theta + 0.03)]
-        )
+        self.mark.set_xy([_point(1.12 * R, theta), _point(1.22 * R, theta - 0.05), _point(1.22 * R, theta + 0.05)])
+        # The arrow begins at the mark.
+        sense = float(np.sign(ring_omega))
+        along = theta + sense * np.linspace(0.09, 0.36, 20)
+        self.turn.set_data(*_point(1.18 * R, along))
+        end, tip = theta + sense * 0.34, theta + sense * 0.46
+        self.turning.set_xy([_point(1.18 * R, tip), _point(1.14 * R, end), _point(1.22 * R, end)])
+        for artist in (self.turn, self.turning):
+            artist.set_visible(sense != 0.0)
         contacts = np.array([_point(R, phi + rig.offset(c)) for c in rig.contacts])
         centres = contacts * (1.0 - rig.ball / R)
         self.rod.set_data(*centres.T)
@@ -152,10 +187,23 @@ class RingArtists:
         self.centre.set_data(*centre_of_mass[:, None])
         normals = np.array([states[f"normal_{c}"][k] for c in rig.contacts])
         frictions = np.array([states[f"friction_{c}"][k] for c in rig.contacts])
-        _set_arrows(self.reactions, contacts, inwards * (normals * self.scale)[:, None])
-        _set_arrows(self.frictions, contacts, forwards * (frictions * self.scale * self.magnification)[:, None])
-        _set_arrows(self.gravity, centre_of_mass[None], np.array([[0.0, -self.weight * self.scale]]))
-        self.ax.set_title(f"t = {states['time'][k]:.4f} s, {mode_name(states['mode'][k])}", fontsize=11)
+        reactions = inwards * (normals * self.scale)[:, None]
+        frictions = forwards * (frictions * self.scale * self.magnification)[:, None]
+        weight = np.array([[0.0, -self.weight * self.scale]])
+        _set_arrows(self.reactions, contacts, reactions)
+        _set_arrows(self.frictions, contacts, frictions)
+        _set_arrows(self.gravity, centre_of_mass[None], weight)
+        starts = np.concatenate([contacts, contacts])
+        *names, weight_name = self.names
+        for name, start, arrow in zip(names, starts, np.concatenate([reactions, frictions]), strict=True):
+            length = float(np.hypot(*arrow))
+            name.set_visible(length > _SHORTEST * R)
+            if name.get_visible():
+                name.set_position(tuple(start + arrow * (1.0 + 0.12 * R / length)))
+        # At the tip would be the number of the angle 0.
+        weight_name.set_position(tuple(centre_of_mass + 0.6 * weight[0] + (0.13 * R, 0.0)))
+        weight_name.set_visible(self.weight > 0.0)
+        self.ax.set_title(f"t = {states['time'][k]:.4f} s, {mode_name(states['mode'][k])}", fontsize="medium")
         self.speeds.set_text(
             f"body {number_text(omega, '+.2f')} rad s⁻¹, ring {number_text(ring_omega, '+.2f')} rad s⁻¹"
         )
@@ -165,34 +213,30 @@ class RingArtists:
         """Artists that :meth:`show` changes."""
         arrows = [self.reactions, self.frictions, self.gravity]
         body = [self.rod, *self.balls, *self.numbers, self.centre]
-        return [*self.arcs, self.mark, *body, *arrows, self.speeds, self.ax.title]
+        ring = [*self.arcs, self.mark, self.turn, self.turning]
+        return [*ring, *body, *arrows, *self.names, self.speeds, self.ax.title]
 
     def legend_entries(self) -> list[Artist]:
-        """Legend entries of all colours and arrows."""
+        """Legend entries of the surfaces and the mark; arrows have their names beside them."""
         entries: list[Artist] = [
-            Patch(facecolor=arc_colour(k), edgecolor="0.3", label=name)
+            Patch(facecolor=arc_colour(k), edgecolor=on_page("0.3"), label=name)
             for k, name in enumerate(arc_names(len(self.rig.arcs)), start=1)
         ]
-        entries.append(Patch(facecolor=REST, edgecolor="0.3", label="elsewhere"))
-        for c in self.rig.contacts:
-            contact = f" at {c}" if len(self.rig.contacts) > 1 else ""
-            factor = f", {TIMES}{self.magnification:g}" if self.magnification > 1.0 else ""
-            for label, width in (("reaction" + contact, 3.5), ("friction" + contact + factor, 1.6)):
-                entries.append(Line2D([], [], color=PAIR_COLOURS[c - 1], linewidth=width, label=label))
-        entries.append(Line2D([], [], color="black", linewidth=1.6, label="weight"))
-        style: dict[str, Any] = {"marker": "^", "color": "0.2", "linestyle": "", "markersize": 5}
-        return [*entries, Line2D([], [], label="mark on the ring", **style)]
+        entries.append(Patch(facecolor=on_page(REST), edgecolor=on_page("0.3"), label="elsewhere"))
+        style: dict[str, Any] = {"marker": "v", "color": on_page("0.2"), "linestyle": "", "markersize": 5}
+        return [*entries, Line2D([], [], label="angle θ of the ring", **style)]
 
     def _draw_angles(self) -> None:
         """Ticks and labels of angles around the ring."""
         R = self.rig.radius
         for angle in range(0, 360, 15):
             inner, outer = _point(1.1 * R, math.radians(angle)), _point(1.13 * R, math.radians(angle))
-            self.ax.plot(*zip(inner, outer, strict=True), color="0.5", linewidth=0.6, zorder=1)
-        for angle in (0, 90, 180, -90):
-            x, y = _point(1.3 * R, math.radians(angle))
-            text = self.ax.text(x, y, number_text(angle, "d") + "°", fontsize=SMALL, color="0.35", zorder=7)
-            text.set(ha="center", va="center", bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5})
+            self.ax.plot(*zip(inner, outer, strict=True), color=on_page("0.5"), linewidth=0.6, zorder=1)
+        degrees = {angle: number_text(angle, "d") + "°" for angle in (0, 90, 180, -90)}
+        radians = {0: "0", 90: "π/2", 180: "π", -90: f"{MINUS}π/2"}
+        for angle, name in (degrees if angle_unit()[1] == "°" else radians).items():
+            x, y = _point(1.37 * R, math.radians(angle))
+            self.ax.text(x, y, name, fontsize=SMALL, color=on_page("0.35"), ha="center", va="center", zorder=7)
 
     def _arrows(self, colours: list[str], width: float) -> Quiver:
         """An arrow of each colour; `width` is a multiple of the radius of the ring."""
@@ -213,22 +257,29 @@ class RingArtists:
         )
 
     def _draw_scale_bars(self) -> None:
-        """A bar of a round force and one of a round length below the ring."""
+        """Bars of round forces and of a round length below the ring."""
         R = self.rig.radius
-        y = -1.5 * R
+        y = -1.62 * R
         force, length = round_down(0.75 * self.reference), round_down(0.5 * R)
-        style: dict[str, Any] = {"color": "0.3", "linewidth": 1.2}
-        for x, extent, text in (
-            (-1.2 * R, force * self.scale, f"{force:g} N"),
-            (0.35 * R, length, f"{1000 * length:g} mm"),
-        ):
+        if self.magnification > 1.0:
+            friction = round_down(0.75 * self.reference / self.magnification)
+            bars = [
+                (force * self.scale, f"{force:g} N", "$N$, $Mg$"),
+                (friction * self.scale * self.magnification, f"{friction:g} N", "$F$"),
+            ]
+        else:
+            bars = [(force * self.scale, f"{force:g} N", "$N$, $F$, $Mg$")]
+        bars.append((length, f"{1000 * length:g} mm", ""))
+        style: dict[str, Any] = {"color": on_page("0.3"), "linewidth": 1.2}
+        for x, (extent, text, what) in zip((-1.4 * R, -0.35 * R, 0.7 * R), bars, strict=False):
             self.ax.plot([x, x + extent], [y, y], marker="|", **style)
-            self.ax.text(x + extent / 2, y + 0.04 * R, text, ha="center", va="bottom", fontsize=SMALL)
+            self.ax.text(x + extent / 2, y + 0.05 * R, text, ha="center", va="bottom", fontsize=SMALL)
+            self.ax.text(x + extent / 2, y - 0.05 * R, what, ha="center", va="top", fontsize=SMALL)
 
 
-def _point(radius: float, angle: float) -> tuple[float, float]:
-    """Point at an angle from the downward vertical, counter-clockwise."""
-    return radius * math.sin(angle), -radius * math.cos(angle)
+def _point(radius: float, angle: Any) -> tuple[Any, Any]:
+    """Point at an angle, or points at several, from the downward vertical, counter-clockwise."""
+    return radius * np.sin(angle), -radius * np.cos(angle)
 
 
 def _set_arrows(arrows: Quiver, points: NDArray[Any], vectors: NDArray[Any]) -> None:

@@ -14,14 +14,31 @@ from matplotlib.patches import Patch
 
 from ringsweep.errors import InputError
 from ringsweep.plots.datasets import resolve
-from ringsweep.plots.labels import axis_label
-from ringsweep.plots.style import CURVE_COLOURS, CURVE_STYLES, SMALL, axes_or_current, legend_beside
+from ringsweep.plots.labels import axis_label, number_text
+from ringsweep.plots.style import (
+    CURVE_COLOURS,
+    CURVE_STYLES,
+    GRID,
+    SMALL,
+    axes_or_current,
+    figure_width,
+    folded,
+    is_narrow,
+    label_axes,
+    on_page,
+    page_colour,
+    place_legend,
+    small_ticks,
+    width_of,
+)
 
-# The number of markers and the number of colours have no common factor, so a pair of the two returns only after 77
-# methods.
+# Own methods, which look the same in every picture.
+_OWN = ("implicit", "event", "rk4")
+
+# One colour is one method. The number of markers and the number of colours have no common factor, so a pair of the two
+# returns only after 143 methods.
+_METHOD_COLOURS = (*CURVE_COLOURS, "#882255", "#999933", "#332288", "#7F7F7F", "#661100", "#44AA99")
 _METHOD_MARKERS = ("o", "s", "^", "D", "v", "P", "<", "p", ">", "h", "*")
-
-_SIZE = (7.6, 4.8)
 
 
 def work_precision(ds: xr.Dataset, error: str = "error_end") -> Figure:
@@ -50,7 +67,8 @@ def work_precision(ds: xr.Dataset, error: str = "error_end") -> Figure:
     Traceback (most recent call last):
     ringsweep.errors.InputError: ds: has no contender, cell, time_per_run, method: it is not error against run time
     """
-    figure = Figure(figsize=_SIZE, layout="constrained")
+    width = figure_width()
+    figure = Figure(figsize=(width, (1.15 if is_narrow(width) else 0.63) * width), layout="constrained")
     precision_panel(ds, error, figure.add_subplot())
     return figure
 
@@ -72,7 +90,7 @@ def precision_panel(ds: xr.Dataset, error: str = "error_end", ax: Axes | None = 
     error : str
         Variable to draw. NaN means that a cell has no such error.
     ax : matplotlib.axes.Axes, optional
-        Axes to draw in, by default pyplot's current ones. The legend stands beside them: a figure with
+        Axes to draw in, by default pyplot's current ones. The legend stands outside them: a figure with
         ``layout="constrained"`` makes room for it.
 
     Returns
@@ -115,23 +133,24 @@ def precision_panel(ds: xr.Dataset, error: str = "error_end", ax: Axes | None = 
     low, high = np.clip(median, floor, ceiling), np.clip(largest, floor, ceiling)
     wrong = (ds["regime_wrong"] == 1).any("cell").values if "regime_wrong" in ds else np.zeros(len(numbers), bool)
 
-    ax = axes_or_current(ax, _SIZE)
+    ax = axes_or_current(ax, 0.63)
+    small_ticks(ax)
     ax.set_xscale("log")
     ax.set_yscale("log")
-    ax.grid(True, color="#E6E6E6", linewidth=0.6)
+    ax.grid(True, color=on_page(GRID), linewidth=0.6)
     ax.set_axisbelow(True)
     curves: list[Artist] = []
     entries: list[Artist] = []
     if f"reference_{error}" in ds and (uncertainty := np.nanmedian(ds[f"reference_{error}"])) > 0.0:
-        ax.axhspan(0.0, uncertainty, color="#EEEEEE", linewidth=0)
-        entries.append(Patch(color="#EEEEEE", label="within the median\nuncertainty of the reference"))
+        ax.axhspan(0.0, uncertainty, color=on_page("#EEEEEE"), linewidth=0)
+        entries.append(Patch(color=on_page("#EEEEEE"), label="within the median\nuncertainty of the reference"))
     if target := ds.attrs.get("target"):
-        dashed: dict[str, Any] = {"color": "0.25", "linewidth": 1, "linestyle": (0, (5, 3))}
+        dashed: dict[str, Any] = {"color": on_page("0.25"), "linewidth": 1, "linestyle": (0, (5, 3))}
         ax.axhline(target, **dashed)
-        entries.append(Line2D([], [], **dashed, label=f"target, {target:g}"))
+        entries.append(Line2D([], [], **dashed, label=f"target, {number_text(target)}"))
     drawn = dict.fromkeys(methods[rows].tolist())
     # The attribute names the methods of all pictures that are compared, so a method looks the same in each of them.
-    numbered = list(dict.fromkeys([*ds.attrs.get("methods", ()), *drawn]))
+    numbered = list(dict.fromkeys([*_OWN, *ds.attrs.get("methods", ()), *drawn]))
     for method in drawn:
         own = rows[methods[rows] == method]
         style = _method_style(numbered.index(method))
@@ -147,39 +166,41 @@ def precision_panel(ds: xr.Dataset, error: str = "error_end", ax: Axes | None = 
         )
         curves += ax.plot(seconds[own], low[own], label=str(method), **style)
         hollow = own[wrong[own]]
-        ax.plot(seconds[hollow], low[hollow], **style | {"linestyle": "", "markerfacecolor": "white"})
+        ax.plot(seconds[hollow], low[hollow], **style | {"linestyle": "", "markerfacecolor": page_colour()})
     if wrong[rows].any():
-        circle: dict[str, Any] = {"color": "0.4", "linestyle": "", "marker": "o", "markerfacecolor": "white"}
+        circle: dict[str, Any] = {"color": on_page("0.4"), "linestyle": "", "marker": "o"}
+        circle["markerfacecolor"] = page_colour()
         entries.append(Line2D([], [], label="hollow: a regime\nis wrong in some cell", **circle))
     for height, where, arrow, meaning in (
         (0.6 * floor, median[rows] <= 0.0, "$\\downarrow$", "no error (at the floor)"),
         (1.7 * ceiling, np.isinf(median[rows]), "$\\uparrow$", "failed (at the ceiling)"),
     ):
         if where.any():
-            arrows: dict[str, Any] = {"color": "black", "marker": arrow, "linestyle": "", "markersize": 8}
+            arrows: dict[str, Any] = {"color": on_page("black"), "marker": arrow, "linestyle": "", "markersize": 8}
             ax.plot(seconds[rows[where]], np.full(where.sum(), height), **arrows)
             entries.append(Line2D([], [], label=meaning, **arrows))
     if "recommended" in ds.attrs and "solver" in ds.coords:
         (chosen,) = np.flatnonzero(ds["solver"].values == ds.attrs["recommended"])[:1]
-        circle = {"color": "black", "marker": "o", "markerfacecolor": "none", "linestyle": ""}
+        circle = {"color": on_page("black"), "marker": "o", "markerfacecolor": "none", "linestyle": ""}
         ax.plot(seconds[chosen], low[chosen], markersize=13, markeredgewidth=1.4, **circle)
         meaning = "recommended:\n" + str(ds.attrs["recommended"]).replace("method: ", "")
         entries.append(Line2D([], [], markersize=9, label=meaning, **circle))
     cells = ds.sizes["cell"]
     if cells > 1:
-        ax.set_title(f"points: median of {cells} cells; bars: up to the largest", fontsize=SMALL, loc="left")
-    ax.set_xlabel(axis_label(ds["time_per_run"], ds))
-    ax.set_ylabel(axis_label(ds[error], ds))
-    legend_beside(ax, [*curves, *entries], handlelength=3)
+        text = f"points: median of {cells} cells; bars: up to the largest"
+        ax.set_title(folded([text], width_of(ax)), fontsize=SMALL, loc="left")
+    # A target is given in rad, so errors of angles are too.
+    label_axes(ax, axis_label(ds["time_per_run"], ds), axis_label(ds[error], ds).replace("(°)", "(rad)"))
+    place_legend(ax, [*curves, *entries], handlelength=3)
     return ax
 
 
 def _method_style(number: int) -> dict[str, Any]:
     """Line and marker of a method; `number` counts from 0."""
     return {
-        "color": CURVE_COLOURS[number % len(CURVE_COLOURS)],
+        "color": on_page(_METHOD_COLOURS[number % len(_METHOD_COLOURS)]),
         "marker": _METHOD_MARKERS[number % len(_METHOD_MARKERS)],
         "markersize": 5.5,
-        "linestyle": CURVE_STYLES[number // len(CURVE_COLOURS) % len(CURVE_STYLES)],
+        "linestyle": CURVE_STYLES[number // len(_METHOD_COLOURS) % len(CURVE_STYLES)],
         "linewidth": 1.3,
     }

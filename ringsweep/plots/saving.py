@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import matplotlib
 from matplotlib.figure import Figure
 
 from ringsweep.errors import InputError
@@ -38,7 +39,8 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
     """
     suffix = suffix_of(path, SUFFIXES, "pictures")
     with replacing(path) as temporary:
-        figure.savefig(temporary, dpi=150, format=suffix[1:])
+        dots = matplotlib.rcParams["savefig.dpi"]
+        figure.savefig(temporary, dpi=150 if dots == "figure" else dots, format=suffix[1:])
 
 
 def suffix_of(path: str | os.PathLike[str], allowed: tuple[str, ...], what: str) -> str:

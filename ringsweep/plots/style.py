@@ -1,13 +1,22 @@
-"""Colours, line styles and legends that all pictures share."""
+"""Colours, line styles, sizes and legends that all pictures share, and the switch between looks of a picture."""
 
 from __future__ import annotations
 
-from typing import Any
+import math
+import re
+import textwrap
+from typing import Any, Literal
 
+import matplotlib
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.legend import Legend
+from matplotlib.transforms import ScaledTranslation
 from numpy.typing import NDArray
+
+from ringsweep.errors import InputError
 
 #: The colour of each regime in every picture. These are the colours of Okabe and Ito, which colour-blind readers tell
 #: apart. Their lightness is changed so that the regimes of one model differ in greyscale too.
@@ -45,8 +54,121 @@ STICK = "#E6E6E6"
 #: Surface of the ring outside the zones.
 REST = "#F2F2F2"
 
-#: Font size of legends and of titles above panels, points.
-SMALL = 8
+#: Lines behind curves.
+GRID = "#E6E6E6"
+
+#: Font size of ticks, legends and notes. Labels and titles have the size of the text.
+SMALL = "small"
+
+#: Width that ticks and label of the vertical axis take, inches.
+MARGIN = 0.7
+
+# Figures and cells of a grid of axes that are narrower have their legend below, not beside, inches.
+_NARROW = 4.6
+
+_NO_BREAK = "\N{NO-BREAK SPACE}"
+
+_DARK_PAGE, _LIGHT_INK = "#1E1E1E", "#E8E8E8"
+
+# Settings of matplotlib by style. A style resets the settings of all others to the defaults of matplotlib.
+_STYLES: dict[str, dict[str, Any]] = {
+    "light": {},
+    "print": {
+        "font.size": 8.0,
+        "axes.linewidth": 0.6,
+        **{f"{axis}tick.{kind}.width": 0.6 for axis in "xy" for kind in ("major", "minor")},
+        "savefig.dpi": 300.0,
+        # Letters stay letters: publishers refuse fonts of type 3.
+        "pdf.fonttype": 42,
+    },
+    "dark": {
+        **dict.fromkeys(("figure.facecolor", "axes.facecolor"), _DARK_PAGE),
+        **dict.fromkeys(
+            ("text.color", "axes.labelcolor", "axes.edgecolor", "axes.titlecolor", "xtick.color", "ytick.color"),
+            _LIGHT_INK,
+        ),
+    },
+    "transparent": dict.fromkeys(("figure.facecolor", "axes.facecolor"), "none"),
+}
+
+_angles: Literal["deg", "rad"] = "deg"
+
+
+def style(
+    name: Literal["light", "print", "dark", "transparent"] = "light",
+    *,
+    width: float | None = None,
+    angles: Literal["deg", "rad"] = "deg",
+) -> None:
+    """Choose the look of all pictures that are drawn from now on.
+
+    The look consists of settings of matplotlib (``matplotlib.rcParams``), so other figures get it too. Pictures follow
+    these settings, whoever makes them: the size of the text (``font.size``), the colours of page and text, and the
+    width of a figure (``figure.figsize``).
+
+    Parameters
+    ----------
+    name : {"light", "print", "dark", "transparent"}
+        ``"light"`` is the default look, with a white page. ``"print"`` has text of 8 points, thinner axes and 300 dots
+        per inch. ``"dark"`` has light text on a dark page. ``"transparent"`` has no page: what lies behind the picture
+        shows through.
+    width : float, optional
+        Width of a figure, mm, for example 85 or 170 for one or two columns of a journal; by default 162.56 mm, the 6.4
+        inches of matplotlib. In pictures of 85 mm all text can be read; small multiples need 170 mm.
+    angles : {"deg", "rad"}
+        Unit of angles. Angular velocities and accelerations are always in rad s⁻¹ and rad s⁻².
+
+    Raises
+    ------
+    InputError
+        If an argument is none of these.
+
+    Examples
+    --------
+    >>> style("print", width=85)
+    >>> style()
+    """
+    global _angles
+    if name not in _STYLES:
+        raise InputError("name", f"{name!r} is no style; choose from {', '.join(_STYLES)}")
+    if angles not in ("deg", "rad"):
+        raise InputError("angles", f"{angles!r} is neither 'deg' nor 'rad'")
+    if width is not None and not 20.0 <= width <= 2000.0:
+        raise InputError("width", f"{width!r} is not between 20 and 2000: a width in mm")
+    usual: Any = matplotlib.rcParamsDefault
+    settings = {key: usual[key] for chosen in _STYLES.values() for key in chosen}
+    ratio = usual["figure.figsize"][1] / usual["figure.figsize"][0]
+    inches = usual["figure.figsize"][0] if width is None else width / 25.4
+    matplotlib.rcParams.update(settings | _STYLES[name] | {"figure.figsize": (inches, ratio * inches)})
+    _angles = angles
+
+
+def angle_unit() -> tuple[float, str]:
+    """Size of the unit of angles, as a factor from radians, and its symbol."""
+    return (180.0 / math.pi, "°") if _angles == "deg" else (1.0, "rad")
+
+
+def figure_width() -> float:
+    """Width of a new figure, inches."""
+    return float(matplotlib.rcParams["figure.figsize"][0])
+
+
+def on_page(colour: Any) -> Any:
+    """A colour as it is drawn on the page: on a dark page greys are inverted, and other colours are lighter."""
+    ink, page = np.array(to_rgb(matplotlib.rcParams["text.color"])), np.array(to_rgb(page_colour()))
+    if page.mean() > ink.mean():
+        return colour
+    given = np.array(to_rgb(colour))
+    mixed = ink + given.mean() * (page - ink) if np.ptp(given) < 0.02 else 0.6 * given + 0.4
+    return tuple(map(float, mixed))
+
+
+def page_colour() -> Any:
+    """Colour of the page; of a transparent one, the colour on which its text can be read."""
+    for key in ("axes.facecolor", "figure.facecolor"):
+        if (colour := matplotlib.rcParams[key]) != "none":
+            return colour
+    return "white" if np.mean(to_rgb(matplotlib.rcParams["text.color"])) < 0.5 else "black"
 
 
 def arc_colour(number: int) -> str:
@@ -59,25 +181,140 @@ def arc_names(count: int) -> list[str]:
     return ["zone"] if count == 1 else [f"zone {k + 1}" for k in range(count)]
 
 
-def axes_or_current(ax: Axes | None, size: tuple[float, float]) -> Axes:
-    """`ax`, or pyplot's current axes if it is None. A new figure has the given size, inches."""
+def axes_or_current(ax: Axes | None, height: float) -> Axes:
+    """`ax`, or pyplot's current axes if it is None. A new figure has this height, as a multiple of its width."""
     if ax is not None:
         return ax
     # Importing pyplot chooses a backend, which may fail on a machine without a display.
     from matplotlib import pyplot
 
     if not pyplot.get_fignums():
-        pyplot.figure(figsize=size, layout="constrained")
+        pyplot.figure(figsize=(figure_width(), height * figure_width()), layout="constrained")
     return pyplot.gca()
 
 
-def legend_beside(ax: Axes, handles: list[Artist] | None = None, **options: Any) -> None:
-    """Put a legend to the right of the axes, where it hides no data; by default with all that has a label."""
-    style: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "fontsize": SMALL, "frameon": False}
-    if handles is None:
-        handles = list(ax.get_legend_handles_labels()[0])
+def width_of(ax: Axes) -> float:
+    """Width that the layout of the figure has for the axes with their labels and legend, inches."""
+    figure: Any = ax.figure
+    spec = ax.get_subplotspec()
+    share = len(spec.colspan) / spec.get_gridspec().ncols if spec else ax.get_position().width
+    return float(share * figure.bbox.width / figure.dpi)
+
+
+def height_of(ax: Axes) -> float:
+    """Height that the layout of the figure has for the axes with their labels, inches."""
+    figure: Any = ax.figure
+    spec = ax.get_subplotspec()
+    share = len(spec.rowspan) / spec.get_gridspec().nrows if spec else ax.get_position().height
+    return float(share * figure.bbox.height / figure.dpi)
+
+
+def is_narrow(inches: float) -> bool:
+    """Whether axes of this width have their legend below."""
+    return inches < _NARROW
+
+
+def label_axes(ax: Axes, x: str, y: str) -> None:
+    """Write the labels of both axes, in as many lines as their widths need."""
+    # Ticks and the label of the vertical axis take a part of the width.
+    ax.set_xlabel(folded([x], width_of(ax) - MARGIN))
+    ax.set_ylabel(folded([y], 0.75 * height_of(ax)))
+
+
+def letters(inches: float) -> int:
+    """Number of letters of the size of the text in a line."""
+    return max(12, int(72.0 * inches / (0.53 * matplotlib.rcParams["font.size"])))
+
+
+def folded(texts: list[str], inches: float) -> str:
+    """Texts separated by semicolons, in lines of at most this width; a unit in brackets stays in one line."""
+    lines = [""]
+    for text in filter(None, texts):
+        if lines[-1] and _length(lines[-1]) + _length(text) + 2 > letters(inches):
+            lines[-1] += ";"
+            lines.append("")
+        lines[-1] += ("; " if lines[-1] else "") + text
+    whole = (re.sub(r"\([^()]*\)$", lambda unit: unit[0].replace(" ", _NO_BREAK), line) for line in lines)
+    filled = (textwrap.fill(line, letters(inches) + len(line) - _length(line)) for line in whole)
+    return "\n".join(filled).replace(_NO_BREAK, " ")
+
+
+def _length(text: str) -> int:
+    """Number of letters as drawn: without the marks of an exponent."""
+    return len(text.replace("$", "").replace("^{", "").replace("}", ""))
+
+
+def place_legend(ax: Axes, handles: list[Artist], where: bool | str = True, **options: Any) -> None:
+    """Put a legend where it hides no data, or where the user wants it.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+        Axes with their labels.
+    handles : list of Artist
+        Entries; without any there is no legend.
+    where : bool or str
+        ``"beside"`` (to the right of the axes), ``"below"``, or a location of matplotlib within the axes. True chooses
+        between the first two by the width that there is; False draws no legend.
+    **options
+        Further options of a legend beside the axes.
+
+    Raises
+    ------
+    InputError
+        If `where` is none of these.
+    """
+    if where is False or not handles:
+        return
+    if where is True:
+        where = "below" if is_narrow(width_of(ax)) else "beside"
+    common: dict[str, Any] = {"handles": handles, "fontsize": SMALL, "frameon": False}
+    common |= {name: value for name, value in options.items() if name.startswith("handle")}
+    if where == "beside":
+        ax.legend(**common | {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)} | options)
+    elif where == "below":
+        size, lines = matplotlib.rcParams["font.size"], 1 + ax.get_xlabel().count("\n")
+        figure: Any = ax.figure
+        # Below ticks, their labels, and the label of the axis.
+        below = ScaledTranslation(0.0, -(8.0 + (1.0 + 1.25 * lines) * size) / 72.0, figure.dpi_scale_trans)
+        columns = columns_of(handles, width_of(ax))
+        at: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "columnspacing": 1.2}
+        ax.legend(**common, **at, bbox_transform=ax.transAxes + below, ncols=columns)
+    elif where in Legend.codes:
+        ax.legend(**common | {"frameon": True, "loc": where})
+    else:
+        allowed = ", ".join(["beside", "below", *Legend.codes])
+        raise InputError("legend", f"{where!r} is no place of a legend; choose True, False, or one of {allowed}")
+
+
+def columns_of(handles: list[Artist], inches: float) -> int:
+    """Columns of a legend of this width; its labels are then in one line."""
+    for handle in handles:
+        handle.set_label(str(handle.get_label()).replace("\n", " "))
+    longest = max(_length(str(handle.get_label())) for handle in handles)
+    # Letters of a legend are smaller than those of the text.
+    return max(1, min(len(handles), int(1.2 * letters(inches)) // (longest + 6)))
+
+
+def legend_width(handles: list[Artist]) -> float:
+    """Width of a legend of one column, inches."""
+    longest = max((_length(line) for handle in handles for line in str(handle.get_label()).split("\n")), default=-8)
+    return 10.0 * (longest + 8) / letters(10.0) / 1.2
+
+
+def legend_above(ax: Axes, handles: list[Artist] | None = None) -> None:
+    """Put a legend in one line above the axes, to the right; by default with all that has a label."""
+    handles = list(ax.get_legend_handles_labels()[0]) if handles is None else handles
     if handles:
-        ax.legend(handles=handles, **style | options)
+        style: dict[str, Any] = {"fontsize": SMALL, "frameon": False, "ncols": len(handles), "columnspacing": 1.2}
+        style |= {"borderaxespad": 0.1, "borderpad": 0.1, "handlelength": 1.8}
+        ax.legend(handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), **style)
+
+
+def small_ticks(*axes: Axes) -> None:
+    """Give the labels of ticks the size of legends and notes."""
+    for ax in axes:
+        ax.tick_params(labelsize=SMALL, which="both")
 
 
 def true_ranges(mask: NDArray[Any]) -> NDArray[np.intp]:

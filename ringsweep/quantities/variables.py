@@ -219,7 +219,8 @@ def words(data: xr.DataArray) -> xr.DataArray:
     Returns
     -------
     xarray.DataArray
-        Text of the same shape; empty where a value is none of the flags.
+        Text of the same shape; empty where a value is none of the flags. It has no attributes: xarray would hand the
+        ``long_name`` on to a comparison such as ``words(ds.regime) == "separating"``, which is no regime.
 
     Raises
     ------
@@ -242,5 +243,5 @@ def words(data: xr.DataArray) -> xr.DataArray:
     for value, meaning in meanings.items():
         text[data.values == value] = meaning
     found = data.copy(data=text)
-    found.attrs = {name: value for name, value in data.attrs.items() if not name.startswith("flag_")}
+    found.attrs = {}
     return found
