@@ -199,7 +199,8 @@ class _Film:
         now = float(self.states["time"][k])
         for cover in self.futures:
             cover.set_x(now)
-            cover.set_width(self.until - now)
+            # At the end nothing of the future is left to cover.
+            cover.set_width(self.until - now if k + 1 < len(self.states["time"]) else 0.0)
         return self.figure.moving
 
     def animation(self) -> FuncAnimation:

@@ -66,6 +66,9 @@ MARGIN = 0.7
 # Figures and cells of a grid of axes that are narrower have their legend below, not beside, inches.
 _NARROW = 4.6
 
+# Letters of a legend in the room of a letter of the text.
+_LETTERS = 1.2
+
 _NO_BREAK = "\N{NO-BREAK SPACE}"
 
 _DARK_PAGE, _LIGHT_INK = "#1E1E1E", "#E8E8E8"
@@ -292,14 +295,16 @@ def columns_of(handles: list[Artist], inches: float) -> int:
     for handle in handles:
         handle.set_label(str(handle.get_label()).replace("\n", " "))
     longest = max(_length(str(handle.get_label())) for handle in handles)
-    # Letters of a legend are smaller than those of the text.
-    return max(1, min(len(handles), int(1.2 * letters(inches)) // (longest + 6)))
+    return max(1, min(len(handles), int(_LETTERS * letters(inches)) // (longest + 6)))
 
 
 def legend_width(handles: list[Artist]) -> float:
     """Width of a legend of one column, inches."""
-    longest = max((_length(line) for handle in handles for line in str(handle.get_label()).split("\n")), default=-8)
-    return 10.0 * (longest + 8) / letters(10.0) / 1.2
+    if not handles:
+        return 0.0
+    longest = max(_length(line) for handle in handles for line in str(handle.get_label()).split("\n"))
+    # A handle with its margins is as wide as eight letters.
+    return 10.0 * (longest + 8) / letters(10.0) / _LETTERS
 
 
 def legend_above(ax: Axes, handles: list[Artist] | None = None) -> None:
