@@ -114,8 +114,9 @@ def test_errors_of_python_are_not_taken_for_those_of_numba():
 
 class TestCacheOnDisk:
     @pytest.fixture
-    def folder(self, tmp_path, monkeypatch):
+    def folder(self, tmp_path, monkeypatch, caplog):
         """An empty cache, and a process that has told nothing of its cache yet."""
+        caplog.set_level("INFO", logger="ringsweep")
         monkeypatch.setattr(caching.config, "CACHE_DIR", str(tmp_path))
         for told in (cache._announce_compilation, cache._announce_damage, numba_private._warn_of_no_cache):
             told.cache_clear()

@@ -21,6 +21,7 @@ from pathlib import Path
 
 from benchmarks._common import machine, markdown
 from benchmarks.hostile.attack import Report
+from benchmarks.hostile.configurations import configurations
 from benchmarks.hostile.faults import faults
 from benchmarks.hostile.files import damaged_files
 from benchmarks.hostile.kills import kills
@@ -40,6 +41,7 @@ class Part:
 
 #: To add a part, add a line.
 PARTS = {
+    "configurations": Part(configurations, 10_000, 20),
     "files": Part(damaged_files, 1000, 4),
     "faults": Part(faults, 100_000, 4),
     "writers": Part(writers, 100, 1),

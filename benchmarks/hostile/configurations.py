@@ -1,7 +1,6 @@
 """Random configurations by grammar: each is refused in one line that names the place, or runs to finite numbers.
 
-    python -m benchmarks.hostile_configurations                  # 10 000 configurations
-    python -m benchmarks.hostile_configurations --count 100 --seed 7
+    python -m benchmarks.hostile configurations
 
 A configuration begins as one that runs, with one to four cells. Then up to three mutations change values, units, types,
 names, formulas, tables, axes, refinement and solver, or its text. The command line runs it in this process. What must
@@ -11,7 +10,6 @@ names a path or a line; numbers of runs that did not fail are finite; nothing is
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import copy
 import io
@@ -19,13 +17,9 @@ import logging
 import math
 import random
 import re
-import sys
-import tempfile
 import time
 import warnings
-from collections import Counter
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -33,9 +27,7 @@ import numpy as np
 import xarray as xr
 import yaml
 
-from benchmarks._common import machine, markdown
-
-SEED = 20241121
+from benchmarks.hostile.attack import Report
 
 _BELT: dict[str, Any] = {
     "model": "belt",
@@ -215,14 +207,6 @@ _MAY_BE_MISSING = {
 }
 
 
-@dataclass
-class Report:
-    """What an attack found: how often each outcome came, and what did not hold, with its seed and number."""
-
-    counts: Counter[str] = field(default_factory=Counter)
-    broken: list[str] = field(default_factory=list)
-
-
 def random_configuration(draw: random.Random, kinds: Collection[str]) -> str:
     """Text of a configuration: one that runs, with up to three mutations."""
     scene, swept = copy.deepcopy(KINDS[draw.choice(list(kinds))])
@@ -376,10 +360,9 @@ def configurations(folder: Path, count: int, seed: int, kinds: Collection[str] =
         outcome = f"{verb}: exit status {status}"
         if verb == "run" and status == 0 and not problems:
             outcome = "run: some cells failed" if _failed(target) else "run: all cells have a regime"
-        report.counts[outcome if not problems else "BROKEN"] += 1
-        if problems:
-            report.broken.append(f"configurations, seed {seed}, number {number}: {'; '.join(problems)}")
-            print("BROKEN:", report.broken[-1], flush=True)
+        problem = problems and f"configurations, seed {seed}, number {number}: {'; '.join(problems)}"
+        report.add(outcome, problem or "")
+        if problem:
             (folder.parent / f"hostile-{seed}-{number}.yaml").write_bytes(config.read_bytes())
         for path in folder.iterdir():
             path.unlink()
@@ -463,23 +446,3 @@ def _failed(target: Path) -> bool:
 def _flag(variable: xr.DataArray, meaning: str) -> int:
     meanings = str(variable.attrs["flag_meanings"]).split()
     return int(np.atleast_1d(variable.attrs["flag_values"])[meanings.index(meaning)])
-
-
-def main() -> int:
-    """Run random configurations and print a table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--count", type=int, default=10_000)
-    parser.add_argument("--seed", type=int, default=SEED)
-    arguments = parser.parse_args()
-    with tempfile.TemporaryDirectory(prefix="hostile-") as name:
-        folder = Path(name) / "configurations"
-        folder.mkdir()
-        report = configurations(folder, arguments.count, arguments.seed)
-    print(f"{machine()}\nseed {arguments.seed}\n")
-    print(markdown(["outcome", "times"], [[outcome, str(times)] for outcome, times in sorted(report.counts.items())]))
-    print("\n".join(["what did not hold:", *report.broken]) if report.broken else "everything held")
-    return 1 if report.broken else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
