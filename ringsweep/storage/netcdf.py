@@ -15,6 +15,7 @@ import netCDF4
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from xarray.backends import NetCDF4DataStore
 
 from ringsweep.errors import InputError
 from ringsweep.quantities import digest
@@ -52,8 +53,8 @@ def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
         If writing fails, or the file differs from the dataset when it is read back.
     """
     with replacing(path) as temporary, _naming_the_cause(Path(path)):
-        _to_netcdf(ds, temporary)
-        with _appending(temporary) as file:
+        with _created(temporary) as file:
+            _add(ds, file)
             _record_digests(file, ds)
         _read_back(temporary)
 
@@ -94,8 +95,9 @@ def write(
     temporary = folder.temporary()
     try:
         with _naming_the_cause(target):
-            _to_netcdf(frame, temporary)
-            _write_chunks(temporary, frame, variables, layout, chunks, gaps)
+            with _created(temporary) as file:
+                _add(frame, file)
+                _write_chunks(file, frame, variables, layout, chunks, gaps)
             _read_back(temporary)
             put_in_place(temporary, target)
     finally:
@@ -113,15 +115,15 @@ def _naming_the_cause(target: Path) -> Iterator[None]:
 
 
 @contextmanager
-def _appending(path: Path) -> Iterator[Any]:
-    file = netCDF4.Dataset(path, "a")
+def _created(path: Path) -> Iterator[Any]:
+    file = netCDF4.Dataset(path, "w")
     try:
         yield file
     finally:
         try:
             file.close()
         except BaseException:
-            # The library has freed the file although closing failed. To close it once more would end this process.
+            # The library has freed the file although closing failed. To close it once more would crash this process.
             file._isopen = 0
             raise
 
@@ -131,17 +133,18 @@ def _read_back(path: Path) -> None:
         raise OSError("the file does not read back as it was written")
 
 
-def _to_netcdf(ds: xr.Dataset, path: Path) -> None:
+def _add(ds: xr.Dataset, file: Any) -> None:
+    """Write a dataset into an open file, which xarray must not close."""
     ds = ds.drop_encoding()
     ds.attrs = _storable(ds.attrs)
     for variable in ds.variables.values():
         variable.attrs = _storable(variable.attrs)
     encoding = {name: _encoding(variable) for name, variable in ds.variables.items()}
-    ds.to_netcdf(path, format="NETCDF4", engine="netcdf4", encoding=encoding)
+    ds.dump_to_store(NetCDF4DataStore(file), encoding=encoding)
 
 
 def _write_chunks(
-    path: Path,
+    file: Any,
     frame: xr.Dataset,
     variables: Mapping[str, Variable],
     layout: Layout,
@@ -152,20 +155,19 @@ def _write_chunks(
     dims = tuple(map(str, frame.sizes))
     others = " ".join(str(name) for name in frame.coords if name not in dims)
     digests: dict[str, Any] = {}
-    with _appending(path) as file:
-        for region, columns in chunks:
-            for name, column in columns.items():
-                if name not in digests:
-                    fill = MISSING if name in gaps else False
-                    variable = file.createVariable(name, column.dtype, dims, fill_value=fill, **_chunked(layout))
-                    variable.set_auto_maskandscale(False)
-                    _cache_one_chunk(variable)
-                    described = variables[name].attributes | error_attribute(name, columns)
-                    variable.setncatts(described | ({"coordinates": others} if others else {}))
-                    digests[name] = digest.of_variable(variable)
-                file[name][region] = column
-                digest.add(digests[name], column)
-        _record_digests(file, frame, digests, layout)
+    for region, columns in chunks:
+        for name, column in columns.items():
+            if name not in digests:
+                fill = MISSING if name in gaps else False
+                variable = file.createVariable(name, column.dtype, dims, fill_value=fill, **_chunked(layout))
+                variable.set_auto_maskandscale(False)
+                _cache_one_chunk(variable)
+                described = variables[name].attributes | error_attribute(name, columns)
+                variable.setncatts(described | ({"coordinates": others} if others else {}))
+                digests[name] = digest.of_variable(variable)
+            file[name][region] = column
+            digest.add(digests[name], column)
+    _record_digests(file, frame, digests, layout)
 
 
 def _record_digests(
