@@ -40,9 +40,15 @@ def build_parser() -> argparse.ArgumentParser:
     init = _add_command(commands, "init", init_command, "write a first configuration, to be edited", """
         ringsweep init                     my-sweep.yaml: two balls in a ring
         ringsweep init --model belt belt.yaml
+        ringsweep init --model ring-single-contact
         """)  # fmt: skip
     init.add_argument("config", nargs="?", default="my-sweep.yaml", metavar="NEW.yaml", help="default: my-sweep.yaml")
-    init.add_argument("--model", choices=["ring", "belt"], default="ring", help="what it describes (default: ring)")
+    init.add_argument(
+        "--model",
+        choices=["ring", "ring-single-contact", "belt"],
+        default="ring",
+        help="what it describes (default: ring)",
+    )
 
     run = _add_command(commands, "run", run_command, "run a sweep: NetCDF, and a regime map beside it", """
         ringsweep run my.yaml              my.nc and my.png; after a stop the same command goes on
@@ -161,8 +167,9 @@ def build_parser() -> argparse.ArgumentParser:
     completion = _add_command(commands, "completion", completion_command, "print a completion script for a shell", """
         ringsweep completion bash > ~/.local/share/bash-completion/completions/ringsweep
         ringsweep completion zsh > ~/.zfunc/_ringsweep
+        ringsweep completion fish > ~/.config/fish/completions/ringsweep.fish
         """)  # fmt: skip
-    completion.add_argument("shell", choices=["bash", "zsh", "tcsh"])
+    completion.add_argument("shell", choices=["bash", "zsh", "fish", "tcsh"])
     return parser
 
 
