@@ -234,7 +234,7 @@ def animate_command(arguments: argparse.Namespace) -> None:
 
     check_animation(target)
     result = history(config)
-    plots.save_animation(result, target)
+    plots.save_animation(result, target, progress=not arguments.quiet)
     print(result.attrs["outcome"])
     print(f"wrote {target}")
 
