@@ -77,11 +77,12 @@ def build_parser() -> argparse.ArgumentParser:
         ringsweep map my.nc                my.png: the regimes
         ringsweep map my.nc --var t_separation --x zone.half_angle
         ringsweep map my.nc --sel "zone.half_angle=15 deg" -o line.pdf
+        ringsweep map my.nc -o my.html     a page for the browser: zoom, numbers of each cell, all variables
         ringsweep map my.nc --var origin   which cells of a refined sweep were run
         ringsweep map my.nc --boundaries separating --tolerance 1e-6
         """)  # fmt: skip
     draw.add_argument("dataset", metavar="OUT.nc")
-    draw.add_argument("-o", "--output", metavar="MAP.png", help="default: beside OUT.nc; .pdf and .svg too")
+    draw.add_argument("-o", "--output", metavar="MAP.png", help="default: beside OUT.nc; .pdf, .svg and .html too")
     draw.add_argument("--x", metavar="DIM", help="coordinate across")
     draw.add_argument("--y", metavar="DIM", help="coordinate up")
     draw.add_argument("--var", default="regime", metavar="V", help="variable to draw (default: regime)")
