@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.plots.datasets import is_numeric, require_sweep, resolve, swept
-from ringsweep.plots.labels import axis_label, long_name, value_text
+from ringsweep.plots.labels import axis_label, long_name, plain_text, value_text
 from ringsweep.plots.map_axes import Axis, choose_axes, is_scattered, thinned
 from ringsweep.plots.map_colours import ColourScale
 from ringsweep.plots.maps import audit_texts
@@ -38,8 +37,6 @@ _DIGITS, _BOUND_DIGITS = 15, 8
 
 # The script sees to the rest of a dark page.
 _DARK = "@media (prefers-color-scheme: dark) { .bk-input { background-color: #303030; color: #e0e0e0 } }"
-
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def save_page(
@@ -201,7 +198,7 @@ class _Sweep:
         points = template[dict.fromkeys(others, 0)]
         return cls(
             str(ds.attrs.get("title", "ringsweep")),
-            [_plain(note) for note in notes],
+            [plain_text(note) for note in notes],
             var,
             horizontal,
             vertical,
@@ -228,7 +225,7 @@ def _column(data: xr.DataArray, ds: xr.Dataset) -> tuple[NDArray[Any], dict[str,
     error = f"{data.name}_error"
     about: dict[str, Any] = {
         "title": long_name(data),
-        "label": _plain(axis_label(data, ds)),
+        "label": plain_text(axis_label(data, ds)),
         "words": None,
         "error": error if error in ds else None,
         "logarithmic": isinstance(scale.norm, LogNorm),
@@ -265,7 +262,7 @@ def _coordinate(coordinate: xr.DataArray, template: xr.DataArray) -> dict[str, A
     sizes = list(template.sizes.values())
     strides = dict(zip(template.dims, np.cumprod([1, *sizes[:0:-1]])[::-1].tolist(), strict=True))
     return {
-        "texts": [_plain(value_text(coordinate[index])) for index in np.ndindex(coordinate.shape)],
+        "texts": [plain_text(value_text(coordinate[index])) for index in np.ndindex(coordinate.shape)],
         "along": [[strides[dim], size] for dim, size in coordinate.sizes.items()],
     }
 
@@ -273,12 +270,7 @@ def _coordinate(coordinate: xr.DataArray, template: xr.DataArray) -> dict[str, A
 def _slice_text(ds: xr.Dataset, dim: str, k: int) -> str:
     """Values at a place along a dimension."""
     along = [coordinate for coordinate in ds.coords.values() if coordinate.dims == (dim,)]
-    return ", ".join(_plain(value_text(coordinate[k])) for coordinate in along) or f"{dim} {k}"
-
-
-def _plain(text: str) -> str:
-    """Text with powers as characters, in place of those of matplotlib."""
-    return re.sub(r"\$\^\{(.*?)\}\$", lambda power: power[1].translate(_SUPERSCRIPTS), text)
+    return ", ".join(plain_text(value_text(coordinate[k])) for coordinate in along) or f"{dim} {k}"
 
 
 def _document(sweep: _Sweep) -> Any:
@@ -309,8 +301,8 @@ def _document(sweep: _Sweep) -> Any:
     plot = figure(
         x_axis_type=horizontal.scale,
         y_axis_type=vertical.scale if vertical else "linear",
-        x_axis_label=_plain(horizontal.label),
-        y_axis_label=_plain(vertical.label) if vertical else "",
+        x_axis_label=plain_text(horizontal.label),
+        y_axis_label=plain_text(vertical.label) if vertical else "",
         tools="pan,wheel_zoom,box_zoom,reset,save",
         active_scroll="wheel_zoom",
         sizing_mode="stretch_both",
