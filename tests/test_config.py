@@ -439,6 +439,16 @@ def test_wrong_setting_is_refused(write, setting, problem):
     assert problem in str(refusal(with_values, write(TEXT), [setting]))
 
 
+@pytest.mark.parametrize(("radius", "count"), [("43.378 mm", 0), (1.0, 0), (43.378, 1)])
+def test_lengths_that_differ_by_more_than_a_factor_of_a_thousand_give_one_warning(caplog, radius, count):
+    for _ in range(2):
+        load({"scene": SCENE | {"ring": {"radius": radius}}})
+    found = [record.getMessage() for record in caplog.records]
+    assert len(found) == count
+    for text in found:
+        assert "scene.ring.radius is 43.378 m and scene.body.ball_radius is 0.01 m: is a unit missing?" in text
+
+
 def test_each_unused_parameter_of_another_law_gives_one_warning(caplog):
     scenes.warn_of_unused.cache_clear()
     with caplog.at_level(logging.WARNING, logger="ringsweep"):
