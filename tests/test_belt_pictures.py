@@ -241,8 +241,10 @@ class TestFilm:
         monkeypatch.setattr("ringsweep.runs.simulate.history", lambda config: run)
         save = plots.save_animation
         monkeypatch.setattr(
-            "ringsweep.plots.save_animation", lambda ds, path: save(ds, path, fps=5, duration=0.6), raising=False
+            "ringsweep.plots.save_animation",
+            lambda ds, path, **given: save(ds, path, fps=5, duration=0.6, **given),
+            raising=False,
         )
         assert main(["init", "--model", "belt", "belt.yaml"]) == 0
         assert main(["animate", "belt.yaml", "-o", "run.html"]) == 0
-        assert "<img" in (tmp_path / "run.html").read_text()
+        assert "<canvas" in (tmp_path / "run.html").read_text()

@@ -80,6 +80,13 @@ class TestBoundary:
         assert (found.error > 1e-4).all()
         assert "not certified" in caplog.text
 
+    def test_axis_along_which_two_numbers_vary_is_refused(self, ds):
+        """A run halfway between two cells would have the one number from there, and the other from a cell."""
+        dim = str(ds["regime"].dims[0])
+        both = ds.assign_coords(another=(dim, ds[dim].values, {"path": "gravity", "units": "m s-2"}))
+        with pytest.raises(InputError, match=f"another varies along {dim}"):
+            ringsweep.boundary(both, "separating", 1e-3)
+
     @pytest.mark.parametrize(
         ("change", "problem"),
         [

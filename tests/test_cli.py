@@ -241,7 +241,7 @@ def test_every_configuration_in_configs_names_the_schema_on_its_first_line(path)
     assert (path.parent / first.removeprefix("# yaml-language-server: $schema=")).resolve() == CONFIGS / "schema.json"
 
 
-@pytest.mark.parametrize("model", ["ring", "belt"])
+@pytest.mark.parametrize("model", MODELS)
 def test_init_writes_a_valid_configuration_and_replaces_no_file(folder, capsys, model):
     assert main(["init", "--model", model]) == 0
     config = load("my-sweep.yaml")
@@ -270,7 +270,7 @@ def test_examples_in_the_help_of_every_command_parse(capsys):
             build_parser().parse_args(words)
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "tcsh"])
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish", "tcsh"])
 def test_completion_script_knows_the_commands(capsys, shell):
     assert main(["completion", shell]) == 0
     printed = capsys.readouterr().out

@@ -439,6 +439,16 @@ def test_wrong_setting_is_refused(write, setting, problem):
     assert problem in str(refusal(with_values, write(TEXT), [setting]))
 
 
+@pytest.mark.parametrize(("radius", "count"), [("43.378 mm", 0), (1.0, 0), (43.378, 1)])
+def test_lengths_that_differ_by_more_than_a_factor_of_a_thousand_give_one_warning(caplog, radius, count):
+    for _ in range(2):
+        load({"scene": SCENE | {"ring": {"radius": radius}}})
+    found = [record.getMessage() for record in caplog.records]
+    assert len(found) == count
+    for text in found:
+        assert "scene.ring.radius is 43.378 m and scene.body.ball_radius is 0.01 m: is a unit missing?" in text
+
+
 def test_each_unused_parameter_of_another_law_gives_one_warning(caplog):
     scenes.warn_of_unused.cache_clear()
     with caplog.at_level(logging.WARNING, logger="ringsweep"):
@@ -569,6 +579,24 @@ def test_error_in_a_csv_file_of_points_names_its_line(write):
     config = write(TEXT.split("  grid:")[0] + "  points: cells.csv\n")
     error = refusal(load, config)
     assert (error.file, error.line, error.path) == (str(file), 3, "sweep.points.ring.radius.1")
+
+
+def test_paths_with_commas_between_them_vary_together_along_the_dimension_of_the_first():
+    arcs = [{"center": centre, "half_angle": "10 deg", "mu_s": 0.5, "mu_k": 0.3} for centre in (0.0, 3.0)]
+    scene = {name: part for name, part in SCENE.items() if name != "zone"} | {"zones": arcs}
+    scene["friction"] = {name: value for name, value in SCENE["friction"].items() if name != "rough"}
+    grid = {"zones.0.half_angle, zones.1.half_angle": ["10 deg", "20 deg"], "drive.amplitude": [1.0, 2.0, 3.0]}
+    config = load({"scene": scene, "sweep": {"grid": grid}})
+    assert config.axes.sizes == {"zones_0_half_angle": 2, "drive_amplitude": 3}
+    for k in range(2):
+        dims, values = config.axes.columns[f"zones.{k}.half_angle"]
+        assert dims == ("zones_0_half_angle",)
+        np.testing.assert_allclose(values, np.radians([10.0, 20.0]))
+    Draft202012Validator(schema()).validate(config.source)
+    wrong = {"zones.0.half_angle, zones.0.half_angle": [0.1]}
+    assert "one place only" in refusal(load, {"scene": scene, "sweep": {"grid": wrong}}).problem
+    unknown = {"zones.0.half_angle, zones.2.half_angle": [0.1]}
+    assert "no such number" in refusal(load, {"scene": scene, "sweep": {"grid": unknown}}).problem
 
 
 def test_path_in_both_grid_and_points_is_refused(write):

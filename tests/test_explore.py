@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.backend_bases import MouseEvent
+from matplotlib.backend_bases import KeyEvent, MouseEvent
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import ringsweep
@@ -50,6 +50,11 @@ def click(figure, x, y, button=1, ax=None):
     ax = ax or figure.axes[0]
     at = ax.transData.transform((x, y))
     figure.canvas.callbacks.process("button_press_event", MouseEvent("button_press_event", figure.canvas, *at, button))
+
+
+def press(figure, *keys):
+    for key in keys:
+        figure.canvas.callbacks.process("key_press_event", KeyEvent("key_press_event", figure.canvas, key))
 
 
 class TestCell:
@@ -169,3 +174,42 @@ class TestExplore:
         figure = plots.explore(mapped(scene, {"drive.amplitude": [0.5, 2.0, 8.0]}))
         click(figure, 8.0, 0.5)
         assert asked[1]["drive.amplitude"] == 8.0
+
+    def test_arrow_keys_move_to_the_next_cell_and_stop_at_the_end(self, maps, asked):
+        figure = plots.explore(maps, at={"drive.amplitude": 2.0, "zone.half_angle": "20 deg"})
+        press(figure, "right", "right", "up", "down", "down", "down", "left", "escape")
+        angles = [round(np.degrees(values["zone.half_angle"])) for values in asked]
+        assert [values["drive.amplitude"] for values in asked] == [2.0, 8.0, 8.0, 8.0, 8.0, 2.0]
+        assert angles == [20, 20, 40, 20, 10, 10]
+        np.testing.assert_allclose(figure.axes[0].lines[-1].get_xydata()[0], [2.0, 10.0])
+
+    def test_arrow_keys_among_points_move_to_the_next_value(self, scene, asked):
+        axes = {"drive.amplitude": [0.5, 2.0, 8.0, 8.0], "initial.omega": [3.0, 1.0, 2.0, 0.0]}
+        figure = plots.explore(mapped(scene, axes, points=True), at={"drive.amplitude": 2.0})
+        press(figure, "up", "right", "left", "left", "left", "left")
+        found = [(values["drive.amplitude"], values["initial.omega"]) for values in asked]
+        assert found == [(2.0, 1.0), (8.0, 2.0), (8.0, 0.0), (2.0, 1.0), (0.5, 3.0)]
+
+    def test_pointer_tells_coordinates_regime_certificate_and_error(self, maps, asked):
+        shape = dict(maps.sizes)
+        maps["certified"] = (
+            tuple(shape),
+            np.ones(tuple(shape.values()), dtype="int8"),
+            OUTCOMES["certified"].attributes,
+        )
+        for name, value in (("phi_max", 1.25), ("phi_max_error", 2e-9)):
+            maps[name] = (tuple(shape), np.full(tuple(shape.values()), value), OUTCOMES[name].attributes)
+        told = plots.explore(maps).axes[0].format_coord(2.0, 20.0)
+        place = "amplitude of the ring's angular velocity = 2 rad s⁻¹, half-angle of the rough zone = 20°"
+        assert told == f"{place}, revolving, certified"
+        told = plots.explore(maps, var="phi_max").axes[0].format_coord(2.0, 20.0)
+        assert told.endswith(
+            "revolving, greatest angle of the body (rad): 1.25, error at most 2e\N{MINUS SIGN}09, certified"
+        )
+
+    def test_map_and_history_stand_side_by_side(self, maps, asked):
+        figure = plots.explore(maps)
+        FigureCanvasAgg(figure).draw()
+        left, right = (subfigure.bbox.extents for subfigure in figure.subfigs)
+        assert left[2] <= right[0]
+        assert figure.get_figwidth() * figure.dpi < 1000

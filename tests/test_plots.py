@@ -364,6 +364,16 @@ def test_quantities_that_vary_together_make_one_map_axis():
     np.testing.assert_array_equal(mesh(plots.regime_map(together)).get_array(), ds["regime"].transpose())
 
 
+def test_path_that_gives_its_name_to_a_dimension_is_the_axis():
+    ds = make_sweep((12, 9))
+    ds["zone_half_angle"].attrs["path"] = "zone.half_angle"
+    ds = ds.assign_coords(another=("zone_half_angle", ds["zone_half_angle"].values, {**ANGLE, "path": "another"}))
+    assert "half-angle" in plots.regime_map(ds).axes[0].get_ylabel()
+    assert (
+        plots.regime_map(ds.isel(drive_amplitude=0)).axes[0].get_xlabel() == plots.regime_map(ds).axes[0].get_ylabel()
+    )
+
+
 def test_map_axis_may_consist_of_friction_laws():
     ds = make_sweep((3, 4)).assign_coords(drive_amplitude=["stiction", "coulomb", "dahl"])
     figure = plots.regime_map(ds)

@@ -1,5 +1,6 @@
 """Polar view, phase portrait and animation show positions and forces of the run."""
 
+import base64
 import io
 import json
 import os
@@ -407,10 +408,32 @@ class TestAnimation:
     def test_animation_is_written_as_a_page_that_needs_no_other_file(self, run, tmp_path):
         plots.save_animation(run, tmp_path / "run.HTML", fps=10, duration=0.3)
         page = (tmp_path / "run.HTML").read_text(encoding="utf-8")
-        frames = json.loads(page.partition("const frames = ")[2].partition(";\n")[0])
+        frames = frames_of(page)
         assert len(frames) == 3
-        assert "http" not in page.replace("".join(frames), "")
+        assert "http" not in page.replace("".join(picture for picture, *_ in frames), "")
         assert os.listdir(tmp_path) == ["run.HTML"]
+
+    def test_frames_of_a_page_hold_what_changes_and_make_the_whole_picture(self, run, tmp_path, monkeypatch):
+        monkeypatch.setattr(films, "_WHOLE", 5)
+        written = []
+        finish = films._HtmlWriter.finish
+        monkeypatch.setattr(films._HtmlWriter, "finish", lambda self: written.extend(self.frames) or finish(self))
+        plots.save_animation(run, tmp_path / "run.html", fps=25, duration=0.3)
+        frames = frames_of((tmp_path / "run.html").read_text(encoding="utf-8"))
+        canvas = Image.new("RGBA", written[0].size)
+        for frame, (picture, left, top) in zip(written, frames, strict=True):
+            part = Image.open(io.BytesIO(base64.b64decode(picture))).convert("RGBA")
+            canvas.alpha_composite(part, (left, top))
+            assert canvas.convert("RGB").tobytes() == frame.convert("RGB").tobytes()
+        sizes = [len(picture) for picture, *_ in frames]
+        assert max(sizes[1:5]) < 0.4 * sizes[0]
+        assert sizes[5] > 0.9 * sizes[0]
+
+    def test_film_of_a_page_has_three_megabytes_at_most(self, run, tmp_path):
+        """Of a film of ten seconds, two seconds may take a fifth."""
+        fifth = run.sel(time=slice(0.0, 0.2 * float(run["time"][-1])))
+        plots.save_animation(fifth, tmp_path / "run.html", duration=2.0)
+        assert (tmp_path / "run.html").stat().st_size < 6e5
 
     @pytest.mark.skipif(not FFMpegWriter.isAvailable(), reason="ffmpeg is not installed")
     def test_animation_is_written_as_mp4(self, run, tmp_path):
@@ -445,6 +468,10 @@ class TestAnimation:
         assert os.listdir(tmp_path) == ["run.gif"]
 
 
+def frames_of(page):
+    return json.loads(page.partition("const frames = ")[2].partition(";\n")[0])
+
+
 def pixels(figure):
     buffer = io.BytesIO()
     figure.savefig(buffer, format="rgba", dpi=100)
@@ -461,12 +488,14 @@ class TestCommand:
     def test_animate_names_the_file_after_the_configuration(self, run, folder, monkeypatch, capsys):
         asked = []
         monkeypatch.setattr("ringsweep.runs.simulate.history", lambda config: asked.append(config) or run)
-        monkeypatch.setattr("ringsweep.plots.save_animation", lambda ds, path: asked.append((ds, path)), raising=False)
+        monkeypatch.setattr(
+            "ringsweep.plots.save_animation", lambda *given, progress: asked.append((*given, progress)), raising=False
+        )
         assert main(["animate", "case.yaml", "--set", "drive.amplitude=4"]) == 0
-        config, (ds, path) = asked
+        config, (ds, path, progress) = asked
         assert config.scene.values["drive.amplitude"] == 4.0
         assert ds is run
-        assert path == "case-run.gif"
+        assert (path, progress) == ("case-run.gif", True)
         assert "wrote case-run.gif" in capsys.readouterr().out
 
     @pytest.mark.parametrize("output", ["run.avi", "nowhere/run.gif"])

@@ -123,6 +123,9 @@ def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None
     target = Path(arguments.output or dataset.with_name("-".join([dataset.stem, *shown]) + ".png"))
     files.check_writable(target)
     selection = dict(_selection(text) for text in arguments.sel)
+    page = target.suffix.lower() == ".html"
+    if page and arguments.boundaries is not None:
+        raise InputError("--boundaries", "are drawn into pictures, not into a page: name the output *.png")
     if arguments.tolerance is not None and arguments.boundaries is None:
         raise InputError("--tolerance", "is that of --boundaries REGIME")
     curves = None
@@ -136,12 +139,15 @@ def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None
             written = dataset.with_name(f"{target.stem}-{arguments.boundaries}.nc")
             netcdf.save(curves, written)
             print(f"wrote {written}")
-        figure = plots.regime_map(result, arguments.x, arguments.y, arguments.var, selection, curves)
+        chosen = (arguments.x, arguments.y, arguments.var, selection)
+        if page:
+            plots.save_page(result, target, *chosen)
+        else:
+            plots.save(plots.regime_map(result, *chosen, curves), target)
     except InputError as error:
         if error.path == "ds":
             raise InputError(str(dataset), error.problem) from error
         raise
-    plots.save(figure, target)
     print(f"wrote {target}")
 
 
@@ -234,7 +240,7 @@ def animate_command(arguments: argparse.Namespace) -> None:
 
     check_animation(target)
     result = history(config)
-    plots.save_animation(result, target)
+    plots.save_animation(result, target, progress=not arguments.quiet)
     print(result.attrs["outcome"])
     print(f"wrote {target}")
 

@@ -40,9 +40,15 @@ def build_parser() -> argparse.ArgumentParser:
     init = _add_command(commands, "init", init_command, "write a first configuration, to be edited", """
         ringsweep init                     my-sweep.yaml: two balls in a ring
         ringsweep init --model belt belt.yaml
+        ringsweep init --model ring-single-contact
         """)  # fmt: skip
     init.add_argument("config", nargs="?", default="my-sweep.yaml", metavar="NEW.yaml", help="default: my-sweep.yaml")
-    init.add_argument("--model", choices=["ring", "belt"], default="ring", help="what it describes (default: ring)")
+    init.add_argument(
+        "--model",
+        choices=["ring", "ring-single-contact", "belt"],
+        default="ring",
+        help="what it describes (default: ring)",
+    )
 
     run = _add_command(commands, "run", run_command, "run a sweep: NetCDF, and a regime map beside it", """
         ringsweep run my.yaml              my.nc and my.png; after a stop the same command goes on
@@ -71,11 +77,12 @@ def build_parser() -> argparse.ArgumentParser:
         ringsweep map my.nc                my.png: the regimes
         ringsweep map my.nc --var t_separation --x zone.half_angle
         ringsweep map my.nc --sel "zone.half_angle=15 deg" -o line.pdf
+        ringsweep map my.nc -o my.html     a page for the browser: zoom, numbers of each cell, all variables
         ringsweep map my.nc --var origin   which cells of a refined sweep were run
         ringsweep map my.nc --boundaries separating --tolerance 1e-6
         """)  # fmt: skip
     draw.add_argument("dataset", metavar="OUT.nc")
-    draw.add_argument("-o", "--output", metavar="MAP.png", help="default: beside OUT.nc; .pdf and .svg too")
+    draw.add_argument("-o", "--output", metavar="MAP.png", help="default: beside OUT.nc; .pdf, .svg and .html too")
     draw.add_argument("--x", metavar="DIM", help="coordinate across")
     draw.add_argument("--y", metavar="DIM", help="coordinate up")
     draw.add_argument("--var", default="regime", metavar="V", help="variable to draw (default: regime)")
@@ -161,8 +168,9 @@ def build_parser() -> argparse.ArgumentParser:
     completion = _add_command(commands, "completion", completion_command, "print a completion script for a shell", """
         ringsweep completion bash > ~/.local/share/bash-completion/completions/ringsweep
         ringsweep completion zsh > ~/.zfunc/_ringsweep
+        ringsweep completion fish > ~/.config/fish/completions/ringsweep.fish
         """)  # fmt: skip
-    completion.add_argument("shell", choices=["bash", "zsh", "tcsh"])
+    completion.add_argument("shell", choices=["bash", "zsh", "fish", "tcsh"])
     return parser
 
 

@@ -69,7 +69,13 @@ def sweep_section(doc: Document) -> dict[str, Any]:
 
 def swept_paths(sweep: dict[str, Any]) -> dict[str, str]:
     """Every path that the section ``sweep`` varies, with its place in the configuration."""
-    return {path: f"sweep.{kind}.{path}" for kind in ("points", "grid") for path in sweep.get(kind, ())}
+    found = {path: f"sweep.points.{path}" for path in sweep.get("points", ())}
+    return found | {path: f"sweep.grid.{key}" for key in sweep.get("grid", ()) for path in _paths_of(key)}
+
+
+def _paths_of(key: Any) -> list[Any]:
+    """Paths of an axis of a grid: those that vary together are separated by commas."""
+    return [path.strip() for path in key.split(",")] if isinstance(key, str) else [key]
 
 
 def sweep_axes(scene: Scene, sweep: dict[str, Any]) -> Axes:
@@ -81,13 +87,18 @@ def sweep_axes(scene: Scene, sweep: dict[str, Any]) -> Axes:
         for path, given in points.items():
             where = f"sweep.points.{path}"
             yield path, where, ("point",), read_values(given, swept_parameter(known, path, where), where)
-        for path, given in sweep.get("grid", {}).items():
-            where = f"sweep.grid.{path}"
-            parameter = swept_parameter(known, path, where)
-            if path in points:
-                raise InputError(where, "also a column of sweep.points: a path can vary in one place only")
-            read = _read_spacing if isinstance(given, dict) else read_values
-            yield path, where, (dimension(path),), read(given, parameter, where)
+        seen = set(points)
+        for key, given in sweep.get("grid", {}).items():
+            where = f"sweep.grid.{key}"
+            first, *_ = paths = _paths_of(key)
+            for path in paths:
+                parameter = swept_parameter(known, path, where)
+                if path in seen:
+                    also = "a column of sweep.points" if path in points else "on this or another axis"
+                    raise InputError(where, f"also {also}: a path can vary in one place only")
+                seen.add(path)
+                read = _read_spacing if isinstance(given, dict) else read_values
+                yield path, where, (dimension(first),), read(given, parameter, where)
 
     return build_axes(columns())
 

@@ -23,6 +23,9 @@ from ringsweep.quantities.units import quantity, show
 
 logger = logging.getLogger("ringsweep")
 
+# Ratio of lengths of one scene above which a unit may be wrong: 1 m in place of 1 mm.
+_LARGEST_RATIO = 1000.0
+
 
 def sweepable(scene: Scene) -> dict[str, Parameter | Choice]:
     """Every path of a scene that a sweep can vary, with its parameter."""
@@ -122,7 +125,20 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
                 raise InputError(f"scene.{path}", "cannot stand beside a table, which gives the force at all times")
             where, name = ("drive", drive) if path.startswith("drive.") else ("friction", " or ".join(structures))
             warn_of_unused(path, where, name)
+    _warn_of_lengths(frozenset((path, value) for path, value in values.items() if known[path].unit == "m"))
     return Scene(structures, values, scene)
+
+
+@cache
+def _warn_of_lengths(lengths: frozenset[tuple[str, float]]) -> None:
+    """Warn once per process of lengths so different that a unit may be wrong."""
+    given = sorted((abs(value), path) for path, value in lengths if value)
+    if given and given[-1][0] > _LARGEST_RATIO * given[0][0]:
+        (short, small), (long, large) = given[0], given[-1]
+        logger.warning(
+            "scene.%s is %g m and scene.%s is %g m: is a unit missing? A plain number is in metres",
+            *(large, long, small, short),
+        )
 
 
 @cache

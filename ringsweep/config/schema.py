@@ -166,14 +166,15 @@ def _sweep(paths: list[str]) -> dict[str, Any]:
     laws = {LAW: _list(_laws("friction law"))}
     own = r"^friction\.[A-Za-z][A-Za-z0-9_]*$"
     names = {"anyOf": [{"enum": [*laws, *paths]}, {"pattern": rf"^zones\.[0-9]+\.({arcs})$"}, {"pattern": own}]}
+    together = {"anyOf": [*names["anyOf"], {"pattern": r"^[^,\s]+(\s*,\s*[^,\s]+)+$"}]}
     bounds = {"type": "array", "prefixItems": [value, value, _number(COUNT)], "minItems": 3, "maxItems": 3}
     axis = {"anyOf": [_list(value), *(_section({kind: bounds}) for kind in ("linspace", "geomspace"))]}
     return _section(
         {
             "grid": {
-                "description": "path -> values; every combination is run",
+                "description": "path -> values; every combination is run; paths with commas between them vary together",
                 "type": "object",
-                "propertyNames": names,
+                "propertyNames": together,
                 "properties": {LAW: {**laws[LAW], "uniqueItems": True}},
                 "additionalProperties": axis,
             },

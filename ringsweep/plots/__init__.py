@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from ringsweep.plots.interactive import explore
     from ringsweep.plots.loops import friction_loop
     from ringsweep.plots.maps import map_panel, regime_map
+    from ringsweep.plots.page import save_page
     from ringsweep.plots.phase import phase_portrait
     from ringsweep.plots.polar import polar_view
     from ringsweep.plots.precision import precision_panel, work_precision
@@ -41,6 +42,7 @@ __all__ = [
     "regime_map",
     "save",
     "save_animation",
+    "save_page",
     "style",
     "work_precision",
 ]
@@ -57,6 +59,7 @@ _MODULES = {
     "polar_view": "polar",
     "animation": "films",
     "save_animation": "films",
+    "save_page": "page",
     "cell": "selection",
     "explore": "interactive",
 }

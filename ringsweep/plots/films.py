@@ -31,6 +31,7 @@ from ringsweep.plots.polar import RingArtists, states_at
 from ringsweep.plots.rig import belt_history, ring_history
 from ringsweep.plots.saving import suffix_of
 from ringsweep.plots.style import SMALL, on_page, page_colour
+from ringsweep.runs.executors import progress_bar
 from ringsweep.storage.files import check_writable, replacing
 
 #: Suffixes of the files that `save_animation` writes.
@@ -38,6 +39,12 @@ FILMS = (".mp4", ".gif", ".html")
 
 # Inches and dots per inch. Codecs of mp4 need even numbers of pixels.
 _SIZE, _DPI = (10.8, 5.4), 100
+
+# Number in a palette that stands for "as before".
+_CLEAR = 255
+
+# In a page every so many frames there is a whole picture; the frames between hold only what changes.
+_WHOLE = 50
 
 
 def animation(ds: xr.Dataset, *, fps: float = 25.0, duration: float = 10.0) -> FuncAnimation:
@@ -77,7 +84,14 @@ def animation(ds: xr.Dataset, *, fps: float = 25.0, duration: float = 10.0) -> F
     return _Film(ds, fps, duration).animation()
 
 
-def save_animation(ds: xr.Dataset, path: str | os.PathLike[str], *, fps: float = 25.0, duration: float = 10.0) -> None:
+def save_animation(
+    ds: xr.Dataset,
+    path: str | os.PathLike[str],
+    *,
+    fps: float = 25.0,
+    duration: float = 10.0,
+    progress: bool = True,
+) -> None:
     """Write the animation of a run to a file; see :func:`animation`.
 
     If writing fails, an older file of that name stays as it was.
@@ -93,6 +107,8 @@ def save_animation(ds: xr.Dataset, path: str | os.PathLike[str], *, fps: float =
         Frames per second.
     duration : float
         Duration of the animation, s.
+    progress : bool
+        Whether to show a progress bar in a terminal or a notebook.
 
     Raises
     ------
@@ -109,8 +125,10 @@ def save_animation(ds: xr.Dataset, path: str | os.PathLike[str], *, fps: float =
     """
     check_animation(path)
     film = _Film(ds, fps, duration)
-    with replacing(path) as temporary, film.fixed_background():
-        film.animation().save(temporary, writer=_writer(Path(path).suffix.lower(), fps), dpi=_DPI)
+    bar = progress_bar(len(film.states["time"]), progress, unit="frame")
+    with replacing(path) as temporary, film.fixed_background(), bar:
+        writer = _writer(Path(path).suffix.lower(), fps)
+        film.animation().save(temporary, writer=writer, dpi=_DPI, progress_callback=lambda *_: bar.update())
 
 
 def check_animation(path: str | os.PathLike[str]) -> None:
@@ -260,16 +278,18 @@ class _PaletteWriter(AbstractMovieWriter):
     def grab_frame(self, **options: Any) -> None:
         pixels = _rgba(self.fig, self.dpi, **options)
         frame = Image.frombytes("RGBA", self.frame_size, pixels).convert("RGB")
-        if self.frames:
-            self.frames.append(frame.quantize(palette=self.frames[0], dither=Image.Dither.NONE))
-        else:
-            self.frames.append(_with_palette(frame))
+        # The first frame too: colours of its own would make the second one differ everywhere.
+        palette = self.frames[0] if self.frames else _with_palette(frame)
+        self.frames.append(frame.quantize(palette=palette, dither=Image.Dither.NONE))
 
 
 def _with_palette(frame: Image.Image) -> Image.Image:
-    """A frame with a palette of 256 colours, in which colours close to the background are the background."""
-    reduced = frame.quantize(256, dither=Image.Dither.NONE)
-    palette, background = np.reshape(reduced.getpalette() or [], (-1, 3)), np.asarray(frame)[0, 0]
+    """A frame with a palette of 255 colours, in which colours close to the background are the background."""
+    reduced = frame.quantize(_CLEAR, dither=Image.Dither.NONE)
+    palette = np.resize(reduced.getpalette() or [], (256, 3))
+    # Without a colour of its own this number would be black.
+    palette[_CLEAR] = palette[0]
+    background = np.asarray(frame)[0, 0]
     # Pillow only approximates colours of a given palette: a white page would turn grey.
     palette[np.abs(palette - background.astype(int)).max(axis=1) < 8] = background
     reduced.putpalette(palette.ravel().tolist())
@@ -286,13 +306,26 @@ class _HtmlWriter(_PaletteWriter):
     """Writes a page with buttons; matplotlib's own page loads icons from the internet."""
 
     def finish(self) -> None:
-        pictures = []
-        for frame in self.frames:
+        pictures: list[list[Any]] = []
+        before = None
+        for k, frame in enumerate(self.frames):
+            now = np.asarray(frame)
+            now = np.where(now == _CLEAR, np.uint8(0), now)
+            changed = np.full(now.shape, True) if k % _WHOLE == 0 else now != before
+            before = now
+            rows, columns = (np.flatnonzero(changed.any(axis=axis)) for axis in (1, 0))
+            # A frame in which nothing changes has one clear pixel.
+            top, left = (int(found[0]) if len(found) else 0 for found in (rows, columns))
+            part = np.s_[top : rows[-1] + 1, left : columns[-1] + 1] if len(rows) else np.s_[:1, :1]
+            picture = Image.fromarray(np.where(changed, now, np.uint8(_CLEAR))[part])
+            picture.putpalette(self.frames[0].getpalette() or [])
             buffer = io.BytesIO()
-            frame.save(buffer, "png")
-            pictures.append(base64.b64encode(buffer.getvalue()).decode())
+            picture.save(buffer, "png", transparency=_CLEAR)
+            pictures.append([base64.b64encode(buffer.getvalue()).decode(), left, top])
         page = (files("ringsweep.plots") / "animation.html").read_text(encoding="utf-8")
-        values = {"width": self.frame_size[0], "interval": 1000 / self.fps, "frames": json.dumps(pictures)}
+        width, height = self.frame_size
+        values: dict[str, Any] = {"width": width, "height": height, "interval": 1000 / self.fps, "whole": _WHOLE}
+        values["frames"] = json.dumps(pictures)
         for name, value in values.items():
             page = page.replace(f"{{{name}}}", str(value))
         Path(self.outfile).write_text(page, encoding="utf-8")

@@ -10,6 +10,8 @@ from matplotlib.axis import Axis
 from ringsweep.plots.datasets import is_numeric
 from ringsweep.plots.style import angle_unit
 
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
 MINUS = "\N{MINUS SIGN}"
 TIMES = "\N{MULTIPLICATION SIGN}"
 
@@ -96,3 +98,8 @@ def value_text(value: xr.DataArray) -> str:
     unit = unit_text(value)
     number = number_text(value.item() * display_factor(value), ".4g")
     return f"{name} = {number}{unit if unit == '°' else f' {unit}'.rstrip()}"
+
+
+def plain_text(text: str) -> str:
+    """Text with powers as characters, where nothing draws those of matplotlib."""
+    return re.sub(r"\$\^\{(.*?)\}\$", lambda power: power[1].translate(_SUPERSCRIPTS), text)

@@ -123,9 +123,10 @@ def choose_axes(ds: xr.Dataset, data: xr.DataArray, x: str | None, y: str | None
     candidates: list[str] = []
     for dim in data.dims:
         along = [str(name) for name, c in data.coords.items() if c.dims == (dim,)]
-        # The number of a point is only a label: the coordinates of the points are the axes.
+        # The number of a point is only a label: the coordinates of the points are the axes. Else other coordinates vary
+        # together with that of the dimension.
         others = [name for name in along if name != dim]
-        candidates += others or [str(dim)]
+        candidates += [str(dim)] if "path" in ds[dim].attrs else others or [str(dim)]
     available = [*dict.fromkeys([*candidates, *map(str, data.dims)])]
     x = resolve("x", x, available) if x else None
     y = resolve("y", y, available) if y else None

@@ -302,7 +302,7 @@ class Map:
             columns,
             drawn,
             legend_entries(scale, ds, data, warnings, scattered),
-            ["" if scale.meanings is None else long_name(data), *held, *held_now, *thinning, *_audit(ds)],
+            ["" if scale.meanings is None else long_name(data), *held, *held_now, *thinning, *audit_texts(ds)],
         )
 
     @property
@@ -448,7 +448,7 @@ class Map:
         return self.horizontal.value_of(cell), height
 
 
-def _audit(ds: xr.Dataset) -> list[str]:
+def audit_texts(ds: xr.Dataset) -> list[str]:
     """What a refined sweep says of itself, for the title."""
     if "origin" not in ds or "audit_bound" not in ds.attrs:
         return []

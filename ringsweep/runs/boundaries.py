@@ -143,6 +143,10 @@ def _checked(ds: xr.Dataset, regime: str) -> tuple[int, list[str]]:
         raise InputError(
             "ds", f"has the dimensions {', '.join(dims) or 'none'}: one or two axes of numbers are needed; hold others"
         )
+    for name, coordinate in ds.coords.items():
+        if "path" in coordinate.attrs and name not in dims and coordinate.dims:
+            along = ", ".join(map(str, coordinate.dims))
+            raise InputError("ds", f"{name} varies along {along}: a boundary needs axes along which one number varies")
     return int(np.atleast_1d(ds["regime"].attrs["flag_values"])[meanings.index(regime)]), dims
 
 

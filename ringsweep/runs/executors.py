@@ -184,12 +184,12 @@ def stop_on_interrupt(under_way: Callable[[], str]) -> Iterator[threading.Event]
         restore()
 
 
-def progress_bar(total: int | None, progress: bool, done: int = 0) -> Any:
-    """Progress bar over `total` runs, or a count of runs if their number is not known.
+def progress_bar(total: int | None, progress: bool, done: int = 0, unit: str = "run") -> Any:
+    """Progress bar over `total` runs or other units, or a count of them if their number is not known.
 
     It is shown only in a terminal or a notebook, and only if `progress` is true.
     """
     # tqdm would hide the bar in a notebook, whose output is no terminal.
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
     notebook = hasattr(shell, "kernel")
-    return tqdm(total=total, initial=done, unit="run", disable=(False if notebook else None) if progress else True)
+    return tqdm(total=total, initial=done, unit=unit, disable=(False if notebook else None) if progress else True)

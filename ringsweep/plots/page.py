@@ -1,0 +1,420 @@
+"""A sweep as a page for the browser: zoom, numbers of the cell under the pointer, a choice of variable and slice."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.colors import LogNorm, to_hex
+from numpy.typing import NDArray
+
+from ringsweep.errors import InputError
+from ringsweep.plots.datasets import is_numeric, require_sweep, resolve, swept
+from ringsweep.plots.labels import axis_label, long_name, plain_text, value_text
+from ringsweep.plots.map_axes import Axis, choose_axes, is_scattered, thinned
+from ringsweep.plots.map_colours import ColourScale
+from ringsweep.plots.maps import audit_texts
+from ringsweep.plots.saving import suffix_of
+from ringsweep.plots.selection import select
+from ringsweep.plots.style import CURVE_COLOURS, NO_VALUE
+from ringsweep.storage.files import check_writable, replacing
+
+# Greatest number of cells along an axis, and in a page: a million make some 20 MB.
+_MOST_ALONG, _MOST_CELLS = 512, 1_000_000
+
+# Pixels along an axis whose values have unequal distances.
+_PIXELS = 1000
+
+# Binary digits kept of numbers and of bounds on errors: four decimal digits, and two.
+_DIGITS, _BOUND_DIGITS = 15, 8
+
+# The script sees to the rest of a dark page.
+_DARK = "@media (prefers-color-scheme: dark) { .bk-input { background-color: #303030; color: #e0e0e0 } }"
+
+
+def save_page(
+    ds: xr.Dataset,
+    path: str | os.PathLike[str],
+    x: str | None = None,
+    y: str | None = None,
+    var: str = "regime",
+    sel: Mapping[str, float | str] | None = None,
+) -> None:
+    """Write a sweep as a page for the browser, which needs neither Python nor the internet.
+
+    The page shows one variable over one or two swept quantities. The reader can zoom, read the numbers of the cell
+    under the pointer, and choose the variable and the values of further quantities. Numbers have four digits, bounds
+    on errors have two. Cells that are not certified are hatched, or crossed among points. The page is dark if the
+    browser is. To write it needs Bokeh (``pip install bokeh``).
+
+    If writing fails, an older file of that name stays as it was.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        Result of a sweep.
+    path : path-like
+        File to write or replace, ``*.html``.
+    x, y : str, optional
+        Coordinates of the horizontal and the vertical axis; by default the first and the second that were swept.
+    var : str
+        Variable that the page shows first.
+    sel : mapping of str to float or str, optional
+        Coordinates held at the value nearest to the one given, which must lie within the axis: a plain number is SI,
+        text may have a unit.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, a single cell is left, there are more than a million cells, `path` cannot be written, or
+        Bokeh is not installed.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import xarray as xr
+    >>> ds = xr.Dataset({"phi_max": (("speed", "angle"), np.eye(2))}, {"speed": [1.0, 2.0], "angle": [0.1, 0.2]})
+    >>> save_page(ds, "map.txt")
+    Traceback (most recent call last):
+    ringsweep.errors.InputError: map.txt: pages end in .html, not in '.txt'
+    """
+    check_page(path)
+    from bokeh.embed import file_html
+    from bokeh.resources import INLINE
+
+    sweep = _Sweep.of(ds, x, y, var, sel or {})
+    with replacing(path) as temporary:
+        Path(temporary).write_text(file_html(_document(sweep), INLINE, sweep.title), encoding="utf-8")
+
+
+def check_page(path: str | os.PathLike[str]) -> None:
+    """Check that a page can be written to `path`.
+
+    Raises
+    ------
+    InputError
+        If the suffix is not ``.html``, the file cannot be written, or Bokeh is not installed.
+    """
+    suffix_of(path, (".html",), "pages")
+    check_writable(path)
+    try:
+        import bokeh  # noqa: F401
+    except ImportError as error:
+        problem = "Bokeh, which writes .html, is not installed (pip install bokeh); .png, .pdf and .svg do not need it"
+        raise InputError(str(path), problem) from error
+
+
+@dataclass(frozen=True)
+class _Sweep:
+    """What a page shows, as plain numbers and texts.
+
+    A view shows a slice of the cells: all along the axes, at one value along each further dimension.
+
+    Attributes
+    ----------
+    title : str
+    notes : list of str
+        What is held, how many cells are drawn, and what the audit of a refined sweep says.
+    var : str
+        Variable that is shown first.
+    horizontal, vertical : Axis
+        `vertical` is None if one quantity was swept.
+    x, y : ndarray of shape ``(size,)``
+        Positions of the cells of a slice, where these are points.
+    scattered : bool
+        Whether the cells are points; else they are those of a grid.
+    size : int
+        Number of cells of a slice.
+    cells : dict of str to ndarray
+        Values of each variable: of a classification the positions among `words`, or -1, shape ``(slices * size,)``; of
+        others see :func:`_packed`.
+    variables : dict of str to dict
+        ``title``, the name; ``label``, the name with unit; ``words`` of a classification; ``error``, the variable that
+        bounds the error; ``logarithmic``, whether its colours are.
+    scales : dict of str to tuple
+        Colours of each variable, and the least and the greatest number.
+    coordinates : list of dict
+        ``texts``, the values of a coordinate with its name; ``along``, stride and size of each of its dimensions.
+    slices : list of list of str
+        Values along each further dimension.
+    """
+
+    title: str
+    notes: list[str]
+    var: str
+    horizontal: Axis
+    vertical: Axis | None
+    x: NDArray[Any]
+    y: NDArray[Any]
+    scattered: bool
+    size: int
+    cells: dict[str, NDArray[Any]]
+    variables: dict[str, dict[str, Any]]
+    scales: dict[str, tuple[list[str], float, float]]
+    coordinates: list[dict[str, Any]]
+    slices: list[list[str]]
+
+    @classmethod
+    def of(cls, ds: xr.Dataset, x: str | None, y: str | None, var: str, sel: Mapping[str, float | str]) -> _Sweep:
+        """Choose the axes, and put the cells in their order; arguments and errors as for :func:`save_page`."""
+        require_sweep(ds)
+        var = resolve("var", var, _numeric(ds))
+        held = [value_text(coordinate) for coordinate in swept(ds) if not coordinate.dims]
+        ds, held_now = select(ds, sel)
+        notes = [*held, *held_now, *audit_texts(ds)]
+        if not ds[var].dims:
+            raise InputError("sel" if sel else "ds", "a single cell has no map; at least one dimension must remain")
+        horizontal, vertical = choose_axes(ds, ds[var], x, y)
+        scattered = vertical is not None and is_scattered(horizontal, vertical)
+        axes = [axis for axis in (vertical, horizontal) if axis]
+        if not scattered:
+            # A picture of cells needs their values in ascending order.
+            whole = ds[var].size
+            ds = ds.isel({axis.dims[0]: axis.order for axis in axes} | thinned(axes, _MOST_ALONG))
+            if ds[var].size < whole:
+                notes.append(f"1 cell in {whole / ds[var].size:.0f} shown")
+            axes = [Axis.of(ds[axis.name], ds) for axis in axes]
+            *_, horizontal = axes
+            vertical = axes[0] if vertical else None
+        dims = list(dict.fromkeys(dim for axis in axes for dim in axis.dims))
+        others = [str(dim) for dim in ds[var].dims if dim not in dims]
+        template = ds[var].transpose(*others, *dims)
+        if template.size > _MOST_CELLS:
+            left = ", ".join(f"{dim} ({size})" for dim, size in template.sizes.items())
+            raise InputError("sel", f"{left} are more than {_MOST_CELLS:,} cells: hold some of these: --sel DIM=VALUE")
+        cells, variables, scales = {}, {}, {}
+        for name in _numeric(ds):
+            data = ds[name]
+            if set(data.dims) != set(template.dims):
+                continue
+            cells[name], variables[name], scales[name] = _column(data.transpose(*template.dims), ds)
+        points = template[dict.fromkeys(others, 0)]
+        return cls(
+            str(ds.attrs.get("title", "ringsweep")),
+            [plain_text(note) for note in notes],
+            var,
+            horizontal,
+            vertical,
+            horizontal.values_at(points),
+            vertical.values_at(points) if vertical else np.zeros(points.size),
+            scattered,
+            points.size,
+            cells,
+            variables,
+            scales,
+            [_coordinate(c, template) for c in swept(ds) or template.coords.values() if c.dims],
+            [[_slice_text(ds, dim, k) for k in range(ds.sizes[dim])] for dim in others],
+        )
+
+
+def _numeric(ds: xr.Dataset) -> list[str]:
+    return [str(name) for name, data in ds.data_vars.items() if is_numeric(data)]
+
+
+def _column(data: xr.DataArray, ds: xr.Dataset) -> tuple[NDArray[Any], dict[str, Any], tuple[Any, ...]]:
+    """Values of a variable in compact form, what a page says of it, and its colours."""
+    scale = ColourScale.of(data)
+    numbers = scale.numbers(data).values.ravel()
+    error = f"{data.name}_error"
+    about: dict[str, Any] = {
+        "title": long_name(data),
+        "label": plain_text(axis_label(data, ds)),
+        "words": None,
+        "error": error if error in ds else None,
+        "logarithmic": isinstance(scale.norm, LogNorm),
+    }
+    if scale.meanings is not None:
+        # Classes that do not occur would only fill the legend.
+        present = [k for k in range(len(scale.meanings)) if (numbers == k).any()]
+        positions = np.full(numbers.shape, -1, dtype=np.int8)
+        for position, k in enumerate(present):
+            positions[numbers == k] = position
+        about["words"] = [scale.meanings[k] for k in present]
+        colours = [to_hex(scale.colours(k)) for k in present]
+        return positions, about, (colours or [NO_VALUE], -0.5, max(len(present), 1) - 0.5)
+    colours = [to_hex(colour) for colour in scale.colours(np.linspace(0.0, 1.0, 64))]
+    limits = float(scale.norm.vmin or 0.0), float(scale.norm.vmax or 0.0)
+    return _packed(numbers, str(data.name).endswith("_error")), about, (colours, *limits)
+
+
+def _packed(numbers: NDArray[Any], bound: bool) -> NDArray[np.uint8]:
+    """Numbers with few digits, in a form that compresses well, shape ``(3, size)``; a bound is rounded upwards.
+
+    The bits of the numbers, as ``float32`` without their last nine, are integers. Neighbours differ little, so their
+    differences are stored: those below zero as odd numbers, the bytes of equal weight side by side.
+    """
+    digits, rounding = (_BOUND_DIGITS, np.ceil) if bound else (_DIGITS, np.round)
+    fraction, exponent = np.frexp(numbers)
+    few = np.ldexp(rounding(np.ldexp(fraction, digits)), exponent - digits).astype(np.float32)
+    steps = np.diff(few.view(np.int32) >> 9, prepend=0)
+    unsigned = np.where(steps < 0, -2 * steps - 1, 2 * steps)
+    return np.stack([unsigned >> shift & 255 for shift in (0, 8, 16)]).astype(np.uint8)
+
+
+def _coordinate(coordinate: xr.DataArray, template: xr.DataArray) -> dict[str, Any]:
+    sizes = list(template.sizes.values())
+    strides = dict(zip(template.dims, np.cumprod([1, *sizes[:0:-1]])[::-1].tolist(), strict=True))
+    return {
+        "texts": [plain_text(value_text(coordinate[index])) for index in np.ndindex(coordinate.shape)],
+        "along": [[strides[dim], size] for dim, size in coordinate.sizes.items()],
+    }
+
+
+def _slice_text(ds: xr.Dataset, dim: str, k: int) -> str:
+    """Values at a place along a dimension."""
+    along = [coordinate for coordinate in ds.coords.values() if coordinate.dims == (dim,)]
+    return ", ".join(plain_text(value_text(coordinate[k])) for coordinate in along) or f"{dim} {k}"
+
+
+def _document(sweep: _Sweep) -> Any:
+    """The document of Bokeh. The script beside this file fills it when the page is loaded."""
+    from bokeh.document import Document
+    from bokeh.events import DocumentReady
+    from bokeh.layouts import column, row
+    from bokeh.models import (
+        ColorBar,
+        ColumnDataSource,
+        CustomJS,
+        CustomJSHover,
+        Div,
+        FixedTicker,
+        HoverTool,
+        InlineStyleSheet,
+        LinearColorMapper,
+        LogColorMapper,
+        LogTicker,
+        LogTickFormatter,
+        NoOverlap,
+        Range1d,
+        Select,
+    )
+    from bokeh.plotting import figure
+
+    horizontal, vertical = sweep.horizontal, sweep.vertical
+    plot = figure(
+        x_axis_type=horizontal.scale,
+        y_axis_type=vertical.scale if vertical else "linear",
+        x_axis_label=plain_text(horizontal.label),
+        y_axis_label=plain_text(vertical.label) if vertical else "",
+        tools="pan,wheel_zoom,box_zoom,reset,save",
+        active_scroll="wheel_zoom",
+        sizing_mode="stretch_both",
+        min_height=360,
+        outline_line_color=None,
+    )
+    plot.grid.visible = False
+    plot.toolbar.logo = None
+    plot.axis.axis_label_text_font_style = "normal"
+    plot.axis.axis_label_text_font_size = "14px"
+    plot.axis.major_label_text_font_size = "12px"
+    for axis, drawn in ((horizontal, plot.xaxis), (vertical, plot.yaxis)):
+        if axis and axis.scale == "log":
+            # Over less than two decades the ticks are those of a linear axis: many, of which those that fit are shown.
+            drawn.ticker, drawn.major_label_policy = LogTicker(desired_num_ticks=20), NoOverlap()
+            drawn.formatter = LogTickFormatter(min_exponent=4)
+        if axis and axis.names:
+            drawn.ticker = FixedTicker(ticks=list(range(len(axis.names))))
+            drawn.major_label_overrides = dict(enumerate(axis.names))
+    bars = {}
+    for name, about in sweep.variables.items():
+        colours, low, high = sweep.scales[name]
+        kind = LogColorMapper if about["logarithmic"] else LinearColorMapper
+        ticker = {} if about["words"] is None else {"ticker": FixedTicker(ticks=list(range(len(about["words"]))))}
+        mapper = kind(palette=colours, low=low, high=high)
+        bars[name] = ColorBar(color_mapper=mapper, visible=False, major_label_text_font_size="12px", **ticker)
+        plot.add_layout(bars[name], "right")
+    paint = LinearColorMapper(palette=[NO_VALUE], nan_color=NO_VALUE)
+    line, curve = None, []
+    if sweep.scattered:
+        columns, rows = np.arange(sweep.size), np.zeros(1, dtype=np.intp)
+        view = ColumnDataSource({"x": sweep.x, "y": sweep.y, "value": np.zeros(sweep.size, dtype=np.float32)})
+        size = float(np.clip(300 / math.sqrt(sweep.size), 5, 14))
+        drawn = plot.scatter(
+            "x", "y", size=size, line_color=None, fill_color={"field": "value", "transform": paint}, source=view
+        )
+        doubtful = ColumnDataSource({"x": [], "y": []})
+        plot.scatter("x", "y", marker="x", size=0.6 * size, line_color="black", source=doubtful)
+        edges = None
+    else:
+        edges = [horizontal.edges, vertical.edges if vertical else np.array([0.0, 1.0])]
+        columns, rows = (
+            _cells_of_pixels(e, a.scale if a else "linear") for e, a in zip(edges, (horizontal, vertical), strict=True)
+        )
+        view = ColumnDataSource({"value": [np.zeros((len(rows), len(columns)), dtype=np.float32)]})
+        (left, right), (bottom, top) = ((float(e[0]), float(e[-1])) for e in edges)
+        plot.x_range, plot.y_range = Range1d(left, right), Range1d(bottom, top)
+        drawn = plot.image("value", x=left, y=bottom, dw=right - left, dh=top - bottom, source=view, color_mapper=paint)
+        doubtful = ColumnDataSource({"left": [], "right": [], "bottom": [], "top": []})
+        style = {"fill_color": None, "line_color": None, "hatch_pattern": "/", "hatch_scale": 8, "hatch_weight": 0.5}
+        plot.quad("left", "right", "bottom", "top", source=doubtful, **style)
+        if vertical is None:
+            line = ColumnDataSource({"x": horizontal.values, "value": np.zeros(sweep.size, dtype=np.float32)})
+            style = {"color": CURVE_COLOURS[0], "source": line}
+            curve = [plot.line("x", "value", **style), plot.scatter("x", "value", size=5, **style)]
+    look = {"stylesheets": [InlineStyleSheet(css=_DARK)], "sizing_mode": "stretch_width"}
+    names = [(name, about["title"]) for name, about in sweep.variables.items()]
+    variable = Select(title="variable", value=sweep.var, options=names, **look)
+    slices = [
+        Select(title="slice", value="0", options=[(str(k), text) for k, text in enumerate(texts)], **look)
+        for texts in sweep.slices
+    ]
+    show = CustomJS(
+        args={
+            "plot": plot,
+            "paint": paint,
+            "bars": bars,
+            "drawn": drawn,
+            "view": view,
+            "edges": edges,
+            "doubtful": doubtful,
+            "line": line,
+            "curve": curve,
+            "variable": variable,
+            "slices": slices,
+            "columns": columns.astype(np.int32),
+            "rows": (rows * len(horizontal.values)).astype(np.int32),
+            "size": sweep.size,
+            "cells": sweep.cells,
+            "variables": sweep.variables,
+            "coordinates": sweep.coordinates,
+        },
+        code=(files("ringsweep.plots") / "page.js").read_text(encoding="utf-8"),
+    )
+    for chooser in (variable, *slices):
+        chooser.js_on_change("value", show)
+    tell = CustomJSHover(code="return ringsweep_tell(special_vars)")
+    for renderer in (drawn, *curve[-1:]):
+        # Over a line, wherever the pointer is, the nearest cell tells its numbers.
+        plot.add_tools(
+            HoverTool(
+                tooltips='<div style="white-space: pre">@{value}{custom}</div>',
+                formatters={"@{value}": tell},
+                renderers=[renderer],
+                mode="vline" if renderer in curve else "mouse",
+                limit=1,
+            )
+        )
+    document = Document()
+    notes = Div(text="; ".join([sweep.title, *sweep.notes]), render_as_text=True, sizing_mode="stretch_width")
+    document.add_root(
+        column(notes, row(variable, *slices, sizing_mode="stretch_width"), plot, sizing_mode="stretch_both")
+    )
+    document.js_on_event(DocumentReady, show)
+    return document
+
+
+def _cells_of_pixels(edges: NDArray[Any], scale: str) -> NDArray[np.intp]:
+    """The cell that each pixel along an axis shows; one pixel a cell if their distances are equal."""
+    at = np.log(edges) if scale == "log" else edges
+    count = len(edges) - 1
+    if np.ptp(np.diff(at)) > 1e-6 * (at[-1] - at[0]) / count:
+        count = _PIXELS
+    middles = at[0] + (np.arange(count) + 0.5) / count * (at[-1] - at[0])
+    return np.searchsorted(at[1:-1], middles)

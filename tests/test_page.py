@@ -1,0 +1,214 @@
+"""A page holds the numbers of a sweep, and needs no other file; what it shows is made by the script in the page."""
+
+import base64
+import gzip
+import html
+import json
+import re
+import sys
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from ringsweep import cli, plots
+from ringsweep.errors import InputError
+from ringsweep.quantities.variables import OUTCOMES
+from ringsweep.storage import netcdf
+
+BELT_ONLY = {"x_end", "velocity_end", "x_min", "x_max", "velocity_max", "slips", "first_slip", "period", "force_max"}
+
+
+@pytest.fixture
+def bokeh():
+    """Tests that write a page need Bokeh; without it the other pictures must work."""
+    return pytest.importorskip("bokeh")
+
+
+def sweep(*sizes, points=False):
+    """A sweep of a ring with invented numbers."""
+    rng = np.random.default_rng(7)
+    dims = ("point",) if points else ("drive_amplitude", "zone_half_angle", "initial_omega", "gravity")[: len(sizes)]
+    units = ("rad s-1", "rad", "rad s-1", "m s-2")
+    coords = {}
+    for k, name in enumerate(("drive_amplitude", "zone_half_angle") if points else dims):
+        values = rng.random(sizes[0]) if points else np.arange(1.0, sizes[k] + 1.0)
+        attrs = {"units": units[k], "long_name": f"long name of {name}", "path": name.replace("_", ".", 1)}
+        coords[name] = ("point" if points else name, values, attrs)
+    numbers = {}
+    for name, variable in OUTCOMES.items():
+        if variable.flags is not None:
+            values = rng.choice(list(variable.flags)[:3], sizes).astype("int8")
+        else:
+            values = rng.normal(size=sizes) if variable.dtype.startswith("f") else rng.integers(0, 9, sizes)
+        values = np.abs(values) * 1e-9 if name.endswith("_error") else values
+        if name.removesuffix("_error") not in BELT_ONLY | {"origin", "level", "stiffness"}:
+            numbers[name] = (dims, values.astype(variable.dtype), variable.attributes)
+    return xr.Dataset(numbers, coords, {"title": "a sweep of <b>chance</b>"})
+
+
+def page_of(ds, folder, **options):
+    plots.save_page(ds, folder / "page.html", **options)
+    return (folder / "page.html").read_text(encoding="utf-8")
+
+
+def models(page, kind):
+    """Models of a kind in the document of a page."""
+    text = re.search(r'<script type="application/json"[^>]*>(.*?)</script>', page, re.S)[1]
+    found = []
+
+    def visit(node):
+        if isinstance(node, dict):
+            if node.get("name") == kind and "attributes" in node:
+                found.append(node["attributes"])
+            for child in node.values():
+                visit(child)
+        elif isinstance(node, list):
+            for child in node:
+                visit(child)
+
+    visit(json.loads(html.unescape(text)))
+    return found
+
+
+def plain(node):
+    """Values of a node of the document."""
+    if isinstance(node, dict) and node.get("type") == "map":
+        return {plain(key): plain(value) for key, value in node["entries"]}
+    if isinstance(node, dict) and node.get("type") == "ndarray":
+        raw = gzip.decompress(base64.b64decode(node["array"]["data"]))
+        return np.frombuffer(raw, node["dtype"]).reshape(node["shape"])
+    if isinstance(node, dict) and node.get("type") == "number":
+        return float(node["value"])
+    return [plain(one) for one in node] if isinstance(node, list) else node
+
+
+def script(page):
+    """What the script of a page works with."""
+    (found,) = (one for one in models(page, "CustomJS") if "cells" in str(one["args"])[:100_000])
+    args = dict(found["args"]["entries"]) if "entries" in found["args"] else found["args"]
+    names = ("cells", "variables", "coordinates", "columns", "rows", "size", "edges")
+    values = {name: plain(args[name]) for name in names}
+    for name, packed in values["cells"].items():
+        if packed.dtype == np.uint8:
+            unsigned = np.tensordot([1, 256, 65536], packed, 1)
+            steps = np.where(unsigned % 2 == 1, -(unsigned + 1) // 2, unsigned // 2)
+            values["cells"][name] = (np.cumsum(steps) << 9).astype(np.int32).view(np.float32)
+    pixels = np.add.outer(values["rows"], values["columns"]).ravel()
+    return values | {"pixels": pixels}
+
+
+def test_page_of_256_by_256_cells_is_smaller_than_5_megabytes(bokeh, tmp_path):
+    """Numbers vary smoothly, as between the boundaries of a map; bounds on errors vary by chance."""
+    ds, place = sweep(256, 256), np.linspace(0.0, 1.0, 256)
+    for k, name in enumerate(ds):
+        if ds[name].dtype == "float64":
+            ds[name][:] = np.sin(np.add.outer((3.0 + k) * place, 5.0 * place**2))
+    assert len(page_of(ds, tmp_path).encode()) < 5e6
+
+
+def test_page_loads_nothing_from_elsewhere(bokeh, tmp_path):
+    page = page_of(sweep(4, 3), tmp_path)
+    around = re.sub(r"(<script[^>]*>).*?</script>", r"\1", page, flags=re.S)
+    assert not re.findall(r"\bsrc\b|\bhref\b|https?:", around)
+    assert "<b>chance" not in page
+
+
+def test_page_holds_every_number_with_four_digits_and_no_bound_is_rounded_down(bokeh, tmp_path):
+    ds = sweep(5, 4)
+    ds["t_separation"][2, 1] = np.nan
+    cells = script(page_of(ds, tmp_path))["cells"]
+    assert set(cells) == set(ds.data_vars)
+    for name in ds.data_vars:
+        numbers = ds[name].T.values.ravel()
+        if name.endswith("_error"):
+            assert (cells[name] >= numbers * (1 - 1e-7)).all(), name
+            np.testing.assert_allclose(cells[name], numbers, rtol=0.01)
+        elif "flag_values" not in ds[name].attrs:
+            np.testing.assert_allclose(cells[name], numbers, rtol=5e-5)
+
+
+def test_classes_of_a_page_are_those_that_occur(bokeh, tmp_path):
+    ds = sweep(5, 4)
+    ds["regime"][:] = 3
+    ds["regime"][1, 2] = 5
+    ds["certified"][:] = 1
+    ds["certified"][0, 0] = -1
+    found = script(page_of(ds, tmp_path))
+    assert found["variables"]["regime"]["words"] == ["separating", "failed"]
+    assert found["variables"]["certified"]["words"] == ["certified"]
+    np.testing.assert_array_equal(found["cells"]["regime"], ds["regime"].T.values.ravel() == 5)
+    np.testing.assert_array_equal(found["cells"]["certified"], np.where(ds["certified"].T.values.ravel() == 1, 0, -1))
+
+
+def test_slices_of_a_page_are_the_values_of_further_dimensions(bokeh, tmp_path):
+    ds = sweep(5, 4, 3, 2)
+    page = page_of(ds, tmp_path, x="gravity")
+    variable, *slices = models(page, "Select")
+    assert variable["value"] == "regime"
+    assert [len(chooser["options"]) for chooser in slices] == [4, 3]
+    assert slices[1]["options"][2] == ["2", "long name of initial_omega = 3 rad s⁻¹"]
+    found = script(page)
+    # Further dimensions first, then up, then across.
+    values = ds["turns"].transpose("zone_half_angle", "initial_omega", "drive_amplitude", "gravity").values
+    np.testing.assert_array_equal(found["cells"]["turns"], values.ravel())
+    assert found["size"] == 10
+
+
+def test_coordinates_of_a_cell_are_found_by_strides(bokeh, tmp_path):
+    ds = sweep(5, 4, 3)
+    found = script(page_of(ds, tmp_path))
+    order = ds["turns"].transpose("initial_omega", "zone_half_angle", "drive_amplitude")
+    for number, index in enumerate(np.ndindex(order.shape)):
+        told = []
+        for coordinate in found["coordinates"]:
+            ((stride, size),) = coordinate["along"]
+            told.append(coordinate["texts"][number // stride % size])
+        place = dict(zip(order.dims, index, strict=True))
+        assert [f"{float(ds[dim][place[dim]]) * (180 / np.pi if 'angle' in dim else 1):.4g}" for dim in ds.coords] == [
+            re.search(r"= ([\d.]+)", text)[1] for text in told
+        ]
+
+
+def test_cells_along_an_uneven_axis_have_pixels_in_proportion_to_their_width(bokeh, tmp_path):
+    ds = sweep(3, 2).assign_coords(drive_amplitude=("drive_amplitude", [9.0, 0.0, 1.0]))
+    found = script(page_of(ds, tmp_path))
+    assert found["edges"][0].tolist() == [-0.5, 0.5, 5.0, 13.0]
+    assert np.bincount(found["pixels"]).tolist() == [74, 333, 593] * 2
+    np.testing.assert_array_equal(found["cells"]["turns"], ds["turns"].T.values[:, [1, 2, 0]].ravel())
+
+
+@pytest.mark.parametrize("ds", [sweep(30, points=True), sweep(6)], ids=["points", "one axis"])
+def test_page_of_points_and_of_one_axis_has_each_cell_once(bokeh, tmp_path, ds):
+    found = script(page_of(ds, tmp_path, var="phi_max"))
+    np.testing.assert_array_equal(found["pixels"], np.arange(len(ds["phi_max"])))
+    np.testing.assert_allclose(found["cells"]["phi_max"], ds["phi_max"].values, rtol=5e-5)
+
+
+def test_large_sweep_is_thinned_and_the_page_says_so(bokeh, tmp_path):
+    page = page_of(sweep(1100, 3)[["regime"]], tmp_path)
+    assert "1 cell in 3 shown" in page
+    assert script(page)["size"] == 1101
+
+
+def test_more_than_a_million_cells_are_refused_and_the_message_says_what_to_hold(bokeh, tmp_path):
+    regime = xr.DataArray(np.zeros((200, 200, 30), dtype="int8"), dims=("a", "b", "c"))
+    with pytest.raises(InputError, match=r"a \(200\).*hold some of these: --sel"):
+        plots.save_page(xr.Dataset({"regime": regime}), tmp_path / "page.html")
+
+
+def test_page_needs_bokeh_and_the_message_names_formats_that_do_not(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "bokeh", None)
+    with pytest.raises(InputError, match=r"pip install bokeh\); \.png"):
+        plots.save_page(sweep(2, 2), tmp_path / "page.html")
+    assert not list(tmp_path.iterdir())
+
+
+def test_map_writes_a_page_and_refuses_boundaries_in_it(bokeh, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    netcdf.save(sweep(4, 3).assign_attrs(Conventions="CF-1.11", ringsweep_version="0"), "my.nc")
+    assert cli.main(["map", "my.nc", "-o", "my.html", "--var", "phi_max"]) == 0
+    assert "wrote my.html" in capsys.readouterr().out
+    assert models((tmp_path / "my.html").read_text(encoding="utf-8"), "Select")[0]["value"] == "phi_max"
+    assert cli.main(["map", "my.nc", "-o", "my.html", "--boundaries", "separating"]) == 2
+    assert "not into a page" in capsys.readouterr().err
