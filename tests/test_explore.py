@@ -197,14 +197,14 @@ class TestExplore:
             np.ones(tuple(shape.values()), dtype="int8"),
             OUTCOMES["certified"].attributes,
         )
-        for name, value in (("phi_max", 1.25), ("phi_max_error", 2e-9)):
+        for name, value in (("phi_max", np.radians(80.0)), ("phi_max_error", np.radians(2.01e-9))):
             maps[name] = (tuple(shape), np.full(tuple(shape.values()), value), OUTCOMES[name].attributes)
         told = plots.explore(maps).axes[0].format_coord(2.0, 20.0)
-        place = "amplitude of the ring's angular velocity = 2 rad s⁻¹, half-angle of the rough zone = 20°"
+        place = "amplitude of the ring's angular velocity = 2 rad s⁻¹, half-angle of the zone = 20°"
         assert told == f"{place}, revolving, certified"
         told = plots.explore(maps, var="phi_max").axes[0].format_coord(2.0, 20.0)
         assert told.endswith(
-            "revolving, greatest angle of the body (rad): 1.25, error at most 2e\N{MINUS SIGN}09, certified"
+            "revolving, greatest angle of the body (°): 80, error at most 2.1\N{MULTIPLICATION SIGN}10⁻⁹, certified"
         )
 
     def test_map_and_history_stand_side_by_side(self, maps, asked):

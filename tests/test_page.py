@@ -120,7 +120,8 @@ def test_page_holds_every_number_with_four_digits_and_no_bound_is_rounded_down(b
     cells = script(page_of(ds, tmp_path))["cells"]
     assert set(cells) == set(ds.data_vars)
     for name in ds.data_vars:
-        numbers = ds[name].T.values.ravel()
+        # Angles are shown in degrees.
+        numbers = np.degrees(ds[name].T.values.ravel()) if ds[name].units == "rad" else ds[name].T.values.ravel()
         if name.endswith("_error"):
             assert (cells[name] >= numbers * (1 - 1e-7)).all(), name
             np.testing.assert_allclose(cells[name], numbers, rtol=0.01)
@@ -182,7 +183,7 @@ def test_cells_along_an_uneven_axis_have_pixels_in_proportion_to_their_width(bok
 def test_page_of_points_and_of_one_axis_has_each_cell_once(bokeh, tmp_path, ds):
     found = script(page_of(ds, tmp_path, var="phi_max"))
     np.testing.assert_array_equal(found["pixels"], np.arange(len(ds["phi_max"])))
-    np.testing.assert_allclose(found["cells"]["phi_max"], ds["phi_max"].values, rtol=5e-5)
+    np.testing.assert_allclose(found["cells"]["phi_max"], np.degrees(ds["phi_max"].values), rtol=5e-5)
 
 
 def test_large_sweep_is_thinned_and_the_page_says_so(bokeh, tmp_path):

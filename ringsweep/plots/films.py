@@ -307,6 +307,7 @@ class _HtmlWriter(_PaletteWriter):
 
     def finish(self) -> None:
         pictures: list[list[Any]] = []
+        colours = np.reshape(self.frames[0].getpalette() or [], (-1, 3))
         before = None
         for k, frame in enumerate(self.frames):
             now = np.asarray(frame)
@@ -317,10 +318,12 @@ class _HtmlWriter(_PaletteWriter):
             # A frame in which nothing changes has one clear pixel.
             top, left = (int(found[0]) if len(found) else 0 for found in (rows, columns))
             part = np.s_[top : rows[-1] + 1, left : columns[-1] + 1] if len(rows) else np.s_[:1, :1]
-            picture = Image.fromarray(np.where(changed, now, np.uint8(_CLEAR))[part])
-            picture.putpalette(self.frames[0].getpalette() or [])
+            # Colours that a frame does not use would take a tenth of the page.
+            used, numbers = np.unique(np.where(changed, now, np.uint8(_CLEAR))[part], return_inverse=True)
+            picture = Image.fromarray(numbers.reshape(now[part].shape).astype(np.uint8))
+            picture.putpalette(colours[used].ravel().tolist())
             buffer = io.BytesIO()
-            picture.save(buffer, "png", transparency=_CLEAR)
+            picture.save(buffer, "png", **({"transparency": len(used) - 1} if used[-1] == _CLEAR else {}))
             pictures.append([base64.b64encode(buffer.getvalue()).decode(), left, top])
         page = (files("ringsweep.plots") / "animation.html").read_text(encoding="utf-8")
         width, height = self.frame_size

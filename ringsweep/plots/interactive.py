@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,7 +16,7 @@ from matplotlib.figure import Figure
 
 from ringsweep.plots.datasets import swept
 from ringsweep.plots.histories import draw_history
-from ringsweep.plots.labels import axis_label, number_text, plain_text, value_text
+from ringsweep.plots.labels import axis_label, displayed, number_text, plain_text, value_text
 from ringsweep.plots.maps import Map
 from ringsweep.plots.selection import cell, select
 from ringsweep.plots.style import SMALL
@@ -84,11 +85,8 @@ def explore(
     subfigures: Any = figure.subfigures(1, 2, width_ratios=[1.0, 1.1])
     left, right = subfigures
     ax: Axes = left.add_subplot()
-    found.draw_alone(ax)
-    if legend := ax.get_legend():
-        # Beside the map there is no place for it.
-        legend.remove()
-        left.legend(handles=found.entries, loc="outside lower center", ncols=2, fontsize=SMALL, frameon=False)
+    # Beside the map there is no place for a legend.
+    found.draw_alone(ax, legend="below")
     ax.format_coord = lambda x, y: _description(found.cell_at(ax, x, y), found)  # type: ignore[method-assign]
     style: dict[str, Any] = {"marker": "o", "markersize": 9, "markerfacecolor": "none", "zorder": 5, "clip_on": False}
     # A black circle in a white one is visible on every colour.
@@ -164,14 +162,20 @@ def _description(one: xr.Dataset, found: Map) -> str:
     classes = [name for name in names if "flag_values" in one[name].attrs]
     texts += dict.fromkeys(words(one[name]).item().replace("_", " ") or "no value" for name in classes)
     if found.data.name not in classes:
-        texts.append(
-            f"{axis_label(found.data, found.ds)}: {number_text(found.data.dtype.type(one[found.data.name]), '.6g')}"
-        )
-        if (bound := f"{found.data.name}_error") in one and np.isfinite(one[bound]):
-            texts.append(f"error at most {number_text(float(one[bound]), '.2g')}")
+        value = float(displayed(one[found.data.name]))
+        texts.append(f"{axis_label(found.data, found.ds)}: {number_text(value, '.6g')}")
+        bound = float(displayed(one.get(f"{found.data.name}_error", xr.DataArray(np.nan))))
+        if np.isfinite(bound):
+            texts.append(f"error at most {number_text(_upwards(bound), '.2g')}")
     if "certified" in one:
         texts.append(words(one["certified"]).item().replace("_", " ") or "inferred")
     return plain_text(", ".join(texts))
+
+
+def _upwards(bound: float) -> float:
+    """A bound with two digits, never smaller than it is."""
+    unit = 10.0 ** (math.floor(math.log10(bound)) - 1) if bound else 1.0
+    return math.ceil(bound / unit) * unit
 
 
 def _figure() -> Figure:

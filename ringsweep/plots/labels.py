@@ -10,8 +10,6 @@ from matplotlib.axis import Axis
 from ringsweep.plots.datasets import is_numeric
 from ringsweep.plots.style import angle_unit
 
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-
 MINUS = "\N{MINUS SIGN}"
 TIMES = "\N{MULTIPLICATION SIGN}"
 

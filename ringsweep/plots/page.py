@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.plots.datasets import is_numeric, require_sweep, resolve, swept
-from ringsweep.plots.labels import axis_label, long_name, plain_text, value_text
+from ringsweep.plots.labels import axis_label, displayed, long_name, plain_text, value_text
 from ringsweep.plots.map_axes import Axis, choose_axes, is_scattered, thinned
 from ringsweep.plots.map_colours import ColourScale
 from ringsweep.plots.maps import audit_texts
@@ -220,6 +220,7 @@ def _numeric(ds: xr.Dataset) -> list[str]:
 
 def _column(data: xr.DataArray, ds: xr.Dataset) -> tuple[NDArray[Any], dict[str, Any], tuple[Any, ...]]:
     """Values of a variable in compact form, what a page says of it, and its colours."""
+    data = displayed(data)
     scale = ColourScale.of(data)
     numbers = scale.numbers(data).values.ravel()
     error = f"{data.name}_error"
