@@ -119,17 +119,20 @@ def _created(path: Path) -> Iterator[Any]:
     file = netCDF4.Dataset(path, "w")
     try:
         yield file
-    finally:
-        try:
-            file.close()
-        except BaseException:
-            # The library has freed the file although closing failed. To close it once more would crash this process.
-            file._isopen = 0
-            raise
+        file.sync()
+        file.close()
+    except BaseException:
+        # Closing a file that cannot be written crashes the library. Nobody needs what is in it.
+        file._isopen = 0
+        raise
 
 
 def _read_back(path: Path) -> None:
-    if altered(path, whole=True):
+    try:
+        changed = altered(path, whole=True)
+    except InputError as error:
+        raise OSError("the file cannot be read back") from error
+    if changed:
         raise OSError("the file does not read back as it was written")
 
 
