@@ -253,3 +253,35 @@ def test_body_that_slides_steadily_below_the_end_of_the_stiction_band_is_sliding
     run = ringsweep.sweep(oscillator(friction, belt={"velocity": 0.2}), {"time.span": [300.0, 400.0]}, progress=False)
     assert words(run) == ["sliding", "sliding"]
     assert run.settled[-1] == 1
+
+
+class TestSteadySliding:
+    """Errors of the steps around steady sliding are no oscillation; neither is a motion that decays."""
+
+    SCENE: ClassVar = scene("tustin", k=500.0, belt=0.1, span=20.0, mu_s=0.45, mu_k=0.25, alpha=10.0)
+    AXES: ClassVar = {"belt.velocity": np.geomspace(0.02, 1.0, 8).tolist(), "damper.coefficient": [5.0, 10.0, 20.0]}
+
+    def test_certified_word_at_a_loose_tolerance_is_that_at_a_tight_one(self):
+        tight = ringsweep.sweep(self.SCENE, self.AXES, solver={"method": "event", "rtol": 1e-10}, progress=False)
+        assert {"sliding", "stick-slip"} <= set(words_of(tight).ravel())
+        for rtol in (1e-4, 1e-5):
+            loose = ringsweep.sweep(self.SCENE, self.AXES, solver={"method": "event", "rtol": rtol}, progress=False)
+            trusted = loose.certified.values == 1
+            assert trusted.any()
+            np.testing.assert_array_equal(words_of(loose)[trusted], words_of(tight)[trusted])
+
+    def test_fast_oscillation_that_decays_within_the_span_is_sliding_and_not_settled_at_first(self):
+        stiff = {**self.SCENE, "spring": {"stiffness": 1e7}, "damper": {"coefficient": 14.3}}
+        found = runs(stiff, [2.0, 30.0])
+        assert words(found) == ["sliding", "sliding"]
+        assert found.swing[0] > 10.0 * found.swing[1]
+
+    def test_swing_of_a_free_vibration_without_friction_is_twice_its_amplitude(self):
+        found = runs(scene("coulomb", belt=0.1, x=0.2, velocity=0.0, span=60.0, mu_s=0.0, mu_k=0.0), 60.0)
+        assert words(found) == ["oscillatory"]
+        assert found.swing.item() == pytest.approx(0.4, rel=1e-9)
+        assert found.settled.item() == 1
+
+
+def words_of(found):
+    return ringsweep.words(found.regime).values

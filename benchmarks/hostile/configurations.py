@@ -202,6 +202,7 @@ _MAY_BE_MISSING = {
     "period",
     "stiffness",
     "stops_per_cycle",
+    "swing",
     "stick_share",
     "normal_min_2",
 }

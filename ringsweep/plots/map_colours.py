@@ -118,7 +118,7 @@ def missing_text(ds: xr.Dataset, data: xr.DataArray) -> str:
 
 # Events that a run may lack, and what it lacks if another variable is missing.
 _EVENTS = {"t_separation": "no separation", "first_slip": "no slip"}
-_ABSENT = _EVENTS | dict.fromkeys(("period", "stick_share", "stops_per_cycle"), "no cycle")
+_ABSENT = _EVENTS | dict.fromkeys(("period", "stick_share", "stops_per_cycle", "swing"), "no cycle")
 
 
 def _span(ds: xr.Dataset) -> str:

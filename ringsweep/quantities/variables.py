@@ -119,6 +119,7 @@ OUTCOMES: dict[str, Variable] = {
     "period": Variable("s", "time in which the motion returns"),
     "stick_share": Variable("1", "share of a cycle in which the body sticks to the belt"),
     "stops_per_cycle": Variable("1", "stops in a cycle"),
+    "swing": Variable("m", "distance between the extremes of the displacement in the last cycle"),
     "settled": Variable(
         "1", "whether the last cycles repeat each other", dtype="int8", flags={0: "not_settled", 1: "settled"}
     ),

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from math import inf
 
+import numpy as np
+
 from ringsweep.models.belt.bristles import contact_force
 from ringsweep.models.belt.force import (
     damping,
@@ -17,10 +19,15 @@ from ringsweep.models.belt.force import (
     with_loads,
     with_sizes,
 )
+from ringsweep.models.belt.record import Outcome
 from ringsweep.models.interface import audit, implicit
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.forces import force_in
 from ringsweep.physics.friction.velocity import stiction_band
+from ringsweep.quantities.variables import OSCILLATORY
+
+# An oscillation is certain if the two runs of a cell differ by less than this share of its swing.
+_SMALLEST_SHARE = 0.1
 
 # Rounding of an acceleration, as a share of its largest terms.
 _ROUNDING = 1e-12
@@ -82,3 +89,14 @@ def _bristle_violation(scene, mode, forcing, y, rates, s, tolerance):
     imbalance = max(imbalance, abs(rate - rates[2]) / allowed)
     power = with_loads(scene, -friction * velocity, velocity, velocity, 0.0, push)
     return (max(-mode.sign * v / speed, imbalance) if imbalance < inf else inf), power
+
+
+@audit.undecided.implements(Belt, BristleBelt)
+def _undecided(batch, rows, second_rows, fall_rates):
+    """Around steady sliding the errors of the steps look like an oscillation, in both runs."""
+    one, other = Outcome(*rows.T), Outcome(*second_rows.T)
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        pace = np.sqrt(batch.mass / batch.stiffness)
+        apart = np.maximum(np.abs(one.x_end - other.x_end), np.abs(one.swing - other.swing))
+        apart = np.fmax(apart, np.abs(one.velocity_end - other.velocity_end) * pace)
+        return (one.regime == OSCILLATORY) & ~(apart <= _SMALLEST_SHARE * np.minimum(one.swing, other.swing))

@@ -40,6 +40,7 @@ class Outcome(NamedTuple):
     period: float
     stick_share: float
     stops_per_cycle: float
+    swing: float
     settled: float
     force_max: float
 
@@ -179,6 +180,9 @@ class Record(NamedTuple):
 
 #: The motion has returned if displacement and velocity differ by less than this share of their swing in a cycle.
 RETURN = 1e-3
+
+# A free oscillation has settled if its swing, at the rate of its last cycle, changes by less than this share in a span.
+_DECAY = 1e-2
 
 # Laps of more cycles are not looked for.
 _MOST_CYCLES = 64.0
@@ -485,6 +489,7 @@ def conclude(scene, r, status, t, x, velocity):
         period,
         share,
         stops,
+        r.cycles.swing if stops == stops else nan,
         1.0 if settled else 0.0,
         r.force_max,
     )
@@ -532,8 +537,11 @@ def _settles_to(scene, r, t):
         return STICK_SLIP, c.period, c.share, c.stops, returned
     if c.swing <= _ROUNDING * (r.x_max - r.x_min):
         return SLIDING, nan, 0.0, 0.0, True
-    if returned or forced or c.swing >= c.swing_before:
-        return OSCILLATORY, c.period, 0.0, 0.0, returned
+    # At a high frequency even a slow decay per cycle ends the motion within the span.
+    decays = not forced and c.lap == 1.0 and abs(c.swing - c.swing_before) * c.count > _DECAY * c.swing
+    stays = returned and not decays
+    if stays or forced or c.swing >= c.swing_before:
+        return OSCILLATORY, c.period if stays else nan, 0.0, 0.0, stays
     return SLIDING, nan, 0.0, 0.0, c.swing <= RETURN * (r.x_max - r.x_min)
 
 
