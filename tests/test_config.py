@@ -815,3 +815,20 @@ def test_annotated_int_declares_a_whole_parameter():
 def test_whole_configuration_in_place_of_a_scene_is_refused_with_a_hint(call):
     error = refusal(call, {"scene": SCENE, "solver": SOLVER})
     assert "pass config['scene']" in error.problem
+
+
+@pytest.mark.parametrize(
+    ("section", "table", "path"),
+    [
+        ("friction", {"law": "table", "v": [0, 5e-324, 1], "mu": [0.3, 0.2, 0.1]}, "scene.friction.mu.1"),
+        ("friction", {"law": "table", "v": [0, 0.1, 1e308], "mu": [0.3, 0.2, 0.1]}, "scene.friction.mu.2"),
+        ("drive", {"law": "table", "time": [0, 1e-308, 0.1, 9], "theta": [0, 1, 2, 3]}, "scene.drive.theta.1"),
+        ("drive", {"law": "table", "time": [0, 1, 2, 9], "theta": [0, 1e308, -1e308, 0]}, "scene.drive.theta.2"),
+    ],
+)
+def test_table_whose_curve_overflows_is_refused_with_its_row(section, table, path):
+    belt = {"model": "belt", "body": {"mass": 1.0}, "spring": {"stiffness": 2.0}, "time": {"span": 1.0}}
+    others = {"friction": {"law": "coulomb", "mu_k": 0.1}} if section == "drive" else {"belt": {"velocity": 0.1}}
+    with pytest.raises(InputError, match="is too steep or too far") as refusal:
+        load({"scene": {**belt, **others, section: table}})
+    assert refusal.value.path == path

@@ -47,7 +47,8 @@ def read_table(
     Raises
     ------
     InputError
-        If the table is missing, is too short, begins after 0, or its first column does not ascend.
+        If the table is missing, is too short, begins after 0, or its first column does not ascend; or if a row is so
+        far from the one before that numbers overflow.
     """
     where, columns = f"scene.{section}", TABLES[section]
     first, second = columns
@@ -77,6 +78,15 @@ def read_table(
         raise InputError(f"{where}.{first}.{i}", f"{x[i]:g} {unit} does not come after {x[i - 1]:g} {unit}")
     if x[0] > 0.0:
         raise InputError(f"{where}.{first}.0", f"the table begins at {x[0]:g} {unit}: it must begin at 0 {unit}")
+    # The coefficients of the cubics between rows.
+    with np.errstate(all="ignore"):
+        steep = np.flatnonzero(~np.isfinite(np.diff(y) / np.diff(x) ** 3) | ~np.isfinite(np.diff(x) ** 3))
+    if len(steep):
+        i = int(steep[0]) + 1
+        raise InputError(
+            f"{where}.{second}.{i}",
+            f"from {y[i - 1]:g} to {y[i]:g} over {x[i] - x[i - 1]:g} {unit} is too steep or too far",
+        )
     return x, y
 
 
