@@ -143,6 +143,8 @@ def results(stiffness, t_end=1.0):
     [
         ([0.0, 2.61], None),
         ([0.0, 5.22, 2.0, 2.0], "25.0 % of the cells exceed .* about 2e+02 steps are needed"),
+        # A number of steps that is rounded down is too small.
+        ([5.24, 2.0], "about 2.1e+02 steps are needed"),
         ([np.inf, 2.0], "50.0 % of the cells exceed .* no step is small enough"),
         ([5.22, np.nan], "100.0 % of the cells exceed .* no step is small enough"),
     ],

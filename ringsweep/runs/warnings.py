@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 
 import numpy as np
 import xarray as xr
@@ -49,7 +50,8 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
             largest = float(np.maximum(largest, beyond.max(initial=0.0)))
     if unstable:
         if np.isfinite(largest):
-            remedy = f"about {config.solver.steps * largest / STABILITY_LIMIT:.2g} steps are needed"
+            steps = config.solver.steps * largest / STABILITY_LIMIT
+            remedy = f"about {_two_digits_up(steps):.2g} steps are needed"
         else:
             remedy = "no step is small enough for a friction law that jumps"
         logger.warning(
@@ -72,6 +74,13 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
     if ended_at_start > 0.5 * count:
         runs = "the run ends" if count == 1 else f"{ended_at_start / count:.0%} of the runs end"
         logger.warning("%s at t = 0: is a unit or the initial state wrong?", runs)
+
+
+def _two_digits_up(number: float) -> float:
+    """A positive number, rounded up to two digits."""
+    unit = 10.0 ** (math.floor(math.log10(number)) - 1)
+    # The small number forgives rounding: 200 stays 200.
+    return math.ceil(number / unit - 1e-9) * unit
 
 
 def _share_failed(results: xr.Dataset) -> float:
