@@ -26,9 +26,11 @@ def summarise(result: xr.Dataset) -> None:
     if "certified" in result:
         # NaN in a refined sweep, where no cell was run.
         certified = result["certified"].values
-        share = float((certified[~np.isnan(certified)] == 1).mean())
+        run = ~np.isnan(certified)
+        share = float((certified[run] == 1).mean())
         # Rounding must not turn "nearly all" into 100 %.
-        print(f"certified: {share if share == 1.0 else min(share, 0.999):.1%}")
+        of = "" if run.all() else f" of the {np.count_nonzero(run)} cells run"
+        print(f"certified: {share if share == 1.0 else min(share, 0.999):.1%}{of}")
     if "audit" in result.attrs:
         print("refined:", result.attrs["audit"])
     lines = []
