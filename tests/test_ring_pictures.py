@@ -182,6 +182,11 @@ class TestPolarView:
                 ahead = place(theta + np.pi / 2) @ head.get_xy()[0]
                 assert np.sign(ahead) == sense
 
+    def test_time_of_a_polar_view_may_have_a_unit(self, run, ax):
+        assert plots.polar_view(run, "1200 ms", ax).get_title().startswith("t = 1.2000 s")
+        with pytest.raises(InputError, match="has the wrong unit: time is in s"):
+            plots.polar_view(run, "3 m", ax)
+
     def test_title_of_a_polar_view_has_time_and_mode(self, run, ax):
         stick = at(run.isel(time=run["mode"] == 0), 0.5)
         plots.polar_view(run, stick["time"], ax)

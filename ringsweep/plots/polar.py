@@ -33,12 +33,14 @@ from ringsweep.plots.style import (
     page_colour,
     place_legend,
 )
+from ringsweep.quantities.parameters import Parameter
+from ringsweep.quantities.units import quantity
 
 # Length of an arrow below which it has no name, as a multiple of the radius of the ring: the name would hide it.
 _SHORTEST = 0.04
 
 
-def polar_view(ds: xr.Dataset, time: float, ax: Axes | None = None) -> Axes:
+def polar_view(ds: xr.Dataset, time: float | str, ax: Axes | None = None) -> Axes:
     """Draw the body in the ring at one instant, to scale, with all forces.
 
     Angles count from the downward vertical, counter-clockwise. A mark shows the angle θ of the ring, and an arrow
@@ -50,8 +52,8 @@ def polar_view(ds: xr.Dataset, time: float, ax: Axes | None = None) -> Axes:
     ----------
     ds : xarray.Dataset
         Result of :func:`ringsweep.simulate` on a ring.
-    time : float
-        Instant, s.
+    time : float or str
+        Instant: a plain number is in seconds, text may have a unit.
     ax : matplotlib.axes.Axes, optional
         Axes to draw in, by default pyplot's current ones. The legend stands below them: a figure with
         ``layout="constrained"`` makes room for it.
@@ -63,7 +65,7 @@ def polar_view(ds: xr.Dataset, time: float, ax: Axes | None = None) -> Axes:
     Raises
     ------
     InputError
-        If the dataset is not the history of one run on a ring, or `time` is not within the run.
+        If the dataset is not the history of one run on a ring, or `time` is no time within the run.
 
     Examples
     --------
@@ -75,6 +77,7 @@ def polar_view(ds: xr.Dataset, time: float, ax: Axes | None = None) -> Axes:
     """
     run, rig = ring_history(ds)
     first, last = run["time"].values[[0, -1]]
+    time = quantity(time, Parameter("s", "time"), "time") if isinstance(time, str) else float(time)
     if not first <= time <= last:
         raise InputError("time", f"{time:g} s is not within the run, from {first:g} s to {last:.6g} s")
     ax = axes_or_current(ax, 1.2 if is_narrow(figure_width()) else 0.8)
