@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -55,6 +56,11 @@ def __getattr__(name: str) -> Any:
             import_module("ringsweep.accessor")
         return getattr(import_module(f"ringsweep.{_MODULES[name]}"), name)
     raise AttributeError(f"module 'ringsweep' has no attribute {name!r}")
+
+
+# Xarray is slow to import too. Where it is imported already, `ds.ringsweep` is there at once.
+if "xarray" in sys.modules:
+    import_module("ringsweep.accessor")
 
 
 def __dir__() -> list[str]:

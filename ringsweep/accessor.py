@@ -1,10 +1,12 @@
 """The functions that take a dataset, as ``ds.ringsweep`` of xarray.
 
-Any use of :mod:`ringsweep` registers it. Before one, for example if xarray alone opens a file, import this module.
+``import ringsweep`` after ``import xarray`` registers it, and so does any use of :mod:`ringsweep`. In doubt,
+``import ringsweep.accessor``.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import xarray as xr
@@ -38,11 +40,11 @@ class Accessor:
 
         return words(self._ds[var])
 
-    def map(self, **options: Any) -> Figure:
-        """A map; arguments as for :func:`ringsweep.plots.regime_map`."""
+    def map(self, var: str = "regime", **options: Any) -> Figure:
+        """A map of a variable; other arguments as for :func:`ringsweep.plots.regime_map`."""
         from ringsweep.plots.maps import regime_map
 
-        return regime_map(self._ds, **options)
+        return regime_map(self._ds, var=var, **options)
 
     def boundary(self, regime: str, tolerance: float = 1e-6) -> xr.Dataset:
         """Curves around the cells of a regime; see :func:`ringsweep.boundary`."""
@@ -50,9 +52,12 @@ class Accessor:
 
         return boundary(self._ds, regime, tolerance)
 
-    def simulate(self, **cell: float | str) -> xr.Dataset:
-        """Time history of the cell nearest to some values of the coordinates; see :func:`ringsweep.plots.cell`."""
+    def simulate(self, sel: Mapping[str, float | str] | None = None, /, **cell: float | str) -> xr.Dataset:
+        """Time history of the cell nearest to some values of the coordinates; see :func:`ringsweep.plots.cell`.
+
+        The values are a mapping, such as ``{"drive.amplitude": 2}``, or keywords, such as ``drive_amplitude=2``.
+        """
         from ringsweep.plots.selection import cell as configuration_of
         from ringsweep.runs.simulate import simulate
 
-        return simulate(configuration_of(self._ds, cell))
+        return simulate(configuration_of(self._ds, {**(sel or {}), **cell}))

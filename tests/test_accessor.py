@@ -25,16 +25,18 @@ def test_words_and_boundary_are_those_of_the_functions(ds):
 
 def test_run_of_a_cell_has_the_outcome_of_that_cell(ds):
     run = ds.ringsweep.simulate(drive_amplitude=2, zone_half_angle="15 deg")
+    xr.testing.assert_identical(
+        run.drop_attrs(), ds.ringsweep.simulate({"drive.amplitude": 2, "zone.half_angle": "15 deg"}).drop_attrs()
+    )
     here = ds.sel(drive_amplitude=2.0).isel(zone_half_angle=1)
     assert float(run.phi_end) == float(here.phi_end)
 
 
 def test_map_has_the_title_of_the_function(ds):
-    assert (
-        ds.ringsweep.map(var="t_end").axes[-1].get_ylabel() == plots.regime_map(ds, var="t_end").axes[-1].get_ylabel()
-    )
+    assert ds.ringsweep.map("t_end").axes[-1].get_ylabel() == plots.regime_map(ds, var="t_end").axes[-1].get_ylabel()
 
 
-def test_accessor_is_there_for_a_file_that_xarray_alone_has_opened():
-    code = "import ringsweep.accessor, xarray as xr; print(xr.Dataset().ringsweep.words.__name__)"
+@pytest.mark.parametrize("imports", ["ringsweep.accessor, xarray as xr", "xarray as xr, ringsweep"])
+def test_accessor_is_there_for_a_file_that_xarray_alone_has_opened(imports):
+    code = f"import {imports}; print(xr.Dataset().ringsweep.words.__name__)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "words"
