@@ -3,7 +3,7 @@ Maps in a figure of your own
 ============================
 
 ``map_panel`` draws into axes of yours. Here one sweep is computed twice: by Runge-Kutta 4 with 5000 steps, and with all
-events located. The maps differ in kind. Hatched cells are not certified.
+events located. The maps differ in kind. No cell of the left map is certified: its legend says so.
 """
 
 from pathlib import Path

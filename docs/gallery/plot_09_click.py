@@ -2,7 +2,7 @@
 A map that you can click
 ========================
 
-In a notebook with ``%matplotlib widget``, or in a window, a click on a cell draws its time history below the map.
+In a notebook with ``%matplotlib widget``, or in a window, a click on a cell draws its time history beside the map.
 """
 
 import ringsweep
