@@ -373,7 +373,7 @@ def _difference(names: Sequence[str]) -> str:
     listed = ", ".join(names[:_MAX_NAMED]) + f" and {len(names) - _MAX_NAMED} more" * (len(names) > _MAX_NAMED)
     return (
         f"is damaged, or another program changed it: not as ringsweep wrote them are {listed} "
-        f"(if the change is wanted, remove the attribute {digest.ATTRIBUTE})"
+        f'(if the change is wanted, remove the digests: `del ds.attrs["{digest.ATTRIBUTE}"]` in xarray, and save ds)'
     )
 
 
