@@ -224,6 +224,7 @@ class TestPint:
         ("3 bananas", "m", "not a known unit"),
         ("3 m^9^9^9", "m", "not a known unit"),
         ("3 rad", "", "takes a plain number"),
+        ("0,1 m/s", "m/s", "a decimal point, not a comma"),
         ("ten", "m", "is not a number"),
         ("1 m\n2", "m", "is not a known unit"),
         ("nan", "m", "not finite"),

@@ -17,6 +17,7 @@ from ringsweep.quantities.quantity import cf_units
 
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 
+_DECIMAL_COMMA = re.compile(r"[-+]?[0-9]*,[0-9][^,]*")
 _NOT_FINITE = re.compile(r"[-+]?\.?(nan|inf|infinity)", re.IGNORECASE)
 _WORD = r"[A-Za-zµμ°%_]+(?:(?:\^|\*\*)?-?[0-9])?"
 _UNIT = re.compile(rf"(?:1\s*/\s*)?{_WORD}(?:(?:\s*[*/·]\s*|\s+){_WORD})*")
@@ -174,6 +175,8 @@ def _convert(value: Any, parameter: Parameter, path: str) -> float:
     unit = None
     if isinstance(value, str):
         text = value.strip()
+        if len(text) <= _LONGEST and _DECIMAL_COMMA.fullmatch(text):
+            raise InputError(path, f"{show(value)}: write a decimal point, not a comma; {wanted}")
         match = NUMBER.match(text) if len(text) <= _LONGEST else None
         if match is None and not _NOT_FINITE.fullmatch(text):
             raise InputError(path, f"{show(value)} is not a number: {wanted}")
