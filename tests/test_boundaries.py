@@ -112,6 +112,10 @@ class TestBoundary:
         assert cli.main(["info", str(tmp_path / "my-jammed.nc")]) == 0
         assert "boundary of jammed: 0 curves, 0 points" in capsys.readouterr().out
 
+    def test_refusal_of_an_unknown_regime_names_the_nearest(self, ds):
+        with pytest.raises(InputError, match=r"not a regime; did you mean `separating`\?"):
+            ringsweep.boundary(ds, "seperating")
+
     @pytest.mark.parametrize(
         ("regime", "tolerance", "path"),
         [

@@ -12,6 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.config import Axes, Config, load
+from ringsweep.config.sections import suggestion
 from ringsweep.errors import InputError
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity, show
@@ -136,7 +137,7 @@ def _checked(ds: xr.Dataset, regime: str) -> tuple[int, list[str]]:
         raise InputError("ds", "is no sweep: it has no regimes")
     meanings = str(ds["regime"].attrs["flag_meanings"]).split()
     if regime not in meanings:
-        raise InputError("regime", f"{show(regime)} is none of {', '.join(meanings)}")
+        raise InputError("regime", f"{show(regime)} is not a regime{suggestion(regime, meanings)}")
     dims = [str(dim) for dim in ds["regime"].dims]
     swept = [dim for dim in dims if dim in ds.coords and "path" in ds[dim].attrs and ds[dim].dtype.kind == "f"]
     if dims != swept or not 1 <= len(dims) <= 2:
