@@ -13,6 +13,7 @@ import yaml
 
 import ringsweep
 from ringsweep import cli
+from ringsweep.cli.report import summarise
 from ringsweep.config import load
 from ringsweep.runs.warnings import warn_of_results
 from ringsweep.storage import netcdf
@@ -123,10 +124,12 @@ def test_warnings_of_a_belt_whose_weight_overflows_are_the_only_ones():
     assert found["regime"].size == 1
 
 
-def test_belts_give_the_share_of_motions_that_have_not_settled(caplog):
+def test_belts_give_the_share_of_motions_that_have_not_settled(caplog, capsys):
     of = BELT | {"body": {"mass": 1.0}, "spring": {"stiffness": 2.0}, "belt": {"velocity": 0.1}, "initial": {"x": 0.0}}
-    ringsweep.sweep(of, {"time.span": [12.0, 60.0]}, progress=False)
+    found = ringsweep.sweep(of, {"time.span": [12.0, 60.0]}, progress=False)
     assert "50.0% of the motions have not settled" in caplog.text
+    summarise(found)
+    assert "not settled: 50.0% of the motions" in capsys.readouterr().out
 
 
 def results(stiffness, t_end=1.0):

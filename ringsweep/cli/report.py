@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from ringsweep.quantities.variables import FAILED, INFERRED, RIDING
+
 
 def summarise(result: xr.Dataset) -> None:
     """Print the number of cells, the share of each regime, the share of certified cells and the bounds on errors.
@@ -31,6 +33,11 @@ def summarise(result: xr.Dataset) -> None:
         # Rounding must not turn "nearly all" into 100 %.
         of = "" if run.all() else f" of the {np.count_nonzero(run)} cells run"
         print(f"certified: {share if share == 1.0 else min(share, 0.999):.1%}{of}")
+    if "settled" in result:
+        unsettled = (result["settled"] == 0) & ~regime.isin([RIDING, FAILED])
+        if unsettled.any():
+            cells = np.count_nonzero(result["origin"] != INFERRED) if "origin" in result else regime.size
+            print(f"not settled: {int(unsettled.sum()) / cells:.1%} of the motions; a longer span may change them")
     if "audit" in result.attrs:
         print("refined:", result.attrs["audit"])
     lines = []
