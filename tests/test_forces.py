@@ -14,7 +14,7 @@ import ringsweep
 from ringsweep.compile import take
 from ringsweep.config import load
 from ringsweep.errors import InputError
-from ringsweep.models import batch
+from ringsweep.models import MODELS, batch
 from ringsweep.models.belt.bristles import Mode as BristleMode
 from ringsweep.models.belt.series import Mode
 from ringsweep.models.interface import audit, implicit, series
@@ -450,6 +450,10 @@ class TestParts:
             "drive": isinstance(cells.drive, Forced),
         }
         assert [name for name, found in present.items() if found] == [part]
+
+    def test_name_of_a_number_in_a_dataset_tells_no_default(self):
+        known = MODELS["belt"].parameters(load({"scene": self.plain()}).scene.structure)
+        assert known["damper.coefficient"].attributes["long_name"] == "coefficient of the damper to the wall"
 
     def test_parts_without_effect_change_nothing(self):
         plain, zero = self.plain(), forced(friction=0.4, load=0.1)

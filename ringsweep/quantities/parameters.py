@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from types import MappingProxyType
-from typing import get_type_hints
+from typing import Any, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +49,11 @@ class Parameter(Quantity):
     default: float | None = None
     optional: bool = False
     whole: bool = False
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """CF attributes. A value that is given has no default, so the name does not tell one."""
+        return super().attributes | {"long_name": self.long_name.partition(" (default: ")[0]}
 
     def allows(self, value: float) -> bool:
         """Whether a finite `value` lies within the interval."""
