@@ -854,6 +854,13 @@ class TestWorkPrecision:
         words = [text.get_text() for text in axes.get_legend().get_texts()]
         assert words == ["method 0", "no error (at the floor)", "failed (at the ceiling)"]
 
+    def test_errors_of_runs_that_diverged_do_not_stretch_the_axis(self):
+        ds = make_work(1)
+        ds["error_end"][0] = 1e150
+        axes = plots.work_precision(ds).axes[0]
+        assert axes.get_ylim()[1] < 1e5
+        assert axes.get_legend().get_texts()[-1].get_text() == "failed or diverged (at the ceiling)"
+
     def test_diagram_accepts_errors_that_are_all_zero(self):
         ds = make_work(1)
         ds["error_end"][:] = 0.0

@@ -32,6 +32,9 @@ from ringsweep.plots.style import (
     width_of,
 )
 
+# Error above which a run has diverged: no axis need reach beyond it.
+_DIVERGED = 1e3
+
 # Own methods, which look the same in every picture.
 _OWN = ("implicit", "event", "rk4")
 
@@ -78,7 +81,8 @@ def precision_panel(ds: xr.Dataset, error: str = "error_end", ax: Axes | None = 
 
     A point shows the median over the cells; a bar goes up to the largest error. A point is hollow if the regime of
     some cell is wrong. A median of zero lies on a floor below all other points. An infinite median, of runs that
-    failed, lies on a ceiling above them. Arrows mark floor and ceiling.
+    failed, lies on a ceiling above them, and so does an error above 1000, of runs that diverged. Arrows mark floor and
+    ceiling.
 
     Parameters
     ----------
@@ -130,6 +134,10 @@ def precision_panel(ds: xr.Dataset, error: str = "error_end", ax: Axes | None = 
     median, largest = np.full((2, len(numbers)), np.nan)
     median[rows], largest[rows] = np.nanmedian(numbers[rows], axis=1), np.nanmax(numbers[rows], axis=1)
     floor, ceiling = (positive.min() / 10.0, positive.max() * 10.0) if len(positive) else (1e-17, 1.0)
+    if ceiling > _DIVERGED > 10.0 * floor:
+        ceiling = _DIVERGED
+    # Infinite, or beyond the ceiling.
+    diverged = median > ceiling
     low, high = np.clip(median, floor, ceiling), np.clip(largest, floor, ceiling)
     wrong = (ds["regime_wrong"] == 1).any("cell").values if "regime_wrong" in ds else np.zeros(len(numbers), bool)
 
@@ -171,9 +179,10 @@ def precision_panel(ds: xr.Dataset, error: str = "error_end", ax: Axes | None = 
         circle: dict[str, Any] = {"color": on_page("0.4"), "linestyle": "", "marker": "o"}
         circle["markerfacecolor"] = page_colour()
         entries.append(Line2D([], [], label="hollow: a regime\nis wrong in some cell", **circle))
+    failure = "failed" + " or diverged" * bool(np.isfinite(median[diverged]).any()) + " (at the ceiling)"
     for height, where, arrow, meaning in (
         (0.6 * floor, median[rows] <= 0.0, "$\\downarrow$", "no error (at the floor)"),
-        (1.7 * ceiling, np.isinf(median[rows]), "$\\uparrow$", "failed (at the ceiling)"),
+        (1.7 * ceiling, diverged[rows], "$\\uparrow$", failure),
     ):
         if where.any():
             arrows: dict[str, Any] = {"color": on_page("black"), "marker": arrow, "linestyle": "", "markersize": 8}
