@@ -80,9 +80,14 @@ class CellWarning:
 
 
 def cell_warnings(ds: xr.Dataset, data: xr.DataArray) -> list[CellWarning]:
-    """Warnings of a map of regimes or motions: not certified, or beyond the stability limit of ``rk4``."""
+    """Warnings of a map of regimes or motions: not certified, or beyond the stability limit of ``rk4``.
+
+    A map of another variable hatches the cells without a value that were inferred, if others have none for another
+    reason.
+    """
     if data.name not in ("regime", "motion"):
-        return []
+        inferred = _missing_inferred(ds, data)
+        return [CellWarning(_NOT_RUN, "//////", "x", inferred)] if _has_two_kinds_of_missing(data, inferred) else []
     found = []
     if "certified" in ds:
         cells = (ds["certified"] == 0).broadcast_like(data)
@@ -110,10 +115,24 @@ def missing_text(ds: xr.Dataset, data: xr.DataArray) -> str:
     ended_early = "regime" in ds and bool((missing & ds["regime"].isin([JAMMED, FAILED])).any())
     if name in _EVENTS and not ended_early and (span := _span(ds)):
         text += f"\nwithin {span}"
-    inferred = missing & (ds["origin"] == INFERRED) if "origin" in ds else missing & False
-    if inferred.any():
-        text = "inferred, not run" if inferred.equals(missing) else f"{text}, or\ninferred, not run"
+    inferred = _missing_inferred(ds, data)
+    if inferred.any() and not _has_two_kinds_of_missing(data, inferred):
+        text = _NOT_RUN if inferred.equals(missing) else f"{text}, or\n{_NOT_RUN}"
     return text
+
+
+_NOT_RUN = "inferred, not run"
+
+
+def _missing_inferred(ds: xr.Dataset, data: xr.DataArray) -> xr.DataArray:
+    """Cells without a value that were inferred."""
+    missing = data.isnull()
+    return missing & (ds["origin"] == INFERRED) if "origin" in ds else missing & False
+
+
+def _has_two_kinds_of_missing(data: xr.DataArray, inferred: xr.DataArray) -> bool:
+    """Whether some cells were inferred and others lack a value for another reason. A line cannot be hatched."""
+    return data.ndim > 1 and bool(inferred.any()) and not inferred.equals(data.isnull())
 
 
 # Events that a run may lack, and what it lacks if another variable is missing.
@@ -142,7 +161,9 @@ def legend_entries(
             if where.any():
                 entries.append(Patch(color=scale.colours(k), label=f"{meaning}, {_share(where)}"))
     if not shown.all():
-        entries.append(Patch(color=on_page(NO_VALUE), label=f"{missing_text(ds, data)}, {_share(~shown)}"))
+        inferred = _missing_inferred(ds, data)
+        other = ~shown & ~inferred.values if _has_two_kinds_of_missing(data, inferred) else ~shown
+        entries.append(Patch(color=on_page(NO_VALUE), label=f"{missing_text(ds, data)}, {_share(other)}"))
     ink = on_page("black")
     for warning in warnings:
         label = f"{warning.label}, {_share(warning.cells.values)}"
