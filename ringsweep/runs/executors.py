@@ -102,10 +102,11 @@ class Threads:
 
         # Daemons, so that a second Ctrl-C need not wait for their tasks.
         threads = [threading.Thread(target=work, daemon=True) for _ in range(self._jobs)]
-        for thread in threads:
-            thread.start()
         working, failure = len(threads), None
         try:
+            # The first thread may have finished tasks before the last one has started.
+            for thread in threads:
+                thread.start()
             while working:
                 item = found.get()
                 if item is None:
