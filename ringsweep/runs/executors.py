@@ -173,9 +173,10 @@ def stop_on_interrupt(under_way: Callable[[], str]) -> Iterator[threading.Event]
             signal.signal(number, handler)
 
     def interrupt(number: int, frame: Any) -> None:
+        # A second one that comes before the message is out would end the process without it.
+        logger.info("stopping when %s (Ctrl-C again: stop now and lose that)", under_way())
         restore()
         stopped.set()
-        logger.info("stopping when %s (Ctrl-C again: stop now and lose that)", under_way())
 
     for number in before:
         signal.signal(number, interrupt)
