@@ -168,8 +168,10 @@ class TestRecommendation:
 
     @pytest.mark.parametrize(("rtol", "meets"), [(1e-4, "misses"), (1e-11, "meets")])
     def test_report_says_whether_the_solver_of_the_configuration_meets_the_target(self, found, rtol, meets):
-        solver = next(name for name in found["solver"].values if name.endswith(f"rtol: {rtol!r}"))
-        text = report(found.assign_attrs(configured=solver))
+        solver, other = (
+            next(name for name in found["solver"].values if name.endswith(f"rtol: {one!r}")) for one in (rtol, 1e-12)
+        )
+        text = report(found.assign_attrs(configured=solver, recommended=other))
         assert f"the solver of this configuration, `{solver}`, {meets} the target: " in text
         text = report(found.assign_attrs(configured=found.attrs["recommended"]))
         assert "it is the solver of this configuration already: nothing needs to change" in text
