@@ -282,6 +282,11 @@ class TestSteadySliding:
         assert found.swing.item() == pytest.approx(0.4, rel=1e-9)
         assert found.settled.item() == 1
 
+    def test_forced_oscillation_without_a_spring_is_certified(self):
+        found = runs(scene("coulomb", k=0.0, drive=(1.0, 2.0), span=20.0, mu_k=0.01), 20.0)
+        assert words(found) == ["oscillatory"]
+        assert found.certified.item() == 1
+
 
 def words_of(found):
     return ringsweep.words(found.regime).values

@@ -96,7 +96,7 @@ def _undecided(batch, rows, second_rows, fall_rates):
     """Around steady sliding the errors of the steps look like an oscillation, in both runs."""
     one, other = Outcome(*rows.T), Outcome(*second_rows.T)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        pace = np.sqrt(batch.mass / batch.stiffness)
+        pace = np.where(batch.stiffness > 0.0, np.sqrt(batch.mass / batch.stiffness), 0.0)
         apart = np.maximum(np.abs(one.x_end - other.x_end), np.abs(one.swing - other.swing))
         apart = np.fmax(apart, np.abs(one.velocity_end - other.velocity_end) * pace)
         return (one.regime == OSCILLATORY) & ~(apart <= _SMALLEST_SHARE * np.minimum(one.swing, other.swing))
