@@ -300,10 +300,12 @@ def _status_at_zero_reaction(scene, mode, guard, t, y):
     body = scene.body
     K1, K2, sin_phi, cos_phi, omega = _sliding_at(scene, mode, t, y)
     epsilon, determinant = ring.acceleration(body, K1, K2, sin_phi, cos_phi, omega)
-    if not determinant > NEARLY_JAMMED * ring.free_determinant(body):
-        return JAM
     normal_1, normal_2 = ring.reactions(body, K1, K2, sin_phi, cos_phi, omega)
-    least = AT_ONCE * body.mass * (body.gravity + body.radius * (omega * omega + abs(epsilon)))
+    scale = body.mass * (body.gravity + body.radius * (omega * omega + abs(epsilon)))
+    # Near a jam the polynomial of a reaction is inaccurate, and may vanish where the reaction does not.
+    if (normal_1 if guard == NORMAL_1 else normal_2) > 1e-2 * scale:
+        return JAM if not determinant > NEARLY_JAMMED * ring.free_determinant(body) else BROKEN
+    least = AT_ONCE * scale
     return ENDS[contact.lost(body, guard == NORMAL_1 or normal_1 <= least, guard == NORMAL_2 or normal_2 <= least)]
 
 

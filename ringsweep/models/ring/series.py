@@ -230,8 +230,8 @@ def _after_zero_reaction(scene, mode, guard, t, y):
     else:
         _, normal_1, normal_2, scale = _sliding_at(scene, mode, t, y)
         # Near a jam the series of a reaction is inaccurate, and may vanish where the reaction does not.
-        if _is_jamming(scene, mode, t, y) or (normal_1 if guard == NORMAL_1 else normal_2) > 1e-2 * scale:
-            return JAM, mode, y
+        if (normal_1 if guard == NORMAL_1 else normal_2) > 1e-2 * scale:
+            return JAM if _is_jamming(scene, mode, t, y) else BROKEN, mode, y
     least = AT_ONCE * scale
     opens_1, opens_2 = guard == NORMAL_1 or normal_1 <= least, guard == NORMAL_2 or normal_2 <= least
     return ENDS[contact.lost(scene.body, opens_1, opens_2)], mode, y
