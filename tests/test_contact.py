@@ -7,7 +7,7 @@ import pytest
 
 from ringsweep.physics import contact
 from ringsweep.physics.contact import BACKWARD, CLOSED, FORWARD, IMPOSSIBLE, OPEN_1, OPEN_2, OPEN_BOTH, STICK
-from ringsweep.physics.ring import OneContact, TwoContacts
+from ringsweep.physics.ring import OneContact, TwoContacts, acceleration
 
 MIRRORED = {OPEN_1: OPEN_2, OPEN_2: OPEN_1, FORWARD: BACKWARD, BACKWARD: FORWARD}
 
@@ -173,7 +173,62 @@ class TestAtRest:
                 assert abs(kappa) <= 1.0
 
 
+def response(body, K, phi, omega):
+    """Accelerations of both gaps without contact forces, and their changes by a unit of each reaction with friction."""
+    free, units = balances(body, phi)
+    base = np.array(contact_accelerations(body, free, omega))[:, 0]
+    columns = [units[:, 2 * i] + K[i] * units[:, 2 * i + 1] for i in (0, 1)]
+    return base, np.array([np.array(contact_accelerations(body, free + c, omega))[:, 0] - base for c in columns]).T
+
+
+@pytest.fixture(scope="module")
+def states():
+    """Random bodies that slide: body, friction per unit of both reactions, angle, angular velocity."""
+    rng = np.random.default_rng(3)
+    found = []
+    for _ in range(3000):
+        body, _, kinetic, phi, omega, _ = draw(rng)
+        found.append((body, rng.choice([-1, 1]) * np.array(kinetic), phi, omega))
+    return found
+
+
 class TestSliding:
+    def test_determinant_of_the_balances_is_that_of_the_gaps(self, states):
+        """The gaps are those of a body of three degrees of freedom."""
+        for body, K, phi, omega in states:
+            _, A = response(body, K, phi, omega)
+            determinant = acceleration(body, *K, sin(phi), cos(phi), omega)[1] * 2 * body.sin_beta * body.cos_beta
+            assert np.linalg.det(A) * body.mass**2 * body.inertia == pytest.approx(
+                determinant, rel=1e-9, abs=1e-9 * body.mass**2 * body.inertia * np.abs(A).max() ** 2
+            )
+
+    def test_mode_is_the_admissible_one(self, states):
+        seen, below = set(), 0
+        for body, K, phi, omega in states:
+            base, A = response(body, K, phi, omega)
+            scale = body.gravity + body.radius * omega**2
+            normals = np.linalg.solve(A, -base) / body.mass
+            lone = -base / np.diag(A) / body.mass
+            gaps = base[::-1] + body.mass * lone * np.array([A[1, 0], A[0, 1]])
+            alone = np.minimum(lone, gaps)
+            margins = np.abs([*normals, *lone, *gaps, *base]) / scale
+            if margins.min() < 1e-6:
+                continue
+            opens = [mode for mode, i in ((OPEN_1, 1), (OPEN_2, 0)) if alone[i] > 0.0 and A[i, i] > 0.0]
+            opens += [OPEN_BOTH] if min(base) > 0.0 else []
+            if min(normals) > 0.0:
+                expected = CLOSED if np.linalg.det(A) > 0.0 else IMPOSSIBLE
+            else:
+                expected = OPEN_BOTH if len(opens) > 1 else opens[0] if opens else IMPOSSIBLE
+            found = contact.sliding(body, *K, sin(phi), cos(phi), omega)
+            assert found == expected
+            seen.add(found)
+            D = (K[0] - K[1]) * cos(2 * body.beta) + (1 + K[0] * K[1]) * sin(2 * body.beta)
+            below += D < 0.0 and found == CLOSED
+        assert seen == {CLOSED, OPEN_1, OPEN_2, OPEN_BOTH, IMPOSSIBLE}
+        # The determinant of two of the balances is no criterion.
+        assert below > 10
+
     def test_slow_body_without_friction_at_the_top_loses_both_contacts_and_fast_body_none(self):
         body = TwoContacts.of(0.076, 4.47e-5, 0.043378, 0.022, 0.75, np.sqrt(1 - 0.75**2), 9.81)
         modes = [contact.sliding(body, 0.0, 0.0, sin(3.1), cos(3.1), omega) for omega in (0.0, 50.0)]

@@ -221,7 +221,7 @@ class TestLimit:
 
 
 class TestEnds:
-    def test_launch_jams_where_the_effective_inertia_is_not_positive(self, stiction):
+    def test_launch_jams_where_the_determinant_of_the_balances_is_not_positive(self, stiction):
         body = take(stiction({}).body, 0)
         about_axis = (body.inertia / body.mass + body.xi**2) * body.cos_beta
         limit = np.sqrt(about_axis / (body.radius * body.xi - about_axis))

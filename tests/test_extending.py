@@ -142,8 +142,8 @@ def test_examples_do_what_the_page_claims(tmp_path):
         ("my_dahl.py", '"dahl-ductile"', '"lugre"', "there is a friction law lugre already"),
         (
             "my_disc.py",
-            "(body, K1, K2, sin_phi, cos_phi, omega, phi_dd)",
-            "(body, K1, K2)",
+            "_reactions(body, K1, K2, sin_phi, cos_phi, omega)",
+            "_reactions(body, K1, K2)",
             "the arguments of reactions are",
         ),
     ],

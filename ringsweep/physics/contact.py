@@ -11,7 +11,10 @@ mode is tested for its equations and inequalities:
   or opens too.
 
 Stick has priority over slip, and closed contacts over open ones. If both slips but not stick are admissible, or no mode
-is, the state has no unique motion of rigid bodies (jamming).
+is, the state has no unique motion of rigid bodies (jamming). The same holds for slip in which the determinant of the
+balances is not positive.
+
+A reaction that is smaller than the rounding of the load is zero.
 
 If a contact may open, the body has three degrees of freedom. Let only one contact act, with the reaction ``N`` and the
 friction ``F``; ``s = -1`` for contact 1 and ``+1`` for contact 2. The accelerations of its gap g and of its place x
@@ -229,14 +232,14 @@ def _slip_margin(body, sign, friction, tangential, sin_phi, cos_phi, omega, epsi
         As for :func:`stick`.
     """
     K1, K2 = -sign * friction[0], -sign * friction[1]
-    phi_dd, _, inertia = ring.acceleration(body, K1, K2, sin_phi, cos_phi, omega)
-    n1, n2 = ring.reactions(body, K1, K2, sin_phi, cos_phi, omega, phi_dd)
+    phi_dd, determinant = ring.acceleration(body, K1, K2, sin_phi, cos_phi, omega)
+    n1, n2 = ring.reactions(body, K1, K2, sin_phi, cos_phi, omega)
     terms = _scale(body, sin_phi, cos_phi, omega, epsilon)
     push = sign * body.radius * (phi_dd - epsilon) / terms
     if tangential:
         # The body starts to slide if even more friction than the limit would be needed to hold it.
         gain = sign * ring.acceleration_slope(body, K1, K2, K1, K2, sin_phi, cos_phi, omega)
-        push = -body.radius * gain / terms if inertia > 0.0 else -1.0
+        push = -body.radius * gain / terms if determinant > 0.0 else -1.0
     margin = min(push, min(n1, n2) / (body.mass * terms))
     # NaN if the acceleration does not exist.
     return margin if margin >= -1.0 else -1.0
@@ -269,8 +272,9 @@ def at_rest(body, static, forward, backward, sin_phi, cos_phi, omega, epsilon, r
     if released == 0:
         _, reserve, n1, n2 = stick(body, m1, m2, sin_phi, cos_phi, omega, epsilon)
         held = min(reserve, min(n1, n2)) / (body.mass * _scale(body, sin_phi, cos_phi, omega, epsilon))
+        least = _ROUNDING * body.mass * _scale(body, sin_phi, cos_phi, omega, epsilon)
         # Without friction or without a load the body cannot stick.
-        if held >= 0.0 and m1 + m2 > 0.0 and min(n1, n2) > 0.0:
+        if held >= 0.0 and m1 + m2 > 0.0 and min(n1, n2) > least:
             return STICK
     tangential = released == 1 and forward == static
     ahead = _slip_margin(body, 1.0, forward, tangential, sin_phi, cos_phi, omega, epsilon)
@@ -305,12 +309,10 @@ def sliding(body, K1, K2, sin_phi, cos_phi, omega):
     int
         CLOSED, OPEN_1, OPEN_2, OPEN_BOTH or IMPOSSIBLE.
     """
-    phi_dd, determinant, inertia = ring.acceleration(body, K1, K2, sin_phi, cos_phi, omega)
-    if not (determinant > 0.0 and inertia > 0.0):
-        return IMPOSSIBLE
-    n1, n2 = ring.reactions(body, K1, K2, sin_phi, cos_phi, omega, phi_dd)
-    if n1 > 0.0 and n2 > 0.0:
-        return CLOSED
+    _, determinant = ring.acceleration(body, K1, K2, sin_phi, cos_phi, omega)
+    n1, n2 = ring.reactions(body, K1, K2, sin_phi, cos_phi, omega)
+    if min(n1, n2) > _ROUNDING * body.mass * _scale(body, sin_phi, cos_phi, omega, 0.0):
+        return CLOSED if determinant > 0.0 else IMPOSSIBLE
     return opening(body, K1, K2, 0.0, 0.0, 1, sin_phi, cos_phi, omega, 0.0)
 
 

@@ -21,8 +21,17 @@ determinant :math:`D = D_0 + D_1 \\Delta + D_2 P`, and all three give
     \\ddot\\varphi = \\frac{(m_0 + m_1 \\Delta + m_2 P) \\sin\\varphi + (l_0 \\cos\\varphi + l_1 \\omega^2) S}
         {i_0 + i_1 \\Delta + i_2 P} ,
 
-with the coefficients of :class:`TwoContacts`. The denominator is D times the effective inertia. If D or the denominator
-is not positive, no motion of a rigid body exists, or it is not unique (jamming, Painleve).
+with the coefficients of :class:`TwoContacts`. The denominator is the determinant of the three balances as equations for
+the angular acceleration and both reactions. A body that slides on both contacts jams where it falls to 0 (Painleve):
+with ``q = R - xi cos(beta)`` the accelerations of the gaps are ``A N + b``,
+
+.. math::
+
+    A_{11} = \\frac1M + \\frac{\\xi \\sin\\beta\\,(\\xi \\sin\\beta - K_1 q)}{J}, \\qquad
+    A_{12} = \\frac{\\cos 2\\beta + K_2 \\sin 2\\beta}{M} - \\frac{\\xi \\sin\\beta\\,(\\xi \\sin\\beta + K_2 q)}{J},
+
+``A_22`` and ``A_21`` follow with ``-K_2`` in place of ``K_1`` and ``-K_1`` in place of ``K_2``. ``M^2 J det A`` is the
+determinant of the balances times ``sin(2 beta)``.
 """
 
 from __future__ import annotations
@@ -52,9 +61,11 @@ class TwoContacts(NamedTuple):
         Half the angle between the contacts, rad; its sine and cosine.
     gravity : float
         Acceleration of gravity, m/s^2.
-    determinant, effective, weight, lift : tuple of float
-        Coefficients of the acceleration, see the head of this module: (D_0, D_1, D_2), 1; (i_0, i_1, i_2), kg m^2;
-        (m_0, m_1, m_2), N m; (l_0, l_1), N m and kg m^2.
+    determinant, weight, lift : tuple of float
+        Coefficients of the acceleration, see the head of this module: (i_0, i_1, i_2), kg m^2; (m_0, m_1, m_2), N m;
+        (l_0, l_1), N m and kg m^2.
+    reaction : tuple of float
+        Coefficients of the reactions, see :func:`reactions`: kg^2 m^2, 1, m/s^2.
     """
 
     mass: Leaf
@@ -66,21 +77,22 @@ class TwoContacts(NamedTuple):
     cos_beta: Leaf
     gravity: Leaf
     determinant: tuple[Leaf, Leaf, Leaf]
-    effective: tuple[Leaf, Leaf, Leaf]
     weight: tuple[Leaf, Leaf, Leaf]
     lift: tuple[Leaf, Leaf]
+    reaction: tuple[Leaf, Leaf, Leaf]
 
     @classmethod
     def of(
         cls, mass: Any, inertia: Any, radius: Any, xi: Any, sin_beta: Any, cos_beta: Any, gravity: Any
     ) -> TwoContacts:
-        """Body with the coefficients of its acceleration computed."""
+        """Body with the coefficients of its acceleration and reactions computed."""
+        # Coefficients of the determinant of the radial and the tangential balance, which the paper calls D.
         D = 2.0 * sin_beta * cos_beta, cos_beta * cos_beta - sin_beta * sin_beta, 2.0 * sin_beta * cos_beta
         # Coefficients of the tangential balance after the moment about the axis is eliminated.
         T = 0.0, cos_beta, 2.0 * sin_beta
         about_axis = inertia + mass * xi * xi
         lever, arm = radius * mass, mass * xi
-        effective = [about_axis * d - lever * xi * t for d, t in zip(D, T, strict=True)]
+        determinant = [about_axis * d - lever * xi * t for d, t in zip(D, T, strict=True)]
         weight = [gravity * (lever * t - arm * d) for d, t in zip(D, T, strict=True)]
         return cls(
             mass,
@@ -91,10 +103,10 @@ class TwoContacts(NamedTuple):
             sin_beta,
             cos_beta,
             gravity,
-            D,
-            (effective[0], effective[1], effective[2]),
+            (determinant[0], determinant[1], determinant[2]),
             (weight[0], weight[1], weight[2]),
             (lever * gravity * sin_beta, lever * xi * sin_beta),
+            (mass * about_axis, cos_beta - lever * xi / about_axis, gravity * inertia / about_axis),
         )
 
 
@@ -181,19 +193,19 @@ def _two_offset(body):
 
 
 @hook(optional=True)
-def about_axis(body):
-    """Scale of the third result of :func:`acceleration`: the moment of inertia about the axis, kg m^2. By default 1."""
+def free_determinant(body):
+    """Determinant of the balances without friction, kg m^2. By default 1, for bodies that cannot jam."""
     return 1.0
 
 
-@about_axis.implements(TwoContacts)
-def _two_about_axis(body):
-    return body.inertia + body.mass * body.xi * body.xi
+@free_determinant.implements(TwoContacts)
+def _two_free_determinant(body):
+    return body.determinant[0]
 
 
 @hook(absorb=True)
 def acceleration(body, K1, K2, sin_phi, cos_phi, omega):
-    """Angular acceleration of the body in slip, and whether the body jams.
+    """Angular acceleration of the body in slip, and the determinant that tells whether the body jams.
 
     Bodies get vector lanes, so they are written without ``if``. Apart from :func:`constant_terms`, the acceleration is
     linear in ``sin_phi``, ``cos_phi`` and ``omega**2``.
@@ -211,8 +223,8 @@ def acceleration(body, K1, K2, sin_phi, cos_phi, omega):
     Returns
     -------
     tuple of float or Lanes
-        ``(phi_dd, D, inertia)``: angular acceleration, rad/s^2; determinant of the reactions, 1; D times the effective
-        inertia, kg m^2. The body jams if D or inertia is not positive. A body that cannot jam returns 1 for both.
+        ``(phi_dd, determinant)``: angular acceleration, rad/s^2; determinant of the balances, kg m^2. The body jams if
+        it is not positive. A body that cannot jam returns 1.
     """
 
 
@@ -227,16 +239,16 @@ def _combine(coefficients, delta, P):
 def _two_acceleration(body, K1, K2, sin_phi, cos_phi, omega):
     delta, P = K1 - K2, K1 * K2
     l_0, l_1 = body.lift
-    inertia = _combine(body.effective, delta, P)
+    determinant = _combine(body.determinant, delta, P)
     moment = _combine(body.weight, delta, P) * sin_phi + (l_0 * cos_phi + l_1 * (omega * omega)) * (K1 + K2)
-    return moment * (1.0 / inertia), _combine(body.determinant, delta, P), inertia
+    return moment * (1.0 / determinant), determinant
 
 
 @acceleration.implements(OneContact)
 def _one_acceleration(body, K1, K2, sin_phi, cos_phi, omega):
     b = body
     phi_dd = -b.gravity / b.radius * sin_phi + K1 * (b.gravity / b.radius * cos_phi + omega * omega)
-    return phi_dd, 1.0, 1.0
+    return phi_dd, 1.0
 
 
 @hook(optional=True)
@@ -257,8 +269,8 @@ def constant_terms(body, K1, K2):
     tuple of float
         Constant terms of the angular acceleration, rad/s^2, and of both normal reactions, N.
     """
-    phi_dd, _, _ = acceleration(body, K1, K2, 0.0, 0.0, 0.0)
-    normal_1, normal_2 = reactions(body, K1, K2, 0.0, 0.0, 0.0, 0.0)
+    phi_dd, _ = acceleration(body, K1, K2, 0.0, 0.0, 0.0)
+    normal_1, normal_2 = reactions(body, K1, K2, 0.0, 0.0, 0.0)
     return phi_dd, normal_1, normal_2
 
 
@@ -300,15 +312,15 @@ def acceleration_slope(body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega):
 def _two_slope(body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega):
     delta, P = K1 - K2, K1 * K2
     d_delta, d_P = slope_1 - slope_2, slope_1 * K2 + K1 * slope_2
-    _, i_1, i_2 = body.effective
+    _, i_1, i_2 = body.determinant
     _, m_1, m_2 = body.weight
     l_0, l_1 = body.lift
     lift = l_0 * cos_phi + l_1 * (omega * omega)
-    inertia = _combine(body.effective, delta, P)
+    determinant = _combine(body.determinant, delta, P)
     moment = _combine(body.weight, delta, P) * sin_phi + lift * (K1 + K2)
     d_moment = (m_1 * d_delta + m_2 * d_P) * sin_phi + lift * (slope_1 + slope_2)
-    per_inertia = 1.0 / inertia
-    return (d_moment - moment * per_inertia * (i_1 * d_delta + i_2 * d_P)) * per_inertia
+    per_determinant = 1.0 / determinant
+    return (d_moment - moment * per_determinant * (i_1 * d_delta + i_2 * d_P)) * per_determinant
 
 
 @acceleration_slope.implements(OneContact)
@@ -336,9 +348,9 @@ def acceleration_gradient(body, K1, K2, sin_phi, cos_phi, omega):
 def _two_gradient(body, K1, K2, sin_phi, cos_phi, omega):
     delta, P = K1 - K2, K1 * K2
     l_0, l_1 = body.lift
-    per_inertia = 1.0 / _combine(body.effective, delta, P)
+    per_determinant = 1.0 / _combine(body.determinant, delta, P)
     by_phi = _combine(body.weight, delta, P) * cos_phi - l_0 * sin_phi * (K1 + K2)
-    return by_phi * per_inertia, 2.0 * omega * l_1 * (K1 + K2) * per_inertia
+    return by_phi * per_determinant, 2.0 * omega * l_1 * (K1 + K2) * per_determinant
 
 
 @acceleration_gradient.implements(OneContact)
@@ -365,7 +377,7 @@ def friction_gain(body, cos_phi, omega):
 @friction_gain.implements(TwoContacts)
 def _two_friction_gain(body, cos_phi, omega):
     l_0, l_1 = body.lift
-    return (l_0 * cos_phi + l_1 * (omega * omega)) * (2.0 / body.effective[0])
+    return (l_0 * cos_phi + l_1 * (omega * omega)) * (2.0 / body.determinant[0])
 
 
 @friction_gain.implements(OneContact)
@@ -384,19 +396,19 @@ def reaction_determinant(body):
 
 @reaction_determinant.implements(TwoContacts)
 def _two_reaction_determinant(body):
-    return body.determinant[0]
+    return 2.0 * body.sin_beta * body.cos_beta
 
 
 @hook(absorb=True)
-def reactions(body, K1, K2, sin_phi, cos_phi, omega, phi_dd):
-    """Normal reactions (the paper's Eq. 17).
+def reactions(body, K1, K2, sin_phi, cos_phi, omega):
+    """Normal reactions in slip: the paper's Eq. 17 with the angular acceleration eliminated.
+
+    Eq. 17 divides by D. Where D vanishes and the determinant of the balances does not, the reactions are finite.
 
     Parameters
     ----------
     body, K1, K2, sin_phi, cos_phi, omega
         As for :func:`acceleration`.
-    phi_dd : float or Lanes
-        Angular acceleration of the body, rad/s^2.
 
     Returns
     -------
@@ -406,19 +418,20 @@ def reactions(body, K1, K2, sin_phi, cos_phi, omega, phi_dd):
 
 
 @reactions.implements(TwoContacts)
-def _two_reactions(body, K1, K2, sin_phi, cos_phi, omega, phi_dd):
+def _two_reactions(body, K1, K2, sin_phi, cos_phi, omega):
     b = body
-    # Weight and inertia per unit of mass, along the race and across it.
-    along = b.gravity * sin_phi + b.xi * phi_dd
+    scale, lever, pull = b.reaction
+    # Weight and inertia per unit of mass, along the race and across it; the moment about the axis is eliminated.
+    along = pull * sin_phi
     across = b.gravity * cos_phi + b.xi * (omega * omega)
-    load = b.mass / _combine(b.determinant, K1 - K2, K1 * K2)
-    N1 = across * (b.sin_beta - K2 * b.cos_beta) + along * (b.cos_beta + K2 * b.sin_beta)
-    N2 = across * (b.sin_beta + K1 * b.cos_beta) - along * (b.cos_beta - K1 * b.sin_beta)
+    load = scale * (1.0 / _combine(b.determinant, K1 - K2, K1 * K2))
+    N1 = across * (b.sin_beta - K2 * lever) + along * (b.cos_beta + K2 * b.sin_beta)
+    N2 = across * (b.sin_beta + K1 * lever) - along * (b.cos_beta - K1 * b.sin_beta)
     return load * N1, load * N2
 
 
 @reactions.implements(OneContact)
-def _one_reactions(body, K1, K2, sin_phi, cos_phi, omega, phi_dd):
+def _one_reactions(body, K1, K2, sin_phi, cos_phi, omega):
     N = body.mass * (body.gravity * cos_phi + body.radius * omega * omega)
     return N, N
 
@@ -535,7 +548,7 @@ def _one_tractions(body, sin_phi, cos_phi, omega, phi_dd, normal_1, normal_2):
 BODY_MEMBERS = (
     contact_count,
     contact_offset,
-    about_axis,
+    free_determinant,
     acceleration,
     constant_terms,
     acceleration_slope,

@@ -23,7 +23,7 @@ from ringsweep.physics.friction.velocity import friction_at, stiction_band
 from ringsweep.physics.zones import PER_TURN, Segments, edge_ahead, roughest, roughness
 from ringsweep.quantities.variables import SEPARATING
 
-# Rounding of an acceleration, as a share of its largest terms.
+# Rounding of an acceleration or a reaction, as a share of its largest terms.
 _ROUNDING = 1e-12
 
 # Distance from the edge of a zone within which a contact counts as on the edge, where both sides are right, rad.
@@ -78,20 +78,20 @@ def _violation(scene, mode, forcing, y, rates, s, tolerance):
     if mode.sign == 0:
         kappa, reserve, normal_1, normal_2 = contact.stick(body, mu_s1, mu_s2, sin_phi, cos_phi, omega, ring_epsilon)
         K1, K2 = -kappa * mu_s1, -kappa * mu_s2
-        epsilon, _, _ = ring.acceleration(body, K1, K2, sin_phi, cos_phi, omega)
+        epsilon, _ = ring.acceleration(body, K1, K2, sin_phi, cos_phi, omega)
         least, relaxation = min(reserve, min(normal_1, normal_2)), 0.0
     else:
         sign = 1.0 if v > 0.0 else -1.0
         mu_1, mu_2, slope_1, slope_2 = friction_at(scene.law, abs(v), (mu_s1, mu_k1, mu_s2, mu_k2))
         K1, K2 = -sign * mu_1, -sign * mu_2
-        epsilon, determinant, inertia = ring.acceleration(body, K1, K2, sin_phi, cos_phi, omega)
-        normal_1, normal_2 = ring.reactions(body, K1, K2, sin_phi, cos_phi, omega, epsilon)
+        epsilon, determinant = ring.acceleration(body, K1, K2, sin_phi, cos_phi, omega)
+        normal_1, normal_2 = ring.reactions(body, K1, K2, sin_phi, cos_phi, omega)
         least = min(normal_1, normal_2)
         relaxation = body.radius * abs(ring.acceleration_slope(body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega))
         if mode.region < 0:
             speed = min(speed, 1e3 * stiction_band(scene.law))
         largest = _larger(largest, -mode.sign * v / (tolerance * speed))
-        if not (determinant > 0.0 and inertia > 0.0):
+        if not determinant > 0.0:
             largest = inf
     # An error of the velocity changes the acceleration through the slope of friction, and the mean rate over the step.
     rate_factor = 1.0 / s + relaxation
@@ -119,9 +119,9 @@ def _bristle_violation(scene, mode, forcing, y, rates, s, tolerance):
     sign = 1.0 if v >= 0.0 else -1.0
     rate_1, rate_v1, rate_z1, traction_1, by_v_1, by_z_1 = bristle(scene.law, mu_s1, mu_k1, v, z_1, sign, mode.region)
     rate_2, rate_v2, rate_z2, traction_2, by_v_2, by_z_2 = bristle(scene.law, mu_s2, mu_k2, v, z_2, sign, mode.region)
-    epsilon, determinant, inertia = ring.acceleration(body, -traction_1, -traction_2, sin_phi, cos_phi, omega)
-    normal_1, normal_2 = ring.reactions(body, -traction_1, -traction_2, sin_phi, cos_phi, omega, epsilon)
-    if not (determinant > 0.0 and inertia > 0.0):
+    epsilon, determinant = ring.acceleration(body, -traction_1, -traction_2, sin_phi, cos_phi, omega)
+    normal_1, normal_2 = ring.reactions(body, -traction_1, -traction_2, sin_phi, cos_phi, omega)
+    if not determinant > 0.0:
         largest = inf
     terms = body.gravity + body.radius * (omega * omega + abs(ring_epsilon))
     _, speed, deflection, _, _ = implicit.error_scales(scene, implicit.IMPLICIT_TOLERANCE * tolerance, y)
@@ -190,14 +190,15 @@ def _is_near_another_regime(batch, a, b, fall_rates):
     separating, moved = a.regime == SEPARATING, a.t_end > _LAUNCH_TIME
     found = np.zeros(len(fall_rates), dtype=bool)
     # A least reaction that is smaller than its error leaves separation open.
+    body, omega_squared = batch.body, np.maximum(np.abs(a.omega_min), np.abs(a.omega_max)) ** 2
+    rounding = _ROUNDING * body.mass * (body.gravity + body.radius * omega_squared)
     contacts = (1, a.normal_min_1, b.normal_min_1), (2, a.normal_min_2, b.normal_min_2)
-    for number, least, second_least in contacts[: ring.contact_count(batch.body)]:
+    for number, least, second_least in contacts[: ring.contact_count(body)]:
         separated = separating & ((a.separating_contact.astype(int) & number) > 0)
-        found |= moved & ~separated & (least <= 2.0 * np.abs(least - second_least))
+        found |= moved & ~separated & (least <= np.maximum(2.0 * np.abs(least - second_least), rounding))
     # A reaction that falls slowly may rise again before it vanishes. Its second derivative is at most about that of the
     # weight of a body that swings or revolves, plus that of the centrifugal load, which friction changes.
-    body, (mu, _) = batch.body, roughest(batch.surface)
-    omega_squared = np.maximum(np.abs(a.omega_min), np.abs(a.omega_max)) ** 2
+    mu, _ = roughest(batch.surface)
     friction_term = np.minimum(1.0, 4.0 * mu * mu) * body.radius * omega_squared * omega_squared
     curvature = body.mass * (body.gravity * (body.gravity / body.radius + omega_squared) + friction_term)
     found |= separating & moved & (_FALL_FACTOR * np.abs(a.t_separation - b.t_separation) * curvature > fall_rates)

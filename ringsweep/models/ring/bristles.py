@@ -25,7 +25,7 @@ from ringsweep.models.ring.contacts import (
     zones_at,
     zones_under,
 )
-from ringsweep.models.ring.creep import FAST, INERTIA, NORMAL_1, NORMAL_2, SLOW
+from ringsweep.models.ring.creep import DETERMINANT, FAST, NORMAL_1, NORMAL_2, SLOW
 from ringsweep.models.ring.record import ENDS
 from ringsweep.models.ring.series import AT_ONCE, NEARLY_JAMMED
 from ringsweep.numerics.functions import (
@@ -98,8 +98,8 @@ class Inspection(NamedTuple):
         Time derivative of the state.
     normal_1, normal_2 : float
         Normal reactions, N.
-    D, inertia : float
-        Determinant of the balances and effective inertia; the body jams where one of them is not positive.
+    determinant : float
+        Determinant of the balances, kg m^2; the body jams where it is not positive.
     creep, swing : tuple of float
         Trace, 1/s, and determinant, 1/s^2, of two parts of the linearised equations: sliding with its bristles, and the
         swing of the body.
@@ -114,8 +114,7 @@ class Inspection(NamedTuple):
     rates: tuple[float, float, float, float]
     normal_1: float
     normal_2: float
-    D: float
-    inertia: float
+    determinant: float
     creep: tuple[float, float]
     swing: tuple[float, float]
     omega: float
@@ -149,7 +148,7 @@ def _contacts_at(scene, y, forcing):
 def _rates(scene, now, y, forcing):
     _, _, _, contacts = _contacts_at(scene, y, forcing)
     sin_phi, cos_phi = sine_cosine_near(y[0], now.phi, now.sin_phi, now.cos_phi)
-    epsilon, _, _ = ring.acceleration(scene.body, contacts.K1, contacts.K2, sin_phi, cos_phi, y[1])
+    epsilon, _ = ring.acceleration(scene.body, contacts.K1, contacts.K2, sin_phi, cos_phi, y[1])
     return y[1], epsilon, contacts.rates[0], contacts.rates[1]
 
 
@@ -171,8 +170,8 @@ def _inspection(scene, y, forcing, at):
     b = scene.body
     under, v, sign, now = _contacts_at(scene, y, forcing)
     stuck = _region_guard(scene, under, v, z_1, z_2, sign, BAND) > 0.0
-    epsilon, D, inertia = ring.acceleration(b, now.K1, now.K2, sin_phi, cos_phi, omega)
-    normal_1, normal_2 = ring.reactions(b, now.K1, now.K2, sin_phi, cos_phi, omega, epsilon)
+    epsilon, determinant = ring.acceleration(b, now.K1, now.K2, sin_phi, cos_phi, omega)
+    normal_1, normal_2 = ring.reactions(b, now.K1, now.K2, sin_phi, cos_phi, omega)
     by_v, by_1, by_2 = _sliding_acceleration_slopes(scene, now, sin_phi, cos_phi, omega)
     decay = max(-now.rates_z[0], -now.rates_z[1])
     coupling = abs(by_1 * now.rates_v[0]) + abs(by_2 * now.rates_v[1])
@@ -182,8 +181,7 @@ def _inspection(scene, y, forcing, at):
         (omega, epsilon, now.rates[0], now.rates[1]),
         normal_1,
         normal_2,
-        D,
-        inertia,
+        determinant,
         (decay - by_v, coupling - decay * by_v),
         (by_omega, -by_phi),
         omega,
@@ -268,7 +266,7 @@ def _initial_mode(scene, t, y):
     if v == 0.0:
         mode = Mode(sign, BAND, place_1, place_2)
         now = _contacts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(sign), BAND)
-        epsilon, _, _ = ring.acceleration(scene.body, now.K1, now.K2, sin(phi), cos(phi), omega)
+        epsilon, _ = ring.acceleration(scene.body, now.K1, now.K2, sin(phi), cos(phi), omega)
         sign = 1 if epsilon > ring_epsilon else -1
     place_1, place_2 = places_beyond(scene, place_1, place_2, rho, sign)
     mode = Mode(sign, BAND, place_1, place_2)
@@ -301,26 +299,28 @@ def _status_at_zero_reaction(scene, mode, guard, t, y):
     """Status after a reaction has vanished: jam or separation."""
     body = scene.body
     K1, K2, sin_phi, cos_phi, omega = _sliding_at(scene, mode, t, y)
-    epsilon, D, inertia = ring.acceleration(body, K1, K2, sin_phi, cos_phi, omega)
-    if not (D > 0.0 and inertia > NEARLY_JAMMED * ring.about_axis(body) * D):
-        return JAM
-    normal_1, normal_2 = ring.reactions(body, K1, K2, sin_phi, cos_phi, omega, epsilon)
-    least = AT_ONCE * body.mass * (body.gravity + body.radius * (omega * omega + abs(epsilon)))
+    epsilon, determinant = ring.acceleration(body, K1, K2, sin_phi, cos_phi, omega)
+    normal_1, normal_2 = ring.reactions(body, K1, K2, sin_phi, cos_phi, omega)
+    scale = body.mass * (body.gravity + body.radius * (omega * omega + abs(epsilon)))
+    # Near a jam the polynomial of a reaction is inaccurate, and may vanish where the reaction does not.
+    if (normal_1 if guard == NORMAL_1 else normal_2) > 1e-2 * scale:
+        return JAM if not determinant > NEARLY_JAMMED * ring.free_determinant(body) else BROKEN
+    least = AT_ONCE * scale
     return ENDS[contact.lost(body, guard == NORMAL_1 or normal_1 <= least, guard == NORMAL_2 or normal_2 <= least)]
 
 
 @modes.status_when_stalled.implements(BristleRing)
 def _status_when_stalled(scene, mode, t, y):
     K1, K2, sin_phi, cos_phi, omega = _sliding_at(scene, mode, t, y)
-    _, D, inertia = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
-    return BROKEN if D > 0.0 and inertia > NEARLY_JAMMED * ring.about_axis(scene.body) * D else JAM
+    _, determinant = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
+    return BROKEN if determinant > NEARLY_JAMMED * ring.free_determinant(scene.body) else JAM
 
 
 @modes.switch.implements(BristleRing)
 def _switch(scene, mode, guard, t, y):
     rho, _, z_1, z_2 = y
     sign, place_1, place_2 = mode.sign, mode.place_1, mode.place_2
-    if guard == INERTIA:
+    if guard == DETERMINANT:
         return JAM, mode, y
     if guard in (NORMAL_1, NORMAL_2):
         return _status_at_zero_reaction(scene, mode, guard, t, y), mode, y
@@ -369,7 +369,7 @@ def _in_step(scene, mode, common, forcing, x):
 def _implicit_rates(scene, mode, common, forcing, x):
     radius = scene.body.radius
     _, omega, sin_phi, cos_phi, now = _in_step(scene, mode, common, forcing, x)
-    epsilon, _, _ = ring.acceleration(scene.body, now.K1, now.K2, sin_phi, cos_phi, omega)
+    epsilon, _ = ring.acceleration(scene.body, now.K1, now.K2, sin_phi, cos_phi, omega)
     return x[1] / radius, radius * (epsilon - forcing[2]), now.rates[0], now.rates[1]
 
 
@@ -379,7 +379,7 @@ def _linearise(scene, mode, common, t, forcing, x):
     radius = b.radius
     _, ring_omega, ring_epsilon = forcing
     _, omega, sin_phi, cos_phi, now = _in_step(scene, mode, common, forcing, x)
-    epsilon, _, _ = ring.acceleration(b, now.K1, now.K2, sin_phi, cos_phi, omega)
+    epsilon, _ = ring.acceleration(b, now.K1, now.K2, sin_phi, cos_phi, omega)
     by_phi, by_omega = ring.acceleration_gradient(b, now.K1, now.K2, sin_phi, cos_phi, omega)
     by_v, by_1, by_2 = _sliding_acceleration_slopes(scene, now, sin_phi, cos_phi, omega)
     by_time = radius * (by_phi * ring_omega + by_omega * ring_epsilon - drives.jerk(scene.drive, t))
@@ -406,11 +406,11 @@ def _guards_and_motion(scene, mode, common, forcing, x):
     rho, v, z_1, z_2 = x
     b, sign = scene.body, float(mode.sign)
     phi, omega, sin_phi, cos_phi, now = _in_step(scene, mode, common, forcing, x)
-    epsilon, determinant, inertia = ring.acceleration(b, now.K1, now.K2, sin_phi, cos_phi, omega)
-    normal_1, normal_2 = ring.reactions(b, now.K1, now.K2, sin_phi, cos_phi, omega, epsilon)
+    epsilon, determinant = ring.acceleration(b, now.K1, now.K2, sin_phi, cos_phi, omega)
+    normal_1, normal_2 = ring.reactions(b, now.K1, now.K2, sin_phi, cos_phi, omega)
     ahead_1, ahead_2 = edges_ahead(scene, mode, rho)
     guards = (
-        min(determinant, inertia),
+        determinant,
         sign * v,
         normal_1,
         normal_2,

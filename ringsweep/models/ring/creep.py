@@ -17,7 +17,7 @@ from ringsweep.physics import drives, ring
 from ringsweep.physics.friction.velocity import friction_in, region_bounds, stiction_band
 
 #: Indices of the guards, in the order of the rows of the series.
-INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(6)
+DETERMINANT, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(6)
 
 
 class Common(NamedTuple):
@@ -99,7 +99,7 @@ def _rates(scene, mode, common, forcing, x):
     radius = scene.body.radius
     _, omega, sin_phi, cos_phi = _in_space(common, forcing, x)
     K1, K2, _, _ = _friction(scene, mode, common, x[1])
-    epsilon, _, _ = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
+    epsilon, _ = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
     return x[1] * common.per_radius, radius * (epsilon - forcing[2])
 
 
@@ -110,7 +110,7 @@ def _linearise(scene, mode, common, t, forcing, x):
     _, ring_omega, ring_epsilon = forcing
     _, omega, sin_phi, cos_phi = _in_space(common, forcing, x)
     K1, K2, slope_1, slope_2 = _friction(scene, mode, common, x[1])
-    epsilon, _, _ = ring.acceleration(b, K1, K2, sin_phi, cos_phi, omega)
+    epsilon, _ = ring.acceleration(b, K1, K2, sin_phi, cos_phi, omega)
     by_phi, by_omega = ring.acceleration_gradient(b, K1, K2, sin_phi, cos_phi, omega)
     by_v = ring.acceleration_slope(b, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega)
     jerk = drives.jerk(scene.drive, t)
@@ -126,13 +126,13 @@ def _linearise(scene, mode, common, t, forcing, x):
 def _guards_and_motion(scene, mode, common, forcing, x):
     phi, omega, sin_phi, cos_phi = _in_space(common, forcing, x)
     K1, K2, _, _ = _friction(scene, mode, common, x[1])
-    epsilon, determinant, inertia = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
-    normal_1, normal_2 = ring.reactions(scene.body, K1, K2, sin_phi, cos_phi, omega, epsilon)
+    epsilon, determinant = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
+    normal_1, normal_2 = ring.reactions(scene.body, K1, K2, sin_phi, cos_phi, omega)
     ahead_1, ahead_2 = edges_ahead(scene, mode, x[0])
     low, high = region_bounds(scene.law, mode.region)
     speed = mode.sign * x[1]
     guards = (
-        min(determinant, inertia),
+        determinant,
         speed - low,
         normal_1,
         normal_2,
@@ -147,8 +147,7 @@ def _near_zero(scene, motion):
     b = scene.body
     _, omega, _, _ = motion
     load = 0.05 * b.mass * (b.gravity + b.radius * omega * omega)
-    inertia = 0.02 * ring.reaction_determinant(b) * min(1.0, ring.about_axis(b))
-    return inertia, 0.0, load, load, 0.0, 0.0
+    return 0.02 * ring.free_determinant(b), 0.0, load, load, 0.0, 0.0
 
 
 @implicit.motion.implements(ring.Ring, ring.BristleRing)

@@ -27,8 +27,8 @@ class Inspection(NamedTuple):
         Sliding velocity, m/s.
     normal_1, normal_2 : float
         Normal reactions, N.
-    D, inertia : float
-        Determinant of the balances and effective inertia; the body jams where one of them is not positive.
+    determinant : float
+        Determinant of the balances, kg m^2; the body jams where it is not positive.
     slope : float
         Derivative of the angular acceleration by the angular velocity through the friction coefficients, 1/s.
     by_phi, by_omega : float
@@ -41,8 +41,7 @@ class Inspection(NamedTuple):
     v: float
     normal_1: float
     normal_2: float
-    D: float
-    inertia: float
+    determinant: float
     slope: float
     by_phi: float
     by_omega: float
@@ -81,26 +80,26 @@ def _inspection(scene, y, forcing, at):
     """Inspection of a state, given sine and cosine of the angle."""
     (phi, omega), (sin_phi, cos_phi) = y, at
     v, K1, K2, slope_1, slope_2 = ring.friction(scene, phi, omega, forcing[0], forcing[1])
-    epsilon, D, inertia = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
-    normal_1, normal_2 = ring.reactions(scene.body, K1, K2, sin_phi, cos_phi, omega, epsilon)
+    epsilon, determinant = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
+    normal_1, normal_2 = ring.reactions(scene.body, K1, K2, sin_phi, cos_phi, omega)
     slope = ring.acceleration_slope(scene.body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega)
     by_phi, by_omega = ring.acceleration_gradient(scene.body, K1, K2, sin_phi, cos_phi, omega)
     return Inspection(
-        (omega, epsilon), v, normal_1, normal_2, D, inertia, slope, by_phi, by_omega, phi, sin_phi, cos_phi, omega
+        (omega, epsilon), v, normal_1, normal_2, determinant, slope, by_phi, by_omega, phi, sin_phi, cos_phi, omega
     )
 
 
 @constant_step.holds.implements(ring.Ring, ring.BristleRing)
 def _holds(scene, now):
     # Comparisons with NaN are false.
-    supported = (now.D > 0.0) & (now.inertia > 0.0) & (now.normal_1 > 0.0) & (now.normal_2 > 0.0)
+    supported = (now.determinant > 0.0) & (now.normal_1 > 0.0) & (now.normal_2 > 0.0)
     return supported & (abs(now.rates[1]) < inf) & (abs(now.omega) < inf)
 
 
 @constant_step.verdict.implements(ring.Ring, ring.BristleRing)
 def _verdict(scene, before, now):
-    if not (now.D > 0.0 and now.inertia > 0.0):
-        return (BROKEN if isnan(now.inertia) else JAM), 1.0
+    if not now.determinant > 0.0:
+        return (BROKEN if isnan(now.determinant) else JAM), 1.0
     if not (isfinite(now.rates[1]) and isfinite(now.omega)):
         return BROKEN, 1.0
     first, second = _root_fraction(before.normal_1, now.normal_1), _root_fraction(before.normal_2, now.normal_2)

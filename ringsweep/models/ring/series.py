@@ -61,18 +61,24 @@ from ringsweep.physics.friction.velocity import (
     varies,
 )
 
-# Rows of the table of series. The guards are last. INERTIA is the first guard: the others mean nothing after a jam.
+# Rows of the table of series. The guards are last. DETERMINANT is the first guard: the others mean nothing after
+# a jam.
 PHI, V, OMEGA, EPSILON, SIN, COS, SQUARE, THETA, SPARE = range(9)
 # Factors of the products that grow side by side, in several rows.
 FACTORS = 9
 _GUARDS = FACTORS + MOST_GROUPS * FACTOR_ROWS
-INERTIA, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(_GUARDS, _GUARDS + 6)
+DETERMINANT, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(_GUARDS, _GUARDS + 6)
 
 # If one reaction vanishes and the other is smaller than this share of the load, both contacts separate.
 AT_ONCE = 1e-9
 
-# If the effective inertia is smaller than this share of the moment of inertia about the axis, the body is about to jam.
-NEARLY_JAMMED = 1e-4
+# The body is about to jam if the determinant of the balances is smaller than the first share of its value without
+# friction. If friction varies with the speed, the body jams at the second share.
+NEARLY_JAMMED, LEAST_DETERMINANT = 1e-4, 1e-6
+
+# Near the instant at which both roots of the equation of stick meet, its series converge ever more slowly. A
+# discriminant below this share of its terms is zero.
+_LEAST_DISCRIMINANT = 1e-12
 
 # Friction coefficients that differ by less than this share are equal.
 _EQUAL = 1e-14
@@ -111,7 +117,7 @@ def _initial_state(scene):
 
 @series.table_shape.implements(ring.Ring)
 def _table_shape(scene):
-    return FAST + 1, INERTIA
+    return FAST + 1, DETERMINANT
 
 
 @modes.initial_mode.implements(ring.Ring)
@@ -125,7 +131,7 @@ def _initial_mode(scene, t, y):
     region, entry_guard = region_at(scene.law, abs(v)), -1
     if v == 0.0:
         # Friction is zero here, so that the body slides in the direction in which the other forces accelerate it.
-        epsilon, _, _ = ring.acceleration(scene.body, 0.0, 0.0, sin(phi), cos(phi), ring_omega)
+        epsilon, _ = ring.acceleration(scene.body, 0.0, 0.0, sin(phi), cos(phi), ring_omega)
         sign, entry_guard = (1 if epsilon >= ring_epsilon else -1), SLOW
     mode = Mode(sign, region, entry_guard, *places_beyond(scene, place_1, place_2, phi - theta, sign))
     return _after_jump(scene, mode, t, y), mode
@@ -190,14 +196,14 @@ def _friction_at(scene, mode, t, v):
 
 @inlined
 def _sliding_at(scene, mode, t, y):
-    """D, effective inertia, both reactions and their scale in slip, from the balances and not from a series."""
+    """Determinant of the balances, both reactions and their scale in slip, from the balances and not from a series."""
     phi, v = y
     body = scene.body
     K1, K2, omega = _friction_at(scene, mode, t, v)
-    epsilon, determinant, inertia = ring.acceleration(body, K1, K2, sin(phi), cos(phi), omega)
-    normal_1, normal_2 = ring.reactions(body, K1, K2, sin(phi), cos(phi), omega, epsilon)
+    epsilon, determinant = ring.acceleration(body, K1, K2, sin(phi), cos(phi), omega)
+    normal_1, normal_2 = ring.reactions(body, K1, K2, sin(phi), cos(phi), omega)
     scale = body.mass * (body.gravity + body.radius * (omega * omega + abs(epsilon)))
-    return determinant, inertia, normal_1, normal_2, scale
+    return determinant, normal_1, normal_2, scale
 
 
 @inlined
@@ -205,18 +211,16 @@ def _is_jamming(scene, mode, t, y):
     """Whether slip is so near to a jam, where reactions grow without bound, that their signs mean nothing."""
     if mode.sign == 0:
         return False
-    determinant, inertia, _, _, _ = _sliding_at(scene, mode, t, y)
-    return not (determinant > 0.0 and inertia > NEARLY_JAMMED * ring.about_axis(scene.body) * determinant)
+    determinant, _, _, _ = _sliding_at(scene, mode, t, y)
+    return not determinant > NEARLY_JAMMED * ring.free_determinant(scene.body)
 
 
 @inlined
 def _after_zero_reaction(scene, mode, guard, t, y):
     """Status, mode and state after a reaction has vanished."""
     if mode.sign == 0:
-        # Slip with both contacts closed may follow.
-        status, slip = _mode_at_rest(scene, t, y[0], mode.place_1, mode.place_2, 2)
-        if status == RUNNING:
-            return status, slip, (y[0], 0.0)
+        # The contact opens, even if slip with both contacts closed were admissible: laws with a narrow stiction band
+        # still hold the body at this instant.
         _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
         mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
         _, _, normal_1, normal_2 = contact.stick(
@@ -224,10 +228,10 @@ def _after_zero_reaction(scene, mode, guard, t, y):
         )
         scale = scene.body.mass * (scene.body.gravity + scene.body.radius * ring_omega * ring_omega)
     else:
-        _, _, normal_1, normal_2, scale = _sliding_at(scene, mode, t, y)
+        _, normal_1, normal_2, scale = _sliding_at(scene, mode, t, y)
         # Near a jam the series of a reaction is inaccurate, and may vanish where the reaction does not.
-        if _is_jamming(scene, mode, t, y) or (normal_1 if guard == NORMAL_1 else normal_2) > 1e-2 * scale:
-            return JAM, mode, y
+        if (normal_1 if guard == NORMAL_1 else normal_2) > 1e-2 * scale:
+            return JAM if _is_jamming(scene, mode, t, y) else BROKEN, mode, y
     least = AT_ONCE * scale
     opens_1, opens_2 = guard == NORMAL_1 or normal_1 <= least, guard == NORMAL_2 or normal_2 <= least
     return ENDS[contact.lost(scene.body, opens_1, opens_2)], mode, y
@@ -237,10 +241,10 @@ def _after_zero_reaction(scene, mode, guard, t, y):
 def _status_when_stalled(scene, mode, t, y):
     if mode.sign == 0:
         return BROKEN
-    # Where friction changes fast with the speed, the inertia does not show the jam: test with the static coefficients.
+    # Where friction changes fast with the speed, the determinant does not show the jam: test with static coefficients.
     mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
-    _, determinant, inertia = ring.acceleration(scene.body, -mode.sign * mu_s1, -mode.sign * mu_s2, 0.0, 1.0, 0.0)
-    return JAM if _is_jamming(scene, mode, t, y) or not (determinant > 0.0 and inertia > 0.0) else BROKEN
+    _, determinant = ring.acceleration(scene.body, -mode.sign * mu_s1, -mode.sign * mu_s2, 0.0, 1.0, 0.0)
+    return JAM if _is_jamming(scene, mode, t, y) or not determinant > 0.0 else BROKEN
 
 
 @modes.switch.implements(ring.Ring)
@@ -249,7 +253,7 @@ def _switch(scene, mode, guard, t, y):
     sign, region, place_1, place_2 = mode.sign, mode.region, mode.place_1, mode.place_2
     if guard in (NORMAL_1, NORMAL_2):
         return _after_zero_reaction(scene, mode, guard, t, y)
-    if guard == INERTIA:
+    if guard == DETERMINANT:
         return JAM, mode, y
     if sign == 0:
         stick_end = 1 if guard == SLOW else -1 if guard == FAST else 2
@@ -265,7 +269,9 @@ def _switch(scene, mode, guard, t, y):
         return RUNNING, Mode(sign, region + 1, SLOW, place_1, place_2), (phi, sign * high)
     if low > 0.0:
         return RUNNING, Mode(sign, region - 1, FAST, place_1, place_2), (phi, sign * low)
-    if region < 0:
+    mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
+    # A body that nothing holds passes through rest.
+    if region < 0 or mu_s1 + mu_s2 == 0.0:
         return RUNNING, Mode(-sign, region, SLOW, place_1, place_2), (phi, 0.0)
     status, next_mode = _mode_at_rest(scene, t, phi, place_1, place_2, 0)
     return status, next_mode, (phi, 0.0)
@@ -352,12 +358,11 @@ def _expand_slip(scene, mode, c):
         c[PHI, k], c[OMEGA, k], c[V, k] = before * INVERSE[k], omega, sign * x
         c[SIN, k], c[COS, k], c[SQUARE, k], c[EPSILON, k] = sine, cosine, square, epsilon
         c[NORMAL_1, k], c[NORMAL_2, k] = N1, N2
-        c[INERTIA, k] = effective_inertia(body, 0.0, K1 - K2, both + K1_0 * K2 + K1 * K2_0)
+        c[DETERMINANT, k] = determinant(body, 0.0, K1 - K2, both + K1_0 * K2 + K1 * K2_0)
         before = omega
-    # Before a jam the accelerations grow without bound, so that a small effective inertia counts as a jam.
-    _, determinant, inertia = ring.acceleration(body, K1_0, K2_0, 0.0, 0.0, 0.0)
-    least = 1e-6 * ring.about_axis(body) * determinant if varies(scene.law, mode.region) else 0.0
-    c[INERTIA, 0] = inertia if determinant > 0.0 and inertia > least else -1.0
+    # Before a jam the accelerations grow without bound, so that a small determinant counts as a jam.
+    least = LEAST_DETERMINANT * ring.free_determinant(body) if varies(scene.law, mode.region) else 0.0
+    c[DETERMINANT, 0] = determinant(body, 1.0, K1_0 - K2_0, K1_0 * K2_0) - least
     return sharpness
 
 
@@ -404,13 +409,13 @@ def _two_slip_balance(body, K1, K2):
     #     (sb + K1 lever) N1 - (sb - K2 lever) N2 = M g (1 - M xi^2/I) sin phi - (F1 + F2) lever
     b = body
     sb, cb = b.sin_beta, b.cos_beta
-    about_axis = ring.about_axis(b)
-    lever = cb - b.mass * b.xi * b.radius / about_axis
+    about_axis = b.inertia + b.mass * b.xi * b.xi
+    _, lever, pull = b.reaction
     a1, a2 = cb - K1 * sb, cb + K2 * sb
     b1, b2 = sb + K1 * lever, sb - K2 * lever
     scale = 1.0 / (a2 * b1 + a1 * b2)
     a1, a2, b1, b2 = a1 * scale, a2 * scale, b1 * scale, b2 * scale
-    along, across = b.mass * b.gravity * (1.0 - b.mass * b.xi * b.xi / about_axis), b.mass * b.gravity
+    along, across = b.mass * pull, b.mass * b.gravity
     lift = b.mass * b.xi
     sine_1, cosine_1, square_1 = a2 * along, b2 * across, b2 * lift
     sine_2, cosine_2, square_2 = -a1 * along, b1 * across, b1 * lift
@@ -440,8 +445,8 @@ def _one_slip_balance(body, K1, K2):
 
 
 @hook(optional=True)
-def effective_inertia(body, one, difference, both):
-    """Effective inertia times D, which a jam makes zero, as a linear function of K_1 - K_2 and K_1 K_2.
+def determinant(body, one, difference, both):
+    """Determinant of the balances, which falls to 0 at a jam, as a linear function of K_1 - K_2 and K_1 K_2.
 
     Parameters
     ----------
@@ -454,15 +459,15 @@ def effective_inertia(body, one, difference, both):
     Returns
     -------
     float
-        In the unit of the third result of :func:`ringsweep.physics.ring.acceleration`. By default `one`: the body
+        In the unit of the second result of :func:`ringsweep.physics.ring.acceleration`. By default `one`: the body
         cannot jam.
     """
     return one
 
 
-@effective_inertia.implements(ring.TwoContacts)
-def _two_effective_inertia(body, one, difference, both):
-    i_0, i_1, i_2 = body.effective
+@determinant.implements(ring.TwoContacts)
+def _two_determinant(body, one, difference, both):
+    i_0, i_1, i_2 = body.determinant
     return i_0 * one + i_1 * difference + i_2 * both
 
 
@@ -509,7 +514,7 @@ def _expand_stick(scene, mode, tolerance, c):
     mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
     c[EDGE, 0] = inf
     stick_series(scene.body, mu_s1, mu_s2, c)
-    c[INERTIA, 0] = inf
+    c[DETERMINANT, 0] = inf
     per_load = 1.0 / (scene.body.mass * (scene.body.gravity + scene.body.radius * c[SQUARE, 0]))
     last, previous = 0.0, 0.0
     for row, unit in ((PHI, 1.0), (SIN, 1.0), (COS, 1.0), (SLOW, per_load), (FAST, per_load)):
@@ -551,20 +556,22 @@ def _two_stick_series(body, m1, m2, c):
         friction = (moment * c[EPSILON, k] + b.mass * b.gravity * b.xi * c[SIN, k]) / b.radius
         difference = (b.mass * (b.xi * c[EPSILON, k] + b.gravity * c[SIN, k]) - friction * cb) / sb
         load = b.mass * (b.xi * c[SQUARE, k] + b.gravity * c[COS, k])
-        # mean cb total^2 - linear total - constant = 0
+        # mean cb total^2 - linear total - constant = 0; without friction cb total = load
         linear = mean * load - cb * half * difference + sb * half * friction
         share = half * load + mean * sb * friction
         constant, square, mixed, total = part_from(inner_products(c, FACTORS, k, first, newest), own, ())
         # Where both roots meet, stick ends: no friction gives the acceleration of the ring.
         if k == 0:
             first_difference, first_share, first_linear = difference, share, linear
-            c[EDGE, 0] = linear * linear + 4.0 * mean * cb * difference * share
-            total = first_total = (linear + sqrt(max(c[EDGE, 0], 0.0))) / (2.0 * mean * cb)
+            products = 4.0 * mean * cb * difference * share
+            c[EDGE, 0] = linear * linear + products - _LEAST_DISCRIMINANT * (linear * linear + abs(products))
+            root = linear + sqrt(max(linear * linear + products, 0.0))
+            total = first_total = root / (2.0 * mean * cb) if mean > 0.0 else load / cb
         else:
             constant += first_difference * share + difference * first_share
             c[EDGE, k] = square + 2.0 * first_linear * linear + 4.0 * mean * cb * constant
             rest = constant + mixed + linear * first_total - mean * cb * total
-            total = rest / (2.0 * mean * cb * first_total - first_linear)
+            total = rest / (2.0 * mean * cb * first_total - first_linear) if mean > 0.0 else load / cb
             left, right = (difference, linear, linear, total), (share, linear, total, total)
             newest = set_factors(c, FACTORS, k, left, right)
             first = newest if k == 1 else first
@@ -651,4 +658,4 @@ def _after_first_step(mode):
 
 
 #: Hooks that the series need of a body.
-BODY_MEMBERS = (slip_balance, effective_inertia, stick_series)
+BODY_MEMBERS = (slip_balance, determinant, stick_series)
