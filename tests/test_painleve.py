@@ -1,7 +1,7 @@
 """The determinant at which the body jams, from the equations of a body that is free to leave the race.
 
-Forces act on a free body with a mass and a moment of inertia. Its positions a short time later give the accelerations of
-both gaps, and differences between forces give the matrix A. No formula of the package is used.
+Forces act on a free body with a mass and a moment of inertia. Its positions a short time before and after give the
+accelerations of both gaps, and differences between forces give the matrix A. No formula of the package is used.
 """
 
 import numpy as np

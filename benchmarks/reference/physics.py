@@ -15,10 +15,13 @@ from benchmarks.reference.problem import (
     ARCTAN,
     BELT,
     BENGISU,
+    BUMP,
     CONSTANT,
     CUBIC,
     DAHL,
     ELASTO,
+    HUMP,
+    JUMP,
     KARNOPP,
     LINEAR,
     NONE,
@@ -28,11 +31,14 @@ from benchmarks.reference.problem import (
     SINGLE,
     SINUSOIDAL,
     STICTION,
+    TENT,
     THRELFALL,
     TURN,
     TUSTIN,
 )
 
+#: Where steps must end about a narrow bump of a law, in widths.
+BUMP_CORNERS = np.array([-6.0, -3.0, -1.5, 0.0, 1.5, 3.0, 6.0])
 #: Solutions of a contact problem: stick, slip backward or forward, contacts that separate, no solution, several.
 STICK, BACKWARD, FORWARD, OPEN_1, OPEN_2, OPEN_BOTH, JAMMED, SEVERAL = 0, -1, 1, 2, 3, 4, 5, 6
 #: A determinant below this share of its value without friction counts as zero.
@@ -73,6 +79,16 @@ def coefficient(p, piece, speed, mu_s, mu_k):
     size = abs(piece)
     if p.law == TUSTIN:
         return mu_k + (mu_s - mu_k) * math.exp(-max(p.alpha * speed, -50.0))
+    if p.law == BUMP:
+        x = (speed - p.vb) / p.w
+        return mu_k + p.h * math.exp(-x * x)
+    if p.law == TENT and 1 < size < 4:
+        return mu_k + p.h * (1.0 + (speed - p.vb) / p.w * (1.0 if size == 2 else -1.0))
+    if p.law == HUMP and size == 2:
+        x = (speed - p.vb) / p.w
+        return mu_s - p.unit * x * x
+    if p.law == JUMP:
+        return mu_s if size == 1 else mu_k
     if p.law == THRELFALL and size == 1:
         return mu_k * (1.0 - math.exp(-3.0 * max(speed / p.v0, -20.0))) / (1.0 - math.exp(-3.0))
     if p.law == LINEAR and size < 3:
@@ -134,6 +150,18 @@ def corners(p, piece):
         if size == 1:
             return 0.0, p.v0
         return (p.v0, p.v1) if size == 2 else (p.v1, math.inf)
+    if p.law == BUMP or p.law == TENT or p.law == HUMP or p.law == JUMP:
+        if p.law == BUMP:
+            places = p.vb + p.w * BUMP_CORNERS
+        elif p.law == TENT:
+            places = p.vb + p.w * np.array([-1.0, 0.0, 1.0])
+        elif p.law == HUMP:
+            # Only for a surface that is the same everywhere.
+            places = p.vb + p.w * math.sqrt((p.mu_s[0] - p.mu_k[0]) / p.unit) * np.array([-1.0, 1.0])
+        else:
+            places = np.array([p.vb])
+        low = places[size - 2] if size > 1 else 0.0
+        return low, places[size - 1] if size <= places.size else math.inf
     if p.law == KARNOPP:
         # The dead band has two pieces: 1 while friction holds the load, 3 while the load exceeds mu_s.
         return (p.dead_band, math.inf) if size == 2 else (-p.dead_band, p.dead_band)
@@ -231,10 +259,16 @@ def friction(p, k, piece, v, z):
 
 
 @njit(cache=True, error_model="numpy")
+def pull(p, t, x):
+    """Force of the spring and of the drive on a body on the belt."""
+    return p.force * math.sin(TURN * p.force_frequency * t + p.force_phase) - (p.stiffness + p.cubic * x * x) * x
+
+
+@njit(cache=True, error_model="numpy")
 def load_on_band(p, t, y):
     """Friction force with which a body on the belt keeps its sliding velocity."""
     theta, _, ring_epsilon = drive(p, t)
-    return -p.stiffness * (y[0] + theta) - p.mass * ring_epsilon
+    return pull(p, t, y[0] + theta) - p.mass * ring_epsilon
 
 
 @njit(cache=True, error_model="numpy")
@@ -253,7 +287,7 @@ def state(p, k1, k2, piece, t, y):
             K1 = -load_on_band(p, t, y) if abs(piece) == 1 else -math.copysign(p.mu_s[0], piece)
         else:
             K1 -= p.viscous * y[1]
-        epsilon = (K1 - p.stiffness * phi) / p.mass
+        epsilon = (K1 + pull(p, t, phi)) / p.mass
         return phi, omega, epsilon, 1.0, 1.0, 1.0, ring_epsilon, rate1, 0.0
     K2, rate2 = friction(p, k2, piece, y[1], y[3]) if p.model == RING else (0.0, 0.0)
     epsilon, N1, N2, det = closed(p, phi, omega, K1, K2)
@@ -421,7 +455,7 @@ def stick_reserves(p, k1, k2, t, rho, least):
     """Distances of a body in stick from breakaway and from the separation of each contact; positive if it can stick."""
     if p.model == BELT:
         theta, _, ring_epsilon = drive(p, t)
-        load = -p.stiffness * (rho + theta) - p.mass * ring_epsilon
+        load = pull(p, t, rho + theta) - p.mass * ring_epsilon
         return 1.0 - abs(load) / p.mu_s[k1 % p.edges.size], 1.0, 1.0
     kappa, N1, N2 = stick_reactions(p, k1, k2, t, rho)
     if not abs(kappa) < math.inf:
@@ -474,10 +508,10 @@ def resting_problem(p, k1, k2, t, rho, least):
 @njit(cache=True, error_model="numpy")
 def is_set_valued(p):
     """Whether the law is set-valued at rest."""
-    return p.law <= TUSTIN
+    return p.law <= JUMP
 
 
 @njit(cache=True, error_model="numpy")
 def falls_at_rest(p):
     """Whether friction falls at once at breakaway."""
-    return p.law == STICTION
+    return p.law == STICTION or p.law == BUMP or p.law == TENT or p.law == HUMP

@@ -31,7 +31,7 @@ from benchmarks.reference.physics import (
     stick_reserve,
     stick_reserves,
 )
-from benchmarks.reference.problem import BELT, DAHL, KARNOPP, POWER, RESET, RING, SINUSOIDAL, TABLE, TURN
+from benchmarks.reference.problem import BELT, DAHL, JUMP, KARNOPP, POWER, RESET, RING, SINUSOIDAL, TABLE, TURN
 from benchmarks.reference.radau import NODES, attempt, interpolate, jacobian
 
 #: Ends of a run, in addition to the solutions of the contact problem.
@@ -248,6 +248,8 @@ def run(p, rtol, least, slack, most_steps):
     longest = span / 20.0
     if p.drive == SINUSOIDAL:
         longest = min(longest, 0.05 / p.frequency)
+    if p.force != 0.0:
+        longest = min(longest, 0.05 / p.force_frequency)
     h, before, steps, events, stalled = min(1e-4, longest), 0.0, 0, 0, 0
 
     while t < span:
@@ -443,8 +445,12 @@ def run(p, rtol, least, slack, most_steps):
             piece *= 2
         elif hit == _FASTER:
             piece += 1 if piece > 0 else -1
+            if p.law == JUMP:
+                mode = sliding_problem(p, k1, k2, piece, t, y, least)
         elif abs(piece) > 1 and p.law != RESET:
             piece -= 1 if piece > 0 else -1
+            if p.law == JUMP:
+                mode = sliding_problem(p, k1, k2, piece, t, y, least)
         elif set_valued:
             y[1] = 0.0
             mode = resting_problem(p, k1, k2, t, y[0], least)
