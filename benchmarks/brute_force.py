@@ -170,7 +170,7 @@ def parameters(rng, law, belt, weight=1.0):
     v0, vb = log(rng, -9, 0), log(rng, -2, 0.5) * (0.3 if belt else 1.0)
     values = {
         "vb": vb,
-        "w": vb * log(rng, -2, -0.7),
+        "w": vb * log(rng, -2, -0.8),
         "alpha": log(rng, 0, 7),
         "v0": v0,
         "v1": v0 * (1.0 + log(rng, -1, 2)),
