@@ -55,7 +55,8 @@ class Accessor:
     def simulate(self, sel: Mapping[str, float | str] | None = None, /, **cell: float | str) -> xr.Dataset:
         """Time history of the cell nearest to some values of the coordinates; see :func:`ringsweep.plots.cell`.
 
-        The values are a mapping, such as ``{"drive.amplitude": 2}``, or keywords, such as ``drive_amplitude=2``.
+        The values are a mapping, such as ``{"drive.amplitude": 2}``, or keywords, such as ``drive_amplitude=2``. A
+        warning tells the value taken if it is another.
         """
         from ringsweep.plots.selection import cell as configuration_of
         from ringsweep.runs.simulate import simulate

@@ -131,11 +131,16 @@ def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None
     curves = None
     try:
         if arguments.boundaries is not None:
-            from ringsweep.plots.selection import select
-            from ringsweep.runs.boundaries import boundary
+            from ringsweep.plots.selection import select_grid
+            from ringsweep.runs.boundaries import boundary, run_at
 
             tolerance = 1e-6 if arguments.tolerance is None else arguments.tolerance
-            curves = boundary(select(result, selection)[0], arguments.boundaries, tolerance)
+            # The picture shows the cells between which the curves lie.
+            result, missing = select_grid(result, selection)
+            selection = {}
+            if missing:
+                result = run_at(result, missing, arguments.boundaries)
+            curves = boundary(result, arguments.boundaries, tolerance)
             written = dataset.with_name(f"{target.stem}-{arguments.boundaries}.nc")
             netcdf.save(curves, written)
             print(f"wrote {written}")

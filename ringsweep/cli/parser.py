@@ -91,7 +91,7 @@ def build_parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="DIM=VALUE",
-        help="fix a coordinate at its value nearest to VALUE; units allowed",
+        help="fix a coordinate at its value nearest to VALUE, with --boundaries at VALUE; units allowed",
     )
 
     draw.add_argument("--boundaries", metavar="REGIME", help="locate the boundary of a regime: curves, also as NetCDF")
