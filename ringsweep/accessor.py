@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 
@@ -39,6 +40,20 @@ class Accessor:
         from ringsweep.quantities.variables import words
 
         return words(self._ds[var])
+
+    def to_frame(self) -> pd.DataFrame:
+        """Table with a row for each cell: coordinates, then variables, with classifications as categories of words."""
+        import pandas as pd
+
+        from ringsweep.quantities.variables import words
+
+        frame = self._ds.to_dataframe().reset_index()
+        for name, variable in self._ds.data_vars.items():
+            if "flag_meanings" in variable.attrs:
+                known = str(variable.attrs["flag_meanings"]).split()
+                named = words(variable).to_dataframe(name=name).reset_index()[name]
+                frame[name] = pd.Categorical(named, categories=known)
+        return frame
 
     def map(self, var: str = "regime", **options: Any) -> Figure:
         """A map of a variable; other arguments as for :func:`ringsweep.plots.regime_map`."""

@@ -46,7 +46,7 @@ def run_command(arguments: argparse.Namespace) -> None:
         raise InputError("--backend", "dask needs the address of its scheduler: --scheduler ADDRESS")
     if arguments.backend == "threads" and arguments.scheduler is not None:
         raise InputError("--scheduler", "is for --backend dask")
-    config = refined(load(arguments.config), arguments.refine or None)
+    config = refined(load(arguments.config, arguments.set), arguments.refine or None)
     target, picture = _outputs(f"{config.name}.nc" if arguments.output is None else arguments.output, "regime", "sweep")
 
     if arguments.dry_run:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 import signal
 import sys
 import threading
@@ -13,7 +14,7 @@ from contextlib import contextmanager, nullcontext, redirect_stdout, suppress
 from typing import Any
 
 from ringsweep.cli.parser import build_parser
-from ringsweep.errors import InputError, shortened
+from ringsweep.errors import InputError, nearest_name, shortened
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -36,8 +37,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     arguments, unknown = parser.parse_known_args(given)
     if unknown:
+        near = nearest_name(unknown[0], re.findall(r"--[a-z-]+", arguments.parser.format_usage()))
         takes_values = any(option in given for option in ("--set", "--sel"))
         hint = "; a value with a space needs quotes: --set 'drive.amplitude=2 rad/s'" if takes_values else ""
+        hint = f"; did you mean {near}?" if unknown[0].startswith("-") and near else hint
         parser.error(f"unrecognized arguments: {' '.join(unknown)}{hint}")
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
     logging.getLogger().handlers[0].setFormatter(_Formatter(_is_coloured(sys.stderr)))
