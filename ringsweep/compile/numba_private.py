@@ -342,8 +342,8 @@ if AVAILABLE:
     class _SealedFiles(IndexDataCacheFile):
         """Files of the cache, each with a digest in front, which also covers the sources and the version of Numba.
 
-        A file of compiled code holds the name of its kernel, the signature and the processor too: a file that was copied
-        over another is whole, but it is not what is looked for.
+        A file of compiled code also holds the name of its kernel, the signature and the processor: a file that was
+        copied over another is whole, but it is not what is looked for.
         """
 
         def save(self, key: Any, data: Any) -> None:

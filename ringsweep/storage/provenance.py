@@ -46,8 +46,9 @@ def processor() -> str:
 
     Another one may round sums of products differently, and so may the same one with a feature that is turned off.
     """
-    name = numba.config.CPU_NAME or llvmlite.binding.get_host_cpu_name()
-    features = numba.config.CPU_FEATURES or llvmlite.binding.get_host_cpu_features().flatten()
+    options: Any = numba.config
+    name = options.CPU_NAME or llvmlite.binding.get_host_cpu_name()
+    features = options.CPU_FEATURES or llvmlite.binding.get_host_cpu_features().flatten()
     return f"{name}-{hashlib.sha256(features.encode()).hexdigest()[:8]}"
 
 
