@@ -190,6 +190,25 @@ def test_misspelt_option_and_configuration_in_place_of_a_result_are_told(folder,
     )
 
 
+def test_control_characters_of_a_file_and_of_a_name_are_escaped(folder, capsys):
+    assert main(["run", "case.yaml", "-o", "out.nc"]) == 0
+    with netcdf.open_dataset("out.nc") as result:
+        crafted = result.load()
+    crafted["drive_amplitude"].attrs["units"] = "\x1b[2Jrad/s"
+    crafted.to_netcdf("crafted.nc")
+    assert main(["info", "crafted.nc"]) == 0
+    assert main(["map", "no\x1b[31m.nc"]) == 2
+    out, err = capsys.readouterr()
+    assert "\x1b" not in out + err
+    assert "0.1 to 10 \\x1b[2Jrad/s" in out
+    assert "no\\x1b[31m.nc: does not exist" in err
+
+
+def test_link_to_itself_is_no_output(folder, capsys):
+    (folder / "loop.nc").symlink_to("loop.nc")
+    assert "loop.nc: is a symbolic link that leads to itself" in refused(capsys, "run", "case.yaml", "-o", "loop.nc")
+
+
 def test_run_takes_values_from_the_command_line(folder):
     assert main(["run", "case.yaml", "--set", "time.span=2 s", "--set", "solver.steps=500", "-o", "short.nc"]) == 0
     configuration = json.loads(netcdf.load("short.nc").attrs["configuration"])
