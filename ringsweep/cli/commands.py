@@ -46,7 +46,7 @@ def run_command(arguments: argparse.Namespace) -> None:
         raise InputError("--backend", "dask needs the address of its scheduler: --scheduler ADDRESS")
     if arguments.backend == "threads" and arguments.scheduler is not None:
         raise InputError("--scheduler", "is for --backend dask")
-    config = refined(load(arguments.config), arguments.refine or None)
+    config = refined(load(arguments.config, arguments.set), arguments.refine or None)
     target, picture = _outputs(f"{config.name}.nc" if arguments.output is None else arguments.output, "regime", "sweep")
 
     if arguments.dry_run:
@@ -131,11 +131,16 @@ def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None
     curves = None
     try:
         if arguments.boundaries is not None:
-            from ringsweep.plots.selection import select
-            from ringsweep.runs.boundaries import boundary
+            from ringsweep.plots.selection import select_grid
+            from ringsweep.runs.boundaries import boundary, run_at
 
             tolerance = 1e-6 if arguments.tolerance is None else arguments.tolerance
-            curves = boundary(select(result, selection)[0], arguments.boundaries, tolerance)
+            # The picture shows the cells between which the curves lie.
+            result, missing = select_grid(result, selection)
+            selection = {}
+            if missing:
+                result = run_at(result, missing, arguments.boundaries)
+            curves = boundary(result, arguments.boundaries, tolerance)
             written = dataset.with_name(f"{target.stem}-{arguments.boundaries}.nc")
             netcdf.save(curves, written)
             print(f"wrote {written}")

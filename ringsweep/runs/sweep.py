@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from threading import Event
 from time import monotonic
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -34,6 +34,9 @@ from ringsweep.storage import netcdf
 from ringsweep.storage.checkpoint import Checkpoint, Columns, DamagedTask, open_checkpoint
 from ringsweep.storage.chunks import Layout
 from ringsweep.storage.provenance import attributes, differences, environment, identity
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 logger = logging.getLogger("ringsweep")
 
@@ -131,7 +134,7 @@ def _run(config: Config, output: str | os.PathLike[str] | None, fresh: bool, **o
 
 def sweep(
     scene: Mapping[str, Any],
-    axes: Mapping[str, Any],
+    axes: Mapping[str, Any] | pd.DataFrame,
     output: str | os.PathLike[str] | None = None,
     *,
     solver: str | Mapping[str, Any] = "auto",
@@ -148,9 +151,10 @@ def sweep(
     ----------
     scene : mapping
         The mapping under ``scene`` in a configuration.
-    axes : mapping of str to sequence or xarray.DataArray
+    axes : mapping of str to sequence or xarray.DataArray, or pandas.DataFrame
         Values for paths of the scene, such as ``"drive.amplitude"``, or names for ``"friction.law"``.
-        A 1-D sequence is a grid axis. DataArrays that share a dimension vary together along it.
+        A 1-D sequence is a grid axis. DataArrays that share a dimension vary together along it. Each row of a DataFrame
+        is a run: its columns are paths, which vary together along the dimension ``point``.
     solver : str or mapping
         Name of a method, or the mapping under ``solver`` in a configuration.
     output, jobs, fresh, reuse, refine, scheduler, progress
@@ -184,6 +188,8 @@ def sweep(
     >>> ds.period.sel(friction_mu_s=0.15, belt_velocity=0.1).round(3).item()
     7.523
     """
+    if hasattr(axes, "itertuples"):
+        axes = {str(path): xr.DataArray(column.to_numpy(), dims="point") for path, column in axes.items()}
     parsed = read_scene(scene, swept=axes)
     found = read_axes(parsed, axes)
     method = {"method": solver} if isinstance(solver, str) else dict(solver)
