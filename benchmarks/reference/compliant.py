@@ -285,17 +285,26 @@ def sliding_speed(p, start):
     return (start[2] - drive(p, start[0])[1]) * p.radius
 
 
-def rest_speed(p, start, load, frequency):
+def rest_speed(p, start, until, load, frequency):
     """Speed below which friction rises linearly. A contact at rest creeps more slowly than this."""
     usual = min(1e-3, 10.0 * load / (p.mass * frequency))
-    slip = abs(sliding_speed(p, start))
+    # Contacts that slide must be faster: at the start, or because the ring leaves the body behind.
+    slip = max(abs(sliding_speed(p, start)), p.radius * abs(drive(p, until)[1] - drive(p, start[0])[1]))
     wanted = min(usual, 0.1 * steepness(p), 0.02 * slip if slip > 0.0 else usual)
     return max(wanted, 0.03 * usual)
 
 
 def resolved(p, t, runs):
-    """Whether the stiffest springs ring faster than the law changes friction just before t."""
-    scale, stiffest = steepness(p), max(runs, key=lambda r: r["k"])
+    """Whether the stiffest springs ring faster than the slip of the rigid body changes at t.
+
+    Friction of a steep law changes within a short time, and a drive of infinite acceleration makes a body slide against
+    its weight for a nanosecond.
+    """
+    stiffest = max(plain(runs), key=lambda r: r["k"])
+    now = before(p, t)
+    if now is not None and sliding_speed(p, now) * (stiffest["slip_1"] + stiffest["slip_2"]) < 0.0:
+        return False
+    scale = steepness(p)
     if scale == math.inf:
         return True
     span = LASTING * math.sqrt(p.mass / stiffest["k"])
@@ -312,7 +321,7 @@ def follow(p, start, about, until, k, damping, ratio=1.0, preload=1.0):
     load = max(p.mass * p.gravity, start[5], start[6])
     k1, k2 = k * math.sqrt(ratio), k / math.sqrt(ratio)
     frequency = math.sqrt(k / p.mass)
-    v_rest = rest_speed(p, start, load, frequency)
+    v_rest = rest_speed(p, start, until, load, frequency)
     springs = np.array([k1, k2, damping * math.sqrt(k1 * p.mass), damping * math.sqrt(k2 * p.mass)])
     start = (*start[:5], preload * start[5], preload * start[6], start[7])
     y, out = place(p, start, k1, k2, v_rest), np.zeros(12)
