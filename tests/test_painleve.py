@@ -2,10 +2,14 @@
 
 Forces act on a free body with a mass and a moment of inertia. Its positions a short time before and after give the
 accelerations of both gaps, and differences between forces give the matrix A. No formula of the package is used.
+
+A body on springs needs no criterion at all: where the rigid body slides its reactions are those of the rigid body, and
+where it jams they grow without bound.
 """
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from ringsweep.physics import ring
 
@@ -99,3 +103,78 @@ def test_jams_of_the_determinant_and_of_D_are_different():
             assert min(ring.reactions(body, K1, K2, np.sin(phi), np.cos(phi), omega)) > 0.0
             found += 1
     assert found > 0
+
+
+def on_springs(scene, phi, omega, K1, K2, loads, stiffness, span, damping=0.3):
+    """Reactions of a sliding body whose contacts are springs with dampers, over time until they are 200 times `loads`.
+
+    The springs carry `loads` at first.
+    """
+    M, J, R, r, a, g = scene
+    beta, damping = np.arcsin(a / (R - r)), damping * np.sqrt(stiffness * M)
+
+    def contacts(y):
+        rod = a * np.array([np.cos(y[2]), np.sin(y[2])])
+        for side, K in ((-1.0, K1), (1.0, K2)):
+            ball = y[:2] + side * rod
+            outward = ball / np.linalg.norm(ball)
+            opens = -outward @ (y[3:5] + side * y[5] * np.array([-rod[1], rod[0]]))
+            gap = R - r - np.linalg.norm(ball)
+            N = max(0.0, -stiffness * gap - damping * opens) if gap < 0.0 else 0.0
+            push = N * (-outward + K * np.array([-outward[1], outward[0]]))
+            yield N, push, side * rod + r * outward
+
+    def rates(t, y):
+        force, moment = M * g * np.array([0.0, -1.0]), 0.0
+        for _, push, arm in contacts(y):
+            force, moment = force + push, moment + arm[0] * push[1] - arm[1] * push[0]
+        return [*y[3:], *(force / M), moment / J]
+
+    outward, along = np.array([np.sin(phi), -np.cos(phi)]), np.array([np.cos(phi), np.sin(phi)])
+    centre = (R - r) * np.cos(beta) * outward
+    for _ in range(3):
+        balls = [centre + side * a * along for side in (-1.0, 1.0)]
+        normals = [-ball / np.linalg.norm(ball) for ball in balls]
+        gaps = [R - r - np.linalg.norm(ball) for ball in balls]
+        centre = centre + np.linalg.solve(normals, -np.array(loads) / stiffness - gaps)
+    start = [*centre, phi, -omega * centre[1], omega * centre[0], omega]
+
+    def grows(t, y):
+        return 200.0 * sum(loads) - sum(N for N, _, _ in contacts(y))
+
+    grows.terminal = True
+    longest = 0.3 * np.sqrt(M / stiffness)
+    run = solve_ivp(rates, (0.0, span), start, rtol=1e-8, atol=1e-13, max_step=longest, events=grows)
+    return np.array([[N for N, _, _ in contacts(y)] for y in run.y.T])
+
+
+def sliding_bodies(jams, count=2):
+    """Bodies with D < 0 and positive reactions that slide against friction; det A is positive, or they jam."""
+    found = 0
+    for scene, body, phi, _, K1, K2 in states():
+        omega = -30.0 * np.sign(K1)
+        D = (K1 - K2) * np.cos(2.0 * body.beta) + (1.0 + K1 * K2) * np.sin(2.0 * body.beta)
+        A, b = matrix(scene, phi, omega, K1, K2)
+        loads = np.linalg.solve(A, -b)
+        determinant = np.linalg.det(A) * body.mass**2
+        if D < 0.0 and (loads > 0.0).all() and (determinant < -0.1 if jams else determinant > 0.1) and found < count:
+            found += 1
+            yield scene, (phi, omega, K1, K2), loads, np.sqrt(body.mass)
+    assert found == count
+
+
+def test_body_on_springs_keeps_the_rigid_reactions_where_D_is_negative_and_det_A_positive():
+    for scene, state, loads, root_mass in sliding_bodies(jams=False):
+        errors = []
+        for stiffness in (1e8, 1e10):
+            reactions = on_springs(scene, *state, 1.2 * loads, stiffness, 60.0 * root_mass / np.sqrt(stiffness))
+            errors.append(abs(reactions[-1] / loads - 1.0).max())
+        assert errors[1] < 0.3 * errors[0]
+        assert errors[1] < 0.02
+
+
+def test_reactions_of_a_body_on_springs_grow_without_bound_where_det_A_is_negative():
+    for scene, state, loads, root_mass in sliding_bodies(jams=True):
+        for stiffness in (1e8, 1e10):
+            reactions = on_springs(scene, *state, 1.2 * loads, stiffness, 60.0 * root_mass / np.sqrt(stiffness))
+            assert reactions.max() > 100.0 * loads.max()
