@@ -58,6 +58,8 @@ LEAD, LASTING = 80.0, 30.0
 GROWTH = 0.25
 #: Tolerance of a step, in units of the penetration.
 RTOL = 1e-4
+#: Reaction in units of the load at which a run ends: the law, under which the body gains energy, lets it grow for ever.
+UNBOUNDED = 1e9
 #: Ratio of the greatest reactions of runs with other springs at which their outcomes differ.
 VIOLENT = 10.0
 MOST_STEPS = 400_000
@@ -124,8 +126,8 @@ def motion(p, springs, v_rest, t, y, f, found):
 
 
 @njit(cache=True, error_model="numpy")
-def integrate(p, springs, v_rest, t, y, until, about, scale, longest, lasting, rtol, most_steps, out):
-    """Run from t to `until`; y is overwritten.
+def integrate(p, springs, v_rest, t, y, until, about, scale, longest, lasting, rtol, most_steps, most, out):
+    """Run from t to `until`, or until a reaction exceeds `most`; y is overwritten.
 
     Writes to `out`: instants of the first lasting loss of both contacts (infinite if none), greatest reactions after
     `about`, shares of the time after `about` in which each contact is open, reactions and sliding velocities at the
@@ -142,7 +144,7 @@ def integrate(p, springs, v_rest, t, y, until, about, scale, longest, lasting, r
         if found[2 + i] <= 0.0:
             since[i] = t
     begin = t
-    while t < until and steps < most_steps:
+    while t < until and steps < most_steps and max(found[2], found[3]) < most:
         h = min(h, longest, until - t)
         for s in range(1, 7):
             for j in range(n):
@@ -332,10 +334,10 @@ def follow(p, start, about, until, k, damping, ratio=1.0, preload=1.0):
     if p.law >= DAHL:
         scale[6:] = p.mu_k.min() / p.sigma0
     integrate(smoothed(p, v_rest), springs, v_rest, start[0], y, until, about, scale, 0.5 / frequency,
-              LASTING / frequency, RTOL, MOST_STEPS, out)  # fmt: skip
+              LASTING / frequency, RTOL, MOST_STEPS, UNBOUNDED * load, out)  # fmt: skip
     names = ("lost_1", "lost_2", "peak_1", "peak_2", "open_1", "open_2", "normal_1", "normal_2", "slip_1", "slip_2",
              "steps", "t")  # fmt: skip
-    springs = {"k": k, "damping": damping, "ratio": ratio, "preload": preload, "v_rest": v_rest}
+    springs = {"k": k, "damping": damping, "ratio": ratio, "preload": preload, "v_rest": v_rest, "load": load}
     return springs | dict(zip(names, out, strict=True)) | {"psi": y[2], "omega": y[5]}
 
 
@@ -413,7 +415,8 @@ def jam(p, runs):
     """Opinion on a jam."""
     growth, fates = growths(runs), sorted({fate(r) for r in runs if r["level"] > 0})
     why = f"reactions grow like stiffness to the power {min(growth):.2f} to {max(growth):.2f}; contacts lost: {fates}"
-    if min(growth) > GROWTH:
+    unbounded = min(max(r["peak_1"], r["peak_2"]) / r["load"] for r in plain(runs)) > 0.1 * UNBOUNDED
+    if min(growth) > GROWTH or unbounded:
         return Opinion("confirmed", why, runs)
     peaks = [max(r["peak_1"], r["peak_2"]) for r in runs if r["level"] == LEVELS // 2]
     if len(fates) > 1 or max(peaks) > VIOLENT * min(peaks):
