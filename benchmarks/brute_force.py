@@ -34,7 +34,7 @@ law `bristle` is left out, because its random bonds cannot be repeated independe
 
 ``--csv PATH`` writes the 500 scenes of ``tests/test_brute_force.py`` instead: the scene (SI units, on the paper's
 rig); regime, motion, contact and time of separation; least reaction in weights of the body; whether the runs of the
-reference agree in kind.
+reference agree in kind; what the compliant body says of the end.
 """
 
 import argparse
@@ -542,7 +542,7 @@ CSV_COUNT, CSV_SEED = 500, 181
 CSV_PARAMETERS = ["amplitude", "exponent", "center", "half_angle", "rough_s", "rough_k", "rest_s", "rest_k", "alpha",
                   "v0"]  # fmt: skip
 CSV_SCENE = ["drive", *CSV_PARAMETERS, "omega", "span"]
-CSV_OUTCOME = ["method", "regime", "motion", "contact", "t_separation", "normal_min", "agrees"]
+CSV_OUTCOME = ["method", "regime", "motion", "contact", "t_separation", "normal_min", "agrees", "compliant"]
 
 
 def draw_csv(rng):
@@ -604,6 +604,8 @@ def write_csv(path):
             verdict = judge(from_csv(values))
             regime, motion, contact = verdict.kind or ("unresolved", "unresolved", 0)
             apart, held = regime == "separating", regime in ("resting", "oscillatory", "revolving")
+            word = "held" if held else regime
+            t = verdict.runs[0]["t_least"] if held else verdict.runs[0]["t_end"]
             outcome = {
                 "method": "radau",
                 "regime": regime,
@@ -612,6 +614,7 @@ def write_csv(path):
                 "t_separation": f"{verdict.numbers['t_separation']:.8g}" if apart else "",
                 "normal_min": f"{min(verdict.runs[0]['least_1'], verdict.runs[0]['least_2']):.2g}" if held else "",
                 "agrees": int(verdict.state == "clear"),
+                "compliant": opinion(problem(from_csv(values)), word, contact, t).word,
             }
             writer.writerow(values | outcome)
 

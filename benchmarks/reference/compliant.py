@@ -306,15 +306,17 @@ def resolved(p, t, runs):
     now = before(p, t)
     if now is not None and sliding_speed(p, now) * (stiffest["slip_1"] + stiffest["slip_2"]) < 0.0:
         return False
-    scale = steepness(p)
-    if scale == math.inf:
-        return True
     span = LASTING * math.sqrt(p.mass / stiffest["k"])
     late, early = before(p, max(0.0, t - span)), before(p, max(0.0, t - 2.0 * span))
     if late is None or early is None:
         return False
     v = sliding_speed(p, late)
-    change = abs(v - sliding_speed(p, early))
+    if p.law >= DAHL:
+        # Bristles turn within a distance of about mu / sigma0.
+        return p.mu_k.min() > 10.0 * p.sigma0 * abs(v) * span
+    scale = steepness(p)
+    after = 0.5 * (stiffest["slip_1"] + stiffest["slip_2"])
+    change = max(abs(v - sliding_speed(p, early)), abs(after - v) * span / (stiffest["t"] - late[0]))
     return abs(v) > 30.0 * max(scale, change) or (change < 0.3 * scale and stiffest["v_rest"] < 0.3 * scale)
 
 
@@ -398,10 +400,11 @@ def separation(p, runs, contact, t):
         other = math.inf if thrown else r[f"lost_{3 - contact}"]
         error = errors[r["damping"], r["level"]] = max(abs(x - t) for x in lost)
         allowed = LASTING * math.sqrt(p.mass / r["k"])
-        # The stiffest springs need not be as close if they are closer than those before.
-        converged = r["level"] == LEVELS - 1 and error < 0.5 * errors[r["damping"], r["level"] - 1]
+        # The stiffest springs need not be as close if they are much closer than those before.
+        converged = r["level"] == LEVELS - 1 and error < min(10.0 * allowed, 0.5 * errors[r["damping"], LEVELS - 2])
         firm.append((error <= allowed or converged) and other > max(lost))
-        otherwise.append(not math.isfinite(max(lost)))
+        if r["level"] == LEVELS - 1:
+            otherwise.append(not error <= 10.0 * allowed)
     worst = max(errors[damping, LEVELS - 1] for damping in DAMPINGS)
     if all(f for f, r in zip(firm, equal, strict=True) if r["level"] == LEVELS - 1):
         return Opinion("confirmed", f"lost {worst:.2g} s from {t:.9g} s", runs)
