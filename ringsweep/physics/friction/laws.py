@@ -232,9 +232,9 @@ Table = _tabulated(
     "Table",
     """Measured friction that is set-valued at rest, up to its value at v = 0.
 
-    A monotone cubic through each pair of points (Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5, 1984), times the factor
-    ``scale`` of the surface; constant beyond the last point. ``pieces``, of shape ``(cells, points, 5)``, has a row for
-    each cubic: its lower bound, m/s, and its coefficients from the lowest power up.
+    A monotone cubic through each pair of points (Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5, 1984), times the
+    factor ``scale`` of the surface; constant beyond the last point. ``pieces``, of shape ``(cells, points, 5)``, has a
+    row for each cubic: its lower bound, m/s, and its coefficients from the lowest power up.
     """,
     set_valued=True,
 )
