@@ -18,7 +18,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.numerics.expressions import ONE, ZERO, Node, add as plus, multiply as times, negative, nodes_of, number
+from ringsweep.numerics.expressions import ONE, ZERO, Node, negative, nodes_of, number
+from ringsweep.numerics.expressions import add as plus
+from ringsweep.numerics.expressions import multiply as times
 
 #: Numbers that are closer to zero count as zero where only a sign matters: rounding outwards leaves them behind.
 VANISHING = 1e-250
@@ -249,15 +251,17 @@ def _series_of(node: Node, parts: list[Series], order: int) -> Series:
         overflows = inner.low > _LARGEST_EXPONENT
         return [_replaced(c, overflows, 0.0 if k else _HUGE) for k, c in enumerate(found)] if overflows.any() else found
     if node.kind == "tanh":
-        found, decay = [_tanh(inner)], [_decay(inner)]
+        found = [_tanh(inner)]
+        decay: Series = [_decay(inner)]
         for k in numbers:
             rate = _sum([_product(_times(a[j], j), decay[k - j]) for j in range(1, k + 1)])
             found.append(_over(rate, k))
             decay.append(_minus(_product_series(found, found)[k]))
         return found
     if node.kind == "sqrt":
-        found = [_sqrt(inner)]
-        per = inverse(scaled(found[0], 2.0)) if any(c is not None for c in a[1:]) else None
+        root = _sqrt(inner)
+        found = [root]
+        per = inverse(scaled(root, 2.0)) if any(c is not None for c in a[1:]) else None
         for k in numbers:
             rest = _sum([_product(found[j], found[k - j]) for j in range(1, k)])
             found.append(_product(_sum([a[k], _minus(rest)]), per))
@@ -266,7 +270,7 @@ def _series_of(node: Node, parts: list[Series], order: int) -> Series:
         divisor = _product_series(a, a)
         divisor[0] = add(exact(1.0), divisor[0]) if divisor[0] is not None else exact(1.0)
         found = [_atan(inner)]
-        per = inverse(divisor[0])
+        per = inverse(divisor[0] or exact(1.0))
     elif node.kind == "log":
         found, divisor, per = [_log(inner)], a, inverse(inner)
     else:
@@ -392,7 +396,8 @@ class Enclosure:
         """Magnitude of the terms of a sum at a speed for each row, or else of the expression."""
         found = self._found(row, speed, speed, side, 0)
         terms = self.output.parts if self.output.kind == "add" else (self.output,)
-        sizes = [np.maximum(abs(found[term][0].low), abs(found[term][0].high)) for term in terms]
+        values = [found[term][0] or exact(0.0) for term in terms]
+        sizes = [np.maximum(abs(value.low), abs(value.high)) for value in values]
         return np.broadcast_to(np.maximum.reduce(np.broadcast_arrays(*sizes)), len(row))
 
     def __call__(
@@ -422,7 +427,7 @@ class Enclosure:
                 found[node] = [_taken(constant, row), *empty]
             for node in self.nodes:
                 if node.kind == "speed":
-                    found[node] = [Interval(low, high), *([exact(1.0)] + empty)[:order]]
+                    found[node] = [Interval(low, high), *[exact(1.0), *empty][:order]]
                     continue
                 parts = [found[part] for part in node.parts]
                 if node.kind == "switch":

@@ -55,7 +55,7 @@ class Cells(NamedTuple):
     low: NDArray[np.float64]
     high: NDArray[np.float64]
 
-    def where(self, chosen: NDArray[np.bool_]) -> Cells:
+    def where(self, chosen: NDArray[np.bool_] | NDArray[np.intp] | slice) -> Cells:
         """Some of the intervals."""
         return Cells(self.row[chosen], self.low[chosen], self.high[chosen])
 
@@ -112,16 +112,21 @@ def _subdivide(cells: Cells, decide: _Decide) -> tuple[Cells, NDArray[np.int8]]:
         code = np.empty(len(cells.row), dtype=np.int8)
         for begin in range(0, len(code), _BLOCK):
             part = slice(begin, begin + _BLOCK)
-            code[part] = decide(Cells(*(field[part] for field in cells)), narrow[part])
+            code[part] = decide(cells.where(part), narrow[part])
         split = code == _OPEN
         decided.append(cells.where(~split))
         codes.append(code[~split])
         _check_budget(cells, split)
         rest = cells.where(split)
         cells, _ = rest.halves(np.ones(len(rest.row), dtype=bool))
-    found, code = Cells(*(np.concatenate(fields) for fields in zip(*decided, strict=True))), np.concatenate(codes)
+    found, code = _joined(decided), np.concatenate(codes)
     order = np.lexsort((found.low, found.row))
-    return Cells(*(field[order] for field in found)), code[order]
+    return found.where(order), code[order]
+
+
+def _joined(parts: list[Cells]) -> Cells:
+    row, low, high = (np.concatenate(fields) for fields in zip(*parts, strict=True))
+    return Cells(row, low, high)
 
 
 # ---- bounds -----------------------------------------------------------------------------------
@@ -169,7 +174,7 @@ class _Bounds(NamedTuple):
 
 def _ends(enclosure: Enclosure, cells: Cells, k: int) -> list[Interval]:
     """Coefficient `k` at both ends of each interval."""
-    both = Cells(*(np.concatenate([field, field]) for field in cells))
+    both = _joined([cells, cells])
     found = _at(enclosure, both, np.concatenate([cells.low, cells.high]), k)
     return [Interval(found.low[half], found.high[half]) for half in np.split(np.arange(len(both.row)), 2)]
 
@@ -178,7 +183,7 @@ def _bounds(enclosure: Enclosure, cells: Cells, k: int) -> _Bounds:
     """Bounds on coefficient `k`."""
     found = []
     for begin in range(0, max(len(cells.row), 1), _BLOCK):
-        part = Cells(*(field[begin : begin + _BLOCK] for field in cells))
+        part = cells.where(slice(begin, begin + _BLOCK))
         count, middle = len(part.row), part.middle()
         series = enclosure(part.row, part.low, part.high, part.low, k + 1)
         natural, rate = _filled(series[k], count), multiply(_filled(series[k + 1], count), exact(k + 1.0))
@@ -287,7 +292,7 @@ def _signs(enclosure: Enclosure, cells: Cells, least: float | None) -> NDArray[n
         rest = np.flatnonzero((code == _OPEN) & whole & (value.high < _HUGE) & (value.low > -_HUGE))
         if not len(rest):
             return code
-        some = Cells(*(field[rest] for field in cells))
+        some = cells.where(rest)
         value, slope = (
             Interval(found.low[rest], found.high[rest], None if found.partial is None else found.partial[rest])
             for found in (value, slope)

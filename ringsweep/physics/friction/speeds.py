@@ -1,7 +1,6 @@
 """Speeds at which the expression of a friction law switches, and numbers that are found once for each cell.
 
-All are isolated by interval arithmetic, see :mod:`ringsweep.numerics.isolation`: no feature of a law is too narrow to be
-found.
+All are isolated by interval arithmetic, see :mod:`ringsweep.numerics.isolation`: no feature of a law is too narrow.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.numerics.expressions import Node, derivative, evaluate, negative, nodes_of
+from ringsweep.numerics.expressions import Node, derivative, evaluate, nodes_of
 from ringsweep.numerics.intervals import Enclosure
 from ringsweep.numerics.isolation import (
     FASTEST,
@@ -200,8 +199,8 @@ class _Finder:
                 return kept[0] if threshold.kind == "head" else kept[1]
             if threshold.kind == "valid":
                 return self._once(sought, lambda: self._invalid(threshold.difference))[threshold.order]
-            signs = self._once(sought, lambda: self._signs(threshold.difference, low, high))
-            return self._equal(self._root(*signs, threshold.order))
+            first, speeds = self._once(sought, lambda: self._signs(threshold.difference, low, high))
+            return self._equal(self._root(first, speeds, threshold.order))
         except UndecidedError as error:
             what = "whether friction is negative" if threshold.kind == "valid" else "where min, max or abs switch"
             raise self._undecided(what, error) from None
@@ -332,7 +331,8 @@ class _Finder:
         elif (abs(at_rest) > 1e-9).any():
             raise FormulaError(
                 "without at_rest friction must vanish at v = 0, where it is "
-                f"{at_rest[abs(at_rest) > 1e-9][0]:.6g}: give `at_rest: mu_s` for friction that holds up to mu_s at rest",
+                f"{at_rest[abs(at_rest) > 1e-9][0]:.6g}: "
+                "give `at_rest: mu_s` for friction that holds up to mu_s at rest",
                 "at_rest",
             )
 
