@@ -306,8 +306,9 @@ class _Finder:
             bounds = speeds[mine][order][np.diff(count > 0, prepend=False)]
             if len(bounds) > 3:
                 raise FormulaError(
-                    f"it is negative or no number in several intervals of the speed, from {bounds[0]:.6g}, "
-                    f"{bounds[2]:.6g} and {bounds[4 if len(bounds) > 4 else 3]:.6g} m/s on: at most two are allowed"
+                    f"it is negative or no number in several intervals of the speed, from {bounds[0]:.6g} to "
+                    f"{bounds[1]:.6g} and from {bounds[2]:.6g} to {bounds[3]:.6g} m/s: it may be so in one interval, "
+                    "and from another speed on"
                 )
             found[: len(bounds), own] = bounds
         return [np.tile(bound, self.surfaces) for bound in found]
