@@ -209,6 +209,16 @@ def test_link_to_itself_is_no_output(folder, capsys):
     assert "loop.nc: is a symbolic link that leads to itself" in refused(capsys, "run", "case.yaml", "-o", "loop.nc")
 
 
+def test_part_of_a_history_is_drawn_and_a_run_of_another_scene_is_replaced_with_a_word(folder, capsys, caplog):
+    for amplitude in ("2", "3"):
+        assert main(["simulate", "case.yaml", "--set", f"drive.amplitude={amplitude}"]) == 0
+    assert "case-run.nc held a run of another scene, which is replaced: drive.amplitude was 2" in caplog.text
+    assert main(["plot", "case-run.nc", "--from", "1", "--to", "2", "-o", "part.png"]) == 0
+    assert (folder / "part.png").stat().st_size > 1000
+    capsys.readouterr()
+    assert "has times from 0 to 10 s: none" in refused(capsys, "plot", "case-run.nc", "--from", "11")
+
+
 def test_run_takes_values_from_the_command_line(folder):
     assert main(["run", "case.yaml", "--set", "time.span=2 s", "--set", "solver.steps=500", "-o", "short.nc"]) == 0
     configuration = json.loads(netcdf.load("short.nc").attrs["configuration"])
@@ -255,7 +265,7 @@ def test_plot_draws_what_simulate_and_precision_wrote_and_names_the_command_for_
     )
     assert main(["plot", "work.nc"]) == 0
     assert "wrote work.png" in capsys.readouterr().out
-    assert "for time histories" in refused(capsys, "plot", "work.nc", "--kind", "phase")
+    assert "are for histories" in refused(capsys, "plot", "work.nc", "--kind", "phase")
 
 
 @pytest.mark.parametrize("arguments", [["rum"], ["run"], ["run", "case.yaml", "--jobs", "0"]])

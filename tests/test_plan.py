@@ -42,6 +42,15 @@ def test_dry_run_tells_cells_memory_disk_and_time_and_writes_nothing(sweep, tmp_
     assert [path.name for path in tmp_path.iterdir()] == ["a.yaml"]
 
 
+@pytest.mark.parametrize("n", [4, 48])
+def test_size_of_the_file_is_the_one_told(sweep, tmp_path, capsys, n):
+    assert cli.main(["run", sweep(n), "--dry-run"]) == 0
+    number, unit = capsys.readouterr().out.split("runs, then ")[1].split(";")[0].split()
+    assert cli.main(["run", "a.yaml"]) == 0
+    told = float(number) * {"kB": 1e3, "MB": 1e6}[unit]
+    assert (tmp_path / "a.nc").stat().st_size == pytest.approx(told, rel=0.25)
+
+
 def test_hundred_million_cells_are_told_at_once(sweep, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(plan, "_MOST", 100)
     monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=10**12))

@@ -182,13 +182,21 @@ def _plot(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
     shown = [name for name in (arguments.kind, arguments.law) if name is not None]
     target = Path(arguments.output or dataset.with_name("-".join([dataset.stem, *shown]) + ".png"))
     files.check_writable(target)
-    if "contender" in result.dims and shown:
-        raise InputError(str(dataset), "holds errors against run time: --kind and --law are for time histories")
+    cut = slice(arguments.begin, arguments.end)
+    if "contender" in result.dims and (shown or cut != slice(None)):
+        raise InputError(str(dataset), "holds errors against run time: --kind, --law, --from, --to are for histories")
     if arguments.law is not None:
         if "friction_law" not in result.dims:
             raise InputError("--law", f"{dataset} holds a run under one friction law only")
         laws = map(str, result["friction_law"].values)
         result = result.sel(friction_law=resolve("--law", arguments.law, laws))
+    if cut != slice(None):
+        times = result["time"].values
+        result = result.sel(time=cut)
+        if result.sizes["time"] < 2:
+            raise InputError(
+                "--from", f"{dataset} has times from {times[0]:g} to {times[-1]:g} s: none in this interval"
+            )
     try:
         if "contender" in result.dims:
             figure = plots.work_precision(result)
@@ -218,10 +226,30 @@ def simulate_command(arguments: argparse.Namespace) -> None:
     from ringsweep.storage import netcdf
 
     result = history(config)
+    if replaced := _other_scene(target, result):
+        logger.info("%s held a run of another scene, which is replaced: %s", target, replaced)
     netcdf.save(result, target)
     print(result.attrs["outcome"])
     print(f"wrote {target}")
     _draw(lambda: plots.history(result), picture, f"ringsweep plot {target}")
+
+
+def _other_scene(target: Path, result: Any) -> str:
+    """What the scene of a run that is there already has other than that of a result; empty if nothing."""
+    from ringsweep.storage import netcdf
+
+    if not target.exists():
+        return ""
+    with netcdf.open_dataset(target) as earlier:
+        old, new = (_leaves(json.loads(ds.attrs["configuration"])["scene"]) for ds in (earlier, result))
+    return "; ".join(f"{path} was {old.get(path)}" for path in {**old, **new} if old.get(path) != new.get(path))
+
+
+def _leaves(node: Any, path: str = "") -> dict[str, Any]:
+    """Values of a nested mapping by their dotted paths."""
+    if not isinstance(node, dict):
+        return {path: node}
+    return {p: v for key, child in node.items() for p, v in _leaves(child, f"{path}.{key}".lstrip(".")).items()}
 
 
 def animate_command(arguments: argparse.Namespace) -> None:

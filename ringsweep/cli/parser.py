@@ -113,6 +113,7 @@ def build_parser() -> argparse.ArgumentParser:
 
     plot = _add_command(commands, "plot", plot_command, "draw a stored run, or stored errors against run time", """
         ringsweep plot my-run.nc           my-run.png: the time history
+        ringsweep plot my-run.nc --from 3 --to 4 -o end.png
         ringsweep plot my-run.nc --kind phase -o portrait.pdf
         ringsweep plot my-run.nc --kind friction --law lugre
         """)  # fmt: skip
@@ -124,6 +125,8 @@ def build_parser() -> argparse.ArgumentParser:
         help="phase portrait, or friction force over sliding velocity (belt), in place of the time history",
     )
     plot.add_argument("--law", metavar="LAW", help="the run under this friction law, if RUN.nc has several")
+    plot.add_argument("--from", type=float, dest="begin", metavar="T", help="draw the history from this time on, s")
+    plot.add_argument("--to", type=float, dest="end", metavar="T", help="draw the history up to this time, s")
 
     animate = _add_command(commands, "animate", animate_command, "run once: film of the body", """
         ringsweep animate my.yaml          my-run.gif
