@@ -230,8 +230,8 @@ def run(p, rtol, least, slack, most_steps):
                     mode = found
             if not set_valued:
                 piece = piece_of(p, y[1])
-    if set_valued and y[1] == 0.0 and mode in (FORWARD, BACKWARD):
-        piece = mode
+    if set_valued and mode in (FORWARD, BACKWARD):
+        piece = mode if y[1] == 0.0 else piece_of(p, y[1])
     if mode == BACKWARD and p.model != BELT:
         k1, k2 = lower_segments(p, k1, k2, y[0])
 
