@@ -467,9 +467,9 @@ def opinion(p, word, contact, t):
         if found.word == "confirmed":
             return found
         words.append(found.word)
-    # Stiffer springs and shorter runs must repeat a contradiction, and that the outcome depends on the springs.
+    # The two shortest runs must agree on a contradiction, or on that the outcome depends on the springs.
     if words[-2:] == ["divided"] * 2:
         return Opinion("confirmed", found.why, found.runs)
     if words and not resolved(p, t, found.runs):
         return Opinion("undecided", f"friction changes faster than the springs ring; {found.why}", found.runs)
-    return found if words == ["contradicted"] * len(ZOOMS) else Opinion("undecided", found.why, found.runs)
+    return found if words[-2:] == ["contradicted"] * 2 else Opinion("undecided", found.why, found.runs)
