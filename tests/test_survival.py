@@ -22,7 +22,7 @@ from benchmarks.hostile.kills import POINTS, killed_at
 from ringsweep import cli
 from ringsweep.config import load
 from ringsweep.runs.cells import compute_task
-from ringsweep.runs.executors import Threads, stop_on_interrupt
+from ringsweep.runs.executors import executor, stop_on_interrupt
 from ringsweep.runs.sweep import write
 from ringsweep.runs.task_sizes import TaskSizes
 from ringsweep.storage import netcdf
@@ -66,9 +66,8 @@ def test_thread_that_fails_stops_the_others_and_no_result_before_is_lost():
             raise ValueError("the fifth task")
         return int(task[0])
 
-    results = Threads(2).results(compute, tasks, lambda result: result, stopped)
-    with pytest.raises(ValueError, match="the fifth task"):
-        found.extend(results)
+    with executor(2, None) as workers, pytest.raises(ValueError, match="the fifth task"):
+        found.extend(workers.results(compute, tasks, lambda result: result, stopped))
     assert {0, 1, 2, 3, 4} <= set(found)
     assert 5 not in found
     assert len(found) < 1_000_000
