@@ -17,7 +17,7 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 import ringsweep
 from benchmarks.hostile.attack import same_bits
 from ringsweep import cli
-from ringsweep.runs.executors import executor
+from ringsweep.runs.executors import Execution
 from ringsweep.runs.task_sizes import TaskSizes
 from ringsweep.storage.checkpoint import Checkpoint
 
@@ -120,7 +120,7 @@ def test_task_of_a_killed_process_is_computed_when_the_sweep_goes_on(scene, by_t
 )
 @pytest.mark.parametrize("backend", [{}, {"backend": "threading"}, {"backend": "loky"}])
 def test_number_of_workers_is_that_of_the_call_then_that_of_joblib_then_that_of_cores(backend, given, own, workers):
-    with joblib.parallel_config(**backend, **given), executor(own, None) as local:
+    with joblib.parallel_config(**backend, **given), Execution(own).open() as local:
         assert local.concurrency() == workers
 
 

@@ -8,6 +8,7 @@ import sys
 import threading
 from collections.abc import Callable, Generator, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass
 from itertools import islice
 from multiprocessing import resource_tracker
 from queue import SimpleQueue
@@ -182,25 +183,45 @@ def _shield_from_interrupts() -> None:
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
 
 
-def executor(jobs: int | None, scheduler: str | None) -> AbstractContextManager[Executor]:
-    """Workers of this machine, or those of the Dask scheduler at an address.
+@dataclass(frozen=True)
+class Execution:
+    """How the tasks of a sweep are run.
 
-    Raises
-    ------
-    InputError
-        If the number of workers is not positive, if both are given, or if no scheduler answers.
+    Attributes
+    ----------
+    jobs : int, optional
+        Number of workers of this machine; see :class:`Local`.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers compute the cells.
+    progress : bool
+        Whether to show a progress bar, if there is a terminal or a notebook.
     """
-    if jobs is not None and jobs < 1:
-        raise InputError("jobs", f"{jobs} threads cannot compute anything: give at least 1")
-    if scheduler is None:
-        return nullcontext(Local(jobs))
-    if jobs is not None:
-        raise InputError("--jobs", "is for threads of this machine: Dask's workers have their own number of threads")
-    try:
-        from ringsweep.runs import dask
-    except ImportError:
-        raise InputError("--scheduler", "Dask is not installed: pip install distributed") from None
-    return dask.workers(scheduler)
+
+    jobs: int | None = None
+    scheduler: str | None = None
+    progress: bool = True
+
+    def open(self) -> AbstractContextManager[Executor]:
+        """Workers of this machine, or those of the Dask scheduler.
+
+        Raises
+        ------
+        InputError
+            If the number of workers is not positive, if a scheduler is given too, or if no scheduler answers.
+        """
+        if self.jobs is not None and self.jobs < 1:
+            raise InputError("jobs", f"{self.jobs} threads cannot compute anything: give at least 1")
+        if self.scheduler is None:
+            return nullcontext(Local(self.jobs))
+        if self.jobs is not None:
+            raise InputError(
+                "--jobs", "is for threads of this machine: Dask's workers have their own number of threads"
+            )
+        try:
+            from ringsweep.runs import dask
+        except ImportError:
+            raise InputError("--scheduler", "Dask is not installed: pip install distributed") from None
+        return dask.workers(self.scheduler)
 
 
 def interruptible(function: Callable[[], Result]) -> Result:
