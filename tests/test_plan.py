@@ -12,6 +12,7 @@ from ringsweep.config import load
 from ringsweep.errors import InputError
 from ringsweep.runs import plan
 from ringsweep.runs.cells import TaskResult
+from ringsweep.runs.executors import Execution
 from ringsweep.runs.sweep import write
 from ringsweep.storage.checkpoint import Checkpoint
 
@@ -106,9 +107,9 @@ def test_only_cells_that_are_still_to_be_computed_need_room_on_the_disk(sweep, t
     with monkeypatch.context() as patch:
         patch.setattr(Checkpoint, "put", full)
         with pytest.raises(OSError, match="No space"):
-            write(config, tmp_path / "a.nc", progress=False)
+            write(config, tmp_path / "a.nc", Execution(progress=False))
     room = 63 * plan.bytes_of_cell(config)
-    assert write(config, tmp_path / "a.nc", progress=False)
+    assert write(config, tmp_path / "a.nc", Execution(progress=False))
 
 
 @pytest.mark.parametrize("solver", ["auto", {"method": "event", "certify": False}])

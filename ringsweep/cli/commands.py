@@ -59,13 +59,14 @@ def run_command(arguments: argparse.Namespace) -> None:
 
     from ringsweep import plots
     from ringsweep.cli.report import summarise
+    from ringsweep.runs.executors import Execution
     from ringsweep.runs.sweep import write
     from ringsweep.storage import netcdf
 
     if arguments.scheduler is not None and not arguments.verbose:
         _silence_dask()
-    options = {name: getattr(arguments, name) for name in ("jobs", "fresh", "reuse", "scheduler")}
-    if computed := write(config, target, **options, progress=not arguments.quiet):
+    execution = Execution(arguments.jobs, arguments.scheduler, not arguments.quiet)
+    if computed := write(config, target, execution, fresh=arguments.fresh, reuse=arguments.reuse):
         print(f"wrote {target}")
     else:
         print(f"{target} holds this sweep already (--fresh computes it again)")

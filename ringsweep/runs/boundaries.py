@@ -18,6 +18,7 @@ from ringsweep.errors import InputError
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity, show
 from ringsweep.quantities.variables import INFERRED
+from ringsweep.runs.executors import Execution
 from ringsweep.runs.sweep import compute
 
 logger = logging.getLogger("ringsweep")
@@ -166,7 +167,7 @@ def run_at(ds: xr.Dataset, held: Mapping[str, float], regime: str, *, jobs: int 
     if refine := source["sweep"].get("refine"):
         # Along the axes that are left, whichever were named.
         sweep["refine"] = refine if refine is True else {key: refine[key] for key in refine if key != "axes"}
-    found = compute(load(source | {"sweep": sweep}), jobs=jobs, progress=False)
+    found = compute(load(source | {"sweep": sweep}), Execution(jobs, progress=False))
     return found.isel(dict.fromkeys(fixed, 0))
 
 
@@ -242,7 +243,7 @@ def _run(config: Config, values: dict[str, NDArray[Any]], jobs: int | None) -> x
     """Run points; the progress of each of many rounds is not shown."""
     count = len(next(iter(values.values())))
     axes = Axes({"point": count}, {path: (("point",), column) for path, column in values.items()})
-    return compute(replace(config, axes=axes, refine=None), jobs=jobs, progress=False, warn=False)
+    return compute(replace(config, axes=axes, refine=None), Execution(jobs, progress=False), warn=False)
 
 
 def _joined(low: NDArray[np.intp], axis: NDArray[np.intp], shape: tuple[int, ...]) -> tuple[NDArray[np.intp], Any]:

@@ -18,7 +18,7 @@ from ringsweep.models import MODELS, batch
 from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import turn
 from ringsweep.quantities.variables import HISTORY, REGIMES
-from ringsweep.runs.executors import interruptible
+from ringsweep.runs.executors import Execution, interruptible
 from ringsweep.runs.sweep import compute
 from ringsweep.storage.provenance import attributes
 
@@ -100,7 +100,7 @@ def history(config: Config, *, samples: int = SAMPLES) -> xr.Dataset:
 
 
 def _history(config: Config, samples: int) -> xr.Dataset:
-    outcome = compute(config, jobs=1, progress=False)
+    outcome = compute(config, Execution(1, progress=False))
     runs = {}
     for law, structure in config.scene.structures.items():
         own = outcome.sel(friction_law=law) if config.axes.sizes else outcome

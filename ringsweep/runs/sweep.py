@@ -6,7 +6,8 @@ import logging
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from threading import Event
@@ -22,7 +23,7 @@ from ringsweep.config.axes import dimension
 from ringsweep.errors import InputError
 from ringsweep.quantities.variables import INFERRED, OUTCOMES, error_attribute
 from ringsweep.runs.cells import TaskResult, compute_task
-from ringsweep.runs.executors import Executor, executor, progress_bar, stop_on_interrupt
+from ringsweep.runs.executors import Execution, Executor, progress_bar, stop_on_interrupt
 from ringsweep.runs.plan import check_room
 from ringsweep.runs.refined import KnownLabels, complete, decide, gaps, with_nan
 from ringsweep.runs.refined import attributes as refinement_attributes
@@ -68,7 +69,7 @@ def run(
         NetCDF file to write. Until it is complete, finished cells are kept in a folder beside it, and not in memory. If
         the sweep is stopped, the same call continues it.
     jobs : int, optional
-        Number of threads; all cores by default.
+        Number of threads; by default that of ``joblib.parallel_config``, or else all cores.
     fresh : bool
         Whether to discard what an earlier call computed.
     reuse : path-like, optional
@@ -122,13 +123,19 @@ def run(
     True
     """
     loaded = refined(load(config), refine)
-    return _run(loaded, output, fresh, jobs=jobs, reuse=reuse, scheduler=scheduler, progress=progress)
+    return _run(loaded, output, Execution(jobs, scheduler, progress), fresh, reuse)
 
 
-def _run(config: Config, output: str | os.PathLike[str] | None, fresh: bool, **options: Any) -> xr.Dataset:
+def _run(
+    config: Config,
+    output: str | os.PathLike[str] | None,
+    execution: Execution,
+    fresh: bool,
+    reuse: str | os.PathLike[str] | None,
+) -> xr.Dataset:
     if output is None:
-        return compute(config, **options)
-    write(config, Path(output), fresh=fresh, **options)
+        return compute(config, execution, reuse=reuse)
+    write(config, Path(output), execution, fresh=fresh, reuse=reuse)
     return netcdf.open_dataset(output)
 
 
@@ -195,7 +202,7 @@ def sweep(
     method = {"method": solver} if isinstance(solver, str) else dict(solver)
     source = {"scene": dict(parsed.source), "solver": method, "sweep": _sweep_section(found)}
     config = refined(Config(parsed, read_solver(method, parsed), found, source, name="ringsweep"), refine)
-    return _run(config, output, fresh, jobs=jobs, reuse=reuse, scheduler=scheduler, progress=progress)
+    return _run(config, output, Execution(jobs, scheduler, progress), fresh, reuse)
 
 
 def _sweep_section(axes: Axes) -> dict[str, Any]:
@@ -217,11 +224,9 @@ def _sweep_section(axes: Axes) -> dict[str, Any]:
 
 def compute(
     config: Config,
+    execution: Execution,
     *,
-    jobs: int | None = None,
     reuse: str | os.PathLike[str] | None = None,
-    scheduler: str | None = None,
-    progress: bool = True,
     warn: bool = True,
 ) -> xr.Dataset:
     """Run a validated configuration in memory, with or without warnings about the results; see :func:`run`."""
@@ -232,7 +237,7 @@ def compute(
         raise InputError("sweep", f"{layout.total:.3g} cells do not fit into memory: name a file as output")
     check_room(config, layout.total, None)
     store = MemoryStore(layout.total)
-    found = _compute_cells(config, layout, store, earlier, jobs, scheduler, progress)
+    found = _compute_cells(config, layout, store, earlier, execution)
     columns = {name: column.reshape(sizes) for name, column in store.columns.items()}
     results = _frame(config, found)
     if found is not None and config.refine is not None:
@@ -252,12 +257,10 @@ def compute(
 def write(
     config: Config,
     target: Path,
+    execution: Execution,
     *,
-    jobs: int | None = None,
     fresh: bool = False,
     reuse: str | os.PathLike[str] | None = None,
-    scheduler: str | None = None,
-    progress: bool = True,
 ) -> bool:
     """Run a validated configuration into a file, or continue such a run; see :func:`run`.
 
@@ -275,7 +278,7 @@ def write(
         computed = fresh or not _holds_sweep(target, checkpoint)
         if computed:
             try:
-                _compute_file(config, target, layout, checkpoint, earlier, jobs, scheduler, progress)
+                _compute_file(config, target, layout, checkpoint, earlier, execution)
             except BaseException as error:
                 if (finished := int(checkpoint.done.sum())) and checkpoint.folder.exists():
                     again = "the same command without --fresh" if fresh else "the same command"
@@ -369,18 +372,15 @@ def _compute_cells(
     layout: Layout,
     store: Checkpoint | MemoryStore,
     earlier: EarlierSweep | None,
-    jobs: int | None,
-    scheduler: str | None,
-    progress: bool,
+    execution: Execution,
 ) -> Refined | None:
     """Compute the cells that the store lacks, task after task: every cell, or those that a refinement asks for."""
-    context = executor(jobs, scheduler)
     if config.refine is not None:
-        return _refine_cells(config, layout, store, earlier, context, progress)
+        return _refine_cells(config, layout, store, earlier, execution)
     if earlier is not None:
         _take_shared(config, layout, store, earlier, store.done)
     if not store.done.all():
-        with _open_tasks(config, layout, store, context, progress, layout.total) as tasks:
+        with _open_tasks(config, layout, store, execution, layout.total) as tasks:
             tasks.run(divide_into_tasks(store.done, tasks.sizes, tasks.stopped))
             if not store.done.all():
                 raise KeyboardInterrupt
@@ -392,8 +392,7 @@ def _refine_cells(
     layout: Layout,
     store: Checkpoint | MemoryStore,
     earlier: EarlierSweep | None,
-    context: AbstractContextManager[Executor],
-    progress: bool,
+    execution: Execution,
 ) -> Refined:
     """Compute the cells that a refinement asks for."""
     labels = KnownLabels(config, layout.total)
@@ -403,7 +402,7 @@ def _refine_cells(
     if earlier is not None:
         for positions, columns in earlier.shared_cells(config, layout, labels.known, labels.names):
             labels.put(positions, columns)
-    with _open_tasks(config, layout, store, context, progress, None) as tasks:
+    with _open_tasks(config, layout, store, execution, None) as tasks:
         tasks.notice = labels.put
 
         def run(cells: NDArray[np.intp]) -> None:
@@ -440,8 +439,7 @@ def _open_tasks(
     config: Config,
     layout: Layout,
     store: Checkpoint | MemoryStore,
-    context: AbstractContextManager[Executor],
-    progress: bool,
+    execution: Execution,
     total: int | None,
 ) -> Iterator[_Tasks]:
     """Tasks that compute cells of a sweep; `total` is the number of its cells, if all of them are computed."""
@@ -450,12 +448,14 @@ def _open_tasks(
         learnt = not math.isnan(sizes.seconds_per_cell)
         return "the tasks under way are done" if learnt else "compilation and the first cells are done"
 
-    with context as workers:
+    with execution.open() as workers:
         sizes = TaskSizes(config.solver.side_by_side, workers.concurrency)
         # What is in memory is lost anyway: there the first Ctrl-C ends the sweep.
         stopping = stop_on_interrupt(under_way) if isinstance(store, Checkpoint) else nullcontext(Event())
-        with stopping as stopped, progress_bar(total, progress, int(store.done.sum())) as bar:
-            tasks = _Tasks(partial(compute_task, config, layout), store, workers, sizes, stopped, bar)
+        with stopping as stopped, progress_bar(total, execution.progress, int(store.done.sum())) as bar:
+            # Other processes get it with every task: points as they were written are long.
+            task = partial(compute_task, replace(config, source={}), layout)
+            tasks = _Tasks(task, store, workers, sizes, stopped, bar)
             try:
                 yield tasks
             finally:
