@@ -18,7 +18,7 @@ from ringsweep.physics.friction import LAWS, Dynamic, SetValued, Smooth, family_
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.variables import FAILED
 from ringsweep.solvers.automaton import PATIENCE, integrate
-from ringsweep.solvers.certificate import certifiable, errors, took_same_steps, with_errors
+from ringsweep.solvers.certificate import apart, certifiable, diverging, errors, took_same_steps, with_errors
 from ringsweep.solvers.method import Method, Needs, Result
 
 LIMIT = Parameter("1", "steps after which a run is given up as failed", lower=1, upper=1e10)
@@ -95,29 +95,28 @@ class _Piecewise(Method):
         open_cells = np.flatnonzero(~self._given_up(rows, steps, outcomes))
         if not len(open_cells):
             return Result(rows, steps=steps, certified=certified, errors=bounds)
-        second_rows, more_steps, _ = replace(self, rtol=self.rtol * FACTOR).integrate(
-            _select(batch, open_cells), len(outcomes), audit=False
-        )
-        certified[open_cells] = self._certified(
-            _select(batch, open_cells), rows[open_cells], second_rows, audits[open_cells], outcomes
-        )
-        certified[open_cells] &= ~took_same_steps(rows[open_cells], second_rows, outcomes)
-        bounds[open_cells] = self._errors(batch, rows[open_cells], second_rows, steps[open_cells], outcomes)
-        steps[open_cells] += more_steps
-        finer = self
-        for _ in range(_MOST_RETRIES):
-            open_cells = open_cells[~certified[open_cells]]
-            finer = replace(finer, rtol=finer.rtol / FACTOR)
-            if not len(open_cells) or finer.tolerances()[0] < 1e-15:
-                break
+        looser, finer = replace(self, rtol=self.rtol * FACTOR), self
+        distance = np.full(len(rows), np.inf)
+        second_rows, more_steps, _ = looser.integrate(_select(batch, open_cells), len(outcomes), audit=False)
+        new_rows, new_steps, audits = rows[open_cells], steps[open_cells], audits[open_cells]
+        for retry in range(_MOST_RETRIES + 1):
             cells = _select(batch, open_cells)
-            finer_rows, more_steps, audits = finer.integrate(cells, len(outcomes), audit=True)
-            certified[open_cells] = self._certified(cells, finer_rows, rows[open_cells], audits, outcomes)
-            bounds[open_cells] = finer._errors(batch, finer_rows, rows[open_cells], more_steps, outcomes)
+            certified[open_cells], bounds[open_cells], distance[open_cells], may_converge = finer._compare(
+                cells, new_rows, second_rows, audits, new_steps, distance[open_cells], looser, outcomes
+            )
+            if retry == 0:
+                certified[open_cells] &= ~took_same_steps(new_rows, second_rows, outcomes)
             steps[open_cells] += more_steps
-            finished = ~self._given_up(finer_rows, more_steps, outcomes)
-            rows[open_cells[finished]] = finer_rows[finished]
-            open_cells = open_cells[finished]
+            finished = ~self._given_up(new_rows, new_steps, outcomes)
+            rows[open_cells[finished]] = new_rows[finished]
+            open_cells = open_cells[finished & (~certified[open_cells] | may_converge)]
+            looser, finer = finer, replace(finer, rtol=finer.rtol / FACTOR)
+            tolerance = finer.tolerances()[0]
+            if retry == _MOST_RETRIES or not len(open_cells) or not 1e-15 <= tolerance < looser.tolerances()[0]:
+                break
+            second_rows = rows[open_cells]
+            new_rows, more_steps, audits = finer.integrate(_select(batch, open_cells), len(outcomes), audit=True)
+            new_steps = more_steps
         return Result(rows, steps=steps, certified=certified, errors=bounds)
 
     def _given_up(
@@ -127,29 +126,39 @@ class _Piecewise(Method):
         failed: NDArray[np.bool_] = rows[:, outcomes.index("regime")] == FAILED
         return failed & (steps >= min(self.max_steps, PATIENCE))
 
-    @staticmethod
-    def _certified(
-        batch: Any,
-        rows: NDArray[np.float64],
-        second_rows: NDArray[np.float64],
-        audits: NDArray[np.float64],
-        outcomes: tuple[str, ...],
-    ) -> NDArray[np.bool_]:
-        """Whether each run is certified, from its audit and from the second run at another tolerance."""
-        obeys_law: NDArray[np.bool_] = (audits[:, 0] <= _MOST_VIOLATION) & (audits[:, 1] <= _MOST_UNEXPLAINED)
-        return obeys_law & certifiable(batch, rows, second_rows, audits[:, 2], outcomes)
-
-    def _errors(
+    def _compare(
         self,
         batch: Any,
         rows: NDArray[np.float64],
         second_rows: NDArray[np.float64],
+        audits: NDArray[np.float64],
         steps: NDArray[Any],
+        distance_before: NDArray[np.float64],
+        looser: _Piecewise,
         outcomes: tuple[str, ...],
-    ) -> NDArray[np.float64]:
-        """Bounds on the errors of runs at this tolerance, from second runs at a looser tolerance."""
-        tolerance = self.tolerances()[family_of(type(batch.law)) is Dynamic]
-        return errors(rows, second_rows, outcomes, safety=self.safety, tolerance=tolerance, steps=steps)
+    ) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+        """Certificates of runs at this tolerance and bounds on their errors, from second runs at a looser tolerance.
+
+        Returns
+        -------
+        tuple of ndarray
+            Whether each run is certified; bounds, NaN where nearby runs diverge; distance of the runs where they
+            diverge, infinite elsewhere; whether they diverge, but a tighter tolerance may show that they converge.
+        """
+        distance = apart(rows, second_rows, outcomes)
+        diverge = diverging(distance, looser._tolerance(batch), distance_before)
+        obeys_law: NDArray[np.bool_] = (audits[:, 0] <= _MOST_VIOLATION) & (audits[:, 1] <= _MOST_UNEXPLAINED)
+        certified = obeys_law & certifiable(batch, rows, second_rows, audits[:, 2], outcomes)
+        if diverge.any():
+            certified &= ~diverge | audit.same_statistics(batch, rows, second_rows)
+        bounds = errors(rows, second_rows, outcomes, safety=self.safety, tolerance=self._tolerance(batch), steps=steps)
+        bounds[diverge] = np.nan
+        may_converge = diverge & ~diverging(distance / FACTOR, self._tolerance(batch))
+        return certified, bounds, np.where(diverge, distance, np.inf), may_converge
+
+    def _tolerance(self, batch: Any) -> float:
+        """Relative error allowed to the steps that most runs of a batch take."""
+        return self.tolerances()[family_of(type(batch.law)) is Dynamic]
 
     def integrate(
         self, batch: Any, width: int, *, audit: bool
