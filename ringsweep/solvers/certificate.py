@@ -26,10 +26,8 @@ _MOST_APART, _MOST_GROWTH = 1e-3, 1e6
 # Differences shrink if the difference from a run at a tighter tolerance is at most this share of the difference before.
 _SHRUNK = 0.2
 
-# A bound on an error is at least: a share of the tolerance of a step; the rounding of a step times the root of their
-# number; a share of the largest relative difference between both runs in any outcome. Found by experiment, see
-# docs/accuracy.md.
-_FLOOR, _ROUNDING, _SHARE_OF_LARGEST = 0.05, 1e-15, 0.04
+# Rounding of a step. The rounding of a run grows with the root of the number of steps.
+_ROUNDING = 1e-15
 
 
 def agree(rows: NDArray[np.float64], second_rows: NDArray[np.float64], outcomes: tuple[str, ...]) -> NDArray[np.bool_]:
@@ -157,9 +155,11 @@ def errors(
     second_rows: NDArray[np.float64],
     outcomes: tuple[str, ...],
     *,
-    safety: float,
-    tolerance: float = 0.0,
-    steps: Any = 0.0,
+    safety: Any,
+    share: float,
+    steps: Any,
+    floor: Any = 0.0,
+    rate_floor: Any = 0.0,
 ) -> NDArray[np.float64]:
     """Bounds on the errors of runs, from second runs at another resolution.
 
@@ -172,12 +172,14 @@ def errors(
         Outcomes of the runs, and of the second runs.
     outcomes : tuple of str
         Names of the columns.
-    safety : float
+    safety : float or ndarray of shape ``(cells,)``
         Largest error of a run, in units of its difference from the second run.
-    tolerance : float
-        Relative error allowed to a step.
+    share : float
+        Share of the largest relative difference that counts in every outcome.
     steps : ndarray of shape ``(cells,)``
         Number of steps. Their rounding accumulates.
+    floor, rate_floor : float or ndarray of shape ``(cells,)``
+        Errors that both runs share: relative errors, and relative errors per second, which velocities have in addition.
 
     Returns
     -------
@@ -186,12 +188,14 @@ def errors(
     """
     names = with_errors(outcomes)
     difference, scale = _differences(rows, second_rows, outcomes)
-    floor = _FLOOR * tolerance + _ROUNDING * np.sqrt(1.0 + np.asarray(steps))[..., None]
     with np.errstate(invalid="ignore", over="ignore"):
-        largest = _largest(difference, scale)[:, None]
-        bound: NDArray[np.float64] = (
-            safety * np.maximum(difference, _SHARE_OF_LARGEST * largest * scale) + floor * scale
-        )
+        least = share * _largest(difference, scale)[:, None] * scale
+        bound: NDArray[np.float64] = np.atleast_1d(safety)[:, None] * np.maximum(difference, least)
+        bound += np.atleast_1d(floor + _ROUNDING * np.sqrt(1.0 + np.asarray(steps)))[:, None] * scale
+        units = [OUTCOMES[name].units for name in names]
+        for k, unit in enumerate(units):
+            if unit.endswith("/s"):
+                bound[:, k] += rate_floor * scale[:, units.index(unit.removesuffix("/s"))]
     # A run that reaches the end of the span has an exact time of its end.
     reached = rows[:, outcomes.index("regime")] == rows[:, outcomes.index("motion")]
     bound[reached & (difference[:, names.index("t_end")] == 0.0), names.index("t_end")] = 0.0
