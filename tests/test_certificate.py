@@ -318,7 +318,7 @@ class TestErrors:
             covered.append((stated >= error)[known])
             ratios.append((stated / np.where(error > 0.0, error, np.nan))[known])
         assert np.concatenate(covered).mean() > 0.99
-        assert np.nanmedian(np.concatenate(ratios)) < (200 if drive == "power" else 100)
+        assert np.nanmedian(np.concatenate(ratios)) < 150
 
     def test_error_bounds_are_linked_to_their_variables_and_absent_without_certificates(self, scene):
         axes = {"drive.amplitude": [0.1, 2.0]}

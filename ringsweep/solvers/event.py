@@ -35,7 +35,7 @@ _CREEP_FACTOR = 3.0
 # Errors of a run that the difference from the second run does not show, found by experiment, see docs/accuracy.md. In
 # units of the remainder of a series: once in a run, and for each shared step. In units of the tolerance of an implicit
 # step: once in a run with bristles, and for each shared step of others.
-_ONCE, _SHARED, _ONCE_IMPLICIT, _SHARED_IMPLICIT = 0.2, 3.0, 0.05, 0.02
+_ONCE, _SHARED, _ONCE_IMPLICIT, _SHARED_IMPLICIT = 0.2, 2.0, 0.05, 0.02
 
 # The errors of so many implicit steps average out: the difference is so much more certain, down to the least share.
 _REGULAR, _LEAST_SAFETY = 40.0, 0.2
@@ -245,8 +245,8 @@ class Event(_Piecewise):
 
     name: ClassVar[str] = "event"
     families: ClassVar[tuple[type, ...]] = (SetValued,)
-    safety: ClassVar[float] = 1.0
-    share: ClassVar[float] = 0.1
+    safety: ClassVar[float] = 0.8
+    share: ClassVar[float] = 0.04
 
     rtol: Annotated[float, Parameter("1", "error allowed to a step", lower=1e-15, upper=1e-3)] = 1e-10
     max_steps: Annotated[int, LIMIT] = _MOST_STEPS

@@ -37,7 +37,7 @@ STABILITY_LIMIT = 2.61
 # Largest error of a run, in units of its difference from the run at half the step; and share of the largest relative
 # difference that counts in every number. Where friction jumps, the order is one at best, and errors of both runs are
 # erratic.
-_SAFETY, _SHARE_OF_LARGEST = 24.0, 0.8
+_SAFETY, _SHARE_OF_LARGEST = 20.0, 0.7
 
 # Runs that differ by more than this share of the scale of a number have diverged.
 _MOST_APART = 1e-2
