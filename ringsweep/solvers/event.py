@@ -35,10 +35,10 @@ _CREEP_FACTOR = 3.0
 # Errors of a run that the difference from the second run does not show, found by experiment, see docs/accuracy.md. In
 # units of the remainder of a series: once in a run, and for each shared step. In units of the tolerance of an implicit
 # step: once in a run with bristles, and for each shared step of others.
-_ONCE, _SHARED, _ONCE_IMPLICIT, _SHARED_IMPLICIT = 0.2, 2.0, 0.05, 0.02
+_ONCE, _SHARED, _ONCE_IMPLICIT, _SHARED_IMPLICIT = 0.2, 3.0, 0.05, 0.02
 
 # The errors of so many implicit steps average out: the difference is so much more certain, down to the least share.
-_REGULAR, _LEAST_SAFETY = 40.0, 0.2
+_REGULAR, _LEAST_SAFETY = 40.0, 0.15
 
 # Largest violation of the friction law in a certified run, in units of the violation that the tolerance would explain;
 # and largest share of the energy turnover that is not work of friction.
@@ -263,8 +263,8 @@ class Implicit(_Piecewise):
 
     name: ClassVar[str] = "implicit"
     families: ClassVar[tuple[type, ...]] = (Smooth, Dynamic)
-    safety: ClassVar[float] = 1.5
-    share: ClassVar[float] = 0.03
+    safety: ClassVar[float] = 2.0
+    share: ClassVar[float] = 0.05
 
     rtol: Annotated[float, Parameter("1", "error allowed to a step", lower=1e-13, upper=1e-3)] = 3e-6
     max_steps: Annotated[int, LIMIT] = _MOST_STEPS
