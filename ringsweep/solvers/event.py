@@ -38,7 +38,7 @@ _CREEP_FACTOR = 3.0
 _ONCE, _SHARED, _ONCE_IMPLICIT, _SHARED_IMPLICIT = 0.2, 3.0, 0.05, 0.02
 
 # The errors of so many implicit steps average out: the difference is so much more certain, down to the least share.
-_REGULAR, _LEAST_SAFETY = 40.0, 0.15
+_REGULAR, _LEAST_SAFETY = 60.0, 0.3
 
 # Largest violation of the friction law in a certified run, in units of the violation that the tolerance would explain;
 # and largest share of the energy turnover that is not work of friction.
