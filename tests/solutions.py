@@ -35,7 +35,7 @@ def trail(method, batch, spacing):
     times, rows = np.empty(2_000_000), np.empty((2_000_000, len(HISTORY)))
     batch = take(batch, [0])
     out, steps = np.empty((1, 0)), np.empty(1)
-    count = integrate(batch, method.tolerances(), method.max_steps, out, steps, np.empty((0, 3)), spacing, times, rows)
+    count = integrate(batch, method.tolerances(), method.max_steps, out, steps, np.empty((0, 7)), spacing, times, rows)
     return SimpleNamespace(t=times[:count], **dict(zip(HISTORY, rows[:count].T, strict=True)))
 
 

@@ -281,9 +281,16 @@ class TestErrors:
         assert (found.errors[:, with_errors(NAMES).index("t_separation")] >= error).all()
 
     @pytest.mark.parametrize(
-        ("law", "drive"), [("stiction", "arctan"), ("bengisu-akay", "arctan"), ("bengisu-akay", "power")]
+        ("method", "law", "drive"),
+        [
+            (Event(), "stiction", "arctan"),
+            # Most steps end at events, so that a run at a looser tolerance takes the same steps.
+            (Event(rtol=1e-5), "stiction", "arctan"),
+            (Implicit(), "bengisu-akay", "arctan"),
+            (Implicit(), "bengisu-akay", "power"),
+        ],
     )
-    def test_error_bounds_cover_the_true_errors(self, cells, law, drive):
+    def test_error_bounds_cover_the_true_errors(self, cells, method, law, drive):
         rng = np.random.default_rng(8)
         count = 400
         values = {
@@ -301,7 +308,7 @@ class TestErrors:
             # Below 2 the initial acceleration is infinite, and the first steps are equally short at any tolerance.
             values["drive.exponent"] = rng.uniform(1.05, 1.95, count)
         batch = cells(values, law=law, drive=drive)
-        found = Auto().run(batch, NAMES)
+        found = method.run(batch, NAMES)
         exact = solve(Event(rtol=1e-14) if law == "stiction" else Implicit(rtol=3e-10), batch)
         covered, ratios = [], []
         for k, name in enumerate(with_errors(NAMES)):
@@ -310,8 +317,8 @@ class TestErrors:
             known = np.isfinite(error) & np.isfinite(stated) & (found.rows[:, 0] == exact.regime)
             covered.append((stated >= error)[known])
             ratios.append((stated / np.where(error > 0.0, error, np.nan))[known])
-        assert np.concatenate(covered).mean() > (0.98 if drive == "power" else 0.99)
-        assert np.nanmedian(np.concatenate(ratios)) < 100
+        assert np.concatenate(covered).mean() > 0.99
+        assert np.nanmedian(np.concatenate(ratios)) < 150
 
     def test_error_bounds_are_linked_to_their_variables_and_absent_without_certificates(self, scene):
         axes = {"drive.amplitude": [0.1, 2.0]}
@@ -324,3 +331,57 @@ class TestErrors:
         without = ringsweep.sweep(scene, axes, solver={"method": "auto", "certify": False})
         assert not [name for name in without.data_vars if str(name).endswith("_error")]
         assert "ancillary_variables" not in without.phi_end.attrs
+
+
+class TestChaos:
+    """A mass on a cubic spring under 300 periods of a force: nearby runs diverge."""
+
+    SCENE: ClassVar = {
+        "model": "belt",
+        "body": {"mass": 1.0},
+        "spring": {"stiffness": 0.1, "cubic": 1.0},
+        "damper": {"coefficient": 0.046},
+        "friction": {"law": "tustin", "mu_s": 0.0180848, "mu_k": 0.0113261, "alpha": 5.77},
+        "belt": {"velocity": 0.174811},
+        "force": {"amplitude": 4.93, "frequency": 0.134},
+        "time": {"span": 2238.81},
+    }
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def found(cls):
+        """Runs at three tolerances: of a chaotic motion, and of one that a strong damper makes periodic."""
+        axes = {"damper.coefficient": [0.046, 1.0]}
+        tolerances = (1e-8, 1e-10, 1e-13)
+        return [ringsweep.sweep(cls.SCENE, axes, solver={"method": "event", "rtol": rtol}) for rtol in tolerances]
+
+    def test_numbers_of_runs_that_diverge_have_no_bound(self, found):
+        ends = [float(run.x_end[0]) for run in found]
+        assert np.ptp(ends) > 0.1
+        for run in found:
+            assert np.isnan([float(run[f"{name}_error"][0]) for name in ("x_end", "velocity_end", "x_max")]).all()
+
+    def test_regime_of_a_chaotic_motion_is_certified_if_the_statistics_agree(self, found):
+        assert found[0].certified[0] == 1
+        assert ringsweep.words(found[0].regime).values[0] == "stick-slip"
+
+    def test_numbers_of_runs_that_converge_have_a_bound(self, found):
+        for run in found:
+            assert run.certified[1] == 1
+            assert abs(float(run.x_end[1] - found[-1].x_end[1])) <= float(run.x_end_error[1])
+            assert float(run.x_end_error[1]) < 1e-4
+
+
+def test_greatest_velocity_of_a_body_that_rides_on_a_belt_is_that_of_the_belt():
+    scene = {
+        "model": "belt",
+        "body": {"mass": 1.0},
+        "spring": {"stiffness": 1.0},
+        "friction": {"law": "stiction", "mu_s": 0.9, "mu_k": 0.8},
+        "drive": {"law": "sinusoidal", "amplitude": 0.1, "frequency": 0.7, "phase": 1.0},
+        "initial": {"velocity": float(0.1 * 2.0 * np.pi * 0.7 * np.cos(1.0))},
+        "time": {"span": 5.0},
+    }
+    found = ringsweep.sweep(scene, {"drive.frequency": [0.7]})
+    assert ringsweep.words(found.regime).values[0] == "riding"
+    assert float(found.velocity_max[0]) == pytest.approx(0.1 * 2.0 * np.pi * 0.7, rel=1e-9)

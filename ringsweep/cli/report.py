@@ -48,3 +48,6 @@ def summarise(result: xr.Dataset) -> None:
             lines.append(f"  {name}: {np.median(bounds):.1e}, {bounds.max():.1e} {result[name].attrs.get('units', '')}")
     if lines:
         print("bounds on errors (median, largest):", *lines, sep="\n")
+    for name in ("phi_end_error", "x_end_error"):
+        if name in result and (unbounded := int(((result["certified"] == 1) & result[name].isnull()).sum())):
+            print(f"no bound: {unbounded} certified cells, where nearby runs diverge")

@@ -167,6 +167,8 @@ def _description(one: xr.Dataset, found: Map) -> str:
         bound = float(displayed(one.get(f"{found.data.name}_error", xr.DataArray(np.nan))))
         if np.isfinite(bound):
             texts.append(f"error at most {number_text(_upwards(bound), '.2g')}")
+        elif f"{found.data.name}_error" in one and np.isfinite(value) and one.get("certified", 0) == 1:
+            texts.append("no bound on the error: nearby runs diverge")
     if "certified" in one:
         texts.append(words(one["certified"]).item().replace("_", " ") or "inferred")
     return plain_text(", ".join(texts))

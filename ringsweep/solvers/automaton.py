@@ -8,14 +8,14 @@ Smooth laws take implicit steps where a mode relaxes much faster than it moves, 
 from __future__ import annotations
 
 from math import isfinite
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ringsweep.compile import Cells, borrowed, hook, inlined, kernel, take
 from ringsweep.models.interface import implicit, modes, recorder, series
 from ringsweep.models.interface.status import BROKEN, COMPLETE, RUNNING
-from ringsweep.numerics.series import STACK
+from ringsweep.numerics.series import ORDER, STACK
 from ringsweep.numerics.terms import COLUMNS
 from ringsweep.physics import drives
 from ringsweep.physics.friction import Dynamic, SetValued, Smooth, family
@@ -26,6 +26,9 @@ from ringsweep.solvers.taylor import series_step
 # A run ends after this many consecutive steps and events at one instant.
 _MOST_STALLED = 400
 
+#: The second run of a certificate has a tolerance that is looser by this factor.
+FACTOR = 30.0
+
 # By kind of cells: number of series in the table, and of components of a state.
 _SHAPES: dict[Any, tuple[int, int]] = {}
 
@@ -33,8 +36,46 @@ _SHAPES: dict[Any, tuple[int, int]] = {}
 PATIENCE = 1_000_000
 
 
+class LocalErrors(NamedTuple):
+    """Errors of the steps that a run and a run at a tolerance :data:`FACTOR` times looser share.
+
+    An event, a knot of the drive or the span limits the length of these steps, and not the tolerance. So the difference
+    between the runs does not show their errors.
+
+    Attributes
+    ----------
+    series : float
+        Sum over the steps of series, in units of the tolerance.
+    rate : float
+        The same for the velocity in stick, 1/s: the tolerance applies to the place alone.
+    implicit : float
+        Sum over the implicit steps, in units of the tolerance.
+    creep : float
+        Number of all implicit steps.
+    """
+
+    series: float
+    rate: float
+    implicit: float
+    creep: float
+
+
+@inlined
+def _shared(s, reach):
+    """Error of a step of length `s` of a series that meets the tolerance over a length `reach`, if it is shared."""
+    share = s / reach if s > 0.0 else 0.0
+    error = share**ORDER
+    return error if error * FACTOR < 1.0 else 0.0
+
+
+@inlined
+def _after_creep(local, error):
+    """Local errors after one more implicit step."""
+    return LocalErrors(local.series, local.rate, local.implicit + error, local.creep + 1.0)
+
+
 @hook
-def _step(family, scene, record, mode, t, y, control, h_max, tolerances, c, first, work, course, bends, samples):
+def _step(family, scene, record, mode, t, y, control, local, h_max, tolerances, c, first, work, course, bends, samples):
     """One step of the kind that the family of the friction law needs.
 
     Parameters
@@ -48,6 +89,8 @@ def _step(family, scene, record, mode, t, y, control, h_max, tolerances, c, firs
         State at time `t`.
     control : StepControl
         Length of the next implicit step.
+    local : LocalErrors
+        Up to the step.
     h_max : float
         Greatest length of the step, s.
     tolerances : tuple of float
@@ -66,19 +109,25 @@ def _step(family, scene, record, mode, t, y, control, h_max, tolerances, c, firs
     Returns
     -------
     tuple
-        Whether the step was implicit; the guard that ended it, or -1; its length, s; state, record and control after
-        it.
+        Whether the step was implicit; the guard that ended it, or -1; its length, s; state, record, control and local
+        errors after it.
     """
 
 
 @_step.implements(SetValued)
-def _step_series(family, scene, record, mode, t, y, control, h_max, tolerances, c, first, work, course, bends, samples):
-    guard, s, y, record = series_step(scene, record, mode, t, y, h_max, tolerances[0], c, first, work)
-    return False, guard, s, y, record, control
+def _step_series(
+    family, scene, record, mode, t, y, control, local, h_max, tolerances, c, first, work, course, bends, samples
+):
+    guard, s, y, record, reach = series_step(scene, record, mode, t, y, h_max, tolerances[0], c, first, work)
+    shared = _shared(s, reach)
+    rate = shared * ORDER / s if shared > 0.0 and modes.sticks(scene, mode) else 0.0
+    return False, guard, s, y, record, control, LocalErrors(local.series + shared, local.rate + rate, 0.0, 0.0)
 
 
 @_step.implements(Smooth)
-def _step_either(family, scene, record, mode, t, y, control, h_max, tolerances, c, first, work, course, bends, samples):
+def _step_either(
+    family, scene, record, mode, t, y, control, local, h_max, tolerances, c, first, work, course, bends, samples
+):
     if implicit.may_creep(scene, mode):
         forcing = implicit.forcing(scene, course, t)
         x = implicit.to_implicit(scene, forcing, y)
@@ -88,7 +137,7 @@ def _step_either(family, scene, record, mode, t, y, control, h_max, tolerances, 
             if control.last_h == 0.0:
                 # The transient into creep decays at this rate.
                 control = StepControl(min(control.h, -1.0 / linear[1][3]), 0.0, 0.0)
-            guard, s, y, record, control = implicit_step(
+            guard, s, y, record, control, error = implicit_step(
                 scene,
                 record,
                 mode,
@@ -107,20 +156,22 @@ def _step_either(family, scene, record, mode, t, y, control, h_max, tolerances, 
                 samples,
                 work,
             )
-            return True, guard, s, y, record, control
-    guard, s, y, record = series_step(scene, record, mode, t, y, h_max, tolerances[0], c, first, work)
-    return False, guard, s, y, record, StepControl(1e-6 * scene.span, 0.0, 0.0)
+            return True, guard, s, y, record, control, _after_creep(local, error)
+    guard, s, y, record, reach = series_step(scene, record, mode, t, y, h_max, tolerances[0], c, first, work)
+    control = StepControl(1e-6 * scene.span, 0.0, 0.0)
+    local = LocalErrors(local.series + _shared(s, reach), local.rate, local.implicit, local.creep)
+    return False, guard, s, y, record, control, local
 
 
 @_step.implements(Dynamic)
 def _step_implicit(
-    family, scene, record, mode, t, y, control, h_max, tolerances, c, first, work, course, bends, samples
+    family, scene, record, mode, t, y, control, local, h_max, tolerances, c, first, work, course, bends, samples
 ):
     forcing = implicit.forcing(scene, course, t)
     x = implicit.to_implicit(scene, forcing, y)
     common = implicit.common(scene, mode, forcing, x)
     linear = implicit.linearise(scene, mode, common, t, forcing, x)
-    guard, s, y, record, control = implicit_step(
+    guard, s, y, record, control, error = implicit_step(
         scene,
         record,
         mode,
@@ -139,7 +190,7 @@ def _step_implicit(
         samples,
         work,
     )
-    return True, guard, s, y, record, control
+    return True, guard, s, y, record, control, _after_creep(local, error)
 
 
 @hook
@@ -243,10 +294,10 @@ def integrate(batch, tolerances, max_steps, rows, steps, audits, spacing, times,
         Filled with outcomes. It may have no columns.
     steps : ndarray of shape ``(cells,)``
         Filled with the number of steps.
-    audits : ndarray of shape ``(cells, 3)`` or ``(0, 3)``
+    audits : ndarray of shape ``(cells, 7)`` or ``(0, 7)``
         Unless empty, filled with the audit of each run: the largest violation of the friction law, in units of the
         violation that the tolerance would explain; the share of the energy turnover that is not work of friction; the
-        rate at which the guard that ended the run fell, in its unit per second.
+        rate at which the guard that ended the run fell, in its unit per second; :class:`LocalErrors`.
     spacing : float
         Greatest time between two rows of the history, s.
     times, table : ndarray of shape ``(samples,)`` and ``(samples, variables)``
@@ -304,7 +355,7 @@ def _integrate(
         status, mode = modes.initial_mode(scene, t, y)
         record = _begin(family(scene.law), scene, mode, t, y, tolerances, c)
         control = StepControl(1e-6 * scene.span, 0.0, 0.0)
-        audit, guard_fall_rate = Audit(0.0, 0.0, 0.0), 0.0
+        audit, guard_fall_rate, local = Audit(0.0, 0.0, 0.0), 0.0, LocalErrors(0.0, 0.0, 0.0, 0.0)
         n = stalled = 0
         t_before = -1.0
         t_judged, least_gain = t, scene.span * (PATIENCE / max_steps)
@@ -326,7 +377,7 @@ def _integrate(
             n += 1
             h_max = min(scene.span, drives.next_knot(scene.drive, t)) - t
             control = StepControl(min(control.h, spacing), control.last_h, control.last_factor)
-            is_implicit, guard, s, y_next, record, control = _step(
+            is_implicit, guard, s, y_next, record, control, local = _step(
                 family(scene.law),
                 scene,
                 record,
@@ -334,6 +385,7 @@ def _integrate(
                 t,
                 y,
                 control,
+                local,
                 h_max,
                 tolerances,
                 c,
@@ -390,4 +442,5 @@ def _integrate(
             audits[i, 0] = audit.violation
             audits[i, 1] = abs(audit.unexplained) / audit.turnover if audit.turnover > 0.0 else 0.0
             audits[i, 2] = guard_fall_rate
+            _fill(audits[i, 3:], local)
     return count

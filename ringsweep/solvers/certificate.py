@@ -19,10 +19,15 @@ _MAY_LACK = ("t_separation", "first_slip", "period", "stops_per_cycle", "swing")
 # Relative difference of two final states that rounding explains.
 _SAME = 1e-14
 
-# A bound on an error is at least: a share of the tolerance of a step; the rounding of a step times the root of their
-# number; a share of the largest relative difference between both runs in any outcome. Found by experiment, see
-# docs/accuracy.md.
-_FLOOR, _ROUNDING, _SHARE_OF_LARGEST = 0.05, 1e-15, 0.04
+# Two runs have diverged if they differ by more than this share of the scale of a number, or by more than so many
+# tolerances of the looser run: then rounding alone may have grown to a share of the first.
+_MOST_APART, _MOST_GROWTH = 1e-3, 1e6
+
+# Differences shrink if the difference from a run at a tighter tolerance is at most this share of the difference before.
+_SHRUNK = 0.2
+
+# Rounding of a step. The rounding of a run grows with the root of the number of steps.
+_ROUNDING = 1e-15
 
 
 def agree(rows: NDArray[np.float64], second_rows: NDArray[np.float64], outcomes: tuple[str, ...]) -> NDArray[np.bool_]:
@@ -96,6 +101,50 @@ def took_same_steps(
     return np.asarray(same & ~stuck)
 
 
+def apart(
+    rows: NDArray[np.float64], second_rows: NDArray[np.float64], outcomes: tuple[str, ...]
+) -> NDArray[np.float64]:
+    """Largest difference between two runs of each cell in any number, relative to the scale of the number.
+
+    Parameters
+    ----------
+    rows, second_rows : ndarray of shape ``(cells, outcomes)``
+        Outcomes of the runs, and of second runs at another resolution.
+    outcomes : tuple of str
+        Names of the columns.
+
+    Returns
+    -------
+    ndarray of shape ``(cells,)``
+    """
+    difference, scale = _differences(rows, second_rows, outcomes)
+    # Laps of other lengths are no measure of divergence.
+    lasting = [k for k, name in enumerate(with_errors(outcomes)) if name != "period"]
+    return _largest(difference[:, lasting], scale[:, lasting])
+
+
+def diverging(
+    distance: NDArray[np.float64], tolerance: float, distance_before: NDArray[np.float64] | None = None
+) -> NDArray[np.bool_]:
+    """Whether nearby runs diverge, so that their difference bounds no error.
+
+    Parameters
+    ----------
+    distance : ndarray of shape ``(cells,)``
+        What :func:`apart` returned for each run and the run at the looser tolerance.
+    tolerance : float
+        Relative error allowed to a step of the looser run.
+    distance_before : ndarray of shape ``(cells,)``, optional
+        The same for the looser run and the run before it; infinite where these did not diverge.
+
+    Returns
+    -------
+    ndarray of bool, shape ``(cells,)``
+    """
+    found: NDArray[np.bool_] = distance > min(_MOST_APART, _MOST_GROWTH * tolerance)
+    return found if distance_before is None else found | ~(distance <= _SHRUNK * distance_before)
+
+
 def with_errors(outcomes: tuple[str, ...]) -> tuple[str, ...]:
     """Names of the outcomes that have a bound on their error."""
     return tuple(name for name in outcomes if f"{name}_error" in OUTCOMES)
@@ -106,9 +155,11 @@ def errors(
     second_rows: NDArray[np.float64],
     outcomes: tuple[str, ...],
     *,
-    safety: float,
-    tolerance: float = 0.0,
-    steps: Any = 0.0,
+    safety: Any,
+    share: float,
+    steps: Any,
+    floor: Any = 0.0,
+    rate_floor: Any = 0.0,
 ) -> NDArray[np.float64]:
     """Bounds on the errors of runs, from second runs at another resolution.
 
@@ -121,18 +172,41 @@ def errors(
         Outcomes of the runs, and of the second runs.
     outcomes : tuple of str
         Names of the columns.
-    safety : float
+    safety : float or ndarray of shape ``(cells,)``
         Largest error of a run, in units of its difference from the second run.
-    tolerance : float
-        Relative error allowed to a step.
+    share : float
+        Share of the largest relative difference that counts in every outcome.
     steps : ndarray of shape ``(cells,)``
         Number of steps. Their rounding accumulates.
+    floor, rate_floor : float or ndarray of shape ``(cells,)``
+        Errors that both runs share: relative errors, and relative errors per second, which velocities have in addition.
 
     Returns
     -------
     ndarray of shape ``(cells, len(with_errors(outcomes)))``
         Each in the unit of its outcome; NaN where :func:`agree` is false.
     """
+    names = with_errors(outcomes)
+    difference, scale = _differences(rows, second_rows, outcomes)
+    with np.errstate(invalid="ignore", over="ignore"):
+        least = share * _largest(difference, scale)[:, None] * scale
+        bound: NDArray[np.float64] = np.atleast_1d(safety)[:, None] * np.maximum(difference, least)
+        bound += np.atleast_1d(floor + _ROUNDING * np.sqrt(1.0 + np.asarray(steps)))[:, None] * scale
+        units = [OUTCOMES[name].units for name in names]
+        for k, unit in enumerate(units):
+            if unit.endswith("/s"):
+                bound[:, k] += rate_floor * scale[:, units.index(unit.removesuffix("/s"))]
+    # A run that reaches the end of the span has an exact time of its end.
+    reached = rows[:, outcomes.index("regime")] == rows[:, outcomes.index("motion")]
+    bound[reached & (difference[:, names.index("t_end")] == 0.0), names.index("t_end")] = 0.0
+    bound[~agree(rows, second_rows, outcomes)] = np.nan
+    return bound
+
+
+def _differences(
+    rows: NDArray[np.float64], second_rows: NDArray[np.float64], outcomes: tuple[str, ...]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Differences between two runs of each cell, and the scale of each number."""
     names = with_errors(outcomes)
     columns = [outcomes.index(name) for name in names]
     a = rows[:, columns]
@@ -144,14 +218,11 @@ def errors(
         of_unit = units == unit
         largest = np.nanmax(np.abs(a[:, of_unit]), axis=1, initial=0.0)
         scale[:, of_unit] = (largest + (0.0 if unit.startswith("m") else 1.0))[:, None]
-    floor = _FLOOR * tolerance + _ROUNDING * np.sqrt(1.0 + np.asarray(steps))[..., None]
+    return difference, scale
+
+
+def _largest(difference: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Largest relative difference of each cell."""
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        largest_difference = np.nanmax(np.where(scale > 0.0, difference / scale, 0.0), axis=1, initial=0.0)[:, None]
-        bound: NDArray[np.float64] = (
-            safety * np.maximum(difference, _SHARE_OF_LARGEST * largest_difference * scale) + floor * scale
-        )
-    # A run that reaches the end of the span has an exact time of its end.
-    reached = rows[:, outcomes.index("regime")] == rows[:, outcomes.index("motion")]
-    bound[reached & (difference[:, names.index("t_end")] == 0.0), names.index("t_end")] = 0.0
-    bound[~agree(rows, second_rows, outcomes)] = np.nan
-    return bound
+        found: NDArray[np.float64] = np.nanmax(np.where(scale > 0.0, difference / scale, 0.0), axis=1, initial=0.0)
+    return found

@@ -290,7 +290,8 @@ def implicit_step(
     -------
     tuple
         The guard that ended the step, or -1; length of the step, s, negative if no step was accepted; state, record and
-        control after it.
+        control after it; norm of its error, in units of the tolerance, if a guard, a knot of the drive or the span and
+        not the tolerance limited its length, 0 otherwise.
     """
     scales = implicit.error_scales(scene, tolerance, x)
     s = min(control.h, h_max)
@@ -323,12 +324,12 @@ def implicit_step(
             break
         near = False
     else:
-        return -1, -1.0, y, record, control
+        return -1, -1.0, y, record, control, 0.0
     control = _next_control(control, s, error_norm, s == h_max, s < min(control.h, h_max))
     if event >= 0:
         event += first
         if h == 0.0:
-            return event, 0.0, y, record, control
+            return event, 0.0, y, record, control, 0.0
     fractions, count = work[0], 0
     velocity, acceleration = implicit.motion(scene, forcing, x, linear)
     for start, view in ((0.0, middle), (0.5, after)):
@@ -367,7 +368,7 @@ def implicit_step(
         duration = (fraction - fraction_before) * h
         record = recorder.observe(scene, record, t + fraction * h, duration, stuck, implicit.seen(scene, view))
         fraction_before = fraction
-    return event, h, implicit.from_implicit(scene, end, x_next), record, control
+    return event, h, implicit.from_implicit(scene, end, x_next), record, control, h_norm if h < s or s == h_max else 0.0
 
 
 @inlined

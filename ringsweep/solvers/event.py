@@ -13,21 +13,32 @@ from ringsweep.compile import take
 from ringsweep.errors import InputError
 from ringsweep.models.interface import audit, implicit, modes, recorder, series
 from ringsweep.models.scene import Structure
+from ringsweep.numerics.series import ORDER
 from ringsweep.physics import drives
 from ringsweep.physics.friction import LAWS, Dynamic, SetValued, Smooth, family_of, presliding
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.variables import FAILED
-from ringsweep.solvers.automaton import PATIENCE, integrate
-from ringsweep.solvers.certificate import certifiable, errors, took_same_steps, with_errors
+from ringsweep.solvers.automaton import FACTOR, PATIENCE, LocalErrors, integrate
+from ringsweep.solvers.certificate import apart, certifiable, diverging, errors, took_same_steps, with_errors
 from ringsweep.solvers.method import Method, Needs, Result
 
 LIMIT = Parameter("1", "steps after which a run is given up as failed", lower=1, upper=1e10)
 _MOST_STEPS = 100_000_000
 
-#: The second run of a certificate has a tolerance that is looser by this factor. A cell without a certificate is run
-#: again with a tolerance that is tighter by this factor, at most _MOST_RETRIES times.
-FACTOR = 30.0
+# A cell without a certificate is run again with a tolerance that is tighter by FACTOR, at most so many times.
 _MOST_RETRIES = 3
+
+# The second run of a certificate has looser tolerances, by FACTOR. Implicit steps within a stiction band lose accuracy
+# faster than the tolerance says: at a tolerance looser by FACTOR the difference would be thousands of errors.
+_CREEP_FACTOR = 3.0
+
+# Errors of a run that the difference from the second run does not show, found by experiment, see docs/accuracy.md. In
+# units of the remainder of a series: once in a run, and for each shared step. In units of the tolerance of an implicit
+# step: once in a run with bristles, and for each shared step of others.
+_ONCE, _SHARED, _ONCE_IMPLICIT, _SHARED_IMPLICIT = 0.2, 3.0, 0.05, 0.02
+
+# The errors of so many implicit steps average out: the difference is so much more certain, down to the least share.
+_REGULAR, _LEAST_SAFETY = 60.0, 0.3
 
 # Largest violation of the friction law in a certified run, in units of the violation that the tolerance would explain;
 # and largest share of the energy turnover that is not work of friction.
@@ -45,7 +56,9 @@ class _Piecewise(Method):
 
     families: ClassVar[tuple[type, ...]]
     safety: ClassVar[float]
-    """Largest error of a run, in units of its difference from the run at the looser tolerance; the median is 1/50."""
+    """Largest error of a run, in units of its difference from the run at the looser tolerance."""
+    share: ClassVar[float]
+    """Share of the largest relative difference that counts in every number."""
 
     rtol: float
     max_steps: int = _MOST_STEPS
@@ -95,29 +108,29 @@ class _Piecewise(Method):
         open_cells = np.flatnonzero(~self._given_up(rows, steps, outcomes))
         if not len(open_cells):
             return Result(rows, steps=steps, certified=certified, errors=bounds)
-        second_rows, more_steps, _ = replace(self, rtol=self.rtol * FACTOR).integrate(
-            _select(batch, open_cells), len(outcomes), audit=False
+        finer, distance = self, np.full(len(rows), np.inf)
+        looser = self.looser(batch)
+        second_rows, more_steps, _ = self.integrate(
+            _select(batch, open_cells), len(outcomes), audit=False, tolerances=looser
         )
-        certified[open_cells] = self._certified(
-            _select(batch, open_cells), rows[open_cells], second_rows, audits[open_cells], outcomes
-        )
-        certified[open_cells] &= ~took_same_steps(rows[open_cells], second_rows, outcomes)
-        bounds[open_cells] = self._errors(batch, rows[open_cells], second_rows, steps[open_cells], outcomes)
-        steps[open_cells] += more_steps
-        finer = self
-        for _ in range(_MOST_RETRIES):
-            open_cells = open_cells[~certified[open_cells]]
-            finer = replace(finer, rtol=finer.rtol / FACTOR)
-            if not len(open_cells) or finer.tolerances()[0] < 1e-15:
-                break
+        new_rows, new_steps, audits = rows[open_cells], steps[open_cells], audits[open_cells]
+        for retry in range(_MOST_RETRIES + 1):
             cells = _select(batch, open_cells)
-            finer_rows, more_steps, audits = finer.integrate(cells, len(outcomes), audit=True)
-            certified[open_cells] = self._certified(cells, finer_rows, rows[open_cells], audits, outcomes)
-            bounds[open_cells] = finer._errors(batch, finer_rows, rows[open_cells], more_steps, outcomes)
+            certified[open_cells], bounds[open_cells], distance[open_cells], may_converge = finer._compare(
+                cells, new_rows, second_rows, audits, new_steps, distance[open_cells], looser, outcomes
+            )
+            if retry == 0:
+                certified[open_cells] &= ~took_same_steps(new_rows, second_rows, outcomes)
             steps[open_cells] += more_steps
-            finished = ~self._given_up(finer_rows, more_steps, outcomes)
-            rows[open_cells[finished]] = finer_rows[finished]
-            open_cells = open_cells[finished]
+            finished = ~self._given_up(new_rows, new_steps, outcomes)
+            rows[open_cells[finished]] = new_rows[finished]
+            open_cells = open_cells[finished & (~certified[open_cells] | may_converge)]
+            looser, finer = finer.tolerances(), replace(finer, rtol=finer.rtol / FACTOR)
+            if retry == _MOST_RETRIES or not len(open_cells) or not 1e-15 <= finer.tolerances()[0] < looser[0]:
+                break
+            second_rows = rows[open_cells]
+            new_rows, more_steps, audits = finer.integrate(_select(batch, open_cells), len(outcomes), audit=True)
+            new_steps = more_steps
         return Result(rows, steps=steps, certified=certified, errors=bounds)
 
     def _given_up(
@@ -127,32 +140,64 @@ class _Piecewise(Method):
         failed: NDArray[np.bool_] = rows[:, outcomes.index("regime")] == FAILED
         return failed & (steps >= min(self.max_steps, PATIENCE))
 
-    @staticmethod
-    def _certified(
-        batch: Any,
-        rows: NDArray[np.float64],
-        second_rows: NDArray[np.float64],
-        audits: NDArray[np.float64],
-        outcomes: tuple[str, ...],
-    ) -> NDArray[np.bool_]:
-        """Whether each run is certified, from its audit and from the second run at another tolerance."""
-        obeys_law: NDArray[np.bool_] = (audits[:, 0] <= _MOST_VIOLATION) & (audits[:, 1] <= _MOST_UNEXPLAINED)
-        return obeys_law & certifiable(batch, rows, second_rows, audits[:, 2], outcomes)
-
-    def _errors(
+    def _compare(
         self,
         batch: Any,
         rows: NDArray[np.float64],
         second_rows: NDArray[np.float64],
+        audits: NDArray[np.float64],
         steps: NDArray[Any],
+        distance_before: NDArray[np.float64],
+        looser: tuple[float, float],
         outcomes: tuple[str, ...],
-    ) -> NDArray[np.float64]:
-        """Bounds on the errors of runs at this tolerance, from second runs at a looser tolerance."""
-        tolerance = self.tolerances()[family_of(type(batch.law)) is Dynamic]
-        return errors(rows, second_rows, outcomes, safety=self.safety, tolerance=tolerance, steps=steps)
+    ) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+        """Certificates of runs at this tolerance and bounds on their errors, from second runs at a looser tolerance.
+
+        Returns
+        -------
+        tuple of ndarray
+            Whether each run is certified; bounds, NaN where nearby runs diverge; distance of the runs where they
+            diverge, infinite elsewhere; whether they diverge, but a tighter tolerance may show that they converge.
+        """
+        of_bristles = family_of(type(batch.law)) is Dynamic
+        distance = apart(rows, second_rows, outcomes)
+        diverge = diverging(distance, looser[of_bristles], distance_before)
+        obeys_law: NDArray[np.bool_] = (audits[:, 0] <= _MOST_VIOLATION) & (audits[:, 1] <= _MOST_UNEXPLAINED)
+        certified = obeys_law & certifiable(batch, rows, second_rows, audits[:, 2], outcomes)
+        if diverge.any():
+            certified &= ~diverge | audit.same_statistics(batch, rows, second_rows)
+        tolerance, implicit_tolerance = self.tolerances()
+        local = LocalErrors(*audits[:, 3:].T)
+        if of_bristles:
+            floor, safety = _ONCE_IMPLICIT * implicit_tolerance, self.safety
+        else:
+            # Ratio of successive terms of a series at the end of a step; a geometric series is the remainder.
+            ratio = tolerance ** (1.0 / ORDER)
+            floor = tolerance * ratio / (1.0 - ratio) * (_ONCE + _SHARED * local.series)
+            floor += _SHARED_IMPLICIT * implicit_tolerance * local.implicit
+            safety = self.safety * np.clip(_REGULAR / np.maximum(local.creep, 1.0), _LEAST_SAFETY, 1.0)
+        bounds = errors(
+            rows,
+            second_rows,
+            outcomes,
+            safety=safety,
+            share=self.share,
+            steps=steps,
+            floor=floor,
+            rate_floor=tolerance * local.rate,
+        )
+        bounds[diverge] = np.nan
+        may_converge = diverge & ~diverging(distance / FACTOR, self.tolerances()[of_bristles])
+        return certified, bounds, np.where(diverge, distance, np.inf), may_converge
+
+    def looser(self, batch: Any) -> tuple[float, float]:
+        """Tolerances of the second run of a certificate, as :meth:`tolerances` returns them."""
+        tolerance, implicit_tolerance = self.tolerances()
+        factor = _CREEP_FACTOR if family_of(type(batch.law)) is Smooth else FACTOR
+        return tolerance * FACTOR, implicit_tolerance * factor
 
     def integrate(
-        self, batch: Any, width: int, *, audit: bool
+        self, batch: Any, width: int, *, audit: bool, tolerances: tuple[float, float] | None = None
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Run every cell once.
 
@@ -164,16 +209,19 @@ class _Piecewise(Method):
             Number of outcomes.
         audit : bool
             Whether the runs are audited.
+        tolerances : tuple of float, optional
+            In place of :meth:`tolerances`.
 
         Returns
         -------
         tuple of ndarray
-            Outcomes of shape ``(cells, width)``; numbers of steps of shape ``(cells,)``; audits of shape ``(cells, 3)``
-            or ``(0, 3)``, see :func:`ringsweep.solvers.automaton.integrate`.
+            Outcomes of shape ``(cells, width)``; numbers of steps of shape ``(cells,)``; audits of shape ``(cells, 7)``
+            or ``(0, 7)``, see :func:`ringsweep.solvers.automaton.integrate`.
         """
         rows = np.empty((len(batch.span), width))
-        steps, audits = np.empty(len(rows)), np.empty((len(rows) if audit else 0, 3))
-        integrate(batch, self.tolerances(), self.max_steps, rows, steps, audits, np.inf, np.empty(0), np.empty((0, 0)))
+        steps, audits = np.empty(len(rows)), np.empty((len(rows) if audit else 0, 7))
+        tolerances = tolerances or self.tolerances()
+        integrate(batch, tolerances, self.max_steps, rows, steps, audits, np.inf, np.empty(0), np.empty((0, 0)))
         return rows, steps, audits
 
     def history(self, batch: Any, samples: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -184,7 +232,7 @@ class _Piecewise(Method):
             times, table = np.empty(size), np.empty((size, width))
             no_outcomes, steps = np.empty((1, 0)), np.empty(1)
             count = integrate(
-                batch, self.tolerances(), self.max_steps, no_outcomes, steps, np.empty((0, 3)), spacing, times, table
+                batch, self.tolerances(), self.max_steps, no_outcomes, steps, np.empty((0, 7)), spacing, times, table
             )
             if count < size or size >= self.max_steps:
                 return times[:count], table[:count]
@@ -197,7 +245,8 @@ class Event(_Piecewise):
 
     name: ClassVar[str] = "event"
     families: ClassVar[tuple[type, ...]] = (SetValued,)
-    safety: ClassVar[float] = 0.7
+    safety: ClassVar[float] = 0.8
+    share: ClassVar[float] = 0.04
 
     rtol: Annotated[float, Parameter("1", "error allowed to a step", lower=1e-15, upper=1e-3)] = 1e-10
     max_steps: Annotated[int, LIMIT] = _MOST_STEPS
@@ -214,7 +263,8 @@ class Implicit(_Piecewise):
 
     name: ClassVar[str] = "implicit"
     families: ClassVar[tuple[type, ...]] = (Smooth, Dynamic)
-    safety: ClassVar[float] = 1.5
+    safety: ClassVar[float] = 2.0
+    share: ClassVar[float] = 0.05
 
     rtol: Annotated[float, Parameter("1", "error allowed to a step", lower=1e-13, upper=1e-3)] = 3e-6
     max_steps: Annotated[int, LIMIT] = _MOST_STEPS

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ringsweep.compile import Cells, absorbed, add_scaled, hook, inlined, kernel, put, take
 from ringsweep.errors import InputError
-from ringsweep.models.interface import constant_step, recorder
+from ringsweep.models.interface import audit, constant_step, recorder
 from ringsweep.models.interface.status import COMPLETE, RUNNING
 from ringsweep.models.scene import Structure
 from ringsweep.numerics.functions import any_of, select
@@ -27,16 +27,20 @@ from ringsweep.physics.drives import lookup, shape_numbers, table_row, turn, wit
 from ringsweep.physics.friction import TRAITS, Dynamic, family_of, presliding
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.variables import SEPARATING
-from ringsweep.solvers.certificate import certifiable, errors, with_errors
+from ringsweep.solvers.certificate import apart, certifiable, errors, with_errors
 from ringsweep.solvers.method import Method, Needs, Result
 
 #: Radius of the largest half disc in the left half plane in which the method is stable (more exactly 2.616). On the
 #: real axis the method is stable up to 2.785.
 STABILITY_LIMIT = 2.61
 
-# Largest error of a run, in units of its difference from the run at half the step. Where friction jumps, the order is
-# one at best.
-_SAFETY = 5.0
+# Largest error of a run, in units of its difference from the run at half the step; and share of the largest relative
+# difference that counts in every number. Where friction jumps, the order is one at best, and errors of both runs are
+# erratic.
+_SAFETY, _SHARE_OF_LARGEST = 20.0, 0.7
+
+# Runs that differ by more than this share of the scale of a number have diverged.
+_MOST_APART = 1e-2
 
 # Largest share of the narrowest segment of the surface that a step of a certified run slides across.
 _MOST_ARC_SHARE = 0.5
@@ -108,10 +112,22 @@ class RK4(Method):
                 trusted = (
                     contacts_held & (half_report[:, 1] <= STABILITY_LIMIT) & (half_report[:, 4] <= _MOST_ARC_SHARE)
                 )
+                diverge = apart(stable_rows, half_rows, outcomes) > _MOST_APART
+                if diverge.any():
+                    trusted &= ~diverge | audit.same_statistics(stable_batch, stable_rows, half_rows)
                 certified[stable] = trusted & certifiable(
                     stable_batch, stable_rows, half_rows, half_report[:, 3], outcomes
                 )
-                bounds[stable] = errors(stable_rows, half_rows, outcomes, safety=_SAFETY, steps=report[stable, 0])
+                found = errors(
+                    stable_rows,
+                    half_rows,
+                    outcomes,
+                    safety=_SAFETY,
+                    share=_SHARE_OF_LARGEST,
+                    steps=report[stable, 0],
+                )
+                found[diverge] = np.nan
+                bounds[stable] = found
         return Result(rows, steps=report[:, 0], stiffness=report[:, 1], certified=certified, errors=bounds)
 
     def _integrate(

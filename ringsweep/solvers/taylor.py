@@ -81,10 +81,12 @@ def series_step(scene, record, mode, t, y, h_max, tolerance, c, first, work):
     Returns
     -------
     tuple
-        The guard that ended the step, or -1; length of the step, s; state and record after it.
+        The guard that ended the step, or -1; length of the step, s; state and record after it; length over which the
+        series meets the tolerance, s.
     """
-    h = min(series.expand(scene, mode, t, y, tolerance, c), h_max)
+    reach = series.expand(scene, mode, t, y, tolerance, c)
+    h = min(reach, h_max)
     guard, s = _first_event(c, first, mode.entry_guard, h, work)
     if s > 0.0:
         record = _observe(scene, record, mode, c, t, s, work)
-    return guard, s, series.state_at(scene, c, s), record
+    return guard, s, series.state_at(scene, c, s), record, reach

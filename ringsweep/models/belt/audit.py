@@ -29,6 +29,13 @@ from ringsweep.quantities.variables import OSCILLATORY
 # An oscillation is certain if the two runs of a cell differ by less than this share of its swing.
 _SMALLEST_SHARE = 0.1
 
+# Statistics of two runs agree if the ranges of their displacements and their shares of stick differ by less than the
+# first, and their stops in a cycle by less than the second: laps of chaotic motions are no longer than 64 cycles.
+_SAME_SHARE, _SAME_STOPS = 0.1, 0.25
+
+# Errors of the steps around steady sliding look like a swing of a smaller share of the range of the displacement.
+_SMALLEST_SWING = 1e-2
+
 # Rounding of an acceleration, as a share of its largest terms.
 _ROUNDING = 1e-12
 
@@ -99,4 +106,17 @@ def _undecided(batch, rows, second_rows, fall_rates):
         pace = np.where(batch.stiffness > 0.0, np.sqrt(batch.mass / batch.stiffness), 0.0)
         apart = np.maximum(np.abs(one.x_end - other.x_end), np.abs(one.swing - other.swing))
         apart = np.fmax(apart, np.abs(one.velocity_end - other.velocity_end) * pace)
-        return (one.regime == OSCILLATORY) & ~(apart <= _SMALLEST_SHARE * np.minimum(one.swing, other.swing))
+        swing = np.minimum(one.swing, other.swing)
+        swings = (apart <= _SMALLEST_SHARE * swing) | (swing > _SMALLEST_SWING * (one.x_max - one.x_min))
+        return (one.regime == OSCILLATORY) & ~swings
+
+
+@audit.same_statistics.implements(Belt, BristleBelt)
+def _same_statistics(batch, rows, second_rows):
+    one, other = Outcome(*rows.T), Outcome(*second_rows.T)
+    with np.errstate(invalid="ignore", over="ignore"):
+        range_1, range_2 = one.x_max - one.x_min, other.x_max - other.x_min
+        same = np.abs(range_1 - range_2) <= _SAME_SHARE * np.minimum(range_1, range_2)
+        # Without a cycle there are no shares.
+        same &= ~(np.abs(one.stick_share - other.stick_share) > _SAME_SHARE)
+        return same & ~(np.abs(one.stops_per_cycle - other.stops_per_cycle) > _SAME_STOPS)

@@ -301,6 +301,12 @@ def _extremes(scene, record, mode, c, h, work):
         net = terms(c[X]) * scene.stiffness + terms(c[FORCE])
         set_terms(c[SPARE], with_loads(scene, net, -1.0, terms(c[VELOCITY]), terms(c[CUBE]), terms(c[PUSH])))
         count = crossings(c[SPARE], h, work, count)
+    elif c[VELOCITY, 0] + variation(c[VELOCITY], h) > record.velocity_max:
+        # In stick the belt decides where the velocity has an extreme.
+        for k in range(ORDER):
+            c[SPARE, k] = (k + 1.0) * c[VELOCITY, k + 1]
+        c[SPARE, ORDER] = 0.0
+        count = crossings(c[SPARE], h, work, count)
     rest = due_within(scene, record, h)
     if rest > 0.0:
         work[0][count] = rest

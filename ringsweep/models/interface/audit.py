@@ -78,4 +78,26 @@ def undecided(batch, rows, second_rows, fall_rates):
     return np.zeros(len(rows), dtype=bool)
 
 
-MEMBERS = (violation, energy, undecided)
+@hook(optional=True)
+def same_statistics(batch, rows, second_rows):
+    """Which runs of a batch have the same statistics as other runs of the same cells, within sampling error.
+
+    Nearby runs of a chaotic motion diverge. Their numbers at the end say nothing, but their regime may be certain. It
+    runs outside kernels and may use NumPy.
+
+    Parameters
+    ----------
+    batch : NamedTuple
+        Cells. The type of the batch decides which body runs.
+    rows, second_rows : ndarray of shape ``(cells, outcomes)``
+        Outcomes of the runs, and of second runs at another resolution.
+
+    Returns
+    -------
+    ndarray of bool, shape ``(cells,)``
+        By default false for all cells: the runs have no statistics.
+    """
+    return np.zeros(len(rows), dtype=bool)
+
+
+MEMBERS = (violation, energy, undecided, same_statistics)
