@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cache
 
 from ringsweep.numerics.expressions import Node, derivative, multiply, nodes_of, number
 
@@ -413,6 +414,7 @@ SERIES_ROWS = 36
 _FUNCTIONS = ("exp", "log", "log1p", "sqrt", "power", "tanh", "atan", "sin", "cos")
 
 
+@cache
 def _degree(node: Node) -> int | None:
     """Degree of a polynomial; None for anything else."""
     if not node.varies:
@@ -431,8 +433,8 @@ def is_polynomial(node: Node) -> bool:
     return _degree(node) is not None
 
 
-def taylor_lines(names: Mapping[str, str], value: Node, rate: Node, side: str) -> list[str]:
-    """Lines that fill the array ``theta`` with the power series of an expression in the variable, up to ``order``.
+def taylor_lines(names: Mapping[str, str], value: Node, rate: Node, side: str, factor: str) -> list[str]:
+    """Body that fills the array ``theta`` with the power series of an expression in the variable, up to ``order``.
 
     Coefficients of a function follow from those of its derivative, which is an expression of the same functions. The
     lines need an array ``work`` of shape ``(SERIES_ROWS, order + 1)``.
@@ -444,6 +446,8 @@ def taylor_lines(names: Mapping[str, str], value: Node, rate: Node, side: str) -
         The expression, and its derivative.
     side : str
         As for :func:`float_lines`.
+    factor : str
+        Source text of a factor on the series.
 
     Raises
     ------
@@ -490,6 +494,7 @@ def taylor_lines(names: Mapping[str, str], value: Node, rate: Node, side: str) -
             part if j < 2 else f"({part} if k >= {j} else 0.0)" for j, part in enumerate(parts) if j >= first
         )
 
+    writer.write(f"factor = {factor}")
     for node, i in place.items():
         writer.write(f"work[{i}, 0] = {writer.known[node]}")
     inverses = {node: writer.new(f"1.0 / {writer.known[node.parts[1]]}") for node in place if node.kind == "divide"}
@@ -511,8 +516,8 @@ def taylor_lines(names: Mapping[str, str], value: Node, rate: Node, side: str) -
             writer.write(f"work[{i}, k] = {text}")
         writer.write("pass")
     with writer.block("for k in range(1, order + 1):"):
-        writer.write(f"theta[k] = {term(rate, 'k - 1')} * INVERSE[k]")
-    writer.write(f"theta[0] = {writer.known[value]}")
+        writer.write(f"theta[k] = factor * {term(rate, 'k - 1')} * INVERSE[k]")
+    writer.write(f"theta[0] = factor * {writer.known[value]}")
     return writer.lines
 
 

@@ -558,9 +558,8 @@ def _make(name: str, doc: str, function: Function, parameters: Mapping[str, Para
     implement(amplitude, "drive", number(factor))
     implement(shape, "drive, t", writer.float_lines(names, [s, rate, second], _SIDE))
     implement(jerk, "drive, t", number(derivative(second), "amplitude(drive) * "))
-    series = writer.taylor_lines(names, s, rate, _SIDE)
-    scaled = ["a = amplitude(drive)", "for k in range(order + 1):", "    theta[k] = a * theta[k]"]
-    implement(expand, "drive, t, order, theta, work", [*series, *scaled])
+    series = writer.taylor_lines(names, s, rate, _SIDE, "amplitude(drive)")
+    implement(expand, "drive, t, order, theta, work", series)
     implement(top_speed, "drive", ["t = 0.0", *number(size_at_start(function.rate))])
     if function.knots:
         later = ["if t < knot < found:", "    found = knot"]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from math import inf
 from typing import Any
 
@@ -16,7 +17,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.numerics import expressions
-from ringsweep.numerics.expressions import ONE, TIME, ZERO, Node, add, derivative, evaluate, multiply, negative
+from ringsweep.numerics.expressions import (
+    ONE,
+    TIME,
+    ZERO,
+    Node,
+    add,
+    derivative,
+    evaluate,
+    multiply,
+    negative,
+    nodes_of,
+)
 from ringsweep.physics.friction.formula import FormulaError, Language, Reader, Threshold, Units, dimension, parsed
 
 #: The language of drives and forces.
@@ -219,20 +231,19 @@ def period_of(node: Node, values: Values) -> Any:
 
     It repeats if the time stands only in sines and cosines of straight lines in t whose periods have a common multiple.
     """
-    if not node.varies:
-        return 0.0
-    if node.kind in ("sin", "cos") and not (slope := derivative(node.parts[0])).varies:
-        rate = abs(evaluate(slope, 0.0, values))
-        with np.errstate(divide="ignore"):
-            return np.where(rate > 0.0, 2.0 * np.pi / rate, 0.0)
-    if node.kind in ("variable", "switch"):
-        return inf
-    found = 0.0
-    for part in node.parts:
-        found = common_period(found, period_of(part, values))
-    if node.kind == "multiply" and not node.parts[0].varies:
-        return np.where(evaluate(node.parts[0], 0.0, values) == 0.0, 0.0, found)
-    return found
+    found: dict[Node, Any] = {}
+    for one in nodes_of(node):
+        if one.kind in ("sin", "cos") and not (slope := derivative(one.parts[0])).varies:
+            rate = abs(evaluate(slope, 0.0, values))
+            with np.errstate(divide="ignore"):
+                found[one] = np.where(rate > 0.0, 2.0 * np.pi / rate, 0.0)
+            continue
+        found[one] = inf if one.kind in ("variable", "switch") else 0.0
+        for part in one.parts:
+            found[one] = common_period(found[one], found[part])
+        if one.kind == "multiply" and not one.parts[0].varies:
+            found[one] = np.where(evaluate(one.parts[0], 0.0, values) == 0.0, 0.0, found[one])
+    return found[node]
 
 
 # Largest number of periods, of the slower of two oscillations, that make a common period.
@@ -255,6 +266,7 @@ def common_period(a: Any, b: Any) -> Any:
 # ---- rounding ---------------------------------------------------------------------------------
 
 
+@cache
 def size_at_start(node: Node) -> Node:
     """Bound on the sizes of the terms of an expression at t = 0; its rounding scales with it."""
     if not node.varies:
