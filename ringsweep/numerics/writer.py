@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
 
-from ringsweep.numerics.expressions import Node, derivative, multiply, nodes_of, number
+from ringsweep.numerics.expressions import ONE, Node, add, derivative, multiply, nodes_of, number
 
 _CALLS = ("exp", "log", "sqrt", "power", "tanh", "atan")
 
@@ -314,12 +314,34 @@ def _keep(writer: _Writer, step: _Step, node: Node, side: str) -> None:
         part = writer.known[node.parts[0]]
         writer.write(f"{step.needed[node, 'one_plus_square']} = 1.0 / (1.0 + {part} * {part})")
     if node.varies and node.kind in ("exp", "tanh"):
-        inner = node.parts[0]
-        rates = [derivative(inner), derivative(derivative(inner))]
         scale = 2.0 if node.kind == "tanh" else 1.0
-        _floats(writer, rates, side)
-        first, second = (writer.known[rate] for rate in rates)
-        writer.write(f"sharpness = max(sharpness, {scale} * (abs({first}) + 2.0 * sqrt_of(0.5 * abs({second}))))")
+        _sharpen(writer, node.parts[0], "1.0", scale, side)
+    elif node.varies and (base := singular(node)) is not None and base.varies:
+        # The series converges up to the zero of this expression that is nearest in the complex plane. Where a narrow
+        # peak is still far its terms are too small to tell, so that a step would lead across it.
+        _straight(writer, [base])
+        _sharpen(writer, base, writer.new(f"abs({writer.known[base]})"), 4.0, side)
+
+
+def singular(node: Node) -> Node | None:
+    """Expression at whose zeros a node has no power series."""
+    if node.kind == "log1p":
+        return add(ONE, node.parts[0])
+    if node.kind == "divide":
+        return node.parts[1]
+    if node.kind == "atan":
+        return add(ONE, multiply(node.parts[0], node.parts[0]))
+    return node.parts[0] if node.kind in ("log", "sqrt", "power") else None
+
+
+def _sharpen(writer: _Writer, inner: Node, unit: str, scale: float, side: str) -> None:
+    """Take the rate at which an expression changes, in a unit, into the sharpness."""
+    rates = [derivative(inner), derivative(derivative(inner))]
+    _floats(writer, rates, side)
+    first, second = (writer.known[rate] for rate in rates)
+    share = "" if unit == "1.0" else f" / {unit}"
+    change = f"abs({first}){share} + 2.0 * sqrt_of(0.5 * abs({second}){share})"
+    writer.write(f"sharpness = max(sharpness, {scale} * ({change}))")
 
 
 def _series(step: _Step, outputs: list[Node], side: str) -> None:
@@ -518,6 +540,30 @@ def taylor_lines(names: Mapping[str, str], value: Node, rate: Node, side: str, f
     with writer.block("for k in range(1, order + 1):"):
         writer.write(f"theta[k] = factor * {term(rate, 'k - 1')} * INVERSE[k]")
     writer.write(f"theta[0] = factor * {writer.known[value]}")
+    return writer.lines
+
+
+def reach_lines(names: Mapping[str, str], output: Node, side: str) -> list[str]:
+    """Lines that shorten ``h``, from the variable on, so that a power series within it sees all features ahead.
+
+    Where a narrow feature is still far, the terms of the series are too small to tell of it. The lines call
+    ``time_of(distance, first, second)``: how long an expression with these derivatives needs for a distance.
+    """
+    writer = _Writer(names)
+    bounds = []
+    for node in nodes_of(output):
+        if node.varies and node.kind in ("exp", "tanh"):
+            # Beyond these arguments the functions are constant but for rounding.
+            far = "-40.0 - {}" if node.kind == "exp" else "abs({}) - 20.0"
+            bounds.append((node.parts[0], f"max({4.0 if node.kind == 'exp' else 2.0}, {far})"))
+        elif node.varies and (base := singular(node)) is not None and base.varies:
+            bounds.append((base, "0.5 * abs({})"))
+    for inner, distance in bounds:
+        parts = [inner, derivative(inner), derivative(derivative(inner))]
+        writer.constants(*parts)
+        _floats(writer, parts, side)
+        value, first, second = (writer.known[part] for part in parts)
+        writer.write(f"h = min(h, time_of({distance.format(value)}, {first}, {second}))")
     return writer.lines
 
 

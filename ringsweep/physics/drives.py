@@ -517,6 +517,14 @@ def add_drive(name: str, drive: type) -> None:
 
 # ---- drives by formula ------------------------------------------------------------------------
 
+
+@inlined
+def _time_of(distance, first, second):
+    """Time in which an expression with these two derivatives changes by a distance."""
+    rate = abs(first) + sqrt(first * first + 2.0 * abs(second) * distance)
+    return 2.0 * distance / rate if rate > 0.0 else inf
+
+
 _SCOPE = {
     "abs": abs,
     "amplitude": amplitude,
@@ -532,6 +540,7 @@ _SCOPE = {
     "sin_of": sin,
     "sqrt_of": sqrt,
     "tanh_of": tanh,
+    "time_of": _time_of,
 }
 
 _SIDE = "t < drive.knots[{}]"
@@ -561,10 +570,12 @@ def _make(name: str, doc: str, function: Function, parameters: Mapping[str, Para
     series = writer.taylor_lines(names, s, rate, _SIDE, "amplitude(drive)")
     implement(expand, "drive, t, order, theta, work", series)
     implement(top_speed, "drive", ["t = 0.0", *number(size_at_start(function.rate))])
-    if function.knots:
-        later = ["if t < knot < found:", "    found = knot"]
-        lines = ["found = inf", "for knot in drive.knots:", *(f"    {line}" for line in later), "return found"]
-        implement(next_knot, "drive, t", lines)
+    # The drives of the package have no narrow features.
+    reach = writer.reach_lines(names, s, _SIDE) if qualified else []
+    if function.knots or reach:
+        lines = ["h = inf", *reach, "found = t + h"]
+        lines += ["for knot in drive.knots:", "    if t < knot < found:", "        found = knot"] * bool(function.knots)
+        implement(next_knot, "drive, t", [*lines, "return found"])
     elif writer.is_polynomial(rate):
         turn_near.implements(drive)(_turn_itself)
     angle_at_start.implements(drive)(
