@@ -13,7 +13,7 @@ from ringsweep.errors import InputError
 from ringsweep.models.parts import drive_of
 from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import (
-    COURSE_LENGTH,
+    COURSE_SHAPE,
     DRIVES,
     Arctan,
     Constant,
@@ -77,7 +77,7 @@ class TestCourse:
     """Within a step the series about a recent time replaces the drive."""
 
     def course(self, drive, t, h):
-        course = np.empty(COURSE_LENGTH)
+        course = np.empty(COURSE_SHAPE)
         new_course(course)
         follow(drive, course, t, h)
         return course
@@ -85,7 +85,7 @@ class TestCourse:
     @pytest.mark.parametrize("t", [1e-14, 1e-9, 1e-3, 0.05, 0.39, 1.1, 2.9])
     def test_series_differs_from_the_drive_by_rounding(self, drive, t):
         course = self.course(drive, t, 1e-3)
-        times = t + np.linspace(0.0, 1.0, 23) * min(course[1], 0.1)
+        times = t + np.linspace(0.0, 1.0, 23) * min(course[0, 1], 0.1)
         exact = np.array([[*turn(drive, time), jerk(drive, time)] for time in times])
         found = np.array([turn_near(drive, course, time) for time in times])
         # The drive itself is as uncertain as its time.
@@ -95,17 +95,17 @@ class TestCourse:
 
     def test_drive_itself_is_taken_where_the_series_does_not_reach(self, drive):
         course = self.course(drive, 1.0, 1e-3)
-        for t in (0.2, 0.999999, 1.0 + 2.0 * course[1] if course[1] < inf else 0.5):
+        for t in (0.2, 0.999999, 1.0 + 2.0 * course[0, 1] if course[0, 1] < inf else 0.5):
             assert turn_near(drive, course, t) == turn(drive, t)
 
     def test_series_is_kept_while_it_reaches(self, drive):
         course = self.course(drive, 1.2, 1e-6)
-        end = 1.2 + course[1]
-        assert course[0] == 1.2
+        end = 1.2 + course[0, 1]
+        assert course[0, 0] == 1.2
         follow(drive, course, 1.2 + 1e-6, 1e-6)
-        assert course[0] == 1.2
+        assert course[0, 0] == 1.2
         follow(drive, course, 2.9, 1e-6)
-        assert course[0] == (1.2 if end > 2.9 else 2.9)
+        assert course[0, 0] == (1.2 if end > 2.9 else 2.9)
 
 
 class TestArctan:

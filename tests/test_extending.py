@@ -16,9 +16,50 @@ PAGE = (Path(__file__).parents[1] / "docs" / "extending.md").read_text(encoding=
 #: Example files of the page, by name.
 FILES = {name: text for text, name in re.findall(r"```python\n(# (my_\w+\.py)\n.*?)```", PAGE, re.DOTALL)}
 
-#: The formula in a scene, and the one in Python.
-(SECTION,) = (yaml.safe_load(text) for text in re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL))
+#: The formulas of friction and of a drive in a scene, and the one in Python.
+SECTION, DRIVE = (yaml.safe_load(text) for text in re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL))
 (IN_PYTHON,) = re.findall(r"```python\n(import ringsweep\n.*?)```", PAGE, re.DOTALL)
+
+#: A drive with functions of its own, as a drive needs them that is no formula.
+FILES["my_run_up.py"] = """# my_run_up.py
+from math import exp
+from typing import Annotated, NamedTuple
+
+from ringsweep.physics.drives import add_drive, expand, jerk, shape
+from ringsweep.quantities.parameters import Leaf, Parameter
+
+
+class RunUp(NamedTuple):
+    \"\"\"A ring that runs up to a constant speed: d theta/dt = amplitude (1 - exp(-t/tau)).\"\"\"
+
+    amplitude: Annotated[Leaf, Parameter("rad/s", "final angular velocity of the ring")]
+    tau: Annotated[Leaf, Parameter("s", "time constant of the run-up", lower=0.0, open_lower=True)]
+
+
+@shape.implements(RunUp)
+def _shape(drive, t):
+    rest = exp(-t / drive.tau)
+    return t - drive.tau * (1.0 - rest), 1.0 - rest, rest / drive.tau
+
+
+@expand.implements(RunUp)
+def _expand(drive, t, order, theta, work):
+    # Each term is the one before times -1/(k tau), but for the straight line t - tau.
+    term = drive.amplitude * drive.tau * exp(-t / drive.tau)
+    for k in range(order + 1):
+        theta[k] = term
+        term = -term / ((k + 1.0) * drive.tau)
+    theta[0] += drive.amplitude * (t - drive.tau)
+    theta[1] += drive.amplitude
+
+
+@jerk.implements(RunUp)
+def _jerk(drive, t):
+    return -drive.amplitude / (drive.tau * drive.tau) * exp(-t / drive.tau)
+
+
+add_drive("run-up", RunUp)
+"""
 
 #: Beginning of the scripts below.
 RUN = """
@@ -65,7 +106,7 @@ def in_a_process(script, paths, cache, package_folder=Path(__file__).parents[1])
 
 
 def test_page_has_one_example_for_each_kind_of_extension():
-    assert list(FILES) == ["my_dahl.py", "my_run_up.py", "my_disc.py", "my_heun.py"]
+    assert list(FILES) == ["my_dahl.py", "my_disc.py", "my_heun.py", "my_run_up.py"]
 
 
 #: Claims of the page, each with a script that checks it.
@@ -99,6 +140,12 @@ CLAIMS = {
         assert found["certified"] == 1
         assert np.abs(found["phi"] - equilibrium).max() < 0.05
         assert found["normal_1"].std() < 1e-12
+    """,
+    "the formula of the run-up moves the ring as its functions would": f"""
+        known = {{"law": "run-up", "amplitude": 2.0, "tau": 1.0}}
+        drives = known, {DRIVE["drive"]}
+        ends = [run({{**disc, "drive": d}}, {{"method": "rk4", "steps": 2000}})["phi_end"] for d in drives]
+        assert abs(ends[0] - ends[1]) < 1e-9, ends
     """,
     "rk4 and event agree on a body that swings on the disc at rest": """
         scene = {**disc, "initial": {"phi": 1.0, "omega": -0.5}, "time": {"span": 0.2}}

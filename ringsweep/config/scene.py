@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Collection, Iterator, Mapping
+from dataclasses import replace
 from functools import cache
 from itertools import product
 from typing import Any
 
 from ringsweep.config.friction import FORMULA, keep_definitions, keys_of, law_of_curve, own_laws, read_curve
 from ringsweep.config.friction import TABLE as TABLE_LAW
+from ringsweep.config.motion import FORMULA as FORMULA_DRIVE
+from ringsweep.config.motion import own_drive, own_force
 from ringsweep.config.sections import choose, missing_text, read_values, section_of, suggestion
 from ringsweep.config.tables import TABLES, read_table
 from ringsweep.config.yaml_text import Document
@@ -69,16 +72,27 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     curve = read_curve(doc, friction) if TABLE_LAW in names else None
     if curve is not None:
         own[TABLE_LAW] = law_of_curve(curve)
+    drive = "none"
+    if "drive" in scene:
+        names_of_drives = dict.fromkeys([*DRIVES, FORMULA_DRIVE])
+        drive = choose(names_of_drives, section_of(scene, "drive", "scene."), "scene.drive.law", "drive law")
+    by_formula = Structure(model, "", drive, own_drive=own_drive(model, scene.get("drive", {})))
+    if "force.constant" in parameters(Structure(model, next(iter(MODELS[model].laws)))) and "force" in scene:
+        by_formula = replace(by_formula, own_force=own_force(section_of(scene, "force", "scene.")))
     # Name a misspelt key, rather than the key that is missing because of it.
     all_laws = MODELS[model].laws | own
-    paths = _Paths(_all_paths(model, zones or ("zones.0",), dict.fromkeys([*all_laws, FORMULA, TABLE_LAW]), own))
+    paths = _Paths(
+        _all_paths(model, zones or ("zones.0",), dict.fromkeys([*all_laws, FORMULA, TABLE_LAW]), own, by_formula)
+    )
     try:
         leaves = dict(_leaves(scene, "", paths))
     except _UnknownKey as error:
         path = f"scene.{error.section}.{error.key}" if error.section else f"scene.{error.key}"
         hint = _belongs_elsewhere(error.section, str(error.key), paths, model)
         if hint is None:
-            near = _Paths(_all_paths(model, zones[:1] or ("zones.0",), names, own)).children if names else {}
+            near = (
+                _Paths(_all_paths(model, zones[:1] or ("zones.0",), names, own, by_formula)).children if names else {}
+            )
             hint = suggestion(error.key, near.get(error.section, paths.children[error.section]))
         raise InputError(path, f"unknown key{hint}") from None
     if not names:
@@ -87,9 +101,6 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     keep_definitions(friction, names)
     # Laws of this process too: other processes know only what the structure holds.
     own |= own_laws(friction)
-    drive = "none"
-    if "drive" in scene:
-        drive = choose(DRIVES, section_of(scene, "drive", "scene."), "scene.drive.law", "drive law")
     rough = [path for path in leaves if path.startswith("friction.rough.")]
     if "zones" in scene:
         for other in ("zone", *rough):
@@ -104,7 +115,15 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     measured = force is not None and any(name in force for name in (*TABLES["force"], "file"))
     forces = read_table(doc, scene["force"], "force", 4) if measured else None
     structures = {
-        law: Structure(model, law, drive, zones, table, own.get(law), curve if law == TABLE_LAW else None, forces)
+        law: replace(
+            by_formula,
+            law=law,
+            arcs=zones,
+            table=table,
+            own_law=own.get(law),
+            curve=curve if law == TABLE_LAW else None,
+            force=forces,
+        )
         for law in names
     }
     known = numbers_of(structures)
@@ -118,13 +137,15 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
             needing = [law for law, structure in structures.items() if path in parameters(structure)]
             who = f"; law {needing[0]} needs it" if len(structures) > len(needing) else ""
             name = path.rpartition(".")[2]
-            if name != name.lower() and name.lower() in NAMES:
+            if path.startswith("friction.") and name != name.lower() and name.lower() in NAMES:
                 who += f"; or did you mean `{name.lower()}` in the formula, {NAMES[name.lower()]}?"
             raise InputError(f"scene.{path}", missing_text(path, parameter) + who)
     for path in leaves:
         if path not in known and path not in _structural(model, drive, names):
             if path.startswith("force."):
-                raise InputError(f"scene.{path}", "cannot stand beside a table, which gives the force at all times")
+                raise InputError(
+                    f"scene.{path}", "cannot stand beside a table or a formula, which gives all of the force"
+                )
             where, name = ("drive", drive) if path.startswith("drive.") else ("friction", " or ".join(structures))
             warn_of_unused(path, where, name)
     _warn_of_lengths(frozenset((path, value) for path, value in values.items() if known[path].unit == "m"))
@@ -181,16 +202,25 @@ def law_choice(model: str, own: Mapping[str, type]) -> Choice:
 def _structural(model: str, drive: str, laws: Collection[str]) -> tuple[str, ...]:
     """Paths of a scene that are no numeric parameters."""
     sections = ["drive"] if drive == "table" else []
+    formulas = ["drive.theta"] if drive == FORMULA_DRIVE else []
     if "force.constant" in parameters(Structure(model, next(iter(MODELS[model].laws)))):
         sections.append("force")
+        formulas.append("force.formula")
     return (
+        *formulas,
         *("model", LAW, "drive.law"),
         *(f"{section}.{name}" for section in sections for name in (*TABLES[section], "file")),
         *(f"friction.{name}" for name in keys_of(laws)),
     )
 
 
-def _all_paths(model: str, zones: tuple[str, ...], laws: Collection[str], own: Mapping[str, type]) -> list[str]:
+def _all_paths(
+    model: str,
+    zones: tuple[str, ...],
+    laws: Collection[str],
+    own: Mapping[str, type],
+    by_formula: Structure | None = None,
+) -> list[str]:
     """Every path that a scene of this model can have, under some laws and all drives."""
     paths = dict.fromkeys(_structural(model, "table", laws))
     known = [law for law in laws if law in MODELS[model].laws or law in own]
@@ -198,6 +228,8 @@ def _all_paths(model: str, zones: tuple[str, ...], laws: Collection[str], own: M
     kinds = [*product(known, ("none",), ((), ("zone",), zones)), *product(known[:1], DRIVES, ((),))]
     for law, drive, arcs in kinds:
         paths |= dict.fromkeys(parameters(Structure(model, law, drive, arcs, own_law=own.get(law))))
+    if by_formula is not None:
+        paths |= dict.fromkeys(parameters(replace(by_formula, law=law, own_law=own.get(law))))
     return list(paths)
 
 

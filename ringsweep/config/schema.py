@@ -12,6 +12,7 @@ from typing import Any
 from ringsweep.config.axes import COUNT
 from ringsweep.config.friction import FORMULA
 from ringsweep.config.friction import TABLE as TABLE_LAW
+from ringsweep.config.motion import FORMULA as FORMULA_DRIVE
 from ringsweep.config.refinement import NUMBERS
 from ringsweep.config.tables import TABLES
 from ringsweep.models import MODELS, parameters
@@ -54,7 +55,7 @@ def schema() -> dict[str, Any]:
             "friction.at_rest": _at_rest(),
             "friction.v": _list(_number(TABLES["friction"]["v"])),
             "friction.file": {"type": "string", "description": "CSV file with columns v (m/s), mu"},
-            "drive.law": _names(DRIVES, "how the ring is driven"),
+            "drive.law": _drives(),
             "drive.file": {"type": "string", "description": "CSV file with columns t (s), theta (rad)"},
             "force.file": {"type": "string", "description": "CSV file with columns t (s), force (N)"},
             **{
@@ -62,14 +63,17 @@ def schema() -> dict[str, Any]:
                 for section in ("drive", "force")
                 for name, parameter in TABLES[section].items()
             },
+            "drive.theta": _any_of([_formula("angle or displacement", TIME), _list(_number(TABLES["drive"]["theta"]))]),
+            "force.formula": _formula("force on the body, N,", TIME),
             **leaves,
         }
     )
     scene["required"] = ["model"]
     scene["properties"]["drive"]["required"] = ["law"]
-    scene["properties"]["friction"]["additionalProperties"] = _number(
-        Parameter("", "parameter of a friction law by formula")
-    )
+    for section, what in {"friction": "friction law", "drive": "drive", "force": "force"}.items():
+        scene["properties"][section]["additionalProperties"] = _number(
+            Parameter("", f"parameter of a {what} by formula")
+        )
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "ringsweep configuration",
@@ -108,8 +112,18 @@ def _laws(about: str) -> dict[str, Any]:
     return {"description": about, "type": "string", "anyOf": [*known["oneOf"], own]}
 
 
-def _formula() -> dict[str, Any]:
-    return {"description": "friction coefficient as a formula of the sliding speed v", "type": "string"}
+def _drives() -> dict[str, Any]:
+    found = _names(DRIVES, "how the ring is driven")
+    found["oneOf"].append({"const": FORMULA_DRIVE, "description": "A formula of the time, under theta"})
+    return found
+
+
+# Variables of formulas.
+SPEED, TIME = "the sliding speed v", "the time t, s"
+
+
+def _formula(what: str = "friction coefficient", of: str = SPEED) -> dict[str, Any]:
+    return {"description": f"{what} as a formula of {of}", "type": "string"}
 
 
 def _at_rest() -> dict[str, Any]:
@@ -164,7 +178,7 @@ def _sweep(paths: list[str]) -> dict[str, Any]:
     value = {"type": ["number", "string"]}
     arcs = "|".join(path.removeprefix("zones.0.") for path in paths if path.startswith("zones.0."))
     laws = {LAW: _list(_laws("friction law"))}
-    own = r"^friction\.[A-Za-z][A-Za-z0-9_]*$"
+    own = r"^(friction|drive|force)\.[A-Za-z][A-Za-z0-9_]*$"
     names = {"anyOf": [{"enum": [*laws, *paths]}, {"pattern": rf"^zones\.[0-9]+\.({arcs})$"}, {"pattern": own}]}
     together = {"anyOf": [*names["anyOf"], {"pattern": r"^[^,\s]+(\s*,\s*[^,\s]+)+$"}]}
     bounds = {"type": "array", "prefixItems": [value, value, _number(COUNT)], "minItems": 3, "maxItems": 3}

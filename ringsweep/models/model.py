@@ -28,6 +28,8 @@ class Model(ABC):
     driven : tuple of str
         History variables for the place and the velocity of the ring or belt that the drive moves, if the methods do not
         give them. Without any there is no film of the model.
+    drive_unit : str
+        Unit of the motion of the drive.
     absent : frozenset of str
         Outcomes and history variables that have no meaning for this model. Datasets leave them out.
     """
@@ -37,6 +39,7 @@ class Model(ABC):
     outcomes: ClassVar[tuple[str, ...]]
     place: ClassVar[str]
     driven: ClassVar[tuple[str, ...]] = ()
+    drive_unit: ClassVar[str] = "rad"
     absent: ClassVar[frozenset[str]] = frozenset()
 
     @property

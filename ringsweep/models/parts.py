@@ -16,6 +16,7 @@ from ringsweep.physics.friction.formula import FormulaError
 from ringsweep.physics.friction.speeds import hidden_fields, table_fields
 from ringsweep.physics.friction.velocity import EXPRESSIONS
 from ringsweep.quantities.parameters import Parameter, declared
+from ringsweep.quantities.units import show
 
 MASS = Parameter("kg", "mass of the body", lower=0.0, open_lower=True)
 GRAVITY = Parameter("m/s^2", "acceleration of gravity", lower=0.0, default=9.81)
@@ -113,13 +114,26 @@ def drive_of(structure: Structure, values: Values) -> Any:
     Raises
     ------
     InputError
-        If the table of a drive ends before the span of time.
+        If the table of a drive ends before the span of time, or if the formula of a drive is not smooth.
     """
-    law = drives.DRIVES[structure.drive]
-    columns: dict[str, Any] = {field: values[f"drive.{field}"] for field in declared(law)}
     if structure.table is None:
-        return law(**columns)
+        return by_formula(structure.drive_type, "drive", "theta", values)
+    columns = {field: values[f"drive.{field}"] for field in declared(structure.drive_type)}
     return table_of(*structure.table, columns["amplitude"], "drive", values)
+
+
+def by_formula(law: type, section: str, key: str, values: Values) -> Any:
+    """Drive or force with fields of shape ``(cells, ...)``; `key` of the `section` of a scene has its formula.
+
+    Raises
+    ------
+    InputError
+        If the formula is not smooth.
+    """
+    try:
+        return drives.made(law, {name: values[f"{section}.{name}"] for name in declared(law)}, values["time.span"])
+    except FormulaError as error:
+        raise InputError(f"scene.{section}.{key}", f"{show(drives.FORMULAS[law].text)}: {error}") from None
 
 
 def table_of(

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
+from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS
 
 Values = Mapping[str, NDArray[np.float64]]
@@ -39,6 +40,8 @@ class Structure:
         Sliding speeds (m/s) and friction coefficients of a law from a table, each of shape ``(points,)``.
     force : tuple of ndarray, optional
         Times (s) and forces (N) of a force from a table, each of shape ``(samples,)``.
+    own_drive, own_force : type, optional
+        Types of the drive and of the force on the body if the configuration defines them by formulas.
     """
 
     model: str
@@ -49,11 +52,18 @@ class Structure:
     own_law: type | None = None
     curve: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     force: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    own_drive: type | None = None
+    own_force: type | None = None
 
     @property
     def law_type(self) -> type:
         """Type of the friction law."""
         return self.own_law or LAWS[self.law]
+
+    @property
+    def drive_type(self) -> type:
+        """Type of the drive."""
+        return self.own_drive or DRIVES[self.drive]
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Expressions of one variable, the speed, with parameters: what friction laws are written in.
+"""Expressions of one variable, with parameters: friction laws are functions of the speed, drives of the time.
 
 An expression is a graph in which equal parts are one node. So common parts are computed once, in whatever language the
 expression is written out later.
@@ -23,12 +23,13 @@ class Node:
     Attributes
     ----------
     kind : str
-        ``number``, ``symbol``, ``speed``, ``add``, ``multiply``, ``divide``, ``power``, ``exp``, ``log``, ``sqrt``,
-        ``tanh``, ``atan``, ``switch``; ``minimum`` or ``maximum`` of constant parts.
+        ``number``, ``symbol``, ``variable``, ``add``, ``multiply``, ``divide``, ``power``, a function (``exp``,
+        ``log``, ``log1p``, ``sqrt``, ``tanh``, ``atan``, ``sin``, ``cos``), ``switch``; ``minimum`` or ``maximum`` of
+        constant parts.
     parts : tuple of Node
         What the node is computed from. Of a switch, the expression below its threshold and the one above.
     value : float, str or int, optional
-        Value of a number, name of a symbol, or index of the threshold of a switch.
+        Value of a number, name of a symbol or of the variable, or index of the threshold of a switch.
     """
 
     kind: str
@@ -37,7 +38,7 @@ class Node:
 
     @property
     def varies(self) -> bool:
-        """Whether the node depends on the speed."""
+        """Whether the node depends on the variable."""
         return _varies(self)
 
 
@@ -53,11 +54,11 @@ def _node(kind: str, *parts: Node, value: Any = None) -> Node:
 
 @cache
 def _varies(node: Node) -> bool:
-    return node.kind in ("speed", "switch") or any(_varies(part) for part in node.parts)
+    return node.kind in ("variable", "switch") or any(_varies(part) for part in node.parts)
 
 
-#: The speed, at least zero.
-SPEED = _node("speed")
+#: The variable of friction laws and that of drives, both at least zero.
+SPEED, TIME = _node("variable", value="speed"), _node("variable", value="t")
 
 
 def number(value: float) -> Node:
@@ -150,11 +151,14 @@ _FUNCTIONS: dict[str, Callable[[float], float]] = {
     "sqrt": math.sqrt,
     "tanh": math.tanh,
     "atan": math.atan,
+    "log1p": math.log1p,
+    "sin": math.sin,
+    "cos": math.cos,
 }
 
 
 def function(name: str, a: Node) -> Node:
-    """``exp``, ``log``, ``sqrt``, ``tanh`` or ``atan`` of an expression."""
+    """Function of an expression: a key of the table above."""
     if a.kind == "number":
         try:
             return number(_FUNCTIONS[name](a.value))
@@ -164,21 +168,21 @@ def function(name: str, a: Node) -> Node:
 
 
 def extreme(kind: str, a: Node, b: Node) -> Node:
-    """``minimum`` or ``maximum`` of two expressions that do not depend on the speed."""
+    """``minimum`` or ``maximum`` of two expressions that do not depend on the variable."""
     return a if a is b else _node(kind, a, b)
 
 
 def switch(threshold: int, below: Node, above: Node) -> Node:
-    """`below` at speeds less than a threshold, `above` from the threshold on."""
+    """`below` where the variable is less than a threshold, `above` from the threshold on."""
     return below if below is above else _node("switch", below, above, value=threshold)
 
 
 @cache
 def derivative(a: Node) -> Node:
-    """Derivative by the speed; at a threshold the one from above."""
+    """Derivative by the variable; at a threshold the one from above."""
     if not a.varies:
         return ZERO
-    if a.kind == "speed":
+    if a.kind == "variable":
         return ONE
     rates = [derivative(part) for part in a.parts]
     p = a.parts
@@ -200,6 +204,12 @@ def derivative(a: Node) -> Node:
         return multiply(add(ONE, negative(multiply(a, a))), rates[0])
     if a.kind == "atan":
         return divide(rates[0], add(ONE, multiply(p[0], p[0])))
+    if a.kind == "log1p":
+        return divide(rates[0], add(ONE, p[0]))
+    if a.kind == "sin":
+        return multiply(function("cos", p[0]), rates[0])
+    if a.kind == "cos":
+        return multiply(negative(function("sin", p[0])), rates[0])
     return switch(a.value, *rates)
 
 
@@ -247,18 +257,18 @@ def symbols_of(*expressions: Node) -> list[str]:
     return [node.value for node in nodes_of(*expressions) if node.kind == "symbol"]
 
 
-def evaluate(a: Node, speed: Any, values: Mapping[str, Any], thresholds: Any = ()) -> NDArray[np.float64]:
+def evaluate(a: Node, variable: Any, values: Mapping[str, Any], thresholds: Any = ()) -> NDArray[np.float64]:
     """Value of an expression in NumPy.
 
     Parameters
     ----------
     a : Node
-    speed : array_like
-        Speed, at least zero; broadcasts with the values.
+    variable : array_like
+        Value of the variable, at least zero; broadcasts with the values.
     values : mapping of str to array_like
         Values of the parameters.
     thresholds : sequence of array_like
-        Speed of each threshold.
+        Value of the variable at each threshold.
 
     Returns
     -------
@@ -268,19 +278,19 @@ def evaluate(a: Node, speed: Any, values: Mapping[str, Any], thresholds: Any = (
     found: dict[Node, Any] = {}
     with np.errstate(all="ignore"):
         for node in nodes_of(a):
-            found[node] = _apply(node, [found[part] for part in node.parts], speed, values, thresholds)
+            found[node] = _apply(node, [found[part] for part in node.parts], variable, values, thresholds)
     return np.asarray(found[a], dtype=np.float64)
 
 
-def _apply(node: Node, parts: list[Any], speed: Any, values: Mapping[str, Any], thresholds: Any) -> Any:
+def _apply(node: Node, parts: list[Any], variable: Any, values: Mapping[str, Any], thresholds: Any) -> Any:
     if node.kind == "number":
         return np.float64(node.value)
     if node.kind == "symbol":
         return np.asarray(values[node.value], dtype=np.float64)
-    if node.kind == "speed":
-        return np.asarray(speed, dtype=np.float64)
+    if node.kind == "variable":
+        return np.asarray(variable, dtype=np.float64)
     if node.kind == "switch":
-        return np.where(np.asarray(speed) < thresholds[node.value], *parts)
+        return np.where(np.asarray(variable) < thresholds[node.value], *parts)
     simple: dict[str, Any] = {"add": np.add, "multiply": np.multiply, "divide": np.divide, "power": np.power}
     return (simple[node.kind] if node.kind in simple else getattr(np, {"atan": "arctan"}.get(node.kind, node.kind)))(
         *parts

@@ -307,7 +307,7 @@ def _polynomial(node: Node) -> list[Node] | None:
     """Coefficients of a polynomial of the speed, from the lowest power up; None if it is none."""
     if not node.varies:
         return [node]
-    if node.kind == "speed":
+    if node.kind == "variable":
         return [ZERO, ONE]
     if node.kind not in ("add", "multiply"):
         return None
@@ -426,7 +426,7 @@ class Enclosure:
             for node, constant in self.constants.items():
                 found[node] = [_taken(constant, row), *empty]
             for node in self.nodes:
-                if node.kind == "speed":
+                if node.kind == "variable":
                     found[node] = [Interval(low, high), *[exact(1.0), *empty][:order]]
                     continue
                 parts = [found[part] for part in node.parts]

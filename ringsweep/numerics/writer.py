@@ -1,7 +1,7 @@
 """Source code of expressions: for floats, for vector lanes, and for power series.
 
 Expressions are those of :mod:`ringsweep.numerics.expressions`. Each function returns the lines of a function body. A
-parameter has the source text that `names` gives it; the speed is called ``speed``.
+parameter has the source text that `names` gives it; the variable is called ``speed`` or ``t``.
 
 In kernels an interval of the speed is known where a series is computed. There a switch is an ``if``, and only one side
 of it is computed. In vector lanes each lane may be on another side, so both sides are computed, except where no lane
@@ -13,8 +13,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cache
 
-from ringsweep.numerics.expressions import ONE, Node, add, derivative, multiply, nodes_of
+from ringsweep.numerics.expressions import ONE, Node, add, derivative, multiply, nodes_of, number
 
 _CALLS = ("exp", "log", "sqrt", "power", "tanh", "atan")
 
@@ -60,8 +61,8 @@ class _Writer:
             return repr(node.value) if node.value == node.value else "nan"
         if node.kind == "symbol":
             return self.names[node.value]
-        if node.kind == "speed":
-            return "speed"
+        if node.kind == "variable":
+            return str(node.value)
         parts = [self.known[part] for part in node.parts]
         if node.kind in _OPERATORS:
             return self.new(f" {_OPERATORS[node.kind]} ".join(parts))
@@ -145,7 +146,7 @@ def varies_lines(output: Node, side: str) -> list[str]:
     def text(node: Node) -> str:
         if not node.varies:
             return "False"
-        if node.kind == "speed":
+        if node.kind == "variable":
             return "True"
         parts = [text(part) for part in node.parts]
         if node.kind == "switch":
@@ -315,15 +316,17 @@ def _keep(writer: _Writer, step: _Step, node: Node, side: str) -> None:
     if node.varies and node.kind in ("exp", "tanh"):
         scale = 2.0 if node.kind == "tanh" else 1.0
         _sharpen(writer, node.parts[0], "1.0", scale, side)
-    elif node.varies and (singular := _singular(node)) is not None and singular.varies:
+    elif node.varies and (base := singular(node)) is not None and base.varies:
         # The series converges up to the zero of this expression that is nearest in the complex plane. Where a narrow
         # peak is still far its terms are too small to tell, so that a step would lead across it.
-        _straight(writer, [singular])
-        _sharpen(writer, singular, writer.new(f"abs({writer.known[singular]})"), 4.0, side)
+        _straight(writer, [base])
+        _sharpen(writer, base, writer.new(f"abs({writer.known[base]})"), 4.0, side)
 
 
-def _singular(node: Node) -> Node | None:
+def singular(node: Node) -> Node | None:
     """Expression at whose zeros a node has no power series."""
+    if node.kind == "log1p":
+        return add(ONE, node.parts[0])
     if node.kind == "divide":
         return node.parts[1]
     if node.kind == "atan":
@@ -370,7 +373,7 @@ def _series(step: _Step, outputs: list[Node], side: str) -> None:
 
 def _coefficient(step: _Step, node: Node) -> str:
     """Name of coefficient k of a node whose parts are known."""
-    if node.kind == "speed":
+    if node.kind == "variable":
         return "x"
     k = [step.known[part] if part.varies else "0.0" for part in node.parts]
     p = node.parts
@@ -419,4 +422,154 @@ def _coefficient(step: _Step, node: Node) -> str:
         found = step.new(f"({k[0]} - INVERSE[k] * inner[{j}]) * {step.begun(node, 'one_plus_square')}")
         step.factors(i, k[0], k[0])
         step.factors(j, f"k * {found}", square)
+    return found
+
+
+# ---- power series in the variable itself ------------------------------------------------------
+
+# Polynomials up to this degree have their coefficients in the place of a series.
+_MOST_DEGREE = 4
+
+#: Rows of the scratch for :func:`taylor_lines`.
+SERIES_ROWS = 36
+
+_FUNCTIONS = ("exp", "log", "log1p", "sqrt", "power", "tanh", "atan", "sin", "cos")
+
+
+@cache
+def _degree(node: Node) -> int | None:
+    """Degree of a polynomial; None for anything else."""
+    if not node.varies:
+        return 0
+    if node.kind == "variable":
+        return 1
+    degrees = [degree for part in node.parts if (degree := _degree(part)) is not None]
+    if node.kind not in ("add", "multiply", "switch") or len(degrees) < len(node.parts):
+        return None
+    found = sum(degrees) if node.kind == "multiply" else max(degrees)
+    return found if found <= _MOST_DEGREE else None
+
+
+def is_polynomial(node: Node) -> bool:
+    """Whether a node is a polynomial of low degree between its switches."""
+    return _degree(node) is not None
+
+
+def taylor_lines(names: Mapping[str, str], value: Node, rate: Node, side: str, factor: str) -> list[str]:
+    """Body that fills the array ``theta`` with the power series of an expression in the variable, up to ``order``.
+
+    Coefficients of a function follow from those of its derivative, which is an expression of the same functions. The
+    lines need an array ``work`` of shape ``(SERIES_ROWS, order + 1)``.
+
+    Parameters
+    ----------
+    names : mapping of str to str
+    value, rate : Node
+        The expression, and its derivative.
+    side : str
+        As for :func:`float_lines`.
+    factor : str
+        Source text of a factor on the series.
+
+    Raises
+    ------
+    OverflowError
+        If there are more series than the scratch has rows.
+    """
+    writer = _Writer(names)
+    found = [rate]
+    for node in found:
+        slopes = [derivative(part) for part in nodes_of(node) if part.varies and part.kind in _FUNCTIONS]
+        found += [slope for slope in slopes if slope not in found]
+    every = nodes_of(*found)
+    series = {node for node in every if not is_polynomial(node)}
+    # Of two polynomials whose product has too high a degree one becomes a series.
+    series |= {node.parts[1] for node in series if node.kind == "multiply" and not series.intersection(node.parts)}
+    place = {node: i for i, node in enumerate(node for node in every if node in series)}
+    if len(place) > SERIES_ROWS:
+        raise OverflowError
+    others = {part for node in place if node.kind not in _FUNCTIONS for part in node.parts} | {rate}
+    others |= {derivative(node) for node in place if node.kind in _FUNCTIONS}
+    coefficients = {node: _coefficients(node) for node in every if node in others and is_polynomial(node)}
+    numbers = [one for several in coefficients.values() for one in several]
+    writer.constants(value, *found, *numbers)
+    _floats(writer, [value, *place, *numbers], side)
+
+    def term(node: Node, k: str) -> str:
+        """Coefficient `k` of a node."""
+        return f"work[{place[node]}, {k}]" if node in place else polynomial(node, k)
+
+    def polynomial(node: Node, k: str) -> str:
+        return (
+            "(" + "".join(f"{writer.known[p]} if {k} == {j} else " for j, p in enumerate(coefficients[node])) + "0.0)"
+        )
+
+    def product(left: Node, right: Node, first: int) -> str:
+        """Coefficient k of a product, with the coefficients of the left factor from `first` on."""
+        if left in place:
+            writer.write("total = 0.0")
+            with writer.block(f"for j in range({first}, k + 1):"):
+                writer.write(f"total += work[{place[left]}, j] * work[{place[right]}, k - j]")
+            return "total"
+        parts = [f"{writer.known[p]} * work[{place[right]}, k - {j}]" for j, p in enumerate(coefficients[left])]
+        return " + ".join(
+            part if j < 2 else f"({part} if k >= {j} else 0.0)" for j, part in enumerate(parts) if j >= first
+        )
+
+    writer.write(f"factor = {factor}")
+    for node, i in place.items():
+        writer.write(f"work[{i}, 0] = {writer.known[node]}")
+    inverses = {node: writer.new(f"1.0 / {writer.known[node.parts[1]]}") for node in place if node.kind == "divide"}
+    with writer.block("for k in range(1, order):"):
+        for node, i in place.items():
+            p = node.parts
+            if is_polynomial(node):
+                text = polynomial(node, "k")
+            elif node.kind == "add":
+                text = " + ".join(term(part, "k") for part in p if part.varies)
+            elif node.kind == "multiply":
+                text = product(p[0], p[1], 0) if p[1] in place else product(p[1], p[0], 0)
+            elif node.kind == "divide":
+                text = f"({term(p[0], 'k') if p[0].varies else '0.0'} - ({product(p[1], node, 1)})) * {inverses[node]}"
+            elif node.kind == "switch":
+                text = f"{term(p[0], 'k')} if {side.format(node.value)} else {term(p[1], 'k')}"
+            else:
+                text = f"{term(derivative(node), 'k - 1')} * INVERSE[k]"
+            writer.write(f"work[{i}, k] = {text}")
+        writer.write("pass")
+    with writer.block("for k in range(1, order + 1):"):
+        writer.write(f"theta[k] = factor * {term(rate, 'k - 1')} * INVERSE[k]")
+    writer.write(f"theta[0] = factor * {writer.known[value]}")
+    return writer.lines
+
+
+def reach_lines(names: Mapping[str, str], output: Node, side: str) -> list[str]:
+    """Lines that shorten ``h``, from the variable on, so that a power series within it sees all features ahead.
+
+    Where a narrow feature is still far, the terms of the series are too small to tell of it. The lines call
+    ``time_of(distance, first, second)``: how long an expression with these derivatives needs for a distance.
+    """
+    writer = _Writer(names)
+    bounds = []
+    for node in nodes_of(output):
+        if node.varies and node.kind in ("exp", "tanh"):
+            # Beyond these arguments the functions are constant but for rounding.
+            far = "-40.0 - {}" if node.kind == "exp" else "abs({}) - 20.0"
+            bounds.append((node.parts[0], f"max({4.0 if node.kind == 'exp' else 2.0}, {far})"))
+        elif node.varies and (base := singular(node)) is not None and base.varies:
+            bounds.append((base, "0.5 * abs({})"))
+    for inner, distance in bounds:
+        parts = [inner, derivative(inner), derivative(derivative(inner))]
+        writer.constants(*parts)
+        _floats(writer, parts, side)
+        value, first, second = (writer.known[part] for part in parts)
+        writer.write(f"h = min(h, time_of({distance.format(value)}, {first}, {second}))")
+    return writer.lines
+
+
+def _coefficients(polynomial: Node) -> list[Node]:
+    """Coefficients of the power series of a polynomial."""
+    found = [polynomial]
+    for k in range(1, (_degree(polynomial) or 0) + 1):
+        found.append(multiply(number(1.0 / k), derivative(found[-1])))
     return found

@@ -1,5 +1,8 @@
 """Drives: prescribed motions of the ring or of the belt. ``docs/extending.md`` shows how to add one.
 
+A drive is a formula of the time. All else is derived from it: angular velocity and acceleration, power series, knots,
+the period. Only what is no formula, or singular at t = 0, has functions of its own.
+
 Every drive is an amplitude times a shape, :math:`\\theta(t) = A\\, s(t)`. The shape does not depend on the amplitude.
 So cells that differ only in amplitude share one table of the shape. On the belt theta is a displacement: m in place of
 rad.
@@ -7,29 +10,25 @@ rad.
 
 from __future__ import annotations
 
-from math import atan, cos, exp, inf, log, log1p, pi, sin
+import base64
+import hashlib
+import json
+from collections.abc import Mapping
+from math import atan, cos, exp, inf, log, log1p, nan, sin, sqrt, tanh
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ringsweep.compile import hook, inlined, lacking
+from ringsweep.compile import function_from_lines, hook, inlined, lacking, take
+from ringsweep.numerics import writer
+from ringsweep.numerics.expressions import ZERO, Node, derivative, evaluate, symbols_of
+from ringsweep.numerics.functions import raised
+from ringsweep.numerics.series import INVERSE
+from ringsweep.physics import functions_of_time
+from ringsweep.physics.friction.formula import FormulaError
+from ringsweep.physics.functions_of_time import Function, check, knots_of, period_of, read_function, size_at_start
 from ringsweep.quantities.parameters import Leaf, Parameter
-
-
-class Still(NamedTuple):
-    """No drive: the ring is at rest."""
-
-
-class Constant(NamedTuple):
-    """Constant angular velocity: :math:`s = t`."""
-
-    amplitude: Annotated[Leaf, Parameter("rad/s", "angular velocity of the ring")]
-
-
-class Arctan(NamedTuple):
-    """Smooth run-up, the paper's h(t): :math:`s = t \\arctan t - \\tfrac12 \\ln(1 + t^2)`."""
-
-    amplitude: Annotated[float, Parameter("rad/s", "amplitude of the ring's angular velocity")]
 
 
 class Power(NamedTuple):
@@ -37,14 +36,6 @@ class Power(NamedTuple):
 
     amplitude: Annotated[float, Parameter("", "angle of the ring after one second")]
     exponent: Annotated[float, Parameter("1", "exponent of the power law", lower=1.0)]
-
-
-class Sinusoidal(NamedTuple):
-    """Rocking ring: :math:`s = \\sin(2 \\pi f t + \\psi)`."""
-
-    amplitude: Annotated[Leaf, Parameter("rad", "amplitude of the rocking angle")]
-    frequency: Annotated[Leaf, Parameter("Hz", "frequency of rocking", lower=0.0)]
-    phase: Annotated[Leaf, Parameter("rad", "phase of rocking at t = 0", default=0.0)]
 
 
 class Table(NamedTuple):
@@ -59,6 +50,10 @@ class Table(NamedTuple):
     coefficients: Any
 
 
+#: Formulas of the drives that have one, by their type.
+FORMULAS: dict[type, Function] = {}
+
+
 class WithoutShape(NamedTuple):
     """Drive whose shape is read from a table, see :func:`lookup`."""
 
@@ -67,6 +62,10 @@ class WithoutShape(NamedTuple):
 
 def without_shape(drive: Any) -> Any:
     """Drive without its shape, and without those of the drives in it; :func:`lookup` needs nothing else."""
+    function = FORMULAS.get(type(drive))
+    if function is not None and function.value is not ZERO:
+        cells = len(drive[0]) if len(drive) else 1
+        return WithoutShape(np.broadcast_to(evaluate(function.factors[0], 0.0, drive._asdict()), (cells,)).copy())
     if hasattr(drive, "amplitude"):
         return WithoutShape(drive.amplitude)
     return type(drive)(*(without_shape(part) if isinstance(part, tuple) else part for part in drive))
@@ -75,6 +74,10 @@ def without_shape(drive: Any) -> Any:
 def shape_numbers(drive: Any) -> list[Any]:
     """Numbers of a drive, and of the drives in it, on which :func:`table_row` depends: arrays of shape ``(cells,)``."""
     found = []
+    function = FORMULAS.get(type(drive))
+    if function is not None:
+        needed = symbols_of(function.factors[1], function.shape_rate)
+        return [getattr(drive, name) for name in needed] + list(getattr(drive, "knots", np.empty((0, 0))).T)
     for name, part in zip(drive._fields, drive, strict=True):
         if isinstance(part, tuple):
             found += shape_numbers(part)
@@ -104,35 +107,12 @@ def shape(drive, t):
     """
 
 
-@shape.implements(Still)
-def _still(drive, t):
-    return 0.0, 0.0, 0.0
-
-
-@shape.implements(Constant)
-def _constant(drive, t):
-    return t, 1.0, 0.0
-
-
-@shape.implements(Arctan)
-def _arctan(drive, t):
-    rate = atan(t)
-    return t * rate - 0.5 * log1p(t * t), rate, 1.0 / (1.0 + t * t)
-
-
 @shape.implements(Power)
 def _power(drive, t):
     n = drive.exponent
     if t == 0.0:
         return 0.0, 1.0 if n == 1.0 else 0.0, (2.0 if n == 2.0 else 0.0 if n > 2.0 or n == 1.0 else inf)
     return t**n, n * t ** (n - 1.0), n * (n - 1.0) * t ** (n - 2.0)
-
-
-@shape.implements(Sinusoidal)
-def _sinusoidal(drive, t):
-    rate = 2.0 * pi * drive.frequency
-    s = sin(rate * t + drive.phase)
-    return s, rate * cos(rate * t + drive.phase), -rate * rate * s
 
 
 @inlined
@@ -156,6 +136,12 @@ def _table(drive, t):
     return c0 + x * (c1 + x * (c2 + x * c3)), c1 + x * (2.0 * c2 + 3.0 * x * c3), 2.0 * c2 + 6.0 * x * c3
 
 
+@hook(absorb=True, optional=True)
+def amplitude(drive):
+    """Factor on :func:`shape`: by default the field of this name."""
+    return drive.amplitude
+
+
 @hook(optional=True)
 def turn(drive, t):
     """Angle of the ring and its first two derivatives.
@@ -173,14 +159,9 @@ def turn(drive, t):
         ``(theta, omega, epsilon)``, rad, rad/s, rad/s^2; on the belt m, m/s, m/s^2.
     """
     theta, omega, epsilon = shape(drive, t)
-    a = drive.amplitude
+    a = amplitude(drive)
     # With an amplitude of zero the ring rests, even if the shape has an infinite acceleration.
     return a * theta, a * omega, a * epsilon if a != 0.0 else 0.0
-
-
-@turn.implements(Still)
-def _no_turn(drive, t):
-    return 0.0, 0.0, 0.0
 
 
 @hook(optional=True)
@@ -219,16 +200,12 @@ def lookup(drive, table, k):
     tuple of float
         ``(theta, omega)``, rad, rad/s; on the belt m, m/s.
     """
-    return drive.amplitude * table[k, 0], drive.amplitude * table[k, 1]
-
-
-@lookup.implements(Still)
-def _no_lookup(drive, table, k):
-    return 0.0, 0.0
+    a = amplitude(drive)
+    return a * table[k, 0], a * table[k, 1]
 
 
 @hook
-def expand(drive, t, order, theta):
+def expand(drive, t, order, theta, work):
     """Taylor series of the angle of the ring about time `t`: theta[0] + theta[1] s + theta[2] s^2 + ...
 
     Parameters
@@ -239,37 +216,13 @@ def expand(drive, t, order, theta):
         Highest power.
     theta : ndarray of shape ``(order + 1,)``
         Filled with the coefficients, rad/s^k; on the belt m/s^k.
+    work : ndarray of shape ``(SERIES_ROWS, order + 1)``
+        Scratch.
     """
 
 
-@expand.implements(Still)
-def _expand_still(drive, t, order, theta):
-    for k in range(order + 1):
-        theta[k] = 0.0
-
-
-@expand.implements(Constant)
-def _expand_constant(drive, t, order, theta):
-    for k in range(2, order + 1):
-        theta[k] = 0.0
-    theta[0], theta[1] = drive.amplitude * t, drive.amplitude
-
-
-@expand.implements(Arctan)
-def _expand_arctan(drive, t, order, theta):
-    # g = 1/(1 + (t + s)^2) obeys (1 + t^2 + 2 t s + s^2) g = 1, and theta'' = A g.
-    scale = 1.0 / (1.0 + t * t)
-    before, g = 0.0, scale
-    rate = atan(t)
-    theta[0] = drive.amplitude * (t * rate - 0.5 * log1p(t * t))
-    theta[1] = drive.amplitude * rate
-    for k in range(2, order + 1):
-        theta[k] = drive.amplitude * g / (k * (k - 1.0))
-        before, g = g, -(2.0 * t * g + before) * scale
-
-
 @expand.implements(Power)
-def _expand_power(drive, t, order, theta):
+def _expand_power(drive, t, order, theta, work):
     t = max(t, _POWER_BEGINNING)
     n = drive.exponent
     theta[0] = drive.amplitude * t**n
@@ -277,18 +230,8 @@ def _expand_power(drive, t, order, theta):
         theta[k] = theta[k - 1] * (n - k + 1.0) / (k * t)
 
 
-@expand.implements(Sinusoidal)
-def _expand_sinusoidal(drive, t, order, theta):
-    rate = 2.0 * pi * drive.frequency
-    a = drive.amplitude * sin(rate * t + drive.phase)
-    b = drive.amplitude * cos(rate * t + drive.phase)
-    for k in range(order + 1):
-        theta[k] = a
-        a, b = b * rate / (k + 1.0), -a * rate / (k + 1.0)
-
-
 @expand.implements(Table)
-def _expand_table(drive, t, order, theta):
+def _expand_table(drive, t, order, theta, work):
     for k in range(4, order + 1):
         theta[k] = 0.0
     j = _piece(drive.knots, t)
@@ -332,6 +275,12 @@ def _next_knot(drive, t):
     return drive.knots[j + 1] if j + 2 < len(drive.knots) else inf
 
 
+@hook(optional=True)
+def angle_at_start(drive):
+    """Angle of the ring at t = 0, rad; outside kernels, for arrays of shape ``(cells,)``."""
+    return np.array([turn(take(drive, i), 0.0)[0] for i in range(len(drive[0]))])
+
+
 @hook
 def jerk(drive, t):
     """Third derivative of the angle of the ring, rad/s^3; on the belt m/s^3.
@@ -343,27 +292,10 @@ def jerk(drive, t):
     """
 
 
-@jerk.implements(Still, Constant)
-def _no_jerk(drive, t):
-    return 0.0
-
-
-@jerk.implements(Arctan)
-def _arctan_jerk(drive, t):
-    g = 1.0 / (1.0 + t * t)
-    return -2.0 * drive.amplitude * t * g * g
-
-
 @jerk.implements(Power)
 def _power_jerk(drive, t):
     n = drive.exponent
     return drive.amplitude * n * (n - 1.0) * (n - 2.0) * max(t, _POWER_BEGINNING) ** (n - 3.0)
-
-
-@jerk.implements(Sinusoidal)
-def _sinusoidal_jerk(drive, t):
-    rate = 2.0 * pi * drive.frequency
-    return -drive.amplitude * rate**3 * cos(rate * t + drive.phase)
 
 
 @jerk.implements(Table)
@@ -374,14 +306,15 @@ def _table_jerk(drive, t):
 #: Highest power of the series of a drive about a recent time.
 COURSE_ORDER = 12
 
-#: Length of an array that holds such a series: its centre and its reach, s, then the coefficients of :func:`expand`.
-COURSE_LENGTH = COURSE_ORDER + 3
+#: Shape of a course: its first row holds the centre and the reach of such a series, s, then the coefficients of
+#: :func:`expand`; the others are scratch.
+COURSE_SHAPE = 1 + writer.SERIES_ROWS, COURSE_ORDER + 3
 
 
 @inlined
 def new_course(course):
     """Empty a course, so that a run depends on no other run."""
-    course[0] = course[1] = inf
+    course[0, 0] = course[0, 1] = inf
 
 
 @inlined
@@ -391,18 +324,18 @@ def follow(drive, course, t, h):
     Parameters
     ----------
     drive : NamedTuple
-    course : ndarray of shape ``(COURSE_LENGTH,)``
+    course : ndarray of shape ``COURSE_SHAPE``
         Series of the drive about a recent time; see :func:`new_course`.
     t, h : float
         Time at the beginning of the step, and length of the step, s.
     """
-    centre, reach = course[0], course[1]
+    centre, reach = course[0, 0], course[0, 1]
     if t >= centre and t + h <= centre + reach:
         return
     # A series that serves a small part of a long step is not worth its coefficients. The reach may have grown since.
     if h <= 2.0 * reach or t > 2.0 * centre:
-        expand(drive, t, COURSE_ORDER, course[2:])
-        course[0], course[1] = t, min(_reach(course), next_knot(drive, t) - t)
+        expand(drive, t, COURSE_ORDER, course[0, 2:], course[1:])
+        course[0, 0], course[0, 1] = t, min(_reach(course), next_knot(drive, t) - t)
 
 
 @inlined
@@ -410,10 +343,10 @@ def _reach(course):
     """Time within which the truncation error of the acceleration is below its rounding, s."""
     # Coefficients of the acceleration: the first two, and the last two.
     n = COURSE_ORDER
-    first, second = 2.0 * abs(course[4]), 6.0 * abs(course[5])
+    first, second = 2.0 * abs(course[0, 4]), 6.0 * abs(course[0, 5])
     reach = inf
     for k in (n - 1, n):
-        last = k * (k - 1.0) * abs(course[k + 2])
+        last = k * (k - 1.0) * abs(course[0, k + 2])
         if last != 0.0:
             by_first, by_second = 2.0**-54 * first / last, 2.0**-54 * second / last
             # The acceleration itself may pass through zero; then its rate gives the scale.
@@ -429,7 +362,7 @@ def turn_near(drive, course, t):
     Parameters
     ----------
     drive : NamedTuple
-    course : ndarray of shape ``(COURSE_LENGTH,)``
+    course : ndarray of shape ``COURSE_SHAPE``
         See :func:`follow`.
     t : float
         Time, s.
@@ -439,26 +372,31 @@ def turn_near(drive, course, t):
     tuple of float
         As for :func:`turn`; equal to it but for rounding.
     """
-    s = t - course[0]
-    if not 0.0 <= s <= course[1]:
+    s = t - course[0, 0]
+    if not 0.0 <= s <= course[0, 1]:
         return turn(drive, t)
-    theta, omega, half_epsilon = course[COURSE_ORDER + 2], 0.0, 0.0
+    theta, omega, half_epsilon = course[0, COURSE_ORDER + 2], 0.0, 0.0
     for k in range(COURSE_ORDER + 1, 1, -1):
         half_epsilon = half_epsilon * s + omega
         omega = omega * s + theta
-        theta = theta * s + course[k]
+        theta = theta * s + course[0, k]
     return theta, omega, 2.0 * half_epsilon
 
 
-@turn_near.implements(Still, Constant, Table)
+@turn_near.implements(Table)
 def _turn_itself(drive, course, t):
-    # These drives are as fast as a series.
+    # A polynomial is as fast as a series.
     return turn(drive, t)
 
 
 @hook(optional=True)
 def beginning(drive):
     """First time at which the drive has a Taylor series, s. By default 0; later if the drive is singular at 0."""
+    return 0.0
+
+
+@angle_at_start.implements(Power)
+def _zero(drive):
     return 0.0
 
 
@@ -474,12 +412,6 @@ def top_speed(drive):
     By default the speed at t = 0.
     """
     return abs(turn(drive, 0.0)[1])
-
-
-@top_speed.implements(Sinusoidal)
-def _greatest_speed(drive):
-    # At an extreme of the angle the computed speed is the rounding of a cosine, not zero.
-    return abs(2.0 * pi * drive.frequency * drive.amplitude)
 
 
 @hook(optional=True)
@@ -501,10 +433,10 @@ def period(drive):
     return inf
 
 
-@period.implements(Sinusoidal)
-def _rocking_period(drive):
-    rocks = (drive.frequency > 0.0) & (drive.amplitude != 0.0)
-    return np.where(rocks, 1.0 / np.where(rocks, drive.frequency, 1.0), inf)
+@hook(optional=True)
+def force_period(drive):
+    """Period of a force with the formula of a drive; see :func:`period`, which is that of its rate."""
+    return period(drive)
 
 
 # Velocities that differ by less than this share of their size are equal but for rounding.
@@ -559,14 +491,7 @@ CONSTANT_STEP_MEMBERS = (shape, turn, lookup)
 MEMBERS = (turn, expand, jerk, next_knot, turn_near, beginning, top_speed)
 
 #: Drives by the name that the configuration gives them.
-DRIVES: dict[str, type] = {
-    "none": Still,
-    "constant": Constant,
-    "arctan": Arctan,
-    "power": Power,
-    "sinusoidal": Sinusoidal,
-    "table": Table,
-}
+DRIVES: dict[str, type] = {}
 
 
 def add_drive(name: str, drive: type) -> None:
@@ -588,3 +513,211 @@ def add_drive(name: str, drive: type) -> None:
         raise TypeError(f"drive {name} has no {', '.join(missing)}: every drive needs it, before add_drive is called")
     if DRIVES.setdefault(name, drive) is not drive:
         raise TypeError(f"there is a drive {name} already: choose another name")
+
+
+# ---- drives by formula ------------------------------------------------------------------------
+
+
+@inlined
+def _time_of(distance, first, second):
+    """Time in which an expression with these two derivatives changes by a distance."""
+    rate = abs(first) + sqrt(first * first + 2.0 * abs(second) * distance)
+    return 2.0 * distance / rate if rate > 0.0 else inf
+
+
+_SCOPE = {
+    "abs": abs,
+    "amplitude": amplitude,
+    "atan_of": atan,
+    "cos_of": cos,
+    "exp_of": exp,
+    "inf": inf,
+    "INVERSE": INVERSE,
+    "log1p_of": log1p,
+    "log_of": log,
+    "nan": nan,
+    "power_of": raised,
+    "sin_of": sin,
+    "sqrt_of": sqrt,
+    "tanh_of": tanh,
+    "time_of": _time_of,
+}
+
+_SIDE = "t < drive.knots[{}]"
+
+
+def _make(name: str, doc: str, function: Function, parameters: Mapping[str, Parameter], qualified: str = "") -> type:
+    """Type of the drive with a formula: a ``NamedTuple`` of its parameters, and of its knots if it has any."""
+    fields: list[Any] = [(field, Annotated[Leaf, p]) for field, p in parameters.items()]
+    drive: Any = NamedTuple(name, [*fields, *([("knots", Any)] if function.knots else [])])  # type: ignore[misc]
+    drive.__doc__, drive.__module__, drive.__qualname__ = doc, __name__, qualified or name
+    FORMULAS[drive] = function
+    names = {field: f"drive.{field}" for field in parameters}
+    factor, s = function.factors
+    rate = function.shape_rate
+    second = derivative(rate)
+
+    def implement(function: Any, arguments: str, lines: list[str]) -> None:
+        function.implements(drive)(function_from_lines(arguments, lines, _SCOPE))
+
+    def number(node: Node, before: str = "") -> list[str]:
+        lines = writer.float_lines(names, [node], _SIDE)
+        return [*lines[:-1], lines[-1].replace("return", f"return {before}") + "[0]"]
+
+    implement(amplitude, "drive", number(factor))
+    implement(shape, "drive, t", writer.float_lines(names, [s, rate, second], _SIDE))
+    implement(jerk, "drive, t", number(derivative(second), "amplitude(drive) * "))
+    series = writer.taylor_lines(names, s, rate, _SIDE, "amplitude(drive)")
+    implement(expand, "drive, t, order, theta, work", series)
+    implement(top_speed, "drive", ["t = 0.0", *number(size_at_start(function.rate))])
+    # The drives of the package have no narrow features.
+    reach = writer.reach_lines(names, s, _SIDE) if qualified else []
+    if function.knots or reach:
+        lines = ["h = inf", *reach, "found = t + h"]
+        lines += ["for knot in drive.knots:", "    if t < knot < found:", "        found = knot"] * bool(function.knots)
+        implement(next_knot, "drive, t", [*lines, "return found"])
+    elif writer.is_polynomial(rate):
+        turn_near.implements(drive)(_turn_itself)
+    angle_at_start.implements(drive)(
+        lambda drive: evaluate(function.value, 0.0, drive._asdict(), list(getattr(drive, "knots", np.empty((0, 0))).T))
+    )
+    period.implements(drive)(_period(function.rate))
+    force_period.implements(drive)(_period(function.value))
+    found: type = drive
+    return found
+
+
+def _period(node: Node) -> Any:
+    def period(drive: Any) -> Any:
+        found = period_of(node, drive._asdict())
+        return np.where(found == 0.0, inf, found)
+
+    return period
+
+
+# ---- the drives of the package ----------------------------------------------------------------
+
+
+def _drive(name: str, doc: str, theta: str, rate: str | None = None, **parameters: Parameter) -> Any:
+    """Define a drive by its formula, and register it under its name."""
+    function = read_function(theta, "rad", rate, infer_units=False)
+    drive = _make({"none": "Still"}.get(name, name.title()), doc, function, parameters)
+    add_drive(name, drive)
+    return drive
+
+
+Still = _drive("none", "No drive: the ring is at rest.", "0")
+
+Constant = _drive(
+    "constant",
+    "Constant angular velocity: :math:`s = t`.",
+    "amplitude*t",
+    amplitude=Parameter("rad/s", "angular velocity of the ring"),
+)
+
+Arctan = _drive(
+    "arctan",
+    "Smooth run-up, the paper's h(t): :math:`s = t \\arctan t - \\tfrac12 \\ln(1 + t^2)`.",
+    "amplitude*(t*atan(t) - log1p(t**2)/2)",
+    rate="amplitude*atan(t)",
+    amplitude=Parameter("rad/s", "amplitude of the ring's angular velocity"),
+)
+
+add_drive("power", Power)
+
+Sinusoidal = _drive(
+    "sinusoidal",
+    "Rocking ring: :math:`s = \\sin(2 \\pi f t + \\psi)`.",
+    "amplitude*sin(2*pi*frequency*t + phase)",
+    amplitude=Parameter("rad", "amplitude of the rocking angle"),
+    frequency=Parameter("Hz", "frequency of rocking", lower=0.0),
+    phase=Parameter("rad", "phase of rocking at t = 0", default=0.0),
+)
+
+add_drive("table", Table)
+
+
+@lookup.implements(Still)
+def _no_lookup(drive, table, k):
+    return 0.0, 0.0
+
+
+# ---- drives of users --------------------------------------------------------------------------
+
+_PREFIX = "formula_"
+
+_DEFINED: dict[str, type] = {}
+
+#: What must be continuous, by the unit of the formula.
+_CONTINUOUS = {
+    "rad": (("the angle", "rad"), ("the angular velocity", "rad/s")),
+    "m": (("the displacement", "m"), ("the velocity", "m/s")),
+    "N": (("the force", "N"),),
+}
+
+
+def define(text: str, unit: str) -> type:
+    """Type of the drive, or of the force, that a formula defines.
+
+    Parameters
+    ----------
+    text : str
+    unit : str
+        ``rad`` for the angle of a ring, ``m`` for the displacement of a belt, ``N`` for a force.
+
+    Raises
+    ------
+    FormulaError
+        If something in the formula is wrong.
+    """
+    # Code on disk names the type of a drive. So the name of the type tells its formula.
+    return _defined(_PREFIX + base64.urlsafe_b64encode(json.dumps([text, unit]).encode()).decode().rstrip("="))
+
+
+def _defined(qualified: str) -> type:
+    if qualified in _DEFINED:
+        return _DEFINED[qualified]
+    encoded = qualified.removeprefix(_PREFIX).encode()
+    text, unit = json.loads(base64.urlsafe_b64decode(encoded + b"=" * (-len(encoded) % 4)))
+    function = read_function(text, unit)
+    if not function.value.varies or not function.units:
+        raise FormulaError("it must depend on t, and on a parameter, which has the unit")
+    what = "force" if unit == "N" else "drive"
+    parameters = {name: Parameter(of, f"parameter {name} of the {what}") for name, of in function.units.items()}
+    name = "Formula_" + hashlib.sha256(qualified.encode()).hexdigest()[:12]
+    try:
+        drive = _make(name, f"{text}, {unit}", function, parameters, qualified)
+    except OverflowError:
+        raise FormulaError("it is too long: its power series have too many parts") from None
+    _DEFINED[qualified] = drive
+    return drive
+
+
+def __getattr__(name: str) -> Any:
+    if name.startswith(_PREFIX):
+        return _defined(name)
+    raise AttributeError(f"module {__name__} has no attribute {name}")
+
+
+def made(drive: type, columns: dict[str, NDArray[np.float64]], spans: NDArray[np.float64]) -> Any:
+    """Drives of cells, from their parameters of shape ``(cells,)``.
+
+    Raises
+    ------
+    FormulaError
+        If a formula has a jump, or is no number, within the spans of time of the cells, s.
+    """
+    if drive.__qualname__ not in _DEFINED:
+        return drive(**columns)
+    function = FORMULAS[drive]
+    knots = knots_of(function, columns, len(spans))
+    some = np.unique(np.stack([*columns.values(), spans], axis=1), axis=0, return_index=True)[1]
+    values = {name: column[some] for name, column in columns.items()}
+    check(function, values, knots[some], spans[some], _CONTINUOUS[function.unit])
+    return drive(**columns, knots=knots) if function.knots else drive(**columns)
+
+
+def largest(force: Any, spans: NDArray[np.float64]) -> Any:
+    """About the largest magnitude of forces by formula within spans of time (s), N, of shape ``(cells,)``."""
+    knots = getattr(force, "knots", np.empty((len(spans), 0)))
+    return functions_of_time.largest(FORMULAS[type(force)], force._asdict(), knots, spans)

@@ -13,6 +13,7 @@ import numpy as np
 
 from ringsweep.compile import hook
 from ringsweep.physics import drives
+from ringsweep.physics.functions_of_time import common_period
 from ringsweep.quantities.parameters import Leaf, Parameter
 
 CONSTANT = Parameter("N", "constant force on the body (default: 0)", optional=True)
@@ -99,7 +100,7 @@ def _largest_force(drive):
 
 
 @hook(optional=True)
-def expand_force(drive, t, order, force):
+def expand_force(drive, t, order, force, work):
     """Taylor series of the force about time `t`; without a force nothing is filled.
 
     Parameters
@@ -110,12 +111,14 @@ def expand_force(drive, t, order, force):
         Highest power.
     force : ndarray of shape ``(order + 1,)``
         Filled with the coefficients, N/s^k.
+    work : ndarray of shape ``(SERIES_ROWS, order + 1)``
+        Scratch.
     """
 
 
 @expand_force.implements(Forced)
-def _expand_force(drive, t, order, force):
-    drives.expand(drive.force, t, order, force)
+def _expand_force(drive, t, order, force, work):
+    drives.expand(drive.force, t, order, force, work)
     force[0] += drive.constant
 
 
@@ -152,7 +155,7 @@ def _lookup(drive, table, k):
 @hook(absorb=True, optional=True)
 def _varying(force, table, k):
     """Part of the force that varies, N, from the third column of a table of shapes."""
-    return force.amplitude * table[k, 2]
+    return drives.amplitude(force) * table[k, 2]
 
 
 @_varying.implements(drives.Still)
@@ -161,8 +164,8 @@ def _not_varying(force, table, k):
 
 
 @drives.expand.implements(Forced)
-def _expand(drive, t, order, theta):
-    drives.expand(drive.motion, t, order, theta)
+def _expand(drive, t, order, theta, work):
+    drives.expand(drive.motion, t, order, theta, work)
 
 
 @drives.jerk.implements(Forced)
@@ -182,17 +185,7 @@ def _beginning(drive):
 
 @drives.period.implements(Forced)
 def _period(drive):
-    motion, force = np.broadcast_arrays(drives.period(drive.motion), drives.period(drive.force))
-    shorter, longer = np.minimum(motion, force), np.maximum(motion, force)
-    found = np.where(longer == inf, shorter, inf)
-    # The least common multiple, if it is a few periods.
-    for n in range(_MOST_PERIODS, 0, -1):
-        with np.errstate(invalid="ignore"):
-            ratio = n * longer / shorter
-            repeats = (longer < inf) & (abs(ratio - np.round(ratio)) <= 1e-9 * ratio)
-        found = np.where(repeats, n * longer, found)
-    return found
-
-
-# Largest number of periods, of the slower of two oscillations, that make a common period.
-_MOST_PERIODS = 20
+    # Of a motion and a force that do not repeat, the other one decides.
+    periods = (drives.period(drive.motion), drives.force_period(drive.force))
+    found = common_period(*(np.where(np.isinf(period), 0.0, period) for period in periods))
+    return np.where(found == 0.0, inf, found)

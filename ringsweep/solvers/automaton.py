@@ -101,7 +101,7 @@ def _step(family, scene, record, mode, t, y, control, local, h_max, tolerances, 
         Row of the first guard in the table.
     work, samples : ndarray
         Scratch.
-    course : ndarray of shape ``(COURSE_LENGTH,)``
+    course : ndarray of shape ``COURSE_SHAPE``
         Series of the drive, see :func:`ringsweep.physics.drives.follow`.
     bends : ndarray of shape ``(2, 3, components)``
         As in :func:`ringsweep.solvers.creep.implicit_step`.
@@ -318,7 +318,7 @@ def integrate(batch, tolerances, max_steps, rows, steps, audits, spacing, times,
     scratch = (
         np.zeros((size, COLUMNS)),
         np.empty((STACK, COLUMNS)),
-        np.empty(drives.COURSE_LENGTH),
+        np.empty(drives.COURSE_SHAPE),
         np.empty((2, 3, components)),
         np.empty((MOST_GUARDS, INSTANTS + 1)),
     )

@@ -269,7 +269,7 @@ def implicit_step(
     forcing, common, linear : tuple
         Forcing at time `t`; what :func:`ringsweep.models.interface.implicit.common` and
         :func:`ringsweep.models.interface.implicit.linearise` returned for this state.
-    course : ndarray of shape ``(COURSE_LENGTH,)``
+    course : ndarray of shape ``COURSE_SHAPE``
         Series of the drive, see :func:`ringsweep.physics.drives.follow`.
     control : StepControl
         Length of the step to try first.

@@ -13,7 +13,6 @@ from ringsweep.compile import has_known_source, lacking
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS
 from ringsweep.models.scene import Structure
-from ringsweep.physics.drives import DRIVES
 
 
 @dataclass(frozen=True)
@@ -71,7 +70,7 @@ class Method(ABC):
             one of them is not known to the cache of compiled code.
         """
         needs, model = self.needs(structure), MODELS[structure.model]
-        law, drive = structure.law_type, DRIVES[structure.drive]
+        law, drive = structure.law_type, structure.drive_type
         for path, kind, name, source, cls, members in (
             ("scene.friction.law", "friction law", structure.law, law, law, needs.law),
             ("scene.drive.law", "drive", structure.drive, drive, drive, needs.drive),

@@ -71,6 +71,9 @@ def identity(config: Config) -> dict[str, str]:
     for law, own in scene.structures.items():
         if own.own_law is not None:
             found[f"scene.friction.laws.{law}"] = str(own.own_law.__doc__)
+    for path, formula in (("scene.drive.theta", structure.own_drive), ("scene.force.formula", structure.own_force)):
+        if formula is not None:
+            found[path] = str(formula.__doc__)
     if structure.table is not None:
         found["scene.drive"] = f"a table of {len(structure.table[0])} samples ({_digest(*structure.table)})"
     if structure.force is not None:

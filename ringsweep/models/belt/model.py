@@ -11,7 +11,7 @@ from ringsweep.compile import take
 from ringsweep.errors import InputError
 from ringsweep.models.belt.record import Outcome
 from ringsweep.models.model import Model
-from ringsweep.models.parts import GRAVITY, MASS, SPAN, drive_of, friction_coefficients, law_of, table_of
+from ringsweep.models.parts import GRAVITY, MASS, SPAN, by_formula, drive_of, friction_coefficients, law_of, table_of
 from ringsweep.models.scene import Structure, Values, require
 from ringsweep.physics import belt, drives, forces, friction
 from ringsweep.quantities.parameters import Parameter, declared
@@ -25,6 +25,7 @@ class Belt(Model):
     outcomes: ClassVar[tuple[str, ...]] = Outcome._fields
     place: ClassVar[str] = "x"
     driven: ClassVar[tuple[str, ...]] = ("belt_x", "belt_velocity")
+    drive_unit: ClassVar[str] = "m"
 
     def scene_type(self, structure: Structure) -> type:
         """``BristleBelt`` for laws with bristles, else ``Belt``."""
@@ -54,10 +55,12 @@ class Belt(Model):
             found[f"friction.{name}"] = replace(p, unit=absolute.get(p.unit, p.unit))
         if friction.family_of(law) is not friction.Dynamic:
             found["friction.viscous"] = Parameter("N s/m", "viscous friction", lower=0.0, default=0.0)
-        for name, p in declared(drives.DRIVES[structure.drive]).items():
-            found[f"drive.{name}"] = _along_a_line(p)
+        for name, p in declared(structure.drive_type).items():
+            found[f"drive.{name}"] = _along_a_line(p) if structure.own_drive is None else p
         found["force.constant"] = forces.CONSTANT
-        if structure.force is None:
+        if structure.own_force is not None:
+            found |= {f"force.{name}": p for name, p in declared(structure.own_force).items()}
+        elif structure.force is None:
             found |= {"force.amplitude": forces.AMPLITUDE, "force.frequency": forces.FREQUENCY}
             found["force.phase"] = forces.PHASE
         else:
@@ -138,6 +141,9 @@ class Belt(Model):
             factor = values["force.amplitude"]
             force: Any = table_of(*structure.force, factor, "force", values)
             largest = abs(factor) * np.abs(structure.force[1]).max()
+        elif structure.own_force is not None:
+            force = by_formula(structure.own_force, "force", "formula", values)
+            largest = drives.largest(force, values["time.span"])
         elif given:
             for name, example in (("amplitude", "1 N"), ("frequency", "1 Hz")):
                 if name not in given:

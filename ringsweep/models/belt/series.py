@@ -177,8 +177,8 @@ def _cube_term(cubic, c, k):
 
 @series.expand.implements(belt.Belt)
 def _expand(scene, mode, t, y, tolerance, c):
-    drives.expand(scene.drive, t, ORDER + 2, c[SHIFT])
-    expand_force(scene.drive, t, ORDER, c[PUSH])
+    drives.expand(scene.drive, t, ORDER + 2, c[SHIFT], c[FACTORS:])
+    expand_force(scene.drive, t, ORDER, c[PUSH], c[FACTORS:])
     load = scene.mass * scene.gravity
     stiffness_per_mass = scene.stiffness / scene.mass
     c[X, 0], c[V, 0] = y

@@ -170,12 +170,7 @@ def _is_launched_on_edge(batch):
     """Whether each body is launched at rest with a contact on an edge: rounding decides which side holds the body."""
     if not isinstance(batch.surface, Segments) or family_of(type(batch.law)) is not SetValued:
         return np.zeros(len(batch.span), dtype=bool)
-    drive = batch.drive
-    if isinstance(drive, drives.Table):
-        theta = np.array([drives.turn(take(drive, i), 0.0)[0] for i in range(len(batch.span))])
-    else:
-        theta = drive.amplitude * np.sin(drive.phase) if isinstance(drive, drives.Sinusoidal) else 0.0
-    rho, offset = batch.initial_phi - theta, ring.contact_offset(batch.body)
+    rho, offset = batch.initial_phi - drives.angle_at_start(batch.drive), ring.contact_offset(batch.body)
     found = np.zeros(len(batch.span), dtype=bool)
     for angle in (rho - offset, rho + offset):
         distance = (angle[:, None] - batch.surface.edges + np.pi) % (2.0 * np.pi) - np.pi

@@ -12,7 +12,7 @@ from ringsweep.models.model import Model
 from ringsweep.models.parts import GRAVITY, MASS, SPAN, drive_of, friction_coefficients, law_of
 from ringsweep.models.ring import record, series
 from ringsweep.models.scene import Structure, Values, require
-from ringsweep.physics import contact, drives, friction, ring, zones
+from ringsweep.physics import contact, friction, ring, zones
 from ringsweep.physics.friction.presliding import steady_deflection
 from ringsweep.quantities.parameters import Parameter, declared
 
@@ -76,7 +76,7 @@ class SingleContactRing(Model):
             for name, p in declared(zones.Arc).items():
                 whose = places.get(arc, "the zone")
                 found[f"{arc}.{name}"] = replace(p, long_name=p.long_name.replace("the zone", whose))
-        found |= {f"drive.{name}": p for name, p in declared(drives.DRIVES[structure.drive]).items()}
+        found |= {f"drive.{name}": p for name, p in declared(structure.drive_type).items()}
         return found | {
             "initial.phi": Parameter("rad", "angle of the body at launch", default=0.0),
             "initial.omega": Parameter("rad/s", "angular velocity of the body at launch", default=0.0),

@@ -279,7 +279,7 @@ def _switch(scene, mode, guard, t, y):
 
 @series.expand.implements(ring.Ring)
 def _expand(scene, mode, t, y, tolerance, c):
-    drives.expand(scene.drive, t, ORDER + 2, c[THETA])
+    drives.expand(scene.drive, t, ORDER + 2, c[THETA], c[FACTORS:])
     c[PHI, 0] = y[0]
     c[V, 0] = y[1]
     if mode.sign == 0:

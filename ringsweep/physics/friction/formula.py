@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -30,9 +31,48 @@ COEFFICIENTS = ("mu_s", "mu_k")
 # Longest text, in characters, and deepest nesting.
 _LONGEST, _DEEPEST = 2000, 60
 
-_ONE_ARGUMENT = ("exp", "log", "sqrt", "tanh", "atan", "abs")
 
-_GRAMMAR = "numbers, v, names of parameters, + - * / **, exp log sqrt tanh atan abs min max, piecewise(v < v1, a, b)"
+@dataclass(frozen=True)
+class Language:
+    """What formulas of one variable may contain.
+
+    Attributes
+    ----------
+    variable : Node
+    name : str
+        Name of the variable in formulas.
+    functions : tuple of str
+        Functions of one argument.
+    reserved : frozenset of str
+        Names that no parameter can have.
+    units : dict of str to str
+        Units of the names that are no parameters.
+    example : str
+    """
+
+    variable: Node
+    name: str
+    functions: tuple[str, ...]
+    reserved: frozenset[str]
+    units: Mapping[str, str]
+    example: str
+
+    @property
+    def grammar(self) -> str:
+        """What is allowed, in words."""
+        x, functions = self.name, " ".join([*self.functions, "min", "max"])
+        return f"numbers, {x}, names of parameters, + - * / **, {functions}, piecewise({x} < {x}1, a, b)"
+
+
+#: The language of friction laws.
+FRICTION = Language(
+    variable=SPEED,
+    name="v",
+    functions=("exp", "log", "sqrt", "tanh", "atan", "abs"),
+    reserved=RESERVED,
+    units={"v": "m/s", "pi": "1", "mu_s": "1", "mu_k": "1"},
+    example="mu_k + (mu_s - mu_k)*exp(-v/v_s)",
+)
 
 
 #: What a name with a meaning of its own stands for in a formula.
@@ -114,26 +154,26 @@ def read_formula(text: Any) -> Formula:
     FormulaError
         If the text is no such formula, or its units contradict each other.
     """
-    tree = _parsed(text)
-    reader = _Reader(text)
+    tree = parsed(text)
+    reader = Reader()
     mu = reader.visit(tree, ())
-    units = _Units()
+    units = Units()
     units.equal(units.visit(tree), _NONE, "the friction coefficient")
     return Formula(mu, reader.thresholds, units.solved())
 
 
 def read_expression(text: str) -> Node:
     """Read an expression of parameters, without the speed and without switches."""
-    reader = _Reader(text)
-    found = reader.visit(_parsed(text), ())
+    found = Reader().visit(parsed(text), ())
     if found.varies:
         raise FormulaError(f"{text} depends on v")
     return found
 
 
-def _parsed(text: Any) -> ast.expr:
+def parsed(text: Any, language: Language = FRICTION) -> ast.expr:
+    """Syntax tree of a formula."""
     if not isinstance(text, str):
-        raise FormulaError(f"a formula is a text such as mu_k + (mu_s - mu_k)*exp(-v/v_s), got {type(text).__name__}")
+        raise FormulaError(f"a formula is a text such as {language.example}, got {type(text).__name__}")
     if len(text) > _LONGEST:
         raise FormulaError(f"{len(text)} characters are too many: at most {_LONGEST}")
     plain = text.strip().replace("\N{MINUS SIGN}", "-").replace("\N{MULTIPLICATION SIGN}", "*")
@@ -142,7 +182,7 @@ def _parsed(text: Any) -> ast.expr:
     try:
         tree = ast.parse(plain.replace("\n", " "), mode="eval").body
     except (SyntaxError, ValueError, MemoryError, RecursionError):
-        raise FormulaError(f"this is no formula (allowed: {_GRAMMAR})") from None
+        raise FormulaError(f"this is no formula (allowed: {language.grammar})") from None
     if _depth(tree) > _DEEPEST:
         raise FormulaError(f"it is nested too deeply: at most {_DEEPEST} levels")
     return tree
@@ -161,11 +201,11 @@ def _shown(node: ast.AST) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-class _Reader:
+class Reader:
     """Makes expressions from the syntax tree of a formula."""
 
-    def __init__(self, text: str) -> None:
-        self.text = text
+    def __init__(self, language: Language = FRICTION) -> None:
+        self.language = language
         self.thresholds: list[Threshold] = []
 
     def visit(self, tree: ast.expr, within: tuple[tuple[int, bool], ...]) -> Node:
@@ -175,7 +215,7 @@ class _Reader:
                 raise FormulaError(f"{_shown(tree)} is not a finite number")
             return number(tree.value)
         if isinstance(tree, ast.Name):
-            return _named(tree.id)
+            return self._named(tree.id)
         if isinstance(tree, ast.UnaryOp) and isinstance(tree.op, ast.UAdd | ast.USub):
             inner = self.visit(tree.operand, within)
             return expressions.negative(inner) if isinstance(tree.op, ast.USub) else inner
@@ -183,7 +223,7 @@ class _Reader:
             return self._binary(tree, within)
         if isinstance(tree, ast.Call) and isinstance(tree.func, ast.Name) and not tree.keywords:
             return self._call(tree, tree.func.id, within)
-        raise FormulaError(f"{_shown(tree)} is not understood (allowed: {_GRAMMAR})")
+        raise FormulaError(f"{_shown(tree)} is not understood (allowed: {self.language.grammar})")
 
     def _binary(self, tree: ast.BinOp, within: tuple[tuple[int, bool], ...]) -> Node:
         a, b = self.visit(tree.left, within), self.visit(tree.right, within)
@@ -197,7 +237,7 @@ class _Reader:
         ):
             if isinstance(tree.op, kind):
                 return operation(a, b)
-        raise FormulaError(f"{_shown(tree)} is not understood (allowed: {_GRAMMAR})")
+        raise FormulaError(f"{_shown(tree)} is not understood (allowed: {self.language.grammar})")
 
     def _call(self, tree: ast.Call, name: str, within: tuple[tuple[int, bool], ...]) -> Node:
         if name == "piecewise":
@@ -209,8 +249,8 @@ class _Reader:
             for argument in tree.args[1:]:
                 found = self._extreme(name, found, self.visit(argument, within), within)
             return found
-        if name not in _ONE_ARGUMENT:
-            raise FormulaError(f"{name} is not a known function (allowed: {_GRAMMAR})")
+        if name not in self.language.functions:
+            raise FormulaError(f"{name} is not a known function (allowed: {self.language.grammar})")
         if len(tree.args) != 1:
             raise FormulaError(f"{_shown(tree)}: {name} takes one argument")
         inner = self.visit(tree.args[0], within)
@@ -249,7 +289,11 @@ class _Reader:
             return expressions.extreme(kind, a, b)
         if name == "max":
             difference = expressions.negative(difference)
-        # Where the difference is negative the first one is taken. It may change its sign three times.
+        return self._first_where_negative(difference, a, b, within)
+
+    def _first_where_negative(self, difference: Node, a: Node, b: Node, within: tuple[tuple[int, bool], ...]) -> Node:
+        """The first of two expressions where a difference is negative, the second elsewhere."""
+        # The difference may change its sign three times.
         found = a
         for order in (2, 1, 0):
             below, above = (a, found) if order % 2 == 0 else (b, found)
@@ -258,7 +302,9 @@ class _Reader:
 
     def _piecewise(self, tree: ast.Call, within: tuple[tuple[int, bool], ...]) -> Node:
         if len(tree.args) < 3 or len(tree.args) % 2 == 0:
-            raise FormulaError(f"{_shown(tree)}: write piecewise(v < v1, a, b), with a below v1 and b from v1 on")
+            x = self.language.name
+            example = f"piecewise({x} < {x}1, a, b), with a below {x}1 and b from {x}1 on"
+            raise FormulaError(f"{_shown(tree)}: write {example}")
         condition, first, *rest = tree.args
         limit, lower = self._limit(condition)
         threshold = Threshold(limit, within=within)
@@ -275,17 +321,28 @@ class _Reader:
         return self._piecewise(call, within)
 
     def _limit(self, condition: ast.expr) -> tuple[Node, bool]:
-        """Speed that a condition compares v with, and whether the condition holds below it."""
+        """What a condition compares the variable with, and whether the condition holds below it."""
         if isinstance(condition, ast.Compare) and len(condition.ops) == 1:
             left, right = condition.left, condition.comparators[0]
             less = isinstance(condition.ops[0], ast.Lt | ast.LtE)
             if less or isinstance(condition.ops[0], ast.Gt | ast.GtE):
                 a, b = self.visit(left, ()), self.visit(right, ())
-                if a is SPEED and not b.varies:
+                if a is self.language.variable and not b.varies:
                     return b, less
-                if b is SPEED and not a.varies:
+                if b is self.language.variable and not a.varies:
                     return a, not less
-        raise FormulaError(f"{_shown(condition)}: a condition compares v with a parameter, such as v < v1")
+        x = self.language.name
+        raise FormulaError(f"{_shown(condition)}: a condition compares {x} with a parameter, such as {x} < {x}1")
+
+    def _named(self, name: str) -> Node:
+        if name == self.language.name:
+            return self.language.variable
+        if name == "pi":
+            return number(math.pi)
+        if name in self.language.reserved or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
+            remedy = "take letters, digits and _, and another name"
+            raise FormulaError(f"{name} cannot be the name of a parameter: {remedy}")
+        return symbol(name)
 
 
 def _finite(value: float) -> bool:
@@ -295,43 +352,48 @@ def _finite(value: float) -> bool:
         return False
 
 
-def _named(name: str) -> Node:
-    if name == "v":
-        return SPEED
-    if name == "pi":
-        return number(math.pi)
-    if name in RESERVED or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
-        raise FormulaError(f"{name} cannot be the name of a parameter: take letters, digits and _, and another name")
-    return symbol(name)
-
-
 # ---- units ------------------------------------------------------------------------------------
+
+
+#: Base units. The radian is no more than a mark: it tells rad/s from Hz, and never makes units contradict each other.
+_BASE = ("N", "m", "rad", "s")
+_RADIAN = _BASE.index("rad")
 
 
 @dataclass(frozen=True)
 class _Dimension:
-    """Exponents of metre and second, plus multiples of the unknown exponents of parameters."""
+    """Exponents of the base units, plus multiples of the unknown exponents of parameters."""
 
-    known: tuple[Fraction, Fraction]
+    known: tuple[Fraction, ...]
     unknown: tuple[tuple[str, Fraction], ...] = ()
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether it cannot be the ratio of equal units."""
+        return not self.unknown and any(exponent for i, exponent in enumerate(self.known) if i != _RADIAN)
 
     def plus(self, other: _Dimension, factor: Fraction) -> _Dimension:
         unknown = dict(self.unknown)
         for name, share in other.unknown:
             unknown[name] = unknown.get(name, Fraction(0)) + factor * share
-        a, b = (x + factor * y for x, y in zip(self.known, other.known, strict=True))
-        return _Dimension((a, b), tuple(item for item in unknown.items() if item[1]))
+        known = (x + factor * y for x, y in zip(self.known, other.known, strict=True))
+        return _Dimension(tuple(known), tuple(item for item in unknown.items() if item[1]))
 
 
-_ZERO = Fraction(0)
-_NONE = _Dimension((_ZERO, _ZERO))
-_SPEED = _Dimension((Fraction(1), Fraction(-1)))
+def dimension(unit: str) -> _Dimension:
+    """Dimension of a quotient of base units, such as ``"m/s"``."""
+    above, _, below = unit.partition("/")
+    return _Dimension(tuple(Fraction((name == above) - (name == below)) for name in _BASE))
 
 
-class _Units:
-    """Infers the units of parameters: sums need equal units, functions take plain numbers."""
+_NONE, _ANGLE = dimension("1"), dimension("rad")
 
-    def __init__(self) -> None:
+
+class Units:
+    """Infers the units of parameters: sums need equal units, functions take plain numbers, or angles."""
+
+    def __init__(self, language: Language = FRICTION) -> None:
+        self.language = language
         self.names: list[str] = []
         self.equations: list[_Dimension] = []
         self.wildcards = 0
@@ -361,22 +423,20 @@ class _Units:
         inner = self.visit(tree.args[0])
         if tree.func.id == "sqrt":
             return _NONE.plus(inner, Fraction(1, 2))
-        self.equal(inner, _NONE, _shown(tree.args[0]))
+        self.equal(inner, _ANGLE if tree.func.id in ("sin", "cos", "tan") else _NONE, _shown(tree.args[0]))
         return _NONE
 
     def _any(self) -> _Dimension:
         # Zero has any unit.
         self.wildcards += 1
-        return _Dimension((_ZERO, _ZERO), ((f"0_{self.wildcards}", Fraction(1)),))
+        return _Dimension(_NONE.known, ((f"0_{self.wildcards}", Fraction(1)),))
 
     def _of_name(self, name: str) -> _Dimension:
-        if name == "v":
-            return _SPEED
-        if name == "pi" or name in COEFFICIENTS:
-            return _NONE
+        if name in self.language.units:
+            return dimension(self.language.units[name])
         if name not in self.names:
             self.names.append(name)
-        return _Dimension((_ZERO, _ZERO), ((name, Fraction(1)),))
+        return _Dimension(_NONE.known, ((name, Fraction(1)),))
 
     def _binary(self, tree: ast.BinOp) -> _Dimension:
         a, b = self.visit(tree.left), self.visit(tree.right)
@@ -385,7 +445,8 @@ class _Units:
         if isinstance(tree.op, ast.Div):
             return a.plus(b, Fraction(-1))
         if isinstance(tree.op, ast.Pow):
-            exponent = read_expression(ast.unparse(tree.right)) if not _uses_speed(tree.right) else SPEED
+            varies = any(isinstance(node, ast.Name) and node.id == self.language.name for node in ast.walk(tree.right))
+            exponent = SPEED if varies else Reader(self.language).visit(tree.right, ())
             self.equal(b, _NONE, _shown(tree.right))
             if exponent.kind == "number":
                 return _NONE.plus(a, Fraction(exponent.value).limit_denominator(1000))
@@ -403,9 +464,10 @@ class _Units:
     def equal(self, a: _Dimension, b: _Dimension, where: str) -> None:
         """Demand equal dimensions of two parts."""
         equation = self._reduced(a.plus(b, Fraction(-1)))
+        if equation.contradicts:
+            known = f"{self.language.name} is in {self.language.units[self.language.name]}"
+            raise FormulaError(f"units do not fit in {where}: {self._text(a)} and {self._text(b)} ({known})")
         if not equation.unknown:
-            if any(equation.known):
-                raise FormulaError(f"units do not fit in {where}: {self._text(a)} and {self._text(b)} (v is in m/s)")
             return
         name, share = equation.unknown[0]
         scaled = _NONE.plus(equation, 1 / share)
@@ -434,17 +496,15 @@ class _Units:
         return found
 
 
-def _uses_speed(tree: ast.expr) -> bool:
-    return any(isinstance(node, ast.Name) and node.id == "v" for node in ast.walk(tree))
-
-
-def unit_text(exponents: tuple[Fraction, Fraction]) -> str:
-    """Unit with these exponents of metre and second, such as ``"s/m"``; ``""`` if an exponent is not whole."""
-    if any(exponent.denominator != 1 for exponent in exponents):
+def unit_text(exponents: tuple[Fraction, ...]) -> str:
+    """Unit with these exponents of the base units, such as ``"s/m"``; ``""`` if an exponent is not whole."""
+    # An amplitude over an angular frequency is no square of an angle.
+    shown = [min(max(e, Fraction(0)), Fraction(1)) if i == _RADIAN else e for i, e in enumerate(exponents)]
+    if any(exponent.denominator != 1 for exponent in shown):
         return ""
 
     def factors(sign: int) -> list[str]:
-        powers = [(name, sign * int(exponent)) for name, exponent in zip("ms", exponents, strict=True)]
+        powers = [(name, sign * int(exponent)) for name, exponent in zip(_BASE, shown, strict=True)]
         return [name if power == 1 else f"{name}^{power}" for name, power in powers if power > 0]
 
     return "/".join([" ".join(factors(1)) or "1", *factors(-1)])

@@ -1,0 +1,353 @@
+"""Drives and forces by formula: what is derived from the text, and what is refused."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from scipy.integrate import solve_ivp
+
+import ringsweep
+from ringsweep.compile import take
+from ringsweep.config import load
+from ringsweep.errors import InputError
+from ringsweep.models import batch
+from ringsweep.numerics.writer import SERIES_ROWS
+from ringsweep.physics import drives
+from ringsweep.quantities.parameters import declared
+from ringsweep.solvers.rk4 import _groups_by_drive
+
+#: Drives in the documentation.
+EXAMPLES = [
+    found["drive"]
+    for text in re.findall(r"```yaml\n(drive:.*?)```", (Path(__file__).parents[1] / "docs/scenes.md").read_text(), re.S)
+    for found in [yaml.safe_load(text)]
+]
+
+RK4 = {"method": "rk4", "steps": 400, "diagnose": False}
+
+RUN_UP = "piecewise(t < t1, a*t**2/2, a*t1*(t - t1/2))"
+
+
+def by(theta, **parameters):
+    """Section of a drive by formula."""
+    return {"law": "formula", "theta": theta, **parameters}
+
+
+def ring(drive, **others):
+    """A small body in a ring."""
+    friction = {"law": "coulomb", "rest": {"mu_k": 0.3}, "rough": {"mu_k": 0.6}}
+    return {
+        **{"model": "ring-single-contact", "body": {"mass": 0.1}, "ring": {"radius": 0.2}, "zone": {"half_angle": 0.4}},
+        **{"friction": friction, "drive": drive, "time": {"span": 2.0}},
+        **others,
+    }
+
+
+def belt(drive=None, force=None, friction=None):
+    """A body on a belt with a spring, under tanh friction of a width that makes it smooth."""
+    smooth = {"law": "tanh", "mu_k": 0.2, "v0": 0.5}
+    return {
+        **{"model": "belt", "body": {"mass": 1.0}, "spring": {"stiffness": 4.0}, "friction": friction or smooth},
+        **({"belt": {"velocity": 0.0}} if drive is None else {"drive": drive}),
+        **({} if force is None else {"force": force}),
+        "time": {"span": 6.0},
+    }
+
+
+def cells_of(scene, **axes):
+    """Cells of a scene; `axes` are values of paths, with ``__`` in place of dots."""
+    found = load({"scene": scene}).scene
+    values = {path: np.array([value]) for path, value in found.values.items()}
+    values |= {path.replace("__", "."): np.asarray(given, dtype=float) for path, given in axes.items()}
+    count = max(map(len, values.values()))
+    return batch(found.structure, {path: np.broadcast_to(value, (count,)).copy() for path, value in values.items()})
+
+
+def drive_of(section, **axes):
+    return cells_of(ring(section), **axes).drive
+
+
+def series_of(drive, t, order=18):
+    theta = np.empty(order + 1)
+    drives.expand(drive, t, order, theta, np.full((SERIES_ROWS, order + 1), np.nan))
+    return theta
+
+
+def refused(scene):
+    with pytest.raises(InputError) as caught:
+        cells_of(scene)
+    return str(caught.value)
+
+
+#: Each drive of the package, and a formula for the same motion.
+ALIKE = {
+    "constant": ({"law": "constant", "amplitude": 2.0}, by("A*t", A=2.0)),
+    "arctan": (
+        {"law": "arctan", "amplitude": 2.0},
+        by("A*(t*atan(t/T) - T*log(1 + (t/T)**2)/2)", A="2 rad/s", T="1 s"),
+    ),
+    "sinusoidal": (
+        {"law": "sinusoidal", "amplitude": 0.5, "frequency": 0.7, "phase": "30 deg"},
+        by("sin(2*pi*f*t + psi)*A", A="0.5 rad", f="0.7 Hz", psi="30 deg"),
+    ),
+    "power": ({"law": "power", "amplitude": 0.5, "exponent": 3.0}, by("A*t**3", A="0.5 rad/s^3")),
+}
+
+
+class TestDerived:
+    """All that the methods need of a drive follows from its formula."""
+
+    @pytest.mark.parametrize(("known", "formula"), ALIKE.values(), ids=list(ALIKE))
+    def test_formula_of_a_drive_of_the_package_is_that_drive(self, known, formula):
+        a, b = take(drive_of(known), 0), take(drive_of(formula), 0)
+        for t in (1e-6, 0.3, 1.7, 20.0):
+            np.testing.assert_allclose(drives.turn(b, t), drives.turn(a, t), rtol=1e-13, atol=1e-15)
+            assert drives.jerk(b, t) == pytest.approx(drives.jerk(a, t), rel=1e-12, abs=1e-14)
+            expected = series_of(a, t)
+            # Of a polynomial, coefficients that another formula gives as rounding are zero.
+            np.testing.assert_allclose(series_of(b, t), expected, rtol=1e-11, atol=1e-14 * abs(expected).max())
+        assert drives.period(b) == pytest.approx(drives.period(a))
+
+    def test_runs_under_such_formulas_are_the_runs_of_the_package(self):
+        axes = {"initial.omega": np.linspace(-1.0, 1.0, 9)}
+        for known, formula in ALIKE.values():
+            a, b = (ringsweep.sweep(ring(d), axes, solver=RK4, progress=False) for d in (known, formula))
+            np.testing.assert_allclose(b.phi_end, a.phi_end, rtol=1e-9)
+            assert (a.regime == b.regime).all()
+
+    @pytest.mark.parametrize(
+        "text",
+        [
+            "A*exp(-t/s)*sin(w*t)",
+            "A*tanh(exp(-t/s) + t/s)",
+            "A*sqrt(2 + sin(w*t))/(2 + cos(w*t))",
+            "A*log(1 + (t/s)**2)*atan(t/s)",
+            "A*(1 + t/s)**0.3 + A*tan(w*t/9)",
+            "A*(t/s)**7/(1 + (t/s)**5)",
+            "A*(t/s)**9*exp(t/s)",
+            "A*exp(sin(w*t)**2)",
+            "A*log1p(t/s)",
+        ],
+    )
+    def test_series_and_derivatives_are_those_of_cauchys_integral(self, text):
+        numbers = {
+            name: value for name, value in (("A", 1.3), ("s", 1.7), ("w", 2.1)) if re.search(rf"\b{name}\b", text)
+        }
+        drive = take(drive_of(by(text, **numbers)), 0)
+        names = {name: getattr(np, name) for name in ("exp", "tanh", "sqrt", "sin", "cos", "tan", "log", "log1p")}
+        names |= {"atan": np.arctan, **numbers}
+        t, radius, points = 0.4, 0.5, 256
+        circle = radius * np.exp(2j * np.pi * np.arange(points) / points)
+        # The function has no singularity within the circle.
+        expected = np.fft.fft(eval(text, names | {"t": t + circle})).real[:19] / points
+        np.testing.assert_allclose(series_of(drive, t) * radius ** np.arange(19), expected, atol=1e-13)
+        factorials = radius ** -np.arange(4.0) * [1, 1, 2, 6]
+        found = [*drives.turn(drive, t), drives.jerk(drive, t)]
+        np.testing.assert_allclose(found, expected[:4] * factorials, rtol=1e-11)
+
+    def test_cells_with_one_shape_share_its_table_whatever_their_factor_is(self):
+        scene = ring(by("-2*A*(t - tau*(1 - exp(-t/tau)))", A=1.0, tau=1.0))
+        cells = cells_of(scene, drive__A=[1.0, 2.0, 3.0, 1.0], drive__tau=[1.0, 1.0, 1.0, 2.0])
+        assert [len(group) for group in _groups_by_drive(cells, np.arange(4))] == [3, 1]
+        assert drives.without_shape(cells.drive).amplitude.tolist() == [-2.0, -4.0, -6.0, -2.0]
+
+    def test_examples_of_the_documentation_run_and_their_parameters_can_be_swept(self):
+        assert len(EXAMPLES) == 4
+        for drive in EXAMPLES:
+            name = list(drive)[-1]
+            units = declared(type(drive_of(drive)))[name].unit
+            values = [drive[name], f"2 {units}"]
+            found = ringsweep.sweep(ring(drive), {f"drive.{name}": values}, solver=RK4, progress=False)
+            assert found.phi_end.values[0] != found.phi_end.values[1]
+
+    def test_body_at_rest_on_a_formula_at_its_turning_point_stays_at_rest(self):
+        """There the velocity of the drive is the rounding of its terms, not zero."""
+        drive = take(drive_of(by("A*sin(w*t + p) + A*sin(3*w*t + q)", A=0.3, w=40.0, p="90 deg", q="270 deg")), 0)
+        assert drives.turn(drive, 0.0)[1] != 0.0
+        assert drives.relative_velocity(drive, 0.0) == 0.0
+
+
+class TestSwitches:
+    """Switches are knots: steps end there."""
+
+    def test_steps_end_at_the_end_of_a_ramp_and_the_run_is_certified(self):
+        """A body that the ring carries breaks loose or not as the run-up says, and the hold is exact."""
+        run = ringsweep.simulate(ring(by(RUN_UP, a="4 rad/s^2", t1="0.35 s")), solver="event", samples=7)
+        assert run.certified == 1
+        assert abs(run.time.values - 0.35).min() == 0.0
+        after = run.time.values >= 0.35
+        np.testing.assert_allclose(run.ring_omega.values[after], 1.4, rtol=1e-15)
+        np.testing.assert_allclose(run.ring_omega.values[~after], 4.0 * run.time.values[~after], rtol=1e-14)
+
+    def test_stuck_body_breaks_loose_where_the_acceleration_jumps(self):
+        """The ring starts at t1 with more than friction can give: the body stays behind from that instant on."""
+        start = by("piecewise(t < t1, 0, a*(t - t1)**2/2)", a="100 rad/s^2", t1="0.5 s")
+        run = ringsweep.simulate(ring(start, time={"span": 0.51}), solver="event", samples=50)
+        assert run.certified == 1
+        slips = run["mode"].values != 0
+        assert run.time.values[slips].min() == 0.5
+        # From there on it falls behind with the friction of its contact, 0.6 g/R.
+        expected = 0.5 * 0.6 * 9.81 / 0.2 * 0.01**2
+        assert float(run.phi_end) == pytest.approx(expected, rel=1e-3)
+
+    def test_narrow_feature_that_is_still_far_is_not_leapt_over(self):
+        """Before the pulse the drive is at rest but for 1e-300, and a step could be as long as the span."""
+        pulse = by("A*(1 + tanh((t - t1)/w))", A="3 deg", t1="0.9 s", w="1 ms")
+        run = ringsweep.simulate(ring(pulse), solver="event", samples=5)
+        assert run.certified == 1
+        assert run.phi_max > 1e-3
+
+    def test_min_and_max_are_switches_at_the_time_where_their_arguments_are_equal(self):
+        ramp = take(drive_of(by(RUN_UP, a=3.0, t1=0.7)), 0)
+        same = take(drive_of(by("a*min(t, t1)**2/2 + a*t1*max(t - t1, 0)", a=3.0, t1=0.7)), 0)
+        mirrored = take(drive_of(by("a*t1*max(0, t - t1) - a*max(-t, -t1)*min(t1, t)/2", a=3.0, t1=0.7)), 0)
+        for drive in (same, mirrored):
+            assert drives.next_knot(drive, 0.0) == 0.7
+            assert drives.next_knot(drive, 0.7) == np.inf
+            for t in (0.2, 0.7, 1.1):
+                np.testing.assert_allclose(drives.turn(drive, t), drives.turn(ramp, t), rtol=1e-14)
+                np.testing.assert_allclose(series_of(drive, t), series_of(ramp, t), rtol=1e-14)
+
+    @pytest.mark.parametrize(
+        ("drive", "message"),
+        [
+            (
+                by("piecewise(t < t1, a*t, a*t + a*t1/2)", a=2.0, t1=1.0),
+                "the angle jumps from 2 rad to 3 rad at t = 1 s",
+            ),
+            (by("a*min(t, t1)", a=2.0, t1=1.0), "the angular velocity jumps from 2 rad/s to 0 rad/s at t = 1 s"),
+            (by("A*abs(w*(t - t1))", A=2.0, w=1.0, t1=1.0), "jumps from -2 rad/s to 2 rad/s"),
+            (by("A*max(sin(w*t), 0)", A=2.0, w=1.0), "differ by a straight line in t: write piecewise"),
+            (by("A*t**1.5", A=2.0), "its first derivative is no finite number at t = 0 s"),
+            (by("A*log(t/T)", A=2.0, T=1.0), "the formula is no finite number at t = 0 s"),
+        ],
+    )
+    def test_drive_that_is_not_smooth_enough_is_refused_with_place_and_sizes(self, drive, message):
+        found = refused(ring(drive))
+        assert found.startswith(f"scene.drive.theta: {drive['theta']!r}: ")
+        assert message in found
+
+    def test_jump_after_the_span_does_no_harm(self):
+        cells_of(ring(by("a*min(t, t1)", a=2.0, t1=3.0)))
+
+    def test_jump_of_a_single_cell_of_a_sweep_is_told(self):
+        with pytest.raises(InputError, match=r"at t = 1\.5 s"):
+            drive_of(by("a*min(t, t1)", a=2.0, t1=5.0), drive__t1=[3.0, 1.5, 4.0])
+
+
+class TestUnits:
+    """Units of the parameters follow from the formula; angles are counted in rad."""
+
+    @pytest.mark.parametrize(
+        ("text", "units"),
+        [
+            ("A*(t - tau*(1 - exp(-t/tau)))", {"A": "rad/s", "tau": "s"}),
+            ("A*sin(w*t + psi)", {"A": "rad", "w": "rad/s", "psi": "rad"}),
+            ("A*sin(2*pi*(f*t + rise*t**2/2))", {"A": "rad", "f": "1/s", "rise": "1/s^2"}),
+            ("A*sin(w*t)/w", {"A": "rad/s", "w": "rad/s"}),
+            ("pi/2*tanh(t/tau)", {"tau": "s"}),
+            ("B*exp(-d*w*t)*cos(w*t)", {"B": "rad", "d": "1", "w": "rad/s"}),
+        ],
+    )
+    def test_units_of_a_ring(self, text, units):
+        parameters = declared(drives.define(text, "rad"))
+        assert {name: parameter.unit for name, parameter in parameters.items()} == units
+
+    def test_units_on_a_belt_are_metres_but_in_a_sine(self):
+        parameters = declared(drives.define("v*t + A*sin(w*t)", "m"))
+        assert {name: parameter.unit for name, parameter in parameters.items()} == {"v": "m/s", "A": "m", "w": "rad/s"}
+
+    def test_values_are_converted(self):
+        drive = drive_of(by("A*sin(w*t) + B*sin(2*pi*f*t)", A="90 deg", w="30 rpm", B=1.0, f="2 Hz"))
+        np.testing.assert_allclose([drive.A, drive.w, drive.f], [[np.pi / 2], [np.pi], [2.0]])
+
+    @pytest.mark.parametrize(
+        ("section", "message"),
+        [
+            (by("A*t", A="2 s"), "scene.drive.A: '2 s' has the wrong unit: parameter A of the drive is in rad/s"),
+            (by("A*t + B*exp(t)", A=1.0, B=1.0), "units do not fit in t: s and 1 (t is in s)"),
+            (by("A*t", A=1.0, tau=1.0), "scene.drive.tau: unknown key"),
+            (by("A*t"), "scene.drive.A: missing: parameter A of the drive, in rad/s"),
+            (by("A*sine(t)", A=1.0), "sine is not a known function (allowed: numbers, t, names of parameters"),
+            (by("A*t^2", A=1.0), "powers are written **"),
+            (by("A*theta", A=1.0), "theta cannot be the name of a parameter"),
+            (by("A", A=1.0), "it must depend on t"),
+            (by(3.0), "a formula is a text such as A*sin(w*t), got float"),
+            ({"law": "formula"}, "scene.drive.theta: missing: the formula of the motion"),
+            (by("A*piecewise(A < 1, t, 0)", A=1.0), "a condition compares t with a parameter, such as t < t1"),
+        ],
+    )
+    def test_mistakes_are_told_with_path_and_cause(self, section, message):
+        assert message in refused(ring(section))
+
+
+class TestPeriods:
+    """A formula of sines and cosines with a common period has it."""
+
+    @pytest.mark.parametrize(
+        ("text", "period"),
+        [
+            ("A*sin(w*t) + B*cos(3*w*t + p)", np.pi),
+            ("A*sin(2*w*t) + B*cos(3*w*t)", np.pi),
+            ("A*sin(w*t)**2*cos(w*t)", np.pi),
+            ("v*t + A*sin(w*t)", np.pi),
+            ("A*sin(w*t) + B*sin(sqrt(2)*w*t)", np.inf),
+            ("A*sin(w*t) + Z*sin(sqrt(2)*w*t)", np.pi),
+            ("A*exp(-w*t)*sin(w*t)", np.inf),
+            ("A*sin(w*t + k*t**2)", np.inf),
+            ("v*t", np.inf),
+            ("Z*sin(w*t)", np.inf),
+            ("A*sin(w*t)*max(t, t1)**2", np.inf),
+        ],
+    )
+    def test_period_of_the_velocity(self, text, period):
+        law = drives.define(text, "m")
+        values = {"A": 1.0, "B": 2.0, "w": 2.0, "p": 0.3, "v": 0.7, "k": 0.1, "Z": 0.0, "t1": -1.0}
+        drive = law(
+            **{name: np.array([values[name]]) for name in declared(law)}, **({"knots": 1} if "max" in text else {})
+        )
+        assert np.broadcast_to(drives.period(drive), (1,)) == pytest.approx(period)
+
+    def test_belt_is_classified_by_the_common_period_of_drive_and_force(self):
+        force = {"formula": "P*sin(2*pi*g*t)", "P": 1.0, "g": 0.5}
+        cells = cells_of(belt(by("v*t + A*sin(2*pi*f*t)", v=0.1, A=0.01, f=0.75), force))
+        assert cells.forcing_period == pytest.approx(4.0)
+        # A force with a trend does not repeat, though its rate does; then the belt decides.
+        force = {"formula": "q*t + P*sin(2*pi*g*t)", "P": 1.0, "g": 0.5, "q": 0.1}
+        cells = cells_of(belt(by("v*t + A*sin(2*pi*f*t)", v=0.1, A=0.01, f=0.75), force))
+        assert cells.forcing_period == pytest.approx(4.0 / 3.0)
+
+
+class TestForces:
+    def test_chirp_of_belt_and_force_moves_a_body_as_scipy_says(self):
+        chirp = {"A": "5 cm", "f": "0.3 Hz", "k": "0.2 Hz/s"}
+        force = {"formula": "P*exp(-t/tau)*sin(w*t)", "P": "2 N", "tau": "3 s", "w": "4 rad/s", "constant": "0.5 N"}
+        run = ringsweep.simulate(belt(by("A*sin(2*pi*(f*t + k*t**2/2))", **chirp), force), samples=60)
+
+        def rates(t, y):
+            rate = 2 * np.pi * (0.3 + 0.2 * t)
+            v_belt = 0.05 * rate * np.cos(2 * np.pi * (0.3 * t + 0.1 * t * t))
+            push = 2.0 * np.exp(-t / 3.0) * np.sin(4.0 * t) + 0.5
+            return y[1], push - 4.0 * y[0] - 0.2 * 9.81 * np.tanh((y[1] - v_belt) / 0.5)
+
+        start = [0.0, 0.05 * 2 * np.pi * 0.3]
+        exact = solve_ivp(rates, (0.0, 6.0), start, method="DOP853", rtol=1e-12, atol=1e-13, dense_output=True)
+        assert run.certified == 1
+        np.testing.assert_allclose([run.x, run.velocity], exact.sol(run.time.values), atol=1e-8)
+
+    def test_force_that_jumps_is_refused(self):
+        force = {"formula": "P*piecewise(t < t1, 0, 1)", "P": "2 N", "t1": "1 s"}
+        assert (
+            "scene.force.formula: 'P*piecewise(t < t1, 0, 1)': the force jumps from 0 N to 2 N at t = 1 s"
+            in refused(belt(force=force))
+        )
+
+    def test_formula_stands_beside_no_other_force_but_a_constant(self):
+        force = {"formula": "P*sin(w*t)", "P": 1.0, "w": 1.0, "constant": 2.0}
+        assert cells_of(belt(force=force)).drive.constant == 2.0
+        assert "scene.force.amplitude: cannot stand beside" in refused(belt(force=force | {"amplitude": 1.0}))
+        assert "scene.force.time: cannot stand beside" in refused(
+            belt(force=force | {"time": [0, 1, 2, 3], "force": [0] * 4})
+        )
