@@ -13,7 +13,7 @@ from ringsweep.config import load
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS
 from ringsweep.physics import ring
-from ringsweep.plots.datasets import configuration, on_ring, present, require_history, require_one_run
+from ringsweep.plots.datasets import configuration, on_ring, require_history, require_one_run
 from ringsweep.quantities.variables import MODES
 
 
@@ -78,9 +78,9 @@ def ring_history(ds: xr.Dataset) -> tuple[xr.Dataset, Rig]:
         raise InputError("ds", "is the history of a body on a belt: there is no ring to draw")
     ds = require_one_run(ds, ("phi", "theta"))
     rig = Rig.of(ds)
-    phi, (first, *others) = ds["phi"].values, [ds[name].values for name in present(ds, ("normal_1", "normal_2"))]
-    state = np.sin(phi), np.cos(phi), ds["omega"].values, ds["epsilon"].values, first, *(others or [first])
-    forces = ring.tractions(rig.body, *state)
+    phi, first = ds["phi"].values, ds["normal_1"].values
+    omega = ds["omega"].values
+    _, _, *forces = ring.held(rig.body, 1.0, np.sin(phi), np.cos(phi), omega, omega**2, ds["epsilon"].values, first)
     return ds.assign({f"friction_{k}": ("time", values) for k, values in enumerate(forces, start=1)}), rig
 
 
