@@ -323,7 +323,7 @@ def imbalance(body, K1, K2, N1, N2, phi_dd, sin_phi, cos_phi, omega):
     """
 
 
-#: Functions of a body that follow from its balances. Each is written by the method of its name of `Equations`.
+#: Functions of a body that follow from its balances. `Equations` writes them.
 DERIVED = (
     contact_count,
     acceleration,
@@ -371,9 +371,8 @@ def body(*, balances: tuple[str, ...], energy: str, offset: str = "") -> Callabl
         except ValueError as error:
             raise TypeError(f"{cls.__name__}: {error}") from None
         for function in DERIVED:
-            lines = getattr(equations, function.__name__)()
             names = ", ".join(inspect.signature(function).parameters)
-            function.implements(cls)(function_from_lines(names, lines, {}))
+            function.implements(cls)(function_from_lines(names, equations.lines(function.__name__), {}))
         if offset:
             contact_offset.implements(cls)(function_from_lines("body", [f"return body.{offset}"], {}))
         return cls

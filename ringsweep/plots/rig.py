@@ -47,7 +47,8 @@ class Rig:
         """Measures of the scene in the attribute ``configuration`` of a dataset."""
         scene = load(configuration(ds)).scene
         model: Any = MODELS[scene.structure.model]
-        body = take(model.build_body({path: np.array([value]) for path, value in scene.values.items()}), 0)
+        bodies = model.build_body({path: np.array([value]) for path, value in scene.values.items()})
+        body = take(ring.completed(bodies), 0)
         arcs = tuple((scene.values[f"{a}.center"], scene.values[f"{a}.half_angle"]) for a in scene.structure.arcs)
         beta = float(ring.contact_offset(body))
         # A body without a radius, or with a tiny one, is drawn as a ball that can be seen.

@@ -131,6 +131,9 @@ class Ring(SingleContactRing):
             "m", "half the distance between the centres of the balls", lower=0.0, open_lower=True
         ),
         "body.ball_radius": Parameter("m", "radius of the balls", lower=0.0),
+        "body.center_offset": Parameter(
+            "m", "distance of the centre of mass from the line of the balls, away from the axis", default=0.0
+        ),
         "body.beta": Parameter(
             "rad", "half the angle that the contacts subtend", 0.0, pi / 2, True, True, optional=True
         ),
@@ -173,7 +176,7 @@ class Ring(SingleContactRing):
             mass=values["body.mass"],
             inertia=values["body.inertia"],
             radius=R,
-            xi=(R - r) * cos_beta,
+            xi=(R - r) * cos_beta + values["body.center_offset"],
             beta=np.arcsin(sin_beta),
             sin_beta=sin_beta,
             cos_beta=cos_beta,
