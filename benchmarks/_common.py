@@ -19,6 +19,7 @@ import numpy as np
 from ringsweep import config
 from ringsweep.models import MODELS, batch
 from ringsweep.runs import cells, sweep
+from ringsweep.runs.executors import Execution
 from ringsweep.solvers.method import Result
 
 #: The ring of the paper's Fig. 29 (SI units), without its friction law.
@@ -81,7 +82,7 @@ def on_one_core(configuration: Any) -> Callable[[], dict[str, Any]]:
 
 def on_all_cores(configuration: Any) -> Any:
     """Run a configuration as a sweep on all cores; returns its dataset."""
-    return sweep.compute(configuration, jobs=None, progress=False)
+    return sweep.compute(configuration, Execution(progress=False))
 
 
 @contextmanager

@@ -34,6 +34,7 @@ import numpy as np
 from benchmarks._common import PAPER_STEPS, alternate, bare, configure, family, heading, machine, markdown, ring, table
 from ringsweep.runs import sweep
 from ringsweep.runs.cells import compute_task
+from ringsweep.runs.executors import Execution
 
 RESULTS = Path(__file__).parent / "results"
 TARGET = 1.95
@@ -109,7 +110,7 @@ def on_free_cores(configuration: Any) -> float:
     """Speed of two free cores over the speed of one, from the CPU seconds of one run with two jobs."""
     with timed_tasks() as tasks:
         begin = time.process_time()
-        sweep.compute(configuration, jobs=2, progress=False)
+        sweep.compute(configuration, Execution(2, progress=False))
         serial = time.process_time() - begin - sum(tasks)
     busy = [0.0, 0.0]
     for seconds in tasks:
@@ -131,7 +132,7 @@ def main() -> None:
         cells = CELLS[method] // (9 if quick else 1)
         for grid in (even, uneven):
             configuration = grid(method, cells)
-            runs = {jobs: partial(sweep.compute, configuration, jobs=jobs, progress=False) for jobs in (1, 2)}
+            runs = {jobs: partial(sweep.compute, configuration, Execution(jobs, progress=False)) for jobs in (1, 2)}
             runs[2]()
             given = what_the_machine_gives(3)
             times, results = alternate(runs, rounds)

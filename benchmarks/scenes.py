@@ -46,6 +46,7 @@ from benchmarks._common import (
 )
 from ringsweep.physics.friction import LAWS, SetValued, coefficients_of, family_of
 from ringsweep.runs import sweep
+from ringsweep.runs.executors import Execution
 from ringsweep.solvers import automaton, rk4
 
 ROOT = Path(__file__).parent.parent
@@ -251,9 +252,9 @@ def memory(cells: int) -> dict[str, float]:
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
 
     found = {"imported": peak()}
-    sweep.compute(rung.configuration("rk4", 64, steps=10), jobs=None, progress=False)
+    sweep.compute(rung.configuration("rk4", 64, steps=10), Execution(progress=False))
     found["small"] = peak()
-    sweep.compute(rung.configuration("rk4", cells, steps=10), jobs=None, progress=False)
+    sweep.compute(rung.configuration("rk4", cells, steps=10), Execution(progress=False))
     return found | {"large": peak()}
 
 

@@ -55,6 +55,7 @@ from benchmarks.scenes import ROOT, environment
 from benchmarks.work_precision import SCENES
 from ringsweep.models import MODELS
 from ringsweep.runs import sweep
+from ringsweep.runs.executors import Execution
 
 RESULTS = Path(__file__).parent / "results"
 #: A column of the result files, the value at the end, by model.
@@ -265,7 +266,7 @@ def two_cores(effort: Effort) -> list[list[str]]:
     found = []
     for method, share in (("rk4", 1), ("event", 1), ("implicit", 4)):
         configuration = uneven(method, effort.sweep // share)
-        runs = {jobs: partial(sweep.compute, configuration, jobs=jobs, progress=False) for jobs in (1, 2)}
+        runs = {jobs: partial(sweep.compute, configuration, Execution(jobs, progress=False)) for jobs in (1, 2)}
         times, _ = alternate(runs, max(3, effort.rounds // 2))
         found.append([
             f"`{method}`, two jobs", f"{effort.sweep // share} cells", f"{times[2].median:.2f} s",

@@ -42,6 +42,7 @@ from benchmarks._common import ALPHA, BODY, GRAVITY, RADIUS, REST, ROUGH, V0, ma
 from ringsweep import config
 from ringsweep.quantities.variables import REGIMES
 from ringsweep.runs import sweep
+from ringsweep.runs.executors import Execution
 from ringsweep.solvers.rk4 import STABILITY_LIMIT
 from ringsweep.storage import netcdf
 
@@ -118,7 +119,7 @@ def run(scene: Mapping[str, Any], solver: Mapping[str, Any], points: Mapping[str
     tree: dict[str, Any] = {"scene": copy.deepcopy(dict(scene)), "solver": dict(solver)}
     if points:
         tree["sweep"] = {"points": {path: np.asarray(column).tolist() for path, column in points.items()}}
-    return sweep.compute(config.load(tree), jobs=None, progress=False)
+    return sweep.compute(config.load(tree), Execution(progress=False))
 
 
 def difference(found: xr.Dataset, reference: Mapping[str, Any]) -> tuple[Any, Any]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 
@@ -40,6 +41,20 @@ class Accessor:
 
         return words(self._ds[var])
 
+    def to_frame(self) -> pd.DataFrame:
+        """Table with a row for each cell: coordinates, then variables, with classifications as categories of words."""
+        import pandas as pd
+
+        from ringsweep.quantities.variables import words
+
+        frame = self._ds.to_dataframe().reset_index()
+        for name, variable in self._ds.data_vars.items():
+            if "flag_meanings" in variable.attrs:
+                known = str(variable.attrs["flag_meanings"]).split()
+                named = words(variable).to_dataframe(name=name).reset_index()[name]
+                frame[name] = pd.Categorical(named, categories=known)
+        return frame
+
     def map(self, var: str = "regime", **options: Any) -> Figure:
         """A map of a variable; other arguments as for :func:`ringsweep.plots.regime_map`."""
         from ringsweep.plots.maps import regime_map
@@ -55,7 +70,8 @@ class Accessor:
     def simulate(self, sel: Mapping[str, float | str] | None = None, /, **cell: float | str) -> xr.Dataset:
         """Time history of the cell nearest to some values of the coordinates; see :func:`ringsweep.plots.cell`.
 
-        The values are a mapping, such as ``{"drive.amplitude": 2}``, or keywords, such as ``drive_amplitude=2``.
+        The values are a mapping, such as ``{"drive.amplitude": 2}``, or keywords, such as ``drive_amplitude=2``. A
+        warning tells the value taken if it is another.
         """
         from ringsweep.plots.selection import cell as configuration_of
         from ringsweep.runs.simulate import simulate

@@ -2,10 +2,31 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
+
 
 def shortened(text: str, most: int) -> str:
     """A text as messages hold it: of a long one the start and the length."""
     return text if len(text) <= most else f"{text[:most]}... ({len(text)} characters)"
+
+
+# Control characters but for tab and line feed, and what else turns the direction of text.
+_CONTROL = {code: f"\\x{code:02x}" for code in [*range(32), *range(127, 160)] if code not in (9, 10)}
+_CONTROL |= {code: f"\\u{code:04x}" for code in [*range(0x202A, 0x202F), *range(0x2066, 0x206A)]}
+
+
+def escaped(text: str) -> str:
+    """A text as a terminal may show it: what a file holds could clear the screen, or hide what was printed."""
+    return text.translate(_CONTROL)
+
+
+def nearest_name(word: object, known: Iterable[str]) -> str | None:
+    """The known name that a user probably means: one that begins with the word, or the most similar one."""
+    wanted, names = str(word)[:100].lower(), list(known)
+    begun = [name for name in names if len(wanted) > 2 and name.lower().startswith(wanted)]
+    near = [begun[0]] if len(begun) == 1 else difflib.get_close_matches(wanted, names, n=1)
+    return near[0] if near else None
 
 
 class InputError(ValueError):

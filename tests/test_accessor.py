@@ -32,6 +32,21 @@ def test_run_of_a_cell_has_the_outcome_of_that_cell(ds):
     assert float(run.phi_end) == float(here.phi_end)
 
 
+def test_frame_has_a_row_for_each_cell_and_makes_the_same_runs_again(ds, scene):
+    frame = ds.ringsweep.to_frame()
+    assert frame["regime"].tolist() == ringsweep.words(ds.regime).values.ravel().tolist()
+    assert list(frame["regime"].cat.categories) == ds.regime.attrs["flag_meanings"].split()
+    points = frame.rename(columns={"drive_amplitude": "drive.amplitude", "zone_half_angle": "zone.half_angle"})
+    again = ringsweep.sweep(scene, points[["drive.amplitude", "zone.half_angle"]])
+    assert again.sizes == {"point": 6}
+    assert again.phi_end.values.tolist() == ds.phi_end.values.ravel().tolist()
+
+
+def test_dataset_in_place_of_a_scene_is_refused_with_what_to_call(ds):
+    with pytest.raises(ringsweep.InputError, match=r"got a dataset: ds\.ringsweep\.simulate"):
+        ringsweep.simulate(ds)
+
+
 def test_map_has_the_title_of_the_function(ds):
     assert ds.ringsweep.map("t_end").axes[-1].get_ylabel() == plots.regime_map(ds, var="t_end").axes[-1].get_ylabel()
 

@@ -160,6 +160,72 @@ def test_value_with_a_space_and_without_quotes_gets_a_hint(folder, capsys):
     assert "unrecognized arguments: rad/s; a value with a space needs quotes" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("arguments", "problem"),
+    [
+        (("--set", "velocity=2"), "scene.velocity: unknown key: model belt has `belt.velocity` or `initial.velocity`"),
+        (("--set", "spring.stiffness=2"), "scene.spring: unknown key: model belt has `spring`, this is model ring"),
+        (("--set", "mass=2"), "scene.mass: unknown key; did you mean `body.mass`?"),
+        (("--set", "zone.from=2"), "a zone has a center, which is (from + to)/2"),
+        (("--set", "drive.amplitude=2"), "scene.drive.amplitude: is swept here"),
+    ],
+)
+def test_key_at_a_wrong_place_is_told_its_place(folder, capsys, arguments, problem):
+    message = refused(capsys, "run", "case.yaml", *arguments)
+    assert problem in message
+    assert f"--set {arguments[1]}: " in message
+
+
+def test_decimal_comma_in_a_mapping_is_told(folder, capsys):
+    (folder / "case.yaml").write_text(TEXT.replace("mass: 0.076 kg", "mass: 0,076 kg"))
+    assert "line 3: scene.body.076 kg: unknown key: a comma ends a value" in refused(capsys, "run", "case.yaml")
+
+
+def test_misspelt_option_and_configuration_in_place_of_a_result_are_told(folder, capsys):
+    with pytest.raises(SystemExit):
+        main(["run", "case.yaml", "--dryrun"])
+    assert "unrecognized arguments: --dryrun; did you mean --dry-run?" in capsys.readouterr().err
+    assert "case.yaml: is a configuration, not a result: `ringsweep run case.yaml`" in refused(
+        capsys, "map", "case.yaml"
+    )
+
+
+def test_control_characters_of_a_file_and_of_a_name_are_escaped(folder, capsys):
+    assert main(["run", "case.yaml", "-o", "out.nc"]) == 0
+    with netcdf.open_dataset("out.nc") as result:
+        crafted = result.load()
+    crafted["drive_amplitude"].attrs["units"] = "\x1b[2Jrad/s"
+    crafted.to_netcdf("crafted.nc")
+    assert main(["info", "crafted.nc"]) == 0
+    assert main(["map", "no\x1b[31m.nc"]) == 2
+    out, err = capsys.readouterr()
+    assert "\x1b" not in out + err
+    assert "0.1 to 10 \\x1b[2Jrad/s" in out
+    assert "no\\x1b[31m.nc: does not exist" in err
+
+
+def test_link_to_itself_is_no_output(folder, capsys):
+    (folder / "loop.nc").symlink_to("loop.nc")
+    assert "loop.nc: is a symbolic link that leads to itself" in refused(capsys, "run", "case.yaml", "-o", "loop.nc")
+
+
+def test_part_of_a_history_is_drawn_and_a_run_of_another_scene_is_replaced_with_a_word(folder, capsys, caplog):
+    for amplitude in ("2", "3"):
+        assert main(["simulate", "case.yaml", "--set", f"drive.amplitude={amplitude}"]) == 0
+    assert "case-run.nc held a run of another scene, which is replaced: drive.amplitude was 2" in caplog.text
+    assert main(["plot", "case-run.nc", "--from", "1", "--to", "2", "-o", "part.png"]) == 0
+    assert (folder / "part.png").stat().st_size > 1000
+    capsys.readouterr()
+    assert "has times from 0 to 10 s: none" in refused(capsys, "plot", "case-run.nc", "--from", "11")
+
+
+def test_run_takes_values_from_the_command_line(folder):
+    assert main(["run", "case.yaml", "--set", "time.span=2 s", "--set", "solver.steps=500", "-o", "short.nc"]) == 0
+    configuration = json.loads(netcdf.load("short.nc").attrs["configuration"])
+    assert configuration["scene"]["time"]["span"] == "2 s"
+    assert configuration["solver"]["steps"] == 500
+
+
 def test_uncertified_run_is_reported_as_not_certified(folder, capsys, caplog):
     assert main(["simulate", "case.yaml"]) == 0
     assert "not certified" in capsys.readouterr().out.splitlines()[0]
@@ -199,7 +265,7 @@ def test_plot_draws_what_simulate_and_precision_wrote_and_names_the_command_for_
     )
     assert main(["plot", "work.nc"]) == 0
     assert "wrote work.png" in capsys.readouterr().out
-    assert "for time histories" in refused(capsys, "plot", "work.nc", "--kind", "phase")
+    assert "are for histories" in refused(capsys, "plot", "work.nc", "--kind", "phase")
 
 
 @pytest.mark.parametrize("arguments", [["rum"], ["run"], ["run", "case.yaml", "--jobs", "0"]])

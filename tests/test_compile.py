@@ -154,6 +154,26 @@ class TestCacheOnDisk:
         assert self.doubled() == 42.0
         assert not caplog.messages
 
+    def test_code_of_another_kernel_is_compiled_again(self, folder, caplog):
+        """A cache that was copied from another machine may have the same names for other kernels."""
+
+        def kernels():
+            def double(x):
+                return 2.0 * x
+
+            def triple(x):
+                return 3.0 * x
+
+            return [cache.kernel(function)(np.float64(2.0)) for function in (double, triple)]
+
+        assert kernels() == [4.0, 6.0]
+        one, other = sorted(folder.rglob("*.nbc"))
+        other.write_bytes(one.read_bytes())
+        cache._announce_compilation.cache_clear()
+        caplog.clear()
+        assert kernels() == [4.0, 6.0]
+        assert caplog.messages == [f"compiled code in {one.parent} is damaged: compiling it again"]
+
     @pytest.mark.parametrize("suffix", ["nbi", "nbc"])
     def test_file_that_cannot_be_read_is_compiled_again(self, folder, caplog, monkeypatch, suffix):
         """Another user may own it."""

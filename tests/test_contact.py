@@ -8,7 +8,6 @@ from solutions import ball, rod
 
 from ringsweep.physics import contact
 from ringsweep.physics.contact import BACKWARD, CLOSED, FORWARD, IMPOSSIBLE, OPEN_1, OPEN_2, OPEN_BOTH, STICK
-from ringsweep.physics.ring import acceleration
 
 MIRRORED = {OPEN_1: OPEN_2, OPEN_2: OPEN_1, FORWARD: BACKWARD, BACKWARD: FORWARD}
 
@@ -194,15 +193,6 @@ def states():
 
 
 class TestSliding:
-    def test_determinant_of_the_balances_is_that_of_the_gaps(self, states):
-        """The gaps are those of a body of three degrees of freedom."""
-        for body, K, phi, omega in states:
-            _, A = response(body, K, phi, omega)
-            determinant = acceleration(body, *K, sin(phi), cos(phi), omega)[1] * 2 * body.sin_beta * body.cos_beta
-            assert np.linalg.det(A) * body.mass**2 * body.inertia == pytest.approx(
-                determinant, rel=1e-9, abs=1e-9 * body.mass**2 * body.inertia * np.abs(A).max() ** 2
-            )
-
     def test_mode_is_the_admissible_one(self, states):
         seen, below = set(), 0
         for body, K, phi, omega in states:

@@ -69,7 +69,7 @@ def test_flipped_bit_of_a_small_file_is_told_by_every_command_that_uses_its_numb
     assert cli.main([command, str(copy), *COMMANDS[command]]) == 2
     message = capsys.readouterr().err
     assert message.count("\n") == 1
-    assert "is damaged, or another program changed it" in message
+    assert "is a part of a result, or another program changed it, or it is damaged" in message
     assert name in message
 
 

@@ -58,12 +58,16 @@ def press(figure, *keys):
 
 
 class TestCell:
-    def test_cell_is_the_configuration_with_the_values_of_the_cell(self, maps):
+    def test_cell_is_the_configuration_with_the_values_of_the_cell(self, maps, caplog):
         found = plots.cell(maps, {"drive.amplitude": 1.9, "zone_half_angle": np.radians(39.0)})
         assert "sweep" not in found
         values = load(found).scene.values
         assert values["drive.amplitude"] == 2.0
         assert values["zone.half_angle"] == float(maps["zone_half_angle"][2])
+        assert caplog.messages == [
+            "drive.amplitude: 1.9 rad s⁻¹ is not in the dataset: the nearest value is taken, 2 rad s⁻¹",
+            "zone_half_angle: 39° is not in the dataset: the nearest value is taken, 40°",
+        ]
 
     def test_cell_accepts_a_dataset_already_selected_with_xarray(self, maps):
         found = plots.cell(maps.isel(drive_amplitude=2).sel(zone_half_angle=0.3, method="nearest"))

@@ -5,6 +5,7 @@ import math
 import os
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -12,14 +13,16 @@ import pytest
 import xarray as xr
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
-from solutions import made
+from solutions import made, motion
 
 import ringsweep
 from ringsweep.config import load
 from ringsweep.errors import InputError
 from ringsweep.models import batch
-from ringsweep.numerics.expressions import evaluate
+from ringsweep.numerics.expressions import derivative, evaluate
+from ringsweep.numerics.intervals import Enclosure
 from ringsweep.physics.friction.formula import FormulaError, read_formula
 from ringsweep.physics.friction.laws import Definition, define
 from ringsweep.physics.friction.velocity import (
@@ -138,6 +141,8 @@ def thresholds_of(found):
     for k, threshold in enumerate(found.thresholds):
         if threshold.kind == "given":
             values[k] = float(evaluate(threshold.at, 0.0, VALUES))
+        if threshold.kind == "head":
+            values[k] = 0.0
     return values
 
 
@@ -362,7 +367,7 @@ class TestRegions:
         assert friction_at(law, 0.5 * crossing, (0.5, 0.3)) == pytest.approx((0.15, 5.0), rel=1e-14)
         assert friction_at(law, 2.0 * crossing, (0.5, 0.3)) == (0.3, 0.0)
         assert min(abs(law.thresholds - crossing)) < 1e-15
-        assert stiction_band(law) == pytest.approx(crossing, rel=0.1)
+        assert stiction_band(law) == pytest.approx(crossing, rel=1e-15)
         law = made(define(Definition("max(mu_k, mu_s - mu_s*v/w)", "mu_s")), w=0.1)
         assert friction_at(law, 0.03, (0.5, 0.3)) == pytest.approx((0.35, -5.0), rel=1e-13)
         assert friction_at(law, 0.05, (0.5, 0.3)) == (0.3, 0.0)
@@ -403,20 +408,230 @@ class TestRegions:
 
     def test_friction_ends_where_it_would_be_negative_or_no_number(self):
         law = made(define(Definition("mu_s - mu_k*v/w", "mu_s")), w=1.0)
-        assert law.thresholds[-1] == pytest.approx(0.5 / 0.3, rel=1e-11)
+        assert law.thresholds[-3] == pytest.approx(0.5 / 0.3, rel=1e-11)
         assert math.isnan(friction_at(law, 1.7, (0.5, 0.3))[0])
         law = made(define(Definition("mu_s*sqrt(1 - v/w)", "mu_s")), w=1.0)
-        assert law.thresholds[-1] == pytest.approx(1.0, rel=1e-14)
+        assert law.thresholds[-3] == pytest.approx(1.0, rel=1e-11)
         assert math.isnan(friction_at(law, 1.01, (0.5, 0.3))[0])
-        # Before a pole.
+        # At a pole.
         law = made(define(Definition("mu_s/(1 + v/w)/(1 - v/w)**2/2", "mu_s")), w=1.0)
-        assert 0.8 < law.thresholds[-1] <= 1.0
+        assert law.thresholds[-3] == pytest.approx(1.0, rel=1e-14)
+        assert law.thresholds[-3] < 1.0 < law.thresholds[-2]
 
     def test_law_of_steps_does_not_vary_within_a_region(self):
-        law = made(define(Definition("mu_k + (mu_s - mu_k)*piecewise(v < w, 1, v < 2*w, 0.5, v/w)", "mu_s")), w=0.1)
+        law = made(define(Definition("mu_k + (mu_s - mu_k)*piecewise(v < w, 1, v < 2*w, 0.5, 0.5*w/v)", "mu_s")), w=0.1)
         assert [varies(law, region_at(law, v)) for v in (0.05, 0.15, 0.25)] == [False, False, True]
         law = made(define(Definition("mu_k + (mu_s - mu_k)*piecewise(v < w, 1, v < 2*w, 0.5, 0.3)", "mu_s")), w=0.1)
         assert [varies(law, region_at(law, v)) for v in (0.05, 0.15, 0.25)] == [False, False, False]
+
+
+class TestIntervals:
+    """Bounds on a function over intervals of the speed, against values in between."""
+
+    @settings(max_examples=200)
+    @given(trees, st.floats(0.0, 2.0), st.floats(1e-9, 1.0), st.lists(st.floats(0.0, 1.0), min_size=1, max_size=5))
+    def test_interval_of_a_function_and_of_its_slopes_contains_their_values(self, tree, low, width, shares):
+        value_of(tree, low)
+        found = read_formula(text_of(tree))
+        thresholds = thresholds_of(found)
+        high = low + width
+        # An interval lies on one side of each switch.
+        high = min([high, *(threshold for threshold in thresholds if threshold > low)])
+        values = {name: np.array([value]) for name, value in VALUES.items()}
+        enclosure = Enclosure(found.mu, values, [np.array([threshold]) for threshold in thresholds])
+        row, low, high = np.zeros(1, dtype=int), np.array([low]), np.array([high])
+        coefficient, factorial = found.mu, 1.0
+        for k, bounds in enumerate(enclosure(row, low, high, low, 3)):
+            least, most = (0.0, 0.0) if bounds is None else (bounds.low[0], bounds.high[0])
+            for share in shares:
+                v = min(low[0] + share * (high[0] - low[0]), np.nextafter(high[0], 0.0))
+                value = float(evaluate(coefficient, v, VALUES, thresholds)) / factorial
+                if math.isfinite(value) and not math.isnan(least):
+                    # The value itself is rounded.
+                    off = 1e-9 * (1.0 + abs(value))
+                    assert least - off <= value <= most + off, (text_of(tree), k, v)
+                # What is undefined somewhere is no part of an interval that is defined everywhere.
+                if k == 0 and math.isnan(value) and bounds is not None:
+                    assert math.isnan(least) or bounds.partial is not None or not math.isfinite(least + most)
+            coefficient, factorial = derivative(coefficient), factorial * (k + 1)
+
+    def test_interval_of_a_square_is_not_negative(self):
+        node = read_formula("mu_s*((v - w)/w)**2").mu
+        found = Enclosure(node, {"mu_s": np.array([1.0]), "w": np.array([0.6])})(
+            np.zeros(1, dtype=int), np.array([0.3]), np.array([0.9]), np.array([0.3]), 0
+        )[0]
+        assert found.low[0] == pytest.approx(0.0, abs=1e-300)
+        assert found.high[0] == pytest.approx(0.25, rel=1e-14)
+
+    def test_point_has_an_interval_of_rounding(self):
+        node = read_formula("mu_s*exp(-v/w)*tanh(v/w)/(1 + (v/w)**2)**1.5").mu
+        v = np.geomspace(1e-9, 5.0, 50)
+        found = Enclosure(node, {"mu_s": np.array([0.5]), "w": np.array([0.6])}, [np.array([np.inf])] * 2)(
+            np.zeros(50, dtype=int), v, v, v, 0
+        )[0]
+        assert (found.high - found.low <= 1e-13 * found.high).all()
+
+
+# Features of friction around a speed c, of width w, with height 1.
+FEATURES = (
+    "exp(-((v - {c})/{w})**2)",
+    "1/(1 + ((v - {c})/{w})**2)",
+    "max(0, 1 - abs(v - {c})/{w})",
+    "max(0, 1 - ((v - {c})/{w})**2)",
+    "0.5*(1 + tanh((v - {c})/{w}))",
+    "exp(-abs(v - {c})/{w})",
+)
+
+NUMPY = {"exp": np.exp, "abs": np.abs, "tanh": np.tanh, "max": np.maximum}
+
+features = st.lists(
+    st.tuples(
+        st.sampled_from(FEATURES),
+        st.floats(-1.6, 0.8),
+        st.floats(math.log(1e-2), math.log(3.0)).map(math.exp),
+        st.floats(math.log(1e-6), math.log(0.3)).map(math.exp),
+    ),
+    min_size=1,
+    max_size=3,
+)
+
+
+def featured(drawn):
+    """Factor on friction with some features, its parameters, and 1e5 speeds, most of them around the features."""
+    text, parameters = "(1", {}
+    speeds = [np.geomspace(1e-9, 1e6, 20_000), np.linspace(1e-4, 4.0, 20_000)]
+    for i, (shape, height, c, w) in enumerate(drawn):
+        text += f" + {height!r}*" + shape.format(c=f"c{i}", w=f"w{i}")
+        parameters |= {f"c{i}": c, f"w{i}": w}
+        far = np.geomspace(6.0, 1e4, 1000)
+        speeds.append(c + w * np.concatenate([-far, np.linspace(-6.0, 6.0, 18_000), far]))
+    speeds = np.unique(np.concatenate(speeds))
+    return text + ")", parameters, speeds[speeds > 0.0]
+
+
+class TestNoFeatureIsMissed:
+    """Laws with bumps, dips, kinks and steps at any speed, against 1e5 samples of each."""
+
+    @settings(max_examples=60)
+    @given(features, st.booleans())
+    @example([(FEATURES[0], -1.5, 0.31, 0.005)], False)
+    @example([(FEATURES[1], -1.5, 0.31, 1e-6)], False)
+    def test_switches_and_bounds_of_validity_are_where_samples_say(self, drawn, limited):
+        factor, parameters, v = featured(drawn)
+        text = f"0.5*mu_s*{factor}"
+        text = f"max(0.1*mu_k, {text})" if limited else text
+        sampled = np.broadcast_to(eval(text, NUMPY, parameters | {"mu_s": 0.5, "mu_k": 0.3, "v": v}), v.shape)
+        cls, problem = define(Definition(text, "mu_s")), ""
+        try:
+            law = made(cls, **parameters)
+        except FormulaError as error:
+            problem = str(error)
+        if problem:
+            # Only what has many switches, or is negative at rest or too often, is refused.
+            said = ("more than three times", "in several intervals", "at rest it gives", "begins to slip")
+            assert any(words in problem for words in said), (text, problem)
+            return
+        values = {name: np.float64(value) for name, value in parameters.items()} | {"mu_s": 0.5, "mu_k": 0.3}
+        found = evaluate(EXPRESSIONS[cls].mu, v, values, list(law.thresholds))
+        finite = law.edges[np.isfinite(law.edges)]
+        clear = (abs(v[:, None] - finite) > 1e-10 * (1.0 + v[:, None])).all(axis=1)
+        assert np.isnan(found[clear & (sampled < -1e-11)]).all(), text
+        valid = clear & (sampled >= 0.0)
+        np.testing.assert_allclose(found[valid], sampled[valid], atol=1e-8, err_msg=text)
+
+    @settings(max_examples=25)
+    @given(features, st.floats(math.log(1e-4), math.log(0.1)).map(math.exp))
+    def test_band_and_steepest_slope_are_those_of_samples(self, drawn, w):
+        factor, parameters, v = featured([(shape, 0.3 * height, c, w) for shape, height, c, w in drawn])
+        cls = define(Definition(f"0.5*mu_s*{factor}*tanh(v/w)"))
+        law = made(cls, w=w, **parameters)
+        values = {name: np.float64(value) for name, value in parameters.items()} | {"mu_s": 0.5, "mu_k": 0.3, "w": w}
+        slope = derivative(EXPRESSIONS[cls].mu)
+        v = np.unique(np.concatenate([[0.0], v, law.edges[np.isfinite(law.edges)]]))
+        found = evaluate(slope, v, values, list(law.thresholds))
+        steepest = np.maximum.accumulate(found)
+        below = v < law.band * (1 - 1e-9)
+        assert (found[below] > 0.01 * steepest[below] * (1 - 1e-6)).all()
+        at = np.searchsorted(v, law.band)
+        assert found[at] <= 0.01 * steepest[at] * (1 + 1e-6)
+        assert found[0] == law.slope_at_rest
+        beyond = abs(found[at:]).max()
+        assert beyond * (1 - 1e-9) <= law.slope_beyond <= 1.02 * beyond
+
+
+class TestNegativeFriction:
+    DIP = Definition("mu_s - 1.5*mu_s*exp(-((v - vb)/w)**2)", "mu_s")
+
+    def test_narrow_interval_of_negative_friction_has_none(self):
+        w, vb = 1e-5, 0.31
+        law = made(define(self.DIP), vb=vb, w=w)
+        ends = vb - w * math.sqrt(math.log(1.5)), vb + w * math.sqrt(math.log(1.5))
+        assert law.thresholds[-3:-1] == pytest.approx(ends, rel=1e-11)
+        for v, valid in [(0.1, True), (ends[0] - 1e-9, True), (vb, False), (ends[1] - 1e-9, False), (1.0, True)]:
+            assert math.isnan(friction_at(law, v, (0.5, 0.3))[0]) != valid
+
+    def test_interval_holds_for_the_surface_with_the_widest(self):
+        cls = define(Definition("mu_k - mu_s*exp(-((v - vb)/w)**2)", "mu_s"))
+        law = made(cls, [(0.5, 0.3), (0.5, 0.1)], vb=0.31, w=0.005)
+        half = 0.005 * math.sqrt(math.log(5.0))
+        assert law.thresholds[-3:-1] == pytest.approx((0.31 - half, 0.31 + half), rel=1e-10)
+
+    def test_law_that_is_negative_in_three_intervals_is_refused(self):
+        dips = " - ".join(f"1.5*mu_s*exp(-((v - {c}*w)/(0.01*w))**2)" for c in (1, 2, 3))
+        with pytest.raises(FormulaError, match="in several intervals"):
+            made(define(Definition(f"mu_s - {dips}", "mu_s")), w=0.1)
+
+
+class TestJumps:
+    def test_upward_jump_is_refused_for_all_methods(self):
+        message = refused(formula("piecewise(v < w, mu_k, mu_s)", w=0.2))
+        assert "friction jumps up from 0.25 to 0.4 at v = 0.2 m/s: a body would keep this speed" in message
+        assert "Write a steep ramp" in message
+
+    def test_jump_that_is_upward_on_one_surface_only_is_refused(self):
+        cls = define(Definition("piecewise(v < w, 0.3*(mu_s/mu_s), mu_k)", "mu_s"))
+        assert made(cls, [(0.5, 0.3), (0.5, 0.1)], w=0.1)
+        with pytest.raises(FormulaError, match=r"jumps up from 0\.3 to 0\.4"):
+            made(cls, [(0.5, 0.3), (0.5, 0.4)], w=0.1)
+
+    def test_jump_that_is_upward_in_one_cell_of_a_sweep_is_refused(self):
+        scene = belt(formula("mu_k*piecewise(v < w, 1, a)", w=0.2, a=1.0))
+        with pytest.raises(InputError, match=r"jumps up from 0\.25 to 0\.3 "):
+            ringsweep.sweep(scene, {"friction.a": [0.8, 1.0, 1.2]}, progress=False)
+
+    def test_kink_and_downward_jump_are_accepted(self):
+        for text in (
+            "piecewise(v < w, mu_s, mu_k)",
+            "piecewise(v < w, mu_s - mu_s*v/(2*w), 0.1*mu_s*v/w + 0.4*mu_s)",
+            "max(mu_k, mu_s - mu_s*((v - w)/(0.1*w))**2)",
+            "piecewise(v < w, mu_k*(v/w + (1 - v/w))/3*3, mu_k)",
+        ):
+            assert made(define(Definition(text, "mu_s")), w=0.3)
+
+
+class TestBand:
+    @pytest.mark.parametrize("text", ["mu_s*min(v/w, 1)", "mu_s*min(1, v/w)"])
+    def test_band_of_a_ramp_ends_where_the_ramp_does(self, text):
+        for w in np.geomspace(1e-6, 10.0, 30):
+            assert stiction_band(made(define(Definition(text)), w=w)) == pytest.approx(w, rel=3e-16)
+
+    def test_band_of_a_decaying_slope_ends_at_a_hundredth_of_the_steepest(self):
+        """The slope of v/(w + v) is w/(w + v)^2; that of tanh is 1 - tanh^2."""
+        assert stiction_band(made(define(Definition("mu_s*v/(w + v)")), w=0.01)) == pytest.approx(0.09, rel=1e-12)
+        law = made(define(Definition("mu_s*tanh(v/w)")), w=0.01)
+        assert stiction_band(law) == pytest.approx(0.01 * math.atanh(math.sqrt(0.99)), rel=1e-12)
+
+    def test_word_does_not_depend_on_how_a_ramp_is_written_or_on_a_grid(self):
+        words = [
+            ringsweep.sweep(
+                belt(formula(text, None, mu_s=0.4, w=0.1)),
+                {"friction.w": np.linspace(0.09, 0.12, 16)},
+                progress=False,
+            ).regime.values
+            for text in ("mu_s*min(v/w, 1)", "mu_s*min(1, v/w)")
+        ]
+        assert (words[0] == words[1]).all()
+        assert (words[0] == words[0][0]).all()
 
 
 # ---- motion -----------------------------------------------------------------------------------
@@ -466,6 +681,78 @@ def test_sweep_over_laws_that_nothing_defines_is_refused(laws, message):
     with pytest.raises(InputError) as refusal:
         load({"scene": scene, "sweep": {"grid": {"friction.law": laws}}})
     assert message in str(refusal.value)
+
+
+def angle_of_rest(mu, points):
+    """Angle at which a body of the ring comes to rest, launched at 10 rad/s, by an integration over the sliding speed.
+
+    The speeds `points`, m/s, are where friction changes: the steps follow from them, not from the time.
+    """
+    config = load({"scene": launched({"law": "stiction"})})
+    body = batch(config.scene.structure, {path: np.array([value]) for path, value in config.scene.values.items()}).body
+    body = type(body)(*(np.ravel(field)[0] for field in body))
+
+    def rates(v, y):
+        phi, omega = y[0], v / body.radius
+        K = -mu(v)
+        epsilon = motion(body, K, K)[0] @ [omega**2, math.cos(phi), math.sin(phi)]
+        return [omega / (body.radius * epsilon)]
+
+    speeds, phi = sorted({10.0 * body.radius, *points, 0.0}, reverse=True), 0.0
+    for high, low in pairwise(v for v in speeds if v <= 10.0 * body.radius):
+        solved = solve_ivp(
+            rates, (high, low), [phi], method="DOP853", rtol=1e-13, atol=1e-15, max_step=(high - low) / 8
+        )
+        phi = solved.y[0, -1]
+    return phi
+
+
+def launched(friction):
+    """A ring at rest with one surface, and a body that is launched at 10 rad/s and comes to rest."""
+    surface = {"mu_s": 0.6, "mu_k": 0.1}
+    return RING | {
+        "friction": friction | {"rough": surface, "rest": surface},
+        "drive": {"law": "none"},
+        "initial": {"phi": 0.0, "omega": 10.0},
+        "time": {"span": 1.0},
+    }
+
+
+class TestNarrowFeatures:
+    """A body passes a narrow feature of friction; the answer is that of an integration which is told where it is."""
+
+    @pytest.mark.parametrize(
+        ("text", "shape", "w"),
+        [
+            ("max(mu_k, mu_s - ((v - vb)/w)**2)", lambda x: max(0.1, 0.6 - x * x), 0.02),
+            ("mu_k + (mu_s - mu_k)*exp(-((v - vb)/w)**2)", lambda x: 0.1 + 0.5 * math.exp(-x * x), 1e-4),
+            ("mu_k*(1 + 0.5/(1 + ((v - vb)/w)**2))", lambda x: 0.1 * (1 + 0.5 / (1 + x * x)), 1e-6),
+        ],
+    )
+    def test_body_passes_a_narrow_peak_of_friction(self, text, shape, w):
+        vb = 0.3
+        friction = {"law": "formula", "mu": text, "at_rest": "mu_s", "vb": vb, "w": w}
+        found = outcome(launched(friction))
+        far = w * np.concatenate([np.linspace(0.0, 8.0, 65), np.geomspace(10.0, 1e5, 30), [math.sqrt(0.5)]])
+        points = [v for v in (*(vb - far), *(vb + far)) if v > 0.0]
+        expected = angle_of_rest(lambda v: shape((v - vb) / w), points)
+        assert found["certified"] == 1
+        assert float(abs(found["phi_end"] - expected)) < float(found["phi_end_error"]) + 1e-11
+        # What is far from the peak costs few steps.
+        assert found["steps"] < 500
+
+    def test_run_of_constant_steps_that_leap_over_a_peak_is_not_certified(self):
+        text = "max(mu_k, mu_s - ((v - vb)/w)**2)"
+        friction = {"law": "formula", "mu": text, "at_rest": "mu_s", "vb": 0.3, "w": 0.002}
+        found = outcome(launched(friction) | {"time": {"span": 0.05}}, {"method": "rk4", "steps": 10})
+        assert found["certified"] == 0
+
+    def test_run_fails_if_and_only_if_it_meets_negative_friction(self):
+        friction = {"law": "formula", "mu": TestNegativeFriction.DIP.mu, "at_rest": "mu_s", "w": 0.005}
+        assert outcome(launched(friction | {"vb": 0.31}))["regime"] == FAILED
+        below = outcome(launched(friction | {"vb": 0.6}))
+        assert below["regime"] != FAILED
+        assert below["certified"] == 1
 
 
 class TestMotion:

@@ -12,6 +12,7 @@ from ringsweep.config import load
 from ringsweep.errors import InputError
 from ringsweep.runs import plan
 from ringsweep.runs.cells import TaskResult
+from ringsweep.runs.executors import Execution
 from ringsweep.runs.sweep import write
 from ringsweep.storage.checkpoint import Checkpoint
 
@@ -40,6 +41,15 @@ def test_dry_run_tells_cells_memory_disk_and_time_and_writes_nothing(sweep, tmp_
     assert "cells spread over the grid" in lines["time"]
     assert "nothing was written" in lines
     assert [path.name for path in tmp_path.iterdir()] == ["a.yaml"]
+
+
+@pytest.mark.parametrize("n", [4, 48])
+def test_size_of_the_file_is_the_one_told(sweep, tmp_path, capsys, n):
+    assert cli.main(["run", sweep(n), "--dry-run"]) == 0
+    number, unit = capsys.readouterr().out.split("runs, then ")[1].split(";")[0].split()
+    assert cli.main(["run", "a.yaml"]) == 0
+    told = float(number) * {"kB": 1e3, "MB": 1e6}[unit]
+    assert (tmp_path / "a.nc").stat().st_size == pytest.approx(told, rel=0.25)
 
 
 def test_hundred_million_cells_are_told_at_once(sweep, tmp_path, monkeypatch, capsys):
@@ -97,9 +107,9 @@ def test_only_cells_that_are_still_to_be_computed_need_room_on_the_disk(sweep, t
     with monkeypatch.context() as patch:
         patch.setattr(Checkpoint, "put", full)
         with pytest.raises(OSError, match="No space"):
-            write(config, tmp_path / "a.nc", progress=False)
+            write(config, tmp_path / "a.nc", Execution(progress=False))
     room = 63 * plan.bytes_of_cell(config)
-    assert write(config, tmp_path / "a.nc", progress=False)
+    assert write(config, tmp_path / "a.nc", Execution(progress=False))
 
 
 @pytest.mark.parametrize("solver", ["auto", {"method": "event", "certify": False}])

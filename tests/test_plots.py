@@ -387,12 +387,27 @@ def test_map_axis_may_consist_of_friction_laws():
     assert " = dahl" in title(plots.regime_map(ds, sel={"drive_amplitude": "dahl"}))
 
 
-def test_map_holds_the_nearest_value_and_names_it_in_the_title():
+def test_map_holds_the_nearest_value_and_tells_it_in_the_title_and_by_a_warning(caplog):
     ds = make_sweep((12, 9, 3))
-    figure = plots.regime_map(ds, sel={"friction.rough.mu_k": 0.32, "zone_half_angle": 0.04})
+    figure = plots.regime_map(ds, sel={"friction.rough.mu_k": 0.32, "zone_half_angle": "2.5 deg"})
     np.testing.assert_array_equal(mesh(figure).get_array()[0], ds["regime"][:, 0, 1])
-    assert "coefficient of kinetic friction = 0.3" in title(figure)
-    assert "half-angle of the zone = 2°" in title(figure)
+    assert "coefficient of kinetic friction = 0.3 (nearest to 0.32)" in title(figure)
+    assert "half-angle of the zone = 2° (nearest to 2.5°)" in title(figure)
+    assert "friction.rough.mu_k: 0.32 is not in the dataset: the nearest value is taken, 0.3" in caplog.messages
+    assert "zone_half_angle: 2.5° is not in the dataset: the nearest value is taken, 2°" in caplog.messages
+
+
+def test_nearest_value_is_told_with_as_many_digits_as_differ(caplog):
+    figure = plots.regime_map(make_sweep((12, 9)), sel={"zone.half_angle": "2.00004 deg"})
+    assert "half-angle of the zone = 2° (nearest to 2.00004°)" in title(figure)
+    assert "zone.half_angle: 2.00004° is not in the dataset" in caplog.text
+
+
+@pytest.mark.parametrize("value", ["2 deg", np.radians(60.0), np.nextafter(np.radians(60.0), 0.0)])
+def test_value_of_the_dataset_needs_no_warning(value, caplog):
+    figure = plots.regime_map(make_sweep((12, 9)), sel={"zone.half_angle": value})
+    assert not caplog.messages
+    assert "nearest" not in title(figure)
 
 
 @pytest.mark.parametrize("value", ["30 deg", "0.5236", 0.5236, "0.08333 turn"])

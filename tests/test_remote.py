@@ -1,19 +1,23 @@
-"""Sweeps on the workers of a Dask scheduler."""
+"""Sweeps on other workers than threads: those of a Dask scheduler, and those that the user names to joblib."""
 
 import logging
+import multiprocessing
 import os
 import signal
 import subprocess
 import sys
 
+import joblib
 import numpy as np
 import pytest
 import yaml
 from distributed import LocalCluster
+from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 import ringsweep
 from benchmarks.hostile.attack import same_bits
 from ringsweep import cli
+from ringsweep.runs.executors import Execution
 from ringsweep.runs.task_sizes import TaskSizes
 from ringsweep.storage.checkpoint import Checkpoint
 
@@ -48,9 +52,90 @@ def test_task_of_a_killed_worker_is_computed_by_another(cluster, scene, tmp_path
     assert same_bits(tmp_path / "threads.nc", tmp_path / "dask.nc")
 
 
+@pytest.fixture(scope="module")
+def by_threads(scene, tmp_path_factory):
+    """Axes of a sweep of 120 cells, and its result file by threads."""
+    axes = {"drive.amplitude": np.geomspace(0.5, 8.0, 12), "zone.half_angle": np.radians(np.linspace(5.0, 40.0, 10))}
+    path = tmp_path_factory.mktemp("threads") / "threads.nc"
+    ringsweep.sweep(scene, axes, path, progress=False).close()
+    return axes, path
+
+
+@pytest.mark.parametrize("backend", ["loky", "threading"])
+def test_workers_that_joblib_is_told_to_use_give_the_same_bits(scene, by_threads, tmp_path, monkeypatch, backend):
+    axes, path = by_threads
+    monkeypatch.setattr(TaskSizes, "max_cells", 4)
+    monkeypatch.setattr("ringsweep.runs.sweep.compute_task", _named_by_process())
+    put, processes = Checkpoint.put, set()
+
+    def noted(self, positions, columns, process):
+        processes.add(process)
+        put(self, positions, columns, process)
+
+    monkeypatch.setattr(Checkpoint, "put", noted)
+    with joblib.parallel_config(backend=backend, n_jobs=2):
+        ringsweep.sweep(scene, axes, tmp_path / "out.nc", progress=False).close()
+    assert (str(os.getpid()) in processes) == (backend == "threading")
+    assert same_bits(path, tmp_path / "out.nc")
+
+
+def _named_by_process():
+    """A function that computes a task and tells its process in place of its processor. Loky sends it by value."""
+
+    def named(*arguments):
+        import os
+        from dataclasses import replace
+
+        from ringsweep.runs.cells import compute_task
+
+        return replace(compute_task(*arguments), processor=str(os.getpid()))
+
+    return named
+
+
+def test_task_of_a_killed_process_is_computed_when_the_sweep_goes_on(scene, by_threads, tmp_path, monkeypatch):
+    axes, path = by_threads
+    monkeypatch.setattr(TaskSizes, "max_cells", 4)
+    put = Checkpoint.put
+
+    def kill_one(self, *rest):
+        put(self, *rest)
+        if len(self.files) == 5:
+            children = multiprocessing.active_children()
+            os.kill(next(one.pid for one in children if one.name.startswith("LokyProcess")), signal.SIGKILL)
+
+    target = tmp_path / "out.nc"
+    with joblib.parallel_config(backend="loky", n_jobs=2):
+        with monkeypatch.context() as patch:
+            patch.setattr(Checkpoint, "put", kill_one)
+            with pytest.raises(TerminatedWorkerError) as caught:
+                ringsweep.sweep(scene, axes, target, progress=False)
+        assert "cells are kept in" in caught.value.__notes__[0]
+        ringsweep.sweep(scene, axes, target, progress=False).close()
+    assert same_bits(path, target)
+
+
+@pytest.mark.parametrize(
+    ("given", "own", "workers"), [({}, None, joblib.cpu_count()), ({"n_jobs": 3}, None, 3), ({"n_jobs": 3}, 2, 2)]
+)
+@pytest.mark.parametrize("backend", [{}, {"backend": "threading"}, {"backend": "loky"}])
+def test_number_of_workers_is_that_of_the_call_then_that_of_joblib_then_that_of_cores(backend, given, own, workers):
+    with joblib.parallel_config(**backend, **given), Execution(own).open() as local:
+        assert local.concurrency() == workers
+
+
+def test_backend_that_keeps_its_results_until_the_end_is_refused(scene):
+    with (
+        joblib.parallel_config(backend="multiprocessing", n_jobs=2),
+        pytest.raises(ringsweep.InputError, match="MultiprocessingBackend returns results only at the end"),
+    ):
+        ringsweep.sweep(scene, {"drive.amplitude": [1.0]}, progress=False)
+
+
 #: A scheduler with one worker, in one process.
 ALONE = """
 from distributed import LocalCluster
+from joblib.externals.loky.process_executor import TerminatedWorkerError
 cluster = LocalCluster(n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address=None)
 print(cluster.scheduler_address, flush=True)
 input()

@@ -7,6 +7,7 @@ import pytest
 from benchmarks import scenes
 from benchmarks.work_precision import SCENES
 from ringsweep.runs import sweep
+from ringsweep.runs.executors import Execution
 
 LEANEST, CUT = "one contact, Coulomb, immobile uniform ring", "+ a zone"
 
@@ -34,10 +35,10 @@ def test_memory_of_a_sweep_does_not_grow_with_its_steps():
     def most(steps: int) -> int:
         smooth = SCENES["smooth"]
         configuration = smooth.configuration(smooth.cells(256), "rk4", steps=steps)
-        sweep.compute(configuration, jobs=1, progress=False)
+        sweep.compute(configuration, Execution(1, progress=False))
         tracemalloc.start()
         try:
-            sweep.compute(configuration, jobs=1, progress=False)
+            sweep.compute(configuration, Execution(1, progress=False))
             return tracemalloc.get_traced_memory()[1]
         finally:
             tracemalloc.stop()

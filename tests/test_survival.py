@@ -22,7 +22,7 @@ from benchmarks.hostile.kills import POINTS, killed_at
 from ringsweep import cli
 from ringsweep.config import load
 from ringsweep.runs.cells import compute_task
-from ringsweep.runs.executors import Threads, stop_on_interrupt
+from ringsweep.runs.executors import Execution, stop_on_interrupt
 from ringsweep.runs.sweep import write
 from ringsweep.runs.task_sizes import TaskSizes
 from ringsweep.storage import netcdf
@@ -66,9 +66,8 @@ def test_thread_that_fails_stops_the_others_and_no_result_before_is_lost():
             raise ValueError("the fifth task")
         return int(task[0])
 
-    results = Threads(2).results(compute, tasks, lambda result: result, stopped)
-    with pytest.raises(ValueError, match="the fifth task"):
-        found.extend(results)
+    with Execution(2).open() as workers, pytest.raises(ValueError, match="the fifth task"):
+        found.extend(workers.results(compute, tasks, lambda result: result, stopped))
     assert {0, 1, 2, 3, 4} <= set(found)
     assert 5 not in found
     assert len(found) < 1_000_000
@@ -319,9 +318,9 @@ class TestCheckpoint:
     ):
         target = tmp_path / "out.nc"
         shutil.copy(never_stopped, target)
-        assert not write(load(config), target, progress=False)
+        assert not write(load(config), target, Execution(progress=False))
         other = load(config.read_text() and {"scene": load(config).source["scene"] | {"time": {"span": "3 s"}}})
-        assert write(other, target, progress=False)
+        assert write(other, target, Execution(progress=False))
         assert "scene.time.span was 4.0, is 3.0" in caplog.text
 
 
@@ -407,7 +406,7 @@ class TestResultFile:
         ringsweep.sweep(scene, axes, one, progress=False).close()
         ringsweep.run(one, two, progress=False).close()
         assert same_bits(one, two)
-        assert not write(load(two), one, progress=False)
+        assert not write(load(two), one, Execution(progress=False))
         assert "replaced" not in caplog.text
 
     def test_file_of_a_single_run_has_no_dimension(self, scene, tmp_path):

@@ -11,7 +11,10 @@ all modes of the contacts. It runs each scene on the ring four times:
 
 If the drive has an infinite acceleration at t = 0, the upward shift looks at the contacts at t = 0, the other runs an
 instant later. If the runs do not agree in kind, the scene is ambiguous. A scene on the belt is run twice, at the two
-tolerances.
+tolerances. Under a force the run is long: both tolerances are a hundred times as wide, and if the runs differ it is run
+once more with the tight tolerance.
+
+:mod:`benchmarks.reference.compliant` gives a second opinion on the end of a run. It shares no criterion with this one.
 """
 
 from dataclasses import dataclass, field
@@ -76,15 +79,20 @@ def _numbers(found, belt):
 
 def judge(scene):
     """Verdict on a scene, a mapping as in a configuration, but with numbers only (SI)."""
-    belt = scene["model"] == "belt"
-    runs = []
+    belt, forced = scene["model"] == "belt", "force" in scene
+    runs, most_steps, wider = [], MOST_STEPS * (20 if forced else 1), 100.0 if forced else 1.0
     for rtol, shift in VARIATIONS[: 2 if belt else 4]:
-        found = dict(zip(RESULT, run(problem(scene, 1.0 + shift), rtol, shift, shift, MOST_STEPS), strict=True))
+        found = dict(zip(RESULT, run(problem(scene, 1.0 + shift), wider * rtol, shift, shift, most_steps), strict=True))
         runs.append(found)
         if found["end"] == UNRESOLVED:
             why = f"stopped at {found['t_end']:.6g} s after {found['steps']} steps and {found['events']} events"
             return Verdict("unresolved", None, {}, {}, why, runs)
     first, second = runs[:2]
+    if forced and not abs(first["position"] - second["position"]) < 1e-8:
+        # Errors may grow over hundreds of periods.
+        third = dict(zip(RESULT, run(problem(scene), TIGHT, 0.0, 0.0, most_steps), strict=True))
+        if third["end"] != UNRESOLVED:
+            first, second = third, first
     numbers, other = _numbers(first, belt), _numbers(second, belt)
     spread = {name: abs(numbers[name] - other[name]) for name in numbers}
     if belt:

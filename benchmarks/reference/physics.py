@@ -15,10 +15,13 @@ from benchmarks.reference.problem import (
     ARCTAN,
     BELT,
     BENGISU,
+    BUMP,
     CONSTANT,
     CUBIC,
     DAHL,
     ELASTO,
+    HUMP,
+    JUMP,
     KARNOPP,
     LINEAR,
     NONE,
@@ -28,15 +31,18 @@ from benchmarks.reference.problem import (
     SINGLE,
     SINUSOIDAL,
     STICTION,
+    TENT,
     THRELFALL,
     TURN,
     TUSTIN,
 )
 
+#: Where steps must end about a narrow bump of a law, in widths.
+BUMP_CORNERS = np.array([-6.0, -3.0, -1.5, 0.0, 1.5, 3.0, 6.0])
 #: Solutions of a contact problem: stick, slip backward or forward, contacts that separate, no solution, several.
 STICK, BACKWARD, FORWARD, OPEN_1, OPEN_2, OPEN_BOTH, JAMMED, SEVERAL = 0, -1, 1, 2, 3, 4, 5, 6
-#: An effective inertia below this share of the moment of inertia counts as zero.
-LEAST_INERTIA = 1e-6
+#: A determinant below this share of its value without friction counts as zero.
+LEAST_DETERMINANT = 1e-6
 
 
 @njit(cache=True, error_model="numpy")
@@ -73,6 +79,16 @@ def coefficient(p, piece, speed, mu_s, mu_k):
     size = abs(piece)
     if p.law == TUSTIN:
         return mu_k + (mu_s - mu_k) * math.exp(-max(p.alpha * speed, -50.0))
+    if p.law == BUMP:
+        x = (speed - p.vb) / p.w
+        return mu_k + p.h * math.exp(-x * x)
+    if p.law == TENT and 1 < size < 4:
+        return mu_k + p.h * (1.0 + (speed - p.vb) / p.w * (1.0 if size == 2 else -1.0))
+    if p.law == HUMP and size == 2:
+        x = (speed - p.vb) / p.w
+        return mu_s - p.unit * x * x
+    if p.law == JUMP:
+        return mu_s if size == 1 else mu_k
     if p.law == THRELFALL and size == 1:
         return mu_k * (1.0 - math.exp(-3.0 * max(speed / p.v0, -20.0))) / (1.0 - math.exp(-3.0))
     if p.law == LINEAR and size < 3:
@@ -134,6 +150,18 @@ def corners(p, piece):
         if size == 1:
             return 0.0, p.v0
         return (p.v0, p.v1) if size == 2 else (p.v1, math.inf)
+    if p.law == BUMP or p.law == TENT or p.law == HUMP or p.law == JUMP:
+        if p.law == BUMP:
+            places = p.vb + p.w * BUMP_CORNERS
+        elif p.law == TENT:
+            places = p.vb + p.w * np.array([-1.0, 0.0, 1.0])
+        elif p.law == HUMP:
+            # Only for a surface that is the same everywhere.
+            places = p.vb + p.w * math.sqrt((p.mu_s[0] - p.mu_k[0]) / p.unit) * np.array([-1.0, 1.0])
+        else:
+            places = np.array([p.vb])
+        low = places[size - 2] if size > 1 else 0.0
+        return low, places[size - 1] if size <= places.size else math.inf
     if p.law == KARNOPP:
         # The dead band has two pieces: 1 while friction holds the load, 3 while the load exceeds mu_s.
         return (p.dead_band, math.inf) if size == 2 else (-p.dead_band, p.dead_band)
@@ -169,27 +197,54 @@ def segment(p, x):
 
 
 @njit(cache=True, error_model="numpy")
-def closed(p, phi, omega, K1, K2):
-    """Both contacts closed and sliding: acceleration, reactions, determinant of the reactions, effective inertia.
+def accelerations(p, phi, omega, ring_epsilon, N1, T1, N2, T2):
+    """Newton-Euler equations of the body with three degrees of freedom, both of whose balls touch the race.
 
-    Two balances of forces give the reactions as functions of the acceleration. The balance of moments about the axis
-    gives the acceleration.
+    Linear momentum along the radius and the tangent of the centre of mass, and angular momentum about it. The forces N
+    (inwards) and T (along the race) act on the balls where they touch the race.
+
+    Returns
+    -------
+    tuple of float
+        Accelerations of both gaps, and of both contacts along the race relative to it, m/s^2; angular acceleration of
+        the body, rad/s^2.
+
     """
-    g, M, R = p.gravity, p.mass, p.radius
+    sb, cb, g, w2 = math.sin(p.beta), math.cos(p.beta), p.gravity, omega * omega
+    a, r, reach = p.half_distance, p.ball_radius, p.radius - p.ball_radius
+    radial = g * math.cos(phi) + (sb * (T1 - T2) - cb * (N1 + N2)) / p.mass
+    tangential = -g * math.sin(phi) + (sb * (N1 - N2) + cb * (T1 + T2)) / p.mass
+    angular = (a * cb * (N2 - N1) + (a * sb + r) * (T1 + T2)) / p.inertia
+    # The centres of the balls are at -a and +a along the tangent.
+    out1, on1 = radial + a * angular, tangential + a * w2
+    out2, on2 = radial - a * angular, tangential - a * w2
+    gap1, gap2 = -(cb * out1 - sb * on1 + w2 * reach), -(cb * out2 + sb * on2 + w2 * reach)
+    spin = r * angular - p.radius * ring_epsilon
+    return gap1, gap2, sb * out1 + cb * on1 + spin, cb * on2 - sb * out2 + spin, angular
+
+
+@njit(cache=True, error_model="numpy")
+def response(p, phi, omega, K1, K2):
+    """Accelerations A N + b of both gaps under the reactions N of contacts with friction K1 N1 and K2 N2."""
+    b1, b2, _, _, _ = accelerations(p, phi, omega, 0.0, 0.0, 0.0, 0.0, 0.0)
+    a11, a21, _, _, _ = accelerations(p, phi, omega, 0.0, 1.0, K1, 0.0, 0.0)
+    a12, a22, _, _, _ = accelerations(p, phi, omega, 0.0, 0.0, 0.0, 1.0, K2)
+    return a11 - b1, a12 - b1, a21 - b2, a22 - b2, b1, b2
+
+
+@njit(cache=True, error_model="numpy")
+def closed(p, phi, omega, K1, K2):
+    """Both contacts closed and sliding: angular acceleration, reactions, and det A over its value without friction."""
     if p.model == SINGLE:
-        N = M * (g * math.cos(phi) + R * omega * omega)
-        return (K1 * N / M - g * math.sin(phi)) / R, N, N, 1.0, 1.0
-    sb, cb = math.sin(p.beta), math.cos(p.beta)
-    radial = M * (g * math.cos(phi) + p.xi * omega * omega)
-    tangential = M * g * math.sin(phi)
-    a11, a12, a21, a22 = cb - K1 * sb, cb + K2 * sb, sb + K1 * cb, K2 * cb - sb
-    D = a12 * a21 - a11 * a22
-    N1, N2 = (a12 * tangential - a22 * radial) / D, (a21 * radial - a11 * tangential) / D
-    slope1, slope2 = a12 * M * p.xi / D, -a11 * M * p.xi / D
-    about = p.inertia + M * p.xi * p.xi
-    effective = about - R * (K1 * slope1 + K2 * slope2)
-    epsilon = (R * (K1 * N1 + K2 * N2) - p.xi * tangential) / effective
-    return epsilon, N1 + slope1 * epsilon, N2 + slope2 * epsilon, D, effective / about
+        N = p.mass * (p.gravity * math.cos(phi) + p.radius * omega * omega)
+        return (K1 * N / p.mass - p.gravity * math.sin(phi)) / p.radius, N, N, 1.0
+    # The reactions keep both gaps closed.
+    a11, a12, a21, a22, b1, b2 = response(p, phi, omega, K1, K2)
+    det = a11 * a22 - a12 * a21
+    N1, N2 = (a12 * b2 - a22 * b1) / det, (a21 * b1 - a11 * b2) / det
+    f11, f12, f21, f22, _, _ = response(p, phi, omega, 0.0, 0.0)
+    epsilon = accelerations(p, phi, omega, 0.0, N1, K1 * N1, N2, K2 * N2)[4]
+    return epsilon, N1, N2, det / (f11 * f22 - f12 * f21)
 
 
 @njit(cache=True, error_model="numpy")
@@ -204,18 +259,24 @@ def friction(p, k, piece, v, z):
 
 
 @njit(cache=True, error_model="numpy")
+def pull(p, t, x):
+    """Force of the spring and of the drive on a body on the belt."""
+    return p.force * math.sin(TURN * p.force_frequency * t + p.force_phase) - (p.stiffness + p.cubic * x * x) * x
+
+
+@njit(cache=True, error_model="numpy")
 def load_on_band(p, t, y):
     """Friction force with which a body on the belt keeps its sliding velocity."""
     theta, _, ring_epsilon = drive(p, t)
-    return -p.stiffness * (y[0] + theta) - p.mass * ring_epsilon
+    return pull(p, t, y[0] + theta) - p.mass * ring_epsilon
 
 
 @njit(cache=True, error_model="numpy")
 def state(p, k1, k2, piece, t, y):
     """Kinematics, reactions and rates of the bristles.
 
-    Returns angle, angular velocity and angular acceleration of the body, both reactions, determinant, effective
-    inertia, angular acceleration of the ring, and both rates of the bristles.
+    Returns angle, angular velocity and angular acceleration of the body, both reactions, determinant (see
+    :func:`closed`), angular acceleration of the ring, and both rates of the bristles.
     """
     theta, ring_omega, ring_epsilon = drive(p, t)
     phi, omega = y[0] + theta, y[1] / p.radius + ring_omega
@@ -226,17 +287,17 @@ def state(p, k1, k2, piece, t, y):
             K1 = -load_on_band(p, t, y) if abs(piece) == 1 else -math.copysign(p.mu_s[0], piece)
         else:
             K1 -= p.viscous * y[1]
-        epsilon = (K1 - p.stiffness * phi) / p.mass
-        return phi, omega, epsilon, 1.0, 1.0, 1.0, 1.0, ring_epsilon, rate1, 0.0
+        epsilon = (K1 + pull(p, t, phi)) / p.mass
+        return phi, omega, epsilon, 1.0, 1.0, 1.0, ring_epsilon, rate1, 0.0
     K2, rate2 = friction(p, k2, piece, y[1], y[3]) if p.model == RING else (0.0, 0.0)
-    epsilon, N1, N2, D, effective = closed(p, phi, omega, K1, K2)
-    return phi, omega, epsilon, N1, N2, D, effective, ring_epsilon, rate1, rate2
+    epsilon, N1, N2, det = closed(p, phi, omega, K1, K2)
+    return phi, omega, epsilon, N1, N2, det, ring_epsilon, rate1, rate2
 
 
 @njit(cache=True, error_model="numpy")
 def rates(p, k1, k2, piece, t, y, f):
     """Write the rates of the state to f."""
-    _, _, epsilon, _, _, _, _, ring_epsilon, f[2], f[3] = state(p, k1, k2, piece, t, y)
+    _, _, epsilon, _, _, _, ring_epsilon, f[2], f[3] = state(p, k1, k2, piece, t, y)
     f[0] = y[1] / p.radius
     f[1] = p.radius * (epsilon - ring_epsilon)
 
@@ -274,33 +335,35 @@ def substitute(A, order, b, n):
 
 
 @njit(cache=True, error_model="numpy")
-def one_open(p, phi, omega, ring_epsilon, held, K, stuck):
-    """Only contact `held` (-1: the first, 1: the second) is closed; it sticks, or slides with friction K.
-
-    The unknowns are the radial, tangential and angular acceleration of the free body, and reaction and friction of the
-    contact. Returns reaction, friction, sliding acceleration of this contact, and acceleration of the other gap.
-    """
-    sb, cb, M, g = math.sin(p.beta), math.cos(p.beta), p.mass, p.gravity
-    a, w2, s = p.half_distance, omega * omega, float(held)
-    A, b, order = np.zeros((5, 5)), np.zeros(5), np.zeros(5, np.int64)
-    # Linear momentum along the radius and the tangent of the centre of mass, angular momentum about it.
-    A[0, 0], A[0, 3], A[0, 4], b[0] = M, cb, s * sb, M * g * math.cos(phi)
-    A[1, 1], A[1, 3], A[1, 4], b[1] = M, s * sb, -cb, -M * g * math.sin(phi)
-    A[2, 2], A[2, 3], A[2, 4] = p.inertia, -p.xi * s * sb, p.xi * cb - p.radius
-    # The ball of the closed contact stays on the race.
-    reach = p.radius - p.ball_radius
-    A[3, 0], A[3, 1], A[3, 2], b[3] = cb, s * sb, -s * a * cb, a * w2 * sb - w2 * reach
-    slide = np.array([-s * sb, cb, a * sb + p.ball_radius])
-    drift = -s * a * w2 * cb - p.radius * ring_epsilon
-    if stuck:
-        A[4, :3], b[4] = slide, -drift
+def alone(p, phi, omega, ring_epsilon, held, N, T):
+    """Accelerations of gap and sliding of contact `held` (1 or 2), which alone acts, and of the other gap."""
+    if held == 1:
+        gap, other, slide, _, _ = accelerations(p, phi, omega, ring_epsilon, N, T, 0.0, 0.0)
     else:
-        A[4, 3], A[4, 4] = -K, 1.0
-    factor(A, order, 5)
-    substitute(A, order, b, 5)
-    radial, tangential = b[0] + s * a * b[2], b[1] + s * a * w2
-    gap = -(cb * radial - s * sb * tangential + w2 * reach)
-    return b[3], b[4], slide[0] * b[0] + slide[1] * b[1] + slide[2] * b[2] + drift, gap
+        other, gap, _, slide, _ = accelerations(p, phi, omega, ring_epsilon, 0.0, 0.0, N, T)
+    return gap, slide, other
+
+
+@njit(cache=True, error_model="numpy")
+def one_open(p, phi, omega, ring_epsilon, held, K, stuck):
+    """Only contact `held` (1 or 2) is closed; it sticks, or slides with friction K.
+
+    Returns reaction, friction, sliding acceleration of this contact, and acceleration of the other gap. The reaction is
+    NaN if more reaction would not open the closed contact.
+    """
+    gap0, slide0, _ = alone(p, phi, omega, ring_epsilon, held, 0.0, 0.0)
+    if stuck:
+        gap_n, slide_n, _ = alone(p, phi, omega, ring_epsilon, held, 1.0, 0.0)
+        gap_t, slide_t, _ = alone(p, phi, omega, ring_epsilon, held, 0.0, 1.0)
+        gap_n, gap_t, slide_n, slide_t = gap_n - gap0, gap_t - gap0, slide_n - slide0, slide_t - slide0
+        det = gap_n * slide_t - gap_t * slide_n
+        N, T = (gap_t * slide0 - slide_t * gap0) / det, (slide_n * gap0 - gap_n * slide0) / det
+    else:
+        stiffness = alone(p, phi, omega, ring_epsilon, held, 1.0, K)[0] - gap0
+        N = -gap0 / stiffness if stiffness > 0.0 else math.nan
+        T = K * N
+    _, slide, other = alone(p, phi, omega, ring_epsilon, held, N, T)
+    return N, T, slide, other
 
 
 @njit(cache=True, error_model="numpy")
@@ -314,8 +377,8 @@ def opening(p, phi, omega, ring_epsilon, K1, K2, least, at_rest, s1, s2):
     # With `least` > 0 a contact is lost early, at a gap that does not open yet.
     yet = -20.0 * max(least, 0.0) * p.gravity
     found, several = JAMMED, 0
-    for held in (1, -1):
-        K, limit = (K2, s2) if held == 1 else (K1, s1)
+    for held in (2, 1):
+        K, limit = (K2, s2) if held == 2 else (K1, s1)
         possible = False
         if at_rest:
             N, T, _, gap = one_open(p, phi, omega, ring_epsilon, held, 0.0, True)
@@ -327,11 +390,10 @@ def opening(p, phi, omega, ring_epsilon, K1, K2, least, at_rest, s1, s2):
             N, _, _, gap = one_open(p, phi, omega, ring_epsilon, held, K, False)
             possible = least * weight < N and gap > yet
         if possible:
-            found, several = (OPEN_1 if held == 1 else OPEN_2), several + 1
+            found, several = (OPEN_1 if held == 2 else OPEN_2), several + 1
     # Free flight of both contacts.
-    sb, cb, w2, g = math.sin(p.beta), math.cos(p.beta), omega * omega, p.gravity
-    pull = cb * g * math.cos(phi) - w2 * p.half_distance * sb + w2 * (p.radius - p.ball_radius)
-    if pull + sb * g * math.sin(phi) < 0.0 and pull - sb * g * math.sin(phi) < 0.0:
+    gap1, gap2, _, _, _ = accelerations(p, phi, omega, ring_epsilon, 0.0, 0.0, 0.0, 0.0)
+    if gap1 > 0.0 and gap2 > 0.0:
         found, several = OPEN_BOTH, several + 1
     return SEVERAL if several > 1 else found
 
@@ -339,7 +401,7 @@ def opening(p, phi, omega, ring_epsilon, K1, K2, least, at_rest, s1, s2):
 @njit(cache=True, error_model="numpy")
 def sliding_problem(p, k1, k2, piece, t, y, least):
     """Contact problem at a sliding velocity that is not zero: the direction of slip, or how slip ends."""
-    phi, omega, _, N1, N2, D, effective, ring_epsilon, _, _ = state(p, k1, k2, piece, t, y)
+    phi, omega, _, N1, N2, det, ring_epsilon, _, _ = state(p, k1, k2, piece, t, y)
     sense = FORWARD if piece > 0 else BACKWARD
     if p.model == BELT:
         return sense
@@ -347,24 +409,23 @@ def sliding_problem(p, k1, k2, piece, t, y, least):
     if p.model == SINGLE:
         return sense if floor < N1 else OPEN_1
     if floor < N1 and floor < N2:
-        return sense if D > 0.0 and effective > LEAST_INERTIA else JAMMED
+        return sense if det > LEAST_DETERMINANT else JAMMED
     K1, K2 = friction(p, k1, piece, y[1], y[2])[0], friction(p, k2, piece, y[1], y[3])[0]
     return opening(p, phi, omega, ring_epsilon, K1, K2, least, False, 0.0, 0.0)
 
 
 @njit(cache=True, error_model="numpy")
-def stick_reserve(p, k1, k2, t, rho, least):
-    """Distance of a body in stick from breakaway and from separation; positive if it can stick."""
+def stick_reactions(p, k1, k2, t, rho):
+    """Saturation of friction, and reactions, of a body that sticks to the ring; NaN if it cannot.
+
+    Of two solutions this is the one that is farther from breakaway and from separation.
+    """
     theta, ring_omega, ring_epsilon = drive(p, t)
     phi, M, g = rho + theta, p.mass, p.gravity
-    weight, m1, m2 = M * g, p.mu_s[k1 % p.edges.size], p.mu_s[k2 % p.edges.size]
-    if p.model == BELT:
-        load = -p.stiffness * phi - M * ring_epsilon
-        return 1.0 - abs(load) / m1
+    m1, m2 = p.mu_s[k1 % p.edges.size], p.mu_s[k2 % p.edges.size]
     if p.model == SINGLE:
         N = M * (g * math.cos(phi) + p.radius * ring_omega * ring_omega)
-        need = abs(M * (p.radius * ring_epsilon + g * math.sin(phi)))
-        return min((m1 * N - need) / weight, N / weight - least)
+        return -M * (p.radius * ring_epsilon + g * math.sin(phi)) / (m1 * N), N, N
     # Friction forces are T = -kappa mu_s N. The moment about the axis gives their sum q, the tangential balance gives
     # the difference d of the reactions, and the radial balance gives a quadratic equation for the sum of the reactions.
     sb, cb = math.sin(p.beta), math.cos(p.beta)
@@ -377,14 +438,37 @@ def stick_reserve(p, k1, k2, t, rho, least):
     a, b, c = cb * m, cb * n * d + sb * q * n - radial * m, sb * q * m * d - radial * n * d
     disc = b * b - 4.0 * a * c
     if not disc >= 0.0 or m <= 0.0:
-        return -1.0
+        return math.nan, math.nan, math.nan
     big = -0.5 * (b + math.copysign(math.sqrt(disc), b))
-    best = -math.inf
+    best, saturation, first, second = -math.inf, math.nan, math.nan, math.nan
     for root in (big / a, c / big if big != 0.0 else 0.0):
         N1, N2, capacity = 0.5 * (root + d), 0.5 * (root - d), m * root + n * d
         kappa = q / capacity if capacity != 0.0 else (0.0 if q == 0.0 else math.inf)
-        best = max(best, min(1.0 - abs(kappa), N1 / weight - least, N2 / weight - least))
-    return best
+        reserve = min(1.0 - abs(kappa), N1 / (M * g), N2 / (M * g))
+        if reserve > best:
+            best, saturation, first, second = reserve, kappa, N1, N2
+    return saturation, first, second
+
+
+@njit(cache=True, error_model="numpy")
+def stick_reserves(p, k1, k2, t, rho, least):
+    """Distances of a body in stick from breakaway and from the separation of each contact; positive if it can stick."""
+    if p.model == BELT:
+        theta, _, ring_epsilon = drive(p, t)
+        load = pull(p, t, rho + theta) - p.mass * ring_epsilon
+        return 1.0 - abs(load) / p.mu_s[k1 % p.edges.size], 1.0, 1.0
+    kappa, N1, N2 = stick_reactions(p, k1, k2, t, rho)
+    if not abs(kappa) < math.inf:
+        return -1.0, -1.0, -1.0
+    weight = p.mass * p.gravity
+    return 1.0 - abs(kappa), N1 / weight - least, N2 / weight - least
+
+
+@njit(cache=True, error_model="numpy")
+def stick_reserve(p, k1, k2, t, rho, least):
+    """Least distance of a body in stick from breakaway and from separation; positive if it can stick."""
+    slide, first, second = stick_reserves(p, k1, k2, t, rho, least)
+    return min(slide, first, second)
 
 
 @njit(cache=True, error_model="numpy")
@@ -406,9 +490,9 @@ def resting_problem(p, k1, k2, t, rho, least):
     found = JAMMED
     for sense in (1, -1):
         j1, j2 = (k1, k2) if sense == 1 or p.model == BELT else lower_segments(p, k1, k2, rho)
-        _, _, epsilon, N1, N2, D, effective, ring_epsilon, _, _ = state(p, j1, j2, sense, t, y)
+        _, _, epsilon, N1, N2, det, ring_epsilon, _, _ = state(p, j1, j2, sense, t, y)
         if min(N1, N2) > least * p.mass * p.gravity and sense * (epsilon - ring_epsilon) > 0.0:
-            if found != JAMMED or not (D > 0.0 and effective > LEAST_INERTIA):
+            if found != JAMMED or not det > LEAST_DETERMINANT:
                 return JAMMED
             found = sense
     if p.model != RING:
@@ -424,10 +508,10 @@ def resting_problem(p, k1, k2, t, rho, least):
 @njit(cache=True, error_model="numpy")
 def is_set_valued(p):
     """Whether the law is set-valued at rest."""
-    return p.law <= TUSTIN
+    return p.law <= JUMP
 
 
 @njit(cache=True, error_model="numpy")
 def falls_at_rest(p):
     """Whether friction falls at once at breakaway."""
-    return p.law == STICTION
+    return p.law == STICTION or p.law == BUMP or p.law == TENT or p.law == HUMP

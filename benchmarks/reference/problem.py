@@ -11,12 +11,22 @@ TURN = 2.0 * math.pi
 RING, SINGLE, BELT = range(3)
 MODELS = ("ring", "ring-single-contact", "belt")
 
-# The first three laws are set-valued at rest. From DAHL on, laws have bristles.
-COULOMB, STICTION, TUSTIN, KARNOPP, THRELFALL, LINEAR, CUBIC, BENGISU, DAHL, LUGRE, ELASTO, RESET = range(12)
+# The laws up to JUMP are set-valued at rest. From DAHL on, laws have bristles.
+(
+    COULOMB, STICTION, TUSTIN, BUMP, TENT, HUMP, JUMP, KARNOPP, THRELFALL, LINEAR, CUBIC, BENGISU, DAHL, LUGRE, ELASTO,
+    RESET,
+) = range(16)  # fmt: skip
 LAWS = (
-    "coulomb", "stiction", "tustin", "karnopp", "threlfall", "piecewise-linear", "piecewise-cubic", "bengisu-akay",
-    "dahl", "lugre", "elasto-plastic", "reset-integrator",
+    "coulomb", "stiction", "tustin", "bump", "tent", "hump", "jump", "karnopp", "threlfall", "piecewise-linear",
+    "piecewise-cubic", "bengisu-akay", "dahl", "lugre", "elasto-plastic", "reset-integrator",
 )  # fmt: skip
+#: Laws by formula. All of them hold with up to mu_s at rest.
+FORMULAS = {
+    "bump": "mu_k + h*exp(-((v - vb)/w)**2)",
+    "tent": "mu_k + h*max(0, 1 - abs(v - vb)/w)",
+    "hump": "max(mu_k, mu_s - ((v - vb)/w)**2)",
+    "jump": "piecewise(v < vb, mu_s, mu_k)",
+}
 
 NONE, CONSTANT, ARCTAN, POWER, SINUSOIDAL, TABLE = range(6)
 DRIVES = ("none", "constant", "arctan", "power", "sinusoidal", "table")
@@ -26,8 +36,8 @@ class Problem(NamedTuple):
     """A scene in SI units.
 
     The angles `edges` divide the ring into segments. Each segment reaches from its edge to the next edge and has the
-    friction coefficients `mu_s` and `mu_k`. On the belt there is one segment, both coefficients are forces in N, and
-    the radius is 1.
+    friction coefficients `mu_s` and `mu_k`. On the belt there is one segment, both coefficients and the height `h` of a
+    law are forces in N, and the radius is 1. `unit` is the friction per unit of friction coefficient: 1, or the weight.
     """
 
     model: int
@@ -41,7 +51,11 @@ class Problem(NamedTuple):
     ball_radius: float
     gravity: float
     stiffness: float
+    cubic: float
     viscous: float
+    force: float
+    force_frequency: float
+    force_phase: float
     edges: np.ndarray
     mu_s: np.ndarray
     mu_k: np.ndarray
@@ -50,6 +64,10 @@ class Problem(NamedTuple):
     v1: float
     v_s: float
     dead_band: float
+    vb: float
+    w: float
+    h: float
+    unit: float
     sigma0: float
     sigma1: float
     sigma2: float
@@ -108,7 +126,10 @@ def problem(scene, factor=1.0):
     """
     body, friction, drive = scene["body"], scene["friction"], dict(scene.get("drive", {"law": "none"}))
     model, gravity = MODELS.index(scene["model"]), float(scene.get("gravity", 9.81))
-    initial, mass, law = scene.get("initial", {}), float(body["mass"]), LAWS.index(friction["law"])
+    initial, mass, name = scene.get("initial", {}), float(body["mass"]), friction["law"]
+    if name == "formula":
+        name = next(key for key, text in FORMULAS.items() if text == friction["mu"])
+    law, unit = LAWS.index(name), 1.0
     inertia = xi = beta = half = ball = stiffness = 0.0
     radius = 1.0
     if model == RING:
@@ -123,8 +144,8 @@ def problem(scene, factor=1.0):
         if "belt" in scene:
             drive = {"law": "constant", "amplitude": scene["belt"]["velocity"]}
     if model == BELT:
-        weight = mass * gravity
-        edges, mu_s, mu_k = np.zeros(1), *(np.array([value * weight]) for value in coefficients(friction))
+        unit = mass * gravity
+        edges, mu_s, mu_k = np.zeros(1), *(np.array([value * unit]) for value in coefficients(friction))
     else:
         arcs = [
             (float(arc.get("center", 0.0)), float(arc["half_angle"]), *coefficients(arc))
@@ -140,13 +161,17 @@ def problem(scene, factor=1.0):
     if drive["law"] == "table":
         spline = CubicSpline(np.asarray(drive["time"], float), np.asarray(drive["theta"], float), bc_type="not-a-knot")
         knots, pieces = np.ascontiguousarray(spline.x), np.ascontiguousarray(spline.c)
-    number = {name: float(friction.get(name, 0.0)) for name in ("alpha", "v0", "v1", "v_s", "dead_band")}
+    number = {name: float(friction.get(name, 0.0)) for name in ("alpha", "v0", "v1", "v_s", "dead_band", "vb", "w")}
     bristles = {name: float(friction.get(name, 0.0)) for name in ("sigma0", "sigma1", "sigma2")}
+    force = scene.get("force", {})
     position, speed = initial.get("phi", initial.get("x", 0.0)), initial.get("omega", initial.get("velocity"))
     at_rest = speed is None and model == BELT
     return Problem(
         model=model, law=law, mass=mass, inertia=inertia, xi=xi, beta=beta, radius=radius, half_distance=half,
-        ball_radius=ball, gravity=gravity, stiffness=stiffness, viscous=float(friction.get("viscous", 0.0)),
+        ball_radius=ball, gravity=gravity, stiffness=stiffness, cubic=float(scene.get("spring", {}).get("cubic", 0.0)),
+        viscous=float(friction.get("viscous", 0.0)), force=float(force.get("amplitude", 0.0)),
+        force_frequency=float(force.get("frequency", 0.0)), force_phase=float(force.get("phase", 0.0)),
+        h=float(friction.get("h", 0.0)) * unit * factor, unit=unit * factor,
         edges=edges, mu_s=mu_s * factor, mu_k=mu_k * factor, **number, **bristles,
         elastic=float(friction.get("elastic_fraction", 0.7)), drive=DRIVES.index(drive["law"]),
         amplitude=float(drive.get("amplitude", 1.0)), exponent=float(drive.get("exponent", 0.0)),

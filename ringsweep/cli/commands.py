@@ -46,7 +46,7 @@ def run_command(arguments: argparse.Namespace) -> None:
         raise InputError("--backend", "dask needs the address of its scheduler: --scheduler ADDRESS")
     if arguments.backend == "threads" and arguments.scheduler is not None:
         raise InputError("--scheduler", "is for --backend dask")
-    config = refined(load(arguments.config), arguments.refine or None)
+    config = refined(load(arguments.config, arguments.set), arguments.refine or None)
     target, picture = _outputs(f"{config.name}.nc" if arguments.output is None else arguments.output, "regime", "sweep")
 
     if arguments.dry_run:
@@ -59,13 +59,14 @@ def run_command(arguments: argparse.Namespace) -> None:
 
     from ringsweep import plots
     from ringsweep.cli.report import summarise
+    from ringsweep.runs.executors import Execution
     from ringsweep.runs.sweep import write
     from ringsweep.storage import netcdf
 
     if arguments.scheduler is not None and not arguments.verbose:
         _silence_dask()
-    options = {name: getattr(arguments, name) for name in ("jobs", "fresh", "reuse", "scheduler")}
-    if computed := write(config, target, **options, progress=not arguments.quiet):
+    execution = Execution(arguments.jobs, arguments.scheduler, not arguments.quiet)
+    if computed := write(config, target, execution, fresh=arguments.fresh, reuse=arguments.reuse):
         print(f"wrote {target}")
     else:
         print(f"{target} holds this sweep already (--fresh computes it again)")
@@ -131,11 +132,16 @@ def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None
     curves = None
     try:
         if arguments.boundaries is not None:
-            from ringsweep.plots.selection import select
-            from ringsweep.runs.boundaries import boundary
+            from ringsweep.plots.selection import select_grid
+            from ringsweep.runs.boundaries import boundary, run_at
 
             tolerance = 1e-6 if arguments.tolerance is None else arguments.tolerance
-            curves = boundary(select(result, selection)[0], arguments.boundaries, tolerance)
+            # The picture shows the cells between which the curves lie.
+            result, missing = select_grid(result, selection)
+            selection = {}
+            if missing:
+                result = run_at(result, missing, arguments.boundaries)
+            curves = boundary(result, arguments.boundaries, tolerance)
             written = dataset.with_name(f"{target.stem}-{arguments.boundaries}.nc")
             netcdf.save(curves, written)
             print(f"wrote {written}")
@@ -177,13 +183,21 @@ def _plot(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
     shown = [name for name in (arguments.kind, arguments.law) if name is not None]
     target = Path(arguments.output or dataset.with_name("-".join([dataset.stem, *shown]) + ".png"))
     files.check_writable(target)
-    if "contender" in result.dims and shown:
-        raise InputError(str(dataset), "holds errors against run time: --kind and --law are for time histories")
+    cut = slice(arguments.begin, arguments.end)
+    if "contender" in result.dims and (shown or cut != slice(None)):
+        raise InputError(str(dataset), "holds errors against run time: --kind, --law, --from, --to are for histories")
     if arguments.law is not None:
         if "friction_law" not in result.dims:
             raise InputError("--law", f"{dataset} holds a run under one friction law only")
         laws = map(str, result["friction_law"].values)
         result = result.sel(friction_law=resolve("--law", arguments.law, laws))
+    if cut != slice(None):
+        times = result["time"].values
+        result = result.sel(time=cut)
+        if result.sizes["time"] < 2:
+            raise InputError(
+                "--from", f"{dataset} has times from {times[0]:g} to {times[-1]:g} s: none in this interval"
+            )
     try:
         if "contender" in result.dims:
             figure = plots.work_precision(result)
@@ -213,10 +227,30 @@ def simulate_command(arguments: argparse.Namespace) -> None:
     from ringsweep.storage import netcdf
 
     result = history(config)
+    if replaced := _other_scene(target, result):
+        logger.info("%s held a run of another scene, which is replaced: %s", target, replaced)
     netcdf.save(result, target)
     print(result.attrs["outcome"])
     print(f"wrote {target}")
     _draw(lambda: plots.history(result), picture, f"ringsweep plot {target}")
+
+
+def _other_scene(target: Path, result: Any) -> str:
+    """What the scene of a run that is there already has other than that of a result; empty if nothing."""
+    from ringsweep.storage import netcdf
+
+    if not target.exists():
+        return ""
+    with netcdf.open_dataset(target) as earlier:
+        old, new = (_leaves(json.loads(ds.attrs["configuration"])["scene"]) for ds in (earlier, result))
+    return "; ".join(f"{path} was {old.get(path)}" for path in {**old, **new} if old.get(path) != new.get(path))
+
+
+def _leaves(node: Any, path: str = "") -> dict[str, Any]:
+    """Values of a nested mapping by their dotted paths."""
+    if not isinstance(node, dict):
+        return {path: node}
+    return {p: v for key, child in node.items() for p, v in _leaves(child, f"{path}.{key}".lstrip(".")).items()}
 
 
 def animate_command(arguments: argparse.Namespace) -> None:

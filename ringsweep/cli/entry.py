@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import io
 import logging
 import os
+import re
 import signal
 import sys
 import threading
 import traceback
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext, redirect_stdout, suppress
+from contextlib import contextmanager, redirect_stdout, suppress
 from typing import Any
 
 from ringsweep.cli.parser import build_parser
-from ringsweep.errors import InputError, shortened
+from ringsweep.errors import InputError, escaped, nearest_name, shortened
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -36,8 +38,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     arguments, unknown = parser.parse_known_args(given)
     if unknown:
+        near = nearest_name(unknown[0], re.findall(r"--[a-z-]+", arguments.parser.format_usage()))
         takes_values = any(option in given for option in ("--set", "--sel"))
         hint = "; a value with a space needs quotes: --set 'drive.amplitude=2 rad/s'" if takes_values else ""
+        hint = f"; did you mean {near}?" if unknown[0].startswith("-") and near else hint
         parser.error(f"unrecognized arguments: {' '.join(unknown)}{hint}")
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
     logging.getLogger().handlers[0].setFormatter(_Formatter(_is_coloured(sys.stderr)))
@@ -45,7 +49,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         logging.DEBUG if arguments.verbose else logging.WARNING if arguments.quiet else logging.INFO
     )
     try:
-        with _terminable(), redirect_stdout(None) if arguments.quiet else nullcontext():
+        with _terminable(), redirect_stdout(None if arguments.quiet else _Escaped(sys.stdout)):
             status = arguments.command(arguments)
     except InputError as error:
         return _fail(str(error), 2)
@@ -85,12 +89,28 @@ def _terminable() -> Iterator[None]:
 def _fail(message: str, status: int, error: BaseException | None = None) -> int:
     notes = getattr(error, "__notes__", [])
     prefix = "\033[1;31mringsweep:\033[0m" if _is_coloured(sys.stderr) else "ringsweep:"
-    print(prefix, " ".join("; ".join([message, *notes]).split()), file=sys.stderr)
+    print(prefix, escaped(" ".join("; ".join([message, *notes]).split())), file=sys.stderr)
     return status
 
 
 def _is_coloured(stream: Any) -> bool:
     return stream.isatty() and "NO_COLOR" not in os.environ and os.environ.get("TERM") != "dumb"
+
+
+class _Escaped(io.TextIOBase):
+    """Text stream that hands on what it is given, with control characters escaped."""
+
+    def __init__(self, stream: Any):
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        """Write a text."""
+        self._stream.write(escaped(text))
+        return len(text)
+
+    def flush(self) -> None:
+        """Flush the stream."""
+        self._stream.flush()
 
 
 class _Formatter(logging.Formatter):
@@ -101,7 +121,7 @@ class _Formatter(logging.Formatter):
         self.coloured = coloured
 
     def format(self, record: logging.LogRecord) -> str:
-        text = super().format(record)
+        text = escaped(super().format(record))
         if self.coloured and record.levelno >= logging.WARNING:
             return text.replace("ringsweep:", "\033[33mringsweep:\033[0m", 1)
         return text

@@ -54,6 +54,7 @@ def build_parser() -> argparse.ArgumentParser:
         ringsweep run my.yaml              my.nc and my.png; after a stop the same command goes on
         ringsweep run my.yaml --dry-run    cells, memory, disk, time; writes nothing
         ringsweep run my.yaml --jobs 1 -o results/one.nc
+        ringsweep run my.yaml --set time.span=20 -o longer.nc
         ringsweep run finer.yaml --reuse my.nc
         ringsweep run my.yaml --refine     compute only the boundaries of the map
         ringsweep run my.nc -o again.nc    repeat the sweep of my.nc
@@ -61,6 +62,7 @@ def build_parser() -> argparse.ArgumentParser:
         """)  # fmt: skip
     run.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose sweep is repeated")
     run.add_argument("-o", "--output", metavar="OUT.nc", help="default: the configuration's name, in this folder")
+    _add_settings(run)
     run.add_argument("--jobs", type=whole_number, metavar="N", help="threads (default: all cores)")
     run.add_argument(
         "--dry-run", action="store_true", help="tell how much memory, disk and time it will take; write nothing"
@@ -91,7 +93,7 @@ def build_parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="DIM=VALUE",
-        help="fix a coordinate at its value nearest to VALUE; units allowed",
+        help="fix a coordinate at its value nearest to VALUE, with --boundaries at VALUE; units allowed",
     )
 
     draw.add_argument("--boundaries", metavar="REGIME", help="locate the boundary of a regime: curves, also as NetCDF")
@@ -111,6 +113,7 @@ def build_parser() -> argparse.ArgumentParser:
 
     plot = _add_command(commands, "plot", plot_command, "draw a stored run, or stored errors against run time", """
         ringsweep plot my-run.nc           my-run.png: the time history
+        ringsweep plot my-run.nc --from 3 --to 4 -o end.png
         ringsweep plot my-run.nc --kind phase -o portrait.pdf
         ringsweep plot my-run.nc --kind friction --law lugre
         """)  # fmt: skip
@@ -122,6 +125,8 @@ def build_parser() -> argparse.ArgumentParser:
         help="phase portrait, or friction force over sliding velocity (belt), in place of the time history",
     )
     plot.add_argument("--law", metavar="LAW", help="the run under this friction law, if RUN.nc has several")
+    plot.add_argument("--from", type=float, dest="begin", metavar="T", help="draw the history from this time on, s")
+    plot.add_argument("--to", type=float, dest="end", metavar="T", help="draw the history up to this time, s")
 
     animate = _add_command(commands, "animate", animate_command, "run once: film of the body", """
         ringsweep animate my.yaml          my-run.gif
@@ -191,7 +196,7 @@ def _add_command(commands: Any, name: str, function: Any, summary: str, examples
         formatter_class=_formatter,
     )
     _add_verbosity(parser)
-    parser.set_defaults(command=function)
+    parser.set_defaults(command=function, parser=parser)
     return parser
 
 

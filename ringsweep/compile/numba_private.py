@@ -340,7 +340,26 @@ if AVAILABLE:
         """A file of the cache that is not what was written."""
 
     class _SealedFiles(IndexDataCacheFile):
-        """Files of the cache, each with a digest in front, which also covers the sources and the version of Numba."""
+        """Files of the cache, each with a digest in front, which also covers the sources and the version of Numba.
+
+        A file of compiled code also holds the name of its kernel, the signature and the processor: a file that was
+        copied over another is whole, but it is not what is looked for.
+        """
+
+        def save(self, key: Any, data: Any) -> None:
+            super().save(key, (self._identity(key), self._dump(data)))
+
+        def load(self, key: Any) -> Any:
+            found = super().load(key)
+            if found is None:
+                return None
+            identity, body = found
+            if identity != self._identity(key):
+                raise _DamagedFile(Path(self._index_path).parent)
+            return pickle.loads(body)
+
+        def _identity(self, key: Any) -> str:
+            return repr((self._index_name, key))
 
         def _seal(self, body: bytes) -> bytes:
             return hashlib.sha256(repr((self._version, self._source_stamp)).encode() + body).digest()

@@ -64,13 +64,15 @@ class Config:
     refine: Refinement | None = None
 
 
-def load(config: str | os.PathLike[str] | Mapping[str, Any]) -> Config:
+def load(config: str | os.PathLike[str] | Mapping[str, Any], settings: Iterable[str] = ()) -> Config:
     """Read and validate a configuration.
 
     Parameters
     ----------
     config : path-like or mapping
         A YAML file, the mapping that it would hold, or a result file, which holds its configuration.
+    settings : iterable of str
+        Values to change, as for :func:`with_values`; none that is swept.
 
     Raises
     ------
@@ -79,6 +81,10 @@ def load(config: str | os.PathLike[str] | Mapping[str, Any]) -> Config:
     """
     doc = yaml_text.read(config)
     with doc.locating_errors():
+        swept = swept_paths(sweep_section(doc)) if settings else {}
+        for path in [_apply_setting(doc, setting) for setting in settings]:
+            if path.removeprefix("scene.") in swept:
+                raise InputError(path, "is swept here: --set changes values that all cells share")
         found = _validate(doc)
     if doc.result_axes is None:
         return found
@@ -198,9 +204,10 @@ def _apply_setting(doc: Document, setting: str) -> str:
     full = path if path.split(".")[0] in ("scene", "solver") else f"scene.{path}"
     *parents, last = full.split(".")
     node: Any = doc.tree
-    for key in parents:
+    for depth, key in enumerate(parents, start=1):
         if isinstance(node, dict) and key not in node:
             node[key] = {}
+            doc.locations[".".join(parents[:depth])] = f"--set {setting}", None
         node = _child(node, key, full)
     if isinstance(node, list):
         _child(node, last, full)

@@ -75,10 +75,12 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     try:
         leaves = dict(_leaves(scene, "", paths))
     except _UnknownKey as error:
-        near = _Paths(_all_paths(model, zones[:1] or ("zones.0",), names, own)).children if names else {}
-        keys = near.get(error.section, paths.children[error.section])
         path = f"scene.{error.section}.{error.key}" if error.section else f"scene.{error.key}"
-        raise InputError(path, "unknown key" + suggestion(error.key, keys)) from None
+        hint = _belongs_elsewhere(error.section, str(error.key), paths, model)
+        if hint is None:
+            near = _Paths(_all_paths(model, zones[:1] or ("zones.0",), names, own)).children if names else {}
+            hint = suggestion(error.key, near.get(error.section, paths.children[error.section]))
+        raise InputError(path, f"unknown key{hint}") from None
     if not names:
         section_of(scene, "friction", "scene.")
         raise InputError(f"scene.{LAW}", "missing: name a friction law: " + ", ".join(known_laws.names))
@@ -127,6 +129,22 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
             warn_of_unused(path, where, name)
     _warn_of_lengths(frozenset((path, value) for path, value in values.items() if known[path].unit == "m"))
     return Scene(structures, values, scene)
+
+
+def _belongs_elsewhere(section: str, key: str, paths: _Paths, model: str) -> str | None:
+    """End of the message about an unknown key that a comma has made, or that is known at another place."""
+    if key[:1].isdigit():
+        return ": a comma ends a value in YAML, write a decimal point"
+    if section.startswith("zone") and key in ("from", "to", "start", "end", "width"):
+        return ": a zone has a center, which is (from + to)/2, and a half_angle, which is (to - from)/2"
+    if places := paths.ending_with(key):
+        return f"; did you mean {places}?"
+    for other in MODELS:
+        known = _Paths(_all_paths(other, ("zones.0",), dict.fromkeys(MODELS[other].laws), {}))
+        if other != model and (key in known.children.get(section, ()) or known.ending_with(key)):
+            places = known.ending_with(key) or f"`{section}.{key}`".replace("`.", "`")
+            return f": model {other} has {places}, this is model {model}"
+    return None
 
 
 @cache
@@ -194,6 +212,11 @@ class _Paths:
                 parent, _, key = path.rpartition(".")
                 self.children.setdefault(parent, {})[key] = None
                 path = parent
+
+    def ending_with(self, key: str) -> str:
+        """Paths whose last key is `key`, as text; those of a list of zones are left out."""
+        found = [path for path in self.known if path.rpartition(".")[2] == key and not path.startswith("zones.")]
+        return " or ".join(f"`{path}`" for path in sorted(found))
 
 
 class _UnknownKey(Exception):

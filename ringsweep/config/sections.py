@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.errors import InputError
+from ringsweep.errors import InputError, nearest_name
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.units import length_of, quantity, show, spelled
 
@@ -20,9 +19,9 @@ MAX_LENGTH = 1_000_000
 def suggestion(word: object, known: Iterable[str]) -> str:
     """End of a message about an unknown name: the nearest known name, and all known names."""
     names = list(dict.fromkeys(known))
-    near = difflib.get_close_matches(str(word)[:100], names, n=1)
+    near = nearest_name(word, names)
     rest = "" if len(names) <= 40 else f", ... ({len(names)} in all)"
-    return (f"; did you mean `{near[0]}`?" if near else "") + f" (known: {', '.join(names[:40])}{rest})"
+    return (f"; did you mean `{near}`?" if near else "") + f" (known: {', '.join(names[:40])}{rest})"
 
 
 def missing_text(path: str, parameter: Parameter) -> str:

@@ -21,7 +21,7 @@ import numpy as np
 import yaml
 
 from ringsweep.errors import InputError
-from ringsweep.quantities.digest import Digests
+from ringsweep.quantities.digest import ALTERED, Digests
 from ringsweep.quantities.units import LONG_INTEGER, NUMBER, length_of, show, spelled
 from ringsweep.quantities.variables import OUTCOMES
 
@@ -196,8 +196,7 @@ def _read_result(file: Path) -> Document:
             if recorded is not None:
                 axes_of_sweep = [name for name in recorded.variables if is_sweep and name not in OUTCOMES]
                 if changed := recorded.altered(content, ["configuration"], axes_of_sweep):
-                    problem = f"is damaged, or another program changed it: {', '.join(changed)}"
-                    raise InputError("", problem, file=str(file))
+                    raise InputError("", f"{ALTERED}: {', '.join(changed)}", file=str(file))
             tree = json.loads(content.getncattr("configuration"))
             axes = None
             if is_sweep:

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
-from ringsweep.numerics.expressions import Node, derivative, nodes_of
+from ringsweep.numerics.expressions import ONE, Node, add, derivative, multiply, nodes_of
 
 _CALLS = ("exp", "log", "sqrt", "power", "tanh", "atan")
 
@@ -313,12 +313,32 @@ def _keep(writer: _Writer, step: _Step, node: Node, side: str) -> None:
         part = writer.known[node.parts[0]]
         writer.write(f"{step.needed[node, 'one_plus_square']} = 1.0 / (1.0 + {part} * {part})")
     if node.varies and node.kind in ("exp", "tanh"):
-        inner = node.parts[0]
-        rates = [derivative(inner), derivative(derivative(inner))]
         scale = 2.0 if node.kind == "tanh" else 1.0
-        _floats(writer, rates, side)
-        first, second = (writer.known[rate] for rate in rates)
-        writer.write(f"sharpness = max(sharpness, {scale} * (abs({first}) + 2.0 * sqrt_of(0.5 * abs({second}))))")
+        _sharpen(writer, node.parts[0], "1.0", scale, side)
+    elif node.varies and (singular := _singular(node)) is not None and singular.varies:
+        # The series converges up to the zero of this expression that is nearest in the complex plane. Where a narrow
+        # peak is still far its terms are too small to tell, so that a step would lead across it.
+        _straight(writer, [singular])
+        _sharpen(writer, singular, writer.new(f"abs({writer.known[singular]})"), 4.0, side)
+
+
+def _singular(node: Node) -> Node | None:
+    """Expression at whose zeros a node has no power series."""
+    if node.kind == "divide":
+        return node.parts[1]
+    if node.kind == "atan":
+        return add(ONE, multiply(node.parts[0], node.parts[0]))
+    return node.parts[0] if node.kind in ("log", "sqrt", "power") else None
+
+
+def _sharpen(writer: _Writer, inner: Node, unit: str, scale: float, side: str) -> None:
+    """Take the rate at which an expression changes, in a unit, into the sharpness."""
+    rates = [derivative(inner), derivative(derivative(inner))]
+    _floats(writer, rates, side)
+    first, second = (writer.known[rate] for rate in rates)
+    share = "" if unit == "1.0" else f" / {unit}"
+    change = f"abs({first}){share} + 2.0 * sqrt_of(0.5 * abs({second}){share})"
+    writer.write(f"sharpness = max(sharpness, {scale} * ({change}))")
 
 
 def _series(step: _Step, outputs: list[Node], side: str) -> None:

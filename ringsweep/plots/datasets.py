@@ -5,7 +5,6 @@ A dataset made by hand has no attributes. So names of dimensions and variables d
 
 from __future__ import annotations
 
-import difflib
 import json
 from collections.abc import Iterable
 from itertools import chain
@@ -14,7 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ringsweep.errors import InputError
+from ringsweep.errors import InputError, nearest_name
 from ringsweep.quantities.variables import HISTORY
 
 #: Panels of a history by the variable that says where the body is: ``phi`` in a ring, ``x`` on a belt.
@@ -168,6 +167,6 @@ def resolve(argument: str, name: str, available: Iterable[Any]) -> str:
     wanted, names = name.replace(".", "_"), [str(one) for one in available]
     if wanted in names:
         return wanted
-    close = difflib.get_close_matches(wanted, names, n=1)
-    hint = f"; did you mean {close[0]}?" if close else ""
+    near = nearest_name(wanted, names)
+    hint = f"; did you mean {near}?" if near else ""
     raise InputError(argument, f"{name!r} is not in the dataset, which has {', '.join(names) or 'none'}{hint}")

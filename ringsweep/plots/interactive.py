@@ -56,7 +56,7 @@ def explore(
         Variable to draw.
     sel : mapping of str to float or str, optional
         Coordinates held at the value nearest to the one given, which must lie within the axis: a plain number is SI,
-        text may have a unit.
+        text may have a unit. A warning and the title tell the value taken if it is another.
     at : mapping of str to float or str, optional
         Coordinates of the cell whose history is drawn first, given as in `sel`; on other axes the middle cell.
 

@@ -90,12 +90,14 @@ def unit_text(data: xr.DataArray) -> str:
 
 def value_text(value: xr.DataArray) -> str:
     """One value of a coordinate with its name and unit."""
-    name = long_name(value)
-    if not is_numeric(value):
-        return f"{name} = {value.item()}"
+    return f"{long_name(value)} = {amount_text(value) if is_numeric(value) else value.item()}"
+
+
+def amount_text(value: xr.DataArray, digits: int = 4) -> str:
+    """One number with its unit."""
     unit = unit_text(value)
-    number = number_text(value.item() * display_factor(value), ".4g")
-    return f"{name} = {number}{unit if unit == '°' else f' {unit}'.rstrip()}"
+    number = number_text(value.item() * display_factor(value), f".{digits}g")
+    return f"{number}{unit if unit == '°' else f' {unit}'.rstrip()}"
 
 
 def plain_text(text: str) -> str:

@@ -23,7 +23,15 @@ from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.plots.datasets import is_numeric, require_sweep, resolve, swept
-from ringsweep.plots.labels import axis_label, display_factor, displayed, long_name, number_text, value_text
+from ringsweep.plots.labels import (
+    axis_label,
+    display_factor,
+    displayed,
+    long_name,
+    number_text,
+    plain_text,
+    value_text,
+)
 from ringsweep.plots.map_axes import Axis, as_matrix, choose_axes, is_scattered, thinned
 from ringsweep.plots.map_colours import CellWarning, ColourScale, cell_warnings, legend_entries
 from ringsweep.plots.selection import select
@@ -91,7 +99,7 @@ def regime_map(
         Variable to draw.
     sel : mapping of str to float or str, optional
         Coordinates held at the value nearest to the one given, which must lie within the axis: a plain number is SI,
-        text may have a unit.
+        text may have a unit. A warning and the title tell the value taken if it is another.
     boundaries : xarray.Dataset, optional
         Curves of :func:`ringsweep.boundary`, which are drawn over a map of one panel.
     title : bool or str
@@ -190,7 +198,7 @@ def map_panel(
         Variable to draw.
     sel : mapping of str to float or str, optional
         Coordinates held at the value nearest to the one given, which must lie within the axis: a plain number is SI,
-        text may have a unit.
+        text may have a unit. A warning and the title tell the value taken if it is another.
     ax : matplotlib.axes.Axes, optional
         Axes to draw in, by default pyplot's current ones. The legend stands outside them: a figure with
         ``layout="constrained"`` makes room for it.
@@ -353,6 +361,9 @@ class Map:
         """Entry of the legend for the curves of boundaries."""
         if self.scattered or len(self.panels) > 1:
             raise InputError("boundaries", "are drawn over one map of a grid: hold the other axes")
+        for held in swept(self.ds):
+            if not held.dims and held.name in boundaries.coords and (boundaries[held.name].values != held.values).any():
+                raise InputError("boundaries", f"are those of another map: this one has {plain_text(value_text(held))}")
         regime, tolerance = boundaries.attrs["boundary_of"], boundaries.attrs["boundary_tolerance"]
         return Line2D([], [], label=f"boundary of {regime}\n± {number_text(tolerance)} (SI units)", **_CURVE)
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import logging
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,11 @@ import xarray as xr
 
 from ringsweep.errors import InputError
 from ringsweep.plots.datasets import configuration, is_numeric, resolve, swept
-from ringsweep.plots.labels import long_name, value_text
+from ringsweep.plots.labels import amount_text, long_name, plain_text, value_text
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity
+
+logger = logging.getLogger("ringsweep")
 
 
 def cell(ds: xr.Dataset, sel: Mapping[str, float | str] | None = None) -> dict[str, Any]:
@@ -24,7 +27,7 @@ def cell(ds: xr.Dataset, sel: Mapping[str, float | str] | None = None) -> dict[s
         Result of a sweep, or a part of it. Coordinates that ``ds.isel(...)`` has fixed stay fixed.
     sel : mapping of str to float or str, optional
         Coordinates held at the value nearest to the one given, which must lie within the axis: a plain number is SI,
-        text may have a unit.
+        text may have a unit. A warning tells the value taken if it is another.
 
     Returns
     -------
@@ -58,7 +61,7 @@ def cell(ds: xr.Dataset, sel: Mapping[str, float | str] | None = None) -> dict[s
 
 
 def select(ds: xr.Dataset, sel: Mapping[str, float | str]) -> tuple[xr.Dataset, list[str]]:
-    """Hold coordinates at the nearest value.
+    """Hold coordinates at the nearest value, and warn where that is not the value given.
 
     Returns
     -------
@@ -67,19 +70,90 @@ def select(ds: xr.Dataset, sel: Mapping[str, float | str]) -> tuple[xr.Dataset, 
     list of str
         Names and values of the coordinates held, for a title.
     """
-    held = []
+    texts = []
+    for wanted, coordinate, index, asked in _places(ds, sel):
+        ds = ds.isel({coordinate.dims[0]: index})
+        text = value_text(coordinate[index])
+        if asked is not None:
+            taken, given = _told_apart(coordinate[index], asked)
+            logger.warning(
+                "%s: %s is not in the dataset: the nearest value is taken, %s",
+                *(wanted, plain_text(given), plain_text(taken)),
+            )
+            text = f"{long_name(coordinate)} = {taken} (nearest to {given})"
+        texts.append(text)
+    return ds, texts
+
+
+def select_grid(ds: xr.Dataset, sel: Mapping[str, float | str]) -> tuple[xr.Dataset, dict[str, float]]:
+    """Hold axes of a grid, and find the values given that it lacks.
+
+    Returns
+    -------
+    xarray.Dataset
+        Without the dimensions that are held, at the nearest values.
+    dict of str to float
+        The values given of those coordinates whose nearest value is another.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, a value lies outside its axis, or a value that is missing is not that of an axis of one
+        number: a run could not have it alone.
+    """
+    missing = {}
+    for wanted, coordinate, index, asked in _places(ds, sel):
+        dim = str(coordinate.dims[0])
+        if asked is not None:
+            taken, given = map(plain_text, _told_apart(coordinate[index], asked))
+            if [one.name for one in swept(ds) if dim in one.dims] != [dim]:
+                problem = f"{given} is not in the dataset, and {dim} is no axis of one number: give {taken}"
+                raise InputError(f"sel.{wanted}", problem)
+            logger.info("%s: %s is not in the dataset: the cells there are run", wanted, given)
+            missing[dim] = asked
+        ds = ds.isel({dim: index})
+    return ds, missing
+
+
+def _places(ds: xr.Dataset, sel: Mapping[str, float | str]) -> Iterator[tuple[str, xr.DataArray, int, float | None]]:
+    """Where coordinates are held.
+
+    Yields
+    ------
+    str
+        Name as given.
+    xarray.DataArray
+        The coordinate.
+    int
+        Index of its nearest value.
+    float or None
+        The value given, in SI units, if it differs from the nearest by more than rounding.
+    """
     for wanted, value in sel.items():
         name = resolve("sel", wanted, [n for n in {**ds.sizes, **ds.coords} if n in ds.dims or ds[n].ndim == 1])
         coordinate = ds[name]
+        asked = None
         if is_numeric(coordinate):
             number = quantity(value, _range_of(coordinate), f"sel.{wanted}")
             index = int(np.nanargmin(np.abs(coordinate.values - number)))
+            # A value between others is rounded as they are: 0 of linspace(-1, 1, 21) may be 1e-16.
+            rounding = 4.0 * np.finfo(float).eps * np.nanmax(np.abs(coordinate.values))
+            if not np.isclose(coordinate.values[index], number, rtol=1e-12, atol=rounding):
+                asked = number
         else:
             names = [str(one) for one in coordinate.values]
             index = names.index(resolve("sel", str(value), names))
+        yield wanted, coordinate, index, asked
         ds = ds.isel({coordinate.dims[0]: index})
-        held.append(value_text(coordinate[index]))
-    return ds, held
+
+
+def _told_apart(taken: xr.DataArray, asked: float) -> tuple[str, str]:
+    """Texts of the value taken and of the value asked for, with as many digits as they need to differ."""
+    for digits in range(4, 18):
+        texts = amount_text(taken, digits), amount_text(taken.astype(float).copy(data=asked), digits)
+        if texts[0] != texts[1]:
+            break
+    return texts
 
 
 def _range_of(coordinate: xr.DataArray) -> Parameter:

@@ -19,6 +19,9 @@ from numpy.typing import ArrayLike
 #: Attribute that holds the digests.
 ATTRIBUTE = "digest"
 
+#: Message about a file that differs from its digests; the usual reason comes first.
+ALTERED = "is a part of a result, or another program changed it, or it is damaged"
+
 #: Attributes of a file that have no digest: every program that changes a file adds a line to its history.
 FREE = ("history",)
 

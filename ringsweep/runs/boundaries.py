@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -17,6 +18,7 @@ from ringsweep.errors import InputError
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity, show
 from ringsweep.quantities.variables import INFERRED
+from ringsweep.runs.executors import Execution
 from ringsweep.runs.sweep import compute
 
 logger = logging.getLogger("ringsweep")
@@ -131,6 +133,44 @@ def boundary(ds: xr.Dataset, regime: str, tolerance: float = 1e-6, *, jobs: int 
     )
 
 
+def run_at(ds: xr.Dataset, held: Mapping[str, float], regime: str, *, jobs: int | None = None) -> xr.Dataset:
+    """Run the cells of a map at other values of coordinates that are held, to locate a boundary there.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        As for :func:`boundary`.
+    held : mapping of str to float
+        By coordinate its other value, in SI units.
+    regime : str
+        As for :func:`boundary`.
+    jobs : int, optional
+        Number of threads; all cores by default.
+
+    Returns
+    -------
+    xarray.Dataset
+        The same cells but for those values; refined if the sweep was.
+
+    Raises
+    ------
+    InputError
+        As for :func:`boundary`.
+    """
+    _, dims = _checked(ds, regime)
+    _check_cells(ds, _config(ds), jobs)
+    columns = {str(name): c for name, c in ds.coords.items() if "path" in c.attrs}
+    fixed = {name: held.get(name, c.item()) for name, c in columns.items() if name not in dims}
+    values = {dim: columns[dim].values.tolist() for dim in dims} | {name: [value] for name, value in fixed.items()}
+    source = json.loads(ds.attrs["configuration"])
+    sweep: dict[str, Any] = {"grid": {columns[name].attrs["path"]: along for name, along in values.items()}}
+    if refine := source["sweep"].get("refine"):
+        # Along the axes that are left, whichever were named.
+        sweep["refine"] = refine if refine is True else {key: refine[key] for key in refine if key != "axes"}
+    found = compute(load(source | {"sweep": sweep}), Execution(jobs, progress=False))
+    return found.isel(dict.fromkeys(fixed, 0))
+
+
 def _checked(ds: xr.Dataset, regime: str) -> tuple[int, list[str]]:
     """Flag of the regime and the dimensions of the map."""
     if "regime" not in ds or "time" in ds.dims:
@@ -163,6 +203,9 @@ def _check_cells(ds: xr.Dataset, config: Config, jobs: int | None) -> None:
                 "ds", f"has {path} = {foreign[0]}, which its sweep has not: give the values and units of the sweep"
             )
     run = np.argwhere(_was_run(ds))
+    if not len(run):
+        # A line of a refined map may have inferred cells only.
+        return
     cells = run[np.linspace(0, len(run) - 1, min(len(run), _CHECKED_CELLS)).astype(int)]
     dims = [str(dim) for dim in ds["regime"].dims]
     values = {path: _values(c, dims, cells) for path, c in known.items() if path in config.axes.columns}
@@ -200,7 +243,7 @@ def _run(config: Config, values: dict[str, NDArray[Any]], jobs: int | None) -> x
     """Run points; the progress of each of many rounds is not shown."""
     count = len(next(iter(values.values())))
     axes = Axes({"point": count}, {path: (("point",), column) for path, column in values.items()})
-    return compute(replace(config, axes=axes, refine=None), jobs=jobs, progress=False, warn=False)
+    return compute(replace(config, axes=axes, refine=None), Execution(jobs, progress=False), warn=False)
 
 
 def _joined(low: NDArray[np.intp], axis: NDArray[np.intp], shape: tuple[int, ...]) -> tuple[NDArray[np.intp], Any]:

@@ -8,11 +8,15 @@ import sys
 import threading
 from collections.abc import Callable, Generator, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass
+from itertools import islice
+from multiprocessing import resource_tracker
 from queue import SimpleQueue
 from typing import Any, Protocol, TypeVar
 
 import joblib
 import numpy as np
+from joblib.parallel import get_active_backend
 from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
@@ -52,21 +56,31 @@ class Executor(Protocol):
         """
 
 
-class Threads:
-    """Threads of this machine.
+class Local:
+    """Workers of this machine by joblib: threads, or those that the user names with :func:`joblib.parallel_config`.
 
     Parameters
     ----------
     jobs : int, optional
-        Number of threads; all cores by default.
+        Number of workers; by default that of the user's configuration of joblib, or else all cores.
     """
 
     def __init__(self, jobs: int | None):
-        self._jobs: int = jobs or joblib.cpu_count()
+        # If threads are only preferred, joblib forgets the number that the user has set.
+        self._jobs = jobs or get_active_backend()[1] or -1
+        backend, _ = get_active_backend(prefer="threads")
+        self._workers: int = backend.effective_n_jobs(self._jobs)
+        self._shared = self._workers == 1 or getattr(backend, "supports_sharedmem", False)
+        self._alone = 0 if self._shared else 1
+        if not self._shared and not backend.supports_return_generator:
+            raise InputError(
+                "joblib.parallel_config",
+                f"{type(backend).__name__} returns results only at the end: name another, as loky",
+            )
 
     def concurrency(self) -> int:
-        """Number of threads."""
-        return self._jobs
+        """Number of workers."""
+        return self._workers
 
     def results(
         self,
@@ -77,78 +91,143 @@ class Threads:
     ) -> Generator[Result]:
         """Results in the order in which they are finished; see :class:`Executor`.
 
-        The calling thread only waits: compilation and kernels would hold up its reaction to Ctrl-C. A thread that
-        fails stops the others after their tasks; its error is raised when their results are handed over. If Ctrl-C
+        The calling thread only waits: compilation and kernels would hold up its reaction to Ctrl-C. A task that fails
+        stops the sweep after the tasks under way; its error is raised when their results are handed over. If Ctrl-C
         ends the wait, or is thrown into the generator, what is finished is still handed over.
         """
         found: SimpleQueue[Result | BaseException | None] = SimpleQueue()
-        lock = threading.Lock()
+        lock, expected = threading.Lock(), 1
+        parallel = joblib.Parallel(self._jobs, return_as="generator_unordered", prefer="threads", batch_size=1)
+
+        def finish(outcome: Result | BaseException) -> None:
+            if isinstance(outcome, BaseException):
+                stopped.set()
+            else:
+                with lock:
+                    learn(outcome)
+            found.put(outcome)
+
+        def end() -> None:
+            nonlocal expected
+            with lock:
+                expected -= 1
+            if not expected:
+                found.put(None)
+
+        def work_here(task: Positions) -> None:
+            # joblib takes some tasks ahead of time.
+            if not stopped.is_set():
+                finish(_attempt(compute, task))
+            end()
+
+        def counted() -> Iterator[Any]:
+            nonlocal expected
+            for task in tasks:
+                with lock:
+                    expected += 1
+                yield joblib.delayed(work_here)(task)
+            end()
 
         def work() -> None:
             try:
-                while True:
-                    with lock:
-                        task = next(tasks, None)
-                    if task is None:
-                        break
-                    result = compute(task)
-                    with lock:
-                        learn(result)
-                    found.put(result)
+                if self._shared:
+                    # joblib polls for results, 10 ms for each round of a refined sweep: threads hand them over at once.
+                    for _ in parallel(counted()):
+                        pass
+                    return
+                _shield_from_interrupts()
+                # The first task runs alone: the other processes find its kernels compiled.
+                for some in (islice(tasks, self._alone), tasks):
+                    for outcome in parallel(joblib.delayed(_attempt)(compute, task) for task in some):
+                        finish(outcome)
+                self._alone = 0
             except BaseException as error:
-                stopped.set()
-                found.put(error)
+                # Once the sweep is to stop, it is no news that workers ended with their tasks.
+                if not stopped.is_set():
+                    found.put(error)
             found.put(None)
 
-        # Daemons, so that a second Ctrl-C need not wait for their tasks.
-        threads = [threading.Thread(target=work, daemon=True) for _ in range(self._jobs)]
-        working, failure = len(threads), None
-        try:
-            # The first thread may have finished tasks before the last one has started.
-            for thread in threads:
-                thread.start()
-            while working:
-                item = found.get()
-                if item is None:
-                    working -= 1
-                elif isinstance(item, BaseException):
-                    failure = failure or item
-                else:
-                    yield item
-        except KeyboardInterrupt:
-            while not found.empty():
-                if (item := found.get()) is not None and not isinstance(item, BaseException):
-                    yield item
-            raise
+        failure = None
+        # Its exit kills processes that still have tasks.
+        with nullcontext() if self._shared else parallel:
+            # A daemon, as joblib's threads are, so that a second Ctrl-C need not wait for their tasks.
+            threading.Thread(target=work, daemon=True).start()
+            try:
+                while (item := found.get()) is not None:
+                    if isinstance(item, BaseException):
+                        failure = failure or item
+                    else:
+                        yield item
+            except KeyboardInterrupt:
+                while not found.empty():
+                    if (item := found.get()) is not None and not isinstance(item, BaseException):
+                        yield item
+                raise
         if failure is not None:
             raise failure
 
 
-def executor(jobs: int | None, scheduler: str | None) -> AbstractContextManager[Executor]:
-    """Threads of this machine, or the workers of the Dask scheduler at an address.
-
-    Raises
-    ------
-    InputError
-        If the number of threads is not positive, if both are given, or if no scheduler answers.
-    """
-    if jobs is not None and jobs < 1:
-        raise InputError("jobs", f"{jobs} threads cannot compute anything: give at least 1")
-    if scheduler is None:
-        return nullcontext(Threads(jobs))
-    if jobs is not None:
-        raise InputError("--jobs", "is for threads of this machine: Dask's workers have their own number of threads")
+def _attempt(compute: Callable[[Positions], Result], task: Positions) -> Result | BaseException:
+    """Result of a task, or its error: if a task raised it, joblib would drop what other tasks have finished."""
     try:
-        from ringsweep.runs import dask
-    except ImportError:
-        raise InputError("--scheduler", "Dask is not installed: pip install distributed") from None
-    return dask.workers(scheduler)
+        return compute(task)
+    except BaseException as error:
+        return error
+
+
+def _shield_from_interrupts() -> None:
+    """Keep Ctrl-C from processes that this thread starts: a terminal sends it to them too, but tasks are to end."""
+    if hasattr(signal, "pthread_sigmask"):
+        # Its start would undo this before Python 3.12.
+        resource_tracker.ensure_running()
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+
+
+@dataclass(frozen=True)
+class Execution:
+    """How the tasks of a sweep are run.
+
+    Attributes
+    ----------
+    jobs : int, optional
+        Number of workers of this machine; see :class:`Local`.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers compute the cells.
+    progress : bool
+        Whether to show a progress bar, if there is a terminal or a notebook.
+    """
+
+    jobs: int | None = None
+    scheduler: str | None = None
+    progress: bool = True
+
+    def open(self) -> AbstractContextManager[Executor]:
+        """Workers of this machine, or those of the Dask scheduler.
+
+        Raises
+        ------
+        InputError
+            If the number of workers is not positive, if a scheduler is given too, or if no scheduler answers.
+        """
+        if self.jobs is not None and self.jobs < 1:
+            raise InputError("jobs", f"{self.jobs} threads cannot compute anything: give at least 1")
+        if self.scheduler is None:
+            return nullcontext(Local(self.jobs))
+        if self.jobs is not None:
+            raise InputError(
+                "--jobs", "is for threads of this machine: Dask's workers have their own number of threads"
+            )
+        try:
+            from ringsweep.runs import dask
+        except ImportError:
+            raise InputError("--scheduler", "Dask is not installed: pip install distributed") from None
+        return dask.workers(self.scheduler)
 
 
 def interruptible(function: Callable[[], Result]) -> Result:
     """Result of a function that runs in another thread, so that Ctrl-C ends the wait for it at once."""
     tasks = iter([np.empty(0, dtype=np.intp)])
-    (result,) = Threads(1).results(lambda _: function(), tasks, lambda result: result, threading.Event())
+    (result,) = Local(1).results(lambda _: function(), tasks, lambda result: result, threading.Event())
     return result
 
 

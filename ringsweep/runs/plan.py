@@ -21,12 +21,14 @@ from ringsweep.quantities.variables import OUTCOMES
 from ringsweep.runs.cells import TaskResult, compute_task
 from ringsweep.solvers.certificate import with_errors
 from ringsweep.storage.chunks import Layout
+from ringsweep.storage.netcdf import COMPRESSED_FROM
 
 # Bytes of this process without cells, and for each cell of the grid; from benchmarks/results/sizes.md.
 _PROCESS, _BOOKKEEPING = 300e6, 33.0
 
-# Share of the size of the columns that compression leaves in the finished file, from the same table.
-_COMPRESSED = 0.45
+# Bytes of a finished file without cells, and the share of its columns that compression leaves: 0.55 of some thousand
+# cells, 0.4 of millions.
+_FILE, _COMPRESSED = 40e3, 0.55
 
 # Seconds to measure cells, seconds to wait for the first ones (they may be compiled), and the most cells to measure.
 _MEASURING, _FIRST, _MOST = 1.0, 120.0, 100_000
@@ -102,6 +104,7 @@ def describe(config: Config, target: Path, jobs: int | None) -> str:
     check_room(config, layout.total, folder)
     shape = f" ({', '.join(f'{name} {length}' for name, length in config.axes.sizes.items())})" * bool(layout.sizes)
     columns = float(layout.total * bytes_of_cell(config))
+    finished = _FILE + columns * (_COMPRESSED if layout.total >= COMPRESSED_FROM else 1.0)
     free = shutil.disk_usage(folder).free
     threads = jobs or joblib.cpu_count()
     most = "at most " if config.refine is not None else ""
@@ -109,7 +112,7 @@ def describe(config: Config, target: Path, jobs: int | None) -> str:
         (
             f"cells: {most}{layout.total}{shape}",
             f"memory: some {size(memory_needed(config, False))} of {size(memory_of_machine())}",
-            f"disk: {most}{size(columns * (1.0 + _COMPRESSED))} while it runs, then {most}{size(columns * _COMPRESSED)}"
+            f"disk: {most}{size(columns + finished)} while it runs, then {most}{size(finished)}"
             f"; {size(free)} are free in {folder}",
             f"time: {most}{_time(config, layout, threads)}",
             "nothing was written",

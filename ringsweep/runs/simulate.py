@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from ringsweep.compile import readable_compile_errors, take
 from ringsweep.config import Config, with_values
+from ringsweep.errors import InputError
 from ringsweep.models import MODELS, batch
 from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import turn
 from ringsweep.quantities.variables import HISTORY, REGIMES
-from ringsweep.runs.executors import interruptible
+from ringsweep.runs.executors import Execution, interruptible
 from ringsweep.runs.sweep import compute
 from ringsweep.storage.provenance import attributes
 
@@ -83,6 +84,9 @@ def simulate(
 
 def _single_run(scene: str | os.PathLike[str] | Mapping[str, Any], solver: str | Mapping[str, Any] | None) -> Config:
     """Configuration of a single run from a scene or a whole configuration."""
+    if isinstance(scene, xr.Dataset):
+        cure = "ds.ringsweep.simulate(drive_amplitude=2) runs a cell of it, ringsweep.plots.cell names the cell"
+        raise InputError("scene", f"a configuration is expected, got a dataset: {cure}")
     if isinstance(scene, Mapping) and "scene" not in scene:
         scene = {"scene": scene}
     if solver is None:
@@ -96,7 +100,7 @@ def history(config: Config, *, samples: int = SAMPLES) -> xr.Dataset:
 
 
 def _history(config: Config, samples: int) -> xr.Dataset:
-    outcome = compute(config, jobs=1, progress=False)
+    outcome = compute(config, Execution(1, progress=False))
     runs = {}
     for law, structure in config.scene.structures.items():
         own = outcome.sel(friction_law=law) if config.axes.sizes else outcome

@@ -6,12 +6,13 @@ import logging
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from threading import Event
 from time import monotonic
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -22,7 +23,7 @@ from ringsweep.config.axes import dimension
 from ringsweep.errors import InputError
 from ringsweep.quantities.variables import INFERRED, OUTCOMES, error_attribute
 from ringsweep.runs.cells import TaskResult, compute_task
-from ringsweep.runs.executors import Executor, executor, progress_bar, stop_on_interrupt
+from ringsweep.runs.executors import Execution, Executor, progress_bar, stop_on_interrupt
 from ringsweep.runs.plan import check_room
 from ringsweep.runs.refined import KnownLabels, complete, decide, gaps, with_nan
 from ringsweep.runs.refined import attributes as refinement_attributes
@@ -34,6 +35,9 @@ from ringsweep.storage import netcdf
 from ringsweep.storage.checkpoint import Checkpoint, Columns, DamagedTask, open_checkpoint
 from ringsweep.storage.chunks import Layout
 from ringsweep.storage.provenance import attributes, differences, environment, identity
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 logger = logging.getLogger("ringsweep")
 
@@ -65,7 +69,7 @@ def run(
         NetCDF file to write. Until it is complete, finished cells are kept in a folder beside it, and not in memory. If
         the sweep is stopped, the same call continues it.
     jobs : int, optional
-        Number of threads; all cores by default.
+        Number of threads; by default that of ``joblib.parallel_config``, or else all cores.
     fresh : bool
         Whether to discard what an earlier call computed.
     reuse : path-like, optional
@@ -119,19 +123,25 @@ def run(
     True
     """
     loaded = refined(load(config), refine)
-    return _run(loaded, output, fresh, jobs=jobs, reuse=reuse, scheduler=scheduler, progress=progress)
+    return _run(loaded, output, Execution(jobs, scheduler, progress), fresh, reuse)
 
 
-def _run(config: Config, output: str | os.PathLike[str] | None, fresh: bool, **options: Any) -> xr.Dataset:
+def _run(
+    config: Config,
+    output: str | os.PathLike[str] | None,
+    execution: Execution,
+    fresh: bool,
+    reuse: str | os.PathLike[str] | None,
+) -> xr.Dataset:
     if output is None:
-        return compute(config, **options)
-    write(config, Path(output), fresh=fresh, **options)
+        return compute(config, execution, reuse=reuse)
+    write(config, Path(output), execution, fresh=fresh, reuse=reuse)
     return netcdf.open_dataset(output)
 
 
 def sweep(
     scene: Mapping[str, Any],
-    axes: Mapping[str, Any],
+    axes: Mapping[str, Any] | pd.DataFrame,
     output: str | os.PathLike[str] | None = None,
     *,
     solver: str | Mapping[str, Any] = "auto",
@@ -148,9 +158,10 @@ def sweep(
     ----------
     scene : mapping
         The mapping under ``scene`` in a configuration.
-    axes : mapping of str to sequence or xarray.DataArray
+    axes : mapping of str to sequence or xarray.DataArray, or pandas.DataFrame
         Values for paths of the scene, such as ``"drive.amplitude"``, or names for ``"friction.law"``.
-        A 1-D sequence is a grid axis. DataArrays that share a dimension vary together along it.
+        A 1-D sequence is a grid axis. DataArrays that share a dimension vary together along it. Each row of a DataFrame
+        is a run: its columns are paths, which vary together along the dimension ``point``.
     solver : str or mapping
         Name of a method, or the mapping under ``solver`` in a configuration.
     output, jobs, fresh, reuse, refine, scheduler, progress
@@ -184,12 +195,14 @@ def sweep(
     >>> ds.period.sel(friction_mu_s=0.15, belt_velocity=0.1).round(3).item()
     7.523
     """
+    if hasattr(axes, "itertuples"):
+        axes = {str(path): xr.DataArray(column.to_numpy(), dims="point") for path, column in axes.items()}
     parsed = read_scene(scene, swept=axes)
     found = read_axes(parsed, axes)
     method = {"method": solver} if isinstance(solver, str) else dict(solver)
     source = {"scene": dict(parsed.source), "solver": method, "sweep": _sweep_section(found)}
     config = refined(Config(parsed, read_solver(method, parsed), found, source, name="ringsweep"), refine)
-    return _run(config, output, fresh, jobs=jobs, reuse=reuse, scheduler=scheduler, progress=progress)
+    return _run(config, output, Execution(jobs, scheduler, progress), fresh, reuse)
 
 
 def _sweep_section(axes: Axes) -> dict[str, Any]:
@@ -211,11 +224,9 @@ def _sweep_section(axes: Axes) -> dict[str, Any]:
 
 def compute(
     config: Config,
+    execution: Execution,
     *,
-    jobs: int | None = None,
     reuse: str | os.PathLike[str] | None = None,
-    scheduler: str | None = None,
-    progress: bool = True,
     warn: bool = True,
 ) -> xr.Dataset:
     """Run a validated configuration in memory, with or without warnings about the results; see :func:`run`."""
@@ -226,7 +237,7 @@ def compute(
         raise InputError("sweep", f"{layout.total:.3g} cells do not fit into memory: name a file as output")
     check_room(config, layout.total, None)
     store = MemoryStore(layout.total)
-    found = _compute_cells(config, layout, store, earlier, jobs, scheduler, progress)
+    found = _compute_cells(config, layout, store, earlier, execution)
     columns = {name: column.reshape(sizes) for name, column in store.columns.items()}
     results = _frame(config, found)
     if found is not None and config.refine is not None:
@@ -246,12 +257,10 @@ def compute(
 def write(
     config: Config,
     target: Path,
+    execution: Execution,
     *,
-    jobs: int | None = None,
     fresh: bool = False,
     reuse: str | os.PathLike[str] | None = None,
-    scheduler: str | None = None,
-    progress: bool = True,
 ) -> bool:
     """Run a validated configuration into a file, or continue such a run; see :func:`run`.
 
@@ -269,7 +278,7 @@ def write(
         computed = fresh or not _holds_sweep(target, checkpoint)
         if computed:
             try:
-                _compute_file(config, target, layout, checkpoint, earlier, jobs, scheduler, progress)
+                _compute_file(config, target, layout, checkpoint, earlier, execution)
             except BaseException as error:
                 if (finished := int(checkpoint.done.sum())) and checkpoint.folder.exists():
                     again = "the same command without --fresh" if fresh else "the same command"
@@ -363,18 +372,15 @@ def _compute_cells(
     layout: Layout,
     store: Checkpoint | MemoryStore,
     earlier: EarlierSweep | None,
-    jobs: int | None,
-    scheduler: str | None,
-    progress: bool,
+    execution: Execution,
 ) -> Refined | None:
     """Compute the cells that the store lacks, task after task: every cell, or those that a refinement asks for."""
-    context = executor(jobs, scheduler)
     if config.refine is not None:
-        return _refine_cells(config, layout, store, earlier, context, progress)
+        return _refine_cells(config, layout, store, earlier, execution)
     if earlier is not None:
         _take_shared(config, layout, store, earlier, store.done)
     if not store.done.all():
-        with _open_tasks(config, layout, store, context, progress, layout.total) as tasks:
+        with _open_tasks(config, layout, store, execution, layout.total) as tasks:
             tasks.run(divide_into_tasks(store.done, tasks.sizes, tasks.stopped))
             if not store.done.all():
                 raise KeyboardInterrupt
@@ -386,8 +392,7 @@ def _refine_cells(
     layout: Layout,
     store: Checkpoint | MemoryStore,
     earlier: EarlierSweep | None,
-    context: AbstractContextManager[Executor],
-    progress: bool,
+    execution: Execution,
 ) -> Refined:
     """Compute the cells that a refinement asks for."""
     labels = KnownLabels(config, layout.total)
@@ -397,7 +402,7 @@ def _refine_cells(
     if earlier is not None:
         for positions, columns in earlier.shared_cells(config, layout, labels.known, labels.names):
             labels.put(positions, columns)
-    with _open_tasks(config, layout, store, context, progress, None) as tasks:
+    with _open_tasks(config, layout, store, execution, None) as tasks:
         tasks.notice = labels.put
 
         def run(cells: NDArray[np.intp]) -> None:
@@ -434,8 +439,7 @@ def _open_tasks(
     config: Config,
     layout: Layout,
     store: Checkpoint | MemoryStore,
-    context: AbstractContextManager[Executor],
-    progress: bool,
+    execution: Execution,
     total: int | None,
 ) -> Iterator[_Tasks]:
     """Tasks that compute cells of a sweep; `total` is the number of its cells, if all of them are computed."""
@@ -444,12 +448,14 @@ def _open_tasks(
         learnt = not math.isnan(sizes.seconds_per_cell)
         return "the tasks under way are done" if learnt else "compilation and the first cells are done"
 
-    with context as workers:
+    with execution.open() as workers:
         sizes = TaskSizes(config.solver.side_by_side, workers.concurrency)
         # What is in memory is lost anyway: there the first Ctrl-C ends the sweep.
         stopping = stop_on_interrupt(under_way) if isinstance(store, Checkpoint) else nullcontext(Event())
-        with stopping as stopped, progress_bar(total, progress, int(store.done.sum())) as bar:
-            tasks = _Tasks(partial(compute_task, config, layout), store, workers, sizes, stopped, bar)
+        with stopping as stopped, progress_bar(total, execution.progress, int(store.done.sum())) as bar:
+            # Other processes get it with every task: points as they were written are long.
+            task = partial(compute_task, replace(config, source={}), layout)
+            tasks = _Tasks(task, store, workers, sizes, stopped, bar)
             try:
                 yield tasks
             finally:

@@ -76,11 +76,13 @@ def check_name(path: str | os.PathLike[str]) -> None:
     Raises
     ------
     InputError
-        If the locale does not have its characters.
+        If the locale does not have its characters, or it is a symbolic link to itself.
     """
     encoding = sys.getfilesystemencoding()
     try:
         str(Path(path).resolve()).encode(encoding)
+    except (RuntimeError, OSError) as error:
+        raise InputError(str(path), "is a symbolic link that leads to itself") from error
     except UnicodeEncodeError as error:
         shown = os.fsencode(path).decode("utf-8", "replace")
         raise InputError(

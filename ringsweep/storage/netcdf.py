@@ -372,14 +372,16 @@ _DAMAGED = "is not a NetCDF file, or is damaged"
 def _difference(names: Sequence[str]) -> str:
     listed = ", ".join(names[:_MAX_NAMED]) + f" and {len(names) - _MAX_NAMED} more" * (len(names) > _MAX_NAMED)
     return (
-        f"is damaged, or another program changed it: not as ringsweep wrote them are {listed} "
-        f'(if the change is wanted, remove the digests: `del ds.attrs["{digest.ATTRIBUTE}"]` in xarray, and save ds)'
+        f"{digest.ALTERED}: not as ringsweep wrote them are {listed} "
+        f'(a part or a change that is wanted: `del ds.attrs["{digest.ATTRIBUTE}"]` in xarray, and save ds)'
     )
 
 
 def _check_exists(path: str | os.PathLike[str]) -> None:
     if not Path(path).is_file():
         raise InputError(str(path), "is not a file" if Path(path).exists() else "does not exist")
+    if Path(path).suffix.lower() in (".yaml", ".yml"):
+        raise InputError(str(path), f"is a configuration, not a result: `ringsweep run {path}` writes one")
     check_name(path)
 
 

@@ -14,6 +14,7 @@ from importlib.metadata import version
 from typing import Any
 
 import llvmlite.binding
+import numba
 import numpy as np
 
 from ringsweep.compile import SOURCES_DIGEST
@@ -41,8 +42,14 @@ def environment() -> dict[str, str]:
 
 @cache
 def processor() -> str:
-    """Name of the processor for which kernels are compiled. Another may round sums of products differently."""
-    return str(llvmlite.binding.get_host_cpu_name())
+    """Processor for which kernels are compiled: its name, and a digest of its features.
+
+    Another one may round sums of products differently, and so may the same one with a feature that is turned off.
+    """
+    options: Any = numba.config
+    name = options.CPU_NAME or llvmlite.binding.get_host_cpu_name()
+    features = options.CPU_FEATURES or llvmlite.binding.get_host_cpu_features().flatten()
+    return f"{name}-{hashlib.sha256(features.encode()).hexdigest()[:8]}"
 
 
 def identity(config: Config) -> dict[str, str]:

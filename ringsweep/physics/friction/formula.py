@@ -66,11 +66,11 @@ class Threshold:
     difference : Node, optional
         If there is no `at`: the expression from which the speed is found.
     order : int
-        Of a root, which one; number 0 is the speed zero if `difference` is positive at first. Of a tail, the factor of
-        `difference` in the exponent.
+        Of a root, which one; number 0 is the speed zero if `difference` is positive at first. Of a head or tail, the
+        factor of `difference` in the exponent. Of a bound of validity, which one.
     kind : str
-        ``given``; ``root``, where `difference` changes its sign; ``tail``, where an exponential has decayed;
-        ``valid``, where `difference` becomes negative or is no number.
+        ``given``; ``root``, where `difference` changes its sign; ``head`` and ``tail``, below and beyond which an
+        exponential is negligible; ``valid``, where `difference` becomes negative or is no number, or ceases to be so.
     within : tuple
         Switches that contain this one: (index of the threshold, whether it is on the lower side).
     """
@@ -219,13 +219,20 @@ class _Reader:
         found = expressions.function(name, inner)
         if not found.varies or name not in ("exp", "tanh"):
             return found
-        # Beyond some speed the function is constant but for rounding: there the law has a region of its own, in which
-        # steps need not resolve what has long decayed.
+        # Beyond some speed the function is constant but for rounding, and so it may be below some speed: there the law
+        # has regions of its own, in which steps need not resolve what has long decayed.
+        moved = expressions.substitute(inner, {SPEED: expressions.ZERO}) is not expressions.ZERO
+        exponent = expressions.negative(inner)
         if name == "exp":
-            return self._switch(
-                Threshold(None, expressions.negative(inner), 1, "tail", within), found, expressions.ZERO
-            )
-        return self._switch(Threshold(None, inner, 2, "tail", within), found, expressions.ONE)
+            tail = Threshold(None, exponent, 1, "tail", within)
+            found = self._switch(tail, found, expressions.ZERO)
+            if not (moved and expressions.derivative(inner).varies):
+                return found
+            return self._switch(Threshold(None, exponent, 1, "head", within), expressions.ZERO, found)
+        found = self._switch(Threshold(None, inner, 2, "tail", within), found, expressions.ONE)
+        if not moved:
+            return found
+        return self._switch(Threshold(None, exponent, 2, "head", within), number(-1.0), found)
 
     def _switch(self, threshold: Threshold, below: Node, above: Node) -> Node:
         if threshold not in self.thresholds:

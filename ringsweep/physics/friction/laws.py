@@ -232,9 +232,9 @@ Table = _tabulated(
     "Table",
     """Measured friction that is set-valued at rest, up to its value at v = 0.
 
-    A monotone cubic through each pair of points (Fritsch and Carlson, SIAM J. Numer. Anal. 17, 1980), times the factor
-    ``scale`` of the surface; constant beyond the last point. ``pieces``, of shape ``(cells, points, 5)``, has a row for
-    each cubic: its lower bound, m/s, and its coefficients from the lowest power up.
+    A monotone cubic through each pair of points (Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5, 1984), times the
+    factor ``scale`` of the surface; constant beyond the last point. ``pieces``, of shape ``(cells, points, 5)``, has a
+    row for each cubic: its lower bound, m/s, and its coefficients from the lowest power up.
     """,
     set_valued=True,
 )
@@ -282,12 +282,13 @@ def _defined(qualified: str) -> type:
     if at_rest == "mu_k" and "mu_s" in used:
         raise FormulaError("the formula uses mu_s, which is never less than mu_k: write at_rest: mu_s", "at_rest")
     # Friction that turns negative or is no number ends a run.
-    valid = Threshold(None, formula.mu, kind="valid")
-    checked = switch(len(formula.thresholds), formula.mu, number(float("nan")))
+    bounds, nowhere = len(formula.thresholds), number(float("nan"))
+    checked = switch(bounds, formula.mu, switch(bounds + 1, nowhere, switch(bounds + 2, formula.mu, nowhere)))
+    valid = (Threshold(None, formula.mu, order, "valid") for order in range(3))
     parameters = {
         name: Parameter(unit, f"parameter {name} of the friction law") for name, unit in formula.units.items()
     }
-    expression = Expression(checked, (*formula.thresholds, valid), at_rest is not None, None, parameters)
+    expression = Expression(checked, (*formula.thresholds, *valid), at_rest is not None, None, parameters)
     name = "Formula_" + hashlib.sha256(qualified.encode()).hexdigest()[:12]
     if series_products(expression) > MOST_PRODUCTS:
         raise FormulaError(f"it is too long: more than {MOST_PRODUCTS} products of varying factors")

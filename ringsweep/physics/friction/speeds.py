@@ -1,8 +1,10 @@
-"""Speeds at which the expression of a friction law switches, and numbers that are found once for each cell."""
+"""Speeds at which the expression of a friction law switches, and numbers that are found once for each cell.
+
+All are isolated by interval arithmetic, see :mod:`ringsweep.numerics.isolation`: no feature of a law is too narrow.
+"""
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,14 +12,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.numerics.expressions import Node, derivative, evaluate, nodes_of
+from ringsweep.numerics.intervals import Enclosure
+from ringsweep.numerics.isolation import (
+    FASTEST,
+    Cells,
+    Changes,
+    UndecidedError,
+    cells_between,
+    first_flat,
+    not_negligible,
+    reach,
+    sign_changes,
+    steepest,
+)
 from ringsweep.physics.friction.formula import FormulaError, Threshold
 from ringsweep.physics.friction.velocity import Expression
 
 _Columns = dict[str, NDArray[np.float64]]
 _Surface = tuple[NDArray[np.float64], NDArray[np.float64]]
-
-# Speeds at which expressions are looked at, m/s.
-_GRID = np.concatenate([[0.0], np.geomspace(1e-15, 1e9, 481)])
 
 # The stiction band ends where the slope has fallen to this share of the steepest slope below.
 _FLAT = 0.01
@@ -49,7 +61,8 @@ def hidden_fields(
     Raises
     ------
     FormulaError
-        If the formula has no value at rest, or another one than its kind needs.
+        If the formula has no value at rest, or another one than its kind needs; if friction jumps up at some speed; or
+        if the speeds cannot be found.
     """
     table = np.stack([*columns.values(), *(column for surface in surfaces for column in surface)], axis=1)
     rows, cell_row = _distinct(table)
@@ -80,7 +93,6 @@ def table_fields(
     last = [speeds[-1], mu[-1], 0.0, 0.0, 0.0]
     pieces = np.vstack([np.column_stack([speeds[:-1], curve.c[::-1].T]), last])
     cells, scale = len(surfaces[0][1]), np.max([factor for _, factor in surfaces], axis=0)
-    slopes = abs(curve(np.concatenate([np.linspace(a, b, 33) for a, b in itertools.pairwise(speeds)]), 1))
     found: dict[str, NDArray[Any]] = {"pieces": np.broadcast_to(pieces, (cells, *pieces.shape))}
     if mu[0] > 0.0:
         jump = np.where(scale > 0.0, np.inf, 0.0)
@@ -90,10 +102,19 @@ def table_fields(
     top = int(falls[0]) if len(falls) else len(mu) - 1
     return found | {
         "slope_at_rest": scale * abs(curve(0.0, 1)),
-        "slope_beyond": scale * (slopes[33 * top :].max() if top + 1 < len(mu) else 0.0),
+        "slope_beyond": scale * _steepest_of(curve.c[::-1, top:], np.diff(speeds)[top:]),
         "band": np.full(cells, speeds[top]),
         "in_band": np.full(cells, top),
     }
+
+
+def _steepest_of(cubics: NDArray[np.float64], widths: NDArray[np.float64]) -> float:
+    """Greatest magnitude of the slopes of cubics, of which each has a column of coefficients from the lowest up."""
+    _, linear, square, cube = cubics
+    with np.errstate(all="ignore"):
+        turn = np.nan_to_num(-square / (3.0 * cube)).clip(0.0, widths)
+    slopes = [abs(linear + x * (2.0 * square + x * 3.0 * cube)) for x in (0.0 * widths, turn, widths)]
+    return float(np.max(slopes, initial=0.0))
 
 
 def _distinct(table: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
@@ -105,212 +126,269 @@ def _distinct(table: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[
 
 
 class _Finder:
-    """Finds the speeds of one expression for several sets of parameters at once."""
+    """Finds the speeds of one expression for several sets of parameters at once.
+
+    A row is a set of parameters with one of the surfaces; the rows of one surface stand together.
+    """
 
     def __init__(self, expression: Expression, columns: _Columns, surfaces: list[_Surface]) -> None:
-        self.expression = expression
-        self.rows = len(surfaces[0][0])
-        self.values = [{**columns, "mu_s": mu_s, "mu_k": mu_k} for mu_s, mu_k in surfaces]
+        self.expression, self.surfaces = expression, len(surfaces)
+        self.values = {name: np.tile(column, len(surfaces)) for name, column in columns.items()}
+        self.values["mu_s"], self.values["mu_k"] = (np.concatenate(column) for column in zip(*surfaces, strict=True))
+        self.rows = len(self.values["mu_s"])
+        self.rest = np.zeros(self.rows)
         self.thresholds: list[NDArray[np.float64]] = []
+        self.found: dict[Any, Any] = {}
 
     def fields(self) -> dict[str, NDArray[Any]]:
         for threshold in self.expression.thresholds:
-            self.thresholds.append(self._clipped(threshold, self._speed_of(threshold)))
+            speed = self._speed_of(threshold)
+            for index, lower in threshold.within:
+                limit = self.thresholds[index]
+                speed = np.minimum(speed, limit) if lower else np.maximum(speed, limit)
+            self.thresholds.append(speed)
         self._check_rest()
+        self._check_jumps()
         found: dict[str, NDArray[Any]] = {}
-        edges = list(self.thresholds)
+        edges = [self._one_of_each(speed) for speed in self.thresholds]
+        thresholds = edges.copy()
         if self.expression.has_band:
             found["band"] = self._band()
             edges.append(found["band"])
         if self.expression.has_edges:
             found["edges"] = _sorted_edges(edges)
-            if self.thresholds:
-                found["thresholds"] = np.stack(self.thresholds, axis=1)
+            if thresholds:
+                found["thresholds"] = np.stack(thresholds, axis=1)
         if self.expression.has_band:
             found["in_band"] = (found["edges"] < found["band"][:, None]).sum(axis=1) + 1
-        found["slope_at_rest"], found["slope_beyond"] = self._slopes(found)
+        found["slope_at_rest"], found["slope_beyond"] = self._slopes(found.get("band"))
         return found
 
-    def at(self, node: Node, speed: Any, values: _Columns) -> NDArray[np.float64]:
-        """Value of a node at speeds of shape ``(rows,)`` or ``(rows, speeds)``."""
-        speed = np.asarray(speed)
-        if speed.ndim == 1:
-            return np.broadcast_to(evaluate(node, speed, values, self.thresholds), speed.shape)
-        wide = {name: column[:, None] for name, column in values.items()}
-        return np.broadcast_to(
-            evaluate(node, speed, wide, [threshold[:, None] for threshold in self.thresholds]), speed.shape
-        )
+    def at(self, node: Node, speed: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Value of a node at one speed for each row."""
+        return np.broadcast_to(evaluate(node, speed, self.values, self.thresholds), self.rows)
 
-    def on_grid(self, node: Node, values: _Columns) -> NDArray[np.float64]:
-        """Value of a node on the grid, shape ``(rows, speeds)``."""
-        return self.at(node, np.broadcast_to(_GRID, (self.rows, len(_GRID))), values)
+    def _by_surface(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return values.reshape(self.surfaces, -1)
+
+    def _one_of_each(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Numbers that are the same for all surfaces, once."""
+        found: NDArray[np.float64] = self._by_surface(values)[0]
+        return found
+
+    def _enclosed(self, node: Node) -> Enclosure:
+        return Enclosure(node, self.values, self.thresholds)
+
+    def _cells(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> Cells:
+        return cells_between(low, high, [speed for speed in self.thresholds if np.isfinite(speed).any()])
+
+    # ---- switches -----------------------------------------------------------------------------
 
     def _speed_of(self, threshold: Threshold) -> NDArray[np.float64]:
-        found = [self._speed_on(threshold, values) for values in self.values]
-        if threshold.kind == "tail":
-            return np.max(found, axis=0)
-        if threshold.kind == "valid":
-            return np.min(found, axis=0)
-        for other in found[1:]:
-            if not np.allclose(other, found[0], rtol=1e-12, atol=0.0):
-                raise FormulaError(
-                    "it switches at a speed that depends on mu_s or mu_k, which differ by zone: "
-                    "write the speed as a parameter of its own"
-                )
-        return found[0]
-
-    def _speed_on(self, threshold: Threshold, values: _Columns) -> NDArray[np.float64]:
         if threshold.at is not None:
-            found = self.at(threshold.at, np.zeros(self.rows), values)
-            if np.isnan(found).any():
-                raise FormulaError("the speed at which it switches is not a number")
-            return found
+            return self._equal(self._given(threshold.at))
         assert threshold.difference is not None
-        if threshold.kind == "tail":
-            return self._tail(threshold.difference, threshold.order, values)
-        if threshold.kind == "valid":
-            return self._first_invalid(threshold.difference, values)
-        return self._root(threshold.difference, threshold.order, values)
-
-    def _clipped(self, threshold: Threshold, speed: NDArray[np.float64]) -> NDArray[np.float64]:
+        low, high = self.rest, np.full(self.rows, np.inf)
         for index, lower in threshold.within:
-            speed = np.minimum(speed, self.thresholds[index]) if lower else np.maximum(speed, self.thresholds[index])
-        return speed
+            limit = self.thresholds[index]
+            low, high = (low, np.minimum(high, limit)) if lower else (np.maximum(low, limit), high)
+        sought = threshold.kind in ("head", "tail"), threshold.difference, threshold.within
+        try:
+            if threshold.kind in ("head", "tail"):
+                kept = self._once(sought, lambda: self._kept(threshold, low, high))
+                return kept[0] if threshold.kind == "head" else kept[1]
+            if threshold.kind == "valid":
+                return self._once(sought, lambda: self._invalid(threshold.difference))[threshold.order]
+            first, speeds = self._once(sought, lambda: self._signs(threshold.difference, low, high))
+            return self._equal(self._root(first, speeds, threshold.order))
+        except UndecidedError as error:
+            what = "whether friction is negative" if threshold.kind == "valid" else "where min, max or abs switch"
+            raise self._undecided(what, error) from None
 
-    def _root(self, difference: Node, order: int, values: _Columns) -> NDArray[np.float64]:
-        """Speed at which a difference changes its sign; order 0 is 0 if it is positive at first."""
-        signs = self.on_grid(difference, values) > 0.0
-        # At rest the sign is that just above rest.
-        signs[:, 0] = signs[:, 1]
-        changes = signs[:, 1:] != signs[:, :-1]
-        if (changes.sum(axis=1) + signs[:, 0] > 3).any():
-            raise FormulaError("min, max or abs switch more than three times: write piecewise")
-        found, wanted = np.full(self.rows, np.inf), order - signs[:, 0]
-        found[wanted < 0] = 0.0
-        # Number of changes up to each speed of the grid.
-        place = (np.cumsum(changes, axis=1) <= wanted[:, None]).sum(axis=1)
-        rows = np.flatnonzero((wanted >= 0) & (place < changes.shape[1]))
-        found[rows] = self._bisect(difference, values, rows, _GRID[place[rows]], _GRID[place[rows] + 1])
+    def _once(self, key: Any, find: Any) -> Any:
+        if key not in self.found:
+            self.found[key] = find()
+        return self.found[key]
+
+    @staticmethod
+    def _undecided(what: str, error: UndecidedError) -> FormulaError:
+        return FormulaError(
+            f"{what} cannot be told from rounding at speeds from {error.low:.6g} to {error.high:.6g} m/s: write the "
+            "formula so that nearly equal numbers are not subtracted, or with piecewise"
+        )
+
+    def _given(self, speed: Node) -> NDArray[np.float64]:
+        found = self.at(speed, self.rest)
+        if np.isnan(found).any():
+            raise FormulaError("the speed at which it switches is not a number")
         return found
 
-    def _bisect(
-        self, node: Node, values: _Columns, rows: NDArray[np.intp], low: NDArray[Any], high: NDArray[Any]
-    ) -> NDArray[np.float64]:
-        """Speeds between two speeds at which the sign of a node changes, in some of the rows."""
-        own = {name: column[rows] for name, column in values.items()}
-        thresholds = [threshold[rows] for threshold in self.thresholds]
-        positive = evaluate(node, high, own, thresholds) > 0.0
+    def _equal(self, speed: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Speeds that must not depend on the surface."""
+        found = self._by_surface(speed)
+        if not np.allclose(found, found[0], rtol=1e-12, atol=0.0):
+            raise FormulaError(
+                "it switches at a speed that depends on mu_s or mu_k, which differ by zone: "
+                "write the speed as a parameter of its own"
+            )
+        return np.tile(found[0], self.surfaces)
+
+    def _signs(
+        self, difference: Node, low: NDArray[np.float64], high: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int8], NDArray[np.float64]]:
+        """Sign of a difference at first, and the speeds at which it changes, of shape ``(rows, 3)``."""
+        changes = sign_changes(self._enclosed(difference), self._cells(low, high))
+        count = np.bincount(changes.row, minlength=self.rows)
+        if (count + (changes.first > 0) > 3).any():
+            raise FormulaError("min, max or abs switch more than three times: write piecewise")
+        found = np.full((self.rows, 3), np.inf)
+        found[changes.row, _places(changes.row)] = self._refined(difference, changes)
+        return changes.first, found
+
+    @staticmethod
+    def _root(first: NDArray[np.int8], speeds: NDArray[np.float64], order: int) -> NDArray[np.float64]:
+        """Speed at which a difference changes its sign; order 0 is 0 if it is positive at first."""
+        wanted = order - (first > 0)
+        return np.where(wanted < 0, 0.0, np.take_along_axis(speeds, wanted.clip(0)[:, None], axis=1)[:, 0])
+
+    def _refined(self, node: Node, changes: Changes, least: float = 0.0) -> NDArray[np.float64]:
+        """First speed of each change of sign at which the sign is no longer the one before."""
+        values = {name: column[changes.row] for name, column in self.values.items()}
+        thresholds = [threshold[changes.row] for threshold in self.thresholds]
+        low, high = changes.low, changes.high
         while True:
             middle = 0.5 * (low + high)
             if not ((low < middle) & (middle < high)).any():
                 return high
-            same = (evaluate(node, middle, own, thresholds) > 0.0) == positive
-            low, high = np.where(same, low, middle), np.where(same, middle, high)
+            value = evaluate(node, middle, values, thresholds) - least
+            # A number that is none is not the one before a pole.
+            passed = np.where(changes.after > 0, value >= 0.0, ~(value > 0.0) if least == 0.0 else ~(value >= 0.0))
+            low, high = np.where(passed, low, middle), np.where(passed, middle, high)
 
-    def _tail(self, exponent: Node, scale: int, values: _Columns) -> NDArray[np.float64]:
-        """Speed beyond which ``exp(-scale * exponent)`` is negligible.
-
-        The rest of it changes a sliding velocity by less than 1e-17 m/s.
-        """
+    def _kept(
+        self, threshold: Threshold, low: NDArray[np.float64], high: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Speeds between which an exponential is not negligible."""
+        exponent, scale = threshold.difference, threshold.order
+        assert exponent is not None
         rate = derivative(exponent)
-        if not rate.varies:
-            offset, slope = (self.at(node, np.zeros(self.rows), values) for node in (exponent, rate))
+        if not rate.varies and threshold.kind == "tail":
+            offset, slope = (self.at(node, self.rest) for node in (exponent, rate))
             with np.errstate(all="ignore"):
-                found = (_reach(scale * slope) / scale - offset) / slope
-            return np.where(slope > 0.0, np.maximum(found, 0.0), np.inf)
-        on_grid, rates = self.on_grid(exponent, values), self.on_grid(rate, values)
-        with np.errstate(invalid="ignore"):
-            short = ~(scale * on_grid > _reach(scale * rates))
-        # The first speed from which the exponent has grown once and for all.
-        last = np.where(short.any(axis=1), short.shape[1] - short[:, ::-1].argmax(axis=1), 0)
-        return np.append(_GRID, np.inf)[last]
+                found = (reach(scale * slope) / scale - offset) / slope
+            found = np.where(slope > 0.0, np.maximum(found, 0.0), np.inf)
+            return self.rest, self._of_all(found, np.max)
+        first, last = not_negligible(self._enclosed(exponent), self._cells(low, high), scale)
+        return self._of_all(np.minimum(first, last), np.min), self._of_all(last, np.max)
 
-    def _first_invalid(self, mu: Node, values: _Columns) -> NDArray[np.float64]:
-        """First speed at which friction is negative or no number."""
-        grid = self.on_grid(mu, values)
-        with np.errstate(invalid="ignore"):
-            invalid = ~((grid >= -_ROUNDING) & (grid < np.inf))
-        found = np.full(self.rows, np.inf)
-        rows = np.flatnonzero(invalid.any(axis=1))
-        place = invalid[rows].argmax(axis=1)
-        if (place == 0).any():
-            value = grid[rows[place == 0][0], 0]
-            raise FormulaError(f"at rest it gives {value:.6g}: a friction coefficient is a number and not negative")
-        found[rows] = _GRID[place - 1]
-        # A pole is not bisected: friction is positive on both sides.
-        bounded = grid[rows, place] != np.inf
-        rows, place = rows[bounded], place[bounded]
-        found[rows] = self._bisect(mu, values, rows, _GRID[place - 1], _GRID[place])
-        return found
+    def _of_all(self, values: NDArray[np.float64], choose: Any) -> NDArray[np.float64]:
+        return np.tile(choose(self._by_surface(values), axis=0), self.surfaces)
+
+    # ---- validity -----------------------------------------------------------------------------
+
+    def _invalid(self, mu: Node) -> list[NDArray[np.float64]]:
+        """Bounds of the speeds at which friction is negative or no number on some surface, one below the other."""
+        at_rest = self.at(mu, self.rest)
+        wrong = ~((at_rest >= -_ROUNDING) & (at_rest < np.inf))
+        if wrong.any():
+            raise FormulaError(
+                f"at rest it gives {at_rest[wrong][0]:.6g}: a friction coefficient is a number and not negative"
+            )
+        changes = sign_changes(self._enclosed(mu), self._cells(self.rest, np.full(self.rows, np.inf)), -_ROUNDING)
+        speeds = self._refined(mu, changes, -_ROUNDING)
+        sets = self.rows // self.surfaces
+        found = np.full((3, sets), np.inf)
+        for own in np.unique(changes.row % sets):
+            mine = changes.row % sets == own
+            order = np.argsort(speeds[mine], kind="stable")
+            # Number of surfaces on which friction is invalid.
+            count = np.cumsum(-changes.after[mine][order].astype(int))
+            bounds = speeds[mine][order][np.diff(count > 0, prepend=False)]
+            if len(bounds) > 3:
+                raise FormulaError(
+                    f"it is negative or no number in several intervals of the speed, from {bounds[0]:.6g} to "
+                    f"{bounds[1]:.6g} and from {bounds[2]:.6g} to {bounds[3]:.6g} m/s: it may be so in one interval, "
+                    "and from another speed on"
+                )
+            found[: len(bounds), own] = bounds
+        return [np.tile(bound, self.surfaces) for bound in found]
 
     def _check_rest(self) -> None:
         """Check values at rest, and that the law has a power series there."""
-        for values in self.values:
-            at_rest = self.at(self.expression.mu, np.zeros(self.rows), values)
-            for node in nodes_of(self.expression.mu):
-                if node.varies and node.kind in ("sqrt", "log", "power"):
-                    inner = self.at(node.parts[0], np.zeros(self.rows), values)
-                    if (inner == 0.0).any():
-                        raise FormulaError(
-                            "a root, a power or a logarithm of something that vanishes at rest has no power series "
-                            "there: take a whole exponent, or add a small constant"
-                        )
-            if self.expression.set_valued:
-                excess = at_rest > values["mu_s"] * (1.0 + _ROUNDING) + _ROUNDING
-                if excess.any():
-                    raise FormulaError(
-                        f"it begins to slip with friction {at_rest[excess][0]:.6g}, more than the "
-                        f"{values['mu_s'][excess][0]:.6g} that it has at rest"
-                    )
-            elif (abs(at_rest) > 1e-9).any():
+        at_rest, mu_s = self.at(self.expression.mu, self.rest), self.values["mu_s"]
+        for node in nodes_of(self.expression.mu):
+            if node.varies and node.kind in ("sqrt", "log", "power") and (self.at(node.parts[0], self.rest) == 0).any():
                 raise FormulaError(
-                    "without at_rest friction must vanish at v = 0, where it is "
-                    f"{at_rest[abs(at_rest) > 1e-9][0]:.6g}: "
-                    "give `at_rest: mu_s` for friction that holds up to mu_s at rest",
-                    "at_rest",
+                    "a root, a power or a logarithm of something that vanishes at rest has no power series there: "
+                    "take a whole exponent, or add a small constant"
                 )
+        if self.expression.set_valued:
+            excess = at_rest > mu_s * (1.0 + _ROUNDING) + _ROUNDING
+            if excess.any():
+                raise FormulaError(
+                    f"it begins to slip with friction {at_rest[excess][0]:.6g}, more than the "
+                    f"{mu_s[excess][0]:.6g} that it has at rest"
+                )
+        elif (abs(at_rest) > 1e-9).any():
+            raise FormulaError(
+                "without at_rest friction must vanish at v = 0, where it is "
+                f"{at_rest[abs(at_rest) > 1e-9][0]:.6g}: "
+                "give `at_rest: mu_s` for friction that holds up to mu_s at rest",
+                "at_rest",
+            )
+
+    def _check_jumps(self) -> None:
+        """Check that friction does not jump up: there a body would neither get faster nor slower."""
+        pairs = zip(self.expression.thresholds, self.thresholds, strict=True)
+        for speed in [speed for threshold, speed in pairs if threshold.kind in ("given", "root")]:
+            inside = np.where((speed > 0.0) & (speed < FASTEST), speed, 0.0)
+            lower = [np.where(other == inside, np.inf, other) for other in self.thresholds]
+            mu, slope = self.expression.mu, derivative(self.expression.mu)
+            above, rate = self.at(mu, inside), abs(self.at(slope, inside))
+            below = np.broadcast_to(evaluate(mu, inside, self.values, lower), self.rows)
+            rate = rate + abs(evaluate(slope, inside, self.values, lower))
+            with np.errstate(invalid="ignore"):
+                rounding = _ROUNDING * (1.0 + abs(below)) + 8.0 * rate * np.spacing(inside)
+                jumps = (inside > 0.0) & (above > below + rounding)
+            if jumps.any():
+                at = np.flatnonzero(jumps)[0]
+                raise FormulaError(
+                    f"friction jumps up from {below[at]:.6g} to {above[at]:.6g} at v = {inside[at]:.6g} m/s: a body "
+                    "would keep this speed, with any friction between the two. Write a steep ramp in place of the jump"
+                )
+
+    # ---- band and slopes ----------------------------------------------------------------------
 
     def _band(self) -> NDArray[np.float64]:
         if self.expression.band is not None:
-            return self.at(self.expression.band, np.zeros(self.rows), self.values[0])
+            return self._one_of_each(self.at(self.expression.band, self.rest))
+        cells = self._cells(self.rest, np.full(self.rows, np.inf))
+        try:
+            low, high, level = first_flat(self._enclosed(self.expression.mu), cells, _FLAT)
+        except UndecidedError as error:
+            raise self._undecided("where friction grows no more", error) from None
         slope = derivative(self.expression.mu)
-        found = []
-        for values in self.values:
-            slopes = self.on_grid(slope, values)
-            steepest = np.maximum.accumulate(slopes, axis=1)
-            flat = (slopes <= _FLAT * steepest) & (steepest > 0.0)
-            first = np.where(flat.any(axis=1), flat.argmax(axis=1), len(_GRID) - 1)
-            found.append(_GRID[first])
-        return np.max(found, axis=0)
+        while ((low < (middle := 0.5 * (low + high))) & (middle < high)).any():
+            flat = self.at(slope, middle) <= level
+            low, high = np.where(flat, low, middle), np.where(flat, middle, high)
+        return self._one_of_each(self._of_all(high, np.max))
 
-    def _slopes(self, found: Mapping[str, NDArray[Any]]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _slopes(self, band: NDArray[np.float64] | None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Steepest slopes at rest and beyond the band, on the roughest surface."""
-        rough = np.max([values["mu_s"] for values in self.values], axis=0) > 0.0
-        if not self.expression.has_band:
-            jump = np.where(rough, np.inf, 0.0)
+        if band is None:
+            jump = np.where(self._by_surface(self.values["mu_s"]).max(axis=0) > 0.0, np.inf, 0.0)
             return jump, jump
-        slope = derivative(self.expression.mu)
-        at_rest, beyond = np.zeros(self.rows), np.zeros(self.rows)
-        edges, band = found["edges"], found["band"]
-        lows = np.concatenate([np.zeros((self.rows, 1)), edges], axis=1)
-        highs = np.concatenate([edges, np.full((self.rows, 1), np.inf)], axis=1)
-        with np.errstate(invalid="ignore", over="ignore"):
-            shares = np.linspace(0.0, 1.0, 64, endpoint=False)
-            inside = np.where(np.isfinite(highs), highs, 1e3 * np.maximum(lows, band[:, None]))[:, :, None]
-            speeds = (lows[:, :, None] + shares * (inside - lows[:, :, None])).reshape(self.rows, -1)
-        speeds = np.where(np.isfinite(speeds), speeds, band[:, None])
-        for values in self.values:
-            if not self.expression.set_valued:
-                at_rest = np.fmax(at_rest, abs(self.at(slope, np.zeros(self.rows), values)))
-            steep = np.where(speeds >= band[:, None], abs(self.at(slope, speeds, values)), 0.0)
-            beyond = np.fmax(beyond, np.nanmax(steep, axis=1))
-        return at_rest, beyond
+        at_rest = abs(self.at(derivative(self.expression.mu), self.rest))
+        if self.expression.set_valued:
+            at_rest = self.rest
+        beyond_band = self._cells(np.tile(band, self.surfaces), np.full(self.rows, np.inf))
+        beyond = steepest(self._enclosed(self.expression.mu), beyond_band)
+        return self._by_surface(at_rest).max(axis=0), self._by_surface(beyond).max(axis=0)
 
 
-def _reach(rate: Any) -> Any:
-    """Exponent from which an exponential that decays at a rate, s/m, is negligible."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.clip(39.1 - np.log(rate), 10.0, 40.0)
+def _places(row: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Place of each number among those of the same row; rows ascend."""
+    return np.arange(len(row)) - np.searchsorted(row, row)
 
 
 def _sorted_edges(edges: list[NDArray[np.float64]]) -> NDArray[np.float64]:

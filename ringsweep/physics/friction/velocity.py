@@ -347,8 +347,8 @@ def passes_band(law, before, after, ahead):
     Returns
     -------
     tuple of bool
-        Whether the step meets rest; whether it meets rest or the bound of the band; whether it jumps across the whole
-        band.
+        Whether the step meets rest; whether it meets rest or the bound of the band, or leaps over a whole region, of
+        which it sees nothing; whether it jumps across the whole band.
     """
     band = stiction_band(law)
     slow = min(min(abs(before), abs(after)), abs(ahead))
@@ -356,7 +356,16 @@ def passes_band(law, before, after, ahead):
     rest = (before * after < 0.0) | (before * ahead < 0.0)
     # A law without a band is set-valued at rest.
     rest = rest | ((band == 0.0) & (before * after == 0.0))
-    return rest, rest | ((slow < band) & (band <= fast)), rest & (slow >= band)
+    meets = rest | ((slow < band) & (band <= fast)) | leaps(law, slow, fast)
+    return rest, meets, rest & (slow >= band)
+
+
+@_derived
+def leaps(expression, count, lanes, law, slow, fast):
+    """Whether a whole region of a law, with a bound on both sides, lies between two speeds, m/s."""
+    edges = 0 if expression.tabulated else len(expression.thresholds) + expression.has_band
+    within = [f"((slow < law.edges[{i}]) & (law.edges[{i + 1}] <= fast))" for i in range(edges - 1)]
+    return ["return " + (" | ".join(within) or "slow > inf")]
 
 
 # ---- power series -----------------------------------------------------------------------------
