@@ -1,6 +1,7 @@
 """Equations of the ring: balances, symmetries, limits; and compiled functions against plain formulas."""
 
 from math import cos, exp, pi, radians, sin
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -162,6 +163,69 @@ class TestDeclaredBalances:
     def test_wrong_balance_is_told_with_its_text(self, balances, message):
         with pytest.raises(TypeError, match=f"OneContact: .*{message}"):
             ring.body(balances=balances, energy="0")(ring.OneContact)
+
+
+@ring.body(
+    balances=(
+        "-mass*xi*omega**2 = mass*gravity*cos_phi - (N1 + N2)*cos_beta + (K1*N1 - K2*N2)*sin_beta + pull",
+        "mass*xi*phi_dd = -mass*gravity*sin_phi + (N1 - N2)*sin_beta + (K1*N1 + K2*N2)*cos_beta - drag*omega",
+        "(inertia + mass*xi**2)*phi_dd = -mass*gravity*xi*sin_phi + radius*(K1*N1 + K2*N2) - drag*xi*omega",
+    ),
+    energy="0.5*(inertia + mass*xi**2)*omega**2 - mass*gravity*xi*cos_phi",
+)
+class Dragged(NamedTuple):
+    """Two contacts, drag of the air at the centre of mass, and a constant radial force."""
+
+    mass: float
+    inertia: float
+    radius: float
+    xi: float
+    beta: float
+    sin_beta: float
+    cos_beta: float
+    gravity: float
+    drag: float
+    pull: float
+    constants: tuple[float, ...] = ()
+
+
+class TestDerivedFunctions:
+    """What follows from the balances agrees, for a body whose balances have every kind of term."""
+
+    @given(states(), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
+    def test_forms_of_the_solution_agree(self, state, drag, pull):
+        simple, K1, K2, phi, omega = state
+        weight = simple.mass * simple.gravity
+        size = weight * (1.0 + omega**2 * simple.radius / simple.gravity)
+        body = ring.completed(Dragged(*simple[:8], drag * size / (1.0 + abs(omega)), pull * weight))
+        at = sin(phi), cos(phi), omega
+        epsilon, N1, N2 = motion(body, K1, K2, phi, omega)
+        scale = force_scale(body, omega, epsilon, N1, N2) + size
+        moment = scale * body.radius
+        np.testing.assert_allclose(
+            solution(body, K1, K2, phi, omega) * [body.mass * body.radius, 1, 1],
+            np.array([epsilon, N1, N2]) * [body.mass * body.radius, 1, 1],
+            rtol=0,
+            atol=1e-9 * scale,
+        )
+        basis = 1.0, *at, omega**2
+        for row, expected in zip(ring.slip_balance(body, K1, K2), (epsilon, N1, N2), strict=True):
+            terms = np.multiply(row[:5], basis)
+            assert abs(terms.sum() - expected) <= 1e-11 * np.abs(terms).sum()
+        found = ring.held(body, 1.0, *at, omega**2, epsilon, N1)
+        np.testing.assert_allclose(found, (N1, N2, K1 * N1, K2 * N2), rtol=0, atol=1e-9 * scale)
+        _, determinant = acceleration(body, K1, K2, *at)
+        assert ring.determinant_terms(body, 1.0, K1, K2, K1 * K2) == pytest.approx(determinant, rel=1e-12)
+        inertia = body.inertia + body.mass * body.xi**2
+        rate = inertia * omega * epsilon + weight * body.xi * sin(phi) * omega
+        assert abs(ring.power(body, K1, K2, N1, N2, *at) - rate) < 1e-9 * moment * (1 + abs(omega))
+        by_phi, by_omega = ring.acceleration_gradient(body, K1, K2, *at)
+        tiny = 1e-30j
+        assert by_omega == pytest.approx(acceleration(body, K1, K2, *at[:2], omega + tiny)[0].imag / 1e-30, rel=1e-9)
+        turned = at[0] + tiny * at[1], at[1] - tiny * at[0]
+        assert by_phi == pytest.approx(acceleration(body, K1, K2, *turned, omega)[0].imag / 1e-30, rel=1e-9)
+        gain = acceleration(body, tiny, tiny, *at)[0].imag / 1e-30
+        assert ring.friction_gain(body, *at) == pytest.approx(gain, rel=1e-9, abs=1e-9)
 
 
 class TestSlope:
