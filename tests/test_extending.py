@@ -41,7 +41,7 @@ DRAG = [
     ("K1*N1 - ", "K1*N1 - drag*radius*omega - "),
     ("    pull: Leaf\n", "    pull: Leaf\n    drag: Leaf\n"),
     ('{"disc.slope": slope}', '{"disc.slope": slope, "disc.drag": Parameter("N s/m", "drag of the air")}'),
-    ("gravity * np.sin(slope))", 'gravity * np.sin(slope), values["disc.drag"])'),
+    ("press, pull)\n", 'press, pull, values["disc.drag"])\n'),
     ('name = "disc"', 'name = "disc-in-air"'),
 ]
 
