@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 
 from ringsweep.compile import take
 from ringsweep.models.ring.record import Outcome
+from ringsweep.physics import ring
 from ringsweep.physics.friction.speeds import hidden_fields
 from ringsweep.physics.friction.velocity import EXPRESSIONS, friction_at
 from ringsweep.solvers.automaton import integrate
@@ -19,6 +20,17 @@ def made(law, surfaces=((0.5, 0.3),), **parameters):
     columns = {name: np.array([float(value)]) for name, value in parameters.items()}
     pairs = [tuple(np.array([float(mu)]) for mu in pair) for pair in surfaces]
     return take(law(**columns, **hidden_fields(EXPRESSIONS[law], columns, pairs)), 0)
+
+
+def rod(mass, inertia, radius, xi, sin_beta, cos_beta, gravity):
+    """Body with two contacts, with its constants."""
+    beta = np.arcsin(sin_beta)
+    return ring.completed(ring.TwoContacts(mass, inertia, radius, xi, beta, sin_beta, cos_beta, gravity))
+
+
+def ball(mass, radius, gravity):
+    """Body with one contact, with its constants."""
+    return ring.completed(ring.OneContact(mass, radius, gravity))
 
 
 def solve(method, batch):

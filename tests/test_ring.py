@@ -1,19 +1,20 @@
 """Equations of the ring: balances, symmetries, limits; and compiled functions against plain formulas."""
 
 from math import cos, exp, pi, radians, sin
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from solutions import made
+from solutions import ball, made, rod
 
 from ringsweep.compile import kernel, take
 from ringsweep.errors import InputError
 from ringsweep.models.interface.constant_step import inspect
 from ringsweep.physics import ring
 from ringsweep.physics.friction.laws import BengisuAkay
-from ringsweep.physics.ring import OneContact, Ring, TwoContacts, acceleration, acceleration_slope, reactions
+from ringsweep.physics.ring import Ring, acceleration, acceleration_slope, reactions
 from ringsweep.physics.zones import Arc, surface_of
 
 angles = st.floats(-20.0, 20.0)
@@ -29,7 +30,7 @@ def two_contacts(draw):
     mass, gravity = draw(st.floats(1e-3, 1e3)), draw(st.floats(0.1, 30.0))
     xi = radius * (1.0 - draw(st.floats(0.0, 0.7))) * cos(beta)
     inertia = mass * xi * xi * draw(st.floats(0.0, 3.0))
-    return TwoContacts.of(mass, inertia, radius, xi, sin(beta), cos(beta), gravity)
+    return rod(mass, inertia, radius, xi, sin(beta), cos(beta), gravity)
 
 
 @st.composite
@@ -108,6 +109,125 @@ class TestTwoContactBalances:
         assert motion(body, 0.0, 0.0, phi, omega)[0] == pytest.approx(pendulum, rel=1e-12, abs=1e-300)
 
 
+def solution(body, K1, K2, phi, omega):
+    """Angular acceleration and reactions from the balances as they are declared, solved as linear equations."""
+    texts = ring.EQUATIONS[type(body)].texts
+    known = {**body._asdict(), "sin_phi": sin(phi), "cos_phi": cos(phi), "omega": omega, "K1": K1, "K2": K2}
+
+    def errors(unknowns):
+        names = known | dict(zip(("phi_dd", "N1", "N2"), unknowns, strict=True))
+        sides = ([eval(side, {}, names) for side in text.split("=")] for text in texts)
+        return np.array([left - right for left, right in sides])
+
+    size = len(texts)
+    base = errors(np.zeros(3))
+    matrix = np.array([errors(unit) - base for unit in np.eye(3)[:size]]).T
+    return np.linalg.solve(matrix, -base)
+
+
+class TestDeclaredBalances:
+    @given(states())
+    def test_solution_of_two_contacts_solves_the_declared_balances(self, state):
+        epsilon, N1, N2 = motion(*state)
+        scale = force_scale(state[0], state[-1], epsilon, N1, N2)
+        found = solution(*state)
+        assert abs(found[0] - epsilon) * state[0].mass * state[0].radius < 1e-9 * scale
+        assert np.abs(found[1:] - [N1, N2]).max() < 1e-9 * scale
+
+    @given(friction_ratios, angles, st.floats(-50.0, 50.0))
+    def test_solution_of_one_contact_solves_the_declared_balances(self, K, phi, omega):
+        body = ball(0.3, 0.2, 9.81)
+        np.testing.assert_allclose(
+            solution(body, K, 0.0, phi, omega), motion(body, K, 0.0, phi, omega)[:2], rtol=1e-9, atol=1e-9
+        )
+
+    @given(states(), st.floats(-1e-3, 1e-3))
+    def test_audit_sees_a_wrong_reaction(self, state, share):
+        body, K1, K2, phi, omega = state
+        epsilon, N1, N2 = motion(*state)
+        at = sin(phi), cos(phi), omega
+        assert ring.imbalance(body, K1, K2, N1, N2, epsilon, *at) < 1e-24
+        wrong = share * (abs(N1) + abs(N2))
+        assert ring.imbalance(body, K1, K2, N1 + wrong, N2, epsilon, *at) >= 1e-4 * share**2
+
+    @pytest.mark.parametrize(
+        ("balances", "message"),
+        [
+            (("mass*gravty*cos_phi = N1", "mass*radius*phi_dd = K1*N1"), "'gravty' is not defined"),
+            (("mass*gravity = N1*N1", "mass*radius*phi_dd = K1*N1"), "a balance is a sum of multiples"),
+            (("mass*gravity = 0", "mass*radius*phi_dd = K1*N1"), "do not determine"),
+            (("mass*gravity = sqrt(N1)", "mass*radius*phi_dd = K1*N1"), "sqrt"),
+            (("mass*gravity = N1",), "1 balances: give two"),
+        ],
+    )
+    def test_wrong_balance_is_told_with_its_text(self, balances, message):
+        with pytest.raises(TypeError, match=f"OneContact: .*{message}"):
+            ring.body(balances=balances, energy="0")(ring.OneContact)
+
+
+@ring.body(
+    balances=(
+        "-mass*xi*omega**2 = mass*gravity*cos_phi - (N1 + N2)*cos_beta + (K1*N1 - K2*N2)*sin_beta + pull",
+        "mass*xi*phi_dd = -mass*gravity*sin_phi + (N1 - N2)*sin_beta + (K1*N1 + K2*N2)*cos_beta - drag*omega",
+        "(inertia + mass*xi**2)*phi_dd = -mass*gravity*xi*sin_phi + radius*(K1*N1 + K2*N2) - drag*xi*omega",
+    ),
+    energy="0.5*(inertia + mass*xi**2)*omega**2 - mass*gravity*xi*cos_phi",
+)
+class Dragged(NamedTuple):
+    """Two contacts, drag of the air at the centre of mass, and a constant radial force."""
+
+    mass: float
+    inertia: float
+    radius: float
+    xi: float
+    beta: float
+    sin_beta: float
+    cos_beta: float
+    gravity: float
+    drag: float
+    pull: float
+    constants: tuple[float, ...] = ()
+
+
+class TestDerivedFunctions:
+    """What follows from the balances agrees, for a body whose balances have every kind of term."""
+
+    @given(states(), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
+    def test_forms_of_the_solution_agree(self, state, drag, pull):
+        simple, K1, K2, phi, omega = state
+        weight = simple.mass * simple.gravity
+        size = weight * (1.0 + omega**2 * simple.radius / simple.gravity)
+        body = ring.completed(Dragged(*simple[:8], drag * size / (1.0 + abs(omega)), pull * weight))
+        at = sin(phi), cos(phi), omega
+        epsilon, N1, N2 = motion(body, K1, K2, phi, omega)
+        scale = force_scale(body, omega, epsilon, N1, N2) + size
+        moment = scale * body.radius
+        np.testing.assert_allclose(
+            solution(body, K1, K2, phi, omega) * [body.mass * body.radius, 1, 1],
+            np.array([epsilon, N1, N2]) * [body.mass * body.radius, 1, 1],
+            rtol=0,
+            atol=1e-9 * scale,
+        )
+        basis = 1.0, *at, omega**2
+        for row, expected in zip(ring.slip_balance(body, K1, K2), (epsilon, N1, N2), strict=True):
+            terms = np.multiply(row[:5], basis)
+            assert abs(terms.sum() - expected) <= 1e-11 * np.abs(terms).sum()
+        found = ring.held(body, 1.0, *at, omega**2, epsilon, N1)
+        np.testing.assert_allclose(found, (N1, N2, K1 * N1, K2 * N2), rtol=0, atol=1e-9 * scale)
+        _, determinant = acceleration(body, K1, K2, *at)
+        assert ring.determinant_terms(body, 1.0, K1, K2, K1 * K2) == pytest.approx(determinant, rel=1e-12)
+        inertia = body.inertia + body.mass * body.xi**2
+        rate = inertia * omega * epsilon + weight * body.xi * sin(phi) * omega
+        assert abs(ring.power(body, K1, K2, N1, N2, *at) - rate) < 1e-9 * moment * (1 + abs(omega))
+        by_phi, by_omega = ring.acceleration_gradient(body, K1, K2, *at)
+        tiny = 1e-30j
+        assert by_omega == pytest.approx(acceleration(body, K1, K2, *at[:2], omega + tiny)[0].imag / 1e-30, rel=1e-9)
+        turned = at[0] + tiny * at[1], at[1] - tiny * at[0]
+        assert by_phi == pytest.approx(acceleration(body, K1, K2, *turned, omega)[0].imag / 1e-30, rel=1e-9)
+        gain = acceleration(body, tiny, tiny, *at)[0].imag / 1e-30
+        assert ring.friction_gain(body, *at) == pytest.approx(gain, rel=1e-9, abs=1e-9)
+
+
 class TestSlope:
     """Derivative of the acceleration by way of friction, from which the stiffness of a step is computed."""
 
@@ -124,7 +244,7 @@ class TestSlope:
 
     @given(lifts, friction_ratios, angles, st.floats(-1.0, 1.0))
     def test_acceleration_slope_of_one_contact_is_the_derivative(self, lift, K, phi, slope):
-        body = OneContact(0.1, 0.05, 9.81)
+        body = ball(0.1, 0.05, 9.81)
         where = (sin(phi), cos(phi), (lift * 9.81 / 0.05) ** 0.5)
         complex_step = acceleration(body, K + 1e-40j * slope, 0.0, *where)[0].imag / 1e-40
         assert acceleration_slope(body, K, 0.0, slope, 0.0, *where) == pytest.approx(complex_step, rel=1e-12)
@@ -133,7 +253,7 @@ class TestSlope:
 class TestOneContact:
     @given(friction_ratios, angles, st.floats(-50.0, 50.0))
     def test_forces_on_a_body_with_one_contact_are_balanced(self, K, phi, omega):
-        body = OneContact(mass=0.3, radius=0.2, gravity=9.81)
+        body = ball(mass=0.3, radius=0.2, gravity=9.81)
         epsilon, normal, repeated = motion(body, K, 0.7, phi, omega)
         assert normal == repeated
         assert normal == pytest.approx(0.3 * (9.81 * cos(phi) + 0.2 * omega**2), rel=1e-12, abs=1e-12)
@@ -142,11 +262,11 @@ class TestOneContact:
     @given(friction_ratios, angles, st.floats(-50.0, 50.0))
     def test_one_contact_is_the_limit_of_two_close_contacts(self, K, phi, omega):
         M, R, g = 0.3, 0.2, 9.81
-        epsilon, N, _ = motion(OneContact(M, R, g), K, K, phi, omega)
+        epsilon, N, _ = motion(ball(M, R, g), K, K, phi, omega)
         scale = g + R * omega**2
         gaps = []
         for beta in (1e-3, 1e-4, 1e-5):
-            close = TwoContacts.of(M, 0.0, R, R * cos(beta), sin(beta), cos(beta), g)
+            close = rod(M, 0.0, R, R * cos(beta), sin(beta), cos(beta), g)
             epsilon_2, N1, N2 = motion(close, K, K, phi, omega)
             gaps.append((abs(epsilon_2 - epsilon) * R + abs(N1 + N2 - N) / M) / scale)
         assert gaps[0] < 1e-2
@@ -239,6 +359,14 @@ class TestGeometry:
         assert from_radius.xi == pytest.approx(0.022115, abs=1e-6)
         for one, other in zip(from_beta, from_radius, strict=True):
             np.testing.assert_allclose(one, other, rtol=2e-4)
+
+    def test_centre_of_mass_lies_beside_the_line_of_the_balls(self, cells):
+        on_line, beside = take(cells().body, 0), take(cells({"body.center_offset": 0.005}).body, 0)
+        assert beside.xi == pytest.approx(on_line.xi + 0.005)
+        assert (beside.radius, beside.beta) == (on_line.radius, on_line.beta)
+        # Without friction it is a longer pendulum.
+        M, J, xi, g = beside.mass, beside.inertia, beside.xi, beside.gravity
+        assert motion(beside, 0.0, 0.0, 1.0, 2.0)[0] == pytest.approx(-M * g * xi / (J + M * xi**2) * sin(1.0))
 
     @pytest.mark.parametrize(
         ("changes", "message"),

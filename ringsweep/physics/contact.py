@@ -42,12 +42,13 @@ CLOSED, OPEN_1, OPEN_2, OPEN_BOTH, STICK, FORWARD, BACKWARD, IMPOSSIBLE = range(
 _ROUNDING = 1e-13
 
 
-@hook
+@inlined
 def stick(body, m1, m2, sin_phi, cos_phi, omega, epsilon):
     """Saturation of friction, and normal reactions, of a body that sticks to the ring.
 
     Friction is ``K_i = -kappa mu_s,i`` at both contacts, with the saturation ``kappa`` at which the angular
-    acceleration of the body equals that of the ring.
+    acceleration of the body equals that of the ring. The balances leave ``N_1`` open if there are two contacts. With
+    friction in proportion to ``mu_s,i N_i`` it solves a quadratic equation.
 
     Parameters
     ----------
@@ -69,40 +70,50 @@ def stick(body, m1, m2, sin_phi, cos_phi, omega, epsilon):
         this acceleration.
     """
 
-
-@stick.implements(ring.TwoContacts)
-def _two_stick(body, m1, m2, sin_phi, cos_phi, omega, epsilon):
-    b = body
-    sb, cb = b.sin_beta, b.cos_beta
-    mean, half = 0.5 * (m1 + m2), 0.5 * (m1 - m2)
-    # The moment about the axis gives the sum of friction, the tangential balance gives the difference of the reactions.
-    friction = ((b.inertia + b.mass * b.xi * b.xi) * epsilon + b.mass * b.gravity * b.xi * sin_phi) / b.radius
-    difference = (b.mass * (b.xi * epsilon + b.gravity * sin_phi) - friction * cb) / sb
-    load = b.mass * (b.xi * omega * omega + b.gravity * cos_phi)
-    if mean == 0.0:
-        total = load / cb
-        return 0.0, -abs(friction), 0.5 * (total + difference), 0.5 * (total - difference)
-    # With friction in proportion to m_i N_i the radial balance is: mean cb total^2 - linear total - constant = 0.
-    linear = mean * load - cb * half * difference + sb * half * friction
-    constant = difference * (half * load + mean * sb * friction)
-    square = linear * linear + 4.0 * mean * cb * constant
-    if not square >= 0.0:
-        return 0.0, -inf, 0.0, 0.0
-    root = sqrt(square)
-    # If the smaller root is admissible the larger root is too, with larger reactions.
-    total = (linear + root) / (2.0 * mean * cb) if linear >= 0.0 else 2.0 * constant / (root - linear)
-    normal_1, normal_2 = 0.5 * (total + difference), 0.5 * (total - difference)
-    capacity = m1 * normal_1 + m2 * normal_2
-    return -friction / capacity if capacity != 0.0 else 0.0, capacity - abs(friction), normal_1, normal_2
+    N1, N2, F1, F2 = ring.held(body, 1.0, sin_phi, cos_phi, omega, omega * omega, epsilon, 0.0)
+    friction, capacity = F1, m1 * N1
+    if ring.contact_count(body) == 2:
+        _, by_N2, by_F1, by_F2 = ring.held(body, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+        square, linear, constant = sharing(m1, m2, (N2, F1, F2), (by_N2, by_F1, by_F2))
+        discriminant = linear * linear - 4.0 * square * constant
+        if not discriminant >= 0.0:
+            return 0.0, -inf, 0.0, 0.0
+        N1 = larger_root(square, linear, constant) if square > 0.0 else (F2 - F1) / (by_F1 - by_F2)
+        N2 += by_N2 * N1
+        friction, capacity = F1 + F2 + (by_F1 + by_F2) * N1, m1 * N1 + m2 * N2
+    return -friction / capacity if capacity != 0.0 else 0.0, capacity - abs(friction), N1, N2
 
 
-@stick.implements(ring.OneContact)
-def _one_stick(body, m1, m2, sin_phi, cos_phi, omega, epsilon):
-    b = body
-    friction = b.mass * (b.radius * epsilon + b.gravity * sin_phi)
-    normal = b.mass * (b.gravity * cos_phi + b.radius * omega * omega)
-    capacity = m1 * normal
-    return -friction / capacity if capacity != 0.0 else 0.0, capacity - abs(friction), normal, normal
+@inlined
+def sharing(m1, m2, at_zero, by_N1):
+    """Coefficients of the quadratic equation for N_1 that makes friction proportional to m_i N_i at both contacts.
+
+    It is ``F1 m2 N2 = F2 m1 N1``, where N2, F1 and F2 are linear in N_1.
+
+    Parameters
+    ----------
+    m1, m2 : float
+        Static friction coefficients under the contacts, 1.
+    at_zero, by_N1 : tuple of float
+        N2, F1 and F2 at N_1 = 0, N, and their derivatives by N_1; see :func:`ringsweep.physics.ring.held`.
+
+    Returns
+    -------
+    tuple of float
+        Coefficients of N_1^2 (1; greater than 0 unless m1 = m2 = 0) and of N_1, N, and constant term, N^2.
+    """
+    (N2, F1, F2), (by_N2, by_F1, by_F2) = at_zero, by_N1
+    return m2 * by_F1 * by_N2 - m1 * by_F2, m2 * (by_F1 * N2 + F1 * by_N2) - m1 * F2, m2 * F1 * N2
+
+
+@inlined
+def larger_root(square, linear, constant):
+    """Larger root of a quadratic equation with positive `square`.
+
+    If the smaller root is admissible the larger root is too, with larger reactions.
+    """
+    root = sqrt(max(linear * linear - 4.0 * square * constant, 0.0))
+    return 0.5 * (root - linear) / square if linear <= 0.0 else -2.0 * constant / (root + linear)
 
 
 @hook(optional=True)
@@ -185,7 +196,7 @@ def _two_opening(body, k1, k2, m1, m2, slides, sin_phi, cos_phi, omega, epsilon)
     return OPEN_2 if second else IMPOSSIBLE
 
 
-@hook(optional=True)
+@inlined
 def lost(body, first, second):
     """Contacts that open, given whether the normal reaction of each has vanished.
 
@@ -198,13 +209,10 @@ def lost(body, first, second):
     Returns
     -------
     int
-        OPEN_1, OPEN_2 or OPEN_BOTH. By default OPEN_1, for bodies with one contact.
+        OPEN_1, OPEN_2 or OPEN_BOTH.
     """
-    return OPEN_1
-
-
-@lost.implements(ring.TwoContacts)
-def _two_lost(body, first, second):
+    if ring.contact_count(body) == 1:
+        return OPEN_1
     return OPEN_BOTH if first and second else OPEN_1 if first else OPEN_2
 
 
@@ -317,4 +325,4 @@ def sliding(body, K1, K2, sin_phi, cos_phi, omega):
 
 
 #: Functions of a body that the contact problem needs.
-BODY_MEMBERS = (stick, opening, lost)
+BODY_MEMBERS = (opening,)

@@ -13,17 +13,8 @@ Balance of momentum, radial and tangential, and of moment of momentum about the 
     M \\xi \\ddot\\varphi &= -M g \\sin\\varphi + (N_1 - N_2) \\sin\\beta + (K_1 N_1 + K_2 N_2) \\cos\\beta \\\\
     (J + M \\xi^2) \\ddot\\varphi &= -M g \\xi \\sin\\varphi + R (K_1 N_1 + K_2 N_2)
 
-With ``S = K1 + K2``, ``Delta = K1 - K2`` and ``P = K1 K2`` the first two give the paper's Eq. 17 with the
-determinant :math:`D = D_0 + D_1 \\Delta + D_2 P`, and all three give
-
-.. math::
-
-    \\ddot\\varphi = \\frac{(m_0 + m_1 \\Delta + m_2 P) \\sin\\varphi + (l_0 \\cos\\varphi + l_1 \\omega^2) S}
-        {i_0 + i_1 \\Delta + i_2 P} ,
-
-with the coefficients of :class:`TwoContacts`. The denominator is the determinant of the three balances as equations for
-the angular acceleration and both reactions. A body that slides on both contacts jams where it falls to 0 (Painleve):
-with ``q = R - xi cos(beta)`` the accelerations of the gaps are ``A N + b``,
+They are equations for the angular acceleration and both reactions. Where their determinant falls to 0, a body that
+slides on both contacts jams (Painleve): with ``q = R - xi cos(beta)`` the accelerations of the gaps are ``A N + b``,
 
 .. math::
 
@@ -32,90 +23,24 @@ with ``q = R - xi cos(beta)`` the accelerations of the gaps are ``A N + b``,
 
 ``A_22`` and ``A_21`` follow with ``-K_2`` in place of ``K_1`` and ``-K_1`` in place of ``K_2``. ``M^2 J det A`` is the
 determinant of the balances times ``sin(2 beta)``.
+
+A body is declared by :func:`body`. All that the solvers need of it follows from its balances; see
+:mod:`ringsweep.physics.bodies`.
 """
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from ringsweep.compile import absorbed, hook, inlined
+from ringsweep.compile import absorbed, function_from_lines, hook, inlined
 from ringsweep.numerics.functions import opposing
 from ringsweep.physics import drives
+from ringsweep.physics.bodies import Equations
 from ringsweep.physics.friction.velocity import friction_at
 from ringsweep.physics.zones import PER_TURN, roughness
 from ringsweep.quantities.parameters import Leaf
-
-
-class TwoContacts(NamedTuple):
-    """Two balls joined by a rod (the paper's Fig. 22).
-
-    Attributes
-    ----------
-    mass, inertia : float
-        Mass M, kg, and moment of inertia J about the centre of mass, kg m^2.
-    radius, xi : float
-        Radius R of the race, and distance of the centre of mass from the axis, m.
-    beta, sin_beta, cos_beta : float
-        Half the angle between the contacts, rad; its sine and cosine.
-    gravity : float
-        Acceleration of gravity, m/s^2.
-    determinant, weight, lift : tuple of float
-        Coefficients of the acceleration, see the head of this module: (i_0, i_1, i_2), kg m^2; (m_0, m_1, m_2), N m;
-        (l_0, l_1), N m and kg m^2.
-    reaction : tuple of float
-        Coefficients of the reactions, see :func:`reactions`: kg^2 m^2, 1, m/s^2.
-    """
-
-    mass: Leaf
-    inertia: Leaf
-    radius: Leaf
-    xi: Leaf
-    beta: Leaf
-    sin_beta: Leaf
-    cos_beta: Leaf
-    gravity: Leaf
-    determinant: tuple[Leaf, Leaf, Leaf]
-    weight: tuple[Leaf, Leaf, Leaf]
-    lift: tuple[Leaf, Leaf]
-    reaction: tuple[Leaf, Leaf, Leaf]
-
-    @classmethod
-    def of(
-        cls, mass: Any, inertia: Any, radius: Any, xi: Any, sin_beta: Any, cos_beta: Any, gravity: Any
-    ) -> TwoContacts:
-        """Body with the coefficients of its acceleration and reactions computed."""
-        # Coefficients of the determinant of the radial and the tangential balance, which the paper calls D.
-        D = 2.0 * sin_beta * cos_beta, cos_beta * cos_beta - sin_beta * sin_beta, 2.0 * sin_beta * cos_beta
-        # Coefficients of the tangential balance after the moment about the axis is eliminated.
-        T = 0.0, cos_beta, 2.0 * sin_beta
-        about_axis = inertia + mass * xi * xi
-        lever, arm = radius * mass, mass * xi
-        determinant = [about_axis * d - lever * xi * t for d, t in zip(D, T, strict=True)]
-        weight = [gravity * (lever * t - arm * d) for d, t in zip(D, T, strict=True)]
-        return cls(
-            mass,
-            inertia,
-            radius,
-            xi,
-            np.arcsin(sin_beta),
-            sin_beta,
-            cos_beta,
-            gravity,
-            (determinant[0], determinant[1], determinant[2]),
-            (weight[0], weight[1], weight[2]),
-            (lever * gravity * sin_beta, lever * xi * sin_beta),
-            (mass * about_axis, cos_beta - lever * xi / about_axis, gravity * inertia / about_axis),
-        )
-
-
-class OneContact(NamedTuple):
-    """A small body on one contact (the paper's Fig. 13): mass, kg; radius of the race, m; gravity, m/s^2."""
-
-    mass: Leaf
-    radius: Leaf
-    gravity: Leaf
 
 
 class Ring(NamedTuple):
@@ -187,28 +112,14 @@ def contact_offset(body):
     return 0.0
 
 
-@contact_offset.implements(TwoContacts)
-def _two_offset(body):
-    return body.beta
-
-
-@hook(optional=True)
+@hook
 def free_determinant(body):
-    """Determinant of the balances without friction, kg m^2. By default 1, for bodies that cannot jam."""
-    return 1.0
-
-
-@free_determinant.implements(TwoContacts)
-def _two_free_determinant(body):
-    return body.determinant[0]
+    """Determinant of the balances without friction, kg m^2. 1 for bodies that cannot jam."""
 
 
 @hook(absorb=True)
 def acceleration(body, K1, K2, sin_phi, cos_phi, omega):
     """Angular acceleration of the body in slip, and the determinant that tells whether the body jams.
-
-    Bodies get vector lanes, so they are written without ``if``. Apart from :func:`constant_terms`, the acceleration is
-    linear in ``sin_phi``, ``cos_phi`` and ``omega**2``.
 
     Parameters
     ----------
@@ -228,66 +139,9 @@ def acceleration(body, K1, K2, sin_phi, cos_phi, omega):
     """
 
 
-@inlined
-def _combine(coefficients, delta, P):
-    """Value of ``c_0 + c_1 Delta + c_2 P``."""
-    c_0, c_1, c_2 = coefficients
-    return c_0 + c_1 * delta + c_2 * P
-
-
-@acceleration.implements(TwoContacts)
-def _two_acceleration(body, K1, K2, sin_phi, cos_phi, omega):
-    delta, P = K1 - K2, K1 * K2
-    l_0, l_1 = body.lift
-    determinant = _combine(body.determinant, delta, P)
-    moment = _combine(body.weight, delta, P) * sin_phi + (l_0 * cos_phi + l_1 * (omega * omega)) * (K1 + K2)
-    return moment * (1.0 / determinant), determinant
-
-
-@acceleration.implements(OneContact)
-def _one_acceleration(body, K1, K2, sin_phi, cos_phi, omega):
-    b = body
-    phi_dd = -b.gravity / b.radius * sin_phi + K1 * (b.gravity / b.radius * cos_phi + omega * omega)
-    return phi_dd, 1.0
-
-
-@hook(optional=True)
-def constant_terms(body, K1, K2):
-    """Terms of the angular acceleration and of the reactions that do not depend on the state.
-
-    The other terms are proportional to ``sin_phi``, ``cos_phi`` or ``omega**2``. By default they are found as what is
-    left
-    where these three are 0.
-
-    Parameters
-    ----------
-    body, K1, K2
-        As for :func:`acceleration`.
-
-    Returns
-    -------
-    tuple of float
-        Constant terms of the angular acceleration, rad/s^2, and of both normal reactions, N.
-    """
-    phi_dd, _ = acceleration(body, K1, K2, 0.0, 0.0, 0.0)
-    normal_1, normal_2 = reactions(body, K1, K2, 0.0, 0.0, 0.0)
-    return phi_dd, normal_1, normal_2
-
-
-@constant_terms.implements(TwoContacts, OneContact)
-def _no_constant_terms(body, K1, K2):
-    return 0.0, 0.0, 0.0
-
-
-@hook(optional=True)
+@hook
 def contact_count(body):
-    """Number of contacts of a body; by default 1."""
-    return 1
-
-
-@contact_count.implements(TwoContacts)
-def _two_contacts(body):
-    return 2
+    """Number of contacts of a body, 1 or 2."""
 
 
 @hook(absorb=True)
@@ -308,26 +162,6 @@ def acceleration_slope(body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega):
     """
 
 
-@acceleration_slope.implements(TwoContacts)
-def _two_slope(body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega):
-    delta, P = K1 - K2, K1 * K2
-    d_delta, d_P = slope_1 - slope_2, slope_1 * K2 + K1 * slope_2
-    _, i_1, i_2 = body.determinant
-    _, m_1, m_2 = body.weight
-    l_0, l_1 = body.lift
-    lift = l_0 * cos_phi + l_1 * (omega * omega)
-    determinant = _combine(body.determinant, delta, P)
-    moment = _combine(body.weight, delta, P) * sin_phi + lift * (K1 + K2)
-    d_moment = (m_1 * d_delta + m_2 * d_P) * sin_phi + lift * (slope_1 + slope_2)
-    per_determinant = 1.0 / determinant
-    return (d_moment - moment * per_determinant * (i_1 * d_delta + i_2 * d_P)) * per_determinant
-
-
-@acceleration_slope.implements(OneContact)
-def _one_slope(body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega):
-    return slope_1 * (body.gravity / body.radius * cos_phi + omega * omega)
-
-
 @hook(absorb=True)
 def acceleration_gradient(body, K1, K2, sin_phi, cos_phi, omega):
     """Derivatives of the angular acceleration by angle and by angular velocity, at constant K1 and K2.
@@ -344,27 +178,13 @@ def acceleration_gradient(body, K1, K2, sin_phi, cos_phi, omega):
     """
 
 
-@acceleration_gradient.implements(TwoContacts)
-def _two_gradient(body, K1, K2, sin_phi, cos_phi, omega):
-    delta, P = K1 - K2, K1 * K2
-    l_0, l_1 = body.lift
-    per_determinant = 1.0 / _combine(body.determinant, delta, P)
-    by_phi = _combine(body.weight, delta, P) * cos_phi - l_0 * sin_phi * (K1 + K2)
-    return by_phi * per_determinant, 2.0 * omega * l_1 * (K1 + K2) * per_determinant
-
-
-@acceleration_gradient.implements(OneContact)
-def _one_gradient(body, K1, K2, sin_phi, cos_phi, omega):
-    return -body.gravity / body.radius * (cos_phi + K1 * sin_phi), 2.0 * omega * K1
-
-
 @hook(absorb=True)
-def friction_gain(body, cos_phi, omega):
+def friction_gain(body, sin_phi, cos_phi, omega):
     """Derivative of the angular acceleration by K, with the same K at all contacts, at K = 0.
 
     Parameters
     ----------
-    body, cos_phi, omega
+    body, sin_phi, cos_phi, omega
         As for :func:`acceleration`.
 
     Returns
@@ -374,29 +194,12 @@ def friction_gain(body, cos_phi, omega):
     """
 
 
-@friction_gain.implements(TwoContacts)
-def _two_friction_gain(body, cos_phi, omega):
-    l_0, l_1 = body.lift
-    return (l_0 * cos_phi + l_1 * (omega * omega)) * (2.0 / body.determinant[0])
-
-
-@friction_gain.implements(OneContact)
-def _one_friction_gain(body, cos_phi, omega):
-    return body.gravity / body.radius * cos_phi + omega * omega
-
-
-@hook(optional=True)
+@hook
 def reaction_determinant(body):
     """Determinant D of the reactions without friction, 1. Errors of friction grow in the reactions by 1/D.
 
-    By default 1.
+    It is that of all balances but the last, as equations for the reactions.
     """
-    return 1.0
-
-
-@reaction_determinant.implements(TwoContacts)
-def _two_reaction_determinant(body):
-    return 2.0 * body.sin_beta * body.cos_beta
 
 
 @hook(absorb=True)
@@ -417,68 +220,222 @@ def reactions(body, K1, K2, sin_phi, cos_phi, omega):
     """
 
 
-@reactions.implements(TwoContacts)
-def _two_reactions(body, K1, K2, sin_phi, cos_phi, omega):
-    b = body
-    scale, lever, pull = b.reaction
-    # Weight and inertia per unit of mass, along the race and across it; the moment about the axis is eliminated.
-    along = pull * sin_phi
-    across = b.gravity * cos_phi + b.xi * (omega * omega)
-    load = scale * (1.0 / _combine(b.determinant, K1 - K2, K1 * K2))
-    N1 = across * (b.sin_beta - K2 * lever) + along * (b.cos_beta + K2 * b.sin_beta)
-    N2 = across * (b.sin_beta + K1 * lever) - along * (b.cos_beta - K1 * b.sin_beta)
-    return load * N1, load * N2
+@hook
+def slip_balance(body, K1, K2):
+    """Solution of the balances in slip, where friction is K_i N_i plus a given force.
 
+    Angular acceleration and reactions are linear in sine and cosine of the angle, in the angular velocity and its
+    square, and in the given forces. The series need it because coefficient k of the product of two series K_i and N_i
+    is ``K_i[0] N_i[k]`` plus terms that are known.
 
-@reactions.implements(OneContact)
-def _one_reactions(body, K1, K2, sin_phi, cos_phi, omega):
-    N = body.mass * (body.gravity * cos_phi + body.radius * omega * omega)
-    return N, N
+    Parameters
+    ----------
+    body, K1, K2
+        As for :func:`acceleration`.
+
+    Returns
+    -------
+    tuple of tuple of float
+        Three rows: for the angular acceleration, rad/s^2, and for N_1 and N_2, N. Each row has seven numbers: the
+        constant term, and the factors of sine, cosine, angular velocity, its square, and force at contact 1 and 2.
+    """
 
 
 @hook
-def energy(body, cos_phi, omega):
-    """Kinetic and potential energy of the body, J. Its rate is :func:`friction_power`.
+def determinant_terms(body, one, K1, K2, both):
+    """Determinant of the balances as a linear function of 1, K_1, K_2 and K_1 K_2.
 
     Parameters
     ----------
     body : NamedTuple
-    cos_phi : float
-        Cosine of the angle of the body.
-    omega : float
-        Angular velocity of the body, rad/s.
+    one, K1, K2, both : float
+        1, K_1, K_2 and K_1 K_2, or coefficients of their series.
+
+    Returns
+    -------
+    float
+        In the unit of the second result of :func:`acceleration`. It is `one` for bodies that cannot jam.
     """
 
 
-@energy.implements(TwoContacts)
-def _two_energy(body, cos_phi, omega):
-    b = body
-    return 0.5 * (b.inertia + b.mass * b.xi * b.xi) * omega * omega - b.mass * b.gravity * b.xi * cos_phi
+@hook
+def held(body, one, sin_phi, cos_phi, omega, square, epsilon, normal):
+    """Forces at the contacts from the balances and not from a friction law: so in stick too.
 
-
-@energy.implements(OneContact)
-def _one_energy(body, cos_phi, omega):
-    b = body
-    return b.mass * b.radius * (0.5 * b.radius * omega * omega - b.gravity * cos_phi)
-
-
-@hook(optional=True)
-def friction_power(body, K1, K2, normal_1, normal_2, omega):
-    """Power of friction on the body, W. By default the power of one contact, R omega K1 N1.
+    They are linear in the arguments after `body`, so that coefficients of series can take their place.
 
     Parameters
     ----------
-    body, K1, K2, omega
+    body : NamedTuple
+    one : float
+        1.
+    sin_phi, cos_phi, omega, square : float
+        Sine and cosine of the angle of the body; angular velocity, rad/s, and its square.
+    epsilon : float
+        Angular acceleration of the body, rad/s^2.
+    normal : float
+        Normal reaction at contact 1, N, which the balances do not determine if there are two contacts.
+
+    Returns
+    -------
+    tuple of float
+        ``(N1, N2, F1, F2)``: normal reactions, and friction along the race, positive in the direction of growing phi,
+        N. With one contact N2 and F2 repeat N1 and F1.
+    """
+
+
+@hook
+def energy(body, sin_phi, cos_phi, omega):
+    """Kinetic and potential energy of the body, J. Its rate is :func:`power`.
+
+    Parameters
+    ----------
+    body, sin_phi, cos_phi, omega
         As for :func:`acceleration`.
-    normal_1, normal_2 : float
+    """
+
+
+@hook
+def power(body, K1, K2, N1, N2, sin_phi, cos_phi, omega):
+    """Power of friction, and of other forces that are not in the energy, W: from the last balance.
+
+    Parameters
+    ----------
+    body, K1, K2, sin_phi, cos_phi, omega
+        As for :func:`acceleration`.
+    N1, N2 : float
         Normal reactions, N.
     """
-    return body.radius * omega * K1 * normal_1
 
 
-@friction_power.implements(TwoContacts)
-def _two_power(body, K1, K2, normal_1, normal_2, omega):
-    return body.radius * omega * (K1 * normal_1 + K2 * normal_2)
+@hook
+def imbalance(body, K1, K2, N1, N2, phi_dd, sin_phi, cos_phi, omega):
+    """Error of the balances as they are written down: sum of its squares, each as a share of those of the terms.
+
+    Parameters
+    ----------
+    body, K1, K2, sin_phi, cos_phi, omega
+        As for :func:`acceleration`.
+    N1, N2 : float
+        Normal reactions, N.
+    phi_dd : float
+        Angular acceleration of the body, rad/s^2.
+    """
+
+
+#: Functions of a body that follow from its balances. `Equations` writes them.
+DERIVED = (
+    contact_count,
+    acceleration,
+    reactions,
+    acceleration_slope,
+    acceleration_gradient,
+    friction_gain,
+    free_determinant,
+    reaction_determinant,
+    slip_balance,
+    determinant_terms,
+    held,
+    energy,
+    power,
+    imbalance,
+)
+
+#: Balances of the bodies, and what follows from them, by the type of the body.
+EQUATIONS: dict[type, Equations] = {}
+
+
+def body(*, balances: tuple[str, ...], energy: str, offset: str = "") -> Callable[[type], type]:
+    """Declare a body: decorator of the ``NamedTuple`` of its parameters.
+
+    The fields ``mass``, ``radius`` and ``gravity`` are needed for scales, and ``constants`` for :func:`completed`.
+
+    Parameters
+    ----------
+    balances : tuple of str
+        Two equations for a body with one contact, three for a body with two; see :mod:`ringsweep.physics.bodies`.
+    energy : str
+        Kinetic and potential energy, J.
+    offset : str
+        Field with half the angle between the contacts, rad. By default 0.
+
+    Raises
+    ------
+    TypeError
+        If the body cannot be declared so; the message says why.
+    """
+
+    def declare(cls: Any) -> Any:
+        try:
+            equations = EQUATIONS[cls] = Equations(cls._fields, balances, energy)
+        except ValueError as error:
+            raise TypeError(f"{cls.__name__}: {error}") from None
+        for function in DERIVED:
+            names = ", ".join(inspect.signature(function).parameters)
+            function.implements(cls)(function_from_lines(names, equations.lines(function.__name__), {}))
+        if offset:
+            contact_offset.implements(cls)(function_from_lines("body", [f"return body.{offset}"], {}))
+        return cls
+
+    return declare
+
+
+def completed(body: Any) -> Any:
+    """The body with its constants: numbers that depend on its other fields only."""
+    return body._replace(constants=EQUATIONS[type(body)].constants(body))
+
+
+@body(
+    balances=(
+        "-mass*xi*omega**2 = mass*gravity*cos_phi - (N1 + N2)*cos_beta + (K1*N1 - K2*N2)*sin_beta",
+        "mass*xi*phi_dd = -mass*gravity*sin_phi + (N1 - N2)*sin_beta + (K1*N1 + K2*N2)*cos_beta",
+        "(inertia + mass*xi**2)*phi_dd = -mass*gravity*xi*sin_phi + radius*(K1*N1 + K2*N2)",
+    ),
+    energy="0.5*(inertia + mass*xi**2)*omega**2 - mass*gravity*xi*cos_phi",
+    offset="beta",
+)
+class TwoContacts(NamedTuple):
+    """Two balls joined by a rod (the paper's Fig. 22).
+
+    Attributes
+    ----------
+    mass, inertia : float
+        Mass M, kg, and moment of inertia J about the centre of mass, kg m^2.
+    radius, xi : float
+        Radius R of the race, and distance of the centre of mass from the axis, m.
+    beta, sin_beta, cos_beta : float
+        Half the angle between the contacts, rad; its sine and cosine.
+    gravity : float
+        Acceleration of gravity, m/s^2.
+    constants : tuple of float
+        See :func:`completed`.
+    """
+
+    mass: Leaf
+    inertia: Leaf
+    radius: Leaf
+    xi: Leaf
+    beta: Leaf
+    sin_beta: Leaf
+    cos_beta: Leaf
+    gravity: Leaf
+    constants: tuple[Leaf, ...] = ()
+
+
+@body(
+    balances=(
+        "-mass*radius*omega**2 = mass*gravity*cos_phi - N1",
+        "mass*radius*phi_dd = -mass*gravity*sin_phi + K1*N1",
+    ),
+    energy="mass*radius*(0.5*radius*omega**2 - gravity*cos_phi)",
+)
+class OneContact(NamedTuple):
+    """A small body on one contact (the paper's Fig. 13): mass, kg; radius of the race, m; gravity, m/s^2."""
+
+    mass: Leaf
+    radius: Leaf
+    gravity: Leaf
+    constants: tuple[Leaf, ...] = ()
 
 
 @absorbed
@@ -506,57 +463,3 @@ def friction(scene, phi, omega, theta, ring_omega):
     mu_s2, mu_k2 = roughness(scene.surface, turns, offset)
     mu_1, mu_2, slope_1, slope_2 = friction_at(scene.law, abs(v), (mu_s1, mu_k1, mu_s2, mu_k2))
     return v, opposing(mu_1, v), opposing(mu_2, v), -slope_1 * radius, -slope_2 * radius
-
-
-@hook
-def tractions(body, sin_phi, cos_phi, omega, phi_dd, normal_1, normal_2):
-    """Friction at the contacts, from the balances and not from a friction law: so in stick too.
-
-    Parameters
-    ----------
-    body : NamedTuple
-    sin_phi, cos_phi : float
-        Sine and cosine of the angle of the body.
-    omega, phi_dd : float
-        Angular velocity, rad/s, and angular acceleration, rad/s^2, of the body.
-    normal_1, normal_2 : float
-        Normal reactions, N.
-
-    Returns
-    -------
-    tuple of float
-        ``(F1, F2)`` along the race, N, positive in the direction of growing phi. With one contact F2 repeats F1.
-    """
-
-
-@tractions.implements(TwoContacts)
-def _two_tractions(body, sin_phi, cos_phi, omega, phi_dd, normal_1, normal_2):
-    b = body
-    both = ((b.inertia + b.mass * b.xi * b.xi) * phi_dd + b.mass * b.gravity * b.xi * sin_phi) / b.radius
-    load = b.mass * (b.gravity * cos_phi + b.xi * omega * omega)
-    difference = ((normal_1 + normal_2) * b.cos_beta - load) / b.sin_beta
-    return 0.5 * (both + difference), 0.5 * (both - difference)
-
-
-@tractions.implements(OneContact)
-def _one_tractions(body, sin_phi, cos_phi, omega, phi_dd, normal_1, normal_2):
-    friction = body.mass * (body.radius * phi_dd + body.gravity * sin_phi)
-    return friction, friction
-
-
-#: Functions of a body that the model of the ring needs, besides those of :mod:`ringsweep.physics.contact`.
-BODY_MEMBERS = (
-    contact_count,
-    contact_offset,
-    free_determinant,
-    acceleration,
-    constant_terms,
-    acceleration_slope,
-    acceleration_gradient,
-    friction_gain,
-    reaction_determinant,
-    reactions,
-    energy,
-    friction_power,
-    tractions,
-)

@@ -13,7 +13,7 @@ from ringsweep.config import load
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS
 from ringsweep.physics import ring
-from ringsweep.plots.datasets import configuration, on_ring, present, require_history, require_one_run
+from ringsweep.plots.datasets import configuration, on_ring, require_history, require_one_run
 from ringsweep.quantities.variables import MODES
 
 
@@ -47,7 +47,8 @@ class Rig:
         """Measures of the scene in the attribute ``configuration`` of a dataset."""
         scene = load(configuration(ds)).scene
         model: Any = MODELS[scene.structure.model]
-        body = take(model.build_body({path: np.array([value]) for path, value in scene.values.items()}), 0)
+        bodies = model.build_body({path: np.array([value]) for path, value in scene.values.items()})
+        body = take(ring.completed(bodies), 0)
         arcs = tuple((scene.values[f"{a}.center"], scene.values[f"{a}.half_angle"]) for a in scene.structure.arcs)
         beta = float(ring.contact_offset(body))
         # A body without a radius, or with a tiny one, is drawn as a ball that can be seen.
@@ -78,9 +79,9 @@ def ring_history(ds: xr.Dataset) -> tuple[xr.Dataset, Rig]:
         raise InputError("ds", "is the history of a body on a belt: there is no ring to draw")
     ds = require_one_run(ds, ("phi", "theta"))
     rig = Rig.of(ds)
-    phi, (first, *others) = ds["phi"].values, [ds[name].values for name in present(ds, ("normal_1", "normal_2"))]
-    state = np.sin(phi), np.cos(phi), ds["omega"].values, ds["epsilon"].values, first, *(others or [first])
-    forces = ring.tractions(rig.body, *state)
+    phi, first = ds["phi"].values, ds["normal_1"].values
+    omega = ds["omega"].values
+    _, _, *forces = ring.held(rig.body, 1.0, np.sin(phi), np.cos(phi), omega, omega**2, ds["epsilon"].values, first)
     return ds.assign({f"friction_{k}": ("time", values) for k, values in enumerate(forces, start=1)}), rig
 
 

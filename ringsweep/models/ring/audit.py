@@ -1,8 +1,8 @@
 """Audit of runs on the ring: violations of the friction law, of the balances and of the signs of the reactions.
 
 The audit uses neither the series nor the segments of a mode. The coefficients are those of the surface at the angle of
-each contact; reactions and accelerations are those of :mod:`ringsweep.physics.ring`. Only the formulas of the friction
-law are also used by the solver.
+each contact; reactions and accelerations are those of :mod:`ringsweep.physics.ring`, and they are put into the balances
+as these are written down. The formulas of the friction law are also used by the solver.
 """
 
 from __future__ import annotations
@@ -25,6 +25,9 @@ from ringsweep.quantities.variables import SEPARATING
 
 # Rounding of an acceleration or a reaction, as a share of its largest terms.
 _ROUNDING = 1e-12
+
+# Square of an error of the balances, as a share of their terms, that is more than rounding.
+_UNBALANCED = 1e-9 * 1e-9
 
 # Distance from the edge of a zone within which a contact counts as on the edge, where both sides are right, rad.
 _ON_EDGE = 1e-8
@@ -98,12 +101,14 @@ def _violation(scene, mode, forcing, y, rates, s, tolerance):
     imbalance = abs(body.radius * (epsilon - ring_epsilon) - rates[1])
     largest = _larger(largest, imbalance / (rate_factor * tolerance * speed + _ROUNDING * terms))
     largest = _larger(largest, -least / (body.mass * terms * REACTION_TOLERANCE * tolerance))
-    return largest, ring.friction_power(body, K1, K2, normal_1, normal_2, omega)
+    at = sin_phi, cos_phi, omega
+    largest = _larger(largest, ring.imbalance(body, K1, K2, normal_1, normal_2, epsilon, *at) / _UNBALANCED)
+    return largest, ring.power(body, K1, K2, normal_1, normal_2, *at)
 
 
 @audit.energy.implements(ring.Ring)
 def _energy(scene, forcing, y):
-    return ring.energy(scene.body, cos(y[0]), y[1] / scene.body.radius + forcing[1])
+    return ring.energy(scene.body, sin(y[0]), cos(y[0]), y[1] / scene.body.radius + forcing[1])
 
 
 @audit.violation.implements(ring.BristleRing)
@@ -139,12 +144,15 @@ def _bristle_violation(scene, mode, forcing, y, rates, s, tolerance):
         largest = _larger(largest, abs(rate - dense_rate) / (allowed + _ROUNDING * abs(v)))
     largest = _larger(largest, -mode.sign * v / speed)
     largest = _larger(largest, -min(normal_1, normal_2) / (body.mass * terms * REACTION_TOLERANCE * tolerance))
-    return largest, ring.friction_power(body, -traction_1, -traction_2, normal_1, normal_2, omega)
+    found = -traction_1, -traction_2, normal_1, normal_2
+    largest = _larger(largest, ring.imbalance(body, *found, epsilon, sin_phi, cos_phi, omega) / _UNBALANCED)
+    return largest, ring.power(body, *found, sin_phi, cos_phi, omega)
 
 
 @audit.energy.implements(ring.BristleRing)
 def _bristle_energy(scene, forcing, y):
-    return ring.energy(scene.body, cos(y[0] + forcing[0]), y[1] / scene.body.radius + forcing[1])
+    phi = y[0] + forcing[0]
+    return ring.energy(scene.body, sin(phi), cos(phi), y[1] / scene.body.radius + forcing[1])
 
 
 # Largest rounding of an angle, rad.

@@ -10,14 +10,14 @@ import numpy as np
 
 from ringsweep.models.model import Model
 from ringsweep.models.parts import GRAVITY, MASS, SPAN, drive_of, friction_coefficients, law_of
-from ringsweep.models.ring import record, series
+from ringsweep.models.ring import record
 from ringsweep.models.scene import Structure, Values, require
 from ringsweep.physics import contact, friction, ring, zones
 from ringsweep.physics.friction.presliding import steady_deflection
 from ringsweep.quantities.parameters import Parameter, declared
 
 #: Hooks that must be implemented for the type of a body.
-BODY_MEMBERS = ring.BODY_MEMBERS + contact.BODY_MEMBERS + series.BODY_MEMBERS
+BODY_MEMBERS = ring.DERIVED + contact.BODY_MEMBERS
 
 RADIUS = Parameter("m", "radius of the inner race", lower=0.0, open_lower=True)
 
@@ -102,7 +102,7 @@ class SingleContactRing(Model):
         surface = zones.surface_of(arcs, *rest)
         surfaces = [rest, *((arc.mu_s, arc.mu_k) for arc in arcs)]
         return self.scene_type(structure)(
-            body=self.build_body(values),
+            body=ring.completed(self.build_body(values)),
             surface=surface,
             law=law_of(structure, values, surfaces),
             drive=drive_of(structure, values),
@@ -131,6 +131,9 @@ class Ring(SingleContactRing):
             "m", "half the distance between the centres of the balls", lower=0.0, open_lower=True
         ),
         "body.ball_radius": Parameter("m", "radius of the balls", lower=0.0),
+        "body.center_offset": Parameter(
+            "m", "distance of the centre of mass from the line of the balls, away from the axis", default=0.0
+        ),
         "body.beta": Parameter(
             "rad", "half the angle that the contacts subtend", 0.0, pi / 2, True, True, optional=True
         ),
@@ -169,11 +172,12 @@ class Ring(SingleContactRing):
             sin_beta = np.sin(values["body.beta"])
             R = r + a / sin_beta
         cos_beta = np.sqrt((1.0 - sin_beta) * (1.0 + sin_beta))
-        return ring.TwoContacts.of(
+        return ring.TwoContacts(
             mass=values["body.mass"],
             inertia=values["body.inertia"],
             radius=R,
-            xi=(R - r) * cos_beta,
+            xi=(R - r) * cos_beta + values["body.center_offset"],
+            beta=np.arcsin(sin_beta),
             sin_beta=sin_beta,
             cos_beta=cos_beta,
             gravity=values["gravity"],

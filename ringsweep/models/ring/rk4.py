@@ -124,7 +124,7 @@ def _eigenvalue(scene, before, now, h, most):
     # A step that jumps over the band, or over its edge, does not sample the slope there. The slope counts all the same,
     # since just such a step may lead to a wrong regime.
     at_rest, at_edge = steepest(scene.law)
-    scale = -radius * ring.friction_gain(scene.body, now.cos_phi, now.omega)
+    scale = -radius * ring.friction_gain(scene.body, now.sin_phi, now.cos_phi, now.omega)
     bound = max(abs(at_rest), abs(at_edge)) * abs(scale) + abs(now.by_omega)
     if any_of(exceeds(most, bound, -now.by_phi)):
         # The stages of the step reach about as far as the acceleration at its beginning takes the body.

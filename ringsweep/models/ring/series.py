@@ -4,16 +4,17 @@ A mode names the sign of the sliding velocity, the region of the friction law, a
 state is ``(phi, v)``: angle in space and sliding velocity. The difference of two large angular velocities would not
 resolve a stiction band of 1e-9 m/s.
 
-In slip with constant K the acceleration is ``p omega^2 + q cos phi + r sin phi``. In stick the body accelerates like
-the ring, and the balances of :mod:`ringsweep.physics.ring` give the reactions: no differential equation is left.
+In slip with constant K the acceleration is linear in sine and cosine of phi, in omega and in its square. In stick the
+body accelerates like the ring, and the balances of :mod:`ringsweep.physics.ring` give the reactions: no differential
+equation is left.
 """
 
 from __future__ import annotations
 
-from math import cos, inf, isnan, sin, sqrt
+from math import cos, inf, isnan, sin
 from typing import NamedTuple
 
-from ringsweep.compile import absorbed, hook, inlined
+from ringsweep.compile import absorbed, inlined
 from ringsweep.models.interface import modes, series
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
 from ringsweep.models.ring.contacts import (
@@ -328,10 +329,10 @@ def _expand_slip(scene, mode, c):
     sin_0, cos_0, square_0 = sin(c[PHI, 0]), cos(c[PHI, 0]), omega_0 * omega_0
     (mu_1, mu_2), begun, sharpness = begin_series(scene.law, mode.region, sign * c[V, 0], surfaces)
     K1_0, K2_0 = -sign * mu_1, -sign * mu_2
-    acceleration, reaction_1, reaction_2 = slip_balance(body, K1_0, K2_0)
-    epsilon = _constant_term(acceleration, sin_0, cos_0, square_0)
-    N1_0 = _constant_term(reaction_1, sin_0, cos_0, square_0)
-    N2_0 = _constant_term(reaction_2, sin_0, cos_0, square_0)
+    acceleration, reaction_1, reaction_2 = ring.slip_balance(body, K1_0, K2_0)
+    epsilon = _constant_term(acceleration, sin_0, cos_0, omega_0, square_0)
+    N1_0 = _constant_term(reaction_1, sin_0, cos_0, omega_0, square_0)
+    N2_0 = _constant_term(reaction_2, sin_0, cos_0, omega_0, square_0)
     c[SIN, 0], c[COS, 0], c[SQUARE, 0], c[EPSILON, 0] = sin_0, cos_0, square_0, epsilon
     c[NORMAL_1, 0], c[NORMAL_2, 0] = N1_0, N2_0
     before = omega_0
@@ -349,126 +350,34 @@ def _expand_slip(scene, mode, c):
         sine, cosine = (sine + before * cos_0) * INVERSE[k], -(cosine + before * sin_0) * INVERSE[k]
         square += 2.0 * omega_0 * omega
         loaded_1, loaded_2 = loaded_1 + K1 * N1_0, loaded_2 + K2 * N2_0
-        epsilon = _term(acceleration, sine, cosine, square, loaded_1, loaded_2)
-        N1 = _term(reaction_1, sine, cosine, square, loaded_1, loaded_2)
-        N2 = _term(reaction_2, sine, cosine, square, loaded_1, loaded_2)
+        epsilon = _term(acceleration, sine, cosine, omega, square, loaded_1, loaded_2)
+        N1 = _term(reaction_1, sine, cosine, omega, square, loaded_1, loaded_2)
+        N2 = _term(reaction_2, sine, cosine, omega, square, loaded_1, loaded_2)
         left, right = (before, before, omega, K1, K2, K1), (cosine, sine, omega, N1, N2, K2)
         newest = set_factors(c, FACTORS, k, joined(left, law_left), joined(right, law_right))
         first = newest if k == 1 else first
         c[PHI, k], c[OMEGA, k], c[V, k] = before * INVERSE[k], omega, sign * x
         c[SIN, k], c[COS, k], c[SQUARE, k], c[EPSILON, k] = sine, cosine, square, epsilon
         c[NORMAL_1, k], c[NORMAL_2, k] = N1, N2
-        c[DETERMINANT, k] = determinant(body, 0.0, K1 - K2, both + K1_0 * K2 + K1 * K2_0)
+        c[DETERMINANT, k] = ring.determinant_terms(body, 0.0, K1, K2, both + K1_0 * K2 + K1 * K2_0)
         before = omega
     # Before a jam the accelerations grow without bound, so that a small determinant counts as a jam.
     least = LEAST_DETERMINANT * ring.free_determinant(body) if varies(scene.law, mode.region) else 0.0
-    c[DETERMINANT, 0] = determinant(body, 1.0, K1_0 - K2_0, K1_0 * K2_0) - least
+    c[DETERMINANT, 0] = ring.determinant_terms(body, 1.0, K1_0, K2_0, K1_0 * K2_0) - least
     return sharpness
 
 
 @inlined
-def _constant_term(balance, sine, cosine, square):
-    """Coefficient 0 of a series from a row of :func:`slip_balance`."""
-    return balance[0] + balance[1] * sine + balance[2] * cosine + balance[3] * square
+def _constant_term(balance, sine, cosine, omega, square):
+    """Coefficient 0 of a series from a row of :func:`ringsweep.physics.ring.slip_balance`."""
+    return balance[0] + balance[1] * sine + balance[2] * cosine + balance[3] * omega + balance[4] * square
 
 
 @absorbed
-def _term(balance, sine, cosine, square, loaded_1, loaded_2):
-    """Coefficient 1 or higher of a series from a row of :func:`slip_balance`; the newest numbers come last."""
-    return ((balance[1] * sine + balance[2] * cosine + balance[3] * square) + balance[4] * loaded_1) + balance[
-        5
-    ] * loaded_2
-
-
-@hook
-def slip_balance(body, K1, K2):
-    """Solution of the balances in slip, where friction is K_i N_i plus a given force.
-
-    Angular acceleration and reactions are linear in sine and cosine of the angle, in the square of the angular
-    velocity and in the given forces. The series need it because coefficient k of the product of two series K_i and N_i
-    is ``K_i[0] N_i[k]`` plus terms that are known.
-
-    Parameters
-    ----------
-    body : NamedTuple
-    K1, K2 : float
-        Friction per unit of the normal reaction at each contact, 1.
-
-    Returns
-    -------
-    tuple of tuple of float
-        Three rows: for the angular acceleration, rad/s^2, and for N_1 and N_2, N. Each row has six numbers: the
-        constant term, and the factors of sine, cosine, square of the angular velocity, and force at contact 1 and 2.
-    """
-
-
-@slip_balance.implements(ring.TwoContacts)
-def _two_slip_balance(body, K1, K2):
-    # With the angular acceleration eliminated the balances are, with the given forces F1 and F2,
-    #     (cb - K1 sb) N1 + (cb + K2 sb) N2 = M (g cos phi + xi omega^2) + (F1 - F2) sb
-    #     (sb + K1 lever) N1 - (sb - K2 lever) N2 = M g (1 - M xi^2/I) sin phi - (F1 + F2) lever
-    b = body
-    sb, cb = b.sin_beta, b.cos_beta
-    about_axis = b.inertia + b.mass * b.xi * b.xi
-    _, lever, pull = b.reaction
-    a1, a2 = cb - K1 * sb, cb + K2 * sb
-    b1, b2 = sb + K1 * lever, sb - K2 * lever
-    scale = 1.0 / (a2 * b1 + a1 * b2)
-    a1, a2, b1, b2 = a1 * scale, a2 * scale, b1 * scale, b2 * scale
-    along, across = b.mass * pull, b.mass * b.gravity
-    lift = b.mass * b.xi
-    sine_1, cosine_1, square_1 = a2 * along, b2 * across, b2 * lift
-    sine_2, cosine_2, square_2 = -a1 * along, b1 * across, b1 * lift
-    first_1, second_1 = b2 * sb - a2 * lever, -b2 * sb - a2 * lever
-    first_2, second_2 = b1 * sb + a1 * lever, -b1 * sb + a1 * lever
-    # Friction alone turns the body about the axis, and weight.
-    k1, k2 = K1 * b.radius / about_axis, K2 * b.radius / about_axis
-    return (
-        (
-            0.0,
-            k1 * sine_1 + k2 * sine_2 - b.mass * b.gravity * b.xi / about_axis,
-            k1 * cosine_1 + k2 * cosine_2,
-            k1 * square_1 + k2 * square_2,
-            k1 * first_1 + k2 * first_2 + b.radius / about_axis,
-            k1 * second_1 + k2 * second_2 + b.radius / about_axis,
-        ),
-        (0.0, sine_1, cosine_1, square_1, first_1, second_1),
-        (0.0, sine_2, cosine_2, square_2, first_2, second_2),
-    )
-
-
-@slip_balance.implements(ring.OneContact)
-def _one_slip_balance(body, K1, K2):
-    g, radius = body.gravity / body.radius, body.radius
-    reaction = 0.0, 0.0, body.mass * body.gravity, body.mass * radius, 0.0, 0.0
-    return (0.0, -g, K1 * g, K1, 1.0 / (body.mass * radius), 0.0), reaction, reaction
-
-
-@hook(optional=True)
-def determinant(body, one, difference, both):
-    """Determinant of the balances, which falls to 0 at a jam, as a linear function of K_1 - K_2 and K_1 K_2.
-
-    Parameters
-    ----------
-    body : NamedTuple
-    one : float
-        Factor of the constant term.
-    difference, both : float
-        K_1 - K_2 and K_1 K_2, or coefficients of their series.
-
-    Returns
-    -------
-    float
-        In the unit of the second result of :func:`ringsweep.physics.ring.acceleration`. By default `one`: the body
-        cannot jam.
-    """
-    return one
-
-
-@determinant.implements(ring.TwoContacts)
-def _two_determinant(body, one, difference, both):
-    i_0, i_1, i_2 = body.determinant
-    return i_0 * one + i_1 * difference + i_2 * both
+def _term(balance, sine, cosine, omega, square, loaded_1, loaded_2):
+    """Coefficient 1 or higher of a series from such a row; the newest numbers come last."""
+    of_motion = balance[1] * sine + balance[2] * cosine + balance[3] * omega + balance[4] * square
+    return (of_motion + balance[5] * loaded_1) + balance[6] * loaded_2
 
 
 @inlined
@@ -513,7 +422,7 @@ def _expand_stick(scene, mode, tolerance, c):
         before = omega
     mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
     c[EDGE, 0] = inf
-    stick_series(scene.body, mu_s1, mu_s2, c)
+    _expand_reserve(scene.body, mu_s1, mu_s2, c)
     c[DETERMINANT, 0] = inf
     per_load = 1.0 / (scene.body.mass * (scene.body.gravity + scene.body.radius * c[SQUARE, 0]))
     last, previous = 0.0, 0.0
@@ -523,71 +432,43 @@ def _expand_stick(scene, mode, tolerance, c):
     return step_size(last / tolerance, previous / tolerance)
 
 
-@hook
-def stick_series(body, m1, m2, c):
-    """Fill the reactions and the guards of stick.
+@inlined
+def _expand_reserve(body, m1, m2, c):
+    """Fill the reactions and the guards of stick, from the series of the motion; see :func:`contact.sharing`.
 
-    For two contacts the moment about the axis gives the sum of the friction forces, and the tangential balance gives
-    the difference of the reactions. The radial balance gives a quadratic equation for the sum of the reactions, with
-    friction shared in proportion to ``m_i N_i``.
-
-    Parameters
-    ----------
-    body : NamedTuple
-    m1, m2 : float
-        Static friction coefficients under the contacts.
-    c : ndarray of shape ``(rows, columns)``
-        Table of the series. Known: PHI, OMEGA, EPSILON, SIN, COS and SQUARE (of omega). To be filled: NORMAL_1,
-        NORMAL_2, and the reserves of friction (N) before forward slip (SLOW) and before backward slip (FAST). For two
-        contacts also EDGE, the discriminant of the quadratic equation; with one contact it stays infinite.
+    NORMAL_1, NORMAL_2; the reserves of friction, N, before forward slip (SLOW) and before backward slip (FAST). For two
+    contacts also EDGE, the discriminant of the quadratic equation; with one contact it stays infinite.
     """
-
-
-@stick_series.implements(ring.TwoContacts)
-def _two_stick_series(body, m1, m2, c):
-    b = body
-    sb, cb = b.sin_beta, b.cos_beta
-    mean, half = 0.5 * (m1 + m2), 0.5 * (m1 - m2)
-    moment = b.inertia + b.mass * b.xi * b.xi
-    first_difference = first_share = first_linear = first_total = 0.0
+    _, by_N2, by_F1, by_F2 = ring.held(body, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+    first_N2 = first_F1 = first_linear = first_N1 = 0.0
     own = 0.0, 0.0, 0.0, 0.0
     first = newest = no_factors(own)
     for k in range(ORDER + 1):
-        friction = (moment * c[EPSILON, k] + b.mass * b.gravity * b.xi * c[SIN, k]) / b.radius
-        difference = (b.mass * (b.xi * c[EPSILON, k] + b.gravity * c[SIN, k]) - friction * cb) / sb
-        load = b.mass * (b.xi * c[SQUARE, k] + b.gravity * c[COS, k])
-        # mean cb total^2 - linear total - constant = 0; without friction cb total = load
-        linear = mean * load - cb * half * difference + sb * half * friction
-        share = half * load + mean * sb * friction
-        constant, square, mixed, total = part_from(inner_products(c, FACTORS, k, first, newest), own, ())
-        # Where both roots meet, stick ends: no friction gives the acceleration of the ring.
-        if k == 0:
-            first_difference, first_share, first_linear = difference, share, linear
-            products = 4.0 * mean * cb * difference * share
-            c[EDGE, 0] = linear * linear + products - _LEAST_DISCRIMINANT * (linear * linear + abs(products))
-            root = linear + sqrt(max(linear * linear + products, 0.0))
-            total = first_total = root / (2.0 * mean * cb) if mean > 0.0 else load / cb
-        else:
-            constant += first_difference * share + difference * first_share
-            c[EDGE, k] = square + 2.0 * first_linear * linear + 4.0 * mean * cb * constant
-            rest = constant + mixed + linear * first_total - mean * cb * total
-            total = rest / (2.0 * mean * cb * first_total - first_linear) if mean > 0.0 else load / cb
-            left, right = (difference, linear, linear, total), (share, linear, total, total)
-            newest = set_factors(c, FACTORS, k, left, right)
-            first = newest if k == 1 else first
-        c[NORMAL_1, k] = 0.5 * (total + difference)
-        c[NORMAL_2, k] = 0.5 * (total - difference)
-        reserve = m1 * c[NORMAL_1, k] + m2 * c[NORMAL_2, k]
-        c[SLOW, k], c[FAST, k] = reserve + friction, reserve - friction
-
-
-@stick_series.implements(ring.OneContact)
-def _one_stick_series(body, m1, m2, c):
-    for k in range(ORDER + 1):
-        friction = body.mass * (body.radius * c[EPSILON, k] + body.gravity * c[SIN, k])
-        c[NORMAL_1, k] = body.mass * (body.gravity * c[COS, k] + body.radius * c[SQUARE, k])
-        c[NORMAL_2, k] = c[NORMAL_1, k]
-        c[SLOW, k], c[FAST, k] = m1 * c[NORMAL_1, k] + friction, m1 * c[NORMAL_1, k] - friction
+        one = 1.0 if k == 0 else 0.0
+        N1, N2, F1, F2 = ring.held(body, one, c[SIN, k], c[COS, k], c[OMEGA, k], c[SQUARE, k], c[EPSILON, k], 0.0)
+        friction, capacity = F1, m1 * N1
+        if ring.contact_count(body) == 2:
+            square, linear, _ = contact.sharing(m1, m2, (N2, F1, F2), (by_N2, by_F1, by_F2))
+            rest, squared, mixed, both = part_from(inner_products(c, FACTORS, k, first, newest), own, ())
+            # Where both roots meet, stick ends: no friction gives the acceleration of the ring.
+            if k == 0:
+                first_N2, first_F1, first_linear = N2, F1, linear
+                constant = m2 * F1 * N2
+                first_term, last_term = linear * linear, 4.0 * square * constant
+                c[EDGE, 0] = first_term - last_term - _LEAST_DISCRIMINANT * (first_term + abs(last_term))
+                N1 = first_N1 = contact.larger_root(square, linear, constant) if square > 0.0 else 0.0
+            else:
+                constant = m2 * (first_F1 * N2 + F1 * first_N2 + rest)
+                c[EDGE, k] = 2.0 * first_linear * linear + squared - 4.0 * square * constant
+                N1 = -(square * both + mixed + linear * first_N1 + constant)
+                N1 = N1 / (2.0 * square * first_N1 + first_linear) if square > 0.0 else 0.0
+                newest = set_factors(c, FACTORS, k, (F1, linear, linear, N1), (N2, linear, N1, N1))
+                first = newest if k == 1 else first
+            N1 = N1 if square > 0.0 else (F2 - F1) / (by_F1 - by_F2)
+            N2 += by_N2 * N1
+            friction, capacity = F1 + F2 + (by_F1 + by_F2) * N1, m1 * N1 + m2 * N2
+        c[NORMAL_1, k], c[NORMAL_2, k] = N1, N2
+        c[SLOW, k], c[FAST, k] = capacity + friction, capacity - friction
 
 
 @series.state_at.implements(ring.Ring)
@@ -655,7 +536,3 @@ def _in_space(scene, t, y):
 @series.after_first_step.implements(Mode)
 def _after_first_step(mode):
     return Mode(mode.sign, mode.region, -1, mode.place_1, mode.place_2)
-
-
-#: Hooks that the series need of a body.
-BODY_MEMBERS = (slip_balance, determinant, stick_series)
