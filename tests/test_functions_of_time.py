@@ -129,6 +129,8 @@ class TestDerived:
             "A*(t/s)**9*exp(t/s)",
             "A*exp(sin(w*t)**2)",
             "A*log1p(t/s)",
+            "A*tanh(t/s)",
+            "+".join(f"A*sin({k}*w*t)/{k}" for k in range(1, 13)),
         ],
     )
     def test_series_and_derivatives_are_those_of_cauchys_integral(self, text):

@@ -31,7 +31,7 @@ def own_drive(model: str, drive: Mapping[str, Any]) -> type | None:
     return _defined(drive["theta"], MODELS[model].drive_unit, "scene.drive.theta")
 
 
-def own_force(force: Mapping[str, Any]) -> type | None:
+def own_force(force: Any) -> type | None:
     """Type of the force on the body if the section ``force`` has a ``formula``.
 
     Raises
@@ -39,7 +39,7 @@ def own_force(force: Mapping[str, Any]) -> type | None:
     InputError
         If the formula is wrong, or if a table stands beside it.
     """
-    if "formula" not in force:
+    if not isinstance(force, Mapping) or "formula" not in force:
         return None
     for key in (*TABLES["force"], "file"):
         if key in force:

@@ -77,8 +77,8 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
         names_of_drives = dict.fromkeys([*DRIVES, FORMULA_DRIVE])
         drive = choose(names_of_drives, section_of(scene, "drive", "scene."), "scene.drive.law", "drive law")
     by_formula = Structure(model, "", drive, own_drive=own_drive(model, scene.get("drive", {})))
-    if "force.constant" in parameters(Structure(model, next(iter(MODELS[model].laws)))) and "force" in scene:
-        by_formula = replace(by_formula, own_force=own_force(section_of(scene, "force", "scene.")))
+    if "force.constant" in parameters(Structure(model, next(iter(MODELS[model].laws)))):
+        by_formula = replace(by_formula, own_force=own_force(scene.get("force")))
     # Name a misspelt key, rather than the key that is missing because of it.
     all_laws = MODELS[model].laws | own
     paths = _Paths(

@@ -10,6 +10,7 @@ needs a side that calls functions.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -482,22 +483,38 @@ def taylor_lines(names: Mapping[str, str], value: Node, rate: Node, side: str, f
         slopes = [derivative(part) for part in nodes_of(node) if part.varies and part.kind in _FUNCTIONS]
         found += [slope for slope in slopes if slope not in found]
     every = nodes_of(*found)
-    series = {node for node in every if not is_polynomial(node)}
-    # Of two polynomials whose product has too high a degree one becomes a series.
-    series |= {node.parts[1] for node in series if node.kind == "multiply" and not series.intersection(node.parts)}
-    place = {node: i for i, node in enumerate(node for node in every if node in series)}
+    others = [node for node in every if not is_polynomial(node)]
+    users = Counter([part for node in others for part in set(node.parts)])
+    users.update(derivative(node) for node in others if node.kind in _FUNCTIONS)
+    # Sums and multiples that one expression uses are written into it. A factor of a product has a row; of two
+    # polynomials whose product has too high a degree, one.
+    products = [node for node in others if node.kind == "divide" or (node.kind == "multiply" and node.parts[0].varies)]
+    rows = {part for node in products for part in node.parts if not is_polynomial(part)}
+    rows |= {node.parts[1] for node in products if node.kind == "multiply" and not rows.intersection(node.parts)}
+    linear = {node for node in others if node.kind == "add" or (node.kind == "multiply" and not node.parts[0].varies)}
+    rows |= {node for node in others if node not in linear or users[node] > 1}
+    place = {node: i for i, node in enumerate(node for node in every if node in rows)}
     if len(place) > SERIES_ROWS:
         raise OverflowError
-    others = {part for node in place if node.kind not in _FUNCTIONS for part in node.parts} | {rate}
-    others |= {derivative(node) for node in place if node.kind in _FUNCTIONS}
-    coefficients = {node: _coefficients(node) for node in every if node in others and is_polynomial(node)}
+    needed = {part for node in others if node.kind not in _FUNCTIONS for part in node.parts} | {rate}
+    needed |= {derivative(node) for node in others if node.kind in _FUNCTIONS}
+    coefficients = {node: _coefficients(node) for node in every if node in needed and is_polynomial(node)}
     numbers = [one for several in coefficients.values() for one in several]
     writer.constants(value, *found, *numbers)
     _floats(writer, [value, *place, *numbers], side)
 
     def term(node: Node, k: str) -> str:
         """Coefficient `k` of a node."""
-        return f"work[{place[node]}, {k}]" if node in place else polynomial(node, k)
+        if node in place:
+            return f"work[{place[node]}, {k}]"
+        return polynomial(node, k) if is_polynomial(node) else linear_text(node, k)
+
+    def linear_text(node: Node, k: str) -> str:
+        a, b = node.parts
+        if node.kind == "multiply":
+            return f"{writer.known[a]} * {term(b, k)}"
+        # A constant has a coefficient 0 only.
+        return "(" + " + ".join(term(part, k) for part in (a, b) if part.varies or k != "k") + ")"
 
     def polynomial(node: Node, k: str) -> str:
         return (
@@ -525,8 +542,8 @@ def taylor_lines(names: Mapping[str, str], value: Node, rate: Node, side: str, f
             p = node.parts
             if is_polynomial(node):
                 text = polynomial(node, "k")
-            elif node.kind == "add":
-                text = " + ".join(term(part, "k") for part in p if part.varies)
+            elif node in linear:
+                text = linear_text(node, "k")
             elif node.kind == "multiply":
                 text = product(p[0], p[1], 0) if p[1] in place else product(p[1], p[0], 0)
             elif node.kind == "divide":
