@@ -6,6 +6,7 @@ All are isolated by interval arithmetic, see :mod:`ringsweep.numerics.isolation`
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,9 @@ _Surface = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 # The stiction band ends where the slope has fallen to this share of the steepest slope below.
 _FLAT = 0.01
+
+# Results for at most so many sets of parameters are kept.
+_FEW = 16
 
 # Rounding of a friction coefficient.
 _ROUNDING = 1e-12
@@ -66,10 +70,21 @@ def hidden_fields(
     """
     table = np.stack([*columns.values(), *(column for surface in surfaces for column in surface)], axis=1)
     rows, cell_row = _distinct(table)
-    found_columns = {name: rows[:, k] for k, name in enumerate(columns)}
-    pairs = rows[:, len(columns) :].reshape(len(rows), -1, 2)
-    found = _Finder(expression, found_columns, [(pairs[:, i, 0], pairs[:, i, 1]) for i in range(pairs.shape[1])])
-    return {name: np.ascontiguousarray(field[cell_row]) for name, field in found.fields().items()}
+    # The tasks of a sweep often share their few sets of parameters.
+    find = _fields_of_few if len(rows) <= _FEW else _fields_of
+    found = find(expression, tuple(columns), len(rows), rows.tobytes())
+    return {name: np.ascontiguousarray(field[cell_row]) for name, field in found.items()}
+
+
+def _fields_of(expression: Expression, names: tuple[str, ...], count: int, content: bytes) -> dict[str, NDArray[Any]]:
+    """Fields of distinct sets of parameters: the numbers of a table with `count` rows."""
+    rows = np.frombuffer(content).reshape(count, -1)
+    columns = {name: rows[:, k] for k, name in enumerate(names)}
+    pairs = rows[:, len(names) :].reshape(count, -1, 2)
+    return _Finder(expression, columns, [(pairs[:, i, 0], pairs[:, i, 1]) for i in range(pairs.shape[1])]).fields()
+
+
+_fields_of_few = lru_cache(maxsize=64)(_fields_of)
 
 
 def table_fields(
