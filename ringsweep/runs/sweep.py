@@ -200,9 +200,10 @@ def sweep(
         axes = {str(path): xr.DataArray(column.to_numpy(), dims="point") for path, column in axes.items()}
     parsed = read_scene(scene, swept=axes)
     found = read_axes(parsed, axes)
-    method = {"method": solver} if isinstance(solver, str) else dict(solver)
-    source = {"scene": dict(parsed.source), "solver": method, "sweep": _sweep_section(found)}
-    config = refined(Config(parsed, read_solver(method, parsed), found, source, name="ringsweep"), refine)
+    method = read_solver(solver, parsed)
+    given = {"method": solver} if isinstance(solver, str) else dict(solver)
+    source = {"scene": dict(parsed.source), "solver": given, "sweep": _sweep_section(found)}
+    config = refined(Config(parsed, method, found, source, name="ringsweep"), refine)
     return _run(config, output, Execution(jobs, scheduler, progress), fresh, reuse)
 
 
@@ -496,7 +497,7 @@ class _Tasks:
                 self._keep(self._last)
         except KeyboardInterrupt as interrupt:
             self.stopped.set()
-            # What is finished is kept; what is under way is not waited for.
+            # Finished tasks are kept. Tasks under way are not waited for.
             if self._last is not None:
                 self._keep(self._last)
             self._last = results.throw(interrupt)
