@@ -11,7 +11,7 @@ from solutions import HISTORY, Fall, solve
 from ringsweep.compile import take
 from ringsweep.models import batch, parameters
 from ringsweep.models.scene import Structure
-from ringsweep.quantities.variables import FAILED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
+from ringsweep.quantities.flags import FAILED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 from ringsweep.solvers import event
 from ringsweep.solvers.automaton import PATIENCE
 from ringsweep.solvers.event import Auto, Event, Implicit

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from ringsweep.quantities.variables import FAILED, INFERRED, RIDING
+from ringsweep.quantities.flags import FAILED, RIDING
+from ringsweep.quantities.variables import INFERRED
 
 
 def summarise(result: xr.Dataset) -> None:

@@ -9,17 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ringsweep.errors import InputError
+from ringsweep.quantities.flags import JAMMED, REGIMES, SEPARATING
 from ringsweep.quantities.quantity import Quantity
 
 if TYPE_CHECKING:
     import xarray as xr
-
-#: Regimes in the order of their flag values.
-REGIMES = (
-    *("resting", "oscillatory", "revolving", "separating", "jammed", "failed", "stick-slip"),
-    *("sliding", "sticking", "riding"),
-)
-RESTING, OSCILLATORY, REVOLVING, SEPARATING, JAMMED, FAILED, STICK_SLIP, SLIDING, STICKING, RIDING = range(10)
 
 #: What each regime says, of the ring or of the belt.
 DEFINITIONS = {

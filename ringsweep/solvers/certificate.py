@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.models.interface.audit import undecided
-from ringsweep.quantities.variables import FAILED, OUTCOMES
+from ringsweep.quantities.flags import FAILED
+from ringsweep.quantities.variables import OUTCOMES
 
 #: Outcomes on which two resolutions must agree for a certificate.
 _CERTIFIED = ("regime", "motion", "separating_contact")

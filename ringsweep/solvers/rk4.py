@@ -25,8 +25,8 @@ from ringsweep.numerics.memory import align_stack, conform, read, read_lanes, si
 from ringsweep.physics import drives
 from ringsweep.physics.drives import lookup, shape_numbers, table_row, turn, without_shape
 from ringsweep.physics.friction import TRAITS, Dynamic, family_of, presliding
+from ringsweep.quantities.flags import SEPARATING
 from ringsweep.quantities.parameters import Parameter
-from ringsweep.quantities.variables import SEPARATING
 from ringsweep.solvers.certificate import apart, certifiable, errors, with_errors
 from ringsweep.solvers.method import Method, Needs, Result
 
