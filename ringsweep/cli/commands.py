@@ -235,6 +235,23 @@ def simulate_command(arguments: argparse.Namespace) -> None:
     _draw(lambda: plots.history(result), picture, f"ringsweep plot {target}")
 
 
+def threshold_command(arguments: argparse.Namespace) -> None:
+    """Print the values at which a regime begins or ends."""
+    from ringsweep.runs.thresholds import in_words, locate
+
+    found = locate(
+        arguments.config,
+        arguments.path,
+        arguments.regime,
+        (arguments.low, arguments.high),
+        arguments.tolerance,
+        scan=arguments.scan,
+        settings=arguments.set,
+        jobs=arguments.jobs,
+    )
+    print(in_words(found))
+
+
 def _other_scene(target: Path, result: Any) -> str:
     """What the scene of a run that is there already has other than that of a result; empty if nothing."""
     from ringsweep.storage import netcdf

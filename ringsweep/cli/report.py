@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from ringsweep.quantities.variables import FAILED, INFERRED, RIDING
+from ringsweep.quantities.variables import CERTIFIED, DOUBTS, FAILED, INFERRED, RIDING
 
 
 def summarise(result: xr.Dataset) -> None:
@@ -33,6 +33,12 @@ def summarise(result: xr.Dataset) -> None:
         # Rounding must not turn "nearly all" into 100 %.
         of = "" if run.all() else f" of the {np.count_nonzero(run)} cells run"
         print(f"certified: {share if share == 1.0 else min(share, 0.999):.1%}{of}")
+    if "uncertified_because" in result:
+        because = result["uncertified_because"]
+        names = str(because.attrs["flag_meanings"]).split()
+        for flag, name in zip(np.atleast_1d(because.attrs["flag_values"]), names, strict=True):
+            if flag != CERTIFIED and (count := int((because == flag).sum())):
+                print(f"  {count} not: {DOUBTS.get(name, name)}")
     if "settled" in result:
         unsettled = (result["settled"] == 0) & ~regime.isin([RIDING, FAILED])
         if unsettled.any():
