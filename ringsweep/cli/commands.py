@@ -223,6 +223,7 @@ def simulate_command(arguments: argparse.Namespace) -> None:
     target, picture = _outputs(arguments.output or f"{config.name}-run.nc", "time", "history")
 
     from ringsweep import plots
+    from ringsweep.cli.report import print_events
     from ringsweep.runs.simulate import history
     from ringsweep.storage import netcdf
 
@@ -231,6 +232,7 @@ def simulate_command(arguments: argparse.Namespace) -> None:
         logger.info("%s held a run of another scene, which is replaced: %s", target, replaced)
     netcdf.save(result, target)
     print(result.attrs["outcome"])
+    print_events(result)
     print(f"wrote {target}")
     _draw(lambda: plots.history(result), picture, f"ringsweep plot {target}")
 

@@ -73,7 +73,7 @@ def boundary(ds: xr.Dataset, regime: str, tolerance: float = 1e-6, *, jobs: int 
     >>> bool((found.error <= 1e-3).all())
     True
     """
-    flag, dims = _checked(ds, regime)
+    _checked(ds, regime)
     tolerance = quantity(tolerance, _TOLERANCE, "tolerance")
     configuration = _config(ds)
     _check_cells(ds, configuration, jobs)

@@ -148,22 +148,29 @@ def locate(
 
 def _interval(config: Any, path: str, between: tuple[Any, Any], settings: list[str]) -> tuple[Config, float, float]:
     """Configuration of a single run, and the ends of the interval in SI units."""
-    swept = load(config).axes.columns
+    whole = load(config, settings)
+    parameter = swept_parameter(sweepable(whole.scene), path, "path")
+    if isinstance(parameter, Choice) or parameter.whole:
+        raise InputError("path", f"{path} is no number that varies continuously: there is nothing to halve")
+    swept = whole.axes.columns
     own: NDArray[Any] | None = swept[path][1] if path in swept else None
     first = between[0] if between[0] is not None else between[1] if own is None else own.flat[0].item()
     if first is None:
-        raise InputError("from", f"the configuration does not sweep {path}: say where to look, by --from and --to")
+        raise InputError(
+            "from",
+            f"the configuration does not sweep {path}: say where to look, by --from and --to (in Python: between)",
+        )
     one = with_values(config, [*settings, f"{path}={first}"])
     if one.axes.sizes:
         raise InputError("sweep", "several friction laws, but a threshold is that of one: --set friction.law=...")
-    parameter = swept_parameter(sweepable(one.scene), path, "path")
-    if isinstance(parameter, Choice) or parameter.whole:
-        raise InputError("path", f"{path} is no number that varies continuously: there is nothing to halve")
     ends = []
     for where, given, of_sweep in (("from", between[0], np.min), ("to", between[1], np.max)):
         if given is None and own is None:
-            raise InputError(where, f"the configuration does not sweep {path}: say where to look, by --from and --to")
-        ends.append(float(of_sweep(own)) if given is None else quantity(given, parameter, where))
+            raise InputError(
+                where,
+                f"the configuration does not sweep {path}: say where to look, by --from and --to (in Python: between)",
+            )
+        ends.append(float(of_sweep(np.asarray(own))) if given is None else quantity(given, parameter, where))
     if not ends[0] < ends[1]:
         raise InputError("to", f"{ends[1]:g} is not greater than {ends[0]:g}, where the interval begins")
     return one, ends[0], ends[1]
