@@ -37,7 +37,7 @@ _MEASURING, _FIRST, _MOST = 1.0, 120.0, 100_000
 def bytes_of_cell(config: Config) -> int:
     """Size of the columns of a cell; variables that some solvers leave out are counted."""
     model = MODELS[config.scene.structure.model]
-    names = {*model.outcomes, "steps", "certified", "stiffness"} - set(model.absent)
+    names = {*model.outcomes, "steps", "certified", "uncertified_because", "stiffness"} - set(model.absent)
     errors = (
         [f"{name}_error" for name in with_errors(model.outcomes)] if getattr(config.solver, "certify", False) else []
     )
