@@ -47,7 +47,8 @@ def run_command(arguments: argparse.Namespace) -> None:
     if arguments.backend == "threads" and arguments.scheduler is not None:
         raise InputError("--scheduler", "is for --backend dask")
     config = refined(load(arguments.config, arguments.set), arguments.refine or None)
-    target, picture = _outputs(f"{config.name}.nc" if arguments.output is None else arguments.output, "regime", "sweep")
+    kind = ("regime", "sweep") if config.sample is None else ("probability", "sampled sweep")
+    target, picture = _outputs(f"{config.name}.nc" if arguments.output is None else arguments.output, *kind)
 
     if arguments.dry_run:
         from ringsweep.runs.plan import describe
@@ -72,9 +73,12 @@ def run_command(arguments: argparse.Namespace) -> None:
         print(f"{target} holds this sweep already (--fresh computes it again)")
     with netcdf.reading(target) as result:
         summarise(result)
-        if not config.axes.sizes or (not computed and _is_newer(picture, target)):
+        if not computed and _is_newer(picture, target):
             return
-        _draw(lambda: plots.regime_map(result), picture, f"ringsweep map {target}")
+        if config.axes.sizes:
+            _draw(lambda: plots.regime_map(result), picture, f"ringsweep map {target}")
+        elif config.sample is not None:
+            _draw(lambda: plots.probabilities(result), picture, f"ringsweep plot {target}")
 
 
 def _draw(figure: Callable[[], Any], picture: Path, command: str) -> None:
