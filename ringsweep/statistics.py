@@ -83,8 +83,8 @@ def _bad_ends(low: float, high: float) -> str:
 
 
 def _bad_truncation(mean: float, deviation: float, low: float, high: float) -> str:
-    a, b = sorted([abs(low - mean) / deviation, abs(high - mean) / deviation])
-    far = a > 30.0 and (low > mean or high < mean)
+    nearest = min(abs(low - mean), abs(high - mean)) / deviation
+    far = nearest > 30.0 and (low > mean or high < mean)
     return _bad_ends(low, high) or ("both ends are more than 30 standard deviations away" if far else "")
 
 

@@ -73,8 +73,8 @@ def _summarise_sample(result: xr.Dataset) -> None:
             part = f", of which {numerics:.2%} are numerics" if numerics > 0.0 else ""
             print(f"  {word}: {share:.2%} ({low:.2%} to {high:.2%}{part})")
             continue
-        share = of["probability"]
-        print(f"  {word}: {float(share.min()):.2%} to {float(share.max()):.2%}, mean {float(share.mean()):.2%}", end="")
+        shares = of["probability"].values
+        print(f"  {word}: {shares.min():.2%} to {shares.max():.2%}, mean {shares.mean():.2%}", end="")
         length = (of["probability_high"] - of["probability_low"]).max()
         print(f"; intervals up to {float(length):.2%} long", end="")
         numerics = float(of["probability_numerics"].max(grid))

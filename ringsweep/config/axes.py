@@ -90,7 +90,7 @@ def swept_paths(sweep: dict[str, Any]) -> dict[str, str]:
     found = {path: f"sweep.points.{path}" for path in sweep.get("points", ())}
     of = sweep.get("sample", {}).get("of")
     for key in of if isinstance(of, dict) else ():
-        found |= {path: f"sweep.sample.of.{key}" for path in paths_of(key)}
+        found |= dict.fromkeys(paths_of(key), f"sweep.sample.of.{key}")
     return found | {path: f"sweep.grid.{key}" for key in sweep.get("grid", ()) for path in paths_of(key)}
 
 

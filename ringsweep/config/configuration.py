@@ -35,7 +35,6 @@ from ringsweep.errors import InputError
 from ringsweep.models.scene import LAW, Scene
 from ringsweep.quantities.units import show
 
-
 _NOT_REFINED = "cannot stand beside sweep.sample: a probability has no boundary, and each cell needs its own runs"
 
 

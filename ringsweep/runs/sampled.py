@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -16,15 +15,14 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsweep.config import Config
+from ringsweep.config import Config, load
 from ringsweep.config.sampling import Sample, censored
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS
-from ringsweep.quantities.variables import OUTCOMES, REGIMES, SAMPLED, Variable
+from ringsweep.quantities.variables import REGIMES, SAMPLED, Variable
 from ringsweep.runs.cells import TaskResult, compute_task
 from ringsweep.statistics import (
     CONFIDENCE,
-    METHODS,
     SUMMARY,
     quantiles,
     share_interval,
@@ -260,3 +258,25 @@ def attributes(config: Config) -> dict[str, Any]:
         "sample_interval": f"{100 * CONFIDENCE:g} %: {way}; a run that is not certified counts both ways",
         **({"survival_of": censored(config.scene)} if sample.survival else {}),
     }
+
+
+def nominal(ds: xr.Dataset) -> Config:
+    """The sweep of a sampled one without its sample: every uncertain parameter has its median.
+
+    Raises
+    ------
+    InputError
+        If an uncertain parameter is a ratio to one that the grid varies.
+    """
+    source = json.loads(ds.attrs["configuration"])
+    config = load(source)
+    sample = _sample(config)
+    axes = sample.axes(config.scene, config.axes, np.full((1, len(sample.factors)), 0.5))
+    settings = []
+    for path in (path for factor in sample.factors for path in factor.paths):
+        dims, column = axes.columns[path]
+        if len(dims) > 1:
+            raise InputError("boundaries", f"{path} is a ratio to an axis: no sweep at the medians is a grid")
+        settings.append(f"{path}={column.item()!r}")
+    sweep = {key: value for key, value in source["sweep"].items() if key != "sample"}
+    return load(source | {"sweep": sweep}, settings)
