@@ -186,6 +186,27 @@ def error_attribute(name: str, columns: Collection[str]) -> dict[str, str]:
     return {"ancillary_variables": error} if error in columns else {}
 
 
+_SHARE, _INDEX = "probability of each regime", "Sobol index of the indicator of each regime"
+
+#: Variables of each cell of a sampled sweep.
+SAMPLED: dict[str, Variable] = {
+    "probability": Variable("1", _SHARE, comment=_defined(REGIMES)),
+    "probability_low": Variable("1", f"lower end of the 95 % interval: {_SHARE}"),
+    "probability_high": Variable("1", f"upper end of the 95 % interval: {_SHARE}"),
+    "probability_numerics": Variable("1", "part of the length of the interval that runs without certificate add"),
+    "runs": Variable("1", "runs of each replicate, without and with certificate", dtype="int32"),
+    "survival": Variable("1", "probability that a contact still holds, or that a body still rides"),
+    "survival_low": Variable("1", "lower end of the 95 % interval: survival"),
+    "survival_high": Variable("1", "upper end of the 95 % interval: survival"),
+    "sobol_first": Variable("1", f"first {_INDEX}"),
+    "sobol_first_low": Variable("1", f"lower end of the 95 % interval: first {_INDEX}"),
+    "sobol_first_high": Variable("1", f"upper end of the 95 % interval: first {_INDEX}"),
+    "sobol_total": Variable("1", f"total {_INDEX}"),
+    "sobol_total_low": Variable("1", f"lower end of the 95 % interval: total {_INDEX}"),
+    "sobol_total_high": Variable("1", f"upper end of the 95 % interval: total {_INDEX}"),
+    "sobol_sums": Variable("1", "sums of which the Sobol indices are made"),
+}
+
 HISTORY: dict[str, Variable] = {
     "phi": Variable("rad", "angle of the body"),
     "omega": Variable("rad/s", "angular velocity of the body"),
