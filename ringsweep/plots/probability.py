@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 from matplotlib import rcParams
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 from matplotlib.ticker import PercentFormatter
@@ -136,9 +137,9 @@ def sensitivity_panel(ds: xr.Dataset, ax: Axes | None = None, word: str | None =
     share = float(ds["probability"])
     ax.set_xlabel("Sobol index (95 % interval)")
     ax.set_title(folded([f"what {word} hangs on", f"probability {share:.1%}"], width_of(ax)), fontsize="medium")
-    handles = [
+    handles: list[Artist] = [
         Patch(color=on_page(colour), label=label)
-        for colour, label in zip(PAIR_COLOURS, ("alone", "in all"), strict=True)
+        for colour, label in zip(PAIR_COLOURS, ("first: alone", "total: with the others"), strict=True)
     ]
     place_legend(ax, handles, "lower right")
     small_ticks(ax)
