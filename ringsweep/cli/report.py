@@ -88,7 +88,7 @@ def print_events(run: xr.Dataset) -> None:
 
 
 def _summarise_sample(result: xr.Dataset) -> None:
-    """Print the probability of each regime that occurs, and its interval; of several cells the extremes."""
+    """Print the probability of each regime that occurs, with its interval; of several cells the range."""
     probability = result["probability"]
     cells = probability.size // result.sizes["word"]
     print("cells:", cells)

@@ -404,7 +404,10 @@ class Map:
         if levels:
             styles = [_LEVELS[level] for level in levels]
             curves = axes.contour(x, y, numbers, levels, colors="white", linewidths=1.2, linestyles=styles)
-            axes.clabel(curves, fmt=lambda level: f"{level:.0%}", fontsize=SMALL)
+            stroke: list[Any] = [withStroke(linewidth=2.2, foreground="#404040")]
+            curves.set_path_effects(stroke)
+            for text in axes.clabel(curves, fmt=lambda level: f"{level:.0%}", fontsize=SMALL):
+                text.set_path_effects(stroke)
 
     def _draw_points(self, axes: Axes, vertical: Axis, data: xr.DataArray, warnings: list[CellWarning]) -> None:
         x, y = self.horizontal.values_at(data), vertical.values_at(data)

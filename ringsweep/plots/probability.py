@@ -139,7 +139,7 @@ def sensitivity_panel(ds: xr.Dataset, ax: Axes | None = None, word: str | None =
     ax.set_title(folded([f"what {word} hangs on", f"probability {share:.1%}"], width_of(ax)), fontsize="medium")
     handles: list[Artist] = [
         Patch(color=on_page(colour), label=label)
-        for colour, label in zip(PAIR_COLOURS, ("alone", "in all"), strict=True)
+        for colour, label in zip(PAIR_COLOURS, ("first: alone", "total: with the others"), strict=True)
     ]
     place_legend(ax, handles, "lower right")
     small_ticks(ax)

@@ -195,6 +195,7 @@ SAMPLED: dict[str, Variable] = {
     "probability_high": Variable("1", f"upper end of the 95 % interval: {_SHARE}"),
     "probability_numerics": Variable("1", "part of the length of the interval that runs without certificate add"),
     "runs": Variable("1", "runs of each replicate, without and with certificate", dtype="int32"),
+    "lost": Variable("1", "runs of each replicate that have lost a contact, or slipped, by then", dtype="int32"),
     "survival": Variable("1", "probability that a contact still holds, or that a body still rides"),
     "survival_low": Variable("1", "lower end of the 95 % interval: survival"),
     "survival_high": Variable("1", "upper end of the 95 % interval: survival"),

@@ -13,6 +13,7 @@ from time import monotonic
 
 import joblib
 import numpy as np
+from numpy.typing import NDArray
 
 from ringsweep.config import Config
 from ringsweep.errors import InputError
@@ -150,7 +151,11 @@ def _measure(config: Config, layout: Layout) -> list[TaskResult] | None:
     drawn = draw.permutation(layout.total) if few else draw.integers(layout.total, size=_MOST)
     answers: SimpleQueue[TaskResult | BaseException | None] = SimpleQueue()
     side = 1 if config.sample else config.solver.side_by_side
-    compute = compute_task if config.sample is None else sampled.compute_parts
+
+    def compute(config: Config, layout: Layout, positions: NDArray[np.integer]) -> TaskResult:
+        if config.sample is None:
+            return compute_task(config, layout, positions)
+        return sampled.compute_parts(config, layout, None, positions)
 
     def work() -> None:
         try:

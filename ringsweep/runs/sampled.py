@@ -1,13 +1,14 @@
 """Sampled sweeps: runs at the points of a sample are reduced to sums, and sums to probabilities.
 
-A part of a cell is what one replicate of the sample adds to it. A task runs some parts, and keeps of each only sums of
-a size that does not depend on the number of runs. Sums are whole numbers, so their order does not matter.
+A part of a cell is what one replicate of the sample adds to it. A task runs some parts, and keeps of each only sums,
+whose size does not depend on the number of runs. They are whole numbers, so their order does not matter.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import os
 from dataclasses import replace
 from typing import Any
 
@@ -31,8 +32,9 @@ from ringsweep.statistics import (
     sobol_sums,
     summarised,
 )
+from ringsweep.storage import netcdf
 from ringsweep.storage.chunks import CHUNK, Layout
-from ringsweep.storage.provenance import environment, processor
+from ringsweep.storage.provenance import differences, environment, fingerprint, identity, processor
 
 Columns = dict[str, NDArray[Any]]
 
@@ -41,7 +43,7 @@ _CHUNK_BYTES = 32e6
 
 
 def grid_layout(config: Config, whole: bool = False) -> Layout:
-    """Order of the cells of a sampled sweep; in one chunk, or in chunks whose sums fit into memory."""
+    """Order of the cells of a sampled sweep; in one chunk, or in chunks whose sums fit into the memory."""
     sizes = tuple(config.axes.sizes.values())
     if whole:
         return Layout(sizes, sizes)
@@ -83,16 +85,74 @@ def _sums_of(sample: Sample) -> dict[str, tuple[str, tuple[int, ...]]]:
     return found
 
 
-def compute_parts(config: Config, layout: Layout, positions: NDArray[np.integer]) -> TaskResult:
-    """Run the parts at some positions of the layout of parts, and reduce each to its sums."""
+class EarlierSample:
+    """File of the same sampled sweep with fewer points, which are the first ones of a larger one.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    config : Config
+        The new sweep.
+
+    Raises
+    ------
+    InputError
+        If the file holds no such sweep, or the points or sums of the new one do not continue its own.
+
+    Attributes
+    ----------
+    size : int
+        Points of each replicate.
+    processors : str
+        Names of the processors that computed the file.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], config: Config):
+        new = _sample(config)
+        if new.method == "latin-hypercube":
+            raise InputError("--reuse", "the points of a larger Latin hypercube are others: use sobol or random")
+        if new.quantiles:
+            raise InputError("--reuse", "a file does not hold the numbers that quantiles need: leave quantiles out")
+        netcdf.check(path)
+        with netcdf.reading(path) as ds:
+            if "runs" not in ds or "probability" not in ds:
+                raise InputError(str(path), "holds no sampled sweep that could go on")
+            earlier = load(path)
+            old = _sample(earlier)
+            if ds.attrs.get("fingerprint") != fingerprint(identity(earlier)):
+                raise InputError(str(path), "was computed by another version: it cannot go on")
+            same, changed = replace(earlier, sample=replace(old, n=new.n)), identity(config)
+            if changes := differences(identity(same), changed):
+                raise InputError(str(path), f"is another sweep: {changes}")
+            if old.n > new.n:
+                raise InputError(str(path), f"has {old.n} samples in each cell already, and {new.n} are asked for")
+            self.size, self.processors = old.size, str(ds.attrs.get("processors"))
+            self._sums = {name: ds[name].values for name in _sums_of(new)}
+
+    def sums(self, layout: Layout, positions: NDArray[np.integer]) -> Columns:
+        """The sums of some parts."""
+        place = layout.indices(positions)
+        return {name: column[place] for name, column in self._sums.items()}
+
+
+def compute_parts(
+    config: Config, layout: Layout, earlier: EarlierSample | None, positions: NDArray[np.integer]
+) -> TaskResult:
+    """Run the parts at some positions of the layout of parts, and reduce each to its sums.
+
+    Those of an earlier sweep are added, and its points are not run again.
+    """
     sample = _sample(config)
     cells, replicates = np.divmod(positions, sample.replicates)
     sums = {name: np.zeros((len(positions), *shape), dtype=dtype) for name, (dtype, shape) in _sums_of(sample).items()}
     seconds: float | None = 0.0
     grid = Layout(layout.sizes[:-1], layout.chunk[:-1])
+    first = 0 if earlier is None else earlier.size
     for replicate in np.unique(replicates).tolist():
-        shares = sample.shares(replicate)
-        runs = len(shares)
+        shares = sample.shares(replicate)[first * sample.rows :]
+        if not (runs := len(shares)):
+            continue
         axes = sample.axes(config.scene, config.axes, shares)
         one = replace(config, axes=axes, sample=None)
         # A cell and its runs stand together, so a run has the position of its cell times their number.
@@ -114,7 +174,12 @@ def compute_parts(config: Config, layout: Layout, positions: NDArray[np.integer]
                 of_part = _reduce(sample, censored(config.scene), {name: column[k] for name, column in columns.items()})
                 for name, value in of_part.items():
                     sums[name][part] = value
-    return TaskResult(positions, sums, seconds, environment(), processor())
+    processors = {processor()}
+    if earlier is not None:
+        processors |= set(earlier.processors.split(", "))
+        for name, before in earlier.sums(layout, positions).items():
+            sums[name] += before
+    return TaskResult(positions, sums, seconds, environment(), ", ".join(sorted(processors)))
 
 
 def _needed(config: Config) -> list[str]:
@@ -130,7 +195,7 @@ def _needed(config: Config) -> list[str]:
 def _reduce(sample: Sample, time: str, columns: Columns) -> Columns:
     """The sums of one part, from the outcomes of its runs; `time` is the variable of survival."""
     # A row for each point; with Saltelli's design its first and last run are points of the sample itself.
-    rows = {name: column.reshape(sample.size, sample.rows) for name, column in columns.items()}
+    rows = {name: column.reshape(-1, sample.rows) for name, column in columns.items()}
     points = {name: column[:, [0, -1] if sample.sensitivity else [0]].ravel() for name, column in rows.items()}
     sure = points["certified"] == 1
     found: Columns = {"runs": np.zeros((len(REGIMES), 2), dtype=np.int32)}
@@ -174,6 +239,7 @@ def statistics(config: Config, sums: Columns) -> Columns:
     without = np.subtract(*share_interval(reported, size, sample.independent)[::-1])
     found["probability_numerics"] = np.maximum(high - low - without, 0.0)
     if sample.survival:
+        found["lost"] = flat["lost"]
         lost = np.moveaxis(flat["lost"], 1, -1)
         held, certain = size - lost.sum(axis=2), size - unsure[:, None] - lost[:, :, 1]
         found["survival"] = held.sum(axis=-1) / total
@@ -233,6 +299,7 @@ def variables(config: Config) -> dict[str, tuple[tuple[str, ...], Variable]]:
         **{name: (("word",), one) for name, one in SAMPLED.items() if name.startswith("probability")},
     }
     if sample.survival:
+        found["lost"] = ("replicate", "survival_time", "certificate"), SAMPLED["lost"]
         found |= {name: (("survival_time",), one) for name, one in SAMPLED.items() if name.startswith("survival")}
     known = MODELS[config.scene.structure.model].variables
     for name in sample.quantiles:

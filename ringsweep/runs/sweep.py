@@ -31,6 +31,7 @@ from ringsweep.runs.refined import KnownLabels, complete, decide, gaps, with_nan
 from ringsweep.runs.refined import attributes as refinement_attributes
 from ringsweep.runs.refinement import Refined
 from ringsweep.runs.reuse import EarlierSweep
+from ringsweep.runs.sampled import EarlierSample
 from ringsweep.runs.task_sizes import TaskSizes, divide_cells, divide_into_tasks
 from ringsweep.runs.warnings import warn_of_results, warn_of_sample
 from ringsweep.storage import netcdf
@@ -423,16 +424,17 @@ def _compute_cells(
     config: Config,
     layout: Layout,
     store: Checkpoint | MemoryStore,
-    earlier: EarlierSweep | None,
+    earlier: EarlierSweep | EarlierSample | None,
     execution: Execution,
 ) -> Refined | None:
     """Compute the cells that the store lacks, task after task: every cell, or those that a refinement asks for."""
-    if config.refine is not None:
+    if config.refine is not None and not isinstance(earlier, EarlierSample):
         return _refine_cells(config, layout, store, earlier, execution)
-    if earlier is not None:
+    continued = earlier if isinstance(earlier, EarlierSample) else None
+    if isinstance(earlier, EarlierSweep):
         _take_shared(config, layout, store, earlier, store.done)
     if not store.done.all():
-        with _open_tasks(config, layout, store, execution, layout.total) as tasks:
+        with _open_tasks(config, layout, store, execution, layout.total, continued) as tasks:
             tasks.run(divide_into_tasks(store.done, tasks.sizes, tasks.stopped))
             if not store.done.all():
                 raise KeyboardInterrupt
@@ -493,8 +495,13 @@ def _open_tasks(
     store: Checkpoint | MemoryStore,
     execution: Execution,
     total: int | None,
+    continued: EarlierSample | None = None,
 ) -> Iterator[_Tasks]:
-    """Tasks that compute cells of a sweep; `total` is the number of its cells, if all of them are computed."""
+    """Tasks that compute cells of a sweep.
+
+    `total` is the number of its cells, if all of them are computed. `continued` is the sampled sweep with fewer points
+    that goes on.
+    """
 
     def under_way() -> str:
         learnt = not math.isnan(sizes.seconds_per_cell)
@@ -506,8 +513,9 @@ def _open_tasks(
         stopping = stop_on_interrupt(under_way) if isinstance(store, Checkpoint) else nullcontext(Event())
         with stopping as stopped, progress_bar(total, execution.progress, int(store.done.sum())) as bar:
             # Other processes get it with every task: points as they were written are long.
-            compute = compute_task if config.sample is None else sampled.compute_parts
-            task = partial(compute, replace(config, source={}), layout)
+            task: Callable[..., TaskResult] = partial(compute_task, replace(config, source={}), layout)
+            if config.sample is not None:
+                task = partial(sampled.compute_parts, replace(config, source={}), layout, continued)
             tasks = _Tasks(task, store, workers, sizes, stopped, bar)
             try:
                 yield tasks
@@ -604,11 +612,13 @@ def _frame(config: Config, found: Refined | None) -> xr.Dataset:
     )
 
 
-def _earlier_sweep(config: Config, reuse: str | os.PathLike[str] | None) -> tuple[Config, EarlierSweep | None]:
+def _earlier_sweep(
+    config: Config, reuse: str | os.PathLike[str] | None
+) -> tuple[Config, EarlierSweep | EarlierSample | None]:
     """The configuration, with its axes aligned to those of the earlier sweep, and that sweep."""
     if reuse is None:
         return config, None
     if config.sample is not None:
-        raise InputError("--reuse", "not for samples yet")
+        return config, sampled.EarlierSample(reuse, config)
     earlier = EarlierSweep(reuse, config)
     return earlier.align_axes(config), earlier
