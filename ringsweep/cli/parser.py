@@ -134,14 +134,20 @@ def build_parser() -> argparse.ArgumentParser:
         ringsweep plot my-run.nc --from 3 --to 4 -o end.png
         ringsweep plot my-run.nc --kind phase -o portrait.pdf
         ringsweep plot my-run.nc --kind friction --law lugre
+        ringsweep plot uncertain.nc --kind sensitivity --word separating --sel drive.amplitude=2
         """)  # fmt: skip
-    plot.add_argument("dataset", metavar="RUN.nc", help="what ringsweep simulate or ringsweep precision wrote")
+    plot.add_argument(
+        "dataset", metavar="RUN.nc", help="what ringsweep simulate or precision wrote, or a sampled sweep"
+    )
     plot.add_argument("-o", "--output", metavar="RUN.png", help="default: beside RUN.nc; .pdf and .svg too")
     plot.add_argument(
         "--kind",
-        choices=["phase", "friction"],
-        help="phase portrait, or friction force over sliding velocity (belt), in place of the time history",
+        choices=["phase", "friction", "probability", "survival", "sensitivity"],
+        help="phase portrait, or friction force over sliding velocity (belt), in place of the time history; "
+        "of a sampled sweep probabilities (default), survival, or Sobol indices",
     )
+    plot.add_argument("--sel", action="append", default=[], metavar="DIM=VALUE", help="cell of a sampled sweep")
+    plot.add_argument("--word", metavar="REGIME", help="regime whose Sobol indices are drawn")
     plot.add_argument("--law", metavar="LAW", help="the run under this friction law, if RUN.nc has several")
     plot.add_argument("--from", type=float, dest="begin", metavar="T", help="draw the history from this time on, s")
     plot.add_argument("--to", type=float, dest="end", metavar="T", help="draw the history up to this time, s")

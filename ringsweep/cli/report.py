@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from ringsweep.quantities.variables import CERTIFIED, DOUBTS, FAILED, INFERRED, RIDING, words
+from ringsweep.quantities.flags import FAILED, RIDING
+from ringsweep.quantities.variables import CERTIFIED, DOUBTS, INFERRED, words
 
 
 def summarise(result: xr.Dataset) -> None:
@@ -17,6 +18,9 @@ def summarise(result: xr.Dataset) -> None:
         curves, points = len(np.unique(result["line"])), result.sizes["vertex"]
         print(f"boundary of {result.attrs['boundary_of']}: {curves} curves, {points} points", end="")
         print(f", each within {result['error'].values.max():.2g} along its axis" if points else "")
+        return
+    if "probability" in result:
+        _summarise_sample(result)
         return
     regime = result["regime"]
     print("cells:", regime.size)
@@ -81,3 +85,31 @@ def print_events(run: xr.Dataset) -> None:
         if k not in left_out or len(left_out) == 1:
             who = contacts[k].replace("contact_", " contact ").replace("both", " both contacts").replace("none", "")
             print(f"  {run['event_time'].values[k]:.9g} s {kind}{who}")
+
+
+def _summarise_sample(result: xr.Dataset) -> None:
+    """Print the probability of each regime that occurs, with its interval; of several cells the range."""
+    probability = result["probability"]
+    cells = probability.size // result.sizes["word"]
+    print("cells:", cells)
+    print("sample:", result.attrs.get("sample"))
+    print("interval:", result.attrs.get("sample_interval"))
+    grid = [dim for dim in probability.dims if dim != "word"]
+    for word in map(str, result["word"].values):
+        of = {name: result[name].sel(word=word) for name in result.data_vars if str(name).startswith("probability")}
+        if not (of["probability"] > 0.0).any():
+            continue
+        if cells == 1:
+            share, low, high, numerics = (float(column.values.squeeze()) for column in of.values())
+            part = f", of which {numerics:.2%} are numerics" if numerics > 0.0 else ""
+            print(f"  {word}: {share:.2%} ({low:.2%} to {high:.2%}{part})")
+            continue
+        shares = of["probability"].values
+        print(f"  {word}: {shares.min():.2%} to {shares.max():.2%}, mean {shares.mean():.2%}", end="")
+        length = (of["probability_high"] - of["probability_low"]).max()
+        print(f"; intervals up to {float(length):.2%} long", end="")
+        numerics = float(of["probability_numerics"].max(grid))
+        print(f", of which up to {numerics:.2%} are numerics" * (numerics > 0.0))
+    runs = result["runs"]
+    share = float(runs.isel(certificate=1).sum() / runs.sum())
+    print(f"certified: {share if share == 1.0 else min(share, 0.999):.1%} of {int(runs.sum())} runs")

@@ -9,17 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ringsweep.errors import InputError
+from ringsweep.quantities.flags import JAMMED, REGIMES, SEPARATING
 from ringsweep.quantities.quantity import Quantity
 
 if TYPE_CHECKING:
     import xarray as xr
-
-#: Regimes in the order of their flag values.
-REGIMES = (
-    *("resting", "oscillatory", "revolving", "separating", "jammed", "failed", "stick-slip"),
-    *("sliding", "sticking", "riding"),
-)
-RESTING, OSCILLATORY, REVOLVING, SEPARATING, JAMMED, FAILED, STICK_SLIP, SLIDING, STICKING, RIDING = range(10)
 
 #: What each regime says, of the ring or of the belt.
 DEFINITIONS = {
@@ -191,6 +185,28 @@ def error_attribute(name: str, columns: Collection[str]) -> dict[str, str]:
     error = f"{name}_error"
     return {"ancillary_variables": error} if error in columns else {}
 
+
+_SHARE, _INDEX = "probability of each regime", "Sobol index of the indicator of each regime"
+
+#: Variables of each cell of a sampled sweep.
+SAMPLED: dict[str, Variable] = {
+    "probability": Variable("1", _SHARE, comment=_defined(REGIMES)),
+    "probability_low": Variable("1", f"lower end of the 95 % interval: {_SHARE}"),
+    "probability_high": Variable("1", f"upper end of the 95 % interval: {_SHARE}"),
+    "probability_numerics": Variable("1", "part of the length of the interval that runs without certificate add"),
+    "runs": Variable("1", "runs of each replicate, without and with certificate", dtype="int32"),
+    "lost": Variable("1", "runs of each replicate that have lost a contact, or slipped, by then", dtype="int32"),
+    "survival": Variable("1", "probability that a contact still holds, or that a body still rides"),
+    "survival_low": Variable("1", "lower end of the 95 % interval: survival"),
+    "survival_high": Variable("1", "upper end of the 95 % interval: survival"),
+    "sobol_first": Variable("1", f"first {_INDEX}"),
+    "sobol_first_low": Variable("1", f"lower end of the 95 % interval: first {_INDEX}"),
+    "sobol_first_high": Variable("1", f"upper end of the 95 % interval: first {_INDEX}"),
+    "sobol_total": Variable("1", f"total {_INDEX}"),
+    "sobol_total_low": Variable("1", f"lower end of the 95 % interval: total {_INDEX}"),
+    "sobol_total_high": Variable("1", f"upper end of the 95 % interval: total {_INDEX}"),
+    "sobol_sums": Variable("1", "sums of which the Sobol indices are made"),
+}
 
 HISTORY: dict[str, Variable] = {
     "phi": Variable("rad", "angle of the body"),

@@ -9,7 +9,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsweep.quantities.variables import JAMMED, OUTCOMES, Variable
+from ringsweep.quantities.flags import JAMMED
+from ringsweep.quantities.variables import OUTCOMES, Variable
 
 #: Kinds of events, and what each says.
 KINDS = {

@@ -274,8 +274,8 @@ def stop_on_interrupt(under_way: Callable[[], str]) -> Iterator[threading.Event]
 def progress_bar(total: int | None, progress: bool, done: int = 0, unit: str = "run") -> Any:
     """Progress bar over `total` runs or other units, or a count of them if their number is not known.
 
-    It is shown only in a terminal or a notebook, and only if `progress` is true. Elsewhere, as in the log of a batch job,
-    a line tells how far it is after a minute, and then each time that the time since the start has doubled.
+    It is shown only in a terminal or a notebook, and only if `progress` is true. Elsewhere, as in the log of a batch
+    job, a line tells how far it is after a minute, and then each time that the time since the start has doubled.
     """
     # tqdm would hide the bar in a notebook, whose output is no terminal.
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None

@@ -17,7 +17,8 @@ from ringsweep.errors import InputError
 from ringsweep.models import MODELS, batch
 from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import turn
-from ringsweep.quantities.variables import HISTORY, REGIMES
+from ringsweep.quantities.flags import REGIMES
+from ringsweep.quantities.variables import HISTORY
 from ringsweep.runs.events import events, side_by_side
 from ringsweep.runs.executors import Execution, interruptible
 from ringsweep.runs.sweep import compute
