@@ -15,7 +15,7 @@ import ringsweep
 from ringsweep import cli
 from ringsweep.cli.report import summarise
 from ringsweep.config import load
-from ringsweep.quantities.variables import OSCILLATORY
+from ringsweep.quantities.flags import OSCILLATORY
 from ringsweep.runs.warnings import _hint_at_one_word, warn_of_results
 from ringsweep.storage import netcdf
 
