@@ -1013,7 +1013,7 @@ class TestColoursOfNumbers:
         colours = {}
         for var in ("period", "t_end_error"):
             figure = plots.regime_map(ds, var=var)
-            colours[var] = figure.axes[0].collections[0].get_facecolor().reshape(100, 4)
+            colours[var] = figure.axes[0].collections[0].get_array().transpose(1, 0, 2).reshape(100, 4)
             texts = [text.get_text() for text in figure.axes[0].get_legend().get_texts()] if var != "period" else []
         assert texts == ["exactly 0, 20.0 %"]
         assert len(np.unique(colours["t_end_error"][:20], axis=0)) == 1

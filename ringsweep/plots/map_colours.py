@@ -45,22 +45,22 @@ class ColourScale:
         if "flag_values" not in data.attrs:
             finite = data.values[np.isfinite(data.values)]
             positive = finite[finite > 0.0]
-            colours = _with_grey(cmap or "viridis")
-            if str(data.name) in SAMPLED and data.dtype.kind == "f" and norm is None:
-                # Shares: every map of them has the same colours.
-                return cls(colours, Normalize(0.0, 1.0))
+            palette = _with_grey(cmap or "viridis")
             if norm == "log" and (not positive.size or finite.min() < 0.0):
                 raise InputError("norm", f"{data.name} has no logarithm: its values are not positive")
             if positive.size and positive.max() > positive.min() and _is_logarithmic(data, finite, norm):
-                return cls(colours.with_extremes(under=_ZERO), LogNorm(positive.min(), positive.max()))
+                return cls(palette.with_extremes(under=_ZERO), LogNorm(positive.min(), positive.max()))
+            if str(data.name) in SAMPLED and data.dtype.kind == "f" and norm is None:
+                # Shares: every map of them has the same colours.
+                return cls(palette, Normalize(0.0, 1.0))
             limits = (finite.min(), finite.max()) if finite.size else (0.0, 1.0)
-            return cls(colours, Normalize(*limits))
+            return cls(palette, Normalize(*limits))
         flags = np.atleast_1d(data.attrs["flag_values"])
         meanings = str(data.attrs["flag_meanings"]).split()
         # The colour of a class does not depend on which other classes occur.
-        of_classes = [REGIME_COLOURS.get(m, CLASS_COLOURS[k % len(CLASS_COLOURS)]) for k, m in enumerate(meanings)]
+        colours = [REGIME_COLOURS.get(m, CLASS_COLOURS[k % len(CLASS_COLOURS)]) for k, m in enumerate(meanings)]
         classes = BoundaryNorm(np.arange(len(flags) + 1) - 0.5, len(flags))
-        return cls(_with_grey(ListedColormap(of_classes)), classes, flags, tuple(m.replace("_", " ") for m in meanings))
+        return cls(_with_grey(ListedColormap(colours)), classes, flags, tuple(m.replace("_", " ") for m in meanings))
 
     def numbers(self, data: xr.DataArray) -> xr.DataArray:
         """Numbers for `norm`: the value, or the position of its flag; NaN where there is none."""

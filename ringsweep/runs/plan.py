@@ -126,23 +126,23 @@ def describe(config: Config, target: Path, jobs: int | None, reuse: str | os.Pat
     return "\n".join(
         (
             f"cells: {most}{layout.total}{shape}{runs}",
-            *([] if not taken else [f"reuse: {taken} of them are taken from {reuse}"]),
+            *([] if reuse is None or config.sample is not None else [f"reuse: {taken} of them are taken from {reuse}"]),
             f"memory: some {size(memory_needed(config, False))} of {size(memory_of_machine())}",
             f"disk: {most}{size(columns + finished)} while it runs, then {most}{size(finished)}"
             f"; {size(free)} are free in {folder}",
-            f"time: {most}{_time(config, layout, threads, layout.total - taken)}",
+            f"time: {most}{_time(config, layout, threads, taken)}",
             "nothing was written",
         )
     )
 
 
-def _time(config: Config, layout: Layout, threads: int, count: int) -> str:
-    """Estimated time of a sweep of which `count` cells are run, in words."""
-    if not count:
-        return "hardly any: no cell is run"
+def _time(config: Config, layout: Layout, threads: int, taken: int) -> str:
+    """Estimated time of a sweep of which an earlier one has some cells, in words."""
     if config.sample is not None:
         layout = sampled.part_layout(config, layout)
-        count = layout.total
+    count = layout.total - taken
+    if not count:
+        return "hardly any: no cell is run"
     results = _measure(config, layout)
     if results is None:
         return f"not known: the first cells took more than {_FIRST:.0f} s, compilation included"
