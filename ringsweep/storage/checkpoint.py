@@ -168,7 +168,9 @@ class Checkpoint:
     def _write(self, positions: NDArray[np.integer], columns: Columns, processor: str) -> None:
         """Write a task file."""
         # One structured array: each member of an archive takes longer to write than a few hundred cells.
-        cells = np.empty(len(positions), dtype=[(name, column.dtype) for name, column in columns.items()])
+        cells = np.empty(
+            len(positions), dtype=[(name, column.dtype, column.shape[1:]) for name, column in columns.items()]
+        )
         for name, column in columns.items():
             cells[name] = column
         members = {
@@ -247,9 +249,11 @@ class Checkpoint:
                 within = positions[part] - start
                 missing[within] = False
                 for name, column in columns.items():
-                    chunk.setdefault(name, np.empty(stop - start, dtype=column.dtype))[within] = column[part]
+                    chunk.setdefault(name, np.empty((stop - start, *column.shape[1:]), column.dtype))[within] = column[
+                        part
+                    ]
             shape = [s.stop - s.start for s in region]
-            chunk = {name: column.reshape(shape) for name, column in chunk.items()}
+            chunk = {name: column.reshape(*shape, *column.shape[1:]) for name, column in chunk.items()}
             known = complete is not None and complete(region, missing.reshape(shape), chunk)
             if missing.any() and not known:
                 raise DamagedTask(f"{missing.sum()} cells are in no task file of {self.folder}")
