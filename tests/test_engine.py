@@ -10,7 +10,8 @@ import xarray as xr
 import ringsweep
 from ringsweep.config import load
 from ringsweep.models.ring.record import Outcome
-from ringsweep.quantities.variables import OUTCOMES, REGIMES
+from ringsweep.quantities.flags import REGIMES
+from ringsweep.quantities.variables import OUTCOMES
 from ringsweep.solvers.certificate import with_errors
 from ringsweep.storage.provenance import attributes, identity
 
@@ -137,7 +138,7 @@ class TestSingleRun:
         assert run.normal_2.min() == run.normal_min_2
 
     def test_model_with_one_contact_has_no_variables_of_contact_2(self, scene):
-        alone = scene | {"model": "ring-single-contact", "body": {"mass": 0.076}, "drive": {"law": "none"}}
+        alone = scene | {"model": "ring-single-contact", "body": {"mass": 0.076}}
         run = ringsweep.simulate(alone | {"initial": {"omega": 5.0}})
         assert "normal_1" in run
         assert not {"normal_2", "zone_2", "normal_min_2"} & set(run.variables)

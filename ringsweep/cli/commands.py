@@ -289,6 +289,7 @@ def simulate_command(arguments: argparse.Namespace) -> None:
     target, picture = _outputs(arguments.output or f"{config.name}-run.nc", "time", "history")
 
     from ringsweep import plots
+    from ringsweep.cli.report import print_events
     from ringsweep.runs.simulate import history
     from ringsweep.storage import netcdf
 
@@ -297,8 +298,26 @@ def simulate_command(arguments: argparse.Namespace) -> None:
         logger.info("%s held a run of another scene, which is replaced: %s", target, replaced)
     netcdf.save(result, target)
     print(result.attrs["outcome"])
+    print_events(result)
     print(f"wrote {target}")
     _draw(lambda: plots.history(result), picture, f"ringsweep plot {target}")
+
+
+def threshold_command(arguments: argparse.Namespace) -> None:
+    """Print the values at which a regime begins or ends."""
+    from ringsweep.runs.thresholds import in_words, locate
+
+    found = locate(
+        arguments.config,
+        arguments.path,
+        arguments.regime,
+        (arguments.low, arguments.high),
+        arguments.tolerance,
+        scan=arguments.scan,
+        settings=arguments.set,
+        jobs=arguments.jobs,
+    )
+    print(in_words(found))
 
 
 def _other_scene(target: Path, result: Any) -> str:

@@ -19,6 +19,7 @@ from ringsweep.cli.commands import (
     run_command,
     schema_command,
     simulate_command,
+    threshold_command,
     verify_command,
 )
 from ringsweep.errors import shortened
@@ -98,6 +99,24 @@ def build_parser() -> argparse.ArgumentParser:
     draw.add_argument(
         "--tolerance", type=positive_number, metavar="T", help="error of these, in SI units (default: 1e-6)"
     )
+
+    threshold = _add_command(commands, "threshold", threshold_command,
+        "the value of a number at which a regime begins or ends", """
+        ringsweep threshold my.yaml --path drive.amplitude --regime separating
+        ringsweep threshold my.yaml --path zone.half_angle --regime jammed --from "2 deg" --to "60 deg"
+        ringsweep threshold my.yaml --path friction.rough.mu_k --regime separating --from 0.1 --to 0.5 --tolerance 1e-9
+        """)  # fmt: skip
+    threshold.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose scene is run")
+    threshold.add_argument("--path", required=True, metavar="PATH", help="the number that varies: drive.amplitude")
+    threshold.add_argument("--regime", required=True, metavar="REGIME", help="the regime: separating")
+    threshold.add_argument("--from", dest="low", metavar="VALUE", help="where to look; default: as the sweep has it")
+    threshold.add_argument("--to", dest="high", metavar="VALUE", help="units allowed")
+    threshold.add_argument("--tolerance", metavar="T", help="largest error (default: 1e-6 of the greatest value)")
+    threshold.add_argument(
+        "--scan", type=whole_number, metavar="N", help="runs in which changes of regime are looked for (default: 128)"
+    )
+    threshold.add_argument("--jobs", type=whole_number, metavar="N", help="threads (default: all cores)")
+    _add_settings(threshold)
 
     simulate = _add_command(commands, "simulate", simulate_command,
         "run once, or under each law of a sweep: history and its picture", """

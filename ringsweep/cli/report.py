@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from ringsweep.quantities.variables import FAILED, INFERRED, RIDING
+from ringsweep.quantities.flags import FAILED, RIDING
+from ringsweep.quantities.variables import CERTIFIED, DOUBTS, INFERRED, words
 
 
 def summarise(result: xr.Dataset) -> None:
@@ -36,6 +37,12 @@ def summarise(result: xr.Dataset) -> None:
         # Rounding must not turn "nearly all" into 100 %.
         of = "" if run.all() else f" of the {np.count_nonzero(run)} cells run"
         print(f"certified: {share if share == 1.0 else min(share, 0.999):.1%}{of}")
+    if "uncertified_because" in result:
+        because = result["uncertified_because"]
+        names = str(because.attrs["flag_meanings"]).split()
+        for flag, name in zip(np.atleast_1d(because.attrs["flag_values"]), names, strict=True):
+            if flag != CERTIFIED and (count := int((because == flag).sum())):
+                print(f"  {count} not: {DOUBTS.get(name, name)}")
     if "settled" in result:
         unsettled = (result["settled"] == 0) & ~regime.isin([RIDING, FAILED])
         if unsettled.any():
@@ -54,6 +61,30 @@ def summarise(result: xr.Dataset) -> None:
     for name in ("phi_end_error", "x_end_error"):
         if name in result and (unbounded := int(((result["certified"] == 1) & result[name].isnull()).sum())):
             print(f"no bound: {unbounded} certified cells, where nearby runs diverge")
+
+
+# Events of a run that are printed: all, or the first and the last.
+_FIRST, _LAST = 8, 4
+
+
+def print_events(run: xr.Dataset) -> None:
+    """Print how many events of each kind a run has, and the first and the last of them."""
+    if "friction_law" in run.dims:
+        for law in run["friction_law"].values:
+            print(f"{law}: ", end="")
+            print_events(run.sel(friction_law=law))
+        return
+    kinds, contacts = words(run["event_kind"]).values, words(run["event_contact"]).values
+    kinds = kinds[kinds != "none"]
+    counts = [f"{kind} {np.count_nonzero(kinds == kind)}" for kind in dict.fromkeys(kinds.tolist())]
+    print("events:", ", ".join(counts) or "none")
+    left_out = range(_FIRST, len(kinds) - _LAST)
+    for k, kind in enumerate(kinds):
+        if k == left_out.start and len(left_out) > 1:
+            print(f"  ... {len(left_out)} more are in the file")
+        if k not in left_out or len(left_out) == 1:
+            who = contacts[k].replace("contact_", " contact ").replace("both", " both contacts").replace("none", "")
+            print(f"  {run['event_time'].values[k]:.9g} s {kind}{who}")
 
 
 def _summarise_sample(result: xr.Dataset) -> None:

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from ringsweep.plots.datasets import configuration
 from ringsweep.plots.labels import number_text
 from ringsweep.plots.style import CLASS_COLOURS, NO_VALUE, REGIME_COLOURS, on_page
-from ringsweep.quantities.variables import FAILED, INFERRED, JAMMED, SAMPLED
+from ringsweep.quantities.flags import FAILED, JAMMED
+from ringsweep.quantities.variables import INFERRED, SAMPLED
 
 
 @dataclass(frozen=True)

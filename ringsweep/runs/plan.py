@@ -41,7 +41,7 @@ def bytes_of_cell(config: Config) -> int:
     if config.sample is not None:
         return sampled.bytes_of_part(config) * config.sample.replicates
     model = MODELS[config.scene.structure.model]
-    names = {*model.outcomes, "steps", "certified", "stiffness"} - set(model.absent)
+    names = {*model.outcomes, "steps", "certified", "uncertified_because", "stiffness"} - set(model.absent)
     errors = (
         [f"{name}_error" for name in with_errors(model.outcomes)] if getattr(config.solver, "certify", False) else []
     )

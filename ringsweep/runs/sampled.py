@@ -21,7 +21,8 @@ from ringsweep.config.axes import dimension
 from ringsweep.config.sampling import Sample, censored
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS
-from ringsweep.quantities.variables import REGIMES, SAMPLED, Variable
+from ringsweep.quantities.flags import REGIMES
+from ringsweep.quantities.variables import SAMPLED, Variable
 from ringsweep.runs.cells import TaskResult, compute_task
 from ringsweep.statistics import (
     CONFIDENCE,

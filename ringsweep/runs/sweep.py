@@ -6,7 +6,7 @@ import logging
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -307,6 +307,8 @@ def write(
             try:
                 _compute_file(config, target, layout, checkpoint, earlier, execution)
             except BaseException as error:
+                with suppress(InputError, OSError):
+                    checkpoint.keep()
                 if (finished := int(checkpoint.done.sum())) and checkpoint.folder.exists():
                     again = "the same command without --fresh" if fresh else "the same command"
                     error.add_note(

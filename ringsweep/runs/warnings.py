@@ -13,7 +13,8 @@ from ringsweep.config import Config
 from ringsweep.models import batch
 from ringsweep.physics.belt import Damper
 from ringsweep.physics.drives import Constant
-from ringsweep.quantities.variables import FAILED, INFERRED, RIDING
+from ringsweep.quantities.flags import FAILED, RIDING
+from ringsweep.quantities.variables import INFERRED
 from ringsweep.runs.cells import laws_at, values_at
 from ringsweep.solvers.rk4 import STABILITY_LIMIT
 from ringsweep.storage.chunks import Layout

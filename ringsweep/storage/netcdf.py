@@ -21,6 +21,7 @@ from ringsweep.errors import InputError
 from ringsweep.quantities import digest
 from ringsweep.quantities.digest import Digests
 from ringsweep.quantities.variables import MISSING, OUTCOMES, Variable, error_attribute
+from ringsweep.storage import trailer
 from ringsweep.storage.chunks import Layout
 from ringsweep.storage.files import WorkingFolder, check_name, put_in_place, replacing
 
@@ -57,6 +58,7 @@ def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
             _add(ds, file)
             _record_digests(file, ds)
         _read_back(temporary)
+        trailer.seal(temporary)
 
 
 def write(
@@ -102,6 +104,7 @@ def write(
                 _add(frame, file)
                 _write_chunks(file, frame, variables, layout, chunks, gaps, within)
             _read_back(temporary)
+            trailer.seal(temporary)
             put_in_place(temporary, target)
     finally:
         with suppress(OSError):
@@ -132,7 +135,7 @@ def _created(path: Path) -> Iterator[Any]:
 
 def _read_back(path: Path) -> None:
     try:
-        changed = altered(path, whole=True)
+        changed = altered(path, whole=True, trusted=True)
     except InputError as error:
         raise OSError("the file cannot be read back") from error
     if changed:
@@ -197,7 +200,7 @@ def _record_digests(
     file.setncattr(digest.ATTRIBUTE, recorded.text)
 
 
-def altered(path: str | os.PathLike[str], *, whole: bool) -> list[str] | None:
+def altered(path: str | os.PathLike[str], *, whole: bool, trusted: bool = False) -> list[str] | None:
     """Names of what is not as it was written in a file; None if the file has no digests.
 
     Parameters
@@ -205,12 +208,17 @@ def altered(path: str | os.PathLike[str], *, whole: bool) -> list[str] | None:
     path : path-like
     whole : bool
         Whether to read all variables, or only those whose values have no checksums of their own.
+    trusted : bool
+        Whether the HDF5 library is given the file without a look at its seal.
 
     Raises
     ------
     InputError
         If the file is no NetCDF file, or is damaged.
     """
+    if not trusted:
+        with _reading_file(path):
+            trailer.check(path, whole=whole)
     with _reading_file(path), netCDF4.Dataset(Path(path).resolve()) as file:
         recorded = Digests.read(file)
         if recorded is None:
@@ -408,6 +416,8 @@ def _reading_file(path: str | os.PathLike[str]) -> Iterator[None]:
         yield
     except PermissionError as error:
         raise InputError(str(path), "cannot be read: permission denied") from error
+    except InputError as error:
+        raise InputError(str(path), error.problem) from error
     except Exception as error:
         # On a damaged file the libraries raise errors of many kinds.
         raise InputError(str(path), _DAMAGED) from error
