@@ -439,18 +439,22 @@ class TestParts:
 
     def test_scene_without_the_parts_has_no_place_for_their_numbers(self):
         cells = self.cells(self.plain())
-        assert cells.cubic == cells.damper == belt.Absent()
+        assert cells.body._fields == ("mass", "gravity", "stiffness", "constants")
         assert type(cells.drive) is drives.Constant
 
     @pytest.mark.parametrize(
         ("swept", "part"),
-        [("damper.coefficient", "damper"), ("spring.cubic", "cubic"), ("force.constant", "drive")],
+        [
+            ("damper.coefficient", "damping"),
+            ("spring.cubic", "cubic"),
+            ("force.constant", "drive"),
+            ("body.normal_stiffness", "normal_stiffness"),
+        ],
     )
     def test_swept_part_is_present_and_the_others_are_not(self, swept, part):
         cells = self.cells(self.plain(), (swept,))
         present = {
-            "damper": cells.damper != belt.Absent(),
-            "cubic": cells.cubic != belt.Absent(),
+            **{name: name in cells.body._fields for name in belt.OPTIONAL},
             "drive": isinstance(cells.drive, Forced),
         }
         assert [name for name, found in present.items() if found] == [part]
