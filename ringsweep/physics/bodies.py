@@ -136,7 +136,7 @@ class Equations:
             "energy": lambda: [source.value(self.energy)],
             "power": lambda: [self._power()],
             "imbalance": lambda: [" + ".join(map(self._error, self.balances))],
-            "size": lambda: [" + ".join(f"abs({term})" for term in self._terms(self.balances[-1]))],
+            "size": lambda: [" + ".join(f"abs({term})" for term in self._terms(self._forces()))],
         }
         found = values[name]()
         return [*source.lines, "return " + (found[0] if len(found) == 1 else f"({', '.join(found)})")]
@@ -191,6 +191,10 @@ class Equations:
         changed = {self.basis[0]: symbol("one"), self.basis[4]: symbol("square")}
         terms = (changed.get(key, Polynomial([(key, 1.0)])) * factor for key, factor in parts.items())
         return self.source.quotient(sum(terms, Polynomial()), whole)
+
+    def _forces(self) -> Polynomial:
+        """The last balance without friction and inertia."""
+        return self.balances[-1].substitute(dict.fromkeys((*_CONTACTS, self.unknowns[0]), 0.0))
 
     def _power(self) -> str:
         source, last = self.source, self.balances[-1]

@@ -355,8 +355,8 @@ def imbalance(body, K1, K2, N1, N2, phi_dd, sin_phi, cos_phi, omega):
 
 
 @hook(absorb=True)
-def size(body, K1, K2, N1, N2, phi_dd, sin_phi, cos_phi, omega):
-    """Sum of the magnitudes of the terms of the last balance, N m, or N on a belt; arguments as for `imbalance`."""
+def size(body, sin_phi, cos_phi, omega):
+    """Sum of the magnitudes of the terms of the last balance without friction and inertia, N m, or N on a belt."""
 
 
 #: Functions of a body that follow from its balances. `Equations` writes them.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from math import inf
-
 import numpy as np
 
 from ringsweep.compile import inlined
@@ -11,6 +9,7 @@ from ringsweep.models.belt.bristles import contact
 from ringsweep.models.belt.force import breakaway_force, length_scale, sliding, sliding_slopes, speed_scale
 from ringsweep.models.belt.record import Outcome
 from ringsweep.models.interface import audit, implicit
+from ringsweep.models.sliding import larger, of_balances
 from ringsweep.physics import ring
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.forces import force_in
@@ -32,17 +31,8 @@ _SMALLEST_SWING = 1e-2
 _ROUNDING = 1e-12
 
 
-# Square of an error of the balances, as a share of their terms, that is more than rounding.
-_UNBALANCED = 1e-9 * 1e-9
-
 # A separation is certain if the reaction needs more time to rise again than this multiple of the error of the instant.
 _FALL_FACTOR = 5.0
-
-
-@inlined
-def _larger(a, b):
-    """The larger of two violations; infinite if `b` is not a number."""
-    return max(a, b) if b < inf else inf
 
 
 @audit.violation.implements(Belt)
@@ -55,7 +45,7 @@ def _violation(scene, mode, forcing, y, rates, s, tolerance):
         at = x, push, velocity
         normal, _, friction, _ = ring.held(body, 1.0, *at, x * x * x, forcing[2], 0.0)
         K = friction / normal if normal != 0.0 else 0.0
-        sizes = ring.size(body, 0.0, 0.0, 0.0, 0.0, forcing[2], length, push, velocity) + body.mass * body.gravity
+        sizes = ring.size(body, length, push, velocity) + body.mass * (body.gravity + abs(forcing[2]))
         largest = (abs(friction) - breakaway_force(scene, x)) / (tolerance * sizes + 1e-300)
     else:
         K, slope, viscous, at = sliding(scene, x, velocity, v, forcing)
@@ -65,24 +55,15 @@ def _violation(scene, mode, forcing, y, rates, s, tolerance):
             if mode.region < 0:
                 speed = min(speed, 1e3 * stiction_band(scene.law))
             largest = -mode.sign * v / (tolerance * speed)
-    allowed = (1.0 / s + relaxation) * tolerance * speed
-    violation, power = _balances(scene, K, at, forcing, rates[1], allowed, tolerance)
-    return _larger(largest, violation), power
+    scales = (1.0 / s + relaxation) * tolerance * speed, _terms(body, at, forcing), tolerance
+    violation, power = of_balances(scene, (K, K), ring.reactions(body, K, K, *at), at, forcing, rates[1], scales)
+    return larger(largest, violation), power
 
 
 @inlined
-def _balances(scene, K, at, forcing, rate, allowed, tolerance):
-    """Violation of the balances by the rate of the sliding velocity, m/s^2, and power, W."""
-    body = scene.body
-    acceleration, _ = ring.acceleration(body, K, K, *at)
-    normal, _ = ring.reactions(body, K, K, *at)
-    size = ring.size(body, K, K, normal, normal, acceleration, *at)
-    allowed = allowed + _ROUNDING * (size / body.mass + abs(forcing[2])) + 1e-300
-    violation = _larger(0.0, abs(acceleration - forcing[2] - rate) / allowed)
-    violation = _larger(violation, ring.imbalance(body, K, K, normal, normal, acceleration, *at) / _UNBALANCED)
-    if ring.if_load_varies(body, True, False):
-        violation = _larger(violation, -normal / (tolerance * (size + body.mass * body.gravity) + 1e-300))
-    return violation, ring.power(body, K, K, normal, normal, *at)
+def _terms(body, at, forcing):
+    """Size of the terms of the acceleration, m/s^2."""
+    return body.gravity + ring.size(body, *at) / body.mass + abs(forcing[2]) + 1e-200
 
 
 @audit.energy.implements(Belt, BristleBelt)
@@ -98,10 +79,11 @@ def _bristle_violation(scene, mode, forcing, y, rates, s, tolerance):
     _, speed, deflection, _ = implicit.error_scales(scene, implicit.IMPLICIT_TOLERANCE * tolerance, y)
     by_v = sliding_slopes(scene, K, slope_v, 0.0, at)[1]
     by_z = ring.acceleration_slope(scene.body, K, K, slope_z, slope_z, *at)
-    allowed = speed / s + abs(by_v) * speed + abs(by_z) * deflection
-    largest, power = _balances(scene, K, at, forcing, rates[1], allowed, implicit.IMPLICIT_TOLERANCE * tolerance)
+    scales = speed / s + abs(by_v) * speed + abs(by_z) * deflection, _terms(scene.body, at, forcing), tolerance
+    normals = ring.reactions(scene.body, K, K, *at)
+    largest, power = of_balances(scene, (K, K), normals, at, forcing, rates[1], scales)
     allowed = (1.0 / s + abs(rate_z)) * deflection + abs(rate_v) * speed + _ROUNDING * abs(v)
-    return _larger(_larger(largest, abs(rate - rates[2]) / allowed), -mode.sign * v / speed), power
+    return larger(larger(largest, abs(rate - rates[2]) / allowed), -mode.sign * v / speed), power
 
 
 @audit.undecided.implements(Belt, BristleBelt)

@@ -249,7 +249,7 @@ def _guards_and_motion(scene, mode, common, forcing, x):
     sign = float(mode.sign)
     at, (_, _, _, K, _, _) = _in_step(scene, mode, forcing, x)
     fast = region_guard(scene.law, scene.mu_s, scene.mu_k, x[1], x[2], sign, mode.region)
-    return view(scene, forcing, x, x[0] - forcing[0], 0.0, K, at, sign * x[1], fast)
+    return view(scene, forcing, x, x[0] - forcing[0], (K, 0.0), at, (sign * x[1], fast))
 
 
 @implicit.row.implements(BristleBelt)

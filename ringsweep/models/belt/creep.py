@@ -10,17 +10,6 @@ from ringsweep.physics.forces import force_rate
 from ringsweep.physics.friction.velocity import region_bounds, stiction_band
 
 
-# The place is relative to the drive, so that no large numbers cancel in slow creep.
-@implicit.to_implicit.implements(belt.Belt)
-def _to_implicit(scene, forcing, y):
-    return y[0] - forcing[0], y[1]
-
-
-@implicit.from_implicit.implements(belt.Belt)
-def _from_implicit(scene, forcing, x):
-    return x[0] + forcing[0], x[1]
-
-
 @implicit.is_stiff.implements(belt.Belt)
 def _is_stiff(scene, mode, y, linear):
     (_, acceleration), (_, _, _, decay), _, _ = linear
@@ -62,12 +51,16 @@ def all_guards(body, normal, slow, fast):
 
 
 @inlined
-def view(scene, forcing, x, place, friction, K, at, slow, fast):
-    """View of a state in slip; `place` is that on the belt, and `x` has the sliding velocity."""
+def view(scene, forcing, x, place, friction, at, guards):
+    """View of a state in slip.
+
+    `place` is that on the belt, m, and `friction` are K and the viscous friction, N. `x` has the sliding velocity.
+    """
+    K, viscous = friction
     acceleration, _ = ring.acceleration(scene.body, K, K, *at)
     normal, _ = ring.reactions(scene.body, K, K, *at)
-    motion = at[0], at[2], acceleration, friction - K * normal, place, x[1], forcing[2]
-    return all_guards(scene.body, normal, slow, fast), motion
+    motion = at[0], at[2], acceleration, viscous - K * normal, place, x[1], forcing[2]
+    return all_guards(scene.body, normal, *guards), motion
 
 
 @implicit.guards_and_motion.implements(belt.Belt)
@@ -75,12 +68,7 @@ def _guards_and_motion(scene, mode, common, forcing, x):
     K, _, viscous, at = _in_step(scene, forcing, x)
     low, high = region_bounds(scene.law, mode.region)
     speed = mode.sign * x[1]
-    return view(scene, forcing, x, x[0], viscous * x[1], K, at, speed - low, high - speed)
-
-
-@implicit.motion.implements(belt.Belt, belt.BristleBelt)
-def _motion(scene, forcing, x, linear):
-    return x[1] + forcing[1], linear[0][1] + forcing[2]
+    return view(scene, forcing, x, x[0], (K, viscous * x[1]), at, (speed - low, high - speed))
 
 
 @implicit.seen.implements(belt.Belt, belt.BristleBelt)

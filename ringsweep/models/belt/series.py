@@ -241,7 +241,7 @@ def _expand(scene, mode, t, y, tolerance, c):
         # If friction does not drop at breakaway, the slope is zero there: what is computed is rounding.
         if mode.entry_guard == SLOW and low == 0.0 and not yielding:
             at = c[X, 0], c[PUSH, 0], c[VELOCITY, 0]
-            terms_of_balance = abs(c[FORCE, 0]) + ring.size(body, 0.0, 0.0, 0.0, 0.0, 0.0, *at)
+            terms_of_balance = abs(c[FORCE, 0]) + ring.size(body, *at)
             if abs(c[V, 1]) <= 1e-12 * terms_of_balance / body.mass:
                 c[SLOW, 1] = 0.0
     # The unit of length is the distance that belt, body or load could move within a natural period of the spring.
@@ -255,7 +255,7 @@ def _expand(scene, mode, t, y, tolerance, c):
     if has_loads(scene) and (mode.sign == 0 or (holds_in_band(scene.law) and mode.region < 0)):
         # The guards are forces, whose series may converge more slowly than that of the motion.
         at = length, largest_force(scene.drive), c[VELOCITY, 0]
-        scale = abs(breakaway_force(scene, c[X, 0])) + ring.size(body, 0.0, 0.0, 0.0, 0.0, 0.0, *at) + 1e-300
+        scale = abs(breakaway_force(scene, c[X, 0])) + ring.size(body, *at) + 1e-300
         last = max(last, abs(c[SLOW, ORDER]) / scale)
         previous = max(previous, abs(c[SLOW, ORDER - 1]) / scale)
     h = step_size(last / tolerance, previous / tolerance)
@@ -300,16 +300,6 @@ def _expand_slip(scene, mode, viscous, c):
     return sharpness
 
 
-@series.state_at.implements(belt.Belt)
-def _state_at(scene, c, s):
-    return value(c[X], s), value(c[V], s)
-
-
-@series.rates_at.implements(belt.Belt)
-def _rates_at(scene, c, s):
-    return slope(c[X], s), slope(c[V], s)
-
-
 @series.seen_at_start.implements(belt.Belt)
 def _seen_at_start(scene, c):
     return c[X, 0], c[VELOCITY, 0], c[FORCE, 0], c[X, 0] - c[SHIFT, 0], c[V, 0], c[V, 1]
@@ -344,8 +334,3 @@ def _extremes(scene, record, mode, c, h, work):
 def _row(scene, mode, c, t, s):
     mode_now = 0.0 if mode.region < 0 else float(mode.sign)
     return value(c[X], s), value(c[VELOCITY], s), value(c[FORCE], s), 0.0, mode_now
-
-
-@modes.in_space.implements(belt.Belt, belt.BristleBelt)
-def _in_space(scene, t, y):
-    return y[0], y[1] + drives.turn(scene.drive, t)[1]

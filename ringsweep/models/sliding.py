@@ -1,23 +1,113 @@
-"""What ends a step of constant length on a ring or a belt, and its stiffness.
-
-The inspections of both have the fields that are used here. A belt is kinematically a ring of radius 1.
-"""
+"""What a body on a ring and a body on a belt have in common. A belt is kinematically a ring of radius 1."""
 
 from __future__ import annotations
 
 from math import inf, isfinite, isnan
 
+import numpy as np
+
 from ringsweep.compile import inlined
-from ringsweep.models.interface import constant_step
-from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
+from ringsweep.models.interface import constant_step, implicit, modes, series
+from ringsweep.models.interface.status import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2, SEPARATED_BOTH
 from ringsweep.models.parts import exceeds, larger_eigenvalue
-from ringsweep.models.ring.record import ENDS
 from ringsweep.numerics.functions import any_of, select
-from ringsweep.physics import contact, ring
+from ringsweep.numerics.series import slope, value
+from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.friction.registry import holds_in_band
 from ringsweep.physics.friction.velocity import passes_band, steepest, stiction_band
 from ringsweep.physics.ring import BristleRing, Ring
+
+#: Status of a run for each mode of :mod:`ringsweep.physics.contact`.
+ENDS = np.full(8, RUNNING)
+ENDS[[contact.OPEN_1, contact.OPEN_2, contact.OPEN_BOTH]] = SEPARATED_1, SEPARATED_2, SEPARATED_BOTH
+ENDS[contact.IMPOSSIBLE] = JAM
+
+#: Error allowed to the reactions as a share of the load, in units of the tolerance of the series.
+REACTION_TOLERANCE = 1e3
+
+# Rounding of an acceleration, as a share of its largest terms.
+_ROUNDING = 1e-12
+
+# Square of an error of the balances, as a share of their terms, that is more than rounding.
+_UNBALANCED = 1e-9 * 1e-9
+
+
+# ---- states -----------------------------------------------------------------------------------
+
+# Place and sliding velocity are the first rows of a table of series.
+
+
+@series.state_at.implements(Ring, Belt)
+def _state_at(scene, c, s):
+    return value(c[0], s), value(c[1], s)
+
+
+@series.rates_at.implements(Ring, Belt)
+def _rates_at(scene, c, s):
+    return slope(c[0], s), slope(c[1], s)
+
+
+@modes.in_space.implements(Ring, Belt, BristleBelt)
+def _in_space(scene, t, y):
+    return y[0], y[1] / ring.radius(scene.body) + drives.turn(scene.drive, t)[1]
+
+
+# The place of an implicit step is relative to the drive, so that no large numbers cancel in slow creep.
+@implicit.to_implicit.implements(Ring, Belt)
+def _to_implicit(scene, forcing, y):
+    return y[0] - forcing[0], y[1]
+
+
+@implicit.from_implicit.implements(Ring, Belt)
+def _from_implicit(scene, forcing, x):
+    return x[0] + forcing[0], x[1]
+
+
+@implicit.motion.implements(Ring, BristleRing, Belt, BristleBelt)
+def _motion(scene, forcing, x, linear):
+    radius = ring.radius(scene.body)
+    return x[1] / radius + forcing[1], linear[0][1] / radius + forcing[2]
+
+
+# ---- audit ------------------------------------------------------------------------------------
+
+
+@inlined
+def larger(a, b):
+    """The larger of two violations; infinite if `b` is not a number."""
+    return max(a, b) if b < inf else inf
+
+
+@inlined
+def of_balances(scene, friction, normals, at, forcing, rate, scales):
+    """Violation of the balances and of the signs of the reactions by a state in slip or stick, and power, W.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+    friction, normals : tuple of float
+        K, and the reaction (N), at each contact.
+    at : tuple of float
+        Last arguments of :func:`ringsweep.physics.ring.acceleration`.
+    forcing : tuple of float
+        What :func:`ringsweep.models.interface.implicit.forcing` returned.
+    rate : float
+        Rate of the sliding velocity from the dense output, m/s^2.
+    scales : tuple of float
+        Error allowed to this rate; size of the terms of the acceleration, m/s^2; tolerance of the run.
+    """
+    body, (allowed, terms, tolerance) = scene.body, scales
+    acceleration, _ = ring.acceleration(body, *friction, *at)
+    error = abs(ring.radius(body) * (acceleration - forcing[2]) - rate)
+    violation = larger(0.0, error / (allowed + _ROUNDING * terms))
+    least = ring.if_load_varies(body, min(normals[0], normals[1]), 0.0)
+    violation = larger(violation, -least / (body.mass * terms * REACTION_TOLERANCE * tolerance))
+    violation = larger(violation, ring.imbalance(body, *friction, *normals, acceleration, *at) / _UNBALANCED)
+    return violation, ring.power(body, *friction, *normals, *at)
+
+
+# ---- steps of constant length -----------------------------------------------------------------
 
 
 @constant_step.holds.implements(Ring, BristleRing, Belt, BristleBelt)
