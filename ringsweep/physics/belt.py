@@ -12,15 +12,14 @@ are those of its balances, with x, the given force and the velocity in place of 
 
 from __future__ import annotations
 
-from itertools import combinations
 from typing import Any, NamedTuple
 
 from ringsweep.physics.bodies import LINE
-from ringsweep.physics.ring import body, radius, variant
+from ringsweep.physics.ring import body, having, radius
 from ringsweep.quantities.parameters import Leaf
 
-#: Fields of the parts that a body may lack.
-OPTIONAL = "cubic", "damping", "normal_stiffness"
+#: Symbols of the parts that a body may lack. The force is the sum of the external and of the viscous force.
+OPTIONAL = "cubic", "damping", "normal_stiffness", "force"
 
 
 @body(
@@ -60,13 +59,7 @@ class OnBelt(NamedTuple):
     constants: tuple[Leaf, ...] = ()
 
 
-def types_with(name: str) -> list[type]:
-    """Types of the body that have a field."""
-    found = (variant(OnBelt, absent) for count in range(4) for absent in combinations(OPTIONAL, count))
-    return [cls for cls in found if name in cls._fields]  # type: ignore[attr-defined]
-
-
-@radius.implements(*types_with("mass"))
+@radius.implements(*having(OnBelt, "mass"))
 def _radius(body):
     return 1.0
 

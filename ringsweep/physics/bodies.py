@@ -182,8 +182,11 @@ class Equations:
 
     def _driven(self) -> list[str]:
         numerators, whole = solve([p.substitute(_FREE) for p in self._forced()], self.unknowns)
-        found = [self._linear(p, whole) for p in numerators]
-        return [found[0], found[1], found[-1]]
+        given = dict.fromkeys(("F1", "F2", *(name for by in self._rates()[2:] for name in by)), 0.0)
+        forces = [(name, numerators[0].rate({name: 1.0})) for name in ("F1", "F2")]
+        # Forces are known last.
+        terms = [f"{self.source.quotient(factor, whole)} * {name}" for name, factor in forces if factor]
+        return [" + ".join([self._linear(numerators[0].substitute(given), whole), *terms])]
 
     def _linear(self, p: Polynomial, whole: Polynomial) -> str:
         """Quotient with the symbols `one` and `square` in place of 1 and of the product of the motion."""

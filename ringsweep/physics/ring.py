@@ -294,19 +294,14 @@ def held(body, one, sin_phi, cos_phi, omega, square, epsilon, normal):
 
 @hook
 def driven(body, one, sin_phi, cos_phi, omega, square, F1, F2):
-    """Acceleration and reactions under given friction forces, linear in the arguments after `body`.
+    """Acceleration of the body under given friction forces, rad/s^2, linear in the arguments after `body`.
 
     Parameters
     ----------
     body, one, sin_phi, cos_phi, omega, square
         As for :func:`held`.
     F1, F2 : float
-        Friction along the race, positive in the direction of growing phi, N.
-
-    Returns
-    -------
-    tuple of float
-        ``(phi_dd, N1, N2)``, rad/s^2, N and N. With one contact N2 repeats N1.
+        Friction along the race, positive in the direction of growing phi, N; on a belt with the force given there.
     """
 
 
@@ -410,7 +405,7 @@ def body(
         By default the angle of the body. The functions in :data:`DERIVED` are documented for it. With another
         coordinate they take its numbers in place of ``sin_phi``, ``cos_phi``, ``omega`` and ``phi_dd``.
     optional : tuple of str
-        Fields of parts that a body may lack, see :func:`variant`. Without them their terms cost nothing.
+        Symbols of parts that a body may lack, see :func:`variant`. Without them their terms cost nothing.
 
     Raises
     ------
@@ -458,6 +453,11 @@ def _derive(cls: Any, balances: Any, energy: str, coordinate: Coordinate, absent
 def variant(cls: type, absent: Collection[str]) -> type:
     """Type of a body that lacks some of its optional parts."""
     return _VARIANTS[cls, frozenset(absent)]
+
+
+def having(cls: type, part: str) -> list[type]:
+    """Types of a body that do not lack an optional part."""
+    return [found for (declared, absent), found in _VARIANTS.items() if declared is cls and part not in absent]
 
 
 def completed(body: Any) -> Any:

@@ -5,10 +5,21 @@ from __future__ import annotations
 from ringsweep.compile import absorbed, hook, inlined
 from ringsweep.numerics.functions import opposing, select
 from ringsweep.physics import drives, ring
-from ringsweep.physics.belt import types_with
+from ringsweep.physics.belt import OnBelt
 from ringsweep.physics.forces import Forced, force_in, force_rate, largest_force
 from ringsweep.physics.friction.registry import SetValued, family
 from ringsweep.physics.friction.velocity import friction_at, stiction_band
+
+
+@hook(absorb=True, optional=True)
+def if_force(body, yes, no):
+    """`yes` if a given force acts on the body, an external or a viscous one, else `no`."""
+    return no
+
+
+@if_force.implements(*ring.having(OnBelt, "force"))
+def _if_force(body, yes, no):
+    return yes
 
 
 @absorbed
@@ -34,7 +45,7 @@ def sliding(scene, x, velocity, v, forcing):
         forces in a dead band, as far as it can.
     """
     mu, slope = friction_at(scene.law, abs(v), (scene.mu_s, scene.mu_k))
-    found, push = (opposing(mu, v), -slope, scene.viscous), force_in(scene.drive, forcing)
+    found, push = (opposing(mu, v), -slope, if_force(scene.body, scene.viscous, 0.0)), force_in(scene.drive, forcing)
     K, slope, viscous = _in_dead_band(family(scene.law), scene, x, push, velocity, v, found)
     return K, slope, viscous, (x, push - viscous * v, velocity)
 
@@ -90,7 +101,7 @@ def _varies_alone(part):
     return False
 
 
-@_varies_alone.implements(Forced, *types_with("cubic"), *types_with("damping"))
+@_varies_alone.implements(Forced, *ring.having(OnBelt, "cubic"), *ring.having(OnBelt, "damping"))
 def _present(part):
     return True
 
@@ -106,7 +117,7 @@ def _cubic_stiffness(body):
     return 0.0
 
 
-@_cubic_stiffness.implements(*types_with("cubic"))
+@_cubic_stiffness.implements(*ring.having(OnBelt, "cubic"))
 def _stiffness_of_cubic(body):
     return body.cubic
 

@@ -64,7 +64,7 @@ class Belt(Model):
             absolute = {"1/m": "N/m", "s/m": "N s/m"} if per_load else {}
             found[f"friction.{name}"] = replace(p, unit=absolute.get(p.unit, p.unit))
         if friction.family_of(law) is not friction.Dynamic:
-            found["friction.viscous"] = Parameter("N s/m", "viscous friction", lower=0.0, default=0.0)
+            found["friction.viscous"] = Parameter("N s/m", "viscous friction (default: 0)", lower=0.0, optional=True)
         for name, p in declared(structure.drive_type).items():
             found[f"drive.{name}"] = _along_a_line(p) if structure.own_drive is None else p
         found["force.constant"] = forces.CONSTANT
@@ -96,13 +96,15 @@ class Belt(Model):
             launched = values["initial.velocity"]
             sliding = np.array([drives.relative_velocity(take(drive, i), v) for i, v in enumerate(launched)])
         mass, gravity = values["body.mass"], values["gravity"]
+        forced = self._with_force(drive, structure, values)
         parts = {name: values[path] for name, path in _OPTIONAL.items() if path in values}
-        kind: Any = ring.variant(belt.OnBelt, _OPTIONAL.keys() - parts)
+        acts = {"force"} if forced is not drive or "friction.viscous" in values else set()
+        kind: Any = ring.variant(belt.OnBelt, _OPTIONAL.keys() - parts | {"force"} - acts)
         fields: dict[str, Any] = {
             "body": ring.completed(kind(mass, gravity, values["spring.stiffness"], **parts, constants=())),
             "mu_s": mu_s,
             "mu_k": mu_k,
-            "drive": self._with_force(drive, structure, values),
+            "drive": forced,
             "initial_x": values["initial.x"],
             "initial_v": sliding,
             "span": values["time.span"],

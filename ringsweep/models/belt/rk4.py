@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ringsweep.models.belt.force import sliding
+from ringsweep.models.belt.force import if_force, sliding
 from ringsweep.models.interface import constant_step
 from ringsweep.physics import belt, drives, ring
 from ringsweep.physics.friction.velocity import stiction_band
@@ -68,7 +68,8 @@ def _inspect(scene, y, forcing):
     slope = ring.acceleration_slope(body, K, K, slope, slope, *at)
     by_place, by_velocity, by_force = ring.acceleration_gradient(body, K, K, *at)
     by_velocity = by_velocity - viscous * by_force
-    friction, place, rates = viscous * v - K * normal, y[0] - forcing[0], (y[1], acceleration)
+    friction = if_force(body, viscous * v - K * normal, -K * normal)
+    place, rates = y[0] - forcing[0], (y[1], acceleration)
     return Inspection(rates, v, normal, normal, determinant, slope, by_place, by_velocity, at, friction, place)
 
 

@@ -12,6 +12,7 @@ from ringsweep.compile import hook, inlined
 from ringsweep.models.belt.force import (
     breakaway_force,
     has_loads,
+    if_force,
     length_scale,
     speed_scale,
     stuck_pull,
@@ -170,7 +171,7 @@ def _cube_term(body, c, k):
     return 0.0
 
 
-@_cube_term.implements(*belt.types_with("cubic"))
+@_cube_term.implements(*ring.having(belt.OnBelt, "cubic"))
 def _term_of_cube(body, c, k):
     square = cube = 0.0
     for j in range(k + 1):
@@ -188,10 +189,10 @@ def _friction_term(body, c, k, K, load):
     return K * load
 
 
-@_friction_term.implements(*belt.types_with("normal_stiffness"))
+@_friction_term.implements(*ring.having(belt.OnBelt, "normal_stiffness"))
 def _term_of_friction(body, c, k, K, load):
     c[RATIO, k] = K
-    c[NORMAL, k] = ring.driven(body, 1.0 if k == 0 else 0.0, c[X, k], 0.0, 0.0, 0.0, 0.0, 0.0)[1]
+    c[NORMAL, k] = ring.held(body, 1.0 if k == 0 else 0.0, c[X, k], 0.0, 0.0, 0.0, 0.0, 0.0)[0]
     friction = 0.0
     for j in range(k + 1):
         friction += c[RATIO, j] * c[NORMAL, k - j]
@@ -201,8 +202,9 @@ def _term_of_friction(body, c, k, K, load):
 @series.expand.implements(belt.Belt)
 def _expand(scene, mode, t, y, tolerance, c):
     drives.expand(scene.drive, t, ORDER + 2, c[SHIFT], c[FACTORS:])
-    expand_force(scene.drive, t, ORDER, c[PUSH], c[FACTORS:])
     body = scene.body
+    if if_force(body, True, False):
+        expand_force(scene.drive, t, ORDER, c[PUSH], c[FACTORS:])
     c[X, 0], c[V, 0] = y
     c[VELOCITY, 0] = y[1] + c[SHIFT, 1]
     sharpness = 0.0
@@ -227,7 +229,7 @@ def _expand(scene, mode, t, y, tolerance, c):
         sign = float(mode.sign)
         low, high = region_bounds(scene.law, mode.region)
         yielding = holds_in_band(scene.law) and mode.region < 0
-        sharpness = _expand_slip(scene, mode, 0.0 if yielding else scene.viscous, c)
+        sharpness = _expand_slip(scene, mode, 0.0 if yielding else if_force(body, scene.viscous, 0.0), c)
         set_terms(c[SLOW], terms(c[V]) * sign)
         set_terms(c[FAST], terms(c[V]) * -sign)
         c[SLOW, 0], c[FAST, 0] = sign * c[V, 0] - low, high - sign * c[V, 0]
@@ -280,9 +282,10 @@ def _expand_slip(scene, mode, viscous, c):
     x, velocity, v = c[X, 0], c[VELOCITY, 0], c[V, 0]
     (mu,), begun, sharpness = begin_series(scene.law, mode.region, sign * v, surfaces)
     load, _ = ring.reactions(body, 0.0, 0.0, x, 0.0, velocity)
-    friction, push = _friction_term(body, c, 0, -sign * mu, load), c[PUSH, 0] - viscous * v
-    acceleration, _, _ = ring.driven(body, 1.0, x, push, velocity, _cube_term(body, c, 0), friction, friction)
-    c[FORCE, 0], c[ACCELERATION, 0], c[PUSH, 0] = viscous * v - friction, acceleration, push
+    friction = _friction_term(body, c, 0, -sign * mu, load)
+    force = if_force(body, friction + c[PUSH, 0] - viscous * v, friction)
+    acceleration = ring.driven(body, 1.0, x, 0.0, velocity, _cube_term(body, c, 0), force, force)
+    c[FORCE, 0], c[ACCELERATION, 0] = if_force(body, viscous * v - friction, -friction), acceleration
     of_law = no_products(scene.law, surfaces)
     first = newest = no_factors(of_law)
     for k in range(1, ORDER + 1):
@@ -293,10 +296,11 @@ def _expand_slip(scene, mode, viscous, c):
         (mu,), left, right = series_term(scene.law, mode.region, k, sign * v, inner, begun, surfaces)
         newest = set_factors(c, FACTORS, k, left, right)
         first = newest if k == 1 else first
-        friction, push = _friction_term(body, c, k, -sign * mu, load), c[PUSH, k] - viscous * v
-        acceleration, _, _ = ring.driven(body, 0.0, x, push, velocity, _cube_term(body, c, k), friction, friction)
-        c[VELOCITY, k], c[V, k], c[FORCE, k] = velocity, v, viscous * v - friction
-        c[ACCELERATION, k], c[PUSH, k] = acceleration, push
+        friction = _friction_term(body, c, k, -sign * mu, load)
+        force = if_force(body, friction + c[PUSH, k] - viscous * v, friction)
+        acceleration = ring.driven(body, 0.0, x, 0.0, velocity, _cube_term(body, c, k), force, force)
+        c[VELOCITY, k], c[V, k] = velocity, v
+        c[FORCE, k], c[ACCELERATION, k] = if_force(body, viscous * v - friction, -friction), acceleration
     return sharpness
 
 
