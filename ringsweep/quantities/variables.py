@@ -109,6 +109,8 @@ OUTCOMES: dict[str, Variable] = {
     "stick_time": Variable("s", "time for which the body sticks to the ring or belt"),
     "normal_min_1": Variable("N", "least normal reaction at contact 1"),
     "normal_min_2": Variable("N", "least normal reaction at contact 2"),
+    "normal_max_1": Variable("N", "greatest normal reaction at contact 1"),
+    "normal_max_2": Variable("N", "greatest normal reaction at contact 2"),
     "x_end": Variable("m", "displacement of the body at the end"),
     "velocity_end": Variable("m/s", "velocity of the body at the end"),
     "x_min": Variable("m", "least displacement of the body"),
@@ -124,6 +126,8 @@ OUTCOMES: dict[str, Variable] = {
         "1", "whether the last cycles repeat each other", dtype="int8", flags={0: "not_settled", 1: "settled"}
     ),
     "force_max": Variable("N", "greatest magnitude of the friction force"),
+    "jump_max": Variable("rad/s^2", "largest jump of the angular acceleration of the body"),
+    "t_jump_max": Variable("s", "time of the largest jump of the acceleration"),
     "steps": Variable("1", "steps of the integration", dtype="int64"),
     "stiffness": Variable("1", "largest stiffness met: magnitude of the eigenvalue times the step"),
     "certified": Variable(

@@ -129,8 +129,8 @@ def _trace(config: Config, structure: Structure, samples: int) -> xr.Dataset:
             columns[name][-1:] = np.maximum(columns[name][-1:], 0.0)
     if model.driven:
         drive = take(cell.drive, 0)
-        course = np.array([turn(drive, t) for t in times.tolist()])
-        columns |= dict(zip(model.driven, course.T, strict=False))
+        motion = np.array([turn(drive, t) for t in times.tolist()])
+        columns |= dict(zip(model.driven, motion.T, strict=False))
     return xr.Dataset(
         {
             name: ("time", column.astype(HISTORY[name].dtype), HISTORY[name].attributes)

@@ -14,7 +14,7 @@ from ringsweep.quantities.variables import FAILED, OUTCOMES
 _CERTIFIED = ("regime", "motion", "separating_contact")
 
 # Outcomes that may be NaN in a certified run.
-_MAY_LACK = ("t_separation", "first_slip", "period", "stops_per_cycle", "swing")
+_MAY_LACK = ("t_separation", "first_slip", "period", "stops_per_cycle", "swing", "jump_max", "t_jump_max")
 
 # Relative difference of two final states that rounding explains.
 _SAME = 1e-14

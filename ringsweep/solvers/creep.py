@@ -329,6 +329,7 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
         if h == 0.0:
             return event, 0.0, y, record, control, 0.0
     fractions, count = scratch.work[0], 0
+    record = recorder.enter(scene, record, t, implicit.seen(scene, before))
     velocity, acceleration = implicit.motion(scene, forcing, x, linear)
     for begin, view in ((0.0, middle), (0.5, after)):
         # Where velocity or acceleration change sign, place or velocity have an extreme: the recorder must look there.

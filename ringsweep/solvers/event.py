@@ -67,7 +67,7 @@ class _Piecewise(Method):
     def needs(self, structure: Structure) -> Needs:
         """Functions for modes and audit, and for series, implicit steps or both, as the law's family needs."""
         family = family_of(structure.law_type)
-        of_model = recorder.MEMBERS + modes.MEMBERS + audit.MEMBERS
+        of_model = recorder.MEMBERS + recorder.EVENT_MEMBERS + modes.MEMBERS + audit.MEMBERS
         of_model += () if family is Dynamic else series.MEMBERS
         of_model += () if family is SetValued else implicit.MEMBERS
         of_model += (implicit.is_stiff,) if family is Smooth else ()

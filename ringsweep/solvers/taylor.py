@@ -43,6 +43,7 @@ def _first_event(c, first, entry_guard, h, work):
 @inlined
 def _observe(scene, record, mode, c, t, s, work):
     """Record after a step of length `s` of the series `c`, with the extremes within the step."""
+    record = recorder.enter(scene, record, t, series.seen_at_start(scene, c))
     count = series.extremes(scene, record, mode, c, s, work)
     instants = work[0]
     ascending(instants, count)
@@ -50,8 +51,7 @@ def _observe(scene, record, mode, c, t, s, work):
     before = 0.0
     for j in range(count + 1):
         now = instants[j] if j < count else s
-        seen = series.seen_at(scene, c, now, s) if now > 0.0 else series.seen_at_start(scene, c)
-        record = recorder.observe(scene, record, t + now, now - before, stuck, seen)
+        record = recorder.observe(scene, record, t + now, now - before, stuck, series.seen_at(scene, c, now, s))
         before = now
     return record
 

@@ -17,6 +17,7 @@ from ringsweep.models.interface import constant_step, implicit, modes, recorder
 from ringsweep.models.interface.status import RUNNING, SEPARATED_1
 from ringsweep.models.parts import larger_eigenvalue
 from ringsweep.numerics.functions import any_of, select
+from ringsweep.numerics.memory import select_all
 from ringsweep.physics import drives, ring
 from ringsweep.physics.belt import BristleBelt
 from ringsweep.physics.forces import force_in, force_rate
@@ -29,12 +30,6 @@ def contact(scene, v, z, sign, region):
     """Rate of the deflection (m/s) and its derivatives by v and z; friction K and its derivatives (s/m, 1/m)."""
     rate, rate_v, rate_z, traction, by_v, by_z = bristle(scene.law, scene.mu_s, scene.mu_k, v, z, sign, region)
     return rate, rate_v, rate_z, -traction, -by_v, -by_z
-
-
-@inlined
-def _region(scene, v, z, sign):
-    """BAND if the contact counts as stuck, KINETIC if it slips."""
-    return BAND if _in_band(scene, v, z, sign) else KINETIC
 
 
 @absorbed
@@ -50,14 +45,7 @@ def _contact_in_region(scene, v, z):
     stuck = _in_band(scene, v, z, sign)
     a = contact(scene, v, z, sign, BAND)
     b = contact(scene, v, z, sign, KINETIC)
-    return stuck, (
-        select(stuck, a[0], b[0]),
-        select(stuck, a[1], b[1]),
-        select(stuck, a[2], b[2]),
-        select(stuck, a[3], b[3]),
-        select(stuck, a[4], b[4]),
-        select(stuck, a[5], b[5]),
-    )
+    return stuck, select_all(stuck, a, b)
 
 
 @inlined
@@ -188,7 +176,7 @@ def _initial_mode(scene, t, y):
     if v == 0.0:
         # The body begins to slide in the direction of the net force; without a net force the belt leaves it behind.
         sign = 1 if ring.acceleration(scene.body, K, K, *at)[0] > forcing[2] else -1
-    mode = Mode(sign, _region(scene, v, z, float(sign)))
+    mode = Mode(sign, BAND if _in_band(scene, v, z, float(sign)) else KINETIC)
     opens = ring.if_load_varies(scene.body, True, False) and ring.reactions(scene.body, K, K, *at)[0] <= 0.0
     return (SEPARATED_1 if opens else RUNNING), mode
 

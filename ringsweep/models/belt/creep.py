@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ringsweep.compile import absorbed, inlined
-from ringsweep.models.belt.force import length_scale, sliding, sliding_slopes
+from ringsweep.models.belt.force import length_scale, located, sliding, sliding_slopes
 from ringsweep.models.interface import implicit
 from ringsweep.physics import belt, drives, ring
 from ringsweep.physics.forces import force_rate
@@ -74,7 +74,7 @@ def _guards_and_motion(scene, mode, common, forcing, x):
 @implicit.seen.implements(belt.Belt, belt.BristleBelt)
 def _seen(scene, view):
     _, (x, velocity, acceleration, friction, place, v, belt_acceleration) = view
-    return x, velocity, friction, place, v, acceleration - belt_acceleration
+    return x, velocity, friction, place, v, acceleration - belt_acceleration, located(scene, x, acceleration)
 
 
 @implicit.near_zero.implements(belt.Belt, belt.BristleBelt)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from ringsweep.compile import absorbed, hook, inlined
+from ringsweep.models.interface import shock
 from ringsweep.numerics.functions import opposing, select
 from ringsweep.physics import drives, ring
 from ringsweep.physics.belt import OnBelt
-from ringsweep.physics.forces import Forced, force_in, force_rate, largest_force
+from ringsweep.physics.forces import force_in, force_rate, largest_force
 from ringsweep.physics.friction.registry import SetValued, family
 from ringsweep.physics.friction.velocity import friction_at, stiction_band
 
@@ -80,6 +81,13 @@ def breakaway_force(scene, x):
 
 
 @inlined
+def located(scene, x, acceleration):
+    """Acceleration of the body at the displacement `x`, and the size of its terms, for the recorder."""
+    forces = abs(breakaway_force(scene, x)) + ring.size(scene.body, x, 0.0, 0.0)
+    return shock.Located(acceleration, forces / scene.body.mass + abs(acceleration))
+
+
+@inlined
 def stuck_pull(scene, x, v, forcing):
     """Force that friction must balance to keep the sliding velocity `v` (m/s) constant, N; positive forwards."""
     push = force_in(scene.drive, forcing)
@@ -94,22 +102,6 @@ def stuck_rates(scene, t, x, forcing):
     cube_rate = 3.0 * x * x * velocity
     load, _, friction, _ = ring.held(scene.body, 0.0, velocity, push_rate, acceleration, cube_rate, jerk, 0.0)
     return -friction, scene.mu_s * load
-
-
-@hook(optional=True)
-def _varies_alone(part):
-    return False
-
-
-@_varies_alone.implements(Forced, *ring.having(OnBelt, "cubic"), *ring.having(OnBelt, "damping"))
-def _present(part):
-    return True
-
-
-@inlined
-def has_loads(scene):
-    """Whether the scene has a damper, a cubic part of the spring or an external force."""
-    return _varies_alone(scene.body) or _varies_alone(scene.drive)
 
 
 @hook(optional=True)

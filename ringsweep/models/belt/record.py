@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from ringsweep.compile import absorbed, hook, inlined
 from ringsweep.models.belt.force import breakaway_force
-from ringsweep.models.interface import recorder
+from ringsweep.models.interface import recorder, shock
 from ringsweep.models.interface.status import BROKEN, SEPARATED_1
 from ringsweep.numerics.functions import any_of, floor, lanes_body, select, square_root
 from ringsweep.numerics.memory import select_all
@@ -44,6 +44,8 @@ class Outcome(NamedTuple):
     swing: float
     settled: float
     force_max: float
+    jump_max: float
+    t_jump_max: float
 
 
 class Last(NamedTuple):
@@ -166,6 +168,8 @@ class Record(NamedTuple):
         As in :class:`Outcome`, but the displacement only at turns.
     stops : Stops
     cycles : Cycles
+    shocks : Shocks or NoShocks
+        Jumps of the acceleration.
     """
 
     band: Any
@@ -177,6 +181,7 @@ class Record(NamedTuple):
     force_max: Any
     stops: Stops
     cycles: Cycles
+    shocks: Any
 
 
 #: The motion has returned if displacement and velocity differ by less than this share of their swing in a cycle.
@@ -205,7 +210,7 @@ _ROUNDING = 1e-6
 @inlined
 def begin(scene, t, seen, band, play):
     """Record at the beginning of a run."""
-    x, velocity, force, place, v, v_rate = seen
+    x, velocity, force, place, v, v_rate, acceleration = seen
     start = Mark(t, x, velocity, 0.0, 0.0)
     # The body counts as stuck until it slips: the first stop begins with the run. If the pull exceeds breakaway, it may
     # pass the stiction band at once.
@@ -222,16 +227,15 @@ def begin(scene, t, seen, band, play):
         abs(force),
         Stops(1.0, t, 0.0, t, -max(least, 1e-300), nan, t, 0.0, 0.0, nan),
         Cycles(0.0, scene.forcing_period, x, x, 0.0, 0.0, 0.0, start, start, 0.0, 1.0, 0.0, nan, nan, nan),
+        shock.begin(acceleration),
     )
 
 
-@absorbed
-def observe(scene, r, t, duration, stuck, seen):
-    """Record after an interval of `duration` seconds that ends at time `t`, in which the body stuck or slipped.
-
-    In most steps nothing turns, begins or ends.
-    """
-    x, velocity, force, place, v, v_rate = seen
+@recorder.observe.implements(Belt, BristleBelt)
+def _observe(scene, record, t, duration, stuck, seen):
+    # In most steps nothing turns, begins or ends.
+    r = record
+    x, velocity, force, place, v, v_rate, acceleration = seen
     stops, cycles, x_min, x_max = r.stops, r.cycles, r.x_min, r.x_max
     place = _place(scene, r, place)
     side = select(stuck, 1.0, -1.0)
@@ -262,6 +266,7 @@ def observe(scene, r, t, duration, stuck, seen):
         max(r.force_max, abs(force)),
         stops,
         cycles,
+        shock.observe(r.shocks, acceleration),
     )
 
 
@@ -469,9 +474,9 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
     return old
 
 
-@inlined
-def conclude(scene, r, status, t, x, velocity):
-    """Outcome of a run that ended with `status` at time `t` in the state `(x, velocity)`."""
+@recorder.conclude.implements(Belt, BristleBelt)
+def _conclude(scene, record, status, t, place, velocity):
+    r, x = record, place
     motion, period, share, stops, settled = _settles_to(scene, r, t)
     if status == BROKEN or not (isfinite(x) and isfinite(velocity)):
         motion = FAILED
@@ -493,6 +498,7 @@ def conclude(scene, r, status, t, x, velocity):
         r.cycles.swing if stops == stops else nan,
         1.0 if settled else 0.0,
         r.force_max,
+        *shock.largest(r.shocks),
     )
 
 
@@ -546,23 +552,12 @@ def _settles_to(scene, r, t):
     return SLIDING, nan, 0.0, 0.0, c.swing <= RETURN * (r.x_max - r.x_min)
 
 
-@inlined
-def due_within(scene, r, h):
-    """Time until the forcing ends its next period, s, or a negative number if that is beyond a step of length `h`."""
-    rest = r.cycles.next - r.last.t
-    return rest if rest < h else -1.0
-
-
 @recorder.begin.implements(Belt)
 def _begin(scene, t, seen):
     return begin(scene, t, seen, stiction_band(scene.law), -1.0)
 
 
-@recorder.observe.implements(Belt, BristleBelt)
-def _observe(scene, record, t, duration, stuck, seen):
-    return observe(scene, record, t, duration, stuck, seen)
-
-
-@recorder.conclude.implements(Belt, BristleBelt)
-def _conclude(scene, record, status, t, place, velocity):
-    return conclude(scene, record, status, t, place, velocity)
+@recorder.enter.implements(Belt, BristleBelt)
+def _enter(scene, record, t, seen):
+    r, shocks = record, shock.enter(record.shocks, t, seen[6])
+    return Record(r.band, r.play, r.last, r.x_min, r.x_max, r.velocity_max, r.force_max, r.stops, r.cycles, shocks)

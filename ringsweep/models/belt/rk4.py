@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from ringsweep.models.belt.force import if_force, sliding
 from ringsweep.models.interface import constant_step
+from ringsweep.models.interface.shock import Unlocated
 from ringsweep.physics import belt, drives, ring
 from ringsweep.physics.friction.velocity import stiction_band
 
@@ -76,7 +77,7 @@ def _inspect(scene, y, forcing):
 @constant_step.seen.implements(belt.Belt, belt.BristleBelt)
 def _seen(scene, y, now):
     # The record takes the rate of the sliding velocity from the differences of short steps.
-    return y[0], y[1], now.force, now.place, now.v, 0.0
+    return y[0], y[1], now.force, now.place, now.v, 0.0, Unlocated()
 
 
 @constant_step.row.implements(belt.Belt)

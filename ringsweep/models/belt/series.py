@@ -11,14 +11,13 @@ from typing import NamedTuple
 from ringsweep.compile import hook, inlined
 from ringsweep.models.belt.force import (
     breakaway_force,
-    has_loads,
     if_force,
     length_scale,
+    located,
     speed_scale,
     stuck_pull,
     stuck_rates,
 )
-from ringsweep.models.belt.record import due_within
 from ringsweep.models.interface import modes, series
 from ringsweep.models.interface.status import RUNNING, SEPARATED_1
 from ringsweep.numerics.series import INVERSE, ORDER, crossings, slope, step_size, value, variation
@@ -254,7 +253,7 @@ def _expand(scene, mode, t, y, tolerance, c):
         speed = min(speed, 1e3 * stiction_band(scene.law))
     last = max(abs(c[X, ORDER]) / length, abs(c[V, ORDER]) / speed)
     previous = max(abs(c[X, ORDER - 1]) / length, abs(c[V, ORDER - 1]) / speed)
-    if has_loads(scene) and (mode.sign == 0 or (holds_in_band(scene.law) and mode.region < 0)):
+    if mode.sign == 0 or (holds_in_band(scene.law) and mode.region < 0):
         # The guards are forces, whose series may converge more slowly than that of the motion.
         at = length, largest_force(scene.drive), c[VELOCITY, 0]
         scale = abs(breakaway_force(scene, c[X, 0])) + ring.size(body, *at) + 1e-300
@@ -306,7 +305,8 @@ def _expand_slip(scene, mode, viscous, c):
 
 @series.seen_at_start.implements(belt.Belt)
 def _seen_at_start(scene, c):
-    return c[X, 0], c[VELOCITY, 0], c[FORCE, 0], c[X, 0] - c[SHIFT, 0], c[V, 0], c[V, 1]
+    acceleration = located(scene, c[X, 0], c[ACCELERATION, 0])
+    return c[X, 0], c[VELOCITY, 0], c[FORCE, 0], c[X, 0] - c[SHIFT, 0], c[V, 0], c[V, 1], acceleration
 
 
 @series.seen_at.implements(belt.Belt)
@@ -316,7 +316,8 @@ def _seen_at(scene, c, s, h):
         # A velocity within rounding is zero, so that an extreme of the displacement is recognised.
         velocity = 0.0
     x = value(c[X], s)
-    return x, velocity, value(c[FORCE], s), x - value(c[SHIFT], s), value(c[V], s), slope(c[V], s)
+    acceleration = located(scene, x, value(c[ACCELERATION], s))
+    return x, velocity, value(c[FORCE], s), x - value(c[SHIFT], s), value(c[V], s), slope(c[V], s), acceleration
 
 
 @series.extremes.implements(belt.Belt)
@@ -327,8 +328,9 @@ def _extremes(scene, record, mode, c, h, work):
     # In slip friction has an extreme where the velocity has one.
     if mode.sign != 0 or c[VELOCITY, 0] + variation(c[VELOCITY], h) > record.velocity_max:
         count = crossings(c[ACCELERATION], h, work, count)
-    rest = due_within(scene, record, h)
-    if rest > 0.0:
+    # The forcing may end its next period.
+    rest = record.cycles.next - record.last.t
+    if 0.0 < rest < h:
         work[0][count] = rest
         count += 1
     return count

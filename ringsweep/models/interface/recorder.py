@@ -43,7 +43,7 @@ def observe(scene, record, t, duration, stuck, seen):
     t : float
         Time at the end of the interval, s.
     duration : float
-        Length of the interval, s. It is 0 where a value has jumped.
+        Length of the interval, s.
     stuck : bool
         Whether the body stuck during the whole interval.
     seen : tuple of float
@@ -53,6 +53,28 @@ def observe(scene, record, t, duration, stuck, seen):
     -------
     NamedTuple
         Record at the end of the interval, of the same type as `record`.
+    """
+
+
+@hook
+def enter(scene, record, t, seen):
+    """Record at the beginning of a step, where values may have jumped. Methods of constant step do not call it.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    record : NamedTuple
+        Record at the end of the step before.
+    t : float
+        Time, s.
+    seen : tuple of float
+        The state at `t` as the recorder takes it.
+
+    Returns
+    -------
+    NamedTuple
+        Record of the same type as `record`.
     """
 
 
@@ -81,3 +103,5 @@ def conclude(scene, record, status, t, place, velocity):
 
 
 MEMBERS = (begin, observe, conclude)
+#: What methods that locate events need in addition.
+EVENT_MEMBERS = (enter,)

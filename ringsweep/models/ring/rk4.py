@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from ringsweep.compile import absorbed
 from ringsweep.models.interface import constant_step
+from ringsweep.models.interface.shock import Unlocated
 from ringsweep.models.ring.contacts import zones_at
 from ringsweep.numerics.functions import sine_cosine, sine_cosine_carried, sine_cosine_near
 from ringsweep.physics import ring, zones
@@ -90,7 +91,7 @@ def _arc_share(scene, now, h):
 
 @constant_step.seen.implements(ring.Ring, ring.BristleRing)
 def _seen(scene, y, now):
-    return y[0], y[1], now.normal_1, now.normal_2
+    return y[0], y[1], now.normal_1, now.normal_2, Unlocated()
 
 
 @constant_step.row.implements(ring.Ring)
