@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 import ringsweep
-from ringsweep.quantities.variables import REGIMES
+from ringsweep.quantities.flags import REGIMES
 from ringsweep.solvers.rk4 import STABILITY_LIMIT
 
 CONFIGS = Path(__file__).parents[1] / "configs"

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import ringsweep
-from ringsweep.quantities.variables import REGIMES
+from ringsweep.quantities.flags import REGIMES
 
 M, K, G = 1.3, 20.0, 9.81
 SMALL_STEPS = {"method": "rk4", "steps": 40_000}

@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 import ringsweep
-from ringsweep.quantities.variables import REGIMES
+from ringsweep.quantities.flags import REGIMES
 
 
 def scene(law, *, k=2.0, drive=None, belt=None, x=0.0, velocity=None, span=60.0, **friction):

@@ -10,7 +10,8 @@ import xarray as xr
 import ringsweep
 from ringsweep.config import load
 from ringsweep.models.ring.record import Outcome
-from ringsweep.quantities.variables import OUTCOMES, REGIMES
+from ringsweep.quantities.flags import REGIMES
+from ringsweep.quantities.variables import OUTCOMES
 from ringsweep.solvers.certificate import with_errors
 from ringsweep.storage.provenance import attributes, identity
 

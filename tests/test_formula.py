@@ -33,7 +33,7 @@ from ringsweep.physics.friction.velocity import (
     stiction_band,
     varies,
 )
-from ringsweep.quantities.variables import FAILED
+from ringsweep.quantities.flags import FAILED
 
 LEINE = {"law": "formula", "mu": "mu_s/(1 + delta*v)", "at_rest": "mu_s", "mu_s": 1.0, "delta": "3 s/m"}
 

@@ -29,8 +29,8 @@ from ringsweep.physics.drives import lookup
 from ringsweep.physics.friction import LAWS, Dynamic, SetValued, coefficients_of, family_of
 from ringsweep.physics.friction.laws import Definition, define
 from ringsweep.physics.friction.velocity import friction_at, steepest, stiction_band
+from ringsweep.quantities.flags import SEPARATING
 from ringsweep.quantities.parameters import declared
-from ringsweep.quantities.variables import SEPARATING
 from ringsweep.solvers import rk4
 from ringsweep.solvers.rk4 import RK4
 

@@ -18,7 +18,8 @@ from PIL import Image
 
 from ringsweep import plots
 from ringsweep.errors import InputError
-from ringsweep.quantities.variables import HISTORY, OUTCOMES, REGIMES, words
+from ringsweep.quantities.flags import REGIMES
+from ringsweep.quantities.variables import HISTORY, OUTCOMES, words
 
 DRIVE = {"units": "rad s-1", "long_name": "amplitude of the drive"}
 ANGLE = {"units": "rad", "long_name": "half-angle of the zone"}

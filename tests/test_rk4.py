@@ -14,7 +14,7 @@ from ringsweep.models.ring.record import Outcome
 from ringsweep.models.ring.rk4 import Inspection
 from ringsweep.physics.friction.velocity import friction_at
 from ringsweep.physics.ring import acceleration, reactions
-from ringsweep.quantities.variables import FAILED, JAMMED, OSCILLATORY, REGIMES, RESTING, REVOLVING, SEPARATING
+from ringsweep.quantities.flags import FAILED, JAMMED, OSCILLATORY, REGIMES, RESTING, REVOLVING, SEPARATING
 from ringsweep.solvers.rk4 import RK4, STABILITY_LIMIT
 
 MU = 0.1

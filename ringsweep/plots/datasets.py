@@ -40,6 +40,35 @@ def require_sweep(ds: xr.Dataset) -> None:
         )
 
 
+#: Dimensions that a sampled sweep has within a cell.
+WITHIN = ("word", "parameter", "quantile", "survival_time", "replicate", "certificate", "sum")
+
+
+def is_sampled(ds: xr.Dataset) -> bool:
+    """Whether a dataset holds probabilities, and no runs."""
+    return "word" in ds.coords and "probability" in ds
+
+
+def require_sample(ds: xr.Dataset, name: str) -> xr.Dataset:
+    """One cell of a sampled sweep that has a variable.
+
+    Raises
+    ------
+    InputError
+        If the dataset is no sampled sweep, lacks the variable, or has several cells.
+    """
+    if not is_sampled(ds):
+        raise InputError("ds", "is no sampled sweep: sweep.sample in a configuration makes one")
+    if name not in ds:
+        key = {"sobol_first": "sensitivity: true", "survival": "survival: [times]"}.get(name, name)
+        raise InputError("ds", f"has no {name}: run it with `{key}` in sweep.sample")
+    grid = [str(dim) for dim in ds[name].dims if dim not in WITHIN]
+    single = ds.isel({dim: 0 for dim in grid if ds.sizes[dim] == 1})
+    if left := [f"{dim} ({ds.sizes[dim]})" for dim in grid if ds.sizes[dim] > 1]:
+        raise InputError("ds", f"has several cells: hold {', '.join(left)}, by --sel or ds.isel(...)")
+    return single
+
+
 def require_history(ds: xr.Dataset) -> xr.Dataset:
     """The history of a run, or of one run under each of several friction laws.
 

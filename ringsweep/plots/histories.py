@@ -49,7 +49,8 @@ from ringsweep.plots.style import (
     true_ranges,
     width_of,
 )
-from ringsweep.quantities.variables import JAMMED, SEPARATING, words
+from ringsweep.quantities.flags import JAMMED, SEPARATING
+from ringsweep.quantities.variables import words
 
 # Share of a run in which differences between friction laws belong to its start.
 _LATEST = 0.1

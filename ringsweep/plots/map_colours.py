@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from ringsweep.plots.datasets import configuration
 from ringsweep.plots.labels import number_text
 from ringsweep.plots.style import CLASS_COLOURS, NO_VALUE, REGIME_COLOURS, on_page
-from ringsweep.quantities.variables import FAILED, INFERRED, JAMMED
+from ringsweep.quantities.flags import FAILED, JAMMED
+from ringsweep.quantities.variables import INFERRED, SAMPLED
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,9 @@ class ColourScale:
             if str(data.name).endswith("_error") and positive.size and positive.max() > positive.min():
                 # Bounds on errors differ by powers of ten.
                 return cls(_with_grey("viridis"), LogNorm(positive.min(), positive.max()))
+            if str(data.name) in SAMPLED and data.dtype.kind == "f":
+                # Shares: every map of them has the same colours.
+                return cls(_with_grey("viridis"), Normalize(0.0, 1.0))
             limits = (finite.min(), finite.max()) if finite.size else (0.0, 1.0)
             return cls(_with_grey("viridis"), Normalize(*limits))
         flags = np.atleast_1d(data.attrs["flag_values"])

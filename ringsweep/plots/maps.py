@@ -22,7 +22,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
-from ringsweep.plots.datasets import is_numeric, require_sweep, resolve, swept
+from ringsweep.plots.datasets import is_numeric, is_sampled, require_sweep, resolve, swept
 from ringsweep.plots.labels import (
     axis_label,
     display_factor,
@@ -63,6 +63,9 @@ _MOST_PANELS = 25
 # Greatest number of cells drawn along an axis: more than a printed page has pixels. Drawing all of millions takes
 # gigabytes.
 _MOST_CELLS = 1200
+
+# Probabilities whose curves are drawn, and their style.
+_LEVELS: dict[float, Any] = {0.05: ":", 0.5: "-", 0.95: "--"}
 
 _CURVE: dict[str, Any] = {
     "color": "black",
@@ -277,6 +280,13 @@ class Map:
     def of(cls, ds: xr.Dataset, x: str | None, y: str | None, var: str, sel: Mapping[str, float | str]) -> Map:
         """Choose axes, panels and colours; arguments and errors as for :func:`regime_map`."""
         require_sweep(ds)
+        if is_sampled(ds):
+            var = "probability" if var == "regime" else var
+            # Regimes that occur nowhere have no map.
+            if "word" not in sel and "word" in ds.dims:
+                ds = ds.isel(
+                    word=(ds["probability"] > 0.0).any([d for d in ds["probability"].dims if d != "word"]).values
+                )
         var = resolve("var", var, [name for name, data in ds.data_vars.items() if is_numeric(data)])
         # The title also names what was held before, by `ds.isel` for example.
         held = [value_text(coordinate) for coordinate in swept(ds) if not coordinate.dims]
@@ -338,10 +348,13 @@ class Map:
         ]
         if self.vertical is None and self.scale.meanings is None:
             self._draw_line(axes, numbers)
+            self._draw_band(axes, index)
         elif self.scattered and self.vertical:
             self._draw_points(axes, self.vertical, numbers, warnings)
         else:
             self._draw_cells(axes, numbers, warnings)
+            if self.data.name == "probability" and self.vertical and min(numbers.shape) > 1:
+                self._draw_levels(axes, self.vertical, numbers)
 
     def draw_curves(self, axes: Axes, boundaries: xr.Dataset) -> None:
         """Draw the curves of boundaries over a panel."""
@@ -373,6 +386,28 @@ class Map:
         axes.broken_barh(gaps, (0, 1), transform=axes.get_xaxis_transform(), color=on_page(NO_VALUE), linewidth=0)
         marker = "o" if len(numbers) <= 100 else "."
         axes.plot(self.horizontal.values, numbers, marker=marker, markersize=4, color=on_page(PAIR_COLOURS[0]))
+
+    def _draw_band(self, axes: Axes, index: Mapping[str, int]) -> None:
+        """Draw the interval of a probability or a quantile, if the dataset has it."""
+        ends = [f"{self.data.name}{end}" for end in ("_low", "_high")]
+        if all(end in self.ds for end in ends):
+            low, high = (displayed(self.ds[end].isel(index)).values[self.horizontal.order] for end in ends)
+            axes.fill_between(
+                self.horizontal.values, low, high, color=on_page(PAIR_COLOURS[0]), alpha=0.25, linewidth=0
+            )
+
+    def _draw_levels(self, axes: Axes, vertical: Axis, data: xr.DataArray) -> None:
+        """Draw the curves along which a probability is 5, 50 and 95 %."""
+        numbers = as_matrix(data, self.horizontal, vertical)
+        x, y = self.horizontal.values, vertical.values
+        levels = [level for level in _LEVELS if numbers.min() < level < numbers.max()]
+        if levels:
+            styles = [_LEVELS[level] for level in levels]
+            curves = axes.contour(x, y, numbers, levels, colors="white", linewidths=1.2, linestyles=styles)
+            stroke: list[Any] = [withStroke(linewidth=2.2, foreground="#404040")]
+            curves.set_path_effects(stroke)
+            for text in axes.clabel(curves, fmt=lambda level: f"{level:.0%}", fontsize=SMALL):
+                text.set_path_effects(stroke)
 
     def _draw_points(self, axes: Axes, vertical: Axis, data: xr.DataArray, warnings: list[CellWarning]) -> None:
         x, y = self.horizontal.values_at(data), vertical.values_at(data)

@@ -13,11 +13,13 @@ from time import monotonic
 
 import joblib
 import numpy as np
+from numpy.typing import NDArray
 
 from ringsweep.config import Config
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS
 from ringsweep.quantities.variables import OUTCOMES
+from ringsweep.runs import sampled
 from ringsweep.runs.cells import TaskResult, compute_task
 from ringsweep.solvers.certificate import with_errors
 from ringsweep.storage.chunks import Layout
@@ -35,9 +37,11 @@ _MEASURING, _FIRST, _MOST = 1.0, 120.0, 100_000
 
 
 def bytes_of_cell(config: Config) -> int:
-    """Size of the columns of a cell; variables that some solvers leave out are counted."""
+    """Size of the columns of a cell, or of its sums; variables that some solvers leave out are counted."""
+    if config.sample is not None:
+        return sampled.bytes_of_part(config) * config.sample.replicates
     model = MODELS[config.scene.structure.model]
-    names = {*model.outcomes, "steps", "certified", "stiffness"} - set(model.absent)
+    names = {*model.outcomes, "steps", "certified", "uncertified_because", "stiffness"} - set(model.absent)
     errors = (
         [f"{name}_error" for name in with_errors(model.outcomes)] if getattr(config.solver, "certify", False) else []
     )
@@ -107,10 +111,12 @@ def describe(config: Config, target: Path, jobs: int | None) -> str:
     finished = _FILE + columns * (_COMPRESSED if layout.total >= COMPRESSED_FROM else 1.0)
     free = shutil.disk_usage(folder).free
     threads = jobs or joblib.cpu_count()
+    each = 0 if config.sample is None else config.sample.n * config.sample.rows
+    runs = f", {each} runs in each, {each * layout.total} in all" if each else ""
     most = "at most " if config.refine is not None else ""
     return "\n".join(
         (
-            f"cells: {most}{layout.total}{shape}",
+            f"cells: {most}{layout.total}{shape}{runs}",
             f"memory: some {size(memory_needed(config, False))} of {size(memory_of_machine())}",
             f"disk: {most}{size(columns + finished)} while it runs, then {most}{size(finished)}"
             f"; {size(free)} are free in {folder}",
@@ -122,13 +128,18 @@ def describe(config: Config, target: Path, jobs: int | None) -> str:
 
 def _time(config: Config, layout: Layout, threads: int) -> str:
     """Estimated time of a sweep in words."""
+    if config.sample is not None:
+        layout = sampled.part_layout(config, layout)
     results = _measure(config, layout)
     if results is None:
         return f"not known: the first cells took more than {_FIRST:.0f} s, compilation included"
     cells = sum(len(result.positions) for result in results)
     cost = sum(result.seconds or 0.0 for result in results) / cells if cells else _MEASURING
     seconds = cost * layout.total / min(threads, layout.total)
-    basis = f"measured on {cells} cells spread over the grid" if cells else "one cell takes longer than the measurement"
+    what = "cells" if config.sample is None else "replicates of cells"
+    basis = (
+        f"measured on {cells} {what} spread over the grid" if cells else "one cell takes longer than the measurement"
+    )
     about = "about" if cells else "more than"
     return f"{about} {duration(seconds)} on {threads} threads, once the kernels are compiled ({basis})"
 
@@ -139,15 +150,20 @@ def _measure(config: Config, layout: Layout) -> list[TaskResult] | None:
     few = layout.total <= _MOST
     drawn = draw.permutation(layout.total) if few else draw.integers(layout.total, size=_MOST)
     answers: SimpleQueue[TaskResult | BaseException | None] = SimpleQueue()
-    side = config.solver.side_by_side
+    side = 1 if config.sample else config.solver.side_by_side
+
+    def compute(config: Config, layout: Layout, positions: NDArray[np.integer]) -> TaskResult:
+        if config.sample is None:
+            return compute_task(config, layout, positions)
+        return sampled.compute_parts(config, layout, None, positions)
 
     def work() -> None:
         try:
             # The first ones may compile or load kernels. They are run again.
-            answers.put(compute_task(config, layout, drawn[:side]))
+            answers.put(compute(config, layout, drawn[:side]))
             start, stop, began = 0, side, monotonic()
             while start < len(drawn) and monotonic() - began < _MEASURING / 2:
-                answers.put(compute_task(config, layout, drawn[start:stop]))
+                answers.put(compute(config, layout, drawn[start:stop]))
                 start, stop = stop, 2 * stop
             answers.put(None)
         except BaseException as error:

@@ -12,12 +12,16 @@ from numpy.typing import NDArray
 from ringsweep.config import Config
 from ringsweep.models import batch
 from ringsweep.physics.drives import Constant
-from ringsweep.quantities.variables import FAILED, INFERRED, RIDING
+from ringsweep.quantities.flags import FAILED, RIDING
+from ringsweep.quantities.variables import INFERRED
 from ringsweep.runs.cells import laws_at, values_at
 from ringsweep.solvers.rk4 import STABILITY_LIMIT
 from ringsweep.storage.chunks import Layout
 
 logger = logging.getLogger("ringsweep")
+
+# Share of runs without certificate that is worth a warning.
+_MANY_UNSURE = 0.01
 
 
 def warn_of_results(results: xr.Dataset, config: Config) -> None:
@@ -122,6 +126,25 @@ def _warn_of_belt(results: xr.Dataset, config: Config, count: int) -> None:
             else f"{riding / regime.size:.1%} of the bodies ride: they have"
         )
         logger.warning("%s not broken loose; %s", who, remedy)
+
+
+def warn_of_sample(results: xr.Dataset, config: Config) -> None:
+    """Warn of runs of a sample that failed or have no certificate.
+
+    Parameters
+    ----------
+    results : xarray.Dataset
+        Statistics of all cells, in memory or on disk.
+    config : Config
+        Configuration of the runs.
+    """
+    runs = results["runs"].sum([dim for dim in results["runs"].dims if dim not in ("word", "certificate")]).values
+    share, failed = runs[:, 0].sum() / runs.sum(), int(runs[FAILED].sum())
+    if share > _MANY_UNSURE:
+        cure = "" if getattr(config.solver, "certify", True) else ": the solver does not certify"
+        logger.warning("%.1f %% of the runs have no certificate, and widen the intervals%s", 100 * share, cure)
+    if failed:
+        logger.warning("%d runs failed", failed)
 
 
 def _spans_of_first_slip(config: Config, cells: NDArray[np.intp] | None) -> NDArray[np.float64]:

@@ -15,7 +15,7 @@ from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.forces import force_in
 from ringsweep.physics.friction.registry import holds_in_band
 from ringsweep.physics.friction.velocity import stiction_band
-from ringsweep.quantities.variables import OSCILLATORY, SEPARATING
+from ringsweep.quantities.flags import OSCILLATORY, SEPARATING
 
 # An oscillation is certain if the two runs of a cell differ by less than this share of its swing.
 _SMALLEST_SHARE = 0.1

@@ -21,7 +21,7 @@ from ringsweep.numerics.memory import select_all
 from ringsweep.physics import ring
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.friction.velocity import stiction_band
-from ringsweep.quantities.variables import FAILED, OSCILLATORY, RIDING, SEPARATING, SLIDING, STICK_SLIP, STICKING
+from ringsweep.quantities.flags import FAILED, OSCILLATORY, RIDING, SEPARATING, SLIDING, STICK_SLIP, STICKING
 
 
 class Outcome(NamedTuple):

@@ -12,7 +12,7 @@ from ringsweep.models.interface import recorder, shock
 from ringsweep.models.interface.status import BROKEN, JAM, SEPARATED_1, SEPARATED_2, SEPARATED_BOTH
 from ringsweep.numerics.functions import any_of, select
 from ringsweep.physics.ring import BristleRing, Ring
-from ringsweep.quantities.variables import FAILED, JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
+from ringsweep.quantities.flags import FAILED, JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 
 #: Largest number of turns, since datasets store an int32. A diverging run of constant step exceeds it.
 MOST_TURNS = 2.0**31 - 1.0
