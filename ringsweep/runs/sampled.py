@@ -267,7 +267,7 @@ def statistics(config: Config, sums: Columns) -> Columns:
         for name, index in zip(("sobol_first", "sobol_total"), indices, strict=True):
             found |= {f"{name}{end}": part for end, part in zip(("", "_low", "_high"), index, strict=True)}
     found |= {name: column for name, column in flat.items() if name not in _sums_of(sample)}
-    return {name: column.reshape(*shape, *column.shape[1:]) for name, column in found.items()}
+    return {name: column.reshape((*shape, *column.shape[1:])) for name, column in found.items()}
 
 
 def _both_ways(
