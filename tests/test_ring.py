@@ -420,7 +420,7 @@ class TestCompiledModel:
             found = (now.rates[1], now.normal_1, now.normal_2)
             np.testing.assert_allclose(found, np.linalg.solve(balances, loads), rtol=1e-9, atol=1e-9)
             assert now.v == pytest.approx(v, rel=1e-14)
-            assert now.rates[0] == now.omega == omega
+            assert now.rates[0] == now.at[2] == omega
             np.testing.assert_allclose(now.determinant, np.linalg.det(balances), rtol=1e-9)
         assert len(met) == 8
 
