@@ -39,8 +39,8 @@ from ringsweep.storage.provenance import differences, environment, fingerprint, 
 
 Columns = dict[str, NDArray[Any]]
 
-# Bytes of the sums of a chunk.
-_CHUNK_BYTES = 32e6
+# Bytes of the sums of a chunk, and of a run that is kept.
+_CHUNK_BYTES, _RUN_BYTES = 32e6, 200
 
 
 def grid_layout(config: Config, whole: bool = False) -> Layout:
@@ -63,11 +63,11 @@ def part_layout(config: Config, grid: Layout) -> Layout:
     return Layout((*grid.sizes, replicates), (*grid.chunk, replicates))
 
 
-def bytes_of_part(config: Config, of_run: int = 200) -> int:
-    """Size of the sums of a part, and of its runs if they are kept; `of_run` is that of one run."""
+def bytes_of_part(config: Config) -> int:
+    """Size of the sums of a part, and of its runs if they are kept."""
     sample = _sample(config)
     sums = sum(math.prod(shape) * np.dtype(dtype).itemsize for dtype, shape in _sums_of(sample).values())
-    return sums + sample.keep * sample.size * sample.rows * of_run
+    return sums + sample.keep * sample.size * sample.rows * _RUN_BYTES
 
 
 def _sample(config: Config) -> Sample:
