@@ -12,6 +12,7 @@ from ringsweep.config import load
 from ringsweep.models.ring.record import Outcome
 from ringsweep.quantities.flags import REGIMES
 from ringsweep.quantities.variables import OUTCOMES
+from ringsweep.runs import executors
 from ringsweep.solvers.certificate import with_errors
 from ringsweep.storage.provenance import attributes, identity
 
@@ -29,7 +30,7 @@ class TestDataset:
     def test_dataset_has_a_dimension_per_path_and_all_declared_variables(self, grid):
         assert dict(grid.sizes) == {"drive_amplitude": 3, "zone_half_angle": 3}
         bounded = {f"{name}_error" for name in with_errors(Outcome._fields)}
-        assert set(grid.data_vars) == {*Outcome._fields, *bounded, "steps", "certified"}
+        assert set(grid.data_vars) == {*Outcome._fields, *bounded, "steps", "certified", "uncertified_because"}
         for name, variable in grid.data_vars.items():
             assert variable.attrs["units"] == OUTCOMES[name].units
             assert variable.dtype == OUTCOMES[name].dtype
@@ -148,6 +149,16 @@ class TestProgress:
     def test_progress_bar_is_not_shown_in_a_pipe(self, scene, capfd):
         ringsweep.sweep(scene, {"drive.amplitude": [1.0]})
         assert capfd.readouterr().err == ""
+
+    def test_long_sweep_without_a_terminal_tells_how_far_it_is_after_a_minute_and_then_seldom(
+        self, monkeypatch, caplog
+    ):
+        clock = iter([0.0, 30.0, 61.0, 100.0, 121.0, 123.0, 200.0])
+        monkeypatch.setattr(executors.time, "monotonic", lambda: next(clock))
+        with caplog.at_level("INFO", "ringsweep"), executors.progress_bar(60, True) as bar:
+            for _ in range(6):
+                bar.update(10)
+        assert caplog.messages == ["20 runs of 60: about 2 min left", "50 runs of 60: about 25 s left"]
 
 
 class TestConfigurations:

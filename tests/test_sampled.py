@@ -15,7 +15,7 @@ from ringsweep import InputError, statistics
 from ringsweep.cli import main
 from ringsweep.config import load
 from ringsweep.plots import probability_panel, regime_map, sensitivity_panel, survival_panel
-from ringsweep.quantities.variables import REGIMES
+from ringsweep.quantities.flags import REGIMES
 from ringsweep.statistics import (
     clopper_pearson,
     quantiles,

@@ -55,7 +55,7 @@ def run_command(arguments: argparse.Namespace) -> None:
 
         if arguments.scheduler is not None:
             raise InputError("--dry-run", "measures threads of this machine: leave --backend dask out")
-        print(describe(config, target, arguments.jobs))
+        print(describe(config, target, arguments.jobs, arguments.reuse))
         return
 
     from ringsweep import plots
@@ -129,6 +129,8 @@ def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None
     files.check_writable(target)
     selection = dict(_selection(text) for text in arguments.sel)
     page = target.suffix.lower() == ".html"
+    if page and arguments.log:
+        raise InputError("--log", "is for pictures, not for a page: name the output *.png")
     if page and arguments.boundaries is not None:
         raise InputError("--boundaries", "are drawn into pictures, not into a page: name the output *.png")
     if arguments.tolerance is not None and arguments.boundaries is None:
@@ -160,7 +162,7 @@ def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None
         if page:
             plots.save_page(result, target, *chosen)
         else:
-            plots.save(plots.regime_map(result, *chosen, curves), target)
+            plots.save(plots.regime_map(result, *chosen, curves, norm="log" if arguments.log else None), target)
     except InputError as error:
         if error.path == "ds":
             raise InputError(str(dataset), error.problem) from error

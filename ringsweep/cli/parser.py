@@ -95,6 +95,7 @@ def build_parser() -> argparse.ArgumentParser:
         help="fix a coordinate at its value nearest to VALUE, with --boundaries at VALUE; units allowed",
     )
 
+    draw.add_argument("--log", action="store_true", help="colours follow the logarithm of the numbers")
     draw.add_argument("--boundaries", metavar="REGIME", help="locate the boundary of a regime: curves, also as NetCDF")
     draw.add_argument(
         "--tolerance", type=positive_number, metavar="T", help="error of these, in SI units (default: 1e-6)"

@@ -59,6 +59,9 @@ def sources_digest(root: Path, own_files: Iterable[Path] = (), places: Iterable[
             digest.update(str(source.relative_to(root)).encode())
             digest.update(source.read_bytes())
     for path in own_files:
+        if path.exists() and not path.is_file():
+            # A pipe would be waited for.
+            raise InputError("RINGSWEEP_LAWS", f"{path} is not a file")
         try:
             digest.update(path.read_bytes())
         except OSError as error:

@@ -24,6 +24,17 @@ PANELS: dict[str, tuple[tuple[str, ...], ...]] = {
 }
 
 
+# What a picture says of a scene: path, the words before its value, and the unit of a plain number.
+_TOLD = (
+    ("friction.law", "", ""),
+    ("drive.law", "drive ", ""),
+    ("drive.amplitude", "amplitude ", ""),
+    ("zone.half_angle", "zone \N{PLUS-MINUS SIGN}", " rad"),
+    ("belt.velocity", "belt ", " m/s"),
+    ("time.span", "span ", " s"),
+)
+
+
 def require_sweep(ds: xr.Dataset) -> None:
     """Refuse a dataset that is no sweep.
 
@@ -183,6 +194,23 @@ def configuration(ds: xr.Dataset) -> dict[str, Any]:
     if "configuration" not in ds.attrs:
         raise InputError("ds", "has no attribute configuration, so its scene is not known")
     return dict(json.loads(ds.attrs["configuration"]))
+
+
+def scene_text(ds: xr.Dataset) -> list[str]:
+    """What a picture says of the scene, as the user wrote it: law, drive, zone, belt, span, if they were not swept."""
+    if "configuration" not in ds.attrs:
+        return []
+    scene = configuration(ds).get("scene", {})
+    swept_here = {str(c.attrs["path"]) for c in ds.coords.values() if "path" in c.attrs}
+    found = []
+    for path, before, after in _TOLD:
+        section, _, key = path.partition(".")
+        value = scene.get(section, {}).get(key) if isinstance(scene.get(section), dict) else None
+        if value is None or path in swept_here:
+            continue
+        unit = after if isinstance(value, int | float) else ""
+        found.append(f"{before}{value}{unit}")
+    return found
 
 
 def resolve(argument: str, name: str, available: Iterable[Any]) -> str:

@@ -21,6 +21,7 @@ from ringsweep.models import MODELS
 from ringsweep.quantities.variables import OUTCOMES
 from ringsweep.runs import sampled
 from ringsweep.runs.cells import TaskResult, compute_task
+from ringsweep.runs.reuse import EarlierSweep
 from ringsweep.solvers.certificate import with_errors
 from ringsweep.storage.chunks import Layout
 from ringsweep.storage.netcdf import COMPRESSED_FROM
@@ -95,8 +96,10 @@ def memory_of_machine() -> float:
     return found
 
 
-def describe(config: Config, target: Path, jobs: int | None) -> str:
+def describe(config: Config, target: Path, jobs: int | None, reuse: str | os.PathLike[str] | None = None) -> str:
     """Cells, memory, disk and estimated time of a sweep, as lines of text. Some of its cells are run for it.
+
+    Cells that the file `reuse` of an earlier sweep has are counted, and take no time.
 
     Raises
     ------
@@ -105,6 +108,12 @@ def describe(config: Config, target: Path, jobs: int | None) -> str:
     """
     folder = target.resolve().parent
     layout = Layout(tuple(config.axes.sizes.values()))
+    taken = 0
+    if reuse is not None and config.sample is None:
+        earlier = EarlierSweep(reuse, config)
+        config = earlier.align_axes(config)
+        none = np.zeros(layout.total, dtype=bool)
+        taken = sum(len(positions) for positions, _ in earlier.shared_cells(config, layout, none, ()))
     check_room(config, layout.total, folder)
     shape = f" ({', '.join(f'{name} {length}' for name, length in config.axes.sizes.items())})" * bool(layout.sizes)
     columns = float(layout.total * bytes_of_cell(config))
@@ -117,25 +126,29 @@ def describe(config: Config, target: Path, jobs: int | None) -> str:
     return "\n".join(
         (
             f"cells: {most}{layout.total}{shape}{runs}",
+            *([] if reuse is None or config.sample is not None else [f"reuse: {taken} of them are taken from {reuse}"]),
             f"memory: some {size(memory_needed(config, False))} of {size(memory_of_machine())}",
             f"disk: {most}{size(columns + finished)} while it runs, then {most}{size(finished)}"
             f"; {size(free)} are free in {folder}",
-            f"time: {most}{_time(config, layout, threads)}",
+            f"time: {most}{_time(config, layout, threads, taken)}",
             "nothing was written",
         )
     )
 
 
-def _time(config: Config, layout: Layout, threads: int) -> str:
-    """Estimated time of a sweep in words."""
+def _time(config: Config, layout: Layout, threads: int, taken: int) -> str:
+    """Estimated time of a sweep of which an earlier one has some cells, in words."""
     if config.sample is not None:
         layout = sampled.part_layout(config, layout)
+    count = layout.total - taken
+    if not count:
+        return "hardly any: no cell is run"
     results = _measure(config, layout)
     if results is None:
         return f"not known: the first cells took more than {_FIRST:.0f} s, compilation included"
     cells = sum(len(result.positions) for result in results)
     cost = sum(result.seconds or 0.0 for result in results) / cells if cells else _MEASURING
-    seconds = cost * layout.total / min(threads, layout.total)
+    seconds = cost * count / min(threads, count)
     what = "cells" if config.sample is None else "replicates of cells"
     basis = (
         f"measured on {cells} {what} spread over the grid" if cells else "one cell takes longer than the measurement"

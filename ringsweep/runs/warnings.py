@@ -11,13 +11,15 @@ from numpy.typing import NDArray
 
 from ringsweep.config import Config
 from ringsweep.models import batch
-from ringsweep.physics.belt import Damper
 from ringsweep.physics.drives import Constant
-from ringsweep.quantities.flags import FAILED, RIDING
+from ringsweep.quantities.flags import FAILED, REGIMES, RIDING
 from ringsweep.quantities.variables import INFERRED
 from ringsweep.runs.cells import laws_at, values_at
 from ringsweep.solvers.rk4 import STABILITY_LIMIT
 from ringsweep.storage.chunks import Layout
+
+# Least number of cells of which it is surprising that all have one regime.
+_MAP = 16
 
 logger = logging.getLogger("ringsweep")
 
@@ -39,6 +41,8 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
     stiffness = results["stiffness"].variable if "stiffness" in results else None
     ended_at_start = unstable = 0
     count = ended.size
+    if "regime" in results:
+        _hint_at_one_word(results)
     largest = 0.0
     origin = results["origin"].variable if "origin" in results else None
     for _, _, region in Layout(ended.shape).chunks():
@@ -78,6 +82,24 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
     if ended_at_start > 0.5 * count:
         runs = "the run ends" if count == 1 else f"{ended_at_start / count:.0%} of the runs end"
         logger.warning("%s at t = 0: is a unit or the initial state wrong?", runs)
+
+
+def _hint_at_one_word(results: xr.Dataset) -> None:
+    """Say what to look at where one word fills a map: its axes may not reach what decides."""
+    regime = results["regime"].variable
+    if regime.size < _MAP:
+        return
+    found: set[int] = set()
+    for _, _, region in Layout(regime.shape).chunks():
+        found.update(np.unique(regime[region].values).tolist())
+        if len(found) > 1:
+            return
+    logger.info(
+        "all %d cells are %s: do the axes reach far enough, is the span long enough, does a contact meet the zone? "
+        "ringsweep simulate shows one run",
+        regime.size,
+        REGIMES[found.pop()],
+    )
 
 
 def _two_digits_up(number: float) -> float:
@@ -167,9 +189,9 @@ def _spans_of_first_slip(config: Config, cells: NDArray[np.intp] | None) -> NDAr
         if isinstance(body.drive, Constant):
             velocity = body.drive.amplitude
             with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-                load = body.mu_s * body.mass * body.gravity
-                if isinstance(body.damper, Damper):
-                    load = load - body.damper.coefficient * np.abs(velocity)
-                holds = load / body.stiffness - np.sign(velocity) * body.initial_x
-                spans[own] = np.where(velocity * body.stiffness != 0.0, holds / np.abs(velocity), np.inf)
+                parts, ahead = body.body, np.sign(velocity)
+                load = body.mu_s * parts.mass * parts.gravity - getattr(parts, "damping", 0.0) * np.abs(velocity)
+                stiffness = parts.stiffness - ahead * body.mu_s * getattr(parts, "normal_stiffness", 0.0)
+                holds = load / stiffness - ahead * body.initial_x
+                spans[own] = np.where((velocity != 0.0) & (stiffness > 0.0), holds / np.abs(velocity), np.inf)
     return spans
