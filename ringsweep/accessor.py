@@ -42,13 +42,20 @@ class Accessor:
         return words(self._ds[var])
 
     def to_frame(self) -> pd.DataFrame:
-        """Table with a row for each cell: coordinates, then variables, with classifications as categories of words."""
+        """Table with a row for each cell: coordinates, then variables, with classifications as categories of words.
+
+        Of a sampled sweep it has a row for each cell and regime, with the probabilities.
+        """
         import pandas as pd
 
         from ringsweep.quantities.variables import words
 
-        frame = self._ds.to_dataframe().reset_index()
-        for name, variable in self._ds.data_vars.items():
+        ds = self._ds
+        if "probability" in ds:
+            # A table of all variables would have a row for each combination of their dimensions.
+            ds = ds[[name for name in ds.data_vars if str(name).startswith("probability")]]
+        frame = ds.to_dataframe().reset_index()
+        for name, variable in ds.data_vars.items():
             if "flag_meanings" in variable.attrs:
                 known = str(variable.attrs["flag_meanings"]).split()
                 named = words(variable).to_dataframe(name=name).reset_index()[name]

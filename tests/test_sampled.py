@@ -532,6 +532,22 @@ def test_pictures_show_intervals() -> None:
         regime_map(ds.sel(word="riding"))
 
 
+def test_a_table_has_a_row_for_each_cell_and_regime() -> None:
+    ds = run(config(grid={"belt.velocity": [0.05, 0.1, 0.2]}, n=64, sensitivity=True, survival=[1.0, 2.0]))
+    frame = ds.ringsweep.to_frame()
+    assert len(frame) == 3 * len(REGIMES)
+    assert frame.groupby("belt_velocity").probability.sum().tolist() == [1.0] * 3
+
+
+def test_friction_laws_and_points_may_be_beside_a_sample() -> None:
+    given = config(grid={"friction.law": ["stiction", "coulomb"]}, n=64)
+    given["sweep"]["points"] = {"belt.velocity": [0.05, 0.1], "body.mass": [1.0, 1.1]}
+    ds = run(given)
+    assert ds.probability.dims == ("point", "friction_law", "word")
+    alone = run(config(BELT | {"belt": {"velocity": 0.1}, "body": {"mass": 1.1}}, n=64))
+    assert (ds.probability.sel(friction_law="stiction")[1].values == alone.probability.values).all()
+
+
 def test_many_runs_without_certificate_are_a_warning(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING, "ringsweep"):
         run(config(n=64) | {"solver": {"method": "auto", "certify": False}})
