@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ringsweep.config import Axes, Config, load, read_axes, read_scene, read_solver, refined, sweepable
 from ringsweep.config.axes import dimension
 from ringsweep.errors import InputError
-from ringsweep.models import MODELS
+from ringsweep.models import model_of
 from ringsweep.quantities.variables import INFERRED, error_attribute
 from ringsweep.runs.cells import TaskResult, compute_task
 from ringsweep.runs.executors import Execution, Executor, progress_bar, stop_on_interrupt
@@ -245,7 +245,7 @@ def compute(
     if found is not None and config.refine is not None:
         complete(config.refine, found, tuple(slice(None) for _ in sizes), columns)
         columns |= {name: with_nan(columns[name]) for name in gaps(columns)}
-    variables = MODELS[config.scene.structure.model].variables
+    variables = model_of(config.scene.structure).variables
     results = results.assign(
         {
             name: (tuple(config.axes.sizes), column, variables[name].attributes | error_attribute(name, columns))
@@ -315,7 +315,7 @@ def _write_file(config: Config, target: Path, layout: Layout, checkpoint: Checkp
     """Write the file of a sweep whose cells are all in the checkpoint, but for those that were inferred."""
     frame = _frame(config, found)
     frame.attrs["processors"] = ", ".join(sorted(checkpoint.processors))
-    variables = MODELS[config.scene.structure.model].variables
+    variables = model_of(config.scene.structure).variables
     if found is None or config.refine is None:
         netcdf.write(target, checkpoint.working_folder, frame, variables, layout, checkpoint.chunks())
         return
