@@ -299,8 +299,6 @@ def simulate_command(arguments: argparse.Namespace) -> None:
     if replaced := _other_scene(target, result):
         logger.info("%s held a run of another scene, which is replaced: %s", target, replaced)
     netcdf.save(result, target)
-    if "events" in result.attrs:
-        print(result.attrs["events"])
     print(result.attrs["outcome"])
     print_events(result)
     print(f"wrote {target}")

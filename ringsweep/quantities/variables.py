@@ -254,7 +254,7 @@ HISTORY: dict[str, Variable] = {
 }
 
 #: What happens to the contacts in an event, by its number in histories.
-EVENTS = {1: "opens", 2: "rebounds", 3: "closes"}
+EVENTS = {1: "separation", 2: "rebound", 3: "closure"}
 
 #: Impacts of a run, along the dimension ``impact``.
 IMPACTS: dict[str, Variable] = {

@@ -19,7 +19,7 @@ from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import turn
 from ringsweep.quantities.flags import REGIMES
 from ringsweep.quantities.variables import AFTERMATHS, EVENTS, HISTORY, IMPACTS
-from ringsweep.runs.events import events, side_by_side
+from ringsweep.runs.events import Events, events, side_by_side
 from ringsweep.runs.executors import Execution, interruptible
 from ringsweep.runs.sweep import compute
 from ringsweep.storage.provenance import attributes
@@ -106,8 +106,9 @@ def _history(config: Config, samples: int) -> xr.Dataset:
     runs, tables = {}, {}
     for law, structure in config.scene.structures.items():
         own = outcome.sel(friction_law=law) if config.axes.sizes else outcome
-        runs[law] = _open_contact_at_end(_trace(config, structure, samples), own)
-        tables[law] = events(runs[law], own)
+        run, told = _trace(config, structure, samples)
+        runs[law] = _open_contact_at_end(run, own)
+        tables[law] = events(runs[law], own, told)
     if not config.axes.sizes:
         (joined,), (table,) = runs.values(), tables.values()
         words = _describe(outcome)
@@ -119,15 +120,15 @@ def _history(config: Config, samples: int) -> xr.Dataset:
     return joined.merge(outcome).merge(table).assign_attrs(attributes(config) | {"outcome": words})
 
 
-def _trace(config: Config, structure: Structure, samples: int) -> xr.Dataset:
-    """History under one friction law."""
+def _trace(config: Config, structure: Structure, samples: int) -> tuple[xr.Dataset, list[Events]]:
+    """History under one friction law, and events of open contacts."""
     model = model_of(structure)
     cell = batch(structure, {path: np.array([value]) for path, value in config.scene.values.items()})
     names = model.history(structure)
     with readable_compile_errors():
         times, rows = config.solver.history(cell, samples, len(names))
     columns = dict(zip(names, rows.T, strict=True))
-    events = {name: columns.pop(name) for name in names if name.startswith("event_")}
+    open_contacts = {name: columns.pop(name) for name in names if name.startswith("event_")}
     for name in columns:
         if name.startswith("normal_"):
             # Where friction jumps, a normal reaction may jump below zero. There the contact opens and the run ends.
@@ -137,16 +138,16 @@ def _trace(config: Config, structure: Structure, samples: int) -> xr.Dataset:
         motion = np.array([turn(drive, t) for t in times.tolist()])
         columns |= dict(zip(model.driven, motion.T, strict=False))
     variables = HISTORY | model.own_variables
-    return xr.Dataset(
+    run = xr.Dataset(
         {
             name: ("time", column.astype(variables[name].dtype), variables[name].attributes)
             for name, column in columns.items()
             if name not in model.absent
         }
-        | (_impacts(events) if events else {}),
+        | (_impacts(open_contacts) if open_contacts else {}),
         coords={"time": ("time", times, {"long_name": "time", "units": "s", "axis": "T"})},
-        attrs={"events": _table_of(events)} if events else {},
     )
+    return run, _events_of(open_contacts) if open_contacts else []
 
 
 def _rows_of(events: dict[str, NDArray[np.float64]]) -> NDArray[np.intp]:
@@ -166,15 +167,14 @@ def _impacts(events: dict[str, NDArray[np.float64]]) -> dict[str, Any]:
     }
 
 
-def _table_of(events: dict[str, NDArray[np.float64]]) -> str:
-    """Events of a run as a table: time, what happens, at which contact, at which normal velocity."""
-    lines = [f"{'time/s':>12}  {'event':<8}  {'contact':<7}  {'speed/(m/s)':>11}"]
-    for row in _rows_of(events):
-        kind, contact = (int(events[f"event_{name}"][row]) for name in ("event", "contact"))
-        speed = f"{events['event_speed'][row]:.6g}" if kind > 1 else ""
-        where = ("1", "2", "both")[contact - 1]
-        lines.append(f"{events['event_time'][row]:12.6f}  {EVENTS[kind]:<8}  {where:<7}  {speed:>11}".rstrip())
-    return "\n".join(lines)
+def _events_of(events: dict[str, NDArray[np.float64]]) -> list[Events]:
+    """Lost contacts and impacts of a run as events."""
+    rows = _rows_of(events)
+    found = []
+    for number, kind in EVENTS.items():
+        own = rows[events["event_event"][rows] == number]
+        found.append(Events(kind, events["event_time"][own], events["event_contact"][own].astype(np.int8)))
+    return found
 
 
 # A last normal reaction above this share of the largest of the run means that the reaction jumped to zero.
