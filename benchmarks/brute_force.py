@@ -93,6 +93,7 @@ LAWS = {
 BRISTLES = ("dahl", "lugre", "elasto-plastic", "reset-integrator")
 NAMED_LAWS = tuple(name for name in LAWS if name not in FORMULAS)
 RING_LAWS = tuple(name for name in NAMED_LAWS if name not in ("karnopp", "reset-integrator"))
+IMPACT_LAWS = tuple(name for name in RING_LAWS if name not in BRISTLES) + ("bump", "jump")
 DRIVES = ("none", "constant", "arctan", "power", "sinusoidal", "table")
 #: Samples of the drive `table`: s, rad (m on the belt).
 TABLE_TIME = np.linspace(0.0, 3.2, 17)
@@ -111,6 +112,7 @@ class Kind:
     friction: str = "usual"
     shape: str = "usual"
     force: bool = False
+    impact: bool = False
 
 
 def families():
@@ -147,6 +149,13 @@ def families():
         table.setdefault("ice", []).extend(
             Kind("ring", law, name, 1, launch="at rest", friction="ice") for name in ("arctan", "power", "sinusoidal")
         )
+    for i, law in enumerate(IMPACT_LAWS):
+        for j, model in enumerate(("ring", "ring", "ring", "ring-single-contact")):
+            name, launch = DRIVES[(i + j) % 6], ("mixed", "any", "at rest", "any")[j]
+            shape = "any" if (i + j) % 2 else "usual"
+            table.setdefault("impact", []).append(
+                Kind(model, law, name, int(law not in ("hump", "jump") or j < 2), launch, shape=shape, impact=True)
+            )
     for law in ("coulomb", "stiction", "tustin"):
         table.setdefault("belt forced", []).append(Kind("belt", law, "", force=True))
     for i, law in enumerate(NAMED_LAWS):
@@ -270,6 +279,13 @@ def ring_scene(rng, kind):
     elif kind.launch == "any":
         phi = rng.uniform(-math.pi, math.pi)
     values["initial.phi"], values["initial.omega"] = phi, omega
+    if kind.impact:
+        values["impact.restitution"] = pick(rng, (1, 0.0), (1, 1.0), (8, rng.uniform(0.0, 0.95)))
+        if two:
+            # The centre of mass stays between the axis and the race, on either side of the line of the balls.
+            half, reach = values["body.half_distance"], values["ring.radius"] - values["body.ball_radius"]
+            line = math.sqrt(reach * reach - half * half)
+            values["body.center_offset"] = pick(rng, (3, 0.0), (1, line * rng.uniform(-0.4, 0.4)))
     return values
 
 
