@@ -95,7 +95,7 @@ def go_on(scene, rtol=TIGHT, shift=0.0, keep=0):
     p = p._replace(restitution=min(1.0, p.restitution * (1.0 + shift)))
     exchanged = p._replace(offset=-p.offset, xi=p.xi - 2.0 * p.offset)
     log = np.zeros((keep, 5))
-    found = dict(zip(AFTERMATH, follow(p, exchanged, rtol, REST[rtol], 10 * MOST_STEPS, log), strict=True))
+    found = dict(zip(AFTERMATH, follow(p, exchanged, rtol, REST[rtol], MOST_STEPS, log), strict=True))
     return found, log[: int(found["events"])]
 
 

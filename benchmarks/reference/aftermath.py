@@ -5,7 +5,8 @@ integrated by the same method, with four states; in flight it is a parabola with
 wherever friction jumps, the contact problem is solved for the contacts that touch and neither open nor close.
 
 Rebounds that shrink geometrically end at a speed `rest`, below which an impact is plastic. The impulse that is left is
-the same, so what the truncation costs is of second order in that speed.
+the same, so what the truncation costs is of second order in that speed. A contact that such an impact lifts more slowly
+than that stays closed.
 """
 
 import math
@@ -56,6 +57,7 @@ LOSS, HIT = 1, 2
 MEETS, LOSES = 11, 12
 #: A gap below this share of the radius (times angles) has closed: rounding leaves less. Two contacts that are closer touch at once.
 TOUCH, TOGETHER = 1e-14, 1e-11
+MOST_EVENTS = 5_000
 _N, _A, _GAP, _SLOWER, _FASTER, _LOW, _HIGH, _STICK, _COUNT = range(9)
 
 
@@ -125,7 +127,10 @@ def pivot_guard(p, closed, k, piece, t, y, g, q):
     weight = p.mass * p.gravity
     g[:] = 1.0
     g[_N], g[_A] = N / weight, A - LEAST_DETERMINANT
-    g[_GAP] = free.contact(p, q, 0.0, 3 - closed)[0] + touch(p, t, q)
+    gap, opens, _ = free.contact(p, q, 0.0, 3 - closed)
+    g[_GAP] = gap + touch(p, t, q)
+    if opens >= 0.0:
+        g[_GAP] = max(g[_GAP], 1e-300)
     g[_LOW], g[_HIGH] = y[0] - bound(p, k) + 1e-14, bound(p, k + 1) - y[0] + 1e-14
     if piece == STICK:
         g[_STICK] = (p.mu_s[k % p.edges.size] * N - abs(T)) / weight
@@ -493,7 +498,7 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
             if events < log.shape[0]:
                 log[events] = np.array([t, LOSS, lost, 0.0, 0.0])
             events += 1
-        if steps > most_steps or events > 20_000:
+        if steps > most_steps or events > MOST_EVENTS:
             end = UNRESOLVED
             break
         since = t
@@ -562,9 +567,10 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
                 now[5] += moment / free.inertia(p)
         q += now
         before, closed = closed, 0
+        slow = e.max() == 0.0 and max(after[0], after[2]) < rest
         for i in (2, 1):
             if touching[i - 1]:
-                if after[2 * i - 2] <= 1e-13:
+                if after[2 * i - 2] <= 1e-13 or slow:
                     closed += i
                     v = after[2 * i - 1]
                 elif before & i:
