@@ -53,7 +53,9 @@ def rattle(p, s, k, settled, slow, settling, v_rest, t, y, until, scale, longest
     of impacts, passages of the rod over the axis, and for each contact whether it is open at the end.
     """
     K, y_, found = np.zeros((7, 8)), np.zeros(8), np.zeros(6)
-    springs = np.array([k, k if p.model != SINGLE else 0.0, settled, settled, 0.0, 0.0])
+    springs = np.array([k, k, settled, settled, 0.0, 0.0])
+    if p.model == SINGLE:
+        springs[1] = springs[3] = 0.0
     mode, since = np.full(2, _CLOSED), np.zeros(2)
     n = 1 if p.model == SINGLE else 2
     h, steps, side, out[:] = 0.1 * longest, 0, 1.0, 0.0
