@@ -93,7 +93,7 @@ LAWS = {
 BRISTLES = ("dahl", "lugre", "elasto-plastic", "reset-integrator")
 NAMED_LAWS = tuple(name for name in LAWS if name not in FORMULAS)
 RING_LAWS = tuple(name for name in NAMED_LAWS if name not in ("karnopp", "reset-integrator"))
-IMPACT_LAWS = tuple(name for name in RING_LAWS if name not in BRISTLES) + ("bump", "jump")
+IMPACT_LAWS = (*(name for name in RING_LAWS if name not in BRISTLES), "bump", "jump")
 DRIVES = ("none", "constant", "arctan", "power", "sinusoidal", "table")
 #: Samples of the drive `table`: s, rad (m on the belt).
 TABLE_TIME = np.linspace(0.0, 3.2, 17)

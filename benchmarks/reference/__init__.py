@@ -99,7 +99,7 @@ def go_on(scene, rtol=TIGHT, shift=0.0, keep=0):
     return found, log[: int(found["events"])]
 
 
-def aftermath(found, single):
+def word(found, single):
     """Word for what followed a lost contact."""
     if found["separations"] == 0:
         return "held"
@@ -149,7 +149,7 @@ def _judge_aftermath(scene, runs):
     """Verdict on a scene with `impact`, from the runs up to the first loss."""
     found = [go_on(scene, rtol, shift)[0] for rtol, shift in VARIATIONS]
     kinds = [
-        (*_kind(run), aftermath(after, scene["model"] == "ring-single-contact"))
+        (*_kind(run), word(after, scene["model"] == "ring-single-contact"))
         for run, after in zip(runs, found, strict=True)
     ]
     numbers, other = (

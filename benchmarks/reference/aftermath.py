@@ -26,12 +26,10 @@ from benchmarks.reference.physics import (
     OPEN_1,
     OPEN_2,
     OPEN_BOTH,
-    SEVERAL,
     STICK,
     bound,
     corners,
     drive,
-    friction,
     is_set_valued,
     lower_segments,
     on_one,
@@ -55,7 +53,8 @@ AFTERMATH = (
 LOSS, HIT = 1, 2
 #: Results of a pivot, beside the ends of a run: the other contact closes, or the closed contact opens.
 MEETS, LOSES = 11, 12
-#: A gap below this share of the radius (times angles) has closed: rounding leaves less. Two contacts that are closer touch at once.
+#: A gap below the first share of the radius, times angles, has closed: rounding leaves less. Two contacts with gaps
+#: below the second share touch at once.
 TOUCH, TOGETHER = 1e-14, 1e-11
 MOST_EVENTS = 5_000
 _N, _A, _GAP, _SLOWER, _FASTER, _LOW, _HIGH, _STICK, _COUNT = range(9)
@@ -256,7 +255,9 @@ def turn(p, closed, rtol, most_steps, t, y, opens, found):
                             interpolate(y, Z_, x0, 4, y_)
                             pivot_guard(p, closed, k, piece, t + x0 * step, y_, g, q)
                             if g[c] <= 0.0 and x0 <= 1.0:
-                                at = pivot_root(p, closed, k, piece, t, step, y, Z_, x0 - 1.0 / SAMPLES, x0, c, g, y_, q)
+                                at = pivot_root(
+                                    p, closed, k, piece, t, step, y, Z_, x0 - 1.0 / SAMPLES, x0, c, g, y_, q
+                                )
                                 hit = c
             if hit >= 0 or i > SAMPLES:
                 break
@@ -310,7 +311,7 @@ def turn(p, closed, rtol, most_steps, t, y, opens, found):
             return LOSES, t, steps
         if hit == _A:
             return JAMMED, t, steps
-        if hit == _LOW or hit == _HIGH:
+        if hit in (_LOW, _HIGH):
             k += 1 if hit == _HIGH else -1
         elif hit == _STICK:
             # Friction at its limit: the contact slides against it.

@@ -1,7 +1,7 @@
 """The body with three degrees of freedom in the plane of the race: centre of mass (x, y) and angle psi of the rod.
 
 The state of motion is q = (x, y, psi, and their rates); y points upwards. Ball 1 is at -half_distance along the rod,
-ball 2 at +half_distance, both `offset` beside the line through the centre of mass, on the side of the axis at psi = phi.
+ball 2 at +half_distance, both `offset` beside the centre of mass, towards the axis at psi = phi.
 A contact i (1 or 2) pushes with N along the inward normal and with T along the race, where its ball is nearest to it.
 A single contact is ball 1 of a body without extent; its angle psi has no meaning.
 """

@@ -217,7 +217,9 @@ def accelerations(p, phi, omega, ring_epsilon, N1, T1, N2, T2):
     a, d, r, reach = p.half_distance, p.offset, p.ball_radius, p.radius - p.ball_radius
     radial = g * math.cos(phi) + (sb * (T1 - T2) - cb * (N1 + N2)) / p.mass
     tangential = -g * math.sin(phi) + (sb * (N1 - N2) + cb * (T1 + T2)) / p.mass
-    angular = (a * cb * (N2 - N1) + (a * sb + r) * (T1 + T2) - d * p.mass * (tangential + g * math.sin(phi))) / p.inertia
+    angular = (
+        a * cb * (N2 - N1) + (a * sb + r) * (T1 + T2) - d * p.mass * (tangential + g * math.sin(phi))
+    ) / p.inertia
     # The centres of the balls are at -a and +a along the tangent, and at -d along the radius.
     out1, on1 = radial + a * angular + d * w2, tangential - d * angular + a * w2
     out2, on2 = radial - a * angular + d * w2, tangential - d * angular - a * w2

@@ -36,9 +36,10 @@ class Problem(NamedTuple):
     """A scene in SI units.
 
     The angles `edges` divide the ring into segments. Each segment reaches from its edge to the next edge and has the
-    friction coefficients `mu_s` and `mu_k`. The distance `offset` of the centre of mass from the line of the balls counts
-    away from the axis; it changes its sign when the contacts change places. On the belt there is one segment, both coefficients and the height `h` of a
+    friction coefficients `mu_s` and `mu_k`. On the belt there is one segment, both coefficients and the height `h` of a
     law are forces in N, and the radius is 1. `unit` is the friction per unit of friction coefficient: 1, or the weight.
+    The centre of mass is at a distance `offset` from the line of the balls, away from the axis; the sign of the
+    distance changes when the contacts change places.
     """
 
     model: int
@@ -172,7 +173,8 @@ def problem(scene, factor=1.0):
     at_rest = speed is None and model == BELT
     return Problem(
         model=model, law=law, mass=mass, inertia=inertia, xi=xi, beta=beta, radius=radius, half_distance=half,
-        ball_radius=ball, offset=offset, gravity=gravity, stiffness=stiffness, cubic=float(scene.get("spring", {}).get("cubic", 0.0)),
+        ball_radius=ball, offset=offset, gravity=gravity, stiffness=stiffness,
+        cubic=float(scene.get("spring", {}).get("cubic", 0.0)),
         viscous=float(friction.get("viscous", 0.0)), force=float(force.get("amplitude", 0.0)),
         force_frequency=float(force.get("frequency", 0.0)), force_phase=float(force.get("phase", 0.0)),
         h=float(friction.get("h", 0.0)) * unit * factor, unit=unit * factor,

@@ -37,6 +37,7 @@ def damping(e):
     """Factor s of the damping of a contact with a coefficient of restitution 0 < e <= 1."""
     if e >= 1.0:
         return 0.0
+
     # With u = -log(1 - e s); u = 0 is no solution.
     def residual(u):
         s = -math.expm1(-u) / e
