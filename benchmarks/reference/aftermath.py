@@ -408,12 +408,12 @@ def fly(p, t, q, found):
             q[2] += polar - angle - 2.0 * math.pi * round((polar - angle) / (2.0 * math.pi))
             angle = polar
         older, last, s = last, gap, ahead
-        if hits or t + s >= p.span:
+        if hits or s >= p.span - t:
             position = q[2]
             q[:] = now
             if p.model == SINGLE:
                 q[2] = position
-            return hits, t + s
+            return hits, t + s if hits else p.span
 
 
 @njit(cache=True, error_model="numpy")
