@@ -71,7 +71,7 @@ class Accessor:
         """Time history of the cell nearest to some values of the coordinates; see :func:`ringsweep.plots.cell`.
 
         The values are a mapping, such as ``{"drive.amplitude": 2}``, or keywords, such as ``drive_amplitude=2``. A
-        warning tells the value taken if it is another.
+        warning states the value taken if it is another.
         """
         from ringsweep.plots.selection import cell as configuration_of
         from ringsweep.runs.simulate import simulate

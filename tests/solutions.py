@@ -12,7 +12,7 @@ from ringsweep.models.ring.record import Outcome
 from ringsweep.physics import ring
 from ringsweep.physics.friction.speeds import hidden_fields
 from ringsweep.physics.friction.velocity import EXPRESSIONS, friction_at
-from ringsweep.solvers.automaton import integrate
+from ringsweep.solvers.automaton import History, Results, integrate
 
 
 def made(law, surfaces=((0.5, 0.3),), **parameters):
@@ -44,11 +44,10 @@ HISTORY = ("phi", "omega", "epsilon", "normal_1", "normal_2", "ring_omega", "zon
 
 def trail(method, batch, spacing):
     """History of the first cell: the end of every step, and instants `spacing` apart, s."""
-    times, rows = np.empty(2_000_000), np.empty((2_000_000, len(HISTORY)))
-    batch = take(batch, [0])
-    out, steps = np.empty((1, 0)), np.empty(1)
-    count = integrate(batch, method.tolerances(), method.max_steps, out, steps, np.empty((0, 7)), spacing, times, rows)
-    return SimpleNamespace(t=times[:count], **dict(zip(HISTORY, rows[:count].T, strict=True)))
+    history = History(spacing, np.empty(2_000_000), np.empty((2_000_000, len(HISTORY))))
+    no_results = Results(np.empty((1, 0)), np.empty(1), np.empty((0, 7)))
+    count = integrate(take(batch, [0]), method.tolerances(), method.max_steps, no_results, history)
+    return SimpleNamespace(t=history.times[:count], **dict(zip(HISTORY, history.table[:count].T, strict=True)))
 
 
 def motion(body, K1, K2):

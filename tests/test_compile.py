@@ -40,6 +40,7 @@ def test_supported_versions_of_numba_have_the_private_interfaces():
     assert AVAILABLE
 
 
+@pytest.mark.slow
 def test_outcomes_without_private_interfaces_of_numba_are_equal_bit_for_bit(scene, tmp_path):
     axes = {"drive.amplitude": [0.5, 2.0]}
     script = WITHOUT_PRIVATE_INTERFACES.format(scene=scene, axes=axes)

@@ -664,6 +664,13 @@ def test_solver_is_read_with_its_options():
     assert "true or false" in refusal(read_solver, {"method": "rk4", "steps": 10, "certify": "yes"}).problem
 
 
+@pytest.mark.parametrize("solver", [None, 3, ["rk4"]])
+def test_sweep_names_a_solver_that_is_none(solver):
+    found = refusal(ringsweep.sweep, SCENE, {}, solver=solver)
+    assert found.path == "solver"
+    assert "a section with keys is expected" in found.problem
+
+
 def own_law(friction, swept):
     """Configuration with a law that the package does not have, and a sweep of one of its parameters."""
     rest = {"scale": 1.0} if friction["law"] == "table" else {"mu_s": 0.4, "mu_k": 0.3}

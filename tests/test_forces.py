@@ -24,6 +24,7 @@ from ringsweep.physics.forces import Forced
 from ringsweep.physics.friction import SetValued
 from ringsweep.physics.friction.velocity import BAND, KINETIC
 from ringsweep.solvers.audit import Audit, audit_step
+from ringsweep.solvers.steps import Step, scratch_for
 
 G = 9.81
 SMALL_STEPS = {"method": "rk4", "steps": 20_000}
@@ -411,8 +412,11 @@ class TestAudit:
             c = np.zeros((series.table_shape(scene)[0], COLUMNS))
             with np.errstate(divide="ignore"):
                 h = 0.5 * series.expand(scene, mode, 0.2 + late, y, 1e-10, c)
-            empty, after = Audit(0.0, 0.0, 0.0), series.state_at(scene, c, h)
-            found = audit_step(SetValued(), scene, mode, False, c, 0.2, h, y, after, c, c, 1e-10, empty)
+            step, scratch = (
+                Step(mode, False, 0.2, h, y, series.state_at(scene, c, h)),
+                scratch_for(1, 2, 0)._replace(c=c),
+            )
+            found = audit_step(SetValued(), scene, step, scratch, 1e-10, Audit(0.0, 0.0, 0.0))
             audits.append((found.violation, abs(found.unexplained) / found.turnover))
         (violation, share), (wrong_violation, wrong_share) = audits
         assert violation < 1.0

@@ -2,7 +2,6 @@
 
 import json
 import os
-import time
 from pathlib import Path
 
 import matplotlib
@@ -331,12 +330,16 @@ def test_cells_beyond_the_stability_limit_have_another_hatch():
     assert entries(figure)[-1] == "not certified: step beyond stability limit, 30.0 %"
 
 
-def test_hatching_a_large_map_takes_less_than_five_seconds(tmp_path):
+def test_hatching_of_a_large_map_is_one_patch_for_each_colour(tmp_path, monkeypatch):
+    """So its cost does not grow with a patch for each of a hundred thousand cells."""
     ds = make_sweep((512, 512))
     ds["certified"][:] = np.random.default_rng(0).integers(0, 2, (512, 512))
-    begin = time.perf_counter()
-    plots.save(plots.regime_map(ds), tmp_path / "map.png")
-    assert time.perf_counter() - begin < 5
+    # It visits every vertex in Python.
+    monkeypatch.setattr("matplotlib.axes.Axes.add_patch", lambda *arguments: pytest.fail("add_patch is slow"))
+    figure = plots.regime_map(ds)
+    patches = [patch for patch in figure.axes[0].patches if patch.get_hatch()]
+    assert sorted(patch.get_edgecolor()[:3] for patch in patches) == [(0.0, 0.0, 0.0), (1.0, 1.0, 1.0)]
+    plots.save(figure, tmp_path / "map.png")
 
 
 def test_share_of_a_regime_has_no_label_of_a_regime():
@@ -806,12 +809,10 @@ def test_short_outliers_with_many_samples_are_clipped_too():
 def test_long_history_is_condensed_and_keeps_its_extremes(tmp_path):
     ds = make_history(1_000_000)
     ds["normal_2"][123_456] = -7
-    begin = time.perf_counter()
     figure = plots.history(ds)
     plots.save(figure, tmp_path / "history.png")
-    assert time.perf_counter() - begin < 5
+    assert max(len(line.get_xydata()) for ax in figure.axes for line in ax.lines) < 20_000
     line = figure.axes[3].lines[1].get_xydata()
-    assert len(line) < 20_000
     assert line[:, 1].min() == -7
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from ringsweep.models.interface import implicit
 from ringsweep.solvers import rosenbrock
+from ringsweep.solvers.creep import Start
 from ringsweep.solvers.rosenbrock import DENSE, GAMMA, STAGES, TIME_DERIVATIVE_WEIGHTS, TIMES, A, C
 
 #: Coefficients of the standard form k_i = h f(y + sum alpha_ij k_j) + h J sum gamma_ij k_j.
@@ -155,7 +156,8 @@ def step(scene, t, x, h, bends):
     """One step of length `h` from the state `x` at time `t`."""
     linear = implicit.linearise(scene, None, (), t, _forcing(t), x)
     forcings = tuple(_forcing(t + fraction * h) for fraction in rosenbrock.STAGE_TIMES)
-    return rosenbrock.step(x, scene, None, (), linear, h, forcings, bends)
+    start = Start(None, t, x, x, None, (), linear)
+    return rosenbrock.step(x, scene, start, h, forcings, bends)
 
 
 def integrate(scene, steps, end=1.0):

@@ -205,6 +205,9 @@ _MAY_BE_MISSING = {
     "swing",
     "stick_share",
     "normal_min_2",
+    "normal_max_2",
+    "jump_max",
+    "t_jump_max",
 }
 
 

@@ -230,6 +230,8 @@ def simulate_command(arguments: argparse.Namespace) -> None:
     if replaced := _other_scene(target, result):
         logger.info("%s held a run of another scene, which is replaced: %s", target, replaced)
     netcdf.save(result, target)
+    if "events" in result.attrs:
+        print(result.attrs["events"])
     print(result.attrs["outcome"])
     print(f"wrote {target}")
     _draw(lambda: plots.history(result), picture, f"ringsweep plot {target}")

@@ -29,7 +29,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="ringsweep",
         description="Regime maps of dry-friction systems whose friction coefficient jumps.",
-        epilog="ringsweep COMMAND --help tells more, with examples.",
+        epilog="ringsweep COMMAND --help says more, with examples.",
         formatter_class=_formatter,
     )
     parser.add_argument("--version", action=_Version)
@@ -64,9 +64,7 @@ def build_parser() -> argparse.ArgumentParser:
     run.add_argument("-o", "--output", metavar="OUT.nc", help="default: the configuration's name, in this folder")
     _add_settings(run)
     run.add_argument("--jobs", type=whole_number, metavar="N", help="threads (default: all cores)")
-    run.add_argument(
-        "--dry-run", action="store_true", help="tell how much memory, disk and time it will take; write nothing"
-    )
+    run.add_argument("--dry-run", action="store_true", help="estimate memory, disk space and time; write nothing")
     run.add_argument("--fresh", action="store_true", help="start over: discard what an earlier run computed")
     run.add_argument("--reuse", metavar="OLD.nc", help="take cells that this earlier sweep has too")
     run.add_argument(

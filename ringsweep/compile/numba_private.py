@@ -92,13 +92,13 @@ if AVAILABLE:
 
     def _link_all(module: Any, libraries: list[Any]) -> None:
         """Link libraries, and all libraries that they call, into a module: each of them once."""
-        seen: set[Any] = set()
+        done: set[Any] = set()
         waiting = list(libraries)
         while waiting:
             library = waiting.pop()
-            if library in seen:
+            if library in done:
                 continue
-            seen.add(library)
+            done.add(library)
             if isinstance(library, _CalleeLibrary):
                 part = library._final_module.clone()
                 for function in part.functions:

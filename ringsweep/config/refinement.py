@@ -10,11 +10,10 @@ import numpy as np
 from ringsweep.config.axes import Axes, dimension
 from ringsweep.config.sections import suggestion
 from ringsweep.errors import InputError
-from ringsweep.models import MODELS
+from ringsweep.models import model_of
 from ringsweep.models.scene import Scene
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity, show
-from ringsweep.quantities.variables import OUTCOMES
 
 #: Keys of ``sweep.refine`` with a number.
 NUMBERS = {
@@ -122,11 +121,12 @@ def _also(section: dict[str, Any], scene: Scene) -> tuple[str | None, float | No
         )
     if "also" not in section:
         return None, None
-    model = MODELS[scene.structure.model]
-    numbers = [name for name in model.outcomes if OUTCOMES[name].dtype == "float64" and name not in model.absent]
+    model = model_of(scene.structure)
+    variables = model.variables
+    numbers = [name for name in model.outcomes if name not in model.absent and variables[name].dtype == "float64"]
     also = section["also"]
     if also not in numbers:
         raise InputError("sweep.refine.also", f"{show(also)} is no number of this model" + suggestion(also, numbers))
-    unit = OUTCOMES[also].unit
+    unit = variables[also].unit
     error = Parameter(unit, f"largest error of {also} where it is interpolated", lower=0, open_lower=True)
     return also, quantity(section["within"], error, "sweep.refine.within")

@@ -7,7 +7,10 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ringsweep.config.friction import FORMULA, keep_definitions, keys_of, law_of_curve, own_laws, read_curve
 from ringsweep.config.friction import TABLE as TABLE_LAW
@@ -17,7 +20,7 @@ from ringsweep.config.sections import choose, missing_text, read_values, section
 from ringsweep.config.tables import TABLES, read_table
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
-from ringsweep.models import MODELS, parameters
+from ringsweep.models import MODELS, WITH_IMPACT, parameters
 from ringsweep.models.scene import LAW, Scene, Structure
 from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction.formula import NAMES
@@ -54,102 +57,171 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     """
     scene = section_of(doc.tree, "scene", "")
     model = choose(MODELS, scene, "scene.model", "model")
-    arcs = scene.get("zones", [])
-    if not isinstance(arcs, list) or ("zones" in scene and not arcs):
-        raise InputError("scene.zones", f"a list of zones is expected, got {show(arcs)}")
-    zones = tuple(f"zones.{i}" for i in range(len(arcs)))
-    friction = section_of(scene, "friction", "scene.") if "friction" in scene else {}
-    own = own_laws(friction)
-    known_laws = law_choice(model, own)
-    names = []
-    if "law" in friction:
-        # Name a wrong law, rather than the parameters that only this law has.
-        names = [choose(dict.fromkeys(known_laws.names), friction, f"scene.{LAW}", f"friction law of model {model}")]
-    if laws is not None:
-        names = read_values(laws[1], known_laws, laws[0]).tolist()
-    if FORMULA in names and FORMULA not in own:
-        raise InputError("scene.friction.mu", "missing: the formula of the friction coefficient")
-    curve = read_curve(doc, friction) if TABLE_LAW in names else None
-    if curve is not None:
-        own[TABLE_LAW] = law_of_curve(curve)
-    drive = "none"
-    if "drive" in scene:
-        names_of_drives = dict.fromkeys([*DRIVES, FORMULA_DRIVE])
-        drive = choose(names_of_drives, section_of(scene, "drive", "scene."), "scene.drive.law", "drive law")
-    by_formula = Structure(model, "", drive, own_drive=own_drive(model, scene.get("drive", {})))
-    if "force.constant" in parameters(Structure(model, next(iter(MODELS[model].laws)))):
-        by_formula = replace(by_formula, own_force=own_force(scene.get("force")))
-    # Name a misspelt key, rather than the key that is missing because of it.
-    all_laws = MODELS[model].laws | own
-    paths = _Paths(
-        _all_paths(model, zones or ("zones.0",), dict.fromkeys([*all_laws, FORMULA, TABLE_LAW]), own, by_formula)
-    )
-    try:
-        leaves = dict(_leaves(scene, "", paths))
-    except _UnknownKey as error:
-        path = f"scene.{error.section}.{error.key}" if error.section else f"scene.{error.key}"
-        hint = _belongs_elsewhere(error.section, str(error.key), paths, model)
-        if hint is None:
-            near = (
-                _Paths(_all_paths(model, zones[:1] or ("zones.0",), names, own, by_formula)).children if names else {}
-            )
-            hint = suggestion(error.key, near.get(error.section, paths.children[error.section]))
-        raise InputError(path, f"unknown key{hint}") from None
-    if not names:
+    zones = _zones(scene)
+    friction = _read_friction(doc, scene, model, laws)
+    moved = _read_motion(scene, model, swept)
+    leaves = _read_leaves(scene, model, zones, friction, moved)
+    if not friction.names:
         section_of(scene, "friction", "scene.")
-        raise InputError(f"scene.{LAW}", "missing: name a friction law: " + ", ".join(known_laws.names))
-    keep_definitions(friction, names)
-    # Laws of this process too: other processes know only what the structure holds.
-    own |= own_laws(friction)
+        known_laws = law_choice(model, friction.own).names
+        raise InputError(f"scene.{LAW}", "missing: name a friction law: " + ", ".join(known_laws))
+    moved = replace(moved, arcs=_arcs(scene, zones, leaves), **_read_tables(doc, scene, moved))
+    structures = {
+        law: replace(moved, law=law, own_law=friction.own.get(law), curve=friction.curve if law == TABLE_LAW else None)
+        for law in friction.names
+    }
+    values = _read_numbers(structures, leaves, swept)
+    _warn_of_unused_numbers(structures, leaves)
+    _warn_of_lengths(
+        frozenset(
+            (path, values[path])
+            for path, known in numbers_of(structures).items()
+            if known.unit == "m" and path in values
+        )
+    )
+    return Scene(structures, values, scene)
+
+
+class _Friction(NamedTuple):
+    """The section ``friction``: laws that are used, types of those that the configuration defines, a measured curve."""
+
+    names: list[str]
+    own: dict[str, type]
+    curve: tuple[NDArray[np.float64], NDArray[np.float64]] | None
+
+
+def _zones(scene: dict[str, Any]) -> tuple[str, ...]:
+    """Paths of the list ``zones``."""
+    given = scene.get("zones", [])
+    if not isinstance(given, list) or ("zones" in scene and not given):
+        raise InputError("scene.zones", f"a list of zones is expected, got {show(given)}")
+    return tuple(f"zones.{i}" for i in range(len(given)))
+
+
+def _arcs(scene: dict[str, Any], zones: tuple[str, ...], leaves: Collection[str]) -> tuple[str, ...]:
+    """Paths of the zones: of the list, or of the only one."""
     rough = [path for path in leaves if path.startswith("friction.rough.")]
     if "zones" in scene:
         for other in ("zone", *rough):
             if other in scene or other in leaves:
                 raise InputError(f"scene.{other}", "cannot stand beside zones, each of which has its own values")
-    elif "zone" in scene:
-        zones = ("zone",)
-    elif rough:
+        return zones
+    if "zone" in scene:
+        return ("zone",)
+    if rough:
         raise InputError(f"scene.{rough[0]}", "there is no zone: give zone, or leave friction.rough out")
-    table = read_table(doc, scene["drive"], "drive", 4) if drive == "table" else None
+    return ()
+
+
+def _read_friction(doc: Document, scene: dict[str, Any], model: str, laws: tuple[str, Any] | None) -> _Friction:
+    section = section_of(scene, "friction", "scene.") if "friction" in scene else {}
+    own = own_laws(section)
+    known = law_choice(model, own)
+    names = []
+    if "law" in section:
+        # Name a wrong law, rather than the parameters that only this law has.
+        names = [choose(dict.fromkeys(known.names), section, f"scene.{LAW}", f"friction law of model {model}")]
+    if laws is not None:
+        names = read_values(laws[1], known, laws[0]).tolist()
+    if FORMULA in names and FORMULA not in own:
+        raise InputError("scene.friction.mu", "missing: the formula of the friction coefficient")
+    curve = read_curve(doc, section) if TABLE_LAW in names else None
+    if curve is not None:
+        own[TABLE_LAW] = law_of_curve(curve)
+    keep_definitions(section, names)
+    # Laws of this process too: other processes know only what the structure holds.
+    return _Friction(names, own | own_laws(section), curve)
+
+
+def _read_motion(scene: dict[str, Any], model: str, swept: Collection[str]) -> Structure:
+    """Structure without a friction law: the drive, what formulas move the drive and the body, and impact."""
+    drive = "none"
+    if "drive" in scene:
+        names = dict.fromkeys([*DRIVES, FORMULA_DRIVE])
+        drive = choose(names, section_of(scene, "drive", "scene."), "scene.drive.law", "drive law")
+    impact = model in WITH_IMPACT and ("impact" in scene or any(path.startswith("impact.") for path in swept))
+    found = Structure(model, "", drive, own_drive=own_drive(model, scene.get("drive", {})), impact=impact)
+    return replace(found, own_force=own_force(scene.get("force"))) if _takes_force(model) else found
+
+
+def _takes_force(model: str) -> bool:
+    return "force.constant" in parameters(Structure(model, next(iter(MODELS[model].laws))))
+
+
+def _read_tables(doc: Document, scene: dict[str, Any], moved: Structure) -> dict[str, Any]:
+    """Tables of the drive and of the force, as fields of the structure."""
     force = scene.get("force")
     measured = force is not None and any(name in force for name in (*TABLES["force"], "file"))
-    forces = read_table(doc, scene["force"], "force", 4) if measured else None
-    structures = {
-        law: replace(
-            by_formula,
-            law=law,
-            arcs=zones,
-            table=table,
-            own_law=own.get(law),
-            curve=curve if law == TABLE_LAW else None,
-            force=forces,
-        )
-        for law in names
+    return {
+        "table": read_table(doc, scene["drive"], "drive", 4) if moved.drive == "table" else None,
+        "force": read_table(doc, scene["force"], "force", 4) if measured else None,
     }
-    known = numbers_of(structures)
+
+
+def _read_leaves(
+    scene: dict[str, Any], model: str, zones: tuple[str, ...], friction: _Friction, moved: Structure
+) -> dict[str, Any]:
+    """Path and value of every leaf of the scene."""
+    # Name a misspelt key, rather than the key that is missing because of it.
+    laws = dict.fromkeys([*MODELS[model].laws, *friction.own, FORMULA, TABLE_LAW])
+    paths = _Paths(_all_paths(model, zones or ("zones.0",), laws, friction.own, moved))
+    try:
+        return dict(_leaves(scene, "", paths))
+    except _UnknownKey as error:
+        path = f"scene.{error.section}.{error.key}" if error.section else f"scene.{error.key}"
+        hint = _belongs_elsewhere(error.section, str(error.key), paths, model)
+        if hint is None:
+            known = paths.children[error.section]
+            if friction.names:
+                near = _Paths(_all_paths(model, zones[:1] or ("zones.0",), friction.names, friction.own, moved))
+                known = near.children.get(error.section, known)
+            hint = suggestion(error.key, known)
+        raise InputError(path, f"unknown key{hint}") from None
+
+
+def _read_numbers(
+    structures: Mapping[str, Structure], leaves: Mapping[str, Any], swept: Collection[str]
+) -> dict[str, float]:
+    """Values by path: given, or by default. Those that the sweep gives may be missing."""
     values = {}
-    for path, parameter in known.items():
+    for path, parameter in numbers_of(structures).items():
         if path in leaves:
             values[path] = quantity(leaves[path], parameter, f"scene.{path}")
         elif parameter.default is not None:
             values[path] = parameter.default
         elif not parameter.optional and path not in swept:
-            needing = [law for law, structure in structures.items() if path in parameters(structure)]
-            who = f"; law {needing[0]} needs it" if len(structures) > len(needing) else ""
-            name = path.rpartition(".")[2]
-            if path.startswith("friction.") and name != name.lower() and name.lower() in NAMES:
-                who += f"; or did you mean `{name.lower()}` in the formula, {NAMES[name.lower()]}?"
-            raise InputError(f"scene.{path}", missing_text(path, parameter) + who)
+            raise InputError(f"scene.{path}", missing_text(path, parameter) + _who_needs(path, structures))
+    return values
+
+
+def _who_needs(path: str, structures: Mapping[str, Structure]) -> str:
+    """End of the message about a missing number: the law that needs it, and what a formula may have meant."""
+    needing = [law for law, structure in structures.items() if path in parameters(structure)]
+    who = f"; law {needing[0]} needs it" if len(structures) > len(needing) else ""
+    name = path.rpartition(".")[2]
+    if path.startswith("friction.") and name != name.lower() and name.lower() in NAMES:
+        who += f"; or did you mean `{name.lower()}` in the formula, {NAMES[name.lower()]}?"
+    return who
+
+
+def _warn_of_unused_numbers(structures: Mapping[str, Structure], leaves: Collection[str]) -> None:
+    """Warn of numbers that the scene's laws do not have.
+
+    Raises
+    ------
+    InputError
+        If it is a number beside a table or a formula of the force.
+    """
+    first = next(iter(structures.values()))
+    used = {*numbers_of(structures), *_structural(first.model, first.drive, structures)}
     for path in leaves:
-        if path not in known and path not in _structural(model, drive, names):
+        if path not in used:
             if path.startswith("force."):
                 raise InputError(
                     f"scene.{path}", "cannot stand beside a table or a formula, which gives all of the force"
                 )
-            where, name = ("drive", drive) if path.startswith("drive.") else ("friction", " or ".join(structures))
-            warn_of_unused(path, where, name)
-    _warn_of_lengths(frozenset((path, value) for path, value in values.items() if known[path].unit == "m"))
-    return Scene(structures, values, scene)
+            is_drive = path.startswith("drive.")
+            warn_of_unused(path, *(("drive", first.drive) if is_drive else ("friction", " or ".join(structures))))
 
 
 def _belongs_elsewhere(section: str, key: str, paths: _Paths, model: str) -> str | None:
@@ -203,7 +275,7 @@ def _structural(model: str, drive: str, laws: Collection[str]) -> tuple[str, ...
     """Paths of a scene that are no numeric parameters."""
     sections = ["drive"] if drive == "table" else []
     formulas = ["drive.theta"] if drive == FORMULA_DRIVE else []
-    if "force.constant" in parameters(Structure(model, next(iter(MODELS[model].laws)))):
+    if _takes_force(model):
         sections.append("force")
         formulas.append("force.formula")
     return (
@@ -219,7 +291,7 @@ def _all_paths(
     zones: tuple[str, ...],
     laws: Collection[str],
     own: Mapping[str, type],
-    by_formula: Structure | None = None,
+    moved: Structure | None = None,
 ) -> list[str]:
     """Every path that a scene of this model can have, under some laws and all drives."""
     paths = dict.fromkeys(_structural(model, "table", laws))
@@ -227,9 +299,10 @@ def _all_paths(
     # Laws bring parameters of each arc, drives do not: a thousand arcs under every law and drive would take a minute.
     kinds = [*product(known, ("none",), ((), ("zone",), zones)), *product(known[:1], DRIVES, ((),))]
     for law, drive, arcs in kinds:
-        paths |= dict.fromkeys(parameters(Structure(model, law, drive, arcs, own_law=own.get(law))))
-    if by_formula is not None:
-        paths |= dict.fromkeys(parameters(replace(by_formula, law=law, own_law=own.get(law))))
+        structure = Structure(model, law, drive, arcs, own_law=own.get(law), impact=model in WITH_IMPACT)
+        paths |= dict.fromkeys(parameters(structure))
+    if moved is not None:
+        paths |= dict.fromkeys(parameters(replace(moved, law=law, own_law=own.get(law))))
     return list(paths)
 
 

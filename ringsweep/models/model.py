@@ -9,6 +9,7 @@ from ringsweep.models.interface import recorder
 from ringsweep.models.scene import Structure, Values
 from ringsweep.physics import friction
 from ringsweep.quantities.parameters import Parameter
+from ringsweep.quantities.variables import OUTCOMES, Variable
 
 
 class Model(ABC):
@@ -30,6 +31,8 @@ class Model(ABC):
         give them. Without any there is no film of the model.
     drive_unit : str
         Unit of the motion of the drive.
+    own_variables : dict of str to Variable
+        Outcomes whose unit or meaning differs from that of :data:`ringsweep.quantities.variables.OUTCOMES`.
     absent : frozenset of str
         Outcomes and history variables that have no meaning for this model. Datasets leave them out.
     """
@@ -40,7 +43,13 @@ class Model(ABC):
     place: ClassVar[str]
     driven: ClassVar[tuple[str, ...]] = ()
     drive_unit: ClassVar[str] = "rad"
+    own_variables: ClassVar[dict[str, Variable]] = {}
     absent: ClassVar[frozenset[str]] = frozenset()
+
+    @property
+    def variables(self) -> dict[str, Variable]:
+        """All variables of datasets of this model."""
+        return OUTCOMES | self.own_variables
 
     @property
     def laws(self) -> dict[str, type]:

@@ -255,7 +255,7 @@ def sign_changes(enclosure: Enclosure, cells: Cells, least: float | None = None)
             code[some.high <= SLOWEST] = 0
         else:
             code[(code == _OPEN) & narrow] = -1
-            # What is no number at rest is refused elsewhere.
+            # A coefficient that is no number at rest is refused elsewhere.
             code[some.high <= SLOWEST] = 1
         return code
 

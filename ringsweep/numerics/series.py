@@ -186,12 +186,6 @@ def _first_root_by_subdivision(c, h, work):
 
 
 @inlined
-def may_fall_below(c, h, level):
-    """Whether the series may fall below `level` within the step; False is certain, True is not."""
-    return c[0] - variation(c, h) < level
-
-
-@inlined
 def crossings(c, h, work, count):
     """Append to ``work[0]`` every sign change of a series in (0, h).
 

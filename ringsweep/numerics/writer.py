@@ -75,12 +75,12 @@ class _Writer:
 def _frontier(outputs: list[Node], known: Mapping[Node, str]) -> dict[int, list[Node]]:
     """Unknown switches that outputs need, by threshold; without those that only other switches need."""
     found: dict[Node, None] = {}
-    seen: set[Node] = set()
+    visited: set[Node] = set()
 
     def visit(node: Node) -> None:
-        if node in known or node in seen:
+        if node in known or node in visited:
             return
-        seen.add(node)
+        visited.add(node)
         if node.kind == "switch" and node.varies:
             found[node] = None
             return

@@ -10,9 +10,6 @@ rad.
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import json
 from collections.abc import Mapping
 from math import atan, cos, exp, inf, log, log1p, nan, sin, sqrt, tanh
 from typing import Annotated, Any, NamedTuple
@@ -26,6 +23,7 @@ from ringsweep.numerics.expressions import ZERO, Node, derivative, evaluate, sym
 from ringsweep.numerics.functions import raised
 from ringsweep.numerics.series import INVERSE
 from ringsweep.physics import functions_of_time
+from ringsweep.physics.definitions import Definitions
 from ringsweep.physics.friction.formula import FormulaError
 from ringsweep.physics.functions_of_time import Function, check, knots_of, period_of, read_function, size_at_start
 from ringsweep.quantities.parameters import Leaf, Parameter
@@ -644,10 +642,6 @@ def _no_lookup(drive, table, k):
 
 # ---- drives of users --------------------------------------------------------------------------
 
-_PREFIX = "formula_"
-
-_DEFINED: dict[str, type] = {}
-
 #: What must be continuous, by the unit of the formula.
 _CONTINUOUS = {
     "rad": (("the angle", "rad"), ("the angular velocity", "rad/s")),
@@ -670,33 +664,24 @@ def define(text: str, unit: str) -> type:
     FormulaError
         If something in the formula is wrong.
     """
-    # Code on disk names the type of a drive. So the name of the type tells its formula.
-    return _defined(_PREFIX + base64.urlsafe_b64encode(json.dumps([text, unit]).encode()).decode().rstrip("="))
+    return _DEFINITIONS.type_of(text, unit)
 
 
-def _defined(qualified: str) -> type:
-    if qualified in _DEFINED:
-        return _DEFINED[qualified]
-    encoded = qualified.removeprefix(_PREFIX).encode()
-    text, unit = json.loads(base64.urlsafe_b64decode(encoded + b"=" * (-len(encoded) % 4)))
+def _defined(name: str, qualified: str, text: str, unit: str) -> type:
     function = read_function(text, unit)
     if not function.value.varies or not function.units:
         raise FormulaError("it must depend on t, and on a parameter, which has the unit")
     what = "force" if unit == "N" else "drive"
     parameters = {name: Parameter(of, f"parameter {name} of the {what}") for name, of in function.units.items()}
-    name = "Formula_" + hashlib.sha256(qualified.encode()).hexdigest()[:12]
     try:
-        drive = _make(name, f"{text}, {unit}", function, parameters, qualified)
+        return _make(name, f"{text}, {unit}", function, parameters, qualified)
     except OverflowError:
         raise FormulaError("it is too long: its power series have too many parts") from None
-    _DEFINED[qualified] = drive
-    return drive
 
 
-def __getattr__(name: str) -> Any:
-    if name.startswith(_PREFIX):
-        return _defined(name)
-    raise AttributeError(f"module {__name__} has no attribute {name}")
+_DEFINITIONS = Definitions(__name__, _defined)
+
+__getattr__ = _DEFINITIONS.find
 
 
 def made(drive: type, columns: dict[str, NDArray[np.float64]], spans: NDArray[np.float64]) -> Any:
@@ -707,7 +692,7 @@ def made(drive: type, columns: dict[str, NDArray[np.float64]], spans: NDArray[np
     FormulaError
         If a formula has a jump, or is no number, within the spans of time of the cells, s.
     """
-    if drive.__qualname__ not in _DEFINED:
+    if drive.__qualname__ not in _DEFINITIONS.known:
         return drive(**columns)
     function = FORMULAS[drive]
     knots = knots_of(function, columns, len(spans))

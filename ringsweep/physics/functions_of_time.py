@@ -196,14 +196,14 @@ def check(
     nodes += [derivative(nodes[-1]), derivative(derivative(nodes[-1]))]
     thresholds = list(knots.T)
     for order, node in enumerate(nodes):
-        seen = np.broadcast_to(evaluate(node, times, values, thresholds), times.shape)
-        if not np.isfinite(seen).all():
-            at = times[~np.isfinite(seen)][0]
+        sampled = np.broadcast_to(evaluate(node, times, values, thresholds), times.shape)
+        if not np.isfinite(sampled).all():
+            at = times[~np.isfinite(sampled)][0]
             what = ("the formula", "its first derivative", "its second derivative", "its third derivative")[order]
             raise FormulaError(f"{what} is no finite number at t = {at:.6g} s")
         if order >= len(continuous):
             continue
-        largest = abs(seen).max(axis=0)
+        largest = abs(sampled).max(axis=0)
         for at in thresholds:
             within = (at > 0.0) & (at <= spans)
             t = np.where(within, at, 0.0)

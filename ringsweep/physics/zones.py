@@ -96,18 +96,18 @@ def surface_of(arcs: list[Arc], mu_s: Any, mu_k: Any) -> Uniform | Segments:
     """
     if not arcs:
         return Uniform(mu_s, mu_k)
-    turn = 2.0 * np.pi
+    circle = 2.0 * np.pi
     ends = [np.asarray(a.center + side * a.half_angle, dtype=float) for a in arcs for side in (-1, 1)]
-    edges = np.stack(np.broadcast_arrays(*ends), axis=-1) % turn
-    edges = np.sort(np.where(edges >= turn, 0.0, edges), axis=-1)
-    width = np.diff(edges, axis=-1, append=edges[..., :1] + turn)
+    edges = np.stack(np.broadcast_arrays(*ends), axis=-1) % circle
+    edges = np.sort(np.where(edges >= circle, 0.0, edges), axis=-1)
+    width = np.diff(edges, axis=-1, append=edges[..., :1] + circle)
     middle = edges + 0.5 * width
     static = np.broadcast_to(np.asarray(mu_s, dtype=float)[..., None], middle.shape)
     kinetic = np.broadcast_to(np.asarray(mu_k, dtype=float)[..., None], middle.shape)
     index = np.zeros(middle.shape)
     for k, arc in enumerate(arcs, start=1):
         center, half_angle, rough_s, rough_k = (np.asarray(x, dtype=float)[..., None] for x in arc)
-        distance = np.abs((middle - center + np.pi) % turn - np.pi)
+        distance = np.abs((middle - center + np.pi) % circle - np.pi)
         inside = distance < half_angle
         static = np.where(inside, rough_s, static)
         kinetic = np.where(inside, rough_k, kinetic)
@@ -117,7 +117,7 @@ def surface_of(arcs: list[Arc], mu_s: Any, mu_k: Any) -> Uniform | Segments:
     number = np.maximum.accumulate(number, axis=-1)
     number = np.where(number < 0, number[..., -1:], number)
     static, kinetic, index = (np.take_along_axis(leaf, number, axis=-1) for leaf in (static, kinetic, index))
-    narrowest = np.where(width > _NEGLIGIBLE_WIDTH, width, turn).min(axis=-1)
+    narrowest = np.where(width > _NEGLIGIBLE_WIDTH, width, circle).min(axis=-1)
     return Segments(edges, static, kinetic, index, (static.max(axis=-1), kinetic.min(axis=-1)), narrowest)
 
 
@@ -281,7 +281,7 @@ def _segments_narrowest(surface):
 
 @hook
 def locate(surface, angle):
-    """Place of a contact at `angle`, rad: segment, and number of whole turns to the lower edge of the segment."""
+    """Place of a contact at `angle`, rad: segment, and number of whole revolutions to the lower edge of the segment."""
 
 
 @locate.implements(Uniform)
@@ -291,15 +291,15 @@ def _uniform_locate(surface, angle):
 
 @locate.implements(Segments)
 def _segments_locate(surface, angle):
-    turn = math.floor(angle / (2.0 * pi))
-    x = angle - 2.0 * pi * turn
+    revolution = math.floor(angle / (2.0 * pi))
+    x = angle - 2.0 * pi * revolution
     found = -1
     for j in range(len(surface.edges)):
         if surface.edges[j] <= x:
             found = j
     if found < 0:
-        return len(surface.edges) - 1, turn - 1
-    return found, turn
+        return len(surface.edges) - 1, revolution - 1
+    return found, revolution
 
 
 @hook
@@ -310,7 +310,7 @@ def edge_ahead(surface, place, direction):
     ----------
     surface : Uniform or Segments
     place : tuple of int
-        Segment and turn of the contact, see :func:`locate`.
+        Segment and revolution of the contact, see :func:`locate`.
     direction : int
         Direction of motion, +1 or -1.
     """
@@ -323,12 +323,12 @@ def _uniform_edge_ahead(surface, place, direction):
 
 @edge_ahead.implements(Segments)
 def _segments_edge_ahead(surface, place, direction):
-    j, turn = place
+    j, revolution = place
     if direction > 0:
         j += 1
         if j == len(surface.edges):
-            j, turn = 0, turn + 1
-    return surface.edges[j] + 2.0 * pi * turn
+            j, revolution = 0, revolution + 1
+    return surface.edges[j] + 2.0 * pi * revolution
 
 
 @hook
@@ -343,13 +343,13 @@ def _uniform_cross_edge(surface, place, direction):
 
 @cross_edge.implements(Segments)
 def _segments_cross_edge(surface, place, direction):
-    j, turn = place
+    j, revolution = place
     j += direction
     if j == len(surface.edges):
-        return 0, turn + 1
+        return 0, revolution + 1
     if j < 0:
-        return len(surface.edges) - 1, turn - 1
-    return j, turn
+        return len(surface.edges) - 1, revolution - 1
+    return j, revolution
 
 
 # A contact this close to an edge is on the edge, rad.
@@ -364,7 +364,7 @@ def leave_edge(surface, place, angle, direction):
     ----------
     surface : Uniform or Segments
     place : tuple of int
-        Segment and turn of the contact, see :func:`locate`.
+        Segment and revolution of the contact, see :func:`locate`.
     angle : float
         Angle of the contact, rad.
     direction : int

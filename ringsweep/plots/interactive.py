@@ -40,8 +40,8 @@ def explore(
 ) -> Figure:
     """Draw a map, and beside it the history of the cell that is clicked.
 
-    Arrow keys move from cell to cell. Below the figure are the coordinates of the cell under the pointer, its regime,
-    its certificate, and the number shown with the bound on its error.
+    Arrow keys move from cell to cell. The coordinates of the cell under the pointer, its regime, its
+    certificate, and the number shown with the bound on its error are written below the figure.
 
     Clicks and keys need an interactive figure: in a notebook ``%matplotlib widget`` (ipympl), elsewhere a window of
     pyplot. Without one, for example under ``%matplotlib inline``, the figure shows the map and the history of one cell.
@@ -56,7 +56,7 @@ def explore(
         Variable to draw.
     sel : mapping of str to float or str, optional
         Coordinates held at the value nearest to the one given, which must lie within the axis: a plain number is SI,
-        text may have a unit. A warning and the title tell the value taken if it is another.
+        text may have a unit. A warning and the title state the value taken if it is another.
     at : mapping of str to float or str, optional
         Coordinates of the cell whose history is drawn first, given as in `sel`; on other axes the middle cell.
 

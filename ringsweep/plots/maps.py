@@ -99,7 +99,7 @@ def regime_map(
         Variable to draw.
     sel : mapping of str to float or str, optional
         Coordinates held at the value nearest to the one given, which must lie within the axis: a plain number is SI,
-        text may have a unit. A warning and the title tell the value taken if it is another.
+        text may have a unit. A warning and the title state the value taken if it is another.
     boundaries : xarray.Dataset, optional
         Curves of :func:`ringsweep.boundary`, which are drawn over a map of one panel.
     title : bool or str
@@ -198,7 +198,7 @@ def map_panel(
         Variable to draw.
     sel : mapping of str to float or str, optional
         Coordinates held at the value nearest to the one given, which must lie within the axis: a plain number is SI,
-        text may have a unit. A warning and the title tell the value taken if it is another.
+        text may have a unit. A warning and the title state the value taken if it is another.
     ax : matplotlib.axes.Axes, optional
         Axes to draw in, by default pyplot's current ones. The legend stands outside them: a figure with
         ``layout="constrained"`` makes room for it.

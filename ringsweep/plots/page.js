@@ -92,7 +92,7 @@ if (line !== null) {
   line.data = {x: line.data.x, value: numbers}
 }
 
-// What the pointer tells of a cell.
+// Text about the cell at the pointer.
 window.ringsweep_tell = place => {
   const i = cellAt(place.image_index?.flat_index ?? place.index)
   const lines = coordinates.map(coordinate => {

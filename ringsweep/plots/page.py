@@ -68,7 +68,7 @@ def save_page(
         Variable that the page shows first.
     sel : mapping of str to float or str, optional
         Coordinates held at the value nearest to the one given, which must lie within the axis: a plain number is SI,
-        text may have a unit. A warning and the title tell the value taken if it is another.
+        text may have a unit. A warning and the title state the value taken if it is another.
 
     Raises
     ------

@@ -27,7 +27,7 @@ def cell(ds: xr.Dataset, sel: Mapping[str, float | str] | None = None) -> dict[s
         Result of a sweep, or a part of it. Coordinates that ``ds.isel(...)`` has fixed stay fixed.
     sel : mapping of str to float or str, optional
         Coordinates held at the value nearest to the one given, which must lie within the axis: a plain number is SI,
-        text may have a unit. A warning tells the value taken if it is another.
+        text may have a unit. A warning states the value taken if it is another.
 
     Returns
     -------

@@ -303,7 +303,7 @@ def uncertainty_exponent(ds: xr.Dataset) -> xr.Dataset:
         Along the dimension ``epsilon``, the side of the boxes in cells: ``boxes``, ``uncertain`` (their number with
         more than one label) and ``fitted`` (whether the size counts in the fit). ``exponent``, the standard
         error ``exponent_error`` that follows from the scatter about the fit alone, and ``dimension`` of the boundary.
-        NaN if there are too few counts, which a warning tells. On a curve the exponent differs from 1 by some 0.01 at
+        NaN if there are too few counts; a warning says so. On a curve the exponent differs from 1 by some 0.01 at
         512 cells a side: counts of few boxes depend on where the curve lies.
 
     Raises

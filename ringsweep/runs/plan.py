@@ -16,7 +16,7 @@ import numpy as np
 
 from ringsweep.config import Config
 from ringsweep.errors import InputError
-from ringsweep.models import MODELS
+from ringsweep.models import model_of
 from ringsweep.quantities.variables import OUTCOMES
 from ringsweep.runs.cells import TaskResult, compute_task
 from ringsweep.solvers.certificate import with_errors
@@ -36,7 +36,7 @@ _MEASURING, _FIRST, _MOST = 1.0, 120.0, 100_000
 
 def bytes_of_cell(config: Config) -> int:
     """Size of the columns of a cell; variables that some solvers leave out are counted."""
-    model = MODELS[config.scene.structure.model]
+    model = model_of(config.scene.structure)
     names = {*model.outcomes, "steps", "certified", "stiffness"} - set(model.absent)
     errors = (
         [f"{name}_error" for name in with_errors(model.outcomes)] if getattr(config.solver, "certify", False) else []

@@ -13,14 +13,14 @@ from ringsweep.config import Config
 from ringsweep.config.refinement import Refinement
 from ringsweep.quantities.units import percent_at_most
 from ringsweep.quantities.variables import INFERRED, LABELS, MISSING, OUTCOMES
-from ringsweep.runs.refinement import Answer, Audit, Refined, refine
+from ringsweep.runs.refinement import Answer, Findings, Refined, refine
 from ringsweep.storage.chunks import Layout
 
 #: Seed of the audit: a sweep that is repeated audits the same cells.
 SEED = 18
 
 # No classification has as many flags.
-_FLAGS = 24
+_FLAGS = 13
 
 Columns = dict[str, NDArray[Any]]
 
@@ -180,7 +180,7 @@ def attributes(config: Refinement, refined: Refined) -> dict[str, Any]:
     return found
 
 
-def _in_words(audit: Audit, config: Refinement) -> str:
+def _in_words(audit: Findings, config: Refinement) -> str:
     if not audit.cells:
         return "none of them is audited"
     words = f"{audit.cells} of the inferred cells are audited: {audit.wrong} had been inferred wrongly"

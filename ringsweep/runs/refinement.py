@@ -52,8 +52,8 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class Audit:
-    """Statement of an audit.
+class Findings:
+    """What the audit of a map found.
 
     Attributes
     ----------
@@ -92,14 +92,14 @@ class Refined:
         How often the coarse block around the cell was halved when the cell was computed or inferred.
     values : ndarray of float, optional
         Numbers that were interpolated where a cell is inferred.
-    audit : Audit
+    audit : Findings
     """
 
     labels: NDArray[np.int16]
     origin: NDArray[np.int8]
     level: NDArray[np.int8]
     values: NDArray[np.float64] | None
-    audit: Audit
+    audit: Findings
 
 
 def refine(
@@ -308,12 +308,12 @@ def _audited(grid: _Grid, share: float, random: np.random.Generator) -> Generato
         most = largest_number(len(inferred), count, drawn) - found
         return min(max(most, 0), left) / left if left else 0.0
 
-    statement = Audit(count, int(wrong.sum()), corrected, bound(int(wrong.sum()), corrected))
+    findings = Findings(count, int(wrong.sum()), corrected, bound(int(wrong.sum()), corrected))
     if far is not None and grid.rough is not None:
         all_far = bound(int(far.sum()), int(grid.rough.flat[followed].sum()))
-        statement = replace(statement, far=int(far.sum()), far_bound=all_far)
+        findings = replace(findings, far=int(far.sum()), far_bound=all_far)
     labels = np.where(grid.labels < 0, ~grid.labels, grid.labels)
-    return Refined(labels, origin, grid.level, grid.values, statement)
+    return Refined(labels, origin, grid.level, grid.values, findings)
 
 
 class _Blocks:

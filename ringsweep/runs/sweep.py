@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from ringsweep.config import Axes, Config, load, read_axes, read_scene, read_solver, refined, sweepable
 from ringsweep.config.axes import dimension
 from ringsweep.errors import InputError
-from ringsweep.quantities.variables import INFERRED, OUTCOMES, error_attribute
+from ringsweep.models import model_of
+from ringsweep.quantities.variables import INFERRED, error_attribute
 from ringsweep.runs.cells import TaskResult, compute_task
 from ringsweep.runs.executors import Execution, Executor, progress_bar, stop_on_interrupt
 from ringsweep.runs.plan import check_room
@@ -199,9 +200,10 @@ def sweep(
         axes = {str(path): xr.DataArray(column.to_numpy(), dims="point") for path, column in axes.items()}
     parsed = read_scene(scene, swept=axes)
     found = read_axes(parsed, axes)
-    method = {"method": solver} if isinstance(solver, str) else dict(solver)
-    source = {"scene": dict(parsed.source), "solver": method, "sweep": _sweep_section(found)}
-    config = refined(Config(parsed, read_solver(method, parsed), found, source, name="ringsweep"), refine)
+    method = read_solver(solver, parsed)
+    given = {"method": solver} if isinstance(solver, str) else dict(solver)
+    source = {"scene": dict(parsed.source), "solver": given, "sweep": _sweep_section(found)}
+    config = refined(Config(parsed, method, found, source, name="ringsweep"), refine)
     return _run(config, output, Execution(jobs, scheduler, progress), fresh, reuse)
 
 
@@ -243,9 +245,10 @@ def compute(
     if found is not None and config.refine is not None:
         complete(config.refine, found, tuple(slice(None) for _ in sizes), columns)
         columns |= {name: with_nan(columns[name]) for name in gaps(columns)}
+    variables = model_of(config.scene.structure).variables
     results = results.assign(
         {
-            name: (tuple(config.axes.sizes), column, OUTCOMES[name].attributes | error_attribute(name, columns))
+            name: (tuple(config.axes.sizes), column, variables[name].attributes | error_attribute(name, columns))
             for name, column in columns.items()
         }
     )
@@ -312,8 +315,9 @@ def _write_file(config: Config, target: Path, layout: Layout, checkpoint: Checkp
     """Write the file of a sweep whose cells are all in the checkpoint, but for those that were inferred."""
     frame = _frame(config, found)
     frame.attrs["processors"] = ", ".join(sorted(checkpoint.processors))
+    variables = model_of(config.scene.structure).variables
     if found is None or config.refine is None:
-        netcdf.write(target, checkpoint.working_folder, frame, OUTCOMES, layout, checkpoint.chunks())
+        netcdf.write(target, checkpoint.working_folder, frame, variables, layout, checkpoint.chunks())
         return
     refine = config.refine
 
@@ -321,7 +325,7 @@ def _write_file(config: Config, target: Path, layout: Layout, checkpoint: Checkp
         complete(refine, found, region, columns)
         return not (missing & (found.origin[region] != INFERRED)).any()
 
-    netcdf.write(target, checkpoint.working_folder, frame, OUTCOMES, layout, checkpoint.chunks(fill), gaps(OUTCOMES))
+    netcdf.write(target, checkpoint.working_folder, frame, variables, layout, checkpoint.chunks(fill), gaps(variables))
 
 
 def _holds_sweep(target: Path, checkpoint: Checkpoint) -> bool:
@@ -493,7 +497,7 @@ class _Tasks:
                 self._keep(self._last)
         except KeyboardInterrupt as interrupt:
             self.stopped.set()
-            # What is finished is kept; what is under way is not waited for.
+            # Finished tasks are kept. Tasks under way are not waited for.
             if self._last is not None:
                 self._keep(self._last)
             self._last = results.throw(interrupt)

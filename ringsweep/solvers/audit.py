@@ -69,76 +69,78 @@ def _audit_after(audit, first, second, energy_before, energy_after, s):
 
 
 @inlined
-def _audit_series_step(scene, mode, c, t, s, y, y_next, tolerance, audit):
-    """Audit after a step of length `s` along the series `c`, from the state `y` at time `t` to the state `y_next`."""
-    first = _violation_in_series_step(scene, mode, c, t, s, tolerance, EARLY * s)
-    second = _violation_in_series_step(scene, mode, c, t, s, tolerance, LATE * s)
+def _audit_series_step(scene, step, c, tolerance, audit):
+    """Audit after a step along the series `c`."""
+    first = _violation_in_series_step(scene, step, c, tolerance, EARLY * step.s)
+    second = _violation_in_series_step(scene, step, c, tolerance, LATE * step.s)
     energy_before, energy_after = (
-        audit_of_model.energy(scene, drives.turn(scene.drive, t), y),
-        audit_of_model.energy(scene, drives.turn(scene.drive, t + s), y_next),
+        audit_of_model.energy(scene, drives.turn(scene.drive, step.t), step.y),
+        audit_of_model.energy(scene, drives.turn(scene.drive, step.t + step.s), step.y_next),
     )
-    return _audit_after(audit, first, second, energy_before, energy_after, s)
+    return _audit_after(audit, first, second, energy_before, energy_after, step.s)
 
 
 @inlined
-def _violation_in_series_step(scene, mode, c, t, s, tolerance, s_check):
-    state, rates = series.state_at(scene, c, s_check), series.rates_at(scene, c, s_check)
-    return audit_of_model.violation(scene, mode, drives.turn(scene.drive, t + s_check), state, rates, s, tolerance)
+def _violation_in_series_step(scene, step, c, tolerance, s):
+    state, rates, forcing = (
+        series.state_at(scene, c, s),
+        series.rates_at(scene, c, s),
+        drives.turn(scene.drive, step.t + s),
+    )
+    return audit_of_model.violation(scene, step.mode, forcing, state, rates, step.s, tolerance)
 
 
 @inlined
-def _audit_implicit_step(scene, mode, t, s, y, y_next, course, bends, tolerance, audit):
-    """Audit after an implicit step of length `s` from the state `y` at time `t` to the state `y_next`."""
-    before, after = implicit.forcing(scene, course, t), implicit.forcing(scene, course, t + s)
-    x, x_next = implicit.to_implicit(scene, before, y), implicit.to_implicit(scene, after, y_next)
-    first = _violation_in_implicit_step(scene, mode, t, s, x, x_next, course, bends, tolerance, EARLY)
-    second = _violation_in_implicit_step(scene, mode, t, s, x, x_next, course, bends, tolerance, LATE)
-    return _audit_after(
-        audit, first, second, audit_of_model.energy(scene, before, y), audit_of_model.energy(scene, after, y_next), s
-    )
+def _ends(scene, step, course):
+    """Forcing and state for implicit steps at both ends of a step."""
+    before, after = implicit.forcing(scene, course, step.t), implicit.forcing(scene, course, step.t + step.s)
+    x, x_next = implicit.to_implicit(scene, before, step.y), implicit.to_implicit(scene, after, step.y_next)
+    return (before, x), (after, x_next)
 
 
 @inlined
-def _violation_in_implicit_step(scene, mode, t, s, x, x_next, course, bends, tolerance, fraction):
-    forcing = implicit.forcing(scene, course, t + fraction * s)
-    state = implicit.from_implicit(scene, forcing, rosenbrock.dense(x, x_next, bends[0], fraction))
-    return audit_of_model.violation(
-        scene, mode, forcing, state, rosenbrock.dense_rates(x, x_next, bends[0], fraction, s), s, tolerance
+def _audit_implicit_step(scene, step, scratch, tolerance, audit):
+    """Audit after an implicit step."""
+    (before, x), (after, x_next) = _ends(scene, step, scratch.course)
+    first = _violation_in_implicit_step(scene, step, scratch, (x, x_next), tolerance, EARLY)
+    second = _violation_in_implicit_step(scene, step, scratch, (x, x_next), tolerance, LATE)
+    energy_before, energy_after = (
+        audit_of_model.energy(scene, before, step.y),
+        audit_of_model.energy(scene, after, step.y_next),
     )
+    return _audit_after(audit, first, second, energy_before, energy_after, step.s)
 
 
 @inlined
-def _fall_rate_in_implicit_step(scene, mode, t, s, y, y_next, course, bends, guard):
-    """Rate at which a guard falls at the end of an implicit step, in its unit per second."""
-    before, late = implicit.forcing(scene, course, t), implicit.forcing(scene, course, t + 0.9 * s)
-    x, x_next = (
-        implicit.to_implicit(scene, before, y),
-        implicit.to_implicit(scene, implicit.forcing(scene, course, t + s), y_next),
-    )
-    state = rosenbrock.dense(x, x_next, bends[0], 0.9)
-    view = implicit.guards_and_motion(scene, mode, implicit.common(scene, mode, before, x), late, state)
-    return view[0][guard] / (0.1 * s)
+def _violation_in_implicit_step(scene, step, scratch, ends, tolerance, fraction):
+    (x, x_next), bends = ends, scratch.bends[0]
+    forcing = implicit.forcing(scene, scratch.course, step.t + fraction * step.s)
+    state = implicit.from_implicit(scene, forcing, rosenbrock.dense(x, x_next, bends, fraction))
+    rates = rosenbrock.dense_rates(x, x_next, bends, fraction, step.s)
+    return audit_of_model.violation(scene, step.mode, forcing, state, rates, step.s, tolerance)
+
+
+@inlined
+def _fall_rate_in_implicit_step(scene, step, scratch, guard):
+    (before, x), (_, x_next) = _ends(scene, step, scratch.course)
+    late = implicit.forcing(scene, scratch.course, step.t + 0.9 * step.s)
+    state = rosenbrock.dense(x, x_next, scratch.bends[0], 0.9)
+    view = implicit.guards_and_motion(scene, step.mode, implicit.common(scene, step.mode, before, x), late, state)
+    return view[0][guard - scratch.first_guard] / (0.1 * step.s)
 
 
 @hook
-def audit_step(family, scene, mode, is_implicit, c, t, s, y, y_next, course, bends, tolerance, audit):
+def audit_step(family, scene, step, scratch, tolerance, audit):
     """Audit after a step.
 
     Parameters
     ----------
     family : SetValued, Smooth or Dynamic
         Family of the friction law.
-    scene, mode : NamedTuple
-    is_implicit : bool
-        Whether the step is implicit.
-    c : ndarray of shape ``(rows, columns)``
-        Table of the series, if the step is not implicit.
-    t, s : float
-        Time at the beginning of the step, and length of the step, s.
-    y, y_next : tuple of float
-        States at both ends of the step.
-    course, bends : ndarray
-        As in :func:`ringsweep.solvers.creep.implicit_step`, if the step is implicit.
+    scene : NamedTuple
+    step : Step
+    scratch : Scratch
+        As the step left it.
     tolerance : float
         Tolerance of the series.
     audit : Audit
@@ -151,43 +153,42 @@ def audit_step(family, scene, mode, is_implicit, c, t, s, y, y_next, course, ben
 
 
 @audit_step.implements(SetValued)
-def _audit_by_series(family, scene, mode, is_implicit, c, t, s, y, y_next, course, bends, tolerance, audit):
-    return _audit_series_step(scene, mode, c, t, s, y, y_next, tolerance, audit)
+def _audit_by_series(family, scene, step, scratch, tolerance, audit):
+    return _audit_series_step(scene, step, scratch.c, tolerance, audit)
 
 
 @audit_step.implements(Smooth)
-def _audit_by_either(family, scene, mode, is_implicit, c, t, s, y, y_next, course, bends, tolerance, audit):
-    if is_implicit:
-        return _audit_implicit_step(scene, mode, t, s, y, y_next, course, bends, tolerance, audit)
-    return _audit_series_step(scene, mode, c, t, s, y, y_next, tolerance, audit)
+def _audit_by_either(family, scene, step, scratch, tolerance, audit):
+    if step.is_implicit:
+        return _audit_implicit_step(scene, step, scratch, tolerance, audit)
+    return _audit_series_step(scene, step, scratch.c, tolerance, audit)
 
 
 @audit_step.implements(Dynamic)
-def _audit_by_implicit(family, scene, mode, is_implicit, c, t, s, y, y_next, course, bends, tolerance, audit):
-    return _audit_implicit_step(scene, mode, t, s, y, y_next, course, bends, tolerance, audit)
+def _audit_by_implicit(family, scene, step, scratch, tolerance, audit):
+    return _audit_implicit_step(scene, step, scratch, tolerance, audit)
 
 
 @hook
-def fall_rate(family, scene, mode, is_implicit, c, t, s, y, y_next, course, bends, guard, first_guard):
+def fall_rate(family, scene, step, scratch, guard):
     """Rate at which a guard falls at the end of a step that it ended, in its unit per second.
 
-    `guard` is the row of the guard, `first_guard` the row of the first guard. Other arguments are as in
-    :func:`audit_step`.
+    `guard` is the row of the guard. Other arguments are as in :func:`audit_step`.
     """
 
 
 @fall_rate.implements(SetValued)
-def _fall_rate_by_series(family, scene, mode, is_implicit, c, t, s, y, y_next, course, bends, guard, first_guard):
-    return -slope(c[guard], s)
+def _fall_rate_by_series(family, scene, step, scratch, guard):
+    return -slope(scratch.c[guard], step.s)
 
 
 @fall_rate.implements(Smooth)
-def _fall_rate_by_either(family, scene, mode, is_implicit, c, t, s, y, y_next, course, bends, guard, first_guard):
-    if is_implicit:
-        return _fall_rate_in_implicit_step(scene, mode, t, s, y, y_next, course, bends, guard - first_guard)
-    return -slope(c[guard], s)
+def _fall_rate_by_either(family, scene, step, scratch, guard):
+    if step.is_implicit:
+        return _fall_rate_in_implicit_step(scene, step, scratch, guard)
+    return -slope(scratch.c[guard], step.s)
 
 
 @fall_rate.implements(Dynamic)
-def _fall_rate_by_implicit(family, scene, mode, is_implicit, c, t, s, y, y_next, course, bends, guard, first_guard):
-    return _fall_rate_in_implicit_step(scene, mode, t, s, y, y_next, course, bends, guard - first_guard)
+def _fall_rate_by_implicit(family, scene, step, scratch, guard):
+    return _fall_rate_in_implicit_step(scene, step, scratch, guard)

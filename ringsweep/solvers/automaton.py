@@ -10,17 +10,15 @@ from __future__ import annotations
 from math import isfinite
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from ringsweep.compile import Cells, borrowed, hook, inlined, kernel, take
 from ringsweep.models.interface import implicit, modes, recorder, series
 from ringsweep.models.interface.status import BROKEN, COMPLETE, RUNNING
-from ringsweep.numerics.series import ORDER, STACK
-from ringsweep.numerics.terms import COLUMNS
+from ringsweep.numerics.series import ORDER
 from ringsweep.physics import drives
 from ringsweep.physics.friction import Dynamic, SetValued, Smooth, family
 from ringsweep.solvers.audit import Audit, audit_step, fall_rate, is_checked
-from ringsweep.solvers.creep import INSTANTS, MOST_GUARDS, StepControl, implicit_step
+from ringsweep.solvers.creep import StepControl, implicit_step, start_at
+from ringsweep.solvers.steps import Step, lent, scratch_for
 from ringsweep.solvers.taylor import series_step
 
 # A run ends after this many consecutive steps and events at one instant.
@@ -29,8 +27,8 @@ _MOST_STALLED = 400
 #: The second run of a certificate has a tolerance that is looser by this factor.
 FACTOR = 30.0
 
-# By kind of cells: number of series in the table, and of components of a state.
-_SHAPES: dict[Any, tuple[int, int]] = {}
+# By kind of cells: number of series in the table, of components of a state, and row of the first guard.
+_SHAPES: dict[Any, tuple[int, int, int]] = {}
 
 #: A run is given up if, at the pace of so many steps, it would exceed its largest number of steps.
 PATIENCE = 1_000_000
@@ -74,123 +72,76 @@ def _after_creep(local, error):
     return LocalErrors(local.series, local.rate, local.implicit + error, local.creep + 1.0)
 
 
+class _Run(NamedTuple):
+    """A run between two steps."""
+
+    record: Any
+    mode: Any
+    t: float
+    y: Any
+    control: StepControl
+    local: LocalErrors
+
+
 @hook
-def _step(family, scene, record, mode, t, y, control, local, h_max, tolerances, c, first, work, course, bends, samples):
+def _step(family, scene, run, h_max, tolerances, scratch):
     """One step of the kind that the family of the friction law needs.
 
     Parameters
     ----------
     family : SetValued, Smooth or Dynamic
         Family of the friction law.
-    scene, record, mode : NamedTuple
-    t : float
-        Time, s.
-    y : tuple of float
-        State at time `t`.
-    control : StepControl
-        Length of the next implicit step.
-    local : LocalErrors
-        Up to the step.
+    scene : NamedTuple
+    run : _Run
     h_max : float
         Greatest length of the step, s.
     tolerances : tuple of float
         As in :func:`integrate`.
-    c : ndarray of shape ``(rows, columns)``
-        Table of the series, which is filled.
-    first : int
-        Row of the first guard in the table.
-    work, samples : ndarray
-        Scratch.
-    course : ndarray of shape ``COURSE_SHAPE``
-        Series of the drive, see :func:`ringsweep.physics.drives.follow`.
-    bends : ndarray of shape ``(2, 3, components)``
-        As in :func:`ringsweep.solvers.creep.implicit_step`.
+    scratch : Scratch
 
     Returns
     -------
     tuple
-        Whether the step was implicit; the guard that ended it, or -1; its length, s; state, record, control and local
-        errors after it.
+        Whether the step was implicit; the guard that ended it, or -1; its length, s; state, record, control of the next
+        implicit step and local errors after it.
     """
 
 
 @_step.implements(SetValued)
-def _step_series(
-    family, scene, record, mode, t, y, control, local, h_max, tolerances, c, first, work, course, bends, samples
-):
-    guard, s, y, record, reach = series_step(scene, record, mode, t, y, h_max, tolerances[0], c, first, work)
+def _step_series(family, scene, run, h_max, tolerances, scratch):
+    guard, s, y, record, reach = series_step(scene, run.record, run.mode, run.t, run.y, h_max, tolerances[0], scratch)
     shared = _shared(s, reach)
-    rate = shared * ORDER / s if shared > 0.0 and modes.sticks(scene, mode) else 0.0
-    return False, guard, s, y, record, control, LocalErrors(local.series + shared, local.rate + rate, 0.0, 0.0)
+    rate = shared * ORDER / s if shared > 0.0 and modes.sticks(scene, run.mode) else 0.0
+    local = LocalErrors(run.local.series + shared, run.local.rate + rate, 0.0, 0.0)
+    return False, guard, s, y, record, run.control, local
 
 
 @_step.implements(Smooth)
-def _step_either(
-    family, scene, record, mode, t, y, control, local, h_max, tolerances, c, first, work, course, bends, samples
-):
-    if implicit.may_creep(scene, mode):
-        forcing = implicit.forcing(scene, course, t)
-        x = implicit.to_implicit(scene, forcing, y)
-        common = implicit.common(scene, mode, forcing, x)
-        linear = implicit.linearise(scene, mode, common, t, forcing, x)
-        if implicit.is_stiff(scene, mode, y, linear):
+def _step_either(family, scene, run, h_max, tolerances, scratch):
+    if implicit.may_creep(scene, run.mode):
+        start = start_at(scene, scratch.course, run.mode, run.t, run.y)
+        if implicit.is_stiff(scene, run.mode, run.y, start.linear):
+            control = run.control
             if control.last_h == 0.0:
                 # The transient into creep decays at this rate.
-                control = StepControl(min(control.h, -1.0 / linear[1][3]), 0.0, 0.0)
+                control = StepControl(min(control.h, -1.0 / start.linear[1][3]), 0.0, 0.0)
             guard, s, y, record, control, error = implicit_step(
-                scene,
-                record,
-                mode,
-                t,
-                y,
-                x,
-                forcing,
-                common,
-                course,
-                linear,
-                control,
-                h_max,
-                tolerances[1],
-                first,
-                bends,
-                samples,
-                work,
+                scene, run.record, start, control, h_max, tolerances[1], scratch
             )
-            return True, guard, s, y, record, control, _after_creep(local, error)
-    guard, s, y, record, reach = series_step(scene, record, mode, t, y, h_max, tolerances[0], c, first, work)
-    control = StepControl(1e-6 * scene.span, 0.0, 0.0)
+            return True, guard, s, y, record, control, _after_creep(run.local, error)
+    guard, s, y, record, reach = series_step(scene, run.record, run.mode, run.t, run.y, h_max, tolerances[0], scratch)
+    local = run.local
     local = LocalErrors(local.series + _shared(s, reach), local.rate, local.implicit, local.creep)
-    return False, guard, s, y, record, control, local
+    return False, guard, s, y, record, StepControl(1e-6 * scene.span, 0.0, 0.0), local
 
 
 @_step.implements(Dynamic)
-def _step_implicit(
-    family, scene, record, mode, t, y, control, local, h_max, tolerances, c, first, work, course, bends, samples
-):
-    forcing = implicit.forcing(scene, course, t)
-    x = implicit.to_implicit(scene, forcing, y)
-    common = implicit.common(scene, mode, forcing, x)
-    linear = implicit.linearise(scene, mode, common, t, forcing, x)
+def _step_implicit(family, scene, run, h_max, tolerances, scratch):
+    start = start_at(scene, scratch.course, run.mode, run.t, run.y)
     guard, s, y, record, control, error = implicit_step(
-        scene,
-        record,
-        mode,
-        t,
-        y,
-        x,
-        forcing,
-        common,
-        course,
-        linear,
-        control,
-        h_max,
-        tolerances[1],
-        first,
-        bends,
-        samples,
-        work,
+        scene, run.record, start, run.control, h_max, tolerances[1], scratch
     )
-    return True, guard, s, y, record, control, _after_creep(local, error)
+    return True, guard, s, y, record, control, _after_creep(run.local, error)
 
 
 @hook
@@ -213,31 +164,29 @@ def _begin_implicit(family, scene, mode, t, y, tolerances, c):
 
 
 @hook
-def _history_row(family, scene, mode, is_implicit, c, t, s, y):
-    """Row of a time history.
-
-    After a series `t` is the time of the row and `s` the time since the step began. After an implicit step `y` is the
-    state of the row.
-    """
+def _history_row(family, scene, step, c, s, y):
+    """Row of a time history, the time `s` after the beginning of a step, where the state is `y`."""
 
 
 @_history_row.implements(SetValued)
-def _row_series(family, scene, mode, is_implicit, c, t, s, y):
-    return series.row(scene, mode, c, t, s)
+def _row_series(family, scene, step, c, s, y):
+    return series.row(scene, step.mode, c, step.t + s, s)
 
 
 @_history_row.implements(Smooth)
-def _row_either(family, scene, mode, is_implicit, c, t, s, y):
-    if is_implicit:
-        forcing = drives.turn(scene.drive, t)
-        return implicit.row(scene, mode, forcing, implicit.to_implicit(scene, forcing, y))
-    return series.row(scene, mode, c, t, s)
+def _row_either(family, scene, step, c, s, y):
+    return _row_of_state(scene, step, s, y) if step.is_implicit else series.row(scene, step.mode, c, step.t + s, s)
 
 
 @_history_row.implements(Dynamic)
-def _row_implicit(family, scene, mode, is_implicit, c, t, s, y):
-    forcing = drives.turn(scene.drive, t)
-    return implicit.row(scene, mode, forcing, implicit.to_implicit(scene, forcing, y))
+def _row_implicit(family, scene, step, c, s, y):
+    return _row_of_state(scene, step, s, y)
+
+
+@inlined
+def _row_of_state(scene, step, s, y):
+    forcing = drives.turn(scene.drive, step.t + s)
+    return implicit.row(scene, step.mode, forcing, implicit.to_implicit(scene, forcing, y))
 
 
 @inlined
@@ -264,18 +213,56 @@ def _fill(row, values):
         row[k] = values[k]
 
 
+class History(NamedTuple):
+    """The history of a run.
+
+    Attributes
+    ----------
+    spacing : float
+        Greatest time between two rows, s.
+    times, table : ndarray of shape ``(samples,)`` and ``(samples, variables)``
+        Filled with the end of every step, and instants at most `spacing` apart within a step. A run that fills them
+        stops there. If they are empty, no history is stored.
+    """
+
+    spacing: float
+    times: Any
+    table: Any
+
+
 @inlined
-def _store_row(scene, mode, is_implicit, c, t, s, y, times, table, count):
-    """Store a row of the history, the time `s` after `t`, and return the new number of rows; a full history stays."""
+def _store_row(scene, step, c, s, y, history, count):
+    """Store the row of :func:`_history_row`, and return the new number of rows; a full history stays."""
+    times = history.times
     if count == len(times):
         return count
-    _fill(table[count], _history_row(family(scene.law), scene, mode, is_implicit, c, t + s, s, y))
+    _fill(history.table[count], _history_row(family(scene.law), scene, step, c, s, y))
     # Rounding must not make times decrease.
-    times[count] = max(t + s, times[count - 1]) if count > 0 else t
+    times[count] = max(step.t + s, times[count - 1]) if count > 0 else step.t
     return count + 1
 
 
-def integrate(batch, tolerances, max_steps, rows, steps, audits, spacing, times, table):
+class Results(NamedTuple):
+    """Arrays that the runs of a batch fill.
+
+    Attributes
+    ----------
+    rows : ndarray of shape ``(cells, outcomes)``
+        Outcomes. It may have no columns.
+    steps : ndarray of shape ``(cells,)``
+        Numbers of steps.
+    audits : ndarray of shape ``(cells, 7)`` or ``(0, 7)``
+        Unless empty, the audit of each run: the largest violation of the friction law, in units of the violation that
+        the tolerance would explain; the share of the energy turnover that is not work of friction; the rate at which
+        the guard that ended the run fell, in its unit per second; :class:`LocalErrors`.
+    """
+
+    rows: Any
+    steps: Any
+    audits: Any
+
+
+def integrate(batch, tolerances, max_steps, results, history):
     """Run every cell of a batch to its end, or to `max_steps` steps.
 
     One kernel serves sweeps and histories, so that each type of scene is compiled once.
@@ -290,19 +277,10 @@ def integrate(batch, tolerances, max_steps, rows, steps, audits, spacing, times,
     max_steps : int
         Steps after which a run is given up as failed. It is given up before if :data:`PATIENCE` steps gain so little
         time that it would not end within `max_steps`.
-    rows : ndarray of shape ``(cells, outcomes)``
-        Filled with outcomes. It may have no columns.
-    steps : ndarray of shape ``(cells,)``
-        Filled with the number of steps.
-    audits : ndarray of shape ``(cells, 7)`` or ``(0, 7)``
-        Unless empty, filled with the audit of each run: the largest violation of the friction law, in units of the
-        violation that the tolerance would explain; the share of the energy turnover that is not work of friction; the
-        rate at which the guard that ended the run fell, in its unit per second; :class:`LocalErrors`.
-    spacing : float
-        Greatest time between two rows of the history, s.
-    times, table : ndarray of shape ``(samples,)`` and ``(samples, variables)``
-        Filled with the history of the only cell: the end of every step, and instants at most `spacing` apart within a
-        step. A run that fills them stops there. If they are empty, no history is stored.
+    results : Results
+        Filled.
+    history : History
+        Filled with the history of the only cell.
 
     Returns
     -------
@@ -312,48 +290,29 @@ def integrate(batch, tolerances, max_steps, rows, steps, audits, spacing, times,
     cells = Cells(batch)
     if cells.layout not in _SHAPES:
         sample = take(batch, 0)
-        _SHAPES[cells.layout] = series.table_shape(sample)[0], len(modes.initial_state(sample)[1])
-    size, components = _SHAPES[cells.layout]
-    # NumPy's functions that make arrays would have to be compiled into each kernel.
-    scratch = (
-        np.zeros((size, COLUMNS)),
-        np.empty((STACK, COLUMNS)),
-        np.empty(drives.COURSE_SHAPE),
-        np.empty((2, 3, components)),
-        np.empty((MOST_GUARDS, INSTANTS + 1)),
-    )
-    count: int = _integrate(cells, tolerances, max_steps, rows, steps, audits, spacing, times, table, *scratch)
+        rows, first_guard = series.table_shape(sample)
+        _SHAPES[cells.layout] = rows, len(modes.initial_state(sample)[1]), first_guard
+    count: int = _integrate(cells, tolerances, max_steps, results, history, scratch_for(*_SHAPES[cells.layout]))
     return count
 
 
 @kernel
-def _integrate(
-    batch, tolerances, max_steps, rows, steps, audits, spacing, times, table, c, work, course, bends, samples
-):
-    """Run every cell; see :func:`integrate`. The last arguments are scratch."""
-    _, first = series.table_shape(take(batch, 0))
-    c, work, course, bends, samples = (
-        borrowed(c),
-        borrowed(work),
-        borrowed(course),
-        borrowed(bends),
-        borrowed(samples),
-    )
-    rows, steps, audits, times, table = (
-        borrowed(rows),
-        borrowed(steps),
-        borrowed(audits),
-        borrowed(times),
-        borrowed(table),
-    )
+def _integrate(batch, tolerances, max_steps, results, history, scratch):
+    """Run every cell; see :func:`integrate`."""
+    scratch = lent(scratch)
+    c = scratch.c
+    rows, steps, audits = borrowed(results.rows), borrowed(results.steps), borrowed(results.audits)
+    history = History(history.spacing, borrowed(history.times), borrowed(history.table))
+    spacing = history.spacing
     audited = len(audits) > 0
     count = 0
     for i in range(len(steps)):
         scene = take(batch, i)
-        drives.new_course(course)
+        drives.new_course(scratch.course)
         t, y = modes.initial_state(scene)
         status, mode = modes.initial_mode(scene, t, y)
         record = _begin(family(scene.law), scene, mode, t, y, tolerances, c)
+        record = recorder.after_event(scene, record, mode, t)
         control = StepControl(1e-6 * scene.span, 0.0, 0.0)
         audit, guard_fall_rate, local = Audit(0.0, 0.0, 0.0), 0.0, LocalErrors(0.0, 0.0, 0.0, 0.0)
         n = stalled = 0
@@ -377,26 +336,13 @@ def _integrate(
             n += 1
             h_max = min(scene.span, drives.next_knot(scene.drive, t)) - t
             control = StepControl(min(control.h, spacing), control.last_h, control.last_factor)
+            run = _Run(record, mode, t, y, control, local)
             is_implicit, guard, s, y_next, record, control, local = _step(
-                family(scene.law),
-                scene,
-                record,
-                mode,
-                t,
-                y,
-                control,
-                local,
-                h_max,
-                tolerances,
-                c,
-                first,
-                work,
-                course,
-                bends,
-                samples,
+                family(scene.law), scene, run, h_max, tolerances, scratch
             )
-            if len(times) > 0:
-                if count == len(times):
+            step = Step(mode, is_implicit, t, s, y, y_next)
+            if len(history.times) > 0:
+                if count == len(history.times):
                     return count
                 if s > 0.0:
                     parts = 1 if is_implicit else int(s / spacing) + 1
@@ -404,36 +350,22 @@ def _integrate(
                         state = y if part == 0 else y_next
                         # Rounded otherwise, the end of a mode would not be the instant at which the next one begins.
                         at = s if part == parts else s * part / parts
-                        count = _store_row(scene, mode, is_implicit, c, t, at, state, times, table, count)
+                        count = _store_row(scene, step, c, at, state, history, count)
                 just_switched = guard >= 0 or (just_switched and s == 0.0)
             if audited and s > 0.0 and is_checked(n):
-                audit = audit_step(
-                    family(scene.law), scene, mode, is_implicit, c, t, s, y, y_next, course, bends, tolerances[0], audit
-                )
-            mode_before, y_before = mode, y
+                audit = audit_step(family(scene.law), scene, step, scratch, tolerances[0], audit)
             t, status, mode, y = _after_step(scene, mode, guard, t, s, h_max, y_next)
-            if audited and status != RUNNING and guard >= 0 and s > 0.0:
-                guard_fall_rate = fall_rate(
-                    family(scene.law),
-                    scene,
-                    mode_before,
-                    is_implicit,
-                    c,
-                    t_before,
-                    s,
-                    y_before,
-                    y_next,
-                    course,
-                    bends,
-                    guard,
-                    first,
-                )
+            if guard >= 0:
+                record = recorder.after_event(scene, record, mode, t)
+            if audited and guard >= 0 and s > 0.0 and (status != RUNNING or modes.first_loss(step.mode, mode)):
+                guard_fall_rate = fall_rate(family(scene.law), scene, step, scratch, guard)
             if s == 0.0 and status != RUNNING:
                 # The history must show the end of a mode that lasts no time.
-                count = _store_row(scene, mode_before, is_implicit, c, t, 0.0, y, times, table, count)
+                count = _store_row(scene, step, c, 0.0, y, history, count)
         if count == 0:
             # A run that ends at launch has a history of one row.
-            count = _store_row(scene, mode, is_implicit, c, t, 0.0, y, times, table, count)
+            step = Step(mode, is_implicit, t, 0.0, y, y)
+            count = _store_row(scene, step, c, 0.0, y, history, count)
         outcome = recorder.conclude(scene, record, status, t, *modes.in_space(scene, t, y))
         for k in range(min(len(outcome), rows.shape[1])):
             rows[i, k] = outcome[k]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import inf, isfinite
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,15 +12,10 @@ from ringsweep.models.interface import implicit, modes, recorder
 from ringsweep.numerics.series import ORDER, ascending, first_root, value
 from ringsweep.physics import drives
 from ringsweep.solvers import rosenbrock
-
-# Parts into which a step is divided to look for roots of the guards.
-INSTANTS = 4
+from ringsweep.solvers.steps import INSTANTS
 
 # Matrix that turns the values at the ends of these parts into the coefficients of a polynomial.
 _INTERPOLATION = np.ascontiguousarray(np.linalg.inv(np.vander(np.linspace(0.0, 1.0, INSTANTS + 1), increasing=True)))
-
-# Largest number of guards of an implicit step.
-MOST_GUARDS = 6
 
 # Factor by which the relative error of the acceleration on bristles may exceed the relative error of the state.
 _ACCELERATION_FACTOR = 100.0
@@ -30,18 +25,52 @@ _ACCELERATION_FACTOR = 100.0
 _EXTREME_PRECISION = 1e-8
 
 
-@inlined
-def _view_at(scene, mode, common, course, t, x):
-    """View of a state at time `t`."""
-    return implicit.guards_and_motion(scene, mode, common, implicit.forcing(scene, course, t), x)
+class Start(NamedTuple):
+    """The beginning of an implicit step.
+
+    Attributes
+    ----------
+    mode : NamedTuple
+    t : float
+        Time, s.
+    y, x : tuple of float
+        State of the mode, and the same state for implicit steps.
+    forcing, common, linear : tuple
+        Forcing at this time; what :func:`ringsweep.models.interface.implicit.common` and
+        :func:`ringsweep.models.interface.implicit.linearise` returned for this state.
+    """
+
+    mode: Any
+    t: float
+    y: Any
+    x: Any
+    forcing: Any
+    common: Any
+    linear: Any
 
 
 @inlined
-def _step(scene, mode, common, course, t, x, linear, h, end, bends):
+def start_at(scene, course, mode, t, y):
+    """Beginning of an implicit step in the state `y` of a mode at time `t`."""
+    forcing = implicit.forcing(scene, course, t)
+    x = implicit.to_implicit(scene, forcing, y)
+    common = implicit.common(scene, mode, forcing, x)
+    return Start(mode, t, y, x, forcing, common, implicit.linearise(scene, mode, common, t, forcing, x))
+
+
+@inlined
+def _view_at(scene, start, course, s, x):
+    """View of a state the time `s` after the beginning of a step."""
+    return implicit.guards_and_motion(scene, start.mode, start.common, implicit.forcing(scene, course, start.t + s), x)
+
+
+@inlined
+def _step(scene, start, course, h, end, bends):
     """State after a step of the method, and the estimate of its error; see :func:`rosenbrock.step`.
 
     `end` is the forcing at the end.
     """
+    t = start.t
     first, second, third, fourth, _ = rosenbrock.STAGE_TIMES
     forcings = (
         implicit.forcing(scene, course, t + first * h),
@@ -50,31 +79,31 @@ def _step(scene, mode, common, course, t, x, linear, h, end, bends):
         implicit.forcing(scene, course, t + fourth * h),
         end,
     )
-    return rosenbrock.step(x, scene, mode, common, linear, h, forcings, bends)
+    return rosenbrock.step(start.x, scene, start, h, forcings, bends)
 
 
 @inlined
-def _guard_after(scene, mode, common, course, t, x, linear, h, g, bends):
+def _guard_after(scene, start, scratch, h, g):
     """Value of guard `g` after a step of length `h`."""
-    end = implicit.forcing(scene, course, t + h)
-    x_next, _ = _step(scene, mode, common, course, t, x, linear, h, end, bends)
-    return implicit.guards_and_motion(scene, mode, common, end, x_next)[0][g]
+    end = implicit.forcing(scene, scratch.course, start.t + h)
+    x_next, _ = _step(scene, start, scratch.course, h, end, scratch.bends[1])
+    return implicit.guards_and_motion(scene, start.mode, start.common, end, x_next)[0][g]
 
 
 @inlined
-def _locate(scene, mode, common, course, t, x, linear, h, f_low, f_high, g, bends):
+def _locate(scene, start, scratch, h, ends, g):
     """Length of the step after which guard `g` is zero.
 
-    The guard is `f_low` before the step and `f_high`, which is not positive, after a step of length `h`. Each value of
-    the guard comes from a step of the method, not from dense output.
+    `ends` are the values of the guard before the step and after a step of length `h`; the second one is not positive.
+    Each value of the guard comes from a step of the method, not from dense output.
     """
-    low, high = 0.0, h
+    (f_low, f_high), low, high = ends, 0.0, h
     if f_low <= 0.0:
         # The guard is zero at the beginning: find a step after which it is positive, if there is one.
         s = h
         for _ in range(80):
             s *= 0.5
-            f_low = _guard_after(scene, mode, common, course, t, x, linear, s, g, bends)
+            f_low = _guard_after(scene, start, scratch, s, g)
             if f_low > 0.0:
                 low = s
                 break
@@ -86,14 +115,14 @@ def _locate(scene, mode, common, course, t, x, linear, h, f_low, f_high, g, bend
     share = f_near / (f_near - f_far)
     for _ in range(100):
         s = near + share * (far - near)
-        f = _guard_after(scene, mode, common, course, t, x, linear, s, g, bends)
+        f = _guard_after(scene, start, scratch, s, g)
         if (f > 0.0) == (f_near > 0.0):
             before, f_before = near, f_near
         else:
             before, f_before, far, f_far = far, f_far, near, f_near
         near, f_near = s, f
         width = abs(far - near)
-        least = 0.5 * max(1e-14 * h, 2e-16 * t)
+        least = 0.5 * max(1e-14 * h, 2e-16 * start.t)
         if width <= 2.0 * least:
             break
         place, height = (near - far) / (before - far), (f_near - f_far) / (f_before - f_far)
@@ -132,19 +161,20 @@ def _may_vanish(near_zero, first, middle, last):
 
 
 @inlined
-def _first_event(scene, mode, common, course, t, x, x_next, linear, s, before, within, after, bends, samples, work):
+def _first_event(scene, start, scratch, x_next, s, views):
     """First guard to fall below zero within an implicit step, and the length of the step up to it; -1 and `s` if none.
 
     A guard is taken as the polynomial through its values at five instants of the dense output, whose degree is four as
-    well. Its first root is isolated like the root of a series, so that no dip between two instants is missed. `before`,
-    `within` and `after` are the views at the beginning, in the middle and at the end of the step. `samples` is filled
-    with the guards at the five instants.
+    well. Its first root is isolated like the root of a series, so that no dip between two instants is missed.
+
+    `views` are those at the beginning, in the middle and at the end of the step.
     """
+    (before, within, after), samples = views, scratch.samples
     near_zero = implicit.near_zero(scene, within[1])
     for i in range(1, INSTANTS, 2):
         fraction = i / INSTANTS
-        state = rosenbrock.dense(x, x_next, bends[0], fraction)
-        guards = _view_at(scene, mode, common, course, t + fraction * s, state)[0]
+        state = rosenbrock.dense(start.x, x_next, scratch.bends[0], fraction)
+        guards = _view_at(scene, start, scratch.course, fraction * s, state)[0]
         for g in range(len(near_zero)):
             samples[g, i] = guards[g]
     event, h_event = -1, s
@@ -152,14 +182,14 @@ def _first_event(scene, mode, common, course, t, x, x_next, linear, s, before, w
         samples[g, 0], samples[g, 2], samples[g, 4] = before[0][g], within[0][g], after[0][g]
         if not _may_vanish(near_zero[g], before[0][g], within[0][g], after[0][g]):
             continue
-        h_below = min(h_event, s * _fraction_below_zero(samples[g], work))
+        h_below = min(h_event, s * _fraction_below_zero(samples[g], scratch.work))
         if h_below == 0.0:
             continue
-        value_below = _guard_after(scene, mode, common, course, t, x, linear, h_below, g, bends[1])
+        value_below = _guard_after(scene, start, scratch, h_below, g)
         # Another guard may vanish first, or the dense output may be below zero by its error alone.
         if value_below > 0.0:
             continue
-        found = _locate(scene, mode, common, course, t, x, linear, h_below, before[0][g], value_below, g, bends[1])
+        found = _locate(scene, start, scratch, h_below, (before[0][g], value_below), g)
         if event < 0 or found < h_event * (1.0 - 1e-12):
             event, h_event = g, found
     return event, h_event
@@ -238,53 +268,21 @@ def _next_control(control, s, error, shortened, rejected):
 
 
 @inlined
-def implicit_step(
-    scene,
-    record,
-    mode,
-    t,
-    y,
-    x,
-    forcing,
-    common,
-    course,
-    linear,
-    control,
-    h_max,
-    tolerance,
-    first,
-    bends,
-    samples,
-    work,
-):
+def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
     """One accepted implicit step, which the first event ends.
 
     Parameters
     ----------
-    scene, record, mode : NamedTuple
-    t : float
-        Time, s.
-    y, x : tuple of float
-        State of the mode at time `t`, and the same state for implicit steps.
-    forcing, common, linear : tuple
-        Forcing at time `t`; what :func:`ringsweep.models.interface.implicit.common` and
-        :func:`ringsweep.models.interface.implicit.linearise` returned for this state.
-    course : ndarray of shape ``COURSE_SHAPE``
-        Series of the drive, see :func:`ringsweep.physics.drives.follow`.
+    scene, record : NamedTuple
+    start : Start
     control : StepControl
         Length of the step to try first.
     h_max : float
         Greatest length of the step, s.
     tolerance : float
         Relative error allowed to the step.
-    first : int
-        Index of the first guard.
-    bends : ndarray of shape ``(2, 3, components)``
-        ``bends[0]`` is filled with what :func:`rosenbrock.dense` needs; ``bends[1]`` is scratch.
-    samples : ndarray of shape ``(MOST_GUARDS, INSTANTS + 1)``
-        Scratch.
-    work : ndarray of shape ``(STACK, columns)``
-        Scratch.
+    scratch : Scratch
+        ``bends[0]`` is filled with what :func:`rosenbrock.dense` needs.
 
     Returns
     -------
@@ -293,6 +291,8 @@ def implicit_step(
         control after it; norm of its error, in units of the tolerance, if a guard, a knot of the drive or the span and
         not the tolerance limited its length, 0 otherwise.
     """
+    mode, t, y, x, forcing, common, linear = start
+    course, bends = scratch.course, scratch.bends[0]
     scales = implicit.error_scales(scene, tolerance, x)
     s = min(control.h, h_max)
     drives.follow(scene.drive, course, t, s)
@@ -301,14 +301,14 @@ def implicit_step(
     before = implicit.guards_and_motion(scene, mode, common, forcing, x)
     for _ in range(400):
         end = implicit.forcing(scene, course, t + h)
-        x_next, error = _step(scene, mode, common, course, t, x, linear, h, end, bends[0])
+        x_next, error = _step(scene, start, course, h, end, bends)
         h_norm = _error_norm(error, scales, linear)
         if not h_norm <= 1.0:
             # The step up to an event has stages of its own and may have a larger error.
             s = h = h * (max(0.2, 0.9 * h_norm**-0.2) if isfinite(h_norm) else 0.1)
             event = -1
             continue
-        middle = _view_at(scene, mode, common, course, t + 0.5 * h, rosenbrock.dense(x, x_next, bends[0], 0.5))
+        middle = _view_at(scene, start, course, 0.5 * h, rosenbrock.dense(x, x_next, bends, 0.5))
         after = implicit.guards_and_motion(scene, mode, common, end, x_next)
         if event >= 0:
             break
@@ -317,9 +317,7 @@ def implicit_step(
             near = near or _may_vanish(near_zero[g], before[0][g], middle[0][g], after[0][g])
         if not near:
             break
-        event, h = _first_event(
-            scene, mode, common, course, t, x, x_next, linear, s, before, middle, after, bends, samples, work
-        )
+        event, h = _first_event(scene, start, scratch, x_next, s, (before, middle, after))
         if event < 0 or h == 0.0:
             break
         near = False
@@ -327,30 +325,18 @@ def implicit_step(
         return -1, -1.0, y, record, control, 0.0
     control = _next_control(control, s, error_norm, s == h_max, s < min(control.h, h_max))
     if event >= 0:
-        event += first
+        event += scratch.first_guard
         if h == 0.0:
             return event, 0.0, y, record, control, 0.0
-    fractions, count = work[0], 0
+    fractions, count = scratch.work[0], 0
+    record = recorder.enter(scene, record, t, implicit.seen(scene, before))
     velocity, acceleration = implicit.motion(scene, forcing, x, linear)
-    for start, view in ((0.0, middle), (0.5, after)):
+    for begin, view in ((0.0, middle), (0.5, after)):
         # Where velocity or acceleration change sign, place or velocity have an extreme: the recorder must look there.
         for component, value_before in ((1, velocity), (2, acceleration)):
             if value_before * view[1][component] < 0.0:
-                fractions[count] = _sign_change(
-                    scene,
-                    mode,
-                    common,
-                    course,
-                    t,
-                    x,
-                    x_next,
-                    h,
-                    bends[0],
-                    start,
-                    component,
-                    value_before,
-                    view[1][component],
-                )
+                ends = value_before, view[1][component]
+                fractions[count] = _sign_change(scene, start, scratch, x_next, h, begin, component, ends)
                 count += 1
         velocity, acceleration = view[1][1], view[1][2]
     for i in range(1 if near else 2, INSTANTS, 1 if near else INSTANTS):
@@ -363,8 +349,7 @@ def implicit_step(
         fraction = fractions[j]
         view = after if fraction == 1.0 else middle
         if fraction != 0.5 and fraction != 1.0:
-            state = rosenbrock.dense(x, x_next, bends[0], fraction)
-            view = _view_at(scene, mode, common, course, t + fraction * h, state)
+            view = _view_at(scene, start, course, fraction * h, rosenbrock.dense(x, x_next, bends, fraction))
         duration = (fraction - fraction_before) * h
         record = recorder.observe(scene, record, t + fraction * h, duration, stuck, implicit.seen(scene, view))
         fraction_before = fraction
@@ -372,13 +357,13 @@ def implicit_step(
 
 
 @inlined
-def _sign_change(scene, mode, common, course, t, x, x_next, h, bends, start, component, first, last):
+def _sign_change(scene, start, scratch, x_next, h, begin, component, ends):
     """Fraction of a step at which velocity (component 1) or acceleration (component 2) of the body change sign.
 
-    The sign changes in the half step that begins at the fraction `start`, where the component is `first`; at the end of
-    the half step it is `last`.
+    The sign changes in the half step that begins at the fraction `begin`; `ends` are the values of the component at
+    both ends of the half step.
     """
-    low, high = start, start + 0.5
+    (first, last), low, high = ends, begin, begin + 0.5
     found, side = low, 0
     for _ in range(60):
         before, found = found, (low * last - high * first) / (last - first)
@@ -386,8 +371,8 @@ def _sign_change(scene, mode, common, course, t, x, x_next, h, bends, start, com
             found = 0.5 * (low + high)
         if abs(found - before) <= _EXTREME_PRECISION:
             break
-        state = rosenbrock.dense(x, x_next, bends, found)
-        there = _view_at(scene, mode, common, course, t + found * h, state)[1][component]
+        state = rosenbrock.dense(start.x, x_next, scratch.bends[0], found)
+        there = _view_at(scene, start, scratch.course, found * h, state)[1][component]
         # Illinois algorithm: an end of the bracket that stays twice loses half its value.
         if there * first > 0.0:
             low, first = found, there

@@ -18,7 +18,7 @@ from ringsweep.physics import drives
 from ringsweep.physics.friction import LAWS, Dynamic, SetValued, Smooth, family_of, presliding
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.variables import FAILED
-from ringsweep.solvers.automaton import FACTOR, PATIENCE, LocalErrors, integrate
+from ringsweep.solvers.automaton import FACTOR, PATIENCE, History, LocalErrors, Results, integrate
 from ringsweep.solvers.certificate import apart, certifiable, diverging, errors, took_same_steps, with_errors
 from ringsweep.solvers.method import Method, Needs, Result
 
@@ -67,7 +67,7 @@ class _Piecewise(Method):
     def needs(self, structure: Structure) -> Needs:
         """Functions for modes and audit, and for series, implicit steps or both, as the law's family needs."""
         family = family_of(structure.law_type)
-        of_model = recorder.MEMBERS + modes.MEMBERS + audit.MEMBERS
+        of_model = recorder.MEMBERS + recorder.EVENT_MEMBERS + modes.MEMBERS + audit.MEMBERS
         of_model += () if family is Dynamic else series.MEMBERS
         of_model += () if family is SetValued else implicit.MEMBERS
         of_model += (implicit.is_stiff,) if family is Smooth else ()
@@ -198,7 +198,7 @@ class _Piecewise(Method):
 
     def integrate(
         self, batch: Any, width: int, *, audit: bool, tolerances: tuple[float, float] | None = None
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    ) -> Results:
         """Run every cell once.
 
         Parameters
@@ -214,28 +214,24 @@ class _Piecewise(Method):
 
         Returns
         -------
-        tuple of ndarray
-            Outcomes of shape ``(cells, width)``; numbers of steps of shape ``(cells,)``; audits of shape ``(cells, 7)``
-            or ``(0, 7)``, see :func:`ringsweep.solvers.automaton.integrate`.
+        Results
         """
-        rows = np.empty((len(batch.span), width))
-        steps, audits = np.empty(len(rows)), np.empty((len(rows) if audit else 0, 7))
-        tolerances = tolerances or self.tolerances()
-        integrate(batch, tolerances, self.max_steps, rows, steps, audits, np.inf, np.empty(0), np.empty((0, 0)))
-        return rows, steps, audits
+        cells = len(batch.span)
+        results = Results(np.empty((cells, width)), np.empty(cells), np.empty((cells if audit else 0, 7)))
+        no_history = History(np.inf, np.empty(0), np.empty((0, 0)))
+        integrate(batch, tolerances or self.tolerances(), self.max_steps, results, no_history)
+        return results
 
     def history(self, batch: Any, samples: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Times and rows of the history of cell 0; see :meth:`ringsweep.solvers.method.Method.history`."""
         spacing = float(batch.span[0]) / samples
         size = 4 * samples
         while True:
-            times, table = np.empty(size), np.empty((size, width))
-            no_outcomes, steps = np.empty((1, 0)), np.empty(1)
-            count = integrate(
-                batch, self.tolerances(), self.max_steps, no_outcomes, steps, np.empty((0, 7)), spacing, times, table
-            )
+            history = History(spacing, np.empty(size), np.empty((size, width)))
+            no_results = Results(np.empty((1, 0)), np.empty(1), np.empty((0, 7)))
+            count = integrate(batch, self.tolerances(), self.max_steps, no_results, history)
             if count < size or size >= self.max_steps:
-                return times[:count], table[:count]
+                return history.times[:count], history.table[:count]
             size *= 4
 
 

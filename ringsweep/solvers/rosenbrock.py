@@ -108,18 +108,16 @@ STAGE_TIMES = tuple(float(time) for time in TIMES[1:6])
 
 
 @unrolled
-def step(length, x, scene, mode, common, linear, h, forcings, bends):
+def step(length, x, scene, start, h, forcings, bends):
     """One step of length `h`.
 
     Parameters
     ----------
     x : tuple of float
         State at the beginning.
-    scene, mode : NamedTuple
-    common : tuple
-        What :func:`ringsweep.models.interface.implicit.common` returned for this state.
-    linear : tuple
-        What :func:`ringsweep.models.interface.implicit.linearise` returned for this state.
+    scene : NamedTuple
+    start : ringsweep.solvers.creep.Start
+        The beginning of the step.
     h : float
         Length of the step, s.
     forcings : tuple of tuple of float
@@ -134,7 +132,7 @@ def step(length, x, scene, mode, common, linear, h, forcings, bends):
     """
     parts = range(length)
     lines = [
-        "f, jacobian, bristles, by_time = linear",
+        "mode, common, (f, jacobian, bristles, by_time) = start.mode, start.common, start.linear",
         "per_h, factors = 1.0 / h, factorise(bristles, jacobian, 1.0 / (GAMMA * h))",
     ]
     for i in range(STAGES):

@@ -43,6 +43,7 @@ def _first_event(c, first, entry_guard, h, work):
 @inlined
 def _observe(scene, record, mode, c, t, s, work):
     """Record after a step of length `s` of the series `c`, with the extremes within the step."""
+    record = recorder.enter(scene, record, t, series.seen_at_start(scene, c))
     count = series.extremes(scene, record, mode, c, s, work)
     instants = work[0]
     ascending(instants, count)
@@ -50,14 +51,13 @@ def _observe(scene, record, mode, c, t, s, work):
     before = 0.0
     for j in range(count + 1):
         now = instants[j] if j < count else s
-        seen = series.seen_at(scene, c, now, s) if now > 0.0 else series.seen_at_start(scene, c)
-        record = recorder.observe(scene, record, t + now, now - before, stuck, seen)
+        record = recorder.observe(scene, record, t + now, now - before, stuck, series.seen_at(scene, c, now, s))
         before = now
     return record
 
 
 @inlined
-def series_step(scene, record, mode, t, y, h_max, tolerance, c, first, work):
+def series_step(scene, record, mode, t, y, h_max, tolerance, scratch):
     """One step of the series, which the first event ends.
 
     Parameters
@@ -71,12 +71,8 @@ def series_step(scene, record, mode, t, y, h_max, tolerance, c, first, work):
         Greatest length of the step, s.
     tolerance : float
         Relative error allowed to the step.
-    c : ndarray of shape ``(rows, columns)``
-        Table of the series, which is filled.
-    first : int
-        Row of the first guard in the table.
-    work : ndarray of shape ``(STACK, columns)``
-        Scratch.
+    scratch : Scratch
+        Its table of series is filled.
 
     Returns
     -------
@@ -84,9 +80,10 @@ def series_step(scene, record, mode, t, y, h_max, tolerance, c, first, work):
         The guard that ended the step, or -1; length of the step, s; state and record after it; length over which the
         series meets the tolerance, s.
     """
+    c, work = scratch.c, scratch.work
     reach = series.expand(scene, mode, t, y, tolerance, c)
     h = min(reach, h_max)
-    guard, s = _first_event(c, first, mode.entry_guard, h, work)
+    guard, s = _first_event(c, scratch.first_guard, mode.entry_guard, h, work)
     if s > 0.0:
         record = _observe(scene, record, mode, c, t, s, work)
     return guard, s, series.state_at(scene, c, s), record, reach

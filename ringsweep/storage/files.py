@@ -60,7 +60,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
         with suppress(FileNotFoundError):
             _folder_of(target).stat()
         if _folder_of(target).exists():
-            # Removes what a killed process left. Whatever forbids it is told by the writer.
+            # Removes what a killed process left. If something forbids it, the writer reports it.
             with suppress(InputError), working_folder(target):
                 pass
         # Permission bits are not reliable on network drives, on read-only mounts, or for root.
@@ -112,7 +112,7 @@ def working_folder(target: Path, patience: float = 0.0) -> Iterator[WorkingFolde
     folder = _folder_of(target)
     mode = 0o777
     with suppress(FileNotFoundError):
-        # Who may not read the file may not read its cells either.
+        # A user who may not read the file may not read its cells either.
         mode = _permissions(target)
         mode |= 0o700 | (mode & 0o444) >> 2
     lock = FileLock(folder / _LOCK, timeout=patience)

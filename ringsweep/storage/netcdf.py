@@ -30,7 +30,7 @@ SIGNATURE = ("Conventions", "ringsweep_version")
 #: Variables with fewer elements are not compressed: the index of their chunks would take more than compression saves.
 COMPRESSED_FROM = 1024
 
-# Names of what differs that are told one by one.
+# Number of differing names that a message lists.
 _MAX_NAMED = 4
 
 
@@ -344,7 +344,7 @@ def verify(path: str | os.PathLike[str]) -> None:
     """Check that a file holds what ringsweep wrote: every value, its unit and meaning, and every attribute.
 
     The digests that a file holds cover neither compression and chunks, nor attributes and variables that other programs
-    add. They tell of damage and of changes, but they are no signature: who wants to deceive can compute them too.
+    add. They show damage and changes, but they are no signature: someone who wants to deceive can compute them too.
 
     Parameters
     ----------

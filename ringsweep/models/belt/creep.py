@@ -5,6 +5,7 @@ from __future__ import annotations
 from ringsweep.models.belt.force import (
     friction_force,
     length_scale,
+    located,
     net_force,
     pull,
     with_load_derivatives,
@@ -81,7 +82,7 @@ def _motion(scene, forcing, x, linear):
 @implicit.seen.implements(belt.Belt, belt.BristleBelt)
 def _seen(scene, view):
     _, (x, velocity, acceleration, friction, place, v, belt_acceleration) = view
-    return x, velocity, friction, place, v, acceleration - belt_acceleration
+    return x, velocity, friction, place, v, acceleration - belt_acceleration, located(scene, x, acceleration)
 
 
 @implicit.near_zero.implements(belt.Belt, belt.BristleBelt)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ringsweep.compile import absorbed, hook, inlined
+from ringsweep.models.interface import shock
 from ringsweep.numerics.functions import opposing, select
 from ringsweep.physics import drives
 from ringsweep.physics.belt import Cubic, Damper
@@ -185,6 +186,13 @@ def holds_in_band(law):
 def breakaway_force(scene):
     """Largest friction force of a stuck contact, N."""
     return scene.mu_s * scene.mass * scene.gravity
+
+
+@inlined
+def located(scene, x, acceleration):
+    """Acceleration of the body at the displacement `x`, and the size of its terms, for the recorder."""
+    size = (breakaway_force(scene) + abs(scene.stiffness * x)) / scene.mass + abs(acceleration)
+    return shock.Located(acceleration, size)
 
 
 @absorbed

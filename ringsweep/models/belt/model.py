@@ -15,6 +15,7 @@ from ringsweep.models.parts import GRAVITY, MASS, SPAN, by_formula, drive_of, fr
 from ringsweep.models.scene import Structure, Values, require
 from ringsweep.physics import belt, drives, forces, friction
 from ringsweep.quantities.parameters import Parameter, declared
+from ringsweep.quantities.variables import Variable
 
 
 class Belt(Model):
@@ -26,6 +27,9 @@ class Belt(Model):
     place: ClassVar[str] = "x"
     driven: ClassVar[tuple[str, ...]] = ("belt_x", "belt_velocity")
     drive_unit: ClassVar[str] = "m"
+    own_variables: ClassVar[dict[str, Variable]] = {
+        "jump_max": Variable("m/s^2", "largest jump of the acceleration of the body")
+    }
 
     def scene_type(self, structure: Structure) -> type:
         """``BristleBelt`` for laws with bristles, else ``Belt``."""

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from ringsweep.compile import absorbed, hook, inlined
 from ringsweep.models.belt.force import bend, steepest_spring
-from ringsweep.models.interface import recorder
+from ringsweep.models.interface import recorder, shock
 from ringsweep.models.interface.status import BROKEN
 from ringsweep.numerics.functions import any_of, floor, lanes_body, select, square_root
 from ringsweep.numerics.memory import select_all
@@ -43,6 +43,8 @@ class Outcome(NamedTuple):
     swing: float
     settled: float
     force_max: float
+    jump_max: float
+    t_jump_max: float
 
 
 class Last(NamedTuple):
@@ -165,6 +167,8 @@ class Record(NamedTuple):
         As in :class:`Outcome`, but the displacement only at turns.
     stops : Stops
     cycles : Cycles
+    shocks : Shocks or NoShocks
+        Jumps of the acceleration.
     """
 
     band: Any
@@ -176,6 +180,7 @@ class Record(NamedTuple):
     force_max: Any
     stops: Stops
     cycles: Cycles
+    shocks: Any
 
 
 #: The motion has returned if displacement and velocity differ by less than this share of their swing in a cycle.
@@ -204,7 +209,7 @@ _ROUNDING = 1e-6
 @inlined
 def begin(scene, t, seen, band, play):
     """Record at the beginning of a run."""
-    x, velocity, force, place, v, v_rate = seen
+    x, velocity, force, place, v, v_rate, acceleration = seen
     start = Mark(t, x, velocity, 0.0, 0.0)
     # The body counts as stuck until it slips: the first stop begins with the run. If the pull exceeds breakaway, it may
     # pass the stiction band at once.
@@ -221,6 +226,7 @@ def begin(scene, t, seen, band, play):
         abs(force),
         Stops(1.0, t, 0.0, t, -max(least, 1e-300), nan, t, 0.0, 0.0, nan),
         Cycles(0.0, scene.forcing_period, x, x, 0.0, 0.0, 0.0, start, start, 0.0, 1.0, 0.0, nan, nan, nan),
+        shock.begin(acceleration),
     )
 
 
@@ -230,7 +236,7 @@ def observe(scene, r, t, duration, stuck, seen):
 
     In most steps nothing turns, begins or ends.
     """
-    x, velocity, force, place, v, v_rate = seen
+    x, velocity, force, place, v, v_rate, acceleration = seen
     stops, cycles, x_min, x_max = r.stops, r.cycles, r.x_min, r.x_max
     place = _place(scene, r, place)
     side = select(stuck, 1.0, -1.0)
@@ -261,6 +267,7 @@ def observe(scene, r, t, duration, stuck, seen):
         max(r.force_max, abs(force)),
         stops,
         cycles,
+        shock.observe(r.shocks, acceleration),
     )
 
 
@@ -492,6 +499,7 @@ def conclude(scene, r, status, t, x, velocity):
         r.cycles.swing if stops == stops else nan,
         1.0 if settled else 0.0,
         r.force_max,
+        *shock.largest(r.shocks),
     )
 
 
@@ -560,6 +568,12 @@ def _begin(scene, t, seen):
 @recorder.observe.implements(Belt, BristleBelt)
 def _observe(scene, record, t, duration, stuck, seen):
     return observe(scene, record, t, duration, stuck, seen)
+
+
+@recorder.enter.implements(Belt, BristleBelt)
+def _enter(scene, record, t, seen):
+    r, shocks = record, shock.enter(record.shocks, t, seen[6])
+    return Record(r.band, r.play, r.last, r.x_min, r.x_max, r.velocity_max, r.force_max, r.stops, r.cycles, shocks)
 
 
 @recorder.conclude.implements(Belt, BristleBelt)

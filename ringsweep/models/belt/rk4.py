@@ -15,6 +15,7 @@ from ringsweep.models.belt.force import (
     steepest_spring,
 )
 from ringsweep.models.interface import constant_step
+from ringsweep.models.interface.shock import Unlocated
 from ringsweep.models.parts import exceeds, larger_eigenvalue
 from ringsweep.numerics.functions import any_of, select
 from ringsweep.physics import belt, drives
@@ -94,7 +95,7 @@ def _eigenvalue(scene, before, now, h, most):
 @constant_step.seen.implements(belt.Belt, belt.BristleBelt)
 def _seen(scene, y, now):
     # The record takes the rate of the sliding velocity from the differences of short steps.
-    return y[0], y[1], now.force, now.place, now.v, 0.0
+    return y[0], y[1], now.force, now.place, now.v, 0.0, Unlocated()
 
 
 @constant_step.sticks.implements(belt.Belt)

@@ -14,6 +14,7 @@ from ringsweep.models.belt.force import (
     has_loads,
     holds_in_band,
     length_scale,
+    located,
     speed_scale,
     stuck_pull,
     stuck_pull_rate,
@@ -275,7 +276,8 @@ def _rates_at(scene, c, s):
 
 @series.seen_at_start.implements(belt.Belt)
 def _seen_at_start(scene, c):
-    return c[X, 0], c[VELOCITY, 0], c[FORCE, 0], c[X, 0] - c[SHIFT, 0], c[V, 0], c[V, 1]
+    acceleration = located(scene, c[X, 0], c[VELOCITY, 1])
+    return c[X, 0], c[VELOCITY, 0], c[FORCE, 0], c[X, 0] - c[SHIFT, 0], c[V, 0], c[V, 1], acceleration
 
 
 @series.seen_at.implements(belt.Belt)
@@ -285,7 +287,8 @@ def _seen_at(scene, c, s, h):
         # A velocity within rounding is zero, so that an extreme of the displacement is recognised.
         velocity = 0.0
     x = value(c[X], s)
-    return x, velocity, value(c[FORCE], s), x - value(c[SHIFT], s), value(c[V], s), slope(c[V], s)
+    acceleration = located(scene, x, slope(c[VELOCITY], s))
+    return x, velocity, value(c[FORCE], s), x - value(c[SHIFT], s), value(c[V], s), slope(c[V], s), acceleration
 
 
 @series.extremes.implements(belt.Belt)

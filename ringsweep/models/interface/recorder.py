@@ -43,7 +43,7 @@ def observe(scene, record, t, duration, stuck, seen):
     t : float
         Time at the end of the interval, s.
     duration : float
-        Length of the interval, s. It is 0 where a value has jumped.
+        Length of the interval, s.
     stuck : bool
         Whether the body stuck during the whole interval.
     seen : tuple of float
@@ -53,6 +53,28 @@ def observe(scene, record, t, duration, stuck, seen):
     -------
     NamedTuple
         Record at the end of the interval, of the same type as `record`.
+    """
+
+
+@hook
+def enter(scene, record, t, seen):
+    """Record at the beginning of a step, where values may have jumped. Methods of constant step do not call it.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    record : NamedTuple
+        Record at the end of the step before.
+    t : float
+        Time, s.
+    seen : tuple of float
+        The state at `t` as the recorder takes it.
+
+    Returns
+    -------
+    NamedTuple
+        Record of the same type as `record`.
     """
 
 
@@ -80,4 +102,29 @@ def conclude(scene, record, status, t, place, velocity):
     """
 
 
+@hook(optional=True)
+def after_event(scene, record, mode, t):
+    """Record after an event, at which a mode begins. Methods of constant step do not call it.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    record : NamedTuple
+        Record before the event.
+    mode : NamedTuple
+        The mode that begins; also the first one of a run.
+    t : float
+        Time of the event, s.
+
+    Returns
+    -------
+    NamedTuple
+        By default `record`.
+    """
+    return record
+
+
 MEMBERS = (begin, observe, conclude)
+#: What methods that locate events need in addition.
+EVENT_MEMBERS = (enter,)

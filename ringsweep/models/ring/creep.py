@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from ringsweep.compile import inlined
 from ringsweep.models.interface import implicit
+from ringsweep.models.interface.shock import Located
 from ringsweep.models.ring.contacts import coefficients_under, edges_ahead, zones_under
 from ringsweep.numerics.functions import ROTATED, rotated, sine_cosine_from
 from ringsweep.physics import drives, ring
@@ -158,8 +159,9 @@ def _motion(scene, forcing, x, linear):
 
 @implicit.seen.implements(ring.Ring, ring.BristleRing)
 def _seen(scene, view):
-    guards, (phi, omega, _, _) = view
-    return phi, omega, guards[NORMAL_1], guards[NORMAL_2]
+    guards, (phi, omega, epsilon, _) = view
+    size = scene.body.gravity / scene.body.radius + omega * omega + abs(epsilon)
+    return phi, omega, guards[NORMAL_1], guards[NORMAL_2], Located(epsilon, size)
 
 
 @implicit.row.implements(ring.Ring)

@@ -30,7 +30,7 @@ class SingleContactRing(Model):
     outcomes: ClassVar[tuple[str, ...]] = record.Outcome._fields
     place: ClassVar[str] = "phi"
     driven: ClassVar[tuple[str, ...]] = ("theta",)
-    absent: ClassVar[frozenset[str]] = frozenset({"normal_min_2", "normal_2", "zone_2", "deflection_2"})
+    absent: ClassVar[frozenset[str]] = frozenset({"normal_min_2", "normal_max_2", "normal_2", "zone_2", "deflection_2"})
     body: ClassVar[dict[str, Parameter]] = {"body.mass": MASS, "ring.radius": RADIUS}
 
     body_type: ClassVar[type] = ring.OneContact

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from math import isfinite, nan, pi
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ringsweep.compile import inlined
-from ringsweep.models.interface import recorder
+from ringsweep.models.interface import recorder, shock
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2, SEPARATED_BOTH
 from ringsweep.numerics.functions import any_of, select
 from ringsweep.physics import contact
@@ -38,8 +38,10 @@ class Record(NamedTuple):
         Bounds of the angle since the last reversal, or since the start.
     phi_min, phi_max : float
         Bounds of the angle before the last reversal.
-    omega_min, omega_max, stick_time, normal_min_1, normal_min_2 : float
+    omega_min, omega_max, stick_time, normal_min_1, normal_min_2, normal_max_1, normal_max_2 : float
         As in :class:`Outcome`.
+    shocks : Shocks or NoShocks
+        Jumps of the angular acceleration.
     """
 
     sense: float
@@ -53,6 +55,9 @@ class Record(NamedTuple):
     stick_time: float
     normal_min_1: float
     normal_min_2: float
+    normal_max_1: float
+    normal_max_2: float
+    shocks: Any
 
 
 class Outcome(NamedTuple):
@@ -74,23 +79,29 @@ class Outcome(NamedTuple):
     stick_time: float
     normal_min_1: float
     normal_min_2: float
+    normal_max_1: float
+    normal_max_2: float
+    jump_max: float
+    t_jump_max: float
 
 
 @inlined
-def begin(phi, omega, normal_1, normal_2, epsilon_omega):
+def begin(seen, epsilon_omega):
     """Record at the beginning of a run."""
+    phi, omega, normal_1, normal_2, acceleration = seen
     sense = 1.0 if omega > epsilon_omega else -1.0 if omega < -epsilon_omega else 0.0
-    return Record(sense, 0.0, phi, phi, phi, phi, omega, omega, 0.0, normal_1, normal_2)
+    reactions, shocks = (normal_1, normal_2), shock.begin(acceleration)
+    return Record(sense, 0.0, phi, phi, phi, phi, omega, omega, 0.0, *reactions, *reactions, shocks)
 
 
 @inlined
-def observe(record, phi, omega, normal_1, normal_2, stuck_for, epsilon_omega):
+def observe(record, shocks, stuck_for, seen, epsilon_omega):
     """Record after one more state; `stuck_for` is the time for which the body has stuck since the last state, s.
 
     At a reversal the angular velocity passes from beyond one threshold to beyond the other, so that chatter about zero
     does not count.
     """
-    r = record
+    r, (phi, omega, normal_1, normal_2, _) = record, seen
     sense, reversals = r.sense, r.reversals
     lowest, highest, phi_min, phi_max = min(r.lowest, phi), max(r.highest, phi), r.phi_min, r.phi_max
     # Some lane passes a threshold other than the last one.
@@ -113,6 +124,9 @@ def observe(record, phi, omega, normal_1, normal_2, stuck_for, epsilon_omega):
         r.stick_time + stuck_for,
         min(r.normal_min_1, normal_1),
         min(r.normal_min_2, normal_2),
+        max(r.normal_max_1, normal_1),
+        max(r.normal_max_2, normal_2),
+        shocks,
     )
 
 
@@ -149,19 +163,26 @@ def conclude(record, status, t, phi, omega):
         # The last step ends after the reaction has vanished, and a reaction may jump below zero at the edge of a zone.
         0.0 if status in (SEPARATED_1, SEPARATED_BOTH) else max(r.normal_min_1, 0.0),
         0.0 if status in (SEPARATED_2, SEPARATED_BOTH) else max(r.normal_min_2, 0.0),
+        r.normal_max_1,
+        r.normal_max_2,
+        *shock.largest(r.shocks),
     )
 
 
 @recorder.begin.implements(Ring, BristleRing)
 def _begin(scene, t, seen):
-    phi, omega, normal_1, normal_2 = seen
-    return begin(phi, omega, normal_1, normal_2, scene.epsilon_omega)
+    return begin(seen, scene.epsilon_omega)
 
 
 @recorder.observe.implements(Ring, BristleRing)
 def _observe(scene, record, t, duration, stuck, seen):
-    phi, omega, normal_1, normal_2 = seen
-    return observe(record, phi, omega, normal_1, normal_2, select(stuck, duration, 0.0), scene.epsilon_omega)
+    shocks = shock.observe(record.shocks, seen[4])
+    return observe(record, shocks, select(stuck, duration, 0.0), seen, scene.epsilon_omega)
+
+
+@recorder.enter.implements(Ring, BristleRing)
+def _enter(scene, record, t, seen):
+    return observe(record, shock.enter(record.shocks, t, seen[4]), 0.0, seen, scene.epsilon_omega)
 
 
 @recorder.conclude.implements(Ring, BristleRing)

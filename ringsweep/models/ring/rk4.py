@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from ringsweep.compile import absorbed, inlined
 from ringsweep.models.interface import constant_step
+from ringsweep.models.interface.shock import Unlocated
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
 from ringsweep.models.parts import exceeds, larger_eigenvalue
 from ringsweep.models.ring.contacts import zones_at
@@ -165,7 +166,7 @@ def _fall_rate(scene, before, now, h):
 
 @constant_step.seen.implements(ring.Ring, ring.BristleRing)
 def _seen(scene, y, now):
-    return y[0], y[1], now.normal_1, now.normal_2
+    return y[0], y[1], now.normal_1, now.normal_2, Unlocated()
 
 
 @constant_step.sticks.implements(ring.Ring)

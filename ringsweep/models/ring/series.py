@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 from ringsweep.compile import absorbed, inlined
 from ringsweep.models.interface import modes, series
+from ringsweep.models.interface.shock import Located
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
 from ringsweep.models.ring.contacts import (
     coefficients_under,
@@ -31,7 +32,6 @@ from ringsweep.numerics.series import (
     INVERSE,
     ORDER,
     crossings,
-    may_fall_below,
     slope,
     step_size,
     value,
@@ -483,12 +483,18 @@ def _rates_at(scene, c, s):
 
 @series.seen_at_start.implements(ring.Ring)
 def _seen_at_start(scene, c):
-    return c[PHI, 0], c[OMEGA, 0], c[NORMAL_1, 0], c[NORMAL_2, 0]
+    return c[PHI, 0], c[OMEGA, 0], c[NORMAL_1, 0], c[NORMAL_2, 0], _acceleration(scene, c, c[EPSILON, 0])
 
 
 @series.seen_at.implements(ring.Ring)
 def _seen_at(scene, c, s, h):
-    return value(c[PHI], s), value(c[OMEGA], s), value(c[NORMAL_1], s), value(c[NORMAL_2], s)
+    acceleration = _acceleration(scene, c, value(c[EPSILON], s))
+    return value(c[PHI], s), value(c[OMEGA], s), value(c[NORMAL_1], s), value(c[NORMAL_2], s), acceleration
+
+
+@inlined
+def _acceleration(scene, c, epsilon):
+    return Located(epsilon, scene.body.gravity / scene.body.radius + c[SQUARE, 0] + abs(epsilon))
 
 
 @series.extremes.implements(ring.Ring)
@@ -501,15 +507,17 @@ def _extremes(scene, record, mode, c, h, work):
         count = crossings(c[OMEGA], h, work, count)
     if may_reverse or omega - omega_variation < record.omega_min or omega + omega_variation > record.omega_max:
         count = crossings(c[EPSILON], h, work, count)
-    for row, lowest in ((NORMAL_1, record.normal_min_1), (NORMAL_2, record.normal_min_2)):
-        if may_fall_below(c[row], h, lowest):
+    for row, lowest, highest in (
+        (NORMAL_1, record.normal_min_1, record.normal_max_1),
+        (NORMAL_2, record.normal_min_2, record.normal_max_2),
+    ):
+        change = variation(c[row], h)
+        if c[row, 0] - change < lowest or c[row, 0] + change > highest:
             for k in range(ORDER):
                 c[SPARE, k] = (k + 1.0) * c[row, k + 1]
             c[SPARE, ORDER] = 0.0
             count = crossings(c[SPARE], h, work, count)
-    # The reactions may have jumped on entry into the mode.
-    work[0, count] = 0.0
-    return count + 1
+    return count
 
 
 @series.row.implements(ring.Ring)

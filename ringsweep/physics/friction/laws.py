@@ -5,13 +5,11 @@ Set-valued laws hold a contact at rest with any force up to ``mu_s``; smooth law
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import json
 from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
 from ringsweep.numerics.expressions import SPEED, add, multiply, negative, number, switch, symbol, symbols_of
+from ringsweep.physics.definitions import Definitions
 from ringsweep.physics.friction.formula import COEFFICIENTS, FormulaError, Threshold, read_expression, read_formula
 from ringsweep.physics.friction.registry import SetValued, Smooth, Traits, add_law, describe
 from ringsweep.physics.friction.velocity import EXPRESSIONS, MOST_PRODUCTS, PIECE, Expression, series_products
@@ -255,21 +253,10 @@ def define(definition: Definition) -> type:
     FormulaError
         If something in the formula is wrong.
     """
-    text = json.dumps([definition.mu, definition.at_rest])
-    # Code on disk names the type of a law. So the name of the type tells its formula.
-    return _defined(_PREFIX + base64.urlsafe_b64encode(text.encode()).decode().rstrip("="))
+    return _DEFINITIONS.type_of(definition.mu, definition.at_rest)
 
 
-_PREFIX = "formula_"
-
-_DEFINED: dict[str, type] = {}
-
-
-def _defined(qualified: str) -> type:
-    if qualified in _DEFINED:
-        return _DEFINED[qualified]
-    encoded = qualified.removeprefix(_PREFIX).encode()
-    mu, at_rest = json.loads(base64.urlsafe_b64decode(encoded + b"=" * (-len(encoded) % 4)))
+def _defined(name: str, qualified: str, mu: str, at_rest: str | None) -> type:
     formula = read_formula(mu)
     used = symbols_of(formula.mu)
     if not any(name in used for name in COEFFICIENTS):
@@ -289,16 +276,13 @@ def _defined(qualified: str) -> type:
         name: Parameter(unit, f"parameter {name} of the friction law") for name, unit in formula.units.items()
     }
     expression = Expression(checked, (*formula.thresholds, *valid), at_rest is not None, None, parameters)
-    name = "Formula_" + hashlib.sha256(qualified.encode()).hexdigest()[:12]
     if series_products(expression) > MOST_PRODUCTS:
         raise FormulaError(f"it is too long: more than {MOST_PRODUCTS} products of varying factors")
     law = _make(name, f"mu = {mu}" + (f", up to {at_rest} at rest" if at_rest else ""), expression, qualified=qualified)
     describe(law, Traits(SetValued if at_rest else Smooth, coefficients=_coefficients(used, at_rest)))
-    _DEFINED[qualified] = law
     return law
 
 
-def __getattr__(name: str) -> Any:
-    if name.startswith(_PREFIX):
-        return _defined(name)
-    raise AttributeError(f"module {__name__} has no attribute {name}")
+_DEFINITIONS = Definitions(__name__, _defined)
+
+__getattr__ = _DEFINITIONS.find

@@ -127,8 +127,8 @@ def _steepest_of(cubics: NDArray[np.float64], widths: NDArray[np.float64]) -> fl
     """Greatest magnitude of the slopes of cubics, of which each has a column of coefficients from the lowest up."""
     _, linear, square, cube = cubics
     with np.errstate(all="ignore"):
-        turn = np.nan_to_num(-square / (3.0 * cube)).clip(0.0, widths)
-    slopes = [abs(linear + x * (2.0 * square + x * 3.0 * cube)) for x in (0.0 * widths, turn, widths)]
+        inflection = np.nan_to_num(-square / (3.0 * cube)).clip(0.0, widths)
+    slopes = [abs(linear + x * (2.0 * square + x * 3.0 * cube)) for x in (0.0 * widths, inflection, widths)]
     return float(np.max(slopes, initial=0.0))
 
 

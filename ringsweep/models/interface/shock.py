@@ -1,0 +1,100 @@
+"""Shocks: jumps of the acceleration, which an accelerometer on the body sees.
+
+The acceleration jumps at the edge of a zone, at breakaway, at a stop and at a reversal. A method that locates these
+events shows the recorder the acceleration on both sides. A method of constant step does not: its runs have no shocks.
+"""
+
+from __future__ import annotations
+
+from math import nan
+from typing import NamedTuple
+
+from ringsweep.compile import hook, inlined
+
+# A change of the acceleration below this share of its size is an error of the method.
+_LEAST_SHARE = 1e-6
+
+
+class Located(NamedTuple):
+    """Acceleration of the body, and the size of its terms (rad/s^2 or m/s^2), of a method that locates events."""
+
+    acceleration: float
+    size: float
+
+
+class Unlocated(NamedTuple):
+    """In place of the acceleration, for a method that does not locate events."""
+
+
+class Shocks(NamedTuple):
+    """Acceleration at the last observation, and largest jump up to now.
+
+    Attributes
+    ----------
+    acceleration : float
+        In rad/s^2 or m/s^2.
+    jump_max, t_jump_max : float
+        Magnitude of the jump, and its time, s; NaN if there was none.
+    """
+
+    acceleration: float
+    jump_max: float
+    t_jump_max: float
+
+
+class NoShocks(NamedTuple):
+    """Shocks of a run whose method does not locate events."""
+
+
+@hook
+def begin(seen):
+    """Shocks at the beginning of a run, from what a method shows: :class:`Located` or :class:`Unlocated`."""
+
+
+@begin.implements(Located)
+def _begin(seen):
+    return Shocks(seen.acceleration, 0.0, nan)
+
+
+@begin.implements(Unlocated)
+def _begin_without(seen):
+    return NoShocks()
+
+
+@hook(absorb=True)
+def observe(shocks, seen):
+    """Shocks after one more observation."""
+
+
+@observe.implements(Shocks)
+def _observe(shocks, seen):
+    return Shocks(seen.acceleration, shocks.jump_max, shocks.t_jump_max)
+
+
+@observe.implements(NoShocks)
+def _observe_without(shocks, seen):
+    return shocks
+
+
+@inlined
+def enter(shocks, t, seen):
+    """Shocks at the beginning of a step at time `t`, where the acceleration may have jumped."""
+    jump = abs(seen.acceleration - shocks.acceleration)
+    if jump > shocks.jump_max and jump > _LEAST_SHARE * seen.size:
+        return Shocks(seen.acceleration, jump, t)
+    return observe(shocks, seen)
+
+
+@hook
+def largest(shocks):
+    """Largest jump and its time, s; NaN where it is not known."""
+
+
+@largest.implements(Shocks)
+def _largest(shocks):
+    return shocks.jump_max, shocks.t_jump_max
+
+
+@largest.implements(NoShocks)
+def _largest_without(shocks):
+    return nan, nan

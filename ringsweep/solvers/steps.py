@@ -1,0 +1,84 @@
+"""What the steps of a run share: arrays to work in, and the step that was taken."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ringsweep.compile import borrowed, inlined
+from ringsweep.numerics.series import STACK
+from ringsweep.numerics.terms import COLUMNS
+from ringsweep.physics import drives
+
+# Parts into which an implicit step is divided to look for roots of the guards, and largest number of guards.
+INSTANTS, MOST_GUARDS = 4, 6
+
+
+class Scratch(NamedTuple):
+    """Arrays that the steps of a run fill, and use again.
+
+    Attributes
+    ----------
+    c : ndarray of shape ``(rows, columns)``
+        Table of the series of a step.
+    work : ndarray of shape ``(STACK, columns)``
+        For the isolation of roots.
+    course : ndarray of shape ``COURSE_SHAPE``
+        Series of the drive, see :func:`ringsweep.physics.drives.follow`.
+    bends : ndarray of shape ``(2, 3, components)``
+        ``bends[0]`` holds what :func:`ringsweep.solvers.rosenbrock.dense` needs of the last implicit step.
+    samples : ndarray of shape ``(MOST_GUARDS, INSTANTS + 1)``
+        Guards at instants of an implicit step.
+    first_guard : int
+        Row of the first guard in the table of series.
+    """
+
+    c: Any
+    work: Any
+    course: Any
+    bends: Any
+    samples: Any
+    first_guard: int
+
+
+class Step(NamedTuple):
+    """A step that was taken.
+
+    Attributes
+    ----------
+    mode : NamedTuple
+    is_implicit : bool
+        Whether the step is implicit. If not, the table of series describes it.
+    t, s : float
+        Time at its beginning, and its length, s.
+    y, y_next : tuple of float
+        States at both ends.
+    """
+
+    mode: Any
+    is_implicit: Any
+    t: float
+    s: float
+    y: Any
+    y_next: Any
+
+
+@inlined
+def lent(scratch):
+    """Scratch whose arrays are not counted; see :func:`ringsweep.compile.borrowed`."""
+    c, work, course, bends, samples, first_guard = scratch
+    return Scratch(borrowed(c), borrowed(work), borrowed(course), borrowed(bends), borrowed(samples), first_guard)
+
+
+def scratch_for(rows: int, components: int, first_guard: int) -> Scratch:
+    """Scratch for a table of so many series and for states of so many components."""
+    # NumPy's functions that make arrays would have to be compiled into each kernel.
+    return Scratch(
+        np.zeros((rows, COLUMNS)),
+        np.empty((STACK, COLUMNS)),
+        np.empty(drives.COURSE_SHAPE),
+        np.empty((2, 3, components)),
+        np.empty((MOST_GUARDS, INSTANTS + 1)),
+        first_guard,
+    )
