@@ -52,7 +52,7 @@ from tqdm import tqdm
 
 import ringsweep
 from benchmarks import _common
-from benchmarks.reference import judge
+from benchmarks.reference import judge, rattling
 from benchmarks.reference.compliant import opinion
 from benchmarks.reference.problem import FORMULAS, problem
 from benchmarks.reference.run import drive
@@ -60,6 +60,8 @@ from benchmarks.reference.run import drive
 COUNT, SEED = 20_000, 181
 #: Of the certified runs whose contacts hold, the compliant body is asked about one in this many.
 HELD_EVERY = 20
+#: Of the certified runs that lose a contact and go on, the compliant body is asked about one in this many.
+LOST_EVERY = 5
 #: Least error of the reference (rad, s, m): it looks at contacts an instant after an event.
 SURE = 1e-9
 RIG = {
@@ -398,6 +400,21 @@ def second_opinion(scene, regime, contact, t, verdict, count, report):
         report.scene(f"{found.word} by the compliant body", scene, found.why, f"{end}, {t:.9g} s")
 
 
+def aftermath_opinion(scene, word, verdict, count, report):
+    """Ask the compliant body what follows a lost contact, in every few runs."""
+    if word == "held" or verdict.state != "clear" or verdict.runs[0]["t_end"] < scene["time"]["span"]:
+        return
+    count.tally["lost"] += 1
+    if count.tally["lost"] % LOST_EVERY:
+        return
+    begin = time.perf_counter()
+    found = rattling.opinion(problem(scene), word, verdict.numbers["t_separation"])
+    count.seconds["compliant"] += time.perf_counter() - begin
+    count.ends[f"lost, {word}", found.word] += 1
+    if found.word == "contradicted":
+        report.scene(f"{found.word} by the compliant body", scene, f"{found.why}; {verdict.why}", word)
+
+
 def compare(kind, batch, data, count, report):
     """Add a batch to the count of its family; contradictions go to `report`."""
     belt = kind.model == "belt"
@@ -409,7 +426,9 @@ def compare(kind, batch, data, count, report):
         count.seconds["reference"] += time.perf_counter() - begin
         certified = int(data.certified[i]) == 1
         state, spread = verdict.state, verdict.spread
-        if certified and kind.model == "ring":
+        if certified and kind.impact:
+            aftermath_opinion(scene, str(ringsweep.words(data.aftermath[i]).values), verdict, count, report)
+        elif certified and kind.model == "ring":
             contact, t_end = int(data.separating_contact[i]), float(data.t_end[i])
             second_opinion(scene, str(words[i][0]), contact, t_end, verdict, count, report)
         scale = scales(scene) if belt else 1.0
@@ -436,6 +455,8 @@ def compare(kind, batch, data, count, report):
                 continue
         else:
             kind_said = (str(words[i][0]), str(words[i][1]), int(data.separating_contact[i]))
+            if kind.impact:
+                kind_said = (*kind_said, str(ringsweep.words(data.aftermath[i]).values))
             said = f"{kind_said}, t_end {float(data.t_end[i]):.9g}, phi_end {float(data.phi_end[i]):.6g}"
             if kind_said != verdict.kind:
                 count.tally["contradicted"] += 1

@@ -43,11 +43,11 @@ from benchmarks.reference.problem import JUMP, SINGLE, SINUSOIDAL, TABLE
 from benchmarks.reference.radau import NODES, attempt, interpolate, jacobian
 from benchmarks.reference.run import HELD, SAMPLES, UNRESOLVED, advance, run
 
-#: Return values of :func:`follow`, in this order. `swaps` counts changes of order between instants at which both
-#: contacts touch; `tumbles` counts how often the rod passes over the axis.
+#: Return values of :func:`follow`, in this order. `tumbles` counts changes of order between instants at which both
+#: contacts close; `passages` counts how often the rod passes over the axis.
 AFTERMATH = (
     "end", "t_end", "position", "speed", "open_time", "flight_time", "gap_max", "separations", "impacts",
-    "impact_speed_max", "impulse_max", "impact_loss", "tumbles", "swaps", "t_recovered", "closed", "steps", "events",
+    "impact_speed_max", "impulse_max", "impact_loss", "passages", "tumbles", "t_recovered", "closed", "steps", "events",
 )  # fmt: skip
 #: Kinds of events in a log, whose rows are (time, kind, contact, speed, impulse).
 LOSS, HIT = 1, 2
@@ -451,9 +451,9 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
     v, piece = begin[14], begin[12]
     set_valued, single = is_set_valued(p), p.model == SINGLE
     both = ONLY_1 if single else CLOSED
-    found = np.array([0.0, 0.0, 1.0])  # greatest gap, tumbles, order
+    found = np.array([0.0, 0.0, 1.0])  # greatest gap, passages of the rod, order
     open_time = flight_time = speed_max = impulse_max = loss = 0.0
-    separations, impacts, swaps, events, t_recovered, sense = 0, 0, 0, 0, math.nan, 1.0
+    separations, impacts, tumbles, events, t_recovered, sense = 0, 0, 0, 0, math.nan, 1.0
     q, y, now, closed = np.zeros(6), np.zeros(4), np.zeros(6), both
     touching, e, mu, track = np.zeros(2, np.bool_), np.zeros(2), np.zeros(2), np.zeros(6)
     q[2] = position
@@ -579,12 +579,11 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
                     if events < log.shape[0]:
                         log[events] = np.array([t, LOSS, i, 0.0, 0.0])
                     events += 1
-        if touching[0] and touching[1]:
-            turned = 1.0 if order(p, q) > 0.0 else -1.0
-            swaps += 1 if turned != sense else 0
-            sense = turned
         if closed == both:
             t_recovered = t
+            turned = 1.0 if single or order(p, q) > 0.0 else -1.0
+            tumbles += 1 if turned != sense else 0
+            sense = turned
         if single:
             q[5] = v / p.radius + ring_omega
     if single and closed == 0:
@@ -592,5 +591,5 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
         q[5] = along / math.hypot(q[0], q[1])
     return (
         end, t, q[2], q[5], open_time, flight_time, found[0], separations, impacts, speed_max, impulse_max, loss,
-        found[1], swaps, t_recovered, closed, steps, events,
+        found[1], tumbles, t_recovered, closed, steps, events,
     )  # fmt: skip

@@ -51,7 +51,7 @@ def rattle(p, s, k, settled, slow, settling, v_rest, t, y, until, scale, longest
     """Run from t to `until`; y is overwritten.
 
     Writes to `out`: the time of the end, steps, time with an open contact, greatest gap, greatest closing speed, number
-    of impacts, passages of the rod over the axis, and for each contact whether it is open at the end.
+    of impacts, changes of order between instants at which both contacts are closed, and for each contact whether it is open at the end.
     """
     K, y_, found = np.zeros((7, 8)), np.zeros(8), np.zeros(6)
     springs = np.array([k, k, settled, settled, 0.0, 0.0])
@@ -104,11 +104,11 @@ def rattle(p, s, k, settled, slow, settling, v_rest, t, y, until, scale, longest
                 springs[2 + i], springs[4 + i] = settled, 0.0
         if apart:
             out[2] += h
-        if n == 2:
+        if n == 2 and mode[0] != _OPEN and mode[1] != _OPEN:
             now = order(p, y)
             if now * side < 0.0:
                 out[6] += 1.0
-            side = now if now != 0.0 else side
+            side = now
         h *= min(4.0, 0.9 * max(error, 1e-9) ** -0.2)
     out[0], out[1] = t, steps
     for i in range(n):
