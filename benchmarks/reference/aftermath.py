@@ -95,9 +95,10 @@ def other_gap(p, closed, t, q, N, T):
 def pivot_problem(p, closed, k, piece, t, y, opens):
     """Contact problem of a body on one contact: the piece of slip, STICK, LOSES or JAMMED (above 5).
 
-    With `opens` the other contact has just been lost: its gap must open by its acceleration.
+    With `opens` the other contact has just been lost: its gap must open by its acceleration, which is zero where a
+    reaction has reached zero.
     """
-    q = np.empty(6)
+    q, shut = np.empty(6), -1e-6 * p.gravity
     if not (is_set_valued(p) and y[2] == 0.0):
         N, _, _, _, _, A = on_one(p, closed, k, piece, t, y, q)
         if not A > LEAST_DETERMINANT:
@@ -105,12 +106,12 @@ def pivot_problem(p, closed, k, piece, t, y, opens):
         return LOSES if N <= 0.0 else STICK
     N, T, _, _, _, _ = on_one(p, closed, k, STICK, t, y, q)
     limit = p.mu_s[k % p.edges.size] * N
-    if N > 0.0 and abs(T) <= limit and not (opens and other_gap(p, closed, t, q, N, T) <= 0.0):
+    if N > 0.0 and abs(T) <= limit and not (opens and other_gap(p, closed, t, q, N, T) < shut):
         return STICK
     found = JAMMED
     for sense in (FORWARD, BACKWARD):
         N, T, slide, _, _, A = on_one(p, closed, k, sense, t, y, q)
-        if N > 0.0 and sense * slide > 0.0 and not (opens and other_gap(p, closed, t, q, N, T) <= 0.0):
+        if N > 0.0 and sense * slide > 0.0 and not (opens and other_gap(p, closed, t, q, N, T) < shut):
             if found != JAMMED or not A > LEAST_DETERMINANT:
                 return JAMMED
             found = sense
