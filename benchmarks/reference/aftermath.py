@@ -544,8 +544,6 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
                 if not held and rate < 0.0:
                     hitting += i
                     e[i - 1] = p.restitution if -rate > rest else 0.0
-                    speed_max = max(speed_max, -rate)
-                    impacts += 1
         count, impulse, after = free.shock(p, q, ring_omega, touching, e, mu)
         if count != 1:
             end = JAMMED
@@ -553,6 +551,9 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
         for i in (1, 2):
             if touching[i - 1]:
                 _, rate, slide = free.contact(p, q, ring_omega, i)
+                if hitting & i:
+                    speed_max = max(speed_max, -rate)
+                    impacts += 1
                 N, T = impulse[2 * i - 2], impulse[2 * i - 1]
                 loss -= 0.5 * (N * (rate + after[2 * i - 2]) + T * (slide + after[2 * i - 1]))
                 impulse_max = max(impulse_max, N)
