@@ -53,9 +53,8 @@ AFTERMATH = (
 LOSS, HIT = 1, 2
 #: Results of a pivot, beside the ends of a run: the other contact closes, or the closed contact opens.
 MEETS, LOSES = 11, 12
-#: A gap below the first share of the radius, times angles, has closed: rounding leaves less. Two contacts with gaps
-#: below the second share touch at once.
-TOUCH, TOGETHER = 1e-14, 1e-11
+#: A gap below this share of the radius, times angles, has closed: rounding leaves less.
+TOUCH = 1e-14
 MOST_EVENTS = 5_000
 _N, _A, _GAP, _SLOWER, _FASTER, _LOW, _HIGH, _STICK, _COUNT = range(9)
 
@@ -92,11 +91,11 @@ def other_gap(p, closed, t, q, N, T):
 
 
 @njit(cache=True, error_model="numpy")
-def pivot_problem(p, closed, k, piece, t, y, opens):
+def pivot_problem(p, closed, k, piece, t, y, opens, breaks=False):
     """Contact problem of a body on one contact: the piece of slip, STICK, LOSES or JAMMED (above 5).
 
     With `opens` the other contact has just been lost: its gap must open by its acceleration, which is zero where a
-    reaction has reached zero.
+    reaction has reached zero. With `breaks` friction has reached its limit, and the body does not stick.
     """
     q, shut = np.empty(6), -1e-6 * p.gravity
     if not (is_set_valued(p) and y[2] == 0.0):
@@ -106,7 +105,7 @@ def pivot_problem(p, closed, k, piece, t, y, opens):
         return LOSES if N <= 0.0 else STICK
     N, T, _, _, _, _ = on_one(p, closed, k, STICK, t, y, q)
     limit = p.mu_s[k % p.edges.size] * N
-    if N > 0.0 and abs(T) <= limit and not (opens and other_gap(p, closed, t, q, N, T) < shut):
+    if not breaks and N > 0.0 and abs(T) <= limit and not (opens and other_gap(p, closed, t, q, N, T) < shut):
         return STICK
     found = JAMMED
     for sense in (FORWARD, BACKWARD):
@@ -334,7 +333,7 @@ def turn(p, closed, rtol, most_steps, t, y, opens, found):
         else:
             piece = -1 if piece > 0 else 1
             continue
-        mode = pivot_problem(p, closed, k, piece, t, y, False)
+        mode = pivot_problem(p, closed, k, piece, t, y, False, hit == _STICK)
         if mode > FORWARD:
             return mode, t, steps
         if set_valued and y[2] == 0.0:
@@ -528,21 +527,23 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
             continue
         if end != MEETS:
             break
-        # Impact.
+        # Impact. A contact that is as near, but opens, has just hit itself: such contacts hit in turn, not at once.
         theta, ring_omega, _ = drive(p, t)
-        hitting = 0
+        hitting, near = 0, 3.0 * touch(p, t, q)
+        for i in (1, 2):
+            gap, rate, _ = free.contact(p, q, ring_omega, i)
+            if not (i == 2 and single) and not closed & i and gap < near and rate < 0.0:
+                hitting += i
         for i in (1, 2):
             gap, rate, _ = free.contact(p, q, ring_omega, i)
             touching[i - 1], e[i - 1], mu[i - 1] = False, 0.0, 0.0
             if i == 2 and single:
                 break
-            held = (closed & i) != 0
-            if held or gap < TOGETHER * p.radius:
+            if (closed | hitting) & i or (hitting == 0 and gap < near):
                 touching[i - 1] = True
                 _, ux, uy, _, _ = free.ball(p, q, i)
                 mu[i - 1] = p.mu_k[segment(p, math.atan2(ux, -uy) - theta) % p.edges.size]
-                if not held and rate < 0.0:
-                    hitting += i
+                if hitting & i:
                     e[i - 1] = p.restitution if -rate > rest else 0.0
         count, impulse, after = free.shock(p, q, ring_omega, touching, e, mu)
         if count != 1:
