@@ -51,7 +51,8 @@ def rattle(p, s, k, settled, slow, settling, v_rest, t, y, until, scale, longest
     """Run from t to `until`; y is overwritten.
 
     Writes to `out`: the time of the end, steps, time with an open contact, greatest gap, greatest closing speed, number
-    of impacts, changes of order between instants at which both contacts are closed, and for each contact whether it is open at the end.
+    of impacts, changes of order between instants at which both contacts are closed, and for each contact whether it is
+    open at the end.
     """
     K, y_, found = np.zeros((7, 8)), np.zeros(8), np.zeros(6)
     springs = np.array([k, k, settled, settled, 0.0, 0.0])
