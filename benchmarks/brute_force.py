@@ -35,6 +35,9 @@ law `bristle` is left out, because its random bonds cannot be repeated independe
 ``--csv PATH`` writes the 500 scenes of ``tests/test_brute_force.py`` instead: the scene (SI units, on the paper's
 rig); regime, motion, contact and time of separation; least reaction in weights of the body; whether the runs of the
 reference agree in kind; what the compliant body says of the end.
+
+``--impacts PATH`` writes the scenes of ``tests/test_impact_reference.py`` that lose a contact: the scene by paths (SI),
+regime, contact and aftermath, and the numbers of what follows, of which the reference is sure.
 """
 
 import argparse
@@ -539,9 +542,13 @@ def main():
     parser.add_argument("--verbose", action="store_true", help="also print scenes that the reference could not resolve")
     parser.add_argument("--out", type=Path, help="Markdown file to write")
     parser.add_argument("--csv", type=Path, help="write the 500 scenes of the tests instead")
+    parser.add_argument("--impacts", type=Path, help="write the scenes with impacts of the tests instead")
     arguments = parser.parse_args()
     if arguments.csv:
         write_csv(arguments.csv)
+        return
+    if arguments.impacts:
+        write_impacts(arguments.impacts)
         return
     chosen = {name: kinds for name, kinds in families().items() if name in (arguments.families or families())}
     heading = _common.machine()
@@ -654,6 +661,33 @@ def write_csv(path):
                 "compliant": opinion(problem(from_csv(values)), word, contact, t).word,
             }
             writer.writerow(values | outcome)
+
+
+#: Scenes with impacts of the tests, which share one compiled kernel.
+IMPACTS = Kind("ring", "stiction", "arctan", 1, impact=True)
+IMPACTS_COUNT, IMPACTS_NUMBERS = 100, (
+    "t_separation", "t_end", "phi_end", "omega_end", "open_time", "flight_time", "gap_max", "impact_speed_max",
+    "impact_loss", "tumbles", "t_recovered",
+)  # fmt: skip
+
+
+def write_impacts(path):
+    """Write scenes that lose a contact, of which the reference is sure, and its answers."""
+    rng, rows = np.random.default_rng(CSV_SEED), []
+    while len(rows) < IMPACTS_COUNT:
+        values = draw(rng, IMPACTS)
+        verdict = judge(nest(IMPACTS, values))
+        numbers = {name: verdict.numbers.get(name) for name in IMPACTS_NUMBERS}
+        # Where the row of impacts magnifies rounding, nothing can be compared.
+        if verdict.state != "clear" or verdict.kind[0] != "separating" or not verdict.spread["omega_end"] < 1e-6:
+            continue
+        regime, _, contact, word = verdict.kind
+        numbers = {name: f"{value:.9g}" for name, value in numbers.items()}
+        rows.append(values | {"regime": regime, "contact": contact, "aftermath": word} | numbers)
+    with open(path, "w", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
 
 
 if __name__ == "__main__":

@@ -51,8 +51,8 @@ def rattle(p, s, k, settled, slow, settling, v_rest, t, y, until, scale, longest
     """Run from t to `until`; y is overwritten.
 
     Writes to `out`: the time of the end, steps, time with an open contact, greatest gap, greatest closing speed, number
-    of impacts, changes of order between instants at which both contacts are closed, and for each contact whether it is
-    open at the end.
+    of impacts, changes of order between instants at which both contacts have settled, and for each contact whether it
+    is open at the end.
     """
     K, y_, found = np.zeros((7, 8)), np.zeros(8), np.zeros(6)
     springs = np.array([k, k, settled, settled, 0.0, 0.0])
@@ -105,7 +105,7 @@ def rattle(p, s, k, settled, slow, settling, v_rest, t, y, until, scale, longest
                 springs[2 + i], springs[4 + i] = settled, 0.0
         if apart:
             out[2] += h
-        if n == 2 and mode[0] != _OPEN and mode[1] != _OPEN:
+        if n == 2 and mode[0] == _CLOSED and mode[1] == _CLOSED:
             now = order(p, y)
             if now * side < 0.0:
                 out[6] += 1.0
