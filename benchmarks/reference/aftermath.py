@@ -575,8 +575,10 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
         for i in (2, 1):
             if touching[i - 1]:
                 if after[2 * i - 2] <= 1e-13 or slow:
+                    # Both slide alike, or nearly so after a slow impact, in which one may stick.
+                    if closed == 0 or abs(after[2 * i - 1]) < abs(v):
+                        v = after[2 * i - 1]
                     closed += i
-                    v = after[2 * i - 1]
                 elif before & i:
                     separations += 1
                     if events < log.shape[0]:
