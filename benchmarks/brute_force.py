@@ -36,7 +36,7 @@ law `bristle` is left out, because its random bonds cannot be repeated independe
 rig); regime, motion, contact and time of separation; least reaction in weights of the body; whether the runs of the
 reference agree in kind; what the compliant body says of the end.
 
-``--impacts PATH`` writes the scenes of ``tests/test_impact_reference.py`` that lose a contact: the scene by paths (SI),
+``--impacts PATH`` writes the scenes of ``tests/test_impacts_by_reference.py``: the scene by paths (SI),
 regime, contact and aftermath, and the numbers of what follows, of which the reference is sure.
 """
 
