@@ -29,7 +29,7 @@ SLOW = 3.0
 #: Duration of an impact, in rad of the springs, after which its contact has settled.
 LONGEST = 12.0
 RTOL = 1e-4
-MOST_STEPS = 6_000_000
+MOST_STEPS = 1_000_000
 _OPEN, _HIT, _CLOSED = range(3)
 
 
