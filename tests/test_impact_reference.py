@@ -119,6 +119,13 @@ def test_a_tumbling_body_opens_the_greatest_gap_that_its_length_allows():
     assert found["gap_max"] == pytest.approx(2 * (0.043378 - 0.010 - 0.025), rel=1e-6)
 
 
+@pytest.mark.parametrize("omega", [-9.0, 0.5, 8.0])
+def test_no_gap_of_a_falling_body_exceeds_that(omega):
+    found = go_on(rig(e=0.4, initial={"phi": 3.0, "omega": omega}))[0]
+    assert found["flight_time"] > 0
+    assert 0 < found["gap_max"] < 2 * (0.043378 - 0.010 - 0.025) * (1 + 1e-9)
+
+
 @pytest.mark.parametrize("e", [0.1, 0.5, 0.9])
 def test_a_damper_of_the_second_opinion_returns_the_restitution_whatever_mass_and_stiffness(e):
     s = rattling.damping(e)

@@ -187,7 +187,7 @@ def turn(p, closed, rtol, most_steps, t, y, opens, found):
     y_, f, q, g = np.zeros(4), np.zeros(4), np.zeros(6), np.zeros(_COUNT)
     Z, Z_, previous = np.zeros((3, 4)), np.zeros((3, 4)), np.zeros(4)
     J, A, order_, b, work = np.zeros((4, 4)), np.zeros((12, 12)), np.zeros(12, np.int64), np.zeros(12), np.zeros((4, 4))
-    G, scale, seen = np.zeros((SAMPLES + 2, _COUNT)), np.ones(4), np.zeros(4)
+    G, scale, seen = np.zeros((SAMPLES + 2, _COUNT)), np.ones(4), np.full(4, math.nan)
     scale[3] = 0.1 * math.sqrt(p.gravity / p.radius)
     slow = 1e-2 * p.radius
     for v in (p.v0, p.v_s):
@@ -205,7 +205,6 @@ def turn(p, closed, rtol, most_steps, t, y, opens, found):
     _, rate, _ = free.contact(p, q, 0.0, 3 - closed)
     hop = 2.0 * max(rate, 0.0) / max(abs(other_gap(p, closed, t, q, N, T)), 1e-300)
     h, before, steps = 1e-6 if rate <= 0.0 else max(min(1e-4, 0.3 * hop), 1e-12), 0.0, 0
-    seen[:] = 0.0
     while t < span:
         if steps > most_steps:
             return UNRESOLVED, t, steps
@@ -359,7 +358,7 @@ def least_gap(p, q):
 @njit(cache=True, error_model="numpy")
 def fly(p, t, q, found):
     """Fly up to an impact or to the end of the span; q is overwritten. Returns whether it hits, and the time."""
-    now, seen, closed = np.empty(6), np.zeros(4), touch(p, t, q)
+    now, seen, closed = np.empty(6), np.full(4, math.nan), touch(p, t, q)
     # A gap that opens by its acceleration alone is open only after a while; a hop of a body is over soon.
     s, older, last, ds = 0.0, 0.0, 0.0, 1e-9
     angle = math.atan2(q[0], -q[1])
