@@ -213,7 +213,7 @@ _ROUNDING = 1e-11
 
 @inlined
 def _couplings(mass, moment, a, b):
-    """Change of (opening, slip) at contact `a` by a unit impulse (inwards, along) at contact `b`: four numbers, 1/kg."""
+    """Changes of opening and slip at contact `a` by unit impulses, inwards and along the race, at contact `b`, 1/kg."""
     cosine = a.cosine * b.cosine + a.sine * b.sine
     sine = a.sine * b.cosine - a.cosine * b.sine
     m, j = 1.0 / mass, 1.0 / moment

@@ -67,6 +67,8 @@ class Mode(NamedTuple):
         Number of events up to now.
     time : float
         Time of the last event, s.
+    passed : int
+        1 if the last impact closed all contacts, of which some opened at once; 2 if their order has changed; else 0.
     """
 
     sign: int
@@ -87,6 +89,7 @@ class Mode(NamedTuple):
     lasts: float
     number: int
     time: float
+    passed: int
 
 
 class Event(NamedTuple):
@@ -101,6 +104,14 @@ class Event(NamedTuple):
     lasts: float
     number: int
     time: float
+    passed: int
+
+
+@inlined
+def passing(event, turned):
+    """An impact that closes all contacts, of which some open at once."""
+    e = event
+    return Event(e.event, e.contact, e.speed, e.impulse, e.loss, e.violation, e.lasts, e.number, e.time, 1 + turned)
 
 
 @inlined
@@ -116,13 +127,14 @@ def event_of(mode):
         mode.lasts,
         mode.number,
         mode.time,
+        mode.passed,
     )
 
 
 @inlined
 def opens(contact, number, t):
     """Event: contacts open (`contact`: 1, 2 or 3) after `number` events before."""
-    return Event(OPENS, contact, 0.0, 0.0, 0.0, 0.0, 0.0, number + 1, t)
+    return Event(OPENS, contact, 0.0, 0.0, 0.0, 0.0, 0.0, number + 1, t, 0)
 
 
 @inlined
@@ -148,6 +160,7 @@ def make(sign, region, entry_guard, places, contacts, zeros, event):
         e.lasts,
         e.number,
         e.time,
+        e.passed,
     )
 
 

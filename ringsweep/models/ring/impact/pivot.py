@@ -89,7 +89,7 @@ def size(scene, f):
 
 @inlined
 def in_slip(scene, f, K):
-    """Accelerations of psi and alpha (rad/s^2), normal reaction (N) and denominator (kg m^2) in slip with friction K."""
+    """Accelerations of psi and alpha (rad/s^2), normal reaction (N), and denominator (kg m^2), in slip."""
     body = scene.closed.body
     moment = inertia(body)
     lever = f.w - K * f.q

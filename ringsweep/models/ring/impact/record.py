@@ -131,7 +131,9 @@ def _after_event(scene, record, mode, t):
     if mode.number == r.number:
         return r
     two = ring.contact_count(scene.closed.body) == 2
-    before = int(r.open)
+    # An impact may close all contacts, of which some open at once.
+    passes = mode.passed > 0
+    before = NONE if passes else int(r.open)
     hit = mode.contact if mode.event != OPENS else 0
     # Contacts that held and are open now.
     lost = float((1 if mode.open % 2 == 1 and before % 2 == 0 else 0) + (2 if mode.open >= 2 and before < 2 else 0))
@@ -142,18 +144,18 @@ def _after_event(scene, record, mode, t):
     first_lost = r.first_lost if r.first_lost > 0.0 else lost
     is_impact = mode.event == REBOUNDS or mode.event == CLOSES
     recovers = mode.open == NONE and before != NONE
-    tumbles = recovers and mode.turned != r.turned
-    code = float(1 + mode.event + 4 * (hit + 4 * (mode.open + 4 * mode.turned)))
+    turned = float(mode.passed - 1) if passes else float(mode.turned) if mode.open == NONE else r.turned
+    code = float(1 + mode.event + 4 * (hit + 4 * (mode.open + 4 * (mode.turned + 2 * mode.passed))))
     return Record(
         r.base,
         float(mode.open),
-        float(mode.turned) if mode.open == NONE else r.turned,
+        turned,
         t if r.first_lost == 0.0 and lost > 0.0 else r.t_lost,
         first_lost,
         ever_lost,
         r.gap_max,
         float(mode.number),
-        (r.word * 64.0 + code * _BASE) % _PRIME,
+        (r.word * 512.0 + code * _BASE) % _PRIME,
         max(r.violation, mode.violation),
         r.open_time,
         r.flight_time,
@@ -162,7 +164,7 @@ def _after_event(scene, record, mode, t):
         max(r.impact_speed_max, mode.speed),
         max(r.impulse_max, mode.impulse),
         r.impact_loss + mode.loss,
-        r.tumbles + (1.0 if tumbles else 0.0),
+        r.tumbles + (1.0 if turned != r.turned else 0.0),
         t + mode.lasts if recovers else nan if mode.open != NONE else r.t_recovered,
     )
 

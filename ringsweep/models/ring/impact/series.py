@@ -79,6 +79,9 @@ from ringsweep.physics.zones import edge_ahead
 # Size below which a gap and its rate may be rounding, as a share of rho and of the speed of the body.
 _NOISE = 1e-13
 
+# A contact this close to an edge is on the edge, rad: the instant of the crossing is known to rounding.
+_ON_EDGE = 1e-12
+
 
 @series.table_shape.implements(ImpactRing)
 def _table_shape(scene):
@@ -131,10 +134,7 @@ def _expand_pivot(scene, mode, t, y, tolerance, c):
     fresh = (mode.zeros_1 if mode.open == FIRST else mode.zeros_2) if y[2] == 0.0 else 0
     c[RING + PHI, 0], c[RING + V, 0], c[ETA, 0] = y[0], y[1], y[2]
     at = f, sin(delta), cos(delta), (0.0 if fresh > 1 else y[3]), fresh
-    if mode.sign == 0:
-        sharpness = _expand_pivot_stick(scene, mode, at, c)
-    else:
-        sharpness = _expand_pivot_slip(scene, mode, at, c)
+    sharpness = _expand_pivot_stick(scene, mode, at, c) if mode.sign == 0 else _expand_pivot_slip(scene, mode, at, c)
     _expand_pivot_guards(scene, mode, f, place, y[2], fresh, c)
     per_angle = 1.0 / tolerance
     speed = body.radius * (1.0 + abs(f.psi_dot) + abs(f.alpha_dot))
@@ -299,23 +299,53 @@ def _expand_pivot_guards(scene, mode, f, place, eta, fresh, c):
     beta = side * delta_when_closed(scene.closed.body, contact, mode.turned)
     c[gap, 0] = 4.0 * balls.half_distance * cos(beta + 0.5 * side * eta) * sin(0.5 * side * eta)
     _divide(c, gap, guard, fresh)
+    _expand_edges(scene, place, f.alpha - c[RING + THETA, 0], c)
     if mode.sign == 0:
         return
     low, high = region_bounds(scene.law, mode.region)
     forward = float(mode.sign)
     set_terms(c[RING + SLOW], terms(c[RING + V]) * forward)
     set_terms(c[RING + FAST], terms(c[RING + V]) * -forward)
-    set_terms(c[RING + EDGE], (terms(c[RING + THETA]) + terms(c[ETA]) - terms(c[RING + PHI])) * forward)
     c[RING + SLOW, 0] = 0.0 if mode.entry_guard == RING + SLOW else mode.sign * c[RING + V, 0] - low
     c[RING + FAST, 0] = 0.0 if mode.entry_guard == RING + FAST else high - mode.sign * c[RING + V, 0]
-    rho = f.alpha - c[RING + THETA, 0]
-    c[RING + EDGE, 0] = mode.sign * (edge_ahead(scene.closed.surface, place, mode.sign) - rho)
     # If friction does not drop at breakaway, the slope is zero there: what is computed is rounding.
     if mode.entry_guard == RING + SLOW and low == 0.0:
         body = scene.closed.body
         size = pivot.size(scene, f) + body.radius * (abs(c[RING + EPSILON, 0]) + 2.0 * abs(c[RING + THETA, 2]))
         if abs(c[RING + V, 1]) <= 1e-12 * size:
             c[RING + SLOW, 1] = 0.0
+
+
+@inlined
+def _expand_edges(scene, place, rho, c):
+    """Fill the guard of the edges of the segment under the contact; `rho` is its angle in the ring's frame.
+
+    A ball that pivots moves over the ring either way, whatever the sense of its slip, and even if it rolls. So the guard
+    is the product of the distances from both edges. A distance that is zero is divided by the time.
+    """
+    above, below = edge_ahead(scene.closed.surface, place, 1) - rho, rho - edge_ahead(scene.closed.surface, place, -1)
+    if not above < inf:
+        return
+    nearer = -1.0 if above <= below else 1.0
+    near, far = (above, below) if above <= below else (below, above)
+    for k in range(1, ORDER + 1):
+        c[SPARE, k] = c[RING + PHI, k] - c[ETA, k] - c[RING + THETA, k]
+    shift = 0
+    if near <= _ON_EDGE:
+        near, shift = 0.0, 1
+        while shift < ORDER and c[SPARE, shift] == 0.0:
+            shift += 1
+    row = c[RING + EDGE]
+    for k in range(ORDER + 1):
+        # The distance from the nearer edge, divided, and that from the other one.
+        c[OTHER, k] = nearer * c[SPARE, k + shift] if 0 < k + shift <= ORDER else 0.0
+    if shift == 0:
+        c[OTHER, 0] = near
+    for k in range(ORDER + 1):
+        total = c[OTHER, k] * far
+        for j in range(k):
+            total -= c[OTHER, j] * nearer * c[SPARE, k - j]
+        row[k] = total
 
 
 @inlined

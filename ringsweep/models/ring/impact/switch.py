@@ -36,6 +36,7 @@ from ringsweep.models.ring.impact.mode import (
     holding,
     make,
     opens,
+    passing,
     place_of,
     ring_of,
     with_place,
@@ -54,7 +55,7 @@ from ringsweep.physics.impact import (
     inertia,
     side_of,
 )
-from ringsweep.physics.zones import cross_edge, locate
+from ringsweep.physics.zones import cross_edge, edge_ahead, locate
 
 # Rebounds that end within this time, in units of the square root of rho over the acceleration of the gap, are summed:
 # the contact closes. The place is then wrong by about the square of this share of rho.
@@ -110,9 +111,8 @@ def _separated(scene, status, turned):
 
 
 @inlined
-def _opened(scene, t, y, turned, places, which, zeros, number):
+def _opened(scene, t, y, turned, places, which, zeros, event):
     """Status, mode and state after contacts of a closed ring have opened; `y` is the state of the closed ring."""
-    event = opens(which, number, t)
     _, ring_omega, _ = drives.turn(scene.drive, t)
     if which != BOTH:
         state = y[0], y[1], 0.0, 0.0, 0.0, 0.0, float(which + TURNED * turned)
@@ -127,13 +127,17 @@ def _opened(scene, t, y, turned, places, which, zeros, number):
 
 
 @inlined
-def _after_closed(scene, status, found, t, y, turned, zeros, event):
-    """Status, mode and state from those of the closed ring; `y` is the pair of psi and v."""
+def _after_closed(scene, status, found, t, y, turned, zeros, event, is_new):
+    """Status, mode and state from those of the closed ring; `y` is the pair of psi and v.
+
+    `is_new` is whether `event` is the impact that has just closed the contacts.
+    """
     which = _separated(scene, status, turned)
     after = from_closed(found, turned, event)
     if which != NONE:
         places = after.place_1, after.place_2
-        return _opened(scene, t, y, turned, places, which, zeros, event.number)
+        lost = passing(event, turned) if is_new else opens(which, event.number, t)
+        return _opened(scene, t, y, turned, places, which, zeros, lost)
     return status, after, (y[0], y[1], 0.0, 0.0, 0.0, 0.0, float(TURNED * turned))
 
 
@@ -147,8 +151,8 @@ def _initial_state(scene):
 @inlined
 def _start(scene, t, phi, v):
     status, mode = modes.initial_mode(scene.closed, t, (phi, v))
-    nothing = Event(NO_EVENT, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, t)
-    return _after_closed(scene, status, mode, t, (phi, v), 0, 2, nothing)
+    nothing = Event(NO_EVENT, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, t, 0)
+    return _after_closed(scene, status, mode, t, (phi, v), 0, 2, nothing, False)
 
 
 @modes.initial_mode.implements(ImpactRing)
@@ -164,12 +168,12 @@ def _switch(scene, mode, guard, t, y):
     if mode.open == NONE:
         turned = mode.turned
         own = guard
-        if turned == 1 and (guard == NORMAL_1 or guard == NORMAL_2):
+        if turned == 1 and guard in (NORMAL_1, NORMAL_2):
             own = NORMAL_2 if guard == NORMAL_1 else NORMAL_1
         state = angle_when_closed(y[0], turned), y[1]
         status, found, (_, v) = modes.switch(ring_of(scene, turned), closed_mode(mode), own, t, state)
-        zeros = 3 if guard == NORMAL_1 or guard == NORMAL_2 else 2
-        return _after_closed(scene, status, found, t, (y[0], v), turned, zeros, event_of(mode))
+        zeros = 3 if guard in (NORMAL_1, NORMAL_2) else 2
+        return _after_closed(scene, status, found, t, (y[0], v), turned, zeros, event_of(mode), False)
     if guard == DETERMINANT:
         return JAM, mode, y
     reaches_1, reaches_2 = guard == NORMAL_1, guard == NORMAL_2
@@ -203,11 +207,12 @@ def _on_one_contact(scene, mode, guard, t, y):
     zeros, event, v = _remaining(mode, y, (mode.zeros_1, mode.zeros_2)), event_of(mode), y[1]
     at_rest = y[0], 0.0, y[2], y[3], 0.0, 0.0, y[6]
     sign, region = mode.sign, mode.region
-    if sign == 0:
-        status, found = pivot.begun(scene, t, at_rest, places, contacts, zeros, event, 1 if guard == SLOW else -1)
-        return status, found, at_rest
     if guard == EDGE:
-        places = with_place(mode, cross_edge(scene.closed.surface, place_of(mode), sign))
+        places = with_place(mode, _beyond_nearer_edge(scene, mode, t, y))
+    if sign == 0:
+        stick_end = 0 if guard == EDGE else 1 if guard == SLOW else -1
+        return _begun(scene, t, at_rest, places, contacts, zeros, event, stick_end)
+    if guard == EDGE:
         found = make(sign, region, RING + SLOW if v == 0.0 else -1, places, contacts, zeros, event)
         _, ring_omega, _ = drives.turn(scene.drive, t)
         K, _ = pivot.friction(scene, found, v)
@@ -224,8 +229,32 @@ def _on_one_contact(scene, mode, guard, t, y):
     # A contact that nothing holds passes through rest.
     if region < 0 or mu_s == 0.0:
         return RUNNING, make(-sign, region, RING + SLOW, places, contacts, zeros, event), at_rest
-    status, found = pivot.begun(scene, t, at_rest, places, contacts, zeros, event, 0)
-    return status, found, at_rest
+    return _begun(scene, t, at_rest, places, contacts, zeros, event, 0)
+
+
+@inlined
+def _beyond_nearer_edge(scene, mode, t, y):
+    """Place of the contact that holds in a pivot after it has crossed the nearer edge."""
+    theta, ring_omega, _ = drives.turn(scene.drive, t)
+    place, surface = place_of(mode), scene.closed.surface
+    rho = pivot.frame(scene, holding(mode), mode.turned, y, ring_omega).alpha - theta
+    above, below = edge_ahead(surface, place, 1) - rho, rho - edge_ahead(surface, place, -1)
+    return cross_edge(surface, place, 1 if above <= below else -1)
+
+
+@inlined
+def _begun(scene, t, y, places, contacts, zeros, event, stick_end):
+    """Status, mode and state of a pivot whose sliding velocity is zero; it may turn into a flight."""
+    status, found = pivot.begun(scene, t, y, places, contacts, zeros, event, stick_end)
+    _, ring_omega, _ = drives.turn(scene.drive, t)
+    contact = holding(found)
+    # Friction in stick may have pressed the ball against the race: when it drops, the contact opens.
+    if status == JAM and not pivot.load(scene, pivot.frame(scene, contact, contacts[1], y, ring_omega)) > 0.0:
+        state = in_flight(motion_of(scene, y, ring_omega), contacts[1])
+        empty = (2, zeros[1]) if contact == 1 else (zeros[0], 2)
+        lost = opens(contact, event.number, t)
+        return RUNNING, make(1, 0, -1, places, (BOTH, contacts[1]), empty, lost), state
+    return status, found, y
 
 
 @inlined
@@ -277,7 +306,7 @@ def _lands(scene, mode, hit, t, y):
     open_1, open_2 = not touches_1 or found.opening_1 > 0.0, not touches_2 or found.opening_2 > 0.0
     if (hits_1 and open_1) or (hits_2 and open_2):
         # The acceleration of the gaps that open again, and the time until their rebounds end.
-        event = Event(REBOUNDS, which, closing, 0.0, 0.0, 0.0, 0.0, mode.number + 1, t)
+        event = Event(REBOUNDS, which, closing, 0.0, 0.0, 0.0, 0.0, mode.number + 1, t, 0)
         status, trial, state = _next(scene, t, after, (first, second), (open_1, open_2), touching, found, mode, event)
         if status == RUNNING:
             ends_1 = _rebounds_end(scene, trial, t, state, after, 1, found.opening_1, e) if hits_1 and open_1 else 0.0
@@ -305,6 +334,7 @@ def _lands(scene, mode, hit, t, y):
         lasts,
         mode.number + 1,
         t,
+        0,
     )
     return _next(scene, t, after, (first, second), (open_1, open_2), touching, found, mode, event)
 
@@ -382,7 +412,11 @@ def _next(scene, t, motion, before, are_open, touched, found, mode, event):
         rate = opening / (2.0 * balls.half_distance * side * cos(delta))
     which = FIRST if contact == 2 else SECOND
     state = motion.psi, v, away, rate, 0.0, 0.0, float(which + TURNED * turned)
-    if pivot.load(scene, pivot.frame(scene, contact, turned, state, ring_omega)) > 0.0:
+    f = pivot.frame(scene, contact, turned, state, ring_omega)
+    # A place counts the revolutions of the angle that the frame has.
+    place = locate(scene.closed.surface, f.alpha - theta)
+    places = (places[0], place) if contact == 2 else (place, places[1])
+    if pivot.load(scene, f) > 0.0:
         status, found_mode = pivot.begun(scene, t, state, places, (which, turned), zeros, event, 0)
         return status, found_mode, state
     # The contact that has just closed opens again, without an impact.
@@ -395,7 +429,7 @@ def _next(scene, t, motion, before, are_open, touched, found, mode, event):
 def _close(scene, t, psi, v, turned, event):
     """Status, mode and state after all contacts have closed."""
     status, found = modes.initial_mode(ring_of(scene, turned), t, (angle_when_closed(psi, turned), v))
-    return _after_closed(scene, status, found, t, (psi, v), turned, 2, event)
+    return _after_closed(scene, status, found, t, (psi, v), turned, 2, event, True)
 
 
 @modes.status_when_stalled.implements(ImpactRing)
