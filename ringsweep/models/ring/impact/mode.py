@@ -173,7 +173,7 @@ def code_of(mode):
 @inlined
 def contacts_of(y):
     """Contacts that are open, and whether the order has changed, from a state."""
-    code = int(y[6])
+    code = int(y[6] + 0.5)
     return code % TURNED, code // TURNED
 
 

@@ -20,10 +20,10 @@ EVENT = ("number", "time", "event", "contact", "speed", "impulse")
 
 
 @inlined
-def row_of(scene, mode, t, y, seen):
+def row_of(scene, mode, forcing, y, seen):
     """Row of the state `y`, of which the recorder is shown `seen`."""
     psi, rate, normal_1, normal_2, located = seen[0], seen[1], seen[2], seen[3], seen[4]
-    theta, ring_omega, _ = drives.turn(scene.drive, t)
+    theta, ring_omega, _ = forcing
     motion = motion_of(scene, y, ring_omega)
     first = contact_of(scene.balls, 1, motion, 0.0)
     second = contact_of(scene.balls, 2, motion, 0.0) if ring.contact_count(scene.closed.body) == 2 else first
@@ -55,4 +55,5 @@ def row_of(scene, mode, t, y, seen):
 
 @series.row.implements(ImpactRing)
 def _row(scene, mode, c, t, s):
-    return row_of(scene, mode, t, series.state_at(scene, c, s), series.seen_at(scene, c, s, s))
+    forcing = drives.turn(scene.drive, t)
+    return row_of(scene, mode, forcing, series.state_at(scene, c, s), series.seen_at(scene, c, s, s))

@@ -320,8 +320,8 @@ def _expand_pivot_guards(scene, mode, f, place, eta, fresh, c):
 def _expand_edges(scene, place, rho, c):
     """Fill the guard of the edges of the segment under the contact; `rho` is its angle in the ring's frame.
 
-    A ball that pivots moves over the ring either way, whatever the sense of its slip, and even if it rolls. So the guard
-    is the product of the distances from both edges. A distance that is zero is divided by the time.
+    A ball that pivots moves over the ring either way, whatever the sense of its slip, and even if it rolls. So the
+    guard is the product of the distances from both edges. A distance that is zero is divided by the time.
     """
     above, below = edge_ahead(scene.closed.surface, place, 1) - rho, rho - edge_ahead(scene.closed.surface, place, -1)
     if not above < inf:

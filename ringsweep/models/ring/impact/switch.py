@@ -69,7 +69,7 @@ _TOGETHER = 1e-12
 def motion_of(scene, y, ring_omega):
     """Motion of the body in space."""
     closed, balls = scene.closed.body, scene.balls
-    code = int(y[6])
+    code = int(y[6] + 0.5)
     contacts, turned = code % TURNED, code // TURNED
     if contacts == NONE:
         phi, omega = angle_when_closed(y[0], turned), ring.angular_velocity(closed, y[1], ring_omega)
