@@ -35,6 +35,9 @@ law `bristle` is left out, because its random bonds cannot be repeated independe
 ``--csv PATH`` writes the 500 scenes of ``tests/test_brute_force.py`` instead: the scene (SI units, on the paper's
 rig); regime, motion, contact and time of separation; least reaction in weights of the body; whether the runs of the
 reference agree in kind; what the compliant body says of the end.
+
+``--impacts PATH`` writes the scenes of ``tests/test_impacts_by_reference.py``: the scene by paths (SI),
+regime, contact and aftermath, and the numbers of what follows, of which the reference is sure.
 """
 
 import argparse
@@ -52,7 +55,7 @@ from tqdm import tqdm
 
 import ringsweep
 from benchmarks import _common
-from benchmarks.reference import judge
+from benchmarks.reference import judge, rattling
 from benchmarks.reference.compliant import opinion
 from benchmarks.reference.problem import FORMULAS, problem
 from benchmarks.reference.run import drive
@@ -60,6 +63,8 @@ from benchmarks.reference.run import drive
 COUNT, SEED = 20_000, 181
 #: Of the certified runs whose contacts hold, the compliant body is asked about one in this many.
 HELD_EVERY = 20
+#: Of the certified runs that lose a contact and go on, the compliant body is asked about one in this many.
+LOST_EVERY = 5
 #: Least error of the reference (rad, s, m): it looks at contacts an instant after an event.
 SURE = 1e-9
 RIG = {
@@ -93,6 +98,7 @@ LAWS = {
 BRISTLES = ("dahl", "lugre", "elasto-plastic", "reset-integrator")
 NAMED_LAWS = tuple(name for name in LAWS if name not in FORMULAS)
 RING_LAWS = tuple(name for name in NAMED_LAWS if name not in ("karnopp", "reset-integrator"))
+IMPACT_LAWS = (*(name for name in RING_LAWS if name not in BRISTLES), "bump", "jump")
 DRIVES = ("none", "constant", "arctan", "power", "sinusoidal", "table")
 #: Samples of the drive `table`: s, rad (m on the belt).
 TABLE_TIME = np.linspace(0.0, 3.2, 17)
@@ -111,6 +117,7 @@ class Kind:
     friction: str = "usual"
     shape: str = "usual"
     force: bool = False
+    impact: bool = False
 
 
 def families():
@@ -147,6 +154,13 @@ def families():
         table.setdefault("ice", []).extend(
             Kind("ring", law, name, 1, launch="at rest", friction="ice") for name in ("arctan", "power", "sinusoidal")
         )
+    for i, law in enumerate(IMPACT_LAWS):
+        for j, model in enumerate(("ring", "ring", "ring", "ring-single-contact")):
+            name, launch = DRIVES[(i + j) % 6], ("mixed", "any", "at rest", "any")[j]
+            shape = "any" if (i + j) % 2 else "usual"
+            table.setdefault("impact", []).append(
+                Kind(model, law, name, int(law not in ("hump", "jump") or j < 2), launch, shape=shape, impact=True)
+            )
     for law in ("coulomb", "stiction", "tustin"):
         table.setdefault("belt forced", []).append(Kind("belt", law, "", force=True))
     for i, law in enumerate(NAMED_LAWS):
@@ -270,6 +284,13 @@ def ring_scene(rng, kind):
     elif kind.launch == "any":
         phi = rng.uniform(-math.pi, math.pi)
     values["initial.phi"], values["initial.omega"] = phi, omega
+    if kind.impact:
+        values["impact.restitution"] = pick(rng, (1, 0.0), (1, 1.0), (8, rng.uniform(0.0, 0.95)))
+        if two:
+            # The centre of mass stays between the axis and the race, on either side of the line of the balls.
+            half, reach = values["body.half_distance"], values["ring.radius"] - values["body.ball_radius"]
+            line = math.sqrt(reach * reach - half * half)
+            values["body.center_offset"] = pick(rng, (3, 0.0), (1, line * rng.uniform(-0.4, 0.4)))
     return values
 
 
@@ -382,6 +403,21 @@ def second_opinion(scene, regime, contact, t, verdict, count, report):
         report.scene(f"{found.word} by the compliant body", scene, found.why, f"{end}, {t:.9g} s")
 
 
+def aftermath_opinion(scene, word, verdict, count, report):
+    """Ask the compliant body what follows a lost contact, in every few runs."""
+    if word == "held" or verdict.state != "clear" or verdict.runs[0]["t_end"] < scene["time"]["span"]:
+        return
+    count.tally["lost"] += 1
+    if count.tally["lost"] % LOST_EVERY:
+        return
+    begin = time.perf_counter()
+    found = rattling.opinion(problem(scene), word, verdict.numbers["t_separation"])
+    count.seconds["compliant"] += time.perf_counter() - begin
+    count.ends[f"lost, {word}", found.word] += 1
+    if found.word == "contradicted":
+        report.scene(f"{found.word} by the compliant body", scene, f"{found.why}; {verdict.why}", word)
+
+
 def compare(kind, batch, data, count, report):
     """Add a batch to the count of its family; contradictions go to `report`."""
     belt = kind.model == "belt"
@@ -393,7 +429,9 @@ def compare(kind, batch, data, count, report):
         count.seconds["reference"] += time.perf_counter() - begin
         certified = int(data.certified[i]) == 1
         state, spread = verdict.state, verdict.spread
-        if certified and kind.model == "ring":
+        if certified and kind.impact:
+            aftermath_opinion(scene, str(ringsweep.words(data.aftermath[i]).values), verdict, count, report)
+        elif certified and kind.model == "ring":
             contact, t_end = int(data.separating_contact[i]), float(data.t_end[i])
             second_opinion(scene, str(words[i][0]), contact, t_end, verdict, count, report)
         scale = scales(scene) if belt else 1.0
@@ -420,6 +458,10 @@ def compare(kind, batch, data, count, report):
                 continue
         else:
             kind_said = (str(words[i][0]), str(words[i][1]), int(data.separating_contact[i]))
+            if kind.impact:
+                # The package counts reversals and turns up to the end of the run, the reference up to the first loss.
+                aftermath = str(ringsweep.words(data.aftermath[i]).values)
+                kind_said = (kind_said[0], verdict.kind[1], kind_said[2], aftermath)
             said = f"{kind_said}, t_end {float(data.t_end[i]):.9g}, phi_end {float(data.phi_end[i]):.6g}"
             if kind_said != verdict.kind:
                 count.tally["contradicted"] += 1
@@ -502,9 +544,13 @@ def main():
     parser.add_argument("--verbose", action="store_true", help="also print scenes that the reference could not resolve")
     parser.add_argument("--out", type=Path, help="Markdown file to write")
     parser.add_argument("--csv", type=Path, help="write the 500 scenes of the tests instead")
+    parser.add_argument("--impacts", type=Path, help="write the scenes with impacts of the tests instead")
     arguments = parser.parse_args()
     if arguments.csv:
         write_csv(arguments.csv)
+        return
+    if arguments.impacts:
+        write_impacts(arguments.impacts)
         return
     chosen = {name: kinds for name, kinds in families().items() if name in (arguments.families or families())}
     heading = _common.machine()
@@ -617,6 +663,33 @@ def write_csv(path):
                 "compliant": opinion(problem(from_csv(values)), word, contact, t).word,
             }
             writer.writerow(values | outcome)
+
+
+#: Scenes with impacts of the tests, which share one compiled kernel.
+IMPACTS = Kind("ring", "stiction", "arctan", 1, impact=True)
+IMPACTS_COUNT, IMPACTS_NUMBERS = 100, (
+    "t_separation", "t_end", "phi_end", "omega_end", "open_time", "flight_time", "gap_max", "impact_speed_max",
+    "impact_loss", "tumbles", "t_recovered",
+)  # fmt: skip
+
+
+def write_impacts(path):
+    """Write scenes that lose a contact, of which the reference is sure, and its answers."""
+    rng, rows = np.random.default_rng(CSV_SEED), []
+    while len(rows) < IMPACTS_COUNT:
+        values = draw(rng, IMPACTS)
+        verdict = judge(nest(IMPACTS, values))
+        numbers = {name: verdict.numbers.get(name) for name in IMPACTS_NUMBERS}
+        # Where the row of impacts magnifies rounding, nothing can be compared.
+        if verdict.state != "clear" or verdict.kind[0] != "separating" or not verdict.spread["omega_end"] < 1e-6:
+            continue
+        regime, _, contact, word = verdict.kind
+        numbers = {name: f"{value:.9g}" for name, value in numbers.items()}
+        rows.append(values | {"regime": regime, "contact": contact, "aftermath": word} | numbers)
+    with open(path, "w", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
 
 
 if __name__ == "__main__":

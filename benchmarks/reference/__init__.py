@@ -14,11 +14,18 @@ instant later. If the runs do not agree in kind, the scene is ambiguous. A scene
 tolerances. Under a force the run is long: both tolerances are a hundred times as wide, and if the runs differ it is run
 once more with the tight tolerance.
 
+A scene with `impact` goes on after a lost contact (:mod:`benchmarks.reference.aftermath`), in four variations too; the
+shift then changes restitution and friction, and not the reaction at which a contact is lost.
+
 :mod:`benchmarks.reference.compliant` gives a second opinion on the end of a run. It shares no criterion with this one.
 """
 
+import math
 from dataclasses import dataclass, field
 
+import numpy as np
+
+from benchmarks.reference.aftermath import AFTERMATH, follow
 from benchmarks.reference.physics import JAMMED, OPEN_1, OPEN_2, OPEN_BOTH, SEVERAL
 from benchmarks.reference.problem import problem
 from benchmarks.reference.run import RESULT, UNRESOLVED, run
@@ -27,6 +34,13 @@ TIGHT, LOOSE, SHIFT = 1e-9, 1e-7, 1e-6
 MOST_STEPS = 60_000
 #: Variations of a scene: tolerance, and shift of all thresholds.
 VARIATIONS = ((TIGHT, 0.0), (LOOSE, 0.0), (LOOSE, SHIFT), (LOOSE, -SHIFT))
+#: Relative shift of friction and restitution that stands for rounding.
+ROUNDING = 1e-12
+#: Closing speed below which an impact is plastic, m/s, at a tolerance of a step.
+REST = {TIGHT: 1e-6, LOOSE: 1e-5}
+#: Numbers of what follows a lost contact.
+NUMBERS = ("open_time", "flight_time", "gap_max", "separations", "impacts", "impact_speed_max", "impulse_max",
+           "impact_loss", "tumbles", "t_recovered")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -38,7 +52,7 @@ class Verdict:
     state : str
         ``clear``, ``ambiguous`` or ``unresolved``.
     kind : tuple or None
-        Regime, motion and separating contact; None on the belt.
+        Regime, motion and separating contact, and with `impact` the aftermath; None on the belt.
     numbers : dict
         Outcomes by name.
     spread : dict
@@ -77,6 +91,25 @@ def _numbers(found, belt):
     }
 
 
+def go_on(scene, rtol=TIGHT, shift=0.0, keep=0):
+    """Run of a scene with `impact`: outcomes by name, and the first `keep` events."""
+    p = problem(scene, 1.0 + shift)
+    p = p._replace(restitution=min(1.0, p.restitution * (1.0 + shift)))
+    exchanged = p._replace(offset=-p.offset, xi=p.xi - 2.0 * p.offset)
+    log = np.zeros((keep, 5))
+    found = dict(zip(AFTERMATH, follow(p, exchanged, rtol, REST[rtol], MOST_STEPS, log), strict=True))
+    return found, log[: int(found["events"])]
+
+
+def word(found, single):
+    """Word for what followed a lost contact."""
+    if found["separations"] == 0:
+        return "held"
+    if found["tumbles"] > 0:
+        return "tumbled"
+    return "recovered" if found["closed"] == (1 if single else 3) else "open"
+
+
 def judge(scene):
     """Verdict on a scene, a mapping as in a configuration, but with numbers only (SI)."""
     belt, forced = scene["model"] == "belt", "force" in scene
@@ -87,6 +120,8 @@ def judge(scene):
         if found["end"] == UNRESOLVED:
             why = f"stopped at {found['t_end']:.6g} s after {found['steps']} steps and {found['events']} events"
             return Verdict("unresolved", None, {}, {}, why, runs)
+    if "impact" in scene:
+        return _judge_aftermath(scene, runs)
     first, second = runs[:2]
     if forced and not abs(first["position"] - second["position"]) < 1e-8:
         # Errors may grow over hundreds of periods.
@@ -110,3 +145,34 @@ def judge(scene):
     if any(found["end"] == SEVERAL for found in runs):
         return Verdict("ambiguous", kinds[0], numbers, spread, "several contacts could separate", runs)
     return Verdict("clear", kinds[0], numbers, spread, f"{why}; {first['reversals']:.0f} reversals", runs)
+
+
+def _judge_aftermath(scene, runs):
+    """Verdict on a scene with `impact`, from the runs up to the first loss."""
+    # The wide tolerance with a shift of the size of rounding, which a row of impacts may magnify.
+    found = [go_on(scene, rtol, shift or (rtol == LOOSE) * ROUNDING)[0] for rtol, shift in VARIATIONS]
+    kinds = [
+        (*_kind(run), word(after, scene["model"] == "ring-single-contact"))
+        for run, after in zip(runs, found, strict=True)
+    ]
+    numbers, other = (
+        {"t_end": after["t_end"], "phi_end": after["position"], "omega_end": after["speed"]}
+        | {"t_separation": run["t_end"] if kind[0] == "separating" else math.nan}
+        | {name: after[name] for name in NUMBERS}
+        for run, after, kind in zip(runs[:2], found, kinds, strict=False)
+    )
+    spread = {name: abs(numbers[name] - other[name]) for name in numbers}
+    for after in found:
+        if after["end"] == UNRESOLVED:
+            why = f"stopped at {after['t_end']:.6g} s after {after['steps']} steps and {after['events']} events"
+            return Verdict("unresolved", None, numbers, spread, why, found)
+    first = found[0]
+    why = (
+        f"{kinds[0][3]}; lost at {numbers['t_separation']:.9g} s, {first['impacts']} impacts, open for "
+        f"{first['open_time']:.6g} s and up to {first['gap_max']:.4g} m, ends at {first['t_end']:.9g} s"
+    )
+    if any(kind != kinds[0] for kind in kinds) or any(after["end"] == SEVERAL for after in found):
+        return Verdict("ambiguous", kinds[0], numbers, spread, " / ".join(map(str, dict.fromkeys(kinds))), found)
+    if len({after["end"] for after in found}) > 1:
+        return Verdict("ambiguous", kinds[0], numbers, spread, "jams, or not", found)
+    return Verdict("clear", kinds[0], numbers, spread, why, found)

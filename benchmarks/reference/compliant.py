@@ -1,7 +1,7 @@
 """A second opinion on the end of a run: the same body on compliant contacts, which needs no criterion for an end.
 
 The body has three degrees of freedom: the centre of mass (x, y) and the rotation psi. Each contact is a spring and a
-damper that only push: N = max(0, k d - c d'), with the penetration d of the ball into the race. Friction is mu(|v|) N
+damper that only push: N = max(0, k d + c d'), with the penetration d of the ball into the race. Friction is mu(|v|) N
 at the sliding velocity of the contact's own material point. Near rest it rises linearly to mu_s at a speed `v_rest`.
 Nothing here asks for a determinant, an admissible mode, or a reaction that reaches zero: what the springs do, happens.
 
@@ -110,20 +110,41 @@ def motion(p, springs, v_rest, t, y, f, found):
     along_x, along_y = math.cos(y[2]), math.sin(y[2])
     for i in range(2):
         arm = p.half_distance * (2.0 * i - 1.0)
-        cx, cy = y[0] + arm * along_x, y[1] + arm * along_y
-        ux, uy = y[3] - arm * y[5] * along_y, y[4] + arm * y[5] * along_x
+        bx, by = arm * along_x - p.offset * along_y, arm * along_y + p.offset * along_x
+        cx, cy = y[0] + bx, y[1] + by
+        ux, uy = y[3] - y[5] * by, y[4] + y[5] * bx
         distance = math.hypot(cx, cy)
         cx, cy = cx / distance, cy / distance
         gap, opens = p.radius - p.ball_radius - distance, -(cx * ux + cy * uy)
-        N = max(0.0, -springs[i] * gap - springs[2 + i] * opens) if gap < 0.0 else 0.0
+        N = max(0.0, -springs[i] * gap - (springs[2 + i] - springs[4 + i] * gap) * opens) if gap < 0.0 else 0.0
         v = cx * uy - cy * ux + p.ball_radius * y[5] - p.radius * ring_omega
         K, f[6 + i] = traction(p, v_rest, segment(p, math.atan2(cx, -cy) - theta), v, y[6 + i])
         fx, fy = -cx * N - cy * K * N, -cy * N + cx * K * N
-        rx, ry = arm * along_x + p.ball_radius * cx, arm * along_y + p.ball_radius * cy
+        rx, ry = bx + p.ball_radius * cx, by + p.ball_radius * cy
         f[3] += fx / p.mass
         f[4] += fy / p.mass
         f[5] += (rx * fy - ry * fx) / p.inertia
         found[i], found[2 + i], found[4 + i] = gap, N, v
+
+
+@njit(cache=True, error_model="numpy")
+def trial(p, springs, v_rest, t, h, y, y_, K, found, scale, rtol):
+    """Write a step from y, whose rates are K[0], to y_; returns the error in units of the tolerance."""
+    n = y.size
+    for s in range(1, 7):
+        for j in range(n):
+            total = 0.0
+            for r in range(s):
+                total += _A[s, r] * K[r, j]
+            y_[j] = y[j] + h * total
+        motion(p, springs, v_rest, t + _C[s] * h, y_, K[s], found)
+    error = 0.0
+    for j in range(n):
+        total = 0.0
+        for r in range(7):
+            total += _E[r] * K[r, j]
+        error = max(error, abs(h * total) / (rtol * scale[j]))
+    return error
 
 
 @njit(cache=True, error_model="numpy")
@@ -147,19 +168,7 @@ def integrate(p, springs, v_rest, t, y, until, about, scale, longest, lasting, r
     begin = t
     while t < until and steps < most_steps and max(found[2], found[3]) < most:
         h = min(h, longest, until - t)
-        for s in range(1, 7):
-            for j in range(n):
-                total = 0.0
-                for r in range(s):
-                    total += _A[s, r] * K[r, j]
-                y_[j] = y[j] + h * total
-            motion(p, springs, v_rest, t + _C[s] * h, y_, K[s], found)
-        error = 0.0
-        for j in range(n):
-            total = 0.0
-            for r in range(7):
-                total += _E[r] * K[r, j]
-            error = max(error, abs(h * total) / (rtol * scale[j]))
+        error = trial(p, springs, v_rest, t, h, y, y_, K, found, scale, rtol)
         steps += 1
         if not error <= 1.0 and h > 1e-9 * longest:
             h *= max(0.1, 0.9 * error**-0.2) if error < 1e30 else 0.1
@@ -265,7 +274,7 @@ def place(p, start, k1, k2, v_rest):
     for _ in range(3):
         normals, residual = np.zeros((2, 2)), np.zeros(2)
         for i, (side, N, k) in enumerate(((-1.0, N1, k1), (1.0, N2, k2))):
-            ball = centre + side * p.half_distance * along
+            ball = centre + side * p.half_distance * along - p.offset * outward
             distance = math.hypot(*ball)
             normals[i], residual[i] = -ball / distance, -N / k - (p.radius - p.ball_radius - distance)
         centre = centre + np.linalg.solve(normals, residual)
@@ -329,7 +338,7 @@ def follow(p, start, about, until, k, damping, ratio=1.0, preload=1.0):
     k1, k2 = k * math.sqrt(ratio), k / math.sqrt(ratio)
     frequency = math.sqrt(k / p.mass)
     v_rest = rest_speed(p, start, until, load, frequency)
-    springs = np.array([k1, k2, damping * math.sqrt(k1 * p.mass), damping * math.sqrt(k2 * p.mass)])
+    springs = np.array([k1, k2, damping * math.sqrt(k1 * p.mass), damping * math.sqrt(k2 * p.mass), 0.0, 0.0])
     start = (*start[:5], preload * start[5], preload * start[6], start[7])
     y, out = place(p, start, k1, k2, v_rest), np.zeros(12)
     depth = load / k

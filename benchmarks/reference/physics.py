@@ -11,6 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
+from benchmarks.reference import free
 from benchmarks.reference.problem import (
     ARCTAN,
     BELT,
@@ -41,6 +42,8 @@ from benchmarks.reference.problem import (
 BUMP_CORNERS = np.array([-6.0, -3.0, -1.5, 0.0, 1.5, 3.0, 6.0])
 #: Solutions of a contact problem: stick, slip backward or forward, contacts that separate, no solution, several.
 STICK, BACKWARD, FORWARD, OPEN_1, OPEN_2, OPEN_BOTH, JAMMED, SEVERAL = 0, -1, 1, 2, 3, 4, 5, 6
+#: Which contacts are closed: only one of them, or both.
+ONLY_1, ONLY_2, CLOSED = 1, 2, 3
 #: A determinant below this share of its value without friction counts as zero.
 LEAST_DETERMINANT = 1e-6
 
@@ -211,13 +214,15 @@ def accelerations(p, phi, omega, ring_epsilon, N1, T1, N2, T2):
 
     """
     sb, cb, g, w2 = math.sin(p.beta), math.cos(p.beta), p.gravity, omega * omega
-    a, r, reach = p.half_distance, p.ball_radius, p.radius - p.ball_radius
+    a, d, r, reach = p.half_distance, p.offset, p.ball_radius, p.radius - p.ball_radius
     radial = g * math.cos(phi) + (sb * (T1 - T2) - cb * (N1 + N2)) / p.mass
     tangential = -g * math.sin(phi) + (sb * (N1 - N2) + cb * (T1 + T2)) / p.mass
-    angular = (a * cb * (N2 - N1) + (a * sb + r) * (T1 + T2)) / p.inertia
-    # The centres of the balls are at -a and +a along the tangent.
-    out1, on1 = radial + a * angular, tangential + a * w2
-    out2, on2 = radial - a * angular, tangential - a * w2
+    angular = (
+        a * cb * (N2 - N1) + (a * sb + r) * (T1 + T2) - d * p.mass * (tangential + g * math.sin(phi))
+    ) / p.inertia
+    # The centres of the balls are at -a and +a along the tangent, and at -d along the radius.
+    out1, on1 = radial + a * angular + d * w2, tangential - d * angular + a * w2
+    out2, on2 = radial - a * angular + d * w2, tangential - d * angular - a * w2
     gap1, gap2 = -(cb * out1 - sb * on1 + w2 * reach), -(cb * out2 + sb * on2 + w2 * reach)
     spin = r * angular - p.radius * ring_epsilon
     return gap1, gap2, sb * out1 + cb * on1 + spin, cb * on2 - sb * out2 + spin, angular
@@ -295,8 +300,33 @@ def state(p, k1, k2, piece, t, y):
 
 
 @njit(cache=True, error_model="numpy")
-def rates(p, k1, k2, piece, t, y, f):
+def on_one(p, closed, k, piece, t, y, q):
+    """Body on one closed contact (see :func:`free.pivot`), which sticks if `piece` is 0; its motion is written to q.
+
+    Returns reaction, friction force, accelerations of sliding and of psi, velocity of
+    the contact in the frame of the ring, and A (1 in stick).
+    """
+    theta, ring_omega, ring_epsilon = drive(p, t)
+    free.pivot(p, closed, theta, ring_omega, y, q)
+    if piece == STICK:
+        N, T = free.sticking_forces(p, q, ring_epsilon, closed)
+        A = 1.0
+    else:
+        K = friction(p, k, piece, y[2], 0.0)[0]
+        N, T, A = free.sliding_forces(p, q, ring_epsilon, closed, K)
+    fx, fy, moment = free.load(p, q, closed, N, T)
+    _, slide, epsilon = free.acceleration(p, q, ring_epsilon, fx, fy, moment, closed)
+    onward = (y[2] - p.ball_radius * (y[3] - ring_omega)) / (p.radius - p.ball_radius)
+    return N, T, (0.0 if piece == STICK else slide), epsilon, onward, A
+
+
+@njit(cache=True, error_model="numpy")
+def rates(p, closed, k1, k2, piece, t, y, f):
     """Write the rates of the state to f."""
+    if closed != CLOSED:
+        _, _, f[2], f[3], f[0], _ = on_one(p, closed, k1, piece, t, y, np.empty(6))
+        f[1] = y[3]
+        return
     _, _, epsilon, _, _, _, ring_epsilon, f[2], f[3] = state(p, k1, k2, piece, t, y)
     f[0] = y[1] / p.radius
     f[1] = p.radius * (epsilon - ring_epsilon)

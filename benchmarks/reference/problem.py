@@ -38,6 +38,8 @@ class Problem(NamedTuple):
     The angles `edges` divide the ring into segments. Each segment reaches from its edge to the next edge and has the
     friction coefficients `mu_s` and `mu_k`. On the belt there is one segment, both coefficients and the height `h` of a
     law are forces in N, and the radius is 1. `unit` is the friction per unit of friction coefficient: 1, or the weight.
+    The centre of mass is at a distance `offset` from the line of the balls, away from the axis; the sign of the
+    distance changes when the contacts change places.
     """
 
     model: int
@@ -49,6 +51,7 @@ class Problem(NamedTuple):
     radius: float
     half_distance: float
     ball_radius: float
+    offset: float
     gravity: float
     stiffness: float
     cubic: float
@@ -84,6 +87,7 @@ class Problem(NamedTuple):
     at_rest: bool
     span: float
     epsilon: float
+    restitution: float
 
 
 def segments(arcs, rest):
@@ -130,13 +134,14 @@ def problem(scene, factor=1.0):
     if name == "formula":
         name = next(key for key, text in FORMULAS.items() if text == friction["mu"])
     law, unit = LAWS.index(name), 1.0
-    inertia = xi = beta = half = ball = stiffness = 0.0
+    inertia = xi = beta = half = ball = offset = stiffness = 0.0
     radius = 1.0
     if model == RING:
         half, ball, inertia = float(body["half_distance"]), float(body["ball_radius"]), float(body["inertia"])
         radius = float(scene["ring"]["radius"]) if "ring" in scene else ball + half / math.sin(float(body["beta"]))
         beta = math.asin(half / (radius - ball))
-        xi = (radius - ball) * math.cos(beta)
+        offset = float(body.get("center_offset", 0.0))
+        xi = (radius - ball) * math.cos(beta) + offset
     elif model == SINGLE:
         radius = float(scene["ring"]["radius"])
     else:
@@ -168,7 +173,8 @@ def problem(scene, factor=1.0):
     at_rest = speed is None and model == BELT
     return Problem(
         model=model, law=law, mass=mass, inertia=inertia, xi=xi, beta=beta, radius=radius, half_distance=half,
-        ball_radius=ball, gravity=gravity, stiffness=stiffness, cubic=float(scene.get("spring", {}).get("cubic", 0.0)),
+        ball_radius=ball, offset=offset, gravity=gravity, stiffness=stiffness,
+        cubic=float(scene.get("spring", {}).get("cubic", 0.0)),
         viscous=float(friction.get("viscous", 0.0)), force=float(force.get("amplitude", 0.0)),
         force_frequency=float(force.get("frequency", 0.0)), force_phase=float(force.get("phase", 0.0)),
         h=float(friction.get("h", 0.0)) * unit * factor, unit=unit * factor,
@@ -178,4 +184,5 @@ def problem(scene, factor=1.0):
         frequency=float(drive.get("frequency", 0.0)), phase=float(drive.get("phase", 0.0)), knots=knots, pieces=pieces,
         position=float(position), speed=float(speed or 0.0), at_rest=at_rest, span=float(scene["time"]["span"]),
         epsilon=float(scene.get("classify", {}).get("epsilon_omega", 1e-3)),
+        restitution=float(scene.get("impact", {}).get("restitution", math.nan)),
     )  # fmt: skip

@@ -33,7 +33,7 @@ def interpolate(y, Z, x, n, out):
 
 
 @njit(cache=True, error_model="numpy")
-def jacobian(p, k1, k2, piece, t, y, f, scale, n, J, work):
+def jacobian(p, closed, k1, k2, piece, t, y, f, scale, n, J, work):
     """Write the Jacobian of the rates, by differences, to J."""
     y_, f_ = work[0], work[1]
     for j in range(n):
@@ -41,7 +41,7 @@ def jacobian(p, k1, k2, piece, t, y, f, scale, n, J, work):
         delta = 1e-7 * scale[j]
         y_[j] += delta
         delta = y_[j] - y[j]
-        rates(p, k1, k2, piece, t, y_, f_)
+        rates(p, closed, k1, k2, piece, t, y_, f_)
         for i in range(n):
             J[i, j] = (f_[i] - f[i]) / delta
 
@@ -56,7 +56,7 @@ def norm(b, rtol, scale, n):
 
 
 @njit(cache=True, error_model="numpy")
-def attempt(p, k1, k2, piece, t, h, y, f, J, scale, rtol, n, Z, A, order, b, work):
+def attempt(p, closed, k1, k2, piece, t, h, y, f, J, scale, rtol, n, Z, A, order, b, work):
     """Compute the stages Z of a step of length h from y, whose rates are f. Z holds a first guess.
 
     Returns the error in units of the tolerance; infinite if Newton's iteration does not converge.
@@ -77,7 +77,7 @@ def attempt(p, k1, k2, piece, t, h, y, f, J, scale, rtol, n, Z, A, order, b, wor
         for r in range(3):
             for i in range(n):
                 y_[i] = y[i] + Z[r, i]
-            rates(p, k1, k2, piece, t + NODES[r] * h, y_, F[r])
+            rates(p, closed, k1, k2, piece, t + NODES[r] * h, y_, F[r])
         for r in range(3):
             for i in range(n):
                 b[r * n + i] = -Z[r, i] + h * (
@@ -114,7 +114,7 @@ def attempt(p, k1, k2, piece, t, h, y, f, J, scale, rtol, n, Z, A, order, b, wor
     if not error <= 1.0:
         for i in range(n):
             y_[i] = y[i] + b[i]
-        rates(p, k1, k2, piece, t, y_, F[0])
+        rates(p, closed, k1, k2, piece, t, y_, F[0])
         for i in range(n):
             b[i] = GAMMA * (h * F[0, i] + ESTIMATE[0] * Z[0, i] + ESTIMATE[1] * Z[1, i] + ESTIMATE[2] * Z[2, i])
         substitute(A, order, b, n)

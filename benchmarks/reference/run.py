@@ -7,6 +7,7 @@ from numba import njit
 
 from benchmarks.reference.physics import (
     BACKWARD,
+    CLOSED,
     FORWARD,
     JAMMED,
     LEAST_DETERMINANT,
@@ -163,77 +164,16 @@ def after_stick(p, k1, k2, t, rho, least):
 
 
 @njit(cache=True, error_model="numpy")
-def run(p, rtol, least, slack, most_steps):
-    """Run a scene.
-
-    Parameters
-    ----------
-    p : Problem
-    rtol : float
-        Tolerance of the error estimate of a step. The estimate is of lower order than the step.
-    least : float
-        Reaction at which a contact is lost, in weights of the body.
-    slack : float
-        Relative shift of the full turn, and a thousandth of the relative shift of the threshold of a reversal.
-    most_steps : int
-
-    Returns
-    -------
-    tuple
-        See ``RESULT``.
-
-    """
-    set_valued, span = is_set_valued(p), p.span
+def advance(p, rtol, least, slack, most_steps, track, t, y, k1, k2, piece, mode):
+    """Run on from an instant t at which the contact problem has been solved; `y` and `track` are overwritten."""
+    set_valued, span, end = is_set_valued(p), p.span, HELD
     n = 2 if p.law < DAHL else (4 if p.model == RING else 3)
-    y, y_, f = np.zeros(4), np.zeros(4), np.zeros(4)
+    y_, f = np.zeros(4), np.zeros(4)
     Z, Z_, previous = np.zeros((3, 4)), np.zeros((3, 4)), np.zeros(4)
     J, A, order, b, work = np.zeros((4, 4)), np.zeros((12, 12)), np.zeros(12, np.int64), np.zeros(12), np.zeros((4, 4))
     G, g, scale = np.zeros((SAMPLES + 2, _COUNT)), np.zeros(_COUNT), np.ones(4)
     least_1 = least_2 = math.inf
     t_least = 0.0
-
-    # Launch. If the acceleration of the drive is infinite at 0, the motion before `instant` is negligible. Only the
-    # variation with positive slack solves the contact problem at 0 itself.
-    t, instant = 0.0, 0.0
-    if p.drive == POWER and p.exponent < 2.0:
-        instant = 1e-14 if p.exponent < 1.5 else 1e-10
-    theta, ring_omega, _ = drive(p, t)
-    y[0] = p.position - theta
-    speed = ring_omega if p.at_rest else p.speed
-    y[1] = (speed - ring_omega) * p.radius
-    # Where a sinusoidal drive turns back, its velocity is the rounding error of a cosine.
-    rocking = abs(p.amplitude) * TURN * p.frequency if p.drive == SINUSOIDAL else 0.0
-    if abs(speed - ring_omega) <= 4e-16 * max(abs(speed), abs(ring_omega), rocking):
-        y[1] = 0.0
-    track = np.array([0.0, 0.0, p.position, p.position, speed, speed])
-    observe(p, track, p.position, speed, slack)
-    k1, k2 = segment(p, y[0] - p.beta), segment(p, y[0] + p.beta)
-    if y[1] < 0.0:
-        k1, k2 = lower_segments(p, k1, k2, y[0])
-    if p.law >= DAHL and p.model != BELT and y[1] != 0.0:
-        m = p.edges.size
-        for i, k in ((2, k1), (3, k2)):
-            y[i] = math.copysign(steady(p, y[1], p.mu_s[k % m], p.mu_k[k % m]) / p.sigma0, y[1])
-    piece, end = piece_of(p, y[1]), STICK
-    if set_valued and y[1] == 0.0:
-        mode = resting_problem(p, k1, k2, 0.0 if slack > 0.0 else instant, y[0], least)
-    else:
-        mode = sliding_problem(p, k1, k2, piece, t, y, least)
-    t = instant
-    if instant > 0.0 and mode != STICK:
-        theta, ring_omega, _ = drive(p, t)
-        y[0], y[1] = p.position + speed * t - theta, (speed - ring_omega) * p.radius
-        if mode in (FORWARD, BACKWARD):
-            if p.model != BELT and not set_valued:
-                found = passage(p, k1, k2, t, y, least)
-                if found != STICK:
-                    mode = found
-            if not set_valued:
-                piece = piece_of(p, y[1])
-    if set_valued and mode in (FORWARD, BACKWARD):
-        piece = mode if y[1] == 0.0 else piece_of(p, y[1])
-    if mode == BACKWARD and p.model != BELT:
-        k1, k2 = lower_segments(p, k1, k2, y[0])
 
     # Scales of the tolerance: position (rad or m), sliding velocity, bristles.
     slow = 1e-2 * p.radius
@@ -313,8 +253,8 @@ def run(p, rtol, least, slack, most_steps):
 
         # A step of sliding.
         scale[1] = abs(y[1]) + slow
-        rates(p, k1, k2, piece, t, y, f)
-        jacobian(p, k1, k2, piece, t, y, f, scale, n, J, work)
+        rates(p, CLOSED, k1, k2, piece, t, y, f)
+        jacobian(p, CLOSED, k1, k2, piece, t, y, f, scale, n, J, work)
         limit = span
         if p.drive == TABLE:
             for knot in p.knots:
@@ -335,7 +275,7 @@ def run(p, rtol, least, slack, most_steps):
                 for i in range(3):
                     for j in range(n):
                         Z_[i, j] = 0.0
-            error = attempt(p, k1, k2, piece, t, step, y, f, J, scale, rtol, n, Z_, A, order, b, work)
+            error = attempt(p, CLOSED, k1, k2, piece, t, step, y, f, J, scale, rtol, n, Z_, A, order, b, work)
             steps += 1
             if error <= 1.0 or step < 1e-17 or steps > most_steps:
                 break
@@ -396,7 +336,7 @@ def run(p, rtol, least, slack, most_steps):
                 interpolate(y, Z_, NODES[i] * part / step, n, y_)
                 for j in range(n):
                     Z[i, j] = y_[j] - y[j]
-            if attempt(p, k1, k2, piece, t, part, y, f, J, scale, rtol, n, Z, A, order, b, work) == math.inf:
+            if attempt(p, CLOSED, k1, k2, piece, t, part, y, f, J, scale, rtol, n, Z, A, order, b, work) == math.inf:
                 break
             Z_[:], step = Z, part
             interpolate(y, Z_, 1.1, n, y_)
@@ -469,3 +409,71 @@ def run(p, rtol, least, slack, most_steps):
         end, t, y[0] + theta, y[1] / p.radius + ring_omega, track[1], turned, least_1 + least, least_2 + least,
         steps, events, t_least, mode, piece, y[0], y[1], y[2], y[3],
     )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def run(p, rtol, least, slack, most_steps):
+    """Run a scene.
+
+    Parameters
+    ----------
+    p : Problem
+    rtol : float
+        Tolerance of the error estimate of a step. The estimate is of lower order than the step.
+    least : float
+        Reaction at which a contact is lost, in weights of the body.
+    slack : float
+        Relative shift of the full turn, and a thousandth of the relative shift of the threshold of a reversal.
+    most_steps : int
+
+    Returns
+    -------
+    tuple
+        See ``RESULT``.
+
+    """
+    set_valued, y = is_set_valued(p), np.zeros(4)
+
+    # Launch. If the acceleration of the drive is infinite at 0, the motion before `instant` is negligible. Only the
+    # variation with positive slack solves the contact problem at 0 itself.
+    t, instant = 0.0, 0.0
+    if p.drive == POWER and p.exponent < 2.0:
+        instant = 1e-14 if p.exponent < 1.5 else 1e-10
+    theta, ring_omega, _ = drive(p, t)
+    y[0] = p.position - theta
+    speed = ring_omega if p.at_rest else p.speed
+    y[1] = (speed - ring_omega) * p.radius
+    # Where a sinusoidal drive turns back, its velocity is the rounding error of a cosine.
+    rocking = abs(p.amplitude) * TURN * p.frequency if p.drive == SINUSOIDAL else 0.0
+    if abs(speed - ring_omega) <= 4e-16 * max(abs(speed), abs(ring_omega), rocking):
+        y[1] = 0.0
+    track = np.array([0.0, 0.0, p.position, p.position, speed, speed])
+    observe(p, track, p.position, speed, slack)
+    k1, k2 = segment(p, y[0] - p.beta), segment(p, y[0] + p.beta)
+    if y[1] < 0.0:
+        k1, k2 = lower_segments(p, k1, k2, y[0])
+    if p.law >= DAHL and p.model != BELT and y[1] != 0.0:
+        m = p.edges.size
+        for i, k in ((2, k1), (3, k2)):
+            y[i] = math.copysign(steady(p, y[1], p.mu_s[k % m], p.mu_k[k % m]) / p.sigma0, y[1])
+    piece = piece_of(p, y[1])
+    if set_valued and y[1] == 0.0:
+        mode = resting_problem(p, k1, k2, 0.0 if slack > 0.0 else instant, y[0], least)
+    else:
+        mode = sliding_problem(p, k1, k2, piece, t, y, least)
+    t = instant
+    if instant > 0.0 and mode != STICK:
+        theta, ring_omega, _ = drive(p, t)
+        y[0], y[1] = p.position + speed * t - theta, (speed - ring_omega) * p.radius
+        if mode in (FORWARD, BACKWARD):
+            if p.model != BELT and not set_valued:
+                found = passage(p, k1, k2, t, y, least)
+                if found != STICK:
+                    mode = found
+            if not set_valued:
+                piece = piece_of(p, y[1])
+    if set_valued and mode in (FORWARD, BACKWARD):
+        piece = mode if y[1] == 0.0 else piece_of(p, y[1])
+    if mode == BACKWARD and p.model != BELT:
+        k1, k2 = lower_segments(p, k1, k2, y[0])
+    return advance(p, rtol, least, slack, most_steps, track, t, y, k1, k2, piece, mode)

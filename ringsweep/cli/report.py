@@ -78,13 +78,16 @@ def print_events(run: xr.Dataset) -> None:
     kinds = kinds[kinds != "none"]
     counts = [f"{kind} {np.count_nonzero(kinds == kind)}" for kind in dict.fromkeys(kinds.tolist())]
     print("events:", ", ".join(counts) or "none")
+    hits = np.flatnonzero(np.isin(kinds, ("rebound", "closure")))
+    speeds = dict(zip(hits.tolist(), run["impact_speed"].values.tolist(), strict=False)) if len(hits) else {}
     left_out = range(_FIRST, len(kinds) - _LAST)
     for k, kind in enumerate(kinds):
         if k == left_out.start and len(left_out) > 1:
             print(f"  ... {len(left_out)} more are in the file")
         if k not in left_out or len(left_out) == 1:
             who = contacts[k].replace("contact_", " contact ").replace("both", " both contacts").replace("none", "")
-            print(f"  {run['event_time'].values[k]:.9g} s {kind}{who}")
+            speed = f", {speeds[k]:.6g} m/s" if k in speeds else ""
+            print(f"  {run['event_time'].values[k]:.9g} s {kind}{who}{speed}")
 
 
 def _summarise_sample(result: xr.Dataset) -> None:

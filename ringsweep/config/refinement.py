@@ -10,7 +10,7 @@ import numpy as np
 from ringsweep.config.axes import Axes, dimension
 from ringsweep.config.sections import suggestion
 from ringsweep.errors import InputError
-from ringsweep.models import MODELS
+from ringsweep.models import model_of
 from ringsweep.models.scene import Scene
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity, show
@@ -121,9 +121,9 @@ def _also(section: dict[str, Any], scene: Scene) -> tuple[str | None, float | No
         )
     if "also" not in section:
         return None, None
-    model = MODELS[scene.structure.model]
+    model = model_of(scene.structure)
     variables = model.variables
-    numbers = [name for name in model.outcomes if variables[name].dtype == "float64" and name not in model.absent]
+    numbers = [name for name in model.outcomes if name not in model.absent and variables[name].dtype == "float64"]
     also = section["also"]
     if also not in numbers:
         raise InputError("sweep.refine.also", f"{show(also)} is no number of this model" + suggestion(also, numbers))

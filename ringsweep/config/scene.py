@@ -20,7 +20,7 @@ from ringsweep.config.sections import choose, missing_text, read_values, section
 from ringsweep.config.tables import TABLES, read_table
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
-from ringsweep.models import MODELS, parameters
+from ringsweep.models import MODELS, WITH_IMPACT, parameters
 from ringsweep.models.scene import LAW, Scene, Structure
 from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction.formula import NAMES
@@ -59,7 +59,7 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     model = choose(MODELS, scene, "scene.model", "model")
     zones = _zones(scene)
     friction = _read_friction(doc, scene, model, laws)
-    moved = _read_motion(scene, model)
+    moved = _read_motion(scene, model, swept)
     leaves = _read_leaves(scene, model, zones, friction, moved)
     if not friction.names:
         section_of(scene, "friction", "scene.")
@@ -133,13 +133,14 @@ def _read_friction(doc: Document, scene: dict[str, Any], model: str, laws: tuple
     return _Friction(names, own | own_laws(section), curve)
 
 
-def _read_motion(scene: dict[str, Any], model: str) -> Structure:
-    """Structure without a friction law: the drive, and what formulas move the drive and the body."""
+def _read_motion(scene: dict[str, Any], model: str, swept: Collection[str]) -> Structure:
+    """Structure without a friction law: the drive, what formulas move the drive and the body, and impact."""
     drive = "none"
     if "drive" in scene:
         names = dict.fromkeys([*DRIVES, FORMULA_DRIVE])
         drive = choose(names, section_of(scene, "drive", "scene."), "scene.drive.law", "drive law")
-    found = Structure(model, "", drive, own_drive=own_drive(model, scene.get("drive", {})))
+    impact = model in WITH_IMPACT and ("impact" in scene or any(path.startswith("impact.") for path in swept))
+    found = Structure(model, "", drive, own_drive=own_drive(model, scene.get("drive", {})), impact=impact)
     return replace(found, own_force=own_force(scene.get("force"))) if _takes_force(model) else found
 
 
@@ -298,7 +299,8 @@ def _all_paths(
     # Laws bring parameters of each arc, drives do not: a thousand arcs under every law and drive would take a minute.
     kinds = [*product(known, ("none",), ((), ("zone",), zones)), *product(known[:1], DRIVES, ((),))]
     for law, drive, arcs in kinds:
-        paths |= dict.fromkeys(parameters(Structure(model, law, drive, arcs, own_law=own.get(law))))
+        structure = Structure(model, law, drive, arcs, own_law=own.get(law), impact=model in WITH_IMPACT)
+        paths |= dict.fromkeys(parameters(structure))
     if moved is not None:
         paths |= dict.fromkeys(parameters(replace(moved, law=law, own_law=own.get(law))))
     return list(paths)

@@ -9,14 +9,17 @@ import numpy as np
 from ringsweep.compile import lacking
 from ringsweep.models.belt import Belt
 from ringsweep.models.model import Model
-from ringsweep.models.ring import Ring, SingleContactRing
+from ringsweep.models.ring import Ring, RingImpact, SingleContactImpact, SingleContactRing
 from ringsweep.models.scene import Structure, Values
 from ringsweep.quantities.parameters import Parameter
 
-__all__ = ["MODELS", "Model", "Structure", "Values", "add_model", "batch", "parameters"]
+__all__ = ["MODELS", "WITH_IMPACT", "Model", "Structure", "Values", "add_model", "batch", "model_of", "parameters"]
 
 #: Models, by their names in configurations.
 MODELS: dict[str, Model] = {}
+
+#: Models of scenes with the section ``impact``, by the same names.
+WITH_IMPACT: dict[str, Model] = {"ring": RingImpact(), "ring-single-contact": SingleContactImpact()}
 
 
 def add_model(model: Model) -> None:
@@ -40,16 +43,21 @@ for _model in (Ring(), SingleContactRing(), Belt()):
     add_model(_model)
 
 
+def model_of(structure: Structure) -> Model:
+    """The model of a scene of this structure."""
+    return (WITH_IMPACT if structure.impact else MODELS)[structure.model]
+
+
 def parameters(structure: Structure) -> dict[str, Parameter]:
     """Parameters of a scene of this structure by path, in the order of the documentation."""
-    return MODELS[structure.model].parameters(structure)
+    return model_of(structure).parameters(structure)
 
 
 def batch(structure: Structure, values: Values) -> Any:
     """Cells that kernels run over; see :meth:`Model.build`."""
     # Products of values that a double can hold may overflow. Runs of such cells fail.
     with np.errstate(over="ignore", invalid="ignore"):
-        return MODELS[structure.model].build(structure, values)
+        return model_of(structure).build(structure, values)
 
 
 # A file that is put into this folder registers what it holds.

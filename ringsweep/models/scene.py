@@ -42,6 +42,8 @@ class Structure:
         Times (s) and forces (N) of a force from a table, each of shape ``(samples,)``.
     own_drive, own_force : type, optional
         Types of the drive and of the force on the body if the configuration defines them by formulas.
+    impact : bool
+        Whether a run goes on after a contact is lost.
     """
 
     model: str
@@ -54,6 +56,7 @@ class Structure:
     force: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     own_drive: type | None = None
     own_force: type | None = None
+    impact: bool = False
 
     @property
     def law_type(self) -> type:

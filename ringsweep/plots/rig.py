@@ -11,7 +11,7 @@ import xarray as xr
 from ringsweep.compile import take
 from ringsweep.config import load
 from ringsweep.errors import InputError
-from ringsweep.models import MODELS
+from ringsweep.models import model_of
 from ringsweep.physics import ring
 from ringsweep.plots.datasets import configuration, on_ring, require_history, require_one_run
 from ringsweep.quantities.variables import MODES
@@ -46,7 +46,7 @@ class Rig:
     def of(cls, ds: xr.Dataset) -> Rig:
         """Measures of the scene in the attribute ``configuration`` of a dataset."""
         scene = load(configuration(ds)).scene
-        model: Any = MODELS[scene.structure.model]
+        model: Any = model_of(scene.structure)
         bodies = model.build_body({path: np.array([value]) for path, value in scene.values.items()})
         body = take(ring.completed(bodies), 0)
         arcs = tuple((scene.values[f"{a}.center"], scene.values[f"{a}.half_angle"]) for a in scene.structure.arcs)

@@ -30,6 +30,10 @@ DEFINITIONS = {
     "riding": "has stuck since the launch",
 }
 
+#: What becomes of a run after a contact is lost, in the order of the flag values.
+AFTERMATHS = ("held", "recovered", "open", "tumbled")
+HELD, RECOVERED, OPEN, TUMBLED = range(4)
+
 #: Origin of a cell of a refined sweep. An audited cell was inferred, and then run.
 COMPUTED, INFERRED, AUDITED = range(3)
 
@@ -136,6 +140,24 @@ OUTCOMES: dict[str, Variable] = {
     "force_max": Variable("N", "greatest magnitude of the friction force"),
     "jump_max": Variable("rad/s^2", "largest jump of the angular acceleration of the body"),
     "t_jump_max": Variable("s", "time of the largest jump of the acceleration"),
+    "open_time": Variable("s", "time for which a contact is open"),
+    "flight_time": Variable("s", "time for which no contact holds"),
+    "gap_max": Variable("m", "greatest gap of a contact"),
+    "separations": Variable("1", "losses of contacts", dtype="int32"),
+    "impacts": Variable("1", "impacts; the last rebounds of a contact that comes to rest are one", dtype="int32"),
+    "impact_speed_max": Variable("m/s", "greatest normal velocity before an impact"),
+    "impulse_max": Variable("N s", "greatest normal impulse of an impact"),
+    "impact_loss": Variable("J", "energy lost in impacts, relative to the moving ring"),
+    "tumbles": Variable("1", "changes of the order of the contacts", dtype="int32"),
+    "t_recovered": Variable("s", "time from which both contacts hold again"),
+    "aftermath": Variable(
+        "1",
+        "what becomes of the body after a contact is lost",
+        dtype="int8",
+        flags=dict(enumerate(AFTERMATHS)),
+        comment="held: no contact was lost; recovered: all contacts hold at the end, in their first order; open: a "
+        "contact is open at the end; tumbled: the contacts have changed their order",
+    ),
     "steps": Variable("1", "steps of the integration", dtype="int64"),
     "stiffness": Variable("1", "largest stiffness met: magnitude of the eigenvalue times the step"),
     "certified": Variable(
@@ -161,7 +183,7 @@ OUTCOMES: dict[str, Variable] = {
 }
 
 #: Classifications that a refined sweep infers.
-LABELS = ("regime", "motion", "separating_contact")
+LABELS = ("regime", "motion", "separating_contact", "aftermath")
 
 #: Value in files where a whole number is missing, because its cell is inferred.
 MISSING = -1
@@ -174,6 +196,7 @@ OUTCOMES |= {
     for name in (
         *("t_separation", "t_end", "phi_end", "omega_end", "phi_min", "phi_max", "omega_min", "omega_max"),
         *("x_end", "velocity_end", "x_min", "x_max", "velocity_max", "period"),
+        *("open_time", "flight_time", "gap_max", "impact_speed_max", "impulse_max", "impact_loss", "t_recovered"),
     )
 }
 
@@ -225,6 +248,22 @@ HISTORY: dict[str, Variable] = {
     "deflection_1": Variable("m", "deflection of the bristles at contact 1"),
     "deflection_2": Variable("m", "deflection of the bristles at contact 2"),
     "mode": Variable("1", "friction mode", dtype="int8", flags=MODES),
+    "y": Variable("m", "height of the centre of mass above the axis"),
+    "gap_1": Variable("m", "gap of contact 1"),
+    "gap_2": Variable("m", "gap of contact 2"),
+}
+
+#: What happens to the contacts in an event, by its number in histories.
+EVENTS = {1: "separation", 2: "rebound", 3: "closure"}
+
+#: Impacts of a run, along the dimension ``impact``.
+IMPACTS: dict[str, Variable] = {
+    "impact_time": Variable("s", "time of the impact"),
+    "impact_contact": Variable(
+        "1", "contact of the impact", dtype="int8", flags={1: "contact_1", 2: "contact_2", 3: "both"}
+    ),
+    "impact_speed": Variable("m/s", "normal velocity before the impact"),
+    "impulse": Variable("N s", "greatest normal impulse"),
 }
 
 #: Variables of :func:`ringsweep.precision`. For a belt a displacement replaces the angle.

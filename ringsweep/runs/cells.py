@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ringsweep.compile import readable_compile_errors
 from ringsweep.config import Axes, Config
-from ringsweep.models import MODELS, batch
+from ringsweep.models import batch, model_of
 from ringsweep.models.scene import LAW, Scene
 from ringsweep.quantities.variables import OUTCOMES
 from ringsweep.solvers.certificate import with_errors
@@ -83,7 +83,7 @@ class TaskResult:
 def compute_task(config: Config, layout: Layout, positions: NDArray[np.integer]) -> TaskResult:
     """Compute the cells at some positions of the layout."""
     scene, axes = config.scene, config.axes
-    model = MODELS[scene.structure.model]
+    model = model_of(scene.structure)
     indices = dict(zip(axes.sizes, layout.indices(positions), strict=True))
     # Kernels depend on the paths that have a value, but not on the numbers of a table.
     structures = (replace(one, table=None, force=None, curve=None) for one in scene.structures.values())

@@ -1,8 +1,8 @@
-"""Events of a single run as a table: edges of zones, stops, breakaways, reversals of slip, and what ends the run."""
+"""Events of a run as a table: edges of zones, stops, breakaways, reversals, lost contacts, impacts, jams."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +20,8 @@ KINDS = {
     "breakaway": "the body breaks loose",
     "reversal": "the slip changes its direction",
     "separation": "a contact is lost",
+    "rebound": "an open contact hits the race and opens again",
+    "closure": "an open contact hits the race and stays on it",
     "jam": "the rigid body has no motion, or several",
 }
 
@@ -72,7 +74,8 @@ def _changes_of_mode(run: xr.Dataset, outcome: xr.Dataset) -> Iterator[Events]:
 
 
 def _end(run: xr.Dataset, outcome: xr.Dataset) -> Iterator[Events]:
-    if int(outcome.get("separating_contact", 0)):
+    # With impacts the method tells each lost contact.
+    if int(outcome.get("separating_contact", 0)) and "impact_time" not in run:
         contact = np.atleast_1d(outcome["separating_contact"].values).astype(np.int8)
         yield Events("separation", np.atleast_1d(outcome["t_separation"].values), contact)
     if outcome["regime"] == JAMMED:
@@ -83,7 +86,7 @@ def _end(run: xr.Dataset, outcome: xr.Dataset) -> Iterator[Events]:
 FINDERS: tuple[Callable[[xr.Dataset, xr.Dataset], Iterator[Events]], ...] = (_edges, _changes_of_mode, _end)
 
 
-def events(run: xr.Dataset, outcome: xr.Dataset) -> xr.Dataset:
+def events(run: xr.Dataset, outcome: xr.Dataset, told: Iterable[Events] = ()) -> xr.Dataset:
     """Events of a run along the dimension ``event``, in the order of their times.
 
     Parameters
@@ -92,13 +95,15 @@ def events(run: xr.Dataset, outcome: xr.Dataset) -> xr.Dataset:
         History of the run.
     outcome : xarray.Dataset
         Its outcomes.
+    told : iterable of Events
+        Events that the method itself tells.
 
     Returns
     -------
     xarray.Dataset
         The variables of :data:`VARIABLES`. ``rk4`` locates no events but the last.
     """
-    found = [one for finder in FINDERS for one in finder(run, outcome)]
+    found = [*told, *(one for finder in FINDERS for one in finder(run, outcome))]
     times = np.concatenate([one.times for one in found])
     kinds = np.repeat([_NUMBERS[one.kind] for one in found], [len(one.times) for one in found]).astype(np.int8)
     contacts = np.concatenate([one.contacts for one in found])

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ringsweep.config import Config
 from ringsweep.errors import InputError
-from ringsweep.models import MODELS
+from ringsweep.models import model_of
 from ringsweep.quantities.variables import OUTCOMES
 from ringsweep.runs import sampled
 from ringsweep.runs.cells import TaskResult, compute_task
@@ -41,7 +41,7 @@ def bytes_of_cell(config: Config) -> int:
     """Size of the columns of a cell, or of its sums; variables that some solvers leave out are counted."""
     if config.sample is not None:
         return sampled.bytes_of_part(config) * config.sample.replicates
-    model = MODELS[config.scene.structure.model]
+    model = model_of(config.scene.structure)
     names = {*model.outcomes, "steps", "certified", "uncertified_because", "stiffness"} - set(model.absent)
     errors = (
         [f"{name}_error" for name in with_errors(model.outcomes)] if getattr(config.solver, "certify", False) else []

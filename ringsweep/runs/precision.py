@@ -18,7 +18,7 @@ from ringsweep.compile import readable_compile_errors, take
 from ringsweep.config import Config, load, sweepable
 from ringsweep.config.axes import COUNT, dimension
 from ringsweep.errors import InputError
-from ringsweep.models import MODELS, Model, batch
+from ringsweep.models import Model, batch, model_of
 from ringsweep.models.scene import LAW
 from ringsweep.quantities.flags import FAILED
 from ringsweep.quantities.parameters import Parameter
@@ -129,7 +129,7 @@ def _measure(config: Config, target: float, cells: int, rounds: int, progress: b
             f"each of {', '.join(scene.structures)} needs methods and a reference of its own: give one law here",
         )
     structure = scene.structure
-    names = MODELS[structure.model].outcomes
+    names = model_of(structure).outcomes
     contenders, left_out = contenders_for(config)
     best = type(contenders[0])
     total = math.prod(config.axes.sizes.values())
@@ -208,7 +208,7 @@ def _dataset(
 ) -> xr.Dataset:
     """Run times, errors and flags of the contenders in the cells with these numbers, labelled."""
     scene, axes = config.scene, config.axes
-    model = MODELS[scene.structure.model]
+    model = model_of(scene.structure)
     names = model.outcomes
     columns: dict[str, tuple[tuple[str, ...], Any]] = {
         "time_per_run": (("contender",), [median(one.seconds) / len(sample) for one in timed]),

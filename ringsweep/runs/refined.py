@@ -20,7 +20,7 @@ from ringsweep.storage.chunks import Layout
 SEED = 18
 
 # No classification has as many flags.
-_FLAGS = 24
+_FLAGS = 13
 
 Columns = dict[str, NDArray[Any]]
 

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from ringsweep.compile import readable_compile_errors, take
 from ringsweep.config import Config, with_values
 from ringsweep.errors import InputError
-from ringsweep.models import MODELS, batch
+from ringsweep.models import batch, model_of
 from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import turn
 from ringsweep.quantities.flags import REGIMES
-from ringsweep.quantities.variables import HISTORY
-from ringsweep.runs.events import events, side_by_side
+from ringsweep.quantities.variables import AFTERMATHS, EVENTS, HISTORY, IMPACTS
+from ringsweep.runs.events import Events, events, side_by_side
 from ringsweep.runs.executors import Execution, interruptible
 from ringsweep.runs.sweep import compute
 from ringsweep.storage.provenance import attributes
@@ -106,8 +106,9 @@ def _history(config: Config, samples: int) -> xr.Dataset:
     runs, tables = {}, {}
     for law, structure in config.scene.structures.items():
         own = outcome.sel(friction_law=law) if config.axes.sizes else outcome
-        runs[law] = _open_contact_at_end(_trace(config, structure, samples), own)
-        tables[law] = events(runs[law], own)
+        run, told = _trace(config, structure, samples)
+        runs[law] = _open_contact_at_end(run, own)
+        tables[law] = events(runs[law], own, told)
     if not config.axes.sizes:
         (joined,), (table,) = runs.values(), tables.values()
         words = _describe(outcome)
@@ -119,14 +120,15 @@ def _history(config: Config, samples: int) -> xr.Dataset:
     return joined.merge(outcome).merge(table).assign_attrs(attributes(config) | {"outcome": words})
 
 
-def _trace(config: Config, structure: Structure, samples: int) -> xr.Dataset:
-    """History under one friction law."""
-    model = MODELS[structure.model]
+def _trace(config: Config, structure: Structure, samples: int) -> tuple[xr.Dataset, list[Events]]:
+    """History under one friction law, and events of open contacts."""
+    model = model_of(structure)
     cell = batch(structure, {path: np.array([value]) for path, value in config.scene.values.items()})
     names = model.history(structure)
     with readable_compile_errors():
         times, rows = config.solver.history(cell, samples, len(names))
     columns = dict(zip(names, rows.T, strict=True))
+    open_contacts = {name: columns.pop(name) for name in names if name.startswith("event_")}
     for name in columns:
         if name.startswith("normal_"):
             # Where friction jumps, a normal reaction may jump below zero. There the contact opens and the run ends.
@@ -135,14 +137,44 @@ def _trace(config: Config, structure: Structure, samples: int) -> xr.Dataset:
         drive = take(cell.drive, 0)
         motion = np.array([turn(drive, t) for t in times.tolist()])
         columns |= dict(zip(model.driven, motion.T, strict=False))
-    return xr.Dataset(
+    variables = HISTORY | model.own_variables
+    run = xr.Dataset(
         {
-            name: ("time", column.astype(HISTORY[name].dtype), HISTORY[name].attributes)
+            name: ("time", column.astype(variables[name].dtype), variables[name].attributes)
             for name, column in columns.items()
             if name not in model.absent
-        },
+        }
+        | (_impacts(open_contacts) if open_contacts else {}),
         coords={"time": ("time", times, {"long_name": "time", "units": "s", "axis": "T"})},
     )
+    return run, _events_of(open_contacts) if open_contacts else []
+
+
+def _rows_of(events: dict[str, NDArray[np.float64]]) -> NDArray[np.intp]:
+    """Rows of a history in which each event shows first; those before the first event are left out."""
+    numbers, first = np.unique(events["event_number"], return_index=True)
+    return np.asarray(first[numbers > 0])
+
+
+def _impacts(events: dict[str, NDArray[np.float64]]) -> dict[str, Any]:
+    """Impacts of a run as variables of its history."""
+    rows = _rows_of(events)
+    rows = rows[events["event_event"][rows] > 1]
+    columns = {"impact_time": "time", "impact_contact": "contact", "impact_speed": "speed", "impulse": "impulse"}
+    return {
+        name: ("impact", events[f"event_{column}"][rows].astype(IMPACTS[name].dtype), IMPACTS[name].attributes)
+        for name, column in columns.items()
+    }
+
+
+def _events_of(events: dict[str, NDArray[np.float64]]) -> list[Events]:
+    """Lost contacts and impacts of a run as events."""
+    rows = _rows_of(events)
+    found = []
+    for number, kind in EVENTS.items():
+        own = rows[events["event_event"][rows] == number]
+        found.append(Events(kind, events["event_time"][own], events["event_contact"][own].astype(np.int8)))
+    return found
 
 
 # A last normal reaction above this share of the largest of the run means that the reaction jumped to zero.
@@ -151,6 +183,9 @@ _JUMP = 1e-6
 
 def _open_contact_at_end(run: xr.Dataset, outcome: xr.Dataset) -> xr.Dataset:
     """A history whose last instant stands twice if a jump of friction opened a contact: before and after the jump."""
+    if "gap_1" in run:
+        # The run goes on after the contact has opened.
+        return run
     separating = int(outcome.get("separating_contact", 0))
     names = [name for k, name in ((1, "normal_1"), (2, "normal_2")) if separating & k and name in run]
     largest = max((float(run[name].max()) for name in ("normal_1", "normal_2") if name in run), default=0.0)
@@ -164,6 +199,8 @@ def _resample(run: xr.Dataset, times: NDArray[np.float64]) -> xr.Dataset:
     """A history at other times. Numbers are interpolated; classifications have the value of the sample before."""
     # An event stores the states before and after it at one instant: interpolation needs the second.
     run = run.isel(time=np.append(np.diff(run["time"]) > 0.0, True))
+    # Each law has impacts of its own.
+    run = run.drop_dims("impact", errors="ignore")
     own = run["time"].values
     before = np.maximum(np.searchsorted(own, times, side="right") - 1, 0)
     found = run.isel(time=before).assign_coords(time=("time", times, run["time"].attrs))
@@ -179,9 +216,12 @@ def _describe(outcome: xr.Dataset) -> str:
     certificate = "" if outcome["certified"] == 1 else ", not certified"
     if "t_separation" in outcome and np.isfinite(outcome["t_separation"]):
         contact = ("no contact", "contact 1", "contact 2", "both contacts")[int(outcome["separating_contact"])]
+        after = ""
+        if "aftermath" in outcome:
+            after = f", then {AFTERMATHS[int(outcome['aftermath'])]} with {int(outcome['impacts'])} impacts"
         return (
             f"{regime} ({REGIMES[int(outcome['motion'])]}), {contact}, "
-            f"t = {float(outcome['t_separation']):.6g} s{certificate}"
+            f"t = {float(outcome['t_separation']):.6g} s{after}{certificate}"
         )
     period = ""
     if "period" in outcome and np.isfinite(outcome["period"]):

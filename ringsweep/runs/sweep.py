@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ringsweep.config import Axes, Config, load, read_axes, read_scene, read_solver, refined, sweepable
 from ringsweep.config.axes import dimension
 from ringsweep.errors import InputError
-from ringsweep.models import MODELS
+from ringsweep.models import model_of
 from ringsweep.quantities.variables import INFERRED, error_attribute
 from ringsweep.runs import sampled
 from ringsweep.runs.cells import TaskResult, compute_task
@@ -253,7 +253,7 @@ def compute(
     if found is not None and config.refine is not None:
         complete(config.refine, found, tuple(slice(None) for _ in sizes), columns)
         columns |= {name: with_nan(columns[name]) for name in gaps(columns)}
-    variables = MODELS[config.scene.structure.model].variables
+    variables = model_of(config.scene.structure).variables
     results = results.assign(
         {
             name: (tuple(config.axes.sizes), column, variables[name].attributes | error_attribute(name, columns))
@@ -362,7 +362,7 @@ def _write_file(config: Config, target: Path, layout: Layout, checkpoint: Checkp
             within={name: dims for name, (dims, _) in known.items()},
         )
         return
-    variables = MODELS[config.scene.structure.model].variables
+    variables = model_of(config.scene.structure).variables
     if found is None or config.refine is None:
         netcdf.write(target, checkpoint.working_folder, frame, variables, layout, checkpoint.chunks())
         return

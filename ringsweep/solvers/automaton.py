@@ -312,6 +312,7 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
         t, y = modes.initial_state(scene)
         status, mode = modes.initial_mode(scene, t, y)
         record = _begin(family(scene.law), scene, mode, t, y, tolerances, c)
+        record = recorder.after_event(scene, record, mode, t)
         control = StepControl(1e-6 * scene.span, 0.0, 0.0)
         audit, guard_fall_rate, local = Audit(0.0, 0.0, 0.0), 0.0, LocalErrors(0.0, 0.0, 0.0, 0.0)
         n = stalled = 0
@@ -354,7 +355,9 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
             if audited and s > 0.0 and is_checked(n):
                 audit = audit_step(family(scene.law), scene, step, scratch, tolerances[0], audit)
             t, status, mode, y = _after_step(scene, mode, guard, t, s, h_max, y_next)
-            if audited and status != RUNNING and guard >= 0 and s > 0.0:
+            if guard >= 0:
+                record = recorder.after_event(scene, record, mode, t)
+            if audited and guard >= 0 and s > 0.0 and (status != RUNNING or modes.first_loss(step.mode, mode)):
                 guard_fall_rate = fall_rate(family(scene.law), scene, step, scratch, guard)
             if s == 0.0 and status != RUNNING:
                 # The history must show the end of a mode that lasts no time.

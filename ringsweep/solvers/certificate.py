@@ -13,10 +13,19 @@ from ringsweep.quantities.flags import ANSWERS_DIFFER, CERTIFIED, CLOSE_CALL, FA
 from ringsweep.quantities.variables import OUTCOMES
 
 #: Outcomes on which two resolutions must agree for a certificate.
-_CERTIFIED = ("regime", "motion", "separating_contact")
+_CERTIFIED = ("regime", "motion", "separating_contact", "aftermath", "word")
 
 # Outcomes that may be NaN in a certified run.
-_MAY_LACK = ("t_separation", "first_slip", "period", "stops_per_cycle", "swing", "jump_max", "t_jump_max")
+_MAY_LACK = (
+    "t_separation",
+    "t_recovered",
+    "first_slip",
+    "period",
+    "stops_per_cycle",
+    "swing",
+    "jump_max",
+    "t_jump_max",
+)
 
 # Relative difference of two final states that rounding explains.
 _SAME = 1e-14
@@ -244,7 +253,7 @@ def _differences(
     for unit in set(units.tolist()):
         of_unit = units == unit
         largest = np.nanmax(np.abs(a[:, of_unit]), axis=1, initial=0.0)
-        scale[:, of_unit] = (largest + (0.0 if unit.startswith("m") else 1.0))[:, None]
+        scale[:, of_unit] = (largest + (0.0 if unit[0] in "mNJ" else 1.0))[:, None]
     return difference, scale
 
 

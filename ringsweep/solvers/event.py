@@ -111,7 +111,7 @@ class _Piecewise(Method):
         finer, distance = self, np.full(len(rows), np.inf)
         looser = self.looser(batch)
         second_rows, more_steps, _ = self.integrate(
-            _select(batch, open_cells), len(outcomes), audit=False, tolerances=looser
+            audit.disturbed(_select(batch, open_cells)), len(outcomes), audit=False, tolerances=looser
         )
         new_rows, new_steps, audits = rows[open_cells], steps[open_cells], audits[open_cells]
         for retry in range(_MOST_RETRIES + 1):
@@ -130,7 +130,10 @@ class _Piecewise(Method):
             if retry == _MOST_RETRIES or not len(open_cells) or not 1e-15 <= finer.tolerances()[0] < looser[0]:
                 break
             second_rows = rows[open_cells]
-            new_rows, more_steps, audits = finer.integrate(_select(batch, open_cells), len(outcomes), audit=True)
+            cells = _select(batch, open_cells)
+            # Each run is compared with a disturbed one, or a disturbed run with one that is not.
+            cells = cells if retry % 2 else audit.disturbed(cells)
+            new_rows, more_steps, audits = finer.integrate(cells, len(outcomes), audit=True)
             new_steps = more_steps
         return Result(rows, steps=steps, certified=because == CERTIFIED, because=because, errors=bounds)
 

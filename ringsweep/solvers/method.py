@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from ringsweep.compile import has_known_source, lacking
 from ringsweep.errors import InputError
-from ringsweep.models import MODELS
+from ringsweep.models import model_of
 from ringsweep.models.scene import Structure
+from ringsweep.physics.friction import Dynamic, family_of
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,13 @@ class Method(ABC):
             If the method does not take the law; if law, drive or model lack a function that it needs; or if the file of
             one of them is not known to the cache of compiled code.
         """
-        needs, model = self.needs(structure), MODELS[structure.model]
+        if structure.impact and family_of(structure.law_type) is Dynamic:
+            raise InputError(
+                "scene.impact",
+                f"friction law {structure.law} has bristles, which have no state in an impact: "
+                "choose a law without bristles, or leave impact out",
+            )
+        needs, model = self.needs(structure), model_of(structure)
         law, drive = structure.law_type, structure.drive_type
         for path, kind, name, source, cls, members in (
             ("scene.friction.law", "friction law", structure.law, law, law, needs.law),

@@ -87,6 +87,10 @@ class RK4(Method):
             raise InputError(
                 "solver.method", f"rk4 does not take friction law {structure.law}, whose bonds snap: auto takes it"
             )
+        if structure.impact:
+            raise InputError(
+                "solver.method", "rk4 does not go on after a contact is lost: auto does; or leave scene.impact out"
+            )
         super().check(structure)
 
     def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:

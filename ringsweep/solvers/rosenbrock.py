@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ringsweep.compile import unrolled
-from ringsweep.models.interface import implicit  # noqa: F401 - the generated code of a step calls it
+from ringsweep.compile import function_from_lines, hook, unrolled
+from ringsweep.models.interface import implicit
 
 STAGES = 8
 GAMMA = 0.21193756319429014
@@ -160,8 +160,29 @@ def step(length, x, scene, start, h, forcings, bends):
     return [*lines, f"return ({after}), ({error})"]
 
 
+@hook(optional=True)
+def factorise(bristles, jacobian, shift):
+    """Factors of ``shift I - J`` for :func:`solve`; see :func:`implicit.linearise` for `bristles` and `jacobian`."""
+    return _factorise(bristles, jacobian, shift)
+
+
+@hook(optional=True)
+def solve(bristles, factors, right):
+    """Solution k of ``(shift I - J) k = right``, with the result of :func:`factorise`; a tuple like `right`."""
+    return _solve(bristles, factors, right)
+
+
+@hook(optional=True)
+def acceleration_error(bristles, jacobian, error, scales):
+    """Error of the acceleration that follows from the `error` of velocity and deflections, in units of the last scale.
+
+    Zero without bristles.
+    """
+    return _acceleration_error(bristles, jacobian, error, scales)
+
+
 @unrolled
-def factorise(count, bristles, jacobian, shift):
+def _factorise(count, bristles, jacobian, shift):
     """Factors of ``shift I - J`` for :func:`solve`.
 
     J is the Jacobian of place, velocity and deflections. See :func:`ringsweep.models.interface.implicit.linearise` for
@@ -181,8 +202,7 @@ def factorise(count, bristles, jacobian, shift):
 
 
 @unrolled
-def solve(count, bristles, factors, right):
-    """Solution k of ``(shift I - J) k = right``, with the result of :func:`factorise`; a tuple like `right`."""
+def _solve(count, bristles, factors, right):
     numbers = range(count)
     return [
         "m00, m01, m10, m11, eliminated = factors",
@@ -196,13 +216,43 @@ def solve(count, bristles, factors, right):
 
 
 @unrolled
-def acceleration_error(count, bristles, jacobian, error, scales):
-    """Error of the acceleration that follows from the `error` of velocity and deflections, in units of the last scale.
-
-    Zero without bristles.
-    """
+def _acceleration_error(count, bristles, jacobian, error, scales):
     terms = "".join(f" + bristles[{i}][0] * error[{i + 2}]" for i in range(count))
     return [f"return abs(jacobian[3] * error[1]{terms}) / scales[{count + 2}]" if count else "return 0.0"]
+
+
+# The velocity relaxes fastest, so that it is eliminated first, and nothing else needs a pivot.
+_ELIMINATED = (1, 3, 2, 0)
+
+
+def _factors_of_four() -> list[str]:
+    lines = [f"a{i}{j} = {'shift ' if i == j else ''}- bristles.rows[{i}][{j}]" for i in range(4) for j in range(4)]
+    for place, i in enumerate(_ELIMINATED):
+        lines.append(f"p{i} = 1.0 / a{i}{i}")
+        for j in _ELIMINATED[place + 1 :]:
+            lines.append(f"a{j}{i} *= p{i}")
+            lines += [f"a{j}{k} -= a{j}{i} * a{i}{k}" for k in _ELIMINATED[place + 1 :]]
+    rows = "".join(f"({', '.join(f'a{i}{j}' for j in range(4))}), " for i in range(4))
+    return [*lines, f"return ({rows}), (p0, p1, p2, p3), 1.0 / shift"]
+
+
+def _solution_of_four() -> list[str]:
+    lines = ["a, p, rest = factors", *(f"r{i} = right[{i}]" for i in range(4))]
+    for place, i in enumerate(_ELIMINATED):
+        lines += [f"r{j} -= a[{j}][{i}] * r{i}" for j in _ELIMINATED[place + 1 :]]
+    for place, i in reversed(list(enumerate(_ELIMINATED))):
+        known = "".join(f" - a[{i}][{j}] * r{j}" for j in _ELIMINATED[place + 1 :])
+        lines.append(f"r{i} = (r{i}{known}) * p[{i}]")
+    return [*lines, "return r0, r1, r2, r3, rest * right[4]"]
+
+
+factorise.implements(implicit.Coupled)(function_from_lines("bristles, jacobian, shift", _factors_of_four(), {}))
+solve.implements(implicit.Coupled)(function_from_lines("bristles, factors, right", _solution_of_four(), {}))
+
+
+@acceleration_error.implements(implicit.Coupled)
+def _no_acceleration_error(bristles, jacobian, error, scales):
+    return 0.0
 
 
 @unrolled

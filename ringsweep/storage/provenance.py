@@ -19,7 +19,7 @@ import numpy as np
 
 from ringsweep.compile import SOURCES_DIGEST
 from ringsweep.config import Config
-from ringsweep.models import MODELS
+from ringsweep.models import model_of
 from ringsweep.models.scene import LAW
 
 #: What a paper that uses a result can cite.
@@ -111,7 +111,7 @@ def differences(old: Mapping[str, str], new: Mapping[str, str]) -> str:
 
 def attributes(config: Config) -> dict[str, Any]:
     """Attributes of a result. They are enough to compute it again."""
-    model = MODELS[config.scene.structure.model]
+    model = model_of(config.scene.structure)
     versions = {"python": platform.python_version(), **environment(), "xarray": _version("xarray")}
     digest = versions.pop("sources")
     methods = {law: config.solver.resolved(structure) for law, structure in config.scene.structures.items()}

@@ -100,4 +100,24 @@ def same_statistics(batch, rows, second_rows):
     return np.zeros(len(rows), dtype=bool)
 
 
-MEMBERS = (violation, energy, undecided, same_statistics)
+@hook(optional=True)
+def disturbed(batch):
+    """Cells of which a number differs by rounding, for the second run of a certificate.
+
+    Where a motion is in closed form, two resolutions agree to the last bit, and do not show how its rounding grows. It
+    runs outside kernels.
+
+    Parameters
+    ----------
+    batch : NamedTuple
+        Cells. The type of the batch decides which body runs.
+
+    Returns
+    -------
+    NamedTuple
+        By default `batch` itself.
+    """
+    return batch
+
+
+MEMBERS = (violation, energy, undecided, same_statistics, disturbed)

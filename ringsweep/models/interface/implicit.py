@@ -10,11 +10,25 @@ two time derivatives. A *view* is what a solver needs to know of a state: the gu
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 from ringsweep.compile import hook, inlined
 from ringsweep.physics import drives
 
 #: Tolerance of an implicit step, in units of the tolerance of the series.
 IMPLICIT_TOLERANCE = 1e3
+
+
+class Coupled(NamedTuple):
+    """In place of the bristles of :func:`linearise`: a state of four coupled components, and a fifth that is constant.
+
+    Attributes
+    ----------
+    rows : tuple of tuple of float
+        Jacobian of the four components.
+    """
+
+    rows: Any
 
 
 @hook(optional=True)
@@ -182,7 +196,8 @@ def linearise(scene, mode, common, t, forcing, x):
         ``(rates, jacobian, bristles, by_time)``. ``rates`` is what :func:`rates` returns. ``jacobian`` has four
         numbers: the Jacobian of place and velocity, row by row. ``bristles`` has one tuple of three numbers for each
         bundle of bristles: derivative of the sliding acceleration (m/s^2) with respect to the deflection, and
-        derivatives of the rate of the deflection (m/s) with respect to the sliding velocity and to the deflection.
+        derivatives of the rate of the deflection (m/s) with respect to the sliding velocity and to the deflection; or
+        it is :class:`Coupled`.
         ``by_time`` is the partial derivative of the rates with respect to time.
     """
 

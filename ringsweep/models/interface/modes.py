@@ -116,6 +116,23 @@ def sticks(scene, mode):
     return mode.sign == 0 or mode.region < 0
 
 
+@hook(optional=True)
+def first_loss(before, after):
+    """Whether an event between two modes is the first loss of a contact of a run that goes on.
+
+    Parameters
+    ----------
+    before, after : NamedTuple
+        Modes before and after the event.
+
+    Returns
+    -------
+    bool
+        By default false.
+    """
+    return False
+
+
 @hook
 def in_space(scene, t, y):
     """Place and velocity of the body in space.

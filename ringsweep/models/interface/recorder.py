@@ -102,6 +102,29 @@ def conclude(scene, record, status, t, place, velocity):
     """
 
 
+@hook(optional=True)
+def after_event(scene, record, mode, t):
+    """Record after an event, at which a mode begins. Methods of constant step do not call it.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    record : NamedTuple
+        Record before the event.
+    mode : NamedTuple
+        The mode that begins; also the first one of a run.
+    t : float
+        Time of the event, s.
+
+    Returns
+    -------
+    NamedTuple
+        By default `record`.
+    """
+    return record
+
+
 MEMBERS = (begin, observe, conclude)
 #: What methods that locate events need in addition.
 EVENT_MEMBERS = (enter,)

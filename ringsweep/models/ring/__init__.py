@@ -2,6 +2,9 @@
 
 # Import of these modules registers bodies for functions of `ringsweep.models.interface`.
 from ringsweep.models.ring import audit, bristles, creep, rk4, series  # noqa: F401
+from ringsweep.models.ring.impact import audit as _audit  # noqa: F401
+from ringsweep.models.ring.impact import creep as _creep  # noqa: F401
+from ringsweep.models.ring.impact.model import RingImpact, SingleContactImpact
 from ringsweep.models.ring.model import Ring, SingleContactRing
 
-__all__ = ["Ring", "SingleContactRing"]
+__all__ = ["Ring", "RingImpact", "SingleContactImpact", "SingleContactRing"]

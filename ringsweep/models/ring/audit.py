@@ -146,7 +146,8 @@ _FALL_FACTOR = 5.0
 
 
 @audit.undecided.implements(ring.Ring, ring.BristleRing)
-def _undecided(batch, rows, second_rows, fall_rates):
+def undecided_on_contacts(batch, rows, second_rows, fall_rates):
+    """Which runs are so close to another regime that their error could change it, see :func:`audit.undecided`."""
     # Comparisons with NaN are false.
     with np.errstate(invalid="ignore", over="ignore"):
         return _is_near_another_regime(

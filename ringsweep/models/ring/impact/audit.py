@@ -1,0 +1,143 @@
+"""Audit of runs that go on after a contact is lost.
+
+A pivot is put into the balances as :mod:`ringsweep.models.ring.impact.pivot` writes them, with the accelerations of the
+dense output: they give the reaction and the friction, which must obey the law. Gaps follow from the places of the
+balls.
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+import numpy as np
+
+from ringsweep.compile import inlined
+from ringsweep.models.interface import audit
+from ringsweep.models.ring.audit import undecided_on_contacts
+from ringsweep.models.ring.impact import pivot
+from ringsweep.models.ring.impact.mode import (
+    BOTH,
+    NONE,
+    angle_when_closed,
+    closed_mode,
+    coefficients_there,
+    holding,
+    place_of,
+    ring_of,
+)
+from ringsweep.models.ring.impact.record import OUTCOMES
+from ringsweep.models.ring.impact.switch import motion_of
+from ringsweep.models.ring.record import Outcome
+from ringsweep.models.ring.series import REACTION_TOLERANCE
+from ringsweep.physics import ring
+from ringsweep.physics.friction.velocity import friction_at, stiction_band
+from ringsweep.physics.impact import ImpactRing, contact_of, inertia
+from ringsweep.physics.zones import PER_TURN, edge_ahead, roughness
+from ringsweep.quantities.flags import SEPARATING
+
+# Rounding of an acceleration or a reaction as a share of its largest terms, and of a gap as a share of rho.
+_ROUNDING, _GAP_ROUNDING = 1e-12, 1e-12
+
+# Distance from the edge of a zone within which both sides are right, rad.
+_ON_EDGE = 1e-8
+
+
+@inlined
+def _larger(a, b):
+    """The larger of two violations; infinite if `b` is not a number."""
+    return max(a, b) if b < inf else inf
+
+
+@audit.violation.implements(ImpactRing)
+def _violation(scene, mode, forcing, y, rates, s, tolerance):
+    if mode.open == NONE:
+        phi = angle_when_closed(y[0], mode.turned)
+        return audit.violation(
+            ring_of(scene, mode.turned), closed_mode(mode), forcing, (phi, y[1]), (rates[0], rates[1]), s, tolerance
+        )
+    motion, largest = motion_of(scene, y, forcing[1]), 0.0
+    allowed = scene.balls.reach * (_GAP_ROUNDING + tolerance)
+    for contact in (1, 2):
+        if (contact == 1 or ring.contact_count(scene.closed.body) == 2) and mode.open & contact:
+            largest = _larger(largest, -contact_of(scene.balls, contact, motion, 0.0).gap / allowed)
+    if mode.open == BOTH:
+        return largest, 0.0
+    violation, power = _violation_on_one_contact(scene, mode, forcing, y, rates, s, tolerance)
+    return _larger(largest, violation), power
+
+
+@inlined
+def _violation_on_one_contact(scene, mode, forcing, y, rates, s, tolerance):
+    body, balls = scene.closed.body, scene.balls
+    theta, ring_omega, ring_epsilon = forcing
+    f = pivot.frame(scene, holding(mode), mode.turned, y, ring_omega)
+    v, largest = y[1], 0.0
+    # psi_dot = (v + rho eta_dot)/R + ring_omega, and alpha = psi - eta but for a constant.
+    psi_dd = (rates[1] + balls.reach * rates[3]) / body.radius + ring_epsilon
+    alpha_dd = psi_dd - rates[3]
+    square, load = f.psi_dot * f.psi_dot, pivot.size(scene, f) + balls.reach * abs(psi_dd)
+    normal = body.mass * (pivot.load(scene, f) + f.w * psi_dd)
+    along = body.mass * (balls.reach * alpha_dd + f.u * psi_dd - f.w * square + body.gravity * f.sin_alpha)
+    mu_s, mu_k = roughness(scene.closed.surface, (f.alpha - theta) * PER_TURN, 0.0)
+    of_mode = coefficients_there(scene, place_of(mode))
+    if of_mode[0] != mu_s or of_mode[1] != mu_k:
+        place, surface = place_of(mode), scene.closed.surface
+        ahead = abs(edge_ahead(surface, place, 1) - (f.alpha - theta))
+        largest = inf if min(ahead, abs((f.alpha - theta) - edge_ahead(surface, place, -1))) > _ON_EDGE else 0.0
+        mu_s, mu_k = of_mode[0], of_mode[1]
+    # Errors of the rates, and of friction by that of the sliding velocity, which the implicit steps allow.
+    speed = body.radius * (1.0 + abs(f.psi_dot) + abs(f.alpha_dot))
+    if mode.region < 0:
+        speed = min(speed, 1e3 * stiction_band(scene.law))
+    relaxation = 0.0
+    if mode.sign == 0:
+        short = max(0.0, abs(along) - mu_s * normal)
+    else:
+        mu, slope = friction_at(scene.law, abs(v), (mu_s, mu_k))
+        short = abs(along + (mu if v > 0.0 else -mu) * normal)
+        relaxation = abs(slope) * (pivot.size(scene, f) + abs(normal) / body.mass)
+        largest = _larger(largest, -mode.sign * v / (tolerance * speed))
+    moment = inertia(body) * psi_dd + f.w * normal - f.q * along
+    rate = (1.0 / s + relaxation) * tolerance * speed + _ROUNDING * load
+    per_force = 1.0 / (body.mass * (rate * REACTION_TOLERANCE * 1e-2 + REACTION_TOLERANCE * tolerance * load))
+    largest = _larger(largest, short * per_force)
+    largest = _larger(largest, -normal * per_force)
+    largest = _larger(largest, abs(moment) * per_force / (balls.reach + abs(inertia(body)) / (body.mass * balls.reach)))
+    return largest, along * (v + body.radius * ring_omega)
+
+
+@audit.energy.implements(ImpactRing)
+def _energy(scene, forcing, y):
+    body, motion = scene.closed.body, motion_of(scene, y, forcing[1])
+    spin = 0.0 if ring.contact_count(body) == 1 else inertia(body) * motion.psi_dot * motion.psi_dot
+    speed = motion.x_dot * motion.x_dot + motion.y_dot * motion.y_dot
+    return 0.5 * body.mass * speed + 0.5 * spin + body.mass * body.gravity * motion.y
+
+
+# Largest violation of the impact law in a certified run, as a share of the velocities.
+_MOST_VIOLATION = 1e-9
+
+
+@audit.undecided.implements(ImpactRing)
+def _undecided(batch, rows, second_rows, fall_rates):
+    own = len(Outcome._fields)
+    a, b = (dict(zip(OUTCOMES, found[:, own:].T, strict=True)) for found in (rows, second_rows))
+    found = undecided_on_contacts(batch.closed, _lost(rows[:, :own]), _lost(second_rows[:, :own]), fall_rates)
+    return found | ~(np.maximum(a["impact_violation"], b["impact_violation"]) <= _MOST_VIOLATION)
+
+
+# Share by which the restitution of a second run differs: some rounding errors.
+_DISTURBANCE = 1e-14
+
+
+@audit.disturbed.implements(ImpactRing)
+def _disturbed(batch):
+    return batch._replace(restitution=batch.restitution * (1.0 - _DISTURBANCE))
+
+
+def _lost(rows):
+    """Outcomes in which the separating contacts are all that have been open: their least reaction is zero."""
+    outcome = Outcome(*rows.T)
+    lost = 1.0 * (outcome.normal_min_1 == 0.0) + 2.0 * (outcome.normal_min_2 == 0.0)
+    contacts = np.where(outcome.regime == SEPARATING, lost, outcome.separating_contact)
+    return np.column_stack(outcome._replace(separating_contact=contacts))

@@ -1,0 +1,264 @@
+"""Implicit steps of a body that may leave the race, in the stiction band of a smooth law.
+
+The state is ``(psi - theta, v, eta, eta_dot, code)``, see :mod:`mode`; while both contacts hold eta is zero. So no
+state is the difference of two large numbers.
+"""
+
+from __future__ import annotations
+
+from math import cos, inf, pi, sin, sqrt
+from typing import Any, NamedTuple
+
+from ringsweep.compile import inlined
+from ringsweep.models.interface import implicit
+from ringsweep.models.interface.shock import Located
+from ringsweep.models.ring.impact import pivot
+from ringsweep.models.ring.impact.mode import (
+    FIRST,
+    NONE,
+    TURNED,
+    closed_mode,
+    coefficients_there,
+    delta_when_closed,
+    holding,
+    place_of,
+    ring_of,
+)
+from ringsweep.models.ring.impact.rows import row_of
+from ringsweep.physics import drives, ring
+from ringsweep.physics.friction.velocity import friction_in, region_bounds, stiction_band
+from ringsweep.physics.impact import ImpactRing, inertia, side_of
+from ringsweep.physics.zones import edge_ahead
+
+# Error allowed to a gap, in units of that allowed to the angle: the instant of an impact follows from it.
+_GAP_TOLERANCE = 1e-2
+
+# A contact that pivots crosses an edge this far behind it, rad, so that it does not cross back by rounding.
+_BEYOND = 1e-12
+
+
+class Motion(NamedTuple):
+    """Motion of the body, and what recorder and history need besides.
+
+    Attributes
+    ----------
+    psi, psi_dot, psi_dd : float
+        Angle, rad, and its derivatives.
+    normal_1, normal_2, gap_1, gap_2 : float
+        Reactions, N, and measures of the gaps, m.
+    code : float
+        Code of the state.
+    determinant, load_1, load_2 : float
+        How near to zero the guards of the same name may come before their roots are looked for.
+    """
+
+    psi: float
+    psi_dot: float
+    psi_dd: float
+    normal_1: float
+    normal_2: float
+    gap_1: float
+    gap_2: float
+    code: float
+    determinant: float
+    load_1: float
+    load_2: float
+
+
+class Common(NamedTuple):
+    """What the equations have in common within a step: that of the closed ring, and coefficients of the one surface."""
+
+    closed: Any
+    mu_s: float
+    mu_k: float
+
+
+@inlined
+def _closed_state(mode, x):
+    return (x[0] - pi if mode.turned == 1 else x[0]), x[1]
+
+
+@implicit.to_implicit.implements(ImpactRing)
+def _to_implicit(scene, forcing, y):
+    return y[0] - forcing[0], y[1], y[2], y[3], y[6]
+
+
+@implicit.from_implicit.implements(ImpactRing)
+def _from_implicit(scene, forcing, x):
+    return x[0] + forcing[0], x[1], x[2], x[3], 0.0, 0.0, x[4]
+
+
+@implicit.common.implements(ImpactRing)
+def _common(scene, mode, forcing, x):
+    closed = implicit.common(ring_of(scene, mode.turned), closed_mode(mode), forcing, _closed_state(mode, x))
+    mu_s, mu_k, _ = coefficients_there(scene, place_of(mode))
+    return Common(closed, mu_s, mu_k)
+
+
+@implicit.is_stiff.implements(ImpactRing)
+def _is_stiff(scene, mode, y, linear):
+    # A gap that has just opened grows from zero: its first step is a series.
+    if mode.open != NONE and y[2] == 0.0:
+        return False
+    body, (_, acceleration, _, _, _), decay = scene.closed.body, linear[0], -linear[1][3]
+    natural_frequency = sqrt(body.gravity / body.radius) + abs(y[1]) / body.radius
+    return decay > 50.0 * natural_frequency and abs(acceleration) < 0.01 * decay * stiction_band(scene.law)
+
+
+@implicit.error_scales.implements(ImpactRing)
+def _error_scales(scene, tolerance, x):
+    place, speed = implicit.error_scales(scene.closed, tolerance, (x[0], x[1]))
+    gap = tolerance * _GAP_TOLERANCE
+    return place, speed, gap, gap * (1.0 + sqrt(scene.closed.body.gravity / scene.balls.reach)), 1.0
+
+
+@inlined
+def _friction(scene, mode, common, v):
+    """K at the contact that holds, and its derivative, s/m."""
+    sign = 1.0 if v >= 0.0 else -1.0
+    mu, slope = friction_in(scene.law, mode.region, abs(v), (common.mu_s, common.mu_k))
+    return -sign * mu, -slope
+
+
+@inlined
+def _frame(scene, mode, forcing, x):
+    y = x[0] + forcing[0], x[1], x[2], x[3]
+    return pivot.frame(scene, holding(mode), mode.turned, y, forcing[1])
+
+
+@inlined
+def _rates_from(scene, forcing, x, psi_dd, alpha_dd):
+    v_dot = pivot.sliding_acceleration(scene, psi_dd, alpha_dd, forcing[2])
+    turning = (x[1] + scene.balls.reach * x[3]) / scene.closed.body.radius
+    return turning, v_dot, x[3], psi_dd - alpha_dd, 0.0
+
+
+@implicit.rates.implements(ImpactRing)
+def _rates(scene, mode, common, forcing, x):
+    if mode.open == NONE:
+        rho_dot, v_dot = implicit.rates(
+            ring_of(scene, mode.turned), closed_mode(mode), common.closed, forcing, _closed_state(mode, x)
+        )
+        return rho_dot, v_dot, 0.0, 0.0, 0.0
+    K, _ = _friction(scene, mode, common, x[1])
+    psi_dd, alpha_dd, _, _ = pivot.in_slip(scene, _frame(scene, mode, forcing, x), K)
+    return _rates_from(scene, forcing, x, psi_dd, alpha_dd)
+
+
+@implicit.linearise.implements(ImpactRing)
+def _linearise(scene, mode, common, t, forcing, x):
+    nothing = 0.0, 0.0, 0.0, 0.0
+    if mode.open == NONE:
+        (rho_dot, v_dot), (a, b, c, d), _, (first, second) = implicit.linearise(
+            ring_of(scene, mode.turned), closed_mode(mode), common.closed, t, forcing, _closed_state(mode, x)
+        )
+        rows = (a, b, 0.0, 0.0), (c, d, 0.0, 0.0), nothing, nothing
+        return (rho_dot, v_dot, 0.0, 0.0, 0.0), (a, b, c, d), implicit.Coupled(rows), (first, second, 0.0, 0.0, 0.0)
+    _, ring_omega, ring_epsilon = forcing
+    f = _frame(scene, mode, forcing, x)
+    K, slope = _friction(scene, mode, common, x[1])
+    psi_dd, alpha_dd, _, _ = pivot.in_slip(scene, f, K)
+    # Columns of the Jacobian, and the derivative by time at a constant state.
+    by_place = _derivative(scene, f, K, psi_dd, slope, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    by_v = _derivative(scene, f, K, psi_dd, slope, (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    by_eta = _derivative(scene, f, K, psi_dd, slope, (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0))
+    by_rate = _derivative(scene, f, K, psi_dd, slope, (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+    by_time = _derivative(scene, f, K, psi_dd, slope, nothing, (ring_omega, ring_epsilon, drives.jerk(scene.drive, t)))
+    per_radius = 1.0 / scene.closed.body.radius
+    rows = (
+        (0.0, per_radius, 0.0, scene.balls.reach * per_radius),
+        (by_place[0], by_v[0], by_eta[0], by_rate[0]),
+        (0.0, 0.0, 0.0, 1.0),
+        (by_place[1], by_v[1], by_eta[1], by_rate[1]),
+    )
+    jacobian = 0.0, per_radius, by_place[0], by_v[0]
+    rates = _rates_from(scene, forcing, x, psi_dd, alpha_dd)
+    return rates, jacobian, implicit.Coupled(rows), (0.0, by_time[0], 0.0, by_time[1], 0.0)
+
+
+@inlined
+def _derivative(scene, f, K, psi_dd, slope, state, forcing):
+    """Derivatives of the rates of v and of eta_dot along a change of the state and of the forcing."""
+    body, balls = scene.closed.body, scene.balls
+    mass, moment, gravity, radius, rho = body.mass, inertia(body), body.gravity, body.radius, balls.reach
+    d_place, d_v, d_eta, d_rate = state
+    d_theta, d_omega, d_epsilon = forcing
+    d_alpha = d_place + d_theta - d_eta
+    d_psi_dot = (d_v + rho * d_rate) / radius + d_omega
+    d_alpha_dot = d_psi_dot - d_rate
+    d_u, d_w, d_q, d_K = -f.w * d_eta, f.u * d_eta, f.w * d_eta, slope * d_v
+    lever = f.w - K * f.q
+    d_lever = d_w - d_K * f.q - K * d_q
+    denominator = moment + mass * f.w * lever
+    square, d_square = f.psi_dot * f.psi_dot, 2.0 * f.psi_dot * d_psi_dot
+    x = pivot.load(scene, f) / denominator
+    d_load = d_u * square + f.u * d_square + 2.0 * rho * f.alpha_dot * d_alpha_dot - gravity * f.sin_alpha * d_alpha
+    d_x = (d_load - x * mass * (d_w * lever + f.w * d_lever)) / denominator
+    d_psi_dd = -mass * (d_lever * x + lever * d_x)
+    turned = d_u * psi_dd + f.u * d_psi_dd
+    pulled = moment * (d_K * x + K * d_x) + d_w * square + f.w * d_square - gravity * f.cos_alpha * d_alpha
+    d_alpha_dd = (pulled - turned) / rho
+    return pivot.sliding_acceleration(scene, d_psi_dd, d_alpha_dd, d_epsilon), d_psi_dd - d_alpha_dd
+
+
+@implicit.guards_and_motion.implements(ImpactRing)
+def _guards_and_motion(scene, mode, common, forcing, x):
+    body, balls = scene.closed.body, scene.balls
+    psi, psi_dot = x[0] + forcing[0], (x[1] + balls.reach * x[3]) / body.radius + forcing[1]
+    if mode.open == NONE:
+        guards, (_, omega, epsilon, _) = implicit.guards_and_motion(
+            ring_of(scene, mode.turned), closed_mode(mode), common.closed, forcing, _closed_state(mode, x)
+        )
+        determinant, slow, normal_1, normal_2, ahead, fast = guards
+        if mode.turned == 1:
+            normal_1, normal_2 = normal_2, normal_1
+        load = 0.05 * body.mass * (body.gravity + body.radius * omega * omega)
+        near = 0.02 * ring.free_determinant(body)
+        found = Motion(psi, omega, epsilon, normal_1, normal_2, 0.0, 0.0, x[4], near, load, load)
+        return (determinant, slow, normal_1, normal_2, ahead, fast), found
+    contact = holding(mode)
+    f = _frame(scene, mode, forcing, x)
+    K, _ = _friction(scene, mode, common, x[1])
+    psi_dd, _, normal, denominator = pivot.in_slip(scene, f, K)
+    side = side_of(contact)
+    beta, turn = side * delta_when_closed(body, contact, mode.turned), 0.5 * side * x[2]
+    gap = 4.0 * balls.half_distance * cos(beta + turn) * sin(turn)
+    low, high = region_bounds(scene.law, mode.region)
+    speed, place = mode.sign * x[1], place_of(mode)
+    rho = f.alpha - forcing[0]
+    above, below = edge_ahead(scene.closed.surface, place, 1) - rho, rho - edge_ahead(scene.closed.surface, place, -1)
+    ahead = (above + _BEYOND) * (below + _BEYOND) if above < inf else inf
+    load = 0.05 * body.mass * pivot.size(scene, f)
+    near = 0.02 * inertia(body)
+    if mode.open == FIRST:
+        found = Motion(psi, psi_dot, psi_dd, 0.0, normal, gap, 0.0, x[4], near, 0.0, load)
+        return (denominator, speed - low, gap, normal, ahead, high - speed), found
+    found = Motion(psi, psi_dot, psi_dd, normal, 0.0, 0.0, gap, x[4], near, load, 0.0)
+    return (denominator, speed - low, normal, gap, ahead, high - speed), found
+
+
+@implicit.near_zero.implements(ImpactRing)
+def _near_zero(scene, motion):
+    return motion.determinant, 0.0, motion.load_1, motion.load_2, 0.0, 0.0
+
+
+@implicit.motion.implements(ImpactRing)
+def _motion(scene, forcing, x, linear):
+    rates, (_, ring_omega, ring_epsilon), radius, rho = linear[0], forcing, scene.closed.body.radius, scene.balls.reach
+    return (x[1] + rho * x[3]) / radius + ring_omega, (rates[1] + rho * rates[3]) / radius + ring_epsilon
+
+
+@implicit.seen.implements(ImpactRing)
+def _seen(scene, view):
+    m = view[1]
+    size = scene.closed.body.gravity / scene.closed.body.radius + m.psi_dot * m.psi_dot + abs(m.psi_dd)
+    contacts = float(int(m.code + 0.5) % TURNED)
+    return m.psi, m.psi_dot, m.normal_1, m.normal_2, Located(m.psi_dd, size), m.gap_1, m.gap_2, contacts
+
+
+@implicit.row.implements(ImpactRing)
+def _row(scene, mode, forcing, x):
+    common = implicit.common(scene, mode, forcing, x)
+    view = implicit.guards_and_motion(scene, mode, common, forcing, x)
+    y = implicit.from_implicit(scene, forcing, x)
+    return row_of(scene, mode, forcing, y, implicit.seen(scene, view))

@@ -1,0 +1,238 @@
+"""Modes and states of a body that may leave the race.
+
+A state has seven numbers. The last one is a code of the contacts that are open and of the order of the contacts; it
+tells what the others are:
+
+- both contacts hold: ``(psi, v, 0, 0, 0, 0)``, with the sliding velocity v, m/s;
+- pivot on one contact: ``(psi, v, eta, eta_dot, 0, 0)``. The angle from the ball that touches to the body is
+  ``delta = psi - alpha``; eta is its difference from the value at which the other contact closes. So a gap of any size
+  has all its digits, and the angular velocity ``d psi/dt = (v + rho eta_dot)/R + d theta/dt`` is that of both contacts
+  while eta_dot is zero;
+- flight: ``(psi, d psi/dt, x, dx/dt, y, dy/dt)`` of the centre of mass.
+"""
+
+from __future__ import annotations
+
+from math import pi
+from typing import NamedTuple
+
+from ringsweep.compile import inlined
+from ringsweep.models.ring.series import FAST
+from ringsweep.models.ring.series import Mode as ClosedMode
+from ringsweep.numerics.terms import FACTOR_ROWS
+from ringsweep.physics import ring
+from ringsweep.physics.zones import coefficients
+
+#: Contacts that are open: none, contact 1, contact 2, both. A particle has contact 1 only.
+NONE, FIRST, SECOND, BOTH = range(4)
+#: Added to the code of a state if the contacts have changed their order.
+TURNED = 4
+
+#: Kinds of events: a contact opens; it rebounds in an impact; it closes in an impact, or in the limit of its rebounds.
+NO_EVENT, OPENS, REBOUNDS, CLOSES = range(4)
+
+# Rows of the table of series before those of the closed ring: KIND holds the code of the state; GAP_1 and GAP_2 are
+# ``(rho^2 - |c|^2)/(2 rho)``, a measure of the gap that has a series; ETA belongs to a pivot, X and Y to a flight.
+KIND, GAP_1, GAP_2, ETA, X, Y, SPARE, OTHER = range(8)
+#: Groups of products of a pivot that grow side by side, and their rows.
+GROUPS, PRODUCTS = 4, 8
+#: First row of the table of the closed ring.
+RING = PRODUCTS + GROUPS * FACTOR_ROWS
+#: Number of rows.
+ROWS = RING + FAST + 1
+
+
+class Mode(NamedTuple):
+    """Mode of a body that may leave the race.
+
+    Attributes
+    ----------
+    sign, region, entry_guard, place_1, place_2
+        As in :class:`ringsweep.models.ring.series.Mode`; in a pivot those of the contact that holds. An open contact
+        keeps its last place.
+    open : int
+        NONE, FIRST, SECOND or BOTH.
+    turned : int
+        1 if the contacts have changed their order along the race, else 0.
+    zeros_1, zeros_2 : int
+        Number of leading coefficients of the gap that were zero when the mode began: 3 after a smooth loss of the
+        contact, 2 after friction has jumped, 1 after an impact, 0 if the contact had been open before.
+    event, contact : int
+        The last event, and its contacts: 1, 2, or 3 for both.
+    speed, impulse, loss, violation : float
+        In an impact: largest closing speed, m/s; largest normal impulse, N s; lost energy, J; violation of the law.
+    lasts : float
+        Time from the event until a contact that closes by rebounds has come to rest, s.
+    number : int
+        Number of events up to now.
+    time : float
+        Time of the last event, s.
+    passed : int
+        1 if the last impact closed all contacts, of which some opened at once; 2 if their order has changed; else 0.
+    """
+
+    sign: int
+    region: int
+    entry_guard: int
+    place_1: tuple[int, int]
+    place_2: tuple[int, int]
+    open: int
+    turned: int
+    zeros_1: int
+    zeros_2: int
+    event: int
+    contact: int
+    speed: float
+    impulse: float
+    loss: float
+    violation: float
+    lasts: float
+    number: int
+    time: float
+    passed: int
+
+
+class Event(NamedTuple):
+    """What leads into a mode; the fields are those of :class:`Mode`."""
+
+    event: int
+    contact: int
+    speed: float
+    impulse: float
+    loss: float
+    violation: float
+    lasts: float
+    number: int
+    time: float
+    passed: int
+
+
+@inlined
+def passing(event, turned):
+    """An impact that closes all contacts, of which some open at once."""
+    e = event
+    return Event(e.event, e.contact, e.speed, e.impulse, e.loss, e.violation, e.lasts, e.number, e.time, 1 + turned)
+
+
+@inlined
+def event_of(mode):
+    """The last event."""
+    return Event(
+        mode.event,
+        mode.contact,
+        mode.speed,
+        mode.impulse,
+        mode.loss,
+        mode.violation,
+        mode.lasts,
+        mode.number,
+        mode.time,
+        mode.passed,
+    )
+
+
+@inlined
+def opens(contact, number, t):
+    """Event: contacts open (`contact`: 1, 2 or 3) after `number` events before."""
+    return Event(OPENS, contact, 0.0, 0.0, 0.0, 0.0, 0.0, number + 1, t, 0)
+
+
+@inlined
+def make(sign, region, entry_guard, places, contacts, zeros, event):
+    """Mode from its parts; `places`, `contacts` (open, turned), and `zeros` are pairs."""
+    e = event
+    return Mode(
+        sign,
+        region,
+        entry_guard,
+        places[0],
+        places[1],
+        contacts[0],
+        contacts[1],
+        zeros[0],
+        zeros[1],
+        e.event,
+        e.contact,
+        e.speed,
+        e.impulse,
+        e.loss,
+        e.violation,
+        e.lasts,
+        e.number,
+        e.time,
+        e.passed,
+    )
+
+
+@inlined
+def code_of(mode):
+    """Code of the states of a mode."""
+    return float(mode.open + TURNED * mode.turned)
+
+
+@inlined
+def contacts_of(y):
+    """Contacts that are open, and whether the order has changed, from a state."""
+    code = int(y[6] + 0.5)
+    return code % TURNED, code // TURNED
+
+
+@inlined
+def ring_of(scene, turned):
+    """The ring while both contacts hold, in the order of the contacts."""
+    return scene.turned if turned == 1 else scene.closed
+
+
+@inlined
+def closed_mode(mode):
+    """Mode for the ring whose contacts are named in the order in which they stand."""
+    entry_guard = mode.entry_guard - RING if mode.entry_guard >= 0 else -1
+    if mode.turned == 1:
+        return ClosedMode(mode.sign, mode.region, entry_guard, mode.place_2, mode.place_1)
+    return ClosedMode(mode.sign, mode.region, entry_guard, mode.place_1, mode.place_2)
+
+
+@inlined
+def from_closed(found, turned, event):
+    """Mode from one of the ring whose contacts are named in the order in which they stand."""
+    entry_guard = found.entry_guard + RING if found.entry_guard >= 0 else -1
+    places = (found.place_2, found.place_1) if turned == 1 else (found.place_1, found.place_2)
+    return make(found.sign, found.region, entry_guard, places, (NONE, turned), (0, 0), event)
+
+
+@inlined
+def angle_when_closed(psi, turned):
+    """Angle of the centre of mass while both contacts hold, rad."""
+    return psi - pi if turned == 1 else psi
+
+
+@inlined
+def delta_when_closed(body, contact, turned):
+    """Angle from the ball of a contact to the body, at which the other contact closes, rad."""
+    beta = ring.contact_offset(body)
+    beta = pi - beta if turned == 1 else beta
+    return beta if contact == 1 else -beta
+
+
+@inlined
+def holding(mode):
+    """The contact that holds in a pivot: 1 or 2."""
+    return 2 if mode.open == FIRST else 1
+
+
+@inlined
+def place_of(mode):
+    """Segment and turn of the contact that holds in a pivot."""
+    return mode.place_2 if mode.open == FIRST else mode.place_1
+
+
+@inlined
+def with_place(mode, place):
+    """Places of a pivot whose contact that holds is at another place."""
+    return (mode.place_1, place) if mode.open == FIRST else (place, mode.place_2)
+
+
+@inlined
+def coefficients_there(scene, place):
+    """Static and kinetic friction coefficient in a segment, and number of the zone."""
+    return coefficients(scene.closed.surface, place[0])

@@ -1,0 +1,194 @@
+"""The pivot: a body on one contact, which slides or sticks while the body swings about it.
+
+Symbols: alpha is the angle of the ball that touches, ``delta = psi - alpha``. The vector from the centre of the ball to
+the centre of mass is u outwards and w along the race, ``q = r - u``; F is the friction along the race, in slip
+``F = K N``. Momentum, radial and tangential, and moment of momentum about the centre of mass:
+
+.. math::
+
+    M (-\\rho \\dot\\alpha^2 - w \\ddot\\psi - u \\dot\\psi^2) &= M g \\cos\\alpha - N \\\\
+    M (\\rho \\ddot\\alpha + u \\ddot\\psi - w \\dot\\psi^2) &= -M g \\sin\\alpha + F \\\\
+    J \\ddot\\psi &= -w N + q F
+
+In slip they give, with ``P = w - K q`` and ``G = g cos alpha + rho alpha_dot^2 + u psi_dot^2``,
+
+.. math::
+
+    N = \\frac{M J G}{J + M w P}, \\qquad \\ddot\\psi = -\\frac{M G P}{J + M w P}.
+
+The contact jams where the denominator, which is M J times the acceleration of its gap per unit of N, is not positive.
+"""
+
+from __future__ import annotations
+
+from math import cos, isnan, sin
+from typing import NamedTuple
+
+from ringsweep.compile import inlined
+from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
+from ringsweep.models.ring.impact.mode import (
+    RING,
+    coefficients_there,
+    delta_when_closed,
+    holding,
+    make,
+    place_of,
+    with_place,
+)
+from ringsweep.models.ring.series import SLOW
+from ringsweep.physics import drives
+from ringsweep.physics.friction.velocity import KINETIC, friction_in, region_at, stiction_band
+from ringsweep.physics.impact import inertia, side_of
+from ringsweep.physics.zones import leave_edge
+
+# Rounding of accelerations, as a share of their terms.
+_ROUNDING = 1e-13
+
+
+class Frame(NamedTuple):
+    """Place and rates of a pivot: angles in rad, rates in rad/s, lengths in m."""
+
+    alpha: float
+    sin_alpha: float
+    cos_alpha: float
+    u: float
+    w: float
+    q: float
+    psi_dot: float
+    alpha_dot: float
+
+
+@inlined
+def frame(scene, contact, turned, y, ring_omega):
+    """Place and rates of a pivot on a contact, in the state `y`."""
+    balls = scene.balls
+    delta = delta_when_closed(scene.closed.body, contact, turned) + y[2]
+    alpha = y[0] - delta
+    a, h, s, c = side_of(contact) * balls.half_distance, balls.offset, sin(delta), cos(delta)
+    u = h * c - a * s
+    psi_dot = (y[1] + balls.reach * y[3]) / scene.closed.body.radius + ring_omega
+    return Frame(alpha, sin(alpha), cos(alpha), u, a * c + h * s, balls.radius - u, psi_dot, psi_dot - y[3])
+
+
+@inlined
+def load(scene, f):
+    """G of the module's text, m/s^2."""
+    return (
+        scene.closed.body.gravity * f.cos_alpha
+        + scene.balls.reach * f.alpha_dot * f.alpha_dot
+        + f.u * f.psi_dot * f.psi_dot
+    )
+
+
+@inlined
+def size(scene, f):
+    """Size of the terms in the balances per unit of mass, m/s^2."""
+    square = scene.balls.reach * f.alpha_dot * f.alpha_dot + (abs(f.u) + abs(f.w)) * f.psi_dot * f.psi_dot
+    return scene.closed.body.gravity + square + 1e-300
+
+
+@inlined
+def in_slip(scene, f, K):
+    """Accelerations of psi and alpha (rad/s^2), normal reaction (N), and denominator (kg m^2), in slip."""
+    body = scene.closed.body
+    moment = inertia(body)
+    lever = f.w - K * f.q
+    denominator = moment + body.mass * f.w * lever
+    x = load(scene, f) / denominator
+    psi_dd = -body.mass * lever * x
+    rest = K * moment * x - f.u * psi_dd + f.w * f.psi_dot * f.psi_dot - body.gravity * f.sin_alpha
+    return psi_dd, rest / scene.balls.reach, body.mass * moment * x, denominator
+
+
+@inlined
+def in_stick(scene, f, ring_epsilon):
+    """Accelerations of psi and alpha (rad/s^2), normal reaction and friction (N) while the contact sticks."""
+    body = scene.closed.body
+    along = body.radius * ring_epsilon + body.gravity * f.sin_alpha - f.w * f.psi_dot * f.psi_dot
+    across, mass = load(scene, f), body.mass
+    psi_dd = mass * (f.q * along - f.w * across) / (inertia(body) + mass * (f.w * f.w + f.q * f.q))
+    alpha_dd = (body.radius * ring_epsilon - scene.balls.radius * psi_dd) / scene.balls.reach
+    return psi_dd, alpha_dd, mass * (across + f.w * psi_dd), mass * (along - f.q * psi_dd)
+
+
+@inlined
+def sliding_acceleration(scene, psi_dd, alpha_dd, ring_epsilon):
+    """Rate of the sliding velocity, m/s^2."""
+    return scene.balls.reach * alpha_dd + scene.balls.radius * psi_dd - scene.closed.body.radius * ring_epsilon
+
+
+@inlined
+def friction(scene, mode, v):
+    """K at the contact that holds, at the sliding velocity `v`, and its derivative, s/m, by the formula of the mode."""
+    mu_s, mu_k, _ = coefficients_there(scene, place_of(mode))
+    mu, slope = friction_in(scene.law, mode.region, mode.sign * v, (mu_s, mu_k))
+    return -mode.sign * mu, -slope
+
+
+@inlined
+def begun(scene, t, y, places, contacts, zeros, event, stick_end):
+    """Status and mode of a pivot that begins in the state `y`, or whose sliding velocity is zero.
+
+    `stick_end` is 0 if the contact may stick; +1 or -1 if stick has just ended by breakaway in this direction.
+    """
+    body = scene.closed.body
+    theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
+    contact, v = (2 if contacts[0] == 1 else 1), y[1]
+    f = frame(scene, contact, contacts[1], y, ring_omega)
+    rho = f.alpha - theta
+    place = places[1] if contact == 2 else places[0]
+    stick = make(0, KINETIC, -1, places, contacts, zeros, event)
+    if isnan(f.alpha + f.psi_dot + ring_epsilon):
+        return BROKEN, stick
+    least = _ROUNDING * body.mass * size(scene, f)
+    if v == 0.0 and stiction_band(scene.law) == 0.0:
+        mu_s, _, _ = coefficients_there(scene, place)
+        if stick_end == 0:
+            _, _, normal, along = in_stick(scene, f, ring_epsilon)
+            if normal > least and abs(along) <= mu_s * normal and mu_s > 0.0:
+                return RUNNING, stick
+        region = region_at(scene.law, 0.0)
+        best, best_sign = -1e300, 0
+        several = False
+        for sign in (1, -1):
+            there = leave_edge(scene.closed.surface, place, rho, sign)
+            slip = make(sign, region, RING + SLOW, with_place(stick, there), contacts, zeros, event)
+            K, _ = friction(scene, slip, 0.0)
+            psi_dd, alpha_dd, normal, denominator = in_slip(scene, f, K)
+            push = sign * sliding_acceleration(scene, psi_dd, alpha_dd, ring_epsilon)
+            if stick_end == sign and push > -1e-9 * size(scene, f):
+                push = max(push, 1e-12 * size(scene, f))
+            if denominator > 0.0 and normal > least and push > best:
+                several = several or (best > least / body.mass and push > least / body.mass)
+                best, best_sign = push, sign
+        if several:
+            return JAM, stick
+        # A tie: for example a contact without friction.
+        if best_sign == 0 or best < -least / body.mass:
+            return JAM, stick
+        there = leave_edge(scene.closed.surface, place, rho, best_sign)
+        return RUNNING, make(best_sign, region, RING + SLOW, with_place(stick, there), contacts, zeros, event)
+    sign, region, entry_guard = (1 if v > 0.0 else -1), region_at(scene.law, abs(v)), -1
+    if v == 0.0:
+        # Friction is zero here, so that the ball slides in the direction in which the other forces accelerate it.
+        psi_dd, alpha_dd, _, _ = in_slip(scene, f, 0.0)
+        sign = 1 if sliding_acceleration(scene, psi_dd, alpha_dd, ring_epsilon) >= 0.0 else -1
+        entry_guard = RING + SLOW
+    there = leave_edge(scene.closed.surface, place, rho, sign)
+    slip = make(sign, region, entry_guard, with_place(stick, there), contacts, zeros, event)
+    K, _ = friction(scene, slip, v)
+    denominator = in_slip(scene, f, K)[3]
+    return (RUNNING if denominator > 0.0 else JAM), slip
+
+
+@inlined
+def acceleration(scene, mode, t, y):
+    """Accelerations of psi and alpha, and normal reaction, in a pivot: rad/s^2, N."""
+    _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
+    f = frame(scene, holding(mode), mode.turned, y, ring_omega)
+    if mode.sign == 0:
+        psi_dd, alpha_dd, normal, _ = in_stick(scene, f, ring_epsilon)
+    else:
+        K, _ = friction(scene, mode, y[1])
+        psi_dd, alpha_dd, normal, _ = in_slip(scene, f, K)
+    return psi_dd, alpha_dd, normal

@@ -1,0 +1,59 @@
+"""Rows of the history of a run that goes on after a contact is lost."""
+
+from __future__ import annotations
+
+from ringsweep.compile import inlined
+from ringsweep.models.interface import series
+from ringsweep.models.ring.impact.mode import BOTH
+from ringsweep.models.ring.impact.switch import motion_of
+from ringsweep.physics import drives, ring
+from ringsweep.physics.impact import ImpactRing, contact_of
+from ringsweep.physics.zones import coefficients, locate
+
+#: History variables, in the order of their columns.
+HISTORY = (
+    *("phi", "omega", "epsilon", "normal_1", "normal_2", "ring_omega", "zone_1", "zone_2", "mode"),
+    *("x", "y", "gap_1", "gap_2"),
+)
+#: Columns behind them: the last event, see :class:`ringsweep.models.ring.impact.mode.Mode`.
+EVENT = ("number", "time", "event", "contact", "speed", "impulse")
+
+
+@inlined
+def row_of(scene, mode, forcing, y, seen):
+    """Row of the state `y`, of which the recorder is shown `seen`."""
+    psi, rate, normal_1, normal_2, located = seen[0], seen[1], seen[2], seen[3], seen[4]
+    theta, ring_omega, _ = forcing
+    motion = motion_of(scene, y, ring_omega)
+    first = contact_of(scene.balls, 1, motion, 0.0)
+    second = contact_of(scene.balls, 2, motion, 0.0) if ring.contact_count(scene.closed.body) == 2 else first
+    surface = scene.closed.surface
+    _, _, zone_1 = coefficients(surface, locate(surface, first.alpha - theta)[0])
+    _, _, zone_2 = coefficients(surface, locate(surface, second.alpha - theta)[0])
+    return (
+        psi,
+        rate,
+        located.acceleration,
+        normal_1,
+        normal_2,
+        ring_omega,
+        zone_1,
+        zone_2,
+        0.0 if mode.open == BOTH or mode.region < 0 else float(mode.sign),
+        motion.x,
+        motion.y,
+        first.gap if mode.open % 2 == 1 else 0.0,
+        second.gap if mode.open >= 2 else 0.0,
+        float(mode.number),
+        mode.time,
+        float(mode.event),
+        float(mode.contact),
+        mode.speed,
+        mode.impulse,
+    )
+
+
+@series.row.implements(ImpactRing)
+def _row(scene, mode, c, t, s):
+    forcing = drives.turn(scene.drive, t)
+    return row_of(scene, mode, forcing, series.state_at(scene, c, s), series.seen_at(scene, c, s, s))

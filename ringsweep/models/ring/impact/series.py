@@ -1,0 +1,555 @@
+"""Power series of a body that may leave the race: those of the closed ring, of a pivot, and of a flight.
+
+The table has the rows of the closed ring behind rows of its own. In a pivot and in a flight the rows of the angle, of
+the angular velocity and acceleration, of the sliding velocity and of the guards keep their meaning; the guard of a
+contact is its normal reaction while it holds, and its gap while it is open. A gap that has just opened begins with
+coefficients that are zero; its guard is the series divided by that power of the time.
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos, inf, pi, sin, sqrt
+
+from ringsweep.compile import inlined
+from ringsweep.models.interface import series
+from ringsweep.models.interface.shock import Located
+from ringsweep.models.ring.impact import pivot
+from ringsweep.models.ring.impact.mode import (
+    BOTH,
+    ETA,
+    FIRST,
+    GAP_1,
+    GAP_2,
+    KIND,
+    NONE,
+    OTHER,
+    PRODUCTS,
+    RING,
+    ROWS,
+    SPARE,
+    TURNED,
+    Mode,
+    X,
+    Y,
+    angle_when_closed,
+    closed_mode,
+    code_of,
+    coefficients_there,
+    delta_when_closed,
+    event_of,
+    holding,
+    make,
+    place_of,
+    ring_of,
+)
+from ringsweep.models.ring.series import (
+    COS,
+    DETERMINANT,
+    EDGE,
+    EPSILON,
+    FACTORS,
+    FAST,
+    LEAST_DETERMINANT,
+    NORMAL_1,
+    NORMAL_2,
+    OMEGA,
+    PHI,
+    REACTION_TOLERANCE,
+    SIN,
+    SLOW,
+    SQUARE,
+    THETA,
+    V,
+)
+from ringsweep.numerics.series import INVERSE, ORDER, crossings, slope, step_size, value, variation
+from ringsweep.numerics.terms import inner_products, joined, no_factors, part_from, set_factors, set_terms, terms
+from ringsweep.physics import drives, ring
+from ringsweep.physics.friction.velocity import (
+    begin_series,
+    no_products,
+    region_bounds,
+    series_term,
+    shorten_for_decay,
+    stiction_band,
+    varies,
+)
+from ringsweep.physics.impact import ImpactRing, inertia, side_of
+from ringsweep.physics.zones import edge_ahead
+
+# Size below which a gap and its rate may be rounding, as a share of rho and of the speed of the body.
+_NOISE = 1e-13
+
+# A contact this close to an edge is on the edge, rad: the instant of the crossing is known to rounding.
+_ON_EDGE = 1e-12
+
+
+@series.table_shape.implements(ImpactRing)
+def _table_shape(scene):
+    return ROWS, RING + DETERMINANT
+
+
+@series.expand.implements(ImpactRing)
+def _expand(scene, mode, t, y, tolerance, c):
+    c[KIND, 0] = code_of(mode)
+    if mode.open == NONE:
+        return _expand_closed(scene, mode, t, y, tolerance, c)
+    drives.expand(scene.drive, t, ORDER + 2, c[RING + THETA], c[RING + FACTORS :])
+    if mode.open == BOTH:
+        return _expand_flight(scene, mode, y, tolerance, c)
+    # Guards of what ends slip or stick, unless they are filled below.
+    for g in (DETERMINANT, SLOW, EDGE, FAST):
+        _fill_constant(c[RING + g], inf)
+    return _expand_pivot(scene, mode, t, y, tolerance, c)
+
+
+@inlined
+def _fill_constant(row, number):
+    row[0] = number
+    for k in range(1, ORDER + 1):
+        row[k] = 0.0
+
+
+@inlined
+def _expand_closed(scene, mode, t, y, tolerance, c):
+    phi = angle_when_closed(y[0], mode.turned)
+    h = series.expand(ring_of(scene, mode.turned), closed_mode(mode), t, (phi, y[1]), tolerance, c[RING:])
+    c[RING + PHI, 0] = y[0]
+    if mode.turned == 1:
+        # Rows bear the names of the contacts, not their order.
+        for k in range(ORDER + 1):
+            c[RING + NORMAL_1, k], c[RING + NORMAL_2, k] = c[RING + NORMAL_2, k], c[RING + NORMAL_1, k]
+    return h
+
+
+# ---- pivot ------------------------------------------------------------------------------------
+
+
+@inlined
+def _expand_pivot(scene, mode, t, y, tolerance, c):
+    body, balls = scene.closed.body, scene.balls
+    contact, place = holding(mode), place_of(mode)
+    ring_omega = c[RING + THETA, 1]
+    f = pivot.frame(scene, contact, mode.turned, y, ring_omega)
+    delta = delta_when_closed(body, contact, mode.turned) + y[2]
+    fresh = (mode.zeros_1 if mode.open == FIRST else mode.zeros_2) if y[2] == 0.0 else 0
+    c[RING + PHI, 0], c[RING + V, 0], c[ETA, 0] = y[0], y[1], y[2]
+    at = f, sin(delta), cos(delta), (0.0 if fresh > 1 else y[3]), fresh
+    sharpness = _expand_pivot_stick(scene, mode, at, c) if mode.sign == 0 else _expand_pivot_slip(scene, mode, at, c)
+    _expand_pivot_guards(scene, mode, f, place, y[2], fresh, c)
+    per_angle = 1.0 / tolerance
+    speed = body.radius * (1.0 + abs(f.psi_dot) + abs(f.alpha_dot))
+    if mode.region < 0:
+        speed = min(speed, 1e3 * stiction_band(scene.law))
+    per_load = 1.0 / REACTION_TOLERANCE * per_angle
+    if varies(scene.law, mode.region):
+        per_load = max(per_load, 1e3)
+    load = pivot.size(scene, f) + balls.reach * abs(c[RING + EPSILON, 0])
+    own = RING + (NORMAL_2 if contact == 2 else NORMAL_1)
+    last = previous = 0.0
+    for row, unit in (
+        (RING + PHI, per_angle),
+        (ETA, per_angle),
+        (RING + V, per_angle / speed),
+        (RING + EPSILON, per_load * balls.reach / load),
+        (own, per_load / (body.mass * load)),
+    ):
+        last = max(last, abs(c[row, ORDER]) * unit)
+        previous = max(previous, abs(c[row, ORDER - 1]) * unit)
+    return shorten_for_decay(sharpness, c[RING + V], step_size(last, previous))
+
+
+@inlined
+def _expand_pivot_slip(scene, mode, at, c):
+    """Fill the series of a pivot that slips and return the sharpness of the friction law; see :mod:`pivot`."""
+    f, s_d0, c_d0, eta_dot, fresh = at
+    body, balls, law = scene.closed.body, scene.balls, scene.law
+    mass, moment, gravity, race = body.mass, inertia(body), body.gravity, body.radius
+    rho, r, h = balls.reach, balls.radius, balls.offset
+    a = side_of(holding(mode)) * balls.half_distance
+    own_row = RING + (NORMAL_2 if mode.open == FIRST else NORMAL_1)
+    sign = float(mode.sign)
+    mu_s, mu_k, _ = coefficients_there(scene, place_of(mode))
+    surfaces = mu_s, mu_k
+    (mu,), begun, sharpness = begin_series(law, mode.region, sign * c[RING + V, 0], surfaces)
+    K_0 = -sign * mu
+    om_0, ad_0 = f.psi_dot, f.psi_dot - eta_dot
+    u_0, w_0, q_0, s_a0, c_a0 = f.u, f.w, f.q, f.sin_alpha, f.cos_alpha
+    P_0 = w_0 - K_0 * q_0
+    D_0 = moment + mass * w_0 * P_0
+    sq_0 = om_0 * om_0
+    X_0 = (gravity * c_a0 + rho * ad_0 * ad_0 + u_0 * sq_0) / D_0
+    per_D = 1.0 / D_0
+    epsilon = eps_0 = -mass * P_0 * X_0
+    alpha_dd = (moment * K_0 * X_0 - gravity * s_a0 - u_0 * eps_0 + w_0 * sq_0) / rho
+    if fresh == 3:
+        alpha_dd = epsilon
+    c[RING + OMEGA, 0], c[RING + EPSILON, 0], c[RING + SQUARE, 0] = om_0, eps_0, sq_0
+    c[own_row, 0] = mass * moment * X_0
+    least = LEAST_DETERMINANT * moment if varies(law, mode.region) else 0.0
+    c[RING + DETERMINANT, 0] = D_0 - least
+    om_before, ad_before = om_0, ad_0
+    own = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    of_law = no_products(law, surfaces)
+    first = newest = no_factors(joined(own, of_law))
+    for k in range(1, ORDER + 1):
+        om, ad = epsilon * INVERSE[k], alpha_dd * INVERSE[k]
+        v = rho * ad + r * om - race * ((k + 1.0) * c[RING + THETA, k + 1])
+        inner = inner_products(c, PRODUCTS, k, first, newest)
+        i_sa, i_ca, i_sd, i_cd, i_sq, i_ad, i_usq, i_wsq, i_Kq, i_wP, i_DX, i_PX, i_KX, i_ue = part_from(inner, own, ())
+        (mu,), law_left, law_right = series_term(
+            law, mode.region, k, sign * v, part_from(inner, of_law, own), begun, surfaces
+        )
+        K = -sign * mu
+        dd_before = om_before - ad_before
+        s_a, c_a = (i_sa + ad_before * c_a0) * INVERSE[k], -(i_ca + ad_before * s_a0) * INVERSE[k]
+        s_d, c_d = (i_sd + dd_before * c_d0) * INVERSE[k], -(i_cd + dd_before * s_d0) * INVERSE[k]
+        u, w = h * c_d - a * s_d, a * c_d + h * s_d
+        P = w - (i_Kq - K_0 * u + K * q_0)
+        D = mass * (i_wP + w * P_0 + w_0 * P)
+        sq, squared = i_sq + 2.0 * om_0 * om, i_ad + 2.0 * ad_0 * ad
+        G = gravity * c_a + rho * squared + i_usq + u * sq_0 + u_0 * sq
+        x = (G - i_DX - D * X_0) * per_D
+        epsilon = -mass * (i_PX + P * X_0 + P_0 * x)
+        loaded = i_KX + K * X_0 + K_0 * x
+        turned = i_ue + u * eps_0 + u_0 * epsilon
+        alpha_dd = (moment * loaded - gravity * s_a - turned + i_wsq + w * sq_0 + w_0 * sq) / rho
+        left = (ad_before, ad_before, dd_before, dd_before, om, ad, u, w, K, w, D, P, K, u)
+        right = (c_a, s_a, c_d, s_d, om, ad, sq, sq, -u, P, x, x, x, epsilon)
+        newest = set_factors(c, PRODUCTS, k, joined(left, law_left), joined(right, law_right))
+        first = newest if k == 1 else first
+        c[RING + PHI, k], c[RING + OMEGA, k], c[RING + V, k] = om_before * INVERSE[k], om, v
+        c[RING + EPSILON, k], c[RING + SQUARE, k] = epsilon, sq
+        c[ETA, k] = dd_before * INVERSE[k]
+        c[own_row, k], c[RING + DETERMINANT, k] = mass * moment * x, D
+        c[RING + SIN, k], c[RING + COS, k] = s_d, c_d
+        om_before, ad_before = om, ad
+    return sharpness
+
+
+@inlined
+def _expand_pivot_stick(scene, mode, at, c):
+    """Fill the series of a pivot that sticks, and the guards of its friction; see :func:`pivot.in_stick`."""
+    f, s_d0, c_d0, eta_dot, fresh = at
+    body, balls = scene.closed.body, scene.balls
+    mass, moment, gravity, race = body.mass, inertia(body), body.gravity, body.radius
+    rho, r, h = balls.reach, balls.radius, balls.offset
+    a = side_of(holding(mode)) * balls.half_distance
+    own_row = RING + (NORMAL_2 if mode.open == FIRST else NORMAL_1)
+    mu_s, _, _ = coefficients_there(scene, place_of(mode))
+    om_0, ad_0 = f.psi_dot, f.psi_dot - eta_dot
+    u_0, w_0, q_0, s_a0, c_a0 = f.u, f.w, f.q, f.sin_alpha, f.cos_alpha
+    sq_0 = om_0 * om_0
+    T_0 = race * (2.0 * c[RING + THETA, 2]) + gravity * s_a0 - w_0 * sq_0
+    G_0 = gravity * c_a0 + rho * ad_0 * ad_0 + u_0 * sq_0
+    Z_0 = moment + mass * (w_0 * w_0 + q_0 * q_0)
+    per_Z = 1.0 / Z_0
+    epsilon = eps_0 = mass * (q_0 * T_0 - w_0 * G_0) * per_Z
+    normal, along = mass * (G_0 + w_0 * eps_0), mass * (T_0 - q_0 * eps_0)
+    c[RING + OMEGA, 0], c[RING + EPSILON, 0], c[RING + SQUARE, 0] = om_0, eps_0, sq_0
+    c[own_row, 0] = normal
+    # Forward slip begins where friction against it no longer suffices.
+    c[RING + SLOW, 0], c[RING + FAST, 0] = mu_s * normal + along, mu_s * normal - along
+    om_before, ad_before = om_0, ad_0
+    own = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    first = newest = no_factors(own)
+    for k in range(1, ORDER + 1):
+        om = epsilon * INVERSE[k]
+        ad = (race * ((k + 1.0) * c[RING + THETA, k + 1]) - r * om) / rho
+        if fresh == 3 and k == 1:
+            ad = om
+        inner = inner_products(c, PRODUCTS, k, first, newest)
+        i_sa, i_ca, i_sd, i_cd, i_sq, i_ad, i_usq, i_wsq, i_qT, i_wG, i_ww, i_qq, i_Ze, i_we, i_qe = part_from(
+            inner, own, ()
+        )
+        dd_before = om_before - ad_before
+        s_a, c_a = (i_sa + ad_before * c_a0) * INVERSE[k], -(i_ca + ad_before * s_a0) * INVERSE[k]
+        s_d, c_d = (i_sd + dd_before * c_d0) * INVERSE[k], -(i_cd + dd_before * s_d0) * INVERSE[k]
+        u, w = h * c_d - a * s_d, a * c_d + h * s_d
+        sq, squared = i_sq + 2.0 * om_0 * om, i_ad + 2.0 * ad_0 * ad
+        ring_epsilon = (k + 1.0) * (k + 2.0) * c[RING + THETA, k + 2]
+        T = race * ring_epsilon + gravity * s_a - (i_wsq + w * sq_0 + w_0 * sq)
+        G = gravity * c_a + rho * squared + i_usq + u * sq_0 + u_0 * sq
+        Z = mass * (i_ww + 2.0 * w_0 * w + i_qq - 2.0 * q_0 * u)
+        lever = i_qT - u * T_0 + q_0 * T - (i_wG + w * G_0 + w_0 * G)
+        epsilon = (mass * lever - i_Ze - Z * eps_0) * per_Z
+        normal = mass * (G + i_we + w * eps_0 + w_0 * epsilon)
+        along = mass * (T - (i_qe - u * eps_0 + q_0 * epsilon))
+        left = (ad_before, ad_before, dd_before, dd_before, om, ad, u, w, -u, w, w, u, Z, w, -u)
+        right = (c_a, s_a, c_d, s_d, om, ad, sq, sq, T, G, w, u, epsilon, epsilon, epsilon)
+        newest = set_factors(c, PRODUCTS, k, left, right)
+        first = newest if k == 1 else first
+        c[RING + PHI, k], c[RING + OMEGA, k], c[RING + V, k] = om_before * INVERSE[k], om, 0.0
+        c[RING + EPSILON, k], c[RING + SQUARE, k] = epsilon, sq
+        c[ETA, k] = dd_before * INVERSE[k]
+        c[own_row, k] = normal
+        c[RING + SLOW, k], c[RING + FAST, k] = mu_s * normal + along, mu_s * normal - along
+        c[RING + SIN, k], c[RING + COS, k] = s_d, c_d
+        om_before, ad_before = om, ad
+    return 0.0
+
+
+@inlined
+def _expand_pivot_guards(scene, mode, f, place, eta, fresh, c):
+    """Fill the gap of the open contact and its guard; in slip also the ends of the region and of the zone."""
+    balls, contact = scene.balls, holding(mode)
+    side = side_of(contact)
+    gap, guard = (GAP_1, RING + NORMAL_1) if mode.open == FIRST else (GAP_2, RING + NORMAL_2)
+    set_terms(c[gap], terms(c[RING + SIN]) * (2.0 * side * balls.half_distance))
+    # From the angle eta itself, so that the smallest gap has all its digits.
+    beta = side * delta_when_closed(scene.closed.body, contact, mode.turned)
+    c[gap, 0] = 4.0 * balls.half_distance * cos(beta + 0.5 * side * eta) * sin(0.5 * side * eta)
+    _divide(c, gap, guard, fresh)
+    _expand_edges(scene, place, f.alpha - c[RING + THETA, 0], c)
+    if mode.sign == 0:
+        return
+    low, high = region_bounds(scene.law, mode.region)
+    forward = float(mode.sign)
+    set_terms(c[RING + SLOW], terms(c[RING + V]) * forward)
+    set_terms(c[RING + FAST], terms(c[RING + V]) * -forward)
+    c[RING + SLOW, 0] = 0.0 if mode.entry_guard == RING + SLOW else mode.sign * c[RING + V, 0] - low
+    c[RING + FAST, 0] = 0.0 if mode.entry_guard == RING + FAST else high - mode.sign * c[RING + V, 0]
+    # If friction does not drop at breakaway, the slope is zero there: what is computed is rounding.
+    if mode.entry_guard == RING + SLOW and low == 0.0:
+        body = scene.closed.body
+        size = pivot.size(scene, f) + body.radius * (abs(c[RING + EPSILON, 0]) + 2.0 * abs(c[RING + THETA, 2]))
+        if abs(c[RING + V, 1]) <= 1e-12 * size:
+            c[RING + SLOW, 1] = 0.0
+
+
+@inlined
+def _expand_edges(scene, place, rho, c):
+    """Fill the guard of the edges of the segment under the contact; `rho` is its angle in the ring's frame.
+
+    A ball that pivots moves over the ring either way, whatever the sense of its slip, and even if it rolls. So the
+    guard is the product of the distances from both edges. A distance that is zero is divided by the time.
+    """
+    above, below = edge_ahead(scene.closed.surface, place, 1) - rho, rho - edge_ahead(scene.closed.surface, place, -1)
+    if not above < inf:
+        return
+    nearer = -1.0 if above <= below else 1.0
+    near, far = (above, below) if above <= below else (below, above)
+    for k in range(1, ORDER + 1):
+        c[SPARE, k] = c[RING + PHI, k] - c[ETA, k] - c[RING + THETA, k]
+    shift = 0
+    if near <= _ON_EDGE:
+        near, shift = 0.0, 1
+        while shift < ORDER and c[SPARE, shift] == 0.0:
+            shift += 1
+    row = c[RING + EDGE]
+    for k in range(ORDER + 1):
+        # The distance from the nearer edge, divided, and that from the other one.
+        c[OTHER, k] = nearer * c[SPARE, k + shift] if 0 < k + shift <= ORDER else 0.0
+    if shift == 0:
+        c[OTHER, 0] = near
+    for k in range(ORDER + 1):
+        total = c[OTHER, k] * far
+        for j in range(k):
+            total -= c[OTHER, j] * nearer * c[SPARE, k - j]
+        row[k] = total
+
+
+@inlined
+def _divide(c, gap, guard, zeros):
+    """Guard of a gap whose first coefficients are zero: its series divided by that power of the time."""
+    for k in range(zeros):
+        c[gap, k] = 0.0
+    for k in range(ORDER + 1):
+        c[guard, k] = c[gap, k + zeros] if k + zeros <= ORDER else 0.0
+
+
+# ---- flight -----------------------------------------------------------------------------------
+
+
+@inlined
+def _expand_flight(scene, mode, y, tolerance, c):
+    """Fill the series of a parabola with constant spin, and of both gaps; return the length of the step."""
+    body, balls = scene.closed.body, scene.balls
+    psi, spin, x, x_dot, y_0, y_dot, _ = y
+    for row in (X, Y):
+        _fill_constant(c[row], 0.0)
+    for row in (PHI, V, OMEGA, EPSILON, SQUARE, DETERMINANT, SLOW, NORMAL_2, EDGE, FAST):
+        _fill_constant(c[RING + row], inf if row >= DETERMINANT else 0.0)
+    c[X, 0], c[X, 1] = x, x_dot
+    c[Y, 0], c[Y, 1], c[Y, 2] = y_0, y_dot, -0.5 * body.gravity
+    c[RING + PHI, 0], c[RING + PHI, 1], c[RING + OMEGA, 0] = psi, spin, spin
+    c[RING + SQUARE, 0] = spin * spin
+    two = ring.contact_count(body) == 2
+    speed = sqrt(x_dot * x_dot + y_dot * y_dot) + sqrt(body.gravity * balls.reach)
+    h = 4.0 * balls.reach / speed if speed > 0.0 else inf
+    noise = _NOISE * (speed + abs(spin) * balls.reach)
+    if not two:
+        # The angle of the place must not turn by half a turn within a step.
+        distance = sqrt(x * x + y_0 * y_0)
+        h = 0.1 * h * max(distance / balls.reach, 0.05)
+    last = previous = 0.0
+    for contact, gap, guard, zeros in (
+        (1, GAP_1, RING + NORMAL_1, mode.zeros_1),
+        (2, GAP_2, RING + NORMAL_2, mode.zeros_2),
+    ):
+        if contact == 1 or two:
+            _expand_gap(scene, contact, psi, spin, c, gap)
+            found = _leading_zeros(c[gap], zeros, _NOISE * balls.reach, noise)
+            _divide(c, gap, guard, found)
+            last = max(last, abs(c[gap, ORDER]) / (balls.reach * tolerance))
+            previous = max(previous, abs(c[gap, ORDER - 1]) / (balls.reach * tolerance))
+    return min(h, step_size(last, previous))
+
+
+@inlined
+def _expand_gap(scene, contact, psi, spin, c, row):
+    """Fill the series of (rho^2 - x^2 - y^2)/(2 rho) of a ball in flight."""
+    balls = scene.balls
+    a, h = side_of(contact) * balls.half_distance, balls.offset
+    s, k_s = sin(psi), cos(psi)
+    power = 1.0
+    for k in range(ORDER + 1):
+        c[SPARE, k], c[OTHER, k] = c[X, k] - power * (h * s + a * k_s), c[Y, k] + power * (h * k_s - a * s)
+        # The next derivatives of sine and cosine.
+        s, k_s = k_s, -s
+        power *= spin * INVERSE[k + 1]
+    for k in range(ORDER + 1):
+        total = 0.0
+        for j in range(k + 1):
+            total += c[SPARE, j] * c[SPARE, k - j] + c[OTHER, j] * c[OTHER, k - j]
+        c[row, k] = -0.5 * total / balls.reach
+    c[row, 0] += 0.5 * balls.reach
+
+
+@inlined
+def _leading_zeros(gap, zeros, least, least_rate):
+    """Number of leading coefficients of a gap that are rounding: at most as many as were zero when the flight began."""
+    if zeros == 0 or gap[0] > least:
+        return 0
+    if gap[1] > least_rate:
+        return 1
+    return 0 if gap[1] < -least_rate else zeros
+
+
+# ---- what solvers and recorders see -----------------------------------------------------------
+
+
+@inlined
+def _is_particle_in_flight(scene, contacts):
+    return contacts == BOTH and ring.contact_count(scene.closed.body) == 1
+
+
+@inlined
+def _polar(scene, c, s):
+    """Angle of a particle in flight, near the one at the beginning of the step, its rate and its acceleration."""
+    x, y, x_dot, y_dot = value(c[X], s), value(c[Y], s), slope(c[X], s), slope(c[Y], s)
+    square = x * x + y * y
+    angle = atan2(x, -y)
+    angle += 2.0 * pi * round((c[RING + PHI, 0] - angle) / (2.0 * pi))
+    rate = (x * y_dot - y * x_dot) / square
+    return angle, rate, -(scene.closed.body.gravity * x + 2.0 * (x * x_dot + y * y_dot) * rate) / square
+
+
+@series.state_at.implements(ImpactRing)
+def _state_at(scene, c, s):
+    contacts, code = int(c[KIND, 0]) % TURNED, c[KIND, 0]
+    psi = value(c[RING + PHI], s)
+    if contacts == NONE:
+        return psi, value(c[RING + V], s), 0.0, 0.0, 0.0, 0.0, code
+    if contacts == BOTH:
+        rate = c[RING + OMEGA, 0]
+        if _is_particle_in_flight(scene, contacts):
+            psi, rate, _ = _polar(scene, c, s)
+        return psi, rate, value(c[X], s), slope(c[X], s), value(c[Y], s), slope(c[Y], s), code
+    return psi, value(c[RING + V], s), value(c[ETA], s), slope(c[ETA], s), 0.0, 0.0, code
+
+
+@series.rates_at.implements(ImpactRing)
+def _rates_at(scene, c, s):
+    contacts = int(c[KIND, 0]) % TURNED
+    psi_dot = slope(c[RING + PHI], s)
+    if contacts == BOTH:
+        return psi_dot, 0.0, slope(c[X], s), 0.0, slope(c[Y], s), -scene.closed.body.gravity, 0.0
+    eta_dot = eta_dd = 0.0
+    if contacts != NONE:
+        eta_dot = slope(c[ETA], s)
+        _differentiate(c, ETA)
+        eta_dd = slope(c[SPARE], s)
+    return psi_dot, slope(c[RING + V], s), eta_dot, eta_dd, 0.0, 0.0, 0.0
+
+
+@inlined
+def _differentiate(c, row):
+    """Fill SPARE with the derivative of a row."""
+    for k in range(ORDER):
+        c[SPARE, k] = (k + 1.0) * c[row, k + 1]
+    c[SPARE, ORDER] = 0.0
+
+
+@inlined
+def _value(row, s):
+    """Value of a series whose higher coefficients need not be finite at `s` = 0."""
+    return row[0] if s == 0.0 else value(row, s)
+
+
+@inlined
+def _seen(scene, c, s):
+    """What the recorder is shown: psi, its rate, both reactions, the acceleration, both gaps, and the open contacts."""
+    body = scene.closed.body
+    contacts = int(c[KIND, 0]) % TURNED
+    psi, rate, acceleration = _value(c[RING + PHI], s), _value(c[RING + OMEGA], s), _value(c[RING + EPSILON], s)
+    if _is_particle_in_flight(scene, contacts):
+        psi, rate, acceleration = _polar(scene, c, s)
+    open_1, open_2 = contacts % 2 == 1, contacts >= 2
+    normal_1 = 0.0 if open_1 else _value(c[RING + NORMAL_1], s)
+    normal_2 = 0.0 if open_2 else _value(c[RING + NORMAL_2], s)
+    gap_1, gap_2 = _value(c[GAP_1], s) if open_1 else 0.0, _value(c[GAP_2], s) if open_2 else 0.0
+    if ring.contact_count(body) == 1:
+        normal_2, gap_2 = normal_1, 0.0
+    size = body.gravity / body.radius + rate * rate + abs(acceleration)
+    return psi, rate, normal_1, normal_2, Located(acceleration, size), gap_1, gap_2, float(contacts)
+
+
+@series.seen_at_start.implements(ImpactRing)
+def _seen_at_start(scene, c):
+    return _seen(scene, c, 0.0)
+
+
+@series.seen_at.implements(ImpactRing)
+def _seen_at(scene, c, s, h):
+    return _seen(scene, c, s)
+
+
+@series.extremes.implements(ImpactRing)
+def _extremes(scene, record, mode, c, h, work):
+    base = record.base
+    if mode.open == NONE:
+        return series.extremes(ring_of(scene, mode.turned), base, closed_mode(mode), c[RING:], h, work)
+    count = 0
+    for row, is_open in (
+        (GAP_1, mode.open % 2 == 1),
+        (GAP_2, mode.open >= 2 and ring.contact_count(scene.closed.body) == 2),
+    ):
+        if is_open and c[row, 0] + variation(c[row], h) > record.gap_max:
+            _differentiate(c, row)
+            count = crossings(c[SPARE], h, work, count)
+    if mode.open == BOTH:
+        return count
+    omega, change = c[RING + OMEGA, 0], variation(c[RING + OMEGA], h)
+    if abs(omega) <= change:
+        count = crossings(c[RING + OMEGA], h, work, count)
+    if abs(omega) <= change or omega - change < base.omega_min or omega + change > base.omega_max:
+        count = crossings(c[RING + EPSILON], h, work, count)
+    own, highest = (RING + NORMAL_2, base.normal_max_2) if mode.open == FIRST else (RING + NORMAL_1, base.normal_max_1)
+    # A contact that has been lost has had a reaction of zero: only the greatest one is new.
+    if c[own, 0] + variation(c[own], h) > highest:
+        _differentiate(c, own)
+        count = crossings(c[SPARE], h, work, count)
+    return count
+
+
+@inlined
+def true_gap(scene, measure):
+    """Gap, m, from its measure ``(rho^2 - |c|^2)/(2 rho)``."""
+    rho = scene.balls.reach
+    return 2.0 * rho * measure / (rho + sqrt(max(rho * (rho - 2.0 * measure), 0.0)))
+
+
+@series.after_first_step.implements(Mode)
+def _after_first_step(mode):
+    places, contacts, zeros = (mode.place_1, mode.place_2), (mode.open, mode.turned), (mode.zeros_1, mode.zeros_2)
+    return make(mode.sign, mode.region, -1, places, contacts, zeros, event_of(mode))

@@ -1,0 +1,462 @@
+"""Which mode follows another while contacts open and close."""
+
+from __future__ import annotations
+
+from math import cos, pi, sin
+
+from ringsweep.compile import inlined
+from ringsweep.models.interface import modes
+from ringsweep.models.interface.status import (
+    BROKEN,
+    JAM,
+    RUNNING,
+    SEPARATED_1,
+    SEPARATED_2,
+    SEPARATED_BOTH,
+)
+from ringsweep.models.ring.impact import pivot
+from ringsweep.models.ring.impact.mode import (
+    BOTH,
+    CLOSES,
+    FIRST,
+    NO_EVENT,
+    NONE,
+    REBOUNDS,
+    RING,
+    SECOND,
+    TURNED,
+    Event,
+    Mode,
+    angle_when_closed,
+    closed_mode,
+    coefficients_there,
+    delta_when_closed,
+    event_of,
+    from_closed,
+    holding,
+    make,
+    opens,
+    passing,
+    place_of,
+    ring_of,
+    with_place,
+)
+from ringsweep.models.ring.series import DETERMINANT, EDGE, FAST, NEARLY_JAMMED, NORMAL_1, NORMAL_2, SLOW
+from ringsweep.physics import drives, ring
+from ringsweep.physics.friction.velocity import friction_at, region_bounds
+from ringsweep.physics.impact import (
+    Contact,
+    ImpactRing,
+    Motion,
+    after_impact,
+    contact_of,
+    gap_acceleration,
+    impulses,
+    inertia,
+    side_of,
+)
+from ringsweep.physics.zones import cross_edge, edge_ahead, locate
+
+# Rebounds that end within this time, in units of the square root of rho over the acceleration of the gap, are summed:
+# the contact closes. The place is then wrong by about the square of this share of rho.
+_LAST_REBOUNDS = 1e-6
+
+# A contact whose gap is this share of rho touches together with the one that closes.
+_TOGETHER = 1e-12
+
+
+@inlined
+def motion_of(scene, y, ring_omega):
+    """Motion of the body in space."""
+    closed, balls = scene.closed.body, scene.balls
+    code = int(y[6] + 0.5)
+    contacts, turned = code % TURNED, code // TURNED
+    if contacts == NONE:
+        phi, omega = angle_when_closed(y[0], turned), ring.angular_velocity(closed, y[1], ring_omega)
+        distance = balls.reach * cos(ring.contact_offset(closed)) + (1.0 - 2.0 * turned) * balls.offset
+        s, c = distance * sin(phi), distance * cos(phi)
+        return Motion(y[0], omega, s, omega * c, -c, omega * s)
+    if contacts == BOTH:
+        return Motion(y[0], y[1], y[2], y[3], y[4], y[5])
+    f = pivot.frame(scene, 2 if contacts == FIRST else 1, turned, y, ring_omega)
+    out, along = balls.reach + f.u, balls.reach * f.alpha_dot + f.u * f.psi_dot
+    inwards = f.w * f.psi_dot
+    return Motion(
+        y[0],
+        f.psi_dot,
+        out * f.sin_alpha + f.w * f.cos_alpha,
+        along * f.cos_alpha - inwards * f.sin_alpha,
+        f.w * f.sin_alpha - out * f.cos_alpha,
+        along * f.sin_alpha + inwards * f.cos_alpha,
+    )
+
+
+@inlined
+def in_flight(motion, turned):
+    """State of a body without contacts."""
+    code = float(BOTH + TURNED * turned)
+    return motion.psi, motion.psi_dot, motion.x, motion.x_dot, motion.y, motion.y_dot, code
+
+
+@inlined
+def _separated(scene, status, turned):
+    """Contacts that a status of the closed ring opens, by their own names; NONE if it opens none."""
+    if status == SEPARATED_BOTH or (status == SEPARATED_1 and ring.contact_count(scene.closed.body) == 1):
+        return BOTH
+    if status == SEPARATED_1:
+        return SECOND if turned == 1 else FIRST
+    if status == SEPARATED_2:
+        return FIRST if turned == 1 else SECOND
+    return NONE
+
+
+@inlined
+def _opened(scene, t, y, turned, places, which, zeros, event):
+    """Status, mode and state after contacts of a closed ring have opened; `y` is the state of the closed ring."""
+    _, ring_omega, _ = drives.turn(scene.drive, t)
+    if which != BOTH:
+        state = y[0], y[1], 0.0, 0.0, 0.0, 0.0, float(which + TURNED * turned)
+        contact = 2 if which == FIRST else 1
+        if pivot.load(scene, pivot.frame(scene, contact, turned, state, ring_omega)) > 0.0:
+            empty = (zeros, 0) if which == FIRST else (0, zeros)
+            status, mode = pivot.begun(scene, t, state, places, (which, turned), empty, event, 0)
+            return status, mode, state
+    closed = y[0], y[1], 0.0, 0.0, 0.0, 0.0, float(TURNED * turned)
+    state = in_flight(motion_of(scene, closed, ring_omega), turned)
+    return RUNNING, make(1, 0, -1, places, (BOTH, turned), (zeros, zeros), event), state
+
+
+@inlined
+def _after_closed(scene, status, found, t, y, turned, zeros, event, is_new):
+    """Status, mode and state from those of the closed ring; `y` is the pair of psi and v.
+
+    `is_new` is whether `event` is the impact that has just closed the contacts.
+    """
+    which = _separated(scene, status, turned)
+    after = from_closed(found, turned, event)
+    if which != NONE:
+        places = after.place_1, after.place_2
+        lost = passing(event, turned) if is_new else opens(which, event.number, t)
+        return _opened(scene, t, y, turned, places, which, zeros, lost)
+    return status, after, (y[0], y[1], 0.0, 0.0, 0.0, 0.0, float(TURNED * turned))
+
+
+@modes.initial_state.implements(ImpactRing)
+def _initial_state(scene):
+    t, (phi, v) = modes.initial_state(scene.closed)
+    _, _, state = _start(scene, t, phi, v)
+    return t, state
+
+
+@inlined
+def _start(scene, t, phi, v):
+    status, mode = modes.initial_mode(scene.closed, t, (phi, v))
+    nothing = Event(NO_EVENT, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, t, 0)
+    return _after_closed(scene, status, mode, t, (phi, v), 0, 2, nothing, False)
+
+
+@modes.initial_mode.implements(ImpactRing)
+def _initial_mode(scene, t, y):
+    _, (phi, v) = modes.initial_state(scene.closed)
+    status, mode, _ = _start(scene, t, phi, v)
+    return status, mode
+
+
+@modes.switch.implements(ImpactRing)
+def _switch(scene, mode, guard, t, y):
+    guard = guard - RING
+    if mode.open == NONE:
+        turned = mode.turned
+        own = guard
+        if turned == 1 and guard in (NORMAL_1, NORMAL_2):
+            own = NORMAL_2 if guard == NORMAL_1 else NORMAL_1
+        state = angle_when_closed(y[0], turned), y[1]
+        status, found, (_, v) = modes.switch(ring_of(scene, turned), closed_mode(mode), own, t, state)
+        zeros = 3 if guard in (NORMAL_1, NORMAL_2) else 2
+        return _after_closed(scene, status, found, t, (y[0], v), turned, zeros, event_of(mode), False)
+    if guard == DETERMINANT:
+        return JAM, mode, y
+    reaches_1, reaches_2 = guard == NORMAL_1, guard == NORMAL_2
+    if mode.open == BOTH:
+        return _lands(scene, mode, 1 if reaches_1 else 2, t, y)
+    if reaches_1 or reaches_2:
+        contact = 1 if reaches_1 else 2
+        if contact != holding(mode):
+            return _lands(scene, mode, contact, t, y)
+        _, ring_omega, _ = drives.turn(scene.drive, t)
+        state = in_flight(motion_of(scene, y, ring_omega), mode.turned)
+        zeros = (3, mode.zeros_2) if contact == 1 else (mode.zeros_1, 3)
+        event = opens(contact, mode.number, t)
+        places = mode.place_1, mode.place_2
+        return RUNNING, make(1, 0, -1, places, (BOTH, mode.turned), _remaining(mode, y, zeros), event), state
+    return _on_one_contact(scene, mode, guard, t, y)
+
+
+@inlined
+def _remaining(mode, y, zeros):
+    """Zeros of both gaps: those of the contact that was open before are zeros no more once the gap has grown."""
+    if y[2] == 0.0:
+        return zeros
+    return (0, zeros[1]) if mode.open == FIRST else (zeros[0], 0)
+
+
+@inlined
+def _on_one_contact(scene, mode, guard, t, y):
+    """What follows in a pivot after an edge, at the bounds of a region of the law, at rest, and at breakaway."""
+    places, contacts = (mode.place_1, mode.place_2), (mode.open, mode.turned)
+    zeros, event, v = _remaining(mode, y, (mode.zeros_1, mode.zeros_2)), event_of(mode), y[1]
+    at_rest = y[0], 0.0, y[2], y[3], 0.0, 0.0, y[6]
+    sign, region = mode.sign, mode.region
+    if guard == EDGE:
+        places = with_place(mode, _beyond_nearer_edge(scene, mode, t, y))
+    if sign == 0:
+        stick_end = 0 if guard == EDGE else 1 if guard == SLOW else -1
+        return _begun(scene, t, at_rest, places, contacts, zeros, event, stick_end)
+    if guard == EDGE:
+        found = make(sign, region, RING + SLOW if v == 0.0 else -1, places, contacts, zeros, event)
+        _, ring_omega, _ = drives.turn(scene.drive, t)
+        K, _ = pivot.friction(scene, found, v)
+        f = pivot.frame(scene, holding(found), found.turned, y, ring_omega)
+        return (RUNNING if pivot.in_slip(scene, f, K)[3] > 0.0 else JAM), found, y
+    low, high = region_bounds(scene.law, region)
+    if guard == FAST:
+        found = make(sign, region + 1, RING + SLOW, places, contacts, zeros, event)
+        return RUNNING, found, (y[0], sign * high, y[2], y[3], 0.0, 0.0, y[6])
+    if low > 0.0:
+        found = make(sign, region - 1, RING + FAST, places, contacts, zeros, event)
+        return RUNNING, found, (y[0], sign * low, y[2], y[3], 0.0, 0.0, y[6])
+    mu_s, _, _ = coefficients_there(scene, place_of(mode))
+    # A contact that nothing holds passes through rest.
+    if region < 0 or mu_s == 0.0:
+        return RUNNING, make(-sign, region, RING + SLOW, places, contacts, zeros, event), at_rest
+    return _begun(scene, t, at_rest, places, contacts, zeros, event, 0)
+
+
+@inlined
+def _beyond_nearer_edge(scene, mode, t, y):
+    """Place of the contact that holds in a pivot after it has crossed the nearer edge."""
+    theta, ring_omega, _ = drives.turn(scene.drive, t)
+    place, surface = place_of(mode), scene.closed.surface
+    rho = pivot.frame(scene, holding(mode), mode.turned, y, ring_omega).alpha - theta
+    above, below = edge_ahead(surface, place, 1) - rho, rho - edge_ahead(surface, place, -1)
+    return cross_edge(surface, place, 1 if above <= below else -1)
+
+
+@inlined
+def _begun(scene, t, y, places, contacts, zeros, event, stick_end):
+    """Status, mode and state of a pivot whose sliding velocity is zero; it may turn into a flight."""
+    status, found = pivot.begun(scene, t, y, places, contacts, zeros, event, stick_end)
+    _, ring_omega, _ = drives.turn(scene.drive, t)
+    contact = holding(found)
+    # Friction in stick may have pressed the ball against the race: when it drops, the contact opens.
+    if status == JAM and not pivot.load(scene, pivot.frame(scene, contact, contacts[1], y, ring_omega)) > 0.0:
+        state = in_flight(motion_of(scene, y, ring_omega), contacts[1])
+        empty = (2, zeros[1]) if contact == 1 else (zeros[0], 2)
+        lost = opens(contact, event.number, t)
+        return RUNNING, make(1, 0, -1, places, (BOTH, contacts[1]), empty, lost), state
+    return status, found, y
+
+
+@inlined
+def _impact_friction(scene, contact, theta):
+    """Friction coefficient of an impact at a contact."""
+    mu_s, mu_k, _ = coefficients_there(scene, locate(scene.closed.surface, contact.alpha - theta))
+    if scene.has_kinetic > 0.0:
+        return mu_k
+    return friction_at(scene.law, abs(contact.slip), (mu_s, mu_k))[0]
+
+
+@inlined
+def _held(contact, v):
+    """A contact that holds: its gap does not change, and its sliding velocity is a state."""
+    return Contact(contact.alpha, contact.sine, contact.cosine, 0.0, 0.0, v, contact.lever_n, contact.lever_t)
+
+
+@inlined
+def _lands(scene, mode, hit, t, y):
+    """Status, mode and state after the gap of a contact has reached zero."""
+    body, balls = scene.closed.body, scene.balls
+    theta, ring_omega, _ = drives.turn(scene.drive, t)
+    motion, race = motion_of(scene, y, ring_omega), body.radius * ring_omega
+    two = ring.contact_count(body) == 2
+    first = contact_of(balls, 1, motion, race)
+    second = contact_of(balls, 2, motion, race) if two else first
+    near = _TOGETHER * balls.reach
+    hits_1, hits_2 = hit == 1, hit == 2
+    touches_1, touches_2 = hits_1, hits_2
+    if mode.open == BOTH:
+        if two:
+            hits_1 = touches_1 = hits_1 or (first.gap <= near and first.opening < 0.0)
+            hits_2 = touches_2 = hits_2 or (second.gap <= near and second.opening < 0.0)
+    elif hit == 2:
+        first, touches_1 = _held(first, y[1]), True
+    else:
+        second, touches_2 = _held(second, y[1]), True
+    closing = max(-first.opening if hits_1 else 0.0, -second.opening if hits_2 else 0.0)
+    mu = _impact_friction(scene, first, theta), _impact_friction(scene, second, theta)
+    e = scene.restitution
+    restitution = e if hits_1 else 0.0, e if hits_2 else 0.0
+    touching, moment = (touches_1, touches_2), inertia(body)
+    found = impulses(body.mass, moment, first, second, touching, mu, restitution)
+    if found.solutions != 1:
+        return JAM, mode, y
+    which = (1 if hits_1 else 0) + (2 if hits_2 else 0)
+    lasts = 0.0
+    after = after_impact(body.mass, moment, first, second, motion, found)
+    open_1, open_2 = not touches_1 or found.opening_1 > 0.0, not touches_2 or found.opening_2 > 0.0
+    if (hits_1 and open_1) or (hits_2 and open_2):
+        # The acceleration of the gaps that open again, and the time until their rebounds end.
+        event = Event(REBOUNDS, which, closing, 0.0, 0.0, 0.0, 0.0, mode.number + 1, t, 0)
+        status, trial, state = _next(scene, t, after, (first, second), (open_1, open_2), touching, found, mode, event)
+        if status == RUNNING:
+            ends_1 = _rebounds_end(scene, trial, t, state, after, 1, found.opening_1, e) if hits_1 and open_1 else 0.0
+            ends_2 = _rebounds_end(scene, trial, t, state, after, 2, found.opening_2, e) if hits_2 and open_2 else 0.0
+            if (hits_1 and open_1 and ends_1 > 0.0) or (hits_2 and open_2 and ends_2 > 0.0):
+                lasts = max(ends_1, ends_2)
+                restitution = (
+                    0.0 if ends_1 > 0.0 else restitution[0],
+                    0.0 if ends_2 > 0.0 else restitution[1],
+                )
+                found = impulses(body.mass, moment, first, second, touching, mu, restitution)
+                if found.solutions != 1:
+                    return JAM, mode, y
+                after = after_impact(body.mass, moment, first, second, motion, found)
+                open_1 = not touches_1 or found.opening_1 > 0.0
+                open_2 = not touches_2 or found.opening_2 > 0.0
+    again = (not hits_1 or open_1) and (not hits_2 or open_2)
+    event = Event(
+        REBOUNDS if again else CLOSES,
+        which,
+        closing,
+        max(found.normal_1, found.normal_2),
+        found.loss,
+        found.violation,
+        lasts,
+        mode.number + 1,
+        t,
+        0,
+    )
+    return _next(scene, t, after, (first, second), (open_1, open_2), touching, found, mode, event)
+
+
+@inlined
+def _rebounds_end(scene, mode, t, y, motion, contact, speed, e):
+    """Time until the rebounds of a contact end, if that is so short that they are summed; 0 if it is not."""
+    gravity, acceleration = scene.closed.body.gravity, (0.0, 0.0, 0.0)
+    if mode.open == BOTH:
+        acceleration = 0.0, 0.0, -gravity
+    elif mode.open == contact:
+        psi_dd, alpha_dd, _ = pivot.acceleration(scene, mode, t, y)
+        acceleration = _of_center(scene, mode, t, y, psi_dd, alpha_dd)
+    else:
+        return 0.0
+    falls = -gap_acceleration(scene.balls, contact, motion, acceleration)
+    if not falls > 0.0 or e >= 1.0:
+        return 0.0
+    time = 2.0 * speed / (falls * (1.0 - e))
+    return time if time * time * falls <= _LAST_REBOUNDS * _LAST_REBOUNDS * scene.balls.reach else 0.0
+
+
+@inlined
+def _of_center(scene, mode, t, y, psi_dd, alpha_dd):
+    """Accelerations of psi, x and y in a pivot."""
+    _, ring_omega, _ = drives.turn(scene.drive, t)
+    f = pivot.frame(scene, holding(mode), mode.turned, y, ring_omega)
+    reach, square = scene.balls.reach, f.psi_dot * f.psi_dot
+    out = -reach * f.alpha_dot * f.alpha_dot - psi_dd * f.w - square * f.u
+    along = reach * alpha_dd + psi_dd * f.u - square * f.w
+    return psi_dd, out * f.sin_alpha + along * f.cos_alpha, along * f.sin_alpha - out * f.cos_alpha
+
+
+@inlined
+def _next(scene, t, motion, before, are_open, touched, found, mode, event):
+    """Status, mode and state after an impact; `before` are both contacts, `touched` whether they had a gap."""
+    body, balls = scene.closed.body, scene.balls
+    theta, ring_omega, _ = drives.turn(scene.drive, t)
+    first, second = before
+    two = ring.contact_count(body) == 2
+    places = mode.place_1, mode.place_2
+    # A contact that has touched has a new place.
+    if touched[0]:
+        places = locate(scene.closed.surface, first.alpha - theta), places[1]
+    if touched[1] and two:
+        places = places[0], locate(scene.closed.surface, second.alpha - theta)
+    zeros = (1 if touched[0] and are_open[0] else 0), (1 if touched[1] and are_open[1] else 0)
+    if are_open[0] and (are_open[1] or not two):
+        state = in_flight(motion, mode.turned)
+        return RUNNING, make(1, 0, -1, places, (BOTH, mode.turned), zeros, event), state
+    if not two or not (are_open[0] or are_open[1]):
+        turned = 0
+        psi = motion.psi
+        if two:
+            ahead = second.sine * first.cosine - second.cosine * first.sine
+            turned = 1 if ahead < 0.0 else 0
+        v = found.slip_1
+        if two and (found.slip_2 == 0.0 or abs(found.slip_2) < abs(v)):
+            v = found.slip_2
+        return _close(scene, t, psi, v, turned, event)
+    contact = 2 if are_open[0] else 1
+    held, other_touched = (second, touched[0]) if contact == 2 else (first, touched[1])
+    v = found.slip_2 if contact == 2 else found.slip_1
+    opening = found.opening_1 if contact == 2 else found.opening_2
+    side = side_of(contact)
+    delta = motion.psi - held.alpha
+    delta = delta - 2.0 * pi * round(delta / (2.0 * pi))
+    turned = 1 if cos(delta) < 0.0 else 0
+    away = delta - delta_when_closed(body, contact, turned)
+    away = away - 2.0 * pi * round(away / (2.0 * pi))
+    along = (v + body.radius * ring_omega - balls.radius * motion.psi_dot) / balls.reach
+    rate = motion.psi_dot - along
+    if other_touched:
+        away = 0.0
+        rate = opening / (2.0 * balls.half_distance * side * cos(delta))
+    which = FIRST if contact == 2 else SECOND
+    state = motion.psi, v, away, rate, 0.0, 0.0, float(which + TURNED * turned)
+    f = pivot.frame(scene, contact, turned, state, ring_omega)
+    # A place counts the revolutions of the angle that the frame has.
+    place = locate(scene.closed.surface, f.alpha - theta)
+    places = (places[0], place) if contact == 2 else (place, places[1])
+    if pivot.load(scene, f) > 0.0:
+        status, found_mode = pivot.begun(scene, t, state, places, (which, turned), zeros, event, 0)
+        return status, found_mode, state
+    # The contact that has just closed opens again, without an impact.
+    zeros = (zeros[0], 2) if contact == 2 else (2, zeros[1])
+    state = in_flight(motion, turned)
+    return RUNNING, make(1, 0, -1, places, (BOTH, turned), zeros, event), state
+
+
+@inlined
+def _close(scene, t, psi, v, turned, event):
+    """Status, mode and state after all contacts have closed."""
+    status, found = modes.initial_mode(ring_of(scene, turned), t, (angle_when_closed(psi, turned), v))
+    return _after_closed(scene, status, found, t, (psi, v), turned, 2, event, True)
+
+
+@modes.status_when_stalled.implements(ImpactRing)
+def _status_when_stalled(scene, mode, t, y):
+    if mode.open == NONE:
+        return modes.status_when_stalled(
+            ring_of(scene, mode.turned), closed_mode(mode), t, (angle_when_closed(y[0], mode.turned), y[1])
+        )
+    if mode.open == BOTH or mode.sign == 0:
+        return BROKEN
+    _, ring_omega, _ = drives.turn(scene.drive, t)
+    K, _ = pivot.friction(scene, mode, y[1])
+    f = pivot.frame(scene, holding(mode), mode.turned, y, ring_omega)
+    return BROKEN if pivot.in_slip(scene, f, K)[3] > NEARLY_JAMMED * inertia(scene.closed.body) else JAM
+
+
+@modes.sticks.implements(ImpactRing)
+def _sticks(scene, mode):
+    return mode.open == NONE and (mode.sign == 0 or mode.region < 0)
+
+
+@modes.first_loss.implements(Mode)
+def _first_loss(before, after):
+    return before.number == 0 and after.number > 0
+
+
+@modes.in_space.implements(ImpactRing)
+def _in_space(scene, t, y):
+    motion = motion_of(scene, y, drives.turn(scene.drive, t)[1])
+    return motion.psi, motion.psi_dot

@@ -1,0 +1,421 @@
+"""A body of two balls, or a particle, that may leave the race of the ring and fall back on it.
+
+Symbols: (x, y) is the centre of mass, psi the angle of the body, which is phi while both contacts hold. The centre of
+ball i is ``c_i = rho e_r(alpha_i)`` with ``e_r(alpha) = (sin alpha, -cos alpha)`` outwards and
+``e_t(alpha) = (cos alpha, sin alpha)`` along the race. Its gap is ``(R - r) - |c_i|``; its slip is the velocity of its
+material point next to the race, along the race, relative to the race.
+
+The impact law is Newton's with Moreau's complementarity (Moreau 1988; Glocker 2001). At all contacts without a gap
+
+.. math::
+
+    0 \\le \\Lambda_N \\perp \\gamma_N^+ + e\\,\\gamma_N^- \\ge 0, \\qquad
+    -\\Lambda_T \\in \\mu_k \\Lambda_N \\operatorname{Sgn}(\\gamma_T^+),
+
+where the velocities follow from the impulses by momentum and moment of momentum. The modes of the contacts (open, slip
+in each direction, stick: at most 16) are tried one by one.
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos, hypot, sin
+from typing import Any, NamedTuple
+
+from ringsweep.compile import hook, inlined
+from ringsweep.physics import ring
+from ringsweep.quantities.parameters import Leaf
+
+
+class Balls(NamedTuple):
+    """Shape of the body; lengths in m.
+
+    Attributes
+    ----------
+    reach : float
+        Distance rho = R - r of the centre of a ball from the axis while it touches the race.
+    radius : float
+        Radius r of the balls.
+    half_distance : float
+        Half the distance 2a between the centres of the balls; 0 for a particle.
+    offset : float
+        Distance of the centre of mass from the line of the balls, positive away from the axis at psi = 0.
+    """
+
+    reach: Leaf
+    radius: Leaf
+    half_distance: Leaf
+    offset: Leaf
+
+
+class ImpactRing(NamedTuple):
+    """Ring whose body may lose its contacts, and what follows.
+
+    Attributes
+    ----------
+    closed, turned : Ring
+        The ring while all contacts hold: contact 1 behind contact 2, and after the contacts have changed their order.
+    law, drive, span
+        As in :class:`ringsweep.physics.ring.Ring`.
+    balls : Balls
+    restitution : float
+        Coefficient of restitution e, 1.
+    has_kinetic : float
+        1 if the friction law has a kinetic coefficient, which holds in an impact; 0 if its value at the slip before
+        holds.
+    """
+
+    closed: Any
+    turned: Any
+    law: Any
+    drive: Any
+    span: Leaf
+    balls: Balls
+    restitution: Leaf
+    has_kinetic: Leaf
+
+
+class Motion(NamedTuple):
+    """Motion of a free body: angle, rad; centre of mass, m; and their rates.
+
+    For a particle psi is the angle of its place, from the downward vertical.
+    """
+
+    psi: float
+    psi_dot: float
+    x: float
+    x_dot: float
+    y: float
+    y_dot: float
+
+
+class Contact(NamedTuple):
+    """A ball and the point of the race next to it.
+
+    Attributes
+    ----------
+    alpha, sine, cosine : float
+        Angle of the ball's centre from the downward vertical, from -pi to pi, rad; its sine and cosine.
+    gap : float
+        Gap, m.
+    opening : float
+        Rate of the gap, m/s.
+    slip : float
+        Velocity along the race, relative to it, m/s.
+    lever_n, lever_t : float
+        Moment about the centre of mass of a unit force inwards, and of one along the race, m.
+    """
+
+    alpha: float
+    sine: float
+    cosine: float
+    gap: float
+    opening: float
+    slip: float
+    lever_n: float
+    lever_t: float
+
+
+@hook
+def inertia(body):
+    """Moment of inertia about the centre of mass, kg m^2. 1 for a particle, on which no force has a moment."""
+
+
+@inertia.implements(ring.TwoContacts)
+def _two_inertia(body):
+    return body.inertia
+
+
+@inertia.implements(ring.OneContact)
+def _one_inertia(body):
+    return 1.0
+
+
+@inlined
+def side_of(contact):
+    """+1 for contact 1 and -1 for contact 2: the side of the ball on which the centre of mass is."""
+    return 1.0 if contact == 1 else -1.0
+
+
+@inlined
+def contact_of(balls, contact, motion, race_speed):
+    """A ball and the point of the race next to it; `race_speed` is R d theta/dt, m/s."""
+    side, s, c = side_of(contact), sin(motion.psi), cos(motion.psi)
+    a, h = side * balls.half_distance, balls.offset
+    # From the centre of mass to the centre of the ball.
+    across, up = -h * s - a * c, h * c - a * s
+    x, y = motion.x + across, motion.y + up
+    x_dot, y_dot = motion.x_dot - motion.psi_dot * up, motion.y_dot + motion.psi_dot * across
+    distance = hypot(x, y)
+    sine, cosine = x / distance, -y / distance
+    return Contact(
+        atan2(x, -y),
+        sine,
+        cosine,
+        balls.reach - distance,
+        y_dot * cosine - x_dot * sine,
+        x_dot * cosine + y_dot * sine + balls.radius * motion.psi_dot - race_speed,
+        across * cosine + up * sine,
+        balls.radius + across * sine - up * cosine,
+    )
+
+
+@inlined
+def gap_acceleration(balls, contact, motion, acceleration):
+    """Second derivative of a gap, m/s^2; `acceleration` is that of psi, x and y."""
+    side, s, c = side_of(contact), sin(motion.psi), cos(motion.psi)
+    a, h = side * balls.half_distance, balls.offset
+    across, up = -h * s - a * c, h * c - a * s
+    x, y = motion.x + across, motion.y + up
+    rate, (turning, x_dd, y_dd) = motion.psi_dot, acceleration
+    x_dot, y_dot = motion.x_dot - rate * up, motion.y_dot + rate * across
+    x_dd, y_dd = x_dd - turning * up - rate * rate * across, y_dd + turning * across - rate * rate * up
+    distance = hypot(x, y)
+    around = (x * y_dot - y * x_dot) / distance
+    return -(x * x_dd + y * y_dd + around * around) / distance
+
+
+class Impulses(NamedTuple):
+    """What an impact does.
+
+    Attributes
+    ----------
+    solutions : int
+        Number of different solutions of the impact law.
+    normal_1, along_1, normal_2, along_2 : float
+        Impulses at the contacts, N s: inwards, and along the race.
+    opening_1, slip_1, opening_2, slip_2 : float
+        Velocities of the contacts afterwards, m/s; exactly zero where the law says so.
+    loss : float
+        Energy that the body loses relative to the moving race, J.
+    violation : float
+        Largest violation of the law, recomputed from impulses and velocities, as a share of their scale.
+    """
+
+    solutions: int
+    normal_1: float
+    along_1: float
+    normal_2: float
+    along_2: float
+    opening_1: float
+    slip_1: float
+    opening_2: float
+    slip_2: float
+    loss: float
+    violation: float
+
+
+# Modes of a contact in an impact. FORWARD and BACKWARD are the directions of its slip afterwards.
+_OPEN, _FORWARD, _BACKWARD, _STICK = range(4)
+
+# Velocities that differ by less than this share of their scale are equal.
+_ROUNDING = 1e-11
+
+
+@inlined
+def _couplings(mass, moment, a, b):
+    """Changes of opening and slip at contact `a` by unit impulses, inwards and along the race, at contact `b`, 1/kg."""
+    cosine = a.cosine * b.cosine + a.sine * b.sine
+    sine = a.sine * b.cosine - a.cosine * b.sine
+    m, j = 1.0 / mass, 1.0 / moment
+    return (
+        m * cosine + j * a.lever_n * b.lever_n,
+        -m * sine + j * a.lever_n * b.lever_t,
+        m * sine + j * a.lever_t * b.lever_n,
+        m * cosine + j * a.lever_t * b.lever_t,
+    )
+
+
+@inlined
+def _solve_three(m, right):
+    """Solution of three linear equations by Cramer's rule, and the determinant."""
+    (a, b, c), (d, e, f), (g, h, i) = m
+    p, q, r = right
+    whole = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+    first = p * (e * i - f * h) - b * (q * i - f * r) + c * (q * h - e * r)
+    second = a * (q * i - f * r) - p * (d * i - f * g) + c * (d * r - q * g)
+    third = a * (e * r - q * h) - b * (d * r - q * g) + p * (d * h - e * g)
+    return first, second, third, whole
+
+
+@inlined
+def _shared_stick(mu, couplings, wanted, scale):
+    """Impulses that stop both contacts, which is three conditions on four impulses: (found, N1, T1, N2, T2).
+
+    `wanted` are the changes of opening and slip at contact 1 and of opening at contact 2. The impulses that give them
+    form a line. The cones of friction leave an interval of it, whose middle is taken, or nothing.
+    """
+    (nn_11, nt_11, tn_11, tt_11), (nn_12, nt_12, tn_12, tt_12), (nn_21, nt_21, _, _), (nn_22, nt_22, _, _) = couplings
+    d_1, s_1, d_2 = wanted
+    matrix = (nn_11, nt_11, nn_12), (tn_11, tt_11, tn_12), (nn_21, nt_21, nn_22)
+    n_1, t_1, n_2, whole = _solve_three(matrix, (d_1, s_1, d_2))
+    if whole == 0.0:
+        return False, 0.0, 0.0, 0.0, 0.0
+    by_1, by_t, by_2, _ = _solve_three(matrix, (-nt_12, -tt_12, -nt_22))
+    n_1, t_1, n_2 = n_1 / whole, t_1 / whole, n_2 / whole
+    by_1, by_t, by_2 = by_1 / whole, by_t / whole, by_2 / whole
+    # Four conditions p + q z >= 0 on the impulse z along the race at contact 2.
+    low, high = -1e300, 1e300
+    for p, q in (
+        (mu[0] * n_1 - t_1, mu[0] * by_1 - by_t),
+        (mu[0] * n_1 + t_1, mu[0] * by_1 + by_t),
+        (mu[1] * n_2, mu[1] * by_2 - 1.0),
+        (mu[1] * n_2, mu[1] * by_2 + 1.0),
+    ):
+        if q > 0.0:
+            low = max(low, -p / q)
+        elif q < 0.0:
+            high = min(high, -p / q)
+        elif p < 0.0:
+            return False, 0.0, 0.0, 0.0, 0.0
+    least = _ROUNDING * (abs(d_1) + abs(s_1) + abs(d_2)) * scale
+    if low > high + least:
+        return False, 0.0, 0.0, 0.0, 0.0
+    z = 0.5 * (low + high) if low > -1e299 and high < 1e299 else low if low > -1e299 else min(high, 0.0)
+    n_1, t_1, n_2 = n_1 + by_1 * z, t_1 + by_t * z, n_2 + by_2 * z
+    return min(n_1, n_2) >= -least, n_1, t_1, n_2, z
+
+
+@inlined
+def impulses(mass, moment, first, second, touching, mu, restitution):
+    """Impulses of an impact.
+
+    Parameters
+    ----------
+    mass, moment : float
+        Mass, kg, and moment of inertia about the centre of mass, kg m^2.
+    first, second : Contact
+        Both contacts just before; the second one repeats the first if there is only one.
+    touching : tuple of bool
+        Whether each contact has no gap.
+    mu : tuple of float
+        Friction coefficients, 1.
+    restitution : tuple of float
+        Coefficient of restitution at each contact, 1.
+
+    Returns
+    -------
+    Impulses
+    """
+    c_11, c_12 = _couplings(mass, moment, first, first), _couplings(mass, moment, first, second)
+    c_21, c_22 = _couplings(mass, moment, second, first), _couplings(mass, moment, second, second)
+    before = first.opening, first.slip, second.opening, second.slip
+    aims = (
+        -restitution[0] * before[0] if before[0] < 0.0 else 0.0,
+        -restitution[1] * before[2] if before[2] < 0.0 else 0.0,
+    )
+    speed = 1e-300
+    if touching[0]:
+        speed = max(speed, max(abs(before[0]), abs(before[1])))
+    if touching[1]:
+        speed = max(speed, max(abs(before[2]), abs(before[3])))
+    least = _ROUNDING * speed
+    least_impulse = least / min(c_11[0], c_22[0])
+    solutions = 0
+    best = Impulses(0, 0.0, 0.0, 0.0, 0.0, before[0], before[1], before[2], before[3], 0.0, 0.0)
+    for mode_1 in range(4 if touching[0] else 1):
+        for mode_2 in range(4 if touching[1] else 1):
+            t_1 = t_2 = 0.0
+            found = True
+            if mode_1 == _STICK and mode_2 == _STICK:
+                wanted = aims[0] - before[0], -before[1], aims[1] - before[2]
+                found, n_1, t_1, n_2, t_2 = _shared_stick(mu, (c_11, c_12, c_21, c_22), wanted, 1.0 / c_11[0])
+            else:
+                k_1 = -mu[0] if mode_1 == _FORWARD else mu[0] if mode_1 == _BACKWARD else 0.0
+                k_2 = -mu[1] if mode_2 == _FORWARD else mu[1] if mode_2 == _BACKWARD else 0.0
+                one = 1.0, 0.0, 0.0
+                two = 0.0, 1.0, 0.0
+                three = 0.0, 0.0, 1.0
+                right_1 = right_2 = right_3 = 0.0
+                if mode_1 == _STICK:
+                    three = c_11[2], c_12[2] + c_12[3] * k_2, c_11[3]
+                    right_3 = -before[1]
+                elif mode_2 == _STICK:
+                    three = c_21[2] + c_21[3] * k_1, c_22[2], c_22[3]
+                    right_3 = -before[3]
+                if mode_1 != _OPEN:
+                    by_t = c_11[1] if mode_1 == _STICK else c_12[1] if mode_2 == _STICK else 0.0
+                    one = c_11[0] + c_11[1] * k_1, c_12[0] + c_12[1] * k_2, by_t
+                    right_1 = aims[0] - before[0]
+                if mode_2 != _OPEN:
+                    by_t = c_21[1] if mode_1 == _STICK else c_22[1] if mode_2 == _STICK else 0.0
+                    two = c_21[0] + c_21[1] * k_1, c_22[0] + c_22[1] * k_2, by_t
+                    right_2 = aims[1] - before[2]
+                n_1, n_2, t, whole = _solve_three((one, two, three), (right_1, right_2, right_3))
+                if whole == 0.0:
+                    continue
+                n_1, n_2, t = n_1 / whole, n_2 / whole, t / whole
+                t_1 = t if mode_1 == _STICK else k_1 * n_1
+                t_2 = t if mode_2 == _STICK else k_2 * n_2
+            if not found:
+                continue
+            o_1 = before[0] + c_11[0] * n_1 + c_11[1] * t_1 + c_12[0] * n_2 + c_12[1] * t_2
+            s_1 = before[1] + c_11[2] * n_1 + c_11[3] * t_1 + c_12[2] * n_2 + c_12[3] * t_2
+            o_2 = before[2] + c_21[0] * n_1 + c_21[1] * t_1 + c_22[0] * n_2 + c_22[1] * t_2
+            s_2 = before[3] + c_21[2] * n_1 + c_21[3] * t_1 + c_22[2] * n_2 + c_22[3] * t_2
+            # The law once more, from the impulses and the velocities.
+            violation = 0.0
+            for touches, n, along, opens, slides, aim, coefficient, unit in (
+                (touching[0], n_1, t_1, o_1, s_1, aims[0], mu[0], c_11[0]),
+                (touching[1], n_2, t_2, o_2, s_2, aims[1], mu[1], c_22[0]),
+            ):
+                if touches:
+                    impulse = unit * n
+                    wrong = max(-impulse, aim - opens)
+                    wrong = max(wrong, min(impulse, opens - aim))
+                    wrong = max(wrong, unit * (abs(along) - coefficient * n))
+                    # What slides feels all of its friction, against the slip.
+                    short = unit * (coefficient * n + along * (1.0 if slides > 0.0 else -1.0))
+                    wrong = max(wrong, min(abs(slides), abs(short)))
+                    violation = max(violation, wrong / speed)
+            if not violation <= _ROUNDING:
+                continue
+            o_1, o_2 = (0.0 if abs(o_1) <= least else o_1), (0.0 if abs(o_2) <= least else o_2)
+            s_1, s_2 = (0.0 if abs(s_1) <= least else s_1), (0.0 if abs(s_2) <= least else s_2)
+            apart = max(
+                max(abs(o_1 - best.opening_1), abs(s_1 - best.slip_1)),
+                max(abs(o_2 - best.opening_2), abs(s_2 - best.slip_2)),
+            )
+            if solutions > 0 and apart <= 1e3 * least:
+                continue
+            solutions += 1
+            loss = -0.5 * (
+                n_1 * (o_1 + before[0]) + t_1 * (s_1 + before[1]) + n_2 * (o_2 + before[2]) + t_2 * (s_2 + before[3])
+            )
+            if max(abs(n_1), abs(n_2)) <= least_impulse:
+                loss = 0.0
+            best = Impulses(solutions, n_1, t_1, n_2, t_2, o_1, s_1, o_2, s_2, loss, violation)
+    return best
+
+
+@inlined
+def after_impact(mass, moment, first, second, motion, found):
+    """Motion after an impact with the impulses `found`."""
+    return Motion(
+        motion.psi,
+        motion.psi_dot
+        + (
+            first.lever_n * found.normal_1
+            + first.lever_t * found.along_1
+            + second.lever_n * found.normal_2
+            + second.lever_t * found.along_2
+        )
+        / moment,
+        motion.x,
+        motion.x_dot
+        + (
+            first.cosine * found.along_1
+            - first.sine * found.normal_1
+            + second.cosine * found.along_2
+            - second.sine * found.normal_2
+        )
+        / mass,
+        motion.y,
+        motion.y_dot
+        + (
+            first.sine * found.along_1
+            + first.cosine * found.normal_1
+            + second.sine * found.along_2
+            + second.cosine * found.normal_2
+        )
+        / mass,
+    )
