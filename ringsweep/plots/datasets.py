@@ -12,16 +12,23 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from ringsweep.errors import InputError, nearest_name
-from ringsweep.quantities.variables import HISTORY
+from ringsweep.quantities.variables import HISTORY, MODES
 
 #: Panels of a history by the variable that says where the body is: ``phi`` in a ring, ``x`` on a belt.
 #: Variables of one tuple share a panel.
 PANELS: dict[str, tuple[tuple[str, ...], ...]] = {
-    "phi": (("phi",), ("omega", "ring_omega"), ("epsilon",), ("normal_1", "normal_2")),
+    "phi": (
+        *(("phi",), ("omega", "ring_omega"), ("epsilon",), ("normal_1", "normal_2")),
+        *(("gap_1", "gap_2"), ("impact_speed",)),
+    ),
     "x": (("x",), ("velocity", "belt_velocity"), ("friction_force",)),
 }
+
+#: What pictures show in place of the mode of friction while one of two contacts is open, and while none holds.
+PIVOT, FLIGHT = 2, 3
 
 
 def require_sweep(ds: xr.Dataset) -> None:
@@ -126,6 +133,22 @@ def panels_of(ds: xr.Dataset) -> list[tuple[str, ...]]:
 def zones(ds: xr.Dataset) -> list[str]:
     """Variables that say which zone lies under each contact; a history of several laws has no such strip."""
     return [] if compares_laws(ds) else present(ds, ("zone_1", "zone_2"))
+
+
+def phases(ds: xr.Dataset) -> NDArray[Any]:
+    """Mode of friction from each instant of a run to the next, or ``PIVOT`` or ``FLIGHT``."""
+    mode = ds["mode"].values
+    gaps = [ds[name].values for name in present(ds, ("gap_1", "gap_2"))]
+    if not gaps:
+        return np.asarray(mode)
+    # A contact that rebounds is open before and after an instant without a gap.
+    is_open = [np.maximum(gap, np.append(gap[1:], 0.0)) > 0.0 for gap in gaps]
+    return np.select([np.all(is_open, axis=0), np.any(is_open, axis=0)], [FLIGHT, PIVOT], mode)
+
+
+def mode_name(mode: float) -> str:
+    """Name of a mode of friction, or of what takes its place, for readers."""
+    return (MODES | {PIVOT: "one_contact_open", FLIGHT: "flight"})[int(mode)].replace("_", " ")
 
 
 def present(ds: xr.Dataset, names: Iterable[str]) -> list[str]:

@@ -33,6 +33,14 @@ REGIME_COLOURS: dict[str, str] = {
     "riding": "#B48FD0",
 }
 
+#: The colour of each word for what follows a lost contact. Their lightness falls from calm to wild.
+AFTERMATH_COLOURS: dict[str, str] = {
+    "held": "#F0E442",
+    "recovered": "#84CAF2",
+    "open": "#CC5500",
+    "tumbled": "#00507F",
+}
+
 #: Curves of friction laws and of methods, which may cover each other. The numbers of colours and of styles have no
 #: common factor, so a pair of the two returns only after 35 curves.
 CURVE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -50,6 +58,9 @@ PAIR_STYLES = ("-", "--")
 
 #: Shading of times at which the body sticks.
 STICK = "#E6E6E6"
+
+#: Times at which a contact is open. Shading with it is translucent: once for one of two contacts, more for all.
+OPEN = "#6A3D9A"
 
 #: Surface of the ring outside the zones.
 REST = "#F2F2F2"
