@@ -40,7 +40,7 @@ from matplotlib.patches import Patch
 from benchmarks import reference
 from benchmarks._common import ALPHA, BODY, GRAVITY, RADIUS, REST, ROUGH, V0, machine
 from ringsweep import config
-from ringsweep.quantities.variables import REGIMES
+from ringsweep.quantities.flags import REGIMES
 from ringsweep.runs import sweep
 from ringsweep.runs.executors import Execution
 from ringsweep.solvers.rk4 import STABILITY_LIMIT

@@ -54,7 +54,7 @@ from benchmarks._common import (
 from benchmarks.peers import in_c
 from benchmarks.peers.physics import Law
 from ringsweep import plots
-from ringsweep.quantities.variables import SEPARATING
+from ringsweep.quantities.flags import SEPARATING
 
 SEED, SIDE = 181, 64
 RESULTS = Path(__file__).parent / "results"

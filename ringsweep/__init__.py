@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from ringsweep.runs.precision import precision
     from ringsweep.runs.simulate import simulate
     from ringsweep.runs.sweep import run, sweep
+    from ringsweep.runs.thresholds import threshold
     from ringsweep.storage.netcdf import verify
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "run",
     "simulate",
     "sweep",
+    "threshold",
     "uncertainty_exponent",
     "verify",
     "words",
@@ -35,6 +37,7 @@ _MODULES = {
     "simulate": "runs.simulate",
     "precision": "runs.precision",
     "boundary": "runs.boundaries",
+    "threshold": "runs.thresholds",
     "uncertainty_exponent": "runs.boundaries",
     "friction_law": "config.friction",
     "verify": "storage.netcdf",

@@ -11,7 +11,8 @@ from solutions import HISTORY, Fall, solve
 from ringsweep.compile import take
 from ringsweep.models import batch, parameters
 from ringsweep.models.scene import Structure
-from ringsweep.quantities.variables import FAILED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
+from ringsweep.quantities.flags import FAILED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
+from ringsweep.quantities.variables import CLOSE_CALL, COARSE, NO_RESULT, NOT_ASKED
 from ringsweep.solvers import event
 from ringsweep.solvers.automaton import PATIENCE
 from ringsweep.solvers.event import Auto, Event, Implicit
@@ -69,6 +70,7 @@ class TestCertificate:
             fixed = solve(RK4(steps), scene)
             assert fixed.regime == fixed.motion == OSCILLATORY
             assert not fixed.certified
+            assert fixed.because == COARSE
         found = solve(Auto(), scene)
         assert (found.regime, found.separating_contact) == (SEPARATING, 2)
         assert found.certified
@@ -120,12 +122,16 @@ class TestCertificate:
         assert (found.steps[disagree] > first.steps[disagree] + second.steps[disagree]).all()
 
     def test_cells_without_certificate_are_run_again_a_limited_number_of_times(self, monkeypatch, calls, launches):
-        monkeypatch.setattr(event, "certifiable", lambda batch, rows, *_: np.zeros(len(rows), dtype=bool))
-        assert not solve(Event(), launches).certified.any()
+        monkeypatch.setattr(event, "doubts", lambda batch, rows, *_: np.full(len(rows), CLOSE_CALL, dtype=np.int8))
+        found = solve(Event(), launches)
+        assert not found.certified.any()
+        assert (found.because == CLOSE_CALL).all()
         assert 3 <= len(calls) <= 6
 
     def test_no_certificate_is_given_with_certify_false(self, calls, launches):
-        assert not solve(Auto(certify=False), launches).certified.any()
+        found = solve(Auto(certify=False), launches)
+        assert not found.certified.any()
+        assert (found.because == NOT_ASKED).all()
         assert len(calls) == 1
 
     def test_run_that_reaches_max_steps_is_failed_without_certificate(self, scenes, law):
@@ -134,6 +140,7 @@ class TestCertificate:
         np.testing.assert_array_equal(found.regime, FAILED)
         np.testing.assert_array_equal(found.motion, FAILED)
         assert not found.certified.any()
+        assert (found.because == NO_RESULT).all()
 
     @pytest.mark.parametrize(
         "path", ["initial.omega", "initial.phi", "drive.amplitude", "zone.half_angle", "body.mass", "time.span"]

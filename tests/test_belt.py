@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 import ringsweep
-from ringsweep.quantities.variables import REGIMES
+from ringsweep.quantities.flags import REGIMES
 from ringsweep.solvers.rk4 import STABILITY_LIMIT
 
 CONFIGS = Path(__file__).parents[1] / "configs"
@@ -104,7 +104,7 @@ class TestCoulomb:
 
 class TestLaunch:
     def test_launch_without_initial_values_is_at_rest_on_the_belt(self):
-        scene = belt(span=10.0)
+        scene = belt("tustin", alpha=10.0, span=10.0)
         del scene["initial"]
         assert float(outcome(scene).first_slip) == pytest.approx(7.3575, rel=1e-12)
         del scene["belt"]

@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 import ringsweep
-from ringsweep.quantities.variables import REGIMES
+from ringsweep.quantities.flags import REGIMES
 
 
 def scene(law, *, k=2.0, drive=None, belt=None, x=0.0, velocity=None, span=60.0, **friction):
@@ -70,14 +70,10 @@ class TestRiding:
 class TestRounding:
     """Rounded laws have the word of the law that they round."""
 
-    LAWS: ClassVar = {
-        "threlfall": ("coulomb", {"mu_k": 0.3}),
-        "bengisu-akay": ("tustin", {"mu_s": 0.4, "mu_k": 0.3, "alpha": 20.0}),
-    }
+    COULOMB: ClassVar = {"mu_s": 0.3, "mu_k": 0.3, "alpha": 20.0}
 
-    @pytest.mark.parametrize("law", LAWS)
-    def test_rounding_never_changes_the_word(self, law):
-        limit, friction = self.LAWS[law]
+    @pytest.mark.parametrize("friction", [COULOMB, COULOMB | {"mu_s": 0.4}], ids=["coulomb", "tustin"])
+    def test_rounding_never_changes_the_word(self, friction):
         rng = np.random.default_rng(3)
         speeds, places = 10.0 ** rng.uniform(-1.5, 0.5, 16), rng.uniform(-0.3, 0.3, 16)
         axes = {
@@ -86,22 +82,22 @@ class TestRounding:
             "time.span": xr.DataArray(25.3 / frequencies, dims="case"),
             "initial.x": xr.DataArray(places, dims="case"),
         }
-        exact = ringsweep.sweep(scene(limit, k=30.0, drive=(0.1, 1.0), **friction), axes, progress=False)
+        exact = ringsweep.sweep(scene("tustin", k=30.0, drive=(0.1, 1.0), **friction), axes, progress=False)
         assert {"stick-slip", "oscillatory", "sticking"} <= set(words(exact))
         for share in (1e-3, 1e-4, 1e-6):
             rounded = ringsweep.sweep(
-                scene(law, k=30.0, drive=(0.1, 1.0), v0=0.1, **friction),
+                scene("bengisu-akay", k=30.0, drive=(0.1, 1.0), v0=0.1, **friction),
                 axes | {"friction.v0": xr.DataArray(share * speeds, dims="case")},
                 progress=False,
             )
             assert words(rounded) == words(exact)
             np.testing.assert_array_equal(rounded.stops_per_cycle, exact.stops_per_cycle)
-            np.testing.assert_allclose(rounded.stick_share, exact.stick_share, atol=5.0 * share + 1e-3)
+            np.testing.assert_allclose(rounded.stick_share, exact.stick_share, atol=8.0 * share + 1e-3)
 
     def test_body_that_sticks_two_fifths_of_the_time_is_in_stick_slip(self):
-        drive = {"k": 100.0, "drive": (0.01, 3.4), "span": 50.0, "mu_k": 0.3}
-        rounded, exact = runs(scene("threlfall", v0=0.003, **drive), 50.0), runs(scene("coulomb", **drive), 50.0)
-        for found, share in ((rounded, 0.435), (exact, 0.407)):
+        of = {"k": 100.0, "drive": (0.01, 3.4), "span": 50.0, **self.COULOMB}
+        rounded, exact = runs(scene("bengisu-akay", v0=0.003, **of), 50.0), runs(scene("tustin", **of), 50.0)
+        for found, share in ((rounded, 0.437), (exact, 0.407)):
             assert words(found) == ["stick-slip"]
             assert float(found.stick_share[0]) == pytest.approx(share, abs=1e-3)
             assert float(found.stops_per_cycle[0]) == 2.0
@@ -142,10 +138,10 @@ class TestSpan:
         assert found.settled[-2:].all()
         np.testing.assert_allclose(found.period[-1], found.period[-2], rtol=1e-5)
 
-    @pytest.mark.parametrize("law", ["stiction", "threlfall"])
+    @pytest.mark.parametrize("law", ["tustin", "bengisu-akay"])
     def test_longer_settled_runs_have_the_same_word_and_numbers(self, law):
         """Each of the random scenes is run again, longer by fractions of a period of the belt."""
-        of_law = {"mu_s": 0.4} if law == "stiction" else {"v0": 1e-3}
+        of_law = {"mu_s": 0.4, "alpha": 1e3} if law == "tustin" else {"mu_s": 0.3, "alpha": 10.0, "v0": 1e-3}
         rng = np.random.default_rng(7)
         frequencies, speeds = 10.0 ** rng.uniform(-0.8, 0.2, 10), 10.0 ** rng.uniform(-0.5, 0.5, 10)
         fractions = np.linspace(0.0, 1.0, 5)
@@ -170,7 +166,8 @@ class TestSpan:
 class TestPeriod:
     def test_undamped_body_that_is_driven_beside_its_resonance_does_not_return(self):
         """Without friction the free oscillation stays beside the forced one: no cycle repeats another."""
-        found = runs(scene("coulomb", mu_k=0.0, k=2.0, drive=(0.1, 0.37), x=1.0), [40.0, 80.0])
+        of = scene("tustin", mu_s=0.0, mu_k=0.0, alpha=1.0, k=2.0, drive=(0.1, 0.37), x=1.0)
+        found = runs(of, [40.0, 80.0])
         assert words(found) == ["oscillatory"] * 2
         np.testing.assert_array_equal(found.settled, 0)
         assert found.period.isnull().all()
@@ -227,7 +224,8 @@ class TestBreakingLoose:
     @pytest.mark.parametrize("phase", ["-90 deg", "0 deg", "90 deg"])
     def test_force_that_only_touches_breakaway_lets_nothing_slip(self, phase):
         force = {"amplitude": 0.5, "frequency": 0.1, "phase": phase}
-        run = ringsweep.sweep(oscillator(STICTION, force=force), {"time.span": [10.0, 100.0]}, progress=False)
+        coulomb = {"law": "coulomb", "mu_k": 0.5}
+        run = ringsweep.sweep(oscillator(coulomb, force=force), {"time.span": [10.0, 100.0]}, progress=False)
         assert words(run) == ["riding", "riding"]
 
 
@@ -249,7 +247,7 @@ def test_cubic_spring_alone_pulls_a_stuck_body_loose_again_and_again():
 
 def test_body_that_slides_steadily_below_the_end_of_the_stiction_band_is_sliding():
     """Friction that grows with the speed cannot cause stick-slip."""
-    friction = {"law": "formula", "mu": "mu_k*v/(w + v)", "mu_k": 0.1, "w": 0.1}
+    friction = {"law": "bengisu-akay", "mu_s": 0.1, "mu_k": 0.1, "v0": 1.0, "alpha": 10.0}
     run = ringsweep.sweep(oscillator(friction, belt={"velocity": 0.2}), {"time.span": [300.0, 400.0]}, progress=False)
     assert words(run) == ["sliding", "sliding"]
     assert run.settled[-1] == 1
@@ -283,7 +281,8 @@ class TestSteadySliding:
         assert found.settled.item() == 1
 
     def test_forced_oscillation_without_a_spring_is_certified(self):
-        found = runs(scene("coulomb", k=0.0, drive=(1.0, 2.0), span=20.0, mu_k=0.01), 20.0)
+        of = scene("tustin", k=0.0, drive=(1.0, 2.0), span=20.0, mu_s=0.01, mu_k=0.01, alpha=1.0)
+        found = runs(of, 20.0)
         assert words(found) == ["oscillatory"]
         assert found.certified.item() == 1
 

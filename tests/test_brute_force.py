@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from solutions import solve
 
-from ringsweep.quantities.variables import REGIMES
+from ringsweep.quantities.flags import REGIMES
 from ringsweep.solvers.event import Auto
 
 PATHS = {

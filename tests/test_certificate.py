@@ -11,7 +11,7 @@ from ringsweep.compile import take
 from ringsweep.models import MODELS
 from ringsweep.models.interface import audit, modes
 from ringsweep.physics import drives
-from ringsweep.quantities.variables import FAILED, JAMMED, RESTING, SEPARATING
+from ringsweep.quantities.flags import FAILED, JAMMED, RESTING, SEPARATING
 from ringsweep.solvers import audit as run_audit
 from ringsweep.solvers import event
 from ringsweep.solvers.certificate import with_errors

@@ -15,7 +15,7 @@ from numba.core.errors import NumbaError, UnsupportedBytecodeError
 
 import ringsweep
 from ringsweep.compile import cache, numba_private, readable_compile_errors
-from ringsweep.compile.cache import sources_digest
+from ringsweep.compile.cache import IN_KERNELS, sources_digest
 from ringsweep.compile.numba_private import AVAILABLE
 
 PACKAGE = Path(ringsweep.__file__).parent
@@ -79,6 +79,36 @@ def test_edit_in_the_kernels_changes_the_digest_of_sources(package, folder):
     assert before == sources_digest(PACKAGE)
     edited(max((package / folder).rglob("*.py")))
     assert sources_digest(package) != before
+
+
+@pytest.mark.parametrize("name", ["variables.py", "units.py", "quantity.py"])
+def test_edit_of_names_and_units_keeps_the_compiled_kernels(package, name):
+    before = sources_digest(package, places=IN_KERNELS)
+    assert before == sources_digest(PACKAGE, places=IN_KERNELS)
+    edited(package / "quantities" / name)
+    assert sources_digest(package, places=IN_KERNELS) == before
+
+
+@pytest.mark.parametrize(
+    "name", ["quantities/flags.py", "quantities/parameters.py", "numerics/series.py", "solvers/rk4.py"]
+)
+def test_edit_of_what_kernels_contain_compiles_them_anew(package, name):
+    before = sources_digest(package, places=IN_KERNELS)
+    edited(package / name)
+    assert sources_digest(package, places=IN_KERNELS) != before
+
+
+def test_kernels_take_nothing_but_flags_and_declarations_from_quantities():
+    """Names, units and messages are no numbers of a kernel."""
+    declarations = {"Leaf", "OUTCOMES", "Parameter", "Variable", "declared", "show"}
+    for folder in ("compile", "numerics", "physics", "models", "solvers"):
+        for path in (PACKAGE / folder).rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if isinstance(node, ast.Import):
+                    assert not any(name.name.startswith("ringsweep.quantities") for name in node.names), path
+                if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("ringsweep.quantities"):
+                    taken = {name.name for name in node.names}
+                    assert node.module == "ringsweep.quantities.flags" or taken <= declarations, path
 
 
 def test_new_file_of_a_law_changes_the_digest_of_sources(package):

@@ -13,7 +13,7 @@ STEEP = {
     "body": {"mass": 0.1, "inertia": 2.5e-5, "half_distance": 0.025, "ball_radius": 0.01, "beta": "16.8 deg"},
     "friction": {"law": "tustin", "alpha": 30.0, "rest": {"mu_s": 0.05, "mu_k": 0.03}},
     "zones": [{"half_angle": 0.6, "center": 0.4, "mu_s": 0.9, "mu_k": 0.4}],
-    "drive": {"law": "none"},
+    "drive": {"law": "arctan", "amplitude": 0.0},
     "initial": {"phi": 0.3, "omega": -6.0},
     "time": {"span": 1.0},
 }

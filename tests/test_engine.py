@@ -10,7 +10,9 @@ import xarray as xr
 import ringsweep
 from ringsweep.config import load
 from ringsweep.models.ring.record import Outcome
-from ringsweep.quantities.variables import OUTCOMES, REGIMES
+from ringsweep.quantities.flags import REGIMES
+from ringsweep.quantities.variables import OUTCOMES
+from ringsweep.runs import executors
 from ringsweep.solvers.certificate import with_errors
 from ringsweep.storage.provenance import attributes, identity
 
@@ -137,7 +139,7 @@ class TestSingleRun:
         assert run.normal_2.min() == run.normal_min_2
 
     def test_model_with_one_contact_has_no_variables_of_contact_2(self, scene):
-        alone = scene | {"model": "ring-single-contact", "body": {"mass": 0.076}, "drive": {"law": "none"}}
+        alone = scene | {"model": "ring-single-contact", "body": {"mass": 0.076}}
         run = ringsweep.simulate(alone | {"initial": {"omega": 5.0}})
         assert "normal_1" in run
         assert not {"normal_2", "zone_2", "normal_min_2"} & set(run.variables)
@@ -147,6 +149,16 @@ class TestProgress:
     def test_progress_bar_is_not_shown_in_a_pipe(self, scene, capfd):
         ringsweep.sweep(scene, {"drive.amplitude": [1.0]})
         assert capfd.readouterr().err == ""
+
+    def test_long_sweep_without_a_terminal_tells_how_far_it_is_after_a_minute_and_then_seldom(
+        self, monkeypatch, caplog
+    ):
+        clock = iter([0.0, 30.0, 61.0, 100.0, 121.0, 123.0, 200.0])
+        monkeypatch.setattr(executors.time, "monotonic", lambda: next(clock))
+        with caplog.at_level("INFO", "ringsweep"), executors.progress_bar(60, True) as bar:
+            for _ in range(6):
+                bar.update(10)
+        assert caplog.messages == ["20 runs of 60: about 2 min left", "50 runs of 60: about 25 s left"]
 
 
 class TestConfigurations:

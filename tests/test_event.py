@@ -8,7 +8,7 @@ from scipy.optimize import fsolve
 from solutions import Fall, imbalance, motion, solve, trail
 
 from ringsweep.compile import take
-from ringsweep.quantities.variables import JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
+from ringsweep.quantities.flags import JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 from ringsweep.solvers.event import Event
 
 EXACT = Event(rtol=1e-14, certify=False)

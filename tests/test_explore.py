@@ -10,7 +10,8 @@ import ringsweep
 from ringsweep import plots
 from ringsweep.config import load
 from ringsweep.errors import InputError
-from ringsweep.quantities.variables import OUTCOMES, REGIMES
+from ringsweep.quantities.flags import REGIMES
+from ringsweep.quantities.variables import OUTCOMES
 from ringsweep.runs import sweep
 
 AXES = {"drive.amplitude": [0.5, 2.0, 8.0], "zone.half_angle": ["10 deg", "20 deg", "40 deg", "60 deg"]}

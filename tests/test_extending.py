@@ -8,13 +8,21 @@ import sys
 import textwrap
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
+from matplotlib.figure import Figure
+
+import ringsweep
+from ringsweep.errors import InputError
 
 PAGE = (Path(__file__).parents[1] / "docs" / "extending.md").read_text(encoding="utf-8")
 
 #: Example files of the page, by name.
 FILES = {name: text for text, name in re.findall(r"```python\n(# (my_\w+\.py)\n.*?)```", PAGE, re.DOTALL)}
+
+#: The picture of the page. It is no file of RINGSWEEP_LAWS.
+PICTURE = FILES.pop("my_reactions.py")
 
 #: The formulas of friction and of a drive in a scene, and the one in Python.
 SECTION, DRIVE = (yaml.safe_load(text) for text in re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL))
@@ -219,6 +227,61 @@ INCOMPLETE = [
     ("my_dahl.py", '"dahl-ductile"', '"lugre"', "there is a friction law lugre already"),
     ("my_run_up.py", "_jerk(drive, t)", "_jerk(drive)", "the arguments of jerk are"),
 ]
+
+
+def changed(package, diff):
+    """Apply the changes that the page shows to a copy of the package."""
+    for section in re.split(r"^--- ", diff, flags=re.MULTILINE)[1:]:
+        name, _, hunks = section.partition("\n")
+        path = package.parent / name
+        text = path.read_text(encoding="utf-8")
+        for hunk in hunks.split("@@\n"):
+            lines = hunk.splitlines(keepends=True)
+            old, new = ("".join(line[1:] for line in lines if line[0] in kept) for kept in (" -", " +"))
+            assert text.count(old) == 1, f"{name} does not have, once: {old}"
+            text = text.replace(old, new)
+        path.write_text(text, encoding="utf-8")
+
+
+def test_outcome_of_the_page_is_stored_and_drawn(tmp_path):
+    """A body that swings without friction travels twice the width of a swing in each period."""
+    package = tmp_path / "ringsweep"
+    shutil.copytree(Path(__file__).parents[1] / "ringsweep", package, ignore=shutil.ignore_patterns("__pycache__"))
+    (diff,) = re.findall(r"```diff\n(.*?)```", PAGE, re.DOTALL)
+    changed(package, diff)
+    script = """
+        from scipy.special import ellipk
+        widths = np.array([0.5, 1.0])
+        periods = 4.0 * np.sqrt(0.2 / 9.81) * ellipk(np.sin(widths / 2) ** 2)
+        scene = {"model": "ring-single-contact", "body": {"mass": 0.1}, "ring": {"radius": 0.2},
+                 "friction": {"law": "coulomb", "rest": {"mu_k": 0.0}}, "time": {"span": 1.0}}
+        points = {"initial.phi": ("case", widths), "time.span": ("case", 2.0 * periods)}
+        import xarray as xr
+        axes = {path: xr.DataArray(values, dims=dim) for path, (dim, values) in points.items()}
+        found = ringsweep.sweep(scene, axes, "swings.nc", solver="event")
+        assert found["travel"].attrs["units"] == "rad"
+        assert np.allclose(found["travel"], 8.0 * widths, rtol=1e-3), found["travel"].values
+        from ringsweep.cli import main
+        raise SystemExit(main(["map", "swings.nc", "--var", "travel", "-o", "swings.png"]))
+    """
+    (tmp_path / "cache").mkdir()
+    done = in_a_process(script, [], tmp_path / "cache", tmp_path)
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert (tmp_path / "swings.png").stat().st_size > 0
+
+
+def test_picture_of_the_page_shows_the_reactions_of_the_run(scene):
+    run = ringsweep.simulate(scene)
+    found = {}
+    exec(PICTURE, found)
+    ax = found["reactions"](run, ax=Figure().add_subplot())
+    assert ax.get_xlabel().startswith("normal reaction at contact 1")
+    drawn = np.concatenate([line.get_xydata() for line in ax.lines])
+    drawn = drawn[np.isfinite(drawn).all(axis=1)]
+    for reaction, column in zip((run.normal_1.values, run.normal_2.values), drawn.T, strict=True):
+        assert set(column) == set(reaction)
+    with pytest.raises(InputError, match="has no"):
+        found["reactions"](run.drop_vars("normal_2"), ax=Figure().add_subplot())
 
 
 def test_incomplete_file_ends_a_command_with_one_line(tmp_path):

@@ -190,7 +190,7 @@ def test_history_whose_folder_is_deleted_meanwhile_names_the_cause(tmp_path):
 
 def test_names_are_on_the_disk_before_what_relies_on_them(config, monkeypatch):
     """A power cut must not undo the renaming of a task file, nor that of the result before the task files are gone."""
-    monkeypatch.setattr(TaskSizes, "next", lambda self, left: 3)
+    monkeypatch.setattr(TaskSizes, "next", lambda self, left: 2)
     ringsweep.run(config, config.with_name("compiled.nc"), progress=False).close()
     done = []
 
@@ -212,13 +212,14 @@ def test_names_are_on_the_disk_before_what_relies_on_them(config, monkeypatch):
     record("replace", lambda old, new: f"rename to {kind(new)}")
     record("unlink", lambda path: f"delete {kind(path)}")
     ringsweep.run(config, config.with_name("out.nc"), progress=False).close()
-    assert done[:13] == [
+    deleted = [step for step in done if step.startswith("delete")]
+    assert done[: -len(deleted)] == [
         "flush folder",
         *("flush it", "rename to sweep.json", "flush out.nc.partial"),
-        *("flush it", "rename to it", "flush out.nc.partial"),
+        *(2 * ["flush it", "rename to it", "flush out.nc.partial"]),
         *("flush it", "rename to out.nc", "flush folder"),
-        *("delete it", "delete sweep.json", "delete it"),
     ]
+    assert sorted(deleted) == ["delete it", "delete it", "delete it", "delete sweep.json"]
 
 
 @pytest.mark.parametrize("command", ["run", "simulate"])

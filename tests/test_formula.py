@@ -33,7 +33,7 @@ from ringsweep.physics.friction.velocity import (
     stiction_band,
     varies,
 )
-from ringsweep.quantities.variables import FAILED
+from ringsweep.quantities.flags import FAILED
 
 LEINE = {"law": "formula", "mu": "mu_s/(1 + delta*v)", "at_rest": "mu_s", "mu_s": 1.0, "delta": "3 s/m"}
 
@@ -621,17 +621,10 @@ class TestBand:
         law = made(define(Definition("mu_s*tanh(v/w)")), w=0.01)
         assert stiction_band(law) == pytest.approx(0.01 * math.atanh(math.sqrt(0.99)), rel=1e-12)
 
-    def test_word_does_not_depend_on_how_a_ramp_is_written_or_on_a_grid(self):
-        words = [
-            ringsweep.sweep(
-                belt(formula(text, None, mu_s=0.4, w=0.1)),
-                {"friction.w": np.linspace(0.09, 0.12, 16)},
-                progress=False,
-            ).regime.values
-            for text in ("mu_s*min(v/w, 1)", "mu_s*min(1, v/w)")
-        ]
-        assert (words[0] == words[1]).all()
-        assert (words[0] == words[0][0]).all()
+    def test_word_does_not_depend_on_a_grid(self):
+        scene = belt(formula("mu_s*min(v/w, 1)", None, mu_s=0.4, w=0.1))
+        words = ringsweep.sweep(scene, {"friction.w": np.linspace(0.09, 0.12, 16)}, progress=False).regime
+        assert len(set(words.values)) == 1
 
 
 # ---- motion -----------------------------------------------------------------------------------
@@ -721,18 +714,21 @@ def launched(friction):
 class TestNarrowFeatures:
     """A body passes a narrow feature of friction; the answer is that of an integration which is told where it is."""
 
+    #: Three shapes of a peak, of which a run has one: a corner, a Gaussian, and one with long tails.
+    PEAKS = "mu_k + a*max(0, 1 - 2*((v - vb)/w)**2) + b*exp(-((v - vb)/w)**2) + c/(1 + ((v - vb)/w)**2)"
+
     @pytest.mark.parametrize(
-        ("text", "shape", "w"),
+        ("weights", "shape", "w"),
         [
-            ("max(mu_k, mu_s - ((v - vb)/w)**2)", lambda x: max(0.1, 0.6 - x * x), 0.02),
-            ("mu_k + (mu_s - mu_k)*exp(-((v - vb)/w)**2)", lambda x: 0.1 + 0.5 * math.exp(-x * x), 1e-4),
-            ("mu_k*(1 + 0.5/(1 + ((v - vb)/w)**2))", lambda x: 0.1 * (1 + 0.5 / (1 + x * x)), 1e-6),
+            ({"a": 0.5}, lambda x: max(0.1, 0.6 - x * x), 0.02),
+            ({"b": 0.5}, lambda x: 0.1 + 0.5 * math.exp(-x * x), 1e-4),
+            ({"c": 0.05}, lambda x: 0.1 * (1 + 0.5 / (1 + x * x)), 1e-6),
         ],
     )
-    def test_body_passes_a_narrow_peak_of_friction(self, text, shape, w):
+    def test_body_passes_a_narrow_peak_of_friction(self, weights, shape, w):
         vb = 0.3
-        friction = {"law": "formula", "mu": text, "at_rest": "mu_s", "vb": vb, "w": w}
-        found = outcome(launched(friction))
+        friction = {"law": "formula", "mu": self.PEAKS, "at_rest": "mu_s", "vb": vb, "w": w, "a": 0, "b": 0, "c": 0}
+        found = outcome(launched(friction | weights))
         far = w * np.concatenate([np.linspace(0.0, 8.0, 65), np.geomspace(10.0, 1e5, 30), [math.sqrt(0.5)]])
         points = [v for v in (*(vb - far), *(vb + far)) if v > 0.0]
         expected = angle_of_rest(lambda v: shape((v - vb) / w), points)
@@ -760,7 +756,6 @@ class TestMotion:
         ("law", "method", "build"),
         [
             ("tustin", "event", "belt"),
-            ("tustin", {"method": "rk4", "steps": 20000}, "belt"),
             ("bengisu-akay", "implicit", "ring"),
         ],
     )
@@ -777,9 +772,8 @@ class TestMotion:
     @pytest.mark.parametrize(
         ("text", "method"),
         [
-            ("mu_s - mu_k*v/w", "event"),
-            ("mu_s - mu_k*v/w", {"method": "rk4", "steps": 2000}),
             ("mu_s*sqrt(1 - v/w)", "event"),
+            ("mu_s*sqrt(1 - v/w)", {"method": "rk4", "steps": 2000}),
         ],
     )
     def test_run_that_meets_a_speed_without_friction_fails(self, text, method):
@@ -790,7 +784,7 @@ class TestMotion:
         assert found["certified"] == 0
 
     def test_run_that_does_not_meet_such_a_speed_does_not_fail(self):
-        found = outcome(belt(formula("mu_s - mu_k*v/w", w=50.0), velocity=0.01, span=60.0))
+        found = outcome(belt(formula("mu_s*sqrt(1 - v/w)", w=50.0), velocity=0.01, span=60.0))
         assert found["regime"] != FAILED
 
     def test_parameter_of_a_formula_is_swept_like_any_other(self):
@@ -840,11 +834,11 @@ def in_a_process(script, folder):
 class TestLawsOfASession:
     def test_law_is_usable_at_once_and_can_be_replaced(self):
         """As when a cell of a notebook is edited and run again."""
-        scene = belt({"law": "of-session", "mu_s": 0.4, "delta": 3.0})
+        first, second = {"mu_s": 0.4, "delta": 3.0}, {"mu_s": 0.4, "mu_k": 0.25, "alpha": 3.0}
         found = []
-        for text in ("mu_s/(1 + delta*v)", "mu_s/(1 + delta*v)**2", "mu_s/(1 + delta*v)"):
+        for text, numbers in ((LEINE["mu"], first), (TWINS["tustin"][0], second), (LEINE["mu"], first)):
             ringsweep.friction_law("of-session", mu=text, at_rest="mu_s")
-            found.append(ringsweep.sweep(scene, {}))
+            found.append(ringsweep.sweep(belt({"law": "of-session", **numbers}), {}))
         one, other, again = (run["x_max"].item() for run in found)
         assert one == again
         assert abs(one - other) > 1e-3
@@ -922,12 +916,12 @@ class TestTable:
         assert distance(one, other, ("x_end", "x_max")) < 1e-10
 
     def test_table_is_scaled_by_zone(self):
-        mu, at_rest, parameters = TWINS["tustin"]
+        _, _, parameters = TWINS["tustin"]
         sampled = 0.5 + 0.5 * np.exp(-parameters["alpha"] * SPEEDS)
         given = {**table(mu=0.2 * sampled), "rest": {"scale": 1.0}}
         found = outcome(RING | {"friction": {**given, "rough": {"scale": 2.0}}})
         even = outcome(RING | {"friction": {**given, "rough": {"scale": 1.0}}})
-        twin = {"law": "formula", "mu": mu, "at_rest": at_rest, **parameters}
+        twin = {"law": "tustin", **parameters}
         surfaces = {"rough": {"mu_s": 0.4, "mu_k": 0.2}, "rest": {"mu_s": 0.2, "mu_k": 0.1}}
         known = outcome(RING | {"friction": twin | surfaces})
         assert found["regime"] == known["regime"]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from solutions import imbalance, solve, trail
 
-from ringsweep.quantities.variables import JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
+from ringsweep.quantities.flags import JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 from ringsweep.solvers.event import Event, Implicit
 from ringsweep.solvers.rk4 import RK4
 

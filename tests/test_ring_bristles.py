@@ -10,7 +10,7 @@ from ringsweep.compile import take
 from ringsweep.models import MODELS
 from ringsweep.models.scene import Structure
 from ringsweep.physics.friction.bristles import NEARLY
-from ringsweep.quantities.variables import JAMMED, OSCILLATORY, REVOLVING, SEPARATING
+from ringsweep.quantities.flags import JAMMED, OSCILLATORY, REVOLVING, SEPARATING
 from ringsweep.solvers.event import Event, Implicit
 from ringsweep.solvers.rk4 import RK4
 

@@ -14,7 +14,7 @@ from ringsweep.models.ring.record import Outcome
 from ringsweep.models.ring.rk4 import Inspection
 from ringsweep.physics.friction.velocity import friction_at
 from ringsweep.physics.ring import acceleration, reactions
-from ringsweep.quantities.variables import FAILED, JAMMED, OSCILLATORY, REGIMES, RESTING, REVOLVING, SEPARATING
+from ringsweep.quantities.flags import FAILED, JAMMED, OSCILLATORY, REGIMES, RESTING, REVOLVING, SEPARATING
 from ringsweep.solvers.rk4 import RK4, STABILITY_LIMIT
 
 MU = 0.1
@@ -425,7 +425,9 @@ class TestEnd:
         assert found.regime[0] in range(len(REGIMES))
         if found.regime != FAILED:
             # In a jam the reactions have no values.
-            may_be_missing = {"t_separation"} | ({"normal_min_1", "normal_min_2"} if found.regime == JAMMED else set())
+            may_be_missing = {"t_separation", "jump_max", "t_jump_max"} | (
+                {"normal_min_1", "normal_min_2"} if found.regime == JAMMED else set()
+            )
             always = [name for name in Outcome._fields if name not in may_be_missing]
             assert np.isfinite([getattr(found, name) for name in always]).all()
         assert np.isfinite(found.t_separation) == (found.regime == SEPARATING)

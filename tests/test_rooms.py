@@ -11,6 +11,7 @@ PACKAGE = Path(__file__).parents[1] / "ringsweep"
 ROOMS = (
     "errors",
     "quantities",
+    "statistics",
     "compile",
     "numerics",
     "physics",

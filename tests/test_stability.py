@@ -9,7 +9,7 @@ from solutions import solve
 from benchmarks import stability
 from ringsweep.models import MODELS
 from ringsweep.models.ring.record import Outcome
-from ringsweep.quantities.variables import JAMMED, OSCILLATORY, RESTING, SEPARATING
+from ringsweep.quantities.flags import JAMMED, OSCILLATORY, RESTING, SEPARATING
 from ringsweep.solvers.event import Auto, Event, Implicit
 from ringsweep.solvers.rk4 import RK4, STABILITY_LIMIT
 

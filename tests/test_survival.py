@@ -28,6 +28,7 @@ from ringsweep.runs.task_sizes import TaskSizes
 from ringsweep.storage import netcdf
 from ringsweep.storage.checkpoint import Checkpoint, open_checkpoint
 from ringsweep.storage.chunks import Layout
+from ringsweep.storage.files import MANIFEST, WorkingFolder
 from ringsweep.storage.provenance import identity
 
 SWEEP = {
@@ -357,6 +358,38 @@ class TestFullDisk:
         assert cli.main(["run", str(config), "-o", str(target)]) == 1
         assert "does not read back" in capsys.readouterr().err
         assert left(target) == ["out.nc.partial"]
+
+
+class TestOnlyTask:
+    """A sweep of one task writes its cells once."""
+
+    def test_cells_of_the_only_task_are_in_no_file_but_that_of_the_sweep(self, scene, tmp_path, monkeypatch):
+        write, written = WorkingFolder.write, []
+        monkeypatch.setattr(WorkingFolder, "write", lambda self, *file: (written.append(file[0]), write(self, *file)))
+        found = ringsweep.run({"scene": scene}, tmp_path / "one.nc", progress=False)
+        assert written == [MANIFEST]
+        assert found.regime.item() == ringsweep.run({"scene": scene}, progress=False).regime.item()
+
+    def test_only_task_is_kept_if_the_file_of_the_sweep_cannot_be_written(self, scene, tmp_path, monkeypatch):
+        target = tmp_path / "out.nc"
+        with stopping(monkeypatch, netcdf, "write", 0), pytest.raises(Stopped) as stopped:
+            ringsweep.run({"scene": scene}, target, progress=False)
+        assert "1 of 1 cells are kept" in stopped.value.__notes__[0]
+        assert len(tasks_of(target)) == 1
+        monkeypatch.setattr(Checkpoint, "put", lambda *_: pytest.fail("computed again"))
+        ringsweep.run({"scene": scene}, target, progress=False).close()
+        assert left(target) == ["out.nc"]
+
+    def test_only_task_that_cannot_be_kept_does_not_count_as_finished(self, scene, tmp_path, monkeypatch):
+        target = tmp_path / "out.nc"
+        monkeypatch.setattr(Checkpoint, "_write", full)
+        with stopping(monkeypatch, netcdf, "write", 0), pytest.raises(Stopped) as stopped:
+            ringsweep.run({"scene": scene}, target, progress=False)
+        assert not hasattr(stopped.value, "__notes__")
+
+
+def full(*arguments):
+    raise OSError(errno.ENOSPC, "No space left on device")
 
 
 class TestResultFile:

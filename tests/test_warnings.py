@@ -15,7 +15,8 @@ import ringsweep
 from ringsweep import cli
 from ringsweep.cli.report import summarise
 from ringsweep.config import load
-from ringsweep.runs.warnings import warn_of_results
+from ringsweep.quantities.flags import OSCILLATORY
+from ringsweep.runs.warnings import _hint_at_one_word, warn_of_results
 from ringsweep.storage import netcdf
 
 SCENE = load(Path(__file__).parents[1] / "configs" / "regime_map.yaml").source["scene"] | {"time": {"span": "0.5 s"}}
@@ -169,3 +170,17 @@ def test_results_on_disk_are_read_chunk_by_chunk(tmp_path, caplog):
     assert "50.0 % of the cells" in caplog.text
     # A variable has 32 MB.
     assert peak < 4e6
+
+
+def test_map_that_one_word_fills_says_what_to_look_at(caplog):
+    def told(regimes):
+        caplog.clear()
+        with caplog.at_level("INFO", "ringsweep"):
+            _hint_at_one_word(xr.Dataset({"regime": (("x", "y"), regimes)}))
+        return caplog.messages
+
+    regimes = np.full((5, 5), OSCILLATORY, dtype="int8")
+    assert told(regimes)[0].startswith("all 25 cells are oscillatory: do the axes reach far enough")
+    assert not told(regimes[:3, :3])
+    regimes[4, 4] = 0
+    assert not told(regimes)

@@ -47,14 +47,15 @@ def run_command(arguments: argparse.Namespace) -> None:
     if arguments.backend == "threads" and arguments.scheduler is not None:
         raise InputError("--scheduler", "is for --backend dask")
     config = refined(load(arguments.config, arguments.set), arguments.refine or None)
-    target, picture = _outputs(f"{config.name}.nc" if arguments.output is None else arguments.output, "regime", "sweep")
+    kind = ("regime", "sweep") if config.sample is None else ("probability", "sampled sweep")
+    target, picture = _outputs(f"{config.name}.nc" if arguments.output is None else arguments.output, *kind)
 
     if arguments.dry_run:
         from ringsweep.runs.plan import describe
 
         if arguments.scheduler is not None:
             raise InputError("--dry-run", "measures threads of this machine: leave --backend dask out")
-        print(describe(config, target, arguments.jobs))
+        print(describe(config, target, arguments.jobs, arguments.reuse))
         return
 
     from ringsweep import plots
@@ -72,9 +73,12 @@ def run_command(arguments: argparse.Namespace) -> None:
         print(f"{target} holds this sweep already (--fresh computes it again)")
     with netcdf.reading(target) as result:
         summarise(result)
-        if not config.axes.sizes or (not computed and _is_newer(picture, target)):
+        if not computed and _is_newer(picture, target):
             return
-        _draw(lambda: plots.regime_map(result), picture, f"ringsweep map {target}")
+        if config.axes.sizes:
+            _draw(lambda: plots.regime_map(result), picture, f"ringsweep map {target}")
+        elif config.sample is not None:
+            _draw(lambda: _panel(plots.probability_panel, result), picture, f"ringsweep plot {target}")
 
 
 def _draw(figure: Callable[[], Any], picture: Path, command: str) -> None:
@@ -125,6 +129,8 @@ def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None
     files.check_writable(target)
     selection = dict(_selection(text) for text in arguments.sel)
     page = target.suffix.lower() == ".html"
+    if page and arguments.log:
+        raise InputError("--log", "is for pictures, not for a page: name the output *.png")
     if page and arguments.boundaries is not None:
         raise InputError("--boundaries", "are drawn into pictures, not into a page: name the output *.png")
     if arguments.tolerance is not None and arguments.boundaries is None:
@@ -132,16 +138,23 @@ def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None
     curves = None
     try:
         if arguments.boundaries is not None:
+            from ringsweep.plots.datasets import is_sampled
             from ringsweep.plots.selection import select_grid
             from ringsweep.runs.boundaries import boundary, run_at
 
             tolerance = 1e-6 if arguments.tolerance is None else arguments.tolerance
-            # The picture shows the cells between which the curves lie.
-            result, missing = select_grid(result, selection)
-            selection = {}
+            sampled = is_sampled(result)
+            located = _at_medians(result) if sampled else result
+            held = {name: value for name, value in selection.items() if name != "word" or not sampled}
+            located, missing = select_grid(located, held)
             if missing:
-                result = run_at(result, missing, arguments.boundaries)
-            curves = boundary(result, arguments.boundaries, tolerance)
+                located = run_at(located, missing, arguments.boundaries)
+            curves = boundary(located, arguments.boundaries, tolerance)
+            if sampled:
+                selection["word"] = arguments.boundaries
+            else:
+                # The picture shows the cells between which the curves lie.
+                result, selection = located, {}
             written = dataset.with_name(f"{target.stem}-{arguments.boundaries}.nc")
             netcdf.save(curves, written)
             print(f"wrote {written}")
@@ -149,12 +162,30 @@ def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None
         if page:
             plots.save_page(result, target, *chosen)
         else:
-            plots.save(plots.regime_map(result, *chosen, curves), target)
+            plots.save(plots.regime_map(result, *chosen, curves, norm="log" if arguments.log else None), target)
     except InputError as error:
         if error.path == "ds":
             raise InputError(str(dataset), error.problem) from error
         raise
     print(f"wrote {target}")
+
+
+def _at_medians(result: Any) -> Any:
+    """The sweep of a sampled one in which every uncertain parameter has its median."""
+    from ringsweep.runs.executors import Execution
+    from ringsweep.runs.sampled import nominal
+    from ringsweep.runs.sweep import compute
+
+    return compute(nominal(result), Execution(progress=False))
+
+
+def _panel(draw: Callable[..., Any], result: Any, **options: Any) -> Any:
+    """A new figure with one picture."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.6, 4.2), layout="constrained")
+    draw(result, ax=figure.add_subplot(), **options)
+    return figure
 
 
 def _name_part(held: str) -> str:
@@ -175,9 +206,15 @@ def _plot(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
     from matplotlib.figure import Figure
 
     from ringsweep import plots
-    from ringsweep.plots.datasets import resolve
+    from ringsweep.plots.datasets import is_sampled, resolve
     from ringsweep.storage import files
 
+    if is_sampled(result):
+        _plot_sample(arguments, dataset, result)
+        return
+    if arguments.sel or arguments.word is not None or arguments.kind in _SAMPLE_KINDS:
+        option = "--sel" if arguments.sel else "--word" if arguments.word is not None else f"--kind {arguments.kind}"
+        raise InputError(option, f"is for a sampled sweep, and {dataset} is none")
     if not {"time", "contender"} & set(result.dims):
         raise InputError(str(dataset), f"is a sweep, not the history of a run: ringsweep map {dataset} draws it")
     shown = [name for name in (arguments.kind, arguments.law) if name is not None]
@@ -215,6 +252,37 @@ def _plot(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
     print(f"wrote {target}")
 
 
+_SAMPLE_KINDS = ("probability", "survival", "sensitivity")
+
+
+def _plot_sample(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
+    """Draw one cell of a sampled sweep."""
+    from ringsweep import plots
+    from ringsweep.plots.selection import select
+    from ringsweep.storage import files
+
+    if arguments.law is not None or arguments.begin is not None or arguments.end is not None:
+        raise InputError(str(dataset), "is a sampled sweep: --law, --from, --to are for histories")
+    if arguments.kind not in (None, *_SAMPLE_KINDS):
+        raise InputError("--kind", f"{arguments.kind} is for histories; of {dataset}: {', '.join(_SAMPLE_KINDS)}")
+    kind = arguments.kind or "probability"
+    if arguments.word is not None and kind != "sensitivity":
+        raise InputError("--word", "is that of --kind sensitivity")
+    shown = [part for part in (arguments.kind, *map(_name_part, arguments.sel)) if part]
+    target = Path(arguments.output or dataset.with_name("-".join([dataset.stem, *shown]) + ".png"))
+    files.check_writable(target)
+    result, _ = select(result, dict(_selection(text) for text in arguments.sel))
+    draw = getattr(plots, f"{kind}_panel")
+    try:
+        figure = _panel(draw, result, **({"word": arguments.word} if arguments.word else {}))
+    except InputError as error:
+        if error.path == "ds":
+            raise InputError(str(dataset), error.problem) from error
+        raise
+    plots.save(figure, target)
+    print(f"wrote {target}")
+
+
 def simulate_command(arguments: argparse.Namespace) -> None:
     """Run once, write the history and draw it."""
     from ringsweep.config import with_values
@@ -223,6 +291,7 @@ def simulate_command(arguments: argparse.Namespace) -> None:
     target, picture = _outputs(arguments.output or f"{config.name}-run.nc", "time", "history")
 
     from ringsweep import plots
+    from ringsweep.cli.report import print_events
     from ringsweep.runs.simulate import history
     from ringsweep.storage import netcdf
 
@@ -233,8 +302,26 @@ def simulate_command(arguments: argparse.Namespace) -> None:
     if "events" in result.attrs:
         print(result.attrs["events"])
     print(result.attrs["outcome"])
+    print_events(result)
     print(f"wrote {target}")
     _draw(lambda: plots.history(result), picture, f"ringsweep plot {target}")
+
+
+def threshold_command(arguments: argparse.Namespace) -> None:
+    """Print the values at which a regime begins or ends."""
+    from ringsweep.runs.thresholds import in_words, locate
+
+    found = locate(
+        arguments.config,
+        arguments.path,
+        arguments.regime,
+        (arguments.low, arguments.high),
+        arguments.tolerance,
+        scan=arguments.scan,
+        settings=arguments.set,
+        jobs=arguments.jobs,
+    )
+    print(in_words(found))
 
 
 def _other_scene(target: Path, result: Any) -> str:
@@ -286,6 +373,8 @@ def precision_command(arguments: argparse.Namespace) -> None:
     from ringsweep.config import load
 
     config = load(arguments.config)
+    if config.sample is not None:
+        raise InputError("sweep.sample", "precision measures the cells of a grid: leave sample out")
     target, picture = _outputs(arguments.output or f"{config.name}-precision.nc", "contender", "error against run time")
 
     from ringsweep import plots

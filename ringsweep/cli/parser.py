@@ -19,6 +19,7 @@ from ringsweep.cli.commands import (
     run_command,
     schema_command,
     simulate_command,
+    threshold_command,
     verify_command,
 )
 from ringsweep.errors import shortened
@@ -94,10 +95,29 @@ def build_parser() -> argparse.ArgumentParser:
         help="fix a coordinate at its value nearest to VALUE, with --boundaries at VALUE; units allowed",
     )
 
+    draw.add_argument("--log", action="store_true", help="colours follow the logarithm of the numbers")
     draw.add_argument("--boundaries", metavar="REGIME", help="locate the boundary of a regime: curves, also as NetCDF")
     draw.add_argument(
         "--tolerance", type=positive_number, metavar="T", help="error of these, in SI units (default: 1e-6)"
     )
+
+    threshold = _add_command(commands, "threshold", threshold_command,
+        "the value of a number at which a regime begins or ends", """
+        ringsweep threshold my.yaml --path drive.amplitude --regime separating
+        ringsweep threshold my.yaml --path zone.half_angle --regime jammed --from "2 deg" --to "60 deg"
+        ringsweep threshold my.yaml --path friction.rough.mu_k --regime separating --from 0.1 --to 0.5 --tolerance 1e-9
+        """)  # fmt: skip
+    threshold.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose scene is run")
+    threshold.add_argument("--path", required=True, metavar="PATH", help="the number that varies: drive.amplitude")
+    threshold.add_argument("--regime", required=True, metavar="REGIME", help="the regime: separating")
+    threshold.add_argument("--from", dest="low", metavar="VALUE", help="where to look; default: as the sweep has it")
+    threshold.add_argument("--to", dest="high", metavar="VALUE", help="units allowed")
+    threshold.add_argument("--tolerance", metavar="T", help="largest error (default: 1e-6 of the greatest value)")
+    threshold.add_argument(
+        "--scan", type=whole_number, metavar="N", help="runs in which changes of regime are looked for (default: 128)"
+    )
+    threshold.add_argument("--jobs", type=whole_number, metavar="N", help="threads (default: all cores)")
+    _add_settings(threshold)
 
     simulate = _add_command(commands, "simulate", simulate_command,
         "run once, or under each law of a sweep: history and its picture", """
@@ -114,14 +134,20 @@ def build_parser() -> argparse.ArgumentParser:
         ringsweep plot my-run.nc --from 3 --to 4 -o end.png
         ringsweep plot my-run.nc --kind phase -o portrait.pdf
         ringsweep plot my-run.nc --kind friction --law lugre
+        ringsweep plot uncertain.nc --kind sensitivity --word separating --sel drive.amplitude=2
         """)  # fmt: skip
-    plot.add_argument("dataset", metavar="RUN.nc", help="what ringsweep simulate or ringsweep precision wrote")
+    plot.add_argument(
+        "dataset", metavar="RUN.nc", help="what ringsweep simulate or precision wrote, or a sampled sweep"
+    )
     plot.add_argument("-o", "--output", metavar="RUN.png", help="default: beside RUN.nc; .pdf and .svg too")
     plot.add_argument(
         "--kind",
-        choices=["phase", "friction"],
-        help="phase portrait, or friction force over sliding velocity (belt), in place of the time history",
+        choices=["phase", "friction", "probability", "survival", "sensitivity"],
+        help="phase portrait, or friction force over sliding velocity (belt), in place of the time history; "
+        "of a sampled sweep probabilities (default), survival, or Sobol indices",
     )
+    plot.add_argument("--sel", action="append", default=[], metavar="DIM=VALUE", help="cell of a sampled sweep")
+    plot.add_argument("--word", metavar="REGIME", help="regime whose Sobol indices are drawn")
     plot.add_argument("--law", metavar="LAW", help="the run under this friction law, if RUN.nc has several")
     plot.add_argument("--from", type=float, dest="begin", metavar="T", help="draw the history from this time on, s")
     plot.add_argument("--to", type=float, dest="end", metavar="T", help="draw the history up to this time, s")

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from ringsweep.quantities.variables import FAILED, INFERRED, RIDING
+from ringsweep.quantities.flags import FAILED, RIDING
+from ringsweep.quantities.variables import CERTIFIED, DOUBTS, INFERRED, words
 
 
 def summarise(result: xr.Dataset) -> None:
@@ -17,6 +18,9 @@ def summarise(result: xr.Dataset) -> None:
         curves, points = len(np.unique(result["line"])), result.sizes["vertex"]
         print(f"boundary of {result.attrs['boundary_of']}: {curves} curves, {points} points", end="")
         print(f", each within {result['error'].values.max():.2g} along its axis" if points else "")
+        return
+    if "probability" in result:
+        _summarise_sample(result)
         return
     regime = result["regime"]
     print("cells:", regime.size)
@@ -33,6 +37,12 @@ def summarise(result: xr.Dataset) -> None:
         # Rounding must not turn "nearly all" into 100 %.
         of = "" if run.all() else f" of the {np.count_nonzero(run)} cells run"
         print(f"certified: {share if share == 1.0 else min(share, 0.999):.1%}{of}")
+    if "uncertified_because" in result:
+        because = result["uncertified_because"]
+        names = str(because.attrs["flag_meanings"]).split()
+        for flag, name in zip(np.atleast_1d(because.attrs["flag_values"]), names, strict=True):
+            if flag != CERTIFIED and (count := int((because == flag).sum())):
+                print(f"  {count} not: {DOUBTS.get(name, name)}")
     if "settled" in result:
         unsettled = (result["settled"] == 0) & ~regime.isin([RIDING, FAILED])
         if unsettled.any():
@@ -51,3 +61,55 @@ def summarise(result: xr.Dataset) -> None:
     for name in ("phi_end_error", "x_end_error"):
         if name in result and (unbounded := int(((result["certified"] == 1) & result[name].isnull()).sum())):
             print(f"no bound: {unbounded} certified cells, where nearby runs diverge")
+
+
+# Events of a run that are printed: all, or the first and the last.
+_FIRST, _LAST = 8, 4
+
+
+def print_events(run: xr.Dataset) -> None:
+    """Print how many events of each kind a run has, and the first and the last of them."""
+    if "friction_law" in run.dims:
+        for law in run["friction_law"].values:
+            print(f"{law}: ", end="")
+            print_events(run.sel(friction_law=law))
+        return
+    kinds, contacts = words(run["event_kind"]).values, words(run["event_contact"]).values
+    kinds = kinds[kinds != "none"]
+    counts = [f"{kind} {np.count_nonzero(kinds == kind)}" for kind in dict.fromkeys(kinds.tolist())]
+    print("events:", ", ".join(counts) or "none")
+    left_out = range(_FIRST, len(kinds) - _LAST)
+    for k, kind in enumerate(kinds):
+        if k == left_out.start and len(left_out) > 1:
+            print(f"  ... {len(left_out)} more are in the file")
+        if k not in left_out or len(left_out) == 1:
+            who = contacts[k].replace("contact_", " contact ").replace("both", " both contacts").replace("none", "")
+            print(f"  {run['event_time'].values[k]:.9g} s {kind}{who}")
+
+
+def _summarise_sample(result: xr.Dataset) -> None:
+    """Print the probability of each regime that occurs, with its interval; of several cells the range."""
+    probability = result["probability"]
+    cells = probability.size // result.sizes["word"]
+    print("cells:", cells)
+    print("sample:", result.attrs.get("sample"))
+    print("interval:", result.attrs.get("sample_interval"))
+    grid = [dim for dim in probability.dims if dim != "word"]
+    for word in map(str, result["word"].values):
+        of = {name: result[name].sel(word=word) for name in result.data_vars if str(name).startswith("probability")}
+        if not (of["probability"] > 0.0).any():
+            continue
+        if cells == 1:
+            share, low, high, numerics = (float(column.values.squeeze()) for column in of.values())
+            part = f", of which {numerics:.2%} are numerics" if numerics > 0.0 else ""
+            print(f"  {word}: {share:.2%} ({low:.2%} to {high:.2%}{part})")
+            continue
+        shares = of["probability"].values
+        print(f"  {word}: {shares.min():.2%} to {shares.max():.2%}, mean {shares.mean():.2%}", end="")
+        length = (of["probability_high"] - of["probability_low"]).max()
+        print(f"; intervals up to {float(length):.2%} long", end="")
+        numerics = float(of["probability_numerics"].max(grid))
+        print(f", of which up to {numerics:.2%} are numerics" * (numerics > 0.0))
+    runs = result["runs"]
+    share = float(runs.isel(certificate=1).sum() / runs.sum())
+    print(f"certified: {share if share == 1.0 else min(share, 0.999):.1%} of {int(runs.sum())} runs")

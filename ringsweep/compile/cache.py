@@ -23,12 +23,15 @@ logger = logging.getLogger("ringsweep")
 #: The user's own files (friction laws, drives, models, methods), from the environment variable RINGSWEEP_LAWS.
 OWN_FILES = [Path(name) for name in os.environ.get("RINGSWEEP_LAWS", "").split(os.pathsep) if name]
 
-# The sources that determine results. An edit elsewhere, such as in plots, keeps the cached kernels and results valid.
-_DETERMINE_RESULTS = ("compile", "numerics", "physics", "models", "solvers", "quantities", "runs/cells.py")
+# The sources that determine machine code, and those that determine results. An edit elsewhere, such as in plots, keeps
+# the cached kernels and the results valid.
+_ROOMS = ("compile", "numerics", "physics", "models", "solvers")
+IN_KERNELS = (*_ROOMS, "quantities/flags.py", "quantities/parameters.py")
+IN_RESULTS = (*_ROOMS, "quantities", "runs/cells.py")
 
 
-def sources_digest(root: Path, own_files: Iterable[Path] = ()) -> str:
-    """Digest of the sources that determine results.
+def sources_digest(root: Path, own_files: Iterable[Path] = (), places: Iterable[str] = IN_RESULTS) -> str:
+    """Digest of the sources that determine results, or of those in other places.
 
     Parameters
     ----------
@@ -36,6 +39,8 @@ def sources_digest(root: Path, own_files: Iterable[Path] = ()) -> str:
         Folder of the package.
     own_files : iterable of Path
         The user's own files, see :data:`OWN_FILES`.
+    places : iterable of str
+        Folders and files, relative to `root`.
 
     Returns
     -------
@@ -48,12 +53,15 @@ def sources_digest(root: Path, own_files: Iterable[Path] = ()) -> str:
         If one of the user's own files cannot be read.
     """
     digest = hashlib.sha256()
-    for place in _DETERMINE_RESULTS:
+    for place in places:
         path = root / place
         for source in [path] if path.suffix else sorted(path.rglob("*.py")):
             digest.update(str(source.relative_to(root)).encode())
             digest.update(source.read_bytes())
     for path in own_files:
+        if path.exists() and not path.is_file():
+            # A pipe would be waited for.
+            raise InputError("RINGSWEEP_LAWS", f"{path} is not a file")
         try:
             digest.update(path.read_bytes())
         except OSError as error:
@@ -70,19 +78,20 @@ def has_known_source(cls: type) -> bool:
 
 
 SOURCES_DIGEST = sources_digest(Path(__file__).parents[1], OWN_FILES)
+_KERNELS_DIGEST = sources_digest(Path(__file__).parents[1], OWN_FILES, IN_KERNELS)
 
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a function when it is first called, and keep its machine code on disk.
 
-    It runs without the global interpreter lock. The key of the cache covers all sources that determine results, so an
-    edit in a called function compiles the kernel anew.
+    It runs without the global interpreter lock. The key of the cache covers all sources that determine machine code, so
+    an edit in a called function compiles the kernel anew.
     """
     dispatcher = numba.njit(**KERNEL_OPTIONS, **KERNEL_COMPILER)(function)
     dispatcher.compile = _without_collection(dispatcher.compile)
     # Without the suffix, kernels with own files and kernels without them would replace each other in the cache.
     keep_on_disk(
-        dispatcher, SOURCES_DIGEST, SOURCES_DIGEST[:12] if OWN_FILES else "", _announce_compilation, _announce_damage
+        dispatcher, _KERNELS_DIGEST, _KERNELS_DIGEST[:12] if OWN_FILES else "", _announce_compilation, _announce_damage
     )
     return dispatcher
 

@@ -53,28 +53,49 @@ def sweep_section(doc: Document) -> dict[str, Any]:
     if "sweep" not in doc.tree:
         return {}
     section = section_of(doc.tree, "sweep", "")
+    known = ("grid", "points", "refine", "sample")
     for key in section:
-        if key not in ("grid", "points", "refine"):
-            raise InputError(f"sweep.{key}", "unknown key" + suggestion(key, ("grid", "points", "refine")))
+        if key not in known:
+            raise InputError(f"sweep.{key}", "unknown key" + suggestion(key, known))
     if isinstance(section.get("points"), str):
         section["points"] = doc.inline_csv(section["points"], "sweep.points", "sweep.points")
+    if isinstance(sample := section.get("sample"), dict) and isinstance(sample.get("of"), dict):
+        _inline_samples(doc, sample["of"])
     sweep = {key: columns for key, columns in section.items() if key != "refine"}
     if not sweep:
-        raise InputError("sweep", "empty: give grid or points, or leave sweep out")
+        raise InputError("sweep", "empty: give grid, points or sample, or leave sweep out")
     for key in sweep:
         if not section_of(sweep, key, "sweep."):
             raise InputError(f"sweep.{key}", "empty: name at least one path, or leave it out")
     return sweep
 
 
+def _inline_samples(doc: Document, of: dict[str, Any]) -> None:
+    """Put the contents of the CSV files of a sample in the place of their names."""
+    for key, given in of.items():
+        if not isinstance(given, dict) or "file" not in given:
+            continue
+        where = f"sweep.sample.of.{key}"
+        if len(given) > 1:
+            raise InputError(f"{where}.file", "stands alone: the rows of the file are the values")
+        columns = doc.inline_csv(given["file"], f"{where}.file", f"{where}.values")
+        for path in paths_of(key):
+            if path not in columns:
+                raise InputError(f"{where}.file", f"the file has no column {path}" + suggestion(path, columns))
+        of[key] = {"values": {path: columns[path] for path in paths_of(key)}}
+
+
 def swept_paths(sweep: dict[str, Any]) -> dict[str, str]:
     """Every path that the section ``sweep`` varies, with its place in the configuration."""
     found = {path: f"sweep.points.{path}" for path in sweep.get("points", ())}
-    return found | {path: f"sweep.grid.{key}" for key in sweep.get("grid", ()) for path in _paths_of(key)}
+    of = sweep.get("sample", {}).get("of")
+    for key in of if isinstance(of, dict) else ():
+        found |= dict.fromkeys(paths_of(key), f"sweep.sample.of.{key}")
+    return found | {path: f"sweep.grid.{key}" for key in sweep.get("grid", ()) for path in paths_of(key)}
 
 
-def _paths_of(key: Any) -> list[Any]:
-    """Paths of an axis of a grid: those that vary together are separated by commas."""
+def paths_of(key: Any) -> list[Any]:
+    """Paths of an axis of a grid, or of a sample: those that vary together are separated by commas."""
     return [path.strip() for path in key.split(",")] if isinstance(key, str) else [key]
 
 
@@ -90,14 +111,14 @@ def sweep_axes(scene: Scene, sweep: dict[str, Any]) -> Axes:
         seen = set(points)
         for key, given in sweep.get("grid", {}).items():
             where = f"sweep.grid.{key}"
-            first, *_ = paths = _paths_of(key)
+            first, *_ = paths = paths_of(key)
             for path in paths:
                 parameter = swept_parameter(known, path, where)
                 if path in seen:
                     also = "a column of sweep.points" if path in points else "on this or another axis"
                     raise InputError(where, f"also {also}: a path can vary in one place only")
                 seen.add(path)
-                read = _read_spacing if isinstance(given, dict) else read_values
+                read = read_spacing if isinstance(given, dict) else read_values
                 yield path, where, (dimension(first),), read(given, parameter, where)
 
     return build_axes(columns())
@@ -132,7 +153,7 @@ def read_data_array(
     return dims, read_values(flat, parameter, where, MAX_CELLS).reshape(given.shape)
 
 
-def _read_spacing(given: dict[str, Any], parameter: Parameter | Choice, where: str) -> NDArray[np.float64]:
+def read_spacing(given: dict[str, Any], parameter: Parameter | Choice, where: str) -> NDArray[np.float64]:
     """Values from ``{linspace: [first, last, count]}`` or ``{geomspace: ...}``."""
     if isinstance(parameter, Choice):
         raise InputError(where, f"a list of names is expected, got {show(given)}")

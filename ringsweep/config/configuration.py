@@ -26,6 +26,7 @@ from ringsweep.config.axes import (
 )
 from ringsweep.config.consistency import check_consistency
 from ringsweep.config.refinement import Refinement, read_refinement
+from ringsweep.config.sampling import Sample, read_sample
 from ringsweep.config.scene import parse_scene, sweepable
 from ringsweep.config.sections import read_values, suggestion
 from ringsweep.config.solver import read_solver
@@ -33,6 +34,8 @@ from ringsweep.config.yaml_text import Document, scalar
 from ringsweep.errors import InputError
 from ringsweep.models.scene import LAW, Scene
 from ringsweep.quantities.units import show
+
+_NOT_REFINED = "cannot stand beside sweep.sample: a probability has no boundary, and each cell needs its own runs"
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,8 @@ class Config:
         Name of its file without suffix.
     refine : Refinement, optional
         How the grid is refined; None if every cell is computed.
+    sample : Sample, optional
+        Uncertain parameters, which vary within each cell of the axes; None if there are none.
     """
 
     scene: Scene
@@ -62,6 +67,7 @@ class Config:
     source: dict[str, Any]
     name: str
     refine: Refinement | None = None
+    sample: Sample | None = None
 
 
 def load(config: str | os.PathLike[str] | Mapping[str, Any], settings: Iterable[str] = ()) -> Config:
@@ -103,6 +109,8 @@ def refined(config: Config, refine: Mapping[str, Any] | bool | None) -> Config:
     """
     if refine is None or (refine is True and config.refine is not None):
         return config
+    if refine is not False and config.sample is not None:
+        raise InputError("sweep.refine", _NOT_REFINED)
     given = yaml_text.read({"refine": refine}).tree["refine"]
     found = read_refinement(given, config.scene, config.axes)
     sweep = {key: value for key, value in config.source.get("sweep", {}).items() if key != "refine"}
@@ -192,8 +200,11 @@ def _validate(doc: Document) -> Config:
         if where in doc.locations:
             doc.locations[f"scene.{path}"] = doc.locations[where]
     refine = read_refinement(tree.get("sweep", {}).get("refine"), scene, axes)
-    check_consistency(scene, axes)
-    return Config(scene, solver, axes, tree, doc.name, refine)
+    if (sample := read_sample(sweep.get("sample"), scene, axes)) is None:
+        check_consistency(scene, axes)
+    elif refine is not None:
+        raise InputError("sweep.refine", _NOT_REFINED)
+    return Config(scene, solver, axes, tree, doc.name, refine, sample)
 
 
 def _apply_setting(doc: Document, setting: str) -> str:

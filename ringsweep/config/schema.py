@@ -14,6 +14,7 @@ from ringsweep.config.friction import FORMULA
 from ringsweep.config.friction import TABLE as TABLE_LAW
 from ringsweep.config.motion import FORMULA as FORMULA_DRIVE
 from ringsweep.config.refinement import NUMBERS
+from ringsweep.config.sampling import NUMBERS as SAMPLE_NUMBERS
 from ringsweep.config.tables import TABLES
 from ringsweep.models import MODELS, parameters
 from ringsweep.models.scene import LAW, Structure
@@ -23,6 +24,8 @@ from ringsweep.physics.friction.formula import COEFFICIENTS
 from ringsweep.physics.friction.laws import Table
 from ringsweep.quantities.parameters import Parameter, declared
 from ringsweep.solvers import METHODS
+from ringsweep.statistics import DISTRIBUTIONS
+from ringsweep.statistics import METHODS as DESIGNS
 
 
 def schema() -> dict[str, Any]:
@@ -212,6 +215,7 @@ def _sweep(paths: list[str]) -> dict[str, Any]:
                     ),
                 ],
             },
+            "sample": _sample(names),
             "points": {
                 "description": "CSV file whose columns are paths and whose rows are runs, or its columns",
                 "anyOf": [
@@ -226,3 +230,35 @@ def _sweep(paths: list[str]) -> dict[str, Any]:
             },
         }
     )
+
+
+def _sample(names: dict[str, Any]) -> dict[str, Any]:
+    value = {"type": ["number", "string"]}
+    values = {"anyOf": [_list(value), {"type": "object", "additionalProperties": _list(value)}]}
+    kinds: dict[str, Any] = {}
+    for name, distribution in DISTRIBUTIONS.items():
+        count = len(distribution.arguments)
+        about = f"[{', '.join(distribution.arguments)}]"
+        kinds[name] = {"description": about, "type": "array", "items": value, "minItems": count, "maxItems": count}
+    kinds["values"] = {"description": "values, each as probable as the others", **values}
+    kinds["file"] = {"description": "CSV file with a column for each path; a row is a draw", "type": "string"}
+    kinds["over"] = {"description": "path that the draw is multiplied by", "type": "string"}
+    levels = _list({"type": ["number", "string"]})
+    times = {"anyOf": [_list(value), *(_section({kind: _list(value)}) for kind in ("linspace", "geomspace"))]}
+    found = _section(
+        {
+            **{key: _number(parameter) for key, parameter in SAMPLE_NUMBERS.items()},
+            "method": {"description": "how points are drawn", "enum": [*DESIGNS]},
+            "of": {
+                "description": "path -> distribution; paths with commas between them are drawn together",
+                "type": "object",
+                "propertyNames": {"anyOf": [*names["anyOf"], {"pattern": r"^[^,\s]+(\s*,\s*[^,\s]+)+$"}]},
+                "additionalProperties": _section(kinds),
+                "minProperties": 1,
+            },
+            "quantiles": {"description": "variable -> levels", "type": "object", "additionalProperties": levels},
+            "survival": {"description": "times at which it is asked whether the contacts still hold", **times},
+            "sensitivity": {"description": "whether Sobol indices are computed", "type": "boolean"},
+        }
+    )
+    return {"description": "uncertain parameters: each cell of the grid is sampled", **found, "required": ["n", "of"]}

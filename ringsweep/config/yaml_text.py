@@ -191,7 +191,8 @@ def _read_result(file: Path) -> Document:
     """The configuration in the attributes of a result file."""
     try:
         with netCDF4.Dataset(file) as content:
-            is_sweep = "regime" in content.variables and not {"time", "contender"} & set(content.dimensions)
+            others = {"time", "contender", "word"} & set(content.dimensions)
+            is_sweep = "regime" in content.variables and not others
             recorded = Digests.read(content)
             if recorded is not None:
                 axes_of_sweep = [name for name in recorded.variables if is_sweep and name not in OUTCOMES]

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from ringsweep.plots.phase import phase_portrait
     from ringsweep.plots.polar import polar_view
     from ringsweep.plots.precision import precision_panel, work_precision
+    from ringsweep.plots.probability import probability_panel, sensitivity_panel, survival_panel
     from ringsweep.plots.selection import cell
 
 __all__ = [
@@ -39,11 +40,14 @@ __all__ = [
     "phase_portrait",
     "polar_view",
     "precision_panel",
+    "probability_panel",
     "regime_map",
     "save",
     "save_animation",
     "save_page",
+    "sensitivity_panel",
     "style",
+    "survival_panel",
     "work_precision",
 ]
 
@@ -54,6 +58,9 @@ _MODULES = {
     "history_panel": "histories",
     "work_precision": "precision",
     "precision_panel": "precision",
+    "probability_panel": "probability",
+    "survival_panel": "probability",
+    "sensitivity_panel": "probability",
     "phase_portrait": "phase",
     "friction_loop": "loops",
     "polar_view": "polar",

@@ -31,6 +31,17 @@ PANELS: dict[str, tuple[tuple[str, ...], ...]] = {
 PIVOT, FLIGHT = 2, 3
 
 
+# What a picture says of a scene: path, the words before its value, and the unit of a plain number.
+_TOLD = (
+    ("friction.law", "", ""),
+    ("drive.law", "drive ", ""),
+    ("drive.amplitude", "amplitude ", ""),
+    ("zone.half_angle", "zone \N{PLUS-MINUS SIGN}", " rad"),
+    ("belt.velocity", "belt ", " m/s"),
+    ("time.span", "span ", " s"),
+)
+
+
 def require_sweep(ds: xr.Dataset) -> None:
     """Refuse a dataset that is no sweep.
 
@@ -45,6 +56,35 @@ def require_sweep(ds: xr.Dataset) -> None:
         raise InputError(
             "ds", "is error against run time, not a sweep; ringsweep plot draws it, or plots.work_precision"
         )
+
+
+#: Dimensions that a sampled sweep has within a cell.
+WITHIN = ("word", "parameter", "quantile", "survival_time", "replicate", "certificate", "sum")
+
+
+def is_sampled(ds: xr.Dataset) -> bool:
+    """Whether a dataset holds probabilities, and no runs."""
+    return "word" in ds.coords and "probability" in ds
+
+
+def require_sample(ds: xr.Dataset, name: str) -> xr.Dataset:
+    """One cell of a sampled sweep that has a variable.
+
+    Raises
+    ------
+    InputError
+        If the dataset is no sampled sweep, lacks the variable, or has several cells.
+    """
+    if not is_sampled(ds):
+        raise InputError("ds", "is no sampled sweep: sweep.sample in a configuration makes one")
+    if name not in ds:
+        key = {"sobol_first": "sensitivity: true", "survival": "survival: [times]"}.get(name, name)
+        raise InputError("ds", f"has no {name}: run it with `{key}` in sweep.sample")
+    grid = [str(dim) for dim in ds[name].dims if dim not in WITHIN]
+    single = ds.isel({dim: 0 for dim in grid if ds.sizes[dim] == 1})
+    if left := [f"{dim} ({ds.sizes[dim]})" for dim in grid if ds.sizes[dim] > 1]:
+        raise InputError("ds", f"has several cells: hold {', '.join(left)}, by --sel or ds.isel(...)")
+    return single
 
 
 def require_history(ds: xr.Dataset) -> xr.Dataset:
@@ -177,6 +217,23 @@ def configuration(ds: xr.Dataset) -> dict[str, Any]:
     if "configuration" not in ds.attrs:
         raise InputError("ds", "has no attribute configuration, so its scene is not known")
     return dict(json.loads(ds.attrs["configuration"]))
+
+
+def scene_text(ds: xr.Dataset) -> list[str]:
+    """What a picture says of the scene, as the user wrote it: law, drive, zone, belt, span, if they were not swept."""
+    if "configuration" not in ds.attrs:
+        return []
+    scene = configuration(ds).get("scene", {})
+    swept_here = {str(c.attrs["path"]) for c in ds.coords.values() if "path" in c.attrs}
+    found = []
+    for path, before, after in _TOLD:
+        section, _, key = path.partition(".")
+        value = scene.get(section, {}).get(key) if isinstance(scene.get(section), dict) else None
+        if value is None or path in swept_here:
+            continue
+        unit = after if isinstance(value, int | float) else ""
+        found.append(f"{before}{value}{unit}")
+    return found
 
 
 def resolve(argument: str, name: str, available: Iterable[Any]) -> str:

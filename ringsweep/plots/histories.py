@@ -28,6 +28,7 @@ from ringsweep.plots.datasets import (
     present,
     require_history,
     resolve,
+    scene_text,
     zones,
 )
 from ringsweep.plots.labels import axis_label, displayed, label_axis, long_name, number_text, unit_text
@@ -54,7 +55,8 @@ from ringsweep.plots.style import (
     true_ranges,
     width_of,
 )
-from ringsweep.quantities.variables import JAMMED, SEPARATING, words
+from ringsweep.quantities.flags import JAMMED, SEPARATING
+from ringsweep.quantities.variables import words
 
 # Share of a run in which differences between friction laws belong to its start.
 _LATEST = 0.1
@@ -231,7 +233,7 @@ def draw_history(figure: Figure | SubFigure, ds: xr.Dataset) -> None:
         columns = max(1, min(most, letters(figure.bbox.width / float(figure.dpi)) // longest))
         style: dict[str, Any] = {"fontsize": SMALL, "frameon": False, "handlelength": 4}
         figure.legend(*lines, loc="outside upper center", ncols=columns, **style)
-    elif text := outcome(ds):
+    elif text := "\n".join(filter(None, (outcome(ds), "; ".join(scene_text(ds))))):
         inches = figure.bbox.width / float(figure.dpi)
         figure.suptitle("\n".join(folded([line], inches) for line in text.splitlines()), fontsize="medium")
 
@@ -268,6 +270,7 @@ def draw_panel(axes: Axes, ds: xr.Dataset, names: tuple[str, ...], explain_shadi
     for name, colour, style in zip(names, PAIR_COLOURS, PAIR_STYLES, strict=False):
         curve = _envelope(time, displayed(ds[name]).values)
         axes.plot(*curve, color=on_page(colour), linestyle=style, linewidth=1, label=_LEGEND.get(name))
+    _mark_separation(axes, ds, names)
     legend_above(axes)
     axes.set_ylabel(_short_label(ds, names[0]))
     if names[0].startswith("gap"):
@@ -277,7 +280,6 @@ def draw_panel(axes: Axes, ds: xr.Dataset, names: tuple[str, ...], explain_shadi
         axes.set_xlim(*time_limits(ds))
     if names[0] in _CLIPPED:
         clip(axes, time, displayed(ds[names[0]]).values, "left" if explain_shading else "right")
-    _mark_separation(axes, ds, names)
 
 
 def _shades() -> dict[int, dict[str, Any]]:
@@ -324,22 +326,14 @@ def _mark_separation(axes: Axes, ds: xr.Dataset, names: tuple[str, ...]) -> None
     first, last = ds["time"].values[[0, -1]]
     if not ending or not first <= instant <= last * (1.0 + 1e-9):
         return
+    contact = "both contacts separate" if which == 3 else f"contact {which} separates"
+    text = f"{contact}, t = {number_text(instant, '.4g')} s"
     for name in ending:
         known = np.isfinite(ds[name].values) & (ds["time"].values <= instant * (1.0 + 1e-9))
         reaction = ds[name].values[known][-1]
         style: dict[str, Any] = {"marker": "o", "markersize": 5, "markerfacecolor": "none", "clip_on": False}
-        axes.plot([instant], [reaction], color=on_page("black"), linestyle="", zorder=5, **style)
-    contact = "both contacts separate" if which == 3 else f"contact {which} separates"
-    axes.annotate(
-        f"{contact}, t = {number_text(instant, '.4g')} s",
-        (instant, reaction),
-        xytext=(-8.0, 0.0),
-        textcoords="offset points",
-        ha="right",
-        va="bottom",
-        fontsize=SMALL,
-        bbox={"facecolor": page_colour(), "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
-    )
+        axes.plot([instant], [reaction], color=on_page("black"), linestyle="", zorder=5, label=text, **style)
+        text = "_"
 
 
 def _draw_laws(axes: Axes, ds: xr.Dataset, names: tuple[str, ...]) -> None:

@@ -14,7 +14,8 @@ from matplotlib.backend_bases import Event, KeyEvent, MouseEvent, key_press_hand
 from matplotlib.backends import BackendFilter, backend_registry
 from matplotlib.figure import Figure
 
-from ringsweep.plots.datasets import swept
+from ringsweep.errors import InputError
+from ringsweep.plots.datasets import is_sampled, swept
 from ringsweep.plots.histories import draw_history
 from ringsweep.plots.labels import axis_label, displayed, number_text, plain_text, value_text
 from ringsweep.plots.maps import Map
@@ -78,6 +79,8 @@ def explore(
     >>> maps = ringsweep.sweep(scene, {"drive.amplitude": [1.0, 2.0], "zone.half_angle": ["10 deg", "20 deg"]})
     >>> figure = explore(maps, at={"drive.amplitude": 1.0})
     """
+    if is_sampled(ds):
+        raise InputError("ds", "is a sampled sweep, which has no runs to point at: draw a picture, *.png")
     found = Map.of(ds, x, y, var, sel or {})
     first, _ = select(found.ds, at or {})
     first = first.isel({dim: size // 2 for dim, size in first.sizes.items()})

@@ -12,7 +12,7 @@ from matplotlib.ticker import LogFormatterSciNotation
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
-from ringsweep.plots.datasets import is_numeric, resolve
+from ringsweep.plots.datasets import WITHIN, is_numeric, resolve
 from ringsweep.plots.labels import axis_label, display_factor, number_text
 
 
@@ -121,7 +121,7 @@ def choose_axes(ds: xr.Dataset, data: xr.DataArray, x: str | None, y: str | None
         If `x` or `y` is no coordinate of `data`, or both are the same.
     """
     candidates: list[str] = []
-    for dim in data.dims:
+    for dim in [dim for dim in data.dims if dim not in WITHIN]:
         along = [str(name) for name, c in data.coords.items() if c.dims == (dim,)]
         # The number of a point is only a label: the coordinates of the points are the axes. Else other coordinates vary
         # together with that of the dimension.

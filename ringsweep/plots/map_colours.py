@@ -15,10 +15,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from ringsweep.errors import InputError
 from ringsweep.plots.datasets import configuration
 from ringsweep.plots.labels import number_text
 from ringsweep.plots.style import CLASS_COLOURS, NO_VALUE, REGIME_COLOURS, on_page
-from ringsweep.quantities.variables import FAILED, INFERRED, JAMMED
+from ringsweep.quantities.flags import FAILED, JAMMED
+from ringsweep.quantities.variables import INFERRED, SAMPLED
 
 
 @dataclass(frozen=True)
@@ -31,28 +33,38 @@ class ColourScale:
     meanings: tuple[str, ...] | None = None
 
     @classmethod
-    def of(cls, data: xr.DataArray) -> ColourScale:
-        """The colours of a variable: by the meaning of its flags, or from its least to its greatest value."""
+    def of(cls, data: xr.DataArray, norm: str | None = None, cmap: str | None = None) -> ColourScale:
+        """The colours of a variable: by the meaning of its flags, or from its least to its greatest value.
+
+        `norm` is ``"linear"`` or ``"log"``; by default positive numbers that differ by powers of ten are logarithmic.
+        """
+        if norm not in (None, "linear", "log"):
+            raise InputError("norm", f"{norm!r} is none: it is linear or log")
+        if cmap is not None and cmap not in colormaps:
+            raise InputError("cmap", f"{cmap!r} is no colour map of matplotlib, such as viridis or magma")
         if "flag_values" not in data.attrs:
             finite = data.values[np.isfinite(data.values)]
             positive = finite[finite > 0.0]
-            if str(data.name).endswith("_error") and positive.size and positive.max() > positive.min():
-                # Bounds on errors differ by powers of ten.
-                return cls(_with_grey("viridis"), LogNorm(positive.min(), positive.max()))
+            palette = _with_grey(cmap or "viridis")
+            if norm == "log" and (not positive.size or finite.min() < 0.0):
+                raise InputError("norm", f"{data.name} has no logarithm: its values are not positive")
+            if positive.size and positive.max() > positive.min() and _is_logarithmic(data, finite, norm):
+                return cls(palette.with_extremes(under=_ZERO), LogNorm(positive.min(), positive.max()))
+            if str(data.name) in SAMPLED and data.dtype.kind == "f" and norm is None:
+                # Shares: every map of them has the same colours.
+                return cls(palette, Normalize(0.0, 1.0))
             limits = (finite.min(), finite.max()) if finite.size else (0.0, 1.0)
-            return cls(_with_grey("viridis"), Normalize(*limits))
+            return cls(palette, Normalize(*limits))
         flags = np.atleast_1d(data.attrs["flag_values"])
         meanings = str(data.attrs["flag_meanings"]).split()
         # The colour of a class does not depend on which other classes occur.
         colours = [REGIME_COLOURS.get(m, CLASS_COLOURS[k % len(CLASS_COLOURS)]) for k, m in enumerate(meanings)]
-        norm = BoundaryNorm(np.arange(len(flags) + 1) - 0.5, len(flags))
-        return cls(_with_grey(ListedColormap(colours)), norm, flags, tuple(m.replace("_", " ") for m in meanings))
+        classes = BoundaryNorm(np.arange(len(flags) + 1) - 0.5, len(flags))
+        return cls(_with_grey(ListedColormap(colours)), classes, flags, tuple(m.replace("_", " ") for m in meanings))
 
     def numbers(self, data: xr.DataArray) -> xr.DataArray:
         """Numbers for `norm`: the value, or the position of its flag; NaN where there is none."""
         numbers = data.astype(float).where(np.isfinite(data))
-        if isinstance(self.norm, LogNorm):
-            return numbers.clip(min=self.norm.vmin)
         if self.flags is None:
             return numbers
         classes = xr.full_like(numbers, np.nan)
@@ -62,7 +74,24 @@ class ColourScale:
 
     def rgba(self, numbers: NDArray[Any]) -> NDArray[Any]:
         """Colours of such numbers, shape ``(..., 4)``."""
+        if isinstance(self.norm, LogNorm):
+            # A zero has no logarithm, and the colour of what lies below the scale.
+            numbers = np.where(numbers <= 0.0, 0.5 * float(self.norm.vmin or 0.0), numbers)
         return np.asarray(self.colours(self.norm(np.ma.masked_invalid(numbers))))
+
+
+# Colour of zeros among numbers on a logarithmic scale.
+_ZERO = "#d95f0e"
+
+
+def _is_logarithmic(data: xr.DataArray, finite: NDArray[Any], norm: str | None) -> bool:
+    """Whether colours follow the logarithm: as asked for, for bounds on errors, or where half of the map were dark."""
+    if norm is not None:
+        return norm == "log"
+    if str(data.name).endswith("_error"):
+        return True
+    # Half of the values in the lowest twentieth of the scale, over two decades.
+    return bool(finite.min() > 0.0 and finite.max() > max(100.0 * finite.min(), 20.0 * np.median(finite)))
 
 
 @dataclass(frozen=True)
@@ -164,6 +193,8 @@ def legend_entries(
         inferred = _missing_inferred(ds, data)
         other = ~shown & ~inferred.values if _has_two_kinds_of_missing(data, inferred) else ~shown
         entries.append(Patch(color=on_page(NO_VALUE), label=f"{missing_text(ds, data)}, {_share(other)}"))
+    if isinstance(scale.norm, LogNorm) and (zero := data.values == 0.0).any():
+        entries.append(Patch(color=_ZERO, label=f"exactly 0, {_share(zero)}"))
     ink = on_page("black")
     for warning in warnings:
         label = f"{warning.label}, {_share(warning.cells.values)}"

@@ -13,6 +13,7 @@ from matplotlib import rcParams
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
@@ -22,7 +23,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
-from ringsweep.plots.datasets import is_numeric, require_sweep, resolve, swept
+from ringsweep.plots.datasets import is_numeric, is_sampled, require_sweep, resolve, scene_text, swept
 from ringsweep.plots.labels import (
     axis_label,
     display_factor,
@@ -56,13 +57,16 @@ from ringsweep.plots.style import (
     width_of,
 )
 from ringsweep.quantities.units import percent_at_most
-from ringsweep.quantities.variables import INFERRED
+from ringsweep.quantities.variables import AUDITED, INFERRED
 
 _MOST_PANELS = 25
 
 # Greatest number of cells drawn along an axis: more than a printed page has pixels. Drawing all of millions takes
 # gigabytes.
 _MOST_CELLS = 1200
+
+# Probabilities whose curves are drawn, and their style.
+_LEVELS: dict[float, Any] = {0.05: ":", 0.5: "-", 0.95: "--"}
 
 _CURVE: dict[str, Any] = {
     "color": "black",
@@ -81,6 +85,8 @@ def regime_map(
     boundaries: xr.Dataset | None = None,
     title: bool | str = True,
     legend: bool | str = True,
+    norm: str | None = None,
+    cmap: str | None = None,
 ) -> Figure:
     """Draw one variable of a sweep over the swept quantities, as a new figure.
 
@@ -108,6 +114,11 @@ def regime_map(
         Whether the map has a legend, or its place: ``"beside"``, ``"below"``, or a location of matplotlib within the
         axes, such as ``"upper left"``. By default it stands beside the map, and below one that is
         narrower than 117 mm. The legend of several panels always stands above them.
+    norm : {"linear", "log"}, optional
+        Scale of the colours of numbers; by default logarithmic for bounds on errors, and where most of a map would
+        be dark.
+    cmap : str, optional
+        Colour map of matplotlib for numbers.
 
     Returns
     -------
@@ -130,7 +141,7 @@ def regime_map(
     >>> regime_map(ds, var="phi_max").axes[0].get_ylabel()
     'angle (°)'
     """
-    found = Map.of(ds, x, y, var, sel or {})
+    found = Map.of(ds, x, y, var, sel or {}, norm, cmap)
     if boundaries is not None:
         found.entries.append(found.curve_entry(boundaries))
     width = figure_width()
@@ -274,9 +285,25 @@ class Map:
     texts: list[str]
 
     @classmethod
-    def of(cls, ds: xr.Dataset, x: str | None, y: str | None, var: str, sel: Mapping[str, float | str]) -> Map:
+    def of(
+        cls,
+        ds: xr.Dataset,
+        x: str | None,
+        y: str | None,
+        var: str,
+        sel: Mapping[str, float | str],
+        norm: str | None = None,
+        cmap: str | None = None,
+    ) -> Map:
         """Choose axes, panels and colours; arguments and errors as for :func:`regime_map`."""
         require_sweep(ds)
+        if is_sampled(ds):
+            var = "probability" if var == "regime" else var
+            # Regimes that occur nowhere have no map.
+            if "word" not in sel and "word" in ds.dims:
+                ds = ds.isel(
+                    word=(ds["probability"] > 0.0).any([d for d in ds["probability"].dims if d != "word"]).values
+                )
         var = resolve("var", var, [name for name, data in ds.data_vars.items() if is_numeric(data)])
         # The title also names what was held before, by `ds.isel` for example.
         held = [value_text(coordinate) for coordinate in swept(ds) if not coordinate.dims]
@@ -288,7 +315,7 @@ class Map:
             )
         horizontal, vertical = choose_axes(ds, data, x, y)
         scattered = is_scattered(horizontal, vertical)
-        scale = ColourScale.of(data)
+        scale = ColourScale.of(data, norm, cmap)
         warnings = cell_warnings(ds, data)
         others = [str(d) for d in data.dims if d not in {*horizontal.dims, *(vertical.dims if vertical else ())}]
         panels = _panels(ds, others)
@@ -298,6 +325,8 @@ class Map:
         thin = ds.isel(drawn)
         share = math.prod(ds.sizes[dim] / len(indices) for dim, indices in drawn.items())
         thinning = [f"1 cell in {share:.0f} drawn"] if drawn else []
+        # The legend of a map of origins has the shares, and its title is long.
+        told, audit = (scene_text(ds), audit_texts(ds)) if var != "origin" else ([], audit_texts(ds)[1:])
         return cls(
             ds,
             displayed(thin[var]),
@@ -310,7 +339,7 @@ class Map:
             columns,
             drawn,
             legend_entries(scale, ds, data, warnings, scattered),
-            ["" if scale.meanings is None else long_name(data), *held, *held_now, *thinning, *audit_texts(ds)],
+            ["" if scale.meanings is None else long_name(data), *held, *held_now, *told, *thinning, *audit],
         )
 
     @property
@@ -338,10 +367,13 @@ class Map:
         ]
         if self.vertical is None and self.scale.meanings is None:
             self._draw_line(axes, numbers)
+            self._draw_band(axes, index)
         elif self.scattered and self.vertical:
             self._draw_points(axes, self.vertical, numbers, warnings)
         else:
             self._draw_cells(axes, numbers, warnings)
+            if self.data.name == "probability" and self.vertical and min(numbers.shape) > 1:
+                self._draw_levels(axes, self.vertical, numbers)
 
     def draw_curves(self, axes: Axes, boundaries: xr.Dataset) -> None:
         """Draw the curves of boundaries over a panel."""
@@ -374,6 +406,28 @@ class Map:
         marker = "o" if len(numbers) <= 100 else "."
         axes.plot(self.horizontal.values, numbers, marker=marker, markersize=4, color=on_page(PAIR_COLOURS[0]))
 
+    def _draw_band(self, axes: Axes, index: Mapping[str, int]) -> None:
+        """Draw the interval of a probability or a quantile, if the dataset has it."""
+        ends = [f"{self.data.name}{end}" for end in ("_low", "_high")]
+        if all(end in self.ds for end in ends):
+            low, high = (displayed(self.ds[end].isel(index)).values[self.horizontal.order] for end in ends)
+            axes.fill_between(
+                self.horizontal.values, low, high, color=on_page(PAIR_COLOURS[0]), alpha=0.25, linewidth=0
+            )
+
+    def _draw_levels(self, axes: Axes, vertical: Axis, data: xr.DataArray) -> None:
+        """Draw the curves along which a probability is 5, 50 and 95 %."""
+        numbers = as_matrix(data, self.horizontal, vertical)
+        x, y = self.horizontal.values, vertical.values
+        levels = [level for level in _LEVELS if numbers.min() < level < numbers.max()]
+        if levels:
+            styles = [_LEVELS[level] for level in levels]
+            curves = axes.contour(x, y, numbers, levels, colors="white", linewidths=1.2, linestyles=styles)
+            stroke: list[Any] = [withStroke(linewidth=2.2, foreground="#404040")]
+            curves.set_path_effects(stroke)
+            for text in axes.clabel(curves, fmt=lambda level: f"{level:.0%}", fontsize=SMALL):
+                text.set_path_effects(stroke)
+
     def _draw_points(self, axes: Axes, vertical: Axis, data: xr.DataArray, warnings: list[CellWarning]) -> None:
         x, y = self.horizontal.values_at(data), vertical.values_at(data)
         colours = self.scale.rgba(data.values.ravel())
@@ -389,8 +443,12 @@ class Map:
         scale = self.scale
         x, y = self.horizontal.edges, self.vertical.edges if self.vertical else np.array([0.0, 1.0])
         numbers = as_matrix(data, self.horizontal, self.vertical)
-        axes.pcolormesh(x, y, np.ma.masked_invalid(numbers), cmap=scale.colours, norm=scale.norm, rasterized=True)
-        dark = is_dark(scale.rgba(numbers))
+        colours = scale.rgba(numbers)
+        if isinstance(scale.norm, LogNorm):
+            axes.pcolormesh(x, y, colours, rasterized=True)
+        else:
+            axes.pcolormesh(x, y, np.ma.masked_invalid(numbers), cmap=scale.colours, norm=scale.norm, rasterized=True)
+        dark = is_dark(colours)
         for warning in warnings:
             cells = as_matrix(warning.cells, self.horizontal, self.vertical)
             for colour, where in (("white", cells & dark), ("black", cells & ~dark)):
@@ -399,8 +457,20 @@ class Map:
                     patch = PathPatch(_outline(where, x, y), fill=False, linewidth=0, **style)
                     # add_patch would visit every rectangle to update the limits of the axes, which are known.
                     axes.add_artist(patch)
+        if data.name == "origin":
+            self._mark_audited(axes, data)
         if self.vertical is None:
             axes.set_yticks([])
+
+    def _mark_audited(self, axes: Axes, data: xr.DataArray) -> None:
+        """Mark audited cells, which are smaller than a dot of a large map."""
+        if self.vertical is None:
+            return
+        audited = as_matrix(data == AUDITED, self.horizontal, self.vertical)
+        row, column = np.nonzero(audited)
+        colour = self.scale.colours(int(np.flatnonzero(np.asarray(self.scale.flags) == AUDITED)[0]))
+        style: dict[str, Any] = {"edgecolors": "black", "linewidths": 0.3, "s": 9, "rasterized": len(row) > 2000}
+        axes.scatter(self.horizontal.values[column], self.vertical.values[row], color=colour, **style)
 
     def draw_alone(self, axes: Axes, title: bool | str = True, legend: bool | str = True) -> None:
         """Draw a map of one panel with labels, title, colour bar and legend."""

@@ -16,7 +16,7 @@ from matplotlib.colors import LogNorm, to_hex
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
-from ringsweep.plots.datasets import is_numeric, require_sweep, resolve, swept
+from ringsweep.plots.datasets import is_numeric, is_sampled, require_sweep, resolve, swept
 from ringsweep.plots.labels import axis_label, displayed, long_name, plain_text, value_text
 from ringsweep.plots.map_axes import Axis, choose_axes, is_scattered, thinned
 from ringsweep.plots.map_colours import ColourScale
@@ -165,6 +165,8 @@ class _Sweep:
     def of(cls, ds: xr.Dataset, x: str | None, y: str | None, var: str, sel: Mapping[str, float | str]) -> _Sweep:
         """Choose the axes, and put the cells in their order; arguments and errors as for :func:`save_page`."""
         require_sweep(ds)
+        if is_sampled(ds):
+            raise InputError("ds", "is a sampled sweep, which has no runs to point at: draw a picture, *.png")
         var = resolve("var", var, _numeric(ds))
         held = [value_text(coordinate) for coordinate in swept(ds) if not coordinate.dims]
         ds, held_now = select(ds, sel)

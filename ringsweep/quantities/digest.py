@@ -131,7 +131,8 @@ class Digests:
         def variable(name: str) -> str:
             one = file.variables[name]
             regions: Iterable[Any] = [...]
-            if blocks is not None and self.block is not None and "path" not in one.ncattrs():
+            outcome = "path" not in one.ncattrs() and name not in file.dimensions
+            if blocks is not None and self.block is not None and outcome:
                 regions = blocks(one.shape, self.block)
             return str(of_variable(one, (one[region] for region in regions)).hexdigest())
 

@@ -9,17 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ringsweep.errors import InputError
+from ringsweep.quantities.flags import JAMMED, REGIMES, SEPARATING
 from ringsweep.quantities.quantity import Quantity
 
 if TYPE_CHECKING:
     import xarray as xr
-
-#: Regimes in the order of their flag values.
-REGIMES = (
-    *("resting", "oscillatory", "revolving", "separating", "jammed", "failed", "stick-slip"),
-    *("sliding", "sticking", "riding"),
-)
-RESTING, OSCILLATORY, REVOLVING, SEPARATING, JAMMED, FAILED, STICK_SLIP, SLIDING, STICKING, RIDING = range(10)
 
 #: What each regime says, of the ring or of the belt.
 DEFINITIONS = {
@@ -42,6 +36,22 @@ HELD, RECOVERED, OPEN, TUMBLED = range(4)
 
 #: Origin of a cell of a refined sweep. An audited cell was inferred, and then run.
 COMPUTED, INFERRED, AUDITED = range(3)
+
+#: Why a cell has no certificate, and what each reason says.
+CERTIFIED, NOT_ASKED, NO_RESULT, ANSWERS_DIFFER, LAW_NOT_OBEYED = range(5)
+CLOSE_CALL, NOT_FINITE, SAME_STEPS, DIVERGES, COARSE = range(5, 10)
+DOUBTS = {
+    "none": "the cell is certified",
+    "not_asked": "certify is false",
+    "failed": "the run failed, or its repetition at a tighter tolerance",
+    "answers_differ": "two resolutions differ in regime, motion or separating contact",
+    "law_not_obeyed": "the audit found that the run does not obey its law or its balance of energy",
+    "close_call": "the regime hangs on less than the error of the run",
+    "not_finite": "a number is not finite",
+    "same_steps": "both resolutions took the same steps, so that their agreement says nothing",
+    "diverging": "nearby runs diverge, and have no common statistics",
+    "step_too_long": "rk4: the step exceeds the limit of stability, or leaps over a zone or over a contact that opens",
+}
 
 MODES = {-1: "slip_backward", 0: "stick", 1: "slip_forward"}
 
@@ -158,6 +168,13 @@ OUTCOMES: dict[str, Variable] = {
         dtype="int8",
         flags={0: "not_certified", 1: "certified"},
     ),
+    "uncertified_because": Variable(
+        "1",
+        "why the cell is not certified",
+        dtype="int8",
+        flags=dict(enumerate(DOUBTS)),
+        comment="; ".join(f"{name}: {meaning}" for name, meaning in DOUBTS.items()),
+    ),
     "origin": Variable(
         "1",
         "whether the cell was run, or inferred from its neighbours",
@@ -191,6 +208,28 @@ def error_attribute(name: str, columns: Collection[str]) -> dict[str, str]:
     error = f"{name}_error"
     return {"ancillary_variables": error} if error in columns else {}
 
+
+_SHARE, _INDEX = "probability of each regime", "Sobol index of the indicator of each regime"
+
+#: Variables of each cell of a sampled sweep.
+SAMPLED: dict[str, Variable] = {
+    "probability": Variable("1", _SHARE, comment=_defined(REGIMES)),
+    "probability_low": Variable("1", f"lower end of the 95 % interval: {_SHARE}"),
+    "probability_high": Variable("1", f"upper end of the 95 % interval: {_SHARE}"),
+    "probability_numerics": Variable("1", "part of the length of the interval that runs without certificate add"),
+    "runs": Variable("1", "runs of each replicate, without and with certificate", dtype="int32"),
+    "lost": Variable("1", "runs of each replicate that have lost a contact, or slipped, by then", dtype="int32"),
+    "survival": Variable("1", "probability that a contact still holds, or that a body still rides"),
+    "survival_low": Variable("1", "lower end of the 95 % interval: survival"),
+    "survival_high": Variable("1", "upper end of the 95 % interval: survival"),
+    "sobol_first": Variable("1", f"first {_INDEX}"),
+    "sobol_first_low": Variable("1", f"lower end of the 95 % interval: first {_INDEX}"),
+    "sobol_first_high": Variable("1", f"upper end of the 95 % interval: first {_INDEX}"),
+    "sobol_total": Variable("1", f"total {_INDEX}"),
+    "sobol_total_low": Variable("1", f"lower end of the 95 % interval: total {_INDEX}"),
+    "sobol_total_high": Variable("1", f"upper end of the 95 % interval: total {_INDEX}"),
+    "sobol_sums": Variable("1", "sums of which the Sobol indices are made"),
+}
 
 HISTORY: dict[str, Variable] = {
     "phi": Variable("rad", "angle of the body"),

@@ -73,9 +73,16 @@ def boundary(ds: xr.Dataset, regime: str, tolerance: float = 1e-6, *, jobs: int 
     >>> bool((found.error <= 1e-3).all())
     True
     """
-    flag, dims = _checked(ds, regime)
+    _checked(ds, regime)
     tolerance = quantity(tolerance, _TOLERANCE, "tolerance")
     configuration = _config(ds)
+    _check_cells(ds, configuration, jobs)
+    return located(ds, regime, configuration, tolerance, jobs=jobs)
+
+
+def located(ds: xr.Dataset, regime: str, configuration: Config, tolerance: float, *, jobs: int | None) -> xr.Dataset:
+    """Boundary of a regime in a map whose cells are known to be runs of a configuration; see :func:`boundary`."""
+    flag, dims = _checked(ds, regime)
     inside = ds["regime"].values == flag
     usable = ds["certified"].values == 1 if getattr(configuration.solver, "certify", True) else _was_run(ds)
     sides = [_crossings(inside, usable, axis) for axis in range(len(dims))]
@@ -86,7 +93,6 @@ def boundary(ds: xr.Dataset, regime: str, tolerance: float = 1e-6, *, jobs: int 
         logger.warning("the map has no boundary of %s: no two neighbouring certified cells differ in it", regime)
     columns = {str(name): c for name, c in ds.coords.items() if "path" in c.attrs}
     place = {name: _values(c, dims, low) for name, c in columns.items()}
-    _check_cells(ds, configuration, jobs)
     ends = np.zeros((2, len(low)))
     for k, dim in enumerate(dims):
         along = ds[dim].values

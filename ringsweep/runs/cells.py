@@ -114,6 +114,8 @@ def _columns(outcomes: tuple[str, ...], result: Result) -> Iterator[tuple[str, N
     yield from zip(outcomes, result.rows.T, strict=True)
     yield "steps", result.steps
     yield "certified", result.certified
+    if result.because is not None:
+        yield "uncertified_because", result.because
     if result.stiffness is not None:
         yield "stiffness", result.stiffness
     if result.errors is not None:

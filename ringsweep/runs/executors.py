@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import logging
+import math
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Generator, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from itertools import islice
 from multiprocessing import resource_tracker
 from queue import SimpleQueue
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, Self, TypeVar
 
 import joblib
 import numpy as np
@@ -21,8 +23,12 @@ from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
 from ringsweep.errors import InputError
+from ringsweep.runs.plan import duration
 
 logger = logging.getLogger("ringsweep")
+
+#: Seconds until the first line on the progress where there is no terminal.
+FIRST_LINE = 60.0
 
 Result = TypeVar("Result")
 Positions = NDArray[np.integer[Any]]
@@ -268,9 +274,43 @@ def stop_on_interrupt(under_way: Callable[[], str]) -> Iterator[threading.Event]
 def progress_bar(total: int | None, progress: bool, done: int = 0, unit: str = "run") -> Any:
     """Progress bar over `total` runs or other units, or a count of them if their number is not known.
 
-    It is shown only in a terminal or a notebook, and only if `progress` is true.
+    It is shown only in a terminal or a notebook, and only if `progress` is true. Elsewhere, as in the log of a batch
+    job, a line tells how far it is after a minute, and then each time that the time since the start has doubled.
     """
     # tqdm would hide the bar in a notebook, whose output is no terminal.
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
     notebook = hasattr(shell, "kernel")
-    return tqdm(total=total, initial=done, unit=unit, disable=(False if notebook else None) if progress else True)
+    if progress and not notebook and not sys.stderr.isatty():
+        return _ProgressLines(total, done, unit)
+    return tqdm(total=total, initial=done, unit=unit, disable=not progress)
+
+
+class _ProgressLines:
+    """Progress as lines of a log, with the methods of a bar that are used here."""
+
+    def __init__(self, total: int | None, done: int, unit: str) -> None:
+        self._total, self._done, self._first, self._unit = total, done, done, unit
+        self._began, self._next = time.monotonic(), FIRST_LINE
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Tell no more."""
+        self._next = math.inf
+
+    def update(self, count: int = 1) -> None:
+        """Count what is done, and tell it if it is time."""
+        self._done += count
+        since = time.monotonic() - self._began
+        if since < self._next or self._done == self._total:
+            return
+        self._next = 2.0 * since
+        left = ""
+        if self._total is not None:
+            rest = since * (self._total - self._done) / max(self._done - self._first, 1)
+            left = f" of {self._total}: about {duration(rest)} left"
+        logger.info("%d %ss%s", self._done, self._unit, left)

@@ -13,12 +13,15 @@ from time import monotonic
 
 import joblib
 import numpy as np
+from numpy.typing import NDArray
 
 from ringsweep.config import Config
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
 from ringsweep.quantities.variables import OUTCOMES
+from ringsweep.runs import sampled
 from ringsweep.runs.cells import TaskResult, compute_task
+from ringsweep.runs.reuse import EarlierSweep
 from ringsweep.solvers.certificate import with_errors
 from ringsweep.storage.chunks import Layout
 from ringsweep.storage.netcdf import COMPRESSED_FROM
@@ -35,9 +38,11 @@ _MEASURING, _FIRST, _MOST = 1.0, 120.0, 100_000
 
 
 def bytes_of_cell(config: Config) -> int:
-    """Size of the columns of a cell; variables that some solvers leave out are counted."""
+    """Size of the columns of a cell, or of its sums; variables that some solvers leave out are counted."""
+    if config.sample is not None:
+        return sampled.bytes_of_part(config) * config.sample.replicates
     model = model_of(config.scene.structure)
-    names = {*model.outcomes, "steps", "certified", "stiffness"} - set(model.absent)
+    names = {*model.outcomes, "steps", "certified", "uncertified_because", "stiffness"} - set(model.absent)
     errors = (
         [f"{name}_error" for name in with_errors(model.outcomes)] if getattr(config.solver, "certify", False) else []
     )
@@ -91,8 +96,10 @@ def memory_of_machine() -> float:
     return found
 
 
-def describe(config: Config, target: Path, jobs: int | None) -> str:
+def describe(config: Config, target: Path, jobs: int | None, reuse: str | os.PathLike[str] | None = None) -> str:
     """Cells, memory, disk and estimated time of a sweep, as lines of text. Some of its cells are run for it.
+
+    Cells that the file `reuse` of an earlier sweep has are counted, and take no time.
 
     Raises
     ------
@@ -101,34 +108,51 @@ def describe(config: Config, target: Path, jobs: int | None) -> str:
     """
     folder = target.resolve().parent
     layout = Layout(tuple(config.axes.sizes.values()))
+    taken = 0
+    if reuse is not None and config.sample is None:
+        earlier = EarlierSweep(reuse, config)
+        config = earlier.align_axes(config)
+        none = np.zeros(layout.total, dtype=bool)
+        taken = sum(len(positions) for positions, _ in earlier.shared_cells(config, layout, none, ()))
     check_room(config, layout.total, folder)
     shape = f" ({', '.join(f'{name} {length}' for name, length in config.axes.sizes.items())})" * bool(layout.sizes)
     columns = float(layout.total * bytes_of_cell(config))
     finished = _FILE + columns * (_COMPRESSED if layout.total >= COMPRESSED_FROM else 1.0)
     free = shutil.disk_usage(folder).free
     threads = jobs or joblib.cpu_count()
+    each = 0 if config.sample is None else config.sample.n * config.sample.rows
+    runs = f", {each} runs in each, {each * layout.total} in all" if each else ""
     most = "at most " if config.refine is not None else ""
     return "\n".join(
         (
-            f"cells: {most}{layout.total}{shape}",
+            f"cells: {most}{layout.total}{shape}{runs}",
+            *([] if reuse is None or config.sample is not None else [f"reuse: {taken} of them are taken from {reuse}"]),
             f"memory: some {size(memory_needed(config, False))} of {size(memory_of_machine())}",
             f"disk: {most}{size(columns + finished)} while it runs, then {most}{size(finished)}"
             f"; {size(free)} are free in {folder}",
-            f"time: {most}{_time(config, layout, threads)}",
+            f"time: {most}{_time(config, layout, threads, taken)}",
             "nothing was written",
         )
     )
 
 
-def _time(config: Config, layout: Layout, threads: int) -> str:
-    """Estimated time of a sweep in words."""
+def _time(config: Config, layout: Layout, threads: int, taken: int) -> str:
+    """Estimated time of a sweep of which an earlier one has some cells, in words."""
+    if config.sample is not None:
+        layout = sampled.part_layout(config, layout)
+    count = layout.total - taken
+    if not count:
+        return "hardly any: no cell is run"
     results = _measure(config, layout)
     if results is None:
         return f"not known: the first cells took more than {_FIRST:.0f} s, compilation included"
     cells = sum(len(result.positions) for result in results)
     cost = sum(result.seconds or 0.0 for result in results) / cells if cells else _MEASURING
-    seconds = cost * layout.total / min(threads, layout.total)
-    basis = f"measured on {cells} cells spread over the grid" if cells else "one cell takes longer than the measurement"
+    seconds = cost * count / min(threads, count)
+    what = "cells" if config.sample is None else "replicates of cells"
+    basis = (
+        f"measured on {cells} {what} spread over the grid" if cells else "one cell takes longer than the measurement"
+    )
     about = "about" if cells else "more than"
     return f"{about} {duration(seconds)} on {threads} threads, once the kernels are compiled ({basis})"
 
@@ -139,15 +163,20 @@ def _measure(config: Config, layout: Layout) -> list[TaskResult] | None:
     few = layout.total <= _MOST
     drawn = draw.permutation(layout.total) if few else draw.integers(layout.total, size=_MOST)
     answers: SimpleQueue[TaskResult | BaseException | None] = SimpleQueue()
-    side = config.solver.side_by_side
+    side = 1 if config.sample else config.solver.side_by_side
+
+    def compute(config: Config, layout: Layout, positions: NDArray[np.integer]) -> TaskResult:
+        if config.sample is None:
+            return compute_task(config, layout, positions)
+        return sampled.compute_parts(config, layout, None, positions)
 
     def work() -> None:
         try:
             # The first ones may compile or load kernels. They are run again.
-            answers.put(compute_task(config, layout, drawn[:side]))
+            answers.put(compute(config, layout, drawn[:side]))
             start, stop, began = 0, side, monotonic()
             while start < len(drawn) and monotonic() - began < _MEASURING / 2:
-                answers.put(compute_task(config, layout, drawn[start:stop]))
+                answers.put(compute(config, layout, drawn[start:stop]))
                 start, stop = stop, 2 * stop
             answers.put(None)
         except BaseException as error:

@@ -20,9 +20,10 @@ from ringsweep.config.axes import COUNT, dimension
 from ringsweep.errors import InputError
 from ringsweep.models import Model, batch, model_of
 from ringsweep.models.scene import LAW
+from ringsweep.quantities.flags import FAILED
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity
-from ringsweep.quantities.variables import FAILED, OUTCOMES, PRECISION, Variable
+from ringsweep.quantities.variables import OUTCOMES, PRECISION, Variable
 from ringsweep.runs.cells import values_of_cells
 from ringsweep.runs.contenders import TimedMethod, contenders_for, setting_of, solver_yaml, time_methods
 from ringsweep.runs.executors import interruptible, progress_bar

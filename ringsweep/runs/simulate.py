@@ -17,7 +17,9 @@ from ringsweep.errors import InputError
 from ringsweep.models import batch, model_of
 from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import turn
-from ringsweep.quantities.variables import AFTERMATHS, EVENTS, HISTORY, IMPACTS, REGIMES
+from ringsweep.quantities.flags import REGIMES
+from ringsweep.quantities.variables import AFTERMATHS, EVENTS, HISTORY, IMPACTS
+from ringsweep.runs.events import events, side_by_side
 from ringsweep.runs.executors import Execution, interruptible
 from ringsweep.runs.sweep import compute
 from ringsweep.storage.provenance import attributes
@@ -49,9 +51,9 @@ def simulate(
     -------
     xarray.Dataset
         The history along the dimension ``time``, with variables of :data:`ringsweep.quantities.variables.HISTORY`,
-        and the outcomes of the run as scalars. For several laws both also have the dimension ``friction_law``, and
-        ``time`` holds the instants of all runs. After the end of a run numbers are NaN, and classifications keep their
-        last value.
+        the events of the run along the dimension ``event`` (:data:`ringsweep.runs.events.VARIABLES`), and the outcomes
+        of the run as scalars. For several laws all also have the dimension ``friction_law``, and ``time`` holds the
+        instants of all runs. After the end of a run numbers are NaN, and classifications keep their last value.
 
     Raises
     ------
@@ -101,18 +103,20 @@ def history(config: Config, *, samples: int = SAMPLES) -> xr.Dataset:
 
 def _history(config: Config, samples: int) -> xr.Dataset:
     outcome = compute(config, Execution(1, progress=False))
-    runs = {}
+    runs, tables = {}, {}
     for law, structure in config.scene.structures.items():
         own = outcome.sel(friction_law=law) if config.axes.sizes else outcome
         runs[law] = _open_contact_at_end(_trace(config, structure, samples), own)
+        tables[law] = events(runs[law], own)
     if not config.axes.sizes:
-        (joined,) = runs.values()
+        (joined,), (table,) = runs.values(), tables.values()
         words = _describe(outcome)
     else:
         times = np.unique(np.concatenate([run["time"] for run in runs.values()]))
         joined = xr.concat([_resample(run, times) for run in runs.values()], "friction_law")
+        table = side_by_side(tables)
         words = "\n".join(f"{law}: {_describe(outcome.sel(friction_law=law))}" for law in runs)
-    return joined.merge(outcome).assign_attrs(attributes(config) | {"outcome": words})
+    return joined.merge(outcome).merge(table).assign_attrs(attributes(config) | {"outcome": words})
 
 
 def _trace(config: Config, structure: Structure, samples: int) -> xr.Dataset:

@@ -6,7 +6,7 @@ import logging
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -23,6 +23,7 @@ from ringsweep.config.axes import dimension
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
 from ringsweep.quantities.variables import INFERRED, error_attribute
+from ringsweep.runs import sampled
 from ringsweep.runs.cells import TaskResult, compute_task
 from ringsweep.runs.executors import Execution, Executor, progress_bar, stop_on_interrupt
 from ringsweep.runs.plan import check_room
@@ -30,8 +31,9 @@ from ringsweep.runs.refined import KnownLabels, complete, decide, gaps, with_nan
 from ringsweep.runs.refined import attributes as refinement_attributes
 from ringsweep.runs.refinement import Refined
 from ringsweep.runs.reuse import EarlierSweep
+from ringsweep.runs.sampled import EarlierSample
 from ringsweep.runs.task_sizes import TaskSizes, divide_cells, divide_into_tasks
-from ringsweep.runs.warnings import warn_of_results
+from ringsweep.runs.warnings import warn_of_results, warn_of_sample
 from ringsweep.storage import netcdf
 from ringsweep.storage.checkpoint import Checkpoint, Columns, DamagedTask, open_checkpoint
 from ringsweep.storage.chunks import Layout
@@ -234,12 +236,18 @@ def compute(
     """Run a validated configuration in memory, with or without warnings about the results; see :func:`run`."""
     config, earlier = _earlier_sweep(config, reuse)
     sizes = tuple(config.axes.sizes.values())
-    layout = Layout(sizes, chunk=sizes)
+    layout = _layout(config, whole=True)
     if layout.total > MAX_CELLS_IN_MEMORY:
         raise InputError("sweep", f"{layout.total:.3g} cells do not fit into memory: name a file as output")
-    check_room(config, layout.total, None)
+    check_room(config, layout.total // _parts_of_cell(config), None)
     store = MemoryStore(layout.total)
     found = _compute_cells(config, layout, store, earlier, execution)
+    if config.sample is not None:
+        sums = {n: c.reshape(*layout.sizes, *c.shape[1:]) for n, c in store.columns.items()}
+        results = _sampled_dataset(config, sampled.statistics(config, sums))
+        if warn:
+            warn_of_sample(results, config)
+        return results
     columns = {name: column.reshape(sizes) for name, column in store.columns.items()}
     results = _frame(config, found)
     if found is not None and config.refine is not None:
@@ -255,6 +263,22 @@ def compute(
     if warn:
         warn_of_results(results, config)
     return results
+
+
+def _layout(config: Config, whole: bool = False) -> Layout:
+    """Order of the cells of a sweep, or of the parts of the cells of a sampled one; in one chunk for a `whole` one."""
+    if config.sample is not None:
+        return sampled.part_layout(config, sampled.grid_layout(config, whole))
+    sizes = tuple(config.axes.sizes.values())
+    return Layout(sizes, sizes if whole else None)
+
+
+def _sampled_dataset(config: Config, columns: Mapping[str, NDArray[Any]]) -> xr.Dataset:
+    """Dataset of the statistics of all cells."""
+    dims, known = tuple(config.axes.sizes), sampled.variables(config)
+    return _frame(config, None).assign(
+        {name: ((*dims, *known[name][0]), column, known[name][1].attributes) for name, column in columns.items()}
+    )
 
 
 def write(
@@ -275,32 +299,44 @@ def write(
     config, earlier = _earlier_sweep(config, reuse)
     target = target.resolve()
     if target.exists():
-        netcdf.check_kind(target, "regime", "sweep")
-    layout = Layout(tuple(config.axes.sizes.values()))
+        netcdf.check_kind(target, *(("regime", "sweep") if config.sample is None else ("probability", "sampled sweep")))
+    layout = _layout(config)
     with open_checkpoint(target, identity(config), layout, fresh=fresh) as checkpoint:
         computed = fresh or not _holds_sweep(target, checkpoint)
         if computed:
             try:
                 _compute_file(config, target, layout, checkpoint, earlier, execution)
             except BaseException as error:
+                with suppress(InputError, OSError):
+                    checkpoint.keep()
                 if (finished := int(checkpoint.done.sum())) and checkpoint.folder.exists():
                     again = "the same command without --fresh" if fresh else "the same command"
                     error.add_note(
-                        f"{finished} of {layout.total} cells are kept in {checkpoint.folder}: {again} goes on"
+                        f"{finished} of {layout.total} {_parts(config)} are kept in {checkpoint.folder}: "
+                        f"{again} goes on"
                     )
                 raise
         checkpoint.clear()
     with netcdf.reading(target) as results:
-        warn_of_results(results, config)
+        warn = warn_of_results if config.sample is None else warn_of_sample
+        warn(results, config)
     return computed
+
+
+def _parts_of_cell(config: Config) -> int:
+    return 1 if config.sample is None else config.sample.replicates
+
+
+def _parts(config: Config) -> str:
+    return "cells" if config.sample is None else "replicates of cells"
 
 
 def _compute_file(config: Config, target: Path, layout: Layout, checkpoint: Checkpoint, *options: Any) -> None:
     """Compute the cells that the checkpoint lacks, and write the file from it."""
     finished = int(checkpoint.done.sum())
-    check_room(config, layout.total - finished, target.parent)
+    check_room(config, (layout.total - finished) // _parts_of_cell(config), target.parent)
     if finished:
-        logger.info("going on: %d of %d cells are done", finished, layout.total)
+        logger.info("going on: %d of %d %s are done", finished, layout.total, _parts(config))
     found = _compute_cells(config, layout, checkpoint, *options)
     try:
         _write_file(config, target, layout, checkpoint, found)
@@ -315,6 +351,17 @@ def _write_file(config: Config, target: Path, layout: Layout, checkpoint: Checkp
     """Write the file of a sweep whose cells are all in the checkpoint, but for those that were inferred."""
     frame = _frame(config, found)
     frame.attrs["processors"] = ", ".join(sorted(checkpoint.processors))
+    if config.sample is not None:
+        known = sampled.variables(config)
+        chunks = ((region[:-1], sampled.statistics(config, sums)) for region, sums in checkpoint.chunks())
+        netcdf.write(
+            *(target, checkpoint.working_folder, frame),
+            {name: variable for name, (_, variable) in known.items()},
+            sampled.grid_layout(config),
+            chunks,
+            within={name: dims for name, (dims, _) in known.items()},
+        )
+        return
     variables = model_of(config.scene.structure).variables
     if found is None or config.refine is None:
         netcdf.write(target, checkpoint.working_folder, frame, variables, layout, checkpoint.chunks())
@@ -367,7 +414,9 @@ class MemoryStore:
     def put(self, positions: NDArray[np.integer], columns: Columns, processor: str) -> None:
         """Store the columns of the cells at these positions."""
         for name, column in columns.items():
-            self.columns.setdefault(name, np.empty(len(self.done), dtype=column.dtype))[positions] = column
+            if name not in self.columns:
+                self.columns[name] = np.empty((len(self.done), *column.shape[1:]), dtype=column.dtype)
+            self.columns[name][positions] = column
         self.done[positions] = True
 
 
@@ -375,16 +424,17 @@ def _compute_cells(
     config: Config,
     layout: Layout,
     store: Checkpoint | MemoryStore,
-    earlier: EarlierSweep | None,
+    earlier: EarlierSweep | EarlierSample | None,
     execution: Execution,
 ) -> Refined | None:
     """Compute the cells that the store lacks, task after task: every cell, or those that a refinement asks for."""
-    if config.refine is not None:
+    if config.refine is not None and not isinstance(earlier, EarlierSample):
         return _refine_cells(config, layout, store, earlier, execution)
-    if earlier is not None:
+    continued = earlier if isinstance(earlier, EarlierSample) else None
+    if isinstance(earlier, EarlierSweep):
         _take_shared(config, layout, store, earlier, store.done)
     if not store.done.all():
-        with _open_tasks(config, layout, store, execution, layout.total) as tasks:
+        with _open_tasks(config, layout, store, execution, layout.total, continued) as tasks:
             tasks.run(divide_into_tasks(store.done, tasks.sizes, tasks.stopped))
             if not store.done.all():
                 raise KeyboardInterrupt
@@ -445,20 +495,27 @@ def _open_tasks(
     store: Checkpoint | MemoryStore,
     execution: Execution,
     total: int | None,
+    continued: EarlierSample | None = None,
 ) -> Iterator[_Tasks]:
-    """Tasks that compute cells of a sweep; `total` is the number of its cells, if all of them are computed."""
+    """Tasks that compute cells of a sweep.
+
+    `total` is the number of its cells, if all of them are computed. `continued` is the sampled sweep with fewer points
+    that goes on.
+    """
 
     def under_way() -> str:
         learnt = not math.isnan(sizes.seconds_per_cell)
         return "the tasks under way are done" if learnt else "compilation and the first cells are done"
 
     with execution.open() as workers:
-        sizes = TaskSizes(config.solver.side_by_side, workers.concurrency)
+        sizes = TaskSizes(1 if config.sample else config.solver.side_by_side, workers.concurrency)
         # What is in memory is lost anyway: there the first Ctrl-C ends the sweep.
         stopping = stop_on_interrupt(under_way) if isinstance(store, Checkpoint) else nullcontext(Event())
         with stopping as stopped, progress_bar(total, execution.progress, int(store.done.sum())) as bar:
             # Other processes get it with every task: points as they were written are long.
-            task = partial(compute_task, replace(config, source={}), layout)
+            task: Callable[..., TaskResult] = partial(compute_task, replace(config, source={}), layout)
+            if config.sample is not None:
+                task = partial(sampled.compute_parts, replace(config, source={}), layout, continued)
             tasks = _Tasks(task, store, workers, sizes, stopped, bar)
             try:
                 yield tasks
@@ -543,18 +600,25 @@ def _frame(config: Config, found: Refined | None) -> xr.Dataset:
     """Coordinates and attributes of the dataset of a sweep."""
     refinement = {} if found is None or config.refine is None else refinement_attributes(config.refine, found)
     known = sweepable(config.scene)
+    sample = {} if config.sample is None else sampled.coordinates(config.sample)
+    about = {} if config.sample is None else sampled.attributes(config)
     return xr.Dataset(
         coords={
             dimension(path): (dims, column, {**known[path].attributes, "path": path})
             for path, (dims, column) in config.axes.columns.items()
-        },
-        attrs=attributes(config) | refinement,
+        }
+        | sample,
+        attrs=attributes(config) | refinement | about,
     )
 
 
-def _earlier_sweep(config: Config, reuse: str | os.PathLike[str] | None) -> tuple[Config, EarlierSweep | None]:
+def _earlier_sweep(
+    config: Config, reuse: str | os.PathLike[str] | None
+) -> tuple[Config, EarlierSweep | EarlierSample | None]:
     """The configuration, with its axes aligned to those of the earlier sweep, and that sweep."""
     if reuse is None:
         return config, None
+    if config.sample is not None:
+        return config, sampled.EarlierSample(reuse, config)
     earlier = EarlierSweep(reuse, config)
     return earlier.align_axes(config), earlier

@@ -13,12 +13,19 @@ from ringsweep.config import Config
 from ringsweep.models import batch
 from ringsweep.physics.belt import Damper
 from ringsweep.physics.drives import Constant
-from ringsweep.quantities.variables import FAILED, INFERRED, RIDING
+from ringsweep.quantities.flags import FAILED, REGIMES, RIDING
+from ringsweep.quantities.variables import INFERRED
 from ringsweep.runs.cells import laws_at, values_at
 from ringsweep.solvers.rk4 import STABILITY_LIMIT
 from ringsweep.storage.chunks import Layout
 
+# Least number of cells of which it is surprising that all have one regime.
+_MAP = 16
+
 logger = logging.getLogger("ringsweep")
+
+# Share of runs without certificate that is worth a warning.
+_MANY_UNSURE = 0.01
 
 
 def warn_of_results(results: xr.Dataset, config: Config) -> None:
@@ -35,6 +42,8 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
     stiffness = results["stiffness"].variable if "stiffness" in results else None
     ended_at_start = unstable = 0
     count = ended.size
+    if "regime" in results:
+        _hint_at_one_word(results)
     largest = 0.0
     origin = results["origin"].variable if "origin" in results else None
     for _, _, region in Layout(ended.shape).chunks():
@@ -74,6 +83,24 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
     if ended_at_start > 0.5 * count:
         runs = "the run ends" if count == 1 else f"{ended_at_start / count:.0%} of the runs end"
         logger.warning("%s at t = 0: is a unit or the initial state wrong?", runs)
+
+
+def _hint_at_one_word(results: xr.Dataset) -> None:
+    """Say what to look at where one word fills a map: its axes may not reach what decides."""
+    regime = results["regime"].variable
+    if regime.size < _MAP:
+        return
+    found: set[int] = set()
+    for _, _, region in Layout(regime.shape).chunks():
+        found.update(np.unique(regime[region].values).tolist())
+        if len(found) > 1:
+            return
+    logger.info(
+        "all %d cells are %s: do the axes reach far enough, is the span long enough, does a contact meet the zone? "
+        "ringsweep simulate shows one run",
+        regime.size,
+        REGIMES[found.pop()],
+    )
 
 
 def _two_digits_up(number: float) -> float:
@@ -123,6 +150,25 @@ def _warn_of_belt(results: xr.Dataset, config: Config, count: int) -> None:
             else f"{riding / regime.size:.1%} of the bodies ride: they have"
         )
         logger.warning("%s not broken loose; %s", who, remedy)
+
+
+def warn_of_sample(results: xr.Dataset, config: Config) -> None:
+    """Warn of runs of a sample that failed or have no certificate.
+
+    Parameters
+    ----------
+    results : xarray.Dataset
+        Statistics of all cells, in memory or on disk.
+    config : Config
+        Configuration of the runs.
+    """
+    runs = results["runs"].sum([dim for dim in results["runs"].dims if dim not in ("word", "certificate")]).values
+    share, failed = runs[:, 0].sum() / runs.sum(), int(runs[FAILED].sum())
+    if share > _MANY_UNSURE:
+        cure = "" if getattr(config.solver, "certify", True) else ": the solver does not certify"
+        logger.warning("%.1f %% of the runs have no certificate, and widen the intervals%s", 100 * share, cure)
+    if failed:
+        logger.warning("%d runs failed", failed)
 
 
 def _spans_of_first_slip(config: Config, cells: NDArray[np.intp] | None) -> NDArray[np.float64]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.models.interface.audit import undecided
-from ringsweep.quantities.variables import FAILED, OUTCOMES
+from ringsweep.quantities.flags import FAILED
+from ringsweep.quantities.variables import ANSWERS_DIFFER, CERTIFIED, CLOSE_CALL, NO_RESULT, NOT_FINITE, OUTCOMES
 
 #: Outcomes on which two resolutions must agree for a certificate.
 _CERTIFIED = ("regime", "motion", "separating_contact", "aftermath", "word")
@@ -49,10 +51,10 @@ def agree(rows: NDArray[np.float64], second_rows: NDArray[np.float64], outcomes:
     return same & (rows[:, outcomes.index("regime")] != FAILED)
 
 
-def certifiable(
+def doubts(
     batch: Any, rows: NDArray[np.float64], second_rows: NDArray[np.float64], fall_rates: Any, outcomes: tuple[str, ...]
-) -> NDArray[np.bool_]:
-    """Whether two runs of each cell agree, all numbers are finite, and the error is too small to change the regime.
+) -> NDArray[np.int8]:
+    """What speaks against the certificate of each cell: a failure, disagreement, an error that may change the regime.
 
     Parameters
     ----------
@@ -67,11 +69,36 @@ def certifiable(
 
     Returns
     -------
-    ndarray of bool, shape ``(cells,)``
+    ndarray of int8, shape ``(cells,)``
+        Values of :data:`ringsweep.quantities.variables.DOUBTS`; ``CERTIFIED`` where nothing speaks against it.
     """
     needed = [column for column, name in enumerate(outcomes) if name not in _MAY_LACK]
-    decided: NDArray[np.bool_] = agree(rows, second_rows, outcomes) & ~undecided(batch, rows, second_rows, fall_rates)
-    return decided & np.isfinite(rows[:, needed]).all(axis=1)
+    reasons = [
+        (rows[:, outcomes.index("regime")] == FAILED, NO_RESULT),
+        (~agree(rows, second_rows, outcomes), ANSWERS_DIFFER),
+        (undecided(batch, rows, second_rows, fall_rates), CLOSE_CALL),
+        (~np.isfinite(rows[:, needed]).all(axis=1), NOT_FINITE),
+    ]
+    return first_of(reasons, len(rows))
+
+
+def first_of(reasons: Sequence[tuple[NDArray[np.bool_], Any]], cells: int) -> NDArray[np.int8]:
+    """The first reason that holds for each cell; ``CERTIFIED`` where none does.
+
+    Parameters
+    ----------
+    reasons : sequence of tuple
+        For each reason the cells for which it holds, of shape ``(cells,)``, and its number, or its number in each cell.
+    cells : int
+
+    Returns
+    -------
+    ndarray of int8, shape ``(cells,)``
+    """
+    found = np.full(cells, CERTIFIED, dtype=np.int8)
+    for holds, reason in reasons:
+        found = np.where(holds & (found == CERTIFIED), reason, found).astype(np.int8)
+    return found
 
 
 def took_same_steps(

@@ -16,10 +16,11 @@ from ringsweep.models.scene import Structure
 from ringsweep.numerics.series import ORDER
 from ringsweep.physics import drives
 from ringsweep.physics.friction import LAWS, Dynamic, SetValued, Smooth, family_of, presliding
+from ringsweep.quantities.flags import FAILED
 from ringsweep.quantities.parameters import Parameter
-from ringsweep.quantities.variables import FAILED
+from ringsweep.quantities.variables import CERTIFIED, DIVERGES, LAW_NOT_OBEYED, NO_RESULT, NOT_ASKED, SAME_STEPS
 from ringsweep.solvers.automaton import FACTOR, PATIENCE, History, LocalErrors, Results, integrate
-from ringsweep.solvers.certificate import apart, certifiable, diverging, errors, took_same_steps, with_errors
+from ringsweep.solvers.certificate import apart, diverging, doubts, errors, first_of, took_same_steps, with_errors
 from ringsweep.solvers.method import Method, Needs, Result
 
 LIMIT = Parameter("1", "steps after which a run is given up as failed", lower=1, upper=1e10)
@@ -101,13 +102,13 @@ class _Piecewise(Method):
         not, or if both runs took the same steps, the cell is run again at tighter tolerances.
         """
         rows, steps, audits = self.integrate(batch, len(outcomes), audit=self.certify)
-        certified = np.zeros(len(rows), dtype=bool)
+        because = np.full(len(rows), NO_RESULT if self.certify else NOT_ASKED, dtype=np.int8)
         if not self.certify:
-            return Result(rows, steps=steps, certified=certified)
+            return Result(rows, steps=steps, certified=because == CERTIFIED, because=because)
         bounds = np.full((len(rows), len(with_errors(outcomes))), np.nan)
         open_cells = np.flatnonzero(~self._given_up(rows, steps, outcomes))
         if not len(open_cells):
-            return Result(rows, steps=steps, certified=certified, errors=bounds)
+            return Result(rows, steps=steps, certified=because == CERTIFIED, because=because, errors=bounds)
         finer, distance = self, np.full(len(rows), np.inf)
         looser = self.looser(batch)
         second_rows, more_steps, _ = self.integrate(
@@ -116,22 +117,23 @@ class _Piecewise(Method):
         new_rows, new_steps, audits = rows[open_cells], steps[open_cells], audits[open_cells]
         for retry in range(_MOST_RETRIES + 1):
             cells = _select(batch, open_cells)
-            certified[open_cells], bounds[open_cells], distance[open_cells], may_converge = finer._compare(
+            because[open_cells], bounds[open_cells], distance[open_cells], may_converge = finer._compare(
                 cells, new_rows, second_rows, audits, new_steps, distance[open_cells], looser, outcomes
             )
             if retry == 0:
-                certified[open_cells] &= ~took_same_steps(new_rows, second_rows, outcomes)
+                same = open_cells[took_same_steps(new_rows, second_rows, outcomes)]
+                because[same] = np.where(because[same] == CERTIFIED, SAME_STEPS, because[same])
             steps[open_cells] += more_steps
             finished = ~self._given_up(new_rows, new_steps, outcomes)
             rows[open_cells[finished]] = new_rows[finished]
-            open_cells = open_cells[finished & (~certified[open_cells] | may_converge)]
+            open_cells = open_cells[finished & ((because[open_cells] != CERTIFIED) | may_converge)]
             looser, finer = finer.tolerances(), replace(finer, rtol=finer.rtol / FACTOR)
             if retry == _MOST_RETRIES or not len(open_cells) or not 1e-15 <= finer.tolerances()[0] < looser[0]:
                 break
             second_rows = rows[open_cells]
             new_rows, more_steps, audits = finer.integrate(_select(batch, open_cells), len(outcomes), audit=True)
             new_steps = more_steps
-        return Result(rows, steps=steps, certified=certified, errors=bounds)
+        return Result(rows, steps=steps, certified=because == CERTIFIED, because=because, errors=bounds)
 
     def _given_up(
         self, rows: NDArray[np.float64], steps: NDArray[np.float64], outcomes: tuple[str, ...]
@@ -150,22 +152,24 @@ class _Piecewise(Method):
         distance_before: NDArray[np.float64],
         looser: tuple[float, float],
         outcomes: tuple[str, ...],
-    ) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-        """Certificates of runs at this tolerance and bounds on their errors, from second runs at a looser tolerance.
+    ) -> tuple[NDArray[np.int8], NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+        """Why runs have no certificate, and bounds on their errors, from second runs at a looser tolerance.
 
         Returns
         -------
         tuple of ndarray
-            Whether each run is certified; bounds, NaN where nearby runs diverge; distance of the runs where they
+            Reasons against each certificate; bounds, NaN where nearby runs diverge; distance of the runs where they
             diverge, infinite elsewhere; whether they diverge, but a tighter tolerance may show that they converge.
         """
         of_bristles = family_of(type(batch.law)) is Dynamic
         distance = apart(rows, second_rows, outcomes)
         diverge = diverging(distance, looser[of_bristles], distance_before)
         obeys_law: NDArray[np.bool_] = (audits[:, 0] <= _MOST_VIOLATION) & (audits[:, 1] <= _MOST_UNEXPLAINED)
-        certified = obeys_law & certifiable(batch, rows, second_rows, audits[:, 2], outcomes)
-        if diverge.any():
-            certified &= ~diverge | audit.same_statistics(batch, rows, second_rows)
+        because = doubts(batch, rows, second_rows, audits[:, 2], outcomes)
+        chaotic = diverge & ~audit.same_statistics(batch, rows, second_rows) if diverge.any() else diverge
+        because = first_of(
+            [(because != CERTIFIED, because), (~obeys_law, LAW_NOT_OBEYED), (chaotic, DIVERGES)], len(rows)
+        )
         tolerance, implicit_tolerance = self.tolerances()
         local = LocalErrors(*audits[:, 3:].T)
         if of_bristles:
@@ -188,7 +192,7 @@ class _Piecewise(Method):
         )
         bounds[diverge] = np.nan
         may_converge = diverge & ~diverging(distance / FACTOR, self.tolerances()[of_bristles])
-        return certified, bounds, np.where(diverge, distance, np.inf), may_converge
+        return because, bounds, np.where(diverge, distance, np.inf), may_converge
 
     def looser(self, batch: Any) -> tuple[float, float]:
         """Tolerances of the second run of a certificate, as :meth:`tolerances` returns them."""

@@ -28,6 +28,8 @@ class Result:
         Numbers of steps, those of second runs for a certificate included, unless the method says otherwise.
     certified : ndarray of bool, shape ``(cells,)``
         Whether each cell has a certificate.
+    because : ndarray of int8, shape ``(cells,)``, optional
+        Why each cell has none, a value of :data:`ringsweep.quantities.variables.DOUBTS`; 0 where it has one.
     stiffness : ndarray of shape ``(cells,)``, optional
         Largest stiffness of each run; only from methods of constant step.
     errors : ndarray of shape ``(cells, numbers)``, optional
@@ -38,6 +40,7 @@ class Result:
     rows: NDArray[np.float64]
     steps: NDArray[Any]
     certified: NDArray[np.bool_]
+    because: NDArray[np.int8] | None = None
     stiffness: NDArray[np.float64] | None = None
     errors: NDArray[np.float64] | None = None
 

@@ -25,9 +25,10 @@ from ringsweep.numerics.memory import align_stack, conform, read, read_lanes, si
 from ringsweep.physics import drives
 from ringsweep.physics.drives import lookup, shape_numbers, table_row, turn, without_shape
 from ringsweep.physics.friction import TRAITS, Dynamic, family_of, presliding
+from ringsweep.quantities.flags import FAILED, SEPARATING
 from ringsweep.quantities.parameters import Parameter
-from ringsweep.quantities.variables import SEPARATING
-from ringsweep.solvers.certificate import apart, certifiable, errors, with_errors
+from ringsweep.quantities.variables import CERTIFIED, COARSE, DIVERGES, NO_RESULT, NOT_ASKED
+from ringsweep.solvers.certificate import apart, doubts, errors, first_of, with_errors
 from ringsweep.solvers.method import Method, Needs, Result
 
 #: Radius of the largest half disc in the left half plane in which the method is stable (more exactly 2.616). On the
@@ -97,11 +98,13 @@ class RK4(Method):
         """Outcomes of every cell, and steps of the first run; see :meth:`ringsweep.solvers.method.Method.run`."""
         cells = len(batch.span)
         rows, report = self._integrate(batch, np.arange(cells), self.steps, len(outcomes))
-        certified, bounds = np.zeros(cells, dtype=bool), None
+        because, bounds = np.full(cells, NOT_ASKED, dtype=np.int8), None
         if not self.diagnose:
-            return Result(rows, steps=report[:, 0], certified=certified)
+            return Result(rows, steps=report[:, 0], certified=because == CERTIFIED, because=because)
         if self.certify:
             bounds = np.full((cells, len(with_errors(outcomes))), np.nan)
+            failed = rows[:, outcomes.index("regime")] == FAILED
+            because = np.where(failed, NO_RESULT, COARSE).astype(np.int8)
             # Beyond the limit of stability both runs may agree although both are wrong. A run that ends at t = 0 has no
             # step to check.
             stable = np.flatnonzero((report[:, 1] <= STABILITY_LIMIT) & (report[:, 0] > 0.0))
@@ -117,10 +120,12 @@ class RK4(Method):
                     contacts_held & (half_report[:, 1] <= STABILITY_LIMIT) & (half_report[:, 4] <= _MOST_ARC_SHARE)
                 )
                 diverge = apart(stable_rows, half_rows, outcomes) > _MOST_APART
+                chaotic = diverge
                 if diverge.any():
-                    trusted &= ~diverge | audit.same_statistics(stable_batch, stable_rows, half_rows)
-                certified[stable] = trusted & certifiable(
-                    stable_batch, stable_rows, half_rows, half_report[:, 3], outcomes
+                    chaotic = diverge & ~audit.same_statistics(stable_batch, stable_rows, half_rows)
+                doubt = doubts(stable_batch, stable_rows, half_rows, half_report[:, 3], outcomes)
+                because[stable] = first_of(
+                    [(doubt != CERTIFIED, doubt), (~trusted, COARSE), (chaotic, DIVERGES)], len(stable)
                 )
                 found = errors(
                     stable_rows,
@@ -132,7 +137,14 @@ class RK4(Method):
                 )
                 found[diverge] = np.nan
                 bounds[stable] = found
-        return Result(rows, steps=report[:, 0], stiffness=report[:, 1], certified=certified, errors=bounds)
+        return Result(
+            rows,
+            steps=report[:, 0],
+            certified=because == CERTIFIED,
+            because=because,
+            stiffness=report[:, 1],
+            errors=bounds,
+        )
 
     def _integrate(
         self, batch: Any, cells: NDArray[np.intp], steps: int, width: int

@@ -32,6 +32,9 @@ Columns = Mapping[str, NDArray[Any]]
 # Unusable task files that are named one by one.
 _MAX_NAMED = 3
 
+# In place of the path of a task file: the cells of the only task, in memory.
+_HELD = Path("in memory")
+
 
 @contextmanager
 def open_checkpoint(
@@ -88,6 +91,7 @@ class Checkpoint:
         self.done = np.zeros(layout.total, dtype=bool)
         self.files: dict[Path, tuple[int, int]] = {}
         self.processors: set[str] = set()
+        self._held: tuple[NDArray[np.intp], dict[str, NDArray[Any]], str] | None = None
 
     def resume(self) -> None:
         """Read what an earlier run left.
@@ -116,6 +120,7 @@ class Checkpoint:
         """Find out which cells are finished. Warns of damaged task files and of those of another sweep."""
         self.done[:] = False
         self.files.clear()
+        self._held = None
         unusable = 0
         for path in self.task_files():
             try:
@@ -131,9 +136,41 @@ class Checkpoint:
             logger.warning("the cells of %d more such files are computed again too", unusable - _MAX_NAMED)
 
     def put(self, positions: NDArray[np.integer], columns: Columns, processor: str) -> None:
-        """Store the columns of the cells at these positions, which ascend."""
+        """Store the columns of the cells at these positions, which ascend.
+
+        A task that has all cells of the sweep stays in memory: the file of the sweep is written next. If that fails,
+        :meth:`keep` writes the task.
+        """
+        self.processors.add(processor)
+        self.done[positions] = True
+        if len(positions) == self.layout.total:
+            self._held = positions.astype(np.intp), dict(columns), processor
+            self.files[_HELD] = 0, len(positions) - 1
+        else:
+            self._write(positions, columns, processor)
+
+    def keep(self) -> None:
+        """Write the cells that are only in memory.
+
+        Raises
+        ------
+        InputError, OSError
+            If they cannot be written. Then they do not count as finished.
+        """
+        if self._held is None:
+            return
+        held, self._held = self._held, None
+        del self.files[_HELD]
+        self.done[:] = False
+        self._write(*held)
+        self.done[:] = True
+
+    def _write(self, positions: NDArray[np.integer], columns: Columns, processor: str) -> None:
+        """Write a task file."""
         # One structured array: each member of an archive takes longer to write than a few hundred cells.
-        cells = np.empty(len(positions), dtype=[(name, column.dtype) for name, column in columns.items()])
+        cells = np.empty(
+            len(positions), dtype=[(name, column.dtype, column.shape[1:]) for name, column in columns.items()]
+        )
         for name, column in columns.items():
             cells[name] = column
         members = {
@@ -147,8 +184,6 @@ class Checkpoint:
         name = f"{stem}-{_checksum(content.getvalue())}.npz"
         self.working_folder.check()
         self.working_folder.write(name, content.getvalue())
-        self.processors.add(processor)
-        self.done[positions] = True
         self.files[self.folder / name] = int(positions[0]), int(positions[-1])
 
     def read(self, path: Path) -> tuple[NDArray[np.intp], dict[str, NDArray[Any]]]:
@@ -159,6 +194,8 @@ class Checkpoint:
         DamagedTask
             If the file is damaged, or belongs to another sweep.
         """
+        if path == _HELD and self._held is not None:
+            return self._held[:2]
         try:
             content = path.read_bytes()
         except OSError as error:
@@ -212,9 +249,11 @@ class Checkpoint:
                 within = positions[part] - start
                 missing[within] = False
                 for name, column in columns.items():
-                    chunk.setdefault(name, np.empty(stop - start, dtype=column.dtype))[within] = column[part]
+                    chunk.setdefault(name, np.empty((stop - start, *column.shape[1:]), column.dtype))[within] = column[
+                        part
+                    ]
             shape = [s.stop - s.start for s in region]
-            chunk = {name: column.reshape(shape) for name, column in chunk.items()}
+            chunk = {name: column.reshape(*shape, *column.shape[1:]) for name, column in chunk.items()}
             known = complete is not None and complete(region, missing.reshape(shape), chunk)
             if missing.any() and not known:
                 raise DamagedTask(f"{missing.sum()} cells are in no task file of {self.folder}")
@@ -230,6 +269,7 @@ class Checkpoint:
             path.unlink(missing_ok=True)
         self.working_folder.remove_temporary()
         self.files.clear()
+        self._held = None
         self.done[:] = False
 
 

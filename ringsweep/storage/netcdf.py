@@ -21,6 +21,7 @@ from ringsweep.errors import InputError
 from ringsweep.quantities import digest
 from ringsweep.quantities.digest import Digests
 from ringsweep.quantities.variables import MISSING, OUTCOMES, Variable, error_attribute
+from ringsweep.storage import trailer
 from ringsweep.storage.chunks import Layout
 from ringsweep.storage.files import WorkingFolder, check_name, put_in_place, replacing
 
@@ -57,6 +58,7 @@ def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
             _add(ds, file)
             _record_digests(file, ds)
         _read_back(temporary)
+        trailer.seal(temporary)
 
 
 def write(
@@ -67,6 +69,7 @@ def write(
     layout: Layout,
     chunks: Iterable[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]],
     gaps: Collection[str] = (),
+    within: Mapping[str, tuple[str, ...]] = MappingProxyType({}),
 ) -> None:
     """Write the dataset of a sweep chunk by chunk, completely or not at all. Memory holds a few chunks at a time.
 
@@ -86,6 +89,8 @@ def write(
         Slices of each chunk in the grid, and its columns in the shape of the chunk.
     gaps : collection of str
         Columns of whole numbers in which `MISSING` stands for no value: xarray reads them as floats with NaN.
+    within : mapping of str to tuple of str
+        Dimensions that columns have besides those of the grid.
 
     Raises
     ------
@@ -97,8 +102,9 @@ def write(
         with _naming_the_cause(target):
             with _created(temporary) as file:
                 _add(frame, file)
-                _write_chunks(file, frame, variables, layout, chunks, gaps)
+                _write_chunks(file, frame, variables, layout, chunks, gaps, within)
             _read_back(temporary)
+            trailer.seal(temporary)
             put_in_place(temporary, target)
     finally:
         with suppress(OSError):
@@ -129,7 +135,7 @@ def _created(path: Path) -> Iterator[Any]:
 
 def _read_back(path: Path) -> None:
     try:
-        changed = altered(path, whole=True)
+        changed = altered(path, whole=True, trusted=True)
     except InputError as error:
         raise OSError("the file cannot be read back") from error
     if changed:
@@ -153,22 +159,28 @@ def _write_chunks(
     layout: Layout,
     chunks: Iterable[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]],
     gaps: Collection[str],
+    within: Mapping[str, tuple[str, ...]],
 ) -> None:
     """Add the columns and the digests to a file."""
-    dims = tuple(map(str, frame.sizes))
-    others = " ".join(str(name) for name in frame.coords if name not in dims)
+    dims = tuple(map(str, frame.sizes))[: len(layout.sizes)]
+    others = " ".join(str(name) for name in frame.coords if name not in frame.dims)
     digests: dict[str, Any] = {}
     for region, columns in chunks:
         for name, column in columns.items():
             if name not in digests:
                 fill = MISSING if name in gaps else False
-                variable = file.createVariable(name, column.dtype, dims, fill_value=fill, **_chunked(layout))
+                inner = column.shape[len(dims) :]
+                for dim, size in zip(within.get(name, ()), inner, strict=True):
+                    if dim not in file.dimensions:
+                        file.createDimension(dim, size)
+                all_dims = (*dims, *within.get(name, ()))
+                variable = file.createVariable(name, column.dtype, all_dims, fill_value=fill, **_chunked(layout, inner))
                 variable.set_auto_maskandscale(False)
                 _cache_one_chunk(variable)
                 described = variables[name].attributes | error_attribute(name, columns)
                 variable.setncatts(described | ({"coordinates": others} if others else {}))
                 digests[name] = digest.of_variable(variable)
-            file[name][region] = column
+            file[name][(*region, ...)] = column
             digest.add(digests[name], column)
     _record_digests(file, frame, digests, layout)
 
@@ -188,7 +200,7 @@ def _record_digests(
     file.setncattr(digest.ATTRIBUTE, recorded.text)
 
 
-def altered(path: str | os.PathLike[str], *, whole: bool) -> list[str] | None:
+def altered(path: str | os.PathLike[str], *, whole: bool, trusted: bool = False) -> list[str] | None:
     """Names of what is not as it was written in a file; None if the file has no digests.
 
     Parameters
@@ -196,12 +208,17 @@ def altered(path: str | os.PathLike[str], *, whole: bool) -> list[str] | None:
     path : path-like
     whole : bool
         Whether to read all variables, or only those whose values have no checksums of their own.
+    trusted : bool
+        Whether the HDF5 library is given the file without a look at its seal.
 
     Raises
     ------
     InputError
         If the file is no NetCDF file, or is damaged.
     """
+    if not trusted:
+        with _reading_file(path):
+            trailer.check(path, whole=whole)
     with _reading_file(path), netCDF4.Dataset(Path(path).resolve()) as file:
         recorded = Digests.read(file)
         if recorded is None:
@@ -216,9 +233,9 @@ def altered(path: str | os.PathLike[str], *, whole: bool) -> list[str] | None:
         return recorded.altered(file, recorded.attributes, names, _blocks)
 
 
-def _blocks(shape: Sequence[int], block: list[int]) -> Iterator[tuple[slice, ...]]:
-    for _, _, region in Layout(shape, block).chunks():
-        yield region
+def _blocks(shape: Sequence[int], block: list[int]) -> Iterator[tuple[Any, ...]]:
+    for _, _, region in Layout(shape[: len(block)], block).chunks():
+        yield (*region, ...)
 
 
 def _cache_one_chunk(variable: Any) -> None:
@@ -228,10 +245,16 @@ def _cache_one_chunk(variable: Any) -> None:
         variable.set_var_chunk_cache(size=2 * size, nelems=11, preemption=1.0)
 
 
-def _chunked(layout: Layout) -> dict[str, Any]:
-    if layout.total < COMPRESSED_FROM:
+def _chunked(layout: Layout, inner: tuple[int, ...]) -> dict[str, Any]:
+    if layout.total * math.prod(inner) < COMPRESSED_FROM:
         return {}
-    return {"compression": "zlib", "complevel": 1, "shuffle": True, "fletcher32": True, "chunksizes": layout.chunk}
+    return {
+        "compression": "zlib",
+        "complevel": 1,
+        "shuffle": True,
+        "fletcher32": True,
+        "chunksizes": (*layout.chunk, *inner),
+    }
 
 
 def check_kind(path: str | os.PathLike[str], mark: str, content: str) -> None:
@@ -241,8 +264,8 @@ def check_kind(path: str | os.PathLike[str], mark: str, content: str) -> None:
     ----------
     path : path-like
         File that exists.
-    mark : {"regime", "time", "contender"}
-        Dimension or variable by which the kind is known: sweep, history, or error against run time.
+    mark : {"regime", "time", "contender", "probability"}
+        Dimension or variable by which the kind is known: sweep, history, error against run time, or sampled sweep.
     content : str
         Contents of the new file, for the message.
 
@@ -252,7 +275,9 @@ def check_kind(path: str | os.PathLike[str], mark: str, content: str) -> None:
         If it is no file of this package, or a result of another kind.
     """
     with open_dataset(path) as existing:
-        kinds = [kind for kind in ("contender", "time", "regime") if kind in existing.dims or kind in existing]
+        kinds = [
+            kind for kind in ("contender", "time", "probability", "regime") if kind in existing.dims or kind in existing
+        ]
     if kinds[:1] != [mark]:
         raise InputError(str(path), f"holds a result of another kind: name another file for this {content}")
 
@@ -391,6 +416,8 @@ def _reading_file(path: str | os.PathLike[str]) -> Iterator[None]:
         yield
     except PermissionError as error:
         raise InputError(str(path), "cannot be read: permission denied") from error
+    except InputError as error:
+        raise InputError(str(path), error.problem) from error
     except Exception as error:
         # On a damaged file the libraries raise errors of many kinds.
         raise InputError(str(path), _DAMAGED) from error

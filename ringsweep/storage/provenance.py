@@ -85,6 +85,8 @@ def identity(config: Config) -> dict[str, str]:
     for path, (dims, column) in axes.columns.items():
         ends = " to ".join(f"{end:.6g}" if column.dtype.kind == "f" else str(end) for end in column.flat[[0, -1]])
         found[f"sweep.{path}"] = f"{column.size} values, {ends}, along {' x '.join(dims)} ({_digest(column)})"
+    if config.sample is not None:
+        found |= config.sample.identity
     return found | {"solver": repr(config.solver)} | environment()
 
 

@@ -24,7 +24,7 @@ from ringsweep.models.interface import audit, implicit
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.forces import force_in
 from ringsweep.physics.friction.velocity import stiction_band
-from ringsweep.quantities.variables import OSCILLATORY
+from ringsweep.quantities.flags import OSCILLATORY
 
 # An oscillation is certain if the two runs of a cell differ by less than this share of its swing.
 _SMALLEST_SHARE = 0.1

@@ -20,7 +20,7 @@ from ringsweep.numerics.functions import any_of, floor, lanes_body, select, squa
 from ringsweep.numerics.memory import select_all
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.friction.velocity import stiction_band
-from ringsweep.quantities.variables import FAILED, OSCILLATORY, RIDING, SLIDING, STICK_SLIP, STICKING
+from ringsweep.quantities.flags import FAILED, OSCILLATORY, RIDING, SLIDING, STICK_SLIP, STICKING
 
 
 class Outcome(NamedTuple):

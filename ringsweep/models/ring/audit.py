@@ -21,7 +21,7 @@ from ringsweep.physics.friction import SetValued, family_of
 from ringsweep.physics.friction.bristles import bristle
 from ringsweep.physics.friction.velocity import friction_at, stiction_band
 from ringsweep.physics.zones import PER_TURN, Segments, edge_ahead, roughest, roughness
-from ringsweep.quantities.variables import SEPARATING
+from ringsweep.quantities.flags import SEPARATING
 
 # Rounding of an acceleration or a reaction, as a share of its largest terms.
 _ROUNDING = 1e-12

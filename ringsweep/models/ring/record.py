@@ -13,7 +13,7 @@ from ringsweep.models.interface.status import BROKEN, JAM, RUNNING, SEPARATED_1,
 from ringsweep.numerics.functions import any_of, select
 from ringsweep.physics import contact
 from ringsweep.physics.ring import BristleRing, Ring
-from ringsweep.quantities.variables import FAILED, JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
+from ringsweep.quantities.flags import FAILED, JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 
 #: Status of a run for each mode of :mod:`ringsweep.physics.contact`.
 ENDS = np.full(8, RUNNING)

@@ -1,0 +1,430 @@
+"""The key ``sweep.sample``: uncertain parameters, and the points at which they are drawn."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsweep.config.axes import MAX_CELLS, Axes, dimension, paths_of, read_spacing, swept_parameter
+from ringsweep.config.consistency import check_consistency
+from ringsweep.config.scene import sweepable
+from ringsweep.config.sections import read_values, suggestion
+from ringsweep.errors import InputError
+from ringsweep.models import MODELS
+from ringsweep.models.scene import Scene
+from ringsweep.quantities.parameters import Choice, Parameter
+from ringsweep.quantities.units import quantity, show
+from ringsweep.quantities.variables import OUTCOMES
+from ringsweep.statistics import DISTRIBUTIONS, METHODS, saltelli, unit_points
+
+#: Keys of ``sweep.sample`` with a number.
+NUMBERS = {
+    "n": Parameter("1", "number of samples of each cell", lower=2, upper=1_000_000, whole=True),
+    "seed": Parameter("1", "seed of the sample", lower=0, upper=2**53, whole=True, default=0),
+    "replicates": Parameter("1", "independent parts of the sample", lower=4, upper=64, whole=True, default=8),
+}
+
+#: Keys of ``sweep.sample``.
+KEYS = (*NUMBERS, "method", "of", "quantiles", "survival", "sensitivity")
+
+_LEVEL = Parameter("1", "level of a quantile", lower=0, upper=1, open_lower=True, open_upper=True)
+
+# Numbers that tell when something happens, and that are missing where it does not.
+_CENSORED = ("t_separation", "first_slip")
+
+# Points of a sample that are tried one by one, to tell how many are not allowed.
+_TRIED = 1000
+
+
+@dataclass(frozen=True)
+class Factor:
+    """One uncertain quantity: a number of the scene, a ratio of two, or several that are drawn together.
+
+    Attributes
+    ----------
+    paths : tuple of str
+        Several only for rows of a table.
+    kind : str
+        Name of a distribution, or ``values``.
+    numbers : tuple of float
+        Those of the distribution, in SI units.
+    table : tuple of tuple of float
+        Values of each path, all of one length, each row as probable as the others.
+    over : str, optional
+        Path that the draw is multiplied by.
+    """
+
+    paths: tuple[str, ...]
+    kind: str
+    numbers: tuple[float, ...] = ()
+    table: tuple[tuple[float, ...], ...] = ()
+    over: str | None = None
+
+    @property
+    def name(self) -> str:
+        """The paths as a configuration has them."""
+        return ", ".join(self.paths)
+
+    def __str__(self) -> str:
+        inside = f"{len(self.table[0])} rows" if self.table else ", ".join(f"{number:g}" for number in self.numbers)
+        return f"{self.kind}({inside})" + (f" times {self.over}" if self.over else "")
+
+    def draw(self, u: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+        """Values of each path, or the ratio, at shares between 0 and 1."""
+        if self.table:
+            row = (u * len(self.table[0])).astype(int)
+            return {path: np.array(column)[row] for path, column in zip(self.paths, self.table, strict=True)}
+        return {self.paths[0]: DISTRIBUTIONS[self.kind].quantile(u, *self.numbers)}
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Uncertain parameters, and what is asked of them.
+
+    Attributes
+    ----------
+    factors : tuple of Factor
+        In an order in which those that are multiplied by others come after them.
+    n : int
+        Points for each cell.
+    method : str
+    seed, replicates : int
+        The points come in independent replicates of the same length.
+    quantiles : dict of str to tuple of float
+        Levels by variable.
+    survival : tuple of float
+        Times at which it is asked whether the contacts still hold, s.
+    sensitivity : bool
+        Whether Sobol indices are asked for.
+    """
+
+    factors: tuple[Factor, ...]
+    n: int
+    method: str
+    seed: int
+    replicates: int
+    quantiles: Mapping[str, tuple[float, ...]]
+    survival: tuple[float, ...]
+    sensitivity: bool
+
+    @property
+    def size(self) -> int:
+        """Points of each replicate."""
+        return self.n // self.replicates
+
+    @property
+    def rows(self) -> int:
+        """Runs for each point."""
+        return len(self.factors) + 2 if self.sensitivity else 1
+
+    @property
+    def independent(self) -> bool:
+        """Whether all points are independent of each other."""
+        return self.method == "random"
+
+    def shares(self, replicate: int) -> NDArray[np.float64]:
+        """Shares of the runs of a replicate, shape ``(size * rows, factors)``; the runs of one point stand together."""
+        return _shares(self.method, self.size, len(self.factors), self.seed, replicate, self.sensitivity)
+
+    def axes(self, scene: Scene, axes: Axes, shares: NDArray[np.float64]) -> Axes:
+        """The axes of a grid with one more dimension, ``sample``, along which the uncertain parameters vary."""
+        columns = dict(axes.columns)
+        for factor, u in zip(self.factors, shares.T, strict=True):
+            for path, drawn in factor.draw(u).items():
+                if factor.over is None:
+                    columns[path] = ("sample",), drawn
+                    continue
+                dims, base = columns.get(factor.over, ((), np.array(scene.values.get(factor.over, np.nan))))
+                if "sample" in dims:
+                    columns[path] = dims, base * drawn
+                else:
+                    columns[path] = (*dims, "sample"), base[..., None] * drawn
+        return Axes({**axes.sizes, "sample": len(shares)}, columns)
+
+    @property
+    def identity(self) -> dict[str, str]:
+        """All that determines its results, by name."""
+        factors = {f"sweep.sample.of.{factor.name}": repr(factor) for factor in self.factors}
+        asked = {"quantiles": dict(self.quantiles), "survival": self.survival, "sensitivity": self.sensitivity}
+        return factors | {
+            "sweep.sample.method": f"{self.method}, seed {self.seed}, {self.replicates} replicates",
+            "sweep.sample.n": str(self.n),
+            **{f"sweep.sample.{name}": repr(value) for name, value in asked.items()},
+        }
+
+
+@lru_cache(maxsize=8)
+def _shares(method: str, size: int, factors: int, seed: int, replicate: int, sensitivity: bool) -> NDArray[np.float64]:
+    if not sensitivity:
+        return unit_points(method, size, factors, seed, replicate)
+    return saltelli(unit_points(method, size, 2 * factors, seed, replicate)).reshape(-1, factors)
+
+
+def censored(scene: Scene) -> str:
+    """The number that tells when a contact is lost, or when a body that rides on its belt first slips."""
+    return next(name for name in _CENSORED if name in MODELS[scene.structure.model].outcomes)
+
+
+def read_sample(given: Any, scene: Scene, axes: Axes) -> Sample | None:
+    """Read and validate the section ``sweep.sample``.
+
+    Raises
+    ------
+    InputError
+        If a key or value is wrong, or a point of the sample is not allowed.
+    """
+    if given is None:
+        return None
+    if not isinstance(given, dict):
+        raise InputError("sweep.sample", f"a section with keys is expected, got {show(given)}")
+    for key in given:
+        if key not in KEYS:
+            raise InputError(f"sweep.sample.{key}", "unknown key" + suggestion(key, KEYS))
+    for key in ("n", "of"):
+        if key not in given:
+            example = "n: 1024" if key == "n" else "of: {body.mass: {normal: [76 g, 1 %]}}"
+            raise InputError(f"sweep.sample.{key}", f"missing (for example `{example}`)")
+    numbers = {
+        key: int(quantity(given.get(key, parameter.default), parameter, f"sweep.sample.{key}"))
+        for key, parameter in NUMBERS.items()
+    }
+    method = given.get("method", METHODS[0])
+    if method not in METHODS:
+        raise InputError("sweep.sample.method", f"{show(method)} is not a method" + suggestion(method, METHODS))
+    _check_number(method, numbers["n"], numbers["replicates"])
+    sensitivity = given.get("sensitivity", False)
+    if not isinstance(sensitivity, bool):
+        raise InputError("sweep.sample.sensitivity", f"true or false is expected, got {show(sensitivity)}")
+    found = Sample(
+        _factors(given["of"], scene, axes),
+        method=method,
+        quantiles=_quantiles(given.get("quantiles"), scene),
+        survival=_survival(given.get("survival"), scene),
+        sensitivity=sensitivity,
+        **numbers,
+    )
+    runs = math.prod(axes.sizes.values()) * found.replicates
+    if runs > MAX_CELLS:
+        raise InputError("sweep", f"{runs:.3g} cells times replicates are too many: at most {MAX_CELLS:.3g} fit")
+    _check_points(found, scene, axes)
+    return found
+
+
+def _check_number(method: str, n: int, replicates: int) -> None:
+    size, rest = divmod(n, replicates)
+    where = "sweep.sample.n"
+    if method == "sobol" and (rest or size < 1 or size & (size - 1)):
+        fitting = replicates * 2 ** max(round(math.log2(max(n / replicates, 1.0))), 0)
+        raise InputError(
+            where, f"{n} is not {replicates} replicates of a power of two, as Sobol points are: give {fitting}"
+        )
+    if rest or size < 1:
+        fitting = replicates * max(round(n / replicates), 1)
+        raise InputError(where, f"{n} samples do not divide into {replicates} replicates: give {fitting}")
+
+
+def _factors(given: Any, scene: Scene, axes: Axes) -> tuple[Factor, ...]:
+    if not isinstance(given, dict) or not given:
+        raise InputError("sweep.sample.of", f"a section of paths and distributions is expected, got {show(given)}")
+    known = sweepable(scene)
+    found: dict[str, Factor] = {}
+    for key, spec in given.items():
+        where = f"sweep.sample.of.{key}"
+        parameters = {path: swept_parameter(known, path, where) for path in paths_of(key)}
+        for path, parameter in parameters.items():
+            if isinstance(parameter, Choice):
+                raise InputError(where, f"a {parameter.long_name} has no distribution: make it an axis of sweep.grid")
+            if path in axes.columns:
+                raise InputError(where, "also an axis of the sweep: a path can vary in one place only")
+            if any(path in other.paths for other in found.values()):
+                raise InputError(where, f"{path} is drawn twice")
+            if dimension(path) in ("sample", "replicate", "word", "parameter"):
+                raise InputError(where, "the path has the name of a dimension of the result")
+        found[where] = _factor(spec, parameters, where, known)
+    return _ordered(found, scene, axes)
+
+
+def _factor(spec: Any, parameters: Mapping[str, Any], where: str, known: Mapping[str, Parameter | Choice]) -> Factor:
+    kinds = (*DISTRIBUTIONS, "values", "file")
+    if not isinstance(spec, dict):
+        raise InputError(
+            where,
+            f"a distribution is expected, such as `{{normal: [0.3, 10 %]}}`, got {show(spec)} ({', '.join(kinds)})",
+        )
+    for key in spec:
+        if key not in (*kinds, "over"):
+            raise InputError(f"{where}.{key}", "is no distribution" + suggestion(key, kinds))
+    named = [key for key in spec if key != "over"]
+    if len(named) != 1:
+        raise InputError(where, f"one distribution is expected, got {' and '.join(named) or 'none'}")
+    (kind,) = named
+    paths, over = tuple(parameters), None
+    if "over" in spec:
+        if len(paths) > 1:
+            raise InputError(f"{where}.over", "several paths that are drawn together have no common ratio")
+        over = _reference(spec["over"], paths[0], parameters[paths[0]], known, f"{where}.over")
+        parameters = {paths[0]: Parameter("1", f"ratio of {paths[0]} to {over}")}
+    if kind == "values":
+        return Factor(paths, kind, (), _table(spec["values"], parameters, f"{where}.values"), over)
+    if len(paths) > 1:
+        raise InputError(where, "paths that are drawn together need rows: {file: samples.csv}")
+    parameter = parameters[paths[0]]
+    if parameter.whole:
+        raise InputError(where, f"{parameter.long_name} must be a whole number: list them as {{values: [...]}}")
+    return Factor(paths, kind, _numbers(spec[kind], kind, parameter, f"{where}.{kind}"), (), over)
+
+
+def _reference(given: Any, path: str, parameter: Any, known: Mapping[str, Parameter | Choice], where: str) -> str:
+    """The path that a ratio is over; the section may be left out."""
+    beside = f"{path.rpartition('.')[0]}.{given}"
+    full = beside if beside in known else given
+    other = swept_parameter(known, full, where)
+    if full == path:
+        raise InputError(where, "is the path itself")
+    if isinstance(other, Choice) or other.unit != parameter.unit:
+        raise InputError(where, f"{full} is no number in the unit of {path}: their ratio has no meaning")
+    return str(full)
+
+
+def _table(given: Any, parameters: Mapping[str, Any], where: str) -> tuple[tuple[float, ...], ...]:
+    if not isinstance(given, dict):
+        if len(parameters) > 1:
+            raise InputError(where, f"a list for each of {', '.join(parameters)} is expected, got {show(given)}")
+        given = {next(iter(parameters)): given}
+    if set(given) != set(parameters):
+        raise InputError(where, f"lists for {', '.join(parameters)} are expected, got {', '.join(map(str, given))}")
+    columns = {path: read_values(given[path], parameters[path], f"{where}.{path}") for path in parameters}
+    lengths = {path: len(column) for path, column in columns.items()}
+    if len(set(lengths.values())) > 1:
+        raise InputError(where, f"columns of different lengths: {lengths}")
+    return tuple(tuple(column.tolist()) for column in columns.values())
+
+
+def _numbers(given: Any, kind: str, parameter: Parameter, where: str) -> tuple[float, ...]:
+    """The numbers of a distribution. A standard deviation in per cent is a share of the mean."""
+    distribution = DISTRIBUTIONS[kind]
+    wanted = ", ".join(distribution.arguments)
+    if not isinstance(given, list) or len(given) != len(distribution.arguments):
+        raise InputError(where, f"[{wanted}] is expected, got {show(given)}")
+    place = replace(parameter, lower=-math.inf, upper=math.inf, open_lower=False, open_upper=False)
+    found: list[float] = []
+    for k, (what, value) in enumerate(zip(distribution.arguments, given, strict=True)):
+        at = f"{where}.{k}"
+        if what != "standard deviation":
+            found.append(quantity(value, replace(place, long_name=f"{what} of {parameter.long_name}"), at))
+            continue
+        share = isinstance(value, str) and value.strip().endswith("%")
+        unit = "1" if share else parameter.unit
+        number = quantity(value, Parameter(unit, f"{what} of {parameter.long_name}", lower=0, open_lower=True), at)
+        if share and found[0] == 0.0:
+            raise InputError(at, f"{show(value)} of a mean of 0 is nothing: give the standard deviation itself")
+        found.append(number * abs(found[0]) if share else number)
+    if problem := distribution.problem(*found):
+        raise InputError(where, f"{problem}, got {show(given)} ({wanted})")
+    return tuple(found)
+
+
+def _ordered(factors: Mapping[str, Factor], scene: Scene, axes: Axes) -> tuple[Factor, ...]:
+    """Factors, each after the one that it is multiplied by."""
+    waiting, found = dict(factors), list[Factor]()
+    drawn = {path for factor in factors.values() for path in factor.paths}
+    while waiting:
+        ready = [
+            where
+            for where, factor in waiting.items()
+            if factor.over not in drawn or any(factor.over in other.paths for other in found)
+        ]
+        if not ready:
+            where, factor = next(iter(waiting.items()))
+            raise InputError(f"{where}.over", f"{factor.over} is itself drawn over {factor.paths[0]}")
+        for where in ready:
+            over = waiting[where].over
+            if over is not None and over not in drawn and over not in axes.columns and over not in scene.values:
+                raise InputError(f"{where}.over", f"{over} has no value in the scene, and no distribution")
+            found.append(waiting.pop(where))
+    return tuple(found)
+
+
+def _quantiles(given: Any, scene: Scene) -> dict[str, tuple[float, ...]]:
+    if given is None:
+        return {}
+    where = "sweep.sample.quantiles"
+    if not isinstance(given, dict) or not given:
+        raise InputError(where, f"variables with lists of levels are expected, got {show(given)}")
+    model = MODELS[scene.structure.model]
+    names = [name for name in model.outcomes if OUTCOMES[name].dtype == "float64" and name not in model.absent]
+    found = {}
+    for name, levels in given.items():
+        if name not in names:
+            raise InputError(f"{where}.{name}", "is no number of this model" + suggestion(name, names))
+        found[name] = tuple(sorted(set(read_values(levels, _LEVEL, f"{where}.{name}").tolist())))
+    return found
+
+
+def _survival(given: Any, scene: Scene) -> tuple[float, ...]:
+    if given is None:
+        return ()
+    time = Parameter("s", f"time at which {censored(scene)} is asked for", lower=0)
+    where = "sweep.sample.survival"
+    if isinstance(given, dict):
+        return tuple(np.unique(read_spacing(given, time, where)).tolist())
+    return tuple(np.unique(read_values(given, time, where)).tolist())
+
+
+def _check_points(sample: Sample, scene: Scene, axes: Axes) -> None:
+    """Make sure that every point of the sample is allowed, in every cell of the grid."""
+    known = sweepable(scene)
+    for replicate in range(sample.replicates):
+        found = sample.axes(scene, axes, sample.shares(replicate))
+        for factor in sample.factors:
+            for path in factor.paths:
+                values, parameter = found.columns[path][1], known[path]
+                assert isinstance(parameter, Parameter)
+                low = values <= parameter.lower if parameter.open_lower else values < parameter.lower
+                high = values >= parameter.upper if parameter.open_upper else values > parameter.upper
+                wrong = low | high | ~np.isfinite(values)
+                if wrong.any():
+                    unit = f" {parameter.unit}" * (parameter.unit not in ("", "1"))
+                    raise InputError(
+                        f"sweep.sample.of.{factor.name}",
+                        f"draws {values[wrong].flat[0]:.3g}{unit}, but {parameter.long_name} must be "
+                        f"{parameter.interval}{unit}: {_probability(sample, factor, parameter)} "
+                        "(truncnormal and uniform have ends)",
+                    )
+        try:
+            check_consistency(scene, found)
+        except InputError as error:
+            error.problem += f": {_share_refused(sample, scene, axes)} of the points of the sample are not allowed"
+            error.problem += " (`over` ties one number to another)"
+            raise
+
+
+def _probability(sample: Sample, factor: Factor, parameter: Parameter) -> str:
+    """Probability with which a factor draws a value that is not allowed, in words."""
+    if factor.over is not None:
+        return "a ratio that draws it is not allowed"
+    # The distribution function is the inverse of a monotone function: a table of its values is exact enough.
+    shares = np.concatenate([np.geomspace(1e-12, 1e-3, 400), np.linspace(1e-3, 1.0, 40_001)[1:-1]])
+    shares = np.unique(np.concatenate([shares, 1.0 - shares]))
+    values = next(iter(factor.draw(shares).values()))
+    allowed = np.array([parameter.allows(value) for value in values.tolist()])
+    edges = np.concatenate([[0.0], 0.5 * (shares[1:] + shares[:-1]), [1.0]])
+    return f"{factor} has probability {np.diff(edges)[~allowed].sum():.2g} of that"
+
+
+def _share_refused(sample: Sample, scene: Scene, axes: Axes) -> str:
+    """Share of the points that the model refuses, of the first ones."""
+    shares = sample.shares(0)[:_TRIED]
+    refused = 0
+    for row in shares:
+        try:
+            check_consistency(scene, sample.axes(scene, axes, row[None]))
+        except InputError:
+            refused += 1
+    return f"{refused / len(shares):.1%}" if refused else "some"

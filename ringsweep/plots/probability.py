@@ -1,0 +1,146 @@
+"""Pictures of one cell of a sampled sweep: probabilities, survival, Sobol indices."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib import rcParams
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.patches import Patch
+from matplotlib.ticker import PercentFormatter
+
+from ringsweep.errors import InputError
+from ringsweep.plots.datasets import require_sample
+from ringsweep.plots.style import (
+    NO_VALUE,
+    PAIR_COLOURS,
+    REGIME_COLOURS,
+    axes_or_current,
+    folded,
+    on_page,
+    place_legend,
+    small_ticks,
+    width_of,
+)
+
+
+def probability_panel(ds: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw the probability of each regime that occurs, with its 95 % interval.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        One cell of a sampled sweep.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw in, by default pyplot's current ones.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InputError
+        If the dataset is no sampled sweep, or has several cells.
+    """
+    ds = require_sample(ds, "probability")
+    ax = axes_or_current(ax, 0.5)
+    ds = ds.isel(word=ds["probability"].values > 0.0)
+    words = list(map(str, ds["word"].values))
+    place = np.arange(len(words))
+    share = ds["probability"].values
+    ends = np.abs(np.stack([share - ds["probability_low"].values, ds["probability_high"].values - share]))
+    colours = [on_page(REGIME_COLOURS.get(word, NO_VALUE)) for word in words]
+    ax.barh(place, share, xerr=ends, color=colours, ecolor=rcParams["text.color"], capsize=3)
+    ax.set_yticks(place, words)
+    ax.invert_yaxis()
+    ax.set_xlim(0.0, 1.0)
+    ax.xaxis.set_major_formatter(PercentFormatter(1.0))
+    ax.set_xlabel("probability (95 % interval)")
+    small_ticks(ax)
+    return ax
+
+
+def survival_panel(ds: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw the probability that a contact still holds, or that a body still rides, over time, with its 95 % band.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        One cell of a sampled sweep with ``survival``.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw in, by default pyplot's current ones.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InputError
+        If the dataset is no sampled sweep with ``survival``, or has several cells.
+    """
+    ds = require_sample(ds, "survival")
+    ax = axes_or_current(ax, 0.5)
+    time, colour = ds["survival_time"].values, on_page(PAIR_COLOURS[0])
+    ax.fill_between(
+        time, ds["survival_low"].values, ds["survival_high"].values, color=colour, alpha=0.3, linewidth=0, step="post"
+    )
+    ax.step(time, ds["survival"].values, color=colour, where="post")
+    ax.set_ylim(0.0, 1.02)
+    ax.yaxis.set_major_formatter(PercentFormatter(1.0))
+    ax.set_xlabel("time (s)")
+    what = "rides" if ds.attrs.get("survival_of") == "first_slip" else "holds its contacts"
+    ax.set_ylabel(f"body still {what}")
+    small_ticks(ax)
+    return ax
+
+
+def sensitivity_panel(ds: xr.Dataset, ax: Axes | None = None, word: str | None = None) -> Axes:
+    """Draw first and total Sobol indices of the indicator of a regime as bars with 95 % intervals.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        One cell of a sampled sweep with ``sensitivity``.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw in, by default pyplot's current ones.
+    word : str, optional
+        The regime; by default the one whose probability is nearest to a half.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InputError
+        If the dataset is no sampled sweep with ``sensitivity``, has several cells, or the regime is unknown.
+    """
+    ds = require_sample(ds, "sobol_first")
+    if word is None:
+        word = str(ds["word"].values[int(np.argmin(np.abs(ds["probability"].values - 0.5)))])
+    if word not in ds["word"].values:
+        raise InputError("word", f"{word!r} is no regime: {', '.join(map(str, ds['word'].values))}")
+    ax = axes_or_current(ax, 0.5)
+    ds = ds.sel(word=word)
+    place = np.arange(ds.sizes["parameter"])
+    for k, name in enumerate(("sobol_first", "sobol_total")):
+        index = ds[name].values
+        ends = np.stack([index - ds[f"{name}_low"].values, ds[f"{name}_high"].values - index])
+        style = {"color": on_page(PAIR_COLOURS[k]), "ecolor": rcParams["text.color"], "capsize": 3}
+        ax.barh(place + 0.4 * k - 0.2, index, 0.36, xerr=np.maximum(ends, 0.0), **style)
+    ax.set_yticks(place, list(map(str, ds["parameter"].values)))
+    ax.invert_yaxis()
+    ax.set_xlim(0.0, 1.0)
+    share = float(ds["probability"])
+    ax.set_xlabel("Sobol index (95 % interval)")
+    ax.set_title(folded([f"what {word} hangs on", f"probability {share:.1%}"], width_of(ax)), fontsize="medium")
+    handles: list[Artist] = [
+        Patch(color=on_page(colour), label=label)
+        for colour, label in zip(PAIR_COLOURS, ("first: alone", "total: with the others"), strict=True)
+    ]
+    place_legend(ax, handles, "lower right")
+    small_ticks(ax)
+    return ax

@@ -1,0 +1,118 @@
+"""Events of a single run as a table: edges of zones, stops, breakaways, reversals of slip, and what ends the run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ringsweep.quantities.flags import JAMMED
+from ringsweep.quantities.variables import OUTCOMES, Variable
+
+#: Kinds of events, and what each says.
+KINDS = {
+    "none": "no event",
+    "edge": "a contact passes to another segment of the ring",
+    "stop": "the body comes to stick",
+    "breakaway": "the body breaks loose",
+    "reversal": "the slip changes its direction",
+    "separation": "a contact is lost",
+    "jam": "the rigid body has no motion, or several",
+}
+
+#: Variables along the dimension ``event``.
+VARIABLES = {
+    "event_time": Variable("s", "time of the event"),
+    "event_kind": Variable(
+        "1",
+        "kind of the event",
+        dtype="int8",
+        flags=dict(enumerate(KINDS)),
+        comment="; ".join(f"{kind}: {meaning}" for kind, meaning in KINDS.items()),
+    ),
+    "event_contact": Variable(
+        "1",
+        "contact that the event concerns; none: the body as a whole",
+        dtype="int8",
+        flags=OUTCOMES["separating_contact"].flags,
+    ),
+}
+
+_NUMBERS = {kind: number for number, kind in enumerate(KINDS)}
+
+
+class Events(NamedTuple):
+    """Events of one kind: times, s, and contacts as `separating_contact` has them, both of shape ``(events,)``."""
+
+    kind: str
+    times: NDArray[np.float64]
+    contacts: NDArray[np.int8]
+
+
+def _edges(run: xr.Dataset, outcome: xr.Dataset) -> Iterator[Events]:
+    """A history has each located event twice, before and after it."""
+    times = run["time"].values
+    crossing = np.zeros(len(times) - 1, dtype=np.int8)
+    for contact in (1, 2):
+        if f"zone_{contact}" in run:
+            crossing += contact * (np.diff(run[f"zone_{contact}"].values) != 0).astype(np.int8)
+    at = np.flatnonzero((crossing > 0) & (np.diff(times) == 0.0))
+    yield Events("edge", times[at], crossing[at])
+
+
+def _changes_of_mode(run: xr.Dataset, outcome: xr.Dataset) -> Iterator[Events]:
+    times, mode = run["time"].values, run["mode"].values
+    at = np.flatnonzero((np.diff(mode) != 0) & (np.diff(times) == 0.0))
+    before, after = mode[at], mode[at + 1]
+    for kind, which in (("stop", after == 0), ("breakaway", before == 0), ("reversal", before * after < 0)):
+        yield Events(kind, times[at][which], np.zeros(np.count_nonzero(which), dtype=np.int8))
+
+
+def _end(run: xr.Dataset, outcome: xr.Dataset) -> Iterator[Events]:
+    if int(outcome.get("separating_contact", 0)):
+        contact = np.atleast_1d(outcome["separating_contact"].values).astype(np.int8)
+        yield Events("separation", np.atleast_1d(outcome["t_separation"].values), contact)
+    if outcome["regime"] == JAMMED:
+        yield Events("jam", np.atleast_1d(outcome["t_end"].values), np.zeros(1, dtype=np.int8))
+
+
+#: What finds events in a history and the outcomes of the run. Events at one instant keep this order.
+FINDERS: tuple[Callable[[xr.Dataset, xr.Dataset], Iterator[Events]], ...] = (_edges, _changes_of_mode, _end)
+
+
+def events(run: xr.Dataset, outcome: xr.Dataset) -> xr.Dataset:
+    """Events of a run along the dimension ``event``, in the order of their times.
+
+    Parameters
+    ----------
+    run : xarray.Dataset
+        History of the run.
+    outcome : xarray.Dataset
+        Its outcomes.
+
+    Returns
+    -------
+    xarray.Dataset
+        The variables of :data:`VARIABLES`. ``rk4`` locates no events but the last.
+    """
+    found = [one for finder in FINDERS for one in finder(run, outcome)]
+    times = np.concatenate([one.times for one in found])
+    kinds = np.repeat([_NUMBERS[one.kind] for one in found], [len(one.times) for one in found]).astype(np.int8)
+    contacts = np.concatenate([one.contacts for one in found])
+    order = np.argsort(times, kind="stable")
+    columns = zip(VARIABLES.items(), (times, kinds, contacts), strict=True)
+    return xr.Dataset({name: ("event", column[order], kind.attributes) for (name, kind), column in columns})
+
+
+def side_by_side(tables: dict[str, xr.Dataset]) -> xr.Dataset:
+    """Events under several friction laws; shorter tables are filled with NaN and ``none``."""
+    longest = max(table.sizes["event"] for table in tables.values())
+    filled = []
+    for table in tables.values():
+        end = {"event": (0, longest - table.sizes["event"])}
+        filler = {"event_time": np.nan, "event_kind": 0, "event_contact": 0}
+        filled.append(table.pad(end, constant_values=filler, keep_attrs=True).astype(table.dtypes))
+    return xr.concat(filled, "friction_law")

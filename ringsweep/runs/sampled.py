@@ -1,0 +1,350 @@
+"""Sampled sweeps: runs at the points of a sample are reduced to sums, and sums to probabilities.
+
+A part of a cell is what one replicate of the sample adds to it. A task runs some parts, and keeps of each only sums,
+whose size does not depend on the number of runs. They are whole numbers, so their order does not matter.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ringsweep.config import Config, load
+from ringsweep.config.sampling import Sample, censored
+from ringsweep.errors import InputError
+from ringsweep.models import MODELS
+from ringsweep.quantities.flags import REGIMES
+from ringsweep.quantities.variables import SAMPLED, Variable
+from ringsweep.runs.cells import TaskResult, compute_task
+from ringsweep.statistics import (
+    CONFIDENCE,
+    SUMMARY,
+    quantiles,
+    share_interval,
+    sobol_indices,
+    sobol_sums,
+    summarised,
+)
+from ringsweep.storage import netcdf
+from ringsweep.storage.chunks import CHUNK, Layout
+from ringsweep.storage.provenance import differences, environment, fingerprint, identity, processor
+
+Columns = dict[str, NDArray[Any]]
+
+# Bytes of the sums of a chunk.
+_CHUNK_BYTES = 32e6
+
+
+def grid_layout(config: Config, whole: bool = False) -> Layout:
+    """Order of the cells of a sampled sweep; in one chunk, or in chunks whose sums fit into the memory."""
+    sizes = tuple(config.axes.sizes.values())
+    if whole:
+        return Layout(sizes, sizes)
+    layout = Layout(sizes)
+    most = max(int(_CHUNK_BYTES / (bytes_of_part(config) * _sample(config).replicates)), 1)
+    shape = list(layout.chunk)
+    while math.prod(shape) > most:
+        longest = shape.index(max(shape))
+        shape[longest] = -(-shape[longest] // 2)
+    return Layout(sizes, shape)
+
+
+def part_layout(config: Config, grid: Layout) -> Layout:
+    """Order of the parts of all cells: those of a cell stand together."""
+    replicates = _sample(config).replicates
+    return Layout((*grid.sizes, replicates), (*grid.chunk, replicates))
+
+
+def bytes_of_part(config: Config) -> int:
+    """Size of the sums of a part."""
+    return sum(math.prod(shape) * np.dtype(dtype).itemsize for dtype, shape in _sums_of(_sample(config)).values())
+
+
+def _sample(config: Config) -> Sample:
+    assert config.sample is not None
+    return config.sample
+
+
+def _sums_of(sample: Sample) -> dict[str, tuple[str, tuple[int, ...]]]:
+    """Type and shape of the sums of a part, by name."""
+    found: dict[str, tuple[str, tuple[int, ...]]] = {"runs": ("int32", (len(REGIMES), 2))}
+    if sample.survival:
+        found["lost"] = "int32", (len(sample.survival), 2)
+    for name in sample.quantiles:
+        found[f"{name}_known"] = "int32", ()
+        found[f"{name}_summary"] = "float64", (SUMMARY,)
+    if sample.sensitivity:
+        found["sobol_sums"] = "float64", (len(REGIMES), 3 + 3 * len(sample.factors))
+    return found
+
+
+class EarlierSample:
+    """File of the same sampled sweep with fewer points, which are the first ones of a larger one.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    config : Config
+        The new sweep.
+
+    Raises
+    ------
+    InputError
+        If the file holds no such sweep, or the points or sums of the new one do not continue its own.
+
+    Attributes
+    ----------
+    size : int
+        Points of each replicate.
+    processors : str
+        Names of the processors that computed the file.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], config: Config):
+        new = _sample(config)
+        if new.method == "latin-hypercube":
+            raise InputError("--reuse", "the points of a larger Latin hypercube are others: use sobol or random")
+        if new.quantiles:
+            raise InputError("--reuse", "a file does not hold the numbers that quantiles need: leave quantiles out")
+        netcdf.check(path)
+        with netcdf.reading(path) as ds:
+            if "runs" not in ds or "probability" not in ds:
+                raise InputError(str(path), "holds no sampled sweep that could go on")
+            earlier = load(path)
+            old = _sample(earlier)
+            if ds.attrs.get("fingerprint") != fingerprint(identity(earlier)):
+                raise InputError(str(path), "was computed by another version: it cannot go on")
+            same, changed = replace(earlier, sample=replace(old, n=new.n)), identity(config)
+            if changes := differences(identity(same), changed):
+                raise InputError(str(path), f"is another sweep: {changes}")
+            if old.n > new.n:
+                raise InputError(str(path), f"has {old.n} samples in each cell already, and {new.n} are asked for")
+            self.size, self.processors = old.size, str(ds.attrs.get("processors"))
+            self._sums = {name: ds[name].values for name in _sums_of(new)}
+
+    def sums(self, layout: Layout, positions: NDArray[np.integer]) -> Columns:
+        """The sums of some parts."""
+        place = layout.indices(positions)
+        return {name: column[place] for name, column in self._sums.items()}
+
+
+def compute_parts(
+    config: Config, layout: Layout, earlier: EarlierSample | None, positions: NDArray[np.integer]
+) -> TaskResult:
+    """Run the parts at some positions of the layout of parts, and reduce each to its sums.
+
+    Those of an earlier sweep are added, and its points are not run again.
+    """
+    sample = _sample(config)
+    cells, replicates = np.divmod(positions, sample.replicates)
+    sums = {name: np.zeros((len(positions), *shape), dtype=dtype) for name, (dtype, shape) in _sums_of(sample).items()}
+    seconds: float | None = 0.0
+    grid = Layout(layout.sizes[:-1], layout.chunk[:-1])
+    first = 0 if earlier is None else earlier.size
+    for replicate in np.unique(replicates).tolist():
+        shares = sample.shares(replicate)[first * sample.rows :]
+        if not (runs := len(shares)):
+            continue
+        axes = sample.axes(config.scene, config.axes, shares)
+        one = replace(config, axes=axes, sample=None)
+        # A cell and its runs stand together, so a run has the position of its cell times their number.
+        of_runs = Layout((*grid.sizes, runs), (*grid.chunk, runs))
+        own = np.flatnonzero(replicates == replicate)
+        together = max(CHUNK // runs, 1)
+        for some in (own[start : start + together] for start in range(0, len(own), together)):
+            numbers = (cells[some, None] * runs + np.arange(runs)).ravel()
+            found: list[TaskResult] = []
+            for start in range(0, len(numbers), CHUNK):
+                result = compute_task(one, of_runs, numbers[start : start + CHUNK])
+                seconds = None if result.seconds is None or seconds is None else seconds + result.seconds
+                found.append(replace(result, columns={name: result.columns[name] for name in _needed(config)}))
+            columns = {
+                name: np.concatenate([result.columns[name] for result in found]).reshape(len(some), runs)
+                for name in _needed(config)
+            }
+            for k, part in enumerate(some.tolist()):
+                of_part = _reduce(sample, censored(config.scene), {name: column[k] for name, column in columns.items()})
+                for name, value in of_part.items():
+                    sums[name][part] = value
+    processors = {processor()}
+    if earlier is not None:
+        processors |= set(earlier.processors.split(", "))
+        for name, before in earlier.sums(layout, positions).items():
+            sums[name] += before
+    return TaskResult(positions, sums, seconds, environment(), ", ".join(sorted(processors)))
+
+
+def _needed(config: Config) -> list[str]:
+    """Outcomes that are reduced."""
+    sample = _sample(config)
+    return list(
+        dict.fromkeys(
+            ["regime", "certified", *([censored(config.scene)] if sample.survival else []), *sample.quantiles]
+        )
+    )
+
+
+def _reduce(sample: Sample, time: str, columns: Columns) -> Columns:
+    """The sums of one part, from the outcomes of its runs; `time` is the variable of survival."""
+    # A row for each point; with Saltelli's design its first and last run are points of the sample itself.
+    rows = {name: column.reshape(-1, sample.rows) for name, column in columns.items()}
+    points = {name: column[:, [0, -1] if sample.sensitivity else [0]].ravel() for name, column in rows.items()}
+    sure = points["certified"] == 1
+    found: Columns = {"runs": np.zeros((len(REGIMES), 2), dtype=np.int32)}
+    np.add.at(found["runs"], (points["regime"], sure.astype(int)), 1)
+    if sample.survival:
+        lost = points[time][:, None] <= np.array(sample.survival)
+        found["lost"] = np.stack([lost[~sure].sum(axis=0), lost[sure].sum(axis=0)], axis=-1)
+    for name in sample.quantiles:
+        values = points[name][sure]
+        found[f"{name}_known"] = np.array(len(values))
+        # What did not happen within the span happens later, if ever.
+        found[f"{name}_summary"] = summarised(np.where(np.isnan(values), np.inf, values))
+    if sample.sensitivity:
+        found["sobol_sums"] = np.stack(
+            [sobol_sums((rows["regime"] == flag).astype(float)) for flag in range(len(REGIMES))]
+        )
+    return found
+
+
+def statistics(config: Config, sums: Columns) -> Columns:
+    """Probabilities, quantiles and indices of cells, from the sums of their parts.
+
+    Parameters
+    ----------
+    config : Config
+    sums : dict of str to ndarray of shape ``(..., replicates, ...)``
+        As tasks return them; the first dimensions are those of the grid.
+    """
+    sample = _sample(config)
+    shape = sums["runs"].shape[:-3]
+    flat = {name: column.reshape(-1, *column.shape[len(shape) :]) for name, column in sums.items()}
+    size = sample.size * (2 if sample.sensitivity else 1)
+    total = float(size * sample.replicates)
+    found: Columns = {"runs": flat["runs"]}
+    # Replicates last, certified runs and all runs of a word.
+    counts = np.moveaxis(flat["runs"], 1, -1)
+    sure, reported = counts[:, :, 1], counts.sum(axis=2)
+    unsure = counts[:, :, 0].sum(axis=1)
+    found["probability"] = reported.sum(axis=-1) / total
+    low, high = _both_ways(found, "probability", sure, unsure[:, None], size, sample)
+    without = np.subtract(*share_interval(reported, size, sample.independent)[::-1])
+    found["probability_numerics"] = np.maximum(high - low - without, 0.0)
+    if sample.survival:
+        found["lost"] = flat["lost"]
+        lost = np.moveaxis(flat["lost"], 1, -1)
+        held, certain = size - lost.sum(axis=2), size - unsure[:, None] - lost[:, :, 1]
+        found["survival"] = held.sum(axis=-1) / total
+        _both_ways(found, "survival", certain, unsure[:, None], size, sample)
+    for name, levels in sample.quantiles.items():
+        rows = [
+            quantiles(summary, known, size, np.array(levels), sample.independent)
+            for summary, known in zip(flat[f"{name}_summary"], flat[f"{name}_known"], strict=True)
+        ]
+        place = np.searchsorted(_levels(sample), levels)
+        for k, end in enumerate(("", "_low", "_high")):
+            column = found[f"{name}_quantile{end}"] = np.full((len(rows), len(_levels(sample))), np.nan)
+            column[:, place] = [row[k] for row in rows]
+    if sample.sensitivity:
+        found["sobol_sums"] = flat["sobol_sums"]
+        indices = sobol_indices(np.moveaxis(flat["sobol_sums"], 1, -2), sample.size)
+        for name, index in zip(("sobol_first", "sobol_total"), indices, strict=True):
+            found |= {f"{name}{end}": part for end, part in zip(("", "_low", "_high"), index, strict=True)}
+    return {name: column.reshape(*shape, *column.shape[1:]) for name, column in found.items()}
+
+
+def _both_ways(
+    found: Columns, name: str, sure: NDArray[Any], unsure: NDArray[Any], size: int, sample: Sample
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Add the interval of a share in which each uncertified run counts once as a miss and once as a hit."""
+    low, _ = share_interval(sure, size, sample.independent)
+    _, high = share_interval(np.minimum(sure + unsure, size), size, sample.independent)
+    found[f"{name}_low"], found[f"{name}_high"] = low, high
+    return low, high
+
+
+def _levels(sample: Sample) -> NDArray[np.float64]:
+    return np.unique([level for levels in sample.quantiles.values() for level in levels])
+
+
+def coordinates(sample: Sample) -> dict[str, Any]:
+    """Coordinates of the statistics of a cell."""
+    found: dict[str, Any] = {
+        "word": ("word", list(REGIMES), {"long_name": "regime"}),
+        "replicate": ("replicate", np.arange(sample.replicates), {"long_name": "replicate of the sample"}),
+    }
+    if sample.survival:
+        found["survival_time"] = "survival_time", list(sample.survival), {"units": "s", "long_name": "time"}
+    if sample.quantiles:
+        found["quantile"] = "quantile", _levels(sample), {"units": "1", "long_name": "level of the quantile"}
+    if sample.sensitivity:
+        names = [factor.name for factor in sample.factors]
+        found["parameter"] = "parameter", names, {"long_name": "uncertain parameter"}
+    return found
+
+
+def variables(config: Config) -> dict[str, tuple[tuple[str, ...], Variable]]:
+    """Dimensions within a cell, and declaration, of each of the statistics."""
+    sample = _sample(config)
+    found: dict[str, tuple[tuple[str, ...], Variable]] = {
+        "runs": (("replicate", "word", "certificate"), SAMPLED["runs"]),
+        **{name: (("word",), one) for name, one in SAMPLED.items() if name.startswith("probability")},
+    }
+    if sample.survival:
+        found["lost"] = ("replicate", "survival_time", "certificate"), SAMPLED["lost"]
+        found |= {name: (("survival_time",), one) for name, one in SAMPLED.items() if name.startswith("survival")}
+    known = MODELS[config.scene.structure.model].variables
+    for name in sample.quantiles:
+        for end, of in {"": "quantile", "_low": "lower end of a quantile", "_high": "upper end of a quantile"}.items():
+            about = f"{of}: {known[name].long_name}"
+            found[f"{name}_quantile{end}"] = ("quantile",), Variable(known[name].unit, about)
+    if sample.sensitivity:
+        found["sobol_sums"] = ("replicate", "word", "sum"), SAMPLED["sobol_sums"]
+        for name, one in SAMPLED.items():
+            if name.startswith(("sobol_first", "sobol_total")):
+                found[name] = ("word", "parameter"), one
+    return found
+
+
+def attributes(config: Config) -> dict[str, Any]:
+    """Attributes that say what was sampled, and how the intervals follow from it."""
+    sample = _sample(config)
+    way = "Clopper and Pearson" if sample.independent else "scatter of the replicates (Korn and Graubard)"
+    points = f"{sample.n * (2 if sample.sensitivity else 1)} runs"
+    rest = f", and {sample.n * len(sample.factors)} more for the indices" if sample.sensitivity else ""
+    return {
+        "sample": f"{points} in each cell{rest}: {sample.method}, seed {sample.seed}, {sample.replicates} replicates; "
+        + "; ".join(f"{factor.name} {factor}" for factor in sample.factors),
+        "sample_interval": f"{100 * CONFIDENCE:g} %: {way}; a run that is not certified counts both ways",
+        **({"survival_of": censored(config.scene)} if sample.survival else {}),
+    }
+
+
+def nominal(ds: xr.Dataset) -> Config:
+    """The sweep of a sampled one without its sample: every uncertain parameter has its median.
+
+    Raises
+    ------
+    InputError
+        If an uncertain parameter is a ratio to one that the grid varies.
+    """
+    source = json.loads(ds.attrs["configuration"])
+    config = load(source)
+    sample = _sample(config)
+    axes = sample.axes(config.scene, config.axes, np.full((1, len(sample.factors)), 0.5))
+    settings = []
+    for path in (path for factor in sample.factors for path in factor.paths):
+        dims, column = axes.columns[path]
+        if len(dims) > 1:
+            raise InputError("boundaries", f"{path} is a ratio to an axis: no sweep at the medians is a grid")
+        settings.append(f"{path}={column.item()!r}")
+    sweep = {key: value for key, value in source["sweep"].items() if key != "sample"}
+    return load(source | {"sweep": sweep}, settings)

@@ -1,0 +1,358 @@
+"""Statistics of uncertain parameters: distributions, points, intervals of shares and quantiles, Sobol indices.
+
+Pure functions of numbers: nothing here knows scenes, solvers or files. Samples come in replicates. The replicates of a
+design are independent of each other, so their scatter tells the error of their mean, whatever the points within a
+replicate have to do with each other (A. B. Owen, Practical Quasi-Monte Carlo Integration, 2023, ch. 17).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import betaincinv, ndtr, ndtri, stdtrit
+
+Floats = NDArray[np.float64]
+
+#: Confidence of all intervals.
+CONFIDENCE = 0.95
+
+#: Order statistics that :func:`summarised` keeps.
+SUMMARY = 256
+
+#: Methods of :func:`unit_points`.
+METHODS = ("sobol", "latin-hypercube", "random")
+
+
+# Distributions
+
+
+def _normal(u: Floats, mean: float, deviation: float) -> Floats:
+    return mean + deviation * ndtri(u)
+
+
+def _uniform(u: Floats, low: float, high: float) -> Floats:
+    return low + (high - low) * u
+
+
+def _lognormal(u: Floats, mean: float, deviation: float) -> Floats:
+    variance = np.log1p((deviation / mean) ** 2)
+    return mean * np.exp(np.sqrt(variance) * ndtri(u) - 0.5 * variance)
+
+
+def _truncnormal(u: Floats, mean: float, deviation: float, low: float, high: float) -> Floats:
+    a, b = (low - mean) / deviation, (high - mean) / deviation
+    # In the upper tail the distribution function rounds to 1, in the lower one it has all its digits.
+    sign = -1.0 if a > 0.0 else 1.0
+    if a > 0.0:
+        a, b, u = -b, -a, 1.0 - u
+    z = ndtri(ndtr(a) + u * (ndtr(b) - ndtr(a)))
+    return np.clip(mean + sign * deviation * z, low, high)
+
+
+def _triangular(u: Floats, low: float, mode: float, high: float) -> Floats:
+    width, rise = high - low, mode - low
+    below = low + np.sqrt(u * width * rise)
+    return np.where(u * width < rise, below, high - np.sqrt((1.0 - u) * width * (high - mode)))
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """A distribution of one number.
+
+    Attributes
+    ----------
+    arguments : tuple of str
+        What its numbers mean. A ``standard deviation`` is positive; all others are values of the number itself.
+    quantile : callable
+        Inverse of the distribution function, of shares and of these numbers.
+    problem : callable
+        What is wrong with the numbers; empty if nothing.
+    """
+
+    arguments: tuple[str, ...]
+    quantile: Callable[..., Floats]
+    problem: Callable[..., str] = lambda *_: ""
+
+
+def _bad_ends(low: float, high: float) -> str:
+    return "" if low < high else "the first end must be less than the last"
+
+
+def _bad_truncation(mean: float, deviation: float, low: float, high: float) -> str:
+    nearest = min(abs(low - mean), abs(high - mean)) / deviation
+    far = nearest > 30.0 and (low > mean or high < mean)
+    return _bad_ends(low, high) or ("both ends are more than 30 standard deviations away" if far else "")
+
+
+def _bad_triangle(low: float, mode: float, high: float) -> str:
+    return _bad_ends(low, high) or ("" if low <= mode <= high else "the mode must lie between the ends")
+
+
+#: Distributions by name.
+DISTRIBUTIONS: dict[str, Distribution] = {
+    "normal": Distribution(("mean", "standard deviation"), _normal),
+    "uniform": Distribution(("least value", "greatest value"), _uniform, _bad_ends),
+    "lognormal": Distribution(
+        ("mean", "standard deviation"),
+        _lognormal,
+        lambda mean, _: "" if mean > 0.0 else "the mean must be greater than 0",
+    ),
+    "truncnormal": Distribution(
+        ("mean", "standard deviation", "least value", "greatest value"), _truncnormal, _bad_truncation
+    ),
+    "triangular": Distribution(("least value", "mode", "greatest value"), _triangular, _bad_triangle),
+}
+
+
+# Designs
+
+
+def unit_points(method: str, count: int, dimension: int, seed: int, replicate: int) -> Floats:
+    """Points of one replicate in the unit cube, none of them on its faces.
+
+    The first points of a longer replicate are those of a shorter one, but for Latin hypercubes.
+
+    Parameters
+    ----------
+    method : {"sobol", "latin-hypercube", "random"}
+        Scrambled Sobol points, a Latin hypercube, or independent points.
+    count, dimension : int
+    seed, replicate : int
+        Replicates of one seed are independent of each other.
+
+    Returns
+    -------
+    ndarray of shape ``(count, dimension)``
+    """
+    random = np.random.default_rng([seed, replicate])
+    if method == "random":
+        points = random.random((count, dimension))
+    else:
+        # It is slow to import, and only samples need it.
+        from scipy.stats import qmc
+
+        if method == "sobol":
+            sequence = qmc.Sobol(dimension, seed=random)
+            # Points are multiples of 2^-30: half of that moves them away from 0.
+            points = sequence.random_base2(int(count).bit_length() - 1) + 2.0**-31
+        else:
+            points = qmc.LatinHypercube(dimension, seed=random).random(count)
+    return np.clip(points, 2.0**-53, 1.0 - 2.0**-53)
+
+
+def saltelli(points: Floats) -> Floats:
+    """Saltelli's design for first and total Sobol indices.
+
+    Parameters
+    ----------
+    points : ndarray of shape ``(count, 2 * parameters)``
+        The matrices A and B side by side.
+
+    Returns
+    -------
+    ndarray of shape ``(count, parameters + 2, parameters)``
+        Rows of A, of A with one column from B for each parameter, and of B: the order of SALib.
+    """
+    parameters = points.shape[1] // 2
+    a, b = points[:, :parameters], points[:, parameters:]
+    mixed = np.repeat(a[:, None, :], parameters, axis=1)
+    own = np.arange(parameters)
+    mixed[:, own, own] = b
+    return np.concatenate([a[:, None], mixed, b[:, None]], axis=1)
+
+
+# Shares
+
+
+def clopper_pearson(hits: Any, runs: Any) -> tuple[Floats, Floats]:
+    """Two-sided interval of Clopper and Pearson (1934) for a probability; `hits` and `runs` need not be whole."""
+    hits, runs = np.broadcast_arrays(np.asarray(hits, dtype=float), np.asarray(runs, dtype=float))
+    tail = 0.5 * (1.0 - CONFIDENCE)
+    missed = np.maximum(runs - hits, 0.0)
+    low = np.where(hits > 0.0, betaincinv(np.maximum(hits, 1e-300), missed + 1.0, tail), 0.0)
+    high = np.where(missed > 0.0, betaincinv(hits + 1.0, np.maximum(missed, 1e-300), 1.0 - tail), 1.0)
+    return low, high
+
+
+def share_interval(hits: NDArray[Any], size: int, independent: bool) -> tuple[Floats, Floats]:
+    """95 % interval of a probability from the hits of each replicate.
+
+    Independent runs: Clopper and Pearson. Otherwise the same with an effective number of runs, from the scatter of the
+    replicates (E. L. Korn, B. I. Graubard, Survey Methodology 24, 1998, p. 193): the scatter is taken as one hit in one
+    replicate at least, since equal whole numbers do not mean equal shares.
+
+    Parameters
+    ----------
+    hits : ndarray of int, shape ``(..., replicates)``
+    size : int
+        Runs of each replicate.
+    independent : bool
+        Whether all runs are independent of each other.
+
+    Returns
+    -------
+    low, high : ndarray of shape ``(...)``
+    """
+    replicates = hits.shape[-1]
+    runs = float(replicates * size)
+    total = hits.sum(axis=-1).astype(float)
+    if independent:
+        return clopper_pearson(total, runs)
+    share = total / runs
+    scatter = np.maximum(hits.var(axis=-1, ddof=1), 1.0 / replicates) / replicates / size**2
+    effective = share * (1.0 - share) / scatter * (_student(runs - 1.0) / _student(replicates - 1.0)) ** 2
+    effective = np.where((total == 0.0) | (total == runs), runs, effective)
+    return clopper_pearson(share * effective, effective)
+
+
+def _student(freedom: float) -> float:
+    return float(stdtrit(freedom, 0.5 + 0.5 * CONFIDENCE))
+
+
+# Quantiles
+
+
+def summarised(values: Floats) -> Floats:
+    """At most :data:`SUMMARY` order statistics of some numbers, padded with NaN; all numbers if there are not more.
+
+    Each stands for the same number of values, so a share that is read off them errs by half of 1 / :data:`SUMMARY`.
+    """
+    found = np.full(SUMMARY, np.nan)
+    ordered = np.sort(values)
+    if len(ordered) > SUMMARY:
+        ordered = ordered[((np.arange(SUMMARY) + 0.5) * (len(ordered) / SUMMARY)).astype(int)]
+    found[: len(ordered)] = ordered
+    return found
+
+
+def quantiles(
+    summaries: Floats, known: NDArray[Any], size: int, levels: Floats, independent: bool
+) -> tuple[Floats, Floats, Floats]:
+    """Quantiles of a number with 95 % intervals, from summaries of its replicates.
+
+    The interval of a quantile holds the numbers x at which the interval of the probability to be at most x holds the
+    level. Runs whose number is not known count both ways: as the least and as the greatest number.
+
+    Parameters
+    ----------
+    summaries : ndarray of shape ``(replicates, SUMMARY)``
+        Of :func:`summarised`. Infinite numbers are allowed.
+    known : ndarray of int, shape ``(replicates,)``
+        Numbers behind each summary.
+    size : int
+        Runs of each replicate.
+    levels : ndarray of shape ``(levels,)``
+    independent : bool
+        As for :func:`share_interval`.
+
+    Returns
+    -------
+    value, low, high : ndarray of shape ``(levels,)``
+        Infinite where the sample does not bound them, and NaN where no number is known.
+    """
+    kept = np.minimum(known, summaries.shape[1])
+    if not kept.sum():
+        return np.full(len(levels), np.nan), np.full(len(levels), -np.inf), np.full(len(levels), np.inf)
+    # Rank of each number within each replicate, in runs.
+    numbers = np.unique(summaries[~np.isnan(summaries)])
+    weight = known / np.maximum(kept, 1)
+    ranks = np.stack(
+        [
+            np.searchsorted(row[:k], numbers, side="right") * w
+            for row, k, w in zip(summaries, kept, weight, strict=True)
+        ],
+        axis=-1,
+    )
+    error = np.where(known > summaries.shape[1], 0.5 * known / summaries.shape[1], 0.0)
+    unknown = size - known
+    least = np.clip(np.floor(ranks - error), 0, size)
+    most = np.clip(np.ceil(ranks + error) + unknown, 0, size)
+    below = ranks.sum(axis=-1) / known.sum()
+    floor, _ = share_interval(least, size, independent)
+    _, ceiling = share_interval(most, size, independent)
+    # The probability to lie below all numbers that occur is not 0.
+    _, before = share_interval(unknown[None, :].astype(float), size, independent)
+    value, low, high = (np.empty(len(levels)) for _ in range(3))
+    for k, level in enumerate(levels):
+        value[k] = numbers[min(np.searchsorted(below, level * (1.0 - 1e-12)), len(numbers) - 1)]
+        low[k] = -np.inf if before[0] >= level else numbers[min(int(np.argmax(ceiling >= level)), len(numbers) - 1)]
+        enough = floor >= level
+        high[k] = numbers[int(np.argmax(enough))] if enough.any() else np.inf
+    return value, low, high
+
+
+# Sensitivity
+
+
+def sobol_sums(rows: Floats) -> Floats:
+    """Sums over the rows of Saltelli's design, from which :func:`sobol_indices` follow. Sums of two parts add up.
+
+    Parameters
+    ----------
+    rows : ndarray of shape ``(count, parameters + 2)``
+        Values of a function at the points of :func:`saltelli`.
+
+    Returns
+    -------
+    ndarray of shape ``(3 + 3 * parameters,)``
+        The sums of f(A), f(B) and f(A)² + f(B)², then for each parameter those of f(AB), f(B) (f(AB) - f(A)) and
+        (f(A) - f(AB))².
+    """
+    a, b, mixed = rows[:, :1], rows[:, -1:], rows[:, 1:-1]
+    each = np.stack([mixed.sum(axis=0), (b * (mixed - a)).sum(axis=0), ((a - mixed) ** 2).sum(axis=0)], axis=-1)
+    return np.concatenate([[a.sum(), b.sum(), (a**2).sum() + (b**2).sum()], each.ravel()])
+
+
+def sobol_indices(sums: Floats, size: int) -> tuple[Floats, Floats]:
+    """First and total Sobol indices with 95 % intervals.
+
+    First indices: A. Saltelli et al., Computer Physics Communications 181, 2010, Table 2 (b), about the mean. Total
+    indices: M. J. W. Jansen, 1999, Table 2 (f) there. Intervals come from the jackknife over replicates. If a function
+    does not vary in the sample, its indices are 0, and as nothing is known of them, their intervals are 0 to 1.
+
+    Parameters
+    ----------
+    sums : ndarray of shape ``(..., replicates, 3 + 3 * parameters)``
+        Of :func:`sobol_sums`.
+    size : int
+        Rows of each replicate.
+
+    Returns
+    -------
+    first, total : ndarray of shape ``(3, ..., parameters)``
+        Index, and the ends of its interval.
+    """
+    replicates = sums.shape[-2]
+    together = sums.sum(axis=-2, keepdims=True)
+    pooled = _indices(together, replicates * size)[..., 0, :, :]
+    without = _indices(together - sums, (replicates - 1) * size)
+    spread = (replicates - 1) / replicates * ((without - without.mean(axis=-3, keepdims=True)) ** 2).sum(axis=-3)
+    half = _student(replicates - 1.0) * np.sqrt(spread)
+    known = _variance(together[..., 0, :], replicates * size)[..., None, None] > 0.0
+    low = np.where(known, np.clip(pooled - half, 0.0, 1.0), 0.0)
+    high = np.where(known, np.clip(pooled + half, 0.0, 1.0), 1.0)
+    first, total = np.moveaxis(np.stack([np.clip(pooled, 0.0, 1.0), low, high]), -1, 0)
+    return first, total
+
+
+def _variance(sums: Floats, count: int) -> Floats:
+    """Variance of f over A and B together."""
+    mean = (sums[..., 0] + sums[..., 1]) / (2 * count)
+    variance = sums[..., 2] / (2 * count) - mean**2
+    # Below this it is rounding.
+    return np.where(variance > 1e-12 * np.abs(sums[..., 2]) / count, variance, 0.0)
+
+
+def _indices(sums: Floats, count: int) -> Floats:
+    """First and total indices along the last axis, shape ``(..., parameters, 2)``; 0 where f does not vary."""
+    each = sums[..., 3:].reshape(*sums.shape[:-1], -1, 3)
+    mean = ((sums[..., 0] + sums[..., 1]) / (2 * count))[..., None]
+    variance = _variance(sums, count)[..., None]
+    first = (each[..., 1] - mean * (each[..., 0] - sums[..., :1])) / count
+    both = np.stack([first, 0.5 * each[..., 2] / count], axis=-1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(variance[..., None] > 0.0, both / variance[..., None], 0.0)

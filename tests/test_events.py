@@ -1,0 +1,54 @@
+"""The table of the events of a run."""
+
+import numpy as np
+import pytest
+
+import ringsweep
+from ringsweep.cli.report import print_events
+
+BELT = {
+    "model": "belt",
+    "body": {"mass": 1.0},
+    "spring": {"stiffness": 2.0},
+    "belt": {"velocity": 0.1},
+    "friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.1},
+    "time": {"span": 20.0},
+}
+
+
+def told(run, kind):
+    return run.event_time.values[ringsweep.words(run.event_kind).values == kind]
+
+
+class TestEvents:
+    def test_body_on_a_belt_breaks_loose_at_the_static_friction_and_stops_at_the_mirror_of_that_place(self):
+        """The slip is a circle about mu_k m g / k, so that it ends as far below this centre as it began above it."""
+        run = ringsweep.simulate(BELT)
+        assert told(run, "breakaway")[0] == pytest.approx(0.15 * 9.81 / 2.0 / 0.1, rel=1e-12)
+        stops = told(run, "stop")
+        places = np.interp(stops, run.time, run.x)
+        np.testing.assert_allclose(places, 2 * 0.1 * 9.81 / 2.0 - 0.15 * 9.81 / 2.0, rtol=1e-6)
+        assert len(run.event_time) == 2 * len(stops) == 2 * int(run.slips)
+
+    def test_edges_are_where_a_contact_meets_the_end_of_the_zone_and_the_last_event_is_the_separation(self, scene):
+        run = ringsweep.simulate(scene)
+        beta, half = np.arcsin(0.025 / 0.033378), np.radians(15.0)
+        kinds, contacts = ringsweep.words(run.event_kind).values, run.event_contact.values
+        edges = kinds == "edge"
+        assert set(contacts[edges]) == {1, 2}
+        for time, contact in zip(run.event_time.values[edges], contacts[edges], strict=True):
+            place = np.interp(time, run.time, run.phi - run.theta) + (-beta if contact == 1 else beta)
+            assert abs((place + np.pi) % (2 * np.pi) - np.pi) == pytest.approx(half, abs=1e-6)
+        assert (np.diff(run.event_time) >= 0.0).all()
+        assert kinds[-1] == "separation"
+        assert contacts[-1] == run.separating_contact
+        assert run.event_time[-1] == run.t_separation
+
+    def test_runs_under_several_laws_have_tables_side_by_side(self, capsys):
+        runs = ringsweep.simulate({"scene": BELT, "sweep": {"grid": {"friction.law": ["coulomb", "stiction"]}}})
+        alone = ringsweep.simulate(BELT)
+        both = runs.sel(friction_law="stiction")
+        np.testing.assert_array_equal(told(both, "breakaway"), told(alone, "breakaway"))
+        assert runs.event_kind.dtype == alone.event_kind.dtype
+        print_events(runs)
+        assert "stiction: events: breakaway 2, stop 2\n  7.3575 s breakaway\n" in capsys.readouterr().out

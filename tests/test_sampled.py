@@ -1,0 +1,517 @@
+"""Uncertain parameters: probabilities, survival, quantiles and Sobol indices of sampled sweeps."""
+
+import json
+import logging
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.special import ndtr, ndtri
+from xarray.testing import assert_identical
+
+import ringsweep
+from ringsweep import InputError, statistics
+from ringsweep.cli import main
+from ringsweep.config import load
+from ringsweep.plots import probability_panel, regime_map, sensitivity_panel, survival_panel
+from ringsweep.quantities.variables import REGIMES
+from ringsweep.statistics import (
+    clopper_pearson,
+    quantiles,
+    saltelli,
+    share_interval,
+    sobol_indices,
+    sobol_sums,
+    summarised,
+    unit_points,
+)
+
+# A body on a belt rides until k v t = mu_s m g.
+BELT: dict[str, Any] = {
+    "model": "belt",
+    "body": {"mass": 1.0},
+    "spring": {"stiffness": 2.0},
+    "belt": {"velocity": 0.1},
+    "friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.05},
+    "gravity": 9.81,
+    "time": {"span": 7.0},
+}
+SAMPLE: dict[str, Any] = {"n": 256, "of": {"friction.mu_s": {"normal": [0.15, "10 %"]}}}
+
+
+def config(scene: Any = BELT, grid: Any = None, solver: str = "auto", **sample: Any) -> dict[str, Any]:
+    sweep = {"sample": SAMPLE | sample} | ({"grid": grid} if grid else {})
+    return {"scene": scene, "sweep": sweep, "solver": solver}
+
+
+def run(given: dict[str, Any], *args: Any, **options: Any) -> xr.Dataset:
+    return ringsweep.run(given, *args, **({"jobs": 1, "progress": False} | options)).load()
+
+
+def probability_of_riding(span: Any, mean: float = 0.15, deviation: float = 0.015) -> Any:
+    return ndtr((mean - span * 2.0 * 0.1 / 9.81) / deviation)
+
+
+def write(path: Any, given: dict[str, Any]) -> str:
+    # A mapping in JSON is YAML too.
+    path.write_text(json.dumps(given))
+    return str(path)
+
+
+# The designs and the estimators, alone
+
+
+def test_a_distribution_has_its_mean_and_its_quantiles() -> None:
+    u = (np.arange(200_000) + 0.5) / 200_000
+    cases = {
+        "normal": ((2.0, 0.5), 2.0, 0.5),
+        "uniform": ((1.0, 3.0), 2.0, 2.0 / np.sqrt(12.0)),
+        "lognormal": ((2.0, 0.5), 2.0, 0.5),
+        "triangular": ((0.0, 1.0, 2.0), 1.0, np.sqrt(1.0 / 6.0)),
+        "truncnormal": ((0.0, 1.0, 0.0, 40.0), np.sqrt(2.0 / np.pi), np.sqrt(1.0 - 2.0 / np.pi)),
+    }
+    for name, (numbers, mean, deviation) in cases.items():
+        values = statistics.DISTRIBUTIONS[name].quantile(u, *numbers)
+        assert values.mean() == pytest.approx(mean, rel=1e-4), name
+        assert values.std() == pytest.approx(deviation, rel=1e-3), name
+        assert (np.diff(values) >= 0.0).all()
+
+
+def test_a_truncated_normal_keeps_its_digits_in_both_tails() -> None:
+    u = np.array([0.1, 0.9])
+    above = statistics.DISTRIBUTIONS["truncnormal"].quantile(u, 0.0, 1.0, 12.0, 13.0)
+    below = statistics.DISTRIBUTIONS["truncnormal"].quantile(1.0 - u, 0.0, 1.0, -13.0, -12.0)
+    # Far out a normal tail is an exponential of rate 12.
+    assert above == pytest.approx(12.0 - np.log1p(-u) / 12.0, abs=5e-3)
+    assert above == pytest.approx(-below, rel=1e-12)
+
+
+@pytest.mark.parametrize("method", ["sobol", "random"])
+def test_more_points_continue_the_points_before(method: str) -> None:
+    few, many = (unit_points(method, count, 3, 5, 2) for count in (64, 256))
+    assert (many[:64] == few).all()
+    assert ((many > 0.0) & (many < 1.0)).all()
+    assert (unit_points(method, 64, 3, 5, 3) != few).all()
+
+
+def test_a_latin_hypercube_has_one_point_in_each_stratum() -> None:
+    points = unit_points("latin-hypercube", 50, 2, 1, 0)
+    assert (np.sort((points * 50).astype(int), axis=0) == np.arange(50)[:, None]).all()
+
+
+def test_the_interval_of_clopper_and_pearson_is_that_of_tables() -> None:
+    low, high = clopper_pearson([0, 3, 10], 10)
+    # C. J. Clopper, E. S. Pearson, Biometrika 26, 1934; 3 of 10 from R's binom.test.
+    assert low == pytest.approx([0.0, 0.06673951, 0.69150289], abs=1e-7)
+    assert high == pytest.approx([0.30849711, 0.65245285, 1.0], abs=1e-7)
+
+
+@pytest.mark.parametrize(("method", "dimension"), [("sobol", 1), ("sobol", 3), ("latin-hypercube", 2), ("random", 2)])
+def test_intervals_cover_known_probabilities(method: str, dimension: int) -> None:
+    """Half-spaces of normal numbers have known probabilities."""
+    random, covered, count = np.random.default_rng(7), 0, 600
+    designs = [np.stack([unit_points(method, 32, dimension, seed, r) for r in range(8)]) for seed in range(20)]
+    for k in range(count):
+        normal = random.normal(size=dimension)
+        share = random.uniform(0.01, 0.99)
+        inside = ndtri(designs[k % 20]) @ (normal / np.linalg.norm(normal)) < ndtri(share)
+        low, high = share_interval(inside.sum(axis=-1), 32, method == "random")
+        covered += bool(low <= share <= high)
+    assert 0.935 <= covered / count <= 0.995
+
+
+def test_equal_counts_are_not_taken_for_certainty() -> None:
+    low, high = share_interval(np.full(8, 8), 32, independent=False)
+    assert low < 0.25 - 0.2 / 32
+    assert high > 0.25 + 0.2 / 32
+
+
+def test_quantiles_of_a_normal_number_are_covered() -> None:
+    random, levels, covered = np.random.default_rng(3), np.array([0.05, 0.5, 0.9]), np.zeros(3)
+    for _ in range(100):
+        values = random.normal(size=(8, 400))
+        found = quantiles(np.stack([summarised(row) for row in values]), np.full(8, 400), 400, levels, True)
+        covered += (found[1] <= ndtri(levels)) & (ndtri(levels) <= found[2])
+    assert (covered >= 91).all()
+
+
+def test_a_quantile_that_most_runs_do_not_reach_is_infinite() -> None:
+    values = np.where(np.arange(80).reshape(8, 10) % 10 < 3, 1.0, np.inf)
+    value, low, high = quantiles(
+        np.stack([summarised(row) for row in values]), np.full(8, 10), 10, np.array([0.1, 0.5]), True
+    )
+    assert value.tolist() == [1.0, np.inf]
+    assert high[1] == np.inf
+    assert low[0] == 1.0
+
+
+def ishigami(u: Any) -> Any:
+    x = np.pi * (2.0 * u - 1.0)
+    return np.sin(x[..., 0]) + 7.0 * np.sin(x[..., 1]) ** 2 + 0.1 * x[..., 2] ** 4 * np.sin(x[..., 0])
+
+
+def g_function(u: Any) -> Any:
+    a = np.array([0.0, 1.0, 4.5, 9.0, 99.0, 99.0, 99.0, 99.0])
+    return np.prod((np.abs(4.0 * u - 2.0) + a) / (1.0 + a), axis=-1)
+
+
+def indices(function: Any, dimension: int, size: int, seed: int = 3) -> Any:
+    rows = [function(saltelli(unit_points("sobol", size, 2 * dimension, seed, r))) for r in range(8)]
+    return sobol_indices(np.stack([sobol_sums(one) for one in rows]), size)
+
+
+def test_indices_of_functions_whose_indices_are_known() -> None:
+    # T. Ishigami, T. Homma, 1990, and A. Saltelli, I. M. Sobol, 1995.
+    first, total = indices(ishigami, 3, 1024)
+    assert first[0] == pytest.approx([0.3139, 0.4424, 0.0], abs=0.01)
+    assert total[0] - first[0] == pytest.approx([0.2437, 0.0, 0.2437], abs=0.01)
+    first, _ = indices(g_function, 8, 1024)
+    assert first[0] == pytest.approx([0.7162, 0.1790, 0.0237, 0.0072, 0.0001, 0.0001, 0.0001, 0.0001], abs=0.005)
+
+
+def test_intervals_cover_known_indices() -> None:
+    known = np.array([[0.3139, 0.4424, 0.0], [0.5576, 0.4424, 0.2437]])
+    covered = np.zeros((2, 3))
+    for seed in range(100):
+        _, low, high = np.moveaxis(np.stack(indices(ishigami, 3, 64, seed)), 0, 1)
+        covered += (low <= known) & (known <= high)
+    assert (covered >= 88).all()
+
+
+def test_indices_agree_with_those_of_salib() -> None:
+    sobol = pytest.importorskip("SALib.analyze.sobol")
+    rows = ishigami(saltelli(unit_points("sobol", 1024, 6, 1, 0)))
+    # One replicate given eight times has its own indices.
+    first, total = sobol_indices(np.stack([sobol_sums(rows)] * 8), 1024)
+    problem = {"num_vars": 3, "names": ["a", "b", "c"], "bounds": [[0, 1]] * 3}
+    theirs = sobol.analyze(problem, rows.ravel(), calc_second_order=False, num_resamples=2, seed=1)
+    # They divide by the variance of all rows.
+    assert first[0] == pytest.approx(np.clip(theirs["S1"], 0.0, 1.0), abs=0.02)
+    assert total[0] == pytest.approx(theirs["ST"], abs=0.02)
+
+
+def test_a_function_that_does_not_vary_has_indices_of_which_nothing_is_known() -> None:
+    first, total = sobol_indices(np.stack([sobol_sums(np.ones((16, 4)))] * 8), 16)
+    for found in (first, total):
+        assert (found[0] == 0.0).all()
+        assert (found[1] == 0.0).all()
+        assert (found[2] == 1.0).all()
+
+
+# Sweeps
+
+
+@pytest.mark.parametrize("method", ["sobol", "latin-hypercube", "random"])
+def test_the_probability_to_ride_is_that_of_the_closed_form(method: str) -> None:
+    spans = [6.5, 7.0, 7.5, 8.0, 8.5]
+    ds = run(config(grid={"time.span": spans}, method=method))
+    known = probability_of_riding(np.array(spans))
+    found = ds.sel(word="riding")
+    assert (found.probability_low.values <= known).all()
+    assert (known <= found.probability_high.values).all()
+    assert ds.probability.sum("word").values == pytest.approx(1.0)
+    assert ds.runs.sum(["replicate", "word", "certificate"]).values.tolist() == [256] * 5
+    assert ds.word.values.tolist() == list(REGIMES)
+
+
+def test_survival_and_quantiles_of_the_first_slip_are_those_of_the_closed_form() -> None:
+    times = np.linspace(5.0, 9.0, 9)
+    ds = run(config(survival={"linspace": [5.0, 9.0, 9]}, quantiles={"first_slip": [0.05, 0.5]}, n=1024))
+    known = np.where(times < 7.0, probability_of_riding(times), probability_of_riding(7.0))
+    assert (ds.survival_low.values <= known).all()
+    assert (known <= ds.survival_high.values).all()
+    # Half of the bodies ride for longer than the span.
+    median = 0.15 * 9.81 / 0.2
+    assert ds.first_slip_quantile.values[1] == np.inf
+    early = median * (1.0 + 0.1 * ndtri(0.05))
+    assert ds.first_slip_quantile_low.values[0] <= early <= ds.first_slip_quantile_high.values[0]
+
+
+def test_probabilities_are_those_of_runs_of_the_same_points() -> None:
+    """An independent way: the points in a table, each run by a plain sweep, counted by numpy."""
+    of = {"friction.mu_k": {"uniform": [0.05, 0.1]}, "friction.mu_s": {"over": "mu_k", "uniform": [1.2, 2.0]}}
+    ds = run(config(of=of, grid={"belt.velocity": [0.05, 0.1]}, sensitivity=True, survival=[3.0]))
+    sample = load(config(of=of)).sample
+    assert sample is not None
+    rows = np.concatenate([saltelli(unit_points("sobol", 32, 4, 0, r)) for r in range(8)])
+    low, ratio = 0.05 + 0.05 * rows[..., 0], 1.2 + 0.8 * rows[..., 1]
+    columns = {"friction.mu_k": xr.DataArray(low.ravel(), dims="point")}
+    columns["friction.mu_s"] = xr.DataArray((low * ratio).ravel(), dims="point")
+    plain = ringsweep.sweep(BELT, {"belt.velocity": [0.05, 0.1], **columns}, jobs=1, progress=False)
+    regimes = plain.regime.transpose("belt_velocity", "point").values.reshape(2, 256, 4)
+    for k, word in enumerate(REGIMES):
+        mine = (regimes == k)[:, :, [0, 3]].mean(axis=(1, 2))
+        assert ds.probability.sel(word=word).values.tolist() == mine.tolist()
+        for cell in range(2):
+            sums = sobol_sums((regimes[cell] == k).astype(float))
+            assert ds.sobol_sums.sel(word=word).values[cell].sum(axis=0).tolist() == sums.tolist()
+    slip = plain.first_slip.transpose("belt_velocity", "point").values.reshape(2, 256, 4)[:, :, [0, 3]]
+    assert ds.survival.values[:, 0].tolist() == (~(slip <= 3.0)).mean(axis=(1, 2)).tolist()
+    assert not np.isnan(ds.sobol_first.values).any()
+    assert not np.isnan(ds.sobol_total.values).any()
+
+
+def test_runs_without_certificate_count_both_ways() -> None:
+    scene = BELT | {"time": {"span": 7.3}}
+    given = config(scene, n=64) | {"solver": {"method": "auto", "certify": False}}
+    ds = run(given)
+    assert (ds.probability_low == 0.0).all()
+    assert (ds.probability_high == 1.0).all()
+    certified = run(config(scene, n=64))
+    assert (ds.probability == certified.probability).all()
+    assert (certified.probability_numerics == 0.0).all()
+    alone = certified.probability_high - certified.probability_low
+    assert ds.probability_numerics.values == pytest.approx(1.0 - alone.values)
+
+
+def test_a_measured_sample_is_drawn_row_by_row(tmp_path: Any) -> None:
+    (tmp_path / "runs.csv").write_text("friction.mu_s,friction.mu_k\n0.2,0.19\n0.1,0.09\n")
+    given = config(of={"friction.mu_s, friction.mu_k": {"file": "runs.csv"}})
+    write(tmp_path / "joint.yaml", given)
+    ds = run(tmp_path / "joint.yaml", tmp_path / "joint.nc")
+    # With mu_s = 0.1 it slips at 4.9 s, with 0.2 at 9.8 s. A row with the other's mu_k would not be allowed.
+    assert ds.probability.sel(word="riding").item() == 0.5
+    (tmp_path / "runs.csv").unlink()
+    again = run(tmp_path / "joint.nc", tmp_path / "again.nc")
+    assert (again.probability == ds.probability).all()
+
+
+def test_a_ratio_to_an_axis_keeps_its_ratio() -> None:
+    of = {"friction.mu_s": {"over": "friction.mu_k", "uniform": [1.0, 1.5]}}
+    ds = run(config(of=of, grid={"friction.mu_k": [0.09, 0.12, 0.15]}))
+    # It rides if mu_s > 0.1427.
+    known = np.clip((1.5 - 0.2 * 7.0 / 9.81 / np.array([0.09, 0.12, 0.15])) / 0.5, 0.0, 1.0)
+    assert ds.probability.sel(word="riding").values == pytest.approx(known, abs=0.01)
+
+
+def test_a_sampled_sweep_that_is_stopped_goes_on_bit_for_bit(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    from ringsweep.runs import sampled
+
+    given = config(grid={"belt.velocity": [0.05, 0.1, 0.2]}, sensitivity=True, survival=[3.0, 5.0])
+    whole = run(given, tmp_path / "whole.nc")
+    compute, done = sampled.compute_parts, []
+
+    def fail_later(*args: Any) -> Any:
+        done.append(1)
+        if len(done) > 2:
+            raise RuntimeError("stop")
+        return compute(*args)
+
+    monkeypatch.setattr(sampled, "compute_parts", fail_later)
+    with pytest.raises(RuntimeError):
+        run(given, tmp_path / "part.nc")
+    assert list((tmp_path / "part.nc.partial").glob("*.npz"))
+    monkeypatch.setattr(sampled, "compute_parts", compute)
+    part = run(given, tmp_path / "part.nc", jobs=2)
+    for name in whole.data_vars:
+        assert_identical(part[name], whole[name])
+    ringsweep.verify(tmp_path / "part.nc")
+    memory = run(given)
+    for name in whole.data_vars:
+        assert (memory[name].values == whole[name].values).all()
+
+
+@pytest.mark.parametrize("method", ["sobol", "random"])
+def test_a_larger_sample_continues_a_smaller_one_bit_for_bit(
+    method: str, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from ringsweep.runs import sampled
+
+    given = config(grid={"belt.velocity": [0.05, 0.1]}, sensitivity=True, survival=[3.0], method=method, n=64)
+    run(given, tmp_path / "few.nc")
+    given["sweep"]["sample"] |= {"n": 256}
+    fresh = run(given, tmp_path / "fresh.nc")
+    cells, compute = [], sampled.compute_task
+    monkeypatch.setattr(sampled, "compute_task", lambda *a: cells.append(len(a[2])) or compute(*a))
+    continued = run(given, tmp_path / "many.nc", reuse=tmp_path / "few.nc")
+    for name in fresh.data_vars:
+        assert_identical(continued[name], fresh[name])
+    assert sum(cells) == 2 * (256 - 64) * 3
+
+
+def test_the_file_does_not_grow_with_the_sample(tmp_path: Any) -> None:
+    sizes = []
+    for n in (64, 2048):
+        run(config(n=n), tmp_path / f"{n}.nc")
+        sizes.append((tmp_path / f"{n}.nc").stat().st_size)
+    assert sizes[1] <= sizes[0] + 200
+
+
+def test_what_cannot_be_continued_is_told(tmp_path: Any) -> None:
+    run(config(n=64), tmp_path / "few.nc")
+    for changed, words in (
+        ({"n": 64, "method": "latin-hypercube"}, "Latin hypercube"),
+        ({"quantiles": {"first_slip": [0.5]}}, "quantiles"),
+        ({"seed": 2}, "another sweep"),
+        ({"of": {"friction.mu_s": {"normal": [0.16, 0.01]}}}, "another sweep"),
+        ({"n": 32}, "64 samples"),
+    ):
+        with pytest.raises(InputError, match=words):
+            run(config(**changed), tmp_path / "more.nc", reuse=tmp_path / "few.nc")
+
+
+# What a person types wrongly
+
+
+MISTAKES: list[tuple[dict[str, Any], str, str]] = [
+    ({"n": 1000}, "sweep.sample.n", "give 1024"),
+    ({"n": 100, "method": "random"}, "sweep.sample.n", "give 96"),
+    ({"n": 0}, "sweep.sample.n", "at least 2"),
+    ({"n": "many"}, "sweep.sample.n", "not a number"),
+    ({"seed": -1}, "sweep.sample.seed", "at least 0"),
+    ({"seed": 1.5}, "sweep.sample.seed", "whole"),
+    ({"replicates": 2}, "sweep.sample.replicates", "at least 4"),
+    ({"method": "halton"}, "sweep.sample.method", "sobol"),
+    ({"methods": "sobol"}, "sweep.sample.methods", "did you mean `method`"),
+    ({"sensitivity": "yes"}, "sweep.sample.sensitivity", "true or false"),
+    ({"of": {}}, "sweep.sample.of", "paths and distributions"),
+    ({"of": [1]}, "sweep.sample.of", "paths and distributions"),
+    ({"of": {"friction.mus": {"normal": [1, 1]}}}, "sweep.sample.of.friction.mus", "did you mean `friction.mu_s`"),
+    ({"of": {"friction.law": {"values": ["coulomb"]}}}, "sweep.sample.of.friction.law", "axis of sweep.grid"),
+    ({"of": {"friction.mu_s": 0.3}}, "sweep.sample.of.friction.mu_s", "a distribution is expected"),
+    ({"of": {"friction.mu_s": {}}}, "sweep.sample.of.friction.mu_s", "got none"),
+    ({"of": {"friction.mu_s": {"gauss": [1, 2]}}}, "sweep.sample.of.friction.mu_s.gauss", "is no distribution"),
+    ({"of": {"friction.mu_s": {"normal": [1, 2], "uniform": [1, 2]}}}, "sweep.sample.of.friction.mu_s", "one dist"),
+    ({"of": {"friction.mu_s": {"normal": [0.15]}}}, "sweep.sample.of.friction.mu_s.normal", "mean, standard dev"),
+    ({"of": {"friction.mu_s": {"normal": [0.15, 0]}}}, "sweep.sample.of.friction.mu_s.normal.1", "greater than 0"),
+    ({"of": {"body.mass": {"normal": [1, "3 mm"]}}}, "sweep.sample.of.body.mass.normal.1", "wrong unit"),
+    ({"of": {"initial.x": {"normal": [0, "10 %"]}}}, "sweep.sample.of.initial.x.normal.1", "a mean of 0"),
+    ({"of": {"friction.mu_s": {"uniform": [0.3, 0.2]}}}, "sweep.sample.of.friction.mu_s.uniform", "less than the"),
+    ({"of": {"body.mass": {"triangular": [1, 3, 2]}}}, "sweep.sample.of.body.mass.triangular", "mode must lie"),
+    ({"of": {"body.mass": {"lognormal": [-1, 2]}}}, "sweep.sample.of.body.mass.lognormal", "greater than 0"),
+    ({"of": {"body.mass": {"truncnormal": [0, 1, 50, 60]}}}, "sweep.sample.of.body.mass.truncnormal", "30 standard"),
+    ({"of": {"friction.mu_s": {"over": "mu_j", "uniform": [1, 2]}}}, "sweep.sample.of.friction.mu_s.over", "mu_k"),
+    ({"of": {"friction.mu_s": {"over": "mu_s", "uniform": [1, 2]}}}, "sweep.sample.of.friction.mu_s.over", "itself"),
+    ({"of": {"friction.mu_s": {"over": "body.mass", "uniform": [1, 2]}}}, "sweep.sample.of.friction.mu_s.over", "unit"),
+    ({"of": {"friction.mu_s": {"over": "mu_k"}}}, "sweep.sample.of.friction.mu_s", "got none"),
+    (
+        {
+            "of": {
+                "friction.mu_s": {"over": "mu_k", "uniform": [1, 2]},
+                "friction.mu_k": {"over": "mu_s", "uniform": [1, 2]},
+            }
+        },
+        "sweep.sample.of.friction.mu_s.over",
+        "itself drawn over",
+    ),
+    ({"of": {"friction.mu_s, friction.mu_k": {"normal": [1, 2]}}}, "sweep.sample.of.friction.mu_s, f", "need rows"),
+    ({"of": {"friction.mu_s": {"values": []}}}, "sweep.sample.of.friction.mu_s.values", "empty"),
+    ({"of": {"friction.mu_s": {"values": [0.2, -1]}}}, "sweep.sample.of.friction.mu_s.values", "at least 0"),
+    ({"of": {"friction.mu_s": {"file": "no.csv"}}}, "sweep.sample.of.friction.mu_s.file", "No such file"),
+    ({"of": {"friction.mu_s": {"file": 3}}}, "sweep.sample.of.friction.mu_s.file", "file name"),
+    ({"quantiles": {"t_separation": [0.5]}}, "sweep.sample.quantiles.t_separation", "no number of this model"),
+    ({"quantiles": {"first_slip": [50]}}, "sweep.sample.quantiles.first_slip", "less than 1"),
+    ({"quantiles": [0.5]}, "sweep.sample.quantiles", "lists of levels"),
+    ({"survival": [-1.0]}, "sweep.sample.survival", "at least 0"),
+    ({"survival": {"linspace": [0, 1]}}, "sweep.sample.survival.linspace", "count"),
+    ({"survival": 3}, "sweep.sample.survival", "list of values"),
+]
+
+
+@pytest.mark.parametrize(
+    ("changed", "path", "words"), MISTAKES, ids=[f"{p}-{k}" for k, (_, p, _) in enumerate(MISTAKES)]
+)
+def test_a_mistake_is_located(changed: dict[str, Any], path: str, words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        load(config(**changed))
+    assert caught.value.path.startswith(path)
+    assert words in caught.value.problem
+
+
+def test_a_sample_that_is_not_allowed_is_told_with_its_probability() -> None:
+    with pytest.raises(InputError, match=r"must be greater than 0 kg: normal\(1, 0.5\) has probability 0\.023 of that"):
+        load(config(of={"body.mass": {"normal": [1.0, 0.5]}}))
+    # Nobody draws what has a probability of 1e-23.
+    assert load(config(of={"body.mass": {"normal": [1.0, 0.1]}})).sample is not None
+    with pytest.raises(InputError, match=r"[45]\d\.\d% of the points of the sample are not allowed") as caught:
+        load(config(of={"friction.mu_k": {"normal": [0.15, 0.01]}}))
+    assert caught.value.path == "scene.friction.mu_k"
+
+
+def test_a_path_varies_in_one_place_only() -> None:
+    with pytest.raises(InputError, match="one place only"):
+        load(config(grid={"friction.mu_s": [0.1, 0.2]}))
+    with pytest.raises(InputError, match="swept here"):
+        load(config(), ["friction.mu_s=0.2"])
+
+
+def test_a_sampled_sweep_cannot_be_refined() -> None:
+    with pytest.raises(InputError, match=r"sweep\.refine: cannot stand beside"):
+        ringsweep.run(config(grid={"belt.velocity": [0.1, 0.2]}), refine=True)
+
+
+# Commands and pictures
+
+
+def test_commands_work_on_a_sampled_sweep(tmp_path: Any, capsys: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    grid = {"belt.velocity": {"linspace": [0.08, 0.12, 4]}, "time.span": {"linspace": [6.0, 9.0, 4]}}
+    write(tmp_path / "my.yaml", config(grid=grid, n=64, sensitivity=True, survival=[2.0, 6.0, 7.0]))
+    assert main(["run", "my.yaml", "--dry-run", "--jobs", "1"]) == 0
+    assert "192 runs in each, 3072 in all" in capsys.readouterr().out
+    assert main(["run", "my.yaml", "--jobs", "1"]) == 0
+    assert "riding: 0.00% to 100.00%" in capsys.readouterr().out
+    assert (tmp_path / "my.png").exists()
+    for arguments in (
+        ["info", "my.nc"],
+        ["verify", "my.nc"],
+        ["run", "my.yaml", "--jobs", "1"],
+        ["run", "my.nc", "-o", "again.nc", "--jobs", "1"],
+        ["map", "my.nc", "--boundaries", "riding", "--tolerance", "1e-3", "-o", "boundary.png"],
+        ["map", "my.nc", "--var", "survival", "-o", "survival.png"],
+        ["plot", "my.nc", "--sel", "belt.velocity=0.08", "--sel", "time.span=9"],
+        ["plot", "my.nc", "--sel", "belt.velocity=0.08", "--sel", "time.span=9", "--kind", "survival", "-o", "s.pdf"],
+        ["plot", "my.nc", "--sel", "belt.velocity=0.08", "--sel", "time.span=9", "--kind", "sensitivity"],
+    ):
+        assert main(arguments) == 0, arguments
+    capsys.readouterr()
+    for arguments, words in (
+        (["map", "my.nc", "-o", "my.html"], "no runs to point at"),
+        (["plot", "my.nc"], "has several cells: hold belt_velocity (4), time_span (4)"),
+        (["plot", "my.nc", "--kind", "phase"], "is for histories"),
+        (["plot", "my.nc", "--word", "riding"], "--kind sensitivity"),
+        (["map", "my.nc", "--sel", "word=ridin"], "did you mean riding?"),
+        (["run", "my.yaml", "--refine"], "cannot stand beside sweep.sample"),
+        (["precision", "my.yaml"], "leave sample out"),
+        (["simulate", "my.yaml"], "wrote"),
+    ):
+        main(arguments)
+        captured = capsys.readouterr()
+        assert words in captured.err + captured.out, arguments
+        assert "Traceback" not in captured.err
+
+
+def test_the_boundary_at_the_medians_is_that_of_the_closed_form(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    from ringsweep.runs.sampled import nominal
+    from ringsweep.runs.sweep import Execution, compute
+
+    ds = run(config(grid={"time.span": [6.0, 7.0, 8.0]}, n=64))
+    curves = ringsweep.boundary(compute(nominal(ds), Execution(1, progress=False)), "riding", 1e-5)
+    assert curves.time_span.values == pytest.approx([0.15 * 9.81 / 0.2], abs=2e-5)
+
+
+def test_pictures_show_intervals() -> None:
+    ds = run(
+        config(
+            n=64, sensitivity=True, survival=[6.0, 6.5, 7.0], of=SAMPLE["of"] | {"body.mass": {"uniform": [0.9, 1.1]}}
+        )
+    )
+    from matplotlib.figure import Figure
+
+    bars = probability_panel(ds, Figure().add_subplot())
+    shown = [text.get_text() for text in bars.get_yticklabels()]
+    assert shown == [word for word in REGIMES if ds.probability.sel(word=word) > 0.0]
+    assert survival_panel(ds, Figure().add_subplot()).get_ylabel() == "body still rides"
+    hangs = sensitivity_panel(ds, Figure().add_subplot(), word="riding")
+    assert [text.get_text() for text in hangs.get_yticklabels()] == ["friction.mu_s", "body.mass"]
+    with pytest.raises(InputError, match="is no regime"):
+        sensitivity_panel(ds, Figure().add_subplot(), word="flying")
+    with pytest.raises(InputError, match="single cell"):
+        regime_map(ds.sel(word="riding"))
+
+
+def test_many_runs_without_certificate_are_a_warning(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.WARNING, "ringsweep"):
+        run(config(n=64) | {"solver": {"method": "auto", "certify": False}})
+    assert "100.0 % of the runs have no certificate" in caplog.text
