@@ -177,13 +177,17 @@ def zones(ds: xr.Dataset) -> list[str]:
 
 def phases(ds: xr.Dataset) -> NDArray[Any]:
     """Mode of friction from each instant of a run to the next, or ``PIVOT`` or ``FLIGHT``."""
-    mode = ds["mode"].values
-    gaps = [ds[name].values for name in present(ds, ("gap_1", "gap_2"))]
-    if not gaps:
+    mode, is_open = ds["mode"].values, open_contacts(ds)
+    if not is_open:
         return np.asarray(mode)
-    # A contact that rebounds is open before and after an instant without a gap.
-    is_open = [np.maximum(gap, np.append(gap[1:], 0.0)) > 0.0 for gap in gaps]
     return np.select([np.all(is_open, axis=0), np.any(is_open, axis=0)], [FLIGHT, PIVOT], mode)
+
+
+def open_contacts(ds: xr.Dataset) -> list[NDArray[np.bool_]]:
+    """Whether each contact is open from each instant of a run to the next; empty if the run has no gaps."""
+    gaps = [ds[name].values for name in present(ds, ("gap_1", "gap_2"))]
+    # A contact that rebounds is open before and after an instant without a gap.
+    return [np.maximum(gap, np.append(gap[1:], 0.0)) > 0.0 for gap in gaps]
 
 
 def mode_name(mode: float) -> str:

@@ -92,10 +92,10 @@ def states_at(run: xr.Dataset, times: NDArray[np.float64]) -> dict[str, NDArray[
     own = run["time"].values
     before = np.maximum(np.searchsorted(own, times, side="right") - 1, 0)
     states: dict[str, NDArray[Any]] = {"time": times, "mode": run["mode"].values[before]}
-    ring = ("phi", "theta", "omega", "ring_omega", "normal_1", "normal_2", "friction_1", "friction_2")
-    ring += ("alpha_1", "alpha_2", "gap_1", "gap_2", "y")
+    ring = ("omega", "theta", "ring_omega", "y")
+    contacts = [f"{name}_{k}" for name in ("normal", "friction", "alpha", "gap") for k in (1, 2)]
     belt = ("x", "velocity", "friction_force", "belt_x", "belt_velocity")
-    return states | {name: np.interp(times, own, run[name].values) for name in present(run, (*ring, *belt))}
+    return states | {name: np.interp(times, own, run[name].values) for name in present(run, (*ring, *contacts, *belt))}
 
 
 class RingArtists:

@@ -14,7 +14,7 @@ from ringsweep.config import load
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
 from ringsweep.physics import ring
-from ringsweep.plots.datasets import configuration, on_ring, phases, present, require_history, require_one_run
+from ringsweep.plots.datasets import configuration, on_ring, open_contacts, phases, require_history, require_one_run
 
 
 @dataclass(frozen=True)
@@ -97,12 +97,11 @@ def _on_race(ds: xr.Dataset, rig: Rig) -> dict[str, NDArray[Any]]:
     epsilon, first = ds["epsilon"].values, ds["normal_1"].values
     _, _, *forces = ring.held(rig.body, 1.0, np.sin(phi), np.cos(phi), omega, omega**2, epsilon, first)
     distance = getattr(rig.body, "xi", rig.radius - rig.ball)
-    found = {"x": distance * np.sin(phi), "y": -distance * np.cos(phi)}
+    found = {} if "x" in ds else {"x": distance * np.sin(phi), "y": -distance * np.cos(phi)}
     for k, force in enumerate(forces, start=1):
-        # An open contact has no force.
-        found[f"friction_{k}"] = force * (ds["gap_1"].values <= 0.0) if "gap_1" in ds else force
+        found[f"friction_{k}"] = np.where(open_contacts(ds)[0], 0.0, force) if "gap_1" in ds else force
         found[f"alpha_{k}"] = phi + rig.offset(k)
-    return found if not present(ds, ("x",)) else {name: found[name] for name in found if name not in ("x", "y")}
+    return found
 
 
 def _off_race(ds: xr.Dataset, rig: Rig) -> dict[str, NDArray[Any]]:
@@ -116,7 +115,7 @@ def _off_race(ds: xr.Dataset, rig: Rig) -> dict[str, NDArray[Any]]:
     mass, distance = rig.body.mass, np.hypot(x, y)
     moment = rig.body.inertia * epsilon
     radial = -mass * distance * omega**2 + mass * rig.body.gravity * y / distance
-    found, levers, shares, closed = {}, [], [], []
+    found, levers, shares = {}, [], []
     for k, a in ((1, rig.half_distance), (2, -rig.half_distance)):
         # From the centre of mass to the centre of the ball.
         across = -rig.center_offset * np.sin(psi) - a * np.cos(psi)
@@ -128,13 +127,12 @@ def _off_race(ds: xr.Dataset, rig: Rig) -> dict[str, NDArray[Any]]:
         radial = radial - normal * (cosine * y - sine * x) / distance
         levers.append(rig.body.radius - x * sine + y * cosine)
         shares.append((cosine * x + sine * y) / distance)
-        closed.append(ds[f"gap_{k}"].values <= 0.0)
         found[f"alpha_{k}"] = alpha
-    (l1, l2), (s1, s2) = levers, shares
-    both = closed[0] & closed[1]
+    (l1, l2), (s1, s2), (open_1, open_2) = levers, shares, open_contacts(ds)
+    both = ~(open_1 | open_2)
     whole = np.where(both, l1 * s2 - l2 * s1, 1.0)
-    found["friction_1"] = np.where(both, (moment * s2 - radial * l2) / whole, np.where(closed[0], moment / l1, 0.0))
-    found["friction_2"] = np.where(both, (radial * l1 - moment * s1) / whole, np.where(closed[1], moment / l2, 0.0))
+    found["friction_1"] = np.where(both, (moment * s2 - radial * l2) / whole, np.where(open_1, 0.0, moment / l1))
+    found["friction_2"] = np.where(both, (radial * l1 - moment * s1) / whole, np.where(open_2, 0.0, moment / l2))
     return found
 
 
