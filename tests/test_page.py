@@ -13,6 +13,7 @@ import xarray as xr
 
 from ringsweep import cli, plots
 from ringsweep.errors import InputError
+from ringsweep.models.ring.impact.record import OUTCOMES as IMPACT_ONLY
 from ringsweep.quantities.variables import OUTCOMES
 from ringsweep.storage import netcdf
 
@@ -42,7 +43,7 @@ def sweep(*sizes, points=False):
         else:
             values = rng.normal(size=sizes) if variable.dtype.startswith("f") else rng.integers(0, 9, sizes)
         values = np.abs(values) * 1e-9 if name.endswith("_error") else values
-        if name.removesuffix("_error") not in BELT_ONLY | {"origin", "level", "stiffness"}:
+        if name.removesuffix("_error") not in BELT_ONLY | {"origin", "level", "stiffness", *IMPACT_ONLY}:
             numbers[name] = (dims, values.astype(variable.dtype), variable.attributes)
     return xr.Dataset(numbers, coords, {"title": "a sweep of <b>chance</b>"})
 

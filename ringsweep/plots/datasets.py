@@ -235,8 +235,8 @@ def scene_text(ds: xr.Dataset) -> list[str]:
         value = scene.get(section, {}).get(key) if isinstance(scene.get(section), dict) else None
         if value is None or path in swept_here:
             continue
-        unit = after if isinstance(value, int | float) else ""
-        found.append(f"{before}{value}{unit}")
+        is_number = isinstance(value, int | float)
+        found.append(f"{before}{value:.4g}{after}" if is_number else f"{before}{value}")
     return found
 
 

@@ -319,10 +319,14 @@ def legend_width(handles: list[Artist]) -> float:
 
 
 def legend_above(ax: Axes, handles: list[Artist] | None = None) -> None:
-    """Put a legend in one line above the axes, to the right; by default with all that has a label."""
+    """Put a legend above the axes, to the right, in as many lines as it needs; by default with all that has a label."""
     handles = list(ax.get_legend_handles_labels()[0]) if handles is None else handles
     if handles:
-        style: dict[str, Any] = {"fontsize": SMALL, "frameon": False, "ncols": len(handles), "columnspacing": 1.2}
+        # A line, the space around it, and the label.
+        needed = sum(_length(str(handle.get_label())) + 6 for handle in handles)
+        lines = math.ceil(needed / (_LETTERS * letters(width_of(ax) - 0.5 * MARGIN)))
+        columns = math.ceil(len(handles) / lines)
+        style: dict[str, Any] = {"fontsize": SMALL, "frameon": False, "ncols": columns, "columnspacing": 1.2}
         style |= {"borderaxespad": 0.1, "borderpad": 0.1, "handlelength": 1.8}
         ax.legend(handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), **style)
 
