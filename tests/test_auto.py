@@ -11,8 +11,17 @@ from solutions import HISTORY, Fall, solve
 from ringsweep.compile import take
 from ringsweep.models import batch, parameters
 from ringsweep.models.scene import Structure
-from ringsweep.quantities.flags import FAILED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
-from ringsweep.quantities.variables import CLOSE_CALL, COARSE, NO_RESULT, NOT_ASKED
+from ringsweep.quantities.flags import (
+    CLOSE_CALL,
+    COARSE,
+    FAILED,
+    NO_RESULT,
+    NOT_ASKED,
+    OSCILLATORY,
+    RESTING,
+    REVOLVING,
+    SEPARATING,
+)
 from ringsweep.solvers import event
 from ringsweep.solvers.automaton import PATIENCE
 from ringsweep.solvers.event import Auto, Event, Implicit

@@ -21,7 +21,7 @@ from jsonschema import Draft202012Validator
 import ringsweep
 from ringsweep.config import load, read_axes, read_scene, with_values
 from ringsweep.config import scene as scenes
-from ringsweep.config.axes import _read_spacing
+from ringsweep.config.axes import read_spacing
 from ringsweep.config.schema import _number, schema
 from ringsweep.config.solver import read_solver
 from ringsweep.errors import InputError
@@ -810,8 +810,8 @@ def test_whole_parameter_refuses_a_fraction_and_is_an_integer_in_the_schema():
 
 def test_spacing_of_a_whole_parameter_must_give_whole_numbers():
     whole = Parameter("1", "seed", whole=True)
-    assert _read_spacing({"linspace": [0, 9, 4]}, whole, "axis").tolist() == [0.0, 3.0, 6.0, 9.0]
-    error = refusal(_read_spacing, {"linspace": [0, 9, 3]}, whole, "axis")
+    assert read_spacing({"linspace": [0, 9, 4]}, whole, "axis").tolist() == [0.0, 3.0, 6.0, 9.0]
+    error = refusal(read_spacing, {"linspace": [0, 9, 3]}, whole, "axis")
     assert "makes 4.5, but seed must be a whole number" in error.problem
 
 

@@ -30,7 +30,7 @@ class TestDataset:
     def test_dataset_has_a_dimension_per_path_and_all_declared_variables(self, grid):
         assert dict(grid.sizes) == {"drive_amplitude": 3, "zone_half_angle": 3}
         bounded = {f"{name}_error" for name in with_errors(Outcome._fields)}
-        assert set(grid.data_vars) == {*Outcome._fields, *bounded, "steps", "certified"}
+        assert set(grid.data_vars) == {*Outcome._fields, *bounded, "steps", "certified", "uncertified_because"}
         for name, variable in grid.data_vars.items():
             assert variable.attrs["units"] == OUTCOMES[name].units
             assert variable.dtype == OUTCOMES[name].dtype

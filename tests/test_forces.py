@@ -19,7 +19,7 @@ from ringsweep.models.belt.bristles import Mode as BristleMode
 from ringsweep.models.belt.series import Mode
 from ringsweep.models.interface import audit, implicit, series
 from ringsweep.numerics.terms import COLUMNS
-from ringsweep.physics import belt, drives
+from ringsweep.physics import belt, drives, ring
 from ringsweep.physics.forces import Forced
 from ringsweep.physics.friction import SetValued
 from ringsweep.physics.friction.velocity import BAND, KINETIC
@@ -439,21 +439,22 @@ class TestParts:
 
     def test_scene_without_the_parts_has_no_place_for_their_numbers(self):
         cells = self.cells(self.plain())
-        assert cells.cubic == cells.damper == belt.Absent()
+        assert type(cells.body) is ring.variant(belt.OnBelt, belt.OPTIONAL)
         assert type(cells.drive) is drives.Constant
 
     @pytest.mark.parametrize(
         ("swept", "part"),
-        [("damper.coefficient", "damper"), ("spring.cubic", "cubic"), ("force.constant", "drive")],
+        [
+            ("damper.coefficient", "damping"),
+            ("spring.cubic", "cubic"),
+            ("force.constant", "force"),
+            ("body.normal_stiffness", "normal_stiffness"),
+        ],
     )
     def test_swept_part_is_present_and_the_others_are_not(self, swept, part):
         cells = self.cells(self.plain(), (swept,))
-        present = {
-            "damper": cells.damper != belt.Absent(),
-            "cubic": cells.cubic != belt.Absent(),
-            "drive": isinstance(cells.drive, Forced),
-        }
-        assert [name for name, found in present.items() if found] == [part]
+        assert [name for name in belt.OPTIONAL if type(cells.body) in ring.having(belt.OnBelt, name)] == [part]
+        assert isinstance(cells.drive, Forced) == (part == "force")
 
     def test_name_of_a_number_in_a_dataset_tells_no_default(self):
         known = MODELS["belt"].parameters(load({"scene": self.plain()}).scene.structure)

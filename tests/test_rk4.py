@@ -328,7 +328,7 @@ class TestCertificate:
 class TestVerdict:
     """Status of a run after a step, from the inspections at both ends."""
 
-    VALID = Inspection((1.0, 0.0), 0.1, 1.0, 1.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0, 1.0)
+    VALID = Inspection((1.0, 0.0), 0.1, 1.0, 1.0, 1.0, 0.0, -1.0, 0.0, 0.0, (0.0, 1.0, 1.0))
 
     @pytest.mark.parametrize(
         ("change", "expected"),
@@ -346,7 +346,7 @@ class TestVerdict:
             ({"determinant": nan}, (BROKEN, 1.0)),
             ({"rates": (1.0, inf), "normal_2": -1.0}, (BROKEN, 1.0)),
             ({"rates": (1.0, nan)}, (BROKEN, 1.0)),
-            ({"omega": -inf}, (BROKEN, 1.0)),
+            ({"rates": (-inf, 0.0)}, (BROKEN, 1.0)),
         ],
     )
     def test_verdict_after_a_valid_state(self, coulomb, change, expected):

@@ -15,7 +15,7 @@ from ringsweep import InputError, statistics
 from ringsweep.cli import main
 from ringsweep.config import load
 from ringsweep.plots import probability_panel, regime_map, sensitivity_panel, survival_panel
-from ringsweep.quantities.variables import REGIMES
+from ringsweep.quantities.flags import REGIMES
 from ringsweep.statistics import (
     clopper_pearson,
     quantiles,
@@ -338,6 +338,26 @@ def test_the_file_does_not_grow_with_the_sample(tmp_path: Any) -> None:
     assert sizes[1] <= sizes[0] + 200
 
 
+def test_runs_that_are_kept_are_those_that_are_counted(tmp_path: Any) -> None:
+    given = config(grid={"friction.mu_k": [0.05, 0.1]}, keep=True, sensitivity=True, n=64)
+    given["sweep"]["sample"]["of"] = {
+        "friction.mu_s": {"over": "friction.mu_k", "uniform": [1.0, 3.0]},
+        "body.mass": {"normal": [1.0, "1 %"]},
+    }
+    ds = run(given, tmp_path / "kept.nc")
+    assert ds.first_slip.dims == ("friction_mu_k", "replicate", "sample")
+    assert ds.friction_mu_s.dims == ("friction_mu_k", "replicate", "sample")
+    own = ds.isel(sample=[k for k in range(32) if k % 4 in (0, 3)])
+    riding = ringsweep.words(own.regime) == "riding"
+    assert (riding.mean(["replicate", "sample"]) == ds.probability.sel(word="riding")).all()
+    slips = ds.friction_mu_s * 9.81 / 0.2 * ds.body_mass
+    assert ds.first_slip.values == pytest.approx(slips.where(slips < 7.0).values, nan_ok=True, rel=1e-6)
+    ringsweep.verify(tmp_path / "kept.nc")
+    again = run(tmp_path / "kept.nc", tmp_path / "again.nc")
+    assert (again.regime == ds.regime).all()
+    assert main(["info", str(tmp_path / "kept.nc")]) == 0
+
+
 def test_what_cannot_be_continued_is_told(tmp_path: Any) -> None:
     run(config(n=64), tmp_path / "few.nc")
     for changed, words in (
@@ -364,6 +384,7 @@ MISTAKES: list[tuple[dict[str, Any], str, str]] = [
     ({"replicates": 2}, "sweep.sample.replicates", "at least 4"),
     ({"method": "halton"}, "sweep.sample.method", "sobol"),
     ({"methods": "sobol"}, "sweep.sample.methods", "did you mean `method`"),
+    ({"keep": 1}, "sweep.sample.keep", "true or false"),
     ({"sensitivity": "yes"}, "sweep.sample.sensitivity", "true or false"),
     ({"of": {}}, "sweep.sample.of", "paths and distributions"),
     ({"of": [1]}, "sweep.sample.of", "paths and distributions"),

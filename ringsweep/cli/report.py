@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from ringsweep.quantities.flags import FAILED, RIDING
-from ringsweep.quantities.variables import CERTIFIED, DOUBTS, INFERRED, words
+from ringsweep.quantities.flags import CERTIFIED, FAILED, RIDING
+from ringsweep.quantities.variables import DOUBTS, INFERRED, words
 
 
 def summarise(result: xr.Dataset) -> None:

@@ -31,7 +31,7 @@ NUMBERS = {
 }
 
 #: Keys of ``sweep.sample``.
-KEYS = (*NUMBERS, "method", "of", "quantiles", "survival", "sensitivity")
+KEYS = (*NUMBERS, "method", "of", "quantiles", "survival", "sensitivity", "keep")
 
 _LEVEL = Parameter("1", "level of a quantile", lower=0, upper=1, open_lower=True, open_upper=True)
 
@@ -102,6 +102,8 @@ class Sample:
         Times at which it is asked whether the contacts still hold, s.
     sensitivity : bool
         Whether Sobol indices are asked for.
+    keep : bool
+        Whether the result holds the runs too.
     """
 
     factors: tuple[Factor, ...]
@@ -112,6 +114,7 @@ class Sample:
     quantiles: Mapping[str, tuple[float, ...]]
     survival: tuple[float, ...]
     sensitivity: bool
+    keep: bool
 
     @property
     def size(self) -> int:
@@ -151,7 +154,12 @@ class Sample:
     def identity(self) -> dict[str, str]:
         """All that determines its results, by name."""
         factors = {f"sweep.sample.of.{factor.name}": repr(factor) for factor in self.factors}
-        asked = {"quantiles": dict(self.quantiles), "survival": self.survival, "sensitivity": self.sensitivity}
+        asked = {
+            "quantiles": dict(self.quantiles),
+            "survival": self.survival,
+            "sensitivity": self.sensitivity,
+            "keep": self.keep,
+        }
         return factors | {
             "sweep.sample.method": f"{self.method}, seed {self.seed}, {self.replicates} replicates",
             "sweep.sample.n": str(self.n),
@@ -198,20 +206,26 @@ def read_sample(given: Any, scene: Scene, axes: Axes) -> Sample | None:
     if method not in METHODS:
         raise InputError("sweep.sample.method", f"{show(method)} is not a method" + suggestion(method, METHODS))
     _check_number(method, numbers["n"], numbers["replicates"])
-    sensitivity = given.get("sensitivity", False)
-    if not isinstance(sensitivity, bool):
-        raise InputError("sweep.sample.sensitivity", f"true or false is expected, got {show(sensitivity)}")
+    switches = {key: given.get(key, False) for key in ("sensitivity", "keep")}
+    for key, value in switches.items():
+        if not isinstance(value, bool):
+            raise InputError(f"sweep.sample.{key}", f"true or false is expected, got {show(value)}")
     found = Sample(
         _factors(given["of"], scene, axes),
         method=method,
         quantiles=_quantiles(given.get("quantiles"), scene),
         survival=_survival(given.get("survival"), scene),
-        sensitivity=sensitivity,
-        **numbers,
+        n=numbers["n"],
+        seed=numbers["seed"],
+        replicates=numbers["replicates"],
+        sensitivity=switches["sensitivity"],
+        keep=switches["keep"],
     )
-    runs = math.prod(axes.sizes.values()) * found.replicates
-    if runs > MAX_CELLS:
-        raise InputError("sweep", f"{runs:.3g} cells times replicates are too many: at most {MAX_CELLS:.3g} fit")
+    cells = math.prod(axes.sizes.values())
+    if cells * found.replicates > MAX_CELLS:
+        raise InputError("sweep", f"{cells} cells x {found.replicates} replicates: at most {MAX_CELLS:.3g} fit")
+    if found.keep and cells * found.n * found.rows > MAX_CELLS:
+        raise InputError("sweep.sample.keep", f"{cells * found.n * found.rows:.3g} runs: at most {MAX_CELLS:.3g} fit")
     _check_points(found, scene, axes)
     return found
 

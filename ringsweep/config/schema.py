@@ -259,6 +259,7 @@ def _sample(names: dict[str, Any]) -> dict[str, Any]:
             "quantiles": {"description": "variable -> levels", "type": "object", "additionalProperties": levels},
             "survival": {"description": "times at which it is asked whether the contacts still hold", **times},
             "sensitivity": {"description": "whether Sobol indices are computed", "type": "boolean"},
+            "keep": {"description": "whether the result holds the runs too", "type": "boolean"},
         }
     )
     return {"description": "uncertain parameters: each cell of the grid is sampled", **found, "required": ["n", "of"]}

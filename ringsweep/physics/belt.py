@@ -1,51 +1,78 @@
 """The belt: a mass on a spring, dragged by a moving belt through dry friction (the paper's Fig. 1).
 
-.. math:: m \\ddot x = -k x - k_3 x^3 - c \\dot x + P(t) - F, \\qquad v = \\dot x - v_b , \\qquad F_N = m g
+.. math:: m \\ddot x = -k x - k_3 x^3 - c \\dot x + P(t) - F, \\qquad v = \\dot x - v_b , \\qquad N = m g + k_n x
 
-F is the friction force at the sliding velocity v, or the traction of bristles times :math:`F_N`. A belt may lack the
-cubic part :math:`k_3 x^3` of the spring, the damper c and the force P.
+F is the friction force at the sliding velocity v: the friction coefficient, or the traction of bristles, times N, and
+viscous friction. A belt may lack the cubic part :math:`k_3 x^3` of the spring, the damper c, the normal stiffness
+:math:`k_n` and the force P.
+
+The body is kinematically one on a ring of radius 1 with one contact: the functions of :mod:`ringsweep.physics.ring`
+are those of its balances, with x, the given force and the velocity in place of sine, cosine and angular velocity.
 """
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from ringsweep.physics.bodies import LINE
+from ringsweep.physics.ring import body, having, radius
 from ringsweep.quantities.parameters import Leaf
 
-
-class Absent(NamedTuple):
-    """A part that a belt lacks."""
-
-
-class Cubic(NamedTuple):
-    """The cubic part of the spring: the restoring force is :math:`k x + k_3 x^3`."""
-
-    stiffness: Leaf
+#: Symbols of the parts that a body may lack. The force is the sum of the external and of the viscous force.
+OPTIONAL = "cubic", "damping", "normal_stiffness", "force"
 
 
-class Damper(NamedTuple):
-    """A damper between the body and the wall."""
-
-    coefficient: Leaf
-
-
-class Belt(NamedTuple):
-    """Belt, body, spring, friction law and drive of a cell.
-
-    The angle and the angular velocity of the drive are here the displacement, m, and the velocity, m/s, of the belt.
+@body(
+    balances=(
+        "0 = N1 - mass*gravity - normal_stiffness*x",
+        "mass*x_dd = -stiffness*x - cubic*x**3 - damping*velocity + force + K1*N1",
+    ),
+    energy="0.5*mass*velocity**2 + 0.5*stiffness*x**2 + 0.25*cubic*x**4",
+    coordinate=LINE,
+    optional=OPTIONAL,
+)
+class OnBelt(NamedTuple):
+    """Body, spring and damper.
 
     Attributes
     ----------
     mass : float
         Mass of the body, kg.
-    stiffness : float
-        Stiffness of the spring, N/m.
-    cubic : Cubic or Absent
-        Cubic part of the spring; its stiffness is in N/m^3.
-    damper : Damper or Absent
-        Damper between the body and the wall; its coefficient is in N s/m.
     gravity : float
         Acceleration of gravity, m/s^2.
+    stiffness, cubic : float
+        Stiffness of the spring, N/m, and its cubic stiffness, N/m^3.
+    damping : float
+        Coefficient of the damper between the body and the wall, N s/m.
+    normal_stiffness : float
+        Growth of the normal reaction with the displacement, N/m.
+    constants : tuple of float
+        See :func:`ringsweep.physics.ring.completed`.
+    """
+
+    mass: Leaf
+    gravity: Leaf
+    stiffness: Leaf
+    cubic: Leaf
+    damping: Leaf
+    normal_stiffness: Leaf
+    constants: tuple[Leaf, ...] = ()
+
+
+@radius.implements(*having(OnBelt, "mass"))
+def _radius(body):
+    return 1.0
+
+
+class Belt(NamedTuple):
+    """Belt, body, friction law and drive of a cell.
+
+    The angle and the angular velocity of the drive are here the displacement, m, and the velocity, m/s, of the belt.
+
+    Attributes
+    ----------
+    body : NamedTuple
+        :class:`OnBelt`, or a type that lacks some of its parts.
     mu_s, mu_k : float
         Static and kinetic friction coefficient, 1.
     viscous : float
@@ -62,11 +89,7 @@ class Belt(NamedTuple):
         Period of the forcing, s; infinite without a period.
     """
 
-    mass: Leaf
-    stiffness: Leaf
-    cubic: Any
-    damper: Any
-    gravity: Leaf
+    body: Any
     mu_s: Leaf
     mu_k: Leaf
     viscous: Leaf
@@ -78,19 +101,5 @@ class Belt(NamedTuple):
     forcing_period: Leaf
 
 
-class BristleBelt(NamedTuple):
-    """Belt with a friction law of bristles: their deflection is a third state variable. Fields as for :class:`Belt`."""
-
-    mass: Leaf
-    stiffness: Leaf
-    cubic: Any
-    damper: Any
-    gravity: Leaf
-    mu_s: Leaf
-    mu_k: Leaf
-    law: Any
-    drive: Any
-    initial_x: Leaf
-    initial_v: Leaf
-    span: Leaf
-    forcing_period: Leaf
+class BristleBelt(Belt):
+    """Belt with a friction law of bristles: their deflection is a third state variable. It has no viscous friction."""

@@ -1,29 +1,54 @@
-"""What follows from the balances of a body that moves round an axis on one contact or on two.
+"""What follows from the balances of a body that slides on one contact or on two.
 
-The balances are equations between these symbols, besides the fields of the body: ``sin_phi``, ``cos_phi``, ``omega``
-and ``phi_dd`` (angle of the body, its first and its second derivative), the normal reactions ``N1`` and ``N2``, and the
-friction ``K1`` and ``K2`` per unit of each reaction. They are linear in ``phi_dd``, ``N1`` and ``N2``; K occurs only in
-``K1*N1`` and ``K2*N2``. The last one is the balance along the motion: it has ``phi_dd``.
+The balances are equations between these symbols, besides the fields of the body: three numbers of its motion and its
+acceleration, which its :class:`Coordinate` names, the normal reactions ``N1`` and ``N2``, and the friction ``K1`` and
+``K2`` per unit of each reaction. They are linear in acceleration, ``N1`` and ``N2``; K occurs only in ``K1*N1`` and
+``K2*N2``. The last one is the balance along the motion: it has the acceleration.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any, NamedTuple
 
 from ringsweep.numerics.balances import ONE, Polynomial, Source, determinant, evaluate, read, solve, symbol
 
-_MOTION = ("sin_phi", "cos_phi", "omega")
-_UNKNOWNS = ("phi_dd", "N1", "N2", "K1", "K2")
-_BY_PHI = {"sin_phi": symbol("cos_phi"), "cos_phi": -symbol("sin_phi")}
+_CONTACTS = ("N1", "N2", "K1", "K2")
 _BY_K = {"K1": symbol("slope_1"), "K2": symbol("slope_2")}
 _FREE = {"K1": 0.0, "K2": 0.0, "slope_1": 1.0, "slope_2": 1.0}
 
-#: Products of the state and of the forces F1 and F2 to which the solution is proportional.
-_BASIS = tuple(
-    next(iter(read(text, (*_MOTION, "F1", "F2"))))
-    for text in ("1", "sin_phi", "cos_phi", "omega", "omega**2", "F1", "F2")
+
+class Coordinate(NamedTuple):
+    """The coordinate of a body, and what its balances may have of the motion.
+
+    Attributes
+    ----------
+    acceleration : str
+        Symbol of its second derivative.
+    motion : tuple of str
+        Symbols of three numbers of the motion. The last one is the first derivative of the coordinate.
+    by_place : mapping
+        Derivatives of these numbers by the coordinate; those that are missing are 0.
+    product : str
+        One product of these numbers. Balances are linear in it and in them.
+    """
+
+    acceleration: str
+    motion: tuple[str, str, str]
+    by_place: Mapping[str, Any]
+    product: str
+
+
+#: Angle of a body that moves round an axis.
+ANGLE = Coordinate(
+    "phi_dd",
+    ("sin_phi", "cos_phi", "omega"),
+    {"sin_phi": symbol("cos_phi"), "cos_phi": -symbol("sin_phi")},
+    "omega**2",
 )
+
+#: Displacement of a body along a line, on which a given force acts.
+LINE = Coordinate("x_dd", ("x", "force", "velocity"), {"x": 1.0}, "x**3")
 
 
 class Equations:
@@ -37,6 +62,9 @@ class Equations:
         Equations, two for a body with one contact and three for a body with two.
     energy : str
         Kinetic and potential energy, J.
+    coordinate : Coordinate
+    absent : collection of str
+        Symbols that are 0 in balances and energy: fields of parts that the body lacks.
 
     Raises
     ------
@@ -44,25 +72,38 @@ class Equations:
         If a balance cannot be used; the message says why.
     """
 
-    def __init__(self, fields: Sequence[str], balances: Sequence[str], energy: str):
+    def __init__(
+        self,
+        fields: Sequence[str],
+        balances: Sequence[str],
+        energy: str,
+        coordinate: Coordinate = ANGLE,
+        absent: Collection[str] = (),
+    ):
         self.texts, self.contacts = tuple(balances), len(balances) - 1
         if self.contacts not in (1, 2):
             raise ValueError(f"{len(balances)} balances: give two for one contact, or three for two contacts")
-        self.unknowns = _UNKNOWNS[: 1 + self.contacts]
-        names = {*fields, *_MOTION, *self.unknowns, *(f"K{i + 1}" for i in range(self.contacts))}
-        self.balances = [read(text, names) for text in balances]
-        self.energy = read(energy, {*fields, *_MOTION})
-        taken = {(("K1", 1), ("N1", 1)), (("K2", 1), ("N2", 1)), *(((name, 1),) for name in _UNKNOWNS[:3]), *_BASIS}
+        self.coordinate, motion, acceleration = coordinate, coordinate.motion, coordinate.acceleration
+        self.unknowns = (acceleration, "N1", "N2")[: 1 + self.contacts]
+        products = "1", *motion, coordinate.product, "F1", "F2"
+        #: Products of the motion and of the forces F1 and F2 to which the solution is proportional.
+        self.basis = [next(iter(read(text, (*motion, "F1", "F2")))) for text in products]
+        names, lacks = {*fields, *absent, *motion}, dict.fromkeys(absent, 0.0)
+        unknown = {*self.unknowns, *(f"K{i + 1}" for i in range(self.contacts))}
+        self.balances = [read(text, names | unknown).substitute(lacks) for text in balances]
+        self.energy = read(energy, names).substitute(lacks)
+        single = [((name, 1),) for name in (acceleration, "N1", "N2")]
+        taken = {(("K1", 1), ("N1", 1)), (("K2", 1), ("N2", 1)), *single, *self.basis}
         for text, balance in zip(balances, self.balances, strict=True):
-            if not set(balance.parts(_MOTION + _UNKNOWNS)) <= taken:
+            if not set(balance.parts((*motion, acceleration, *_CONTACTS))) <= taken:
                 raise ValueError(
-                    f"{text!r}: a balance is a sum of multiples of phi_dd, N1, N2, K1*N1, K2*N2, sin_phi, cos_phi, "
-                    "omega, omega**2 and 1"
+                    f"{text!r}: a balance is a sum of multiples of {acceleration}, N1, N2, K1*N1, K2*N2, "
+                    f"{', '.join(products[1:5])} and 1"
                 )
         self.numerators, self.whole = solve(self.balances, self.unknowns)
         free = sum(self.whole.substitute(_FREE).values())
         if free == 0.0:
-            raise ValueError("the balances do not determine phi_dd and the reactions")
+            raise ValueError(f"the balances do not determine {acceleration} and the reactions")
         # Without friction the determinant is positive.
         self.sign = 1.0 if free > 0.0 else -1.0
         self.numerators, self.whole = [p * self.sign for p in self.numerators], self.whole * self.sign
@@ -76,7 +117,7 @@ class Equations:
         """Body of the function of this name of :mod:`ringsweep.physics.ring`."""
         source, (moment, *normals), whole = self.source, self.numerators, self.whole
         # Such functions are seldom called, or must not use what is computed from the balances.
-        source.begin(plain=name in ("reaction_determinant", "energy", "power", "imbalance"))
+        source.begin(plain=name in ("reaction_determinant", "energy", "power", "imbalance", "size"))
         jams = whole != ONE
         values: dict[str, Any] = {
             "contact_count": lambda: [str(self.contacts)],
@@ -84,20 +125,26 @@ class Equations:
             "reactions": lambda: [source.quotient(p, whole) for p in (normals[0], normals[-1])],
             "acceleration_slope": lambda: [self._slope(moment, whole, {})],
             "friction_gain": lambda: [self._slope(moment, whole, _FREE)],
-            "acceleration_gradient": lambda: [
-                source.quotient(moment.rate(by), whole) for by in (_BY_PHI, {"omega": 1.0})
-            ],
+            "acceleration_gradient": lambda: [source.quotient(moment.rate(by), whole) for by in self._rates()],
             "free_determinant": lambda: [source.value(whole.substitute(_FREE))],
             "reaction_determinant": lambda: [f"abs({source.value(self._of_reactions())})"],
             "determinant_terms": lambda: [source.value(_in_terms(whole)) if jams else "one"],
             "slip_balance": self._slip_balance,
             "held": self._held,
+            "driven": self._driven,
+            "if_load_varies": lambda: ["yes" if jams or any(p.symbols - source.fields for p in normals) else "no"],
             "energy": lambda: [source.value(self.energy)],
             "power": lambda: [self._power()],
             "imbalance": lambda: [" + ".join(map(self._error, self.balances))],
+            "size": lambda: [" + ".join(f"abs({term})" for term in self._terms(self._forces()))],
         }
         found = values[name]()
         return [*source.lines, "return " + (found[0] if len(found) == 1 else f"({', '.join(found)})")]
+
+    def _rates(self) -> list[Mapping[str, Any]]:
+        """Rates of the motion if the coordinate changes, its derivative, and then each number that is given."""
+        by_place, *others, velocity = self.coordinate.by_place, *self.coordinate.motion
+        return [by_place, {velocity: 1.0}, *({name: 1.0} for name in others if name not in by_place)]
 
     def _slope(self, moment: Polynomial, whole: Polynomial, values: dict[str, float]) -> str:
         source = self.source
@@ -121,35 +168,52 @@ class Equations:
     def _slip_balance(self) -> list[str]:
         rows = []
         for numerator in solve(self._forced(), self.unknowns)[0]:
-            parts = (numerator * self.sign).parts((*_MOTION, "F1", "F2"))
-            factors = [self.source.quotient(parts.get(key, Polynomial()), self.whole) for key in _BASIS]
+            parts = (numerator * self.sign).parts((*self.coordinate.motion, "F1", "F2"))
+            factors = [self.source.quotient(parts.get(key, Polynomial()), self.whole) for key in self.basis]
             rows.append(f"({', '.join(factors)})")
         return [rows[0], rows[1], rows[-1]]
 
     def _held(self) -> list[str]:
         unknowns = [self.unknowns[-1], "F1", "F2"][: 1 + self.contacts]
         numerators, whole = solve([p.substitute(_FREE) for p in self._forced()], unknowns)
-        found = []
-        for p in numerators:
-            p = p.substitute({"phi_dd": symbol("epsilon"), "N1": symbol("normal")})
-            parts = p.parts((*_MOTION, "epsilon", "normal"))
-            changed = {_BASIS[0]: symbol("one"), _BASIS[4]: symbol("square")}
-            terms = (changed.get(key, Polynomial([(key, 1.0)])) * factor for key, factor in parts.items())
-            found.append(self.source.quotient(sum(terms, Polynomial()), whole))
+        values = {self.unknowns[0]: symbol("epsilon"), "N1": symbol("normal")}
+        found = [self._linear(p.substitute(values), whole) for p in numerators]
         return ["normal", *found] if self.contacts == 2 else [found[0], found[0], found[1], found[1]]
+
+    def _driven(self) -> list[str]:
+        numerators, whole = solve([p.substitute(_FREE) for p in self._forced()], self.unknowns)
+        given = dict.fromkeys(("F1", "F2", *(name for by in self._rates()[2:] for name in by)), 0.0)
+        forces = [(name, numerators[0].rate({name: 1.0})) for name in ("F1", "F2")]
+        # Forces are known last.
+        terms = [f"{self.source.quotient(factor, whole)} * {name}" for name, factor in forces if factor]
+        return [" + ".join([self._linear(numerators[0].substitute(given), whole), *terms])]
+
+    def _linear(self, p: Polynomial, whole: Polynomial) -> str:
+        """Quotient with the symbols `one` and `square` in place of 1 and of the product of the motion."""
+        parts = p.parts((*self.coordinate.motion, "epsilon", "normal", "F1", "F2"))
+        changed = {self.basis[0]: symbol("one"), self.basis[4]: symbol("square")}
+        terms = (changed.get(key, Polynomial([(key, 1.0)])) * factor for key, factor in parts.items())
+        return self.source.quotient(sum(terms, Polynomial()), whole)
+
+    def _forces(self) -> Polynomial:
+        """The last balance without friction and inertia."""
+        return self.balances[-1].substitute(dict.fromkeys((*_CONTACTS, self.unknowns[0]), 0.0))
 
     def _power(self) -> str:
         source, last = self.source, self.balances[-1]
-        rest, along = last.substitute({"phi_dd": 0.0}), last.rate({"phi_dd": 1.0})
-        by_phi, by_omega = (source.value(self.energy.rate(by)) for by in (_BY_PHI, {"omega": 1.0}))
-        return f"{by_phi} * omega + {by_omega} * {source.quotient(-rest, along)}"
+        rest, along = last.substitute({self.unknowns[0]: 0.0}), last.rate({self.unknowns[0]: 1.0})
+        by_place, by_velocity = (source.value(self.energy.rate(by)) for by in self._rates()[:2])
+        return f"{by_place} * {self.coordinate.motion[-1]} + {by_velocity} * {source.quotient(-rest, along)}"
 
     def _error(self, balance: Polynomial) -> str:
         """Square of the error of a balance, as a share of the squares of its terms."""
-        source, parts = self.source, balance.parts(_MOTION + _UNKNOWNS)
-        terms = [source.value(Polynomial([(key, 1.0)]) * factor) for key, factor in parts.items()]
+        source, terms = self.source, self._terms(balance)
         error, size = source.name(" + ".join(terms)), source.name(" + ".join(f"{term} * {term}" for term in terms))
         return f"{error} * {error} / ({size} + 1e-300)"
+
+    def _terms(self, balance: Polynomial) -> list[str]:
+        parts = balance.parts((*self.coordinate.motion, self.unknowns[0], *_CONTACTS))
+        return [self.source.value(Polynomial([(key, 1.0)]) * factor) for key, factor in parts.items()]
 
 
 def _in_terms(whole: Polynomial) -> Polynomial:

@@ -101,7 +101,7 @@ def _largest_force(drive):
 
 @hook(optional=True)
 def expand_force(drive, t, order, force, work):
-    """Taylor series of the force about time `t`; without a force nothing is filled.
+    """Taylor series of the force about time `t`; without a force it is 0.
 
     Parameters
     ----------
@@ -114,6 +114,8 @@ def expand_force(drive, t, order, force, work):
     work : ndarray of shape ``(SERIES_ROWS, order + 1)``
         Scratch.
     """
+    for k in range(order + 1):
+        force[k] = 0.0
 
 
 @expand_force.implements(Forced)

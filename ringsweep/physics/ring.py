@@ -31,13 +31,15 @@ A body is declared by :func:`body`. All that the solvers need of it follows from
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Collection
+from itertools import combinations
 from typing import Any, NamedTuple
 
 from ringsweep.compile import absorbed, function_from_lines, hook, inlined
 from ringsweep.numerics.functions import opposing
 from ringsweep.physics import drives
-from ringsweep.physics.bodies import Equations
+from ringsweep.physics.bodies import ANGLE, Coordinate, Equations
 from ringsweep.physics.friction.velocity import friction_at
 from ringsweep.physics.zones import PER_TURN, roughness
 from ringsweep.quantities.parameters import Leaf
@@ -112,6 +114,12 @@ def contact_offset(body):
     return 0.0
 
 
+@hook(optional=True)
+def radius(body):
+    """Velocity of the body at its contacts per unit of the rate of its coordinate: the radius of the race, m."""
+    return body.radius
+
+
 @hook
 def free_determinant(body):
     """Determinant of the balances without friction, kg m^2. 1 for bodies that cannot jam."""
@@ -174,7 +182,7 @@ def acceleration_gradient(body, K1, K2, sin_phi, cos_phi, omega):
     Returns
     -------
     tuple of float or Lanes
-        ``(d phi_dd/dphi, d phi_dd/domega)``, 1/s^2 and 1/s.
+        ``(d phi_dd/dphi, d phi_dd/domega)``, 1/s^2 and 1/s; and on a belt the derivative by the force, 1/kg.
     """
 
 
@@ -285,6 +293,24 @@ def held(body, one, sin_phi, cos_phi, omega, square, epsilon, normal):
 
 
 @hook
+def driven(body, one, sin_phi, cos_phi, omega, square, F1, F2):
+    """Acceleration of the body under given friction forces, rad/s^2, linear in the arguments after `body`.
+
+    Parameters
+    ----------
+    body, one, sin_phi, cos_phi, omega, square
+        As for :func:`held`.
+    F1, F2 : float
+        Friction along the race, positive in the direction of growing phi, N; on a belt with the force given there.
+    """
+
+
+@hook(absorb=True)
+def if_load_varies(body, yes, no):
+    """`yes` if a reaction depends on motion or friction, else `no`: then no contact can open."""
+
+
+@hook
 def energy(body, sin_phi, cos_phi, omega):
     """Kinetic and potential energy of the body, J. Its rate is :func:`power`.
 
@@ -323,6 +349,11 @@ def imbalance(body, K1, K2, N1, N2, phi_dd, sin_phi, cos_phi, omega):
     """
 
 
+@hook(absorb=True)
+def size(body, sin_phi, cos_phi, omega):
+    """Sum of the magnitudes of the terms of the last balance without friction and inertia, N m, or N on a belt."""
+
+
 #: Functions of a body that follow from its balances. `Equations` writes them.
 DERIVED = (
     contact_count,
@@ -336,16 +367,28 @@ DERIVED = (
     slip_balance,
     determinant_terms,
     held,
+    driven,
+    if_load_varies,
     energy,
     power,
     imbalance,
+    size,
 )
 
 #: Balances of the bodies, and what follows from them, by the type of the body.
 EQUATIONS: dict[type, Equations] = {}
 
+_VARIANTS: dict[tuple[type, frozenset[str]], type] = {}
 
-def body(*, balances: tuple[str, ...], energy: str, offset: str = "") -> Callable[[type], type]:
+
+def body(
+    *,
+    balances: tuple[str, ...],
+    energy: str,
+    offset: str = "",
+    coordinate: Coordinate = ANGLE,
+    optional: tuple[str, ...] = (),
+) -> Callable[[type], type]:
     """Declare a body: decorator of the ``NamedTuple`` of its parameters.
 
     The fields ``mass``, ``radius`` and ``gravity`` are needed for scales, and ``constants`` for :func:`completed`.
@@ -358,6 +401,11 @@ def body(*, balances: tuple[str, ...], energy: str, offset: str = "") -> Callabl
         Kinetic and potential energy, J.
     offset : str
         Field with half the angle between the contacts, rad. By default 0.
+    coordinate : Coordinate
+        By default the angle of the body. The functions in :data:`DERIVED` are documented for it. With another
+        coordinate they take its numbers in place of ``sin_phi``, ``cos_phi``, ``omega`` and ``phi_dd``.
+    optional : tuple of str
+        Symbols of parts that a body may lack, see :func:`variant`. Without them their terms cost nothing.
 
     Raises
     ------
@@ -366,18 +414,50 @@ def body(*, balances: tuple[str, ...], energy: str, offset: str = "") -> Callabl
     """
 
     def declare(cls: Any) -> Any:
-        try:
-            equations = EQUATIONS[cls] = Equations(cls._fields, balances, energy)
-        except ValueError as error:
-            raise TypeError(f"{cls.__name__}: {error}") from None
-        for function in DERIVED:
-            names = ", ".join(inspect.signature(function).parameters)
-            function.implements(cls)(function_from_lines(names, equations.lines(function.__name__), {}))
-        if offset:
-            contact_offset.implements(cls)(function_from_lines("body", [f"return body.{offset}"], {}))
+        for count in range(len(optional) + 1):
+            for absent in combinations(optional, count):
+                variant = _VARIANTS[cls, frozenset(absent)] = _without(cls, absent)
+                _derive(variant, balances, energy, coordinate, absent)
+                if offset:
+                    contact_offset.implements(variant)(function_from_lines("body", [f"return body.{offset}"], {}))
         return cls
 
     return declare
+
+
+def _without(cls: Any, absent: tuple[str, ...]) -> Any:
+    """Type of a body without some fields, under a name of its own in the module of the body."""
+    if not absent:
+        return cls
+    name, fields = "_without_".join((cls.__name__, *absent)), [field for field in cls._fields if field not in absent]
+    found: Any = NamedTuple(name, [(field, Any) for field in fields])  # type: ignore[misc]
+    found.__doc__, found.__module__ = cls.__doc__, cls.__module__
+    setattr(sys.modules[cls.__module__], name, found)
+    return found
+
+
+def _derive(cls: Any, balances: Any, energy: str, coordinate: Coordinate, absent: tuple[str, ...]) -> None:
+    """Give the functions in :data:`DERIVED` bodies for a type."""
+    try:
+        equations = EQUATIONS[cls] = Equations(cls._fields, balances, energy, coordinate, absent)
+    except ValueError as error:
+        raise TypeError(f"{cls.__name__}: {error}") from None
+    own = dict(zip((*ANGLE.motion, ANGLE.acceleration), (*coordinate.motion, coordinate.acceleration), strict=True))
+    for function in DERIVED:
+        names = list(inspect.signature(function).parameters)
+        renamed = [f"{own[name]} = {name}" for name in names if own.get(name, name) != name]
+        lines = [*renamed, *equations.lines(function.__name__)]
+        function.implements(cls)(function_from_lines(", ".join(names), lines, {}))
+
+
+def variant(cls: type, absent: Collection[str]) -> type:
+    """Type of a body that lacks some of its optional parts."""
+    return _VARIANTS[cls, frozenset(absent)]
+
+
+def having(cls: type, part: str) -> list[type]:
+    """Types of a body that do not lack an optional part."""
+    return [found for (declared, absent), found in _VARIANTS.items() if declared is cls and part not in absent]
 
 
 def completed(body: Any) -> Any:

@@ -59,7 +59,7 @@ def require_sweep(ds: xr.Dataset) -> None:
 
 
 #: Dimensions that a sampled sweep has within a cell.
-WITHIN = ("word", "parameter", "quantile", "survival_time", "replicate", "certificate", "sum")
+WITHIN = ("word", "parameter", "quantile", "survival_time", "replicate", "certificate", "sum", "sample")
 
 
 def is_sampled(ds: xr.Dataset) -> bool:

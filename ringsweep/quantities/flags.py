@@ -1,4 +1,4 @@
-"""Values of the classification of runs. They stand in machine code."""
+"""Values of the classifications of runs. Kernels and solvers use them; names and meanings are in ``variables``."""
 
 from __future__ import annotations
 
@@ -8,3 +8,7 @@ REGIMES = (
     *("sliding", "sticking", "riding"),
 )
 RESTING, OSCILLATORY, REVOLVING, SEPARATING, JAMMED, FAILED, STICK_SLIP, SLIDING, STICKING, RIDING = range(10)
+
+#: Why a cell has no certificate: flag values of `DOUBTS`.
+CERTIFIED, NOT_ASKED, NO_RESULT, ANSWERS_DIFFER, LAW_NOT_OBEYED = range(5)
+CLOSE_CALL, NOT_FINITE, SAME_STEPS, DIVERGES, COARSE = range(5, 10)

@@ -37,9 +37,7 @@ HELD, RECOVERED, OPEN, TUMBLED = range(4)
 #: Origin of a cell of a refined sweep. An audited cell was inferred, and then run.
 COMPUTED, INFERRED, AUDITED = range(3)
 
-#: Why a cell has no certificate, and what each reason says.
-CERTIFIED, NOT_ASKED, NO_RESULT, ANSWERS_DIFFER, LAW_NOT_OBEYED = range(5)
-CLOSE_CALL, NOT_FINITE, SAME_STEPS, DIVERGES, COARSE = range(5, 10)
+#: Why a cell has no certificate, in the order of the flag values, and what each reason says.
 DOUBTS = {
     "none": "the cell is certified",
     "not_asked": "certify is false",

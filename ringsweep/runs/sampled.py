@@ -16,10 +16,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsweep.config import Config, load
+from ringsweep.config import Config, load, sweepable
+from ringsweep.config.axes import dimension
 from ringsweep.config.sampling import Sample, censored
 from ringsweep.errors import InputError
-from ringsweep.models import MODELS
+from ringsweep.models import model_of
 from ringsweep.quantities.flags import REGIMES
 from ringsweep.quantities.variables import SAMPLED, Variable
 from ringsweep.runs.cells import TaskResult, compute_task
@@ -62,9 +63,11 @@ def part_layout(config: Config, grid: Layout) -> Layout:
     return Layout((*grid.sizes, replicates), (*grid.chunk, replicates))
 
 
-def bytes_of_part(config: Config) -> int:
-    """Size of the sums of a part."""
-    return sum(math.prod(shape) * np.dtype(dtype).itemsize for dtype, shape in _sums_of(_sample(config)).values())
+def bytes_of_part(config: Config, of_run: int = 200) -> int:
+    """Size of the sums of a part, and of its runs if they are kept; `of_run` is that of one run."""
+    sample = _sample(config)
+    sums = sum(math.prod(shape) * np.dtype(dtype).itemsize for dtype, shape in _sums_of(sample).values())
+    return sums + sample.keep * sample.size * sample.rows * of_run
 
 
 def _sample(config: Config) -> Sample:
@@ -112,8 +115,9 @@ class EarlierSample:
         new = _sample(config)
         if new.method == "latin-hypercube":
             raise InputError("--reuse", "the points of a larger Latin hypercube are others: use sobol or random")
-        if new.quantiles:
-            raise InputError("--reuse", "a file does not hold the numbers that quantiles need: leave quantiles out")
+        if new.quantiles or new.keep:
+            key = "keep" if new.keep else "quantiles"
+            raise InputError("--reuse", f"a file does not hold what {key} needs of each run: leave {key} out")
         netcdf.check(path)
         with netcdf.reading(path) as ds:
             if "runs" not in ds or "probability" not in ds:
@@ -165,11 +169,15 @@ def compute_parts(
             for start in range(0, len(numbers), CHUNK):
                 result = compute_task(one, of_runs, numbers[start : start + CHUNK])
                 seconds = None if result.seconds is None or seconds is None else seconds + result.seconds
-                found.append(replace(result, columns={name: result.columns[name] for name in _needed(config)}))
+                needed = list(result.columns) if sample.keep else _needed(config)
+                found.append(replace(result, columns={name: result.columns[name] for name in needed}))
             columns = {
                 name: np.concatenate([result.columns[name] for result in found]).reshape(len(some), runs)
-                for name in _needed(config)
+                for name in needed
             }
+            if sample.keep:
+                for name, column in columns.items():
+                    sums.setdefault(name, np.empty((len(positions), runs), dtype=column.dtype))[some] = column
             for k, part in enumerate(some.tolist()):
                 of_part = _reduce(sample, censored(config.scene), {name: column[k] for name, column in columns.items()})
                 for name, value in of_part.items():
@@ -258,7 +266,8 @@ def statistics(config: Config, sums: Columns) -> Columns:
         indices = sobol_indices(np.moveaxis(flat["sobol_sums"], 1, -2), sample.size)
         for name, index in zip(("sobol_first", "sobol_total"), indices, strict=True):
             found |= {f"{name}{end}": part for end, part in zip(("", "_low", "_high"), index, strict=True)}
-    return {name: column.reshape(*shape, *column.shape[1:]) for name, column in found.items()}
+    found |= {name: column for name, column in flat.items() if name not in _sums_of(sample)}
+    return {name: column.reshape((*shape, *column.shape[1:])) for name, column in found.items()}
 
 
 def _both_ways(
@@ -275,8 +284,9 @@ def _levels(sample: Sample) -> NDArray[np.float64]:
     return np.unique([level for levels in sample.quantiles.values() for level in levels])
 
 
-def coordinates(sample: Sample) -> dict[str, Any]:
-    """Coordinates of the statistics of a cell."""
+def coordinates(config: Config) -> dict[str, Any]:
+    """Coordinates of the statistics of a cell, and of its runs if they are kept."""
+    sample = _sample(config)
     found: dict[str, Any] = {
         "word": ("word", list(REGIMES), {"long_name": "regime"}),
         "replicate": ("replicate", np.arange(sample.replicates), {"long_name": "replicate of the sample"}),
@@ -288,6 +298,13 @@ def coordinates(sample: Sample) -> dict[str, Any]:
     if sample.sensitivity:
         names = [factor.name for factor in sample.factors]
         found["parameter"] = "parameter", names, {"long_name": "uncertain parameter"}
+    if sample.keep:
+        each = [sample.axes(config.scene, config.axes, sample.shares(r)).columns for r in range(sample.replicates)]
+        known = sweepable(config.scene)
+        for path in (path for factor in sample.factors for path in factor.paths):
+            dims = each[0][path][0]
+            column = np.stack([columns[path][1] for columns in each], axis=-2)
+            found[dimension(path)] = (*dims[:-1], "replicate", "sample"), column, known[path].attributes
     return found
 
 
@@ -301,7 +318,7 @@ def variables(config: Config) -> dict[str, tuple[tuple[str, ...], Variable]]:
     if sample.survival:
         found["lost"] = ("replicate", "survival_time", "certificate"), SAMPLED["lost"]
         found |= {name: (("survival_time",), one) for name, one in SAMPLED.items() if name.startswith("survival")}
-    known = MODELS[config.scene.structure.model].variables
+    known = model_of(config.scene.structure).variables
     for name in sample.quantiles:
         for end, of in {"": "quantile", "_low": "lower end of a quantile", "_high": "upper end of a quantile"}.items():
             about = f"{of}: {known[name].long_name}"
@@ -311,6 +328,8 @@ def variables(config: Config) -> dict[str, tuple[tuple[str, ...], Variable]]:
         for name, one in SAMPLED.items():
             if name.startswith(("sobol_first", "sobol_total")):
                 found[name] = ("word", "parameter"), one
+    if sample.keep:
+        found |= {name: (("replicate", "sample"), one) for name, one in known.items() if name not in found}
     return found
 
 

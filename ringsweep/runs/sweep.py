@@ -600,7 +600,7 @@ def _frame(config: Config, found: Refined | None) -> xr.Dataset:
     """Coordinates and attributes of the dataset of a sweep."""
     refinement = {} if found is None or config.refine is None else refinement_attributes(config.refine, found)
     known = sweepable(config.scene)
-    sample = {} if config.sample is None else sampled.coordinates(config.sample)
+    sample = {} if config.sample is None else sampled.coordinates(config)
     about = {} if config.sample is None else sampled.attributes(config)
     return xr.Dataset(
         coords={

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from ringsweep.config import Config
 from ringsweep.models import batch
-from ringsweep.physics.belt import Damper
 from ringsweep.physics.drives import Constant
 from ringsweep.quantities.flags import FAILED, REGIMES, RIDING
 from ringsweep.quantities.variables import INFERRED
@@ -190,9 +189,9 @@ def _spans_of_first_slip(config: Config, cells: NDArray[np.intp] | None) -> NDAr
         if isinstance(body.drive, Constant):
             velocity = body.drive.amplitude
             with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-                load = body.mu_s * body.mass * body.gravity
-                if isinstance(body.damper, Damper):
-                    load = load - body.damper.coefficient * np.abs(velocity)
-                holds = load / body.stiffness - np.sign(velocity) * body.initial_x
-                spans[own] = np.where(velocity * body.stiffness != 0.0, holds / np.abs(velocity), np.inf)
+                parts, ahead = body.body, np.sign(velocity)
+                load = body.mu_s * parts.mass * parts.gravity - getattr(parts, "damping", 0.0) * np.abs(velocity)
+                stiffness = parts.stiffness - ahead * body.mu_s * getattr(parts, "normal_stiffness", 0.0)
+                holds = load / stiffness - ahead * body.initial_x
+                spans[own] = np.where((velocity != 0.0) & (stiffness > 0.0), holds / np.abs(velocity), np.inf)
     return spans

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.models.interface.audit import undecided
-from ringsweep.quantities.flags import FAILED
-from ringsweep.quantities.variables import ANSWERS_DIFFER, CERTIFIED, CLOSE_CALL, NO_RESULT, NOT_FINITE, OUTCOMES
+from ringsweep.quantities.flags import ANSWERS_DIFFER, CERTIFIED, CLOSE_CALL, FAILED, NO_RESULT, NOT_FINITE
+from ringsweep.quantities.variables import OUTCOMES
 
 #: Outcomes on which two resolutions must agree for a certificate.
 _CERTIFIED = ("regime", "motion", "separating_contact", "aftermath", "word")

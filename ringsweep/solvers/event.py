@@ -16,9 +16,8 @@ from ringsweep.models.scene import Structure
 from ringsweep.numerics.series import ORDER
 from ringsweep.physics import drives
 from ringsweep.physics.friction import LAWS, Dynamic, SetValued, Smooth, family_of, presliding
-from ringsweep.quantities.flags import FAILED
+from ringsweep.quantities.flags import CERTIFIED, DIVERGES, FAILED, LAW_NOT_OBEYED, NO_RESULT, NOT_ASKED, SAME_STEPS
 from ringsweep.quantities.parameters import Parameter
-from ringsweep.quantities.variables import CERTIFIED, DIVERGES, LAW_NOT_OBEYED, NO_RESULT, NOT_ASKED, SAME_STEPS
 from ringsweep.solvers.automaton import FACTOR, PATIENCE, History, LocalErrors, Results, integrate
 from ringsweep.solvers.certificate import apart, diverging, doubts, errors, first_of, took_same_steps, with_errors
 from ringsweep.solvers.method import Method, Needs, Result

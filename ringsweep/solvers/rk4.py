@@ -25,9 +25,8 @@ from ringsweep.numerics.memory import align_stack, conform, read, read_lanes, si
 from ringsweep.physics import drives
 from ringsweep.physics.drives import lookup, shape_numbers, table_row, turn, without_shape
 from ringsweep.physics.friction import TRAITS, Dynamic, family_of, presliding
-from ringsweep.quantities.flags import FAILED, SEPARATING
+from ringsweep.quantities.flags import CERTIFIED, COARSE, DIVERGES, FAILED, NO_RESULT, NOT_ASKED, SEPARATING
 from ringsweep.quantities.parameters import Parameter
-from ringsweep.quantities.variables import CERTIFIED, COARSE, DIVERGES, NO_RESULT, NOT_ASKED
 from ringsweep.solvers.certificate import apart, doubts, errors, first_of, with_errors
 from ringsweep.solvers.method import Method, Needs, Result
 

@@ -253,7 +253,7 @@ class Checkpoint:
                         part
                     ]
             shape = [s.stop - s.start for s in region]
-            chunk = {name: column.reshape(*shape, *column.shape[1:]) for name, column in chunk.items()}
+            chunk = {name: column.reshape((*shape, *column.shape[1:])) for name, column in chunk.items()}
             known = complete is not None and complete(region, missing.reshape(shape), chunk)
             if missing.any() and not known:
                 raise DamagedTask(f"{missing.sum()} cells are in no task file of {self.folder}")

@@ -437,6 +437,9 @@ def _check_attributes(ds: xr.Dataset) -> None:
 def _encoding(variable: xr.Variable) -> dict[str, Any]:
     # With a fill value xarray would read integers as floats.
     encoding: dict[str, Any] = {"_FillValue": None}
+    if variable.dtype.kind == "U" and "path" not in variable.attrs:
+        # Characters: the library can crash if some handles of a file read its texts of variable length and others not.
+        encoding["dtype"] = "S1"
     if variable.dtype.kind in "iuf" and variable.size >= COMPRESSED_FROM:
         encoding |= {"zlib": True, "complevel": 1, "fletcher32": True}
     return encoding

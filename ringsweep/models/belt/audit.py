@@ -2,29 +2,20 @@
 
 from __future__ import annotations
 
-from math import inf
-
 import numpy as np
 
-from ringsweep.models.belt.bristles import contact_force
-from ringsweep.models.belt.force import (
-    damping,
-    friction_force,
-    holds_in_band,
-    length_scale,
-    pull,
-    speed_scale,
-    stuck_pull,
-    with_cubic_energy,
-    with_loads,
-    with_sizes,
-)
+from ringsweep.compile import inlined
+from ringsweep.models.belt.bristles import contact
+from ringsweep.models.belt.force import breakaway_force, length_scale, sliding, sliding_slopes, speed_scale
 from ringsweep.models.belt.record import Outcome
 from ringsweep.models.interface import audit, implicit
+from ringsweep.models.sliding import larger, of_balances
+from ringsweep.physics import ring
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.forces import force_in
+from ringsweep.physics.friction.registry import holds_in_band
 from ringsweep.physics.friction.velocity import stiction_band
-from ringsweep.quantities.flags import OSCILLATORY
+from ringsweep.quantities.flags import OSCILLATORY, SEPARATING
 
 # An oscillation is certain if the two runs of a cell differ by less than this share of its swing.
 _SMALLEST_SHARE = 0.1
@@ -40,75 +31,93 @@ _SMALLEST_SWING = 1e-2
 _ROUNDING = 1e-12
 
 
+# A separation is certain if the reaction needs more time to rise again than this multiple of the error of the instant.
+_FALL_FACTOR = 5.0
+
+
 @audit.violation.implements(Belt)
 def _violation(scene, mode, forcing, y, rates, s, tolerance):
     x, v = y
-    belt_velocity, belt_acceleration, push = forcing[1], forcing[2], force_in(scene.drive, forcing)
-    velocity, cube = v + belt_velocity, x * x * x
-    stiffness_per_mass, load = scene.stiffness / scene.mass, scene.mass * scene.gravity
-    length = abs(x) + length_scale(scene, abs(velocity) + abs(belt_velocity))
-    speed = speed_scale(scene, length)
-    # In a dead band the sliding velocity need not have the direction of the force.
-    in_dead_band, largest, relaxation = holds_in_band(scene.law) and mode.region < 0, 0.0, 0.0
+    body, velocity, push = scene.body, v + forcing[1], force_in(scene.drive, forcing)
+    length = abs(x) + length_scale(scene, abs(velocity) + abs(forcing[1]))
+    speed, largest, relaxation = speed_scale(scene, length), 0.0, 0.0
     if mode.sign == 0:
-        friction = stuck_pull(scene, x, v, forcing)
-        sizes = load + scene.stiffness * length + scene.mass * abs(belt_acceleration)
-        allowed = tolerance * with_sizes(scene, sizes, 1.0, velocity, length * length * length, push) + 1e-300
-        largest = (abs(friction) - scene.mu_s * load) / allowed
+        at = x, push, velocity
+        normal, _, friction, _ = ring.held(body, 1.0, *at, x * x * x, forcing[2], 0.0)
+        K = friction / normal if normal != 0.0 else 0.0
+        sizes = ring.size(body, length, push, velocity) + body.mass * (body.gravity + abs(forcing[2]))
+        largest = (abs(friction) - breakaway_force(scene, x)) / (tolerance * sizes + 1e-300)
     else:
-        friction, slope = friction_force(scene, pull(scene, x, velocity, forcing), v)
-        relaxation = abs(damping(scene, slope)) / scene.mass
-        if not in_dead_band:
+        K, slope, viscous, at = sliding(scene, x, velocity, v, forcing)
+        relaxation = abs(sliding_slopes(scene, K, slope, viscous, at)[1])
+        # In a dead band the sliding velocity need not have the direction of the force.
+        if not (holds_in_band(scene.law) and mode.region < 0):
             if mode.region < 0:
                 speed = min(speed, 1e3 * stiction_band(scene.law))
             largest = -mode.sign * v / (tolerance * speed)
-    per_mass = 1.0 / scene.mass
-    terms = stiffness_per_mass * abs(x) + abs(friction) / scene.mass + abs(belt_acceleration)
-    terms = with_sizes(scene, terms, per_mass, velocity, cube, push)
-    balance = -stiffness_per_mass * x - friction / scene.mass - belt_acceleration - rates[1]
-    imbalance = abs(with_loads(scene, balance, per_mass, velocity, cube, push))
-    imbalance = imbalance / ((1.0 / s + relaxation) * tolerance * speed + _ROUNDING * terms)
-    power = with_loads(scene, -friction * velocity, velocity, velocity, 0.0, push)
-    return (max(largest, imbalance) if largest + imbalance < inf else inf), power
+    scales = (1.0 / s + relaxation) * tolerance * speed, _terms(body, at, forcing), tolerance
+    violation, power = of_balances(scene, (K, K), ring.reactions(body, K, K, *at), at, forcing, rates[1], scales)
+    return larger(largest, violation), power
+
+
+@inlined
+def _terms(body, at, forcing):
+    """Size of the terms of the acceleration, m/s^2."""
+    return body.gravity + ring.size(body, *at) / body.mass + abs(forcing[2]) + 1e-200
 
 
 @audit.energy.implements(Belt, BristleBelt)
 def _energy(scene, forcing, y):
-    x, velocity = y[0], y[1] + forcing[1]
-    found = 0.5 * (scene.mass * velocity * velocity + scene.stiffness * x * x)
-    return with_cubic_energy(scene, found, x)
+    return ring.energy(scene.body, y[0], 0.0, y[1] + forcing[1])
 
 
 @audit.violation.implements(BristleBelt)
 def _bristle_violation(scene, mode, forcing, y, rates, s, tolerance):
     x, v, z = y
-    belt_velocity, belt_acceleration, push = forcing[1], forcing[2], force_in(scene.drive, forcing)
-    velocity, cube, per_mass = v + belt_velocity, x * x * x, 1.0 / scene.mass
-    rate, rate_v, rate_z, friction, by_v, by_z = contact_force(scene, v, z, 1.0 if v >= 0.0 else -1.0, mode.region)
+    at = x, force_in(scene.drive, forcing), v + forcing[1]
+    rate, rate_v, rate_z, K, slope_v, slope_z = contact(scene, v, z, 1.0 if v >= 0.0 else -1.0, mode.region)
     _, speed, deflection, _ = implicit.error_scales(scene, implicit.IMPLICIT_TOLERANCE * tolerance, y)
-    stiffness_per_mass = scene.stiffness / scene.mass
-    terms = stiffness_per_mass * abs(x) + abs(friction) / scene.mass + abs(belt_acceleration)
-    terms = with_sizes(scene, terms, per_mass, velocity, cube, push)
-    allowed = speed / s + (abs(damping(scene, by_v)) * speed + abs(by_z) * deflection) / scene.mass + _ROUNDING * terms
-    balance = -stiffness_per_mass * x - friction / scene.mass - belt_acceleration - rates[1]
-    imbalance = abs(with_loads(scene, balance, per_mass, velocity, cube, push)) / allowed
+    by_v = sliding_slopes(scene, K, slope_v, 0.0, at)[1]
+    by_z = ring.acceleration_slope(scene.body, K, K, slope_z, slope_z, *at)
+    scales = speed / s + abs(by_v) * speed + abs(by_z) * deflection, _terms(scene.body, at, forcing), tolerance
+    normals = ring.reactions(scene.body, K, K, *at)
+    largest, power = of_balances(scene, (K, K), normals, at, forcing, rates[1], scales)
     allowed = (1.0 / s + abs(rate_z)) * deflection + abs(rate_v) * speed + _ROUNDING * abs(v)
-    imbalance = max(imbalance, abs(rate - rates[2]) / allowed)
-    power = with_loads(scene, -friction * velocity, velocity, velocity, 0.0, push)
-    return (max(-mode.sign * v / speed, imbalance) if imbalance < inf else inf), power
+    return larger(larger(largest, abs(rate - rates[2]) / allowed), -mode.sign * v / speed), power
 
 
 @audit.undecided.implements(Belt, BristleBelt)
 def _undecided(batch, rows, second_rows, fall_rates):
-    """Around steady sliding the errors of the steps look like an oscillation, in both runs."""
     one, other = Outcome(*rows.T), Outcome(*second_rows.T)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        pace = np.where(batch.stiffness > 0.0, np.sqrt(batch.mass / batch.stiffness), 0.0)
-        apart = np.maximum(np.abs(one.x_end - other.x_end), np.abs(one.swing - other.swing))
-        apart = np.fmax(apart, np.abs(one.velocity_end - other.velocity_end) * pace)
-        swing = np.minimum(one.swing, other.swing)
-        swings = (apart <= _SMALLEST_SHARE * swing) | (swing > _SMALLEST_SWING * (one.x_max - one.x_min))
-        return (one.regime == OSCILLATORY) & ~swings
+        return _sliding_or_swing(batch, one, other) | _may_hold(batch.body, one, other, fall_rates)
+
+
+def _sliding_or_swing(batch, one, other):
+    """Around steady sliding the errors of the steps look like an oscillation, in both runs."""
+    stiffness = batch.body.stiffness
+    pace = np.where(stiffness > 0.0, np.sqrt(batch.body.mass / stiffness), 0.0)
+    apart = np.maximum(np.abs(one.x_end - other.x_end), np.abs(one.swing - other.swing))
+    apart = np.fmax(apart, np.abs(one.velocity_end - other.velocity_end) * pace)
+    swing = np.minimum(one.swing, other.swing)
+    swings = (apart <= _SMALLEST_SHARE * swing) | (swing > _SMALLEST_SWING * (one.x_max - one.x_min))
+    return (one.regime == OSCILLATORY) & ~swings
+
+
+def _may_hold(body, one, other, fall_rates):
+    """Whether the error could undo a separation, or add one."""
+    if not ring.if_load_varies(body, True, False):
+        return np.zeros(len(fall_rates), dtype=bool)
+    growth = body.normal_stiffness
+    least, second = (
+        body.mass * body.gravity + np.minimum(growth * found.x_min, growth * found.x_max) for found in (one, other)
+    )
+    separated = one.regime == SEPARATING
+    # The acceleration is at most about that of the spring and of the load where the reaction vanishes.
+    far = np.maximum(np.abs(one.x_min), np.abs(one.x_max))
+    curvature = np.abs(growth) * (body.gravity + (body.stiffness + np.abs(growth)) / body.mass * far)
+    slow = _FALL_FACTOR * np.abs(one.t_end - other.t_end) * curvature > fall_rates
+    return np.where(separated, (one.t_end > 0.0) & slow, least <= 2.0 * np.abs(least - second))
 
 
 @audit.same_statistics.implements(Belt, BristleBelt)

@@ -10,39 +10,26 @@ from math import sqrt
 from typing import NamedTuple
 
 from ringsweep.compile import absorbed, inlined
-from ringsweep.models.belt.force import (
-    acceleration,
-    bend,
-    damping,
-    net_force,
-    steepest_spring,
-    with_load_derivatives,
-    with_loads,
-)
+from ringsweep.models.belt.creep import view
+from ringsweep.models.belt.force import sliding_slopes
 from ringsweep.models.belt.record import begin
 from ringsweep.models.interface import constant_step, implicit, modes, recorder
-from ringsweep.models.interface.status import RUNNING
+from ringsweep.models.interface.status import RUNNING, SEPARATED_1
 from ringsweep.models.parts import larger_eigenvalue
 from ringsweep.numerics.functions import any_of, select
-from ringsweep.physics import drives
+from ringsweep.numerics.memory import select_all
+from ringsweep.physics import drives, ring
 from ringsweep.physics.belt import BristleBelt
-from ringsweep.physics.forces import force_in
+from ringsweep.physics.forces import force_in, force_rate
 from ringsweep.physics.friction.bristles import after_yield, bristle, initial_deflection, region_guard, stick_speed
 from ringsweep.physics.friction.velocity import BAND, KINETIC
 
 
 @absorbed
-def contact_force(scene, v, z, sign, region):
-    """Rate of the deflection (m/s) and its derivatives by v and z; friction force (N) and its derivatives."""
+def contact(scene, v, z, sign, region):
+    """Rate of the deflection (m/s) and its derivatives by v and z; friction K and its derivatives (s/m, 1/m)."""
     rate, rate_v, rate_z, traction, by_v, by_z = bristle(scene.law, scene.mu_s, scene.mu_k, v, z, sign, region)
-    load = scene.mass * scene.gravity
-    return rate, rate_v, rate_z, load * traction, load * by_v, load * by_z
-
-
-@inlined
-def _region(scene, v, z, sign):
-    """BAND if the contact counts as stuck, KINETIC if it slips."""
-    return BAND if _in_band(scene, v, z, sign) else KINETIC
+    return rate, rate_v, rate_z, -traction, -by_v, -by_z
 
 
 @absorbed
@@ -52,26 +39,19 @@ def _in_band(scene, v, z, sign):
 
 
 @absorbed
-def _force_in_region(scene, v, z):
-    """Whether the contact counts as stuck, and :func:`contact_force` in its region, for floats and Lanes."""
+def _contact_in_region(scene, v, z):
+    """Whether the contact counts as stuck, and :func:`contact` in its region, for floats and Lanes."""
     sign = select(v >= 0.0, 1.0, -1.0)
     stuck = _in_band(scene, v, z, sign)
-    a = contact_force(scene, v, z, sign, BAND)
-    b = contact_force(scene, v, z, sign, KINETIC)
-    return stuck, (
-        select(stuck, a[0], b[0]),
-        select(stuck, a[1], b[1]),
-        select(stuck, a[2], b[2]),
-        select(stuck, a[3], b[3]),
-        select(stuck, a[4], b[4]),
-        select(stuck, a[5], b[5]),
-    )
+    a = contact(scene, v, z, sign, BAND)
+    b = contact(scene, v, z, sign, KINETIC)
+    return stuck, select_all(stuck, a, b)
 
 
 @inlined
 def _recoil_speed(scene):
     """Speed of a body that bristles drive back from their largest deflection, m/s."""
-    return scene.mu_s * sqrt(scene.gravity / scene.law.sigma0)
+    return scene.mu_s * sqrt(scene.body.gravity / scene.law.sigma0)
 
 
 @inlined
@@ -87,9 +67,13 @@ class Inspection(NamedTuple):
     ----------
     rates : tuple of float
         Time derivative of the state.
+    normal_1, normal_2 : float
+        Normal reaction, N.
+    determinant : float
+        1: the body cannot jam.
     force : float
         Friction force, N.
-    trace, determinant : float
+    trace, product : float
         Trace, 1/s, and determinant, 1/s^2, of the linearised contact.
     stuck : float
         1 if the contact counts as stuck, else 0.
@@ -98,9 +82,12 @@ class Inspection(NamedTuple):
     """
 
     rates: tuple[float, float, float]
+    normal_1: float
+    normal_2: float
+    determinant: float
     force: float
     trace: float
-    determinant: float
+    product: float
     stuck: float
     place: float
     v: float
@@ -114,28 +101,39 @@ def _initial_state_in_space(scene):
 
 @constant_step.rates.implements(BristleBelt)
 def _rates(scene, now, y, forcing):
-    _, (rate, _, _, force, _, _) = _force_in_region(scene, y[1] - forcing[1], y[2])
-    return y[1], acceleration(scene, y[0], y[1], forcing, force), rate
+    _, (rate, _, _, K, _, _) = _contact_in_region(scene, y[1] - forcing[1], y[2])
+    at = y[0], force_in(scene.drive, forcing), y[1]
+    return y[1], ring.acceleration(scene.body, K, K, *at)[0], rate
 
 
 @constant_step.inspect.implements(BristleBelt)
 def _inspect(scene, y, forcing):
-    v = y[1] - forcing[1]
-    stuck, (rate, rate_v, rate_z, force, by_v, by_z) = _force_in_region(scene, v, y[2])
-    per_mass = 1.0 / scene.mass
-    stiffness = steepest_spring(scene.cubic, scene.stiffness, bend(scene.cubic, y[0]), bend(scene.cubic, y[0]))
-    by_v = damping(scene, by_v)
-    determinant = (stiffness + by_z * rate_v - by_v * rate_z) * per_mass
-    rates = y[1], acceleration(scene, y[0], y[1], forcing, force), rate
-    place = y[0] - forcing[0]
-    return Inspection(rates, force, rate_z - by_v * per_mass, determinant, select(stuck, 1.0, 0.0), place, v)
+    body, v = scene.body, y[1] - forcing[1]
+    at = y[0], force_in(scene.drive, forcing), y[1]
+    stuck, (rate, rate_v, rate_z, K, slope_v, slope_z) = _contact_in_region(scene, v, y[2])
+    acceleration, determinant = ring.acceleration(body, K, K, *at)
+    normal, _ = ring.reactions(body, K, K, *at)
+    by_place, by_v, _, _ = sliding_slopes(scene, K, slope_v, 0.0, at)
+    by_z = ring.acceleration_slope(body, K, K, slope_z, slope_z, *at)
+    return Inspection(
+        (y[1], acceleration, rate),
+        normal,
+        normal,
+        determinant,
+        -K * normal,
+        rate_z + by_v,
+        by_v * rate_z - by_z * rate_v - by_place,
+        select(stuck, 1.0, 0.0),
+        y[0] - forcing[0],
+        v,
+    )
 
 
 @constant_step.eigenvalue.implements(BristleBelt)
 def _eigenvalue(scene, before, now, h, most):
     if any_of(most == 0.0):
-        most = larger_eigenvalue(most, before.trace, before.determinant)
-    return larger_eigenvalue(most, now.trace, now.determinant)
+        most = larger_eigenvalue(most, before.trace, before.product)
+    return larger_eigenvalue(most, now.trace, now.product)
 
 
 @constant_step.sticks.implements(BristleBelt)
@@ -152,10 +150,6 @@ def _begin(scene, t, seen):
 def _row(scene, y, forcing):
     now = constant_step.inspect(scene, y, forcing)
     return y[0], y[1], now.force, y[2], 0.0 if now.stuck > 0.0 else 1.0 if y[1] > forcing[1] else -1.0
-
-
-# Indices of the guards.
-SLOW, FAST = range(2)
 
 
 class Mode(NamedTuple):
@@ -176,42 +170,53 @@ def _initial_state(scene):
 def _initial_mode(scene, t, y):
     x, v, z = y
     sign = 1 if v > 0.0 else -1
+    _, _, _, K, _, _ = contact(scene, v, z, 1.0, BAND)
+    forcing = drives.turn(scene.drive, t)
+    at = x, force_in(scene.drive, forcing), v + forcing[1]
     if v == 0.0:
         # The body begins to slide in the direction of the net force; without a net force the belt leaves it behind.
-        _, _, _, force, _, _ = contact_force(scene, v, z, 1.0, BAND)
-        forcing = drives.turn(scene.drive, t)
-        total = -scene.stiffness * x - force - scene.mass * forcing[2]
-        push = force_in(scene.drive, forcing)
-        sign = 1 if with_loads(scene, total, 1.0, forcing[1], x * x * x, push) > 0.0 else -1
-    return RUNNING, Mode(sign, _region(scene, v, z, float(sign)))
+        sign = 1 if ring.acceleration(scene.body, K, K, *at)[0] > forcing[2] else -1
+    mode = Mode(sign, BAND if _in_band(scene, v, z, float(sign)) else KINETIC)
+    opens = ring.if_load_varies(scene.body, True, False) and ring.reactions(scene.body, K, K, *at)[0] <= 0.0
+    return (SEPARATED_1 if opens else RUNNING), mode
 
 
 @modes.switch.implements(BristleBelt)
 def _switch(scene, mode, guard, t, y):
     x, v, z = y
-    if guard == SLOW:
+    # The order is that of `all_guards`.
+    after_normal = ring.if_load_varies(scene.body, guard - 1, guard)
+    if after_normal < 0:
+        return SEPARATED_1, mode, y
+    if after_normal == 0:
         return RUNNING, Mode(-mode.sign, BAND), (x, 0.0, z)
     z, region = after_yield(scene.law, scene.mu_s, scene.mu_k, z, float(mode.sign), mode.region)
     return RUNNING, Mode(mode.sign, region), (x, v, z)
 
 
+@absorbed
+def _in_step(scene, mode, forcing, x):
+    """Numbers of the motion, and what :func:`contact` returns."""
+    at = x[0], force_in(scene.drive, forcing), x[1] + forcing[1]
+    return at, contact(scene, x[1], x[2], float(mode.sign), mode.region)
+
+
 @implicit.rates.implements(BristleBelt)
 def _implicit_rates(scene, mode, common, forcing, x):
-    rate, _, _, force, _, _ = contact_force(scene, x[1], x[2], float(mode.sign), mode.region)
-    velocity = x[1] + forcing[1]
-    return velocity, net_force(scene, x[0], velocity, forcing, force) / scene.mass - forcing[2], rate
+    at, (rate, _, _, K, _, _) = _in_step(scene, mode, forcing, x)
+    return at[2], ring.acceleration(scene.body, K, K, *at)[0] - forcing[2], rate
 
 
 @implicit.linearise.implements(BristleBelt)
 def _linearise(scene, mode, common, t, forcing, x):
-    rate, rate_v, rate_z, force, by_v, by_z = contact_force(scene, x[1], x[2], float(mode.sign), mode.region)
-    velocity = x[1] + forcing[1]
-    derivatives = -scene.stiffness / scene.mass, -by_v / scene.mass, -drives.jerk(scene.drive, t)
-    by_place, by_velocity, by_time = with_load_derivatives(scene, derivatives, x[0], 0.0, forcing)
+    at, (rate, rate_v, rate_z, K, slope_v, slope_z) = _in_step(scene, mode, forcing, x)
+    by_place, by_v, by_velocity, by_force = sliding_slopes(scene, K, slope_v, 0.0, at)
+    by_z = ring.acceleration_slope(scene.body, K, K, slope_z, slope_z, *at)
+    by_time = by_velocity * forcing[2] + by_force * force_rate(scene.drive, forcing) - drives.jerk(scene.drive, t)
     return (
-        (velocity, net_force(scene, x[0], velocity, forcing, force) / scene.mass - forcing[2], rate),
-        (0.0, 1.0, by_place, by_velocity),
-        ((-by_z / scene.mass, rate_v, rate_z),),
+        (at[2], ring.acceleration(scene.body, K, K, *at)[0] - forcing[2], rate),
+        (0.0, 1.0, by_place, by_v),
+        ((by_z, rate_v, rate_z),),
         (forcing[2], by_time, 0.0),
     )
 
@@ -223,17 +228,16 @@ def _error_scales(scene, tolerance, x):
         tolerance * (abs(x[0]) + deflection),
         tolerance * (abs(x[1]) + _recoil_speed(scene)),
         tolerance * deflection,
-        tolerance * scene.mu_s * scene.gravity,
+        tolerance * scene.mu_s * scene.body.gravity,
     )
 
 
 @implicit.guards_and_motion.implements(BristleBelt)
 def _guards_and_motion(scene, mode, common, forcing, x):
-    sign, velocity = float(mode.sign), x[1] + forcing[1]
-    _, _, _, force, _, _ = contact_force(scene, x[1], x[2], sign, mode.region)
-    guards = sign * x[1], region_guard(scene.law, scene.mu_s, scene.mu_k, x[1], x[2], sign, mode.region)
-    acceleration = net_force(scene, x[0], velocity, forcing, force) / scene.mass
-    return guards, (x[0], velocity, acceleration, force, x[0] - forcing[0], x[1], forcing[2])
+    sign = float(mode.sign)
+    at, (_, _, _, K, _, _) = _in_step(scene, mode, forcing, x)
+    fast = region_guard(scene.law, scene.mu_s, scene.mu_k, x[1], x[2], sign, mode.region)
+    return view(scene, forcing, x, x[0] - forcing[0], (K, 0.0), at, (sign * x[1], fast))
 
 
 @implicit.row.implements(BristleBelt)

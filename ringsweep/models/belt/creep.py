@@ -2,36 +2,18 @@
 
 from __future__ import annotations
 
-from ringsweep.models.belt.force import (
-    friction_force,
-    length_scale,
-    located,
-    net_force,
-    pull,
-    with_load_derivatives,
-    with_loads,
-)
+from ringsweep.compile import absorbed, inlined
+from ringsweep.models.belt.force import length_scale, located, sliding, sliding_slopes
 from ringsweep.models.interface import implicit
-from ringsweep.physics import belt, drives
-from ringsweep.physics.forces import force_in
+from ringsweep.physics import belt, drives, ring
+from ringsweep.physics.forces import force_rate
 from ringsweep.physics.friction.velocity import region_bounds, stiction_band
-
-
-# The place is relative to the drive, so that no large numbers cancel in slow creep.
-@implicit.to_implicit.implements(belt.Belt)
-def _to_implicit(scene, forcing, y):
-    return y[0] - forcing[0], y[1]
-
-
-@implicit.from_implicit.implements(belt.Belt)
-def _from_implicit(scene, forcing, x):
-    return x[0] + forcing[0], x[1]
 
 
 @implicit.is_stiff.implements(belt.Belt)
 def _is_stiff(scene, mode, y, linear):
     (_, acceleration), (_, _, _, decay), _, _ = linear
-    natural_frequency = (scene.stiffness / scene.mass) ** 0.5
+    natural_frequency = (scene.body.stiffness / scene.body.mass) ** 0.5
     return -decay > 50.0 * natural_frequency and abs(acceleration) < 0.01 * -decay * stiction_band(scene.law)
 
 
@@ -41,42 +23,52 @@ def _error_scales(scene, tolerance, x):
     return tolerance * length, tolerance * stiction_band(scene.law)
 
 
+@absorbed
+def _in_step(scene, forcing, x):
+    """What :func:`sliding` returns for the state of an implicit step."""
+    return sliding(scene, x[0] + forcing[0], x[1] + forcing[1], x[1], forcing)
+
+
 @implicit.rates.implements(belt.Belt)
 def _rates(scene, mode, common, forcing, x):
-    place, velocity = x[0] + forcing[0], x[1] + forcing[1]
-    friction, _ = friction_force(scene, pull(scene, place, velocity, forcing), x[1])
-    return x[1], net_force(scene, place, velocity, forcing, friction) / scene.mass - forcing[2]
+    K, _, _, at = _in_step(scene, forcing, x)
+    return x[1], ring.acceleration(scene.body, K, K, *at)[0] - forcing[2]
 
 
 @implicit.linearise.implements(belt.Belt)
 def _linearise(scene, mode, common, t, forcing, x):
-    place, velocity, belt_velocity = x[0] + forcing[0], x[1] + forcing[1], forcing[1]
-    friction, slope = friction_force(scene, pull(scene, place, velocity, forcing), x[1])
-    stiffness_per_mass = scene.stiffness / scene.mass
-    acceleration = -stiffness_per_mass * place - friction / scene.mass
-    cube, push = place * place * place, force_in(scene.drive, forcing)
-    acceleration = with_loads(scene, acceleration, 1.0 / scene.mass, velocity, cube, push) - forcing[2]
-    by_time = -stiffness_per_mass * belt_velocity - drives.jerk(scene.drive, t)
-    derivatives = -stiffness_per_mass, -slope / scene.mass, by_time
-    by_place, by_v, by_time = with_load_derivatives(scene, derivatives, place, belt_velocity, forcing)
-    return (x[1], acceleration), (0.0, 1.0, by_place, by_v), (), (0.0, by_time)
+    K, slope, viscous, at = _in_step(scene, forcing, x)
+    by_place, by_v, by_velocity, by_force = sliding_slopes(scene, K, slope, viscous, at)
+    rate = by_place * forcing[1] + by_velocity * forcing[2] + by_force * force_rate(scene.drive, forcing)
+    acceleration = ring.acceleration(scene.body, K, K, *at)[0] - forcing[2]
+    return (x[1], acceleration), (0.0, 1.0, by_place, by_v), (), (0.0, rate - drives.jerk(scene.drive, t))
+
+
+@inlined
+def all_guards(body, normal, slow, fast):
+    """The guards of a mode: the normal reaction is one of them only if it varies."""
+    return ring.if_load_varies(body, (normal, slow, fast), (slow, fast))
+
+
+@inlined
+def view(scene, forcing, x, place, friction, at, guards):
+    """View of a state in slip.
+
+    `place` is that on the belt, m, and `friction` are K and the viscous friction, N. `x` has the sliding velocity.
+    """
+    K, viscous = friction
+    acceleration, _ = ring.acceleration(scene.body, K, K, *at)
+    normal, _ = ring.reactions(scene.body, K, K, *at)
+    motion = at[0], at[2], acceleration, viscous - K * normal, place, x[1], forcing[2]
+    return all_guards(scene.body, normal, *guards), motion
 
 
 @implicit.guards_and_motion.implements(belt.Belt)
 def _guards_and_motion(scene, mode, common, forcing, x):
-    place, velocity = x[0] + forcing[0], x[1] + forcing[1]
-    friction, _ = friction_force(scene, pull(scene, place, velocity, forcing), x[1])
-    acceleration = net_force(scene, place, velocity, forcing, friction) / scene.mass
+    K, _, viscous, at = _in_step(scene, forcing, x)
     low, high = region_bounds(scene.law, mode.region)
     speed = mode.sign * x[1]
-    # The order is that of the rows of the series: SLOW, FAST.
-    guards = speed - low, high - speed
-    return guards, (place, velocity, acceleration, friction, x[0], x[1], forcing[2])
-
-
-@implicit.motion.implements(belt.Belt, belt.BristleBelt)
-def _motion(scene, forcing, x, linear):
-    return x[1] + forcing[1], linear[0][1] + forcing[2]
+    return view(scene, forcing, x, x[0], (K, viscous * x[1]), at, (speed - low, high - speed))
 
 
 @implicit.seen.implements(belt.Belt, belt.BristleBelt)
@@ -87,7 +79,7 @@ def _seen(scene, view):
 
 @implicit.near_zero.implements(belt.Belt, belt.BristleBelt)
 def _near_zero(scene, motion):
-    return 0.0, 0.0
+    return all_guards(scene.body, 0.05 * scene.body.mass * scene.body.gravity, 0.0, 0.0)
 
 
 @implicit.row.implements(belt.Belt)

@@ -13,9 +13,16 @@ from ringsweep.models.belt.record import Outcome
 from ringsweep.models.model import Model
 from ringsweep.models.parts import GRAVITY, MASS, SPAN, by_formula, drive_of, friction_coefficients, law_of, table_of
 from ringsweep.models.scene import Structure, Values, require
-from ringsweep.physics import belt, drives, forces, friction
+from ringsweep.physics import belt, drives, forces, friction, ring
 from ringsweep.quantities.parameters import Parameter, declared
 from ringsweep.quantities.variables import Variable
+
+# Optional fields of the body, by path.
+_OPTIONAL = {
+    "cubic": "spring.cubic",
+    "damping": "damper.coefficient",
+    "normal_stiffness": "body.normal_stiffness",
+}
 
 
 class Belt(Model):
@@ -44,6 +51,9 @@ class Belt(Model):
         law = structure.law_type
         found = {
             "body.mass": MASS,
+            "body.normal_stiffness": Parameter(
+                "N/m", "growth of the normal reaction with the displacement (default: 0)", optional=True
+            ),
             "spring.stiffness": Parameter("N/m", "stiffness of the spring", lower=0.0),
             "spring.cubic": Parameter("N/m^3", "cubic stiffness of the spring (default: 0)", optional=True),
             "damper.coefficient": Parameter(
@@ -58,7 +68,7 @@ class Belt(Model):
             absolute = {"1/m": "N/m", "s/m": "N s/m"} if per_load else {}
             found[f"friction.{name}"] = replace(p, unit=absolute.get(p.unit, p.unit))
         if friction.family_of(law) is not friction.Dynamic:
-            found["friction.viscous"] = Parameter("N s/m", "viscous friction", lower=0.0, default=0.0)
+            found["friction.viscous"] = Parameter("N s/m", "viscous friction (default: 0)", lower=0.0, optional=True)
         for name, p in declared(structure.drive_type).items():
             found[f"drive.{name}"] = _along_a_line(p) if structure.own_drive is None else p
         found["force.constant"] = forces.CONSTANT
@@ -90,22 +100,23 @@ class Belt(Model):
             launched = values["initial.velocity"]
             sliding = np.array([drives.relative_velocity(take(drive, i), v) for i, v in enumerate(launched)])
         mass, gravity = values["body.mass"], values["gravity"]
-        fields = {
-            "mass": mass,
-            "stiffness": values["spring.stiffness"],
-            "cubic": belt.Cubic(values["spring.cubic"]) if "spring.cubic" in values else belt.Absent(),
-            "damper": belt.Damper(values["damper.coefficient"]) if "damper.coefficient" in values else belt.Absent(),
-            "gravity": gravity,
+        forced = self._with_force(drive, structure, values)
+        parts = {name: values[path] for name, path in _OPTIONAL.items() if path in values}
+        acts = {"force"} if forced is not drive or "friction.viscous" in values else set()
+        kind: Any = ring.variant(belt.OnBelt, _OPTIONAL.keys() - parts | {"force"} - acts)
+        fields: dict[str, Any] = {
+            "body": ring.completed(kind(mass, gravity, values["spring.stiffness"], **parts, constants=())),
             "mu_s": mu_s,
             "mu_k": mu_k,
-            "drive": self._with_force(drive, structure, values),
+            "drive": forced,
             "initial_x": values["initial.x"],
             "initial_v": sliding,
             "span": values["time.span"],
         }
         fields["forcing_period"] = np.broadcast_to(drives.period(fields["drive"]), mass.shape).copy()
+        fields["viscous"] = values.get("friction.viscous", np.zeros(len(mass)))
         if friction.family_of(law) is not friction.Dynamic:
-            viscous, load = values["friction.viscous"], mass * gravity
+            viscous, load = fields["viscous"], mass * gravity
             if friction.TRAITS[law].dead_band:
                 require(
                     mu_k * load + viscous * values["friction.dead_band"] <= mu_s * load,
@@ -113,7 +124,7 @@ class Belt(Model):
                     viscous,
                     "{} N s/m is too large: friction at the edge of the dead band exceeds friction within it",
                 )
-            return belt.Belt(**fields, law=law_of(structure, values, [(mu_s, mu_k)]), viscous=viscous)
+            return belt.Belt(**fields, law=law_of(structure, values, [(mu_s, mu_k)]))
         require(gravity > 0.0, "gravity", gravity, "{} m/s^2 is not allowed: a law with bristles needs a load")
         per_load = {
             path: value / (mass * gravity) for path, value in values.items() if path.startswith("friction.sigma")

@@ -13,14 +13,15 @@ from math import inf, isfinite, isnan, nan, pi, sqrt
 from typing import Any, NamedTuple
 
 from ringsweep.compile import absorbed, hook, inlined
-from ringsweep.models.belt.force import bend, steepest_spring
+from ringsweep.models.belt.force import breakaway_force
 from ringsweep.models.interface import recorder, shock
-from ringsweep.models.interface.status import BROKEN
+from ringsweep.models.interface.status import BROKEN, SEPARATED_1
 from ringsweep.numerics.functions import any_of, floor, lanes_body, select, square_root
 from ringsweep.numerics.memory import select_all
+from ringsweep.physics import ring
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.friction.velocity import stiction_band
-from ringsweep.quantities.flags import FAILED, OSCILLATORY, RIDING, SLIDING, STICK_SLIP, STICKING
+from ringsweep.quantities.flags import FAILED, OSCILLATORY, RIDING, SEPARATING, SLIDING, STICK_SLIP, STICKING
 
 
 class Outcome(NamedTuple):
@@ -213,13 +214,13 @@ def begin(scene, t, seen, band, play):
     start = Mark(t, x, velocity, 0.0, 0.0)
     # The body counts as stuck until it slips: the first stop begins with the run. If the pull exceeds breakaway, it may
     # pass the stiction band at once.
-    pull = max(abs(scene.mass * v_rate + force), abs(scene.stiffness * x))
-    passes = band > 0.0 and pull > (1.0 + 1e-9) * scene.mu_s * scene.mass * scene.gravity
-    least = min(_LONGEST_PASSAGE * _pace(scene), _PASSAGE * band * scene.mass / pull) if passes else 0.0
+    pull = max(abs(scene.body.mass * v_rate + force), abs(scene.body.stiffness * x))
+    passes = band > 0.0 and pull > (1.0 + 1e-9) * breakaway_force(scene, x)
+    least = min(_LONGEST_PASSAGE * _pace(scene), _PASSAGE * band * scene.body.mass / pull) if passes else 0.0
     return Record(
         band,
         play,
-        Last(t, x, velocity, place, v, v_rate, scene.mass * v_rate + force),
+        Last(t, x, velocity, place, v, v_rate, scene.body.mass * v_rate + force),
         x,
         x,
         velocity,
@@ -230,12 +231,10 @@ def begin(scene, t, seen, band, play):
     )
 
 
-@absorbed
-def observe(scene, r, t, duration, stuck, seen):
-    """Record after an interval of `duration` seconds that ends at time `t`, in which the body stuck or slipped.
-
-    In most steps nothing turns, begins or ends.
-    """
+@recorder.observe.implements(Belt, BristleBelt)
+def _observe(scene, record, t, duration, stuck, seen):
+    # In most steps nothing turns, begins or ends.
+    r = record
     x, velocity, force, place, v, v_rate, acceleration = seen
     stops, cycles, x_min, x_max = r.stops, r.cycles, r.x_min, r.x_max
     place = _place(scene, r, place)
@@ -259,7 +258,7 @@ def observe(scene, r, t, duration, stuck, seen):
             place,
             v,
             _located(r.last.v_rate, v_rate),
-            _located(r.last.pull, scene.mass * v_rate + force),
+            _located(r.last.pull, scene.body.mass * v_rate + force),
         ),
         x_min,
         x_max,
@@ -357,13 +356,13 @@ def _stops(scene, r, t, duration, stuck, side, place, v, force, span):
     # Within the play of the bristles a stop goes on.
     resumed = s.slip_from == s.slip_from
     anew = begins & _not(resumed)
-    scale = _AT_REST * square_root(scene.stiffness / scene.mass) * span
+    scale = _AT_REST * square_root(scene.body.stiffness / scene.body.mass) * span
     rate = select(duration > 0.0, (v - r.last.v) / duration, 0.0)
     slowing = max(abs(r.last.v_rate), abs(rate))
     passage = _PASSAGE * max(max(r.band, scale), abs(r.last.v)) / slowing
     # Under a greater pull than that of breakaway a set-valued law would let the body pass, maybe slowly.
-    pull = _located(scene.mass * rate + force, r.last.pull)
-    passes = abs(pull) > (1.0 + 1e-9) * scene.mu_s * scene.mass * scene.gravity
+    pull = _located(scene.body.mass * rate + force, r.last.pull)
+    passes = abs(pull) > (1.0 + 1e-9) * breakaway_force(scene, r.last.x)
     passage = max(passage, select(passes, square_root(r.band * _pace(scene) / slowing), 0.0))
     start = select(anew, before, s.start)
     least = select(anew, min(_LONGEST_PASSAGE * _pace(scene), passage), s.least)
@@ -389,7 +388,7 @@ def _stops(scene, r, t, duration, stuck, side, place, v, force, span):
 @absorbed
 def _pace(scene):
     """Natural period or period of the forcing, whichever is shorter, s."""
-    return min(2.0 * pi / square_root(scene.stiffness / scene.mass), scene.forcing_period)
+    return min(2.0 * pi / square_root(scene.body.stiffness / scene.body.mass), scene.forcing_period)
 
 
 @absorbed
@@ -400,7 +399,7 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
     low, high = select(up, min(c.low, turn.x), c.low), select(down, max(c.high, turn.x), c.high)
     # Without forcing a cycle ends where the body is farthest against the motion of the belt: no vibration of bristles
     # in stick disturbs this turn.
-    frequency = square_root(scene.stiffness / scene.mass)
+    frequency = square_root(scene.body.stiffness / scene.body.mass)
     backward = v - velocity > 1e-6 * frequency * (high - low)
     far = high - low > max(r.play, _ROUNDING * span)
     turns = far & select(backward, down, up) & (period == inf)
@@ -475,14 +474,14 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
     return old
 
 
-@inlined
-def conclude(scene, r, status, t, x, velocity):
-    """Outcome of a run that ended with `status` at time `t` in the state `(x, velocity)`."""
+@recorder.conclude.implements(Belt, BristleBelt)
+def _conclude(scene, record, status, t, place, velocity):
+    r, x = record, place
     motion, period, share, stops, settled = _settles_to(scene, r, t)
     if status == BROKEN or not (isfinite(x) and isfinite(velocity)):
         motion = FAILED
     return Outcome(
-        float(motion),
+        float(SEPARATING if status == SEPARATED_1 and motion != FAILED else motion),
         float(motion),
         t,
         x,
@@ -512,10 +511,10 @@ def _settles_to(scene, r, t):
     in_stop = stop > abs(stops.least)
     # On a belt at rest, or without a spring, the load on a stuck body does not grow.
     belt_velocity = r.last.velocity - r.last.v
-    breakaway = scene.mu_s * scene.mass * scene.gravity
     travel = abs(belt_velocity) * scene.span
-    ahead = bend(scene.cubic, abs(r.last.x) + travel)
-    loads = abs(steepest_spring(scene.cubic, scene.stiffness, ahead, ahead)) * travel > _ROUNDING * 1e-3 * breakaway
+    ahead = abs(r.last.x) + travel
+    stiffness = scene.body.mass * abs(ring.acceleration_gradient(scene.body, 0.0, 0.0, ahead, 0.0, 0.0)[0])
+    loads = stiffness * travel > _ROUNDING * 1e-3 * breakaway_force(scene, r.last.x)
     if forced:
         # In stick the body may creep, but the belt does not carry it away.
         for_good = c.share > 1.0 - 1e-9 and abs(c.drift) <= max(RETURN * c.swing, r.band * scene.forcing_period)
@@ -529,7 +528,7 @@ def _settles_to(scene, r, t):
         return RIDING, c.period, 1.0, 0.0, for_good
     if in_stop and for_good:
         return STICKING, c.period if forced else nan, 1.0, 0.0, True
-    natural = 2.0 * pi / sqrt(scene.stiffness / scene.mass) if scene.stiffness > 0.0 else inf
+    natural = 2.0 * pi / sqrt(scene.body.stiffness / scene.body.mass) if scene.body.stiffness > 0.0 else inf
     slips_since = t - stops.slip_start
     if isnan(c.share) or (not forced and not in_stop and min(slips_since, t - c.last.t) > 2.0 * natural):
         # There is no cycle, or none any more.
@@ -553,29 +552,12 @@ def _settles_to(scene, r, t):
     return SLIDING, nan, 0.0, 0.0, c.swing <= RETURN * (r.x_max - r.x_min)
 
 
-@inlined
-def due_within(scene, r, h):
-    """Time until the forcing ends its next period, s, or a negative number if that is beyond a step of length `h`."""
-    rest = r.cycles.next - r.last.t
-    return rest if rest < h else -1.0
-
-
 @recorder.begin.implements(Belt)
 def _begin(scene, t, seen):
     return begin(scene, t, seen, stiction_band(scene.law), -1.0)
-
-
-@recorder.observe.implements(Belt, BristleBelt)
-def _observe(scene, record, t, duration, stuck, seen):
-    return observe(scene, record, t, duration, stuck, seen)
 
 
 @recorder.enter.implements(Belt, BristleBelt)
 def _enter(scene, record, t, seen):
     r, shocks = record, shock.enter(record.shocks, t, seen[6])
     return Record(r.band, r.play, r.last, r.x_min, r.x_max, r.velocity_max, r.force_max, r.stops, r.cycles, shocks)
-
-
-@recorder.conclude.implements(Belt, BristleBelt)
-def _conclude(scene, record, status, t, place, velocity):
-    return conclude(scene, record, status, t, place, velocity)

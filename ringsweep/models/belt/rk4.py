@@ -2,24 +2,13 @@
 
 from __future__ import annotations
 
-from math import inf
 from typing import NamedTuple
 
-from ringsweep.models.belt.force import (
-    acceleration,
-    bend,
-    damping,
-    friction_force,
-    holds_in_band,
-    pull,
-    steepest_spring,
-)
+from ringsweep.models.belt.force import if_force, sliding
 from ringsweep.models.interface import constant_step
 from ringsweep.models.interface.shock import Unlocated
-from ringsweep.models.parts import exceeds, larger_eigenvalue
-from ringsweep.numerics.functions import any_of, select
-from ringsweep.physics import belt, drives
-from ringsweep.physics.friction.velocity import passes_band, steepest, stiction_band
+from ringsweep.physics import belt, drives, ring
+from ringsweep.physics.friction.velocity import stiction_band
 
 
 class Inspection(NamedTuple):
@@ -31,22 +20,33 @@ class Inspection(NamedTuple):
         Time derivative of the state.
     v : float
         Sliding velocity, m/s.
+    normal_1, normal_2 : float
+        Normal reaction, N.
+    determinant : float
+        1: the body cannot jam.
+    slope : float
+        Derivative of the acceleration by the velocity through the friction coefficient, 1/s.
+    by_place, by_velocity : float
+        Derivatives of the acceleration by displacement and velocity at a constant friction coefficient.
+    at : tuple of float
+        Displacement, m, given force, N, and velocity, m/s.
     force : float
         Friction force, N.
-    slope : float
-        Derivative of the forces of friction and damper by the velocity, N s/m.
     place : float
         Displacement relative to the belt, m.
-    bend : tuple of float
-        Displacement in space, m, if the spring has a cubic part; else empty.
     """
 
     rates: tuple[float, float]
     v: float
-    force: float
+    normal_1: float
+    normal_2: float
+    determinant: float
     slope: float
+    by_place: float
+    by_velocity: float
+    at: tuple[float, float, float]
+    force: float
     place: float
-    bend: tuple[float, ...]
 
 
 @constant_step.initial_state.implements(belt.Belt)
@@ -56,40 +56,22 @@ def _initial_state(scene):
 
 @constant_step.rates.implements(belt.Belt)
 def _rates(scene, now, y, forcing):
-    force, _ = friction_force(scene, pull(scene, y[0], y[1], forcing), y[1] - forcing[1])
-    return y[1], acceleration(scene, y[0], y[1], forcing, force)
+    K, _, _, at = sliding(scene, y[0], y[1], y[1] - forcing[1], forcing)
+    return y[1], ring.acceleration(scene.body, K, K, *at)[0]
 
 
 @constant_step.inspect.implements(belt.Belt)
 def _inspect(scene, y, forcing):
-    v = y[1] - forcing[1]
-    force, slope = friction_force(scene, pull(scene, y[0], y[1], forcing), v)
-    rates = y[1], acceleration(scene, y[0], y[1], forcing, force)
-    return Inspection(rates, v, force, damping(scene, slope), y[0] - forcing[0], bend(scene.cubic, y[0]))
-
-
-@constant_step.eigenvalue.implements(belt.Belt)
-def _eigenvalue(scene, before, now, h, most):
-    slope, load = max(abs(before.slope), abs(now.slope)), scene.mass * scene.gravity
-    at_rest, at_edge = steepest(scene.law)
-    viscous = damping(scene, scene.viscous)
-    at_rest, at_edge = load * at_rest + viscous, load * at_edge + viscous
-    per_mass = 1.0 / scene.mass
-    swing = steepest_spring(scene.cubic, scene.stiffness, before.bend, now.bend) * per_mass
-    if holds_in_band(scene.law) or any_of(exceeds(most, max(at_rest, at_edge) * per_mass, swing)):
-        # The stages of the step reach about as far as the acceleration at its beginning takes the body.
-        belt_gains = (now.rates[0] - now.v) - (before.rates[0] - before.v)
-        ahead = before.v + h * before.rates[1] - belt_gains
-        rest, edge, jumped = passes_band(scene.law, before.v, now.v, ahead)
-        if holds_in_band(scene.law):
-            # A step over a discontinuity has infinite stiffness; but a step may end in the dead band.
-            slope = select(jumped, inf, slope)
-        else:
-            # A step that jumps over the band, or over its edge, does not sample the slope there; the slope counts all
-            # the same.
-            slope = max(slope, select(rest, at_rest, 0.0))
-            slope = max(slope, select(edge, at_edge, 0.0))
-    return larger_eigenvalue(most, slope * per_mass, swing)
+    body, v = scene.body, y[1] - forcing[1]
+    K, slope, viscous, at = sliding(scene, y[0], y[1], v, forcing)
+    acceleration, determinant = ring.acceleration(body, K, K, *at)
+    normal, _ = ring.reactions(body, K, K, *at)
+    slope = ring.acceleration_slope(body, K, K, slope, slope, *at)
+    by_place, by_velocity, by_force = ring.acceleration_gradient(body, K, K, *at)
+    by_velocity = by_velocity - viscous * by_force
+    friction = if_force(body, viscous * v - K * normal, -K * normal)
+    place, rates = y[0] - forcing[0], (y[1], acceleration)
+    return Inspection(rates, v, normal, normal, determinant, slope, by_place, by_velocity, at, friction, place)
 
 
 @constant_step.seen.implements(belt.Belt, belt.BristleBelt)
@@ -98,13 +80,8 @@ def _seen(scene, y, now):
     return y[0], y[1], now.force, now.place, now.v, 0.0, Unlocated()
 
 
-@constant_step.sticks.implements(belt.Belt)
-def _sticks(scene, before, now):
-    return (abs(before.v) < stiction_band(scene.law)) | (before.v * now.v < 0.0)
-
-
 @constant_step.row.implements(belt.Belt)
 def _row(scene, y, forcing):
-    v = y[1] - forcing[1]
-    mode = 0.0 if abs(v) < stiction_band(scene.law) or v == 0.0 else 1.0 if v > 0.0 else -1.0
-    return y[0], y[1], friction_force(scene, pull(scene, y[0], y[1], forcing), v)[0], 0.0, mode
+    now = constant_step.inspect(scene, y, forcing)
+    mode = 0.0 if abs(now.v) < stiction_band(scene.law) or now.v == 0.0 else 1.0 if now.v > 0.0 else -1.0
+    return y[0], y[1], now.force, 0.0, mode

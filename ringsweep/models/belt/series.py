@@ -11,19 +11,15 @@ from typing import NamedTuple
 from ringsweep.compile import hook, inlined
 from ringsweep.models.belt.force import (
     breakaway_force,
-    has_loads,
-    holds_in_band,
+    if_force,
     length_scale,
     located,
     speed_scale,
     stuck_pull,
-    stuck_pull_rate,
-    with_loads,
-    with_sizes,
+    stuck_rates,
 )
-from ringsweep.models.belt.record import due_within
 from ringsweep.models.interface import modes, series
-from ringsweep.models.interface.status import RUNNING
+from ringsweep.models.interface.status import RUNNING, SEPARATED_1
 from ringsweep.numerics.series import INVERSE, ORDER, crossings, slope, step_size, value, variation
 from ringsweep.numerics.terms import (
     FACTOR_ROWS,
@@ -35,8 +31,9 @@ from ringsweep.numerics.terms import (
     set_terms,
     terms,
 )
-from ringsweep.physics import belt, drives
+from ringsweep.physics import belt, drives, ring
 from ringsweep.physics.forces import expand_force, largest_force
+from ringsweep.physics.friction.registry import holds_in_band
 from ringsweep.physics.friction.velocity import (
     KINETIC,
     begin_series,
@@ -49,10 +46,10 @@ from ringsweep.physics.friction.velocity import (
 )
 
 # Rows of the table of series; the guards are last.
-X, V, VELOCITY, FORCE, SHIFT, SPARE, PUSH, SQUARE, CUBE, FACTORS = range(10)
-SLOW = FACTORS + MOST_GROUPS * FACTOR_ROWS
-FAST = SLOW + 1
-
+X, V, VELOCITY, ACCELERATION, FORCE, SHIFT, PUSH, SQUARE, CUBE, RATIO, FACTORS = range(11)
+_GUARDS = FACTORS + MOST_GROUPS * FACTOR_ROWS
+# The normal reaction is a guard only if it varies.
+NORMAL, SLOW, FAST = range(_GUARDS, _GUARDS + 3)
 
 # A pull that differs by less than this share from the breakaway force is equal to it.
 _ON_BOUND = 1e-12
@@ -92,12 +89,14 @@ def _initial_state(scene):
 
 @series.table_shape.implements(belt.Belt)
 def _table_shape(scene):
-    return FAST + 1, SLOW
+    return FAST + 1, ring.if_load_varies(scene.body, NORMAL, SLOW)
 
 
 @modes.initial_mode.implements(belt.Belt)
 def _initial_mode(scene, t, y):
     x, v = y
+    if ring.if_load_varies(scene.body, True, False) and breakaway_force(scene, x) <= 0.0:
+        return SEPARATED_1, Mode(0, KINETIC, -1)
     if holds_in_band(scene.law) and abs(v) <= stiction_band(scene.law):
         return RUNNING, _mode_at_rest(scene, t, x, v)
     if v == 0.0:
@@ -110,29 +109,36 @@ def _initial_mode(scene, t, y):
 def _mode_at_rest(scene, t, x, v):
     """Mode of a set-valued law at a sliding velocity of zero or within the dead band."""
     forcing = drives.turn(scene.drive, t)
-    pull = stuck_pull(scene, x, v, forcing)
-    bound = breakaway_force(scene)
+    pull, bound = stuck_pull(scene, x, v, forcing), breakaway_force(scene, x)
+    rate, bound_rate = stuck_rates(scene, t, x, forcing)
     if bound > 0.0:
         if abs(pull) <= bound * (1.0 - _ON_BOUND):
             return Mode(0, KINETIC, -1)
         if abs(pull) <= bound * (1.0 + _ON_BOUND):
             # The pull only touches the breakaway force unless it still grows.
             forward = pull > 0.0
-            rate = stuck_pull_rate(scene, t, x, forcing)
-            per_period = max(1.0 / scene.forcing_period, (scene.stiffness / scene.mass) ** 0.5)
-            if (rate if forward else -rate) <= _LEVEL * bound * per_period:
+            if (rate if forward else -rate) - bound_rate <= _level(scene, bound):
                 return Mode(0, KINETIC, SLOW if forward else FAST)
     if pull == 0.0:
         # The rate of the pull decides, while the belt carries the body along.
-        pull = stuck_pull_rate(scene, t, x, forcing)
+        pull = rate
     # Without a dead band the sliding velocity, which is zero here, is a guard.
     entry_guard = SLOW if stiction_band(scene.law) == 0.0 else -1
     return Mode(1 if pull >= 0.0 else -1, region_at(scene.law, 0.0), entry_guard)
 
 
+@inlined
+def _level(scene, bound):
+    """Rate of a pull, N/s, that counts as level beside the breakaway force `bound`."""
+    per_period = max(1.0 / scene.forcing_period, (scene.body.stiffness / scene.body.mass) ** 0.5)
+    return _LEVEL * bound * per_period
+
+
 @modes.switch.implements(belt.Belt)
 def _switch(scene, mode, guard, t, y):
     x, _ = y
+    if guard == NORMAL:
+        return SEPARATED_1, mode, y
     sign, region = mode.sign, mode.region
     if sign == 0:
         held = _mode_at_rest(scene, t, x, y[1])
@@ -156,7 +162,7 @@ def _switch(scene, mode, guard, t, y):
 
 
 @hook(optional=True)
-def cube_term(cubic, c, k):
+def _cube_term(body, c, k):
     """Coefficient `k` of the third power of the displacement, from those up to `k` of the displacement.
 
     It is stored, with that of the square; the coefficients before must have been. 0 for a linear spring.
@@ -164,8 +170,8 @@ def cube_term(cubic, c, k):
     return 0.0
 
 
-@cube_term.implements(belt.Cubic)
-def _cube_term(cubic, c, k):
+@_cube_term.implements(*ring.having(belt.OnBelt, "cubic"))
+def _term_of_cube(body, c, k):
     square = cube = 0.0
     for j in range(k + 1):
         square += c[X, j] * c[X, k - j]
@@ -176,75 +182,69 @@ def _cube_term(cubic, c, k):
     return cube
 
 
+@hook(optional=True)
+def _friction_term(body, c, k, K, load):
+    """Coefficient `k` of friction from that of the friction per load, K; `load` is the reaction if it is constant."""
+    return K * load
+
+
+@_friction_term.implements(*ring.having(belt.OnBelt, "normal_stiffness"))
+def _term_of_friction(body, c, k, K, load):
+    c[RATIO, k] = K
+    c[NORMAL, k] = ring.held(body, 1.0 if k == 0 else 0.0, c[X, k], 0.0, 0.0, 0.0, 0.0, 0.0)[0]
+    friction = 0.0
+    for j in range(k + 1):
+        friction += c[RATIO, j] * c[NORMAL, k - j]
+    return friction
+
+
 @series.expand.implements(belt.Belt)
 def _expand(scene, mode, t, y, tolerance, c):
     drives.expand(scene.drive, t, ORDER + 2, c[SHIFT], c[FACTORS:])
-    expand_force(scene.drive, t, ORDER, c[PUSH], c[FACTORS:])
-    load = scene.mass * scene.gravity
-    stiffness_per_mass = scene.stiffness / scene.mass
+    body = scene.body
+    if if_force(body, True, False):
+        expand_force(scene.drive, t, ORDER, c[PUSH], c[FACTORS:])
     c[X, 0], c[V, 0] = y
     c[VELOCITY, 0] = y[1] + c[SHIFT, 1]
     sharpness = 0.0
     if mode.sign == 0:
-        bound = breakaway_force(scene)
         for k in range(ORDER + 1):
             # The sliding velocity is constant: zero, or that on entry into the dead band.
-            v_k = y[1] if k == 0 else 0.0
-            c[V, k] = v_k
-            c[VELOCITY, k] = (k + 1.0) * c[SHIFT, k + 1] + v_k
+            one, v = (1.0, y[1]) if k == 0 else (0.0, 0.0)
+            c[V, k], c[VELOCITY, k] = v, (k + 1.0) * c[SHIFT, k + 1] + v
+            c[ACCELERATION, k] = (k + 1.0) * (k + 2.0) * c[SHIFT, k + 2]
             if k > 0:
                 c[X, k] = c[SHIFT, k] + (y[1] if k == 1 else 0.0)
-            cube = cube_term(scene.cubic, c, k)
-            pull = -scene.stiffness * c[X, k] - scene.mass * (k + 1.0) * (k + 2.0) * c[SHIFT, k + 2]
-            c[FORCE, k] = with_loads(scene, pull, 1.0, c[VELOCITY, k], cube, c[PUSH, k])
-            c[SLOW, k], c[FAST, k] = -c[FORCE, k], c[FORCE, k]
-        c[SLOW, 0] = 0.0 if mode.entry_guard == SLOW else c[SLOW, 0] + bound
-        c[FAST, 0] = 0.0 if mode.entry_guard == FAST else c[FAST, 0] + bound
-        # A pull that only touches the breakaway force is at its extreme.
-        level = _LEVEL * bound * max(1.0 / scene.forcing_period, stiffness_per_mass**0.5)
-        if mode.entry_guard in (SLOW, FAST) and abs(c[mode.entry_guard, 1]) <= level:
-            c[mode.entry_guard, 1] = 0.0
+            load, pull = _held_term(body, c, k, one, c[ACCELERATION, k])
+            bound = scene.mu_s * load
+            c[FORCE, k], c[SLOW, k], c[FAST, k] = pull, bound - pull, bound + pull
+        bound = breakaway_force(scene, y[0])
+        if mode.entry_guard in (SLOW, FAST):
+            c[mode.entry_guard, 0] = 0.0
+            # A pull that only touches the breakaway force is at its extreme.
+            if abs(c[mode.entry_guard, 1]) <= _level(scene, bound):
+                c[mode.entry_guard, 1] = 0.0
     else:
-        sign, surfaces = float(mode.sign), (scene.mu_s, scene.mu_k)
+        sign = float(mode.sign)
         low, high = region_bounds(scene.law, mode.region)
         yielding = holds_in_band(scene.law) and mode.region < 0
-        viscous = 0.0 if yielding else scene.viscous
-        (mu,), begun, sharpness = begin_series(scene.law, mode.region, sign * c[V, 0], surfaces)
-        force = sign * load * mu + viscous * c[V, 0]
-        c[FORCE, 0], place, velocity = force, c[X, 0], c[VELOCITY, 0]
-        of_law = no_products(scene.law, surfaces)
-        first = newest = no_factors(of_law)
-        for k in range(1, ORDER + 1):
-            cube, per_mass = cube_term(scene.cubic, c, k - 1), 1.0 / scene.mass
-            acceleration = -(stiffness_per_mass * place + force * per_mass)
-            acceleration = with_loads(scene, acceleration, per_mass, velocity, cube, c[PUSH, k - 1])
-            place, velocity = velocity * INVERSE[k], acceleration * INVERSE[k]
-            v = velocity - (k + 1.0) * c[SHIFT, k + 1]
-            x = sign * v
-            inner = part_from(inner_products(c, FACTORS, k, first, newest), of_law, ())
-            (mu,), left, right = series_term(scene.law, mode.region, k, x, inner, begun, surfaces)
-            force = sign * load * mu + viscous * v
-            newest = set_factors(c, FACTORS, k, left, right)
-            first = newest if k == 1 else first
-            c[X, k], c[VELOCITY, k], c[V, k], c[FORCE, k] = place, velocity, v, force
+        sharpness = _expand_slip(scene, mode, 0.0 if yielding else if_force(body, scene.viscous, 0.0), c)
         set_terms(c[SLOW], terms(c[V]) * sign)
         set_terms(c[FAST], terms(c[V]) * -sign)
-        excess = sign * c[V, 0] - low
+        c[SLOW, 0], c[FAST, 0] = sign * c[V, 0] - low, high - sign * c[V, 0]
         if yielding:
             # With a dead band the velocity of the belt is constant.
-            cube_term(scene.cubic, c, ORDER)
-            pull = terms(c[X]) * (-sign * scene.stiffness)
-            pull = with_loads(scene, pull, sign, terms(c[VELOCITY]), terms(c[CUBE]), terms(c[PUSH]))
-            set_terms(c[SLOW], pull)
-            excess = -sign * scene.stiffness * c[X, 0] - breakaway_force(scene)
-            excess = with_loads(scene, excess, sign, c[VELOCITY, 0], c[CUBE, 0], c[PUSH, 0])
-        c[SLOW, 0] = 0.0 if mode.entry_guard == SLOW else excess
-        c[FAST, 0] = 0.0 if mode.entry_guard == FAST else high - mode.sign * c[V, 0]
+            for k in range(ORDER + 1):
+                load, pull = _held_term(body, c, k, 1.0 if k == 0 else 0.0, 0.0)
+                c[SLOW, k] = sign * pull - scene.mu_s * load
+        if mode.entry_guard in (SLOW, FAST):
+            c[mode.entry_guard, 0] = 0.0
         # If friction does not drop at breakaway, the slope is zero there: what is computed is rounding.
-        size = stiffness_per_mass * abs(c[X, 0]) + abs(c[FORCE, 0]) / scene.mass
-        size = with_sizes(scene, size, 1.0 / scene.mass, c[VELOCITY, 0], c[CUBE, 0], c[PUSH, 0])
-        if mode.entry_guard == SLOW and low == 0.0 and not yielding and abs(c[V, 1]) <= 1e-12 * size:
-            c[SLOW, 1] = 0.0
+        if mode.entry_guard == SLOW and low == 0.0 and not yielding:
+            at = c[X, 0], c[PUSH, 0], c[VELOCITY, 0]
+            terms_of_balance = abs(c[FORCE, 0]) + ring.size(body, *at)
+            if abs(c[V, 1]) <= 1e-12 * terms_of_balance / body.mass:
+                c[SLOW, 1] = 0.0
     # The unit of length is the distance that belt, body or load could move within a natural period of the spring.
     length = abs(c[X, 0]) + length_scale(scene, abs(c[VELOCITY, 0]) + abs(c[SHIFT, 1]))
     speed = speed_scale(scene, length)
@@ -253,30 +253,59 @@ def _expand(scene, mode, t, y, tolerance, c):
         speed = min(speed, 1e3 * stiction_band(scene.law))
     last = max(abs(c[X, ORDER]) / length, abs(c[V, ORDER]) / speed)
     previous = max(abs(c[X, ORDER - 1]) / length, abs(c[V, ORDER - 1]) / speed)
-    if has_loads(scene) and (mode.sign == 0 or (holds_in_band(scene.law) and mode.region < 0)):
+    if mode.sign == 0 or (holds_in_band(scene.law) and mode.region < 0):
         # The guards are forces, whose series may converge more slowly than that of the motion.
-        scale = breakaway_force(scene) + scene.stiffness * length + 1e-300
-        cube, push = length * length * length, largest_force(scene.drive)
-        scale = with_sizes(scene, scale, 1.0, c[VELOCITY, 0], cube, push)
+        at = length, largest_force(scene.drive), c[VELOCITY, 0]
+        scale = abs(breakaway_force(scene, c[X, 0])) + ring.size(body, *at) + 1e-300
         last = max(last, abs(c[SLOW, ORDER]) / scale)
         previous = max(previous, abs(c[SLOW, ORDER - 1]) / scale)
     h = step_size(last / tolerance, previous / tolerance)
     return h if mode.sign == 0 else shorten_for_decay(sharpness, c[V], h)
 
 
-@series.state_at.implements(belt.Belt)
-def _state_at(scene, c, s):
-    return value(c[X], s), value(c[V], s)
+@inlined
+def _held_term(body, c, k, one, acceleration):
+    """Coefficients `k` of the reaction and of the force that friction must balance; `one` is that of 1."""
+    at = c[X, k], c[PUSH, k], c[VELOCITY, k]
+    c[NORMAL, k], _, friction, _ = ring.held(body, one, *at, _cube_term(body, c, k), acceleration, 0.0)
+    return c[NORMAL, k], -friction
 
 
-@series.rates_at.implements(belt.Belt)
-def _rates_at(scene, c, s):
-    return slope(c[X], s), slope(c[V], s)
+@inlined
+def _expand_slip(scene, mode, viscous, c):
+    """Fill the series of slip and return the sharpness of the friction law.
+
+    Each coefficient is computed from numbers that are still in registers; the table only keeps it.
+    """
+    body, sign, surfaces = scene.body, float(mode.sign), (scene.mu_s, scene.mu_k)
+    x, velocity, v = c[X, 0], c[VELOCITY, 0], c[V, 0]
+    (mu,), begun, sharpness = begin_series(scene.law, mode.region, sign * v, surfaces)
+    load, _ = ring.reactions(body, 0.0, 0.0, x, 0.0, velocity)
+    friction = _friction_term(body, c, 0, -sign * mu, load)
+    force = if_force(body, friction + c[PUSH, 0] - viscous * v, friction)
+    acceleration = ring.driven(body, 1.0, x, 0.0, velocity, _cube_term(body, c, 0), force, force)
+    c[FORCE, 0], c[ACCELERATION, 0] = if_force(body, viscous * v - friction, -friction), acceleration
+    of_law = no_products(scene.law, surfaces)
+    first = newest = no_factors(of_law)
+    for k in range(1, ORDER + 1):
+        x, velocity = velocity * INVERSE[k], acceleration * INVERSE[k]
+        v = velocity - (k + 1.0) * c[SHIFT, k + 1]
+        c[X, k] = x
+        inner = part_from(inner_products(c, FACTORS, k, first, newest), of_law, ())
+        (mu,), left, right = series_term(scene.law, mode.region, k, sign * v, inner, begun, surfaces)
+        newest = set_factors(c, FACTORS, k, left, right)
+        first = newest if k == 1 else first
+        friction = _friction_term(body, c, k, -sign * mu, load)
+        force = if_force(body, friction + c[PUSH, k] - viscous * v, friction)
+        acceleration = ring.driven(body, 0.0, x, 0.0, velocity, _cube_term(body, c, k), force, force)
+        c[VELOCITY, k], c[V, k] = velocity, v
+        c[FORCE, k], c[ACCELERATION, k] = if_force(body, viscous * v - friction, -friction), acceleration
+    return sharpness
 
 
 @series.seen_at_start.implements(belt.Belt)
 def _seen_at_start(scene, c):
-    acceleration = located(scene, c[X, 0], c[VELOCITY, 1])
+    acceleration = located(scene, c[X, 0], c[ACCELERATION, 0])
     return c[X, 0], c[VELOCITY, 0], c[FORCE, 0], c[X, 0] - c[SHIFT, 0], c[V, 0], c[V, 1], acceleration
 
 
@@ -287,7 +316,7 @@ def _seen_at(scene, c, s, h):
         # A velocity within rounding is zero, so that an extreme of the displacement is recognised.
         velocity = 0.0
     x = value(c[X], s)
-    acceleration = located(scene, x, slope(c[VELOCITY], s))
+    acceleration = located(scene, x, value(c[ACCELERATION], s))
     return x, velocity, value(c[FORCE], s), x - value(c[SHIFT], s), value(c[V], s), slope(c[V], s), acceleration
 
 
@@ -296,22 +325,12 @@ def _extremes(scene, record, mode, c, h, work):
     count = 0
     if abs(c[VELOCITY, 0]) <= variation(c[VELOCITY], h):
         count = crossings(c[VELOCITY], h, work, count)
-    if mode.sign != 0:
-        # The velocity has an extreme where the net force vanishes.
-        cube_term(scene.cubic, c, ORDER)
-        net = scene.stiffness * c[X, 0] + c[FORCE, 0]
-        c[SPARE, 0] = with_loads(scene, net, -1.0, c[VELOCITY, 0], c[CUBE, 0], c[PUSH, 0])
-        net = terms(c[X]) * scene.stiffness + terms(c[FORCE])
-        set_terms(c[SPARE], with_loads(scene, net, -1.0, terms(c[VELOCITY]), terms(c[CUBE]), terms(c[PUSH])))
-        count = crossings(c[SPARE], h, work, count)
-    elif c[VELOCITY, 0] + variation(c[VELOCITY], h) > record.velocity_max:
-        # In stick the belt decides where the velocity has an extreme.
-        for k in range(ORDER):
-            c[SPARE, k] = (k + 1.0) * c[VELOCITY, k + 1]
-        c[SPARE, ORDER] = 0.0
-        count = crossings(c[SPARE], h, work, count)
-    rest = due_within(scene, record, h)
-    if rest > 0.0:
+    # In slip friction has an extreme where the velocity has one.
+    if mode.sign != 0 or c[VELOCITY, 0] + variation(c[VELOCITY], h) > record.velocity_max:
+        count = crossings(c[ACCELERATION], h, work, count)
+    # The forcing may end its next period.
+    rest = record.cycles.next - record.last.t
+    if 0.0 < rest < h:
         work[0][count] = rest
         count += 1
     return count
@@ -321,8 +340,3 @@ def _extremes(scene, record, mode, c, h, work):
 def _row(scene, mode, c, t, s):
     mode_now = 0.0 if mode.region < 0 else float(mode.sign)
     return value(c[X], s), value(c[VELOCITY], s), value(c[FORCE], s), 0.0, mode_now
-
-
-@modes.in_space.implements(belt.Belt, belt.BristleBelt)
-def _in_space(scene, t, y):
-    return y[0], y[1] + drives.turn(scene.drive, t)[1]

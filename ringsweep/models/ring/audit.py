@@ -15,7 +15,7 @@ from ringsweep.compile import inlined, take
 from ringsweep.models.interface import audit, implicit
 from ringsweep.models.ring.contacts import coefficients_under
 from ringsweep.models.ring.record import Outcome
-from ringsweep.models.ring.series import REACTION_TOLERANCE
+from ringsweep.models.sliding import REACTION_TOLERANCE, larger, of_balances
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction import SetValued, family_of
 from ringsweep.physics.friction.bristles import bristle
@@ -25,9 +25,6 @@ from ringsweep.quantities.flags import SEPARATING
 
 # Rounding of an acceleration or a reaction, as a share of its largest terms.
 _ROUNDING = 1e-12
-
-# Square of an error of the balances, as a share of their terms, that is more than rounding.
-_UNBALANCED = 1e-9 * 1e-9
 
 # Distance from the edge of a zone within which a contact counts as on the edge, where both sides are right, rad.
 _ON_EDGE = 1e-8
@@ -60,50 +57,38 @@ def _coefficients_at(scene, rho):
     return roughness(scene.surface, turns, -shift), roughness(scene.surface, turns, shift)
 
 
-@inlined
-def _larger(a, b):
-    """The larger of two violations; infinite if `b` is not a number."""
-    return max(a, b) if b < inf else inf
-
-
 @audit.violation.implements(ring.Ring)
 def _violation(scene, mode, forcing, y, rates, s, tolerance):
     body = scene.body
     phi, v = y
     theta, ring_omega, ring_epsilon = forcing
     omega = v / body.radius + ring_omega
-    sin_phi, cos_phi = sin(phi), cos(phi)
+    at = sin(phi), cos(phi), omega
     under = _coefficients_at(scene, phi - theta)
     (mu_s1, mu_k1), (mu_s2, mu_k2) = under
     largest = inf if _names_wrong_segment(scene, mode, phi - theta, under) else 0.0
     terms = body.gravity + body.radius * (omega * omega + abs(ring_epsilon))
     speed = body.radius * (1.0 + abs(omega))
     if mode.sign == 0:
-        kappa, reserve, normal_1, normal_2 = contact.stick(body, mu_s1, mu_s2, sin_phi, cos_phi, omega, ring_epsilon)
+        kappa, reserve, normal_1, normal_2 = contact.stick(body, mu_s1, mu_s2, *at, ring_epsilon)
         K1, K2 = -kappa * mu_s1, -kappa * mu_s2
-        epsilon, _ = ring.acceleration(body, K1, K2, sin_phi, cos_phi, omega)
-        least, relaxation = min(reserve, min(normal_1, normal_2)), 0.0
+        largest, relaxation = larger(largest, -reserve / (body.mass * terms * REACTION_TOLERANCE * tolerance)), 0.0
     else:
         sign = 1.0 if v > 0.0 else -1.0
         mu_1, mu_2, slope_1, slope_2 = friction_at(scene.law, abs(v), (mu_s1, mu_k1, mu_s2, mu_k2))
         K1, K2 = -sign * mu_1, -sign * mu_2
-        epsilon, determinant = ring.acceleration(body, K1, K2, sin_phi, cos_phi, omega)
-        normal_1, normal_2 = ring.reactions(body, K1, K2, sin_phi, cos_phi, omega)
-        least = min(normal_1, normal_2)
-        relaxation = body.radius * abs(ring.acceleration_slope(body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega))
+        _, determinant = ring.acceleration(body, K1, K2, *at)
+        normal_1, normal_2 = ring.reactions(body, K1, K2, *at)
+        relaxation = body.radius * abs(ring.acceleration_slope(body, K1, K2, slope_1, slope_2, *at))
         if mode.region < 0:
             speed = min(speed, 1e3 * stiction_band(scene.law))
-        largest = _larger(largest, -mode.sign * v / (tolerance * speed))
+        largest = larger(largest, -mode.sign * v / (tolerance * speed))
         if not determinant > 0.0:
             largest = inf
     # An error of the velocity changes the acceleration through the slope of friction, and the mean rate over the step.
-    rate_factor = 1.0 / s + relaxation
-    imbalance = abs(body.radius * (epsilon - ring_epsilon) - rates[1])
-    largest = _larger(largest, imbalance / (rate_factor * tolerance * speed + _ROUNDING * terms))
-    largest = _larger(largest, -least / (body.mass * terms * REACTION_TOLERANCE * tolerance))
-    at = sin_phi, cos_phi, omega
-    largest = _larger(largest, ring.imbalance(body, K1, K2, normal_1, normal_2, epsilon, *at) / _UNBALANCED)
-    return largest, ring.power(body, K1, K2, normal_1, normal_2, *at)
+    scales = (1.0 / s + relaxation) * tolerance * speed, terms, tolerance
+    violation, power = of_balances(scene, (K1, K2), (normal_1, normal_2), at, forcing, rates[1], scales)
+    return larger(largest, violation), power
 
 
 @audit.energy.implements(ring.Ring)
@@ -116,37 +101,32 @@ def _bristle_violation(scene, mode, forcing, y, rates, s, tolerance):
     body = scene.body
     rho, v, z_1, z_2 = y
     theta, ring_omega, ring_epsilon = forcing
-    phi, omega = rho + theta, v / body.radius + ring_omega
-    sin_phi, cos_phi = sin(phi), cos(phi)
+    omega = v / body.radius + ring_omega
+    at = sin(rho + theta), cos(rho + theta), omega
     under = _coefficients_at(scene, rho)
     (mu_s1, mu_k1), (mu_s2, mu_k2) = under
     largest = inf if _names_wrong_segment(scene, mode, rho, under) else 0.0
     sign = 1.0 if v >= 0.0 else -1.0
     rate_1, rate_v1, rate_z1, traction_1, by_v_1, by_z_1 = bristle(scene.law, mu_s1, mu_k1, v, z_1, sign, mode.region)
     rate_2, rate_v2, rate_z2, traction_2, by_v_2, by_z_2 = bristle(scene.law, mu_s2, mu_k2, v, z_2, sign, mode.region)
-    epsilon, determinant = ring.acceleration(body, -traction_1, -traction_2, sin_phi, cos_phi, omega)
-    normal_1, normal_2 = ring.reactions(body, -traction_1, -traction_2, sin_phi, cos_phi, omega)
-    if not determinant > 0.0:
+    K1, K2 = -traction_1, -traction_2
+    normals = ring.reactions(body, K1, K2, *at)
+    if not ring.acceleration(body, K1, K2, *at)[1] > 0.0:
         largest = inf
     terms = body.gravity + body.radius * (omega * omega + abs(ring_epsilon))
     _, speed, deflection, _, _ = implicit.error_scales(scene, implicit.IMPLICIT_TOLERANCE * tolerance, y)
-    by_v = ring.acceleration_slope(body, -traction_1, -traction_2, -by_v_1, -by_v_2, sin_phi, cos_phi, omega)
-    by_1 = ring.acceleration_slope(body, -traction_1, -traction_2, -by_z_1, 0.0, sin_phi, cos_phi, omega)
-    by_2 = ring.acceleration_slope(body, -traction_1, -traction_2, 0.0, -by_z_2, sin_phi, cos_phi, omega)
+    by_v = ring.acceleration_slope(body, K1, K2, -by_v_1, -by_v_2, *at)
+    by_1 = ring.acceleration_slope(body, K1, K2, -by_z_1, 0.0, *at)
+    by_2 = ring.acceleration_slope(body, K1, K2, 0.0, -by_z_2, *at)
     allowed = speed / s + body.radius * (abs(by_v) * speed + (abs(by_1) + abs(by_2)) * deflection)
-    imbalance = abs(body.radius * (epsilon - ring_epsilon) - rates[1])
-    largest = _larger(largest, imbalance / (allowed + _ROUNDING * terms))
+    violation, power = of_balances(scene, (K1, K2), normals, at, forcing, rates[1], (allowed, terms, tolerance))
     for rate, dense_rate, rate_v, rate_z in (
         (rate_1, rates[2], rate_v1, rate_z1),
         (rate_2, rates[3], rate_v2, rate_z2),
     ):
         allowed = (1.0 / s + abs(rate_z)) * deflection + abs(rate_v) * speed
-        largest = _larger(largest, abs(rate - dense_rate) / (allowed + _ROUNDING * abs(v)))
-    largest = _larger(largest, -mode.sign * v / speed)
-    largest = _larger(largest, -min(normal_1, normal_2) / (body.mass * terms * REACTION_TOLERANCE * tolerance))
-    found = -traction_1, -traction_2, normal_1, normal_2
-    largest = _larger(largest, ring.imbalance(body, *found, epsilon, sin_phi, cos_phi, omega) / _UNBALANCED)
-    return largest, ring.power(body, *found, sin_phi, cos_phi, omega)
+        largest = larger(largest, abs(rate - dense_rate) / (allowed + _ROUNDING * abs(v)))
+    return larger(larger(largest, -mode.sign * v / speed), violation), power
 
 
 @audit.energy.implements(ring.BristleRing)

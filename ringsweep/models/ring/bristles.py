@@ -26,8 +26,8 @@ from ringsweep.models.ring.contacts import (
     zones_under,
 )
 from ringsweep.models.ring.creep import DETERMINANT, FAST, NORMAL_1, NORMAL_2, SLOW
-from ringsweep.models.ring.record import ENDS
 from ringsweep.models.ring.series import AT_ONCE, NEARLY_JAMMED
+from ringsweep.models.sliding import ENDS
 from ringsweep.numerics.functions import (
     any_of,
     select,
@@ -103,8 +103,8 @@ class Inspection(NamedTuple):
     creep, swing : tuple of float
         Trace, 1/s, and determinant, 1/s^2, of two parts of the linearised equations: sliding with its bristles, and the
         swing of the body.
-    omega, v : float
-        Angular velocity of the body, rad/s, and sliding velocity, m/s.
+    v : float
+        Sliding velocity, m/s.
     stuck : float
         1 if the body counts as stuck, else 0.
     phi, sin_phi, cos_phi : float
@@ -117,7 +117,6 @@ class Inspection(NamedTuple):
     determinant: float
     creep: tuple[float, float]
     swing: tuple[float, float]
-    omega: float
     v: float
     stuck: float
     phi: float
@@ -184,7 +183,6 @@ def _inspection(scene, y, forcing, at):
         determinant,
         (decay - by_v, coupling - decay * by_v),
         (by_omega, -by_phi),
-        omega,
         v,
         select(stuck, 1.0, 0.0),
         phi,

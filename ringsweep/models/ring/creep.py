@@ -70,17 +70,6 @@ def _in_space(common, forcing, x):
     return phi, omega, sin_phi, cos_phi
 
 
-# The place is relative to the drive, so that no large numbers cancel in slow creep.
-@implicit.to_implicit.implements(ring.Ring)
-def _to_implicit(scene, forcing, y):
-    return y[0] - forcing[0], y[1]
-
-
-@implicit.from_implicit.implements(ring.Ring)
-def _from_implicit(scene, forcing, x):
-    return x[0] + forcing[0], x[1]
-
-
 @implicit.is_stiff.implements(ring.Ring)
 def _is_stiff(scene, mode, y, linear):
     (_, acceleration), (_, _, _, decay), _, _ = linear
@@ -149,12 +138,6 @@ def _near_zero(scene, motion):
     _, omega, _, _ = motion
     load = 0.05 * b.mass * (b.gravity + b.radius * omega * omega)
     return 0.02 * ring.free_determinant(b), 0.0, load, load, 0.0, 0.0
-
-
-@implicit.motion.implements(ring.Ring, ring.BristleRing)
-def _motion(scene, forcing, x, linear):
-    _, ring_omega, ring_epsilon = forcing
-    return x[1] / scene.body.radius + ring_omega, linear[0][1] / scene.body.radius + ring_epsilon
 
 
 @implicit.seen.implements(ring.Ring, ring.BristleRing)

@@ -9,17 +9,10 @@ import numpy as np
 
 from ringsweep.compile import inlined
 from ringsweep.models.interface import recorder, shock
-from ringsweep.models.interface.status import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2, SEPARATED_BOTH
+from ringsweep.models.interface.status import BROKEN, JAM, SEPARATED_1, SEPARATED_2, SEPARATED_BOTH
 from ringsweep.numerics.functions import any_of, select
-from ringsweep.physics import contact
 from ringsweep.physics.ring import BristleRing, Ring
 from ringsweep.quantities.flags import FAILED, JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
-
-#: Status of a run for each mode of :mod:`ringsweep.physics.contact`.
-ENDS = np.full(8, RUNNING)
-ENDS[[contact.OPEN_1, contact.OPEN_2, contact.OPEN_BOTH]] = SEPARATED_1, SEPARATED_2, SEPARATED_BOTH
-ENDS[contact.IMPOSSIBLE] = JAM
-
 
 #: Largest number of turns, since datasets store an int32. A diverging run of constant step exceeds it.
 MOST_TURNS = 2.0**31 - 1.0

@@ -27,12 +27,11 @@ from ringsweep.models.ring.contacts import (
     places_beyond,
     zones_under,
 )
-from ringsweep.models.ring.record import ENDS
+from ringsweep.models.sliding import ENDS, REACTION_TOLERANCE
 from ringsweep.numerics.series import (
     INVERSE,
     ORDER,
     crossings,
-    slope,
     step_size,
     value,
     variation,
@@ -83,9 +82,6 @@ _LEAST_DISCRIMINANT = 1e-12
 
 # Friction coefficients that differ by less than this share are equal.
 _EQUAL = 1e-14
-
-#: Error allowed to the reactions as a share of the load, in units of the tolerance of the series.
-REACTION_TOLERANCE = 1e3
 
 
 class Mode(NamedTuple):
@@ -471,16 +467,6 @@ def _expand_reserve(body, m1, m2, c):
         c[SLOW, k], c[FAST, k] = capacity + friction, capacity - friction
 
 
-@series.state_at.implements(ring.Ring)
-def _state_at(scene, c, s):
-    return value(c[PHI], s), value(c[V], s)
-
-
-@series.rates_at.implements(ring.Ring)
-def _rates_at(scene, c, s):
-    return slope(c[PHI], s), slope(c[V], s)
-
-
 @series.seen_at_start.implements(ring.Ring)
 def _seen_at_start(scene, c):
     return c[PHI, 0], c[OMEGA, 0], c[NORMAL_1, 0], c[NORMAL_2, 0], _acceleration(scene, c, c[EPSILON, 0])
@@ -534,11 +520,6 @@ def _row(scene, mode, c, t, s):
         zone_2,
         0.0 if mode.region < 0 else float(mode.sign),
     )
-
-
-@modes.in_space.implements(ring.Ring)
-def _in_space(scene, t, y):
-    return y[0], y[1] / scene.body.radius + drives.turn(scene.drive, t)[1]
 
 
 @series.after_first_step.implements(Mode)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from ringsweep.compile import hook, lacking
+from ringsweep.compile import hook, inlined, lacking
 from ringsweep.physics.friction import presliding
 from ringsweep.physics.friction.velocity import MU_K, MU_S, SCALE
 from ringsweep.quantities.parameters import Parameter
@@ -73,6 +73,22 @@ def _dynamic(law):
 
 
 _FAMILY_BODIES: dict[type, Any] = {SetValued: _set_valued, Smooth: _smooth, Dynamic: _dynamic}
+
+
+@hook(optional=True)
+def _is_set_valued(family):
+    return False
+
+
+@_is_set_valued.implements(SetValued)
+def _set_valued_is(family):
+    return True
+
+
+@inlined
+def holds_in_band(law):
+    """Whether friction in the band of the law takes any value up to the breakaway force, as in a dead band."""
+    return _is_set_valued(family(law))
 
 
 def add_law(name: str, law: type, traits: Traits) -> None:

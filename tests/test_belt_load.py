@@ -1,0 +1,170 @@
+"""The belt whose normal load grows with the displacement, N = m g + k_n x, against closed forms and SciPy."""
+
+from math import acos, atan2, copysign, pi, sqrt
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import ringsweep
+from ringsweep.quantities.flags import REGIMES
+
+M, K, G = 1.3, 20.0, 9.81
+SMALL_STEPS = {"method": "rk4", "steps": 40_000}
+
+
+def scene(law="stiction", *, growth=8.0, v_b=0.1, start=None, span=20.0, **friction):
+    """Scene on a belt; `start` is displacement and velocity, by default at rest on the belt."""
+    x, velocity = start or (0.0, v_b)
+    return {
+        "model": "belt",
+        "body": {"mass": M, "normal_stiffness": growth},
+        "spring": {"stiffness": K},
+        "belt": {"velocity": v_b},
+        "friction": {"law": law, "mu_s": 0.4, "mu_k": 0.25, **friction},
+        "initial": {"x": x, "velocity": velocity},
+        "time": {"span": span},
+    }
+
+
+def outcome(scene, solver=None):
+    axes = {"time.span": [scene["time"]["span"]]}
+    return ringsweep.sweep(scene, axes, solver=solver or {"method": "auto"}, progress=False).isel(time_span=0)
+
+
+def word(found):
+    return REGIMES[int(found.regime)]
+
+
+class TestStickSlip:
+    @pytest.mark.parametrize("growth", [8.0, -8.0])
+    def test_cycle_is_that_of_a_spring_that_friction_softens(self, growth):
+        """While the belt leads, friction is mu (m g + k_n x): the spring has the stiffness k - mu k_n."""
+        mu_s, mu_k, v_b = 0.4, 0.25, 0.1
+        breaks, centre = (mu * M * G / (K - mu * growth) for mu in (mu_s, mu_k))
+        omega = sqrt((K - mu_k * growth) / M)
+        slip = 2.0 / omega * (pi - atan2((breaks - centre) * omega, v_b))
+        found = outcome(scene(growth=growth, v_b=v_b, span=80.0))
+        assert word(found) == "stick-slip"
+        assert found.certified == 1
+        assert float(found.first_slip) == pytest.approx(breaks / v_b, rel=1e-10)
+        assert float(found.period) == pytest.approx(2.0 * (breaks - centre) / v_b + slip, rel=1e-9)
+        assert float(found.force_max) == pytest.approx(mu_s * (M * G + growth * breaks), rel=1e-10)
+
+    def test_map_over_the_growth_of_the_load_is_that_of_theory(self):
+        """Where friction grows faster than the spring the body rides for ever; just below it slips off the belt."""
+        mu_s, mu_k, v_b = 0.4, 0.25, 0.1
+        growth = K / mu_s * np.array([-1.0, 0.5, 0.7, 0.9, 1.01, 2.0])
+        breaks, centre = (mu * M * G / (K - mu * growth) for mu in (mu_s, mu_k))
+        farthest = centre - np.hypot(breaks - centre, v_b / np.sqrt(np.abs(K - mu_k * growth) / M))
+        leaves = M * G + growth * farthest < 0.0
+        expected = np.where(mu_s * growth > K, "riding", np.where(leaves, "separating", "stick-slip"))
+        assert set(expected) == {"riding", "separating", "stick-slip"}
+        found = ringsweep.sweep(scene(span=200.0), {"body.normal_stiffness": growth}, progress=False)
+        assert [REGIMES[int(regime)] for regime in found.regime] == expected.tolist()
+        assert (found.certified == 1).all()
+
+    def test_touch_of_the_bound_depends_on_the_rates_of_both(self):
+        """On a belt at rest the bound does not move: a body that a spring holds with all friction stays."""
+        start = (0.4 * M * G / (K - 0.4 * 8.0), 0.0)
+        found = outcome(scene(v_b=0.0, start=start, span=5.0))
+        assert word(found) == "riding"
+        assert float(found.x_end) == start[0]
+
+
+class TestSeparation:
+    START = 0.3, -8.0
+
+    def leaves(self, growth=8.0):
+        """Time at which the load vanishes, and the velocity there, while the body slides against a fast belt.
+
+        Friction is -mu (m g + k_n x): a spring of stiffness k + mu k_n about -mu m g / (k + mu k_n).
+        """
+        mu, (x, velocity) = 0.25, self.START
+        stiffness = K + mu * growth
+        omega, centre = sqrt(stiffness / M), -mu * M * G / stiffness
+        size, phase = np.hypot(x - centre, velocity / omega), atan2(-velocity / omega, x - centre)
+        at = acos((-M * G / growth - centre) / size)
+        return (at - phase) / omega, -size * omega * np.sin(at)
+
+    @pytest.mark.parametrize(
+        ("law", "solver", "precision"),
+        [
+            ({"law": "stiction"}, None, 1e-11),
+            ({"law": "bengisu-akay", "alpha": 1e9, "v0": 1e-6}, {"method": "implicit"}, 1e-6),
+            ({"law": "bengisu-akay", "alpha": 1e9, "v0": 1e-6}, SMALL_STEPS, 1e-6),
+        ],
+    )
+    def test_run_ends_where_the_load_vanishes(self, law, solver, precision):
+        expected, velocity = self.leaves()
+        found = outcome(scene(**law, v_b=-50.0, start=self.START, span=2.0), solver)
+        assert word(found) == "separating"
+        assert REGIMES[int(found.motion)] == "sliding"
+        assert float(found.t_end) == pytest.approx(expected, rel=precision)
+        assert float(found.x_end) == pytest.approx(-M * G / 8.0, rel=precision)
+        assert float(found.velocity_end) == pytest.approx(velocity, rel=1e-3 if precision > 1e-9 else precision)
+        if solver is None:
+            assert found.certified == 1
+
+    def test_body_without_a_load_at_launch_separates_at_once(self):
+        found = outcome(scene(start=(-2.0, 0.0)))
+        assert word(found) == "separating"
+        assert float(found.t_end) == 0.0
+
+    def test_swing_that_nearly_leaves_the_belt_is_not_certified(self):
+        """The load at the turn is smaller than what the two runs can tell apart, or the run separates there."""
+        mu, growth = 0.25, 8.0
+        stiffness = K + mu * growth
+        centre = -mu * M * G / stiffness
+        far = 2.0 * centre + M * G / growth
+        held, lost = (
+            outcome(scene(v_b=-50.0, start=(far + shift, 0.0), span=0.9 * 2 * pi * sqrt(M / stiffness)))
+            for shift in (-1e-3, 1e-3)
+        )
+        assert word(held) != "separating"
+        assert word(lost) == "separating"
+        grazing = outcome(scene(v_b=-50.0, start=(far, 0.0), span=0.9 * 2 * pi * sqrt(M / stiffness)))
+        assert (held.certified, lost.certified, grazing.certified) == (1, 1, 0)
+
+
+class TestOtherIntegrators:
+    """A smooth law in SciPy, written down here again."""
+
+    FRICTION = {"v0": 0.05, "alpha": 5.0}  # noqa: RUF012
+
+    def rates(self, v_b, growth):
+        def mu(v):
+            if abs(v) < 0.05:
+                return 0.4 * (1.0 - (1.0 - abs(v) / 0.05) ** 2)
+            return 0.25 * (1.0 + (0.4 / 0.25 - 1.0) * np.exp(-5.0 * (abs(v) - 0.05)))
+
+        def found(t, y):
+            v = y[1] - v_b
+            return y[1], (-K * y[0] - copysign(mu(v), v) * (M * G + growth * y[0])) / M
+
+        return found
+
+    @pytest.mark.parametrize("solver", [{"method": "implicit", "rtol": 1e-9}, SMALL_STEPS])
+    def test_end_of_a_run_agrees(self, solver):
+        start, v_b, growth = (0.2, 1.5), 0.3, 12.0
+        found = outcome(scene("bengisu-akay", growth=growth, v_b=v_b, start=start, span=8.0, **self.FRICTION), solver)
+        tight = {"rtol": 1e-11, "atol": 1e-12, "max_step": 1e-2}
+        end = solve_ivp(self.rates(v_b, growth), (0.0, 8.0), start, method="DOP853", **tight).y[:, -1]
+        np.testing.assert_allclose([found.x_end, found.velocity_end], end, atol=3e-6)
+        assert found.certified == 1
+
+    def test_bristles_carry_the_varying_load(self):
+        """Dahl's bristles: force sigma0 z (m g + k_n x)/(m g)."""
+        sigma0, mu_k, growth, v_b = 300.0, 0.25, 12.0, 0.3
+
+        def rates(t, y):
+            x, velocity, z = y
+            v, per_load = velocity - v_b, sigma0 / (M * G)
+            rate = v - per_load * abs(v) * z / mu_k
+            return velocity, (-K * x - per_load * z * (M * G + growth * x)) / M, rate
+
+        found = scene("dahl", growth=growth, v_b=v_b, start=(0.2, 1.5), span=5.0)
+        found["friction"] = {"law": "dahl", "mu_k": mu_k, "sigma0": sigma0}
+        end = solve_ivp(rates, (0.0, 5.0), (0.2, 1.5, 0.0), method="DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
+        result = outcome(found, {"method": "implicit", "rtol": 1e-9})
+        np.testing.assert_allclose([result.x_end, result.velocity_end], end[:2], atol=1e-5)
