@@ -203,6 +203,26 @@ class TestHistory:
         assert not [line for line in after[3].lines if line.get_marker() == "o"]
         assert after[5].get_xlim() == (1.5, pytest.approx(3.8, abs=0.02))
 
+    @pytest.mark.parametrize("width", [85, 170])
+    def test_nothing_of_a_printed_history_is_cut_off(self, run, width):
+        plots.style("print", width=width)
+        try:
+            figure = plots.history(run.assign(t_separation=1.285))
+            figure.draw_without_rendering()
+        finally:
+            plots.style()
+        for axes in figure.axes:
+            for artist in filter(None, [axes.xaxis.label, axes.yaxis.label, axes.get_legend()]):
+                box = artist.get_window_extent()
+                assert box.x0 > -1
+                assert box.x1 < figure.bbox.x1 + 1
+
+    def test_laws_have_a_panel_for_the_gap_of_each_contact(self, run):
+        one = run.drop_dims("impact").drop_vars(["aftermath", "regime"])
+        both = xr.concat([one, one], xr.DataArray(["stiction", "coulomb"], dims="friction_law", name="friction_law"))
+        titles = [axes.get_title(loc="left") for axes in plots.history(both).axes]
+        assert titles.count("contact 1") == titles.count("contact 2") == 2
+
     def test_one_panel_shows_the_impacts_alone(self, run):
         axes = plots.history_panel(run, "impact_speed", ax())
         assert len(axes.lines) == 2

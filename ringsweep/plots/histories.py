@@ -350,7 +350,7 @@ def _draw_laws(axes: Axes, ds: xr.Dataset, names: tuple[str, ...]) -> None:
         )
     axes.set_ylabel(_short_label(ds, name))
     axes.margins(x=0)
-    if name.startswith("normal"):
+    if name.startswith(("normal", "gap")):
         axes.set_title(f"contact {name[-1]}", fontsize=SMALL, loc="left")
     if name in _CLIPPED:
         clip(axes, ds["time"].values, numbers)
