@@ -49,7 +49,7 @@ class ColourScale:
             if norm == "log" and (not positive.size or finite.min() < 0.0):
                 raise InputError("norm", f"{data.name} has no logarithm: its values are not positive")
             if positive.size and positive.max() > positive.min() and _is_logarithmic(data, finite, norm):
-                return cls(palette.with_extremes(under=_ZERO), LogNorm(positive.min(), positive.max()))
+                return cls(palette.with_extremes(under=ZERO), LogNorm(positive.min(), positive.max()))
             if str(data.name) in SAMPLED and data.dtype.kind == "f" and norm is None:
                 # Shares: every map of them has the same colours.
                 return cls(palette, Normalize(0.0, 1.0))
@@ -82,8 +82,8 @@ class ColourScale:
 
 _WORDS = REGIME_COLOURS | AFTERMATH_COLOURS
 
-# Colour of zeros among numbers on a logarithmic scale: lighter than all numbers, and of another hue.
-_ZERO = "#FBDFCB"
+#: Colour of zeros among numbers on a logarithmic scale: lighter than most numbers, and of another hue.
+ZERO = "#FBDFCB"
 
 
 def _is_logarithmic(data: xr.DataArray, finite: NDArray[Any], norm: str | None) -> bool:
@@ -201,7 +201,7 @@ def legend_entries(
         other = ~shown & ~inferred.values if _has_two_kinds_of_missing(data, inferred) else ~shown
         entries.append(Patch(color=on_page(NO_VALUE), label=f"{missing_text(ds, data)}, {_share(other)}"))
     if isinstance(scale.norm, LogNorm) and (zero := data.values == 0.0).any():
-        entries.append(Patch(color=_ZERO, label=f"exactly 0, {_share(zero)}"))
+        entries.append(Patch(color=ZERO, label=f"exactly 0, {_share(zero)}"))
     ink = on_page("black")
     for warning in warnings:
         label = f"{warning.label}, {_share(warning.cells.values)}"
