@@ -175,6 +175,18 @@ class TestOffTheRace:
         np.testing.assert_allclose(weight.get_offsets()[0], [now["x"], now["y"]], atol=1e-12)
         assert axes.get_title().endswith({1.5: "one contact open", 2.5: "flight"}.get(time, axes.get_title()))
 
+    def test_particle_in_flight_is_a_ball_as_far_from_the_race_as_its_gap_with_its_weight_at_its_centre(self, run):
+        scene = {name: SCENE[name] for name in ("ring", "friction", "zone", "drive", "impact", "time")}
+        scene |= {"model": "ring-single-contact", "body": {"mass": MASS}}
+        alone = run.drop_vars(["gap_2", "normal_2"]).assign_attrs(configuration=json.dumps({"scene": scene}))
+        axes = ax()
+        plots.polar_view(alone.assign(gap_1=("time", np.full(run.sizes["time"], 0.005))), 2.5, axes)
+        (ball,) = (patch for patch in axes.patches if isinstance(patch, Circle))
+        *_, weight = (artist for artist in axes.collections if isinstance(artist, Quiver))
+        assert np.hypot(*ball.center) == pytest.approx(RADIUS - ball.radius - 0.005)
+        np.testing.assert_allclose(weight.get_offsets()[0], ball.center)
+        assert axes.get_title().endswith("flight")
+
     def test_film_moves_the_body_off_the_race(self, run, tmp_path):
         plots.save_animation(run, tmp_path / "film.gif", fps=2, duration=2, progress=False)
         assert (tmp_path / "film.gif").stat().st_size > 1000

@@ -97,7 +97,10 @@ def _on_race(ds: xr.Dataset, rig: Rig) -> dict[str, NDArray[Any]]:
     epsilon, first = ds["epsilon"].values, ds["normal_1"].values
     _, _, *forces = ring.held(rig.body, 1.0, np.sin(phi), np.cos(phi), omega, omega**2, epsilon, first)
     distance = getattr(rig.body, "xi", rig.radius - rig.ball)
-    found = {} if "x" in ds else {"x": distance * np.sin(phi), "y": -distance * np.cos(phi)}
+    if "gap_1" in ds:
+        # A particle is drawn as a ball within the race.
+        distance = distance - ds["gap_1"].values
+    found = {"x": distance * np.sin(phi), "y": -distance * np.cos(phi)}
     for k, force in enumerate(forces, start=1):
         found[f"friction_{k}"] = np.where(open_contacts(ds)[0], 0.0, force) if "gap_1" in ds else force
         found[f"alpha_{k}"] = phi + rig.offset(k)
