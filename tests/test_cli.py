@@ -8,11 +8,12 @@ import sys
 from itertools import product
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
 from jsonschema import Draft202012Validator
 
-from ringsweep.cli import main
+from ringsweep.cli import main, report
 from ringsweep.cli.parser import build_parser
 from ringsweep.config import load
 from ringsweep.config.schema import schema
@@ -373,3 +374,16 @@ def test_documentation_names_every_key_law_drive_and_variable():
     }
     for name in {*keys, *MODELS, *LAWS, *DRIVES, *METHODS, *OUTCOMES, *HISTORY} - {"auto"}:
         assert re.search(rf"`[^`]*\b{re.escape(name)}`", text), name
+
+
+def test_info_tells_what_follows_lost_contacts_and_the_greatest_loads(tmp_path, capsys):
+    values = {"regime": [1, 3, 3, 3], "aftermath": [0, 1, 1, 3], "gap_max": [0.0, 1e-5, 2e-3, 0.0168]}
+    values |= {"jump_max": [50.0, 60.0, 357.8, 90.0], "certified": [1, 1, 1, 0]}
+    ds = xr.Dataset(
+        {name: ("drive_amplitude", np.array(column), OUTCOMES[name].attributes) for name, column in values.items()},
+        {"drive_amplitude": [1.0, 2.0, 3.0, 4.0]},
+    )
+    report.summarise(ds)
+    text = capsys.readouterr().out
+    assert "contacts:\n  held: 1 (25.0%)\n  recovered: 2 (50.0%)\n  tumbled: 1 (25.0%)\n" in text
+    assert "greatest: jump_max 358 rad s-2, gap_max 0.0168 m\n" in text

@@ -40,6 +40,11 @@ SMALLER = {
         "np.geomspace(0.035, 1.2, 110)": "np.geomspace(0.035, 1.2, 22)",
         "np.linspace(0.02, 0.98, 65)": "np.linspace(0.02, 0.98, 13)",
     },
+    "07-after-contact": {
+        "np.geomspace(0.1, 10, 32), np.radians(np.linspace(2, 60, 32))": (
+            "np.geomspace(0.1, 10, 8), np.radians(np.linspace(2, 60, 8))"
+        ),
+    },
 }
 
 #: Text that depends on the machine or shows a problem: folders, progress bars, warnings, tracebacks.

@@ -13,6 +13,7 @@ import xarray as xr
 
 from ringsweep import cli, plots
 from ringsweep.errors import InputError
+from ringsweep.models.ring.impact.record import OUTCOMES as IMPACT_ONLY
 from ringsweep.quantities.variables import OUTCOMES
 from ringsweep.storage import netcdf
 
@@ -42,7 +43,7 @@ def sweep(*sizes, points=False):
         else:
             values = rng.normal(size=sizes) if variable.dtype.startswith("f") else rng.integers(0, 9, sizes)
         values = np.abs(values) * 1e-9 if name.endswith("_error") else values
-        if name.removesuffix("_error") not in BELT_ONLY | {"origin", "level", "stiffness"}:
+        if name.removesuffix("_error") not in BELT_ONLY | {"origin", "level", "stiffness", *IMPACT_ONLY}:
             numbers[name] = (dims, values.astype(variable.dtype), variable.attributes)
     return xr.Dataset(numbers, coords, {"title": "a sweep of <b>chance</b>"})
 
@@ -213,3 +214,13 @@ def test_map_writes_a_page_and_refuses_boundaries_in_it(bokeh, tmp_path, monkeyp
     assert models((tmp_path / "my.html").read_text(encoding="utf-8"), "Select")[0]["value"] == "phi_max"
     assert cli.main(["map", "my.nc", "-o", "my.html", "--boundaries", "separating"]) == 2
     assert "not into a page" in capsys.readouterr().err
+
+
+def test_zeros_among_numbers_over_decades_have_a_colour_of_their_own_and_the_least_number_has_not(bokeh, tmp_path):
+    ds = sweep(12, 10)
+    errors = np.geomspace(1e-12, 1e-6, 120).reshape(12, 10)
+    errors[:3] = 0.0
+    ds = ds[["regime", "t_end_error"]].assign(t_end_error=(ds["t_end_error"].dims, errors, ds["t_end_error"].attrs))
+    (mapper,) = models(page_of(ds, tmp_path), "LogColorMapper")
+    assert mapper["low_color"] not in mapper["palette"]
+    assert 0.9 * errors[errors > 0.0].min() < mapper["low"] < errors[errors > 0.0].min()

@@ -24,11 +24,12 @@ def summarise(result: xr.Dataset) -> None:
         return
     regime = result["regime"]
     print("cells:", regime.size)
-    meanings = str(regime.attrs["flag_meanings"]).split()
-    for flag, meaning in zip(np.atleast_1d(regime.attrs["flag_values"]), meanings, strict=True):
-        count = int((regime == flag).sum())
-        if count:
-            print(f"  {meaning}: {count} ({count / regime.size:.1%})")
+    _print_shares(regime)
+    if "aftermath" in result:
+        print("contacts:")
+        _print_shares(result["aftermath"])
+    if extremes := [_extreme(result[name]) for name in _GREATEST if name in result and result[name].notnull().any()]:
+        print("greatest:", ", ".join(extremes))
     if "certified" in result:
         # NaN in a refined sweep, where no cell was run.
         certified = result["certified"].values
@@ -61,6 +62,23 @@ def summarise(result: xr.Dataset) -> None:
     for name in ("phi_end_error", "x_end_error"):
         if name in result and (unbounded := int(((result["certified"] == 1) & result[name].isnull()).sum())):
             print(f"no bound: {unbounded} certified cells, where nearby runs diverge")
+
+
+# What loads or shakes the body most, over all cells.
+_GREATEST = ("jump_max", "normal_max_1", "normal_max_2", "gap_max", "impact_speed_max", "impulse_max")
+
+
+def _extreme(data: xr.DataArray) -> str:
+    return f"{data.name} {float(data.max()):.3g} {data.attrs.get('units', '')}"
+
+
+def _print_shares(data: xr.DataArray) -> None:
+    """Print the number and the share of the cells of each class that occurs."""
+    meanings = str(data.attrs["flag_meanings"]).split()
+    for flag, meaning in zip(np.atleast_1d(data.attrs["flag_values"]), meanings, strict=True):
+        count = int((data == flag).sum())
+        if count:
+            print(f"  {meaning}: {count} ({count / data.size:.1%})")
 
 
 # Events of a run that are printed: all, or the first and the last.

@@ -14,11 +14,10 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from ringsweep.config import load
-from ringsweep.plots.datasets import configuration
+from ringsweep.plots.datasets import configuration, mode_name
 from ringsweep.plots.labels import number_text
 from ringsweep.plots.phase import draw_belt_portrait
 from ringsweep.plots.polar import reference_force, round_down
-from ringsweep.plots.rig import mode_name
 from ringsweep.plots.style import PAIR_COLOURS, REST, SMALL, on_page, page_colour
 
 # Heights in the picture, where the body stands on the belt at 0.

@@ -12,16 +12,23 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from ringsweep.errors import InputError, nearest_name
-from ringsweep.quantities.variables import HISTORY
+from ringsweep.quantities.variables import HISTORY, MODES
 
 #: Panels of a history by the variable that says where the body is: ``phi`` in a ring, ``x`` on a belt.
 #: Variables of one tuple share a panel.
 PANELS: dict[str, tuple[tuple[str, ...], ...]] = {
-    "phi": (("phi",), ("omega", "ring_omega"), ("epsilon",), ("normal_1", "normal_2")),
+    "phi": (
+        *(("phi",), ("omega", "ring_omega"), ("epsilon",), ("normal_1", "normal_2")),
+        *(("gap_1", "gap_2"), ("impact_speed",)),
+    ),
     "x": (("x",), ("velocity", "belt_velocity"), ("friction_force",)),
 }
+
+#: What pictures show in place of the mode of friction while one of two contacts is open, and while none holds.
+PIVOT, FLIGHT = 2, 3
 
 
 # What a picture says of a scene: path, the words before its value, and the unit of a plain number.
@@ -168,6 +175,26 @@ def zones(ds: xr.Dataset) -> list[str]:
     return [] if compares_laws(ds) else present(ds, ("zone_1", "zone_2"))
 
 
+def phases(ds: xr.Dataset) -> NDArray[Any]:
+    """Mode of friction from each instant of a run to the next, or ``PIVOT`` or ``FLIGHT``."""
+    mode, is_open = ds["mode"].values, open_contacts(ds)
+    if not is_open:
+        return np.asarray(mode)
+    return np.select([np.all(is_open, axis=0), np.any(is_open, axis=0)], [FLIGHT, PIVOT], mode)
+
+
+def open_contacts(ds: xr.Dataset) -> list[NDArray[np.bool_]]:
+    """Whether each contact is open from each instant of a run to the next; empty if the run has no gaps."""
+    gaps = [ds[name].values for name in present(ds, ("gap_1", "gap_2"))]
+    # A contact that rebounds is open before and after an instant without a gap.
+    return [np.maximum(gap, np.append(gap[1:], 0.0)) > 0.0 for gap in gaps]
+
+
+def mode_name(mode: float) -> str:
+    """Name of a mode of friction, or of what takes its place, for readers."""
+    return (MODES | {PIVOT: "one_contact_open", FLIGHT: "flight"})[int(mode)].replace("_", " ")
+
+
 def present(ds: xr.Dataset, names: Iterable[str]) -> list[str]:
     """Those of the names that are in the dataset."""
     return [name for name in names if name in ds]
@@ -208,8 +235,8 @@ def scene_text(ds: xr.Dataset) -> list[str]:
         value = scene.get(section, {}).get(key) if isinstance(scene.get(section), dict) else None
         if value is None or path in swept_here:
             continue
-        unit = after if isinstance(value, int | float) else ""
-        found.append(f"{before}{value}{unit}")
+        is_number = isinstance(value, int | float)
+        found.append(f"{before}{value:.4g}{after}" if is_number else f"{before}{value}")
     return found
 
 

@@ -193,10 +193,12 @@ class _Film:
         self.states = states_at(run, np.linspace(time[0], time[-1], max(2, round(fps * duration))))
         style: dict[str, Any] = {"ncols": 3, "fontsize": SMALL, "frameon": False, "columnspacing": 1}
         left.legend(handles=self.body.legend_entries(), loc="outside lower center", **style)
-        shown = [names for names in panels_of(run) if names != ("epsilon",)]
+        shown = [names for names in panels_of(run) if names not in (("epsilon",), ("impact_speed",))]
         panels = list(right.subplots(len(shown), 1, sharex=True))
         for panel, names in zip(panels, shown, strict=True):
             draw_panel(panel, run, names)
+            if len(shown) > 3:
+                panel.yaxis.label.set_fontsize(SMALL)
         panels[-1].set_xlabel(axis_label(run["time"], run))
         self.futures = [_cover_of_future(panel) for panel in panels]
         if time[-1] > time[0]:

@@ -16,21 +16,26 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from ringsweep.plots.datasets import (
+    FLIGHT,
     PANELS,
+    PIVOT,
     compares_laws,
+    mode_name,
     on_ring,
     outcome,
     panels_of,
+    phases,
     present,
     require_history,
     resolve,
     scene_text,
     zones,
 )
-from ringsweep.plots.labels import axis_label, displayed, long_name, number_text, unit_text
+from ringsweep.plots.labels import axis_label, displayed, label_axis, long_name, number_text, unit_text
 from ringsweep.plots.style import (
     CURVE_COLOURS,
     CURVE_STYLES,
+    OPEN,
     PAIR_COLOURS,
     PAIR_STYLES,
     REST,
@@ -62,6 +67,9 @@ _DIFFERENT = 0.05
 # Panels in which a few outliers must not flatten the rest.
 _CLIPPED = ("epsilon", "friction_force")
 
+# Impact speeds below this share of the greatest are not shown: the last rebounds of a contact are endless.
+_WEAKEST = 1e-4
+
 # Intervals of time into which a long history is condensed: more than a printed panel has pixels.
 _INTERVALS = 4000
 
@@ -71,12 +79,16 @@ _SHORT_NAMES = {
     "epsilon": "angular\nacceleration",
     "normal_1": "normal reaction",
     "normal_2": "normal reaction",
+    "gap_1": "gap",
+    "gap_2": "gap",
+    "impact_speed": "impact speed",
     "x": "displacement",
     "velocity": "velocity",
     "friction_force": "friction force",
 }
 
 _LEGEND = {"omega": "body", "ring_omega": "ring", "normal_1": "contact 1", "normal_2": "contact 2"}
+_LEGEND |= {"gap_1": "contact 1", "gap_2": "contact 2"}
 _LEGEND |= {"velocity": "body", "belt_velocity": "belt"}
 
 
@@ -84,9 +96,10 @@ def history(ds: xr.Dataset) -> Figure:
     """Draw the time history of one run, or of a run under each of several friction laws.
 
     The panels are those of the paper. For a ring they show angle, angular velocity, angular acceleration and normal
-    reactions, with a mark where a contact separates; a strip below shows which zone lies under each contact. For a belt
-    they show displacement, velocity and friction force. Times at which the body sticks are shaded. If the law has
-    bristles and the body breaks away, a last panel shows the friction force around the first break-away.
+    reactions, with a mark where a contact separates; a strip below shows which zone lies under each contact. If the run
+    goes on after that, panels below show the gaps and, as marks, the speeds of impacts. For a belt the panels show
+    displacement, velocity and friction force. Times at which the body sticks, or a contact is open, are shaded. If the
+    law has bristles and the body breaks away, a last panel shows the friction force around the first break-away.
 
     Several friction laws are a line each, without strip and shading. On a belt, if their friction forces differ at the
     start, a panel shows the start for twice as long as they differ. Its time axis is logarithmic if differences end at
@@ -125,7 +138,7 @@ def history(ds: xr.Dataset) -> Figure:
 
 
 def history_panel(ds: xr.Dataset, var: str = "phi", ax: Axes | None = None) -> Axes:
-    """Draw one quantity of a run over time; times at which the body sticks are shaded.
+    """Draw one quantity of a run over time; times at which the body sticks, or a contact is open, are shaded.
 
     The panel of ``omega`` also shows the angular velocity of the ring, and the panel of a normal reaction also shows
     that of the other contact. Several friction laws are a line each.
@@ -160,7 +173,7 @@ def history_panel(ds: xr.Dataset, var: str = "phi", ax: Axes | None = None) -> A
     'time (s)'
     """
     ds = require_history(ds)
-    var = resolve("var", var, [name for name, data in ds.items() if "time" in data.dims])
+    var = resolve("var", var, [name for name, data in ds.items() if {"time", "impact"} & set(data.dims)])
     ax = axes_or_current(ax, 0.34)
     if compares_laws(ds):
         _draw_laws(ax, ds, (var,))
@@ -240,22 +253,28 @@ def draw_panel(axes: Axes, ds: xr.Dataset, names: tuple[str, ...], explain_shadi
     time, names = ds["time"].values, tuple(present(ds, names))
     explain_shading = explain_shading or names[0] in PANELS
     if "mode" in ds:
-        at, mode = _by_interval(time, ds["mode"].values)
-        sticks = [(at[i], at[j] - at[i]) for i, j in true_ranges(mode == 0)]
-        axes.broken_barh(
-            sticks,
-            (0, 1),
-            transform=axes.get_xaxis_transform(),
-            color=on_page(STICK),
-            linewidth=0,
-            label="stick" if explain_shading and sticks else None,
-        )
+        at, phase = _by_interval(time, phases(ds))
+        for value, look in _shades().items():
+            spans = [(at[i], at[j] - at[i]) for i, j in true_ranges(phase == value)]
+            axes.broken_barh(
+                spans,
+                (0, 1),
+                transform=axes.get_xaxis_transform(),
+                **look,
+                linewidth=0,
+                label=mode_name(value) if explain_shading and spans else None,
+            )
+    if names == ("impact_speed",):
+        _draw_impacts(axes, ds)
+        return
     for name, colour, style in zip(names, PAIR_COLOURS, PAIR_STYLES, strict=False):
         curve = _envelope(time, displayed(ds[name]).values)
         axes.plot(*curve, color=on_page(colour), linestyle=style, linewidth=1, label=_LEGEND.get(name))
     _mark_separation(axes, ds, names)
     legend_above(axes)
     axes.set_ylabel(_short_label(ds, names[0]))
+    if names[0].startswith("gap"):
+        label_axis(axes.yaxis, _SHORT_NAMES[names[0]], unit_text(ds[names[0]]))
     axes.margins(x=0)
     if time_limits(ds)[1] > time[-1]:
         axes.set_xlim(*time_limits(ds))
@@ -263,26 +282,55 @@ def draw_panel(axes: Axes, ds: xr.Dataset, names: tuple[str, ...], explain_shadi
         clip(axes, time, displayed(ds[names[0]]).values, "left" if explain_shading else "right")
 
 
+def _shades() -> dict[int, dict[str, Any]]:
+    """Shading of times by phase."""
+    return {
+        0: {"color": on_page(STICK)},
+        PIVOT: {"color": OPEN, "alpha": 0.18},
+        FLIGHT: {"color": OPEN, "alpha": 0.45},
+    }
+
+
+def _draw_impacts(axes: Axes, ds: xr.Dataset) -> None:
+    """Draw the speed of each impact as a mark."""
+    first, last = map(float, ds["time"].values[[0, -1]])
+    time, contact, speed = (ds[name].values for name in ("impact_time", "impact_contact", "impact_speed"))
+    shown = (first <= time) & (time <= last) & (speed > _WEAKEST * speed.max(initial=0.0))
+    colours = [*map(on_page, PAIR_COLOURS), on_page("black")]
+    for which, colour, marker, label in zip((1, 2, 3), colours, "+x*", ("contact 1", "contact 2", "both"), strict=True):
+        here = shown & (contact == which)
+        if here.any():
+            axes.plot(time[here], speed[here], marker=marker, color=colour, linestyle="", markersize=4, label=label)
+    legend_above(axes)
+    if shown.any():
+        axes.set_yscale("log")
+    axes.set_ylabel(_short_label(ds, "impact_speed"))
+    axes.set_xlim(*time_limits(ds))
+
+
 def time_limits(ds: xr.Dataset) -> tuple[float, float]:
     """Limits of the time axis of a history, s: with a margin behind an end that comes before the end of the span."""
     first, last = map(float, ds["time"].values[[0, -1]])
-    ends_early = "regime" in ds and bool(ds["regime"].isin([SEPARATING, JAMMED]).any())
+    ends = [JAMMED] if "aftermath" in ds else [SEPARATING, JAMMED]
+    ends_early = "regime" in ds and bool(ds["regime"].isin(ends).any())
     return first, last + 0.03 * (last - first) * ends_early
 
 
 def _mark_separation(axes: Axes, ds: xr.Dataset, names: tuple[str, ...]) -> None:
-    """Mark the end of a run at which a contact separates, in the panel of the normal reactions."""
+    """Mark where a contact separates first, in the panel of the normal reactions."""
     if not {"separating_contact", "t_separation"} <= set(ds.variables):
         return
     which, instant = int(ds["separating_contact"]), float(ds["t_separation"])
     ending = [name for name in names if name in (f"normal_{which}", *("normal_1", "normal_2")[: 2 * (which == 3)])]
-    # A part of a run may end before the separation.
-    if not ending or not instant <= ds["time"].values[-1] * (1.0 + 1e-9):
+    # A part of a run may have no separation.
+    first, last = ds["time"].values[[0, -1]]
+    if not ending or not first <= instant <= last * (1.0 + 1e-9):
         return
     contact = "both contacts separate" if which == 3 else f"contact {which} separates"
     text = f"{contact}, t = {number_text(instant, '.4g')} s"
     for name in ending:
-        reaction = ds[name].values[np.isfinite(ds[name].values)][-1]
+        known = np.isfinite(ds[name].values) & (ds["time"].values <= instant * (1.0 + 1e-9))
+        reaction = ds[name].values[known][-1]
         style: dict[str, Any] = {"marker": "o", "markersize": 5, "markerfacecolor": "none", "clip_on": False}
         axes.plot([instant], [reaction], color=on_page("black"), linestyle="", zorder=5, label=text, **style)
         text = "_"
@@ -302,7 +350,7 @@ def _draw_laws(axes: Axes, ds: xr.Dataset, names: tuple[str, ...]) -> None:
         )
     axes.set_ylabel(_short_label(ds, name))
     axes.margins(x=0)
-    if name.startswith("normal"):
+    if name.startswith(("normal", "gap")):
         axes.set_title(f"contact {name[-1]}", fontsize=SMALL, loc="left")
     if name in _CLIPPED:
         clip(axes, ds["time"].values, numbers)

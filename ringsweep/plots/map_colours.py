@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ringsweep.errors import InputError
 from ringsweep.plots.datasets import configuration
 from ringsweep.plots.labels import number_text
-from ringsweep.plots.style import CLASS_COLOURS, NO_VALUE, REGIME_COLOURS, on_page
+from ringsweep.plots.style import AFTERMATH_COLOURS, CLASS_COLOURS, NO_VALUE, REGIME_COLOURS, on_page
 from ringsweep.quantities.flags import FAILED, JAMMED
 from ringsweep.quantities.variables import INFERRED, SAMPLED
 
@@ -36,7 +36,7 @@ class ColourScale:
     def of(cls, data: xr.DataArray, norm: str | None = None, cmap: str | None = None) -> ColourScale:
         """The colours of a variable: by the meaning of its flags, or from its least to its greatest value.
 
-        `norm` is ``"linear"`` or ``"log"``; by default positive numbers that differ by powers of ten are logarithmic.
+        `norm` is ``"linear"`` or ``"log"``; by default numbers over powers of ten, zeros among them, are logarithmic.
         """
         if norm not in (None, "linear", "log"):
             raise InputError("norm", f"{norm!r} is none: it is linear or log")
@@ -49,7 +49,7 @@ class ColourScale:
             if norm == "log" and (not positive.size or finite.min() < 0.0):
                 raise InputError("norm", f"{data.name} has no logarithm: its values are not positive")
             if positive.size and positive.max() > positive.min() and _is_logarithmic(data, finite, norm):
-                return cls(palette.with_extremes(under=_ZERO), LogNorm(positive.min(), positive.max()))
+                return cls(palette.with_extremes(under=ZERO), LogNorm(positive.min(), positive.max()))
             if str(data.name) in SAMPLED and data.dtype.kind == "f" and norm is None:
                 # Shares: every map of them has the same colours.
                 return cls(palette, Normalize(0.0, 1.0))
@@ -58,7 +58,7 @@ class ColourScale:
         flags = np.atleast_1d(data.attrs["flag_values"])
         meanings = str(data.attrs["flag_meanings"]).split()
         # The colour of a class does not depend on which other classes occur.
-        colours = [REGIME_COLOURS.get(m, CLASS_COLOURS[k % len(CLASS_COLOURS)]) for k, m in enumerate(meanings)]
+        colours = [_WORDS.get(m, CLASS_COLOURS[k % len(CLASS_COLOURS)]) for k, m in enumerate(meanings)]
         classes = BoundaryNorm(np.arange(len(flags) + 1) - 0.5, len(flags))
         return cls(_with_grey(ListedColormap(colours)), classes, flags, tuple(m.replace("_", " ") for m in meanings))
 
@@ -80,18 +80,24 @@ class ColourScale:
         return np.asarray(self.colours(self.norm(np.ma.masked_invalid(numbers))))
 
 
-# Colour of zeros among numbers on a logarithmic scale.
-_ZERO = "#d95f0e"
+_WORDS = REGIME_COLOURS | AFTERMATH_COLOURS
+
+#: Colour of zeros among numbers on a logarithmic scale: lighter than most numbers, and of another hue.
+ZERO = "#FBDFCB"
 
 
 def _is_logarithmic(data: xr.DataArray, finite: NDArray[Any], norm: str | None) -> bool:
-    """Whether colours follow the logarithm: as asked for, for bounds on errors, or where half of the map were dark."""
+    """Whether colours follow the logarithm: as asked for, for bounds on errors, or for numbers over decades."""
     if norm is not None:
         return norm == "log"
     if str(data.name).endswith("_error"):
         return True
-    # Half of the values in the lowest twentieth of the scale, over two decades.
-    return bool(finite.min() > 0.0 and finite.max() > max(100.0 * finite.min(), 20.0 * np.median(finite)))
+    positive = finite[finite > 0.0]
+    if not positive.size or finite.min() < 0.0:
+        return False
+    low, middle, high = np.quantile(positive, (0.05, 0.5, 0.95))
+    # Half of the values in the lowest twentieth of the scale, or nine in ten of them over two decades.
+    return bool(positive.max() > max(100.0 * positive.min(), 20.0 * middle) or high > 100.0 * low)
 
 
 @dataclass(frozen=True)
@@ -109,12 +115,12 @@ class CellWarning:
 
 
 def cell_warnings(ds: xr.Dataset, data: xr.DataArray) -> list[CellWarning]:
-    """Warnings of a map of regimes or motions: not certified, or beyond the stability limit of ``rk4``.
+    """Warnings of a map of regimes, motions or aftermaths: not certified, or beyond the stability limit of ``rk4``.
 
     A map of another variable hatches the cells without a value that were inferred, if others have none for another
     reason.
     """
-    if data.name not in ("regime", "motion"):
+    if data.name not in ("regime", "motion", "aftermath"):
         inferred = _missing_inferred(ds, data)
         return [CellWarning(_NOT_RUN, "//////", "x", inferred)] if _has_two_kinds_of_missing(data, inferred) else []
     found = []
@@ -167,6 +173,7 @@ def _has_two_kinds_of_missing(data: xr.DataArray, inferred: xr.DataArray) -> boo
 # Events that a run may lack, and what it lacks if another variable is missing.
 _EVENTS = {"t_separation": "no separation", "first_slip": "no slip"}
 _ABSENT = _EVENTS | dict.fromkeys(("period", "stick_share", "stops_per_cycle", "swing"), "no cycle")
+_ABSENT |= {"t_recovered": "none lost, or\nopen at the end"}
 
 
 def _span(ds: xr.Dataset) -> str:
@@ -194,7 +201,7 @@ def legend_entries(
         other = ~shown & ~inferred.values if _has_two_kinds_of_missing(data, inferred) else ~shown
         entries.append(Patch(color=on_page(NO_VALUE), label=f"{missing_text(ds, data)}, {_share(other)}"))
     if isinstance(scale.norm, LogNorm) and (zero := data.values == 0.0).any():
-        entries.append(Patch(color=_ZERO, label=f"exactly 0, {_share(zero)}"))
+        entries.append(Patch(color=ZERO, label=f"exactly 0, {_share(zero)}"))
     ink = on_page("black")
     for warning in warnings:
         label = f"{warning.label}, {_share(warning.cells.values)}"

@@ -19,7 +19,7 @@ from ringsweep.errors import InputError
 from ringsweep.plots.datasets import is_numeric, is_sampled, require_sweep, resolve, swept
 from ringsweep.plots.labels import axis_label, displayed, long_name, plain_text, value_text
 from ringsweep.plots.map_axes import Axis, choose_axes, is_scattered, thinned
-from ringsweep.plots.map_colours import ColourScale
+from ringsweep.plots.map_colours import ZERO, ColourScale
 from ringsweep.plots.maps import audit_texts
 from ringsweep.plots.saving import suffix_of
 from ringsweep.plots.selection import select
@@ -330,7 +330,9 @@ def _document(sweep: _Sweep) -> Any:
         colours, low, high = sweep.scales[name]
         kind = LogColorMapper if about["logarithmic"] else LinearColorMapper
         ticker = {} if about["words"] is None else {"ticker": FixedTicker(ticks=list(range(len(about["words"]))))}
-        mapper = kind(palette=colours, low=low, high=high)
+        # Numbers of a page are rounded: the least one must not fall below the scale, where only zeros are.
+        zeros = {"low": 0.99 * low, "low_color": ZERO} if about["logarithmic"] else {"low": low}
+        mapper = kind(palette=colours, high=high, **zeros)
         bars[name] = ColorBar(color_mapper=mapper, visible=False, major_label_text_font_size="12px", **ticker)
         plot.add_layout(bars[name], "right")
     paint = LinearColorMapper(palette=[NO_VALUE], nan_color=NO_VALUE)

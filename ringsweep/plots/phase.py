@@ -18,10 +18,11 @@ from matplotlib.transforms import ScaledTranslation
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
-from ringsweep.plots.datasets import on_ring, require_history, zones
+from ringsweep.plots.datasets import FLIGHT, PIVOT, mode_name, on_ring, require_history, zones
 from ringsweep.plots.labels import label_axis
-from ringsweep.plots.rig import Rig, belt_history, mode_name, ring_history
+from ringsweep.plots.rig import Rig, belt_history, ring_history
 from ringsweep.plots.style import (
+    OPEN,
     PAIR_COLOURS,
     PAIR_STYLES,
     SMALL,
@@ -37,11 +38,17 @@ from ringsweep.plots.style import (
     true_ranges,
 )
 
+# In place of a mode: the velocity jumps.
+_JUMP = 4
+
 # Slip has the hue of the body; slip forward is darker.
 _MODE_STYLES: dict[int, dict[str, Any]] = {
     1: {"color": PAIR_COLOURS[0], "linewidth": 1.1},
     -1: {"color": "#56B4E9", "linewidth": 1.1},
     0: {"color": "black", "linewidth": 2.6, "solid_capstyle": "round"},
+    PIVOT: {"color": OPEN, "linewidth": 1.1, "linestyle": (0, (5, 1.5))},
+    FLIGHT: {"color": OPEN, "linewidth": 1.1, "linestyle": (0, (1, 1))},
+    _JUMP: {"color": "0.55", "linewidth": 0.6},
 }
 
 # Range of an angle above which it is shown modulo a full turn, turns.
@@ -49,7 +56,7 @@ _LONGEST = 2.0
 
 
 def phase_portrait(ds: xr.Dataset, frame: Literal["space", "ring"] = "space", ax: Axes | None = None) -> Axes:
-    """Draw velocity over place, with stick, slip, and the speed of the ring or belt.
+    """Draw velocity over place, with stick, slip, open contacts, impacts, and the speed of the ring or belt.
 
     For a ring, in space, the angular velocity of the ring is a curve of its own, which the body follows while it
     sticks. A broad line lies under the curve of the body while a contact is on a zone. In the frame of the ring
@@ -132,7 +139,9 @@ def _ring_portrait(ds: xr.Dataset, frame: str, ax: Axes | None) -> Axes:
     else:
         ax.plot(*_curve(angle, run["ring_omega"].values, wrapped), **ring_style)
     entries.append(Line2D([], [], **ring_style, label="speed of the ring" + (", stick" if relative else "")))
-    entries += draw_modes(ax, run["mode"].values, angle, speed, wrapped)
+    jumps = np.diff(run["time"].values) == 0.0
+    jumps &= np.abs(np.diff(speed)) > 1e-6 * np.ptp(speed)
+    entries += draw_modes(ax, run["mode"].values, angle, speed, wrapped, jumps)
     label_axes(
         ax,
         f"angle of the body{' on the ring' if relative else ''} ({unit})",
@@ -161,7 +170,12 @@ def _driven_style(constant: bool) -> dict[str, Any]:
 
 
 def draw_modes(
-    ax: Axes, mode: NDArray[Any], across: NDArray[Any], up: NDArray[Any], wrapped: bool = False
+    ax: Axes,
+    mode: NDArray[Any],
+    across: NDArray[Any],
+    up: NDArray[Any],
+    wrapped: bool = False,
+    jumps: NDArray[np.bool_] | None = None,
 ) -> list[Artist]:
     """Draw the curve of a run with a line for each friction mode, its start and its end; returns the legend entries.
 
@@ -173,12 +187,16 @@ def draw_modes(
         Friction mode, and coordinates in the axes.
     wrapped : bool
         Whether `across` is an angle, shown modulo a full turn.
+    jumps : ndarray of shape ``(samples - 1,)``, optional
+        Whether an impact lies between a sample and the next.
     """
     entries: list[Artist] = []
     # From one sample to the next the body slips if it slips at either of them.
     between = np.where(mode[:-1] != 0, mode[:-1], mode[1:])
+    if jumps is not None:
+        between = np.where(jumps, _JUMP, between)
     for value, look in _MODE_STYLES.items():
-        if not (mode == value).any():
+        if not ((mode == value).any() or (between == value).any()):
             continue
         style = look | {"color": on_page(look["color"])}
         ax.plot(*_curve(*_segments(between == value, across, up), wrapped), **style)
@@ -187,7 +205,7 @@ def draw_modes(
         if dot:
             first = [i for i, _ in true_ranges(mode == value)]
             ax.plot(_wrap(across[first], wrapped), up[first], color=style["color"], linestyle="", **dot)
-        entries.append(Line2D([], [], **style, **dot, label=mode_name(value)))
+        entries.append(Line2D([], [], **style, **dot, label="impact" if value == _JUMP else mode_name(value)))
     ink = on_page("black")
     for k, label, colour in ((0, "start", page_colour()), (-1, "end", ink)):
         square: dict[str, Any] = {"marker": "s", "markersize": 5.5, "color": ink, "linestyle": ""}

@@ -16,9 +16,9 @@ from matplotlib.quiver import Quiver
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
-from ringsweep.plots.datasets import present
+from ringsweep.plots.datasets import mode_name, present
 from ringsweep.plots.labels import MINUS, number_text
-from ringsweep.plots.rig import Rig, mode_name, ring_history
+from ringsweep.plots.rig import Rig, ring_history
 from ringsweep.plots.style import (
     PAIR_COLOURS,
     REST,
@@ -92,9 +92,10 @@ def states_at(run: xr.Dataset, times: NDArray[np.float64]) -> dict[str, NDArray[
     own = run["time"].values
     before = np.maximum(np.searchsorted(own, times, side="right") - 1, 0)
     states: dict[str, NDArray[Any]] = {"time": times, "mode": run["mode"].values[before]}
-    ring = ("phi", "theta", "omega", "ring_omega", "normal_1", "normal_2", "friction_1", "friction_2")
+    ring = ("omega", "theta", "ring_omega", "y")
+    contacts = [f"{name}_{k}" for name in ("normal", "friction", "alpha", "gap") for k in (1, 2)]
     belt = ("x", "velocity", "friction_force", "belt_x", "belt_velocity")
-    return states | {name: np.interp(times, own, run[name].values) for name in present(run, (*ring, *belt))}
+    return states | {name: np.interp(times, own, run[name].values) for name in present(run, (*ring, *contacts, *belt))}
 
 
 class RingArtists:
@@ -161,7 +162,7 @@ class RingArtists:
     def show(self, states: dict[str, NDArray[Any]], k: int) -> None:
         """Move all artists to the `k`-th state of :func:`states_at`."""
         rig, R = self.rig, self.rig.radius
-        phi, theta = float(states["phi"][k]), float(states["theta"][k])
+        theta = float(states["theta"][k])
         ring_omega, omega = float(states["ring_omega"][k]), float(states["omega"][k])
         for wedge, (center, half_angle) in zip(self.arcs, rig.arcs, strict=True):
             middle = theta + center
@@ -177,8 +178,9 @@ class RingArtists:
         self.turning.set_xy([_point(1.18 * R, tip), _point(1.14 * R, end), _point(1.22 * R, end)])
         for artist in (self.turn, self.turning):
             artist.set_visible(sense != 0.0)
-        contacts = np.array([_point(R, phi + rig.offset(c)) for c in rig.contacts])
-        centres = contacts * (1.0 - rig.ball / R)
+        contacts = np.array([_point(R, states[f"alpha_{c}"][k]) for c in rig.contacts])
+        gaps = np.array([states[f"gap_{c}"][k] if f"gap_{c}" in states else 0.0 for c in rig.contacts])
+        centres = contacts * (1.0 - (rig.ball + gaps) / R)[:, None]
         self.rod.set_data(*centres.T)
         inwards = -contacts / R
         forwards = np.column_stack([inwards[:, 1], -inwards[:, 0]])
@@ -186,7 +188,7 @@ class RingArtists:
             ball.set_center(tuple(at))
             # The arrow of the reaction passes through the centre of the ball.
             number.set_position(tuple(at + (0.55 if c == 2 else -0.55) * rig.ball * forward))
-        centre_of_mass = centres.mean(axis=0)
+        centre_of_mass = np.array([states["x"][k], states["y"][k]])
         self.centre.set_data(*centre_of_mass[:, None])
         normals = np.array([states[f"normal_{c}"][k] for c in rig.contacts])
         frictions = np.array([states[f"friction_{c}"][k] for c in rig.contacts])

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from ringsweep.compile import take
 from ringsweep.config import load
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
 from ringsweep.physics import ring
-from ringsweep.plots.datasets import configuration, on_ring, require_history, require_one_run
-from ringsweep.quantities.variables import MODES
+from ringsweep.plots.datasets import configuration, on_ring, open_contacts, phases, require_history, require_one_run
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,8 @@ class Rig:
         ``(1,)`` or ``(1, 2)``.
     arcs : tuple of (float, float)
         Centre and half-angle of each zone in the frame of the ring, rad. Where zones overlap, the later one holds.
+    half_distance, center_offset : float
+        Half the distance between the centres of the balls, and that of the centre of mass from their line, m.
     """
 
     body: Any
@@ -41,6 +43,8 @@ class Rig:
     beta: float
     contacts: tuple[int, ...]
     arcs: tuple[tuple[float, float], ...]
+    half_distance: float
+    center_offset: float
 
     @classmethod
     def of(cls, ds: xr.Dataset) -> Rig:
@@ -53,7 +57,8 @@ class Rig:
         beta = float(ring.contact_offset(body))
         # A body without a radius, or with a tiny one, is drawn as a ball that can be seen.
         ball = max(scene.values.get("body.ball_radius", 0.07 * body.radius), 0.02 * body.radius)
-        return cls(body, float(body.radius), float(ball), beta, (1, 2) if beta else (1,), arcs)
+        lengths = (scene.values.get(f"body.{name}", 0.0) for name in ("half_distance", "center_offset"))
+        return cls(body, float(body.radius), float(ball), beta, (1, 2) if beta else (1,), arcs, *map(float, lengths))
 
     def offset(self, contact: int) -> float:
         """Angle from the body to a contact, rad."""
@@ -67,7 +72,8 @@ def ring_history(ds: xr.Dataset) -> tuple[xr.Dataset, Rig]:
     -------
     xarray.Dataset
         The history up to the end of the run, with the friction forces ``friction_1`` and ``friction_2``, N, positive
-        the way phi grows.
+        the way phi grows; the angles ``alpha_1`` and ``alpha_2`` of the centres of the balls, rad; and the place ``x``,
+        ``y`` of the centre of mass, m. While a contact is open, ``mode`` is ``PIVOT`` or ``FLIGHT``.
     Rig
 
     Raises
@@ -79,10 +85,58 @@ def ring_history(ds: xr.Dataset) -> tuple[xr.Dataset, Rig]:
         raise InputError("ds", "is the history of a body on a belt: there is no ring to draw")
     ds = require_one_run(ds, ("phi", "theta"))
     rig = Rig.of(ds)
-    phi, first = ds["phi"].values, ds["normal_1"].values
-    omega = ds["omega"].values
-    _, _, *forces = ring.held(rig.body, 1.0, np.sin(phi), np.cos(phi), omega, omega**2, ds["epsilon"].values, first)
-    return ds.assign({f"friction_{k}": ("time", values) for k, values in enumerate(forces, start=1)}), rig
+    if "mode" in ds:
+        ds = ds.assign(mode=("time", phases(ds)))
+    found = _off_race(ds, rig) if "gap_2" in ds else _on_race(ds, rig)
+    return ds.assign({name: ("time", values) for name, values in found.items()}), rig
+
+
+def _on_race(ds: xr.Dataset, rig: Rig) -> dict[str, NDArray[Any]]:
+    """Forces and places of a body whose contacts all hold, or of one with a single contact."""
+    phi, omega = ds["phi"].values, ds["omega"].values
+    epsilon, first = ds["epsilon"].values, ds["normal_1"].values
+    _, _, *forces = ring.held(rig.body, 1.0, np.sin(phi), np.cos(phi), omega, omega**2, epsilon, first)
+    distance = getattr(rig.body, "xi", rig.radius - rig.ball)
+    if "gap_1" in ds:
+        # A particle is drawn as a ball within the race.
+        distance = distance - ds["gap_1"].values
+    found = {"x": distance * np.sin(phi), "y": -distance * np.cos(phi)}
+    for k, force in enumerate(forces, start=1):
+        found[f"friction_{k}"] = np.where(open_contacts(ds)[0], 0.0, force) if "gap_1" in ds else force
+        found[f"alpha_{k}"] = phi + rig.offset(k)
+    return found
+
+
+def _off_race(ds: xr.Dataset, rig: Rig) -> dict[str, NDArray[Any]]:
+    """Forces and places of two balls that may be off the race.
+
+    The moments about the centre of mass give the friction of the one contact that holds. If both hold, the balance
+    along the line from the axis to the centre of mass is the second equation.
+    """
+    names = ("phi", "omega", "epsilon", "x", "y")
+    psi, omega, epsilon, x, y = (ds[name].values for name in names)
+    mass, distance = rig.body.mass, np.hypot(x, y)
+    moment = rig.body.inertia * epsilon
+    radial = -mass * distance * omega**2 + mass * rig.body.gravity * y / distance
+    found, levers, shares = {}, [], []
+    for k, a in ((1, rig.half_distance), (2, -rig.half_distance)):
+        # From the centre of mass to the centre of the ball.
+        across = -rig.center_offset * np.sin(psi) - a * np.cos(psi)
+        up = rig.center_offset * np.cos(psi) - a * np.sin(psi)
+        alpha = np.unwrap(np.arctan2(x + across, -y - up))
+        sine, cosine = np.sin(alpha), np.cos(alpha)
+        normal = ds[f"normal_{k}"].values
+        moment = moment - normal * (across * cosine + up * sine)
+        radial = radial - normal * (cosine * y - sine * x) / distance
+        levers.append(rig.body.radius - x * sine + y * cosine)
+        shares.append((cosine * x + sine * y) / distance)
+        found[f"alpha_{k}"] = alpha
+    (l1, l2), (s1, s2), (open_1, open_2) = levers, shares, open_contacts(ds)
+    both = ~(open_1 | open_2)
+    whole = np.where(both, l1 * s2 - l2 * s1, 1.0)
+    found["friction_1"] = np.where(both, (moment * s2 - radial * l2) / whole, np.where(open_1, 0.0, moment / l1))
+    found["friction_2"] = np.where(both, (radial * l1 - moment * s1) / whole, np.where(open_2, 0.0, moment / l2))
+    return found
 
 
 def belt_history(ds: xr.Dataset) -> xr.Dataset:
@@ -96,8 +150,3 @@ def belt_history(ds: xr.Dataset) -> xr.Dataset:
     if on_ring(require_history(ds)):
         raise InputError("ds", "is the history of a body in a ring: there is no belt to draw")
     return require_one_run(ds, ("x", "velocity", "friction_force", "belt_x", "belt_velocity", "mode"))
-
-
-def mode_name(mode: float) -> str:
-    """Name of a mode for readers: stick, slip forward or slip backward."""
-    return MODES[int(mode)].replace("_", " ")

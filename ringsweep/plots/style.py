@@ -33,6 +33,14 @@ REGIME_COLOURS: dict[str, str] = {
     "riding": "#B48FD0",
 }
 
+#: The colour of each word for what follows a lost contact. Their lightness falls from calm to wild.
+AFTERMATH_COLOURS: dict[str, str] = {
+    "held": "#F0E442",
+    "recovered": "#84CAF2",
+    "open": "#CC5500",
+    "tumbled": "#00507F",
+}
+
 #: Curves of friction laws and of methods, which may cover each other. The numbers of colours and of styles have no
 #: common factor, so a pair of the two returns only after 35 curves.
 CURVE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -50,6 +58,9 @@ PAIR_STYLES = ("-", "--")
 
 #: Shading of times at which the body sticks.
 STICK = "#E6E6E6"
+
+#: Times at which a contact is open. Shading with it is translucent: once for one of two contacts, more for all.
+OPEN = "#6A3D9A"
 
 #: Surface of the ring outside the zones.
 REST = "#F2F2F2"
@@ -308,10 +319,14 @@ def legend_width(handles: list[Artist]) -> float:
 
 
 def legend_above(ax: Axes, handles: list[Artist] | None = None) -> None:
-    """Put a legend in one line above the axes, to the right; by default with all that has a label."""
+    """Put a legend above the axes, to the right, in as many lines as it needs; by default with all that has a label."""
     handles = list(ax.get_legend_handles_labels()[0]) if handles is None else handles
     if handles:
-        style: dict[str, Any] = {"fontsize": SMALL, "frameon": False, "ncols": len(handles), "columnspacing": 1.2}
+        # A line, the space around it, and the label.
+        needed = sum(_length(str(handle.get_label())) + 6 for handle in handles)
+        lines = math.ceil(needed / (_LETTERS * letters(width_of(ax) - 0.5 * MARGIN)))
+        columns = math.ceil(len(handles) / lines)
+        style: dict[str, Any] = {"fontsize": SMALL, "frameon": False, "ncols": columns, "columnspacing": 1.2}
         style |= {"borderaxespad": 0.1, "borderpad": 0.1, "handlelength": 1.8}
         ax.legend(handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), **style)
 

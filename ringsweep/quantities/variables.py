@@ -152,7 +152,7 @@ OUTCOMES: dict[str, Variable] = {
     "t_recovered": Variable("s", "time from which both contacts hold again"),
     "aftermath": Variable(
         "1",
-        "what becomes of the body after a contact is lost",
+        "what follows a lost contact",
         dtype="int8",
         flags=dict(enumerate(AFTERMATHS)),
         comment="held: no contact was lost; recovered: all contacts hold at the end, in their first order; open: a "

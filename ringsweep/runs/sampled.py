@@ -20,7 +20,7 @@ from ringsweep.config import Config, load, sweepable
 from ringsweep.config.axes import dimension
 from ringsweep.config.sampling import Sample, censored
 from ringsweep.errors import InputError
-from ringsweep.models import MODELS
+from ringsweep.models import model_of
 from ringsweep.quantities.flags import REGIMES
 from ringsweep.quantities.variables import SAMPLED, Variable
 from ringsweep.runs.cells import TaskResult, compute_task
@@ -318,7 +318,7 @@ def variables(config: Config) -> dict[str, tuple[tuple[str, ...], Variable]]:
     if sample.survival:
         found["lost"] = ("replicate", "survival_time", "certificate"), SAMPLED["lost"]
         found |= {name: (("survival_time",), one) for name, one in SAMPLED.items() if name.startswith("survival")}
-    known = MODELS[config.scene.structure.model].variables
+    known = model_of(config.scene.structure).variables
     for name in sample.quantiles:
         for end, of in {"": "quantile", "_low": "lower end of a quantile", "_high": "upper end of a quantile"}.items():
             about = f"{of}: {known[name].long_name}"
