@@ -941,7 +941,7 @@ class TestTable:
         config = {"scene": belt({"law": "table", "file": str(tmp_path / "mu_v.csv")})}
         found = ringsweep.run(config)
         stored = json.loads(found.attrs["configuration"])["scene"]["friction"]
-        defaults = {"scale": 1.0, "viscous": 0.0}
+        defaults = {"scale": 1.0}
         assert stored == {"law": "table", "v": [0.0, 0.1, 1.0], "mu": [0.4, 0.3, 0.25]} | defaults
         assert isinstance(found, xr.Dataset)
 

@@ -43,6 +43,17 @@ def probability_panel(ds: xr.Dataset, ax: Axes | None = None) -> Axes:
     ------
     InputError
         If the dataset is no sampled sweep, or has several cells.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> share = xr.DataArray([0.7, 0.3], dims="word")
+    >>> ds = xr.Dataset(
+    ...     {"probability": share, "probability_low": share - 0.02, "probability_high": share + 0.02},
+    ...     coords={"word": ["oscillatory", "separating"]},
+    ... )
+    >>> [label.get_text() for label in probability_panel(ds).get_yticklabels()]
+    ['oscillatory', 'separating']
     """
     ds = require_sample(ds, "probability")
     ax = axes_or_current(ax, 0.5)
@@ -80,6 +91,17 @@ def survival_panel(ds: xr.Dataset, ax: Axes | None = None) -> Axes:
     ------
     InputError
         If the dataset is no sampled sweep with ``survival``, or has several cells.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> share = xr.DataArray([1.0, 0.8, 0.6], dims="survival_time")
+    >>> ds = xr.Dataset(
+    ...     {"probability": ("word", [1.0]), "survival": share, "survival_low": share - 0.1, "survival_high": share},
+    ...     coords={"word": ["separating"], "survival_time": [0.0, 1.0, 2.0]},
+    ... )
+    >>> survival_panel(ds).get_ylabel()
+    'body still holds its contacts'
     """
     ds = require_sample(ds, "survival")
     ax = axes_or_current(ax, 0.5)
@@ -117,6 +139,17 @@ def sensitivity_panel(ds: xr.Dataset, ax: Axes | None = None, word: str | None =
     ------
     InputError
         If the dataset is no sampled sweep with ``sensitivity``, has several cells, or the regime is unknown.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> index = xr.DataArray([[0.8, 0.2]], dims=("word", "parameter"))
+    >>> ds = xr.Dataset(
+    ...     {f"sobol_{which}{end}": index for which in ("first", "total") for end in ("", "_low", "_high")},
+    ...     coords={"word": ["separating"], "parameter": ["friction.rest.mu_k", "zone.half_angle"]},
+    ... ).assign(probability=("word", [0.4]))
+    >>> [label.get_text() for label in sensitivity_panel(ds).get_yticklabels()]
+    ['friction.rest.mu_k', 'zone.half_angle']
     """
     ds = require_sample(ds, "sobol_first")
     if word is None:
