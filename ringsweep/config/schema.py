@@ -16,7 +16,7 @@ from ringsweep.config.motion import FORMULA as FORMULA_DRIVE
 from ringsweep.config.refinement import NUMBERS
 from ringsweep.config.sampling import NUMBERS as SAMPLE_NUMBERS
 from ringsweep.config.tables import TABLES
-from ringsweep.models import MODELS, parameters
+from ringsweep.models import MODELS, WITH_IMPACT, parameters
 from ringsweep.models.scene import LAW, Structure
 from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS
@@ -38,7 +38,8 @@ def schema() -> dict[str, Any]:
     for model, drive, arcs in product(MODELS, DRIVES, ((), ("zone",), ("zones.0",))):
         for law in (*MODELS[model].laws, TABLE_LAW):
             own = Table if law == TABLE_LAW else None
-            for path, parameter in parameters(Structure(model, law, drive, arcs, own_law=own)).items():
+            structure = Structure(model, law, drive, arcs, own_law=own, impact=model in WITH_IMPACT)
+            for path, parameter in parameters(structure).items():
                 # All zones of a list have one description.
                 parameter = dataclasses.replace(parameter, long_name=parameter.long_name.replace("zone 1", "the zone"))
                 meanings = known.setdefault(path, [])

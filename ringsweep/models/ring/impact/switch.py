@@ -117,6 +117,9 @@ def _opened(scene, t, y, turned, places, which, zeros, event):
     if which != BOTH:
         state = y[0], y[1], 0.0, 0.0, 0.0, 0.0, float(which + TURNED * turned)
         contact = 2 if which == FIRST else 1
+        if turned == 1 and contact == 2:
+            # In the frame of a pivot this contact stands a revolution ahead of its angle in the closed ring.
+            places = places[0], (places[1][0], places[1][1] + 1)
         if pivot.load(scene, pivot.frame(scene, contact, turned, state, ring_omega)) > 0.0:
             empty = (zeros, 0) if which == FIRST else (0, zeros)
             status, mode = pivot.begun(scene, t, state, places, (which, turned), empty, event, 0)
