@@ -14,8 +14,8 @@ from ringsweep import plots
 from ringsweep.plots.datasets import FLIGHT, PIVOT, phases
 from ringsweep.plots.rig import ring_history
 from ringsweep.plots.style import AFTERMATH_COLOURS
-from ringsweep.quantities.flags import SEPARATING
-from ringsweep.quantities.variables import AFTERMATHS, HISTORY, IMPACTS, OPEN, OUTCOMES, TUMBLED
+from ringsweep.quantities.flags import AFTERMATHS, OPEN, SEPARATING, TUMBLED
+from ringsweep.quantities.variables import HISTORY, IMPACTS, OUTCOMES
 
 MASS, INERTIA, RADIUS, BALL, HALF, OFFSET, GRAVITY = 0.076, 4.47e-5, 0.043378, 0.010, 0.025, 0.004, 9.81
 SCENE = {

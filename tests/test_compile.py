@@ -69,7 +69,8 @@ def edited(path):
 @pytest.mark.parametrize("folder", ["plots", "cli", "config", "storage"])
 def test_edit_outside_the_kernels_keeps_the_digest_of_sources(package, folder):
     before = sources_digest(package)
-    edited(next((package / folder).glob("*.py")))
+    # The designs of samples determine results.
+    edited(next(path for path in (package / folder).glob("*.py") if path.name != "sampling.py"))
     assert sources_digest(package) == before
 
 

@@ -12,3 +12,7 @@ RESTING, OSCILLATORY, REVOLVING, SEPARATING, JAMMED, FAILED, STICK_SLIP, SLIDING
 #: Why a cell has no certificate: flag values of `DOUBTS`.
 CERTIFIED, NOT_ASKED, NO_RESULT, ANSWERS_DIFFER, LAW_NOT_OBEYED = range(5)
 CLOSE_CALL, NOT_FINITE, SAME_STEPS, DIVERGES, COARSE = range(5, 10)
+
+#: What becomes of a run after a contact is lost, in the order of the flag values.
+AFTERMATHS = ("held", "recovered", "open", "tumbled")
+HELD, RECOVERED, OPEN, TUMBLED = range(4)

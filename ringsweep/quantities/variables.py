@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ringsweep.errors import InputError
-from ringsweep.quantities.flags import JAMMED, REGIMES, SEPARATING
+from ringsweep.quantities.flags import AFTERMATHS, JAMMED, REGIMES, SEPARATING
 from ringsweep.quantities.quantity import Quantity
 
 if TYPE_CHECKING:
@@ -29,10 +29,6 @@ DEFINITIONS = {
     "sticking": "came to stick for good",
     "riding": "has stuck since the launch",
 }
-
-#: What becomes of a run after a contact is lost, in the order of the flag values.
-AFTERMATHS = ("held", "recovered", "open", "tumbled")
-HELD, RECOVERED, OPEN, TUMBLED = range(4)
 
 #: Origin of a cell of a refined sweep. An audited cell was inferred, and then run.
 COMPUTED, INFERRED, AUDITED = range(3)

@@ -17,8 +17,8 @@ from ringsweep.errors import InputError
 from ringsweep.models import batch, model_of
 from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import turn
-from ringsweep.quantities.flags import REGIMES
-from ringsweep.quantities.variables import AFTERMATHS, EVENTS, HISTORY, IMPACTS
+from ringsweep.quantities.flags import AFTERMATHS, REGIMES
+from ringsweep.quantities.variables import EVENTS, HISTORY, IMPACTS
 from ringsweep.runs.events import Events, events, side_by_side
 from ringsweep.runs.executors import Execution, interruptible
 from ringsweep.runs.sweep import compute

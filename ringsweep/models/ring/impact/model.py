@@ -15,7 +15,6 @@ from ringsweep.models.scene import Structure, Values, require
 from ringsweep.physics import friction, ring
 from ringsweep.physics.impact import Balls, ImpactRing
 from ringsweep.quantities.parameters import Parameter
-from ringsweep.quantities.variables import HISTORY as KNOWN
 from ringsweep.quantities.variables import Variable
 
 RESTITUTION = Parameter("1", "coefficient of restitution", lower=0.0, upper=1.0)
@@ -30,7 +29,7 @@ class SingleContactImpact(SingleContactRing):
     outcomes: ClassVar[tuple[str, ...]] = (*of_ring.Outcome._fields, *OUTCOMES)
     absent: ClassVar[frozenset[str]] = SingleContactRing.absent | _HIDDEN | {"gap_2"}
     own_variables: ClassVar[dict[str, Variable]] = {
-        "x": replace(KNOWN["x"], long_name="place of the centre of mass to the right of the axis")
+        "x": Variable("m", "place of the centre of mass to the right of the axis")
     }
 
     def scene_type(self, structure: Structure) -> type:

@@ -14,8 +14,7 @@ from ringsweep.models.ring.impact.series import true_gap
 from ringsweep.numerics.terms import joined
 from ringsweep.physics import ring
 from ringsweep.physics.impact import ImpactRing
-from ringsweep.quantities.flags import FAILED, SEPARATING
-from ringsweep.quantities.variables import HELD, OPEN, RECOVERED, TUMBLED
+from ringsweep.quantities.flags import FAILED, HELD, OPEN, RECOVERED, SEPARATING, TUMBLED
 
 # The word of events is a polynomial of their codes modulo this prime: a double holds every product exactly.
 _PRIME, _BASE = 67108859.0, 33554393.0
