@@ -51,7 +51,7 @@ def simulate(
     -------
     xarray.Dataset
         The history along the dimension ``time``, with variables of :data:`ringsweep.quantities.variables.HISTORY`,
-        the events of the run along the dimension ``event`` (:data:`ringsweep.runs.events.VARIABLES`), and the outcomes
+        the events of the run along the dimension ``event`` (``ringsweep.runs.events.VARIABLES``), and the outcomes
         of the run as scalars. For several laws all also have the dimension ``friction_law``, and ``time`` holds the
         instants of all runs. After the end of a run numbers are NaN, and classifications keep their last value.
 
