@@ -357,7 +357,9 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
             t, status, mode, y = _after_step(scene, mode, guard, t, s, h_max, y_next)
             if guard >= 0:
                 record = recorder.after_event(scene, record, mode, t)
-            if audited and guard >= 0 and s > 0.0 and (status != RUNNING or modes.first_loss(step.mode, mode)):
+            # The regime of a run that goes on after a loss is that loss: what ends the run later does not count.
+            decides = status != RUNNING or modes.first_loss(step.mode, mode)
+            if audited and guard >= 0 and s > 0.0 and decides and guard_fall_rate == 0.0:
                 guard_fall_rate = fall_rate(family(scene.law), scene, step, scratch, guard)
             if s == 0.0 and status != RUNNING:
                 # The history must show the end of a mode that lasts no time.

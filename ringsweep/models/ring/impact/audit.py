@@ -28,7 +28,7 @@ from ringsweep.models.ring.impact.mode import (
 from ringsweep.models.ring.impact.record import OUTCOMES
 from ringsweep.models.ring.impact.switch import motion_of
 from ringsweep.models.ring.record import Outcome
-from ringsweep.models.ring.series import REACTION_TOLERANCE
+from ringsweep.models.sliding import REACTION_TOLERANCE, larger
 from ringsweep.physics import ring
 from ringsweep.physics.friction.velocity import friction_at, stiction_band
 from ringsweep.physics.impact import ImpactRing, contact_of, inertia
@@ -42,12 +42,6 @@ _ROUNDING, _GAP_ROUNDING = 1e-12, 1e-12
 _ON_EDGE = 1e-8
 
 
-@inlined
-def _larger(a, b):
-    """The larger of two violations; infinite if `b` is not a number."""
-    return max(a, b) if b < inf else inf
-
-
 @audit.violation.implements(ImpactRing)
 def _violation(scene, mode, forcing, y, rates, s, tolerance):
     if mode.open == NONE:
@@ -59,11 +53,11 @@ def _violation(scene, mode, forcing, y, rates, s, tolerance):
     allowed = scene.balls.reach * (_GAP_ROUNDING + tolerance)
     for contact in (1, 2):
         if (contact == 1 or ring.contact_count(scene.closed.body) == 2) and mode.open & contact:
-            largest = _larger(largest, -contact_of(scene.balls, contact, motion, 0.0).gap / allowed)
+            largest = larger(largest, -contact_of(scene.balls, contact, motion, 0.0).gap / allowed)
     if mode.open == BOTH:
         return largest, 0.0
     violation, power = _violation_on_one_contact(scene, mode, forcing, y, rates, s, tolerance)
-    return _larger(largest, violation), power
+    return larger(largest, violation), power
 
 
 @inlined
@@ -96,13 +90,13 @@ def _violation_on_one_contact(scene, mode, forcing, y, rates, s, tolerance):
         mu, slope = friction_at(scene.law, abs(v), (mu_s, mu_k))
         short = abs(along + (mu if v > 0.0 else -mu) * normal)
         relaxation = abs(slope) * (pivot.size(scene, f) + abs(normal) / body.mass)
-        largest = _larger(largest, -mode.sign * v / (tolerance * speed))
+        largest = larger(largest, -mode.sign * v / (tolerance * speed))
     moment = inertia(body) * psi_dd + f.w * normal - f.q * along
     rate = (1.0 / s + relaxation) * tolerance * speed + _ROUNDING * load
     per_force = 1.0 / (body.mass * (rate * REACTION_TOLERANCE * 1e-2 + REACTION_TOLERANCE * tolerance * load))
-    largest = _larger(largest, short * per_force)
-    largest = _larger(largest, -normal * per_force)
-    largest = _larger(largest, abs(moment) * per_force / (balls.reach + abs(inertia(body)) / (body.mass * balls.reach)))
+    largest = larger(largest, short * per_force)
+    largest = larger(largest, -normal * per_force)
+    largest = larger(largest, abs(moment) * per_force / (balls.reach + abs(inertia(body)) / (body.mass * balls.reach)))
     return largest, along * (v + body.radius * ring_omega)
 
 

@@ -42,6 +42,37 @@ RING = PRODUCTS + GROUPS * FACTOR_ROWS
 ROWS = RING + FAST + 1
 
 
+class Event(NamedTuple):
+    """An event that opens or closes contacts.
+
+    Attributes
+    ----------
+    kind, contact : int
+        What happens, and to which contacts: 1, 2, or 3 for both.
+    speed, impulse, loss, violation : float
+        In an impact: largest closing speed, m/s; largest normal impulse, N s; lost energy, J; violation of the law.
+    lasts : float
+        Time from the event until a contact that closes by rebounds has come to rest, s.
+    number : int
+        Number of events up to now.
+    time : float
+        Time of the event, s.
+    passed : int
+        1 if an impact closed all contacts, of which some opened at once; 2 if their order has changed; else 0.
+    """
+
+    kind: int
+    contact: int
+    speed: float
+    impulse: float
+    loss: float
+    violation: float
+    lasts: float
+    number: int
+    time: float
+    passed: int
+
+
 class Mode(NamedTuple):
     """Mode of a body that may leave the race.
 
@@ -57,18 +88,8 @@ class Mode(NamedTuple):
     zeros_1, zeros_2 : int
         Number of leading coefficients of the gap that were zero when the mode began: 3 after a smooth loss of the
         contact, 2 after friction has jumped, 1 after an impact, 0 if the contact had been open before.
-    event, contact : int
-        The last event, and its contacts: 1, 2, or 3 for both.
-    speed, impulse, loss, violation : float
-        In an impact: largest closing speed, m/s; largest normal impulse, N s; lost energy, J; violation of the law.
-    lasts : float
-        Time from the event until a contact that closes by rebounds has come to rest, s.
-    number : int
-        Number of events up to now.
-    time : float
-        Time of the last event, s.
-    passed : int
-        1 if the last impact closed all contacts, of which some opened at once; 2 if their order has changed; else 0.
+    event : Event
+        The last event.
     """
 
     sign: int
@@ -80,55 +101,14 @@ class Mode(NamedTuple):
     turned: int
     zeros_1: int
     zeros_2: int
-    event: int
-    contact: int
-    speed: float
-    impulse: float
-    loss: float
-    violation: float
-    lasts: float
-    number: int
-    time: float
-    passed: int
-
-
-class Event(NamedTuple):
-    """What leads into a mode; the fields are those of :class:`Mode`."""
-
-    event: int
-    contact: int
-    speed: float
-    impulse: float
-    loss: float
-    violation: float
-    lasts: float
-    number: int
-    time: float
-    passed: int
+    event: Event
 
 
 @inlined
 def passing(event, turned):
     """An impact that closes all contacts, of which some open at once."""
     e = event
-    return Event(e.event, e.contact, e.speed, e.impulse, e.loss, e.violation, e.lasts, e.number, e.time, 1 + turned)
-
-
-@inlined
-def event_of(mode):
-    """The last event."""
-    return Event(
-        mode.event,
-        mode.contact,
-        mode.speed,
-        mode.impulse,
-        mode.loss,
-        mode.violation,
-        mode.lasts,
-        mode.number,
-        mode.time,
-        mode.passed,
-    )
+    return Event(e.kind, e.contact, e.speed, e.impulse, e.loss, e.violation, e.lasts, e.number, e.time, 1 + turned)
 
 
 @inlined
@@ -140,41 +120,13 @@ def opens(contact, number, t):
 @inlined
 def make(sign, region, entry_guard, places, contacts, zeros, event):
     """Mode from its parts; `places`, `contacts` (open, turned), and `zeros` are pairs."""
-    e = event
-    return Mode(
-        sign,
-        region,
-        entry_guard,
-        places[0],
-        places[1],
-        contacts[0],
-        contacts[1],
-        zeros[0],
-        zeros[1],
-        e.event,
-        e.contact,
-        e.speed,
-        e.impulse,
-        e.loss,
-        e.violation,
-        e.lasts,
-        e.number,
-        e.time,
-        e.passed,
-    )
+    return Mode(sign, region, entry_guard, *places, *contacts, *zeros, event)
 
 
 @inlined
 def code_of(mode):
     """Code of the states of a mode."""
     return float(mode.open + TURNED * mode.turned)
-
-
-@inlined
-def contacts_of(y):
-    """Contacts that are open, and whether the order has changed, from a state."""
-    code = int(y[6] + 0.5)
-    return code % TURNED, code // TURNED
 
 
 @inlined

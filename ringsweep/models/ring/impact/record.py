@@ -9,7 +9,7 @@ from ringsweep.compile import inlined
 from ringsweep.models.interface import recorder
 from ringsweep.models.interface.status import COMPLETE, JAM
 from ringsweep.models.ring import record as of_ring
-from ringsweep.models.ring.impact.mode import BOTH, CLOSES, NONE, OPENS, REBOUNDS
+from ringsweep.models.ring.impact.mode import BOTH, CLOSES, NONE, REBOUNDS
 from ringsweep.models.ring.impact.series import true_gap
 from ringsweep.numerics.terms import joined
 from ringsweep.physics import ring
@@ -20,43 +20,32 @@ from ringsweep.quantities.flags import FAILED, HELD, OPEN, RECOVERED, SEPARATING
 _PRIME, _BASE = 67108859.0, 33554393.0
 
 
-class Record(NamedTuple):
-    """Record of a run that goes on after a contact is lost.
+class Lost(NamedTuple):
+    """What events have done to the contacts up to now.
 
     Attributes
     ----------
-    base : ringsweep.models.ring.record.Record
-        Record of the motion.
     open, turned : float
         Contacts that are open, and whether the order of the contacts has changed.
-    t_lost, first_lost : float
+    t_first, first : float
         Time of the first loss, s, NaN if there was none, and its contacts.
-    ever_lost : float
-        Contacts that have been open: 0 to 3.
-    gap_max : float
-        Greatest measure ``(rho^2 - |c|^2)/(2 rho)`` of a gap, m.
     number : float
         Number of events.
     word : float
         The sequence of the events, their contacts and what is open after each, as one number.
     violation : float
         Largest violation of the impact law.
-    open_time, flight_time, separations, impacts, impact_speed_max, impulse_max, impact_loss, tumbles, t_recovered
+    separations, impacts, impact_speed_max, impulse_max, impact_loss, tumbles, t_recovered
         As in :class:`Outcome`.
     """
 
-    base: Any
     open: float
     turned: float
-    t_lost: float
-    first_lost: float
-    ever_lost: float
-    gap_max: float
+    t_first: float
+    first: float
     number: float
     word: float
     violation: float
-    open_time: float
-    flight_time: float
     separations: float
     impacts: float
     impact_speed_max: float
@@ -66,6 +55,27 @@ class Record(NamedTuple):
     t_recovered: float
 
 
+class Record(NamedTuple):
+    """Record of a run that goes on after a contact is lost.
+
+    Attributes
+    ----------
+    base : ringsweep.models.ring.record.Record
+        Record of the motion.
+    gap_max : float
+        Greatest measure ``(rho^2 - |c|^2)/(2 rho)`` of a gap, m.
+    open_time, flight_time : float
+        Time for which some contact, and all contacts, have been open, s.
+    lost : Lost
+    """
+
+    base: Any
+    gap_max: float
+    open_time: float
+    flight_time: float
+    lost: Lost
+
+
 #: Outcomes behind those of the ring without impact. The last two are for certificates only.
 OUTCOMES = (
     *("open_time", "flight_time", "gap_max", "separations", "impacts", "impact_speed_max", "impulse_max"),
@@ -73,50 +83,25 @@ OUTCOMES = (
 )
 
 
-@inlined
-def _with_base(record, base, gap_max, open_time, flight_time):
-    r = record
-    return Record(
-        base,
-        r.open,
-        r.turned,
-        r.t_lost,
-        r.first_lost,
-        r.ever_lost,
-        gap_max,
-        r.number,
-        r.word,
-        r.violation,
-        open_time,
-        flight_time,
-        r.separations,
-        r.impacts,
-        r.impact_speed_max,
-        r.impulse_max,
-        r.impact_loss,
-        r.tumbles,
-        r.t_recovered,
-    )
-
-
 @recorder.begin.implements(ImpactRing)
 def _begin(scene, t, seen):
-    base = recorder.begin(scene.closed, t, seen[:5])
-    return Record(base, 0.0, 0.0, nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, nan)
+    nothing = Lost(0.0, 0.0, nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, nan)
+    return Record(recorder.begin(scene.closed, t, seen[:5]), 0.0, 0.0, 0.0, nothing)
 
 
 @recorder.observe.implements(ImpactRing)
 def _observe(scene, record, t, duration, stuck, seen):
-    base = recorder.observe(scene.closed, record.base, t, duration, stuck, seen[:5])
-    is_open, flies = (duration if seen[7] > 0.0 else 0.0), (duration if seen[7] == BOTH else 0.0)
-    gap_max = max(record.gap_max, max(seen[5], seen[6]))
-    return _with_base(record, base, gap_max, record.open_time + is_open, record.flight_time + flies)
+    r, contacts = record, seen[7]
+    base = recorder.observe(scene.closed, r.base, t, duration, stuck, seen[:5])
+    gap_max, open_for = max(r.gap_max, max(seen[5], seen[6])), (duration if contacts > 0.0 else 0.0)
+    flies_for = duration if contacts == BOTH else 0.0
+    return Record(base, gap_max, r.open_time + open_for, r.flight_time + flies_for, r.lost)
 
 
 @recorder.enter.implements(ImpactRing)
 def _enter(scene, record, t, seen):
-    base = recorder.enter(scene.closed, record.base, t, seen[:5])
-    return _with_base(record, base, record.gap_max, record.open_time, record.flight_time)
+    r = record
+    return Record(recorder.enter(scene.closed, r.base, t, seen[:5]), r.gap_max, r.open_time, r.flight_time, r.lost)
 
 
 @inlined
@@ -126,73 +111,65 @@ def _count(contacts):
 
 @recorder.after_event.implements(ImpactRing)
 def _after_event(scene, record, mode, t):
-    r = record
-    if mode.number == r.number:
-        return r
-    two = ring.contact_count(scene.closed.body) == 2
+    r, event = record.lost, mode.event
+    if event.number == r.number:
+        return record
     # An impact may close all contacts, of which some open at once.
-    passes = mode.passed > 0
+    passes = event.passed > 0
     before = NONE if passes else int(r.open)
-    hit = mode.contact if mode.event != OPENS else 0
     # Contacts that held and are open now.
     lost = float((1 if mode.open % 2 == 1 and before % 2 == 0 else 0) + (2 if mode.open >= 2 and before < 2 else 0))
-    if not two:
+    if ring.contact_count(scene.closed.body) == 1:
         lost = min(lost, 1.0)
-    ever = int(r.ever_lost)
-    ever_lost = float((1 if ever % 2 == 1 or lost % 2.0 == 1.0 else 0) + (2 if ever >= 2 or lost >= 2.0 else 0))
-    first_lost = r.first_lost if r.first_lost > 0.0 else lost
-    is_impact = mode.event == REBOUNDS or mode.event == CLOSES
+    is_impact = event.kind in (REBOUNDS, CLOSES)
     recovers = mode.open == NONE and before != NONE
-    turned = float(mode.passed - 1) if passes else float(mode.turned) if mode.open == NONE else r.turned
-    code = float(1 + mode.event + 4 * (hit + 4 * (mode.open + 4 * (mode.turned + 2 * mode.passed))))
-    return Record(
-        r.base,
+    turned = float(event.passed - 1) if passes else float(mode.turned) if mode.open == NONE else r.turned
+    hit = event.contact if is_impact else 0
+    code = float(1 + event.kind + 4 * (hit + 4 * (mode.open + 4 * (mode.turned + 2 * event.passed))))
+    found = Lost(
         float(mode.open),
         turned,
-        t if r.first_lost == 0.0 and lost > 0.0 else r.t_lost,
-        first_lost,
-        ever_lost,
-        r.gap_max,
-        float(mode.number),
+        t if r.first == 0.0 and lost > 0.0 else r.t_first,
+        r.first if r.first > 0.0 else lost,
+        float(event.number),
         (r.word * 512.0 + code * _BASE) % _PRIME,
-        max(r.violation, mode.violation),
-        r.open_time,
-        r.flight_time,
+        max(r.violation, event.violation),
         r.separations + _count(int(lost)),
-        r.impacts + (_count(mode.contact) if is_impact else 0.0),
-        max(r.impact_speed_max, mode.speed),
-        max(r.impulse_max, mode.impulse),
-        r.impact_loss + mode.loss,
+        r.impacts + _count(hit),
+        max(r.impact_speed_max, event.speed),
+        max(r.impulse_max, event.impulse),
+        r.impact_loss + event.loss,
         r.tumbles + (1.0 if turned != r.turned else 0.0),
-        t + mode.lasts if recovers else nan if mode.open != NONE else r.t_recovered,
+        t + event.lasts if recovers else nan if mode.open != NONE else r.t_recovered,
     )
+    return Record(record.base, record.gap_max, record.open_time, record.flight_time, found)
 
 
 @recorder.conclude.implements(ImpactRing)
 def _conclude(scene, record, status, t, place, velocity):
-    r = record
+    r = record.lost
     # A jam after a loss ends the run, whose regime is that of the loss.
-    ended = COMPLETE if status == JAM and r.first_lost > 0.0 else status
-    o = recorder.conclude(scene.closed, r.base, ended, t, place, velocity)
-    was_lost = r.first_lost > 0.0 and o.regime != FAILED
+    ended = COMPLETE if status == JAM and r.first > 0.0 else status
+    o = recorder.conclude(scene.closed, record.base, ended, t, place, velocity)
+    was_lost = r.first > 0.0 and o.regime != FAILED
     aftermath = HELD
     if r.tumbles > 0.0:
         aftermath = TUMBLED
     elif r.open > 0.0:
         aftermath = OPEN
-    elif r.first_lost > 0.0:
+    elif r.first > 0.0:
         aftermath = RECOVERED
     base = of_ring.Outcome(
         float(SEPARATING) if was_lost else o.regime,
         o.motion,
-        r.first_lost if was_lost else 0.0,
-        r.t_lost if was_lost else nan,
+        r.first if was_lost else 0.0,
+        r.t_first if was_lost else nan,
         *o[4:],
     )
     own = (
-        r.open_time,
-        r.flight_time,
-        true_gap(scene, r.gap_max),
+        record.open_time,
+        record.flight_time,
+        true_gap(scene, record.gap_max),
         r.separations,
         r.impacts,
         r.impact_speed_max,

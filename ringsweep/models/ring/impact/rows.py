@@ -23,7 +23,7 @@ EVENT = ("number", "time", "event", "contact", "speed", "impulse")
 def row_of(scene, mode, forcing, y, seen):
     """Row of the state `y`, of which the recorder is shown `seen`."""
     psi, rate, normal_1, normal_2, located = seen[0], seen[1], seen[2], seen[3], seen[4]
-    theta, ring_omega, _ = forcing
+    event, (theta, ring_omega, _) = mode.event, forcing
     motion = motion_of(scene, y, ring_omega)
     first = contact_of(scene.balls, 1, motion, 0.0)
     second = contact_of(scene.balls, 2, motion, 0.0) if ring.contact_count(scene.closed.body) == 2 else first
@@ -44,12 +44,12 @@ def row_of(scene, mode, forcing, y, seen):
         motion.y,
         first.gap if mode.open % 2 == 1 else 0.0,
         second.gap if mode.open >= 2 else 0.0,
-        float(mode.number),
-        mode.time,
-        float(mode.event),
-        float(mode.contact),
-        mode.speed,
-        mode.impulse,
+        float(event.number),
+        event.time,
+        float(event.kind),
+        float(event.contact),
+        event.speed,
+        event.impulse,
     )
 
 

@@ -36,7 +36,6 @@ from ringsweep.models.ring.impact.mode import (
     code_of,
     coefficients_there,
     delta_when_closed,
-    event_of,
     holding,
     make,
     place_of,
@@ -54,13 +53,13 @@ from ringsweep.models.ring.series import (
     NORMAL_2,
     OMEGA,
     PHI,
-    REACTION_TOLERANCE,
     SIN,
     SLOW,
     SQUARE,
     THETA,
     V,
 )
+from ringsweep.models.sliding import REACTION_TOLERANCE
 from ringsweep.numerics.series import INVERSE, ORDER, crossings, slope, step_size, value, variation
 from ringsweep.numerics.terms import inner_products, joined, no_factors, part_from, set_factors, set_terms, terms
 from ringsweep.physics import drives, ring
@@ -552,4 +551,4 @@ def true_gap(scene, measure):
 @series.after_first_step.implements(Mode)
 def _after_first_step(mode):
     places, contacts, zeros = (mode.place_1, mode.place_2), (mode.open, mode.turned), (mode.zeros_1, mode.zeros_2)
-    return make(mode.sign, mode.region, -1, places, contacts, zeros, event_of(mode))
+    return make(mode.sign, mode.region, -1, places, contacts, zeros, mode.event)

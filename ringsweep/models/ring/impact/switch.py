@@ -31,7 +31,6 @@ from ringsweep.models.ring.impact.mode import (
     closed_mode,
     coefficients_there,
     delta_when_closed,
-    event_of,
     from_closed,
     holding,
     make,
@@ -176,7 +175,7 @@ def _switch(scene, mode, guard, t, y):
         state = angle_when_closed(y[0], turned), y[1]
         status, found, (_, v) = modes.switch(ring_of(scene, turned), closed_mode(mode), own, t, state)
         zeros = 3 if guard in (NORMAL_1, NORMAL_2) else 2
-        return _after_closed(scene, status, found, t, (y[0], v), turned, zeros, event_of(mode), False)
+        return _after_closed(scene, status, found, t, (y[0], v), turned, zeros, mode.event, False)
     if guard == DETERMINANT:
         return JAM, mode, y
     reaches_1, reaches_2 = guard == NORMAL_1, guard == NORMAL_2
@@ -189,7 +188,7 @@ def _switch(scene, mode, guard, t, y):
         _, ring_omega, _ = drives.turn(scene.drive, t)
         state = in_flight(motion_of(scene, y, ring_omega), mode.turned)
         zeros = (3, mode.zeros_2) if contact == 1 else (mode.zeros_1, 3)
-        event = opens(contact, mode.number, t)
+        event = opens(contact, mode.event.number, t)
         places = mode.place_1, mode.place_2
         return RUNNING, make(1, 0, -1, places, (BOTH, mode.turned), _remaining(mode, y, zeros), event), state
     return _on_one_contact(scene, mode, guard, t, y)
@@ -207,7 +206,7 @@ def _remaining(mode, y, zeros):
 def _on_one_contact(scene, mode, guard, t, y):
     """What follows in a pivot after an edge, at the bounds of a region of the law, at rest, and at breakaway."""
     places, contacts = (mode.place_1, mode.place_2), (mode.open, mode.turned)
-    zeros, event, v = _remaining(mode, y, (mode.zeros_1, mode.zeros_2)), event_of(mode), y[1]
+    zeros, event, v = _remaining(mode, y, (mode.zeros_1, mode.zeros_2)), mode.event, y[1]
     at_rest = y[0], 0.0, y[2], y[3], 0.0, 0.0, y[6]
     sign, region = mode.sign, mode.region
     if guard == EDGE:
@@ -300,46 +299,38 @@ def _lands(scene, mode, hit, t, y):
     e = scene.restitution
     restitution = e if hits_1 else 0.0, e if hits_2 else 0.0
     touching, moment = (touches_1, touches_2), inertia(body)
-    found = impulses(body.mass, moment, first, second, touching, mu, restitution)
-    if found.solutions != 1:
-        return JAM, mode, y
-    which = (1 if hits_1 else 0) + (2 if hits_2 else 0)
-    lasts = 0.0
-    after = after_impact(body.mass, moment, first, second, motion, found)
-    open_1, open_2 = not touches_1 or found.opening_1 > 0.0, not touches_2 or found.opening_2 > 0.0
-    if (hits_1 and open_1) or (hits_2 and open_2):
-        # The acceleration of the gaps that open again, and the time until their rebounds end.
-        event = Event(REBOUNDS, which, closing, 0.0, 0.0, 0.0, 0.0, mode.number + 1, t, 0)
-        status, trial, state = _next(scene, t, after, (first, second), (open_1, open_2), touching, found, mode, event)
-        if status == RUNNING:
-            ends_1 = _rebounds_end(scene, trial, t, state, after, 1, found.opening_1, e) if hits_1 and open_1 else 0.0
-            ends_2 = _rebounds_end(scene, trial, t, state, after, 2, found.opening_2, e) if hits_2 and open_2 else 0.0
-            if (hits_1 and open_1 and ends_1 > 0.0) or (hits_2 and open_2 and ends_2 > 0.0):
-                lasts = max(ends_1, ends_2)
-                restitution = (
-                    0.0 if ends_1 > 0.0 else restitution[0],
-                    0.0 if ends_2 > 0.0 else restitution[1],
-                )
-                found = impulses(body.mass, moment, first, second, touching, mu, restitution)
-                if found.solutions != 1:
-                    return JAM, mode, y
-                after = after_impact(body.mass, moment, first, second, motion, found)
-                open_1 = not touches_1 or found.opening_1 > 0.0
-                open_2 = not touches_2 or found.opening_2 > 0.0
-    again = (not hits_1 or open_1) and (not hits_2 or open_2)
-    event = Event(
-        REBOUNDS if again else CLOSES,
-        which,
-        closing,
-        max(found.normal_1, found.normal_2),
-        found.loss,
-        found.violation,
-        lasts,
-        mode.number + 1,
-        t,
-        0,
-    )
-    return _next(scene, t, after, (first, second), (open_1, open_2), touching, found, mode, event)
+    which, lasts = (1 if hits_1 else 0) + (2 if hits_2 else 0), 0.0
+    while True:
+        found = impulses(body.mass, moment, first, second, touching, mu, restitution)
+        if found.solutions != 1:
+            return JAM, mode, y
+        after = after_impact(body.mass, moment, first, second, motion, found)
+        open_1, open_2 = not touches_1 or found.opening_1 > 0.0, not touches_2 or found.opening_2 > 0.0
+        again = (not hits_1 or open_1) and (not hits_2 or open_2)
+        event = Event(
+            REBOUNDS if again else CLOSES,
+            which,
+            closing,
+            max(found.normal_1, found.normal_2),
+            found.loss,
+            found.violation,
+            lasts,
+            mode.event.number + 1,
+            t,
+            0,
+        )
+        opened, contacts = (open_1, open_2), (first, second)
+        status, after_mode, state = _next(scene, t, after, contacts, opened, touching, found, mode, event)
+        rebounds_1, rebounds_2 = hits_1 and open_1, hits_2 and open_2
+        if lasts > 0.0 or status != RUNNING or not (rebounds_1 or rebounds_2):
+            return status, after_mode, state
+        ends_1 = _rebounds_end(scene, after_mode, t, state, after, 1, found.opening_1, e) if rebounds_1 else 0.0
+        ends_2 = _rebounds_end(scene, after_mode, t, state, after, 2, found.opening_2, e) if rebounds_2 else 0.0
+        lasts = max(ends_1, ends_2)
+        if lasts == 0.0:
+            return status, after_mode, state
+        # The rebounds of a contact are over so soon that it stays closed: the same impact without restitution.
+        restitution = 0.0 if ends_1 > 0.0 else restitution[0], 0.0 if ends_2 > 0.0 else restitution[1]
 
 
 @inlined
@@ -456,7 +447,7 @@ def _sticks(scene, mode):
 
 @modes.first_loss.implements(Mode)
 def _first_loss(before, after):
-    return before.number == 0 and after.number > 0
+    return before.event.number == 0 and after.event.number > 0
 
 
 @modes.in_space.implements(ImpactRing)
