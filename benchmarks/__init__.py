@@ -1,1 +1,1 @@
-"""Benchmarks. Run each module from the root of the repository: ``python -m benchmarks.NAME``."""
+"""Benchmarks. Run all of them from the root of the repository: ``python -m benchmarks``."""

@@ -1,13 +1,16 @@
-"""Shared by the benchmarks: scenes of the package, timing of contenders in turn, printing."""
+"""Shared by the benchmarks: scenes of the package, timing of contenders in turn, printing, reports."""
 
 from __future__ import annotations
 
+import argparse
+import hashlib
 import os
 import platform
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from math import ceil, radians
 from pathlib import Path
@@ -21,6 +24,9 @@ from ringsweep.models import MODELS, batch
 from ringsweep.runs import cells, sweep
 from ringsweep.runs.executors import Execution
 from ringsweep.solvers.method import Result
+
+#: Results that the documents show.
+RESULTS = Path(__file__).parent / "results"
 
 #: The ring of the paper's Fig. 29 (SI units), without its friction law.
 SPAN = 10.0
@@ -198,3 +204,44 @@ def machine(also: Sequence[str] = ()) -> str:
     return f"{models[0] if models else platform.processor() or platform.machine()}, {cores} cores{load}\n" + ", ".join(
         versions
     )
+
+
+def command(doc: str) -> argparse.ArgumentParser:
+    """Parser of the command line of a benchmark, with the options that all have."""
+    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="less of everything: to see that it works")
+    parser.add_argument("--keep", action="store_true", help=f"write to {RESULTS.name}/, which the documents show")
+    return parser
+
+
+def folder_of(given: argparse.Namespace) -> Path:
+    """Folder of the report: `benchmark-results` in the current folder, unless it shall be kept."""
+    if given.keep and given.quick:
+        raise SystemExit("--keep: a quick measurement is not kept; leave out --quick")
+    folder = RESULTS if given.keep else Path("benchmark-results", "quick" if given.quick else "full")
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def sources() -> str:
+    """Digest of the sources of the package that a benchmark measures: all but pictures and the command line."""
+    root = Path(config.__file__).parents[1]
+    digest = hashlib.blake2b(digest_size=6)
+    for path in sorted(root.rglob("*.py")):
+        if (name := path.relative_to(root)).parts[0] not in ("plots", "cli"):
+            digest.update(f"{name.as_posix()}\n".encode() + path.read_bytes())
+    return digest.hexdigest()
+
+
+def stamp(name: str, quick: bool) -> str:
+    """What a report says of its sources; a report with another stamp is older than the sources."""
+    return f"`python -m benchmarks.{name}{' --quick' if quick else ''}` on sources `{sources()}`"
+
+
+def publish(given: argparse.Namespace, name: str, title: str, where: str, body: str) -> None:
+    """Write a report, Markdown: title, sources, date, machine (the lines of `where`), and the body."""
+    folder = folder_of(given)
+    lines = "".join(f"- {line}\n" for line in where.splitlines())
+    report = f"# {title}\n\n{stamp(name, given.quick)}, {datetime.now(UTC).date()}:\n\n{lines}\n{body.strip()}\n"
+    (folder / f"{name}.md").write_text(report)
+    print(f"\n{name}.md is in {folder.resolve()}", flush=True)

@@ -1,6 +1,6 @@
 """Certified answers against an independent reference, over the whole space of scenes.
 
-    python -m benchmarks.brute_force [--count 20000] [--families stiction "belt dahl" ...] [--out TABLE.md]
+    python -m benchmarks.brute_force [--count 20000] [--families stiction "belt dahl" ...]
 
 Draws random scenes by families. `ringsweep.sweep` answers them in batches, :mod:`benchmarks.reference` answers them
 one by one. The benchmark prints a table with a row for each family:
@@ -32,6 +32,8 @@ run). It is ambiguous if two tolerances of the reference differ by more than a h
 is compared where the package gives no bound and so claims no number; there are a tenth as many of these long runs. The
 law `bristle` is left out, because its random bonds cannot be repeated independently.
 
+Writes `brute_force.md`, if all families were drawn.
+
 ``--csv PATH`` writes the 500 scenes of ``tests/test_brute_force.py`` instead: the scene (SI units, on the paper's
 rig); regime, motion, contact and time of separation; least reaction in weights of the body; whether the runs of the
 reference agree in kind; what the compliant body says of the end.
@@ -40,7 +42,6 @@ reference agree in kind; what the compliant body says of the end.
 regime, contact and aftermath, and the numbers of what follows, of which the reference is sure.
 """
 
-import argparse
 import csv
 import math
 import pprint
@@ -60,7 +61,7 @@ from benchmarks.reference.compliant import opinion
 from benchmarks.reference.problem import FORMULAS, problem
 from benchmarks.reference.run import drive
 
-COUNT, SEED = 20_000, 181
+COUNT, QUICK, SEED = 20_000, 300, 181
 #: Of the certified runs whose contacts hold, the compliant body is asked about one in this many.
 HELD_EVERY = 20
 #: Of the certified runs that lose a contact and go on, the compliant body is asked about one in this many.
@@ -536,13 +537,12 @@ def end_rows(ends):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--count", type=int, default=COUNT, help="scenes (default %(default)s)")
+    parser = _common.command(__doc__)
+    parser.add_argument("--count", type=int, help=f"scenes (default {COUNT}; {QUICK} with --quick)")
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--families", nargs="+", metavar="NAME", help=", ".join(families()))
     parser.add_argument("--solver", default="auto")
     parser.add_argument("--verbose", action="store_true", help="also print scenes that the reference could not resolve")
-    parser.add_argument("--out", type=Path, help="Markdown file to write")
     parser.add_argument("--csv", type=Path, help="write the 500 scenes of the tests instead")
     parser.add_argument("--impacts", type=Path, help="write the scenes with impacts of the tests instead")
     arguments = parser.parse_args()
@@ -556,7 +556,7 @@ def main():
     heading = _common.machine()
     print(heading)
     report, counts, total = Report(arguments.verbose), {}, Count()
-    many = arguments.count / len(chosen)
+    many = (arguments.count or (QUICK if arguments.quick else COUNT)) / len(chosen)
     with _common.one_core():
         for name in tqdm(chosen, disable=None):
             counts[name] = count = run_family(name, chosen[name], many, arguments.seed, arguments.solver, report)
@@ -572,15 +572,12 @@ def main():
     _common.table(END_HEADER, end_rows(total.ends))
     cost = ", ".join(f"{name} {seconds:.0f} s" for name, seconds in total.seconds.items())
     print(f"on one core: {cost} (compilation included), seed {arguments.seed}")
-    if arguments.out:
-        where = "; ".join(heading.splitlines())
-        text = "# Certified answers against an independent reference\n\n"
-        text += f"`python -m benchmarks.brute_force`, seed {arguments.seed}; {where}; {cost}.\n\n"
-        text += (
-            _common.markdown(HEADER, rows)
-            + "\n## Certified ends, and what a body on compliant contacts says of them\n\n"
-        )
-        arguments.out.write_text(text + _common.markdown(END_HEADER, end_rows(total.ends)))
+    if not arguments.families:
+        text = f"Seed {arguments.seed}; {cost}.\n\n{_common.markdown(HEADER, rows)}"
+        text += "\n## Certified ends, and what a body on compliant contacts says of them\n\n"
+        text += _common.markdown(END_HEADER, end_rows(total.ends))
+        title = "Certified answers against an independent reference"
+        _common.publish(arguments, "brute_force", title, heading, text)
 
 
 # The 500 scenes of the tests.

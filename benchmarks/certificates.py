@@ -9,26 +9,36 @@ tolerance. Ratios are medians of the ratios within the rounds. The table also gi
 largest error, against a run at a tolerance a thousand times tighter; the share of the errors that the stated bounds
 cover; and the median of bound over error.
 
-Writes `certificates.md` to `benchmarks/results/`, or to the current folder with `--quick`.
+Writes `certificates.md`.
 """
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import replace
-from pathlib import Path
 from statistics import median
 
 import numpy as np
 
-from benchmarks._common import ALPHA, V0, alternate, family, heading, machine, markdown, one_core, ring, table
+from benchmarks._common import (
+    ALPHA,
+    V0,
+    alternate,
+    command,
+    family,
+    heading,
+    machine,
+    markdown,
+    one_core,
+    publish,
+    ring,
+    table,
+)
 from ringsweep import config
 from ringsweep.models import MODELS, batch
 from ringsweep.runs import cells
 from ringsweep.solvers.certificate import with_errors
 from ringsweep.solvers.event import Event, Implicit
 
-RESULTS = Path(__file__).parent / "results"
 NAMES = MODELS["ring"].outcomes
 LAWS = {
     "bengisu-akay": ({"law": "bengisu-akay", "alpha": ALPHA, "v0": V0}, Implicit()),
@@ -79,16 +89,12 @@ def measure(law: str, side: int, rounds: int) -> list[str]:
 
 def main() -> None:
     """Measure, print and write."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="fewer cells and rounds")
-    quick = parser.parse_args().quick
+    given = command(__doc__).parse_args()
     print(where := machine())
-    rows = [measure(law, 16 if quick else 64, 3 if quick else 9) for law in LAWS]
+    rows = [measure(law, 16 if given.quick else 64, 3 if given.quick else 9) for law in LAWS]
     heading("What a certificate costs")
     table(HEADER, rows)
-    report = "# What a certificate costs\n\n`python -m benchmarks.certificates` on\n\n"
-    report += "".join(f"- {line}\n" for line in where.splitlines()) + f"\n{markdown(HEADER, rows)}"
-    (Path() if quick else RESULTS).joinpath("certificates.md").write_text(report)
+    publish(given, "certificates", "What a certificate costs", where, markdown(HEADER, rows))
 
 
 if __name__ == "__main__":

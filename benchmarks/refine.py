@@ -11,7 +11,6 @@ do not grow with other load on the machine; they contain everything: runs, decis
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 import time
 from pathlib import Path
@@ -22,12 +21,11 @@ import numpy as np
 import xarray as xr
 
 import ringsweep
-from benchmarks._common import ALPHA, V0, heading, machine, markdown, ring, table
+from benchmarks._common import ALPHA, V0, command, folder_of, heading, machine, markdown, publish, ring, table
 from ringsweep.quantities.variables import INFERRED, LABELS
 from ringsweep.runs.refined import SEED
 from ringsweep.runs.refinement import Answer, refine
 
-RESULTS = Path(__file__).parent / "results"
 SCENE = ring({"law": "bengisu-akay", "alpha": ALPHA, "v0": V0})
 #: A ragged place in the lower right corner of the map: amplitude (rad/s), half-angle (rad).
 CORNER = (3.6, np.radians(3.2))
@@ -192,8 +190,7 @@ def zoom(side: int) -> str:
 
 def main() -> None:
     """Measure, print, write."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="smaller maps")
+    parser = command(__doc__)
     parser.add_argument("--part", choices=["full", "scaling", "zoom"], help="only this part, which is only printed")
     parser.add_argument("--sides", type=int, nargs="+", help="cells along a side of the maps of this part")
     given = parser.parse_args()
@@ -203,18 +200,15 @@ def main() -> None:
     full, resolutions, window = (
         ([128], [64, 128], 64) if given.quick else ([512, 1024], [2**k for k in range(6, 13)], 128)
     )
-    target = Path() if given.quick or given.part else RESULTS
     with tempfile.TemporaryDirectory() as folder:
         parts = {
             "full": lambda: against_full(given.sides or full, folder),
-            "scaling": lambda: scaling(given.sides or resolutions, folder, target / "refine.png"),
+            "scaling": lambda: scaling(given.sides or resolutions, folder, folder_of(given) / "refine.png"),
             "zoom": lambda: zoom((given.sides or [window])[0]),
         }
         texts = [part() for name, part in parts.items() if given.part in (None, name)]
     if given.part is None:
-        report = "# Refined maps\n\n`python -m benchmarks.refine` on\n\n"
-        report += "".join(f"- {line}\n" for line in where.splitlines()) + "\n" + "\n".join(texts)
-        (target / "refine.md").write_text(report)
+        publish(given, "refine", "Refined maps", where, "\n".join(texts))
 
 
 if __name__ == "__main__":

@@ -9,12 +9,11 @@ rounds. *Idle* pairs compute the same motion twice: with a thing that has no eff
 rough as the rest), and without it. Compilation is measured in CPU seconds, which do not grow with other load on the
 machine, in a new process for each kernel.
 
-Writes `scenes.md` to `benchmarks/results/`, or to the current folder with `--quick`.
+Writes `scenes.md`.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import re
@@ -37,11 +36,13 @@ from benchmarks._common import (
     Times,
     alternate,
     bare,
+    command,
     configure,
     heading,
     machine,
     markdown,
     one_core,
+    publish,
     table,
 )
 from ringsweep.physics.friction import LAWS, SetValued, coefficients_of, family_of
@@ -50,7 +51,6 @@ from ringsweep.runs.executors import Execution
 from ringsweep.solvers import automaton, rk4
 
 ROOT = Path(__file__).parent.parent
-RESULTS = Path(__file__).parent / "results"
 
 #: Functions of the C library that a kernel may call.
 CALLS = ("exp", "atan", "log1p", "log", "pow", "sin", "cos")
@@ -349,18 +349,10 @@ def over(found: Mapping[str, Any], name: str, other: str, method: str, per: str 
     return Times(one["wall"]).ratio(Times(two["wall"])) * two[per] / one[per]
 
 
-def judge(value: float, target: float, unit: str) -> list[str]:
-    """Value, target and verdict of a row in the table of targets."""
-    return [f"{value:.2f}{unit}", f"{target:g}{unit}", "met" if value <= target else "MISSED"]
-
-
 def main() -> None:
     """Measure, print, write."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="fewer cells and rounds")
-    quick = parser.parse_args().quick
-    cells, few, rounds = (64, 16, 3) if quick else (512, 128, 5)
-    begin = time.perf_counter()
+    given = command(__doc__).parse_args()
+    cells, few, rounds = (64, 16, 3) if given.quick else (512, 128, 5)
     where = machine()
     print(where)
 
@@ -397,36 +389,26 @@ def main() -> None:
         print(f"cold: {cold[0]:.1f} s, {cold[1]:.1f} s", flush=True)
         warm = min(first_and_last(config, folder, cache) for _ in range(3))
         idle.append(["stiffness recorded, over `diagnose: false`", f"{kept:.2f}", "-"])
-        command = "`ringsweep run configs/regime_map.yaml`"
+        words = "`ringsweep run configs/regime_map.yaml`"
         sections.append(("Start and memory", ["", ""], [
             ["python alone", f"{bare_start:.2f} s"],
             ["`import ringsweep`", f"{imported:.2f} s"],
             ["`import ringsweep.runs.sweep`, with Numba and xarray", f"{everything:.2f} s"],
             ["`ringsweep --help`", f"{helped:.2f} s"],
-            [f"{command}, cold: time to the first cells, total", f"{cold[0]:.1f} s, {cold[1]:.1f} s"],
-            [f"{command}, warm: time to the first cells, total", f"{warm[0]:.1f} s, {warm[1]:.1f} s"],
+            [f"{words}, cold: time to the first cells, total", f"{cold[0]:.1f} s, {cold[1]:.1f} s"],
+            [f"{words}, warm: time to the first cells, total", f"{warm[0]:.1f} s, {warm[1]:.1f} s"],
             ["size of its cache", f"{size_of(cache) / 1024:.0f} KiB"],
             ["peak memory after the import", f"{peaks['imported']:.0f} MiB"],
             ["peak memory after a sweep of 64 cells", f"{peaks['small']:.0f} MiB"],
             [f"additional memory for {many} cells", f"{peaks['large'] - peaks['small']:.0f} MiB"],
         ]))  # fmt: skip
-        contacts = 1.0 / over(found, "+ second contact", "one contact, Coulomb, immobile uniform ring", "rk4", "steps")
-        sections.append(("Targets", ["target", "measured", "at most", ""], [
-            ["first result of a cold `ringsweep run`", *judge(cold[0], 20.0, " s")],
-            ["first result of a warm `ringsweep run`", *judge(warm[0], 2.0, " s")],
-            ["a step of `rk4` with one contact over one with two", *judge(contacts, 1.0, "")],
-        ]))  # fmt: skip
 
-    report = "# The cost of each thing in a scene\n\n`python -m benchmarks.scenes` on\n\n"
-    report += "".join(f"- {line}\n" for line in where.splitlines()) + ABOUT
+    report = ABOUT
     for title, header, rows in sections:
         heading(title)
         table(header, rows)
         report += f"\n## {title}\n\n{markdown(header, rows)}"
-    target = Path() if quick else RESULTS
-    target.mkdir(exist_ok=True)
-    (target / "scenes.md").write_text(report)
-    print(f"\nscenes.md is in {target.resolve()}; {time.perf_counter() - begin:.0f} s in all")
+    publish(given, "scenes", "The cost of each thing in a scene", where, report)
 
 
 #: Explanation at the head of the report.

@@ -8,12 +8,11 @@ velocity) of the ring of the paper's Fig. 29, under stiction, for 2 s, with cert
 process, measured as a whole: start, tasks, merge and verification. Memory is the greatest resident set of that
 process. Then one map is drawn from each file.
 
-Writes `sizes.md` to `benchmarks/results/`, or to the current folder with `--quick`.
+Writes `sizes.md`.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 import subprocess
 import sys
@@ -25,9 +24,8 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from benchmarks._common import heading, machine, markdown, ring, table
+from benchmarks._common import command, heading, machine, markdown, publish, ring, table
 
-RESULTS = Path(__file__).parent / "results"
 #: Values along each of the five axes.
 SIDES = (10, 16, 25)
 
@@ -72,9 +70,7 @@ def cost(*arguments: str) -> Cost:
 
 def main() -> None:
     """Measure, print, write."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="without the largest sweep")
-    quick = parser.parse_args().quick
+    given = command(__doc__).parse_args()
     where = machine()
     print(where)
     rows = []
@@ -84,7 +80,7 @@ def main() -> None:
         config.write_text(configuration(3))
         # The first run compiles: the cost of the second is the cost of the start.
         start = [cost("run", str(config), "-o", str(folder / name)) for name in ("first.nc", "second.nc")][1]
-        for side in SIDES[: 2 if quick else 3]:
+        for side in SIDES[: 2 if given.quick else 3]:
             cells = side**5
             config.write_text(configuration(side))
             target.unlink(missing_ok=True)
@@ -112,17 +108,12 @@ def main() -> None:
     ]
     heading("Size of a sweep over five axes")
     table(header, rows)
-    report = "# Size of a sweep\n\n`python -m benchmarks.sizes` on\n\n"
-    report += "".join(f"- {line}\n" for line in where.splitlines())
-    report += f"""
+    about = f"""
 A grid over five axes, 2 s under stiction for each cell, with certificates, from start to finished file. A sweep of
 {3**5} cells takes {start.wall:.1f} s and {start.memory / 2**20:.0f} MiB; rates count only the time beyond that.
 
 """
-    out = Path() if quick else RESULTS
-    out.mkdir(exist_ok=True)
-    (out / "sizes.md").write_text(report + markdown(header, rows))
-    print(f"\nsizes.md is in {out.resolve()}")
+    publish(given, "sizes", "Size of a sweep", where, about + markdown(header, rows))
 
 
 if __name__ == "__main__":

@@ -17,12 +17,11 @@ Errors are the largest over the cells: of the angle at the end (rad), or of the 
 law `rk4` is compared with `plain.c` at the same step, which leaves rounding errors. The other references are methods of
 the package at their tightest tolerance, which `benchmarks.work_precision` compares with other libraries.
 
-Writes `speed.md` to `benchmarks/results/`, or to the current folder with `--quick`.
+Writes `speed.md`.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import subprocess
 import sys
@@ -41,11 +40,13 @@ from benchmarks._common import (
     Times,
     alternate,
     bare,
+    command,
     configure,
     heading,
     machine,
     markdown,
     one_core,
+    publish,
     ring,
     table,
 )
@@ -57,7 +58,6 @@ from ringsweep.models import MODELS
 from ringsweep.runs import sweep
 from ringsweep.runs.executors import Execution
 
-RESULTS = Path(__file__).parent / "results"
 #: A column of the result files, the value at the end, by model.
 ENDS = {"ring": "phi_end", "belt": "x_end"}
 
@@ -277,21 +277,15 @@ def two_cores(effort: Effort) -> list[list[str]]:
 
 def main() -> None:
     """Measure, print, write."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="fewer cells and rounds")
-    quick = parser.parse_args().quick
-    effort = QUICK if quick else FULL
+    given = command(__doc__).parse_args()
+    effort = QUICK if given.quick else FULL
     compilers = [in_c.compiler(name) or f"no compiler ({name}): no units" for name in ("cc", "c++")]
     where = "\n".join([machine(), *compilers, f"A: {' '.join(in_c.PLAIN_FLAGS)}", f"B: {' '.join(in_c.VECTOR_FLAGS)}"])
     print(where)
     found = [*rows(units(effort), contenders(effort), effort.rounds), first_cell(), *two_cores(effort)]
     heading("Speed and error")
     table(HEADER, found)
-    report = "# Speed and error\n\n`python -m benchmarks.speed` on\n\n"
-    report += "".join(f"- {line}\n" for line in where.splitlines()) + f"{ABOUT}\n{markdown(HEADER, found)}"
-    folder = Path() if quick else RESULTS
-    (folder / "speed.md").write_text(report)
-    print(f"\nspeed.md is in {folder.resolve()}")
+    publish(given, "speed", "Speed and error", where, f"{ABOUT}\n{markdown(HEADER, found)}")
 
 
 #: Explanation at the head of the report.

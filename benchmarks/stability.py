@@ -15,16 +15,15 @@ Every run is put into one of four classes against a reference:
 A cell of a map has the worst class of three scenes, so that no result depends on one lucky scene. The reference of
 the maps is the piecewise method at a tolerance five decades below its default. This reference is compared with
 Runge-Kutta at a step within its limit of stability, and with ``benchmarks.reference``, which shares no code with
-the package. Results go to ``benchmarks/results``: ``stability.nc``, ``stability.png`` and ``stability.md``.
+the package. Writes ``stability.nc``, ``stability.png`` and ``stability.md``.
 """
 
 from __future__ import annotations
 
-import argparse
 import copy
 import textwrap
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import asin, cos, pi, radians, sin, sqrt
 from pathlib import Path
@@ -38,7 +37,20 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from benchmarks import reference
-from benchmarks._common import ALPHA, BODY, GRAVITY, RADIUS, REST, ROUGH, V0, machine
+from benchmarks._common import (
+    ALPHA,
+    BODY,
+    GRAVITY,
+    RADIUS,
+    REST,
+    ROUGH,
+    V0,
+    command,
+    folder_of,
+    machine,
+    markdown,
+    publish,
+)
 from ringsweep import config
 from ringsweep.quantities.flags import REGIMES
 from ringsweep.runs import sweep
@@ -46,7 +58,6 @@ from ringsweep.runs.executors import Execution
 from ringsweep.solvers.rk4 import STABILITY_LIMIT
 from ringsweep.storage import netcdf
 
-RESULTS = Path(__file__).parent / "results"
 SEED = 29
 
 #: Allowed error of phi_end (rad), of t_separation (s), and of x_end relative to the largest displacement.
@@ -699,12 +710,6 @@ def _legend(ds: xr.Dataset, drawn: Sequence[Map]) -> list[Artist]:
     return [*entries, beyond]
 
 
-def markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table in Markdown."""
-    lines = [header, ["---"] * len(header), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
 def counts(ds: xr.Dataset, chosen: Sequence[Map]) -> list[list[str]]:
     """Rows with the number of runs of each map in each class, and of runs certified beyond the limit of stability."""
     rows = []
@@ -723,23 +728,22 @@ def counts(ds: xr.Dataset, chosen: Sequence[Map]) -> list[list[str]]:
 
 def main() -> None:
     """Run the benchmark and write its results."""
-    parser = argparse.ArgumentParser(description="Solvers on stiff and extreme cases.")
-    parser.add_argument("--quick", action="store_true", help="coarser maps: under a minute once compiled")
-    parser.add_argument("--out", type=Path, default=RESULTS, help="folder of the results (default %(default)s)")
+    parser = command(__doc__)
     parser.add_argument("--redraw", action="store_true", help="only draw the stored numbers again")
-    arguments = parser.parse_args()
-    if arguments.redraw:
-        picture(xr.load_dataset(arguments.out / "stability.nc"), maps(quick=False), arguments.out / "stability.png")
+    given = parser.parse_args()
+    folder = folder_of(given)
+    if given.redraw:
+        picture(xr.load_dataset(folder / "stability.nc"), maps(given.quick), folder / "stability.png")
         return
     begin = time.perf_counter()
     where = machine()
     print(where, flush=True)
-    ds, chosen = draw_maps(arguments.quick)
-    checks = crosscheck(arguments.quick)
+    ds, chosen = draw_maps(given.quick)
+    checks = crosscheck(given.quick)
     print(f"reference checked: {time.perf_counter() - begin:.0f} s", flush=True)
     wild, lines = try_extremes()
     print(f"extremes: {time.perf_counter() - begin:.0f} s", flush=True)
-    energy, losses, order = drifts(arguments.quick)
+    energy, losses, order = drifts(given.quick)
     ds = ds.merge(wild).merge(energy)
     ds.attrs = {
         "Conventions": "CF-1.11",
@@ -747,9 +751,8 @@ def main() -> None:
         "close": CLOSE,
         "machine": where,
     }
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    netcdf.save(ds, arguments.out / "stability.nc")
-    picture(ds, chosen, arguments.out / "stability.png")
+    netcdf.save(ds, folder / "stability.nc")
+    picture(ds, chosen, folder / "stability.png")
     sections = [
         ("Maps", markdown(
             ["map", "runs", *(name.replace("_", " ") for name in CLASSES), "silent in kind",
@@ -762,14 +765,12 @@ def main() -> None:
              "ms", "class", "λh"], lines)),
         ("Energy without friction: relative change (steps)", markdown(
             ["method", *(f"{span:g} s" for span in energy["span"].values)], losses)
-         + f"\n\nThe loss of rk4 over 10 s falls with the power {order:.2f} of the step (theory: 5)."),
+         + f"\nThe loss of rk4 over 10 s falls with the power {order:.2f} of the step (theory: 5)."),
     ]  # fmt: skip
-    text = "# Numerical stability\n\n" + "  \n".join(where.splitlines())
-    text += f"\n\nWrong: another regime, motion or contact, or an error of more than {CLOSE:g} rad or s.\n"
-    text += "".join(f"\n## {title}\n\n{body}\n" for title, body in sections)
-    text += f"\n{time.perf_counter() - begin:.0f} s in all.\n"
-    (arguments.out / "stability.md").write_text(text)
+    text = f"Wrong: another regime, motion or contact, or an error of more than {CLOSE:g} rad or s.\n"
+    text += "".join(f"\n## {title}\n\n{body}" for title, body in sections)
     print(text)
+    publish(given, "stability", "Numerical stability", where, text)
 
 
 if __name__ == "__main__":

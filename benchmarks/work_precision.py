@@ -12,13 +12,11 @@ share no formula with the package. If a peer is not installed, the benchmark say
 backwards. Times are medians over the rounds, ratios are medians of the ratios within the rounds. There are no
 certificates, because peers have none.
 
-Writes `work_precision.{md,nc}` and a picture of each scene, `work_precision_smooth.png` for example, to
-`benchmarks/results/`, or to the current folder with `--quick` or `--scene`.
+Writes `work_precision.{md,nc}` and a picture of each scene, `work_precision_smooth.png` for example.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 import time
 import warnings
@@ -28,6 +26,7 @@ from functools import partial
 from importlib import import_module
 from math import sqrt
 from pathlib import Path
+from statistics import median
 from typing import Any, NamedTuple
 
 import joblib
@@ -40,14 +39,17 @@ from benchmarks._common import (
     SPAN,
     Times,
     alternate,
+    command,
     configure,
     family,
+    folder_of,
     heading,
     machine,
     markdown,
     on_all_cores,
     on_one_core,
     one_core,
+    publish,
     ring,
     table,
 )
@@ -57,7 +59,8 @@ from ringsweep import plots
 from ringsweep.quantities.flags import SEPARATING
 
 SEED, SIDE = 181, 64
-RESULTS = Path(__file__).parent / "results"
+#: A setting with a larger error at the end is not compared.
+CLOSE = 1e-3
 
 #: Width of a picture, inches: that of a page.
 WIDTH = 6.69
@@ -368,6 +371,8 @@ def measure(scene: Scene, effort: Effort) -> Measured:
 
 # ---- what is shown -------------------------------------------------------------------------
 
+RATES = ["", "runs", "runs/s"]
+BESIDE = ["peer", "largest error", "times longer", "in the rounds", "than"]
 HEADER = ["method", "setting", "cells", "ms per run", "error at T: median", "max", "t_sep: max", "regimes wrong"]
 
 
@@ -439,7 +444,7 @@ def draw_all(scenes: dict[str, xr.Dataset], folder: Path) -> None:
         draw(data, methods).savefig(folder / f"work_precision_{name}.png", dpi=150, metadata={"Software": None})
 
 
-# ---- targets -------------------------------------------------------------------------------
+# ---- beside peers ---------------------------------------------------------------------------
 
 
 def cheapest(found: Measured, method: str, error: float) -> tuple[str, str] | None:
@@ -448,36 +453,34 @@ def cheapest(found: Measured, method: str, error: float) -> tuple[str, str] | No
     return min(keys, key=found.per_run, default=None)
 
 
-def against_peer(found: Measured, peer: tuple[str, str], factor: float, least: float) -> list[str]:
-    """Row of a target of the form '`least` times faster than a peer, with `factor` times less error'."""
-    words = f"`implicit` ≥ {least:g}x {peer[0]}, {peer[1]}"
-    words += f", with {factor:g} times less error" if factor > 1.0 else ", at its error"
-    if peer not in found.times:
-        return [words, "-", "peer absent", "not measured"]
-    theirs = found.largest(peer)
-    best = cheapest(found, "implicit", theirs / factor)
-    if best is None:
-        return [words, "-", f"no setting has an error of {theirs / factor:.0e}", "MISSED"]
-    ratio = found.ratio(peer, best)
-    note = (
-        f"{best[1]}: max {found.largest(best):.0e}, {1e3 * found.per_run(best):.3g} ms; "
-        f"peer: max {theirs:.0e}, {1e3 * found.per_run(peer):.3g} ms"
-    )
-    return [words, f"{ratio:.2g}x", note, "met" if ratio >= least else "MISSED"]
+def beside_peers(scene: Scene, found: Measured) -> list[list[str]]:
+    """Rows that compare each peer, at each setting, with the fastest setting of ours that errs no more."""
+    rows = []
+    for peer in found.times:
+        theirs = found.largest(peer)
+        if peer[0] in ("rk4", scene.method) or not theirs < CLOSE:
+            continue
+        if (best := cheapest(found, scene.method, theirs)) is None:
+            ours = ["-", "-", "no setting errs as little"]
+        else:
+            each = sorted(a / b for a, b in zip(found.times[peer].wall, found.times[best].wall, strict=False))
+            lanes = float(found.ratio(peer, best)) / median(each)
+            spread = f"{number(lanes * each[0])} to {number(lanes * each[-1])}"
+            ours = [number(found.ratio(peer, best)), spread, f"`{best[0]}`, {best[1]}: {found.largest(best):.0e}"]
+        rows.append([", ".join(peer), f"{theirs:.0e}", *ours])
+    return rows
 
 
-def throughput(effort: Effort) -> tuple[list[list[str]], list[list[str]]]:
-    """Rows of the targets about whole families, and rows of the runs per second on all cores."""
+def number(value: float) -> str:
+    """Two digits of a number, without an exponent."""
+    return f"{value:.0f}" if value >= 10.0 else f"{value:.2g}"
+
+
+def throughput(effort: Effort) -> list[list[str]]:
+    """Rows of the runs per second on all cores."""
     cells = family(effort.side)
     smooth, stiff, limit = SCENES["smooth"], SCENES["stiff"], SCENES["limit"]
     cores = joblib.cpu_count()
-
-    with one_core():
-        single = {"rk4": own_of(smooth, "rk4", cells, steps=PAPER_STEPS)}
-        if in_c.compiler():
-            single["C"] = in_c.ring(smooth.law, cells, PAPER_STEPS)
-        alone, _ = alternate(single, effort.rounds + 2)
-
     many: dict[str, tuple[int, Callable[[], Any]]] = {}
     for name, scene, method, options in (
         ("`event`, limit law, rtol 1e-10", limit, "event", {"rtol": 1e-10}),
@@ -485,8 +488,7 @@ def throughput(effort: Effort) -> tuple[list[list[str]], list[list[str]]]:
         ("`implicit`, smooth, rtol 3e-06", smooth, "implicit", {"rtol": 3e-6}),
         (f"`rk4`, smooth, {PAPER_STEPS} steps", smooth, "rk4", {"steps": PAPER_STEPS}),
     ):
-        configuration = scene.configuration(cells, method, **options)
-        many[name] = len(cells), partial(on_all_cores, configuration)
+        many[name] = len(cells), partial(on_all_cores, scene.configuration(cells, method, **options))
     try:
         numbalsoda = import_module("benchmarks.peers.with_numbalsoda")
         share = stiff.cells(min(64, len(cells)))
@@ -497,27 +499,8 @@ def throughput(effort: Effort) -> tuple[list[list[str]], list[list[str]]]:
         pass
     for _, call in many.values():
         call()
-    times, results = alternate({name: call for name, (_, call) in many.items()}, effort.rounds)
-    rates = {name: many[name][0] / times[name].median for name in many}
-
-    event = next(iter(many))
-    exact = on_one_core(limit.configuration(cells, "event", rtol=1e-15))()["phi_end"]
-    error = float(np.median(abs(np.ravel(results[event]["phi_end"]) - exact)))
-    small = "" if effort is FULL else " (of a family too small to reach the rate)"
-    targets = [[
-        f"`event` ≥ 25000 runs/s on all cores, error ≤ 1e-10, {len(cells)} cells{small}", f"{rates[event]:.0f} runs/s",
-        f"rtol 1e-10: median error {error:.0e} rad, {cores} cores",
-        "met" if rates[event] >= 25_000 and error <= 1e-10 else "MISSED",
-    ]]  # fmt: skip
-    wanted = f"`rk4` ≥ 18x scalar C, one core, {PAPER_STEPS} steps, smooth, {len(cells)} cells"
-    if "C" in alone:
-        ratio = alone["C"].ratio(alone["rk4"])
-        each = {name: 1e9 * alone[name].median / (len(cells) * PAPER_STEPS) for name in alone}
-        note = f"{each['rk4']:.3g} and {each['C']:.3g} ns per step of the span; {' '.join(in_c.FLAGS)}"
-        targets.append([wanted, f"{ratio:.2g}x", note, "met" if ratio >= 18.0 else "MISSED"])
-    else:
-        targets.append([wanted, "-", "no compiler", "not measured"])
-    return targets, [[name, f"{rate:.0f}"] for name, rate in rates.items()]
+    times, _ = alternate({name: call for name, (_, call) in many.items()}, effort.rounds)
+    return [[name, str(count), f"{count / times[name].median:.0f}"] for name, (count, _) in many.items()]
 
 
 #: Explanation at the head of the report.
@@ -532,16 +515,16 @@ separates. The time of diffrax is the time of one lane of a full solve.
 
 def main() -> None:
     """Measure, print, write."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="fewer cells and settings")
+    parser = command(__doc__)
     parser.add_argument("--scene", action="append", choices=SCENES, help="only this scene; repeatable")
     parser.add_argument("--redraw", action="store_true", help="only draw the stored numbers again")
-    arguments = parser.parse_args()
-    if arguments.redraw:
-        stored = RESULTS / "work_precision.nc"
-        draw_all({name: xr.load_dataset(stored, group=name) for name in SCENES}, RESULTS)
+    given = parser.parse_args()
+    folder = folder_of(given)
+    if given.redraw:
+        stored = folder / "work_precision.nc"
+        draw_all({name: xr.load_dataset(stored, group=name) for name in SCENES}, folder)
         return
-    effort = QUICK if arguments.quick else FULL
+    effort = QUICK if given.quick else FULL
     # XLA reads this when JAX is imported, which happens when a scene asks for diffrax.
     os.environ["XLA_FLAGS"] = "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"
     # LSODA warns if a tolerance is loose; the table shows the resulting error.
@@ -550,13 +533,10 @@ def main() -> None:
 
     where = machine(("numbalsoda", "diffrax", "jax", "heyoka", "xarray")) + f"\n{in_c.compiler() or 'no C compiler'}"
     print(where)
-    folder = Path() if arguments.quick or arguments.scene else RESULTS
-    folder.mkdir(exist_ok=True)
-    report = "# Error against run time\n\n`python -m benchmarks.work_precision` on\n\n"
-    report += "".join(f"- {line}\n" for line in where.splitlines()) + ABOUT
+    report = ABOUT
     measured: dict[str, Measured] = {}
     with one_core():
-        for name in arguments.scene or SCENES:
+        for name in given.scene or SCENES:
             found = measured[name] = measure(SCENES[name], effort)
             heading(SCENES[name].title)
             print("\n".join(found.words))
@@ -565,32 +545,19 @@ def main() -> None:
             report += f"\n## {SCENES[name].title}\n\n![error against run time](work_precision_{name}.png)\n\n"
             report += "".join(f"- {words}\n" for words in found.words)
             report += "\n" + markdown(HEADER, lines(found.data))
-            # Written after each scene, so that an interrupted run keeps its results.
-            write(folder, report, measured, where)
-    targets = []
-    if "smooth" in measured:
-        targets.append(against_peer(measured["smooth"], ("heyoka", "rtol 1e-09"), 1.0, 8.0))
-    if "stiff" in measured:
-        targets.append(against_peer(measured["stiff"], ("numbalsoda LSODA", "rtol 1e-09"), 10.0, 10.0))
-    rates: list[list[str]] = []
-    if not arguments.scene:
-        more, rates = throughput(effort)
-        targets += more
-    for title, header, rows in (
-        ("Targets", ["target", "measured", "how", ""], targets),
-        (f"Runs per second on all cores, T = {SPAN:g} s", ["", "runs/s"], rates),
-    ):
-        if rows:
-            heading(title)
-            table(header, rows)
-            report += f"\n## {title}\n\n{markdown(header, rows)}"
-    write(folder, report, measured, where)
-    print(f"\nwork_precision.md, .nc, and pictures: {folder.resolve()}; {time.perf_counter() - begin:.0f} s in all")
+            table(BESIDE, rows := beside_peers(SCENES[name], found))
+            report += f"\nHow many times longer a peer takes than ours at no larger error:\n\n{markdown(BESIDE, rows)}"
+    if not given.scene:
+        title, header, rows = f"Runs per second on all cores, T = {SPAN:g} s", RATES, throughput(effort)
+        heading(title)
+        table(header, rows)
+        report += f"\n## {title}\n\n{markdown(header, rows)}"
+    write(folder, measured, where)
+    publish(given, "work_precision", "Error against run time", where, report)
 
 
-def write(folder: Path, report: str, measured: dict[str, Measured], where: str) -> None:
-    """Write the report, the numbers (one NetCDF group for each scene) and the pictures."""
-    (folder / "work_precision.md").write_text(report)
+def write(folder: Path, measured: dict[str, Measured], where: str) -> None:
+    """Write the numbers (one NetCDF group for each scene) and the pictures."""
     for k, (name, found) in enumerate(measured.items()):
         found.data.attrs["machine"] = where
         found.data.to_netcdf(folder / "work_precision.nc", group=name, mode="a" if k else "w")

@@ -1,6 +1,7 @@
 """Extension of Sphinx: help of the commands, figures for the gallery, and what must be there before a build."""
 
 import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,9 @@ from sphinx_gallery.scrapers import figure_rst
 import ringsweep
 from ringsweep import cli
 from ringsweep.cli.parser import build_parser
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from benchmarks._common import sources
 
 GALLERY = Path(__file__).parent / "gallery"
 
@@ -43,9 +47,17 @@ def collect_figures(block: Any, block_vars: dict[str, Any], gallery_conf: dict[s
     return figure_rst(paths, gallery_conf["src_dir"])
 
 
+def mark_older_results(app: Any, document: str, source: list[str]) -> None:
+    """Say at the head of a report that it is older than the sources, if it does not bear their digest."""
+    if document.startswith("benchmarks/results/") and f"on sources `{sources()}`" not in source[0]:
+        title, _, rest = source[0].partition("\n")
+        source[0] = f"{title}\n\n```{{note}}\nThese figures were measured on older sources of the package.\n```\n{rest}"
+
+
 def setup(app: Any) -> dict[str, Any]:
-    """Add the directive, write the files that the gallery reads, and import all public names."""
+    """Add the directive and the notes, write the files that the gallery reads, and import all public names."""
     app.add_directive("command-help", CommandHelp)
+    app.connect("source-read", mark_older_results)
     for model, name in (("ring", "my-sweep.yaml"), ("belt", "belt.yaml")):
         if not (path := GALLERY / name).exists():
             cli.main(["init", "-q", "--model", model, str(path)])
