@@ -126,6 +126,13 @@ def friction(scene, mode, v):
 
 
 @inlined
+def _heading(scene, y, sign):
+    """Direction in which the ball moves over the ring: a ball that does not roll moves as it slides, with `sign`."""
+    rolls = y[1] - scene.balls.radius * y[3]
+    return sign if rolls == 0.0 else 1 if rolls > 0.0 else -1
+
+
+@inlined
 def begun(scene, t, y, places, contacts, zeros, event, stick_end):
     """Status and mode of a pivot that begins in the state `y`, or whose sliding velocity is zero.
 
@@ -151,7 +158,7 @@ def begun(scene, t, y, places, contacts, zeros, event, stick_end):
         best, best_sign = -1e300, 0
         several = False
         for sign in (1, -1):
-            there = leave_edge(scene.closed.surface, place, rho, sign)
+            there = leave_edge(scene.closed.surface, place, rho, _heading(scene, y, sign))
             slip = make(sign, region, RING + SLOW, with_place(stick, there), contacts, zeros, event)
             K, _ = friction(scene, slip, 0.0)
             psi_dd, alpha_dd, normal, denominator = in_slip(scene, f, K)
@@ -166,7 +173,7 @@ def begun(scene, t, y, places, contacts, zeros, event, stick_end):
         # A tie: for example a contact without friction.
         if best_sign == 0 or best < -least / body.mass:
             return JAM, stick
-        there = leave_edge(scene.closed.surface, place, rho, best_sign)
+        there = leave_edge(scene.closed.surface, place, rho, _heading(scene, y, best_sign))
         return RUNNING, make(best_sign, region, RING + SLOW, with_place(stick, there), contacts, zeros, event)
     sign, region, entry_guard = (1 if v > 0.0 else -1), region_at(scene.law, abs(v)), -1
     if v == 0.0:
@@ -174,7 +181,7 @@ def begun(scene, t, y, places, contacts, zeros, event, stick_end):
         psi_dd, alpha_dd, _, _ = in_slip(scene, f, 0.0)
         sign = 1 if sliding_acceleration(scene, psi_dd, alpha_dd, ring_epsilon) >= 0.0 else -1
         entry_guard = RING + SLOW
-    there = leave_edge(scene.closed.surface, place, rho, sign)
+    there = leave_edge(scene.closed.surface, place, rho, _heading(scene, y, sign))
     slip = make(sign, region, entry_guard, with_place(stick, there), contacts, zeros, event)
     K, _ = friction(scene, slip, v)
     denominator = in_slip(scene, f, K)[3]
