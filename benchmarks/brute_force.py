@@ -460,9 +460,7 @@ def compare(kind, batch, data, count, report):
         else:
             kind_said = (str(words[i][0]), str(words[i][1]), int(data.separating_contact[i]))
             if kind.impact:
-                # The package counts reversals and turns up to the end of the run, the reference up to the first loss.
-                aftermath = str(ringsweep.words(data.aftermath[i]).values)
-                kind_said = (kind_said[0], verdict.kind[1], kind_said[2], aftermath)
+                kind_said = (*kind_said, str(ringsweep.words(data.aftermath[i]).values))
             said = f"{kind_said}, t_end {float(data.t_end[i]):.9g}, phi_end {float(data.phi_end[i]):.6g}"
             if kind_said != verdict.kind:
                 count.tally["contradicted"] += 1

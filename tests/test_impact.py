@@ -92,16 +92,33 @@ class TestBody:
             np.testing.assert_allclose(mirrored[name].values[sure], drums[name].values[sure], rtol=1e-6, err_msg=name)
         np.testing.assert_allclose(mirrored.phi_end.values[sure], -drums.phi_end.values[sure], rtol=1e-6)
 
-    def test_first_loss_is_that_of_the_run_without_impact(self, drums):
-        ended = ringsweep.sweep(
-            {name: part for name, part in BODY.items() if name != "impact"},
-            {"drive.amplitude": AMPLITUDES},
-            progress=False,
+    @pytest.mark.parametrize("law", ["stiction", "bengisu-akay"])
+    def test_run_up_to_the_first_loss_is_the_run_without_impact_bit_for_bit(self, law):
+        """Regime, motion, contact and time of separation are numbers of that part. Tolerances are alike: no retries."""
+        rng, count = np.random.default_rng(31), 400
+        smooth = law == "bengisu-akay"
+        of_law = {"alpha": 1e4, "v0": 1e-4} if smooth else {}
+        scene = BODY | {"friction": BODY["friction"] | {"law": law} | of_law}
+        values = {
+            "drive.amplitude": rng.choice([-1, 1], count) * 10 ** rng.uniform(-0.5, 1.3, count),
+            "zone.half_angle": rng.uniform(0.05, 2.0, count),
+            "zone.center": rng.uniform(-np.pi, np.pi, count),
+            "initial.phi": rng.uniform(-1.0, 1.0, count),
+            "initial.omega": rng.choice([0.0, 1.0], count) * rng.uniform(-100, 100, count),
+            "friction.rest.mu_k": rng.uniform(0.02, 0.2, count),
+        }
+        axes = {path: xr.DataArray(column, dims="cell") for path, column in values.items()}
+        ended, gone_on = (
+            ringsweep.sweep(given, axes, solver={"method": "auto", "certify": False}, progress=False)
+            for given in ({name: part for name, part in scene.items() if name != "impact"}, scene)
         )
-        for name in ("regime", "separating_contact"):
-            np.testing.assert_array_equal(ended[name], drums[name])
-        np.testing.assert_allclose(ended.t_separation, drums.t_separation, rtol=1e-9)
         assert "aftermath" not in ended
+        lost = ended.separating_contact.values > 0
+        assert 0.2 < lost.mean() < 0.98
+        assert len(np.unique(ended.motion.values[lost])) == 3, "each motion comes before a loss"
+        assert (gone_on.reversals.values > ended.reversals.values).any()
+        for name in ("regime", "motion", "separating_contact", "t_separation"):
+            np.testing.assert_array_equal(gone_on[name], ended[name], err_msg=name)
 
     def test_gap_is_never_negative_and_an_open_contact_bears_nothing(self):
         run = ringsweep.simulate(BODY | {"drive": {"law": "arctan", "amplitude": 3.67}}, samples=4000)

@@ -107,6 +107,40 @@ def _step(family, scene, run, h_max, tolerances, scratch):
     """
 
 
+@hook
+def _creep(kind, scene, run, h_max, tolerance, scratch):
+    """Whether a mode is stiff, and the result of :func:`implicit_step` if it is; arguments as for :func:`_step`."""
+
+
+@_creep.implements(implicit.Whole)
+def _creep_whole(kind, scene, run, h_max, tolerance, scratch):
+    return _creep_in(scene, run, h_max, tolerance, scratch)
+
+
+@inlined
+def _creep_in(scene, run, h_max, tolerance, scratch):
+    start, control = start_at(scene, scratch.course, run.mode, run.t, run.y), run.control
+    if not implicit.is_stiff(scene, run.mode, run.y, start.linear):
+        return False, -1, 0.0, run.y, run.record, control, 0.0
+    if control.last_h == 0.0:
+        # The transient into creep decays at this rate.
+        control = StepControl(min(control.h, -1.0 / start.linear[1][3]), 0.0, 0.0)
+    guard, s, y, record, control, error = implicit_step(scene, run.record, start, control, h_max, tolerance, scratch)
+    return True, guard, s, y, record, control, error
+
+
+@_creep.implements(implicit.Parted)
+def _creep_parted(kind, scene, run, h_max, tolerance, scratch):
+    if not implicit.has_part(scene, run.mode):
+        return _creep_in(scene, run, h_max, tolerance, scratch)
+    part, record, mode, y = implicit.part(scene, run.record, run.mode, run.y)
+    run_of_part = _Run(record, mode, run.t, y, run.control, run.local)
+    is_stiff, guard, s, y, record, control, error = _creep_in(part, run_of_part, h_max, tolerance, scratch)
+    local = guard - scratch.first_guard if guard >= 0 else -1
+    local, record, y = implicit.rejoined(scene, run.record, run.mode, local, record, y)
+    return is_stiff, (local + scratch.first_guard if local >= 0 else -1), s, y, record, control, error
+
+
 @_step.implements(SetValued)
 def _step_series(family, scene, run, h_max, tolerances, scratch):
     guard, s, y, record, reach = series_step(scene, run.record, run.mode, run.t, run.y, h_max, tolerances[0], scratch)
@@ -119,15 +153,10 @@ def _step_series(family, scene, run, h_max, tolerances, scratch):
 @_step.implements(Smooth)
 def _step_either(family, scene, run, h_max, tolerances, scratch):
     if implicit.may_creep(scene, run.mode):
-        start = start_at(scene, scratch.course, run.mode, run.t, run.y)
-        if implicit.is_stiff(scene, run.mode, run.y, start.linear):
-            control = run.control
-            if control.last_h == 0.0:
-                # The transient into creep decays at this rate.
-                control = StepControl(min(control.h, -1.0 / start.linear[1][3]), 0.0, 0.0)
-            guard, s, y, record, control, error = implicit_step(
-                scene, run.record, start, control, h_max, tolerances[1], scratch
-            )
+        is_stiff, guard, s, y, record, control, error = _creep(
+            implicit.kind(scene), scene, run, h_max, tolerances[1], scratch
+        )
+        if is_stiff:
             return True, guard, s, y, record, control, _after_creep(run.local, error)
     guard, s, y, record, reach = series_step(scene, run.record, run.mode, run.t, run.y, h_max, tolerances[0], scratch)
     local = run.local

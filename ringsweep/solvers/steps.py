@@ -78,7 +78,8 @@ def scratch_for(rows: int, components: int, first_guard: int) -> Scratch:
         np.zeros((rows, COLUMNS)),
         np.empty((STACK, COLUMNS)),
         np.empty(drives.COURSE_SHAPE),
-        np.empty((2, 3, components)),
+        # A component that no step has changed must not be read as if one had.
+        np.zeros((2, 3, components)),
         np.empty((MOST_GUARDS, INSTANTS + 1)),
         first_guard,
     )

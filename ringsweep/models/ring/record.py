@@ -124,11 +124,21 @@ def observe(record, shocks, stuck_for, seen, epsilon_omega):
 
 
 @inlined
+def turns_of(record):
+    """Number of full turns since the last reversal, or since the start."""
+    return min(np.floor((record.highest - record.lowest) / (2.0 * pi)), MOST_TURNS)
+
+
+@inlined
+def motion_of(record):
+    """Motion up to now."""
+    return REVOLVING if turns_of(record) >= 1 else OSCILLATORY if record.reversals > 0 else RESTING
+
+
+@inlined
 def conclude(record, status, t, phi, omega):
     """Outcome of a run that ended with `status` at time `t` in the state `(phi, omega)`."""
-    r = record
-    turns = min(np.floor((r.highest - r.lowest) / (2.0 * pi)), MOST_TURNS)
-    motion = REVOLVING if turns >= 1 else OSCILLATORY if r.reversals > 0 else RESTING
+    r, motion = record, motion_of(record)
     if status == BROKEN or not (isfinite(phi + omega) and isfinite(r.normal_min_1 + r.normal_min_2)):
         regime, motion = FAILED, FAILED
     elif status == JAM:
@@ -151,7 +161,7 @@ def conclude(record, status, t, phi, omega):
         r.omega_min,
         r.omega_max,
         r.reversals,
-        float(turns),
+        turns_of(r),
         r.stick_time,
         # The last step ends after the reaction has vanished, and a reaction may jump below zero at the edge of a zone.
         0.0 if status in (SEPARATED_1, SEPARATED_BOTH) else max(r.normal_min_1, 0.0),

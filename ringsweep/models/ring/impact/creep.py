@@ -1,7 +1,7 @@
 """Implicit steps of a body that may leave the race, in the stiction band of a smooth law.
 
-The state is ``(psi - theta, v, eta, eta_dot, code)``, see :mod:`mode`; while both contacts hold eta is zero. So no
-state is the difference of two large numbers.
+While both contacts hold, the steps are those of the closed ring. In a pivot the state is
+``(psi - theta, v, eta, eta_dot, code)``, see :mod:`mode`, so that no state is the difference of two large numbers.
 """
 
 from __future__ import annotations
@@ -12,18 +12,22 @@ from typing import Any, NamedTuple
 from ringsweep.compile import inlined
 from ringsweep.models.interface import implicit
 from ringsweep.models.interface.shock import Located
+from ringsweep.models.ring.creep import NORMAL_1, NORMAL_2
 from ringsweep.models.ring.impact import pivot
 from ringsweep.models.ring.impact.mode import (
     FIRST,
     NONE,
     TURNED,
+    angle_when_closed,
     closed_mode,
+    code_of,
     coefficients_there,
     delta_when_closed,
     holding,
     place_of,
     ring_of,
 )
+from ringsweep.models.ring.impact.record import renamed, with_base
 from ringsweep.models.ring.impact.rows import row_of
 from ringsweep.physics import drives, ring
 from ringsweep.physics.friction.velocity import friction_in, region_bounds, stiction_band
@@ -78,6 +82,32 @@ def _closed_state(mode, x):
     return (x[0] - pi if mode.turned == 1 else x[0]), x[1]
 
 
+@implicit.kind.implements(ImpactRing)
+def _kind(scene):
+    return implicit.Parted()
+
+
+@implicit.has_part.implements(ImpactRing)
+def _has_part(scene, mode):
+    return mode.open == NONE
+
+
+@implicit.part.implements(ImpactRing)
+def _part(scene, record, mode, y):
+    base = renamed(record.base, -pi) if mode.turned == 1 else record.base
+    return ring_of(scene, mode.turned), base, closed_mode(mode), (angle_when_closed(y[0], mode.turned), y[1])
+
+
+@implicit.rejoined.implements(ImpactRing)
+def _rejoined(scene, record, mode, guard, part_record, y):
+    psi, base = y[0], part_record
+    if mode.turned == 1:
+        psi, base = y[0] + pi, renamed(part_record, pi)
+        guard = NORMAL_2 if guard == NORMAL_1 else NORMAL_1 if guard == NORMAL_2 else guard
+    state = psi, y[1], 0.0, 0.0, 0.0, 0.0, code_of(mode)
+    return guard, with_base(record, base), state
+
+
 @implicit.to_implicit.implements(ImpactRing)
 def _to_implicit(scene, forcing, y):
     return y[0] - forcing[0], y[1], y[2], y[3], y[6]
@@ -98,7 +128,7 @@ def _common(scene, mode, forcing, x):
 @implicit.is_stiff.implements(ImpactRing)
 def _is_stiff(scene, mode, y, linear):
     # A gap that has just opened grows from zero: its first step is a series.
-    if mode.open != NONE and y[2] == 0.0:
+    if y[2] == 0.0:
         return False
     body, (_, acceleration, _, _, _), decay = scene.closed.body, linear[0], -linear[1][3]
     natural_frequency = sqrt(body.gravity / body.radius) + abs(y[1]) / body.radius
@@ -135,11 +165,6 @@ def _rates_from(scene, forcing, x, psi_dd, alpha_dd):
 
 @implicit.rates.implements(ImpactRing)
 def _rates(scene, mode, common, forcing, x):
-    if mode.open == NONE:
-        rho_dot, v_dot = implicit.rates(
-            ring_of(scene, mode.turned), closed_mode(mode), common.closed, forcing, _closed_state(mode, x)
-        )
-        return rho_dot, v_dot, 0.0, 0.0, 0.0
     K, _ = _friction(scene, mode, common, x[1])
     psi_dd, alpha_dd, _, _ = pivot.in_slip(scene, _frame(scene, mode, forcing, x), K)
     return _rates_from(scene, forcing, x, psi_dd, alpha_dd)
@@ -147,14 +172,7 @@ def _rates(scene, mode, common, forcing, x):
 
 @implicit.linearise.implements(ImpactRing)
 def _linearise(scene, mode, common, t, forcing, x):
-    nothing = 0.0, 0.0, 0.0, 0.0
-    if mode.open == NONE:
-        (rho_dot, v_dot), (a, b, c, d), _, (first, second) = implicit.linearise(
-            ring_of(scene, mode.turned), closed_mode(mode), common.closed, t, forcing, _closed_state(mode, x)
-        )
-        rows = (a, b, 0.0, 0.0), (c, d, 0.0, 0.0), nothing, nothing
-        return (rho_dot, v_dot, 0.0, 0.0, 0.0), (a, b, c, d), implicit.Coupled(rows), (first, second, 0.0, 0.0, 0.0)
-    _, ring_omega, ring_epsilon = forcing
+    nothing, (_, ring_omega, ring_epsilon) = (0.0, 0.0, 0.0, 0.0), forcing
     f = _frame(scene, mode, forcing, x)
     K, slope = _friction(scene, mode, common, x[1])
     psi_dd, alpha_dd, _, _ = pivot.in_slip(scene, f, K)

@@ -27,8 +27,8 @@ class Lost(NamedTuple):
     ----------
     open, turned : float
         Contacts that are open, and whether the order of the contacts has changed.
-    t_first, first : float
-        Time of the first loss, s, NaN if there was none, and its contacts.
+    t_first, first, motion : float
+        Time of the first loss, s, NaN if there was none, its contacts, and the motion up to it.
     number : float
         Number of events.
     word : float
@@ -43,6 +43,7 @@ class Lost(NamedTuple):
     turned: float
     t_first: float
     first: float
+    motion: float
     number: float
     word: float
     violation: float
@@ -85,7 +86,7 @@ OUTCOMES = (
 
 @recorder.begin.implements(ImpactRing)
 def _begin(scene, t, seen):
-    nothing = Lost(0.0, 0.0, nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, nan)
+    nothing = Lost(0.0, 0.0, nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, nan)
     return Record(recorder.begin(scene.closed, t, seen[:5]), 0.0, 0.0, 0.0, nothing)
 
 
@@ -100,8 +101,35 @@ def _observe(scene, record, t, duration, stuck, seen):
 
 @recorder.enter.implements(ImpactRing)
 def _enter(scene, record, t, seen):
-    r = record
-    return Record(recorder.enter(scene.closed, r.base, t, seen[:5]), r.gap_max, r.open_time, r.flight_time, r.lost)
+    return with_base(record, recorder.enter(scene.closed, record.base, t, seen[:5]))
+
+
+@inlined
+def with_base(record, base):
+    """Record with another record of the motion."""
+    return Record(base, record.gap_max, record.open_time, record.flight_time, record.lost)
+
+
+@inlined
+def renamed(base, shift):
+    """Record of the motion with angles that are greater by `shift`, rad, and with the contacts exchanged."""
+    b = base
+    return of_ring.Record(
+        b.sense,
+        b.reversals,
+        b.lowest + shift,
+        b.highest + shift,
+        b.phi_min + shift,
+        b.phi_max + shift,
+        b.omega_min,
+        b.omega_max,
+        b.stick_time,
+        b.normal_min_2,
+        b.normal_min_1,
+        b.normal_max_2,
+        b.normal_max_1,
+        b.shocks,
+    )
 
 
 @inlined
@@ -126,11 +154,13 @@ def _after_event(scene, record, mode, t):
     turned = float(event.passed - 1) if passes else float(mode.turned) if mode.open == NONE else r.turned
     hit = event.contact if is_impact else 0
     code = float(1 + event.kind + 4 * (hit + 4 * (mode.open + 4 * (mode.turned + 2 * event.passed))))
+    is_first = r.first == 0.0 and lost > 0.0
     found = Lost(
         float(mode.open),
         turned,
-        t if r.first == 0.0 and lost > 0.0 else r.t_first,
-        r.first if r.first > 0.0 else lost,
+        t if is_first else r.t_first,
+        lost if is_first else r.first,
+        float(of_ring.motion_of(record.base)) if is_first else r.motion,
         float(event.number),
         (r.word * 512.0 + code * _BASE) % _PRIME,
         max(r.violation, event.violation),
@@ -161,7 +191,7 @@ def _conclude(scene, record, status, t, place, velocity):
         aftermath = RECOVERED
     base = of_ring.Outcome(
         float(SEPARATING) if was_lost else o.regime,
-        o.motion,
+        r.motion if was_lost else o.motion,
         r.first if was_lost else 0.0,
         r.t_first if was_lost else nan,
         *o[4:],
