@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -39,7 +39,7 @@ Floats = NDArray[np.float64]
 STARTS = 8
 
 # Points at which the misfit is tried, for each start that is chosen among them.
-_TRIED = 16
+_TRIED = 64
 
 # Instants of a history: between them cubics err by 1e-9 where the angle varies by 1.
 _INSTANTS = 2000
@@ -49,6 +49,9 @@ _STEP = 1e-4
 
 # Points of each profile, and how far it reaches in standard errors.
 _PROFILE, _REACH = 13, 3.5
+
+# Correlation of neighbouring residuals, in its standard deviations, from which they are not independent.
+_NEIGHBOURS = 4.0
 
 # From this correlation on, or below this share of the greatest singular value, two parameters are not told apart.
 _ALIKE, _SINGULAR = 0.95, 1e-6
@@ -406,9 +409,7 @@ def _fit(problem: _Problem, noise: float | None, starts: int, column: Variable) 
     misfits = np.array([problem.misfit(u) for u in tried])
     if not np.isfinite(misfits).any():
         raise InputError("vary", "no point of these ranges makes a scene that is allowed: other ranges are needed")
-    chosen = [u for u, misfit in zip(tried, misfits, strict=True) if math.isfinite(misfit)]
-    chosen = [chosen[k] for k in np.argsort(misfits[np.isfinite(misfits)], kind="stable")[:starts]]
-    minima = sorted((problem.minimise(u) for u in chosen), key=lambda minimum: minimum[1])
+    minima = sorted((problem.minimise(u) for u in _apart(tried, misfits, starts)), key=lambda minimum: minimum[1])
     best, misfit = minima[0]
 
     freedom = len(problem.times) - count
@@ -418,7 +419,7 @@ def _fit(problem: _Problem, noise: float | None, starts: int, column: Variable) 
     covariance, alike = _covariance(jacobian, variance, [factor.path for factor in problem.factors])
     error = np.sqrt(np.diag(covariance))
     half = math.sqrt(limit / variance) * error if variance > 0.0 else 0.0 * error
-    profiles = [_profile(problem, k, best, misfit, error[k], limit) for k in range(count)]
+    profiles = [_profile(problem, k, best, misfit, covariance[k], limit) for k in range(count)]
 
     for text in alike:
         logger.warning("%s", text)
@@ -441,6 +442,15 @@ def _fit(problem: _Problem, noise: float | None, starts: int, column: Variable) 
             shown = ", ".join(f"{factor.path} = {value:.6g}" for factor, value in numbers)
             logger.warning("another minimum is as good: %s", shown)
             break
+    residuals = history - problem.measured
+    alike_neighbours = float(residuals[1:] @ residuals[:-1]) / misfit if misfit > 0.0 else 0.0
+    if alike_neighbours > _NEIGHBOURS / math.sqrt(len(residuals)):
+        logger.warning(
+            "residuals are like their neighbours (correlation %.2f): the model, or this minimum, is not right, and the "
+            "intervals are too short; look at the picture, or try wider ranges and --start %d",
+            alike_neighbours,
+            4 * starts,
+        )
     unsure = _uncertified(problem, best)
     if unsure:
         logger.warning("%d of the %d runs at and beside the fitted values are not certified", unsure, 2 * count + 1)
@@ -457,6 +467,17 @@ def _fit(problem: _Problem, noise: float | None, starts: int, column: Variable) 
             "not_told_apart": "; ".join(alike),
         }
     )
+
+
+def _apart(tried: Floats, misfits: Floats, starts: int) -> list[Floats]:
+    """Starts: the best points of those tried, each in a part of the ranges of its own while there are enough."""
+    order = [k for k in np.argsort(misfits, kind="stable") if math.isfinite(misfits[k])]
+    distance = 0.5 * starts ** (-1.0 / tried.shape[1])
+    found: list[Floats] = []
+    for k in order:
+        if len(found) < starts and all(np.abs(tried[k] - other).max() >= distance for other in found):
+            found.append(tried[k])
+    return found
 
 
 def _limit(variance: float, freedom: int, estimated: bool) -> float:
@@ -495,34 +516,63 @@ def _covariance(jacobian: Floats, variance: float, paths: list[str]) -> tuple[Fl
 
 
 def _profile(
-    problem: _Problem, k: int, best: Floats, misfit: float, error: float, limit: float
+    problem: _Problem, k: int, best: Floats, misfit: float, covariance: Floats, limit: float
 ) -> tuple[Floats, Floats, float, float]:
     """Profile of one number: values, misfits, and the ends of its 95 % interval, in scaled numbers."""
-    reach = _REACH * error if 0.0 < error < math.inf else 1.0
+    known = 0.0 < covariance[k] < math.inf
+    reach = _REACH * math.sqrt(covariance[k]) if known else 1.0
+    along = np.where(np.isfinite(covariance), covariance, 0.0) / covariance[k] if known else np.zeros(len(best))
     offsets = np.linspace(-reach, reach, _PROFILE)
     low, high = problem.bounds[:, k]
     values = np.clip(best[k] + offsets, low, high)
     misfits = np.full(_PROFILE, math.inf)
     middle = _PROFILE // 2
     misfits[middle] = misfit
+
+    def least(near: Floats, value: float) -> tuple[Floats, float]:
+        """Least misfit with this value, from a point near it and from where the others are on average then."""
+        found = near, math.inf
+        for start in (near, np.clip(best + (value - best[k]) * along, *problem.bounds)):
+            v = start.copy()
+            v[k] = value
+            if math.isfinite(problem.misfit(v)):
+                found = min(found, problem.minimise(v, fixed=k), key=lambda minimum: minimum[1])
+        return found
+
+    def growth_beside(near: Floats) -> Callable[[float], float]:
+        return lambda value: least(near, value)[1] - misfit
+
     ends = []
     for side in (range(middle - 1, -1, -1), range(middle + 1, _PROFILE)):
-        u, before = best, middle
+        u, before = best, (values[middle], 0.0)
         end = math.inf if side.step > 0 else -math.inf
         for place in side:
-            v = u.copy()
-            v[k] = values[place]
-            if math.isfinite(problem.misfit(v)):
-                u, misfits[place] = problem.minimise(v, fixed=k)
+            v, misfits[place] = least(u, values[place])
+            growth = misfits[place] - misfit
             # What the scene does not allow tells nothing of the data: there the interval stays open.
-            if math.isinf(end) and math.inf > misfits[place] - misfit >= limit > 0.0:
-                # Roots of misfits are nearly straight.
-                one, two = (math.sqrt(max(misfits[p] - misfit, 0.0)) for p in (before, place))
-                share = (math.sqrt(limit) - one) / (two - one)
-                end = values[before] + share * (values[place] - values[before])
-            before = place
+            if math.isinf(end) and math.inf > growth >= limit > 0.0:
+                end = _end(growth_beside(u), before, (values[place], growth), limit)
+            u, before = v, (values[place], max(growth, 0.0))
         ends.append(float(end))
     return values, misfits, ends[0], ends[1]
+
+
+def _end(growth: Callable[[float], float], low: tuple[float, float], high: tuple[float, float], limit: float) -> float:
+    """Where the growth of the misfit reaches the limit, between two values with their growths."""
+    # Roots of misfits are nearly straight, but where an event comes or goes they jump: there the interval is halved.
+    for _ in range(6):
+        if math.sqrt(high[1]) - math.sqrt(low[1]) < math.sqrt(limit):
+            break
+        value = 0.5 * (low[0] + high[0])
+        here = max(growth(value), 0.0)
+        low, high = ((value, here), high) if here < limit else (low, (value, here))
+    if not math.isfinite(high[1]):
+        return high[0]
+    one, two = math.sqrt(low[1]), math.sqrt(high[1])
+    # The interval must not be too short.
+    if two - one > 2.0 * math.sqrt(limit):
+        return high[0]
+    return low[0] + (math.sqrt(limit) - one) / (two - one) * (high[0] - low[0])
 
 
 def _uncertified(problem: _Problem, best: Floats) -> int:

@@ -213,8 +213,8 @@ def distribution(
     never = ~inside.any(axis=1)
     # Runs before the first in the regime decide that it is the first.
     deciding = np.where(never, len(values), begins + 1)
-    known = (sure | (np.arange(len(values)) >= deciding[:, None])).all(axis=1)
-    found = np.where(never, np.inf, np.where(begins == 0, -np.inf, 0.0))
+    known = np.logical_and.reduce(sure | (np.arange(len(values)) >= deciding[:, None]), axis=1)
+    found: NDArray[np.float64] = np.where(never, np.inf, np.where(begins == 0, -np.inf, 0.0))
     inner = (found == 0.0) & known
     low, high = values[np.maximum(begins - 1, 0)], values[begins]
     open_ = inner.copy()
