@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from ringsweep.errors import InputError
     from ringsweep.quantities.variables import words
     from ringsweep.runs.boundaries import boundary, uncertainty_exponent
+    from ringsweep.runs.fit import fit
     from ringsweep.runs.precision import precision
     from ringsweep.runs.simulate import simulate
     from ringsweep.runs.sweep import run, sweep
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = [
     "InputError",
     "boundary",
+    "fit",
     "friction_law",
     "precision",
     "run",
@@ -38,6 +40,7 @@ _MODULES = {
     "precision": "runs.precision",
     "boundary": "runs.boundaries",
     "threshold": "runs.thresholds",
+    "fit": "runs.fit",
     "uncertainty_exponent": "runs.boundaries",
     "friction_law": "config.friction",
     "verify": "storage.netcdf",

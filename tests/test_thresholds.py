@@ -62,3 +62,37 @@ def test_wrong_request_says_what_is_wrong(path, between, problem):
     with pytest.raises(InputError) as error:
         ringsweep.threshold(BELT, path, "riding", between)
     assert problem in str(error.value)
+
+
+class TestDistribution:
+    def test_uncertain_spring_makes_the_threshold_uncertain_in_proportion(self, tmp_path, capsys):
+        """k v T = mu_s m g, with k even between 1.5 and 2.5 N/m: so is mu_s, and its quantiles are known."""
+        of = {"spring.stiffness": {"uniform": [1.5, 2.5]}}
+        config = tmp_path / "belt.yaml"
+        config.write_text(json.dumps({"scene": BELT, "sweep": {"sample": {"n": 128, "seed": 3, "of": of}}}))
+        found = ringsweep.threshold(config, "friction.mu_s", "riding", (0.12, 0.4), 1e-7, scan=9)
+        exact = (1.5 + found["quantile"].values) * 0.1 * 10.0 / 9.81
+        assert (found.threshold_quantile_low.values <= exact).all()
+        assert (exact <= found.threshold_quantile_high.values).all()
+        assert found.threshold_quantile.values == pytest.approx(exact, rel=0.02)
+        assert np.isfinite(found.threshold).all()
+        line = ["threshold", str(config), "--path", "friction.mu_s", "--regime", "riding", "--scan", "9"]
+        assert cli.main([*line, "--from", "0.12", "--to", "0.2"]) == 0
+        said = capsys.readouterr().out
+        assert "50% below 0.2" in said or "50% below inf" in said
+        # k < 0.2 m g / (v T) = 1.962 N/m begins within: 46.2 % of the points.
+        assert "; 69 begin nowhere there" in said or "; 68 begin nowhere there" in said
+
+    @pytest.mark.parametrize(
+        ("of", "grid", "regime", "problem"),
+        [
+            ({"friction.mu_s": {"uniform": [0.2, 0.3]}}, None, "riding", "path: friction.mu_s is uncertain itself"),
+            ({"friction.mu_k": {"over": "mu_s", "uniform": [0.5, 0.6]}}, None, "riding", "is drawn over friction.mu_s"),
+            ({"body.mass": {"uniform": [1, 2]}}, {"belt.velocity": [0.1, 0.2]}, "riding", "also varies belt.velocity"),
+            ({"body.mass": {"uniform": [1, 2]}}, None, "rideing", "is no regime; did you mean `riding`?"),
+        ],
+    )
+    def test_mistakes_with_a_sample(self, of, grid, regime, problem):
+        sweep = {"sample": {"n": 32, "of": of}} | ({"grid": grid} if grid else {})
+        with pytest.raises(InputError, match=problem):
+            ringsweep.threshold({"scene": BELT, "sweep": sweep}, "friction.mu_s", regime, (0.12, 0.4))

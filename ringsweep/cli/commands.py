@@ -209,6 +209,14 @@ def _plot(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
     from ringsweep.plots.datasets import is_sampled, resolve
     from ringsweep.storage import files
 
+    if "standard_error" in result:
+        given = (arguments.kind, arguments.law, arguments.word, arguments.begin, arguments.end)
+        if arguments.sel or any(option is not None for option in given):
+            raise InputError(str(dataset), "is a fit, of which there is one picture: leave other options out")
+        target = Path(arguments.output or dataset.with_suffix(".png"))
+        plots.save(plots.fit(result), target)
+        print(f"wrote {target}")
+        return
     if is_sampled(result):
         _plot_sample(arguments, dataset, result)
         return
@@ -320,6 +328,31 @@ def threshold_command(arguments: argparse.Namespace) -> None:
         jobs=arguments.jobs,
     )
     print(in_words(found))
+
+
+def fit_command(arguments: argparse.Namespace) -> None:
+    """Fit numbers of a scene to a measured history, write and draw the fit."""
+    from ringsweep.config import load
+    from ringsweep.runs.fit import fitted, in_words, ranges_of
+
+    name = arguments.output or f"{load(arguments.config, arguments.set).name}-fit.nc"
+    target, picture = _outputs(name, "standard_error", "fit")
+
+    from ringsweep import plots
+    from ringsweep.storage import netcdf
+
+    result = fitted(
+        arguments.config,
+        arguments.data,
+        ranges_of(arguments.vary),
+        start=arguments.start,
+        noise=arguments.noise,
+        settings=arguments.set,
+    )
+    netcdf.save(result, target)
+    print(in_words(result))
+    print(f"wrote {target}")
+    _draw(lambda: plots.fit(result), picture, f"ringsweep plot {target}")
 
 
 def _other_scene(target: Path, result: Any) -> str:
@@ -434,6 +467,10 @@ def _print_summary(name: str, result: Any) -> None:
         from ringsweep.cli.precision_table import report
 
         print(report(result))
+    elif "standard_error" in result:
+        from ringsweep.runs.fit import in_words
+
+        print(in_words(result))
     else:
         from ringsweep.cli.report import summarise
 

@@ -11,6 +11,7 @@ from typing import Any, NoReturn
 
 from ringsweep.cli.commands import (
     animate_command,
+    fit_command,
     info_command,
     init_command,
     map_command,
@@ -118,6 +119,22 @@ def build_parser() -> argparse.ArgumentParser:
     )
     threshold.add_argument("--jobs", type=whole_number, metavar="N", help="threads (default: all cores)")
     _add_settings(threshold)
+
+    fit = _add_command(commands, "fit", fit_command,
+        "numbers of a scene with which its history is nearest to a measured one", """
+        ringsweep fit my.yaml --data run.csv --vary friction.rough.mu_k,zone.half_angle
+        ringsweep fit my.yaml --data run.csv --vary "friction.rough.mu_k=0.1..0.6" --noise "0.5 deg"
+        The first line of run.csv names the columns: t (s), and phi (deg) or x (mm).
+        """)  # fmt: skip
+    fit.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose scene is fitted")
+    fit.add_argument("--data", required=True, metavar="RUN.csv", help="the measured history")
+    fit.add_argument(
+        "--vary", required=True, metavar="PATHS", help="numbers to fit: PATH or PATH=LOW..HIGH, separated by commas"
+    )
+    fit.add_argument("-o", "--output", metavar="FIT.nc", help="default: the configuration's name with -fit")
+    fit.add_argument("--start", type=whole_number, metavar="N", help="minimisations, each from its start (default: 8)")
+    fit.add_argument("--noise", metavar="S", help="standard deviation of a measurement (default: by the residuals)")
+    _add_settings(fit)
 
     simulate = _add_command(commands, "simulate", simulate_command,
         "run once, or under each law of a sweep: history and its picture", """

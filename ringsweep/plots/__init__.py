@@ -16,6 +16,7 @@ from ringsweep.plots.style import REGIME_COLOURS, style
 
 if TYPE_CHECKING:
     from ringsweep.plots.films import animation, save_animation
+    from ringsweep.plots.fits import fit
     from ringsweep.plots.histories import history, history_panel
     from ringsweep.plots.interactive import explore
     from ringsweep.plots.loops import friction_loop
@@ -33,6 +34,7 @@ __all__ = [
     "animation",
     "cell",
     "explore",
+    "fit",
     "friction_loop",
     "history",
     "history_panel",
@@ -61,6 +63,7 @@ _MODULES = {
     "probability_panel": "probability",
     "survival_panel": "probability",
     "sensitivity_panel": "probability",
+    "fit": "fits",
     "phase_portrait": "phase",
     "friction_loop": "loops",
     "polar_view": "polar",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from math import degrees, floor, log10
 from typing import Any
 
@@ -12,14 +13,22 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.config import Config, load, sweepable, with_values
-from ringsweep.config.axes import dimension, swept_parameter
+from ringsweep.config.axes import Axes, dimension, swept_parameter
+from ringsweep.config.consistency import check_consistency
+from ringsweep.config.sections import suggestion
 from ringsweep.errors import InputError
+from ringsweep.quantities.flags import REGIMES
 from ringsweep.quantities.parameters import Choice, Parameter
-from ringsweep.quantities.units import quantity
+from ringsweep.quantities.units import quantity, show
 from ringsweep.quantities.variables import words
 from ringsweep.runs.boundaries import located
 from ringsweep.runs.executors import Execution
 from ringsweep.runs.sweep import compute
+from ringsweep.statistics import quantiles, summarised
+from ringsweep.storage.provenance import attributes
+
+#: Levels of the quantiles of a threshold.
+LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 #: Number of runs in which changes of the regime are looked for.
 SCAN = 128
@@ -70,7 +79,7 @@ def threshold(
     xarray.Dataset
         Along the dimension ``vertex``: the values as a coordinate, ``error`` (the threshold lies within ± this),
         ``begins`` (1 where the regime begins as the number grows, 0 where it ends) and ``beyond`` (the regime on the
-        other side).
+        other side). If the configuration has a sample, what :func:`ringsweep.runs.thresholds.distribution` returns.
 
     Raises
     ------
@@ -119,15 +128,12 @@ def locate(
     settings : iterable of str
         As for :func:`ringsweep.config.with_values`.
     """
-    one, low, high = _interval(config, path, between, list(settings))
-    parameter = swept_parameter(sweepable(one.scene), path, "path")
-    assert isinstance(parameter, Parameter)
-    error = Parameter(parameter.unit, "tolerance of a threshold", lower=0.0, open_lower=True)
-    allowed = quantity(_TOLERANCE * max(abs(low), abs(high)) if tolerance is None else tolerance, error, "tolerance")
-    count = SCAN if scan is None else int(quantity(scan, Parameter("1", "number of runs", lower=2, whole=True), "scan"))
-    spaced = np.geomspace if low > 0.0 and high >= _WIDE * low else np.linspace
-    values = spaced(low, high, count)
-    values[[0, -1]] = low, high
+    settings = list(settings)
+    if (whole := load(config, settings)).sample is not None:
+        low, high = _ends(whole, path, between)
+        return distribution(whole, path, regime, *_scan(whole, path, (low, high), tolerance, scan), jobs=jobs)
+    one, low, high = _interval(config, path, between, settings)
+    values, allowed = _scan(one, path, (low, high), tolerance, scan)
     scanned = load(dict(one.source) | {"sweep": {"grid": {path: values.tolist()}}})
     runs = compute(scanned, Execution(jobs, progress=False))
     name = dimension(path)
@@ -146,23 +152,132 @@ def locate(
     )
 
 
-def _interval(config: Any, path: str, between: tuple[Any, Any], settings: list[str]) -> tuple[Config, float, float]:
-    """Configuration of a single run, and the ends of the interval in SI units."""
-    whole = load(config, settings)
+def distribution(
+    config: Config, path: str, regime: str, values: NDArray[np.float64], tolerance: float, *, jobs: int | None = None
+) -> xr.Dataset:
+    """Distribution of the least value of a number at which a regime begins, over the sample of a configuration.
+
+    Each point of the sample has its own threshold. It is infinite if the regime begins nowhere in the interval, and
+    negatively infinite if it is there at the first value already. Where runs that decide it are not certified, it is
+    not known, and counts both ways in the intervals of the quantiles.
+
+    Parameters
+    ----------
+    config : Config
+        With a sample, and no axes but `path`.
+    path, regime : str
+    values : ndarray of shape ``(scan,)``
+        Values of the number at which changes of the regime are looked for.
+    tolerance : float
+        Largest error of a threshold.
+    jobs : int, optional
+
+    Returns
+    -------
+    xarray.Dataset
+        ``threshold`` (dimensions ``replicate`` and ``sample``; NaN where it is not known), and along ``quantile``
+        ``threshold_quantile`` with ``threshold_quantile_low`` and ``threshold_quantile_high`` (95 %).
+
+    Raises
+    ------
+    InputError
+        If the sweep has other axes, or a number of the sample is a ratio to the one that varies.
+    """
+    assert config.sample is not None
+    sample = replace(config.sample, sensitivity=False, keep=False, quantiles={}, survival=())
+    if regime not in REGIMES:
+        raise InputError("regime", f"{show(regime)} is no regime" + suggestion(regime, REGIMES))
+    if others := [name for name in config.axes.columns if name != path]:
+        raise InputError("sweep", f"also varies {', '.join(others)}, but a threshold is that of one cell: leave it out")
+    for factor in sample.factors:
+        if path in factor.paths:
+            raise InputError("path", f"{path} is uncertain itself: a threshold is that of another number")
+        if factor.over == path:
+            raise InputError("path", f"{factor.paths[0]} is drawn over {path}: give it a distribution of its own")
+    size, flag = sample.size, REGIMES.index(regime)
+    shares = np.concatenate([sample.shares(k) for k in range(sample.replicates)])
+    drawn = {name: column for name, (_, column) in sample.axes(config.scene, Axes(), shares).columns.items()}
+
+    def runs(points: NDArray[np.intp], at: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Whether runs of some points of the sample are in the regime, and whether they are certified."""
+        columns = {name: (("point",), column[points]) for name, column in drawn.items()}
+        axes = Axes({"point": len(points)}, {**columns, path: (("point",), at)})
+        check_consistency(config.scene, axes)
+        found = compute(replace(config, axes=axes, sample=None), Execution(jobs, progress=False), warn=False)
+        certain = getattr(config.solver, "certify", True)
+        return found["regime"].values == flag, found["certified"].values == 1 if certain else np.full(len(points), True)
+
+    total, every = len(shares), np.arange(len(shares))
+    inside, sure = (part.reshape(total, -1) for part in runs(np.repeat(every, len(values)), np.tile(values, total)))
+    begins = inside.argmax(axis=1)
+    never = ~inside.any(axis=1)
+    # Runs before the first in the regime decide that it is the first.
+    deciding = np.where(never, len(values), begins + 1)
+    known = np.logical_and.reduce(sure | (np.arange(len(values)) >= deciding[:, None]), axis=1)
+    found: NDArray[np.float64] = np.where(never, np.inf, np.where(begins == 0, -np.inf, 0.0))
+    inner = (found == 0.0) & known
+    low, high = values[np.maximum(begins - 1, 0)], values[begins]
+    open_ = inner.copy()
+    while True:
+        middle = 0.5 * (low + high)
+        open_ &= (high - low > 2.0 * tolerance) & (middle != low) & (middle != high)
+        if not open_.any():
+            break
+        which = np.flatnonzero(open_)
+        here, certain = runs(which, middle[which])
+        low[which[~here & certain]] = middle[which[~here & certain]]
+        high[which[here & certain]] = middle[which[here & certain]]
+        known[which[~certain]] = False
+        open_[which[~certain]] = False
+    found = np.where(known, np.where(inner, 0.5 * (low + high), found), np.nan).reshape(sample.replicates, size)
+    told = known.reshape(found.shape)
+    summaries = np.stack([summarised(row[own]) for row, own in zip(found, told, strict=True)])
+    ends = quantiles(summaries, told.sum(axis=1), size, np.array(LEVELS), sample.independent)
+    parameter = sweepable(config.scene)[path]
+    about = parameter.attributes
+    names = {"": "quantile", "_low": "lower end of a quantile", "_high": "upper end of a quantile"}
+    return xr.Dataset(
+        {
+            "threshold": (("replicate", "sample"), found, about | {"long_name": f"{path} at which {regime} begins"}),
+            **{
+                f"threshold_quantile{end}": ("quantile", column, about | {"long_name": f"{name} of the threshold"})
+                for (end, name), column in zip(names.items(), ends, strict=True)
+            },
+        },
+        coords={"quantile": ("quantile", list(LEVELS), {"units": "1", "long_name": "level of the quantile"})},
+        attrs=attributes(config)
+        | {
+            "threshold_path": path,
+            "boundary_of": regime,
+            "boundary_tolerance": tolerance,
+            "scan": f"{len(values)} runs for each of {total} points of the sample",
+        },
+    )
+
+
+def _scan(
+    config: Config, path: str, ends: tuple[float, float], tolerance: Any, scan: int | None
+) -> tuple[NDArray[np.float64], float]:
+    """Values at which changes are looked for, and the error allowed."""
+    low, high = ends
+    parameter = swept_parameter(sweepable(config.scene), path, "path")
+    assert isinstance(parameter, Parameter)
+    error = Parameter(parameter.unit, "tolerance of a threshold", lower=0.0, open_lower=True)
+    allowed = quantity(_TOLERANCE * max(abs(low), abs(high)) if tolerance is None else tolerance, error, "tolerance")
+    count = SCAN if scan is None else int(quantity(scan, Parameter("1", "number of runs", lower=2, whole=True), "scan"))
+    spaced = np.geomspace if low > 0.0 and high >= _WIDE * low else np.linspace
+    values = spaced(low, high, count)
+    values[[0, -1]] = low, high
+    return values, allowed
+
+
+def _ends(whole: Config, path: str, between: tuple[Any, Any]) -> tuple[float, float]:
+    """Ends of the interval in SI units: as given, or those of the sweep."""
     parameter = swept_parameter(sweepable(whole.scene), path, "path")
     if isinstance(parameter, Choice) or parameter.whole:
         raise InputError("path", f"{path} is no number that varies continuously: there is nothing to halve")
     swept = whole.axes.columns
     own: NDArray[Any] | None = swept[path][1] if path in swept else None
-    first = between[0] if between[0] is not None else between[1] if own is None else own.flat[0].item()
-    if first is None:
-        raise InputError(
-            "from",
-            f"the configuration does not sweep {path}: say where to look, by --from and --to (in Python: between)",
-        )
-    one = with_values(config, [*settings, f"{path}={first}"])
-    if one.axes.sizes:
-        raise InputError("sweep", "several friction laws, but a threshold is that of one: --set friction.law=...")
     ends = []
     for where, given, of_sweep in (("from", between[0], np.min), ("to", between[1], np.max)):
         if given is None and own is None:
@@ -173,7 +288,16 @@ def _interval(config: Any, path: str, between: tuple[Any, Any], settings: list[s
         ends.append(float(of_sweep(np.asarray(own))) if given is None else quantity(given, parameter, where))
     if not ends[0] < ends[1]:
         raise InputError("to", f"{ends[1]:g} is not greater than {ends[0]:g}, where the interval begins")
-    return one, ends[0], ends[1]
+    return ends[0], ends[1]
+
+
+def _interval(config: Any, path: str, between: tuple[Any, Any], settings: list[str]) -> tuple[Config, float, float]:
+    """Configuration of a single run, and the ends of the interval in SI units."""
+    low, high = _ends(load(config, settings), path, between)
+    one = with_values(config, [*settings, f"{path}={low!r}"])
+    if one.axes.sizes:
+        raise InputError("sweep", "several friction laws, but a threshold is that of one: --set friction.law=...")
+    return one, low, high
 
 
 def _scanned(runs: xr.Dataset, name: str) -> str:
@@ -193,6 +317,10 @@ def _number(value: float, axis: xr.DataArray, digits: str = ".6g") -> str:
 def in_words(found: xr.Dataset) -> str:
     """What :func:`threshold` found, a line for each threshold."""
     path, regime = found.attrs["threshold_path"], found.attrs["boundary_of"]
+    if "quantile" in found.dims:
+        return "\n".join(
+            [f"{regime} begins at {path}, by its probability (95 % interval):", *_quantiles_in_words(found)]
+        )
     axis = found[dimension(path)]
     lines = []
     for value, error, begins, beyond in zip(
@@ -206,3 +334,21 @@ def in_words(found: xr.Dataset) -> str:
     if not lines:
         lines.append(f"{regime} neither begins nor ends there")
     return "\n".join([*lines, f"scan: {found.attrs['scan']}; two changes between two of these runs are missed"])
+
+
+def _quantiles_in_words(found: xr.Dataset) -> list[str]:
+    unit = found["threshold"].attrs.get("units", "1")
+    lines = []
+    for level in found["quantile"].values:
+        one = found.sel(quantile=level)
+        value, low, high = (one[f"threshold_quantile{end}"].item() for end in ("", "_low", "_high"))
+        shown = f"{value:.6g}{'' if unit == '1' else f' {unit}'} ({low:.6g} to {high:.6g})"
+        lines.append(f"  {level:.0%} below {shown}")
+    values = found["threshold"].values
+    counts = {
+        "begin at the first value or before": np.count_nonzero(np.isneginf(values)),
+        "begin nowhere there": np.count_nonzero(np.isposinf(values)),
+        "are not known, for lack of certified runs": np.count_nonzero(np.isnan(values)),
+    }
+    told = "".join(f"; {count} {what}" for what, count in counts.items() if count)
+    return [*lines, f"scan: {found.attrs['scan']}{told}; two changes between two of these runs are missed"]

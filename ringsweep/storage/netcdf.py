@@ -264,8 +264,9 @@ def check_kind(path: str | os.PathLike[str], mark: str, content: str) -> None:
     ----------
     path : path-like
         File that exists.
-    mark : {"regime", "time", "contender", "probability"}
-        Dimension or variable by which the kind is known: sweep, history, error against run time, or sampled sweep.
+    mark : {"regime", "time", "contender", "probability", "standard_error"}
+        Dimension or variable by which the kind is known: sweep, history, error against run time, sampled sweep,
+        or fit.
     content : str
         Contents of the new file, for the message.
 
@@ -275,9 +276,8 @@ def check_kind(path: str | os.PathLike[str], mark: str, content: str) -> None:
         If it is no file of this package, or a result of another kind.
     """
     with open_dataset(path) as existing:
-        kinds = [
-            kind for kind in ("contender", "time", "probability", "regime") if kind in existing.dims or kind in existing
-        ]
+        marks = ("contender", "time", "probability", "standard_error", "regime")
+        kinds = [kind for kind in marks if kind in existing.dims or kind in existing]
     if kinds[:1] != [mark]:
         raise InputError(str(path), f"holds a result of another kind: name another file for this {content}")
 

@@ -1,0 +1,61 @@
+"""Picture of a fit: measurements, residuals, and the profile of each parameter."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from ringsweep.errors import InputError
+from ringsweep.plots.style import PAIR_COLOURS, figure_width, legend_above, on_page, small_ticks
+
+
+def fit(ds: xr.Dataset) -> Figure:
+    """Draw a fit: measured and fitted history, residuals, and the misfit over each parameter.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        Result of :func:`ringsweep.fit`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        If the dataset is no fit.
+    """
+    if not {"measured", "fitted", "profile_misfit"} <= set(ds):
+        raise InputError("ds", "is no fit: ringsweep fit makes one")
+    width, count = figure_width(), ds.sizes["parameter"]
+    figure = Figure(figsize=(width, 0.95 * width), layout="constrained")
+    parts: Any = figure.subfigures(2, 1, height_ratios=[3, 2])
+    above, below = parts
+    data, rest = above.subplots(2, 1, sharex=True, height_ratios=[2, 1])
+    one, two = (on_page(colour) for colour in PAIR_COLOURS)
+    time, unit = ds["t"].values, ds["measured"].attrs["units"]
+    data.plot(time, ds["measured"].values, ".", color=two, markersize=3, label="measured")
+    data.plot(time, ds["fitted"].values, color=one, label="fitted")
+    data.set_ylabel(f"{str(ds['fitted'].attrs['long_name']).removeprefix('fitted ')} ({unit})")
+    legend_above(data)
+    rest.axhline(0.0, color=one, linewidth=1.0)
+    rest.plot(time, ds["residual"].values, ".", color=two, markersize=3)
+    rest.set(xlabel="time (s)", ylabel=f"residual ({unit})")
+    panels = np.atleast_1d(below.subplots(1, count, sharey=True))
+    for k, ax in enumerate(panels):
+        own = ds.isel(parameter=k)
+        growth = (own["profile_misfit"].values - float(ds["misfit"])) / ds.attrs["noise"] ** 2
+        known = np.isfinite(growth)
+        ax.plot(own["profile_value"].values[known], growth[known], ".-", color=one)
+        for name in ("profile_low", "profile_high"):
+            if np.isfinite(own[name]):
+                ax.axvline(float(own[name]), color=two, linestyle="--", linewidth=1.0)
+        label = str(own["unit"].item())
+        ax.set_xlabel(str(own["parameter"].item()) + ("" if label == "1" else f" ({label})"))
+    panels[0].set_ylabel("growth of the misfit\n(in squares of the noise)")
+    small_ticks(data, rest, *panels)
+    return figure
