@@ -27,6 +27,7 @@ NAMES = (
     "scaling",
     "sizes",
     "refine",
+    "fits",
     "brute_force",
 )
 

@@ -1,20 +1,23 @@
 """How often 95 % intervals of fits hold the true values: synthetic histories with noise, stick and edges of zones.
 
-    python -m benchmarks.fits [--problems 100] [--seed 1]
+    python -m benchmarks.fits            # four minutes
+    python -m benchmarks.fits --quick    # fewer problems
 
 Each problem has its own rough friction, zone and drive, and 200 angles in 5 s with normal noise of 0.01 rad. Problems
 without stick, without motion over the edges, or with a lost contact are left out.
+
+Writes `fits.md`.
 """
 
 from __future__ import annotations
 
-import argparse
 import logging
 from time import perf_counter
 
 import numpy as np
 
 import ringsweep
+from benchmarks._common import command, heading, machine, markdown, publish, table
 from ringsweep.statistics import clopper_pearson
 
 NOISE, SPAN, COUNT = 0.01, 5.0, 200
@@ -50,29 +53,35 @@ def problem(random: np.random.Generator) -> tuple[dict, dict, np.ndarray]:
 
 
 def main() -> None:
-    """Print the coverage of both kinds of intervals."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--problems", type=int, default=100)
+    """Measure, print, write."""
+    parser = command(__doc__)
+    parser.add_argument("--problems", type=int, help="number of fits (default 100; 10 with --quick)")
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
+    problems = given.problems or (10 if given.quick else 100)
+    print(where := machine())
     logging.getLogger("ringsweep").setLevel(logging.ERROR)
     random = np.random.default_rng(given.seed)
     held = {name: np.zeros(2, dtype=int) for name in ("", "profile_")}
     seconds, runs = 0.0, 0
-    for _ in range(given.problems):
+    for _ in range(problems):
         scene, data, truth = problem(random)
         begin = perf_counter()
         found = ringsweep.fit(scene, data, "friction.rough.mu_k=0.1..0.39, zone.half_angle=0.1..0.5")
         seconds, runs = seconds + perf_counter() - begin, runs + found.attrs["runs"]
         for name, hits in held.items():
             hits += (found[f"{name}low"].values <= truth) & (truth <= found[f"{name}high"].values)
-    paths = found["parameter"].values
+    rows = []
     for name, hits in held.items():
-        for path, k in zip(paths, hits, strict=True):
-            low, high = clopper_pearson(k, given.problems)
+        for path, k in zip(found["parameter"].values, hits, strict=True):
+            low, high = clopper_pearson(k, problems)
             kind = "profile" if name else "covariance"
-            print(f"{kind:10} {path:20} {k} of {given.problems} = {k / given.problems:.1%} ({low:.1%} to {high:.1%})")
-    print(f"{seconds / given.problems:.2f} s and {runs / given.problems:.0f} runs a fit")
+            rows.append([kind, str(path), f"{k} of {problems}", f"{k / problems:.1%}", f"{low:.1%} to {high:.1%}"])
+    header = ["interval from", "number", "holds the true value", "share", "95 % interval of the share"]
+    heading("Coverage of the intervals of fits")
+    table(header, rows)
+    cost = f"{seconds / problems:.2f} s and {runs / problems:.0f} runs a fit; seed {given.seed}."
+    publish(given, "fits", "Coverage of the intervals of fits", where, f"{markdown(header, rows)}\n{cost}")
 
 
 if __name__ == "__main__":
