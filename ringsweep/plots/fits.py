@@ -50,12 +50,17 @@ def fit(ds: xr.Dataset) -> Figure:
         own = ds.isel(parameter=k)
         growth = (own["profile_misfit"].values - float(ds["misfit"])) / ds.attrs["noise"] ** 2
         known = np.isfinite(growth)
-        ax.plot(own["profile_value"].values[known], growth[known], ".-", color=one)
+        # Profiles are narrow: ticks of the values themselves would differ in their last digits only.
+        fitted = float(own["value"])
+        ax.plot(own["profile_value"].values[known] - fitted, growth[known], ".-", color=one)
         for name in ("profile_low", "profile_high"):
             if np.isfinite(own[name]):
-                ax.axvline(float(own[name]), color=two, linestyle="--", linewidth=1.0)
-        label = str(own["unit"].item())
-        ax.set_xlabel(str(own["parameter"].item()) + ("" if label == "1" else f" ({label})"))
+                ax.axvline(float(own[name]) - fitted, color=two, linestyle="--", linewidth=1.0)
+        label = f"{own['parameter'].item()} \N{MINUS SIGN} {fitted:.6g}"
+        unit = str(own["unit"].item())
+        ax.set_xlabel(label if unit == "1" else f"{label} ({unit})")
+        ax.locator_params(axis="x", nbins=4)
+        ax.ticklabel_format(axis="x", style="sci", scilimits=(-2, 3))
     panels[0].set_ylabel("growth of the misfit\n(in squares of the noise)")
     small_ticks(data, rest, *panels)
     return figure

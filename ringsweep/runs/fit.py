@@ -219,7 +219,7 @@ def _factors(config: Config, vary: Mapping[str, Any]) -> list[_Factor]:
         raise InputError("vary", "empty: name at least one number to fit, such as friction.rough.mu_k")
     known, found = sweepable(config.scene), []
     for path, ends in vary.items():
-        parameter = swept_parameter(known, path, "vary")
+        parameter = swept_parameter(known, path, f"vary.{path}")
         if isinstance(parameter, Choice) or parameter.whole:
             raise InputError("vary", f"{path} is no number that varies continuously: its misfit has no slope")
         if path == "time.span":
