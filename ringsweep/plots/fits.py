@@ -28,6 +28,24 @@ def fit(ds: xr.Dataset) -> Figure:
     ------
     InputError
         If the dataset is no fit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import xarray as xr
+    >>> history = {
+    ...     name: ("measurement", np.zeros(3), {"units": "m", "long_name": name})
+    ...     for name in ("measured", "fitted", "residual")
+    ... }
+    >>> profile = ("parameter", "profile"), np.array([[4.0, 0.0, 4.0]])
+    >>> ends = {f"profile_{end}": ("parameter", [value]) for end, value in {"low": 0.1, "high": 0.2}.items()}
+    >>> ds = xr.Dataset(
+    ...     history | ends | {"profile_value": profile, "profile_misfit": profile, "misfit": 0.0},
+    ...     coords={"parameter": ["v"], "unit": ("parameter", ["m/s"]), "t": ("measurement", [0.0, 1.0, 2.0])},
+    ...     attrs={"noise": 1.0},
+    ... )
+    >>> len(fit(ds).axes)
+    3
     """
     if not {"measured", "fitted", "profile_misfit"} <= set(ds):
         raise InputError("ds", "is no fit: ringsweep fit makes one")
