@@ -4,8 +4,7 @@ A *stop* is an interval in which the body sticks to the belt, and stays longer t
 the speed of the belt. A *cycle* is a period of the forcing; without forcing, it lasts from one turn of the displacement
 to the next of its kind. At the end of each cycle the state is compared with that one cycle before, and with a
 reference, which is replaced after ever more cycles (Brent's cycle detection). The first state that equals one of them
-closes a *lap*: the time since then is the period of the motion if each later lap returns too. After a lap that does not
-return, states must be closer to count as equal: a motion that only comes near its past is not taken for a periodic one.
+closes a *lap*: the time since then is the period of the motion.
 """
 
 from __future__ import annotations
@@ -133,11 +132,6 @@ class Cycles(NamedTuple):
         Cycles since the reference, and cycles after which it is replaced.
     lap : float
         Cycles in a lap; 0 if the motion did not return.
-    laps, gap_first, gap : float
-        Laps of this length that returned one after the other, and the distance between the ends of the first and of the
-        last of them, as a share of the swing.
-    near : float
-        Greatest distance, as a share of the swing, at which the motion has returned.
     period, share, stops : float
         Duration of the last lap, s, NaN if the motion did not return. Share of stick and stops in a cycle, of the last
         lap or of the cycles since the reference.
@@ -155,10 +149,6 @@ class Cycles(NamedTuple):
     since: Any
     most: Any
     lap: Any
-    laps: Any
-    gap_first: Any
-    gap: Any
-    near: Any
     period: Any
     share: Any
     stops: Any
@@ -196,16 +186,6 @@ class Record(NamedTuple):
 
 #: The motion has returned if displacement and velocity differ by less than this share of their swing in a cycle.
 RETURN = 1e-3
-
-# After a lap that did not return this share is a tenth of what it was, but not less than this one.
-_NEAREST = 1e-6
-
-# A return within this share is evidence by itself: no motion comes so close to its past by chance.
-_EXACT = 1e-7
-
-# Without it, so many laps must return, and their gaps shrink, or add up in ten spans to less than this share.
-_LAPS = 4.0
-_TREND = 0.1
 
 # A free oscillation has settled if its swing, at the rate of its last cycle, changes by less than this share in a span.
 _DECAY = 1e-2
@@ -246,27 +226,7 @@ def begin(scene, t, seen, band, play):
         velocity,
         abs(force),
         Stops(1.0, t, 0.0, t, -max(least, 1e-300), nan, t, 0.0, 0.0, nan),
-        Cycles(
-            0.0,
-            scene.forcing_period,
-            x,
-            x,
-            0.0,
-            0.0,
-            0.0,
-            start,
-            start,
-            0.0,
-            1.0,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            RETURN,
-            nan,
-            nan,
-            nan,
-        ),
+        Cycles(0.0, scene.forcing_period, x, x, 0.0, 0.0, 0.0, start, start, 0.0, 1.0, 0.0, nan, nan, nan),
         shock.begin(acceleration),
     )
 
@@ -456,10 +416,6 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
         c.since,
         c.most,
         c.lap,
-        c.laps,
-        c.gap_first,
-        c.gap,
-        c.near,
         c.period,
         c.share,
         c.stops,
@@ -477,21 +433,16 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
         swing = high - low
         stop = select(stops.slip_from == stops.slip_from, min(stops.slip_start, t_mark), t_mark) - stops.start
         total = stops.total + select(stop > abs(stops.least), stop, 0.0)
-        fast = swing * (2.0 * pi) / _pace(scene)
+        near, fast = RETURN * swing, RETURN * swing * (2.0 * pi) / _pace(scene)
         # Without forcing the launch is not the end of a cycle.
         known = due | (c.count > 0.0)
+        repeats = known & (abs(x_mark - c.last.x) <= near) & (abs(v_mark - c.last.velocity) <= fast)
         since = c.since + (count - c.count)
-        gap_last = _gap(c.last, x_mark, v_mark, swing, fast)
-        gap_reference = _gap(c.reference, x_mark, v_mark, swing, fast)
-        repeats = known & (gap_last <= c.near)
-        returns = repeats | (known & (gap_reference <= c.near))
+        returns = known & (abs(x_mark - c.reference.x) <= near) & (abs(v_mark - c.reference.velocity) <= fast)
+        returns = returns | repeats
         # A lap of several cycles need not be closed before its end.
         open_lap = _not(returns) & (since < c.lap)
         lap = select(repeats, 1.0, select(returns, since, select(open_lap, c.lap, 0.0)))
-        gap = select(repeats, gap_last, gap_reference)
-        again = returns & (lap == c.lap)
-        laps = select(again, c.laps + 1.0, select(returns, 1.0, select(open_lap, c.laps, 0.0)))
-        broken = known & (c.lap > 0.0) & _not(again | open_lap)
         t_from = select(repeats, c.last.t, c.reference.t)
         total_from = select(repeats, c.last.total, c.reference.total)
         slips_from = select(repeats, c.last.slips, c.reference.slips)
@@ -515,34 +466,12 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
             select(renew, 0.0, since),
             most,
             lap,
-            laps,
-            select(returns & _not(again), gap, c.gap_first),
-            select(returns, gap, c.gap),
-            select(broken, max(0.1 * c.near, _NEAREST), c.near),
             select(returns, (t_mark - t_from) * lap / cycles, select(keeps, c.period, nan)),
             select(keeps, c.share, (total - total_from) / (t_mark - t_from)),
             select(keeps, c.stops, (stops.slips - slips_from) / cycles),
         )
         return select_all(ended, new, old)
     return old
-
-
-@absorbed
-def _gap(mark, x, velocity, swing, fast):
-    """Distance of a state from a mark, as a share of the swing in a cycle."""
-    return max(abs(x - mark.x) / max(swing, 1e-300), abs(velocity - mark.velocity) / max(fast, 1e-300))
-
-
-@inlined
-def _stays_returned(scene, c):
-    """Whether the motion returns each time, and its trend would not change it in ten spans."""
-    if isnan(c.period):
-        return False
-    laps_to_come = 10.0 * scene.span / c.period
-    # The gaps that follow add up to a geometric series if they shrink.
-    ratio = (c.gap / c.gap_first) ** (1.0 / (c.laps - 1.0)) if c.laps > 1.0 and c.gap < c.gap_first else 1.0
-    more = laps_to_come if ratio >= 1.0 else min(laps_to_come, ratio / (1.0 - ratio))
-    return (c.gap <= _EXACT or c.laps >= _LAPS) and c.gap * more <= _TREND
 
 
 @recorder.conclude.implements(Belt, BristleBelt)
@@ -577,8 +506,7 @@ def _conclude(scene, record, status, t, place, velocity):
 def _settles_to(scene, r, t):
     """Word for what the motion settles to, period, share of stick and stops in a cycle, and whether it has settled."""
     c, stops = r.cycles, r.stops
-    forced, returned = scene.forcing_period < inf, _stays_returned(scene, c)
-    period_found = c.period if returned else nan
+    forced, returned = scene.forcing_period < inf, not isnan(c.period)
     stop = t - stops.start
     in_stop = stop > abs(stops.least)
     # On a belt at rest, or without a spring, the load on a stuck body does not grow.
@@ -597,9 +525,9 @@ def _settles_to(scene, r, t):
         # The belt slides along under a body at rest, below the speed at which its friction no longer grows.
         return SLIDING, nan, 0.0, 0.0, True
     if in_stop and stops.least < 0.0:
-        return RIDING, period_found, 1.0, 0.0, for_good
+        return RIDING, c.period, 1.0, 0.0, for_good
     if in_stop and for_good:
-        return STICKING, period_found if forced else nan, 1.0, 0.0, True
+        return STICKING, c.period if forced else nan, 1.0, 0.0, True
     natural = 2.0 * pi / sqrt(scene.body.stiffness / scene.body.mass) if scene.body.stiffness > 0.0 else inf
     slips_since = t - stops.slip_start
     if isnan(c.share) or (not forced and not in_stop and min(slips_since, t - c.last.t) > 2.0 * natural):
@@ -613,14 +541,13 @@ def _settles_to(scene, r, t):
             steady = abs(r.last.v_rate) * scene.span <= RETURN * abs(r.last.v)
         return SLIDING, nan, 0.0, 0.0, steady
     if c.stops > 0.0 or c.share > 0.0 or (in_stop and not forced):
-        return STICK_SLIP, period_found, c.share, c.stops, returned
+        return STICK_SLIP, c.period, c.share, c.stops, returned
     if c.swing <= _ROUNDING * (r.x_max - r.x_min):
         return SLIDING, nan, 0.0, 0.0, True
     # At a high frequency even a slow decay per cycle ends the motion within the span.
     decays = not forced and c.lap == 1.0 and abs(c.swing - c.swing_before) * c.count > _DECAY * c.swing
-    stays = not isnan(c.period) and not decays
+    stays = returned and not decays
     if stays or forced or c.swing >= c.swing_before:
-        stays = stays and returned
         return OSCILLATORY, c.period if stays else nan, 0.0, 0.0, stays
     return SLIDING, nan, 0.0, 0.0, c.swing <= RETURN * (r.x_max - r.x_min)
 
