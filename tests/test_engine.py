@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -154,7 +155,8 @@ class TestProgress:
         self, monkeypatch, caplog
     ):
         clock = iter([0.0, 30.0, 61.0, 100.0, 121.0, 123.0, 200.0])
-        monkeypatch.setattr(executors.time, "monotonic", lambda: next(clock))
+        # Only there: other threads read the clock of the module `time` too.
+        monkeypatch.setattr(executors, "time", SimpleNamespace(monotonic=lambda: next(clock)))
         with caplog.at_level("INFO", "ringsweep"), executors.progress_bar(60, True) as bar:
             for _ in range(6):
                 bar.update(10)
