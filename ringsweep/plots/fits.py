@@ -38,7 +38,8 @@ def fit(ds: xr.Dataset) -> Figure:
     ...     for name in ("measured", "fitted", "residual")
     ... }
     >>> profile = ("parameter", "profile"), np.array([[4.0, 0.0, 4.0]])
-    >>> ends = {name: ("parameter", [v]) for name, v in {"value": 0.15, "profile_low": 0.1, "profile_high": 0.2}.items()}
+    >>> numbers = {"value": 0.15, "profile_low": 0.1, "profile_high": 0.2}
+    >>> ends = {name: ("parameter", [number]) for name, number in numbers.items()}
     >>> ds = xr.Dataset(
     ...     history | ends | {"profile_value": profile, "profile_misfit": profile, "misfit": 0.0},
     ...     coords={"parameter": ["v"], "unit": ("parameter", ["m/s"]), "t": ("measurement", [0.0, 1.0, 2.0])},
