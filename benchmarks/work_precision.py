@@ -64,7 +64,6 @@ CLOSE = 1e-3
 
 #: Width of a picture, inches: that of a page.
 WIDTH = 6.69
-PEERS = ("scipy", "numbalsoda", "diffrax", "heyoka")
 
 _BELT = {
     "model": "belt",

@@ -7,7 +7,7 @@ expression is written out later.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -295,8 +295,3 @@ def _apply(node: Node, parts: list[Any], variable: Any, values: Mapping[str, Any
     return (simple[node.kind] if node.kind in simple else getattr(np, {"atan": "arctan"}.get(node.kind, node.kind)))(
         *parts
     )
-
-
-def switches_of(*expressions: Node) -> Iterator[Node]:
-    """All switches of expressions."""
-    return (node for node in nodes_of(*expressions) if node.kind == "switch")

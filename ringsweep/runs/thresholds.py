@@ -79,7 +79,7 @@ def threshold(
     xarray.Dataset
         Along the dimension ``vertex``: the values as a coordinate, ``error`` (the threshold lies within ± this),
         ``begins`` (1 where the regime begins as the number grows, 0 where it ends) and ``beyond`` (the regime on the
-        other side). If the configuration has a sample, what :func:`ringsweep.runs.thresholds.distribution` returns.
+        other side). If the configuration has a sample, the quantiles of the least value.
 
     Raises
     ------
