@@ -1,6 +1,6 @@
 """Transition matrices of linear equations ``dw/dt = J(t) w`` by collocation at the nodes of Radau.
 
-The method is of order 13 and L-stable: a mode that decays within a step is gone after it.
+With n nodes the method is of order 2n - 1. It is L-stable: a mode that decays within a step is gone after it.
 """
 
 from __future__ import annotations
@@ -10,9 +10,6 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from ringsweep.compile import inlined, unrolled
-
-#: Instants of a step at which the matrix J is needed.
-NODES = 7
 
 
 def _radau(nodes: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -24,11 +21,12 @@ def _radau(nodes: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return fractions, np.ascontiguousarray(integrals)
 
 
-#: The instants, as fractions of a step, and the weights of the stages.
-FRACTIONS, _INTEGRALS = _radau(NODES)
+#: Fractions of a step at which J is needed, and weights of the stages: for series, and for implicit steps of order 5.
+MANY, WEIGHTS_OF_MANY = _radau(7)
+FEW, WEIGHTS_OF_FEW = _radau(4)
 
-# Rows of the scratch array: a system of equations, the matrices J, the transition matrix.
-_SYSTEM, _MATRICES, _FOUND = 0, 3 * NODES, 4 * NODES
+# Rows of the scratch array after the system of equations: the matrices J, the transition matrix.
+_MATRICES, _FOUND = 3 * len(MANY), 4 * len(MANY)
 
 
 @inlined
@@ -46,7 +44,7 @@ def stored(length, like, work):
 
 
 @inlined
-def transition(n, h, work):
+def transition(n, h, weights, work):
     """Find the transition matrix over a step from the matrices that :func:`store` has stored.
 
     Parameters
@@ -55,6 +53,8 @@ def transition(n, h, work):
         Number of components of w, at most 3.
     h : float
         Length of the step, s.
+    weights : ndarray
+        ``WEIGHTS_OF_MANY`` or ``WEIGHTS_OF_FEW``.
     work : ndarray of at least 29 rows of 24 numbers
 
     Returns
@@ -62,26 +62,27 @@ def transition(n, h, work):
     float
         Logarithm of the determinant of the matrix: the integral of the trace of J (Liouville).
     """
-    size, log_determinant = n * NODES, 0.0
+    nodes, log_determinant = len(weights), 0.0
+    size, last = n * nodes, weights[nodes - 1]
     # The unknowns are the rates k_i = J_i (w + h sum_j A_ij k_j) at the nodes, for each column of the unit matrix w.
-    for i in range(NODES):
+    for i in range(nodes):
         matrix = work[_MATRICES + i]
         for r in range(n):
-            row = work[_SYSTEM + i * n + r]
+            row = work[i * n + r]
             for k in range(n):
                 entry = matrix[r * n + k]
                 row[size + k] = entry
-                for j in range(NODES):
-                    row[j * n + k] = -h * _INTEGRALS[i, j] * entry
+                for j in range(nodes):
+                    row[j * n + k] = -h * weights[i, j] * entry
             row[i * n + r] += 1.0
-            log_determinant += h * _INTEGRALS[NODES - 1, i] * matrix[r * n + r]
+            log_determinant += h * last[i] * matrix[r * n + r]
     _eliminate(size, size + n, work)
     found = work[_FOUND]
     for r in range(n):
         for k in range(n):
             total = 0.0
-            for j in range(NODES):
-                total += _INTEGRALS[NODES - 1, j] * work[j * n + r][size + k]
+            for j in range(nodes):
+                total += last[j] * work[j * n + r][size + k]
             found[r * n + k] = h * total + (1.0 if r == k else 0.0)
     return log_determinant
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ringsweep.compile import hook
 from ringsweep.models.interface import implicit, series, variation
-from ringsweep.numerics.collocation import FRACTIONS, NODES, store
+from ringsweep.numerics.collocation import FEW, MANY, WEIGHTS_OF_FEW, WEIGHTS_OF_MANY, store
 from ringsweep.solvers import rosenbrock
 
 
@@ -41,10 +41,10 @@ def _along_series(asked, scene, record, mode, c, t, ends, work):
     low, high = ends
     if not high > low:
         return record
-    for i in range(NODES):
-        s = low + (high - low) * FRACTIONS[i]
+    for i in range(len(MANY)):
+        s = low + (high - low) * MANY[i]
         store(variation.jacobian(scene, mode, t + s, series.state_at(scene, c, s)), i, work)
-    return variation.advance(scene, record, high - low, series.rates_at(scene, c, high), work)
+    return variation.advance(scene, record, high - low, series.rates_at(scene, c, high), WEIGHTS_OF_MANY, work)
 
 
 @hook(optional=True)
@@ -59,12 +59,12 @@ def _along_implicit(asked, scene, record, start, x_next, h, ends, scratch):
     if not high > low:
         return record
     forcing, x = start.forcing, start.x
-    for i in range(NODES):
-        fraction = low + (high - low) * FRACTIONS[i]
+    for i in range(len(FEW)):
+        fraction = low + (high - low) * FEW[i]
         t = start.t + fraction * h
         forcing = implicit.forcing(scene, scratch.course, t)
         x = rosenbrock.dense(start.x, x_next, scratch.bends[0], fraction)
         store(variation.jacobian(scene, start.mode, t, implicit.from_implicit(scene, forcing, x)), i, work)
     # The last node is the end.
     rates = implicit.rates(scene, start.mode, start.common, forcing, x)
-    return variation.advance(scene, record, (high - low) * h, rates, work)
+    return variation.advance(scene, record, (high - low) * h, rates, WEIGHTS_OF_FEW, work)

@@ -32,7 +32,7 @@ class Blocks(NamedTuple):
 
     Attributes
     ----------
-    count, mean, squares : float
+    number, mean, squares : float
         Number, mean (1/s) and sum of the squared deviations from the mean (1/s^2).
     first_t, first_growth, t, growth : float
         Time, s, and growth of the disturbance at the beginning of the first block and of the present one.
@@ -40,7 +40,7 @@ class Blocks(NamedTuple):
         Time from which the present block may end, s.
     """
 
-    count: float
+    number: float
     mean: float
     squares: float
     first_t: float
@@ -64,10 +64,13 @@ class Tangent(NamedTuple):
     growth : float
         Logarithm of its growth.
     blocks : Blocks
-    rates : tuple of float
-        Rates of the state at the last observation.
+    rates, entry : tuple of float
+        Rates of the state at the end of the last interval, and at the beginning of the present step.
     gradient : tuple of float
-        Gradient of the guard that has just vanished over its rate, s per unit of the state; 0 without an event.
+        Gradient of the guard that has vanished since the last interval over its rate, s per unit of the state; 0
+        without an event. Of several events at one instant the first one counts, since no mode lasts between them.
+    keeps : float
+        0 in a stick that keeps no disturbance of the sliding velocity; else 1.
     multiplier_1, multiplier_2, rate, change : float
         Multipliers of the last lap that returned; logarithm of the second one over the period, 1/s; and how much it
         differs from that of the lap before.
@@ -79,7 +82,9 @@ class Tangent(NamedTuple):
     growth: float
     blocks: Blocks
     rates: Any
+    entry: Any
     gradient: Any
+    keeps: float
     multiplier_1: float
     multiplier_2: float
     rate: float
@@ -123,13 +128,12 @@ def _length(length, vector, frequency):
 
 
 @unrolled
-def _saltation(length, gradient, before, after, projects):
+def _saltation(length, gradient, before, after, keeps):
     """Saltation matrix from the rates before and after an event, and the logarithm of its determinant.
 
-    The displacement has the same rate before and after. A stick that begins keeps no sliding velocity: `projects`.
+    The displacement has the same rate before and after.
     """
     lines = [f"jump{i} = {f'after[{i}] - before[{i}]' if i else '0.0'}" for i in range(length)]
-    lines.append("keeps = 0.0 if projects else 1.0")
     entries = (
         f"{'keeps * ' if i == 1 else ''}({float(i == j)} + jump{i} * gradient[{j}])"
         for i in range(length)
@@ -227,37 +231,42 @@ def _begin(asked, scene, t):
     vector = _scaled(vector, 1.0 / _length(vector, _frequency(scene)))
     zero, unit = _scaled(vector, 0.0), Flow(_unit(vector), 0.0)
     blocks = Blocks(-1.0, 0.0, 0.0, t, 0.0, t, 0.0, _SKIPPED * scene.span)
-    return Tangent(unit, unit, vector, 0.0, blocks, zero, zero, nan, nan, nan, inf)
+    return Tangent(unit, unit, vector, 0.0, blocks, zero, zero, zero, 1.0, nan, nan, nan, inf)
 
 
 @inlined
-def enter(tangent, projects, rates):
-    """Tangent at the beginning of a step: after saltation, if an event came before; `projects` in stick."""
-    r = tangent
-    salt, log_determinant = _saltation(r.gradient, r.rates, rates, projects)
-    step = Flow(_product(r.vector, salt, r.step.matrix), r.step.log_determinant + log_determinant)
-    return _at(r, step, rates, _scaled(r.gradient, 0.0))
+def enter(tangent, keeps, rates):
+    """Tangent at the beginning of a step, where the rates of the state are `rates`."""
+    return _at(tangent, tangent.step, tangent.rates, rates, tangent.gradient, keeps)
 
 
 @inlined
-def advance(tangent, h, rates, work):
-    """Tangent after an interval of length `h`, from the Jacobians in `work`."""
+def advance(tangent, h, rates, weights, work):
+    """Tangent after an interval; see :func:`ringsweep.models.interface.variation.advance`."""
     r = tangent
-    log_determinant = transition(len(r.vector), h, work)
-    step = Flow(
-        _product(r.vector, stored(r.step.matrix, work), r.step.matrix), r.step.log_determinant + log_determinant
-    )
-    return _at(r, step, rates, r.gradient)
+    step = r.step
+    if r.keeps == 0.0 or _is_pending(r.gradient):
+        salt, log_determinant = _saltation(r.gradient, r.rates, r.entry, r.keeps)
+        step = Flow(_product(r.vector, salt, step.matrix), step.log_determinant + log_determinant)
+    log_determinant = step.log_determinant + transition(len(r.vector), h, weights, work)
+    step = Flow(_product(r.vector, stored(step.matrix, work), step.matrix), log_determinant)
+    return _at(r, step, rates, r.entry, _scaled(r.gradient, 0.0), r.keeps)
 
 
 @inlined
 def switched(tangent, gradient):
     """Tangent after an event, with the gradient of the guard over its rate."""
-    return _at(tangent, tangent.step, tangent.rates, gradient)
+    r = tangent
+    return _at(r, r.step, r.rates, r.entry, r.gradient if _is_pending(r.gradient) else gradient, r.keeps)
+
+
+@unrolled
+def _is_pending(length, gradient):
+    return ["return " + " or ".join(f"gradient[{i}] != 0.0" for i in range(length))]
 
 
 @inlined
-def _at(r, step, rates, gradient):
+def _at(r, step, rates, entry, gradient, keeps):
     return Tangent(
         r.lap,
         step,
@@ -265,7 +274,9 @@ def _at(r, step, rates, gradient):
         r.growth,
         r.blocks,
         rates,
+        entry,
         gradient,
+        keeps,
         r.multiplier_1,
         r.multiplier_2,
         r.rate,
@@ -302,7 +313,21 @@ def _observe(tangent, scene, before, cycles, t, duration):
     forced = scene.forcing_period < inf
     ends = not forced or (at_end and cycles.count != before.count)
     blocks = _blocks(r.blocks, scene.span, t, growth, ends)
-    return Tangent(lap, unit, vector, growth, blocks, r.rates, r.gradient, multiplier_1, multiplier_2, rate, change)
+    return Tangent(
+        lap,
+        unit,
+        vector,
+        growth,
+        blocks,
+        r.rates,
+        r.entry,
+        r.gradient,
+        r.keeps,
+        multiplier_1,
+        multiplier_2,
+        rate,
+        change,
+    )
 
 
 @inlined
@@ -311,12 +336,14 @@ def _blocks(b, span, t, growth, ends):
     width = (1.0 - _SKIPPED) * span / _BLOCKS
     if t < b.until or not (ends or t >= b.until + width):
         return b
-    until = _SKIPPED * span + width * (b.count + 2.0)
-    if b.count < 0.0:
+    until = _SKIPPED * span + width * (b.number + 2.0)
+    if b.number < 0.0:
         return Blocks(0.0, 0.0, 0.0, t, growth, t, growth, until)
-    rate, count = (growth - b.growth) / (t - b.t), b.count + 1.0
-    mean = b.mean + (rate - b.mean) / count
-    return Blocks(count, mean, b.squares + (rate - b.mean) * (rate - mean), b.first_t, b.first_growth, t, growth, until)
+    rate, number = (growth - b.growth) / (t - b.t), b.number + 1.0
+    mean = b.mean + (rate - b.mean) / number
+    return Blocks(
+        number, mean, b.squares + (rate - b.mean) * (rate - mean), b.first_t, b.first_growth, t, growth, until
+    )
 
 
 @unrolled
@@ -335,9 +362,9 @@ def with_exponent(tangent, outcome, scene):
 def _with_exponent(tangent, outcome, scene):
     r, b = tangent, tangent.blocks
     exponent, error, multiplier_1, multiplier_2 = nan, nan, nan, nan
-    if b.count > 1.0:
+    if b.number > 1.0:
         exponent = (b.growth - b.first_growth) / (b.t - b.first_t)
-        error = sqrt(b.squares / (b.count * (b.count - 1.0)))
+        error = sqrt(b.squares / (b.number * (b.number - 1.0)))
     if not isnan(outcome.period):
         multiplier_1, multiplier_2 = r.multiplier_1, r.multiplier_2
         if scene.forcing_period == inf and not isnan(r.rate):

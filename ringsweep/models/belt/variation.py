@@ -16,7 +16,7 @@ from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.forces import force_in
 from ringsweep.physics.friction.bristles import region_guard
 from ringsweep.physics.friction.registry import holds_in_band
-from ringsweep.physics.friction.velocity import friction_in
+from ringsweep.physics.friction.velocity import friction_in, stiction_band
 
 # Differences for the gradient of a guard of bristles, as a share of their speed and deflection.
 _SMALL = 1e-4
@@ -50,14 +50,21 @@ def _with(r, changed):
     )
 
 
-@variation.enter.implements(Belt, BristleBelt)
+@variation.enter.implements(Belt)
 def _enter(scene, record, mode, rates):
-    return _with(record, tangent.enter(record.tangent, mode.sign == 0, rates))
+    # A body stays in a dead band at any velocity in it; only one that comes from outside has that of the edge.
+    arrives = stiction_band(scene.law) == 0.0 or record.tangent.gradient[1] != 0.0
+    return _with(record, tangent.enter(record.tangent, 0.0 if mode.sign == 0 and arrives else 1.0, rates))
+
+
+@variation.enter.implements(BristleBelt)
+def _enter_with_bristles(scene, record, mode, rates):
+    return _with(record, tangent.enter(record.tangent, 1.0, rates))
 
 
 @variation.advance.implements(Belt, BristleBelt)
-def _advance(scene, record, h, rates, work):
-    return _with(record, tangent.advance(record.tangent, h, rates, work))
+def _advance(scene, record, h, rates, weights, work):
+    return _with(record, tangent.advance(record.tangent, h, rates, weights, work))
 
 
 @variation.switched.implements(Belt, BristleBelt)

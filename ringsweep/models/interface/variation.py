@@ -54,11 +54,11 @@ def jacobian(scene, mode, t, y):
 
 @hook
 def enter(scene, record, mode, rates):
-    """Record at the beginning of a step in a mode, where the rates of the state are `rates`; after saltation."""
+    """Record at the beginning of a step in a mode, where the rates of the state are `rates`."""
 
 
 @hook
-def advance(scene, record, h, rates, work):
+def advance(scene, record, h, rates, weights, work):
     """Record after an interval of length `h` within a step.
 
     Parameters
@@ -68,8 +68,8 @@ def advance(scene, record, h, rates, work):
         Length of the interval, s.
     rates : tuple of float
         Rates of the state at its end.
-    work : ndarray
-        Holds the Jacobians, see :func:`ringsweep.numerics.collocation.store`.
+    weights, work : ndarray
+        Arguments of :func:`ringsweep.numerics.collocation.transition`; `work` holds the Jacobians.
     """
 
 
