@@ -35,6 +35,8 @@ from ringsweep.errors import InputError
 from ringsweep.models.scene import LAW, Scene
 from ringsweep.quantities.units import show
 
+_SECTIONS = "scene", "solver", "record", "sweep"
+
 _NOT_REFINED = "cannot stand beside sweep.sample: a probability has no boundary, and each cell needs its own runs"
 
 
@@ -188,8 +190,8 @@ def read_scene(scene: Mapping[str, Any], swept: Collection[str] = ()) -> Scene:
 def _validate(doc: Document) -> Config:
     tree = doc.tree
     for key in tree:
-        if key not in ("scene", "solver", "sweep"):
-            raise InputError(key, "unknown section" + suggestion(key, ("scene", "solver", "sweep")))
+        if key not in _SECTIONS:
+            raise InputError(key, "unknown section" + suggestion(key, _SECTIONS))
     sweep = sweep_section(doc)
     swept = swept_paths(sweep)
     laws = [(f"sweep.{kind}.{LAW}", columns[LAW]) for kind, columns in sweep.items() if LAW in columns]
@@ -212,7 +214,7 @@ def _apply_setting(doc: Document, setting: str) -> str:
     path, equals, text = (part.strip() for part in setting.partition("="))
     if not equals or not path:
         raise InputError("--set", f"{show(setting)} is not of the form PATH=VALUE")
-    full = path if path.split(".")[0] in ("scene", "solver") else f"scene.{path}"
+    full = path if path.split(".")[0] in ("scene", "solver", "record") else f"scene.{path}"
     *parents, last = full.split(".")
     node: Any = doc.tree
     for depth, key in enumerate(parents, start=1):

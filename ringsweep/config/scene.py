@@ -16,6 +16,7 @@ from ringsweep.config.friction import FORMULA, keep_definitions, keys_of, law_of
 from ringsweep.config.friction import TABLE as TABLE_LAW
 from ringsweep.config.motion import FORMULA as FORMULA_DRIVE
 from ringsweep.config.motion import own_drive, own_force
+from ringsweep.config.record import read_record
 from ringsweep.config.sections import choose, missing_text, read_values, section_of, suggestion
 from ringsweep.config.tables import TABLES, read_table
 from ringsweep.config.yaml_text import Document
@@ -57,6 +58,7 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     """
     scene = section_of(doc.tree, "scene", "")
     model = choose(MODELS, scene, "scene.model", "model")
+    exponent = read_record(doc.tree.get("record", {}), model)
     zones = _zones(scene)
     friction = _read_friction(doc, scene, model, laws)
     moved = _read_motion(scene, model, swept)
@@ -65,7 +67,7 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
         section_of(scene, "friction", "scene.")
         known_laws = law_choice(model, friction.own).names
         raise InputError(f"scene.{LAW}", "missing: name a friction law: " + ", ".join(known_laws))
-    moved = replace(moved, arcs=_arcs(scene, zones, leaves), **_read_tables(doc, scene, moved))
+    moved = replace(moved, exponent=exponent, arcs=_arcs(scene, zones, leaves), **_read_tables(doc, scene, moved))
     structures = {
         law: replace(moved, law=law, own_law=friction.own.get(law), curve=friction.curve if law == TABLE_LAW else None)
         for law in friction.names

@@ -81,7 +81,7 @@ def schema() -> dict[str, Any]:
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "ringsweep configuration",
-        **_section({"scene": scene, "solver": _solver(), "sweep": _sweep(list(known))}),
+        **_section({"scene": scene, "solver": _solver(), "record": _record(), "sweep": _sweep(list(known))}),
         "required": ["scene"],
     }
 
@@ -161,6 +161,11 @@ def _list(items: dict[str, Any]) -> dict[str, Any]:
 
 def _any_of(options: list[dict[str, Any]]) -> dict[str, Any]:
     return options[0] if len(options) == 1 else {"anyOf": options}
+
+
+def _record() -> dict[str, Any]:
+    about = "whether a run on the belt tells its Lyapunov exponent and its Floquet multipliers"
+    return {"description": "what a run records", **_section({"exponent": {"description": about, "type": "boolean"}})}
 
 
 def _solver() -> dict[str, Any]:

@@ -44,6 +44,8 @@ class Structure:
         Types of the drive and of the force on the body if the configuration defines them by formulas.
     impact : bool
         Whether a run goes on after a contact is lost.
+    exponent : bool
+        Whether the record of a run holds its exponent and multipliers.
     """
 
     model: str
@@ -57,6 +59,7 @@ class Structure:
     own_drive: type | None = None
     own_force: type | None = None
     impact: bool = False
+    exponent: bool = False
 
     @property
     def law_type(self) -> type:

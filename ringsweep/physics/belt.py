@@ -87,6 +87,8 @@ class Belt(NamedTuple):
         Span of time, s.
     forcing_period : float
         Period of the forcing, s; infinite without a period.
+    asked : NamedTuple
+        What the record is asked for beyond the outcomes; an empty tuple for nothing.
     """
 
     body: Any
@@ -99,6 +101,7 @@ class Belt(NamedTuple):
     initial_v: Leaf
     span: Leaf
     forcing_period: Leaf
+    asked: Any = ()
 
 
 class BristleBelt(Belt):

@@ -11,7 +11,7 @@ from math import isfinite
 from typing import Any, NamedTuple
 
 from ringsweep.compile import Cells, borrowed, hook, inlined, kernel, take
-from ringsweep.models.interface import implicit, modes, recorder, series
+from ringsweep.models.interface import implicit, modes, recorder, series, variation
 from ringsweep.models.interface.status import BROKEN, COMPLETE, RUNNING
 from ringsweep.numerics.series import ORDER
 from ringsweep.physics import drives
@@ -385,6 +385,7 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
                 audit = audit_step(family(scene.law), scene, step, scratch, tolerances[0], audit)
             t, status, mode, y = _after_step(scene, mode, guard, t, s, h_max, y_next)
             if guard >= 0:
+                record = variation.switched(scene, record, step.mode, guard, t, y_next)
                 record = recorder.after_event(scene, record, mode, t)
             # The regime of a run that goes on after a loss is that loss: what ends the run later does not count.
             decides = status != RUNNING or modes.first_loss(step.mode, mode)

@@ -25,6 +25,10 @@ _MAY_LACK = (
     "swing",
     "jump_max",
     "t_jump_max",
+    "lyapunov",
+    "lyapunov_error",
+    "multiplier_1",
+    "multiplier_2",
 )
 
 # Relative difference of two final states that rounding explains.
@@ -182,8 +186,9 @@ def diverging(
 
 
 def with_errors(outcomes: tuple[str, ...]) -> tuple[str, ...]:
-    """Names of the outcomes that have a bound on their error."""
-    return tuple(name for name in outcomes if f"{name}_error" in OUTCOMES)
+    """Names of the outcomes that have a bound on their error; a run itself tells some of the errors."""
+    errors = {name: f"{name}_error" for name in outcomes}
+    return tuple(name for name in outcomes if errors[name] in OUTCOMES and errors[name] not in outcomes)
 
 
 def errors(

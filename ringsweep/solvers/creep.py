@@ -8,11 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ringsweep.compile import inlined
-from ringsweep.models.interface import implicit, modes, recorder
+from ringsweep.models.interface import implicit, modes, recorder, variation
 from ringsweep.numerics.series import ORDER, ascending, first_root, value
 from ringsweep.physics import drives
 from ringsweep.solvers import rosenbrock
 from ringsweep.solvers.steps import INSTANTS
+from ringsweep.solvers.variation import along_implicit, enter_implicit
 
 # Matrix that turns the values at the ends of these parts into the coefficients of a polynomial.
 _INTERPOLATION = np.ascontiguousarray(np.linalg.inv(np.vander(np.linspace(0.0, 1.0, INSTANTS + 1), increasing=True)))
@@ -293,6 +294,7 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
     """
     mode, t, y, x, forcing, common, linear = start
     course, bends = scratch.course, scratch.bends[0]
+    record = enter_implicit(variation.asked(scene), scene, record, start)
     scales = implicit.error_scales(scene, tolerance, x)
     s = min(control.h, h_max)
     drives.follow(scene.drive, course, t, s)
@@ -342,6 +344,10 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
     for i in range(1 if near else 2, INSTANTS, 1 if near else INSTANTS):
         fractions[count] = i / INSTANTS
         count += 1
+    due = variation.due(scene, record) - t
+    if 0.0 < due < h:
+        fractions[count] = due / h
+        count += 1
     ascending(fractions, count)
     fraction_before, stuck = 0.0, modes.sticks(scene, mode)
     fractions[count] = 1.0
@@ -351,6 +357,8 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
         if fraction != 0.5 and fraction != 1.0:
             view = _view_at(scene, start, course, fraction * h, rosenbrock.dense(x, x_next, bends, fraction))
         duration = (fraction - fraction_before) * h
+        ends = fraction_before, fraction
+        record = along_implicit(variation.asked(scene), scene, record, start, x_next, h, ends, scratch)
         record = recorder.observe(scene, record, t + fraction * h, duration, stuck, implicit.seen(scene, view))
         fraction_before = fraction
     return event, h, implicit.from_implicit(scene, end, x_next), record, control, h_norm if h < s or s == h_max else 0.0

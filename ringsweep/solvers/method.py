@@ -13,7 +13,7 @@ from ringsweep.compile import has_known_source, lacking
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
 from ringsweep.models.scene import Structure
-from ringsweep.physics.friction import Dynamic, family_of
+from ringsweep.physics.friction import TRAITS, Dynamic, family_of
 
 
 @dataclass(frozen=True)
@@ -78,6 +78,12 @@ class Method(ABC):
                 "scene.impact",
                 f"friction law {structure.law} has bristles, which have no state in an impact: "
                 "choose a law without bristles, or leave impact out",
+            )
+        if structure.exponent and TRAITS[structure.law_type].snaps:
+            raise InputError(
+                "record.exponent",
+                f"friction law {structure.law} has none: its bonds form anew at random; choose another law, or leave "
+                "record.exponent out",
             )
         needs, model = self.needs(structure), model_of(structure)
         law, drive = structure.law_type, structure.drive_type

@@ -91,6 +91,10 @@ class RK4(Method):
             raise InputError(
                 "solver.method", "rk4 does not go on after a contact is lost: auto does; or leave scene.impact out"
             )
+        if structure.exponent:
+            raise InputError(
+                "solver.method", "rk4 locates no events, at which disturbances jump: auto gives record.exponent"
+            )
         super().check(structure)
 
     def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:

@@ -8,8 +8,9 @@ from __future__ import annotations
 from math import isnan, nan
 
 from ringsweep.compile import inlined
-from ringsweep.models.interface import modes, recorder, series
+from ringsweep.models.interface import modes, recorder, series, variation
 from ringsweep.numerics.series import ORDER, ascending, first_root
+from ringsweep.solvers.variation import along_series, enter_series
 
 
 @inlined
@@ -51,6 +52,7 @@ def _observe(scene, record, mode, c, t, s, work):
     before = 0.0
     for j in range(count + 1):
         now = instants[j] if j < count else s
+        record = along_series(variation.asked(scene), scene, record, mode, c, t, (before, now), work[1:])
         record = recorder.observe(scene, record, t + now, now - before, stuck, series.seen_at(scene, c, now, s))
         before = now
     return record
@@ -82,6 +84,7 @@ def series_step(scene, record, mode, t, y, h_max, tolerance, scratch):
     """
     c, work = scratch.c, scratch.work
     reach = series.expand(scene, mode, t, y, tolerance, c)
+    record = enter_series(variation.asked(scene), scene, record, mode, c)
     h = min(reach, h_max)
     guard, s = _first_event(c, scratch.first_guard, mode.entry_guard, h, work)
     if s > 0.0:

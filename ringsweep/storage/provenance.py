@@ -79,6 +79,8 @@ def identity(config: Config) -> dict[str, str]:
     if structure.force is not None:
         found["scene.force"] = f"a table of {len(structure.force[0])} samples ({_digest(*structure.force)})"
     found |= {f"scene.{path}": repr(float(value)) for path, value in scene.values.items() if path not in axes.columns}
+    if structure.exponent:
+        found["record.exponent"] = "true"
     if config.refine is not None:
         found["sweep.refine"] = repr(config.refine)
     found["sweep"] = ", ".join(f"{name} {size}" for name, size in axes.sizes.items()) or "a single run"

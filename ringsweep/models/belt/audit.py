@@ -86,9 +86,14 @@ def _bristle_violation(scene, mode, forcing, y, rates, s, tolerance):
     return larger(larger(largest, abs(rate - rates[2]) / allowed), -mode.sign * v / speed), power
 
 
+def _outcome(rows):
+    """The outcomes that every run has, in columns."""
+    return Outcome(*rows.T[: len(Outcome._fields)])
+
+
 @audit.undecided.implements(Belt, BristleBelt)
 def _undecided(batch, rows, second_rows, fall_rates):
-    one, other = Outcome(*rows.T), Outcome(*second_rows.T)
+    one, other = _outcome(rows), _outcome(second_rows)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         return _sliding_or_swing(batch, one, other) | _may_hold(batch.body, one, other, fall_rates)
 
@@ -122,7 +127,7 @@ def _may_hold(body, one, other, fall_rates):
 
 @audit.same_statistics.implements(Belt, BristleBelt)
 def _same_statistics(batch, rows, second_rows):
-    one, other = Outcome(*rows.T), Outcome(*second_rows.T)
+    one, other = _outcome(rows), _outcome(second_rows)
     with np.errstate(invalid="ignore", over="ignore"):
         range_1, range_2 = one.x_max - one.x_min, other.x_max - other.x_min
         same = np.abs(range_1 - range_2) <= _SAME_SHARE * np.minimum(range_1, range_2)

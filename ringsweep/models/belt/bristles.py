@@ -49,7 +49,7 @@ def _contact_in_region(scene, v, z):
 
 
 @inlined
-def _recoil_speed(scene):
+def recoil_speed(scene):
     """Speed of a body that bristles drive back from their largest deflection, m/s."""
     return scene.mu_s * sqrt(scene.body.gravity / scene.law.sigma0)
 
@@ -143,7 +143,7 @@ def _sticks(scene, before, now):
 
 @recorder.begin.implements(BristleBelt)
 def _begin(scene, t, seen):
-    return begin(scene, t, seen, stick_speed(scene.law, _recoil_speed(scene)), _play(scene))
+    return begin(scene, t, seen, stick_speed(scene.law, recoil_speed(scene)), _play(scene))
 
 
 @constant_step.row.implements(BristleBelt)
@@ -226,7 +226,7 @@ def _error_scales(scene, tolerance, x):
     deflection = scene.mu_s / scene.law.sigma0
     return (
         tolerance * (abs(x[0]) + deflection),
-        tolerance * (abs(x[1]) + _recoil_speed(scene)),
+        tolerance * (abs(x[1]) + recoil_speed(scene)),
         tolerance * deflection,
         tolerance * scene.mu_s * scene.body.gravity,
     )

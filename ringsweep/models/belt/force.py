@@ -104,6 +104,13 @@ def stuck_rates(scene, t, x, forcing):
     return -friction, scene.mu_s * load
 
 
+@inlined
+def stuck_gradient(scene, x):
+    """Derivatives of :func:`stuck_pull` and :func:`breakaway_force` of a body at rest on the belt by place, N/m."""
+    load, _, friction, _ = ring.held(scene.body, 0.0, 1.0, 0.0, 0.0, 3.0 * x * x, 0.0, 0.0)
+    return -friction, scene.mu_s * load
+
+
 @hook(optional=True)
 def _cubic_stiffness(body):
     return 0.0

@@ -9,7 +9,9 @@ import numpy as np
 
 from ringsweep.compile import take
 from ringsweep.errors import InputError
+from ringsweep.models.belt import tangent
 from ringsweep.models.belt.record import Outcome
+from ringsweep.models.interface.variation import Exponent
 from ringsweep.models.model import Model
 from ringsweep.models.parts import GRAVITY, MASS, SPAN, by_formula, drive_of, friction_coefficients, law_of, table_of
 from ringsweep.models.scene import Structure, Values, require
@@ -113,6 +115,8 @@ class Belt(Model):
             "initial_v": sliding,
             "span": values["time.span"],
         }
+        if structure.exponent:
+            fields["asked"] = Exponent()
         fields["forcing_period"] = np.broadcast_to(drives.period(fields["drive"]), mass.shape).copy()
         fields["viscous"] = values.get("friction.viscous", np.zeros(len(mass)))
         if friction.family_of(law) is not friction.Dynamic:
@@ -172,6 +176,12 @@ class Belt(Model):
         else:
             return drive
         return forces.Forced(drive, force, constant, abs(constant) + largest)
+
+
+class BeltWithExponent(Belt):
+    """The belt whose record is asked for the exponent."""
+
+    outcomes: ClassVar[tuple[str, ...]] = Outcome._fields + tangent.OUTCOMES
 
 
 def _along_a_line(parameter: Parameter) -> Parameter:

@@ -13,6 +13,7 @@ from math import inf, isfinite, isnan, nan, pi, sqrt
 from typing import Any, NamedTuple
 
 from ringsweep.compile import absorbed, hook, inlined
+from ringsweep.models.belt import tangent
 from ringsweep.models.belt.force import breakaway_force
 from ringsweep.models.interface import recorder, shock
 from ringsweep.models.interface.status import BROKEN, SEPARATED_1
@@ -170,6 +171,8 @@ class Record(NamedTuple):
     cycles : Cycles
     shocks : Shocks or NoShocks
         Jumps of the acceleration.
+    tangent : Tangent
+        Growth of small disturbances; an empty tuple if no exponent is asked for.
     """
 
     band: Any
@@ -182,6 +185,7 @@ class Record(NamedTuple):
     stops: Stops
     cycles: Cycles
     shocks: Any
+    tangent: Any
 
 
 #: The motion has returned if displacement and velocity differ by less than this share of their swing in a cycle.
@@ -228,6 +232,7 @@ def begin(scene, t, seen, band, play):
         Stops(1.0, t, 0.0, t, -max(least, 1e-300), nan, t, 0.0, 0.0, nan),
         Cycles(0.0, scene.forcing_period, x, x, 0.0, 0.0, 0.0, start, start, 0.0, 1.0, 0.0, nan, nan, nan),
         shock.begin(acceleration),
+        tangent.begin(scene.asked, scene, t),
     )
 
 
@@ -267,6 +272,7 @@ def _observe(scene, record, t, duration, stuck, seen):
         stops,
         cycles,
         shock.observe(r.shocks, acceleration),
+        tangent.observe(r.tangent, scene, r.cycles, cycles, t, duration),
     )
 
 
@@ -480,7 +486,7 @@ def _conclude(scene, record, status, t, place, velocity):
     motion, period, share, stops, settled = _settles_to(scene, r, t)
     if status == BROKEN or not (isfinite(x) and isfinite(velocity)):
         motion = FAILED
-    return Outcome(
+    outcome = Outcome(
         float(SEPARATING if status == SEPARATED_1 and motion != FAILED else motion),
         float(motion),
         t,
@@ -500,6 +506,7 @@ def _conclude(scene, record, status, t, place, velocity):
         r.force_max,
         *shock.largest(r.shocks),
     )
+    return tangent.with_exponent(r.tangent, outcome, scene)
 
 
 @inlined
@@ -560,4 +567,6 @@ def _begin(scene, t, seen):
 @recorder.enter.implements(Belt, BristleBelt)
 def _enter(scene, record, t, seen):
     r, shocks = record, shock.enter(record.shocks, t, seen[6])
-    return Record(r.band, r.play, r.last, r.x_min, r.x_max, r.velocity_max, r.force_max, r.stops, r.cycles, shocks)
+    return Record(
+        r.band, r.play, r.last, r.x_min, r.x_max, r.velocity_max, r.force_max, r.stops, r.cycles, shocks, r.tangent
+    )

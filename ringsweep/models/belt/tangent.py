@@ -1,0 +1,373 @@
+"""Growth of small disturbances of a motion on the belt: Floquet multipliers of a lap, and the Lyapunov exponent."""
+
+from __future__ import annotations
+
+from math import acos, cos, exp, inf, isnan, log, nan, pi, sqrt
+from typing import Any, NamedTuple
+
+from ringsweep.compile import hook, inlined, unrolled
+from ringsweep.models.interface.variation import Exponent
+from ringsweep.numerics.collocation import stored, transition
+from ringsweep.physics.belt import Belt, BristleBelt
+
+#: Outcomes of a run whose exponent is asked for, after the others.
+OUTCOMES = "lyapunov", "lyapunov_error", "multiplier_1", "multiplier_2"
+
+#: Share of the span after which the exponent is measured, and number of blocks of the rest.
+_SKIPPED, _BLOCKS = 0.25, 24
+
+
+class Flow(NamedTuple):
+    """Derivative of a state by an earlier one: the matrix, row by row, and the logarithm of its determinant.
+
+    The logarithm is summed up on its own, since a matrix that contracts much in one direction does not show how much.
+    """
+
+    matrix: Any
+    log_determinant: float
+
+
+class Blocks(NamedTuple):
+    """Rates of growth of the blocks up to now.
+
+    Attributes
+    ----------
+    number, mean, squares : float
+        Number, mean (1/s) and sum of the squared deviations from the mean (1/s^2).
+    first_t, first_growth, t, growth : float
+        Time, s, and growth of the disturbance at the beginning of the first block and of the present one.
+    until : float
+        Time from which the present block may end, s.
+    """
+
+    number: float
+    mean: float
+    squares: float
+    first_t: float
+    first_growth: float
+    t: float
+    growth: float
+    until: float
+
+
+class Tangent(NamedTuple):
+    """Disturbances of a run.
+
+    Attributes
+    ----------
+    lap : Flow
+        From the beginning of the present lap to the last observation.
+    step : Flow
+        Since the last observation.
+    vector : tuple of float
+        A disturbance at the last observation, of length 1.
+    growth : float
+        Logarithm of its growth.
+    blocks : Blocks
+    rates, entry : tuple of float
+        Rates of the state at the end of the last interval, and at the beginning of the present step.
+    gradient : tuple of float
+        Gradient of the guard that has vanished since the last interval over its rate, s per unit of the state; 0
+        without an event. Of several events at one instant the first one counts, since no mode lasts between them.
+    keeps : float
+        0 in a stick that keeps no disturbance of the sliding velocity; else 1.
+    multiplier_1, multiplier_2, rate, change : float
+        Multipliers of the last lap that returned; logarithm of the second one over the period, 1/s; and how much it
+        differs from that of the lap before.
+    """
+
+    lap: Flow
+    step: Flow
+    vector: Any
+    growth: float
+    blocks: Blocks
+    rates: Any
+    entry: Any
+    gradient: Any
+    keeps: float
+    multiplier_1: float
+    multiplier_2: float
+    rate: float
+    change: float
+
+
+# ---- matrices -----------------------------------------------------------------------------------
+
+
+@unrolled
+def _product(length, vector, a, b):
+    """Product of two matrices, row by row; the length of `vector` is the number of rows."""
+    n = range(length)
+    entries = (" + ".join(f"a[{i * length + k}] * b[{k * length + j}]" for k in n) for i in n for j in n)
+    return ["return " + ", ".join(entries)]
+
+
+@unrolled
+def _applied(length, vector, a):
+    """Product of a matrix and a vector."""
+    n = range(length)
+    return ["return " + ", ".join(" + ".join(f"a[{i * length + k}] * vector[{k}]" for k in n) for i in n)]
+
+
+@unrolled
+def _unit(length, vector):
+    """Unit matrix."""
+    return ["return " + ", ".join(f"{float(i == j)}" for i in range(length) for j in range(length))]
+
+
+@unrolled
+def _scaled(length, vector, factor):
+    return ["return " + ", ".join(f"factor * vector[{i}]" for i in range(length))]
+
+
+@unrolled
+def _length(length, vector, frequency):
+    """Length of a disturbance, m/s: displacements count times the frequency of the motion."""
+    squares = ("vector[1] * vector[1]" if i == 1 else f"(frequency * vector[{i}]) ** 2" for i in range(length))
+    return ["return sqrt(" + " + ".join(squares) + ")"]
+
+
+@unrolled
+def _saltation(length, gradient, before, after, keeps):
+    """Saltation matrix from the rates before and after an event, and the logarithm of its determinant.
+
+    The displacement has the same rate before and after.
+    """
+    lines = [f"jump{i} = {f'after[{i}] - before[{i}]' if i else '0.0'}" for i in range(length)]
+    entries = (
+        f"{'keeps * ' if i == 1 else ''}({float(i == j)} + jump{i} * gradient[{j}])"
+        for i in range(length)
+        for j in range(length)
+    )
+    determinant = " + ".join(f"jump{i} * gradient[{i}]" for i in range(length))
+    return [*lines, f"size = keeps * abs(1.0 + {determinant})", "return (" + ", ".join(entries) + "), logarithm(size)"]
+
+
+@inlined
+def logarithm(x):
+    """Natural logarithm; that of 0 is minus infinity."""
+    return log(x) if x > 0.0 else -inf
+
+
+@unrolled
+def _magnitudes(length, vector, matrix, log_determinant):
+    """Magnitudes of the two largest eigenvalues, and the logarithm of the second."""
+    return [f"return {'_of_two_by_two' if length == 2 else '_of_three_by_three'}(matrix, log_determinant)"]
+
+
+@inlined
+def _of_two_by_two(matrix, log_determinant):
+    a, b, c, d = matrix
+    root = 0.25 * (a - d) ** 2 + b * c
+    first = 0.5 * abs(a + d) + sqrt(root) if root >= 0.0 else exp(0.5 * log_determinant)
+    second = log_determinant - logarithm(first) if first > 0.0 else -inf
+    return first, exp(second), second
+
+
+@inlined
+def _of_three_by_three(matrix, log_determinant):
+    a, b, c, d, e, f, g, h, i = matrix
+    minors = a * e - b * d + a * i - c * g + e * i - f * h
+    determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+    first, second = _of_cubic(a + e + i, minors, determinant)
+    return first, second, logarithm(second)
+
+
+@inlined
+def _of_cubic(trace, minors, determinant):
+    """The two largest magnitudes of the roots of ``x^3 - trace x^2 + minors x - determinant``."""
+    third = trace / 3.0
+    p, q = minors - trace * third, (minors - 2.0 * third * third) * third - determinant
+    discriminant = 0.25 * q * q + p * p * p / 27.0
+    if discriminant > 0.0:
+        u = sqrt(discriminant) + 0.5 * abs(q)
+        u = u ** (1.0 / 3.0)
+        real = third + (p / (3.0 * u) - u if q > 0.0 else u - p / (3.0 * u))
+        pair = sqrt(abs(minors - real * (trace - real)))
+        return max(abs(real), pair), pair if pair <= abs(real) else max(min(abs(real), pair), pair)
+    radius = 2.0 * sqrt(max(-p / 3.0, 0.0))
+    angle = acos(min(max(-4.0 * q / radius**3, -1.0), 1.0)) / 3.0 if radius > 0.0 else 0.0
+    x = abs(third + radius * cos(angle))
+    y = abs(third + radius * cos(angle - 2.0 * pi / 3.0))
+    z = abs(third + radius * cos(angle + 2.0 * pi / 3.0))
+    largest, least = max(x, max(y, z)), min(x, min(y, z))
+    return largest, x + y + z - largest - least
+
+
+# ---- the run ------------------------------------------------------------------------------------
+
+
+@hook
+def _disturbance(scene):
+    """A disturbance with a component along each component of the state."""
+
+
+@_disturbance.implements(Belt)
+def _of_two(scene):
+    return 1.0, 1.0
+
+
+@_disturbance.implements(BristleBelt)
+def _of_three(scene):
+    return 1.0, 1.0, 1.0
+
+
+@hook(optional=True)
+def begin(asked, scene, t):
+    """Tangent at the beginning of a run; an empty tuple if no exponent is asked for."""
+    return ()
+
+
+@inlined
+def _frequency(scene):
+    natural = sqrt(abs(scene.body.stiffness) / scene.body.mass)
+    found = max(natural, 2.0 * pi / scene.forcing_period)
+    return found if found > 0.0 else 1.0
+
+
+@begin.implements(Exponent)
+def _begin(asked, scene, t):
+    vector = _disturbance(scene)
+    vector = _scaled(vector, 1.0 / _length(vector, _frequency(scene)))
+    zero, unit = _scaled(vector, 0.0), Flow(_unit(vector), 0.0)
+    blocks = Blocks(-1.0, 0.0, 0.0, t, 0.0, t, 0.0, _SKIPPED * scene.span)
+    return Tangent(unit, unit, vector, 0.0, blocks, zero, zero, zero, 1.0, nan, nan, nan, inf)
+
+
+@inlined
+def enter(tangent, keeps, rates):
+    """Tangent at the beginning of a step, where the rates of the state are `rates`."""
+    return _at(tangent, tangent.step, tangent.rates, rates, tangent.gradient, keeps)
+
+
+@inlined
+def advance(tangent, h, rates, weights, work):
+    """Tangent after an interval; see :func:`ringsweep.models.interface.variation.advance`."""
+    r = tangent
+    step = r.step
+    if r.keeps == 0.0 or _is_pending(r.gradient):
+        salt, log_determinant = _saltation(r.gradient, r.rates, r.entry, r.keeps)
+        step = Flow(_product(r.vector, salt, step.matrix), step.log_determinant + log_determinant)
+    log_determinant = step.log_determinant + transition(len(r.vector), h, weights, work)
+    step = Flow(_product(r.vector, stored(step.matrix, work), step.matrix), log_determinant)
+    return _at(r, step, rates, r.entry, _scaled(r.gradient, 0.0), r.keeps)
+
+
+@inlined
+def switched(tangent, gradient):
+    """Tangent after an event, with the gradient of the guard over its rate."""
+    r = tangent
+    return _at(r, r.step, r.rates, r.entry, r.gradient if _is_pending(r.gradient) else gradient, r.keeps)
+
+
+@unrolled
+def _is_pending(length, gradient):
+    return ["return " + " or ".join(f"gradient[{i}] != 0.0" for i in range(length))]
+
+
+@inlined
+def _at(r, step, rates, entry, gradient, keeps):
+    return Tangent(
+        r.lap,
+        step,
+        r.vector,
+        r.growth,
+        r.blocks,
+        rates,
+        entry,
+        gradient,
+        keeps,
+        r.multiplier_1,
+        r.multiplier_2,
+        r.rate,
+        r.change,
+    )
+
+
+@hook(absorb=True, optional=True)
+def observe(tangent, scene, before, cycles, t, duration):
+    """Tangent after an observation, from the cycles before and after it."""
+    return tangent
+
+
+@observe.implements(Tangent)
+def _observe(tangent, scene, before, cycles, t, duration):
+    r = tangent
+    lap = Flow(_product(r.vector, r.step.matrix, r.lap.matrix), r.lap.log_determinant + r.step.log_determinant)
+    vector = _applied(r.vector, r.step.matrix)
+    length = _length(vector, _frequency(scene))
+    growth = r.growth + logarithm(length)
+    vector = _scaled(vector, 1.0 / length) if length > 0.0 else r.vector
+    unit = Flow(_unit(vector), 0.0)
+    multiplier_1, multiplier_2, rate, change = r.multiplier_1, r.multiplier_2, r.rate, r.change
+    at_end = t - cycles.last.t <= 0.5 * duration
+    if cycles.reference.t != before.reference.t:
+        # The lap ends at the end of this interval, or at its beginning.
+        whole = lap if at_end else r.lap
+        lap = unit if at_end else r.step
+        if not isnan(cycles.period):
+            share = cycles.lap / (before.since + (cycles.count - before.count))
+            first, second, logarithm_2 = _magnitudes(vector, whole.matrix, whole.log_determinant)
+            multiplier_1, multiplier_2, rate = first**share, second**share, share * logarithm_2 / cycles.period
+            change = abs(rate - r.rate) if rate != r.rate else 0.0
+    forced = scene.forcing_period < inf
+    ends = not forced or (at_end and cycles.count != before.count)
+    blocks = _blocks(r.blocks, scene.span, t, growth, ends)
+    return Tangent(
+        lap,
+        unit,
+        vector,
+        growth,
+        blocks,
+        r.rates,
+        r.entry,
+        r.gradient,
+        r.keeps,
+        multiplier_1,
+        multiplier_2,
+        rate,
+        change,
+    )
+
+
+@inlined
+def _blocks(b, span, t, growth, ends):
+    """Blocks up to now. In a forced motion they end with a period of the forcing (`ends`), unless it is long."""
+    width = (1.0 - _SKIPPED) * span / _BLOCKS
+    if t < b.until or not (ends or t >= b.until + width):
+        return b
+    until = _SKIPPED * span + width * (b.number + 2.0)
+    if b.number < 0.0:
+        return Blocks(0.0, 0.0, 0.0, t, growth, t, growth, until)
+    rate, number = (growth - b.growth) / (t - b.t), b.number + 1.0
+    mean = b.mean + (rate - b.mean) / number
+    return Blocks(
+        number, mean, b.squares + (rate - b.mean) * (rate - mean), b.first_t, b.first_growth, t, growth, until
+    )
+
+
+@unrolled
+def _followed(length, outcome, more):
+    """A tuple followed by four numbers."""
+    return ["a, b, c, d = more", "return " + "".join(f"outcome[{i}], " for i in range(length)) + "a, b, c, d"]
+
+
+@hook(optional=True)
+def with_exponent(tangent, outcome, scene):
+    """Outcome of a run, with exponent, its error and multipliers if they are asked for."""
+    return outcome
+
+
+@with_exponent.implements(Tangent)
+def _with_exponent(tangent, outcome, scene):
+    r, b = tangent, tangent.blocks
+    exponent, error, multiplier_1, multiplier_2 = nan, nan, nan, nan
+    if b.number > 1.0:
+        exponent = (b.growth - b.first_growth) / (b.t - b.first_t)
+        error = sqrt(b.squares / (b.number * (b.number - 1.0)))
+    if not isnan(outcome.period):
+        multiplier_1, multiplier_2 = r.multiplier_1, r.multiplier_2
+        if scene.forcing_period == inf and not isnan(r.rate):
+            # A shift in time neither grows nor decays, and says nothing.
+            exponent, error = r.rate, r.change
+    return _followed(outcome, (exponent, error, multiplier_1, multiplier_2))

@@ -1,0 +1,140 @@
+"""The variational equation on the belt: Jacobians of the modes, and gradients of the guards at events."""
+
+from __future__ import annotations
+
+from math import inf
+
+from ringsweep.compile import hook, inlined
+from ringsweep.models.belt import tangent
+from ringsweep.models.belt.bristles import recoil_speed
+from ringsweep.models.belt.force import if_force, sliding_slopes, stuck_gradient, stuck_rates
+from ringsweep.models.belt.record import Record
+from ringsweep.models.belt.series import SLOW
+from ringsweep.models.interface import implicit, variation
+from ringsweep.physics import drives, ring
+from ringsweep.physics.belt import Belt, BristleBelt
+from ringsweep.physics.forces import force_in
+from ringsweep.physics.friction.bristles import region_guard
+from ringsweep.physics.friction.registry import holds_in_band
+from ringsweep.physics.friction.velocity import friction_in, stiction_band
+
+# Differences for the gradient of a guard of bristles, as a share of their speed and deflection.
+_SMALL = 1e-4
+
+
+@variation.asked.implements(Belt, BristleBelt)
+def _asked(scene):
+    return scene.asked
+
+
+@variation.due.implements(Belt, BristleBelt)
+def _due(scene, record):
+    return _due_if_asked(scene.asked, record)
+
+
+@hook(optional=True)
+def _due_if_asked(asked, record):
+    return inf
+
+
+@_due_if_asked.implements(variation.Exponent)
+def _end_of_cycle(asked, record):
+    return record.cycles.next
+
+
+@inlined
+def _with(r, changed):
+    """Record with another tangent."""
+    return Record(
+        r.band, r.play, r.last, r.x_min, r.x_max, r.velocity_max, r.force_max, r.stops, r.cycles, r.shocks, changed
+    )
+
+
+@variation.enter.implements(Belt)
+def _enter(scene, record, mode, rates):
+    # A body stays in a dead band at any velocity in it; only one that comes from outside has that of the edge.
+    arrives = stiction_band(scene.law) == 0.0 or record.tangent.gradient[1] != 0.0
+    return _with(record, tangent.enter(record.tangent, 0.0 if mode.sign == 0 and arrives else 1.0, rates))
+
+
+@variation.enter.implements(BristleBelt)
+def _enter_with_bristles(scene, record, mode, rates):
+    return _with(record, tangent.enter(record.tangent, 1.0, rates))
+
+
+@variation.advance.implements(Belt, BristleBelt)
+def _advance(scene, record, h, rates, weights, work):
+    return _with(record, tangent.advance(record.tangent, h, rates, weights, work))
+
+
+@variation.switched.implements(Belt, BristleBelt)
+def _switched(scene, record, mode, guard, t, y):
+    return _switched_if_asked(scene.asked, scene, record, mode, guard, t, y)
+
+
+@hook(optional=True)
+def _switched_if_asked(asked, scene, record, mode, guard, t, y):
+    return record
+
+
+@_switched_if_asked.implements(variation.Exponent)
+def _gradient_at_event(asked, scene, record, mode, guard, t, y):
+    rates = record.tangent.rates
+    return _with(record, tangent.switched(record.tangent, _gradient(scene, mode, guard, t, y, rates)))
+
+
+@hook
+def _gradient(scene, mode, guard, t, y, rates):
+    """Gradient of a guard by the state over the rate of the guard, in the mode that ends."""
+
+
+@variation.jacobian.implements(Belt)
+def _jacobian(scene, mode, t, y):
+    x, v = y
+    if mode.sign == 0:
+        return 0.0, 1.0, 0.0, 0.0
+    forcing = drives.turn(scene.drive, t)
+    mu, slope = friction_in(scene.law, mode.region, mode.sign * v, (scene.mu_s, scene.mu_k))
+    yields = holds_in_band(scene.law) and mode.region < 0
+    viscous = 0.0 if yields else if_force(scene.body, scene.viscous, 0.0)
+    at = x, force_in(scene.drive, forcing) - viscous * v, v + forcing[1]
+    by_place, by_v, _, _ = sliding_slopes(scene, -mode.sign * mu, -slope, viscous, at)
+    return 0.0, 1.0, by_place, by_v
+
+
+@_gradient.implements(Belt)
+def _gradient_of_guard(scene, mode, guard, t, y, rates):
+    yields = holds_in_band(scene.law) and mode.region < 0 and guard == SLOW
+    if mode.sign != 0 and not yields:
+        return 0.0, 1.0 / rates[1] if rates[1] != 0.0 else 0.0
+    x, v = y
+    # The guard is the breakaway force less the pull in one direction.
+    way = (1.0 if guard == SLOW else -1.0) if mode.sign == 0 else float(mode.sign)
+    forcing = drives.turn(scene.drive, t)
+    pull, bound = stuck_gradient(scene, x)
+    pull_rate, bound_rate = stuck_rates(scene, t, x, forcing)
+    by_x = bound - way * pull
+    rate = bound_rate - way * pull_rate + by_x * v
+    return by_x / rate if rate != 0.0 else 0.0, 0.0
+
+
+@variation.jacobian.implements(BristleBelt)
+def _bristle_jacobian(scene, mode, t, y):
+    linear = implicit.linearise(scene, mode, (), t, drives.turn(scene.drive, t), y)
+    _, (_, _, by_place, by_v), ((by_z, rate_v, rate_z),), _ = linear
+    return 0.0, 1.0, 0.0, by_place, by_v, by_z, 0.0, rate_v, rate_z
+
+
+@_gradient.implements(BristleBelt)
+def _gradient_of_bristle_guard(scene, mode, guard, t, y, rates):
+    _, v, z = y
+    by_v, by_z = 1.0, 0.0
+    if ring.if_load_varies(scene.body, guard - 1, guard) == 1:
+        law, mu_s, mu_k, sign, region = scene.law, scene.mu_s, scene.mu_k, float(mode.sign), mode.region
+        dv, dz = _SMALL * recoil_speed(scene), _SMALL * mu_s / law.sigma0
+        above = region_guard(law, mu_s, mu_k, v + dv, z, sign, region)
+        by_v = (above - region_guard(law, mu_s, mu_k, v - dv, z, sign, region)) / (2.0 * dv)
+        above = region_guard(law, mu_s, mu_k, v, z + dz, sign, region)
+        by_z = (above - region_guard(law, mu_s, mu_k, v, z - dz, sign, region)) / (2.0 * dz)
+    rate = by_v * rates[1] + by_z * rates[2]
+    return (0.0, by_v / rate, by_z / rate) if rate != 0.0 else (0.0, 0.0, 0.0)

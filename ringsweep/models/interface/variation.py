@@ -1,0 +1,79 @@
+"""The variational equation along a run, for scenes that ask for an exponent.
+
+A small disturbance w of the state of a mode obeys ``dw/dt = J w``. At an event the modes before and after it have
+different rates f, and the disturbed run reaches the guard at another time. There w is multiplied by the saltation
+matrix (Leine and Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, 2004, section 7.3)
+
+.. math:: S = I + \\frac{(f^+ - f^-)\\, n^T}{n^T f^- + \\partial_t h},
+
+where n is the gradient of the guard h. In stick w keeps no component along the sliding velocity.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import NamedTuple
+
+from ringsweep.compile import hook
+
+
+class Exponent(NamedTuple):
+    """What a scene asks for: the exponent of its motion."""
+
+
+@hook(optional=True)
+def asked(scene):
+    """What a scene asks for: :class:`Exponent`, or an empty tuple."""
+    return ()
+
+
+@hook(optional=True)
+def due(scene, record):
+    """Time that a step must show the record, s; by default infinite. Series show it among the extremes."""
+    return inf
+
+
+@hook
+def jacobian(scene, mode, t, y):
+    """Jacobian of the rates of a mode by its state, row by row, by the formulas of the mode.
+
+    Parameters
+    ----------
+    scene, mode : NamedTuple
+        One cell, and its mode.
+    t : float
+        Time, s.
+    y : tuple of float
+        State at time `t`.
+
+    Returns
+    -------
+    tuple of float
+    """
+
+
+@hook
+def enter(scene, record, mode, rates):
+    """Record at the beginning of a step in a mode, where the rates of the state are `rates`."""
+
+
+@hook
+def advance(scene, record, h, rates, weights, work):
+    """Record after an interval of length `h` within a step.
+
+    Parameters
+    ----------
+    scene, record : NamedTuple
+    h : float
+        Length of the interval, s.
+    rates : tuple of float
+        Rates of the state at its end.
+    weights, work : ndarray
+        Arguments of :func:`ringsweep.numerics.collocation.transition`; `work` holds the Jacobians.
+    """
+
+
+@hook(optional=True)
+def switched(scene, record, mode, guard, t, y):
+    """Record after a guard of a mode has vanished; the arguments are those of :func:`modes.switch`."""
+    return record

@@ -1,0 +1,70 @@
+"""The variational equation along the steps of a run; without anything asked for, nothing of it is compiled."""
+
+from __future__ import annotations
+
+from ringsweep.compile import hook
+from ringsweep.models.interface import implicit, series, variation
+from ringsweep.numerics.collocation import FEW, MANY, WEIGHTS_OF_FEW, WEIGHTS_OF_MANY, store
+from ringsweep.solvers import rosenbrock
+
+
+@hook(optional=True)
+def enter_series(asked, scene, record, mode, c):
+    """Record at the beginning of a step of series."""
+    return record
+
+
+@enter_series.implements(variation.Exponent)
+def _enter_series(asked, scene, record, mode, c):
+    return variation.enter(scene, record, mode, series.rates_at(scene, c, 0.0))
+
+
+@hook(optional=True)
+def enter_implicit(asked, scene, record, start):
+    """Record at the beginning of an implicit step."""
+    return record
+
+
+@enter_implicit.implements(variation.Exponent)
+def _enter_implicit(asked, scene, record, start):
+    return variation.enter(scene, record, start.mode, start.linear[0])
+
+
+@hook(optional=True)
+def along_series(asked, scene, record, mode, c, t, ends, work):
+    """Record after an interval of a step of series that begins at time `t`; `ends` are those of the interval, s."""
+    return record
+
+
+@along_series.implements(variation.Exponent)
+def _along_series(asked, scene, record, mode, c, t, ends, work):
+    low, high = ends
+    if not high > low:
+        return record
+    for i in range(len(MANY)):
+        s = low + (high - low) * MANY[i]
+        store(variation.jacobian(scene, mode, t + s, series.state_at(scene, c, s)), i, work)
+    return variation.advance(scene, record, high - low, series.rates_at(scene, c, high), WEIGHTS_OF_MANY, work)
+
+
+@hook(optional=True)
+def along_implicit(asked, scene, record, start, x_next, h, ends, scratch):
+    """Record after an interval of an implicit step of length `h`; `ends` are those of the interval, as fractions."""
+    return record
+
+
+@along_implicit.implements(variation.Exponent)
+def _along_implicit(asked, scene, record, start, x_next, h, ends, scratch):
+    (low, high), work = ends, scratch.work[1:]
+    if not high > low:
+        return record
+    forcing, x = start.forcing, start.x
+    for i in range(len(FEW)):
+        fraction = low + (high - low) * FEW[i]
+        t = start.t + fraction * h
+        forcing = implicit.forcing(scene, scratch.course, t)
+        x = rosenbrock.dense(start.x, x_next, scratch.bends[0], fraction)
+        store(variation.jacobian(scene, start.mode, t, implicit.from_implicit(scene, forcing, x)), i, work)
+    # The last node is the end.
+    rates = implicit.rates(scene, start.mode, start.common, forcing, x)
+    return variation.advance(scene, record, (high - low) * h, rates, WEIGHTS_OF_FEW, work)

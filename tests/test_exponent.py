@@ -1,0 +1,250 @@
+"""Growth of small disturbances on the belt: Floquet multipliers and the Lyapunov exponent."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import ringsweep
+
+BODY = {"model": "belt", "body": {"mass": 1.0}, "gravity": 1.0}
+
+#: A body on any spring, with a damper and a force, under a set-valued law.
+FORCED = BODY | {
+    "spring": {"stiffness": 1.0, "cubic": 0.0},
+    "damper": {"coefficient": 0.0},
+    "belt": {"velocity": 0.0},
+    "friction": {"law": "tustin", "mu_s": 0.3, "mu_k": 0.3, "alpha": 1.0},
+    "force": {"amplitude": 1.0, "frequency": 1.0, "phase": 0.0},
+    "initial": {"x": 1.0, "velocity": 0.0},
+}
+
+#: The friction oscillator of bSTAB without a force.
+FREE = BODY | {
+    "spring": {"stiffness": 1.0},
+    "damper": {"coefficient": 0.1},
+    "friction": {"law": "tustin", "mu_s": 1.0, "mu_k": 0.5, "alpha": 2.0},
+}
+
+
+def run(scene, points=None, exponent=True, certify=False):
+    """Outcomes of a scene; `points` are columns of values by path."""
+    config = {
+        "scene": scene,
+        "record": {"exponent": exponent},
+        "solver": {"method": "auto", "certify": certify},
+        **({} if points is None else {"sweep": {"points": {k: np.asarray(v).tolist() for k, v in points.items()}}}),
+    }
+    return ringsweep.run(config, jobs=1, progress=False)
+
+
+def test_multipliers_of_den_hartog_without_stops():
+    """Between its two reversals the flow keeps areas; each reversal scales them by a+/a-, in closed form."""
+    r, friction = 0.7, 0.3
+    period, half = 2.0 * np.pi / r, np.pi / r
+    gain = 1.0 / (1.0 - r * r)
+    sine_part = -friction * np.sin(half) / (1.0 + np.cos(half))
+    amplitude = np.sqrt(gain**2 - (sine_part / r) ** 2)
+    after, before = (amplitude / gain - amplitude + sign * friction for sign in (1.0, -1.0))
+    found = run(FORCED | {"time": {"span": 100 * period}}, {"force.frequency": [r / (2.0 * np.pi)]}, certify=True)
+    assert (after / before) ** 2 == pytest.approx(0.25989715, abs=1e-8)
+    assert found.certified.item() == 1
+    for name in ("multiplier_1", "multiplier_2"):
+        assert found[name].item() == pytest.approx(after / before, abs=1e-9) or found[name].item() == pytest.approx(
+            -after / before, abs=1e-9
+        )
+    exponent = np.log(abs(after / before)) / period
+    assert found.lyapunov.item() == pytest.approx(exponent, abs=3.0 * found.lyapunov_error.item())
+
+
+def test_multipliers_of_a_linear_oscillator():
+    """In steady slip under constant friction, only the damper takes disturbances away: exp(-c T / 2m), twice."""
+    scene = FORCED | {"belt": {"velocity": 5.0}, "damper": {"coefficient": 0.1}, "time": {"span": 400.0}}
+    found = run(scene, {"force.amplitude": [0.5], "force.frequency": [0.2]})
+    assert found.multiplier_1.item() == pytest.approx(np.exp(-0.25), rel=1e-11)
+    assert found.multiplier_2.item() == pytest.approx(np.exp(-0.25), rel=1e-11)
+    assert found.lyapunov.item() == pytest.approx(-0.05, abs=3.0 * found.lyapunov_error.item())
+
+
+def test_exponent_of_the_oscillator_of_ueda():
+    """A smooth Duffing belt against 0.1034 1/s (Sprott, Chaos and Time-Series Analysis, 2003, A.4.5)."""
+    scene = FORCED | {
+        "spring": {"stiffness": 0.0, "cubic": 1.0},
+        "damper": {"coefficient": 0.05},
+        "friction": FORCED["friction"] | {"mu_s": 0.0, "mu_k": 0.0},
+        "initial": {"x": 2.5, "velocity": 0.0},
+        "time": {"span": 4000 * 2.0 * np.pi},
+    }
+    found = run(scene, {"force.amplitude": [7.5], "force.frequency": [1.0 / (2.0 * np.pi)]})
+    assert found.lyapunov_error.item() < 0.004
+    assert found.lyapunov.item() == pytest.approx(0.1034, abs=3.0 * found.lyapunov_error.item())
+
+
+def test_exponent_is_that_of_two_neighbouring_runs():
+    """Pairs of runs, brought together again after each period, in random cells with and without stops."""
+    cells, periods, distance = 20, 120, 1e-7
+    rng = np.random.default_rng(30)
+    period = 2.0 * np.pi / rng.uniform(0.3, 2.5, cells)
+    speed = rng.uniform(0.05, 0.6, cells) * (rng.random(cells) < 0.8)
+    points = {
+        "belt.velocity": speed,
+        "spring.stiffness": rng.uniform(0.5, 1.5, cells),
+        "spring.cubic": rng.uniform(0.0, 2.0, cells),
+        "damper.coefficient": rng.uniform(0.0, 0.05, cells),
+        "force.amplitude": rng.uniform(0.1, 1.5, cells),
+        "force.frequency": 1.0 / period,
+        "initial.x": rng.uniform(-1.0, 1.0, cells),
+        "initial.velocity": speed + rng.normal(0.0, 0.3, cells),
+    }
+    scene = FORCED | {"friction": {"law": "tustin", "mu_s": 0.4, "mu_k": 0.2, "alpha": 2.0}}
+    found = run(scene, points | {"time.span": periods * period})
+    both = {path: np.tile(column, 2) for path, column in points.items()} | {"time.span": np.tile(period, 2)}
+    state = np.array([points["initial.x"], points["initial.velocity"]])
+    apart, growth = np.full((2, cells), distance), np.zeros((periods, cells))
+    for k in range(periods):
+        both["initial.x"], both["initial.velocity"] = np.hstack([state, state + apart])
+        ends = run(scene, both)
+        ends = np.array([ends.x_end.values, ends.velocity_end.values])
+        state, apart = ends[:, :cells], ends[:, cells:] - ends[:, :cells]
+        length = np.hypot(apart[0] * 2.0 * np.pi / period, apart[1])
+        growth[k], apart = np.log(length / distance), apart / length * distance
+    used = growth[periods // 4 :]
+    scatter = np.hypot(used.std(axis=0) / np.sqrt(len(used)), found.lyapunov_error.values * period)
+    assert (np.abs(found.lyapunov.values * period - used.mean(axis=0)) <= 3.0 * scatter + 0.02).all()
+    assert 0 < (found.stick_time.values == 0.0).sum() < cells
+    # The exponent of a periodic motion is the logarithm of its multiplier.
+    periodic = np.isfinite(found.multiplier_1.values)
+    of_multiplier = np.log(found.multiplier_1.values) / found.period.values
+    difference = np.abs(found.lyapunov.values - of_multiplier)[periodic] * period[periodic]
+    assert periodic.sum() >= 15
+    assert (difference <= 3.0 * (found.lyapunov_error.values * period)[periodic] + 0.02).all()
+
+
+def test_stick_erases_the_past_of_a_free_motion():
+    """It breaks loose at one place: of two disturbances one is a shift in time, the other is gone."""
+    found = run(FREE | {"belt": {"velocity": 1.0}, "initial": {"x": 2.0, "velocity": 0.0}, "time": {"span": 200.0}})
+    assert found.stick_share.item() > 0.1
+    assert found.multiplier_1.item() == pytest.approx(1.0, abs=1e-9)
+    assert found.multiplier_2.item() == 0.0
+    assert found.lyapunov.item() == -np.inf
+
+
+def test_steady_sliding_loses_its_stability_at_half_the_logarithm_of_ten():
+    """Near steady sliding disturbances grow like exp(-(0.1 - exp(-2 v)) t / 2)."""
+    speed = np.array([1.2, 1.5, 3.0])
+    points = {
+        "belt.velocity": speed,
+        "initial.x": 0.5 + 0.5 * np.exp(-2.0 * speed) + 1e-6,
+        "initial.velocity": np.zeros(3),
+    }
+    found = run(FREE | {"time": {"span": 500.0}}, points)
+    exact = -0.5 * (0.1 - np.exp(-2.0 * speed))
+    assert np.sign(exact).tolist() == [-1.0, -1.0, -1.0]
+    np.testing.assert_allclose(found.lyapunov, exact, atol=1e-3)
+    slower = run(FREE | {"time": {"span": 200.0}}, {**points, "belt.velocity": speed - 0.1})
+    assert np.sign(slower.lyapunov.values).tolist() == [1.0, -1.0, -1.0]
+
+
+def test_multipliers_with_bristles_that_let_go():
+    """The reset integrator jumps at breakaway and at each reversal. SciPy finds the derivative of its period map."""
+    v_belt, force, frequency, damping, stiffness, damping_z, mu_s, mu_k = 0.2, 0.3, 0.8, 0.05, 5.0, 0.4, 0.35, 0.25
+    period = 2.0 * np.pi / frequency
+    scene = BODY | {
+        "spring": {"stiffness": 1.0},
+        "damper": {"coefficient": damping},
+        "belt": {"velocity": v_belt},
+        "friction": {
+            "law": "reset-integrator", "mu_s": mu_s, "mu_k": mu_k, "sigma0": stiffness, "sigma1": damping_z,
+        },
+        "force": {"amplitude": force, "frequency": frequency / (2.0 * np.pi)},
+        "initial": {"x": 0.1},
+        "time": {"span": 150 * period},
+    }  # fmt: skip
+    found = run(scene, certify=True)
+
+    def after(state, sign, periods=1):
+        """State, and direction of slip (0 in stick), after some periods."""
+        t, end = 0.0, periods * period
+        while t < end * (1.0 - 1e-14):
+
+            def rates(t, y, sign=sign):
+                x, v, z = y
+                traction = sign * mu_k if sign else stiffness * z + damping_z * v
+                net = force * np.cos(frequency * t) - x - damping * (v + v_belt) - traction
+                return [v + v_belt, net, 0.0 if sign else v]
+
+            def lets_go(t, y):
+                return mu_s / stiffness - abs(y[2])
+
+            def reverses(t, y, sign=sign):
+                return sign * y[1]
+
+            event = reverses if sign else lets_go
+            event.terminal, event.direction = True, -1
+            part = solve_ivp(rates, (t, end), state, "DOP853", events=event, rtol=1e-12, atol=1e-14)
+            t, state = part.t[-1], part.y[:, -1]
+            if part.status == 1:
+                sign = 0 if sign else int(np.sign(state[2]))
+                state[2] = sign * mu_s / stiffness if sign else state[2]
+        return state, sign
+
+    state, sign = after(np.array([0.1, 0.0, 0.0]), 0, 60)
+    steps = 1e-6 * np.eye(3)
+    map_derivative = np.array([(after(state + d, sign)[0] - after(state - d, sign)[0]) / 2e-6 for d in steps]).T
+    first, second, third = np.sort(np.abs(np.linalg.eigvals(map_derivative)))[::-1]
+    assert found.certified.item() == 1
+    assert found.multiplier_1.item() == pytest.approx(first, rel=1e-5)
+    assert found.multiplier_2.item() == pytest.approx(second, rel=1e-5)
+    assert third < 1e-8
+
+
+def test_a_steep_smooth_law_has_the_multipliers_of_the_law_that_jumps():
+    """With stops: what the stick erases under Coulomb's law, the creep of a smooth law takes away."""
+    period = 2.0 * np.pi / 0.6
+    points = {"belt.velocity": [0.05, 0.3], "force.amplitude": [0.35, 0.5], "force.frequency": [1.0 / period] * 2}
+    scene = FORCED | {"time": {"span": 100 * period}}
+    smooth = {"law": "tanh", "mu_k": 0.3, "v0": 1e-4}
+    one, other = (run(scene | {"friction": law}, points) for law in (FORCED["friction"], smooth))
+    assert (one.stick_share > 0.1).all()
+    np.testing.assert_allclose(other.multiplier_1, one.multiplier_1, atol=3e-3)
+    assert (one.multiplier_2 == 0.0).all()
+    assert (other.multiplier_2 < 1e-100).all()
+
+
+def test_the_record_changes_no_other_outcome():
+    scene = FORCED | {"time": {"span": "30 s"}, "belt": {"velocity": 0.1}}
+    plain, asked = (run(scene, {"force.frequency": [0.1, 0.2]}, exponent) for exponent in (False, True))
+    added = set(asked.data_vars) - set(plain.data_vars)
+    assert added == {"lyapunov", "lyapunov_error", "multiplier_1", "multiplier_2"}
+    assert asked.drop_vars(added).equals(plain)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"solver": {"method": "rk4", "steps": 1000}}, "solver.method: rk4 locates no events"),
+        ({"record": {"exponent": "yes"}}, "record.exponent: true or false is expected"),
+        ({"record": {"exponents": True}}, "record.exponents: unknown key; did you mean `exponent`?"),
+        (
+            {"scene": FORCED | {"time": {"span": 1.0}, "friction": {"law": "bristle", "mu_k": 0.3, "sigma0": 100.0}}},
+            "record.exponent: friction law bristle has none",
+        ),
+        (
+            {
+                "scene": {
+                    "model": "ring-single-contact",
+                    "ring": {"radius": 0.1},
+                    "body": {"mass": 1.0},
+                    "friction": {"law": "coulomb", "mu_k": 0.2},
+                    "drive": {"law": "sinusoidal", "amplitude": 1.0, "frequency": "1 Hz"},
+                    "time": {"span": 1.0},
+                }
+            },
+            "record.exponent: model ring-single-contact has none",
+        ),
+    ],
+)
+def test_what_has_no_exponent_is_refused(change, said):
+    config = {"scene": FORCED | {"time": {"span": 1.0}}, "record": {"exponent": True}}
+    with pytest.raises(ringsweep.InputError) as error:
+        ringsweep.run(config | change)
+    assert str(error.value).startswith(said)
