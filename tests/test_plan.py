@@ -8,7 +8,7 @@ import yaml
 
 import ringsweep
 from ringsweep import cli
-from ringsweep.config import load
+from ringsweep.config import load, refined
 from ringsweep.errors import InputError
 from ringsweep.runs import plan
 from ringsweep.runs.cells import TaskResult
@@ -170,3 +170,12 @@ def test_dry_run_measures_no_workers_of_dask(sweep, capsys):
     arguments = ["--dry-run", "--backend", "dask", "--scheduler", "tcp://127.0.0.1:1"]
     assert cli.main(["run", sweep(8), *arguments]) == 2
     assert "--dry-run" in capsys.readouterr().err
+
+
+#: Most bytes that `run --refine --jobs 1` took, with the picture, by side of the map (stiction, 10 s).
+PEAKS = {512: 354e6, 1024: 465e6, 2048: 505e6, 4096: 892e6}
+
+
+@pytest.mark.parametrize("side", PEAKS)
+def test_memory_that_is_told_is_what_a_refined_map_took(sweep, side):
+    assert 0.95 < plan.memory_needed(refined(load(sweep(side)), True), False) / PEAKS[side] < 1.25

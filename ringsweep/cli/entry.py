@@ -52,7 +52,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         with _terminable(), redirect_stdout(None if arguments.quiet else _Escaped(sys.stdout)):
             status = arguments.command(arguments)
     except InputError as error:
-        return _fail(str(error), 2)
+        return _fail(str(error), 2, error)
     except KeyboardInterrupt as error:
         _fail("interrupted", 130, error)
         if argv is None:
