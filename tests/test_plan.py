@@ -59,7 +59,7 @@ def test_hundred_million_cells_are_told_at_once(sweep, tmp_path, monkeypatch, ca
     assert cli.main(["run", sweep(10_000), "--dry-run"]) == 0
     out = capsys.readouterr().out
     assert "cells: 100000000" in out
-    assert "memory: some 3.6 GB of 100 GB" in out
+    assert "memory: some 3.73 GB of 100 GB" in out
     assert cli.main(["run", sweep(1_000_000), "--dry-run"]) == 2
     assert "1e+12 cells: at most 1e+08" in capsys.readouterr().err
 
