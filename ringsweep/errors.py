@@ -24,8 +24,9 @@ def escaped(text: str) -> str:
 def nearest_name(word: object, known: Iterable[str]) -> str | None:
     """The known name that a user probably means: one that begins with the word, or the most similar one."""
     wanted, names = str(word)[:100].lower(), list(known)
-    begun = [name for name in names if len(wanted) > 2 and name.lower().startswith(wanted)]
-    near = [begun[0]] if len(begun) == 1 else difflib.get_close_matches(wanted, names, n=1)
+    begun = sorted((name for name in names if len(wanted) > 2 and name.lower().startswith(wanted)), key=len)
+    one = begun and all(name.startswith(begun[0]) for name in begun)
+    near = begun[:1] if one else difflib.get_close_matches(wanted, names, n=1)
     return near[0] if near else None
 
 

@@ -13,6 +13,7 @@ import pytest
 import xarray as xr
 from jsonschema import Draft202012Validator
 
+import ringsweep
 from ringsweep.cli import main, report
 from ringsweep.cli.parser import build_parser
 from ringsweep.config import load
@@ -155,10 +156,22 @@ def test_call_without_a_command_prints_help(capsys):
     assert "simulate" in out
 
 
-def test_value_with_a_space_and_without_quotes_gets_a_hint(folder, capsys):
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["simulate", "case.yaml", "--set", "drive.amplitude=1", "rad/s"],
+        ["threshold", "case.yaml", "--path", "drive.amplitude", "--regime", "separating", "--from", "10", "rad/s"],
+    ],
+)
+def test_value_with_a_space_and_without_quotes_gets_a_hint(folder, capsys, arguments):
     with pytest.raises(SystemExit):
-        main(["simulate", "case.yaml", "--set", "drive.amplitude=1", "rad/s"])
+        main(arguments)
     assert "unrecognized arguments: rad/s; a value with a space needs quotes" in capsys.readouterr().err
+
+
+def test_ends_in_the_wrong_order_are_told_with_their_unit(scene):
+    with pytest.raises(ringsweep.InputError, match=r"1\.0472 rad/s is not greater than 5\.23599 rad/s"):
+        ringsweep.threshold({"scene": scene}, "drive.amplitude", "separating", ("50 rpm", "10 rpm"))
 
 
 @pytest.mark.parametrize(

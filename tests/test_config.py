@@ -24,12 +24,13 @@ from ringsweep.config import scene as scenes
 from ringsweep.config.axes import read_spacing
 from ringsweep.config.schema import _number, schema
 from ringsweep.config.solver import read_solver
-from ringsweep.errors import InputError
+from ringsweep.errors import InputError, nearest_name
 from ringsweep.quantities.parameters import Parameter, declared
 from ringsweep.quantities.quantity import cf_units
 from ringsweep.quantities.units import quantity
 from ringsweep.quantities.variables import Variable
 from ringsweep.solvers.rk4 import RK4
+from ringsweep.storage import netcdf
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 
@@ -840,3 +841,20 @@ def test_table_whose_curve_overflows_is_refused_with_its_row(section, table, pat
     with pytest.raises(InputError, match="is too steep or too far") as refusal:
         load({"scene": {**belt, **others, section: table}})
     assert refusal.value.path == path
+
+
+def test_beginning_of_a_name_means_the_shortest_name_that_all_others_continue():
+    assert nearest_name("t_sep", ["t_end", "t_separation", "t_separation_error"]) == "t_separation"
+    assert nearest_name("phi_e", ["t_end", "phi_end_error", "phi_end"]) == "phi_end"
+
+
+def test_table_that_a_changed_result_names_is_read_with_its_name_told(write, tmp_path, caplog):
+    scene, file = table(write, ROWS)
+    ds = ringsweep.sweep(scene, {"zone.half_angle": [0.1]}, solver={"method": "rk4", "steps": 10}, progress=False)
+    configuration = json.loads(ds.attrs["configuration"])
+    configuration["scene"]["drive"] = {"law": "table", "file": str(file)}
+    ds.attrs["configuration"] = json.dumps(configuration)
+    netcdf.save(ds, tmp_path / "changed.nc")
+    with caplog.at_level("INFO", "ringsweep"):
+        load(tmp_path / "changed.nc")
+    assert f"scene.drive.file: read from {file}" in caplog.messages

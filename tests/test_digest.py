@@ -12,6 +12,7 @@ import xarray as xr
 import ringsweep
 from ringsweep import cli
 from ringsweep.errors import InputError
+from ringsweep.quantities import digest
 from ringsweep.storage import netcdf
 
 AXES = {"drive.amplitude": [0.5, 2.0, 8.0], "zone.half_angle": np.radians([10.0, 20.0])}
@@ -193,3 +194,36 @@ def test_digests_of_another_file_do_not_pass(copy, written):
         file.digest = json.dumps(found)
     with pytest.raises(InputError, match="regime"):
         ringsweep.verify(copy)
+
+
+@pytest.mark.parametrize("emptied", [["variables"], ["attributes"], ["variables", "attributes", "dimensions"]])
+def test_digest_without_entries_vouches_for_nothing(copy, capsys, emptied):
+    with netCDF4.Dataset(copy, "a") as file:
+        file.digest = json.dumps(json.loads(file.digest) | {key: {} for key in emptied})
+        file["phi_max"][0, 0] = 0.5
+    assert cli.main(["verify", str(copy)]) == 2
+    assert cli.main(["run", str(copy), "-o", "again.nc"]) == 2
+    assert capsys.readouterr().err.count("\n") == 2
+
+
+@pytest.mark.parametrize("name", ["phi_max", "drive_amplitude", "configuration"])
+def test_what_a_result_is_read_by_has_a_digest(copy, name):
+    with netCDF4.Dataset(copy, "a") as file:
+        found = json.loads(file.digest)
+        for part in ("variables", "attributes"):
+            found[part].pop(name, None)
+        file.digest = json.dumps(found)
+    with pytest.raises(InputError, match=name):
+        ringsweep.verify(copy)
+
+
+def test_file_with_replaced_digests_has_one_answer(copy, capsys):
+    """A digest is no signature: who replaces both is believed, by every command."""
+    with netCDF4.Dataset(copy, "a") as file:
+        file.title = "another title"
+        found = json.loads(file.digest)
+        found["attributes"]["title"] = digest.of_attribute(file.title)
+        file.digest = json.dumps(found)
+    assert cli.main(["verify", str(copy)]) == 0
+    assert cli.main(["run", str(copy), "-o", str(copy)]) == 0
+    assert "holds this sweep already" in capsys.readouterr().out

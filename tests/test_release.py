@@ -1,10 +1,16 @@
 """What a release says of itself is the same everywhere."""
 
 import re
+import shutil
+import subprocess
 import tomllib
 from pathlib import Path
 
+import pytest
 import yaml
+
+from ringsweep import cli
+from ringsweep.config import load
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -25,3 +31,35 @@ def test_every_citation_of_the_paper_is_in_its_list_and_the_other_way_round():
     text, listed = ((ROOT / "paper" / name).read_text(encoding="utf-8") for name in ("paper.md", "paper.bib"))
     cited = set(re.findall(r"@([a-z]+)", text.partition("# Summary")[2]))
     assert cited == set(re.findall(r"^@\w+\{(\w+),", listed, flags=re.MULTILINE))
+
+
+def test_release_is_refused_until_one_command_has_filled_the_address_of_the_project(tmp_path):
+    names = ("pyproject.toml", "CITATION.cff", ".ci/release")
+    (tmp_path / ".ci").mkdir()
+    for name in names:
+        shutil.copy(ROOT / name, tmp_path / name)
+
+    def release(*address):
+        return subprocess.run([tmp_path / ".ci/release", *address], capture_output=True, text=True, check=False)
+
+    refused = release()
+    assert refused.returncode == 2
+    assert "the project has no address yet" in refused.stderr
+    assert release("ftp://a b").returncode == 2
+    assert release("https://host.example/owner/ringsweep").returncode == 0
+    filled = [(tmp_path / name).read_text(encoding="utf-8") for name in names[:2]]
+    assert not any("placeholder" in text and "invalid" in text.split("placeholder")[1][:9] for text in filled)
+    assert 'Issues = "https://host.example/owner/ringsweep/issues"' in filled[0]
+    assert "repository-code: https://host.example/owner/ringsweep\n" in filled[1]
+
+
+@pytest.mark.parametrize("file", sorted((ROOT / "tests/data").glob("*.nc")), ids=lambda file: file.name)
+def test_kept_file_of_an_earlier_version_is_read(file, tmp_path, capsys):
+    """Nine cells of a ring under stiction; the file has no seal, since it is older."""
+    assert cli.main(["verify", str(file)]) == 0
+    assert cli.main(["info", str(file)]) == 0
+    assert "separating: 5 (55.6%)" in capsys.readouterr().out
+    assert cli.main(["map", str(file), "-o", str(tmp_path / "map.png")]) == 0
+    config = load(file)
+    assert config.axes.sizes == {"drive_amplitude": 3, "zone_half_angle": 3}
+    assert config.scene.values["friction.rough.mu_s"] == 0.5

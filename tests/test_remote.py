@@ -6,7 +6,9 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 
+import dask
 import joblib
 import numpy as np
 import pytest
@@ -209,3 +211,48 @@ def test_wrong_options_for_dask_are_refused_in_one_line(scene, tmp_path, monkeyp
     assert problem in message
     assert message.count("\n") == 1
     assert [path.name for path in tmp_path.iterdir()] == ["a.yaml"]
+
+
+@pytest.mark.parametrize("address", ["inproc://x", "http://127.0.0.1:8786"])
+def test_address_of_another_kind_is_told_with_its_cure_before_a_client_tries_it(address, monkeypatch):
+    monkeypatch.setattr("ringsweep.runs.dask.Client", None)
+    with pytest.raises(ringsweep.InputError, match="give tcp://HOST:PORT"):
+        Execution(None, address).open().__enter__()
+
+
+def test_frozen_scheduler_does_not_hold_up_the_second_interrupt(scene, monkeypatch):
+    """The scheduler takes no leave; without a bound the client would wait for a minute."""
+    monkeypatch.setattr("ringsweep.runs.dask._LEAVE", 0.1)
+    frozen, asked = threading.Event(), []
+
+    def never(*_, **__):
+        asked.append(threading.current_thread())
+        frozen.wait()
+
+    def interrupt(*_):
+        signal.raise_signal(signal.SIGINT)
+        return result(*_)
+
+    result = TaskSizes.learn
+    try:
+        with LocalCluster(1, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL) as alone:
+            with monkeypatch.context() as patch:
+                patch.setattr("distributed.Client.unregister_worker_plugin", never)
+                patch.setattr(TaskSizes, "learn", interrupt)
+                address = alone.scheduler_address
+                with pytest.raises(KeyboardInterrupt):
+                    ringsweep.sweep(scene, {"drive.amplitude": [1.0, 2.0]}, scheduler=address, progress=False)
+            assert asked
+            assert threading.main_thread() not in asked
+    finally:
+        frozen.set()
+
+
+def test_workers_that_die_with_their_cells_are_told_with_the_likely_cure(scene, monkeypatch):
+    monkeypatch.setattr("ringsweep.runs.dask._run_task", lambda *_: __import__("os")._exit(1))
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 0}),
+        LocalCluster(1, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL) as alone,
+        pytest.raises(ringsweep.InputError, match=r"several workers died .* limit of memory .*--memory-limit 2GB"),
+    ):
+        ringsweep.sweep(scene, {"drive.amplitude": [1.0]}, scheduler=alone.scheduler_address, progress=False)

@@ -9,7 +9,8 @@ import xarray as xr
 
 from ringsweep import cli
 from ringsweep.errors import InputError
-from ringsweep.storage import netcdf, trailer
+from ringsweep.quantities import trailer
+from ringsweep.storage import netcdf
 
 
 @pytest.fixture
@@ -31,7 +32,7 @@ def test_sound_file_is_read_without_another_process(path, monkeypatch):
     assert netcdf.check(path)
 
 
-@pytest.mark.parametrize("command", ["verify", "info", "map"])
+@pytest.mark.parametrize("command", ["verify", "info", "map", "run", "simulate", "precision"])
 def test_file_on_which_the_library_hangs_is_told_by_every_command(path, monkeypatch, capsys, command):
     damage(path)
     monkeypatch.setattr(trailer, "_OPENING", "import time; time.sleep(60)")

@@ -20,6 +20,7 @@ from ringsweep.runs.warnings import _hint_at_one_word, warn_of_results
 from ringsweep.storage import netcdf
 
 SCENE = load(Path(__file__).parents[1] / "configs" / "regime_map.yaml").source["scene"] | {"time": {"span": "0.5 s"}}
+FRICTION = {"rough": {"mu_s": 0.5, "mu_k": 0.3}, "rest": {"mu_s": 0.2, "mu_k": 0.1}}
 RK4 = {"method": "rk4", "steps": 100}
 AXES = {"drive.amplitude": [0.5, 2.0]}
 #: Friction jumps at once, so the body falls off at the top.
@@ -184,3 +185,55 @@ def test_map_that_one_word_fills_says_what_to_look_at(caplog):
     assert not told(regimes[:3, :3])
     regimes[4, 4] = 0
     assert not told(regimes)
+
+
+def test_run_that_is_given_up_is_named_with_its_coordinates_and_the_reason(tmp_path, warned):
+    """A body that rests at one amplitude, and sticks and slips for 1e300 s at the other."""
+    scene = BELT | {"body": {"mass": 1.0}, "spring": {"stiffness": 2.0}, "time": {"span": 1e300}}
+    solver = {"method": "event", "max_steps": 2000}
+    ringsweep.sweep(scene, {"belt.velocity": [0.1, 0.2]}, solver=solver, progress=False)
+    assert warned("2 of 2 runs have failed; the first at belt_velocity = 0.1 m s-1: it was given up after 2000 steps")
+    assert warned("of 1e+300 s, as events go on: a shorter time.span has a result")
+
+
+def test_axis_that_changes_no_number_is_told(caplog):
+    """In a ring that turns by 0.15 or 0.3 rad no ball meets a zone at the top; in one that turns by 6 rad both do."""
+    scene = SCENE | {"time": {"span": "3 s"}, "friction": {"law": "stiction", **FRICTION}}
+    axes = {"zone.half_angle": np.radians([5.0, 10.0, 20.0]), "drive.amplitude": [0.05, 0.1, 0.1001]}
+    top = scene | {"zone": {"center": "180 deg"}}
+
+    def told(swept):
+        caplog.clear()
+        with caplog.at_level("INFO", "ringsweep"):
+            ringsweep.sweep(top, swept, progress=False)
+        return [message for message in caplog.messages if "no number depends" in message]
+
+    why = "no contact meets an edge of the zone, or friction is alike on both sides"
+    assert told(axes) == [f"no number depends on zone_half_angle: {why}"]
+    assert not told(axes | {"drive.amplitude": [2.0]})
+
+
+def test_summary_of_a_file_reads_it_chunk_by_chunk(tmp_path, capsys):
+    values = np.zeros((2000, 2000))
+    flags = {"flag_values": np.int8([0, 1]), "flag_meanings": "resting oscillatory"}
+    ds = xr.Dataset(
+        {
+            "regime": (("a", "b"), (values + np.arange(2000) % 2).astype("int8"), flags),
+            "certified": (("a", "b"), np.ones(values.shape, dtype="int8"), flags),
+            "phi_end": (("a", "b"), values),
+            "phi_end_error": (("a", "b"), np.where(np.arange(2000) % 100 == 0, 1e-9, np.nan) + values),
+        },
+        attrs={"Conventions": "CF-1.11", "ringsweep_version": "0"},
+    )
+    netcdf.save(ds, tmp_path / "out.nc")
+    with netcdf.open_dataset(tmp_path / "out.nc") as found:
+        tracemalloc.start()
+        summarise(found)
+        _, peak = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+    out = capsys.readouterr().out
+    assert "resting: 2000000 (50.0%)" in out
+    assert "phi_end: 1.0e-09, 1.0e-09" in out
+    assert "no bound: 3960000 certified cells" in out
+    # A variable has 32 MB.
+    assert peak < 8e6

@@ -39,8 +39,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments, unknown = parser.parse_known_args(given)
     if unknown:
         near = nearest_name(unknown[0], re.findall(r"--[a-z-]+", arguments.parser.format_usage()))
-        takes_values = any(option in given for option in ("--set", "--sel"))
-        hint = "; a value with a space needs quotes: --set 'drive.amplitude=2 rad/s'" if takes_values else ""
+        apart = any(word.startswith("-") for word in given) and not unknown[0].startswith("-")
+        hint = "; a value with a space needs quotes: --set 'drive.amplitude=2 rad/s'" if apart else ""
         hint = f"; did you mean {near}?" if unknown[0].startswith("-") and near else hint
         parser.error(f"unrecognized arguments: {' '.join(unknown)}{hint}")
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
@@ -52,7 +52,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         with _terminable(), redirect_stdout(None if arguments.quiet else _Escaped(sys.stdout)):
             status = arguments.command(arguments)
     except InputError as error:
-        return _fail(str(error), 2)
+        return _fail(str(error), 2, error)
     except KeyboardInterrupt as error:
         _fail("interrupted", 130, error)
         if argv is None:

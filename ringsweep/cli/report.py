@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Any
+
 import numpy as np
 import xarray as xr
 
 from ringsweep.quantities.flags import CERTIFIED, FAILED, RIDING
 from ringsweep.quantities.variables import DOUBTS, INFERRED, words
+from ringsweep.storage.chunks import Layout
 
 
 def summarise(result: xr.Dataset) -> None:
@@ -28,21 +32,18 @@ def summarise(result: xr.Dataset) -> None:
     if "aftermath" in result:
         print("contacts:")
         _print_shares(result["aftermath"])
-    if extremes := [_extreme(result[name]) for name in _GREATEST if name in result and result[name].notnull().any()]:
+    if extremes := [extreme for name in _GREATEST if name in result and (extreme := _extreme(result[name]))]:
         print("greatest:", ", ".join(extremes))
     if "certified" in result:
         # NaN in a refined sweep, where no cell was run.
-        certified = result["certified"].values
-        run = ~np.isnan(certified)
-        share = float((certified[run] == 1).mean())
+        run = sum(np.count_nonzero(~np.isnan(part)) for part in _parts(result["certified"]))
+        share = sum(np.count_nonzero(part == 1) for part in _parts(result["certified"])) / run
         # Rounding must not turn "nearly all" into 100 %.
-        of = "" if run.all() else f" of the {np.count_nonzero(run)} cells run"
+        of = "" if run == regime.size else f" of the {run} cells run"
         print(f"certified: {share if share == 1.0 else min(share, 0.999):.1%}{of}")
     if "uncertified_because" in result:
-        because = result["uncertified_because"]
-        names = str(because.attrs["flag_meanings"]).split()
-        for flag, name in zip(np.atleast_1d(because.attrs["flag_values"]), names, strict=True):
-            if flag != CERTIFIED and (count := int((because == flag).sum())):
+        for flag, name, count in _counts(result["uncertified_because"]):
+            if flag != CERTIFIED:
                 print(f"  {count} not: {DOUBTS.get(name, name)}")
     if "settled" in result:
         unsettled = (result["settled"] == 0) & ~regime.isin([RIDING, FAILED])
@@ -53,14 +54,16 @@ def summarise(result: xr.Dataset) -> None:
         print("refined:", result.attrs["audit"])
     lines = []
     for name in (str(name).removesuffix("_error") for name in result.data_vars if str(name).endswith("_error")):
-        bounds = result[f"{name}_error"].values
-        bounds = bounds[np.isfinite(bounds)]
+        bounds = np.concatenate([part[np.isfinite(part)] for part in _parts(result[f"{name}_error"])])
         if bounds.size:
             lines.append(f"  {name}: {np.median(bounds):.1e}, {bounds.max():.1e} {result[name].attrs.get('units', '')}")
     if lines:
         print("bounds on errors (median, largest):", *lines, sep="\n")
     for name in ("phi_end_error", "x_end_error"):
-        if name in result and (unbounded := int(((result["certified"] == 1) & result[name].isnull()).sum())):
+        if name not in result:
+            continue
+        both = zip(_parts(result["certified"]), _parts(result[name]), strict=True)
+        if unbounded := sum(np.count_nonzero((certified == 1) & np.isnan(bound)) for certified, bound in both):
             print(f"no bound: {unbounded} certified cells, where nearby runs diverge")
 
 
@@ -69,16 +72,31 @@ _GREATEST = ("jump_max", "normal_max_1", "normal_max_2", "gap_max", "impact_spee
 
 
 def _extreme(data: xr.DataArray) -> str:
-    return f"{data.name} {float(data.max()):.3g} {data.attrs.get('units', '')}"
+    """Name and largest value; nothing if all are missing."""
+    largest = float(np.fmax.reduce([np.fmax.reduce(part, axis=None) for part in _parts(data)]))
+    return "" if np.isnan(largest) else f"{data.name} {largest:.3g} {data.attrs.get('units', '')}"
+
+
+def _parts(data: xr.DataArray) -> Iterator[Any]:
+    """Values chunk by chunk: a dataset would keep all that was read at once."""
+    for _, _, region in Layout(data.shape).chunks():
+        yield np.atleast_1d(data.variable[region].values)
+
+
+def _counts(data: xr.DataArray) -> list[tuple[int, str, int]]:
+    """Flag, name and number of cells of each class that occurs."""
+    flags = np.atleast_1d(data.attrs["flag_values"]).tolist()
+    counts = np.zeros(len(flags), dtype=int)
+    for part in _parts(data):
+        counts += [np.count_nonzero(part == flag) for flag in flags]
+    classes = zip(flags, str(data.attrs["flag_meanings"]).split(), counts.tolist(), strict=True)
+    return [one for one in classes if one[2]]
 
 
 def _print_shares(data: xr.DataArray) -> None:
     """Print the number and the share of the cells of each class that occurs."""
-    meanings = str(data.attrs["flag_meanings"]).split()
-    for flag, meaning in zip(np.atleast_1d(data.attrs["flag_values"]), meanings, strict=True):
-        count = int((data == flag).sum())
-        if count:
-            print(f"  {meaning}: {count} ({count / data.size:.1%})")
+    for _, meaning, count in _counts(data):
+        print(f"  {meaning}: {count} ({count / data.size:.1%})")
 
 
 # Events of a run that are printed: all, or the first and the last.

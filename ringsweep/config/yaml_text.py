@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import logging
 import math
 import os
 import re
@@ -21,9 +22,12 @@ import numpy as np
 import yaml
 
 from ringsweep.errors import InputError
+from ringsweep.quantities import trailer
 from ringsweep.quantities.digest import ALTERED, Digests
 from ringsweep.quantities.units import LONG_INTEGER, NUMBER, length_of, show, spelled
 from ringsweep.quantities.variables import OUTCOMES
+
+logger = logging.getLogger("ringsweep")
 
 #: Largest number of values in a configuration, with each value counted as often as it occurs.
 MAX_VALUES = 1_000_000
@@ -94,6 +98,9 @@ class Document:
         if not isinstance(name, str):
             raise InputError(path, f"a file name is expected, got {show(name)}")
         file = self.folder / name
+        if self.result_axes is not None:
+            # Results hold their tables, so this one was changed: it could name any file of the reader.
+            logger.info("%s: read from %s", path, file)
         try:
             text = _read(file, _LARGEST_TABLE)
         except InputError as error:
@@ -190,24 +197,27 @@ def _opened(file: Path) -> BinaryIO:
 def _read_result(file: Path) -> Document:
     """The configuration in the attributes of a result file."""
     try:
+        trailer.check(file, whole=False)
         with netCDF4.Dataset(file) as content:
             others = {"time", "contender", "word"} & set(content.dimensions)
             is_sweep = "regime" in content.variables and not others
             recorded = Digests.read(content)
             if recorded is not None:
-                axes_of_sweep = [name for name in recorded.variables if is_sweep and name not in OUTCOMES]
+                axes = [name for name, one in content.variables.items() if "path" in one.ncattrs()]
+                names = dict.fromkeys((*recorded.variables, *axes))
+                axes_of_sweep = [name for name in names if is_sweep and name not in OUTCOMES]
                 if changed := recorded.altered(content, ["configuration"], axes_of_sweep):
                     raise InputError("", f"{ALTERED}: {', '.join(changed)}", file=str(file))
             tree = json.loads(content.getncattr("configuration"))
-            axes = None
+            found = None
             if is_sweep:
-                axes = {
+                found = {
                     variable.path: (variable.dimensions, np.array(variable[:].tolist()))
                     for variable in content.variables.values()
                     if "path" in variable.ncattrs()
                 }
                 dims = content["regime"].dimensions
-                axes = dict(sorted(axes.items(), key=lambda item: dims.index(item[1][0][0])))
+                found = dict(sorted(found.items(), key=lambda item: dims.index(item[1][0][0])))
     except InputError:
         raise
     except Exception as error:
@@ -215,7 +225,7 @@ def _read_result(file: Path) -> Document:
         raise InputError(
             "", "is damaged, or not a result of ringsweep: it holds no configuration", file=str(file)
         ) from error
-    return Document(_plain_copy(tree, "", 0), file.parent, file.stem, {"": (str(file), None)}, axes)
+    return Document(_plain_copy(tree, "", 0), file.parent, file.stem, {"": (str(file), None)}, found)
 
 
 def scalar(text: str) -> Any:

@@ -100,9 +100,12 @@ class Digests:
             return None
         found = json.loads(file.getncattr(ATTRIBUTE))
         try:
-            return cls(**{field.name: found[field.name] for field in fields(cls)})
+            digests = cls(**{field.name: found[field.name] for field in fields(cls)})
         except (KeyError, TypeError) as error:
             raise ValueError("the digests are damaged") from error
+        if not digests.attributes or not digests.variables:
+            raise ValueError("the digests say nothing")
+        return digests
 
     def altered(
         self,
@@ -147,8 +150,17 @@ def _differing(recorded: dict[str, str], names: Iterable[str], now: Callable[[st
     for name in names:
         try:
             same = now(name) == recorded[name]
-        except Exception:
-            # The NetCDF library raises errors of many kinds on a damaged file.
+        except (
+            ArithmeticError,
+            AttributeError,
+            LookupError,
+            MemoryError,
+            OSError,
+            RuntimeError,
+            TypeError,
+            ValueError,
+        ):
+            # What the NetCDF library raises on a damaged file; and a name without a digest.
             same = False
         if not same:
             differing.append(name)

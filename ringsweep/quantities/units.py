@@ -222,8 +222,7 @@ def _factor(unit: str, target: str) -> float:
     registry = _registry()
     try:
         source = registry.Quantity(1.0, _parsed(unit))
-    except Exception:
-        # If the text is no unit, pint does not always raise its own errors.
+    except (_pint().PintError, ValueError):
         raise LookupError from None
     if not source.is_compatible_with(_parsed(target)):
         raise ValueError

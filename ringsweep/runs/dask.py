@@ -11,12 +11,12 @@ from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
 from itertools import islice
-from threading import Event
+from threading import Event, Thread
 from time import monotonic
 from typing import Any, TypeVar
 
 import numpy as np
-from distributed import Client, as_completed
+from distributed import Client, KilledWorker, as_completed
 from distributed.comm.addressing import parse_address, parse_host_port
 from distributed.diagnostics.plugin import WorkerPlugin
 from numpy.typing import NDArray
@@ -28,8 +28,13 @@ logger = logging.getLogger("ringsweep")
 Result = TypeVar("Result")
 Positions = NDArray[np.integer[Any]]
 
-# Seconds to wait for an answer of the scheduler.
-_TIMEOUT = 10.0
+# Seconds to wait for an answer of the scheduler, and for it to take leave.
+_TIMEOUT, _LEAVE = 10.0, 2.0
+
+# What other addresses mean, a Client finds out after many seconds, and then its own clean-up fails.
+_PROTOCOLS = ("tcp", "tls", "ucx", "ws", "wss")
+
+_CURE = "a limit of memory below 1 GB is too small for a worker: dask worker ADDRESS --memory-limit 2GB"
 
 # Seconds between two counts of the workers.
 _COUNT_INTERVAL = 0.5
@@ -69,6 +74,8 @@ def workers(address: str) -> Iterator[Workers]:
     try:
         # A Client would go on trying in the background, and log errors there.
         protocol, location = parse_address(address)
+        if protocol not in _PROTOCOLS:
+            raise ValueError(f"give tcp://HOST:PORT or tls://HOST:PORT, as the scheduler prints it, not {protocol}://")
         if protocol in ("tcp", "tls"):
             socket.create_connection(parse_host_port(location, 8786), timeout=_TIMEOUT).close()
         client = Client(address, timeout=_TIMEOUT, set_as_default=False, name="ringsweep")
@@ -80,7 +87,19 @@ def workers(address: str) -> Iterator[Workers]:
     finally:
         # To close a client that has lost its scheduler, Dask would use an event loop that it has closed.
         if workers.is_connected():
-            client.close()
+            _leave(client.close)
+
+
+def _leave(farewell: Callable[[], Any]) -> None:
+    """Call a function, and wait a little for it: a scheduler that is frozen does not answer."""
+
+    def say() -> None:
+        with suppress(Exception, asyncio.CancelledError):
+            farewell()
+
+    thread = Thread(target=say, daemon=True)
+    thread.start()
+    thread.join(_LEAVE)
 
 
 class Workers:
@@ -121,7 +140,7 @@ class Workers:
 
             submit()
             if not self.concurrency():
-                logger.warning("the scheduler has no worker yet: waiting for one")
+                logger.warning("the scheduler has no worker yet: waiting for one (%s)", _CURE)
                 while not self.concurrency():
                     if stopped.wait(_COUNT_INTERVAL):
                         return
@@ -131,6 +150,8 @@ class Workers:
                     raise result
                 yield learn(result)
                 submit()
+        except KilledWorker as error:
+            raise InputError("--scheduler", f"several workers died with the same cells: {_CURE}") from error
         except (Exception, asyncio.CancelledError) as error:
             # Dask raises errors of many kinds once its connection is lost.
             if isinstance(error, OSError | CancelledError | asyncio.CancelledError) or not self.is_connected():
@@ -138,8 +159,7 @@ class Workers:
             raise
         finally:
             if self.is_connected():
-                with suppress(OSError):
-                    self.client.unregister_worker_plugin(plugin.name)
+                _leave(lambda: self.client.unregister_worker_plugin(plugin.name))
 
     def is_connected(self) -> bool:
         """Whether the client has not lost its scheduler."""

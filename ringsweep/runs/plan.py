@@ -29,6 +29,9 @@ from ringsweep.storage.netcdf import COMPRESSED_FROM
 # Bytes of this process without cells, and for each cell of the grid; from benchmarks/results/sizes.md.
 _PROCESS, _BOOKKEEPING = 300e6, 33.0
 
+# Bytes for each cell of the picture, which has no more pixels than that; for each cell if numbers are interpolated.
+_PICTURE, _MOST_DRAWN, _INTERPOLATING = 120.0, 1 << 20, 40.0
+
 # Bytes of a finished file without cells, and the share of its columns that compression leaves: 0.55 of some thousand
 # cells, 0.4 of millions.
 _FILE, _COMPRESSED = 40e3, 0.55
@@ -81,7 +84,9 @@ def check_room(config: Config, cells: int, folder: Path | None) -> None:
 def memory_needed(config: Config, in_memory: bool) -> float:
     """Bytes of memory that a sweep takes at most."""
     total = Layout(tuple(config.axes.sizes.values())).total
-    return _PROCESS + total * (_BOOKKEEPING + (2.0 * bytes_of_cell(config) if in_memory else 0.0))
+    interpolates = config.refine is not None and config.refine.also is not None
+    each = _BOOKKEEPING + _INTERPOLATING * interpolates + (2.0 * bytes_of_cell(config) if in_memory else 0.0)
+    return _PROCESS + total * each + min(total, _MOST_DRAWN) * _PICTURE
 
 
 def memory_of_machine() -> float:

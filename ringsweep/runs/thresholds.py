@@ -287,7 +287,8 @@ def _ends(whole: Config, path: str, between: tuple[Any, Any]) -> tuple[float, fl
             )
         ends.append(float(of_sweep(np.asarray(own))) if given is None else quantity(given, parameter, where))
     if not ends[0] < ends[1]:
-        raise InputError("to", f"{ends[1]:g} is not greater than {ends[0]:g}, where the interval begins")
+        unit = f" {parameter.unit}" if parameter.unit not in ("", "1") else ""
+        raise InputError("to", f"{ends[1]:g}{unit} is not greater than {ends[0]:g}{unit}, where the interval begins")
     return ends[0], ends[1]
 
 
@@ -333,7 +334,9 @@ def in_words(found: xr.Dataset) -> str:
         lines.append(f"{regime} {does} at {at}; {side}: {beyond}")
     if not lines:
         lines.append(f"{regime} neither begins nor ends there")
-    return "\n".join([*lines, f"scan: {found.attrs['scan']}; two changes between two of these runs are missed"])
+    return "\n".join(
+        [*lines, f"scan: {found.attrs['scan']}; two changes between neighbours among these runs would be missed"]
+    )
 
 
 def _quantiles_in_words(found: xr.Dataset) -> list[str]:
@@ -351,4 +354,7 @@ def _quantiles_in_words(found: xr.Dataset) -> list[str]:
         "are not known, for lack of certified runs": np.count_nonzero(np.isnan(values)),
     }
     told = "".join(f"; {count} {what}" for what, count in counts.items() if count)
-    return [*lines, f"scan: {found.attrs['scan']}{told}; two changes between two of these runs are missed"]
+    return [
+        *lines,
+        f"scan: {found.attrs['scan']}{told}; two changes between neighbours among these runs would be missed",
+    ]

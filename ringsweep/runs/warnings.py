@@ -15,11 +15,12 @@ from ringsweep.physics.drives import Constant
 from ringsweep.quantities.flags import FAILED, REGIMES, RIDING
 from ringsweep.quantities.variables import INFERRED
 from ringsweep.runs.cells import laws_at, values_at
+from ringsweep.solvers.automaton import PATIENCE
 from ringsweep.solvers.rk4 import STABILITY_LIMIT
 from ringsweep.storage.chunks import Layout
 
-# Least number of cells of which it is surprising that all have one regime.
-_MAP = 16
+# Least number of cells of which it is surprising that all have one regime, and of values that change nothing.
+_MAP, _ALONG = 16, 3
 
 logger = logging.getLogger("ringsweep")
 
@@ -71,14 +72,9 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
         )
     if "settled" in results:
         _warn_of_belt(results, config, count)
-    failed = _share_failed(results) if any(one.own_law for one in config.scene.structures.values()) else 0.0
-    if failed > 0.0:
-        who = "the run has" if ended.size == 1 else f"{failed:.1%} of the runs have"
-        logger.warning(
-            "%s failed: the friction law of the configuration may be negative, or no number, "
-            "at a sliding speed that the body reached",
-            who,
-        )
+    if "regime" in results:
+        _warn_of_failures(results, config)
+        _hint_at_idle_axes(results)
     if ended_at_start > 0.5 * count:
         runs = "the run ends" if count == 1 else f"{ended_at_start / count:.0%} of the runs end"
         logger.warning("%s at t = 0: is a unit or the initial state wrong?", runs)
@@ -109,12 +105,60 @@ def _two_digits_up(number: float) -> float:
     return math.ceil(number / unit - 1e-9) * unit
 
 
-def _share_failed(results: xr.Dataset) -> float:
-    regime = results["regime"].variable
-    count = sum(
-        int(np.count_nonzero(regime[region].values == FAILED)) for _, _, region in Layout(regime.shape).chunks()
-    )
-    return count / regime.size
+def _warn_of_failures(results: xr.Dataset, config: Config) -> None:
+    """Name the first run that failed, and say why."""
+    regime, first, count = results["regime"].variable, None, 0
+    for _, _, region in Layout(regime.shape).chunks():
+        failed = np.argwhere(np.atleast_1d(regime[region].values == FAILED))
+        if len(failed) and first is None:
+            first = [part.start + k for part, k in zip(region, failed[0].tolist(), strict=False)]
+        count += len(failed)
+    if first is None:
+        return
+    cell = {str(dim): k for dim, k in zip(regime.dims, first, strict=True)}
+    one = results.isel(cell)
+    steps = int(one["steps"]) if "steps" in one else 0
+    why = "a number was not finite"
+    if steps >= min(PATIENCE, getattr(config.solver, "max_steps", PATIENCE)):
+        span = float(one["time_span"]) if "time_span" in one.coords else config.scene.values.get("time.span", np.nan)
+        why = (
+            f"it was given up after {steps} steps at t = {float(one['t_end']):.6g} s of {span:.6g} s, "
+            "as events go on: a shorter time.span has a result"
+        )
+    elif any(structure.own_law for structure in config.scene.structures.values()):
+        why = "its friction law may be negative, or no number, at a sliding speed that the body reached"
+    who = "the run has failed"
+    if regime.size > 1:
+        at = ", ".join(f"{name} = {_value(axis)}" for name, axis in one.coords.items() if "path" in axis.attrs)
+        who = f"{count} of {regime.size} runs have failed; the first at {at}"
+    logger.warning("%s: %s", who, why)
+
+
+def _value(axis: xr.DataArray) -> str:
+    unit = axis.attrs.get("units", "1")
+    return f"{axis.item():g}{'' if unit == '1' else f' {unit}'}" if axis.dtype.kind in "iuf" else str(axis.item())
+
+
+def _hint_at_idle_axes(results: xr.Dataset) -> None:
+    """Say which axes change no number of any cell."""
+    columns = [results[name].variable for name in results.data_vars if name != "steps"]
+    for dim in map(str, results["regime"].dims):
+        if "origin" in results or results.sizes[dim] < _ALONG or not all(_is_idle(one, dim) for one in columns):
+            continue
+        why = ": no contact meets an edge of the zone, or friction is alike on both sides" if "zone" in dim else ""
+        logger.info("no number depends on %s%s", dim, why)
+
+
+def _is_idle(column: xr.Variable, dim: str) -> bool:
+    """Whether each value is the first one along a dimension."""
+    for _, _, region in Layout(column.shape).chunks():
+        values = column[region].values
+        first = column[
+            tuple(slice(0, 1) if name == dim else part for name, part in zip(column.dims, region, strict=True))
+        ]
+        if not ((values == first.values) | (values != values) & (first.values != first.values)).all():
+            return False
+    return True
 
 
 def _warn_of_belt(results: xr.Dataset, config: Config, count: int) -> None:

@@ -47,6 +47,8 @@ def check_writable(path: str | os.PathLike[str]) -> None:
         characters.
     """
     check_name(path)
+    if not str(path).isprintable():
+        raise InputError(ascii(str(path))[1:-1], "the name has control characters: choose another one")
     target = Path(path).resolve()
     folder = target.parent
     try:
@@ -120,6 +122,12 @@ def working_folder(target: Path, patience: float = 0.0) -> Iterator[WorkingFolde
         while True:
             with suppress(FileExistsError):
                 folder.mkdir(mode=mode)
+                if _permissions(folder) & 0o700 != 0o700:
+                    folder.rmdir()
+                    problem = (
+                        "cannot be written: the umask of this shell forbids you to read what you write; set `umask 022`"
+                    )
+                    raise InputError(str(target), problem)
                 flush_folder(folder.parent)
             # Another process may remove the folder meanwhile, because it has finished.
             with suppress(FileNotFoundError):

@@ -18,10 +18,9 @@ from numpy.typing import NDArray
 from xarray.backends import NetCDF4DataStore
 
 from ringsweep.errors import InputError
-from ringsweep.quantities import digest
+from ringsweep.quantities import digest, trailer
 from ringsweep.quantities.digest import Digests
 from ringsweep.quantities.variables import MISSING, OUTCOMES, Variable, error_attribute
-from ringsweep.storage import trailer
 from ringsweep.storage.chunks import Layout
 from ringsweep.storage.files import WorkingFolder, check_name, put_in_place, replacing
 
@@ -33,6 +32,9 @@ COMPRESSED_FROM = 1024
 
 # Number of differing names that a message lists.
 _MAX_NAMED = 4
+
+# Bytes of each variable of an open file that are kept: a few chunks.
+_CACHE = 1 << 20
 
 
 def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> None:
@@ -229,8 +231,11 @@ def altered(path: str | os.PathLike[str], *, whole: bool, trusted: bool = False)
             filters: Any = variable.filters()
             if not whole and filters and filters["fletcher32"]:
                 checked.add(name)
-        names = [name for name in recorded.variables if name not in checked]
-        return recorded.altered(file, recorded.attributes, names, _blocks)
+        # Other programs may add names, but what a result is read by has a digest.
+        needed = [name for name, one in file.variables.items() if name in OUTCOMES or "path" in one.ncattrs()]
+        names = [name for name in dict.fromkeys((*recorded.variables, *needed)) if name not in checked]
+        attributes = dict.fromkeys((*recorded.attributes, *{"configuration", *SIGNATURE}.intersection(file.ncattrs())))
+        return recorded.altered(file, attributes, names, _blocks)
 
 
 def _blocks(shape: Sequence[int], block: list[int]) -> Iterator[tuple[Any, ...]]:
@@ -238,8 +243,19 @@ def _blocks(shape: Sequence[int], block: list[int]) -> Iterator[tuple[Any, ...]]
         yield (*region, ...)
 
 
+@contextmanager
+def _small_caches() -> Iterator[None]:
+    """Let files that are opened in the block keep few chunks: by default it would be 64 MiB of each variable."""
+    before = netCDF4.get_chunk_cache()
+    netCDF4.set_chunk_cache(_CACHE)
+    try:
+        yield
+    finally:
+        netCDF4.set_chunk_cache(*before)
+
+
 def _cache_one_chunk(variable: Any) -> None:
-    # Each chunk is used once, but NetCDF would by default keep 64 MiB of each variable in memory.
+    # Each chunk is used once.
     if variable.dtype is not str and variable.chunking() not in (None, "contiguous"):
         size = math.prod(variable.chunking()) * np.dtype(variable.dtype).itemsize
         variable.set_var_chunk_cache(size=2 * size, nelems=11, preemption=1.0)
@@ -313,7 +329,7 @@ def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     _check_exists(path)
     if changed := altered(path, whole=False):
         raise InputError(str(path), _difference(changed))
-    with _reading_file(path):
+    with _reading_file(path), _small_caches():
         # Decoding would turn numbers of seconds into timedelta64.
         ds = xr.open_dataset(Path(path).resolve(), engine="netcdf4", decode_times=False)
     try:
