@@ -3,6 +3,7 @@
 import logging
 import subprocess
 import sys
+import threading
 import tracemalloc
 from pathlib import Path
 
@@ -16,7 +17,9 @@ from ringsweep import cli
 from ringsweep.cli.report import summarise
 from ringsweep.config import load
 from ringsweep.quantities.flags import OSCILLATORY
+from ringsweep.runs import cells
 from ringsweep.runs.warnings import _hint_at_one_word, warn_of_results
+from ringsweep.solvers.rk4 import RK4 as RK4Method
 from ringsweep.storage import netcdf
 
 SCENE = load(Path(__file__).parents[1] / "configs" / "regime_map.yaml").source["scene"] | {"time": {"span": "0.5 s"}}
@@ -237,3 +240,20 @@ def test_summary_of_a_file_reads_it_chunk_by_chunk(tmp_path, capsys):
     assert "no bound: 3960000 certified cells" in out
     # A variable has 32 MB.
     assert peak < 8e6
+
+
+def test_task_that_runs_long_is_named_with_its_coordinates(monkeypatch):
+    """Here each task does: the block ends after the line was written."""
+    named = threading.Event()
+    monkeypatch.setattr(cells, "LONG", 0.0)
+    run = RK4Method.run
+
+    def slow(*arguments):
+        named.wait(10.0)
+        return run(*arguments)
+
+    monkeypatch.setattr(RK4Method, "run", slow)
+    said = []
+    monkeypatch.setattr(cells.logger, "info", lambda text, *of: said.append(text % of) or named.set())
+    ringsweep.sweep(SCENE, {"drive.amplitude": [0.5]}, solver=RK4, progress=False)
+    assert said[0].startswith("not done after 0 s, first cell (SI units) drive.amplitude = 0.5: many events")

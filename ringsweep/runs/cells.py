@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from threading import Timer
 from time import perf_counter
 from typing import Any
 
@@ -22,6 +25,11 @@ from ringsweep.storage.provenance import environment, processor
 
 #: Index of each cell along each dimension, by name of the dimension.
 Indices = Mapping[str, NDArray[np.intp]]
+
+logger = logging.getLogger("ringsweep")
+
+#: Seconds after which a task that still runs is named; most take less than two.
+LONG = 60.0
 
 # Solvers and structures whose kernels this process has compiled.
 _compiled: set[Any] = set()
@@ -98,7 +106,7 @@ def compute_task(config: Config, layout: Layout, positions: NDArray[np.integer])
         if not len(own):
             continue
         values = values_at(scene, axes, {dim: along[own] for dim, along in indices.items()}, len(own))
-        with readable_compile_errors():
+        with readable_compile_errors(), _named_if_long(axes, indices):
             result = config.solver.run(batch(structure, values), model.outcomes)
         # A bound beyond the range of a float of 32 bits is infinite.
         with np.errstate(over="ignore"):
@@ -108,6 +116,29 @@ def compute_task(config: Config, layout: Layout, positions: NDArray[np.integer])
     seconds = perf_counter() - start
     _compiled.add(compiled)
     return TaskResult(positions, columns, None if compiles else seconds, environment(), processor())
+
+
+@contextmanager
+def _named_if_long(axes: Axes, indices: Indices) -> Iterator[None]:
+    """Name the first cell of a task, and say why it may be slow, if the block takes long."""
+    first = {path: column[tuple(indices[dim][0] for dim in dims)] for path, (dims, column) in axes.columns.items()}
+    at = ", ".join(f"{path} = {value if isinstance(value, str) else f'{value:g}'}" for path, value in first.items())
+    timer = Timer(
+        LONG,
+        logger.info,
+        (
+            "not done after %g s%s: many events, or friction that changes within a tiny speed, take many steps; "
+            "solver.max_steps bounds them",
+            LONG,
+            f", first cell (SI units) {at}" * bool(at),
+        ),
+    )
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 def _columns(outcomes: tuple[str, ...], result: Result) -> Iterator[tuple[str, NDArray[Any]]]:
