@@ -178,7 +178,7 @@ class _Piecewise(Method):
         tolerance, implicit_tolerance = self.tolerances()
         local = LocalErrors(*audits[:, 3:].T)
         if of_bristles:
-            floor, safety = _ONCE_IMPLICIT * implicit_tolerance, self.safety
+            floor, safety = _ONCE_IMPLICIT * implicit_tolerance, np.full(len(rows), self.safety)
         else:
             # Ratio of successive terms of a series at the end of a step; a geometric series is the remainder.
             ratio = tolerance ** (1.0 / ORDER)
