@@ -37,6 +37,8 @@ from ringsweep.quantities.units import show
 
 _SECTIONS = "scene", "solver", "record", "sweep"
 
+_NO_SECTION = "cannot stand beside record.section: {}; leave one of them out"
+
 _NOT_REFINED = "cannot stand beside sweep.sample: a probability has no boundary, and each cell needs its own runs"
 
 
@@ -115,6 +117,7 @@ def refined(config: Config, refine: Mapping[str, Any] | bool | None) -> Config:
         raise InputError("sweep.refine", _NOT_REFINED)
     given = yaml_text.read({"refine": refine}).tree["refine"]
     found = read_refinement(given, config.scene, config.axes)
+    _check_section(config.scene, found, None)
     sweep = {key: value for key, value in config.source.get("sweep", {}).items() if key != "refine"}
     if found is not None:
         sweep["refine"] = given
@@ -206,7 +209,16 @@ def _validate(doc: Document) -> Config:
         check_consistency(scene, axes)
     elif refine is not None:
         raise InputError("sweep.refine", _NOT_REFINED)
+    _check_section(scene, refine, sample)
     return Config(scene, solver, axes, tree, doc.name, refine, sample)
+
+
+def _check_section(scene: Scene, refine: Refinement | None, sample: Sample | None) -> None:
+    """Refuse sweeps whose cells are not all run, or not kept, beside a section."""
+    if scene.structure.section is not None and refine is not None:
+        raise InputError("sweep.refine", _NO_SECTION.format("cells that are inferred have no points"))
+    if scene.structure.section is not None and sample is not None:
+        raise InputError("sweep.sample", _NO_SECTION.format("a probability has no points"))
 
 
 def _apply_setting(doc: Document, setting: str) -> str:

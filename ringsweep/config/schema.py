@@ -13,6 +13,7 @@ from ringsweep.config.axes import COUNT
 from ringsweep.config.friction import FORMULA
 from ringsweep.config.friction import TABLE as TABLE_LAW
 from ringsweep.config.motion import FORMULA as FORMULA_DRIVE
+from ringsweep.config.record import INSTANTS, KEEP
 from ringsweep.config.refinement import NUMBERS
 from ringsweep.config.sampling import NUMBERS as SAMPLE_NUMBERS
 from ringsweep.config.tables import TABLES
@@ -165,7 +166,11 @@ def _any_of(options: list[dict[str, Any]]) -> dict[str, Any]:
 
 def _record() -> dict[str, Any]:
     about = "whether a run on the belt tells its Lyapunov exponent and its Floquet multipliers"
-    return {"description": "what a run records", **_section({"exponent": {"description": about, "type": "boolean"}})}
+    instants = [{"const": at, "description": what} for at, what in INSTANTS.items()]
+    section = _section({"at": {"description": "instants of the points", "oneOf": instants}, "keep": _number(KEEP)})
+    kept = {"description": "points of the motion on the belt that a run keeps", **section, "required": ["at"]}
+    exponent = {"description": about, "type": "boolean"}
+    return {"description": "what a run records", **_section({"exponent": exponent, "section": kept})}
 
 
 def _solver() -> dict[str, Any]:

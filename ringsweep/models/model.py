@@ -35,6 +35,8 @@ class Model(ABC):
         Outcomes whose unit or meaning differs from that of :data:`ringsweep.quantities.variables.OUTCOMES`.
     absent : frozenset of str
         Outcomes and history variables that have no meaning for this model. Datasets leave them out.
+    sections : tuple of str
+        Values of ``record.section.at`` that the model takes.
     """
 
     name: ClassVar[str]
@@ -45,11 +47,16 @@ class Model(ABC):
     drive_unit: ClassVar[str] = "rad"
     own_variables: ClassVar[dict[str, Variable]] = {}
     absent: ClassVar[frozenset[str]] = frozenset()
+    sections: ClassVar[tuple[str, ...]] = ()
 
     @property
     def variables(self) -> dict[str, Variable]:
         """All variables of datasets of this model."""
         return OUTCOMES | self.own_variables
+
+    def columns(self, structure: Structure) -> tuple[str, ...]:
+        """Names of the columns of a run; a variable with a dimension of its own has several, side by side."""
+        return self.outcomes
 
     @property
     def laws(self) -> dict[str, type]:

@@ -89,6 +89,8 @@ class Belt(NamedTuple):
         Period of the forcing, s; infinite without a period.
     asked : NamedTuple
         What the record is asked for beyond the outcomes; an empty tuple for nothing.
+    section : NamedTuple
+        Which states of the run are kept; an empty tuple for none.
     """
 
     body: Any
@@ -102,6 +104,7 @@ class Belt(NamedTuple):
     span: Leaf
     forcing_period: Leaf
     asked: Any = ()
+    section: Any = ()
 
 
 class BristleBelt(Belt):

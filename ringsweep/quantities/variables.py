@@ -64,11 +64,14 @@ class Variable(Quantity):
         Values of a classification, and their meanings.
     comment : str
         What the meanings are, if their names do not tell.
+    dims : tuple of str
+        Dimensions besides those of the grid.
     """
 
     dtype: str = "float64"
     flags: dict[int, str] | None = None
     comment: str = ""
+    dims: tuple[str, ...] = ()
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -140,6 +143,9 @@ OUTCOMES: dict[str, Variable] = {
     "lyapunov_error": Variable("1/s", "standard error of the largest Lyapunov exponent"),
     "multiplier_1": Variable("1", "largest magnitude of the Floquet multipliers of the periodic motion"),
     "multiplier_2": Variable("1", "second largest magnitude of the Floquet multipliers of the periodic motion"),
+    "x_section": Variable("m", "displacement of the body at the points of its section", dims=("section",)),
+    "velocity_section": Variable("m/s", "velocity of the body at the points of its section", dims=("section",)),
+    "deflection_section": Variable("m", "deflection of the bristles at the points of the section", dims=("section",)),
     "open_time": Variable("s", "time for which a contact is open"),
     "flight_time": Variable("s", "time for which no contact holds"),
     "gap_max": Variable("m", "greatest gap of a contact"),

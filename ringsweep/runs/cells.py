@@ -6,6 +6,7 @@ import logging
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import groupby
 from threading import Timer
 from time import perf_counter
 from typing import Any
@@ -71,7 +72,7 @@ class TaskResult:
     ----------
     positions : ndarray of shape ``(cells,)``
         Positions of the cells in the order of the layout.
-    columns : dict of str to ndarray of shape ``(cells,)``
+    columns : dict of str to ndarray of shape ``(cells,)`` or ``(cells, points)``
         Outcomes by name of the variable.
     seconds : float, optional
         Run time; None if kernels may have been compiled meanwhile.
@@ -107,12 +108,14 @@ def compute_task(config: Config, layout: Layout, positions: NDArray[np.integer])
             continue
         values = values_at(scene, axes, {dim: along[own] for dim, along in indices.items()}, len(own))
         with readable_compile_errors(), _named_if_long(axes, indices):
-            result = config.solver.run(batch(structure, values), model.outcomes)
+            names = model.columns(structure)
+            result = config.solver.run(batch(structure, values), names)
         # A bound beyond the range of a float of 32 bits is infinite.
         with np.errstate(over="ignore"):
-            for name, column in _columns(model.outcomes, result):
+            for name, column in _columns(names, result):
                 if name not in model.absent:
-                    columns.setdefault(name, np.empty(len(positions), dtype=OUTCOMES[name].dtype))[own] = column
+                    shape = len(positions), *column.shape[1:]
+                    columns.setdefault(name, np.empty(shape, dtype=OUTCOMES[name].dtype))[own] = column
     seconds = perf_counter() - start
     _compiled.add(compiled)
     return TaskResult(positions, columns, None if compiles else seconds, environment(), processor())
@@ -142,7 +145,11 @@ def _named_if_long(axes: Axes, indices: Indices) -> Iterator[None]:
 
 
 def _columns(outcomes: tuple[str, ...], result: Result) -> Iterator[tuple[str, NDArray[Any]]]:
-    yield from zip(outcomes, result.rows.T, strict=True)
+    start = 0
+    for name, side_by_side in groupby(outcomes):
+        stop = start + len(list(side_by_side))
+        yield name, result.rows[:, start:stop] if OUTCOMES[name].dims else result.rows[:, start]
+        start = stop
     yield "steps", result.steps
     yield "certified", result.certified
     if result.because is not None:

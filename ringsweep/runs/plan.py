@@ -45,11 +45,12 @@ def bytes_of_cell(config: Config) -> int:
     if config.sample is not None:
         return sampled.bytes_of_part(config) * config.sample.replicates
     model = model_of(config.scene.structure)
-    names = {*model.outcomes, "steps", "certified", "uncertified_because", "stiffness"} - set(model.absent)
+    columns = model.columns(config.scene.structure)
+    names = [*(name for name in columns if name not in model.absent), "steps", "certified", "uncertified_because"]
     errors = (
         [f"{name}_error" for name in with_errors(model.outcomes)] if getattr(config.solver, "certify", False) else []
     )
-    return sum(np.dtype(OUTCOMES[name].dtype).itemsize for name in (*names, *errors))
+    return sum(np.dtype(OUTCOMES[name].dtype).itemsize for name in (*names, "stiffness", *errors))
 
 
 def check_room(config: Config, cells: int, folder: Path | None) -> None:

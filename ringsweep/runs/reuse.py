@@ -138,7 +138,8 @@ class EarlierSweep:
                 count = int(shared.sum())
 
                 def read(name: str, part: xr.Dataset = part, within: Any = within, count: int = count) -> NDArray[Any]:
-                    return np.broadcast_to(part[name].transpose(*in_file).values[within], count)  # noqa: B023
+                    found = part[name].transpose(*in_file, ...).values[within]  # noqa: B023
+                    return np.broadcast_to(found, (count, *found.shape[bool(within) :]))
 
                 # What an earlier refined sweep has inferred is no cell of it.
                 run = read("origin") != INFERRED if "origin" in ds else np.ones(count, dtype=bool)

@@ -36,7 +36,7 @@ from ringsweep.runs.task_sizes import TaskSizes, divide_cells, divide_into_tasks
 from ringsweep.runs.warnings import warn_of_results, warn_of_sample
 from ringsweep.storage import netcdf
 from ringsweep.storage.checkpoint import Checkpoint, Columns, DamagedTask, open_checkpoint
-from ringsweep.storage.chunks import Layout
+from ringsweep.storage.chunks import CHUNK, Layout
 from ringsweep.storage.provenance import attributes, differences, environment, identity
 
 if TYPE_CHECKING:
@@ -248,7 +248,7 @@ def compute(
         if warn:
             warn_of_sample(results, config)
         return results
-    columns = {name: column.reshape(sizes) for name, column in store.columns.items()}
+    columns = {name: column.reshape((*sizes, *column.shape[1:])) for name, column in store.columns.items()}
     results = _frame(config, found)
     if found is not None and config.refine is not None:
         complete(config.refine, found, tuple(slice(None) for _ in sizes), columns)
@@ -256,7 +256,11 @@ def compute(
     variables = model_of(config.scene.structure).variables
     results = results.assign(
         {
-            name: (tuple(config.axes.sizes), column, variables[name].attributes | error_attribute(name, columns))
+            name: (
+                (*config.axes.sizes, *variables[name].dims),
+                column,
+                variables[name].attributes | error_attribute(name, columns),
+            )
             for name, column in columns.items()
         }
     )
@@ -269,8 +273,8 @@ def _layout(config: Config, whole: bool = False) -> Layout:
     """Order of the cells of a sweep, or of the parts of the cells of a sampled one; in one chunk for a `whole` one."""
     if config.sample is not None:
         return sampled.part_layout(config, sampled.grid_layout(config, whole))
-    sizes = tuple(config.axes.sizes.values())
-    return Layout(sizes, sizes if whole else None)
+    sizes, section = tuple(config.axes.sizes.values()), config.scene.structure.section
+    return Layout(sizes, sizes if whole else None, max(CHUNK // (1 if section is None else section.keep), 1))
 
 
 def _sampled_dataset(config: Config, columns: Mapping[str, NDArray[Any]]) -> xr.Dataset:
@@ -364,7 +368,8 @@ def _write_file(config: Config, target: Path, layout: Layout, checkpoint: Checkp
         return
     variables = model_of(config.scene.structure).variables
     if found is None or config.refine is None:
-        netcdf.write(target, checkpoint.working_folder, frame, variables, layout, checkpoint.chunks())
+        within = {name: variable.dims for name, variable in variables.items() if variable.dims}
+        netcdf.write(target, checkpoint.working_folder, frame, variables, layout, checkpoint.chunks(), within=within)
         return
     refine = config.refine
 

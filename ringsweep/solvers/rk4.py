@@ -95,6 +95,8 @@ class RK4(Method):
             raise InputError(
                 "solver.method", "rk4 locates no events, at which disturbances jump: auto gives record.exponent"
             )
+        if structure.section is not None:
+            raise InputError("solver.method", "rk4 locates no instants for record.section: auto does")
         super().check(structure)
 
     def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:

@@ -242,5 +242,5 @@ def _guards_and_motion(scene, mode, common, forcing, x):
 
 @implicit.row.implements(BristleBelt)
 def _implicit_row(scene, mode, forcing, x):
-    _, (place, velocity, _, force, _, _, _) = implicit.guards_and_motion(scene, mode, (), forcing, x)
+    _, (place, velocity, _, force, _, _, _, _) = implicit.guards_and_motion(scene, mode, (), forcing, x)
     return place, velocity, force, x[2], 0.0 if mode.region == BAND else float(mode.sign)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ringsweep.compile import take
 from ringsweep.errors import InputError
-from ringsweep.models.belt import tangent
+from ringsweep.models.belt import section, tangent
 from ringsweep.models.belt.record import Outcome
 from ringsweep.models.interface.variation import Exponent
 from ringsweep.models.model import Model
@@ -39,6 +39,12 @@ class Belt(Model):
     own_variables: ClassVar[dict[str, Variable]] = {
         "jump_max": Variable("m/s^2", "largest jump of the acceleration of the body")
     }
+
+    sections: ClassVar[tuple[str, ...]] = "period", "turn"
+
+    def columns(self, structure: Structure) -> tuple[str, ...]:
+        """Outcomes, and after them the points of the section."""
+        return (*self.outcomes, *_points(structure))
 
     def scene_type(self, structure: Structure) -> type:
         """``BristleBelt`` for laws with bristles, else ``Belt``."""
@@ -117,6 +123,10 @@ class Belt(Model):
         }
         if structure.exponent:
             fields["asked"] = Exponent()
+        if structure.section is not None:
+            kept: Any = section.AtPeriod if structure.section.at == "period" else section.AtTurn
+            sizes = structure.section.keep, len(_points(structure))
+            fields["section"] = kept(*(np.full(mass.shape, size) for size in sizes))
         fields["forcing_period"] = np.broadcast_to(drives.period(fields["drive"]), mass.shape).copy()
         fields["viscous"] = values.get("friction.viscous", np.zeros(len(mass)))
         if friction.family_of(law) is not friction.Dynamic:
@@ -182,6 +192,14 @@ class BeltWithExponent(Belt):
     """The belt whose record is asked for the exponent."""
 
     outcomes: ClassVar[tuple[str, ...]] = Outcome._fields + tangent.OUTCOMES
+
+
+def _points(structure: Structure) -> tuple[str, ...]:
+    """Names of the columns of the points of the section."""
+    asked = structure.section
+    if asked is None:
+        return ()
+    return tuple(name for name in section.VARIABLES[: 2 + asked.deflections] for _ in range(asked.keep))
 
 
 def _along_a_line(parameter: Parameter) -> Parameter:

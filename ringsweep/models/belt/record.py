@@ -13,8 +13,9 @@ from math import inf, isfinite, isnan, nan, pi, sqrt
 from typing import Any, NamedTuple
 
 from ringsweep.compile import absorbed, hook, inlined
-from ringsweep.models.belt import tangent
+from ringsweep.models.belt import section, tangent
 from ringsweep.models.belt.force import breakaway_force
+from ringsweep.models.belt.turn import between, turn_within
 from ringsweep.models.interface import recorder, shock
 from ringsweep.models.interface.status import BROKEN, SEPARATED_1
 from ringsweep.numerics.functions import any_of, floor, lanes_body, select, square_root
@@ -173,6 +174,8 @@ class Record(NamedTuple):
         Jumps of the acceleration.
     tangent : Tangent
         Growth of small disturbances; an empty tuple if no exponent is asked for.
+    section : Points
+        Points of the section; an empty tuple if none is asked for.
     """
 
     band: Any
@@ -186,6 +189,7 @@ class Record(NamedTuple):
     cycles: Cycles
     shocks: Any
     tangent: Any
+    section: Any
 
 
 #: The motion has returned if displacement and velocity differ by less than this share of their swing in a cycle.
@@ -214,7 +218,7 @@ _ROUNDING = 1e-6
 @inlined
 def begin(scene, t, seen, band, play):
     """Record at the beginning of a run."""
-    x, velocity, force, place, v, v_rate, acceleration = seen
+    x, velocity, force, place, v, v_rate, acceleration, _ = seen
     start = Mark(t, x, velocity, 0.0, 0.0)
     # The body counts as stuck until it slips: the first stop begins with the run. If the pull exceeds breakaway, it may
     # pass the stiction band at once.
@@ -233,6 +237,31 @@ def begin(scene, t, seen, band, play):
         Cycles(0.0, scene.forcing_period, x, x, 0.0, 0.0, 0.0, start, start, 0.0, 1.0, 0.0, nan, nan, nan),
         shock.begin(acceleration),
         tangent.begin(scene.asked, scene, t),
+        (),
+    )
+
+
+@recorder.lend.implements(Belt, BristleBelt)
+def _lend(scene, record, row):
+    return changed(record, record.tangent, section.lent(scene.section, record, row))
+
+
+@inlined
+def changed(r, new_tangent, new_section):
+    """Record with another tangent and other points."""
+    return Record(
+        r.band,
+        r.play,
+        r.last,
+        r.x_min,
+        r.x_max,
+        r.velocity_max,
+        r.force_max,
+        r.stops,
+        r.cycles,
+        r.shocks,
+        new_tangent,
+        new_section,
     )
 
 
@@ -240,7 +269,7 @@ def begin(scene, t, seen, band, play):
 def _observe(scene, record, t, duration, stuck, seen):
     # In most steps nothing turns, begins or ends.
     r = record
-    x, velocity, force, place, v, v_rate, acceleration = seen
+    x, velocity, force, place, v, v_rate, acceleration, deflection = seen
     stops, cycles, x_min, x_max = r.stops, r.cycles, r.x_min, r.x_max
     place = _place(scene, r, place)
     side = select(stuck, 1.0, -1.0)
@@ -249,7 +278,7 @@ def _observe(scene, record, t, duration, stuck, seen):
         stops = _stops(scene, r, t, duration, stuck, side, place, v, force, span)
     if any_of((r.last.velocity * velocity <= 0.0) | (t >= cycles.next)):
         up, down = (r.last.velocity <= 0.0) & (velocity > 0.0), (r.last.velocity > 0.0) & (velocity <= 0.0)
-        turn = _turn(r.last, t, duration, x, velocity)
+        turn = turn_within(r.last, t, duration, x, velocity)
         x_min, x_max = select(up, min(x_min, turn.x), x_min), select(down, max(x_max, turn.x), x_max)
         span = max(x_max, x) - min(x_min, x)
         cycles = _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span)
@@ -273,6 +302,7 @@ def _observe(scene, record, t, duration, stuck, seen):
         cycles,
         shock.observe(r.shocks, acceleration),
         tangent.observe(r.tangent, scene, r.cycles, cycles, t, duration),
+        section.observe(scene.section, scene, r, cycles, t, duration, x, velocity, deflection),
     )
 
 
@@ -326,30 +356,6 @@ def _located(before, now):
 @lanes_body(_located)
 def _not_located(before, now):
     return before
-
-
-class _Turn(NamedTuple):
-    """Time, s, and displacement, m, of a turn."""
-
-    t: Any
-    x: Any
-
-
-@absorbed
-def _turn(last, t, duration, x, velocity):
-    """Turn within an interval in which the velocity changes its sign. There it is nearly linear in time."""
-    change = last.velocity - velocity
-    changes = abs(change) > 0.0
-    share = select(changes, last.velocity / select(changes, change, 1.0), 0.0)
-    return _Turn(t - (1.0 - share) * duration, _between(last, duration, x, velocity, share))
-
-
-@absorbed
-def _between(last, duration, x, velocity, share):
-    """Displacement at a share of an interval: the cubic through displacements and velocities at both ends."""
-    rest = 1.0 - share
-    ends = (1.0 + 2.0 * share) * rest * rest * last.x + share * share * (3.0 - 2.0 * share) * x
-    return ends + share * rest * duration * (rest * last.velocity - share * velocity)
 
 
 @absorbed
@@ -431,7 +437,7 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
     if any_of(ended):
         share = select(duration > 0.0, 1.0 - (t - count * period) / duration, 1.0)
         share = select(due, min(max(share, 0.0), 1.0), 1.0)
-        x_due = _between(last, duration, x, velocity, share)
+        x_due = between(last, duration, x, velocity, share)
         t_mark = select(due, count * period, turn.t)
         x_mark = select(due, x_due, turn.x)
         v_mark = select(due, (1.0 - share) * last.velocity + share * velocity, 0.0)
@@ -483,6 +489,7 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
 @recorder.conclude.implements(Belt, BristleBelt)
 def _conclude(scene, record, status, t, place, velocity):
     r, x = record, place
+    section.finish(scene.section, scene, r)
     motion, period, share, stops, settled = _settles_to(scene, r, t)
     if status == BROKEN or not (isfinite(x) and isfinite(velocity)):
         motion = FAILED
@@ -568,5 +575,16 @@ def _begin(scene, t, seen):
 def _enter(scene, record, t, seen):
     r, shocks = record, shock.enter(record.shocks, t, seen[6])
     return Record(
-        r.band, r.play, r.last, r.x_min, r.x_max, r.velocity_max, r.force_max, r.stops, r.cycles, shocks, r.tangent
+        r.band,
+        r.play,
+        r.last,
+        r.x_min,
+        r.x_max,
+        r.velocity_max,
+        r.force_max,
+        r.stops,
+        r.cycles,
+        shocks,
+        r.tangent,
+        r.section,
     )

@@ -103,6 +103,27 @@ def conclude(scene, record, status, t, place, velocity):
 
 
 @hook(optional=True)
+def lend(scene, record, row):
+    """Record of a run that may store what it records in its row of outcomes. Methods of constant step do not call it.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    record : NamedTuple
+        Record at the beginning of the run.
+    row : ndarray
+        Row of the run. Its first columns are filled after the run.
+
+    Returns
+    -------
+    NamedTuple
+        By default `record`.
+    """
+    return record
+
+
+@hook(optional=True)
 def after_event(scene, record, mode, t):
     """Record after an event, at which a mode begins. Methods of constant step do not call it.
 
