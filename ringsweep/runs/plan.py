@@ -6,6 +6,7 @@ import math
 import os
 import shutil
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from threading import Thread
@@ -173,7 +174,8 @@ def _measure(config: Config, layout: Layout) -> list[TaskResult] | None:
 
     def compute(config: Config, layout: Layout, positions: NDArray[np.integer]) -> TaskResult:
         if config.sample is None:
-            return compute_task(config, layout, positions)
+            # A cell that starts from another one costs about as much.
+            return compute_task(replace(config, follow=None), layout, positions)
         return sampled.compute_parts(config, layout, None, positions)
 
     def work() -> None:

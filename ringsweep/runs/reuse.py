@@ -64,6 +64,8 @@ class EarlierSweep:
         self.axes = self.config.axes
         if stored_fingerprint != fingerprint(identity(self.config)):
             raise InputError(str(path), "was computed by another version: its cells cannot be reused")
+        if self.config.follow is not None:
+            raise InputError(str(path), "follows an axis: its cells start from other states than those of this sweep")
         if any(len(dims) > 1 for dims, _ in self.axes.columns.values()):
             raise InputError(str(path), "has an axis of several dimensions: its cells cannot be reused")
         if changes := self._changes(config):

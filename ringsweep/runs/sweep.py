@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ringsweep.config import Axes, Config, load, read_axes, read_scene, read_solver, refined, sweepable
 from ringsweep.config.axes import dimension
+from ringsweep.config.follow import BOTH, DIRECTION
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
 from ringsweep.quantities.variables import INFERRED, error_attribute
@@ -32,7 +33,7 @@ from ringsweep.runs.refined import attributes as refinement_attributes
 from ringsweep.runs.refinement import Refined
 from ringsweep.runs.reuse import EarlierSweep
 from ringsweep.runs.sampled import EarlierSample
-from ringsweep.runs.task_sizes import TaskSizes, divide_cells, divide_into_tasks
+from ringsweep.runs.task_sizes import TaskSizes, divide_cells, divide_into_chains, divide_into_tasks
 from ringsweep.runs.warnings import warn_of_results, warn_of_sample
 from ringsweep.storage import netcdf
 from ringsweep.storage.checkpoint import Checkpoint, Columns, DamagedTask, open_checkpoint
@@ -440,7 +441,12 @@ def _compute_cells(
         _take_shared(config, layout, store, earlier, store.done)
     if not store.done.all():
         with _open_tasks(config, layout, store, execution, layout.total, continued) as tasks:
-            tasks.run(divide_into_tasks(store.done, tasks.sizes, tasks.stopped))
+            if config.follow is None:
+                tasks.run(divide_into_tasks(store.done, tasks.sizes, tasks.stopped))
+            else:
+                dim, orders = config.follow.chains(config.axes)
+                chain = orders.shape[1], list(config.axes.sizes).index(dim)
+                tasks.run(divide_into_chains(layout, *chain, store.done, tasks.sizes, tasks.stopped))
             if not store.done.all():
                 raise KeyboardInterrupt
     return None
@@ -607,12 +613,17 @@ def _frame(config: Config, found: Refined | None) -> xr.Dataset:
     known = sweepable(config.scene)
     sample = {} if config.sample is None else sampled.coordinates(config)
     about = {} if config.sample is None else sampled.attributes(config)
+    directions: dict[str, Any] = {}
+    if DIRECTION in config.axes.sizes:
+        about_it = {"long_name": f"direction in which {config.follow.path} is followed"} if config.follow else {}
+        directions = {DIRECTION: (DIRECTION, list(BOTH), about_it)}
     return xr.Dataset(
         coords={
             dimension(path): (dims, column, {**known[path].attributes, "path": path})
             for path, (dims, column) in config.axes.columns.items()
         }
-        | sample,
+        | sample
+        | directions,
         attrs=attributes(config) | refinement | about,
     )
 
@@ -623,6 +634,8 @@ def _earlier_sweep(
     """The configuration, with its axes aligned to those of the earlier sweep, and that sweep."""
     if reuse is None:
         return config, None
+    if config.follow is not None:
+        raise InputError("--reuse", "cells of sweep.follow start from the cells before them: leave one of them out")
     if config.sample is not None:
         return config, sampled.EarlierSample(reuse, config)
     earlier = EarlierSweep(reuse, config)

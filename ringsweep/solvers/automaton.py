@@ -402,6 +402,7 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
         outcome = recorder.conclude(scene, record, status, t, *modes.in_space(scene, t, y))
         for k in range(min(len(outcome), rows.shape[1])):
             rows[i, k] = outcome[k]
+        recorder.keep_memory(scene, rows[i], len(outcome), y)
         steps[i] = n
         if audited:
             audits[i, 0] = audit.violation

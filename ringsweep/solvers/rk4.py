@@ -345,6 +345,7 @@ def _conclude(scene, record, status, t, y, steps, diagnosis, fall_rate, h, cell,
     outcome = recorder.conclude(scene, record, status, t, y[0], y[1])
     for column in range(len(outcome)):
         rows[cell, column] = outcome[column]
+    recorder.keep_memory(scene, rows[cell], len(outcome), y)
     report[cell, 0], report[cell, 1], report[cell, 2] = steps, diagnosis.eigenvalue * h, diagnosis.margin
     report[cell, 3], report[cell, 4] = fall_rate, diagnosis.arc_share
 

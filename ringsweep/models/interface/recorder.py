@@ -124,6 +124,23 @@ def lend(scene, record, row):
 
 
 @hook(optional=True)
+def keep_memory(scene, row, column, y):
+    """Store what the state at the end of a run has beside place and velocity, after the outcomes of the run.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    row : ndarray
+        Row of the run.
+    column : int
+        Number of the outcomes, which are the first columns.
+    y : tuple of float
+        State at the end.
+    """
+
+
+@hook(optional=True)
 def after_event(scene, record, mode, t):
     """Record after an event, at which a mode begins. Methods of constant step do not call it.
 
