@@ -196,7 +196,7 @@ RING = {
     ("change", "said"),
     [
         ({"record": {"section": {"keep": 3}}}, "record.section.at: missing: give period or turn"),
-        ({"record": {"section": {"at": "periods"}}}, "record.section.at: 'periods' is no instant of a section; did you"),
+        ({"record": {"section": {"at": "periods"}}}, "record.section.at: 'periods' is no instant of a section"),
         ({"record": {"section": {"at": "turn", "kept": 3}}}, "record.section.kept: unknown key; did you mean `keep`?"),
         ({"record": {"section": {"at": "turn", "keep": 0}}}, "record.section.keep: 0 is not allowed"),
         ({"record": {"section": "turn"}}, "record.section: a section with keys is expected"),

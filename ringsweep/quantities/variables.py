@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ringsweep.errors import InputError
-from ringsweep.quantities.flags import AFTERMATHS, JAMMED, REGIMES, SEPARATING
+from ringsweep.quantities.flags import AFTERMATHS, JAMMED, LONG_RUNS, REGIMES, SEPARATING
 from ringsweep.quantities.quantity import Quantity
 
 if TYPE_CHECKING:
@@ -141,8 +141,15 @@ OUTCOMES: dict[str, Variable] = {
     "stick_share": Variable("1", "share of a cycle in which the body sticks to the belt"),
     "stops_per_cycle": Variable("1", "stops in a cycle"),
     "swing": Variable("m", "distance between the extremes of the displacement in the last cycle"),
-    "settled": Variable(
-        "1", "whether the last cycles repeat each other", dtype="int8", flags={0: "not_settled", 1: "settled"}
+    "settled": Variable("1", "whether the motion has settled", dtype="int8", flags={0: "not_settled", 1: "settled"}),
+    "long_run": Variable(
+        "1",
+        "what the motion settles to",
+        dtype="int8",
+        flags=dict(enumerate(LONG_RUNS)),
+        comment="rest: at rest; steady: steady slip; periodic: returns each time; quasi-periodic: does not return, and "
+        "the exponent is zero; chaotic: does not return, and the exponent is positive; unbounded: the swing grows "
+        "steadily beyond all scales of the scene; transient: not settled, or nothing shows that it has",
     ),
     "force_max": Variable("N", "greatest magnitude of the friction force"),
     "jump_max": Variable("rad/s^2", "largest jump of the angular acceleration of the body"),
