@@ -189,3 +189,8 @@ class TestErrors:
         run(LUGRE, tmp_path / "two.nc", sweep={"grid": {"initial.x": [0.0, 0.1]}}).close()
         several = changed(LUGRE, "initial", **{"from": str(tmp_path / "two.nc")})
         self.refused(several, "scene.initial.from", "2 runs")
+
+
+def test_a_cell_of_a_chain_has_no_configuration_of_its_own(both):
+    with pytest.raises(InputError, match="end of the one before"):
+        ringsweep.plots.cell(both.isel(force_amplitude=0, force_frequency=1, direction=0))

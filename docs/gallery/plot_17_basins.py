@@ -18,7 +18,7 @@ scene = {
     "damper": {"coefficient": 0.1},
     "belt": {"velocity": 1.5},
     "friction": {"law": "tustin", "mu_s": 1.0, "mu_k": 0.5, "alpha": 2.0},
-    "time": {"span": 200.0},
+    "time": {"span": 600.0},
 }
 config = {
     "scene": scene,

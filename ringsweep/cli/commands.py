@@ -125,12 +125,12 @@ def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None
     from ringsweep.storage import files, netcdf
 
     selection = dict(_selection(text) for text in arguments.sel)
-    held = {name.replace(".", "_") for name in selection}
+    fixed = {name.replace(".", "_") for name in selection}
     diagram = arguments.var in POINTS
     if arguments.var is None:
         # A file of one axis is drawn as a diagram, unless something is asked for that only a map has.
         plain = not (arguments.y or arguments.log or arguments.boundaries or str(arguments.output).endswith(".html"))
-        along = result.isel(dict.fromkeys(held & set(result.dims), 0))
+        along = result.isel(dict.fromkeys(fixed & set(map(str, result.dims)), 0))
         diagram = plain and has_diagram(along)
         arguments.var = POINTS[0] if diagram else "regime"
     if arguments.var == "attractor" and "x_section" in result:

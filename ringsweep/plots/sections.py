@@ -215,7 +215,7 @@ def section_panel(ds: xr.Dataset, ax: Axes | None = None) -> Axes:
     order = np.arange(1, kept.sum() + 1)
     drawn = ax.scatter(x[kept], velocity[kept], c=order, s=8.0, cmap="viridis", linewidths=0, rasterized=True)
     label_axes(ax, _label(ds, "x_section"), _label(ds, "velocity_section"))
-    if ax.figure is not None and len(order) > 1:
+    if len(order) > 1:
         bar = ax.figure.colorbar(drawn, ax=ax, label="point, in time", ticks=MaxNLocator(6, integer=True))
         bar.ax.tick_params(labelsize=SMALL)
     small_ticks(ax)

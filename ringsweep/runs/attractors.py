@@ -53,7 +53,8 @@ def attractors(ds: xr.Dataset, tolerance: float = 1e-3) -> xr.Dataset:
         Result of a sweep over initial states with a section. Cells of different parameters are compared too: choose
         one value of other axes before.
     tolerance : float
-        Largest distance between two points that are the same, as a share of the range of all points in each variable.
+        Largest distance between two points that are the same, as a share of the range of all points in each variable,
+        and for velocities at least of the greatest one.
 
     Returns
     -------
@@ -84,7 +85,7 @@ def attractors(ds: xr.Dataset, tolerance: float = 1e-3) -> xr.Dataset:
         raise InputError("ds", "has no section: give record: {section: {at: period}} in the configuration")
     if not tolerance > 0.0:
         raise InputError("tolerance", f"{tolerance!r} is not greater than 0")
-    dims = tuple(dim for dim in ds["x_section"].dims if dim != "section")
+    dims = tuple(str(dim) for dim in ds["x_section"].dims if dim != "section")
     shape = tuple(ds.sizes[dim] for dim in dims)
     named = {name: _by_cell(ds, name, dims) for name in ("regime", "long_run") if name in ds}
     motions = list(_motions(ds, dims, named, tolerance))
@@ -145,6 +146,9 @@ def _motions(
     seen = np.concatenate([points[~lost & ~still].reshape(-1, len(variables)), ends[~lost & still]])
     seen = seen[np.isfinite(seen[:, :2]).all(axis=1)]
     scale = np.ptp(seen, axis=0) if len(seen) else np.ones(len(variables))
+    # At turns all velocities are zero: their range would be that of rounding.
+    if "velocity_max" in ds and (fastest := np.abs(ds["velocity_max"].values[np.isfinite(ds["velocity_max"])])).size:
+        scale[1] = max(scale[1], fastest.max())
     scale[~(scale > 0.0)] = 1.0
     for cell in range(len(points)):
         kept = points[cell][np.isfinite(points[cell][:, :2]).all(axis=1)]
