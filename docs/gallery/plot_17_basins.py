@@ -24,8 +24,8 @@ config = {
     "scene": scene,
     "record": {"section": {"at": "turn", "keep": 8}},
     "sweep": {"grid": {
-        "initial.x": np.linspace(-2.0, 2.0, 40).tolist(),
-        "initial.velocity": np.linspace(0.0, 2.0, 40).tolist(),
+        "initial.x": np.linspace(-1.95, 1.95, 40).tolist(),
+        "initial.velocity": np.linspace(0.025, 1.975, 40).tolist(),
     }},
 }  # fmt: skip
 basins = ringsweep.attractors(ringsweep.run(config, progress=False))
