@@ -766,7 +766,8 @@ def _returns_each_time(scene, r):
     # The corners are states at the ends of laps, and so is the reference.
     fast = c.swing * (2.0 * pi) / _pace(scene)
     change = _gap(laps.older, c.reference.x, c.reference.velocity, c.swing, fast) / (laps.number - laps.older.number)
-    to_come = change * (10.0 * scene.span / c.period)
+    # Laps of many cycles are few: there as many must come as there are cycles.
+    to_come = change * (10.0 * scene.span * max(c.lap, 1.0) / c.period)
     if laps.gap < _SHRUNK * laps.first_gap:
         # Gaps that shrink add up to a geometric series. On a torus they vary, but little in a few laps.
         ratio = (laps.gap / laps.first_gap) ** (1.0 / (laps.number - 1.0))
