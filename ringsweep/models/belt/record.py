@@ -283,6 +283,9 @@ _EXACT, _LAPS, _LAPS_IF_FREE = 1e-7, 4.0, 1.0
 # A change that would add up to less than this share of the swing in ten spans is no trend.
 _TREND = 0.1
 
+# Gaps of laps shrink if the last one is less than this share of the first one.
+_SHRUNK = 0.3
+
 # Two parts of the record have the same mean if it differs by less than so many standard errors and this share; shares
 # of stick may differ by the second share. Each part must have so many cycles in the mean.
 _ERRORS, _SAME_SWING, _SAME_STICK, _FEWEST = 3.0, 0.05, 0.1, 16.0
@@ -763,9 +766,10 @@ def _returns_each_time(scene, r):
     # The corners are states at the ends of laps, and so is the reference.
     fast = c.swing * (2.0 * pi) / _pace(scene)
     change = _gap(laps.older, c.reference.x, c.reference.velocity, c.swing, fast) / (laps.number - laps.older.number)
-    to_come = change * (10.0 * scene.span / c.period)
-    if laps.gap < laps.first_gap:
-        # Gaps that shrink add up to a geometric series.
+    # Laps of many cycles are few: there as many must come as there are cycles.
+    to_come = change * (10.0 * scene.span * max(c.lap, 1.0) / c.period)
+    if laps.gap < _SHRUNK * laps.first_gap:
+        # Gaps that shrink add up to a geometric series. On a torus they vary, but little in a few laps.
         ratio = (laps.gap / laps.first_gap) ** (1.0 / (laps.number - 1.0))
         to_come = min(to_come, laps.gap * ratio / (1.0 - ratio)) if ratio < 1.0 else to_come
     return to_come <= _TREND
