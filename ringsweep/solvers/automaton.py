@@ -362,7 +362,8 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
         drives.new_course(scratch.course)
         t, y = modes.initial_state(scene)
         status, mode = modes.initial_mode(scene, t, y)
-        record = _begin_in(simpler.kind(scene), scene, mode, t, y, tolerances, c)
+        begun = _begin_in(simpler.kind(scene), scene, mode, t, y, tolerances, c)
+        record = recorder.lend(scene, begun, take(rows, i))
         record = recorder.after_event(scene, record, mode, t)
         control = StepControl(1e-6 * scene.span, 0.0, 0.0)
         audit, guard_fall_rate, local = Audit(0.0, 0.0, 0.0), 0.0, LocalErrors(0.0, 0.0, 0.0, 0.0)
@@ -423,6 +424,7 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
         outcome = recorder.conclude(scene, record, status, t, *modes.in_space(scene, t, y))
         for k in range(min(len(outcome), rows.shape[1])):
             rows[i, k] = outcome[k]
+        recorder.keep_memory(scene, rows[i], len(outcome), y)
         steps[i] = n
         if audited:
             audits[i, 0] = audit.violation
