@@ -371,73 +371,7 @@ def test_what_cannot_be_continued_is_told(tmp_path: Any) -> None:
             run(config(**changed), tmp_path / "more.nc", reuse=tmp_path / "few.nc")
 
 
-# What a person types wrongly
-
-
-MISTAKES: list[tuple[dict[str, Any], str, str]] = [
-    ({"n": 1000}, "sweep.sample.n", "give 1024"),
-    ({"n": 100, "method": "random"}, "sweep.sample.n", "give 96"),
-    ({"n": 0}, "sweep.sample.n", "at least 2"),
-    ({"n": "many"}, "sweep.sample.n", "not a number"),
-    ({"seed": -1}, "sweep.sample.seed", "at least 0"),
-    ({"seed": 1.5}, "sweep.sample.seed", "whole"),
-    ({"replicates": 2}, "sweep.sample.replicates", "at least 4"),
-    ({"method": "halton"}, "sweep.sample.method", "sobol"),
-    ({"methods": "sobol"}, "sweep.sample.methods", "did you mean `method`"),
-    ({"keep": 1}, "sweep.sample.keep", "true or false"),
-    ({"sensitivity": "yes"}, "sweep.sample.sensitivity", "true or false"),
-    ({"of": {}}, "sweep.sample.of", "paths and distributions"),
-    ({"of": [1]}, "sweep.sample.of", "paths and distributions"),
-    ({"of": {"friction.mus": {"normal": [1, 1]}}}, "sweep.sample.of.friction.mus", "did you mean `friction.mu_s`"),
-    ({"of": {"friction.law": {"values": ["coulomb"]}}}, "sweep.sample.of.friction.law", "axis of sweep.grid"),
-    ({"of": {"friction.mu_s": 0.3}}, "sweep.sample.of.friction.mu_s", "a distribution is expected"),
-    ({"of": {"friction.mu_s": {}}}, "sweep.sample.of.friction.mu_s", "got none"),
-    ({"of": {"friction.mu_s": {"gauss": [1, 2]}}}, "sweep.sample.of.friction.mu_s.gauss", "is no distribution"),
-    ({"of": {"friction.mu_s": {"normal": [1, 2], "uniform": [1, 2]}}}, "sweep.sample.of.friction.mu_s", "one dist"),
-    ({"of": {"friction.mu_s": {"normal": [0.15]}}}, "sweep.sample.of.friction.mu_s.normal", "mean, standard dev"),
-    ({"of": {"friction.mu_s": {"normal": [0.15, 0]}}}, "sweep.sample.of.friction.mu_s.normal.1", "greater than 0"),
-    ({"of": {"body.mass": {"normal": [1, "3 mm"]}}}, "sweep.sample.of.body.mass.normal.1", "wrong unit"),
-    ({"of": {"initial.x": {"normal": [0, "10 %"]}}}, "sweep.sample.of.initial.x.normal.1", "a mean of 0"),
-    ({"of": {"friction.mu_s": {"uniform": [0.3, 0.2]}}}, "sweep.sample.of.friction.mu_s.uniform", "less than the"),
-    ({"of": {"body.mass": {"triangular": [1, 3, 2]}}}, "sweep.sample.of.body.mass.triangular", "mode must lie"),
-    ({"of": {"body.mass": {"lognormal": [-1, 2]}}}, "sweep.sample.of.body.mass.lognormal", "greater than 0"),
-    ({"of": {"body.mass": {"truncnormal": [0, 1, 50, 60]}}}, "sweep.sample.of.body.mass.truncnormal", "30 standard"),
-    ({"of": {"friction.mu_s": {"over": "mu_j", "uniform": [1, 2]}}}, "sweep.sample.of.friction.mu_s.over", "mu_k"),
-    ({"of": {"friction.mu_s": {"over": "mu_s", "uniform": [1, 2]}}}, "sweep.sample.of.friction.mu_s.over", "itself"),
-    ({"of": {"friction.mu_s": {"over": "body.mass", "uniform": [1, 2]}}}, "sweep.sample.of.friction.mu_s.over", "unit"),
-    ({"of": {"friction.mu_s": {"over": "mu_k"}}}, "sweep.sample.of.friction.mu_s", "got none"),
-    (
-        {
-            "of": {
-                "friction.mu_s": {"over": "mu_k", "uniform": [1, 2]},
-                "friction.mu_k": {"over": "mu_s", "uniform": [1, 2]},
-            }
-        },
-        "sweep.sample.of.friction.mu_s.over",
-        "itself drawn over",
-    ),
-    ({"of": {"friction.mu_s, friction.mu_k": {"normal": [1, 2]}}}, "sweep.sample.of.friction.mu_s, f", "need rows"),
-    ({"of": {"friction.mu_s": {"values": []}}}, "sweep.sample.of.friction.mu_s.values", "empty"),
-    ({"of": {"friction.mu_s": {"values": [0.2, -1]}}}, "sweep.sample.of.friction.mu_s.values", "at least 0"),
-    ({"of": {"friction.mu_s": {"file": "no.csv"}}}, "sweep.sample.of.friction.mu_s.file", "No such file"),
-    ({"of": {"friction.mu_s": {"file": 3}}}, "sweep.sample.of.friction.mu_s.file", "file name"),
-    ({"quantiles": {"t_separation": [0.5]}}, "sweep.sample.quantiles.t_separation", "no number of this model"),
-    ({"quantiles": {"first_slip": [50]}}, "sweep.sample.quantiles.first_slip", "less than 1"),
-    ({"quantiles": [0.5]}, "sweep.sample.quantiles", "lists of levels"),
-    ({"survival": [-1.0]}, "sweep.sample.survival", "at least 0"),
-    ({"survival": {"linspace": [0, 1]}}, "sweep.sample.survival.linspace", "count"),
-    ({"survival": 3}, "sweep.sample.survival", "list of values"),
-]
-
-
-@pytest.mark.parametrize(
-    ("changed", "path", "words"), MISTAKES, ids=[f"{p}-{k}" for k, (_, p, _) in enumerate(MISTAKES)]
-)
-def test_a_mistake_is_located(changed: dict[str, Any], path: str, words: str) -> None:
-    with pytest.raises(InputError) as caught:
-        load(config(**changed))
-    assert caught.value.path.startswith(path)
-    assert words in caught.value.problem
+# Samples that cannot be
 
 
 def test_a_sample_that_is_not_allowed_is_told_with_its_probability() -> None:

@@ -298,12 +298,14 @@ def _reference(given: Any, path: str, parameter: Any, known: Mapping[str, Parame
     """The path that a ratio is over; the section may be left out."""
     beside = f"{path.rpartition('.')[0]}.{given}"
     full = beside if beside in known else given
-    other = swept_parameter(known, full, where)
+    if not isinstance(full, str) or full not in known:
+        raise InputError(where, f"{show(given)} is no number of the scene" + suggestion(beside, known))
     if full == path:
-        raise InputError(where, "is the path itself")
+        raise InputError(where, f"{full} is the path itself")
+    other = known[full]
     if isinstance(other, Choice) or other.unit != parameter.unit:
         raise InputError(where, f"{full} is no number in the unit of {path}: their ratio has no meaning")
-    return str(full)
+    return full
 
 
 def _table(given: Any, parameters: Mapping[str, Any], where: str) -> tuple[tuple[float, ...], ...]:
