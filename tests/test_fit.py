@@ -9,6 +9,8 @@ import pytest
 import ringsweep
 from ringsweep import cli, plots
 from ringsweep.errors import InputError
+from ringsweep.runs.fit import _apart, _end
+from ringsweep.statistics import unit_points
 
 BELT = {
     "model": "belt",
@@ -156,3 +158,26 @@ class TestCommand:
     def test_a_sweep_is_no_fit(self):
         with pytest.raises(InputError, match="is no fit"):
             plots.fit(ringsweep.simulate(BELT))
+
+
+def test_starts_reach_a_minimum_whose_points_are_not_among_the_best():
+    """One valley is deep and wide: each of the eight best points lies in it."""
+    tried = unit_points("sobol", 512, 2, 0, 0)
+    wide, other = (((tried - centre) ** 2).sum(axis=1) for centre in (0.25, 0.8))
+    misfits = np.minimum(wide, 0.05 + other)
+    assert (wide < other)[np.argsort(misfits)[:8]].all()
+    starts = np.array(_apart(tried, misfits, 8))
+    assert len(starts) > 1
+    assert starts[0].tolist() == tried[np.argmin(misfits)].tolist()
+    assert (np.abs(starts - 0.8).max(axis=1) < 0.2).any()
+
+
+@pytest.mark.parametrize("jump", [0.15, 0.5, 0.85])
+def test_an_interval_ends_where_the_misfit_jumps(jump):
+    """The straight line between the ends would end it at 0.2."""
+    end = _end(lambda value: value**2 if value < jump else 100.0, (0.0, 0.0), (1.0, 100.0), 4.0)
+    assert jump <= end <= jump + 1 / 64
+
+
+def test_an_interval_on_a_parabola_ends_at_its_root():
+    assert _end(lambda value: 16.0 * value**2, (0.0, 0.0), (1.0, 16.0), 4.0) == pytest.approx(0.5)
