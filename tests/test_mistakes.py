@@ -127,6 +127,11 @@ SAMPLES: list[tuple[dict[str, Any], str, str]] = [
     ({"seed": "one"}, "sweep.sample.seed", "'one' is not a number"),
     ({"quantiles": {"first_slip": 0.5}}, "sweep.sample.quantiles.first_slip", "list of values"),
     ({"quantiles": {"first_slip": [0, 1]}}, "sweep.sample.quantiles.first_slip.0", "greater than 0"),
+    ({"sensitivity": {"off": ["x_end"]}}, "sweep.sample.sensitivity", "{of: [t_end]}"),
+    ({"sensitivity": {"of": "x_end"}}, "sweep.sample.sensitivity.of", "a list of variables is expected, got 'x_end'"),
+    ({"sensitivity": {"of": []}}, "sweep.sample.sensitivity.of", "a list of variables"),
+    ({"sensitivity": {"of": ["x_ned"]}}, "sweep.sample.sensitivity.of.0", "did you mean `x_end`"),
+    ({"sensitivity": {"of": ["first_slip"]}}, "sweep.sample.sensitivity.of.0", "ask for survival"),
     ({"survival": ["3 kg"]}, "sweep.sample.survival.0", "is in s"),
 ]
 

@@ -191,8 +191,13 @@ def test_indices_agree_with_those_of_salib() -> None:
     assert total[0] == pytest.approx(theirs["ST"], abs=0.02)
 
 
-def test_a_function_that_does_not_vary_has_indices_of_which_nothing_is_known() -> None:
-    first, total = sobol_indices(np.stack([sobol_sums(np.ones((16, 4)))] * 8), 16)
+@pytest.mark.parametrize("missing", [False, True])
+def test_a_function_that_does_not_vary_or_has_gaps_has_indices_of_which_nothing_is_known(missing: bool) -> None:
+    rows = np.ones((8, 16, 4))
+    if missing:
+        rows += unit_points("random", 512, 1, 0, 0).reshape(rows.shape)
+        rows[3, 5, 2] = np.nan
+    first, total = sobol_indices(np.stack([sobol_sums(one) for one in rows]), 16)
     for found in (first, total):
         assert (found[0] == 0.0).all()
         assert (found[1] == 0.0).all()
@@ -226,6 +231,24 @@ def test_survival_and_quantiles_of_the_first_slip_are_those_of_the_closed_form()
     assert ds.first_slip_quantile.values[1] == np.inf
     early = median * (1.0 + 0.1 * ndtri(0.05))
     assert ds.first_slip_quantile_low.values[0] <= early <= ds.first_slip_quantile_high.values[0]
+
+
+def test_indices_of_the_way_of_a_body_that_rides_are_those_of_a_product() -> None:
+    """x = v T with both uniform: shares of the variance of a product of independent numbers."""
+    of = {"belt.velocity": {"uniform": [0.05, 0.15]}, "time.span": {"uniform": [1.0, 4.5]}}
+    ds = run(config(of=of, n=1024, sensitivity={"of": ["x_end", "t_end"]}))
+    assert ds.probability.sel(word="riding") == 1.0
+    velocity, span, both = 2.75**2 * 0.1**2 / 12.0, 0.1**2 * 3.5**2 / 12.0, 0.1**2 / 12.0 * 3.5**2 / 12.0
+    known = np.array([velocity, span]) / (velocity + span + both)
+    assert ds.x_end_sobol_first.values == pytest.approx(known, abs=0.01)
+    assert (ds.x_end_sobol_first_low <= known).all()
+    assert (known <= ds.x_end_sobol_first_high).all()
+    assert (ds.x_end_sobol_total - ds.x_end_sobol_first).values == pytest.approx(
+        2 * [both / (velocity + span + both)], abs=0.01
+    )
+    assert ds.t_end_sobol_first.values == pytest.approx([0.0, 1.0], abs=0.01)
+    # All ride: nothing is known of what the regime hangs on.
+    assert (ds.sobol_first_high == 1.0).all()
 
 
 def test_probabilities_are_those_of_runs_of_the_same_points() -> None:
@@ -363,6 +386,7 @@ def test_what_cannot_be_continued_is_told(tmp_path: Any) -> None:
     for changed, words in (
         ({"n": 64, "method": "latin-hypercube"}, "Latin hypercube"),
         ({"quantiles": {"first_slip": [0.5]}}, "quantiles"),
+        ({"sensitivity": {"of": ["x_end"]}}, "order"),
         ({"seed": 2}, "another sweep"),
         ({"of": {"friction.mu_s": {"normal": [0.16, 0.01]}}}, "another sweep"),
         ({"n": 32}, "64 samples"),

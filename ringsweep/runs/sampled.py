@@ -84,7 +84,9 @@ def _sums_of(sample: Sample) -> dict[str, tuple[str, tuple[int, ...]]]:
         found[f"{name}_known"] = "int32", ()
         found[f"{name}_summary"] = "float64", (SUMMARY,)
     if sample.sensitivity:
-        found["sobol_sums"] = "float64", (len(REGIMES), 3 + 3 * len(sample.factors))
+        each = 3 + 3 * len(sample.factors)
+        found["sobol_sums"] = "float64", (len(REGIMES), each)
+        found |= {f"{name}_sobol_sums": ("float64", (each,)) for name in sample.sensitive}
     return found
 
 
@@ -115,6 +117,8 @@ class EarlierSample:
         new = _sample(config)
         if new.method == "latin-hypercube":
             raise InputError("--reuse", "the points of a larger Latin hypercube are others: use sobol or random")
+        if new.sensitive:
+            raise InputError("--reuse", "sums of numbers depend on their order: leave sensitivity.of out")
         if new.quantiles or new.keep:
             key = "keep" if new.keep else "quantiles"
             raise InputError("--reuse", f"a file does not hold what {key} needs of each run: leave {key} out")
@@ -195,7 +199,13 @@ def _needed(config: Config) -> list[str]:
     sample = _sample(config)
     return list(
         dict.fromkeys(
-            ["regime", "certified", *([censored(config.scene)] if sample.survival else []), *sample.quantiles]
+            [
+                "regime",
+                "certified",
+                *([censored(config.scene)] if sample.survival else []),
+                *sample.quantiles,
+                *sample.sensitive,
+            ]
         )
     )
 
@@ -220,6 +230,7 @@ def _reduce(sample: Sample, time: str, columns: Columns) -> Columns:
         found["sobol_sums"] = np.stack(
             [sobol_sums((rows["regime"] == flag).astype(float)) for flag in range(len(REGIMES))]
         )
+        found |= {f"{name}_sobol_sums": sobol_sums(rows[name]) for name in sample.sensitive}
     return found
 
 
@@ -262,10 +273,11 @@ def statistics(config: Config, sums: Columns) -> Columns:
             column = found[f"{name}_quantile{end}"] = np.full((len(rows), len(_levels(sample))), np.nan)
             column[:, place] = [row[k] for row in rows]
     if sample.sensitivity:
-        found["sobol_sums"] = flat["sobol_sums"]
-        indices = sobol_indices(np.moveaxis(flat["sobol_sums"], 1, -2), sample.size)
-        for name, index in zip(("sobol_first", "sobol_total"), indices, strict=True):
-            found |= {f"{name}{end}": part for end, part in zip(("", "_low", "_high"), index, strict=True)}
+        for prefix in ("", *(f"{name}_" for name in sample.sensitive)):
+            together = found[f"{prefix}sobol_sums"] = flat[f"{prefix}sobol_sums"]
+            indices = sobol_indices(np.moveaxis(together, 1, -2), sample.size)
+            for name, index in zip(("sobol_first", "sobol_total"), indices, strict=True):
+                found |= {f"{prefix}{name}{end}": part for end, part in zip(("", "_low", "_high"), index, strict=True)}
     found |= {name: column for name, column in flat.items() if name not in _sums_of(sample)}
     return {name: column.reshape((*shape, *column.shape[1:])) for name, column in found.items()}
 
@@ -328,6 +340,19 @@ def variables(config: Config) -> dict[str, tuple[tuple[str, ...], Variable]]:
         for name, one in SAMPLED.items():
             if name.startswith(("sobol_first", "sobol_total")):
                 found[name] = ("word", "parameter"), one
+        for number in sample.sensitive:
+            about = known[number].long_name
+            found[f"{number}_sobol_sums"] = ("replicate", "sum"), SAMPLED["sobol_sums"]
+            for which in ("first", "total"):
+                for end, of in {
+                    "": "",
+                    "_low": "lower end of the 95 % interval: ",
+                    "_high": "upper end of the 95 % interval: ",
+                }.items():
+                    found[f"{number}_sobol_{which}{end}"] = (
+                        ("parameter",),
+                        Variable("1", f"{of}{which} Sobol index: {about}"),
+                    )
     if sample.keep:
         found |= {name: (("replicate", "sample"), one) for name, one in known.items() if name not in found}
     return found
