@@ -131,7 +131,7 @@ SAMPLES: list[tuple[dict[str, Any], str, str]] = [
     ({"sensitivity": {"of": "x_end"}}, "sweep.sample.sensitivity.of", "a list of variables is expected, got 'x_end'"),
     ({"sensitivity": {"of": []}}, "sweep.sample.sensitivity.of", "a list of variables"),
     ({"sensitivity": {"of": ["x_ned"]}}, "sweep.sample.sensitivity.of.0", "did you mean `x_end`"),
-    ({"sensitivity": {"of": ["first_slip"]}}, "sweep.sample.sensitivity.of.0", "ask for survival"),
+    ({"sensitivity": {"of": ["first_slip"]}}, "sweep.sample.sensitivity.of.0", "by survival: [1 s]"),
     ({"survival": ["3 kg"]}, "sweep.sample.survival.0", "is in s"),
 ]
 

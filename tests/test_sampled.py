@@ -251,6 +251,21 @@ def test_indices_of_the_way_of_a_body_that_rides_are_those_of_a_product() -> Non
     assert (ds.sobol_first_high == 1.0).all()
 
 
+def test_indices_of_a_slip_until_a_time_are_those_of_runs_of_the_same_points() -> None:
+    """The body slips by t if mu_s m g <= k v t, so its indicator follows from the points without a run."""
+    of = {"friction.mu_s": {"uniform": [0.1, 0.2]}, "belt.velocity": {"uniform": [0.08, 0.12]}}
+    times = np.array([5.0, 6.5])
+    ds = run(config(of=of, n=256, survival=times.tolist(), sensitivity={"of": ["first_slip"]}))
+    rows = np.stack([saltelli(unit_points("sobol", 32, 4, 0, r)) for r in range(8)])
+    slip = (0.1 + 0.1 * rows[..., 0]) * 9.81 / (2.0 * (0.08 + 0.04 * rows[..., 1]))
+    for k, time in enumerate(times):
+        first, total = sobol_indices(np.stack([sobol_sums((one <= time).astype(float)) for one in slip]), 32)
+        one = ds.isel(survival_time=k)
+        assert np.stack([one[f"first_slip_sobol_first{end}"] for end in ("", "_low", "_high")]) == pytest.approx(first)
+        assert np.stack([one[f"first_slip_sobol_total{end}"] for end in ("", "_low", "_high")]) == pytest.approx(total)
+    assert (ds.first_slip_sobol_first.sel(parameter="friction.mu_s") > 0.3).all()
+
+
 def test_probabilities_are_those_of_runs_of_the_same_points() -> None:
     """An independent way: the points in a table, each run by a plain sweep, counted by numpy."""
     of = {"friction.mu_k": {"uniform": [0.05, 0.1]}, "friction.mu_s": {"over": "mu_k", "uniform": [1.2, 2.0]}}

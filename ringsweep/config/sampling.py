@@ -35,8 +35,8 @@ KEYS = (*NUMBERS, "method", "of", "quantiles", "survival", "sensitivity", "keep"
 
 _LEVEL = Parameter("1", "level of a quantile", lower=0, upper=1, open_lower=True, open_upper=True)
 
-# Numbers that tell when something happens, and that are missing where it does not.
-_CENSORED = ("t_separation", "first_slip")
+#: Numbers that tell when something happens, and that are missing where it does not.
+CENSORED = ("t_separation", "first_slip")
 
 # Points of a sample that are tried one by one, to tell how many are not allowed.
 _TRIED = 1000
@@ -103,7 +103,8 @@ class Sample:
     sensitivity : bool
         Whether Sobol indices are asked for.
     sensitive : tuple of str
-        Variables whose own indices are asked for, beside those of the regimes.
+        Variables whose own indices are asked for, beside those of the regimes; for a time that some runs do not have,
+        those of whether it has come at the times of `survival`.
     keep : bool
         Whether the result holds the runs too.
     """
@@ -181,7 +182,7 @@ def _shares(method: str, size: int, factors: int, seed: int, replicate: int, sen
 
 def censored(scene: Scene) -> str:
     """The number that tells when a contact is lost, or when a body that rides on its belt first slips."""
-    return next(name for name in _CENSORED if name in MODELS[scene.structure.model].outcomes)
+    return next(name for name in CENSORED if name in MODELS[scene.structure.model].outcomes)
 
 
 def read_sample(given: Any, scene: Scene, axes: Axes) -> Sample | None:
@@ -214,7 +215,7 @@ def read_sample(given: Any, scene: Scene, axes: Axes) -> Sample | None:
     keep = given.get("keep", False)
     if not isinstance(keep, bool):
         raise InputError("sweep.sample.keep", f"true or false is expected, got {show(keep)}")
-    sensitivity, sensitive = _sensitivity(given.get("sensitivity", False), scene)
+    sensitivity, sensitive = _sensitivity(given.get("sensitivity", False), scene, bool(given.get("survival")))
     found = Sample(
         _factors(given["of"], scene, axes),
         method=method,
@@ -394,7 +395,7 @@ def _outcomes(scene: Scene) -> list[str]:
     return [name for name in model.outcomes if OUTCOMES[name].dtype == "float64" and name not in model.absent]
 
 
-def _sensitivity(given: Any, scene: Scene) -> tuple[bool, tuple[str, ...]]:
+def _sensitivity(given: Any, scene: Scene, timed: bool) -> tuple[bool, tuple[str, ...]]:
     """Whether indices are asked for, and of which variables beside the regimes."""
     if isinstance(given, bool):
         return given, ()
@@ -403,10 +404,12 @@ def _sensitivity(given: Any, scene: Scene) -> tuple[bool, tuple[str, ...]]:
         raise InputError(where, f"true or false is expected, or {{of: [t_end]}}, got {show(given)}")
     if not isinstance(given["of"], list) or not given["of"]:
         raise InputError(f"{where}.of", f"a list of variables is expected, got {show(given['of'])}")
-    names = [name for name in _outcomes(scene) if name not in _CENSORED]
+    time = censored(scene)
+    names = [name for name in _outcomes(scene) if name not in CENSORED or name == time]
     for k, name in enumerate(given["of"]):
-        if name in _CENSORED:
-            raise InputError(f"{where}.of.{k}", f"{name} is missing where it does not happen: ask for survival")
+        if name == time and not timed:
+            problem = f"{time} is missing in runs in which it does not happen: say at which times, by survival: [1 s]"
+            raise InputError(f"{where}.of.{k}", problem)
         if not isinstance(name, str) or name not in names:
             raise InputError(f"{where}.of.{k}", f"{show(name)} is no number of this model" + suggestion(name, names))
     return True, tuple(dict.fromkeys(given["of"]))

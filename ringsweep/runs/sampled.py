@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ringsweep.config import Config, load, sweepable
 from ringsweep.config.axes import dimension
-from ringsweep.config.sampling import Sample, censored
+from ringsweep.config.sampling import CENSORED, Sample, censored
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
 from ringsweep.quantities.flags import REGIMES
@@ -86,7 +86,8 @@ def _sums_of(sample: Sample) -> dict[str, tuple[str, tuple[int, ...]]]:
     if sample.sensitivity:
         each = 3 + 3 * len(sample.factors)
         found["sobol_sums"] = "float64", (len(REGIMES), each)
-        found |= {f"{name}_sobol_sums": ("float64", (each,)) for name in sample.sensitive}
+        for name in sample.sensitive:
+            found[f"{name}_sobol_sums"] = "float64", (*([len(sample.survival)] if name in CENSORED else []), each)
     return found
 
 
@@ -230,7 +231,11 @@ def _reduce(sample: Sample, time: str, columns: Columns) -> Columns:
         found["sobol_sums"] = np.stack(
             [sobol_sums((rows["regime"] == flag).astype(float)) for flag in range(len(REGIMES))]
         )
-        found |= {f"{name}_sobol_sums": sobol_sums(rows[name]) for name in sample.sensitive}
+        for name in sample.sensitive:
+            # A time that has not come is not a number, and compares as later.
+            functions = [rows[name] <= t for t in sample.survival] if name in CENSORED else [rows[name]]
+            each = [sobol_sums(function.astype(float)) for function in functions]
+            found[f"{name}_sobol_sums"] = np.stack(each) if name in CENSORED else each[0]
     return found
 
 
@@ -342,7 +347,8 @@ def variables(config: Config) -> dict[str, tuple[tuple[str, ...], Variable]]:
                 found[name] = ("word", "parameter"), one
         for number in sample.sensitive:
             about = known[number].long_name
-            found[f"{number}_sobol_sums"] = ("replicate", "sum"), SAMPLED["sobol_sums"]
+            times = ("survival_time",) if number in CENSORED else ()
+            found[f"{number}_sobol_sums"] = ("replicate", *times, "sum"), SAMPLED["sobol_sums"]
             for which in ("first", "total"):
                 for end, of in {
                     "": "",
@@ -350,7 +356,7 @@ def variables(config: Config) -> dict[str, tuple[tuple[str, ...], Variable]]:
                     "_high": "upper end of the 95 % interval: ",
                 }.items():
                     found[f"{number}_sobol_{which}{end}"] = (
-                        ("parameter",),
+                        (*times, "parameter"),
                         Variable("1", f"{of}{which} Sobol index: {about}"),
                     )
     if sample.keep:
