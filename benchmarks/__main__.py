@@ -28,6 +28,7 @@ NAMES = (
     "sizes",
     "refine",
     "fits",
+    "probabilities",
     "brute_force",
 )
 
