@@ -81,7 +81,8 @@ def main() -> None:
         print(json.dumps({"seconds": seconds, "memory": memory, "found": found.tolist()}))
         return
     print(where := machine())
-    rows, maps = [], []
+    rows: list[list[str]] = []
+    maps: list[np.ndarray] = []
     for way in WAYS:
         line = [sys.executable, "-m", "benchmarks.probabilities", "--way", way, *["--quick"] * given.quick]
         told = json.loads(subprocess.run(line, check=True, capture_output=True, text=True).stdout.splitlines()[-1])
