@@ -72,10 +72,10 @@ def main() -> None:
     side = 16 if given.quick else 64
     logging.getLogger("ringsweep").setLevel(logging.ERROR)
     if given.way:
-        way = sampled if given.way == WAYS[0] else by_hand
-        way(2)
+        measured = sampled if given.way == WAYS[0] else by_hand
+        measured(2)
         begin = perf_counter()
-        found = way(side)
+        found = measured(side)
         seconds = perf_counter() - begin
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
         print(json.dumps({"seconds": seconds, "memory": memory, "found": found.tolist()}))
