@@ -30,6 +30,7 @@ NAMES = (
     "sizes",
     "refine",
     "fits",
+    "probabilities",
     "brute_force",
 )
 

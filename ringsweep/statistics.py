@@ -312,7 +312,8 @@ def sobol_indices(sums: Floats, size: int) -> tuple[Floats, Floats]:
 
     First indices: A. Saltelli et al., Computer Physics Communications 181, 2010, Table 2 (b), about the mean. Total
     indices: M. J. W. Jansen, 1999, Table 2 (f) there. Intervals come from the jackknife over replicates. If a function
-    does not vary in the sample, its indices are 0, and as nothing is known of them, their intervals are 0 to 1.
+    does not vary in the sample, or is missing (NaN) somewhere, its indices are 0, and as nothing is known of them,
+    their intervals are 0 to 1.
 
     Parameters
     ----------
@@ -327,6 +328,7 @@ def sobol_indices(sums: Floats, size: int) -> tuple[Floats, Floats]:
         Index, and the ends of its interval.
     """
     replicates = sums.shape[-2]
+    sums = np.where(np.isfinite(sums).all(axis=(-2, -1), keepdims=True), sums, 0.0)
     together = sums.sum(axis=-2, keepdims=True)
     pooled = _indices(together, replicates * size)[..., 0, :, :]
     without = _indices(together - sums, (replicates - 1) * size)

@@ -9,6 +9,8 @@ import pytest
 import ringsweep
 from ringsweep import cli, plots
 from ringsweep.errors import InputError
+from ringsweep.runs.fit import _apart, _end
+from ringsweep.statistics import unit_points
 
 BELT = {
     "model": "belt",
@@ -158,48 +160,24 @@ class TestCommand:
             plots.fit(ringsweep.simulate(BELT))
 
 
-GOOD = {"t": [0.1, 0.2, 0.3, 0.4], "x": [0.01, 0.02, 0.03, 0.04]}
+def test_starts_reach_a_minimum_whose_points_are_not_among_the_best():
+    """One valley is deep and wide: each of the eight best points lies in it."""
+    tried = unit_points("sobol", 512, 2, 0, 0)
+    wide, other = (((tried - centre) ** 2).sum(axis=1) for centre in (0.25, 0.8))
+    misfits = np.minimum(wide, 0.05 + other)
+    assert (wide < other)[np.argsort(misfits)[:8]].all()
+    starts = np.array(_apart(tried, misfits, 8))
+    assert len(starts) > 1
+    assert starts[0].tolist() == tried[np.argmin(misfits)].tolist()
+    assert (np.abs(starts - 0.8).max(axis=1) < 0.2).any()
 
 
-@pytest.mark.parametrize(
-    ("data", "vary", "options", "problem"),
-    [
-        (GOOD, "", {}, "vary: '' is not of the form"),
-        (GOOD, {}, {}, "vary: empty: name at least one number"),
-        (GOOD, 3, {}, "vary: paths are expected"),
-        (GOOD, "friction.mu", {}, "did you mean `friction.mu_"),
-        (GOOD, "friction.law", {}, "no number that varies continuously"),
-        (GOOD, "time.span", {}, "no influence on a measured history"),
-        (GOOD, "friction.mu_k, friction.mu_k", {}, "friction.mu_k stands twice"),
-        (GOOD, "friction.mu_k=0.1", {}, "is not of the form PATH or PATH=LOW..HIGH"),
-        (GOOD, "friction.mu_k=0.1..", {}, "is not of the form PATH or PATH=LOW..HIGH"),
-        (GOOD, "friction.mu_k=0.2..0.1", {}, "0.1 is not greater than 0.2"),
-        (GOOD, "friction.mu_k=-1..0.1", {}, "vary.friction.mu_k: -1 is not allowed"),
-        (GOOD, "body.mass=1 m..2 m", {}, "vary.body.mass"),
-        (GOOD, {"friction.mu_k": 0.1}, {}, "vary.friction.mu_k: a pair of values is expected"),
-        (GOOD, "spring.cubic", {}, "spring.cubic=LOW..HIGH"),
-        (GOOD, "friction.mu_k=0.2..0.3, friction.mu_s=0.01..0.1", {}, "mu_s"),
-        (GOOD, "friction.mu_k", {"start": 0}, "start: 0 is not allowed"),
-        (GOOD, "friction.mu_k", {"start": 1.5}, "start: 1.5 is not a whole number"),
-        (GOOD, "friction.mu_k", {"noise": 0}, "noise: 0 m is not allowed"),
-        (GOOD, "friction.mu_k", {"noise": "1 deg"}, "noise: "),
-        (7, "friction.mu_k", {}, "data: a CSV file, a mapping or a DataFrame is expected"),
-        ("nowhere.csv", "friction.mu_k", {}, "data: nowhere.csv cannot be read: No such file"),
-        ({"x": [1.0]}, "friction.mu_k", {}, "data: no column t with the times; got x"),
-        ({"t": [1.0]}, "friction.mu_k", {}, "one column beside t is expected, such as phi or x, got none"),
-        (GOOD | {"velocity": [0.0]}, "friction.mu_k", {}, "got x, velocity: a fit takes one"),
-        ({"t": GOOD["t"], "phi": GOOD["x"]}, "friction.mu_k", {}, "data.phi: is no quantity of the history"),
-        ({"t": GOOD["t"], "x": [0.1]}, "friction.mu_k", {}, "data.x: 1 values for 4 times"),
-        ({"t": [0.1, 0.3, 0.2], "x": [0, 0, 0]}, "friction.mu_k", {}, "data.t.2: 0.2 s does not come after 0.3 s"),
-        ({"t": [-0.1, 0.3], "x": [0, 0]}, "friction.mu_k", {}, "data.t.0: -0.1 s is not allowed"),
-        ({"t": [0.0], "x": [0.0]}, "friction.mu_k", {}, "the only time is 0 s"),
-        ({"t": [], "x": []}, "friction.mu_k", {}, "data.t: empty"),
-        ({"t": [0.1], "x": [0.0]}, "friction.mu_k", {}, "1 measurements are too few for 1 numbers"),
-        (GOOD | {"x": [0.1, float("nan"), 0.1, 0.1]}, "friction.mu_k", {}, "data.x.1"),
-    ],
-)
-def test_mistakes_in_one_line(data, vary, options, problem):
-    with pytest.raises(InputError) as error:
-        ringsweep.fit(BELT, data, vary, **options)
-    assert problem in str(error.value)
-    assert "\n" not in str(error.value)
+@pytest.mark.parametrize("jump", [0.15, 0.5, 0.85])
+def test_an_interval_ends_where_the_misfit_jumps(jump):
+    """The straight line between the ends would end it at 0.2."""
+    end = _end(lambda value: value**2 if value < jump else 100.0, (0.0, 0.0), (1.0, 100.0), 4.0)
+    assert jump <= end <= jump + 1 / 64
+
+
+def test_an_interval_on_a_parabola_ends_at_its_root():
+    assert _end(lambda value: 16.0 * value**2, (0.0, 0.0), (1.0, 16.0), 4.0) == pytest.approx(0.5)

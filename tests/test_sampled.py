@@ -191,8 +191,13 @@ def test_indices_agree_with_those_of_salib() -> None:
     assert total[0] == pytest.approx(theirs["ST"], abs=0.02)
 
 
-def test_a_function_that_does_not_vary_has_indices_of_which_nothing_is_known() -> None:
-    first, total = sobol_indices(np.stack([sobol_sums(np.ones((16, 4)))] * 8), 16)
+@pytest.mark.parametrize("missing", [False, True])
+def test_a_function_that_does_not_vary_or_has_gaps_has_indices_of_which_nothing_is_known(missing: bool) -> None:
+    rows = np.ones((8, 16, 4))
+    if missing:
+        rows += unit_points("random", 512, 1, 0, 0).reshape(rows.shape)
+        rows[3, 5, 2] = np.nan
+    first, total = sobol_indices(np.stack([sobol_sums(one) for one in rows]), 16)
     for found in (first, total):
         assert (found[0] == 0.0).all()
         assert (found[1] == 0.0).all()
@@ -226,6 +231,39 @@ def test_survival_and_quantiles_of_the_first_slip_are_those_of_the_closed_form()
     assert ds.first_slip_quantile.values[1] == np.inf
     early = median * (1.0 + 0.1 * ndtri(0.05))
     assert ds.first_slip_quantile_low.values[0] <= early <= ds.first_slip_quantile_high.values[0]
+
+
+def test_indices_of_the_way_of_a_body_that_rides_are_those_of_a_product() -> None:
+    """x = v T with both uniform: shares of the variance of a product of independent numbers."""
+    of = {"belt.velocity": {"uniform": [0.05, 0.15]}, "time.span": {"uniform": [1.0, 4.5]}}
+    ds = run(config(of=of, n=1024, sensitivity={"of": ["x_end", "t_end"]}))
+    assert ds.probability.sel(word="riding") == 1.0
+    velocity, span, both = 2.75**2 * 0.1**2 / 12.0, 0.1**2 * 3.5**2 / 12.0, 0.1**2 / 12.0 * 3.5**2 / 12.0
+    known = np.array([velocity, span]) / (velocity + span + both)
+    assert ds.x_end_sobol_first.values == pytest.approx(known, abs=0.01)
+    assert (ds.x_end_sobol_first_low <= known).all()
+    assert (known <= ds.x_end_sobol_first_high).all()
+    assert (ds.x_end_sobol_total - ds.x_end_sobol_first).values == pytest.approx(
+        2 * [both / (velocity + span + both)], abs=0.01
+    )
+    assert ds.t_end_sobol_first.values == pytest.approx([0.0, 1.0], abs=0.01)
+    # All ride: nothing is known of what the regime hangs on.
+    assert (ds.sobol_first_high == 1.0).all()
+
+
+def test_indices_of_a_slip_until_a_time_are_those_of_runs_of_the_same_points() -> None:
+    """The body slips by t if mu_s m g <= k v t, so its indicator follows from the points without a run."""
+    of = {"friction.mu_s": {"uniform": [0.1, 0.2]}, "belt.velocity": {"uniform": [0.08, 0.12]}}
+    times = np.array([5.0, 6.5])
+    ds = run(config(of=of, n=256, survival=times.tolist(), sensitivity={"of": ["first_slip"]}))
+    rows = np.stack([saltelli(unit_points("sobol", 32, 4, 0, r)) for r in range(8)])
+    slip = (0.1 + 0.1 * rows[..., 0]) * 9.81 / (2.0 * (0.08 + 0.04 * rows[..., 1]))
+    for k, time in enumerate(times):
+        first, total = sobol_indices(np.stack([sobol_sums((one <= time).astype(float)) for one in slip]), 32)
+        one = ds.isel(survival_time=k)
+        assert np.stack([one[f"first_slip_sobol_first{end}"] for end in ("", "_low", "_high")]) == pytest.approx(first)
+        assert np.stack([one[f"first_slip_sobol_total{end}"] for end in ("", "_low", "_high")]) == pytest.approx(total)
+    assert (ds.first_slip_sobol_first.sel(parameter="friction.mu_s") > 0.3).all()
 
 
 def test_probabilities_are_those_of_runs_of_the_same_points() -> None:
@@ -363,6 +401,7 @@ def test_what_cannot_be_continued_is_told(tmp_path: Any) -> None:
     for changed, words in (
         ({"n": 64, "method": "latin-hypercube"}, "Latin hypercube"),
         ({"quantiles": {"first_slip": [0.5]}}, "quantiles"),
+        ({"sensitivity": {"of": ["x_end"]}}, "order"),
         ({"seed": 2}, "another sweep"),
         ({"of": {"friction.mu_s": {"normal": [0.16, 0.01]}}}, "another sweep"),
         ({"n": 32}, "64 samples"),
@@ -371,73 +410,7 @@ def test_what_cannot_be_continued_is_told(tmp_path: Any) -> None:
             run(config(**changed), tmp_path / "more.nc", reuse=tmp_path / "few.nc")
 
 
-# What a person types wrongly
-
-
-MISTAKES: list[tuple[dict[str, Any], str, str]] = [
-    ({"n": 1000}, "sweep.sample.n", "give 1024"),
-    ({"n": 100, "method": "random"}, "sweep.sample.n", "give 96"),
-    ({"n": 0}, "sweep.sample.n", "at least 2"),
-    ({"n": "many"}, "sweep.sample.n", "not a number"),
-    ({"seed": -1}, "sweep.sample.seed", "at least 0"),
-    ({"seed": 1.5}, "sweep.sample.seed", "whole"),
-    ({"replicates": 2}, "sweep.sample.replicates", "at least 4"),
-    ({"method": "halton"}, "sweep.sample.method", "sobol"),
-    ({"methods": "sobol"}, "sweep.sample.methods", "did you mean `method`"),
-    ({"keep": 1}, "sweep.sample.keep", "true or false"),
-    ({"sensitivity": "yes"}, "sweep.sample.sensitivity", "true or false"),
-    ({"of": {}}, "sweep.sample.of", "paths and distributions"),
-    ({"of": [1]}, "sweep.sample.of", "paths and distributions"),
-    ({"of": {"friction.mus": {"normal": [1, 1]}}}, "sweep.sample.of.friction.mus", "did you mean `friction.mu_s`"),
-    ({"of": {"friction.law": {"values": ["coulomb"]}}}, "sweep.sample.of.friction.law", "axis of sweep.grid"),
-    ({"of": {"friction.mu_s": 0.3}}, "sweep.sample.of.friction.mu_s", "a distribution is expected"),
-    ({"of": {"friction.mu_s": {}}}, "sweep.sample.of.friction.mu_s", "got none"),
-    ({"of": {"friction.mu_s": {"gauss": [1, 2]}}}, "sweep.sample.of.friction.mu_s.gauss", "is no distribution"),
-    ({"of": {"friction.mu_s": {"normal": [1, 2], "uniform": [1, 2]}}}, "sweep.sample.of.friction.mu_s", "one dist"),
-    ({"of": {"friction.mu_s": {"normal": [0.15]}}}, "sweep.sample.of.friction.mu_s.normal", "mean, standard dev"),
-    ({"of": {"friction.mu_s": {"normal": [0.15, 0]}}}, "sweep.sample.of.friction.mu_s.normal.1", "greater than 0"),
-    ({"of": {"body.mass": {"normal": [1, "3 mm"]}}}, "sweep.sample.of.body.mass.normal.1", "wrong unit"),
-    ({"of": {"initial.x": {"normal": [0, "10 %"]}}}, "sweep.sample.of.initial.x.normal.1", "a mean of 0"),
-    ({"of": {"friction.mu_s": {"uniform": [0.3, 0.2]}}}, "sweep.sample.of.friction.mu_s.uniform", "less than the"),
-    ({"of": {"body.mass": {"triangular": [1, 3, 2]}}}, "sweep.sample.of.body.mass.triangular", "mode must lie"),
-    ({"of": {"body.mass": {"lognormal": [-1, 2]}}}, "sweep.sample.of.body.mass.lognormal", "greater than 0"),
-    ({"of": {"body.mass": {"truncnormal": [0, 1, 50, 60]}}}, "sweep.sample.of.body.mass.truncnormal", "30 standard"),
-    ({"of": {"friction.mu_s": {"over": "mu_j", "uniform": [1, 2]}}}, "sweep.sample.of.friction.mu_s.over", "mu_k"),
-    ({"of": {"friction.mu_s": {"over": "mu_s", "uniform": [1, 2]}}}, "sweep.sample.of.friction.mu_s.over", "itself"),
-    ({"of": {"friction.mu_s": {"over": "body.mass", "uniform": [1, 2]}}}, "sweep.sample.of.friction.mu_s.over", "unit"),
-    ({"of": {"friction.mu_s": {"over": "mu_k"}}}, "sweep.sample.of.friction.mu_s", "got none"),
-    (
-        {
-            "of": {
-                "friction.mu_s": {"over": "mu_k", "uniform": [1, 2]},
-                "friction.mu_k": {"over": "mu_s", "uniform": [1, 2]},
-            }
-        },
-        "sweep.sample.of.friction.mu_s.over",
-        "itself drawn over",
-    ),
-    ({"of": {"friction.mu_s, friction.mu_k": {"normal": [1, 2]}}}, "sweep.sample.of.friction.mu_s, f", "need rows"),
-    ({"of": {"friction.mu_s": {"values": []}}}, "sweep.sample.of.friction.mu_s.values", "empty"),
-    ({"of": {"friction.mu_s": {"values": [0.2, -1]}}}, "sweep.sample.of.friction.mu_s.values", "at least 0"),
-    ({"of": {"friction.mu_s": {"file": "no.csv"}}}, "sweep.sample.of.friction.mu_s.file", "No such file"),
-    ({"of": {"friction.mu_s": {"file": 3}}}, "sweep.sample.of.friction.mu_s.file", "file name"),
-    ({"quantiles": {"t_separation": [0.5]}}, "sweep.sample.quantiles.t_separation", "no number of this model"),
-    ({"quantiles": {"first_slip": [50]}}, "sweep.sample.quantiles.first_slip", "less than 1"),
-    ({"quantiles": [0.5]}, "sweep.sample.quantiles", "lists of levels"),
-    ({"survival": [-1.0]}, "sweep.sample.survival", "at least 0"),
-    ({"survival": {"linspace": [0, 1]}}, "sweep.sample.survival.linspace", "count"),
-    ({"survival": 3}, "sweep.sample.survival", "list of values"),
-]
-
-
-@pytest.mark.parametrize(
-    ("changed", "path", "words"), MISTAKES, ids=[f"{p}-{k}" for k, (_, p, _) in enumerate(MISTAKES)]
-)
-def test_a_mistake_is_located(changed: dict[str, Any], path: str, words: str) -> None:
-    with pytest.raises(InputError) as caught:
-        load(config(**changed))
-    assert caught.value.path.startswith(path)
-    assert words in caught.value.problem
+# Samples that cannot be
 
 
 def test_a_sample_that_is_not_allowed_is_told_with_its_probability() -> None:

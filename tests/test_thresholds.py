@@ -7,7 +7,6 @@ import pytest
 
 import ringsweep
 from ringsweep import cli
-from ringsweep.errors import InputError
 
 BELT = {
     "model": "belt",
@@ -48,22 +47,6 @@ class TestThreshold:
         assert "riding neither begins nor ends there\nscan: 5 runs from 0.3 to 0.4: 5 riding" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    ("path", "between", "problem"),
-    [
-        ("friction.mu", (0.1, 0.2), "path: the scene has no such number to vary; did you mean"),
-        ("friction.law", (0.1, 0.2), "no number that varies continuously"),
-        ("friction.mu_s", None, "does not sweep friction.mu_s: say where to look, by --from and --to"),
-        ("friction.mu_s", (0.3, 0.2), "to: 0.2 is not greater than 0.3"),
-        ("friction.mu_s", (0.2, "3 kg"), "to: "),
-    ],
-)
-def test_wrong_request_says_what_is_wrong(path, between, problem):
-    with pytest.raises(InputError) as error:
-        ringsweep.threshold(BELT, path, "riding", between)
-    assert problem in str(error.value)
-
-
 class TestDistribution:
     def test_uncertain_spring_makes_the_threshold_uncertain_in_proportion(self, tmp_path, capsys):
         """k v T = mu_s m g, with k even between 1.5 and 2.5 N/m: so is mu_s, and its quantiles are known."""
@@ -82,17 +65,3 @@ class TestDistribution:
         assert "50% below 0.2" in said or "50% below inf" in said
         # k < 0.2 m g / (v T) = 1.962 N/m begins within: 46.2 % of the points.
         assert "; 69 begin nowhere there" in said or "; 68 begin nowhere there" in said
-
-    @pytest.mark.parametrize(
-        ("of", "grid", "regime", "problem"),
-        [
-            ({"friction.mu_s": {"uniform": [0.2, 0.3]}}, None, "riding", "path: friction.mu_s is uncertain itself"),
-            ({"friction.mu_k": {"over": "mu_s", "uniform": [0.5, 0.6]}}, None, "riding", "is drawn over friction.mu_s"),
-            ({"body.mass": {"uniform": [1, 2]}}, {"belt.velocity": [0.1, 0.2]}, "riding", "also varies belt.velocity"),
-            ({"body.mass": {"uniform": [1, 2]}}, None, "rideing", "is no regime; did you mean `riding`?"),
-        ],
-    )
-    def test_mistakes_with_a_sample(self, of, grid, regime, problem):
-        sweep = {"sample": {"n": 32, "of": of}} | ({"grid": grid} if grid else {})
-        with pytest.raises(InputError, match=problem):
-            ringsweep.threshold({"scene": BELT, "sweep": sweep}, "friction.mu_s", regime, (0.12, 0.4))

@@ -35,8 +35,8 @@ KEYS = (*NUMBERS, "method", "of", "quantiles", "survival", "sensitivity", "keep"
 
 _LEVEL = Parameter("1", "level of a quantile", lower=0, upper=1, open_lower=True, open_upper=True)
 
-# Numbers that tell when something happens, and that are missing where it does not.
-_CENSORED = ("t_separation", "first_slip")
+#: Numbers that tell when something happens, and that are missing where it does not.
+CENSORED = ("t_separation", "first_slip")
 
 # Points of a sample that are tried one by one, to tell how many are not allowed.
 _TRIED = 1000
@@ -102,6 +102,9 @@ class Sample:
         Times at which it is asked whether the contacts still hold, s.
     sensitivity : bool
         Whether Sobol indices are asked for.
+    sensitive : tuple of str
+        Variables whose own indices are asked for, beside those of the regimes; for a time that some runs do not have,
+        those of whether it has come at the times of `survival`.
     keep : bool
         Whether the result holds the runs too.
     """
@@ -114,6 +117,7 @@ class Sample:
     quantiles: Mapping[str, tuple[float, ...]]
     survival: tuple[float, ...]
     sensitivity: bool
+    sensitive: tuple[str, ...]
     keep: bool
 
     @property
@@ -154,12 +158,14 @@ class Sample:
     def identity(self) -> dict[str, str]:
         """All that determines its results, by name."""
         factors = {f"sweep.sample.of.{factor.name}": repr(factor) for factor in self.factors}
-        asked = {
+        asked: dict[str, Any] = {
             "quantiles": dict(self.quantiles),
             "survival": self.survival,
             "sensitivity": self.sensitivity,
             "keep": self.keep,
         }
+        if self.sensitive:
+            asked["sensitivity"] = self.sensitive
         return factors | {
             "sweep.sample.method": f"{self.method}, seed {self.seed}, {self.replicates} replicates",
             "sweep.sample.n": str(self.n),
@@ -176,7 +182,7 @@ def _shares(method: str, size: int, factors: int, seed: int, replicate: int, sen
 
 def censored(scene: Scene) -> str:
     """The number that tells when a contact is lost, or when a body that rides on its belt first slips."""
-    return next(name for name in _CENSORED if name in MODELS[scene.structure.model].outcomes)
+    return next(name for name in CENSORED if name in MODELS[scene.structure.model].outcomes)
 
 
 def read_sample(given: Any, scene: Scene, axes: Axes) -> Sample | None:
@@ -206,10 +212,10 @@ def read_sample(given: Any, scene: Scene, axes: Axes) -> Sample | None:
     if method not in METHODS:
         raise InputError("sweep.sample.method", f"{show(method)} is not a method" + suggestion(method, METHODS))
     _check_number(method, numbers["n"], numbers["replicates"])
-    switches = {key: given.get(key, False) for key in ("sensitivity", "keep")}
-    for key, value in switches.items():
-        if not isinstance(value, bool):
-            raise InputError(f"sweep.sample.{key}", f"true or false is expected, got {show(value)}")
+    keep = given.get("keep", False)
+    if not isinstance(keep, bool):
+        raise InputError("sweep.sample.keep", f"true or false is expected, got {show(keep)}")
+    sensitivity, sensitive = _sensitivity(given.get("sensitivity", False), scene, bool(given.get("survival")))
     found = Sample(
         _factors(given["of"], scene, axes),
         method=method,
@@ -218,8 +224,9 @@ def read_sample(given: Any, scene: Scene, axes: Axes) -> Sample | None:
         n=numbers["n"],
         seed=numbers["seed"],
         replicates=numbers["replicates"],
-        sensitivity=switches["sensitivity"],
-        keep=switches["keep"],
+        sensitivity=sensitivity,
+        sensitive=sensitive,
+        keep=keep,
     )
     cells = math.prod(axes.sizes.values())
     if cells * found.replicates > MAX_CELLS:
@@ -298,12 +305,14 @@ def _reference(given: Any, path: str, parameter: Any, known: Mapping[str, Parame
     """The path that a ratio is over; the section may be left out."""
     beside = f"{path.rpartition('.')[0]}.{given}"
     full = beside if beside in known else given
-    other = swept_parameter(known, full, where)
+    if not isinstance(full, str) or full not in known:
+        raise InputError(where, f"{show(given)} is no number of the scene" + suggestion(beside, known))
     if full == path:
-        raise InputError(where, "is the path itself")
+        raise InputError(where, f"{full} is the path itself")
+    other = known[full]
     if isinstance(other, Choice) or other.unit != parameter.unit:
         raise InputError(where, f"{full} is no number in the unit of {path}: their ratio has no meaning")
-    return str(full)
+    return full
 
 
 def _table(given: Any, parameters: Mapping[str, Any], where: str) -> tuple[tuple[float, ...], ...]:
@@ -371,14 +380,39 @@ def _quantiles(given: Any, scene: Scene) -> dict[str, tuple[float, ...]]:
     where = "sweep.sample.quantiles"
     if not isinstance(given, dict) or not given:
         raise InputError(where, f"variables with lists of levels are expected, got {show(given)}")
-    model = MODELS[scene.structure.model]
-    names = [name for name in model.outcomes if OUTCOMES[name].dtype == "float64" and name not in model.absent]
+    names = _outcomes(scene)
     found = {}
     for name, levels in given.items():
         if name not in names:
             raise InputError(f"{where}.{name}", "is no number of this model" + suggestion(name, names))
         found[name] = tuple(sorted(set(read_values(levels, _LEVEL, f"{where}.{name}").tolist())))
     return found
+
+
+def _outcomes(scene: Scene) -> list[str]:
+    """Outcomes of the model that are numbers."""
+    model = MODELS[scene.structure.model]
+    return [name for name in model.outcomes if OUTCOMES[name].dtype == "float64" and name not in model.absent]
+
+
+def _sensitivity(given: Any, scene: Scene, timed: bool) -> tuple[bool, tuple[str, ...]]:
+    """Whether indices are asked for, and of which variables beside the regimes."""
+    if isinstance(given, bool):
+        return given, ()
+    where = "sweep.sample.sensitivity"
+    if not isinstance(given, dict) or set(given) != {"of"}:
+        raise InputError(where, f"true or false is expected, or {{of: [t_end]}}, got {show(given)}")
+    if not isinstance(given["of"], list) or not given["of"]:
+        raise InputError(f"{where}.of", f"a list of variables is expected, got {show(given['of'])}")
+    time = censored(scene)
+    names = [name for name in _outcomes(scene) if name not in CENSORED or name == time]
+    for k, name in enumerate(given["of"]):
+        if name == time and not timed:
+            problem = f"{time} is missing in runs in which it does not happen: say at which times, by survival: [1 s]"
+            raise InputError(f"{where}.of.{k}", problem)
+        if not isinstance(name, str) or name not in names:
+            raise InputError(f"{where}.of.{k}", f"{show(name)} is no number of this model" + suggestion(name, names))
+    return True, tuple(dict.fromkeys(given["of"]))
 
 
 def _survival(given: Any, scene: Scene) -> tuple[float, ...]:

@@ -285,7 +285,10 @@ def _sample(names: dict[str, Any]) -> dict[str, Any]:
             },
             "quantiles": {"description": "variable -> levels", "type": "object", "additionalProperties": levels},
             "survival": {"description": "times at which it is asked whether the contacts still hold", **times},
-            "sensitivity": {"description": "whether Sobol indices are computed", "type": "boolean"},
+            "sensitivity": {
+                "description": "whether Sobol indices are computed, and of which variables beside the regimes",
+                "anyOf": [{"type": "boolean"}, {**_section({"of": _list({"type": "string"})}), "required": ["of"]}],
+            },
             "keep": {"description": "whether the result holds the runs too", "type": "boolean"},
         }
     )

@@ -162,7 +162,13 @@ def _problem(
     """The problem, and the declaration of the measured quantity."""
     name, times = _times(columns)
     values = [f"{factor.path}={factor.first!r}" for factor in factors]
-    one = with_values(config, [*settings, *values, f"time.span={float(times[-1])!r}"])
+    try:
+        one = with_values(config, [*settings, *values, f"time.span={float(times[-1])!r}"])
+    except InputError as error:
+        if error.problem.startswith("missing") or error.path == "scene.time.span":
+            raise
+        # Nobody gave these settings: the ranges did.
+        raise InputError("vary", f"starts at {', '.join(values)}: {error.path}: {error.problem}") from None
     if one.axes.sizes:
         raise InputError("sweep", "several friction laws, but a fit has one: --set friction.law=...")
     model = model_of(one.scene.structure)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ringsweep.config import Config, load, sweepable
 from ringsweep.config.axes import dimension
-from ringsweep.config.sampling import Sample, censored
+from ringsweep.config.sampling import CENSORED, Sample, censored
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
 from ringsweep.quantities.flags import REGIMES
@@ -84,7 +84,10 @@ def _sums_of(sample: Sample) -> dict[str, tuple[str, tuple[int, ...]]]:
         found[f"{name}_known"] = "int32", ()
         found[f"{name}_summary"] = "float64", (SUMMARY,)
     if sample.sensitivity:
-        found["sobol_sums"] = "float64", (len(REGIMES), 3 + 3 * len(sample.factors))
+        each = 3 + 3 * len(sample.factors)
+        found["sobol_sums"] = "float64", (len(REGIMES), each)
+        for name in sample.sensitive:
+            found[f"{name}_sobol_sums"] = "float64", (*([len(sample.survival)] if name in CENSORED else []), each)
     return found
 
 
@@ -115,6 +118,8 @@ class EarlierSample:
         new = _sample(config)
         if new.method == "latin-hypercube":
             raise InputError("--reuse", "the points of a larger Latin hypercube are others: use sobol or random")
+        if new.sensitive:
+            raise InputError("--reuse", "sums of numbers depend on their order: leave sensitivity.of out")
         if new.quantiles or new.keep:
             key = "keep" if new.keep else "quantiles"
             raise InputError("--reuse", f"a file does not hold what {key} needs of each run: leave {key} out")
@@ -195,7 +200,13 @@ def _needed(config: Config) -> list[str]:
     sample = _sample(config)
     return list(
         dict.fromkeys(
-            ["regime", "certified", *([censored(config.scene)] if sample.survival else []), *sample.quantiles]
+            [
+                "regime",
+                "certified",
+                *([censored(config.scene)] if sample.survival else []),
+                *sample.quantiles,
+                *sample.sensitive,
+            ]
         )
     )
 
@@ -220,6 +231,11 @@ def _reduce(sample: Sample, time: str, columns: Columns) -> Columns:
         found["sobol_sums"] = np.stack(
             [sobol_sums((rows["regime"] == flag).astype(float)) for flag in range(len(REGIMES))]
         )
+        for name in sample.sensitive:
+            # A time that has not come is not a number, and compares as later.
+            functions = [rows[name] <= t for t in sample.survival] if name in CENSORED else [rows[name]]
+            each = [sobol_sums(function.astype(float)) for function in functions]
+            found[f"{name}_sobol_sums"] = np.stack(each) if name in CENSORED else each[0]
     return found
 
 
@@ -262,10 +278,11 @@ def statistics(config: Config, sums: Columns) -> Columns:
             column = found[f"{name}_quantile{end}"] = np.full((len(rows), len(_levels(sample))), np.nan)
             column[:, place] = [row[k] for row in rows]
     if sample.sensitivity:
-        found["sobol_sums"] = flat["sobol_sums"]
-        indices = sobol_indices(np.moveaxis(flat["sobol_sums"], 1, -2), sample.size)
-        for name, index in zip(("sobol_first", "sobol_total"), indices, strict=True):
-            found |= {f"{name}{end}": part for end, part in zip(("", "_low", "_high"), index, strict=True)}
+        for prefix in ("", *(f"{name}_" for name in sample.sensitive)):
+            together = found[f"{prefix}sobol_sums"] = flat[f"{prefix}sobol_sums"]
+            indices = sobol_indices(np.moveaxis(together, 1, -2), sample.size)
+            for name, index in zip(("sobol_first", "sobol_total"), indices, strict=True):
+                found |= {f"{prefix}{name}{end}": part for end, part in zip(("", "_low", "_high"), index, strict=True)}
     found |= {name: column for name, column in flat.items() if name not in _sums_of(sample)}
     return {name: column.reshape((*shape, *column.shape[1:])) for name, column in found.items()}
 
@@ -328,6 +345,20 @@ def variables(config: Config) -> dict[str, tuple[tuple[str, ...], Variable]]:
         for name, one in SAMPLED.items():
             if name.startswith(("sobol_first", "sobol_total")):
                 found[name] = ("word", "parameter"), one
+        for number in sample.sensitive:
+            about = known[number].long_name
+            times = ("survival_time",) if number in CENSORED else ()
+            found[f"{number}_sobol_sums"] = ("replicate", *times, "sum"), SAMPLED["sobol_sums"]
+            for which in ("first", "total"):
+                for end, of in {
+                    "": "",
+                    "_low": "lower end of the 95 % interval: ",
+                    "_high": "upper end of the 95 % interval: ",
+                }.items():
+                    found[f"{number}_sobol_{which}{end}"] = (
+                        (*times, "parameter"),
+                        Variable("1", f"{of}{which} Sobol index: {about}"),
+                    )
     if sample.keep:
         found |= {name: (("replicate", "sample"), one) for name, one in known.items() if name not in found}
     return found

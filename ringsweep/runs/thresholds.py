@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from math import degrees, floor, log10
 from typing import Any
@@ -44,7 +44,7 @@ def threshold(
     config: str | os.PathLike[str] | Mapping[str, Any],
     path: str,
     regime: str,
-    between: tuple[Any, Any] | None = None,
+    between: Sequence[Any] | None = None,
     tolerance: Any = None,
     *,
     scan: int | None = None,
@@ -105,7 +105,10 @@ def threshold(
     """
     if isinstance(config, Mapping) and "scene" not in config:
         config = {"scene": config}
-    return locate(config, path, regime, between or (None, None), tolerance, scan=scan, jobs=jobs)
+    if between is not None and (not isinstance(between, list | tuple) or len(between) != 2):
+        raise InputError("between", f"a pair of values is expected, got {show(between)}")
+    low, high = between or (None, None)
+    return locate(config, path, regime, (low, high), tolerance, scan=scan, jobs=jobs)
 
 
 def locate(
@@ -128,6 +131,8 @@ def locate(
     settings : iterable of str
         As for :func:`ringsweep.config.with_values`.
     """
+    if regime not in REGIMES:
+        raise InputError("regime", f"{show(regime)} is not a regime" + suggestion(regime, REGIMES))
     settings = list(settings)
     if (whole := load(config, settings)).sample is not None:
         low, high = _ends(whole, path, between)
@@ -184,9 +189,7 @@ def distribution(
         If the sweep has other axes, or a number of the sample is a ratio to the one that varies.
     """
     assert config.sample is not None
-    sample = replace(config.sample, sensitivity=False, keep=False, quantiles={}, survival=())
-    if regime not in REGIMES:
-        raise InputError("regime", f"{show(regime)} is no regime" + suggestion(regime, REGIMES))
+    sample = replace(config.sample, sensitivity=False, sensitive=(), keep=False, quantiles={}, survival=())
     if others := [name for name in config.axes.columns if name != path]:
         raise InputError("sweep", f"also varies {', '.join(others)}, but a threshold is that of one cell: leave it out")
     for factor in sample.factors:
@@ -295,7 +298,12 @@ def _ends(whole: Config, path: str, between: tuple[Any, Any]) -> tuple[float, fl
 def _interval(config: Any, path: str, between: tuple[Any, Any], settings: list[str]) -> tuple[Config, float, float]:
     """Configuration of a single run, and the ends of the interval in SI units."""
     low, high = _ends(load(config, settings), path, between)
-    one = with_values(config, [*settings, f"{path}={low!r}"])
+    try:
+        one = with_values(config, [*settings, f"{path}={low!r}"])
+    except InputError as error:
+        if error.problem.startswith("missing"):
+            raise
+        raise InputError("from", f"{path} = {low:g} is not allowed: {error.path}: {error.problem}") from None
     if one.axes.sizes:
         raise InputError("sweep", "several friction laws, but a threshold is that of one: --set friction.law=...")
     return one, low, high

@@ -1,0 +1,248 @@
+"""What a person types wrongly about samples, thresholds and fits: each mistake is told in one line, before any run."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import ringsweep
+from ringsweep import InputError
+from ringsweep.config import load
+
+BELT: dict[str, Any] = {
+    "model": "belt",
+    "body": {"mass": 1.0},
+    "spring": {"stiffness": 2.0},
+    "belt": {"velocity": 0.1},
+    "friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.05},
+    "time": {"span": 7.0},
+}
+SAMPLE: dict[str, Any] = {"n": 256, "of": {"friction.mu_s": {"normal": [0.15, "10 %"]}}}
+GOOD = {"t": [0.1, 0.2, 0.3, 0.4], "x": [0.01, 0.02, 0.03, 0.04]}
+FILES = {
+    "other.csv": "mu_s,other\n0.1,0.2\n0.2,0.3\n",
+    "hole.csv": "friction.mu_s\n0.1\nnan\n",
+    "word.csv": "friction.mu_s\n0.1\nabc\n",
+    "empty.csv": "",
+    "gap.csv": "t,x\n0.1,0.2\n0.2,nan\n0.3,0.2\n",
+    "angle.csv": "t,phi (deg)\n0.1,0.2\n",
+    "mass.csv": "t,x (kg)\n0.1,0.2\n0.2,0.2\n0.3,1\n",
+}
+
+
+@pytest.fixture(autouse=True)
+def nothing_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files with faults in the working directory, and no runs."""
+    for name, text in FILES.items():
+        (tmp_path / name).write_text(text)
+    monkeypatch.chdir(tmp_path)
+    for module in ("ringsweep.runs.thresholds.compute", "ringsweep.runs.fit._fit"):
+        monkeypatch.setattr(module, lambda *_args, **_options: pytest.fail("a mistake is told before the first run"))
+
+
+def located(call: Any, path: str, words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        call()
+    assert caught.value.path.startswith(path)
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+# The keys of `sweep.sample`: what is changed, the path of the mistake, and words of its line.
+OF = "sweep.sample.of.friction.mu_s"
+SAMPLES: list[tuple[dict[str, Any], str, str]] = [
+    ({"n": 1000}, "sweep.sample.n", "give 1024"),
+    ({"n": 100, "method": "random"}, "sweep.sample.n", "give 96"),
+    ({"n": 0}, "sweep.sample.n", "at least 2"),
+    ({"n": "many"}, "sweep.sample.n", "not a number"),
+    ({"seed": -1}, "sweep.sample.seed", "at least 0"),
+    ({"seed": 1.5}, "sweep.sample.seed", "whole"),
+    ({"replicates": 2}, "sweep.sample.replicates", "at least 4"),
+    ({"method": "halton"}, "sweep.sample.method", "sobol"),
+    ({"methods": "sobol"}, "sweep.sample.methods", "did you mean `method`"),
+    ({"keep": 1}, "sweep.sample.keep", "true or false"),
+    ({"sensitivity": "yes"}, "sweep.sample.sensitivity", "true or false"),
+    ({"of": {}}, "sweep.sample.of", "paths and distributions"),
+    ({"of": [1]}, "sweep.sample.of", "paths and distributions"),
+    ({"of": {"friction.mus": {"normal": [1, 1]}}}, "sweep.sample.of.friction.mus", "did you mean `friction.mu_s`"),
+    ({"of": {"friction.law": {"values": ["coulomb"]}}}, "sweep.sample.of.friction.law", "axis of sweep.grid"),
+    ({"of": {"friction.mu_s": 0.3}}, "sweep.sample.of.friction.mu_s", "a distribution is expected"),
+    ({"of": {"friction.mu_s": {}}}, "sweep.sample.of.friction.mu_s", "got none"),
+    ({"of": {"friction.mu_s": {"gauss": [1, 2]}}}, "sweep.sample.of.friction.mu_s.gauss", "is no distribution"),
+    ({"of": {"friction.mu_s": {"normal": [1, 2], "uniform": [1, 2]}}}, "sweep.sample.of.friction.mu_s", "one dist"),
+    ({"of": {"friction.mu_s": {"normal": [0.15]}}}, "sweep.sample.of.friction.mu_s.normal", "mean, standard dev"),
+    ({"of": {"friction.mu_s": {"normal": [0.15, 0]}}}, "sweep.sample.of.friction.mu_s.normal.1", "greater than 0"),
+    ({"of": {"body.mass": {"normal": [1, "3 mm"]}}}, "sweep.sample.of.body.mass.normal.1", "wrong unit"),
+    ({"of": {"initial.x": {"normal": [0, "10 %"]}}}, "sweep.sample.of.initial.x.normal.1", "a mean of 0"),
+    ({"of": {"friction.mu_s": {"uniform": [0.3, 0.2]}}}, "sweep.sample.of.friction.mu_s.uniform", "less than the"),
+    ({"of": {"body.mass": {"triangular": [1, 3, 2]}}}, "sweep.sample.of.body.mass.triangular", "mode must lie"),
+    ({"of": {"body.mass": {"lognormal": [-1, 2]}}}, "sweep.sample.of.body.mass.lognormal", "greater than 0"),
+    ({"of": {"body.mass": {"truncnormal": [0, 1, 50, 60]}}}, "sweep.sample.of.body.mass.truncnormal", "30 standard"),
+    ({"of": {"friction.mu_s": {"over": "mu_j", "uniform": [1, 2]}}}, "sweep.sample.of.friction.mu_s.over", "mu_k"),
+    ({"of": {"friction.mu_s": {"over": "mu_s", "uniform": [1, 2]}}}, "sweep.sample.of.friction.mu_s.over", "itself"),
+    ({"of": {"friction.mu_s": {"over": "body.mass", "uniform": [1, 2]}}}, "sweep.sample.of.friction.mu_s.over", "unit"),
+    ({"of": {"friction.mu_s": {"over": "mu_k"}}}, "sweep.sample.of.friction.mu_s", "got none"),
+    (
+        {
+            "of": {
+                "friction.mu_s": {"over": "mu_k", "uniform": [1, 2]},
+                "friction.mu_k": {"over": "mu_s", "uniform": [1, 2]},
+            }
+        },
+        "sweep.sample.of.friction.mu_s.over",
+        "itself drawn over",
+    ),
+    ({"of": {"friction.mu_s, friction.mu_k": {"normal": [1, 2]}}}, "sweep.sample.of.friction.mu_s, f", "need rows"),
+    ({"of": {"friction.mu_s": {"values": []}}}, "sweep.sample.of.friction.mu_s.values", "empty"),
+    ({"of": {"friction.mu_s": {"values": [0.2, -1]}}}, "sweep.sample.of.friction.mu_s.values", "at least 0"),
+    ({"of": {"friction.mu_s": {"file": "no.csv"}}}, "sweep.sample.of.friction.mu_s.file", "No such file"),
+    ({"of": {"friction.mu_s": {"file": 3}}}, "sweep.sample.of.friction.mu_s.file", "file name"),
+    ({"quantiles": {"t_separation": [0.5]}}, "sweep.sample.quantiles.t_separation", "no number of this model"),
+    ({"quantiles": {"first_slip": [50]}}, "sweep.sample.quantiles.first_slip", "less than 1"),
+    ({"quantiles": [0.5]}, "sweep.sample.quantiles", "lists of levels"),
+    ({"survival": [-1.0]}, "sweep.sample.survival", "at least 0"),
+    ({"survival": {"linspace": [0, 1]}}, "sweep.sample.survival.linspace", "count"),
+    ({"survival": 3}, "sweep.sample.survival", "list of values"),
+    ({"of": {"friction.mu_s": {"norml": [0.15, 0.01]}}}, f"{OF}.norml", "did you mean `normal`"),
+    ({"of": {"friction.mu_s": {"normal": [0.15, -0.01]}}}, f"{OF}.normal.1", "-0.01 is not allowed"),
+    ({"of": {"friction.mu_s": {"normal": [0.15, "-5 %"]}}}, f"{OF}.normal.1", "greater than 0"),
+    ({"of": {"friction.mu_s": {"normal": ["0.15 m", 0.01]}}}, f"{OF}.normal.0", "has no unit"),
+    ({"of": {"friction.mu_s": {"normal": [float("nan"), 0.01]}}}, f"{OF}.normal.0", "not finite"),
+    ({"of": {"friction.mu_s": {"normal": {"mean": 0.15, "sd": 0.01}}}}, f"{OF}.normal", "[mean, standard deviation]"),
+    ({"of": {"friction.mu_s": "normal(0.15, 0.01)"}}, OF, "such as `{normal: [0.3, 10 %]}`"),
+    ({"of": {"friction.mu_s": {"truncnormal": [0.15, 0.01, 0.2, 0.1]}}}, f"{OF}.truncnormal", "less than the last"),
+    ({"of": {"friction.mu_s": {"file": "other.csv"}}}, f"{OF}.file", "no column friction.mu_s (known: mu_s, other)"),
+    ({"of": {"friction.mu_s": {"file": "hole.csv"}}}, OF, "hole.csv, line 3: "),
+    ({"of": {"friction.mu_s": {"file": "word.csv"}}}, OF, "word.csv, line 3: "),
+    ({"of": {"friction.mu_s": {"file": "empty.csv"}}}, OF, "the file is empty"),
+    (
+        {"of": {"friction.mu_s": {"over": "mu_j", "uniform": [1, 2]}}},
+        f"{OF}.over",
+        "'mu_j' is no number of the scene; did",
+    ),
+    ({"of": {"friction.mu_s": {"over": ["mu_k"], "uniform": [1, 2]}}}, f"{OF}.over", "['mu_k'] is no number"),
+    ({"of": {"body.mass": {"normal": [1, 0.5]}}}, "sweep.sample.of.body.mass", "normal(1, 0.5) has probability 0.023"),
+    ({"of": {"friction.mu_k": {"uniform": [0.1, 0.2]}}}, "scene.friction.mu_k", "50.0% of the points of the sample"),
+    ({"n": -8}, "sweep.sample.n", "-8 is not allowed"),
+    ({"seed": "one"}, "sweep.sample.seed", "'one' is not a number"),
+    ({"quantiles": {"first_slip": 0.5}}, "sweep.sample.quantiles.first_slip", "list of values"),
+    ({"quantiles": {"first_slip": [0, 1]}}, "sweep.sample.quantiles.first_slip.0", "greater than 0"),
+    ({"sensitivity": {"off": ["x_end"]}}, "sweep.sample.sensitivity", "{of: [t_end]}"),
+    ({"sensitivity": {"of": "x_end"}}, "sweep.sample.sensitivity.of", "a list of variables is expected, got 'x_end'"),
+    ({"sensitivity": {"of": []}}, "sweep.sample.sensitivity.of", "a list of variables"),
+    ({"sensitivity": {"of": ["x_ned"]}}, "sweep.sample.sensitivity.of.0", "did you mean `x_end`"),
+    ({"sensitivity": {"of": ["first_slip"]}}, "sweep.sample.sensitivity.of.0", "by survival: [1 s]"),
+    ({"survival": ["3 kg"]}, "sweep.sample.survival.0", "is in s"),
+]
+
+# Path, interval, regime, options; then as above.
+THRESHOLDS: list[tuple[str, Any, Any, dict[str, Any], str, str]] = [
+    ("friction.mu", (0.1, 0.2), "riding", {}, "path", "the scene has no such number to vary; did you mean"),
+    ("friction.law", (0.1, 0.2), "riding", {}, "path", "no number that varies continuously"),
+    (
+        "friction.mu_s",
+        None,
+        "riding",
+        {},
+        "from",
+        "does not sweep friction.mu_s: say where to look, by --from and --to",
+    ),
+    ("friction.mu_s", (0.3, 0.2), "riding", {}, "to", "0.2 is not greater than 0.3"),
+    ("friction.mu_s", (0.2, "3 kg"), "riding", {}, "to", "has no unit"),
+    ("friction.mu_s", (-1, 0.4), "riding", {}, "from", "-1 is not allowed"),
+    (
+        "friction.mu_s",
+        (0.01, 0.4),
+        "riding",
+        {},
+        "from",
+        "friction.mu_s = 0.01 is not allowed: scene.friction.mu_k: 0.05",
+    ),
+    ("friction.mu_s", (0.12,), "riding", {}, "between", "a pair of values is expected, got (0.12,)"),
+    ("friction.mu_s", 3, "riding", {}, "between", "a pair of values is expected, got 3"),
+    ("friction.mu_s", (0.12, 0.4), "rideing", {}, "regime", "did you mean `riding`"),
+    ("friction.mu_s", (0.12, 0.4), 3, {}, "regime", "3 is not a regime"),
+    ("friction.mu_s", (0.12, 0.4), "riding", {"tolerance": -1}, "tolerance", "greater than 0"),
+    ("friction.mu_s", (0.12, 0.4), "riding", {"tolerance": "1 m"}, "tolerance", "has no unit"),
+    ("friction.mu_s", (0.12, 0.4), "riding", {"scan": 1}, "scan", "at least 2"),
+]
+
+# The same with a sample: its distributions, the grid, the regime.
+UNCERTAIN: list[tuple[dict[str, Any], Any, str, str, str]] = [
+    ({"friction.mu_s": {"uniform": [0.2, 0.3]}}, None, "riding", "path", "friction.mu_s is uncertain itself"),
+    ({"friction.mu_k": {"over": "mu_s", "uniform": [0.5, 0.6]}}, None, "riding", "path", "is drawn over friction.mu_s"),
+    ({"body.mass": {"uniform": [1, 2]}}, {"belt.velocity": [0.1, 0.2]}, "riding", "sweep", "also varies belt.velocity"),
+    ({"body.mass": {"uniform": [1, 2]}}, None, "rideing", "regime", "is not a regime; did you mean `riding`?"),
+]
+
+# Data, paths, options, the start of the line.
+FITS: list[tuple[Any, Any, dict[str, Any], str]] = [
+    (GOOD, "", {}, "vary: '' is not of the form"),
+    (GOOD, {}, {}, "vary: empty: name at least one number"),
+    (GOOD, 3, {}, "vary: paths are expected"),
+    (GOOD, "friction.mu", {}, "did you mean `friction.mu_"),
+    (GOOD, "friction.law", {}, "no number that varies continuously"),
+    (GOOD, "time.span", {}, "no influence on a measured history"),
+    (GOOD, "friction.mu_k, friction.mu_k", {}, "friction.mu_k stands twice"),
+    (GOOD, "friction.mu_k=0.1", {}, "is not of the form PATH or PATH=LOW..HIGH"),
+    (GOOD, "friction.mu_k=0.1..", {}, "is not of the form PATH or PATH=LOW..HIGH"),
+    (GOOD, "friction.mu_k=0.2..0.1", {}, "0.1 is not greater than 0.2"),
+    (GOOD, "friction.mu_k=-1..0.1", {}, "vary.friction.mu_k: -1 is not allowed"),
+    (GOOD, "body.mass=1 m..2 m", {}, "vary.body.mass"),
+    (GOOD, {"friction.mu_k": 0.1}, {}, "vary.friction.mu_k: a pair of values is expected"),
+    (GOOD, "spring.cubic", {}, "spring.cubic=LOW..HIGH"),
+    (GOOD, "friction.mu_k=0.2..0.3, friction.mu_s=0.01..0.1", {}, "mu_s"),
+    (GOOD, "friction.mu_k", {"start": 0}, "start: 0 is not allowed"),
+    (GOOD, "friction.mu_k", {"start": 1.5}, "start: 1.5 is not a whole number"),
+    (GOOD, "friction.mu_k", {"noise": 0}, "noise: 0 m is not allowed"),
+    (GOOD, "friction.mu_k", {"noise": "1 deg"}, "noise: "),
+    (7, "friction.mu_k", {}, "data: a CSV file, a mapping or a DataFrame is expected"),
+    ("nowhere.csv", "friction.mu_k", {}, "data: nowhere.csv cannot be read: No such file"),
+    ({"x": [1.0]}, "friction.mu_k", {}, "data: no column t with the times; got x"),
+    ({"t": [1.0]}, "friction.mu_k", {}, "one column beside t is expected, such as phi or x, got none"),
+    (GOOD | {"velocity": [0.0]}, "friction.mu_k", {}, "got x, velocity: a fit takes one"),
+    ({"t": GOOD["t"], "phi": GOOD["x"]}, "friction.mu_k", {}, "data.phi: is no quantity of the history"),
+    ({"t": GOOD["t"], "x": [0.1]}, "friction.mu_k", {}, "data.x: 1 values for 4 times"),
+    ({"t": [0.1, 0.3, 0.2], "x": [0, 0, 0]}, "friction.mu_k", {}, "data.t.2: 0.2 s does not come after 0.3 s"),
+    ({"t": [-0.1, 0.3], "x": [0, 0]}, "friction.mu_k", {}, "data.t.0: -0.1 s is not allowed"),
+    ({"t": [0.0], "x": [0.0]}, "friction.mu_k", {}, "the only time is 0 s"),
+    ({"t": [], "x": []}, "friction.mu_k", {}, "data.t: empty"),
+    ({"t": [0.1], "x": [0.0]}, "friction.mu_k", {}, "1 measurements are too few for 1 numbers"),
+    (GOOD | {"x": [0.1, float("nan"), 0.1, 0.1]}, "friction.mu_k", {}, "data.x.1"),
+    (GOOD, "friction.mu_k=0.2..0.3", {}, "vary: starts at friction.mu_k=0.25: scene.friction.mu_k: 0.25 exceeds mu_s"),
+    (GOOD, "friction.mu_k", {"noise": float("nan")}, "noise: nan is not finite"),
+    (GOOD, "friction.mu_k", {"start": "many"}, "start: 'many' is not a number"),
+    ("gap.csv", "friction.mu_k", {}, "gap.csv, line 3: data.x.1: 'nan' is not finite"),
+    ("angle.csv", "friction.mu_k", {}, "angle.csv, line 1: data.phi: is no quantity of the history"),
+    ("mass.csv", "friction.mu_k", {}, "mass.csv, line 2: data.x.0: '0.2 kg' has the wrong unit"),
+    ("empty.csv", "friction.mu_k", {}, "the file is empty"),
+]
+
+
+@pytest.mark.parametrize(("changed", "path", "words"), SAMPLES, ids=[f"{p}-{k}" for k, (_, p, _) in enumerate(SAMPLES)])
+def test_mistake_in_a_sample(changed: dict[str, Any], path: str, words: str) -> None:
+    located(lambda: load({"scene": BELT, "sweep": {"sample": SAMPLE | changed}}), path, words)
+
+
+def test_path_that_is_sampled_and_swept() -> None:
+    sweep = {"sample": SAMPLE, "grid": {"friction.mu_s": [0.1, 0.2]}}
+    located(lambda: load({"scene": BELT, "sweep": sweep}), "sweep.sample.of.friction.mu_s", "one place only")
+
+
+@pytest.mark.parametrize(("vary", "between", "regime", "options", "path", "words"), THRESHOLDS)
+def test_mistake_in_a_threshold(
+    vary: str, between: Any, regime: Any, options: dict[str, Any], path: str, words: str
+) -> None:
+    located(lambda: ringsweep.threshold(BELT, vary, regime, between, **options), path, words)
+
+
+@pytest.mark.parametrize(("of", "grid", "regime", "path", "words"), UNCERTAIN)
+def test_mistake_in_an_uncertain_threshold(of: dict[str, Any], grid: Any, regime: str, path: str, words: str) -> None:
+    sweep = {"sample": {"n": 32, "of": of}} | ({"grid": grid} if grid else {})
+    given = {"scene": BELT, "sweep": sweep}
+    located(lambda: ringsweep.threshold(given, "friction.mu_s", regime, (0.12, 0.4)), path, words)
+
+
+@pytest.mark.parametrize(("data", "vary", "options", "words"), FITS)
+def test_mistake_in_a_fit(data: Any, vary: Any, options: dict[str, Any], words: str) -> None:
+    located(lambda: ringsweep.fit(BELT, data, vary, **options), "", words)
