@@ -107,7 +107,9 @@ def compute_task(config: Config, layout: Layout, positions: NDArray[np.integer])
             continue
         values = values_at(scene, axes, {dim: along[own] for dim, along in indices.items()}, len(own))
         with readable_compile_errors(), _named_if_long(axes, indices):
+            began = perf_counter()
             result = config.solver.run(batch(structure, values), model.outcomes)
+            _name_longest(axes, {dim: along[own] for dim, along in indices.items()}, result, perf_counter() - began)
         # A bound beyond the range of a float of 32 bits is infinite.
         with np.errstate(over="ignore"):
             for name, column in _columns(model.outcomes, result):
@@ -120,17 +122,14 @@ def compute_task(config: Config, layout: Layout, positions: NDArray[np.integer])
 
 @contextmanager
 def _named_if_long(axes: Axes, indices: Indices) -> Iterator[None]:
-    """Name the first cell of a task, and say why it may be slow, if the block takes long."""
-    first = {path: column[tuple(indices[dim][0] for dim in dims)] for path, (dims, column) in axes.columns.items()}
-    at = ", ".join(f"{path} = {value if isinstance(value, str) else f'{value:g}'}" for path, value in first.items())
+    """Name the cells of a task, and say why one may be slow, if the block takes long."""
     timer = Timer(
         LONG,
         logger.info,
         (
-            "not done after %g s%s: many events, or friction that changes within a tiny speed, take many steps; "
-            "solver.max_steps bounds them",
+            "not done after %g s: %s (SI units); events, or friction that changes within a tiny speed, take many steps",
             LONG,
-            f", first cell (SI units) {at}" * bool(at),
+            _place(axes, indices) or "the run",
         ),
     )
     timer.daemon = True
@@ -139,6 +138,32 @@ def _named_if_long(axes: Axes, indices: Indices) -> Iterator[None]:
         yield
     finally:
         timer.cancel()
+
+
+def _name_longest(axes: Axes, indices: Indices, result: Result, seconds: float) -> None:
+    """Name the cell that took most of a long task, and say which limit of steps stands for a minute."""
+    if seconds < LONG:
+        return
+    longest = int(np.argmax(result.steps))
+    place = _place(axes, {dim: along[longest : longest + 1] for dim, along in indices.items()}) or "the run"
+    most, total = float(result.steps[longest]), float(result.steps.sum())
+    logger.info(
+        "%s (SI units) took %.2g steps, %.2g s; a run of %.2g steps takes a minute here: solver.max_steps bounds each",
+        place,
+        most,
+        seconds * most / total,
+        60.0 * total / seconds,
+    )
+
+
+def _place(axes: Axes, indices: Indices) -> str:
+    """Values of some cells, or the ends of their ranges, in words."""
+    words = []
+    for path, (dims, column) in axes.columns.items():
+        found = np.unique(column[tuple(indices[dim] for dim in dims)])
+        ends = dict.fromkeys(one if isinstance(one, str) else f"{one:g}" for one in (found[0], found[-1]))
+        words.append(f"{path} = {' to '.join(ends)}")
+    return ", ".join(words)
 
 
 def _columns(outcomes: tuple[str, ...], result: Result) -> Iterator[tuple[str, NDArray[Any]]]:
