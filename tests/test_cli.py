@@ -218,6 +218,20 @@ def test_control_characters_of_a_file_and_of_a_name_are_escaped(folder, capsys):
     assert "no\\x1b[31m.nc: does not exist" in err
 
 
+def test_warning_of_a_library_is_a_line_of_the_log_with_control_characters_escaped(folder, capsys):
+    """Matplotlib quotes what it cannot draw. Python would print the escape sequence, and a line of code."""
+    assert main(["run", "case.yaml", "-o", "out.nc"]) == 0
+    with netcdf.open_dataset("out.nc") as result:
+        crafted = result.load()
+    crafted["drive_amplitude"].attrs["units"] = "\x1b[2Jrad/s"
+    crafted.to_netcdf("crafted.nc")
+    script = "import sys; from ringsweep.cli import main; sys.exit(main(['map', 'crafted.nc']))"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "\x1b" not in done.stderr
+    assert "savefig" not in done.stderr
+
+
 def test_link_to_itself_is_no_output(folder, capsys):
     (folder / "loop.nc").symlink_to("loop.nc")
     assert "loop.nc: is a symbolic link that leads to itself" in refused(capsys, "run", "case.yaml", "-o", "loop.nc")
