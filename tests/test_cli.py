@@ -223,7 +223,7 @@ def test_warning_of_a_library_is_a_line_of_the_log_with_control_characters_escap
     assert main(["run", "case.yaml", "-o", "out.nc"]) == 0
     with netcdf.open_dataset("out.nc") as result:
         crafted = result.load()
-    crafted["drive_amplitude"].attrs["units"] = "\x1b[2Jrad/s"
+    crafted["drive_amplitude"].attrs |= {"long_name": "\x1b]0;title\x07", "units": "\x1b[2J"}
     crafted.to_netcdf("crafted.nc")
     script = "import sys; from ringsweep.cli import main; sys.exit(main(['map', 'crafted.nc']))"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
