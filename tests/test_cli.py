@@ -180,6 +180,8 @@ def test_ends_in_the_wrong_order_are_told_with_their_unit(scene):
         (("--set", "velocity=2"), "scene.velocity: unknown key: model belt has `belt.velocity` or `initial.velocity`"),
         (("--set", "spring.stiffness=2"), "scene.spring: unknown key: model belt has `spring`, this is model ring"),
         (("--set", "mass=2"), "scene.mass: unknown key; did you mean `body.mass`?"),
+        (("--set", "friction.rough.mu=2"), "scene.friction.rough.mu: unknown key; did you mean `mu_"),
+        (("--set", "zone.half_angle=40 mm"), "is in rad: the angle of an arc is its length divided by the radius"),
         (("--set", "zone.from=2"), "a zone has a center, which is (from + to)/2"),
         (("--set", "drive.amplitude=2"), "scene.drive.amplitude: is swept here"),
     ],
@@ -199,6 +201,9 @@ def test_misspelt_option_and_configuration_in_place_of_a_result_are_told(folder,
     with pytest.raises(SystemExit):
         main(["run", "case.yaml", "--dryrun"])
     assert "unrecognized arguments: --dryrun; did you mean --dry-run?" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["map", "case.nc", "--units", "deg"])
+    assert capsys.readouterr().err.endswith("unrecognized arguments: --units deg\n")
     assert "case.yaml: is a configuration, not a result: `ringsweep run case.yaml`" in refused(
         capsys, "map", "case.yaml"
     )

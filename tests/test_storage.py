@@ -161,3 +161,5 @@ def test_words_replace_flags_and_a_variable_without_flags_is_refused():
     assert not told.attrs, "a comparison would inherit them"
     with pytest.raises(InputError, match="phi_end"):
         ringsweep.words(xr.DataArray([0.5], name="phi_end"))
+    with pytest.raises(InputError, match=r"data: is not a classification, such as ds\.regime"):
+        ringsweep.words(xr.Dataset({"regime": told}))

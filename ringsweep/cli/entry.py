@@ -39,10 +39,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     arguments, unknown = parser.parse_known_args(given)
     if unknown:
-        near = nearest_name(unknown[0], re.findall(r"--[a-z-]+", arguments.parser.format_usage()))
+        # With the hyphens, which all have in common, --units would be near --boundaries.
+        near = nearest_name(unknown[0].lstrip("-"), re.findall(r"--([a-z-]+)", arguments.parser.format_usage()))
         apart = any(word.startswith("-") for word in given) and not unknown[0].startswith("-")
         hint = "; a value with a space needs quotes: --set 'drive.amplitude=2 rad/s'" if apart else ""
-        hint = f"; did you mean {near}?" if unknown[0].startswith("-") and near else hint
+        hint = f"; did you mean --{near}?" if unknown[0].startswith("-") and near else hint
         parser.error(f"unrecognized arguments: {' '.join(unknown)}{hint}")
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
     logging.getLogger().handlers[0].setFormatter(_Formatter(_is_coloured(sys.stderr)))
