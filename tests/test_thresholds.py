@@ -67,6 +67,8 @@ class TestThreshold:
         ("friction.mu_s", None, "does not sweep friction.mu_s: say where to look, by --from and --to"),
         ("friction.mu_s", (0.3, 0.2), "to: 0.2 is not greater than 0.3"),
         ("friction.mu_s", (0.2, "3 kg"), "to: "),
+        ("friction.mu_s", 0.2, "between: the two ends of an interval are expected, such as (0.5, 8), got 0.2"),
+        ("friction.mu_s", "0.2 to 0.4", "between: the two ends of an interval"),
     ],
 )
 def test_wrong_request_says_what_is_wrong(path, between, problem):

@@ -105,7 +105,12 @@ def threshold(
     """
     if isinstance(config, Mapping) and "scene" not in config:
         config = {"scene": config}
-    return locate(config, path, regime, between or (None, None), tolerance, scan=scan, jobs=jobs)
+    try:
+        low, high = (None, None) if between is None else between
+    except (TypeError, ValueError):
+        problem = f"the two ends of an interval are expected, such as (0.5, 8), got {show(between)}"
+        raise InputError("between", problem) from None
+    return locate(config, path, regime, (low, high), tolerance, scan=scan, jobs=jobs)
 
 
 def locate(
