@@ -14,7 +14,7 @@ import xarray as xr
 from jsonschema import Draft202012Validator
 
 import ringsweep
-from ringsweep.cli import main, report
+from ringsweep.cli import commands, main, report
 from ringsweep.cli.parser import build_parser
 from ringsweep.config import load
 from ringsweep.config.schema import schema
@@ -246,6 +246,11 @@ def test_part_of_a_history_is_drawn_and_a_run_of_another_scene_is_replaced_with_
     for amplitude in ("2", "3"):
         assert main(["simulate", "case.yaml", "--set", f"drive.amplitude={amplitude}"]) == 0
     assert "case-run.nc held a run of another scene, which is replaced: drive.amplitude was 2" in caplog.text
+    with netcdf.open_dataset("case-run.nc") as run:
+        other = json.loads(run.attrs["configuration"])
+        other["scene"]["impact"] = {"restitution": 0.5}
+        with_impact = run.assign_attrs(configuration=json.dumps(other))
+    assert commands._other_scene(Path("case-run.nc"), with_impact) == "impact.restitution was absent"
     assert main(["plot", "case-run.nc", "--from", "1", "--to", "2", "-o", "part.png"]) == 0
     assert (folder / "part.png").stat().st_size > 1000
     capsys.readouterr()

@@ -248,6 +248,7 @@ def test_task_that_runs_long_is_named_with_its_coordinates_and_then_its_longest_
     """Here each task does: the block ends after the line was written."""
     named = threading.Event()
     monkeypatch.setattr(cells, "LONG", 0.0)
+    monkeypatch.setattr(cells, "_compiled", set())
     run = RK4Method.run
 
     def slow(*arguments):
@@ -259,6 +260,11 @@ def test_task_that_runs_long_is_named_with_its_coordinates_and_then_its_longest_
     said = []
     monkeypatch.setattr(cells.logger, "info", lambda text, *of: said.append(text % of) or named.set())
     given = load({"scene": SCENE, "solver": RK4, "sweep": {"grid": AXES | {"zone.half_angle": [0.1]}}})
+    cells.compute_task(given, Layout((2, 1)), np.arange(2))
+    # The first task may compile.
+    assert not any("took" in text for text in said)
+    assert "kernels are still compiled, or events" in said.pop(0)
+    named.clear()
     cells.compute_task(given, Layout((2, 1)), np.arange(2))
     where = "drive.amplitude = 0.5 to 2, zone.half_angle = 0.1 (SI units)"
     assert said[0].startswith(f"not done after 0 s: {where}; events")

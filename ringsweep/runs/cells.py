@@ -106,10 +106,12 @@ def compute_task(config: Config, layout: Layout, positions: NDArray[np.integer])
         if not len(own):
             continue
         values = values_at(scene, axes, {dim: along[own] for dim, along in indices.items()}, len(own))
-        with readable_compile_errors(), _named_if_long(axes, indices):
+        with readable_compile_errors(), _named_if_long(axes, indices, compiles):
             began = perf_counter()
             result = config.solver.run(batch(structure, values), model.outcomes)
-            _name_longest(axes, {dim: along[own] for dim, along in indices.items()}, result, perf_counter() - began)
+            # A compilation would count as time of the cells.
+            if not compiles and (took := perf_counter() - began) >= LONG:
+                _name_longest(axes, {dim: along[own] for dim, along in indices.items()}, result, took)
         # A bound beyond the range of a float of 32 bits is infinite.
         with np.errstate(over="ignore"):
             for name, column in _columns(model.outcomes, result):
@@ -121,15 +123,16 @@ def compute_task(config: Config, layout: Layout, positions: NDArray[np.integer])
 
 
 @contextmanager
-def _named_if_long(axes: Axes, indices: Indices) -> Iterator[None]:
+def _named_if_long(axes: Axes, indices: Indices, compiles: bool) -> Iterator[None]:
     """Name the cells of a task, and say why one may be slow, if the block takes long."""
     timer = Timer(
         LONG,
         logger.info,
         (
-            "not done after %g s: %s (SI units); events, or friction that changes within a tiny speed, take many steps",
+            "not done after %g s: %s; %sevents, or friction that changes within a tiny speed, take many steps",
             LONG,
-            _place(axes, indices) or "the run",
+            _place(axes, indices),
+            "kernels are still compiled, or " * compiles,
         ),
     )
     timer.daemon = True
@@ -142,13 +145,11 @@ def _named_if_long(axes: Axes, indices: Indices) -> Iterator[None]:
 
 def _name_longest(axes: Axes, indices: Indices, result: Result, seconds: float) -> None:
     """Name the cell that took most of a long task, and say which limit of steps stands for a minute."""
-    if seconds < LONG:
-        return
     longest = int(np.argmax(result.steps))
-    place = _place(axes, {dim: along[longest : longest + 1] for dim, along in indices.items()}) or "the run"
-    most, total = float(result.steps[longest]), float(result.steps.sum())
+    place = _place(axes, {dim: along[longest : longest + 1] for dim, along in indices.items()})
+    most, total = float(result.steps[longest]), max(float(result.steps.sum()), 1.0)
     logger.info(
-        "%s (SI units) took %.2g steps, %.2g s; a run of %.2g steps takes a minute here: solver.max_steps bounds each",
+        "%s took %.2g steps, %.2g s; a run of %.2g steps takes a minute here: solver.max_steps bounds each",
         place,
         most,
         seconds * most / total,
@@ -163,7 +164,7 @@ def _place(axes: Axes, indices: Indices) -> str:
         found = np.unique(column[tuple(indices[dim] for dim in dims)])
         ends = dict.fromkeys(one if isinstance(one, str) else f"{one:g}" for one in (found[0], found[-1]))
         words.append(f"{path} = {' to '.join(ends)}")
-    return ", ".join(words)
+    return f"{', '.join(words)} (SI units)" if words else "the run"
 
 
 def _columns(outcomes: tuple[str, ...], result: Result) -> Iterator[tuple[str, NDArray[Any]]]:
