@@ -251,7 +251,10 @@ def test_part_of_a_history_is_drawn_and_a_run_of_another_scene_is_replaced_with_
         other["scene"]["impact"] = {"restitution": 0.5}
         with_impact = run.assign_attrs(configuration=json.dumps(other))
     assert commands._other_scene(Path("case-run.nc"), with_impact) == "impact.restitution was absent"
-    assert main(["plot", "case-run.nc", "--from", "1", "--to", "2", "-o", "part.png"]) == 0
+    assert main(["plot", "case-run.nc", "--from", "1", "--to", "2000 ms", "-o", "part.png"]) == 0
+    with pytest.raises(SystemExit):
+        main(["plot", "case-run.nc", "--from", "1 m"])
+    assert "argument --from: '1 m' has the wrong unit: the time is in s" in capsys.readouterr().err
     assert (folder / "part.png").stat().st_size > 1000
     capsys.readouterr()
     assert "has times from 0 to 10 s: none" in refused(capsys, "plot", "case-run.nc", "--from", "11")
