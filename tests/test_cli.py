@@ -14,7 +14,7 @@ import xarray as xr
 from jsonschema import Draft202012Validator
 
 import ringsweep
-from ringsweep.cli import main, report
+from ringsweep.cli import commands, main, report
 from ringsweep.cli.parser import build_parser
 from ringsweep.config import load
 from ringsweep.config.schema import schema
@@ -180,6 +180,8 @@ def test_ends_in_the_wrong_order_are_told_with_their_unit(scene):
         (("--set", "velocity=2"), "scene.velocity: unknown key: model belt has `belt.velocity` or `initial.velocity`"),
         (("--set", "spring.stiffness=2"), "scene.spring: unknown key: model belt has `spring`, this is model ring"),
         (("--set", "mass=2"), "scene.mass: unknown key; did you mean `body.mass`?"),
+        (("--set", "friction.rough.mu=2"), "scene.friction.rough.mu: unknown key; did you mean `mu_"),
+        (("--set", "zone.half_angle=40 mm"), "is in rad: the angle of an arc is its length divided by the radius"),
         (("--set", "zone.from=2"), "a zone has a center, which is (from + to)/2"),
         (("--set", "drive.amplitude=2"), "scene.drive.amplitude: is swept here"),
     ],
@@ -199,6 +201,9 @@ def test_misspelt_option_and_configuration_in_place_of_a_result_are_told(folder,
     with pytest.raises(SystemExit):
         main(["run", "case.yaml", "--dryrun"])
     assert "unrecognized arguments: --dryrun; did you mean --dry-run?" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["map", "case.nc", "--units", "deg"])
+    assert capsys.readouterr().err.endswith("unrecognized arguments: --units deg\n")
     assert "case.yaml: is a configuration, not a result: `ringsweep run case.yaml`" in refused(
         capsys, "map", "case.yaml"
     )
@@ -218,6 +223,20 @@ def test_control_characters_of_a_file_and_of_a_name_are_escaped(folder, capsys):
     assert "no\\x1b[31m.nc: does not exist" in err
 
 
+def test_warning_of_a_library_is_a_line_of_the_log_with_control_characters_escaped(folder, capsys):
+    """Matplotlib quotes what it cannot draw. Python would print the escape sequence, and a line of code."""
+    assert main(["run", "case.yaml", "-o", "out.nc"]) == 0
+    with netcdf.open_dataset("out.nc") as result:
+        crafted = result.load()
+    crafted["drive_amplitude"].attrs |= {"long_name": "\x1b]0;title\x07", "units": "\x1b[2J"}
+    crafted.to_netcdf("crafted.nc")
+    script = "import sys; from ringsweep.cli import main; sys.exit(main(['map', 'crafted.nc']))"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "\x1b" not in done.stderr
+    assert "savefig" not in done.stderr
+
+
 def test_link_to_itself_is_no_output(folder, capsys):
     (folder / "loop.nc").symlink_to("loop.nc")
     assert "loop.nc: is a symbolic link that leads to itself" in refused(capsys, "run", "case.yaml", "-o", "loop.nc")
@@ -227,7 +246,15 @@ def test_part_of_a_history_is_drawn_and_a_run_of_another_scene_is_replaced_with_
     for amplitude in ("2", "3"):
         assert main(["simulate", "case.yaml", "--set", f"drive.amplitude={amplitude}"]) == 0
     assert "case-run.nc held a run of another scene, which is replaced: drive.amplitude was 2" in caplog.text
-    assert main(["plot", "case-run.nc", "--from", "1", "--to", "2", "-o", "part.png"]) == 0
+    with netcdf.open_dataset("case-run.nc") as run:
+        other = json.loads(run.attrs["configuration"])
+        other["scene"]["impact"] = {"restitution": 0.5}
+        with_impact = run.assign_attrs(configuration=json.dumps(other))
+    assert commands._other_scene(Path("case-run.nc"), with_impact) == "impact.restitution was absent"
+    assert main(["plot", "case-run.nc", "--from", "1", "--to", "2000 ms", "-o", "part.png"]) == 0
+    with pytest.raises(SystemExit):
+        main(["plot", "case-run.nc", "--from", "1 m"])
+    assert "argument --from: '1 m' has the wrong unit: the time is in s" in capsys.readouterr().err
     assert (folder / "part.png").stat().st_size > 1000
     capsys.readouterr()
     assert "has times from 0 to 10 s: none" in refused(capsys, "plot", "case-run.nc", "--from", "11")

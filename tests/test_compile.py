@@ -17,6 +17,7 @@ import ringsweep
 from ringsweep.compile import cache, numba_private, readable_compile_errors
 from ringsweep.compile.cache import IN_KERNELS, sources_digest
 from ringsweep.compile.numba_private import AVAILABLE
+from ringsweep.errors import InputError
 
 PACKAGE = Path(ringsweep.__file__).parent
 
@@ -29,6 +30,7 @@ sys.modules["numba._dynfunc"] = None
 
 import ringsweep
 from ringsweep.compile.numba_private import AVAILABLE
+from ringsweep.errors import InputError
 
 assert not AVAILABLE
 found = ringsweep.sweep({scene!r}, {axes!r}, solver="event", jobs=1, progress=False)
@@ -116,6 +118,12 @@ def test_new_file_of_a_law_changes_the_digest_of_sources(package):
     before = sources_digest(package)
     (package / "physics" / "friction" / "new.py").write_text("")
     assert sources_digest(package) != before
+
+
+def test_pipe_in_place_of_an_own_file_is_refused_before_it_is_waited_for(package, tmp_path):
+    os.mkfifo(tmp_path / "own.py")
+    with pytest.raises(InputError, match=r"own\.py is not a file"):
+        sources_digest(package, [tmp_path / "own.py"])
 
 
 @pytest.mark.parametrize("text", ["", "# A law."])

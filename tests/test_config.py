@@ -826,6 +826,10 @@ def test_whole_configuration_in_place_of_a_scene_is_refused_with_a_hint(call):
     assert "pass config['scene']" in error.problem
 
 
+def test_scene_in_place_of_a_whole_configuration_is_refused_with_its_place():
+    assert refusal(load, SCENE).problem == "unknown section: it belongs under `scene`"
+
+
 @pytest.mark.parametrize(
     ("section", "table", "path"),
     [

@@ -1033,3 +1033,8 @@ class TestColoursOfNumbers:
         ds = make_sweep((10, 10)).assign_attrs(configuration=json.dumps({"scene": scene}))
         ds["drive_amplitude"].attrs["path"] = "drive.amplitude"
         assert title(plots.regime_map(ds)) == "regime of the run; dahl; drive arctan; span 1 min"
+
+
+def test_one_variable_in_place_of_a_dataset_is_refused_with_the_call_that_draws_it():
+    with pytest.raises(InputError, match=r"got one variable: regime_map\(ds, var='phi_end'\) draws it"):
+        plots.regime_map(xr.DataArray([[0.5]], name="phi_end"))

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import threading
+from time import sleep
 
 import dask
 import joblib
@@ -19,6 +20,7 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 import ringsweep
 from benchmarks.hostile.attack import same_bits
 from ringsweep import cli
+from ringsweep.runs import dask as remote
 from ringsweep.runs.executors import Execution
 from ringsweep.runs.task_sizes import TaskSizes
 from ringsweep.storage.checkpoint import Checkpoint
@@ -246,6 +248,21 @@ def test_frozen_scheduler_does_not_hold_up_the_second_interrupt(scene, monkeypat
             assert threading.main_thread() not in asked
     finally:
         frozen.set()
+
+
+def test_workers_that_pause_for_want_of_memory_are_told_with_the_likely_cure(monkeypatch, caplog):
+    """A worker above its limit takes no task. Here the scheduler says so of one that works a second."""
+    monkeypatch.setattr(remote, "_PAUSE", 0.05)
+    monkeypatch.setattr("distributed.Client.scheduler_info", lambda *_, **__: {"workers": {"a": {"status": "paused"}}})
+    with (
+        LocalCluster(1, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL) as alone,
+        remote.workers(alone.scheduler_address) as workers,
+        caplog.at_level("WARNING", "ringsweep"),
+    ):
+        found = list(workers.results(lambda task: sleep(1.0) or 3, iter([np.arange(3)]), int, threading.Event()))
+    assert found == [3]
+    told = [record.getMessage() for record in caplog.records if record.name == "ringsweep"]
+    assert told == [f"all workers have paused, as their memory is nearly full ({remote._CURE})"]
 
 
 def test_workers_that_die_with_their_cells_are_told_with_the_likely_cure(scene, monkeypatch):

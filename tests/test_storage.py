@@ -11,7 +11,7 @@ import xarray as xr
 import ringsweep
 from ringsweep.errors import InputError
 from ringsweep.quantities.variables import OUTCOMES
-from ringsweep.storage import files, netcdf
+from ringsweep.storage import files, netcdf, provenance
 
 
 @pytest.fixture
@@ -161,3 +161,16 @@ def test_words_replace_flags_and_a_variable_without_flags_is_refused():
     assert not told.attrs, "a comparison would inherit them"
     with pytest.raises(InputError, match="phi_end"):
         ringsweep.words(xr.DataArray([0.5], name="phi_end"))
+    with pytest.raises(InputError, match=r"data: is not a classification, such as ds\.regime"):
+        ringsweep.words(xr.Dataset({"regime": told}))
+
+
+def test_processor_with_a_feature_turned_off_has_another_name(monkeypatch):
+    """It rounds sums of products differently, so a file must not name both alike."""
+    names = []
+    for features in ("+fma,+avx2", "-fma,+avx2"):
+        monkeypatch.setattr(provenance.numba.config, "CPU_NAME", "generic")
+        monkeypatch.setattr(provenance.numba.config, "CPU_FEATURES", features)
+        names.append(provenance.processor.__wrapped__())
+    assert len(set(names)) == 2
+    assert all(name.startswith("generic-") for name in names)

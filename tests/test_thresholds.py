@@ -40,6 +40,17 @@ class TestThreshold:
             ends = ringsweep.sweep(scene, {"drive.amplitude": [value - 1.001 * error, value + 1.001 * error]})
             assert (ringsweep.words(ends.regime).values == "separating").tolist() == [begins == 0, begins == 1]
 
+    def test_axis_beside_the_threshold_has_the_value_of_the_command_line(self, tmp_path, capsys):
+        """k v T = mu_s m g again, with a spring that the sweep varies."""
+        grid = {"friction.mu_s": [0.12, 0.4], "spring.stiffness": [2.0, 3.0]}
+        config = tmp_path / "belt.yaml"
+        config.write_text(json.dumps({"scene": BELT, "sweep": {"grid": grid}}))
+        asked = ["threshold", str(config), "--path", "friction.mu_s", "--regime", "riding"]
+        assert cli.main([*asked, "--set", "spring.stiffness=3", "--scan", "5"]) == 0
+        assert "riding begins at friction.mu_s = 0.30581" in capsys.readouterr().out
+        assert cli.main([*asked, "--set", "friction.mu_s=0.2"]) == 2
+        assert "friction.mu_s: is swept here" in capsys.readouterr().err
+
     def test_interval_without_a_change_has_no_threshold(self, tmp_path, capsys):
         config = tmp_path / "belt.yaml"
         config.write_text(json.dumps({"scene": BELT, "sweep": {"grid": {"friction.mu_s": [0.3, 0.4]}}}))

@@ -5,6 +5,7 @@ import subprocess
 import sys
 import threading
 import tracemalloc
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ from ringsweep.runs import cells
 from ringsweep.runs.warnings import _hint_at_one_word, warn_of_results
 from ringsweep.solvers.rk4 import RK4 as RK4Method
 from ringsweep.storage import netcdf
+from ringsweep.storage.chunks import Layout
 
 SCENE = load(Path(__file__).parents[1] / "configs" / "regime_map.yaml").source["scene"] | {"time": {"span": "0.5 s"}}
 FRICTION = {"rough": {"mu_s": 0.5, "mu_k": 0.3}, "rest": {"mu_s": 0.2, "mu_k": 0.1}}
@@ -242,18 +244,47 @@ def test_summary_of_a_file_reads_it_chunk_by_chunk(tmp_path, capsys):
     assert peak < 8e6
 
 
-def test_task_that_runs_long_is_named_with_its_coordinates(monkeypatch):
+def test_task_that_runs_long_is_named_with_its_coordinates_and_then_its_longest_cell(monkeypatch):
     """Here each task does: the block ends after the line was written."""
     named = threading.Event()
     monkeypatch.setattr(cells, "LONG", 0.0)
+    monkeypatch.setattr(cells, "_compiled", set())
     run = RK4Method.run
 
     def slow(*arguments):
         named.wait(10.0)
-        return run(*arguments)
+        result = run(*arguments)
+        return replace(result, steps=np.array([100.0, 300.0]))
 
     monkeypatch.setattr(RK4Method, "run", slow)
     said = []
     monkeypatch.setattr(cells.logger, "info", lambda text, *of: said.append(text % of) or named.set())
-    ringsweep.sweep(SCENE, {"drive.amplitude": [0.5]}, solver=RK4, progress=False)
-    assert said[0].startswith("not done after 0 s, first cell (SI units) drive.amplitude = 0.5: many events")
+    given = load({"scene": SCENE, "solver": RK4, "sweep": {"grid": AXES | {"zone.half_angle": [0.1]}}})
+    cells.compute_task(given, Layout((2, 1)), np.arange(2))
+    # The first task may compile.
+    assert not any("took" in text for text in said)
+    assert "kernels are still compiled, or events" in said.pop(0)
+    named.clear()
+    cells.compute_task(given, Layout((2, 1)), np.arange(2))
+    where = "drive.amplitude = 0.5 to 2, zone.half_angle = 0.1 (SI units)"
+    assert said[0].startswith(f"not done after 0 s: {where}; events")
+    assert said[1].startswith("drive.amplitude = 2, zone.half_angle = 0.1 (SI units) took 3e+02 steps, ")
+
+
+def test_cells_whose_contacts_cannot_meet_a_zone_are_told(caplog):
+    """A ring that swings by 10 deg, with a body near its bottom whose contacts are 48.5 deg from the centre."""
+    drive = {"law": "sinusoidal", "amplitude": "10 deg"}
+    scene = SCENE | {"drive": drive, "time": {"span": "10 s"}, "friction": {"law": "stiction", **FRICTION}}
+    axes = {"drive.frequency": [0.1, 0.5], "friction.rest.mu_k": [0.05, 0.1]}
+
+    def told(center):
+        caplog.clear()
+        with caplog.at_level("INFO", "ringsweep"):
+            ringsweep.sweep(scene | {"zone": {"center": center, "half_angle": "15 deg"}}, axes, progress=False)
+        return [message for message in caplog.messages if "no contact meets a zone" in message]
+
+    assert told("180 deg") == [
+        "no contact meets a zone in any cell: zone.center is the angle from the bottom of the ring"
+    ]
+    assert not told("40 deg")
+    assert not told("-60 deg")

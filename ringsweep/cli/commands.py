@@ -378,7 +378,9 @@ def _other_scene(target: Path, result: Any) -> str:
         return ""
     with netcdf.open_dataset(target) as earlier:
         old, new = (_leaves(json.loads(ds.attrs["configuration"])["scene"]) for ds in (earlier, result))
-    return "; ".join(f"{path} was {old.get(path)}" for path in {**old, **new} if old.get(path) != new.get(path))
+    return "; ".join(
+        f"{path} was {old.get(path, 'absent')}" for path in {**old, **new} if old.get(path) != new.get(path)
+    )
 
 
 def _leaves(node: Any, path: str = "") -> dict[str, Any]:

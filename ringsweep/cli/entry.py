@@ -10,6 +10,7 @@ import signal
 import sys
 import threading
 import traceback
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout, suppress
 from typing import Any
@@ -38,10 +39,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     arguments, unknown = parser.parse_known_args(given)
     if unknown:
-        near = nearest_name(unknown[0], re.findall(r"--[a-z-]+", arguments.parser.format_usage()))
+        # With the hyphens, which all have in common, --units would be near --boundaries.
+        near = nearest_name(unknown[0].lstrip("-"), re.findall(r"--([a-z-]+)", arguments.parser.format_usage()))
         apart = any(word.startswith("-") for word in given) and not unknown[0].startswith("-")
         hint = "; a value with a space needs quotes: --set 'drive.amplitude=2 rad/s'" if apart else ""
-        hint = f"; did you mean {near}?" if unknown[0].startswith("-") and near else hint
+        hint = f"; did you mean --{near}?" if unknown[0].startswith("-") and near else hint
         parser.error(f"unrecognized arguments: {' '.join(unknown)}{hint}")
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
     logging.getLogger().handlers[0].setFormatter(_Formatter(_is_coloured(sys.stderr)))
@@ -49,7 +51,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         logging.DEBUG if arguments.verbose else logging.WARNING if arguments.quiet else logging.INFO
     )
     try:
-        with _terminable(), redirect_stdout(None if arguments.quiet else _Escaped(sys.stdout)):
+        with (
+            _terminable(),
+            _warnings_in_one_line(),
+            redirect_stdout(None if arguments.quiet else _Escaped(sys.stdout)),
+        ):
             status = arguments.command(arguments)
     except InputError as error:
         return _fail(str(error), 2, error)
@@ -84,6 +90,14 @@ def _terminable() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGTERM, before)
+
+
+@contextmanager
+def _warnings_in_one_line() -> Iterator[None]:
+    """Log warnings of libraries, which may quote what a file holds, without the lines of code that they come from."""
+    with warnings.catch_warnings():
+        warnings.showwarning = lambda message, *_: logging.getLogger("ringsweep").warning("%s", message)
+        yield
 
 
 def _fail(message: str, status: int, error: BaseException | None = None) -> int:

@@ -23,7 +23,7 @@ from ringsweep.cli.commands import (
     threshold_command,
     verify_command,
 )
-from ringsweep.errors import shortened
+from ringsweep.errors import InputError, shortened
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -170,8 +170,10 @@ def build_parser() -> argparse.ArgumentParser:
     plot.add_argument("--sel", action="append", default=[], metavar="DIM=VALUE", help="cell of a sampled sweep")
     plot.add_argument("--word", metavar="REGIME", help="regime whose Sobol indices are drawn")
     plot.add_argument("--law", metavar="LAW", help="the run under this friction law, if RUN.nc has several")
-    plot.add_argument("--from", type=float, dest="begin", metavar="T", help="draw the history from this time on, s")
-    plot.add_argument("--to", type=float, dest="end", metavar="T", help="draw the history up to this time, s")
+    plot.add_argument("--from", type=instant, dest="begin", metavar="T", help="draw the history from this time on")
+    plot.add_argument(
+        "--to", type=instant, dest="end", metavar="T", help="draw the history up to this time; units allowed"
+    )
 
     animate = _add_command(commands, "animate", animate_command, "run once: film of the body", """
         ringsweep animate my.yaml          my-run.gif
@@ -292,6 +294,17 @@ def whole_number(text: str) -> int:
     if not text.isdecimal() or len(text) > 18 or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least 1")
     return int(text)
+
+
+def instant(text: str) -> float:
+    """A time in seconds, from an argument that may have a unit."""
+    from ringsweep.quantities.parameters import Parameter
+    from ringsweep.quantities.units import quantity
+
+    try:
+        return quantity(text, Parameter("s", "the time"), "time")
+    except InputError as error:
+        raise argparse.ArgumentTypeError(error.problem) from None
 
 
 def positive_number(text: str) -> float:

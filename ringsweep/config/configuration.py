@@ -202,7 +202,9 @@ def _validate(doc: Document) -> Config:
     tree = doc.tree
     for key in tree:
         if key not in _SECTIONS:
-            raise InputError(key, "unknown section" + suggestion(key, _SECTIONS))
+            # A scene alone has a model; a configuration has it within the scene.
+            hint = ": it belongs under `scene`" if "model" in tree else suggestion(key, _SECTIONS)
+            raise InputError(key, "unknown section" + hint)
     sweep = sweep_section(doc)
     swept = swept_paths(sweep)
     laws = [(f"sweep.{kind}.{LAW}", columns[LAW]) for kind, columns in sweep.items() if LAW in columns]

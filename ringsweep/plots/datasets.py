@@ -48,8 +48,12 @@ def require_sweep(ds: xr.Dataset) -> None:
     Raises
     ------
     InputError
-        If the dataset holds the history of a run, or error against run time.
+        If it holds the history of a run, or error against run time, or if it is one variable only.
     """
+    if not hasattr(ds, "data_vars"):
+        raise InputError(
+            "ds", f"a dataset is expected, got one variable: regime_map(ds, var={str(ds.name)!r}) draws it"
+        )
     if "time" in ds.dims:
         raise InputError("ds", "is the time history of one run, not a sweep; ringsweep plot draws it, or plots.history")
     if "contender" in ds.dims:

@@ -207,7 +207,8 @@ def _factor_or_error(unit: str, value: str, parameter: Parameter, path: str) -> 
             path, f"{show(value)}: {show(unit)} is not a known unit; {parameter.long_name} {target}"
         ) from None
     except ValueError:
-        raise InputError(path, f"{show(value)} has the wrong unit: {parameter.long_name} {target}") from None
+        hint = ": the angle of an arc is its length divided by the radius" if parameter.unit == "rad" else ""
+        raise InputError(path, f"{show(value)} has the wrong unit: {parameter.long_name} {target}{hint}") from None
 
 
 @lru_cache(maxsize=256)

@@ -339,7 +339,9 @@ def words(data: xr.DataArray) -> xr.DataArray:
     ['oscillatory', 'separating']
     """
     if not {"flag_values", "flag_meanings"} <= data.attrs.keys():
-        raise InputError(str(data.name), "is not a classification: it has no flag_values and flag_meanings")
+        # A whole dataset has no name.
+        name = str(getattr(data, "name", "data"))
+        raise InputError(name, "is not a classification, such as ds.regime: it has no flag_values and flag_meanings")
     meanings = dict(zip(np.atleast_1d(data.attrs["flag_values"]), data.attrs["flag_meanings"].split(), strict=True))
     text = np.full(data.shape, "", dtype=f"<U{max(map(len, meanings.values()))}")
     for value, meaning in meanings.items():

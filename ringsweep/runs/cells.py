@@ -109,11 +109,15 @@ def compute_task(config: Config, layout: Layout, positions: NDArray[np.integer])
         own = np.flatnonzero(laws == law)
         if not len(own):
             continue
-        with readable_compile_errors(), _named_if_long(axes, indices):
+        with readable_compile_errors(), _named_if_long(axes, indices, compiles):
+            began = perf_counter()
             for cells, found in _runs(config, structure, indices, own):
                 for name, column in found.items():
                     if name not in model.absent:
                         columns.setdefault(name, _missing(name, len(positions), column))[cells] = column
+            # A compilation would count as time of the cells.
+            if not compiles and (took := perf_counter() - began) >= LONG:
+                _name_longest(axes, {dim: along[own] for dim, along in indices.items()}, columns["steps"][own], took)
     seconds = perf_counter() - start
     _compiled.add(compiled)
     return TaskResult(positions, columns, None if compiles else seconds, environment(), processor())
@@ -189,18 +193,16 @@ def _outcomes(
 
 
 @contextmanager
-def _named_if_long(axes: Axes, indices: Indices) -> Iterator[None]:
-    """Name the first cell of a task, and say why it may be slow, if the block takes long."""
-    first = {path: column[tuple(indices[dim][0] for dim in dims)] for path, (dims, column) in axes.columns.items()}
-    at = ", ".join(f"{path} = {value if isinstance(value, str) else f'{value:g}'}" for path, value in first.items())
+def _named_if_long(axes: Axes, indices: Indices, compiles: bool) -> Iterator[None]:
+    """Name the cells of a task, and say why one may be slow, if the block takes long."""
     timer = Timer(
         LONG,
         logger.info,
         (
-            "not done after %g s%s: many events, or friction that changes within a tiny speed, take many steps; "
-            "solver.max_steps bounds them",
+            "not done after %g s: %s; %sevents, or friction that changes within a tiny speed, take many steps",
             LONG,
-            f", first cell (SI units) {at}" * bool(at),
+            _place(axes, indices),
+            "kernels are still compiled, or " * compiles,
         ),
     )
     timer.daemon = True
@@ -209,6 +211,30 @@ def _named_if_long(axes: Axes, indices: Indices) -> Iterator[None]:
         yield
     finally:
         timer.cancel()
+
+
+def _name_longest(axes: Axes, indices: Indices, steps: NDArray[Any], seconds: float) -> None:
+    """Name the cell that took most of a long task, and say which limit of steps stands for a minute."""
+    longest = int(np.argmax(steps))
+    place = _place(axes, {dim: along[longest : longest + 1] for dim, along in indices.items()})
+    most, total = float(steps[longest]), max(float(steps.sum()), 1.0)
+    logger.info(
+        "%s took %.2g steps, %.2g s; a run of %.2g steps takes a minute here: solver.max_steps bounds each",
+        place,
+        most,
+        seconds * most / total,
+        60.0 * total / seconds,
+    )
+
+
+def _place(axes: Axes, indices: Indices) -> str:
+    """Values of some cells, or the ends of their ranges, in words."""
+    words = []
+    for path, (dims, column) in axes.columns.items():
+        found = np.unique(column[tuple(indices[dim] for dim in dims)])
+        ends = dict.fromkeys(one if isinstance(one, str) else f"{one:g}" for one in (found[0], found[-1]))
+        words.append(f"{path} = {' to '.join(ends)}")
+    return f"{', '.join(words)} (SI units)" if words else "the run"
 
 
 def _columns(outcomes: tuple[str, ...], result: Result) -> Iterator[tuple[str, NDArray[Any]]]:

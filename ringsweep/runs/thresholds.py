@@ -12,8 +12,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsweep.config import Config, load, sweepable, with_values
-from ringsweep.config.axes import Axes, dimension, swept_parameter
+from ringsweep.config import Config, load, sweepable, with_values, yaml_text
+from ringsweep.config.axes import Axes, dimension, sweep_section, swept_parameter, swept_paths
 from ringsweep.config.consistency import check_consistency
 from ringsweep.config.sections import suggestion
 from ringsweep.errors import InputError
@@ -105,9 +105,11 @@ def threshold(
     """
     if isinstance(config, Mapping) and "scene" not in config:
         config = {"scene": config}
-    if between is not None and (not isinstance(between, list | tuple) or len(between) != 2):
-        raise InputError("between", f"a pair of values is expected, got {show(between)}")
-    low, high = between or (None, None)
+    try:
+        low, high = (None, None) if between is None else between
+    except (TypeError, ValueError):
+        problem = f"the two ends of an interval are expected, such as (0.5, 8), got {show(between)}"
+        raise InputError("between", problem) from None
     return locate(config, path, regime, (low, high), tolerance, scan=scan, jobs=jobs)
 
 
@@ -134,7 +136,7 @@ def locate(
     if regime not in REGIMES:
         raise InputError("regime", f"{show(regime)} is not a regime" + suggestion(regime, REGIMES))
     settings = list(settings)
-    if (whole := load(config, settings)).sample is not None:
+    if (whole := load(config, _beside_axes(config, path, settings))).sample is not None:
         low, high = _ends(whole, path, between)
         return distribution(whole, path, regime, *_scan(whole, path, (low, high), tolerance, scan), jobs=jobs)
     one, low, high = _interval(config, path, between, settings)
@@ -295,9 +297,18 @@ def _ends(whole: Config, path: str, between: tuple[Any, Any]) -> tuple[float, fl
     return ends[0], ends[1]
 
 
+def _beside_axes(config: Any, path: str, settings: list[str]) -> list[str]:
+    """Settings without those of axes other than `path`: what is swept beside it has one value here, which they give."""
+    doc = yaml_text.read(config)
+    with doc.locating_errors():
+        sweep = sweep_section(doc)
+    others = set() if "sample" in sweep else set(swept_paths(sweep)) - {path.removeprefix("scene.")}
+    return [one for one in settings if one.partition("=")[0].strip().removeprefix("scene.") not in others]
+
+
 def _interval(config: Any, path: str, between: tuple[Any, Any], settings: list[str]) -> tuple[Config, float, float]:
     """Configuration of a single run, and the ends of the interval in SI units."""
-    low, high = _ends(load(config, settings), path, between)
+    low, high = _ends(load(config, _beside_axes(config, path, settings)), path, between)
     try:
         one = with_values(config, [*settings, f"{path}={low!r}"])
     except InputError as error:

@@ -9,8 +9,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ringsweep.compile import take
 from ringsweep.config import Config
 from ringsweep.models import batch
+from ringsweep.physics import drives, ring, zones
 from ringsweep.physics.drives import Constant
 from ringsweep.quantities.flags import FAILED, REGIMES, RIDING
 from ringsweep.quantities.variables import INFERRED
@@ -21,6 +23,9 @@ from ringsweep.storage.chunks import Layout
 
 # Least number of cells of which it is surprising that all have one regime, and of values that change nothing.
 _MAP, _ALONG = 16, 3
+
+# Most cells of which it is asked whether a contact met a zone, and instants at which the ring is looked at.
+_CELLS, _INSTANTS = 64, 1000
 
 logger = logging.getLogger("ringsweep")
 
@@ -75,6 +80,7 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
     if "regime" in results:
         _warn_of_failures(results, config)
         _hint_at_idle_axes(results)
+        _hint_at_zone_never_met(results, config)
     if ended_at_start > 0.5 * count:
         runs = "the run ends" if count == 1 else f"{ended_at_start / count:.0%} of the runs end"
         logger.warning("%s at t = 0: is a unit or the initial state wrong?", runs)
@@ -147,6 +153,45 @@ def _hint_at_idle_axes(results: xr.Dataset) -> None:
             continue
         why = ": no contact meets an edge of the zone, or friction is alike on both sides" if "zone" in dim else ""
         logger.info("no number depends on %s%s", dim, why)
+
+
+def _hint_at_zone_never_met(results: xr.Dataset, config: Config) -> None:
+    """Say that no contact came to a zone, if the ranges of body and ring exclude it in cells spread over the grid."""
+    regime = results["regime"].variable
+    draw = np.random.default_rng(0)
+    drawn = np.arange(regime.size) if regime.size <= _CELLS else np.sort(draw.integers(regime.size, size=_CELLS))
+    if not all(_misses_zones(results, config, np.unravel_index(k, regime.shape)) for k in drawn):
+        return
+    who = (
+        "the run"
+        if regime.size == 1
+        else f"{len(drawn)} of {regime.size} cells"
+        if regime.size > _CELLS
+        else "any cell"
+    )
+    logger.info("no contact meets a zone in %s: zone.center is the angle from the bottom of the ring", who)
+
+
+def _misses_zones(results: xr.Dataset, config: Config, cell: tuple[np.intp, ...]) -> bool:
+    """Whether no contact of a cell can have met a zone."""
+    scene, axes = config.scene, config.axes
+    indices = dict(zip(axes.sizes, np.atleast_2d(np.array(cell)).T, strict=False))
+    structure = scene.structures[str(laws_at(scene, axes, indices, 1)[0])]
+    one = take(batch(structure, values_at(scene, axes, indices, 1)), 0)
+    if not isinstance(getattr(one, "surface", None), zones.Segments):
+        return False
+    end, low, high = (float(results[name].variable[cell].values) for name in ("t_end", "phi_min", "phi_max"))
+    # Multiples of the golden ratio meet no period of a drive again and again.
+    theta = [drives.turn(one.drive, t)[0] for t in end * (np.arange(_INSTANTS) * 0.6180339887498949 % 1.0)]
+    margin = 0.01 * (max(theta) - min(theta))
+    width = high - low + max(theta) - min(theta) + 2.0 * margin
+    for side in (-1.0, 1.0):
+        first = low + side * ring.contact_offset(one.body) - max(theta) - margin
+        at = one.surface.arc[zones.segment(one.surface, first)]
+        # NaN, of a cell that was not run, says nothing.
+        if at or not np.all((one.surface.edges - first) % (2.0 * np.pi) > width):
+            return False
+    return True
 
 
 def _is_idle(column: xr.Variable, dim: str) -> bool:

@@ -404,7 +404,9 @@ def verify(path: str | os.PathLike[str]) -> None:
     >>> ringsweep.verify("my-sweep.nc")
     """
     if not check(path):
-        raise InputError(str(path), "no digest: an older version wrote it, or it was removed. Nothing is known")
+        raise InputError(
+            str(path), "no digest: xarray or an older version wrote it, or it was removed. Nothing is known"
+        )
 
 
 _DAMAGED = "is not a NetCDF file, or is damaged"
