@@ -1,5 +1,7 @@
 """Boundaries of a map as curves, and their uncertainty exponent."""
 
+import re
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -137,7 +139,13 @@ class TestBoundary:
         figure = plots.regime_map(ds, boundaries=curves)
         lines = figure.axes[0].lines
         assert sum(len(line.get_xdata()) for line in lines) == curves.sizes["vertex"]
-        assert "boundary of separating" in " ".join(text.get_text() for text in figure.axes[0].get_legend().get_texts())
+        legend = " ".join(text.get_text() for text in figure.axes[0].get_legend().get_texts())
+        assert "boundary of separating" in legend
+        # The error is told in the units of the axes: the same number of radians is a greater number of degrees.
+        tolerance = curves.attrs["boundary_tolerance"]
+        told = {unit: float(number) for number, unit in re.findall(r"([\d.]+) ?(rad s|°)", legend)}
+        assert told["°"] == pytest.approx(np.degrees(tolerance), rel=0.05)
+        assert told["rad s"] == pytest.approx(tolerance, rel=0.05)
         netcdf.save(ds, tmp_path / "my.nc")
         assert cli.main(["map", str(tmp_path / "my.nc"), "--boundaries", "separating", "--tolerance", "1e-2"]) == 0
         written = netcdf.load(tmp_path / "my-separating.nc")

@@ -25,11 +25,11 @@ from numpy.typing import NDArray
 from ringsweep.errors import InputError
 from ringsweep.plots.datasets import is_numeric, is_sampled, require_sweep, resolve, scene_text, swept
 from ringsweep.plots.labels import (
+    amount_text,
     axis_label,
     display_factor,
     displayed,
     long_name,
-    number_text,
     plain_text,
     value_text,
 )
@@ -93,7 +93,7 @@ def regime_map(
     The cells of a grid are coloured rectangles, points make a scatter plot. One swept quantity makes a strip (of a
     classification) or a line (of numbers). More than two dimensions make small multiples. If an axis has more values
     than a page has pixels, only every second, third, ... is drawn, and the title says so; the legend gives shares of
-    all cells.
+    all cells. Cells of rare classes are drawn in place of neighbours if they would all be left out.
 
     Parameters
     ----------
@@ -321,7 +321,7 @@ class Map:
         panels = _panels(ds, others)
         columns = math.ceil(math.sqrt(len(panels)))
         # A line is drawn with all its values: every peak stays visible.
-        drawn = {} if scattered or vertical is None else thinned([horizontal, vertical], _MOST_CELLS // columns)
+        drawn = {} if scattered or vertical is None else thinned([horizontal, vertical], _MOST_CELLS // columns, data)
         thin = ds.isel(drawn)
         share = math.prod(ds.sizes[dim] / len(indices) for dim, indices in drawn.items())
         thinning = [f"1 cell in {share:.0f} drawn"] if drawn else []
@@ -330,8 +330,8 @@ class Map:
         return cls(
             ds,
             displayed(thin[var]),
-            Axis.of(thin[horizontal.name], thin),
-            Axis.of(thin[vertical.name], thin) if vertical else None,
+            replace(Axis.of(thin[horizontal.name], thin), scale=horizontal.scale),
+            replace(Axis.of(thin[vertical.name], thin), scale=vertical.scale) if vertical else None,
             scattered,
             scale,
             [replace(warning, cells=warning.cells.isel(drawn)) for warning in warnings],
@@ -397,7 +397,12 @@ class Map:
             if not held.dims and held.name in boundaries.coords and (boundaries[held.name].values != held.values).any():
                 raise InputError("boundaries", f"are those of another map: this one has {plain_text(value_text(held))}")
         regime, tolerance = boundaries.attrs["boundary_of"], boundaries.attrs["boundary_tolerance"]
-        return Line2D([], [], label=f"boundary of {regime}\n± {number_text(tolerance)} (SI units)", **_CURVE)
+        # Along each axis the error is a number in the unit of the axis.
+        along = [self.ds[axis.name] for axis in (self.horizontal, self.vertical) if axis is not None]
+        errors = dict.fromkeys(
+            plain_text(amount_text(axis.copy(data=np.full(axis.shape, tolerance))[0], 2)) for axis in along
+        )
+        return Line2D([], [], label=f"boundary of {regime}\n± {' or '.join(errors)}", **_CURVE)
 
     def _draw_line(self, axes: Axes, data: xr.DataArray) -> None:
         numbers, edges = data.values[self.horizontal.order], self.horizontal.edges

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -136,8 +136,9 @@ class _Sweep:
         Values of each variable: of a classification the positions among `words`, or -1, shape ``(slices * size,)``; of
         others see :func:`_packed`.
     variables : dict of str to dict
-        ``title``, the name; ``label``, the name with unit; ``words`` of a classification; ``error``, the variable that
-        bounds the error; ``logarithmic``, whether its colours are.
+        ``title``, the name; ``label``, the name with unit; ``words`` of a classification, and ``shares`` of the cells
+        of the file in each slice that have them; ``error``, the variable that bounds the error; ``logarithmic``,
+        whether its colours are.
     scales : dict of str to tuple
         Colours of each variable, and the least and the greatest number.
     coordinates : list of dict
@@ -176,13 +177,13 @@ class _Sweep:
         horizontal, vertical = choose_axes(ds, ds[var], x, y)
         scattered = vertical is not None and is_scattered(horizontal, vertical)
         axes = [axis for axis in (vertical, horizontal) if axis]
+        whole = ds
         if not scattered:
             # A picture of cells needs their values in ascending order.
-            whole = ds[var].size
-            ds = ds.isel({axis.dims[0]: axis.order for axis in axes} | thinned(axes, _MOST_ALONG))
-            if ds[var].size < whole:
-                notes.append(f"1 cell in {whole / ds[var].size:.0f} shown")
-            axes = [Axis.of(ds[axis.name], ds) for axis in axes]
+            ds = ds.isel({axis.dims[0]: axis.order for axis in axes} | thinned(axes, _MOST_ALONG, ds[var]))
+            if ds[var].size < whole[var].size:
+                notes.append(f"1 cell in {whole[var].size / ds[var].size:.0f} shown; shares are those of all cells")
+            axes = [replace(Axis.of(ds[axis.name], ds), scale=axis.scale) for axis in axes]
             *_, horizontal = axes
             vertical = axes[0] if vertical else None
         dims = list(dict.fromkeys(dim for axis in axes for dim in axis.dims))
@@ -196,7 +197,8 @@ class _Sweep:
             data = ds[name]
             if set(data.dims) != set(template.dims):
                 continue
-            cells[name], variables[name], scales[name] = _column(data.transpose(*template.dims), ds)
+            every = whole[name].transpose(*template.dims)
+            cells[name], variables[name], scales[name] = _column(data.transpose(*template.dims), ds, every, len(others))
         points = template[dict.fromkeys(others, 0)]
         return cls(
             str(ds.attrs.get("title", "ringsweep")),
@@ -220,8 +222,13 @@ def _numeric(ds: xr.Dataset) -> list[str]:
     return [str(name) for name, data in ds.data_vars.items() if is_numeric(data)]
 
 
-def _column(data: xr.DataArray, ds: xr.Dataset) -> tuple[NDArray[Any], dict[str, Any], tuple[Any, ...]]:
-    """Values of a variable in compact form, what a page says of it, and its colours."""
+def _column(
+    data: xr.DataArray, ds: xr.Dataset, every: xr.DataArray, others: int
+) -> tuple[NDArray[Any], dict[str, Any], tuple[Any, ...]]:
+    """Values of a variable in compact form, what a page says of it, and its colours.
+
+    `every` has the cells that are not shown too; the first `others` of its dimensions are those of the slices.
+    """
     data = displayed(data)
     scale = ColourScale.of(data)
     numbers = scale.numbers(data).values.ravel()
@@ -230,16 +237,20 @@ def _column(data: xr.DataArray, ds: xr.Dataset) -> tuple[NDArray[Any], dict[str,
         "title": long_name(data),
         "label": plain_text(axis_label(data, ds)),
         "words": None,
+        "shares": None,
         "error": error if error in ds else None,
         "logarithmic": isinstance(scale.norm, LogNorm),
     }
     if scale.meanings is not None:
-        # Classes that do not occur would only fill the legend.
-        present = [k for k in range(len(scale.meanings)) if (numbers == k).any()]
+        flags = [] if scale.flags is None else [every.values == flag for flag in scale.flags]
+        # Classes that do not occur would only fill the legend; cells that are not shown count.
+        present = [k for k, cells in enumerate(flags) if cells.any()]
         positions = np.full(numbers.shape, -1, dtype=np.int8)
         for position, k in enumerate(present):
             positions[numbers == k] = position
         about["words"] = [scale.meanings[k] for k in present]
+        within = tuple(range(others, every.ndim))
+        about["shares"] = [np.atleast_1d(flags[k].mean(axis=within)).ravel().tolist() for k in present]
         colours = [to_hex(scale.colours(k)) for k in present]
         return positions, about, (colours or [NO_VALUE], -0.5, max(len(present), 1) - 0.5)
     colours = [to_hex(colour) for colour in scale.colours(np.linspace(0.0, 1.0, 64))]
