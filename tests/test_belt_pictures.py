@@ -17,6 +17,7 @@ from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import DRIVES
 from ringsweep.plots import films
 from ringsweep.plots.phase import _MODE_STYLES
+from ringsweep.plots.style import PAIR_COLOURS
 
 # m = 1 kg, k = 2 N/m, so the natural frequency is sqrt(2).
 LOAD, STIFFNESS, BELT = 9.81, 2.0, 0.1
@@ -103,7 +104,7 @@ class TestPortrait:
     def test_stick_on_a_belt_of_changing_speed_lies_on_the_curve_of_the_belt(self, rocking, ax):
         plots.phase_portrait(rocking, ax=ax)
         assert {"stick", "slip forward", "slip backward"} <= {text.get_text() for text in ax.get_legend().get_texts()}
-        curve = next(line for line in ax.lines if line.get_alpha() == 0.7).get_xydata()
+        curve = next(line for line in ax.lines if line.get_color() == PAIR_COLOURS[1]).get_xydata()
         np.testing.assert_array_equal(curve, np.column_stack([rocking.x, rocking.belt_velocity]))
         order = np.round(curve, 9).tolist()
         stick = np.round(drawn(ax, STICK), 9).tolist()

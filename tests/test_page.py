@@ -115,6 +115,14 @@ def test_page_loads_nothing_from_elsewhere(bokeh, tmp_path):
     assert "<b>chance" not in page
 
 
+def test_page_has_the_width_of_a_telephone_and_a_tooltip_of_less_than_half_of_it(bokeh, tmp_path):
+    page = page_of(sweep(4, 3), tmp_path)
+    assert re.search(r'<meta name="viewport" content="width=device-width', page.split("<body>")[0])
+    (tooltip,) = {one["tooltips"] for one in models(page, "HoverTool")}
+    assert "white-space: pre-wrap" in tooltip
+    assert int(re.search(r"max-width: (\d+)vw", tooltip)[1]) < 50
+
+
 def test_page_holds_every_number_with_four_digits_and_no_bound_is_rounded_down(bokeh, tmp_path):
     ds = sweep(5, 4)
     ds["t_separation"][2, 1] = np.nan

@@ -367,6 +367,36 @@ def test_map_of_one_swept_quantity_is_a_strip_or_a_line():
     assert axes.get_xscale() == "log"
 
 
+def test_cells_of_a_strip_meet_at_the_boundary_drawn_over_them():
+    ds = named_sweep((6,))
+    ds["regime"][:] = [0, 0, 0, 3, 3, 3]
+    name = ds["regime"].dims[0]
+    values = ds[name].values
+    place = 0.9 * values[3] + 0.1 * values[2]
+    curves = xr.Dataset(
+        {"line": ("vertex", [0])},
+        {name: ("vertex", [place], ds[name].attrs)},
+        {"boundary_of": "oscillatory", "boundary_tolerance": 1e-6},
+    )
+    ax = plots.regime_map(ds, boundaries=curves).axes[0]
+    (drawn,) = {float(x) for line in ax.lines for x in line.get_xdata()}
+    edges = mesh(ax.figure).get_coordinates()[0, :, 0]
+    assert drawn == edges[3]
+    assert values[1] < edges[2] < values[2]
+
+
+def test_title_of_a_map_of_origins_has_two_lines_in_a_column():
+    ds = refined_sweep()
+    ds.attrs |= {"audit_bound": 0.00871, "audit_cells": 20, "cells_computed": int((ds["origin"].values != 1).sum())}
+    plots.style("print", width=85)
+    try:
+        text = title(plots.regime_map(ds, var="origin"))
+    finally:
+        plots.style()
+    assert text.count("\n") <= 1
+    assert "≤ 0.88 % wrong (95 % confidence)" in text
+
+
 def test_quantities_that_vary_together_make_one_map_axis():
     """Two zones of equal, varying width: the map is that of one zone."""
     ds = make_sweep((12, 9)).rename(zone_half_angle="width")

@@ -225,6 +225,10 @@ class TestPhasePortrait:
         body = np.column_stack([np.degrees(run["phi"]), run["omega"]])[run["mode"] == 0]
         stick = next(line for line in ax.lines if line.get_linewidth() > 2 and line.get_color() == "black")
         shown = stick.get_xydata()[~np.isnan(stick.get_xydata()[:, 1])]
+        # A thin line over a broad one: both are seen while the body sticks.
+        over = next(line for line in ax.lines if np.array_equal(line.get_ydata(), run["ring_omega"]))
+        assert over.get_zorder() > stick.get_zorder()
+        assert over.get_linewidth() < stick.get_linewidth()
         assert {tuple(point) for point in body} <= {tuple(point) for point in shown}
 
     def test_portrait_in_the_frame_of_the_ring_has_a_band_for_each_arc_and_contact(self, run, ax):

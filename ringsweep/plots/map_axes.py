@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -46,6 +46,8 @@ class Axis:
         ``"log"`` or ``"linear"``.
     names : tuple of str
         Values that are names, friction laws for example, in the order of the dataset; empty for numbers.
+    meet : ndarray of shape ``(boundaries,)``
+        Positions at which neighbouring cells meet, where that is not halfway between them.
     """
 
     name: str
@@ -55,6 +57,7 @@ class Axis:
     order: NDArray[np.intp]
     scale: str
     names: tuple[str, ...] = ()
+    meet: NDArray[Any] = field(default_factory=lambda: np.empty(0))
 
     @classmethod
     def of(cls, coordinate: xr.DataArray, ds: xr.Dataset) -> Axis:
@@ -82,14 +85,17 @@ class Axis:
 
     @property
     def edges(self) -> NDArray[Any]:
-        """Edges of the cells, shape ``(size + 1,)``: halfway between neighbours in the scale of the axis."""
+        """Edges of the cells, shape ``(size + 1,)``: halfway between neighbours in its scale, or at `meet`."""
         if len(self.values) == 1:
             half = 0.5 * abs(self.values[0]) or 0.5
             return np.array([self.values[0] - half, self.values[0] + half])
         at = np.log(self.values) if self.scale == "log" else self.values
         middles = (at[1:] + at[:-1]) / 2
         edges = np.concatenate([[2 * at[0] - middles[0]], middles, [2 * at[-1] - middles[-1]]])
-        return np.exp(edges) if self.scale == "log" else edges
+        edges = np.exp(edges) if self.scale == "log" else edges
+        between = self.meet[(self.meet > self.values[0]) & (self.meet < self.values[-1])]
+        edges[np.searchsorted(self.values, between)] = between
+        return edges
 
     def value_of(self, cell: xr.Dataset) -> float:
         """Value as displayed of a single cell."""

@@ -144,6 +144,10 @@ def regime_map(
     found = Map.of(ds, x, y, var, sel or {}, norm, cmap)
     if boundaries is not None:
         found.entries.append(found.curve_entry(boundaries))
+        if found.vertical is None:
+            # Cells of a strip meet where the boundary is: halfway would leave slivers of the wrong colour beside it.
+            places = boundaries[found.horizontal.name]
+            found = replace(found, horizontal=replace(found.horizontal, meet=displayed(places).values))
     width = figure_width()
     if len(found.panels) == 1:
         height = 0.62 if found.vertical else 0.3 if found.scale.meanings else 0.45
@@ -326,7 +330,10 @@ class Map:
         share = math.prod(ds.sizes[dim] / len(indices) for dim, indices in drawn.items())
         thinning = [f"1 cell in {share:.0f} drawn"] if drawn else []
         # The legend of a map of origins has the shares, and its title is long.
-        told, audit = (scene_text(ds), audit_texts(ds)) if var != "origin" else ([], audit_texts(ds)[1:])
+        name, told, audit = "" if scale.meanings is None else long_name(data), scene_text(ds), audit_texts(ds)
+        if var == "origin":
+            name, told = "cells run or inferred", []
+            audit = [text.replace("others: at most", "inferred: ≤") for text in audit[1:]]
         return cls(
             ds,
             displayed(thin[var]),
@@ -339,7 +346,7 @@ class Map:
             columns,
             drawn,
             legend_entries(scale, ds, data, warnings, scattered),
-            ["" if scale.meanings is None else long_name(data), *held, *held_now, *told, *thinning, *audit],
+            [name, *held, *held_now, *told, *thinning, *audit],
         )
 
     @property

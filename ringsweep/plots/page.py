@@ -35,6 +35,12 @@ _PIXELS = 1000
 # Binary digits kept of numbers and of bounds on errors: four decimal digits, and two.
 _DIGITS, _BOUND_DIGITS = 15, 8
 
+# A telephone would show the page as if it were 980 pixels wide.
+_VIEWPORT = '<meta name="viewport" content="width=device-width, initial-scale=1">'
+
+# Beside the pointer there is at least half of the page.
+_TOOLTIP = '<div style="white-space: pre-wrap; max-width: 42vw">@{value}{custom}</div>'
+
 # The script sees to the rest of a dark page.
 _DARK = "@media (prefers-color-scheme: dark) { .bk-input { background-color: #303030; color: #e0e0e0 } }"
 
@@ -91,7 +97,8 @@ def save_page(
 
     sweep = _Sweep.of(ds, x, y, var, sel or {})
     with replacing(path) as temporary:
-        Path(temporary).write_text(file_html(_document(sweep), INLINE, sweep.title), encoding="utf-8")
+        page = file_html(_document(sweep), INLINE, sweep.title).replace("<head>", f"<head>\n    {_VIEWPORT}", 1)
+        Path(temporary).write_text(page, encoding="utf-8")
 
 
 def check_page(path: str | os.PathLike[str]) -> None:
@@ -410,7 +417,7 @@ def _document(sweep: _Sweep) -> Any:
         # Over a line, wherever the pointer is, the nearest cell tells its numbers.
         plot.add_tools(
             HoverTool(
-                tooltips='<div style="white-space: pre">@{value}{custom}</div>',
+                tooltips=_TOOLTIP,
                 formatters={"@{value}": tell},
                 renderers=[renderer],
                 mode="vline" if renderer in curve else "mouse",
@@ -420,7 +427,12 @@ def _document(sweep: _Sweep) -> Any:
     document = Document()
     notes = Div(text="; ".join([sweep.title, *sweep.notes]), render_as_text=True, sizing_mode="stretch_width")
     document.add_root(
-        column(notes, row(variable, *slices, sizing_mode="stretch_width"), plot, sizing_mode="stretch_both")
+        column(
+            notes,
+            row(variable, *slices, sizing_mode="stretch_width", styles={"flex-wrap": "wrap"}),
+            plot,
+            sizing_mode="stretch_both",
+        )
     )
     document.js_on_event(DocumentReady, show)
     return document
