@@ -802,6 +802,29 @@ def test_history_marks_the_separation_within_its_frame():
     assert not any("separates" in text.get_text() for text in part.get_legend().get_texts())
 
 
+def test_history_of_many_cycles_is_a_band_with_the_last_cycles_beside_it():
+    ds = make_history(40_000, ring=False)
+    t = np.linspace(0.0, 870 * 2 * np.pi, ds.sizes["time"])
+    growing = np.sin(t) * (1.0 + t / t[-1])
+    ds = ds.assign_coords(time=("time", t, ds["time"].attrs)).assign(velocity=("time", growing, ds["velocity"].attrs))
+    figure = plots.history(ds)
+    whole = [ax for ax in figure.axes if ax.get_xlim() == (t[0], t[-1])]
+    beside = [ax for ax in figure.axes if ax not in whole]
+    assert len(whole) == len(beside) == 3
+    # The band is as high as the vibration at each time.
+    assert not whole[1].lines
+    (band,) = whole[1].collections
+    corners = band.get_paths()[0].vertices
+    near = np.abs(corners[:, 0] - t[-1] / 2) < t[-1] / 50
+    assert corners[near, 1].max() == pytest.approx(1.5, abs=0.03)
+    assert corners[near, 1].min() == pytest.approx(-1.5, abs=0.03)
+    start, end = beside[1].get_xlim()
+    assert 5 * 2 * np.pi <= end - start <= 6.1 * 2 * np.pi
+    assert end == t[-1]
+    assert any("stick" in text.get_text() for text in beside[0].get_legend().get_texts())
+    assert len(plots.history(make_history(ring=False)).axes) == 3
+
+
 def test_history_shades_stick_for_its_duration():
     axes = plots.history(make_history()).axes[3]
     widths = [np.ptp(path.vertices[:, 0]) for path in axes.collections[0].get_paths()]
