@@ -90,7 +90,7 @@ def friction_loop(
 def _draw_near_zero(ax: Axes, mode: NDArray[Any], velocity: NDArray[Any], force: NDArray[Any]) -> None:
     """Draw small velocities, at which bristles make loops, as an inset where friction, which opposes slip, never is."""
     width = _NEAR * float(np.nanmax(np.abs(velocity)))
-    inset = ax.inset_axes((0.6, 0.12, 0.37, 0.36))
+    inset = ax.inset_axes((0.6, 0.24, 0.37, 0.36))
     draw_modes(inset, mode, velocity, force)
     for line in inset.lines:
         line.set_linewidth(min(line.get_linewidth(), 0.9))
