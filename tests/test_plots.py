@@ -231,6 +231,68 @@ def test_units_of_parameters_look_like_units_of_variables(units, shown):
     assert plots.regime_map(ds).axes[0].get_xlabel() == f"amplitude of the drive ({shown})"
 
 
+def written_sweep(**sweep) -> xr.Dataset:
+    """A sweep of the drive and the radius, m, whose configuration is that given."""
+    ds = make_sweep((5, 4)).rename(zone_half_angle="ring_radius")
+    ds["ring_radius"] = "ring_radius", [0.02, 0.03, 0.04, 0.05], {"units": "m", "long_name": "radius"}
+    for name in ("drive_amplitude", "ring_radius"):
+        ds[name].attrs["path"] = name.replace("_", ".")
+    scene = {"ring": {"radius": "30 mm"}, "drive": {"amplitude": 2.0}}
+    return ds.assign_attrs(configuration=json.dumps({"scene": scene, "sweep": {"grid": sweep}}))
+
+
+@pytest.mark.parametrize(
+    ("written", "label", "last"),
+    [
+        ({"linspace": ["20 mm", "50 mm", 4]}, "radius (mm)", 50.0),
+        (["2 cm", "3 cm", "4 cm", "5 cm"], "radius (cm)", 5.0),
+        ([0.02, 0.03, 0.04, 0.05], "radius (mm)", 50.0),
+        (["20 mm", "3 cm", "4 cm", "5 cm"], "radius (m)", 0.05),
+    ],
+    ids=["in the sweep", "listed", "in the scene", "in two units"],
+)
+def test_axis_has_the_unit_in_which_the_configuration_wrote_it_and_the_file_stays_si(written, label, last):
+    ds = written_sweep(**{"ring.radius": written, "drive.amplitude": ["1 rpm", "2 rpm"]})
+    before = ds.copy(deep=True)
+    ax = plots.regime_map(ds).axes[0]
+    assert ax.get_ylabel() == label
+    assert ax.get_xlabel() == "amplitude of the drive (rpm)"
+    rows = mesh(ax.figure).get_coordinates()[:, 0, 1]
+    assert 0.5 * (rows[-1] + rows[-2]) == pytest.approx(last)
+    columns = mesh(ax.figure).get_coordinates()[0, :, 0]
+    assert np.sqrt(columns[-1] * columns[-2]) == pytest.approx(10.0 * 30.0 / np.pi)
+    xr.testing.assert_identical(ds, before)
+
+
+def test_axis_that_the_user_converted_keeps_the_unit_of_the_user():
+    ds = written_sweep(**{"ring.radius": ["20 mm", "50 mm"]})
+    ds["ring_radius"].attrs["units"] = "1"
+    assert plots.regime_map(ds).axes[0].get_ylabel() == "radius"
+
+
+def test_unit_asked_for_is_that_of_the_axis_and_one_that_does_not_fit_is_refused():
+    ds = written_sweep(**{"ring.radius": ["20 mm", "50 mm"]})
+    assert plots.regime_map(ds, units={"ring.radius": "cm"}).axes[0].get_ylabel() == "radius (cm)"
+    assert plots.regime_map(make_sweep(), units={"zone.half_angle": "rad"}).axes[0].get_ylabel().endswith("(rad)")
+    bar = plots.regime_map(ds, var="t_separation", units={"t_separation": "min"}).axes[1]
+    assert bar.get_ylabel() == "time of separation (min)"
+    for units, told in (({"ring.radius": "kg"}, "wrong unit"), ({"radius": "mm"}, "did you mean ring_radius")):
+        with pytest.raises(InputError, match=told):
+            plots.regime_map(ds, units=units)
+
+
+def test_boundary_lies_where_it_is_in_the_unit_of_the_axis():
+    ds = written_sweep(**{"ring.radius": ["20 mm", "50 mm"]}).isel(drive_amplitude=0, drop=True)
+    curves = xr.Dataset(
+        {"line": ("vertex", [0])},
+        {"ring_radius": ("vertex", [0.037], ds["ring_radius"].attrs)},
+        {"boundary_of": "separating", "boundary_tolerance": 1e-6},
+    )
+    figure = plots.regime_map(ds, boundaries=curves)
+    assert {float(x) for line in figure.axes[0].lines for x in line.get_xdata()} == {37.0}
+    assert "± 0.001 mm" in " ".join(entries(figure))
+
+
 def test_label_has_the_path_if_two_coordinates_share_a_long_name():
     ds = make_sweep((3, 3, 3, 3))
     figure = plots.regime_map(ds.isel(drive_amplitude=0, zone_half_angle=0))

@@ -29,6 +29,7 @@ from ringsweep.plots.labels import (
     axis_label,
     display_factor,
     displayed,
+    in_units,
     long_name,
     plain_text,
     value_text,
@@ -87,6 +88,7 @@ def regime_map(
     legend: bool | str = True,
     norm: str | None = None,
     cmap: str | None = None,
+    units: Mapping[str, str] | None = None,
 ) -> Figure:
     """Draw one variable of a sweep over the swept quantities, as a new figure.
 
@@ -119,6 +121,9 @@ def regime_map(
         be dark.
     cmap : str, optional
         Colour map of matplotlib for numbers.
+    units : mapping of str to str, optional
+        Units of axes or of the variable, such as ``{"ring.radius": "mm"}``. By default swept quantities have the unit
+        in which the configuration wrote them, and angles that of :func:`style`. The file stays SI.
 
     Returns
     -------
@@ -127,7 +132,8 @@ def regime_map(
     Raises
     ------
     InputError
-        If a name or a place is unknown, a single cell is left, or more than 25 panels would be needed.
+        If a name or a place is unknown, a unit does not fit, a single cell is left, or more than 25 panels would be
+        needed.
 
     Examples
     --------
@@ -141,13 +147,14 @@ def regime_map(
     >>> regime_map(ds, var="phi_max").axes[0].get_ylabel()
     'angle (°)'
     """
-    found = Map.of(ds, x, y, var, sel or {}, norm, cmap)
+    found = Map.of(ds, x, y, var, sel or {}, norm, cmap, units)
     if boundaries is not None:
         found.entries.append(found.curve_entry(boundaries))
         if found.vertical is None:
             # Cells of a strip meet where the boundary is: halfway would leave slivers of the wrong colour beside it.
             places = boundaries[found.horizontal.name]
-            found = replace(found, horizontal=replace(found.horizontal, meet=displayed(places).values))
+            factor = display_factor(found.ds[found.horizontal.name])
+            found = replace(found, horizontal=replace(found.horizontal, meet=places.values * factor))
     width = figure_width()
     if len(found.panels) == 1:
         height = 0.62 if found.vertical else 0.3 if found.scale.meanings else 0.45
@@ -298,9 +305,11 @@ class Map:
         sel: Mapping[str, float | str],
         norm: str | None = None,
         cmap: str | None = None,
+        units: Mapping[str, str] | None = None,
     ) -> Map:
         """Choose axes, panels and colours; arguments and errors as for :func:`regime_map`."""
         require_sweep(ds)
+        ds = in_units(ds, units)
         if is_sampled(ds):
             var = "probability" if var == "regime" else var
             # Regimes that occur nowhere have no map.
@@ -387,7 +396,7 @@ class Map:
         for number in np.unique(boundaries["line"]):
             line = boundaries.isel(vertex=boundaries["line"].values == number)
             x, *y = (
-                line[axis.name].values * display_factor(line[axis.name])
+                line[axis.name].values * display_factor(self.ds[axis.name])
                 for axis in (self.horizontal, self.vertical)
                 if axis is not None
             )

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.plots.datasets import is_numeric, is_sampled, require_sweep, resolve, swept
-from ringsweep.plots.labels import axis_label, displayed, long_name, plain_text, value_text
+from ringsweep.plots.labels import axis_label, displayed, in_units, long_name, plain_text, value_text
 from ringsweep.plots.map_axes import Axis, choose_axes, is_scattered, thinned
 from ringsweep.plots.map_colours import ZERO, ColourScale
 from ringsweep.plots.maps import audit_texts
@@ -173,6 +173,7 @@ class _Sweep:
     def of(cls, ds: xr.Dataset, x: str | None, y: str | None, var: str, sel: Mapping[str, float | str]) -> _Sweep:
         """Choose the axes, and put the cells in their order; arguments and errors as for :func:`save_page`."""
         require_sweep(ds)
+        ds = in_units(ds)
         if is_sampled(ds):
             raise InputError("ds", "is a sampled sweep, which has no runs to point at: draw a picture, *.png")
         var = resolve("var", var, _numeric(ds))
