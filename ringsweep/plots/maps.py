@@ -395,15 +395,38 @@ class Map:
         """Draw the curves of boundaries over a panel."""
         for number in np.unique(boundaries["line"]):
             line = boundaries.isel(vertex=boundaries["line"].values == number)
-            x, *y = (
-                line[axis.name].values * display_factor(self.ds[axis.name])
-                for axis in (self.horizontal, self.vertical)
-                if axis is not None
-            )
-            if y:
-                axes.plot(x, y[0], marker="." if len(x) == 1 else "", **_CURVE)
+            if self.vertical is None:
+                axes.axvline(line[self.horizontal.name].values[0] * self._factor(self.horizontal), **_CURVE)
             else:
-                axes.axvline(x[0], **_CURVE)
+                points = self._whole_curve(self.vertical, line)
+                axes.plot(*points.T, marker="." if len(points) == 1 else "", **_CURVE)
+
+    def _factor(self, axis: Axis) -> float:
+        return display_factor(self.ds[axis.name])
+
+    def _whole_curve(self, vertical: Axis, line: xr.Dataset) -> NDArray[Any]:
+        """Points of a curve, shape ``(points, 2)``: up to the frame if it ends at it, and closed if it is.
+
+        The points of a boundary lie between the middles of cells, so the last of them is half a cell from the frame.
+        """
+        pair = self.horizontal, vertical
+        points = np.column_stack([line[axis.name].values * self._factor(axis) for axis in pair])
+        along = line["axis"].attrs["flag_meanings"].split()
+        inside = True
+        for end in (0, -1):
+            across = 1 - [axis.name for axis in pair].index(along[int(line["axis"].values[end])])
+            for value, edge in zip(pair[across].values[[0, -1]], pair[across].edges[[0, -1]], strict=True):
+                if np.isclose(points[end, across], value, rtol=1e-9, atol=0.0):
+                    outer = points[end].copy()
+                    outer[across] = edge
+                    points = np.insert(points, end if end == 0 else len(points), outer, axis=0)
+                    inside = False
+                    break
+        # A curve that uncertified cells interrupt has its ends apart.
+        cells = np.column_stack([np.interp(points[:, k], pair[k].values, range(len(pair[k].values))) for k in (0, 1)])
+        if inside and len(points) > 3 and (np.abs(cells[0] - cells[-1]) <= 1.0).all():
+            points = np.vstack([points, points[:1]])
+        return points
 
     def curve_entry(self, boundaries: xr.Dataset) -> Artist:
         """Entry of the legend for the curves of boundaries."""
