@@ -23,6 +23,8 @@ NAMES = (
     "work_precision",
     "stability",
     "certificates",
+    "errors",
+    "first_page",
     "scenes",
     "scaling",
     "sizes",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import json
 import os
 import platform
 import time
@@ -20,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from ringsweep import config
-from ringsweep.models import MODELS, batch
+from ringsweep.models import batch, model_of
 from ringsweep.runs import cells, sweep
 from ringsweep.runs.executors import Execution
 from ringsweep.solvers.method import Result
@@ -63,17 +64,24 @@ def family(side: int) -> list[Cell]:
 
 
 def configure(
-    scene: Mapping[str, Any], axes: Mapping[str, Sequence[float]], method: str, *, kind: str = "points", **options: Any
+    scene: Mapping[str, Any],
+    axes: Mapping[str, Sequence[float]],
+    method: str,
+    *,
+    kind: str = "points",
+    record: Mapping[str, Any] | None = None,
+    **options: Any,
 ) -> Any:
     """Configuration of a sweep over points or a grid. It has no certificates: they cost a second run."""
     solver = {"method": method, "certify": False, **options}
-    return config.load({"scene": scene, "solver": solver, "sweep": {kind: axes}})
+    parts = {"scene": scene, "solver": solver, "sweep": {kind: axes}}
+    return config.load(parts | ({"record": record} if record else {}))
 
 
 def bare(configuration: Any) -> Callable[[], Result]:
     """A function that runs the solver on a configuration in this thread, without tasks and without a dataset."""
     structure = configuration.scene.structure
-    names = MODELS[structure.model].outcomes
+    names = model_of(structure).outcomes
     count = len(next(iter(configuration.source["sweep"]["points"].values())))
     prepared = batch(structure, cells.values_of_cells(configuration.scene, configuration.axes, np.arange(count)))
     return lambda: configuration.solver.run(prepared, names)
@@ -81,7 +89,7 @@ def bare(configuration: Any) -> Callable[[], Result]:
 
 def on_one_core(configuration: Any) -> Callable[[], dict[str, Any]]:
     """A function as :func:`bare` gives it, which returns outcomes by name."""
-    names = MODELS[configuration.scene.structure.model].outcomes
+    names = model_of(configuration.scene.structure).outcomes
     run = bare(configuration)
     return lambda: dict(zip(names, run().rows.T, strict=True))
 
@@ -238,10 +246,28 @@ def stamp(name: str, quick: bool) -> str:
     return f"`python -m benchmarks.{name}{' --quick' if quick else ''}` on sources `{sources()}`"
 
 
-def publish(given: argparse.Namespace, name: str, title: str, where: str, body: str) -> None:
-    """Write a report, Markdown: title, sources, date, machine (the lines of `where`), and the body."""
+def publish(
+    given: argparse.Namespace, name: str, title: str, where: str, body: str, figures: Mapping[str, str] | None = None
+) -> None:
+    """Write a report, and the figures that documents take from it.
+
+    Parameters
+    ----------
+    given : argparse.Namespace
+        Options of the command.
+    name, title : str
+    where : str
+        Machine, in lines.
+    body : str
+        Markdown.
+    figures : mapping, optional
+        Texts by name, as a document prints them: numbers, words, or tables in Markdown. They go to `{name}.json`;
+        :mod:`benchmarks.documents` fills them in.
+    """
     folder = folder_of(given)
     lines = "".join(f"- {line}\n" for line in where.splitlines())
     report = f"# {title}\n\n{stamp(name, given.quick)}, {datetime.now(UTC).date()}:\n\n{lines}\n{body.strip()}\n"
     (folder / f"{name}.md").write_text(report)
+    if figures is not None:
+        (folder / f"{name}.json").write_text(json.dumps(figures, indent=1, ensure_ascii=False) + "\n")
     print(f"\n{name}.md is in {folder.resolve()}", flush=True)

@@ -70,17 +70,25 @@ class Rung(NamedTuple):
     before: str | None
     swept: str = "initial.phi"
     between: tuple[float, float] = (0.05, 0.3)
+    record: Mapping[str, Any] | None = None
+
+    @property
+    def methods(self) -> list[str]:
+        """Names of METHODS: `rk4` goes on after no impact, and locates no events."""
+        return [name for name in METHODS if name != "rk4" or not (self.record or "impact" in self.scene)]
 
     @property
     def piecewise(self) -> str:
         """`event` or `implicit`, whichever handles the law."""
-        return "event" if family_of(LAWS[self.scene["friction"]["law"]]) is SetValued else "implicit"
+        friction = self.scene["friction"]
+        return "event" if "at_rest" in friction or family_of(LAWS[friction["law"]]) is SetValued else "implicit"
 
     def configuration(self, method: str, cells: int, **options: Any) -> Any:
         """Configuration of a sweep over `cells` cells."""
         if method == "rk4":
             options.setdefault("steps", PAPER_STEPS)
-        return configure(self.scene, {self.swept: np.linspace(*self.between, cells).tolist()}, method, **options)
+        values = np.linspace(*self.between, cells).tolist()
+        return configure(self.scene, {self.swept: values}, method, record=self.record, **options)
 
 
 def on_ring(law: str = "coulomb", *, contacts: int = 2, drive: Any = None, arcs: int = 0, rough: Any = None) -> Any:
@@ -121,8 +129,12 @@ def on_belt(law: str) -> Any:
     }
 
 
+_REST = {"mu_s": 0.2, "mu_k": 0.1}
 _CONSTANT, _ARCTAN = {"law": "constant", "amplitude": 2.0}, {"law": "arctan", "amplitude": 2.0}
 _BELT = ("belt.velocity", (0.05, 0.2))
+#: The arctan drive and the friction law `tustin`, as a user writes them.
+_WRITTEN = {"law": "formula", "theta": "A*(t*atan(t) - log(1 + t**2)/2)*2/pi", "A": 2.0}
+_LAW = {"law": "formula", "mu": "mu_k + (mu_s - mu_k)*exp(-alpha*v)", "at_rest": "mu_s", "alpha": 100.0}
 
 LADDER: dict[str, Rung] = {
     "one contact, Coulomb, immobile uniform ring": Rung(on_ring(contacts=1), None),
@@ -136,12 +148,17 @@ LADDER: dict[str, Rung] = {
     "+ stiction band (bengisu-akay)": Rung(
         on_ring("bengisu-akay", drive=_ARCTAN, arcs=3), "+ exponential tail (tustin)"
     ),
+    "tustin as a formula": Rung(
+        on_ring("tustin", drive=_ARCTAN, arcs=3) | {"friction": _LAW | {"rest": _REST}}, "+ exponential tail (tustin)"
+    ),
+    "drive as a formula": Rung(on_ring("stiction", drive=_WRITTEN, arcs=3), "+ stiction"),
+    "+ impact": Rung(on_ring("stiction", drive=_ARCTAN, arcs=3) | {"impact": {"restitution": 0.5}}, "+ stiction"),
     "belt, Coulomb": Rung(on_belt("coulomb"), None, *_BELT),
     "belt + stiction": Rung(on_belt("stiction"), "belt, Coulomb", *_BELT),
+    "belt + exponent": Rung(on_belt("stiction"), "belt + stiction", *_BELT, {"exponent": True}),
     "belt + bristles (lugre)": Rung(on_belt("lugre"), "belt + stiction", *_BELT),
 }
 
-_REST = {"mu_s": 0.2, "mu_k": 0.1}
 _ALL_ALIKE = {"mu_s": 0.1, "mu_k": 0.1}
 
 
@@ -220,11 +237,12 @@ def step_times(cells: int, few: int, rounds: int) -> dict[str, Any]:
             calls = {
                 name: bare(rung.configuration(rung.piecewise if own else "rk4", few if own else cells))
                 for name, rung in rungs.items()
+                if METHODS[own] in rung.methods
             }
             for call in calls.values():
                 call()
             times, results = alternate(calls, rounds)
-            for name in rungs:
+            for name in calls:
                 found[f"{name}, {METHODS[own]}"] = {
                     "wall": times[name].wall,
                     "steps": float(results[name].steps.sum()),
@@ -327,18 +345,22 @@ def ladder(found: Mapping[str, Any], compiled: Mapping[tuple[str, str], Any]) ->
     lines = []
     for name, rung in LADDER.items():
 
-        def ratio(method: str, per: str, name: str = name, before: str | None = rung.before) -> str:
-            return f"{over(found, name, before, method, per):.2f}" if before else "-"
+        def ratio(method: str, per: str, name: str = name, rung: Rung = rung) -> str:
+            return (
+                f"{over(found, name, rung.before, method, per):.2f}" if rung.before and method in rung.methods else "-"
+            )
 
-        times, own = (found[f"{name}, {method}"] for method in METHODS)
-        both = [compiled[name, method] for method in ("rk4", rung.piecewise)]
+        times, own = (found.get(f"{name}, {method}") for method in METHODS)
+        both = [compiled.get((name, method)) for method in ("rk4", rung.piecewise)]
         lines.append([
             name, rung.piecewise,
-            f"{1e9 * Times(times['wall']).median / times['steps']:.1f}", ratio("rk4", "steps"),
+            f"{1e9 * Times(times['wall']).median / times['steps']:.1f}" if times else "-", ratio("rk4", "steps"),
             f"{1e6 * Times(own['wall']).median / own['runs']:.1f}", f"{own['steps'] / own['runs']:.0f}",
             ratio("piecewise", "runs"), ratio("piecewise", "steps"),
-            *(f"{one['cpu']:.1f}" for one in both), *(f"{one['cache'] / 1024:.0f}" for one in both),
-            *(str(one["instructions"]) for one in both), *(" ".join(one["calls"]) or "none" for one in both),
+            *(f"{one['cpu']:.1f}" if one else "-" for one in both),
+            *(f"{one['cache'] / 1024:.0f}" if one else "-" for one in both),
+            *(str(one["instructions"]) if one else "-" for one in both),
+            *(" ".join(one["calls"]) or "none" if one else "-" for one in both),
         ])  # fmt: skip
     return lines
 
@@ -363,7 +385,7 @@ def main() -> None:
         shared = folder / "shared"
         shared.mkdir()
         for rung_name, rung in LADDER.items():
-            for method in ("rk4", rung.piecewise):
+            for method in ("rk4", rung.piecewise)[2 - len(rung.methods) :]:
                 # One cache for all scenes: code that a scene shares with an earlier scene is not compiled again.
                 before = size_of(shared)
                 one = in_child(compile_one, rung_name, method, cache=shared)
@@ -408,7 +430,8 @@ def main() -> None:
         heading(title)
         table(header, rows)
         report += f"\n## {title}\n\n{markdown(header, rows)}"
-    publish(given, "scenes", "The cost of each thing in a scene", where, report)
+    figures = {"cold": f"{cold[1]:.0f}", "warm": f"{warm[1]:.0f}", "first_cells": f"{cold[0]:.0f}"}
+    publish(given, "scenes", "The cost of each thing in a scene", where, report, figures)
 
 
 #: Explanation at the head of the report.

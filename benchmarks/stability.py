@@ -201,8 +201,8 @@ def maps(quick: bool) -> list[Map]:
     def spaced(low: float, high: float, count: int) -> Any:
         return np.geomspace(low, high, max(3, round(fine * count)))
 
-    v0 = axis("v0", "half-width of the stiction band v0 (m/s)", spaced(1e-9, 1.0, 19), "m s-1")
-    alpha = axis("alpha", "decay of friction alpha (s/m)", spaced(1.0, 1e7, 15), "s m-1")
+    v0 = axis("v0", "half-width of the stiction band v0 (m/s)", spaced(1e-12, 10.0, 27), "m s-1")
+    alpha = axis("alpha", "decay of friction alpha (s/m)", spaced(1.0, 1e9, 19), "s m-1")
 
     def by_ratio(column: Any) -> dict[str, Any]:
         return {f"friction.{place}.mu_s": column * mu["mu_k"] for place, mu in (("rough", ROUGH), ("rest", REST))}
@@ -710,12 +710,19 @@ def _legend(ds: xr.Dataset, drawn: Sequence[Map]) -> list[Artist]:
     return [*entries, beyond]
 
 
+def silent_in_kind(ds: xr.Dataset, chosen: Sequence[Map]) -> int:
+    """Number of certified runs with another regime, motion or contact."""
+    found = (ds[f"{one.name}_class"].values == SILENT for one in chosen)
+    kinds = (ds[f"{one.name}_wrong_in_kind"].values == 1 for one in chosen)
+    return sum(int((silent & kind).sum()) for silent, kind in zip(found, kinds, strict=True))
+
+
 def counts(ds: xr.Dataset, chosen: Sequence[Map]) -> list[list[str]]:
     """Rows with the number of runs of each map in each class, and of runs certified beyond the limit of stability."""
     rows = []
     for map_ in chosen:
         classes = ds[f"{map_.name}_class"].values
-        in_kind = int(((classes == SILENT) & (ds[f"{map_.name}_wrong_in_kind"].values == 1)).sum())
+        in_kind = silent_in_kind(ds, [map_])
         beyond = "-"
         if f"{map_.name}_stiffness" in ds:
             over = ds[f"{map_.name}_stiffness"] > STABILITY_LIMIT
@@ -770,7 +777,12 @@ def main() -> None:
     text = f"Wrong: another regime, motion or contact, or an error of more than {CLOSE:g} rad or s.\n"
     text += "".join(f"\n## {title}\n\n{body}" for title, body in sections)
     print(text)
-    publish(given, "stability", "Numerical stability", where, text)
+    classes = {one.name: ds[f"{one.name}_class"].values for one in chosen}
+    silent = {method: sum(int((found == SILENT).sum()) for name, found in classes.items() if ("rk4" in name) == rk4)
+              for method, rk4 in (("rk4", True), ("others", False))}  # fmt: skip
+    figures = {"runs": str(sum(found.size for found in classes.values())), "silent_rk4": str(silent["rk4"])}
+    figures |= {"silent_others": str(silent["others"]), "silent_in_kind": str(silent_in_kind(ds, chosen))}
+    publish(given, "stability", "Numerical stability", where, text, figures)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from ringsweep.physics import drives
 from ringsweep.quantities.flags import FAILED, JAMMED, RESTING, SEPARATING
 from ringsweep.solvers import audit as run_audit
 from ringsweep.solvers import event
-from ringsweep.solvers.certificate import with_errors
+from ringsweep.solvers.certificate import errors, with_errors
 from ringsweep.solvers.event import Auto, Event, Implicit
 from ringsweep.solvers.rk4 import RK4
 
@@ -319,6 +319,16 @@ class TestErrors:
             ratios.append((stated / np.where(error > 0.0, error, np.nan))[known])
         assert np.concatenate(covered).mean() > 0.99
         assert np.nanmedian(np.concatenate(ratios)) < median
+
+    def test_what_velocities_err_in_each_second_of_angle_is_in_their_bounds(self, cells):
+        batch = cells({"time.span": 1.0}, law="stiction", drive="arctan")
+        rows = Auto().run(batch, NAMES).rows
+        without, with_rate = (
+            errors(batch, rows, rows, NAMES, safety=1.0, share=0.0, steps=10, rate_floor=rate) for rate in (0.0, 1e-6)
+        )
+        added = dict(zip(with_errors(NAMES), (with_rate - without)[0], strict=True))
+        assert added["omega_end"] == pytest.approx(1e-6, rel=0.5)
+        assert added["phi_end"] == 0.0
 
     def test_error_bounds_are_linked_to_their_variables_and_absent_without_certificates(self, scene):
         axes = {"drive.amplitude": [0.1, 2.0]}

@@ -175,6 +175,26 @@ class TestBody:
         assert (found.gap_max <= 2 * (0.043378 - 0.008 - 0.0315) + 1e-9).all()
         assert isinstance(found, xr.Dataset)
 
+    def test_bounds_cover_the_errors_of_what_follows_a_loss(self):
+        """Impacts magnify errors, and a small gap has the error of the place. Checked by runs at rtol 1e-14."""
+        rng = np.random.default_rng(29)
+        points = {
+            "drive.amplitude": xr.DataArray(rng.uniform(2.0, 12.0, 150), dims="run"),
+            "impact.restitution": xr.DataArray(rng.uniform(0.0, 0.8, 150), dims="run"),
+        }
+        found, exact = (
+            ringsweep.sweep(BODY, points, solver={"method": "event", "rtol": rtol}, progress=False)
+            for rtol in (1e-10, 1e-14)
+        )
+        covered = {}
+        for name in ("omega_end", "gap_max", "impact_speed_max", "impulse_max", "impact_loss", "t_recovered"):
+            error, stated = abs(found[name] - exact[name]).values, found[f"{name}_error"].values
+            known = np.isfinite(stated) & (found.impacts == exact.impacts).values & (found.impacts > 0).values
+            covered[name] = (stated >= error - 4.0 * np.spacing(abs(exact[name].values)))[known]
+        assert min(len(each) for each in covered.values()) > 60
+        assert np.concatenate(list(covered.values())).mean() > 0.99
+        assert min(each.mean() for each in covered.values()) > 0.97
+
 
 class TestRefused:
     @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.models.interface.audit import undecided
+from ringsweep.models.interface.audit import least_scales, undecided
 from ringsweep.quantities.flags import ANSWERS_DIFFER, CERTIFIED, CLOSE_CALL, FAILED, NO_RESULT, NOT_FINITE
 from ringsweep.quantities.variables import OUTCOMES
 
@@ -142,12 +142,14 @@ def took_same_steps(
 
 
 def apart(
-    rows: NDArray[np.float64], second_rows: NDArray[np.float64], outcomes: tuple[str, ...]
+    batch: Any, rows: NDArray[np.float64], second_rows: NDArray[np.float64], outcomes: tuple[str, ...]
 ) -> NDArray[np.float64]:
     """Largest difference between two runs of each cell in any number, relative to the scale of the number.
 
     Parameters
     ----------
+    batch : NamedTuple
+        Cells.
     rows, second_rows : ndarray of shape ``(cells, outcomes)``
         Outcomes of the runs, and of second runs at another resolution.
     outcomes : tuple of str
@@ -157,7 +159,7 @@ def apart(
     -------
     ndarray of shape ``(cells,)``
     """
-    difference, scale = _differences(rows, second_rows, outcomes)
+    difference, scale = _differences(batch, rows, second_rows, outcomes)
     # Laps of other lengths are no measure of divergence.
     lasting = [k for k, name in enumerate(with_errors(outcomes)) if name != "period"]
     return _largest(difference[:, lasting], scale[:, lasting])
@@ -192,6 +194,7 @@ def with_errors(outcomes: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def errors(
+    batch: Any,
     rows: NDArray[np.float64],
     second_rows: NDArray[np.float64],
     outcomes: tuple[str, ...],
@@ -209,6 +212,8 @@ def errors(
 
     Parameters
     ----------
+    batch : NamedTuple
+        Cells.
     rows, second_rows : ndarray of shape ``(cells, outcomes)``
         Outcomes of the runs, and of the second runs.
     outcomes : tuple of str
@@ -228,15 +233,15 @@ def errors(
         Each in the unit of its outcome; NaN where :func:`agree` is false.
     """
     names = with_errors(outcomes)
-    difference, scale = _differences(rows, second_rows, outcomes)
+    difference, scale = _differences(batch, rows, second_rows, outcomes)
     with np.errstate(invalid="ignore", over="ignore"):
         least = share * _largest(difference, scale)[:, None] * scale
         bound: NDArray[np.float64] = np.atleast_1d(safety)[:, None] * np.maximum(difference, least)
         bound += np.atleast_1d(floor + _ROUNDING * np.sqrt(1.0 + np.asarray(steps)))[:, None] * scale
         units = [OUTCOMES[name].units for name in names]
         for k, unit in enumerate(units):
-            if unit.endswith("/s"):
-                bound[:, k] += rate_floor * scale[:, units.index(unit.removesuffix("/s"))]
+            if unit.endswith(" s-1"):
+                bound[:, k] += rate_floor * scale[:, units.index(unit.removesuffix(" s-1"))]
     # A run that reaches the end of the span has an exact time of its end.
     reached = rows[:, outcomes.index("regime")] == rows[:, outcomes.index("motion")]
     bound[reached & (difference[:, names.index("t_end")] == 0.0), names.index("t_end")] = 0.0
@@ -245,7 +250,7 @@ def errors(
 
 
 def _differences(
-    rows: NDArray[np.float64], second_rows: NDArray[np.float64], outcomes: tuple[str, ...]
+    batch: Any, rows: NDArray[np.float64], second_rows: NDArray[np.float64], outcomes: tuple[str, ...]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Differences between two runs of each cell, and the scale of each number."""
     names = with_errors(outcomes)
@@ -254,11 +259,11 @@ def _differences(
     with np.errstate(invalid="ignore", over="ignore"):
         difference = np.abs(a - second_rows[:, columns])
     units = np.array([OUTCOMES[name].units for name in names])
-    scale = np.empty_like(a)
+    scale, own_scales = np.empty_like(a), least_scales(batch)
     for unit in set(units.tolist()):
         of_unit = units == unit
         largest = np.nanmax(np.abs(a[:, of_unit]), axis=1, initial=0.0)
-        scale[:, of_unit] = (largest + (0.0 if unit[0] in "mNJ" else 1.0))[:, None]
+        scale[:, of_unit] = (largest + own_scales.get(unit, 0.0 if unit[0] in "mNJ" else 1.0))[:, None]
     return difference, scale
 
 

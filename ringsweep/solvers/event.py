@@ -40,6 +40,9 @@ _ONCE, _SHARED, _ONCE_IMPLICIT, _SHARED_IMPLICIT = 0.2, 3.0, 0.05, 0.02
 # The errors of so many implicit steps average out: the difference is so much more certain, down to the least share.
 _REGULAR, _LEAST_SAFETY = 60.0, 0.3
 
+# Impacts magnify the errors before them: a small difference of two runs is then less certain by this factor.
+_MAGNIFIED = 3.0
+
 # Largest violation of the friction law in a certified run, in units of the violation that the tolerance would explain;
 # and largest share of the energy turnover that is not work of friction.
 _MOST_VIOLATION, _MOST_UNEXPLAINED = 1e3, 5e-3
@@ -164,7 +167,7 @@ class _Piecewise(Method):
             diverge, infinite elsewhere; whether they diverge, but a tighter tolerance may show that they converge.
         """
         of_bristles = family_of(type(batch.law)) is Dynamic
-        distance = apart(rows, second_rows, outcomes)
+        distance = apart(batch, rows, second_rows, outcomes)
         diverge = diverging(distance, looser[of_bristles], distance_before)
         obeys_law: NDArray[np.bool_] = (audits[:, 0] <= _MOST_VIOLATION) & (audits[:, 1] <= _MOST_UNEXPLAINED)
         because = doubts(batch, rows, second_rows, audits[:, 2], outcomes)
@@ -175,21 +178,25 @@ class _Piecewise(Method):
         tolerance, implicit_tolerance = self.tolerances()
         local = LocalErrors(*audits[:, 3:].T)
         if of_bristles:
-            floor, safety = _ONCE_IMPLICIT * implicit_tolerance, self.safety
+            floor, safety = _ONCE_IMPLICIT * implicit_tolerance, np.full(len(rows), self.safety)
         else:
             # Ratio of successive terms of a series at the end of a step; a geometric series is the remainder.
             ratio = tolerance ** (1.0 / ORDER)
             floor = tolerance * ratio / (1.0 - ratio) * (_ONCE + _SHARED * local.series)
             floor += _SHARED_IMPLICIT * implicit_tolerance * local.implicit
             safety = self.safety * np.clip(_REGULAR / np.maximum(local.creep, 1.0), _LEAST_SAFETY, 1.0)
+        # Errors average out along a smooth motion, not if an event magnifies those of the few steps before it.
+        magnified, left_out = audit.magnified(batch, rows)
+        safety = np.where(magnified, _MAGNIFIED * self.safety, safety)
         bounds = errors(
+            batch,
             rows,
             second_rows,
             outcomes,
             safety=safety,
             share=self.share,
             steps=steps,
-            floor=floor,
+            floor=floor + left_out,
             rate_floor=tolerance * local.rate,
         )
         bounds[diverge] = np.nan

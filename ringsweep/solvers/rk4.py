@@ -122,7 +122,7 @@ class RK4(Method):
                 trusted = (
                     contacts_held & (half_report[:, 1] <= STABILITY_LIMIT) & (half_report[:, 4] <= _MOST_ARC_SHARE)
                 )
-                diverge = apart(stable_rows, half_rows, outcomes) > _MOST_APART
+                diverge = apart(stable_batch, stable_rows, half_rows, outcomes) > _MOST_APART
                 chaotic = diverge
                 if diverge.any():
                     chaotic = diverge & ~audit.same_statistics(stable_batch, stable_rows, half_rows)
@@ -131,6 +131,7 @@ class RK4(Method):
                     [(doubt != CERTIFIED, doubt), (~trusted, COARSE), (chaotic, DIVERGES)], len(stable)
                 )
                 found = errors(
+                    stable_batch,
                     stable_rows,
                     half_rows,
                     outcomes,

@@ -120,4 +120,45 @@ def disturbed(batch):
     return batch
 
 
-MEMBERS = (violation, energy, undecided, same_statistics, disturbed)
+@hook(optional=True)
+def least_scales(batch):
+    """Least scales of numbers that follow from the place of a body, to which their errors are compared, by their units.
+
+    A gap may be small, but its error is that of the place. It runs outside kernels.
+
+    Parameters
+    ----------
+    batch : NamedTuple
+        Cells. The type of the batch decides which body runs.
+
+    Returns
+    -------
+    dict of ndarray
+        Of shape ``(cells,)``. By default there are none: the largest number of each unit is its scale.
+    """
+    return {}
+
+
+@hook(optional=True)
+def magnified(batch, rows):
+    """Which runs had events that magnify the errors of what was before, as impacts do, and what their model leaves out.
+
+    It runs outside kernels.
+
+    Parameters
+    ----------
+    batch : NamedTuple
+        Cells. The type of the batch decides which body runs.
+    rows : ndarray of shape ``(cells, outcomes)``
+        Outcomes of the runs.
+
+    Returns
+    -------
+    tuple of ndarray
+        Booleans, and relative errors that no tolerance of the steps shows; both of shape ``(cells,)``. By default false
+        and 0 for all cells.
+    """
+    return np.zeros(len(rows), dtype=bool), np.zeros(len(rows))
+
+
+MEMBERS = (violation, energy, undecided, same_statistics, disturbed, least_scales, magnified)

@@ -26,7 +26,7 @@ from ringsweep.models.ring.impact.mode import (
     ring_of,
 )
 from ringsweep.models.ring.impact.record import OUTCOMES
-from ringsweep.models.ring.impact.switch import motion_of
+from ringsweep.models.ring.impact.switch import SUMMED, motion_of
 from ringsweep.models.ring.record import Outcome
 from ringsweep.models.sliding import REACTION_TOLERANCE, larger
 from ringsweep.physics import ring
@@ -127,6 +127,20 @@ _DISTURBANCE = 1e-14
 @audit.disturbed.implements(ImpactRing)
 def _disturbed(batch):
     return batch._replace(restitution=batch.restitution * (1.0 - _DISTURBANCE))
+
+
+@audit.least_scales.implements(ImpactRing)
+def _least_scales(batch):
+    body, reach = batch.closed.body, batch.balls.reach
+    speed = reach * (1.0 + np.sqrt(body.gravity / reach))
+    return {"m": reach, "m s-1": speed, "N s": body.mass * speed, "J": body.mass * speed * speed}
+
+
+@audit.magnified.implements(ImpactRing)
+def _magnified(batch, rows):
+    impacts, separations = (rows[:, len(Outcome._fields) + OUTCOMES.index(n)] for n in ("impacts", "separations"))
+    # Each loss of a contact ends with rebounds that are summed.
+    return impacts > 0.0, SUMMED * separations
 
 
 def _lost(rows):

@@ -56,9 +56,9 @@ from ringsweep.physics.impact import (
 )
 from ringsweep.physics.zones import cross_edge, edge_ahead, locate
 
-# Rebounds that end within this time, in units of the square root of rho over the acceleration of the gap, are summed:
-# the contact closes. The place is then wrong by about the square of this share of rho.
-_LAST_REBOUNDS = 1e-6
+#: Rebounds that end so soon that the gap could not grow to this share of rho are summed: the contact closes. The place
+#: is then wrong by about as much.
+SUMMED = 1e-12
 
 # A contact whose gap is this share of rho touches together with the one that closes.
 _TOGETHER = 1e-12
@@ -348,7 +348,7 @@ def _rebounds_end(scene, mode, t, y, motion, contact, speed, e):
     if not falls > 0.0 or e >= 1.0:
         return 0.0
     time = 2.0 * speed / (falls * (1.0 - e))
-    return time if time * time * falls <= _LAST_REBOUNDS * _LAST_REBOUNDS * scene.balls.reach else 0.0
+    return time if time * time * falls <= SUMMED * scene.balls.reach else 0.0
 
 
 @inlined

@@ -1,0 +1,29 @@
+"""Figures of the documents are those of the kept results."""
+
+import pytest
+
+from benchmarks import documents
+
+DOCUMENTS = list(documents.documents())
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
+def test_figures_of_a_document_are_the_kept_ones(path):
+    """`python -m benchmarks.documents` fills them in."""
+    text = path.read_text()
+    assert documents.filled(text, documents.kept()) == text
+
+
+def test_every_kept_figure_has_a_reader():
+    named = set().union(*(documents.used(path.read_text()) for path in DOCUMENTS))
+    assert named == set(documents.kept())
+
+
+def test_figures_and_tables_are_filled_in():
+    figures = {("speed", "rate"): "70 000", ("speed", "all"): "| a |\n| --- |\n| 1 |\n"}
+    text = "<!-- speed.rate -->1<!-- / --> runs.\n\n<!-- speed.all -->\n<!-- / -->\n"
+    new = documents.filled(text, figures)
+    assert new == (
+        "<!-- speed.rate -->70 000<!-- / --> runs.\n\n<!-- speed.all -->\n\n| a |\n| --- |\n| 1 |\n\n<!-- / -->\n"
+    )
+    assert documents.filled(new, figures) == new
