@@ -42,9 +42,9 @@ def draw() -> Figure:
     thin = {"color": "black", "linewidth": 0.7, "linestyle": "--", "zorder": 7}
     for angle, reach in ((0.0, 0.9), (phi, 0.8), (phi + beta, 1.0), (theta, 1.0)):
         ax.plot(*zip((0, 0), place(reach * R, angle), strict=True), **thin)
-    name(ax, r"$\varphi$", 0.0, phi, 0.38 * R)
-    name(ax, r"$\beta$", phi, phi + beta, 0.38 * R)
-    name(ax, r"$\theta$", 0.0, theta, 0.2 * R)
+    name(ax, r"$\varphi$", 0.0, phi, 0.3 * R)
+    name(ax, r"$\beta$", phi, phi + beta, 0.3 * R)
+    name(ax, r"$\theta$", 0.0, theta, 0.17 * R)
     straight = {"arrowprops": {"arrowstyle": "-|>", "color": "black", "shrinkA": 0, "shrinkB": 0}}
     ax.annotate("", place(R, -2.2), (0, 0), **straight)
     ax.text(*place(0.6 * R, -2.3), "$R$", fontsize=12)

@@ -17,6 +17,7 @@ from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import DRIVES
 from ringsweep.plots import films
 from ringsweep.plots.phase import _MODE_STYLES
+from ringsweep.plots.style import PAIR_COLOURS
 
 # m = 1 kg, k = 2 N/m, so the natural frequency is sqrt(2).
 LOAD, STIFFNESS, BELT = 9.81, 2.0, 0.1
@@ -103,7 +104,7 @@ class TestPortrait:
     def test_stick_on_a_belt_of_changing_speed_lies_on_the_curve_of_the_belt(self, rocking, ax):
         plots.phase_portrait(rocking, ax=ax)
         assert {"stick", "slip forward", "slip backward"} <= {text.get_text() for text in ax.get_legend().get_texts()}
-        curve = next(line for line in ax.lines if line.get_alpha() == 0.7).get_xydata()
+        curve = next(line for line in ax.lines if line.get_color() == PAIR_COLOURS[1]).get_xydata()
         np.testing.assert_array_equal(curve, np.column_stack([rocking.x, rocking.belt_velocity]))
         order = np.round(curve, 9).tolist()
         stick = np.round(drawn(ax, STICK), 9).tolist()
@@ -130,6 +131,13 @@ class TestFrictionLoop:
         np.testing.assert_allclose(slip[slip[:, 0] < -1e-9, 1], -0.1 * LOAD, rtol=1e-12)
         assert ax.get_xlabel() == "sliding velocity (m s$^{-1}$)"
         assert ax.get_ylabel() == "friction force (N)"
+
+    def test_inset_shows_the_loop_of_bristles_near_zero_and_a_law_without_memory_has_none(self, run, lugre, ax):
+        plots.friction_loop(lugre, ax=ax)
+        (inset,) = ax.child_axes
+        assert inset.get_xlim()[1] == pytest.approx(0.02 * np.abs(lugre.velocity - lugre.belt_velocity).max())
+        assert inset.get_ylim() == ax.get_ylim()
+        assert not plots.friction_loop(run, ax=Figure().add_subplot()).child_axes
 
     def test_bristles_give_another_force_at_breakaway_than_at_the_return_to_stick(self, lugre, ax):
         plots.friction_loop(lugre.sel(time=slice(5.0, 12.0)), ax=ax)

@@ -1,5 +1,7 @@
 """Boundaries of a map as curves, and their uncertainty exponent."""
 
+import re
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -136,8 +138,16 @@ class TestBoundary:
 
         figure = plots.regime_map(ds, boundaries=curves)
         lines = figure.axes[0].lines
-        assert sum(len(line.get_xdata()) for line in lines) == curves.sizes["vertex"]
-        assert "boundary of separating" in " ".join(text.get_text() for text in figure.axes[0].get_legend().get_texts())
+        drawn = np.concatenate([line.get_xydata() for line in lines])
+        points = np.column_stack([curves.drive_amplitude, np.degrees(curves.zone_half_angle)])
+        assert {tuple(point) for point in np.round(points, 9)} <= {tuple(point) for point in np.round(drawn, 9)}
+        legend = " ".join(text.get_text() for text in figure.axes[0].get_legend().get_texts())
+        assert "boundary of separating" in legend
+        # The error is told in the units of the axes: the same number of radians is a greater number of degrees.
+        tolerance = curves.attrs["boundary_tolerance"]
+        told = {unit: float(number) for number, unit in re.findall(r"([\d.]+) ?(rad s|°)", legend)}
+        assert told["°"] == pytest.approx(np.degrees(tolerance), rel=0.05)
+        assert told["rad s"] == pytest.approx(tolerance, rel=0.05)
         netcdf.save(ds, tmp_path / "my.nc")
         assert cli.main(["map", str(tmp_path / "my.nc"), "--boundaries", "separating", "--tolerance", "1e-2"]) == 0
         written = netcdf.load(tmp_path / "my-separating.nc")
@@ -145,6 +155,47 @@ class TestBoundary:
         assert cli.main(["info", str(tmp_path / "my-separating.nc")]) == 0
         assert "boundary of separating: " in capsys.readouterr().out
         assert cli.main(["map", str(tmp_path / "my.nc"), "--tolerance", "1e-2"]) == 2
+
+
+class TestDrawnCurves:
+    """Cells of 1 by 1 with a boundary at the edges of those inside; columns are `drive_amplitude`."""
+
+    def drawn(self, inside, *points):
+        rows, columns = inside.shape
+        places = {"drive_amplitude": np.arange(1.0, columns + 1), "mass": np.arange(1.0, rows + 1)}
+        regime = xr.DataArray(inside.astype("int8"), places, ("mass", "drive_amplitude"))
+        regime.attrs = {"flag_values": np.array([0, 1], "int8"), "flag_meanings": "oscillatory revolving"}
+        ds = xr.Dataset({"regime": regime})
+        x, y, axis = zip(*points, strict=True)
+        about = {"flag_values": np.array([0, 1], "int8"), "flag_meanings": "mass drive_amplitude"}
+        curves = xr.Dataset(
+            {"line": ("vertex", [0] * len(x)), "axis": ("vertex", list(axis), about)},
+            {"drive_amplitude": ("vertex", list(x)), "mass": ("vertex", list(y))},
+            {"boundary_of": "revolving", "boundary_tolerance": 1e-6},
+        )
+        (line,) = plots.regime_map(ds, boundaries=curves, x="drive_amplitude", y="mass").axes[0].lines
+        return line.get_xydata().tolist()
+
+    def test_curve_around_an_island_is_closed(self):
+        inside = np.zeros((5, 5), dtype=bool)
+        inside[2, 2] = True
+        drawn = self.drawn(inside, (3.0, 2.4, 0), (2.4, 3.0, 1), (3.0, 3.6, 0), (3.6, 3.0, 1))
+        assert drawn[0] == drawn[-1]
+        assert len(drawn) == 5
+
+    def test_curve_that_leaves_the_map_is_drawn_up_to_the_frame(self):
+        inside = np.zeros((5, 5), dtype=bool)
+        inside[:2, 2] = True
+        drawn = self.drawn(inside, (2.4, 1.0, 1), (2.4, 2.0, 1), (3.0, 2.6, 0), (3.6, 2.0, 1), (3.6, 1.0, 1))
+        assert drawn[0] == [2.4, 0.5]
+        assert drawn[-1] == [3.6, 0.5]
+        assert len(drawn) == 7
+
+    def test_curve_that_uncertified_cells_interrupt_stays_open(self):
+        inside = np.zeros((7, 7), dtype=bool)
+        inside[2:5, 2:5] = True
+        drawn = self.drawn(inside, (3.0, 2.5, 0), (4.0, 2.5, 0), (5.0, 2.5, 0), (5.5, 3.0, 1), (5.5, 4.0, 1))
+        assert len(drawn) == 5
 
 
 class TestValueThatTheMapLacks:

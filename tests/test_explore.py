@@ -154,6 +154,28 @@ class TestExplore:
         finally:
             pyplot.close("all")
 
+    def test_live_figure_as_the_value_of_a_cell_of_a_notebook_shows_no_second_picture(self, maps, asked, monkeypatch):
+        """Under ipympl pyplot shows the live canvas; IPython would add a picture of the figure, which is dead."""
+        formatters = pytest.importorskip("IPython.core.formatters")
+        from matplotlib import pyplot
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+        monkeypatch.setattr("matplotlib.get_backend", lambda: "widget")
+        monkeypatch.setattr(FigureCanvasAgg, "toolbar_position", "left", raising=False)
+        shown = []
+        monkeypatch.setattr("IPython.display.display", shown.append)
+        format_of = formatters.DisplayFormatter().format
+        try:
+            figure = plots.explore(maps)
+            with pyplot.ion():
+                assert format_of(figure) == ({}, {})
+            assert shown == []
+            with pyplot.ioff():
+                assert format_of(figure) == ({}, {})
+            assert shown == [figure.canvas]
+        finally:
+            pyplot.close("all")
+
     def test_explore_may_exchange_axes_and_hold_others(self, scene, asked):
         maps = mapped(scene, AXES | {"friction.rough.mu_k": [0.25, 0.3]})
         with pytest.raises(InputError, match="friction_rough_mu_k"):

@@ -115,6 +115,14 @@ def test_page_loads_nothing_from_elsewhere(bokeh, tmp_path):
     assert "<b>chance" not in page
 
 
+def test_page_has_the_width_of_a_telephone_and_a_tooltip_of_less_than_half_of_it(bokeh, tmp_path):
+    page = page_of(sweep(4, 3), tmp_path)
+    assert re.search(r'<meta name="viewport" content="width=device-width', page.split("<body>")[0])
+    (tooltip,) = {one["tooltips"] for one in models(page, "HoverTool")}
+    assert "white-space: pre-wrap" in tooltip
+    assert int(re.search(r"max-width: (\d+)vw", tooltip)[1]) < 50
+
+
 def test_page_holds_every_number_with_four_digits_and_no_bound_is_rounded_down(bokeh, tmp_path):
     ds = sweep(5, 4)
     ds["t_separation"][2, 1] = np.nan
@@ -191,6 +199,40 @@ def test_large_sweep_is_thinned_and_the_page_says_so(bokeh, tmp_path):
     page = page_of(sweep(1100, 3)[["regime"]], tmp_path)
     assert "1 cell in 3 shown" in page
     assert script(page)["size"] == 1101
+
+
+def rare(ds, *cells):
+    """The sweep with oscillatory cells, but for one revolving cell at each of these places."""
+    ds["regime"][:] = 0
+    for cell in cells:
+        ds["regime"][cell] = 1
+    return ds
+
+
+@pytest.mark.parametrize("cell", [(0, 0), (1025, 2), (700, 1)])
+def test_legend_of_a_thinned_page_has_the_shares_of_the_file_and_a_rare_word_is_shown(bokeh, tmp_path, cell):
+    ds = rare(sweep(1026, 3)[["regime"]], cell)
+    found = script(page_of(ds, tmp_path))
+    about, words = found["variables"]["regime"], ds["regime"].attrs["flag_meanings"].split()
+    assert about["words"] == words[:2]
+    np.testing.assert_allclose(np.ravel(about["shares"]), [1 - 1 / 3078, 1 / 3078], rtol=1e-12)
+    (shown,) = np.flatnonzero(found["cells"]["regime"] == 1)
+    amplitudes, angles = (one["texts"] for one in found["coordinates"])
+    assert f"= {cell[0] + 1} rad" in amplitudes[shown % len(amplitudes)]
+    assert len(angles) == 3
+
+
+def test_shares_of_a_page_are_those_of_each_slice(bokeh, tmp_path):
+    ds = rare(sweep(6, 4, 2)[["regime"]], (1, 2, 1), (3, 2, 1))
+    shares = script(page_of(ds, tmp_path))["variables"]["regime"]["shares"]
+    np.testing.assert_allclose(shares, [[1.0, 22 / 24], [0.0, 2 / 24]])
+
+
+def test_thinned_geometric_axis_stays_logarithmic_if_a_rare_cell_shifts_it(bokeh, tmp_path):
+    ds = rare(sweep(1026, 3)[["regime"]], (700, 1))
+    ds = ds.assign_coords(drive_amplitude=("drive_amplitude", np.geomspace(0.1, 10.0, 1026)))
+    page = page_of(ds, tmp_path)
+    assert len(models(page, "LogTicker")) == 1
 
 
 def test_more_than_a_million_cells_are_refused_and_the_message_says_what_to_hold(bokeh, tmp_path):

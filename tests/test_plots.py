@@ -231,6 +231,68 @@ def test_units_of_parameters_look_like_units_of_variables(units, shown):
     assert plots.regime_map(ds).axes[0].get_xlabel() == f"amplitude of the drive ({shown})"
 
 
+def written_sweep(**sweep) -> xr.Dataset:
+    """A sweep of the drive and the radius, m, whose configuration is that given."""
+    ds = make_sweep((5, 4)).rename(zone_half_angle="ring_radius")
+    ds["ring_radius"] = "ring_radius", [0.02, 0.03, 0.04, 0.05], {"units": "m", "long_name": "radius"}
+    for name in ("drive_amplitude", "ring_radius"):
+        ds[name].attrs["path"] = name.replace("_", ".")
+    scene = {"ring": {"radius": "30 mm"}, "drive": {"amplitude": 2.0}}
+    return ds.assign_attrs(configuration=json.dumps({"scene": scene, "sweep": {"grid": sweep}}))
+
+
+@pytest.mark.parametrize(
+    ("written", "label", "last"),
+    [
+        ({"linspace": ["20 mm", "50 mm", 4]}, "radius (mm)", 50.0),
+        (["2 cm", "3 cm", "4 cm", "5 cm"], "radius (cm)", 5.0),
+        ([0.02, 0.03, 0.04, 0.05], "radius (mm)", 50.0),
+        (["20 mm", "3 cm", "4 cm", "5 cm"], "radius (m)", 0.05),
+    ],
+    ids=["in the sweep", "listed", "in the scene", "in two units"],
+)
+def test_axis_has_the_unit_in_which_the_configuration_wrote_it_and_the_file_stays_si(written, label, last):
+    ds = written_sweep(**{"ring.radius": written, "drive.amplitude": ["1 rpm", "2 rpm"]})
+    before = ds.copy(deep=True)
+    ax = plots.regime_map(ds).axes[0]
+    assert ax.get_ylabel() == label
+    assert ax.get_xlabel() == "amplitude of the drive (rpm)"
+    rows = mesh(ax.figure).get_coordinates()[:, 0, 1]
+    assert 0.5 * (rows[-1] + rows[-2]) == pytest.approx(last)
+    columns = mesh(ax.figure).get_coordinates()[0, :, 0]
+    assert np.sqrt(columns[-1] * columns[-2]) == pytest.approx(10.0 * 30.0 / np.pi)
+    xr.testing.assert_identical(ds, before)
+
+
+def test_axis_that_the_user_converted_keeps_the_unit_of_the_user():
+    ds = written_sweep(**{"ring.radius": ["20 mm", "50 mm"]})
+    ds["ring_radius"].attrs["units"] = "1"
+    assert plots.regime_map(ds).axes[0].get_ylabel() == "radius"
+
+
+def test_unit_asked_for_is_that_of_the_axis_and_one_that_does_not_fit_is_refused():
+    ds = written_sweep(**{"ring.radius": ["20 mm", "50 mm"]})
+    assert plots.regime_map(ds, units={"ring.radius": "cm"}).axes[0].get_ylabel() == "radius (cm)"
+    assert plots.regime_map(make_sweep(), units={"zone.half_angle": "rad"}).axes[0].get_ylabel().endswith("(rad)")
+    bar = plots.regime_map(ds, var="t_separation", units={"t_separation": "min"}).axes[1]
+    assert bar.get_ylabel() == "time of separation (min)"
+    for units, told in (({"ring.radius": "kg"}, "wrong unit"), ({"radius": "mm"}, "did you mean ring_radius")):
+        with pytest.raises(InputError, match=told):
+            plots.regime_map(ds, units=units)
+
+
+def test_boundary_lies_where_it_is_in_the_unit_of_the_axis():
+    ds = written_sweep(**{"ring.radius": ["20 mm", "50 mm"]}).isel(drive_amplitude=0, drop=True)
+    curves = xr.Dataset(
+        {"line": ("vertex", [0])},
+        {"ring_radius": ("vertex", [0.037], ds["ring_radius"].attrs)},
+        {"boundary_of": "separating", "boundary_tolerance": 1e-6},
+    )
+    figure = plots.regime_map(ds, boundaries=curves)
+    assert {float(x) for line in figure.axes[0].lines for x in line.get_xdata()} == {37.0}
+    assert "± 0.001 mm" in " ".join(entries(figure))
+
+
 def test_label_has_the_path_if_two_coordinates_share_a_long_name():
     ds = make_sweep((3, 3, 3, 3))
     figure = plots.regime_map(ds.isel(drive_amplitude=0, zone_half_angle=0))
@@ -365,6 +427,36 @@ def test_map_of_one_swept_quantity_is_a_strip_or_a_line():
     axes = plots.regime_map(ds, var="t_separation").axes[0]
     np.testing.assert_array_equal(axes.lines[0].get_xydata()[:, 1], ds["t_separation"])
     assert axes.get_xscale() == "log"
+
+
+def test_cells_of_a_strip_meet_at_the_boundary_drawn_over_them():
+    ds = named_sweep((6,))
+    ds["regime"][:] = [0, 0, 0, 3, 3, 3]
+    name = ds["regime"].dims[0]
+    values = ds[name].values
+    place = 0.9 * values[3] + 0.1 * values[2]
+    curves = xr.Dataset(
+        {"line": ("vertex", [0])},
+        {name: ("vertex", [place], ds[name].attrs)},
+        {"boundary_of": "oscillatory", "boundary_tolerance": 1e-6},
+    )
+    ax = plots.regime_map(ds, boundaries=curves).axes[0]
+    (drawn,) = {float(x) for line in ax.lines for x in line.get_xdata()}
+    edges = mesh(ax.figure).get_coordinates()[0, :, 0]
+    assert drawn == edges[3]
+    assert values[1] < edges[2] < values[2]
+
+
+def test_title_of_a_map_of_origins_has_two_lines_in_a_column():
+    ds = refined_sweep()
+    ds.attrs |= {"audit_bound": 0.00871, "audit_cells": 20, "cells_computed": int((ds["origin"].values != 1).sum())}
+    plots.style("print", width=85)
+    try:
+        text = title(plots.regime_map(ds, var="origin"))
+    finally:
+        plots.style()
+    assert text.count("\n") <= 1
+    assert "≤ 0.88 % wrong (95 % confidence)" in text
 
 
 def test_quantities_that_vary_together_make_one_map_axis():
@@ -770,6 +862,29 @@ def test_history_marks_the_separation_within_its_frame():
     # A part of the run that ends earlier does not separate.
     part = plots.history(separated().sel(time=slice(0, 5))).axes[3]
     assert not any("separates" in text.get_text() for text in part.get_legend().get_texts())
+
+
+def test_history_of_many_cycles_is_a_band_with_the_last_cycles_beside_it():
+    ds = make_history(40_000, ring=False)
+    t = np.linspace(0.0, 870 * 2 * np.pi, ds.sizes["time"])
+    growing = np.sin(t) * (1.0 + t / t[-1])
+    ds = ds.assign_coords(time=("time", t, ds["time"].attrs)).assign(velocity=("time", growing, ds["velocity"].attrs))
+    figure = plots.history(ds)
+    whole = [ax for ax in figure.axes if ax.get_xlim() == (t[0], t[-1])]
+    beside = [ax for ax in figure.axes if ax not in whole]
+    assert len(whole) == len(beside) == 3
+    # The band is as high as the vibration at each time.
+    assert not whole[1].lines
+    (band,) = whole[1].collections
+    corners = band.get_paths()[0].vertices
+    near = np.abs(corners[:, 0] - t[-1] / 2) < t[-1] / 50
+    assert corners[near, 1].max() == pytest.approx(1.5, abs=0.03)
+    assert corners[near, 1].min() == pytest.approx(-1.5, abs=0.03)
+    start, end = beside[1].get_xlim()
+    assert 5 * 2 * np.pi <= end - start <= 6.1 * 2 * np.pi
+    assert end == t[-1]
+    assert any("stick" in text.get_text() for text in beside[0].get_legend().get_texts())
+    assert len(plots.history(make_history(ring=False)).axes) == 3
 
 
 def test_history_shades_stick_for_its_duration():

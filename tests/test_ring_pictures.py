@@ -4,6 +4,7 @@ import base64
 import io
 import json
 import os
+import re
 
 import matplotlib
 import numpy as np
@@ -138,7 +139,7 @@ class TestPolarView:
         backward = at(run.isel(time=run["mode"] == -1), 1.0)
         plots.polar_view(run, backward["time"], ax)
         (begin, _), (_, friction), _ = arrows(ax)
-        (_, bar), *_ = (one for one in scale_bars(ax) if one[0] == "$F$")
+        (_, bar), *_ = (one for one in scale_bars(ax) if one[0].startswith("$F$ ("))
         for k in (0, 1):
             forwards = np.array([-begin[k, 1], begin[k, 0]]) / RADIUS
             assert friction[k] @ forwards > 0.0
@@ -152,6 +153,9 @@ class TestPolarView:
         bars = dict(scale_bars(ax))
         assert bars["$N$, $Mg$"] == pytest.approx(WEIGHT / -weight[0, 1])
         assert bars[""] == pytest.approx(1000.0)
+        # The bar of friction tells how much longer its arrows are.
+        (text,) = (name for name in bars if name.startswith("$F$"))
+        assert bars["$N$, $Mg$"] / bars[text] == pytest.approx(float(re.search(r"(\d+)\)", text)[1]))
 
     @pytest.mark.parametrize("time", TIMES)
     def test_each_arrow_has_its_name_beside_it_and_the_legend_names_no_arrow(self, run, ax, time):
@@ -163,9 +167,21 @@ class TestPolarView:
                 assert name not in names
             else:
                 along = np.clip((names[name] - starts[k]) @ reach[k] / (reach[k] @ reach[k]), 0.0, 1.0)
-                assert np.hypot(*(names[name] - starts[k] - along * reach[k])) < 0.14 * RADIUS
+                near = 0.4 if name.startswith("$F") else 0.14 + BALL / RADIUS
+                assert np.hypot(*(names[name] - starts[k] - along * reach[k])) < near * RADIUS
         told = {text.get_text() for text in ax.get_legend().get_texts()}
         assert told == {"zone", "elsewhere", "angle θ of the ring"}
+
+    @pytest.mark.parametrize("time", TIMES)
+    def test_names_of_forces_collide_with_no_ball_and_not_with_the_rim(self, run, ax, time):
+        plots.polar_view(run, time, ax)
+        balls = [np.array(patch.center) for patch in ax.patches if isinstance(patch, Circle)]
+        assert len(balls) == 2
+        for text in ax.texts:
+            if text.get_visible() and text.get_text()[:2] in ("$N", "$F") and "_" in text.get_text():
+                at = np.array(text.get_position())
+                assert min(np.hypot(*(at - ball)) for ball in balls) > BALL + 0.05 * RADIUS
+                assert not 0.93 < np.hypot(*at) / RADIUS < 1.15
 
     def test_mark_is_at_the_angle_of_the_ring_and_an_arrow_shows_the_sense_of_rotation(self, run, ax):
         for time, sense in ((1.2, 1.0), (1.2, -1.0), (1.2, 0.0)):
@@ -225,6 +241,10 @@ class TestPhasePortrait:
         body = np.column_stack([np.degrees(run["phi"]), run["omega"]])[run["mode"] == 0]
         stick = next(line for line in ax.lines if line.get_linewidth() > 2 and line.get_color() == "black")
         shown = stick.get_xydata()[~np.isnan(stick.get_xydata()[:, 1])]
+        # A thin line over a broad one: both are seen while the body sticks.
+        over = next(line for line in ax.lines if np.array_equal(line.get_ydata(), run["ring_omega"]))
+        assert over.get_zorder() > stick.get_zorder()
+        assert over.get_linewidth() < stick.get_linewidth()
         assert {tuple(point) for point in body} <= {tuple(point) for point in shown}
 
     def test_portrait_in_the_frame_of_the_ring_has_a_band_for_each_arc_and_contact(self, run, ax):

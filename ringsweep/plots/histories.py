@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import chain
 from typing import Any, Literal
 
@@ -35,6 +36,7 @@ from ringsweep.plots.labels import axis_label, displayed, label_axis, long_name,
 from ringsweep.plots.style import (
     CURVE_COLOURS,
     CURVE_STYLES,
+    MARGIN,
     OPEN,
     PAIR_COLOURS,
     PAIR_STYLES,
@@ -73,6 +75,9 @@ _WEAKEST = 1e-4
 # Intervals of time into which a long history is condensed: more than a printed panel has pixels.
 _INTERVALS = 4000
 
+# Cycles from which on a printed curve is a block; cycles that are then drawn beside it; and steps of its envelope.
+_MANY_CYCLES, _LAST_CYCLES, _STEPS = 40, 5, 200
+
 _SHORT_NAMES = {
     "phi": "angle",
     "omega": "angular velocity",
@@ -100,6 +105,8 @@ def history(ds: xr.Dataset) -> Figure:
     goes on after that, panels below show the gaps and, as marks, the speeds of impacts. For a belt the panels show
     displacement, velocity and friction force. Times at which the body sticks, or a contact is open, are shaded. If the
     law has bristles and the body breaks away, a last panel shows the friction force around the first break-away.
+    Of a run with more than 40 cycles the panels show the band from the least to the greatest value in each of them or
+    of a few, and beside it the last five cycles with their shading.
 
     Several friction laws are a line each, without strip and shading. On a belt, if their friction forces differ at the
     start, a panel shows the start for twice as long as they differ. Its time axis is logarithmic if differences end at
@@ -192,18 +199,36 @@ def draw_history(figure: Figure | SubFigure, ds: xr.Dataset) -> None:
     panels = panels_of(ds)
     time = ds["time"].values
     heights = _heights(ds)
-    axes = list(figure.subplots(len(heights), 1, gridspec_kw={"height_ratios": heights}))
     start, breakaway = _differences(ds), _first_breakaway(ds)
-    whole = axes[: len(axes) - (start is not None) - (breakaway is not None)]
-    for ax in whole[1:]:
-        ax.sharex(whole[0])
-    for ax in whole[:-1]:
-        ax.tick_params(labelbottom=False)
+    cycles = _cycles(ds)
+    many = len(cycles) > _MANY_CYCLES
+    late = ds.isel(time=slice(cycles[-_LAST_CYCLES - 1], None)) if many else ds
+    grid = figure.add_gridspec(len(heights), 1 + many, height_ratios=heights)
+    rows = len(heights) - (start is not None) - (breakaway is not None)
+    axes = [figure.add_subplot(grid[k, 0] if k < rows else grid[k, :]) for k in range(len(heights))]
+    whole = axes[:rows]
+    beside = [figure.add_subplot(grid[k, 1]) for k in range(rows * many)]
+    for column in filter(None, (whole, beside)):
+        for ax in column[1:]:
+            ax.sharex(column[0])
+        for ax in column[:-1]:
+            ax.tick_params(labelbottom=False)
     draw = _draw_laws if compares_laws(ds) else draw_panel
-    for ax, names in zip(axes, panels, strict=False):
-        draw(ax, ds, names)
+    for k, (ax, names) in enumerate(zip(axes, panels, strict=False)):
+        if many:
+            draw_panel(ax, ds, names, band=cycles)
+            draw_panel(beside[k], late, names)
+            beside[k].set(ylim=ax.get_ylim(), ylabel="")
+            # The axis beside it says so.
+            beside[k].set_title("", loc="left")
+            beside[k].set_title("", loc="right")
+        else:
+            draw(ax, ds, names)
     if strip := zones(ds):
-        _draw_zones(axes[-1], ds, strip)
+        _draw_zones(whole[-1], ds, strip)
+        if many:
+            _draw_zones(beside[-1], late, strip)
+            beside[-1].set_yticks([])
     if start is not None:
         first, last = start
         until = max(20, int(np.searchsorted(time, time[0] + 2.0 * last)))
@@ -224,6 +249,12 @@ def draw_history(figure: Figure | SubFigure, ds: xr.Dataset) -> None:
     if time[-1] > time[0]:
         whole[0].set_xlim(*time_limits(ds))
     whole[-1].set_xlabel(axis_label(ds["time"], ds))
+    if many:
+        inches = width_of(whole[-1]) - MARGIN
+        label = axis_label(ds["time"], ds)
+        whole[-1].set_xlabel(folded([label, "band: least to greatest"], inches))
+        beside[-1].set_xlabel(folded([label, f"the last {_LAST_CYCLES} cycles"], inches))
+        beside[0].set_xlim(float(late["time"][0]), time_limits(ds)[1])
     figure.align_ylabels(axes)
     if compares_laws(ds):
         lines = axes[0].get_legend_handles_labels()
@@ -244,15 +275,22 @@ def _heights(ds: xr.Dataset) -> list[float]:
     return [1.0] * (len(panels_of(ds)) + sum(detail is not None for detail in details)) + [0.13 * strip] * bool(strip)
 
 
-def draw_panel(axes: Axes, ds: xr.Dataset, names: tuple[str, ...], explain_shading: bool = False) -> None:
+def draw_panel(
+    axes: Axes,
+    ds: xr.Dataset,
+    names: tuple[str, ...],
+    explain_shading: bool = False,
+    band: NDArray[np.intp] | None = None,
+) -> None:
     """Draw quantities of one run in one panel; those that the dataset does not have are left out.
 
-    The legend explains the shading in the panel that shows where the body is, elsewhere if `explain_shading`.
+    The legend explains the shading in the panel that shows where the body is, elsewhere if `explain_shading`. With the
+    first samples of cycles as `band` the curves are bands from the least to the greatest value, without shading.
     """
     small_ticks(axes)
     time, names = ds["time"].values, tuple(present(ds, names))
     explain_shading = explain_shading or names[0] in PANELS
-    if "mode" in ds:
+    if "mode" in ds and band is None:
         at, phase = _by_interval(time, phases(ds))
         for value, look in _shades().items():
             spans = [(at[i], at[j] - at[i]) for i, j in true_ranges(phase == value)]
@@ -268,7 +306,11 @@ def draw_panel(axes: Axes, ds: xr.Dataset, names: tuple[str, ...], explain_shadi
         _draw_impacts(axes, ds)
         return
     for name, colour, style in zip(names, PAIR_COLOURS, PAIR_STYLES, strict=False):
-        curve = _envelope(time, displayed(ds[name]).values)
+        numbers = displayed(ds[name]).values
+        if band is not None:
+            _draw_range(axes, time, numbers, band, color=on_page(colour), label=_LEGEND.get(name))
+            continue
+        curve = _envelope(time, numbers)
         axes.plot(*curve, color=on_page(colour), linestyle=style, linewidth=1, label=_LEGEND.get(name))
     _mark_separation(axes, ds, names)
     legend_above(axes)
@@ -280,6 +322,31 @@ def draw_panel(axes: Axes, ds: xr.Dataset, names: tuple[str, ...], explain_shadi
         axes.set_xlim(*time_limits(ds))
     if names[0] in _CLIPPED:
         clip(axes, time, displayed(ds[names[0]]).values, "left" if explain_shading else "right")
+
+
+def _cycles(ds: xr.Dataset) -> NDArray[np.intp]:
+    """First sample of each cycle of one run: where its velocity rises through the middle of its range."""
+    name = next(iter(present(ds, ("omega", "velocity"))), None)
+    if name is None or compares_laws(ds):
+        return np.empty(0, dtype=np.intp)
+    numbers = ds[name].values
+    low, high = np.nanquantile(numbers, (0.01, 0.99))
+    # Noise around the middle is no cycle.
+    middle, margin = 0.5 * (low + high), 0.2 * (high - low)
+    apart = np.flatnonzero(np.abs(numbers - middle) > margin)
+    above = numbers[apart] > middle
+    return apart[1:][above[1:] & ~above[:-1]]
+
+
+def _draw_range(axes: Axes, time: NDArray[Any], numbers: NDArray[Any], cycles: NDArray[np.intp], **look: Any) -> None:
+    """Draw the band from the least to the greatest value in every cycle, or in every few of very many."""
+    starts = np.append(0, cycles[:: math.ceil(len(cycles) / _STEPS)])
+    # The last cycle may be a part of one, whose band would be narrower.
+    starts = np.unique(starts[:-1] if len(starts) > 2 else starts)
+    low, high = np.fmin.reduceat(numbers, starts), np.fmax.reduceat(numbers, starts)
+    edges = np.append(time[starts], time[-1])
+    style: dict[str, Any] = {"step": "post", "alpha": 0.45, "linewidth": 0.8}
+    axes.fill_between(edges, np.append(low, low[-1]), np.append(high, high[-1]), **style, **look)
 
 
 def _shades() -> dict[int, dict[str, Any]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import matplotlib
@@ -183,6 +184,14 @@ def _upwards(bound: float) -> float:
     return math.ceil(bound / unit) * unit
 
 
+def _show_live(figure: Figure) -> None:
+    """Show the live canvas of a figure, unless pyplot shows every new figure by itself."""
+    if not matplotlib.is_interactive():
+        from IPython.display import display
+
+        display(figure.canvas)
+
+
 def _figure() -> Figure:
     """A figure of pyplot if the backend can be interactive, else a figure that a notebook shows once."""
     backend = matplotlib.get_backend()
@@ -196,4 +205,6 @@ def _figure() -> Figure:
         canvas.toolbar_position, canvas.toolbar_visible, canvas.header_visible = "top", True, False
         layout: Any = figure.get_layout_engine()
         layout.set(rect=(0.0, 0.0, 1.0, 1.0 - _TOOLBAR / _SIZE[1]))
+        # IPython asks the value of a cell for this. Its own picture of a figure would be a dead copy of the live one.
+        figure.__dict__["_ipython_display_"] = partial(_show_live, figure)
     return figure

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import Any
 
 import xarray as xr
 from matplotlib.axis import Axis
 
-from ringsweep.plots.datasets import is_numeric
+from ringsweep.errors import InputError
+from ringsweep.plots.datasets import configuration, is_numeric, resolve, swept
 from ringsweep.plots.style import angle_unit
+from ringsweep.quantities.parameters import Parameter
+from ringsweep.quantities.units import NUMBER, quantity
 
 MINUS = "\N{MINUS SIGN}"
 TIMES = "\N{MULTIPLICATION SIGN}"
@@ -53,8 +59,74 @@ def label_axis(axis: Axis, name: str, unit: str) -> None:
     axis.set_label_text(f"{name} ({prefix}{unit})")
 
 
+def in_units(ds: xr.Dataset, units: Mapping[str, str] | None = None) -> xr.Dataset:
+    """A dataset whose quantities tell in which unit pictures show them; its numbers stay SI.
+
+    A swept quantity has the unit in which its configuration wrote it. Angles have that of the style.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        Result of a sweep.
+    units : mapping of str to str, optional
+        Units of some quantities, which the user wants.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, or the unit does not fit.
+    """
+    ds = ds.copy()
+    if "configuration" in ds.attrs:
+        source = configuration(ds)
+        for coordinate in swept(ds):
+            unit = _written_unit(source, str(coordinate.attrs["path"]))
+            if unit and is_numeric(coordinate) and coordinate.attrs.get("units") != "rad":
+                # The user may have changed the unit of the coordinate since.
+                with suppress(InputError):
+                    _show_in(ds, str(coordinate.name), unit)
+    for name, unit in (units or {}).items():
+        if not isinstance(unit, str):
+            raise InputError(f"units.{name}", f"{unit!r} is no unit: give its name, such as 'mm'")
+        _show_in(ds, resolve("units", name, ds.variables), unit)
+    return ds
+
+
+def _show_in(ds: xr.Dataset, name: str, unit: str) -> None:
+    """Show a quantity in a unit from now on; InputError if the unit does not fit."""
+    si = str(ds[name].attrs.get("units", "1"))
+    one = quantity(f"1 {unit}", Parameter(si, f"unit of {name}"), f"units.{name}")
+    if one != 1.0 or si == "rad":
+        ds[name].attrs |= {"display_units": unit, "display_factor": 1.0 / one}
+
+
+def _written_unit(source: Mapping[str, Any], path: str) -> str:
+    """The unit in which a configuration wrote an axis, or else the value in the scene; empty if it wrote plain numbers.
+
+    Different units along one axis count as none.
+    """
+    sweep = source.get("sweep") or {}
+    written = [found for key in ("grid", "points") if (found := _texts((sweep.get(key) or {}).get(path)))]
+    value: Any = source.get("scene")
+    for key in path.split("."):
+        value = value.get(key) if isinstance(value, Mapping) else None
+    texts = written[0] if written else _texts(value)
+    units = {text[match.end() :].strip() for text in texts if (match := NUMBER.match(text))}
+    return units.pop() if len(units) == 1 else ""
+
+
+def _texts(value: Any) -> list[str]:
+    """All texts in a value of a configuration."""
+    if isinstance(value, str):
+        return [value.strip()]
+    parts = value.values() if isinstance(value, Mapping) else value if isinstance(value, list) else ()
+    return [text for part in parts for text in _texts(part)]
+
+
 def display_factor(data: xr.DataArray) -> float:
-    """Factor from the numbers of a quantity to the numbers in a picture, which has the unit of angles of the style."""
+    """Factor from the numbers of a quantity to those in a picture, in the unit of :func:`in_units` or of the style."""
+    if "display_factor" in data.attrs:
+        return float(data.attrs["display_factor"])
     return angle_unit()[0] if data.attrs.get("units") == "rad" else 1.0
 
 
@@ -82,7 +154,10 @@ def axis_label(data: xr.DataArray, ds: xr.Dataset) -> str:
 def unit_text(data: xr.DataArray) -> str:
     """Unit of a quantity in a picture, empty if it has none."""
     units = str(data.attrs.get("units", "1"))
-    units = angle_unit()[1] if units == "rad" else "" if units == "1" else units
+    if "display_units" in data.attrs:
+        units = {"deg": "°", "degree": "°"}.get(data.attrs["display_units"], data.attrs["display_units"])
+    else:
+        units = angle_unit()[1] if units == "rad" else "" if units == "1" else units
     # Parameters have "m/s^2" where variables have "m s-2".
     units = re.sub(r"/([A-Za-z]+)\^?(\d*)", lambda unit: f" {unit[1]}-{unit[2] or 1}", units)
     return re.sub(r"(?<=[A-Za-z])\^?(-?\d+)", r"$^{\1}$", units)

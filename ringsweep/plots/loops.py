@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
+import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.plots.histories import clip
 from ringsweep.plots.labels import label_axis
 from ringsweep.plots.phase import draw_modes
 from ringsweep.plots.rig import belt_history
-from ringsweep.plots.style import axes_or_current, place_legend, small_ticks
+from ringsweep.plots.style import SMALL, axes_or_current, place_legend, small_ticks
+
+# Share of the greatest velocity that the inset shows.
+_NEAR = 0.02
 
 
 def friction_loop(
@@ -20,9 +25,9 @@ def friction_loop(
 ) -> Axes:
     """Draw the friction force on a belt over the sliding velocity, or over the distance slid.
 
-    A law of the sliding velocity alone gives one curve, and a vertical line where the body sticks. Bristles give loops.
-    Over the distance slid, the area of a closed loop is the energy that friction takes in a cycle. For the loops of
-    some cycles only, draw ``ds.sel(time=slice(...))``.
+    A law of the sliding velocity alone gives one curve, and a vertical line where the body sticks. Bristles give loops,
+    which an inset shows at small velocities. Over the distance slid, the area of a closed loop is the energy that
+    friction takes in a cycle. For the loops of some cycles only, draw ``ds.sel(time=slice(...))``.
 
     Parameters
     ----------
@@ -76,5 +81,22 @@ def friction_loop(
     clip(ax, run["time"].values, force)
     label_axis(ax.xaxis, *label)
     label_axis(ax.yaxis, "friction force", "N")
+    if against == "velocity" and "deflection" in run and run["deflection"].values.any():
+        _draw_near_zero(ax, run["mode"].values, across, force)
     place_legend(ax, entries)
     return ax
+
+
+def _draw_near_zero(ax: Axes, mode: NDArray[Any], velocity: NDArray[Any], force: NDArray[Any]) -> None:
+    """Draw small velocities, at which bristles make loops, as an inset where friction, which opposes slip, never is."""
+    width = _NEAR * float(np.nanmax(np.abs(velocity)))
+    inset = ax.inset_axes((0.6, 0.24, 0.37, 0.36))
+    draw_modes(inset, mode, velocity, force)
+    for line in inset.lines:
+        line.set_linewidth(min(line.get_linewidth(), 0.9))
+        if line.get_marker() != "None":
+            line.set_visible(False)
+    inset.set(xlim=(-width, width), ylim=ax.get_ylim(), yticks=[])
+    small_ticks(inset)
+    label_axis(inset.xaxis, "near 0", "m s$^{-1}$")
+    inset.xaxis.label.set_fontsize(SMALL)

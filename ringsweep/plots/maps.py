@@ -25,11 +25,12 @@ from numpy.typing import NDArray
 from ringsweep.errors import InputError
 from ringsweep.plots.datasets import is_numeric, is_sampled, require_sweep, resolve, scene_text, swept
 from ringsweep.plots.labels import (
+    amount_text,
     axis_label,
     display_factor,
     displayed,
+    in_units,
     long_name,
-    number_text,
     plain_text,
     value_text,
 )
@@ -87,13 +88,14 @@ def regime_map(
     legend: bool | str = True,
     norm: str | None = None,
     cmap: str | None = None,
+    units: Mapping[str, str] | None = None,
 ) -> Figure:
     """Draw one variable of a sweep over the swept quantities, as a new figure.
 
     The cells of a grid are coloured rectangles, points make a scatter plot. One swept quantity makes a strip (of a
     classification) or a line (of numbers). More than two dimensions make small multiples. If an axis has more values
     than a page has pixels, only every second, third, ... is drawn, and the title says so; the legend gives shares of
-    all cells.
+    all cells. Cells of rare classes are drawn in place of neighbours if they would all be left out.
 
     Parameters
     ----------
@@ -119,6 +121,9 @@ def regime_map(
         be dark.
     cmap : str, optional
         Colour map of matplotlib for numbers.
+    units : mapping of str to str, optional
+        Units of axes or of the variable, such as ``{"ring.radius": "mm"}``. By default swept quantities have the unit
+        in which the configuration wrote them, and angles that of :func:`style`. The file stays SI.
 
     Returns
     -------
@@ -127,7 +132,8 @@ def regime_map(
     Raises
     ------
     InputError
-        If a name or a place is unknown, a single cell is left, or more than 25 panels would be needed.
+        If a name or a place is unknown, a unit does not fit, a single cell is left, or more than 25 panels would be
+        needed.
 
     Examples
     --------
@@ -141,9 +147,14 @@ def regime_map(
     >>> regime_map(ds, var="phi_max").axes[0].get_ylabel()
     'angle (°)'
     """
-    found = Map.of(ds, x, y, var, sel or {}, norm, cmap)
+    found = Map.of(ds, x, y, var, sel or {}, norm, cmap, units)
     if boundaries is not None:
         found.entries.append(found.curve_entry(boundaries))
+        if found.vertical is None:
+            # Cells of a strip meet where the boundary is: halfway would leave slivers of the wrong colour beside it.
+            places = boundaries[found.horizontal.name]
+            factor = display_factor(found.ds[found.horizontal.name])
+            found = replace(found, horizontal=replace(found.horizontal, meet=places.values * factor))
     width = figure_width()
     if len(found.panels) == 1:
         height = 0.62 if found.vertical else 0.3 if found.scale.meanings else 0.45
@@ -294,9 +305,11 @@ class Map:
         sel: Mapping[str, float | str],
         norm: str | None = None,
         cmap: str | None = None,
+        units: Mapping[str, str] | None = None,
     ) -> Map:
         """Choose axes, panels and colours; arguments and errors as for :func:`regime_map`."""
         require_sweep(ds)
+        ds = in_units(ds, units)
         if is_sampled(ds):
             var = "probability" if var == "regime" else var
             # Regimes that occur nowhere have no map.
@@ -321,17 +334,20 @@ class Map:
         panels = _panels(ds, others)
         columns = math.ceil(math.sqrt(len(panels)))
         # A line is drawn with all its values: every peak stays visible.
-        drawn = {} if scattered or vertical is None else thinned([horizontal, vertical], _MOST_CELLS // columns)
+        drawn = {} if scattered or vertical is None else thinned([horizontal, vertical], _MOST_CELLS // columns, data)
         thin = ds.isel(drawn)
         share = math.prod(ds.sizes[dim] / len(indices) for dim, indices in drawn.items())
         thinning = [f"1 cell in {share:.0f} drawn"] if drawn else []
         # The legend of a map of origins has the shares, and its title is long.
-        told, audit = (scene_text(ds), audit_texts(ds)) if var != "origin" else ([], audit_texts(ds)[1:])
+        name, told, audit = "" if scale.meanings is None else long_name(data), scene_text(ds), audit_texts(ds)
+        if var == "origin":
+            name, told = "cells run or inferred", []
+            audit = [text.replace("others: at most", "inferred: ≤") for text in audit[1:]]
         return cls(
             ds,
             displayed(thin[var]),
-            Axis.of(thin[horizontal.name], thin),
-            Axis.of(thin[vertical.name], thin) if vertical else None,
+            replace(Axis.of(thin[horizontal.name], thin), scale=horizontal.scale),
+            replace(Axis.of(thin[vertical.name], thin), scale=vertical.scale) if vertical else None,
             scattered,
             scale,
             [replace(warning, cells=warning.cells.isel(drawn)) for warning in warnings],
@@ -339,7 +355,7 @@ class Map:
             columns,
             drawn,
             legend_entries(scale, ds, data, warnings, scattered),
-            ["" if scale.meanings is None else long_name(data), *held, *held_now, *told, *thinning, *audit],
+            [name, *held, *held_now, *told, *thinning, *audit],
         )
 
     @property
@@ -379,15 +395,38 @@ class Map:
         """Draw the curves of boundaries over a panel."""
         for number in np.unique(boundaries["line"]):
             line = boundaries.isel(vertex=boundaries["line"].values == number)
-            x, *y = (
-                line[axis.name].values * display_factor(line[axis.name])
-                for axis in (self.horizontal, self.vertical)
-                if axis is not None
-            )
-            if y:
-                axes.plot(x, y[0], marker="." if len(x) == 1 else "", **_CURVE)
+            if self.vertical is None:
+                axes.axvline(line[self.horizontal.name].values[0] * self._factor(self.horizontal), **_CURVE)
             else:
-                axes.axvline(x[0], **_CURVE)
+                points = self._whole_curve(self.vertical, line)
+                axes.plot(*points.T, marker="." if len(points) == 1 else "", **_CURVE)
+
+    def _factor(self, axis: Axis) -> float:
+        return display_factor(self.ds[axis.name])
+
+    def _whole_curve(self, vertical: Axis, line: xr.Dataset) -> NDArray[Any]:
+        """Points of a curve, shape ``(points, 2)``: up to the frame if it ends at it, and closed if it is.
+
+        The points of a boundary lie between the middles of cells, so the last of them is half a cell from the frame.
+        """
+        pair = self.horizontal, vertical
+        points = np.column_stack([line[axis.name].values * self._factor(axis) for axis in pair])
+        along = line["axis"].attrs["flag_meanings"].split()
+        inside = True
+        for end in (0, -1):
+            across = 1 - [axis.name for axis in pair].index(along[int(line["axis"].values[end])])
+            for value, edge in zip(pair[across].values[[0, -1]], pair[across].edges[[0, -1]], strict=True):
+                if np.isclose(points[end, across], value, rtol=1e-9, atol=0.0):
+                    outer = points[end].copy()
+                    outer[across] = edge
+                    points = np.insert(points, end if end == 0 else len(points), outer, axis=0)
+                    inside = False
+                    break
+        # A curve that uncertified cells interrupt has its ends apart.
+        cells = np.column_stack([np.interp(points[:, k], pair[k].values, range(len(pair[k].values))) for k in (0, 1)])
+        if inside and len(points) > 3 and (np.abs(cells[0] - cells[-1]) <= 1.0).all():
+            points = np.vstack([points, points[:1]])
+        return points
 
     def curve_entry(self, boundaries: xr.Dataset) -> Artist:
         """Entry of the legend for the curves of boundaries."""
@@ -397,7 +436,12 @@ class Map:
             if not held.dims and held.name in boundaries.coords and (boundaries[held.name].values != held.values).any():
                 raise InputError("boundaries", f"are those of another map: this one has {plain_text(value_text(held))}")
         regime, tolerance = boundaries.attrs["boundary_of"], boundaries.attrs["boundary_tolerance"]
-        return Line2D([], [], label=f"boundary of {regime}\n± {number_text(tolerance)} (SI units)", **_CURVE)
+        # Along each axis the error is a number in the unit of the axis.
+        along = [self.ds[axis.name] for axis in (self.horizontal, self.vertical) if axis is not None]
+        errors = dict.fromkeys(
+            plain_text(amount_text(axis.copy(data=np.full(axis.shape, tolerance))[0], 2)) for axis in along
+        )
+        return Line2D([], [], label=f"boundary of {regime}\n± {' or '.join(errors)}", **_CURVE)
 
     def _draw_line(self, axes: Axes, data: xr.DataArray) -> None:
         numbers, edges = data.values[self.horizontal.order], self.horizontal.edges

@@ -13,7 +13,8 @@ for (const [key, packed] of Object.entries(cells)) if (packed instanceof Uint8Ar
 
 const name = variable.value, about = variables[name], words = about.words, values = cells[name]
 let first = 0
-for (const slice of slices) first = first * slice.options.length + Number(slice.value)
+for (const chooser of slices) first = first * chooser.options.length + Number(chooser.value)
+const slice = first
 first *= size
 
 function shown(i) {
@@ -23,8 +24,9 @@ function shown(i) {
 function number(value) {
   return String(Number(value.toPrecision(4))).replace(/-/g, "\u2212")
 }
-function percent(count) {
-  return `${(100 * count / size).toFixed(1)} %`
+function percent(share) {
+  if (share > 0 && share < 0.001) return "< 0.1 %"
+  return share > 0.999 && share < 1 ? "> 99.9 %" : `${(100 * share).toFixed(1)} %`
 }
 function upwards(bound) {
   const unit = 10 ** (Math.floor(Math.log10(bound)) - 1)
@@ -46,9 +48,8 @@ view.change.emit()
 // A classification has the share of each class beside its colour.
 for (const [key, bar] of Object.entries(bars)) bar.visible = key === name && (words !== null || line === null)
 if (words !== null) {
-  const counts = words.map(() => 0)
-  for (let i = 0; i < size; i++) if (values[first + i] >= 0) counts[values[first + i]] += 1
-  bars[name].major_label_overrides = new Map(words.map((text, k) => [k, `${text}, ${percent(counts[k])}`]))
+  // The shares are those of all cells of the file, of which a large one does not show every cell.
+  bars[name].major_label_overrides = new Map(words.map((text, k) => [k, `${text}, ${percent(about.shares[k][slice])}`]))
 } else {
   bars[name].title = about.label
 }
@@ -57,9 +58,8 @@ if (words !== null) {
 const places = Object.fromEntries(Object.keys(doubtful.data).map(key => [key, []]))
 const bad = variables.certified?.words?.indexOf("not certified") ?? -1
 const uncertain = i => bad >= 0 && cells.certified[first + i] === bad
-let count = 0
-for (let i = 0; i < size; i++) count += uncertain(i)
-if (["regime", "motion"].includes(name) && count < size) {
+const share = bad >= 0 ? variables.certified.shares[bad][slice] : 0
+if (["regime", "motion"].includes(name) && share < 1) {
   if (edges === null) {
     for (let i = 0; i < size; i++) if (uncertain(i)) { places.x.push(view.data.x[i]); places.y.push(view.data.y[i]) }
   } else {
@@ -76,7 +76,7 @@ if (["regime", "motion"].includes(name) && count < size) {
 }
 doubtful.data = places
 plot.title.text = about.title + (
-  count === 0 ? "" : count === size ? "; no cell is certified" : `; marked: not certified, ${percent(count)}`
+  share === 0 ? "" : share === 1 ? "; no cell is certified" : `; marked: not certified, ${percent(share)}`
 )
 
 // Over one quantity, numbers are a line and classes are a strip.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.plots.datasets import is_numeric, is_sampled, require_sweep, resolve, swept
-from ringsweep.plots.labels import axis_label, displayed, long_name, plain_text, value_text
+from ringsweep.plots.labels import axis_label, displayed, in_units, long_name, plain_text, value_text
 from ringsweep.plots.map_axes import Axis, choose_axes, is_scattered, thinned
 from ringsweep.plots.map_colours import ZERO, ColourScale
 from ringsweep.plots.maps import audit_texts
@@ -34,6 +34,12 @@ _PIXELS = 1000
 
 # Binary digits kept of numbers and of bounds on errors: four decimal digits, and two.
 _DIGITS, _BOUND_DIGITS = 15, 8
+
+# A telephone would show the page as if it were 980 pixels wide.
+_VIEWPORT = '<meta name="viewport" content="width=device-width, initial-scale=1">'
+
+# Beside the pointer there is at least half of the page.
+_TOOLTIP = '<div style="white-space: pre-wrap; max-width: 42vw">@{value}{custom}</div>'
 
 # The script sees to the rest of a dark page.
 _DARK = "@media (prefers-color-scheme: dark) { .bk-input { background-color: #303030; color: #e0e0e0 } }"
@@ -91,7 +97,8 @@ def save_page(
 
     sweep = _Sweep.of(ds, x, y, var, sel or {})
     with replacing(path) as temporary:
-        Path(temporary).write_text(file_html(_document(sweep), INLINE, sweep.title), encoding="utf-8")
+        page = file_html(_document(sweep), INLINE, sweep.title).replace("<head>", f"<head>\n    {_VIEWPORT}", 1)
+        Path(temporary).write_text(page, encoding="utf-8")
 
 
 def check_page(path: str | os.PathLike[str]) -> None:
@@ -136,8 +143,9 @@ class _Sweep:
         Values of each variable: of a classification the positions among `words`, or -1, shape ``(slices * size,)``; of
         others see :func:`_packed`.
     variables : dict of str to dict
-        ``title``, the name; ``label``, the name with unit; ``words`` of a classification; ``error``, the variable that
-        bounds the error; ``logarithmic``, whether its colours are.
+        ``title``, the name; ``label``, the name with unit; ``words`` of a classification, and ``shares`` of the cells
+        of the file in each slice that have them; ``error``, the variable that bounds the error; ``logarithmic``,
+        whether its colours are.
     scales : dict of str to tuple
         Colours of each variable, and the least and the greatest number.
     coordinates : list of dict
@@ -165,6 +173,7 @@ class _Sweep:
     def of(cls, ds: xr.Dataset, x: str | None, y: str | None, var: str, sel: Mapping[str, float | str]) -> _Sweep:
         """Choose the axes, and put the cells in their order; arguments and errors as for :func:`save_page`."""
         require_sweep(ds)
+        ds = in_units(ds)
         if is_sampled(ds):
             raise InputError("ds", "is a sampled sweep, which has no runs to point at: draw a picture, *.png")
         var = resolve("var", var, _numeric(ds))
@@ -176,13 +185,13 @@ class _Sweep:
         horizontal, vertical = choose_axes(ds, ds[var], x, y)
         scattered = vertical is not None and is_scattered(horizontal, vertical)
         axes = [axis for axis in (vertical, horizontal) if axis]
+        whole = ds
         if not scattered:
             # A picture of cells needs their values in ascending order.
-            whole = ds[var].size
-            ds = ds.isel({axis.dims[0]: axis.order for axis in axes} | thinned(axes, _MOST_ALONG))
-            if ds[var].size < whole:
-                notes.append(f"1 cell in {whole / ds[var].size:.0f} shown")
-            axes = [Axis.of(ds[axis.name], ds) for axis in axes]
+            ds = ds.isel({axis.dims[0]: axis.order for axis in axes} | thinned(axes, _MOST_ALONG, ds[var]))
+            if ds[var].size < whole[var].size:
+                notes.append(f"1 cell in {whole[var].size / ds[var].size:.0f} shown; shares are those of all cells")
+            axes = [replace(Axis.of(ds[axis.name], ds), scale=axis.scale) for axis in axes]
             *_, horizontal = axes
             vertical = axes[0] if vertical else None
         dims = list(dict.fromkeys(dim for axis in axes for dim in axis.dims))
@@ -196,7 +205,8 @@ class _Sweep:
             data = ds[name]
             if set(data.dims) != set(template.dims):
                 continue
-            cells[name], variables[name], scales[name] = _column(data.transpose(*template.dims), ds)
+            every = whole[name].transpose(*template.dims)
+            cells[name], variables[name], scales[name] = _column(data.transpose(*template.dims), ds, every, len(others))
         points = template[dict.fromkeys(others, 0)]
         return cls(
             str(ds.attrs.get("title", "ringsweep")),
@@ -220,8 +230,13 @@ def _numeric(ds: xr.Dataset) -> list[str]:
     return [str(name) for name, data in ds.data_vars.items() if is_numeric(data)]
 
 
-def _column(data: xr.DataArray, ds: xr.Dataset) -> tuple[NDArray[Any], dict[str, Any], tuple[Any, ...]]:
-    """Values of a variable in compact form, what a page says of it, and its colours."""
+def _column(
+    data: xr.DataArray, ds: xr.Dataset, every: xr.DataArray, others: int
+) -> tuple[NDArray[Any], dict[str, Any], tuple[Any, ...]]:
+    """Values of a variable in compact form, what a page says of it, and its colours.
+
+    `every` has the cells that are not shown too; the first `others` of its dimensions are those of the slices.
+    """
     data = displayed(data)
     scale = ColourScale.of(data)
     numbers = scale.numbers(data).values.ravel()
@@ -230,16 +245,20 @@ def _column(data: xr.DataArray, ds: xr.Dataset) -> tuple[NDArray[Any], dict[str,
         "title": long_name(data),
         "label": plain_text(axis_label(data, ds)),
         "words": None,
+        "shares": None,
         "error": error if error in ds else None,
         "logarithmic": isinstance(scale.norm, LogNorm),
     }
     if scale.meanings is not None:
-        # Classes that do not occur would only fill the legend.
-        present = [k for k in range(len(scale.meanings)) if (numbers == k).any()]
+        flags = [] if scale.flags is None else [every.values == flag for flag in scale.flags]
+        # Classes that do not occur would only fill the legend; cells that are not shown count.
+        present = [k for k, cells in enumerate(flags) if cells.any()]
         positions = np.full(numbers.shape, -1, dtype=np.int8)
         for position, k in enumerate(present):
             positions[numbers == k] = position
         about["words"] = [scale.meanings[k] for k in present]
+        within = tuple(range(others, every.ndim))
+        about["shares"] = [np.atleast_1d(flags[k].mean(axis=within)).ravel().tolist() for k in present]
         colours = [to_hex(scale.colours(k)) for k in present]
         return positions, about, (colours or [NO_VALUE], -0.5, max(len(present), 1) - 0.5)
     colours = [to_hex(colour) for colour in scale.colours(np.linspace(0.0, 1.0, 64))]
@@ -399,7 +418,7 @@ def _document(sweep: _Sweep) -> Any:
         # Over a line, wherever the pointer is, the nearest cell tells its numbers.
         plot.add_tools(
             HoverTool(
-                tooltips='<div style="white-space: pre">@{value}{custom}</div>',
+                tooltips=_TOOLTIP,
                 formatters={"@{value}": tell},
                 renderers=[renderer],
                 mode="vline" if renderer in curve else "mouse",
@@ -409,7 +428,12 @@ def _document(sweep: _Sweep) -> Any:
     document = Document()
     notes = Div(text="; ".join([sweep.title, *sweep.notes]), render_as_text=True, sizing_mode="stretch_width")
     document.add_root(
-        column(notes, row(variable, *slices, sizing_mode="stretch_width"), plot, sizing_mode="stretch_both")
+        column(
+            notes,
+            row(variable, *slices, sizing_mode="stretch_width", styles={"flex-wrap": "wrap"}),
+            plot,
+            sizing_mode="stretch_both",
+        )
     )
     document.js_on_event(DocumentReady, show)
     return document

@@ -164,9 +164,9 @@ def _ring_portrait(ds: xr.Dataset, frame: str, ax: Axes | None) -> Axes:
 
 
 def _driven_style(constant: bool) -> dict[str, Any]:
-    """Line of the speed of ring or belt; below the curve of the body, which covers it in stick."""
-    style: dict[str, Any] = {"color": on_page(PAIR_COLOURS[1]), "linewidth": 0.8, "alpha": 0.7, "zorder": 1.8}
-    return style | {"linestyle": PAIR_STYLES[1], "linewidth": 1.2, "alpha": 1.0} if constant else style
+    """Line of the speed of ring or belt; a thin one over the broad curve of the body in stick, which would hide it."""
+    style: dict[str, Any] = {"color": on_page(PAIR_COLOURS[1]), "linewidth": 0.8, "zorder": 2.5}
+    return style | {"linestyle": PAIR_STYLES[1], "linewidth": 1.2} if constant else style
 
 
 def draw_modes(

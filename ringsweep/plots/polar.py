@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.plots.datasets import mode_name, present
-from ringsweep.plots.labels import MINUS, number_text
+from ringsweep.plots.labels import MINUS, TIMES, number_text
 from ringsweep.plots.rig import Rig, ring_history
 from ringsweep.plots.style import (
     PAIR_COLOURS,
@@ -39,6 +39,9 @@ from ringsweep.quantities.units import quantity
 # Length of an arrow below which it has no name, as a multiple of the radius of the ring: the name would hide it.
 _SHORTEST = 0.04
 
+# Length from which on the tip of a friction force is outside the ring, as a multiple of its radius.
+_LONG = 0.6
+
 
 def polar_view(ds: xr.Dataset, time: float | str, ax: Axes | None = None) -> Axes:
     """Draw the body in the ring at one instant, to scale, with all forces.
@@ -46,7 +49,7 @@ def polar_view(ds: xr.Dataset, time: float | str, ax: Axes | None = None) -> Axe
     Angles count from the downward vertical, counter-clockwise. A mark shows the angle θ of the ring, and an arrow
     beside it the sense in which the ring turns. Arrows have the names of their forces: normal reactions N, friction
     forces F, weight Mg. Reactions and weight have one scale in all pictures of a run; friction forces, which are
-    smaller, have another one. The friction forces follow from the balances of momentum, in stick too.
+    smaller, are longer by the factor beside their scale. They follow from the balances of momentum, in stick too.
 
     Parameters
     ----------
@@ -200,10 +203,23 @@ class RingArtists:
         _set_arrows(self.gravity, centre_of_mass[None], weight)
         starts = np.concatenate([contacts, contacts])
         *names, weight_name = self.names
-        for name, start, arrow in zip(names, starts, np.concatenate([reactions, frictions]), strict=True):
+        for j, (name, start, arrow) in enumerate(
+            zip(names, starts, np.concatenate([reactions, frictions]), strict=True)
+        ):
             length = float(np.hypot(*arrow))
             name.set_visible(length > _SHORTEST * R)
-            if name.get_visible():
+            if not name.get_visible():
+                continue
+            c = j % len(contacts)
+            if j < len(contacts):
+                # The ball would hide the name of a short reaction.
+                beyond = max(length, 2.0 * rig.ball + gaps[c])
+                name.set_position(tuple(start + arrow * ((beyond + 0.12 * R) / length)))
+            elif length < _LONG * R:
+                # Beside ball and rim, in the free space within the ring.
+                away = max(length / R + 0.06, 0.15 + rig.ball / R) * float(np.sign(arrow @ forwards[c]))
+                name.set_position(_point(0.87 * R, float(states[f"alpha_{rig.contacts[c]}"][k]) + away))
+            else:
                 name.set_position(tuple(start + arrow * (1.0 + 0.12 * R / length)))
         # At the tip would be the number of the angle 0.
         weight_name.set_position(tuple(centre_of_mass + 0.6 * weight[0] + (0.13 * R, 0.0)))
@@ -270,7 +286,7 @@ class RingArtists:
             friction = round_down(0.75 * self.reference / self.magnification)
             bars = [
                 (force * self.scale, f"{force:g} N", "$N$, $Mg$"),
-                (friction * self.scale * self.magnification, f"{friction:g} N", "$F$"),
+                (friction * self.scale * self.magnification, f"{friction:g} N", f"$F$ ({TIMES}{self.magnification:g})"),
             ]
         else:
             bars = [(force * self.scale, f"{force:g} N", "$N$, $F$, $Mg$")]
@@ -279,7 +295,7 @@ class RingArtists:
         for x, (extent, text, what) in zip((-1.4 * R, -0.35 * R, 0.7 * R), bars, strict=False):
             self.ax.plot([x, x + extent], [y, y], marker="|", **style)
             self.ax.text(x + extent / 2, y + 0.05 * R, text, ha="center", va="bottom", fontsize=SMALL)
-            self.ax.text(x + extent / 2, y - 0.05 * R, what, ha="center", va="top", fontsize=SMALL)
+            self.ax.text(x + extent / 2, y - 0.08 * R, what, ha="center", va="top", fontsize=SMALL)
 
 
 def _point(radius: float, angle: Any) -> tuple[Any, Any]:
