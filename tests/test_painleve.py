@@ -12,6 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from solutions import rod
 
+import ringsweep
 from ringsweep.physics import ring
 
 
@@ -179,3 +180,29 @@ def test_reactions_of_a_body_on_springs_grow_without_bound_where_det_A_is_negati
         for stiffness in (1e8, 1e10):
             reactions = on_springs(scene, *state, 1.2 * loads, stiffness, 60.0 * root_mass / np.sqrt(stiffness))
             assert reactions.max() > 100.0 * loads.max()
+
+
+def test_wedged_body_is_taken_along_by_a_ring_that_starts_with_an_infinite_acceleration():
+    """Its contacts are nearly opposite: the more the ring pulls, the more both press. Stick goes before slip.
+
+    The time is that of ``benchmarks.reference``.
+    """
+    scene = {
+        "model": "ring",
+        "body": {"mass": 0.0722696, "inertia": 5.11858e-4, "half_distance": 0.0668469, "ball_radius": 0.0247363},
+        "ring": {"radius": 0.0922752},
+        "friction": {
+            "law": "stiction",
+            "rest": {"mu_s": 0.221905, "mu_k": 0.221905},
+            "rough": {"mu_s": 0.588606, "mu_k": 0.424211},
+        },
+        "zone": {"half_angle": 2.07136, "center": np.pi},
+        "drive": {"law": "power", "amplitude": -1.86835, "exponent": 1.1375},
+        "initial": {"phi": 0.659025, "omega": 0.0},
+        "time": {"span": 2.75782},
+    }
+    found = ringsweep.sweep(scene, {"drive.exponent": [1.1375]}, progress=False)
+    t = found.t_separation.item()
+    assert t == pytest.approx(1.1534711829171995, rel=1e-12)
+    assert found.stick_time.item() == pytest.approx(t, rel=1e-12)
+    assert found.phi_end.item() == pytest.approx(0.659025 - 1.86835 * t**1.1375, rel=1e-12)

@@ -108,8 +108,15 @@ class Mode(NamedTuple):
 
 @modes.initial_state.implements(ring.Ring)
 def _initial_state(scene):
-    v = drives.velocity_at_beginning(scene.drive, ring.launch_velocity(scene)) * scene.body.radius
-    return drives.beginning(scene.drive), (scene.initial_phi, v)
+    t, phi, launch = drives.beginning(scene.drive), scene.initial_phi, ring.launch_velocity(scene)
+    v = drives.velocity_at_beginning(scene.drive, launch) * scene.body.radius
+    # Even a ring that starts with an infinite acceleration takes a body along that is wedged between its contacts.
+    if launch == 0.0 and v != 0.0 and stiction_band(scene.law) == 0.0:
+        theta, _, _ = drives.turn(scene.drive, t)
+        status, mode = _mode_at_rest(scene, t, phi, *places_at(scene, phi - theta), 0)
+        if status == RUNNING and mode.sign == 0:
+            v = 0.0
+    return t, (phi, v)
 
 
 @series.table_shape.implements(ring.Ring)
