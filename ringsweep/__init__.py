@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from ringsweep.config.friction import friction_law
     from ringsweep.errors import InputError
     from ringsweep.quantities.variables import words
+    from ringsweep.runs.attractors import attractors
     from ringsweep.runs.boundaries import boundary, uncertainty_exponent
     from ringsweep.runs.fit import fit
     from ringsweep.runs.precision import precision
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "InputError",
+    "attractors",
     "boundary",
     "fit",
     "friction_law",
@@ -38,6 +40,7 @@ _MODULES = {
     "sweep": "runs.sweep",
     "simulate": "runs.simulate",
     "precision": "runs.precision",
+    "attractors": "runs.attractors",
     "boundary": "runs.boundaries",
     "threshold": "runs.thresholds",
     "fit": "runs.fit",

@@ -44,7 +44,8 @@ class Accessor:
     def to_frame(self) -> pd.DataFrame:
         """Table with a row for each cell: coordinates, then variables, with classifications as categories of words.
 
-        Of a sampled sweep it has a row for each cell and regime, with the probabilities.
+        Of a sampled sweep it has a row for each cell and regime, with the probabilities. The points of a section are
+        left out.
         """
         import pandas as pd
 
@@ -54,6 +55,7 @@ class Accessor:
         if "probability" in ds:
             # A table of all variables would have a row for each combination of their dimensions.
             ds = ds[[name for name in ds.data_vars if str(name).startswith("probability")]]
+        ds = ds.drop_dims("section", errors="ignore")
         frame = ds.to_dataframe().reset_index()
         for name, variable in ds.data_vars.items():
             if "flag_meanings" in variable.attrs:

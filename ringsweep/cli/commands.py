@@ -121,13 +121,26 @@ def map_command(arguments: argparse.Namespace) -> None:
 
 def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
     from ringsweep import plots
+    from ringsweep.plots.sections import POINTS, has_diagram
     from ringsweep.storage import files, netcdf
 
+    selection = dict(_selection(text) for text in arguments.sel)
+    fixed = {name.replace(".", "_") for name in selection}
+    diagram = arguments.var in POINTS
+    if arguments.var is None:
+        # A file of one axis is drawn as a diagram, unless something is asked for that only a map has.
+        plain = not (arguments.y or arguments.log or arguments.boundaries or str(arguments.output).endswith(".html"))
+        along = result.isel(dict.fromkeys(fixed & set(map(str, result.dims)), 0))
+        diagram = plain and has_diagram(along)
+        arguments.var = POINTS[0] if diagram else "regime"
+    if arguments.var == "attractor" and "x_section" in result:
+        from ringsweep.runs.attractors import attractors
+
+        result = attractors(result)
     # The name differs from that of the regime map of the sweep, which must not be replaced.
     shown = [arguments.var] * (arguments.var != "regime") + [_name_part(held) for held in arguments.sel]
     target = Path(arguments.output or dataset.with_name("-".join([dataset.stem, *shown]) + ".png"))
     files.check_writable(target)
-    selection = dict(_selection(text) for text in arguments.sel)
     page = target.suffix.lower() == ".html"
     if page and arguments.log:
         raise InputError("--log", "is for pictures, not for a page: name the output *.png")
@@ -161,6 +174,8 @@ def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None
         chosen = (arguments.x, arguments.y, arguments.var, selection)
         if page:
             plots.save_page(result, target, *chosen)
+        elif diagram:
+            plots.save(plots.bifurcation(result, arguments.x, arguments.var, selection), target)
         else:
             plots.save(plots.regime_map(result, *chosen, curves, norm="log" if arguments.log else None), target)
     except InputError as error:

@@ -87,7 +87,11 @@ def build_parser() -> argparse.ArgumentParser:
     draw.add_argument("-o", "--output", metavar="MAP.png", help="default: beside OUT.nc; .pdf, .svg and .html too")
     draw.add_argument("--x", metavar="DIM", help="coordinate across")
     draw.add_argument("--y", metavar="DIM", help="coordinate up")
-    draw.add_argument("--var", default="regime", metavar="V", help="variable to draw (default: regime)")
+    draw.add_argument(
+        "--var",
+        metavar="V",
+        help="variable to draw (default: regime, or x_section if there is a section along one axis)",
+    )
     draw.add_argument(
         "--sel",
         action="append",

@@ -53,7 +53,7 @@ def sweep_section(doc: Document) -> dict[str, Any]:
     if "sweep" not in doc.tree:
         return {}
     section = section_of(doc.tree, "sweep", "")
-    known = ("grid", "points", "refine", "sample")
+    known = ("grid", "points", "follow", "refine", "sample")
     for key in section:
         if key not in known:
             raise InputError(f"sweep.{key}", "unknown key" + suggestion(key, known))
@@ -61,7 +61,7 @@ def sweep_section(doc: Document) -> dict[str, Any]:
         section["points"] = doc.inline_csv(section["points"], "sweep.points", "sweep.points")
     if isinstance(sample := section.get("sample"), dict) and isinstance(sample.get("of"), dict):
         _inline_samples(doc, sample["of"])
-    sweep = {key: columns for key, columns in section.items() if key != "refine"}
+    sweep = {key: columns for key, columns in section.items() if key not in ("refine", "follow")}
     if not sweep:
         raise InputError("sweep", "empty: give grid, points or sample, or leave sweep out")
     for key in sweep:

@@ -25,6 +25,7 @@ from ringsweep.config.axes import (
     swept_paths,
 )
 from ringsweep.config.consistency import check_consistency
+from ringsweep.config.follow import Follow, put_state, read_follow, run_to_continue, with_direction
 from ringsweep.config.refinement import Refinement, read_refinement
 from ringsweep.config.sampling import Sample, read_sample
 from ringsweep.config.scene import parse_scene, sweepable
@@ -36,6 +37,10 @@ from ringsweep.models.scene import LAW, Scene
 from ringsweep.quantities.units import show
 
 _SECTIONS = "scene", "solver", "record", "sweep"
+
+_NOT_FOLLOWED = "cannot stand beside sweep.follow, by which each cell needs the one before: leave one of them out"
+
+_NO_SECTION = "cannot stand beside record.section: {}; leave one of them out"
 
 _NOT_REFINED = "cannot stand beside sweep.sample: a probability has no boundary, and each cell needs its own runs"
 
@@ -61,6 +66,8 @@ class Config:
         How the grid is refined; None if every cell is computed.
     sample : Sample, optional
         Uncertain parameters, which vary within each cell of the axes; None if there are none.
+    follow : Follow, optional
+        Axis along which each cell starts from the end of the one before; None if all start from ``initial``.
     """
 
     scene: Scene
@@ -70,6 +77,7 @@ class Config:
     name: str
     refine: Refinement | None = None
     sample: Sample | None = None
+    follow: Follow | None = None
 
 
 def load(config: str | os.PathLike[str] | Mapping[str, Any], settings: Iterable[str] = ()) -> Config:
@@ -98,7 +106,7 @@ def load(config: str | os.PathLike[str] | Mapping[str, Any], settings: Iterable[
         return found
     # A configuration cannot name the dimensions that axes share; the coordinates of a result file can.
     columns = ((path, path, dims, values) for path, (dims, values) in doc.result_axes.items())
-    return dataclasses.replace(found, axes=build_axes(columns))
+    return dataclasses.replace(found, axes=with_direction(build_axes(columns), found.follow))
 
 
 def refined(config: Config, refine: Mapping[str, Any] | bool | None) -> Config:
@@ -115,6 +123,9 @@ def refined(config: Config, refine: Mapping[str, Any] | bool | None) -> Config:
         raise InputError("sweep.refine", _NOT_REFINED)
     given = yaml_text.read({"refine": refine}).tree["refine"]
     found = read_refinement(given, config.scene, config.axes)
+    _check_section(config.scene, found, None)
+    if found is not None and config.follow is not None:
+        raise InputError("sweep.refine", _NOT_FOLLOWED)
     sweep = {key: value for key, value in config.source.get("sweep", {}).items() if key != "refine"}
     if found is not None:
         sweep["refine"] = given
@@ -197,6 +208,12 @@ def _validate(doc: Document) -> Config:
     sweep = sweep_section(doc)
     swept = swept_paths(sweep)
     laws = [(f"sweep.{kind}.{LAW}", columns[LAW]) for kind, columns in sweep.items() if LAW in columns]
+    if (file := run_to_continue(doc)) is not None:
+        try:
+            before = load(file)
+        except InputError as error:
+            raise InputError("scene.initial.from", f"{file}: {error.problem}") from None
+        put_state(doc, parse_scene(doc, swept, laws[0] if laws else None), file, before.scene, before.axes, swept)
     scene = parse_scene(doc, swept, laws[0] if laws else None)
     solver = read_solver(tree.get("solver", "auto"), scene)
     axes = sweep_axes(scene, sweep)
@@ -208,7 +225,20 @@ def _validate(doc: Document) -> Config:
         check_consistency(scene, axes)
     elif refine is not None:
         raise InputError("sweep.refine", _NOT_REFINED)
-    return Config(scene, solver, axes, tree, doc.name, refine, sample)
+    _check_section(scene, refine, sample)
+    follow = read_follow(tree.get("sweep", {}).get("follow"), scene, axes)
+    for key, other in (("refine", refine), ("sample", sample)):
+        if follow is not None and other is not None:
+            raise InputError(f"sweep.{key}", _NOT_FOLLOWED)
+    return Config(scene, solver, with_direction(axes, follow), tree, doc.name, refine, sample, follow)
+
+
+def _check_section(scene: Scene, refine: Refinement | None, sample: Sample | None) -> None:
+    """Refuse sweeps whose cells are not all run, or not kept, beside a section."""
+    if scene.structure.section is not None and refine is not None:
+        raise InputError("sweep.refine", _NO_SECTION.format("cells that are inferred have no points"))
+    if scene.structure.section is not None and sample is not None:
+        raise InputError("sweep.sample", _NO_SECTION.format("a probability has no points"))
 
 
 def _apply_setting(doc: Document, setting: str) -> str:

@@ -21,7 +21,8 @@ def check_consistency(scene: Scene, axes: Axes) -> None:
     Raises
     ------
     InputError
-        If values contradict each other, such as a ring too small for its body.
+        If values contradict each other, such as a ring too small for its body; or if a section is asked for at each
+        period, and no cell has one.
     """
     # Each condition is monotone in each value, so the two extremes of a grid axis decide for the whole axis.
     checked = []
@@ -31,6 +32,7 @@ def check_consistency(scene: Scene, axes: Axes) -> None:
         checked.append(np.unique([along[0].argmin(), along[0].argmax()]) if monotone else np.arange(size))
     shape = (1, *map(len, checked))
     total = math.prod(shape)
+    section, periodic = scene.structure.section, False
     for start in range(0, total, _CELLS_AT_ONCE):
         flat = np.arange(start, min(start + _CELLS_AT_ONCE, total))
         numbers = np.unravel_index(flat, shape)[1:]
@@ -43,11 +45,15 @@ def check_consistency(scene: Scene, axes: Axes) -> None:
             if not cells.any():
                 continue
             try:
-                batch(structure, {path: column[cells] for path, column in values.items()})
+                made = batch(structure, {path: column[cells] for path, column in values.items()})
             except InputError as error:
                 if _comes_from_sweep(structure, scene, axes, error):
                     error.problem += " (in a cell of the sweep)"
                 raise
+            if section is not None and not periodic:
+                periodic = bool(np.isfinite(made.forcing_period).any())
+    if section is not None and section.at == "period" and not periodic:
+        raise InputError("record.section.at", "neither force nor drive has a period: give one, or take `turn`")
 
 
 def _comes_from_sweep(structure: Structure, scene: Scene, axes: Axes, error: InputError) -> bool:

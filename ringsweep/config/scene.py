@@ -24,6 +24,7 @@ from ringsweep.errors import InputError
 from ringsweep.models import MODELS, WITH_IMPACT, parameters
 from ringsweep.models.scene import LAW, Scene, Structure
 from ringsweep.physics.drives import DRIVES
+from ringsweep.physics.friction import LAWS, Dynamic, family_of
 from ringsweep.physics.friction.formula import NAMES
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.units import quantity, show
@@ -58,7 +59,7 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     """
     scene = section_of(doc.tree, "scene", "")
     model = choose(MODELS, scene, "scene.model", "model")
-    exponent = read_record(doc.tree.get("record", {}), model)
+    exponent, section = read_record(doc.tree.get("record", {}), model)
     zones = _zones(scene)
     friction = _read_friction(doc, scene, model, laws)
     moved = _read_motion(scene, model, swept)
@@ -67,7 +68,11 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
         section_of(scene, "friction", "scene.")
         known_laws = law_choice(model, friction.own).names
         raise InputError(f"scene.{LAW}", "missing: name a friction law: " + ", ".join(known_laws))
-    moved = replace(moved, exponent=exponent, arcs=_arcs(scene, zones, leaves), **_read_tables(doc, scene, moved))
+    if section is not None:
+        known = {**LAWS, **friction.own}
+        section = section._replace(deflections=any(family_of(known[law]) is Dynamic for law in friction.names))
+    moved = replace(moved, exponent=exponent, section=section)
+    moved = replace(moved, arcs=_arcs(scene, zones, leaves), **_read_tables(doc, scene, moved))
     structures = {
         law: replace(moved, law=law, own_law=friction.own.get(law), curve=friction.curve if law == TABLE_LAW else None)
         for law in friction.names

@@ -10,9 +10,11 @@ from itertools import product
 from typing import Any
 
 from ringsweep.config.axes import COUNT
+from ringsweep.config.follow import DIRECTIONS
 from ringsweep.config.friction import FORMULA
 from ringsweep.config.friction import TABLE as TABLE_LAW
 from ringsweep.config.motion import FORMULA as FORMULA_DRIVE
+from ringsweep.config.record import INSTANTS, KEEP
 from ringsweep.config.refinement import NUMBERS
 from ringsweep.config.sampling import NUMBERS as SAMPLE_NUMBERS
 from ringsweep.config.tables import TABLES
@@ -60,6 +62,7 @@ def schema() -> dict[str, Any]:
             "friction.v": _list(_number(TABLES["friction"]["v"])),
             "friction.file": {"type": "string", "description": "CSV file with columns v (m/s), mu"},
             "drive.law": _drives(),
+            "initial.from": {"type": "string", "description": "result file of the run on the belt that goes on"},
             "drive.file": {"type": "string", "description": "CSV file with columns t (s), theta (rad)"},
             "force.file": {"type": "string", "description": "CSV file with columns t (s), force (N)"},
             **{
@@ -163,9 +166,17 @@ def _any_of(options: list[dict[str, Any]]) -> dict[str, Any]:
     return options[0] if len(options) == 1 else {"anyOf": options}
 
 
+def _constants(meanings: Mapping[str, str]) -> list[dict[str, str]]:
+    return [{"const": name, "description": meaning} for name, meaning in meanings.items()]
+
+
 def _record() -> dict[str, Any]:
     about = "whether a run on the belt tells its Lyapunov exponent and its Floquet multipliers"
-    return {"description": "what a run records", **_section({"exponent": {"description": about, "type": "boolean"}})}
+    at = {"description": "instants of the points", "oneOf": _constants(INSTANTS)}
+    section = _section({"at": at, "keep": _number(KEEP)})
+    kept = {"description": "points of the motion on the belt that a run keeps", **section, "required": ["at"]}
+    exponent = {"description": about, "type": "boolean"}
+    return {"description": "what a run records", **_section({"exponent": exponent, "section": kept})}
 
 
 def _solver() -> dict[str, Any]:
@@ -219,6 +230,16 @@ def _sweep(paths: list[str]) -> dict[str, Any]:
                             },
                         }
                     ),
+                ],
+            },
+            "follow": {
+                "description": "axis along which each cell starts from the state in which the one before ended",
+                "anyOf": [
+                    {"type": "string"},
+                    {
+                        **_section({"axis": {"type": "string"}, "direction": {"oneOf": _constants(DIRECTIONS)}}),
+                        "required": ["axis"],
+                    },
                 ],
             },
             "sample": _sample(names),

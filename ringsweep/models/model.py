@@ -5,6 +5,9 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import Any, ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ringsweep.models.interface import recorder
 from ringsweep.models.scene import Structure, Values
 from ringsweep.physics import friction
@@ -35,6 +38,8 @@ class Model(ABC):
         Outcomes whose unit or meaning differs from that of :data:`ringsweep.quantities.variables.OUTCOMES`.
     absent : frozenset of str
         Outcomes and history variables that have no meaning for this model. Datasets leave them out.
+    sections : tuple of str
+        Values of ``record.section.at`` that the model takes.
     """
 
     name: ClassVar[str]
@@ -45,11 +50,37 @@ class Model(ABC):
     drive_unit: ClassVar[str] = "rad"
     own_variables: ClassVar[dict[str, Variable]] = {}
     absent: ClassVar[frozenset[str]] = frozenset()
+    sections: ClassVar[tuple[str, ...]] = ()
 
     @property
     def variables(self) -> dict[str, Variable]:
         """All variables of datasets of this model."""
         return OUTCOMES | self.own_variables
+
+    def columns(self, structure: Structure) -> tuple[str, ...]:
+        """Names of the columns of a run; a variable with a dimension of its own has several, side by side."""
+        return self.outcomes
+
+    #: Whether a run can start from the state in which another one ended: then there is :meth:`continued`.
+    continues: ClassVar[bool] = False
+
+    def continued(self, structure: Structure, values: Values, ended: Values) -> dict[str, NDArray[np.float64]]:
+        """Initial values that continue other runs of this model.
+
+        Parameters
+        ----------
+        structure : Structure
+        values : mapping of str to ndarray of shape ``(cells,)``
+            Values of the runs that start.
+        ended : mapping of str to ndarray of shape ``(cells,)``
+            Values of the runs that have ended, by path, and their outcomes, by name.
+
+        Returns
+        -------
+        dict of str to ndarray of shape ``(cells,)``
+            By path; values that differ from these are replaced.
+        """
+        raise NotImplementedError
 
     @property
     def laws(self) -> dict[str, type]:

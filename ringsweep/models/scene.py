@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,24 @@ Values = Mapping[str, NDArray[np.float64]]
 
 #: Path of the friction law: the only path without a number that a sweep can vary.
 LAW = "friction.law"
+
+
+class Section(NamedTuple):
+    """Points of a motion that a run keeps.
+
+    Attributes
+    ----------
+    at : str
+        ``period`` (of drive or force) or ``turn`` (maxima of the displacement).
+    keep : int
+        Number of points: the last ones of the run.
+    deflections : bool
+        Whether a point holds the deflection of bristles: true if a law of the sweep has them.
+    """
+
+    at: str
+    keep: int
+    deflections: bool = False
 
 
 @dataclass(frozen=True)
@@ -46,6 +64,8 @@ class Structure:
         Whether a run goes on after a contact is lost.
     exponent : bool
         Whether the record of a run holds its exponent and multipliers.
+    section : Section, optional
+        Points that a run keeps.
     """
 
     model: str
@@ -60,6 +80,7 @@ class Structure:
     own_force: type | None = None
     impact: bool = False
     exponent: bool = False
+    section: Section | None = None
 
     @property
     def law_type(self) -> type:

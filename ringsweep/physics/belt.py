@@ -89,6 +89,10 @@ class Belt(NamedTuple):
         Period of the forcing, s; infinite without a period.
     asked : NamedTuple
         What the record is asked for beyond the outcomes; an empty tuple for nothing.
+    section : NamedTuple
+        Which states of the run are kept; an empty tuple for none.
+    initial_z : float
+        Deflection of the bristles at t = 0, m; an empty tuple without bristles.
     """
 
     body: Any
@@ -102,6 +106,8 @@ class Belt(NamedTuple):
     span: Leaf
     forcing_period: Leaf
     asked: Any = ()
+    section: Any = ()
+    initial_z: Any = ()
 
 
 class BristleBelt(Belt):

@@ -346,7 +346,11 @@ def impulses(mass, moment, first, second, touching, mu, restitution):
                 n_1, n_2, t = n_1 / whole, n_2 / whole, t / whole
                 t_1 = t if mode_1 == _STICK else k_1 * n_1
                 t_2 = t if mode_2 == _STICK else k_2 * n_2
-            if not found:
+            # Most modes need an impulse that pulls, or more friction than there is.
+            pulls = min(c_11[0] * n_1, c_22[0] * n_2) < -least
+            if not found or pulls or abs(t_1) * c_11[0] > mu[0] * c_11[0] * n_1 + least:
+                continue
+            if abs(t_2) * c_22[0] > mu[1] * c_22[0] * n_2 + least:
                 continue
             o_1 = before[0] + c_11[0] * n_1 + c_11[1] * t_1 + c_12[0] * n_2 + c_12[1] * t_2
             s_1 = before[1] + c_11[2] * n_1 + c_11[3] * t_1 + c_12[2] * n_2 + c_12[3] * t_2

@@ -1,9 +1,9 @@
 """Pictures of datasets.
 
-``regime_map``, ``history`` and ``work_precision`` return a new figure. They do not use pyplot: no global state, no
-display, safe in threads. A function with an argument ``ax`` draws one picture in these axes and returns them. Without
-``ax`` it draws in pyplot's current axes. Every picture has an opaque white background, in dark notebooks too, unless
-``style`` chooses another look.
+``regime_map``, ``bifurcation``, ``history`` and ``work_precision`` return a new figure. They do not use pyplot: no
+global state, no display, safe in threads. A function with an argument ``ax`` draws one picture in these axes and
+returns them. Without ``ax`` it draws in pyplot's current axes. Every picture has an opaque white background, in dark
+notebooks too, unless ``style`` chooses another look.
 """
 
 from __future__ import annotations
@@ -26,19 +26,30 @@ if TYPE_CHECKING:
     from ringsweep.plots.polar import polar_view
     from ringsweep.plots.precision import precision_panel, work_precision
     from ringsweep.plots.probability import probability_panel, sensitivity_panel, survival_panel
+    from ringsweep.plots.sections import (
+        bifurcation,
+        bifurcation_panel,
+        exponent_panel,
+        multiplier_panel,
+        section_panel,
+    )
     from ringsweep.plots.selection import cell
 
 __all__ = [
     "REGIME_COLOURS",
     "SUFFIXES",
     "animation",
+    "bifurcation",
+    "bifurcation_panel",
     "cell",
     "explore",
+    "exponent_panel",
     "fit",
     "friction_loop",
     "history",
     "history_panel",
     "map_panel",
+    "multiplier_panel",
     "phase_portrait",
     "polar_view",
     "precision_panel",
@@ -47,6 +58,7 @@ __all__ = [
     "save",
     "save_animation",
     "save_page",
+    "section_panel",
     "sensitivity_panel",
     "style",
     "survival_panel",
@@ -64,6 +76,11 @@ _MODULES = {
     "survival_panel": "probability",
     "sensitivity_panel": "probability",
     "fit": "fits",
+    "bifurcation": "sections",
+    "bifurcation_panel": "sections",
+    "section_panel": "sections",
+    "exponent_panel": "sections",
+    "multiplier_panel": "sections",
     "phase_portrait": "phase",
     "friction_loop": "loops",
     "polar_view": "polar",

@@ -51,7 +51,11 @@ def cell(ds: xr.Dataset, sel: Mapping[str, float | str] | None = None) -> dict[s
     # Models are slow to import, and a map, which uses `select`, needs none.
     from ringsweep.config import with_values
 
-    ds, _ = select(ds, sel or {})
+    ds, _ = select(ds.drop_dims("section", errors="ignore"), sel or {})
+    if configuration(ds).get("sweep", {}).get("follow"):
+        raise InputError(
+            "ds", "follows an axis: a cell starts from the end of the one before, not from its configuration"
+        )
     if ds.sizes:
         left = ", ".join(f"{dim} ({size})" for dim, size in ds.sizes.items())
         raise InputError("sel", f"one cell is wanted, but {left} is left: hold it too")

@@ -9,6 +9,10 @@ REGIMES = (
 )
 RESTING, OSCILLATORY, REVOLVING, SEPARATING, JAMMED, FAILED, STICK_SLIP, SLIDING, STICKING, RIDING = range(10)
 
+#: What a motion settles to, in the order of the flag values.
+LONG_RUNS = ("rest", "steady", "periodic", "quasi-periodic", "chaotic", "unbounded", "transient")
+REST, STEADY, PERIODIC, QUASI_PERIODIC, CHAOTIC, UNBOUNDED, TRANSIENT = range(7)
+
 #: Why a cell has no certificate: flag values of `DOUBTS`.
 CERTIFIED, NOT_ASKED, NO_RESULT, ANSWERS_DIFFER, LAW_NOT_OBEYED = range(5)
 CLOSE_CALL, NOT_FINITE, SAME_STEPS, DIVERGES, COARSE = range(5, 10)

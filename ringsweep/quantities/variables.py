@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ringsweep.errors import InputError
-from ringsweep.quantities.flags import AFTERMATHS, JAMMED, REGIMES, SEPARATING
+from ringsweep.quantities.flags import AFTERMATHS, JAMMED, LONG_RUNS, REGIMES, SEPARATING
 from ringsweep.quantities.quantity import Quantity
 
 if TYPE_CHECKING:
@@ -64,11 +64,14 @@ class Variable(Quantity):
         Values of a classification, and their meanings.
     comment : str
         What the meanings are, if their names do not tell.
+    dims : tuple of str
+        Dimensions besides those of the grid.
     """
 
     dtype: str = "float64"
     flags: dict[int, str] | None = None
     comment: str = ""
+    dims: tuple[str, ...] = ()
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -121,6 +124,14 @@ OUTCOMES: dict[str, Variable] = {
     "normal_max_2": Variable("N", "greatest normal reaction at contact 2"),
     "x_end": Variable("m", "displacement of the body at the end"),
     "velocity_end": Variable("m/s", "velocity of the body at the end"),
+    "deflection_end": Variable("m", "deflection of the bristles at the end"),
+    "started_from": Variable(
+        "1",
+        "state from which the run started",
+        dtype="int8",
+        flags={0: "initial", 1: "end_of_the_cell_before"},
+        comment="a chain starts from `initial`, and again after a run that failed or ended before its span",
+    ),
     "x_min": Variable("m", "least displacement of the body"),
     "x_max": Variable("m", "greatest displacement of the body"),
     "velocity_max": Variable("m/s", "greatest velocity of the body"),
@@ -130,8 +141,15 @@ OUTCOMES: dict[str, Variable] = {
     "stick_share": Variable("1", "share of a cycle in which the body sticks to the belt"),
     "stops_per_cycle": Variable("1", "stops in a cycle"),
     "swing": Variable("m", "distance between the extremes of the displacement in the last cycle"),
-    "settled": Variable(
-        "1", "whether the last cycles repeat each other", dtype="int8", flags={0: "not_settled", 1: "settled"}
+    "settled": Variable("1", "whether the motion has settled", dtype="int8", flags={0: "not_settled", 1: "settled"}),
+    "long_run": Variable(
+        "1",
+        "what the motion settles to",
+        dtype="int8",
+        flags=dict(enumerate(LONG_RUNS)),
+        comment="rest: at rest; steady: steady slip; periodic: returns each time; quasi-periodic: does not return, and "
+        "the exponent is zero; chaotic: does not return, and the exponent is positive; unbounded: the swing grows "
+        "steadily beyond all scales of the scene; transient: not settled, or nothing shows that it has",
     ),
     "force_max": Variable("N", "greatest magnitude of the friction force"),
     "jump_max": Variable("rad/s^2", "largest jump of the angular acceleration of the body"),
@@ -140,6 +158,9 @@ OUTCOMES: dict[str, Variable] = {
     "lyapunov_error": Variable("1/s", "standard error of the largest Lyapunov exponent"),
     "multiplier_1": Variable("1", "largest magnitude of the Floquet multipliers of the periodic motion"),
     "multiplier_2": Variable("1", "second largest magnitude of the Floquet multipliers of the periodic motion"),
+    "x_section": Variable("m", "displacement of the body at the points of its section", dims=("section",)),
+    "velocity_section": Variable("m/s", "velocity of the body at the points of its section", dims=("section",)),
+    "deflection_section": Variable("m", "deflection of the bristles at the points of the section", dims=("section",)),
     "open_time": Variable("s", "time for which a contact is open"),
     "flight_time": Variable("s", "time for which no contact holds"),
     "gap_max": Variable("m", "greatest gap of a contact"),

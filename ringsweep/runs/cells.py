@@ -6,6 +6,7 @@ import logging
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import groupby
 from threading import Timer
 from time import perf_counter
 from typing import Any
@@ -13,10 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.compile import readable_compile_errors
+from ringsweep.compile import readable_compile_errors, take
 from ringsweep.config import Axes, Config
+from ringsweep.config.follow import DIRECTION
 from ringsweep.models import batch, model_of
-from ringsweep.models.scene import LAW, Scene
+from ringsweep.models.scene import LAW, Scene, Structure
+from ringsweep.physics.drives import turn
+from ringsweep.quantities.flags import FAILED
 from ringsweep.quantities.variables import OUTCOMES
 from ringsweep.solvers.certificate import with_errors
 from ringsweep.solvers.method import Result
@@ -71,7 +75,7 @@ class TaskResult:
     ----------
     positions : ndarray of shape ``(cells,)``
         Positions of the cells in the order of the layout.
-    columns : dict of str to ndarray of shape ``(cells,)``
+    columns : dict of str to ndarray of shape ``(cells,)`` or ``(cells, points)``
         Outcomes by name of the variable.
     seconds : float, optional
         Run time; None if kernels may have been compiled meanwhile.
@@ -105,21 +109,86 @@ def compute_task(config: Config, layout: Layout, positions: NDArray[np.integer])
         own = np.flatnonzero(laws == law)
         if not len(own):
             continue
-        values = values_at(scene, axes, {dim: along[own] for dim, along in indices.items()}, len(own))
         with readable_compile_errors(), _named_if_long(axes, indices, compiles):
-            began = perf_counter()
-            result = config.solver.run(batch(structure, values), model.outcomes)
-            # A compilation would count as time of the cells.
-            if not compiles and (took := perf_counter() - began) >= LONG:
-                _name_longest(axes, {dim: along[own] for dim, along in indices.items()}, result, took)
-        # A bound beyond the range of a float of 32 bits is infinite.
-        with np.errstate(over="ignore"):
-            for name, column in _columns(model.outcomes, result):
-                if name not in model.absent:
-                    columns.setdefault(name, np.empty(len(positions), dtype=OUTCOMES[name].dtype))[own] = column
+            for cells, found in _runs(config, structure, indices, own):
+                for name, column in found.items():
+                    if name not in model.absent:
+                        columns.setdefault(name, _missing(name, len(positions), column))[cells] = column
     seconds = perf_counter() - start
+    # A compilation would count as time of the cells.
+    if not compiles and seconds >= LONG:
+        _name_longest(axes, indices, columns["steps"], seconds)
     _compiled.add(compiled)
     return TaskResult(positions, columns, None if compiles else seconds, environment(), processor())
+
+
+def _missing(name: str, count: int, like: NDArray[Any]) -> NDArray[Any]:
+    """Column of a variable in which `count` cells have no value."""
+    dtype = np.dtype(OUTCOMES[name].dtype)
+    return np.full((count, *like.shape[1:]), np.nan if dtype.kind == "f" else 0, dtype=dtype)
+
+
+def _runs(
+    config: Config, structure: Structure, indices: Indices, own: NDArray[np.intp]
+) -> Iterator[tuple[NDArray[np.intp], dict[str, NDArray[Any]]]]:
+    """Cells of one law that are run side by side, as places in `indices`, and their outcomes."""
+    values = values_at(config.scene, config.axes, {dim: along[own] for dim, along in indices.items()}, len(own))
+    if config.follow is None:
+        yield own, _outcomes(config, structure, values)
+        return
+    before: dict[str, NDArray[Any]] = {}
+    for cells in in_chains(config, {dim: along[own] for dim, along in indices.items()}):
+        now = {path: column[cells] for path, column in values.items()}
+        held = np.zeros(len(cells), dtype=bool)
+        if before:
+            held = (before["regime"] == before["motion"]) & (before["motion"] != FAILED)
+            for path, column in model_of(structure).continued(structure, now, before).items():
+                now[path] = np.where(held, column, now.get(path, _default(structure, path, now)))
+        now["time.span"] = _whole_periods(structure, now)
+        found = _outcomes(config, structure, now)
+        yield own[cells], found | {"started_from": held.astype(np.int8)}
+        before = now | found
+
+
+def _default(structure: Structure, path: str, values: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Values of an optional initial value that a scene lacks: phase 0, or the velocity of the belt."""
+    if path != "initial.velocity":
+        return np.zeros(len(values["time.span"]))
+    drive = batch(structure, values).drive
+    return np.array([turn(take(drive, i), 0.0)[1] for i in range(len(values["time.span"]))])
+
+
+def _whole_periods(structure: Structure, values: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Spans, each extended to a whole number of periods of the forcing if it is longer than one, s.
+
+    So the phase is the same at the start of all cells of a chain, and their sections can be compared.
+    """
+    span, period = values["time.span"], batch(structure, values).forcing_period
+    repeats = period <= span
+    periods = np.ceil(span / np.where(repeats, period, 1.0) * (1.0 - 1e-12))
+    return np.where(repeats, periods * np.where(repeats, period, 0.0), span)
+
+
+def in_chains(config: Config, indices: Indices) -> list[NDArray[np.intp]]:
+    """Places in `indices` of the cells of whole chains: the first cells of all chains, the second ones, and so on."""
+    assert config.follow is not None
+    dim, orders = config.follow.chains(config.axes)
+    which = indices[DIRECTION] if DIRECTION in indices else np.zeros(len(indices[dim]), dtype=np.intp)
+    rank = np.argsort(orders, axis=1)[which, indices[dim]]
+    others = [along for name, along in indices.items() if name != dim]
+    # The last key is the first by which cells are sorted.
+    order = np.lexsort((*others[::-1], rank))
+    return np.split(order, np.flatnonzero(np.diff(rank[order])) + 1)
+
+
+def _outcomes(
+    config: Config, structure: Structure, values: Mapping[str, NDArray[np.float64]]
+) -> dict[str, NDArray[Any]]:
+    names = model_of(structure).columns(structure)
+    result = config.solver.run(batch(structure, values), names)
+    # A bound beyond the range of a float of 32 bits is infinite.
+    with np.errstate(over="ignore"):
+        return {name: column.astype(OUTCOMES[name].dtype) for name, column in _columns(names, result)}
 
 
 @contextmanager
@@ -143,11 +212,11 @@ def _named_if_long(axes: Axes, indices: Indices, compiles: bool) -> Iterator[Non
         timer.cancel()
 
 
-def _name_longest(axes: Axes, indices: Indices, result: Result, seconds: float) -> None:
+def _name_longest(axes: Axes, indices: Indices, steps: NDArray[Any], seconds: float) -> None:
     """Name the cell that took most of a long task, and say which limit of steps stands for a minute."""
-    longest = int(np.argmax(result.steps))
+    longest = int(np.argmax(steps))
     place = _place(axes, {dim: along[longest : longest + 1] for dim, along in indices.items()})
-    most, total = float(result.steps[longest]), max(float(result.steps.sum()), 1.0)
+    most, total = float(steps[longest]), max(float(steps.sum()), 1.0)
     logger.info(
         "%s took %.2g steps, %.2g s; a run of %.2g steps takes a minute here: solver.max_steps bounds each",
         place,
@@ -168,7 +237,11 @@ def _place(axes: Axes, indices: Indices) -> str:
 
 
 def _columns(outcomes: tuple[str, ...], result: Result) -> Iterator[tuple[str, NDArray[Any]]]:
-    yield from zip(outcomes, result.rows.T, strict=True)
+    start = 0
+    for name, side_by_side in groupby(outcomes):
+        stop = start + len(list(side_by_side))
+        yield name, result.rows[:, start:stop] if OUTCOMES[name].dims else result.rows[:, start]
+        start = stop
     yield "steps", result.steps
     yield "certified", result.certified
     if result.because is not None:

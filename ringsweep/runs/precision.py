@@ -129,7 +129,7 @@ def _measure(config: Config, target: float, cells: int, rounds: int, progress: b
             f"each of {', '.join(scene.structures)} needs methods and a reference of its own: give one law here",
         )
     structure = scene.structure
-    names = model_of(structure).outcomes
+    names = model_of(structure).columns(structure)
     contenders, left_out = contenders_for(config)
     best = type(contenders[0])
     total = math.prod(config.axes.sizes.values())

@@ -64,6 +64,8 @@ class EarlierSweep:
         self.axes = self.config.axes
         if stored_fingerprint != fingerprint(identity(self.config)):
             raise InputError(str(path), "was computed by another version: its cells cannot be reused")
+        if self.config.follow is not None:
+            raise InputError(str(path), "follows an axis: its cells start from other states than those of this sweep")
         if any(len(dims) > 1 for dims, _ in self.axes.columns.values()):
             raise InputError(str(path), "has an axis of several dimensions: its cells cannot be reused")
         if changes := self._changes(config):
@@ -138,7 +140,8 @@ class EarlierSweep:
                 count = int(shared.sum())
 
                 def read(name: str, part: xr.Dataset = part, within: Any = within, count: int = count) -> NDArray[Any]:
-                    return np.broadcast_to(part[name].transpose(*in_file).values[within], count)  # noqa: B023
+                    found = part[name].transpose(*in_file, ...).values[within]  # noqa: B023
+                    return np.broadcast_to(found, (count, *found.shape[bool(within) :]))
 
                 # What an earlier refined sweep has inferred is no cell of it.
                 run = read("origin") != INFERRED if "origin" in ds else np.ones(count, dtype=bool)

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ringsweep.config import Axes, Config, load, read_axes, read_scene, read_solver, refined, sweepable
 from ringsweep.config.axes import dimension
+from ringsweep.config.follow import BOTH, DIRECTION
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
 from ringsweep.quantities.variables import INFERRED, error_attribute
@@ -32,11 +33,11 @@ from ringsweep.runs.refined import attributes as refinement_attributes
 from ringsweep.runs.refinement import Refined
 from ringsweep.runs.reuse import EarlierSweep
 from ringsweep.runs.sampled import EarlierSample
-from ringsweep.runs.task_sizes import TaskSizes, divide_cells, divide_into_tasks
+from ringsweep.runs.task_sizes import TaskSizes, divide_cells, divide_into_chains, divide_into_tasks
 from ringsweep.runs.warnings import warn_of_results, warn_of_sample
 from ringsweep.storage import netcdf
 from ringsweep.storage.checkpoint import Checkpoint, Columns, DamagedTask, open_checkpoint
-from ringsweep.storage.chunks import Layout
+from ringsweep.storage.chunks import CHUNK, Layout
 from ringsweep.storage.provenance import attributes, differences, environment, identity
 
 if TYPE_CHECKING:
@@ -248,7 +249,7 @@ def compute(
         if warn:
             warn_of_sample(results, config)
         return results
-    columns = {name: column.reshape(sizes) for name, column in store.columns.items()}
+    columns = {name: column.reshape((*sizes, *column.shape[1:])) for name, column in store.columns.items()}
     results = _frame(config, found)
     if found is not None and config.refine is not None:
         complete(config.refine, found, tuple(slice(None) for _ in sizes), columns)
@@ -256,7 +257,11 @@ def compute(
     variables = model_of(config.scene.structure).variables
     results = results.assign(
         {
-            name: (tuple(config.axes.sizes), column, variables[name].attributes | error_attribute(name, columns))
+            name: (
+                (*config.axes.sizes, *variables[name].dims),
+                column,
+                variables[name].attributes | error_attribute(name, columns),
+            )
             for name, column in columns.items()
         }
     )
@@ -269,8 +274,8 @@ def _layout(config: Config, whole: bool = False) -> Layout:
     """Order of the cells of a sweep, or of the parts of the cells of a sampled one; in one chunk for a `whole` one."""
     if config.sample is not None:
         return sampled.part_layout(config, sampled.grid_layout(config, whole))
-    sizes = tuple(config.axes.sizes.values())
-    return Layout(sizes, sizes if whole else None)
+    sizes, section = tuple(config.axes.sizes.values()), config.scene.structure.section
+    return Layout(sizes, sizes if whole else None, max(CHUNK // (1 if section is None else section.keep), 1))
 
 
 def _sampled_dataset(config: Config, columns: Mapping[str, NDArray[Any]]) -> xr.Dataset:
@@ -364,7 +369,8 @@ def _write_file(config: Config, target: Path, layout: Layout, checkpoint: Checkp
         return
     variables = model_of(config.scene.structure).variables
     if found is None or config.refine is None:
-        netcdf.write(target, checkpoint.working_folder, frame, variables, layout, checkpoint.chunks())
+        within = {name: variable.dims for name, variable in variables.items() if variable.dims}
+        netcdf.write(target, checkpoint.working_folder, frame, variables, layout, checkpoint.chunks(), within=within)
         return
     refine = config.refine
 
@@ -435,7 +441,12 @@ def _compute_cells(
         _take_shared(config, layout, store, earlier, store.done)
     if not store.done.all():
         with _open_tasks(config, layout, store, execution, layout.total, continued) as tasks:
-            tasks.run(divide_into_tasks(store.done, tasks.sizes, tasks.stopped))
+            if config.follow is None:
+                tasks.run(divide_into_tasks(store.done, tasks.sizes, tasks.stopped))
+            else:
+                dim, orders = config.follow.chains(config.axes)
+                chain = orders.shape[1], list(config.axes.sizes).index(dim)
+                tasks.run(divide_into_chains(layout, *chain, store.done, tasks.sizes, tasks.stopped))
             if not store.done.all():
                 raise KeyboardInterrupt
     return None
@@ -602,12 +613,17 @@ def _frame(config: Config, found: Refined | None) -> xr.Dataset:
     known = sweepable(config.scene)
     sample = {} if config.sample is None else sampled.coordinates(config)
     about = {} if config.sample is None else sampled.attributes(config)
+    directions: dict[str, Any] = {}
+    if DIRECTION in config.axes.sizes:
+        about_it = {"long_name": f"direction in which {config.follow.path} is followed"} if config.follow else {}
+        directions = {DIRECTION: (DIRECTION, list(BOTH), about_it)}
     return xr.Dataset(
         coords={
             dimension(path): (dims, column, {**known[path].attributes, "path": path})
             for path, (dims, column) in config.axes.columns.items()
         }
-        | sample,
+        | sample
+        | directions,
         attrs=attributes(config) | refinement | about,
     )
 
@@ -618,6 +634,8 @@ def _earlier_sweep(
     """The configuration, with its axes aligned to those of the earlier sweep, and that sweep."""
     if reuse is None:
         return config, None
+    if config.follow is not None:
+        raise InputError("--reuse", "cells of sweep.follow start from the cells before them: leave one of them out")
     if config.sample is not None:
         return config, sampled.EarlierSample(reuse, config)
     earlier = EarlierSweep(reuse, config)

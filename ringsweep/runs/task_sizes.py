@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.runs.cells import TaskResult
-from ringsweep.storage.chunks import CHUNK
+from ringsweep.storage.chunks import CHUNK, Layout
 
 logger = logging.getLogger("ringsweep")
 
@@ -70,6 +70,38 @@ def divide_cells(cells: NDArray[np.integer], sizes: TaskSizes, stopped: Event) -
         stop = start + min(sizes.next(len(cells) - start), len(cells) - start)
         yield cells[start:stop]
         start = stop
+
+
+def divide_into_chains(
+    layout: Layout, chain: int, dim: int, done: NDArray[np.bool_], sizes: TaskSizes, stopped: Event
+) -> Iterator[NDArray[np.integer]]:
+    """Positions of the cells of one task after another, ascending: of whole chains, of which no cell is done.
+
+    Parameters
+    ----------
+    layout : Layout
+    chain : int
+        Number of cells of a chain.
+    dim : int
+        Place of their dimension among those of the layout.
+    done, sizes, stopped
+        As for :func:`divide_into_tasks`. Chains of which some cells are not done are computed again.
+    """
+    along = np.array(layout.sizes, dtype=np.intp)
+    along[dim] = 1
+    left = np.arange(layout.total // chain)
+
+    def cells(chains: NDArray[np.intp]) -> NDArray[np.intp]:
+        others = np.unravel_index(np.repeat(chains, chain), tuple(along))
+        within = np.tile(np.arange(chain), len(chains))
+        return layout.positions([within if k == dim else index for k, index in enumerate(others)])
+
+    while len(left) and not stopped.is_set():
+        size = max(sizes.next(len(left) * chain) // chain, sizes.side_by_side)
+        positions = np.sort(cells(left[:size]))
+        left = left[size:]
+        if not done[positions].all():
+            yield positions
 
 
 def divide_into_tasks(done: NDArray[np.bool_], sizes: TaskSizes, stopped: Event) -> Iterator[NDArray[np.integer]]:

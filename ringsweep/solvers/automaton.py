@@ -11,14 +11,14 @@ from math import isfinite
 from typing import Any, NamedTuple
 
 from ringsweep.compile import Cells, borrowed, hook, inlined, kernel, take
-from ringsweep.models.interface import implicit, modes, recorder, series, variation
+from ringsweep.models.interface import implicit, modes, recorder, series, simpler, variation
 from ringsweep.models.interface.status import BROKEN, COMPLETE, RUNNING
 from ringsweep.numerics.series import ORDER
 from ringsweep.physics import drives
 from ringsweep.physics.friction import Dynamic, SetValued, Smooth, family
 from ringsweep.solvers.audit import Audit, audit_step, fall_rate, is_checked
 from ringsweep.solvers.creep import StepControl, implicit_step, start_at
-from ringsweep.solvers.steps import Step, lent, scratch_for
+from ringsweep.solvers.steps import Step, lent, scratch_for, without_rows
 from ringsweep.solvers.taylor import series_step
 
 # A run ends after this many consecutive steps and events at one instant.
@@ -107,18 +107,9 @@ def _step(family, scene, run, h_max, tolerances, scratch):
     """
 
 
-@hook
-def _creep(kind, scene, run, h_max, tolerance, scratch):
-    """Whether a mode is stiff, and the result of :func:`implicit_step` if it is; arguments as for :func:`_step`."""
-
-
-@_creep.implements(implicit.Whole)
-def _creep_whole(kind, scene, run, h_max, tolerance, scratch):
-    return _creep_in(scene, run, h_max, tolerance, scratch)
-
-
 @inlined
-def _creep_in(scene, run, h_max, tolerance, scratch):
+def _creep(scene, run, h_max, tolerance, scratch):
+    """Whether a mode is stiff, and the result of :func:`implicit_step` if it is; arguments as for :func:`_step`."""
     start, control = start_at(scene, scratch.course, run.mode, run.t, run.y), run.control
     if not implicit.is_stiff(scene, run.mode, run.y, start.linear):
         return False, -1, 0.0, run.y, run.record, control, 0.0
@@ -127,18 +118,6 @@ def _creep_in(scene, run, h_max, tolerance, scratch):
         control = StepControl(min(control.h, -1.0 / start.linear[1][3]), 0.0, 0.0)
     guard, s, y, record, control, error = implicit_step(scene, run.record, start, control, h_max, tolerance, scratch)
     return True, guard, s, y, record, control, error
-
-
-@_creep.implements(implicit.Parted)
-def _creep_parted(kind, scene, run, h_max, tolerance, scratch):
-    if not implicit.has_part(scene, run.mode):
-        return _creep_in(scene, run, h_max, tolerance, scratch)
-    part, record, mode, y = implicit.part(scene, run.record, run.mode, run.y)
-    run_of_part = _Run(record, mode, run.t, y, run.control, run.local)
-    is_stiff, guard, s, y, record, control, error = _creep_in(part, run_of_part, h_max, tolerance, scratch)
-    local = guard - scratch.first_guard if guard >= 0 else -1
-    local, record, y = implicit.rejoined(scene, run.record, run.mode, local, record, y)
-    return is_stiff, (local + scratch.first_guard if local >= 0 else -1), s, y, record, control, error
 
 
 @_step.implements(SetValued)
@@ -153,9 +132,7 @@ def _step_series(family, scene, run, h_max, tolerances, scratch):
 @_step.implements(Smooth)
 def _step_either(family, scene, run, h_max, tolerances, scratch):
     if implicit.may_creep(scene, run.mode):
-        is_stiff, guard, s, y, record, control, error = _creep(
-            implicit.kind(scene), scene, run, h_max, tolerances[1], scratch
-        )
+        is_stiff, guard, s, y, record, control, error = _creep(scene, run, h_max, tolerances[1], scratch)
         if is_stiff:
             return True, guard, s, y, record, control, _after_creep(run.local, error)
     guard, s, y, record, reach = series_step(scene, run.record, run.mode, run.t, run.y, h_max, tolerances[0], scratch)
@@ -171,6 +148,51 @@ def _step_implicit(family, scene, run, h_max, tolerances, scratch):
         scene, run.record, start, run.control, h_max, tolerances[1], scratch
     )
     return True, guard, s, y, record, control, _after_creep(run.local, error)
+
+
+@hook
+def _step_in(kind, scene, run, h_max, tolerances, scratch):
+    """One step of a scene, or of the simpler scene whose mode it is in; arguments and result as for :func:`_step`."""
+
+
+@_step_in.implements(simpler.Whole)
+def _step_in_whole(kind, scene, run, h_max, tolerances, scratch):
+    return _step(family(scene.law), scene, run, h_max, tolerances, scratch)
+
+
+@_step_in.implements(simpler.Parted)
+def _step_in_part(kind, scene, run, h_max, tolerances, scratch):
+    if not simpler.is_simpler(scene, run.mode):
+        return _step(family(scene.law), scene, run, h_max, tolerances, scratch)
+    part, mode, y = simpler.part(scene, run.mode, run.y)
+    run_of_part = _Run(simpler.part_of_record(scene, run.record, run.mode), mode, run.t, y, run.control, run.local)
+    first = simpler.first_row(scene)
+    is_implicit, guard, s, y, record, control, local = _step(
+        family(scene.law), part, run_of_part, h_max, tolerances, without_rows(scratch, first)
+    )
+    guard, record, y = simpler.rejoined(
+        scene, run.record, run.mode, guard + first if guard >= 0 else -1, record, y, scratch.c
+    )
+    return is_implicit, guard, s, y, record, control, local
+
+
+@hook
+def _begin_in(kind, scene, mode, t, y, tolerances, c):
+    """Record at the beginning of a run of a scene, or of the simpler scene whose mode it is in."""
+
+
+@_begin_in.implements(simpler.Whole)
+def _begin_in_whole(kind, scene, mode, t, y, tolerances, c):
+    return _begin(family(scene.law), scene, mode, t, y, tolerances, c)
+
+
+@_begin_in.implements(simpler.Parted)
+def _begin_in_part(kind, scene, mode, t, y, tolerances, c):
+    if not simpler.is_simpler(scene, mode):
+        return _begin(family(scene.law), scene, mode, t, y, tolerances, c)
+    part, part_mode, part_y = simpler.part(scene, mode, y)
+    record = _begin(family(scene.law), part, part_mode, t, part_y, tolerances, c[simpler.first_row(scene) :])
+    return simpler.begun(scene, record)
 
 
 @hook
@@ -340,7 +362,8 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
         drives.new_course(scratch.course)
         t, y = modes.initial_state(scene)
         status, mode = modes.initial_mode(scene, t, y)
-        record = _begin(family(scene.law), scene, mode, t, y, tolerances, c)
+        begun = _begin_in(simpler.kind(scene), scene, mode, t, y, tolerances, c)
+        record = recorder.lend(scene, begun, take(rows, i))
         record = recorder.after_event(scene, record, mode, t)
         control = StepControl(1e-6 * scene.span, 0.0, 0.0)
         audit, guard_fall_rate, local = Audit(0.0, 0.0, 0.0), 0.0, LocalErrors(0.0, 0.0, 0.0, 0.0)
@@ -366,8 +389,8 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
             h_max = min(scene.span, drives.next_knot(scene.drive, t)) - t
             control = StepControl(min(control.h, spacing), control.last_h, control.last_factor)
             run = _Run(record, mode, t, y, control, local)
-            is_implicit, guard, s, y_next, record, control, local = _step(
-                family(scene.law), scene, run, h_max, tolerances, scratch
+            is_implicit, guard, s, y_next, record, control, local = _step_in(
+                simpler.kind(scene), scene, run, h_max, tolerances, scratch
             )
             step = Step(mode, is_implicit, t, s, y, y_next)
             if len(history.times) > 0:
@@ -401,6 +424,7 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
         outcome = recorder.conclude(scene, record, status, t, *modes.in_space(scene, t, y))
         for k in range(min(len(outcome), rows.shape[1])):
             rows[i, k] = outcome[k]
+        recorder.keep_memory(scene, rows[i], len(outcome), y)
         steps[i] = n
         if audited:
             audits[i, 0] = audit.violation

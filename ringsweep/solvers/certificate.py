@@ -29,6 +29,9 @@ _MAY_LACK = (
     "lyapunov_error",
     "multiplier_1",
     "multiplier_2",
+    "x_section",
+    "velocity_section",
+    "deflection_section",
 )
 
 # Relative difference of two final states that rounding explains.

@@ -79,11 +79,12 @@ class Method(ABC):
                 f"friction law {structure.law} has bristles, which have no state in an impact: "
                 "choose a law without bristles, or leave impact out",
             )
-        if structure.exponent and TRAITS[structure.law_type].snaps:
+        asked = [name for name in ("exponent", "section") if getattr(structure, name)]
+        if asked and TRAITS[structure.law_type].snaps:
             raise InputError(
-                "record.exponent",
+                f"record.{asked[0]}",
                 f"friction law {structure.law} has none: its bonds form anew at random; choose another law, or leave "
-                "record.exponent out",
+                f"record.{asked[0]} out",
             )
         needs, model = self.needs(structure), model_of(structure)
         law, drive = structure.law_type, structure.drive_type

@@ -95,6 +95,8 @@ class RK4(Method):
             raise InputError(
                 "solver.method", "rk4 locates no events, at which disturbances jump: auto gives record.exponent"
             )
+        if structure.section is not None:
+            raise InputError("solver.method", "rk4 locates no instants for record.section: auto does")
         super().check(structure)
 
     def run(self, batch: Any, outcomes: tuple[str, ...]) -> Result:
@@ -344,6 +346,7 @@ def _conclude(scene, record, status, t, y, steps, diagnosis, fall_rate, h, cell,
     outcome = recorder.conclude(scene, record, status, t, y[0], y[1])
     for column in range(len(outcome)):
         rows[cell, column] = outcome[column]
+    recorder.keep_memory(scene, rows[cell], len(outcome), y)
     report[cell, 0], report[cell, 1], report[cell, 2] = steps, diagnosis.eigenvalue * h, diagnosis.margin
     report[cell, 3], report[cell, 4] = fall_rate, diagnosis.arc_share
 

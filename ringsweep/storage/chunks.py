@@ -26,13 +26,14 @@ class Layout:
         Length of each dimension.
     chunk : sequence of int, optional
         Length of a chunk along each dimension; chunks at the edges may be shorter. By default the longest dimension is
-        halved until a chunk has at most :data:`CHUNK` cells.
+        halved until a chunk has at most `most` cells.
+    most : int
     """
 
-    def __init__(self, sizes: Sequence[int], chunk: Sequence[int] | None = None):
+    def __init__(self, sizes: Sequence[int], chunk: Sequence[int] | None = None, most: int = CHUNK):
         self.sizes = tuple(sizes)
         self.total = math.prod(self.sizes)
-        self.chunk = tuple(chunk) if chunk is not None else _chunk_shape(self.sizes)
+        self.chunk = tuple(chunk) if chunk is not None else _chunk_shape(self.sizes, most)
 
     @cached_property
     def _chunks(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
@@ -77,9 +78,9 @@ class Layout:
             yield int(start), int(start + shape.prod()), region
 
 
-def _chunk_shape(sizes: tuple[int, ...]) -> tuple[int, ...]:
+def _chunk_shape(sizes: tuple[int, ...], most: int) -> tuple[int, ...]:
     shape = list(sizes)
-    while math.prod(shape) > CHUNK:
+    while math.prod(shape) > most:
         longest = shape.index(max(shape))
         shape[longest] = -(-shape[longest] // 2)
     return tuple(shape)

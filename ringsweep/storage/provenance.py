@@ -81,6 +81,10 @@ def identity(config: Config) -> dict[str, str]:
     found |= {f"scene.{path}": repr(float(value)) for path, value in scene.values.items() if path not in axes.columns}
     if structure.exponent:
         found["record.exponent"] = "true"
+    if structure.section is not None:
+        found["record.section"] = f"at {structure.section.at}, keep {structure.section.keep}"
+    if config.follow is not None:
+        found["sweep.follow"] = repr(config.follow)
     if config.refine is not None:
         found["sweep.refine"] = repr(config.refine)
     found["sweep"] = ", ".join(f"{name} {size}" for name, size in axes.sizes.items()) or "a single run"

@@ -93,10 +93,16 @@ class Inspection(NamedTuple):
     v: float
 
 
+@inlined
+def _deflection_at_start(scene):
+    """Deflection of the bristles at t = 0, m. It also resets the memory that the law may have."""
+    return initial_deflection(scene.law, scene.mu_s, scene.mu_k) + scene.initial_z
+
+
 @constant_step.initial_state.implements(BristleBelt)
 def _initial_state_in_space(scene):
     velocity = scene.initial_v + drives.turn(scene.drive, 0.0)[1]
-    return scene.initial_x, velocity, initial_deflection(scene.law, scene.mu_s, scene.mu_k)
+    return scene.initial_x, velocity, _deflection_at_start(scene)
 
 
 @constant_step.rates.implements(BristleBelt)
@@ -146,6 +152,12 @@ def _begin(scene, t, seen):
     return begin(scene, t, seen, stick_speed(scene.law, recoil_speed(scene)), _play(scene))
 
 
+@recorder.keep_memory.implements(BristleBelt)
+def _keep_deflection(scene, row, column, y):
+    if column < len(row):
+        row[column] = y[2]
+
+
 @constant_step.row.implements(BristleBelt)
 def _row(scene, y, forcing):
     now = constant_step.inspect(scene, y, forcing)
@@ -161,7 +173,7 @@ class Mode(NamedTuple):
 
 @modes.initial_state.implements(BristleBelt)
 def _initial_state(scene):
-    z = initial_deflection(scene.law, scene.mu_s, scene.mu_k)
+    z = _deflection_at_start(scene)
     v = drives.velocity_at_beginning(scene.drive, scene.initial_v)
     return drives.beginning(scene.drive), (scene.initial_x, v, z)
 
@@ -242,5 +254,5 @@ def _guards_and_motion(scene, mode, common, forcing, x):
 
 @implicit.row.implements(BristleBelt)
 def _implicit_row(scene, mode, forcing, x):
-    _, (place, velocity, _, force, _, _, _) = implicit.guards_and_motion(scene, mode, (), forcing, x)
+    _, (place, velocity, _, force, _, _, _, _) = implicit.guards_and_motion(scene, mode, (), forcing, x)
     return place, velocity, force, x[2], 0.0 if mode.region == BAND else float(mode.sign)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from ringsweep.compile import absorbed, inlined
+from math import nan
+
+from ringsweep.compile import absorbed, inlined, unrolled
 from ringsweep.models.belt.force import length_scale, located, sliding, sliding_slopes
 from ringsweep.models.interface import implicit
 from ringsweep.physics import belt, drives, ring
@@ -59,8 +61,14 @@ def view(scene, forcing, x, place, friction, at, guards):
     K, viscous = friction
     acceleration, _ = ring.acceleration(scene.body, K, K, *at)
     normal, _ = ring.reactions(scene.body, K, K, *at)
-    motion = at[0], at[2], acceleration, viscous - K * normal, place, x[1], forcing[2]
+    motion = at[0], at[2], acceleration, viscous - K * normal, place, x[1], forcing[2], _deflection(x, nan)
     return all_guards(scene.body, normal, *guards), motion
+
+
+@unrolled
+def _deflection(length, x, missing):
+    """Deflection of the bristles; `missing` without bristles."""
+    return ["return x[2]" if length > 2 else "return missing"]
 
 
 @implicit.guards_and_motion.implements(belt.Belt)
@@ -73,8 +81,9 @@ def _guards_and_motion(scene, mode, common, forcing, x):
 
 @implicit.seen.implements(belt.Belt, belt.BristleBelt)
 def _seen(scene, view):
-    _, (x, velocity, acceleration, friction, place, v, belt_acceleration) = view
-    return x, velocity, friction, place, v, acceleration - belt_acceleration, located(scene, x, acceleration)
+    _, (x, velocity, acceleration, friction, place, v, belt_acceleration, deflection) = view
+    jumps = located(scene, x, acceleration)
+    return x, velocity, friction, place, v, acceleration - belt_acceleration, jumps, deflection
 
 
 @implicit.near_zero.implements(belt.Belt, belt.BristleBelt)
@@ -84,5 +93,5 @@ def _near_zero(scene, motion):
 
 @implicit.row.implements(belt.Belt)
 def _row(scene, mode, forcing, x):
-    _, (position, velocity, _, friction, _, _, _) = implicit.guards_and_motion(scene, mode, (), forcing, x)
+    _, (position, velocity, _, friction, _, _, _, _) = implicit.guards_and_motion(scene, mode, (), forcing, x)
     return position, velocity, friction, 0.0, 0.0

@@ -6,10 +6,11 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ringsweep.compile import take
 from ringsweep.errors import InputError
-from ringsweep.models.belt import tangent
+from ringsweep.models.belt import section, tangent
 from ringsweep.models.belt.record import Outcome
 from ringsweep.models.interface.variation import Exponent
 from ringsweep.models.model import Model
@@ -39,6 +40,33 @@ class Belt(Model):
     own_variables: ClassVar[dict[str, Variable]] = {
         "jump_max": Variable("m/s^2", "largest jump of the acceleration of the body")
     }
+
+    sections: ClassVar[tuple[str, ...]] = "period", "turn"
+
+    def columns(self, structure: Structure) -> tuple[str, ...]:
+        """Outcomes, and after them the deflection of bristles and the points of the section."""
+        bristles = ("deflection_end",) if friction.family_of(structure.law_type) is friction.Dynamic else ()
+        return (*self.outcomes, *bristles, *_points(structure))
+
+    continues: ClassVar[bool] = True
+
+    def continued(self, structure: Structure, values: Values, ended: Values) -> dict[str, NDArray[np.float64]]:
+        """Displacement, velocity, deflection and phases at the end of other runs.
+
+        Bristles are not longer than those that start can be.
+        """
+        found = {"initial.x": ended["x_end"], "initial.velocity": ended["velocity_end"]}
+        if "initial.deflection" in values:
+            most = _largest_deflection(structure, values)
+            found["initial.deflection"] = np.clip(ended["deflection_end"], -most, most)
+        for part in ("force", "drive"):
+            if f"{part}.frequency" in values and f"{part}.frequency" in ended:
+                turns = ended[f"{part}.frequency"] * ended["t_end"]
+                # But for rounding, a whole number of turns changes no phase.
+                turns = np.where(abs(turns - np.round(turns)) < 1e-9, 0.0, turns % 1.0)
+                phase = ended.get(f"{part}.phase", np.zeros(len(turns))) + 2.0 * np.pi * turns
+                found[f"{part}.phase"] = np.where(turns == 0.0, phase, phase % (2.0 * np.pi))
+        return found
 
     def scene_type(self, structure: Structure) -> type:
         """``BristleBelt`` for laws with bristles, else ``Belt``."""
@@ -86,9 +114,17 @@ class Belt(Model):
             "initial.velocity": Parameter(
                 "m/s", "velocity of the body at the start (default: that of the belt)", optional=True
             ),
+            **self._deflection(structure),
             "time.span": SPAN,
             "gravity": GRAVITY,
         }
+
+    def _deflection(self, structure: Structure) -> dict[str, Parameter]:
+        """The initial deflection, if the law has one that describes its state."""
+        law = structure.law_type
+        if friction.family_of(law) is not friction.Dynamic or friction.TRAITS[law].snaps:
+            return {}
+        return {"initial.deflection": Parameter("m", "deflection of the bristles at the start", default=0.0)}
 
     def build(self, structure: Structure, values: Values) -> belt.Belt | belt.BristleBelt:
         """Cells that kernels run over; see :meth:`ringsweep.models.model.Model.build`."""
@@ -117,6 +153,10 @@ class Belt(Model):
         }
         if structure.exponent:
             fields["asked"] = Exponent()
+        if structure.section is not None:
+            kept: Any = section.AtPeriod if structure.section.at == "period" else section.AtTurn
+            sizes = structure.section.keep, len(_points(structure))
+            fields["section"] = kept(*(np.full(mass.shape, size) for size in sizes))
         fields["forcing_period"] = np.broadcast_to(drives.period(fields["drive"]), mass.shape).copy()
         fields["viscous"] = values.get("friction.viscous", np.zeros(len(mass)))
         if friction.family_of(law) is not friction.Dynamic:
@@ -133,6 +173,16 @@ class Belt(Model):
         per_load = {
             path: value / (mass * gravity) for path, value in values.items() if path.startswith("friction.sigma")
         }
+        deflection = values.get("initial.deflection", np.zeros(len(mass)))
+        if deflection.any():
+            most = _largest_deflection(structure, values)
+            require(
+                abs(deflection) <= most * (1.0 + 1e-9),
+                "initial.deflection",
+                deflection,
+                "{} m is not allowed: friction at rest holds bristles up to " + f"{most.min():.6g} m",
+            )
+        fields["initial_z"] = deflection
         return belt.BristleBelt(**fields, law=law_of(structure, {**values, **per_load}, [(mu_s, mu_k)]))
 
     def _drive(self, structure: Structure, values: Values) -> Any:
@@ -182,6 +232,20 @@ class BeltWithExponent(Belt):
     """The belt whose record is asked for the exponent."""
 
     outcomes: ClassVar[tuple[str, ...]] = Outcome._fields + tangent.OUTCOMES
+
+
+def _largest_deflection(structure: Structure, values: Values) -> NDArray[np.float64]:
+    """Deflection at which the bristles carry the static friction, m."""
+    mu_s, _ = friction_coefficients(structure, "friction", values)
+    return mu_s * values["body.mass"] * values["gravity"] / values["friction.sigma0"]
+
+
+def _points(structure: Structure) -> tuple[str, ...]:
+    """Names of the columns of the points of the section."""
+    asked = structure.section
+    if asked is None:
+        return ()
+    return tuple(name for name in section.VARIABLES[: 2 + asked.deflections] for _ in range(asked.keep))
 
 
 def _along_a_line(parameter: Parameter) -> Parameter:

@@ -4,7 +4,8 @@ A *stop* is an interval in which the body sticks to the belt, and stays longer t
 the speed of the belt. A *cycle* is a period of the forcing; without forcing, it lasts from one turn of the displacement
 to the next of its kind. At the end of each cycle the state is compared with that one cycle before, and with a
 reference, which is replaced after ever more cycles (Brent's cycle detection). The first state that equals one of them
-closes a *lap*: the time since then is the period of the motion.
+closes a *lap*: the time since then is the period of the motion if each later lap returns too. After a lap that does not
+return, states must be closer to count as equal: a motion that only comes near its past is not taken for a periodic one.
 """
 
 from __future__ import annotations
@@ -13,16 +14,33 @@ from math import inf, isfinite, isnan, nan, pi, sqrt
 from typing import Any, NamedTuple
 
 from ringsweep.compile import absorbed, hook, inlined
-from ringsweep.models.belt import tangent
+from ringsweep.models.belt import section, tangent
 from ringsweep.models.belt.force import breakaway_force
+from ringsweep.models.belt.turn import between, turn_within
 from ringsweep.models.interface import recorder, shock
-from ringsweep.models.interface.status import BROKEN, SEPARATED_1
+from ringsweep.models.interface.status import BROKEN, COMPLETE, SEPARATED_1
 from ringsweep.numerics.functions import any_of, floor, lanes_body, select, square_root
 from ringsweep.numerics.memory import select_all
 from ringsweep.physics import ring
 from ringsweep.physics.belt import Belt, BristleBelt
+from ringsweep.physics.forces import largest_force
 from ringsweep.physics.friction.velocity import stiction_band
-from ringsweep.quantities.flags import FAILED, OSCILLATORY, RIDING, SEPARATING, SLIDING, STICK_SLIP, STICKING
+from ringsweep.quantities.flags import (
+    CHAOTIC,
+    FAILED,
+    OSCILLATORY,
+    PERIODIC,
+    QUASI_PERIODIC,
+    REST,
+    RIDING,
+    SEPARATING,
+    SLIDING,
+    STEADY,
+    STICK_SLIP,
+    STICKING,
+    TRANSIENT,
+    UNBOUNDED,
+)
 
 
 class Outcome(NamedTuple):
@@ -44,6 +62,7 @@ class Outcome(NamedTuple):
     stops_per_cycle: float
     swing: float
     settled: float
+    long_run: float
     force_max: float
     jump_max: float
     t_jump_max: float
@@ -116,6 +135,56 @@ class Mark(NamedTuple):
     slips: Any
 
 
+class Corner(NamedTuple):
+    """State after so many laps: `number`, displacement, m, and velocity, m/s."""
+
+    number: Any
+    x: Any
+    velocity: Any
+
+
+class Laps(NamedTuple):
+    """Laps of one length that returned one after the other.
+
+    Attributes
+    ----------
+    number : float
+    gap, first_gap : float
+        Distances between the ends of the last and of the first of them, as a share of the swing.
+    near : float
+        Greatest distance, as a share of the swing, at which a state has returned.
+    older, newer : Corner
+        States after so many laps, the last two powers of two: `older` is at least half of the laps ago.
+    """
+
+    number: Any
+    gap: Any
+    first_gap: Any
+    near: Any
+    older: Corner
+    newer: Corner
+
+
+class Part(NamedTuple):
+    """Beginning of a part of the record.
+
+    Attributes
+    ----------
+    count : float
+        Cycles before it.
+    mark : Mark
+        State there.
+    swing, sum, squares : float
+        Swing of the cycle before, m; sums of the swings until then, and of their squares.
+    """
+
+    count: Any
+    mark: Mark
+    swing: Any
+    sum: Any
+    squares: Any
+
+
 class Cycles(NamedTuple):
     """Cycles up to now.
 
@@ -133,6 +202,11 @@ class Cycles(NamedTuple):
         Cycles since the reference, and cycles after which it is replaced.
     lap : float
         Cycles in a lap; 0 if the motion did not return.
+    laps : Laps
+    sum, squares : float
+        Sums of the swings of all cycles, m, and of their squares.
+    before, middle : Part
+        After the last two powers of two of cycles: at least half of the record comes after `before`.
     period, share, stops : float
         Duration of the last lap, s, NaN if the motion did not return. Share of stick and stops in a cycle, of the last
         lap or of the cycles since the reference.
@@ -150,6 +224,11 @@ class Cycles(NamedTuple):
     since: Any
     most: Any
     lap: Any
+    laps: Laps
+    sum: Any
+    squares: Any
+    before: Part
+    middle: Part
     period: Any
     share: Any
     stops: Any
@@ -173,6 +252,8 @@ class Record(NamedTuple):
         Jumps of the acceleration.
     tangent : Tangent
         Growth of small disturbances; an empty tuple if no exponent is asked for.
+    section : Points
+        Points of the section; an empty tuple if none is asked for.
     """
 
     band: Any
@@ -186,10 +267,39 @@ class Record(NamedTuple):
     cycles: Cycles
     shocks: Any
     tangent: Any
+    section: Any
 
 
 #: The motion has returned if displacement and velocity differ by less than this share of their swing in a cycle.
 RETURN = 1e-3
+
+# After a lap that did not return this share is a tenth of what it was, but not less than this one.
+_NEAREST = 1e-5
+
+# Under a force one return within this share is evidence: no motion comes so close to its past by chance. Else so many
+# laps must return. A free motion has no other way to return than to repeat itself.
+_EXACT, _LAPS, _LAPS_IF_FREE = 1e-7, 4.0, 1.0
+
+# A change that would add up to less than this share of the swing in ten spans is no trend.
+_TREND = 0.1
+
+# Gaps of laps shrink if the last one is less than this share of the first one.
+_SHRUNK = 0.3
+
+# Two parts of the record have the same mean if it differs by less than so many standard errors and this share; shares
+# of stick may differ by the second share. Each part must have so many cycles in the mean.
+_ERRORS, _SAME_SWING, _SAME_STICK, _FEWEST = 3.0, 0.05, 0.1, 16.0
+
+# A swing has no bound if it is so many times the scales of the scene, and its growth in a cycle falls by less than the
+# second share between two parts of the record.
+_BEYOND, _SLOWER = 100.0, 0.01
+
+# An exponent is positive if it exceeds so many standard errors. It is zero if with so many it changes a disturbance by
+# less than the second share in a cycle.
+_POSITIVE, _ZERO = 3.0, 0.02
+
+# A multiplier above this one is that of an unstable motion, which does not last.
+_UNSTABLE = 1.01
 
 # A free oscillation has settled if its swing, at the rate of its last cycle, changes by less than this share in a span.
 _DECAY = 1e-2
@@ -214,8 +324,10 @@ _ROUNDING = 1e-6
 @inlined
 def begin(scene, t, seen, band, play):
     """Record at the beginning of a run."""
-    x, velocity, force, place, v, v_rate, acceleration = seen
+    x, velocity, force, place, v, v_rate, acceleration, _ = seen
     start = Mark(t, x, velocity, 0.0, 0.0)
+    corner, part = Corner(0.0, x, velocity), Part(0.0, start, 0.0, 0.0, 0.0)
+    laps = Laps(0.0, 0.0, 0.0, RETURN, corner, corner)
     # The body counts as stuck until it slips: the first stop begins with the run. If the pull exceeds breakaway, it may
     # pass the stiction band at once.
     pull = max(abs(scene.body.mass * v_rate + force), abs(scene.body.stiffness * x))
@@ -230,9 +342,55 @@ def begin(scene, t, seen, band, play):
         velocity,
         abs(force),
         Stops(1.0, t, 0.0, t, -max(least, 1e-300), nan, t, 0.0, 0.0, nan),
-        Cycles(0.0, scene.forcing_period, x, x, 0.0, 0.0, 0.0, start, start, 0.0, 1.0, 0.0, nan, nan, nan),
+        Cycles(
+            0.0,
+            scene.forcing_period,
+            x,
+            x,
+            0.0,
+            0.0,
+            0.0,
+            start,
+            start,
+            0.0,
+            1.0,
+            0.0,
+            laps,
+            0.0,
+            0.0,
+            part,
+            part,
+            nan,
+            nan,
+            nan,
+        ),
         shock.begin(acceleration),
         tangent.begin(scene.asked, scene, t),
+        (),
+    )
+
+
+@recorder.lend.implements(Belt, BristleBelt)
+def _lend(scene, record, row):
+    return changed(record, record.tangent, section.lent(scene.section, record, row))
+
+
+@inlined
+def changed(r, new_tangent, new_section):
+    """Record with another tangent and other points."""
+    return Record(
+        r.band,
+        r.play,
+        r.last,
+        r.x_min,
+        r.x_max,
+        r.velocity_max,
+        r.force_max,
+        r.stops,
+        r.cycles,
+        r.shocks,
+        new_tangent,
+        new_section,
     )
 
 
@@ -240,7 +398,7 @@ def begin(scene, t, seen, band, play):
 def _observe(scene, record, t, duration, stuck, seen):
     # In most steps nothing turns, begins or ends.
     r = record
-    x, velocity, force, place, v, v_rate, acceleration = seen
+    x, velocity, force, place, v, v_rate, acceleration, deflection = seen
     stops, cycles, x_min, x_max = r.stops, r.cycles, r.x_min, r.x_max
     place = _place(scene, r, place)
     side = select(stuck, 1.0, -1.0)
@@ -249,7 +407,7 @@ def _observe(scene, record, t, duration, stuck, seen):
         stops = _stops(scene, r, t, duration, stuck, side, place, v, force, span)
     if any_of((r.last.velocity * velocity <= 0.0) | (t >= cycles.next)):
         up, down = (r.last.velocity <= 0.0) & (velocity > 0.0), (r.last.velocity > 0.0) & (velocity <= 0.0)
-        turn = _turn(r.last, t, duration, x, velocity)
+        turn = turn_within(r.last, t, duration, x, velocity)
         x_min, x_max = select(up, min(x_min, turn.x), x_min), select(down, max(x_max, turn.x), x_max)
         span = max(x_max, x) - min(x_min, x)
         cycles = _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span)
@@ -273,6 +431,7 @@ def _observe(scene, record, t, duration, stuck, seen):
         cycles,
         shock.observe(r.shocks, acceleration),
         tangent.observe(r.tangent, scene, r.cycles, cycles, t, duration),
+        section.observe(scene.section, scene, r, cycles, t, duration, x, velocity, deflection),
     )
 
 
@@ -326,30 +485,6 @@ def _located(before, now):
 @lanes_body(_located)
 def _not_located(before, now):
     return before
-
-
-class _Turn(NamedTuple):
-    """Time, s, and displacement, m, of a turn."""
-
-    t: Any
-    x: Any
-
-
-@absorbed
-def _turn(last, t, duration, x, velocity):
-    """Turn within an interval in which the velocity changes its sign. There it is nearly linear in time."""
-    change = last.velocity - velocity
-    changes = abs(change) > 0.0
-    share = select(changes, last.velocity / select(changes, change, 1.0), 0.0)
-    return _Turn(t - (1.0 - share) * duration, _between(last, duration, x, velocity, share))
-
-
-@absorbed
-def _between(last, duration, x, velocity, share):
-    """Displacement at a share of an interval: the cubic through displacements and velocities at both ends."""
-    rest = 1.0 - share
-    ends = (1.0 + 2.0 * share) * rest * rest * last.x + share * share * (3.0 - 2.0 * share) * x
-    return ends + share * rest * duration * (rest * last.velocity - share * velocity)
 
 
 @absorbed
@@ -422,6 +557,11 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
         c.since,
         c.most,
         c.lap,
+        c.laps,
+        c.sum,
+        c.squares,
+        c.before,
+        c.middle,
         c.period,
         c.share,
         c.stops,
@@ -431,7 +571,7 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
     if any_of(ended):
         share = select(duration > 0.0, 1.0 - (t - count * period) / duration, 1.0)
         share = select(due, min(max(share, 0.0), 1.0), 1.0)
-        x_due = _between(last, duration, x, velocity, share)
+        x_due = between(last, duration, x, velocity, share)
         t_mark = select(due, count * period, turn.t)
         x_mark = select(due, x_due, turn.x)
         v_mark = select(due, (1.0 - share) * last.velocity + share * velocity, 0.0)
@@ -439,13 +579,15 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
         swing = high - low
         stop = select(stops.slip_from == stops.slip_from, min(stops.slip_start, t_mark), t_mark) - stops.start
         total = stops.total + select(stop > abs(stops.least), stop, 0.0)
-        near, fast = RETURN * swing, RETURN * swing * (2.0 * pi) / _pace(scene)
+        fast = swing * (2.0 * pi) / _pace(scene)
         # Without forcing the launch is not the end of a cycle.
         known = due | (c.count > 0.0)
-        repeats = known & (abs(x_mark - c.last.x) <= near) & (abs(v_mark - c.last.velocity) <= fast)
         since = c.since + (count - c.count)
-        returns = known & (abs(x_mark - c.reference.x) <= near) & (abs(v_mark - c.reference.velocity) <= fast)
-        returns = returns | repeats
+        near = c.laps.near
+        gap_last = _gap(c.last, x_mark, v_mark, swing, fast)
+        gap_reference = _gap(c.reference, x_mark, v_mark, swing, fast)
+        repeats = known & (gap_last <= near)
+        returns = repeats | (known & (gap_reference <= near))
         # A lap of several cycles need not be closed before its end.
         open_lap = _not(returns) & (since < c.lap)
         lap = select(repeats, 1.0, select(returns, since, select(open_lap, c.lap, 0.0)))
@@ -459,6 +601,21 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
         renew = returns | late | _not(known)
         most = select(late, min(2.0 * c.most, _MOST_CYCLES), c.most)
         mark = Mark(t_mark, x_mark, v_mark, total, stops.slips)
+        again = returns & (lap == c.lap)
+        start = select_all(repeats, c.last, c.reference)
+        gap = select(repeats, gap_last, gap_reference)
+        laps = Laps(
+            select(again, c.laps.number + 1.0, select(returns, 1.0, select(lap > 0.0, c.laps.number, 0.0))),
+            select(returns, gap, c.laps.gap),
+            select(returns & _not(again), gap, c.laps.first_gap),
+            select((c.lap > 0.0) & (lap == 0.0), max(0.1 * near, _NEAREST), near),
+            c.laps.older,
+            c.laps.newer,
+        )
+        laps = _with_corners(laps, returns & _not(again), again, start, mark)
+        sum_now, squares = c.sum + swing, c.squares + swing * swing
+        halves = count >= 2.0 * c.middle.count
+        here = Part(count, mark, swing, sum_now, squares)
         new = Cycles(
             count,
             (count + 1.0) * period,
@@ -472,6 +629,11 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
             select(renew, 0.0, since),
             most,
             lap,
+            laps,
+            sum_now,
+            squares,
+            select_all(halves, c.middle, c.before),
+            select_all(halves, here, c.middle),
             select(returns, (t_mark - t_from) * lap / cycles, select(keeps, c.period, nan)),
             select(keeps, c.share, (total - total_from) / (t_mark - t_from)),
             select(keeps, c.stops, (stops.slips - slips_from) / cycles),
@@ -480,12 +642,33 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
     return old
 
 
+@absorbed
+def _gap(mark, x, velocity, swing, fast):
+    """Distance of a state from a mark, as a share of the swing of displacement and velocity."""
+    far_x, far_v = abs(x - mark.x), abs(velocity - mark.velocity)
+    return max(far_x / max(swing, 1e-300), far_v / max(fast, 1e-300))
+
+
+@absorbed
+def _with_corners(laps, first, again, start, mark):
+    """Laps with their corners, after a lap from `start` to `mark` that is the first of its length, or one more."""
+    older, newer = laps.older, laps.newer
+    begun, here = Corner(0.0, start.x, start.velocity), Corner(laps.number, mark.x, mark.velocity)
+    doubled = again & (laps.number >= 2.0 * max(newer.number, 1.0))
+    older = select_all(first, begun, select_all(doubled, newer, older))
+    newer = select_all(first, begun, select_all(doubled, here, newer))
+    return Laps(laps.number, laps.gap, laps.first_gap, laps.near, older, newer)
+
+
 @recorder.conclude.implements(Belt, BristleBelt)
 def _conclude(scene, record, status, t, place, velocity):
     r, x = record, place
-    motion, period, share, stops, settled = _settles_to(scene, r, t)
+    section.finish(scene.section, scene, r)
+    motion, long_run, period, share, stops = _settles_to(scene, r, t)
     if status == BROKEN or not (isfinite(x) and isfinite(velocity)):
         motion = FAILED
+    if status != COMPLETE or motion == FAILED:
+        long_run = TRANSIENT
     outcome = Outcome(
         float(SEPARATING if status == SEPARATED_1 and motion != FAILED else motion),
         float(motion),
@@ -502,7 +685,8 @@ def _conclude(scene, record, status, t, place, velocity):
         share,
         stops,
         r.cycles.swing if stops == stops else nan,
-        1.0 if settled else 0.0,
+        0.0 if long_run in (TRANSIENT, UNBOUNDED) else 1.0,
+        float(long_run),
         r.force_max,
         *shock.largest(r.shocks),
     )
@@ -511,9 +695,10 @@ def _conclude(scene, record, status, t, place, velocity):
 
 @inlined
 def _settles_to(scene, r, t):
-    """Word for what the motion settles to, period, share of stick and stops in a cycle, and whether it has settled."""
+    """Words for the motion and for what it settles to, period, share of stick and stops in a cycle."""
     c, stops = r.cycles, r.stops
-    forced, returned = scene.forcing_period < inf, not isnan(c.period)
+    forced, returns = scene.forcing_period < inf, _returns_each_time(scene, r)
+    period = c.period if returns else nan
     stop = t - stops.start
     in_stop = stop > abs(stops.least)
     # On a belt at rest, or without a spring, the load on a stuck body does not grow.
@@ -527,36 +712,97 @@ def _settles_to(scene, r, t):
         for_good = c.share > 1.0 - 1e-9 and abs(c.drift) <= max(RETURN * c.swing, r.band * scene.forcing_period)
     else:
         for_good = not loads
+    # A stuck body that moves goes with its belt.
+    held = PERIODIC if forced and c.swing > max(r.play, r.band * scene.forcing_period) else REST
+    still = STEADY if belt_velocity != 0.0 else REST
     rests = max(abs(r.last.velocity), abs(r.last.v_rate) * _pace(scene)) <= RETURN * abs(belt_velocity)
     if not forced and in_stop and rests and belt_velocity != 0.0:
         # The belt slides along under a body at rest, below the speed at which its friction no longer grows.
-        return SLIDING, nan, 0.0, 0.0, True
+        return SLIDING, STEADY, nan, 0.0, 0.0
     if in_stop and stops.least < 0.0:
-        return RIDING, c.period, 1.0, 0.0, for_good
+        return RIDING, held if for_good else TRANSIENT, c.period if for_good else nan, 1.0, 0.0
     if in_stop and for_good:
-        return STICKING, c.period if forced else nan, 1.0, 0.0, True
+        return STICKING, held, c.period if forced else nan, 1.0, 0.0
     natural = 2.0 * pi / sqrt(scene.body.stiffness / scene.body.mass) if scene.body.stiffness > 0.0 else inf
     slips_since = t - stops.slip_start
     if isnan(c.share) or (not forced and not in_stop and min(slips_since, t - c.last.t) > 2.0 * natural):
         # There is no cycle, or none any more.
         if in_stop or (stops.slips > 0.0 and slips_since < natural):
-            return STICK_SLIP, nan, (stops.total + (stop if in_stop else 0.0)) / t, nan, False
+            return STICK_SLIP, TRANSIENT, nan, (stops.total + (stop if in_stop else 0.0)) / t, nan
         if natural < inf:
             swing = max(r.x_max, r.last.x) - min(r.x_min, r.last.x)
             steady = abs(r.last.velocity) * min(natural, scene.span) <= RETURN * swing
         else:
             steady = abs(r.last.v_rate) * scene.span <= RETURN * abs(r.last.v)
-        return SLIDING, nan, 0.0, 0.0, steady
-    if c.stops > 0.0 or c.share > 0.0 or (in_stop and not forced):
-        return STICK_SLIP, c.period, c.share, c.stops, returned
+        return SLIDING, still if steady else TRANSIENT, nan, 0.0, 0.0
+    share, stops_per_cycle = c.share, c.stops
+    if forced and not returns and c.last.t > c.before.mark.t:
+        # The last cycles before the end differ from those before another end.
+        share = (c.last.total - c.before.mark.total) / (c.last.t - c.before.mark.t)
+        stops_per_cycle = (c.last.slips - c.before.mark.slips) / (c.count - c.before.count)
+    long_run = PERIODIC if returns else _without_return(scene, r)
+    if stops_per_cycle > 0.0 or share > 0.0 or (in_stop and not forced):
+        return STICK_SLIP, long_run, period, share, stops_per_cycle
     if c.swing <= _ROUNDING * (r.x_max - r.x_min):
-        return SLIDING, nan, 0.0, 0.0, True
+        return SLIDING, still, nan, 0.0, 0.0
     # At a high frequency even a slow decay per cycle ends the motion within the span.
     decays = not forced and c.lap == 1.0 and abs(c.swing - c.swing_before) * c.count > _DECAY * c.swing
-    stays = returned and not decays
+    stays = not isnan(c.period) and not decays
     if stays or forced or c.swing >= c.swing_before:
-        return OSCILLATORY, c.period if stays else nan, 0.0, 0.0, stays
-    return SLIDING, nan, 0.0, 0.0, c.swing <= RETURN * (r.x_max - r.x_min)
+        lasts = (stays and returns) or long_run != PERIODIC
+        return OSCILLATORY, long_run if lasts else TRANSIENT, period if stays else nan, 0.0, 0.0
+    return SLIDING, still if c.swing <= RETURN * (r.x_max - r.x_min) else TRANSIENT, nan, 0.0, 0.0
+
+
+@inlined
+def _returns_each_time(scene, r):
+    """Whether the motion returns each time, and no trend of its states would change it in ten spans."""
+    c, laps = r.cycles, r.cycles.laps
+    if isnan(c.period) or tangent.largest_multiplier(r.tangent) > _UNSTABLE:
+        return False
+    forced = scene.forcing_period < inf
+    if laps.number < (_LAPS if forced else _LAPS_IF_FREE) and laps.gap > _EXACT:
+        return False
+    # The corners are states at the ends of laps, and so is the reference.
+    fast = c.swing * (2.0 * pi) / _pace(scene)
+    change = _gap(laps.older, c.reference.x, c.reference.velocity, c.swing, fast) / (laps.number - laps.older.number)
+    # Laps of many cycles are few: there as many must come as there are cycles.
+    to_come = change * (10.0 * scene.span * max(c.lap, 1.0) / c.period)
+    if laps.gap < _SHRUNK * laps.first_gap:
+        # Gaps that shrink add up to a geometric series. On a torus they vary, but little in a few laps.
+        ratio = (laps.gap / laps.first_gap) ** (1.0 / (laps.number - 1.0))
+        to_come = min(to_come, laps.gap * ratio / (1.0 - ratio)) if ratio < 1.0 else to_come
+    return to_come <= _TREND
+
+
+@inlined
+def _without_return(scene, r):
+    """What a motion that does not return settles to, as far as two parts of its record and its exponent tell."""
+    c = r.cycles
+    first, second = c.middle.count - c.before.count, c.count - c.middle.count
+    if scene.forcing_period == inf or c.before.count < 1.0 or second < 1.0:
+        return TRANSIENT
+    stiffness = scene.body.stiffness
+    force = largest_force(scene.drive) + breakaway_force(scene, 0.0)
+    scale = force / stiffness + abs(r.last.velocity - r.last.v) * _pace(scene) if stiffness > 0.0 else inf
+    growth = (c.middle.swing - c.before.swing) / first
+    if c.swing > _BEYOND * scale and growth > 0.0:
+        slower = (c.swing - c.middle.swing) / second < (1.0 - _SLOWER) * growth
+        return TRANSIENT if slower else UNBOUNDED
+    exponent, error = tangent.exponent(r.tangent)
+    mean_1, mean_2 = (c.middle.sum - c.before.sum) / first, (c.sum - c.middle.sum) / second
+    scatter = max((c.middle.squares - c.before.squares) / first - mean_1 * mean_1, 0.0)
+    allowed = _ERRORS * sqrt(scatter * (1.0 / first + 1.0 / second)) + _SAME_SWING * mean_1
+    stick_1 = (c.middle.mark.total - c.before.mark.total) / (c.middle.mark.t - c.before.mark.t)
+    stick_2 = (c.last.total - c.middle.mark.total) / (c.last.t - c.middle.mark.t)
+    same_stick = abs(stick_1 - stick_2) <= _SAME_STICK + 1.0 / sqrt(second)
+    if isnan(exponent) or first < _FEWEST or abs(mean_1 - mean_2) > allowed or not same_stick:
+        return TRANSIENT
+    if exponent > _POSITIVE * error:
+        return CHAOTIC
+    if (abs(exponent) + _POSITIVE * error) * scene.forcing_period <= _ZERO:
+        return QUASI_PERIODIC
+    return TRANSIENT
 
 
 @recorder.begin.implements(Belt)
@@ -568,5 +814,16 @@ def _begin(scene, t, seen):
 def _enter(scene, record, t, seen):
     r, shocks = record, shock.enter(record.shocks, t, seen[6])
     return Record(
-        r.band, r.play, r.last, r.x_min, r.x_max, r.velocity_max, r.force_max, r.stops, r.cycles, shocks, r.tangent
+        r.band,
+        r.play,
+        r.last,
+        r.x_min,
+        r.x_max,
+        r.velocity_max,
+        r.force_max,
+        r.stops,
+        r.cycles,
+        shocks,
+        r.tangent,
+        r.section,
     )

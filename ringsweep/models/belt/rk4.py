@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import nan
 from typing import NamedTuple
 
 from ringsweep.models.belt.force import if_force, sliding
@@ -77,7 +78,7 @@ def _inspect(scene, y, forcing):
 @constant_step.seen.implements(belt.Belt, belt.BristleBelt)
 def _seen(scene, y, now):
     # The record takes the rate of the sliding velocity from the differences of short steps.
-    return y[0], y[1], now.force, now.place, now.v, 0.0, Unlocated()
+    return y[0], y[1], now.force, now.place, now.v, 0.0, Unlocated(), nan
 
 
 @constant_step.row.implements(belt.Belt)

@@ -6,6 +6,7 @@ would lose all its digits.
 
 from __future__ import annotations
 
+from math import nan
 from typing import NamedTuple
 
 from ringsweep.compile import hook, inlined
@@ -306,7 +307,7 @@ def _expand_slip(scene, mode, viscous, c):
 @series.seen_at_start.implements(belt.Belt)
 def _seen_at_start(scene, c):
     acceleration = located(scene, c[X, 0], c[ACCELERATION, 0])
-    return c[X, 0], c[VELOCITY, 0], c[FORCE, 0], c[X, 0] - c[SHIFT, 0], c[V, 0], c[V, 1], acceleration
+    return c[X, 0], c[VELOCITY, 0], c[FORCE, 0], c[X, 0] - c[SHIFT, 0], c[V, 0], c[V, 1], acceleration, nan
 
 
 @series.seen_at.implements(belt.Belt)
@@ -317,7 +318,7 @@ def _seen_at(scene, c, s, h):
         velocity = 0.0
     x = value(c[X], s)
     acceleration = located(scene, x, value(c[ACCELERATION], s))
-    return x, velocity, value(c[FORCE], s), x - value(c[SHIFT], s), value(c[V], s), slope(c[V], s), acceleration
+    return x, velocity, value(c[FORCE], s), x - value(c[SHIFT], s), value(c[V], s), slope(c[V], s), acceleration, nan
 
 
 @series.extremes.implements(belt.Belt)

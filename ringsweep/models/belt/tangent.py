@@ -346,6 +346,31 @@ def _blocks(b, span, t, growth, ends):
     )
 
 
+@hook(optional=True)
+def largest_multiplier(tangent):
+    """Largest multiplier of the last lap that returned; 0 if it is not known."""
+    return 0.0
+
+
+@largest_multiplier.implements(Tangent)
+def _largest_multiplier(tangent):
+    return 0.0 if isnan(tangent.multiplier_1) else tangent.multiplier_1
+
+
+@hook(optional=True)
+def exponent(tangent):
+    """Largest exponent up to now and its standard error, 1/s; NaN if it is not known."""
+    return nan, nan
+
+
+@exponent.implements(Tangent)
+def _exponent(tangent):
+    b = tangent.blocks
+    if b.number <= 1.0:
+        return nan, nan
+    return (b.growth - b.first_growth) / (b.t - b.first_t), sqrt(b.squares / (b.number * (b.number - 1.0)))
+
+
 @unrolled
 def _followed(length, outcome, more):
     """A tuple followed by four numbers."""
@@ -360,14 +385,11 @@ def with_exponent(tangent, outcome, scene):
 
 @with_exponent.implements(Tangent)
 def _with_exponent(tangent, outcome, scene):
-    r, b = tangent, tangent.blocks
-    exponent, error, multiplier_1, multiplier_2 = nan, nan, nan, nan
-    if b.number > 1.0:
-        exponent = (b.growth - b.first_growth) / (b.t - b.first_t)
-        error = sqrt(b.squares / (b.number * (b.number - 1.0)))
+    r, multiplier_1, multiplier_2 = tangent, nan, nan
+    rate, error = exponent(tangent)
     if not isnan(outcome.period):
         multiplier_1, multiplier_2 = r.multiplier_1, r.multiplier_2
         if scene.forcing_period == inf and not isnan(r.rate):
             # A shift in time neither grows nor decays, and says nothing.
-            exponent, error = r.rate, r.change
-    return _followed(outcome, (exponent, error, multiplier_1, multiplier_2))
+            rate, error = r.rate, r.change
+    return _followed(outcome, (rate, error, multiplier_1, multiplier_2))

@@ -5,10 +5,10 @@ from __future__ import annotations
 from math import inf
 
 from ringsweep.compile import hook, inlined
-from ringsweep.models.belt import tangent
+from ringsweep.models.belt import section, tangent
 from ringsweep.models.belt.bristles import recoil_speed
 from ringsweep.models.belt.force import if_force, sliding_slopes, stuck_gradient, stuck_rates
-from ringsweep.models.belt.record import Record
+from ringsweep.models.belt.record import changed
 from ringsweep.models.belt.series import SLOW
 from ringsweep.models.interface import implicit, variation
 from ringsweep.physics import drives, ring
@@ -29,7 +29,7 @@ def _asked(scene):
 
 @variation.due.implements(Belt, BristleBelt)
 def _due(scene, record):
-    return _due_if_asked(scene.asked, record)
+    return min(_due_if_asked(scene.asked, record), section.due(scene.section, record))
 
 
 @hook(optional=True)
@@ -43,11 +43,9 @@ def _end_of_cycle(asked, record):
 
 
 @inlined
-def _with(r, changed):
+def _with(r, new):
     """Record with another tangent."""
-    return Record(
-        r.band, r.play, r.last, r.x_min, r.x_max, r.velocity_max, r.force_max, r.stops, r.cycles, r.shocks, changed
-    )
+    return changed(r, new, r.section)
 
 
 @variation.enter.implements(Belt)

@@ -31,52 +31,6 @@ class Coupled(NamedTuple):
     rows: Any
 
 
-class Whole(NamedTuple):
-    """Scenes all of whose modes take implicit steps of one kind."""
-
-
-class Parted(NamedTuple):
-    """Scenes some of whose modes are those of a simpler scene, whose implicit steps have fewer components."""
-
-
-@hook(optional=True)
-def kind(scene):
-    """Kind of a scene: :class:`Whole` or :class:`Parted`; by default the first."""
-    return Whole()
-
-
-@hook
-def has_part(scene, mode):
-    """Whether a mode is one of the simpler scene; only for :class:`Parted`."""
-
-
-@hook
-def part(scene, record, mode, y):
-    """Simpler scene, and record, mode and state there; only for :class:`Parted`."""
-
-
-@hook
-def rejoined(scene, record, mode, guard, part_record, y):
-    """Guard, record and state after an implicit step of the simpler scene; only for :class:`Parted`.
-
-    Parameters
-    ----------
-    scene, record, mode : NamedTuple
-        The scene, its record before the step, and its mode.
-    guard : int
-        Index of the guard that ended the step, or -1.
-    part_record : NamedTuple
-        Record of the simpler scene after the step.
-    y : tuple of float
-        State of the simpler scene after the step.
-
-    Returns
-    -------
-    tuple
-        ``(guard, record, state)``
-    """
-
-
 @hook(optional=True)
 def may_creep(scene, mode):
     """Whether a mode may need implicit steps; if so, :func:`is_stiff` decides at each step.

@@ -103,6 +103,44 @@ def conclude(scene, record, status, t, place, velocity):
 
 
 @hook(optional=True)
+def lend(scene, record, row):
+    """Record of a run that may store what it records in its row of outcomes. Methods of constant step do not call it.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    record : NamedTuple
+        Record at the beginning of the run.
+    row : ndarray
+        Row of the run. Its first columns are filled after the run.
+
+    Returns
+    -------
+    NamedTuple
+        By default `record`.
+    """
+    return record
+
+
+@hook(optional=True)
+def keep_memory(scene, row, column, y):
+    """Store what the state at the end of a run has beside place and velocity, after the outcomes of the run.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+        One cell.
+    row : ndarray
+        Row of the run.
+    column : int
+        Number of the outcomes, which are the first columns.
+    y : tuple of float
+        State at the end.
+    """
+
+
+@hook(optional=True)
 def after_event(scene, record, mode, t):
     """Record after an event, at which a mode begins. Methods of constant step do not call it.
 

@@ -12,22 +12,18 @@ from typing import Any, NamedTuple
 from ringsweep.compile import inlined
 from ringsweep.models.interface import implicit
 from ringsweep.models.interface.shock import Located
-from ringsweep.models.ring.creep import NORMAL_1, NORMAL_2
 from ringsweep.models.ring.impact import pivot
 from ringsweep.models.ring.impact.mode import (
     FIRST,
     NONE,
     TURNED,
-    angle_when_closed,
     closed_mode,
-    code_of,
     coefficients_there,
     delta_when_closed,
     holding,
     place_of,
     ring_of,
 )
-from ringsweep.models.ring.impact.record import renamed, with_base
 from ringsweep.models.ring.impact.rows import row_of
 from ringsweep.physics import drives, ring
 from ringsweep.physics.friction.velocity import friction_in, region_bounds, stiction_band
@@ -80,32 +76,6 @@ class Common(NamedTuple):
 @inlined
 def _closed_state(mode, x):
     return (x[0] - pi if mode.turned == 1 else x[0]), x[1]
-
-
-@implicit.kind.implements(ImpactRing)
-def _kind(scene):
-    return implicit.Parted()
-
-
-@implicit.has_part.implements(ImpactRing)
-def _has_part(scene, mode):
-    return mode.open == NONE
-
-
-@implicit.part.implements(ImpactRing)
-def _part(scene, record, mode, y):
-    base = renamed(record.base, -pi) if mode.turned == 1 else record.base
-    return ring_of(scene, mode.turned), base, closed_mode(mode), (angle_when_closed(y[0], mode.turned), y[1])
-
-
-@implicit.rejoined.implements(ImpactRing)
-def _rejoined(scene, record, mode, guard, part_record, y):
-    psi, base = y[0], part_record
-    if mode.turned == 1:
-        psi, base = y[0] + pi, renamed(part_record, pi)
-        guard = NORMAL_2 if guard == NORMAL_1 else NORMAL_1 if guard == NORMAL_2 else guard
-    state = psi, y[1], 0.0, 0.0, 0.0, 0.0, code_of(mode)
-    return guard, with_base(record, base), state
 
 
 @implicit.to_implicit.implements(ImpactRing)

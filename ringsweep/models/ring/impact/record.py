@@ -84,10 +84,16 @@ OUTCOMES = (
 )
 
 
+@inlined
+def begin(base):
+    """Record at the beginning of a run, from the record of the motion."""
+    nothing = Lost(0.0, 0.0, nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, nan)
+    return Record(base, 0.0, 0.0, 0.0, nothing)
+
+
 @recorder.begin.implements(ImpactRing)
 def _begin(scene, t, seen):
-    nothing = Lost(0.0, 0.0, nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, nan)
-    return Record(recorder.begin(scene.closed, t, seen[:5]), 0.0, 0.0, 0.0, nothing)
+    return begin(recorder.begin(scene.closed, t, seen[:5]))
 
 
 @recorder.observe.implements(ImpactRing)

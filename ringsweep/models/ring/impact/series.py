@@ -1,6 +1,7 @@
-"""Power series of a body that may leave the race: those of the closed ring, of a pivot, and of a flight.
+"""Power series of a body that has left the race: those of a pivot, and of a flight.
 
-The table has the rows of the closed ring behind rows of its own. In a pivot and in a flight the rows of the angle, of
+The table has the rows of the closed ring behind rows of its own; while both contacts hold, the closed ring fills these.
+In a pivot and in a flight the rows of the angle, of
 the angular velocity and acceleration, of the sliding velocity and of the guards keep their meaning; the guard of a
 contact is its normal reaction while it holds, and its gap while it is open. A gap that has just opened begins with
 coefficients that are zero; its guard is the series divided by that power of the time.
@@ -31,15 +32,12 @@ from ringsweep.models.ring.impact.mode import (
     Mode,
     X,
     Y,
-    angle_when_closed,
-    closed_mode,
     code_of,
     coefficients_there,
     delta_when_closed,
     holding,
     make,
     place_of,
-    ring_of,
 )
 from ringsweep.models.ring.series import (
     COS,
@@ -90,8 +88,6 @@ def _table_shape(scene):
 @series.expand.implements(ImpactRing)
 def _expand(scene, mode, t, y, tolerance, c):
     c[KIND, 0] = code_of(mode)
-    if mode.open == NONE:
-        return _expand_closed(scene, mode, t, y, tolerance, c)
     drives.expand(scene.drive, t, ORDER + 2, c[RING + THETA], c[RING + FACTORS :])
     if mode.open == BOTH:
         return _expand_flight(scene, mode, y, tolerance, c)
@@ -106,18 +102,6 @@ def _fill_constant(row, number):
     row[0] = number
     for k in range(1, ORDER + 1):
         row[k] = 0.0
-
-
-@inlined
-def _expand_closed(scene, mode, t, y, tolerance, c):
-    phi = angle_when_closed(y[0], mode.turned)
-    h = series.expand(ring_of(scene, mode.turned), closed_mode(mode), t, (phi, y[1]), tolerance, c[RING:])
-    c[RING + PHI, 0] = y[0]
-    if mode.turned == 1:
-        # Rows bear the names of the contacts, not their order.
-        for k in range(ORDER + 1):
-            c[RING + NORMAL_1, k], c[RING + NORMAL_2, k] = c[RING + NORMAL_2, k], c[RING + NORMAL_1, k]
-    return h
 
 
 # ---- pivot ------------------------------------------------------------------------------------
@@ -515,10 +499,7 @@ def _seen_at(scene, c, s, h):
 
 @series.extremes.implements(ImpactRing)
 def _extremes(scene, record, mode, c, h, work):
-    base = record.base
-    if mode.open == NONE:
-        return series.extremes(ring_of(scene, mode.turned), base, closed_mode(mode), c[RING:], h, work)
-    count = 0
+    base, count = record.base, 0
     for row, is_open in (
         (GAP_1, mode.open % 2 == 1),
         (GAP_2, mode.open >= 2 and ring.contact_count(scene.closed.body) == 2),

@@ -1,0 +1,200 @@
+"""The keys ``sweep.follow`` and ``initial.from``: runs that start from the state in which another run ended."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import netCDF4
+import numpy as np
+from numpy.typing import NDArray
+
+from ringsweep.config.axes import Axes
+from ringsweep.config.sections import suggestion
+from ringsweep.config.yaml_text import Document
+from ringsweep.errors import InputError
+from ringsweep.models import MODELS, model_of
+from ringsweep.models.scene import LAW, Scene, Structure
+from ringsweep.physics.friction import TRAITS
+from ringsweep.quantities.units import show
+
+#: Dimension of a sweep that follows its axis in both directions, and its values.
+DIRECTION, BOTH = "direction", ("up", "down")
+
+#: Values of ``sweep.follow.direction``, and what they mean.
+DIRECTIONS = {
+    "up": "from the least value to the greatest",
+    "down": "from the greatest value to the least",
+    "both": "up and down, along the dimension direction",
+}
+
+# Drives that are the same at all times, or whose phase a scene can have.
+_WITH_PHASE = "none", "constant", "sinusoidal"
+
+
+@dataclass(frozen=True)
+class Follow:
+    """Axis along which each cell starts from the state in which the one before ended.
+
+    Attributes
+    ----------
+    path : str
+        Path of the axis.
+    direction : str
+        A key of :data:`DIRECTIONS`.
+    """
+
+    path: str
+    direction: str = "up"
+
+    def chains(self, axes: Axes) -> tuple[str, NDArray[np.intp]]:
+        """Dimension that is followed, and indices along it in their order, shape ``(directions, cells of a chain)``."""
+        (dim,), values = axes.columns[self.path]
+        up = np.argsort(values, kind="stable")
+        return dim, np.stack([up if way == "up" else up[::-1] for way in self.ways])
+
+    @property
+    def ways(self) -> tuple[str, ...]:
+        """Directions in which the axis is followed."""
+        return BOTH if self.direction == "both" else (self.direction,)
+
+
+def read_follow(given: Any, scene: Scene, axes: Axes) -> Follow | None:
+    """Read and validate the value under ``sweep.follow``.
+
+    Raises
+    ------
+    InputError
+        If it names no axis of the sweep, has an unknown key or a wrong value, or if runs of the scene cannot go on.
+    """
+    if given is None:
+        return None
+    section = given if isinstance(given, dict) else {"axis": given}
+    for key in section:
+        if key not in ("axis", "direction"):
+            raise InputError(f"sweep.follow.{key}", "unknown key" + suggestion(key, ("axis", "direction")))
+    where = "sweep.follow.axis" if isinstance(given, dict) else "sweep.follow"
+    if "axis" not in section:
+        raise InputError(where, "missing: name a path that the sweep varies (for example `axis: force.frequency`)")
+    path, direction = section["axis"], section.get("direction", "up")
+    numeric = [name for name in axes.columns if name != LAW]
+    if not isinstance(path, str) or path not in numeric:
+        raise InputError(where, f"the sweep varies no number {show(path)}" + suggestion(path, numeric))
+    if direction not in DIRECTIONS:
+        problem = f"{show(direction)} is no direction" + suggestion(direction, DIRECTIONS)
+        raise InputError("sweep.follow.direction", problem)
+    dims, _ = axes.columns[path]
+    if len(dims) > 1:
+        raise InputError(where, f"{path} varies along {' and '.join(dims)}: follow a path with one dimension")
+    replaced = [f"initial.{name}" for name in ("x", "velocity", "deflection")] + ["force.phase", "drive.phase"]
+    for other, (along, _) in axes.columns.items():
+        if dims[0] in along and other in (LAW, *replaced):
+            what = "a chain has one law" if other == LAW else "the cell before gives it"
+            raise InputError(where, f"{other} varies along {dims[0]} too, but {what}")
+    if DIRECTION in axes.sizes:
+        raise InputError(where, f"the dimension {DIRECTION} of the sweep has the name of that of a followed one")
+    for structure in scene.structures.values():
+        _check_continues(structure, where)
+    return Follow(path, direction)
+
+
+def with_direction(axes: Axes, follow: Follow | None) -> Axes:
+    """Axes, with the dimension of the direction if there are two."""
+    if follow is None or len(follow.ways) == 1:
+        return axes
+    return Axes({**axes.sizes, DIRECTION: len(follow.ways)}, axes.columns)
+
+
+def _check_continues(structure: Structure, where: str) -> None:
+    """Raise an error, located at `where`, unless runs of a scene can start from the end of another one."""
+    if not model_of(structure).continues:
+        able = ", ".join(name for name, model in MODELS.items() if model.continues)
+        raise InputError(where, f"a run of model {structure.model} cannot go on from another one: model {able} can")
+    if TRAITS[structure.law_type].snaps:
+        problem = f"the state of friction law {structure.law} is more than a deflection: choose another law"
+        raise InputError(where, problem)
+    if structure.own_drive is not None or structure.drive not in _WITH_PHASE:
+        raise InputError(where, f"drive law {structure.drive} has no phase to go on from: sinusoidal has one")
+    if structure.own_force is not None or structure.force is not None:
+        what = "a table" if structure.own_force is None else "a formula"
+        raise InputError(where, f"a force by {what} has no phase to go on from: one with a frequency has")
+
+
+def run_to_continue(doc: Document) -> str | None:
+    """Path of the result file that ``initial.from`` names, which is taken out of the tree.
+
+    Raises
+    ------
+    InputError
+        If it is no file name, or values stand beside it that the file gives.
+    """
+    scene = doc.tree.get("scene")
+    initial = scene.get("initial") if isinstance(scene, dict) else None
+    if not isinstance(initial, dict) or "from" not in initial:
+        return None
+    name = initial.pop("from")
+    if not isinstance(name, str):
+        raise InputError("scene.initial.from", f"the name of a result file is expected, got {show(name)}")
+    for key in initial:
+        raise InputError(f"scene.initial.{key}", "cannot stand beside initial.from, which gives it: leave one out")
+    return str(doc.folder / name)
+
+
+def put_state(doc: Document, scene: Scene, file: str, before: Scene, axes: Axes, swept: Any) -> None:
+    """Put the state at the end of the run in a file into the tree, as initial values.
+
+    Parameters
+    ----------
+    doc : Document
+    scene : Scene
+        Its scene without these values.
+    file : str
+        Path of the file.
+    before, axes : Scene and Axes
+        Those of the file.
+    swept : collection of str
+        Paths that the sweep varies.
+
+    Raises
+    ------
+    InputError
+        If the file does not hold one run of the same model that reached its end, or gives a value that is swept.
+    """
+    where = "scene.initial.from"
+    if before.structure.model != scene.structure.model:
+        raise InputError(where, f"{file} holds a run of model {before.structure.model}")
+    for structure in (*scene.structures.values(), *before.structures.values()):
+        _check_continues(structure, where)
+    ended = {path: np.full(1, value) for path, value in before.values.items()} | _end_of(file)
+    ended |= {path: column.ravel()[:1] for path, (_, column) in axes.columns.items() if path != LAW}
+    values = {path: np.full(1, scene.values.get(path, np.nan)) for path in {**scene.values, **dict.fromkeys(swept)}}
+    found = model_of(scene.structure).continued(scene.structure, values, ended)
+    # What is too long for the bristles of this scene is an error in its place.
+    found |= {path: ended["deflection_end"] for path in found if path == "initial.deflection"}
+    for path, (value,) in found.items():
+        section, _, name = path.partition(".")
+        given = doc.tree["scene"].get(section, {})
+        if path in swept or name in given:
+            raise InputError(f"scene.{path}", "cannot stand beside initial.from, which gives it: leave one out")
+        doc.tree["scene"].setdefault(section, {})[name] = float(value)
+
+
+def _end_of(file: str) -> dict[str, NDArray[np.float64]]:
+    """Numbers at the end of the run that a file holds."""
+    where = "scene.initial.from"
+    with netCDF4.Dataset(file) as content:
+        found = {}
+        for name, last in (("t_end", "time"), ("x_end", "x"), ("velocity_end", "velocity"),
+                           ("deflection_end", "deflection")):  # fmt: skip
+            variable = content.variables.get(last if "time" in content.dimensions else name)
+            if variable is not None:
+                numbers = np.ma.filled(variable[:], np.nan).astype(float).ravel()
+                if "time" not in content.dimensions and len(numbers) != 1:
+                    raise InputError(where, f"{file} holds {len(numbers)} runs: name a file of one run")
+                found[name] = numbers[-1:]
+    found.setdefault("deflection_end", np.zeros(1))
+    if not {"t_end", "x_end", "velocity_end"} <= found.keys():
+        raise InputError(where, f"{file} holds no run on the belt")
+    if not all(np.isfinite(number).all() for number in found.values()):
+        raise InputError(where, f"the run in {file} failed: it has no state at its end")
+    return found

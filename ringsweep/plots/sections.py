@@ -1,0 +1,343 @@
+"""Pictures of sections: bifurcation diagrams, the points of one motion, multipliers and exponents along an axis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+from matplotlib import rcParams
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+from matplotlib.transforms import blended_transform_factory
+
+from ringsweep.errors import InputError
+from ringsweep.plots.datasets import resolve, scene_text
+from ringsweep.plots.labels import unit_text
+from ringsweep.plots.map_axes import Axis
+from ringsweep.plots.selection import select
+from ringsweep.plots.style import (
+    NO_VALUE,
+    PAIR_COLOURS,
+    REGIME_COLOURS,
+    SMALL,
+    STICK,
+    axes_or_current,
+    figure_width,
+    folded,
+    label_axes,
+    legend_above,
+    on_page,
+    small_ticks,
+    true_ranges,
+)
+from ringsweep.quantities.variables import words
+
+#: Variables of the points of a section.
+POINTS = "x_section", "velocity_section", "deflection_section"
+
+# Their full names would take half of a narrow picture.
+_SHORT = {"x_section": "x", "velocity_section": "velocity", "deflection_section": "deflection"}
+
+# Points of the diagram, in points of a page squared, and the height of the strip of regimes as a share of the axes.
+_DOT, _STRIP = 1.0, 0.025
+
+# Heights of diagram, exponent and multipliers, as multiples of the width.
+_HEIGHTS = {"diagram": 0.5, "lyapunov": 0.25, "multiplier_1": 0.25}
+
+_DIRECTION = "direction"
+
+
+def has_diagram(ds: xr.Dataset) -> bool:
+    """Whether a dataset holds sections along one axis."""
+    return "x_section" in ds and len(_axes_of(ds)) == 1
+
+
+def _axes_of(ds: xr.Dataset) -> list[str]:
+    return [str(dim) for dim in ds["x_section"].dims if dim not in ("section", _DIRECTION)]
+
+
+def bifurcation(
+    ds: xr.Dataset, x: str | None = None, var: str = "x_section", sel: Mapping[str, float | str] | None = None
+) -> Figure:
+    """Draw a bifurcation diagram as a new figure, with exponent and multipliers below if the dataset has them.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        Result of a sweep with a section along one axis, maybe followed up and down.
+    x : str, optional
+        Coordinate of the axis; by default the first that was swept along it.
+    var : str
+        Variable of the section.
+    sel : mapping of str to float or str, optional
+        Other coordinates held at the value nearest to the one given.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        If there is no section, or it has further axes.
+    """
+    ds, held = select(ds, sel or {})
+    _require_diagram(ds)
+    below = [name for name in ("lyapunov", "multiplier_1") if name in ds and bool(np.isfinite(ds[name]).any())]
+    heights = [_HEIGHTS[name] for name in ("diagram", *below)]
+    width = figure_width()
+    figure = Figure(figsize=(width, sum(heights) * width + 0.6), layout="constrained")
+    panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
+    bifurcation_panel(ds, x, var, panels[0])
+    for name, ax in zip(below, panels[1:], strict=True):
+        (exponent_panel if name == "lyapunov" else multiplier_panel)(ds, x, ax)
+        # The upper panel has the key to the directions.
+        if (legend := ax.get_legend()) is not None:
+            legend.remove()
+    for ax in panels[:-1]:
+        ax.set_xlabel("")
+        ax.tick_params(labelbottom=False, which="both")
+    if text := folded([*scene_text(ds), *held], width):
+        figure.suptitle(text, fontsize=SMALL)
+    return figure
+
+
+def bifurcation_panel(ds: xr.Dataset, x: str | None = None, var: str = "x_section", ax: Axes | None = None) -> Axes:
+    """Draw the points of the sections over the axis, in a colour for each direction, under a strip of the regimes.
+
+    Parameters
+    ----------
+    ds, x, var
+        As for :func:`bifurcation`.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw in, by default pyplot's current ones.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InputError
+        As for :func:`bifurcation`.
+
+    Examples
+    --------
+    >>> import numpy as np, xarray as xr
+    >>> points = np.array([[[0.0, 0.0], [0.0, 0.1]], [[-1.0, 1.0], [-1.0, 1.0]]])
+    >>> ds = xr.Dataset(
+    ...     {"x_section": (("speed", "direction", "section"), points, {"units": "m", "long_name": "x"})},
+    ...     coords={"speed": [1.0, 2.0], "direction": ["up", "down"]},
+    ... )
+    >>> [text.get_text() for text in bifurcation_panel(ds).get_legend().get_texts()]
+    ['up', 'down']
+    """
+    axis = _axis(ds, x)
+    name = resolve("var", var, [one for one in POINTS if one in ds])
+    ax = axes_or_current(ax, _HEIGHTS["diagram"])
+    handles: list[Artist] = []
+    branches = list(_branches(ds))
+    # Where both branches are the same, the second one must not hide the first: it has smaller points.
+    for k, (way, branch) in enumerate(branches):
+        points = branch[name].transpose(*axis.dims, "section").values[axis.order]
+        colour = on_page(PAIR_COLOURS[k])
+        place = np.repeat(axis.values, points.shape[1])
+        size = _DOT * (2.5 if k == 0 and len(branches) > 1 else 1.0)
+        ax.scatter(place, points.ravel(), s=size, color=colour, linewidths=0, rasterized=True, zorder=2 + k)
+        if way:
+            handles.append(Line2D([], [], linestyle="", marker="o", markersize=4, color=colour, label=way))
+    if "regime" in ds:
+        handles += _strips(ax, axis, ds)
+    _finish(ax, axis, _label(ds, name))
+    legend_above(ax, handles)
+    return ax
+
+
+def _strips(ax: Axes, axis: Axis, ds: xr.Dataset) -> list[Artist]:
+    """Draw the regimes as a strip at the upper edge for each direction, the first at the top; entries of a legend."""
+    found: dict[str, Artist] = {}
+    across = blended_transform_factory(ax.transData, ax.transAxes)
+    edges = axis.edges
+    branches = list(_branches(ds))
+    for k, (_, branch) in enumerate(branches):
+        regime = np.asarray(words(branch["regime"]).transpose(*axis.dims).values).astype(str)[axis.order]
+        for word in dict.fromkeys(regime.tolist()):
+            colour = on_page(REGIME_COLOURS.get(word, NO_VALUE))
+            spans = [(edges[a], edges[b] - edges[a]) for a, b in true_ranges(regime == word)]
+            strip = (1.0 - (k + 1) * _STRIP, _STRIP)
+            ax.broken_barh(spans, strip, transform=across, facecolors=colour, linewidth=0, zorder=5)
+            found.setdefault(word, Patch(color=colour, label=word))
+    low, high = ax.get_ylim()
+    ax.set_ylim(low, high + 1.3 * len(branches) * _STRIP * (high - low))
+    return list(found.values())
+
+
+def section_panel(ds: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw the points of one motion in the plane of displacement and velocity, coloured by their order in time.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        One cell of a sweep with a section.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw in, by default pyplot's current ones.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InputError
+        If there is no section, or the dataset has several cells.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> attributes = {"units": "m", "long_name": "x"}, {"units": "m/s", "long_name": "velocity"}
+    >>> x, v = (("section", [0.0, 1.0, 0.5], one) for one in attributes)
+    >>> section_panel(xr.Dataset({"x_section": x, "velocity_section": v})).get_xlabel()
+    'x (m)'
+    """
+    _require_section(ds)
+    ds = ds.squeeze()
+    if ds["x_section"].dims != ("section",):
+        several = ", ".join(str(dim) for dim in ds["x_section"].dims if dim != "section")
+        raise InputError("ds", f"has sections along {several}, and this picture shows one: choose a cell by ds.sel")
+    ax = axes_or_current(ax, 0.75)
+    x, velocity = ds["x_section"].values, ds["velocity_section"].values
+    kept = np.isfinite(x) & np.isfinite(velocity)
+    order = np.arange(1, kept.sum() + 1)
+    drawn = ax.scatter(x[kept], velocity[kept], c=order, s=8.0, cmap="viridis", linewidths=0, rasterized=True)
+    label_axes(ax, _label(ds, "x_section"), _label(ds, "velocity_section"))
+    if len(order) > 1:
+        bar = ax.figure.colorbar(drawn, ax=ax, label="point, in time", ticks=MaxNLocator(6, integer=True))
+        bar.ax.tick_params(labelsize=SMALL)
+    small_ticks(ax)
+    return ax
+
+
+def exponent_panel(ds: xr.Dataset, x: str | None = None, ax: Axes | None = None) -> Axes:
+    """Draw the largest Lyapunov exponent over the axis, with its standard error.
+
+    Where it is -inf, since stick erases the past, a mark stands at the lower edge.
+
+    Parameters
+    ----------
+    ds, x
+        As for :func:`bifurcation`; the dataset has ``lyapunov``.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw in, by default pyplot's current ones.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InputError
+        If the dataset has no exponents along one axis.
+    """
+    axis = _axis(ds, x, "lyapunov")
+    ax = axes_or_current(ax, _HEIGHTS["lyapunov"])
+    ax.axhline(0.0, color=rcParams["axes.edgecolor"], linewidth=0.8, zorder=1)
+    for k, (way, branch) in enumerate(_branches(ds)):
+        value = branch["lyapunov"].transpose(*axis.dims).values[axis.order]
+        colour = on_page(PAIR_COLOURS[k])
+        finite = np.where(np.isfinite(value), value, np.nan)
+        ax.plot(axis.values, finite, ".-", color=colour, markersize=2, linewidth=0.8, label=way or None)
+        if "lyapunov_error" in branch:
+            error = branch["lyapunov_error"].transpose(*axis.dims).values[axis.order]
+            band = finite - error, finite + error
+            ax.fill_between(axis.values, *band, color=colour, alpha=0.3, linewidth=0)
+        erased = axis.values[np.isneginf(value)]
+        edge = blended_transform_factory(ax.transData, ax.transAxes)
+        ax.plot(erased, np.full(len(erased), 0.03), "v", transform=edge, color=colour, markersize=2)
+    _finish(ax, axis, "exponent (s$^{-1}$)")
+    legend_above(ax)
+    return ax
+
+
+def multiplier_panel(ds: xr.Dataset, x: str | None = None, ax: Axes | None = None) -> Axes:
+    """Draw the magnitudes of the Floquet multipliers over the axis; the inside of the unit circle is shaded.
+
+    Parameters
+    ----------
+    ds, x
+        As for :func:`bifurcation`; the dataset has ``multiplier_1``.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw in, by default pyplot's current ones.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InputError
+        If the dataset has no multipliers along one axis.
+    """
+    axis = _axis(ds, x, "multiplier_1")
+    ax = axes_or_current(ax, _HEIGHTS["multiplier_1"])
+    ax.axhspan(0.0, 1.0, color=on_page(STICK), linewidth=0, zorder=0)
+    for k, (way, branch) in enumerate(_branches(ds)):
+        for name, dots in (("multiplier_1", "."), ("multiplier_2", "x")):
+            if name in branch:
+                value = branch[name].transpose(*axis.dims).values[axis.order]
+                label = f"{way} {name[-1]}".strip()
+                ax.plot(axis.values, value, dots, color=on_page(PAIR_COLOURS[k]), markersize=2.5, label=label)
+    ax.set_ylim(0.0, max(1.1, ax.get_ylim()[1]))
+    _finish(ax, axis, "multipliers")
+    legend_above(ax)
+    return ax
+
+
+def _label(ds: xr.Dataset, name: str) -> str:
+    return f"{_SHORT[name]} ({unit_text(ds[name])})"
+
+
+def _branches(ds: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
+    """Name and dataset of each direction; without directions one with no name."""
+    if _DIRECTION not in ds.dims:
+        return [("", ds)]
+    return [(str(ds[_DIRECTION].values[k]), ds.isel({_DIRECTION: k})) for k in range(ds.sizes[_DIRECTION])]
+
+
+def _require_section(ds: xr.Dataset) -> None:
+    if "x_section" not in ds:
+        raise InputError("ds", "has no section: give record: {section: {at: period}} in the configuration")
+
+
+def _require_diagram(ds: xr.Dataset) -> None:
+    _require_section(ds)
+    if not has_diagram(ds):
+        along = ", ".join(_axes_of(ds)) or "no axis"
+        raise InputError("ds", f"has sections along {along}, and a diagram has one axis: hold the others by sel")
+
+
+def _axis(ds: xr.Dataset, x: str | None, needed: str | None = None) -> Axis:
+    """The axis of a diagram."""
+    if needed is None:
+        _require_diagram(ds)
+        (dim,) = _axes_of(ds)
+    else:
+        dims = [str(dim) for dim in ds[needed].dims if dim != _DIRECTION] if needed in ds else []
+        if len(dims) != 1:
+            raise InputError("ds", f"has no {needed} along one axis: record: {{exponent: true}} gives it")
+        (dim,) = dims
+    along = [str(name) for name, coordinate in ds.coords.items() if coordinate.dims == (dim,)]
+    name = resolve("x", x, along) if x else next(iter([*along, dim]))
+    return Axis.of(ds[name], ds)
+
+
+def _finish(ax: Axes, axis: Axis, label: str) -> None:
+    axis.apply(ax.set_xscale, ax.xaxis)
+    edges = axis.edges
+    ax.set_xlim(edges[0], edges[-1])
+    label_axes(ax, axis.label, label)
+    small_ticks(ax)

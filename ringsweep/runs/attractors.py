@@ -1,0 +1,219 @@
+"""Attractors: which cells of a sweep end on the same motion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ringsweep.errors import InputError
+from ringsweep.quantities.variables import words
+
+Floats = NDArray[np.float64]
+
+#: Variables of a point, with those of the end of a run, which stand for a motion that is a point.
+POINTS = {"x_section": "x_end", "velocity_section": "velocity_end", "deflection_section": "deflection_end"}
+
+#: Long runs and regimes whose motion is a point: then the section is not looked at.
+_STILL = ("rest", "steady")
+_STEADY = ("sliding",)
+
+#: Long runs and regimes that end on no motion.
+_NONE = ("transient", "unbounded")
+_ENDED = ("failed", "separating")
+
+#: Name of cells that end on no motion.
+NONE = "none"
+
+# Clouds of points are one if the points of each lie as near to the other as to their own neighbours, within a factor.
+_AS_NEAR = 3.0
+
+
+class _Motion(NamedTuple):
+    """The points of a motion, shape ``(points, variables)``, in scaled units, and whether they return in this order."""
+
+    points: Floats
+    periodic: bool
+
+
+def attractors(ds: xr.Dataset, tolerance: float = 1e-3) -> xr.Dataset:
+    """Label the cells of a sweep that end on the same motion, and tell the share of each motion.
+
+    Motions are compared by their last points (``record.section``). Points that return in the same order are a periodic
+    motion. Two of these are the same if one is the other from a later point on. Other motions are clouds of points,
+    which are the same if each lies as near to the other as its points lie to each other. Steady slip and rest are
+    single points. Cells that have not settled, or whose run ended early, have no motion.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        Result of a sweep over initial states with a section. Cells of different parameters are compared too: choose
+        one value of other axes before.
+    tolerance : float
+        Largest distance between two points that are the same, as a share of the range of all points in each variable,
+        and for velocities at least of the greatest one.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``attractor`` of each cell: a classification, 0 for no motion, the others in the order of their shares. Their
+        names are the regime and a number. Along ``label``: ``share`` of the cells and ``share_error``, its standard
+        error. For points that is the binomial one of independent draws. For a grid each cell at a boundary counts half
+        a cell more or less, all independent of each other: a boundary along the grid errs by more.
+
+    Raises
+    ------
+    InputError
+        If the dataset has no section, or the tolerance is not positive.
+
+    Examples
+    --------
+    Three runs: two end on one motion of two points, the third at rest:
+
+    >>> import numpy as np, ringsweep, xarray as xr
+    >>> x = np.array([[0.0, 1.0] * 4, [1.0, 0.0] * 4, [0.5] * 8])
+    >>> dims = "initial_x", "section"
+    >>> section = xr.Dataset({"x_section": (dims, x), "velocity_section": (dims, 0.0 * x)})
+    >>> found = ringsweep.attractors(section)
+    >>> found.attractor.values, found.share.values.round(2)
+    (array([1, 1, 2], dtype=int16), array([0.  , 0.67, 0.33]))
+    """
+    if "x_section" not in ds or "velocity_section" not in ds:
+        raise InputError("ds", "has no section: give record: {section: {at: period}} in the configuration")
+    if not tolerance > 0.0:
+        raise InputError("tolerance", f"{tolerance!r} is not greater than 0")
+    dims = tuple(str(dim) for dim in ds["x_section"].dims if dim != "section")
+    shape = tuple(ds.sizes[dim] for dim in dims)
+    named = {name: _by_cell(ds, name, dims) for name in ("regime", "long_run") if name in ds}
+    motions = list(_motions(ds, dims, named, tolerance))
+    labels = np.zeros(len(motions), dtype=np.int64)
+    known: list[_Motion] = []
+    for cell, motion in enumerate(motions):
+        if motion is not None:
+            number = next((k for k, other in enumerate(known) if _same(motion, other, tolerance)), len(known))
+            if number == len(known):
+                known.append(motion)
+            labels[cell] = number + 1
+    # The most frequent first; of equal ones the one that was met first.
+    counts = np.bincount(labels, minlength=len(known) + 1)
+    order = np.argsort(-counts[1:], kind="stable") + 1
+    rank = np.zeros(len(counts), dtype=np.int64)
+    rank[order] = np.arange(1, len(counts))
+    labels = rank[labels]
+    names = [NONE, *_names(labels, named.get("regime"), len(known))]
+    share = np.bincount(labels, minlength=len(names)) / max(len(labels), 1)
+    errors = _errors(labels.reshape(shape), share, dims == ("point",) or len(dims) == 0)
+    attributes = {"long_name": "motion on which the cell ends", "units": "1", "flag_meanings": " ".join(names)}
+    flags = {"flag_values": np.arange(len(names), dtype=np.int16)}
+    return xr.Dataset(
+        {
+            "attractor": (dims, labels.astype(np.int16).reshape(shape), attributes | flags),
+            "share": ("label", share, {"long_name": "share of the cells", "units": "1"}),
+            "share_error": ("label", errors, {"long_name": "standard error of the share", "units": "1"}),
+        },
+        coords={
+            **{name: coordinate for name, coordinate in ds.coords.items() if set(coordinate.dims) <= set(dims)},
+            "label": ("label", names, {"long_name": "motion"}),
+        },
+        attrs=ds.attrs,
+    )
+
+
+def _by_cell(ds: xr.Dataset, name: str, dims: tuple[str, ...]) -> NDArray[np.str_]:
+    return np.asarray(words(ds[name]).transpose(*dims).values).astype(str).ravel()
+
+
+def _motions(
+    ds: xr.Dataset, dims: tuple[str, ...], named: dict[str, NDArray[np.str_]], tolerance: float
+) -> Iterator[_Motion | None]:
+    """The motion of each cell; None if it ends on none."""
+    variables = [name for name in POINTS if name in ds and bool(ds[name].notnull().any())]
+    points = np.stack([ds[name].transpose(*dims, "section").values for name in variables], axis=-1)
+    points = points.reshape(-1, *points.shape[-2:])
+    ends = np.full((len(points), len(variables)), np.nan)
+    for k, name in enumerate(variables):
+        if POINTS[name] in ds:
+            ends[:, k] = ds[POINTS[name]].transpose(*dims).values.ravel()
+    regime = named.get("regime", np.full(len(points), ""))
+    long_run = named.get("long_run", np.full(len(points), ""))
+    lost = np.isin(regime, _ENDED) | np.isin(long_run, _NONE)
+    if "long_run" not in named and "settled" in ds:
+        lost |= ds["settled"].transpose(*dims).values.ravel() != 1
+    still = np.isin(long_run, _STILL) | (np.isin(regime, _STEADY) & (long_run != "periodic"))
+    seen = np.concatenate([points[~lost & ~still].reshape(-1, len(variables)), ends[~lost & still]])
+    seen = seen[np.isfinite(seen[:, :2]).all(axis=1)]
+    scale = np.ptp(seen, axis=0) if len(seen) else np.ones(len(variables))
+    # At turns all velocities are zero: their range would be that of rounding.
+    if "velocity_max" in ds and (fastest := np.abs(ds["velocity_max"].values[np.isfinite(ds["velocity_max"])])).size:
+        scale[1] = max(scale[1], fastest.max())
+    scale[~(scale > 0.0)] = 1.0
+    for cell in range(len(points)):
+        kept = points[cell][np.isfinite(points[cell][:, :2]).all(axis=1)]
+        if lost[cell]:
+            yield None
+        elif still[cell] or not len(kept):
+            yield _Motion(ends[cell : cell + 1] / scale, True) if np.isfinite(ends[cell, :2]).all() else None
+        else:
+            yield _cycle(np.nan_to_num(kept / scale), tolerance)
+
+
+def _cycle(points: Floats, tolerance: float) -> _Motion:
+    """The last lap of points that return in the same order twice; all points if they do not."""
+    for lap in range(1, len(points) // 2 + 1):
+        # Twice the longest lap is the record: shorter ones must return over all of its later half.
+        compared = max(lap, len(points) // 2)
+        last, before = points[-compared:], points[-compared - lap : len(points) - lap]
+        if np.abs(last - before).max() <= tolerance:
+            return _Motion(points[-lap:], True)
+    return _Motion(points, len(points) == 1)
+
+
+def _same(a: _Motion, b: _Motion, tolerance: float) -> bool:
+    if a.periodic != b.periodic or (a.periodic and len(a.points) != len(b.points)):
+        return False
+    if a.periodic:
+        starts = np.flatnonzero(np.abs(b.points - a.points[0]).max(axis=1) <= tolerance)
+        return any(np.abs(np.roll(b.points, -start, axis=0) - a.points).max() <= tolerance for start in starts)
+    between = np.abs(a.points[:, None] - b.points[None]).max(axis=2)
+    within = max(_spacing(a.points), _spacing(b.points), tolerance)
+    return bool(max(np.median(between.min(axis=0)), np.median(between.min(axis=1))) <= _AS_NEAR * within)
+
+
+def _spacing(points: Floats) -> float:
+    """Median distance of a point to the nearest other one."""
+    distance = np.abs(points[:, None] - points[None]).max(axis=2)
+    np.fill_diagonal(distance, np.inf)
+    return float(np.median(distance.min(axis=1)))
+
+
+def _names(labels: NDArray[np.int64], regime: NDArray[np.str_] | None, count: int) -> list[str]:
+    """Names of the motions: the most frequent regime of their cells, and a number."""
+    if regime is None:
+        return [f"motion_{k}" for k in range(1, count + 1)]
+    found = []
+    for k in range(1, count + 1):
+        own, often = np.unique(regime[labels == k], return_counts=True)
+        found.append(f"{own[often.argmax()]}_{k}")
+    return found
+
+
+def _errors(labels: NDArray[np.int64], share: Floats, independent: bool) -> Floats:
+    """Standard errors of the shares."""
+    if independent:
+        return np.sqrt(share * (1.0 - share) / max(labels.size, 1))
+    found = np.empty(len(share))
+    for k in range(len(share)):
+        inside, edge = labels == k, np.zeros(labels.shape, dtype=bool)
+        for axis in range(labels.ndim):
+            differs = np.diff(inside, axis=axis)
+            before = [slice(None)] * labels.ndim
+            after = list(before)
+            before[axis], after[axis] = slice(None, -1), slice(1, None)
+            edge[tuple(before)] |= differs & inside[tuple(before)]
+            edge[tuple(after)] |= differs & inside[tuple(after)]
+        # A share of a cell between 0 and 1, each as probable as the others, has the variance 1/12.
+        found[k] = np.sqrt(edge.sum() / 12.0) / labels.size
+    return found

@@ -1,0 +1,139 @@
+"""Attractors: cells that end on the same motion have one label, and shares have their sampling error."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import ringsweep
+from ringsweep import InputError
+
+
+def sections(x, velocity=None, dims=("initial_x",), **variables):
+    """Dataset of cells with these sections."""
+    x = np.asarray(x, dtype=float)
+    velocity = np.zeros_like(x) if velocity is None else np.asarray(velocity, dtype=float)
+    points = {"x_section": ((*dims, "section"), x), "velocity_section": ((*dims, "section"), velocity)}
+    return xr.Dataset(points | {name: (dims, value) for name, value in variables.items()})
+
+
+def flags(values, meanings):
+    return xr.DataArray(values, dims="initial_x", attrs={"flag_values": range(len(meanings.split())),
+                                                         "flag_meanings": meanings})  # fmt: skip
+
+
+def henon(start, count, b=0.3):
+    """Points of the map of Henon, after a transient: a chaotic attractor at a = 1.4."""
+    x, y, found = *start, []
+    for k in range(count + 500):
+        x, y = 1.0 - 1.4 * x * x + y, b * x
+        if k >= 500:
+            found.append((x, y))
+    return np.array(found).T
+
+
+def labels(ds, **options):
+    return ringsweep.attractors(ds, **options).attractor.values.tolist()
+
+
+class TestLabels:
+    def test_periodic_motions_are_the_same_from_any_point_on(self):
+        lap = [0.0, 1.0, 3.0]
+        ds = sections([lap * 4, np.roll(lap, 1).tolist() * 4, [0.0, 3.0, 1.0] * 4, [0.0] * 12])
+        # The same three points in another order are another motion.
+        assert labels(ds) == [1, 1, 2, 3]
+
+    def test_old_points_of_a_transient_do_not_count(self):
+        motion = np.tile([0.0, 1.0], 16)
+        late = motion + np.where(np.arange(32) < 8, 0.3, 0.0)
+        assert labels(sections([motion, late])) == [1, 1]
+
+    def test_points_that_differ_by_less_than_the_tolerance_are_the_same(self):
+        ds = sections([[0.0, 1.0] * 4, [0.0, 1.0 + 1e-4] * 4, [0.0, 1.0 + 1e-2] * 4])
+        assert labels(ds) == [1, 1, 2]
+        assert labels(ds, tolerance=0.1) == [1, 1, 1]
+
+    def test_a_chaotic_motion_is_one_cloud_wherever_its_runs_start(self):
+        clouds = [henon((0.1 * k, 0.0), 64) for k in range(4)]
+        other = clouds[0] + np.array([[0.0], [1.0]])
+        x, velocity = np.stack([*clouds, other]).transpose(1, 0, 2)
+        assert labels(sections(x, velocity)) == [1, 1, 1, 1, 2]
+
+    def test_steady_slip_is_a_point_whatever_its_section_kept(self):
+        x = [[0.5, 0.3, 0.2, 0.15], [np.nan] * 4, [2.0, 0.0, 2.0, 0.0]]
+        regime = flags([1, 1, 0], "oscillatory sliding")
+        ds = sections(x, x_end=[0.1, 0.1, 0.7], velocity_end=[0.0, 0.0, 0.2]).assign(regime=regime)
+        found = ringsweep.attractors(ds)
+        assert ringsweep.words(found.attractor).values.tolist() == ["sliding_1", "sliding_1", "oscillatory_2"]
+
+    def test_cells_that_have_not_settled_have_none(self):
+        x = [[0.0, 1.0] * 4] * 4
+        long_run = flags([0, 1, 0, 2], "periodic transient unbounded")
+        assert labels(sections(x).assign(long_run=long_run)) == [1, 0, 1, 0]
+        assert labels(sections(x, settled=[1, 1, 0, 1])) == [1, 1, 0, 1]
+
+    def test_the_most_frequent_motion_is_the_first(self):
+        assert labels(sections([[5.0] * 4, [1.0] * 4, [1.0] * 4])) == [2, 1, 1]
+
+
+class TestShares:
+    def spread(self, found, exact):
+        return np.std([(one.share[2] - exact) / one.share_error[2] for one in found])
+
+    def test_errors_of_random_cells_are_those_of_draws(self):
+        draw, found = np.random.default_rng(1), []
+        for _ in range(200):
+            hit = draw.uniform(size=300) < 0.2
+            # Of the two motions the first one is the more frequent.
+            found.append(ringsweep.attractors(sections(np.where(hit, 1.0, 0.0)[:, None] * np.ones(4), dims=("point",))))
+        assert 0.8 < self.spread(found, 0.2) < 1.2
+
+    def test_errors_of_a_grid_are_those_of_an_area(self):
+        draw, found, side = np.random.default_rng(2), [], 24
+        for _ in range(100):
+            offset = draw.uniform(size=2)
+            i, j = (np.arange(side) + offset[:, None]) / side
+            # The disc lies within the square wherever the grid does.
+            inside = np.hypot(i[:, None] - 1.04 * 0.5, j[None] - 1.04 * 0.5) < 0.3
+            x = np.where(inside, 1.0, 0.0)[..., None] * np.ones(4)
+            found.append(ringsweep.attractors(sections(x, dims=("initial_x", "initial_velocity"))))
+        assert 0.3 < self.spread(found, np.pi * 0.09) < 1.5
+
+
+def test_labels_draw_a_map_and_have_an_uncertainty_exponent():
+    i, j = np.indices((128, 128)) / 128
+    x = np.where(i**2 + j**2 < 0.5, 1.0, 0.0)[..., None] * np.ones(4)
+    found = ringsweep.attractors(sections(x, dims=("initial_x", "initial_velocity")))
+    exponent = ringsweep.uncertainty_exponent(found.rename(attractor="regime")).exponent
+    assert 0.8 < exponent < 1.2
+    figure = ringsweep.plots.regime_map(found, var="attractor")
+    assert any("motion 1" in text.get_text() for text in figure.findobj(match=lambda a: hasattr(a, "get_text")))
+
+
+def test_a_sweep_without_a_section_is_refused():
+    with pytest.raises(InputError, match="record"):
+        ringsweep.attractors(xr.Dataset({"regime": ("a", [1])}))
+    with pytest.raises(InputError, match="tolerance"):
+        ringsweep.attractors(sections([[1.0]]), tolerance=0.0)
+
+
+def test_share_of_steady_sliding_is_that_of_the_published_basin():
+    """Stender and Hoffmann, bSTAB, Nonlinear Dyn. 107 (2022): 0.312 of the launches, with a standard error of 0.007."""
+    side = (np.arange(24) + 0.5) / 24
+    scene = {
+        "model": "belt",
+        "gravity": 1.0,
+        "body": {"mass": 1.0},
+        "spring": {"stiffness": 1.0},
+        "damper": {"coefficient": 0.1},
+        "belt": {"velocity": 1.5},
+        "friction": {"law": "tustin", "mu_s": 1.0, "mu_k": 0.5, "alpha": 2.0},
+        "time": {"span": 600.0},
+    }
+    grid = {"initial.x": (4.0 * side - 2.0).tolist(), "initial.velocity": (2.0 * side).tolist()}
+    record = {"section": {"at": "turn", "keep": 8}}
+    ds = ringsweep.run({"scene": scene, "record": record, "sweep": {"grid": grid}}, jobs=1, progress=False)
+    found = ringsweep.attractors(ds)
+    assert found.label.values.tolist() == ["none", "stick-slip_1", "sliding_2"]
+    share, error = found.share.values[2], found.share_error.values[2]
+    assert abs(share - 0.312) < 3.0 * np.hypot(error, 0.007)
+    assert found.share.values[0] == 0.0

@@ -1,0 +1,157 @@
+"""What a motion on the belt settles to is decided by evidence that does not hang on the end of the span."""
+
+from math import pi
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import ringsweep
+
+
+def scene(law, omega, amplitude, *, x=0.0, v_belt=1.0, cubic=0.0, damping=0.0, **friction):
+    """A body of 1 kg on a spring of 1 N/m, g = 1 m/s^2, under a force (N) at `omega` (rad/s)."""
+    return {
+        "model": "belt",
+        "gravity": 1.0,
+        "body": {"mass": 1.0},
+        "spring": {"stiffness": 1.0, "cubic": cubic},
+        "damper": {"coefficient": damping},
+        "belt": {"velocity": v_belt},
+        "friction": {"law": law, **friction},
+        "force": {"amplitude": amplitude, "frequency": omega / (2.0 * pi)},
+        "initial": {"x": x, "velocity": 0.0},
+        "time": {"span": 100.0},
+    }
+
+
+def over(of, omega, periods, exponent=False):
+    """Runs of a scene over these numbers of periods of the force."""
+    config = {
+        "scene": of,
+        "record": {"exponent": exponent},
+        "solver": {"method": "auto", "certify": False},
+        "sweep": {"grid": {"time.span": [n * 2.0 * pi / omega for n in periods]}},
+    }
+    return ringsweep.run(config, jobs=1, progress=False)
+
+
+def words(found):
+    return ringsweep.words(found.long_run).values.tolist()
+
+
+#: The body of a cubic spring sticks, slips and passes the belt.
+def cubic(omega, amplitude):
+    friction = {"mu_s": 0.6, "mu_k": 0.2, "alpha": 3.0}
+    return scene("tustin", omega, amplitude, x=0.1, cubic=1.0, damping=0.02, **friction)
+
+
+def test_slow_growth_of_a_forced_motion_is_transient():
+    """The damper takes less than the falling friction gives: the swing grows until the body sticks."""
+    of = scene("tustin", 0.5, 0.1, x=0.5, mu_s=0.302, mu_k=0.3, alpha=1.0, damping=5e-4)
+    found = over(of, 0.5, [50, 100, 300, 1000])
+    assert words(found) == ["transient"] * 3 + ["periodic"]
+    np.testing.assert_array_equal(found.settled, [0, 0, 0, 1])
+    np.testing.assert_allclose(found.period, [np.nan, np.nan, np.nan, 4.0 * pi])
+    assert ringsweep.words(found.regime).values.tolist() == ["oscillatory"] * 3 + ["stick-slip"]
+
+
+def test_resonance_without_bound_is_unbounded():
+    """Den Hartog's oscillator at r = 1, F/P = 0.5: friction takes less than the force gives, at any swing.
+
+    In a period of large swing the energy grows by (pi P - 4 F) a, so that the amplitude a grows by pi - 2.
+    """
+    found = over(scene("tustin", 1.0, 1.0, v_belt=0.0, mu_s=0.5, mu_k=0.5, alpha=1.0), 1.0, [50, 300, 800, 5000])
+    assert words(found) == ["transient", "unbounded", "unbounded", "unbounded"]
+    np.testing.assert_allclose(found.swing[2:], [1825, 11415], rtol=1e-3)
+    np.testing.assert_allclose((found.swing[3] - found.swing[2]) / 4200.0, 2.0 * (pi - 2.0), rtol=1e-3)
+    np.testing.assert_array_equal(found.settled, 0)
+    assert np.isnan(found.period).all()
+
+
+def test_resonance_with_a_damper_is_bounded():
+    of = scene("tustin", 1.0, 1.0, v_belt=0.0, mu_s=0.5, mu_k=0.5, alpha=1.0, damping=1e-3)
+    found = over(of, 1.0, [300, 5000])
+    assert words(found) == ["transient", "periodic"]
+    # The work of the force is that of friction and damper: pi a P = 4 a F + pi c a^2.
+    np.testing.assert_allclose(found.swing[1], 2.0 * (1.0 - 2.0 / pi) / 1e-3, rtol=1e-3)
+
+
+def test_motion_that_does_not_return_has_no_period_in_any_span():
+    spans = [*range(200, 240), 617, 1000]
+    found = over(cubic(0.6, 0.8), 0.6, spans)
+    assert words(found) == ["transient"] * len(spans)
+    assert np.isnan(found.period).all()
+    assert set(ringsweep.words(found.regime).values.tolist()) == {"stick-slip"}
+    # Over the second half of the record the statistics agree.
+    assert np.ptp(found.stick_share.values) < 0.01
+
+
+def test_the_exponent_tells_chaos_from_motion_on_a_torus():
+    chaotic, torus = over(cubic(0.8, 0.5), 0.8, [617, 1000], True), over(cubic(0.6, 0.8), 0.6, [617, 1000], True)
+    assert words(chaotic) == ["chaotic"] * 2
+    assert words(torus) == ["quasi-periodic"] * 2
+    for found in (chaotic, torus):
+        np.testing.assert_array_equal(found.settled, 1)
+        assert np.isnan(found.period).all()
+    assert (chaotic.lyapunov > 3.0 * chaotic.lyapunov_error).all()
+    assert (abs(torus.lyapunov) < 3.0 * torus.lyapunov_error).all()
+
+
+def test_period_of_thirteen_cycles_is_found_in_each_span():
+    """SciPy finds the same motion: it returns after thirteen periods of the force, and not before."""
+    period = 2.0 * pi / 1.6
+    found = over(cubic(1.6, 0.3), 1.6, [200, 213, 300, 617, 1000])
+    assert words(found) == ["periodic"] * 5
+    np.testing.assert_allclose(found.period, 13.0 * period, rtol=1e-9)
+
+    def pull(t, x, v):
+        return 0.3 * np.sin(1.6 * t) - x - x**3 - 0.02 * (v + 1.0)
+
+    t, state, sign, stops, points = 0.0, [0.1, -1.0], -1, [], []
+    while t < 213 * period:
+
+        def rates(t, y, sign=sign):
+            x, v = y
+            return [v + 1.0, pull(t, x, v) - sign * (0.2 + 0.4 * np.exp(-3.0 * abs(v))) if sign else 0.0]
+
+        def ends(t, y, sign=sign):
+            return sign * y[1] if sign else 0.6 - abs(pull(t, y[0], 0.0))
+
+        ends.terminal, ends.direction = True, -1
+        part = solve_ivp(
+            rates, (t, 213 * period), state, "DOP853", events=ends, dense_output=True, rtol=1e-10, atol=1e-12
+        )
+        first, last = int(t / period) + 1, int(part.t[-1] / period)
+        points += [part.sol(n * period) for n in range(first, last + 1)]
+        t, state = part.t[-1], [part.y[0, -1], 0.0]
+        held = bool(sign and abs(pull(t, state[0], 0.0)) <= 0.6)
+        stops += [t] * held
+        sign = 0 if held else int(np.sign(pull(t, state[0], 0.0)))
+    x = np.array(points)[-27:, 0]
+    np.testing.assert_allclose(x[13:], x[:-13], atol=1e-7)
+    assert min(abs(x[-1] - x[-1 - k]) for k in range(1, 13)) > 1e-3
+    assert np.sum(np.array(stops) > 200 * period) == pytest.approx(13.0 * found.stops_per_cycle[0].item())
+
+
+def test_words_of_free_motions():
+    """Stick-slip of three cycles erased its past; steady slip is steady; a body at rest on a belt at rest rests."""
+    free = {
+        "model": "belt",
+        "body": {"mass": 1.0},
+        "spring": {"stiffness": 2.0},
+        "belt": {"velocity": 0.1},
+        "friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.1},
+        "initial": {"x": 0.0, "velocity": 0.0},
+        "time": {"span": 30.0},
+    }
+    points = {
+        "belt.velocity": [0.1, 0.1, 0.1, 0.0, 0.1],
+        "initial.x": [0.0, 0.45, 0.0, 1.0, 0.0],
+        "damper.coefficient": [0.0, 1.0, 0.0, 0.0, 0.0],
+        "initial.velocity": [0.1, 0.0, 0.1, 0.0, 0.1],
+        "time.span": [30.0, 30.0, 10.0, 30.0, 5.0],
+    }
+    found = ringsweep.run({"scene": free, "sweep": {"points": points}}, jobs=1, progress=False)
+    assert words(found) == ["periodic", "steady", "transient", "rest", "transient"]
+    assert found.settled.values.tolist() == [1, 1, 0, 1, 0]

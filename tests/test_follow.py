@@ -1,0 +1,196 @@
+"""Branches: along an axis each cell starts from the end of the one before, and the run of a file goes on."""
+
+from copy import deepcopy
+
+import numpy as np
+import pytest
+
+import ringsweep
+from ringsweep import InputError
+from ringsweep.storage.checkpoint import Checkpoint
+
+#: A spring that hardens, under a force: near 0.35 Hz a large and a small motion exist side by side.
+HARDENING = {
+    "model": "belt",
+    "gravity": 1.0,
+    "body": {"mass": 1.0},
+    "spring": {"stiffness": 1.0, "cubic": 1.0},
+    "damper": {"coefficient": 0.1},
+    "belt": {"velocity": 50.0},
+    "friction": {"law": "coulomb", "mu_k": 1e-6},
+    "force": {"amplitude": 0.5, "frequency": 0.25},
+    "initial": {"x": 0.0, "velocity": 0.0},
+    "time": {"span": 199.0},
+}
+
+LUGRE = {
+    "model": "belt",
+    "gravity": 1.0,
+    "body": {"mass": 1.0},
+    "spring": {"stiffness": 1.0},
+    "belt": {"velocity": 0.1},
+    "friction": {
+        "law": "lugre", "mu_s": 0.15, "mu_k": 0.1, "sigma0": 100.0, "sigma1": 2.0, "sigma2": 0.1, "v_s": 0.05,
+    },
+    "force": {"amplitude": 0.05, "frequency": 0.2},
+    "time": {"span": 7.0},
+}  # fmt: skip
+
+FREQUENCIES = [0.21, 0.24, 0.27, 0.3, 0.33, 0.36]
+
+OUTCOMES = "x_end", "velocity_end", "t_end", "swing", "certified", "started_from"
+
+
+def run(scene, output=None, jobs=1, **sections):
+    return ringsweep.run({"scene": deepcopy(scene), **deepcopy(sections)}, output, jobs=jobs, progress=False)
+
+
+def branches(output=None, jobs=1, **options):
+    follow = {"axis": "force.frequency", "direction": "both"}
+    grid = {"force.amplitude": [0.4, 0.5], "force.frequency": FREQUENCIES}
+    return run(HARDENING, output, jobs, sweep={"grid": grid, "follow": follow}, **options)
+
+
+@pytest.fixture(scope="module")
+def both():
+    return branches().load()
+
+
+def changed(scene, section, **values):
+    scene = deepcopy(scene)
+    scene.setdefault(section, {}).update(values)
+    return scene
+
+
+class TestBranches:
+    def test_up_and_down_find_both_motions_of_a_hardening_spring(self, both):
+        up, down = (both.swing.sel(force_amplitude=0.5, direction=way) for way in ("up", "down"))
+        assert (abs(up / down - 1.0) > 0.5).any()
+        # Below and above the fold there is one motion.
+        assert abs(up / down - 1.0)[0] < 1e-3
+
+    def test_each_cell_is_a_run_from_the_end_of_the_one_before(self, both):
+        before = both.isel(force_frequency=3).sel(force_amplitude=0.5, direction="up")
+        scene = changed(HARDENING, "initial", x=float(before.x_end), velocity=float(before.velocity_end))
+        scene["force"]["frequency"] = FREQUENCIES[4]
+        now = both.isel(force_frequency=4).sel(force_amplitude=0.5, direction="up")
+        scene["time"]["span"] = float(now.t_end)
+        alone = run(scene)
+        for name in "x_end", "velocity_end", "swing":
+            assert alone[name] == now[name]
+
+    def test_spans_are_whole_periods_so_that_sections_can_be_compared(self, both):
+        periods = both.t_end * both.force_frequency
+        assert np.allclose(periods, np.round(periods), rtol=0, atol=1e-9)
+        assert (both.t_end >= 199.0).all()
+        assert (both.t_end < 199.0 + 1.0 / 0.21).all()
+
+    def test_only_the_first_cell_of_a_chain_starts_from_initial(self, both):
+        expected = np.ones((2, 6, 2))
+        expected[:, 0, 0] = expected[:, -1, 1] = 0
+        assert np.array_equal(both.started_from, expected)
+
+    def test_the_same_cells_three_times_are_one_run_of_three_spans(self):
+        points = {"points": {"force.frequency": [0.2] * 3}, "follow": "force.frequency"}
+        scene = changed(LUGRE, "time", span=10.0)
+        chain, whole = run(scene, sweep=points), run(changed(LUGRE, "time", span=30.0))
+        for name in "x_end", "velocity_end", "deflection_end":
+            assert np.isclose(chain[name][-1], whole[name], rtol=1e-5, atol=1e-9)
+
+    def test_after_a_run_that_failed_the_chain_starts_from_initial_again(self):
+        sweep = {"grid": {"time.span": [20.0, 40.0, 2000.0]}, "follow": {"axis": "time.span", "direction": "down"}}
+        ds = run(HARDENING, sweep=sweep, solver={"method": "event", "max_steps": 500})
+        assert ringsweep.words(ds.regime).values.tolist() == ["oscillatory", "oscillatory", "failed"]
+        assert ds.started_from.values.tolist() == [1, 0, 0]
+
+
+class TestTheSameBits:
+    def test_with_two_jobs_and_from_a_file(self, both, tmp_path):
+        found = branches(tmp_path / "a.nc", jobs=2)
+        for name in OUTCOMES:
+            assert np.array_equal(found[name], both[name], equal_nan=True), name
+        assert found.direction.values.tolist() == ["up", "down"]
+
+    def test_after_an_interruption(self, both, tmp_path, monkeypatch):
+        put, calls = Checkpoint.put, []
+
+        def interrupted(self, *args):
+            put(self, *args)
+            calls.append(1)
+            if len(calls) == 2:
+                raise KeyboardInterrupt
+
+        monkeypatch.setattr(Checkpoint, "put", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            branches(tmp_path / "a.nc")
+        monkeypatch.setattr(Checkpoint, "put", put)
+        found = branches(tmp_path / "a.nc")
+        for name in OUTCOMES:
+            assert np.array_equal(found[name], both[name], equal_nan=True), name
+
+    def test_from_the_configuration_in_the_file(self, both, tmp_path):
+        branches(tmp_path / "a.nc").close()
+        again = ringsweep.run(tmp_path / "a.nc", progress=False, jobs=1)
+        assert again.sizes == both.sizes
+        assert np.array_equal(again.x_end, both.x_end)
+
+
+class TestAFileGoesOn:
+    @pytest.mark.parametrize("simulated", [False, True])
+    def test_two_runs_are_one_run_of_both_spans(self, simulated, tmp_path):
+        file = tmp_path / "first.nc"
+        if simulated:
+            ringsweep.simulate(deepcopy(LUGRE)).to_netcdf(file)
+        else:
+            run(LUGRE, file).close()
+        second = run(changed(LUGRE, "initial", **{"from": str(file)}))
+        whole = run(changed(LUGRE, "time", span=14.0))
+        for name in "x_end", "velocity_end", "deflection_end":
+            assert np.isclose(second[name], whole[name], rtol=1e-4, atol=1e-7), name
+
+    def test_a_deflection_is_a_number_of_the_scene(self):
+        # The bristles alone pull: m a = -sigma0 z at the first instant.
+        scene = changed(LUGRE, "initial", deflection=1e-3, x=0.0)
+        scene["friction"] |= {"sigma1": 0.0, "sigma2": 0.0}
+        history = ringsweep.simulate(scene)
+        assert history.deflection[0] == 1e-3
+        assert np.isclose(history.friction_force[0], 100.0 * 1e-3)
+
+
+class TestErrors:
+    def refused(self, scene, path, words, **sections):
+        with pytest.raises(InputError) as error:
+            run(scene, **sections)
+        assert (error.value.path, words in error.value.problem) == (path, True), error.value
+
+    def test_of_the_axis(self):
+        sweep = {"grid": {"force.frequency": FREQUENCIES}}
+        follow = {"axis": "force.frequency", "direction": "sideways"}
+        self.refused(HARDENING, "sweep.follow", "did you mean", sweep=sweep | {"follow": "force.frequenzy"})
+        self.refused(HARDENING, "sweep.follow.direction", "both", sweep=sweep | {"follow": follow})
+        self.refused(HARDENING, "sweep.follow.axes", "did you mean", sweep=sweep | {"follow": {"axes": 1}})
+        self.refused(HARDENING, "sweep.refine", "follow", sweep=sweep | {"follow": "force.frequency", "refine": True})
+
+    def test_of_scenes_whose_runs_cannot_go_on(self):
+        sweep = {"grid": {"time.span": [1.0, 2.0]}, "follow": "time.span"}
+        bonds = deepcopy(LUGRE)
+        bonds["friction"] = {"law": "bristle", "mu_k": 0.1, "sigma0": 100.0}
+        self.refused(bonds, "sweep.follow", "more than a deflection", sweep=sweep)
+        moved = deepcopy(LUGRE)
+        del moved["belt"]
+        moved["drive"] = {"law": "arctan", "amplitude": 1.0}
+        self.refused(moved, "sweep.follow", "no phase", sweep=sweep)
+
+    def test_of_the_initial_state(self, tmp_path):
+        self.refused(changed(LUGRE, "initial", deflection=1.0), "scene.initial.deflection", "up to 0.0015 m")
+        beside = changed(LUGRE, "initial", x=1.0, **{"from": "a.nc"})
+        self.refused(beside, "scene.initial.x", "leave one out")
+        self.refused(changed(LUGRE, "initial", **{"from": str(tmp_path / "no.nc")}), "scene.initial.from", "no.nc")
+        run(LUGRE, tmp_path / "two.nc", sweep={"grid": {"initial.x": [0.0, 0.1]}}).close()
+        several = changed(LUGRE, "initial", **{"from": str(tmp_path / "two.nc")})
+        self.refused(several, "scene.initial.from", "2 runs")
+
+
+def test_a_cell_of_a_chain_has_no_configuration_of_its_own(both):
+    with pytest.raises(InputError, match="end of the one before"):
+        ringsweep.plots.cell(both.isel(force_amplitude=0, force_frequency=1, direction=0))

@@ -1,0 +1,220 @@
+"""Sections of the motion on the belt: states at each period of force or drive, and at each turn."""
+
+from copy import deepcopy
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import ringsweep
+from ringsweep import cli
+from ringsweep.runs.task_sizes import TaskSizes
+from ringsweep.storage.checkpoint import Checkpoint
+
+BODY = {"model": "belt", "gravity": 1.0, "body": {"mass": 1.0}, "spring": {"stiffness": 1.0}}
+
+#: It sticks, slips, and passes the speed of the belt, under a force with the period 4.
+FORCED = BODY | {
+    "damper": {"coefficient": 0.02},
+    "belt": {"velocity": 0.3},
+    "friction": {"law": "tustin", "mu_s": 0.6, "mu_k": 0.2, "alpha": 3.0},
+    "force": {"amplitude": 0.5, "frequency": 0.25},
+    "initial": {"x": 0.1, "velocity": 0.0},
+    "time": {"span": 48.0},
+}
+
+BRISTLES = BODY | {
+    "belt": {"velocity": 0.1},
+    "friction": {
+        "law": "lugre", "mu_s": 0.15, "mu_k": 0.1, "sigma0": 100.0, "sigma1": 2.0, "sigma2": 0.1, "v_s": 0.05,
+    },
+    "force": {"amplitude": 0.05, "frequency": 0.2},
+    "time": {"span": 20.0},
+}  # fmt: skip
+
+
+def run(scene, section, output=None, **sweep):
+    """Outcomes of a scene with a section."""
+    config = {"scene": scene, **({"record": {"section": section}} if section else {}), **sweep}
+    return ringsweep.run(deepcopy(config), output, jobs=1, progress=False)
+
+
+def reference(times):
+    """Displacement and velocity at some times in the scene FORCED, and at its maxima, by SciPy."""
+    c, v_belt, mu_s, mu_k, alpha = 0.02, 0.3, 0.6, 0.2, 3.0
+
+    def pull(t, x, v):
+        return 0.5 * np.sin(0.5 * np.pi * t) - x - c * (v + v_belt)
+
+    t, state, sign, found, maxima = 0.0, [0.1, -0.3], -1, [], []
+    while t < 48.0:
+
+        def rates(t, y, sign=sign):
+            x, v = y
+            friction = sign * (mu_k + (mu_s - mu_k) * np.exp(-alpha * abs(v)))
+            return [v + v_belt, pull(t, x, v) - friction if sign else 0.0]
+
+        def ends(t, y, sign=sign):
+            return sign * y[1] if sign else mu_s - abs(pull(t, y[0], 0.0))
+
+        def turns(t, y):
+            return y[1] + v_belt
+
+        ends.terminal, ends.direction, turns.direction = True, -1, -1
+        part = solve_ivp(
+            rates, (t, 48.0), state, "DOP853", events=(ends, turns), dense_output=True, rtol=1e-12, atol=1e-13
+        )
+        found += [part.sol(at) for at in times if t < at <= part.t[-1]]
+        maxima += [y[0] for y in part.y_events[1]]
+        t, state = part.t[-1], [part.y[0, -1], 0.0]
+        # The pull decides at rest, and its sign is that of the slip that follows.
+        held = abs(pull(t, state[0], 0.0)) <= mu_s if sign else False
+        sign = 0 if held else int(np.sign(pull(t, state[0], 0.0)))
+    states = np.array(found)
+    return states[:, 0], states[:, 1] + v_belt, np.array(maxima)
+
+
+def test_points_at_each_period_of_the_force_are_those_of_an_independent_integration():
+    x, velocity, _ = reference(4.0 * np.arange(1, 13))
+    ds = run(FORCED, {"at": "period", "keep": 12})
+    assert ds.stick_time > 2.0
+    assert ds.slips > 3
+    np.testing.assert_allclose(ds.x_section, x, atol=1e-9)
+    np.testing.assert_allclose(ds.velocity_section, velocity, atol=1e-9)
+    assert ds.x_section.dims == ("section",)
+    assert "deflection_section" not in ds
+
+
+def test_points_at_each_turn_are_the_maxima_of_an_independent_integration():
+    *_, maxima = reference([48.0])
+    ds = run(FORCED, {"at": "turn"})
+    np.testing.assert_allclose(ds.x_section[: len(maxima)], maxima, atol=1e-9)
+    assert np.isnan(ds.x_section[len(maxima) :]).all()
+    assert np.isnan(ds.velocity_section[len(maxima) :]).all()
+    np.testing.assert_array_equal(ds.velocity_section[: len(maxima)], 0.0)
+
+
+@pytest.mark.parametrize("at", ["period", "turn"])
+def test_bristles_bring_their_deflection(at):
+    v_belt, stiffness, damping, viscous, mu_s, mu_k, v_s = 0.1, 100.0, 2.0, 0.1, 0.15, 0.1, 0.05
+
+    def rates(t, y):
+        x, v, z = y
+        z_rate = v - stiffness * abs(v) * z / (mu_k + (mu_s - mu_k) * np.exp(-((v / v_s) ** 2)))
+        friction = stiffness * z + damping * z_rate + viscous * v
+        return [v + v_belt, 0.05 * np.sin(0.4 * np.pi * t) - x - friction, z_rate]
+
+    def turns(t, y):
+        return y[1] + v_belt
+
+    turns.direction = -1
+    part = solve_ivp(
+        rates, (0.0, 20.0), [0.0, 0.0, 0.0], "LSODA", events=turns, t_eval=[5, 10, 15, 20], rtol=1e-11, atol=1e-13
+    )
+    states = part.y.T if at == "period" else part.y_events[0]
+    ds = run(BRISTLES, {"at": at, "keep": 5})
+    assert ds.deflection_section.units == "m"
+    in_space = states + np.array([0.0, v_belt, 0.0])
+    for name, exact in zip(("x", "velocity", "deflection"), in_space.T, strict=True):
+        np.testing.assert_allclose(ds[f"{name}_section"][: len(states)], exact, atol=2e-6)
+        assert np.isnan(ds[f"{name}_section"][len(states) :]).all()
+
+
+def test_the_last_points_are_kept_in_their_order_and_nothing_else_changes():
+    spans = {"sweep": {"grid": {"time.span": [3.0, 7.0, 23.0, 44.0, 48.0]}}}
+    every, few = (run(FORCED, {"at": "period", "keep": keep}, **spans) for keep in (64, 5))
+    for i, count in enumerate([0, 1, 5, 11, 12]):
+        assert np.isfinite(every.x_section[i]).sum() == count
+        for name in ("x_section", "velocity_section"):
+            last = every[name][i, max(count - 5, 0) : count].values
+            np.testing.assert_array_equal(few[name][i, : len(last)], last)
+            assert np.isnan(few[name][i, len(last) :]).all()
+    plain = run(FORCED, None, **spans)
+    assert every.drop_dims("section").equals(plain)
+
+
+@pytest.fixture(scope="module")
+def swept():
+    return {"sweep": {"grid": {"force.frequency": np.linspace(0.1, 0.3, 5).tolist(), "force.amplitude": [0.2, 0.4]}}}
+
+
+def test_files_resume_and_reuse_hold_the_points(tmp_path, monkeypatch, swept):
+    section, target = {"at": "period", "keep": 16384}, tmp_path / "out.nc"
+    whole = run(FORCED, section, **swept)
+    assert whole.x_section.dims == ("force_frequency", "force_amplitude", "section")
+    monkeypatch.setattr(TaskSizes, "max_cells", 3)
+    put, stored = Checkpoint.put, []
+
+    def stop_after_one(self, positions, *rest):
+        if stored:
+            raise RuntimeError("stopped")
+        stored.append(len(positions))
+        put(self, positions, *rest)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Checkpoint, "put", stop_after_one)
+        with pytest.raises(RuntimeError):
+            run(FORCED, section, target, **swept)
+    assert (tmp_path / "out.nc.partial").exists()
+    with run(FORCED, section, target, **swept) as file:
+        assert file.drop_attrs().equals(whole.drop_attrs())
+        assert file.x_section.encoding["chunksizes"] == (1, 2, 16384)
+    ringsweep.verify(target)
+    part = deepcopy(swept)
+    part["sweep"]["grid"]["force.amplitude"] = [0.4]
+    config = {"scene": FORCED, "record": {"section": section}, **part}
+    again = ringsweep.run(config, reuse=target, progress=False)
+    np.testing.assert_array_equal(again.x_section, whole.x_section[:, 1:])
+    assert cli.main(["info", str(target)]) == 0
+    assert len(whole.ringsweep.to_frame()) == 10
+
+
+def test_sweep_over_laws_has_no_deflection_where_the_law_has_no_bristles():
+    scene = deepcopy(FORCED)
+    scene["friction"] |= {"sigma0": 100.0, "sigma1": 2.0, "sigma2": 0.1, "v_s": 0.05}
+    ds = run(scene, {"at": "period", "keep": 4}, sweep={"grid": {"friction.law": ["tustin", "lugre"]}})
+    assert np.isnan(ds.deflection_section[0]).all()
+    assert np.isfinite(ds.deflection_section[1]).all()
+    assert np.isfinite(ds.x_section).all()
+
+
+def without(scene, *sections):
+    return {key: part for key, part in scene.items() if key not in sections}
+
+
+RING = {
+    "model": "ring-single-contact",
+    "ring": {"radius": 0.1},
+    "body": {"mass": 1.0},
+    "friction": {"law": "coulomb", "mu_k": 0.2},
+    "drive": {"law": "sinusoidal", "amplitude": 1.0, "frequency": "1 Hz"},
+    "time": {"span": 1.0},
+}
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"record": {"section": {"keep": 3}}}, "record.section.at: missing: give period or turn"),
+        ({"record": {"section": {"at": "periods"}}}, "record.section.at: 'periods' is no instant of a section"),
+        ({"record": {"section": {"at": "turn", "kept": 3}}}, "record.section.kept: unknown key; did you mean `keep`?"),
+        ({"record": {"section": {"at": "turn", "keep": 0}}}, "record.section.keep: 0 is not allowed"),
+        ({"record": {"section": "turn"}}, "record.section: a section with keys is expected"),
+        ({"scene": without(FORCED, "force")}, "record.section.at: neither force nor drive has a period"),
+        ({"scene": RING}, "record.section: model ring-single-contact has none"),
+        ({"solver": {"method": "rk4", "steps": 1000}}, "solver.method: rk4 locates no instants for record.section"),
+        (
+            {"sweep": {"grid": {"belt.velocity": [0.1, 0.2, 0.3]}, "refine": True}},
+            "sweep.refine: cannot stand beside record.section",
+        ),
+        (
+            {"sweep": {"sample": {"n": 8, "seed": 1, "of": {"friction.mu_k": {"uniform": [0.1, 0.2]}}}}},
+            "sweep.sample: cannot stand beside record.section",
+        ),
+    ],
+)  # fmt: skip
+def test_what_has_no_section_is_refused(change, said):
+    config = {"scene": FORCED, "record": {"section": {"at": "period"}}} | change
+    with pytest.raises(ringsweep.InputError) as error:
+        ringsweep.run(config)
+    assert str(error.value).startswith(said)

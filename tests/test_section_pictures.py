@@ -1,0 +1,104 @@
+"""Pictures of sections: diagrams in both directions, the points of one motion, multipliers and exponents."""
+
+from itertools import pairwise
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.collections import PathCollection
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+
+from ringsweep import InputError, cli, plots
+from ringsweep.plots.style import PAIR_COLOURS
+
+mpl.use("Agg")
+
+
+@pytest.fixture
+def diagram():
+    """Two branches over three frequencies: one point up, two points down."""
+    x = np.empty((3, 2, 4))
+    x[:, 0], x[:, 1] = 1.0, [0.0, 2.0, 0.0, 2.0]
+    dims = "force_frequency", "direction"
+    flags = {"flag_values": [0, 1], "flag_meanings": "stick-slip oscillatory"}
+    return xr.Dataset(
+        {
+            "x_section": ((*dims, "section"), x, {"units": "m"}),
+            "velocity_section": ((*dims, "section"), 0.0 * x, {"units": "m s-1"}),
+            "regime": (dims, np.array([[0, 0], [0, 1], [1, 1]], dtype=np.int8), flags),
+            "lyapunov": (dims, [[-0.1, -np.inf], [0.2, -0.3], [0.1, -0.2]], {"units": "s-1"}),
+            "lyapunov_error": (dims, np.full((3, 2), 0.01), {"units": "s-1"}),
+            "multiplier_1": (dims, [[0.5, 0.2], [1.5, 0.3], [0.9, 0.1]], {"units": "1"}),
+        },
+        coords={
+            "force_frequency": ("force_frequency", [0.3, 0.1, 0.2], {"units": "Hz", "path": "force.frequency"}),
+            "direction": ["up", "down"],
+        },
+        attrs={"Conventions": "CF-1.11", "ringsweep_version": "0.1.0"},
+    )
+
+
+def points(ax):
+    return [one for one in ax.collections if isinstance(one, PathCollection)]
+
+
+def test_up_and_down_are_points_in_two_colours_that_are_rasterised(diagram):
+    up, down = points(plots.bifurcation_panel(diagram, ax=Figure().subplots()))
+    assert [to_hex(one.get_facecolor()[0]).upper() for one in (up, down)] == list(PAIR_COLOURS)
+    assert set(up.get_offsets()[:, 1]) == {1.0}
+    assert set(down.get_offsets()[:, 1]) == {0.0, 2.0}
+    assert up.get_rasterized()
+    assert down.get_rasterized()
+
+
+def test_regimes_are_a_strip_over_their_part_of_the_axis(diagram):
+    ax = plots.bifurcation_panel(diagram, ax=Figure().subplots())
+    names = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert names == ["up", "down", "stick-slip", "oscillatory"]
+
+
+def test_exponent_and_multipliers_stand_below_on_the_same_axis(diagram):
+    figure = plots.bifurcation(diagram)
+    assert len(figure.axes) == 3
+    assert len({ax.get_xlim() for ax in figure.axes}) == 1
+    assert [ax.get_xlabel() != "" for ax in figure.axes] == [False, False, True]
+    # A multiplier outside the unit circle is within the picture.
+    assert figure.axes[2].get_ylim()[1] > 1.5
+    bare = diagram.drop_vars(["lyapunov", "multiplier_1"])
+    assert len(plots.bifurcation(bare).axes) == 1
+
+
+@pytest.mark.parametrize("width", [85.0, 170.0])
+def test_no_text_covers_another(diagram, width):
+    plots.style("print", width=width)
+    try:
+        figure = plots.bifurcation(diagram)
+        figure.canvas.draw()
+        labels = [ax.yaxis.label.get_window_extent() for ax in figure.axes]
+        assert not any(a.overlaps(b) for a, b in pairwise(labels))
+    finally:
+        plots.style()
+
+
+def test_a_section_shows_its_points_in_time(diagram):
+    one = diagram.isel(force_frequency=0, direction=1)
+    (drawn,) = points(plots.section_panel(one, Figure().subplots()))
+    assert drawn.get_array().tolist() == [1, 2, 3, 4]
+    with pytest.raises(InputError, match="choose a cell"):
+        plots.section_panel(diagram)
+
+
+def test_the_command_chooses_the_diagram_by_itself(diagram, tmp_path, capsys):
+    file = tmp_path / "diagram.nc"
+    diagram.to_netcdf(file)
+    assert cli.main(["map", str(file)]) == 0
+    assert (tmp_path / "diagram-x_section.png").exists()
+    assert cli.main(["map", str(file), "--var", "regime"]) == 0
+    assert (tmp_path / "diagram.png").exists()
+    several = xr.concat([diagram, diagram], xr.DataArray([1.0, 2.0], dims="belt_velocity", name="belt_velocity"))
+    several.to_netcdf(tmp_path / "two.nc")
+    assert cli.main(["map", str(tmp_path / "two.nc"), "--var", "x_section"]) == 2
+    assert "hold the others" in capsys.readouterr().err
+    assert cli.main(["map", str(tmp_path / "two.nc"), "--sel", "belt_velocity=1"]) == 0
