@@ -110,15 +110,14 @@ def compute_task(config: Config, layout: Layout, positions: NDArray[np.integer])
         if not len(own):
             continue
         with readable_compile_errors(), _named_if_long(axes, indices, compiles):
-            began = perf_counter()
             for cells, found in _runs(config, structure, indices, own):
                 for name, column in found.items():
                     if name not in model.absent:
                         columns.setdefault(name, _missing(name, len(positions), column))[cells] = column
-            # A compilation would count as time of the cells.
-            if not compiles and (took := perf_counter() - began) >= LONG:
-                _name_longest(axes, {dim: along[own] for dim, along in indices.items()}, columns["steps"][own], took)
     seconds = perf_counter() - start
+    # A compilation would count as time of the cells.
+    if not compiles and seconds >= LONG:
+        _name_longest(axes, indices, columns["steps"], seconds)
     _compiled.add(compiled)
     return TaskResult(positions, columns, None if compiles else seconds, environment(), processor())
 
