@@ -430,8 +430,7 @@ def main() -> None:
         heading(title)
         table(header, rows)
         report += f"\n## {title}\n\n{markdown(header, rows)}"
-    figures = {"cold": f"{cold[1]:.0f}", "warm": f"{warm[1]:.0f}", "first_cells": f"{cold[0]:.0f}"}
-    publish(given, "scenes", "The cost of each thing in a scene", where, report, figures)
+    publish(given, "scenes", "The cost of each thing in a scene", where, report)
 
 
 #: Explanation at the head of the report.
