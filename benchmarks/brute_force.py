@@ -33,7 +33,7 @@ run). It is ambiguous if two tolerances of the reference differ by more than a h
 is compared where the package gives no bound and so claims no number. There are a tenth as many of these long runs, and
 three tenths as many of `far`. The law `bristle` is left out, because its random bonds cannot be repeated independently.
 
-Writes `brute_force.md`, if all families were drawn.
+Writes `brute_force.md` if all families were drawn, `brute_force_impact.md`, for example, if it was one.
 
 ``--csv PATH`` writes the 500 scenes of ``tests/test_brute_force.py`` instead: the scene (SI units, on the paper's
 rig); regime, motion, contact and time of separation; least reaction in weights of the body; whether the runs of the
@@ -606,12 +606,13 @@ def main():
     _common.table(END_HEADER, end_rows(total.ends))
     cost = ", ".join(f"{name} {seconds:.0f} s" for name, seconds in total.seconds.items())
     print(f"on one core: {cost} (compilation included), seed {arguments.seed}")
-    if not arguments.families:
+    if len(chosen) in (1, len(families())):
         text = f"Seed {arguments.seed}; {cost}.\n\n{_common.markdown(HEADER, rows)}"
         text += "\n## Certified ends, and what a body on compliant contacts says of them\n\n"
         text += _common.markdown(END_HEADER, end_rows(total.ends))
         title = "Certified answers against an independent reference"
-        _common.publish(arguments, "brute_force", title, heading, text, figures(counts, total))
+        name = "brute_force" if len(chosen) > 1 else f"brute_force_{next(iter(chosen)).replace(' ', '_')}"
+        _common.publish(arguments, name, title, heading, text, figures(counts, total))
 
 
 #: Rows of the table in the documents: families by title.

@@ -45,6 +45,11 @@ SMALLER = {
             "np.geomspace(0.1, 10, 8), np.radians(np.linspace(2, 60, 8))"
         ),
     },
+    "08-long-run": {
+        '"linspace": [0.15, 0.4, 60]': '"linspace": [0.15, 0.4, 8]',
+        "np.linspace(-1.95, 1.95, 40)": "np.linspace(-1.95, 1.95, 8)",
+        "np.linspace(0.025, 1.975, 40)": "np.linspace(0.025, 1.975, 8)",
+    },
 }
 
 #: Text that depends on the machine or shows a problem: folders, progress bars, warnings, tracebacks.
