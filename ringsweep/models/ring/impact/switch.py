@@ -60,8 +60,8 @@ from ringsweep.physics.zones import cross_edge, edge_ahead, locate
 #: is then wrong by about as much.
 SUMMED = 1e-12
 
-# A reaction that reaches zero leaves a gap that does not close, but for this share of the accelerations. A reaction that
-# changes its sign through infinity, in the instant of a jam, leaves one that does.
+# A reaction that reaches zero leaves a gap that does not close, but for this share of the accelerations. One that
+# passes through infinity, in the instant of a jam, leaves one that does.
 _NO_LOAD = 1e-6
 
 # A contact whose gap is this share of rho touches together with the one that closes.
