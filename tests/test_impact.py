@@ -255,6 +255,27 @@ class TestBody:
         assert found.t_recovered.item() == pytest.approx(1.106471579, abs=1e-5)
         assert found.phi_end.item() == pytest.approx(-3.365267361, rel=1e-6)
 
+    def test_reaction_that_changes_its_sign_through_infinity_jams_and_opens_no_contact(self):
+        """The body pivots on a contact that would enter the race if it opened. The time is that of the reference."""
+        scene = {
+            "model": "ring",
+            "body": {
+                "mass": 0.475957, "inertia": 4.73961e-06, "half_distance": 0.00424212, "ball_radius": 0.0128909,
+                "center_offset": 0.0,
+            },
+            "ring": {"radius": 0.0420561},
+            "friction": {
+                "law": "tustin", "alpha": 1702030.0,
+                "rest": {"mu_s": 0.235758, "mu_k": 0.10485}, "rough": {"mu_s": 0.48332, "mu_k": 0.267488},
+            },
+            "zone": {"half_angle": 2.70773, "center": pi},
+            "drive": {"law": "power", "amplitude": 8.84074, "exponent": 1.53252},
+            "initial": {"phi": 2.84616, "omega": 89.1353},
+            "time": {"span": 0.256649},
+        }  # fmt: skip
+        found = ringsweep.sweep(scene | {"impact": {"restitution": 0.0}}, {"time.span": [0.256649]}, progress=False)
+        assert found.t_end.item() == pytest.approx(0.24783247, abs=1e-7)
+
     def test_restitution_is_an_axis_and_the_greatest_gap_has_a_bound(self):
         found = ringsweep.sweep(BODY, {"impact.restitution": [0.0, 0.3, 0.9]}, progress=False)
         assert (found.gap_max <= 2 * (0.043378 - 0.008 - 0.0315) + 1e-9).all()

@@ -184,11 +184,16 @@ def in_chains(config: Config, indices: Indices) -> list[NDArray[np.intp]]:
 def _outcomes(
     config: Config, structure: Structure, values: Mapping[str, NDArray[np.float64]]
 ) -> dict[str, NDArray[Any]]:
-    names = model_of(structure).columns(structure)
+    model = model_of(structure)
+    names = model.columns(structure)
     result = config.solver.run(batch(structure, values), names)
     # A bound beyond the range of a float of 32 bits is infinite.
     with np.errstate(over="ignore"):
-        return {name: column.astype(OUTCOMES[name].dtype) for name, column in _columns(names, result)}
+        return {
+            name: column.astype(OUTCOMES[name].dtype)
+            for name, column in _columns(names, result)
+            if name not in model.absent
+        }
 
 
 @contextmanager
@@ -240,7 +245,9 @@ def _columns(outcomes: tuple[str, ...], result: Result) -> Iterator[tuple[str, N
     start = 0
     for name, side_by_side in groupby(outcomes):
         stop = start + len(list(side_by_side))
-        yield name, result.rows[:, start:stop] if OUTCOMES[name].dims else result.rows[:, start]
+        # Certificates use numbers that are no outcomes.
+        is_wide = name in OUTCOMES and OUTCOMES[name].dims
+        yield name, result.rows[:, start:stop] if is_wide else result.rows[:, start]
         start = stop
     yield "steps", result.steps
     yield "certified", result.certified

@@ -60,6 +60,10 @@ from ringsweep.physics.zones import cross_edge, edge_ahead, locate
 #: is then wrong by about as much.
 SUMMED = 1e-12
 
+# A reaction that reaches zero leaves a gap that does not close, but for this share of the accelerations. One that
+# passes through infinity, in the instant of a jam, leaves one that does.
+_NO_LOAD = 1e-6
+
 # A contact whose gap is this share of rho touches together with the one that closes.
 _TOGETHER = 1e-12
 
@@ -186,7 +190,12 @@ def _switch(scene, mode, guard, t, y):
         if contact != holding(mode):
             return _lands(scene, mode, contact, t, y)
         _, ring_omega, _ = drives.turn(scene.drive, t)
-        state = in_flight(motion_of(scene, y, ring_omega), mode.turned)
+        motion = motion_of(scene, y, ring_omega)
+        if gap_acceleration(scene.balls, contact, motion, (0.0, 0.0, -scene.closed.body.gravity)) < -_NO_LOAD * (
+            scene.closed.body.gravity + scene.balls.reach * motion.psi_dot * motion.psi_dot
+        ):
+            return JAM, mode, y
+        state = in_flight(motion, mode.turned)
         zeros = (3, mode.zeros_2) if contact == 1 else (mode.zeros_1, 3)
         event = opens(contact, mode.event.number, t)
         places = mode.place_1, mode.place_2
