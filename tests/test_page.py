@@ -17,7 +17,10 @@ from ringsweep.models.ring.impact.record import OUTCOMES as IMPACT_ONLY
 from ringsweep.quantities.variables import OUTCOMES
 from ringsweep.storage import netcdf
 
-BELT_ONLY = {"x_end", "velocity_end", "x_min", "x_max", "velocity_max", "slips", "first_slip", "period", "force_max"}
+BELT_ONLY = {
+    *("x_end", "velocity_end", "x_min", "x_max", "velocity_max", "slips", "first_slip", "period", "force_max"),
+    *("long_run", "lyapunov", "multiplier_1", "multiplier_2", "deflection_end", "started_from"),
+}
 
 
 @pytest.fixture

@@ -288,11 +288,11 @@ class TestCheckpoint:
     ):
         merge = netcdf.write
 
-        def vanish(*arguments):
+        def vanish(*arguments, **options):
             monkeypatch.setattr(netcdf, "write", merge)
             for path in tasks_of(half_done)[:3]:
                 path.unlink()
-            merge(*arguments)
+            merge(*arguments, **options)
 
         monkeypatch.setattr(netcdf, "write", vanish)
         ringsweep.run(config, half_done, progress=False).close()

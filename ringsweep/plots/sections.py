@@ -85,6 +85,14 @@ def bifurcation(
     ------
     InputError
         If there is no section, or it has further axes.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> points = ("speed", "section"), [[0.0, 0.0], [-1.0, 1.0]], {"units": "m", "long_name": "x"}
+    >>> ds = xr.Dataset({"x_section": points}, coords={"speed": [1.0, 2.0]})
+    >>> len(bifurcation(ds).axes)
+    1
     """
     ds, held = select(ds, sel or {})
     _require_diagram(ds)
@@ -242,6 +250,14 @@ def exponent_panel(ds: xr.Dataset, x: str | None = None, ax: Axes | None = None)
     ------
     InputError
         If the dataset has no exponents along one axis.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> attributes = {"units": "s-1", "long_name": "exponent"}
+    >>> numbers = {"lyapunov": ("speed", [-1.0, 0.5], attributes), "lyapunov_error": ("speed", [0.1, 0.1], attributes)}
+    >>> exponent_panel(xr.Dataset(numbers, coords={"speed": [1.0, 2.0]})).get_xlabel()
+    'speed'
     """
     axis = _axis(ds, x, "lyapunov")
     ax = axes_or_current(ax, _HEIGHTS["lyapunov"])
@@ -281,6 +297,14 @@ def multiplier_panel(ds: xr.Dataset, x: str | None = None, ax: Axes | None = Non
     ------
     InputError
         If the dataset has no multipliers along one axis.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> attributes = {"units": "1", "long_name": "multiplier"}
+    >>> numbers = {f"multiplier_{k}": ("speed", [0.5, 0.9], attributes) for k in (1, 2)}
+    >>> multiplier_panel(xr.Dataset(numbers, coords={"speed": [1.0, 2.0]})).get_xlabel()
+    'speed'
     """
     axis = _axis(ds, x, "multiplier_1")
     ax = axes_or_current(ax, _HEIGHTS["multiplier_1"])

@@ -37,7 +37,7 @@ from ringsweep.runs.task_sizes import TaskSizes, divide_cells, divide_into_chain
 from ringsweep.runs.warnings import warn_of_results, warn_of_sample
 from ringsweep.storage import netcdf
 from ringsweep.storage.checkpoint import Checkpoint, Columns, DamagedTask, open_checkpoint
-from ringsweep.storage.chunks import CHUNK, Layout
+from ringsweep.storage.chunks import Layout
 from ringsweep.storage.provenance import attributes, differences, environment, identity
 
 if TYPE_CHECKING:
@@ -275,7 +275,7 @@ def _layout(config: Config, whole: bool = False) -> Layout:
     if config.sample is not None:
         return sampled.part_layout(config, sampled.grid_layout(config, whole))
     sizes, section = tuple(config.axes.sizes.values()), config.scene.structure.section
-    return Layout(sizes, sizes if whole else None, max(CHUNK // (1 if section is None else section.keep), 1))
+    return Layout(sizes, sizes if whole else None, 1 if section is None else section.keep)
 
 
 def _sampled_dataset(config: Config, columns: Mapping[str, NDArray[Any]]) -> xr.Dataset:

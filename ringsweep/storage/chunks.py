@@ -26,14 +26,15 @@ class Layout:
         Length of each dimension.
     chunk : sequence of int, optional
         Length of a chunk along each dimension; chunks at the edges may be shorter. By default the longest dimension is
-        halved until a chunk has at most `most` cells.
-    most : int
+        halved until a chunk has at most :data:`CHUNK` numbers.
+    points : int, optional
+        Numbers of a cell in its longest variable.
     """
 
-    def __init__(self, sizes: Sequence[int], chunk: Sequence[int] | None = None, most: int = CHUNK):
+    def __init__(self, sizes: Sequence[int], chunk: Sequence[int] | None = None, points: int = 1):
         self.sizes = tuple(sizes)
         self.total = math.prod(self.sizes)
-        self.chunk = tuple(chunk) if chunk is not None else _chunk_shape(self.sizes, most)
+        self.chunk = tuple(chunk) if chunk is not None else _chunk_shape(self.sizes, max(CHUNK // points, 1))
 
     @cached_property
     def _chunks(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
