@@ -72,7 +72,7 @@ def main() -> None:
             solver={"method": "rk4", "steps": round(SPAN / step)},
             progress=False,
         )
-        found.append([f"{step:g} s", str(ringsweep.words(ds.regime).values[0])])
+        found.append([f"{step:g} s".replace("e-0", "e-"), str(ringsweep.words(ds.regime).values[0])])
     heading("The run, by rk4")
     table(["step", "regime"], found)
     finds = [regime == "separating" for _, regime in found]

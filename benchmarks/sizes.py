@@ -86,7 +86,7 @@ def main() -> None:
             target.unlink(missing_ok=True)
             took = cost("run", str(config), "-o", str(target))
             held = [f"{axis}={value}" for axis, value in
-                    (("friction_rough_mu_k", 0.3), ("friction_rest_mu_s", 0.2), ("initial_omega", 0.0))]  # fmt: skip
+                    (("friction_rough_mu_k", 0.3), ("friction_rest_mu_s", 0.2), ("initial_omega", 2.5))]  # fmt: skip
             picture = cost("map", str(target), "-o", str(folder / "map.png"),
                            *(word for one in held for word in ("--sel", one)))  # fmt: skip
             rows.append([

@@ -669,6 +669,8 @@ def picture(ds: xr.Dataset, chosen: Sequence[Map], path: Path) -> None:
         panel.set(xscale="linear" if map_.x.name == "mu_ratio" else "log", yscale="log")
         panel.set(xlabel=map_.x.label, ylabel=map_.y.label)
         panel.tick_params(labelsize="small")
+        for axis in (panel.xaxis, panel.yaxis):
+            axis.label.set_size("small")
     text, *unused = axes[len(drawn) :]
     for panel in (text, *unused):
         panel.set_axis_off()

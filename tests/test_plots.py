@@ -121,7 +121,7 @@ def texts_drawn(figure: Figure) -> list[Text]:
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):
             low, high = sorted(axis.get_view_interval())
-            slack = 1e-9 * (high - low)
+            slack = 1e-9 * (low if axis.get_scale() == "log" else high - low)
             for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks()):
                 if not low - slack <= tick.get_loc() <= high + slack:
                     hidden |= {tick.label1, tick.label2}
