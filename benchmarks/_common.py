@@ -81,7 +81,7 @@ def configure(
 def bare(configuration: Any) -> Callable[[], Result]:
     """A function that runs the solver on a configuration in this thread, without tasks and without a dataset."""
     structure = configuration.scene.structure
-    names = model_of(structure).outcomes
+    names = model_of(structure).columns(structure)
     count = len(next(iter(configuration.source["sweep"]["points"].values())))
     prepared = batch(structure, cells.values_of_cells(configuration.scene, configuration.axes, np.arange(count)))
     return lambda: configuration.solver.run(prepared, names)
@@ -89,7 +89,8 @@ def bare(configuration: Any) -> Callable[[], Result]:
 
 def on_one_core(configuration: Any) -> Callable[[], dict[str, Any]]:
     """A function as :func:`bare` gives it, which returns outcomes by name."""
-    names = model_of(configuration.scene.structure).outcomes
+    structure = configuration.scene.structure
+    names = model_of(structure).columns(structure)
     run = bare(configuration)
     return lambda: dict(zip(names, run().rows.T, strict=True))
 

@@ -48,7 +48,7 @@ def test_release_is_refused_until_one_command_has_filled_the_address_of_the_proj
     assert release("ftp://a b").returncode == 2
     assert release("https://host.example/owner/ringsweep").returncode == 0
     filled = [(tmp_path / name).read_text(encoding="utf-8") for name in names[:2]]
-    assert not any("placeholder" in text and "invalid" in text.split("placeholder")[1][:9] for text in filled)
+    assert not any("placeholder.invalid" in text for text in filled)
     assert 'Issues = "https://host.example/owner/ringsweep/issues"' in filled[0]
     assert "repository-code: https://host.example/owner/ringsweep\n" in filled[1]
 

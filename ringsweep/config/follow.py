@@ -14,6 +14,7 @@ from ringsweep.config.sections import suggestion
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, model_of
+from ringsweep.models.model import Continues
 from ringsweep.models.scene import LAW, Scene, Structure
 from ringsweep.physics.friction import TRAITS
 from ringsweep.quantities.units import show
@@ -107,8 +108,8 @@ def with_direction(axes: Axes, follow: Follow | None) -> Axes:
 
 def _check_continues(structure: Structure, where: str) -> None:
     """Raise an error, located at `where`, unless runs of a scene can start from the end of another one."""
-    if not model_of(structure).continues:
-        able = ", ".join(name for name, model in MODELS.items() if model.continues)
+    if not isinstance(model_of(structure), Continues):
+        able = ", ".join(name for name, model in MODELS.items() if isinstance(model, Continues))
         raise InputError(where, f"a run of model {structure.model} cannot go on from another one: model {able} can")
     if TRAITS[structure.law_type].snaps:
         problem = f"the state of friction law {structure.law} is more than a deflection: choose another law"
@@ -168,7 +169,9 @@ def put_state(doc: Document, scene: Scene, file: str, before: Scene, axes: Axes,
     ended = {path: np.full(1, value) for path, value in before.values.items()} | _end_of(file)
     ended |= {path: column.ravel()[:1] for path, (_, column) in axes.columns.items() if path != LAW}
     values = {path: np.full(1, scene.values.get(path, np.nan)) for path in {**scene.values, **dict.fromkeys(swept)}}
-    found = model_of(scene.structure).continued(scene.structure, values, ended)
+    model = model_of(scene.structure)
+    assert isinstance(model, Continues)
+    found = model.continued(scene.structure, values, ended)
     # What is too long for the bristles of this scene is an error in its place.
     found |= {path: ended["deflection_end"] for path in found if path == "initial.deflection"}
     for path, (value,) in found.items():

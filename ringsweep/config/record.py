@@ -6,7 +6,7 @@ from typing import Any
 
 from ringsweep.config.sections import section_of, suggestion
 from ringsweep.errors import InputError
-from ringsweep.models import MODELS, WITH_EXPONENT
+from ringsweep.models import MODELS
 from ringsweep.models.scene import Section
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity, show
@@ -33,8 +33,8 @@ def read_record(given: Any, model: str) -> tuple[bool, Section | None]:
     exponent = record.get("exponent", False)
     if not isinstance(exponent, bool):
         raise InputError("record.exponent", f"true or false is expected, got {show(exponent)}")
-    if exponent and model not in WITH_EXPONENT:
-        able = ", ".join(WITH_EXPONENT)
+    if exponent and not MODELS[model].has_exponent:
+        able = ", ".join(name for name, other in MODELS.items() if other.has_exponent)
         raise InputError("record.exponent", f"model {model} has none: it is known of model {able}; leave it out")
     return exponent, _section(record, model) if "section" in record else None
 

@@ -7,34 +7,19 @@ from typing import Any
 import numpy as np
 
 from ringsweep.compile import lacking
-from ringsweep.models.belt import Belt, BeltWithExponent
+from ringsweep.models.belt import Belt
 from ringsweep.models.model import Model
 from ringsweep.models.ring import Ring, RingImpact, SingleContactImpact, SingleContactRing
 from ringsweep.models.scene import Structure, Values
 from ringsweep.quantities.parameters import Parameter
 
-__all__ = [
-    "MODELS",
-    "WITH_EXPONENT",
-    "WITH_IMPACT",
-    "Model",
-    "Structure",
-    "Values",
-    "add_model",
-    "batch",
-    "model_of",
-    "parameters",
-]
+__all__ = ["MODELS", "WITH_IMPACT", "Model", "Structure", "Values", "add_model", "batch", "model_of", "parameters"]
 
 #: Models, by their names in configurations.
 MODELS: dict[str, Model] = {}
 
 #: Models of scenes with the section ``impact``, by the same names.
 WITH_IMPACT: dict[str, Model] = {"ring": RingImpact(), "ring-single-contact": SingleContactImpact()}
-
-
-#: Models of scenes whose record is asked for ``exponent``, by the same names.
-WITH_EXPONENT: dict[str, Model] = {"belt": BeltWithExponent()}
 
 
 def add_model(model: Model) -> None:
@@ -60,8 +45,6 @@ for _model in (Ring(), SingleContactRing(), Belt()):
 
 def model_of(structure: Structure) -> Model:
     """The model of a scene of this structure."""
-    if structure.exponent:
-        return WITH_EXPONENT[structure.model]
     return (WITH_IMPACT if structure.impact else MODELS)[structure.model]
 
 

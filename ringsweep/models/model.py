@@ -15,6 +15,28 @@ from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.variables import OUTCOMES, Variable
 
 
+class Continues(ABC):
+    """A model of which a run can start from the state in which another one ended."""
+
+    @abstractmethod
+    def continued(self, structure: Structure, values: Values, ended: Values) -> dict[str, NDArray[np.float64]]:
+        """Initial values that continue other runs of this model.
+
+        Parameters
+        ----------
+        structure : Structure
+        values : mapping of str to ndarray of shape ``(cells,)``
+            Values of the runs that start.
+        ended : mapping of str to ndarray of shape ``(cells,)``
+            Values of the runs that have ended, by path, and their outcomes, by name.
+
+        Returns
+        -------
+        dict of str to ndarray of shape ``(cells,)``
+            By path; values that differ from these are replaced.
+        """
+
+
 class Model(ABC):
     """A model of a mechanical system.
 
@@ -38,6 +60,8 @@ class Model(ABC):
         Outcomes whose unit or meaning differs from that of :data:`ringsweep.quantities.variables.OUTCOMES`.
     absent : frozenset of str
         Outcomes and history variables that have no meaning for this model. Datasets leave them out.
+    has_exponent : bool
+        Whether the model takes ``record.exponent``.
     sections : tuple of str
         Values of ``record.section.at`` that the model takes.
     """
@@ -50,6 +74,7 @@ class Model(ABC):
     drive_unit: ClassVar[str] = "rad"
     own_variables: ClassVar[dict[str, Variable]] = {}
     absent: ClassVar[frozenset[str]] = frozenset()
+    has_exponent: ClassVar[bool] = False
     sections: ClassVar[tuple[str, ...]] = ()
 
     @property
@@ -60,27 +85,6 @@ class Model(ABC):
     def columns(self, structure: Structure) -> tuple[str, ...]:
         """Names of the columns of a run; a variable with a dimension of its own has several, side by side."""
         return self.outcomes
-
-    #: Whether a run can start from the state in which another one ended: then there is :meth:`continued`.
-    continues: ClassVar[bool] = False
-
-    def continued(self, structure: Structure, values: Values, ended: Values) -> dict[str, NDArray[np.float64]]:
-        """Initial values that continue other runs of this model.
-
-        Parameters
-        ----------
-        structure : Structure
-        values : mapping of str to ndarray of shape ``(cells,)``
-            Values of the runs that start.
-        ended : mapping of str to ndarray of shape ``(cells,)``
-            Values of the runs that have ended, by path, and their outcomes, by name.
-
-        Returns
-        -------
-        dict of str to ndarray of shape ``(cells,)``
-            By path; values that differ from these are replaced.
-        """
-        raise NotImplementedError
 
     @property
     def laws(self) -> dict[str, type]:

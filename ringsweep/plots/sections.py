@@ -103,9 +103,10 @@ def bifurcation(
     panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
     bifurcation_panel(ds, x, var, panels[0])
     for name, ax in zip(below, panels[1:], strict=True):
-        (exponent_panel if name == "lyapunov" else multiplier_panel)(ds, x, ax)
-        # The upper panel has the key to the directions.
-        if (legend := ax.get_legend()) is not None:
+        if name == "multiplier_1":
+            multiplier_panel(ds, x, ax)
+        elif (legend := exponent_panel(ds, x, ax).get_legend()) is not None:
+            # The panel above has the key to the directions.
             legend.remove()
     for ax in panels[:-1]:
         ax.set_xlabel("")
@@ -310,10 +311,10 @@ def multiplier_panel(ds: xr.Dataset, x: str | None = None, ax: Axes | None = Non
     ax = axes_or_current(ax, _HEIGHTS["multiplier_1"])
     ax.axhspan(0.0, 1.0, color=on_page(STICK), linewidth=0, zorder=0)
     for k, (way, branch) in enumerate(_branches(ds)):
-        for name, dots in (("multiplier_1", "."), ("multiplier_2", "x")):
+        for name, dots, which in (("multiplier_1", ".", "larger one"), ("multiplier_2", "x", "smaller one")):
             if name in branch:
                 value = branch[name].transpose(*axis.dims).values[axis.order]
-                label = f"{way} {name[-1]}".strip()
+                label = f"{way}, {which}" if way else which
                 ax.plot(axis.values, value, dots, color=on_page(PAIR_COLOURS[k]), markersize=2.5, label=label)
     ax.set_ylim(0.0, max(1.1, ax.get_ylim()[1]))
     _finish(ax, axis, "multipliers")

@@ -18,6 +18,7 @@ from ringsweep.compile import readable_compile_errors, take
 from ringsweep.config import Axes, Config
 from ringsweep.config.follow import DIRECTION
 from ringsweep.models import batch, model_of
+from ringsweep.models.model import Continues
 from ringsweep.models.scene import LAW, Scene, Structure
 from ringsweep.physics.drives import turn
 from ringsweep.quantities.flags import FAILED
@@ -95,7 +96,6 @@ class TaskResult:
 def compute_task(config: Config, layout: Layout, positions: NDArray[np.integer]) -> TaskResult:
     """Compute the cells at some positions of the layout."""
     scene, axes = config.scene, config.axes
-    model = model_of(scene.structure)
     indices = dict(zip(axes.sizes, layout.indices(positions), strict=True))
     # Kernels depend on the paths that have a value, but not on the numbers of a table.
     structures = (replace(one, table=None, force=None, curve=None) for one in scene.structures.values())
@@ -111,8 +111,9 @@ def compute_task(config: Config, layout: Layout, positions: NDArray[np.integer])
             continue
         with readable_compile_errors(), _named_if_long(axes, indices, compiles):
             for cells, found in _runs(config, structure, indices, own):
-                for name, column in found.items():
-                    if name not in model.absent:
+                # A bound beyond the range of a float of 32 bits is infinite.
+                with np.errstate(over="ignore"):
+                    for name, column in found.items():
                         columns.setdefault(name, _missing(name, len(positions), column))[cells] = column
     seconds = perf_counter() - start
     # A compilation would count as time of the cells.
@@ -136,13 +137,14 @@ def _runs(
     if config.follow is None:
         yield own, _outcomes(config, structure, values)
         return
-    before: dict[str, NDArray[Any]] = {}
+    model, before = model_of(structure), dict[str, NDArray[Any]]()
+    assert isinstance(model, Continues)
     for cells in in_chains(config, {dim: along[own] for dim, along in indices.items()}):
         now = {path: column[cells] for path, column in values.items()}
         held = np.zeros(len(cells), dtype=bool)
         if before:
             held = (before["regime"] == before["motion"]) & (before["motion"] != FAILED)
-            for path, column in model_of(structure).continued(structure, now, before).items():
+            for path, column in model.continued(structure, now, before).items():
                 now[path] = np.where(held, column, now.get(path, _default(structure, path, now)))
         now["time.span"] = _whole_periods(structure, now)
         found = _outcomes(config, structure, now)
@@ -187,13 +189,7 @@ def _outcomes(
     model = model_of(structure)
     names = model.columns(structure)
     result = config.solver.run(batch(structure, values), names)
-    # A bound beyond the range of a float of 32 bits is infinite.
-    with np.errstate(over="ignore"):
-        return {
-            name: column.astype(OUTCOMES[name].dtype)
-            for name, column in _columns(names, result)
-            if name not in model.absent
-        }
+    return {name: column for name, column in _columns(names, result) if name not in model.absent}
 
 
 @contextmanager

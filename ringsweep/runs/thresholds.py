@@ -39,6 +39,8 @@ _TOLERANCE = 1e-6
 # From this ratio of the ends on, the runs of a scan stand in geometric progression.
 _WIDE = 10.0
 
+_MISSED = "two changes between neighbours among these runs would be missed"
+
 
 def threshold(
     config: str | os.PathLike[str] | Mapping[str, Any],
@@ -353,9 +355,7 @@ def in_words(found: xr.Dataset) -> str:
         lines.append(f"{regime} {does} at {at}; {side}: {beyond}")
     if not lines:
         lines.append(f"{regime} neither begins nor ends there")
-    return "\n".join(
-        [*lines, f"scan: {found.attrs['scan']}; two changes between neighbours among these runs would be missed"]
-    )
+    return "\n".join([*lines, f"scan: {found.attrs['scan']}; {_MISSED}"])
 
 
 def _quantiles_in_words(found: xr.Dataset) -> list[str]:
@@ -373,7 +373,4 @@ def _quantiles_in_words(found: xr.Dataset) -> list[str]:
         "are not known, for lack of certified runs": np.count_nonzero(np.isnan(values)),
     }
     told = "".join(f"; {count} {what}" for what, count in counts.items() if count)
-    return [
-        *lines,
-        f"scan: {found.attrs['scan']}{told}; two changes between neighbours among these runs would be missed",
-    ]
+    return [*lines, f"scan: {found.attrs['scan']}{told}; {_MISSED}"]

@@ -3,6 +3,6 @@
 # Import of these modules registers bodies for functions of `ringsweep.models.interface`.
 from ringsweep.models import sliding  # noqa: F401
 from ringsweep.models.belt import audit, bristles, creep, rk4, series, variation  # noqa: F401
-from ringsweep.models.belt.model import Belt, BeltWithExponent
+from ringsweep.models.belt.model import Belt
 
-__all__ = ["Belt", "BeltWithExponent"]
+__all__ = ["Belt"]

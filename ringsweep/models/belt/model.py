@@ -13,7 +13,7 @@ from ringsweep.errors import InputError
 from ringsweep.models.belt import section, tangent
 from ringsweep.models.belt.record import Outcome
 from ringsweep.models.interface.variation import Exponent
-from ringsweep.models.model import Model
+from ringsweep.models.model import Continues, Model
 from ringsweep.models.parts import GRAVITY, MASS, SPAN, by_formula, drive_of, friction_coefficients, law_of, table_of
 from ringsweep.models.scene import Structure, Values, require
 from ringsweep.physics import belt, drives, forces, friction, ring
@@ -28,7 +28,7 @@ _OPTIONAL = {
 }
 
 
-class Belt(Model):
+class Belt(Model, Continues):
     """A mass on a spring on a moving belt (the paper's Fig. 1)."""
 
     name: ClassVar[str] = "belt"
@@ -41,14 +41,14 @@ class Belt(Model):
         "jump_max": Variable("m/s^2", "largest jump of the acceleration of the body")
     }
 
+    has_exponent: ClassVar[bool] = True
     sections: ClassVar[tuple[str, ...]] = "period", "turn"
 
     def columns(self, structure: Structure) -> tuple[str, ...]:
-        """Outcomes, and after them the deflection of bristles and the points of the section."""
+        """Outcomes, and after them exponent and multipliers, the deflection of bristles, the points of the section."""
+        exponent = tangent.OUTCOMES if structure.exponent else ()
         bristles = ("deflection_end",) if friction.family_of(structure.law_type) is friction.Dynamic else ()
-        return (*self.outcomes, *bristles, *_points(structure))
-
-    continues: ClassVar[bool] = True
+        return (*self.outcomes, *exponent, *bristles, *_points(structure))
 
     def continued(self, structure: Structure, values: Values, ended: Values) -> dict[str, NDArray[np.float64]]:
         """Displacement, velocity, deflection and phases at the end of other runs.
@@ -226,12 +226,6 @@ class Belt(Model):
         else:
             return drive
         return forces.Forced(drive, force, constant, abs(constant) + largest)
-
-
-class BeltWithExponent(Belt):
-    """The belt whose record is asked for the exponent."""
-
-    outcomes: ClassVar[tuple[str, ...]] = Outcome._fields + tangent.OUTCOMES
 
 
 def _largest_deflection(structure: Structure, values: Values) -> NDArray[np.float64]:

@@ -372,12 +372,12 @@ def begin(scene, t, seen, band, play):
 
 @recorder.lend.implements(Belt, BristleBelt)
 def _lend(scene, record, row):
-    return changed(record, record.tangent, section.lent(scene.section, record, row))
+    return changed(record, record.shocks, record.tangent, section.lent(scene.section, record, row))
 
 
 @inlined
-def changed(r, new_tangent, new_section):
-    """Record with another tangent and other points."""
+def changed(r, new_shocks, new_tangent, new_section):
+    """Record with other shocks, another tangent and other points."""
     return Record(
         r.band,
         r.play,
@@ -388,7 +388,7 @@ def changed(r, new_tangent, new_section):
         r.force_max,
         r.stops,
         r.cycles,
-        r.shocks,
+        new_shocks,
         new_tangent,
         new_section,
     )
@@ -812,18 +812,4 @@ def _begin(scene, t, seen):
 
 @recorder.enter.implements(Belt, BristleBelt)
 def _enter(scene, record, t, seen):
-    r, shocks = record, shock.enter(record.shocks, t, seen[6])
-    return Record(
-        r.band,
-        r.play,
-        r.last,
-        r.x_min,
-        r.x_max,
-        r.velocity_max,
-        r.force_max,
-        r.stops,
-        r.cycles,
-        shocks,
-        r.tangent,
-        r.section,
-    )
+    return changed(record, shock.enter(record.shocks, t, seen[6]), record.tangent, record.section)

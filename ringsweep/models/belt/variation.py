@@ -45,7 +45,7 @@ def _end_of_cycle(asked, record):
 @inlined
 def _with(r, new):
     """Record with another tangent."""
-    return changed(r, new, r.section)
+    return changed(r, r.shocks, new, r.section)
 
 
 @variation.enter.implements(Belt)
