@@ -1,5 +1,6 @@
 """Branches: along an axis each cell starts from the end of the one before, and the run of a file goes on."""
 
+import json
 from copy import deepcopy
 
 import numpy as np
@@ -186,6 +187,9 @@ class TestErrors:
         beside = changed(LUGRE, "initial", x=1.0, **{"from": "a.nc"})
         self.refused(beside, "scene.initial.x", "leave one out")
         self.refused(changed(LUGRE, "initial", **{"from": str(tmp_path / "no.nc")}), "scene.initial.from", "no.nc")
+        configuration = tmp_path / "lugre.yaml"
+        configuration.write_text(json.dumps({"scene": LUGRE}))
+        self.refused(changed(LUGRE, "initial", **{"from": str(configuration)}), "scene.initial.from", "no result file")
         run(LUGRE, tmp_path / "two.nc", sweep={"grid": {"initial.x": [0.0, 0.1]}}).close()
         several = changed(LUGRE, "initial", **{"from": str(tmp_path / "two.nc")})
         self.refused(several, "scene.initial.from", "2 runs")

@@ -185,7 +185,11 @@ def put_state(doc: Document, scene: Scene, file: str, before: Scene, axes: Axes,
 def _end_of(file: str) -> dict[str, NDArray[np.float64]]:
     """Numbers at the end of the run that a file holds."""
     where = "scene.initial.from"
-    with netCDF4.Dataset(file) as content:
+    try:
+        opened = netCDF4.Dataset(file)
+    except OSError:
+        raise InputError(where, f"{file} is no result file: `ringsweep run` or `simulate` writes one") from None
+    with opened as content:
         found = {}
         for name, last in (("t_end", "time"), ("x_end", "x"), ("velocity_end", "velocity"),
                            ("deflection_end", "deflection")):  # fmt: skip
