@@ -14,7 +14,7 @@ from __future__ import annotations
 from math import cos, inf, isnan, sin
 from typing import NamedTuple
 
-from ringsweep.compile import absorbed, inlined
+from ringsweep.compile import absorbed, hook, inlined
 from ringsweep.models.interface import modes, series
 from ringsweep.models.interface.shock import Located
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
@@ -109,14 +109,25 @@ class Mode(NamedTuple):
 @modes.initial_state.implements(ring.Ring)
 def _initial_state(scene):
     t, phi, launch = drives.beginning(scene.drive), scene.initial_phi, ring.launch_velocity(scene)
-    v = drives.velocity_at_beginning(scene.drive, launch) * scene.body.radius
+    return t, (phi, _sliding_at_start(scene.drive, scene, t, phi, launch))
+
+
+@hook(optional=True)
+def _sliding_at_start(drive, scene, t, phi, launch):
+    """Sliding velocity at the first instant of a run that is launched at `launch`, rad/s; m/s."""
+    return drives.velocity_at_beginning(drive, launch) * scene.body.radius
+
+
+@_sliding_at_start.implements(drives.Power)
+def _sliding_at_start_of_power(drive, scene, t, phi, launch):
+    v = drives.velocity_at_beginning(drive, launch) * scene.body.radius
     # Even a ring that starts with an infinite acceleration takes a body along that is wedged between its contacts.
     if launch == 0.0 and v != 0.0 and stiction_band(scene.law) == 0.0:
-        theta, _, _ = drives.turn(scene.drive, t)
+        theta, _, _ = drives.turn(drive, t)
         status, mode = _mode_at_rest(scene, t, phi, *places_at(scene, phi - theta), 0)
         if status == RUNNING and mode.sign == 0:
-            v = 0.0
-    return t, (phi, v)
+            return 0.0
+    return v
 
 
 @series.table_shape.implements(ring.Ring)
