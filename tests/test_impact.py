@@ -276,6 +276,32 @@ class TestBody:
         found = ringsweep.sweep(scene | {"impact": {"restitution": 0.0}}, {"time.span": [0.256649]}, progress=False)
         assert found.t_end.item() == pytest.approx(0.24783247, abs=1e-7)
 
+    def test_last_rebounds_that_friction_forbids_close_the_contact(self):
+        """An impact at one contact while the other one holds need not have a solution with restitution.
+
+        Among the last of unending rebounds, of 1e-8 m/s, the body closes and goes on. Gap and time are those of
+        ``benchmarks.reference``.
+        """
+        scene = {
+            "model": "ring",
+            "body": {
+                "mass": 0.213905, "inertia": 6.69e-05, "half_distance": 0.0255529, "ball_radius": 0.00972928,
+                "center_offset": 0.0,
+            },
+            "ring": {"radius": 0.0362977},
+            "friction": {
+                "law": "tustin", "alpha": 1702030.0,
+                "rest": {"mu_s": 0.366641, "mu_k": 0.366641}, "rough": {"mu_s": 0.00943182, "mu_k": 0.00778139},
+            },
+            "zone": {"half_angle": 1.03967, "center": 2.16646},
+            "drive": {"law": "power", "amplitude": -6.43394, "exponent": 2.20164},
+            "initial": {"phi": 1.03281, "omega": 0.0},
+            "time": {"span": 1.2},
+        }  # fmt: skip
+        found = ringsweep.sweep(scene | {"impact": {"restitution": 0.7348}}, {"time.span": [1.2]}, progress=False)
+        assert found.t_end.item() == 1.2
+        assert found.gap_max.item() == pytest.approx(0.002025674, abs=1e-9)
+
     def test_restitution_is_an_axis_and_the_greatest_gap_has_a_bound(self):
         found = ringsweep.sweep(BODY, {"impact.restitution": [0.0, 0.3, 0.9]}, progress=False)
         assert (found.gap_max <= 2 * (0.043378 - 0.008 - 0.0315) + 1e-9).all()

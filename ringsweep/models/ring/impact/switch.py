@@ -311,6 +311,12 @@ def _lands(scene, mode, hit, t, y):
     which, lasts = (1 if hits_1 else 0) + (2 if hits_2 else 0), 0.0
     while True:
         found = impulses(body.mass, moment, first, second, touching, mu, restitution)
+        if found.solutions == 0 and lasts == 0.0:
+            # Friction may forbid that a contact rebounds while the other one holds: among the last rebounds it closes.
+            lasts = _rebounds_end(scene, mode, t, y, motion, hit, e * closing, e)
+            restitution = 0.0, 0.0
+            if lasts > 0.0:
+                continue
         if found.solutions != 1:
             return JAM, mode, y
         after = after_impact(body.mass, moment, first, second, motion, found)
