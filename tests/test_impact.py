@@ -302,6 +302,14 @@ class TestBody:
         assert found.t_end.item() == 1.2
         assert found.gap_max.item() == pytest.approx(0.002025674, abs=1e-9)
 
+    def test_pivot_breaks_away_where_friction_does_not_fall(self):
+        """The acceleration is zero at breakaway, and grows. The time of the jam is that of ``benchmarks.reference``."""
+        friction = {"law": "stiction", "rough": {"mu_s": 0.366122, "mu_k": 0.366122}}
+        friction["rest"] = {"mu_s": 0.618378, "mu_k": 0.618378}
+        scene = BODY | {"friction": friction, "drive": {"law": "arctan", "amplitude": 11.9243}}
+        found = ringsweep.sweep(scene, {"impact.restitution": [0.678]}, progress=False)
+        assert found.t_end.item() == pytest.approx(1.102354443, rel=1e-6)
+
     def test_restitution_is_an_axis_and_the_greatest_gap_has_a_bound(self):
         found = ringsweep.sweep(BODY, {"impact.restitution": [0.0, 0.3, 0.9]}, progress=False)
         assert (found.gap_max <= 2 * (0.043378 - 0.008 - 0.0315) + 1e-9).all()

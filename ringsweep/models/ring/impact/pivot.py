@@ -163,7 +163,8 @@ def begun(scene, t, y, places, contacts, zeros, event, stick_end):
             K, _ = friction(scene, slip, 0.0)
             psi_dd, alpha_dd, normal, denominator = in_slip(scene, f, K)
             push = sign * sliding_acceleration(scene, psi_dd, alpha_dd, ring_epsilon)
-            if stick_end == sign and push > -1e-9 * size(scene, f):
+            # At breakaway no friction is greater than that in stick. Where it does not fall, the push begins at zero.
+            if stick_end == sign and abs(K) <= mu_s:
                 push = max(push, 1e-12 * size(scene, f))
             if denominator > 0.0 and normal > least and push > best:
                 several = several or (best > least / body.mass and push > least / body.mass)
