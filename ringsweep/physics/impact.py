@@ -137,8 +137,21 @@ def side_of(contact):
 
 
 @inlined
-def contact_of(balls, contact, motion, race_speed):
-    """A ball and the point of the race next to it; `race_speed` is R d theta/dt, m/s."""
+def relative_to_race(motion, ring_omega):
+    """Motion as an observer sees it who turns with the race, m/s and rad/s."""
+    return Motion(
+        motion.psi,
+        motion.psi_dot - ring_omega,
+        motion.x,
+        motion.x_dot + ring_omega * motion.y,
+        motion.y,
+        motion.y_dot - ring_omega * motion.x,
+    )
+
+
+@inlined
+def contact_of(balls, contact, motion):
+    """A ball and the point of the race next to it; its slip is right if `motion` is relative to the race."""
     side, s, c = side_of(contact), sin(motion.psi), cos(motion.psi)
     a, h = side * balls.half_distance, balls.offset
     # From the centre of mass to the centre of the ball.
@@ -153,7 +166,7 @@ def contact_of(balls, contact, motion, race_speed):
         cosine,
         balls.reach - distance,
         y_dot * cosine - x_dot * sine,
-        x_dot * cosine + y_dot * sine + balls.radius * motion.psi_dot - race_speed,
+        x_dot * cosine + y_dot * sine + balls.radius * motion.psi_dot,
         across * cosine + up * sine,
         balls.radius + across * sine - up * cosine,
     )

@@ -53,7 +53,7 @@ def _violation(scene, mode, forcing, y, rates, s, tolerance):
     allowed = scene.balls.reach * (_GAP_ROUNDING + tolerance)
     for contact in (1, 2):
         if (contact == 1 or ring.contact_count(scene.closed.body) == 2) and mode.open & contact:
-            largest = larger(largest, -contact_of(scene.balls, contact, motion, 0.0).gap / allowed)
+            largest = larger(largest, -contact_of(scene.balls, contact, motion).gap / allowed)
     if mode.open == BOTH:
         return largest, 0.0
     violation, power = _violation_on_one_contact(scene, mode, forcing, y, rates, s, tolerance)

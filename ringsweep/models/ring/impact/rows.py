@@ -25,8 +25,8 @@ def row_of(scene, mode, forcing, y, seen):
     psi, rate, normal_1, normal_2, located = seen[0], seen[1], seen[2], seen[3], seen[4]
     event, (theta, ring_omega, _) = mode.event, forcing
     motion = motion_of(scene, y, ring_omega)
-    first = contact_of(scene.balls, 1, motion, 0.0)
-    second = contact_of(scene.balls, 2, motion, 0.0) if ring.contact_count(scene.closed.body) == 2 else first
+    first = contact_of(scene.balls, 1, motion)
+    second = contact_of(scene.balls, 2, motion) if ring.contact_count(scene.closed.body) == 2 else first
     surface = scene.closed.surface
     _, _, zone_1 = coefficients(surface, locate(surface, first.alpha - theta)[0])
     _, _, zone_2 = coefficients(surface, locate(surface, second.alpha - theta)[0])

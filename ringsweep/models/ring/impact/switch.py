@@ -52,6 +52,7 @@ from ringsweep.physics.impact import (
     gap_acceleration,
     impulses,
     inertia,
+    relative_to_race,
     side_of,
 )
 from ringsweep.physics.zones import cross_edge, edge_ahead, locate
@@ -288,10 +289,12 @@ def _lands(scene, mode, hit, t, y):
     """Status, mode and state after the gap of a contact has reached zero."""
     body, balls = scene.closed.body, scene.balls
     theta, ring_omega, _ = drives.turn(scene.drive, t)
-    motion, race = motion_of(scene, y, ring_omega), body.radius * ring_omega
+    motion = motion_of(scene, y, ring_omega)
+    # Velocities seen from the race keep their digits in the slowest impacts: the contacts move as one body.
+    seen = relative_to_race(motion, ring_omega) if mode.open == BOTH else motion_of(scene, y, 0.0)
     two = ring.contact_count(body) == 2
-    first = contact_of(balls, 1, motion, race)
-    second = contact_of(balls, 2, motion, race) if two else first
+    first = contact_of(balls, 1, seen)
+    second = contact_of(balls, 2, seen) if two else first
     near = _TOGETHER * balls.reach
     hits_1, hits_2 = hit == 1, hit == 2
     touches_1, touches_2 = hits_1, hits_2
