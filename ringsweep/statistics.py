@@ -388,8 +388,9 @@ def morris_effects(sums: Floats, size: int, independent: bool, indicator: bool) 
     """Mean magnitude of the elementary effects with its 95 % interval, and their standard deviation.
 
     M. D. Morris, Technometrics 33, 1991; F. Campolongo, J. Cariboni, A. Saltelli, Environmental Modelling & Software
-    22, 2007. The magnitude of an indicator's effect is 0 or 2: half of its mean has the interval of a share. For other functions the interval comes from the means of the replicates. Effects of a function that is missing (NaN)
-    somewhere are NaN.
+    22, 2007. The magnitude of an indicator's effect is 0 or 2: half of its mean has the interval of a share. For other
+    functions the interval comes from the means of the replicates. Effects of a function that is missing (NaN) somewhere
+    are NaN.
 
     Parameters
     ----------
