@@ -214,6 +214,12 @@ def test_the_effect_of_a_factor_of_a_product_varies_with_the_other() -> None:
     assert sigma == pytest.approx([12.0**-0.5] * 2, abs=1e-3)
 
 
+def test_effects_of_a_function_that_is_missing_somewhere_are_not_known() -> None:
+    mu_star, sigma = effects(lambda u: np.where(u[..., 0] > 0.9, np.nan, u[..., 1]), 2, 16)
+    assert np.isnan(mu_star[:, 0]).all()
+    assert np.isnan(sigma[0])
+
+
 def test_intervals_cover_known_effects() -> None:
     covered, known = np.zeros(2), np.array([1 / 3, 0.5])
     for seed in range(100):
@@ -429,13 +435,15 @@ def test_a_sampled_sweep_that_is_stopped_goes_on_bit_for_bit(tmp_path: Any, monk
         assert (memory[name].values == whole[name].values).all()
 
 
-@pytest.mark.parametrize("method", ["sobol", "random"])
+@pytest.mark.parametrize(
+    ("method", "sensitivity", "rows"), [("sobol", True, 3), ("random", True, 3), ("sobol", "morris", 2)]
+)
 def test_a_larger_sample_continues_a_smaller_one_bit_for_bit(
-    method: str, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
+    method: str, sensitivity: Any, rows: int, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from ringsweep.runs import sampled
 
-    given = config(grid={"belt.velocity": [0.05, 0.1]}, sensitivity=True, survival=[3.0], method=method, n=64)
+    given = config(grid={"belt.velocity": [0.05, 0.1]}, sensitivity=sensitivity, survival=[3.0], method=method, n=64)
     run(given, tmp_path / "few.nc")
     given["sweep"]["sample"] |= {"n": 256}
     fresh = run(given, tmp_path / "fresh.nc")
@@ -444,7 +452,7 @@ def test_a_larger_sample_continues_a_smaller_one_bit_for_bit(
     continued = run(given, tmp_path / "many.nc", reuse=tmp_path / "few.nc")
     for name in fresh.data_vars:
         assert_identical(continued[name], fresh[name])
-    assert sum(cells) == 2 * (256 - 64) * 3
+    assert sum(cells) == 2 * (256 - 64) * rows
 
 
 def test_the_file_does_not_grow_with_the_sample(tmp_path: Any) -> None:
