@@ -165,6 +165,30 @@ def saltelli(points: Floats) -> Floats:
     return np.concatenate([a[:, None], mixed, b[:, None]], axis=1)
 
 
+def trajectories(points: Floats) -> Floats:
+    """Morris's design: from each point one parameter after the other moves by half of its distribution.
+
+    The direction is the one that stays within 0 to 1, so a shifted point is drawn like the point itself.
+
+    Parameters
+    ----------
+    points : ndarray of shape ``(count, parameters)``
+
+    Returns
+    -------
+    ndarray of shape ``(count, parameters + 1, parameters)``
+    """
+    rows = np.repeat(points[:, None, :], points.shape[1] + 1, axis=1)
+    moved = np.clip(points + 0.5 * _directions(points), 2.0**-53, 1.0 - 2.0**-53)
+    for k in range(points.shape[1]):
+        rows[:, k + 1 :, k] = moved[:, k, None]
+    return rows
+
+
+def _directions(points: Floats) -> Floats:
+    return np.where(points < 0.5, 1.0, -1.0)
+
+
 # Shares
 
 
@@ -339,6 +363,65 @@ def sobol_indices(sums: Floats, size: int) -> tuple[Floats, Floats]:
     high = np.where(known, np.clip(pooled + half, 0.0, 1.0), 1.0)
     first, total = np.moveaxis(np.stack([np.clip(pooled, 0.0, 1.0), low, high]), -1, 0)
     return first, total
+
+
+def morris_sums(rows: Floats, points: Floats) -> Floats:
+    """Sums of elementary effects, from which :func:`morris_effects` follow. Sums of two parts add up.
+
+    Parameters
+    ----------
+    rows : ndarray of shape ``(count, parameters + 1)``
+        Values of a function along :func:`trajectories`.
+    points : ndarray of shape ``(count, parameters)``
+        Points at which they begin.
+
+    Returns
+    -------
+    ndarray of shape ``(3 * parameters,)``
+        For each parameter the sums of the effect, of its magnitude and of its square.
+    """
+    effects = np.diff(rows, axis=1) / (0.5 * _directions(points))
+    return np.stack([effects.sum(axis=0), np.abs(effects).sum(axis=0), (effects**2).sum(axis=0)], axis=-1).ravel()
+
+
+def morris_effects(sums: Floats, size: int, independent: bool, indicator: bool) -> tuple[Floats, Floats]:
+    """Mean magnitude of the elementary effects with its 95 % interval, and their standard deviation.
+
+    M. D. Morris, Technometrics 33, 1991; F. Campolongo, J. Cariboni, A. Saltelli, Environmental Modelling & Software
+    22, 2007. The magnitude of an indicator's effect is 0 or 2: half of its mean has the interval of a share. For other
+    functions the interval comes from the means of the replicates. Effects of a function that is missing (NaN) somewhere
+    are NaN.
+
+    Parameters
+    ----------
+    sums : ndarray of shape ``(..., replicates, 3 * parameters)``
+        Of :func:`morris_sums`.
+    size : int
+        Trajectories of each replicate.
+    independent : bool
+        As for :func:`share_interval`.
+    indicator : bool
+        Whether the function is 0 or 1.
+
+    Returns
+    -------
+    mu_star : ndarray of shape ``(3, ..., parameters)``
+        Mean magnitude, and the ends of its interval, per whole distribution of the parameter.
+    sigma : ndarray of shape ``(..., parameters)``
+    """
+    replicates = sums.shape[-2]
+    count = replicates * size
+    each = sums.reshape(*sums.shape[:-1], -1, 3)
+    total = each.sum(axis=-3)
+    mean, mu_star, square = (total[..., k] / count for k in range(3))
+    variance = square - mean**2
+    # Below this it is rounding.
+    sigma = np.sqrt(np.where(variance <= 1e-12 * square, 0.0, variance) * (count / (count - 1)))
+    if indicator:
+        low, high = share_interval(np.moveaxis(each[..., 1], -2, -1) / 2.0, size, independent)
+        return np.stack([mu_star, 2.0 * low, 2.0 * high]), sigma
+    half = _student(replicates - 1.0) * (each[..., 1] / size).std(axis=-2, ddof=1) / np.sqrt(replicates)
+    return np.stack([mu_star, np.maximum(mu_star - half, 0.0), mu_star + half]), sigma
 
 
 def _variance(sums: Floats, count: int) -> Floats:

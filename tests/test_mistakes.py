@@ -62,6 +62,7 @@ SAMPLES: list[tuple[dict[str, Any], str, str]] = [
     ({"methods": "sobol"}, "sweep.sample.methods", "did you mean `method`"),
     ({"keep": 1}, "sweep.sample.keep", "true or false"),
     ({"sensitivity": "yes"}, "sweep.sample.sensitivity", "true or false"),
+    ({"sensitivity": "moris"}, "sweep.sample.sensitivity", "did you mean `morris`"),
     ({"of": {}}, "sweep.sample.of", "paths and distributions"),
     ({"of": [1]}, "sweep.sample.of", "paths and distributions"),
     ({"of": {"friction.mus": {"normal": [1, 1]}}}, "sweep.sample.of.friction.mus", "did you mean `friction.mu_s`"),

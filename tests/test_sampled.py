@@ -18,12 +18,15 @@ from ringsweep.plots import probability_panel, regime_map, sensitivity_panel, su
 from ringsweep.quantities.flags import REGIMES
 from ringsweep.statistics import (
     clopper_pearson,
+    morris_effects,
+    morris_sums,
     quantiles,
     saltelli,
     share_interval,
     sobol_indices,
     sobol_sums,
     summarised,
+    trajectories,
     unit_points,
 )
 
@@ -191,6 +194,54 @@ def test_indices_agree_with_those_of_salib() -> None:
     assert total[0] == pytest.approx(theirs["ST"], abs=0.02)
 
 
+def effects(function: Any, dimension: int, size: int, seed: int = 3) -> Any:
+    points = [unit_points("sobol", size, dimension, seed, r) for r in range(8)]
+    return morris_effects(np.stack([morris_sums(function(trajectories(u)), u) for u in points]), size, False, False)
+
+
+def test_effects_of_a_linear_function_are_its_coefficients_and_do_not_vary() -> None:
+    coefficients = np.array([3.0, -2.0, 0.0])
+    mu_star, sigma = effects(lambda u: 5.0 + u @ coefficients, 3, 4)
+    assert mu_star[0] == pytest.approx(np.abs(coefficients), abs=1e-9)
+    assert mu_star[1] == pytest.approx(mu_star[2], abs=1e-9)
+    assert sigma.tolist() == [0.0, 0.0, 0.0]
+
+
+def test_the_effect_of_a_factor_of_a_product_varies_with_the_other() -> None:
+    """The effect of u in u v is v, which is uniform."""
+    mu_star, sigma = effects(lambda u: u[..., 0] * u[..., 1], 2, 1024)
+    assert mu_star[0] == pytest.approx([0.5, 0.5], abs=1e-3)
+    assert sigma == pytest.approx([12.0**-0.5] * 2, abs=1e-3)
+
+
+def test_effects_of_a_function_that_is_missing_somewhere_are_not_known() -> None:
+    mu_star, sigma = effects(lambda u: np.where(u[..., 0] > 0.9, np.nan, u[..., 1]), 2, 16)
+    assert np.isnan(mu_star[:, 0]).all()
+    assert np.isnan(sigma[0])
+
+
+def test_intervals_cover_known_effects() -> None:
+    covered, known = np.zeros(2), np.array([1 / 3, 0.5])
+    for seed in range(100):
+        (_, low, high), _ = effects(lambda u: u[..., 0] * u[..., 1] ** 2, 2, 16, seed)
+        # The effect of v in u v^2 from v to v + 1/2 is u (2 v + 1/2), with v uniform below 1/2.
+        covered += (low <= known) & (known <= high)
+    assert (covered >= 88).all()
+
+
+def test_effects_agree_with_those_of_salib() -> None:
+    morris = pytest.importorskip("SALib.analyze.morris")
+    points = unit_points("random", 64, 3, 1, 0)
+    path = trajectories(points)
+    rows = ishigami(path)
+    mu_star, sigma = morris_effects(np.stack([morris_sums(rows, points)] * 8), 64, True, False)
+    problem = {"num_vars": 3, "names": ["a", "b", "c"], "bounds": [[0, 1]] * 3}
+    theirs = morris.analyze(problem, path.reshape(-1, 3), rows.ravel(), num_levels=4, seed=1)
+    # Their step is 2/3 with four levels; ours is 1/2. One part given eight times counts as 512 trajectories.
+    assert mu_star[0] == pytest.approx(np.asarray(theirs["mu_star"]) * (2 / 3) / 0.5)
+    assert sigma * np.sqrt(511 / 512 * 64 / 63) == pytest.approx(np.asarray(theirs["sigma"]) * (2 / 3) / 0.5)
+
+
 @pytest.mark.parametrize("missing", [False, True])
 def test_a_function_that_does_not_vary_or_has_gaps_has_indices_of_which_nothing_is_known(missing: bool) -> None:
     rows = np.ones((8, 16, 4))
@@ -249,6 +300,40 @@ def test_indices_of_the_way_of_a_body_that_rides_are_those_of_a_product() -> Non
     assert ds.t_end_sobol_first.values == pytest.approx([0.0, 1.0], abs=0.01)
     # All ride: nothing is known of what the regime hangs on.
     assert (ds.sobol_first_high == 1.0).all()
+
+
+def test_effects_on_the_way_of_a_body_that_rides_follow_from_its_velocity() -> None:
+    """x = v T with v uniform and T fixed is linear; the body always rides, so no effect on its regime is seen."""
+    of = {"belt.velocity": {"uniform": [0.05, 0.15]}, "friction.mu_s": {"uniform": [0.3, 0.4]}}
+    scene = {"scene": BELT | {"time": {"span": 4.0}}}
+    ds = run(config(of=of, n=64, sensitivity={"of": ["x_end"], "method": "morris"}) | scene)
+    assert ds.x_end_morris_mu_star.values == pytest.approx([0.4, 0.0], abs=1e-6)
+    assert ds.x_end_morris_sigma.values == pytest.approx([0.0, 0.0], abs=1e-6)
+    assert ds.x_end_morris_mu_star.attrs["units"] == "m"
+    assert (ds.morris_mu_star == 0.0).all()
+    # A share of 64 of which none was seen.
+    assert ((ds.morris_mu_star_high > 0.02) & (ds.morris_mu_star_high < 0.4)).all()
+    assert ds.probability.sel(word="riding") == 1.0
+    assert "64 runs in each cell, and 128 more for the elementary effects" in ds.attrs["sample"]
+
+
+def test_effects_on_a_regime_are_counts_of_runs_that_change_it() -> None:
+    """The body slips within 7 s if mu_s m g <= k v 7 s."""
+    of = {"friction.mu_s": {"uniform": [0.1, 0.2]}, "belt.velocity": {"uniform": [0.08, 0.12]}}
+    scene = {"scene": BELT | {"time": {"span": 7.0}}}
+    ds = run(config(of=of, n=256, sensitivity="morris") | scene)
+    rows = np.concatenate([trajectories(unit_points("sobol", 32, 2, 0, r)) for r in range(8)])
+    rides = (0.1 + 0.1 * rows[..., 0]) * 9.81 > 2.0 * (0.08 + 0.04 * rows[..., 1]) * 7.0
+    changed = (rides[:, 1:] != rides[:, :-1]).mean(axis=0)
+    riding = ds.sel(word="riding")
+    assert riding.morris_mu_star.values == pytest.approx(2.0 * changed)
+    assert (riding.morris_mu_star_low < riding.morris_mu_star).all()
+    assert (riding.morris_mu_star < riding.morris_mu_star_high).all()
+    assert riding.probability == rides[:, 0].mean()
+    from matplotlib.figure import Figure
+
+    bars = sensitivity_panel(ds, Figure().add_subplot(), word="riding")
+    assert bars.get_xlabel() == "elementary effect (95 % interval)"
 
 
 def test_indices_of_a_slip_until_a_time_are_those_of_runs_of_the_same_points() -> None:
@@ -350,13 +435,15 @@ def test_a_sampled_sweep_that_is_stopped_goes_on_bit_for_bit(tmp_path: Any, monk
         assert (memory[name].values == whole[name].values).all()
 
 
-@pytest.mark.parametrize("method", ["sobol", "random"])
+@pytest.mark.parametrize(
+    ("method", "sensitivity", "rows"), [("sobol", True, 3), ("random", True, 3), ("sobol", "morris", 2)]
+)
 def test_a_larger_sample_continues_a_smaller_one_bit_for_bit(
-    method: str, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
+    method: str, sensitivity: Any, rows: int, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from ringsweep.runs import sampled
 
-    given = config(grid={"belt.velocity": [0.05, 0.1]}, sensitivity=True, survival=[3.0], method=method, n=64)
+    given = config(grid={"belt.velocity": [0.05, 0.1]}, sensitivity=sensitivity, survival=[3.0], method=method, n=64)
     run(given, tmp_path / "few.nc")
     given["sweep"]["sample"] |= {"n": 256}
     fresh = run(given, tmp_path / "fresh.nc")
@@ -365,7 +452,7 @@ def test_a_larger_sample_continues_a_smaller_one_bit_for_bit(
     continued = run(given, tmp_path / "many.nc", reuse=tmp_path / "few.nc")
     for name in fresh.data_vars:
         assert_identical(continued[name], fresh[name])
-    assert sum(cells) == 2 * (256 - 64) * 3
+    assert sum(cells) == 2 * (256 - 64) * rows
 
 
 def test_the_file_does_not_grow_with_the_sample(tmp_path: Any) -> None:

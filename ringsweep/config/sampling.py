@@ -21,7 +21,7 @@ from ringsweep.models.scene import Scene
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.units import quantity, show
 from ringsweep.quantities.variables import OUTCOMES
-from ringsweep.statistics import DISTRIBUTIONS, METHODS, saltelli, unit_points
+from ringsweep.statistics import DISTRIBUTIONS, METHODS, saltelli, trajectories, unit_points
 
 #: Keys of ``sweep.sample`` with a number.
 NUMBERS = {
@@ -32,6 +32,9 @@ NUMBERS = {
 
 #: Keys of ``sweep.sample``.
 KEYS = (*NUMBERS, "method", "of", "quantiles", "survival", "sensitivity", "keep")
+
+#: What `sweep.sample.sensitivity` can ask for; `true` is the first.
+SENSITIVITIES = ("sobol", "morris")
 
 _LEVEL = Parameter("1", "level of a quantile", lower=0, upper=1, open_lower=True, open_upper=True)
 
@@ -100,8 +103,8 @@ class Sample:
         Levels by variable.
     survival : tuple of float
         Times at which it is asked whether the contacts still hold, s.
-    sensitivity : bool
-        Whether Sobol indices are asked for.
+    sensitivity : str
+        One of :data:`SENSITIVITIES`, or empty.
     sensitive : tuple of str
         Variables whose own indices are asked for, beside those of the regimes; for a time that some runs do not have,
         those of whether it has come at the times of `survival`.
@@ -116,7 +119,7 @@ class Sample:
     replicates: int
     quantiles: Mapping[str, tuple[float, ...]]
     survival: tuple[float, ...]
-    sensitivity: bool
+    sensitivity: str
     sensitive: tuple[str, ...]
     keep: bool
 
@@ -128,7 +131,12 @@ class Sample:
     @property
     def rows(self) -> int:
         """Runs for each point."""
-        return len(self.factors) + 2 if self.sensitivity else 1
+        return len(self.factors) + len(self.own) if self.sensitivity else 1
+
+    @property
+    def own(self) -> list[int]:
+        """Which of the runs for each point are points of the sample itself."""
+        return [0, -1] if self.sensitivity == "sobol" else [0]
 
     @property
     def independent(self) -> bool:
@@ -174,9 +182,10 @@ class Sample:
 
 
 @lru_cache(maxsize=8)
-def _shares(method: str, size: int, factors: int, seed: int, replicate: int, sensitivity: bool) -> NDArray[np.float64]:
-    if not sensitivity:
-        return unit_points(method, size, factors, seed, replicate)
+def _shares(method: str, size: int, factors: int, seed: int, replicate: int, sensitivity: str) -> NDArray[np.float64]:
+    if sensitivity != "sobol":
+        points = unit_points(method, size, factors, seed, replicate)
+        return trajectories(points).reshape(-1, factors) if sensitivity else points
     return saltelli(unit_points(method, size, 2 * factors, seed, replicate)).reshape(-1, factors)
 
 
@@ -395,13 +404,19 @@ def _outcomes(scene: Scene) -> list[str]:
     return [name for name in model.outcomes if OUTCOMES[name].dtype == "float64" and name not in model.absent]
 
 
-def _sensitivity(given: Any, scene: Scene, timed: bool) -> tuple[bool, tuple[str, ...]]:
-    """Whether indices are asked for, and of which variables beside the regimes."""
+def _sensitivity(given: Any, scene: Scene, timed: bool) -> tuple[str, tuple[str, ...]]:
+    """Which measure is asked for, and of which variables beside the regimes."""
     if isinstance(given, bool):
+        return SENSITIVITIES[0] * given, ()
+    if given in SENSITIVITIES:
         return given, ()
     where = "sweep.sample.sensitivity"
-    if not isinstance(given, dict) or set(given) != {"of"}:
-        raise InputError(where, f"true or false is expected, or {{of: [t_end]}}, got {show(given)}")
+    if not isinstance(given, dict) or not {"of"} <= set(given) <= {"of", "method"}:
+        problem = f"true or false is expected, morris, or {{of: [t_end]}}, got {show(given)}"
+        raise InputError(where, problem + (suggestion(given, SENSITIVITIES) if isinstance(given, str) else ""))
+    method = given.get("method", SENSITIVITIES[0])
+    if method not in SENSITIVITIES:
+        raise InputError(f"{where}.method", f"{show(method)} is not a method" + suggestion(method, SENSITIVITIES))
     if not isinstance(given["of"], list) or not given["of"]:
         raise InputError(f"{where}.of", f"a list of variables is expected, got {show(given['of'])}")
     time = censored(scene)
@@ -412,7 +427,7 @@ def _sensitivity(given: Any, scene: Scene, timed: bool) -> tuple[bool, tuple[str
             raise InputError(f"{where}.of.{k}", problem)
         if not isinstance(name, str) or name not in names:
             raise InputError(f"{where}.of.{k}", f"{show(name)} is no number of this model" + suggestion(name, names))
-    return True, tuple(dict.fromkeys(given["of"]))
+    return method, tuple(dict.fromkeys(given["of"]))
 
 
 def _survival(given: Any, scene: Scene) -> tuple[float, ...]:

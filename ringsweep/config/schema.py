@@ -17,6 +17,7 @@ from ringsweep.config.motion import FORMULA as FORMULA_DRIVE
 from ringsweep.config.record import INSTANTS, KEEP
 from ringsweep.config.refinement import NUMBERS
 from ringsweep.config.sampling import NUMBERS as SAMPLE_NUMBERS
+from ringsweep.config.sampling import SENSITIVITIES
 from ringsweep.config.tables import TABLES
 from ringsweep.models import MODELS, WITH_IMPACT, parameters
 from ringsweep.models.scene import LAW, Structure
@@ -271,6 +272,8 @@ def _sample(names: dict[str, Any]) -> dict[str, Any]:
     kinds["file"] = {"description": "CSV file with a column for each path; a row is a draw", "type": "string"}
     kinds["over"] = {"description": "path that the draw is multiplied by", "type": "string"}
     levels = _list({"type": ["number", "string"]})
+    measure = {"enum": [*SENSITIVITIES]}
+    asked = _section({"of": _list({"type": "string"}), "method": measure})
     times = {"anyOf": [_list(value), *(_section({kind: _list(value)}) for kind in ("linspace", "geomspace"))]}
     found = _section(
         {
@@ -286,8 +289,8 @@ def _sample(names: dict[str, Any]) -> dict[str, Any]:
             "quantiles": {"description": "variable -> levels", "type": "object", "additionalProperties": levels},
             "survival": {"description": "times at which it is asked whether the contacts still hold", **times},
             "sensitivity": {
-                "description": "whether Sobol indices are computed, and of which variables beside the regimes",
-                "anyOf": [{"type": "boolean"}, {**_section({"of": _list({"type": "string"})}), "required": ["of"]}],
+                "description": "Sobol indices (true) or Morris's effects, and of which variables beside the regimes",
+                "anyOf": [{"type": "boolean"}, measure, {**asked, "required": ["of"]}],
             },
             "keep": {"description": "whether the result holds the runs too", "type": "boolean"},
         }

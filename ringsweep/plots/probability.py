@@ -120,7 +120,7 @@ def survival_panel(ds: xr.Dataset, ax: Axes | None = None) -> Axes:
 
 
 def sensitivity_panel(ds: xr.Dataset, ax: Axes | None = None, word: str | None = None) -> Axes:
-    """Draw first and total Sobol indices of the indicator of a regime as bars with 95 % intervals.
+    """Draw Sobol indices, or Morris's effects, of the indicator of a regime as bars with 95 % intervals.
 
     Parameters
     ----------
@@ -151,7 +151,10 @@ def sensitivity_panel(ds: xr.Dataset, ax: Axes | None = None, word: str | None =
     >>> [label.get_text() for label in sensitivity_panel(ds).get_yticklabels()]
     ['friction.rest.mu_k', 'zone.half_angle']
     """
-    ds = require_sample(ds, "sobol_first")
+    screened = "morris_mu_star" in ds
+    names = ("morris_mu_star", "morris_sigma") if screened else ("sobol_first", "sobol_total")
+    labels = ("mean magnitude", "standard deviation") if screened else ("first: alone", "total: with the others")
+    ds = require_sample(ds, names[0])
     if word is None:
         word = str(ds["word"].values[int(np.argmin(np.abs(ds["probability"].values - 0.5)))])
     if word not in ds["word"].values:
@@ -159,20 +162,20 @@ def sensitivity_panel(ds: xr.Dataset, ax: Axes | None = None, word: str | None =
     ax = axes_or_current(ax, 0.5)
     ds = ds.sel(word=word)
     place = np.arange(ds.sizes["parameter"])
-    for k, name in enumerate(("sobol_first", "sobol_total")):
+    for k, name in enumerate(names):
         index = ds[name].values
-        ends = np.stack([index - ds[f"{name}_low"].values, ds[f"{name}_high"].values - index])
+        # The standard deviation of effects has no interval.
+        ends = [np.abs(ds.get(f"{name}{end}", ds[name]).values - index) for end in ("_low", "_high")]
         style = {"color": on_page(PAIR_COLOURS[k]), "ecolor": rcParams["text.color"], "capsize": 3}
-        ax.barh(place + 0.4 * k - 0.2, index, 0.36, xerr=np.maximum(ends, 0.0), **style)
+        ax.barh(place + 0.4 * k - 0.2, index, 0.36, xerr=None if name == "morris_sigma" else ends, **style)
     ax.set_yticks(place, list(map(str, ds["parameter"].values)))
     ax.invert_yaxis()
-    ax.set_xlim(0.0, 1.0)
+    ax.set_xlim(0.0, 2.0 if screened else 1.0)
     share = float(ds["probability"])
-    ax.set_xlabel("Sobol index (95 % interval)")
+    ax.set_xlabel(("elementary effect" if screened else "Sobol index") + " (95 % interval)")
     ax.set_title(folded([f"what {word} hangs on", f"probability {share:.1%}"], width_of(ax)), fontsize="medium")
     handles: list[Artist] = [
-        Patch(color=on_page(colour), label=label)
-        for colour, label in zip(PAIR_COLOURS, ("first: alone", "total: with the others"), strict=True)
+        Patch(color=on_page(colour), label=label) for colour, label in zip(PAIR_COLOURS, labels, strict=True)
     ]
     place_legend(ax, handles, "lower right")
     small_ticks(ax)

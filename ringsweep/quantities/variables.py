@@ -228,6 +228,7 @@ def error_attribute(name: str, columns: Collection[str]) -> dict[str, str]:
     return {"ancillary_variables": error} if error in columns else {}
 
 
+_EFFECT = "mean magnitude of the elementary effects on the indicator of each regime"
 _SHARE, _INDEX = "probability of each regime", "Sobol index of the indicator of each regime"
 
 #: Variables of each cell of a sampled sweep.
@@ -247,6 +248,11 @@ SAMPLED: dict[str, Variable] = {
     "sobol_total": Variable("1", f"total {_INDEX}"),
     "sobol_total_low": Variable("1", f"lower end of the 95 % interval: total {_INDEX}"),
     "sobol_total_high": Variable("1", f"upper end of the 95 % interval: total {_INDEX}"),
+    "morris_mu_star": Variable("1", _EFFECT),
+    "morris_mu_star_low": Variable("1", f"lower end of the 95 % interval: {_EFFECT}"),
+    "morris_mu_star_high": Variable("1", f"upper end of the 95 % interval: {_EFFECT}"),
+    "morris_sigma": Variable("1", "standard deviation of the elementary effects on the indicator of each regime"),
+    "morris_sums": Variable("1", "sums of elementary effects, of their magnitudes and of their squares"),
     "sobol_sums": Variable("1", "sums of which the Sobol indices are made"),
 }
 

@@ -10,6 +10,7 @@ import json
 import math
 import os
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,8 @@ from ringsweep.runs.cells import TaskResult, compute_task
 from ringsweep.statistics import (
     CONFIDENCE,
     SUMMARY,
+    morris_effects,
+    morris_sums,
     quantiles,
     share_interval,
     sobol_indices,
@@ -84,10 +87,11 @@ def _sums_of(sample: Sample) -> dict[str, tuple[str, tuple[int, ...]]]:
         found[f"{name}_known"] = "int32", ()
         found[f"{name}_summary"] = "float64", (SUMMARY,)
     if sample.sensitivity:
-        each = 3 + 3 * len(sample.factors)
-        found["sobol_sums"] = "float64", (len(REGIMES), each)
+        kind = f"{sample.sensitivity}_sums"
+        each = 3 * (len(sample.factors) + (sample.sensitivity == "sobol"))
+        found[kind] = "float64", (len(REGIMES), each)
         for name in sample.sensitive:
-            found[f"{name}_sobol_sums"] = "float64", (*([len(sample.survival)] if name in CENSORED else []), each)
+            found[f"{name}_{kind}"] = "float64", (*([len(sample.survival)] if name in CENSORED else []), each)
     return found
 
 
@@ -184,7 +188,8 @@ def compute_parts(
                 for name, column in columns.items():
                     sums.setdefault(name, np.empty((len(positions), runs), dtype=column.dtype))[some] = column
             for k, part in enumerate(some.tolist()):
-                of_part = _reduce(sample, censored(config.scene), {name: column[k] for name, column in columns.items()})
+                of_run = {name: column[k] for name, column in columns.items()}
+                of_part = _reduce(sample, censored(config.scene), of_run, shares)
                 for name, value in of_part.items():
                     sums[name][part] = value
     processors = {processor()}
@@ -211,11 +216,11 @@ def _needed(config: Config) -> list[str]:
     )
 
 
-def _reduce(sample: Sample, time: str, columns: Columns) -> Columns:
+def _reduce(sample: Sample, time: str, columns: Columns, shares: NDArray[np.float64]) -> Columns:
     """The sums of one part, from the outcomes of its runs; `time` is the variable of survival."""
-    # A row for each point; with Saltelli's design its first and last run are points of the sample itself.
+    # A row for each point.
     rows = {name: column.reshape(-1, sample.rows) for name, column in columns.items()}
-    points = {name: column[:, [0, -1] if sample.sensitivity else [0]].ravel() for name, column in rows.items()}
+    points = {name: column[:, sample.own].ravel() for name, column in rows.items()}
     sure = points["certified"] == 1
     found: Columns = {"runs": np.zeros((len(REGIMES), 2), dtype=np.int32)}
     np.add.at(found["runs"], (points["regime"], sure.astype(int)), 1)
@@ -228,14 +233,14 @@ def _reduce(sample: Sample, time: str, columns: Columns) -> Columns:
         # What did not happen within the span happens later, if ever.
         found[f"{name}_summary"] = summarised(np.where(np.isnan(values), np.inf, values))
     if sample.sensitivity:
-        found["sobol_sums"] = np.stack(
-            [sobol_sums((rows["regime"] == flag).astype(float)) for flag in range(len(REGIMES))]
-        )
+        kind = f"{sample.sensitivity}_sums"
+        reduced = sobol_sums if sample.sensitivity == "sobol" else partial(morris_sums, points=shares[:: sample.rows])
+        found[kind] = np.stack([reduced((rows["regime"] == flag).astype(float)) for flag in range(len(REGIMES))])
         for name in sample.sensitive:
             # A time that has not come is not a number, and compares as later.
             functions = [rows[name] <= t for t in sample.survival] if name in CENSORED else [rows[name]]
-            each = [sobol_sums(function.astype(float)) for function in functions]
-            found[f"{name}_sobol_sums"] = np.stack(each) if name in CENSORED else each[0]
+            each = [reduced(function.astype(float)) for function in functions]
+            found[f"{name}_{kind}"] = np.stack(each) if name in CENSORED else each[0]
     return found
 
 
@@ -251,7 +256,7 @@ def statistics(config: Config, sums: Columns) -> Columns:
     sample = _sample(config)
     shape = sums["runs"].shape[:-3]
     flat = {name: column.reshape(-1, *column.shape[len(shape) :]) for name, column in sums.items()}
-    size = sample.size * (2 if sample.sensitivity else 1)
+    size = sample.size * len(sample.own)
     total = float(size * sample.replicates)
     found: Columns = {"runs": flat["runs"]}
     # Replicates last, certified runs and all runs of a word.
@@ -279,9 +284,18 @@ def statistics(config: Config, sums: Columns) -> Columns:
             column[:, place] = [row[k] for row in rows]
     if sample.sensitivity:
         for prefix in ("", *(f"{name}_" for name in sample.sensitive)):
-            together = found[f"{prefix}sobol_sums"] = flat[f"{prefix}sobol_sums"]
-            indices = sobol_indices(np.moveaxis(together, 1, -2), sample.size)
-            for name, index in zip(("sobol_first", "sobol_total"), indices, strict=True):
+            kind = f"{prefix}{sample.sensitivity}_sums"
+            together = found[kind] = flat[kind]
+            each = np.moveaxis(together, 1, -2)
+            if sample.sensitivity == "sobol":
+                indices = dict(zip(("sobol_first", "sobol_total"), sobol_indices(each, sample.size), strict=True))
+            else:
+                indicator = prefix.removesuffix("_") in ("", *CENSORED)
+                mu_star, found[f"{prefix}morris_sigma"] = morris_effects(
+                    each, sample.size, sample.independent, indicator
+                )
+                indices = {"morris_mu_star": mu_star}
+            for name, index in indices.items():
                 found |= {f"{prefix}{name}{end}": part for end, part in zip(("", "_low", "_high"), index, strict=True)}
     found |= {name: column for name, column in flat.items() if name not in _sums_of(sample)}
     return {name: column.reshape((*shape, *column.shape[1:])) for name, column in found.items()}
@@ -341,24 +355,19 @@ def variables(config: Config) -> dict[str, tuple[tuple[str, ...], Variable]]:
             about = f"{of}: {known[name].long_name}"
             found[f"{name}_quantile{end}"] = ("quantile",), Variable(known[name].unit, about)
     if sample.sensitivity:
-        found["sobol_sums"] = ("replicate", "word", "sum"), SAMPLED["sobol_sums"]
-        for name, one in SAMPLED.items():
-            if name.startswith(("sobol_first", "sobol_total")):
-                found[name] = ("word", "parameter"), one
+        kind = f"{sample.sensitivity}_sums"
+        measures = {name: one for name, one in SAMPLED.items() if name.startswith(f"{sample.sensitivity}_")}
+        del measures[kind]
+        found[kind] = ("replicate", "word", "sum"), SAMPLED[kind]
+        found |= {name: (("word", "parameter"), one) for name, one in measures.items()}
         for number in sample.sensitive:
             about = known[number].long_name
             times = ("survival_time",) if number in CENSORED else ()
-            found[f"{number}_sobol_sums"] = ("replicate", *times, "sum"), SAMPLED["sobol_sums"]
-            for which in ("first", "total"):
-                for end, of in {
-                    "": "",
-                    "_low": "lower end of the 95 % interval: ",
-                    "_high": "upper end of the 95 % interval: ",
-                }.items():
-                    found[f"{number}_sobol_{which}{end}"] = (
-                        (*times, "parameter"),
-                        Variable("1", f"{of}{which} Sobol index: {about}"),
-                    )
+            found[f"{number}_{kind}"] = ("replicate", *times, "sum"), SAMPLED[kind]
+            unit = "1" if sample.sensitivity == "sobol" or number in CENSORED else known[number].unit
+            for name, one in measures.items():
+                text = one.long_name.replace("the indicator of each regime", about)
+                found[f"{number}_{name}"] = (*times, "parameter"), Variable(unit, text)
     if sample.keep:
         found |= {name: (("replicate", "sample"), one) for name, one in known.items() if name not in found}
     return found
@@ -368,8 +377,9 @@ def attributes(config: Config) -> dict[str, Any]:
     """Attributes that say what was sampled, and how the intervals follow from it."""
     sample = _sample(config)
     way = "Clopper and Pearson" if sample.independent else "scatter of the replicates (Korn and Graubard)"
-    points = f"{sample.n * (2 if sample.sensitivity else 1)} runs"
-    rest = f", and {sample.n * len(sample.factors)} more for the indices" if sample.sensitivity else ""
+    points = f"{sample.n * len(sample.own)} runs"
+    measure = "indices" if sample.sensitivity == "sobol" else "elementary effects"
+    rest = f", and {sample.n * len(sample.factors)} more for the {measure}" if sample.sensitivity else ""
     return {
         "sample": f"{points} in each cell{rest}: {sample.method}, seed {sample.seed}, {sample.replicates} replicates; "
         + "; ".join(f"{factor.name} {factor}" for factor in sample.factors),
