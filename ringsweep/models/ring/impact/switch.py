@@ -314,14 +314,16 @@ def _lands(scene, mode, hit, t, y):
     which, lasts = (1 if hits_1 else 0) + (2 if hits_2 else 0), 0.0
     while True:
         found = impulses(body.mass, moment, first, second, touching, mu, restitution)
-        if found.solutions == 0 and lasts == 0.0:
+        if found.solutions != 1:
+            if lasts > 0.0:
+                # So slow an impact may be an error of the step.
+                return BROKEN, mode, y
             # Friction may forbid that a contact rebounds while the other one holds: among the last rebounds it closes.
             lasts = _rebounds_end(scene, mode, t, y, motion, hit, e * closing, e)
+            if lasts == 0.0:
+                return JAM, mode, y
             restitution = 0.0, 0.0
-            if lasts > 0.0:
-                continue
-        if found.solutions != 1:
-            return JAM, mode, y
+            continue
         after = after_impact(body.mass, moment, first, second, motion, found)
         open_1, open_2 = not touches_1 or found.opening_1 > 0.0, not touches_2 or found.opening_2 > 0.0
         again = (not hits_1 or open_1) and (not hits_2 or open_2)
