@@ -316,6 +316,24 @@ class TestBody:
         assert np.ptp(found.t_end.values) < 1e-7
         assert found.certified.all()
 
+    def test_contact_that_opens_within_a_stiction_band_stays_open(self):
+        """A body that a slow ring carries up loses a contact in a band of 1e-8 m/s and lifts it ever higher.
+
+        How far does not depend on the speed of the ring.
+        """
+        scene = BODY | {
+            "body": {"mass": 0.487588, "inertia": 0.0010535, "half_distance": 0.0651855, "ball_radius": 0.0287784},
+            "ring": {"radius": 0.0942658},
+            "friction": {
+                "law": "bengisu-akay", "alpha": 5762090.0, "v0": 8.05494e-09,
+                "rest": {"mu_s": 0.545811, "mu_k": 0.453534}, "rough": {"mu_s": 0.551256, "mu_k": 0.355862},
+            },
+            "zone": {"half_angle": 2.57735, "center": 2.15758},
+            "initial": {"phi": 1.36964, "omega": 0.0},
+        }  # fmt: skip
+        found = ringsweep.sweep(scene, {"drive.amplitude": [0.6, 0.9, 1.2, 1.5]}, progress=False)
+        assert found.gap_max.values == pytest.approx(6.038e-4, abs=3e-7)
+
     def test_restitution_is_an_axis_and_the_greatest_gap_has_a_bound(self):
         found = ringsweep.sweep(BODY, {"impact.restitution": [0.0, 0.3, 0.9]}, progress=False)
         assert (found.gap_max <= 2 * (0.043378 - 0.008 - 0.0315) + 1e-9).all()
