@@ -206,3 +206,26 @@ def test_wedged_body_is_taken_along_by_a_ring_that_starts_with_an_infinite_accel
     assert t == pytest.approx(1.1534711829171995, rel=1e-12)
     assert found.stick_time.item() == pytest.approx(t, rel=1e-12)
     assert found.phi_end.item() == pytest.approx(0.659025 - 1.86835 * t**1.1375, rel=1e-12)
+
+
+@pytest.mark.parametrize(("exponent", "amplitude"), [(1.1, 1.0), (1.61798, 13.5216), (2.0, 1e6), (2.0, 1e9)])
+def test_infinite_acceleration_of_the_ring_is_the_limit_of_great_ones(exponent, amplitude):
+    """It pushes this body off its second contact at once."""
+    scene = {
+        "model": "ring",
+        "body": {"mass": 0.168919, "inertia": 1.25523e-06, "half_distance": 0.00460163, "ball_radius": 0.0153383},
+        "ring": {"radius": 0.0448897},
+        "friction": {
+            "law": "stiction",
+            "rest": {"mu_s": 0.396856, "mu_k": 0.361019},
+            "rough": {"mu_s": 0.479091, "mu_k": 0.415847},
+        },
+        "zone": {"half_angle": 1.6949, "center": 0.631828},
+        "drive": {"law": "power", "amplitude": amplitude},
+        "initial": {"phi": -0.0752281, "omega": 0.0},
+        "time": {"span": 1.032},
+    }
+    found = ringsweep.sweep(scene, {"drive.exponent": [exponent]}, progress=False)
+    assert ringsweep.words(found.regime).item() == "separating"
+    assert found.separating_contact.item() == 2
+    assert found.t_separation.item() < 1e-9

@@ -121,11 +121,12 @@ def _sliding_at_start(drive, scene, t, phi, launch):
 @_sliding_at_start.implements(drives.Power)
 def _sliding_at_start_of_power(drive, scene, t, phi, launch):
     v = drives.velocity_at_beginning(drive, launch) * scene.body.radius
-    # Even a ring that starts with an infinite acceleration takes a body along that is wedged between its contacts.
+    # A ring that starts with an infinite acceleration need not slide under the body: one that is wedged between its
+    # contacts it takes along, or pushes off a contact.
     if launch == 0.0 and v != 0.0 and stiction_band(scene.law) == 0.0:
         theta, _, _ = drives.turn(drive, t)
         status, mode = _mode_at_rest(scene, t, phi, *places_at(scene, phi - theta), 0)
-        if status == RUNNING and mode.sign == 0:
+        if status != RUNNING or mode.sign == 0:
             return 0.0
     return v
 
