@@ -44,7 +44,7 @@ def main() -> int:
     options = [f"--{name}" for name in ("quick", "keep") if getattr(given, name)]
     for name in given.only or NAMES:
         report = folder / f"{name}.md"
-        if report.exists() and stamp(name, given.quick) in report.read_text():
+        if report.exists() and stamp(name, [option for option in options if option != "--keep"]) in report.read_text():
             print(f"{name}: {report} is of these sources already", flush=True)
             continue
         begin = time.monotonic()

@@ -7,6 +7,8 @@ import hashlib
 import json
 import os
 import platform
+import shlex
+import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -242,9 +244,9 @@ def sources() -> str:
     return digest.hexdigest()
 
 
-def stamp(name: str, quick: bool) -> str:
-    """What a report says of its sources; a report with another stamp is older than the sources."""
-    return f"`python -m benchmarks.{name}{' --quick' if quick else ''}` on sources `{sources()}`"
+def stamp(name: str, options: Sequence[str]) -> str:
+    """What a report says of its command and its sources; one with another stamp is older than the sources."""
+    return f"`{shlex.join(['python', '-m', f'benchmarks.{name}', *options])}` on sources `{sources()}`"
 
 
 def publish(
@@ -267,7 +269,9 @@ def publish(
     """
     folder = folder_of(given)
     lines = "".join(f"- {line}\n" for line in where.splitlines())
-    report = f"# {title}\n\n{stamp(name, given.quick)}, {datetime.now(UTC).date()}:\n\n{lines}\n{body.strip()}\n"
+    options = [option for option in sys.argv[1:] if option != "--keep"]
+    mark = stamp(Path(sys.argv[0]).stem, options)
+    report = f"# {title}\n\n{mark}, {datetime.now(UTC).date()}:\n\n{lines}\n{body.strip()}\n"
     (folder / f"{name}.md").write_text(report)
     if figures is not None:
         (folder / f"{name}.json").write_text(json.dumps(figures, indent=1, ensure_ascii=False) + "\n")

@@ -599,7 +599,7 @@ def main():
             total.bounded += count.bounded
             total.ends.update(count.ends)
             tqdm.write(" | ".join(row(name, count)))
-    rows = [row(name, count) for name, count in [*counts.items(), ("all", total)]]
+    rows = [row(name, count) for name, count in (counts | {"all": total} if len(counts) > 1 else counts).items()]
     _common.heading("Certified answers against an independent reference")
     _common.table(HEADER, rows)
     _common.heading("Certified ends, and what a body on compliant contacts says of them")
@@ -632,7 +632,7 @@ def figures(counts, total):
         title = TITLES.get(name, "the belt, all laws" if name.startswith("belt ") else "the ring, all laws")
         merged.setdefault(title, Counter()).update(count.tally)
     rows = []
-    for title, tally in [*merged.items(), ("all", total.tally)]:
+    for title, tally in (merged | {"all": total.tally} if len(merged) > 1 else merged).items():
         share = 100.0 * tally["uncertified"] / max(tally["runs"], 1)
         words = {name: str(tally[name]) for name in SUMMARY[1:]} | {
             "uncertified": f"{tally['uncertified']} ({share:.1f} %)"

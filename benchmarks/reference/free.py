@@ -144,9 +144,7 @@ def shock(p, q, ring_omega, touching, e, mu):
         for c in range(2 * n):
             for j in range(3):
                 G[r, c] += W[j, r] * W[j, c] / M[j]
-    # Rounding of the velocities in space, of which those of the contacts are small differences.
-    speed = math.hypot(q[3], q[4]) + p.radius * (abs(q[5]) + abs(ring_omega))
-    count, impulse, after = impact(G, before, ee, mm, 1e-15 * speed)
+    count, impulse, after = impact(G, before, ee, mm)
     full, speeds = np.zeros(4), np.zeros(4)
     for m in range(n):
         for j in range(2):
@@ -155,7 +153,7 @@ def shock(p, q, ring_omega, touching, e, mu):
 
 
 @njit(cache=True, error_model="numpy")
-def impact(G, before, e, mu, rounding=0.0):
+def impact(G, before, e, mu):
     """Solutions of an impact of any body at n contacts, by trial of all 4^n modes.
 
     Impulses P and velocities after = before + G P satisfy, at each contact, with normal part N and tangential part T:
@@ -168,8 +166,6 @@ def impact(G, before, e, mu, rounding=0.0):
     before : array, (2n,)
         Velocities before.
     e, mu : array, (n,)
-    rounding : float
-        Rounding of `before`, m/s.
 
     Returns
     -------
@@ -180,7 +176,7 @@ def impact(G, before, e, mu, rounding=0.0):
     """
     n = e.size
     scale = np.max(np.abs(before)) + 1e-300
-    small = 1e-10 * scale + rounding
+    small = 1e-10 * scale
     count, best, result = 0, np.zeros(2 * n), before.copy()
     for code in range(4**n):
         # Modes of a contact: 0 open, 1 stick, 2 slip forward, 3 slip backward.
