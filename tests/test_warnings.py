@@ -17,9 +17,9 @@ import ringsweep
 from ringsweep import cli
 from ringsweep.cli.report import summarise
 from ringsweep.config import load
-from ringsweep.quantities.flags import OSCILLATORY
+from ringsweep.quantities.flags import FAILED, OSCILLATORY
 from ringsweep.runs import cells
-from ringsweep.runs.warnings import _hint_at_one_word, warn_of_results
+from ringsweep.runs.warnings import _hint_at_one_word, _warn_of_failures, warn_of_results
 from ringsweep.solvers.rk4 import RK4 as RK4Method
 from ringsweep.storage import netcdf
 from ringsweep.storage.chunks import Layout
@@ -199,6 +199,15 @@ def test_run_that_is_given_up_is_named_with_its_coordinates_and_the_reason(tmp_p
     ringsweep.sweep(scene, {"belt.velocity": [0.1, 0.2]}, solver=solver, progress=False)
     assert warned("2 of 2 runs have failed; the first at belt_velocity = 0.1 m s-1: it was given up after 2000 steps")
     assert warned("of 1e+300 s, as events go on: a shorter time.span has a result")
+
+
+@pytest.mark.parametrize(
+    ("phi_end", "why"), [(np.nan, "a number was not finite"), (1.5, "no step succeeds at t = 2.5 s")]
+)
+def test_failed_run_with_finite_numbers_says_when_no_step_succeeded(caplog, phi_end, why):
+    ends = {"phi_end": phi_end, "omega_end": 0.5, "t_end": 2.5}
+    _warn_of_failures(xr.Dataset({"regime": np.int8(FAILED)} | ends), load(config()))
+    assert caplog.messages[0].startswith(f"the run has failed: {why}")
 
 
 def test_axis_that_changes_no_number_is_told(caplog):
