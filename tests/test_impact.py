@@ -279,11 +279,10 @@ class TestBody:
     def test_last_rebounds_that_friction_forbids_close_the_contact(self):
         """An impact at one contact while the other one holds need not have a solution with restitution.
 
-        Among the last of unending rebounds, of 1e-8 m/s, the body closes and goes on. Gap and time are those of
+        Among the last of unending rebounds, of 1e-8 m/s, the body closes and goes on. The gap is that of
         ``benchmarks.reference``.
         """
-        scene = {
-            "model": "ring",
+        scene = BODY | {
             "body": {
                 "mass": 0.213905, "inertia": 6.69e-05, "half_distance": 0.0255529, "ball_radius": 0.00972928,
                 "center_offset": 0.0,
@@ -296,9 +295,9 @@ class TestBody:
             "zone": {"half_angle": 1.03967, "center": 2.16646},
             "drive": {"law": "power", "amplitude": -6.43394, "exponent": 2.20164},
             "initial": {"phi": 1.03281, "omega": 0.0},
-            "time": {"span": 1.2},
+            "impact": {"restitution": 0.7348},
         }  # fmt: skip
-        found = ringsweep.sweep(scene | {"impact": {"restitution": 0.7348}}, {"time.span": [1.2]}, progress=False)
+        found = ringsweep.sweep(scene, {"time.span": [1.2]}, progress=False)
         assert found.t_end.item() == 1.2
         assert found.gap_max.item() == pytest.approx(0.002025674, abs=1e-9)
 
@@ -319,7 +318,7 @@ class TestBody:
     def test_contact_that_opens_within_a_stiction_band_stays_open(self):
         """A body that a slow ring carries up loses a contact in a band of 1e-8 m/s and lifts it ever higher.
 
-        How far does not depend on the speed of the ring.
+        How far depends neither on the speed of the ring nor on restitution: there is no impact.
         """
         scene = BODY | {
             "body": {"mass": 0.487588, "inertia": 0.0010535, "half_distance": 0.0651855, "ball_radius": 0.0287784},
@@ -331,8 +330,29 @@ class TestBody:
             "zone": {"half_angle": 2.57735, "center": 2.15758},
             "initial": {"phi": 1.36964, "omega": 0.0},
         }  # fmt: skip
-        found = ringsweep.sweep(scene, {"drive.amplitude": [0.6, 0.9, 1.2, 1.5]}, progress=False)
-        assert found.gap_max.values == pytest.approx(6.038e-4, abs=3e-7)
+        axes = {"drive.amplitude": [0.6, 0.9, 1.2, 1.5], "impact.restitution": [0.0, 0.5, 1.0]}
+        found = ringsweep.sweep(scene, axes, progress=False)
+        assert found.gap_max.values.ravel() == pytest.approx(6.038e-4, abs=3e-7)
+
+    def test_rounding_of_a_formula_does_not_forbid_that_a_pivot_breaks_away(self):
+        """Tustin's friction at rest rounds to the next number above mu_s, which is more than the stick can bear."""
+        kinetic = np.array([0.10009512251045444, 0.022795588796030497, 0.054372165083124285])
+        static = np.array([0.6902539533856736, 0.11586194087614195, 0.18113126204733618])
+        assert (kinetic + (static - kinetic) > static).any()
+        points = {
+            "friction.rough.mu_s": static,
+            "friction.rough.mu_k": kinetic,
+            "friction.rest.mu_s": [0.38453651532681116, 0.4402872064369389, 0.6907273417069072],
+            "friction.rest.mu_k": [0.07331794609510014, 0.10905866041608533, 0.09870081894815391],
+            "drive.amplitude": [11.389784962935275, 3.2236387068756627, 8.306229096530728],
+        }
+        scene = BODY | {
+            "friction": {"law": "tustin", "alpha": 10} | {k: BODY["friction"][k] for k in ("rough", "rest")}
+        }
+        found = ringsweep.sweep(
+            scene, {path: xr.DataArray(each, dims="run") for path, each in points.items()}, progress=False
+        )
+        assert (found.t_end == 5.0).all()
 
     def test_restitution_is_an_axis_and_the_greatest_gap_has_a_bound(self):
         found = ringsweep.sweep(BODY, {"impact.restitution": [0.0, 0.3, 0.9]}, progress=False)

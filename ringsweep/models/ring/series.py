@@ -80,8 +80,8 @@ NEARLY_JAMMED, LEAST_DETERMINANT = 1e-4, 1e-6
 # discriminant below this share of its terms is zero.
 _LEAST_DISCRIMINANT = 1e-12
 
-# Friction coefficients that differ by less than this share are equal.
-_EQUAL = 1e-14
+#: Friction coefficients that differ by less than this share are equal.
+EQUAL = 1e-14
 
 
 class Mode(NamedTuple):
@@ -160,8 +160,8 @@ def _at_breakaway(scene, mode):
     mu_1, mu_2, _, _ = friction_in(scene.law, mode.region, 0.0, surfaces)
     # Friction that does not drop at breakaway is static friction, without the rounding of the formula.
     return (
-        mu_s1 if abs(mu_1 - mu_s1) <= _EQUAL * mu_s1 else mu_1,
-        mu_s2 if abs(mu_2 - mu_s2) <= _EQUAL * mu_s2 else mu_2,
+        mu_s1 if abs(mu_1 - mu_s1) <= EQUAL * mu_s1 else mu_1,
+        mu_s2 if abs(mu_2 - mu_s2) <= EQUAL * mu_s2 else mu_2,
     )
 
 

@@ -35,7 +35,7 @@ from ringsweep.models.ring.impact.mode import (
     place_of,
     with_place,
 )
-from ringsweep.models.ring.series import SLOW
+from ringsweep.models.ring.series import EQUAL, SLOW
 from ringsweep.physics import drives
 from ringsweep.physics.friction.velocity import KINETIC, friction_in, region_at, stiction_band
 from ringsweep.physics.impact import inertia, side_of
@@ -164,7 +164,7 @@ def begun(scene, t, y, places, contacts, zeros, event, stick_end):
             psi_dd, alpha_dd, normal, denominator = in_slip(scene, f, K)
             push = sign * sliding_acceleration(scene, psi_dd, alpha_dd, ring_epsilon)
             # At breakaway no friction is greater than that in stick. Where it does not fall, the push begins at zero.
-            if stick_end == sign and abs(K) <= mu_s:
+            if stick_end == sign and abs(K) <= (1.0 + EQUAL) * mu_s:
                 push = max(push, 1e-12 * size(scene, f))
             if denominator > 0.0 and normal > least and push > best:
                 several = several or (best > least / body.mass and push > least / body.mass)

@@ -290,11 +290,11 @@ def _lands(scene, mode, hit, t, y):
     body, balls = scene.closed.body, scene.balls
     theta, ring_omega, _ = drives.turn(scene.drive, t)
     motion = motion_of(scene, y, ring_omega)
-    # Velocities seen from the race keep their digits in the slowest impacts: the contacts move as one body.
-    seen = relative_to_race(motion, ring_omega) if mode.open == BOTH else motion_of(scene, y, 0.0)
+    # Velocities relative to the race keep their digits in the slowest impacts: the contacts move as one body.
+    relative = relative_to_race(motion, ring_omega) if mode.open == BOTH else motion_of(scene, y, 0.0)
     two = ring.contact_count(body) == 2
-    first = contact_of(balls, 1, seen)
-    second = contact_of(balls, 2, seen) if two else first
+    first = contact_of(balls, 1, relative)
+    second = contact_of(balls, 2, relative) if two else first
     near = _TOGETHER * balls.reach
     hits_1, hits_2 = hit == 1, hit == 2
     touches_1, touches_2 = hits_1, hits_2
@@ -319,7 +319,7 @@ def _lands(scene, mode, hit, t, y):
                 # So slow an impact may be an error of the step.
                 return BROKEN, mode, y
             # Friction may forbid that a contact rebounds while the other one holds: among the last rebounds it closes.
-            lasts = _rebounds_end(scene, mode, t, y, motion, hit, e * closing, e)
+            lasts = _rebounds_end(scene, mode, t, y, motion, hit, closing, 0.0)
             if lasts == 0.0:
                 return JAM, mode, y
             restitution = 0.0, 0.0
