@@ -39,7 +39,7 @@ from benchmarks.reference.physics import (
     segment,
     sliding_problem,
 )
-from benchmarks.reference.problem import JUMP, SINGLE, SINUSOIDAL, TABLE
+from benchmarks.reference.problem import JUMP, POWER, SINGLE, SINUSOIDAL, TABLE
 from benchmarks.reference.radau import NODES, attempt, interpolate, jacobian
 from benchmarks.reference.run import HELD, SAMPLES, UNRESOLVED, advance, run
 
@@ -511,6 +511,11 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
             theta, ring_omega, _ = drive(p, t)
             _, ux, uy, _, _ = free.ball(p, q, closed)
             y[0], y[1], y[2], y[3] = math.atan2(ux, -uy) - theta, q[2], v, q[5]
+            if p.drive == POWER and p.exponent < 2.0 and t == begin[1] and t <= 1e-10 and (p.at_rest or p.speed == 0.0):
+                # A ring with infinite acceleration takes along what is wedged on one contact: stick goes before slip.
+                y[2] = 0.0
+                if pivot_problem(p, closed, place_of(p, closed, t, y), STICK, t, y, True) != STICK:
+                    y[2] = v
             end, t, more = turn(p, closed, rtol, most_steps, t, y, opens, found)
             steps += more
             open_time += t - since

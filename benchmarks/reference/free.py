@@ -130,12 +130,14 @@ def shock(p, q, ring_omega, touching, e, mu):
     n = int(touching[0]) + int(touching[1])
     W, before = np.zeros((3, 2 * n)), np.zeros(2 * n)
     ee, mm, place = np.zeros(n), np.zeros(n), np.zeros(n, np.int64)
-    m = 0
+    m, misfit = 0, 0.0
     for i in (1, 2):
         if touching[i - 1]:
             W[0, 2 * m], W[1, 2 * m], W[2, 2 * m] = load(p, q, i, 1.0, 0.0)
             W[0, 2 * m + 1], W[1, 2 * m + 1], W[2, 2 * m + 1] = load(p, q, i, 0.0, 1.0)
-            _, before[2 * m], before[2 * m + 1] = contact(p, q, ring_omega, i)
+            gap, before[2 * m], before[2 * m + 1] = contact(p, q, ring_omega, i)
+            # Where two contacts stick, a gap that counts as closed does not fit their velocities.
+            misfit += abs(gap) * (abs(q[5]) + abs(ring_omega))
             ee[m], mm[m], place[m] = e[i - 1], mu[i - 1], i - 1
             m += 1
     M = np.array([p.mass, p.mass, inertia(p)])
@@ -144,7 +146,7 @@ def shock(p, q, ring_omega, touching, e, mu):
         for c in range(2 * n):
             for j in range(3):
                 G[r, c] += W[j, r] * W[j, c] / M[j]
-    count, impulse, after = impact(G, before, ee, mm)
+    count, impulse, after = impact(G, before, ee, mm, misfit)
     full, speeds = np.zeros(4), np.zeros(4)
     for m in range(n):
         for j in range(2):
@@ -153,7 +155,7 @@ def shock(p, q, ring_omega, touching, e, mu):
 
 
 @njit(cache=True, error_model="numpy")
-def impact(G, before, e, mu):
+def impact(G, before, e, mu, misfit=0.0):
     """Solutions of an impact of any body at n contacts, by trial of all 4^n modes.
 
     Impulses P and velocities after = before + G P satisfy, at each contact, with normal part N and tangential part T:
@@ -166,6 +168,8 @@ def impact(G, before, e, mu):
     before : array, (2n,)
         Velocities before.
     e, mu : array, (n,)
+    misfit : float
+        How far `before` may be from the velocities of one rigid body, m/s.
 
     Returns
     -------
@@ -176,7 +180,7 @@ def impact(G, before, e, mu):
     """
     n = e.size
     scale = np.max(np.abs(before)) + 1e-300
-    small = 1e-10 * scale
+    small = 1e-10 * scale + misfit
     count, best, result = 0, np.zeros(2 * n), before.copy()
     for code in range(4**n):
         # Modes of a contact: 0 open, 1 stick, 2 slip forward, 3 slip backward.
