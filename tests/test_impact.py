@@ -301,6 +301,85 @@ class TestBody:
         assert found.t_end.item() == 1.2
         assert found.gap_max.item() == pytest.approx(0.002025674, abs=1e-9)
 
+    def test_contacts_that_rebound_in_turn_close_together(self):
+        """Each impact at one contact brings the other one down, until both hold. The angle is that of the reference."""
+        scene = BODY | {
+            "body": {"mass": 0.34295, "inertia": 0.00034546, "half_distance": 0.039532, "ball_radius": 0.02979},
+            "ring": {"radius": 0.073942},
+            "zone": {"half_angle": 2.0, "center": pi},
+            "friction": {
+                "law": "stiction",
+                "rest": {"mu_s": 0.52646, "mu_k": 0.50751},
+                "rough": {"mu_s": 0.69648, "mu_k": 0.4932},
+            },
+            "drive": {"law": "arctan", "amplitude": -2.8076},
+            "initial": {"phi": 2.8394, "omega": 2.8514},
+            "time": {"span": 1.0},
+        }
+        found = ringsweep.sweep(scene, {"impact.restitution": [0.11094]}, progress=False)
+        assert found.t_end.item() == 1.0
+        assert found.phi_end.item() == pytest.approx(1.9295466835627817, rel=1e-9)
+
+    @pytest.mark.parametrize(
+        ("scene", "phi_end"),
+        [
+            # Pushed off both contacts, the body stays at rest while the ring has moved on.
+            pytest.param({
+                "friction": {
+                    "law": "tustin", "alpha": 16.9413,
+                    "rest": {"mu_s": 0.391247, "mu_k": 0.124068}, "rough": {"mu_s": 0.521341, "mu_k": 0.26673},
+                },
+                "drive": {"law": "power", "amplitude": 0.169772, "exponent": 1.05595},
+                "body": {
+                    "mass": 0.0622681, "inertia": 4.35788e-05, "half_distance": 0.0263802, "ball_radius": 0.0238993,
+                    "center_offset": 0.0,
+                },
+                "ring": {"radius": 0.0987501},
+                "zone": {"half_angle": 1.08239, "center": 2.715},
+                "time": {"span": 0.924103},
+                "initial": {"phi": -2.75764, "omega": 0.0},
+                "impact": {"restitution": 0.803551},
+            }, -3.059077252, id="off both"),
+            # A body that is wedged on one contact is taken along.
+            pytest.param({
+                "friction": {
+                    "law": "tustin", "alpha": 20800.1,
+                    "rest": {"mu_s": 0.435147, "mu_k": 0.435147}, "rough": {"mu_s": 0.333057, "mu_k": 0.0930198},
+                },
+                "drive": {"law": "power", "amplitude": 9.3018, "exponent": 1.71787},
+                "body": {
+                    "mass": 0.382064, "inertia": 2.82698e-06, "half_distance": 0.00257343, "ball_radius": 0.0165818,
+                    "center_offset": 0.0,
+                },
+                "ring": {"radius": 0.0421444},
+                "zone": {"half_angle": 2.85642, "center": 1.33532},
+                "time": {"span": 2.59935},
+                "initial": {"phi": 1.22941, "omega": 0.0},
+                "impact": {"restitution": 0.401576},
+            }, 2.351071097, id="wedged on one"),
+            # Its contacts hit so nearly at once that friction forbids both impacts together, but not in turn.
+            pytest.param({
+                "friction": {
+                    "law": "tustin", "alpha": 9.24635,
+                    "rest": {"mu_s": 0.484993, "mu_k": 0.471637}, "rough": {"mu_s": 0.0623722, "mu_k": 0.0607234},
+                },
+                "drive": {"law": "power", "amplitude": -0.186147, "exponent": 1.48619},
+                "body": {
+                    "mass": 0.0947472, "inertia": 4.42698e-07, "half_distance": 0.00433759, "ball_radius": 0.0168983,
+                    "center_offset": 0.0,
+                },
+                "ring": {"radius": 0.0427085},
+                "zone": {"half_angle": 1.4492, "center": pi},
+                "time": {"span": 1.74251},
+                "initial": {"phi": 1.02004, "omega": 0.0},
+                "impact": {"restitution": 0.772468},
+            }, 2.725634, id="both in turn"),
+        ],
+    )  # fmt: skip
+    def test_start_with_infinite_acceleration_goes_on_as_the_reference_does(self, scene, phi_end):
+        found = ringsweep.sweep({"model": "ring"} | scene, {"time.span": [scene["time"]["span"]]}, progress=False)
+        assert found.phi_end.item() == pytest.approx(phi_end, abs=1e-6)
+
     def test_rounding_decides_nothing_at_the_end_of_rebounds(self):
         """The wedged body comes to rest, breaks away where friction does not fall, and jams in the end.
 

@@ -121,14 +121,26 @@ def _sliding_at_start(drive, scene, t, phi, launch):
 @_sliding_at_start.implements(drives.Power)
 def _sliding_at_start_of_power(drive, scene, t, phi, launch):
     v = drives.velocity_at_beginning(drive, launch) * scene.body.radius
-    # A ring that starts with an infinite acceleration need not slide under the body: one that is wedged between its
-    # contacts it takes along, or pushes off a contact.
-    if launch == 0.0 and v != 0.0 and stiction_band(scene.law) == 0.0:
+    if leaves_behind(drive, scene, t, v):
         theta, _, _ = drives.turn(drive, t)
         status, mode = _mode_at_rest(scene, t, phi, *places_at(scene, phi - theta), 0)
-        if status != RUNNING or mode.sign == 0:
+        # A body that is wedged between its contacts is taken along.
+        if status == RUNNING and mode.sign == 0:
             return 0.0
     return v
+
+
+@hook(optional=True)
+def leaves_behind(drive, scene, t, v):
+    """Whether `v` is the sliding velocity of a body at rest after an infinite acceleration of the ring."""
+    return False
+
+
+@leaves_behind.implements(drives.Power)
+def _power_leaves_behind(drive, scene, t, v):
+    if v == 0.0 or t != drives.beginning(drive) or ring.launch_velocity(scene) != 0.0 or stiction_band(scene.law) > 0.0:
+        return False
+    return v == drives.velocity_at_beginning(drive, 0.0) * scene.body.radius
 
 
 @series.table_shape.implements(ring.Ring)
@@ -143,6 +155,11 @@ def _initial_mode(scene, t, y):
     place_1, place_2 = places_at(scene, phi - theta)
     if v == 0.0 and stiction_band(scene.law) == 0.0:
         return _mode_at_rest(scene, t, phi, place_1, place_2, 0)
+    if leaves_behind(scene.drive, scene, t, v):
+        # Such a ring may push the body off a contact, or jam it.
+        status, mode = _mode_at_rest(scene, t, phi, place_1, place_2, 0)
+        if status != RUNNING:
+            return status, mode
     sign = 1 if v > 0.0 else -1
     region, entry_guard = region_at(scene.law, abs(v)), -1
     if v == 0.0:

@@ -40,7 +40,7 @@ from ringsweep.models.ring.impact.mode import (
     ring_of,
     with_place,
 )
-from ringsweep.models.ring.series import DETERMINANT, EDGE, FAST, NEARLY_JAMMED, NORMAL_1, NORMAL_2, SLOW
+from ringsweep.models.ring.series import DETERMINANT, EDGE, FAST, NEARLY_JAMMED, NORMAL_1, NORMAL_2, SLOW, leaves_behind
 from ringsweep.physics import drives, ring
 from ringsweep.physics.friction.velocity import friction_at, region_bounds
 from ringsweep.physics.impact import (
@@ -61,12 +61,15 @@ from ringsweep.physics.zones import cross_edge, edge_ahead, locate
 #: is then wrong by about as much.
 SUMMED = 1e-12
 
+# Where rebounds are summed, slow velocities are left. An impact that friction forbids then closes the contact.
+_FORBIDDEN = 1e-10
+
 # A reaction that reaches zero leaves a gap that does not close, but for this share of the accelerations. One that
 # passes through infinity, in the instant of a jam, leaves one that does.
 _NO_LOAD = 1e-6
 
-# A contact whose gap is this share of rho touches together with the one that closes.
-_TOGETHER = 1e-12
+# A contact whose gap is this share of rho touches together with the one that closes. Gaps are rounded by the second.
+_TOGETHER, _ROUNDING = 1e-12, 1e-15
 
 
 @inlined
@@ -159,6 +162,11 @@ def _initial_state(scene):
 def _start(scene, t, phi, v):
     status, mode = modes.initial_mode(scene.closed, t, (phi, v))
     nothing = Event(NO_EVENT, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, t, 0)
+    if leaves_behind(scene.drive, scene.closed, t, v):
+        wedged = _after_closed(scene, status, mode, t, (phi, 0.0), 0, 2, nothing, False)
+        # A body that is wedged on one contact is taken along.
+        if wedged[0] == RUNNING and wedged[1].sign == 0:
+            return wedged
     return _after_closed(scene, status, mode, t, (phi, v), 0, 2, nothing, False)
 
 
@@ -306,20 +314,26 @@ def _lands(scene, mode, hit, t, y):
         first, touches_1 = _held(first, y[1]), True
     else:
         second, touches_2 = _held(second, y[1]), True
-    closing = max(-first.opening if hits_1 else 0.0, -second.opening if hits_2 else 0.0)
     mu = _impact_friction(scene, first, theta), _impact_friction(scene, second, theta)
     e = scene.restitution
     restitution = e if hits_1 else 0.0, e if hits_2 else 0.0
-    touching, moment = (touches_1, touches_2), inertia(body)
-    which, lasts = (1 if hits_1 else 0) + (2 if hits_2 else 0), 0.0
+    moment, lasts = inertia(body), 0.0
     while True:
+        touching = touches_1, touches_2
+        closing = max(-first.opening if hits_1 else 0.0, -second.opening if hits_2 else 0.0)
+        which = (1 if hits_1 else 0) + (2 if hits_2 else 0)
         found = impulses(body.mass, moment, first, second, touching, mu, restitution)
         if found.solutions != 1:
+            if hits_1 and hits_2 and lasts == 0.0 and (second.gap if hit == 1 else first.gap) > _ROUNDING * balls.reach:
+                # What has no solution for both at once may have one for each in turn.
+                hits_1 = touches_1 = hit == 1
+                hits_2 = touches_2 = hit == 2
+                continue
             if lasts > 0.0:
                 # So slow an impact may be an error of the step.
                 return BROKEN, mode, y
             # Friction may forbid that a contact rebounds while the other one holds: among the last rebounds it closes.
-            lasts = _rebounds_end(scene, mode, t, y, motion, hit, closing, 0.0)
+            lasts = _rebounds_end(scene, mode, t, y, motion, hit, closing, 0.0, _FORBIDDEN)
             if lasts == 0.0:
                 return JAM, mode, y
             restitution = 0.0, 0.0
@@ -344,8 +358,8 @@ def _lands(scene, mode, hit, t, y):
         rebounds_1, rebounds_2 = hits_1 and open_1, hits_2 and open_2
         if lasts > 0.0 or status != RUNNING or not (rebounds_1 or rebounds_2):
             return status, after_mode, state
-        ends_1 = _rebounds_end(scene, after_mode, t, state, after, 1, found.opening_1, e) if rebounds_1 else 0.0
-        ends_2 = _rebounds_end(scene, after_mode, t, state, after, 2, found.opening_2, e) if rebounds_2 else 0.0
+        ends_1 = _rebounds_end(scene, after_mode, t, state, after, 1, found.opening_1, e, SUMMED) if rebounds_1 else 0.0
+        ends_2 = _rebounds_end(scene, after_mode, t, state, after, 2, found.opening_2, e, SUMMED) if rebounds_2 else 0.0
         lasts = max(ends_1, ends_2)
         if lasts == 0.0:
             return status, after_mode, state
@@ -354,8 +368,8 @@ def _lands(scene, mode, hit, t, y):
 
 
 @inlined
-def _rebounds_end(scene, mode, t, y, motion, contact, speed, e):
-    """Time until the rebounds of a contact end, if that is so short that they are summed; 0 if it is not."""
+def _rebounds_end(scene, mode, t, y, motion, contact, speed, e, share):
+    """Time until the rebounds of a contact end, if the gap could not grow to this share of rho by then; 0 if it can."""
     gravity, acceleration = scene.closed.body.gravity, (0.0, 0.0, 0.0)
     if mode.open == BOTH:
         acceleration = 0.0, 0.0, -gravity
@@ -368,7 +382,7 @@ def _rebounds_end(scene, mode, t, y, motion, contact, speed, e):
     if not falls > 0.0 or e >= 1.0:
         return 0.0
     time = 2.0 * speed / (falls * (1.0 - e))
-    return time if time * time * falls <= SUMMED * scene.balls.reach else 0.0
+    return time if time * time * falls <= share * scene.balls.reach else 0.0
 
 
 @inlined
