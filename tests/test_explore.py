@@ -145,6 +145,7 @@ class TestExplore:
     def test_explore_uses_pyplot_only_with_an_interactive_backend(self, maps, asked, monkeypatch):
         from matplotlib import pyplot
 
+        pyplot.close("all")
         plots.explore(maps)
         assert not pyplot.get_fignums()
         monkeypatch.setattr("matplotlib.get_backend", lambda: "widget")
