@@ -301,6 +301,28 @@ class TestBody:
         assert found.t_end.item() == 1.2
         assert found.gap_max.item() == pytest.approx(0.002025674, abs=1e-9)
 
+    def test_contact_that_opens_at_breakaway_opens_by_its_acceleration(self):
+        """When stick ends and no slip holds both contacts, one opens at once: the other ball must slide, not stick.
+
+        The numbers are those of the reference.
+        """
+        scene = BODY | {
+            "body": {"mass": 0.364591, "inertia": 0.000196867, "half_distance": 0.0193353, "ball_radius": 0.00469679},
+            "ring": {"radius": 0.0315957},
+            "zone": {"half_angle": 2.0, "center": pi},
+            "friction": {
+                "law": "stiction",
+                "rest": {"mu_s": 0.223021, "mu_k": 0.166925},
+                "rough": {"mu_s": 0.718786, "mu_k": 0.355663},
+            },
+            "drive": {"law": "arctan", "amplitude": -8.66607},
+            "initial": {"phi": -1.08749, "omega": 22.8486},
+            "time": {"span": 1.0},
+        }
+        found = ringsweep.sweep(scene, {"impact.restitution": [0.169101]}, progress=False)
+        assert ringsweep.words(found.aftermath).item() == "tumbled"
+        assert found.phi_end.item() == pytest.approx(-3.1472056528869796, rel=1e-9)
+
     def test_contacts_that_rebound_in_turn_close_together(self):
         """Each impact at one contact brings the other one down, until both hold. The angle is that of the reference."""
         scene = BODY | {

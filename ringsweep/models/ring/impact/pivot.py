@@ -44,6 +44,9 @@ from ringsweep.physics.zones import leave_edge
 # Rounding of accelerations, as a share of their terms.
 _ROUNDING = 1e-13
 
+# A gap whose acceleration is zero opens by its third derivative. This share of the terms counts as zero.
+_SHUT = 1e-6
+
 
 class Frame(NamedTuple):
     """Place and rates of a pivot: angles in rad, rates in rad/s, lengths in m."""
@@ -148,11 +151,16 @@ def begun(scene, t, y, places, contacts, zeros, event, stick_end):
     if isnan(f.alpha + f.psi_dot + ring_epsilon):
         return BROKEN, stick
     least = _ROUNDING * body.mass * size(scene, f)
+    # The other contact, if it touches and does not move yet, must open by its acceleration.
+    touches = y[2] == 0.0 and y[3] == 0.0
+    arm = 2.0 * scene.balls.half_distance * side_of(contact) * cos(delta_when_closed(body, contact, contacts[1]))
+    shut = -_SHUT * size(scene, f)
     if v == 0.0 and stiction_band(scene.law) == 0.0:
         mu_s, _, _ = coefficients_there(scene, place)
         if stick_end == 0:
-            _, _, normal, along = in_stick(scene, f, ring_epsilon)
-            if normal > least and abs(along) <= mu_s * normal and mu_s > 0.0:
+            psi_dd, alpha_dd, normal, along = in_stick(scene, f, ring_epsilon)
+            holds = normal > least and abs(along) <= mu_s * normal and mu_s > 0.0
+            if holds and not (touches and arm * (psi_dd - alpha_dd) < shut):
                 return RUNNING, stick
         region = region_at(scene.law, 0.0)
         best, best_sign = -1e300, 0
@@ -166,6 +174,8 @@ def begun(scene, t, y, places, contacts, zeros, event, stick_end):
             # At breakaway no friction is greater than that in stick. Where it does not fall, the push begins at zero.
             if stick_end == sign and abs(K) <= (1.0 + EQUAL) * mu_s:
                 push = max(push, 1e-12 * size(scene, f))
+            if touches and arm * (psi_dd - alpha_dd) < shut:
+                continue
             if denominator > 0.0 and normal > least and push > best:
                 several = several or (best > least / body.mass and push > least / body.mass)
                 best, best_sign = push, sign
