@@ -407,12 +407,12 @@ def _outcomes(scene: Scene) -> list[str]:
 def _sensitivity(given: Any, scene: Scene, timed: bool) -> tuple[str, tuple[str, ...]]:
     """Which measure is asked for, and of which variables beside the regimes."""
     if isinstance(given, bool):
-        return SENSITIVITIES[0] * given, ()
+        return (SENSITIVITIES[0] if given else ""), ()
     if given in SENSITIVITIES:
         return given, ()
     where = "sweep.sample.sensitivity"
     if not isinstance(given, dict) or not {"of"} <= set(given) <= {"of", "method"}:
-        problem = f"true or false is expected, morris, or {{of: [t_end]}}, got {show(given)}"
+        problem = f"true, false, morris, or {{of: [t_end]}} is expected, got {show(given)}"
         raise InputError(where, problem + (suggestion(given, SENSITIVITIES) if isinstance(given, str) else ""))
     method = given.get("method", SENSITIVITIES[0])
     if method not in SENSITIVITIES:
