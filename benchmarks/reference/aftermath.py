@@ -445,6 +445,9 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
         See ``AFTERMATH``.
 
     """
+    if p.restitution >= 1.0:
+        # Rebounds without loss do not shrink.
+        rest = 0.0
     begin = run(p, rtol, 0.0, 0.0, most_steps)
     end, t, position, speed, steps = begin[0], begin[1], begin[2], begin[3], begin[8]
     v, piece = begin[14], begin[12]
