@@ -61,7 +61,7 @@ SAMPLES: list[tuple[dict[str, Any], str, str]] = [
     ({"method": "halton"}, "sweep.sample.method", "sobol"),
     ({"methods": "sobol"}, "sweep.sample.methods", "did you mean `method`"),
     ({"keep": 1}, "sweep.sample.keep", "true or false"),
-    ({"sensitivity": "yes"}, "sweep.sample.sensitivity", "true or false"),
+    ({"sensitivity": "yes"}, "sweep.sample.sensitivity", "true, false, morris"),
     ({"sensitivity": "moris"}, "sweep.sample.sensitivity", "did you mean `morris`"),
     ({"of": {}}, "sweep.sample.of", "paths and distributions"),
     ({"of": [1]}, "sweep.sample.of", "paths and distributions"),
