@@ -37,9 +37,7 @@ _TOLD = (
     ("drive.law", "drive ", ""),
     ("drive.amplitude", "amplitude ", ""),
     ("zone.half_angle", "zone \N{PLUS-MINUS SIGN}", " rad"),
-    ("zone.center", "its centre ", " rad"),
     ("belt.velocity", "belt ", " m/s"),
-    ("impact.restitution", "restitution ", ""),
     ("time.span", "span ", " s"),
 )
 
