@@ -41,15 +41,16 @@ def main() -> int:
     parser.add_argument("--only", nargs="+", metavar="NAME", choices=NAMES, help=", ".join(NAMES))
     given = parser.parse_args()
     folder, failed = folder_of(given), []
-    options = [f"--{name}" for name in ("quick", "keep") if getattr(given, name)]
+    options = ["--quick"] if given.quick else []
     for name in given.only or NAMES:
         report = folder / f"{name}.md"
-        if report.exists() and stamp(name, [option for option in options if option != "--keep"]) in report.read_text():
+        if report.exists() and stamp(name, options) in report.read_text():
             print(f"{name}: {report} is of these sources already", flush=True)
             continue
         begin = time.monotonic()
         print(f"{name}: begins", flush=True)
-        if subprocess.run([sys.executable, "-m", f"benchmarks.{name}", *options], check=False).returncode:
+        kept = ["--keep"] if given.keep else []
+        if subprocess.run([sys.executable, "-m", f"benchmarks.{name}", *options, *kept], check=False).returncode:
             failed.append(name)
         print(f"{name}: {time.monotonic() - begin:.0f} s", flush=True)
     if failed:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from benchmarks.reference import go_on, rattling
+from benchmarks.reference import free, go_on, rattling
 from benchmarks.reference.free import impact
 from benchmarks.reference.problem import problem
 
@@ -68,6 +68,18 @@ def test_endless_rebounds_at_the_lowest_point_end_when_their_sum_says(e):
     assert found["impact_loss"] == pytest.approx(0.076 * G * 0.2, rel=1e-9)
     speeds = log[1:, 3]
     np.testing.assert_allclose(speeds[1:6], e * speeds[:5][: len(speeds[1:6])], rtol=1e-9)
+
+
+@pytest.mark.parametrize("ring_omega", [0.0, 1.0, 100.0])
+def test_slow_impact_that_wedges_the_body_has_one_solution_on_a_fast_race_too(ring_omega):
+    p, q, rng = problem(rig(mu=1.5)), np.zeros(6), np.random.default_rng(1)
+    touching, hits = np.array([True, True]), 0
+    while hits < 50:
+        phi, turns = rng.uniform(-3, 3), rng.choice([-1.0, 1.0]) * 10 ** rng.uniform(-12, -6)
+        free.pivot(p, 1, 0.0, ring_omega, np.array([phi - p.beta, phi, 0.0, ring_omega + turns]), q)
+        if free.contact(p, q, ring_omega, 2)[1] < 0.0:
+            hits += 1
+            assert free.shock(p, q, ring_omega, touching, np.zeros(2), np.full(2, 1.5))[0] == 1
 
 
 def energy(scene, found):

@@ -8,6 +8,9 @@ The impact needs no effective mass, and its law is Newton's.
 
 A contact that has settled, or closes so slowly that its load keeps it closed, is overdamped: Moreau's law lets a closed
 contact give way in the impact of the other, but not rebound. Nothing here knows modes, a complementarity or Zeno's sum.
+
+Springs cannot tell a contact that holds from rebounds that are shorter than they ring. Each run has therefore two
+words: one counts a contact as closed as soon as it has settled, the other if it stays so for a while.
 """
 
 import math
@@ -28,6 +31,8 @@ SETTLED = 6.0
 SLOW = 3.0
 #: Duration of an impact, in rad of the springs, after which its contact has settled.
 LONGEST = 12.0
+#: Time for which both contacts hold if they certainly do, in rad of the springs.
+LASTING = 100.0
 RTOL = 1e-4
 MOST_STEPS = 1_000_000
 _OPEN, _HIT, _CLOSED = range(3)
@@ -47,12 +52,12 @@ def damping(e):
 
 
 @njit(cache=True, error_model="numpy")
-def rattle(p, s, k, settled, slow, settling, v_rest, t, y, until, scale, longest, rtol, most_steps, out):
+def rattle(p, s, k, settled, slow, settling, lasting, v_rest, t, y, until, scale, longest, rtol, most_steps, out):
     """Run from t to `until`; y is overwritten.
 
     Writes to `out`: the time of the end, steps, time with an open contact, greatest gap, greatest closing speed, number
-    of impacts, changes of order between instants at which both contacts have settled, and for each contact whether it
-    is open at the end.
+    of impacts, changes of order between instants at which both contacts have settled, the same between instants at
+    which they have held for `lasting`, whether a contact is open at the end, and whether one was within `lasting`.
     """
     K, y_, found = np.zeros((7, 8)), np.zeros(8), np.zeros(6)
     springs = np.array([k, k, settled, settled, 0.0, 0.0])
@@ -60,8 +65,8 @@ def rattle(p, s, k, settled, slow, settling, v_rest, t, y, until, scale, longest
         springs[1] = springs[3] = 0.0
     mode, since = np.full(2, _CLOSED), np.zeros(2)
     n = 1 if p.model == SINGLE else 2
-    h, steps, side, out[:] = 0.1 * longest, 0, 1.0, 0.0
-    closing = np.zeros(2)
+    h, steps, out[:] = 0.1 * longest, 0, 0.0
+    closing, sides, apart_at = np.zeros(2), np.ones(2), -math.inf
     while t < until and steps < most_steps:
         motion(p, springs, v_rest, t, y, K[0], found)
         free = mode[0] == _OPEN and (n == 1 or mode[1] == _OPEN)
@@ -105,16 +110,22 @@ def rattle(p, s, k, settled, slow, settling, v_rest, t, y, until, scale, longest
                 springs[2 + i], springs[4 + i] = settled, 0.0
         if apart:
             out[2] += h
-        if n == 2 and mode[0] == _CLOSED and mode[1] == _CLOSED:
+        if mode[0] != _CLOSED or mode[1] != _CLOSED:
+            apart_at = t
+        elif n == 2:
             now = order(p, y)
-            if now * side < 0.0:
-                out[6] += 1.0
-            side = now
+            for i in range(2):
+                if i == 0 or t - apart_at > lasting:
+                    if now * sides[i] < 0.0:
+                        out[6 + i] += 1.0
+                    sides[i] = now
         h *= min(4.0, 0.9 * max(error, 1e-9) ** -0.2)
     out[0], out[1] = t, steps
     for i in range(n):
         # A contact that still rings is closed.
-        out[7 + i] = 1.0 if mode[i] == _OPEN and max(found[i] / scale[0], abs(closing[i]) / slow) > 10.0 else 0.0
+        if mode[i] == _OPEN and max(found[i] / scale[0], abs(closing[i]) / slow) > 10.0:
+            out[8] = 1.0
+    out[9] = 1.0 if t - apart_at <= lasting else 0.0
 
 
 def follow(p, t, depth):
@@ -138,18 +149,18 @@ def follow(p, t, depth):
     scale = depth * p.radius * np.array([1.0, 1.0, 1.0 / p.radius, *(frequency * np.array([1, 1, 1 / p.radius])), 1, 1])
     scale[6:] = 1.0
     s = damping(p.restitution) if p.restitution > 0.0 else math.inf
-    out = np.zeros(9)
-    rattle(smoothed(p, v_rest), s, k, SETTLED * math.sqrt(k * p.mass), SLOW * slow, LONGEST / frequency, v_rest,
-           start[0], y, until, scale, 0.4 / frequency, RTOL, MOST_STEPS, out)  # fmt: skip
-    names = ("t", "steps", "open_time", "gap_max", "impact_speed_max", "impacts", "tumbles", "open_1", "open_2")
+    out = np.zeros(10)
+    rattle(smoothed(p, v_rest), s, k, SETTLED * math.sqrt(k * p.mass), SLOW * slow, LONGEST / frequency,
+           LASTING / frequency, v_rest, start[0], y, until, scale, 0.4 / frequency, RTOL, MOST_STEPS, out)  # fmt: skip
+    names = ("t", "steps", "open_time", "gap_max", "impact_speed_max", "impacts", "tumbles", "lasting_tumbles", "open",
+             "lately_open")  # fmt: skip
     return dict(zip(names, out, strict=True)) | {"phi_end": y[2], "omega_end": y[5], "k": k}
 
 
-def word(found):
-    """Word for what the springs did."""
-    if found["tumbles"] > 0:
-        return "tumbled"
-    return "open" if found["open_1"] + found["open_2"] > 0 else "recovered"
+def words(found):
+    """Words for what the springs did: if a contact is closed once it has settled, and if it must stay so."""
+    said = [("tumbles", "open"), ("lasting_tumbles", "lately_open")]
+    return ["tumbled" if found[turns] else "open" if found[ends] else "recovered" for turns, ends in said]
 
 
 def opinion(p, said, t):
@@ -167,8 +178,11 @@ def opinion(p, said, t):
     runs = [follow(p, max(0.0, t - 1e-4), depth) for depth in DEPTHS]
     if None in runs or any(run["t"] < p.span for run in runs):
         return Opinion("undecided", "the run did not end", [run for run in runs if run])
-    words = [word(run) for run in runs]
-    why = " / ".join(f"{name}, up to {run['gap_max']:.4g} m" for name, run in zip(words, runs, strict=True))
-    if set(words) == {said}:
+    told = [words(run) for run in runs]
+    why = " / ".join(
+        f"{' or '.join(sorted(set(both)))}, up to {run['gap_max']:.4g} m" for both, run in zip(told, runs, strict=True)
+    )
+    found = set(told[0]) | set(told[1])
+    if found == {said}:
         return Opinion("confirmed", why, runs)
-    return Opinion("undecided" if said in words else "contradicted", why, runs)
+    return Opinion("undecided" if said in found else "contradicted", why, runs)
