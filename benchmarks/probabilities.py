@@ -1,10 +1,12 @@
-"""A map of probabilities, by `sweep.sample` and by hand: a plain sweep over points that scipy drew, counted by numpy.
+"""Maps of probabilities and of Sobol indices, by `sweep.sample` and by hand with scipy, SALib and a plain sweep.
 
-    python -m benchmarks.probabilities            # a million runs each way
-    python -m benchmarks.probabilities --quick    # 16 x 16 cells
+    python -m benchmarks.probabilities            # a million runs each way for the probabilities
+    python -m benchmarks.probabilities --quick    # fewer cells
 
-The grid has amplitudes of the drive and half-angles of the zone, and two coefficients of friction are uncertain. Each
-way has a process of its own, one job, and the same number of runs, none certified. Compilation is not counted.
+The grid has amplitudes of the drive and half-angles of the zone, and two coefficients of friction are uncertain. By
+hand means a plain sweep with one more dimension, over points that scipy or SALib drew; numpy counts the regimes, and
+`SALib.analyze.sobol` makes the indices of `separating` cell by cell. Each way has a process of its own, one job, and
+the same number of runs, none certified. Compilation is not counted.
 
 Writes `probabilities.md`.
 """
@@ -16,7 +18,9 @@ import logging
 import resource
 import subprocess
 import sys
+from collections.abc import Callable
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
@@ -26,7 +30,7 @@ from ringsweep.quantities.flags import REGIMES
 
 N, SPREAD = 256, 0.05
 MEANS = {"friction.rest.mu_k": 0.1, "friction.rough.mu_k": 0.3}
-WAYS = ("sweep.sample", "by hand")
+SEPARATING = REGIMES.index("separating")
 
 
 def grid(side: int) -> dict[str, list[float]]:
@@ -37,65 +41,117 @@ def grid(side: int) -> dict[str, list[float]]:
     }
 
 
-def sampled(side: int) -> np.ndarray:
-    """Probability of each regime, by the package."""
+def sampled(side: int, sensitivity: bool) -> Any:
+    """Dataset of a sampled sweep."""
     of = {path: {"normal": [mean, SPREAD * mean]} for path, mean in MEANS.items()}
     given = {
         "scene": ring({"law": "stiction"}),
         "solver": {"method": "auto", "certify": False},
-        "sweep": {"grid": grid(side), "sample": {"n": N, "seed": 1, "of": of}},
+        "sweep": {"grid": grid(side), "sample": {"n": N, "seed": 1, "of": of, "sensitivity": sensitivity}},
     }
-    return ringsweep.run(given, jobs=1, progress=False)["probability"].values
+    return ringsweep.run(given, jobs=1, progress=False)
 
 
-def by_hand(side: int) -> np.ndarray:
-    """The same by a sweep with one more dimension, whose runs are all kept until they are counted."""
+def by_hand(side: int, points: np.ndarray) -> np.ndarray:
+    """Regimes of a sweep with one more dimension, whose runs are all kept until they are counted."""
     import xarray as xr
-    from scipy.stats import norm, qmc
 
-    points = qmc.Sobol(len(MEANS), seed=1).random(N)
-    columns = {
-        path: xr.DataArray(norm.ppf(u, mean, SPREAD * mean), dims="point")
-        for (path, mean), u in zip(MEANS.items(), points.T, strict=True)
-    }
+    columns = {path: xr.DataArray(column, dims="point") for path, column in zip(MEANS, points.T, strict=True)}
     solver = {"method": "auto", "certify": False}
     ds = ringsweep.sweep(ring({"law": "stiction"}), {**grid(side), **columns}, solver=solver, jobs=1, progress=False)
-    regimes = ds["regime"].transpose(..., "point").values
+    return ds["regime"].transpose(..., "point").values
+
+
+def probabilities(side: int) -> np.ndarray:
+    """Probability of each regime, by the package."""
+    return sampled(side, False)["probability"].values
+
+
+def probabilities_by_hand(side: int) -> np.ndarray:
+    """The same with the points of scipy."""
+    from scipy.stats import norm, qmc
+
+    means = np.array(list(MEANS.values()))
+    regimes = by_hand(side, norm.ppf(qmc.Sobol(len(MEANS), seed=1).random(N), means, SPREAD * means))
     return np.stack([(regimes == k).mean(axis=-1) for k in range(len(REGIMES))], axis=-1)
+
+
+def indices(side: int) -> np.ndarray:
+    """Total indices of `separating`, by the package."""
+    return sampled(side, True)["sobol_total"].sel(word="separating").values
+
+
+def indices_by_hand(side: int) -> np.ndarray:
+    """The same with SALib; NaN where nearly all runs of a cell are alike, so that their indices say little."""
+    from SALib.analyze import sobol as analyse
+    from SALib.sample import sobol as draw
+
+    bounds = [[mean, SPREAD * mean] for mean in MEANS.values()]
+    problem = {"num_vars": len(MEANS), "names": list(MEANS), "bounds": bounds, "dists": ["norm"] * len(MEANS)}
+    lost = by_hand(side, draw.sample(problem, N, calc_second_order=False, seed=1)) == SEPARATING
+    found = np.full((side, side, len(MEANS)), np.nan)
+    for cell in np.ndindex(side, side):
+        if 0.0 < (share := lost[cell].mean()) < 1.0:
+            told = analyse.analyze(problem, lost[cell].astype(float), calc_second_order=False, seed=1)["ST"]
+            if 0.1 < share < 0.9:
+                found[cell] = told
+    return found
+
+
+#: What is measured: the number, the way, the function, cells along an axis in full and quick.
+MEASURED: dict[str, tuple[str, str, Callable[[int], np.ndarray], int, int]] = {
+    "sampled": ("probabilities", "sweep.sample", probabilities, 64, 16),
+    "by-hand": ("probabilities", "by hand", probabilities_by_hand, 64, 16),
+    "sampled-indices": ("Sobol indices", "sweep.sample", indices, 24, 8),
+    "salib": ("Sobol indices", "by hand, with SALib", indices_by_hand, 24, 8),
+}
 
 
 def main() -> None:
     """Measure, print, write."""
     parser = command(__doc__)
-    parser.add_argument("--way", choices=WAYS, help="measure this one only, in this process")
+    parser.add_argument("--way", choices=MEASURED, help="measure this one only, in this process")
     given = parser.parse_args()
-    side = 16 if given.quick else 64
     logging.getLogger("ringsweep").setLevel(logging.ERROR)
     if given.way:
-        measured = sampled if given.way == WAYS[0] else by_hand
+        _, _, measured, full, quick = MEASURED[given.way]
         measured(2)
         begin = perf_counter()
-        found = measured(side)
+        found = measured(quick if given.quick else full)
         seconds = perf_counter() - begin
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
         print(json.dumps({"seconds": seconds, "memory": memory, "found": found.tolist()}))
         return
     print(where := machine())
     rows: list[list[str]] = []
-    maps: list[np.ndarray] = []
-    for way in WAYS:
-        line = [sys.executable, "-m", "benchmarks.probabilities", "--way", way, *["--quick"] * given.quick]
+    maps: dict[str, list[np.ndarray]] = {}
+    for key, (number, way, _, full, quick) in MEASURED.items():
+        line = [sys.executable, "-m", "benchmarks.probabilities", "--way", key, *["--quick"] * given.quick]
         told = json.loads(subprocess.run(line, check=True, capture_output=True, text=True).stdout.splitlines()[-1])
-        maps.append(np.array(told["found"]))
-        rows.append([way, f"{side * side * N}", f"{told['seconds']:.0f} s", f"{told['memory']:.0f} MB"])
-    header = ["way", "runs", "time, one job", "greatest memory"]
-    heading("A map of probabilities")
+        maps.setdefault(number, []).append(np.array(told["found"]))
+        side = quick if given.quick else full
+        runs = side * side * N * (len(MEANS) + 2 if number == "Sobol indices" else 1)
+        rows.append(
+            [number, way, f"{side} x {side}", f"{runs}", f"{told['seconds']:.0f} s", f"{told['memory']:.0f} MB"]
+        )
+    header = ["number", "way", "cells", "runs", "time, one job", "greatest memory"]
+    heading("Maps of probabilities and of Sobol indices")
     table(header, rows)
-    apart = (
-        f"{side} x {side} cells, n = {N}. Greatest difference of a probability: {np.abs(maps[0] - maps[1]).max():.3f}."
+    apart = " ".join(
+        f"The {number} of both ways differ by {np.nanmedian(np.abs(a - b)):.3f} in the median and by"
+        f" {np.nanmax(np.abs(a - b)):.3f} at most."
+        for number, (a, b) in maps.items()
     )
+    apart = f"n = {N} in each cell; both ways have points of their own. {apart} Indices are compared in"
+    apart += " cells where 10 to 90 % of the runs separate."
     print(apart)
-    publish(given, "probabilities", "A map of probabilities", where, f"{markdown(header, rows)}\n{apart}")
+    publish(
+        given,
+        "probabilities",
+        "Maps of probabilities and of Sobol indices",
+        where,
+        f"{markdown(header, rows)}\n{apart}",
+    )
 
 
 if __name__ == "__main__":
