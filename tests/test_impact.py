@@ -103,6 +103,24 @@ class TestBody:
         assert (drums.open_time >= drums.flight_time).all()
         assert (drums.gap_max.where(lost, 1.0) > 0.0).all()
 
+    def test_run_with_an_impact_that_gains_energy_is_not_certified(self):
+        """Newton's law may gain energy at strong friction (Kane's example); a body on springs tumbles here."""
+        axes = {"impact.restitution": [0.3, 0.890835]}
+        scene = BODY | {
+            "body": {"mass": 0.076, "inertia": 4.47e-5, "half_distance": 0.025, "ball_radius": 0.01},
+            "friction": {
+                "law": "stiction",
+                "rough": {"mu_s": 0.0986779, "mu_k": 0.0734336},
+                "rest": {"mu_s": 0.679746, "mu_k": 0.292398},
+            },
+            "drive": {"law": "none"},
+            "zone": {"half_angle": 0.0743326, "center": np.pi},
+            "initial": {"phi": 1.27371, "omega": 26.5},
+            "time": {"span": 1.0},
+        }
+        found = ringsweep.sweep(scene, axes, progress=False)
+        assert found.certified.values.tolist() == [1, 0]
+
     def test_mirror_image_has_the_mirrored_run(self, drums):
         mirrored = ringsweep.sweep(BODY, {"drive.amplitude": -AMPLITUDES}, progress=False)
         sure = (drums.certified.values == 1) & (mirrored.certified.values == 1)

@@ -2,6 +2,7 @@
 
 import json
 import logging
+import re
 from typing import Any
 
 import numpy as np
@@ -533,6 +534,9 @@ def test_commands_work_on_a_sampled_sweep(tmp_path: Any, capsys: Any, monkeypatc
     assert "192 runs in each, 3072 in all" in capsys.readouterr().out
     assert main(["run", "my.yaml", "--jobs", "1"]) == 0
     assert "riding: 0.00% to 100.00%" in capsys.readouterr().out
+    write(tmp_path / "one.yaml", config(n=64, sensitivity=True))
+    assert main(["run", "one.yaml", "--jobs", "1"]) == 0
+    assert re.search(r"riding: .*\n    total Sobol index: \S+ \d+% \(\d+% to \d+%\)", capsys.readouterr().out)
     assert (tmp_path / "my.png").exists()
     for arguments in (
         ["info", "my.nc"],

@@ -14,12 +14,13 @@ words: one counts a contact as closed as soon as it has settled, the other if it
 """
 
 import math
+from itertools import pairwise
 
 import numpy as np
 from numba import njit
 from scipy.optimize import brentq
 
-from benchmarks.reference.aftermath import order
+from benchmarks.reference.aftermath import HIT, order
 from benchmarks.reference.compliant import Opinion, before, motion, place, rest_speed, smoothed, trial
 from benchmarks.reference.problem import SINGLE
 
@@ -31,6 +32,9 @@ SETTLED = 6.0
 SLOW = 3.0
 #: Duration of an impact, in rad of the springs, after which its contact has settled.
 LONGEST = 12.0
+#: Impacts at which a run of the springs is compared with one of the rigid body, and difference of their angular
+#: velocities, in units of the greatest one or of a fall, at which they have parted.
+LOOKED_AT, PARTED = 40, 0.05
 #: Time for which both contacts hold if they certainly do, in rad of the springs.
 LASTING = 100.0
 RTOL = 1e-4
@@ -186,3 +190,39 @@ def opinion(p, said, t):
     if found == {said}:
         return Opinion("confirmed", why, runs)
     return Opinion("undecided" if said in found else "contradicted", why, runs)
+
+
+def parts_in_shared_impact(p, t, rigid, log):
+    """Whether springs part from the rigid body after an impact at one contact while the other one holds.
+
+    There the impulse goes through both contacts, and rigid bodies do not say in which order they give way.
+
+    Parameters
+    ----------
+    p : Problem
+    t : float
+        Time of the loss, s.
+    rigid : callable
+        Outcomes of the rigid body, by name, at the end of a span, s.
+    log : ndarray, (events, 5)
+        Events of the rigid body.
+
+    """
+    instants = np.concatenate(([t], log[log[:, 1] == HIT, 0][:LOOKED_AT], [p.span]))
+    together = math.nan
+    for earlier, now in pairwise(instants):
+        before = now - 0.02 * (now - earlier)
+        if now - earlier < 1e-4:
+            continue
+        if apart(p, t, rigid, before):
+            # They were together just before the impact that came last.
+            return together > t and rigid(together)["closed"] > 0
+        together = before
+    return False
+
+
+def apart(p, t, rigid, until):
+    """Whether springs and the rigid body have different angular velocities at a time."""
+    run, found = follow(p._replace(span=until), max(0.0, t - 1e-4), DEPTHS[-1]), rigid(until)
+    scale = math.sqrt(p.gravity / p.radius) + max(abs(found["speed"]), abs(run["omega_end"]))
+    return abs(found["speed"] - run["omega_end"]) > PARTED * scale

@@ -126,6 +126,24 @@ def print_events(run: xr.Dataset) -> None:
             print(f"  {run['event_time'].values[k]:.9g} s {kind}{who}{speed}")
 
 
+# Parameters of the greatest influence on a regime that are printed.
+_MOST_PARAMETERS = 3
+
+
+def _print_indices(of: xr.Dataset) -> None:
+    """Print the greatest total indices of a regime in one cell, unless nothing is known of them."""
+    if "sobol_total" not in of or float((of["sobol_total_high"] - of["sobol_total_low"]).min()) >= 1.0:
+        return
+    order = np.argsort(-of["sobol_total"].values)[:_MOST_PARAMETERS]
+    told = (of.isel(parameter=k) for k in order.tolist())
+    parts = (
+        f"{one['parameter'].item()} {float(one['sobol_total']):.0%}"
+        f" ({float(one['sobol_total_low']):.0%} to {float(one['sobol_total_high']):.0%})"
+        for one in told
+    )
+    print(f"    total Sobol index: {', '.join(parts)}")
+
+
 def _summarise_sample(result: xr.Dataset) -> None:
     """Print the probability of each regime that occurs, with its interval; of several cells the range."""
     probability = result["probability"]
@@ -142,6 +160,7 @@ def _summarise_sample(result: xr.Dataset) -> None:
             share, low, high, numerics = (float(column.values.squeeze()) for column in of.values())
             part = f", of which {numerics:.2%} are numerics" if numerics > 0.0 else ""
             print(f"  {word}: {share:.2%} ({low:.2%} to {high:.2%}{part})")
+            _print_indices(result.sel(word=word).squeeze(grid))
             continue
         shares = of["probability"].values
         print(f"  {word}: {shares.min():.2%} to {shares.max():.2%}, mean {shares.mean():.2%}", end="")

@@ -201,7 +201,8 @@ class Impulses(NamedTuple):
     loss : float
         Energy that the body loses relative to the moving race, J.
     violation : float
-        Largest violation of the law, recomputed from impulses and velocities, as a share of their scale.
+        Largest violation of the law, recomputed from impulses and velocities, as a share of their scale. Energy that
+        the body gains is a violation too: Newton's law may yield it where friction is strong.
     """
 
     solutions: int
@@ -322,7 +323,7 @@ def impulses(mass, moment, first, second, touching, mu, restitution):
     if touching[1]:
         speed = max(speed, max(abs(before[2]), abs(before[3])))
     least = _ROUNDING * speed
-    least_impulse = least / min(c_11[0], c_22[0])
+    least_impulse, unit_mass = least / min(c_11[0], c_22[0]), max(c_11[0], c_22[0])
     solutions = 0
     best = Impulses(0, 0.0, 0.0, 0.0, 0.0, before[0], before[1], before[2], before[3], 0.0, 0.0)
     for mode_1 in range(4 if touching[0] else 1):
@@ -400,6 +401,7 @@ def impulses(mass, moment, first, second, touching, mu, restitution):
             )
             if max(abs(n_1), abs(n_2)) <= least_impulse:
                 loss = 0.0
+            violation = max(violation, -loss * unit_mass / speed / speed)
             best = Impulses(solutions, n_1, t_1, n_2, t_2, o_1, s_1, o_2, s_2, loss, violation)
     return best
 

@@ -8,8 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.models.interface.audit import least_scales, undecided
-from ringsweep.quantities.flags import ANSWERS_DIFFER, CERTIFIED, CLOSE_CALL, FAILED, NO_RESULT, NOT_FINITE
+from ringsweep.models.interface.audit import disobeys, least_scales, undecided
+from ringsweep.quantities.flags import (
+    ANSWERS_DIFFER,
+    CERTIFIED,
+    CLOSE_CALL,
+    FAILED,
+    LAW_NOT_OBEYED,
+    NO_RESULT,
+    NOT_FINITE,
+)
 from ringsweep.quantities.variables import OUTCOMES
 
 #: Outcomes on which two resolutions must agree for a certificate.
@@ -92,6 +100,7 @@ def doubts(
     reasons = [
         (rows[:, outcomes.index("regime")] == FAILED, NO_RESULT),
         (~agree(rows, second_rows, outcomes), ANSWERS_DIFFER),
+        (disobeys(batch, rows) | disobeys(batch, second_rows), LAW_NOT_OBEYED),
         (undecided(batch, rows, second_rows, fall_rates), CLOSE_CALL),
         (~np.isfinite(rows[:, needed]).all(axis=1), NOT_FINITE),
     ]

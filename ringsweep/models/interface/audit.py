@@ -79,6 +79,27 @@ def undecided(batch, rows, second_rows, fall_rates):
 
 
 @hook(optional=True)
+def disobeys(batch, rows):
+    """Which runs of a batch have an outcome that no motion obeying the law has, beside what the audit finds.
+
+    It runs outside kernels and may use NumPy.
+
+    Parameters
+    ----------
+    batch : NamedTuple
+        Cells. The type of the batch decides which body runs.
+    rows : ndarray of shape ``(cells, outcomes)``
+        Outcomes of the runs.
+
+    Returns
+    -------
+    ndarray of bool, shape ``(cells,)``
+        By default false for all cells.
+    """
+    return np.zeros(len(rows), dtype=bool)
+
+
+@hook(optional=True)
 def same_statistics(batch, rows, second_rows):
     """Which runs of a batch have the same statistics as other runs of the same cells, within sampling error.
 
@@ -161,4 +182,4 @@ def magnified(batch, rows):
     return np.zeros(len(rows), dtype=bool), np.zeros(len(rows))
 
 
-MEMBERS = (violation, energy, undecided, same_statistics, disturbed, least_scales, magnified)
+MEMBERS = (violation, energy, undecided, disobeys, same_statistics, disturbed, least_scales, magnified)
