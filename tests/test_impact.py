@@ -104,22 +104,15 @@ class TestBody:
         assert (drums.gap_max.where(lost, 1.0) > 0.0).all()
 
     def test_run_with_an_impact_that_gains_energy_is_not_certified(self):
-        """Newton's law may gain energy at strong friction (Kane's example); a body on springs tumbles here."""
-        axes = {"impact.restitution": [0.3, 0.890835]}
-        scene = BODY | {
-            "body": {"mass": 0.076, "inertia": 4.47e-5, "half_distance": 0.025, "ball_radius": 0.01},
-            "friction": {
-                "law": "stiction",
-                "rough": {"mu_s": 0.0986779, "mu_k": 0.0734336},
-                "rest": {"mu_s": 0.679746, "mu_k": 0.292398},
-            },
-            "drive": {"law": "none"},
-            "zone": {"half_angle": 0.0743326, "center": np.pi},
-            "initial": {"phi": 1.27371, "omega": 26.5},
-            "time": {"span": 1.0},
-        }
+        """Newton's law may gain energy at strong friction, as in Kane's example. No body on springs does."""
+        strong = {"mu_s": 0.6, "mu_k": 0.4}
+        scene = AT_REST | {"friction": {"law": "stiction", "rough": strong, "rest": strong}}
+        axes = {"impact.restitution": [0.5, 0.8, 1.0], "initial.omega": [20.0, 25.0, 35.0], "initial.phi": [0.0, 1.0]}
         found = ringsweep.sweep(scene, axes, progress=False)
-        assert found.certified.values.tolist() == [1, 0]
+        assert (found.impact_loss.values < -1e-6).any()
+        assert not found.certified.values[found.impact_loss.values < 0.0].any()
+        gains = ringsweep.words(found.uncertified_because).values == "law_not_obeyed"
+        assert gains.any(axis=(1, 2)).tolist() == [False, False, True]
 
     def test_mirror_image_has_the_mirrored_run(self, drums):
         mirrored = ringsweep.sweep(BODY, {"drive.amplitude": -AMPLITUDES}, progress=False)

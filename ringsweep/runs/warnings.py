@@ -134,8 +134,8 @@ def _warn_of_failures(results: xr.Dataset, config: Config) -> None:
     elif any(structure.own_law for structure in config.scene.structures.values()):
         why = "its friction law may be negative, or no number, at a sliding speed that the body reached"
     elif all(np.isfinite(float(one[name])) for name in ("phi_end", "omega_end", "velocity_end") if name in one):
-        other = "another solver.rtol" if hasattr(config.solver, "rtol") else "solver.method auto"
-        why = f"no step succeeds at t = {float(one['t_end']):.6g} s; {other} may have a result"
+        other = "another" if hasattr(config.solver, "rtol") else "solver.method event with another"
+        why = f"no step succeeds at t = {float(one['t_end']):.6g} s; {other} rtol may have a result"
     who = "the run has failed"
     if regime.size > 1:
         at = ", ".join(f"{name} = {_value(axis)}" for name, axis in one.coords.items() if "path" in axis.attrs)
