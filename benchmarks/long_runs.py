@@ -87,8 +87,8 @@ def words(kind: Any, points: Points, period: np.ndarray, tally: Counter[str]) ->
         if len({one[k] for one in regime}) > 1:
             faults.append("regime")
         if long_run[0][k] == "periodic":
-            periods = {int(np.round(one["period"].values[k] / period[k])) for one in runs}
-            if len(periods) > 1:
+            periods = np.round([one["period"].values[k] / period[k] for one in runs])
+            if np.ptp(periods[np.isfinite(periods)]) > 0.0:
                 faults.append("period")
             # What returns each time has a period that the true one divides.
             if (told[k] % own[k] if own[k] else told[k] <= LONGEST) != 0:
