@@ -37,7 +37,7 @@ function word(key, i) {
 }
 
 // The values, in the places of the view, and their colours.
-const colours = bars[name].color_mapper, scale = about.logarithmic ? Math.log10 : value => value
+const colours = bars[name][0].color_mapper, scale = about.logarithmic ? Math.log10 : value => value
 const target = edges === null ? view.data.value : view.data.value[0]
 const cellAt = pixel => rows[Math.floor(pixel / columns.length)] + columns[pixel % columns.length]
 for (let pixel = 0; pixel < target.length; pixel++) target[pixel] = scale(shown(cellAt(pixel)))
@@ -46,12 +46,20 @@ paint.change.emit()
 view.change.emit()
 
 // A classification has the share of each class beside its colour.
-for (const [key, bar] of Object.entries(bars)) bar.visible = key === name && (words !== null || line === null)
-if (words !== null) {
-  // The shares are those of all cells of the file, of which a large one does not show every cell.
-  bars[name].major_label_overrides = new Map(words.map((text, k) => [k, `${text}, ${percent(about.shares[k][slice])}`]))
-} else {
-  bars[name].title = about.label
+// On a narrow screen the colour bar stands below the plot, whose width it would take.
+const narrow = window.innerWidth < 600
+for (const [key, pair] of Object.entries(bars)) {
+  pair.forEach((bar, k) => { bar.visible = key === name && (words !== null || line === null) && narrow === (k === 1) })
+}
+if (narrow) for (const axis of axes) axis.axis_label_text_font_size = "11px"
+for (const [k, bar] of bars[name].entries()) {
+  if (words !== null) {
+    // The shares are those of all cells of the file, of which a large one does not show every cell.
+    const told = (text, share) => k === 0 ? `${text}, ${percent(share)}` : `${text}\n${percent(share)}`
+    bar.major_label_overrides = new Map(words.map((text, i) => [i, told(text, about.shares[i][slice])]))
+  } else {
+    bar.title = about.label
+  }
 }
 
 // Marks on cells that are not certified.

@@ -352,8 +352,10 @@ def _document(sweep: _Sweep) -> Any:
         # Numbers of a page are rounded: the least one must not fall below the scale, where only zeros are.
         zeros = {"low": 0.99 * low, "low_color": ZERO} if about["logarithmic"] else {"low": low}
         mapper = kind(palette=colours, high=high, **zeros)
-        bars[name] = ColorBar(color_mapper=mapper, visible=False, major_label_text_font_size="12px", **ticker)
-        plot.add_layout(bars[name], "right")
+        style = {"color_mapper": mapper, "visible": False, **ticker}
+        bars[name] = [ColorBar(**style, major_label_text_font_size=f"{size}px") for size in (12, 11)]
+        for bar, side in zip(bars[name], ("right", "below"), strict=True):
+            plot.add_layout(bar, side)
     paint = LinearColorMapper(palette=[NO_VALUE], nan_color=NO_VALUE)
     line, curve = None, []
     if sweep.scattered:
@@ -394,6 +396,7 @@ def _document(sweep: _Sweep) -> Any:
             "plot": plot,
             "paint": paint,
             "bars": bars,
+            "axes": [*plot.xaxis, *plot.yaxis],
             "drawn": drawn,
             "view": view,
             "edges": edges,
