@@ -210,6 +210,30 @@ def test_a_steep_smooth_law_has_the_multipliers_of_the_law_that_jumps():
     assert (other.multiplier_2 < 1e-100).all()
 
 
+def test_friction_that_falls_within_a_micrometre_a_second_has_the_exponent_of_neighbouring_runs():
+    """A step through the fall of friction holds many times in which a disturbance grows by a factor of e."""
+    scene = {
+        "model": "belt",
+        "body": {"mass": 0.432273},
+        "spring": {"stiffness": 22.8094, "cubic": 441.366},
+        "friction": {"law": "tustin", "mu_s": 0.208922, "mu_k": 0.0993472, "alpha": 1e6},
+        "belt": {"velocity": 0.0},
+        "force": {"amplitude": 1.49253, "frequency": 0.446578, "phase": -2.48131},
+        "initial": {"x": 0.1, "velocity": 0.0},
+    }
+    periods, left_out, distance = 60, 20, 1e-8
+    found = run(scene | {"time": {"span": 100 / 0.446578}}, {"initial.x": [0.1]})
+    at, apart, growth = np.array([0.1, 0.0]), np.array([distance, 0.0]), []
+    for _ in range(periods):
+        x, v = np.transpose([at, at + apart])
+        ends = run(scene | {"time": {"span": 1 / 0.446578}}, {"initial.x": x, "initial.velocity": v}, False)
+        (at, other) = np.transpose([ends.x_end.values, ends.velocity_end.values])
+        length = np.hypot((other - at)[0] * 2.0 * np.pi * 0.446578, (other - at)[1])
+        growth.append(np.log(length / distance))
+        apart = (other - at) / length * distance
+    assert found.lyapunov.item() / 0.446578 == pytest.approx(np.mean(growth[left_out:]), abs=0.03)
+
+
 def test_the_record_changes_no_other_outcome():
     scene = FORCED | {"time": {"span": "30 s"}, "belt": {"velocity": 0.1}}
     plain, asked = (run(scene, {"force.frequency": [0.1, 0.2]}, exponent) for exponent in (False, True))

@@ -37,6 +37,18 @@ def store(matrix, i, work):
         row[k] = matrix[k]
 
 
+@inlined
+def largest_trace(n, nodes, work):
+    """Largest trace of the matrices that are stored for the nodes; 0 if none is positive."""
+    largest = 0.0
+    for i in range(nodes):
+        row, trace = work[_MATRICES + i], 0.0
+        for r in range(n):
+            trace += row[r * n + r]
+        largest = max(largest, trace)
+    return largest
+
+
 @unrolled
 def stored(length, like, work):
     """The transition matrix that :func:`transition` left in `work`, a tuple like `like`."""

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from ringsweep.compile import hook
 from ringsweep.models.interface import implicit, series, variation
-from ringsweep.numerics.collocation import FEW, MANY, WEIGHTS_OF_FEW, WEIGHTS_OF_MANY, store
+from ringsweep.numerics.collocation import FEW, MANY, WEIGHTS_OF_FEW, WEIGHTS_OF_MANY, largest_trace, store
 from ringsweep.solvers import rosenbrock
+
+# Longest piece of a step of series, in times in which a disturbance grows by a factor of e: where friction falls
+# steeply, a step holds many, and collocation follows decay of any rate, but not growth.
+_MOST_GROWTH = 1.0
 
 
 @hook(optional=True)
@@ -39,12 +43,19 @@ def along_series(asked, scene, record, mode, c, t, ends, work):
 @along_series.implements(variation.Exponent)
 def _along_series(asked, scene, record, mode, c, t, ends, work):
     low, high = ends
-    if not high > low:
-        return record
-    for i in range(len(MANY)):
-        s = low + (high - low) * MANY[i]
-        store(variation.jacobian(scene, mode, t + s, series.state_at(scene, c, s)), i, work)
-    return variation.advance(scene, record, high - low, series.rates_at(scene, c, high), WEIGHTS_OF_MANY, work)
+    width = high - low
+    while low < high:
+        end = low + width if low + 1.5 * width < high else high
+        for i in range(len(MANY)):
+            s = low + (end - low) * MANY[i]
+            store(variation.jacobian(scene, mode, t + s, series.state_at(scene, c, s)), i, work)
+        rates = series.rates_at(scene, c, end)
+        if (end - low) * largest_trace(len(rates), len(MANY), work) > _MOST_GROWTH:
+            width = 0.5 * (end - low)
+            continue
+        record = variation.advance(scene, record, end - low, rates, WEIGHTS_OF_MANY, work)
+        low = end
+    return record
 
 
 @hook(optional=True)
