@@ -126,6 +126,14 @@ def test_page_has_the_width_of_a_telephone_and_a_tooltip_of_less_than_half_of_it
     assert int(re.search(r"max-width: (\d+)vw", tooltip)[1]) < 50
 
 
+def test_colours_of_a_variable_stand_beside_the_plot_and_on_a_narrow_screen_below_it(bokeh, tmp_path):
+    page = page_of(sweep(4, 3), tmp_path)
+    (plot,) = models(page, "Figure")
+    beside, below = (json.dumps(plot[side]).count('"ColorBar"') for side in ("right", "below"))
+    assert beside == below == len(script(page)["variables"])
+    assert "window.innerWidth < 600" in html.unescape(page)
+
+
 def test_page_holds_every_number_with_four_digits_and_no_bound_is_rounded_down(bokeh, tmp_path):
     ds = sweep(5, 4)
     ds["t_separation"][2, 1] = np.nan
