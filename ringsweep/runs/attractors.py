@@ -33,10 +33,14 @@ _AS_NEAR = 3.0
 
 
 class _Motion(NamedTuple):
-    """The points of a motion, shape ``(points, variables)``, in scaled units, and whether they return in this order."""
+    """Points of a motion in scaled units, whether they return in this order, and how far the same ones may differ.
+
+    The points have the shape ``(points, variables)``, the distance that of the variables.
+    """
 
     points: Floats
     periodic: bool
+    within: Floats
 
 
 def attractors(ds: xr.Dataset, tolerance: float = 1e-3) -> xr.Dataset:
@@ -54,7 +58,8 @@ def attractors(ds: xr.Dataset, tolerance: float = 1e-3) -> xr.Dataset:
         one value of other axes before.
     tolerance : float
         Largest distance between two points that are the same, as a share of the range of all points in each variable,
-        and for velocities at least of the greatest one.
+        and for velocities at least of the greatest one. Steady slip and rest are approached, not reached: they may
+        also differ by this share of the range of displacements in their runs.
 
     Returns
     -------
@@ -93,7 +98,7 @@ def attractors(ds: xr.Dataset, tolerance: float = 1e-3) -> xr.Dataset:
     known: list[_Motion] = []
     for cell, motion in enumerate(motions):
         if motion is not None:
-            number = next((k for k, other in enumerate(known) if _same(motion, other, tolerance)), len(known))
+            number = next((k for k, other in enumerate(known) if _same(motion, other)), len(known))
             if number == len(known):
                 known.append(motion)
             labels[cell] = number + 1
@@ -150,36 +155,44 @@ def _motions(
     if "velocity_max" in ds and (fastest := np.abs(ds["velocity_max"].values[np.isfinite(ds["velocity_max"])])).size:
         scale[1] = max(scale[1], fastest.max())
     scale[~(scale > 0.0)] = 1.0
+    within = np.full(len(variables), tolerance)
+    travel = np.zeros(len(points))
+    if "x_min" in ds and "x_max" in ds:
+        travel = (ds["x_max"] - ds["x_min"]).transpose(*dims).values.ravel()
     for cell in range(len(points)):
         kept = points[cell][np.isfinite(points[cell][:, :2]).all(axis=1)]
         if lost[cell]:
             yield None
         elif still[cell] or not len(kept):
-            yield _Motion(ends[cell : cell + 1] / scale, True) if np.isfinite(ends[cell, :2]).all() else None
+            # The deflection of bristles follows from displacement and velocity here, and its range may be rounding.
+            near = np.array([tolerance * max(1.0, travel[cell] / scale[0]), tolerance, np.inf])[: len(variables)]
+            end = np.nan_to_num(ends[cell : cell + 1] / scale)
+            yield _Motion(end, True, near) if np.isfinite(ends[cell, :2]).all() else None
         else:
-            yield _cycle(np.nan_to_num(kept / scale), tolerance)
+            yield _cycle(np.nan_to_num(kept / scale), within)
 
 
-def _cycle(points: Floats, tolerance: float) -> _Motion:
+def _cycle(points: Floats, within: Floats) -> _Motion:
     """The last lap of points that return in the same order twice; all points if they do not."""
     for lap in range(1, len(points) // 2 + 1):
         # Twice the longest lap is the record: shorter ones must return over all of its later half.
         compared = max(lap, len(points) // 2)
         last, before = points[-compared:], points[-compared - lap : len(points) - lap]
-        if np.abs(last - before).max() <= tolerance:
-            return _Motion(points[-lap:], True)
-    return _Motion(points, len(points) == 1)
+        if (np.abs(last - before) <= within).all():
+            return _Motion(points[-lap:], True, within)
+    return _Motion(points, len(points) == 1, within)
 
 
-def _same(a: _Motion, b: _Motion, tolerance: float) -> bool:
+def _same(a: _Motion, b: _Motion) -> bool:
     if a.periodic != b.periodic or (a.periodic and len(a.points) != len(b.points)):
         return False
+    within = np.maximum(a.within, b.within)
     if a.periodic:
-        starts = np.flatnonzero(np.abs(b.points - a.points[0]).max(axis=1) <= tolerance)
-        return any(np.abs(np.roll(b.points, -start, axis=0) - a.points).max() <= tolerance for start in starts)
+        starts = np.flatnonzero((np.abs(b.points - a.points[0]) <= within).all(axis=1))
+        return any((np.abs(np.roll(b.points, -start, axis=0) - a.points) <= within).all() for start in starts)
     between = np.abs(a.points[:, None] - b.points[None]).max(axis=2)
-    within = max(_spacing(a.points), _spacing(b.points), tolerance)
-    return bool(max(np.median(between.min(axis=0)), np.median(between.min(axis=1))) <= _AS_NEAR * within)
+    spacing = max(_spacing(a.points), _spacing(b.points), within.max())
+    return bool(max(np.median(between.min(axis=0)), np.median(between.min(axis=1))) <= _AS_NEAR * spacing)
 
 
 def _spacing(points: Floats) -> float:
