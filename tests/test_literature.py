@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from scipy import optimize, special
 
 import ringsweep
 
@@ -69,3 +70,95 @@ def test_steady_motions_have_the_numbers_of_stops_that_hong_and_liu_found():
     run = ringsweep.sweep(oscillator(800.0), axes)
     trusted = run.stops_per_cycle.values[(run.settled == 1) & (run.certified == 1)]
     assert {0, 1, 2, 4, 6, 8, 10, 12, 14} <= set(trusted.tolist())
+
+
+def on_belt(damping, friction, **changes):
+    """A mass on a spring and a damper under friction that falls with the speed; mass, stiffness and gravity are 1."""
+    return {
+        "model": "belt",
+        "body": {"mass": 1.0},
+        "spring": {"stiffness": 1.0},
+        "damper": {"coefficient": damping},
+        "gravity": 1.0,
+        "friction": friction,
+    } | changes
+
+
+class TestThomsenAndFidlinsAmplitudes:
+    """Analytical approximations for stick-slip vibration amplitudes, Int. J. Non-Linear Mech. 38 (2003).
+
+    Damping and falling friction are small of the first order: their errors are of the second.
+    """
+
+    STATIC, LEAST, SPEED, RATIO = 0.4, 0.25, 0.5, 0.05
+
+    def branch(self, small, shares):
+        """Run down from steady slip, at shares of the speed below which it is unstable; the speeds, and their limit."""
+        fall, damping = (self.STATIC - self.LEAST) * small, self.RATIO * small
+        k1, k3 = 1.5 * fall / self.SPEED, 0.5 * fall / self.SPEED**3
+        onset = np.sqrt((k1 - 2 * damping) / (3 * k3))
+        law = {"law": "formula", "mu": "mu_s - k1*v + k3*v**3", "at_rest": "mu_s", "mu_s": self.STATIC}
+        velocities = np.array(shares) * onset
+        mapping = {
+            "scene": on_belt(
+                2 * damping,
+                law | {"k1": k1, "k3": k3},
+                initial={"x": 0.4, "velocity": 0.0},
+                time={"span": 3000.0 / small},
+            ),
+            "record": {"exponent": True},
+            "sweep": {
+                "grid": {"belt.velocity": velocities.tolist()},
+                "follow": {"axis": "belt.velocity", "direction": "down"},
+            },
+        }
+        run = ringsweep.run(mapping, jobs=1, progress=False)
+        return run, velocities, onset, -0.5 * (2 * damping - k1 + 3 * k3 * velocities**2)
+
+    def test_amplitude_of_slip_without_stick(self):
+        errors = []
+        for small in (1.0, 0.3):
+            run, velocities, onset, rate = self.branch(small, [0.9, 0.92, 0.95, 0.98])
+            assert set(ringsweep.words(run.regime).values) == {"oscillatory"}
+            assert set(ringsweep.words(run.long_run).values) == {"periodic"}
+            errors.append(0.5 * run.swing.values / (2 * np.sqrt(onset**2 - velocities**2)) - 1.0)
+            # The cycle attracts twice as fast as steady slip repels.
+            np.testing.assert_allclose(run.lyapunov, -2 * rate, rtol=0.06)
+        assert (abs(errors[1]) < 2.1e-3).all()
+        np.testing.assert_allclose(errors[1] / errors[0], 0.3**2, rtol=0.05)
+
+    def test_onset_and_speed_below_which_it_sticks(self):
+        run, _, _, rate = self.branch(1.0, [0.88, 0.9, 1.005, 1.02])
+        assert ringsweep.words(run.regime).values.tolist() == ["stick-slip", "oscillatory", "sliding", "sliding"]
+        assert 0.88 < np.sqrt(4 / 5) < 0.9
+        np.testing.assert_allclose(run.lyapunov[2:], rate[2:], rtol=1e-3)
+
+
+def threshold(scene, slip, radius):
+    """Displacement at rest, near that of steady slip plus the radius, beyond which the motion goes to the cycle."""
+    ends = sorted([slip + 0.5 * radius, slip + 1.5 * radius])
+    found = ringsweep.threshold(scene, "initial.x", "stick-slip", ends, 1e-7, scan=3, jobs=1)
+    assert found.begins.values.tolist() == [radius > 0.0]
+    return float(found.initial_x[0])
+
+
+def test_hetzlers_unstable_cycle_bounds_the_basin_of_steady_slip():
+    """Hetzler, Schwarzer and Seemann, Commun. Nonlinear Sci. Numer. Simul. 12 (2007): the Hopf bifurcation under
+    exponentially falling friction is subcritical. Averaging over a cycle of radius a gives
+    2 I_1(alpha a)/(alpha a) = exp(alpha (v - v_hopf)), with an error of the second order in damping.
+    """
+    alpha, hopf, errors = 2.0, 0.5 * np.log(10.0), []
+    for small in (1.0, 0.3):
+        law = {"law": "tustin", "mu_s": 0.5 + 0.5 * small, "mu_k": 0.5, "alpha": alpha}
+        for velocity in (1.18, 1.25):
+            target = np.exp(alpha * (velocity - hopf))
+            radius = optimize.brentq(lambda z, t=target: 2 * special.iv(1, z) / z - t, 1e-3, 10.0) / alpha
+            slip = 0.5 + 0.5 * small * np.exp(-alpha * velocity)
+            scene = on_belt(
+                0.1 * small, law, belt={"velocity": velocity}, initial={"velocity": 0.0}, time={"span": 4000.0 / small}
+            )
+            # Half the width: harmonics of the first order move both ends alike.
+            ends = [threshold(scene, slip, side * radius) for side in (-1.0, 1.0)]
+            errors.append((ends[1] - ends[0]) / (2.0 * radius) - 1.0)
+    assert (abs(np.array(errors[2:])) < 2e-4).all()
+    np.testing.assert_allclose(np.array(errors[2:]) / errors[:2], 0.3**2, rtol=0.1)
