@@ -31,6 +31,7 @@ NAMES = (
     "refine",
     "fits",
     "probabilities",
+    "diagram",
     "long_runs",
     "brute_force",
 )

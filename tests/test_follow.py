@@ -198,3 +198,32 @@ class TestErrors:
 def test_a_cell_of_a_chain_has_no_configuration_of_its_own(both):
     with pytest.raises(InputError, match="end of the one before"):
         ringsweep.plots.cell(both.isel(force_amplitude=0, force_frequency=1, direction=0))
+
+
+class TestSweepsInPython:
+    def test_it_takes_record_and_follow_as_a_configuration_does(self, tmp_path):
+        scene, follow = changed(HARDENING, "time", span=40.0), {"axis": "force.frequency", "direction": "both"}
+        record, axes = {"section": {"at": "period", "keep": 4}}, {"force.frequency": FREQUENCIES[:3]}
+        python = ringsweep.sweep(scene, axes, tmp_path / "own.nc", record=record, follow=follow, progress=False)
+        yaml = run(scene, record=record, sweep={"grid": axes, "follow": follow})
+        assert python.sizes == yaml.sizes
+        for name in "x_end", "x_section", "started_from":
+            np.testing.assert_array_equal(python[name], yaml[name])
+        # The file holds what is needed to run it again.
+        again = ringsweep.run(tmp_path / "own.nc", progress=False)
+        np.testing.assert_array_equal(again["x_section"], yaml["x_section"])
+
+    @pytest.mark.parametrize(
+        ("given", "path"),
+        [
+            ({"record": {"sections": 1}}, "record.sections"),
+            ({"record": [1]}, "record"),
+            ({"follow": "belt.velocity"}, "sweep.follow"),
+            ({"follow": {"axis": "force.frequency", "direction": "left"}}, "sweep.follow.direction"),
+            ({"follow": "force.frequency", "refine": True}, "sweep.refine"),
+        ],
+    )
+    def test_errors_name_their_paths(self, given, path):
+        with pytest.raises(InputError) as error:
+            ringsweep.sweep(HARDENING, {"force.frequency": FREQUENCIES[:3]}, **given, progress=False)
+        assert error.value.path == path

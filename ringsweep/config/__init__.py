@@ -2,12 +2,23 @@
 
 from ringsweep.compile.cache import OWN_FILES
 from ringsweep.config.axes import Axes
-from ringsweep.config.configuration import Config, load, read_axes, read_scene, refined, with_values
+from ringsweep.config.configuration import Config, followed, load, read_axes, read_scene, refined, with_values
 from ringsweep.config.own_files import load_own_files
 from ringsweep.config.scene import sweepable
 from ringsweep.config.solver import read_solver
 
-__all__ = ["Axes", "Config", "load", "read_axes", "read_scene", "read_solver", "refined", "sweepable", "with_values"]
+__all__ = [
+    "Axes",
+    "Config",
+    "followed",
+    "load",
+    "read_axes",
+    "read_scene",
+    "read_solver",
+    "refined",
+    "sweepable",
+    "with_values",
+]
 
 # These files may use everything that is imported above.
 load_own_files(OWN_FILES)

@@ -174,8 +174,8 @@ def with_values(
             raise
 
 
-def read_scene(scene: Mapping[str, Any], swept: Collection[str] = ()) -> Scene:
-    """Read and validate the mapping under ``scene`` in a configuration.
+def read_scene(scene: Mapping[str, Any], swept: Collection[str] = (), record: Mapping[str, Any] | None = None) -> Scene:
+    """Read and validate the mappings under ``scene`` and ``record`` in a configuration.
 
     Parameters
     ----------
@@ -183,6 +183,7 @@ def read_scene(scene: Mapping[str, Any], swept: Collection[str] = ()) -> Scene:
     swept : collection of str, or mapping of str to sequence
         Paths that a sweep will fill. Their values may be missing, and :func:`read_axes` looks for contradictions
         between values. If friction laws are swept, `swept` must be a mapping that names them.
+    record : mapping, optional
 
     Raises
     ------
@@ -192,7 +193,8 @@ def read_scene(scene: Mapping[str, Any], swept: Collection[str] = ()) -> Scene:
     if isinstance(scene, Mapping) and "scene" in scene:
         raise InputError("scene", "this is a whole configuration: pass config['scene']")
     laws = (f"axes[{LAW!r}]", swept[LAW]) if isinstance(swept, Mapping) and LAW in swept else None
-    found = parse_scene(Document(yaml_text.read({"scene": scene}).tree), swept, laws)
+    given = {"scene": scene} | ({"record": record} if record is not None else {})
+    found = parse_scene(Document(yaml_text.read(given).tree), swept, laws)
     if not swept:
         check_consistency(found, Axes())
     return found
@@ -231,6 +233,22 @@ def _validate(doc: Document) -> Config:
         if follow is not None and other is not None:
             raise InputError(f"sweep.{key}", _NOT_FOLLOWED)
     return Config(scene, solver, with_direction(axes, follow), tree, doc.name, refine, sample, follow)
+
+
+def followed(config: Config, follow: str | Mapping[str, Any] | None) -> Config:
+    """A configuration without ``sweep.follow``, with `follow` in its place.
+
+    Raises
+    ------
+    InputError
+        If `follow` is wrong, or runs of the scene cannot go on.
+    """
+    if follow is None:
+        return config
+    given = yaml_text.read({"follow": follow}).tree["follow"]
+    found = read_follow(given, config.scene, config.axes)
+    source = config.source | {"sweep": config.source.get("sweep", {}) | {"follow": given}}
+    return dataclasses.replace(config, axes=with_direction(config.axes, found), source=source, follow=found)
 
 
 def _check_section(scene: Scene, refine: Refinement | None, sample: Sample | None) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsweep.config import Axes, Config, load, read_axes, read_scene, read_solver, refined, sweepable
+from ringsweep.config import Axes, Config, followed, load, read_axes, read_scene, read_solver, refined, sweepable
 from ringsweep.config.axes import dimension
 from ringsweep.config.follow import BOTH, DIRECTION
 from ringsweep.errors import InputError
@@ -153,6 +153,8 @@ def sweep(
     fresh: bool = False,
     reuse: str | os.PathLike[str] | None = None,
     refine: Mapping[str, Any] | bool | None = None,
+    record: Mapping[str, Any] | None = None,
+    follow: str | Mapping[str, Any] | None = None,
     scheduler: str | None = None,
     progress: bool = True,
 ) -> xr.Dataset:
@@ -168,6 +170,8 @@ def sweep(
         is a run: its columns are paths, which vary together along the dimension ``point``.
     solver : str or mapping
         Name of a method, or the mapping under ``solver`` in a configuration.
+    record, follow : mapping, optional
+        The mappings under ``record`` and ``sweep.follow`` in a configuration.
     output, jobs, fresh, reuse, refine, scheduler, progress
         As for :func:`run`.
 
@@ -178,7 +182,7 @@ def sweep(
     Raises
     ------
     InputError
-        If scene, axes or solver are wrong; see also :func:`run`.
+        If scene, axes, solver, record or follow are wrong; see also :func:`run`.
 
     Examples
     --------
@@ -201,12 +205,14 @@ def sweep(
     """
     if hasattr(axes, "itertuples"):
         axes = {str(path): xr.DataArray(column.to_numpy(), dims="point") for path, column in axes.items()}
-    parsed = read_scene(scene, swept=axes)
+    parsed = read_scene(scene, axes, record)
     found = read_axes(parsed, axes)
     method = read_solver(solver, parsed)
     given = {"method": solver} if isinstance(solver, str) else dict(solver)
     source = {"scene": dict(parsed.source), "solver": given, "sweep": _sweep_section(found)}
-    config = refined(Config(parsed, method, found, source, name="ringsweep"), refine)
+    if record is not None:
+        source["record"] = dict(record)
+    config = refined(followed(Config(parsed, method, found, source, name="ringsweep"), follow), refine)
     return _run(config, output, Execution(jobs, scheduler, progress), fresh, reuse)
 
 
