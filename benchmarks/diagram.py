@@ -55,7 +55,7 @@ def diagram(count: int) -> Any:
 def by_scipy(frequency: float, state: tuple[float, float], end: float, rtol: float) -> np.ndarray:
     """The last points of a run from event to event, shape ``(KEPT, 2)``."""
     rate = 2.0 * pi * frequency
-    times = (round(end * frequency) - np.arange(KEPT)[::-1]) / frequency
+    times = np.minimum((round(end * frequency) - np.arange(KEPT)[::-1]) / frequency, end)
     points, t, y = [], 0.0, np.array(state)
 
     def load(t: float, x: float) -> float:
