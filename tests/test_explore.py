@@ -1,5 +1,7 @@
 """Cells of a sweep as configurations, and the map that draws the history of the cell clicked."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -158,15 +160,21 @@ class TestExplore:
     def test_live_figure_as_the_value_of_a_cell_of_a_notebook_shows_no_second_picture(self, maps, asked, monkeypatch):
         """Under ipympl pyplot shows the live canvas; IPython would add a picture of the figure, which is dead."""
         formatters = pytest.importorskip("IPython.core.formatters")
+        from IPython.core.pylabtools import select_figure_formats
         from matplotlib import pyplot
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
 
         monkeypatch.setattr("matplotlib.get_backend", lambda: "widget")
         monkeypatch.setattr(FigureCanvasAgg, "toolbar_position", "left", raising=False)
         shown = []
         monkeypatch.setattr("IPython.display.display", shown.append)
-        format_of = formatters.DisplayFormatter().format
+        shell = SimpleNamespace(display_formatter=formatters.DisplayFormatter())
+        # A notebook's, where a terminal's shows text only.
+        shell.display_formatter.active_types = shell.display_formatter.format_types
+        # What `%matplotlib widget` does.
+        select_figure_formats(shell, {"png"})
+        format_of = shell.display_formatter.format
         try:
+            assert "image/png" in format_of(pyplot.subplots()[0])[0]
             figure = plots.explore(maps)
             with pyplot.ion():
                 assert format_of(figure) == ({}, {})

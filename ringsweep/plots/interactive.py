@@ -205,6 +205,6 @@ def _figure() -> Figure:
         canvas.toolbar_position, canvas.toolbar_visible, canvas.header_visible = "top", True, False
         layout: Any = figure.get_layout_engine()
         layout.set(rect=(0.0, 0.0, 1.0, 1.0 - _TOOLBAR / _SIZE[1]))
-        # IPython asks the value of a cell for this. Its own picture of a figure would be a dead copy of the live one.
-        figure.__dict__["_ipython_display_"] = partial(_show_live, figure)
+        # IPython shows a figure that is the value of a cell by this. Its other way is a picture: a dead copy.
+        canvas.manager.reshow = partial(_show_live, figure)
     return figure
