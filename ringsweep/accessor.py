@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import xarray as xr
 
 if TYPE_CHECKING:
@@ -41,27 +42,47 @@ class Accessor:
 
         return words(self._ds[var])
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self, along: str | None = None) -> pd.DataFrame:
         """Table with a row for each cell: coordinates, then variables, with classifications as categories of words.
 
         Of a sampled sweep it has a row for each cell and regime, with the probabilities. The points of a section are
-        left out.
+        left out. Of a history it has a row for each sample of the time.
+
+        Parameters
+        ----------
+        along : str, optional
+            A dimension: the rows are its values, and the variables are those that have it. ``"event"`` gives the events
+            of a history, ``"section"`` the points of a section.
+
+        Raises
+        ------
+        InputError
+            If the dataset has no such dimension.
         """
         import pandas as pd
 
-        from ringsweep.quantities.variables import words
+        from ringsweep.errors import InputError
 
         ds = self._ds
-        if "probability" in ds:
+        if along is None and "time" in ds.dims:
+            along = "time"
+        if along is not None:
+            if along not in ds.dims:
+                raise InputError(
+                    "along", f"{along!r} is no dimension: {', '.join(map(str, ds.dims)) or 'there is none'}"
+                )
+            ds = ds[[name for name, variable in ds.data_vars.items() if along in variable.dims]]
+        elif "probability" in ds:
             # A table of all variables would have a row for each combination of their dimensions.
             ds = ds[[name for name in ds.data_vars if str(name).startswith("probability")]]
-        ds = ds.drop_dims("section", errors="ignore")
+        else:
+            ds = ds.drop_dims("section", errors="ignore")
         frame = ds.to_dataframe().reset_index()
-        for name, variable in ds.data_vars.items():
-            if "flag_meanings" in variable.attrs:
+        for name, variable in ds.variables.items():
+            if "flag_meanings" in variable.attrs and name in frame:
                 known = str(variable.attrs["flag_meanings"]).split()
-                named = words(variable).to_dataframe(name=name).reset_index()[name]
-                frame[name] = pd.Categorical(named, categories=known)
+                named = dict(zip(np.atleast_1d(variable.attrs["flag_values"]).tolist(), known, strict=True))
+                frame[name] = pd.Categorical(frame[name].map(named), categories=known)
         return frame
 
     def map(self, var: str = "regime", **options: Any) -> Figure:

@@ -42,6 +42,17 @@ def test_frame_has_a_row_for_each_cell_and_makes_the_same_runs_again(ds, scene):
     assert again.phi_end.values.tolist() == ds.phi_end.values.ravel().tolist()
 
 
+def test_frames_of_a_history_have_a_row_for_each_sample_or_event(ds):
+    run = ds.ringsweep.simulate(drive_amplitude=2, zone_half_angle="15 deg")
+    frame, events = run.ringsweep.to_frame(), run.ringsweep.to_frame("event")
+    assert frame.time.tolist() == run.time.values.tolist()
+    assert frame.phi.tolist() == run.phi.values.tolist()
+    assert events.event_time.tolist() == run.event_time.values.tolist()
+    assert events.event_kind.tolist() == ringsweep.words(run.event_kind).values.tolist()
+    with pytest.raises(ringsweep.InputError, match="no dimension"):
+        run.ringsweep.to_frame("point")
+
+
 def test_dataset_in_place_of_a_scene_is_refused_with_what_to_call(ds):
     with pytest.raises(ringsweep.InputError, match=r"got a dataset: ds\.ringsweep\.simulate"):
         ringsweep.simulate(ds)
