@@ -1,16 +1,16 @@
-"""Error against run time on four scenes: `rk4`, `event`, `implicit`, and other libraries (peers).
+"""Error against run time on five scenes: `rk4`, `event`, `implicit`, and other libraries (peers).
 
     python -m benchmarks.work_precision                  all, about ten minutes
     python -m benchmarks.work_precision --quick          fewer cells and settings, under two minutes
-    python -m benchmarks.work_precision --scene stiff    one scene (smooth, stiff, limit, lugre); repeatable
+    python -m benchmarks.work_precision --scene stiff    one scene (smooth, stiff, limit, lugre, impact); repeatable
     python -m benchmarks.work_precision --redraw         only the pictures, from the stored numbers
 
 Scenes: a seeded sample of the Fig. 29 family (two-contact ring, T = 10 s) under Bengisu and Akay's law, smooth (alpha
-100, v0 0.2) and stiff (alpha 1e5, v0 2e-6), and under its limit, stiction; and the belt under LuGre's law. Peers
-share no formula with the package. If a peer is not installed, the benchmark says so and skips it (`pip install
-'.[bench]'`). All contenders are compiled before, pinned to one core, and run in turn within each round, forwards and
-backwards. Times are medians over the rounds, ratios are medians of the ratios within the rounds. There are no
-certificates, because peers have none.
+100, v0 0.2) and stiff (alpha 1e5, v0 2e-6), and under its limit, stiction; the belt under LuGre's law; and the ring
+under Coulomb's law, on after lost contacts, beside Moreau and Jean's time stepping. Peers share no formula with the
+package. If a peer is not installed, the benchmark says so and skips it (`pip install '.[bench]'`). All contenders are
+compiled before, pinned to one core, and run in turn within each round, forwards and backwards. Times are medians over
+the rounds, ratios are medians of the ratios within the rounds. There are no certificates, because peers have none.
 
 Writes `work_precision.{md,nc}` and a picture of each scene, `work_precision_smooth.png` for example.
 """
@@ -36,6 +36,8 @@ from matplotlib.figure import Figure
 
 from benchmarks._common import (
     PAPER_STEPS,
+    REST,
+    ROUGH,
     SPAN,
     Times,
     alternate,
@@ -95,7 +97,7 @@ class Outcome(NamedTuple):
 
 @dataclass(frozen=True)
 class Scene:
-    """One of the four scenes."""
+    """One of the five scenes."""
 
     title: str
     scene: dict[str, Any]
@@ -124,6 +126,8 @@ class Scene:
 
 
 _BENGISU_AKAY = {"law": "bengisu-akay"}
+_COULOMB = {"law": "coulomb", "rough": {"mu_k": ROUGH["mu_s"]}, "rest": {"mu_k": REST["mu_s"]}}
+RESTITUTION = 0.5
 SCENES = {
     "smooth": Scene(
         "Smooth: alpha = 100 s/m, v0 = 0.2 m/s",
@@ -139,6 +143,12 @@ SCENES = {
     ),
     "limit": Scene("Limit law: stiction", ring({"law": "stiction"}), "event", Law(0.0, 0.0)),
     "lugre": Scene("LuGre on the belt", _BELT, "implicit", None, "m"),
+    "impact": Scene(
+        f"With impacts: Coulomb, restitution {RESTITUTION}",
+        ring(_COULOMB) | {"friction": _COULOMB, "impact": {"restitution": RESTITUTION}},
+        "event",
+        Law(0.0, 0.0),
+    ),
 }
 
 
@@ -218,6 +228,12 @@ def contenders(scene: Scene, effort: Effort) -> tuple[list[Contender], list[str]
     }
     for rtol in tolerances[scene.method]:
         enter(scene.method, f"rtol {rtol:.0e}", partial(own_of, scene, scene.method, rtol=rtol), everything)
+    if scene is SCENES["impact"]:
+        counts = {2_000: everything, 20_000: everything, 200_000: few, 2_000_000: fewest}
+        for steps, count in list(counts.items())[: effort.finest - 1] if in_c.compiler() else ():
+            enter("C, Moreau-Jean", f"{steps:.0e} steps", partial(moreau_jean, steps), count)
+        skipped.append("rk4 and the other peers: they end where a contact is lost")
+        return entered, skipped
     # The decades in which `rk4` goes from useless to its best accuracy, which differ between scenes.
     coarsest = 1e3 if scene is SCENES["stiff"] else 1e4 if belt else 1e2
     for steps in [round(coarsest * 10**k) for k in range(effort.finest + 1)]:
@@ -252,6 +268,11 @@ def contenders(scene: Scene, effort: Effort) -> tuple[list[Contender], list[str]
         tightest = 1e-13 if belt else 1e-15
         peer("heyoka", "heyoka", [1e-3, 1e-6, 1e-9, 1e-12, tightest], few if belt else everything)
     return entered, skipped
+
+
+def moreau_jean(steps: int, cells: Sequence[Any]) -> Callable[[], Any]:
+    """Function that runs Moreau and Jean's time stepping on cells."""
+    return in_c.moreau_jean(RESTITUTION, cells, steps)
 
 
 def own_of(scene: Scene, method: str, cells: Sequence[Any], **options: Any) -> Callable[[], Outcome]:
@@ -320,6 +341,8 @@ def reference(scene: Scene, cells: Sequence[Any], effort: Effort) -> tuple[Outco
     rtol = {"event": 1e-15, "implicit": 1e-12}[scene.method]
     found = own(scene, scene.method, cells, rtol=rtol)()
     words = f"Reference: `{scene.method}` at rtol {rtol:.0e}"
+    if scene is SCENES["impact"]:
+        return found, words + "."
     stiff = scene is SCENES["stiff"]
     count, name, *given = (
         (effort.few, "scipy", "Radau", 1e-10)

@@ -5,7 +5,7 @@ import pytest
 
 from benchmarks import speed
 from benchmarks.peers import in_c, with_scipy
-from benchmarks.work_precision import SCENES, own
+from benchmarks.work_precision import RESTITUTION, SCENES, own
 
 
 @pytest.mark.parametrize("name", ["smooth", "limit"])
@@ -37,6 +37,23 @@ def test_plain_and_vectorised_runge_kutta_agree_with_rk4():
     for name, values in plain._asdict().items():
         np.testing.assert_allclose(getattr(vector, name), values, rtol=0, atol=1e-13, err_msg=name)
     assert len(set(plain.reversals)) > 1
+
+
+@pytest.mark.skipif(in_c.compiler() is None, reason="no C compiler")
+def test_moreau_and_jeans_time_stepping_tends_to_the_package_at_first_order():
+    """Impact law, mechanics and zones of the peer are its own, and it knows no events."""
+    scene = SCENES["impact"]
+    cells = scene.cells(12)
+    ours = own(scene, "event", cells, rtol=1e-11)()
+    lost = np.isfinite(ours.separation)
+    assert 3 < lost.sum() < 12
+    coarse, fine = (in_c.moreau_jean(RESTITUTION, cells, steps)() for steps in (2000, 20_000))
+    np.testing.assert_array_equal(np.isfinite(fine.separation), lost)
+    errors = [np.median(abs(found.separation - ours.separation)[lost]) for found in (coarse, fine)]
+    assert 5.0 < errors[0] / errors[1] < 20.0
+    # Impacts magnify errors: after hundreds of them the end takes shorter steps than these.
+    errors = [np.median(abs(found.end - ours.end)) for found in (coarse, fine)]
+    assert errors[1] < min(0.01, 0.2 * errors[0])
 
 
 def test_table_of_speed_has_the_error_of_every_method():

@@ -1,7 +1,8 @@
-"""Runge-Kutta 4 of the ring by hand, compiled at run time: `rk4.c`, `plain.c` and `vector.cpp`.
+"""The ring in C by hand, compiled at run time: `rk4.c`, `plain.c`, `vector.cpp`, and `moreau_jean.c` for impacts.
 
-`rk4.c` is scalar C with the account of the package. `plain.c` is the method as the paper has it, and `vector.cpp` is
-the method as fast as we can make it; both have the account that :class:`Account` lists.
+`rk4.c` is Runge-Kutta 4 in scalar C with the account of the package. `plain.c` is the method as the paper has it, and
+`vector.cpp` is the method as fast as we can make it; both have the account that :class:`Account` lists. `moreau_jean.c`
+is the time stepping of the codes for nonsmooth mechanics, such as Siconos.
 """
 
 from __future__ import annotations
@@ -55,6 +56,17 @@ class Account(NamedTuple):
     reversals: Any
 
 
+class _ImpactScene(ctypes.Structure):
+    """`scene_t` of moreau_jean.c."""
+
+    _fields_ = [
+        (name, ctypes.c_double)
+        for name in (
+            "mass", "inertia", "half_distance", "ball_radius", "radius", "gravity", "rough", "rest", "restitution",
+        )
+    ]  # fmt: skip
+
+
 class _Scene(ctypes.Structure):
     """`scene_t` of rk4.c; that of plain.c and vector.cpp lacks the last member."""
 
@@ -88,22 +100,26 @@ def _library(name: str, flags: tuple[str, ...]) -> Any:
         subprocess.run([command, "-shared", str(compiled), "-o", str(target), "-lm"], check=True)
         run = ctypes.CDLL(str(target)).run
     vector = np.ctypeslib.ndpointer(dtype=np.float64, flags="C_CONTIGUOUS")
+    scene = _ImpactScene if name == "moreau_jean.c" else _Scene
     run.argtypes = [
-        ctypes.c_int64, vector, vector, ctypes.POINTER(_Scene), ctypes.c_int64, ctypes.c_double, vector,
+        ctypes.c_int64, vector, vector, ctypes.POINTER(scene), ctypes.c_int64, ctypes.c_double, vector,
     ]  # fmt: skip
     return run
 
 
-def _arguments(law: Law, cells: Sequence[Cell], steps: int) -> tuple[Any, ...]:
+def _arguments(scene: ctypes.Structure, cells: Sequence[Cell], steps: int) -> tuple[Any, ...]:
     """Arguments of the function `run` before the last."""
     amplitudes, half_angles = (np.array(column) for column in zip(*cells, strict=True))
-    scene = _Scene(MASS, INERTIA, HALF_DISTANCE, BALL, RADIUS, GRAVITY, *ROUGH, *REST, *law, _EPSILON_OMEGA)
     return len(cells), amplitudes, half_angles, scene, steps, SPAN
+
+
+def _under(law: Law) -> _Scene:
+    return _Scene(MASS, INERTIA, HALF_DISTANCE, BALL, RADIUS, GRAVITY, *ROUGH, *REST, *law, _EPSILON_OMEGA)
 
 
 def ring(law: Law, cells: Sequence[Cell], steps: int) -> Callable[[], Found]:
     """Function that runs cells of the ring with `steps` steps of `rk4.c`."""
-    run, given = _library("rk4.c", FLAGS), _arguments(law, cells, steps)
+    run, given = _library("rk4.c", FLAGS), _arguments(_under(law), cells, steps)
     run.restype = ctypes.c_int64
 
     def call() -> Found:
@@ -111,6 +127,21 @@ def ring(law: Law, cells: Sequence[Cell], steps: int) -> Callable[[], Found]:
         if run(*given, out) != _COLUMNS:
             raise MemoryError("rk4.c found no memory for the table of the drive")
         return Found(out[:, _PHI_END], np.where(out[:, _CONTACT] > 0.0, out[:, _T_END], np.nan))
+
+    return call
+
+
+def moreau_jean(restitution: float, cells: Sequence[Cell], steps: int) -> Callable[[], Found]:
+    """Function that runs cells of the ring with `moreau_jean.c`: Coulomb's law with mu_s, impacts of lost contacts."""
+    run = _library("moreau_jean.c", PLAIN_FLAGS)
+    scene = _ImpactScene(MASS, INERTIA, HALF_DISTANCE, BALL, RADIUS, GRAVITY, ROUGH[0], REST[0], restitution)
+    given = _arguments(scene, cells, steps)
+    run.restype = None
+
+    def call() -> Found:
+        out = np.empty((len(cells), len(Found._fields)))
+        run(*given, out)
+        return Found(*out.T)
 
     return call
 
@@ -126,7 +157,7 @@ def vector(law: Law, cells: Sequence[Cell], steps: int) -> Callable[[], Account]
 
 
 def _accounts(run: Any, law: Law, cells: Sequence[Cell], steps: int) -> Callable[[], Account]:
-    given = _arguments(law, cells, steps)
+    given = _arguments(_under(law), cells, steps)
     run.restype = None
 
     def call() -> Account:
