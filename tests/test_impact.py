@@ -31,6 +31,13 @@ BODY = {
     "time": {"span": "5 s"},
     "impact": {"restitution": 0.5},
 }
+#: Friction is mu_s below the speed vb, and mu_k above.
+JUMPING = {
+    "model": "ring",
+    "body": {"mass": 0.076, "inertia": 4.47e-5, "half_distance": 0.025, "ball_radius": 0.010},
+    "ring": {"radius": 0.043378},
+    "friction": {"law": "formula", "mu": "piecewise(v < vb, mu_s, mu_k)", "at_rest": "mu_s"},
+}
 AMPLITUDES = np.geomspace(1.5, 12, 12)
 AT_REST = BODY | {"drive": {"law": "arctan", "amplitude": 0.0}, "time": {"span": "2 s"}}
 LAUNCHES = np.linspace(18.0, 60.0, 8)
@@ -412,6 +419,33 @@ class TestBody:
     def test_start_with_infinite_acceleration_goes_on_as_the_reference_does(self, scene, phi_end):
         found = ringsweep.sweep({"model": "ring"} | scene, {"time.span": [scene["time"]["span"]]}, progress=False)
         assert found.phi_end.item() == pytest.approx(phi_end, abs=1e-6)
+
+    def test_contact_that_opens_where_friction_jumps_at_a_speed_opens_by_its_acceleration(self):
+        """The gap grows like t^2. The numbers are those of the free body, integrated by SciPy with its own balances."""
+        scene = JUMPING | {
+            "friction": JUMPING["friction"] | {"vb": 0.0548297, "rest": {"mu_s": 0.227239, "mu_k": 0.00340348}},
+            "drive": {"law": "sinusoidal", "amplitude": 0.0607017, "frequency": 2.35927, "phase": 0.5 * pi},
+            "initial": {"phi": 1.63614, "omega": 0.0},
+            "time": {"span": 0.3},
+            "impact": {"restitution": 0.0},
+        }
+        run = ringsweep.simulate(scene, samples=50)
+        assert run.impact_time.values[-1] == pytest.approx(0.25515686191877684, rel=1e-9)
+        assert run.impact_speed.values[-1] == pytest.approx(0.0024191139510299285, rel=1e-6)
+
+    def test_body_that_has_no_motion_where_friction_jumps_at_a_speed_jams(self):
+        """Under the greater friction contact 2 would pull, and contact 1 alone would press itself into the race."""
+        scene = JUMPING | {
+            "body": {"mass": 0.362325, "inertia": 1.36913e-05, "half_distance": 0.0127683, "ball_radius": 0.0244479},
+            "ring": {"radius": 0.0645043},
+            "friction": JUMPING["friction"] | {"vb": 1.16804, "rest": {"mu_s": 0.780949, "mu_k": 0.430834}},
+            "initial": {"phi": 1.55313, "omega": -22.6359},
+            "impact": {"restitution": 0.0641463},
+        }
+        found = ringsweep.sweep(scene, {"time.span": [0.5]}, progress=False)
+        assert ringsweep.words(found.regime).item() == "jammed"
+        assert found.certified.item() == 1
+        assert found.omega_end.item() == pytest.approx(-1.16804 / 0.0645043, rel=1e-12)
 
     def test_rounding_decides_nothing_at_the_end_of_rebounds(self):
         """The wedged body comes to rest, breaks away where friction does not fall, and jams in the end.

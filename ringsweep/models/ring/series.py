@@ -296,12 +296,14 @@ def _switch(scene, mode, guard, t, y):
         theta, _, _ = drives.turn(scene.drive, t)
         place_1, place_2 = places_after_edge(scene, mode, phi - theta)
         mode = Mode(sign, region, SLOW if v == 0.0 else -1, place_1, place_2)
-        return _after_jump(scene, mode, t, y), mode, y
     low, high = region_bounds(scene.law, region)
+    # A formula may jump at the bound of a region.
     if guard == FAST:
-        return RUNNING, Mode(sign, region + 1, SLOW, place_1, place_2), (phi, sign * high)
-    if low > 0.0:
-        return RUNNING, Mode(sign, region - 1, FAST, place_1, place_2), (phi, sign * low)
+        mode, v = Mode(sign, region + 1, SLOW, place_1, place_2), sign * high
+    elif guard == SLOW and low > 0.0:
+        mode, v = Mode(sign, region - 1, FAST, place_1, place_2), sign * low
+    if guard != SLOW or low > 0.0:
+        return _after_jump(scene, mode, t, (phi, v)), mode, (phi, v)
     mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
     # A body that nothing holds passes through rest.
     if region < 0 or mu_s1 + mu_s2 == 0.0:

@@ -232,19 +232,18 @@ def _on_one_contact(scene, mode, guard, t, y):
     if sign == 0:
         stick_end = 0 if guard == EDGE else 1 if guard == SLOW else -1
         return _begun(scene, t, at_rest, places, contacts, zeros, event, stick_end)
-    if guard == EDGE:
-        found = make(sign, region, RING + SLOW if v == 0.0 else -1, places, contacts, zeros, event)
+    entry_guard, (low, high) = RING + SLOW if v == 0.0 else -1, region_bounds(scene.law, region)
+    # A formula may jump at the bound of a region.
+    if guard == FAST:
+        region, entry_guard, v = region + 1, RING + SLOW, sign * high
+    elif guard == SLOW and low > 0.0:
+        region, entry_guard, v = region - 1, RING + FAST, sign * low
+    if guard != SLOW or low > 0.0:
+        found, state = make(sign, region, entry_guard, places, contacts, zeros, event), (y[0], v, *y[2:])
         _, ring_omega, _ = drives.turn(scene.drive, t)
         K, _ = pivot.friction(scene, found, v)
-        f = pivot.frame(scene, holding(found), found.turned, y, ring_omega)
-        return (RUNNING if pivot.in_slip(scene, f, K)[3] > 0.0 else JAM), found, y
-    low, high = region_bounds(scene.law, region)
-    if guard == FAST:
-        found = make(sign, region + 1, RING + SLOW, places, contacts, zeros, event)
-        return RUNNING, found, (y[0], sign * high, y[2], y[3], 0.0, 0.0, y[6])
-    if low > 0.0:
-        found = make(sign, region - 1, RING + FAST, places, contacts, zeros, event)
-        return RUNNING, found, (y[0], sign * low, y[2], y[3], 0.0, 0.0, y[6])
+        f = pivot.frame(scene, holding(found), found.turned, state, ring_omega)
+        return (RUNNING if pivot.in_slip(scene, f, K)[3] > 0.0 else JAM), found, state
     mu_s, _, _ = coefficients_there(scene, place_of(mode))
     # A contact that nothing holds passes through rest.
     if region < 0 or mu_s == 0.0:
