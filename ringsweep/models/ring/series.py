@@ -215,7 +215,7 @@ def _after_jump(scene, mode, t, y):
     """Status in slip after friction may have jumped."""
     phi, v = y
     K1, K2, omega = _friction_at(scene, mode, t, v)
-    if isnan(phi + omega):
+    if isnan(phi + omega + K1 + K2):
         return BROKEN
     return ENDS[contact.sliding(scene.body, K1, K2, sin(phi), cos(phi), omega)]
 

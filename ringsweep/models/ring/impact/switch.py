@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, pi, sin
+from math import cos, isnan, pi, sin
 
 from ringsweep.compile import inlined
 from ringsweep.models.interface import modes
@@ -243,7 +243,8 @@ def _on_one_contact(scene, mode, guard, t, y):
         _, ring_omega, _ = drives.turn(scene.drive, t)
         K, _ = pivot.friction(scene, found, v)
         f = pivot.frame(scene, holding(found), found.turned, state, ring_omega)
-        return (RUNNING if pivot.in_slip(scene, f, K)[3] > 0.0 else JAM), found, state
+        denominator = pivot.in_slip(scene, f, K)[3]
+        return (RUNNING if denominator > 0.0 else BROKEN if isnan(denominator) else JAM), found, state
     mu_s, _, _ = coefficients_there(scene, place_of(mode))
     # A contact that nothing holds passes through rest.
     if region < 0 or mu_s == 0.0:
