@@ -88,6 +88,39 @@ def energy(scene, found):
     return 0.5 * (p.inertia + p.mass * p.xi**2) * found["speed"] ** 2 - p.mass * G * p.xi * math.cos(found["position"])
 
 
+#: Bodies at rest on rings whose acceleration is infinite at 0, and when a contact is lost.
+AT_ONCE = [
+    # Left behind, caught up after 4e-13 s, and held until the falling acceleration unloads contact 1.
+    pytest.param({
+        "friction": {"law": "formula", "mu": "mu_k + h*exp(-((v - vb)/w)**2)", "at_rest": "mu_s",
+                     "vb": 0.0591481, "w": 0.0036196, "h": -0.149709,
+                     "rest": {"mu_s": 0.628147, "mu_k": 0.275179}},
+        "drive": {"law": "power", "amplitude": 0.118852, "exponent": 1.75063},
+        "body": {"mass": 0.220058, "inertia": 1.29634e-06, "half_distance": 0.00313086, "ball_radius": 0.00909936,
+                 "center_offset": 0.00286972},
+        "ring": {"radius": 0.0313716},
+        "initial": {"phi": -0.778751, "omega": 0.0},
+    }, 1.49134405e-11, id="caught up"),
+    # Left behind for good, although stick is admissible from 1e-10 s on. The time is that of SciPy's DOP853.
+    pytest.param({
+        "friction": {"law": "formula", "mu": "mu_k + h*exp(-((v - vb)/w)**2)", "at_rest": "mu_s",
+                     "vb": 0.158546, "w": 0.0177405, "h": 0.0825207,
+                     "rest": {"mu_s": 0.33283, "mu_k": 0.0031922}, "rough": {"mu_s": 0.338215, "mu_k": 0.00402841}},
+        "drive": {"law": "power", "amplitude": -16.1635, "exponent": 1.90444},
+        "body": {"mass": 0.298869, "inertia": 0.000687997, "half_distance": 0.0394439, "ball_radius": 0.0258572},
+        "ring": {"radius": 0.0665151},
+        "zone": {"half_angle": 0.37743, "center": -2.53899},
+        "initial": {"phi": -0.00150168, "omega": 0.0},
+    }, 0.34350943534083, id="left behind"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("scene", "lost"), AT_ONCE)
+def test_first_instant_of_a_ring_with_infinite_acceleration_is_followed(scene, lost):
+    scene = {"model": "ring", "time": {"span": 0.4}, "impact": {"restitution": 0.5}} | scene
+    assert go_on(scene, keep=1)[1][0][0] == pytest.approx(lost, rel=1e-6)
+
+
 @pytest.mark.parametrize("omega", [20.0, -28.0, 33.0])
 def test_without_friction_a_body_loses_energy_in_impacts_only(omega):
     scene = rig(mu=0.0, e=0.3, initial={"phi": 0.0, "omega": omega}, time={"span": 4.0})

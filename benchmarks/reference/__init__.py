@@ -9,8 +9,8 @@ all modes of the contacts. It runs each scene on the ring four times:
   coefficients, the reaction at which a contact is lost (in weights of the body), the full turn and, shifted by a
   thousandth, the angular velocity of a reversal.
 
-If the drive has an infinite acceleration at t = 0, the upward shift looks at the contacts at t = 0, the other runs an
-instant later. If the runs do not agree in kind, the scene is ambiguous. A scene on the belt is run twice, at the two
+If the drive has an infinite acceleration at t = 0, a body at rest is followed through the first instant, in which
+accelerations fall and velocities hardly grow. If the runs do not agree in kind, the scene is ambiguous. A scene on the belt is run twice, at the two
 tolerances. Under a force the run is long: both tolerances are a hundred times as wide, and if the runs differ it is run
 once more with the tight tolerance.
 
