@@ -447,6 +447,28 @@ class TestBody:
         assert found.certified.item() == 1
         assert found.omega_end.item() == pytest.approx(-1.16804 / 0.0645043, rel=1e-12)
 
+    def test_impact_of_a_wedged_body_has_its_solution_although_impulses_cancel(self):
+        """Both impulses are 1e5 times the momentum. With 40 digits one of the 16 modes is admissible."""
+        scene = {
+            "model": "ring",
+            "friction": {
+                "law": "tustin", "alpha": 1859.76,
+                "rest": {"mu_s": 0.501325, "mu_k": 0.194777}, "rough": {"mu_s": 0.103706, "mu_k": 0.103706},
+            },
+            "drive": {"law": "power", "amplitude": 1.50143, "exponent": 2.92213},
+            "body": {
+                "mass": 0.149936, "inertia": 8.98195e-05, "half_distance": 0.0274996, "ball_radius": 0.00955871,
+                "center_offset": 0.00105183,
+            },
+            "ring": {"radius": 0.0375752},
+            "zone": {"half_angle": 0.153688, "center": 0.333103},
+            "initial": {"phi": 0.953257, "omega": 14.4442},
+            "impact": {"restitution": 0.71469},
+        }  # fmt: skip
+        found = ringsweep.sweep(scene, {"time.span": [0.659132]}, progress=False)
+        assert found.phi_end.item() == pytest.approx(1.83277839, abs=1e-8)
+        assert found.impulse_max.item() == pytest.approx(146.67072, rel=1e-5)
+
     def test_rounding_decides_nothing_at_the_end_of_rebounds(self):
         """The wedged body comes to rest, breaks away where friction does not fall, and jams in the end.
 

@@ -224,6 +224,9 @@ _OPEN, _FORWARD, _BACKWARD, _STICK = range(4)
 # Velocities that differ by less than this share of their scale are equal.
 _ROUNDING = 1e-11
 
+# Where friction wedges a body, impulses of both contacts cancel: velocities are rounded by this share of their terms.
+_CANCELLED = 1e-15
+
 
 @inlined
 def _couplings(mass, moment, a, b):
@@ -360,11 +363,12 @@ def impulses(mass, moment, first, second, touching, mu, restitution):
                 n_1, n_2, t = n_1 / whole, n_2 / whole, t / whole
                 t_1 = t if mode_1 == _STICK else k_1 * n_1
                 t_2 = t if mode_2 == _STICK else k_2 * n_2
+            rough = least + _CANCELLED * (c_11[0] * abs(n_1) + c_22[0] * abs(n_2))
             # Most modes need an impulse that pulls, or more friction than there is.
-            pulls = min(c_11[0] * n_1, c_22[0] * n_2) < -least
-            if not found or pulls or abs(t_1) * c_11[0] > mu[0] * c_11[0] * n_1 + least:
+            pulls = min(c_11[0] * n_1, c_22[0] * n_2) < -rough
+            if not found or pulls or abs(t_1) * c_11[0] > mu[0] * c_11[0] * n_1 + rough:
                 continue
-            if abs(t_2) * c_22[0] > mu[1] * c_22[0] * n_2 + least:
+            if abs(t_2) * c_22[0] > mu[1] * c_22[0] * n_2 + rough:
                 continue
             o_1 = before[0] + c_11[0] * n_1 + c_11[1] * t_1 + c_12[0] * n_2 + c_12[1] * t_2
             s_1 = before[1] + c_11[2] * n_1 + c_11[3] * t_1 + c_12[2] * n_2 + c_12[3] * t_2
@@ -385,15 +389,15 @@ def impulses(mass, moment, first, second, touching, mu, restitution):
                     short = unit * (coefficient * n + along * (1.0 if slides > 0.0 else -1.0))
                     wrong = max(wrong, min(abs(slides), abs(short)))
                     violation = max(violation, wrong / speed)
-            if not violation <= _ROUNDING:
+            if not violation * speed <= rough:
                 continue
-            o_1, o_2 = (0.0 if abs(o_1) <= least else o_1), (0.0 if abs(o_2) <= least else o_2)
-            s_1, s_2 = (0.0 if abs(s_1) <= least else s_1), (0.0 if abs(s_2) <= least else s_2)
+            o_1, o_2 = (0.0 if abs(o_1) <= rough else o_1), (0.0 if abs(o_2) <= rough else o_2)
+            s_1, s_2 = (0.0 if abs(s_1) <= rough else s_1), (0.0 if abs(s_2) <= rough else s_2)
             apart = max(
                 max(abs(o_1 - best.opening_1), abs(s_1 - best.slip_1)),
                 max(abs(o_2 - best.opening_2), abs(s_2 - best.slip_2)),
             )
-            if solutions > 0 and apart <= 1e3 * least:
+            if solutions > 0 and apart <= 1e3 * rough:
                 continue
             solutions += 1
             loss = -0.5 * (
