@@ -40,6 +40,28 @@ class TestThreshold:
             ends = ringsweep.sweep(scene, {"drive.amplitude": [value - 1.001 * error, value + 1.001 * error]})
             assert (ringsweep.words(ends.regime).values == "separating").tolist() == [begins == 0, begins == 1]
 
+    def test_what_follows_a_lost_contact_has_thresholds_too(self, scene, tmp_path, capsys):
+        """Runs beside each threshold differ in the word of the aftermath. Without `impact` there is none."""
+        going_on = scene | {"impact": {"restitution": 0.5}}
+        found = ringsweep.threshold(going_on, "drive.amplitude", "recovered", (0.5, 8.0), scan=17)
+        assert found.sizes["vertex"] > 0
+        for value, error, begins in zip(
+            found.drive_amplitude.values, found.error.values, found.begins.values, strict=True
+        ):
+            axes = {"drive.amplitude": [value - 1.001 * error, value + 1.001 * error]}
+            words = ringsweep.words(ringsweep.sweep(going_on, axes, progress=False).aftermath).values
+            assert (words == "recovered").tolist() == [begins == 0, begins == 1]
+        assert set(ringsweep.words(found.beyond).values) <= {"held", "open", "tumbled"}
+        maps = ringsweep.sweep(going_on, {"drive.amplitude": np.geomspace(0.5, 8.0, 17)}, progress=False)
+        located = ringsweep.boundary(maps, "recovered", 1e-3)
+        nearest = abs(located.drive_amplitude.values[:, None] - found.drive_amplitude.values).min(axis=1)
+        assert (nearest <= 1.1e-3).all()
+        config = tmp_path / "ring.yaml"
+        config.write_text(json.dumps({"scene": scene}))
+        asked = ["threshold", str(config), "--path", "drive.amplitude", "--from", "1", "--to", "2"]
+        assert cli.main([*asked, "--regime", "tumbled"]) == 2
+        assert "it needs impact in the scene" in capsys.readouterr().err
+
     def test_axis_beside_the_threshold_has_the_value_of_the_command_line(self, tmp_path, capsys):
         """k v T = mu_s m g again, with a spring that the sweep varies."""
         grid = {"friction.mu_s": [0.12, 0.4], "spring.stiffness": [2.0, 3.0]}

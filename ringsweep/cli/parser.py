@@ -114,7 +114,9 @@ def build_parser() -> argparse.ArgumentParser:
         """)  # fmt: skip
     threshold.add_argument("config", metavar="CONFIG.yaml", help="or OUT.nc, whose scene is run")
     threshold.add_argument("--path", required=True, metavar="PATH", help="the number that varies: drive.amplitude")
-    threshold.add_argument("--regime", required=True, metavar="REGIME", help="the regime: separating")
+    threshold.add_argument(
+        "--regime", required=True, metavar="REGIME", help="the regime: separating; with impact also: tumbled"
+    )
     threshold.add_argument("--from", dest="low", metavar="VALUE", help="where to look; default: as the sweep has it")
     threshold.add_argument("--to", dest="high", metavar="VALUE", help="units allowed")
     threshold.add_argument("--tolerance", metavar="T", help="largest error (default: 1e-6 of the greatest value)")

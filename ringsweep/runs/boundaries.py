@@ -45,7 +45,7 @@ def boundary(ds: xr.Dataset, regime: str, tolerance: float = 1e-6, *, jobs: int 
         Result of a sweep over a grid, refined or not, of one or two dimensions. Hold further ones by ``ds.isel`` or
         ``ds.sel``.
     regime : str
-        Name of the regime, such as ``"separating"``.
+        Name of the regime, such as ``"separating"``, or a word of ``aftermath``, such as ``"tumbled"``.
     tolerance : float
         Largest distance of a point from the boundary along its axis, in the unit of that axis (rad for angles).
     jobs : int, optional
@@ -55,7 +55,7 @@ def boundary(ds: xr.Dataset, regime: str, tolerance: float = 1e-6, *, jobs: int 
     -------
     xarray.Dataset
         Along the dimension ``vertex``: the swept coordinates, ``line`` (the number of the curve), ``error`` (the
-        boundary lies within ± this), ``axis`` (along which of the two) and ``beyond`` (the regime on the other side).
+        boundary lies within ± this), ``axis`` (along which of the two) and ``beyond`` (the word on the other side).
 
     Raises
     ------
@@ -73,17 +73,17 @@ def boundary(ds: xr.Dataset, regime: str, tolerance: float = 1e-6, *, jobs: int 
     >>> bool((found.error <= 1e-3).all())
     True
     """
-    _checked(ds, regime)
+    label, _, _ = _checked(ds, regime)
     tolerance = quantity(tolerance, _TOLERANCE, "tolerance")
     configuration = _config(ds)
-    _check_cells(ds, configuration, jobs)
+    _check_cells(ds, label, configuration, jobs)
     return located(ds, regime, configuration, tolerance, jobs=jobs)
 
 
 def located(ds: xr.Dataset, regime: str, configuration: Config, tolerance: float, *, jobs: int | None) -> xr.Dataset:
     """Boundary of a regime in a map whose cells are known to be runs of a configuration; see :func:`boundary`."""
-    flag, dims = _checked(ds, regime)
-    inside = ds["regime"].values == flag
+    label, flag, dims = _checked(ds, regime)
+    inside = ds[label].values == flag
     usable = ds["certified"].values == 1 if getattr(configuration.solver, "certify", True) else _was_run(ds)
     sides = [_crossings(inside, usable, axis) for axis in range(len(dims))]
     low = np.concatenate([one for one, _ in sides])
@@ -98,7 +98,7 @@ def located(ds: xr.Dataset, regime: str, configuration: Config, tolerance: float
         along = ds[dim].values
         ends[:, axis == k] = along[low[axis == k, k]], along[high[axis == k, k]]
     within = inside[tuple(low.T)]
-    beyond = ds["regime"].values[tuple(np.where(within[:, None], high, low).T)].copy()
+    beyond = ds[label].values[tuple(np.where(within[:, None], high, low).T)].copy()
     open_ = np.ones(len(low), dtype=bool)
     while True:
         middle = 0.5 * (ends[0] + ends[1])
@@ -112,17 +112,17 @@ def located(ds: xr.Dataset, regime: str, configuration: Config, tolerance: float
         }
         found = _run(configuration, {columns[name].attrs["path"]: column for name, column in values.items()}, jobs)
         certified = found["certified"].values == 1 if getattr(configuration.solver, "certify", True) else True
-        here = found["regime"].values == flag
+        here = found[label].values == flag
         which = np.flatnonzero(open_)
         side = (here == within[which]) & certified
         other = (here != within[which]) & certified
         ends[0, which[side]], ends[1, which[other]] = middle[which[side]], middle[which[other]]
         outside = ~here & certified
-        beyond[which[outside]] = found["regime"].values[outside]
+        beyond[which[outside]] = found[label].values[outside]
         open_[which[~(side | other)]] = False
     for k, dim in enumerate(dims):
         place[dim] = np.where(axis == k, 0.5 * (ends[0] + ends[1]), place[dim])
-    order, line = _joined(low, axis, ds["regime"].shape)
+    order, line = _joined(low, axis, ds[label].shape)
     error = 0.5 * np.abs(ends[1] - ends[0])
     if count := int((error > tolerance).sum()):
         logger.warning("%d of %d points are less certain than asked for: runs there are not certified", count, len(low))
@@ -132,7 +132,7 @@ def located(ds: xr.Dataset, regime: str, configuration: Config, tolerance: float
             "line": ("vertex", line, {"long_name": "number of the curve"}),
             "error": ("vertex", error[order], {"long_name": "largest distance of the boundary along its axis"}),
             "axis": ("vertex", axis[order].astype(np.int8), {"long_name": "axis along which it is located", **axes}),
-            "beyond": ("vertex", beyond[order].astype(np.int8), ds["regime"].attrs | {"long_name": "regime beyond"}),
+            "beyond": ("vertex", beyond[order].astype(np.int8), ds[label].attrs | {"long_name": f"{label} beyond"}),
         },
         coords={name: ("vertex", column[order], columns[name].attrs) for name, column in place.items()},
         attrs={**ds.attrs, "boundary_of": regime, "boundary_tolerance": tolerance},
@@ -163,8 +163,8 @@ def run_at(ds: xr.Dataset, held: Mapping[str, float], regime: str, *, jobs: int 
     InputError
         As for :func:`boundary`.
     """
-    _, dims = _checked(ds, regime)
-    _check_cells(ds, _config(ds), jobs)
+    label, _, dims = _checked(ds, regime)
+    _check_cells(ds, label, _config(ds), jobs)
     columns = {str(name): c for name, c in ds.coords.items() if "path" in c.attrs}
     fixed = {name: held.get(name, c.item()) for name, c in columns.items() if name not in dims}
     values = {dim: columns[dim].values.tolist() for dim in dims} | {name: [value] for name, value in fixed.items()}
@@ -177,13 +177,29 @@ def run_at(ds: xr.Dataset, held: Mapping[str, float], regime: str, *, jobs: int 
     return found.isel(dict.fromkeys(fixed, 0))
 
 
-def _checked(ds: xr.Dataset, regime: str) -> tuple[int, list[str]]:
-    """Flag of the regime and the dimensions of the map."""
+def word_in(ds: xr.Dataset, word: str) -> tuple[str, int]:
+    """Classification that has a word, `regime` or `aftermath`, and the flag of the word.
+
+    Raises
+    ------
+    InputError
+        If the dataset has no such word.
+    """
+    known: list[str] = []
+    for name in ("regime", "aftermath"):
+        if name in ds:
+            meanings = str(ds[name].attrs["flag_meanings"]).split()
+            if word in meanings:
+                return name, int(np.atleast_1d(ds[name].attrs["flag_values"])[meanings.index(word)])
+            known += meanings
+    raise InputError("regime", f"{show(word)} is not a regime{suggestion(word, known)}")
+
+
+def _checked(ds: xr.Dataset, regime: str) -> tuple[str, int, list[str]]:
+    """Classification that has the word, its flag, and the dimensions of the map."""
     if "regime" not in ds or "time" in ds.dims:
         raise InputError("ds", "is no sweep: it has no regimes")
-    meanings = str(ds["regime"].attrs["flag_meanings"]).split()
-    if regime not in meanings:
-        raise InputError("regime", f"{show(regime)} is not a regime{suggestion(regime, meanings)}")
+    label, flag = word_in(ds, regime)
     dims = [str(dim) for dim in ds["regime"].dims]
     swept = [dim for dim in dims if dim in ds.coords and "path" in ds[dim].attrs and ds[dim].dtype.kind == "f"]
     if dims != swept or not 1 <= len(dims) <= 2:
@@ -194,10 +210,10 @@ def _checked(ds: xr.Dataset, regime: str) -> tuple[int, list[str]]:
         if "path" in coordinate.attrs and name not in dims and coordinate.dims:
             along = ", ".join(map(str, coordinate.dims))
             raise InputError("ds", f"{name} varies along {along}: a boundary needs axes along which one number varies")
-    return int(np.atleast_1d(ds["regime"].attrs["flag_values"])[meanings.index(regime)]), dims
+    return label, flag, dims
 
 
-def _check_cells(ds: xr.Dataset, config: Config, jobs: int | None) -> None:
+def _check_cells(ds: xr.Dataset, label: str, config: Config, jobs: int | None) -> None:
     """Refuse a dataset whose cells are not those of its configuration: bisection would run another scene."""
     known = {str(c.attrs["path"]): c for c in ds.coords.values() if "path" in c.attrs}
     for path, (_, column) in config.axes.columns.items():
@@ -217,7 +233,7 @@ def _check_cells(ds: xr.Dataset, config: Config, jobs: int | None) -> None:
     values = {path: _values(c, dims, cells) for path, c in known.items() if path in config.axes.columns}
     again = _run(config, values, jobs)
     sure = (ds["certified"].values[tuple(cells.T)] == 1) & (again["certified"].values == 1)
-    if (sure & (again["regime"].values != ds["regime"].values[tuple(cells.T)])).any():
+    if (sure & (again[label].values != ds[label].values[tuple(cells.T)])).any():
         raise InputError("ds", "has other regimes than runs of its configuration: was it put together from several?")
 
 
@@ -292,8 +308,8 @@ def _joined(low: NDArray[np.intp], axis: NDArray[np.intp], shape: tuple[int, ...
 def uncertainty_exponent(ds: xr.Dataset) -> xr.Dataset:
     """How fast the part of a map that lies near a boundary shrinks with the distance.
 
-    The map is divided into square boxes. The share of boxes that hold more than one regime, motion or separating
-    contact goes like a power of the side of a box. The exponent 1 belongs to a smooth boundary, of dimension 1. A
+    The map is divided into square boxes. The share of boxes that hold more than one regime, motion, separating contact
+    or aftermath goes like a power of the side of a box. The exponent 1 belongs to a smooth boundary, of dimension 1. A
     smaller exponent belongs to a boundary of dimension 2 minus the exponent, on which more digits in the parameters
     hardly help to foretell the regime (Grebogi, McDonald, Ott and Yorke 1983). As in Attractors.jl the result has the
     counts, so that a reader can judge the fit.
@@ -330,7 +346,7 @@ def uncertainty_exponent(ds: xr.Dataset) -> xr.Dataset:
     if "regime" not in ds or ds["regime"].ndim != 2:
         raise InputError("ds", "is no map of regimes over two dimensions: hold further ones by ds.isel")
     labels = ds["regime"].values.astype(np.int64)
-    for name in ("motion", "separating_contact"):
+    for name in ("motion", "separating_contact", "aftermath"):
         if name in ds:
             labels = labels * 32 + ds[name].values
     # Boxes have cells at their corners and share their edges, so that every boundary lies in a box.

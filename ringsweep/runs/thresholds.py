@@ -17,11 +17,11 @@ from ringsweep.config.axes import Axes, dimension, sweep_section, swept_paramete
 from ringsweep.config.consistency import check_consistency
 from ringsweep.config.sections import suggestion
 from ringsweep.errors import InputError
-from ringsweep.quantities.flags import REGIMES
+from ringsweep.quantities.flags import AFTERMATHS, REGIMES
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.units import quantity, show
 from ringsweep.quantities.variables import words
-from ringsweep.runs.boundaries import located
+from ringsweep.runs.boundaries import located, word_in
 from ringsweep.runs.executors import Execution
 from ringsweep.runs.sweep import compute
 from ringsweep.statistics import quantiles, summarised
@@ -66,7 +66,7 @@ def threshold(
     path : str
         Path of the number, such as ``"drive.amplitude"``.
     regime : str
-        Name of the regime, such as ``"separating"``.
+        Name of the regime, such as ``"separating"``; with ``impact`` in the scene also a word of ``aftermath``.
     between : tuple of two values, optional
         Ends of the interval; text may have a unit. By default those between which the configuration sweeps the path.
     tolerance : float or str, optional
@@ -135,10 +135,13 @@ def locate(
     settings : iterable of str
         As for :func:`ringsweep.config.with_values`.
     """
-    if regime not in REGIMES:
-        raise InputError("regime", f"{show(regime)} is not a regime" + suggestion(regime, REGIMES))
+    if regime not in REGIMES + AFTERMATHS:
+        raise InputError("regime", f"{show(regime)} is not a regime" + suggestion(regime, REGIMES + AFTERMATHS))
     settings = list(settings)
-    if (whole := load(config, _beside_axes(config, path, settings))).sample is not None:
+    whole = load(config, _beside_axes(config, path, settings))
+    if regime in AFTERMATHS and "impact.restitution" not in sweepable(whole.scene):
+        raise InputError("regime", f"{show(regime)} is said of runs that go on: it needs impact in the scene")
+    if whole.sample is not None:
         low, high = _ends(whole, path, between)
         return distribution(whole, path, regime, *_scan(whole, path, (low, high), tolerance, scan), jobs=jobs)
     one, low, high = _interval(config, path, between, settings)
@@ -152,12 +155,13 @@ def locate(
         sure = runs
     found = located(sure, regime, scanned, allowed, jobs=jobs)
     above = np.searchsorted(sure[name].values, found[name].values)
-    begins = (words(sure["regime"]).values[above] == regime).astype(np.int8)
+    label, _ = word_in(sure, regime)
+    begins = (words(sure[label]).values[above] == regime).astype(np.int8)
     flags = {"flag_values": np.arange(2, dtype=np.int8), "flag_meanings": "ends begins"}
     return (
         found.drop_vars(["line", "axis"])
         .assign(begins=("vertex", begins, {"long_name": "whether the regime begins as the number grows"} | flags))
-        .assign_attrs(threshold_path=path, scan=_scanned(runs, name))
+        .assign_attrs(threshold_path=path, scan=_scanned(runs, name, label))
     )
 
 
@@ -201,7 +205,7 @@ def distribution(
             raise InputError("path", f"{path} is uncertain itself: a threshold is that of another number")
         if factor.over == path:
             raise InputError("path", f"{factor.paths[0]} is drawn over {path}: give it a distribution of its own")
-    size, flag = sample.size, REGIMES.index(regime)
+    size = sample.size
     shares = np.concatenate([sample.shares(k) for k in range(sample.replicates)])
     drawn = {name: column for name, (_, column) in sample.axes(config.scene, Axes(), shares).columns.items()}
 
@@ -212,7 +216,8 @@ def distribution(
         check_consistency(config.scene, axes)
         found = compute(replace(config, axes=axes, sample=None), Execution(jobs, progress=False), warn=False)
         certain = getattr(config.solver, "certify", True)
-        return found["regime"].values == flag, found["certified"].values == 1 if certain else np.full(len(points), True)
+        label, flag = word_in(found, regime)
+        return found[label].values == flag, found["certified"].values == 1 if certain else np.full(len(points), True)
 
     total, every = len(shares), np.arange(len(shares))
     inside, sure = (part.reshape(total, -1) for part in runs(np.repeat(every, len(values)), np.tile(values, total)))
@@ -322,9 +327,9 @@ def _interval(config: Any, path: str, between: tuple[Any, Any], settings: list[s
     return one, low, high
 
 
-def _scanned(runs: xr.Dataset, name: str) -> str:
+def _scanned(runs: xr.Dataset, name: str, label: str) -> str:
     """What a scan found, in words."""
-    axis, regimes = runs[name], words(runs["regime"]).values
+    axis, regimes = runs[name], words(runs[label]).values
     seen = ", ".join(f"{count} {regime}" for regime, count in zip(*np.unique(regimes, return_counts=True), strict=True))
     text = f"{len(regimes)} runs from {_number(axis[0].item(), axis)} to {_number(axis[-1].item(), axis)}: {seen}"
     unsure = int((runs["certified"] != 1).sum())
