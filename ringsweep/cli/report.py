@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ringsweep.quantities.flags import CERTIFIED, FAILED, RIDING
+from ringsweep.quantities.flags import CERTIFIED, FAILED, JAMMED, RIDING, SEPARATING
 from ringsweep.quantities.variables import DOUBTS, INFERRED, words
 from ringsweep.storage.chunks import Layout
 
@@ -46,7 +46,7 @@ def summarise(result: xr.Dataset) -> None:
             if flag != CERTIFIED:
                 print(f"  {count} not: {DOUBTS.get(name, name)}")
     if "settled" in result:
-        unsettled = (result["settled"] == 0) & ~regime.isin([RIDING, FAILED])
+        unsettled = (result["settled"] == 0) & ~regime.isin([RIDING, FAILED, SEPARATING, JAMMED])
         if unsettled.any():
             cells = np.count_nonzero(result["origin"] != INFERRED) if "origin" in result else regime.size
             print(f"not settled: {int(unsettled.sum()) / cells:.1%} of the motions; a longer span may change them")

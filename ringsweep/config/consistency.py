@@ -8,7 +8,7 @@ import numpy as np
 
 from ringsweep.config.axes import Axes
 from ringsweep.errors import InputError
-from ringsweep.models import batch
+from ringsweep.models import MODELS, batch
 from ringsweep.models.scene import LAW, Scene, Structure
 
 # Cells that are checked at once: many zones over many points must not fill the memory.
@@ -32,7 +32,9 @@ def check_consistency(scene: Scene, axes: Axes) -> None:
         checked.append(np.unique([along[0].argmin(), along[0].argmax()]) if monotone else np.arange(size))
     shape = (1, *map(len, checked))
     total = math.prod(shape)
-    section, periodic = scene.structure.section, False
+    section, periodic, able = scene.structure.section, False, MODELS[scene.structure.model].sections
+    # Without a section at turns, a motion without a period has no cycles.
+    needed = section.at == "period" if section is not None else scene.structure.exponent and "turn" not in able
     for start in range(0, total, _CELLS_AT_ONCE):
         flat = np.arange(start, min(start + _CELLS_AT_ONCE, total))
         numbers = np.unravel_index(flat, shape)[1:]
@@ -50,10 +52,12 @@ def check_consistency(scene: Scene, axes: Axes) -> None:
                 if _comes_from_sweep(structure, scene, axes, error):
                     error.problem += " (in a cell of the sweep)"
                 raise
-            if section is not None and not periodic:
+            if needed and not periodic:
                 periodic = bool(np.isfinite(made.forcing_period).any())
-    if section is not None and section.at == "period" and not periodic:
-        raise InputError("record.section.at", "neither force nor drive has a period: give one, or take `turn`")
+    if needed and not periodic:
+        others = "give one, or state it by `period`" + (", or take `turn`" if "turn" in able else "")
+        where = "record.section.at" if section is not None else "record.exponent"
+        raise InputError(where, f"neither force nor drive has a period: {others}")
 
 
 def _comes_from_sweep(structure: Structure, scene: Scene, axes: Axes, error: InputError) -> bool:

@@ -14,8 +14,11 @@ from ringsweep.quantities.units import quantity, show
 #: Number of points of a section.
 KEEP = Parameter("1", "number of points, the last of a run", lower=1, upper=16384, default=64, whole=True)
 
+#: Time between two points.
+PERIOD = Parameter("s", "time between two points, if neither force nor drive has a period", lower=0.0, open_lower=True)
+
 #: Instants of the points of a section, and what they are.
-INSTANTS = {"period": "the end of each period of force or drive", "turn": "each maximum of the displacement"}
+INSTANTS = {"period": "the end of each period of force or drive", "turn": "each maximum of the displacement (belt only)"}
 
 
 def read_record(given: Any, model: str) -> tuple[bool, Section | None]:
@@ -42,8 +45,8 @@ def read_record(given: Any, model: str) -> tuple[bool, Section | None]:
 def _section(record: dict[str, Any], model: str) -> Section:
     section = section_of(record, "section", "record.")
     for key in section:
-        if key not in ("at", "keep"):
-            raise InputError(f"record.section.{key}", "unknown key" + suggestion(key, ("at", "keep")))
+        if key not in ("at", "keep", "period"):
+            raise InputError(f"record.section.{key}", "unknown key" + suggestion(key, ("at", "keep", "period")))
     able = MODELS[model].sections
     if not able:
         others = ", ".join(name for name, other in MODELS.items() if other.sections)
@@ -53,4 +56,10 @@ def _section(record: dict[str, Any], model: str) -> Section:
     at = section["at"]
     if at not in able:
         raise InputError("record.section.at", f"{show(at)} is no instant of a section" + suggestion(at, able))
-    return Section(at, int(quantity(section.get("keep", KEEP.default), KEEP, "record.section.keep")))
+    period = None
+    if "period" in section:
+        if at != "period":
+            raise InputError("record.section.period", f"belongs to `at: period`, not to `at: {at}`: leave it out")
+        period = float(quantity(section["period"], PERIOD, "record.section.period"))
+    keep = int(quantity(section.get("keep", KEEP.default), KEEP, "record.section.keep"))
+    return Section(at, keep, period=period)

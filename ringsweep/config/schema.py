@@ -14,7 +14,7 @@ from ringsweep.config.follow import DIRECTIONS
 from ringsweep.config.friction import FORMULA
 from ringsweep.config.friction import TABLE as TABLE_LAW
 from ringsweep.config.motion import FORMULA as FORMULA_DRIVE
-from ringsweep.config.record import INSTANTS, KEEP
+from ringsweep.config.record import INSTANTS, KEEP, PERIOD
 from ringsweep.config.refinement import NUMBERS
 from ringsweep.config.sampling import NUMBERS as SAMPLE_NUMBERS
 from ringsweep.config.sampling import SENSITIVITIES
@@ -172,10 +172,10 @@ def _constants(meanings: Mapping[str, str]) -> list[dict[str, str]]:
 
 
 def _record() -> dict[str, Any]:
-    about = "whether a run on the belt tells its Lyapunov exponent and its Floquet multipliers"
+    about = "whether a run tells its Lyapunov exponent and its Floquet multipliers"
     at = {"description": "instants of the points", "oneOf": _constants(INSTANTS)}
-    section = _section({"at": at, "keep": _number(KEEP)})
-    kept = {"description": "points of the motion on the belt that a run keeps", **section, "required": ["at"]}
+    section = _section({"at": at, "keep": _number(KEEP), "period": _number(PERIOD)})
+    kept = {"description": "points of the motion that a run keeps", **section, "required": ["at"]}
     exponent = {"description": about, "type": "boolean"}
     return {"description": "what a run records", **_section({"exponent": exponent, "section": kept})}
 

@@ -8,11 +8,28 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsweep.errors import InputError
 from ringsweep.models.interface import recorder
 from ringsweep.models.scene import Structure, Values
 from ringsweep.physics import friction
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.variables import OUTCOMES, Variable
+
+
+def period_of(structure: Structure, period: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Periods of the forcing, s: those given, or the one that the section states.
+
+    Raises
+    ------
+    InputError
+        If the section states a period where force or drive have one.
+    """
+    asked = structure.section
+    if asked is None or asked.period is None:
+        return period
+    if np.isfinite(period).any():
+        raise InputError("record.section.period", f"force or drive have the period {period.min():.6g} s: leave it out")
+    return np.full(period.shape, asked.period)
 
 
 class Continues(ABC):

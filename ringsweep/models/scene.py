@@ -33,11 +33,14 @@ class Section(NamedTuple):
         Number of points: the last ones of the run.
     deflections : bool
         Whether a point holds the deflection of bristles: true if a law of the sweep has them.
+    period : float, optional
+        Time between two points, s, where neither force nor drive has a period.
     """
 
     at: str
     keep: int
     deflections: bool = False
+    period: float | None = None
 
 
 @dataclass(frozen=True)

@@ -62,6 +62,12 @@ class Ring(NamedTuple):
         Span of time, s.
     epsilon_omega : float
         Angular velocity beyond which a change of its sign counts as a reversal, rad/s.
+    forcing_period : float
+        Period of the drive, s; infinite without a period. An empty tuple unless something is asked for.
+    long_run : NamedTuple
+        That the record tells what the motion settles to; an empty tuple if it does not.
+    asked, section : NamedTuple
+        As in :class:`ringsweep.physics.belt.Belt`.
     """
 
     body: Any
@@ -72,6 +78,10 @@ class Ring(NamedTuple):
     initial_omega: Leaf
     span: Leaf
     epsilon_omega: Leaf
+    forcing_period: Any = ()
+    long_run: Any = ()
+    asked: Any = ()
+    section: Any = ()
 
 
 class BristleRing(Ring):

@@ -161,6 +161,14 @@ OUTCOMES: dict[str, Variable] = {
     "x_section": Variable("m", "displacement of the body at the points of its section", dims=("section",)),
     "velocity_section": Variable("m/s", "velocity of the body at the points of its section", dims=("section",)),
     "deflection_section": Variable("m", "deflection of the bristles at the points of the section", dims=("section",)),
+    "phi_section": Variable("rad", "angle of the body at the points of its section, from -pi to pi", dims=("section",)),
+    "omega_section": Variable("rad/s", "angular velocity of the body at the points of its section", dims=("section",)),
+    "deflection_1_section": Variable(
+        "m", "deflection of the bristles at contact 1 at the points of the section", dims=("section",)
+    ),
+    "deflection_2_section": Variable(
+        "m", "deflection of the bristles at contact 2 at the points of the section", dims=("section",)
+    ),
     "open_time": Variable("s", "time for which a contact is open"),
     "flight_time": Variable("s", "time for which no contact holds"),
     "gap_max": Variable("m", "greatest gap of a contact"),

@@ -14,7 +14,7 @@ from ringsweep.config import Config
 from ringsweep.models import batch
 from ringsweep.physics import drives, ring, zones
 from ringsweep.physics.drives import Constant
-from ringsweep.quantities.flags import FAILED, REGIMES, RIDING
+from ringsweep.quantities.flags import FAILED, JAMMED, REGIMES, RIDING, SEPARATING
 from ringsweep.quantities.variables import INFERRED
 from ringsweep.runs.cells import laws_at, values_at
 from ringsweep.solvers.automaton import PATIENCE
@@ -76,7 +76,7 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
             remedy,
         )
     if "settled" in results:
-        _warn_of_belt(results, config, count)
+        _warn_of_long_runs(results, config, count)
     if "regime" in results:
         _warn_of_failures(results, config)
         _hint_at_idle_axes(results)
@@ -209,8 +209,8 @@ def _is_idle(column: xr.Variable, dim: str) -> bool:
     return True
 
 
-def _warn_of_belt(results: xr.Dataset, config: Config, count: int) -> None:
-    """Warn of motions on the belt that have not settled, and of bodies that have not broken loose.
+def _warn_of_long_runs(results: xr.Dataset, config: Config, count: int) -> None:
+    """Warn of motions that have not settled, and of bodies that have not broken loose.
 
     `count` is the number of cells that were run. No others have a value of `settled`.
     """
@@ -220,7 +220,7 @@ def _warn_of_belt(results: xr.Dataset, config: Config, count: int) -> None:
     for _, _, region in Layout(regime.shape).chunks():
         words = regime[region].values
         rides = words == RIDING
-        unsettled += int(np.count_nonzero((settled[region].values == 0) & ~rides & (words != FAILED)))
+        unsettled += int(np.count_nonzero((settled[region].values == 0) & ~rides & ~np.isin(words, (FAILED, SEPARATING, JAMMED))))
         riding += int(np.count_nonzero(rides))
         if rides.any():
             firsts = np.array([part.start for part in region], dtype=np.intp)
@@ -229,7 +229,8 @@ def _warn_of_belt(results: xr.Dataset, config: Config, count: int) -> None:
             soonest, latest = min(soonest, spans.min(initial=np.inf)), max(latest, spans.max(initial=0.0))
     if unsettled:
         who = "the motion has" if regime.size == 1 else f"{unsettled / count:.1%} of the motions have"
-        logger.warning("%s not settled: a longer span may change regime, share of stick and stops", who)
+        what = "regime, share of stick and stops" if "stick_share" in results else "what it settles to"
+        logger.warning("%s not settled: a longer span may change %s", who, what)
     if riding:
         remedy = "what pulls them does not reach breakaway"
         if latest > 0.0:

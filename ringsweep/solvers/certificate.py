@@ -40,6 +40,10 @@ _MAY_LACK = (
     "x_section",
     "velocity_section",
     "deflection_section",
+    "phi_section",
+    "omega_section",
+    "deflection_1_section",
+    "deflection_2_section",
 )
 
 # Relative difference of two final states that rounding explains.

@@ -86,6 +86,12 @@ class Method(ABC):
                 f"friction law {structure.law} has none: its bonds form anew at random; choose another law, or leave "
                 f"record.{asked[0]} out",
             )
+        if asked and structure.impact:
+            raise InputError(
+                f"record.{asked[0]}",
+                "cannot stand beside scene.impact: the number of state variables changes from mode to mode; leave one "
+                "of them out",
+            )
         needs, model = self.needs(structure), model_of(structure)
         law, drive = structure.law_type, structure.drive_type
         for path, kind, name, source, cls, members in (

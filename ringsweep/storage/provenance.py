@@ -83,6 +83,8 @@ def identity(config: Config) -> dict[str, str]:
         found["record.exponent"] = "true"
     if structure.section is not None:
         found["record.section"] = f"at {structure.section.at}, keep {structure.section.keep}"
+        if structure.section.period is not None:
+            found["record.section.period"] = repr(structure.section.period)
     if config.follow is not None:
         found["sweep.follow"] = repr(config.follow)
     if config.refine is not None:

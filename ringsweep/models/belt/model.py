@@ -10,15 +10,18 @@ from numpy.typing import NDArray
 
 from ringsweep.compile import take
 from ringsweep.errors import InputError
-from ringsweep.models.belt import section, tangent
+from ringsweep.models import section, tangent
 from ringsweep.models.belt.record import Outcome
 from ringsweep.models.interface.variation import Exponent
-from ringsweep.models.model import Continues, Model
+from ringsweep.models.model import Continues, Model, period_of
 from ringsweep.models.parts import GRAVITY, MASS, SPAN, by_formula, drive_of, friction_coefficients, law_of, table_of
 from ringsweep.models.scene import Structure, Values, require
 from ringsweep.physics import belt, drives, forces, friction, ring
 from ringsweep.quantities.parameters import Parameter, declared
 from ringsweep.quantities.variables import Variable
+
+#: Variables of a point of a section: displacement and velocity, and under a law with bristles their deflection.
+SECTION = "x_section", "velocity_section", "deflection_section"
 
 # Optional fields of the body, by path.
 _OPTIONAL = {
@@ -157,7 +160,8 @@ class Belt(Model, Continues):
             kept: Any = section.AtPeriod if structure.section.at == "period" else section.AtTurn
             sizes = structure.section.keep, len(_points(structure))
             fields["section"] = kept(*(np.full(mass.shape, size) for size in sizes))
-        fields["forcing_period"] = np.broadcast_to(drives.period(fields["drive"]), mass.shape).copy()
+        period = np.broadcast_to(drives.period(fields["drive"]), mass.shape).copy()
+        fields["forcing_period"] = period_of(structure, period)
         fields["viscous"] = values.get("friction.viscous", np.zeros(len(mass)))
         if friction.family_of(law) is not friction.Dynamic:
             viscous, load = fields["viscous"], mass * gravity
@@ -239,7 +243,7 @@ def _points(structure: Structure) -> tuple[str, ...]:
     asked = structure.section
     if asked is None:
         return ()
-    return tuple(name for name in section.VARIABLES[: 2 + asked.deflections] for _ in range(asked.keep))
+    return tuple(name for name in SECTION[: 2 + asked.deflections] for _ in range(asked.keep))
 
 
 def _along_a_line(parameter: Parameter) -> Parameter:

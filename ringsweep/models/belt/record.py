@@ -2,10 +2,7 @@
 
 A *stop* is an interval in which the body sticks to the belt, and stays longer than a motion that only passes or grazes
 the speed of the belt. A *cycle* is a period of the forcing; without forcing, it lasts from one turn of the displacement
-to the next of its kind. At the end of each cycle the state is compared with that one cycle before, and with a
-reference, which is replaced after ever more cycles (Brent's cycle detection). The first state that equals one of them
-closes a *lap*: the time since then is the period of the motion if each later lap returns too. After a lap that does not
-return, states must be closer to count as equal: a motion that only comes near its past is not taken for a periodic one.
+to the next of its kind. See :mod:`ringsweep.models.cycles`.
 """
 
 from __future__ import annotations
@@ -14,11 +11,12 @@ from math import inf, isfinite, isnan, nan, pi, sqrt
 from typing import Any, NamedTuple
 
 from ringsweep.compile import absorbed, hook, inlined
-from ringsweep.models.belt import section, tangent
+from ringsweep.models import cycles, section, tangent
 from ringsweep.models.belt.force import breakaway_force
-from ringsweep.models.belt.turn import between, turn_within
+from ringsweep.models.cycles import RETURN, Cycles, Mark
 from ringsweep.models.interface import recorder, shock
 from ringsweep.models.interface.status import BROKEN, COMPLETE, SEPARATED_1
+from ringsweep.models.turn import between, turn_within
 from ringsweep.numerics.functions import any_of, floor, lanes_body, select, square_root
 from ringsweep.numerics.memory import select_all
 from ringsweep.physics import ring
@@ -26,11 +24,9 @@ from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.forces import largest_force
 from ringsweep.physics.friction.velocity import stiction_band
 from ringsweep.quantities.flags import (
-    CHAOTIC,
     FAILED,
     OSCILLATORY,
     PERIODIC,
-    QUASI_PERIODIC,
     REST,
     RIDING,
     SEPARATING,
@@ -125,115 +121,6 @@ class Stops(NamedTuple):
     first_slip: Any
 
 
-class Mark(NamedTuple):
-    """State at the end of a cycle: time, displacement, velocity, and `total` and `slips` of the stops until then."""
-
-    t: Any
-    x: Any
-    velocity: Any
-    total: Any
-    slips: Any
-
-
-class Corner(NamedTuple):
-    """State after so many laps: `number`, displacement, m, and velocity, m/s."""
-
-    number: Any
-    x: Any
-    velocity: Any
-
-
-class Laps(NamedTuple):
-    """Laps of one length that returned one after the other.
-
-    Attributes
-    ----------
-    number : float
-    gap, first_gap : float
-        Distances between the ends of the last and of the first of them, as a share of the swing.
-    near : float
-        Greatest distance, as a share of the swing, at which a state has returned.
-    older, newer : Corner
-        States after so many laps, the last two powers of two: `older` is at least half of the laps ago.
-    """
-
-    number: Any
-    gap: Any
-    first_gap: Any
-    near: Any
-    older: Corner
-    newer: Corner
-
-
-class Part(NamedTuple):
-    """Beginning of a part of the record.
-
-    Attributes
-    ----------
-    count : float
-        Cycles before it.
-    mark : Mark
-        State there.
-    swing, sum, squares : float
-        Swing of the cycle before, m; sums of the swings until then, and of their squares.
-    """
-
-    count: Any
-    mark: Mark
-    swing: Any
-    sum: Any
-    squares: Any
-
-
-class Cycles(NamedTuple):
-    """Cycles up to now.
-
-    Attributes
-    ----------
-    count, next : float
-        Number of the last cycle, and time at which the forcing ends its next period, s.
-    low, high : float
-        Least and greatest displacement at turns since its end, m.
-    swing, swing_before, drift : float
-        Distance between the extremes of the last cycle, and of the cycle before, and displacement in it, m.
-    last, reference : Mark
-        End of the last cycle, and the state with which later states are compared.
-    since, most : float
-        Cycles since the reference, and cycles after which it is replaced.
-    lap : float
-        Cycles in a lap; 0 if the motion did not return.
-    laps : Laps
-    sum, squares : float
-        Sums of the swings of all cycles, m, and of their squares.
-    before, middle : Part
-        After the last two powers of two of cycles: at least half of the record comes after `before`.
-    period, share, stops : float
-        Duration of the last lap, s, NaN if the motion did not return. Share of stick and stops in a cycle, of the last
-        lap or of the cycles since the reference.
-    """
-
-    count: Any
-    next: Any
-    low: Any
-    high: Any
-    swing: Any
-    swing_before: Any
-    drift: Any
-    last: Mark
-    reference: Mark
-    since: Any
-    most: Any
-    lap: Any
-    laps: Laps
-    sum: Any
-    squares: Any
-    before: Part
-    middle: Part
-    period: Any
-    share: Any
-    stops: Any
-
-
 class Record(NamedTuple):
     """Record of a run on the belt; lengths in m, velocities in m/s, times in s, forces in N.
 
@@ -270,42 +157,12 @@ class Record(NamedTuple):
     section: Any
 
 
-#: The motion has returned if displacement and velocity differ by less than this share of their swing in a cycle.
-RETURN = 1e-3
-
-# After a lap that did not return this share is a tenth of what it was, but not less than this one.
-_NEAREST = 1e-5
-
-# Under a force one return within this share is evidence: no motion comes so close to its past by chance. Else so many
-# laps must return. A free motion has no other way to return than to repeat itself.
-_EXACT, _LAPS, _LAPS_IF_FREE = 1e-7, 4.0, 1.0
-
-# A change that would add up to less than this share of the swing in ten spans is no trend.
-_TREND = 0.1
-
-# Gaps of laps shrink if the last one is less than this share of the first one.
-_SHRUNK = 0.3
-
-# Two parts of the record have the same mean if it differs by less than so many standard errors and this share; shares
-# of stick may differ by the second share. Each part must have so many cycles in the mean.
-_ERRORS, _SAME_SWING, _SAME_STICK, _FEWEST = 3.0, 0.05, 0.1, 16.0
-
 # A swing has no bound if it is so many times the scales of the scene, and its growth in a cycle falls by less than the
 # second share between two parts of the record.
 _BEYOND, _SLOWER = 100.0, 0.01
 
-# An exponent is positive if it exceeds so many standard errors. It is zero if with so many it changes a disturbance by
-# less than the second share in a cycle.
-_POSITIVE, _ZERO = 3.0, 0.02
-
-# A multiplier above this one is that of an unstable motion, which does not last.
-_UNSTABLE = 1.01
-
 # A free oscillation has settled if its swing, at the rate of its last cycle, changes by less than this share in a span.
 _DECAY = 1e-2
-
-# Laps of more cycles are not looked for.
-_MOST_CYCLES = 64.0
 
 # A stop that counts lasts longer than this factor times the time in which the body would lose its sliding velocity. A
 # motion that grazes the speed of the belt stays in the stiction band for four times this time, one that passes for two.
@@ -326,8 +183,6 @@ def begin(scene, t, seen, band, play):
     """Record at the beginning of a run."""
     x, velocity, force, place, v, v_rate, acceleration, _ = seen
     start = Mark(t, x, velocity, 0.0, 0.0)
-    corner, part = Corner(0.0, x, velocity), Part(0.0, start, 0.0, 0.0, 0.0)
-    laps = Laps(0.0, 0.0, 0.0, RETURN, corner, corner)
     # The body counts as stuck until it slips: the first stop begins with the run. If the pull exceeds breakaway, it may
     # pass the stiction band at once.
     pull = max(abs(scene.body.mass * v_rate + force), abs(scene.body.stiffness * x))
@@ -342,28 +197,7 @@ def begin(scene, t, seen, band, play):
         velocity,
         abs(force),
         Stops(1.0, t, 0.0, t, -max(least, 1e-300), nan, t, 0.0, 0.0, nan),
-        Cycles(
-            0.0,
-            scene.forcing_period,
-            x,
-            x,
-            0.0,
-            0.0,
-            0.0,
-            start,
-            start,
-            0.0,
-            1.0,
-            0.0,
-            laps,
-            0.0,
-            0.0,
-            part,
-            part,
-            nan,
-            nan,
-            nan,
-        ),
+        cycles.begin(scene.forcing_period, start),
         shock.begin(acceleration),
         tangent.begin(scene.asked, scene, t),
         (),
@@ -372,7 +206,7 @@ def begin(scene, t, seen, band, play):
 
 @recorder.lend.implements(Belt, BristleBelt)
 def _lend(scene, record, row):
-    return changed(record, record.shocks, record.tangent, section.lent(scene.section, record, row))
+    return changed(record, record.shocks, record.tangent, section.lent(scene.section, record, row, (nan,)))
 
 
 @inlined
@@ -399,18 +233,18 @@ def _observe(scene, record, t, duration, stuck, seen):
     # In most steps nothing turns, begins or ends.
     r = record
     x, velocity, force, place, v, v_rate, acceleration, deflection = seen
-    stops, cycles, x_min, x_max = r.stops, r.cycles, r.x_min, r.x_max
+    stops, now, x_min, x_max = r.stops, r.cycles, r.x_min, r.x_max
     place = _place(scene, r, place)
     side = select(stuck, 1.0, -1.0)
     if any_of((side * stops.side < 0.0) | _leaves(scene, r, place)):
         span = max(x_max, x) - min(x_min, x)
         stops = _stops(scene, r, t, duration, stuck, side, place, v, force, span)
-    if any_of((r.last.velocity * velocity <= 0.0) | (t >= cycles.next)):
+    if any_of((r.last.velocity * velocity <= 0.0) | (t >= now.next)):
         up, down = (r.last.velocity <= 0.0) & (velocity > 0.0), (r.last.velocity > 0.0) & (velocity <= 0.0)
         turn = turn_within(r.last, t, duration, x, velocity)
         x_min, x_max = select(up, min(x_min, turn.x), x_min), select(down, max(x_max, turn.x), x_max)
         span = max(x_max, x) - min(x_min, x)
-        cycles = _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span)
+        now = _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span)
     return Record(
         r.band,
         r.play,
@@ -428,10 +262,10 @@ def _observe(scene, record, t, duration, stuck, seen):
         max(r.velocity_max, velocity),
         max(r.force_max, abs(force)),
         stops,
-        cycles,
+        now,
         shock.observe(r.shocks, acceleration),
-        tangent.observe(r.tangent, scene, r.cycles, cycles, t, duration),
-        section.observe(scene.section, scene, r, cycles, t, duration, x, velocity, deflection),
+        tangent.observe(r.tangent, scene, r.cycles, now, t, duration),
+        section.observe(scene.section, scene, r, now, t, duration, x, velocity, (deflection,)),
     )
 
 
@@ -580,84 +414,11 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
         stop = select(stops.slip_from == stops.slip_from, min(stops.slip_start, t_mark), t_mark) - stops.start
         total = stops.total + select(stop > abs(stops.least), stop, 0.0)
         fast = swing * (2.0 * pi) / _pace(scene)
-        # Without forcing the launch is not the end of a cycle.
-        known = due | (c.count > 0.0)
-        since = c.since + (count - c.count)
-        near = c.laps.near
-        gap_last = _gap(c.last, x_mark, v_mark, swing, fast)
-        gap_reference = _gap(c.reference, x_mark, v_mark, swing, fast)
-        repeats = known & (gap_last <= near)
-        returns = repeats | (known & (gap_reference <= near))
-        # A lap of several cycles need not be closed before its end.
-        open_lap = _not(returns) & (since < c.lap)
-        lap = select(repeats, 1.0, select(returns, since, select(open_lap, c.lap, 0.0)))
-        t_from = select(repeats, c.last.t, c.reference.t)
-        total_from = select(repeats, c.last.total, c.reference.total)
-        slips_from = select(repeats, c.last.slips, c.reference.slips)
-        cycles = select(repeats, count - c.count, since)
-        keeps = open_lap | _not(known)
-        lost = _not(returns | keeps)
-        late = lost & (since >= c.most)
-        renew = returns | late | _not(known)
-        most = select(late, min(2.0 * c.most, _MOST_CYCLES), c.most)
         mark = Mark(t_mark, x_mark, v_mark, total, stops.slips)
-        again = returns & (lap == c.lap)
-        start = select_all(repeats, c.last, c.reference)
-        gap = select(repeats, gap_last, gap_reference)
-        laps = Laps(
-            select(again, c.laps.number + 1.0, select(returns, 1.0, select(lap > 0.0, c.laps.number, 0.0))),
-            select(returns, gap, c.laps.gap),
-            select(returns & _not(again), gap, c.laps.first_gap),
-            select((c.lap > 0.0) & (lap == 0.0), max(0.1 * near, _NEAREST), near),
-            c.laps.older,
-            c.laps.newer,
-        )
-        laps = _with_corners(laps, returns & _not(again), again, start, mark)
-        sum_now, squares = c.sum + swing, c.squares + swing * swing
-        halves = count >= 2.0 * c.middle.count
-        here = Part(count, mark, swing, sum_now, squares)
-        new = Cycles(
-            count,
-            (count + 1.0) * period,
-            x_mark,
-            x_mark,
-            swing,
-            c.swing,
-            (x_mark - c.last.x) / (count - c.count),
-            mark,
-            select_all(renew, mark, c.reference),
-            select(renew, 0.0, since),
-            most,
-            lap,
-            laps,
-            sum_now,
-            squares,
-            select_all(halves, c.middle, c.before),
-            select_all(halves, here, c.middle),
-            select(returns, (t_mark - t_from) * lap / cycles, select(keeps, c.period, nan)),
-            select(keeps, c.share, (total - total_from) / (t_mark - t_from)),
-            select(keeps, c.stops, (stops.slips - slips_from) / cycles),
-        )
+        # Without forcing the launch is not the end of a cycle.
+        new = cycles.closed(scene, c, mark, count, due | (c.count > 0.0), (count + 1.0) * period, swing, fast)
         return select_all(ended, new, old)
     return old
-
-
-@absorbed
-def _gap(mark, x, velocity, swing, fast):
-    """Distance of a state from a mark, as a share of the swing of displacement and velocity."""
-    far_x, far_v = abs(x - mark.x), abs(velocity - mark.velocity)
-    return max(far_x / max(swing, 1e-300), far_v / max(fast, 1e-300))
-
-
-@absorbed
-def _with_corners(laps, first, again, start, mark):
-    """Laps with their corners, after a lap from `start` to `mark` that is the first of its length, or one more."""
-    older, newer = laps.older, laps.newer
-    begun, here = Corner(0.0, start.x, start.velocity), Corner(laps.number, mark.x, mark.velocity)
-    doubled = again & (laps.number >= 2.0 * max(newer.number, 1.0))
-    older = select_all(first, begun, select_all(doubled, newer, older))
-    newer = select_all(first, begun, select_all(doubled, here, newer))
-    return Laps(laps.number, laps.gap, laps.first_gap, laps.near, older, newer)
 
 
 @recorder.conclude.implements(Belt, BristleBelt)
@@ -690,7 +451,7 @@ def _conclude(scene, record, status, t, place, velocity):
         r.force_max,
         *shock.largest(r.shocks),
     )
-    return tangent.with_exponent(r.tangent, outcome, scene)
+    return tangent.with_exponent(r.tangent, outcome, period, scene)
 
 
 @inlined
@@ -757,29 +518,15 @@ def _settles_to(scene, r, t):
 @inlined
 def _returns_each_time(scene, r):
     """Whether the motion returns each time, and no trend of its states would change it in ten spans."""
-    c, laps = r.cycles, r.cycles.laps
-    if isnan(c.period) or tangent.largest_multiplier(r.tangent) > _UNSTABLE:
-        return False
-    forced = scene.forcing_period < inf
-    if laps.number < (_LAPS if forced else _LAPS_IF_FREE) and laps.gap > _EXACT:
-        return False
-    # The corners are states at the ends of laps, and so is the reference.
-    fast = c.swing * (2.0 * pi) / _pace(scene)
-    change = _gap(laps.older, c.reference.x, c.reference.velocity, c.swing, fast) / (laps.number - laps.older.number)
-    # Laps of many cycles are few: there as many must come as there are cycles.
-    to_come = change * (10.0 * scene.span * max(c.lap, 1.0) / c.period)
-    if laps.gap < _SHRUNK * laps.first_gap:
-        # Gaps that shrink add up to a geometric series. On a torus they vary, but little in a few laps.
-        ratio = (laps.gap / laps.first_gap) ** (1.0 / (laps.number - 1.0))
-        to_come = min(to_come, laps.gap * ratio / (1.0 - ratio)) if ratio < 1.0 else to_come
-    return to_come <= _TREND
+    fast = r.cycles.swing * (2.0 * pi) / _pace(scene)
+    return cycles.returns_each_time(scene, r.cycles, fast, tangent.largest_multiplier(r.tangent))
 
 
 @inlined
 def _without_return(scene, r):
     """What a motion that does not return settles to, as far as two parts of its record and its exponent tell."""
     c = r.cycles
-    first, second = c.middle.count - c.before.count, c.count - c.middle.count
+    first, second = cycles.part_sizes(c)
     if scene.forcing_period == inf or c.before.count < 1.0 or second < 1.0:
         return TRANSIENT
     stiffness = scene.body.stiffness
@@ -789,20 +536,7 @@ def _without_return(scene, r):
     if c.swing > _BEYOND * scale and growth > 0.0:
         slower = (c.swing - c.middle.swing) / second < (1.0 - _SLOWER) * growth
         return TRANSIENT if slower else UNBOUNDED
-    exponent, error = tangent.exponent(r.tangent)
-    mean_1, mean_2 = (c.middle.sum - c.before.sum) / first, (c.sum - c.middle.sum) / second
-    scatter = max((c.middle.squares - c.before.squares) / first - mean_1 * mean_1, 0.0)
-    allowed = _ERRORS * sqrt(scatter * (1.0 / first + 1.0 / second)) + _SAME_SWING * mean_1
-    stick_1 = (c.middle.mark.total - c.before.mark.total) / (c.middle.mark.t - c.before.mark.t)
-    stick_2 = (c.last.total - c.middle.mark.total) / (c.last.t - c.middle.mark.t)
-    same_stick = abs(stick_1 - stick_2) <= _SAME_STICK + 1.0 / sqrt(second)
-    if isnan(exponent) or first < _FEWEST or abs(mean_1 - mean_2) > allowed or not same_stick:
-        return TRANSIENT
-    if exponent > _POSITIVE * error:
-        return CHAOTIC
-    if (abs(exponent) + _POSITIVE * error) * scene.forcing_period <= _ZERO:
-        return QUASI_PERIODIC
-    return TRANSIENT
+    return cycles.without_return(c, scene.forcing_period, tangent.exponent(r.tangent))
 
 
 @recorder.begin.implements(Belt)

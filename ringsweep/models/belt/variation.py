@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import inf
 
 from ringsweep.compile import hook, inlined
-from ringsweep.models.belt import section, tangent
+from ringsweep.models import section, tangent
 from ringsweep.models.belt.bristles import recoil_speed
 from ringsweep.models.belt.force import if_force, sliding_slopes, stuck_gradient, stuck_rates
 from ringsweep.models.belt.record import changed

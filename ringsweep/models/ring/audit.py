@@ -150,9 +150,14 @@ def undecided_on_contacts(batch, rows, second_rows, fall_rates):
     """Which runs are so close to another regime that their error could change it, see :func:`audit.undecided`."""
     # Comparisons with NaN are false.
     with np.errstate(invalid="ignore", over="ignore"):
-        return _is_near_another_regime(
-            batch, Outcome(*rows.T), Outcome(*second_rows.T), fall_rates
-        ) | _is_launched_on_edge(batch)
+        return _is_near_another_regime(batch, _outcome(rows), _outcome(second_rows), fall_rates) | _is_launched_on_edge(
+            batch
+        )
+
+
+def _outcome(rows):
+    """Outcomes by name, without what is asked for beside them."""
+    return Outcome(*rows.T[: len(Outcome._fields)])
 
 
 def _is_launched_on_edge(batch):

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from ringsweep.compile import absorbed, inlined
 from ringsweep.models.interface import constant_step, implicit, modes
+from ringsweep.models.interface.shock import Located
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
 from ringsweep.models.parts import larger_eigenvalue
 from ringsweep.models.ring.contacts import (
@@ -415,13 +416,20 @@ def _guards_and_motion(scene, mode, common, forcing, x):
         min(ahead_1, ahead_2),
         _region_guard(scene, common.under, v, z_1, z_2, sign, mode.region),
     )
-    return guards, (phi, omega, epsilon, forcing[1])
+    return guards, (phi, omega, epsilon, forcing[1], z_1, z_2)
+
+
+@implicit.seen.implements(BristleRing)
+def _seen(scene, view):
+    guards, (phi, omega, epsilon, _, z_1, z_2) = view
+    size = scene.body.gravity / scene.body.radius + omega * omega + abs(epsilon)
+    return phi, omega, guards[NORMAL_1], guards[NORMAL_2], Located(epsilon, size), z_1, z_2
 
 
 @implicit.row.implements(BristleRing)
 def _implicit_row(scene, mode, forcing, x):
     common = implicit.common(scene, mode, forcing, x)
-    guards, (phi, omega, epsilon, ring_omega) = implicit.guards_and_motion(scene, mode, common, forcing, x)
+    guards, (phi, omega, epsilon, ring_omega, _, _) = implicit.guards_and_motion(scene, mode, common, forcing, x)
     zone_1, zone_2 = zones_under(scene, mode)
     state = 0.0 if mode.region == BAND else float(mode.sign)
     return phi, omega, epsilon, guards[NORMAL_1], guards[NORMAL_2], ring_omega, zone_1, zone_2, state, x[2], x[3]

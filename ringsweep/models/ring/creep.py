@@ -135,12 +135,12 @@ def _guards_and_motion(scene, mode, common, forcing, x):
 @implicit.near_zero.implements(ring.Ring, ring.BristleRing)
 def _near_zero(scene, motion):
     b = scene.body
-    _, omega, _, _ = motion
+    omega = motion[1]
     load = 0.05 * b.mass * (b.gravity + b.radius * omega * omega)
     return 0.02 * ring.free_determinant(b), 0.0, load, load, 0.0, 0.0
 
 
-@implicit.seen.implements(ring.Ring, ring.BristleRing)
+@implicit.seen.implements(ring.Ring)
 def _seen(scene, view):
     guards, (phi, omega, epsilon, _) = view
     size = scene.body.gravity / scene.body.radius + omega * omega + abs(epsilon)

@@ -8,18 +8,29 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ringsweep.models.model import Model
+from ringsweep.errors import InputError
+from ringsweep.models import section, tangent
+from ringsweep.models.interface.variation import Exponent
+from ringsweep.models.model import Model, period_of
 from ringsweep.models.parts import GRAVITY, MASS, SPAN, drive_of, friction_coefficients, law_of
-from ringsweep.models.ring import record
+from ringsweep.models.ring import long_run, record
 from ringsweep.models.scene import Structure, Values, require
-from ringsweep.physics import contact, friction, ring, zones
+from ringsweep.physics import contact, drives, friction, ring, zones
 from ringsweep.physics.friction.presliding import steady_deflection
 from ringsweep.quantities.parameters import Parameter, declared
 
 #: Hooks that must be implemented for the type of a body.
 BODY_MEMBERS = ring.DERIVED + contact.BODY_MEMBERS
 
+#: Variables of a point of a section: angle and angular velocity, and under a law with bristles their deflections.
+SECTION = "phi_section", "omega_section", "deflection_1_section", "deflection_2_section"
+
 RADIUS = Parameter("m", "radius of the inner race", lower=0.0, open_lower=True)
+
+
+def _is_recorded(structure: Structure) -> bool:
+    """Whether a run records what its motion settles to."""
+    return structure.exponent or structure.section is not None
 
 
 class SingleContactRing(Model):
@@ -32,9 +43,26 @@ class SingleContactRing(Model):
     driven: ClassVar[tuple[str, ...]] = ("theta",)
     absent: ClassVar[frozenset[str]] = frozenset({"normal_min_2", "normal_max_2", "normal_2", "zone_2", "deflection_2"})
     body: ClassVar[dict[str, Parameter]] = {"body.mass": MASS, "ring.radius": RADIUS}
+    has_exponent: ClassVar[bool] = True
+    sections: ClassVar[tuple[str, ...]] = ("period",)
+    contacts: ClassVar[int] = 1
+    """Number of contacts."""
 
     body_type: ClassVar[type] = ring.OneContact
     """Type of the body; the hooks of :data:`BODY_MEMBERS` are implemented for it."""
+
+    def columns(self, structure: Structure) -> tuple[str, ...]:
+        """Outcomes, and after them what is asked for: words of the long run, exponent and multipliers, the section."""
+        words = long_run.OUTCOMES if _is_recorded(structure) else ()
+        exponent = tangent.OUTCOMES if structure.exponent else ()
+        return (*self.outcomes, *words, *exponent, *self._points(structure))
+
+    def _points(self, structure: Structure) -> tuple[str, ...]:
+        """Names of the columns of the points of the section."""
+        asked = structure.section
+        if asked is None:
+            return ()
+        return tuple(name for name in SECTION[: 2 + self.contacts * asked.deflections] for _ in range(asked.keep))
 
     def takes(self, law: type) -> bool:
         """Laws without a dead band; laws with bristles need ``steady_deflection``."""
@@ -110,7 +138,29 @@ class SingleContactRing(Model):
             initial_omega=values["initial.omega"],
             span=values["time.span"],
             epsilon_omega=values["classify.epsilon_omega"],
+            **(self._recorded(structure, values) if _is_recorded(structure) else {}),
         )
+
+    def _recorded(self, structure: Structure, values: Values) -> dict[str, Any]:
+        """Fields of a cell for what is asked for beyond the outcomes."""
+        drive, cells = drive_of(structure, values), len(values["time.span"])
+        # Zones turn with the ring: its angle must return, not only its velocity.
+        period = drives.force_period(drive) if structure.arcs else drives.period(drive)
+        found: dict[str, Any] = {
+            "forcing_period": period_of(structure, np.broadcast_to(period, cells).copy()),
+            "long_run": long_run.Asked(),
+        }
+        if structure.exponent:
+            if self._has_bristles(structure):
+                problem = (
+                    f"friction law {structure.law} has none on a ring: choose a law without bristles, or leave it out"
+                )
+                raise InputError("record.exponent", problem)
+            found["asked"] = Exponent()
+        if structure.section is not None:
+            sizes = structure.section.keep, len(self._points(structure))
+            found["section"] = section.AtPeriod(*(np.full(cells, size) for size in sizes))
+        return found
 
     def build_body(self, values: Values) -> Any:
         """Bodies of the cells: a ``NamedTuple`` of type :attr:`body_type` with arrays of shape ``(cells,)``."""
@@ -122,6 +172,7 @@ class Ring(SingleContactRing):
 
     name = "ring"
     body_type = ring.TwoContacts
+    contacts = 2
     doc = "a two-contact body in a rotating ring"
     absent = frozenset()
     body: ClassVar[dict[str, Parameter]] = {

@@ -10,6 +10,7 @@ import numpy as np
 from ringsweep.compile import inlined
 from ringsweep.models.interface import recorder, shock
 from ringsweep.models.interface.status import BROKEN, JAM, SEPARATED_1, SEPARATED_2, SEPARATED_BOTH
+from ringsweep.models.ring import long_run
 from ringsweep.numerics.functions import any_of, select
 from ringsweep.physics.ring import BristleRing, Ring
 from ringsweep.quantities.flags import FAILED, JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
@@ -35,6 +36,8 @@ class Record(NamedTuple):
         As in :class:`Outcome`.
     shocks : Shocks or NoShocks
         Jumps of the angular acceleration.
+    long_run : LongRun
+        What the motion settles to; an empty tuple if this is not asked for.
     """
 
     sense: float
@@ -51,6 +54,7 @@ class Record(NamedTuple):
     normal_max_1: float
     normal_max_2: float
     shocks: Any
+    long_run: Any
 
 
 class Outcome(NamedTuple):
@@ -81,10 +85,10 @@ class Outcome(NamedTuple):
 @inlined
 def begin(seen, epsilon_omega):
     """Record at the beginning of a run."""
-    phi, omega, normal_1, normal_2, acceleration = seen
+    phi, omega, normal_1, normal_2, acceleration = seen[0], seen[1], seen[2], seen[3], seen[4]
     sense = 1.0 if omega > epsilon_omega else -1.0 if omega < -epsilon_omega else 0.0
     reactions, shocks = (normal_1, normal_2), shock.begin(acceleration)
-    return Record(sense, 0.0, phi, phi, phi, phi, omega, omega, 0.0, *reactions, *reactions, shocks)
+    return Record(sense, 0.0, phi, phi, phi, phi, omega, omega, 0.0, *reactions, *reactions, shocks, ())
 
 
 @inlined
@@ -94,7 +98,7 @@ def observe(record, shocks, stuck_for, seen, epsilon_omega):
     At a reversal the angular velocity passes from beyond one threshold to beyond the other, so that chatter about zero
     does not count.
     """
-    r, (phi, omega, normal_1, normal_2, _) = record, seen
+    r, phi, omega, normal_1, normal_2 = record, seen[0], seen[1], seen[2], seen[3]
     sense, reversals = r.sense, r.reversals
     lowest, highest, phi_min, phi_max = min(r.lowest, phi), max(r.highest, phi), r.phi_min, r.phi_max
     # Some lane passes a threshold other than the last one.
@@ -120,6 +124,7 @@ def observe(record, shocks, stuck_for, seen, epsilon_omega):
         max(r.normal_max_1, normal_1),
         max(r.normal_max_2, normal_2),
         shocks,
+        r.long_run,
     )
 
 
@@ -172,15 +177,44 @@ def conclude(record, status, t, phi, omega):
     )
 
 
+@inlined
+def changed(r, new_shocks, new_long_run):
+    """Record with other shocks and another long run."""
+    return Record(
+        r.sense,
+        r.reversals,
+        r.lowest,
+        r.highest,
+        r.phi_min,
+        r.phi_max,
+        r.omega_min,
+        r.omega_max,
+        r.stick_time,
+        r.normal_min_1,
+        r.normal_min_2,
+        r.normal_max_1,
+        r.normal_max_2,
+        new_shocks,
+        new_long_run,
+    )
+
+
 @recorder.begin.implements(Ring, BristleRing)
 def _begin(scene, t, seen):
-    return begin(seen, scene.epsilon_omega)
+    begun = begin(seen, scene.epsilon_omega)
+    return changed(begun, begun.shocks, long_run.begin(scene.long_run, scene, t, seen))
+
+
+@recorder.lend.implements(Ring, BristleRing)
+def _lend(scene, record, row):
+    return changed(record, record.shocks, long_run.lent(record.long_run, scene, row))
 
 
 @recorder.observe.implements(Ring, BristleRing)
 def _observe(scene, record, t, duration, stuck, seen):
     shocks = shock.observe(record.shocks, seen[4])
-    return observe(record, shocks, select(stuck, duration, 0.0), seen, scene.epsilon_omega)
+    r = observe(record, shocks, select(stuck, duration, 0.0), seen, scene.epsilon_omega)
+    return changed(r, shocks, long_run.observe(r.long_run, scene, r.stick_time, t, duration, seen))
 
 
 @recorder.enter.implements(Ring, BristleRing)
@@ -190,4 +224,5 @@ def _enter(scene, record, t, seen):
 
 @recorder.conclude.implements(Ring, BristleRing)
 def _conclude(scene, record, status, t, place, velocity):
-    return conclude(record, status, t, place, velocity)
+    outcome = conclude(record, status, t, place, velocity)
+    return long_run.followed(record.long_run, outcome, scene, status)

@@ -18,6 +18,7 @@ from ringsweep.compile import absorbed, hook, inlined
 from ringsweep.models.interface import modes, series
 from ringsweep.models.interface.shock import Located
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
+from ringsweep.models.ring import long_run
 from ringsweep.models.ring.contacts import (
     coefficients_under,
     edges_ahead,
@@ -541,6 +542,11 @@ def _extremes(scene, record, mode, c, h, work):
                 c[SPARE, k] = (k + 1.0) * c[row, k + 1]
             c[SPARE, ORDER] = 0.0
             count = crossings(c[SPARE], h, work, count)
+    # The drive may end its next period.
+    rest = long_run.rest(record.long_run)
+    if 0.0 < rest < h:
+        work[0][count] = rest
+        count += 1
     return count
 
 

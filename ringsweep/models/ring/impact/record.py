@@ -135,6 +135,7 @@ def renamed(base, shift):
         b.normal_max_2,
         b.normal_max_1,
         b.shocks,
+        b.long_run,
     )
 
 

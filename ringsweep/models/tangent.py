@@ -1,4 +1,4 @@
-"""Growth of small disturbances of a motion on the belt: Floquet multipliers of a lap, and the Lyapunov exponent."""
+"""Growth of small disturbances of a motion: Floquet multipliers of a lap, and the Lyapunov exponent."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from ringsweep.compile import hook, inlined, unrolled
 from ringsweep.models.interface.variation import Exponent
 from ringsweep.numerics.collocation import stored, transition
 from ringsweep.physics.belt import Belt, BristleBelt
+from ringsweep.physics.ring import Ring
 
 #: Outcomes of a run whose exponent is asked for, after the others.
 OUTCOMES = "lyapunov", "lyapunov_error", "multiplier_1", "multiplier_2"
@@ -122,7 +123,7 @@ def _scaled(length, vector, factor):
 
 @unrolled
 def _length(length, vector, frequency):
-    """Length of a disturbance, m/s: displacements count times the frequency of the motion."""
+    """Length of a disturbance, m/s; see :func:`frequency`."""
     squares = ("vector[1] * vector[1]" if i == 1 else f"(frequency * vector[{i}]) ** 2" for i in range(length))
     return ["return sqrt(" + " + ".join(squares) + ")"]
 
@@ -202,7 +203,7 @@ def _disturbance(scene):
     """A disturbance with a component along each component of the state."""
 
 
-@_disturbance.implements(Belt)
+@_disturbance.implements(Belt, Ring)
 def _of_two(scene):
     return 1.0, 1.0
 
@@ -218,17 +219,28 @@ def begin(asked, scene, t):
     return ()
 
 
-@inlined
+@hook
+def frequency(scene):
+    """Velocity, m/s, that counts as much in a disturbance as a unit of the place, m or rad."""
+
+
+@frequency.implements(Belt, BristleBelt)
 def _frequency(scene):
     natural = sqrt(abs(scene.body.stiffness) / scene.body.mass)
     found = max(natural, 2.0 * pi / scene.forcing_period)
     return found if found > 0.0 else 1.0
 
 
+@frequency.implements(Ring)
+def _frequency_on_ring(scene):
+    radius = scene.body.radius
+    return radius * max(sqrt(scene.body.gravity / radius), 2.0 * pi / scene.forcing_period)
+
+
 @begin.implements(Exponent)
 def _begin(asked, scene, t):
     vector = _disturbance(scene)
-    vector = _scaled(vector, 1.0 / _length(vector, _frequency(scene)))
+    vector = _scaled(vector, 1.0 / _length(vector, frequency(scene)))
     zero, unit = _scaled(vector, 0.0), Flow(_unit(vector), 0.0)
     blocks = Blocks(-1.0, 0.0, 0.0, t, 0.0, t, 0.0, _SKIPPED * scene.span)
     return Tangent(unit, unit, vector, 0.0, blocks, zero, zero, zero, 1.0, nan, nan, nan, inf)
@@ -295,7 +307,7 @@ def _observe(tangent, scene, before, cycles, t, duration):
     r = tangent
     lap = Flow(_product(r.vector, r.step.matrix, r.lap.matrix), r.lap.log_determinant + r.step.log_determinant)
     vector = _applied(r.vector, r.step.matrix)
-    length = _length(vector, _frequency(scene))
+    length = _length(vector, frequency(scene))
     growth = r.growth + logarithm(length)
     vector = _scaled(vector, 1.0 / length) if length > 0.0 else r.vector
     unit = Flow(_unit(vector), 0.0)
@@ -378,16 +390,16 @@ def _followed(length, outcome, more):
 
 
 @hook(optional=True)
-def with_exponent(tangent, outcome, scene):
-    """Outcome of a run, with exponent, its error and multipliers if they are asked for."""
+def with_exponent(tangent, outcome, period, scene):
+    """Outcome of a run of this period, s, with exponent, its error and multipliers if they are asked for."""
     return outcome
 
 
 @with_exponent.implements(Tangent)
-def _with_exponent(tangent, outcome, scene):
+def _with_exponent(tangent, outcome, period, scene):
     r, multiplier_1, multiplier_2 = tangent, nan, nan
     rate, error = exponent(tangent)
-    if not isnan(outcome.period):
+    if not isnan(period):
         multiplier_1, multiplier_2 = r.multiplier_1, r.multiplier_2
         if scene.forcing_period == inf and not isnan(r.rate):
             # A shift in time neither grows nor decays, and says nothing.

@@ -1,4 +1,4 @@
-"""Sections of the motion on the belt: the last states at each period of the forcing, or at each turn.
+"""Sections of a motion: its last states at each period of the forcing, or at each turn of the displacement.
 
 The points of a run lie in the last columns of its row of outcomes, which are a ring buffer until the run ends.
 """
@@ -8,12 +8,10 @@ from __future__ import annotations
 from math import inf, nan
 from typing import Any, NamedTuple
 
-from ringsweep.compile import hook, inlined
-from ringsweep.models.belt.turn import turn_within
+from ringsweep.compile import hook, inlined, unrolled
+from ringsweep.models import cycles
+from ringsweep.models.turn import turn_within
 from ringsweep.quantities.parameters import Leaf
-
-#: Variables of a point: displacement and velocity, and under a law with bristles their deflection.
-VARIABLES = "x_section", "velocity_section", "deflection_section"
 
 # A maximum counts if the body has moved farther towards it than this share of the range of its displacement.
 _ROUNDING = 1e-6
@@ -30,7 +28,7 @@ class AtPeriod(NamedTuple):
     keep : int
         Number of points that are kept.
     columns : int
-        Number of columns that hold them: `keep` for each variable.
+        Number of columns that hold them: `keep` for the place, for the velocity, and for each deflection that is kept.
     """
 
     keep: Leaf
@@ -53,36 +51,49 @@ class Points(NamedTuple):
         Row of outcomes of the run, whose last columns hold the points. A run that stores no outcomes has no room.
     number : float
         Number of points.
-    deflection : float
-        Deflection at the last observation, m; NaN without bristles.
+    deflections : tuple of float
+        Deflections at the last observation, m; NaN without bristles.
     low : float
         Least displacement since the last maximum, m.
     pending : float
         1 if the body is at rest after a rise: only a fall makes this a maximum. Else 0.
-    x_turn, deflection_turn : float
-        State there, m.
+    x_turn : float
+        Displacement there, m.
+    deflections_turn : tuple of float
+        Deflections there, m.
     """
 
     row: Any
     number: float
-    deflection: float
+    deflections: Any
     low: float
     pending: float
     x_turn: float
-    deflection_turn: float
+    deflections_turn: Any
 
 
 @hook(optional=True)
-def lent(asked, record, row):
-    """Points at the beginning of a run; an empty tuple if no section is asked for."""
+def lent(asked, record, row, deflections):
+    """Points at the beginning of a run; an empty tuple if no section is asked for.
+
+    Parameters
+    ----------
+    asked : AtPeriod or AtTurn
+    record : NamedTuple
+        With the last observation, ``last``, and with ``cycles``.
+    row : ndarray
+        Row of outcomes of the run.
+    deflections : tuple of float
+        NaN for each deflection, or one NaN without bristles.
+    """
     return ()
 
 
 @lent.implements(AtPeriod, AtTurn)
-def _lent(asked, record, row):
+def _lent(asked, record, row, deflections):
     for k in range(max(len(row) - asked.columns, 0), len(row)):
         row[k] = nan
-    return Points(row, 0.0, nan, record.last.x, 0.0, nan, nan)
+    return Points(row, 0.0, deflections, record.last.x, 0.0, nan, deflections)
 
 
 @hook(optional=True)
@@ -97,69 +108,78 @@ def _end_of_period(asked, record):
 
 
 @hook(absorb=True, optional=True)
-def observe(asked, scene, r, cycles, t, duration, x, velocity, deflection):
+def observe(asked, scene, r, now, t, duration, x, velocity, deflections):
     """Points after an observation.
 
     Parameters
     ----------
     asked : AtPeriod or AtTurn
     scene, r : NamedTuple
-        One cell, and its record before the observation.
-    cycles : Cycles
+        One cell, and its record before the observation, as in :func:`lent`.
+    now : Cycles
         Cycles after it.
     t, duration : float
         Time, and length of the interval, s.
-    x, velocity, deflection : float
-        State at `t`, m and m/s.
+    x, velocity : float
+        Place and velocity at `t`, m and m/s, or rad and rad/s.
+    deflections : tuple of float
+        Those at `t`, m.
     """
     return ()
 
 
 @observe.implements(AtPeriod)
-def _at_period(asked, scene, r, cycles, t, duration, x, velocity, deflection):
-    p, mark = r.section, cycles.last
+def _at_period(asked, scene, r, now, t, duration, x, velocity, deflections):
+    p, mark = r.section, now.last
     count = p.number
-    if scene.forcing_period < inf and cycles.count != r.cycles.count:
+    if scene.forcing_period < inf and now.count != r.cycles.count:
         late = (t - mark.t) / duration if duration > 0.0 else 0.0
-        _store(asked, p, mark.x, mark.velocity, _earlier(p, deflection, late))
+        x = cycles.difference(scene, mark.x, 0.0)
+        _store(_earlier(deflections, p.deflections, late), asked, p, x, mark.velocity)
         count += 1.0
-    return Points(p.row, count, deflection, p.low, 0.0, nan, nan)
+    return Points(p.row, count, deflections, p.low, 0.0, nan, p.deflections_turn)
 
 
 @observe.implements(AtTurn)
-def _at_turn(asked, scene, r, cycles, t, duration, x, velocity, deflection):
+def _at_turn(asked, scene, r, now, t, duration, x, velocity, deflections):
     p, before = r.section, r.last.velocity
-    count, pending, x_turn, deflection_turn = p.number, p.pending, p.x_turn, p.deflection_turn
+    count, pending, x_turn, deflections_turn = p.number, p.pending, p.x_turn, p.deflections_turn
     low = min(p.low, r.last.x)
     if before > 0.0 and velocity <= 0.0:
         turn = turn_within(r.last, t, duration, x, velocity)
         late = (t - turn.t) / duration if duration > 0.0 else 0.0
-        pending, x_turn, deflection_turn = 1.0, turn.x, _earlier(p, deflection, late)
+        pending, x_turn, deflections_turn = 1.0, turn.x, _earlier(deflections, p.deflections, late)
     if velocity > 0.0:
         pending = 0.0
     elif velocity < 0.0 and pending > 0.0:
         pending = 0.0
         if x_turn - low > max(r.play, _ROUNDING * (r.x_max - r.x_min)):
-            _store(asked, p, x_turn, 0.0, deflection_turn)
+            _store(deflections_turn, asked, p, x_turn, 0.0)
             count, low = count + 1.0, x_turn
-    return Points(p.row, count, deflection, low, pending, x_turn, deflection_turn)
+    return Points(p.row, count, deflections, low, pending, x_turn, deflections_turn)
 
 
-@inlined
-def _earlier(p, deflection, share):
-    """Deflection a share of the interval before its end, and not before its beginning."""
-    return deflection if share <= 0.0 else deflection + min(share, 1.0) * (p.deflection - deflection)
+@unrolled
+def _earlier(length, deflections, before, share):
+    """Deflections a share of an interval before its end, and not before its beginning, where they are `before`."""
+    mixed = "".join(f"deflections[{k}] + part * (before[{k}] - deflections[{k}]), " for k in range(length))
+    return ["if share <= 0.0:", "    return deflections", "part = min(share, 1.0)", f"return {mixed}"]
 
 
-@inlined
-def _store(asked, p, x, velocity, deflection):
-    first = len(p.row) - asked.columns
-    if first >= 0:
-        k = first + int(p.number) % asked.keep
-        p.row[k] = x
-        p.row[k + asked.keep] = velocity
-        if asked.columns > 2 * asked.keep:
-            p.row[k + 2 * asked.keep] = deflection
+@unrolled
+def _store(length, deflections, asked, p, x, velocity):
+    """Store a point as the one of the number ``p.number``."""
+    lines = [
+        "first, keep = len(p.row) - asked.columns, asked.keep",
+        "if first < 0:",
+        "    return",
+        "k = first + int(p.number) % keep",
+        "p.row[k] = x",
+        "p.row[k + keep] = velocity",
+    ]
+    for j in range(2, 2 + length):
+        lines += [f"if asked.columns > {j} * keep:", f"    p.row[k + {j} * keep] = deflections[{j - 2}]"]
+    return lines
 
 
 @hook(optional=True)
@@ -173,7 +193,7 @@ def _finish_at_period(asked, scene, record):
     count = p.number
     if record.cycles.next < inf and record.cycles.next - last.t <= _SAME * last.t:
         # But for rounding, the run ends with a period.
-        _store(asked, p, last.x, last.velocity, p.deflection)
+        _store(p.deflections, asked, p, cycles.difference(scene, last.x, 0.0), last.velocity)
         count += 1.0
     _order(asked, p.row, count)
 

@@ -1,0 +1,213 @@
+"""What a motion on a ring with a periodic drive settles to: its cycles, its section, and its small disturbances.
+
+A *cycle* is a period of the drive. States that differ by full turns of the body are the same.
+"""
+
+from __future__ import annotations
+
+from math import floor, inf, nan, pi, sqrt
+from typing import Any, NamedTuple
+
+from ringsweep.compile import absorbed, hook, inlined
+from ringsweep.models import cycles, section, tangent
+from ringsweep.models.cycles import Cycles, Mark
+from ringsweep.models.interface import variation
+from ringsweep.models.interface.status import COMPLETE
+from ringsweep.models.turn import between
+from ringsweep.numerics.terms import joined
+from ringsweep.physics.ring import BristleRing, Ring
+from ringsweep.quantities.flags import PERIODIC, TRANSIENT, UNBOUNDED
+
+#: Outcomes of a run whose long run is asked for, after the others.
+OUTCOMES = "period", "settled", "long_run"
+
+
+class Asked(NamedTuple):
+    """What a scene asks for: what its motion settles to."""
+
+
+class Last(NamedTuple):
+    """The last observation: time, s, angle of the body, rad, and angular velocity, rad/s."""
+
+    t: float
+    x: float
+    velocity: float
+
+
+class LongRun(NamedTuple):
+    """Cycles up to now, and what is asked for beside them.
+
+    Attributes
+    ----------
+    last : Last
+    low, high : float
+        Least and greatest angle since the end of the last cycle, rad.
+    cycles : Cycles
+    tangent : Tangent
+        Growth of small disturbances; an empty tuple if no exponent is asked for.
+    section : Points
+        Points of the section; an empty tuple if none is asked for.
+    """
+
+    last: Last
+    low: float
+    high: float
+    cycles: Cycles
+    tangent: Any
+    section: Any
+
+
+@cycles.difference.implements(Ring, BristleRing)
+def _without_full_turns(scene, x, other):
+    apart = x - other
+    return apart - 2.0 * pi * floor(apart / (2.0 * pi) + 0.5)
+
+
+@hook(optional=True)
+def begin(asked, scene, t, seen):
+    """Long run at the beginning of a run; an empty tuple if it is not asked for."""
+    return ()
+
+
+@begin.implements(Asked)
+def _begin(asked, scene, t, seen):
+    phi, omega = seen[0], seen[1]
+    started = cycles.begin(scene.forcing_period, Mark(t, phi, omega, 0.0, 0.0))
+    return LongRun(Last(t, phi, omega), phi, phi, started, tangent.begin(scene.asked, scene, t), ())
+
+
+@hook(optional=True)
+def lent(long_run, scene, row):
+    """Long run whose points lie in a row of outcomes."""
+    return long_run
+
+
+@lent.implements(LongRun)
+def _lent(long_run, scene, row):
+    r = long_run
+    points = section.lent(scene.section, r, row, _no_deflections(scene))
+    return LongRun(r.last, r.low, r.high, r.cycles, r.tangent, points)
+
+
+@hook
+def _no_deflections(scene):
+    """NaN for each deflection of bristles; one NaN without bristles."""
+
+
+@_no_deflections.implements(Ring)
+def _none(scene):
+    return (nan,)
+
+
+@_no_deflections.implements(BristleRing)
+def _none_of_two(scene):
+    return nan, nan
+
+
+@hook
+def _deflections(scene, seen):
+    """Deflections of the bristles as the recorder takes them, m; one NaN without bristles."""
+
+
+@_deflections.implements(Ring)
+def _no_bristles(scene, seen):
+    return (nan,)
+
+
+@_deflections.implements(BristleRing)
+def _of_both_contacts(scene, seen):
+    return seen[5], seen[6]
+
+
+@hook(optional=True)
+def due(long_run):
+    """Time that a step must show the record, s; infinite if there is none."""
+    return inf
+
+
+@due.implements(LongRun)
+def _end_of_cycle(long_run):
+    return long_run.cycles.next
+
+
+@hook(optional=True)
+def rest(long_run):
+    """Time from the last observation to :func:`due`, s; infinite if there is none."""
+    return inf
+
+
+@rest.implements(LongRun)
+def _rest_of_cycle(long_run):
+    return long_run.cycles.next - long_run.last.t
+
+
+@hook(absorb=True, optional=True)
+def observe(long_run, scene, stick_time, t, duration, seen):
+    """Long run after an observation; `stick_time` is the time for which the body has stuck up to `t`, s."""
+    return long_run
+
+
+@observe.implements(LongRun)
+def _observe(long_run, scene, stick_time, t, duration, seen):
+    r, c = long_run, long_run.cycles
+    phi, omega = seen[0], seen[1]
+    low, high, now = min(r.low, phi), max(r.high, phi), c
+    if t >= c.next:
+        period = scene.forcing_period
+        count = max(c.count + 1.0, floor(t / period))
+        share = 1.0 - (t - count * period) / duration if duration > 0.0 else 1.0
+        share = min(max(share, 0.0), 1.0)
+        velocity = (1.0 - share) * r.last.velocity + share * omega
+        mark = Mark(count * period, between(r.last, duration, phi, omega, share), velocity, stick_time, 0.0)
+        fast = (high - low) * (2.0 * pi) / _pace(scene)
+        now = cycles.closed(scene, c, mark, count, True, (count + 1.0) * period, high - low, fast)
+        low = high = mark.x
+    return LongRun(
+        Last(t, phi, omega),
+        low,
+        high,
+        now,
+        tangent.observe(r.tangent, scene, c, now, t, duration),
+        section.observe(scene.section, scene, r, now, t, duration, phi, omega, _deflections(scene, seen)),
+    )
+
+
+@absorbed
+def _pace(scene):
+    """Period of a small swing without friction or period of the drive, whichever is shorter, s."""
+    natural = 2.0 * pi * sqrt(scene.body.radius / scene.body.gravity) if scene.body.gravity > 0.0 else inf
+    return min(natural, scene.forcing_period)
+
+
+@inlined
+def with_tangent(long_run, new):
+    """Long run with another tangent."""
+    r = long_run
+    return LongRun(r.last, r.low, r.high, r.cycles, new, r.section)
+
+
+@hook(optional=True)
+def followed(long_run, outcome, scene, status):
+    """Outcome of a run that ended with `status`, with what its motion settles to if this is asked for."""
+    return outcome
+
+
+@followed.implements(LongRun)
+def _followed(long_run, outcome, scene, status):
+    r, c = long_run, long_run.cycles
+    section.finish(scene.section, scene, r)
+    fast = c.swing * (2.0 * pi) / _pace(scene)
+    word, period = TRANSIENT, nan
+    if status == COMPLETE:
+        first, second = cycles.part_sizes(c)
+        if cycles.returns_each_time(scene, c, fast, tangent.largest_multiplier(r.tangent)):
+            word, period = PERIODIC, c.period
+        elif c.before.count >= 1.0 and first >= 1.0 and second >= 1.0:
+            word = cycles.without_return(c, scene.forcing_period, tangent.exponent(r.tangent))
+    settled = 0.0 if word in (TRANSIENT, UNBOUNDED) else 1.0
+    return tangent.with_exponent(r.tangent, joined(outcome, (period, settled, float(word))), period, scene)
+
+
+@variation.due.implements(Ring, BristleRing)
+def _due(scene, record):
+    return due(record.long_run)

@@ -1,0 +1,107 @@
+"""The variational equation on the ring: Jacobians of the modes, and gradients of the guards at events."""
+
+from __future__ import annotations
+
+from math import cos, sin
+
+from ringsweep.compile import hook, inlined
+from ringsweep.models import tangent
+from ringsweep.models.interface import implicit, variation
+from ringsweep.models.ring.contacts import coefficients_under
+from ringsweep.models.ring.long_run import with_tangent
+from ringsweep.models.ring.record import changed
+from ringsweep.models.ring.series import EDGE
+from ringsweep.physics import contact, drives
+from ringsweep.physics.friction.velocity import stiction_band
+from ringsweep.physics.ring import Ring
+
+# Differences for the gradient of the reserve of friction: of the angle, rad, and as a share of the size of the rates.
+_SMALL = 1e-5
+
+
+@variation.asked.implements(Ring)
+def _asked(scene):
+    return scene.asked
+
+
+@inlined
+def _with(record, new):
+    """Record with another tangent."""
+    return changed(record, record.shocks, with_tangent(record.long_run, new))
+
+
+@variation.enter.implements(Ring)
+def _enter(scene, record, mode, rates):
+    # A body that comes to rest on the ring keeps no disturbance of the sliding velocity.
+    keeps = 0.0 if mode.sign == 0 and stiction_band(scene.law) == 0.0 else 1.0
+    return _with(record, tangent.enter(record.long_run.tangent, keeps, rates))
+
+
+@variation.advance.implements(Ring)
+def _advance(scene, record, h, rates, weights, work):
+    return _with(record, tangent.advance(record.long_run.tangent, h, rates, weights, work))
+
+
+@variation.switched.implements(Ring)
+def _switched(scene, record, mode, guard, t, y):
+    return _switched_if_asked(scene.asked, scene, record, mode, guard, t, y)
+
+
+@hook(optional=True)
+def _switched_if_asked(asked, scene, record, mode, guard, t, y):
+    return record
+
+
+@_switched_if_asked.implements(variation.Exponent)
+def _gradient_at_event(asked, scene, record, mode, guard, t, y):
+    before = record.long_run.tangent
+    return _with(record, tangent.switched(before, _gradient(scene, mode, guard, t, y, before.rates)))
+
+
+@variation.jacobian.implements(Ring)
+def _jacobian(scene, mode, t, y):
+    if mode.sign == 0:
+        return 0.0, 1.0 / scene.body.radius, 0.0, 0.0
+    forcing = drives.turn(scene.drive, t)
+    x = implicit.to_implicit(scene, forcing, y)
+    _, by_state, _, _ = implicit.linearise(scene, mode, implicit.common(scene, mode, forcing, x), t, forcing, x)
+    return by_state
+
+
+@inlined
+def _gradient(scene, mode, guard, t, y, rates):
+    """Gradient of a guard by the state over the rate of the guard, in the mode that ends."""
+    if mode.sign == 0:
+        return _gradient_of_reserve(scene, mode, t, y[0])
+    if guard == EDGE:
+        # The edge moves with the ring: the contact nears it at the sliding velocity.
+        return scene.body.radius / y[1] if y[1] != 0.0 else 0.0, 0.0
+    return 0.0, 1.0 / rates[1] if rates[1] != 0.0 else 0.0
+
+
+@inlined
+def _gradient_of_reserve(scene, mode, t, phi):
+    """Gradient of the reserve of friction, whose zero ends stick, over its rate."""
+    _, omega, epsilon = drives.turn(scene.drive, t)
+    slow = (scene.body.gravity / scene.body.radius) ** 0.5 + abs(omega)
+    step, step_omega, step_epsilon = _SMALL, _SMALL * slow, _SMALL * (slow * slow + abs(epsilon))
+    by_phi = (_reserve(scene, mode, phi + step, omega, epsilon) - _reserve(scene, mode, phi - step, omega, epsilon)) / (
+        2.0 * step
+    )
+    by_omega = (
+        _reserve(scene, mode, phi, omega + step_omega, epsilon)
+        - _reserve(scene, mode, phi, omega - step_omega, epsilon)
+    ) / (2.0 * step_omega)
+    by_epsilon = (
+        _reserve(scene, mode, phi, omega, epsilon + step_epsilon)
+        - _reserve(scene, mode, phi, omega, epsilon - step_epsilon)
+    ) / (2.0 * step_epsilon)
+    rate = by_phi * omega + by_omega * epsilon + by_epsilon * drives.jerk(scene.drive, t)
+    return by_phi / rate if rate != 0.0 else 0.0, 0.0
+
+
+@inlined
+def _reserve(scene, mode, phi, omega, epsilon):
+    mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
+    _, reserve, _, _ = contact.stick(scene.body, mu_s1, mu_s2, sin(phi), cos(phi), omega, epsilon)
+    return reserve

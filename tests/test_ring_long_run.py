@@ -1,0 +1,127 @@
+"""What a rocking ring settles to: sections at each period of the drive, words, exponents and multipliers."""
+
+from copy import deepcopy
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import ringsweep
+
+GRAVITY, RADIUS = 9.81, 0.1
+
+#: A small body that slips both ways on a ring with a rough zone, sticks for a part of each period, and crosses edges.
+ROCKING = {
+    "model": "ring-single-contact",
+    "body": {"mass": 0.2},
+    "ring": {"radius": RADIUS},
+    "friction": {"law": "stiction", "rest": {"mu_s": 0.3, "mu_k": 0.2}, "rough": {"mu_s": 0.8, "mu_k": 0.6}},
+    "zone": {"half_angle": 0.3},
+    "drive": {"law": "sinusoidal", "amplitude": 1.0, "frequency": 1.0},
+    "initial": {"phi": 0.4, "omega": 0.0},
+    "time": {"span": 40.0},
+}
+
+#: Two balls on a rod, on a ring that rocks.
+RIG = {
+    "model": "ring",
+    "body": {"mass": 0.076, "inertia": 4.47e-5, "half_distance": 0.025, "ball_radius": 0.01},
+    "ring": {"radius": 0.043378},
+    "friction": {"law": "stiction", "rest": {"mu_s": 0.2, "mu_k": 0.1}, "rough": {"mu_s": 0.5, "mu_k": 0.3}},
+    "zone": {"half_angle": 0.26},
+    "drive": {"law": "sinusoidal", "amplitude": 0.6, "frequency": 1.3},
+    "initial": {"phi": 0.3, "omega": 0.0},
+    "time": {"span": 60.0 / 1.3},
+}
+
+
+def run(scene, record=None, **sections):
+    record = {"section": {"at": "period", "keep": 8}, "exponent": True} if record is None else record
+    return ringsweep.run(deepcopy({"scene": scene, "record": record, **sections}), jobs=1, progress=False)
+
+
+def word(found, name="long_run"):
+    return ringsweep.words(found[name]).item()
+
+
+class Reference:
+    """One contact on a rocking ring with a zone, by SciPy from event to event; the state is (phi, omega)."""
+
+    def __init__(self, amplitude, frequency, half_angle=0.0, rest=(0.3, 0.2), rough=(0.8, 0.6)):
+        self.amplitude, self.rate, self.half_angle = amplitude, 2.0 * np.pi * frequency, half_angle
+        self.rest, self.rough = rest, rough
+
+    def ring(self, t):
+        w, a = self.rate, self.amplitude
+        return a * np.sin(w * t), a * w * np.cos(w * t), -a * w * w * np.sin(w * t)
+
+    def load(self, t, phi):
+        """Normal reaction and the friction that stick needs, per unit of mass."""
+        _, omega, epsilon = self.ring(t)
+        return GRAVITY * np.cos(phi) + RADIUS * omega**2, RADIUS * epsilon + GRAVITY * np.sin(phi)
+
+    def after(self, t, end, state, sign, inside):
+        """State at `end`, sign of slip and whether the contact is on the zone; they begin with those at `t`."""
+        phi, omega = state
+        while end - t > 1e-13:
+            mu_s, mu_k = self.rough if inside else self.rest
+            if sign == 0:
+                rho = phi - self.ring(t)[0]
+
+                def lets_go(t, y, rho=rho, mu_s=mu_s):
+                    normal, needed = self.load(t, rho + self.ring(t)[0])
+                    return mu_s * normal - abs(needed)
+
+                lets_go.terminal, lets_go.direction = True, -1
+                part = solve_ivp(lambda t, y: [1.0], (t, end), [0.0], events=lets_go, max_step=2e-3, rtol=1e-12)
+                t = part.t[-1]
+                theta, omega, _ = self.ring(t)
+                phi = rho + theta
+                if part.status == 1:
+                    # The body falls back against the friction that held it.
+                    sign = -int(np.sign(self.load(t, phi)[1]))
+                continue
+
+            def rates(t, y, sign=sign, mu_k=mu_k):
+                normal = GRAVITY * np.cos(y[0]) + RADIUS * y[1] ** 2
+                return [y[1], (-GRAVITY * np.sin(y[0]) - sign * mu_k * normal) / RADIUS]
+
+            def stops(t, y, sign=sign):
+                return sign * (y[1] - self.ring(t)[1])
+
+            def crosses(t, y, inside=inside):
+                apart = abs((y[0] - self.ring(t)[0] + np.pi) % (2.0 * np.pi) - np.pi)
+                return (self.half_angle - apart) * (1.0 if inside else -1.0)
+
+            for event in (stops, crosses):
+                event.terminal, event.direction = True, -1
+            events = (stops, crosses) if self.half_angle else (stops,)
+            part = solve_ivp(
+                rates, (t, end), [phi, omega], "DOP853", events=events, max_step=5e-3, rtol=1e-12, atol=1e-13
+            )
+            t, (phi, omega) = part.t[-1], part.y[:, -1]
+            if part.status == 1 and len(part.t_events[0]):
+                omega = self.ring(t)[1]
+                normal, needed = self.load(t, phi)
+                sign = 0 if abs(needed) <= mu_s * normal else -int(np.sign(needed))
+            elif part.status == 1:
+                inside = not inside
+        return np.array([phi, omega]), sign, inside
+
+    def begin(self, phi):
+        """A body that starts at rest on a ring that moves forwards slips backwards."""
+        return np.array([phi, 0.0]), -1, abs(phi) < self.half_angle
+
+
+def test_points_of_one_contact_are_those_of_an_independent_integration():
+    found = run(ROCKING | {"time": {"span": 12.0}}, {"section": {"at": "period", "keep": 12}})
+    reference = Reference(1.0, 1.0, 0.3)
+    state = reference.begin(0.4)
+    expected = []
+    for k in range(12):
+        state = reference.after(k, k + 1.0, *state)
+        expected.append(state[0])
+    expected = np.array(expected).T
+    assert 0.1 < found.stick_time.item() < 11.0
+    np.testing.assert_allclose(found.phi_section, (expected[0] + np.pi) % (2.0 * np.pi) - np.pi, atol=1e-8)
+    np.testing.assert_allclose(found.omega_section, expected[1], atol=1e-7)
