@@ -125,3 +125,69 @@ def test_points_of_one_contact_are_those_of_an_independent_integration():
     assert 0.1 < found.stick_time.item() < 11.0
     np.testing.assert_allclose(found.phi_section, (expected[0] + np.pi) % (2.0 * np.pi) - np.pi, atol=1e-8)
     np.testing.assert_allclose(found.omega_section, expected[1], atol=1e-7)
+
+
+@pytest.mark.parametrize("rtol", [1e-10, 1e-12, 1e-14])
+@pytest.mark.parametrize(("amplitude", "sticks"), [(1.0, True), (2.0, False)])
+def test_multipliers_are_those_of_the_period_map(amplitude, sticks, rtol):
+    """With stops, reversals and edges; stick erases one of two disturbances."""
+    drive = {"law": "sinusoidal", "amplitude": amplitude, "frequency": 1.0}
+    found = run(ROCKING | {"drive": drive}, solver={"method": "event", "rtol": rtol})
+    assert word(found) == "periodic"
+    assert found.period.item() == pytest.approx(1.0, rel=1e-12)
+    assert (found.stick_time.item() > 1.0) == sticks
+    reference = Reference(amplitude, 1.0, 0.3)
+    state, sign, inside = reference.after(0.0, 40.0, *reference.begin(0.4))
+    columns = []
+    for d in 1e-6 * np.eye(2):
+        one, other = (reference.after(0.0, 1.0, state + way * d, sign, inside)[0] for way in (1.0, -1.0))
+        columns.append((one - other) / 2e-6)
+    values = np.sort(np.abs(np.linalg.eigvals(np.transpose(columns))))
+    assert found.multiplier_1.item() == pytest.approx(values[1], rel=1e-6)
+    assert found.multiplier_2.item() == pytest.approx(values[0], rel=1e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize("law", ["stiction", "bengisu-akay"])
+def test_exponents_are_those_of_two_neighbouring_runs(law):
+    """Pairs of runs of two balls on a rod, brought together again after each period, in random cells."""
+    cells, periods, distance = 24, 60, 1e-7
+    rng = np.random.default_rng(30)
+    frequency = rng.uniform(0.8, 2.0, cells)
+    mu_k, rough = rng.uniform(0.03, 0.15, cells), rng.uniform(0.15, 0.4, cells)
+    steep = {} if law == "stiction" else {"alpha": 5.0, "v0": 0.01}
+    points = {
+        "drive.frequency": frequency,
+        "drive.amplitude": rng.uniform(0.2, 0.7, cells) / frequency,
+        "friction.rest.mu_k": mu_k,
+        "friction.rest.mu_s": 1.5 * mu_k,
+        "friction.rough.mu_k": rough,
+        "friction.rough.mu_s": 1.3 * rough,
+        "zone.half_angle": rng.uniform(0.1, 0.6, cells),
+        "initial.phi": rng.uniform(-0.5, 0.5, cells),
+        "initial.omega": rng.uniform(-1.0, 1.0, cells),
+    }
+    scene = RIG | {"friction": {"law": law} | steep, "zone": {}}
+    scene["drive"] = {"law": "sinusoidal"}
+
+    def ends(points, record):
+        sweep = {"points": {path: np.asarray(column).tolist() for path, column in points.items()}}
+        return run(scene, record, sweep=sweep, solver={"method": "auto", "certify": False})
+
+    found = ends(points | {"time.span": periods / frequency}, {"exponent": True})
+    both = {path: np.tile(column, 2) for path, column in points.items()} | {"time.span": np.tile(1.0 / frequency, 2)}
+    state = np.array([points["initial.phi"], points["initial.omega"]])
+    apart, growth = np.full((2, cells), distance), np.zeros((periods, cells))
+    for k in range(periods):
+        both["initial.phi"], both["initial.omega"] = np.hstack([state, state + apart])
+        last = ends(both, {})
+        last = np.array([last.phi_end.values, last.omega_end.values])
+        state, apart = last[:, :cells], last[:, cells:] - last[:, :cells]
+        length = np.hypot(apart[0] * np.maximum(2.0 * np.pi * frequency, np.sqrt(GRAVITY / 0.043378)), apart[1])
+        growth[k], apart = np.log(length / distance), apart / length * distance
+    kept = np.isfinite(found.lyapunov.values)
+    used = growth[periods // 4 :, kept]
+    error = np.hypot(used.std(axis=0) / np.sqrt(len(used)), (found.lyapunov_error.values / frequency)[kept])
+    difference = np.abs((found.lyapunov.values / frequency)[kept] - used.mean(axis=0))
+    assert (np.abs(used.mean(axis=0)) > 0.1).sum() >= 5
+    assert kept.sum() >= 18
+    assert (difference <= 3.0 * error + 0.02).all()

@@ -18,7 +18,10 @@ KEEP = Parameter("1", "number of points, the last of a run", lower=1, upper=1638
 PERIOD = Parameter("s", "time between two points, if neither force nor drive has a period", lower=0.0, open_lower=True)
 
 #: Instants of the points of a section, and what they are.
-INSTANTS = {"period": "the end of each period of force or drive", "turn": "each maximum of the displacement (belt only)"}
+INSTANTS = {
+    "period": "the end of each period of force or drive",
+    "turn": "each maximum of the displacement (belt only)",
+}
 
 
 def read_record(given: Any, model: str) -> tuple[bool, Section | None]:

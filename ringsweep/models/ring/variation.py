@@ -63,7 +63,9 @@ def _jacobian(scene, mode, t, y):
     if mode.sign == 0:
         return 0.0, 1.0 / scene.body.radius, 0.0, 0.0
     forcing = drives.turn(scene.drive, t)
-    x = implicit.to_implicit(scene, forcing, y)
+    # At the end of slip the velocity is zero but for rounding, which must not turn friction round.
+    v = mode.sign * max(mode.sign * y[1], 1e-300)
+    x = implicit.to_implicit(scene, forcing, (y[0], v))
     _, by_state, _, _ = implicit.linearise(scene, mode, implicit.common(scene, mode, forcing, x), t, forcing, x)
     return by_state
 
