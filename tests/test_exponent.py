@@ -252,19 +252,6 @@ def test_the_record_changes_no_other_outcome():
             {"scene": FORCED | {"time": {"span": 1.0}, "friction": {"law": "bristle", "mu_k": 0.3, "sigma0": 100.0}}},
             "record.exponent: friction law bristle has none",
         ),
-        (
-            {
-                "scene": {
-                    "model": "ring-single-contact",
-                    "ring": {"radius": 0.1},
-                    "body": {"mass": 1.0},
-                    "friction": {"law": "coulomb", "mu_k": 0.2},
-                    "drive": {"law": "sinusoidal", "amplitude": 1.0, "frequency": "1 Hz"},
-                    "time": {"span": 1.0},
-                }
-            },
-            "record.exponent: model ring-single-contact has none",
-        ),
     ],
 )
 def test_what_has_no_exponent_is_refused(change, said):

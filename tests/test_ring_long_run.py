@@ -2,11 +2,14 @@
 
 from copy import deepcopy
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.integrate import solve_ivp
 
 import ringsweep
+from ringsweep import cli
 
 GRAVITY, RADIUS = 9.81, 0.1
 
@@ -33,6 +36,8 @@ RIG = {
     "initial": {"phi": 0.3, "omega": 0.0},
     "time": {"span": 60.0 / 1.3},
 }
+
+LUGRE = {"law": "lugre", "sigma0": 2000.0, "sigma1": 5.0, "sigma2": 0.0, "v_s": 0.01}
 
 
 def run(scene, record=None, **sections):
@@ -191,3 +196,146 @@ def test_exponents_are_those_of_two_neighbouring_runs(law):
     assert (np.abs(used.mean(axis=0)) > 0.1).sum() >= 5
     assert kept.sum() >= 18
     assert (difference <= 3.0 * error + 0.02).all()
+
+
+@pytest.mark.parametrize("law", ["lugre", "bengisu-akay"])
+def test_points_of_laws_that_creep_are_states_at_whole_periods(law):
+    """Each point is the end of a run over so many periods, and bristles bring both deflections."""
+    parts = {
+        "lugre": {"sigma0": 2000.0, "sigma1": 5.0, "sigma2": 0.0, "v_s": 0.01},
+        "bengisu-akay": {"alpha": 50.0, "v0": 1e-3},
+    }
+    scene = RIG | {"friction": RIG["friction"] | {"law": law} | parts[law], "time": {"span": 2.0 / 1.3}}
+    found = run(scene, {"section": {"at": "period", "keep": 2}})
+    histories = ringsweep.simulate(scene, samples=600).drop_duplicates("time")
+    for k, point in enumerate((1.0, 2.0)):
+        names = {"phi": "phi_section", "omega": "omega_section"}
+        if law == "lugre":
+            names |= {"deflection_1": "deflection_1_section", "deflection_2": "deflection_2_section"}
+        for name, points in names.items():
+            at = np.interp(point / 1.3, histories.time, histories[name])
+            scale = float(np.abs(histories[name]).max())
+            assert found[points].values[k] == pytest.approx(at, abs=2e-3 * scale)
+    assert found.phi_section.values[-1] == pytest.approx(found.phi_end.item(), abs=1e-12)
+    assert ("deflection_1_section" in found) == (law == "lugre")
+
+
+def table(periods):
+    """The drive of RIG over some periods, as a table."""
+    time = np.linspace(0.0, periods / 1.3, 200 * periods + 1)
+    return {"law": "table", "time": time.tolist(), "theta": (0.6 * np.sin(2.0 * np.pi * 1.3 * time)).tolist()}
+
+
+def test_a_measured_drive_takes_the_period_that_is_stated():
+    asked = {"section": {"at": "period", "keep": 6, "period": 1.0 / 1.3}, "exponent": True}
+    found, exact = run(RIG | {"drive": table(60)}, asked), run(RIG)
+    assert word(found) == word(exact) == "periodic"
+    np.testing.assert_allclose(found.phi_section, exact.phi_section[-6:], atol=1e-5)
+    assert found.multiplier_1.item() == pytest.approx(exact.multiplier_1.item(), abs=1e-6)
+
+
+def test_the_record_changes_no_other_outcome():
+    plain, asked = run(RIG, {}), run(RIG)
+    added = set(asked.data_vars) - set(plain.data_vars)
+    assert {"phi_section", "omega_section", "lyapunov", "long_run", "settled", "period"} <= added
+    same = [name for name in plain.data_vars if name not in ("steps", "uncertified_because")]
+    for name in same:
+        if not name.endswith("_error"):
+            assert plain[name].item() == pytest.approx(asked[name].item(), rel=1e-9, nan_ok=True)
+
+
+def test_words_do_not_change_with_the_span():
+    """A body that rocks, one that a ring turns round, one that sticks for good, at 60, 120 and 300 periods."""
+    cells = 20
+    rng = np.random.default_rng(3)
+    frequency = np.tile(rng.uniform(0.7, 2.0, cells), 3)
+    points = {
+        "drive.frequency": frequency,
+        "drive.amplitude": np.tile(rng.uniform(0.2, 0.8, cells), 3) / frequency,
+        "zone.half_angle": np.tile(rng.uniform(0.1, 0.6, cells), 3),
+        "initial.phi": np.tile(rng.uniform(-0.6, 0.6, cells), 3),
+        "time.span": np.repeat([60.0, 120.0, 300.0], cells) / frequency,
+    }
+    sweep = {"points": {path: column.tolist() for path, column in points.items()}}
+    scene = RIG | {"drive": {"law": "sinusoidal"}, "zone": {}}
+    found = run(scene, sweep=sweep, solver={"method": "auto", "certify": False})
+    words, settled = ringsweep.words(found.long_run).values.reshape(3, cells), found.settled.values.reshape(3, cells)
+    period = found.period.values.reshape(3, cells)
+    first = settled[0] == 1
+    assert first.sum() >= cells // 2
+    assert (words[1:, first] == words[0, first]).all()
+    np.testing.assert_allclose(period[1:, first], np.broadcast_to(period[0, first], (2, first.sum())), rtol=1e-9)
+
+
+def test_full_turns_do_not_count():
+    """A ring that turns once in each period carries the body round: the motion returns."""
+    drive = {"law": "formula", "theta": "2*pi*f*t + a*sin(2*pi*f*t)", "f": "0.5 Hz", "a": 0.1}
+    scene = ROCKING | {"friction": {"law": "stiction", "rest": {"mu_s": 0.9, "mu_k": 0.5}}, "drive": drive}
+    scene = {key: part for key, part in scene.items() if key != "zone"} | {"time": {"span": 60.0}, "gravity": 0.1}
+    scene["initial"] = {"phi": 0.0, "omega": np.pi * 1.1}
+    found = run(scene)
+    assert found.phi_end.item() > 100.0
+    assert np.abs(found.phi_section.values).max() <= np.pi
+    assert word(found) == "periodic"
+    assert found.period.item() == pytest.approx(2.0)
+
+
+def without(scene, *sections):
+    return {key: part for key, part in scene.items() if key not in sections}
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"record": {"section": {"at": "turn"}}}, "record.section.at: 'turn' is no instant of a section"),
+        (
+            {"scene": without(RIG, "drive")},
+            "record.section.at: neither force nor drive has a period",
+        ),
+        (
+            {"scene": RIG | {"drive": {"law": "constant", "amplitude": 1.0}}, "record": {"exponent": True}},
+            "record.exponent: neither force nor drive has a period",
+        ),
+        (
+            {"record": {"section": {"at": "period", "period": 1.0}}},
+            "record.section.period: force or drive have",
+        ),
+        ({"scene": RIG | {"impact": {"restitution": 0.5}}}, "record.section: cannot stand beside scene.impact"),
+        (
+            {"scene": RIG | {"friction": RIG["friction"] | LUGRE}, "record": {"exponent": True}},
+            "record.exponent: friction law lugre has none on a ring",
+        ),
+        ({"solver": {"method": "rk4", "steps": 1000}}, "solver.method: rk4 locates no instants for record.section"),
+    ],
+)
+def test_what_has_no_section_is_refused(change, said):
+    with pytest.raises(ringsweep.InputError) as error:
+        ringsweep.run(deepcopy({"scene": RIG, "record": {"section": {"at": "period"}}} | change))
+    assert str(error.value).startswith(said)
+
+
+def test_attractors_of_a_ring_are_motions_on_a_circle():
+    """Points just beyond either end of the range of angles are near to each other."""
+    phi = np.array([[3.1415, 0.0] * 4, [-3.1415, 0.0] * 4, [2.9, 0.0] * 4])
+    points = {
+        "phi_section": (("initial_phi", "section"), phi),
+        "omega_section": (("initial_phi", "section"), 0.1 * phi**2),
+    }
+    found = ringsweep.attractors(xr.Dataset(points))
+    assert found.attractor.values.tolist() == [1, 1, 2]
+
+
+def test_diagram_and_section_of_a_ring_are_drawn(tmp_path):
+    grid = {"drive.amplitude": np.linspace(0.5, 2.0, 6).tolist()}
+    record = {"section": {"at": "period", "keep": 8}, "exponent": True}
+    sweep = {"scene": ROCKING, "record": record, "sweep": {"grid": grid}}
+    ds = ringsweep.run(deepcopy(sweep), tmp_path / "ring.nc", jobs=1, progress=False)
+    assert cli.main(["map", str(tmp_path / "ring.nc"), "-o", str(tmp_path / "ring.png")]) == 0
+    assert (tmp_path / "ring.png").exists()
+    figure = ringsweep.plots.bifurcation(ds)
+    assert figure.axes[0].get_ylabel() == r"$\varphi$ (°)"
+    drawn = figure.axes[0].collections[0].get_offsets()[:, 1]
+    np.testing.assert_allclose(np.sort(drawn), np.sort(np.degrees(ds.phi_section.values.ravel())))
+    ax = ringsweep.plots.section_panel(ds.isel(drive_amplitude=3))
+    assert ax.get_ylabel().startswith(r"$\omega$")
+    plt.close("all")

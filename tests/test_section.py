@@ -182,16 +182,6 @@ def without(scene, *sections):
     return {key: part for key, part in scene.items() if key not in sections}
 
 
-RING = {
-    "model": "ring-single-contact",
-    "ring": {"radius": 0.1},
-    "body": {"mass": 1.0},
-    "friction": {"law": "coulomb", "mu_k": 0.2},
-    "drive": {"law": "sinusoidal", "amplitude": 1.0, "frequency": "1 Hz"},
-    "time": {"span": 1.0},
-}
-
-
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -201,7 +191,9 @@ RING = {
         ({"record": {"section": {"at": "turn", "keep": 0}}}, "record.section.keep: 0 is not allowed"),
         ({"record": {"section": "turn"}}, "record.section: a section with keys is expected"),
         ({"scene": without(FORCED, "force")}, "record.section.at: neither force nor drive has a period"),
-        ({"scene": RING}, "record.section: model ring-single-contact has none"),
+        ({"record": {"section": {"at": "turn", "period": 2.0}}}, "record.section.period: belongs to `at: period`"),
+        ({"record": {"section": {"at": "period", "period": 2.0}}}, "record.section.period: force or drive have"),
+        ({"record": {"section": {"at": "period", "period": 0.0}}}, "record.section.period: 0 is not allowed"),
         ({"solver": {"method": "rk4", "steps": 1000}}, "solver.method: rk4 locates no instants for record.section"),
         (
             {"sweep": {"grid": {"belt.velocity": [0.1, 0.2, 0.3]}, "refine": True}},

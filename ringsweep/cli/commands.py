@@ -121,7 +121,7 @@ def map_command(arguments: argparse.Namespace) -> None:
 
 def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
     from ringsweep import plots
-    from ringsweep.plots.sections import POINTS, has_diagram
+    from ringsweep.plots.sections import POINTS, has_diagram, points_of
     from ringsweep.storage import files, netcdf
 
     selection = dict(_selection(text) for text in arguments.sel)
@@ -132,8 +132,8 @@ def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None
         plain = not (arguments.y or arguments.log or arguments.boundaries or str(arguments.output).endswith(".html"))
         along = result.isel(dict.fromkeys(fixed & set(map(str, result.dims)), 0))
         diagram = plain and has_diagram(along)
-        arguments.var = POINTS[0] if diagram else "regime"
-    if arguments.var == "attractor" and "x_section" in result:
+        arguments.var = points_of(result)[0] if diagram else "regime"
+    if arguments.var == "attractor" and points_of(result):
         from ringsweep.runs.attractors import attractors
 
         result = attractors(result)

@@ -90,7 +90,7 @@ def build_parser() -> argparse.ArgumentParser:
     draw.add_argument(
         "--var",
         metavar="V",
-        help="variable to draw (default: regime, or x_section if there is a section along one axis)",
+        help="variable to draw (default: regime, or the place if there is a section along one axis)",
     )
     draw.add_argument(
         "--sel",

@@ -20,7 +20,7 @@ PERIOD = Parameter("s", "time between two points, if neither force nor drive has
 #: Instants of the points of a section, and what they are.
 INSTANTS = {
     "period": "the end of each period of force or drive",
-    "turn": "each maximum of the displacement (belt only)",
+    "turn": "each maximum of x, on the belt",
 }
 
 

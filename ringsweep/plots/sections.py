@@ -17,7 +17,7 @@ from matplotlib.transforms import blended_transform_factory
 
 from ringsweep.errors import InputError
 from ringsweep.plots.datasets import resolve, scene_text
-from ringsweep.plots.labels import unit_text
+from ringsweep.plots.labels import display_factor, unit_text
 from ringsweep.plots.map_axes import Axis
 from ringsweep.plots.selection import select
 from ringsweep.plots.style import (
@@ -38,10 +38,15 @@ from ringsweep.plots.style import (
 from ringsweep.quantities.variables import words
 
 #: Variables of the points of a section.
-POINTS = "x_section", "velocity_section", "deflection_section"
+POINTS = (
+    *("x_section", "velocity_section", "deflection_section"),
+    *("phi_section", "omega_section", "deflection_1_section", "deflection_2_section"),
+)
 
 # Their full names would take half of a narrow picture.
 _SHORT = {"x_section": "x", "velocity_section": "velocity", "deflection_section": "deflection"}
+_SHORT |= {"phi_section": r"$\varphi$", "omega_section": r"$\omega$"}
+_SHORT |= {f"deflection_{k}_section": f"deflection {k}" for k in (1, 2)}
 
 # Points of the diagram, in points of a page squared, and the height of the strip of regimes as a share of the axes.
 _DOT, _STRIP = 1.0, 0.025
@@ -54,15 +59,20 @@ _DIRECTION = "direction"
 
 def has_diagram(ds: xr.Dataset) -> bool:
     """Whether a dataset holds sections along one axis."""
-    return "x_section" in ds and len(_axes_of(ds)) == 1
+    return bool(points_of(ds)) and len(_axes_of(ds)) == 1
+
+
+def points_of(ds: xr.Dataset) -> list[str]:
+    """Variables of the points of a section, place and velocity first; none without a section."""
+    return [name for name in POINTS if name in ds]
 
 
 def _axes_of(ds: xr.Dataset) -> list[str]:
-    return [str(dim) for dim in ds["x_section"].dims if dim not in ("section", _DIRECTION)]
+    return [str(dim) for dim in ds[points_of(ds)[0]].dims if dim not in ("section", _DIRECTION)]
 
 
 def bifurcation(
-    ds: xr.Dataset, x: str | None = None, var: str = "x_section", sel: Mapping[str, float | str] | None = None
+    ds: xr.Dataset, x: str | None = None, var: str | None = None, sel: Mapping[str, float | str] | None = None
 ) -> Figure:
     """Draw a bifurcation diagram as a new figure, with exponent and multipliers below if the dataset has them.
 
@@ -72,8 +82,8 @@ def bifurcation(
         Result of a sweep with a section along one axis, maybe followed up and down.
     x : str, optional
         Coordinate of the axis; by default the first that was swept along it.
-    var : str
-        Variable of the section.
+    var : str, optional
+        Variable of the section; by default the place of the body.
     sel : mapping of str to float or str, optional
         Other coordinates held at the value nearest to the one given.
 
@@ -116,7 +126,7 @@ def bifurcation(
     return figure
 
 
-def bifurcation_panel(ds: xr.Dataset, x: str | None = None, var: str = "x_section", ax: Axes | None = None) -> Axes:
+def bifurcation_panel(ds: xr.Dataset, x: str | None = None, var: str | None = None, ax: Axes | None = None) -> Axes:
     """Draw the points of the sections over the axis, in a colour for each direction, under a strip of the regimes.
 
     Parameters
@@ -147,13 +157,14 @@ def bifurcation_panel(ds: xr.Dataset, x: str | None = None, var: str = "x_sectio
     ['up', 'down']
     """
     axis = _axis(ds, x)
-    name = resolve("var", var, [one for one in POINTS if one in ds])
+    known = points_of(ds)
+    name = resolve("var", var, known) if var else known[0]
     ax = axes_or_current(ax, _HEIGHTS["diagram"])
     handles: list[Artist] = []
     branches = list(_branches(ds))
     # Where both branches are the same, the second one must not hide the first: it has smaller points.
     for k, (way, branch) in enumerate(branches):
-        points = branch[name].transpose(*axis.dims, "section").values[axis.order]
+        points = branch[name].transpose(*axis.dims, "section").values[axis.order] * display_factor(ds[name])
         colour = on_page(PAIR_COLOURS[k])
         place = np.repeat(axis.values, points.shape[1])
         size = _DOT * (2.5 if k == 0 and len(branches) > 1 else 1.0)
@@ -187,7 +198,7 @@ def _strips(ax: Axes, axis: Axis, ds: xr.Dataset) -> list[Artist]:
 
 
 def section_panel(ds: xr.Dataset, ax: Axes | None = None) -> Axes:
-    """Draw the points of one motion in the plane of displacement and velocity, coloured by their order in time.
+    """Draw the points of one motion in the plane of place and velocity, coloured by their order in time.
 
     Parameters
     ----------
@@ -215,15 +226,16 @@ def section_panel(ds: xr.Dataset, ax: Axes | None = None) -> Axes:
     """
     _require_section(ds)
     ds = ds.squeeze()
-    if ds["x_section"].dims != ("section",):
-        several = ", ".join(str(dim) for dim in ds["x_section"].dims if dim != "section")
+    place, speed, *_ = points_of(ds)
+    if ds[place].dims != ("section",):
+        several = ", ".join(str(dim) for dim in ds[place].dims if dim != "section")
         raise InputError("ds", f"has sections along {several}, and this picture shows one: choose a cell by ds.sel")
     ax = axes_or_current(ax, 0.75)
-    x, velocity = ds["x_section"].values, ds["velocity_section"].values
+    x, velocity = (ds[name].values * display_factor(ds[name]) for name in (place, speed))
     kept = np.isfinite(x) & np.isfinite(velocity)
     order = np.arange(1, kept.sum() + 1)
     drawn = ax.scatter(x[kept], velocity[kept], c=order, s=8.0, cmap="viridis", linewidths=0, rasterized=True)
-    label_axes(ax, _label(ds, "x_section"), _label(ds, "velocity_section"))
+    label_axes(ax, _label(ds, place), _label(ds, speed))
     if len(order) > 1:
         bar = ax.figure.colorbar(drawn, ax=ax, label="point, in time", ticks=MaxNLocator(6, integer=True))
         bar.ax.tick_params(labelsize=SMALL)
@@ -334,7 +346,7 @@ def _branches(ds: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
 
 
 def _require_section(ds: xr.Dataset) -> None:
-    if "x_section" not in ds:
+    if not points_of(ds):
         raise InputError("ds", "has no section: give record: {section: {at: period}} in the configuration")
 
 

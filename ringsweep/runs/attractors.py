@@ -15,7 +15,15 @@ from ringsweep.quantities.variables import words
 Floats = NDArray[np.float64]
 
 #: Variables of a point, with those of the end of a run, which stand for a motion that is a point.
-POINTS = {"x_section": "x_end", "velocity_section": "velocity_end", "deflection_section": "deflection_end"}
+POINTS = {
+    "x_section": "x_end",
+    "velocity_section": "velocity_end",
+    "deflection_section": "deflection_end",
+    "phi_section": "phi_end",
+    "omega_section": "omega_end",
+    "deflection_1_section": "",
+    "deflection_2_section": "",
+}
 
 #: Long runs and regimes whose motion is a point: then the section is not looked at.
 _STILL = ("rest", "steady")
@@ -23,7 +31,7 @@ _STEADY = ("sliding",)
 
 #: Long runs and regimes that end on no motion.
 _NONE = ("transient", "unbounded")
-_ENDED = ("failed", "separating")
+_ENDED = ("failed", "separating", "jammed")
 
 #: Name of cells that end on no motion.
 NONE = "none"
@@ -86,11 +94,12 @@ def attractors(ds: xr.Dataset, tolerance: float = 1e-3) -> xr.Dataset:
     >>> found.attractor.values, found.share.values.round(2)
     (array([1, 1, 2], dtype=int16), array([0.  , 0.67, 0.33]))
     """
-    if "x_section" not in ds or "velocity_section" not in ds:
+    place = next((name for name in POINTS if name in ds), None)
+    if place is None:
         raise InputError("ds", "has no section: give record: {section: {at: period}} in the configuration")
     if not tolerance > 0.0:
         raise InputError("tolerance", f"{tolerance!r} is not greater than 0")
-    dims = tuple(str(dim) for dim in ds["x_section"].dims if dim != "section")
+    dims = tuple(str(dim) for dim in ds[place].dims if dim != "section")
     shape = tuple(ds.sizes[dim] for dim in dims)
     named = {name: _by_cell(ds, name, dims) for name in ("regime", "long_run") if name in ds}
     motions = list(_motions(ds, dims, named, tolerance))
@@ -142,6 +151,13 @@ def _motions(
     for k, name in enumerate(variables):
         if POINTS[name] in ds:
             ends[:, k] = ds[POINTS[name]].transpose(*dims).values.ravel()
+    if "phi_section" in variables:
+        # An angle is a point of a circle.
+        variables.append("phi_section")
+        points, ends = (
+            np.concatenate([np.cos(found[..., :1]), found[..., 1:], np.sin(found[..., :1])], axis=-1)
+            for found in (points, ends)
+        )
     regime = named.get("regime", np.full(len(points), ""))
     long_run = named.get("long_run", np.full(len(points), ""))
     lost = np.isin(regime, _ENDED) | np.isin(long_run, _NONE)

@@ -220,9 +220,8 @@ def _warn_of_long_runs(results: xr.Dataset, config: Config, count: int) -> None:
     for _, _, region in Layout(regime.shape).chunks():
         words = regime[region].values
         rides = words == RIDING
-        unsettled += int(
-            np.count_nonzero((settled[region].values == 0) & ~rides & ~np.isin(words, (FAILED, SEPARATING, JAMMED)))
-        )
+        goes_on = ~np.isin(words, (RIDING, FAILED, SEPARATING, JAMMED))
+        unsettled += int(np.count_nonzero((settled[region].values == 0) & goes_on))
         riding += int(np.count_nonzero(rides))
         if rides.any():
             firsts = np.array([part.start for part in region], dtype=np.intp)
