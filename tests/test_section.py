@@ -193,7 +193,7 @@ def without(scene, *sections):
         ({"scene": without(FORCED, "force")}, "record.section.at: neither force nor drive has a period"),
         ({"record": {"section": {"at": "turn", "period": 2.0}}}, "record.section.period: belongs to `at: period`"),
         ({"record": {"section": {"at": "period", "period": 2.0}}}, "record.section.period: force or drive have"),
-        ({"record": {"section": {"at": "period", "period": 0.0}}}, "record.section.period: 0 is not allowed"),
+        ({"record": {"section": {"at": "period", "period": 0.0}}}, "record.section.period: 0 s is not allowed"),
         ({"solver": {"method": "rk4", "steps": 1000}}, "solver.method: rk4 locates no instants for record.section"),
         (
             {"sweep": {"grid": {"belt.velocity": [0.1, 0.2, 0.3]}, "refine": True}},

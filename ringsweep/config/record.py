@@ -15,7 +15,7 @@ from ringsweep.quantities.units import quantity, show
 KEEP = Parameter("1", "number of points, the last of a run", lower=1, upper=16384, default=64, whole=True)
 
 #: Time between two points.
-PERIOD = Parameter("s", "time between two points, if neither force nor drive has a period", lower=0.0, open_lower=True)
+PERIOD = Parameter("s", "time between two points, where force and drive have no period", lower=0.0, open_lower=True)
 
 #: Instants of the points of a section, and what they are.
 INSTANTS = {
