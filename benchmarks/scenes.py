@@ -23,12 +23,13 @@ import sys
 import tempfile
 import termios
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import radians
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba.core import event
 
 from benchmarks._common import (
     PAPER_STEPS,
@@ -54,6 +55,14 @@ ROOT = Path(__file__).parent.parent
 
 #: Functions of the C library that a kernel may call.
 CALLS = ("exp", "atan", "log1p", "log", "pow", "sin", "cos")
+
+#: Modules of things that most scenes lack, under ``ringsweep.``
+OPTIONAL = {
+    "impact": ("models.ring.impact", "physics.impact"),
+    "exponent": ("models.tangent", "solvers.variation"),
+    "section": ("models.section",),
+    "bristles": ("models.belt.bristles", "models.ring.bristles", "physics.friction.bristles"),
+}
 
 
 #: Names under which times are stored: `rk4`, and `event` or `implicit`, whichever handles the law.
@@ -155,6 +164,7 @@ LADDER: dict[str, Rung] = {
     "+ impact": Rung(on_ring("stiction", drive=_ARCTAN, arcs=3) | {"impact": {"restitution": 0.5}}, "+ stiction"),
     "belt, Coulomb": Rung(on_belt("coulomb"), None, *_BELT),
     "belt + stiction": Rung(on_belt("stiction"), "belt, Coulomb", *_BELT),
+    "belt + section": Rung(on_belt("stiction"), "belt + stiction", *_BELT, {"section": {"at": "turn", "keep": 64}}),
     "belt + exponent": Rung(on_belt("stiction"), "belt + stiction", *_BELT, {"exponent": True}),
     "belt + bristles (lugre)": Rung(on_belt("lugre"), "belt + stiction", *_BELT),
 }
@@ -203,15 +213,33 @@ def compile_one(name: str, method: str) -> dict[str, Any]:
     rung = LADDER[name]
     run = bare(rung.configuration(method, 2, **({"steps": 4} if method == "rk4" else {})))
     begin = time.process_time(), time.perf_counter()
-    run()
+    with event.install_recorder("numba:compile") as compiled:
+        run()
     took = time.process_time() - begin[0], time.perf_counter() - begin[1]
     rk4_kernels = (rk4._tabulate, rk4._start, rk4._advance_block, rk4._finish_at_end_of_span)
     kernels = rk4_kernels if method == "rk4" else (automaton._integrate,)
     found = {"cpu": took[0], "wall": took[1]}
     if any(kernel.stats.cache_hits for kernel in kernels[-2:]):
         # Another scene has the same types, and a kernel loaded from the cache has no assembly text.
-        return found | {"instructions": "the same", "calls": ["the same"]}
-    return found | code_of("".join(kernel.inspect_asm(kernel.signatures[-1]) for kernel in kernels))
+        return found | {"instructions": "the same", "calls": ["the same"], "optional": {}}
+    functions = {one.data["dispatcher"].py_func for _, one in compiled.buffer}
+    return (
+        found
+        | {"optional": optional_in(functions)}
+        | code_of("".join(kernel.inspect_asm(kernel.signatures[-1]) for kernel in kernels))
+    )
+
+
+def optional_in(functions: Iterable[Any]) -> dict[str, int]:
+    """Number of functions that belong to each optional thing, without what stands for its absence."""
+    found = dict.fromkeys(OPTIONAL, 0)
+    for one in functions:
+        hook = getattr(sys.modules.get(one.__module__), one.__name__, None)
+        # The body of a hook for types without one does nothing.
+        if getattr(hook, "__wrapped__", None) is not one:
+            for thing, modules in OPTIONAL.items():
+                found[thing] += any(f"{one.__module__}.".startswith(f"ringsweep.{name}.") for name in modules)
+    return found
 
 
 def codes(names: Sequence[str], method: str) -> dict[str, Any]:
@@ -396,6 +424,9 @@ def main() -> None:
         sections.append(("From the simplest scene to the fullest", HEADER, ladder(found, compiled)))
         idle = [[thing, *(f"{over(found, f'idle: {thing}', f'without: {thing}', method):.2f}" for method in METHODS)]
                 for thing in IDLE]  # fmt: skip
+        parts = [[name, method, *(str(one["optional"][thing]) for thing in OPTIONAL)]
+                 for (name, method), one in compiled.items() if one["optional"]]  # fmt: skip
+        sections.append((LEFT_OUT, ["scene", "method", *OPTIONAL], parts))
         sections.append(("Things without effect: time with the thing over time without it", ["", "rk4", "event"], idle))
         kept = in_child(diagnostics, cells, rounds, cache=shared)
 
@@ -433,13 +464,16 @@ def main() -> None:
     publish(given, "scenes", "The cost of each thing in a scene", where, report)
 
 
+LEFT_OUT = "Functions of optional things in a kernel"
+
 #: Explanation at the head of the report.
 ABOUT = f"""
 One core, compiled before, no certificates, T = {SPAN:g} s, {PAPER_STEPS} steps of `rk4`. x is the ratio to the row that
 this row adds something to. An addition may also change the motion: if the number of steps changes, the ratio per step
 gives the cost of the addition itself. Instructions are those of the whole kernel, with its set-up and its ends. Calls
 are calls of the C library; they make the table of the drive, once for all cells of a task. The kernel has no code for
-what a scene lacks: `tests/test_scenes.py` checks this.
+what a scene lacks: the last columns, and the table of optional things, which counts the compiled functions of each.
+Uncertain parameters (`sweep.sample`) take the kernels of the plain sweep. `tests/test_scenes.py` checks this.
 """
 
 

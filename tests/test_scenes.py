@@ -6,8 +6,11 @@ import pytest
 
 from benchmarks import scenes
 from benchmarks.work_precision import SCENES
+from ringsweep import config
+from ringsweep.models import tangent
 from ringsweep.runs import sweep
 from ringsweep.runs.executors import Execution
+from ringsweep.solvers import automaton
 
 LEANEST, CUT = "one contact, Coulomb, immobile uniform ring", "+ a zone"
 
@@ -29,6 +32,28 @@ def test_kernel_calls_only_functions_that_its_scene_uses(code):
     # Calls of the arctan drive.
     assert set(code[CUT]["calls"]) == {"atan", "log1p"}
     assert code[LEANEST]["instructions"] < code[CUT]["instructions"]
+
+
+def test_kernel_takes_no_function_from_what_its_scene_lacks(code):
+    for one in code.values():
+        assert one["optional"] == dict.fromkeys(scenes.OPTIONAL, 0)
+
+
+def test_functions_of_an_optional_thing_are_counted_but_not_those_that_stand_for_its_absence():
+    stub, body = tangent.begin.__wrapped__, tangent.begin.body_of(tangent.Exponent)
+    assert scenes.optional_in([stub])["exponent"] == 0
+    assert scenes.optional_in([stub, body])["exponent"] == 1
+
+
+def test_sampled_sweep_runs_the_kernels_of_the_plain_one():
+    scene = scenes.on_ring("stiction", drive={"law": "arctan", "amplitude": 2.0}, arcs=1)
+    plain = {"scene": scene, "sweep": {"grid": {"initial.phi": [0.1]}}}
+    sampled = {"scene": scene, "sweep": {"sample": {"n": 16, "of": {"drive.amplitude": {"uniform": [1.0, 2.0]}}}}}
+    counts = []
+    for source in (plain, sampled):
+        sweep.compute(config.load(source), Execution(1, progress=False))
+        counts.append(len(automaton._integrate.signatures))
+    assert counts[0] == counts[1]
 
 
 def test_memory_of_a_sweep_does_not_grow_with_its_steps():
