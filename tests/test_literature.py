@@ -162,3 +162,53 @@ def test_hetzlers_unstable_cycle_bounds_the_basin_of_steady_slip():
             errors.append((ends[1] - ends[0]) / (2.0 * radius) - 1.0)
     assert (abs(np.array(errors[2:])) < 2e-4).all()
     np.testing.assert_allclose(np.array(errors[2:]) / errors[:2], 0.3**2, rtol=0.1)
+
+
+class TestSuddenOnsetOfChaos:
+    """Oscillator of Popp and Stelter with the friction 1.5 - 1.5 v + 0.45 v^3, and a force of 0.1 cos(nu t).
+
+    di Bernardo, Kowalczyk and Nordmark (2003): chaos begins at once at nu = 1.7077997, where the motion of period four
+    grazes the speed of the belt.
+    """
+
+    def follow(self, nu, exponent, span=3000.0):
+        scene = {
+            "model": "belt",
+            "gravity": 1.0,
+            "body": {"mass": 1.0},
+            "spring": {"stiffness": 1.0},
+            "belt": {"velocity": 1.0},
+            "friction": {
+                "law": "formula",
+                "mu": "mu_s - a*v + b*v**3",
+                "at_rest": "mu_s",
+                "mu_s": 1.5,
+                "a": "1.5 s/m",
+                "b": "0.45 s^3/m^3",
+            },
+            "force": {"amplitude": 0.1, "phase": np.pi / 2.0},
+            "initial": {"x": 1.0, "velocity": 1.0},
+            "time": {"span": span},
+        }
+        grid = {"force.frequency": (np.asarray(nu) / (2.0 * np.pi)).tolist()}
+        config = {"scene": scene, "record": {"exponent": exponent}, "sweep": {"grid": grid}}
+        return ringsweep.run(config, jobs=1, progress=False)
+
+    def test_chaos_begins_where_it_has_been_published(self):
+        nu = 1.7077997 + np.arange(-7, 8) * 1e-7
+        ds = self.follow(nu, exponent=True)
+        below = nu <= 1.7077997 + 1e-12
+        assert set(ringsweep.words(ds.long_run).values[below]) == {"chaotic"}
+        assert set(ringsweep.words(ds.long_run).values[~below]) == {"periodic"}
+        np.testing.assert_allclose(ds.period.values[~below] * nu[~below] / (2.0 * np.pi), 4.0)
+        assert (ds.lyapunov.values[below] > 3.0 * ds.lyapunov_error.values[below]).all()
+        # The stable motion contracts by a finite factor up to the end: no multiplier announces it.
+        assert (ds.multiplier_1.values[~below] < 0.85).all()
+
+    def test_words_of_bands_that_are_narrower_than_the_tolerance_do_not_change_with_the_span(self):
+        """One of four bands touches the speed of the belt, at times: the last lap may have a stop or none."""
+        nu = np.linspace(1.7075, 1.7077, 9)
+        for span in (3000.0, 4000.0, 15000.0):
+            ds = self.follow(nu, exponent=False, span=span)
+            assert set(ringsweep.words(ds.regime).values) == {"stick-slip"}
+            np.testing.assert_allclose(ds.stops_per_cycle, 0.158, atol=0.012)

@@ -11,7 +11,7 @@ The place x of the body is a displacement, or an angle on a ring; lengths in m a
 
 from __future__ import annotations
 
-from math import inf, isnan, nan, sqrt
+from math import floor, inf, isnan, nan, sqrt
 from typing import Any, NamedTuple
 
 from ringsweep.compile import absorbed, hook, inlined
@@ -31,11 +31,10 @@ class Mark(NamedTuple):
 
 
 class Corner(NamedTuple):
-    """State after so many laps: `number`, displacement, m, and velocity, m/s."""
+    """State after so many laps, their `number`."""
 
     number: Any
-    x: Any
-    velocity: Any
+    mark: Mark
 
 
 class Laps(NamedTuple):
@@ -149,6 +148,9 @@ _SHRUNK = 0.3
 # of stick may differ by the second share. Each part must have so many cycles in the mean.
 _ERRORS, _SAME_SWING, _SAME_STICK, _FEWEST = 3.0, 0.05, 0.1, 16.0
 
+# Stops in a cycle are the same if they differ by less.
+_SAME_STOPS = 1e-9
+
 # An exponent is positive if it exceeds so many standard errors. It is zero if with so many it changes a disturbance by
 # less than the second share in a cycle.
 _POSITIVE, _ZERO = 3.0, 0.02
@@ -182,7 +184,7 @@ def gap(scene, mark, x, velocity, swing, fast):
 @inlined
 def begin(period, start):
     """Cycles at the beginning of a run, which is the mark `start`; `period` is that of the forcing, s."""
-    corner, part = Corner(0.0, start.x, start.velocity), Part(0.0, start, 0.0, 0.0, 0.0)
+    corner, part = Corner(0.0, start), Part(0.0, start, 0.0, 0.0, 0.0)
     laps = Laps(0.0, 0.0, 0.0, RETURN, corner, corner)
     sums = 0.0, 0.0, part, part, nan, nan, nan
     return Cycles(0.0, period, start.x, start.x, 0.0, 0.0, 0.0, start, start, 0.0, 1.0, 0.0, laps, *sums)
@@ -192,7 +194,7 @@ def begin(period, start):
 def _with_corners(laps, first, again, start, mark):
     """Laps with their corners, after a lap from `start` to `mark` that is the first of its length, or one more."""
     older, newer = laps.older, laps.newer
-    begun, here = Corner(0.0, start.x, start.velocity), Corner(laps.number, mark.x, mark.velocity)
+    begun, here = Corner(0.0, start), Corner(laps.number, mark)
     doubled = again & (laps.number >= 2.0 * max(newer.number, 1.0))
     older = select_all(first, begun, select_all(doubled, newer, older))
     newer = select_all(first, begun, select_all(doubled, here, newer))
@@ -281,19 +283,24 @@ def closed(scene, c, mark, count, known, next_end, swing, fast):
 
 
 @inlined
-def returns_each_time(scene, c, fast, largest_multiplier):
+def returns_each_time(scene, c, fast, largest_multiplier, growth):
     """Whether the motion returns each time, and no trend of its states would change it in ten spans.
 
-    `fast` is that of the last cycle, see :func:`closed`; `largest_multiplier` is 0 if it is not known.
+    `fast` is that of the last cycle, see :func:`closed`; `largest_multiplier` is 0 if it is not known, `growth` is that
+    of :func:`without_return`.
     """
+    exponent, error = growth
     laps = c.laps
     if isnan(c.period) or largest_multiplier > _UNSTABLE:
         return False
     forced = scene.forcing_period < inf
     if laps.number < (_LAPS if forced else _LAPS_IF_FREE) and laps.gap > _EXACT:
         return False
+    if forced and exponent > _POSITIVE * error:
+        # It returns within the tolerance only, or stays beside a periodic motion for a while.
+        return False
     # The corners are states at the ends of laps, and so is the reference.
-    changed = gap(scene, laps.older, c.reference.x, c.reference.velocity, c.swing, fast)
+    changed = gap(scene, laps.older.mark, c.reference.x, c.reference.velocity, c.swing, fast)
     change = changed / (laps.number - laps.older.number)
     # Laps of many cycles are few: there as many must come as there are cycles.
     to_come = change * (10.0 * scene.span * max(c.lap, 1.0) / c.period)
@@ -302,6 +309,18 @@ def returns_each_time(scene, c, fast, largest_multiplier):
         ratio = (laps.gap / laps.first_gap) ** (1.0 / (laps.number - 1.0))
         to_come = min(to_come, laps.gap * ratio / (1.0 - ratio)) if ratio < 1.0 else to_come
     return to_come <= _TREND
+
+
+@inlined
+def stops_of_laps(c, period):
+    """Share of stick and stops in a cycle of a forced motion that returns.
+
+    They are those of the last lap, unless earlier ones have other stops: then those of the later half of the laps.
+    """
+    first = c.laps.older.mark
+    t = c.reference.t - first.t
+    stops = (c.reference.slips - first.slips) / floor(t / period + 0.5)
+    return (c.share, c.stops) if abs(stops - c.stops) < _SAME_STOPS else ((c.reference.total - first.total) / t, stops)
 
 
 @inlined

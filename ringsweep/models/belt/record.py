@@ -501,6 +501,8 @@ def _settles_to(scene, r, t):
         # The last cycles before the end differ from those before another end.
         share = (c.last.total - c.before.mark.total) / (c.last.t - c.before.mark.t)
         stops_per_cycle = (c.last.slips - c.before.mark.slips) / (c.count - c.before.count)
+    if forced and returns:
+        share, stops_per_cycle = cycles.stops_of_laps(c, scene.forcing_period)
     long_run = PERIODIC if returns else _without_return(scene, r)
     if stops_per_cycle > 0.0 or share > 0.0 or (in_stop and not forced):
         return STICK_SLIP, long_run, period, share, stops_per_cycle
@@ -519,7 +521,8 @@ def _settles_to(scene, r, t):
 def _returns_each_time(scene, r):
     """Whether the motion returns each time, and no trend of its states would change it in ten spans."""
     fast = r.cycles.swing * (2.0 * pi) / _pace(scene)
-    return cycles.returns_each_time(scene, r.cycles, fast, tangent.largest_multiplier(r.tangent))
+    largest, growth = tangent.largest_multiplier(r.tangent), tangent.exponent(r.tangent)
+    return cycles.returns_each_time(scene, r.cycles, fast, largest, growth)
 
 
 @inlined

@@ -200,10 +200,11 @@ def _followed(long_run, outcome, scene, status):
     word, period = TRANSIENT, nan
     if status == COMPLETE:
         first, second = cycles.part_sizes(c)
-        if cycles.returns_each_time(scene, c, fast, tangent.largest_multiplier(r.tangent)):
+        largest, growth = tangent.largest_multiplier(r.tangent), tangent.exponent(r.tangent)
+        if cycles.returns_each_time(scene, c, fast, largest, growth):
             word, period = PERIODIC, c.period
         elif c.before.count >= 1.0 and first >= 1.0 and second >= 1.0:
-            word = cycles.without_return(c, scene.forcing_period, tangent.exponent(r.tangent))
+            word = cycles.without_return(c, scene.forcing_period, growth)
     settled = 0.0 if word in (TRANSIENT, UNBOUNDED) else 1.0
     return tangent.with_exponent(r.tangent, joined(outcome, (period, settled, float(word))), period, scene)
 
