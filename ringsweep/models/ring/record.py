@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ringsweep.compile import inlined
+from ringsweep.compile import inlined, unrolled
 from ringsweep.models.interface import recorder, shock
 from ringsweep.models.interface.status import BROKEN, JAM, SEPARATED_1, SEPARATED_2, SEPARATED_BOTH
 from ringsweep.models.ring import long_run
@@ -177,44 +177,28 @@ def conclude(record, status, t, phi, omega):
     )
 
 
-@inlined
-def changed(r, new_shocks, new_long_run):
-    """Record with other shocks and another long run."""
-    return Record(
-        r.sense,
-        r.reversals,
-        r.lowest,
-        r.highest,
-        r.phi_min,
-        r.phi_max,
-        r.omega_min,
-        r.omega_max,
-        r.stick_time,
-        r.normal_min_1,
-        r.normal_min_2,
-        r.normal_max_1,
-        r.normal_max_2,
-        new_shocks,
-        new_long_run,
-    )
+@unrolled
+def with_long_run(length, record, new):
+    """Record with another long run, which is its last field."""
+    return ["return Record(" + "".join(f"record[{i}], " for i in range(length - 1)) + "new)"]
 
 
 @recorder.begin.implements(Ring, BristleRing)
 def _begin(scene, t, seen):
     begun = begin(seen, scene.epsilon_omega)
-    return changed(begun, begun.shocks, long_run.begin(scene.long_run, scene, t, seen))
+    return with_long_run(begun, long_run.begin(scene.long_run, scene, t, seen))
 
 
 @recorder.lend.implements(Ring, BristleRing)
 def _lend(scene, record, row):
-    return changed(record, record.shocks, long_run.lent(record.long_run, scene, row))
+    return with_long_run(record, long_run.lent(record.long_run, scene, row))
 
 
 @recorder.observe.implements(Ring, BristleRing)
 def _observe(scene, record, t, duration, stuck, seen):
     shocks = shock.observe(record.shocks, seen[4])
     r = observe(record, shocks, select(stuck, duration, 0.0), seen, scene.epsilon_omega)
-    return changed(r, shocks, long_run.observe(r.long_run, scene, r.stick_time, t, duration, seen))
+    return with_long_run(r, long_run.observe(r.long_run, scene, r.stick_time, t, duration, seen))
 
 
 @recorder.enter.implements(Ring, BristleRing)

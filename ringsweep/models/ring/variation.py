@@ -9,7 +9,7 @@ from ringsweep.models import tangent
 from ringsweep.models.interface import implicit, variation
 from ringsweep.models.ring.contacts import coefficients_under
 from ringsweep.models.ring.long_run import with_tangent
-from ringsweep.models.ring.record import changed
+from ringsweep.models.ring.record import with_long_run
 from ringsweep.models.ring.series import EDGE
 from ringsweep.physics import contact, drives
 from ringsweep.physics.friction.velocity import stiction_band
@@ -27,7 +27,7 @@ def _asked(scene):
 @inlined
 def _with(record, new):
     """Record with another tangent."""
-    return changed(record, record.shocks, with_tangent(record.long_run, new))
+    return with_long_run(record, with_tangent(record.long_run, new))
 
 
 @variation.enter.implements(Ring)
