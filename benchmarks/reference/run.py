@@ -38,8 +38,9 @@ from benchmarks.reference.radau import NODES, attempt, interpolate, jacobian
 #: Ends of a run, in addition to the solutions of the contact problem.
 HELD, UNRESOLVED = 0, 7
 SAMPLES = 20
-#: Earliest time at which something may happen on a ring whose acceleration is infinite at 0, s.
-EARLIEST = 1e-280
+#: Earliest time at which something happens on a ring whose acceleration is infinite at 0, s. Only the variation with
+#: positive slack follows what happens before.
+EARLIEST = 1e-14
 #: Return values of :func:`run`, in this order.
 RESULT = (
     "end", "t_end", "position", "speed", "reversals", "turned", "least_1", "least_2", "steps", "events", "t_least",
@@ -414,19 +415,22 @@ def advance(p, rtol, least, slack, most_steps, track, t, y, k1, k2, piece, mode)
 
 
 @njit(cache=True, error_model="numpy")
-def leave_at_once(p, k1, k2, rho, instant, least):
+def leave_at_once(p, k1, k2, rho, earliest, instant, least):
     """Mode, time and sliding velocity after a launch at rest on a ring whose acceleration is infinite at 0.
 
     Up to `instant` nothing moves so far that weight and friction change. A body that is left behind has a constant
     acceleration a, and the ring A n (n - 1) t^(n - 2). It is caught up at (A n / a)^(1 / (2 - n)), and may stick from
-    then on until its friction or a reaction ends that, all of it before `instant`.
+    then on until its friction or a reaction ends that, all of it before `instant`. What happens before `earliest` is
+    taken to happen then.
     """
-    y, n, t, v = np.array([rho, 0.0, 0.0, 0.0]), p.exponent, 0.0, 0.0
-    mode = resting_problem(p, k1, k2, 0.0, rho, least)
-    for _ in range(3):
+    y, n, t = np.array([rho, 0.0, 0.0, 0.0]), p.exponent, earliest
+    mode, behind = resting_problem(p, k1, k2, t, rho, least), True
+    if mode > FORWARD:
+        return mode, t, -p.radius * drive(p, t)[1]
+    while mode == STICK or behind:
         if mode == STICK:
-            first = t if t > 0.0 else EARLIEST
-            low, high, ends = first, first, False
+            first = low = high = t
+            behind, ends = False, False
             for i in range(1, 601):
                 low, high = high, first * (instant / first) ** (i / 600.0)
                 if stick_reserve(p, k1, k2, high, rho, least) <= 0.0:
@@ -443,20 +447,21 @@ def leave_at_once(p, k1, k2, rho, instant, least):
                 else:
                     low = middle
             mode, t = after_stick(p, k1, k2, high, rho, least)
-        if mode > FORWARD:
-            return mode, t, v
-        if mode != STICK:
+            if mode == STICK:
+                return UNRESOLVED, t, 0.0
+        else:
             j1, j2 = lower_segments(p, k1, k2, rho) if mode == BACKWARD and p.model != BELT else (k1, k2)
             epsilon = state(p, j1, j2, mode, t, y)[2]
             meets = (p.amplitude * n / epsilon) ** (1.0 / (2.0 - n)) if epsilon * p.amplitude > 0.0 else math.inf
-            if t > 0.0 or meets >= instant:
-                v = p.radius * (epsilon * (instant - t) - drive(p, instant)[1] + drive(p, t)[1])
-                return mode, instant, v
-            if meets < EARLIEST:
-                return UNRESOLVED, t, v
-            t = meets
+            if meets >= instant:
+                return mode, instant, p.radius * (epsilon * instant - drive(p, instant)[1])
+            behind, t = False, max(meets, earliest)
             mode = resting_problem(p, k1, k2, t, rho, least)
-    return UNRESOLVED, t, v
+    if mode > FORWARD:
+        return mode, t, 0.0
+    j1, j2 = lower_segments(p, k1, k2, rho) if mode == BACKWARD and p.model != BELT else (k1, k2)
+    epsilon = state(p, j1, j2, mode, t, y)[2]
+    return mode, instant, p.radius * (epsilon * (instant - t) - drive(p, instant)[1] + drive(p, t)[1])
 
 
 @njit(cache=True, error_model="numpy")
@@ -485,7 +490,7 @@ def run(p, rtol, least, slack, most_steps):
     # Launch. If the acceleration of the drive is infinite at 0, the motion before `instant` is negligible.
     t, instant = 0.0, 0.0
     if p.drive == POWER and p.exponent < 2.0:
-        instant = 1e-14 if p.exponent < 1.5 else 1e-10
+        instant = 1e-13 if p.exponent < 1.5 else 1e-10
     theta, ring_omega, _ = drive(p, t)
     y[0] = p.position - theta
     speed = ring_omega if p.at_rest else p.speed
@@ -505,12 +510,8 @@ def run(p, rtol, least, slack, most_steps):
             y[i] = math.copysign(steady(p, y[1], p.mu_s[k % m], p.mu_k[k % m]) / p.sigma0, y[1])
     piece = piece_of(p, y[1])
     if set_valued and y[1] == 0.0 and instant > 0.0:
-        mode, t, y[1] = leave_at_once(p, k1, k2, y[0], instant, least)
+        mode, t, y[1] = leave_at_once(p, k1, k2, y[0], 1e-280 if slack > 0.0 else EARLIEST, instant, least)
         y[0] = p.position - drive(p, t)[0]
-        if mode > FORWARD and t == 0.0:
-            t = instant
-            theta, ring_omega, _ = drive(p, t)
-            y[0], y[1] = p.position + speed * t - theta, (speed - ring_omega) * p.radius
     elif set_valued and y[1] == 0.0:
         mode = resting_problem(p, k1, k2, 0.0, y[0], least)
     else:
