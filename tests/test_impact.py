@@ -469,6 +469,29 @@ class TestBody:
         assert found.phi_end.item() == pytest.approx(1.83277839, abs=1e-8)
         assert found.impulse_max.item() == pytest.approx(146.67072, rel=1e-5)
 
+    def test_contact_that_is_lost_where_no_mode_can_follow_jams_the_body_and_does_not_let_it_fly(self):
+        """Contact 2 alone has A_22 < 0 and no load, and without both contacts the gap of contact 1 would close."""
+        friction = {
+            "law": "formula", "mu": "mu_k + h*exp(-((v - vb)/w)**2)", "at_rest": "mu_s",
+            "vb": 0.304904, "w": 0.0141684, "h": 0.558222,
+            "rest": {"mu_s": 1.26286, "mu_k": 1.01809}, "rough": {"mu_s": 0.349284, "mu_k": 0.00191046},
+        }  # fmt: skip
+        scene = {
+            "model": "ring",
+            "friction": friction,
+            "drive": {"law": "constant", "amplitude": -11.0615},
+            "body": {"mass": 0.489069, "inertia": 7.10457e-05, "half_distance": 0.0238336, "ball_radius": 0.00874807},
+            "ring": {"radius": 0.0605306},
+            "zone": {"half_angle": 2.4754},
+            "initial": {"phi": 0.0, "omega": 18.6091},
+            "impact": {"restitution": 0.721582},
+        }
+        found = ringsweep.sweep(scene, {"time.span": [0.5]}, progress=False)
+        assert ringsweep.words(found.regime).item() == "separating"
+        assert found.separating_contact.item() == 1
+        assert found.t_end.item() == found.t_separation.item() == pytest.approx(0.126876351, abs=1e-8)
+        assert found.flight_time.item() == 0.0
+
     def test_rounding_decides_nothing_at_the_end_of_rebounds(self):
         """The wedged body comes to rest, breaks away where friction does not fall, and jams in the end.
 

@@ -118,6 +118,14 @@ def _separated(scene, status, turned):
 
 
 @inlined
+def _presses(scene, contact, motion):
+    """Whether a free body closes the gap of a contact that touches."""
+    gravity = scene.closed.body.gravity
+    least = -_NO_LOAD * (gravity + scene.balls.reach * motion.psi_dot * motion.psi_dot)
+    return gap_acceleration(scene.balls, contact, motion, (0.0, 0.0, -gravity)) < least
+
+
+@inlined
 def _opened(scene, t, y, turned, places, which, zeros, event):
     """Status, mode and state after contacts of a closed ring have opened; `y` is the state of the closed ring."""
     _, ring_omega, _ = drives.turn(scene.drive, t)
@@ -127,10 +135,14 @@ def _opened(scene, t, y, turned, places, which, zeros, event):
         if turned == 1 and contact == 2:
             # In the frame of a pivot this contact stands a revolution ahead of its angle in the closed ring.
             places = places[0], (places[1][0], places[1][1] + 1)
+        empty = (zeros, 0) if which == FIRST else (0, zeros)
         if pivot.load(scene, pivot.frame(scene, contact, turned, state, ring_omega)) > 0.0:
-            empty = (zeros, 0) if which == FIRST else (0, zeros)
             status, mode = pivot.begun(scene, t, state, places, (which, turned), empty, event, 0)
             return status, mode, state
+        motion = motion_of(scene, state, ring_omega)
+        if _presses(scene, 3 - contact, motion):
+            # Neither contact can carry the body alone, and without both the one that is lost would close again.
+            return JAM, make(1, 0, -1, places, (which, turned), empty, event), state
     closed = y[0], y[1], 0.0, 0.0, 0.0, 0.0, float(TURNED * turned)
     state = in_flight(motion_of(scene, closed, ring_omega), turned)
     return RUNNING, make(1, 0, -1, places, (BOTH, turned), (zeros, zeros), event), state
@@ -200,9 +212,7 @@ def _switch(scene, mode, guard, t, y):
             return _lands(scene, mode, contact, t, y)
         _, ring_omega, _ = drives.turn(scene.drive, t)
         motion = motion_of(scene, y, ring_omega)
-        if gap_acceleration(scene.balls, contact, motion, (0.0, 0.0, -scene.closed.body.gravity)) < -_NO_LOAD * (
-            scene.closed.body.gravity + scene.balls.reach * motion.psi_dot * motion.psi_dot
-        ):
+        if _presses(scene, contact, motion):
             return JAM, mode, y
         state = in_flight(motion, mode.turned)
         zeros = (3, mode.zeros_2) if contact == 1 else (mode.zeros_1, 3)
