@@ -167,6 +167,9 @@ def test_value_with_a_space_and_without_quotes_gets_a_hint(folder, capsys, argum
     with pytest.raises(SystemExit):
         main(arguments)
     assert "unrecognized arguments: rad/s; a value with a space needs quotes" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["simulate", "case.yaml", "--set", "drive.amplitude=4", "time.span=2"])
+    assert "time.span=2; each value has its own --set: --set time.span=2" in capsys.readouterr().err
 
 
 def test_ends_in_the_wrong_order_are_told_with_their_unit(scene):

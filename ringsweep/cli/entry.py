@@ -43,6 +43,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         near = nearest_name(unknown[0].lstrip("-"), re.findall(r"--([a-z-]+)", arguments.parser.format_usage()))
         apart = any(word.startswith("-") for word in given) and not unknown[0].startswith("-")
         hint = "; a value with a space needs quotes: --set 'drive.amplitude=2 rad/s'" if apart else ""
+        if "--set" in given and "=" in unknown[0]:
+            hint = f"; each value has its own --set: --set {unknown[0]}"
         hint = f"; did you mean --{near}?" if unknown[0].startswith("-") and near else hint
         parser.error(f"unrecognized arguments: {' '.join(unknown)}{hint}")
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
