@@ -115,6 +115,24 @@ def bifurcation(
     for name, ax in zip(below, panels[1:], strict=True):
         if name == "multiplier_1":
             multiplier_panel(ds, x, ax)
+            if _DIRECTION in ds.dims:
+                # The diagram has the key to the directions; theirs would cover the name of the axis.
+                handles, texts = ax.get_legend_handles_labels()
+                legend_above(
+                    ax,
+                    [
+                        Line2D(
+                            [],
+                            [],
+                            linestyle="",
+                            marker=drawn.get_marker(),
+                            color=rcParams["text.color"],
+                            markersize=4,
+                            label=text.split(", ")[1],
+                        )
+                        for drawn, text in zip(handles[:2], texts[:2], strict=True)
+                    ],
+                )
         elif (legend := exponent_panel(ds, x, ax).get_legend()) is not None:
             # The panel above has the key to the directions.
             legend.remove()
