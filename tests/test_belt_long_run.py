@@ -98,6 +98,46 @@ def test_the_exponent_tells_chaos_from_motion_on_a_torus():
     assert (abs(torus.lyapunov) < 3.0 * torus.lyapunov_error).all()
 
 
+def branch(frequency, x, velocity, spans):
+    """Runs that begin beside a motion that a change of the frequency has made unstable, as a followed branch does."""
+    of = {
+        "model": "belt",
+        "gravity": 1.0,
+        "body": {"mass": 1.0},
+        "spring": {"stiffness": 1.0},
+        "damper": {"coefficient": 0.05},
+        "belt": {"velocity": 0.3},
+        "friction": {"law": "tustin", "mu_s": 0.4, "mu_k": 0.15, "alpha": 3.0},
+        "force": {"amplitude": 0.3, "frequency": frequency},
+        "initial": {"x": x, "velocity": velocity},
+    }
+    return over(of, 2.0 * pi * frequency, [int(span * frequency) for span in spans], exponent=True)
+
+
+@pytest.mark.parametrize(
+    ("start", "laps"),
+    [
+        ((0.21445378151260502, 0.16900256924577015, -0.4176918531735572), 2.0),
+        ((0.24134453781512605, 0.30104565295412833, -0.3234233747048327), 2.0),
+        ((0.20907563025210085, 0.1476761406794336, -0.4227321490531239), 1.0),
+    ],
+)
+def test_motion_that_slowly_leaves_an_unstable_one_is_transient_until_it_has_found_its_period(start, laps):
+    """Its exponent is positive for hundreds of periods, with a tiny scatter: the motion beside it is unstable.
+
+    In the last case each cycle turns a disturbance round, and takes a hundredth of it: long before the motion returns
+    after one period it does after two.
+    """
+    found = branch(*start, spans := [300, 600, 900, 1200, 3000, 10000])
+    said = words(found)
+    assert said[0] == "transient"
+    assert said == ["transient"] * said.count("transient") + ["periodic"] * said.count("periodic")
+    assert said[-2:] == ["periodic"] * 2
+    assert len(said) == len(spans)
+    periods = found.period.values * start[0]
+    np.testing.assert_allclose(periods[np.isfinite(periods)], laps, rtol=1e-6)
+
+
 def test_period_of_thirteen_cycles_is_found_in_each_span():
     """SciPy finds the same motion: it returns after thirteen periods of the force, and not before."""
     period = 2.0 * pi / 1.6

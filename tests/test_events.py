@@ -44,6 +44,19 @@ class TestEvents:
         assert contacts[-1] == run.separating_contact
         assert run.event_time[-1] == run.t_separation
 
+    def test_edges_are_told_in_runs_that_go_on_too(self, scene):
+        """Up to the lost contact both runs are the same; afterwards contacts that hold meet edges."""
+        run = ringsweep.simulate(scene | {"impact": {"restitution": 0.5}})
+        alone = ringsweep.simulate(scene)
+        edges = told(run, "edge")
+        np.testing.assert_allclose(edges[edges < alone.t_separation.item()], told(alone, "edge"), rtol=1e-9)
+        assert edges[-1] > alone.t_separation
+        # Each change of a zone is at an edge, or while its contact is open.
+        for zone, gap in ((run.zone_1, run.gap_1), (run.zone_2, run.gap_2)):
+            at = np.flatnonzero(np.diff(zone.values))
+            held = (gap.values[at] == 0.0) & (gap.values[at + 1] == 0.0)
+            assert np.isin(run.time.values[at][held], edges).all()
+
     def test_runs_under_several_laws_have_tables_side_by_side(self, capsys):
         runs = ringsweep.simulate({"scene": BELT, "sweep": {"grid": {"friction.law": ["coulomb", "stiction"]}}})
         alone = ringsweep.simulate(BELT)

@@ -148,6 +148,15 @@ _SHRUNK = 0.3
 # of stick may differ by the second share. Each part must have so many cycles in the mean.
 _ERRORS, _SAME_SWING, _SAME_STICK, _FEWEST = 3.0, 0.05, 0.1, 16.0
 
+# Swings scatter alike in two parts of the record if their variances differ by less than the first factor, on a torus by
+# less than the second. A motion that leaves an unstable one, or nears another, changes its scatter: by far more than
+# this, if its disturbances grow by the exponential of the third number in both parts. Less scatter than the last share
+# of the swing is rounding.
+_SAME_SCATTER, _SAME_ON_TORUS, _GROWN, _SCATTERED = 4.0, 1.5, 4.0, 1e-6
+
+# Two states that are apart by less than so many times the change to come may become one.
+_MERGING = 4.0
+
 # Stops in a cycle are the same if they differ by less.
 _SAME_STOPS = 1e-9
 
@@ -308,7 +317,9 @@ def returns_each_time(scene, c, fast, largest_multiplier, growth):
         # Gaps that shrink add up to a geometric series. On a torus they vary, but little in a few laps.
         ratio = (laps.gap / laps.first_gap) ** (1.0 / (laps.number - 1.0))
         to_come = min(to_come, laps.gap * ratio / (1.0 - ratio)) if ratio < 1.0 else to_come
-    return to_come <= _TREND
+    # Where disturbances change their sign in each cycle, a lap of two returns before a lap of one does.
+    merging = forced and c.lap == 2.0 and abs(c.drift) <= _MERGING * to_come * c.swing
+    return to_come <= _TREND and not merging
 
 
 @inlined
@@ -344,15 +355,19 @@ def without_return(c, period, growth):
     """
     (exponent, error), (first, second) = growth, part_sizes(c)
     mean_1, mean_2 = (c.middle.sum - c.before.sum) / first, (c.sum - c.middle.sum) / second
-    scatter = max((c.middle.squares - c.before.squares) / first - mean_1 * mean_1, 0.0)
-    allowed = _ERRORS * sqrt(scatter * (1.0 / first + 1.0 / second)) + _SAME_SWING * mean_1
-    stick_1 = (c.middle.mark.total - c.before.mark.total) / (c.middle.mark.t - c.before.mark.t)
-    stick_2 = (c.last.total - c.middle.mark.total) / (c.last.t - c.middle.mark.t)
+    scatter_1 = max((c.middle.squares - c.before.squares) / first - mean_1 * mean_1, 0.0)
+    scatter_2 = max((c.squares - c.middle.squares) / second - mean_2 * mean_2, 0.0)
+    allowed = _ERRORS * sqrt(scatter_1 * (1.0 / first + 1.0 / second)) + _SAME_SWING * mean_1
+    time_1, time_2 = c.middle.mark.t - c.before.mark.t, c.last.t - c.middle.mark.t
+    stick_1 = (c.middle.mark.total - c.before.mark.total) / time_1
+    stick_2 = (c.last.total - c.middle.mark.total) / time_2
     same_stick = abs(stick_1 - stick_2) <= _SAME_STICK + 1.0 / sqrt(second)
     if isnan(exponent) or first < _FEWEST or abs(mean_1 - mean_2) > allowed or not same_stick:
         return TRANSIENT
+    least, most = min(scatter_1, scatter_2), max(scatter_1, scatter_2)
     if exponent > _POSITIVE * error:
-        return CHAOTIC
-    if (abs(exponent) + _POSITIVE * error) * period <= _ZERO:
+        grown = exponent * (time_1 + time_2) > _GROWN and least > (_SCATTERED * mean_1) ** 2
+        return CHAOTIC if grown and most <= _SAME_SCATTER * least else TRANSIENT
+    if (abs(exponent) + _POSITIVE * error) * period <= _ZERO and c.lap == 0.0 and most <= _SAME_ON_TORUS * least:
         return QUASI_PERIODIC
     return TRANSIENT

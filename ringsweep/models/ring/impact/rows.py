@@ -27,9 +27,12 @@ def row_of(scene, mode, forcing, y, seen):
     motion = motion_of(scene, y, ring_omega)
     first = contact_of(scene.balls, 1, motion)
     second = contact_of(scene.balls, 2, motion) if ring.contact_count(scene.closed.body) == 2 else first
+    # On an edge the mode knows on which side of it a contact rubs.
     surface = scene.closed.surface
-    _, _, zone_1 = coefficients(surface, locate(surface, first.alpha - theta)[0])
-    _, _, zone_2 = coefficients(surface, locate(surface, second.alpha - theta)[0])
+    segment_1 = locate(surface, first.alpha - theta)[0] if mode.open % 2 == 1 else mode.place_1[0]
+    segment_2 = locate(surface, second.alpha - theta)[0] if mode.open >= 2 else mode.place_2[0]
+    _, _, zone_1 = coefficients(surface, segment_1)
+    _, _, zone_2 = coefficients(surface, segment_2)
     return (
         psi,
         rate,
