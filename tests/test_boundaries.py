@@ -111,7 +111,7 @@ class TestBoundary:
 
         netcdf.save(ds, tmp_path / "my.nc")
         assert cli.main(["map", str(tmp_path / "my.nc"), "--boundaries", "jammed"]) == 0
-        assert "the map has no boundary of jammed" in capsys.readouterr().err + caplog.text
+        assert "no boundary of jammed" in capsys.readouterr().err + caplog.text
         assert cli.main(["info", str(tmp_path / "my-jammed.nc")]) == 0
         assert "boundary of jammed: 0 curves, 0 points" in capsys.readouterr().out
 

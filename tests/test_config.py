@@ -220,7 +220,9 @@ class TestPint:
     [
         ("15 mm", "kg", "wrong unit"),
         ("5 Hz", "rad/s", "wrong unit"),
-        ("30 rpm", "Hz", "wrong unit"),
+        ("30 rpm", "Hz", "a frequency counts cycles: 60 rpm, or 2 pi rad/s, is 1 Hz"),
+        ("60 deg/s", "rad", "an angle is wanted, not its rate"),
+        ("15 mm", "rad", "the angle of an arc is its length divided by the radius"),
         ("15 deg", "1", "wrong unit"),
         ("3 bananas", "m", "not a known unit"),
         ("3 m^9^9^9", "m", "not a known unit"),

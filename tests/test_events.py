@@ -44,13 +44,19 @@ class TestEvents:
         assert contacts[-1] == run.separating_contact
         assert run.event_time[-1] == run.t_separation
 
-    def test_edges_are_told_in_runs_that_go_on_too(self, scene):
+    def test_edges_are_told_in_runs_that_go_on_too(self, scene, capsys):
         """Up to the lost contact both runs are the same; afterwards contacts that hold meet edges."""
         run = ringsweep.simulate(scene | {"impact": {"restitution": 0.5}})
         alone = ringsweep.simulate(scene)
         edges = told(run, "edge")
         np.testing.assert_allclose(edges[edges < alone.t_separation.item()], told(alone, "edge"), rtol=1e-9)
         assert edges[-1] > alone.t_separation
+        print_events(run)
+        hardest = int(np.argmax(run.impact_speed.values))
+        assert (
+            f"hardest impact: {run.impact_speed_max.item():.6g} m/s at {run.impact_time.values[hardest]:.9g} s; "
+            f"greatest gap: {run.gap_max.item():.6g} m"
+        ) in capsys.readouterr().out
         # Each change of a zone is at an edge, or while its contact is open.
         for zone, gap in ((run.zone_1, run.gap_1), (run.zone_2, run.gap_2)):
             at = np.flatnonzero(np.diff(zone.values))

@@ -46,7 +46,7 @@ class TestFit:
         half = 2.0227 * deviation / np.sqrt(t @ t)
         ends = [found.low, found.high, found.profile_low, found.profile_high]
         assert [end.item() for end in ends] == pytest.approx(2 * [slope - half, slope + half], rel=1e-3)
-        given = ringsweep.fit(BELT, {"t": t, "x": x}, {"belt.velocity": (0.05, 0.13)}, start=2, noise="3 mm")
+        given = ringsweep.fit(BELT, {"t": t, "x (mm)": 1e3 * x}, {"belt.velocity": (0.05, 0.13)}, start=2, noise="3 mm")
         assert given.standard_error.item() == pytest.approx(0.003 / np.sqrt(t @ t), rel=1e-6)
 
     def test_a_wrong_start_finds_the_numbers_that_made_the_history(self):

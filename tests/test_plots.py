@@ -407,6 +407,15 @@ def test_hatching_of_a_large_map_is_one_patch_for_each_colour(tmp_path, monkeypa
     plots.save(figure, tmp_path / "map.png")
 
 
+def test_axes_are_saved_with_their_figure(tmp_path):
+    figure = plots.regime_map(make_sweep())
+    for name, what in (("figure.png", figure), ("axes.png", figure.axes[0])):
+        plots.save(what, tmp_path / name)
+    assert (tmp_path / "axes.png").read_bytes() == (tmp_path / "figure.png").read_bytes()
+    with pytest.raises(InputError, match="a width in mm"):
+        plots.style(width="85 mm")
+
+
 def test_share_of_a_regime_has_no_label_of_a_regime():
     share = (words(make_sweep()["regime"]) == "separating").mean("drive_amplitude").rename("share that separates")
     ax = panel()

@@ -299,7 +299,7 @@ def test_indices_of_the_way_of_a_body_that_rides_are_those_of_a_product() -> Non
         2 * [both / (velocity + span + both)], abs=0.01
     )
     assert ds.t_end_sobol_first.values == pytest.approx([0.0, 1.0], abs=0.01)
-    # All ride: nothing is known of what the regime hangs on.
+    # All ride: nothing is known of what the regime depends on.
     assert (ds.sobol_first_high == 1.0).all()
 
 

@@ -179,15 +179,19 @@ def test_results_on_disk_are_read_chunk_by_chunk(tmp_path, caplog):
 
 
 def test_map_that_one_word_fills_says_what_to_look_at(caplog):
-    def told(regimes):
+    def told(regimes, scene=SCENE):
         caplog.clear()
         with caplog.at_level("INFO", "ringsweep"):
-            _hint_at_one_word(xr.Dataset({"regime": (("x", "y"), regimes)}))
+            _hint_at_one_word(xr.Dataset({"regime": (("x", "y"), regimes)}), load(config(scene)))
         return caplog.messages
 
     regimes = np.full((5, 5), OSCILLATORY, dtype="int8")
     assert told(regimes)[0].startswith("all 25 cells are oscillatory: do the axes reach far enough")
     assert not told(regimes[:3, :3])
+    belt = {"model": "belt", "body": {"mass": 1.0}, "spring": {"stiffness": 2.0}, "belt": {"velocity": 0.1}}
+    belt |= {"friction": {"law": "coulomb", "mu_k": 0.1}, "time": {"span": 1.0}}
+    zoned = SCENE | {"zone": {"half_angle": 0.3}}
+    assert ["zone" in told(regimes, scene)[0] for scene in (belt, zoned)] == [False, True]
     regimes[4, 4] = 0
     assert not told(regimes)
 

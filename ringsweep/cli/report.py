@@ -124,6 +124,10 @@ def print_events(run: xr.Dataset) -> None:
             who = contacts[k].replace("contact_", " contact ").replace("both", " both contacts").replace("none", "")
             speed = f", {speeds[k]:.6g} m/s" if k in speeds else ""
             print(f"  {run['event_time'].values[k]:.9g} s {kind}{who}{speed}")
+    if speeds:
+        hardest = max(speeds, key=speeds.__getitem__)
+        when = run["event_time"].values[hardest]
+        print(f"hardest impact: {speeds[hardest]:.6g} m/s at {when:.9g} s; greatest gap: {float(run['gap_max']):.6g} m")
 
 
 # Parameters of the greatest influence on a regime that are printed.

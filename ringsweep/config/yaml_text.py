@@ -113,12 +113,12 @@ class Document:
                 raise InputError(path, problem, file=str(file), line=1)
             columns: dict[str, tuple[str, list[Any]]] = {}
             for cell in header:
-                match = re.fullmatch(r"([^\s(\[]+)\s*(?:[(\[](.*)[)\]])?", cell.strip())
-                if match is None or match[1] in columns:
+                name, unit = name_and_unit(cell)
+                if not name or name in columns:
                     raise InputError(
                         path, f"column {show(cell)} has no name, or the name of another column", file=str(file), line=1
                     )
-                columns[match[1]] = match[2] or "", []
+                columns[name] = unit, []
             if not columns:
                 raise InputError(path, "the file is empty", file=str(file))
             count = 0
@@ -137,6 +137,12 @@ class Document:
         for column in columns:
             self.locations[f"{section}.{column}"] = str(file), 1
         return {column: cells for column, (_, cells) in columns.items()}
+
+
+def name_and_unit(header: str) -> tuple[str, str]:
+    """Name and unit of a column, from a header such as ``phi (deg)``; both empty if it is none."""
+    match = re.fullmatch(r"([^\s(\[]+)\s*(?:[(\[](.*)[)\]])?", header.strip())
+    return (match[1], match[2] or "") if match else ("", "")
 
 
 def read(config: str | os.PathLike[str] | Mapping[str, Any]) -> Document:

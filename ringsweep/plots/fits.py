@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import textwrap
 from typing import Any
 
 import numpy as np
@@ -9,7 +11,10 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from ringsweep.errors import InputError
-from ringsweep.plots.style import PAIR_COLOURS, figure_width, legend_above, on_page, small_ticks
+from ringsweep.plots.style import PAIR_COLOURS, SMALL, figure_width, legend_above, on_page, small_ticks
+
+# Least height of the picture, inches.
+_LEAST_HEIGHT = 4.6
 
 
 def fit(ds: xr.Dataset) -> Figure:
@@ -51,19 +56,21 @@ def fit(ds: xr.Dataset) -> Figure:
     if not {"measured", "fitted", "profile_misfit"} <= set(ds):
         raise InputError("ds", "is no fit: ringsweep fit makes one")
     width, count = figure_width(), ds.sizes["parameter"]
-    figure = Figure(figsize=(width, 0.95 * width), layout="constrained")
+    figure = Figure(figsize=(width, max(0.95 * width, _LEAST_HEIGHT)), layout="constrained")
     parts: Any = figure.subfigures(2, 1, height_ratios=[3, 2])
     above, below = parts
-    data, rest = above.subplots(2, 1, sharex=True, height_ratios=[2, 1])
+    data, rest = above.subplots(2, 1, sharex=True, height_ratios=[3, 2])
     one, two = (on_page(colour) for colour in PAIR_COLOURS)
     time, unit = ds["t"].values, ds["measured"].attrs["units"]
     data.plot(time, ds["measured"].values, ".", color=two, markersize=3, label="measured")
     data.plot(time, ds["fitted"].values, color=one, label="fitted")
-    data.set_ylabel(f"{str(ds['fitted'].attrs['long_name']).removeprefix('fitted ')} ({unit})")
+    name = textwrap.fill(str(ds["fitted"].attrs["long_name"]).removeprefix("fitted "), 18)
+    data.set_ylabel(f"{name} ({unit})", fontsize=SMALL)
     legend_above(data)
     rest.axhline(0.0, color=one, linewidth=1.0)
     rest.plot(time, ds["residual"].values, ".", color=two, markersize=3)
-    rest.set(xlabel="time (s)", ylabel=f"residual ({unit})")
+    rest.set_xlabel("time (s)", fontsize=SMALL)
+    rest.set_ylabel(f"residual ({unit})", fontsize=SMALL)
     panels = np.atleast_1d(below.subplots(1, count, sharey=True))
     for k, ax in enumerate(panels):
         own = ds.isel(parameter=k)
@@ -71,15 +78,18 @@ def fit(ds: xr.Dataset) -> Figure:
         known = np.isfinite(growth)
         # Profiles are narrow: ticks of the values themselves would differ in their last digits only.
         fitted = float(own["value"])
-        ax.plot(own["profile_value"].values[known] - fitted, growth[known], ".-", color=one)
+        apart = own["profile_value"].values[known] - fitted
+        power = math.floor(math.log10(float(np.abs(apart).max(initial=0.0)) or 1.0))
+        scale = 10.0**power
+        ax.plot(apart / scale, growth[known], ".-", color=one)
         for name in ("profile_low", "profile_high"):
             if np.isfinite(own[name]):
-                ax.axvline(float(own[name]) - fitted, color=two, linestyle="--", linewidth=1.0)
-        label = f"{own['parameter'].item()} \N{MINUS SIGN} {fitted:.6g}"
+                ax.axvline((float(own[name]) - fitted) / scale, color=two, linestyle="--", linewidth=1.0)
+        # Digits of the value that its profile does not tell would be rounding.
+        label = f"{own['parameter'].item().rpartition('.')[2]} \N{MINUS SIGN}\n{fitted:.{max(2 - power, 0)}f}"
         unit = str(own["unit"].item())
-        ax.set_xlabel(label if unit == "1" else f"{label} ({unit})")
+        ax.set_xlabel(f"{label}\n($10^{{{power}}}${'' if unit == '1' else f' {unit}'})", fontsize=SMALL)
         ax.locator_params(axis="x", nbins=4)
-        ax.ticklabel_format(axis="x", style="sci", scilimits=(-2, 3))
-    panels[0].set_ylabel("growth of the misfit\n(in squares of the noise)")
+    panels[0].set_ylabel("growth of the misfit\n(squares of the noise)", fontsize=SMALL)
     small_ticks(data, rest, *panels)
     return figure

@@ -173,10 +173,10 @@ def sensitivity_panel(ds: xr.Dataset, ax: Axes | None = None, word: str | None =
     ax.set_xlim(0.0, 2.0 if screened else 1.0)
     share = float(ds["probability"])
     ax.set_xlabel(("elementary effect" if screened else "Sobol index") + " (95 % interval)")
-    ax.set_title(folded([f"what {word} hangs on", f"probability {share:.1%}"], width_of(ax)), fontsize="medium")
+    ax.set_title(folded([f"what {word} depends on", f"probability {share:.1%}"], width_of(ax)), fontsize="medium")
     handles: list[Artist] = [
         Patch(color=on_page(colour), label=label) for colour, label in zip(PAIR_COLOURS, labels, strict=True)
     ]
-    place_legend(ax, handles, "lower right")
+    place_legend(ax, handles, "below")
     small_ticks(ax)
     return ax

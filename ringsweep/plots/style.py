@@ -147,7 +147,8 @@ def style(
         raise InputError("name", f"{name!r} is no style; choose from {', '.join(_STYLES)}")
     if angles not in ("deg", "rad"):
         raise InputError("angles", f"{angles!r} is neither 'deg' nor 'rad'")
-    if width is not None and not 20.0 <= width <= 2000.0:
+    given: Any = width
+    if not (given is None or (isinstance(given, int | float) and 20.0 <= given <= 2000.0)):
         raise InputError("width", f"{width!r} is not between 20 and 2000: a width in mm")
     usual: Any = matplotlib.rcParamsDefault
     settings = {key: usual[key] for chosen in _STYLES.values() for key in chosen}

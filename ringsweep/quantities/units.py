@@ -198,7 +198,7 @@ def _convert(value: Any, parameter: Parameter, path: str) -> float:
 
 def _factor_or_error(unit: str, value: str, parameter: Parameter, path: str) -> float:
     if not parameter.unit:
-        raise InputError(path, f"{show(value)} has a unit, but {parameter.long_name} takes a plain number")
+        raise InputError(path, f"{show(value)} has a unit, but {parameter.long_name} takes a plain number in SI units")
     target = "has no unit" if parameter.unit == "1" else f"is in {parameter.unit}"
     try:
         return _factor(unit, parameter.unit)
@@ -207,8 +207,28 @@ def _factor_or_error(unit: str, value: str, parameter: Parameter, path: str) -> 
             path, f"{show(value)}: {show(unit)} is not a known unit; {parameter.long_name} {target}"
         ) from None
     except ValueError:
-        hint = ": the angle of an arc is its length divided by the radius" if parameter.unit == "rad" else ""
-        raise InputError(path, f"{show(value)} has the wrong unit: {parameter.long_name} {target}{hint}") from None
+        text = f"{show(value)} has the wrong unit: {parameter.long_name} {target}{_hint(unit, parameter.unit)}"
+        raise InputError(path, text) from None
+
+
+#: What a unit of another dimension may have meant: unit that is wanted, one that was given, and the advice.
+_MEANT = (
+    ("rad", "m", "the angle of an arc is its length divided by the radius"),
+    ("rad", "rad/s", "an angle is wanted, not its rate; the drive `constant` takes a rate"),
+    ("Hz", "rad/s", "a frequency counts cycles: 60 rpm, or 2 pi rad/s, is 1 Hz"),
+)
+
+
+def _hint(given: str, wanted: str) -> str:
+    """End of the message about a unit of another dimension."""
+    for target, source, advice in _MEANT:
+        if wanted == target:
+            try:
+                _factor(given, source)
+            except (LookupError, ValueError):
+                continue
+            return f": {advice}"
+    return ""
 
 
 @lru_cache(maxsize=256)

@@ -40,7 +40,7 @@ DOUBTS = {
     "failed": "the run failed, or its repetition at a tighter tolerance",
     "answers_differ": "two resolutions differ in regime, motion or separating contact",
     "law_not_obeyed": "the run does not obey its law or its balance of energy, or an impact gains energy",
-    "close_call": "the regime hangs on less than the error of the run",
+    "close_call": "the regime depends on less than the error of the run",
     "not_finite": "a number is not finite",
     "same_steps": "both resolutions took the same steps, so that their agreement says nothing",
     "diverging": "nearby runs diverge, and have no common statistics",

@@ -90,7 +90,7 @@ def located(ds: xr.Dataset, regime: str, configuration: Config, tolerance: float
     high = np.concatenate([other for _, other in sides])
     axis = np.repeat(np.arange(len(dims)), [len(one) for one, _ in sides])
     if not len(low):
-        logger.warning("the map has no boundary of %s: no two neighbouring certified cells differ in it", regime)
+        logger.warning("no boundary of %s: no two neighbouring certified cells differ in it", regime)
     columns = {str(name): c for name, c in ds.coords.items() if "path" in c.attrs}
     place = {name: _values(c, dims, low) for name, c in columns.items()}
     ends = np.zeros((2, len(low)))

@@ -19,7 +19,7 @@ from ringsweep.compile import readable_compile_errors
 from ringsweep.config import Config, load, sweepable, with_values
 from ringsweep.config.axes import Axes, build_axes, swept_parameter
 from ringsweep.config.sections import read_values, suggestion
-from ringsweep.config.yaml_text import Document
+from ringsweep.config.yaml_text import Document, name_and_unit
 from ringsweep.errors import InputError
 from ringsweep.models import batch, model_of
 from ringsweep.quantities.parameters import Choice, Parameter
@@ -259,7 +259,11 @@ def _columns(doc: Document, data: Any) -> Mapping[str, Any]:
         columns = {str(name): data[name].tolist() for name in data.columns}
     else:
         raise InputError("data", f"a CSV file, a mapping or a DataFrame is expected, got {show(data)}")
-    return {"t" if name == "time" else name: column for name, column in columns.items()}
+    found = {}
+    for header, column in columns.items():
+        name, unit = name_and_unit(str(header))
+        found["t" if name == "time" else name or header] = [f"{value} {unit}" for value in column] if unit else column
+    return found
 
 
 def _times(columns: Mapping[str, Any]) -> tuple[str, Floats]:

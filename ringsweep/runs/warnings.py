@@ -48,7 +48,7 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
     ended_at_start = unstable = 0
     count = ended.size
     if "regime" in results:
-        _hint_at_one_word(results)
+        _hint_at_one_word(results, config)
     largest = 0.0
     origin = results["origin"].variable if "origin" in results else None
     for _, _, region in Layout(ended.shape).chunks():
@@ -86,7 +86,7 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
         logger.warning("%s at t = 0: is a unit or the initial state wrong?", runs)
 
 
-def _hint_at_one_word(results: xr.Dataset) -> None:
+def _hint_at_one_word(results: xr.Dataset, config: Config) -> None:
     """Say what to look at where one word fills a map: its axes may not reach what decides."""
     regime = results["regime"].variable
     if regime.size < _MAP:
@@ -96,11 +96,13 @@ def _hint_at_one_word(results: xr.Dataset) -> None:
         found.update(np.unique(regime[region].values).tolist())
         if len(found) > 1:
             return
+    zones = any(structure.arcs for structure in config.scene.structures.values())
     logger.info(
-        "all %d cells are %s: do the axes reach far enough, is the span long enough, does a contact meet the zone? "
+        "all %d cells are %s: do the axes reach far enough, is the span long enough%s? "
         "ringsweep simulate shows one run",
         regime.size,
         REGIMES[found.pop()],
+        ", does a contact meet the zone" if zones else "",
     )
 
 

@@ -106,7 +106,8 @@ class Checkpoint:
             changes = differences(before, self.identity)
             raise InputError(
                 str(self.folder),
-                f"holds finished cells of another sweep: {changes}. --fresh starts over, -o keeps both",
+                f"holds finished cells of another sweep: {changes}. --fresh (in Python fresh=True) starts over, "
+                "another output file keeps both",
             )
         if before != self.identity:
             self.working_folder.write(MANIFEST, json.dumps(self.identity, indent=1).encode())
