@@ -367,7 +367,9 @@ def without_return(c, period, growth):
     least, most = min(scatter_1, scatter_2), max(scatter_1, scatter_2)
     if exponent > _POSITIVE * error:
         grown = exponent * (time_1 + time_2) > _GROWN and least > (_SCATTERED * mean_1) ** 2
-        return CHAOTIC if grown and most <= _SAME_SCATTER * least else TRANSIENT
-    if (abs(exponent) + _POSITIVE * error) * period <= _ZERO and c.lap == 0.0 and most <= _SAME_ON_TORUS * least:
+        # A few cycles tell no scatter.
+        return CHAOTIC if grown and (second < _FEWEST or most <= _SAME_SCATTER * least) else TRANSIENT
+    torus = c.lap == 0.0 and second >= _FEWEST and most <= _SAME_ON_TORUS * least
+    if torus and (abs(exponent) + _POSITIVE * error) * period <= _ZERO:
         return QUASI_PERIODIC
     return TRANSIENT
