@@ -20,25 +20,24 @@ SUFFIXES = (".pdf", ".png", ".svg")
 def save(figure: Figure | Axes, path: str | os.PathLike[str]) -> None:
     """Write a figure to a file. If writing fails, an older file of that name stays as it was.
 
-        Parameters
-        ----------
-        figure : matplotlib.figure.Figure or matplotlib.axes.Axes
-            Figure to write, or axes in it.
-        path : path-like
-            File to write or replace. Its suffix, one of `SUFFIXES`, decides the format.
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure or matplotlib.axes.Axes
+        Figure to write, or axes in it.
+    path : path-like
+        File to write or replace. Its suffix, one of `SUFFIXES`, decides the format.
 
-        Raises
-        ------
-        InputError
-            If the suffix is unknown or `path` cannot be written.
+    Raises
+    ------
+    InputError
+        If the suffix is unknown or `path` cannot be written.
 
-        Examples
-        --------
-        >>> from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-        >>> save(Figure(), "my.txt")
-        Traceback (most recent call last):
-        ringsweep.errors.InputError: my.txt: pictures end in .pdf, .png, .svg, not in '.txt'
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> save(Figure(), "my.txt")
+    Traceback (most recent call last):
+    ringsweep.errors.InputError: my.txt: pictures end in .pdf, .png, .svg, not in '.txt'
     """
     suffix = suffix_of(path, SUFFIXES, "pictures")
     with replacing(path) as temporary:
