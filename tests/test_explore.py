@@ -163,7 +163,8 @@ class TestExplore:
         from IPython.core.pylabtools import select_figure_formats
         from matplotlib import pyplot
 
-        monkeypatch.setattr("matplotlib.get_backend", lambda: "widget")
+        # Older IPython knows ipympl by this name only.
+        monkeypatch.setattr("matplotlib.get_backend", lambda: "module://ipympl.backend_nbagg")
         monkeypatch.setattr(FigureCanvasAgg, "toolbar_position", "left", raising=False)
         shown = []
         monkeypatch.setattr("IPython.display.display", shown.append)
