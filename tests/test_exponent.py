@@ -53,7 +53,12 @@ def test_multipliers_of_den_hartog_without_stops():
             -after / before, abs=1e-9
         )
     exponent = np.log(abs(after / before)) / period
-    assert found.lyapunov.item() == pytest.approx(exponent, abs=3.0 * found.lyapunov_error.item())
+    assert found.lyapunov.item() == pytest.approx(exponent, rel=1e-8)
+    turned = [(found[f"multiplier_{k}"] * np.exp(1j * found[f"multiplier_angle_{k}"])).item() for k in (1, 2)]
+    rotation = np.array([[np.cos(half), np.sin(half)], [-np.sin(half), np.cos(half)]])
+    exact = np.linalg.eigvals(np.linalg.matrix_power(np.diag([1.0, after / before]) @ rotation, 2))
+    np.testing.assert_allclose(turned, sorted(exact, key=lambda one: -one.imag), atol=1e-8)
+    np.testing.assert_allclose(turned, [-0.4534 + 0.2331j, -0.4534 - 0.2331j], atol=1e-4)
 
 
 def test_multipliers_of_a_linear_oscillator():
@@ -62,7 +67,11 @@ def test_multipliers_of_a_linear_oscillator():
     found = run(scene, {"force.amplitude": [0.5], "force.frequency": [0.2]})
     assert found.multiplier_1.item() == pytest.approx(np.exp(-0.25), rel=1e-11)
     assert found.multiplier_2.item() == pytest.approx(np.exp(-0.25), rel=1e-11)
-    assert found.lyapunov.item() == pytest.approx(-0.05, abs=3.0 * found.lyapunov_error.item())
+    assert found.lyapunov.item() == pytest.approx(-0.05, rel=1e-10)
+    # Disturbances oscillate at the frequency of the free oscillator, sampled once a period of 5 s.
+    turned = np.angle(np.exp(5j * np.sqrt(1.0 - 0.05**2)))
+    assert abs(turned) == pytest.approx(found.multiplier_angle_1.item(), rel=1e-10)
+    assert found.multiplier_angle_2.item() == -found.multiplier_angle_1.item()
 
 
 def test_exponent_of_the_oscillator_of_ueda():
@@ -238,7 +247,14 @@ def test_the_record_changes_no_other_outcome():
     scene = FORCED | {"time": {"span": "30 s"}, "belt": {"velocity": 0.1}}
     plain, asked = (run(scene, {"force.frequency": [0.1, 0.2]}, exponent) for exponent in (False, True))
     added = set(asked.data_vars) - set(plain.data_vars)
-    assert added == {"lyapunov", "lyapunov_error", "multiplier_1", "multiplier_2"}
+    assert added == {
+        "lyapunov",
+        "lyapunov_error",
+        "multiplier_1",
+        "multiplier_2",
+        "multiplier_angle_1",
+        "multiplier_angle_2",
+    }
     assert asked.drop_vars(added).equals(plain)
 
 

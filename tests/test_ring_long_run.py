@@ -147,9 +147,12 @@ def test_multipliers_are_those_of_the_period_map(amplitude, sticks, rtol):
     for d in 1e-6 * np.eye(2):
         one, other = (reference.after(0.0, 1.0, state + way * d, sign, inside)[0] for way in (1.0, -1.0))
         columns.append((one - other) / 2e-6)
-    values = np.sort(np.abs(np.linalg.eigvals(np.transpose(columns))))
+    exact = np.linalg.eigvals(np.transpose(columns))
+    values = np.sort(np.abs(exact))
     assert found.multiplier_1.item() == pytest.approx(values[1], rel=1e-6)
     assert found.multiplier_2.item() == pytest.approx(values[0], rel=1e-6, abs=1e-6)
+    angles = np.abs(np.angle(exact[np.abs(exact) > 1e-3 * values[1]]))
+    assert abs(found.multiplier_angle_1.item()) == pytest.approx(angles.max(), abs=1e-5)
 
 
 @pytest.mark.parametrize("law", ["stiction", "bengisu-akay"])

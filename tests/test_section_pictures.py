@@ -90,6 +90,45 @@ def test_a_section_shows_its_points_in_time(diagram):
         plots.section_panel(diagram)
 
 
+@pytest.fixture
+def multipliers():
+    """A pair that turns around, one on the way out at -1, and one that stick has erased; no periodic motion at last."""
+    numbers = {
+        "multiplier_1": ("speed", [0.5, 1.5, 0.8, np.nan], {"units": "1"}),
+        "multiplier_2": ("speed", [0.5, 0.1, 0.0, np.nan], {"units": "1"}),
+        "multiplier_angle_1": ("speed", [1.0, np.pi, 0.0, np.nan], {"units": "rad"}),
+        "multiplier_angle_2": ("speed", [-1.0, np.pi, 0.0, np.nan], {"units": "rad"}),
+    }
+    return xr.Dataset(numbers, coords={"speed": ("speed", [4.0, 1.0, 2.0, 3.0], {"units": "m s-1"})})
+
+
+def test_multipliers_stand_in_the_complex_plane_with_the_unit_circle(multipliers):
+    ax = plots.multiplier_circle(multipliers, ax=Figure().subplots())
+    first, second = points(ax)
+    place = first.get_offsets()[[0, 1, 3]]
+    pair = [0.5 * np.cos(1.0), 0.5 * np.sin(1.0)]
+    np.testing.assert_allclose(place, [[-1.5, 0.0], [0.8, 0.0], pair], atol=1e-12)
+    np.testing.assert_allclose(second.get_offsets()[3], [pair[0], -pair[1]])
+    # One outside the unit circle is within the picture.
+    assert ax.get_xlim()[0] < -1.5
+    assert ax.get_aspect() == 1.0
+    with pytest.raises(InputError, match="exponent: true"):
+        plots.multiplier_circle(multipliers.drop_vars("multiplier_angle_1"))
+
+
+def test_the_circle_tells_up_from_down_by_its_marks(multipliers):
+    both = xr.concat([multipliers, multipliers], xr.DataArray(["up", "down"], dims="direction", name="direction"))
+    ax = plots.multiplier_circle(both, ax=Figure().subplots())
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["up", "down"]
+    assert len({one.get_paths()[0].vertices.tobytes() for one in points(ax)}) == 2
+
+
+def test_the_command_draws_multipliers_of_one_axis_in_the_circle(multipliers, diagram, tmp_path):
+    multipliers.assign_attrs(diagram.attrs).to_netcdf(tmp_path / "one.nc")
+    assert cli.main(["map", str(tmp_path / "one.nc"), "--var", "multiplier_1"]) == 0
+    assert (tmp_path / "one-multiplier_1.png").exists()
+
+
 def test_the_command_chooses_the_diagram_by_itself(diagram, tmp_path, capsys):
     file = tmp_path / "diagram.nc"
     diagram.to_netcdf(file)

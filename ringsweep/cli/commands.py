@@ -121,16 +121,18 @@ def map_command(arguments: argparse.Namespace) -> None:
 
 def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
     from ringsweep import plots
-    from ringsweep.plots.sections import POINTS, has_diagram, points_of
+    from ringsweep.plots.sections import POINTS, has_circle, has_diagram, points_of
+    from ringsweep.plots.selection import select
     from ringsweep.storage import files, netcdf
 
     selection = dict(_selection(text) for text in arguments.sel)
     fixed = {name.replace(".", "_") for name in selection}
     diagram = arguments.var in POINTS
+    # A file of one axis is drawn as a diagram, unless something is asked for that only a map has.
+    plain = not (arguments.y or arguments.log or arguments.boundaries or str(arguments.output).endswith(".html"))
+    along = result.isel(dict.fromkeys(fixed & set(map(str, result.dims)), 0))
+    circle = str(arguments.var).startswith("multiplier_") and plain and has_circle(along)
     if arguments.var is None:
-        # A file of one axis is drawn as a diagram, unless something is asked for that only a map has.
-        plain = not (arguments.y or arguments.log or arguments.boundaries or str(arguments.output).endswith(".html"))
-        along = result.isel(dict.fromkeys(fixed & set(map(str, result.dims)), 0))
         diagram = plain and has_diagram(along)
         arguments.var = points_of(result)[0] if diagram else "regime"
     if arguments.var == "attractor" and points_of(result):
@@ -176,6 +178,8 @@ def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None
             plots.save_page(result, target, *chosen)
         elif diagram:
             plots.save(plots.bifurcation(result, arguments.x, arguments.var, selection), target)
+        elif circle:
+            plots.save(_panel(plots.multiplier_circle, select(result, selection)[0], x=arguments.x), target)
         else:
             plots.save(plots.regime_map(result, *chosen, curves, norm="log" if arguments.log else None), target)
     except InputError as error:

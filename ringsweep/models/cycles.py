@@ -94,8 +94,9 @@ class Cycles(NamedTuple):
         End of the last cycle, and the state with which later states are compared.
     since, most : float
         Cycles since the reference, and cycles after which it is replaced.
-    lap : float
-        Cycles in a lap; 0 if the motion did not return.
+    lap, half : float
+        Cycles in a lap, 0 if the motion did not return; and displacement after half of the last one, m, NaN if its
+        cycles are odd in number.
     laps : Laps
     sum, squares : float
         Sums of the swings of all cycles, m, and of their squares.
@@ -118,6 +119,7 @@ class Cycles(NamedTuple):
     since: Any
     most: Any
     lap: Any
+    half: Any
     laps: Laps
     sum: Any
     squares: Any
@@ -196,7 +198,7 @@ def begin(period, start):
     corner, part = Corner(0.0, start), Part(0.0, start, 0.0, 0.0, 0.0)
     laps = Laps(0.0, 0.0, 0.0, RETURN, corner, corner)
     sums = 0.0, 0.0, part, part, nan, nan, nan
-    return Cycles(0.0, period, start.x, start.x, 0.0, 0.0, 0.0, start, start, 0.0, 1.0, 0.0, laps, *sums)
+    return Cycles(0.0, period, start.x, start.x, 0.0, 0.0, 0.0, start, start, 0.0, 1.0, 0.0, nan, laps, *sums)
 
 
 @absorbed
@@ -280,6 +282,7 @@ def closed(scene, c, mark, count, known, next_end, swing, fast):
         select(renew, 0.0, since),
         most,
         lap,
+        select(lap == c.lap, select(since + since == lap, mark.x, c.half), nan),
         laps,
         sum_now,
         squares,
@@ -317,8 +320,8 @@ def returns_each_time(scene, c, fast, largest_multiplier, growth):
         # Gaps that shrink add up to a geometric series. On a torus they vary, but little in a few laps.
         ratio = (laps.gap / laps.first_gap) ** (1.0 / (laps.number - 1.0))
         to_come = min(to_come, laps.gap * ratio / (1.0 - ratio)) if ratio < 1.0 else to_come
-    # Where disturbances change their sign in each cycle, a lap of two returns before a lap of one does.
-    merging = forced and c.lap == 2.0 and abs(c.drift) <= _MERGING * to_come * c.swing
+    # Where disturbances change their sign in each lap, two of these laps return before one does.
+    merging = forced and abs(difference(scene, c.half, c.reference.x)) <= _MERGING * to_come * c.swing
     return to_come <= _TREND and not merging
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import acos, cos, exp, inf, isnan, log, nan, pi, sqrt
+from math import acos, atan2, cos, exp, inf, isnan, log, nan, pi, sqrt
 from typing import Any, NamedTuple
 
 from ringsweep.compile import hook, inlined, unrolled
@@ -12,7 +12,10 @@ from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.ring import Ring
 
 #: Outcomes of a run whose exponent is asked for, after the others.
-OUTCOMES = "lyapunov", "lyapunov_error", "multiplier_1", "multiplier_2"
+OUTCOMES = (
+    *("lyapunov", "lyapunov_error", "multiplier_1", "multiplier_2"),
+    *("multiplier_angle_1", "multiplier_angle_2"),
+)
 
 #: Share of the span after which the exponent is measured, and number of blocks of the rest.
 _SKIPPED, _BLOCKS = 0.25, 24
@@ -51,6 +54,31 @@ class Blocks(NamedTuple):
     until: float
 
 
+class Multipliers(NamedTuple):
+    """Floquet multipliers of the last lap that returned; NaN before.
+
+    Attributes
+    ----------
+    first, second : float
+        The two largest magnitudes.
+    angle_1, angle_2 : float
+        Their arguments, rad; of a pair the positive one is the first.
+    rate_1, rate_2 : float
+        Logarithms of the magnitudes over the period, 1/s.
+    change_1, change_2 : float
+        How much the rates differ from those of the lap before, 1/s.
+    """
+
+    first: float
+    second: float
+    angle_1: float
+    angle_2: float
+    rate_1: float
+    rate_2: float
+    change_1: float
+    change_2: float
+
+
 class Tangent(NamedTuple):
     """Disturbances of a run.
 
@@ -72,9 +100,7 @@ class Tangent(NamedTuple):
         without an event. Of several events at one instant the first one counts, since no mode lasts between them.
     keeps : float
         0 in a stick that keeps no disturbance of the sliding velocity; else 1.
-    multiplier_1, multiplier_2, rate, change : float
-        Multipliers of the last lap that returned; logarithm of the second one over the period, 1/s; and how much it
-        differs from that of the lap before.
+    multipliers : Multipliers
     """
 
     lap: Flow
@@ -86,10 +112,7 @@ class Tangent(NamedTuple):
     entry: Any
     gradient: Any
     keeps: float
-    multiplier_1: float
-    multiplier_2: float
-    rate: float
-    change: float
+    multipliers: Multipliers
 
 
 # ---- matrices -----------------------------------------------------------------------------------
@@ -151,18 +174,30 @@ def logarithm(x):
 
 
 @unrolled
-def _magnitudes(length, vector, matrix, log_determinant):
-    """Magnitudes of the two largest eigenvalues, and the logarithm of the second."""
+def _eigenvalues(length, vector, matrix, log_determinant):
+    """Magnitudes of the two largest eigenvalues, their logarithms, and their arguments."""
     return [f"return {'_of_two_by_two' if length == 2 else '_of_three_by_three'}(matrix, log_determinant)"]
 
 
 @inlined
 def _of_two_by_two(matrix, log_determinant):
+    # No mode of a motion turns the plane of its states over: real eigenvalues have one sign.
     a, b, c, d = matrix
-    root = 0.25 * (a - d) ** 2 + b * c
-    first = 0.5 * abs(a + d) + sqrt(root) if root >= 0.0 else exp(0.5 * log_determinant)
-    second = log_determinant - logarithm(first) if first > 0.0 else -inf
-    return first, exp(second), second
+    half, root = 0.5 * (a + d), 0.25 * (a - d) ** 2 + b * c
+    if root < 0.0:
+        size, angle = exp(0.5 * log_determinant), atan2(sqrt(-root), half)
+        return size, size, 0.5 * log_determinant, 0.5 * log_determinant, angle, -angle
+    first = abs(half) + sqrt(root)
+    log_1 = logarithm(first)
+    log_2 = log_determinant - log_1 if first > 0.0 else -inf
+    angle, second = _angle(half), exp(log_2)
+    return first, second, log_1, log_2, angle, angle if second > 0.0 else 0.0
+
+
+@inlined
+def _angle(x):
+    """Argument of a real number; 0 of zero."""
+    return pi if x < 0.0 else 0.0
 
 
 @inlined
@@ -170,13 +205,13 @@ def _of_three_by_three(matrix, log_determinant):
     a, b, c, d, e, f, g, h, i = matrix
     minors = a * e - b * d + a * i - c * g + e * i - f * h
     determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
-    first, second = _of_cubic(a + e + i, minors, determinant)
-    return first, second, logarithm(second)
+    first, second, angle_1, angle_2 = _of_cubic(a + e + i, minors, determinant)
+    return first, second, logarithm(first), logarithm(second), angle_1, angle_2
 
 
 @inlined
 def _of_cubic(trace, minors, determinant):
-    """The two largest magnitudes of the roots of ``x^3 - trace x^2 + minors x - determinant``."""
+    """The two largest roots of ``x^3 - trace x^2 + minors x - determinant``: their magnitudes and arguments."""
     third = trace / 3.0
     p, q = minors - trace * third, (minors - 2.0 * third * third) * third - determinant
     discriminant = 0.25 * q * q + p * p * p / 27.0
@@ -185,14 +220,20 @@ def _of_cubic(trace, minors, determinant):
         u = u ** (1.0 / 3.0)
         real = third + (p / (3.0 * u) - u if q > 0.0 else u - p / (3.0 * u))
         pair = sqrt(abs(minors - real * (trace - real)))
-        return max(abs(real), pair), pair if pair <= abs(real) else max(min(abs(real), pair), pair)
+        half = 0.5 * (trace - real)
+        angle = atan2(sqrt(max(pair * pair - half * half, 0.0)), half)
+        if pair > abs(real):
+            return pair, pair, angle, -angle
+        return abs(real), pair, _angle(real), angle
     radius = 2.0 * sqrt(max(-p / 3.0, 0.0))
-    angle = acos(min(max(-4.0 * q / radius**3, -1.0), 1.0)) / 3.0 if radius > 0.0 else 0.0
-    x = abs(third + radius * cos(angle))
-    y = abs(third + radius * cos(angle - 2.0 * pi / 3.0))
-    z = abs(third + radius * cos(angle + 2.0 * pi / 3.0))
-    largest, least = max(x, max(y, z)), min(x, min(y, z))
-    return largest, x + y + z - largest - least
+    turn = acos(min(max(-4.0 * q / radius**3, -1.0), 1.0)) / 3.0 if radius > 0.0 else 0.0
+    x = third + radius * cos(turn)
+    y = third + radius * cos(turn - 2.0 * pi / 3.0)
+    z = third + radius * cos(turn + 2.0 * pi / 3.0)
+    # x is the largest of the three, y the next, z the least.
+    first, other = (x, z) if abs(x) >= abs(z) else (z, x)
+    second = y if abs(y) > abs(other) else other
+    return abs(first), abs(second), _angle(first), _angle(second)
 
 
 # ---- the run ------------------------------------------------------------------------------------
@@ -243,7 +284,8 @@ def _begin(asked, scene, t):
     vector = _scaled(vector, 1.0 / _length(vector, frequency(scene)))
     zero, unit = _scaled(vector, 0.0), Flow(_unit(vector), 0.0)
     blocks = Blocks(-1.0, 0.0, 0.0, t, 0.0, t, 0.0, _SKIPPED * scene.span)
-    return Tangent(unit, unit, vector, 0.0, blocks, zero, zero, zero, 1.0, nan, nan, nan, inf)
+    multipliers = Multipliers(nan, nan, nan, nan, nan, nan, inf, inf)
+    return Tangent(unit, unit, vector, 0.0, blocks, zero, zero, zero, 1.0, multipliers)
 
 
 @inlined
@@ -279,21 +321,7 @@ def _is_pending(length, gradient):
 
 @inlined
 def _at(r, step, rates, entry, gradient, keeps):
-    return Tangent(
-        r.lap,
-        step,
-        r.vector,
-        r.growth,
-        r.blocks,
-        rates,
-        entry,
-        gradient,
-        keeps,
-        r.multiplier_1,
-        r.multiplier_2,
-        r.rate,
-        r.change,
-    )
+    return Tangent(r.lap, step, r.vector, r.growth, r.blocks, rates, entry, gradient, keeps, r.multipliers)
 
 
 @hook(absorb=True, optional=True)
@@ -311,7 +339,7 @@ def _observe(tangent, scene, before, cycles, t, duration):
     growth = r.growth + logarithm(length)
     vector = _scaled(vector, 1.0 / length) if length > 0.0 else r.vector
     unit = Flow(_unit(vector), 0.0)
-    multiplier_1, multiplier_2, rate, change = r.multiplier_1, r.multiplier_2, r.rate, r.change
+    multipliers = r.multipliers
     at_end = t - cycles.last.t <= 0.5 * duration
     if cycles.reference.t != before.reference.t:
         # The lap ends at the end of this interval, or at its beginning.
@@ -319,27 +347,24 @@ def _observe(tangent, scene, before, cycles, t, duration):
         lap = unit if at_end else r.step
         if not isnan(cycles.period):
             share = cycles.lap / (before.since + (cycles.count - before.count))
-            first, second, logarithm_2 = _magnitudes(vector, whole.matrix, whole.log_determinant)
-            multiplier_1, multiplier_2, rate = first**share, second**share, share * logarithm_2 / cycles.period
-            change = abs(rate - r.rate) if rate != r.rate else 0.0
+            multipliers = _multipliers(vector, whole, share, cycles.period, r.multipliers)
     forced = scene.forcing_period < inf
     ends = not forced or (at_end and cycles.count != before.count)
     blocks = _blocks(r.blocks, scene.span, t, growth, ends)
-    return Tangent(
-        lap,
-        unit,
-        vector,
-        growth,
-        blocks,
-        r.rates,
-        r.entry,
-        r.gradient,
-        r.keeps,
-        multiplier_1,
-        multiplier_2,
-        rate,
-        change,
-    )
+    return Tangent(lap, unit, vector, growth, blocks, r.rates, r.entry, r.gradient, r.keeps, multipliers)
+
+
+@inlined
+def _multipliers(vector, flow, share, period, earlier):
+    """Multipliers of a motion of this period, s, of which the flow covers one over `share` laps."""
+    first, second, log_1, log_2, angle_1, angle_2 = _eigenvalues(vector, flow.matrix, flow.log_determinant)
+    rate_1, rate_2 = share * log_1 / period, share * log_2 / period
+    if share != 1.0:
+        # The argument of a root is not unique.
+        angle_1, angle_2 = nan if first > 0.0 else 0.0, nan if second > 0.0 else 0.0
+    change_1 = abs(rate_1 - earlier.rate_1) if rate_1 != earlier.rate_1 else 0.0
+    change_2 = abs(rate_2 - earlier.rate_2) if rate_2 != earlier.rate_2 else 0.0
+    return Multipliers(first**share, second**share, angle_1, angle_2, rate_1, rate_2, change_1, change_2)
 
 
 @inlined
@@ -366,7 +391,7 @@ def largest_multiplier(tangent):
 
 @largest_multiplier.implements(Tangent)
 def _largest_multiplier(tangent):
-    return 0.0 if isnan(tangent.multiplier_1) else tangent.multiplier_1
+    return 0.0 if isnan(tangent.multipliers.first) else tangent.multipliers.first
 
 
 @hook(optional=True)
@@ -385,8 +410,8 @@ def _exponent(tangent):
 
 @unrolled
 def _followed(length, outcome, more):
-    """A tuple followed by four numbers."""
-    return ["a, b, c, d = more", "return " + "".join(f"outcome[{i}], " for i in range(length)) + "a, b, c, d"]
+    """A tuple followed by six numbers."""
+    return ["return " + ", ".join([f"outcome[{i}]" for i in range(length)] + [f"more[{i}]" for i in range(6)])]
 
 
 @hook(optional=True)
@@ -397,11 +422,15 @@ def with_exponent(tangent, outcome, period, scene):
 
 @with_exponent.implements(Tangent)
 def _with_exponent(tangent, outcome, period, scene):
-    r, multiplier_1, multiplier_2 = tangent, nan, nan
+    m = tangent.multipliers
     rate, error = exponent(tangent)
-    if not isnan(period):
-        multiplier_1, multiplier_2 = r.multiplier_1, r.multiplier_2
-        if scene.forcing_period == inf and not isnan(r.rate):
-            # A shift in time neither grows nor decays, and says nothing.
-            rate, error = r.rate, r.change
-    return _followed(outcome, (rate, error, multiplier_1, multiplier_2))
+    if isnan(period) or isnan(m.first):
+        return _followed(outcome, (rate, error, nan, nan, nan, nan))
+    if scene.forcing_period == inf:
+        # A shift in time neither grows nor decays, and says nothing.
+        rate, error = m.rate_2, m.change_2
+    elif m.first > 0.0 or isnan(rate):
+        # The mean of the blocks still holds the approach to the periodic motion. What is left of it shrinks by the
+        # multiplier in each lap, and so do the changes.
+        rate, error = m.rate_1, m.change_1 / (1.0 - m.first) if m.first < 1.0 else m.change_1
+    return _followed(outcome, (rate, error, m.first, m.second, m.angle_1, m.angle_2))

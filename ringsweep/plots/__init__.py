@@ -30,6 +30,7 @@ if TYPE_CHECKING:
         bifurcation,
         bifurcation_panel,
         exponent_panel,
+        multiplier_circle,
         multiplier_panel,
         section_panel,
     )
@@ -49,6 +50,7 @@ __all__ = [
     "history",
     "history_panel",
     "map_panel",
+    "multiplier_circle",
     "multiplier_panel",
     "phase_portrait",
     "polar_view",
@@ -81,6 +83,7 @@ _MODULES = {
     "section_panel": "sections",
     "exponent_panel": "sections",
     "multiplier_panel": "sections",
+    "multiplier_circle": "sections",
     "phase_portrait": "phase",
     "friction_loop": "loops",
     "polar_view": "polar",

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib import rcParams
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -51,8 +53,8 @@ _SHORT |= {f"deflection_{k}_section": f"deflection {k}" for k in (1, 2)}
 # Points of the diagram, in points of a page squared, and the height of the strip of regimes as a share of the axes.
 _DOT, _STRIP = 1.0, 0.025
 
-# Heights of diagram, exponent and multipliers, as multiples of the width.
-_HEIGHTS = {"diagram": 0.5, "lyapunov": 0.25, "multiplier_1": 0.25}
+# Heights of diagram, exponent, multipliers and unit circle, as multiples of the width.
+_HEIGHTS = {"diagram": 0.5, "lyapunov": 0.25, "multiplier_1": 0.25, "circle": 0.75}
 
 _DIRECTION = "direction"
 
@@ -60,6 +62,11 @@ _DIRECTION = "direction"
 def has_diagram(ds: xr.Dataset) -> bool:
     """Whether a dataset holds sections along one axis."""
     return bool(points_of(ds)) and len(_axes_of(ds)) == 1
+
+
+def has_circle(ds: xr.Dataset) -> bool:
+    """Whether a dataset holds multipliers with their arguments along one axis."""
+    return "multiplier_angle_1" in ds and len(set(ds["multiplier_angle_1"].dims) - {_DIRECTION}) == 1
 
 
 def points_of(ds: xr.Dataset) -> list[str]:
@@ -349,6 +356,75 @@ def multiplier_panel(ds: xr.Dataset, x: str | None = None, ax: Axes | None = Non
     ax.set_ylim(0.0, max(1.1, ax.get_ylim()[1]))
     _finish(ax, axis, "multipliers")
     legend_above(ax)
+    return ax
+
+
+def multiplier_circle(ds: xr.Dataset, x: str | None = None, ax: Axes | None = None) -> Axes:
+    """Draw the Floquet multipliers in the complex plane with the unit circle, coloured by their place on the axis.
+
+    A periodic motion is stable if all of them lie inside. Where one leaves the circle tells what the motion turns into:
+    at 1 it meets an unstable one and vanishes (fold), at -1 its period doubles (flip), and a pair elsewhere gives a
+    motion on a torus.
+
+    Parameters
+    ----------
+    ds, x
+        As for :func:`bifurcation`; the dataset has ``multiplier_1`` and ``multiplier_angle_1``.
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw in, by default pyplot's current ones.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InputError
+        If the dataset has no multipliers along one axis.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> numbers = {"multiplier_1": ("speed", [0.5, 0.9]), "multiplier_angle_1": ("speed", [0.0, 3.0])}
+    >>> multiplier_circle(xr.Dataset(numbers, coords={"speed": [1.0, 2.0]})).get_xlabel()
+    'real part of the multipliers'
+    """
+    axis = _axis(ds, x, "multiplier_angle_1")
+    ax = axes_or_current(ax, _HEIGHTS["circle"])
+    turn = np.linspace(0.0, 2.0 * np.pi, 181)
+    ax.fill(np.cos(turn), np.sin(turn), color=on_page(STICK), linewidth=0, zorder=0)
+    ax.plot(np.cos(turn), np.sin(turn), color=rcParams["axes.edgecolor"], linewidth=0.8, zorder=1)
+    for centred in (ax.axhline, ax.axvline):
+        centred(0.0, color=rcParams["axes.edgecolor"], linewidth=0.4, zorder=1)
+    handles: list[Artist] = []
+    reach = 1.1
+    edges = axis.edges
+    colours: dict[str, Any] = {"c": axis.values, "cmap": "viridis"}
+    colours["norm"] = (LogNorm if axis.scale == "log" else Normalize)(edges[0], edges[-1])
+    for k, (way, branch) in enumerate(_branches(ds)):
+        for name in ("1", "2"):
+            if f"multiplier_angle_{name}" not in branch:
+                continue
+            size, angle = (
+                branch[f"{kind}_{name}"].transpose(*axis.dims).values[axis.order]
+                for kind in ("multiplier", "multiplier_angle")
+            )
+            known = np.isfinite(size) & np.isfinite(angle)
+            reach = max(reach, 1.1 * size[known].max(initial=0.0))
+            x_part, y_part = size * np.cos(angle), size * np.sin(angle)
+            drawn = ax.scatter(
+                x_part, y_part, s=10.0, marker="o^"[k], linewidths=0, rasterized=True, zorder=2 + k, **colours
+            )
+        if way:
+            dot = Line2D([], [], linestyle="", marker="o^"[k], markersize=4, color=rcParams["text.color"], label=way)
+            handles.append(dot)
+    ax.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
+    label_axes(ax, "real part of the multipliers", "imaginary part")
+    bar = ax.figure.colorbar(drawn, ax=ax, label=axis.label)
+    if axis.names:
+        bar.set_ticks(range(len(axis.names)), labels=axis.names)
+    small_ticks(ax, bar.ax)
+    legend_above(ax, handles)
     return ax
 
 

@@ -158,6 +158,8 @@ OUTCOMES: dict[str, Variable] = {
     "lyapunov_error": Variable("1/s", "standard error of the largest Lyapunov exponent"),
     "multiplier_1": Variable("1", "largest magnitude of the Floquet multipliers of the periodic motion"),
     "multiplier_2": Variable("1", "second largest magnitude of the Floquet multipliers of the periodic motion"),
+    "multiplier_angle_1": Variable("rad", "argument of the largest Floquet multiplier of the periodic motion"),
+    "multiplier_angle_2": Variable("rad", "argument of the second largest Floquet multiplier of the periodic motion"),
     "x_section": Variable("m", "displacement of the body at the points of its section", dims=("section",)),
     "velocity_section": Variable("m/s", "velocity of the body at the points of its section", dims=("section",)),
     "deflection_section": Variable("m", "deflection of the bristles at the points of the section", dims=("section",)),

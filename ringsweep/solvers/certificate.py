@@ -37,6 +37,8 @@ _MAY_LACK = (
     "lyapunov_error",
     "multiplier_1",
     "multiplier_2",
+    "multiplier_angle_1",
+    "multiplier_angle_2",
     "x_section",
     "velocity_section",
     "deflection_section",

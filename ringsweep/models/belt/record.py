@@ -391,6 +391,7 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
         c.since,
         c.most,
         c.lap,
+        c.half,
         c.laps,
         c.sum,
         c.squares,
