@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
 import ringsweep
+from ringsweep.config import configuration as configurations
 from ringsweep.config import load, read_axes, read_scene, with_values
 from ringsweep.config import scene as scenes
 from ringsweep.config.axes import read_spacing
@@ -451,6 +452,53 @@ def test_lengths_that_differ_by_more_than_a_factor_of_a_thousand_give_one_warnin
     assert len(found) == count
     for text in found:
         assert "scene.ring.radius is 43.378 m and scene.body.ball_radius is 0.01 m: is a unit missing?" in text
+
+
+ROCKING = {"law": "sinusoidal", "amplitude": "60 deg", "frequency": "2 Hz"}
+
+
+@pytest.mark.parametrize(
+    ("setting", "told"),
+    [
+        ("drive.amplitude=1", "1 rad, where the configuration says '60 deg'; was `--set \"{} deg\"` meant?"),
+        ("ring.radius=0.05", "0.05 m, where the configuration says '50 mm'; was `--set \"{} mm\"` meant?"),
+        ("drive.amplitude=60 deg", ""),
+        ("drive.amplitude=1 rad", ""),
+        ("drive.amplitude=0", ""),
+        ("drive.frequency=3", ""),
+        ("body.mass=0.08", ""),
+    ],
+)
+def test_plain_number_in_the_place_of_another_unit_is_told(caplog, setting, told):
+    configurations._warn_of_unit.cache_clear()
+    scene = edited(drive=ROCKING, ring__radius="50 mm")
+    for _ in range(2):
+        with_values({"scene": scene}, [setting])
+    lines = [f"--set {setting} is taken as {told.format(setting)}"] if told else []
+    assert [record.getMessage() for record in caplog.records] == lines
+
+
+def test_value_that_a_program_gives_is_in_si_units_without_a_word(caplog):
+    configurations._warn_of_unit.cache_clear()
+    config = with_values({"scene": edited(drive=ROCKING)}, [("drive.amplitude", 1.5)])
+    assert config.scene.values["drive.amplitude"] == 1.5
+    assert not caplog.records
+
+
+@pytest.mark.parametrize(("amplitude", "told"), [(60, True), ("60 rad", False), ("3600 deg", False), (6.0, False)])
+def test_angle_of_many_turns_without_unit_gives_one_warning(caplog, amplitude, told):
+    scenes._warn_of_turns.cache_clear()
+    for _ in range(2):
+        load({"scene": edited(drive=ROCKING | {"amplitude": amplitude})})
+    text = "scene.drive.amplitude is 60 rad, 9.55 turns: is a unit missing?"
+    assert [record.getMessage().startswith(text) for record in caplog.records] == [True] * told
+
+
+def test_axis_of_a_file_with_angles_of_many_turns_gives_a_warning(caplog, write):
+    scenes._warn_of_turns.cache_clear()
+    rocking = TEXT.replace("law: arctan", "law: sinusoidal\n    frequency: 1")
+    load(write(rocking.replace("geomspace: [0.1, 10, 5]", "linspace: [10, 60, 5]")))
+    assert ["scene.drive.amplitude is 60 rad" in record.getMessage() for record in caplog.records] == [True]
 
 
 def test_each_unused_parameter_of_another_law_gives_one_warning(caplog):

@@ -255,3 +255,20 @@ def test_mistake_in_an_uncertain_threshold(of: dict[str, Any], grid: Any, regime
 @pytest.mark.parametrize(("data", "vary", "options", "words"), FITS)
 def test_mistake_in_a_fit(data: Any, vary: Any, options: dict[str, Any], words: str) -> None:
     located(lambda: ringsweep.fit(BELT, data, vary, **options), "", words)
+
+
+def test_plain_end_of_an_interval_beside_another_unit_is_told(caplog: pytest.LogCaptureFixture) -> None:
+    belt = BELT | {"spring": {"stiffness": "2 N/m"}, "body": {"mass": "900 g"}}
+    with caplog.at_level("WARNING"), pytest.raises(InputError):
+        ringsweep.threshold(belt, "body.mass", "riding", ("800", "700"))
+    with caplog.at_level("WARNING"), pytest.raises(InputError):
+        ringsweep.fit(belt, GOOD, "body.mass=800..700")
+    with caplog.at_level("WARNING"), pytest.raises(InputError):
+        ringsweep.threshold(belt, "spring.stiffness", "riding", ("2", "1"))
+    with caplog.at_level("WARNING"), pytest.raises(InputError):
+        ringsweep.threshold(belt, "body.mass", "riding", (800, 700))
+    cures = [record.getMessage().rpartition("; ")[2] for record in caplog.records]
+    assert cures == [
+        *('was `--from "800 g"` meant?', 'was `--to "700 g"` meant?'),
+        *('was `--vary "body.mass=800 g..HIGH"` meant?', 'was `--vary "body.mass=LOW..700 g"` meant?'),
+    ]

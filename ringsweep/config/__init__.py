@@ -2,7 +2,18 @@
 
 from ringsweep.compile.cache import OWN_FILES
 from ringsweep.config.axes import Axes
-from ringsweep.config.configuration import Config, followed, load, read_axes, read_scene, refined, with_values
+from ringsweep.config.configuration import (
+    Config,
+    Setting,
+    as_written,
+    followed,
+    load,
+    read_axes,
+    read_scene,
+    refined,
+    tell_unit,
+    with_values,
+)
 from ringsweep.config.own_files import load_own_files
 from ringsweep.config.scene import sweepable
 from ringsweep.config.solver import read_solver
@@ -10,6 +21,8 @@ from ringsweep.config.solver import read_solver
 __all__ = [
     "Axes",
     "Config",
+    "Setting",
+    "as_written",
     "followed",
     "load",
     "read_axes",
@@ -17,6 +30,7 @@ __all__ = [
     "read_solver",
     "refined",
     "sweepable",
+    "tell_unit",
     "with_values",
 ]
 

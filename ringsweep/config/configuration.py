@@ -7,9 +7,11 @@ Physics and solvers declare their parameters; error messages are made from these
 from __future__ import annotations
 
 import dataclasses
+import logging
 import os
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 from ringsweep.config import yaml_text
@@ -18,6 +20,7 @@ from ringsweep.config.axes import (
     Column,
     build_axes,
     dimension,
+    paths_of,
     read_data_array,
     sweep_axes,
     sweep_section,
@@ -28,13 +31,19 @@ from ringsweep.config.consistency import check_consistency
 from ringsweep.config.follow import Follow, put_state, read_follow, run_to_continue, with_direction
 from ringsweep.config.refinement import Refinement, read_refinement
 from ringsweep.config.sampling import Sample, read_sample
-from ringsweep.config.scene import parse_scene, sweepable
+from ringsweep.config.scene import parse_scene, sweepable, warn_of_plain_angle
 from ringsweep.config.sections import read_values, suggestion
 from ringsweep.config.solver import read_solver
 from ringsweep.config.yaml_text import Document, scalar
 from ringsweep.errors import InputError
 from ringsweep.models.scene import LAW, Scene
-from ringsweep.quantities.units import show
+from ringsweep.quantities.parameters import Choice, Parameter
+from ringsweep.quantities.units import is_plain, other_unit, show
+
+logger = logging.getLogger("ringsweep")
+
+#: A value to change: ``"PATH=VALUE"`` as a user types it, or path and value as a program gives them.
+Setting = str | tuple[str, Any]
 
 _SECTIONS = "scene", "solver", "record", "sweep"
 
@@ -80,14 +89,14 @@ class Config:
     follow: Follow | None = None
 
 
-def load(config: str | os.PathLike[str] | Mapping[str, Any], settings: Iterable[str] = ()) -> Config:
+def load(config: str | os.PathLike[str] | Mapping[str, Any], settings: Iterable[Setting] = ()) -> Config:
     """Read and validate a configuration.
 
     Parameters
     ----------
     config : path-like or mapping
         A YAML file, the mapping that it would hold, or a result file, which holds its configuration.
-    settings : iterable of str
+    settings : iterable of str or tuple
         Values to change, as for :func:`with_values`; none that is swept.
 
     Raises
@@ -98,10 +107,12 @@ def load(config: str | os.PathLike[str] | Mapping[str, Any], settings: Iterable[
     doc = yaml_text.read(config)
     with doc.locating_errors():
         swept = swept_paths(sweep_section(doc)) if settings else {}
-        for path in [_apply_setting(doc, setting) for setting in settings]:
+        changed = _apply_settings(doc, settings)
+        for path in changed:
             if path.removeprefix("scene.") in swept:
                 raise InputError(path, "is swept here: --set changes values that all cells share")
         found = _validate(doc)
+    _tell_units(changed, found.scene)
     if doc.result_axes is None:
         return found
     # A configuration cannot name the dimensions that axes share; the coordinates of a result file can.
@@ -134,7 +145,7 @@ def refined(config: Config, refine: Mapping[str, Any] | bool | None) -> Config:
 
 def with_values(
     config: str | os.PathLike[str] | Mapping[str, Any],
-    settings: Iterable[str] = (),
+    settings: Iterable[Setting] = (),
     solver: Mapping[str, Any] | None = None,
 ) -> Config:
     """Configuration of a single run: without axes, and with some values changed.
@@ -145,8 +156,10 @@ def with_values(
     ----------
     config : path-like or mapping
         As for :func:`load`. Its other axes are ignored.
-    settings : iterable of str
-        ``"PATH=VALUE"`` with a path in the scene (``drive.amplitude=3``) or in the solver (``solver.steps=100``).
+    settings : iterable of str or tuple
+        ``"PATH=VALUE"`` with a path in the scene (``drive.amplitude=3``) or in the solver (``solver.steps=100``), as a
+        user types it: a number without unit in the place of ``60 deg`` is taken in SI units, with a warning. A program
+        gives path and value as a tuple, without a warning.
     solver : mapping, optional
         Section ``solver`` that takes the place of the configuration's.
 
@@ -160,18 +173,20 @@ def with_values(
         doc.tree["solver"] = yaml_text.read({"solver": solver}).tree["solver"]
         doc.locations = {path: line for path, line in doc.locations.items() if path.partition(".")[0] != "solver"}
     with doc.locating_errors():
-        changed = {_apply_setting(doc, setting) for setting in settings}
+        changed = _apply_settings(doc, settings)
         sweep = sweep_section(doc)
         doc.tree.pop("sweep", None)
         if LAW in sweep.get("grid", {}) and f"scene.{LAW}" not in changed:
             doc.tree["sweep"] = {"grid": {LAW: sweep["grid"][LAW]}}
         try:
-            return _validate(doc)
+            found = _validate(doc)
         except InputError as error:
             path = error.path.removeprefix("scene.")
             if path in swept_paths(sweep) and error.problem.startswith("missing"):
                 error.problem = f"missing: it is swept here, and one run needs one value: --set {path}=VALUE"
             raise
+    _tell_units(changed, found.scene)
+    return found
 
 
 def read_scene(scene: Mapping[str, Any], swept: Collection[str] = (), record: Mapping[str, Any] | None = None) -> Scene:
@@ -219,6 +234,8 @@ def _validate(doc: Document) -> Config:
     scene = parse_scene(doc, swept, laws[0] if laws else None)
     solver = read_solver(tree.get("solver", "auto"), scene)
     axes = sweep_axes(scene, sweep)
+    if doc.result_axes is None and doc.locations:
+        _warn_of_plain_angles(scene, {**sweep.get("points", {}), **sweep.get("grid", {})})
     for path, where in swept.items():
         if where in doc.locations:
             doc.locations[f"scene.{path}"] = doc.locations[where]
@@ -233,6 +250,17 @@ def _validate(doc: Document) -> Config:
         if follow is not None and other is not None:
             raise InputError(f"sweep.{key}", _NOT_FOLLOWED)
     return Config(scene, solver, with_direction(axes, follow), tree, doc.name, refine, sample, follow)
+
+
+def _warn_of_plain_angles(scene: Scene, columns: Mapping[str, Any]) -> None:
+    """Warn of angles of many turns among the axes that a file gives. Axes that a program gives are in SI units."""
+    known = sweepable(scene)
+    for key, given in columns.items():
+        # Of linspace and geomspace, first and last.
+        ends = next(iter(given.values()))[:2] if isinstance(given, dict) else given
+        for path in paths_of(key):
+            for value in ends:
+                warn_of_plain_angle(path, value, known[path])
 
 
 def followed(config: Config, follow: str | Mapping[str, Any] | None) -> Config:
@@ -259,28 +287,97 @@ def _check_section(scene: Scene, refine: Refinement | None, sample: Sample | Non
         raise InputError("sweep.sample", _NO_SECTION.format("a probability has no points"))
 
 
-def _apply_setting(doc: Document, setting: str) -> str:
-    """Put one ``PATH=VALUE`` into the tree and return its full path. The path is checked later, with the tree."""
-    path, equals, text = (part.strip() for part in setting.partition("="))
-    if not equals or not path:
-        raise InputError("--set", f"{show(setting)} is not of the form PATH=VALUE")
+def _apply_settings(doc: Document, settings: Iterable[Setting]) -> dict[str, tuple[Any, Any]]:
+    """Put settings into the tree; what each has replaced and put there by its full path.
+
+    What a program has put there replaces nothing that a user should be told of.
+    """
+    changed: dict[str, tuple[Any, Any]] = {}
+    for setting in settings:
+        if isinstance(setting, str):
+            path, equals, text = (part.strip() for part in setting.partition("="))
+            if not equals or not path:
+                raise InputError("--set", f"{show(setting)} is not of the form PATH=VALUE")
+            value = scalar(text)
+        else:
+            path, value = setting
+        full, before = _apply_setting(doc, path, value)
+        before, _ = changed.get(full, (before, None))
+        changed[full] = before if isinstance(setting, str) else None, value
+    return changed
+
+
+def _tell_units(changed: Mapping[str, tuple[Any, Any]], scene: Scene) -> None:
+    """Say in which unit a number is taken that a user has put in the place of one with another unit."""
+    known = sweepable(scene)
+    for full, (before, value) in changed.items():
+        path = full.removeprefix("scene.")
+        if path in known:
+            tell_unit("--set", f"{path}={{}}", value, before, known[path])
+
+
+def tell_unit(option: str, form: str, value: Any, before: Any, parameter: Parameter | Choice) -> None:
+    """Say in which unit a number without unit is taken, if the configuration writes this number in another unit.
+
+    Parameters
+    ----------
+    option, form : str
+        Option of the command line, and the form of what follows it, such as ``"drive.amplitude={}"``.
+    value, before : object
+        The number as it was typed, and what the configuration says.
+    parameter : Parameter
+    """
+    # Zero is zero in every unit.
+    if not isinstance(parameter, Parameter) or not is_plain(value) or float(value) == 0.0:
+        return
+    if unit := other_unit(before, parameter):
+        taken = f"{value} {parameter.unit}" if parameter.unit != "1" else f"{value}, without unit"
+        cure = form.format(f"{value} {unit}")
+        _warn_of_unit(f"{option} {form.format(value)}", taken, show(before), f'{option} "{cure}"')
+
+
+@cache
+def _warn_of_unit(given: str, taken: str, before: str, cure: str) -> None:
+    """Warn once per process: one command reads its configuration several times."""
+    logger.warning("%s is taken as %s, where the configuration says %s; was `%s` meant?", given, taken, before, cure)
+
+
+def as_written(config: Config, path: str) -> Any:
+    """A number as a configuration gives it, with its unit: in the scene, or else first on its axis; or None."""
+    node: Any = config.source.get("scene", {})
+    for key in path.split("."):
+        node = node.get(key) if isinstance(node, dict) else None
+    if node is None:
+        sweep = config.source.get("sweep", {})
+        for columns in (sweep.get("grid", {}), sweep.get("points", {})):
+            node = columns.get(path, node)
+    while node and isinstance(node, dict | list):
+        node = next(iter(node.values())) if isinstance(node, dict) else node[0]
+    return node
+
+
+def _apply_setting(doc: Document, path: str, value: Any) -> tuple[str, Any]:
+    """Put a value into the tree; its full path and what stood there. The path is checked later, with the tree."""
+    told = f"--set {path}={value}", None
     full = path if path.split(".")[0] in ("scene", "solver", "record") else f"scene.{path}"
     *parents, last = full.split(".")
     node: Any = doc.tree
     for depth, key in enumerate(parents, start=1):
         if isinstance(node, dict) and key not in node:
             node[key] = {}
-            doc.locations[".".join(parents[:depth])] = f"--set {setting}", None
+            doc.locations[".".join(parents[:depth])] = told
         node = _child(node, key, full)
+    before = None
     if isinstance(node, list):
-        _child(node, last, full)
-        node[int(last)] = scalar(text)
+        before = _child(node, last, full)
+        node[int(last)] = value
     elif isinstance(node, dict):
-        node[last] = scalar(text)
+        before = node.get(last)
+        node[last] = value
     else:
         raise InputError(full, f"cannot be set: {'.'.join(parents)} is {show(node)}")
-    doc.locations[full] = f"--set {setting}", None
-    return full
+    doc.locations[full] = told
+    return full, before
 
 
 def _child(node: Any, key: str, full: str) -> Any:

@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
 from itertools import product
+from math import pi
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,12 +28,15 @@ from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS, Dynamic, family_of
 from ringsweep.physics.friction.formula import NAMES
 from ringsweep.quantities.parameters import Choice, Parameter
-from ringsweep.quantities.units import quantity, show
+from ringsweep.quantities.units import is_plain, quantity, show
 
 logger = logging.getLogger("ringsweep")
 
 # Ratio of lengths of one scene above which a unit may be wrong: 1 m in place of 1 mm.
 _LARGEST_RATIO = 1000.0
+
+# Angle in rad above which a plain number may have been meant in degrees: two turns.
+_LARGEST_ANGLE = 4.0 * pi
 
 
 def sweepable(scene: Scene) -> dict[str, Parameter | Choice]:
@@ -86,6 +90,9 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
             if known.unit == "m" and path in values
         )
     )
+    for path, parameter in numbers_of(structures).items():
+        if path in leaves:
+            warn_of_plain_angle(path, leaves[path], parameter)
     return Scene(structures, values, scene)
 
 
@@ -259,6 +266,23 @@ def _warn_of_lengths(lengths: frozenset[tuple[str, float]]) -> None:
             "scene.%s is %g m and scene.%s is %g m: is a unit missing? A plain number is in metres",
             *(large, long, small, short),
         )
+
+
+def warn_of_plain_angle(path: str, given: Any, parameter: Parameter | Choice) -> None:
+    """Warn of an angle of many turns that has no unit: it may have been meant in degrees."""
+    # Other than angles without limits are refused if they are this large.
+    is_angle = isinstance(parameter, Parameter) and parameter.unit == "rad" and is_plain(given)
+    if is_angle and abs(angle := float(given)) > _LARGEST_ANGLE:
+        _warn_of_turns(path, angle)
+
+
+@cache
+def _warn_of_turns(path: str, angle: float) -> None:
+    """Warn once per process: one command reads its configuration several times."""
+    logger.warning(
+        "scene.%s is %g rad, %.3g turns: is a unit missing? A plain number is in radians; write `%g deg` for degrees",
+        *(path, angle, abs(angle) / (2.0 * pi), angle),
+    )
 
 
 @cache

@@ -59,8 +59,7 @@ def cell(ds: xr.Dataset, sel: Mapping[str, float | str] | None = None) -> dict[s
     if ds.sizes:
         left = ", ".join(f"{dim} ({size})" for dim, size in ds.sizes.items())
         raise InputError("sel", f"one cell is wanted, but {left} is left: hold it too")
-    # A number as text keeps all its digits.
-    settings = [f"{coordinate.attrs['path']}={coordinate.item()}" for coordinate in swept(ds)]
+    settings = [(coordinate.attrs["path"], coordinate.item()) for coordinate in swept(ds)]
     return with_values(configuration(ds), settings).source
 
 

@@ -80,7 +80,7 @@ def quantity(value: Any, parameter: Parameter, path: str) -> float:
             raise InputError(path, f"{show(value)} is not a whole number: {parameter.long_name} must be one")
         return number
     unit = f" {parameter.unit}" if parameter.unit not in ("", "1") else ""
-    plain = not isinstance(value, str) or NUMBER.fullmatch(value.strip())
+    plain = not isinstance(value, str) or is_plain(value)
     if plain and parameter.unit == "rad" and abs(number) > parameter.upper > 0.0:
         raise InputError(path, f"{number:g} rad is beyond {_in_pi(parameter.upper)}: was `{number:g} deg` meant?")
     shown = f"{number:g}{unit}" if plain else f"{show(value)} ({number:g}{unit})"
@@ -147,6 +147,28 @@ def percent_at_most(share: float) -> str:
     """
     digits = 3 - math.floor(math.log10(share)) if share > 0.0 else 0
     return f"{100 * math.ceil(share * 10.0 ** (digits - 2) - 1e-9) / 10.0 ** (digits - 2):.3g} %"
+
+
+def is_plain(value: Any) -> bool:
+    """Whether a value is a number without a unit, as a number or as text."""
+    if isinstance(value, str):
+        return bool(NUMBER.fullmatch(value.strip()))
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def other_unit(value: Any, parameter: Parameter) -> str:
+    """The unit of a text such as ``"60 deg"``; empty if it has none, or if its number is the same in SI units.
+
+    >>> angle = Parameter("rad", "angle")
+    >>> other_unit("60 deg", angle), other_unit("1 rad", angle), other_unit(60.0, angle)
+    ('deg', '', '')
+    """
+    text = value.strip() if isinstance(value, str) and len(value) <= _LONGEST else ""
+    match = NUMBER.match(text)
+    unit = text[match.end() :].strip() if match else ""
+    with contextlib.suppress(LookupError, ValueError):
+        return unit if unit and parameter.unit and _factor(unit, parameter.unit) != 1.0 else ""
+    return ""
 
 
 class _Quotes(reprlib.Repr):

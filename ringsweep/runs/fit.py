@@ -16,7 +16,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.compile import readable_compile_errors
-from ringsweep.config import Config, load, sweepable, with_values
+from ringsweep.config import Config, as_written, load, sweepable, tell_unit, with_values
 from ringsweep.config.axes import Axes, build_axes, swept_parameter
 from ringsweep.config.sections import read_values, suggestion
 from ringsweep.config.yaml_text import Document, name_and_unit
@@ -161,14 +161,15 @@ def _problem(
 ) -> tuple[_Problem, Variable]:
     """The problem, and the declaration of the measured quantity."""
     name, times = _times(columns)
-    values = [f"{factor.path}={factor.first!r}" for factor in factors]
+    values = [(factor.path, factor.first) for factor in factors]
     try:
-        one = with_values(config, [*settings, *values, f"time.span={float(times[-1])!r}"])
+        one = with_values(config, [*settings, *values, ("time.span", float(times[-1]))])
     except InputError as error:
         if error.problem.startswith("missing") or error.path == "scene.time.span":
             raise
         # Nobody gave these settings: the ranges did.
-        raise InputError("vary", f"starts at {', '.join(values)}: {error.path}: {error.problem}") from None
+        started = ", ".join(f"{path}={value!r}" for path, value in values)
+        raise InputError("vary", f"starts at {started}: {error.path}: {error.problem}") from None
     if one.axes.sizes:
         raise InputError("sweep", "several friction laws, but a fit has one: --set friction.law=...")
     model = model_of(one.scene.structure)
@@ -241,6 +242,9 @@ def _factors(config: Config, vary: Mapping[str, Any]) -> list[_Factor]:
         else:
             if not isinstance(ends, list | tuple) or len(ends) != 2:
                 raise InputError(f"vary.{path}", f"a pair of values is expected, got {show(ends)}")
+            for form, end in zip(("{}..HIGH", "LOW..{}"), ends, strict=True):
+                if isinstance(end, str):
+                    tell_unit("--vary", f"{path}={form}", end, as_written(config, path), parameter)
             low, high = (quantity(end, parameter, f"vary.{path}") for end in ends)
             if not low < high:
                 raise InputError(f"vary.{path}", f"{high:g} is not greater than {low:g}, where the range begins")

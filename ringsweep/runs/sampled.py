@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsweep.config import Config, load, sweepable
+from ringsweep.config import Config, Setting, load, sweepable
 from ringsweep.config.axes import dimension
 from ringsweep.config.sampling import CENSORED, Sample, censored
 from ringsweep.errors import InputError
@@ -400,11 +400,11 @@ def nominal(ds: xr.Dataset) -> Config:
     config = load(source)
     sample = _sample(config)
     axes = sample.axes(config.scene, config.axes, np.full((1, len(sample.factors)), 0.5))
-    settings = []
+    settings: list[Setting] = []
     for path in (path for factor in sample.factors for path in factor.paths):
         dims, column = axes.columns[path]
         if len(dims) > 1:
             raise InputError("boundaries", f"{path} is a ratio to an axis: no sweep at the medians is a grid")
-        settings.append(f"{path}={column.item()!r}")
+        settings.append((path, column.item()))
     sweep = {key: value for key, value in source["sweep"].items() if key != "sample"}
     return load(source | {"sweep": sweep}, settings)

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsweep.config import Config, load, sweepable, with_values, yaml_text
+from ringsweep.config import Config, as_written, load, sweepable, tell_unit, with_values, yaml_text
 from ringsweep.config.axes import Axes, dimension, sweep_section, swept_parameter, swept_paths
 from ringsweep.config.consistency import check_consistency
 from ringsweep.config.sections import suggestion
@@ -297,6 +297,8 @@ def _ends(whole: Config, path: str, between: tuple[Any, Any]) -> tuple[float, fl
                 where,
                 f"the configuration does not sweep {path}: say where to look, by --from and --to (in Python: between)",
             )
+        if isinstance(given, str):
+            tell_unit(f"--{where}", "{}", given, as_written(whole, path), parameter)
         ends.append(float(of_sweep(np.asarray(own))) if given is None else quantity(given, parameter, where))
     if not ends[0] < ends[1]:
         unit = f" {parameter.unit}" if parameter.unit not in ("", "1") else ""
@@ -317,7 +319,7 @@ def _interval(config: Any, path: str, between: tuple[Any, Any], settings: list[s
     """Configuration of a single run, and the ends of the interval in SI units."""
     low, high = _ends(load(config, _beside_axes(config, path, settings)), path, between)
     try:
-        one = with_values(config, [*settings, f"{path}={low!r}"])
+        one = with_values(config, [*settings, (path, low)])
     except InputError as error:
         if error.problem.startswith("missing"):
             raise
