@@ -119,6 +119,10 @@ class TestBoundary:
         with pytest.raises(InputError, match=r"not a regime; did you mean `separating`\?"):
             ringsweep.boundary(ds, "seperating")
 
+    def test_word_of_the_belt_is_refused_with_the_words_of_a_ring(self, ds):
+        with pytest.raises(InputError, match=r"can be 'stick-slip': those of model ring are resting, .*, failed, with"):
+            ringsweep.boundary(ds, "stick-slip")
+
     @pytest.mark.parametrize(
         ("regime", "tolerance", "path"),
         [

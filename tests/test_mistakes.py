@@ -171,6 +171,19 @@ THRESHOLDS: list[tuple[str, Any, Any, dict[str, Any], str, str]] = [
     ("friction.mu_s", "0.2 to 0.4", "riding", {}, "between", "the two ends of an interval"),
     ("friction.mu_s", (0.12, 0.4), "rideing", {}, "regime", "did you mean `riding`"),
     ("friction.mu_s", (0.12, 0.4), 3, {}, "regime", "3 is not a regime"),
+    (
+        "friction.mu_s",
+        (0.12, 0.4),
+        "jammed",
+        {},
+        "regime",
+        "no run of this scene can be 'jammed': those of model belt are stick-slip, oscillatory, sliding, sticking, "
+        "riding, failed",
+    ),
+    ("friction.mu_s", (0.12, 0.4), "separating", {}, "regime", "those of model belt are stick-slip"),
+    ("friction.mu_s", (0.12, 0.4), "tumbled", {}, "regime", "those of model belt are stick-slip"),
+    # The load may fall to zero: the word is allowed, the interval is not.
+    ("body.normal_stiffness", (2, 1), "separating", {}, "to", "1 N/m is not greater than 2 N/m"),
     ("friction.mu_s", (0.12, 0.4), "riding", {"tolerance": -1}, "tolerance", "greater than 0"),
     ("friction.mu_s", (0.12, 0.4), "riding", {"tolerance": "1 m"}, "tolerance", "has no unit"),
     ("friction.mu_s", (0.12, 0.4), "riding", {"scan": 1}, "scan", "at least 2"),

@@ -4,9 +4,11 @@ import json
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import ringsweep
 from ringsweep import cli
+from ringsweep.runs.thresholds import in_words
 
 BELT = {
     "model": "belt",
@@ -98,3 +100,35 @@ class TestDistribution:
         assert "50% below 0.2" in said or "50% below inf" in said
         # k < 0.2 m g / (v T) = 1.962 N/m begins within: 46.2 % of the points.
         assert "; 69 begin nowhere there" in said or "; 68 begin nowhere there" in said
+
+
+class TestInWords:
+    """Lines are made from datasets of known numbers, without runs."""
+
+    def test_angle_and_its_error_are_told_in_radians_and_in_degrees(self):
+        """1e-6 rad are 5.7e-5 deg."""
+        flags = {"flag_values": np.arange(2, dtype=np.int8), "flag_meanings": "oscillatory jammed"}
+        found = xr.Dataset(
+            {
+                "error": ("vertex", [1e-6]),
+                "begins": ("vertex", [1]),
+                "beyond": ("vertex", np.zeros(1, dtype=np.int8), flags),
+            },
+            coords={"zone_half_angle": ("vertex", [np.radians(15.0)], {"units": "rad"})},
+            attrs={"threshold_path": "zone.half_angle", "boundary_of": "jammed", "scan": "3 runs"},
+        )
+        line = in_words(found).splitlines()[0]
+        angle = "0.2617994 ± 1.0e-06 rad (15.000000 ± 5.7e-05 deg)"
+        assert line == f"jammed begins at zone.half_angle = {angle}; below: oscillatory"
+        plain = found.assign_coords(zone_half_angle=found.zone_half_angle.assign_attrs(units="1"))
+        assert "= 0.2617994 ± 1.0e-06; below" in in_words(plain)
+
+    def test_quantile_of_an_angle_is_told_in_degrees_too(self):
+        ends = {"": np.radians([30.0]), "_low": np.radians([15.0]), "_high": [np.inf]}
+        found = xr.Dataset(
+            {f"threshold_quantile{end}": ("quantile", values) for end, values in ends.items()}
+            | {"threshold": (("replicate", "sample"), np.zeros((1, 4)), {"units": "rad"})},
+            coords={"quantile": [0.5]},
+            attrs={"threshold_path": "zone.half_angle", "boundary_of": "jammed", "scan": "3 runs"},
+        )
+        assert "  50% below 0.523599 rad (0.261799 to inf), 30 deg (15 to inf)" in in_words(found).splitlines()

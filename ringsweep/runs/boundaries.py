@@ -19,6 +19,7 @@ from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity, show
 from ringsweep.quantities.variables import INFERRED
 from ringsweep.runs.executors import Execution
+from ringsweep.runs.regime_words import check_word
 from ringsweep.runs.sweep import compute
 
 logger = logging.getLogger("ringsweep")
@@ -76,6 +77,7 @@ def boundary(ds: xr.Dataset, regime: str, tolerance: float = 1e-6, *, jobs: int 
     label, _, _ = _checked(ds, regime)
     tolerance = quantity(tolerance, _TOLERANCE, "tolerance")
     configuration = _config(ds)
+    check_word(regime, configuration.scene, configuration.axes.columns)
     _check_cells(ds, label, configuration, jobs)
     return located(ds, regime, configuration, tolerance, jobs=jobs)
 
@@ -164,7 +166,9 @@ def run_at(ds: xr.Dataset, held: Mapping[str, float], regime: str, *, jobs: int 
         As for :func:`boundary`.
     """
     label, _, dims = _checked(ds, regime)
-    _check_cells(ds, label, _config(ds), jobs)
+    configuration = _config(ds)
+    check_word(regime, configuration.scene, configuration.axes.columns)
+    _check_cells(ds, label, configuration, jobs)
     columns = {str(name): c for name, c in ds.coords.items() if "path" in c.attrs}
     fixed = {name: held.get(name, c.item()) for name, c in columns.items() if name not in dims}
     values = {dim: columns[dim].values.tolist() for dim in dims} | {name: [value] for name, value in fixed.items()}

@@ -15,14 +15,13 @@ from numpy.typing import NDArray
 from ringsweep.config import Config, as_written, load, sweepable, tell_unit, with_values, yaml_text
 from ringsweep.config.axes import Axes, dimension, sweep_section, swept_parameter, swept_paths
 from ringsweep.config.consistency import check_consistency
-from ringsweep.config.sections import suggestion
 from ringsweep.errors import InputError
-from ringsweep.quantities.flags import AFTERMATHS, REGIMES
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.units import quantity, show
 from ringsweep.quantities.variables import words
 from ringsweep.runs.boundaries import located, word_in
 from ringsweep.runs.executors import Execution
+from ringsweep.runs.regime_words import check_word
 from ringsweep.runs.sweep import compute
 from ringsweep.statistics import quantiles, summarised
 from ringsweep.storage.provenance import attributes
@@ -135,12 +134,10 @@ def locate(
     settings : iterable of str
         As for :func:`ringsweep.config.with_values`.
     """
-    if regime not in REGIMES + AFTERMATHS:
-        raise InputError("regime", f"{show(regime)} is not a regime" + suggestion(regime, REGIMES + AFTERMATHS))
     settings = list(settings)
     whole = load(config, _beside_axes(config, path, settings))
-    if regime in AFTERMATHS and "impact.restitution" not in sweepable(whole.scene):
-        raise InputError("regime", f"{show(regime)} is said of runs that go on: it needs impact in the scene")
+    sampled = () if whole.sample is None else (one for factor in whole.sample.factors for one in factor.paths)
+    check_word(regime, whole.scene, {path, *whole.axes.columns, *sampled})
     if whole.sample is not None:
         low, high = _ends(whole, path, between)
         return distribution(whole, path, regime, *_scan(whole, path, (low, high), tolerance, scan), jobs=jobs)
@@ -338,9 +335,21 @@ def _scanned(runs: xr.Dataset, name: str, label: str) -> str:
     return text + (f"; {unsure} not certified" if unsure else "")
 
 
-def _number(value: float, axis: xr.DataArray, digits: str = ".6g") -> str:
-    unit = axis.attrs.get("units", "1")
-    return f"{value:{digits}}{'' if unit == '1' else f' {unit}'}"
+def _number(value: float, axis: xr.DataArray) -> str:
+    """A number with its unit; an angle in degrees too."""
+    turned = f" ({degrees(value):.6g} deg)" if axis.attrs.get("units") == "rad" else ""
+    return f"{value:.6g}{_unit(axis)}{turned}"
+
+
+def _unit(data: xr.DataArray) -> str:
+    unit = data.attrs.get("units", "1")
+    return "" if unit == "1" else f" {unit}"
+
+
+def _with_error(value: float, error: float) -> str:
+    """A number with as many digits as its error leaves, and the error."""
+    digits = max(1 - floor(log10(error)), 0) if error > 0.0 else 15
+    return f"{value:.{digits}f} ± {error:.1e}"
 
 
 def in_words(found: xr.Dataset) -> str:
@@ -355,10 +364,10 @@ def in_words(found: xr.Dataset) -> str:
     for value, error, begins, beyond in zip(
         axis.values, found["error"].values, found["begins"].values, words(found["beyond"]).values, strict=True
     ):
-        digits = max(1 - floor(log10(error)), 0) if error > 0.0 else 15
-        turned = f" ({degrees(value):.{max(digits - 2, 1)}f} deg)" if axis.attrs.get("units") == "rad" else ""
         does, side = ("begins", "below") if begins else ("ends", "above")
-        at = f"{path} = {_number(value, axis, f'.{digits}f')} ± {error:.1e}{turned}"
+        at = f"{path} = {_with_error(value, error)}{_unit(axis)}"
+        if axis.attrs.get("units") == "rad":
+            at += f" ({_with_error(degrees(value), degrees(error))} deg)"
         lines.append(f"{regime} {does} at {at}; {side}: {beyond}")
     if not lines:
         lines.append(f"{regime} neither begins nor ends there")
@@ -371,7 +380,9 @@ def _quantiles_in_words(found: xr.Dataset) -> list[str]:
     for level in found["quantile"].values:
         one = found.sel(quantile=level)
         value, low, high = (one[f"threshold_quantile{end}"].item() for end in ("", "_low", "_high"))
-        shown = f"{value:.6g}{'' if unit == '1' else f' {unit}'} ({low:.6g} to {high:.6g})"
+        shown = f"{value:.6g}{_unit(found['threshold'])} ({low:.6g} to {high:.6g})"
+        if unit == "rad":
+            shown += f", {degrees(value):.6g} deg ({degrees(low):.6g} to {degrees(high):.6g})"
         lines.append(f"  {level:.0%} below {shown}")
     values = found["threshold"].values
     counts = {
