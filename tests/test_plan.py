@@ -3,6 +3,7 @@
 from threading import Event
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import yaml
 
@@ -10,11 +11,14 @@ import ringsweep
 from ringsweep import cli
 from ringsweep.config import load, refined
 from ringsweep.errors import InputError
+from ringsweep.quantities.variables import INFERRED
 from ringsweep.runs import plan
 from ringsweep.runs.cells import TaskResult
 from ringsweep.runs.executors import Execution
+from ringsweep.runs.refined import KnownLabels, decide
 from ringsweep.runs.sweep import write
 from ringsweep.storage.checkpoint import Checkpoint
+from ringsweep.storage.chunks import Layout
 
 
 @pytest.fixture
@@ -74,7 +78,30 @@ def test_dry_run_counts_the_cells_that_an_earlier_sweep_has(sweep, capsys):
 
 def test_dry_run_of_a_refined_sweep_tells_upper_bounds(sweep, capsys):
     assert cli.main(["run", sweep(8), "--dry-run", "--refine"]) == 0
-    assert capsys.readouterr().out.count("at most") == 4
+    said = capsys.readouterr().out
+    assert said.count("at most") == 4
+    assert "are expected to be run" in said.splitlines()[0]
+
+
+def test_dry_run_estimates_how_many_cells_of_a_refined_map_are_run(sweep):
+    """Of a known map, a disc, decisions ask for about as many cells as the measured ones let expect."""
+    side, draw = 256, np.random.default_rng(1)
+    config = refined(load(sweep(side)), True)
+    layout = Layout((side, side))
+
+    def columns(positions):
+        row, column = layout.indices(positions)
+        inside = np.hypot(row - 100, column - 130) < 60
+        return {"regime": inside.astype(np.int8), "certified": np.ones(len(positions), dtype=np.int8)}
+
+    labels = KnownLabels(config, layout.total)
+    found = decide(config, layout, labels, lambda positions: labels.put(positions, columns(positions)))
+    truth = np.count_nonzero(found.origin != INFERRED)
+    measured = draw.permutation(layout.total)[:2000]
+    expected = plan.expected_cells(config, layout, [TaskResult(measured, columns(measured), 1.0, {}, "")])
+    assert expected == pytest.approx(truth, rel=0.4)
+    assert truth < 0.2 * layout.total
+    assert not plan.expected_cells(load("a.yaml"), layout, [TaskResult(measured, columns(measured), 1.0, {}, "")])
 
 
 @pytest.mark.parametrize("dry", [True, False])

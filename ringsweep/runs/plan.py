@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ringsweep.config import Config
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
-from ringsweep.quantities.variables import OUTCOMES
+from ringsweep.quantities.variables import INFERRED, LABELS, OUTCOMES
 from ringsweep.runs import sampled
 from ringsweep.runs.cells import TaskResult, compute_task
 from ringsweep.runs.reuse import EarlierSweep
@@ -36,6 +36,9 @@ _PICTURE, _MOST_DRAWN, _INTERPOLATING = 120.0, 1 << 20, 40.0
 # Bytes of a finished file without cells, and the share of its columns that compression leaves: 0.55 of some thousand
 # cells, 0.4 of millions.
 _FILE, _COMPRESSED = 40e3, 0.55
+
+# Most cells of a refined sweep of which it is estimated how many are run.
+_MOST_GUESSED = 1 << 20
 
 # Seconds to measure cells, seconds to wait for the first ones (they may be compiled), and the most cells to measure.
 _MEASURING, _FIRST, _MOST = 1.0, 120.0, 100_000
@@ -130,29 +133,30 @@ def describe(config: Config, target: Path, jobs: int | None, reuse: str | os.Pat
     each = 0 if config.sample is None else config.sample.n * config.sample.rows
     runs = f", {each} runs in each, {each * layout.total} in all" if each else ""
     most = "at most " if config.refine is not None else ""
+    time, expected = _time(config, layout, threads, taken)
     return "\n".join(
         (
-            f"cells: {most}{layout.total}{shape}{runs}",
+            f"cells: {most}{layout.total}{shape}{runs}{expected}",
             *([] if reuse is None or config.sample is not None else [f"reuse: {taken} of them are taken from {reuse}"]),
             f"memory: some {size(memory_needed(config, False))} of {size(memory_of_machine())}",
             f"disk: {most}{size(columns + finished)} while it runs, then {most}{size(finished)}"
             f"; {size(free)} are free in {folder}",
-            f"time: {most}{_time(config, layout, threads, taken)}",
+            f"time: {most}{time}",
             "nothing was written",
         )
     )
 
 
-def _time(config: Config, layout: Layout, threads: int, taken: int) -> str:
-    """Estimated time of a sweep of which an earlier one has some cells, in words."""
+def _time(config: Config, layout: Layout, threads: int, taken: int) -> tuple[str, str]:
+    """Estimated time of a sweep of which an earlier one has some cells, and how many cells are expected, in words."""
     if config.sample is not None:
         layout = sampled.part_layout(config, layout)
     count = layout.total - taken
     if not count:
-        return "hardly any: no cell is run"
+        return "hardly any: no cell is run", ""
     results = _measure(config, layout)
     if results is None:
-        return f"not known: the first cells took more than {_FIRST:.0f} s, compilation included"
+        return f"not known: the first cells took more than {_FIRST:.0f} s, compilation included", ""
     cells = sum(len(result.positions) for result in results)
     cost = sum(result.seconds or 0.0 for result in results) / cells if cells else _MEASURING
     seconds = cost * count / min(threads, count)
@@ -161,7 +165,43 @@ def _time(config: Config, layout: Layout, threads: int, taken: int) -> str:
         f"measured on {cells} {what} spread over the grid" if cells else "one cell takes longer than the measurement"
     )
     about = "about" if cells else "more than"
-    return f"{about} {duration(seconds)} on {threads} threads, once the kernels are compiled ({basis})"
+    told = f"{about} {duration(seconds)} on {threads} threads, once the kernels are compiled ({basis})"
+    run = 0 if taken else expected_cells(config, layout, results)
+    if not run:
+        return told, ""
+    less = f"; some {duration(cost * run / min(threads, run))} for the cells that are expected"
+    return told + less, f"; some {run} are expected to be run ({run / layout.total:.2g} of all)"
+
+
+def expected_cells(config: Config, layout: Layout, results: list[TaskResult]) -> int:
+    """About how many cells a refined sweep runs: those of a map in which each cell is as the nearest one that was run.
+
+    Returns
+    -------
+    int
+        0 if the sweep is not refined, or if nothing follows from the results.
+    """
+    known = [result for result in results if "regime" in result.columns]
+    if config.refine is None or config.refine.also is not None or layout.total > _MOST_GUESSED or not known:
+        return 0
+    # Slow to import, and only this needs it.
+    from scipy.spatial import KDTree
+
+    from ringsweep.runs.refined import KnownLabels, decide
+
+    labels = KnownLabels(config, layout.total)
+    positions = np.concatenate([result.positions for result in known])
+    columns = {
+        name: np.concatenate([result.columns[name] for result in known]) for name in LABELS if name in known[0].columns
+    }
+    # Cells of one map are nearer to each other than to those of any other map.
+    apart = [1.0 if dim in config.refine.dims else 4.0 * layout.total for dim in config.axes.sizes]
+    places = np.stack(layout.indices(np.arange(layout.total)), axis=1) * apart
+    _, nearest = KDTree(places[positions]).query(places)
+    guessed = {name: column[nearest] for name, column in columns.items()}
+    labels.put(np.arange(layout.total), guessed | {"certified": np.ones(layout.total, dtype=np.int8)})
+    found = decide(config, layout, labels, lambda _: None)
+    return int(np.count_nonzero(found.origin != INFERRED))
 
 
 def _measure(config: Config, layout: Layout) -> list[TaskResult] | None:
