@@ -459,7 +459,7 @@ def draw(data: xr.Dataset, methods: list[str]) -> Figure:
         share = 100.0 * own_rows.regime_wrong.mean("cell")
         line = styles[method]
         shares.plot(own_rows.time_per_run, share, color=line.get_color(), marker=line.get_marker(), markersize=4)
-    shares.set(xscale="log", xlabel=axes[0].get_xlabel(), ylabel="regime wrong (% of cells)")
+    shares.set(xscale="log", xlabel=axes[0].get_xlabel(), ylabel="regime wrong\n(% of cells)")
     shares.set_ylim(-4.0, 104.0)
     shares.tick_params(labelsize="small")
     shares.grid(True, color="#E6E6E6", linewidth=0.6)

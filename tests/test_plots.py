@@ -624,6 +624,16 @@ class TestPaper:
         assert figure.get_figwidth() == pytest.approx(width / 25.4)
         assert_readable(figure)
 
+    def test_long_label_of_an_error_is_folded_within_one_column(self):
+        plots.style("print", width=85)
+        work = make_work(methods=7)
+        work["error_end"].attrs["long_name"] = "error of the angular velocity of the body at the end"
+        figure = plots.work_precision(work)
+        figure.draw_without_rendering()
+        (ax,) = figure.axes
+        label, frame = ax.yaxis.label.get_window_extent(), ax.get_window_extent()
+        assert frame.y0 < label.y0 < label.y1 < frame.y1
+
     @pytest.mark.parametrize("var", ["regime", "t_separation"])
     def test_two_map_panels_fit_into_one_figure(self, var):
         figure = Figure(figsize=(7, 3), layout="constrained")

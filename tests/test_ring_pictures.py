@@ -279,6 +279,22 @@ class TestPhasePortrait:
         (slide,) = ax.child_axes
         assert slide.get_ylabel() == "sliding velocity (m s$^{-1}$)"
 
+    def test_portrait_of_one_column_without_a_layout_is_not_cut_off(self, run):
+        figure = Figure(figsize=(85 / 25.4, 75 / 25.4))
+        ax = plots.phase_portrait(run, ax=figure.add_subplot())
+        figure.draw_without_rendering()
+        for part in (ax.xaxis.label, ax.yaxis.label, ax.get_legend()):
+            box = part.get_window_extent()
+            assert min(box.x0, box.y0) >= 0.0
+            assert box.x1 <= figure.bbox.x1
+            assert box.y1 <= figure.bbox.y1
+
+    def test_layout_that_the_user_chose_stays(self, run):
+        figure = Figure()
+        figure.subplots_adjust(left=0.2)
+        plots.phase_portrait(run, ax=figure.add_subplot())
+        assert figure.get_layout_engine() is None
+
     def test_portrait_of_many_turns_is_wrapped_without_lines_across(self, run, ax):
         spun = run.assign(phi=run["phi"] * 20.0)
         plots.phase_portrait(spun, ax=ax)

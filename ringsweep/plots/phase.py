@@ -30,7 +30,10 @@ from ringsweep.plots.style import (
     arc_colour,
     arc_names,
     axes_or_current,
+    figure_width,
+    is_narrow,
     label_axes,
+    make_room,
     on_page,
     page_colour,
     place_legend,
@@ -72,8 +75,8 @@ def phase_portrait(ds: xr.Dataset, frame: Literal["space", "ring"] = "space", ax
     frame : {"space", "ring"}
         Frame of reference; on a belt always space.
     ax : matplotlib.axes.Axes, optional
-        Axes to draw in, by default pyplot's current ones. The legend stands outside them: a figure with
-        ``layout="constrained"`` makes room for it.
+        Axes to draw in, by default pyplot's current ones. The legend stands outside them: a figure whose
+        layout was not chosen gets the constrained one, which makes room for it.
 
     Returns
     -------
@@ -99,8 +102,9 @@ def phase_portrait(ds: xr.Dataset, frame: Literal["space", "ring"] = "space", ax
     if frame == "ring":
         raise InputError("frame", "'ring' is for a body in a ring; on a belt the frame is 'space'")
     run = belt_history(ds)
-    ax = axes_or_current(ax, 0.63)
+    ax = axes_or_current(ax, 0.9 if is_narrow(figure_width()) else 0.63)
     place_legend(ax, draw_belt_portrait(ax, run))
+    make_room(ax)
     return ax
 
 
@@ -122,7 +126,7 @@ def draw_belt_portrait(ax: Axes, run: xr.Dataset) -> list[Artist]:
 def _ring_portrait(ds: xr.Dataset, frame: str, ax: Axes | None) -> Axes:
     """Draw angular velocity over angle."""
     run, rig = ring_history(ds)
-    ax = axes_or_current(ax, 0.63)
+    ax = axes_or_current(ax, 0.9 if is_narrow(figure_width()) else 0.63)
     small_ticks(ax)
     factor, unit = angle_unit()
     relative = frame == "ring"
@@ -160,6 +164,7 @@ def _ring_portrait(ds: xr.Dataset, frame: str, ax: Axes | None) -> Axes:
     # The second axis has its labels between axes and legend.
     labels = ScaledTranslation(0.065 * rcParams["font.size"] * relative, 0.0, figure.dpi_scale_trans)
     place_legend(ax, entries, bbox_transform=ax.transAxes + labels, handleheight=1.2)
+    make_room(ax)
     return ax
 
 

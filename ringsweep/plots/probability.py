@@ -18,6 +18,8 @@ from ringsweep.plots.style import (
     REGIME_COLOURS,
     axes_or_current,
     folded,
+    label_axes,
+    make_room,
     on_page,
     place_legend,
     small_ticks,
@@ -112,10 +114,10 @@ def survival_panel(ds: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.step(time, ds["survival"].values, color=colour, where="post")
     ax.set_ylim(0.0, 1.02)
     ax.yaxis.set_major_formatter(PercentFormatter(1.0))
-    ax.set_xlabel("time (s)")
     what = "rides" if ds.attrs.get("survival_of") == "first_slip" else "holds its contacts"
-    ax.set_ylabel(f"body still {what}")
+    label_axes(ax, "time (s)", f"body still {what}")
     small_ticks(ax)
+    make_room(ax)
     return ax
 
 

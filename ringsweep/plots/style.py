@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
+from matplotlib.gridspec import SubplotParams
 from matplotlib.legend import Legend
 from matplotlib.transforms import ScaledTranslation
 from numpy.typing import NDArray
@@ -208,6 +209,21 @@ def axes_or_current(ax: Axes | None, height: float) -> Axes:
     return pyplot.gca()
 
 
+#: Sides of a grid of axes whose places a user may have chosen.
+_ENDS = ("left", "right", "bottom", "top")
+
+
+def make_room(ax: Axes) -> None:
+    """Let the layout make room for labels and legend, in a figure about whose layout nothing was said."""
+    figure: Any = ax.figure
+    spec = ax.get_subplotspec()
+    own = figure.get_figure(root=True)
+    usual = vars(own.subplotpars) == vars(SubplotParams())
+    placed = spec is None or any(getattr(spec.get_gridspec(), end, None) is not None for end in _ENDS)
+    if own.get_layout_engine() is None and usual and not placed:
+        own.set_layout_engine("constrained")
+
+
 def width_of(ax: Axes) -> float:
     """Width that the layout of the figure has for the axes with their labels and legend, inches."""
     figure: Any = ax.figure
@@ -231,9 +247,11 @@ def is_narrow(inches: float) -> bool:
 
 def label_axes(ax: Axes, x: str, y: str) -> None:
     """Write the labels of both axes, in as many lines as their widths need."""
+    # A legend below narrow axes takes a part of the height.
+    share = 0.5 if is_narrow(width_of(ax)) else 0.75
     # Ticks and the label of the vertical axis take a part of the width.
     ax.set_xlabel(folded([x], width_of(ax) - MARGIN))
-    ax.set_ylabel(folded([y], 0.75 * height_of(ax)))
+    ax.set_ylabel(folded([y], share * height_of(ax)))
 
 
 def letters(inches: float) -> int:
