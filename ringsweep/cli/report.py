@@ -32,6 +32,7 @@ def summarise(result: xr.Dataset) -> None:
     if "aftermath" in result:
         print("contacts:")
         _print_shares(result["aftermath"])
+        _print_losses(result)
     if extremes := [extreme for name in _GREATEST if name in result and (extreme := _extreme(result[name]))]:
         print("greatest:", ", ".join(extremes))
     if "certified" in result:
@@ -97,6 +98,21 @@ def _print_shares(data: xr.DataArray) -> None:
     """Print the number and the share of the cells of each class that occurs."""
     for _, meaning, count in _counts(data):
         print(f"  {meaning}: {count} ({count / data.size:.1%})")
+
+
+def _print_losses(result: xr.Dataset) -> None:
+    """Print how often the contacts of a run are lost, and how often they hit the ring."""
+    told = []
+    for name, what in (("separations", "losses of contact"), ("impacts", "impacts")):
+        if name not in result:
+            continue
+        # Inferred cells have no number; cells that lose no contact have no losses.
+        counts = np.concatenate([np.ravel(part[part > 0]) for part in _parts(result[name])])
+        if counts.size:
+            ends = f"{counts.min():.0f} to {counts.max():.0f}, median {np.median(counts):.0f}"
+            told.append(f"{what} {counts[0]:.0f}" if result["regime"].size == 1 else f"{what} {ends}")
+    if told:
+        print("  in a run that has any:" if result["regime"].size > 1 else "  in this run:", "; ".join(told))
 
 
 # Events of a run that are printed: all, or the first and the last.

@@ -210,6 +210,13 @@ def _resample(run: xr.Dataset, times: NDArray[np.float64]) -> xr.Dataset:
     return found
 
 
+def _counted(outcome: xr.Dataset) -> str:
+    """How often contacts are lost, and how often they hit the ring."""
+    lost, hits = int(outcome["separations"]), int(outcome["impacts"])
+    losses = f"{lost} losses of contact" if lost != 1 else "1 loss of contact"
+    return f"{losses} and {hits} impacts" if hits != 1 else f"{losses} and 1 impact"
+
+
 def _describe(outcome: xr.Dataset) -> str:
     """Outcome of a run in words."""
     regime = REGIMES[int(outcome["regime"])]
@@ -218,7 +225,7 @@ def _describe(outcome: xr.Dataset) -> str:
         contact = ("no contact", "contact 1", "contact 2", "both contacts")[int(outcome["separating_contact"])]
         after = ""
         if "aftermath" in outcome:
-            after = f", then {AFTERMATHS[int(outcome['aftermath'])]} with {int(outcome['impacts'])} impacts"
+            after = f", then {AFTERMATHS[int(outcome['aftermath'])]}, with {_counted(outcome)}"
         return (
             f"{regime} ({REGIMES[int(outcome['motion'])]}), {contact}, "
             f"t = {float(outcome['t_separation']):.6g} s{after}{certificate}"
