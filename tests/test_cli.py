@@ -430,3 +430,10 @@ def test_info_tells_what_follows_lost_contacts_and_the_greatest_loads(tmp_path, 
     text = capsys.readouterr().out
     assert "contacts:\n  held: 1 (25.0%)\n  recovered: 2 (50.0%)\n  tumbled: 1 (25.0%)\n" in text
     assert "greatest: jump_max 358 rad s-2, gap_max 0.0168 m\n" in text
+
+
+def test_misspelt_command_is_refused_with_the_nearest(capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(["simulat", "my.yaml"])
+    assert caught.value.code == 2
+    assert "; did you mean `simulate`?" in capsys.readouterr().err.splitlines()[-1]

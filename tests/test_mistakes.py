@@ -238,6 +238,7 @@ FITS: list[tuple[Any, Any, dict[str, Any], str]] = [
     ("angle.csv", "friction.mu_k", {}, "angle.csv, line 1: data.phi: is no quantity of the history"),
     ("mass.csv", "friction.mu_k", {}, "mass.csv, line 2: data.x.0: '0.2 kg' has the wrong unit"),
     ("empty.csv", "friction.mu_k", {}, "the file is empty"),
+    ("drum.yaml", "friction.mu_k", {}, "data: drum.yaml is a configuration by its name; did you mean a table such as"),
 ]
 
 
@@ -285,3 +286,22 @@ def test_plain_end_of_an_interval_beside_another_unit_is_told(caplog: pytest.Log
         *('was `--from "800 g"` meant?', 'was `--to "700 g"` meant?'),
         *('was `--vary "body.mass=800 g..HIGH"` meant?', 'was `--vary "body.mass=LOW..700 g"` meant?'),
     ]
+
+
+@pytest.mark.parametrize(
+    ("changed", "grid", "path", "words"),
+    [
+        ({}, {"body.mass": {"logspace": [1, 2, 3]}}, "sweep.grid.body.mass", "; did you mean `geomspace`, from the"),
+        ({}, {"body.mass": {"linspce": [1, 2, 3]}}, "sweep.grid.body.mass", "; did you mean `linspace`, from the"),
+        ({"solver": {"method": "auto"}}, {}, "scene.solver", "the section `solver` stands beside `scene`, not in it"),
+        (
+            {"drive": {"law": "power", "amplitude": "2 m", "exponent": 1.1}, "belt": None},
+            {},
+            "scene.drive.amplitude",
+            "its unit is m/s^p with the exponent p, so write 2 for 2 m/s^p",
+        ),
+    ],
+)
+def test_mistake_in_a_configuration(changed: dict[str, Any], grid: Any, path: str, words: str) -> None:
+    scene = {key: value for key, value in (BELT | changed).items() if value is not None}
+    located(lambda: load({"scene": scene} | ({"sweep": {"grid": grid}} if grid else {})), path, words)

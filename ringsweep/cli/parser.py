@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 import shutil
 from contextlib import suppress
 from textwrap import dedent, indent
@@ -23,7 +24,7 @@ from ringsweep.cli.commands import (
     threshold_command,
     verify_command,
 )
-from ringsweep.errors import InputError, shortened
+from ringsweep.errors import InputError, nearest_name, shortened
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -276,6 +277,9 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """End the process with a message."""
+        if wrong := re.match(r"argument COMMAND: invalid choice: '([^']*)' \(choose from (.*)\)", message):
+            near = nearest_name(wrong[1], re.findall(r"[a-z]+", wrong[2]))
+            message += f"; did you mean `{near}`?" if near else ""
         super().error(shortened(message, 1000))
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ringsweep.config.scene import sweepable
 from ringsweep.config.sections import MAX_LENGTH, read_values, section_of, suggestion
 from ringsweep.config.yaml_text import Document
-from ringsweep.errors import InputError
+from ringsweep.errors import InputError, nearest_name
 from ringsweep.models.scene import Scene
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.units import is_quantity, quantity, show
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 COUNT = Parameter("1", "number of values", lower=1, upper=MAX_LENGTH, whole=True)
+
+_SPACINGS = ("linspace", "geomspace")
 
 #: Largest number of cells of a sweep. With 24 variables each they take some ten gigabytes on a disk.
 MAX_CELLS = 100_000_000
@@ -157,8 +159,11 @@ def read_spacing(given: dict[str, Any], parameter: Parameter | Choice, where: st
     """Values from ``{linspace: [first, last, count]}`` or ``{geomspace: ...}``."""
     if isinstance(parameter, Choice):
         raise InputError(where, f"a list of names is expected, got {show(given)}")
-    if len(given) != 1 or next(iter(given)) not in ("linspace", "geomspace"):
-        raise InputError(where, f"a list of values, linspace or geomspace is expected, got {show(given)}")
+    if len(given) != 1 or next(iter(given)) not in _SPACINGS:
+        wrong = next((key for key in given if key not in _SPACINGS), None)
+        near = "geomspace" if wrong in ("logspace", "log", "geom") else wrong and nearest_name(wrong, _SPACINGS)
+        hint = f"; did you mean `{near}`, from the first value to the last?" if near else ""
+        raise InputError(where, f"a list of values, linspace or geomspace is expected, got {show(given)}{hint}")
     ((kind, bounds),) = given.items()
     where = f"{where}.{kind}"
     if not isinstance(bounds, list) or len(bounds) != 3:

@@ -244,6 +244,8 @@ def _belongs_elsewhere(section: str, key: str, paths: _Paths, model: str) -> str
         return ": a comma ends a value in YAML, write a decimal point"
     if section.startswith("zone") and key in ("from", "to", "start", "end", "width"):
         return ": a zone has a center, which is (from + to)/2, and a half_angle, which is (to - from)/2"
+    if not section and key in ("solver", "sweep", "record"):
+        return f": the section `{key}` stands beside `scene`, not in it: take away its indentation"
     if len(key) > 1 and any(str(own).startswith(key) for own in paths.children.get(section, ())):
         return None
     if places := paths.ending_with(key):

@@ -256,6 +256,11 @@ def _factors(config: Config, vary: Mapping[str, Any]) -> list[_Factor]:
 def _columns(doc: Document, data: Any) -> Mapping[str, Any]:
     """Columns of the data by their names, with ``t`` for the times."""
     if isinstance(data, str | os.PathLike):
+        if Path(data).suffix.lower() in (".yaml", ".yml", ".nc"):
+            what = "a result" if Path(data).suffix.lower() == ".nc" else "a configuration"
+            raise InputError(
+                "data", f"{data} is {what} by its name; did you mean a table such as run.csv, with t, and phi or x?"
+            )
         columns: Mapping[str, Any] = doc.inline_csv(str(data), "data", "data")
     elif isinstance(data, Mapping):
         columns = data
