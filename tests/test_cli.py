@@ -421,6 +421,7 @@ def test_documentation_names_every_key_law_drive_and_variable():
 
 def test_info_tells_what_follows_lost_contacts_and_the_greatest_loads(tmp_path, capsys):
     values = {"regime": [1, 3, 3, 3], "aftermath": [0, 1, 1, 3], "gap_max": [0.0, 1e-5, 2e-3, 0.0168]}
+    values |= {"separations": [0, 3, 1, 5], "impacts": [0, 59, 4, 100]}
     values |= {"jump_max": [50.0, 60.0, 357.8, 90.0], "certified": [1, 1, 1, 0]}
     ds = xr.Dataset(
         {name: ("drive_amplitude", np.array(column), OUTCOMES[name].attributes) for name, column in values.items()},
@@ -429,6 +430,8 @@ def test_info_tells_what_follows_lost_contacts_and_the_greatest_loads(tmp_path, 
     report.summarise(ds)
     text = capsys.readouterr().out
     assert "contacts:\n  held: 1 (25.0%)\n  recovered: 2 (50.0%)\n  tumbled: 1 (25.0%)\n" in text
+    counts = "losses of contact 1 to 5, median 3; impacts 4 to 100, median 59"
+    assert f"  in a run that has any: {counts}\n" in text
     assert "greatest: jump_max 358 rad s-2, gap_max 0.0168 m\n" in text
 
 
