@@ -588,7 +588,7 @@ def test_pictures_show_intervals() -> None:
     shown = [text.get_text() for text in bars.get_yticklabels()]
     assert shown == [word for word in REGIMES if ds.probability.sel(word=word) > 0.0]
     ax = survival_panel(ds, Figure(figsize=(85 / 25.4, 55 / 25.4)).add_subplot())
-    assert ax.get_ylabel() == "body still rides"
+    assert ax.get_ylabel().replace("\n", " ") == "body still rides"
     ax.figure.draw_without_rendering()
     for label in (ax.xaxis.label, ax.yaxis.label):
         box = label.get_window_extent()
