@@ -626,8 +626,8 @@ class TestPaper:
 
     def test_long_label_of_an_error_is_folded_within_one_column(self):
         plots.style("print", width=85)
-        work = make_work(methods=7)
-        work["error_end"].attrs["long_name"] = "error of the angular velocity of the body at the end"
+        work = make_work(methods=20)
+        work["error_end"].attrs["long_name"] = "error of the angle of the body at the end"
         figure = plots.work_precision(work)
         figure.draw_without_rendering()
         (ax,) = figure.axes
