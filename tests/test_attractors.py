@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from belts import with_all_parts
 
 import ringsweep
 from ringsweep import InputError
@@ -128,7 +129,8 @@ def belt(velocity, law=None, **sections):
         "friction": law or {"law": "tustin", "mu_s": 1.0, "mu_k": 0.5, "alpha": 2.0},
         "time": {"span": 600.0},
     }
-    return ringsweep.run({"scene": scene | sections.pop("scene", {}), **sections}, jobs=1, progress=False)
+    scene = with_all_parts(scene | sections.pop("scene", {}))
+    return ringsweep.run({"scene": scene, **sections}, jobs=1, progress=False)
 
 
 def basin(velocity, side=24, law=None):

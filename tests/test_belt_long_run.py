@@ -4,6 +4,7 @@ from math import pi
 
 import numpy as np
 import pytest
+from belts import with_all_parts
 from scipy.integrate import solve_ivp
 
 import ringsweep
@@ -28,7 +29,7 @@ def scene(law, omega, amplitude, *, x=0.0, v_belt=1.0, cubic=0.0, damping=0.0, *
 def over(of, omega, periods, exponent=False):
     """Runs of a scene over these numbers of periods of the force."""
     config = {
-        "scene": of,
+        "scene": with_all_parts(of),
         "record": {"exponent": exponent},
         "solver": {"method": "auto", "certify": False},
         "sweep": {"grid": {"time.span": [n * 2.0 * pi / omega for n in periods]}},
@@ -192,6 +193,6 @@ def test_words_of_free_motions():
         "initial.velocity": [0.1, 0.0, 0.1, 0.0, 0.1],
         "time.span": [30.0, 30.0, 10.0, 30.0, 5.0],
     }
-    found = ringsweep.run({"scene": free, "sweep": {"points": points}}, jobs=1, progress=False)
+    found = ringsweep.run({"scene": with_all_parts(free), "sweep": {"points": points}}, jobs=1, progress=False)
     assert words(found) == ["periodic", "steady", "transient", "rest", "transient"]
     assert found.settled.values.tolist() == [1, 1, 0, 1, 0]

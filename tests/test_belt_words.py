@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 import xarray as xr
+from belts import with_all_parts
 
 import ringsweep
 from ringsweep.quantities.flags import REGIMES
@@ -239,7 +240,7 @@ def oscillator(friction, **changes):
 
 
 def test_cubic_spring_alone_pulls_a_stuck_body_loose_again_and_again():
-    of = oscillator(STICTION, spring={"stiffness": 0.0, "cubic": 1.0}, belt={"velocity": 0.1})
+    of = with_all_parts(oscillator(STICTION, spring={"stiffness": 0.0, "cubic": 1.0}, belt={"velocity": 0.1}))
     run = ringsweep.sweep(of, {"time.span": [5.0, 100.0, 103.0, 106.0]}, progress=False)
     assert words(run) == ["riding", *["stick-slip"] * 3]
     np.testing.assert_allclose(run.period[1:], 6.44443, atol=1e-5)
@@ -256,7 +257,7 @@ def test_body_that_slides_steadily_below_the_end_of_the_stiction_band_is_sliding
 class TestSteadySliding:
     """Errors of the steps around steady sliding are no oscillation; neither is a motion that decays."""
 
-    SCENE: ClassVar = scene("tustin", k=500.0, belt=0.1, span=20.0, mu_s=0.45, mu_k=0.25, alpha=10.0)
+    SCENE: ClassVar = with_all_parts(scene("tustin", k=500.0, belt=0.1, span=20.0, mu_s=0.45, mu_k=0.25, alpha=10.0))
     AXES: ClassVar = {"belt.velocity": np.geomspace(0.02, 1.0, 8).tolist(), "damper.coefficient": [5.0, 10.0, 20.0]}
 
     def test_certified_word_at_a_loose_tolerance_is_that_at_a_tight_one(self):
@@ -269,7 +270,7 @@ class TestSteadySliding:
             np.testing.assert_array_equal(words_of(loose)[trusted], words_of(tight)[trusted])
 
     def test_fast_oscillation_that_decays_within_the_span_is_sliding_and_not_settled_at_first(self):
-        stiff = {**self.SCENE, "spring": {"stiffness": 1e7}, "damper": {"coefficient": 14.3}}
+        stiff = with_all_parts({**self.SCENE, "spring": {"stiffness": 1e7}, "damper": {"coefficient": 14.3}})
         found = runs(stiff, [2.0, 30.0])
         assert words(found) == ["sliding", "sliding"]
         assert found.swing[0] > 10.0 * found.swing[1]

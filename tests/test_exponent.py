@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from belts import with_all_parts
 from scipy.integrate import solve_ivp
 
 import ringsweep
@@ -29,7 +30,7 @@ FREE = BODY | {
 def run(scene, points=None, exponent=True, certify=False):
     """Outcomes of a scene; `points` are columns of values by path."""
     config = {
-        "scene": scene,
+        "scene": with_all_parts(scene),
         "record": {"exponent": exponent},
         "solver": {"method": "auto", "certify": certify},
         **({} if points is None else {"sweep": {"points": {k: np.asarray(v).tolist() for k, v in points.items()}}}),

@@ -5,6 +5,7 @@ from copy import deepcopy
 
 import numpy as np
 import pytest
+from belts import with_all_parts
 
 import ringsweep
 from ringsweep import InputError
@@ -18,13 +19,13 @@ HARDENING = {
     "spring": {"stiffness": 1.0, "cubic": 1.0},
     "damper": {"coefficient": 0.1},
     "belt": {"velocity": 50.0},
-    "friction": {"law": "coulomb", "mu_k": 1e-6},
+    "friction": {"law": "tustin", "mu_s": 1e-6, "mu_k": 1e-6, "alpha": 1.0},
     "force": {"amplitude": 0.5, "frequency": 0.25},
     "initial": {"x": 0.0, "velocity": 0.0},
     "time": {"span": 199.0},
 }
 
-LUGRE = {
+LUGRE = with_all_parts({
     "model": "belt",
     "gravity": 1.0,
     "body": {"mass": 1.0},
@@ -35,7 +36,7 @@ LUGRE = {
     },
     "force": {"amplitude": 0.05, "frequency": 0.2},
     "time": {"span": 7.0},
-}  # fmt: skip
+})  # fmt: skip
 
 FREQUENCIES = [0.21, 0.24, 0.27, 0.3, 0.33, 0.36]
 

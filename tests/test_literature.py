@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from belts import with_all_parts
 from scipy import optimize, special
 
 import ringsweep
@@ -154,8 +155,14 @@ def test_hetzlers_unstable_cycle_bounds_the_basin_of_steady_slip():
             target = np.exp(alpha * (velocity - hopf))
             radius = optimize.brentq(lambda z, t=target: 2 * special.iv(1, z) / z - t, 1e-3, 10.0) / alpha
             slip = 0.5 + 0.5 * small * np.exp(-alpha * velocity)
-            scene = on_belt(
-                0.1 * small, law, belt={"velocity": velocity}, initial={"velocity": 0.0}, time={"span": 4000.0 / small}
+            scene = with_all_parts(
+                on_belt(
+                    0.1 * small,
+                    law,
+                    belt={"velocity": velocity},
+                    initial={"velocity": 0.0},
+                    time={"span": 4000.0 / small},
+                )
             )
             # Half the width: harmonics of the first order move both ends alike.
             ends = [threshold(scene, slip, side * radius) for side in (-1.0, 1.0)]

@@ -4,6 +4,7 @@ from copy import deepcopy
 
 import numpy as np
 import pytest
+from belts import with_all_parts
 from scipy.integrate import solve_ivp
 
 import ringsweep
@@ -35,7 +36,7 @@ BRISTLES = BODY | {
 
 def run(scene, section, output=None, **sweep):
     """Outcomes of a scene with a section."""
-    config = {"scene": scene, **({"record": {"section": section}} if section else {}), **sweep}
+    config = {"scene": with_all_parts(scene), **({"record": {"section": section}} if section else {}), **sweep}
     return ringsweep.run(deepcopy(config), output, jobs=1, progress=False)
 
 
@@ -162,7 +163,7 @@ def test_files_resume_and_reuse_hold_the_points(tmp_path, monkeypatch, swept):
     ringsweep.verify(target)
     part = deepcopy(swept)
     part["sweep"]["grid"]["force.amplitude"] = [0.4]
-    config = {"scene": FORCED, "record": {"section": section}, **part}
+    config = {"scene": with_all_parts(FORCED), "record": {"section": section}, **part}
     again = ringsweep.run(config, reuse=target, progress=False)
     np.testing.assert_array_equal(again.x_section, whole.x_section[:, 1:])
     assert cli.main(["info", str(target)]) == 0
