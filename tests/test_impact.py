@@ -439,6 +439,7 @@ class TestBody:
             "body": {"mass": 0.362325, "inertia": 1.36913e-05, "half_distance": 0.0127683, "ball_radius": 0.0244479},
             "ring": {"radius": 0.0645043},
             "friction": JUMPING["friction"] | {"vb": 1.16804, "rest": {"mu_s": 0.780949, "mu_k": 0.430834}},
+            "drive": {"law": "sinusoidal", "amplitude": 0.0, "frequency": 1.0},
             "initial": {"phi": 1.55313, "omega": -22.6359},
             "impact": {"restitution": 0.0641463},
         }
