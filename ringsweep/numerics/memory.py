@@ -14,8 +14,8 @@ from numba.core import types
 from numba.extending import intrinsic
 
 from ringsweep.compile import function_from_lines, generated, map_leaves, specialise
-from ringsweep.numerics.functions import select
-from ringsweep.numerics.lanes import LANES, VECTOR, WIDTH, spread_scalar
+from ringsweep.numerics.functions import select, spread
+from ringsweep.numerics.lanes import LANES, VECTOR, WIDTH
 
 
 def _numbers(kind: Any, name: str) -> list[tuple[str, Any]]:
@@ -126,22 +126,17 @@ def read_lanes(memory, at, like):
     return [f"return {text}"], scope | {"load": _load}
 
 
-@intrinsic
-def _broadcast(typingctx, x):
-    return LANES(types.float64), lambda context, builder, sig, args: spread_scalar(builder, args[0], VECTOR)
-
-
 @generated
 def conform(nested, like):
     """Nested tuple in which a number becomes Lanes wherever `like` has Lanes."""
     numbers = _numbers(nested, "nested")
 
-    def spread(kind: Any, k: int) -> str:
+    def fitting(kind: Any, k: int) -> str:
         name, given = numbers[k]
-        return f"broadcast({name})" if kind == LANES and given != LANES else name
+        return f"spread({name})" if kind == LANES and given != LANES else name
 
-    text, scope = _rebuilt(like, spread)
-    return [f"return {text}"], scope | {"broadcast": _broadcast}
+    text, scope = _rebuilt(like, fitting)
+    return [f"return {text}"], scope | {"spread": spread}
 
 
 def select_all(condition, a, b):

@@ -20,6 +20,7 @@ from ringsweep.solvers.audit import Audit, audit_step, fall_rate, is_checked
 from ringsweep.solvers.creep import StepControl, implicit_step, start_at
 from ringsweep.solvers.steps import Step, lent, scratch_for, without_rows
 from ringsweep.solvers.taylor import series_step
+from ringsweep.solvers.variation import at_event
 
 # A run ends after this many consecutive steps and events at one instant.
 _MOST_STALLED = 400
@@ -408,7 +409,7 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
                 audit = audit_step(family(scene.law), scene, step, scratch, tolerances[0], audit)
             t, status, mode, y = _after_step(scene, mode, guard, t, s, h_max, y_next)
             if guard >= 0:
-                record = variation.switched(scene, record, step.mode, guard, t, y_next)
+                record = at_event(variation.asked(scene), scene, record, step.mode, guard, t, y_next)
                 record = recorder.after_event(scene, record, mode, t)
             # The regime of a run that goes on after a loss is that loss: what ends the run later does not count.
             decides = status != RUNNING or modes.first_loss(step.mode, mode)

@@ -79,3 +79,14 @@ def _along_implicit(asked, scene, record, start, x_next, h, ends, scratch):
     # The last node is the end.
     rates = implicit.rates(scene, start.mode, start.common, forcing, x)
     return variation.advance(scene, record, (high - low) * h, rates, WEIGHTS_OF_FEW, work)
+
+
+@hook(optional=True)
+def at_event(asked, scene, record, mode, guard, t, y):
+    """Record after a guard of a mode has vanished."""
+    return record
+
+
+@at_event.implements(variation.Exponent)
+def _at_event(asked, scene, record, mode, guard, t, y):
+    return variation.switched(scene, record, mode, guard, t, y)

@@ -67,16 +67,6 @@ def _advance(scene, record, h, rates, weights, work):
 
 @variation.switched.implements(Belt, BristleBelt)
 def _switched(scene, record, mode, guard, t, y):
-    return _switched_if_asked(scene.asked, scene, record, mode, guard, t, y)
-
-
-@hook(optional=True)
-def _switched_if_asked(asked, scene, record, mode, guard, t, y):
-    return record
-
-
-@_switched_if_asked.implements(variation.Exponent)
-def _gradient_at_event(asked, scene, record, mode, guard, t, y):
     rates = record.tangent.rates
     return _with(record, tangent.switched(record.tangent, _gradient(scene, mode, guard, t, y, rates)))
 

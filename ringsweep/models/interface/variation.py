@@ -73,7 +73,6 @@ def advance(scene, record, h, rates, weights, work):
     """
 
 
-@hook(optional=True)
+@hook
 def switched(scene, record, mode, guard, t, y):
     """Record after a guard of a mode has vanished; the arguments are those of :func:`modes.switch`."""
-    return record

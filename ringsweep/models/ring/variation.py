@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from ringsweep.compile import hook, inlined
+from ringsweep.compile import inlined
 from ringsweep.models import tangent
 from ringsweep.models.interface import implicit, variation
 from ringsweep.models.ring.contacts import coefficients_under
@@ -44,16 +44,6 @@ def _advance(scene, record, h, rates, weights, work):
 
 @variation.switched.implements(Ring)
 def _switched(scene, record, mode, guard, t, y):
-    return _switched_if_asked(scene.asked, scene, record, mode, guard, t, y)
-
-
-@hook(optional=True)
-def _switched_if_asked(asked, scene, record, mode, guard, t, y):
-    return record
-
-
-@_switched_if_asked.implements(variation.Exponent)
-def _gradient_at_event(asked, scene, record, mode, guard, t, y):
     before = record.long_run.tangent
     return _with(record, tangent.switched(before, _gradient(scene, mode, guard, t, y, before.rates)))
 
