@@ -174,7 +174,8 @@ class TestPeriod:
         assert found.period.isnull().all()
 
     def test_motion_without_a_cycle_has_no_period(self):
-        found = runs(scene("coulomb", mu_k=0.1, viscous=0.5, belt=0.1, velocity=0.0), [30.0, 200.0])
+        of = with_all_parts(scene("coulomb", mu_k=0.1, viscous=0.5, belt=0.1, velocity=0.0))
+        found = runs(of, [30.0, 200.0])
         assert words(found) == ["sliding"] * 2
         assert found.period.isnull().all()
         assert found.settled.values.tolist() == [0, 1]
@@ -226,7 +227,8 @@ class TestBreakingLoose:
     def test_force_that_only_touches_breakaway_lets_nothing_slip(self, phase):
         force = {"amplitude": 0.5, "frequency": 0.1, "phase": phase}
         coulomb = {"law": "coulomb", "mu_k": 0.5}
-        run = ringsweep.sweep(oscillator(coulomb, force=force), {"time.span": [10.0, 100.0]}, progress=False)
+        of = with_all_parts(oscillator(coulomb, force=force))
+        run = ringsweep.sweep(of, {"time.span": [10.0, 100.0]}, progress=False)
         assert words(run) == ["riding", "riding"]
 
 
