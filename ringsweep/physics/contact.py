@@ -143,12 +143,13 @@ def opening(body, k1, k2, m1, m2, slides, sin_phi, cos_phi, omega, epsilon):
 
 
 @inlined
-def _carries_alone(body, side, k, m, slides, sin_phi, cos_phi, omega, epsilon):
+def _carries_alone(body, side, k, m, slides, at):
     """Whether one contact can carry the body while the other contact opens.
 
-    `side` is -1 for contact 1 and +1 for contact 2; `k` and `m` are as for :func:`opening`, for this contact.
+    `side` is -1 for contact 1 and +1 for contact 2; `k` and `m` are as for :func:`opening`, for this contact, and `at`
+    holds the last four arguments of it.
     """
-    b = body
+    b, (sin_phi, cos_phi, omega, epsilon) = body, at
     sb, cb = b.sin_beta, b.cos_beta
     # The moment of inertia may be zero; a lower bound avoids the division by zero.
     per_inertia = b.mass / max(b.inertia, 1e-9 * b.mass * b.radius * b.radius)
@@ -189,8 +190,9 @@ def _two_opening(body, k1, k2, m1, m2, slides, sin_phi, cos_phi, omega, epsilon)
     # Without a load both gaps open.
     if body.cos_beta * across + body.sin_beta * abs(along) <= 0.0:
         return OPEN_BOTH
-    first = _carries_alone(body, 1.0, k2, m2, slides, sin_phi, cos_phi, omega, epsilon)
-    second = _carries_alone(body, -1.0, k1, m1, slides, sin_phi, cos_phi, omega, epsilon)
+    at = sin_phi, cos_phi, omega, epsilon
+    first = _carries_alone(body, 1.0, k2, m2, slides, at)
+    second = _carries_alone(body, -1.0, k1, m1, slides, at)
     if first:
         return OPEN_BOTH if second else OPEN_1
     return OPEN_2 if second else IMPOSSIBLE
@@ -223,7 +225,7 @@ def _scale(body, sin_phi, cos_phi, omega, epsilon):
 
 
 @inlined
-def _slip_margin(body, sign, friction, tangential, sin_phi, cos_phi, omega, epsilon):
+def _slip_margin(body, sign, friction, tangential, at):
     """Least margin of the inequalities of a slip that begins at rest, as a share of the terms; negative if one fails.
 
     Parameters
@@ -236,9 +238,10 @@ def _slip_margin(body, sign, friction, tangential, sin_phi, cos_phi, omega, epsi
     tangential : bool
         Whether stick has just ended by this breakaway, and friction does not drop at breakaway. Then the relative
         acceleration is still zero.
-    sin_phi, cos_phi, omega, epsilon : float
-        As for :func:`stick`.
+    at : tuple of float
+        The last four arguments of :func:`stick`.
     """
+    sin_phi, cos_phi, omega, epsilon = at
     K1, K2 = -sign * friction[0], -sign * friction[1]
     phi_dd, determinant = ring.acceleration(body, K1, K2, sin_phi, cos_phi, omega)
     n1, n2 = ring.reactions(body, K1, K2, sin_phi, cos_phi, omega)
@@ -284,10 +287,9 @@ def at_rest(body, static, forward, backward, sin_phi, cos_phi, omega, epsilon, r
         # Without friction or without a load the body cannot stick.
         if held >= 0.0 and m1 + m2 > 0.0 and min(n1, n2) > least:
             return STICK
-    tangential = released == 1 and forward == static
-    ahead = _slip_margin(body, 1.0, forward, tangential, sin_phi, cos_phi, omega, epsilon)
-    tangential = released == -1 and backward == static
-    back = _slip_margin(body, -1.0, backward, tangential, sin_phi, cos_phi, omega, epsilon)
+    at = sin_phi, cos_phi, omega, epsilon
+    ahead = _slip_margin(body, 1.0, forward, released == 1 and forward == static, at)
+    back = _slip_margin(body, -1.0, backward, released == -1 and backward == static, at)
     if ahead > 0.0 or back > 0.0:
         if min(ahead, back) > 0.0:
             return IMPOSSIBLE
