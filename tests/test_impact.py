@@ -1,14 +1,23 @@
 """What follows a lost contact: closed forms, symmetry, energy, and what is refused."""
 
+import shutil
 from itertools import pairwise
 from math import cos, pi, sin, sqrt
 
+import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
+import yaml
 
 import ringsweep
+from benchmarks.hostile.attack import same_bits
+from benchmarks.hostile.kills import killed_at
+from ringsweep import cli
 from ringsweep.errors import InputError
+from ringsweep.quantities.flags import AFTERMATHS, SEPARATING
+from ringsweep.quantities.variables import INFERRED, LABELS
+from ringsweep.storage import netcdf
 
 G, RADIUS = 9.81, 0.2
 
@@ -587,3 +596,80 @@ class TestRefused:
     def test_what_has_no_impact_is_refused_with_its_place(self, change, solver, problem):
         with pytest.raises(InputError, match=problem):
             ringsweep.sweep(BODY | change, {"drive.amplitude": [1.0]}, solver=solver, progress=False)
+
+
+#: A map in which all words of what follows a loss stand, within one regime.
+MAP = {"drive.amplitude": np.geomspace(2.0, 8.0, 33), "time.span": np.linspace(0.3, 3.0, 33)}
+
+
+@pytest.fixture(scope="module")
+def config_of_map(tmp_path_factory):
+    """Configuration file of a refined sweep."""
+    grid = {path: values.tolist() for path, values in MAP.items()}
+    path = tmp_path_factory.mktemp("impact") / "sweep.yaml"
+    refine = {"stride": 8, "audit": 0.05}
+    path.write_text(yaml.safe_dump({"scene": BODY, "sweep": {"grid": grid, "refine": refine}}))
+    return path
+
+
+@pytest.fixture(scope="module")
+def full_map():
+    """The full grid."""
+    return ringsweep.sweep(BODY, MAP, progress=False)
+
+
+@pytest.fixture(scope="module")
+def refined_map(config_of_map):
+    """File of the refined sweep."""
+    path = config_of_map.with_name("refined.nc")
+    assert cli.main(["run", str(config_of_map), "-o", str(path)]) == 0
+    return path
+
+
+class TestSweep:
+    """Sweeps over scenes with impacts are refined, verified and continued as all others are."""
+
+    def test_refined_map_follows_the_words_of_aftermath_within_one_regime(self, refined_map, full_map):
+        ds = netcdf.load(refined_map)
+        inferred, lost = ds.origin.values == INFERRED, full_map.regime.values == SEPARATING
+        assert set(np.unique(full_map.aftermath.values[lost])) == set(range(1, len(AFTERMATHS)))
+        assert 0.2 < inferred.mean() < 0.8
+        wrong = np.zeros(lost.shape, dtype=bool)
+        for name in LABELS:
+            assert ds[name].dtype == np.int8
+            wrong |= ds[name].values != full_map[name].values
+        assert wrong.sum() <= ds.attrs["audit_bound"] * inferred.sum()
+        assert wrong.mean() < 0.01
+        # Beside every boundary between two words both cells are computed, wherever the map is right.
+        for axis in (0, 1):
+            one, other = (np.moveaxis(ds.aftermath.values, axis, 0)[part] for part in (slice(1, None), slice(-1)))
+            edge = one != other
+            run = np.moveaxis(~inferred, axis, 0)
+            assert edge.any()
+            assert run[1:][edge].all()
+            assert run[:-1][edge].all()
+
+    def test_computed_cells_of_a_refined_map_are_those_of_the_full_grid_bit_for_bit(self, refined_map, full_map):
+        ds = netcdf.load(refined_map)
+        run = ds.origin.values != INFERRED
+        for name in full_map.data_vars:
+            expected = full_map[name].values[run]
+            assert ds[name].values[run].astype(expected.dtype).tobytes() == expected.tobytes(), name
+
+    def test_last_bit_of_a_gap_is_verified(self, refined_map, tmp_path, capsys):
+        assert cli.main(["verify", str(refined_map)]) == 0
+        changed = shutil.copy(refined_map, tmp_path / "changed.nc")
+        with netCDF4.Dataset(changed, "a") as file:
+            gaps = file["gap_max"][:].filled(np.nan)
+            at = np.unravel_index(np.nanargmax(gaps), gaps.shape)
+            file["gap_max"][at] = np.nextafter(gaps[at], 1.0)
+        assert cli.main(["verify", str(changed)]) == 2
+        assert "gap_max" in capsys.readouterr().err
+
+    @pytest.mark.parametrize("count", [2, 9])
+    def test_killed_sweep_continues_to_the_same_bits(self, config_of_map, refined_map, tmp_path, count):
+        arguments = ["run", str(config_of_map), "-o", str(tmp_path / "out.nc")]
+        point = "after a rename" if count == 2 else "merge"
+        assert killed_at(point, count, arguments).returncode == -9
+        assert cli.main(arguments) == 0
+        assert same_bits(tmp_path / "out.nc", refined_map)

@@ -56,6 +56,16 @@ def test_task_of_a_killed_worker_is_computed_by_another(cluster, scene, tmp_path
     assert same_bits(tmp_path / "threads.nc", tmp_path / "dask.nc")
 
 
+def test_workers_of_a_scheduler_find_the_same_impacts_as_threads(cluster, scene, tmp_path):
+    falls = scene | {"impact": {"restitution": 0.5}}
+    axes = {"drive.amplitude": np.geomspace(0.5, 8.0, 6), "zone.half_angle": np.radians([10.0, 30.0])}
+    by_threads = ringsweep.sweep(falls, axes, tmp_path / "threads.nc", progress=False)
+    assert len(np.unique(by_threads.aftermath)) > 1
+    by_threads.close()
+    ringsweep.sweep(falls, axes, tmp_path / "dask.nc", scheduler=cluster.scheduler_address, progress=False).close()
+    assert same_bits(tmp_path / "threads.nc", tmp_path / "dask.nc")
+
+
 @pytest.fixture(scope="module")
 def by_threads(scene, tmp_path_factory):
     """Axes of a sweep of 120 cells, and its result file by threads."""

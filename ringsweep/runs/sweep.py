@@ -23,7 +23,7 @@ from ringsweep.config.axes import dimension
 from ringsweep.config.follow import BOTH, DIRECTION
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
-from ringsweep.quantities.variables import INFERRED, error_attribute
+from ringsweep.quantities.variables import INFERRED, OUTCOMES, error_attribute
 from ringsweep.runs import sampled
 from ringsweep.runs.cells import TaskResult, compute_task
 from ringsweep.runs.executors import Execution, Executor, progress_bar, stop_on_interrupt
@@ -384,7 +384,7 @@ def _write_file(config: Config, target: Path, layout: Layout, checkpoint: Checkp
         complete(refine, found, region, columns)
         return not (missing & (found.origin[region] != INFERRED)).any()
 
-    netcdf.write(target, checkpoint.working_folder, frame, variables, layout, checkpoint.chunks(fill), gaps(variables))
+    netcdf.write(target, checkpoint.working_folder, frame, variables, layout, checkpoint.chunks(fill), gaps(OUTCOMES))
 
 
 def _holds_sweep(target: Path, checkpoint: Checkpoint) -> bool:
