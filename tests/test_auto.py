@@ -10,6 +10,7 @@ from solutions import HISTORY, Fall, solve
 
 from ringsweep.compile import take
 from ringsweep.models import batch, parameters
+from ringsweep.models.ring.record import Outcome
 from ringsweep.models.scene import Structure
 from ringsweep.quantities.flags import (
     CLOSE_CALL,
@@ -24,6 +25,7 @@ from ringsweep.quantities.flags import (
 )
 from ringsweep.solvers import event
 from ringsweep.solvers.automaton import PATIENCE
+from ringsweep.solvers.certificate import with_errors
 from ringsweep.solvers.event import Auto, Event, Implicit
 from ringsweep.solvers.rk4 import RK4
 
@@ -362,6 +364,20 @@ class TestTime:
         np.testing.assert_allclose(found.phi_end, exact.phi_end, atol=1e-7)
         np.testing.assert_allclose(found.phi_end[[2, 1]], -found.phi_end[[3, 4]], atol=1e-7)
         assert found.phi_end[5] == 0.0
+
+    def test_bound_on_the_velocity_of_a_body_that_such_a_drive_takes_along_is_true_and_small(self, cells):
+        """Its first steps last 1e-14 s. An error of the place, divided by that time, would bound nothing."""
+        exponent = np.array([1.3, 1.75, 1.95, 2.27])
+        changes = {"drive.amplitude": 0.5, "drive.exponent": exponent, "time.span": 0.6}
+        rough = {f"friction.{place}.mu_s": 1.2 for place in ("rough", "rest")}
+        scene = cells(changes | rough, law="stiction", drive="power")
+        found, exact = solve(Auto(), scene), solve(Event(rtol=1e-13, certify=False), scene)
+        assert found.certified.all()
+        assert (found.stick_time > 0.0).all()
+        for name in ("omega_end", "omega_max"):
+            stated = found.errors[:, with_errors(Outcome._fields).index(name)]
+            assert (abs(getattr(found, name) - getattr(exact, name)) <= stated).all()
+            assert (stated < 1e-6).all()
 
     def test_oscillating_drive_gives_two_reversals_in_each_of_thousands_of_periods(self, cells):
         """Reversals and the share of stick are the same in a short and in a long run."""
