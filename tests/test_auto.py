@@ -379,6 +379,21 @@ class TestTime:
             assert (abs(getattr(found, name) - getattr(exact, name)) <= stated).all()
             assert (stated < 1e-6).all()
 
+    def test_contact_that_rising_friction_unloads_is_lost_before_the_body_would_jam(self, cells):
+        """Under infinite acceleration friction rises from 0 to its value at the first instant in no time.
+
+        With omega = 0 and friction mu at both contacts, the reaction at contact 1 falls to 0 at mu = 0.578. The body
+        could go on on contact 2 up to mu = 0.715, where more reaction no longer opens its gap. At 0.74 nothing goes on.
+        """
+        body = {"mass": 0.193839, "inertia": 5.70525e-06, "half_distance": 0.0126812, "ball_radius": 0.0063635}
+        changes = {f"body.{name}": value for name, value in (body | {"center_offset": -0.00715644}).items()}
+        changes |= {"ring.radius": 0.0427676, "friction.v0": 7.59278e-07, "initial.phi": -0.312087}
+        changes |= {f"friction.{place}.{name}": 0.75479 for place in ("rough", "rest") for name in ("mu_s", "mu_k")}
+        changes |= {"drive.amplitude": np.array([-0.622284]), "drive.exponent": 1.33794}
+        found = solve(Auto(), cells(changes, drive="power"))
+        assert (found.regime[0], found.separating_contact[0]) == (SEPARATING, 1)
+        assert found.t_separation[0] < 1e-12
+
     def test_oscillating_drive_gives_two_reversals_in_each_of_thousands_of_periods(self, cells):
         """Reversals and the share of stick are the same in a short and in a long run."""
         changes = {"drive.amplitude": 0.2, "drive.frequency": 4.5, "zone.half_angle": 0.0}
