@@ -457,6 +457,37 @@ class TestBody:
         assert found.certified.item() == 1
         assert found.omega_end.item() == pytest.approx(-1.16804 / 0.0645043, rel=1e-12)
 
+    def test_body_that_is_wedged_on_one_contact_turns_faster_than_the_ring_that_jerks_it(self):
+        """It has been at rest, and all accelerations are in proportion to that of the ring.
+
+        With u outwards and w along the race from the ball that sticks to the centre of mass, the balances of momentum
+        give psi_dd = M R (r - u) / (J + M w^2 + M (r - u)^2) times the acceleration of the ring.
+        """
+        mass, moment, half, ball, radius = 0.277488, 1.55222e-05, 0.0108799, 0.0174689, 0.0466026
+        mu = {"mu_s": 0.788576, "mu_k": 0.478072}
+        scene = {
+            "model": "ring",
+            "body": {"mass": mass, "inertia": moment, "half_distance": half, "ball_radius": ball},
+            "ring": {"radius": radius},
+            "friction": {"law": "stiction", "rest": mu, "rough": mu},
+            "zone": {"half_angle": 2.60162, "center": -0.672517},
+            "drive": {"law": "power", "amplitude": 11.2748, "exponent": 1.07766},
+            "initial": {"phi": 1.77461, "omega": 0.0},
+            "time": {"span": 0.01},
+            "impact": {"restitution": 0.0},
+        }
+        reach = radius - ball
+        sine = half / reach
+        xi = reach * sqrt(1.0 - sine**2)
+        outwards, along = xi * sqrt(1.0 - sine**2) - reach, xi * sine
+        lever = ball - outwards
+        ratio = mass * radius * lever / (moment + mass * (along**2 + lever**2))
+        run = ringsweep.simulate(scene)
+        early = slice(0, 5)
+        assert (run.normal_2.values[early] == 0.0).all()
+        assert (run.normal_1.values[early] > 1e9).all()
+        np.testing.assert_allclose(run.omega.values[early], ratio * run.ring_omega.values[early], rtol=1e-3)
+
     def test_impact_of_a_wedged_body_has_its_solution_although_impulses_cancel(self):
         """Both impulses are 1e5 times the momentum. With 40 digits one of the 16 modes is admissible."""
         scene = {

@@ -171,6 +171,24 @@ def _initial_state(scene):
 
 
 @inlined
+def _taken_along(scene, t, wedged):
+    """Status, mode and state of a body that was at rest and is wedged on one contact as the ring jerks.
+
+    All accelerations are in proportion to that of the ring, and so are the velocities that they leave.
+    """
+    status, mode, y = wedged
+    if mode.open == NONE:
+        return wedged
+    _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
+    f = pivot.frame(scene, holding(mode), mode.turned, y, ring_omega)
+    psi_dd, alpha_dd, _, _ = pivot.in_stick(scene, f, ring_epsilon)
+    state = y[0], y[1], y[2], (psi_dd - alpha_dd) / ring_epsilon * ring_omega, y[4], y[5], y[6]
+    places, contacts = (mode.place_1, mode.place_2), (mode.open, mode.turned)
+    zeros = (min(mode.zeros_1, 1), min(mode.zeros_2, 1))
+    return status, make(mode.sign, mode.region, mode.entry_guard, places, contacts, zeros, mode.event), state
+
+
+@inlined
 def _start(scene, t, phi, v):
     status, mode = modes.initial_mode(scene.closed, t, (phi, v))
     nothing = Event(NO_EVENT, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, t, 0)
@@ -178,7 +196,7 @@ def _start(scene, t, phi, v):
         wedged = _after_closed(scene, status, mode, t, (phi, 0.0), 0, 2, nothing, False)
         # A body that is wedged on one contact is taken along.
         if wedged[0] == RUNNING and wedged[1].sign == 0:
-            return wedged
+            return _taken_along(scene, t, wedged)
     return _after_closed(scene, status, mode, t, (phi, v), 0, 2, nothing, False)
 
 
