@@ -1,6 +1,7 @@
 """What a motion on the belt settles to is decided by evidence that does not hang on the end of the span."""
 
 from math import pi
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from belts import with_all_parts
 from scipy.integrate import solve_ivp
 
 import ringsweep
+from ringsweep.models import cycles
 
 
 def scene(law, omega, amplitude, *, x=0.0, v_belt=1.0, cubic=0.0, damping=0.0, **friction):
@@ -137,6 +139,21 @@ def test_motion_that_slowly_leaves_an_unstable_one_is_transient_until_it_has_fou
     assert len(said) == len(spans)
     periods = found.period.values * start[0]
     np.testing.assert_allclose(periods[np.isfinite(periods)], laps, rtol=1e-6)
+
+
+@pytest.mark.parametrize("shrinks", [0.9, 0.99, 1.0])
+def test_lap_of_four_that_becomes_one_of_two_is_no_period(shrinks):
+    """A period of two with a disturbance that each lap turns round and lets shrink, as beside a second flip."""
+    forced, k = SimpleNamespace(forcing_period=1.0, span=400.0), np.arange(400)
+    orbit = (-1.0) ** k + 0.05 * shrinks ** (k // 2) * np.array([1.0, 1.0, -1.0, -1.0])[k % 4]
+    found = cycles.begin(1.0, cycles.Mark(0.0, orbit[0], 0.0, 0.0, 0.0))
+    periods = set()
+    for t, x in enumerate(orbit[1:].tolist(), 1):
+        mark = cycles.Mark(float(t), x, 0.0, 0.0, 0.0)
+        found = cycles.closed(forced, found, mark, float(t), True, t + 1.0, 2.0, 2.0)
+        if cycles.returns_each_time(forced, found, 2.0, 0.0, (np.nan, np.nan)):
+            periods.add(found.period)
+    assert periods == {0.9: {2.0}, 0.99: set(), 1.0: {4.0}}[shrinks]
 
 
 def test_period_of_thirteen_cycles_is_found_in_each_span():
