@@ -160,6 +160,53 @@ def test_multipliers_are_those_of_the_period_map(amplitude, sticks, rtol):
     assert abs(found.multiplier_angle_1.item()) == pytest.approx(angles.max(), abs=1e-5)
 
 
+def test_a_chain_of_equal_cells_is_one_run():
+    """Three cells of 20 periods, and a run of 60: the angle of the ring, its zone and the body go on."""
+    three = run(ROCKING | {"time": {"span": 20.0}}, sweep={
+        "points": {"drive.amplitude": [1.0, 1.0, 1.0]}, "follow": "drive.amplitude",
+    })  # fmt: skip
+    assert ringsweep.words(three.started_from).values.tolist() == ["initial", *["end_of_the_cell_before"] * 2]
+    one = run(ROCKING | {"time": {"span": 60.0}})
+    for name in ("phi_end", "omega_end", "multiplier_1"):
+        assert three[name].values[-1] == pytest.approx(one[name].item(), abs=1e-9)
+    np.testing.assert_allclose(three.phi_section[-1], one.phi_section, atol=1e-9)
+
+
+def test_a_rocking_ring_has_two_motions_at_one_frequency_and_the_past_tells_which():
+    """A pendulum swings farther as its frequency falls behind that of the drive, up to a fold; then it sticks."""
+    slippery = {"law": "stiction", "rest": {"mu_s": 0.12, "mu_k": 0.08}, "rough": {"mu_s": 0.12, "mu_k": 0.08}}
+    found = run(ROCKING | {"friction": slippery, "time": {"span": 120.0}}, sweep={
+        "grid": {"drive.frequency": [1.3, 1.34, 1.37, 1.4, 1.44]},
+        "follow": {"axis": "drive.frequency", "direction": "both"},
+    })  # fmt: skip
+    assert set(ringsweep.words(found.long_run).values.ravel().tolist()) == {"periodic"}
+    apart = np.abs(found.phi_section.sel(direction="up") - found.phi_section.sel(direction="down")).max("section")
+    assert (apart.values > 0.1).tolist() == [False, False, False, True, False]
+
+
+def test_run_of_a_file_goes_on_from_its_end(tmp_path):
+    file = tmp_path / "first.nc"
+    ringsweep.run({"scene": ROCKING | {"time": {"span": 7.3}}}, file, jobs=1, progress=False).close()
+    rest = ROCKING | {"initial": {"from": str(file)}, "time": {"span": 4.7}}
+    second, one = ringsweep.simulate(rest), ringsweep.simulate(ROCKING | {"time": {"span": 12.0}})
+    assert np.cos(second.phi.values[-1] - one.phi.values[-1]) == pytest.approx(1.0, abs=1e-12)
+    assert second.omega.values[-1] == pytest.approx(one.omega.values[-1], abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"impact": {"restitution": 0.5}}, "leave impact out"),
+        ({"friction": ROCKING["friction"] | LUGRE}, "choose another law"),
+    ],
+)
+def test_runs_whose_state_is_more_than_place_and_speed_cannot_go_on(change, words):
+    sweep = {"grid": {"time.span": [1.0, 2.0]}, "follow": "time.span"}
+    with pytest.raises(ringsweep.InputError, match=words) as error:
+        ringsweep.run({"scene": ROCKING | change, "sweep": sweep}, jobs=1, progress=False)
+    assert error.value.path == "sweep.follow"
+
+
 @pytest.mark.parametrize("law", ["stiction", "bengisu-akay"])
 def test_exponents_are_those_of_two_neighbouring_runs(law):
     """Pairs of runs of two balls on a rod, brought together again after each period, in random cells."""

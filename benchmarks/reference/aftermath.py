@@ -517,7 +517,12 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
             if p.drive == POWER and p.exponent < 2.0 and t == begin[1] and t <= 1e-10 and (p.at_rest or p.speed == 0.0):
                 # A ring with infinite acceleration takes along what is wedged on one contact: stick goes before slip.
                 y[2] = 0.0
-                if pivot_problem(p, closed, place_of(p, closed, t, y), STICK, t, y, True) != STICK:
+                k = place_of(p, closed, t, y)
+                if pivot_problem(p, closed, k, STICK, t, y, True) == STICK:
+                    # From rest, velocities are in proportion to the accelerations.
+                    epsilon = on_one(p, closed, k, STICK, t, y, now)[3]
+                    y[3] = epsilon / drive(p, t)[2] * ring_omega
+                else:
                     y[2] = v
             end, t, more = turn(p, closed, rtol, most_steps, t, y, opens, found)
             steps += more

@@ -2,10 +2,11 @@
 Multipliers in the unit circle
 ==============================
 
-A small body on a ring that rocks, over the frequency. The first picture shows its angle at each period of the drive,
-its exponent, and the magnitudes of its Floquet multipliers. The second one shows the multipliers in the complex plane:
-a pair runs around the circle while disturbances oscillate, and one is 0 where the body sticks in each period. Between
-1.42 and 1.5 Hz one is 1: the body sticks to the ring for good, at any of many angles.
+A small body on a ring that rocks. The frequency is followed up and down. The first picture shows its angle at each
+period of the drive, its exponent, and the magnitudes of its Floquet multipliers. The second one shows the multipliers
+in the complex plane: a pair runs around the circle while disturbances oscillate, and one is 0 where the body sticks in
+each period. Near 1.4 Hz two motions exist side by side. Up to 1.5 Hz one multiplier of the smaller one is 1: the body
+sticks to the ring for good, at any of many angles.
 """
 
 import matplotlib.pyplot as plt
@@ -25,7 +26,10 @@ scene = {
 config = {
     "scene": scene,
     "record": {"exponent": True, "section": {"at": "period", "keep": 32}},
-    "sweep": {"grid": {"drive.frequency": {"linspace": [0.8, 2.4, 120]}}},
+    "sweep": {
+        "grid": {"drive.frequency": {"linspace": [0.8, 2.4, 120]}},
+        "follow": {"axis": "drive.frequency", "direction": "both"},
+    },
 }
 rocking = ringsweep.run(config, progress=False)
 figure = plots.bifurcation(rocking)

@@ -87,7 +87,8 @@ def read_follow(given: Any, scene: Scene, axes: Axes) -> Follow | None:
     dims, _ = axes.columns[path]
     if len(dims) > 1:
         raise InputError(where, f"{path} varies along {' and '.join(dims)}: follow a path with one dimension")
-    replaced = [f"initial.{name}" for name in ("x", "velocity", "deflection")] + ["force.phase", "drive.phase"]
+    replaced = [f"initial.{name}" for name in ("x", "velocity", "deflection", "phi", "omega")]
+    replaced += ["force.phase", "drive.phase"]
     for other, (along, _) in axes.columns.items():
         if dims[0] in along and other in (LAW, *replaced):
             what = "a chain has one law" if other == LAW else "the cell before gives it"
@@ -108,9 +109,12 @@ def with_direction(axes: Axes, follow: Follow | None) -> Axes:
 
 def _check_continues(structure: Structure, where: str) -> None:
     """Raise an error, located at `where`, unless runs of a scene can start from the end of another one."""
-    if not isinstance(model_of(structure), Continues):
+    model = model_of(structure)
+    if not isinstance(model, Continues):
         able = ", ".join(name for name, model in MODELS.items() if isinstance(model, Continues))
         raise InputError(where, f"a run of model {structure.model} cannot go on from another one: model {able} can")
+    if (problem := model.obstacle(structure)) is not None:
+        raise InputError(where, problem)
     if TRAITS[structure.law_type].snaps:
         problem = f"the state of friction law {structure.law} is more than a deflection: choose another law"
         raise InputError(where, problem)
@@ -166,11 +170,11 @@ def put_state(doc: Document, scene: Scene, file: str, before: Scene, axes: Axes,
         raise InputError(where, f"{file} holds a run of model {before.structure.model}")
     for structure in (*scene.structures.values(), *before.structures.values()):
         _check_continues(structure, where)
-    ended = {path: np.full(1, value) for path, value in before.values.items()} | _end_of(file)
-    ended |= {path: column.ravel()[:1] for path, (_, column) in axes.columns.items() if path != LAW}
-    values = {path: np.full(1, scene.values.get(path, np.nan)) for path in {**scene.values, **dict.fromkeys(swept)}}
     model = model_of(scene.structure)
     assert isinstance(model, Continues)
+    ended = {path: np.full(1, value) for path, value in before.values.items()} | _end_of(file, model)
+    ended |= {path: column.ravel()[:1] for path, (_, column) in axes.columns.items() if path != LAW}
+    values = {path: np.full(1, scene.values.get(path, np.nan)) for path in {**scene.values, **dict.fromkeys(swept)}}
     found = model.continued(scene.structure, values, ended)
     # What is too long for the bristles of this scene is an error in its place.
     found |= {path: ended["deflection_end"] for path in found if path == "initial.deflection"}
@@ -182,8 +186,8 @@ def put_state(doc: Document, scene: Scene, file: str, before: Scene, axes: Axes,
         doc.tree["scene"].setdefault(section, {})[name] = float(value)
 
 
-def _end_of(file: str) -> dict[str, NDArray[np.float64]]:
-    """Numbers at the end of the run that a file holds."""
+def _end_of(file: str, model: Continues) -> dict[str, NDArray[np.float64]]:
+    """Numbers at the end of the run of a model that a file holds."""
     where = "scene.initial.from"
     try:
         opened = netCDF4.Dataset(file)
@@ -191,8 +195,7 @@ def _end_of(file: str) -> dict[str, NDArray[np.float64]]:
         raise InputError(where, f"{file} is no result file: `ringsweep run` or `simulate` writes one") from None
     with opened as content:
         found = {}
-        for name, last in (("t_end", "time"), ("x_end", "x"), ("velocity_end", "velocity"),
-                           ("deflection_end", "deflection")):  # fmt: skip
+        for name, last in {"t_end": "time", **model.ends}.items():
             variable = content.variables.get(last if "time" in content.dimensions else name)
             if variable is not None:
                 numbers = np.ma.filled(variable[:], np.nan).astype(float).ravel()
@@ -200,8 +203,8 @@ def _end_of(file: str) -> dict[str, NDArray[np.float64]]:
                     raise InputError(where, f"{file} holds {len(numbers)} runs: name a file of one run")
                 found[name] = numbers[-1:]
     found.setdefault("deflection_end", np.zeros(1))
-    if not {"t_end", "x_end", "velocity_end"} <= found.keys():
-        raise InputError(where, f"{file} holds no run on the belt")
+    if not {"t_end", *model.ends} <= found.keys():
+        raise InputError(where, f"{file} holds no run that can go on")
     if not all(np.isfinite(number).all() for number in found.values()):
         raise InputError(where, f"the run in {file} failed: it has no state at its end")
     return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Collection, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -33,7 +34,23 @@ def period_of(structure: Structure, period: NDArray[np.float64]) -> NDArray[np.f
 
 
 class Continues(ABC):
-    """A model of which a run can start from the state in which another one ended."""
+    """A model of which a run can start from the state in which another one ended.
+
+    Attributes
+    ----------
+    ends : mapping of str to str
+        Outcomes that are the state at the end, with the variables of a history whose last values they are.
+    """
+
+    ends: ClassVar[Mapping[str, str]]
+
+    def obstacle(self, structure: Structure) -> str | None:
+        """Why runs of this structure cannot go on, for an error message; None if they can."""
+        return None
+
+    @abstractmethod
+    def forcing_period(self, structure: Structure, values: Values) -> NDArray[np.float64]:
+        """Period of drive and force, s, shape ``(cells,)``; infinite if there is none."""
 
     @abstractmethod
     def continued(self, structure: Structure, values: Values, ended: Values) -> dict[str, NDArray[np.float64]]:
@@ -52,6 +69,19 @@ class Continues(ABC):
         dict of str to ndarray of shape ``(cells,)``
             By path; values that differ from these are replaced.
         """
+
+
+def phases(parts: Collection[str], values: Values, ended: Values) -> dict[str, NDArray[np.float64]]:
+    """Phases of the `parts` with a frequency at the end of other runs; see :meth:`Continues.continued`."""
+    found = {}
+    for part in parts:
+        if f"{part}.frequency" in values and f"{part}.frequency" in ended:
+            turns = ended[f"{part}.frequency"] * ended["t_end"]
+            # But for rounding, a whole number of turns changes no phase.
+            turns = np.where(abs(turns - np.round(turns)) < 1e-9, 0.0, turns % 1.0)
+            phase = ended.get(f"{part}.phase", np.zeros(len(turns))) + 2.0 * np.pi * turns
+            found[f"{part}.phase"] = np.where(turns == 0.0, phase, phase % (2.0 * np.pi))
+    return found
 
 
 class Model(ABC):

@@ -165,7 +165,9 @@ def _whole_periods(structure: Structure, values: Mapping[str, NDArray[np.float64
 
     So the phase is the same at the start of all cells of a chain, and their sections can be compared.
     """
-    span, period = values["time.span"], batch(structure, values).forcing_period
+    model = model_of(structure)
+    assert isinstance(model, Continues)
+    span, period = values["time.span"], model.forcing_period(structure, values)
     repeats = period <= span
     periods = np.ceil(span / np.where(repeats, period, 1.0) * (1.0 - 1e-12))
     return np.where(repeats, periods * np.where(repeats, period, 0.0), span)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -13,7 +14,7 @@ from ringsweep.errors import InputError
 from ringsweep.models import section, tangent
 from ringsweep.models.belt.record import Outcome
 from ringsweep.models.interface.variation import Exponent
-from ringsweep.models.model import Continues, Model, period_of
+from ringsweep.models.model import Continues, Model, period_of, phases
 from ringsweep.models.parts import GRAVITY, MASS, SPAN, by_formula, drive_of, friction_coefficients, law_of, table_of
 from ringsweep.models.scene import Structure, Values, require
 from ringsweep.physics import belt, drives, forces, friction, ring
@@ -35,6 +36,7 @@ class Belt(Model, Continues):
     """A mass on a spring on a moving belt (the paper's Fig. 1)."""
 
     name: ClassVar[str] = "belt"
+    ends: ClassVar[Mapping[str, str]] = {"x_end": "x", "velocity_end": "velocity", "deflection_end": "deflection"}
     doc: ClassVar[str] = "a mass on a spring on a moving belt"
     outcomes: ClassVar[tuple[str, ...]] = Outcome._fields
     place: ClassVar[str] = "x"
@@ -62,14 +64,11 @@ class Belt(Model, Continues):
         if "initial.deflection" in values:
             most = _largest_deflection(structure, values)
             found["initial.deflection"] = np.clip(ended["deflection_end"], -most, most)
-        for part in ("force", "drive"):
-            if f"{part}.frequency" in values and f"{part}.frequency" in ended:
-                turns = ended[f"{part}.frequency"] * ended["t_end"]
-                # But for rounding, a whole number of turns changes no phase.
-                turns = np.where(abs(turns - np.round(turns)) < 1e-9, 0.0, turns % 1.0)
-                phase = ended.get(f"{part}.phase", np.zeros(len(turns))) + 2.0 * np.pi * turns
-                found[f"{part}.phase"] = np.where(turns == 0.0, phase, phase % (2.0 * np.pi))
-        return found
+        return found | phases(("force", "drive"), values, ended)
+
+    def forcing_period(self, structure: Structure, values: Values) -> NDArray[np.float64]:
+        """Period of drive and force, s; infinite if there is none."""
+        return np.asarray(self.build(structure, values).forcing_period)
 
     def scene_type(self, structure: Structure) -> type:
         """``BristleBelt`` for laws with bristles, else ``Belt``."""

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from math import pi
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.models import section, tangent
 from ringsweep.models.interface.variation import Exponent
-from ringsweep.models.model import Model, period_of
+from ringsweep.models.model import Continues, Model, period_of, phases
 from ringsweep.models.parts import GRAVITY, MASS, SPAN, drive_of, friction_coefficients, law_of
 from ringsweep.models.ring import long_run, record
 from ringsweep.models.scene import Structure, Values, require
@@ -33,13 +35,14 @@ def _is_recorded(structure: Structure) -> bool:
     return structure.exponent or structure.section is not None
 
 
-class SingleContactRing(Model):
+class SingleContactRing(Model, Continues):
     """A small body on one contact with the ring (the paper's Fig. 13)."""
 
     name: ClassVar[str] = "ring-single-contact"
     doc: ClassVar[str] = "a small body in a rotating ring, one contact"
     outcomes: ClassVar[tuple[str, ...]] = record.Outcome._fields
     place: ClassVar[str] = "phi"
+    ends: ClassVar[Mapping[str, str]] = {"phi_end": "phi", "omega_end": "omega"}
     driven: ClassVar[tuple[str, ...]] = ("theta",)
     absent: ClassVar[frozenset[str]] = frozenset({"normal_min_2", "normal_max_2", "normal_2", "zone_2", "deflection_2"})
     body: ClassVar[dict[str, Parameter]] = {"body.mass": MASS, "ring.radius": RADIUS}
@@ -63,6 +66,26 @@ class SingleContactRing(Model):
         if asked is None:
             return ()
         return tuple(name for name in SECTION[: 2 + self.contacts * asked.deflections] for _ in range(asked.keep))
+
+    def obstacle(self, structure: Structure) -> str | None:
+        """Why runs of this structure cannot go on: their state is more than angle and angular velocity."""
+        if structure.impact:
+            return "with impact, the state of a run is more than angle and angular velocity: leave impact out"
+        if self._has_bristles(structure):
+            return f"law {structure.law} has deflections, with which no run on a ring can start: choose another law"
+        return None
+
+    def continued(self, structure: Structure, values: Values, ended: Values) -> dict[str, NDArray[np.float64]]:
+        """Angle without full turns, angular velocity and phase of the drive at the end of other runs."""
+        phi = (ended["phi_end"] + pi) % (2.0 * pi) - pi
+        return {"initial.phi": phi, "initial.omega": ended["omega_end"]} | phases(("drive",), values, ended)
+
+    def forcing_period(self, structure: Structure, values: Values) -> NDArray[np.float64]:
+        """Period of the drive, s; infinite if there is none."""
+        drive, cells = drive_of(structure, values), len(values["time.span"])
+        # Zones turn with the ring: its angle must return, not only its velocity.
+        period = drives.force_period(drive) if structure.arcs else drives.period(drive)
+        return period_of(structure, np.broadcast_to(period, cells).copy())
 
     def takes(self, law: type) -> bool:
         """Laws without a dead band; laws with bristles need ``steady_deflection``."""
@@ -143,11 +166,8 @@ class SingleContactRing(Model):
 
     def _recorded(self, structure: Structure, values: Values) -> dict[str, Any]:
         """Fields of a cell for what is asked for beyond the outcomes."""
-        drive, cells = drive_of(structure, values), len(values["time.span"])
-        # Zones turn with the ring: its angle must return, not only its velocity.
-        period = drives.force_period(drive) if structure.arcs else drives.period(drive)
         found: dict[str, Any] = {
-            "forcing_period": period_of(structure, np.broadcast_to(period, cells).copy()),
+            "forcing_period": self.forcing_period(structure, values),
             "long_run": long_run.Asked(),
         }
         if structure.exponent:
@@ -159,7 +179,7 @@ class SingleContactRing(Model):
             found["asked"] = Exponent()
         if structure.section is not None:
             sizes = structure.section.keep, len(self._points(structure))
-            found["section"] = section.AtPeriod(*(np.full(cells, size) for size in sizes))
+            found["section"] = section.AtPeriod(*(np.full(len(values["time.span"]), size) for size in sizes))
         return found
 
     def build_body(self, values: Values) -> Any:
