@@ -121,6 +121,24 @@ def test_first_instant_of_a_ring_with_infinite_acceleration_is_followed(scene, l
     assert go_on(scene, keep=1)[1][0][0] == pytest.approx(lost, rel=1e-6)
 
 
+def test_body_that_is_wedged_on_one_contact_turns_as_its_accelerations_leave_it():
+    """From rest, its angular velocity is to that of the ring as the accelerations of a body whose contact sticks."""
+    mass, moment, half, ball, radius = 0.277488, 1.55222e-05, 0.0108799, 0.0174689, 0.0466026
+    scene = rig() | {
+        "body": {"mass": mass, "inertia": moment, "half_distance": half, "ball_radius": ball},
+        "ring": {"radius": radius},
+        "friction": {"law": "stiction", "rest": {"mu_s": 0.788576, "mu_k": 0.478072}},
+        "drive": {"law": "power", "amplitude": 11.2748, "exponent": 1.07766},
+        "initial": {"phi": 1.77461, "omega": 0.0},
+    }
+    reach = radius - ball
+    along = half * math.sqrt(reach**2 - half**2) / reach
+    lever = ball + half**2 / reach
+    ratio = mass * radius * lever / (moment + mass * (along**2 + lever**2))
+    t = 1e-6
+    assert until(scene, t)["speed"] == pytest.approx(ratio * 11.2748 * 1.07766 * t**0.07766, rel=1e-3)
+
+
 @pytest.mark.parametrize("omega", [20.0, -28.0, 33.0])
 def test_without_friction_a_body_loses_energy_in_impacts_only(omega):
     scene = rig(mu=0.0, e=0.3, initial={"phi": 0.0, "omega": omega}, time={"span": 4.0})
