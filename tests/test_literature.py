@@ -218,4 +218,5 @@ class TestSuddenOnsetOfChaos:
         for span in (3000.0, 4000.0, 15000.0):
             ds = self.follow(nu, exponent=False, span=span)
             assert set(ringsweep.words(ds.regime).values) == {"stick-slip"}
-            np.testing.assert_allclose(ds.stops_per_cycle, 0.158, atol=0.012)
+            # Shares of some hundred cycles scatter.
+            np.testing.assert_allclose(ds.stops_per_cycle, 0.158, atol=0.02)

@@ -19,7 +19,16 @@ from ringsweep.storage import netcdf
 
 BELT_ONLY = {
     *("x_end", "velocity_end", "x_min", "x_max", "velocity_max", "slips", "first_slip", "period", "force_max"),
-    *("long_run", "lyapunov", "multiplier_1", "multiplier_2", "deflection_end", "started_from"),
+    *(
+        "long_run",
+        "lyapunov",
+        "multiplier_1",
+        "multiplier_2",
+        "multiplier_angle_1",
+        "multiplier_angle_2",
+        "deflection_end",
+        "started_from",
+    ),
 }
 
 

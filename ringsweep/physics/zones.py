@@ -344,12 +344,17 @@ def _uniform_cross_edge(surface, place, direction):
 @cross_edge.implements(Segments)
 def _segments_cross_edge(surface, place, direction):
     j, revolution = place
-    j += direction
-    if j == len(surface.edges):
-        return 0, revolution + 1
-    if j < 0:
-        return len(surface.edges) - 1, revolution - 1
-    return j, revolution
+    last = len(surface.edges) - 1
+    while True:
+        j += direction
+        if j > last:
+            j, revolution = 0, revolution + 1
+        elif j < 0:
+            j, revolution = last, revolution - 1
+        end = surface.edges[j + 1] if j < last else surface.edges[0] + 2.0 * pi
+        # Edges at one place are crossed at once.
+        if end - surface.edges[j] > _NEGLIGIBLE_WIDTH:
+            return j, revolution
 
 
 # A contact this close to an edge is on the edge, rad.
