@@ -49,8 +49,8 @@ def timed(axes: dict[str, Any], folder: str, **options: Any) -> tuple[xr.Dataset
 
 
 def labels_of(ds: xr.Dataset) -> Any:
-    """One number for regime, motion and separating contact."""
-    return sum(ds[name].values.astype(int) * 32**k for k, name in enumerate(LABELS))
+    """One number for regime, motion and separating contact, and with impacts for what follows."""
+    return sum(ds[name].values.astype(int) * 32**k for k, name in enumerate(LABELS) if name in ds)
 
 
 def against_full(sides: list[int], folder: str) -> str:

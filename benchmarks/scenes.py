@@ -142,7 +142,7 @@ _REST = {"mu_s": 0.2, "mu_k": 0.1}
 _CONSTANT, _ARCTAN = {"law": "constant", "amplitude": 2.0}, {"law": "arctan", "amplitude": 2.0}
 _BELT = ("belt.velocity", (0.05, 0.2))
 #: The arctan drive and the friction law `tustin`, as a user writes them.
-_WRITTEN = {"law": "formula", "theta": "A*(t*atan(t) - log(1 + t**2)/2)*2/pi", "A": 2.0}
+_WRITTEN = {"law": "formula", "theta": "A*(t*atan(t/tau) - tau*log(1 + (t/tau)**2)/2)*2/pi", "A": 2.0, "tau": 1.0}
 _LAW = {"law": "formula", "mu": "mu_k + (mu_s - mu_k)*exp(-alpha*v)", "at_rest": "mu_s", "alpha": 100.0}
 
 LADDER: dict[str, Rung] = {
