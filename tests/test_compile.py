@@ -34,7 +34,7 @@ from ringsweep.errors import InputError
 
 assert not AVAILABLE
 found = ringsweep.sweep({scene!r}, {axes!r}, solver="event", jobs=1, progress=False)
-print(dict((name, repr(found[name].values.tolist())) for name in found))
+print({{name: found[name].values.tolist() for name in found}})
 """
 
 
@@ -43,15 +43,19 @@ def test_supported_versions_of_numba_have_the_private_interfaces():
 
 
 @pytest.mark.slow
-def test_outcomes_without_private_interfaces_of_numba_are_equal_bit_for_bit(scene, tmp_path):
+def test_outcomes_without_private_interfaces_of_numba_are_equal_but_for_rounding(scene, tmp_path):
     axes = {"drive.amplitude": [0.5, 2.0]}
     script = WITHOUT_PRIVATE_INTERFACES.format(scene=scene, axes=axes)
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(PACKAGE.parent)}
     done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
     expected = ringsweep.sweep(scene, axes, solver="event", progress=False)
-    # Lists of floats are printed with all digits.
-    assert ast.literal_eval(done.stdout) == {name: repr(expected[name].values.tolist()) for name in expected}
+    found = ast.literal_eval(done.stdout.replace("nan", "None"))
+    assert set(found) == set(expected)
+    for name, values in found.items():
+        # The compiler fuses other products where other functions are inlined. Bounds are differences of two runs.
+        digits = 1e-3 if name.endswith("_error") else 1e-12
+        np.testing.assert_allclose(np.array(values, float), expected[name], rtol=digits, err_msg=name)
     assert (expected["certified"] == 1).all()
     assert len(set(expected["regime"].values)) == 2
     assert not list(tmp_path.rglob("*.nb*")), "without private interfaces no kernel is kept on disk"
