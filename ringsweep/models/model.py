@@ -13,6 +13,7 @@ from ringsweep.errors import InputError
 from ringsweep.models.interface import recorder
 from ringsweep.models.scene import Structure, Values
 from ringsweep.physics import friction
+from ringsweep.quantities.flags import REGIMES
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.variables import OUTCOMES, Variable
 
@@ -137,6 +138,16 @@ class Model(ABC):
     def laws(self) -> dict[str, type]:
         """Friction laws that the model accepts, by name."""
         return {name: law for name, law in friction.LAWS.items() if self.takes(law)}
+
+    def regimes(self, paths: Collection[str]) -> tuple[str, ...]:
+        """Regimes that runs can have; by default all of :data:`ringsweep.quantities.flags.REGIMES`.
+
+        Parameters
+        ----------
+        paths : collection of str
+            Paths of the numbers that the scenes give.
+        """
+        return REGIMES
 
     def takes(self, law: type) -> bool:
         """Whether the model accepts a friction law; by default it accepts all."""

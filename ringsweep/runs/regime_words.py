@@ -1,4 +1,4 @@
-"""Words that runs of a scene can have."""
+"""Refusal of words that no run of a scene can have."""
 
 from __future__ import annotations
 
@@ -6,25 +6,10 @@ from collections.abc import Collection
 
 from ringsweep.config.sections import suggestion
 from ringsweep.errors import InputError
-from ringsweep.models import WITH_IMPACT
+from ringsweep.models import WITH_IMPACT, model_of
 from ringsweep.models.scene import Scene
 from ringsweep.quantities.flags import AFTERMATHS, REGIMES
 from ringsweep.quantities.units import show
-
-_RING = ("resting", "oscillatory", "revolving", "separating", "jammed", "failed")
-_BELT = ("stick-slip", "oscillatory", "sliding", "sticking", "riding", "failed")
-
-
-def regimes_of(scene: Scene, varied: Collection[str] = ()) -> tuple[str, ...]:
-    """Regimes that runs of a scene can have if some of its numbers vary; all, of a model from elsewhere."""
-    model = scene.structure.model
-    if model in ("ring", "ring-single-contact"):
-        return _RING
-    if model != "belt":
-        return REGIMES
-    # Only a load that changes with the displacement can fall to zero.
-    changes = "body.normal_stiffness" in {*varied, *scene.values}
-    return (*_BELT[:-1], "separating", "failed") if changes else _BELT
 
 
 def check_word(word: object, scene: Scene, varied: Collection[str] = ()) -> None:
@@ -42,7 +27,8 @@ def check_word(word: object, scene: Scene, varied: Collection[str] = ()) -> None
     InputError
         If it is no word of a regime or of an aftermath, or none of this scene.
     """
-    model, known = scene.structure.model, regimes_of(scene, varied)
+    model = scene.structure.model
+    known = model_of(scene.structure).regimes({*varied, *scene.values})
     if word not in REGIMES + AFTERMATHS:
         words = known + AFTERMATHS if scene.structure.impact else known
         raise InputError("regime", f"{show(word)} is not a regime" + suggestion(word, words))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from math import pi
 from typing import Any, ClassVar
@@ -86,6 +86,10 @@ class SingleContactRing(Model, Continues):
         # Zones turn with the ring: its angle must return, not only its velocity.
         period = drives.force_period(drive) if structure.arcs else drives.period(drive)
         return period_of(structure, np.broadcast_to(period, cells).copy())
+
+    def regimes(self, paths: Collection[str]) -> tuple[str, ...]:
+        """Regimes that runs can have."""
+        return "resting", "oscillatory", "revolving", "separating", "jammed", "failed"
 
     def takes(self, law: type) -> bool:
         """Laws without a dead band; laws with bristles need ``steady_deflection``."""
