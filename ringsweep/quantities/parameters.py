@@ -40,6 +40,8 @@ class Parameter(Quantity):
         Whether the configuration may leave it out although it has no default: it then follows from other parameters.
     whole : bool
         Whether it must be a whole number.
+    unit_in_words : str
+        Unit that depends on another parameter, for messages; its `unit` is empty.
     """
 
     lower: float = -math.inf
@@ -49,6 +51,7 @@ class Parameter(Quantity):
     default: float | None = None
     optional: bool = False
     whole: bool = False
+    unit_in_words: str = ""
 
     @property
     def attributes(self) -> dict[str, Any]:

@@ -220,7 +220,7 @@ def _convert(value: Any, parameter: Parameter, path: str) -> float:
 
 def _factor_or_error(unit: str, value: str, parameter: Parameter, path: str) -> float:
     if not parameter.unit:
-        its = f": its unit is {_DEPENDENT[parameter.long_name]}" if parameter.long_name in _DEPENDENT else ""
+        its = f": its unit is {parameter.unit_in_words}" if parameter.unit_in_words else ""
         problem = f"{show(value)} has a unit, but {parameter.long_name} takes a plain number in SI units{its}"
         raise InputError(path, problem)
     target = "has no unit" if parameter.unit == "1" else f"is in {parameter.unit}"
@@ -234,12 +234,6 @@ def _factor_or_error(unit: str, value: str, parameter: Parameter, path: str) -> 
         text = f"{show(value)} has the wrong unit: {parameter.long_name} {target}{_hint(unit, parameter.unit)}"
         raise InputError(path, text) from None
 
-
-#: Units that depend on another number, by the meaning of the parameter.
-_DEPENDENT = {
-    "angle of the ring after one second": "rad/s^p with the exponent p, so write 2 for 2 rad/s^p",
-    "displacement of the belt after one second": "m/s^p with the exponent p, so write 2 for 2 m/s^p",
-}
 
 #: What a unit of another dimension may have meant: unit that is wanted, one that was given, and the advice.
 _MEANT = (

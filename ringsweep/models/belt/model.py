@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -69,6 +69,11 @@ class Belt(Model, Continues):
     def forcing_period(self, structure: Structure, values: Values) -> NDArray[np.float64]:
         """Period of drive and force, s; infinite if there is none."""
         return np.asarray(self.build(structure, values).forcing_period)
+
+    def regimes(self, paths: Collection[str]) -> tuple[str, ...]:
+        """Regimes that runs can have; only a load that changes with the displacement can fall to zero."""
+        lost = ("separating",) if "body.normal_stiffness" in paths else ()
+        return "stick-slip", "oscillatory", "sliding", "sticking", "riding", *lost, "failed"
 
     def scene_type(self, structure: Structure) -> type:
         """``BristleBelt`` for laws with bristles, else ``Belt``."""
@@ -251,4 +256,7 @@ def _along_a_line(parameter: Parameter) -> Parameter:
     name = name.replace("ring's angular velocity", "belt's velocity").replace("rocking angle", "displacement")
     name = name.replace("angle of the ring", "displacement of the belt")
     unit = {"rad": "m", "rad/s": "m/s"}.get(parameter.unit, parameter.unit)
-    return replace(parameter, long_name=name, unit=unit if "phase" not in name else parameter.unit)
+    in_words = parameter.unit_in_words.replace("rad", "m")
+    return replace(
+        parameter, long_name=name, unit=unit if "phase" not in name else parameter.unit, unit_in_words=in_words
+    )
