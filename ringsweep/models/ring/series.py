@@ -137,14 +137,9 @@ def leaves_behind(drive, scene, t, v):
     return False
 
 
-@hook(optional=True)
-def _jerks(drive, scene, t, v):
-    """As :func:`leaves_behind`, under any law."""
-    return False
-
-
-@_jerks.implements(drives.Power)
-def _power_jerks(drive, scene, t, v):
+@inlined
+def _jerked(drive, scene, t, v):
+    """As :func:`leaves_behind`, under any law, for a drive that may accelerate infinitely at the beginning."""
     if v == 0.0 or t != drives.beginning(drive) or ring.launch_velocity(scene) != 0.0:
         return False
     return v == drives.velocity_at_beginning(drive, 0.0) * scene.body.radius
@@ -152,7 +147,7 @@ def _power_jerks(drive, scene, t, v):
 
 @leaves_behind.implements(drives.Power)
 def _power_leaves_behind(drive, scene, t, v):
-    return stiction_band(scene.law) == 0.0 and _jerks(drive, scene, t, v)
+    return stiction_band(scene.law) == 0.0 and _jerked(drive, scene, t, v)
 
 
 @series.table_shape.implements(ring.Ring)
@@ -179,30 +174,34 @@ def _initial_mode(scene, t, y):
         epsilon, _ = ring.acceleration(scene.body, 0.0, 0.0, sin(phi), cos(phi), ring_omega)
         sign, entry_guard = (1 if epsilon >= ring_epsilon else -1), SLOW
     mode = Mode(sign, region, entry_guard, *places_beyond(scene, place_1, place_2, phi - theta, sign))
-    status = _after_jump(scene, mode, t, y)
-    if status != RUNNING and stiction_band(scene.law) > 0.0 and _jerks(scene.drive, scene, t, v):
-        return _end_in_band(scene, mode, t, y), mode
-    return status, mode
+    return _status_at_start(scene.drive, scene, mode, t, y), mode
+
+
+@hook(optional=True)
+def _status_at_start(drive, scene, mode, t, y):
+    """Status of a run that begins in slip."""
+    return _after_jump(scene, mode, t, y)
 
 
 # Speeds at which an end is looked for in the band of a smooth law.
 _SPEEDS = 400
 
 
-@inlined
-def _end_in_band(scene, mode, t, y):
-    """Status of the first end of a body whose sliding velocity has grown from 0 to that in `y` in no time.
-
-    Friction has grown with it, so that a contact may have been lost before the body would jam.
-    """
+@_status_at_start.implements(drives.Power)
+def _status_after_jerk(drive, scene, mode, t, y):
     phi, v = y
+    status = _after_jump(scene, mode, t, y)
+    if status == RUNNING or stiction_band(scene.law) == 0.0 or not _jerked(drive, scene, t, v):
+        return status
+    # The sliding velocity has grown from 0 to v in no time, and friction with it: a contact may have been lost before
+    # the body would jam.
     for i in range(1, _SPEEDS):
         slower = v * i / _SPEEDS
         there = Mode(mode.sign, region_at(scene.law, abs(slower)), -1, mode.place_1, mode.place_2)
-        status = _after_jump(scene, there, t, (phi, slower))
-        if status != RUNNING:
-            return status
-    return _after_jump(scene, mode, t, y)
+        earlier = _after_jump(scene, there, t, (phi, slower))
+        if earlier != RUNNING:
+            return earlier
+    return status
 
 
 @inlined
