@@ -9,9 +9,11 @@ from matplotlib.colors import LogNorm, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 from matplotlib.quiver import Quiver
+from matplotlib.text import Text
 
 from ringsweep import plots
 from ringsweep.plots.datasets import FLIGHT, PIVOT, phases
+from ringsweep.plots.films import _Film
 from ringsweep.plots.rig import ring_history
 from ringsweep.plots.style import AFTERMATH_COLOURS
 from ringsweep.quantities.flags import AFTERMATHS, OPEN, SEPARATING, TUMBLED
@@ -190,6 +192,17 @@ class TestOffTheRace:
     def test_film_moves_the_body_off_the_race(self, run, tmp_path):
         plots.save_animation(run, tmp_path / "film.gif", fps=2, duration=2, progress=False)
         assert (tmp_path / "film.gif").stat().st_size > 1000
+
+    def test_title_of_a_film_is_not_cut_off(self, run):
+        words = (
+            "separating (oscillatory), contact 2, t = 1.28478 s, then tumbled, with 8 losses of contact and 178 impacts"
+        )
+        figure = _Film(run.assign_attrs(outcome=words), 2.0, 1.0).figure
+        figure.draw_without_rendering()
+        (title,) = (text for text in figure.findobj(Text) if text.get_text().startswith("separating"))
+        box = title.get_window_extent()
+        assert box.x0 >= figure.subfigs[1].bbox.x0
+        assert box.x1 <= figure.bbox.x1
 
 
 class TestHistory:

@@ -30,7 +30,7 @@ from ringsweep.plots.labels import axis_label
 from ringsweep.plots.polar import RingArtists, states_at
 from ringsweep.plots.rig import belt_history, ring_history
 from ringsweep.plots.saving import suffix_of
-from ringsweep.plots.style import SMALL, on_page, page_colour
+from ringsweep.plots.style import SMALL, folded, on_page, page_colour
 from ringsweep.runs.executors import progress_bar
 from ringsweep.storage.files import check_writable, replacing
 
@@ -205,7 +205,7 @@ class _Film:
             panels[0].set_xlim(*time_limits(run))
         self.until = time_limits(run)[1]
         right.align_ylabels(panels)
-        right.suptitle(outcome(run), fontsize="medium")
+        right.suptitle(folded([outcome(run)], _SIZE[0] * 1.15 / 2.15), fontsize="medium")
         left.suptitle(_speed(float(time[-1] - time[0]), duration), fontsize="medium")
         self.figure.moving = [*self.body.moving, *self.futures]
         self.show(0)
