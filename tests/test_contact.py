@@ -139,7 +139,7 @@ def problems():
 class TestAtRest:
     @staticmethod
     def mode(body, static, kinetic, phi, omega, epsilon):
-        return contact.at_rest(body, static, kinetic, kinetic, sin(phi), cos(phi), omega, epsilon, 0)
+        return contact.at_rest(body, static, kinetic, kinetic, (sin(phi), cos(phi), omega), epsilon, 0)
 
     def test_mode_at_rest_is_the_admissible_one(self, problems):
         seen = set()
@@ -167,7 +167,7 @@ class TestAtRest:
     def test_stick_has_positive_reactions_and_a_saturation_of_at_most_one(self, problems):
         for body, static, kinetic, phi, omega, epsilon in problems:
             if self.mode(body, static, kinetic, phi, omega, epsilon) == STICK:
-                kappa, reserve, n1, n2 = contact.stick(body, *static, sin(phi), cos(phi), omega, epsilon)
+                kappa, reserve, n1, n2 = contact.stick(body, *static, (sin(phi), cos(phi), omega), epsilon)
                 assert min(n1, n2) >= 0.0
                 assert reserve >= 0.0
                 assert abs(kappa) <= 1.0
@@ -211,7 +211,7 @@ class TestSliding:
                 expected = CLOSED if np.linalg.det(A) > 0.0 else IMPOSSIBLE
             else:
                 expected = OPEN_BOTH if len(opens) > 1 else opens[0] if opens else IMPOSSIBLE
-            found = contact.sliding(body, *K, sin(phi), cos(phi), omega)
+            found = contact.sliding(body, *K, (sin(phi), cos(phi), omega))
             assert found == expected
             seen.add(found)
             D = (K[0] - K[1]) * cos(2 * body.beta) + (1 + K[0] * K[1]) * sin(2 * body.beta)
@@ -222,10 +222,10 @@ class TestSliding:
 
     def test_slow_body_without_friction_at_the_top_loses_both_contacts_and_fast_body_none(self):
         body = rod(0.076, 4.47e-5, 0.043378, 0.022, 0.75, np.sqrt(1 - 0.75**2), 9.81)
-        modes = [contact.sliding(body, 0.0, 0.0, sin(3.1), cos(3.1), omega) for omega in (0.0, 50.0)]
+        modes = [contact.sliding(body, 0.0, 0.0, (sin(3.1), cos(3.1), omega)) for omega in (0.0, 50.0)]
         assert modes == [OPEN_BOTH, CLOSED]
 
     def test_body_with_one_contact_can_only_open_that_contact(self):
         body = ball(0.076, 0.043378, 9.81)
-        assert contact.sliding(body, 0.1, 0.1, sin(3.0), cos(3.0), 1.0) == OPEN_1
-        assert contact.at_rest(body, (0.5, 0.5), (0.3, 0.3), (0.3, 0.3), sin(3.0), cos(3.0), 0.0, 0.0, 0) == OPEN_1
+        assert contact.sliding(body, 0.1, 0.1, (sin(3.0), cos(3.0), 1.0)) == OPEN_1
+        assert contact.at_rest(body, (0.5, 0.5), (0.3, 0.3), (0.3, 0.3), (sin(3.0), cos(3.0), 0.0), 0.0, 0) == OPEN_1

@@ -39,15 +39,15 @@ def states(draw):
     body = draw(two_contacts())
     K1, K2, phi = draw(friction_ratios), draw(friction_ratios), draw(angles)
     omega = (draw(lifts) * body.gravity / body.radius) ** 0.5
-    _, determinant = acceleration(body, K1, K2, sin(phi), cos(phi), omega)
+    _, determinant = acceleration(body, K1, K2, (sin(phi), cos(phi), omega))
     assume(abs(determinant) > 0.05 * body.mass * body.xi**2)
     return body, K1, K2, phi, omega
 
 
 def motion(body, K1, K2, phi, omega):
     """Angular acceleration and reactions."""
-    epsilon = acceleration(body, K1, K2, sin(phi), cos(phi), omega)[0]
-    return epsilon, *reactions(body, K1, K2, sin(phi), cos(phi), omega)
+    epsilon = acceleration(body, K1, K2, (sin(phi), cos(phi), omega))[0]
+    return epsilon, *reactions(body, K1, K2, (sin(phi), cos(phi), omega))
 
 
 def force_scale(body, omega, epsilon, *normals):
@@ -146,9 +146,9 @@ class TestDeclaredBalances:
         body, K1, K2, phi, omega = state
         epsilon, N1, N2 = motion(*state)
         at = sin(phi), cos(phi), omega
-        assert ring.imbalance(body, K1, K2, N1, N2, epsilon, *at) < 1e-24
+        assert ring.imbalance(body, K1, K2, N1, N2, epsilon, at) < 1e-24
         wrong = share * (abs(N1) + abs(N2))
-        assert ring.imbalance(body, K1, K2, N1 + wrong, N2, epsilon, *at) >= 1e-4 * share**2
+        assert ring.imbalance(body, K1, K2, N1 + wrong, N2, epsilon, at) >= 1e-4 * share**2
 
     @pytest.mark.parametrize(
         ("balances", "message"),
@@ -212,20 +212,20 @@ class TestDerivedFunctions:
         for row, expected in zip(ring.slip_balance(body, K1, K2), (epsilon, N1, N2), strict=True):
             terms = np.multiply(row[:5], basis)
             assert abs(terms.sum() - expected) <= 1e-11 * np.abs(terms).sum()
-        found = ring.held(body, 1.0, *at, omega**2, epsilon, N1)
+        found = ring.held(body, 1.0, at, omega**2, epsilon, N1)
         np.testing.assert_allclose(found, (N1, N2, K1 * N1, K2 * N2), rtol=0, atol=1e-9 * scale)
-        _, determinant = acceleration(body, K1, K2, *at)
+        _, determinant = acceleration(body, K1, K2, at)
         assert ring.determinant_terms(body, 1.0, K1, K2, K1 * K2) == pytest.approx(determinant, rel=1e-12)
         inertia = body.inertia + body.mass * body.xi**2
         rate = inertia * omega * epsilon + weight * body.xi * sin(phi) * omega
-        assert abs(ring.power(body, K1, K2, N1, N2, *at) - rate) < 1e-9 * moment * (1 + abs(omega))
-        by_phi, by_omega = ring.acceleration_gradient(body, K1, K2, *at)
+        assert abs(ring.power(body, K1, K2, N1, N2, at) - rate) < 1e-9 * moment * (1 + abs(omega))
+        by_phi, by_omega = ring.acceleration_gradient(body, K1, K2, at)
         tiny = 1e-30j
-        assert by_omega == pytest.approx(acceleration(body, K1, K2, *at[:2], omega + tiny)[0].imag / 1e-30, rel=1e-9)
+        assert by_omega == pytest.approx(acceleration(body, K1, K2, (*at[:2], omega + tiny))[0].imag / 1e-30, rel=1e-9)
         turned = at[0] + tiny * at[1], at[1] - tiny * at[0]
-        assert by_phi == pytest.approx(acceleration(body, K1, K2, *turned, omega)[0].imag / 1e-30, rel=1e-9)
-        gain = acceleration(body, tiny, tiny, *at)[0].imag / 1e-30
-        assert ring.friction_gain(body, *at) == pytest.approx(gain, rel=1e-9, abs=1e-9)
+        assert by_phi == pytest.approx(acceleration(body, K1, K2, (*turned, omega))[0].imag / 1e-30, rel=1e-9)
+        gain = acceleration(body, tiny, tiny, at)[0].imag / 1e-30
+        assert ring.friction_gain(body, at) == pytest.approx(gain, rel=1e-9, abs=1e-9)
 
 
 class TestSlope:
@@ -236,9 +236,9 @@ class TestSlope:
         body, K1, K2, phi, omega = state
         where = (sin(phi), cos(phi), omega)
         tiny = 1e-40j
-        complex_step = acceleration(body, K1 + tiny * slope_1, K2 + tiny * slope_2, *where)[0].imag / 1e-40
-        slope = acceleration_slope(body, K1, K2, slope_1, slope_2, *where)
-        epsilon, determinant = acceleration(body, K1, K2, *where)
+        complex_step = acceleration(body, K1 + tiny * slope_1, K2 + tiny * slope_2, where)[0].imag / 1e-40
+        slope = acceleration_slope(body, K1, K2, slope_1, slope_2, where)
+        epsilon, determinant = acceleration(body, K1, K2, where)
         scale = (abs(epsilon) + body.gravity / body.radius + omega**2) * body.mass * body.radius**2 / abs(determinant)
         assert abs(slope - complex_step) < 1e-12 * scale * (1 + body.mass * body.radius**2 / abs(determinant))
 
@@ -246,8 +246,8 @@ class TestSlope:
     def test_acceleration_slope_of_one_contact_is_the_derivative(self, lift, K, phi, slope):
         body = ball(0.1, 0.05, 9.81)
         where = (sin(phi), cos(phi), (lift * 9.81 / 0.05) ** 0.5)
-        complex_step = acceleration(body, K + 1e-40j * slope, 0.0, *where)[0].imag / 1e-40
-        assert acceleration_slope(body, K, 0.0, slope, 0.0, *where) == pytest.approx(complex_step, rel=1e-12)
+        complex_step = acceleration(body, K + 1e-40j * slope, 0.0, where)[0].imag / 1e-40
+        assert acceleration_slope(body, K, 0.0, slope, 0.0, where) == pytest.approx(complex_step, rel=1e-12)
 
 
 class TestOneContact:
@@ -420,7 +420,7 @@ class TestCompiledModel:
             found = (now.rates[1], now.normal_1, now.normal_2)
             np.testing.assert_allclose(found, np.linalg.solve(balances, loads), rtol=1e-9, atol=1e-9)
             assert now.v == pytest.approx(v, rel=1e-14)
-            assert now.rates[0] == now.at[2] == omega
+            assert now.rates[0] == now.motion[2] == omega
             np.testing.assert_allclose(now.determinant, np.linalg.det(balances), rtol=1e-9)
         assert len(met) == 8
 
@@ -435,7 +435,7 @@ class TestCompiledModel:
             ends = []
             for sliding in (omega - step, omega + step):
                 _, K1, K2, _, _ = ring.friction(scene, phi, sliding, theta, ring_omega)
-                ends.append(acceleration(body, K1, K2, sin(phi), cos(phi), omega)[0])
+                ends.append(acceleration(body, K1, K2, (sin(phi), cos(phi), omega))[0])
             difference = (ends[1] - ends[0]) / (2 * step)
             slope = compiled_inspect(batch, 0, (phi, omega), theta, ring_omega).slope
             assert slope == pytest.approx(difference, rel=1e-5, abs=1e-3)

@@ -36,7 +36,7 @@ def coefficients(batch, K):
     """p, q, r of ``phi_dd = p omega^2 + q cos phi + r sin phi`` while K1 = K2 = K."""
     body = take(batch.body, 0)
     # Each call has one of sin phi, cos phi and omega equal to 1 and the others equal to 0.
-    return tuple(acceleration(body, K, K, *term)[0] for term in ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)))
+    return tuple(acceleration(body, K, K, term)[0] for term in ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)))
 
 
 def orbit(p, q, r, phi_0, omega_0):
@@ -360,7 +360,7 @@ class TestEnd:
         found = run(batch, 10)
         for i in range(len(phi)):
             body = take(batch.body, i)
-            normals = reactions(body, 0.0, 0.0, sin(phi[i]), cos(phi[i]), 0.0)
+            normals = reactions(body, 0.0, 0.0, (sin(phi[i]), cos(phi[i]), 0.0))
             separated = {k for k, normal in enumerate(normals, start=1) if normal <= 0.0}
             assert (found.steps[i] == 0) == bool(separated)
             if separated:
@@ -376,7 +376,7 @@ class TestEnd:
         assert coarse.regime == fine.regime == SEPARATING
         assert coarse.t_separation == pytest.approx(fine.t_separation, abs=1e-5)
         scene, phi, omega = take(batch, 0), fine.phi_end[0], fine.omega_end[0]
-        normals = reactions(scene.body, -0.3, -0.3, sin(phi), cos(phi), omega)
+        normals = reactions(scene.body, -0.3, -0.3, (sin(phi), cos(phi), omega))
         assert normals[int(fine.separating_contact[0]) - 1] == pytest.approx(0.0, abs=1e-6)
 
     def test_launch_jams_where_the_determinant_of_the_balances_is_not_positive(self, coulomb, run):

@@ -80,7 +80,7 @@ def larger(a, b):
 
 
 @inlined
-def of_balances(scene, friction, normals, at, forcing, rate, scales):
+def of_balances(scene, friction, normals, motion, forcing, rate, scales):
     """Violation of the balances and of the signs of the reactions by a state in slip or stick, and power, W.
 
     Parameters
@@ -88,8 +88,8 @@ def of_balances(scene, friction, normals, at, forcing, rate, scales):
     scene : NamedTuple
     friction, normals : tuple of float
         K, and the reaction (N), at each contact.
-    at : tuple of float
-        Last arguments of :func:`ringsweep.physics.ring.acceleration`.
+    motion : tuple of float
+        As for :func:`ringsweep.physics.ring.acceleration`.
     forcing : tuple of float
         What :func:`ringsweep.models.interface.implicit.forcing` returned.
     rate : float
@@ -98,13 +98,13 @@ def of_balances(scene, friction, normals, at, forcing, rate, scales):
         Error allowed to this rate; size of the terms of the acceleration, m/s^2; tolerance of the run.
     """
     body, (allowed, terms, tolerance) = scene.body, scales
-    acceleration, _ = ring.acceleration(body, *friction, *at)
+    acceleration, _ = ring.acceleration(body, *friction, motion)
     error = abs(ring.radius(body) * (acceleration - forcing[2]) - rate)
     violation = larger(0.0, error / (allowed + _ROUNDING * terms))
     least = ring.if_load_varies(body, min(normals[0], normals[1]), 0.0)
     violation = larger(violation, -least / (body.mass * terms * REACTION_TOLERANCE * tolerance))
-    violation = larger(violation, ring.imbalance(body, *friction, *normals, acceleration, *at) / _UNBALANCED)
-    return violation, ring.power(body, *friction, *normals, *at)
+    violation = larger(violation, ring.imbalance(body, *friction, *normals, acceleration, motion) / _UNBALANCED)
+    return violation, ring.power(body, *friction, *normals, motion)
 
 
 # ---- steps of constant length -----------------------------------------------------------------
@@ -148,7 +148,7 @@ def _eigenvalue(scene, before, now, h, most):
     # A step that jumps over the band, or over its edge, does not sample the slope there. The slope counts all the same,
     # since just such a step may lead to a wrong regime.
     at_rest, at_edge = steepest(scene.law)
-    scale = -radius * ring.friction_gain(scene.body, *now.at)
+    scale = -radius * ring.friction_gain(scene.body, now.motion)
     bound = max(abs(at_rest), abs(at_edge)) * abs(scale) + abs(now.by_velocity)
     if any_of(exceeds(most, bound, -now.by_place)):
         # The stages of the step reach about as far as the acceleration at its beginning takes the body.

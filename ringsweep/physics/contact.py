@@ -43,7 +43,7 @@ _ROUNDING = 1e-13
 
 
 @inlined
-def stick(body, m1, m2, sin_phi, cos_phi, omega, epsilon):
+def stick(body, m1, m2, motion, epsilon):
     """Saturation of friction, and normal reactions, of a body that sticks to the ring.
 
     Friction is ``K_i = -kappa mu_s,i`` at both contacts, with the saturation ``kappa`` at which the angular
@@ -55,10 +55,8 @@ def stick(body, m1, m2, sin_phi, cos_phi, omega, epsilon):
     body : NamedTuple
     m1, m2 : float
         Static friction coefficients under the contacts, 1.
-    sin_phi, cos_phi : float
-        Sine and cosine of the angle of the body.
-    omega : float
-        Angular velocity of the body, rad/s.
+    motion : tuple of float
+        Sine and cosine of the angle of the body, and its angular velocity, rad/s.
     epsilon : float
         Angular acceleration of the ring, rad/s^2.
 
@@ -69,11 +67,10 @@ def stick(body, m1, m2, sin_phi, cos_phi, omega, epsilon):
         N; normal reactions, N. With one contact N2 repeats N1. The reserve is minus infinity if no saturation gives
         this acceleration.
     """
-
-    N1, N2, F1, F2 = ring.held(body, 1.0, sin_phi, cos_phi, omega, omega * omega, epsilon, 0.0)
+    N1, N2, F1, F2 = ring.held(body, 1.0, motion, motion[2] * motion[2], epsilon, 0.0)
     friction, capacity = F1, m1 * N1
     if ring.contact_count(body) == 2:
-        _, by_N2, by_F1, by_F2 = ring.held(body, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+        _, by_N2, by_F1, by_F2 = ring.held(body, 0.0, (0.0, 0.0, 0.0), 0.0, 0.0, 1.0)
         square, linear, constant = sharing(m1, m2, (N2, F1, F2), (by_N2, by_F1, by_F2))
         discriminant = linear * linear - 4.0 * square * constant
         if not discriminant >= 0.0:
@@ -117,20 +114,20 @@ def larger_root(square, linear, constant):
 
 
 @hook(optional=True)
-def opening(body, k1, k2, m1, m2, slides, sin_phi, cos_phi, omega, epsilon):
+def opening(body, friction, static, slides, motion, epsilon):
     """Contacts that open, of a body whose contacts cannot both stay closed.
 
     Parameters
     ----------
     body : NamedTuple
-    k1, k2 : float
-        Friction per unit of the normal reaction, 1. If the body slides: with sign, positive in the direction of growing
-        phi. If it is at rest: the magnitude just after breakaway.
-    m1, m2 : float
-        Static friction coefficients, 1; only used at rest.
+    friction : tuple of float
+        Friction per unit of the normal reaction at both contacts, 1. If the body slides: with sign, positive in the
+        direction of growing phi. If it is at rest: the magnitude just after breakaway.
+    static : tuple of float
+        Static friction coefficients under both contacts, 1; only used at rest.
     slides : int
         0 if the body is at rest on the ring, 1 if it slides.
-    sin_phi, cos_phi, omega, epsilon : float
+    motion, epsilon
         As for :func:`stick`.
 
     Returns
@@ -143,13 +140,13 @@ def opening(body, k1, k2, m1, m2, slides, sin_phi, cos_phi, omega, epsilon):
 
 
 @inlined
-def _carries_alone(body, side, k, m, slides, at):
+def _carries_alone(body, side, k, m, slides, motion, epsilon):
     """Whether one contact can carry the body while the other contact opens.
 
-    `side` is -1 for contact 1 and +1 for contact 2; `k` and `m` are as for :func:`opening`, for this contact, and `at`
-    holds the last four arguments of it.
+    `side` is -1 for contact 1 and +1 for contact 2; `k` and `m` are friction and static friction at this contact, and
+    the rest is as for :func:`opening`.
     """
-    b, (sin_phi, cos_phi, omega, epsilon) = body, at
+    b, (sin_phi, cos_phi, omega) = body, motion
     sb, cb = b.sin_beta, b.cos_beta
     # The moment of inertia may be zero; a lower bound avoids the division by zero.
     per_inertia = b.mass / max(b.inertia, 1e-9 * b.mass * b.radius * b.radius)
@@ -184,15 +181,15 @@ def _carries_alone(body, side, k, m, slides, at):
 
 
 @opening.implements(ring.TwoContacts)
-def _two_opening(body, k1, k2, m1, m2, slides, sin_phi, cos_phi, omega, epsilon):
+def _two_opening(body, friction, static, slides, motion, epsilon):
+    sin_phi, cos_phi, omega = motion
     across = body.gravity * cos_phi + body.xi * omega * omega
     along = body.gravity * sin_phi
     # Without a load both gaps open.
     if body.cos_beta * across + body.sin_beta * abs(along) <= 0.0:
         return OPEN_BOTH
-    at = sin_phi, cos_phi, omega, epsilon
-    first = _carries_alone(body, 1.0, k2, m2, slides, at)
-    second = _carries_alone(body, -1.0, k1, m1, slides, at)
+    first = _carries_alone(body, 1.0, friction[1], static[1], slides, motion, epsilon)
+    second = _carries_alone(body, -1.0, friction[0], static[0], slides, motion, epsilon)
     if first:
         return OPEN_BOTH if second else OPEN_1
     return OPEN_2 if second else IMPOSSIBLE
@@ -219,13 +216,13 @@ def lost(body, first, second):
 
 
 @inlined
-def _scale(body, sin_phi, cos_phi, omega, epsilon):
+def _scale(body, omega, epsilon):
     """Size of the terms in the balances of momentum, per unit of mass, m/s^2; greater than zero even without a load."""
     return body.gravity + body.radius * (omega * omega + abs(epsilon)) + 1e-300
 
 
 @inlined
-def _slip_margin(body, sign, friction, tangential, at):
+def _slip_margin(body, sign, friction, tangential, motion, epsilon):
     """Least margin of the inequalities of a slip that begins at rest, as a share of the terms; negative if one fails.
 
     Parameters
@@ -238,18 +235,17 @@ def _slip_margin(body, sign, friction, tangential, at):
     tangential : bool
         Whether stick has just ended by this breakaway, and friction does not drop at breakaway. Then the relative
         acceleration is still zero.
-    at : tuple of float
-        The last four arguments of :func:`stick`.
+    motion, epsilon
+        As for :func:`stick`.
     """
-    sin_phi, cos_phi, omega, epsilon = at
     K1, K2 = -sign * friction[0], -sign * friction[1]
-    phi_dd, determinant = ring.acceleration(body, K1, K2, sin_phi, cos_phi, omega)
-    n1, n2 = ring.reactions(body, K1, K2, sin_phi, cos_phi, omega)
-    terms = _scale(body, sin_phi, cos_phi, omega, epsilon)
+    phi_dd, determinant = ring.acceleration(body, K1, K2, motion)
+    n1, n2 = ring.reactions(body, K1, K2, motion)
+    terms = _scale(body, motion[2], epsilon)
     push = sign * body.radius * (phi_dd - epsilon) / terms
     if tangential:
         # The body starts to slide if even more friction than the limit would be needed to hold it.
-        gain = sign * ring.acceleration_slope(body, K1, K2, K1, K2, sin_phi, cos_phi, omega)
+        gain = sign * ring.acceleration_slope(body, K1, K2, K1, K2, motion)
         push = -body.radius * gain / terms if determinant > 0.0 else -1.0
     margin = min(push, min(n1, n2) / (body.mass * terms))
     # NaN if the acceleration does not exist.
@@ -257,7 +253,7 @@ def _slip_margin(body, sign, friction, tangential, at):
 
 
 @inlined
-def at_rest(body, static, forward, backward, sin_phi, cos_phi, omega, epsilon, released):
+def at_rest(body, static, forward, backward, motion, epsilon, released):
     """Mode of a body that is at rest on the ring.
 
     Parameters
@@ -267,7 +263,7 @@ def at_rest(body, static, forward, backward, sin_phi, cos_phi, omega, epsilon, r
         Static friction coefficients under both contacts, 1.
     forward, backward : tuple of float
         Friction coefficients under both contacts just after breakaway forwards and backwards, 1.
-    sin_phi, cos_phi, omega, epsilon : float
+    motion, epsilon
         As for :func:`stick`.
     released : int
         0 if the body may stick. Otherwise stick has just ended: +1 or -1 by breakaway in this direction, 2 because a
@@ -281,29 +277,28 @@ def at_rest(body, static, forward, backward, sin_phi, cos_phi, omega, epsilon, r
     m1, m2 = static
     held = -1.0
     if released == 0:
-        _, reserve, n1, n2 = stick(body, m1, m2, sin_phi, cos_phi, omega, epsilon)
-        held = min(reserve, min(n1, n2)) / (body.mass * _scale(body, sin_phi, cos_phi, omega, epsilon))
-        least = _ROUNDING * body.mass * _scale(body, sin_phi, cos_phi, omega, epsilon)
+        _, reserve, n1, n2 = stick(body, m1, m2, motion, epsilon)
+        load = body.mass * _scale(body, motion[2], epsilon)
+        held = min(reserve, min(n1, n2)) / load
         # Without friction or without a load the body cannot stick.
-        if held >= 0.0 and m1 + m2 > 0.0 and min(n1, n2) > least:
+        if held >= 0.0 and m1 + m2 > 0.0 and min(n1, n2) > _ROUNDING * load:
             return STICK
-    at = sin_phi, cos_phi, omega, epsilon
-    ahead = _slip_margin(body, 1.0, forward, released == 1 and forward == static, at)
-    back = _slip_margin(body, -1.0, backward, released == -1 and backward == static, at)
+    ahead = _slip_margin(body, 1.0, forward, released == 1 and forward == static, motion, epsilon)
+    back = _slip_margin(body, -1.0, backward, released == -1 and backward == static, motion, epsilon)
     if ahead > 0.0 or back > 0.0:
         if min(ahead, back) > 0.0:
             return IMPOSSIBLE
         return FORWARD if ahead > 0.0 else BACKWARD
     # A tie: for example a body without friction in equilibrium.
-    loaded = body.gravity > 0.0 or omega != 0.0
+    loaded = body.gravity > 0.0 or motion[2] != 0.0
     if loaded and max(held, max(ahead, back)) >= -_ROUNDING:
         return FORWARD if ahead >= max(held, back) else BACKWARD if back >= held else STICK
-    k1, k2 = max(forward[0], backward[0]), max(forward[1], backward[1])
-    return opening(body, k1, k2, m1, m2, 0, sin_phi, cos_phi, omega, epsilon)
+    friction = max(forward[0], backward[0]), max(forward[1], backward[1])
+    return opening(body, friction, static, 0, motion, epsilon)
 
 
 @inlined
-def sliding(body, K1, K2, sin_phi, cos_phi, omega):
+def sliding(body, K1, K2, motion):
     """Mode of a body that slides.
 
     Parameters
@@ -311,7 +306,7 @@ def sliding(body, K1, K2, sin_phi, cos_phi, omega):
     body : NamedTuple
     K1, K2 : float
         Friction per unit of the normal reaction at each contact, 1; positive in the direction of growing phi.
-    sin_phi, cos_phi, omega : float
+    motion : tuple of float
         As for :func:`stick`.
 
     Returns
@@ -319,11 +314,11 @@ def sliding(body, K1, K2, sin_phi, cos_phi, omega):
     int
         CLOSED, OPEN_1, OPEN_2, OPEN_BOTH or IMPOSSIBLE.
     """
-    _, determinant = ring.acceleration(body, K1, K2, sin_phi, cos_phi, omega)
-    n1, n2 = ring.reactions(body, K1, K2, sin_phi, cos_phi, omega)
-    if min(n1, n2) > _ROUNDING * body.mass * _scale(body, sin_phi, cos_phi, omega, 0.0):
+    _, determinant = ring.acceleration(body, K1, K2, motion)
+    n1, n2 = ring.reactions(body, K1, K2, motion)
+    if min(n1, n2) > _ROUNDING * body.mass * _scale(body, motion[2], 0.0):
         return CLOSED if determinant > 0.0 else IMPOSSIBLE
-    return opening(body, K1, K2, 0.0, 0.0, 1, sin_phi, cos_phi, omega, 0.0)
+    return opening(body, (K1, K2), (0.0, 0.0), 1, motion, 0.0)
 
 
 #: Functions of a body that the contact problem needs.

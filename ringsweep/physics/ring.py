@@ -136,7 +136,7 @@ def free_determinant(body):
 
 
 @hook(absorb=True)
-def acceleration(body, K1, K2, sin_phi, cos_phi, omega):
+def acceleration(body, K1, K2, motion):
     """Angular acceleration of the body in slip, and the determinant that tells whether the body jams.
 
     Parameters
@@ -144,10 +144,8 @@ def acceleration(body, K1, K2, sin_phi, cos_phi, omega):
     body : NamedTuple
     K1, K2 : float or Lanes
         Friction per unit of the normal reaction at each contact, 1; positive in the direction of growing phi.
-    sin_phi, cos_phi : float or Lanes
-        Sine and cosine of the angle of the body.
-    omega : float or Lanes
-        Angular velocity of the body, rad/s.
+    motion : tuple of float or Lanes
+        Sine and cosine of the angle of the body, and its angular velocity, rad/s.
 
     Returns
     -------
@@ -163,14 +161,14 @@ def contact_count(body):
 
 
 @hook(absorb=True)
-def acceleration_slope(body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega):
+def acceleration_slope(body, K1, K2, slope_1, slope_2, motion):
     """Derivative of the angular acceleration by way of friction: d phi_dd/dK1 slope_1 + d phi_dd/dK2 slope_2.
 
     Parameters
     ----------
     slope_1, slope_2 : float or Lanes
         Derivatives of K1 and K2, for example by the angular velocity, s.
-    body, K1, K2, sin_phi, cos_phi, omega
+    body, K1, K2, motion
         As for :func:`acceleration`.
 
     Returns
@@ -181,12 +179,12 @@ def acceleration_slope(body, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega):
 
 
 @hook(absorb=True)
-def acceleration_gradient(body, K1, K2, sin_phi, cos_phi, omega):
+def acceleration_gradient(body, K1, K2, motion):
     """Derivatives of the angular acceleration by angle and by angular velocity, at constant K1 and K2.
 
     Parameters
     ----------
-    body, K1, K2, sin_phi, cos_phi, omega
+    body, K1, K2, motion
         As for :func:`acceleration`.
 
     Returns
@@ -197,12 +195,12 @@ def acceleration_gradient(body, K1, K2, sin_phi, cos_phi, omega):
 
 
 @hook(absorb=True)
-def friction_gain(body, sin_phi, cos_phi, omega):
+def friction_gain(body, motion):
     """Derivative of the angular acceleration by K, with the same K at all contacts, at K = 0.
 
     Parameters
     ----------
-    body, sin_phi, cos_phi, omega
+    body, motion
         As for :func:`acceleration`.
 
     Returns
@@ -221,14 +219,14 @@ def reaction_determinant(body):
 
 
 @hook(absorb=True)
-def reactions(body, K1, K2, sin_phi, cos_phi, omega):
+def reactions(body, K1, K2, motion):
     """Normal reactions in slip: the paper's Eq. 17 with the angular acceleration eliminated.
 
     Eq. 17 divides by D. Where D vanishes and the determinant of the balances does not, the reactions are finite.
 
     Parameters
     ----------
-    body, K1, K2, sin_phi, cos_phi, omega
+    body, K1, K2, motion
         As for :func:`acceleration`.
 
     Returns
@@ -277,7 +275,7 @@ def determinant_terms(body, one, K1, K2, both):
 
 
 @hook
-def held(body, one, sin_phi, cos_phi, omega, square, epsilon, normal):
+def held(body, one, motion, square, epsilon, normal):
     """Forces at the contacts from the balances and not from a friction law: so in stick too.
 
     They are linear in the arguments after `body`, so that coefficients of series can take their place.
@@ -287,8 +285,10 @@ def held(body, one, sin_phi, cos_phi, omega, square, epsilon, normal):
     body : NamedTuple
     one : float
         1.
-    sin_phi, cos_phi, omega, square : float
-        Sine and cosine of the angle of the body; angular velocity, rad/s, and its square.
+    motion : tuple of float
+        As for :func:`acceleration`.
+    square : float
+        Square of the angular velocity.
     epsilon : float
         Angular acceleration of the body, rad/s^2.
     normal : float
@@ -303,12 +303,12 @@ def held(body, one, sin_phi, cos_phi, omega, square, epsilon, normal):
 
 
 @hook
-def driven(body, one, sin_phi, cos_phi, omega, square, F1, F2):
+def driven(body, one, motion, square, F1, F2):
     """Acceleration of the body under given friction forces, rad/s^2, linear in the arguments after `body`.
 
     Parameters
     ----------
-    body, one, sin_phi, cos_phi, omega, square
+    body, one, motion, square
         As for :func:`held`.
     F1, F2 : float
         Friction along the race, positive in the direction of growing phi, N; on a belt with the force given there.
@@ -321,23 +321,23 @@ def if_load_varies(body, yes, no):
 
 
 @hook
-def energy(body, sin_phi, cos_phi, omega):
+def energy(body, motion):
     """Kinetic and potential energy of the body, J. Its rate is :func:`power`.
 
     Parameters
     ----------
-    body, sin_phi, cos_phi, omega
+    body, motion
         As for :func:`acceleration`.
     """
 
 
 @hook
-def power(body, K1, K2, N1, N2, sin_phi, cos_phi, omega):
+def power(body, K1, K2, N1, N2, motion):
     """Power of friction, and of other forces that are not in the energy, W: from the last balance.
 
     Parameters
     ----------
-    body, K1, K2, sin_phi, cos_phi, omega
+    body, K1, K2, motion
         As for :func:`acceleration`.
     N1, N2 : float
         Normal reactions, N.
@@ -345,12 +345,12 @@ def power(body, K1, K2, N1, N2, sin_phi, cos_phi, omega):
 
 
 @hook
-def imbalance(body, K1, K2, N1, N2, phi_dd, sin_phi, cos_phi, omega):
+def imbalance(body, K1, K2, N1, N2, phi_dd, motion):
     """Error of the balances as they are written down: sum of its squares, each as a share of those of the terms.
 
     Parameters
     ----------
-    body, K1, K2, sin_phi, cos_phi, omega
+    body, K1, K2, motion
         As for :func:`acceleration`.
     N1, N2 : float
         Normal reactions, N.
@@ -360,7 +360,7 @@ def imbalance(body, K1, K2, N1, N2, phi_dd, sin_phi, cos_phi, omega):
 
 
 @hook(absorb=True)
-def size(body, sin_phi, cos_phi, omega):
+def size(body, motion):
     """Sum of the magnitudes of the terms of the last balance without friction and inertia, N m, or N on a belt."""
 
 
@@ -413,7 +413,7 @@ def body(
         Field with half the angle between the contacts, rad. By default 0.
     coordinate : Coordinate
         By default the angle of the body. The functions in :data:`DERIVED` are documented for it. With another
-        coordinate they take its numbers in place of ``sin_phi``, ``cos_phi``, ``omega`` and ``phi_dd``.
+        coordinate they take its numbers as `motion`, and its acceleration in place of `phi_dd`.
     optional : tuple of str
         Symbols of parts that a body may lack, see :func:`variant`. Without them their terms cost nothing.
 
@@ -452,11 +452,11 @@ def _derive(cls: Any, balances: Any, energy: str, coordinate: Coordinate, absent
         equations = EQUATIONS[cls] = Equations(cls._fields, balances, energy, coordinate, absent)
     except ValueError as error:
         raise TypeError(f"{cls.__name__}: {error}") from None
-    own = dict(zip((*ANGLE.motion, ANGLE.acceleration), (*coordinate.motion, coordinate.acceleration), strict=True))
+    own = {"motion": ", ".join(coordinate.motion), ANGLE.acceleration: coordinate.acceleration}
     for function in DERIVED:
         names = list(inspect.signature(function).parameters)
-        renamed = [f"{own[name]} = {name}" for name in names if own.get(name, name) != name]
-        lines = [*renamed, *equations.lines(function.__name__)]
+        named = [f"{own[name]} = {name}" for name in names if name in own]
+        lines = [*named, *equations.lines(function.__name__)]
         function.implements(cls)(function_from_lines(", ".join(names), lines, {}))
 
 

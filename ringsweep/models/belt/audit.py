@@ -42,46 +42,46 @@ def _violation(scene, mode, forcing, y, rates, s, tolerance):
     length = abs(x) + length_scale(scene, abs(velocity) + abs(forcing[1]))
     speed, largest, relaxation = speed_scale(scene, length), 0.0, 0.0
     if mode.sign == 0:
-        at = x, push, velocity
-        normal, _, friction, _ = ring.held(body, 1.0, *at, x * x * x, forcing[2], 0.0)
+        motion = x, push, velocity
+        normal, _, friction, _ = ring.held(body, 1.0, motion, x * x * x, forcing[2], 0.0)
         K = friction / normal if normal != 0.0 else 0.0
-        sizes = ring.size(body, length, push, velocity) + body.mass * (body.gravity + abs(forcing[2]))
+        sizes = ring.size(body, (length, push, velocity)) + body.mass * (body.gravity + abs(forcing[2]))
         largest = (abs(friction) - breakaway_force(scene, x)) / (tolerance * sizes + 1e-300)
     else:
-        K, slope, viscous, at = sliding(scene, x, velocity, v, forcing)
-        relaxation = abs(sliding_slopes(scene, K, slope, viscous, at)[1])
+        K, slope, viscous, motion = sliding(scene, x, velocity, v, forcing)
+        relaxation = abs(sliding_slopes(scene, K, slope, viscous, motion)[1])
         # In a dead band the sliding velocity need not have the direction of the force.
         if not (holds_in_band(scene.law) and mode.region < 0):
             if mode.region < 0:
                 speed = min(speed, 1e3 * stiction_band(scene.law))
             largest = -mode.sign * v / (tolerance * speed)
-    scales = (1.0 / s + relaxation) * tolerance * speed, _terms(body, at, forcing), tolerance
-    violation, power = of_balances(scene, (K, K), ring.reactions(body, K, K, *at), at, forcing, rates[1], scales)
+    scales = (1.0 / s + relaxation) * tolerance * speed, _terms(body, motion, forcing), tolerance
+    violation, power = of_balances(scene, (K, K), ring.reactions(body, K, K, motion), motion, forcing, rates[1], scales)
     return larger(largest, violation), power
 
 
 @inlined
-def _terms(body, at, forcing):
+def _terms(body, motion, forcing):
     """Size of the terms of the acceleration, m/s^2."""
-    return body.gravity + ring.size(body, *at) / body.mass + abs(forcing[2]) + 1e-200
+    return body.gravity + ring.size(body, motion) / body.mass + abs(forcing[2]) + 1e-200
 
 
 @audit.energy.implements(Belt, BristleBelt)
 def _energy(scene, forcing, y):
-    return ring.energy(scene.body, y[0], 0.0, y[1] + forcing[1])
+    return ring.energy(scene.body, (y[0], 0.0, y[1] + forcing[1]))
 
 
 @audit.violation.implements(BristleBelt)
 def _bristle_violation(scene, mode, forcing, y, rates, s, tolerance):
     x, v, z = y
-    at = x, force_in(scene.drive, forcing), v + forcing[1]
+    motion = x, force_in(scene.drive, forcing), v + forcing[1]
     rate, rate_v, rate_z, K, slope_v, slope_z = contact(scene, v, z, 1.0 if v >= 0.0 else -1.0, mode.region)
     _, speed, deflection, _ = implicit.error_scales(scene, implicit.IMPLICIT_TOLERANCE * tolerance, y)
-    by_v = sliding_slopes(scene, K, slope_v, 0.0, at)[1]
-    by_z = ring.acceleration_slope(scene.body, K, K, slope_z, slope_z, *at)
-    scales = speed / s + abs(by_v) * speed + abs(by_z) * deflection, _terms(scene.body, at, forcing), tolerance
-    normals = ring.reactions(scene.body, K, K, *at)
-    largest, power = of_balances(scene, (K, K), normals, at, forcing, rates[1], scales)
+    by_v = sliding_slopes(scene, K, slope_v, 0.0, motion)[1]
+    by_z = ring.acceleration_slope(scene.body, K, K, slope_z, slope_z, motion)
+    scales = speed / s + abs(by_v) * speed + abs(by_z) * deflection, _terms(scene.body, motion, forcing), tolerance
+    normals = ring.reactions(scene.body, K, K, motion)
+    largest, power = of_balances(scene, (K, K), normals, motion, forcing, rates[1], scales)
     allowed = (1.0 / s + abs(rate_z)) * deflection + abs(rate_v) * speed + _ROUNDING * abs(v)
     return larger(larger(largest, abs(rate - rates[2]) / allowed), -mode.sign * v / speed), power
 

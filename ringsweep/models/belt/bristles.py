@@ -108,19 +108,19 @@ def _initial_state_in_space(scene):
 @constant_step.rates.implements(BristleBelt)
 def _rates(scene, now, y, forcing):
     _, (rate, _, _, K, _, _) = _contact_in_region(scene, y[1] - forcing[1], y[2])
-    at = y[0], force_in(scene.drive, forcing), y[1]
-    return y[1], ring.acceleration(scene.body, K, K, *at)[0], rate
+    motion = y[0], force_in(scene.drive, forcing), y[1]
+    return y[1], ring.acceleration(scene.body, K, K, motion)[0], rate
 
 
 @constant_step.inspect.implements(BristleBelt)
 def _inspect(scene, y, forcing):
     body, v = scene.body, y[1] - forcing[1]
-    at = y[0], force_in(scene.drive, forcing), y[1]
+    motion = y[0], force_in(scene.drive, forcing), y[1]
     stuck, (rate, rate_v, rate_z, K, slope_v, slope_z) = _contact_in_region(scene, v, y[2])
-    acceleration, determinant = ring.acceleration(body, K, K, *at)
-    normal, _ = ring.reactions(body, K, K, *at)
-    by_place, by_v, _, _ = sliding_slopes(scene, K, slope_v, 0.0, at)
-    by_z = ring.acceleration_slope(body, K, K, slope_z, slope_z, *at)
+    acceleration, determinant = ring.acceleration(body, K, K, motion)
+    normal, _ = ring.reactions(body, K, K, motion)
+    by_place, by_v, _, _ = sliding_slopes(scene, K, slope_v, 0.0, motion)
+    by_z = ring.acceleration_slope(body, K, K, slope_z, slope_z, motion)
     return Inspection(
         (y[1], acceleration, rate),
         normal,
@@ -184,12 +184,12 @@ def _initial_mode(scene, t, y):
     sign = 1 if v > 0.0 else -1
     _, _, _, K, _, _ = contact(scene, v, z, 1.0, BAND)
     forcing = drives.turn(scene.drive, t)
-    at = x, force_in(scene.drive, forcing), v + forcing[1]
+    motion = x, force_in(scene.drive, forcing), v + forcing[1]
     if v == 0.0:
         # The body begins to slide in the direction of the net force; without a net force the belt leaves it behind.
-        sign = 1 if ring.acceleration(scene.body, K, K, *at)[0] > forcing[2] else -1
+        sign = 1 if ring.acceleration(scene.body, K, K, motion)[0] > forcing[2] else -1
     mode = Mode(sign, BAND if _in_band(scene, v, z, float(sign)) else KINETIC)
-    opens = ring.if_load_varies(scene.body, True, False) and ring.reactions(scene.body, K, K, *at)[0] <= 0.0
+    opens = ring.if_load_varies(scene.body, True, False) and ring.reactions(scene.body, K, K, motion)[0] <= 0.0
     return (SEPARATED_1 if opens else RUNNING), mode
 
 
@@ -209,24 +209,24 @@ def _switch(scene, mode, guard, t, y):
 @absorbed
 def _in_step(scene, mode, forcing, x):
     """Numbers of the motion, and what :func:`contact` returns."""
-    at = x[0], force_in(scene.drive, forcing), x[1] + forcing[1]
-    return at, contact(scene, x[1], x[2], float(mode.sign), mode.region)
+    motion = x[0], force_in(scene.drive, forcing), x[1] + forcing[1]
+    return motion, contact(scene, x[1], x[2], float(mode.sign), mode.region)
 
 
 @implicit.rates.implements(BristleBelt)
 def _implicit_rates(scene, mode, common, forcing, x):
-    at, (rate, _, _, K, _, _) = _in_step(scene, mode, forcing, x)
-    return at[2], ring.acceleration(scene.body, K, K, *at)[0] - forcing[2], rate
+    motion, (rate, _, _, K, _, _) = _in_step(scene, mode, forcing, x)
+    return motion[2], ring.acceleration(scene.body, K, K, motion)[0] - forcing[2], rate
 
 
 @implicit.linearise.implements(BristleBelt)
 def _linearise(scene, mode, common, t, forcing, x):
-    at, (rate, rate_v, rate_z, K, slope_v, slope_z) = _in_step(scene, mode, forcing, x)
-    by_place, by_v, by_velocity, by_force = sliding_slopes(scene, K, slope_v, 0.0, at)
-    by_z = ring.acceleration_slope(scene.body, K, K, slope_z, slope_z, *at)
+    motion, (rate, rate_v, rate_z, K, slope_v, slope_z) = _in_step(scene, mode, forcing, x)
+    by_place, by_v, by_velocity, by_force = sliding_slopes(scene, K, slope_v, 0.0, motion)
+    by_z = ring.acceleration_slope(scene.body, K, K, slope_z, slope_z, motion)
     by_time = by_velocity * forcing[2] + by_force * force_rate(scene.drive, forcing) - drives.jerk(scene.drive, t)
     return (
-        (at[2], ring.acceleration(scene.body, K, K, *at)[0] - forcing[2], rate),
+        (motion[2], ring.acceleration(scene.body, K, K, motion)[0] - forcing[2], rate),
         (0.0, 1.0, by_place, by_v),
         ((by_z, rate_v, rate_z),),
         (forcing[2], by_time, 0.0),
@@ -247,9 +247,9 @@ def _error_scales(scene, tolerance, x):
 @implicit.guards_and_motion.implements(BristleBelt)
 def _guards_and_motion(scene, mode, common, forcing, x):
     sign = float(mode.sign)
-    at, (_, _, _, K, _, _) = _in_step(scene, mode, forcing, x)
+    motion, (_, _, _, K, _, _) = _in_step(scene, mode, forcing, x)
     fast = region_guard(scene.law, scene.mu_s, scene.mu_k, x[1], x[2], sign, mode.region)
-    return view(scene, forcing, x, x[0] - forcing[0], (K, 0.0), at, (sign * x[1], fast))
+    return view(scene, forcing, x, x[0] - forcing[0], (K, 0.0), motion, (sign * x[1], fast))
 
 
 @implicit.row.implements(BristleBelt)

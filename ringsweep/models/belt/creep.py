@@ -33,16 +33,16 @@ def _in_step(scene, forcing, x):
 
 @implicit.rates.implements(belt.Belt)
 def _rates(scene, mode, common, forcing, x):
-    K, _, _, at = _in_step(scene, forcing, x)
-    return x[1], ring.acceleration(scene.body, K, K, *at)[0] - forcing[2]
+    K, _, _, motion = _in_step(scene, forcing, x)
+    return x[1], ring.acceleration(scene.body, K, K, motion)[0] - forcing[2]
 
 
 @implicit.linearise.implements(belt.Belt)
 def _linearise(scene, mode, common, t, forcing, x):
-    K, slope, viscous, at = _in_step(scene, forcing, x)
-    by_place, by_v, by_velocity, by_force = sliding_slopes(scene, K, slope, viscous, at)
+    K, slope, viscous, motion = _in_step(scene, forcing, x)
+    by_place, by_v, by_velocity, by_force = sliding_slopes(scene, K, slope, viscous, motion)
     rate = by_place * forcing[1] + by_velocity * forcing[2] + by_force * force_rate(scene.drive, forcing)
-    acceleration = ring.acceleration(scene.body, K, K, *at)[0] - forcing[2]
+    acceleration = ring.acceleration(scene.body, K, K, motion)[0] - forcing[2]
     return (x[1], acceleration), (0.0, 1.0, by_place, by_v), (), (0.0, rate - drives.jerk(scene.drive, t))
 
 
@@ -53,16 +53,16 @@ def all_guards(body, normal, slow, fast):
 
 
 @inlined
-def view(scene, forcing, x, place, friction, at, guards):
+def view(scene, forcing, x, place, friction, motion, guards):
     """View of a state in slip.
 
     `place` is that on the belt, m, and `friction` are K and the viscous friction, N. `x` has the sliding velocity.
     """
     K, viscous = friction
-    acceleration, _ = ring.acceleration(scene.body, K, K, *at)
-    normal, _ = ring.reactions(scene.body, K, K, *at)
-    motion = at[0], at[2], acceleration, viscous - K * normal, place, x[1], forcing[2], _deflection(x, nan)
-    return all_guards(scene.body, normal, *guards), motion
+    acceleration, _ = ring.acceleration(scene.body, K, K, motion)
+    normal, _ = ring.reactions(scene.body, K, K, motion)
+    seen = motion[0], motion[2], acceleration, viscous - K * normal, place, x[1], forcing[2], _deflection(x, nan)
+    return all_guards(scene.body, normal, *guards), seen
 
 
 @unrolled
@@ -73,10 +73,10 @@ def _deflection(length, x, missing):
 
 @implicit.guards_and_motion.implements(belt.Belt)
 def _guards_and_motion(scene, mode, common, forcing, x):
-    K, _, viscous, at = _in_step(scene, forcing, x)
+    K, _, viscous, motion = _in_step(scene, forcing, x)
     low, high = region_bounds(scene.law, mode.region)
     speed = mode.sign * x[1]
-    return view(scene, forcing, x, x[0], (K, viscous * x[1]), at, (speed - low, high - speed))
+    return view(scene, forcing, x, x[0], (K, viscous * x[1]), motion, (speed - low, high - speed))
 
 
 @implicit.seen.implements(belt.Belt, belt.BristleBelt)

@@ -40,10 +40,10 @@ def sliding(scene, x, velocity, v, forcing):
     Returns
     -------
     tuple
-        ``(K, slope, viscous, at)``: friction per unit of the normal reaction, its derivative by the sliding velocity
-        (s/m), the coefficient of viscous friction (N s/m), and the last arguments of
-        :func:`ringsweep.physics.ring.acceleration`: displacement, given force, velocity. Friction balances the other
-        forces in a dead band, as far as it can.
+        ``(K, slope, viscous, motion)``: friction per unit of the normal reaction, its derivative by the sliding
+        velocity (s/m), the coefficient of viscous friction (N s/m), and the motion as
+        :func:`ringsweep.physics.ring.acceleration` takes it: displacement, given force, velocity. Friction balances the
+        other forces in a dead band, as far as it can.
     """
     mu, slope = friction_at(scene.law, abs(v), (scene.mu_s, scene.mu_k))
     found, push = (opposing(mu, v), -slope, if_force(scene.body, scene.viscous, 0.0)), force_in(scene.drive, forcing)
@@ -61,29 +61,29 @@ def _in_dead_band(family, scene, x, push, velocity, v, found):
 def _balancing(family, scene, x, push, velocity, v, found):
     K, slope, viscous = found
     held = abs(v) < stiction_band(scene.law)
-    load, _, friction, _ = ring.held(scene.body, 1.0, x, push, velocity, x * x * x, 0.0, 0.0)
+    load, _, friction, _ = ring.held(scene.body, 1.0, (x, push, velocity), x * x * x, 0.0, 0.0)
     needed = max(-scene.mu_s, min(scene.mu_s, friction / (load + 1e-300)))
     return select(held, needed, K), select(held, 0.0, slope), select(held, 0.0, viscous)
 
 
 @absorbed
-def sliding_slopes(scene, K, slope, viscous, at):
+def sliding_slopes(scene, K, slope, viscous, motion):
     """Derivatives of the acceleration by place, sliding velocity, velocity of the belt, and given force."""
-    by_place, by_velocity, by_force = ring.acceleration_gradient(scene.body, K, K, *at)
-    by_v = ring.acceleration_slope(scene.body, K, K, slope, slope, *at) - viscous * by_force
+    by_place, by_velocity, by_force = ring.acceleration_gradient(scene.body, K, K, motion)
+    by_v = ring.acceleration_slope(scene.body, K, K, slope, slope, motion) - viscous * by_force
     return by_place, by_velocity + by_v, by_velocity, by_force
 
 
 @absorbed
 def breakaway_force(scene, x):
     """Largest friction force of a stuck contact, N."""
-    return scene.mu_s * ring.reactions(scene.body, 0.0, 0.0, x, 0.0, 0.0)[0]
+    return scene.mu_s * ring.reactions(scene.body, 0.0, 0.0, (x, 0.0, 0.0))[0]
 
 
 @inlined
 def located(scene, x, acceleration):
     """Acceleration of the body at the displacement `x`, and the size of its terms, for the recorder."""
-    forces = abs(breakaway_force(scene, x)) + ring.size(scene.body, x, 0.0, 0.0)
+    forces = abs(breakaway_force(scene, x)) + ring.size(scene.body, (x, 0.0, 0.0))
     return shock.Located(acceleration, forces / scene.body.mass + abs(acceleration))
 
 
@@ -91,7 +91,7 @@ def located(scene, x, acceleration):
 def stuck_pull(scene, x, v, forcing):
     """Force that friction must balance to keep the sliding velocity `v` (m/s) constant, N; positive forwards."""
     push = force_in(scene.drive, forcing)
-    return -ring.held(scene.body, 1.0, x, push, v + forcing[1], x * x * x, forcing[2], 0.0)[2]
+    return -ring.held(scene.body, 1.0, (x, push, v + forcing[1]), x * x * x, forcing[2], 0.0)[2]
 
 
 @inlined
@@ -99,15 +99,15 @@ def stuck_rates(scene, t, x, forcing):
     """Time derivatives of :func:`stuck_pull` and :func:`breakaway_force` of a body at rest on the belt, N/s."""
     _, velocity, acceleration = forcing[:3]
     push_rate, jerk = force_rate(scene.drive, forcing), drives.jerk(scene.drive, t)
-    cube_rate = 3.0 * x * x * velocity
-    load, _, friction, _ = ring.held(scene.body, 0.0, velocity, push_rate, acceleration, cube_rate, jerk, 0.0)
+    rates, cube_rate = (velocity, push_rate, acceleration), 3.0 * x * x * velocity
+    load, _, friction, _ = ring.held(scene.body, 0.0, rates, cube_rate, jerk, 0.0)
     return -friction, scene.mu_s * load
 
 
 @inlined
 def stuck_gradient(scene, x):
     """Derivatives of :func:`stuck_pull` and :func:`breakaway_force` of a body at rest on the belt by place, N/m."""
-    load, _, friction, _ = ring.held(scene.body, 0.0, 1.0, 0.0, 0.0, 3.0 * x * x, 0.0, 0.0)
+    load, _, friction, _ = ring.held(scene.body, 0.0, (1.0, 0.0, 0.0), 3.0 * x * x, 0.0, 0.0)
     return -friction, scene.mu_s * load
 
 

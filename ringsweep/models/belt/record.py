@@ -467,7 +467,7 @@ def _settles_to(scene, r, t):
     belt_velocity = r.last.velocity - r.last.v
     travel = abs(belt_velocity) * scene.span
     ahead = abs(r.last.x) + travel
-    stiffness = scene.body.mass * abs(ring.acceleration_gradient(scene.body, 0.0, 0.0, ahead, 0.0, 0.0)[0])
+    stiffness = scene.body.mass * abs(ring.acceleration_gradient(scene.body, 0.0, 0.0, (ahead, 0.0, 0.0))[0])
     loads = stiffness * travel > _ROUNDING * 1e-3 * breakaway_force(scene, r.last.x)
     if forced:
         # In stick the body may creep, but the belt does not carry it away.

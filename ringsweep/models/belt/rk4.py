@@ -29,7 +29,7 @@ class Inspection(NamedTuple):
         Derivative of the acceleration by the velocity through the friction coefficient, 1/s.
     by_place, by_velocity : float
         Derivatives of the acceleration by displacement and velocity at a constant friction coefficient.
-    at : tuple of float
+    motion : tuple of float
         Displacement, m, given force, N, and velocity, m/s.
     force : float
         Friction force, N.
@@ -45,7 +45,7 @@ class Inspection(NamedTuple):
     slope: float
     by_place: float
     by_velocity: float
-    at: tuple[float, float, float]
+    motion: tuple[float, float, float]
     force: float
     place: float
 
@@ -57,22 +57,22 @@ def _initial_state(scene):
 
 @constant_step.rates.implements(belt.Belt)
 def _rates(scene, now, y, forcing):
-    K, _, _, at = sliding(scene, y[0], y[1], y[1] - forcing[1], forcing)
-    return y[1], ring.acceleration(scene.body, K, K, *at)[0]
+    K, _, _, motion = sliding(scene, y[0], y[1], y[1] - forcing[1], forcing)
+    return y[1], ring.acceleration(scene.body, K, K, motion)[0]
 
 
 @constant_step.inspect.implements(belt.Belt)
 def _inspect(scene, y, forcing):
     body, v = scene.body, y[1] - forcing[1]
-    K, slope, viscous, at = sliding(scene, y[0], y[1], v, forcing)
-    acceleration, determinant = ring.acceleration(body, K, K, *at)
-    normal, _ = ring.reactions(body, K, K, *at)
-    slope = ring.acceleration_slope(body, K, K, slope, slope, *at)
-    by_place, by_velocity, by_force = ring.acceleration_gradient(body, K, K, *at)
+    K, slope, viscous, motion = sliding(scene, y[0], y[1], v, forcing)
+    acceleration, determinant = ring.acceleration(body, K, K, motion)
+    normal, _ = ring.reactions(body, K, K, motion)
+    slope = ring.acceleration_slope(body, K, K, slope, slope, motion)
+    by_place, by_velocity, by_force = ring.acceleration_gradient(body, K, K, motion)
     by_velocity = by_velocity - viscous * by_force
     friction = if_force(body, viscous * v - K * normal, -K * normal)
     place, rates = y[0] - forcing[0], (y[1], acceleration)
-    return Inspection(rates, v, normal, normal, determinant, slope, by_place, by_velocity, at, friction, place)
+    return Inspection(rates, v, normal, normal, determinant, slope, by_place, by_velocity, motion, friction, place)
 
 
 @constant_step.seen.implements(belt.Belt, belt.BristleBelt)

@@ -192,7 +192,7 @@ def _friction_term(body, c, k, K, load):
 @_friction_term.implements(*ring.having(belt.OnBelt, "normal_stiffness"))
 def _term_of_friction(body, c, k, K, load):
     c[RATIO, k] = K
-    c[NORMAL, k] = ring.held(body, 1.0 if k == 0 else 0.0, c[X, k], 0.0, 0.0, 0.0, 0.0, 0.0)[0]
+    c[NORMAL, k] = ring.held(body, 1.0 if k == 0 else 0.0, (c[X, k], 0.0, 0.0), 0.0, 0.0, 0.0)[0]
     friction = 0.0
     for j in range(k + 1):
         friction += c[RATIO, j] * c[NORMAL, k - j]
@@ -242,8 +242,8 @@ def _expand(scene, mode, t, y, tolerance, c):
             c[mode.entry_guard, 0] = 0.0
         # If friction does not drop at breakaway, the slope is zero there: what is computed is rounding.
         if mode.entry_guard == SLOW and low == 0.0 and not yielding:
-            at = c[X, 0], c[PUSH, 0], c[VELOCITY, 0]
-            terms_of_balance = abs(c[FORCE, 0]) + ring.size(body, *at)
+            motion = c[X, 0], c[PUSH, 0], c[VELOCITY, 0]
+            terms_of_balance = abs(c[FORCE, 0]) + ring.size(body, motion)
             if abs(c[V, 1]) <= 1e-12 * terms_of_balance / body.mass:
                 c[SLOW, 1] = 0.0
     # The unit of length is the distance that belt, body or load could move within a natural period of the spring.
@@ -256,8 +256,8 @@ def _expand(scene, mode, t, y, tolerance, c):
     previous = max(abs(c[X, ORDER - 1]) / length, abs(c[V, ORDER - 1]) / speed)
     if mode.sign == 0 or (holds_in_band(scene.law) and mode.region < 0):
         # The guards are forces, whose series may converge more slowly than that of the motion.
-        at = length, largest_force(scene.drive), c[VELOCITY, 0]
-        scale = abs(breakaway_force(scene, c[X, 0])) + ring.size(body, *at) + 1e-300
+        motion = length, largest_force(scene.drive), c[VELOCITY, 0]
+        scale = abs(breakaway_force(scene, c[X, 0])) + ring.size(body, motion) + 1e-300
         last = max(last, abs(c[SLOW, ORDER]) / scale)
         previous = max(previous, abs(c[SLOW, ORDER - 1]) / scale)
     h = step_size(last / tolerance, previous / tolerance)
@@ -267,8 +267,8 @@ def _expand(scene, mode, t, y, tolerance, c):
 @inlined
 def _held_term(body, c, k, one, acceleration):
     """Coefficients `k` of the reaction and of the force that friction must balance; `one` is that of 1."""
-    at = c[X, k], c[PUSH, k], c[VELOCITY, k]
-    c[NORMAL, k], _, friction, _ = ring.held(body, one, *at, _cube_term(body, c, k), acceleration, 0.0)
+    motion = c[X, k], c[PUSH, k], c[VELOCITY, k]
+    c[NORMAL, k], _, friction, _ = ring.held(body, one, motion, _cube_term(body, c, k), acceleration, 0.0)
     return c[NORMAL, k], -friction
 
 
@@ -281,10 +281,10 @@ def _expand_slip(scene, mode, viscous, c):
     body, sign, surfaces = scene.body, float(mode.sign), (scene.mu_s, scene.mu_k)
     x, velocity, v = c[X, 0], c[VELOCITY, 0], c[V, 0]
     (mu,), begun, sharpness = begin_series(scene.law, mode.region, sign * v, surfaces)
-    load, _ = ring.reactions(body, 0.0, 0.0, x, 0.0, velocity)
+    load, _ = ring.reactions(body, 0.0, 0.0, (x, 0.0, velocity))
     friction = _friction_term(body, c, 0, -sign * mu, load)
     force = if_force(body, friction + c[PUSH, 0] - viscous * v, friction)
-    acceleration = ring.driven(body, 1.0, x, 0.0, velocity, _cube_term(body, c, 0), force, force)
+    acceleration = ring.driven(body, 1.0, (x, 0.0, velocity), _cube_term(body, c, 0), force, force)
     c[FORCE, 0], c[ACCELERATION, 0] = if_force(body, viscous * v - friction, -friction), acceleration
     of_law = no_products(scene.law, surfaces)
     first = newest = no_factors(of_law)
@@ -298,7 +298,7 @@ def _expand_slip(scene, mode, viscous, c):
         first = newest if k == 1 else first
         friction = _friction_term(body, c, k, -sign * mu, load)
         force = if_force(body, friction + c[PUSH, k] - viscous * v, friction)
-        acceleration = ring.driven(body, 0.0, x, 0.0, velocity, _cube_term(body, c, k), force, force)
+        acceleration = ring.driven(body, 0.0, (x, 0.0, velocity), _cube_term(body, c, k), force, force)
         c[VELOCITY, k], c[V, k] = velocity, v
         c[FORCE, k], c[ACCELERATION, k] = if_force(body, viscous * v - friction, -friction), acceleration
     return sharpness

@@ -85,8 +85,8 @@ def _jacobian(scene, mode, t, y):
     mu, slope = friction_in(scene.law, mode.region, mode.sign * v, (scene.mu_s, scene.mu_k))
     yields = holds_in_band(scene.law) and mode.region < 0
     viscous = 0.0 if yields else if_force(scene.body, scene.viscous, 0.0)
-    at = x, force_in(scene.drive, forcing) - viscous * v, v + forcing[1]
-    by_place, by_v, _, _ = sliding_slopes(scene, -mode.sign * mu, -slope, viscous, at)
+    motion = x, force_in(scene.drive, forcing) - viscous * v, v + forcing[1]
+    by_place, by_v, _, _ = sliding_slopes(scene, -mode.sign * mu, -slope, viscous, motion)
     return 0.0, 1.0, by_place, by_v
 
 

@@ -63,23 +63,23 @@ def _violation(scene, mode, forcing, y, rates, s, tolerance):
     phi, v = y
     theta, ring_omega, ring_epsilon = forcing
     omega = v / body.radius + ring_omega
-    at = sin(phi), cos(phi), omega
+    motion = sin(phi), cos(phi), omega
     under = _coefficients_at(scene, phi - theta)
     (mu_s1, mu_k1), (mu_s2, mu_k2) = under
     largest = inf if _names_wrong_segment(scene, mode, phi - theta, under) else 0.0
     terms = body.gravity + body.radius * (omega * omega + abs(ring_epsilon))
     speed = body.radius * (1.0 + abs(omega))
     if mode.sign == 0:
-        kappa, reserve, normal_1, normal_2 = contact.stick(body, mu_s1, mu_s2, *at, ring_epsilon)
+        kappa, reserve, normal_1, normal_2 = contact.stick(body, mu_s1, mu_s2, motion, ring_epsilon)
         K1, K2 = -kappa * mu_s1, -kappa * mu_s2
         largest, relaxation = larger(largest, -reserve / (body.mass * terms * REACTION_TOLERANCE * tolerance)), 0.0
     else:
         sign = 1.0 if v > 0.0 else -1.0
         mu_1, mu_2, slope_1, slope_2 = friction_at(scene.law, abs(v), (mu_s1, mu_k1, mu_s2, mu_k2))
         K1, K2 = -sign * mu_1, -sign * mu_2
-        _, determinant = ring.acceleration(body, K1, K2, *at)
-        normal_1, normal_2 = ring.reactions(body, K1, K2, *at)
-        relaxation = body.radius * abs(ring.acceleration_slope(body, K1, K2, slope_1, slope_2, *at))
+        _, determinant = ring.acceleration(body, K1, K2, motion)
+        normal_1, normal_2 = ring.reactions(body, K1, K2, motion)
+        relaxation = body.radius * abs(ring.acceleration_slope(body, K1, K2, slope_1, slope_2, motion))
         if mode.region < 0:
             speed = min(speed, 1e3 * stiction_band(scene.law))
         largest = larger(largest, -mode.sign * v / (tolerance * speed))
@@ -87,13 +87,13 @@ def _violation(scene, mode, forcing, y, rates, s, tolerance):
             largest = inf
     # An error of the velocity changes the acceleration through the slope of friction, and the mean rate over the step.
     scales = (1.0 / s + relaxation) * tolerance * speed, terms, tolerance
-    violation, power = of_balances(scene, (K1, K2), (normal_1, normal_2), at, forcing, rates[1], scales)
+    violation, power = of_balances(scene, (K1, K2), (normal_1, normal_2), motion, forcing, rates[1], scales)
     return larger(largest, violation), power
 
 
 @audit.energy.implements(ring.Ring)
 def _energy(scene, forcing, y):
-    return ring.energy(scene.body, sin(y[0]), cos(y[0]), y[1] / scene.body.radius + forcing[1])
+    return ring.energy(scene.body, (sin(y[0]), cos(y[0]), y[1] / scene.body.radius + forcing[1]))
 
 
 @audit.violation.implements(ring.BristleRing)
@@ -102,7 +102,7 @@ def _bristle_violation(scene, mode, forcing, y, rates, s, tolerance):
     rho, v, z_1, z_2 = y
     theta, ring_omega, ring_epsilon = forcing
     omega = v / body.radius + ring_omega
-    at = sin(rho + theta), cos(rho + theta), omega
+    motion = sin(rho + theta), cos(rho + theta), omega
     under = _coefficients_at(scene, rho)
     (mu_s1, mu_k1), (mu_s2, mu_k2) = under
     largest = inf if _names_wrong_segment(scene, mode, rho, under) else 0.0
@@ -110,16 +110,16 @@ def _bristle_violation(scene, mode, forcing, y, rates, s, tolerance):
     rate_1, rate_v1, rate_z1, traction_1, by_v_1, by_z_1 = bristle(scene.law, mu_s1, mu_k1, v, z_1, sign, mode.region)
     rate_2, rate_v2, rate_z2, traction_2, by_v_2, by_z_2 = bristle(scene.law, mu_s2, mu_k2, v, z_2, sign, mode.region)
     K1, K2 = -traction_1, -traction_2
-    normals = ring.reactions(body, K1, K2, *at)
-    if not ring.acceleration(body, K1, K2, *at)[1] > 0.0:
+    normals = ring.reactions(body, K1, K2, motion)
+    if not ring.acceleration(body, K1, K2, motion)[1] > 0.0:
         largest = inf
     terms = body.gravity + body.radius * (omega * omega + abs(ring_epsilon))
     _, speed, deflection, _, _ = implicit.error_scales(scene, implicit.IMPLICIT_TOLERANCE * tolerance, y)
-    by_v = ring.acceleration_slope(body, K1, K2, -by_v_1, -by_v_2, *at)
-    by_1 = ring.acceleration_slope(body, K1, K2, -by_z_1, 0.0, *at)
-    by_2 = ring.acceleration_slope(body, K1, K2, 0.0, -by_z_2, *at)
+    by_v = ring.acceleration_slope(body, K1, K2, -by_v_1, -by_v_2, motion)
+    by_1 = ring.acceleration_slope(body, K1, K2, -by_z_1, 0.0, motion)
+    by_2 = ring.acceleration_slope(body, K1, K2, 0.0, -by_z_2, motion)
     allowed = speed / s + body.radius * (abs(by_v) * speed + (abs(by_1) + abs(by_2)) * deflection)
-    violation, power = of_balances(scene, (K1, K2), normals, at, forcing, rates[1], (allowed, terms, tolerance))
+    violation, power = of_balances(scene, (K1, K2), normals, motion, forcing, rates[1], (allowed, terms, tolerance))
     for rate, dense_rate, rate_v, rate_z in (
         (rate_1, rates[2], rate_v1, rate_z1),
         (rate_2, rates[3], rate_v2, rate_z2),
@@ -132,7 +132,7 @@ def _bristle_violation(scene, mode, forcing, y, rates, s, tolerance):
 @audit.energy.implements(ring.BristleRing)
 def _bristle_energy(scene, forcing, y):
     phi = y[0] + forcing[0]
-    return ring.energy(scene.body, sin(phi), cos(phi), y[1] / scene.body.radius + forcing[1])
+    return ring.energy(scene.body, (sin(phi), cos(phi), y[1] / scene.body.radius + forcing[1]))
 
 
 # Largest rounding of an angle, rad.

@@ -148,7 +148,7 @@ def _contacts_at(scene, y, forcing):
 def _rates(scene, now, y, forcing):
     _, _, _, contacts = _contacts_at(scene, y, forcing)
     sin_phi, cos_phi = sine_cosine_near(y[0], now.phi, now.sin_phi, now.cos_phi)
-    epsilon, _ = ring.acceleration(scene.body, contacts.K1, contacts.K2, sin_phi, cos_phi, y[1])
+    epsilon, _ = ring.acceleration(scene.body, contacts.K1, contacts.K2, (sin_phi, cos_phi, y[1]))
     return y[1], epsilon, contacts.rates[0], contacts.rates[1]
 
 
@@ -159,24 +159,25 @@ def _inspect(scene, y, forcing):
 
 @constant_step.inspect_next.implements(BristleRing)
 def _inspect_next(scene, before, y, forcing, afresh):
-    at = sine_cosine_carried(y[0], before.phi, before.sin_phi, before.cos_phi, afresh)
-    return _inspection(scene, y, forcing, at)
+    carried = sine_cosine_carried(y[0], before.phi, before.sin_phi, before.cos_phi, afresh)
+    return _inspection(scene, y, forcing, carried)
 
 
 @absorbed
-def _inspection(scene, y, forcing, at):
+def _inspection(scene, y, forcing, sine_and_cosine):
     """Inspection of a state, given sine and cosine of the angle."""
-    (phi, omega, z_1, z_2), (sin_phi, cos_phi) = y, at
+    (phi, omega, z_1, z_2), (sin_phi, cos_phi) = y, sine_and_cosine
+    motion = sin_phi, cos_phi, omega
     b = scene.body
     under, v, sign, now = _contacts_at(scene, y, forcing)
     stuck = _region_guard(scene, under, v, z_1, z_2, sign, BAND) > 0.0
-    epsilon, determinant = ring.acceleration(b, now.K1, now.K2, sin_phi, cos_phi, omega)
-    normal_1, normal_2 = ring.reactions(b, now.K1, now.K2, sin_phi, cos_phi, omega)
-    by_v, by_1, by_2 = _sliding_acceleration_slopes(scene, now, sin_phi, cos_phi, omega)
+    epsilon, determinant = ring.acceleration(b, now.K1, now.K2, motion)
+    normal_1, normal_2 = ring.reactions(b, now.K1, now.K2, motion)
+    by_v, by_1, by_2 = _sliding_acceleration_slopes(scene, now, motion)
     decay = max(-now.rates_z[0], -now.rates_z[1])
     coupling = abs(by_1 * now.rates_v[0]) + abs(by_2 * now.rates_v[1])
     # The body swings even where friction is small.
-    by_phi, by_omega = ring.acceleration_gradient(b, now.K1, now.K2, sin_phi, cos_phi, omega)
+    by_phi, by_omega = ring.acceleration_gradient(b, now.K1, now.K2, motion)
     return Inspection(
         (omega, epsilon, now.rates[0], now.rates[1]),
         normal_1,
@@ -193,13 +194,13 @@ def _inspection(scene, y, forcing, at):
 
 
 @absorbed
-def _sliding_acceleration_slopes(scene, now, sin_phi, cos_phi, omega):
+def _sliding_acceleration_slopes(scene, now, motion):
     """Derivatives of the sliding acceleration by the sliding velocity through friction, and by both deflections."""
     b = scene.body
     v_1, v_2 = now.slopes_v
     z_1, z_2 = now.slopes_z
-    by_K1 = b.radius * ring.acceleration_slope(b, now.K1, now.K2, 1.0, 0.0, sin_phi, cos_phi, omega)
-    by_K2 = b.radius * ring.acceleration_slope(b, now.K1, now.K2, 0.0, 1.0, sin_phi, cos_phi, omega)
+    by_K1 = b.radius * ring.acceleration_slope(b, now.K1, now.K2, 1.0, 0.0, motion)
+    by_K2 = b.radius * ring.acceleration_slope(b, now.K1, now.K2, 0.0, 1.0, motion)
     return by_K1 * v_1 + by_K2 * v_2, by_K1 * z_1, by_K2 * z_2
 
 
@@ -265,7 +266,7 @@ def _initial_mode(scene, t, y):
     if v == 0.0:
         mode = Mode(sign, BAND, place_1, place_2)
         now = _contacts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(sign), BAND)
-        epsilon, _ = ring.acceleration(scene.body, now.K1, now.K2, sin(phi), cos(phi), omega)
+        epsilon, _ = ring.acceleration(scene.body, now.K1, now.K2, (sin(phi), cos(phi), omega))
         sign = 1 if epsilon > ring_epsilon else -1
     place_1, place_2 = places_beyond(scene, place_1, place_2, rho, sign)
     mode = Mode(sign, BAND, place_1, place_2)
@@ -276,31 +277,31 @@ def _initial_mode(scene, t, y):
 
 @inlined
 def _sliding_at(scene, mode, t, y):
-    """K at each contact; sine and cosine of the angle of the body, and its angular velocity."""
+    """K at each contact, and motion: sine and cosine of the angle of the body, and its angular velocity."""
     rho, v, z_1, z_2 = y
     theta, ring_omega, _ = drives.turn(scene.drive, t)
     phi, omega = rho + theta, ring.angular_velocity(scene.body, v, ring_omega)
     now = _contacts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(mode.sign), mode.region)
-    return now.K1, now.K2, sin(phi), cos(phi), omega
+    return now.K1, now.K2, (sin(phi), cos(phi), omega)
 
 
 @inlined
 def _after_jump(scene, mode, t, y):
     """Status after friction may have jumped."""
-    K1, K2, sin_phi, cos_phi, omega = _sliding_at(scene, mode, t, y)
-    if isnan(K1 + K2 + sin_phi + omega):
+    K1, K2, motion = _sliding_at(scene, mode, t, y)
+    if isnan(K1 + K2 + motion[0] + motion[2]):
         return BROKEN
-    return ENDS[contact.sliding(scene.body, K1, K2, sin_phi, cos_phi, omega)]
+    return ENDS[contact.sliding(scene.body, K1, K2, motion)]
 
 
 @inlined
 def _status_at_zero_reaction(scene, mode, guard, t, y):
     """Status after a reaction has vanished: jam or separation."""
     body = scene.body
-    K1, K2, sin_phi, cos_phi, omega = _sliding_at(scene, mode, t, y)
-    epsilon, determinant = ring.acceleration(body, K1, K2, sin_phi, cos_phi, omega)
-    normal_1, normal_2 = ring.reactions(body, K1, K2, sin_phi, cos_phi, omega)
-    scale = body.mass * (body.gravity + body.radius * (omega * omega + abs(epsilon)))
+    K1, K2, motion = _sliding_at(scene, mode, t, y)
+    epsilon, determinant = ring.acceleration(body, K1, K2, motion)
+    normal_1, normal_2 = ring.reactions(body, K1, K2, motion)
+    scale = body.mass * (body.gravity + body.radius * (motion[2] * motion[2] + abs(epsilon)))
     # Near a jam the polynomial of a reaction is inaccurate, and may vanish where the reaction does not.
     if (normal_1 if guard == NORMAL_1 else normal_2) > 1e-2 * scale:
         return JAM if not determinant > NEARLY_JAMMED * ring.free_determinant(body) else BROKEN
@@ -310,8 +311,8 @@ def _status_at_zero_reaction(scene, mode, guard, t, y):
 
 @modes.status_when_stalled.implements(BristleRing)
 def _status_when_stalled(scene, mode, t, y):
-    K1, K2, sin_phi, cos_phi, omega = _sliding_at(scene, mode, t, y)
-    _, determinant = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
+    K1, K2, motion = _sliding_at(scene, mode, t, y)
+    _, determinant = ring.acceleration(scene.body, K1, K2, motion)
     return BROKEN if determinant > NEARLY_JAMMED * ring.free_determinant(scene.body) else JAM
 
 
@@ -357,18 +358,19 @@ def _common(scene, mode, forcing, x):
 
 @inlined
 def _in_step(scene, mode, common, forcing, x):
-    """Angle and angular velocity of the body in space, sine and cosine of the angle, and the bristles."""
+    """Angle of the body in space, its motion (sine and cosine of the angle, angular velocity), and the bristles."""
     rho, v, z_1, z_2 = x
     phi, omega = rho + forcing[0], v / scene.body.radius + forcing[1]
     sin_phi, cos_phi = sine_cosine_from(phi, common.phi, common.sin_phi, common.cos_phi)
-    return phi, omega, sin_phi, cos_phi, _contacts(scene, common.under, v, z_1, z_2, float(mode.sign), mode.region)
+    now = _contacts(scene, common.under, v, z_1, z_2, float(mode.sign), mode.region)
+    return phi, (sin_phi, cos_phi, omega), now
 
 
 @implicit.rates.implements(BristleRing)
 def _implicit_rates(scene, mode, common, forcing, x):
     radius = scene.body.radius
-    _, omega, sin_phi, cos_phi, now = _in_step(scene, mode, common, forcing, x)
-    epsilon, _ = ring.acceleration(scene.body, now.K1, now.K2, sin_phi, cos_phi, omega)
+    _, motion, now = _in_step(scene, mode, common, forcing, x)
+    epsilon, _ = ring.acceleration(scene.body, now.K1, now.K2, motion)
     return x[1] / radius, radius * (epsilon - forcing[2]), now.rates[0], now.rates[1]
 
 
@@ -377,10 +379,10 @@ def _linearise(scene, mode, common, t, forcing, x):
     b = scene.body
     radius = b.radius
     _, ring_omega, ring_epsilon = forcing
-    _, omega, sin_phi, cos_phi, now = _in_step(scene, mode, common, forcing, x)
-    epsilon, _ = ring.acceleration(b, now.K1, now.K2, sin_phi, cos_phi, omega)
-    by_phi, by_omega = ring.acceleration_gradient(b, now.K1, now.K2, sin_phi, cos_phi, omega)
-    by_v, by_1, by_2 = _sliding_acceleration_slopes(scene, now, sin_phi, cos_phi, omega)
+    _, motion, now = _in_step(scene, mode, common, forcing, x)
+    epsilon, _ = ring.acceleration(b, now.K1, now.K2, motion)
+    by_phi, by_omega = ring.acceleration_gradient(b, now.K1, now.K2, motion)
+    by_v, by_1, by_2 = _sliding_acceleration_slopes(scene, now, motion)
     by_time = radius * (by_phi * ring_omega + by_omega * ring_epsilon - drives.jerk(scene.drive, t))
     return (
         (x[1] / radius, radius * (epsilon - ring_epsilon), now.rates[0], now.rates[1]),
@@ -404,9 +406,9 @@ def _error_scales(scene, tolerance, x):
 def _guards_and_motion(scene, mode, common, forcing, x):
     rho, v, z_1, z_2 = x
     b, sign = scene.body, float(mode.sign)
-    phi, omega, sin_phi, cos_phi, now = _in_step(scene, mode, common, forcing, x)
-    epsilon, determinant = ring.acceleration(b, now.K1, now.K2, sin_phi, cos_phi, omega)
-    normal_1, normal_2 = ring.reactions(b, now.K1, now.K2, sin_phi, cos_phi, omega)
+    phi, motion, now = _in_step(scene, mode, common, forcing, x)
+    epsilon, determinant = ring.acceleration(b, now.K1, now.K2, motion)
+    normal_1, normal_2 = ring.reactions(b, now.K1, now.K2, motion)
     ahead_1, ahead_2 = edges_ahead(scene, mode, rho)
     guards = (
         determinant,
@@ -416,7 +418,7 @@ def _guards_and_motion(scene, mode, common, forcing, x):
         min(ahead_1, ahead_2),
         _region_guard(scene, common.under, v, z_1, z_2, sign, mode.region),
     )
-    return guards, (phi, omega, epsilon, forcing[1], z_1, z_2)
+    return guards, (phi, motion[2], epsilon, forcing[1], z_1, z_2)
 
 
 @implicit.seen.implements(BristleRing)

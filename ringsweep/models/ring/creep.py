@@ -58,16 +58,16 @@ def _friction(scene, mode, common, v):
 
 @inlined
 def _in_space(common, forcing, x):
-    """Angle and angular velocity of the body in space, and sine and cosine of the angle."""
+    """Angle of the body in space, and its motion: sine and cosine of the angle, and angular velocity."""
     phi, omega = x[0] + forcing[0], x[1] * common.per_radius + forcing[1]
     # The drive turns the body by more than it creeps. A stage depends on the stage before by the creep alone, so the
     # processor can compute this turn ahead.
     sin_phi, cos_phi = sine_cosine_from(common.rho + forcing[0], common.phi, common.sin_phi, common.cos_phi)
     crept = x[0] - common.rho
     if not abs(crept) < ROTATED:
-        return phi, omega, sin(phi), cos(phi)
+        return phi, (sin(phi), cos(phi), omega)
     sin_phi, cos_phi = rotated(sin_phi, cos_phi, crept)
-    return phi, omega, sin_phi, cos_phi
+    return phi, (sin_phi, cos_phi, omega)
 
 
 @implicit.is_stiff.implements(ring.Ring)
@@ -87,9 +87,9 @@ def _error_scales(scene, tolerance, x):
 @implicit.rates.implements(ring.Ring)
 def _rates(scene, mode, common, forcing, x):
     radius = scene.body.radius
-    _, omega, sin_phi, cos_phi = _in_space(common, forcing, x)
+    _, motion = _in_space(common, forcing, x)
     K1, K2, _, _ = _friction(scene, mode, common, x[1])
-    epsilon, _ = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
+    epsilon, _ = ring.acceleration(scene.body, K1, K2, motion)
     return x[1] * common.per_radius, radius * (epsilon - forcing[2])
 
 
@@ -98,11 +98,11 @@ def _linearise(scene, mode, common, t, forcing, x):
     b = scene.body
     radius = b.radius
     _, ring_omega, ring_epsilon = forcing
-    _, omega, sin_phi, cos_phi = _in_space(common, forcing, x)
+    _, motion = _in_space(common, forcing, x)
     K1, K2, slope_1, slope_2 = _friction(scene, mode, common, x[1])
-    epsilon, _ = ring.acceleration(b, K1, K2, sin_phi, cos_phi, omega)
-    by_phi, by_omega = ring.acceleration_gradient(b, K1, K2, sin_phi, cos_phi, omega)
-    by_v = ring.acceleration_slope(b, K1, K2, slope_1, slope_2, sin_phi, cos_phi, omega)
+    epsilon, _ = ring.acceleration(b, K1, K2, motion)
+    by_phi, by_omega = ring.acceleration_gradient(b, K1, K2, motion)
+    by_v = ring.acceleration_slope(b, K1, K2, slope_1, slope_2, motion)
     jerk = drives.jerk(scene.drive, t)
     return (
         (x[1] * common.per_radius, radius * (epsilon - ring_epsilon)),
@@ -114,10 +114,10 @@ def _linearise(scene, mode, common, t, forcing, x):
 
 @implicit.guards_and_motion.implements(ring.Ring)
 def _guards_and_motion(scene, mode, common, forcing, x):
-    phi, omega, sin_phi, cos_phi = _in_space(common, forcing, x)
+    phi, motion = _in_space(common, forcing, x)
     K1, K2, _, _ = _friction(scene, mode, common, x[1])
-    epsilon, determinant = ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)
-    normal_1, normal_2 = ring.reactions(scene.body, K1, K2, sin_phi, cos_phi, omega)
+    epsilon, determinant = ring.acceleration(scene.body, K1, K2, motion)
+    normal_1, normal_2 = ring.reactions(scene.body, K1, K2, motion)
     ahead_1, ahead_2 = edges_ahead(scene, mode, x[0])
     low, high = region_bounds(scene.law, mode.region)
     speed = mode.sign * x[1]
@@ -129,7 +129,7 @@ def _guards_and_motion(scene, mode, common, forcing, x):
         min(ahead_1, ahead_2),
         high - speed,
     )
-    return guards, (phi, omega, epsilon, forcing[1])
+    return guards, (phi, motion[2], epsilon, forcing[1])
 
 
 @implicit.near_zero.implements(ring.Ring, ring.BristleRing)

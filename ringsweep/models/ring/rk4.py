@@ -32,7 +32,7 @@ class Inspection(NamedTuple):
         Derivatives of the angular acceleration by angle and angular velocity at constant friction coefficients.
     phi : float
         Angle of the body.
-    at : tuple of float
+    motion : tuple of float
         Sine and cosine of the angle, and angular velocity of the body.
     """
 
@@ -45,7 +45,7 @@ class Inspection(NamedTuple):
     by_place: float
     by_velocity: float
     phi: float
-    at: tuple[float, float, float]
+    motion: tuple[float, float, float]
 
 
 @constant_step.initial_state.implements(ring.Ring)
@@ -57,8 +57,8 @@ def _initial_state(scene):
 def _rates(scene, now, y, forcing):
     phi, omega = y
     _, K1, K2, _, _ = ring.friction(scene, phi, omega, forcing[0], forcing[1])
-    sin_phi, cos_phi = sine_cosine_near(phi, now.phi, now.at[0], now.at[1])
-    return omega, ring.acceleration(scene.body, K1, K2, sin_phi, cos_phi, omega)[0]
+    sin_phi, cos_phi = sine_cosine_near(phi, now.phi, now.motion[0], now.motion[1])
+    return omega, ring.acceleration(scene.body, K1, K2, (sin_phi, cos_phi, omega))[0]
 
 
 @constant_step.inspect.implements(ring.Ring)
@@ -68,20 +68,20 @@ def _inspect(scene, y, forcing):
 
 @constant_step.inspect_next.implements(ring.Ring)
 def _inspect_next(scene, before, y, forcing, afresh):
-    at = sine_cosine_carried(y[0], before.phi, before.at[0], before.at[1], afresh)
-    return _inspection(scene, y, forcing, at)
+    carried = sine_cosine_carried(y[0], before.phi, before.motion[0], before.motion[1], afresh)
+    return _inspection(scene, y, forcing, carried)
 
 
 @absorbed
-def _inspection(scene, y, forcing, at):
+def _inspection(scene, y, forcing, sine_and_cosine):
     """Inspection of a state, given sine and cosine of the angle."""
-    (phi, omega), at = y, (*at, y[1])
+    (phi, omega), motion = y, (*sine_and_cosine, y[1])
     v, K1, K2, slope_1, slope_2 = ring.friction(scene, phi, omega, forcing[0], forcing[1])
-    epsilon, determinant = ring.acceleration(scene.body, K1, K2, *at)
-    normal_1, normal_2 = ring.reactions(scene.body, K1, K2, *at)
-    slope = ring.acceleration_slope(scene.body, K1, K2, slope_1, slope_2, *at)
-    by_phi, by_omega = ring.acceleration_gradient(scene.body, K1, K2, *at)
-    return Inspection((omega, epsilon), v, normal_1, normal_2, determinant, slope, by_phi, by_omega, phi, at)
+    epsilon, determinant = ring.acceleration(scene.body, K1, K2, motion)
+    normal_1, normal_2 = ring.reactions(scene.body, K1, K2, motion)
+    slope = ring.acceleration_slope(scene.body, K1, K2, slope_1, slope_2, motion)
+    by_phi, by_omega = ring.acceleration_gradient(scene.body, K1, K2, motion)
+    return Inspection((omega, epsilon), v, normal_1, normal_2, determinant, slope, by_phi, by_omega, phi, motion)
 
 
 @constant_step.arc_share.implements(ring.Ring, ring.BristleRing)

@@ -171,7 +171,7 @@ def _initial_mode(scene, t, y):
     region, entry_guard = region_at(scene.law, abs(v)), -1
     if v == 0.0:
         # Friction is zero here, so that the body slides in the direction in which the other forces accelerate it.
-        epsilon, _ = ring.acceleration(scene.body, 0.0, 0.0, sin(phi), cos(phi), ring_omega)
+        epsilon, _ = ring.acceleration(scene.body, 0.0, 0.0, (sin(phi), cos(phi), ring_omega))
         sign, entry_guard = (1 if epsilon >= ring_epsilon else -1), SLOW
     mode = Mode(sign, region, entry_guard, *places_beyond(scene, place_1, place_2, phi - theta, sign))
     return _status_at_start(scene.drive, scene, mode, t, y), mode
@@ -226,14 +226,14 @@ def _mode_at_rest(scene, t, phi, place_1, place_2, stick_end):
     backward = Mode(-1, region, SLOW, *places_beyond(scene, place_1, place_2, phi - theta, -1))
     mu_s1, _, mu_s2, _ = coefficients_under(scene, stick)
     breakaway = _at_breakaway(scene, forward), _at_breakaway(scene, backward)
-    motion = sin(phi), cos(phi), ring_omega, ring_epsilon
-    found = contact.at_rest(scene.body, (mu_s1, mu_s2), *breakaway, *motion, stick_end)
+    problem = *breakaway, (sin(phi), cos(phi), ring_omega), ring_epsilon
+    found = contact.at_rest(scene.body, (mu_s1, mu_s2), *problem, stick_end)
     if found == contact.IMPOSSIBLE:
         # A contact on an edge may belong to either side.
         for slip in (forward, backward):
             mu_s1, _, mu_s2, _ = coefficients_under(scene, slip)
             on_edge = slip.place_1 != place_1 or slip.place_2 != place_2
-            if on_edge and contact.at_rest(scene.body, (mu_s1, mu_s2), *breakaway, *motion, 0) == contact.STICK:
+            if on_edge and contact.at_rest(scene.body, (mu_s1, mu_s2), *problem, 0) == contact.STICK:
                 return RUNNING, Mode(0, KINETIC, -1, slip.place_1, slip.place_2)
     if found == contact.FORWARD:
         return RUNNING, forward
@@ -251,7 +251,7 @@ def _after_jump(scene, mode, t, y):
     K1, K2, omega = _friction_at(scene, mode, t, v)
     if isnan(phi + omega + K1 + K2):
         return BROKEN
-    return ENDS[contact.sliding(scene.body, K1, K2, sin(phi), cos(phi), omega)]
+    return ENDS[contact.sliding(scene.body, K1, K2, (sin(phi), cos(phi), omega))]
 
 
 @inlined
@@ -267,8 +267,9 @@ def _sliding_at(scene, mode, t, y):
     phi, v = y
     body = scene.body
     K1, K2, omega = _friction_at(scene, mode, t, v)
-    epsilon, determinant = ring.acceleration(body, K1, K2, sin(phi), cos(phi), omega)
-    normal_1, normal_2 = ring.reactions(body, K1, K2, sin(phi), cos(phi), omega)
+    motion = sin(phi), cos(phi), omega
+    epsilon, determinant = ring.acceleration(body, K1, K2, motion)
+    normal_1, normal_2 = ring.reactions(body, K1, K2, motion)
     scale = body.mass * (body.gravity + body.radius * (omega * omega + abs(epsilon)))
     return determinant, normal_1, normal_2, scale
 
@@ -290,9 +291,8 @@ def _after_zero_reaction(scene, mode, guard, t, y):
         # still hold the body at this instant.
         _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
         mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
-        _, _, normal_1, normal_2 = contact.stick(
-            scene.body, mu_s1, mu_s2, sin(y[0]), cos(y[0]), ring_omega, ring_epsilon
-        )
+        motion = sin(y[0]), cos(y[0]), ring_omega
+        _, _, normal_1, normal_2 = contact.stick(scene.body, mu_s1, mu_s2, motion, ring_epsilon)
         scale = scene.body.mass * (scene.body.gravity + scene.body.radius * ring_omega * ring_omega)
     else:
         _, normal_1, normal_2, scale = _sliding_at(scene, mode, t, y)
@@ -310,7 +310,7 @@ def _status_when_stalled(scene, mode, t, y):
         return BROKEN
     # Where friction changes fast with the speed, the determinant does not show the jam: test with static coefficients.
     mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
-    _, determinant = ring.acceleration(scene.body, -mode.sign * mu_s1, -mode.sign * mu_s2, 0.0, 1.0, 0.0)
+    _, determinant = ring.acceleration(scene.body, -mode.sign * mu_s1, -mode.sign * mu_s2, (0.0, 1.0, 0.0))
     return JAM if _is_jamming(scene, mode, t, y) or not determinant > 0.0 else BROKEN
 
 
@@ -507,13 +507,14 @@ def _expand_reserve(body, m1, m2, c):
     NORMAL_1, NORMAL_2; the reserves of friction, N, before forward slip (SLOW) and before backward slip (FAST). For two
     contacts also EDGE, the discriminant of the quadratic equation; with one contact it stays infinite.
     """
-    _, by_N2, by_F1, by_F2 = ring.held(body, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+    _, by_N2, by_F1, by_F2 = ring.held(body, 0.0, (0.0, 0.0, 0.0), 0.0, 0.0, 1.0)
     first_N2 = first_F1 = first_linear = first_N1 = 0.0
     own = 0.0, 0.0, 0.0, 0.0
     first = newest = no_factors(own)
     for k in range(ORDER + 1):
         one = 1.0 if k == 0 else 0.0
-        N1, N2, F1, F2 = ring.held(body, one, c[SIN, k], c[COS, k], c[OMEGA, k], c[SQUARE, k], c[EPSILON, k], 0.0)
+        motion = c[SIN, k], c[COS, k], c[OMEGA, k]
+        N1, N2, F1, F2 = ring.held(body, one, motion, c[SQUARE, k], c[EPSILON, k], 0.0)
         friction, capacity = F1, m1 * N1
         if ring.contact_count(body) == 2:
             square, linear, _ = contact.sharing(m1, m2, (N2, F1, F2), (by_N2, by_F1, by_F2))

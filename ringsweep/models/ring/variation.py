@@ -95,5 +95,5 @@ def _gradient_of_reserve(scene, mode, t, phi):
 @inlined
 def _reserve(scene, mode, phi, omega, epsilon):
     mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
-    _, reserve, _, _ = contact.stick(scene.body, mu_s1, mu_s2, sin(phi), cos(phi), omega, epsilon)
+    _, reserve, _, _ = contact.stick(scene.body, mu_s1, mu_s2, (sin(phi), cos(phi), omega), epsilon)
     return reserve
