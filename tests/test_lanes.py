@@ -216,11 +216,12 @@ def family(cells, model="ring", law="bengisu-akay", count=40):
 
 
 @kernel
-def _serial(batch, launches, table, steps, h, rows, report):
+def _serial(batch, launches, table, stretch, results):
     """Outcomes of all cells by floats, one by one; `table` holds the drive for the whole span."""
-    for cell in range(len(rows)):
+    _, steps, h = stretch
+    for cell in range(len(results.rows)):
         scene = take(batch, cell)
-        y, now, record, diagnosis, _ = rk4._initial_run(batch, launches, cell, table)
+        y, now, record, diagnosis, live = rk4._initial_run(batch, launches, cell, table)
         status, fraction = constant_step.verdict(scene, now, now)
         k, t, fall_rate = 0, 0.0, 0.0
         while status == RUNNING and k < steps:
@@ -239,24 +240,24 @@ def _serial(batch, launches, table, steps, h, rows, report):
             y, now, k = y_next, after, k + 1
         if status == RUNNING:
             status, t = COMPLETE, scene.span
-        rk4._conclude(scene, record, status, t, y, float(k), diagnosis, fall_rate, h, cell, rows, report)
+        run, end = rk4._Run(y, now, record, diagnosis, live), rk4._End(status, t, float(k), fall_rate)
+        rk4._conclude(scene, run, end, h, cell, results)
 
 
 def integrate(batch, steps, names, *, order=None, serial=False):
     """Outcomes of the cells of a batch, side by side in a given order, or one by one."""
     cells, drive = len(batch.span), take(batch.drive, 0)
     order = np.arange(cells) if order is None else order
-    rows, report = np.empty((cells, len(names))), np.empty((cells, 5))
+    results = rk4.Results(np.empty((cells, len(names))), np.empty((cells, 5)))
     scenes, launches = rk4.prepare(batch)
     if serial:
-        h = float(batch.span[0]) / steps
-        table = np.empty((2 * steps + 1, 2))
-        rk4._tabulate(table, drive, 0, steps, h)
-        _serial(scenes, launches, table, steps, h, rows, report)
+        table, stretch = np.empty((2 * steps + 1, 2)), rk4._Stretch(0, steps, float(batch.span[0]) / steps)
+        rk4._tabulate(table, drive, stretch)
+        _serial(scenes, launches, table, stretch, results)
     else:
-        rk4.integrate(rk4.Diagnosed(), scenes, launches, drive, order, steps, rows, report)
-    columns = zip(("steps", "stiffness", "slack", "fall", "stride"), report.T, strict=True)
-    return dict(zip(names, rows.T, strict=True)) | dict(columns)
+        rk4.integrate(rk4.Diagnosed(), scenes, launches, drive, order, steps, results)
+    columns = zip(("steps", "stiffness", "slack", "fall", "stride"), results.report.T, strict=True)
+    return dict(zip(names, results.rows.T, strict=True)) | dict(columns)
 
 
 class TestEachLane:

@@ -155,13 +155,12 @@ class RK4(Method):
     def _integrate(
         self, batch: Any, cells: NDArray[np.intp], steps: int, width: int
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        rows = np.empty((len(batch.span), width))
-        report = np.empty((len(batch.span), 5))
+        results = Results(np.empty((len(batch.span), width)), np.empty((len(batch.span), 5)))
         diagnosed = Diagnosed() if self.diagnose else NotDiagnosed()
         scenes, launches = prepare(batch)
         for group in _groups_by_drive(batch, cells):
-            integrate(diagnosed, scenes, launches, take(batch.drive, group[0]), group, steps, rows, report)
-        return rows[cells], report[cells]
+            integrate(diagnosed, scenes, launches, take(batch.drive, group[0]), group, steps, results)
+        return results.rows[cells], results.report[cells]
 
     def history(self, batch: Any, samples: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Times and rows of the history of cell 0; see :meth:`ringsweep.solvers.method.Method.history`."""
@@ -219,6 +218,57 @@ def _diagnose_nothing(diagnosed, scene, diagnosis, before, now, h):
     return diagnosis
 
 
+class Results(NamedTuple):
+    """Arrays that the runs of a batch fill.
+
+    Attributes
+    ----------
+    rows : ndarray of shape ``(cells, outcomes)``
+        Outcomes.
+    report : ndarray of shape ``(cells, 5)``
+        Number of steps, largest stiffness, least margin, rate at which the guard that ended the run fell, and largest
+        share of a zone.
+    """
+
+    rows: Any
+    report: Any
+
+
+class _Buffers(NamedTuple):
+    """What kernels work in.
+
+    Attributes
+    ----------
+    table : ndarray
+        Shape of the drive and its rate, at whole and half steps; see :func:`_fill`.
+    memory : ndarray of shape ``(blocks of runs, numbers of a scene and a run, WIDTH)``
+        Runs side by side.
+    occupants : ndarray of int
+        Cells whose runs are stored there, in order.
+    """
+
+    table: Any
+    memory: Any
+    occupants: Any
+
+
+class _Stretch(NamedTuple):
+    """Steps for which the table of the drive is filled: index of the first one, their number, and their length, s."""
+
+    first: int
+    steps: int
+    h: float
+
+
+class _Block(NamedTuple):
+    """Runs side by side: the memory, flat, and where they begin there; their cells; and an example of a run."""
+
+    memory: Any
+    at: int
+    cells: Any
+    sample: Any
+
+
 class _Run(NamedTuple):
     """A run, or several runs side by side: state, inspection, record, diagnosis, and whether the run goes on."""
 
@@ -227,6 +277,15 @@ class _Run(NamedTuple):
     record: Any
     diagnosis: Any
     live: Any
+
+
+class _End(NamedTuple):
+    """End of a run: status, time, s, steps taken, and rate at which the guard that ended it fell."""
+
+    status: int
+    t: float
+    steps: float
+    fall_rate: float
 
 
 @inlined
@@ -239,9 +298,9 @@ def _fill(table, drive, first, steps, h):
 
 
 @kernel
-def _tabulate(table, drive, first, steps, h):
+def _tabulate(table, drive, stretch):
     """Fill `table` for all runs; see :func:`_fill`."""
-    _fill(table, drive, first, steps, h)
+    _fill(table, drive, stretch.first, stretch.steps, stretch.h)
 
 
 @absorbed
@@ -268,16 +327,16 @@ def _hermite(y, rate, y_next, rate_next, h, x):
 
 
 @inlined
-def _advance(diagnosed, batch, memory, at, occupants, sample, table, first, k, steps, h):
-    """Advance runs side by side from step `k` to the end of a block of steps, or to a step in which a run ends.
+def _advance(diagnosed, batch, block, table, stretch, k):
+    """Advance runs side by side from step `k` to the end of a stretch, or to a step in which a run ends.
 
     Returns the index of the first step that was not taken.
     """
     align_stack()
-    one = take(batch, occupants[0])
-    runs_at = at + WIDTH * size_of(one)
-    scene = read_lanes(memory, at, one)
-    y, now, record, diagnosis, live = read_lanes(memory, runs_at, sample)
+    one, (first, steps, h) = take(batch, block.cells[0]), stretch
+    runs_at = block.at + WIDTH * size_of(one)
+    scene = read_lanes(block.memory, block.at, one)
+    y, now, record, diagnosis, live = read_lanes(block.memory, runs_at, block.sample)
     while k < steps:
         y_next = _step(scene, y, now, table, 2 * k, h)
         forcing = lookup(scene.drive, table, 2 * k + 2)
@@ -292,18 +351,19 @@ def _advance(diagnosed, batch, memory, at, occupants, sample, table, first, k, s
         record = conform(recorder.observe(scene, record, (first + k + 1) * h, h, stuck, seen), record)
         y, now, live = y_next, after, abs(live)
         k += 1
-    write(memory, runs_at, WIDTH, _Run(y, now, record, diagnosis, live))
+    write(block.memory, runs_at, WIDTH, _Run(y, now, record, diagnosis, live))
     return k
 
 
 @inlined
-def _finish_ended(diagnosed, batch, memory, at, occupants, sample, table, first, k, h, rows, report):
-    """Finish the runs that end in a step, one by one with floats; return the number of runs that go on."""
+def _finish_ended(diagnosed, batch, block, table, stretch, k, results):
+    """Finish the runs that end in step `k`, one by one with floats; return the number of runs that go on."""
+    first, _, h = stretch
     running = 0
-    for lane in range(len(occupants)):
-        scene = take(batch, occupants[lane])
-        start = at + WIDTH * size_of(scene) + lane
-        run = read(memory, start, WIDTH, sample)
+    for lane in range(len(block.cells)):
+        scene = take(batch, block.cells[lane])
+        start = block.at + WIDTH * size_of(scene) + lane
+        run = read(block.memory, start, WIDTH, block.sample)
         live = run.live
         if live == ENDING:
             y_next = _step(scene, run.y, run.now, table, 2 * k, h)
@@ -320,35 +380,23 @@ def _finish_ended(diagnosed, batch, memory, at, occupants, sample, table, first,
                 record = recorder.observe(scene, run.record, t, fraction * h, stuck, seen)
                 # The margin does not cover the contact that separates in this step.
                 diagnosis = Diagnosis(diagnosis.eigenvalue, run.diagnosis.margin, diagnosis.arc_share)
-                fall_rate = constant_step.fall_rate(scene, run.now, after, h)
-                _conclude(
-                    scene,
-                    record,
-                    status,
-                    t,
-                    y_end,
-                    first + k + 1.0,
-                    diagnosis,
-                    fall_rate,
-                    h,
-                    occupants[lane],
-                    rows,
-                    report,
-                )
-            write(memory, start, WIDTH, _Run(run.y, run.now, run.record, run.diagnosis, live))
+                end = _End(status, t, first + k + 1.0, constant_step.fall_rate(scene, run.now, after, h))
+                _conclude(scene, _Run(y_end, after, record, diagnosis, live), end, h, block.cells[lane], results)
+            write(block.memory, start, WIDTH, _Run(run.y, run.now, run.record, run.diagnosis, live))
         running += int(live != FINISHED)
     return running
 
 
 @inlined
-def _conclude(scene, record, status, t, y, steps, diagnosis, fall_rate, h, cell, rows, report):
+def _conclude(scene, run, end, h, cell, results):
     """Store outcome and report of a run."""
-    outcome = recorder.conclude(scene, record, status, t, y[0], y[1])
+    outcome = recorder.conclude(scene, run.record, end.status, end.t, run.y[0], run.y[1])
+    rows, report, diagnosis = results.rows, results.report, run.diagnosis
     for column in range(len(outcome)):
         rows[cell, column] = outcome[column]
-    recorder.keep_memory(scene, rows[cell], len(outcome), y)
-    report[cell, 0], report[cell, 1], report[cell, 2] = steps, diagnosis.eigenvalue * h, diagnosis.margin
-    report[cell, 3], report[cell, 4] = fall_rate, diagnosis.arc_share
+    recorder.keep_memory(scene, rows[cell], len(outcome), run.y)
+    report[cell, 0], report[cell, 1], report[cell, 2] = end.steps, diagnosis.eigenvalue * h, diagnosis.margin
+    report[cell, 3], report[cell, 4] = end.fall_rate, diagnosis.arc_share
 
 
 def prepare(batch: Any) -> tuple[Any, Any]:
@@ -375,14 +423,7 @@ def _launch(batch, launches):
 
 
 def integrate(
-    diagnosed: Any,
-    batch: Any,
-    launches: Any,
-    drive: Any,
-    cells: NDArray[np.intp],
-    steps: int,
-    rows: NDArray[np.float64],
-    report: NDArray[np.float64],
+    diagnosed: Any, batch: Any, launches: Any, drive: Any, cells: NDArray[np.intp], steps: int, results: Results
 ) -> None:
     """Run the given cells of a batch, which have the same span and the same drive but for its amplitude.
 
@@ -398,34 +439,31 @@ def integrate(
         Indices of the cells.
     steps : int
         Number of steps over the span.
-    rows : ndarray of shape ``(cells of the batch, outcomes)``
-        Filled, for these cells, with outcomes.
-    report : ndarray of shape ``(cells of the batch, 5)``
-        Filled, for these cells, with the number of steps, the largest stiffness, the least margin, the rate at which
-        the guard that ended the run fell, and the largest share of a zone.
+    results : Results
+        Filled for these cells.
     """
     h = float(batch.batch.span[cells[0]]) / steps
     table = np.empty((2 * min(_BLOCK, steps) + 1, len(table_row(drive, 0.0))))
-    _tabulate(table, drive, 0, 0, h)
-    memory, occupants, live = _start(batch, launches, cells, table, rows, report)
+    _tabulate(table, drive, _Stretch(0, 0, h))
+    memory, occupants, live = _start(batch, launches, cells, table, results)
+    buffers = _Buffers(table, memory, occupants)
     for first in range(0, steps, _BLOCK):
         if live == 0:
             return
-        size = min(_BLOCK, steps - first)
-        _tabulate(table, drive, first, size, h)
-        live = _advance_block(diagnosed, batch, launches, memory, occupants, live, table, first, size, h, rows, report)
-    _finish_at_end_of_span(batch, launches, memory, occupants, live, steps, h, rows, report)
+        stretch = _Stretch(first, min(_BLOCK, steps - first), h)
+        _tabulate(table, drive, stretch)
+        live = _advance_block(diagnosed, batch, launches, buffers, live, stretch, results)
+    _finish_at_end_of_span(batch, launches, buffers, live, _Stretch(0, steps, h), results)
 
 
 @kernel
-def _start(batch, launches, cells, table, rows, report):
+def _start(batch, launches, cells, table, results):
     """Store runs in memory, side by side in blocks, and finish the runs that end at t = 0.
 
     Returns
     -------
     tuple
-        Memory of shape ``(blocks, numbers of a scene and a run, runs in a block)``; the cells stored there, in order;
-        the number of runs that go on.
+        Memory and occupants, as in :class:`_Buffers`; the number of runs that go on.
     """
     sample = _initial_run(batch, launches, cells[0], table)
     in_scene = size_of(take(batch, cells[0]))
@@ -439,7 +477,7 @@ def _start(batch, launches, cells, table, rows, report):
         scene, run = take(batch, i), _initial_run(batch, launches, i, table)
         status, _ = constant_step.verdict(scene, run.now, run.now)
         if status != RUNNING:
-            _conclude(scene, run.record, status, 0.0, run.y, 0.0, run.diagnosis, 0.0, 0.0, i, rows, report)
+            _conclude(scene, run, _End(status, 0.0, 0.0, 0.0), 0.0, i, results)
             continue
         at = live // WIDTH * numbers * WIDTH + live % WIDTH
         write(flat_memory, at, WIDTH, scene)
@@ -450,19 +488,20 @@ def _start(batch, launches, cells, table, rows, report):
 
 
 @kernel
-def _advance_block(diagnosed, batch, launches, memory, occupants, live, table, first, steps, h, rows, report):
-    """Advance all runs by a block of steps and close the gaps of finished runs; return the number of other runs."""
+def _advance_block(diagnosed, batch, launches, buffers, live, stretch, results):
+    """Advance all runs by a stretch of steps and close the gaps of finished runs; return the number of other runs."""
+    table, memory, occupants = buffers
     numbers = memory.shape[1]
     flat_memory = memory.reshape(memory.size)
     sample = _initial_run(batch, launches, occupants[0], table)
     for start in range(0, live, WIDTH):
-        at, cells = start * numbers, occupants[start : start + WIDTH]
+        block = _Block(flat_memory, start * numbers, occupants[start : start + WIDTH], sample)
         k, running = 0, WIDTH
         while running > 0:
-            k = _advance(diagnosed, batch, flat_memory, at, cells, sample, table, first, k, steps, h)
-            if k == steps:
+            k = _advance(diagnosed, batch, block, table, stretch, k)
+            if k == stretch.steps:
                 break
-            running = _finish_ended(diagnosed, batch, flat_memory, at, cells, sample, table, first, k, h, rows, report)
+            running = _finish_ended(diagnosed, batch, block, table, stretch, k, results)
     remaining = 0
     for slot in range(live):
         if memory[slot // WIDTH, numbers - 1, slot % WIDTH] != FINISHED:
@@ -478,8 +517,9 @@ def _advance_block(diagnosed, batch, launches, memory, occupants, live, table, f
 
 
 @kernel
-def _finish_at_end_of_span(batch, launches, memory, occupants, live, steps, h, rows, report):
-    """Store the outcomes of the runs that reached the end of the span."""
+def _finish_at_end_of_span(batch, launches, buffers, live, stretch, results):
+    """Store the outcomes of the runs that reached the end of the span; `stretch` are all steps."""
+    _, memory, occupants = buffers
     numbers = memory.shape[1]
     flat_memory = memory.reshape(memory.size)
     sample = _initial_run(batch, launches, occupants[0], np.zeros((1, _MOST_COLUMNS)))
@@ -487,11 +527,9 @@ def _finish_at_end_of_span(batch, launches, memory, occupants, live, steps, h, r
         cell = occupants[slot]
         scene = take(batch, cell)
         at = (slot // WIDTH * numbers + size_of(scene)) * WIDTH + slot % WIDTH
-        run = read(flat_memory, at, WIDTH, sample)
         # The sum of the steps would miss the end of the span by rounding.
-        _conclude(
-            scene, run.record, COMPLETE, scene.span, run.y, float(steps), run.diagnosis, 0.0, h, cell, rows, report
-        )
+        end = _End(COMPLETE, scene.span, float(stretch.steps), 0.0)
+        _conclude(scene, read(flat_memory, at, WIDTH, sample), end, stretch.h, cell, results)
 
 
 @inlined
