@@ -14,7 +14,7 @@ from ringsweep.physics import drives
 from ringsweep.quantities.flags import FAILED, JAMMED, RESTING, SEPARATING
 from ringsweep.solvers import audit as run_audit
 from ringsweep.solvers import event
-from ringsweep.solvers.certificate import errors, with_errors
+from ringsweep.solvers.certificate import TwoRuns, errors, with_errors
 from ringsweep.solvers.event import Auto, Event, Implicit
 from ringsweep.solvers.rk4 import RK4
 
@@ -323,9 +323,8 @@ class TestErrors:
     def test_what_velocities_err_in_each_second_of_angle_is_in_their_bounds(self, cells):
         batch = cells({"time.span": 1.0}, law="stiction", drive="arctan")
         rows = Auto().run(batch, NAMES).rows
-        without, with_rate = (
-            errors(batch, rows, rows, NAMES, safety=1.0, share=0.0, steps=10, rate_floor=rate) for rate in (0.0, 1e-6)
-        )
+        runs = TwoRuns(batch, rows, rows, NAMES)
+        without, with_rate = (errors(runs, safety=1.0, share=0.0, steps=10, rate_floor=rate) for rate in (0.0, 1e-6))
         added = dict(zip(with_errors(NAMES), (with_rate - without)[0], strict=True))
         assert added["omega_end"] == pytest.approx(1e-6, rel=0.5)
         assert added["phi_end"] == 0.0

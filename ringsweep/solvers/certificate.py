@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +62,29 @@ _SHRUNK = 0.2
 _ROUNDING = 1e-15
 
 
+class TwoRuns(NamedTuple):
+    """Two runs of each cell, at different resolutions.
+
+    Attributes
+    ----------
+    batch : NamedTuple
+        Cells.
+    rows, second_rows : ndarray of shape ``(cells, outcomes)``
+        Outcomes of the runs, and of the second runs.
+    outcomes : tuple of str
+        Names of the columns.
+    """
+
+    batch: Any
+    rows: NDArray[np.float64]
+    second_rows: NDArray[np.float64]
+    outcomes: tuple[str, ...]
+
+    def column(self, name: str) -> NDArray[np.float64]:
+        """An outcome of the runs."""
+        return self.rows[:, self.outcomes.index(name)]
+
+
 def agree(rows: NDArray[np.float64], second_rows: NDArray[np.float64], outcomes: tuple[str, ...]) -> NDArray[np.bool_]:
     """Whether two runs of each cell agree on regime, motion and separating contact, and have not failed.
 
@@ -81,30 +104,24 @@ def agree(rows: NDArray[np.float64], second_rows: NDArray[np.float64], outcomes:
     return same & (rows[:, outcomes.index("regime")] != FAILED)
 
 
-def doubts(
-    batch: Any, rows: NDArray[np.float64], second_rows: NDArray[np.float64], fall_rates: Any, outcomes: tuple[str, ...]
-) -> NDArray[np.int8]:
+def doubts(runs: TwoRuns, fall_rates: Any) -> NDArray[np.int8]:
     """What speaks against the certificate of each cell: a failure, disagreement, an error that may change the regime.
 
     Parameters
     ----------
-    batch : NamedTuple
-        Cells.
-    rows, second_rows : ndarray of shape ``(cells, outcomes)``
-        Outcomes of the runs, and of second runs at another resolution.
+    runs : TwoRuns
     fall_rates : ndarray of shape ``(cells,)``
         Rate at which the guard that ended each run fell, in its unit per second.
-    outcomes : tuple of str
-        Names of the columns.
 
     Returns
     -------
     ndarray of int8, shape ``(cells,)``
         Values of :data:`ringsweep.quantities.variables.DOUBTS`; ``CERTIFIED`` where nothing speaks against it.
     """
+    batch, rows, second_rows, outcomes = runs
     needed = [column for column, name in enumerate(outcomes) if name not in _MAY_LACK]
     reasons = [
-        (rows[:, outcomes.index("regime")] == FAILED, NO_RESULT),
+        (runs.column("regime") == FAILED, NO_RESULT),
         (~agree(rows, second_rows, outcomes), ANSWERS_DIFFER),
         (disobeys(batch, rows) | disobeys(batch, second_rows), LAW_NOT_OBEYED),
         (undecided(batch, rows, second_rows, fall_rates), CLOSE_CALL),
@@ -132,54 +149,25 @@ def first_of(reasons: Sequence[tuple[NDArray[np.bool_], Any]], cells: int) -> ND
     return found
 
 
-def took_same_steps(
-    rows: NDArray[np.float64], second_rows: NDArray[np.float64], outcomes: tuple[str, ...]
-) -> NDArray[np.bool_]:
-    """Whether two runs of each cell took the same steps, since they end in the same state.
+def took_same_steps(runs: TwoRuns) -> NDArray[np.bool_]:
+    """Whether both runs of each cell took the same steps, since they end in the same state; of shape ``(cells,)``.
 
     The difference between such runs says nothing about the error. A body that sticks all the time is no such case: the
     drive alone decides its motion.
-
-    Parameters
-    ----------
-    rows, second_rows : ndarray of shape ``(cells, outcomes)``
-        Outcomes of the runs, and of second runs at another resolution.
-    outcomes : tuple of str
-        Names of the columns.
-
-    Returns
-    -------
-    ndarray of bool, shape ``(cells,)``
     """
-    ends = [column for column, name in enumerate(outcomes) if name.endswith("_end")]
-    stuck = rows[:, outcomes.index("stick_time")] == rows[:, outcomes.index("t_end")]
-    a, b = rows[:, ends], second_rows[:, ends]
+    ends = [column for column, name in enumerate(runs.outcomes) if name.endswith("_end")]
+    stuck = runs.column("stick_time") == runs.column("t_end")
+    a, b = runs.rows[:, ends], runs.second_rows[:, ends]
     with np.errstate(invalid="ignore"):
         same = (np.abs(a - b) <= _SAME * (1.0 + np.abs(a))).all(axis=1)
     return np.asarray(same & ~stuck)
 
 
-def apart(
-    batch: Any, rows: NDArray[np.float64], second_rows: NDArray[np.float64], outcomes: tuple[str, ...]
-) -> NDArray[np.float64]:
-    """Largest difference between two runs of each cell in any number, relative to the scale of the number.
-
-    Parameters
-    ----------
-    batch : NamedTuple
-        Cells.
-    rows, second_rows : ndarray of shape ``(cells, outcomes)``
-        Outcomes of the runs, and of second runs at another resolution.
-    outcomes : tuple of str
-        Names of the columns.
-
-    Returns
-    -------
-    ndarray of shape ``(cells,)``
-    """
-    difference, scale = _differences(batch, rows, second_rows, outcomes)
+def apart(runs: TwoRuns) -> NDArray[np.float64]:
+    """Largest difference between both runs of each cell in any number, relative to the scale of the number."""
+    difference, scale = _differences(runs)
     # Laps of other lengths are no measure of divergence.
-    lasting = [k for k, name in enumerate(with_errors(outcomes)) if name != "period"]
+    lasting = [k for k, name in enumerate(with_errors(runs.outcomes)) if name != "period"]
     return _largest(difference[:, lasting], scale[:, lasting])
 
 
@@ -212,16 +200,7 @@ def with_errors(outcomes: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def errors(
-    batch: Any,
-    rows: NDArray[np.float64],
-    second_rows: NDArray[np.float64],
-    outcomes: tuple[str, ...],
-    *,
-    safety: Any,
-    share: float,
-    steps: Any,
-    floor: Any = 0.0,
-    rate_floor: Any = 0.0,
+    runs: TwoRuns, *, safety: Any, share: float, steps: Any, floor: Any = 0.0, rate_floor: Any = 0.0
 ) -> NDArray[np.float64]:
     """Bounds on the errors of runs, from second runs at another resolution.
 
@@ -230,12 +209,7 @@ def errors(
 
     Parameters
     ----------
-    batch : NamedTuple
-        Cells.
-    rows, second_rows : ndarray of shape ``(cells, outcomes)``
-        Outcomes of the runs, and of the second runs.
-    outcomes : tuple of str
-        Names of the columns.
+    runs : TwoRuns
     safety : float or ndarray of shape ``(cells,)``
         Largest error of a run, in units of its difference from the second run.
     share : float
@@ -250,8 +224,8 @@ def errors(
     ndarray of shape ``(cells, len(with_errors(outcomes)))``
         Each in the unit of its outcome; NaN where :func:`agree` is false.
     """
-    names = with_errors(outcomes)
-    difference, scale = _differences(batch, rows, second_rows, outcomes)
+    names = with_errors(runs.outcomes)
+    difference, scale = _differences(runs)
     with np.errstate(invalid="ignore", over="ignore"):
         least = share * _largest(difference, scale)[:, None] * scale
         bound: NDArray[np.float64] = np.atleast_1d(safety)[:, None] * np.maximum(difference, least)
@@ -261,23 +235,21 @@ def errors(
             if unit.endswith(" s-1"):
                 bound[:, k] += rate_floor * scale[:, units.index(unit.removesuffix(" s-1"))]
     # A run that reaches the end of the span has an exact time of its end.
-    reached = rows[:, outcomes.index("regime")] == rows[:, outcomes.index("motion")]
+    reached = runs.column("regime") == runs.column("motion")
     bound[reached & (difference[:, names.index("t_end")] == 0.0), names.index("t_end")] = 0.0
-    bound[~agree(rows, second_rows, outcomes)] = np.nan
+    bound[~agree(*runs[1:])] = np.nan
     return bound
 
 
-def _differences(
-    batch: Any, rows: NDArray[np.float64], second_rows: NDArray[np.float64], outcomes: tuple[str, ...]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Differences between two runs of each cell, and the scale of each number."""
-    names = with_errors(outcomes)
-    columns = [outcomes.index(name) for name in names]
-    a = rows[:, columns]
+def _differences(runs: TwoRuns) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Differences between both runs of each cell, and the scale of each number."""
+    names = with_errors(runs.outcomes)
+    columns = [runs.outcomes.index(name) for name in names]
+    a = runs.rows[:, columns]
     with np.errstate(invalid="ignore", over="ignore"):
-        difference = np.abs(a - second_rows[:, columns])
+        difference = np.abs(a - runs.second_rows[:, columns])
     units = np.array([OUTCOMES[name].units for name in names])
-    scale, own_scales = np.empty_like(a), least_scales(batch)
+    scale, own_scales = np.empty_like(a), least_scales(runs.batch)
     for unit in set(units.tolist()):
         of_unit = units == unit
         largest = np.nanmax(np.abs(a[:, of_unit]), axis=1, initial=0.0)

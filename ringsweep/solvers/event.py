@@ -19,7 +19,16 @@ from ringsweep.physics.friction import LAWS, Dynamic, SetValued, Smooth, family_
 from ringsweep.quantities.flags import CERTIFIED, DIVERGES, FAILED, LAW_NOT_OBEYED, NO_RESULT, NOT_ASKED, SAME_STEPS
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.solvers.automaton import FACTOR, PATIENCE, History, LocalErrors, Results, integrate
-from ringsweep.solvers.certificate import apart, diverging, doubts, errors, first_of, took_same_steps, with_errors
+from ringsweep.solvers.certificate import (
+    TwoRuns,
+    apart,
+    diverging,
+    doubts,
+    errors,
+    first_of,
+    took_same_steps,
+    with_errors,
+)
 from ringsweep.solvers.method import Method, Needs, Result
 
 LIMIT = Parameter("1", "steps after which a run is given up as failed", lower=1, upper=1e10)
@@ -116,18 +125,18 @@ class _Piecewise(Method):
         second_rows, more_steps, _ = self.integrate(
             audit.disturbed(_select(batch, open_cells)), len(outcomes), audit=False, tolerances=looser
         )
-        new_rows, new_steps, audits = rows[open_cells], steps[open_cells], audits[open_cells]
+        new = Results(rows[open_cells], steps[open_cells], audits[open_cells])
         for retry in range(_MOST_RETRIES + 1):
-            cells = _select(batch, open_cells)
+            runs = TwoRuns(_select(batch, open_cells), new.rows, second_rows, outcomes)
             because[open_cells], bounds[open_cells], distance[open_cells], may_converge = finer._compare(
-                cells, new_rows, second_rows, audits, new_steps, distance[open_cells], looser, outcomes
+                runs, new.steps, new.audits, distance[open_cells], looser
             )
             if retry == 0:
-                same = open_cells[took_same_steps(new_rows, second_rows, outcomes)]
+                same = open_cells[took_same_steps(runs)]
                 because[same] = np.where(because[same] == CERTIFIED, SAME_STEPS, because[same])
             steps[open_cells] += more_steps
-            finished = ~self._given_up(new_rows, new_steps, outcomes)
-            rows[open_cells[finished]] = new_rows[finished]
+            finished = ~self._given_up(new.rows, new.steps, outcomes)
+            rows[open_cells[finished]] = new.rows[finished]
             open_cells = open_cells[finished & ((because[open_cells] != CERTIFIED) | may_converge)]
             looser, finer = finer.tolerances(), replace(finer, rtol=finer.rtol / FACTOR)
             if retry == _MOST_RETRIES or not len(open_cells) or not 1e-15 <= finer.tolerances()[0] < looser[0]:
@@ -136,8 +145,8 @@ class _Piecewise(Method):
             cells = _select(batch, open_cells)
             # Each run is compared with a disturbed one, or a disturbed run with one that is not.
             cells = cells if retry % 2 else audit.disturbed(cells)
-            new_rows, more_steps, audits = finer.integrate(cells, len(outcomes), audit=True)
-            new_steps = more_steps
+            new = finer.integrate(cells, len(outcomes), audit=True)
+            more_steps = new.steps
         return Result(rows, steps=steps, certified=because == CERTIFIED, because=because, errors=bounds)
 
     def _given_up(
@@ -149,14 +158,11 @@ class _Piecewise(Method):
 
     def _compare(
         self,
-        batch: Any,
-        rows: NDArray[np.float64],
-        second_rows: NDArray[np.float64],
-        audits: NDArray[np.float64],
+        runs: TwoRuns,
         steps: NDArray[Any],
+        audits: NDArray[np.float64],
         distance_before: NDArray[np.float64],
         looser: tuple[float, float],
-        outcomes: tuple[str, ...],
     ) -> tuple[NDArray[np.int8], NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
         """Why runs have no certificate, and bounds on their errors, from second runs at a looser tolerance.
 
@@ -166,11 +172,12 @@ class _Piecewise(Method):
             Reasons against each certificate; bounds, NaN where nearby runs diverge; distance of the runs where they
             diverge, infinite elsewhere; whether they diverge, but a tighter tolerance may show that they converge.
         """
+        batch, rows, second_rows, _ = runs
         of_bristles = family_of(type(batch.law)) is Dynamic
-        distance = apart(batch, rows, second_rows, outcomes)
+        distance = apart(runs)
         diverge = diverging(distance, looser[of_bristles], distance_before)
         obeys_law: NDArray[np.bool_] = (audits[:, 0] <= _MOST_VIOLATION) & (audits[:, 1] <= _MOST_UNEXPLAINED)
-        because = doubts(batch, rows, second_rows, audits[:, 2], outcomes)
+        because = doubts(runs, audits[:, 2])
         chaotic = diverge & ~audit.same_statistics(batch, rows, second_rows) if diverge.any() else diverge
         because = first_of(
             [(because != CERTIFIED, because), (~obeys_law, LAW_NOT_OBEYED), (chaotic, DIVERGES)], len(rows)
@@ -189,10 +196,7 @@ class _Piecewise(Method):
         magnified, left_out = audit.magnified(batch, rows)
         safety = np.where(magnified, _MAGNIFIED * self.safety, safety)
         bounds = errors(
-            batch,
-            rows,
-            second_rows,
-            outcomes,
+            runs,
             safety=safety,
             share=self.share,
             steps=steps,

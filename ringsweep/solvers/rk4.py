@@ -27,7 +27,7 @@ from ringsweep.physics.drives import lookup, shape_numbers, table_row, turn, wit
 from ringsweep.physics.friction import TRAITS, Dynamic, family_of, presliding
 from ringsweep.quantities.flags import CERTIFIED, COARSE, DIVERGES, FAILED, NO_RESULT, NOT_ASKED, SEPARATING
 from ringsweep.quantities.parameters import Parameter
-from ringsweep.solvers.certificate import apart, doubts, errors, first_of, with_errors
+from ringsweep.solvers.certificate import TwoRuns, apart, doubts, errors, first_of, with_errors
 from ringsweep.solvers.method import Method, Needs, Result
 
 #: Radius of the largest half disc in the left half plane in which the method is stable (more exactly 2.616). On the
@@ -115,32 +115,24 @@ class RK4(Method):
             stable = np.flatnonzero((report[:, 1] <= STABILITY_LIMIT) & (report[:, 0] > 0.0))
             if len(stable):
                 half_rows, half_report = self._integrate(batch, stable, 2 * self.steps, len(outcomes))
-                stable_batch, stable_rows = (
-                    (batch, rows) if len(stable) == cells else (take(batch, stable), rows[stable])
-                )
+                whole = len(stable) == cells
+                stable_batch, stable_rows = (batch, rows) if whole else (take(batch, stable), rows[stable])
+                runs = TwoRuns(stable_batch, stable_rows, half_rows, outcomes)
                 # A reaction may vanish between two steps.
                 contacts_held = (half_report[:, 2] > 0.0) | (half_rows[:, outcomes.index("regime")] == SEPARATING)
                 # A narrow zone may lie between two steps.
                 trusted = (
                     contacts_held & (half_report[:, 1] <= STABILITY_LIMIT) & (half_report[:, 4] <= _MOST_ARC_SHARE)
                 )
-                diverge = apart(stable_batch, stable_rows, half_rows, outcomes) > _MOST_APART
+                diverge = apart(runs) > _MOST_APART
                 chaotic = diverge
                 if diverge.any():
                     chaotic = diverge & ~audit.same_statistics(stable_batch, stable_rows, half_rows)
-                doubt = doubts(stable_batch, stable_rows, half_rows, half_report[:, 3], outcomes)
+                doubt = doubts(runs, half_report[:, 3])
                 because[stable] = first_of(
                     [(doubt != CERTIFIED, doubt), (~trusted, COARSE), (chaotic, DIVERGES)], len(stable)
                 )
-                found = errors(
-                    stable_batch,
-                    stable_rows,
-                    half_rows,
-                    outcomes,
-                    safety=_SAFETY,
-                    share=_SHARE_OF_LARGEST,
-                    steps=report[stable, 0],
-                )
+                found = errors(runs, safety=_SAFETY, share=_SHARE_OF_LARGEST, steps=report[stable, 0])
                 found[diverge] = np.nan
                 bounds[stable] = found
         return Result(
