@@ -74,7 +74,7 @@ def _after_creep(local, error):
     return LocalErrors(local.series, local.rate, local.implicit + error, local.creep + 1.0)
 
 
-class _Run(NamedTuple):
+class Run(NamedTuple):
     """A run between two steps."""
 
     record: Any
@@ -94,7 +94,7 @@ def _step(family, scene, run, h_max, tolerances, scratch):
     family : SetValued, Smooth or Dynamic
         Family of the friction law.
     scene : NamedTuple
-    run : _Run
+    run : Run
     h_max : float
         Greatest length of the step, s.
     tolerances : tuple of float
@@ -124,7 +124,7 @@ def _creep(scene, run, h_max, tolerance, scratch):
 
 @_step.implements(SetValued)
 def _step_series(family, scene, run, h_max, tolerances, scratch):
-    guard, s, y, record, reach = series_step(scene, run.record, run.mode, run.t, run.y, h_max, tolerances[0], scratch)
+    guard, s, y, record, reach = series_step(scene, run, h_max, tolerances[0], scratch)
     shared = _shared(s, reach)
     rate = 0.0
     if shared > 0.0 and modes.sticks(scene, run.mode):
@@ -141,7 +141,7 @@ def _step_either(family, scene, run, h_max, tolerances, scratch):
         is_stiff, guard, s, y, record, control, error = _creep(scene, run, h_max, tolerances[1], scratch)
         if is_stiff:
             return True, guard, s, y, record, control, _after_creep(run.local, error)
-    guard, s, y, record, reach = series_step(scene, run.record, run.mode, run.t, run.y, h_max, tolerances[0], scratch)
+    guard, s, y, record, reach = series_step(scene, run, h_max, tolerances[0], scratch)
     local = run.local
     local = LocalErrors(local.series + _shared(s, reach), local.rate, local.implicit, local.creep)
     return False, guard, s, y, record, StepControl(1e-6 * scene.span, 0.0, 0.0), local
@@ -171,7 +171,7 @@ def _step_in_part(kind, scene, run, h_max, tolerances, scratch):
     if not simpler.is_simpler(scene, run.mode):
         return _step(family(scene.law), scene, run, h_max, tolerances, scratch)
     part, mode, y = simpler.part(scene, run.mode, run.y)
-    run_of_part = _Run(simpler.part_of_record(scene, run.record, run.mode), mode, run.t, y, run.control, run.local)
+    run_of_part = Run(simpler.part_of_record(scene, run.record, run.mode), mode, run.t, y, run.control, run.local)
     first = simpler.first_row(scene)
     is_implicit, guard, s, y, record, control, local = _step(
         family(scene.law), part, run_of_part, h_max, tolerances, without_rows(scratch, first)
@@ -394,7 +394,7 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
             n += 1
             h_max = min(scene.span, drives.next_knot(scene.drive, t)) - t
             control = StepControl(min(control.h, spacing), control.last_h, control.last_factor)
-            run = _Run(record, mode, t, y, control, local)
+            run = Run(record, mode, t, y, control, local)
             is_implicit, guard, s, y_next, record, control, local = _step_in(
                 simpler.kind(scene), scene, run, h_max, tolerances, scratch
             )

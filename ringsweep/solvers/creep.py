@@ -50,6 +50,13 @@ class Start(NamedTuple):
     linear: Any
 
 
+class Taken(NamedTuple):
+    """An implicit step from a start: its length, s, and the state at its end."""
+
+    h: float
+    x_next: Any
+
+
 @inlined
 def start_at(scene, course, mode, t, y):
     """Beginning of an implicit step in the state `y` of a mode at time `t`."""
@@ -162,15 +169,17 @@ def _may_vanish(near_zero, first, middle, last):
 
 
 @inlined
-def _first_event(scene, start, scratch, x_next, s, views):
-    """First guard to fall below zero within an implicit step, and the length of the step up to it; -1 and `s` if none.
+def _first_event(scene, start, scratch, taken, views):
+    """First guard to fall below zero within an implicit step, and the length of the step up to it.
+
+    If none does: -1, and the length of the whole step.
 
     A guard is taken as the polynomial through its values at five instants of the dense output, whose degree is four as
     well. Its first root is isolated like the root of a series, so that no dip between two instants is missed.
 
     `views` are those at the beginning, in the middle and at the end of the step.
     """
-    (before, within, after), samples = views, scratch.samples
+    (before, within, after), samples, (s, x_next) = views, scratch.samples, taken
     near_zero = implicit.near_zero(scene, within[1])
     for i in range(1, INSTANTS, 2):
         fraction = i / INSTANTS
@@ -319,7 +328,7 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
             near = near or _may_vanish(near_zero[g], before[0][g], middle[0][g], after[0][g])
         if not near:
             break
-        event, h = _first_event(scene, start, scratch, x_next, s, (before, middle, after))
+        event, h = _first_event(scene, start, scratch, Taken(s, x_next), (before, middle, after))
         if event < 0 or h == 0.0:
             break
         near = False
@@ -330,7 +339,7 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
         event += scratch.first_guard
         if h == 0.0:
             return event, 0.0, y, record, control, 0.0
-    fractions, count = scratch.work[0], 0
+    taken, fractions, count = Taken(h, x_next), scratch.work[0], 0
     record = recorder.enter(scene, record, t, implicit.seen(scene, before))
     velocity, acceleration = implicit.motion(scene, forcing, x, linear)
     for begin, view in ((0.0, middle), (0.5, after)):
@@ -338,7 +347,7 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
         for component, value_before in ((1, velocity), (2, acceleration)):
             if value_before * view[1][component] < 0.0:
                 ends = value_before, view[1][component]
-                fractions[count] = _sign_change(scene, start, scratch, x_next, h, begin, component, ends)
+                fractions[count] = _sign_change(scene, start, scratch, taken, begin, component, ends)
                 count += 1
         velocity, acceleration = view[1][1], view[1][2]
     for i in range(1 if near else 2, INSTANTS, 1 if near else INSTANTS):
@@ -358,14 +367,14 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
             view = _view_at(scene, start, course, fraction * h, rosenbrock.dense(x, x_next, bends, fraction))
         duration = (fraction - fraction_before) * h
         ends = fraction_before, fraction
-        record = along_implicit(variation.asked(scene), scene, record, start, x_next, h, ends, scratch)
+        record = along_implicit(variation.asked(scene), scene, record, start, taken, ends, scratch)
         record = recorder.observe(scene, record, t + fraction * h, duration, stuck, implicit.seen(scene, view))
         fraction_before = fraction
     return event, h, implicit.from_implicit(scene, end, x_next), record, control, h_norm if h < s or s == h_max else 0.0
 
 
 @inlined
-def _sign_change(scene, start, scratch, x_next, h, begin, component, ends):
+def _sign_change(scene, start, scratch, taken, begin, component, ends):
     """Fraction of a step at which velocity (component 1) or acceleration (component 2) of the body change sign.
 
     The sign changes in the half step that begins at the fraction `begin`; `ends` are the values of the component at
@@ -379,8 +388,8 @@ def _sign_change(scene, start, scratch, x_next, h, begin, component, ends):
             found = 0.5 * (low + high)
         if abs(found - before) <= _EXTREME_PRECISION:
             break
-        state = rosenbrock.dense(start.x, x_next, scratch.bends[0], found)
-        there = _view_at(scene, start, scratch.course, found * h, state)[1][component]
+        state = rosenbrock.dense(start.x, taken.x_next, scratch.bends[0], found)
+        there = _view_at(scene, start, scratch.course, found * taken.h, state)[1][component]
         # Illinois algorithm: an end of the bracket that stays twice loses half its value.
         if there * first > 0.0:
             low, first = found, there

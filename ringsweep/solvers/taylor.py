@@ -42,33 +42,31 @@ def _first_event(c, first, entry_guard, h, work):
 
 
 @inlined
-def _observe(scene, record, mode, c, t, s, work):
-    """Record after a step of length `s` of the series `c`, with the extremes within the step."""
-    record = recorder.enter(scene, record, t, series.seen_at_start(scene, c))
-    count = series.extremes(scene, record, mode, c, s, work)
-    instants = work[0]
+def _observe(scene, record, run, s, scratch):
+    """Record after a step of length `s` of the series, with the extremes within the step."""
+    c, instants = scratch.c, scratch.work[0]
+    record = recorder.enter(scene, record, run.t, series.seen_at_start(scene, c))
+    count = series.extremes(scene, record, run.mode, c, s, scratch.work)
     ascending(instants, count)
-    stuck = modes.sticks(scene, mode)
+    stuck = modes.sticks(scene, run.mode)
     before = 0.0
     for j in range(count + 1):
         now = instants[j] if j < count else s
-        record = along_series(variation.asked(scene), scene, record, mode, c, t, (before, now), work[1:])
-        record = recorder.observe(scene, record, t + now, now - before, stuck, series.seen_at(scene, c, now, s))
+        record = along_series(variation.asked(scene), scene, record, run, (before, now), scratch)
+        record = recorder.observe(scene, record, run.t + now, now - before, stuck, series.seen_at(scene, c, now, s))
         before = now
     return record
 
 
 @inlined
-def series_step(scene, record, mode, t, y, h_max, tolerance, scratch):
+def series_step(scene, run, h_max, tolerance, scratch):
     """One step of the series, which the first event ends.
 
     Parameters
     ----------
-    scene, record, mode : NamedTuple
-    t : float
-        Time, s.
-    y : tuple of float
-        State at time `t`.
+    scene : NamedTuple
+    run : Run
+        The run before the step.
     h_max : float
         Greatest length of the step, s.
     tolerance : float
@@ -82,11 +80,11 @@ def series_step(scene, record, mode, t, y, h_max, tolerance, scratch):
         The guard that ended the step, or -1; length of the step, s; state and record after it; length over which the
         series meets the tolerance, s.
     """
-    c, work = scratch.c, scratch.work
-    reach = series.expand(scene, mode, t, y, tolerance, c)
-    record = enter_series(variation.asked(scene), scene, record, mode, c)
+    c = scratch.c
+    reach = series.expand(scene, run.mode, run.t, run.y, tolerance, c)
+    record = enter_series(variation.asked(scene), scene, run.record, run.mode, c)
     h = min(reach, h_max)
-    guard, s = _first_event(c, scratch.first_guard, mode.entry_guard, h, work)
+    guard, s = _first_event(c, scratch.first_guard, run.mode.entry_guard, h, scratch.work)
     if s > 0.0:
-        record = _observe(scene, record, mode, c, t, s, work)
+        record = _observe(scene, record, run, s, scratch)
     return guard, s, series.state_at(scene, c, s), record, reach

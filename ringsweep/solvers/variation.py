@@ -35,20 +35,20 @@ def _enter_implicit(asked, scene, record, start):
 
 
 @hook(optional=True)
-def along_series(asked, scene, record, mode, c, t, ends, work):
-    """Record after an interval of a step of series that begins at time `t`; `ends` are those of the interval, s."""
+def along_series(asked, scene, record, run, ends, scratch):
+    """Record after an interval of a step of series, which begins with `run`; `ends` are those of the interval, s."""
     return record
 
 
 @along_series.implements(variation.Exponent)
-def _along_series(asked, scene, record, mode, c, t, ends, work):
-    low, high = ends
+def _along_series(asked, scene, record, run, ends, scratch):
+    c, work, (low, high) = scratch.c, scratch.work[1:], ends
     width = high - low
     while low < high:
         end = low + width if low + 1.5 * width < high else high
         for i in range(len(MANY)):
             s = low + (end - low) * MANY[i]
-            store(variation.jacobian(scene, mode, t + s, series.state_at(scene, c, s)), i, work)
+            store(variation.jacobian(scene, run.mode, run.t + s, series.state_at(scene, c, s)), i, work)
         rates = series.rates_at(scene, c, end)
         if (end - low) * largest_trace(len(rates), len(MANY), work) > _MOST_GROWTH:
             width = 0.5 * (end - low)
@@ -59,26 +59,26 @@ def _along_series(asked, scene, record, mode, c, t, ends, work):
 
 
 @hook(optional=True)
-def along_implicit(asked, scene, record, start, x_next, h, ends, scratch):
-    """Record after an interval of an implicit step of length `h`; `ends` are those of the interval, as fractions."""
+def along_implicit(asked, scene, record, start, taken, ends, scratch):
+    """Record after an interval of an implicit step, `taken`; `ends` are those of the interval, as fractions."""
     return record
 
 
 @along_implicit.implements(variation.Exponent)
-def _along_implicit(asked, scene, record, start, x_next, h, ends, scratch):
+def _along_implicit(asked, scene, record, start, taken, ends, scratch):
     (low, high), work = ends, scratch.work[1:]
     if not high > low:
         return record
     forcing, x = start.forcing, start.x
     for i in range(len(FEW)):
         fraction = low + (high - low) * FEW[i]
-        t = start.t + fraction * h
+        t = start.t + fraction * taken.h
         forcing = implicit.forcing(scene, scratch.course, t)
-        x = rosenbrock.dense(start.x, x_next, scratch.bends[0], fraction)
+        x = rosenbrock.dense(start.x, taken.x_next, scratch.bends[0], fraction)
         store(variation.jacobian(scene, start.mode, t, implicit.from_implicit(scene, forcing, x)), i, work)
     # The last node is the end.
     rates = implicit.rates(scene, start.mode, start.common, forcing, x)
-    return variation.advance(scene, record, (high - low) * h, rates, WEIGHTS_OF_FEW, work)
+    return variation.advance(scene, record, (high - low) * taken.h, rates, WEIGHTS_OF_FEW, work)
 
 
 @hook(optional=True)
