@@ -150,7 +150,7 @@ def test_lap_of_four_that_becomes_one_of_two_is_no_period(shrinks):
     periods = set()
     for t, x in enumerate(orbit[1:].tolist(), 1):
         mark = cycles.Mark(float(t), x, 0.0, 0.0, 0.0)
-        found = cycles.closed(forced, found, mark, float(t), True, t + 1.0, 2.0, 2.0)
+        found = cycles.closed(forced, found, mark, float(t), True, 2.0, 2.0)
         if cycles.returns_each_time(forced, found, 2.0, 0.0, (np.nan, np.nan)):
             periods.add(found.period)
     assert periods == {0.9: {2.0}, 0.99: set(), 1.0: {4.0}}[shrinks]

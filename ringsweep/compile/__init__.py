@@ -17,6 +17,7 @@ from ringsweep.compile.tuples import (
     generated,
     map_leaves,
     put,
+    replacing,
     take,
     unrolled,
 )
@@ -37,6 +38,7 @@ __all__ = [
     "map_leaves",
     "put",
     "readable_compile_errors",
+    "replacing",
     "specialise",
     "take",
     "unrolled",

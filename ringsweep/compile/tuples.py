@@ -12,7 +12,17 @@ from ringsweep.compile.cells import CellsType, cell_at
 from ringsweep.compile.numba_private import borrowed
 from ringsweep.compile.options import specialise
 
-__all__ = ["add_scaled", "borrowed", "function_from_lines", "generated", "map_leaves", "put", "take", "unrolled"]
+__all__ = [
+    "add_scaled",
+    "borrowed",
+    "function_from_lines",
+    "generated",
+    "map_leaves",
+    "put",
+    "replacing",
+    "take",
+    "unrolled",
+]
 
 
 def function_from_lines(names: str, lines: list[str], scope: dict[str, Any]) -> Any:
@@ -113,6 +123,20 @@ def _take_one(batch: Any, i: Any) -> Any:
 
 
 specialise(take, _take_one)
+
+
+def replacing(*names: str) -> Any:
+    """Make a function that takes a NamedTuple and values of the fields `names`, and returns it with these values."""
+    arguments = ", ".join(("whole", *names))
+    in_python = f"return whole._replace({', '.join(f'{name}={name}' for name in names)})"
+
+    def body(whole: Any, *values: Any) -> Any:
+        fields = [name if name in names else f"whole.{name}" for name in whole.fields]
+        return function_from_lines(arguments, [f"return cls({', '.join(fields)})"], {"cls": whole.instance_class})
+
+    replaced = function_from_lines(arguments, [in_python], {})
+    specialise(replaced, body, absorb=True)
+    return replaced
 
 
 @unrolled

@@ -213,7 +213,7 @@ def _with_corners(laps, first, again, start, mark):
 
 
 @absorbed
-def closed(scene, c, mark, count, known, next_end, swing, fast):
+def closed(scene, c, mark, count, known, swing, fast):
     """Cycles after the end of a cycle.
 
     Parameters
@@ -227,8 +227,6 @@ def closed(scene, c, mark, count, known, next_end, swing, fast):
         Number of the cycle.
     known : bool or Lanes
         Whether the state may be compared with earlier ones.
-    next_end : float or Lanes
-        Time at which the forcing ends its next period, s.
     swing, fast : float or Lanes
         Distance between the extremes of the place in the cycle, and the velocity that counts as much.
 
@@ -271,7 +269,7 @@ def closed(scene, c, mark, count, known, next_end, swing, fast):
     here = Part(count, mark, swing, sum_now, squares)
     return Cycles(
         count,
-        next_end,
+        (count + 1.0) * scene.forcing_period,
         mark.x,
         mark.x,
         swing,

@@ -108,7 +108,7 @@ def _end_of_period(asked, record):
 
 
 @hook(absorb=True, optional=True)
-def observe(asked, scene, r, now, t, duration, x, velocity, deflections):
+def observe(asked, scene, r, cycles_now, now, deflections):
     """Points after an observation.
 
     Parameters
@@ -116,24 +116,22 @@ def observe(asked, scene, r, now, t, duration, x, velocity, deflections):
     asked : AtPeriod or AtTurn
     scene, r : NamedTuple
         One cell, and its record before the observation, as in :func:`lent`.
-    now : Cycles
+    cycles_now : Cycles
         Cycles after it.
-    t, duration : float
-        Time, and length of the interval, s.
-    x, velocity : float
-        Place and velocity at `t`, m and m/s, or rad and rad/s.
+    now : Interval
+        The interval that ends with it.
     deflections : tuple of float
-        Those at `t`, m.
+        Those at its end, m.
     """
     return ()
 
 
 @observe.implements(AtPeriod)
-def _at_period(asked, scene, r, now, t, duration, x, velocity, deflections):
-    p, mark = r.section, now.last
+def _at_period(asked, scene, r, cycles_now, now, deflections):
+    p, mark = r.section, cycles_now.last
     count = p.number
-    if scene.forcing_period < inf and now.count != r.cycles.count:
-        late = (t - mark.t) / duration if duration > 0.0 else 0.0
+    if scene.forcing_period < inf and cycles_now.count != r.cycles.count:
+        late = (now.t - mark.t) / now.duration if now.duration > 0.0 else 0.0
         x = cycles.difference(scene, mark.x, 0.0)
         _store(_earlier(deflections, p.deflections, late), asked, p, x, mark.velocity)
         count += 1.0
@@ -141,17 +139,17 @@ def _at_period(asked, scene, r, now, t, duration, x, velocity, deflections):
 
 
 @observe.implements(AtTurn)
-def _at_turn(asked, scene, r, now, t, duration, x, velocity, deflections):
-    p, before = r.section, r.last.velocity
+def _at_turn(asked, scene, r, cycles_now, now, deflections):
+    p = r.section
     count, pending, x_turn, deflections_turn = p.number, p.pending, p.x_turn, p.deflections_turn
     low = min(p.low, r.last.x)
-    if before > 0.0 and velocity <= 0.0:
-        turn = turn_within(r.last, t, duration, x, velocity)
-        late = (t - turn.t) / duration if duration > 0.0 else 0.0
+    if r.last.velocity > 0.0 and now.velocity <= 0.0:
+        turn = turn_within(r.last, now)
+        late = (now.t - turn.t) / now.duration if now.duration > 0.0 else 0.0
         pending, x_turn, deflections_turn = 1.0, turn.x, _earlier(deflections, p.deflections, late)
-    if velocity > 0.0:
+    if now.velocity > 0.0:
         pending = 0.0
-    elif velocity < 0.0 and pending > 0.0:
+    elif now.velocity < 0.0 and pending > 0.0:
         pending = 0.0
         if x_turn - low > max(r.play, _ROUNDING * (r.x_max - r.x_min)):
             _store(deflections_turn, asked, p, x_turn, 0.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import acos, atan2, cos, exp, inf, isnan, log, nan, pi, sqrt
 from typing import Any, NamedTuple
 
-from ringsweep.compile import hook, inlined, unrolled
+from ringsweep.compile import hook, inlined, replacing, unrolled
 from ringsweep.models.interface.variation import Exponent
 from ringsweep.numerics.collocation import stored, transition
 from ringsweep.physics.belt import Belt, BristleBelt
@@ -113,6 +113,10 @@ class Tangent(NamedTuple):
     gradient: Any
     keeps: float
     multipliers: Multipliers
+
+
+_entered, _advanced = replacing("entry", "keeps"), replacing("step", "rates", "gradient")
+_with_gradient = replacing("gradient")
 
 
 # ---- matrices -----------------------------------------------------------------------------------
@@ -291,7 +295,7 @@ def _begin(asked, scene, t):
 @inlined
 def enter(tangent, keeps, rates):
     """Tangent at the beginning of a step, where the rates of the state are `rates`."""
-    return _at(tangent, tangent.step, tangent.rates, rates, tangent.gradient, keeps)
+    return _entered(tangent, rates, keeps)
 
 
 @inlined
@@ -304,24 +308,18 @@ def advance(tangent, h, rates, weights, work):
         step = Flow(_product(r.vector, salt, step.matrix), step.log_determinant + log_determinant)
     log_determinant = step.log_determinant + transition(len(r.vector), h, weights, work)
     step = Flow(_product(r.vector, stored(step.matrix, work), step.matrix), log_determinant)
-    return _at(r, step, rates, r.entry, _scaled(r.gradient, 0.0), r.keeps)
+    return _advanced(r, step, rates, _scaled(r.gradient, 0.0))
 
 
 @inlined
 def switched(tangent, gradient):
     """Tangent after an event, with the gradient of the guard over its rate."""
-    r = tangent
-    return _at(r, r.step, r.rates, r.entry, r.gradient if _is_pending(r.gradient) else gradient, r.keeps)
+    return tangent if _is_pending(tangent.gradient) else _with_gradient(tangent, gradient)
 
 
 @unrolled
 def _is_pending(length, gradient):
     return ["return " + " or ".join(f"gradient[{i}] != 0.0" for i in range(length))]
-
-
-@inlined
-def _at(r, step, rates, entry, gradient, keeps):
-    return Tangent(r.lap, step, r.vector, r.growth, r.blocks, rates, entry, gradient, keeps, r.multipliers)
 
 
 @hook(absorb=True, optional=True)

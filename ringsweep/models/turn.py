@@ -1,4 +1,4 @@
-"""Turns of the displacement of a body on the belt, between two observations."""
+"""Intervals between two observations, and turns of the displacement within them."""
 
 from __future__ import annotations
 
@@ -8,25 +8,37 @@ from ringsweep.compile import absorbed
 from ringsweep.numerics.functions import select
 
 
+class Interval(NamedTuple):
+    """An interval that ends with an observation: time, s, and duration, s; place and velocity at its end."""
+
+    t: Any
+    duration: Any
+    x: Any
+    velocity: Any
+
+
 class Turn(NamedTuple):
-    """Time, s, and displacement, m, of a turn."""
+    """Time, s, and displacement, m, of a turn, and whether the displacement is least or greatest there."""
 
     t: Any
     x: Any
+    is_least: Any
+    is_greatest: Any
 
 
 @absorbed
-def turn_within(last, t, duration, x, velocity):
-    """Turn within an interval in which the velocity changes its sign. There it is nearly linear in time."""
-    change = last.velocity - velocity
+def turn_within(last, now):
+    """Turn within the interval `now`, in which the velocity changes its sign. There it is nearly linear in time."""
+    change = last.velocity - now.velocity
     changes = abs(change) > 0.0
     share = select(changes, last.velocity / select(changes, change, 1.0), 0.0)
-    return Turn(t - (1.0 - share) * duration, between(last, duration, x, velocity, share))
+    up, down = (last.velocity <= 0.0) & (now.velocity > 0.0), (last.velocity > 0.0) & (now.velocity <= 0.0)
+    return Turn(now.t - (1.0 - share) * now.duration, between(last, now, share), up, down)
 
 
 @absorbed
-def between(last, duration, x, velocity, share):
+def between(last, now, share):
     """Displacement at a share of an interval: the cubic through displacements and velocities at both ends."""
     rest = 1.0 - share
-    ends = (1.0 + 2.0 * share) * rest * rest * last.x + share * share * (3.0 - 2.0 * share) * x
-    return ends + share * rest * duration * (rest * last.velocity - share * velocity)
+    ends = (1.0 + 2.0 * share) * rest * rest * last.x + share * share * (3.0 - 2.0 * share) * now.x
+    return ends + share * rest * now.duration * (rest * last.velocity - share * now.velocity)

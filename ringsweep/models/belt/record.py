@@ -10,13 +10,13 @@ from __future__ import annotations
 from math import inf, isfinite, isnan, nan, pi, sqrt
 from typing import Any, NamedTuple
 
-from ringsweep.compile import absorbed, hook, inlined
+from ringsweep.compile import absorbed, hook, inlined, replacing
 from ringsweep.models import cycles, section, tangent
 from ringsweep.models.belt.force import breakaway_force
 from ringsweep.models.cycles import RETURN, Cycles, Mark
 from ringsweep.models.interface import recorder, shock
 from ringsweep.models.interface.status import BROKEN, COMPLETE, SEPARATED_1
-from ringsweep.models.turn import between, turn_within
+from ringsweep.models.turn import Interval, between, turn_within
 from ringsweep.numerics.functions import any_of, floor, lanes_body, select, square_root
 from ringsweep.numerics.memory import select_all
 from ringsweep.physics import ring
@@ -157,6 +157,11 @@ class Record(NamedTuple):
     section: Any
 
 
+#: Record with another tangent.
+with_tangent = replacing("tangent")
+_with_shocks, _with_section = replacing("shocks"), replacing("section")
+_with_extremes = replacing("low", "high")
+
 # A swing has no bound if it is so many times the scales of the scene, and its growth in a cycle falls by less than the
 # second share between two parts of the record.
 _BEYOND, _SLOWER = 100.0, 0.01
@@ -206,26 +211,7 @@ def begin(scene, t, seen, band, play):
 
 @recorder.lend.implements(Belt, BristleBelt)
 def _lend(scene, record, row):
-    return changed(record, record.shocks, record.tangent, section.lent(scene.section, record, row, (nan,)))
-
-
-@inlined
-def changed(r, new_shocks, new_tangent, new_section):
-    """Record with other shocks, another tangent and other points."""
-    return Record(
-        r.band,
-        r.play,
-        r.last,
-        r.x_min,
-        r.x_max,
-        r.velocity_max,
-        r.force_max,
-        r.stops,
-        r.cycles,
-        new_shocks,
-        new_tangent,
-        new_section,
-    )
+    return _with_section(record, section.lent(scene.section, record, row, (nan,)))
 
 
 @recorder.observe.implements(Belt, BristleBelt)
@@ -233,18 +219,17 @@ def _observe(scene, record, t, duration, stuck, seen):
     # In most steps nothing turns, begins or ends.
     r = record
     x, velocity, force, place, v, v_rate, acceleration, deflection = seen
-    stops, now, x_min, x_max = r.stops, r.cycles, r.x_min, r.x_max
+    now = Interval(t, duration, x, velocity)
+    stops, cycles_now, x_min, x_max = r.stops, r.cycles, r.x_min, r.x_max
     place = _place(scene, r, place)
     side = select(stuck, 1.0, -1.0)
     if any_of((side * stops.side < 0.0) | _leaves(scene, r, place)):
-        span = max(x_max, x) - min(x_min, x)
-        stops = _stops(scene, r, t, duration, stuck, side, place, v, force, span)
-    if any_of((r.last.velocity * velocity <= 0.0) | (t >= now.next)):
-        up, down = (r.last.velocity <= 0.0) & (velocity > 0.0), (r.last.velocity > 0.0) & (velocity <= 0.0)
-        turn = turn_within(r.last, t, duration, x, velocity)
-        x_min, x_max = select(up, min(x_min, turn.x), x_min), select(down, max(x_max, turn.x), x_max)
-        span = max(x_max, x) - min(x_min, x)
-        now = _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span)
+        stops = _stops(scene, r, now, stuck, place, v, force)
+    if any_of((r.last.velocity * velocity <= 0.0) | (t >= cycles_now.next)):
+        turn = turn_within(r.last, now)
+        x_min = select(turn.is_least, min(x_min, turn.x), x_min)
+        x_max = select(turn.is_greatest, max(x_max, turn.x), x_max)
+        cycles_now = _cycles(scene, r, stops, now, v, turn, max(x_max, x) - min(x_min, x))
     return Record(
         r.band,
         r.play,
@@ -262,10 +247,10 @@ def _observe(scene, record, t, duration, stuck, seen):
         max(r.velocity_max, velocity),
         max(r.force_max, abs(force)),
         stops,
-        now,
+        cycles_now,
         shock.observe(r.shocks, acceleration),
-        tangent.observe(r.tangent, scene, r.cycles, now, t, duration),
-        section.observe(scene.section, scene, r, now, t, duration, x, velocity, (deflection,)),
+        tangent.observe(r.tangent, scene, r.cycles, cycles_now, t, duration),
+        section.observe(scene.section, scene, r, cycles_now, now, (deflection,)),
     )
 
 
@@ -322,17 +307,18 @@ def _not_located(before, now):
 
 
 @absorbed
-def _stops(scene, r, t, duration, stuck, side, place, v, force, span):
+def _stops(scene, r, now, stuck, place, v, force):
     """Stops after an interval in which stick began or ended, or a slip became longer than the play."""
-    s, before = r.stops, t - duration
+    s, before, side = r.stops, now.t - now.duration, select(stuck, 1.0, -1.0)
     begins, ends = stuck & (s.side < 0.0), (side < 0.0) & (s.side > 0.0)
     stick_time = s.stick_time + select(ends, before - s.since, 0.0)
     since = select(begins | ends, before, s.since)
     # Within the play of the bristles a stop goes on.
     resumed = s.slip_from == s.slip_from
     anew = begins & _not(resumed)
+    span = max(r.x_max, now.x) - min(r.x_min, now.x)
     scale = _AT_REST * square_root(scene.body.stiffness / scene.body.mass) * span
-    rate = select(duration > 0.0, (v - r.last.v) / duration, 0.0)
+    rate = select(now.duration > 0.0, (v - r.last.v) / now.duration, 0.0)
     slowing = max(abs(r.last.v_rate), abs(rate))
     passage = _PASSAGE * max(max(r.band, scale), abs(r.last.v)) / slowing
     # Under a greater pull than that of breakaway a set-valued law would let the body pass, maybe slowly.
@@ -367,49 +353,28 @@ def _pace(scene):
 
 
 @absorbed
-def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
+def _cycles(scene, r, stops, now, v, turn, span):
     """Cycles after an interval in which the velocity changed its sign or a period of the forcing ended."""
     c, last, period = r.cycles, r.last, scene.forcing_period
-    due = t >= c.next
-    low, high = select(up, min(c.low, turn.x), c.low), select(down, max(c.high, turn.x), c.high)
+    due = now.t >= c.next
+    low = select(turn.is_least, min(c.low, turn.x), c.low)
+    high = select(turn.is_greatest, max(c.high, turn.x), c.high)
     # Without forcing a cycle ends where the body is farthest against the motion of the belt: no vibration of bristles
     # in stick disturbs this turn.
     frequency = square_root(scene.body.stiffness / scene.body.mass)
-    backward = v - velocity > 1e-6 * frequency * (high - low)
+    backward = v - now.velocity > 1e-6 * frequency * (high - low)
     far = high - low > max(r.play, _ROUNDING * span)
-    turns = far & select(backward, down, up) & (period == inf)
-    old = Cycles(
-        c.count,
-        c.next,
-        low,
-        high,
-        c.swing,
-        c.swing_before,
-        c.drift,
-        c.last,
-        c.reference,
-        c.since,
-        c.most,
-        c.lap,
-        c.half,
-        c.laps,
-        c.sum,
-        c.squares,
-        c.before,
-        c.middle,
-        c.period,
-        c.share,
-        c.stops,
-    )
-    count = select(due, max(c.count + 1.0, floor(t / period)), c.count + select(turns, 1.0, 0.0))
+    turns = far & select(backward, turn.is_greatest, turn.is_least) & (period == inf)
+    old = _with_extremes(c, low, high)
+    count = select(due, max(c.count + 1.0, floor(now.t / period)), c.count + select(turns, 1.0, 0.0))
     ended = due | turns
     if any_of(ended):
-        share = select(duration > 0.0, 1.0 - (t - count * period) / duration, 1.0)
+        share = select(now.duration > 0.0, 1.0 - (now.t - count * period) / now.duration, 1.0)
         share = select(due, min(max(share, 0.0), 1.0), 1.0)
-        x_due = between(last, duration, x, velocity, share)
+        x_due = between(last, now, share)
         t_mark = select(due, count * period, turn.t)
         x_mark = select(due, x_due, turn.x)
-        v_mark = select(due, (1.0 - share) * last.velocity + share * velocity, 0.0)
+        v_mark = select(due, (1.0 - share) * last.velocity + share * now.velocity, 0.0)
         low, high = select(ended, min(low, x_mark), low), select(ended, max(high, x_mark), high)
         swing = high - low
         stop = select(stops.slip_from == stops.slip_from, min(stops.slip_start, t_mark), t_mark) - stops.start
@@ -417,7 +382,7 @@ def _cycles(scene, r, stops, t, duration, x, velocity, v, up, down, turn, span):
         fast = swing * (2.0 * pi) / _pace(scene)
         mark = Mark(t_mark, x_mark, v_mark, total, stops.slips)
         # Without forcing the launch is not the end of a cycle.
-        new = cycles.closed(scene, c, mark, count, due | (c.count > 0.0), (count + 1.0) * period, swing, fast)
+        new = cycles.closed(scene, c, mark, count, due | (c.count > 0.0), swing, fast)
         return select_all(ended, new, old)
     return old
 
@@ -550,4 +515,4 @@ def _begin(scene, t, seen):
 
 @recorder.enter.implements(Belt, BristleBelt)
 def _enter(scene, record, t, seen):
-    return changed(record, shock.enter(record.shocks, t, seen[6]), record.tangent, record.section)
+    return _with_shocks(record, shock.enter(record.shocks, t, seen[6]))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from math import inf
 
-from ringsweep.compile import hook, inlined
+from ringsweep.compile import hook
 from ringsweep.models import section, tangent
 from ringsweep.models.belt.bristles import recoil_speed
 from ringsweep.models.belt.force import if_force, sliding_slopes, stuck_gradient, stuck_rates
-from ringsweep.models.belt.record import changed
+from ringsweep.models.belt.record import with_tangent
 from ringsweep.models.belt.series import SLOW
 from ringsweep.models.interface import implicit, variation
 from ringsweep.physics import drives, ring
@@ -42,33 +42,27 @@ def _end_of_cycle(asked, record):
     return record.cycles.next
 
 
-@inlined
-def _with(r, new):
-    """Record with another tangent."""
-    return changed(r, r.shocks, new, r.section)
-
-
 @variation.enter.implements(Belt)
 def _enter(scene, record, mode, rates):
     # A body stays in a dead band at any velocity in it; only one that comes from outside has that of the edge.
     arrives = stiction_band(scene.law) == 0.0 or record.tangent.gradient[1] != 0.0
-    return _with(record, tangent.enter(record.tangent, 0.0 if mode.sign == 0 and arrives else 1.0, rates))
+    return with_tangent(record, tangent.enter(record.tangent, 0.0 if mode.sign == 0 and arrives else 1.0, rates))
 
 
 @variation.enter.implements(BristleBelt)
 def _enter_with_bristles(scene, record, mode, rates):
-    return _with(record, tangent.enter(record.tangent, 1.0, rates))
+    return with_tangent(record, tangent.enter(record.tangent, 1.0, rates))
 
 
 @variation.advance.implements(Belt, BristleBelt)
 def _advance(scene, record, h, rates, weights, work):
-    return _with(record, tangent.advance(record.tangent, h, rates, weights, work))
+    return with_tangent(record, tangent.advance(record.tangent, h, rates, weights, work))
 
 
 @variation.switched.implements(Belt, BristleBelt)
 def _switched(scene, record, mode, guard, t, y):
     rates = record.tangent.rates
-    return _with(record, tangent.switched(record.tangent, _gradient(scene, mode, guard, t, y, rates)))
+    return with_tangent(record, tangent.switched(record.tangent, _gradient(scene, mode, guard, t, y, rates)))
 
 
 @hook

@@ -8,12 +8,12 @@ from __future__ import annotations
 from math import floor, inf, nan, pi, sqrt
 from typing import Any, NamedTuple
 
-from ringsweep.compile import absorbed, hook, inlined
+from ringsweep.compile import absorbed, hook, replacing
 from ringsweep.models import cycles, section, tangent
 from ringsweep.models.cycles import Cycles, Mark
 from ringsweep.models.interface import variation
 from ringsweep.models.interface.status import COMPLETE
-from ringsweep.models.turn import between
+from ringsweep.models.turn import Interval, between
 from ringsweep.numerics.terms import joined
 from ringsweep.physics.ring import BristleRing, Ring
 from ringsweep.quantities.flags import PERIODIC, TRANSIENT, UNBOUNDED
@@ -57,6 +57,10 @@ class LongRun(NamedTuple):
     section: Any
 
 
+#: Long run with another tangent, and with another section.
+with_tangent, _with_section = replacing("tangent"), replacing("section")
+
+
 @cycles.difference.implements(Ring, BristleRing)
 def _without_full_turns(scene, x, other):
     apart = x - other
@@ -84,9 +88,7 @@ def lent(long_run, scene, row):
 
 @lent.implements(LongRun)
 def _lent(long_run, scene, row):
-    r = long_run
-    points = section.lent(scene.section, r, row, _no_deflections(scene))
-    return LongRun(r.last, r.low, r.high, r.cycles, r.tangent, points)
+    return _with_section(long_run, section.lent(scene.section, long_run, row, _no_deflections(scene)))
 
 
 @hook
@@ -151,24 +153,25 @@ def observe(long_run, scene, stick_time, t, duration, seen):
 def _observe(long_run, scene, stick_time, t, duration, seen):
     r, c = long_run, long_run.cycles
     phi, omega = seen[0], seen[1]
-    low, high, now = min(r.low, phi), max(r.high, phi), c
+    now, cycles_now = Interval(t, duration, phi, omega), c
+    low, high = min(r.low, phi), max(r.high, phi)
     if t >= c.next:
         period = scene.forcing_period
         count = max(c.count + 1.0, floor(t / period))
         share = 1.0 - (t - count * period) / duration if duration > 0.0 else 1.0
         share = min(max(share, 0.0), 1.0)
         velocity = (1.0 - share) * r.last.velocity + share * omega
-        mark = Mark(count * period, between(r.last, duration, phi, omega, share), velocity, stick_time, 0.0)
+        mark = Mark(count * period, between(r.last, now, share), velocity, stick_time, 0.0)
         fast = (high - low) * (2.0 * pi) / _pace(scene)
-        now = cycles.closed(scene, c, mark, count, True, (count + 1.0) * period, high - low, fast)
+        cycles_now = cycles.closed(scene, c, mark, count, True, high - low, fast)
         low = high = mark.x
     return LongRun(
         Last(t, phi, omega),
         low,
         high,
-        now,
-        tangent.observe(r.tangent, scene, c, now, t, duration),
-        section.observe(scene.section, scene, r, now, t, duration, phi, omega, _deflections(scene, seen)),
+        cycles_now,
+        tangent.observe(r.tangent, scene, c, cycles_now, t, duration),
+        section.observe(scene.section, scene, r, cycles_now, now, _deflections(scene, seen)),
     )
 
 
@@ -177,13 +180,6 @@ def _pace(scene):
     """Period of a small swing without friction or period of the drive, whichever is shorter, s."""
     natural = 2.0 * pi * sqrt(scene.body.radius / scene.body.gravity) if scene.body.gravity > 0.0 else inf
     return min(natural, scene.forcing_period)
-
-
-@inlined
-def with_tangent(long_run, new):
-    """Long run with another tangent."""
-    r = long_run
-    return LongRun(r.last, r.low, r.high, r.cycles, new, r.section)
 
 
 @hook(optional=True)

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ringsweep.compile import inlined, unrolled
+from ringsweep.compile import inlined, replacing
 from ringsweep.models.interface import recorder, shock
 from ringsweep.models.interface.status import BROKEN, JAM, SEPARATED_1, SEPARATED_2, SEPARATED_BOTH
 from ringsweep.models.ring import long_run
@@ -177,10 +177,8 @@ def conclude(record, status, t, phi, omega):
     )
 
 
-@unrolled
-def with_long_run(length, record, new):
-    """Record with another long run, which is its last field."""
-    return ["return Record(" + "".join(f"record[{i}], " for i in range(length - 1)) + "new)"]
+#: Record with another long run.
+with_long_run = replacing("long_run")
 
 
 @recorder.begin.implements(Ring, BristleRing)

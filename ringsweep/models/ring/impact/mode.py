@@ -16,7 +16,7 @@ from __future__ import annotations
 from math import pi
 from typing import NamedTuple
 
-from ringsweep.compile import inlined
+from ringsweep.compile import inlined, replacing
 from ringsweep.models.ring.series import FAST
 from ringsweep.models.ring.series import Mode as ClosedMode
 from ringsweep.numerics.terms import FACTOR_ROWS
@@ -104,11 +104,13 @@ class Mode(NamedTuple):
     event: Event
 
 
+_with_passed = replacing("passed")
+
+
 @inlined
 def passing(event, turned):
     """An impact that closes all contacts, of which some open at once."""
-    e = event
-    return Event(e.kind, e.contact, e.speed, e.impulse, e.loss, e.violation, e.lasts, e.number, e.time, 1 + turned)
+    return _with_passed(event, 1 + turned)
 
 
 @inlined

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import nan
 from typing import Any, NamedTuple
 
-from ringsweep.compile import inlined
+from ringsweep.compile import inlined, replacing
 from ringsweep.models.interface import recorder
 from ringsweep.models.interface.status import COMPLETE, JAM
 from ringsweep.models.ring import record as of_ring
@@ -91,6 +91,11 @@ def begin(base):
     return Record(base, 0.0, 0.0, 0.0, nothing)
 
 
+#: Record with another record of the motion.
+with_base = replacing("base")
+_with_lost = replacing("lost")
+
+
 @recorder.begin.implements(ImpactRing)
 def _begin(scene, t, seen):
     return begin(recorder.begin(scene.closed, t, seen[:5]))
@@ -108,12 +113,6 @@ def _observe(scene, record, t, duration, stuck, seen):
 @recorder.enter.implements(ImpactRing)
 def _enter(scene, record, t, seen):
     return with_base(record, recorder.enter(scene.closed, record.base, t, seen[:5]))
-
-
-@inlined
-def with_base(record, base):
-    """Record with another record of the motion."""
-    return Record(base, record.gap_max, record.open_time, record.flight_time, record.lost)
 
 
 @inlined
@@ -179,7 +178,7 @@ def _after_event(scene, record, mode, t):
         r.tumbles + (1.0 if turned != r.turned else 0.0),
         t + event.lasts if recovers else nan if mode.open != NONE else r.t_recovered,
     )
-    return Record(record.base, record.gap_max, record.open_time, record.flight_time, found)
+    return _with_lost(record, found)
 
 
 @recorder.conclude.implements(ImpactRing)
