@@ -76,7 +76,7 @@ def test_determinant_of_the_balances_is_that_of_the_gap_accelerations():
     signs = set()
     for scene, body, phi, omega, K1, K2 in states():
         A, _ = matrix(scene, phi, omega, K1, K2)
-        determinant = ring.acceleration(body, K1, K2, np.sin(phi), np.cos(phi), omega)[1]
+        determinant = ring.acceleration(body, K1, K2, (np.sin(phi), np.cos(phi), omega))[1]
         expected = body.mass**2 * body.inertia * np.linalg.det(A) / np.sin(2.0 * body.beta)
         scale = body.mass**2 * body.inertia * abs(A).max() ** 2 / np.sin(2.0 * body.beta)
         assert determinant == pytest.approx(expected, abs=2e-5 * scale)
@@ -91,7 +91,7 @@ def test_reactions_keep_both_gaps_closed():
         if abs(np.linalg.det(A)) < 0.05 * abs(A).max() ** 2:
             continue
         compared += 1
-        found = ring.reactions(body, K1, K2, np.sin(phi), np.cos(phi), omega)
+        found = ring.reactions(body, K1, K2, (np.sin(phi), np.cos(phi), omega))
         expected = -np.linalg.solve(A, b)
         assert found == pytest.approx(expected, rel=1e-3, abs=1e-4 * abs(expected).max())
     assert compared > 100
@@ -104,7 +104,7 @@ def test_jams_of_the_determinant_and_of_D_are_different():
         D = (K1 - K2) * np.cos(2.0 * body.beta) + (1.0 + K1 * K2) * np.sin(2.0 * body.beta)
         A, b = matrix(scene, phi, omega, K1, K2)
         if D < 0.0 and np.linalg.det(A) > 0.0 and (np.linalg.solve(A, -b) > 0.0).all():
-            assert min(ring.reactions(body, K1, K2, np.sin(phi), np.cos(phi), omega)) > 0.0
+            assert min(ring.reactions(body, K1, K2, (np.sin(phi), np.cos(phi), omega))) > 0.0
             found += 1
     assert found > 0
 

@@ -126,6 +126,17 @@ def make(sign, region, entry_guard, places, contacts, zeros, event):
 
 
 @inlined
+def in_flight(places, turned, zeros, event):
+    """Mode of a body without contacts."""
+    return make(1, 0, -1, places, (BOTH, turned), zeros, event)
+
+
+#: Mode with another slip, and with other zeros of the gaps.
+with_slip, with_zeros = replacing("sign", "region", "entry_guard"), replacing("zeros_1", "zeros_2")
+_with_first, _with_second = replacing("place_1"), replacing("place_2")
+
+
+@inlined
 def code_of(mode):
     """Code of the states of a mode."""
     return float(mode.open + TURNED * mode.turned)
@@ -182,8 +193,8 @@ def place_of(mode):
 
 @inlined
 def with_place(mode, place):
-    """Places of a pivot whose contact that holds is at another place."""
-    return (mode.place_1, place) if mode.open == FIRST else (place, mode.place_2)
+    """Mode of a pivot whose contact that holds is at another place."""
+    return _with_second(mode, place) if mode.open == FIRST else _with_first(mode, place)
 
 
 @inlined

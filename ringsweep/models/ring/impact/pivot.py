@@ -31,13 +31,13 @@ from ringsweep.models.ring.impact.mode import (
     coefficients_there,
     delta_when_closed,
     holding,
-    make,
     place_of,
     with_place,
+    with_slip,
 )
 from ringsweep.models.ring.series import EQUAL, SLOW
 from ringsweep.physics import drives
-from ringsweep.physics.friction.velocity import KINETIC, friction_in, region_at, stiction_band
+from ringsweep.physics.friction.velocity import friction_in, region_at, stiction_band
 from ringsweep.physics.impact import inertia, side_of
 from ringsweep.physics.zones import leave_edge
 
@@ -136,24 +136,23 @@ def _heading(scene, y, sign):
 
 
 @inlined
-def begun(scene, t, y, places, contacts, zeros, event, stick_end):
+def begun(scene, t, y, stick, stick_end):
     """Status and mode of a pivot that begins in the state `y`, or whose sliding velocity is zero.
 
-    `stick_end` is 0 if the contact may stick; +1 or -1 if stick has just ended by breakaway in this direction.
+    `stick` is the mode if the contact sticks. `stick_end` is 0 if it may; +1 or -1 if stick has just ended by breakaway
+    in this direction.
     """
     body = scene.closed.body
     theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
-    contact, v = (2 if contacts[0] == 1 else 1), y[1]
-    f = frame(scene, contact, contacts[1], y, ring_omega)
+    contact, place, v = holding(stick), place_of(stick), y[1]
+    f = frame(scene, contact, stick.turned, y, ring_omega)
     rho = f.alpha - theta
-    place = places[1] if contact == 2 else places[0]
-    stick = make(0, KINETIC, -1, places, contacts, zeros, event)
     if isnan(f.alpha + f.psi_dot + ring_epsilon):
         return BROKEN, stick
     least = _ROUNDING * body.mass * size(scene, f)
     # The other contact, if it touches and does not move yet, must open by its acceleration.
     touches = y[2] == 0.0 and y[3] == 0.0
-    arm = 2.0 * scene.balls.half_distance * side_of(contact) * cos(delta_when_closed(body, contact, contacts[1]))
+    arm = 2.0 * scene.balls.half_distance * side_of(contact) * cos(delta_when_closed(body, contact, stick.turned))
     shut = -_SHUT * size(scene, f)
     if v == 0.0 and stiction_band(scene.law) == 0.0:
         mu_s, _, _ = coefficients_there(scene, place)
@@ -167,7 +166,7 @@ def begun(scene, t, y, places, contacts, zeros, event, stick_end):
         several = False
         for sign in (1, -1):
             there = leave_edge(scene.closed.surface, place, rho, _heading(scene, y, sign))
-            slip = make(sign, region, RING + SLOW, with_place(stick, there), contacts, zeros, event)
+            slip = with_slip(with_place(stick, there), sign, region, RING + SLOW)
             K, _ = friction(scene, slip, 0.0)
             psi_dd, alpha_dd, normal, denominator = in_slip(scene, f, K)
             push = sign * sliding_acceleration(scene, psi_dd, alpha_dd, ring_epsilon)
@@ -185,7 +184,7 @@ def begun(scene, t, y, places, contacts, zeros, event, stick_end):
         if best_sign == 0 or best < -least / body.mass:
             return JAM, stick
         there = leave_edge(scene.closed.surface, place, rho, _heading(scene, y, best_sign))
-        return RUNNING, make(best_sign, region, RING + SLOW, with_place(stick, there), contacts, zeros, event)
+        return RUNNING, with_slip(with_place(stick, there), best_sign, region, RING + SLOW)
     sign, region, entry_guard = (1 if v > 0.0 else -1), region_at(scene.law, abs(v)), -1
     if v == 0.0:
         # Friction is zero here, so that the ball slides in the direction in which the other forces accelerate it.
@@ -193,7 +192,7 @@ def begun(scene, t, y, places, contacts, zeros, event, stick_end):
         sign = 1 if sliding_acceleration(scene, psi_dd, alpha_dd, ring_epsilon) >= 0.0 else -1
         entry_guard = RING + SLOW
     there = leave_edge(scene.closed.surface, place, rho, _heading(scene, y, sign))
-    slip = make(sign, region, entry_guard, with_place(stick, there), contacts, zeros, event)
+    slip = with_slip(with_place(stick, there), sign, region, entry_guard)
     K, _ = friction(scene, slip, v)
     denominator = in_slip(scene, f, K)[3]
     return (RUNNING if denominator > 0.0 else JAM), slip

@@ -36,8 +36,8 @@ from ringsweep.models.ring.impact.mode import (
     coefficients_there,
     delta_when_closed,
     holding,
-    make,
     place_of,
+    with_slip,
 )
 from ringsweep.models.ring.series import (
     COS,
@@ -531,5 +531,4 @@ def true_gap(scene, measure):
 
 @series.after_first_step.implements(Mode)
 def _after_first_step(mode):
-    places, contacts, zeros = (mode.place_1, mode.place_2), (mode.open, mode.turned), (mode.zeros_1, mode.zeros_2)
-    return make(mode.sign, mode.region, -1, places, contacts, zeros, mode.event)
+    return with_slip(mode, mode.sign, mode.region, -1)

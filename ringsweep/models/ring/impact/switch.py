@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import cos, isnan, pi, sin
+from typing import NamedTuple
 
 from ringsweep.compile import inlined
 from ringsweep.models.interface import modes
@@ -29,23 +30,28 @@ from ringsweep.models.ring.impact.mode import (
     Mode,
     angle_when_closed,
     closed_mode,
+    code_of,
     coefficients_there,
     delta_when_closed,
     from_closed,
     holding,
+    in_flight,
     make,
     opens,
     passing,
     place_of,
     ring_of,
     with_place,
+    with_slip,
+    with_zeros,
 )
 from ringsweep.models.ring.series import DETERMINANT, EDGE, FAST, NEARLY_JAMMED, NORMAL_1, NORMAL_2, SLOW, leaves_behind
 from ringsweep.physics import drives, ring
-from ringsweep.physics.friction.velocity import friction_at, region_bounds
+from ringsweep.physics.friction.velocity import KINETIC, friction_at, region_bounds
 from ringsweep.physics.impact import (
     Contact,
     ImpactRing,
+    Impulses,
     Motion,
     after_impact,
     contact_of,
@@ -99,7 +105,7 @@ def motion_of(scene, y, ring_omega):
 
 
 @inlined
-def in_flight(motion, turned):
+def state_in_flight(motion, turned):
     """State of a body without contacts."""
     code = float(BOTH + TURNED * turned)
     return motion.psi, motion.psi_dot, motion.x, motion.x_dot, motion.y, motion.y_dot, code
@@ -126,9 +132,10 @@ def _presses(scene, contact, motion):
 
 
 @inlined
-def _opened(scene, t, y, turned, places, which, zeros, event):
-    """Status, mode and state after contacts of a closed ring have opened; `y` is the state of the closed ring."""
+def _opened(scene, t, y, before, which, zeros, event):
+    """Status, mode and state after contacts of a closed ring have opened; `y` and `before` are its state and mode."""
     _, ring_omega, _ = drives.turn(scene.drive, t)
+    places, turned = (before.place_1, before.place_2), before.turned
     if which != BOTH:
         state = y[0], y[1], 0.0, 0.0, 0.0, 0.0, float(which + TURNED * turned)
         contact = 2 if which == FIRST else 1
@@ -137,30 +144,29 @@ def _opened(scene, t, y, turned, places, which, zeros, event):
             places = places[0], (places[1][0], places[1][1] + 1)
         empty = (zeros, 0) if which == FIRST else (0, zeros)
         if pivot.load(scene, pivot.frame(scene, contact, turned, state, ring_omega)) > 0.0:
-            status, mode = pivot.begun(scene, t, state, places, (which, turned), empty, event, 0)
+            stick = make(0, KINETIC, -1, places, (which, turned), empty, event)
+            status, mode = pivot.begun(scene, t, state, stick, 0)
             return status, mode, state
         motion = motion_of(scene, state, ring_omega)
         if _presses(scene, 3 - contact, motion):
             # Neither contact can carry the body alone, and without both the one that is lost would close again.
             return JAM, make(1, 0, -1, places, (which, turned), empty, event), state
     closed = y[0], y[1], 0.0, 0.0, 0.0, 0.0, float(TURNED * turned)
-    state = in_flight(motion_of(scene, closed, ring_omega), turned)
-    return RUNNING, make(1, 0, -1, places, (BOTH, turned), (zeros, zeros), event), state
+    state = state_in_flight(motion_of(scene, closed, ring_omega), turned)
+    return RUNNING, in_flight(places, turned, (zeros, zeros), event), state
 
 
 @inlined
-def _after_closed(scene, status, found, t, y, turned, zeros, event, is_new):
-    """Status, mode and state from those of the closed ring; `y` is the pair of psi and v.
+def _after_closed(scene, status, mode, t, y, zeros, is_new):
+    """Status, mode and state from status and mode of the closed ring; `y` is the pair of psi and v.
 
-    `is_new` is whether `event` is the impact that has just closed the contacts.
+    `is_new` is whether the last event is the impact that has just closed the contacts.
     """
-    which = _separated(scene, status, turned)
-    after = from_closed(found, turned, event)
+    which, event = _separated(scene, status, mode.turned), mode.event
     if which != NONE:
-        places = after.place_1, after.place_2
-        lost = passing(event, turned) if is_new else opens(which, event.number, t)
-        return _opened(scene, t, y, turned, places, which, zeros, lost)
-    return status, after, (y[0], y[1], 0.0, 0.0, 0.0, 0.0, float(TURNED * turned))
+        lost = passing(event, mode.turned) if is_new else opens(which, event.number, t)
+        return _opened(scene, t, y, mode, which, zeros, lost)
+    return status, mode, (y[0], y[1], 0.0, 0.0, 0.0, 0.0, code_of(mode))
 
 
 @modes.initial_state.implements(ImpactRing)
@@ -183,21 +189,19 @@ def _taken_along(scene, t, wedged):
     f = pivot.frame(scene, holding(mode), mode.turned, y, ring_omega)
     psi_dd, alpha_dd, _, _ = pivot.in_stick(scene, f, ring_epsilon)
     state = y[0], y[1], y[2], (psi_dd - alpha_dd) / ring_epsilon * ring_omega, y[4], y[5], y[6]
-    places, contacts = (mode.place_1, mode.place_2), (mode.open, mode.turned)
-    zeros = (min(mode.zeros_1, 1), min(mode.zeros_2, 1))
-    return status, make(mode.sign, mode.region, mode.entry_guard, places, contacts, zeros, mode.event), state
+    return status, with_zeros(mode, min(mode.zeros_1, 1), min(mode.zeros_2, 1)), state
 
 
 @inlined
 def _start(scene, t, phi, v):
-    status, mode = modes.initial_mode(scene.closed, t, (phi, v))
-    nothing = Event(NO_EVENT, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, t, 0)
+    status, found = modes.initial_mode(scene.closed, t, (phi, v))
+    mode = from_closed(found, 0, Event(NO_EVENT, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, t, 0))
     if leaves_behind(scene.drive, scene.closed, t, v):
-        wedged = _after_closed(scene, status, mode, t, (phi, 0.0), 0, 2, nothing, False)
+        wedged = _after_closed(scene, status, mode, t, (phi, 0.0), 2, False)
         # A body that is wedged on one contact is taken along.
         if wedged[0] == RUNNING and wedged[1].sign == 0:
             return _taken_along(scene, t, wedged)
-    return _after_closed(scene, status, mode, t, (phi, v), 0, 2, nothing, False)
+    return _after_closed(scene, status, mode, t, (phi, v), 2, False)
 
 
 @modes.initial_mode.implements(ImpactRing)
@@ -218,7 +222,7 @@ def _switch(scene, mode, guard, t, y):
         state = angle_when_closed(y[0], turned), y[1]
         status, found, (_, v) = modes.switch(ring_of(scene, turned), closed_mode(mode), own, t, state)
         zeros = 3 if guard in (NORMAL_1, NORMAL_2) else 2
-        return _after_closed(scene, status, found, t, (y[0], v), turned, zeros, mode.event, False)
+        return _after_closed(scene, status, from_closed(found, turned, mode.event), t, (y[0], v), zeros, False)
     if guard == DETERMINANT:
         return JAM, mode, y
     reaches_1, reaches_2 = guard == NORMAL_1, guard == NORMAL_2
@@ -232,11 +236,9 @@ def _switch(scene, mode, guard, t, y):
         motion = motion_of(scene, y, ring_omega)
         if _presses(scene, contact, motion):
             return JAM, mode, y
-        state = in_flight(motion, mode.turned)
-        zeros = (3, mode.zeros_2) if contact == 1 else (mode.zeros_1, 3)
-        event = opens(contact, mode.event.number, t)
-        places = mode.place_1, mode.place_2
-        return RUNNING, make(1, 0, -1, places, (BOTH, mode.turned), _remaining(mode, y, zeros), event), state
+        zeros = _remaining(mode, y, (3, mode.zeros_2) if contact == 1 else (mode.zeros_1, 3))
+        flight = in_flight((mode.place_1, mode.place_2), mode.turned, zeros, opens(contact, mode.event.number, t))
+        return RUNNING, flight, state_in_flight(motion, mode.turned)
     return _on_one_contact(scene, mode, guard, t, y)
 
 
@@ -251,15 +253,14 @@ def _remaining(mode, y, zeros):
 @inlined
 def _on_one_contact(scene, mode, guard, t, y):
     """What follows in a pivot after an edge, at the bounds of a region of the law, at rest, and at breakaway."""
-    places, contacts = (mode.place_1, mode.place_2), (mode.open, mode.turned)
-    zeros, event, v = _remaining(mode, y, (mode.zeros_1, mode.zeros_2)), mode.event, y[1]
-    at_rest = y[0], 0.0, y[2], y[3], 0.0, 0.0, y[6]
+    v, at_rest = y[1], (y[0], 0.0, y[2], y[3], 0.0, 0.0, y[6])
     sign, region = mode.sign, mode.region
     if guard == EDGE:
-        places = with_place(mode, _beyond_nearer_edge(scene, mode, t, y))
+        mode = with_place(mode, _beyond_nearer_edge(scene, mode, t, y))
+    mode = with_zeros(mode, *_remaining(mode, y, (mode.zeros_1, mode.zeros_2)))
+    stick = with_slip(mode, 0, KINETIC, -1)
     if sign == 0:
-        stick_end = 0 if guard == EDGE else 1 if guard == SLOW else -1
-        return _begun(scene, t, at_rest, places, contacts, zeros, event, stick_end)
+        return _begun(scene, t, at_rest, stick, 0 if guard == EDGE else 1 if guard == SLOW else -1)
     entry_guard, (low, high) = RING + SLOW if v == 0.0 else -1, region_bounds(scene.law, region)
     # A formula may jump at the bound of a region.
     if guard == FAST:
@@ -267,7 +268,7 @@ def _on_one_contact(scene, mode, guard, t, y):
     elif guard == SLOW and low > 0.0:
         region, entry_guard, v = region - 1, RING + FAST, sign * low
     if guard != SLOW or low > 0.0:
-        found, state = make(sign, region, entry_guard, places, contacts, zeros, event), (y[0], v, *y[2:])
+        found, state = with_slip(mode, sign, region, entry_guard), (y[0], v, *y[2:])
         _, ring_omega, _ = drives.turn(scene.drive, t)
         K, _ = pivot.friction(scene, found, v)
         f = pivot.frame(scene, holding(found), found.turned, state, ring_omega)
@@ -276,8 +277,8 @@ def _on_one_contact(scene, mode, guard, t, y):
     mu_s, _, _ = coefficients_there(scene, place_of(mode))
     # A contact that nothing holds passes through rest.
     if region < 0 or mu_s == 0.0:
-        return RUNNING, make(-sign, region, RING + SLOW, places, contacts, zeros, event), at_rest
-    return _begun(scene, t, at_rest, places, contacts, zeros, event, 0)
+        return RUNNING, with_slip(mode, -sign, region, RING + SLOW), at_rest
+    return _begun(scene, t, at_rest, stick, 0)
 
 
 @inlined
@@ -291,17 +292,16 @@ def _beyond_nearer_edge(scene, mode, t, y):
 
 
 @inlined
-def _begun(scene, t, y, places, contacts, zeros, event, stick_end):
+def _begun(scene, t, y, stick, stick_end):
     """Status, mode and state of a pivot whose sliding velocity is zero; it may turn into a flight."""
-    status, found = pivot.begun(scene, t, y, places, contacts, zeros, event, stick_end)
+    status, found = pivot.begun(scene, t, y, stick, stick_end)
     _, ring_omega, _ = drives.turn(scene.drive, t)
-    contact = holding(found)
+    contact, turned = holding(stick), stick.turned
     # Friction in stick may have pressed the ball against the race: when it drops, the contact opens.
-    if status == JAM and not pivot.load(scene, pivot.frame(scene, contact, contacts[1], y, ring_omega)) > 0.0:
-        state = in_flight(motion_of(scene, y, ring_omega), contacts[1])
-        empty = (2, zeros[1]) if contact == 1 else (zeros[0], 2)
-        lost = opens(contact, event.number, t)
-        return RUNNING, make(1, 0, -1, places, (BOTH, contacts[1]), empty, lost), state
+    if status == JAM and not pivot.load(scene, pivot.frame(scene, contact, turned, y, ring_omega)) > 0.0:
+        zeros = (2, stick.zeros_2) if contact == 1 else (stick.zeros_1, 2)
+        flight = in_flight((stick.place_1, stick.place_2), turned, zeros, opens(contact, stick.event.number, t))
+        return RUNNING, flight, state_in_flight(motion_of(scene, y, ring_omega), turned)
     return status, found, y
 
 
@@ -318,6 +318,15 @@ def _impact_friction(scene, contact, theta):
 def _held(contact, v):
     """A contact that holds: its gap does not change, and its sliding velocity is a state."""
     return Contact(contact.alpha, contact.sine, contact.cosine, 0.0, 0.0, v, contact.lever_n, contact.lever_t)
+
+
+class _Impact(NamedTuple):
+    """An impact: both contacts before it, whether they touch, whether they are open after it, and what it does."""
+
+    before: tuple[Contact, Contact]
+    touch: tuple[bool, bool]
+    are_open: tuple[bool, bool]
+    found: Impulses
 
 
 @inlined
@@ -361,7 +370,7 @@ def _lands(scene, mode, hit, t, y):
                 # So slow an impact may be an error of the step.
                 return BROKEN, mode, y
             # Friction may forbid that a contact rebounds while the other one holds: among the last rebounds it closes.
-            lasts = _rebounds_end(scene, mode, t, y, motion, hit, closing, 0.0, _FORBIDDEN)
+            lasts = _rebounds_end(_falls(scene, mode, t, y, motion, hit), closing, 0.0, _FORBIDDEN * balls.reach)
             if lasts == 0.0:
                 return JAM, mode, y
             restitution = 0.0, 0.0
@@ -381,13 +390,15 @@ def _lands(scene, mode, hit, t, y):
             t,
             0,
         )
-        opened, contacts = (open_1, open_2), (first, second)
-        status, after_mode, state = _next(scene, t, after, contacts, opened, touching, found, mode, event)
+        impact = _Impact((first, second), touching, (open_1, open_2), found)
+        status, after_mode, state = _next(scene, t, after, mode, impact, event)
         rebounds_1, rebounds_2 = hits_1 and open_1, hits_2 and open_2
         if lasts > 0.0 or status != RUNNING or not (rebounds_1 or rebounds_2):
             return status, after_mode, state
-        ends_1 = _rebounds_end(scene, after_mode, t, state, after, 1, found.opening_1, e, SUMMED) if rebounds_1 else 0.0
-        ends_2 = _rebounds_end(scene, after_mode, t, state, after, 2, found.opening_2, e, SUMMED) if rebounds_2 else 0.0
+        falls_1 = _falls(scene, after_mode, t, state, after, 1) if rebounds_1 else 0.0
+        falls_2 = _falls(scene, after_mode, t, state, after, 2) if rebounds_2 else 0.0
+        ends_1 = _rebounds_end(falls_1, found.opening_1, e, SUMMED * balls.reach)
+        ends_2 = _rebounds_end(falls_2, found.opening_2, e, SUMMED * balls.reach)
         lasts = max(ends_1, ends_2)
         if lasts == 0.0:
             return status, after_mode, state
@@ -396,8 +407,8 @@ def _lands(scene, mode, hit, t, y):
 
 
 @inlined
-def _rebounds_end(scene, mode, t, y, motion, contact, speed, e, share):
-    """Time until the rebounds of a contact end, if the gap could not grow to this share of rho by then; 0 if it can."""
+def _falls(scene, mode, t, y, motion, contact):
+    """Acceleration with which the gap of an open contact closes, m/s^2; 0 if the contact holds."""
     gravity, acceleration = scene.closed.body.gravity, (0.0, 0.0, 0.0)
     if mode.open == BOTH:
         acceleration = 0.0, 0.0, -gravity
@@ -406,11 +417,16 @@ def _rebounds_end(scene, mode, t, y, motion, contact, speed, e, share):
         acceleration = _of_center(scene, mode, t, y, psi_dd, alpha_dd)
     else:
         return 0.0
-    falls = -gap_acceleration(scene.balls, contact, motion, acceleration)
+    return -gap_acceleration(scene.balls, contact, motion, acceleration)
+
+
+@inlined
+def _rebounds_end(falls, speed, e, most):
+    """Time until rebounds end in which the gap falls so, if it could not grow to `most`, m, by then; 0 if it can."""
     if not falls > 0.0 or e >= 1.0:
         return 0.0
     time = 2.0 * speed / (falls * (1.0 - e))
-    return time if time * time * falls <= share * scene.balls.reach else 0.0
+    return time if time * time * falls <= most else 0.0
 
 
 @inlined
@@ -425,11 +441,11 @@ def _of_center(scene, mode, t, y, psi_dd, alpha_dd):
 
 
 @inlined
-def _next(scene, t, motion, before, are_open, touched, found, mode, event):
-    """Status, mode and state after an impact; `before` are both contacts, `touched` whether they had a gap."""
+def _next(scene, t, motion, mode, impact, event):
+    """Status, mode and state after an impact; `motion` is that after it, `mode` the one before."""
     body, balls = scene.closed.body, scene.balls
     theta, ring_omega, _ = drives.turn(scene.drive, t)
-    first, second = before
+    (first, second), touched, are_open, found = impact
     two = ring.contact_count(body) == 2
     places = mode.place_1, mode.place_2
     # A contact that has touched has a new place.
@@ -439,8 +455,7 @@ def _next(scene, t, motion, before, are_open, touched, found, mode, event):
         places = places[0], locate(scene.closed.surface, second.alpha - theta)
     zeros = (1 if touched[0] and are_open[0] else 0), (1 if touched[1] and are_open[1] else 0)
     if are_open[0] and (are_open[1] or not two):
-        state = in_flight(motion, mode.turned)
-        return RUNNING, make(1, 0, -1, places, (BOTH, mode.turned), zeros, event), state
+        return RUNNING, in_flight(places, mode.turned, zeros, event), state_in_flight(motion, mode.turned)
     if not two or not (are_open[0] or are_open[1]):
         turned = 0
         psi = motion.psi
@@ -473,19 +488,19 @@ def _next(scene, t, motion, before, are_open, touched, found, mode, event):
     place = locate(scene.closed.surface, f.alpha - theta)
     places = (places[0], place) if contact == 2 else (place, places[1])
     if pivot.load(scene, f) > 0.0:
-        status, found_mode = pivot.begun(scene, t, state, places, (which, turned), zeros, event, 0)
+        stick = make(0, KINETIC, -1, places, (which, turned), zeros, event)
+        status, found_mode = pivot.begun(scene, t, state, stick, 0)
         return status, found_mode, state
     # The contact that has just closed opens again, without an impact.
     zeros = (zeros[0], 2) if contact == 2 else (2, zeros[1])
-    state = in_flight(motion, turned)
-    return RUNNING, make(1, 0, -1, places, (BOTH, turned), zeros, event), state
+    return RUNNING, in_flight(places, turned, zeros, event), state_in_flight(motion, turned)
 
 
 @inlined
 def _close(scene, t, psi, v, turned, event):
     """Status, mode and state after all contacts have closed."""
     status, found = modes.initial_mode(ring_of(scene, turned), t, (angle_when_closed(psi, turned), v))
-    return _after_closed(scene, status, found, t, (psi, v), turned, 2, event, True)
+    return _after_closed(scene, status, from_closed(found, turned, event), t, (psi, v), 2, True)
 
 
 @modes.status_when_stalled.implements(ImpactRing)
