@@ -82,7 +82,7 @@ def explore(
     """
     if is_sampled(ds):
         raise InputError("ds", "is a sampled sweep, which has no runs to point at: draw a picture, *.png")
-    found = Map.of(ds, x, y, var, sel or {})
+    found = Map.of(ds, (x, y), var, sel)
     first, _ = select(found.ds, at or {})
     first = first.isel({dim: size // 2 for dim, size in first.sizes.items()})
     figure = _figure()

@@ -147,7 +147,7 @@ def regime_map(
     >>> regime_map(ds, var="phi_max").axes[0].get_ylabel()
     'angle (°)'
     """
-    found = Map.of(ds, x, y, var, sel or {}, norm, cmap, units)
+    found = Map.of(ds, (x, y), var, sel, (norm, cmap), units)
     if boundaries is not None:
         found.entries.append(found.curve_entry(boundaries))
         if found.vertical is None:
@@ -248,7 +248,7 @@ def map_panel(
     >>> map_panel(ds, var="phi_max", ax=Figure().add_subplot()).get_ylabel()
     'phi_max (°)'
     """
-    found = Map.of(ds, x, y, var, sel or {})
+    found = Map.of(ds, (x, y), var, sel)
     ax = axes_or_current(ax, 0.65)
     found.draw_alone(ax, title, legend)
     return ax
@@ -299,17 +299,18 @@ class Map:
     def of(
         cls,
         ds: xr.Dataset,
-        x: str | None,
-        y: str | None,
+        axes: tuple[str | None, str | None],
         var: str,
-        sel: Mapping[str, float | str],
-        norm: str | None = None,
-        cmap: str | None = None,
+        sel: Mapping[str, float | str] | None,
+        colours: tuple[str | None, str | None] = (None, None),
         units: Mapping[str, str] | None = None,
     ) -> Map:
-        """Choose axes, panels and colours; arguments and errors as for :func:`regime_map`."""
+        """Choose axes, panels and colours; arguments and errors as for :func:`regime_map`.
+
+        `axes` are `x` and `y`, `colours` are `norm` and `cmap`.
+        """
         require_sweep(ds)
-        ds = in_units(ds, units)
+        ds, sel = in_units(ds, units), sel or {}
         if is_sampled(ds):
             var = "probability" if var == "regime" else var
             # Regimes that occur nowhere have no map.
@@ -326,9 +327,9 @@ class Map:
             raise InputError(
                 "sel" if sel else "ds", "a single cell has no map; at least one swept dimension must remain"
             )
-        horizontal, vertical = choose_axes(ds, data, x, y)
+        horizontal, vertical = choose_axes(ds, data, *axes)
         scattered = is_scattered(horizontal, vertical)
-        scale = ColourScale.of(data, norm, cmap)
+        scale = ColourScale.of(data, *colours)
         warnings = cell_warnings(ds, data)
         others = [str(d) for d in data.dims if d not in {*horizontal.dims, *(vertical.dims if vertical else ())}]
         panels = _panels(ds, others)

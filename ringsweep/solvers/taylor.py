@@ -7,10 +7,12 @@ from __future__ import annotations
 
 from math import isnan, nan
 
-from ringsweep.compile import inlined
+from ringsweep.compile import inlined, replacing
 from ringsweep.models.interface import modes, recorder, series, variation
 from ringsweep.numerics.series import ORDER, ascending, first_root
 from ringsweep.solvers.variation import along_series, enter_series
+
+_with_record = replacing("record")
 
 
 @inlined
@@ -42,10 +44,10 @@ def _first_event(c, first, entry_guard, h, work):
 
 
 @inlined
-def _observe(scene, record, run, s, scratch):
+def _observe(scene, run, s, scratch):
     """Record after a step of length `s` of the series, with the extremes within the step."""
     c, instants = scratch.c, scratch.work[0]
-    record = recorder.enter(scene, record, run.t, series.seen_at_start(scene, c))
+    record = recorder.enter(scene, run.record, run.t, series.seen_at_start(scene, c))
     count = series.extremes(scene, record, run.mode, c, s, scratch.work)
     ascending(instants, count)
     stuck = modes.sticks(scene, run.mode)
@@ -82,9 +84,8 @@ def series_step(scene, run, h_max, tolerance, scratch):
     """
     c = scratch.c
     reach = series.expand(scene, run.mode, run.t, run.y, tolerance, c)
-    record = enter_series(variation.asked(scene), scene, run.record, run.mode, c)
+    run = _with_record(run, enter_series(variation.asked(scene), scene, run.record, run.mode, c))
     h = min(reach, h_max)
     guard, s = _first_event(c, scratch.first_guard, run.mode.entry_guard, h, scratch.work)
-    if s > 0.0:
-        record = _observe(scene, record, run, s, scratch)
+    record = _observe(scene, run, s, scratch) if s > 0.0 else run.record
     return guard, s, series.state_at(scene, c, s), record, reach
