@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.config.scene import sweepable
-from ringsweep.config.sections import MAX_LENGTH, read_values, section_of, suggestion
+from ringsweep.config.sections import MAX_LENGTH, check_keys, read_values, section_of, suggestion
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError, nearest_name
 from ringsweep.models.scene import Scene
@@ -55,10 +55,7 @@ def sweep_section(doc: Document) -> dict[str, Any]:
     if "sweep" not in doc.tree:
         return {}
     section = section_of(doc.tree, "sweep", "")
-    known = ("grid", "points", "follow", "refine", "sample")
-    for key in section:
-        if key not in known:
-            raise InputError(f"sweep.{key}", "unknown key" + suggestion(key, known))
+    check_keys(section, ("grid", "points", "follow", "refine", "sample"), "sweep")
     if isinstance(section.get("points"), str):
         section["points"] = doc.inline_csv(section["points"], "sweep.points", "sweep.points")
     if isinstance(sample := section.get("sample"), dict) and isinstance(sample.get("of"), dict):

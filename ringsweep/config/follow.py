@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.config.axes import Axes
-from ringsweep.config.sections import suggestion
+from ringsweep.config.sections import check_keys, one_of, suggestion
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, model_of
@@ -71,19 +71,15 @@ def read_follow(given: Any, scene: Scene, axes: Axes) -> Follow | None:
     if given is None:
         return None
     section = given if isinstance(given, dict) else {"axis": given}
-    for key in section:
-        if key not in ("axis", "direction"):
-            raise InputError(f"sweep.follow.{key}", "unknown key" + suggestion(key, ("axis", "direction")))
+    check_keys(section, ("axis", "direction"), "sweep.follow")
     where = "sweep.follow.axis" if isinstance(given, dict) else "sweep.follow"
     if "axis" not in section:
         raise InputError(where, "missing: name a path that the sweep varies (for example `axis: force.frequency`)")
-    path, direction = section["axis"], section.get("direction", "up")
+    path = section["axis"]
     numeric = [name for name in axes.columns if name != LAW]
     if not isinstance(path, str) or path not in numeric:
         raise InputError(where, f"the sweep varies no number {show(path)}" + suggestion(path, numeric))
-    if direction not in DIRECTIONS:
-        problem = f"{show(direction)} is no direction" + suggestion(direction, DIRECTIONS)
-        raise InputError("sweep.follow.direction", problem)
+    direction = one_of(section.get("direction", "up"), DIRECTIONS, "sweep.follow.direction", "is no direction")
     dims, _ = axes.columns[path]
     if len(dims) > 1:
         raise InputError(where, f"{path} varies along {' and '.join(dims)}: follow a path with one dimension")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.config.sections import suggestion
+from ringsweep.config.sections import check_keys
 from ringsweep.config.tables import TABLES, read_table
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
@@ -92,9 +92,7 @@ def own_laws(friction: Mapping[str, Any]) -> dict[str, type]:
         path = f"scene.friction.laws.{name}"
         if not isinstance(section, Mapping) or "mu" not in section:
             raise InputError(path, "a section with the key mu is expected, and at_rest for a law that holds at rest")
-        for key in section:
-            if key not in ("mu", "at_rest"):
-                raise InputError(f"{path}.{key}", "unknown key" + suggestion(key, ("mu", "at_rest")))
+        check_keys(section, ("mu", "at_rest"), path)
         if not _may_name(name):
             raise InputError(path, f"{show(name)} cannot be the name of a law: choose another name")
         found[name] = _defined(Definition(section["mu"], section.get("at_rest")), path)

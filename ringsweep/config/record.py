@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from ringsweep.config.sections import section_of, suggestion
+from ringsweep.config.sections import boolean, check_keys, one_of, section_of
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS
 from ringsweep.models.scene import Section
 from ringsweep.quantities.parameters import Parameter
-from ringsweep.quantities.units import quantity, show
+from ringsweep.quantities.units import quantity
 
 #: Number of points of a section.
 KEEP = Parameter("1", "number of points, the last of a run", lower=1, upper=16384, default=64, whole=True)
@@ -33,12 +33,8 @@ def read_record(given: Any, model: str) -> tuple[bool, Section | None]:
         If it is no mapping, has an unknown key or a wrong value, or if the model has no exponent or no section.
     """
     record = section_of({"record": given}, "record", "")
-    for key in record:
-        if key not in ("exponent", "section"):
-            raise InputError(f"record.{key}", "unknown key" + suggestion(key, ("exponent", "section")))
-    exponent = record.get("exponent", False)
-    if not isinstance(exponent, bool):
-        raise InputError("record.exponent", f"true or false is expected, got {show(exponent)}")
+    check_keys(record, ("exponent", "section"), "record")
+    exponent = boolean(record.get("exponent", False), "record.exponent")
     if exponent and not MODELS[model].has_exponent:
         able = ", ".join(name for name, other in MODELS.items() if other.has_exponent)
         raise InputError("record.exponent", f"model {model} has none: it is known of model {able}; leave it out")
@@ -47,18 +43,14 @@ def read_record(given: Any, model: str) -> tuple[bool, Section | None]:
 
 def _section(record: dict[str, Any], model: str) -> Section:
     section = section_of(record, "section", "record.")
-    for key in section:
-        if key not in ("at", "keep", "period"):
-            raise InputError(f"record.section.{key}", "unknown key" + suggestion(key, ("at", "keep", "period")))
+    check_keys(section, ("at", "keep", "period"), "record.section")
     able = MODELS[model].sections
     if not able:
         others = ", ".join(name for name, other in MODELS.items() if other.sections)
         raise InputError("record.section", f"model {model} has none: it is known of model {others}; leave it out")
     if "at" not in section:
         raise InputError("record.section.at", f"missing: give {' or '.join(able)}")
-    at = section["at"]
-    if at not in able:
-        raise InputError("record.section.at", f"{show(at)} is no instant of a section" + suggestion(at, able))
+    at = one_of(section["at"], able, "record.section.at", "is no instant of a section")
     period = None
     if "period" in section:
         if at != "period":

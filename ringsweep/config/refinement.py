@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ringsweep.config.axes import Axes, dimension
-from ringsweep.config.sections import suggestion
+from ringsweep.config.sections import check_keys, one_of
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
 from ringsweep.models.scene import Scene
@@ -68,10 +68,7 @@ def read_refinement(given: Any, scene: Scene, axes: Axes) -> Refinement | None:
     section = {} if given is True else given
     if not isinstance(section, dict):
         raise InputError("sweep.refine", f"a section with keys, or true, is expected, got {show(given)}")
-    known = (*NUMBERS, "also", "within", "axes")
-    for key in section:
-        if key not in known:
-            raise InputError(f"sweep.refine.{key}", "unknown key" + suggestion(key, known))
+    check_keys(section, (*NUMBERS, "also", "within", "axes"), "sweep.refine")
     values = {
         key: quantity(section.get(key, parameter.default), parameter, f"sweep.refine.{key}")
         for key, parameter in NUMBERS.items()
@@ -99,9 +96,8 @@ def _dims(given: Any, axes: Axes) -> tuple[str, ...]:
             raise InputError("sweep.refine.axes", f"one or two paths of sweep.grid are expected, got {show(given)}")
         chosen = given
         for k, path in enumerate(chosen):
-            if path not in names:
-                problem = "is an axis of one value" if path in columns else "is no axis of numbers"
-                raise InputError(f"sweep.refine.axes.{k}", f"{show(path)} {problem}" + suggestion(path, names))
+            problem = "is an axis of one value" if path in columns else "is no axis of numbers"
+            one_of(path, names, f"sweep.refine.axes.{k}", problem)
     for path in chosen:
         steps = np.diff(names[path])
         if not ((steps > 0).all() or (steps < 0).all()):
@@ -124,9 +120,7 @@ def _also(section: dict[str, Any], scene: Scene) -> tuple[str | None, float | No
     model = model_of(scene.structure)
     variables = model.variables
     numbers = [name for name in model.outcomes if name not in model.absent and variables[name].dtype == "float64"]
-    also = section["also"]
-    if also not in numbers:
-        raise InputError("sweep.refine.also", f"{show(also)} is no number of this model" + suggestion(also, numbers))
+    also = one_of(section["also"], numbers, "sweep.refine.also", "is no number of this model")
     unit = variables[also].unit
     error = Parameter(unit, f"largest error of {also} where it is interpolated", lower=0, open_lower=True)
     return also, quantity(section["within"], error, "sweep.refine.within")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ringsweep.config.axes import MAX_CELLS, Axes, dimension, paths_of, read_spacing, swept_parameter
 from ringsweep.config.consistency import check_consistency
 from ringsweep.config.scene import sweepable
-from ringsweep.config.sections import read_values, suggestion
+from ringsweep.config.sections import boolean, check_keys, one_of, read_values, suggestion
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS
 from ringsweep.models.scene import Scene
@@ -206,9 +206,7 @@ def read_sample(given: Any, scene: Scene, axes: Axes) -> Sample | None:
         return None
     if not isinstance(given, dict):
         raise InputError("sweep.sample", f"a section with keys is expected, got {show(given)}")
-    for key in given:
-        if key not in KEYS:
-            raise InputError(f"sweep.sample.{key}", "unknown key" + suggestion(key, KEYS))
+    check_keys(given, KEYS, "sweep.sample")
     for key in ("n", "of"):
         if key not in given:
             example = "n: 1024" if key == "n" else "of: {body.mass: {normal: [76 g, 1 %]}}"
@@ -217,13 +215,9 @@ def read_sample(given: Any, scene: Scene, axes: Axes) -> Sample | None:
         key: int(quantity(given.get(key, parameter.default), parameter, f"sweep.sample.{key}"))
         for key, parameter in NUMBERS.items()
     }
-    method = given.get("method", METHODS[0])
-    if method not in METHODS:
-        raise InputError("sweep.sample.method", f"{show(method)} is not a method" + suggestion(method, METHODS))
+    method = one_of(given.get("method", METHODS[0]), METHODS, "sweep.sample.method", "is not a method")
     _check_number(method, numbers["n"], numbers["replicates"])
-    keep = given.get("keep", False)
-    if not isinstance(keep, bool):
-        raise InputError("sweep.sample.keep", f"true or false is expected, got {show(keep)}")
+    keep = boolean(given.get("keep", False), "sweep.sample.keep")
     sensitivity, sensitive = _sensitivity(given.get("sensitivity", False), scene, bool(given.get("survival")))
     found = Sample(
         _factors(given["of"], scene, axes),
@@ -414,9 +408,7 @@ def _sensitivity(given: Any, scene: Scene, timed: bool) -> tuple[str, tuple[str,
     if not isinstance(given, dict) or not {"of"} <= set(given) <= {"of", "method"}:
         problem = f"true, false, morris, or {{of: [t_end]}} is expected, got {show(given)}"
         raise InputError(where, problem + (suggestion(given, SENSITIVITIES) if isinstance(given, str) else ""))
-    method = given.get("method", SENSITIVITIES[0])
-    if method not in SENSITIVITIES:
-        raise InputError(f"{where}.method", f"{show(method)} is not a method" + suggestion(method, SENSITIVITIES))
+    method = one_of(given.get("method", SENSITIVITIES[0]), SENSITIVITIES, f"{where}.method", "is not a method")
     if not isinstance(given["of"], list) or not given["of"]:
         raise InputError(f"{where}.of", f"a list of variables is expected, got {show(given['of'])}")
     time = censored(scene)
@@ -425,8 +417,7 @@ def _sensitivity(given: Any, scene: Scene, timed: bool) -> tuple[str, tuple[str,
         if name == time and not timed:
             problem = f"{time} is missing in runs in which it does not happen: say at which times, by survival: [1 s]"
             raise InputError(f"{where}.of.{k}", problem)
-        if not isinstance(name, str) or name not in names:
-            raise InputError(f"{where}.of.{k}", f"{show(name)} is no number of this model" + suggestion(name, names))
+        one_of(name, names, f"{where}.of.{k}", "is no number of this model")
     return method, tuple(dict.fromkeys(given["of"]))
 
 

@@ -24,6 +24,27 @@ def suggestion(word: object, known: Iterable[str]) -> str:
     return (f"; did you mean `{near}`?" if near else "") + f" (known: {', '.join(names[:40])}{rest})"
 
 
+def check_keys(section: Iterable[Any], known: Iterable[str], path: str) -> None:
+    """Refuse keys of a section that are not known; `path` is that of the section."""
+    for key in section:
+        if key not in known:
+            raise InputError(f"{path}.{key}", "unknown key" + suggestion(key, known))
+
+
+def one_of(given: Any, known: Iterable[str], path: str, problem: str) -> str:
+    """The name given, which must be a known one; else it has this problem, such as ``"is not a method"``."""
+    if not isinstance(given, str) or given not in known:
+        raise InputError(path, f"{show(given)} {problem}" + suggestion(given, known))
+    return given
+
+
+def boolean(given: Any, path: str) -> bool:
+    """The value given, which must be true or false."""
+    if not isinstance(given, bool):
+        raise InputError(path, f"true or false is expected, got {show(given)}")
+    return given
+
+
 def missing_text(path: str, parameter: Parameter) -> str:
     """Message about a missing value: what it means, its unit and an example."""
     examples = {"rad": "15 deg", "m": "10 mm", "1": "0.2", "": "1"}
@@ -58,9 +79,7 @@ def read_values(given: Any, parameter: Parameter | Choice, where: str, most: int
 
 
 def _read_name(given: object, choice: Choice, path: str) -> str:
-    if not isinstance(given, str) or given not in choice.names:
-        raise InputError(path, f"{show(given)} is not a {choice.long_name}" + suggestion(given, choice.names))
-    return given
+    return one_of(given, choice.names, path, f"is not a {choice.long_name}")
 
 
 def section_of(parent: dict[str, Any], key: str, prefix: str) -> dict[str, Any]:
@@ -77,7 +96,4 @@ def choose(registry: Mapping[str, Any], section: dict[str, Any], path: str, what
     key = path.rpartition(".")[2]
     if key not in section:
         raise InputError(path, f"missing: name a {what}: {', '.join(registry)}")
-    name = section[key]
-    if not isinstance(name, str) or name not in registry:
-        raise InputError(path, f"{show(name)} is not a {what}" + suggestion(name, registry))
-    return name
+    return one_of(section[key], registry, path, f"is not a {what}")

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from typing import Any
 
 from ringsweep.config import yaml_text
-from ringsweep.config.sections import choose, missing_text, section_of, suggestion
+from ringsweep.config.sections import boolean, choose, missing_text, section_of, suggestion
 from ringsweep.errors import InputError
 from ringsweep.models.scene import Scene
 from ringsweep.quantities.parameters import declared
-from ringsweep.quantities.units import quantity, show
+from ringsweep.quantities.units import quantity
 from ringsweep.solvers import METHODS
 
 
@@ -47,10 +47,8 @@ def read_solver(solver: str | Mapping[str, Any], scene: Scene | None = None) -> 
         elif name in numbers:
             number = quantity(section[name], numbers[name], path)
             values[name] = int(number) if numbers[name].whole else number
-        elif isinstance(section[name], bool):
-            values[name] = section[name]
         else:
-            raise InputError(path, f"true or false is expected, got {show(section[name])}")
+            values[name] = boolean(section[name], path)
     found = method(**values)
     for structure in scene.structures.values() if scene else ():
         found.check(structure)
