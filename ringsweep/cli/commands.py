@@ -11,8 +11,8 @@ import json
 import logging
 import re
 import sys
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -110,12 +110,32 @@ def _silence_dask() -> None:
             logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
+@contextmanager
+def _naming(dataset: Path) -> Iterator[None]:
+    """Name the file in errors about a dataset."""
+    try:
+        yield
+    except InputError as error:
+        if error.path == "ds":
+            raise InputError(str(dataset), error.problem) from error
+        raise
+
+
+def _picture_of(dataset: Path, output: str | None, *parts: str | None) -> Path:
+    """Path of a picture of a dataset: `output`, or its name with these parts; checked before anything is drawn."""
+    from ringsweep.storage import files
+
+    target = Path(output or dataset.with_name("-".join([dataset.stem, *filter(None, parts)]) + ".png"))
+    files.check_writable(target)
+    return target
+
+
 def map_command(arguments: argparse.Namespace) -> None:
     """Draw a variable of a sweep."""
     from ringsweep.storage import netcdf
 
     dataset = Path(arguments.dataset)
-    with netcdf.reading(dataset) as result:
+    with netcdf.reading(dataset) as result, _naming(dataset):
         _draw_map(arguments, dataset, result)
 
 
@@ -123,7 +143,7 @@ def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None
     from ringsweep import plots
     from ringsweep.plots.sections import POINTS, has_circle, has_diagram, points_of
     from ringsweep.plots.selection import select
-    from ringsweep.storage import files, netcdf
+    from ringsweep.storage import netcdf
 
     selection = dict(_selection(text) for text in arguments.sel)
     fixed = {name.replace(".", "_") for name in selection}
@@ -140,9 +160,8 @@ def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None
 
         result = attractors(result)
     # The name differs from that of the regime map of the sweep, which must not be replaced.
-    shown = [arguments.var] * (arguments.var != "regime") + [_name_part(held) for held in arguments.sel]
-    target = Path(arguments.output or dataset.with_name("-".join([dataset.stem, *shown]) + ".png"))
-    files.check_writable(target)
+    shown = None if arguments.var == "regime" else arguments.var
+    target = _picture_of(dataset, arguments.output, shown, *map(_name_part, arguments.sel))
     page = target.suffix.lower() == ".html"
     if page and arguments.log:
         raise InputError("--log", "is for pictures, not for a page: name the output *.png")
@@ -151,41 +170,36 @@ def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None
     if arguments.tolerance is not None and arguments.boundaries is None:
         raise InputError("--tolerance", "is that of --boundaries REGIME")
     curves = None
-    try:
-        if arguments.boundaries is not None:
-            from ringsweep.plots.datasets import is_sampled
-            from ringsweep.plots.selection import select_grid
-            from ringsweep.runs.boundaries import boundary, run_at
+    if arguments.boundaries is not None:
+        from ringsweep.plots.datasets import is_sampled
+        from ringsweep.plots.selection import select_grid
+        from ringsweep.runs.boundaries import boundary, run_at
 
-            tolerance = 1e-6 if arguments.tolerance is None else arguments.tolerance
-            sampled = is_sampled(result)
-            located = _at_medians(result) if sampled else result
-            held = {name: value for name, value in selection.items() if name != "word" or not sampled}
-            located, missing = select_grid(located, held)
-            if missing:
-                located = run_at(located, missing, arguments.boundaries)
-            curves = boundary(located, arguments.boundaries, tolerance)
-            if sampled:
-                selection["word"] = arguments.boundaries
-            else:
-                # The picture shows the cells between which the curves lie.
-                result, selection = located, {}
-            written = dataset.with_name(f"{target.stem}-{arguments.boundaries}.nc")
-            netcdf.save(curves, written)
-            print(f"wrote {written}")
-        chosen = (arguments.x, arguments.y, arguments.var, selection)
-        if page:
-            plots.save_page(result, target, *chosen)
-        elif diagram:
-            plots.save(plots.bifurcation(result, arguments.x, arguments.var, selection), target)
-        elif circle:
-            plots.save(_panel(plots.multiplier_circle, select(result, selection)[0], x=arguments.x), target)
+        tolerance = 1e-6 if arguments.tolerance is None else arguments.tolerance
+        sampled = is_sampled(result)
+        located = _at_medians(result) if sampled else result
+        held = {name: value for name, value in selection.items() if name != "word" or not sampled}
+        located, missing = select_grid(located, held)
+        if missing:
+            located = run_at(located, missing, arguments.boundaries)
+        curves = boundary(located, arguments.boundaries, tolerance)
+        if sampled:
+            selection["word"] = arguments.boundaries
         else:
-            plots.save(plots.regime_map(result, *chosen, curves, norm="log" if arguments.log else None), target)
-    except InputError as error:
-        if error.path == "ds":
-            raise InputError(str(dataset), error.problem) from error
-        raise
+            # The picture shows the cells between which the curves lie.
+            result, selection = located, {}
+        written = dataset.with_name(f"{target.stem}-{arguments.boundaries}.nc")
+        netcdf.save(curves, written)
+        print(f"wrote {written}")
+    chosen = (arguments.x, arguments.y, arguments.var, selection)
+    if page:
+        plots.save_page(result, target, *chosen)
+    elif diagram:
+        plots.save(plots.bifurcation(result, arguments.x, arguments.var, selection), target)
+    elif circle:
+        plots.save(_panel(plots.multiplier_circle, select(result, selection)[0], x=arguments.x), target)
+    else:
+        plots.save(plots.regime_map(result, *chosen, curves, norm="log" if arguments.log else None), target)
     print(f"wrote {target}")
 
 
@@ -217,7 +231,7 @@ def plot_command(arguments: argparse.Namespace) -> None:
     from ringsweep.storage import netcdf
 
     dataset = Path(arguments.dataset)
-    with netcdf.reading(dataset) as result:
+    with netcdf.reading(dataset) as result, _naming(dataset):
         _plot(arguments, dataset, result)
 
 
@@ -226,7 +240,6 @@ def _plot(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
 
     from ringsweep import plots
     from ringsweep.plots.datasets import is_sampled, resolve
-    from ringsweep.storage import files
 
     if "standard_error" in result:
         given = (arguments.kind, arguments.law, arguments.word, arguments.begin, arguments.end)
@@ -244,11 +257,9 @@ def _plot(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
         raise InputError(option, f"is for a sampled sweep, and {dataset} is none")
     if not {"time", "contender"} & set(result.dims):
         raise InputError(str(dataset), f"is a sweep, not the history of a run: ringsweep map {dataset} draws it")
-    shown = [name for name in (arguments.kind, arguments.law) if name is not None]
-    target = Path(arguments.output or dataset.with_name("-".join([dataset.stem, *shown]) + ".png"))
-    files.check_writable(target)
+    target = _picture_of(dataset, arguments.output, arguments.kind, arguments.law)
     cut = slice(arguments.begin, arguments.end)
-    if "contender" in result.dims and (shown or cut != slice(None)):
+    if "contender" in result.dims and (arguments.kind or arguments.law or cut != slice(None)):
         raise InputError(str(dataset), "holds errors against run time: --kind, --law, --from, --to are for histories")
     if arguments.law is not None:
         if "friction_law" not in result.dims:
@@ -262,19 +273,14 @@ def _plot(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
             raise InputError(
                 "--from", f"{dataset} has times from {times[0]:g} to {times[-1]:g} s: none in this interval"
             )
-    try:
-        if "contender" in result.dims:
-            figure = plots.work_precision(result)
-        elif arguments.kind is None:
-            figure = plots.history(result)
-        else:
-            figure = Figure(figsize=(7.6, 4.8), layout="constrained")
-            draw = plots.phase_portrait if arguments.kind == "phase" else plots.friction_loop
-            draw(result, ax=figure.add_subplot())
-    except InputError as error:
-        if error.path == "ds":
-            raise InputError(str(dataset), error.problem) from error
-        raise
+    if "contender" in result.dims:
+        figure = plots.work_precision(result)
+    elif arguments.kind is None:
+        figure = plots.history(result)
+    else:
+        figure = Figure(figsize=(7.6, 4.8), layout="constrained")
+        draw = plots.phase_portrait if arguments.kind == "phase" else plots.friction_loop
+        draw(result, ax=figure.add_subplot())
     plots.save(figure, target)
     print(f"wrote {target}")
 
@@ -286,7 +292,6 @@ def _plot_sample(arguments: argparse.Namespace, dataset: Path, result: Any) -> N
     """Draw one cell of a sampled sweep."""
     from ringsweep import plots
     from ringsweep.plots.selection import select
-    from ringsweep.storage import files
 
     if arguments.law is not None or arguments.begin is not None or arguments.end is not None:
         raise InputError(str(dataset), "is a sampled sweep: --law, --from, --to are for histories")
@@ -295,18 +300,10 @@ def _plot_sample(arguments: argparse.Namespace, dataset: Path, result: Any) -> N
     kind = arguments.kind or "probability"
     if arguments.word is not None and kind != "sensitivity":
         raise InputError("--word", "is that of --kind sensitivity")
-    shown = [part for part in (arguments.kind, *map(_name_part, arguments.sel)) if part]
-    target = Path(arguments.output or dataset.with_name("-".join([dataset.stem, *shown]) + ".png"))
-    files.check_writable(target)
+    target = _picture_of(dataset, arguments.output, arguments.kind, *map(_name_part, arguments.sel))
     result, _ = select(result, dict(_selection(text) for text in arguments.sel))
     draw = getattr(plots, f"{kind}_panel")
-    try:
-        figure = _panel(draw, result, **({"word": arguments.word} if arguments.word else {}))
-    except InputError as error:
-        if error.path == "ds":
-            raise InputError(str(dataset), error.problem) from error
-        raise
-    plots.save(figure, target)
+    plots.save(_panel(draw, result, **({"word": arguments.word} if arguments.word else {})), target)
     print(f"wrote {target}")
 
 

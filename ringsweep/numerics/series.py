@@ -43,6 +43,14 @@ def slope(c, s):
 
 
 @inlined
+def differentiate(row, derivative):
+    """Fill the row `derivative` with the derivative of a series."""
+    for k in range(ORDER):
+        derivative[k] = (k + 1.0) * row[k + 1]
+    derivative[ORDER] = 0.0
+
+
+@inlined
 def step_size(last, previous):
     """Longest step within which the last two terms of a series stay within the tolerance, s.
 

@@ -68,6 +68,15 @@ def laws_at(scene: Scene, axes: Axes, indices: Indices, count: int) -> NDArray[n
     return np.asarray(names[tuple(indices[dim] for dim in dims)])
 
 
+def by_law(scene: Scene, axes: Axes, indices: Indices, count: int) -> Iterator[tuple[Structure, NDArray[np.intp]]]:
+    """Which of `count` cells have each friction law: a batch has one law, since each law has kernels of its own."""
+    laws = laws_at(scene, axes, indices, count)
+    for law, structure in scene.structures.items():
+        own = np.flatnonzero(laws == law)
+        if len(own):
+            yield structure, own
+
+
 @dataclass(frozen=True)
 class TaskResult:
     """Outcomes of the cells of a task.
@@ -103,12 +112,7 @@ def compute_task(config: Config, layout: Layout, positions: NDArray[np.integer])
     compiles = compiled not in _compiled
     start = perf_counter()
     columns: dict[str, NDArray[Any]] = {}
-    laws = laws_at(scene, axes, indices, len(positions))
-    # Each law has kernels of its own, so a batch has one law.
-    for law, structure in scene.structures.items():
-        own = np.flatnonzero(laws == law)
-        if not len(own):
-            continue
+    for structure, own in by_law(scene, axes, indices, len(positions)):
         with readable_compile_errors(), _named_if_long(axes, indices, compiles):
             for cells, found in _runs(config, structure, indices, own):
                 # A bound beyond the range of a float of 32 bits is infinite.

@@ -37,7 +37,7 @@ from ringsweep.statistics import (
     summarised,
 )
 from ringsweep.storage import netcdf
-from ringsweep.storage.chunks import CHUNK, Layout
+from ringsweep.storage.chunks import CHUNK, Layout, chunk_shape
 from ringsweep.storage.provenance import differences, environment, fingerprint, identity, processor
 
 Columns = dict[str, NDArray[Any]]
@@ -51,13 +51,8 @@ def grid_layout(config: Config, whole: bool = False) -> Layout:
     sizes = tuple(config.axes.sizes.values())
     if whole:
         return Layout(sizes, sizes)
-    layout = Layout(sizes)
     most = max(int(_CHUNK_BYTES / (bytes_of_part(config) * _sample(config).replicates)), 1)
-    shape = list(layout.chunk)
-    while math.prod(shape) > most:
-        longest = shape.index(max(shape))
-        shape[longest] = -(-shape[longest] // 2)
-    return Layout(sizes, shape)
+    return Layout(sizes, chunk_shape(sizes, min(most, CHUNK)))
 
 
 def part_layout(config: Config, grid: Layout) -> Layout:

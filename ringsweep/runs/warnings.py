@@ -16,7 +16,7 @@ from ringsweep.physics import drives, ring, zones
 from ringsweep.physics.drives import Constant
 from ringsweep.quantities.flags import FAILED, JAMMED, REGIMES, RIDING, SEPARATING
 from ringsweep.quantities.variables import INFERRED
-from ringsweep.runs.cells import laws_at, values_at
+from ringsweep.runs.cells import by_law, laws_at, values_at
 from ringsweep.solvers.automaton import PATIENCE
 from ringsweep.solvers.rk4 import STABILITY_LIMIT
 from ringsweep.storage.chunks import Layout
@@ -276,11 +276,8 @@ def _spans_of_first_slip(config: Config, cells: NDArray[np.intp] | None) -> NDAr
     scene, axes = config.scene, config.axes
     count = 1 if cells is None else len(cells)
     indices = {} if cells is None else dict(zip(axes.sizes, cells.T, strict=True))
-    laws, spans = laws_at(scene, axes, indices, count), np.full(count, np.inf)
-    for law, structure in scene.structures.items():
-        own = np.flatnonzero(laws == law)
-        if not len(own):
-            continue
+    spans = np.full(count, np.inf)
+    for structure, own in by_law(scene, axes, indices, count):
         body = batch(structure, values_at(scene, axes, {dim: along[own] for dim, along in indices.items()}, len(own)))
         if isinstance(body.drive, Constant):
             velocity = body.drive.amplitude

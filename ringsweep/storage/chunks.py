@@ -34,7 +34,7 @@ class Layout:
     def __init__(self, sizes: Sequence[int], chunk: Sequence[int] | None = None, points: int = 1):
         self.sizes = tuple(sizes)
         self.total = math.prod(self.sizes)
-        self.chunk = tuple(chunk) if chunk is not None else _chunk_shape(self.sizes, max(CHUNK // points, 1))
+        self.chunk = tuple(chunk) if chunk is not None else chunk_shape(self.sizes, max(CHUNK // points, 1))
 
     @cached_property
     def _chunks(self) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
@@ -79,7 +79,8 @@ class Layout:
             yield int(start), int(start + shape.prod()), region
 
 
-def _chunk_shape(sizes: tuple[int, ...], most: int) -> tuple[int, ...]:
+def chunk_shape(sizes: Sequence[int], most: int) -> tuple[int, ...]:
+    """Lengths of a chunk of at most so many cells: the longest dimension is halved until they fit."""
     shape = list(sizes)
     while math.prod(shape) > most:
         longest = shape.index(max(shape))

@@ -33,6 +33,7 @@ from ringsweep.numerics.series import (
     INVERSE,
     ORDER,
     crossings,
+    differentiate,
     step_size,
     value,
     variation,
@@ -572,9 +573,7 @@ def _extremes(scene, record, mode, c, h, work):
     ):
         change = variation(c[row], h)
         if c[row, 0] - change < lowest or c[row, 0] + change > highest:
-            for k in range(ORDER):
-                c[SPARE, k] = (k + 1.0) * c[row, k + 1]
-            c[SPARE, ORDER] = 0.0
+            differentiate(c[row], c[SPARE])
             count = crossings(c[SPARE], h, work, count)
     # The drive may end its next period.
     rest = long_run.rest(record.long_run)

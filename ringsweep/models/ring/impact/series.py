@@ -58,7 +58,7 @@ from ringsweep.models.ring.series import (
     V,
 )
 from ringsweep.models.sliding import REACTION_TOLERANCE
-from ringsweep.numerics.series import INVERSE, ORDER, crossings, slope, step_size, value, variation
+from ringsweep.numerics.series import INVERSE, ORDER, crossings, differentiate, slope, step_size, value, variation
 from ringsweep.numerics.terms import inner_products, joined, no_factors, part_from, set_factors, set_terms, terms
 from ringsweep.physics import drives, ring
 from ringsweep.physics.friction.velocity import (
@@ -450,17 +450,9 @@ def _rates_at(scene, c, s):
     eta_dot = eta_dd = 0.0
     if contacts != NONE:
         eta_dot = slope(c[ETA], s)
-        _differentiate(c, ETA)
+        differentiate(c[ETA], c[SPARE])
         eta_dd = slope(c[SPARE], s)
     return psi_dot, slope(c[RING + V], s), eta_dot, eta_dd, 0.0, 0.0, 0.0
-
-
-@inlined
-def _differentiate(c, row):
-    """Fill SPARE with the derivative of a row."""
-    for k in range(ORDER):
-        c[SPARE, k] = (k + 1.0) * c[row, k + 1]
-    c[SPARE, ORDER] = 0.0
 
 
 @inlined
@@ -505,7 +497,7 @@ def _extremes(scene, record, mode, c, h, work):
         (GAP_2, mode.open >= 2 and ring.contact_count(scene.closed.body) == 2),
     ):
         if is_open and c[row, 0] + variation(c[row], h) > record.gap_max:
-            _differentiate(c, row)
+            differentiate(c[row], c[SPARE])
             count = crossings(c[SPARE], h, work, count)
     if mode.open == BOTH:
         return count
@@ -517,7 +509,7 @@ def _extremes(scene, record, mode, c, h, work):
     own, highest = (RING + NORMAL_2, base.normal_max_2) if mode.open == FIRST else (RING + NORMAL_1, base.normal_max_1)
     # A contact that has been lost has had a reaction of zero: only the greatest one is new.
     if c[own, 0] + variation(c[own], h) > highest:
-        _differentiate(c, own)
+        differentiate(c[own], c[SPARE])
         count = crossings(c[SPARE], h, work, count)
     return count
 
