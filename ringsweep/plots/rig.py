@@ -95,7 +95,7 @@ def _on_race(ds: xr.Dataset, rig: Rig) -> dict[str, NDArray[Any]]:
     """Forces and places of a body whose contacts all hold, or of one with a single contact."""
     phi, omega = ds["phi"].values, ds["omega"].values
     epsilon, first = ds["epsilon"].values, ds["normal_1"].values
-    _, _, *forces = ring.held(rig.body, 1.0, np.sin(phi), np.cos(phi), omega, omega**2, epsilon, first)
+    _, _, *forces = ring.held(rig.body, 1.0, (np.sin(phi), np.cos(phi), omega), omega**2, epsilon, first)
     distance = getattr(rig.body, "xi", rig.radius - rig.ball)
     if "gap_1" in ds:
         # A particle is drawn as a ball within the race.
