@@ -40,7 +40,7 @@ _TERMS, _FACTORS = Lanes(ORDER), Lanes(PRODUCTS)
 _TERMS_VECTOR = ir.VectorType(ir.DoubleType(), ORDER)
 
 
-def _compiled(body: Any, function: Any) -> None:
+def _in_kernels(function: Any, body: Any) -> None:
     """Let kernels call `body` in place of `function`."""
     specialise(function, lambda *kinds: body, absorb=True)
 
@@ -87,11 +87,7 @@ def terms(c):
     return c[1 : ORDER + 1]
 
 
-def _terms_in_kernel(c):
-    return _load_terms(c, 1)
-
-
-_compiled(_terms_in_kernel, terms)
+_in_kernels(terms, lambda c: _load_terms(c, 1))
 
 
 def set_terms(c, values):
@@ -99,11 +95,7 @@ def set_terms(c, values):
     c[1 : ORDER + 1] = values
 
 
-def _set_terms_in_kernel(c, values):
-    _store_terms(c, 1, values)
-
-
-_compiled(_set_terms_in_kernel, set_terms)
+_in_kernels(set_terms, lambda c, values: _store_terms(c, 1, values))
 
 
 def numbers_from(values, first):
@@ -111,11 +103,7 @@ def numbers_from(values, first):
     return values[first : first + ORDER]
 
 
-def _numbers_in_kernel(values, first):
-    return _load_terms(values, first)
-
-
-_compiled(_numbers_in_kernel, numbers_from)
+_in_kernels(numbers_from, lambda values, first: _load_terms(values, first))
 
 
 def powers(s):
@@ -142,7 +130,7 @@ def _powers_in_kernel(s):
     return _powers(s)
 
 
-_compiled(_powers_in_kernel, powers)
+_in_kernels(powers, _powers_in_kernel)
 
 
 def total(values):
@@ -165,7 +153,7 @@ def _total_in_kernel(values):
     return _total(values)
 
 
-_compiled(_total_in_kernel, total)
+_in_kernels(total, _total_in_kernel)
 
 
 # ---- products of several series ---------------------------------------------------------------

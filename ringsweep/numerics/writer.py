@@ -11,10 +11,10 @@ needs a side that calls functions.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 
 from ringsweep.numerics.expressions import ONE, Node, add, derivative, multiply, nodes_of, number
 
@@ -130,15 +130,20 @@ def float_lines(names: Mapping[str, str], outputs: list[Node], side: str) -> lis
 
 def _floats(writer: _Writer, outputs: list[Node], side: str) -> None:
     for threshold, switches in _frontier(outputs, writer.known).items():
-        targets = [writer.new("0.0") for _ in switches]
-        for k, head in enumerate((f"if {side.format(threshold)}:", "else:")):
-            parts = [node.parts[k] for node in switches]
-            with writer.block(head):
-                _floats(writer, parts, side)
-                for target, part in zip(targets, parts, strict=True):
-                    writer.write(f"{target} = {writer.known[part]}")
-        writer.known.update(zip(switches, targets, strict=True))
+        _branch(writer, switches, side.format(threshold), partial(_floats, writer, side=side))
     _straight(writer, outputs)
+
+
+def _branch(writer: _Writer, switches: list[Node], below: str, compute: Callable[[list[Node]], None]) -> None:
+    """Compute switches of one threshold: on each side of it only the parts of that side, by `compute`."""
+    targets = [writer.new("0.0") for _ in switches]
+    for k, head in enumerate((f"if {below}:", "else:")):
+        parts = [node.parts[k] for node in switches]
+        with writer.block(head):
+            compute(parts)
+            for target, part in zip(targets, parts, strict=True):
+                writer.write(f"{target} = {writer.known[part]}")
+    writer.known.update(zip(switches, targets, strict=True))
 
 
 def varies_lines(output: Node, side: str) -> list[str]:
@@ -280,14 +285,7 @@ def series_source(names: Mapping[str, str], outputs: list[Node], side: str) -> S
 def _begin(writer: _Writer, step: _Step, outputs: list[Node], side: str) -> None:
     """Compute coefficient 0 of outputs, and all that the steps need of it."""
     for threshold, switches in _frontier(outputs, writer.known).items():
-        targets = [writer.new("0.0") for _ in switches]
-        for k, head in enumerate((f"if {side.format(threshold)}:", "else:")):
-            parts = [node.parts[k] for node in switches]
-            with writer.block(head):
-                _begin(writer, step, parts, side)
-                for target, part in zip(targets, parts, strict=True):
-                    writer.write(f"{target} = {writer.known[part]}")
-        writer.known.update(zip(switches, targets, strict=True))
+        _branch(writer, switches, side.format(threshold), partial(_begin, writer, step, side=side))
         for node in switches:
             _keep(writer, step, node, side)
     before = set(writer.known)

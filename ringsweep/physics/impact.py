@@ -150,14 +150,19 @@ def relative_to_race(motion, ring_omega):
 
 
 @inlined
-def contact_of(balls, contact, motion):
-    """A ball and the point of the race next to it; its slip is right if `motion` is relative to the race."""
+def _center_of_ball(balls, contact, motion):
+    """Place of a ball's centre from the centre of mass, and from the axis, m; and its velocity, m/s."""
     side, s, c = side_of(contact), sin(motion.psi), cos(motion.psi)
     a, h = side * balls.half_distance, balls.offset
-    # From the centre of mass to the centre of the ball.
     across, up = -h * s - a * c, h * c - a * s
-    x, y = motion.x + across, motion.y + up
-    x_dot, y_dot = motion.x_dot - motion.psi_dot * up, motion.y_dot + motion.psi_dot * across
+    velocity = motion.x_dot - motion.psi_dot * up, motion.y_dot + motion.psi_dot * across
+    return (across, up), (motion.x + across, motion.y + up), velocity
+
+
+@inlined
+def contact_of(balls, contact, motion):
+    """A ball and the point of the race next to it; its slip is right if `motion` is relative to the race."""
+    (across, up), (x, y), (x_dot, y_dot) = _center_of_ball(balls, contact, motion)
     distance = hypot(x, y)
     sine, cosine = x / distance, -y / distance
     return Contact(
@@ -175,12 +180,8 @@ def contact_of(balls, contact, motion):
 @inlined
 def gap_acceleration(balls, contact, motion, acceleration):
     """Second derivative of a gap, m/s^2; `acceleration` is that of psi, x and y."""
-    side, s, c = side_of(contact), sin(motion.psi), cos(motion.psi)
-    a, h = side * balls.half_distance, balls.offset
-    across, up = -h * s - a * c, h * c - a * s
-    x, y = motion.x + across, motion.y + up
+    (across, up), (x, y), (x_dot, y_dot) = _center_of_ball(balls, contact, motion)
     rate, (turning, x_dd, y_dd) = motion.psi_dot, acceleration
-    x_dot, y_dot = motion.x_dot - rate * up, motion.y_dot + rate * across
     x_dd, y_dd = x_dd - turning * up - rate * rate * across, y_dd + turning * across - rate * rate * up
     distance = hypot(x, y)
     around = (x * y_dot - y * x_dot) / distance
