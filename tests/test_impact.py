@@ -368,6 +368,33 @@ class TestBody:
         assert ringsweep.words(found.aftermath).item() == "tumbled"
         assert found.phi_end.item() == pytest.approx(-3.1472056528869796, rel=1e-9)
 
+    def test_wedged_body_that_rebounds_from_both_contacts_in_turn_comes_to_rest_on_both(self):
+        """Friction forbids that one contact rebounds while the other one rests, which has just been summed.
+
+        The instants are those of flights and impacts in 60 digits, or of ``benchmarks.reference``.
+        """
+        bodies = {
+            "body.mass": [0.356959, 0.0832457, 0.370279],
+            "body.inertia": [4.58035e-5, 1.3943e-5, 0.00146756],
+            "body.half_distance": [0.0265109, 0.0282459, 0.0503466],
+            "body.ball_radius": [0.00552215, 0.0112094, 0.011564],
+            "ring.radius": [0.0360125, 0.0608112, 0.0772017],
+            "friction.rest.mu_s": [1.13669, 1.48556, 0.883744],
+            "friction.rest.mu_k": [0.919274, 1.24284, 0.876469],
+            "initial.phi": [-2.64054, -2.96168, -2.81494],
+            "initial.omega": [-4.28572, -14.6571, 0.0],
+            "impact.restitution": [0.0382919, 0.597197, 0.632354],
+        }
+        bodies["friction.rough.mu_s"], bodies["friction.rough.mu_k"] = (
+            bodies[f"friction.rest.mu_{letter}"] for letter in "sk"
+        )
+        axes = {path: xr.DataArray(values, dims="cell") for path, values in bodies.items()}
+        found = ringsweep.sweep(AT_REST | {"time": {"span": 1.5}}, axes, progress=False)
+        assert (found.certified.values == 1).all()
+        assert (ringsweep.words(found.aftermath).values == "tumbled").all()
+        np.testing.assert_array_equal(found.t_end, 1.5)
+        np.testing.assert_allclose(found.t_recovered, [0.0814800164309276, 0.3779313, 0.361665906], rtol=2e-6)
+
     def test_contacts_that_rebound_in_turn_close_together(self):
         """Each impact at one contact brings the other one down, until both hold. The angle is that of the reference."""
         scene = BODY | {

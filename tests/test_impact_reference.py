@@ -8,7 +8,9 @@ from scipy.integrate import solve_ivp
 
 from benchmarks.reference import free, go_on, rattling
 from benchmarks.reference.free import impact
+from benchmarks.reference.physics import CLOSED
 from benchmarks.reference.problem import problem
+from benchmarks.reference.run import HELD
 
 G = 9.81
 
@@ -68,6 +70,30 @@ def test_endless_rebounds_at_the_lowest_point_end_when_their_sum_says(e):
     assert found["impact_loss"] == pytest.approx(0.076 * G * 0.2, rel=1e-9)
     speeds = log[1:, 3]
     np.testing.assert_allclose(speeds[1:6], e * speeds[:5][: len(speeds[1:6])], rtol=1e-9)
+
+
+#: Bodies that rebound from both contacts in turn: mass, inertia, half distance, radii of balls and ring, mu_s and mu_k;
+#: phi and omega at launch; restitution; and the instant at which they rest, from flights and impacts in 60 digits.
+IN_TURN = [
+    (0.356959, 4.58035e-5, 0.0265109, 0.00552215, 0.0360125, 1.13669, 0.919274, -2.64054, -4.28572, 0.0382919,
+     0.0814800164309276),
+    (0.370279, 0.00146756, 0.0503466, 0.011564, 0.0772017, 0.883744, 0.876469, -2.81494, 0.0, 0.632354, 0.361665906),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("numbers", IN_TURN)
+def test_body_that_rebounds_from_both_contacts_in_turn_comes_to_rest_on_both(numbers):
+    mass, inertia, half, ball, radius, mu_s, mu_k, phi, omega, e, rests = numbers
+    scene = rig(e=e) | {
+        "body": {"mass": mass, "inertia": inertia, "half_distance": half, "ball_radius": ball},
+        "ring": {"radius": radius},
+        "friction": {"law": "stiction", "rest": {"mu_s": mu_s, "mu_k": mu_k}},
+        "initial": {"phi": phi, "omega": omega},
+    }
+    found, _ = go_on(scene)
+    assert (found["end"], found["closed"], found["speed"]) == (HELD, CLOSED, 0.0)
+    # The row is cut off at a speed of 1e-6 m/s.
+    assert found["t_recovered"] == pytest.approx(rests, abs=1e-6)
 
 
 @pytest.mark.parametrize("ring_omega", [0.0, 1.0, 100.0])

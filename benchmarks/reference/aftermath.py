@@ -56,6 +56,9 @@ MEETS, LOSES = 11, 12
 #: A gap below this share of the radius, times angles, has closed: rounding leaves less.
 TOUCH = 1e-14
 MOST_EVENTS = 5_000
+#: Rebounds of both contacts in turn shrink together. Once one contact has come to rest in this way, the other one does
+#: so at this multiple of the speed: what its impact does while the first one rests is no part of the row.
+ROW = 10.0
 _N, _A, _GAP, _SLOWER, _FASTER, _LOW, _HIGH, _STICK, _COUNT = range(9)
 
 
@@ -460,7 +463,7 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
     touching, e, mu, track = np.zeros(2, np.bool_), np.zeros(2), np.zeros(2), np.zeros(6)
     q[2] = position
     stand(p, position, speed, q)
-    opens, fresh = False, True
+    opens, fresh, settled = False, True, False
     while True:
         if closed == both:
             # Both contacts hold until one is lost. At first this has been run already.
@@ -546,6 +549,7 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
             gap, rate, _ = free.contact(p, q, ring_omega, i)
             if not (i == 2 and single) and not closed & i and gap < near and rate < 0.0:
                 hitting += i
+        rests = hitting > 0
         for i in (1, 2):
             gap, rate, _ = free.contact(p, q, ring_omega, i)
             touching[i - 1], e[i - 1], mu[i - 1] = False, 0.0, 0.0
@@ -555,10 +559,11 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
                 touching[i - 1] = True
                 _, ux, uy, _, _ = free.ball(p, q, i)
                 mu[i - 1] = p.mu_k[segment(p, math.atan2(ux, -uy) - theta) % p.edges.size]
-                if hitting & i:
-                    e[i - 1] = p.restitution if -rate > rest else 0.0
+                if hitting & i and -rate > (ROW * rest if settled else rest):
+                    e[i - 1], rests = p.restitution, False
         count, impulse, after = free.shock(p, q, ring_omega, touching, e, mu)
-        if count != 1:
+        # At the end of a row of rebounds from both contacts the body rests, if it may.
+        if count == 0 or (count > 1 and not (rests and settled)):
             end = JAMMED
             break
         for i in (1, 2):
@@ -584,6 +589,7 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
         q += now
         before, closed = closed, 0
         slow = e.max() == 0.0 and max(after[0], after[2]) < rest
+        settled = rests
         for i in (2, 1):
             if touching[i - 1]:
                 if after[2 * i - 2] <= 1e-13 or slow:

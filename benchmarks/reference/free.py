@@ -179,8 +179,9 @@ def impact(G, before, e, mu, misfit=0.0):
     Returns
     -------
     tuple
-        Number of different velocities after the impact, impulses, velocities after. Where several impulses give the
-        same velocities, which are in stick at several contacts, these are in the middle of them.
+        Number of different velocities after the impact, impulses, velocities after: of several, the slowest ones.
+        Where several impulses give the same velocities, which are in stick at several contacts, these are in the middle
+        of them.
 
     """
     n = e.size
@@ -244,8 +245,9 @@ def impact(G, before, e, mu, misfit=0.0):
                 reached &= (after[T] if mode[i] == 2 else -after[T]) >= -small
         if not reached:
             continue
-        if count == 0 or np.max(np.abs(after - result)) > 100.0 * small:
-            count += 1
-        if count == 1:
+        if count > 0 and np.max(np.abs(after - result)) <= 100.0 * small:
+            continue
+        count += 1
+        if count == 1 or np.max(np.abs(after)) < np.max(np.abs(result)):
             best, result = P, after
     return count, best, result

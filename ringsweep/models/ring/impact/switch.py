@@ -360,50 +360,56 @@ def _lands(scene, mode, hit, t, y):
         closing = max(-first.opening if hits_1 else 0.0, -second.opening if hits_2 else 0.0)
         which = (1 if hits_1 else 0) + (2 if hits_2 else 0)
         found = impulses(body.mass, moment, first, second, touching, mu, restitution)
-        if found.solutions != 1:
-            if hits_1 and hits_2 and lasts == 0.0 and (second.gap if hit == 1 else first.gap) > _ROUNDING * balls.reach:
-                # What has no solution for both at once may have one for each in turn.
-                hits_1 = touches_1 = hit == 1
-                hits_2 = touches_2 = hit == 2
-                continue
-            if lasts > 0.0:
-                # So slow an impact may be an error of the step.
-                return BROKEN, mode, y
-            # Friction may forbid that a contact rebounds while the other one holds: among the last rebounds it closes.
-            lasts = _rebounds_end(_falls(scene, mode, t, y, motion, hit), closing, 0.0, _FORBIDDEN * balls.reach)
-            if lasts == 0.0:
-                return JAM, mode, y
-            restitution = 0.0, 0.0
+        allowed = found.solutions == 1
+        later = second.gap if hit == 1 else first.gap
+        if not allowed and hits_1 and hits_2 and lasts == 0.0 and later > _ROUNDING * balls.reach:
+            # What has no solution for both at once may have one for each in turn.
+            hits_1 = touches_1 = hit == 1
+            hits_2 = touches_2 = hit == 2
             continue
-        after = after_impact(body.mass, moment, first, second, motion, found)
-        open_1, open_2 = not touches_1 or found.opening_1 > 0.0, not touches_2 or found.opening_2 > 0.0
-        again = (not hits_1 or open_1) and (not hits_2 or open_2)
-        event = Event(
-            REBOUNDS if again else CLOSES,
-            which,
-            closing,
-            max(found.normal_1, found.normal_2),
-            found.loss,
-            found.violation,
-            lasts,
-            mode.event.number + 1,
-            t,
-            0,
-        )
-        impact = _Impact((first, second), touching, (open_1, open_2), found)
-        status, after_mode, state = _next(scene, t, after, mode, impact, event)
-        rebounds_1, rebounds_2 = hits_1 and open_1, hits_2 and open_2
-        if lasts > 0.0 or status != RUNNING or not (rebounds_1 or rebounds_2):
-            return status, after_mode, state
-        falls_1 = _falls(scene, after_mode, t, state, after, 1) if rebounds_1 else 0.0
-        falls_2 = _falls(scene, after_mode, t, state, after, 2) if rebounds_2 else 0.0
-        ends_1 = _rebounds_end(falls_1, found.opening_1, e, SUMMED * balls.reach)
-        ends_2 = _rebounds_end(falls_2, found.opening_2, e, SUMMED * balls.reach)
-        lasts = max(ends_1, ends_2)
+        if allowed:
+            after = after_impact(body.mass, moment, first, second, motion, found)
+            open_1, open_2 = not touches_1 or found.opening_1 > 0.0, not touches_2 or found.opening_2 > 0.0
+            again = (not hits_1 or open_1) and (not hits_2 or open_2)
+            event = Event(
+                REBOUNDS if again else CLOSES,
+                which,
+                closing,
+                max(found.normal_1, found.normal_2),
+                found.loss,
+                found.violation,
+                lasts,
+                mode.event.number + 1,
+                t,
+                0,
+            )
+            impact = _Impact((first, second), touching, (open_1, open_2), found)
+            status, after_mode, state = _next(scene, t, after, mode, impact, event)
+            rebounds_1, rebounds_2 = hits_1 and open_1, hits_2 and open_2
+            # A rebound may leave the contact that holds in a slip that jams: friction forbids it too.
+            allowed = status != JAM or not (rebounds_1 or rebounds_2)
+            if allowed and (lasts > 0.0 or status != RUNNING or not (rebounds_1 or rebounds_2)):
+                return status, after_mode, state
+            if allowed:
+                falls_1 = _falls(scene, after_mode, t, state, after, 1) if rebounds_1 else 0.0
+                falls_2 = _falls(scene, after_mode, t, state, after, 2) if rebounds_2 else 0.0
+                ends_1 = _rebounds_end(falls_1, found.opening_1, e, SUMMED * balls.reach)
+                ends_2 = _rebounds_end(falls_2, found.opening_2, e, SUMMED * balls.reach)
+                lasts = max(ends_1, ends_2)
+                if lasts == 0.0:
+                    return status, after_mode, state
+                # The rebounds of a contact are over so soon that it stays closed: the same impact without restitution.
+                restitution = 0.0 if ends_1 > 0.0 else restitution[0], 0.0 if ends_2 > 0.0 else restitution[1]
+                continue
+        # Friction may forbid that a contact rebounds while the other one holds: among the last rebounds it closes.
         if lasts == 0.0:
-            return status, after_mode, state
-        # The rebounds of a contact are over so soon that it stays closed: the same impact without restitution.
-        restitution = 0.0 if ends_1 > 0.0 else restitution[0], 0.0 if ends_2 > 0.0 else restitution[1]
+            lasts = _last_rebounds_end(scene, mode, t, y, motion, hit, closing)
+        elif restitution == (0.0, 0.0):
+            # So slow an impact may be an error of the step.
+            return BROKEN if found.solutions != 1 else JAM, mode, y
+        if lasts == 0.0:
+            return JAM, mode, y
+        restitution = 0.0, 0.0
 
 
 @inlined
@@ -427,6 +433,16 @@ def _rebounds_end(falls, speed, e, most):
         return 0.0
     time = 2.0 * speed / (falls * (1.0 - e))
     return time if time * time * falls <= most else 0.0
+
+
+@inlined
+def _last_rebounds_end(scene, mode, t, y, motion, contact, speed):
+    """Time until the rebounds of a contact end that hits with a speed which friction forbids; 0 if they go on."""
+    # Where the rebounds of both contacts shrink together, those of one are summed while the other one is still open,
+    # which hits before they would be over.
+    still = mode.event.time + mode.event.lasts - t if mode.event.kind == CLOSES else 0.0
+    falls = _falls(scene, mode, t, y, motion, contact)
+    return max(still, _rebounds_end(falls, speed, 0.0, _FORBIDDEN * scene.balls.reach))
 
 
 @inlined
