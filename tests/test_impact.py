@@ -321,6 +321,41 @@ class TestBody:
         found = ringsweep.sweep(scene | {"impact": {"restitution": 0.0}}, {"time.span": [0.256649]}, progress=False)
         assert found.t_end.item() == pytest.approx(0.24783247, abs=1e-7)
 
+    def test_rising_friction_takes_a_body_along_on_one_contact_and_is_no_certified_jam(self):
+        """The ring passes a bump of friction, on which contact 2 is lost and contact 1 comes near to a jam.
+
+        The greater the acceleration of the ring, the nearer, but the body turns alike. Under an infinite acceleration
+        no step resolves it.
+        """
+        scene = {
+            "model": "ring",
+            "body": {
+                "mass": 0.313781, "inertia": 0.000143466, "half_distance": 0.0270851, "ball_radius": 0.0190461,
+            },
+            "ring": {"radius": 0.0606886},
+            "friction": {
+                "law": "formula", "mu": "mu_k + h*exp(-((v - vb)/w)**2)", "at_rest": "mu_s",
+                "vb": 0.0150096, "w": 0.00037879, "h": 0.337113,
+                "rest": {"mu_s": 1.17574, "mu_k": 0.830991}, "rough": {"mu_s": 0.648814, "mu_k": 0.597697},
+            },
+            "zone": {"half_angle": 0.267026, "center": -1.78478},
+            "drive": {"law": "power"},
+            "initial": {"phi": 1.17837},
+            "impact": {"restitution": 0.5},
+        }  # fmt: skip
+        drives = {
+            "drive.amplitude": [0.5e5, 0.5e6, 1.21617],
+            "drive.exponent": [2.0, 2.0, 1.05325],
+            "time.span": [1e-5, 1e-6, 1.0],
+        }
+        axes = {path: xr.DataArray(values, dims="cell") for path, values in drives.items()}
+        found = ringsweep.sweep(scene, axes, progress=False)
+        assert found.certified.values.tolist() == [1, 1, 0]
+        assert (found.separating_contact.values[:2] == 2).all()
+        # At the end the ring turns at 1 rad/s.
+        np.testing.assert_allclose(found.omega_end.values[:2], 0.75311, atol=4e-4)
+        assert ringsweep.words(found.regime).values[2] == "failed"
+
     def test_last_rebounds_that_friction_forbids_close_the_contact(self):
         """An impact at one contact while the other one holds need not have a solution with restitution.
 

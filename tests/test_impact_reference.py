@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from benchmarks.reference import free, go_on, rattling
 from benchmarks.reference.free import impact
-from benchmarks.reference.physics import CLOSED
+from benchmarks.reference.physics import CLOSED, ONLY_1
 from benchmarks.reference.problem import problem
 from benchmarks.reference.run import HELD
 
@@ -114,6 +114,19 @@ def energy(scene, found):
     return 0.5 * (p.inertia + p.mass * p.xi**2) * found["speed"] ** 2 - p.mass * G * p.xi * math.cos(found["position"])
 
 
+#: The friction of this body rises steeply at a speed of 0.015 m/s.
+BUMP = {
+    "friction": {"law": "formula", "mu": "mu_k + h*exp(-((v - vb)/w)**2)", "at_rest": "mu_s",
+                 "vb": 0.0150096, "w": 0.00037879, "h": 0.337113,
+                 "rest": {"mu_s": 1.17574, "mu_k": 0.830991}, "rough": {"mu_s": 0.648814, "mu_k": 0.597697}},
+    "drive": {"law": "power", "amplitude": 1.21617, "exponent": 1.05325},
+    "body": {"mass": 0.313781, "inertia": 0.000143466, "half_distance": 0.0270851, "ball_radius": 0.0190461},
+    "ring": {"radius": 0.0606886},
+    "zone": {"half_angle": 0.267026, "center": -1.78478},
+    "initial": {"phi": 1.17837, "omega": 0.0},
+}  # fmt: skip
+
+
 #: Bodies at rest on rings whose acceleration is infinite at 0, and when a contact is lost.
 AT_ONCE = [
     # Left behind, caught up after 4e-13 s, and held until the falling acceleration unloads contact 1.
@@ -138,6 +151,8 @@ AT_ONCE = [
         "zone": {"half_angle": 0.37743, "center": -2.53899},
         "initial": {"phi": -0.00150168, "omega": 0.0},
     }, 0.34350943534083, id="left behind"),
+    # Left behind so fast that the ring passes a bump of friction at once, which unloads contact 2.
+    pytest.param(BUMP, 3.61221169e-14, id="over a bump"),
 ]  # fmt: skip
 
 
@@ -145,6 +160,16 @@ AT_ONCE = [
 def test_first_instant_of_a_ring_with_infinite_acceleration_is_followed(scene, lost):
     scene = {"model": "ring", "time": {"span": 0.4}, "impact": {"restitution": 0.5}} | scene
     assert go_on(scene, keep=1)[1][0][0] == pytest.approx(lost, rel=1e-6)
+
+
+@pytest.mark.parametrize("acceleration", [1e6, 1e9])
+def test_rising_friction_takes_a_body_along_on_one_contact_before_it_jams(acceleration):
+    """The ring turns at 1 rad/s at the end. The faster it gets there, the smaller A stays, and the body turns alike."""
+    drive = {"law": "power", "amplitude": 0.5 * acceleration, "exponent": 2.0}
+    scene = {"model": "ring", "time": {"span": 1.0 / acceleration}, "impact": {"restitution": 0.5}} | BUMP
+    found, _ = go_on(scene | {"drive": drive})
+    assert (found["end"], found["closed"]) == (HELD, ONLY_1)
+    assert found["speed"] == pytest.approx(0.75311, abs=1e-4)
 
 
 def test_body_that_is_wedged_on_one_contact_turns_as_its_accelerations_leave_it():

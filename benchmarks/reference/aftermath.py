@@ -20,7 +20,6 @@ from benchmarks.reference.physics import (
     CLOSED,
     FORWARD,
     JAMMED,
-    LEAST_DETERMINANT,
     ONLY_1,
     ONLY_2,
     OPEN_1,
@@ -30,6 +29,7 @@ from benchmarks.reference.physics import (
     bound,
     corners,
     drive,
+    friction,
     is_set_valued,
     lower_segments,
     on_one,
@@ -41,7 +41,7 @@ from benchmarks.reference.physics import (
 )
 from benchmarks.reference.problem import JUMP, POWER, SINGLE, SINUSOIDAL, TABLE
 from benchmarks.reference.radau import NODES, attempt, interpolate, jacobian
-from benchmarks.reference.run import HELD, SAMPLES, UNRESOLVED, advance, run
+from benchmarks.reference.run import EARLIEST, HELD, SAMPLES, UNRESOLVED, advance, run
 
 #: Return values of :func:`follow`, in this order. `tumbles` counts changes of order between instants at which both
 #: contacts close; `passages` counts how often the rod passes over the axis.
@@ -56,6 +56,10 @@ MEETS, LOSES = 11, 12
 #: A gap below this share of the radius, times angles, has closed: rounding leaves less.
 TOUCH = 1e-14
 MOST_EVENTS = 5_000
+#: A (times the mass) of a contact that jams. While it falls, the reaction grows and slows the slip down. Where friction
+#: is constant, slip falls with the logarithm of A: it ends at a small A, but before A vanishes. Where friction falls
+#: with the speed, A vanishes. Where it rises, A stays near gravity over the acceleration of the ring.
+LEAST_A = 1e-13
 #: Rebounds of both contacts in turn shrink together. Once one contact has come to rest in this way, the other one does
 #: so at this multiple of the speed: what its impact does while the first one rests is no part of the row.
 ROW = 10.0
@@ -103,7 +107,7 @@ def pivot_problem(p, closed, k, piece, t, y, opens, breaks=False):
     q, shut = np.empty(6), -1e-6 * p.gravity
     if not (is_set_valued(p) and y[2] == 0.0):
         N, _, _, _, _, A = on_one(p, closed, k, piece, t, y, q)
-        if not A > LEAST_DETERMINANT:
+        if not A > LEAST_A:
             return JAMMED
         return LOSES if N <= 0.0 else STICK
     N, T, _, _, _, _ = on_one(p, closed, k, STICK, t, y, q)
@@ -114,7 +118,7 @@ def pivot_problem(p, closed, k, piece, t, y, opens, breaks=False):
     for sense in (FORWARD, BACKWARD):
         N, T, slide, _, _, A = on_one(p, closed, k, sense, t, y, q)
         if N > 0.0 and sense * slide > 0.0 and not (opens and other_gap(p, closed, t, q, N, T) < shut):
-            if found != JAMMED or not A > LEAST_DETERMINANT:
+            if found != JAMMED or not A > LEAST_A:
                 return JAMMED
             found = sense
     if found == JAMMED and free.acceleration(p, q, drive(p, t)[2], 0.0, 0.0, 0.0, closed)[0] > 0.0:
@@ -123,12 +127,18 @@ def pivot_problem(p, closed, k, piece, t, y, opens, breaks=False):
 
 
 @njit(cache=True, error_model="numpy")
+def rises(p, k, piece, v):
+    """Whether friction rises with the speed of sliding. Then no contact jams, however small A may become."""
+    return abs(friction(p, k, piece, 1.000001 * v, 0.0)[0]) > abs(friction(p, k, piece, v, 0.0)[0])
+
+
+@njit(cache=True, error_model="numpy")
 def pivot_guard(p, closed, k, piece, t, y, g, q):
     """Write to g the guards of a body on one contact, which must stay positive."""
     N, T, _, _, _, A = on_one(p, closed, k, piece, t, y, q)
     weight = p.mass * p.gravity
     g[:] = 1.0
-    g[_N], g[_A] = N / weight, A - LEAST_DETERMINANT
+    g[_N], g[_A] = N / weight, A - LEAST_A
     gap, opens, _ = free.contact(p, q, 0.0, 3 - closed)
     g[_GAP] = gap + touch(p, t, q)
     if opens >= 0.0:
@@ -241,7 +251,7 @@ def turn(p, closed, rtol, most_steps, t, y, opens, found):
             before = 0.0
             h = step * (0.1 if error == math.inf else max(0.1, 0.9 * error**-0.25))
         if not error <= 1.0:
-            return (JAMMED if step < 1e-17 else UNRESOLVED), t, steps
+            return (JAMMED if step < 1e-17 and not rises(p, k, piece, y[2]) else UNRESOLVED), t, steps
         hit, at = -1, 1.0
         for i in range(SAMPLES + 2):
             x = i / SAMPLES
@@ -312,7 +322,7 @@ def turn(p, closed, rtol, most_steps, t, y, opens, found):
         if hit == _N:
             return LOSES, t, steps
         if hit == _A:
-            return JAMMED, t, steps
+            return (UNRESOLVED if rises(p, k, piece, y[2]) else JAMMED), t, steps
         if hit in (_LOW, _HIGH):
             k += 1 if hit == _HIGH else -1
         elif hit == _STICK:
@@ -320,7 +330,7 @@ def turn(p, closed, rtol, most_steps, t, y, opens, found):
             T = on_one(p, closed, k, STICK, t, y, q)[1]
             piece = BACKWARD if T > 0.0 else FORWARD
             N, _, slide, _, _, A_ii = on_one(p, closed, k, piece, t, y, q)
-            if N > 0.0 and piece * slide > -1e-6 * p.gravity and A_ii > LEAST_DETERMINANT:
+            if N > 0.0 and piece * slide > -1e-6 * p.gravity and A_ii > LEAST_A:
                 continue
         elif hit == _FASTER:
             piece += 1 if piece > 0 else -1
@@ -517,7 +527,8 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
             theta, ring_omega, _ = drive(p, t)
             _, ux, uy, _, _ = free.ball(p, q, closed)
             y[0], y[1], y[2], y[3] = math.atan2(ux, -uy) - theta, q[2], v, q[5]
-            if p.drive == POWER and p.exponent < 2.0 and t == begin[1] and t <= 1e-10 and (p.at_rest or p.speed == 0.0):
+            at_launch = p.drive == POWER and p.exponent < 2.0 and t == begin[1] and (p.at_rest or p.speed == 0.0)
+            if at_launch and (t <= EARLIEST or (v == 0.0 and t <= 1e-10)):
                 # A ring with infinite acceleration takes along what is wedged on one contact: stick goes before slip.
                 y[2] = 0.0
                 k = place_of(p, closed, t, y)

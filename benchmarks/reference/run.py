@@ -415,6 +415,37 @@ def advance(p, rtol, least, slack, most_steps, track, t, y, k1, k2, piece, mode)
 
 
 @njit(cache=True, error_model="numpy")
+def slip_at_once(p, k1, k2, mode, rho, begin, instant, v, epsilon):
+    """Slip from `begin`, at the velocity v, to `instant` on a ring whose acceleration is infinite at 0.
+
+    The ring alone changes the velocity much. It may pass speeds at which friction takes a contact off the ring.
+    Returns mode, time and sliding velocity.
+    """
+    y, n = np.array([rho, v, 0.0, 0.0]), p.exponent
+    slow, before = (begin / instant) ** (n - 1.0), begin
+    for i in range(1, 1001):
+        # Steps of equal change of the velocity of the ring.
+        low, t = before, instant * (slow + (1.0 - slow) * i / 1000.0) ** (1.0 / (n - 1.0))
+        y[1] = v + p.radius * (epsilon * (t - begin) - drive(p, t)[1] + drive(p, begin)[1])
+        found = mode if y[1] * mode <= 0.0 else sliding_problem(p, k1, k2, piece_of(p, y[1]), t, y, 0.0)
+        if found == mode:
+            before = t
+            continue
+        for _ in range(80):
+            middle = math.sqrt(low) * math.sqrt(t)
+            if not low < middle < t:
+                break
+            y[1] = v + p.radius * (epsilon * (middle - begin) - drive(p, middle)[1] + drive(p, begin)[1])
+            if sliding_problem(p, k1, k2, piece_of(p, y[1]), middle, y, 0.0) == mode:
+                low = middle
+            else:
+                t = middle
+        y[1] = v + p.radius * (epsilon * (t - begin) - drive(p, t)[1] + drive(p, begin)[1])
+        return found, t, y[1]
+    return mode, instant, v + p.radius * (epsilon * (instant - begin) - drive(p, instant)[1] + drive(p, begin)[1])
+
+
+@njit(cache=True, error_model="numpy")
 def leave_at_once(p, k1, k2, rho, earliest, instant, least):
     """Mode, time and sliding velocity after a launch at rest on a ring whose acceleration is infinite at 0.
 
@@ -454,14 +485,14 @@ def leave_at_once(p, k1, k2, rho, earliest, instant, least):
             epsilon = state(p, j1, j2, mode, t, y)[2]
             meets = (p.amplitude * n / epsilon) ** (1.0 / (2.0 - n)) if epsilon * p.amplitude > 0.0 else math.inf
             if meets >= instant:
-                return mode, instant, p.radius * (epsilon * instant - drive(p, instant)[1])
+                v = p.radius * (epsilon * t - drive(p, t)[1])
+                return slip_at_once(p, j1, j2, mode, rho, t, instant, v, epsilon)
             behind, t = False, max(meets, earliest)
             mode = resting_problem(p, k1, k2, t, rho, least)
     if mode > FORWARD:
         return mode, t, 0.0
     j1, j2 = lower_segments(p, k1, k2, rho) if mode == BACKWARD and p.model != BELT else (k1, k2)
-    epsilon = state(p, j1, j2, mode, t, y)[2]
-    return mode, instant, p.radius * (epsilon * (instant - t) - drive(p, instant)[1] + drive(p, t)[1])
+    return slip_at_once(p, j1, j2, mode, rho, t, instant, 0.0, state(p, j1, j2, mode, t, y)[2])
 
 
 @njit(cache=True, error_model="numpy")

@@ -224,7 +224,7 @@ def _switch(scene, mode, guard, t, y):
         zeros = 3 if guard in (NORMAL_1, NORMAL_2) else 2
         return _after_closed(scene, status, from_closed(found, turned, mode.event), t, (y[0], v), zeros, False)
     if guard == DETERMINANT:
-        return JAM, mode, y
+        return _jammed(scene, mode, y[1]), mode, y
     reaches_1, reaches_2 = guard == NORMAL_1, guard == NORMAL_2
     if mode.open == BOTH:
         return _lands(scene, mode, 1 if reaches_1 else 2, t, y)
@@ -240,6 +240,17 @@ def _switch(scene, mode, guard, t, y):
         flight = in_flight((mode.place_1, mode.place_2), mode.turned, zeros, opens(contact, mode.event.number, t))
         return RUNNING, flight, state_in_flight(motion, mode.turned)
     return _on_one_contact(scene, mode, guard, t, y)
+
+
+@inlined
+def _jammed(scene, mode, v):
+    """Status of a pivot whose denominator nearly vanishes in slip.
+
+    The reaction that grows meanwhile slows the slip down. Where friction rises with the speed, this keeps the contact
+    from jamming, but only under an almost infinite acceleration of the ring does it come so near.
+    """
+    _, slope = pivot.friction(scene, mode, v)
+    return BROKEN if slope < 0.0 else JAM
 
 
 @inlined
@@ -361,8 +372,8 @@ def _lands(scene, mode, hit, t, y):
         which = (1 if hits_1 else 0) + (2 if hits_2 else 0)
         found = impulses(body.mass, moment, first, second, touching, mu, restitution)
         allowed = found.solutions == 1
-        later = second.gap if hit == 1 else first.gap
-        if not allowed and hits_1 and hits_2 and lasts == 0.0 and later > _ROUNDING * balls.reach:
+        apart = (second.gap if hit == 1 else first.gap) > _ROUNDING * balls.reach
+        if not allowed and hits_1 and hits_2 and lasts == 0.0 and apart:
             # What has no solution for both at once may have one for each in turn.
             hits_1 = touches_1 = hit == 1
             hits_2 = touches_2 = hit == 2
@@ -530,7 +541,8 @@ def _status_when_stalled(scene, mode, t, y):
     _, ring_omega, _ = drives.turn(scene.drive, t)
     K, _ = pivot.friction(scene, mode, y[1])
     f = pivot.frame(scene, holding(mode), mode.turned, y, ring_omega)
-    return BROKEN if pivot.in_slip(scene, f, K)[3] > NEARLY_JAMMED * inertia(scene.closed.body) else JAM
+    nearly = NEARLY_JAMMED * inertia(scene.closed.body)
+    return BROKEN if pivot.in_slip(scene, f, K)[3] > nearly else _jammed(scene, mode, y[1])
 
 
 @modes.sticks.implements(ImpactRing)
