@@ -20,6 +20,7 @@ from benchmarks.reference.physics import (
     CLOSED,
     FORWARD,
     JAMMED,
+    LEAST_DETERMINANT,
     ONLY_1,
     ONLY_2,
     OPEN_1,
@@ -56,10 +57,12 @@ MEETS, LOSES = 11, 12
 #: A gap below this share of the radius, times angles, has closed: rounding leaves less.
 TOUCH = 1e-14
 MOST_EVENTS = 5_000
-#: A (times the mass) of a contact that jams. While it falls, the reaction grows and slows the slip down. Where friction
+#: A (times the mass) of a contact that jams while its reaction grows. The reaction slows the slip down. Where friction
 #: is constant, slip falls with the logarithm of A: it ends at a small A, but before A vanishes. Where friction falls
 #: with the speed, A vanishes. Where it rises, A stays near gravity over the acceleration of the ring.
 LEAST_A = 1e-13
+#: Reaction, in weights, that grows while A vanishes.
+GROWN = 1e3
 #: Rebounds of both contacts in turn shrink together. Once one contact has come to rest in this way, the other one does
 #: so at this multiple of the speed: what its impact does while the first one rests is no part of the row.
 ROW = 10.0
@@ -138,7 +141,8 @@ def pivot_guard(p, closed, k, piece, t, y, g, q):
     N, T, _, _, _, A = on_one(p, closed, k, piece, t, y, q)
     weight = p.mass * p.gravity
     g[:] = 1.0
-    g[_N], g[_A] = N / weight, A - LEAST_A
+    # Where the load vanishes with A, the reaction does not grow, and rounding soon decides its sign.
+    g[_N], g[_A] = N / weight, A - (LEAST_A if GROWN * weight < N else LEAST_DETERMINANT)
     gap, opens, _ = free.contact(p, q, 0.0, 3 - closed)
     g[_GAP] = gap + touch(p, t, q)
     if opens >= 0.0:
