@@ -126,6 +126,8 @@ def _warn_of_failures(results: xr.Dataset, config: Config) -> None:
     cell = {str(dim): k for dim, k in zip(regime.dims, first, strict=True)}
     one = results.isel(cell)
     steps = int(one["steps"]) if "steps" in one else 0
+    finite = all(np.isfinite(float(one[name])) for name in ("phi_end", "omega_end", "velocity_end") if name in one)
+    other = "another" if hasattr(config.solver, "rtol") else "solver.method event with another"
     why = "a number was not finite"
     if steps >= min(PATIENCE, getattr(config.solver, "max_steps", PATIENCE)):
         span = float(one["time_span"]) if "time_span" in one.coords else config.scene.values.get("time.span", np.nan)
@@ -135,8 +137,8 @@ def _warn_of_failures(results: xr.Dataset, config: Config) -> None:
         )
     elif any(structure.own_law for structure in config.scene.structures.values()):
         why = "its friction law may be negative, or no number, at a sliding speed that the body reached"
-    elif all(np.isfinite(float(one[name])) for name in ("phi_end", "omega_end", "velocity_end") if name in one):
-        other = "another" if hasattr(config.solver, "rtol") else "solver.method event with another"
+        why += f"; if it is not, {other} rtol may have a result" if finite else ""
+    elif finite:
         why = f"no step succeeds at t = {float(one['t_end']):.6g} s; {other} rtol may have a result"
     who = "the run has failed"
     if regime.size > 1:
