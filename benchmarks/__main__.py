@@ -1,6 +1,6 @@
 """Run the benchmarks one after the other, each in a process of its own.
 
-    python -m benchmarks                        # all: about an hour on two cores
+    python -m benchmarks                        # all: an hour and a quarter on two cores
     python -m benchmarks --quick                # less of everything
     python -m benchmarks --only speed scaling   # these
     python -m benchmarks --keep                 # replace the results that the documents show

@@ -1,6 +1,6 @@
 """Refined maps against full ones: cost, wrong cells, the bound of the audit; cost against resolution; PhaseMap.
 
-    python -m benchmarks.refine                # half an hour: full maps of 512 and 1024 cells a side
+    python -m benchmarks.refine                # a quarter of an hour: full maps of 512 and 1024 cells a side
     python -m benchmarks.refine --part scaling # or full, zoom
     python -m benchmarks.refine --quick        # smaller maps
 
