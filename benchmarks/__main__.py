@@ -1,7 +1,7 @@
 """Run the benchmarks one after the other, each in a process of its own.
 
-    python -m benchmarks                        # all: an hour and a quarter on two cores
-    python -m benchmarks --quick                # less of everything
+    python -m benchmarks                        # all: an hour on two cores
+    python -m benchmarks --quick                # less of everything, one benchmark on each core: times mean little
     python -m benchmarks --only speed scaling   # these
     python -m benchmarks --keep                 # replace the results that the documents show
 
@@ -12,11 +12,15 @@ among them.
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from queue import LifoQueue
 
-from benchmarks._common import command, folder_of, stamp
+from benchmarks._common import CORE, command, cores, folder_of, stamp
 
 #: Commands in their order. `brute_force` alone, without a count, takes an hour for more scenes.
 COMMANDS = (
@@ -40,29 +44,39 @@ COMMANDS = (
 NAMES = list(dict.fromkeys(command.split()[0] for command in COMMANDS))
 
 
+def run(words: list[str], options: list[str], folder: Path, free: LifoQueue[int]) -> bool:
+    """Run a benchmark, given with its options, unless its report is there; whether it succeeded.
+
+    It pins what it times on one core to the next of those that are `free`.
+    """
+    mark = stamp(words[0], words[1:])
+    if any(mark in report.read_text() for report in folder.glob("*.md")):
+        print(f"{' '.join(words)}: measured on these sources already", flush=True)
+        return True
+    core, begin = free.get(), time.monotonic()
+    print(f"{' '.join(words)}: begins", flush=True)
+    line = [sys.executable, "-m", f"benchmarks.{words[0]}", *words[1:], *options]
+    succeeded = subprocess.run(line, env=os.environ | {CORE: str(core)}, check=False).returncode == 0
+    free.put(core)
+    print(f"{' '.join(words)}: {time.monotonic() - begin:.0f} s", flush=True)
+    return succeeded
+
+
 def main() -> int:
     """Run what is missing; the exit status is 1 if a benchmark failed."""
     parser = command(__doc__)
     parser.add_argument("--only", nargs="+", metavar="NAME", choices=NAMES, help=", ".join(NAMES))
     given = parser.parse_args()
-    folder, failed = folder_of(given), list[str]()
-    quick, kept = ["--quick"] if given.quick else [], ["--keep"] if given.keep else []
-    for words in map(str.split, COMMANDS):
-        name, *options = words
-        if name not in (given.only or NAMES):
-            continue
+    asked = [words for words in map(str.split, COMMANDS) if words[0] in (given.only or NAMES)]
+    if given.quick:
         # Quick measurements choose their amount themselves.
-        options = [*(options[: options.index("--count")] if quick and "--count" in options else options), *quick]
-        mark = stamp(name, options)
-        if any(mark in report.read_text() for report in folder.glob("*.md")):
-            print(f"{' '.join(words)}: measured on these sources already", flush=True)
-            continue
-        begin = time.monotonic()
-        print(f"{' '.join(words)}: begins", flush=True)
-        if subprocess.run([sys.executable, "-m", f"benchmarks.{name}", *options, *kept], check=False).returncode:
-            failed.append(" ".join(words))
-        print(f"{' '.join(words)}: {time.monotonic() - begin:.0f} s", flush=True)
-    if failed:
+        asked = [[*(words[: words.index("--count")] if "--count" in words else words), "--quick"] for words in asked]
+    folder, free = folder_of(given), LifoQueue[int]()
+    for core in reversed(cores()):
+        free.put(core)
+    with ThreadPoolExecutor(len(cores()) if given.quick else 1) as pool:
+        done = list(pool.map(lambda words: run(words, ["--keep"] if given.keep else [], folder, free), asked))
+    if failed := [" ".join(words) for words, succeeded in zip(asked, done, strict=True) if not succeeded]:
         print(f"failed: {', '.join(failed)}", file=sys.stderr)
     return 1 if failed else 0
 

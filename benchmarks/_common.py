@@ -28,6 +28,9 @@ from ringsweep.runs import cells, sweep
 from ringsweep.runs.executors import Execution
 from ringsweep.solvers.method import Result
 
+#: Environment variable with the core to which a benchmark is pinned while others run beside it.
+CORE = "BENCHMARKS_CORE"
+
 #: Results that the documents show.
 RESULTS = Path(__file__).parent / "results"
 
@@ -102,18 +105,24 @@ def on_all_cores(configuration: Any) -> Any:
     return sweep.compute(configuration, Execution(progress=False))
 
 
+def cores() -> list[int]:
+    """Cores on which this process may run, the last one first."""
+    count = os.cpu_count() or 1
+    return sorted(os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(count), reverse=True)
+
+
 @contextmanager
 def one_core() -> Iterator[None]:
     """Pin this process, and the threads that libraries start in it, to one core."""
     if not hasattr(os, "sched_setaffinity"):
         yield
         return
-    cores = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {max(cores)})
+    before = cores()
+    os.sched_setaffinity(0, {int(os.environ.get(CORE, before[0]))})
     try:
         yield
     finally:
-        os.sched_setaffinity(0, cores)
+        os.sched_setaffinity(0, before)
 
 
 @dataclass(frozen=True)
@@ -204,7 +213,6 @@ def machine(also: Sequence[str] = ()) -> str:
     info = Path("/proc/cpuinfo")
     lines = info.read_text().splitlines() if info.exists() else []
     models = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     load = f", load {os.getloadavg()[0]:.2f} at the start" if hasattr(os, "getloadavg") else ""
     versions = [f"{platform.system()}, python {platform.python_version()}"]
     for name in ("ringsweep", "numba", "llvmlite", "numpy", "scipy", "joblib", *also):
@@ -212,9 +220,8 @@ def machine(also: Sequence[str] = ()) -> str:
             versions.append(f"{name} {version(name)}")
         except PackageNotFoundError:
             versions.append(f"{name} absent")
-    return f"{models[0] if models else platform.processor() or platform.machine()}, {cores} cores{load}\n" + ", ".join(
-        versions
-    )
+    processor = models[0] if models else platform.processor() or platform.machine()
+    return f"{processor}, {len(cores())} cores{load}\n{', '.join(versions)}"
 
 
 def command(doc: str) -> argparse.ArgumentParser:

@@ -3,7 +3,7 @@
     python -m benchmarks.brute_force [--count 10000] [--families stiction "belt dahl" ...]
 
 Draws random scenes by families. `ringsweep.sweep` answers them in batches, :mod:`benchmarks.reference` answers them
-one by one. The benchmark prints a table with a row for each family:
+one by one. Each core works on a batch of its own. The benchmark prints a table with a row for each family:
 
 - contradicted: certified, but the reference finds another regime, motion or separating contact. Each such scene is
   printed so that it can be run again, with the answer of the reference;
@@ -35,7 +35,8 @@ run). It is ambiguous if two tolerances of the reference differ by more than a h
 is compared where the package gives no bound and so claims no number. There are a tenth as many of these long runs, and
 three tenths as many of `far`. The law `bristle` is left out, because its random bonds cannot be repeated independently.
 
-Writes `brute_force.md`, or `brute_force_impact.md`, for example, if one family was asked for. `--quick` draws three.
+Writes `brute_force.md`, or `brute_force_impact.md`, for example, if one family was asked for. `--quick` draws from
+three.
 
 ``--csv PATH`` writes the 500 scenes of ``tests/test_brute_force.py`` instead: the scene (SI units, on the paper's
 rig); regime, motion, contact and time of separation; least reaction in weights of the body; whether the runs of the
@@ -47,9 +48,11 @@ regime, contact and aftermath, and the numbers of what follows, of which the ref
 
 import csv
 import math
+import multiprocessing
 import pprint
 import time
 from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -65,7 +68,7 @@ from benchmarks.reference.problem import FORMULAS, problem
 from benchmarks.reference.run import drive
 
 COUNT, QUICK, SEED = 10_000, 300, 181
-#: Families of a quick run: each compiles a kernel for every kind of scene.
+#: Families of a quick run, with the first kind of each: every kind of scene compiles a kernel.
 FEW = ("stiction", "belt lugre", "impact")
 #: Of the certified runs whose contacts hold, the compliant body is asked about one in this many.
 HELD_EVERY = 20
@@ -408,18 +411,34 @@ def draw(rng, kind):
 
 @dataclass
 class Count:
-    """Counts of one family."""
+    """Counts of one batch or of one family, and the scenes to be printed."""
 
     tally: Counter = field(default_factory=Counter)
     bounded: list = field(default_factory=list)
     ends: Counter = field(default_factory=Counter)
     seconds: Counter = field(default_factory=Counter)
+    listings: list = field(default_factory=list)
+    verbose: bool = False
+    #: Number of the batch in its family: of many small batches as many runs are asked about as of a large one.
+    number: int = 0
+
+    def add(self, other):
+        """Add the counts of a batch."""
+        self.tally.update(other.tally)
+        self.bounded += other.bounded
+        self.ends.update(other.ends)
+        self.seconds.update(other.seconds)
+
+    def list_scene(self, word, scene, why, said):
+        """Keep a scene with the answers of the reference and of the package."""
+        listing = pprint.pformat(scene, width=120, sort_dicts=False)
+        self.listings.append(f"\n# {word}; reference: {why}\n# ringsweep: {said}\n{listing}")
 
 
 def answers(kind, batch, solver):
     """Dataset of the package for a batch of scenes of one kind."""
     axes = {path: xr.DataArray([values[path] for values in batch], dims="run") for path in batch[0]}
-    return ringsweep.sweep(nest(kind, batch[0]), axes, solver=solver, progress=False)
+    return ringsweep.sweep(nest(kind, batch[0]), axes, solver=solver, jobs=1, progress=False)
 
 
 def scales(scene):
@@ -428,31 +447,31 @@ def scales(scene):
     return p.mu_s[0] / p.stiffness + abs(drive(p, p.span)[0] - drive(p, 0.0)[0]) * (p.span < 1.0)
 
 
-def second_opinion(scene, regime, contact, t, verdict, count, report):
+def second_opinion(scene, regime, contact, t, verdict, count):
     """Ask the compliant body about the end of a certified run on two contacts."""
     word = regime if regime in ("separating", "jammed") else "held"
     if word == "held":
         count.tally["held"] += 1
-        if count.tally["held"] % HELD_EVERY or not verdict.runs:
+        if (count.tally["held"] + count.number) % HELD_EVERY or not verdict.runs:
             return
         t = verdict.runs[0]["t_least"]
-    begin = time.perf_counter()
+    begin = time.process_time()
     found = opinion(problem(scene), word, contact, t)
-    count.seconds["compliant"] += time.perf_counter() - begin
+    count.seconds["compliant"] += time.process_time() - begin
     end = f"{word} {contact}" if word == "separating" else word
     count.ends[end, found.word] += 1
-    if found.word == "contradicted" or (report.verbose and found.word == "undecided"):
-        report.scene(f"{found.word} by the compliant body", scene, found.why, f"{end}, {t:.9g} s")
+    if found.word == "contradicted" or (count.verbose and found.word == "undecided"):
+        count.list_scene(f"{found.word} by the compliant body", scene, found.why, f"{end}, {t:.9g} s")
 
 
-def aftermath_opinion(scene, word, verdict, count, report):
+def aftermath_opinion(scene, word, verdict, count):
     """Ask the compliant body what follows a lost contact, in every few runs."""
     if word == "held" or verdict.state != "clear" or verdict.runs[0]["t_end"] < scene["time"]["span"]:
         return
     count.tally["lost"] += 1
-    if count.tally["lost"] % LOST_EVERY:
+    if (count.tally["lost"] + count.number) % LOST_EVERY:
         return
-    begin = time.perf_counter()
+    begin = time.process_time()
     p, t = problem(scene), verdict.numbers["t_separation"]
     found, said = rattling.opinion(p, word, t), ""
     if found.word == "contradicted":
@@ -462,28 +481,28 @@ def aftermath_opinion(scene, word, verdict, count, report):
             return go_on(scene | {"time": {"span": float(until)}})[0]
 
         said = SHARED if rattling.parts_in_shared_impact(p, t, rigid, log) else found.word
-    count.seconds["compliant"] += time.perf_counter() - begin
+    count.seconds["compliant"] += time.process_time() - begin
     count.ends[f"lost, {word}", said or found.word] += 1
     if said == "contradicted":
-        report.scene(f"{said} by the compliant body", scene, f"{found.why}; {verdict.why}", word)
+        count.list_scene(f"{said} by the compliant body", scene, f"{found.why}; {verdict.why}", word)
 
 
-def compare(kind, batch, data, count, report):
-    """Add a batch to the count of its family; contradictions go to `report`."""
+def compare(kind, batch, data, count):
+    """Add the runs of a batch to its count."""
     belt = kind.model == "belt"
     words = [] if belt else list(zip(*(ringsweep.words(data[n]).values for n in ("regime", "motion")), strict=True))
     for i, values in enumerate(batch):
         scene = nest(kind, values)
-        begin = time.perf_counter()
+        begin = time.process_time()
         verdict = judge(scene)
-        count.seconds["reference"] += time.perf_counter() - begin
+        count.seconds["reference"] += time.process_time() - begin
         certified = int(data.certified[i]) == 1
         state, spread = verdict.state, verdict.spread
         if certified and kind.impact:
-            aftermath_opinion(scene, str(ringsweep.words(data.aftermath[i]).values), verdict, count, report)
+            aftermath_opinion(scene, str(ringsweep.words(data.aftermath[i]).values), verdict, count)
         elif certified and kind.model == "ring":
             contact, t_end = int(data.separating_contact[i]), float(data.t_end[i])
-            second_opinion(scene, str(words[i][0]), contact, t_end, verdict, count, report)
+            second_opinion(scene, str(words[i][0]), contact, t_end, verdict, count)
         scale = scales(scene) if belt else 1.0
         if belt and state == "clear" and not spread["x_end"] < 1e-5 * scale:
             state = "ambiguous"
@@ -491,8 +510,8 @@ def compare(kind, batch, data, count, report):
         count.tally[state] += 1
         count.tally["certified" if certified else "uncertified"] += 1
         if state != "clear" or not certified:
-            if report.verbose and state == "unresolved":
-                report.scene("unresolved", scene, verdict.why, "")
+            if count.verbose and state == "unresolved":
+                count.list_scene("unresolved", scene, verdict.why, "")
             continue
         if kind.force and not math.isfinite(float(data.x_end_error[i])):
             count.tally["no bound"] += 1
@@ -504,7 +523,7 @@ def compare(kind, batch, data, count, report):
             stated = float(data.x_end_error[i]) if "x_end_error" in data else 0.0
             if not errors["x_end"] < max(1e-3 * scale, stated):
                 count.tally["contradicted"] += 1
-                report.scene("contradicted", scene, verdict.why, said)
+                count.list_scene("contradicted", scene, verdict.why, said)
                 continue
         else:
             kind_said = (str(words[i][0]), str(words[i][1]), int(data.separating_contact[i]))
@@ -513,14 +532,14 @@ def compare(kind, batch, data, count, report):
             said = f"{kind_said}, t_end {float(data.t_end[i]):.9g}, phi_end {float(data.phi_end[i]):.6g}"
             if kind_said != verdict.kind:
                 count.tally["contradicted"] += 1
-                report.scene("contradicted", scene, f"{verdict.kind}: {verdict.why}", said)
+                count.list_scene("contradicted", scene, f"{verdict.kind}: {verdict.why}", said)
                 continue
             stated = {n: float(data[f"{n}_error"][i]) if f"{n}_error" in data else 0.0 for n in ("phi_end", "t_end")}
             places = [n for n in stated if not errors[n] < max(1e-3, 1e3 * spread[n], stated[n])]
             if places:
                 count.tally["off"] += 1
                 why = f"{verdict.why}; phi_end {verdict.numbers['phi_end']:.9g}, t_end {verdict.numbers['t_end']:.9g}"
-                report.scene("off", scene, why, said)
+                count.list_scene("off", scene, why, said)
         for name, error in errors.items():
             stated = float(data[f"{name}_error"][i]) if f"{name}_error" in data else math.nan
             sure = max(spread[name], SURE)
@@ -528,31 +547,17 @@ def compare(kind, batch, data, count, report):
                 count.bounded.append((stated >= error - sure, stated / max(error, sure)))
 
 
-class Report:
-    """Prints wrong answers as they are found."""
-
-    def __init__(self, verbose):
-        self.verbose = verbose
-
-    def scene(self, word, scene, why, said):
-        """Print a scene with the answers of the reference and of the package."""
-        listing = pprint.pformat(scene, width=120, sort_dicts=False)
-        tqdm.write(f"\n# {word}; reference: {why}\n# ringsweep: {said}\n{listing}")
-
-
-def run_family(name, kinds, many, seed, solver, report):
-    """Count of a family of about `many` scenes."""
-    count, batches = Count(), []
-    for k, kind in enumerate(kinds):
-        rng = np.random.default_rng([seed, *name.encode(), k])
-        # Long runs, or runs that cost the reference much.
-        share = many / len(kinds) * (0.1 if kind.force else 0.3 if kind.far else 1.0)
-        batches.append((kind, [draw(rng, kind) for _ in range(max(1, round(share)))]))
-    for kind, batch in batches:
-        begin = time.perf_counter()
-        data = answers(kind, batch, solver)
-        count.seconds["package"] += time.perf_counter() - begin
-        compare(kind, batch, data, count, report)
+def run_batch(task):
+    """Count of about `many` scenes of a kind; a task is kind, `many`, seed, solver, and whether to list more."""
+    kind, many, seed, solver, verbose = task
+    rng, count = np.random.default_rng(seed), Count(verbose=verbose, number=seed[-1])
+    # Long runs, or runs that cost the reference much.
+    share = many * (0.1 if kind.force else 0.3 if kind.far else 1.0)
+    batch = [draw(rng, kind) for _ in range(max(1, round(share)))]
+    begin = time.process_time()
+    data = answers(kind, batch, solver)
+    count.seconds["package"] += time.process_time() - begin
+    compare(kind, batch, data, count)
     return count
 
 
@@ -601,26 +606,31 @@ def main():
         write_impacts(arguments.impacts)
         return
     asked = arguments.families or (FEW if arguments.quick else families())
-    chosen = {name: kinds for name, kinds in families().items() if name in asked}
+    chosen = {name: kinds[: 1 if arguments.quick else None] for name, kinds in families().items() if name in asked}
     heading = _common.machine()
     print(heading)
-    report, counts, total = Report(arguments.verbose), {}, Count()
+    counts, total = {name: Count() for name in chosen}, Count()
     many = (arguments.count or (QUICK if arguments.quick else COUNT)) / len(chosen)
-    with _common.one_core():
-        for name in tqdm(chosen, disable=None):
-            counts[name] = count = run_family(name, chosen[name], many, arguments.seed, arguments.solver, report)
-            total.tally.update(count.tally)
-            total.seconds.update(count.seconds)
-            total.bounded += count.bounded
-            total.ends.update(count.ends)
-            tqdm.write(" | ".join(row(name, count)))
+    batches = [(name, k, kind) for name, kinds in chosen.items() for k, kind in enumerate(kinds)]
+    tasks = [
+        (kind, many / len(chosen[name]), [arguments.seed, *name.encode(), k], arguments.solver, arguments.verbose)
+        for name, k, kind in batches
+    ]
+    with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as pool:
+        for (name, k, _), count in zip(tqdm(batches, disable=None), pool.map(run_batch, tasks), strict=True):
+            counts[name].add(count)
+            total.add(count)
+            for listing in count.listings:
+                tqdm.write(listing)
+            if k == len(chosen[name]) - 1:
+                tqdm.write(" | ".join(row(name, counts[name])))
     rows = [row(name, count) for name, count in (counts | {"all": total} if len(counts) > 1 else counts).items()]
     _common.heading("Certified answers against an independent reference")
     _common.table(HEADER, rows)
     _common.heading("Certified ends, and what a body on compliant contacts says of them")
     _common.table(END_HEADER, end_rows(total.ends))
     cost = ", ".join(f"{name} {seconds:.0f} s" for name, seconds in total.seconds.items())
-    print(f"on one core: {cost} (compilation included), seed {arguments.seed}")
+    print(f"CPU of all cores: {cost} (compilation included), seed {arguments.seed}")
     if len(chosen) == 1 or not arguments.families:
         text = f"Seed {arguments.seed}; {cost}.\n\n{_common.markdown(HEADER, rows)}"
         text += "\n## Certified ends, and what a body on compliant contacts says of them\n\n"
