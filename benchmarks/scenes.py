@@ -363,8 +363,9 @@ def first_and_last(config: Path, folder: Path, cache: Path) -> tuple[float, floa
 
 
 HEADER = [
-    "scene", "", "rk4, ns per step", "x", "us per run", "steps per run", "us per run, x", "ns per step, x",
-    "compile rk4, CPU s", "other", "cache rk4, KiB", "other", "instructions rk4", "other", "calls of rk4", "other",
+    "scene", "compared with", "", "rk4, ns per step", "x", "us per run", "steps per run", "us per run, x",
+    "ns per step, x", "compile rk4, CPU s", "other", "cache rk4, KiB", "other", "instructions rk4", "other",
+    "calls of rk4", "other",
 ]  # fmt: skip
 
 
@@ -381,7 +382,7 @@ def ladder(found: Mapping[str, Any], compiled: Mapping[tuple[str, str], Any]) ->
         times, own = (found.get(f"{name}, {method}") for method in METHODS)
         both = [compiled.get((name, method)) for method in ("rk4", rung.piecewise)]
         lines.append([
-            name, rung.piecewise,
+            name, rung.before or "-", rung.piecewise,
             f"{1e9 * Times(times['wall']).median / times['steps']:.1f}" if times else "-", ratio("rk4", "steps"),
             f"{1e6 * Times(own['wall']).median / own['runs']:.1f}", f"{own['steps'] / own['runs']:.0f}",
             ratio("piecewise", "runs"), ratio("piecewise", "steps"),
@@ -397,6 +398,31 @@ def over(found: Mapping[str, Any], name: str, other: str, method: str, per: str 
     """Time of a scene over the time of another scene, for each run or for each step."""
     one, two = found[f"{name}, {method}"], found[f"{other}, {method}"]
     return Times(one["wall"]).ratio(Times(two["wall"])) * two[per] / one[per]
+
+
+#: Rows of the table in the documents: what is added, the scene with it, and what its ratio counts.
+CHOSEN = (
+    ("a first zone", "+ a zone", "steps"),
+    ("two more zones", "+ two more zones", "steps"),
+    ("`tustin` as a formula", "tustin as a formula", "steps"),
+    ("the drive as a formula", "drive as a formula", "steps"),
+    ("`impact`, while no contact is lost", "+ impact", "runs"),
+    ("a section", "belt + section", "runs"),
+    ("an exponent", "belt + exponent", "runs"),
+    ("bristles (`lugre` in place of `stiction`)", "belt + bristles (lugre)", "runs"),
+)
+
+
+def costs(found: Mapping[str, Any]) -> list[list[str]]:
+    """Rows of the table in the documents: times longer under `rk4`, and under `event` or `implicit`."""
+    rows = []
+    for thing, name, per in CHOSEN:
+        rung = LADDER[name]
+        assert rung.before is not None
+        own = over(found, name, rung.before, "piecewise", per)
+        fixed = f"{over(found, name, rung.before, 'rk4'):.2f}" if "rk4" in rung.methods else "-"
+        rows.append([thing, rung.before, f"{own:.2f} per {per.removesuffix('s')}", fixed])
+    return rows
 
 
 def main() -> None:
@@ -461,15 +487,16 @@ def main() -> None:
         heading(title)
         table(header, rows)
         report += f"\n## {title}\n\n{markdown(header, rows)}"
-    publish(given, "scenes", "The cost of each thing in a scene", where, report)
+    figures = {"costs": markdown(["added", "to", "`event` or `implicit`", "`rk4`, per run"], costs(found))}
+    publish(given, "scenes", "The cost of each thing in a scene", where, report, figures)
 
 
 LEFT_OUT = "Functions of optional things in a kernel"
 
 #: Explanation at the head of the report.
 ABOUT = f"""
-One core, compiled before, no certificates, T = {SPAN:g} s, {PAPER_STEPS} steps of `rk4`. x is the ratio to the row that
-this row adds something to. An addition may also change the motion: if the number of steps changes, the ratio per step
+One core, compiled before, no certificates, T = {SPAN:g} s, {PAPER_STEPS} steps of `rk4`. x is the ratio to the scene
+that a row is compared with. An addition may also change the motion: if the number of steps changes, the ratio per step
 gives the cost of the addition itself. Instructions are those of the whole kernel, with its set-up and its ends. Calls
 are calls of the C library; they make the table of the drive, once for all cells of a task. The kernel has no code for
 what a scene lacks: the last columns, and the table of optional things, which counts the compiled functions of each.

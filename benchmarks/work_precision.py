@@ -20,7 +20,7 @@ from __future__ import annotations
 import os
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
@@ -63,6 +63,9 @@ from ringsweep.quantities.flags import SEPARATING
 SEED, SIDE = 181, 64
 #: A setting with a larger error at the end is not compared.
 CLOSE = 1e-3
+
+#: Largest error at the end, rad or m, at which the documents compare methods.
+TARGET = 1e-6
 
 #: Runs that `rk4` computes side by side at most.
 LANES = 32
@@ -318,9 +321,13 @@ class Measured:
     times: dict[tuple[str, str], Times]
     words: list[str]
 
-    def largest(self, key: tuple[str, str]) -> float:
-        """Largest error of a contender at the end."""
-        return float(self._row(key).error_end.max())
+    def cells(self, key: tuple[str, str]) -> int:
+        """Number of cells of a contender, of which the sample of another contender has the first ones."""
+        return int(self._row(key).error_end.notnull().sum())
+
+    def largest(self, key: tuple[str, str], cells: int | None = None) -> float:
+        """Largest error of a contender at the end, in the first `cells` cells."""
+        return float(self._row(key).error_end[:cells].max())
 
     def per_run(self, key: tuple[str, str]) -> float:
         """Time of one run, s."""
@@ -410,7 +417,7 @@ def measure(scene: Scene, effort: Effort) -> Measured:
 # ---- what is shown -------------------------------------------------------------------------
 
 RATES = ["", "runs", "runs/s"]
-BESIDE = ["peer", "largest error", "times longer", "in the rounds", "than"]
+BESIDE = ["peer", "largest error", "in cells", "times longer", "in the rounds", "than"]
 HEADER = ["method", "setting", "cells", "ms per run", "error at T: median", "max", "t_sep: max", "regimes wrong"]
 
 
@@ -439,7 +446,11 @@ def draw(data: xr.Dataset, methods: list[str]) -> Figure:
     methods : list of str
         Methods of all scenes, so that a colour stands for the same method in all figures.
     """
-    data = data.assign_attrs(methods=methods)
+    solvers = [f"{method}, {setting}" for method, setting in zip(data.method.values, data.setting.values, strict=True)]
+    data = data.assign_coords(solver=("contender", solvers)).assign_attrs(methods=methods, target=TARGET)
+    within = (data.error_end.max("cell") <= TARGET) & data.method.isin(["event", "implicit"])
+    if within.any():
+        data.attrs["recommended"] = solvers[int(np.nanargmin(data.time_per_run.where(within)))]
     errors = [name for name in ("error_end", "error_separation") if data[name].notnull().any()]
     columns = 2
     rows = -(-(len(errors) + 1) // columns)
@@ -463,7 +474,7 @@ def draw(data: xr.Dataset, methods: list[str]) -> Figure:
     shares.set_ylim(-4.0, 104.0)
     shares.tick_params(labelsize="small")
     shares.grid(True, color="#E6E6E6", linewidth=0.6)
-    what = f"points: median of {data.sizes['cell']} cells; bars: up to the largest"
+    what = f"points: median of {data.sizes['cell']} cells, or of the fewer of a slow peer; bars: up to the largest"
     figure.suptitle(f"{data.attrs['title']}\n{what}", fontsize="medium")
     figure.align_ylabels(axes)
     style: dict[str, Any] = {"fontsize": "small", "frameon": False, "handlelength": 3}
@@ -485,9 +496,9 @@ def draw_all(scenes: dict[str, xr.Dataset], folder: Path) -> None:
 # ---- beside peers ---------------------------------------------------------------------------
 
 
-def cheapest(found: Measured, method: str, error: float) -> tuple[str, str] | None:
-    """Fastest setting of a method whose largest error at the end is at most `error`."""
-    keys = [key for key in found.times if key[0] == method and found.largest(key) <= error]
+def cheapest(found: Measured, method: str, error: float, cells: int | None = None) -> tuple[str, str] | None:
+    """Fastest setting of a method whose largest error at the end, in the first `cells` cells, is at most `error`."""
+    keys = [key for key in found.times if key[0] == method and found.largest(key, cells) <= error]
     return min(keys, key=found.per_run, default=None)
 
 
@@ -495,18 +506,39 @@ def beside_peers(scene: Scene, found: Measured) -> list[list[str]]:
     """Rows that compare each peer, at each setting, with the fastest setting of ours that errs no more."""
     rows = []
     for peer in found.times:
-        theirs = found.largest(peer)
+        theirs, cells = found.largest(peer), found.cells(peer)
         if peer[0] in ("rk4", scene.method) or not theirs < CLOSE:
             continue
-        if (best := cheapest(found, scene.method, theirs)) is None:
+        if (best := cheapest(found, scene.method, theirs, cells)) is None:
             ours = ["-", "-", "no setting errs as little"]
         else:
             each = sorted(a / b for a, b in zip(found.times[peer].wall, found.times[best].wall, strict=False))
             lanes = float(found.ratio(peer, best)) / median(each)
             spread = f"{number(lanes * each[0])} to {number(lanes * each[-1])}"
-            ours = [number(found.ratio(peer, best)), spread, f"`{best[0]}`, {best[1]}: {found.largest(best):.0e}"]
-        rows.append([", ".join(peer), f"{theirs:.0e}", *ours])
+            ours = [
+                number(found.ratio(peer, best)),
+                spread,
+                f"`{best[0]}`, {best[1]}: {found.largest(best, cells):.0e}",
+            ]
+        rows.append([", ".join(peer), f"{theirs:.0e}", str(cells), *ours])
     return rows
+
+
+def at_target(measured: Mapping[str, Measured]) -> str:
+    """Table of the documents: the fastest setting of each method, in each scene, that errs by `TARGET` at most."""
+    methods = list(dict.fromkeys(key[0] for found in measured.values() for key in found.times))
+    rows = []
+    for method in ["event", "implicit", *(name for name in methods if name not in ("event", "implicit"))]:
+        row = [f"`{method}`" if method in ("event", "implicit", "rk4") else method]
+        for name, found in measured.items():
+            own = cheapest(found, SCENES[name].method, TARGET)
+            if (best := cheapest(found, method, TARGET)) is not None and own is not None:
+                times = "" if best == own else f", {number(found.ratio(best, own))} x"
+                row.append(f"{1e3 * found.per_run(best):.3g} ms{times} ({best[1]})")
+            else:
+                row.append("too inexact" if any(key[0] == method for key in found.times) else "-")
+        rows.append(row)
+    return markdown(["", *(SCENES[name].title for name in measured)], rows)
 
 
 FRONT = ["method", "setting", "ms per run", "largest error of φ(T), rad", "regimes wrong"]
@@ -600,14 +632,22 @@ def main() -> None:
             report += "".join(f"- {words}\n" for words in found.words)
             report += "\n" + markdown(HEADER, lines(found.data))
             table(BESIDE, rows := beside_peers(SCENES[name], found))
-            report += f"\nHow many times longer a peer takes than ours at no larger error:\n\n{markdown(BESIDE, rows)}"
+            if rows:
+                report += "\nHow many times longer a peer takes than ours at no larger error, in the same cells:\n\n"
+                report += markdown(BESIDE, rows)
+            else:
+                report += f"\nEvery peer errs by more than {CLOSE:g} {found.data.error_end.units} in some cell.\n"
     write(folder, measured, where)
     if not given.scene:
         title, header, rows = f"Runs per second on all cores, T = {SPAN:g} s", RATES, throughput(effort)
         heading(title)
         table(header, rows)
         report += f"\n## {title}\n\n{markdown(header, rows)}"
-        figures = {"stiff": markdown(FRONT, front(measured["stiff"].data)), "cells": str(effort.cells)}
+        figures = {
+            "stiff": markdown(FRONT, front(measured["stiff"].data)),
+            "equal": at_target(measured),
+            "cells": str(effort.cells),
+        }
         publish(given, "work_precision", "Error against run time", where, report, figures)
 
 
