@@ -8,13 +8,13 @@ independent, so it need not wait for one result before it computes the next: a s
 from __future__ import annotations
 
 import operator
-from typing import Any
+from typing import Any, ClassVar
 
 import llvmlite.ir as ir
 from llvmlite.binding import get_host_cpu_features
 from numba.core import cgutils, types
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import lower_builtin, lower_cast, models, register_model
+from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
 
 #: Number of runs side by side. Without AVX-512 registers hold fewer numbers. Results do not depend on it.
 WIDTH = 32 if get_host_cpu_features().get("avx512f") else 16
@@ -24,35 +24,34 @@ _DOUBLE, _WORD = ir.DoubleType(), ir.IntType(64)
 VECTOR, WORDS = (ir.VectorType(kind, WIDTH) for kind in (_DOUBLE, _WORD))
 
 
-class Lanes(types.Type):
+class _Vector(types.Type):
+    element: ClassVar[Any]
+
+    def __init__(self, width: int) -> None:
+        self.width = width
+        super().__init__(f"{type(self).__name__}({width})")
+
+
+class Lanes(_Vector):
     """Numba type of `width` doubles; for runs side by side, one for each run."""
 
-    def __init__(self, width: int) -> None:
-        self.width = width
-        super().__init__(f"Lanes({width})")
+    element = _DOUBLE
 
 
-class Mask(types.Type):
+class Mask(_Vector):
     """Numba type of `width` truth values."""
 
-    def __init__(self, width: int) -> None:
-        self.width = width
-        super().__init__(f"Mask({width})")
+    element = ir.IntType(1)
 
 
 LANES, MASK = Lanes(WIDTH), Mask(WIDTH)
 
 
 @register_model(Lanes)
-class _LanesModel(models.PrimitiveModel):
-    def __init__(self, dmm: Any, fe_type: Any) -> None:
-        super().__init__(dmm, fe_type, ir.VectorType(_DOUBLE, fe_type.width))
-
-
 @register_model(Mask)
-class _MaskModel(models.PrimitiveModel):
+class _VectorModel(models.PrimitiveModel):
     def __init__(self, dmm: Any, fe_type: Any) -> None:
-        super().__init__(dmm, fe_type, ir.VectorType(ir.IntType(1), fe_type.width))
+        super().__init__(dmm, fe_type, ir.VectorType(fe_type.element, fe_type.width))
 
 
 # ---- arithmetic ------------------------------------------------------------------------------
@@ -134,3 +133,39 @@ _define(operator.or_, Mask, Mask, 2, lambda builder, a, b: builder.or_(a, b))
 # If the second argument is NaN the first one is taken, as by Python's min and max.
 _define(min, Lanes, Lanes, 2, lambda builder, a, b: builder.select(builder.fcmp_ordered("<", b, a), b, a))
 _define(max, Lanes, Lanes, 2, lambda builder, a, b: builder.select(builder.fcmp_ordered(">", b, a), b, a))
+
+
+# ---- memory ----------------------------------------------------------------------------------
+
+
+def _place(context: Any, builder: Any, sig: Any, args: Any, lanes: Lanes) -> Any:
+    memory = context.make_array(sig.args[0])(context, builder, args[0])
+    vector = ir.VectorType(_DOUBLE, lanes.width)
+    return builder.bitcast(builder.gep(memory.data, [args[1]]), vector.as_pointer())
+
+
+def loader(lanes: Lanes) -> Any:
+    """Function for kernels of an array and an index: Lanes from consecutive doubles, from this index on."""
+
+    @intrinsic
+    def load(typingctx, memory, at):
+        def lower(context, builder, sig, args):
+            return builder.load(_place(context, builder, sig, args, lanes), align=8)
+
+        return lanes(memory, types.intp), lower
+
+    return load
+
+
+def storer(lanes: Lanes) -> Any:
+    """Function for kernels that stores Lanes where :func:`loader` reads them."""
+
+    @intrinsic
+    def store(typingctx, memory, at, value):
+        def lower(context, builder, sig, args):
+            builder.store(args[2], _place(context, builder, sig, args, lanes), align=8)
+            return context.get_dummy_value()
+
+        return types.none(memory, types.intp, lanes), lower
+
+    return store

@@ -15,7 +15,7 @@ from numba.extending import intrinsic
 
 from ringsweep.compile import function_from_lines, generated, map_leaves, specialise
 from ringsweep.numerics.functions import select, spread
-from ringsweep.numerics.lanes import LANES, VECTOR, WIDTH
+from ringsweep.numerics.lanes import LANES, VECTOR, WIDTH, loader, storer
 
 
 def _numbers(kind: Any, name: str) -> list[tuple[str, Any]]:
@@ -32,28 +32,7 @@ def size_of(nested):
     return [f"return {len(_numbers(nested, 'nested'))}"], {}
 
 
-@intrinsic
-def _load(typingctx, memory, at):
-    """Lanes from consecutive doubles of an array, from index `at` on."""
-
-    def lower(context, builder, sig, args):
-        return builder.load(_place(context, builder, sig, args), align=8)
-
-    return LANES(memory, at), lower
-
-
-@intrinsic
-def _store(typingctx, memory, at, value):
-    def lower(context, builder, sig, args):
-        builder.store(args[2], _place(context, builder, sig, args), align=8)
-        return context.get_dummy_value()
-
-    return types.none(memory, at, LANES), lower
-
-
-def _place(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    memory = context.make_array(sig.args[0])(context, builder, args[0])
-    return builder.bitcast(builder.gep(memory.data, [args[1]]), VECTOR.as_pointer())
+_load, _store = loader(LANES), storer(LANES)
 
 
 @intrinsic

@@ -16,7 +16,7 @@ from numba.core import cgutils, types
 from numba.extending import intrinsic
 
 from ringsweep.compile import absorbed, function_from_lines, specialise
-from ringsweep.numerics.lanes import Lanes, spread_scalar
+from ringsweep.numerics.lanes import Lanes, loader, spread_scalar, storer
 
 #: Highest power of every series.
 ORDER = 16
@@ -45,37 +45,8 @@ def _in_kernels(function: Any, body: Any) -> None:
     specialise(function, lambda *kinds: body, absorb=True)
 
 
-def _place(context: Any, builder: Any, sig: Any, args: Any, lanes: Lanes) -> Any:
-    memory = context.make_array(sig.args[0])(context, builder, args[0])
-    vector = ir.VectorType(ir.DoubleType(), lanes.width)
-    return builder.bitcast(builder.gep(memory.data, [args[1]]), vector.as_pointer())
-
-
-def _loader(lanes: Lanes) -> Any:
-    @intrinsic
-    def load(typingctx, memory, at):
-        def lower(context, builder, sig, args):
-            return builder.load(_place(context, builder, sig, args, lanes), align=8)
-
-        return lanes(memory, types.intp), lower
-
-    return load
-
-
-def _storer(lanes: Lanes) -> Any:
-    @intrinsic
-    def store(typingctx, memory, at, value):
-        def lower(context, builder, sig, args):
-            builder.store(args[2], _place(context, builder, sig, args, lanes), align=8)
-            return context.get_dummy_value()
-
-        return types.none(memory, types.intp, lanes), lower
-
-    return store
-
-
 _load_terms, _store_terms, _load_factors, _store_factors = (
-    make(lanes) for lanes in (_TERMS, _FACTORS) for make in (_loader, _storer)
+    make(lanes) for lanes in (_TERMS, _FACTORS) for make in (loader, storer)
 )
 
 
