@@ -43,20 +43,6 @@ def _any(typingctx, mask):
     return types.boolean(MASK), lower
 
 
-def _unary(name: str) -> Any:
-    """Function that applies an LLVM intrinsic to every lane."""
-    instruction = llvm_function(name)
-
-    @intrinsic
-    def function(typingctx, x):
-        return LANES(LANES), lambda context, builder, sig, args: instruction(builder, *args)
-
-    return function
-
-
-_floor, _nearest, _sqrt = _unary("llvm.floor"), _unary("llvm.rint"), _unary("llvm.sqrt")
-
-
 @intrinsic
 def _opposed(typingctx, x, v):
     """`x`, whose sign bit is not set, with the sign bit that `v` does not have."""
@@ -140,7 +126,7 @@ _HALF_PI_1, _HALF_PI_2, _HALF_PI_3 = map(
 
 
 def lanes_body(scalar: Any) -> Any:
-    """Decorate the body for Lanes of a function of numbers, `scalar`: ``@lanes_body(scalar)``."""
+    """Decorator of the body for Lanes of a function of numbers, `scalar`."""
 
     def register(lanes: Any) -> Any:
         specialise(scalar, lambda *kinds: lanes if LANES in kinds or MASK in kinds else scalar)
@@ -149,14 +135,23 @@ def lanes_body(scalar: Any) -> Any:
     return register
 
 
+def _apply_to_lanes(scalar: Any, name: str) -> None:
+    """Let the body for Lanes of a function of one number apply an LLVM intrinsic to every lane."""
+    instruction = llvm_function(name)
+
+    @intrinsic
+    def function(typingctx, x):
+        return LANES(LANES), lambda context, builder, sig, args: instruction(builder, *args)
+
+    lanes_body(scalar)(lambda x: function(x))
+
+
 def select(condition, a, b):
     """`a` where the condition holds, else `b`. Both are evaluated."""
     return a if condition else b
 
 
-@lanes_body(select)
-def _lanes_select(condition, a, b):
-    return _select(condition, a, b)
+lanes_body(select)(lambda condition, a, b: _select(condition, a, b))
 
 
 def any_of(condition):
@@ -164,9 +159,7 @@ def any_of(condition):
     return condition
 
 
-@lanes_body(any_of)
-def _lanes_any_of(condition):
-    return _any(condition)
+lanes_body(any_of)(lambda condition: _any(condition))
 
 
 def floor(x):
@@ -174,9 +167,7 @@ def floor(x):
     return np.floor(x)
 
 
-@lanes_body(floor)
-def _lanes_floor(x):
-    return _floor(x)
+_apply_to_lanes(floor, "llvm.floor")
 
 
 def nearest(x):
@@ -184,9 +175,7 @@ def nearest(x):
     return np.rint(x)
 
 
-@lanes_body(nearest)
-def _lanes_nearest(x):
-    return _nearest(x)
+_apply_to_lanes(nearest, "llvm.rint")
 
 
 def square_root(x):
@@ -194,9 +183,7 @@ def square_root(x):
     return math.sqrt(x)
 
 
-@lanes_body(square_root)
-def _lanes_square_root(x):
-    return _sqrt(x)
+_apply_to_lanes(square_root, "llvm.sqrt")
 
 
 @unrolled
@@ -252,9 +239,7 @@ def exponential(x):
     return math.exp(x)
 
 
-@lanes_body(exponential)
-def _lanes_exponential(x):
-    return decay(min(max(-x, -700.0), 700.0))
+lanes_body(exponential)(lambda x: decay(min(max(-x, -700.0), 700.0)))
 
 
 def hyperbolic_tangent(x):
@@ -271,12 +256,7 @@ def _lanes_hyperbolic_tangent(x):
     return select(square < 1e-3, small, select(x < 0.0, -large, large))
 
 
-_log, _pow = llvm_function("llvm.log"), llvm_function("llvm.pow")
-
-
-@intrinsic
-def _logarithm(typingctx, x):
-    return LANES(LANES), lambda context, builder, sig, args: _log(builder, *args)
+_pow = llvm_function("llvm.pow")
 
 
 @intrinsic
@@ -305,9 +285,7 @@ def logarithm(x):
     return math.log(x)
 
 
-@lanes_body(logarithm)
-def _lanes_logarithm(x):
-    return _logarithm(x)
+_apply_to_lanes(logarithm, "llvm.log")
 
 
 def raised(x, exponent):
@@ -315,9 +293,7 @@ def raised(x, exponent):
     return x**exponent
 
 
-@lanes_body(raised)
-def _lanes_raised(x, exponent):
-    return _raised(spread(x), spread(exponent))
+lanes_body(raised)(lambda x, exponent: _raised(spread(x), spread(exponent)))
 
 
 def arc_tangent(x):
@@ -325,9 +301,7 @@ def arc_tangent(x):
     return math.atan(x)
 
 
-@lanes_body(arc_tangent)
-def _lanes_arc_tangent(x):
-    return _arc_tangent(x)
+lanes_body(arc_tangent)(lambda x: _arc_tangent(x))
 
 
 @intrinsic
@@ -400,9 +374,7 @@ def sine_cosine_near(x, x_0, sine, cosine):
     return math.sin(x), math.cos(x)
 
 
-@lanes_body(sine_cosine_near)
-def _lanes_sine_cosine_near(x, x_0, sine, cosine):
-    return sine_cosine_carried(x, x_0, sine, cosine, False)
+lanes_body(sine_cosine_near)(lambda x, x_0, sine, cosine: sine_cosine_carried(x, x_0, sine, cosine, False))
 
 
 def sine_cosine_carried(x, x_0, sine, cosine, afresh):
@@ -468,6 +440,4 @@ def opposing(x, v):
     return -x if v > 0.0 else x if v < 0.0 else 0.0 * x
 
 
-@lanes_body(opposing)
-def _lanes_opposing(x, v):
-    return _opposed(x, v)
+lanes_body(opposing)(lambda x, v: _opposed(x, v))

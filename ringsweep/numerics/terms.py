@@ -97,11 +97,7 @@ def _powers(typingctx, s):
     return _TERMS(types.float64), lower
 
 
-def _powers_in_kernel(s):
-    return _powers(s)
-
-
-_in_kernels(powers, _powers_in_kernel)
+_in_kernels(powers, lambda s: _powers(s))
 
 
 def total(values):
@@ -120,11 +116,7 @@ def _total(typingctx, values):
     return types.float64(_TERMS), lower
 
 
-def _total_in_kernel(values):
-    return _total(values)
-
-
-_in_kernels(total, _total_in_kernel)
+_in_kernels(total, lambda values: _total(values))
 
 
 # ---- products of several series ---------------------------------------------------------------
