@@ -319,7 +319,3 @@ def sliding(body, K1, K2, motion):
     if min(n1, n2) > _ROUNDING * body.mass * _scale(body, motion[2], 0.0):
         return CLOSED if determinant > 0.0 else IMPOSSIBLE
     return opening(body, (K1, K2), (0.0, 0.0), 1, motion, 0.0)
-
-
-#: Functions of a body that the contact problem needs.
-BODY_MEMBERS = (opening,)

@@ -486,9 +486,9 @@ def velocity_at_beginning(drive, velocity):
     return velocity - (turn(drive, beginning(drive))[1] - before)
 
 
-#: Functions of a drive that methods with a constant step need, and those that the other methods need.
-CONSTANT_STEP_MEMBERS = (shape, turn, lookup)
-MEMBERS = (turn, expand, jerk, next_knot, turn_near, beginning, top_speed)
+#: Functions without a default that methods with a constant step need of a drive, and those that the other methods need.
+CONSTANT_STEP_MEMBERS = (shape,)
+MEMBERS = (expand, jerk)
 
 #: Drives by the name that the configuration gives them.
 DRIVES: dict[str, type] = {}

@@ -33,6 +33,7 @@ from __future__ import annotations
 import inspect
 import sys
 from collections.abc import Callable, Collection
+from functools import partial
 from itertools import combinations
 from typing import Any, NamedTuple
 
@@ -130,12 +131,24 @@ def radius(body):
     return body.radius
 
 
-@hook
+#: Functions of a body that follow from its balances. `Equations` writes them.
+DERIVED: list[Any] = []
+
+
+def _derived(stub: Any = None, *, absorb: bool = False) -> Any:
+    """Hook that is one of :data:`DERIVED`."""
+    if stub is None:
+        return partial(_derived, absorb=absorb)
+    DERIVED.append(hook(stub, absorb=absorb))
+    return DERIVED[-1]
+
+
+@_derived
 def free_determinant(body):
     """Determinant of the balances without friction, kg m^2. 1 for bodies that cannot jam."""
 
 
-@hook(absorb=True)
+@_derived(absorb=True)
 def acceleration(body, K1, K2, motion):
     """Angular acceleration of the body in slip, and the determinant that tells whether the body jams.
 
@@ -155,12 +168,12 @@ def acceleration(body, K1, K2, motion):
     """
 
 
-@hook
+@_derived
 def contact_count(body):
     """Number of contacts of a body, 1 or 2."""
 
 
-@hook(absorb=True)
+@_derived(absorb=True)
 def acceleration_slope(body, K1, K2, slope_1, slope_2, motion):
     """Derivative of the angular acceleration by way of friction: d phi_dd/dK1 slope_1 + d phi_dd/dK2 slope_2.
 
@@ -178,7 +191,7 @@ def acceleration_slope(body, K1, K2, slope_1, slope_2, motion):
     """
 
 
-@hook(absorb=True)
+@_derived(absorb=True)
 def acceleration_gradient(body, K1, K2, motion):
     """Derivatives of the angular acceleration by angle and by angular velocity, at constant K1 and K2.
 
@@ -194,7 +207,7 @@ def acceleration_gradient(body, K1, K2, motion):
     """
 
 
-@hook(absorb=True)
+@_derived(absorb=True)
 def friction_gain(body, motion):
     """Derivative of the angular acceleration by K, with the same K at all contacts, at K = 0.
 
@@ -210,7 +223,7 @@ def friction_gain(body, motion):
     """
 
 
-@hook
+@_derived
 def reaction_determinant(body):
     """Determinant D of the reactions without friction, 1. Errors of friction grow in the reactions by 1/D.
 
@@ -218,7 +231,7 @@ def reaction_determinant(body):
     """
 
 
-@hook(absorb=True)
+@_derived(absorb=True)
 def reactions(body, K1, K2, motion):
     """Normal reactions in slip: the paper's Eq. 17 with the angular acceleration eliminated.
 
@@ -236,7 +249,7 @@ def reactions(body, K1, K2, motion):
     """
 
 
-@hook
+@_derived
 def slip_balance(body, K1, K2):
     """Solution of the balances in slip, where friction is K_i N_i plus a given force.
 
@@ -257,7 +270,7 @@ def slip_balance(body, K1, K2):
     """
 
 
-@hook
+@_derived
 def determinant_terms(body, one, K1, K2, both):
     """Determinant of the balances as a linear function of 1, K_1, K_2 and K_1 K_2.
 
@@ -274,7 +287,7 @@ def determinant_terms(body, one, K1, K2, both):
     """
 
 
-@hook
+@_derived
 def held(body, one, motion, square, epsilon, normal):
     """Forces at the contacts from the balances and not from a friction law: so in stick too.
 
@@ -302,7 +315,7 @@ def held(body, one, motion, square, epsilon, normal):
     """
 
 
-@hook
+@_derived
 def driven(body, one, motion, square, F1, F2):
     """Acceleration of the body under given friction forces, rad/s^2, linear in the arguments after `body`.
 
@@ -315,12 +328,12 @@ def driven(body, one, motion, square, F1, F2):
     """
 
 
-@hook(absorb=True)
+@_derived(absorb=True)
 def if_load_varies(body, yes, no):
     """`yes` if a reaction depends on motion or friction, else `no`: then no contact can open."""
 
 
-@hook
+@_derived
 def energy(body, motion):
     """Kinetic and potential energy of the body, J. Its rate is :func:`power`.
 
@@ -331,7 +344,7 @@ def energy(body, motion):
     """
 
 
-@hook
+@_derived
 def power(body, K1, K2, N1, N2, motion):
     """Power of friction, and of other forces that are not in the energy, W: from the last balance.
 
@@ -344,7 +357,7 @@ def power(body, K1, K2, N1, N2, motion):
     """
 
 
-@hook
+@_derived
 def imbalance(body, K1, K2, N1, N2, phi_dd, motion):
     """Error of the balances as they are written down: sum of its squares, each as a share of those of the terms.
 
@@ -359,31 +372,10 @@ def imbalance(body, K1, K2, N1, N2, phi_dd, motion):
     """
 
 
-@hook(absorb=True)
+@_derived(absorb=True)
 def size(body, motion):
     """Sum of the magnitudes of the terms of the last balance without friction and inertia, N m, or N on a belt."""
 
-
-#: Functions of a body that follow from its balances. `Equations` writes them.
-DERIVED = (
-    contact_count,
-    acceleration,
-    reactions,
-    acceleration_slope,
-    acceleration_gradient,
-    friction_gain,
-    free_determinant,
-    reaction_determinant,
-    slip_balance,
-    determinant_terms,
-    held,
-    driven,
-    if_load_varies,
-    energy,
-    power,
-    imbalance,
-    size,
-)
 
 #: Balances of the bodies, and what follows from them, by the type of the body.
 EQUATIONS: dict[type, Equations] = {}

@@ -287,18 +287,5 @@ def row(scene, y, forcing):
     """
 
 
-MEMBERS = (
-    initial_state,
-    rates,
-    inspect,
-    inspect_next,
-    holds,
-    verdict,
-    eigenvalue,
-    margin,
-    arc_share,
-    fall_rate,
-    seen,
-    sticks,
-    row,
-)
+#: Functions without a default.
+MEMBERS = (initial_state, rates, inspect, eigenvalue, seen, sticks, row)

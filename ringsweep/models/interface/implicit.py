@@ -324,17 +324,5 @@ def row(scene, mode, forcing, x):
     """
 
 
-MEMBERS = (
-    may_creep,
-    to_implicit,
-    from_implicit,
-    common,
-    rates,
-    linearise,
-    error_scales,
-    guards_and_motion,
-    near_zero,
-    motion,
-    seen,
-    row,
-)
+#: Functions without a default, but for :func:`is_stiff`, which only smooth laws need.
+MEMBERS = (rates, linearise, error_scales, guards_and_motion, near_zero, motion, seen, row)

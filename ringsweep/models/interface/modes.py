@@ -153,4 +153,5 @@ def in_space(scene, t, y):
     """
 
 
-MEMBERS = (initial_state, initial_mode, switch, status_when_stalled, sticks, in_space)
+#: Functions without a default.
+MEMBERS = (initial_state, initial_mode, switch, in_space)

@@ -193,4 +193,5 @@ def after_first_step(mode):
     return mode
 
 
-MEMBERS = (table_shape, expand, state_at, rates_at, seen_at_start, seen_at, extremes, row)
+#: Functions without a default.
+MEMBERS = (expand, state_at, rates_at, seen_at_start, seen_at, extremes, row)

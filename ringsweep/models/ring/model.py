@@ -17,12 +17,9 @@ from ringsweep.models.model import Continues, Model, period_of, phases
 from ringsweep.models.parts import GRAVITY, MASS, SPAN, drive_of, friction_coefficients, law_of
 from ringsweep.models.ring import long_run, record
 from ringsweep.models.scene import Structure, Values, require
-from ringsweep.physics import contact, drives, friction, ring, zones
+from ringsweep.physics import drives, friction, ring, zones
 from ringsweep.physics.friction.presliding import steady_deflection
 from ringsweep.quantities.parameters import Parameter, declared
-
-#: Hooks that must be implemented for the type of a body.
-BODY_MEMBERS = ring.DERIVED + contact.BODY_MEMBERS
 
 #: Variables of a point of a section: angle and angular velocity, and under a law with bristles their deflections.
 SECTION = "phi_section", "omega_section", "deflection_1_section", "deflection_2_section"
@@ -52,7 +49,7 @@ class SingleContactRing(Model, Continues):
     """Number of contacts."""
 
     body_type: ClassVar[type] = ring.OneContact
-    """Type of the body; the hooks of :data:`BODY_MEMBERS` are implemented for it."""
+    """Type of the body; the hooks of :data:`ring.DERIVED` are implemented for it."""
 
     def columns(self, structure: Structure) -> tuple[str, ...]:
         """Outcomes, and after them what is asked for: words of the long run, exponent and multipliers, the section."""
@@ -104,7 +101,7 @@ class SingleContactRing(Model, Continues):
 
     def required(self, structure: Structure) -> dict[type, tuple[Any, ...]]:
         """Hooks of the recorder, and hooks for the type of the body."""
-        return super().required(structure) | {self.body_type: BODY_MEMBERS}
+        return super().required(structure) | {self.body_type: tuple(ring.DERIVED)}
 
     def _has_bristles(self, structure: Structure) -> bool:
         return friction.family_of(structure.law_type) is friction.Dynamic
