@@ -121,13 +121,12 @@ def surface_of(arcs: list[Arc], mu_s: Any, mu_k: Any) -> Uniform | Segments:
     return Segments(edges, static, kinetic, index, (static.max(axis=-1), kinetic.min(axis=-1)), narrowest)
 
 
-@hook
+# The defaults are those of a uniform surface.
+
+
+@hook(optional=True)
 def segment(surface, angle):
     """Index of the segment at `angle`, rad, of any number of turns."""
-
-
-@segment.implements(Uniform)
-def _uniform_segment(surface, angle):
     return 0
 
 
@@ -142,7 +141,7 @@ def _segments_segment(surface, angle):
     return found
 
 
-@hook
+@hook(optional=True)
 def coefficients(surface, segment):
     """Friction coefficients and zone of a segment.
 
@@ -156,10 +155,6 @@ def coefficients(surface, segment):
     tuple of float
         Static and kinetic coefficient, 1; number of the zone, 0 for none.
     """
-
-
-@coefficients.implements(Uniform)
-def _uniform_coefficients(surface, segment):
     return surface.mu_s, surface.mu_k, 0.0
 
 
@@ -205,7 +200,7 @@ def _unrolled_value_at(values: Any, edges: Any, x: Any) -> Any:
 specialise(value_at, _unrolled_value_at)
 
 
-@hook(absorb=True)
+@hook(absorb=True, optional=True)
 def roughness(surface, turns, shift):
     """Static and kinetic friction coefficient at a place, for floats and Lanes.
 
@@ -215,10 +210,6 @@ def roughness(surface, turns, shift):
     turns, shift : float or Lanes
         The place is their sum, in turns; any number of turns. What does not change in a run is best in `shift`.
     """
-
-
-@roughness.implements(Uniform)
-def _uniform_roughness(surface, turns, shift):
     return surface.mu_s, surface.mu_k
 
 
@@ -249,13 +240,9 @@ def _choose_coefficients_at(surface: Any, turns: Any, shift: Any) -> Any:
 specialise(_segments_coefficients_at, _choose_coefficients_at, absorb=True)
 
 
-@hook
+@hook(optional=True)
 def roughest(surface):
     """Largest static and least kinetic friction coefficient of the surface, 1."""
-
-
-@roughest.implements(Uniform)
-def _uniform_roughest(surface):
     return surface.mu_s, surface.mu_k
 
 
@@ -264,13 +251,9 @@ def _segments_roughest(surface):
     return surface.roughest
 
 
-@hook
+@hook(optional=True)
 def narrowest(surface):
     """Width of the narrowest segment of the surface, rad."""
-
-
-@narrowest.implements(Uniform)
-def _uniform_narrowest(surface):
     return 2.0 * pi
 
 
@@ -279,13 +262,9 @@ def _segments_narrowest(surface):
     return surface.narrowest
 
 
-@hook
+@hook(optional=True)
 def locate(surface, angle):
     """Place of a contact at `angle`, rad: segment, and number of whole revolutions to the lower edge of the segment."""
-
-
-@locate.implements(Uniform)
-def _uniform_locate(surface, angle):
     return 0, 0
 
 
@@ -302,7 +281,7 @@ def _segments_locate(surface, angle):
     return found, revolution
 
 
-@hook
+@hook(optional=True)
 def edge_ahead(surface, place, direction):
     """Angle of the next edge of a contact, rad; infinite on a uniform surface.
 
@@ -314,10 +293,6 @@ def edge_ahead(surface, place, direction):
     direction : int
         Direction of motion, +1 or -1.
     """
-
-
-@edge_ahead.implements(Uniform)
-def _uniform_edge_ahead(surface, place, direction):
     return direction * inf
 
 
@@ -331,13 +306,9 @@ def _segments_edge_ahead(surface, place, direction):
     return surface.edges[j] + 2.0 * pi * revolution
 
 
-@hook
+@hook(optional=True)
 def cross_edge(surface, place, direction):
     """Place of a contact after it has crossed the edge ahead; arguments as for :func:`edge_ahead`."""
-
-
-@cross_edge.implements(Uniform)
-def _uniform_cross_edge(surface, place, direction):
     return place
 
 
