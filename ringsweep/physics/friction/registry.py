@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from ringsweep.compile import hook, inlined, lacking
+from ringsweep.compile import hook, lacking
 from ringsweep.physics.friction import presliding
 from ringsweep.physics.friction.velocity import MU_K, MU_S, SCALE
 from ringsweep.quantities.parameters import Parameter
@@ -60,35 +60,10 @@ def family(law):
     """Family of a law: an instance of :class:`SetValued`, :class:`Smooth` or :class:`Dynamic`."""
 
 
-def _set_valued(law):
-    return SetValued()
-
-
-def _smooth(law):
-    return Smooth()
-
-
-def _dynamic(law):
-    return Dynamic()
-
-
-_FAMILY_BODIES: dict[type, Any] = {SetValued: _set_valued, Smooth: _smooth, Dynamic: _dynamic}
-
-
 @hook(optional=True)
-def _is_set_valued(family):
-    return False
-
-
-@_is_set_valued.implements(SetValued)
-def _set_valued_is(family):
-    return True
-
-
-@inlined
 def holds_in_band(law):
     """Whether friction in the band of the law takes any value up to the breakaway force, as in a dead band."""
-    return _is_set_valued(family(law))
+    return False
 
 
 def add_law(name: str, law: type, traits: Traits) -> None:
@@ -120,8 +95,10 @@ def add_law(name: str, law: type, traits: Traits) -> None:
 
 def describe(law: type, traits: Traits) -> None:
     """Set the traits of a law that has no name of its own."""
-    TRAITS[law] = traits
-    family.implements(law)(_FAMILY_BODIES[traits.family])
+    TRAITS[law], kind = traits, traits.family
+    family.implements(law)(lambda law: kind())
+    if kind is SetValued:
+        holds_in_band.implements(law)(lambda law: True)
 
 
 def family_of(law: type) -> type:
