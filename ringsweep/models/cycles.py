@@ -15,7 +15,7 @@ from math import floor, inf, isnan, nan, sqrt
 from typing import Any, NamedTuple
 
 from ringsweep.compile import absorbed, hook, inlined
-from ringsweep.numerics.functions import select
+from ringsweep.numerics.functions import negated, select
 from ringsweep.numerics.memory import select_all
 from ringsweep.quantities.flags import CHAOTIC, QUASI_PERIODIC, TRANSIENT
 
@@ -180,12 +180,6 @@ def difference(scene, x, other):
 
 
 @absorbed
-def _not(condition):
-    """Whether a condition does not hold, for floats and Lanes."""
-    return select(condition, 0.0, 1.0) > 0.0
-
-
-@absorbed
 def gap(scene, mark, x, velocity, swing, fast):
     """Distance of a state from a mark, as a share of the swing of place and velocity."""
     far_x, far_v = abs(difference(scene, x, mark.x)), abs(velocity - mark.velocity)
@@ -241,16 +235,16 @@ def closed(scene, c, mark, count, known, swing, fast):
     repeats = known & (gap_last <= near)
     returns = repeats | (known & (gap_reference <= near))
     # A lap of several cycles need not be closed before its end.
-    open_lap = _not(returns) & (since < c.lap)
+    open_lap = negated(returns) & (since < c.lap)
     lap = select(repeats, 1.0, select(returns, since, select(open_lap, c.lap, 0.0)))
     t_from = select(repeats, c.last.t, c.reference.t)
     total_from = select(repeats, c.last.total, c.reference.total)
     slips_from = select(repeats, c.last.slips, c.reference.slips)
     cycles = select(repeats, count - c.count, since)
-    keeps = open_lap | _not(known)
-    lost = _not(returns | keeps)
+    keeps = open_lap | negated(known)
+    lost = negated(returns | keeps)
     late = lost & (since >= c.most)
-    renew = returns | late | _not(known)
+    renew = returns | late | negated(known)
     most = select(late, min(2.0 * c.most, _MOST_CYCLES), c.most)
     again = returns & (lap == c.lap)
     start = select_all(repeats, c.last, c.reference)
@@ -258,12 +252,12 @@ def closed(scene, c, mark, count, known, swing, fast):
     laps = Laps(
         select(again, c.laps.number + 1.0, select(returns, 1.0, select(lap > 0.0, c.laps.number, 0.0))),
         select(returns, distance, c.laps.gap),
-        select(returns & _not(again), distance, c.laps.first_gap),
+        select(returns & negated(again), distance, c.laps.first_gap),
         select((c.lap > 0.0) & (lap == 0.0), max(0.1 * near, _NEAREST), near),
         c.laps.older,
         c.laps.newer,
     )
-    laps = _with_corners(laps, returns & _not(again), again, start, mark)
+    laps = _with_corners(laps, returns & negated(again), again, start, mark)
     sum_now, squares = c.sum + swing, c.squares + swing * swing
     halves = count >= 2.0 * c.middle.count
     here = Part(count, mark, swing, sum_now, squares)

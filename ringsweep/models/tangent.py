@@ -243,13 +243,9 @@ def _of_cubic(trace, minors, determinant):
 # ---- the run ------------------------------------------------------------------------------------
 
 
-@hook
+@hook(optional=True)
 def _disturbance(scene):
     """A disturbance with a component along each component of the state."""
-
-
-@_disturbance.implements(Belt, Ring)
-def _of_two(scene):
     return 1.0, 1.0
 
 

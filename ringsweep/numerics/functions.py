@@ -23,7 +23,7 @@ from llvmlite.binding import get_host_cpu_features
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
-from ringsweep.compile import inlined, specialise, unrolled
+from ringsweep.compile import absorbed, inlined, specialise, unrolled
 from ringsweep.numerics.lanes import LANES, MASK, VECTOR, WIDTH, WORDS, llvm_function, spread_scalar
 
 
@@ -152,6 +152,12 @@ def select(condition, a, b):
 
 
 lanes_body(select)(lambda condition, a, b: _select(condition, a, b))
+
+
+@absorbed
+def negated(condition):
+    """Whether a condition does not hold."""
+    return select(condition, 0.0, 1.0) > 0.0
 
 
 def any_of(condition):

@@ -156,13 +156,9 @@ def _step_implicit(family, scene, run, h_max, tolerances, scratch):
     return True, guard, s, y, record, control, _after_creep(run.local, error)
 
 
-@hook
+@hook(optional=True)
 def _step_in(kind, scene, run, h_max, tolerances, scratch):
     """One step of a scene, or of the simpler scene whose mode it is in; arguments and result as for :func:`_step`."""
-
-
-@_step_in.implements(simpler.Whole)
-def _step_in_whole(kind, scene, run, h_max, tolerances, scratch):
     return _step(family(scene.law), scene, run, h_max, tolerances, scratch)
 
 
@@ -182,13 +178,9 @@ def _step_in_part(kind, scene, run, h_max, tolerances, scratch):
     return is_implicit, guard, s, y, record, control, local
 
 
-@hook
+@hook(optional=True)
 def _begin_in(kind, scene, mode, t, y, tolerances, c):
     """Record at the beginning of a run of a scene, or of the simpler scene whose mode it is in."""
-
-
-@_begin_in.implements(simpler.Whole)
-def _begin_in_whole(kind, scene, mode, t, y, tolerances, c):
     return _begin(family(scene.law), scene, mode, t, y, tolerances, c)
 
 

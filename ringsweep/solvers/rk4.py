@@ -191,9 +191,10 @@ class Diagnosis(NamedTuple):
     arc_share: Any
 
 
-@hook(absorb=True)
+@hook(absorb=True, optional=True)
 def _diagnose(diagnosed, scene, diagnosis, before, now, h):
     """Diagnosis of a run after one more step."""
+    return diagnosis
 
 
 @_diagnose.implements(Diagnosed)
@@ -203,11 +204,6 @@ def _diagnose_step(diagnosed, scene, diagnosis, before, now, h):
         min(diagnosis.margin, constant_step.margin(scene, before, now)),
         max(diagnosis.arc_share, constant_step.arc_share(scene, now, h)),
     )
-
-
-@_diagnose.implements(NotDiagnosed)
-def _diagnose_nothing(diagnosed, scene, diagnosis, before, now, h):
-    return diagnosis
 
 
 class Results(NamedTuple):

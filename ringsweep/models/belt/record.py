@@ -17,7 +17,7 @@ from ringsweep.models.cycles import RETURN, Cycles, Mark
 from ringsweep.models.interface import recorder, shock
 from ringsweep.models.interface.status import BROKEN, COMPLETE, SEPARATED_1
 from ringsweep.models.turn import Interval, between, turn_within
-from ringsweep.numerics.functions import any_of, floor, lanes_body, select, square_root
+from ringsweep.numerics.functions import any_of, floor, lanes_body, negated, select, square_root
 from ringsweep.numerics.memory import select_all
 from ringsweep.physics import ring
 from ringsweep.physics.belt import Belt, BristleBelt
@@ -135,7 +135,7 @@ class Record(NamedTuple):
         As in :class:`Outcome`, but the displacement only at turns.
     stops : Stops
     cycles : Cycles
-    shocks : Shocks or NoShocks
+    shocks : Shocks or Unlocated
         Jumps of the acceleration.
     tangent : Tangent
         Growth of small disturbances; an empty tuple if no exponent is asked for.
@@ -254,19 +254,9 @@ def _observe(scene, record, t, duration, stuck, seen):
     )
 
 
-@absorbed
-def _not(condition):
-    """Whether a condition does not hold, for floats and Lanes."""
-    return select(condition, 0.0, 1.0) > 0.0
-
-
-@hook(absorb=True)
+@hook(absorb=True, optional=True)
 def _place(scene, r, place):
     """Place to remember, m: without bristles none is needed."""
-
-
-@_place.implements(Belt)
-def _no_place(scene, r, place):
     return r.last.place
 
 
@@ -275,13 +265,9 @@ def _same_place(scene, r, place):
     return place
 
 
-@hook(absorb=True)
+@hook(absorb=True, optional=True)
 def _leaves(scene, r, place):
-    """Whether the body leaves the play of the bristles, after stick has ended."""
-
-
-@_leaves.implements(Belt)
-def _leaves_at_once(scene, r, place):
+    """Whether the body leaves the play of the bristles, after stick has ended; never without bristles."""
     return False
 
 
@@ -315,7 +301,7 @@ def _stops(scene, r, now, stuck, place, v, force):
     since = select(begins | ends, before, s.since)
     # Within the play of the bristles a stop goes on.
     resumed = s.slip_from == s.slip_from
-    anew = begins & _not(resumed)
+    anew = begins & negated(resumed)
     span = max(r.x_max, now.x) - min(r.x_min, now.x)
     scale = _AT_REST * square_root(scene.body.stiffness / scene.body.mass) * span
     rate = select(now.duration > 0.0, (v - r.last.v) / now.duration, 0.0)
@@ -329,7 +315,7 @@ def _stops(scene, r, now, stuck, place, v, force):
     least = select(anew, min(_LONGEST_PASSAGE * _pace(scene), passage), s.least)
     slip_from = select(begins, nan, select(ends, r.last.place, s.slip_from))
     slip_start = select(ends, before, s.slip_start)
-    slipped = _not(stuck) & (abs(place - slip_from) > _least_slip(r))
+    slipped = negated(stuck) & (abs(place - slip_from) > _least_slip(r))
     stop = slip_start - start
     counts = slipped & (stop > abs(least))
     return Stops(

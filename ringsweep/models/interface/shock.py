@@ -23,7 +23,7 @@ class Located(NamedTuple):
 
 
 class Unlocated(NamedTuple):
-    """In place of the acceleration, for a method that does not locate events."""
+    """In place of the acceleration, and of the shocks, for a method that does not locate events."""
 
 
 class Shocks(NamedTuple):
@@ -42,13 +42,10 @@ class Shocks(NamedTuple):
     t_jump_max: float
 
 
-class NoShocks(NamedTuple):
-    """Shocks of a run whose method does not locate events."""
-
-
-@hook
+@hook(optional=True)
 def begin(seen):
     """Shocks at the beginning of a run, from what a method shows: :class:`Located` or :class:`Unlocated`."""
+    return seen
 
 
 @begin.implements(Located)
@@ -56,24 +53,15 @@ def _begin(seen):
     return Shocks(seen.acceleration, 0.0, nan)
 
 
-@begin.implements(Unlocated)
-def _begin_without(seen):
-    return NoShocks()
-
-
-@hook(absorb=True)
+@hook(absorb=True, optional=True)
 def observe(shocks, seen):
     """Shocks after one more observation."""
+    return shocks
 
 
 @observe.implements(Shocks)
 def _observe(shocks, seen):
     return Shocks(seen.acceleration, shocks.jump_max, shocks.t_jump_max)
-
-
-@observe.implements(NoShocks)
-def _observe_without(shocks, seen):
-    return shocks
 
 
 @inlined
@@ -85,16 +73,12 @@ def enter(shocks, t, seen):
     return observe(shocks, seen)
 
 
-@hook
+@hook(optional=True)
 def largest(shocks):
     """Largest jump and its time, s; NaN where it is not known."""
+    return nan, nan
 
 
 @largest.implements(Shocks)
 def _largest(shocks):
     return shocks.jump_max, shocks.t_jump_max
-
-
-@largest.implements(NoShocks)
-def _largest_without(shocks):
-    return nan, nan

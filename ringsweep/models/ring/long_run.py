@@ -91,13 +91,9 @@ def _lent(long_run, scene, row):
     return _with_section(long_run, section.lent(scene.section, long_run, row, _no_deflections(scene)))
 
 
-@hook
+@hook(optional=True)
 def _no_deflections(scene):
     """NaN for each deflection of bristles; one NaN without bristles."""
-
-
-@_no_deflections.implements(Ring)
-def _none(scene):
     return (nan,)
 
 
@@ -106,13 +102,9 @@ def _none_of_two(scene):
     return nan, nan
 
 
-@hook
+@hook(optional=True)
 def _deflections(scene, seen):
     """Deflections of the bristles as the recorder takes them, m; one NaN without bristles."""
-
-
-@_deflections.implements(Ring)
-def _no_bristles(scene, seen):
     return (nan,)
 
 

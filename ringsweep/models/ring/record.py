@@ -34,7 +34,7 @@ class Record(NamedTuple):
         Bounds of the angle before the last reversal.
     omega_min, omega_max, stick_time, normal_min_1, normal_min_2, normal_max_1, normal_max_2 : float
         As in :class:`Outcome`.
-    shocks : Shocks or NoShocks
+    shocks : Shocks or Unlocated
         Jumps of the angular acceleration.
     long_run : LongRun
         What the motion settles to; an empty tuple if this is not asked for.
