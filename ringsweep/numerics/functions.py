@@ -21,10 +21,9 @@ import llvmlite.ir as ir
 import numpy as np
 from llvmlite.binding import get_host_cpu_features
 from numba.core import cgutils, types
-from numba.extending import intrinsic
 
 from ringsweep.compile import absorbed, inlined, specialise, unrolled
-from ringsweep.numerics.lanes import LANES, MASK, VECTOR, WIDTH, WORDS, llvm_function, spread_scalar
+from ringsweep.numerics.lanes import LANES, MASK, VECTOR, WIDTH, WORDS, intrinsic, llvm_function, spread_scalar
 
 
 @intrinsic

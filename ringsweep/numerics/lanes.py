@@ -12,9 +12,13 @@ from typing import Any, ClassVar
 
 import llvmlite.ir as ir
 from llvmlite.binding import get_host_cpu_features
+from numba import extending
 from numba.core import cgutils, types
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
+from numba.extending import lower_builtin, lower_cast, models, register_model
+
+#: Numba's decorator. Its own type says that a call passes the typing context, too.
+intrinsic: Any = extending.intrinsic
 
 #: Number of runs side by side. Without AVX-512 registers hold fewer numbers. Results do not depend on it.
 WIDTH = 32 if get_host_cpu_features().get("avx512f") else 16

@@ -13,10 +13,9 @@ from typing import Any
 import llvmlite.ir as ir
 import numpy as np
 from numba.core import cgutils, types
-from numba.extending import intrinsic
 
 from ringsweep.compile import absorbed, function_from_lines, specialise
-from ringsweep.numerics.lanes import Lanes, loader, spread_scalar, storer
+from ringsweep.numerics.lanes import Lanes, intrinsic, loader, spread_scalar, storer
 
 #: Highest power of every series.
 ORDER = 16
