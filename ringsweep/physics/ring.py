@@ -521,6 +521,23 @@ class OneContact(NamedTuple):
 
 
 @absorbed
+def coefficients_at(scene, rho):
+    """Static and kinetic coefficient under each contact, ``(mu_s1, mu_k1, mu_s2, mu_k2)``.
+
+    Parameters
+    ----------
+    scene : Ring or BristleRing
+        One cell, or several in vector lanes.
+    rho : float or Lanes
+        Angle of the body in the ring's frame, rad.
+    """
+    turns, offset = rho * PER_TURN, contact_offset(scene.body) * PER_TURN
+    mu_s1, mu_k1 = roughness(scene.surface, turns, -offset)
+    mu_s2, mu_k2 = roughness(scene.surface, turns, offset)
+    return mu_s1, mu_k1, mu_s2, mu_k2
+
+
+@absorbed
 def friction(scene, phi, omega, theta, ring_omega):
     """Sliding velocity, and friction K at each contact with its slope.
 
@@ -540,8 +557,5 @@ def friction(scene, phi, omega, theta, ring_omega):
     """
     radius = scene.body.radius
     v = (omega - ring_omega) * radius
-    turns, offset = (phi - theta) * PER_TURN, contact_offset(scene.body) * PER_TURN
-    mu_s1, mu_k1 = roughness(scene.surface, turns, -offset)
-    mu_s2, mu_k2 = roughness(scene.surface, turns, offset)
-    mu_1, mu_2, slope_1, slope_2 = friction_at(scene.law, abs(v), (mu_s1, mu_k1, mu_s2, mu_k2))
+    mu_1, mu_2, slope_1, slope_2 = friction_at(scene.law, abs(v), coefficients_at(scene, phi - theta))
     return v, opposing(mu_1, v), opposing(mu_2, v), -slope_1 * radius, -slope_2 * radius

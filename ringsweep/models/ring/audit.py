@@ -20,7 +20,7 @@ from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction import SetValued, family_of
 from ringsweep.physics.friction.bristles import bristle
 from ringsweep.physics.friction.velocity import friction_at, stiction_band
-from ringsweep.physics.zones import PER_TURN, Segments, edge_ahead, roughest, roughness
+from ringsweep.physics.zones import Segments, edge_ahead, roughest
 from ringsweep.quantities.flags import SEPARATING
 
 # Rounding of an acceleration or a reaction, as a share of its largest terms.
@@ -34,27 +34,19 @@ _ON_EDGE = 1e-8
 def _names_wrong_segment(scene, mode, rho, under):
     """Whether the mode names another segment than the one under a contact, unless the contact is on an edge.
 
-    `under` has the static and the kinetic coefficient under each contact.
+    `under` has the coefficients under the contacts, as :func:`ring.coefficients_at` returns them.
     """
-    mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_under(scene, mode)
-    under_1, under_2 = under
+    of_mode = coefficients_under(scene, mode)
     offset = ring.contact_offset(scene.body)
     wrong = False
-    for place, angle, of_mode, of_surface in (
-        (mode.place_1, rho - offset, (mu_s1, mu_k1), under_1),
-        (mode.place_2, rho + offset, (mu_s2, mu_k2), under_2),
+    for place, angle, assumed, found in (
+        (mode.place_1, rho - offset, of_mode[:2], under[:2]),
+        (mode.place_2, rho + offset, of_mode[2:], under[2:]),
     ):
-        if of_mode != of_surface:
+        if assumed != found:
             ahead, back = edge_ahead(scene.surface, place, 1) - angle, angle - edge_ahead(scene.surface, place, -1)
             wrong = wrong or min(abs(ahead), abs(back)) > _ON_EDGE
     return wrong
-
-
-@inlined
-def _coefficients_at(scene, rho):
-    """Static and kinetic coefficient under each contact, at the angle `rho` in the ring's frame, rad."""
-    turns, shift = rho * PER_TURN, ring.contact_offset(scene.body) * PER_TURN
-    return roughness(scene.surface, turns, -shift), roughness(scene.surface, turns, shift)
 
 
 @audit.violation.implements(ring.Ring)
@@ -64,8 +56,8 @@ def _violation(scene, mode, forcing, y, rates, s, tolerance):
     theta, ring_omega, ring_epsilon = forcing
     omega = v / body.radius + ring_omega
     motion = sin(phi), cos(phi), omega
-    under = _coefficients_at(scene, phi - theta)
-    (mu_s1, mu_k1), (mu_s2, mu_k2) = under
+    under = ring.coefficients_at(scene, phi - theta)
+    mu_s1, mu_k1, mu_s2, mu_k2 = under
     largest = inf if _names_wrong_segment(scene, mode, phi - theta, under) else 0.0
     terms = body.gravity + body.radius * (omega * omega + abs(ring_epsilon))
     speed = body.radius * (1.0 + abs(omega))
@@ -103,8 +95,8 @@ def _bristle_violation(scene, mode, forcing, y, rates, s, tolerance):
     theta, ring_omega, ring_epsilon = forcing
     omega = v / body.radius + ring_omega
     motion = sin(rho + theta), cos(rho + theta), omega
-    under = _coefficients_at(scene, rho)
-    (mu_s1, mu_k1), (mu_s2, mu_k2) = under
+    under = ring.coefficients_at(scene, rho)
+    mu_s1, mu_k1, mu_s2, mu_k2 = under
     largest = inf if _names_wrong_segment(scene, mode, rho, under) else 0.0
     sign = 1.0 if v >= 0.0 else -1.0
     rate_1, rate_v1, rate_z1, traction_1, by_v_1, by_z_1 = bristle(scene.law, mu_s1, mu_k1, v, z_1, sign, mode.region)

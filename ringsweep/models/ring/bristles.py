@@ -41,7 +41,7 @@ from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction.bristles import bristle, region_guard, steady_deflection
 from ringsweep.physics.friction.velocity import BAND, KINETIC
 from ringsweep.physics.ring import BristleRing
-from ringsweep.physics.zones import PER_TURN, roughest, roughness
+from ringsweep.physics.zones import roughest
 
 
 class Contacts(NamedTuple):
@@ -137,10 +137,7 @@ def _contacts_at(scene, y, forcing):
     phi, omega, z_1, z_2 = y
     v = (omega - forcing[1]) * scene.body.radius
     sign = select(v >= 0.0, 1.0, -1.0)
-    turns, offset = (phi - forcing[0]) * PER_TURN, ring.contact_offset(scene.body) * PER_TURN
-    mu_s1, mu_k1 = roughness(scene.surface, turns, -offset)
-    mu_s2, mu_k2 = roughness(scene.surface, turns, offset)
-    under = mu_s1, mu_k1, mu_s2, mu_k2
+    under = ring.coefficients_at(scene, phi - forcing[0])
     return under, v, sign, _contacts(scene, under, v, z_1, z_2, sign, BAND)
 
 
