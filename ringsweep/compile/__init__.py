@@ -9,10 +9,10 @@ from ringsweep.compile.cache import SOURCES_DIGEST, has_known_source, kernel
 from ringsweep.compile.cells import Cells
 from ringsweep.compile.dispatch import hook, lacking
 from ringsweep.compile.errors import readable_compile_errors
+from ringsweep.compile.numba_private import borrowed
 from ringsweep.compile.options import absorbed, inlined, specialise
 from ringsweep.compile.tuples import (
     add_scaled,
-    borrowed,
     function_from_lines,
     generated,
     map_leaves,

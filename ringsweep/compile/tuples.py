@@ -12,18 +12,6 @@ from ringsweep.compile.cells import CellsType, cell_at
 from ringsweep.compile.numba_private import borrowed
 from ringsweep.compile.options import specialise
 
-__all__ = [
-    "add_scaled",
-    "borrowed",
-    "function_from_lines",
-    "generated",
-    "map_leaves",
-    "put",
-    "replacing",
-    "take",
-    "unrolled",
-]
-
 
 def function_from_lines(names: str, lines: list[str], scope: dict[str, Any]) -> Any:
     """Function with arguments `names` and a body of `lines`; the body may use the names in `scope`."""
