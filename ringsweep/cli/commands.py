@@ -141,8 +141,9 @@ def map_command(arguments: argparse.Namespace) -> None:
 
 def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
     from ringsweep import plots
-    from ringsweep.plots.sections import POINTS, has_circle, has_diagram, points_of
+    from ringsweep.plots.sections import has_circle, has_diagram, points_of
     from ringsweep.plots.selection import select
+    from ringsweep.quantities.variables import POINTS
     from ringsweep.storage import netcdf
 
     selection = dict(_selection(text) for text in arguments.sel)

@@ -8,8 +8,11 @@ from __future__ import annotations
 from math import inf, nan
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ringsweep.compile import hook, inlined, unrolled
 from ringsweep.models import cycles
+from ringsweep.models.scene import Section
 from ringsweep.models.turn import turn_within
 from ringsweep.quantities.parameters import Leaf
 
@@ -70,6 +73,27 @@ class Points(NamedTuple):
     pending: float
     x_turn: float
     deflections_turn: Any
+
+
+def columns(asked: Section | None, variables: tuple[str, ...]) -> tuple[str, ...]:
+    """Names of the columns of the points: that of each variable as often as points are kept; none without a section.
+
+    Parameters
+    ----------
+    asked : Section or None
+        The section of a scene.
+    variables : tuple of str
+        Place, velocity and deflections of a point; the deflections count only if the section keeps them.
+    """
+    if asked is None:
+        return ()
+    return tuple(name for name in (variables if asked.deflections else variables[:2]) for _ in range(asked.keep))
+
+
+def field(asked: Section, variables: tuple[str, ...], cells: int) -> AtPeriod | AtTurn:
+    """Field ``section`` of so many cells; arguments as in :func:`columns`."""
+    kind = AtPeriod if asked.at == "period" else AtTurn
+    return kind(np.full(cells, asked.keep), np.full(cells, len(columns(asked, variables))))
 
 
 @hook(optional=True)

@@ -37,13 +37,7 @@ from ringsweep.plots.style import (
     small_ticks,
     true_ranges,
 )
-from ringsweep.quantities.variables import words
-
-#: Variables of the points of a section.
-POINTS = (
-    *("x_section", "velocity_section", "deflection_section"),
-    *("phi_section", "omega_section", "deflection_1_section", "deflection_2_section"),
-)
+from ringsweep.quantities.variables import POINTS, words
 
 # Their full names would take half of a narrow picture.
 _SHORT = {"x_section": "x", "velocity_section": "velocity", "deflection_section": "deflection"}

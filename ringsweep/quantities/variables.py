@@ -213,6 +213,9 @@ OUTCOMES: dict[str, Variable] = {
     "level": Variable("1", "halvings of the blocks of the map around the cell", dtype="int8"),
 }
 
+#: Outcomes that are the points of a section, place and velocity first.
+POINTS = tuple(name for name, variable in OUTCOMES.items() if "section" in variable.dims)
+
 #: Classifications that a refined sweep infers.
 LABELS = ("regime", "motion", "separating_contact", "aftermath")
 

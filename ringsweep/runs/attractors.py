@@ -10,20 +10,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
-from ringsweep.quantities.variables import words
+from ringsweep.quantities.variables import POINTS, words
 
 Floats = NDArray[np.float64]
-
-#: Variables of a point, with those of the end of a run, which stand for a motion that is a point.
-POINTS = {
-    "x_section": "x_end",
-    "velocity_section": "velocity_end",
-    "deflection_section": "deflection_end",
-    "phi_section": "phi_end",
-    "omega_section": "omega_end",
-    "deflection_1_section": "",
-    "deflection_2_section": "",
-}
 
 #: Long runs and regimes whose motion is a point: then the section is not looked at.
 _STILL = ("rest", "steady")
@@ -149,8 +138,10 @@ def _motions(
     points = points.reshape(-1, *points.shape[-2:])
     ends = np.full((len(points), len(variables)), np.nan)
     for k, name in enumerate(variables):
-        if POINTS[name] in ds:
-            ends[:, k] = ds[POINTS[name]].transpose(*dims).values.ravel()
+        # The end of a run stands for a motion that is a point.
+        state = name.replace("_section", "_end")
+        if state in ds:
+            ends[:, k] = ds[state].transpose(*dims).values.ravel()
     if "phi_section" in variables:
         # An angle is a point of a circle.
         variables.append("phi_section")

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsweep.models import tangent
 from ringsweep.models.interface.audit import disobeys, least_scales, undecided
 from ringsweep.quantities.flags import (
     ANSWERS_DIFFER,
@@ -18,7 +19,7 @@ from ringsweep.quantities.flags import (
     NO_RESULT,
     NOT_FINITE,
 )
-from ringsweep.quantities.variables import OUTCOMES
+from ringsweep.quantities.variables import OUTCOMES, POINTS
 
 #: Outcomes on which two resolutions must agree for a certificate.
 _CERTIFIED = ("regime", "motion", "separating_contact", "aftermath", "word")
@@ -33,19 +34,8 @@ _MAY_LACK = (
     "swing",
     "jump_max",
     "t_jump_max",
-    "lyapunov",
-    "lyapunov_error",
-    "multiplier_1",
-    "multiplier_2",
-    "multiplier_angle_1",
-    "multiplier_angle_2",
-    "x_section",
-    "velocity_section",
-    "deflection_section",
-    "phi_section",
-    "omega_section",
-    "deflection_1_section",
-    "deflection_2_section",
+    *tangent.OUTCOMES,
+    *POINTS,
 )
 
 # Relative difference of two final states that rounding explains.

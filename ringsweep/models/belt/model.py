@@ -53,7 +53,7 @@ class Belt(Model, Continues):
         """Outcomes, and after them exponent and multipliers, the deflection of bristles, the points of the section."""
         exponent = tangent.OUTCOMES if structure.exponent else ()
         bristles = ("deflection_end",) if friction.family_of(structure.law_type) is friction.Dynamic else ()
-        return (*self.outcomes, *exponent, *bristles, *_points(structure))
+        return (*self.outcomes, *exponent, *bristles, *section.columns(structure.section, SECTION))
 
     def continued(self, structure: Structure, values: Values, ended: Values) -> dict[str, NDArray[np.float64]]:
         """Displacement, velocity, deflection and phases at the end of other runs.
@@ -161,9 +161,7 @@ class Belt(Model, Continues):
         if structure.exponent:
             fields["asked"] = Exponent()
         if structure.section is not None:
-            kept: Any = section.AtPeriod if structure.section.at == "period" else section.AtTurn
-            sizes = structure.section.keep, len(_points(structure))
-            fields["section"] = kept(*(np.full(mass.shape, size) for size in sizes))
+            fields["section"] = section.field(structure.section, SECTION, len(mass))
         period = np.broadcast_to(drives.period(fields["drive"]), mass.shape).copy()
         fields["forcing_period"] = period_of(structure, period)
         fields["viscous"] = values.get("friction.viscous", np.zeros(len(mass)))
@@ -240,14 +238,6 @@ def _largest_deflection(structure: Structure, values: Values) -> NDArray[np.floa
     """Deflection at which the bristles carry the static friction, m."""
     mu_s, _ = friction_coefficients(structure, "friction", values)
     return mu_s * values["body.mass"] * values["gravity"] / values["friction.sigma0"]
-
-
-def _points(structure: Structure) -> tuple[str, ...]:
-    """Names of the columns of the points of the section."""
-    asked = structure.section
-    if asked is None:
-        return ()
-    return tuple(name for name in SECTION[: 2 + asked.deflections] for _ in range(asked.keep))
 
 
 def _along_a_line(parameter: Parameter) -> Parameter:

@@ -55,14 +55,11 @@ class SingleContactRing(Model, Continues):
         """Outcomes, and after them what is asked for: words of the long run, exponent and multipliers, the section."""
         words = long_run.OUTCOMES if _is_recorded(structure) else ()
         exponent = tangent.OUTCOMES if structure.exponent else ()
-        return (*self.outcomes, *words, *exponent, *self._points(structure))
+        return (*self.outcomes, *words, *exponent, *section.columns(structure.section, self._point))
 
-    def _points(self, structure: Structure) -> tuple[str, ...]:
-        """Names of the columns of the points of the section."""
-        asked = structure.section
-        if asked is None:
-            return ()
-        return tuple(name for name in SECTION[: 2 + self.contacts * asked.deflections] for _ in range(asked.keep))
+    @property
+    def _point(self) -> tuple[str, ...]:
+        return SECTION[: 2 + self.contacts]
 
     def obstacle(self, structure: Structure) -> str | None:
         """Why runs of this structure cannot go on: their state is more than angle and angular velocity."""
@@ -179,8 +176,7 @@ class SingleContactRing(Model, Continues):
                 raise InputError("record.exponent", problem)
             found["asked"] = Exponent()
         if structure.section is not None:
-            sizes = structure.section.keep, len(self._points(structure))
-            found["section"] = section.AtPeriod(*(np.full(len(values["time.span"]), size) for size in sizes))
+            found["section"] = section.field(structure.section, self._point, len(values["time.span"]))
         return found
 
     def build_body(self, values: Values) -> Any:
