@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import xarray as xr
 
 if TYPE_CHECKING:
@@ -62,6 +61,7 @@ class Accessor:
         import pandas as pd
 
         from ringsweep.errors import InputError
+        from ringsweep.quantities.variables import is_classification, meanings_of
 
         ds = self._ds
         if along is None and "time" in ds.dims:
@@ -79,10 +79,9 @@ class Accessor:
             ds = ds.drop_dims("section", errors="ignore")
         frame = ds.to_dataframe().reset_index()
         for name, variable in ds.variables.items():
-            if "flag_meanings" in variable.attrs and name in frame:
-                known = str(variable.attrs["flag_meanings"]).split()
-                named = dict(zip(np.atleast_1d(variable.attrs["flag_values"]).tolist(), known, strict=True))
-                frame[name] = pd.Categorical(frame[name].map(named), categories=known)
+            if is_classification(variable) and name in frame:
+                known = meanings_of(variable)
+                frame[name] = pd.Categorical(frame[name].map(known), categories=list(known.values()))
         return frame
 
     def map(self, var: str = "regime", **options: Any) -> Figure:

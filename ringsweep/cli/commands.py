@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from ringsweep.errors import InputError
+from ringsweep.quantities.quantity import after_number
 
 logger = logging.getLogger("ringsweep")
 
@@ -476,10 +477,9 @@ def _print_summary(name: str, result: Any) -> None:
         if axis.dtype.kind not in "iuf":
             print(f"  {name}: {', '.join(dict.fromkeys(map(str, axis.values.flat)))}")
             continue
-        unit = axis.attrs.get("units", "1")
-        if not axis.size:
-            continue
-        print(f"  {name}: {axis.values.min():g} to {axis.values.max():g}{'' if unit == '1' else f' {unit}'}")
+        if axis.size:
+            unit = after_number(axis.attrs.get("units", "1"))
+            print(f"  {name}: {axis.values.min():g} to {axis.values.max():g}{unit}")
     if not {"contender", "time"} & set(result.dims):
         print("variables:", ", ".join(map(str, result.data_vars)))
     if "contender" in result.dims:

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from ringsweep.quantities.flags import CERTIFIED, FAILED, JAMMED, RIDING, SEPARATING
-from ringsweep.quantities.variables import DOUBTS, INFERRED, words
+from ringsweep.quantities.variables import DOUBTS, INFERRED, meanings_of, words
 from ringsweep.storage.chunks import Layout
 
 
@@ -86,12 +86,11 @@ def _parts(data: xr.DataArray) -> Iterator[Any]:
 
 def _counts(data: xr.DataArray) -> list[tuple[int, str, int]]:
     """Flag, name and number of cells of each class that occurs."""
-    flags = np.atleast_1d(data.attrs["flag_values"]).tolist()
-    counts = np.zeros(len(flags), dtype=int)
+    meanings = meanings_of(data)
+    counts = np.zeros(len(meanings), dtype=int)
     for part in _parts(data):
-        counts += [np.count_nonzero(part == flag) for flag in flags]
-    classes = zip(flags, str(data.attrs["flag_meanings"]).split(), counts.tolist(), strict=True)
-    return [one for one in classes if one[2]]
+        counts += [np.count_nonzero(part == flag) for flag in meanings]
+    return [(flag, name, int(n)) for (flag, name), n in zip(meanings.items(), counts, strict=True) if n]
 
 
 def _print_shares(data: xr.DataArray) -> None:

@@ -88,6 +88,11 @@ class Config:
     sample: Sample | None = None
     follow: Follow | None = None
 
+    @property
+    def certifies(self) -> bool:
+        """Whether the solver looks for certificates; one without this option does."""
+        return bool(getattr(self.solver, "certify", True))
+
 
 def load(config: str | os.PathLike[str] | Mapping[str, Any], settings: Iterable[Setting] = ()) -> Config:
     """Read and validate a configuration.

@@ -19,6 +19,7 @@ from ringsweep.errors import InputError
 from ringsweep.models import MODELS
 from ringsweep.models.scene import Scene
 from ringsweep.quantities.parameters import Choice, Parameter
+from ringsweep.quantities.quantity import after_number
 from ringsweep.quantities.units import quantity, show
 from ringsweep.quantities.variables import OUTCOMES
 from ringsweep.statistics import DISTRIBUTIONS, METHODS, saltelli, trajectories, unit_points
@@ -444,7 +445,7 @@ def _check_points(sample: Sample, scene: Scene, axes: Axes) -> None:
                 high = values >= parameter.upper if parameter.open_upper else values > parameter.upper
                 wrong = low | high | ~np.isfinite(values)
                 if wrong.any():
-                    unit = f" {parameter.unit}" * (parameter.unit not in ("", "1"))
+                    unit = after_number(parameter.unit)
                     raise InputError(
                         f"sweep.sample.of.{factor.name}",
                         f"draws {values[wrong].flat[0]:.3g}{unit}, but {parameter.long_name} must be "

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from ringsweep.errors import InputError
 from ringsweep.plots.style import PAIR_COLOURS, SMALL, figure_width, legend_above, on_page, small_ticks
+from ringsweep.quantities.quantity import after_number
 
 # Least height of the picture, inches.
 _LEAST_HEIGHT = 4.6
@@ -87,8 +88,8 @@ def fit(ds: xr.Dataset) -> Figure:
                 ax.axvline((float(own[name]) - fitted) / scale, color=two, linestyle="--", linewidth=1.0)
         # Digits of the value that its profile does not tell would be rounding.
         label = f"{own['parameter'].item().rpartition('.')[2]} \N{MINUS SIGN}\n{fitted:.{max(2 - power, 0)}f}"
-        unit = str(own["unit"].item())
-        ax.set_xlabel(f"{label}\n($10^{{{power}}}${'' if unit == '1' else f' {unit}'})", fontsize=SMALL)
+        unit = after_number(str(own["unit"].item()))
+        ax.set_xlabel(f"{label}\n($10^{{{power}}}${unit})", fontsize=SMALL)
         ax.locator_params(axis="x", nbins=4)
     panels[0].set_ylabel("growth of the misfit\n(squares of the noise)", fontsize=SMALL)
     small_ticks(data, rest, *panels)

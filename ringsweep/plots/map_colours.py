@@ -20,7 +20,7 @@ from ringsweep.plots.datasets import configuration
 from ringsweep.plots.labels import number_text
 from ringsweep.plots.style import AFTERMATH_COLOURS, CLASS_COLOURS, NO_VALUE, REGIME_COLOURS, on_page
 from ringsweep.quantities.flags import FAILED, JAMMED
-from ringsweep.quantities.variables import INFERRED, SAMPLED
+from ringsweep.quantities.variables import INFERRED, SAMPLED, is_classification, meanings_of
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class ColourScale:
             raise InputError("norm", f"{norm!r} is none: it is linear or log")
         if cmap is not None and cmap not in colormaps:
             raise InputError("cmap", f"{cmap!r} is no colour map of matplotlib, such as viridis or magma")
-        if "flag_values" not in data.attrs:
+        if not is_classification(data):
             finite = data.values[np.isfinite(data.values)]
             positive = finite[finite > 0.0]
             palette = _with_grey(cmap or "viridis")
@@ -55,12 +55,12 @@ class ColourScale:
                 return cls(palette, Normalize(0.0, 1.0))
             limits = (finite.min(), finite.max()) if finite.size else (0.0, 1.0)
             return cls(palette, Normalize(*limits))
-        flags = np.atleast_1d(data.attrs["flag_values"])
-        meanings = str(data.attrs["flag_meanings"]).split()
+        meanings = meanings_of(data)
         # The colour of a class does not depend on which other classes occur.
-        colours = [_WORDS.get(m, CLASS_COLOURS[k % len(CLASS_COLOURS)]) for k, m in enumerate(meanings)]
-        classes = BoundaryNorm(np.arange(len(flags) + 1) - 0.5, len(flags))
-        return cls(_with_grey(ListedColormap(colours)), classes, flags, tuple(m.replace("_", " ") for m in meanings))
+        colours = [_WORDS.get(m, CLASS_COLOURS[k % len(CLASS_COLOURS)]) for k, m in enumerate(meanings.values())]
+        classes = BoundaryNorm(np.arange(len(meanings) + 1) - 0.5, len(meanings))
+        names = tuple(meaning.replace("_", " ") for meaning in meanings.values())
+        return cls(_with_grey(ListedColormap(colours)), classes, np.array(list(meanings)), names)
 
     def numbers(self, data: xr.DataArray) -> xr.DataArray:
         """Numbers for `norm`: the value, or the position of its flag; NaN where there is none."""

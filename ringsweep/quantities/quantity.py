@@ -36,6 +36,11 @@ class Quantity:
         return {"long_name": self.long_name, "units": self.units}
 
 
+def after_number(unit: str) -> str:
+    """Unit as it follows a number in a text: with a space, or empty if there is none."""
+    return "" if unit in ("", "1") else f" {unit}"
+
+
 def cf_units(unit: str) -> str:
     """Unit in the spelling of the CF conventions.
 

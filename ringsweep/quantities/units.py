@@ -13,7 +13,7 @@ from typing import Any
 
 from ringsweep.errors import InputError, shortened
 from ringsweep.quantities.parameters import Parameter
-from ringsweep.quantities.quantity import cf_units
+from ringsweep.quantities.quantity import after_number, cf_units
 
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 
@@ -79,7 +79,7 @@ def quantity(value: Any, parameter: Parameter, path: str) -> float:
         if parameter.whole and not number.is_integer():
             raise InputError(path, f"{show(value)} is not a whole number: {parameter.long_name} must be one")
         return number
-    unit = f" {parameter.unit}" if parameter.unit not in ("", "1") else ""
+    unit = after_number(parameter.unit)
     plain = not isinstance(value, str) or is_plain(value)
     if plain and parameter.unit == "rad" and abs(number) > parameter.upper > 0.0:
         raise InputError(path, f"{number:g} rad is beyond {_in_pi(parameter.upper)}: was `{number:g} deg` meant?")

@@ -329,6 +329,23 @@ PRECISION: dict[str, Variable] = {
 }
 
 
+def is_classification(data: xr.DataArray | xr.Variable) -> bool:
+    """Whether the values of a variable are flags."""
+    return {"flag_values", "flag_meanings"} <= data.attrs.keys()
+
+
+def meanings_of(data: xr.DataArray | xr.Variable) -> dict[int, str]:
+    """Flags of a classification with their meanings, each one word.
+
+    Raises
+    ------
+    KeyError, ValueError
+        If it has no flags, or not as many as meanings.
+    """
+    flags = np.atleast_1d(data.attrs["flag_values"]).tolist()
+    return dict(zip(flags, data.attrs["flag_meanings"].split(), strict=True))
+
+
 def words(data: xr.DataArray) -> xr.DataArray:
     """Names in place of the flags of a classification.
 
@@ -357,11 +374,11 @@ def words(data: xr.DataArray) -> xr.DataArray:
     >>> ringsweep.words(maps.regime).values.tolist()
     ['oscillatory', 'separating']
     """
-    if not {"flag_values", "flag_meanings"} <= data.attrs.keys():
+    if not is_classification(data):
         # A whole dataset has no name.
         name = str(getattr(data, "name", "data"))
         raise InputError(name, "is not a classification, such as ds.regime: it has no flag_values and flag_meanings")
-    meanings = dict(zip(np.atleast_1d(data.attrs["flag_values"]), data.attrs["flag_meanings"].split(), strict=True))
+    meanings = meanings_of(data)
     text = np.full(data.shape, "", dtype=f"<U{max(map(len, meanings.values()))}")
     for value, meaning in meanings.items():
         text[data.values == value] = meaning

@@ -17,7 +17,7 @@ from ringsweep.config.sections import suggestion
 from ringsweep.errors import InputError
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity, show
-from ringsweep.quantities.variables import INFERRED
+from ringsweep.quantities.variables import INFERRED, meanings_of
 from ringsweep.runs.executors import Execution
 from ringsweep.runs.regime_words import check_word
 from ringsweep.runs.sweep import compute
@@ -86,7 +86,7 @@ def located(ds: xr.Dataset, regime: str, configuration: Config, tolerance: float
     """Boundary of a regime in a map whose cells are known to be runs of a configuration; see :func:`boundary`."""
     label, flag, dims = _checked(ds, regime)
     inside = ds[label].values == flag
-    usable = ds["certified"].values == 1 if getattr(configuration.solver, "certify", True) else _was_run(ds)
+    usable = ds["certified"].values == 1 if configuration.certifies else _was_run(ds)
     sides = [_crossings(inside, usable, axis) for axis in range(len(dims))]
     low = np.concatenate([one for one, _ in sides])
     high = np.concatenate([other for _, other in sides])
@@ -113,7 +113,7 @@ def located(ds: xr.Dataset, regime: str, configuration: Config, tolerance: float
             for name, column in place.items()
         }
         found = _run(configuration, {columns[name].attrs["path"]: column for name, column in values.items()}, jobs)
-        certified = found["certified"].values == 1 if getattr(configuration.solver, "certify", True) else True
+        certified = (found["certified"].values == 1) | (not configuration.certifies)
         here = found[label].values == flag
         which = np.flatnonzero(open_)
         side = (here == within[which]) & certified
@@ -192,10 +192,10 @@ def word_in(ds: xr.Dataset, word: str) -> tuple[str, int]:
     known: list[str] = []
     for name in ("regime", "aftermath"):
         if name in ds:
-            meanings = str(ds[name].attrs["flag_meanings"]).split()
-            if word in meanings:
-                return name, int(np.atleast_1d(ds[name].attrs["flag_values"])[meanings.index(word)])
-            known += meanings
+            flags = {meaning: flag for flag, meaning in meanings_of(ds[name]).items()}
+            if word in flags:
+                return name, flags[word]
+            known += flags
     raise InputError("regime", f"{show(word)} is not a regime{suggestion(word, known)}")
 
 

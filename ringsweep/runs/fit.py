@@ -23,6 +23,7 @@ from ringsweep.config.yaml_text import Document, name_and_unit
 from ringsweep.errors import InputError
 from ringsweep.models import batch, model_of
 from ringsweep.quantities.parameters import Choice, Parameter
+from ringsweep.quantities.quantity import after_number
 from ringsweep.quantities.units import quantity, show
 from ringsweep.quantities.variables import HISTORY, Variable
 from ringsweep.runs.cells import compute_task
@@ -596,7 +597,7 @@ def _end(growth: Callable[[float], float], low: tuple[float, float], high: tuple
 
 def _uncertified(problem: _Problem, best: Floats) -> int:
     """How many of the runs at the fitted values, and of those that give their slopes, are not certified."""
-    if not getattr(problem.config.solver, "certify", True):
+    if not problem.config.certifies:
         return 0
     steps = np.concatenate([np.zeros((1, len(best))), _STEP * np.eye(len(best)), -_STEP * np.eye(len(best))])
     allowed = [u for u in best + steps if math.isfinite(problem.misfit(u))]
@@ -674,17 +675,16 @@ def in_words(found: xr.Dataset) -> str:
         one = found.sel(parameter=path)
         value, error, low, high = (float(one[name]) for name in ("value", "standard_error", "low", "high"))
         digits = f".{max(1 - math.floor(math.log10(error)), 0)}f" if 0.0 < error < math.inf else ".6g"
-        unit = str(one["unit"].item())
-        unit = "" if unit == "1" else f" {unit}"
+        unit = after_number(str(one["unit"].item()))
         turned = f" ({math.degrees(value):.4g} ± {math.degrees(error):.2g} deg)" if unit == " rad" else ""
         profile = f"{float(one['profile_low']):{digits}} to {float(one['profile_high']):{digits}}"
         lines.append(
             f"{path} = {value:{digits}} ± {error:.1e}{unit}{turned}; 95 %: {low:{digits}} to {high:{digits}}"
             f", by the profile {profile}"
         )
-    unit = found["residual"].attrs["units"]
+    unit = after_number(found["residual"].attrs["units"])
     lines.append(
-        f"noise {found.attrs['noise']:.3g}{'' if unit == '1' else f' {unit}'} ({found.attrs['noise_is']}), "
+        f"noise {found.attrs['noise']:.3g}{unit} ({found.attrs['noise_is']}), "
         f"{found.sizes['measurement']} measurements, {found.attrs['runs']} runs"
     )
     return "\n".join(lines)

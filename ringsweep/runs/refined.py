@@ -37,7 +37,7 @@ class KnownLabels:
         assert config.refine is not None
         self.also = config.refine.also
         # Without certificates no cell is certified, and that says nothing.
-        self.asks_certificate = bool(getattr(config.solver, "certify", True))
+        self.asks_certificate = config.certifies
         self.known = np.zeros(total, dtype=bool)
         self._labels = np.zeros(total, dtype=np.int16)
         self._certain = np.zeros(total, dtype=bool)

@@ -17,6 +17,7 @@ from ringsweep.config.axes import Axes, dimension, sweep_section, swept_paramete
 from ringsweep.config.consistency import check_consistency
 from ringsweep.errors import InputError
 from ringsweep.quantities.parameters import Choice, Parameter
+from ringsweep.quantities.quantity import after_number
 from ringsweep.quantities.units import quantity, show
 from ringsweep.quantities.variables import words
 from ringsweep.runs.boundaries import located, word_in
@@ -146,10 +147,7 @@ def locate(
     scanned = load(dict(one.source) | {"sweep": {"grid": {path: values.tolist()}}})
     runs = compute(scanned, Execution(jobs, progress=False))
     name = dimension(path)
-    if getattr(scanned.solver, "certify", True):
-        sure = runs.isel({name: np.flatnonzero(runs["certified"].values == 1)})
-    else:
-        sure = runs
+    sure = runs.isel({name: (runs["certified"].values == 1) | (not scanned.certifies)})
     found = located(sure, regime, scanned, allowed, jobs=jobs)
     above = np.searchsorted(sure[name].values, found[name].values)
     label, _ = word_in(sure, regime)
@@ -212,9 +210,8 @@ def distribution(
         axes = Axes({"point": len(points)}, {**columns, path: (("point",), at)})
         check_consistency(config.scene, axes)
         found = compute(replace(config, axes=axes, sample=None), Execution(jobs, progress=False), warn=False)
-        certain = getattr(config.solver, "certify", True)
         label, flag = word_in(found, regime)
-        return found[label].values == flag, found["certified"].values == 1 if certain else np.full(len(points), True)
+        return found[label].values == flag, (found["certified"].values == 1) | (not config.certifies)
 
     total, every = len(shares), np.arange(len(shares))
     inside, sure = (part.reshape(total, -1) for part in runs(np.repeat(every, len(values)), np.tile(values, total)))
@@ -298,7 +295,7 @@ def _ends(whole: Config, path: str, between: tuple[Any, Any]) -> tuple[float, fl
             tell_unit(f"--{where}", "{}", given, as_written(whole, path), parameter)
         ends.append(float(of_sweep(np.asarray(own))) if given is None else quantity(given, parameter, where))
     if not ends[0] < ends[1]:
-        unit = f" {parameter.unit}" if parameter.unit not in ("", "1") else ""
+        unit = after_number(parameter.unit)
         raise InputError("to", f"{ends[1]:g}{unit} is not greater than {ends[0]:g}{unit}, where the interval begins")
     return ends[0], ends[1]
 
@@ -342,8 +339,7 @@ def _number(value: float, axis: xr.DataArray) -> str:
 
 
 def _unit(data: xr.DataArray) -> str:
-    unit = data.attrs.get("units", "1")
-    return "" if unit == "1" else f" {unit}"
+    return after_number(data.attrs.get("units", "1"))
 
 
 def _with_error(value: float, error: float) -> str:

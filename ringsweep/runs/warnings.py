@@ -15,6 +15,7 @@ from ringsweep.models import batch
 from ringsweep.physics import drives, ring, zones
 from ringsweep.physics.drives import Constant
 from ringsweep.quantities.flags import FAILED, JAMMED, REGIMES, RIDING, SEPARATING
+from ringsweep.quantities.quantity import after_number
 from ringsweep.quantities.variables import INFERRED
 from ringsweep.runs.cells import by_law, laws_at, values_at
 from ringsweep.solvers.automaton import PATIENCE
@@ -148,8 +149,9 @@ def _warn_of_failures(results: xr.Dataset, config: Config) -> None:
 
 
 def _value(axis: xr.DataArray) -> str:
-    unit = axis.attrs.get("units", "1")
-    return f"{axis.item():g}{'' if unit == '1' else f' {unit}'}" if axis.dtype.kind in "iuf" else str(axis.item())
+    if axis.dtype.kind not in "iuf":
+        return str(axis.item())
+    return f"{axis.item():g}{after_number(axis.attrs.get('units', '1'))}"
 
 
 def _hint_at_idle_axes(results: xr.Dataset) -> None:
@@ -262,7 +264,7 @@ def warn_of_sample(results: xr.Dataset, config: Config) -> None:
     runs = results["runs"].sum([dim for dim in results["runs"].dims if dim not in ("word", "certificate")]).values
     share, failed = runs[:, 0].sum() / runs.sum(), int(runs[FAILED].sum())
     if share > _MANY_UNSURE:
-        cure = "" if getattr(config.solver, "certify", True) else ": the solver does not certify"
+        cure = "" if config.certifies else ": the solver does not certify"
         logger.warning("%.1f %% of the runs have no certificate, and widen the intervals%s", 100 * share, cure)
     if failed:
         logger.warning("%d runs failed", failed)

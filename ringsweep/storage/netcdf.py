@@ -20,7 +20,7 @@ from xarray.backends import NetCDF4DataStore
 from ringsweep.errors import InputError
 from ringsweep.quantities import digest, trailer
 from ringsweep.quantities.digest import Digests
-from ringsweep.quantities.variables import MISSING, OUTCOMES, Variable, error_attribute
+from ringsweep.quantities.variables import MISSING, OUTCOMES, Variable, error_attribute, meanings_of
 from ringsweep.storage.chunks import Layout
 from ringsweep.storage.files import WorkingFolder, check_name, put_in_place, replacing
 
@@ -444,10 +444,9 @@ def _reading_file(path: str | os.PathLike[str]) -> Iterator[None]:
 def _check_attributes(ds: xr.Dataset) -> None:
     """Raise an error of any kind if attributes that are read later are missing or have another form."""
     for name, variable in ds.variables.items():
-        if str(name) in OUTCOMES and OUTCOMES[str(name)].flags:
-            values, meanings = np.atleast_1d(variable.attrs["flag_values"]), variable.attrs["flag_meanings"].split()
-            if values.dtype.kind not in "iu" or len(values) != len(meanings):
-                raise ValueError(f"{name} has {len(values)} flags and {len(meanings)} meanings")
+        classified = str(name) in OUTCOMES and OUTCOMES[str(name)].flags
+        if classified and not all(isinstance(flag, int) for flag in meanings_of(variable)):
+            raise ValueError(f"{name} has flags that are no whole numbers")
     for name in ("configuration", "versions", "solver"):
         json.loads(ds.attrs.get(name, "{}"))
 
