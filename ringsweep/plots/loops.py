@@ -68,7 +68,6 @@ def friction_loop(
         raise InputError("against", f"{against!r} is neither 'velocity' nor 'distance'")
     run = belt_history(ds)
     ax = axes_or_current(ax, 0.63)
-    small_ticks(ax)
     if against == "velocity":
         across = (run["velocity"] - run["belt_velocity"]).values
         label = "sliding velocity", "m s$^{-1}$"

@@ -83,6 +83,10 @@ class Axis:
         """Whether the axis can be an edge of a grid: one dimension, no value twice, and not a list of points."""
         return len(self.dims) == 1 and self.dims != ("point",) and len(np.unique(self.values)) == len(self.values)
 
+    def along(self, data: xr.DataArray) -> NDArray[Any]:
+        """Values of a variable, in the order of the axis; dimensions other than its own come last."""
+        return np.asarray(data.transpose(*self.dims, ...).values[self.order])
+
     @property
     def edges(self) -> NDArray[Any]:
         """Edges of the cells, shape ``(size + 1,)``: halfway between neighbours in its scale, or at `meet`."""

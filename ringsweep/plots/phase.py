@@ -127,7 +127,6 @@ def _ring_portrait(ds: xr.Dataset, frame: str, ax: Axes | None) -> Axes:
     """Draw angular velocity over angle."""
     run, rig = ring_history(ds)
     ax = axes_or_current(ax, 0.9 if is_narrow(figure_width()) else 0.63)
-    small_ticks(ax)
     factor, unit = angle_unit()
     relative = frame == "ring"
     fixed_arcs = relative or not run["theta"].values.any()

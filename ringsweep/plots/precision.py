@@ -28,7 +28,6 @@ from ringsweep.plots.style import (
     on_page,
     page_colour,
     place_legend,
-    small_ticks,
     width_of,
 )
 
@@ -142,7 +141,6 @@ def precision_panel(ds: xr.Dataset, error: str = "error_end", ax: Axes | None = 
     wrong = (ds["regime_wrong"] == 1).any("cell").values if "regime_wrong" in ds else np.zeros(len(numbers), bool)
 
     ax = axes_or_current(ax, 0.63)
-    small_ticks(ax)
     ax.set_xscale("log")
     ax.set_yscale("log")
     ax.grid(True, color=on_page(GRID), linewidth=0.6)

@@ -22,7 +22,6 @@ from ringsweep.plots.style import (
     make_room,
     on_page,
     place_legend,
-    small_ticks,
     width_of,
 )
 
@@ -71,7 +70,6 @@ def probability_panel(ds: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.set_xlim(0.0, 1.0)
     ax.xaxis.set_major_formatter(PercentFormatter(1.0))
     ax.set_xlabel("probability (95 % interval)")
-    small_ticks(ax)
     return ax
 
 
@@ -116,7 +114,6 @@ def survival_panel(ds: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.yaxis.set_major_formatter(PercentFormatter(1.0))
     what = "rides" if ds.attrs.get("survival_of") == "first_slip" else "holds its contacts"
     label_axes(ax, "time (s)", f"body still {what}")
-    small_ticks(ax)
     make_room(ax)
     return ax
 
@@ -180,5 +177,4 @@ def sensitivity_panel(ds: xr.Dataset, ax: Axes | None = None, word: str | None =
         Patch(color=on_page(colour), label=label) for colour, label in zip(PAIR_COLOURS, labels, strict=True)
     ]
     place_legend(ax, handles, "below")
-    small_ticks(ax)
     return ax

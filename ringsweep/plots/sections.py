@@ -122,15 +122,7 @@ def bifurcation(
                 legend_above(
                     ax,
                     [
-                        Line2D(
-                            [],
-                            [],
-                            linestyle="",
-                            marker=drawn.get_marker(),
-                            color=rcParams["text.color"],
-                            markersize=4,
-                            label=text.split(", ")[1],
-                        )
+                        _dot(drawn.get_marker(), rcParams["text.color"], text.split(", ")[1])
                         for drawn, text in zip(handles[:2], texts[:2], strict=True)
                     ],
                 )
@@ -183,13 +175,13 @@ def bifurcation_panel(ds: xr.Dataset, x: str | None = None, var: str | None = No
     branches = list(_branches(ds))
     # Where both branches are the same, the second one must not hide the first: it has smaller points.
     for k, (way, branch) in enumerate(branches):
-        points = branch[name].transpose(*axis.dims, "section").values[axis.order] * display_factor(ds[name])
+        points = axis.along(branch[name]) * display_factor(ds[name])
         colour = on_page(PAIR_COLOURS[k])
         place = np.repeat(axis.values, points.shape[1])
         size = _DOT * (2.5 if k == 0 and len(branches) > 1 else 1.0)
         ax.scatter(place, points.ravel(), s=size, color=colour, linewidths=0, rasterized=True, zorder=2 + k)
         if way:
-            handles.append(Line2D([], [], linestyle="", marker="o", markersize=4, color=colour, label=way))
+            handles.append(_dot("o", colour, way))
     if "regime" in ds:
         handles += _strips(ax, axis, ds)
     _finish(ax, axis, _label(ds, name))
@@ -204,7 +196,7 @@ def _strips(ax: Axes, axis: Axis, ds: xr.Dataset) -> list[Artist]:
     edges = axis.edges
     branches = list(_branches(ds))
     for k, (_, branch) in enumerate(branches):
-        regime = np.asarray(words(branch["regime"]).transpose(*axis.dims).values).astype(str)[axis.order]
+        regime = axis.along(words(branch["regime"])).astype(str)
         for word in dict.fromkeys(regime.tolist()):
             colour = on_page(REGIME_COLOURS.get(word, NO_VALUE))
             spans = [(edges[a], edges[b] - edges[a]) for a, b in true_ranges(regime == word)]
@@ -257,8 +249,7 @@ def section_panel(ds: xr.Dataset, ax: Axes | None = None) -> Axes:
     label_axes(ax, _label(ds, place), _label(ds, speed))
     if len(order) > 1:
         bar = ax.figure.colorbar(drawn, ax=ax, label="point, in time", ticks=MaxNLocator(6, integer=True))
-        bar.ax.tick_params(labelsize=SMALL)
-    small_ticks(ax)
+        small_ticks(bar.ax)
     return ax
 
 
@@ -295,12 +286,12 @@ def exponent_panel(ds: xr.Dataset, x: str | None = None, ax: Axes | None = None)
     ax = axes_or_current(ax, _HEIGHTS["lyapunov"])
     ax.axhline(0.0, color=rcParams["axes.edgecolor"], linewidth=0.8, zorder=1)
     for k, (way, branch) in enumerate(_branches(ds)):
-        value = branch["lyapunov"].transpose(*axis.dims).values[axis.order]
+        value = axis.along(branch["lyapunov"])
         colour = on_page(PAIR_COLOURS[k])
         finite = np.where(np.isfinite(value), value, np.nan)
         ax.plot(axis.values, finite, ".-", color=colour, markersize=2, linewidth=0.8, label=way or None)
         if "lyapunov_error" in branch:
-            error = branch["lyapunov_error"].transpose(*axis.dims).values[axis.order]
+            error = axis.along(branch["lyapunov_error"])
             band = finite - error, finite + error
             ax.fill_between(axis.values, *band, color=colour, alpha=0.3, linewidth=0)
         erased = axis.values[np.isneginf(value)]
@@ -344,7 +335,7 @@ def multiplier_panel(ds: xr.Dataset, x: str | None = None, ax: Axes | None = Non
     for k, (way, branch) in enumerate(_branches(ds)):
         for name, dots, which in (("multiplier_1", ".", "larger one"), ("multiplier_2", "x", "smaller one")):
             if name in branch:
-                value = branch[name].transpose(*axis.dims).values[axis.order]
+                value = axis.along(branch[name])
                 label = f"{way}, {which}" if way else which
                 ax.plot(axis.values, value, dots, color=on_page(PAIR_COLOURS[k]), markersize=2.5, label=label)
     ax.set_ylim(0.0, max(1.1, ax.get_ylim()[1]))
@@ -399,10 +390,7 @@ def multiplier_circle(ds: xr.Dataset, x: str | None = None, ax: Axes | None = No
         for name in ("1", "2"):
             if f"multiplier_angle_{name}" not in branch:
                 continue
-            size, angle = (
-                branch[f"{kind}_{name}"].transpose(*axis.dims).values[axis.order]
-                for kind in ("multiplier", "multiplier_angle")
-            )
+            size, angle = (axis.along(branch[f"{kind}_{name}"]) for kind in ("multiplier", "multiplier_angle"))
             known = np.isfinite(size) & np.isfinite(angle)
             reach = max(reach, 1.1 * size[known].max(initial=0.0))
             x_part, y_part = size * np.cos(angle), size * np.sin(angle)
@@ -410,16 +398,20 @@ def multiplier_circle(ds: xr.Dataset, x: str | None = None, ax: Axes | None = No
                 x_part, y_part, s=10.0, marker="o^"[k], linewidths=0, rasterized=True, zorder=2 + k, **colours
             )
         if way:
-            dot = Line2D([], [], linestyle="", marker="o^"[k], markersize=4, color=rcParams["text.color"], label=way)
-            handles.append(dot)
+            handles.append(_dot("o^"[k], rcParams["text.color"], way))
     ax.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
     label_axes(ax, "real part of the multipliers", "imaginary part")
     bar = ax.figure.colorbar(drawn, ax=ax, label=axis.label)
     if axis.names:
         bar.set_ticks(range(len(axis.names)), labels=axis.names)
-    small_ticks(ax, bar.ax)
+    small_ticks(bar.ax)
     legend_above(ax, handles)
     return ax
+
+
+def _dot(marker: str, colour: Any, label: str) -> Line2D:
+    """Entry of a legend for points."""
+    return Line2D([], [], linestyle="", marker=marker, markersize=4, color=colour, label=label)
 
 
 def _label(ds: xr.Dataset, name: str) -> str:
@@ -465,4 +457,3 @@ def _finish(ax: Axes, axis: Axis, label: str) -> None:
     edges = axis.edges
     ax.set_xlim(edges[0], edges[-1])
     label_axes(ax, axis.label, label)
-    small_ticks(ax)

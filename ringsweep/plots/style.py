@@ -198,15 +198,19 @@ def arc_names(count: int) -> list[str]:
 
 
 def axes_or_current(ax: Axes | None, height: float) -> Axes:
-    """`ax`, or pyplot's current axes if it is None. A new figure has this height, as a multiple of its width."""
-    if ax is not None:
-        return ax
-    # Importing pyplot chooses a backend, which may fail on a machine without a display.
-    from matplotlib import pyplot
+    """`ax`, or pyplot's current axes if it is None, with small labels of their ticks.
 
-    if not pyplot.get_fignums():
-        pyplot.figure(figsize=(figure_width(), height * figure_width()), layout="constrained")
-    return pyplot.gca()
+    A new figure has this height, as a multiple of its width.
+    """
+    if ax is None:
+        # Importing pyplot chooses a backend, which may fail on a machine without a display.
+        from matplotlib import pyplot
+
+        if not pyplot.get_fignums():
+            pyplot.figure(figsize=(figure_width(), height * figure_width()), layout="constrained")
+        ax = pyplot.gca()
+    small_ticks(ax)
+    return ax
 
 
 #: Sides of a grid of axes whose places a user may have chosen.
