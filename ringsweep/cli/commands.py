@@ -11,8 +11,8 @@ import json
 import logging
 import re
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -84,16 +84,12 @@ def run_command(arguments: argparse.Namespace) -> None:
 
 def _draw(figure: Callable[[], Any], picture: Path, command: str) -> None:
     """Draw the picture of a dataset. The dataset is complete, so a picture that fails is only a warning."""
-    from ringsweep import plots
-
     try:
-        plots.save(figure(), picture)
+        _save(figure(), picture)
     except Exception as error:
         reason = error.problem if isinstance(error, InputError) else error
         logger.warning("%s is not drawn: %s (draw one with %s)", picture, reason, command)
         logger.debug("where the picture failed", exc_info=True)
-    else:
-        print(f"wrote {picture}")
 
 
 def _is_newer(one: Path, other: Path) -> bool:
@@ -111,17 +107,6 @@ def _silence_dask() -> None:
             logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
-@contextmanager
-def _naming(dataset: Path) -> Iterator[None]:
-    """Name the file in errors about a dataset."""
-    try:
-        yield
-    except InputError as error:
-        if error.path == "ds":
-            raise InputError(str(dataset), error.problem) from error
-        raise
-
-
 def _picture_of(dataset: Path, output: str | None, *parts: str | None) -> Path:
     """Path of a picture of a dataset: `output`, or its name with these parts; checked before anything is drawn."""
     from ringsweep.storage import files
@@ -131,13 +116,45 @@ def _picture_of(dataset: Path, output: str | None, *parts: str | None) -> Path:
     return target
 
 
+def _save(figure: Any, picture: Path) -> None:
+    """Save a figure, and say so."""
+    from ringsweep import plots
+
+    plots.save(figure, picture)
+    print(f"wrote {picture}")
+
+
+def _store(result: Any, target: Path, text: str) -> None:
+    """Write a dataset, and print what it says."""
+    from ringsweep.storage import netcdf
+
+    netcdf.save(result, target)
+    print(text)
+    print(f"wrote {target}")
+
+
 def map_command(arguments: argparse.Namespace) -> None:
     """Draw a variable of a sweep."""
+    _draw_stored(arguments, _draw_map)
+
+
+def plot_command(arguments: argparse.Namespace) -> None:
+    """Draw a stored run, or stored errors against run time."""
+    _draw_stored(arguments, _plot)
+
+
+def _draw_stored(arguments: argparse.Namespace, draw: Callable[[argparse.Namespace, Path, Any], None]) -> None:
+    """Draw a file, which errors about a dataset name."""
     from ringsweep.storage import netcdf
 
     dataset = Path(arguments.dataset)
-    with netcdf.reading(dataset) as result, _naming(dataset):
-        _draw_map(arguments, dataset, result)
+    with netcdf.reading(dataset) as result:
+        try:
+            draw(arguments, dataset, result)
+        except InputError as error:
+            if error.path == "ds":
+                raise InputError(str(dataset), error.problem) from error
+            raise
 
 
 def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
@@ -196,13 +213,13 @@ def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None
     chosen = (arguments.x, arguments.y, arguments.var, selection)
     if page:
         plots.save_page(result, target, *chosen)
+        print(f"wrote {target}")
     elif diagram:
-        plots.save(plots.bifurcation(result, arguments.x, arguments.var, selection), target)
+        _save(plots.bifurcation(result, arguments.x, arguments.var, selection), target)
     elif circle:
-        plots.save(_panel(plots.multiplier_circle, select(result, selection)[0], x=arguments.x), target)
+        _save(_panel(plots.multiplier_circle, select(result, selection)[0], x=arguments.x), target)
     else:
-        plots.save(plots.regime_map(result, *chosen, curves, norm="log" if arguments.log else None), target)
-    print(f"wrote {target}")
+        _save(plots.regime_map(result, *chosen, curves, norm="log" if arguments.log else None), target)
 
 
 def _at_medians(result: Any) -> Any:
@@ -228,15 +245,6 @@ def _name_part(held: str) -> str:
     return re.sub(r"[^A-Za-z0-9_-]+", "-", held.replace(" ", "").replace("+", ""))
 
 
-def plot_command(arguments: argparse.Namespace) -> None:
-    """Draw a stored run, or stored errors against run time."""
-    from ringsweep.storage import netcdf
-
-    dataset = Path(arguments.dataset)
-    with netcdf.reading(dataset) as result, _naming(dataset):
-        _plot(arguments, dataset, result)
-
-
 def _plot(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
     from matplotlib.figure import Figure
 
@@ -247,9 +255,7 @@ def _plot(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
         given = (arguments.kind, arguments.law, arguments.word, arguments.begin, arguments.end)
         if arguments.sel or any(option is not None for option in given):
             raise InputError(str(dataset), "is a fit, of which there is one picture: leave other options out")
-        target = Path(arguments.output or dataset.with_suffix(".png"))
-        plots.save(plots.fit(result), target)
-        print(f"wrote {target}")
+        _save(plots.fit(result), Path(arguments.output or dataset.with_suffix(".png")))
         return
     if is_sampled(result):
         _plot_sample(arguments, dataset, result)
@@ -283,8 +289,7 @@ def _plot(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
         figure = Figure(figsize=(7.6, 4.8), layout="constrained")
         draw = plots.phase_portrait if arguments.kind == "phase" else plots.friction_loop
         draw(result, ax=figure.add_subplot())
-    plots.save(figure, target)
-    print(f"wrote {target}")
+    _save(figure, target)
 
 
 _SAMPLE_KINDS = ("probability", "survival", "sensitivity")
@@ -305,8 +310,7 @@ def _plot_sample(arguments: argparse.Namespace, dataset: Path, result: Any) -> N
     target = _picture_of(dataset, arguments.output, arguments.kind, *map(_name_part, arguments.sel))
     result, _ = select(result, dict(_selection(text) for text in arguments.sel))
     draw = getattr(plots, f"{kind}_panel")
-    plots.save(_panel(draw, result, **({"word": arguments.word} if arguments.word else {})), target)
-    print(f"wrote {target}")
+    _save(_panel(draw, result, **({"word": arguments.word} if arguments.word else {})), target)
 
 
 def simulate_command(arguments: argparse.Namespace) -> None:
@@ -357,7 +361,6 @@ def fit_command(arguments: argparse.Namespace) -> None:
     target, picture = _outputs(name, "standard_error", "fit")
 
     from ringsweep import plots
-    from ringsweep.storage import netcdf
 
     result = fitted(
         arguments.config,
@@ -367,9 +370,7 @@ def fit_command(arguments: argparse.Namespace) -> None:
         noise=arguments.noise,
         settings=arguments.set,
     )
-    netcdf.save(result, target)
-    print(in_words(result))
-    print(f"wrote {target}")
+    _store(result, target, in_words(result))
     _draw(lambda: plots.fit(result), picture, f"ringsweep plot {target}")
 
 
@@ -431,14 +432,11 @@ def precision_command(arguments: argparse.Namespace) -> None:
     from ringsweep import plots
     from ringsweep.cli.precision_table import report
     from ringsweep.runs.precision import measure
-    from ringsweep.storage import netcdf
 
     given = {name: getattr(arguments, name) for name in ("target", "cells", "rounds")}
     options = {name: value for name, value in given.items() if value is not None}
     result = measure(config, **options, progress=not arguments.quiet)
-    netcdf.save(result, target)
-    print(report(result))
-    print(f"wrote {target}")
+    _store(result, target, report(result))
     _draw(lambda: plots.work_precision(result), picture, f"ringsweep plot {target}")
 
 
