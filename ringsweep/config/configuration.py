@@ -135,17 +135,13 @@ def refined(config: Config, refine: Mapping[str, Any] | bool | None) -> Config:
     """
     if refine is None or (refine is True and config.refine is not None):
         return config
-    if refine is not False and config.sample is not None:
-        raise InputError("sweep.refine", _NOT_REFINED)
     given = yaml_text.read({"refine": refine}).tree["refine"]
     found = read_refinement(given, config.scene, config.axes)
-    _check_section(config.scene, found, None)
-    if found is not None and config.follow is not None:
-        raise InputError("sweep.refine", _NOT_FOLLOWED)
     sweep = {key: value for key, value in config.source.get("sweep", {}).items() if key != "refine"}
     if found is not None:
         sweep["refine"] = given
-    return dataclasses.replace(config, refine=found, source=config.source | ({"sweep": sweep} if sweep else {}))
+    source = config.source | ({"sweep": sweep} if sweep else {})
+    return _checked(dataclasses.replace(config, refine=found, source=source))
 
 
 def with_values(
@@ -247,14 +243,23 @@ def _validate(doc: Document) -> Config:
     refine = read_refinement(tree.get("sweep", {}).get("refine"), scene, axes)
     if (sample := read_sample(sweep.get("sample"), scene, axes)) is None:
         check_consistency(scene, axes)
-    elif refine is not None:
-        raise InputError("sweep.refine", _NOT_REFINED)
-    _check_section(scene, refine, sample)
     follow = read_follow(tree.get("sweep", {}).get("follow"), scene, axes)
-    for key, other in (("refine", refine), ("sample", sample)):
-        if follow is not None and other is not None:
+    return _checked(Config(scene, solver, with_direction(axes, follow), tree, doc.name, refine, sample, follow))
+
+
+def _checked(config: Config) -> Config:
+    """A configuration, unless two parts of its sweep, or a part and a section, exclude each other."""
+    if config.refine is not None and config.sample is not None:
+        raise InputError("sweep.refine", _NOT_REFINED)
+    for key, given, lack in (
+        ("refine", config.refine, "cells that are inferred have no points"),
+        ("sample", config.sample, "a probability has no points"),
+    ):
+        if given is not None and config.scene.structure.section is not None:
+            raise InputError(f"sweep.{key}", _NO_SECTION.format(lack))
+        if given is not None and config.follow is not None:
             raise InputError(f"sweep.{key}", _NOT_FOLLOWED)
-    return Config(scene, solver, with_direction(axes, follow), tree, doc.name, refine, sample, follow)
+    return config
 
 
 def _warn_of_plain_angles(scene: Scene, columns: Mapping[str, Any]) -> None:
@@ -281,15 +286,7 @@ def followed(config: Config, follow: str | Mapping[str, Any] | None) -> Config:
     given = yaml_text.read({"follow": follow}).tree["follow"]
     found = read_follow(given, config.scene, config.axes)
     source = config.source | {"sweep": config.source.get("sweep", {}) | {"follow": given}}
-    return dataclasses.replace(config, axes=with_direction(config.axes, found), source=source, follow=found)
-
-
-def _check_section(scene: Scene, refine: Refinement | None, sample: Sample | None) -> None:
-    """Refuse sweeps whose cells are not all run, or not kept, beside a section."""
-    if scene.structure.section is not None and refine is not None:
-        raise InputError("sweep.refine", _NO_SECTION.format("cells that are inferred have no points"))
-    if scene.structure.section is not None and sample is not None:
-        raise InputError("sweep.sample", _NO_SECTION.format("a probability has no points"))
+    return _checked(dataclasses.replace(config, axes=with_direction(config.axes, found), source=source, follow=found))
 
 
 def _apply_settings(doc: Document, settings: Iterable[Setting]) -> dict[str, tuple[Any, Any]]:
