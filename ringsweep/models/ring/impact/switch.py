@@ -331,6 +331,27 @@ def _held(contact, v):
     return Contact(contact.alpha, contact.sine, contact.cosine, 0.0, 0.0, v, contact.lever_n, contact.lever_t)
 
 
+class _Landing(NamedTuple):
+    """A body when the gap of a contact has reached zero.
+
+    Attributes
+    ----------
+    motion : Motion
+        Motion in space.
+    contacts : tuple of Contact
+        Both contacts.
+    held : tuple of bool
+        Whether each contact has held up to now.
+    mu : tuple of float
+        Friction coefficients of an impact, 1.
+    """
+
+    motion: Motion
+    contacts: tuple[Contact, Contact]
+    held: tuple[bool, bool]
+    mu: tuple[float, float]
+
+
 class _Impact(NamedTuple):
     """An impact: both contacts before it, whether they touch, whether they are open after it, and what it does."""
 
@@ -340,87 +361,136 @@ class _Impact(NamedTuple):
     found: Impulses
 
 
+class _Tried(NamedTuple):
+    """What an impact with some restitution would lead to.
+
+    Attributes
+    ----------
+    allowed : bool
+        Whether friction allows it.
+    solutions : int
+        Number of solutions of the impact law.
+    status, mode, state : int, Mode, tuple of float
+        What follows; without a unique solution what was before.
+    motion : Motion
+        Motion afterwards.
+    rebounds : tuple of bool
+        Whether each contact has hit and is open again.
+    openings : tuple of float
+        Rates of the gaps afterwards, m/s.
+    """
+
+    allowed: bool
+    solutions: int
+    status: int
+    mode: Mode
+    state: tuple[float, float, float, float, float, float, float]
+    motion: Motion
+    rebounds: tuple[bool, bool]
+    openings: tuple[float, float]
+
+
 @inlined
 def _lands(scene, mode, hit, t, y):
     """Status, mode and state after the gap of a contact has reached zero."""
-    body, balls = scene.closed.body, scene.balls
+    e, lasts = scene.restitution, 0.0
+    landing, hits = _landing(scene, mode, hit, t, y)
+    tried = _try(scene, mode, t, y, landing, hits, (e, e), lasts)
+    first, second = landing.contacts
+    apart = (second.gap if hit == 1 else first.gap) > _ROUNDING * scene.balls.reach
+    if tried.solutions != 1 and hits[0] and hits[1] and apart:
+        # What has no solution for both at once may have one for each in turn.
+        hits = hit == 1, hit == 2
+        tried = _try(scene, mode, t, y, landing, hits, (e, e), lasts)
+    restitution = 0.0, 0.0
+    if tried.allowed:
+        ends_1, ends_2 = _rebounds_end(scene, tried, t, 1), _rebounds_end(scene, tried, t, 2)
+        lasts = max(ends_1, ends_2)
+        # The rebounds of a contact are over so soon that it stays closed: the same impact without restitution.
+        restitution = 0.0 if ends_1 > 0.0 else e, 0.0 if ends_2 > 0.0 else e
+    else:
+        # Friction may forbid that a contact rebounds while the other one holds: among the last rebounds it closes.
+        lasts = _last_rebounds_end(scene, mode, t, y, landing.motion, hit, _closing(landing, hits))
+        if lasts == 0.0:
+            return JAM, mode, y
+    if lasts > 0.0:
+        tried = _try(scene, mode, t, y, landing, hits, restitution, lasts)
+        if not tried.allowed and restitution != (0.0, 0.0):
+            tried = _try(scene, mode, t, y, landing, hits, (0.0, 0.0), lasts)
+    if not tried.allowed:
+        # So slow an impact may be an error of the step.
+        return BROKEN if tried.solutions != 1 else JAM, mode, y
+    return tried.status, tried.mode, tried.state
+
+
+@inlined
+def _landing(scene, mode, hit, t, y):
+    """The body when the gap of a contact has reached zero, and whether each contact hits."""
+    balls = scene.balls
     theta, ring_omega, _ = drives.turn(scene.drive, t)
     motion = motion_of(scene, y, ring_omega)
     # Velocities relative to the race keep their digits in the slowest impacts: the contacts move as one body.
     relative = relative_to_race(motion, ring_omega) if mode.open == BOTH else motion_of(scene, y, 0.0)
-    two = ring.contact_count(body) == 2
+    two = ring.contact_count(scene.closed.body) == 2
     first = contact_of(balls, 1, relative)
     second = contact_of(balls, 2, relative) if two else first
     near = _TOGETHER * balls.reach
     hits_1, hits_2 = hit == 1, hit == 2
-    touches_1, touches_2 = hits_1, hits_2
+    holds_1 = holds_2 = False
     if mode.open == BOTH:
         if two:
-            hits_1 = touches_1 = hits_1 or (first.gap <= near and first.opening < 0.0)
-            hits_2 = touches_2 = hits_2 or (second.gap <= near and second.opening < 0.0)
+            hits_1 = hits_1 or (first.gap <= near and first.opening < 0.0)
+            hits_2 = hits_2 or (second.gap <= near and second.opening < 0.0)
     elif hit == 2:
-        first, touches_1 = _held(first, y[1]), True
+        first, holds_1 = _held(first, y[1]), True
     else:
-        second, touches_2 = _held(second, y[1]), True
+        second, holds_2 = _held(second, y[1]), True
     mu = _impact_friction(scene, first, theta), _impact_friction(scene, second, theta)
-    e = scene.restitution
-    restitution = e if hits_1 else 0.0, e if hits_2 else 0.0
-    moment, lasts = inertia(body), 0.0
-    while True:
-        touching = touches_1, touches_2
-        closing = max(-first.opening if hits_1 else 0.0, -second.opening if hits_2 else 0.0)
-        which = (1 if hits_1 else 0) + (2 if hits_2 else 0)
-        found = impulses(body.mass, moment, first, second, touching, mu, restitution)
-        allowed = found.solutions == 1
-        apart = (second.gap if hit == 1 else first.gap) > _ROUNDING * balls.reach
-        if not allowed and hits_1 and hits_2 and lasts == 0.0 and apart:
-            # What has no solution for both at once may have one for each in turn.
-            hits_1 = touches_1 = hit == 1
-            hits_2 = touches_2 = hit == 2
-            continue
-        if allowed:
-            after = after_impact(body.mass, moment, first, second, motion, found)
-            open_1, open_2 = not touches_1 or found.opening_1 > 0.0, not touches_2 or found.opening_2 > 0.0
-            again = (not hits_1 or open_1) and (not hits_2 or open_2)
-            event = Event(
-                REBOUNDS if again else CLOSES,
-                which,
-                closing,
-                max(found.normal_1, found.normal_2),
-                found.loss,
-                found.violation,
-                lasts,
-                mode.event.number + 1,
-                t,
-                0,
-            )
-            impact = _Impact((first, second), touching, (open_1, open_2), found)
-            status, after_mode, state = _next(scene, t, after, mode, impact, event)
-            rebounds_1, rebounds_2 = hits_1 and open_1, hits_2 and open_2
-            # A rebound may leave the contact that holds in a slip that jams: friction forbids it too.
-            allowed = status != JAM or not (rebounds_1 or rebounds_2)
-            if allowed and (lasts > 0.0 or status != RUNNING or not (rebounds_1 or rebounds_2)):
-                return status, after_mode, state
-            if allowed:
-                falls_1 = _falls(scene, after_mode, t, state, after, 1) if rebounds_1 else 0.0
-                falls_2 = _falls(scene, after_mode, t, state, after, 2) if rebounds_2 else 0.0
-                ends_1 = _rebounds_end(falls_1, found.opening_1, e, SUMMED * balls.reach)
-                ends_2 = _rebounds_end(falls_2, found.opening_2, e, SUMMED * balls.reach)
-                lasts = max(ends_1, ends_2)
-                if lasts == 0.0:
-                    return status, after_mode, state
-                # The rebounds of a contact are over so soon that it stays closed: the same impact without restitution.
-                restitution = 0.0 if ends_1 > 0.0 else restitution[0], 0.0 if ends_2 > 0.0 else restitution[1]
-                continue
-        # Friction may forbid that a contact rebounds while the other one holds: among the last rebounds it closes.
-        if lasts == 0.0:
-            lasts = _last_rebounds_end(scene, mode, t, y, motion, hit, closing)
-        elif restitution == (0.0, 0.0):
-            # So slow an impact may be an error of the step.
-            return BROKEN if found.solutions != 1 else JAM, mode, y
-        if lasts == 0.0:
-            return JAM, mode, y
-        restitution = 0.0, 0.0
+    return _Landing(motion, (first, second), (holds_1, holds_2), mu), (hits_1, hits_2)
+
+
+@inlined
+def _closing(landing, hits):
+    """Largest speed with which a contact hits, m/s."""
+    first, second = landing.contacts
+    return max(-first.opening if hits[0] else 0.0, -second.opening if hits[1] else 0.0)
+
+
+@inlined
+def _try(scene, mode, t, y, landing, hits, restitution, lasts):
+    """What an impact leads to in which these contacts hit.
+
+    `restitution` is that of each contact, if it hits; `lasts` is the time until rebounds end that are summed, s.
+    """
+    body = scene.closed.body
+    first, second = landing.contacts
+    touch = landing.held[0] or hits[0], landing.held[1] or hits[1]
+    each = restitution[0] if hits[0] else 0.0, restitution[1] if hits[1] else 0.0
+    found = impulses(body.mass, inertia(body), first, second, touch, landing.mu, each)
+    openings = found.opening_1, found.opening_2
+    if found.solutions != 1:
+        return _Tried(False, found.solutions, JAM, mode, y, landing.motion, (False, False), openings)
+    after = after_impact(body.mass, inertia(body), first, second, landing.motion, found)
+    are_open = not touch[0] or found.opening_1 > 0.0, not touch[1] or found.opening_2 > 0.0
+    again = (not hits[0] or are_open[0]) and (not hits[1] or are_open[1])
+    event = Event(
+        REBOUNDS if again else CLOSES,
+        (1 if hits[0] else 0) + (2 if hits[1] else 0),
+        _closing(landing, hits),
+        max(found.normal_1, found.normal_2),
+        found.loss,
+        found.violation,
+        lasts,
+        mode.event.number + 1,
+        t,
+        0,
+    )
+    impact = _Impact((first, second), touch, are_open, found)
+    status, after_mode, state = _next(scene, t, after, mode, impact, event)
+    rebounds = hits[0] and are_open[0], hits[1] and are_open[1]
+    # A rebound may leave the contact that holds in a slip that jams: friction forbids it too.
+    allowed = status != JAM or not (rebounds[0] or rebounds[1])
+    return _Tried(allowed, 1, status, after_mode, state, after, rebounds, openings)
 
 
 @inlined
@@ -438,7 +508,16 @@ def _falls(scene, mode, t, y, motion, contact):
 
 
 @inlined
-def _rebounds_end(falls, speed, e, most):
+def _rebounds_end(scene, tried, t, contact):
+    """Time until the rebounds of a contact end after an impact, if they are summed; 0 if they are not, or are none."""
+    if tried.status != RUNNING or not tried.rebounds[contact - 1]:
+        return 0.0
+    falls = _falls(scene, tried.mode, t, tried.state, tried.motion, contact)
+    return _time_of_rebounds(falls, tried.openings[contact - 1], scene.restitution, SUMMED * scene.balls.reach)
+
+
+@inlined
+def _time_of_rebounds(falls, speed, e, most):
     """Time until rebounds end in which the gap falls so, if it could not grow to `most`, m, by then; 0 if it can."""
     if not falls > 0.0 or e >= 1.0:
         return 0.0
@@ -453,7 +532,7 @@ def _last_rebounds_end(scene, mode, t, y, motion, contact, speed):
     # which hits before they would be over.
     still = mode.event.time + mode.event.lasts - t if mode.event.kind == CLOSES else 0.0
     falls = _falls(scene, mode, t, y, motion, contact)
-    return max(still, _rebounds_end(falls, speed, 0.0, _FORBIDDEN * scene.balls.reach))
+    return max(still, _time_of_rebounds(falls, speed, 0.0, _FORBIDDEN * scene.balls.reach))
 
 
 @inlined
