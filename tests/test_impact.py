@@ -110,7 +110,41 @@ class TestParticle:
         assert run.impact_loss.item() == pytest.approx(PARTICLE["body"]["mass"] * G * 2 * RADIUS, rel=1e-12)
 
 
+# A narrow body that rocks from one contact to the other until it rests.
+ROCKER = {
+    "model": "ring",
+    "body": {
+        "mass": 0.225806,
+        "inertia": 2.00695e-5,
+        "half_distance": 0.0122934,
+        "ball_radius": 0.0205493,
+        "center_offset": -0.0107898,
+    },
+    "ring": {"radius": 0.0768918},
+    "friction": {
+        "law": "stiction",
+        "rest": {"mu_s": 0.709165, "mu_k": 0.359963},
+        "rough": {"mu_s": 0.48937, "mu_k": 0.241918},
+    },
+    "zone": {"half_angle": 0.414367, "center": 2.11475},
+    "drive": {"law": "constant", "amplitude": -0.474327},
+    "impact": {"restitution": 0.0551761},
+    "time": {"span": 0.02},
+}
+
+
 class TestBody:
+    def test_body_that_rocks_in_ever_smaller_hops_comes_to_rest_on_both_contacts(self):
+        """Moreau's time stepping, which has no events, gives this angle and rest after 0.0131 s (steps of 5e-7 s)."""
+        run = ringsweep.sweep(ROCKER, {"time.span": [0.02]}, solver="auto", progress=False).squeeze()
+        assert ringsweep.words(run.aftermath).item() == "recovered"
+        assert run.certified.item() == 1
+        assert run.t_recovered.item() == pytest.approx(0.01315, abs=1e-4)
+        assert run.phi_end.item() == pytest.approx(-0.00904113, abs=3e-8)
+        assert run.omega_end.item() == ROCKER["drive"]["amplitude"]
+        # Hops become shorter by a constant factor.
+        assert run.impacts.item() < 80
+
     def test_no_impact_gains_energy_and_only_a_lost_contact_lifts(self, drums):
         assert (drums.impact_loss >= 0.0).all()
         lost = drums.separations > 0

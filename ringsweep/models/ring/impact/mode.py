@@ -104,6 +104,8 @@ class Mode(NamedTuple):
     event: Event
 
 
+#: Event after which a contact comes to rest at another time.
+with_lasts = replacing("lasts")
 _with_passed = replacing("passed")
 
 

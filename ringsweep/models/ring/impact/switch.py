@@ -41,6 +41,7 @@ from ringsweep.models.ring.impact.mode import (
     passing,
     place_of,
     ring_of,
+    with_lasts,
     with_place,
     with_slip,
     with_zeros,
@@ -66,6 +67,10 @@ from ringsweep.physics.zones import cross_edge, edge_ahead, locate
 #: Rebounds that end so soon that the gap could not grow to this share of rho are summed: the contact closes. The place
 #: is then wrong by about as much.
 SUMMED = 1e-12
+
+# A body that rocks from one contact to the other comes to rest in a row of impacts, too. What is left of the sliding
+# velocity is as slow as they are: the row is summed where its hops could not grow to this share of rho.
+_ROCKING = 1e-20
 
 # Where rebounds are summed, slow velocities are left. An impact that friction forbids then closes the contact.
 _FORBIDDEN = 1e-10
@@ -420,6 +425,12 @@ def _lands(scene, mode, hit, t, y):
     if not tried.allowed:
         # So slow an impact may be an error of the step.
         return BROKEN if tried.solutions != 1 else JAM, mode, y
+    lasts = _rocking_ends(scene, mode, t, tried)
+    if lasts > 0.0:
+        psi, v, _, _, _, _, _ = tried.state
+        rests = _close(scene, t, psi, v, tried.mode.turned, with_lasts(tried.mode.event, lasts))
+        if rests[0] == RUNNING and rests[1].open == NONE:
+            return rests
     return tried.status, tried.mode, tried.state
 
 
@@ -523,6 +534,28 @@ def _time_of_rebounds(falls, speed, e, most):
         return 0.0
     time = 2.0 * speed / (falls * (1.0 - e))
     return time if time * time * falls <= most else 0.0
+
+
+@inlined
+def _rocking_ends(scene, mode, t, tried):
+    """Time until a body stops rocking that an impact has just tipped from one contact to the other; 0 if it goes on.
+
+    The contact that had held opens with a speed, and hits with the same speed again. The ratio of it to the speed of
+    its last hit is that of one rock to the one before. Hops last as long as they are fast.
+    """
+    last = mode.event
+    if mode.open + tried.mode.open != BOTH or mode.open == NONE or mode.open == BOTH or tried.status != RUNNING:
+        return 0.0
+    contact = holding(mode)
+    if last.kind != CLOSES or last.contact != contact or tried.rebounds[2 - contact]:
+        return 0.0
+    speed = tried.openings[contact - 1]
+    falls = _falls(scene, tried.mode, t, tried.state, tried.motion, contact)
+    if not (falls > 0.0 and speed < last.speed):
+        return 0.0
+    ratio = speed / last.speed
+    time = (2.0 * speed / falls + ratio * (t - last.time)) / (1.0 - ratio)
+    return time if time * time * falls <= _ROCKING * scene.balls.reach else 0.0
 
 
 @inlined
