@@ -31,8 +31,8 @@ def belt(law="stiction", *, m=1.0, k=2.0, v_b=0.1, mu_s=0.15, mu_k=0.1, span=60.
         "initial": {"x": 0.0, "velocity": v_b if start is None else start},
         "time": {"span": span},
     }
-    # The kernel of this law for a belt with all parts is compiled in any case, for a force on a body in a dead band.
-    return with_all_parts(scene) if law == "karnopp" else scene
+    # The kernels of these laws for a belt with all parts are compiled in any case, for forces on the body.
+    return with_all_parts(scene) if law in ("karnopp", "bengisu-akay") else scene
 
 
 def outcome(scene, **solver):
@@ -259,7 +259,10 @@ class TestTwoMethods:
         scene = belt(law, span=20.0, start=0.0, **MILD[law])
         scene = with_all_parts(scene) if law == "lugre" else scene
         found = outcome(scene)
-        fixed = outcome(scene, method="rk4", steps=100_000)
+        # With a smooth law rk4 takes the belt without the parts that are 0, whose kernel other tests compile too.
+        parts = ("spring", "damper", "force") if law == "bengisu-akay" else ()
+        bare = {key: part for key, part in scene.items() if key not in parts} | {"spring": {"stiffness": 2.0}}
+        fixed = outcome(bare if parts else scene, method="rk4", steps=100_000)
         assert fixed.stiffness < STABILITY_LIMIT
         assert found.regime == fixed.regime
         assert found.certified == fixed.certified == 1

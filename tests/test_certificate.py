@@ -385,7 +385,7 @@ def test_greatest_velocity_of_a_body_that_rides_on_a_belt_is_that_of_the_belt():
     scene = {
         "model": "belt",
         "body": {"mass": 1.0},
-        "spring": {"stiffness": 1.0},
+        "spring": {"stiffness": 1.0, "cubic": 0.0},
         "friction": {"law": "stiction", "mu_s": 0.9, "mu_k": 0.8},
         "drive": {"law": "sinusoidal", "amplitude": 0.1, "frequency": 0.7, "phase": 1.0},
         "initial": {"velocity": float(0.1 * 2.0 * np.pi * 0.7 * np.cos(1.0))},

@@ -583,7 +583,7 @@ class TestBody:
             "model": "ring",
             "body": {"mass": mass, "inertia": moment, "half_distance": half, "ball_radius": ball},
             "ring": {"radius": radius},
-            "friction": {"law": "stiction", "rest": mu, "rough": mu},
+            "friction": {"law": "tustin", "alpha": 1e6, "rest": mu, "rough": mu},
             "zone": {"half_angle": 2.60162, "center": -0.672517},
             "drive": {"law": "power", "amplitude": 11.2748, "exponent": 1.07766},
             "initial": {"phi": 1.77461, "omega": 0.0},
@@ -634,7 +634,7 @@ class TestBody:
         scene = {
             "model": "ring",
             "friction": friction,
-            "drive": {"law": "constant", "amplitude": -11.0615},
+            "drive": {"law": "power", "amplitude": -11.0615, "exponent": 1.0},
             "body": {"mass": 0.489069, "inertia": 7.10457e-05, "half_distance": 0.0238336, "ball_radius": 0.00874807},
             "ring": {"radius": 0.0605306},
             "zone": {"half_angle": 2.4754},

@@ -178,7 +178,7 @@ class TestSuddenOnsetOfChaos:
     grazes the speed of the belt.
     """
 
-    def follow(self, nu, exponent, span=3000.0):
+    def follow(self, nu, span=3000.0):
         scene = {
             "model": "belt",
             "gravity": 1.0,
@@ -198,12 +198,12 @@ class TestSuddenOnsetOfChaos:
             "time": {"span": span},
         }
         grid = {"force.frequency": (np.asarray(nu) / (2.0 * np.pi)).tolist()}
-        config = {"scene": scene, "record": {"exponent": exponent}, "sweep": {"grid": grid}}
+        config = {"scene": scene, "record": {"exponent": True}, "sweep": {"grid": grid}}
         return ringsweep.run(config, jobs=1, progress=False)
 
     def test_chaos_begins_where_it_has_been_published(self):
         nu = 1.7077997 + np.arange(-7, 8) * 1e-7
-        ds = self.follow(nu, exponent=True)
+        ds = self.follow(nu)
         below = nu <= 1.7077997 + 1e-12
         assert set(ringsweep.words(ds.long_run).values[below]) == {"chaotic"}
         assert set(ringsweep.words(ds.long_run).values[~below]) == {"periodic"}
@@ -216,7 +216,7 @@ class TestSuddenOnsetOfChaos:
         """One of four bands touches the speed of the belt, at times: the last lap may have a stop or none."""
         nu = np.linspace(1.7075, 1.7077, 9)
         for span in (3000.0, 4000.0, 15000.0):
-            ds = self.follow(nu, exponent=False, span=span)
+            ds = self.follow(nu, span)
             assert set(ringsweep.words(ds.regime).values) == {"stick-slip"}
             # Shares of some hundred cycles scatter.
             np.testing.assert_allclose(ds.stops_per_cycle, 0.158, atol=0.02)

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from belts import with_all_parts
 
 import ringsweep
 from ringsweep import plots
@@ -209,7 +210,9 @@ class TestSample:
     def test_cells_without_a_reference_are_left_out_and_counted(self, config, monkeypatch):
         monkeypatch.setattr(contenders, "_STEPS", (100,))
         monkeypatch.setattr(precision, "_TIGHTEST", {precision.Event: (1e-15, 1e-3)})
-        found = ringsweep.precision(CONFIGS / "belt_viscous.yaml", rounds=1, progress=False)
+        many = yaml.safe_load((CONFIGS / "belt_viscous.yaml").read_text(encoding="utf-8"))
+        many["scene"] = with_all_parts(many["scene"])
+        found = ringsweep.precision(many, rounds=1, progress=False)
         assert 0 < found.sizes["cell"] < 16
         dropped = 16 - found.sizes["cell"]
         assert f"{found.sizes['cell']} of 4096 cells; {dropped} more were drawn" in found.attrs["sampled"]

@@ -186,9 +186,9 @@ def test_a_rocking_ring_has_two_motions_at_one_frequency_and_the_past_tells_whic
 
 def test_run_of_a_file_goes_on_from_its_end(tmp_path):
     file = tmp_path / "first.nc"
-    ringsweep.run({"scene": ROCKING | {"time": {"span": 7.3}}}, file, jobs=1, progress=False).close()
-    rest = ROCKING | {"initial": {"from": str(file)}, "time": {"span": 4.7}}
-    second, one = ringsweep.simulate(rest), ringsweep.simulate(ROCKING | {"time": {"span": 12.0}})
+    ringsweep.run({"scene": RIG | {"time": {"span": 7.3}}}, file, jobs=1, progress=False).close()
+    rest = RIG | {"initial": {"from": str(file)}, "time": {"span": 4.7}}
+    second, one = ringsweep.simulate(rest), ringsweep.simulate(RIG | {"time": {"span": 12.0}})
     assert np.cos(second.phi.values[-1] - one.phi.values[-1]) == pytest.approx(1.0, abs=1e-12)
     assert second.omega.values[-1] == pytest.approx(one.omega.values[-1], abs=1e-8)
 
@@ -261,8 +261,9 @@ def test_points_of_laws_that_creep_are_states_at_whole_periods(law):
         "bengisu-akay": {"alpha": 50.0, "v0": 1e-3},
     }
     scene = RIG | {"friction": RIG["friction"] | {"law": law} | parts[law], "time": {"span": 2.0 / 1.3}}
-    found = run(scene, section(2, exponent=law != "lugre"))
-    histories = ringsweep.simulate(scene, samples=600).drop_duplicates("time")
+    record = section(2, exponent=law != "lugre")
+    found = run(scene, record)
+    histories = ringsweep.simulate({"scene": scene, "record": record}, samples=600).drop_duplicates("time")
     for k, point in enumerate((1.0, 2.0)):
         names = {"phi": "phi_section", "omega": "omega_section"}
         if law == "lugre":
