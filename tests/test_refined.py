@@ -107,9 +107,10 @@ class TestFile:
         assert same_bits(refined, tmp_path / "again.nc")
 
     def test_further_axis_makes_a_stack_of_refined_maps(self, scene):
-        axes = {"zone.half_angle": AXES["zone.half_angle"], "friction.law": ["coulomb", "stiction"]}
+        axes = {"zone.half_angle": AXES["zone.half_angle"], "friction.law": ["tustin", "stiction"]}
         axes["drive.amplitude"] = AXES["drive.amplitude"]
-        found = ringsweep.sweep(scene, axes, refine=REFINE | {"audit": 0.0}, progress=False)
+        both = scene | {"friction": scene["friction"] | {"alpha": 10.0}}
+        found = ringsweep.sweep(both, axes, refine=REFINE | {"audit": 0.0}, progress=False)
         alone = ringsweep.sweep(
             scene, {name: axes[name] for name in axes if name != "friction.law"}, refine=REFINE | {"audit": 0.0}
         )

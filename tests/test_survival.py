@@ -419,8 +419,9 @@ class TestResultFile:
             "drive.amplitude": xr.DataArray([0.5, 1.0, 2.0, 8.0], dims="rig"),
             "body.mass": xr.DataArray([0.05, 0.06, 0.07, 0.08], dims="rig"),
             "zone.half_angle": ["5 deg", "15 deg", "40 deg"],
-            "friction.law": ["coulomb", "stiction"],
+            "friction.law": ["tustin", "stiction"],
         }
+        scene = scene | {"friction": scene["friction"] | {"alpha": 10.0}}
         found = ringsweep.sweep(scene, axes, tmp_path / "out.nc", progress=False)
         assert found["t_end"].encoding["chunksizes"] == (1, 2, 2)
         assert {"drive_amplitude", "body_mass"} <= set(found.coords)
@@ -433,8 +434,9 @@ class TestResultFile:
         axes = {
             "drive.amplitude": xr.DataArray([[0.5, 1.0], [2.0, 8.0]], dims=("i", "j")),
             "body.mass": xr.DataArray([0.05, 0.06], dims="j"),
-            "friction.law": ["coulomb", "stiction"],
+            "friction.law": ["tustin", "stiction"],
         }
+        scene = scene | {"friction": scene["friction"] | {"alpha": 10.0}}
         one, two = tmp_path / "one.nc", tmp_path / "two.nc"
         ringsweep.sweep(scene, axes, one, progress=False).close()
         ringsweep.run(one, two, progress=False).close()
