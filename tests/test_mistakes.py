@@ -139,6 +139,7 @@ SAMPLES: list[tuple[dict[str, Any], str, str]] = [
 # Path, interval, regime, options; then as above.
 THRESHOLDS: list[tuple[str, Any, Any, dict[str, Any], str, str]] = [
     ("friction.mu", (0.1, 0.2), "riding", {}, "path", "the scene has no such number to vary; did you mean"),
+    ("friction.alpha", (1.0, 2.0), "riding", {}, "path", "law tustin or bengisu-akay has it; did you mean"),
     ("friction.law", (0.1, 0.2), "riding", {}, "path", "no number that varies continuously"),
     (
         "friction.mu_s",

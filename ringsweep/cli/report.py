@@ -114,8 +114,9 @@ def _print_losses(result: xr.Dataset) -> None:
         print("  in a run that has any:" if result["regime"].size > 1 else "  in this run:", "; ".join(told))
 
 
-# Events of a run that are printed: all, or the first and the last.
+# Events of a run that are printed: all, or the first and the last. Where contacts hit, only events of contacts are.
 _FIRST, _LAST = 8, 4
+_OF_CONTACTS = ("separation", "rebound", "closure")
 
 
 def print_events(run: xr.Dataset) -> None:
@@ -129,16 +130,17 @@ def print_events(run: xr.Dataset) -> None:
     kinds = kinds[kinds != "none"]
     counts = [f"{kind} {np.count_nonzero(kinds == kind)}" for kind in dict.fromkeys(kinds.tolist())]
     print("events:", ", ".join(counts) or "none")
-    hits = np.flatnonzero(np.isin(kinds, ("rebound", "closure")))
+    hits = np.flatnonzero(np.isin(kinds, _OF_CONTACTS[1:]))
     speeds = dict(zip(hits.tolist(), run["impact_speed"].values.tolist(), strict=False)) if len(hits) else {}
-    left_out = range(_FIRST, len(kinds) - _LAST)
-    for k, kind in enumerate(kinds):
-        if k == left_out.start and len(left_out) > 1:
-            print(f"  ... {len(left_out)} more are in the file")
-        if k not in left_out or len(left_out) == 1:
+    told = np.flatnonzero(np.isin(kinds, _OF_CONTACTS) | (not speeds))
+    left_out = range(_FIRST, len(told) - _LAST)
+    for row, k in enumerate(told.tolist()):
+        if row == left_out.start and len(left_out) > 1:
+            print(f"  ... {len(left_out)} more, and the other kinds, are in the file")
+        if row not in left_out or len(left_out) == 1:
             who = contacts[k].replace("contact_", " contact ").replace("both", " both contacts").replace("none", "")
             speed = f", {speeds[k]:.6g} m/s" if k in speeds else ""
-            print(f"  {run['event_time'].values[k]:.9g} s {kind}{who}{speed}")
+            print(f"  {run['event_time'].values[k]:.9g} s {kinds[k]}{who}{speed}")
     if speeds:
         hardest = max(speeds, key=speeds.__getitem__)
         when = run["event_time"].values[hardest]

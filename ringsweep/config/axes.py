@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ringsweep.config.friction import laws_with
 from ringsweep.config.scene import sweepable
 from ringsweep.config.sections import MAX_LENGTH, check_keys, read_values, section_of, suggestion
 from ringsweep.config.yaml_text import Document
@@ -126,7 +127,7 @@ def sweep_axes(scene: Scene, sweep: dict[str, Any]) -> Axes:
 def swept_parameter(known: Mapping[str, Parameter | Choice], path: object, where: str) -> Parameter | Choice:
     """The parameter at a swept path, which must be one of the known paths."""
     if not isinstance(path, str) or path not in known:
-        raise InputError(where, "the scene has no such number to vary" + suggestion(path, known))
+        raise InputError(where, "the scene has no such number to vary" + laws_with(path) + suggestion(path, known))
     return known[path]
 
 

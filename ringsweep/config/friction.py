@@ -16,6 +16,7 @@ from ringsweep.errors import InputError
 from ringsweep.physics.friction import LAWS, TRAITS, add_law, laws
 from ringsweep.physics.friction.formula import FormulaError
 from ringsweep.physics.friction.laws import Definition, define
+from ringsweep.quantities.parameters import declared
 from ringsweep.quantities.units import show
 
 #: Name of the law that the section ``friction`` itself defines by the keys ``mu`` and ``at_rest``.
@@ -26,6 +27,13 @@ TABLE = "table"
 
 # Laws that a Python session has defined.
 _REGISTERED: dict[str, Definition] = {}
+
+
+def laws_with(path: object) -> str:
+    """Part of a message about a number that the scene's friction law lacks: the laws that have it, if any has."""
+    section, _, name = str(path).rpartition(".")
+    having = [law for law, kind in LAWS.items() if name in declared(kind)] if section == "friction" else []
+    return f": law {' or '.join(having)} has it" if having else ""
 
 
 def friction_law(name: str, mu: str, at_rest: str | None = None) -> None:

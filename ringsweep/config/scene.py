@@ -13,7 +13,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.config.friction import FORMULA, keep_definitions, keys_of, law_of_curve, own_laws, read_curve
+from ringsweep.config.friction import (
+    FORMULA,
+    keep_definitions,
+    keys_of,
+    law_of_curve,
+    laws_with,
+    own_laws,
+    read_curve,
+)
 from ringsweep.config.friction import TABLE as TABLE_LAW
 from ringsweep.config.motion import FORMULA as FORMULA_DRIVE
 from ringsweep.config.motion import own_drive, own_force
@@ -290,7 +298,7 @@ def _warn_of_turns(path: str, angle: float) -> None:
 @cache
 def warn_of_unused(path: str, where: str, name: str) -> None:
     """Warn once per process: one command reads its configuration several times."""
-    logger.warning("scene.%s is not used: %s law %s has no such parameter", path, where, name)
+    logger.warning("scene.%s is not used: %s law %s has no such parameter%s", path, where, name, laws_with(path))
 
 
 def numbers_of(structures: Mapping[str, Structure]) -> dict[str, Parameter]:
