@@ -63,6 +63,7 @@ from tqdm import tqdm
 import ringsweep
 from benchmarks import _common
 from benchmarks.reference import go_on, judge, rattling
+from benchmarks.reference.aftermath import MOST_EVENTS
 from benchmarks.reference.compliant import opinion
 from benchmarks.reference.problem import FORMULAS, problem
 from benchmarks.reference.run import drive
@@ -475,7 +476,7 @@ def aftermath_opinion(scene, word, verdict, count):
     p, t = problem(scene), verdict.numbers["t_separation"]
     found, said = rattling.opinion(p, word, t), ""
     if found.word == "contradicted":
-        log = go_on(scene, keep=rattling.LOOKED_AT)[1]
+        log = go_on(scene, keep=MOST_EVENTS)[1]
 
         def rigid(until):
             return go_on(scene | {"time": {"span": float(until)}})[0]

@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from benchmarks.reference import free, go_on, rattling
+from benchmarks.reference.aftermath import MOST_EVENTS
 from benchmarks.reference.free import impact
 from benchmarks.reference.physics import CLOSED, ONLY_1
 from benchmarks.reference.problem import problem
@@ -343,3 +344,36 @@ def test_the_woodpecker_pecks_with_the_published_period():
     begin = np.array([0.0, -(R_M - R_0) / H_M, -0.2788]), np.array([-0.3411, 0.0, -7.4583])
     times = peck(*begin, 0.55, 5e-5)
     assert np.diff(times).mean() == pytest.approx(0.1452, rel=0.008)
+
+
+# Hits one ball after the other in flight, then fifty times with one ball, and then with one while the other one holds.
+SHARED = {
+    "model": "ring",
+    "body": {"mass": 0.076, "inertia": 4.47e-5, "half_distance": 0.025, "ball_radius": 0.01, "center_offset": 0.0},
+    "ring": {"radius": 0.043378},
+    "friction": {
+        "law": "bengisu-akay",
+        "rest": {"mu_s": 0.105568, "mu_k": 0.105568},
+        "rough": {"mu_s": 0.585926, "mu_k": 0.190734},
+        "alpha": 819161.0,
+        "v0": 1.00596e-05,
+    },
+    "zone": {"half_angle": 0.00960347, "center": -2.4594},
+    "drive": {"law": "none"},
+    "initial": {"phi": 0.0, "omega": -103.221},
+    "impact": {"restitution": 0.848071},
+    "time": {"span": 0.72},
+}
+
+
+def test_springs_that_hit_a_little_later_part_only_in_the_impact_that_both_contacts_share():
+    """Springs come closer to the rigid body with their stiffness up to 0.595 s, and to another motion after it."""
+    _, log = go_on(SHARED, keep=MOST_EVENTS)
+    asked = []
+
+    def rigid(until):
+        asked.append(until)
+        return go_on(SHARED | {"time": {"span": float(until)}})[0]
+
+    assert rattling.parts_in_shared_impact(problem(SHARED), log[0, 0], rigid, log)
+    assert 0.59 < asked[-1] < 0.671

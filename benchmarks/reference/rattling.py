@@ -32,9 +32,9 @@ SETTLED = 6.0
 SLOW = 3.0
 #: Duration of an impact, in rad of the springs, after which its contact has settled.
 LONGEST = 12.0
-#: Impacts at which a run of the springs is compared with one of the rigid body, and difference of their angular
-#: velocities, in units of the greatest one or of a fall, at which they have parted.
-LOOKED_AT, PARTED = 40, 0.05
+#: Pauses between impacts in which a run of the springs is compared with one of the rigid body, and difference of their
+#: angular velocities, in units of the greatest one or of a fall, at which they have parted.
+LOOKED_AT, PARTED = 60, 0.05
 #: Time for which both contacts hold if they certainly do, in rad of the springs.
 LASTING = 100.0
 RTOL = 1e-4
@@ -208,16 +208,17 @@ def parts_in_shared_impact(p, t, rigid, log):
         Events of the rigid body.
 
     """
-    instants = np.concatenate(([t], log[log[:, 1] == HIT, 0][:LOOKED_AT], [p.span]))
+    instants = np.concatenate(([t], log[log[:, 1] == HIT, 0], [p.span]))
+    # Hundreds of small rebounds may lie between the impacts that matter.
+    pauses = [(earlier, now) for earlier, now in pairwise(instants) if now - earlier >= 1e-4]
     together = math.nan
-    for earlier, now in pairwise(instants):
-        before = now - 0.02 * (now - earlier)
-        if now - earlier < 1e-4:
-            continue
-        if apart(p, t, rigid, before):
-            # They were together just before the impact that came last.
+    for earlier, now in pauses[:LOOKED_AT]:
+        # Impacts of springs last for a while, and come a little sooner or later than those of the rigid body. Just
+        # before an impact one of both bodies may have hit already; midway between two of them neither has.
+        if apart(p, t, rigid, 0.5 * (earlier + now)):
             return together > t and rigid(together)["closed"] > 0
-        together = before
+        # Just before the impact in which they may part.
+        together = now - 0.02 * (now - earlier)
     return False
 
 
