@@ -61,10 +61,15 @@ MOST_EVENTS = 5_000
 #: is constant, slip falls with the logarithm of A: it ends at a small A, but before A vanishes. Where friction falls
 #: with the speed, A vanishes. Where it rises, A stays near gravity over the acceleration of the ring.
 LEAST_A = 1e-13
-#: Reaction, in weights, that grows while A vanishes.
+#: Reaction, in weights, that grows while A vanishes. The reaction is the load over A: at LEAST_DETERMINANT, 1e-6, more
+#: than GROWN weights mean a load of more than a thousandth of the weight. Of 400 random scenes with impacts (222 lose a
+#: contact) none has another word at 10, 1e5 or 1e8.
 GROWN = 1e3
 #: Rebounds of both contacts in turn shrink together. Once one contact has come to rest in this way, the other one does
-#: so at this multiple of the speed: what its impact does while the first one rests is no part of the row.
+#: so at this multiple of the speed: what its impact does while the first one rests is no part of the row. From one hit
+#: to the next the speed falls by some factor, so 10 covers rows in which a hit has at least a tenth of the speed of the
+#: one before. Of 1000 random scenes with impacts (540 lose a contact) none has another word at 1, 2, 5 or 30, and the
+#: angle at the end moves by at most 2.2e-6 rad.
 ROW = 10.0
 _N, _A, _GAP, _SLOWER, _FASTER, _LOW, _HIGH, _STICK, _COUNT = range(9)
 
