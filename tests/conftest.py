@@ -31,14 +31,10 @@ class ByFile(LoadScopeScheduling):
         return nodeid if file.endswith("test_notebooks.py") else file
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the notebooks: at the end one process would wait for the other."""
-    items.sort(key=lambda item: item.path.name != "test_notebooks.py")
-
-
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> ByFile:
     """Scheduler of the processes."""
-    # Newer versions of xdist would begin with the files of most tests.
+    # Newer versions of xdist would begin with the files of most tests. In the order of names the notebooks come when
+    # most of their kernels are compiled, and the files at the end are short, so that no process waits for another.
     config.option.loadscopereorder = False
     return ByFile(config, log)
 

@@ -85,6 +85,10 @@ def on_belt(damping, friction, **changes):
     } | changes
 
 
+#: Friction of two publications; with all parts of a belt they share a kernel.
+CUBIC = {"law": "formula", "mu": "mu_s - k1*v + k3*v**3", "at_rest": "mu_s"}
+
+
 class TestThomsenAndFidlinsAmplitudes:
     """Analytical approximations for stick-slip vibration amplitudes, Int. J. Non-Linear Mech. 38 (2003).
 
@@ -98,14 +102,11 @@ class TestThomsenAndFidlinsAmplitudes:
         fall, damping = (self.STATIC - self.LEAST) * small, self.RATIO * small
         k1, k3 = 1.5 * fall / self.SPEED, 0.5 * fall / self.SPEED**3
         onset = np.sqrt((k1 - 2 * damping) / (3 * k3))
-        law = {"law": "formula", "mu": "mu_s - k1*v + k3*v**3", "at_rest": "mu_s", "mu_s": self.STATIC}
+        law = CUBIC | {"mu_s": self.STATIC, "k1": k1, "k3": k3}
         velocities = np.array(shares) * onset
         mapping = {
-            "scene": on_belt(
-                2 * damping,
-                law | {"k1": k1, "k3": k3},
-                initial={"x": 0.4, "velocity": 0.0},
-                time={"span": 3000.0 / small},
+            "scene": with_all_parts(
+                on_belt(2 * damping, law, initial={"x": 0.4, "velocity": 0.0}, time={"span": 3000.0 / small})
             ),
             "record": {"exponent": True},
             "sweep": {
@@ -185,20 +186,13 @@ class TestSuddenOnsetOfChaos:
             "body": {"mass": 1.0},
             "spring": {"stiffness": 1.0},
             "belt": {"velocity": 1.0},
-            "friction": {
-                "law": "formula",
-                "mu": "mu_s - a*v + b*v**3",
-                "at_rest": "mu_s",
-                "mu_s": 1.5,
-                "a": "1.5 s/m",
-                "b": "0.45 s^3/m^3",
-            },
+            "friction": CUBIC | {"mu_s": 1.5, "k1": "1.5 s/m", "k3": "0.45 s^3/m^3"},
             "force": {"amplitude": 0.1, "phase": np.pi / 2.0},
             "initial": {"x": 1.0, "velocity": 1.0},
             "time": {"span": span},
         }
         grid = {"force.frequency": (np.asarray(nu) / (2.0 * np.pi)).tolist()}
-        config = {"scene": scene, "record": {"exponent": True}, "sweep": {"grid": grid}}
+        config = {"scene": with_all_parts(scene), "record": {"exponent": True}, "sweep": {"grid": grid}}
         return ringsweep.run(config, jobs=1, progress=False)
 
     def test_chaos_begins_where_it_has_been_published(self):
