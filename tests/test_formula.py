@@ -7,6 +7,7 @@ import subprocess
 import sys
 from itertools import pairwise
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from scipy.interpolate import PchipInterpolator
 from solutions import made, motion
 
 import ringsweep
-from ringsweep.config import load
+from ringsweep.config import friction, load
 from ringsweep.errors import InputError
 from ringsweep.models import batch
 from ringsweep.numerics.expressions import derivative, evaluate
@@ -832,6 +833,11 @@ def in_a_process(script, folder):
 
 
 class TestLawsOfASession:
+    @pytest.fixture(autouse=True)
+    def no_law_outlives_its_test(self):
+        with patch.dict(friction.LAWS), patch.dict(friction._REGISTERED):
+            yield
+
     def test_law_is_usable_at_once_and_can_be_replaced(self):
         """As when a cell of a notebook is edited and run again."""
         first, second = {"mu_s": 0.4, "delta": 3.0}, {"mu_s": 0.4, "mu_k": 0.25, "alpha": 3.0}
