@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ringsweep.models.interface.shock import NoShocks, Unlocated
+from ringsweep.models.interface.shock import Unlocated
 from ringsweep.models.interface.status import BROKEN, COMPLETE, JAM, SEPARATED_1, SEPARATED_2
 from ringsweep.models.ring import record as record_module
 from ringsweep.quantities.flags import FAILED, JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
@@ -21,7 +21,7 @@ def outcome(phi, omega, status=COMPLETE, normal_1=1.0, normal_2=1.0, stuck_for=0
     """Outcome of a run through the states `phi` and `omega`."""
     record = begin((phi[0], omega[0], normal_1, normal_2, Unlocated()), EPSILON)
     for x, w in zip(phi[1:], omega[1:], strict=True):
-        record = observe(record, NoShocks(), stuck_for, (x, w, normal_1, normal_2, Unlocated()), EPSILON)
+        record = observe(record, Unlocated(), stuck_for, (x, w, normal_1, normal_2, Unlocated()), EPSILON)
     return conclude(record, status, float(len(phi) - 1), phi[-1], omega[-1])
 
 

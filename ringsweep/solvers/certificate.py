@@ -19,7 +19,7 @@ from ringsweep.quantities.flags import (
     NO_RESULT,
     NOT_FINITE,
 )
-from ringsweep.quantities.variables import OUTCOMES, POINTS
+from ringsweep.quantities.variables import OUTCOMES
 
 #: Outcomes on which two resolutions must agree for a certificate.
 _CERTIFIED = ("regime", "motion", "separating_contact", "aftermath", "word")
@@ -35,7 +35,7 @@ _MAY_LACK = (
     "jump_max",
     "t_jump_max",
     *tangent.OUTCOMES,
-    *POINTS,
+    *(name for name, variable in OUTCOMES.items() if "section" in variable.dims),
 )
 
 # Relative difference of two final states that rounding explains.
