@@ -136,7 +136,7 @@ def print_events(run: xr.Dataset) -> None:
     left_out = range(_FIRST, len(told) - _LAST)
     for row, k in enumerate(told.tolist()):
         if row == left_out.start and len(left_out) > 1:
-            print(f"  ... {len(left_out)} more, and the other kinds, are in the file")
+            print(f"  ... {len(left_out)} more{', and the other kinds,' if speeds else ''} are in the file")
         if row not in left_out or len(left_out) == 1:
             who = contacts[k].replace("contact_", " contact ").replace("both", " both contacts").replace("none", "")
             speed = f", {speeds[k]:.6g} m/s" if k in speeds else ""
