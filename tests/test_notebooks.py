@@ -12,8 +12,7 @@ from nbclient import NotebookClient
 FOLDER = Path(__file__).parents[1] / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 
-#: Grids of the notebooks, and smaller ones that the tests run in their place: text, and what replaces it. Belts get
-#: the parts that they lack with the value 0, for the kernels of :mod:`belts`, which other tests compile too.
+#: Grids of the notebooks, and smaller ones that the tests run in their place: text, and what replaces it.
 SMALLER = {
     "01-first-map": {
         "np.geomspace(1, 10, 64)": "np.geomspace(1, 10, 16)",
@@ -36,10 +35,6 @@ SMALLER = {
         "np.linspace(0.5, 17.5, 18)": "np.linspace(0.5, 17.5, 6)",
     },
     "06-literature": {
-        'return scene if force is None else scene | {"force": force}': (
-            'parts = {"spring": {"stiffness": 1, "cubic": 0}, "damper": {"coefficient": 0}, "force": force}\n'
-            "    return scene if force is None else scene | parts"
-        ),
         "np.linspace(0.52, 3, 80)": "np.linspace(0.52, 3, 20)",
         "np.linspace(0.01, 0.99, 60)": "np.linspace(0.01, 0.99, 12)",
         "np.geomspace(0.035, 1.2, 110)": "np.geomspace(0.035, 1.2, 22)",
@@ -51,9 +46,6 @@ SMALLER = {
         ),
     },
     "08-long-run": {
-        '"spring": {"stiffness": 1.0},\n    "damper"': '"spring": {"stiffness": 1.0, "cubic": 0.0},\n    "damper"',
-        '"spring": {"stiffness": 1.0},\n    "belt"': '"spring": {"stiffness": 1.0, "cubic": 0.0},\n    "belt"',
-        'del free["force"]': 'free["force"] = {"amplitude": 0.0, "frequency": 0.0}',
         '"linspace": [0.15, 0.4, 60]': '"linspace": [0.15, 0.4, 8]',
         "np.linspace(-1.95, 1.95, 40)": "np.linspace(-1.95, 1.95, 8)",
         "np.linspace(0.025, 1.975, 40)": "np.linspace(0.025, 1.975, 8)",
