@@ -10,7 +10,7 @@ A contact that has settled, or closes so slowly that its load keeps it closed, i
 contact give way in the impact of the other, but not rebound. Nothing here knows modes, a complementarity or Zeno's sum.
 
 Springs cannot tell a contact that holds from rebounds that are shorter than they ring. Each run has therefore two
-words: one counts a contact as closed as soon as it has settled, the other if it stays so for a while.
+words: one counts contacts that touch for an instant, the other those that stay closed for a while.
 """
 
 import math
@@ -32,9 +32,13 @@ SETTLED = 6.0
 SLOW = 3.0
 #: Duration of an impact, in rad of the springs, after which its contact has settled.
 LONGEST = 12.0
+#: Speed below which friction rises linearly, at most, in units of that which the load gives in an angle of 1 rad of the
+#: springs. A contact at rest creeps nearly as fast, for the whole run; a lower speed than this costs steps.
+CREEPING = 0.3
 #: Pauses between impacts in which a run of the springs is compared with one of the rigid body, and difference of their
-#: angular velocities, in units of the greatest one or of a fall, at which they have parted.
-LOOKED_AT, PARTED = 60, 0.05
+#: angular velocities, as a share of the greatest one up to then, at which they have parted. A body that has hardly
+#: moved yet counts as if it moved at this share of the speed of a fall.
+LOOKED_AT, PARTED, HARDLY = 60, 0.05, 0.01
 #: Time for which both contacts hold if they certainly do, in rad of the springs.
 LASTING = 100.0
 RTOL = 1e-4
@@ -60,7 +64,7 @@ def rattle(p, s, k, settled, slow, settling, lasting, v_rest, t, y, until, scale
     """Run from t to `until`; y is overwritten.
 
     Writes to `out`: the time of the end, steps, time with an open contact, greatest gap, greatest closing speed, number
-    of impacts, changes of order between instants at which both contacts have settled, the same between instants at
+    of impacts, changes of order between instants at which both contacts touch, the same between instants at
     which they have held for `lasting`, whether a contact is open at the end, and whether one was within `lasting`.
     """
     K, y_, found = np.zeros((7, 8)), np.zeros(8), np.zeros(6)
@@ -116,7 +120,7 @@ def rattle(p, s, k, settled, slow, settling, lasting, v_rest, t, y, until, scale
             out[2] += h
         if mode[0] != _CLOSED or mode[1] != _CLOSED:
             apart_at = t
-        elif n == 2:
+        if n == 2 and not apart:
             now = order(p, y)
             for i in range(2):
                 if i == 0 or t - apart_at > lasting:
@@ -141,7 +145,8 @@ def follow(p, t, depth):
     k = load / (depth * p.radius)
     frequency = math.sqrt(k / p.mass)
     until = p.span
-    v_rest = rest_speed(p, start, min(until, t + 0.1), load, frequency)
+    slow = load / p.mass / frequency
+    v_rest = min(CREEPING * slow, rest_speed(p, start, min(until, t + 0.1), load, frequency))
     if p.model == SINGLE:
         p = p._replace(inertia=1.0)
         outward = np.array([math.sin(start[1]), -math.cos(start[1])])
@@ -149,7 +154,6 @@ def follow(p, t, depth):
         y = np.array([*(p.radius + start[5] / k) * outward, 0.0, *start[2] * p.radius * turned, 0.0, 0.0, 0.0])
     else:
         y = place(p, start, k, k, v_rest)
-    slow = load / p.mass / frequency
     scale = depth * p.radius * np.array([1.0, 1.0, 1.0 / p.radius, *(frequency * np.array([1, 1, 1 / p.radius])), 1, 1])
     scale[6:] = 1.0
     s = damping(p.restitution) if p.restitution > 0.0 else math.inf
@@ -211,19 +215,19 @@ def parts_in_shared_impact(p, t, rigid, log):
     instants = np.concatenate(([t], log[log[:, 1] == HIT, 0], [p.span]))
     # Hundreds of small rebounds may lie between the impacts that matter.
     pauses = [(earlier, now) for earlier, now in pairwise(instants) if now - earlier >= 1e-4]
-    together = math.nan
+    together, fastest = math.nan, HARDLY * math.sqrt(p.gravity / p.radius)
     for earlier, now in pauses[:LOOKED_AT]:
         # Impacts of springs last for a while, and come a little sooner or later than those of the rigid body. Just
         # before an impact one of both bodies may have hit already; midway between two of them neither has.
-        if apart(p, t, rigid, 0.5 * (earlier + now)):
+        springs, found = speeds(p, t, rigid, 0.5 * (earlier + now))
+        fastest = max(fastest, abs(springs), abs(found))
+        if abs(springs - found) > PARTED * fastest:
             return together > t and rigid(together)["closed"] > 0
         # Just before the impact in which they may part.
         together = now - 0.02 * (now - earlier)
     return False
 
 
-def apart(p, t, rigid, until):
-    """Whether springs and the rigid body have different angular velocities at a time."""
-    run, found = follow(p._replace(span=until), max(0.0, t - 1e-4), DEPTHS[-1]), rigid(until)
-    scale = math.sqrt(p.gravity / p.radius) + max(abs(found["speed"]), abs(run["omega_end"]))
-    return abs(found["speed"] - run["omega_end"]) > PARTED * scale
+def speeds(p, t, rigid, until):
+    """Angular velocities of the body on springs and of the rigid one at a time, rad/s."""
+    return follow(p._replace(span=until), max(0.0, t - 1e-4), DEPTHS[-1])["omega_end"], rigid(until)["speed"]

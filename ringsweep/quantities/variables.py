@@ -187,7 +187,7 @@ OUTCOMES: dict[str, Variable] = {
         dtype="int8",
         flags=dict(enumerate(AFTERMATHS)),
         comment="held: no contact was lost; recovered: all contacts hold at the end, in their first order; open: a "
-        "contact is open at the end; tumbled: the contacts have changed their order",
+        "contact is open at the end; tumbled: the contacts have touched in the other order",
     ),
     "steps": Variable("1", "steps of the integration", dtype="int64"),
     "stiffness": Variable("1", "largest stiffness met: magnitude of the eigenvalue times the step"),

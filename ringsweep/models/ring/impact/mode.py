@@ -58,7 +58,7 @@ class Event(NamedTuple):
     time : float
         Time of the event, s.
     passed : int
-        1 if an impact closed all contacts, of which some opened at once; 2 if their order has changed; else 0.
+        1 if an impact closed all contacts, of which some opened at once; else 0.
     """
 
     kind: int
@@ -106,13 +106,8 @@ class Mode(NamedTuple):
 
 #: Event after which a contact comes to rest at another time.
 with_lasts = replacing("lasts")
-_with_passed = replacing("passed")
-
-
-@inlined
-def passing(event, turned):
-    """An impact that closes all contacts, of which some open at once."""
-    return _with_passed(event, 1 + turned)
+#: Event with another value of `passed`.
+with_passed = replacing("passed")
 
 
 @inlined

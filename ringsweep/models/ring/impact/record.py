@@ -26,7 +26,7 @@ class Lost(NamedTuple):
     Attributes
     ----------
     open, turned : float
-        Contacts that are open, and whether the order of the contacts has changed.
+        Contacts that are open, and whether the order in which all contacts last touched is another than at first.
     t_first, first, motion : float
         Time of the first loss, s, NaN if there was none, its contacts, and the motion up to it.
     number : float
@@ -157,8 +157,9 @@ def _after_event(scene, record, mode, t):
         lost = min(lost, 1.0)
     is_impact = event.kind in (REBOUNDS, CLOSES)
     recovers = mode.open == NONE and before != NONE
-    turned = float(event.passed - 1) if passes else float(mode.turned) if mode.open == NONE else r.turned
     hit = event.contact if is_impact else 0
+    # All contacts touch when those that were open hit, whatever they do afterwards.
+    turned = float(mode.turned) if is_impact and hit == r.open else r.turned
     code = float(1 + event.kind + 4 * (hit + 4 * (mode.open + 4 * (mode.turned + 2 * event.passed))))
     is_first = r.first == 0.0 and lost > 0.0
     found = Lost(

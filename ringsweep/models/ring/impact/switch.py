@@ -38,10 +38,10 @@ from ringsweep.models.ring.impact.mode import (
     in_flight,
     make,
     opens,
-    passing,
     place_of,
     ring_of,
     with_lasts,
+    with_passed,
     with_place,
     with_slip,
     with_zeros,
@@ -169,7 +169,7 @@ def _after_closed(scene, status, mode, t, y, zeros, is_new):
     """
     which, event = _separated(scene, status, mode.turned), mode.event
     if which != NONE:
-        lost = passing(event, mode.turned) if is_new else opens(which, event.number, t)
+        lost = with_passed(event, 1) if is_new else opens(which, event.number, t)
         return _opened(scene, t, y, mode, which, zeros, lost)
     return status, mode, (y[0], y[1], 0.0, 0.0, 0.0, 0.0, code_of(mode))
 
@@ -592,19 +592,18 @@ def _next(scene, t, motion, mode, impact, event):
         places = locate(scene.closed.surface, first.alpha - theta), places[1]
     if touched[1] and two:
         places = places[0], locate(scene.closed.surface, second.alpha - theta)
+    turned = mode.turned
+    if two and touched[0] and touched[1]:
+        ahead = second.sine * first.cosine - second.cosine * first.sine
+        turned = 1 if ahead < 0.0 else 0
     zeros = (1 if touched[0] and are_open[0] else 0), (1 if touched[1] and are_open[1] else 0)
     if are_open[0] and (are_open[1] or not two):
-        return RUNNING, in_flight(places, mode.turned, zeros, event), state_in_flight(motion, mode.turned)
+        return RUNNING, in_flight(places, turned, zeros, event), state_in_flight(motion, turned)
     if not two or not (are_open[0] or are_open[1]):
-        turned = 0
-        psi = motion.psi
-        if two:
-            ahead = second.sine * first.cosine - second.cosine * first.sine
-            turned = 1 if ahead < 0.0 else 0
         v = found.slip_1
         if two and (found.slip_2 == 0.0 or abs(found.slip_2) < abs(v)):
             v = found.slip_2
-        return _close(scene, t, psi, v, turned, event)
+        return _close(scene, t, motion.psi, v, turned, event)
     contact = 2 if are_open[0] else 1
     held, other_touched = (second, touched[0]) if contact == 2 else (first, touched[1])
     v = found.slip_2 if contact == 2 else found.slip_1
