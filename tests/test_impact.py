@@ -334,6 +334,27 @@ class TestBody:
         assert found.t_recovered.item() == pytest.approx(1.106471579, abs=1e-5)
         assert found.phi_end.item() == pytest.approx(-3.365267361, rel=1e-6)
 
+    def test_body_has_tumbled_once_a_contact_hits_beside_the_other_one_even_if_it_rebounds(self):
+        """A body on compliant contacts, ``benchmarks.reference.rattling``, lies on both of them soon afterwards."""
+        scene = BODY | {
+            "body": JUMPING["body"],
+            "zone": {"half_angle": 2.42694, "center": 2.80857},
+            "friction": {
+                "law": "stiction",
+                "rough": {"mu_s": 0.825201, "mu_k": 0.451686},
+                "rest": {"mu_s": 0.495015, "mu_k": 0.310563},
+            },
+            "drive": {"law": "arctan", "amplitude": -1.47684},
+            "initial": {"phi": -0.318961, "omega": 9.26745},
+            "impact": {"restitution": 0.277441},
+        }
+        found = ringsweep.sweep(scene, {"time.span": [1.69, 1.70, 1.74]}, progress=False)
+        assert ringsweep.words(found.aftermath).values.tolist() == ["open", "tumbled", "tumbled"]
+        assert found.impacts.values.tolist() == [0, 1, 2]
+        assert found.tumbles.values.tolist() == [0, 1, 1]
+        # Contact 2 holds throughout: both have not been closed again.
+        assert np.isnan(found.t_recovered.values).all()
+
     def test_reaction_that_changes_its_sign_through_infinity_jams_and_opens_no_contact(self):
         """The body pivots on a contact that would enter the race if it opened. The time is that of the reference."""
         scene = {
