@@ -269,6 +269,9 @@ SAMPLED: dict[str, Variable] = {
     "sobol_sums": Variable("1", "sums of which the Sobol indices are made"),
 }
 
+#: What a quantile, and the ends of its 95 % interval, are called, by the end of the name of their variable.
+QUANTILE_ENDS = {"": "quantile", "_low": "lower end of a quantile", "_high": "upper end of a quantile"}
+
 HISTORY: dict[str, Variable] = {
     "phi": Variable("rad", "angle of the body"),
     "omega": Variable("rad/s", "angular velocity of the body"),

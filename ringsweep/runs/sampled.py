@@ -23,7 +23,7 @@ from ringsweep.config.sampling import CENSORED, Sample, censored
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
 from ringsweep.quantities.flags import REGIMES
-from ringsweep.quantities.variables import SAMPLED, Variable
+from ringsweep.quantities.variables import QUANTILE_ENDS, SAMPLED, Variable
 from ringsweep.runs.cells import TaskResult, compute_task
 from ringsweep.statistics import (
     CONFIDENCE,
@@ -334,38 +334,40 @@ def coordinates(config: Config) -> dict[str, Any]:
     return found
 
 
-def variables(config: Config) -> dict[str, tuple[tuple[str, ...], Variable]]:
-    """Dimensions within a cell, and declaration, of each of the statistics."""
+def variables(config: Config) -> dict[str, Variable]:
+    """Declarations of the statistics; their dimensions are those within a cell."""
     sample = _sample(config)
-    found: dict[str, tuple[tuple[str, ...], Variable]] = {
-        "runs": (("replicate", "word", "certificate"), SAMPLED["runs"]),
-        **{name: (("word",), one) for name, one in SAMPLED.items() if name.startswith("probability")},
-    }
+    found = {"runs": replace(SAMPLED["runs"], dims=("replicate", "word", "certificate"))}
+    found |= _beginning_with("probability", ("word",))
     if sample.survival:
-        found["lost"] = ("replicate", "survival_time", "certificate"), SAMPLED["lost"]
-        found |= {name: (("survival_time",), one) for name, one in SAMPLED.items() if name.startswith("survival")}
+        found["lost"] = replace(SAMPLED["lost"], dims=("replicate", "survival_time", "certificate"))
+        found |= _beginning_with("survival", ("survival_time",))
     known = model_of(config.scene.structure).variables
     for name in sample.quantiles:
-        for end, of in {"": "quantile", "_low": "lower end of a quantile", "_high": "upper end of a quantile"}.items():
+        for end, of in QUANTILE_ENDS.items():
             about = f"{of}: {known[name].long_name}"
-            found[f"{name}_quantile{end}"] = ("quantile",), Variable(known[name].unit, about)
+            found[f"{name}_quantile{end}"] = Variable(known[name].unit, about, dims=("quantile",))
     if sample.sensitivity:
         kind = f"{sample.sensitivity}_sums"
-        measures = {name: one for name, one in SAMPLED.items() if name.startswith(f"{sample.sensitivity}_")}
-        del measures[kind]
-        found[kind] = ("replicate", "word", "sum"), SAMPLED[kind]
-        found |= {name: (("word", "parameter"), one) for name, one in measures.items()}
+        measures = _beginning_with(f"{sample.sensitivity}_", ("word", "parameter"))
+        sums = replace(measures.pop(kind), dims=("replicate", "word", "sum"))
+        found |= {kind: sums, **measures}
         for number in sample.sensitive:
             about = known[number].long_name
             times = ("survival_time",) if number in CENSORED else ()
-            found[f"{number}_{kind}"] = ("replicate", *times, "sum"), SAMPLED[kind]
+            found[f"{number}_{kind}"] = replace(sums, dims=("replicate", *times, "sum"))
             unit = "1" if sample.sensitivity == "sobol" or number in CENSORED else known[number].unit
             for name, one in measures.items():
                 text = one.long_name.replace("the indicator of each regime", about)
-                found[f"{number}_{name}"] = (*times, "parameter"), Variable(unit, text)
+                found[f"{number}_{name}"] = Variable(unit, text, dims=(*times, "parameter"))
     if sample.keep:
-        found |= {name: (("replicate", "sample"), one) for name, one in known.items() if name not in found}
+        found |= {name: replace(one, dims=("replicate", "sample")) for name, one in known.items() if name not in found}
     return found
+
+
+def _beginning_with(start: str, dims: tuple[str, ...]) -> dict[str, Variable]:
+    """Statistics whose names begin alike, with their dimensions within a cell."""
+    return {name: replace(one, dims=dims) for name, one in SAMPLED.items() if name.startswith(start)}
 
 
 def attributes(config: Config) -> dict[str, Any]:

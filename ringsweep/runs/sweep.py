@@ -23,7 +23,7 @@ from ringsweep.config.axes import dimension
 from ringsweep.config.follow import BOTH, DIRECTION
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
-from ringsweep.quantities.variables import INFERRED, OUTCOMES, error_attribute
+from ringsweep.quantities.variables import INFERRED, OUTCOMES, Variable, error_attribute
 from ringsweep.runs import sampled
 from ringsweep.runs.cells import TaskResult, compute_task
 from ringsweep.runs.executors import Execution, Executor, progress_bar, stop_on_interrupt
@@ -242,26 +242,20 @@ def compute(
 ) -> xr.Dataset:
     """Run a validated configuration in memory, with or without warnings about the results; see :func:`run`."""
     config, earlier = _earlier_sweep(config, reuse)
-    sizes = tuple(config.axes.sizes.values())
     layout = _layout(config, whole=True)
     if layout.total > MAX_CELLS_IN_MEMORY:
         raise InputError("sweep", f"{layout.total:.3g} cells do not fit into memory: name a file as output")
     check_room(config, layout.total // _parts_of_cell(config), None)
     store = MemoryStore(layout.total)
     found = _compute_cells(config, layout, store, earlier, execution)
+    columns = {name: column.reshape((*layout.sizes, *column.shape[1:])) for name, column in store.columns.items()}
     if config.sample is not None:
-        sums = {n: c.reshape(*layout.sizes, *c.shape[1:]) for n, c in store.columns.items()}
-        results = _sampled_dataset(config, sampled.statistics(config, sums))
-        if warn:
-            warn_of_sample(results, config)
-        return results
-    columns = {name: column.reshape((*sizes, *column.shape[1:])) for name, column in store.columns.items()}
-    results = _frame(config, found)
-    if found is not None and config.refine is not None:
-        complete(config.refine, found, tuple(slice(None) for _ in sizes), columns)
+        columns = sampled.statistics(config, columns)
+    elif found is not None and config.refine is not None:
+        complete(config.refine, found, tuple(slice(None) for _ in layout.sizes), columns)
         columns |= {name: with_nan(columns[name]) for name in gaps(columns)}
-    variables = model_of(config.scene.structure).variables
-    results = results.assign(
+    variables = _variables(config)
+    results = _frame(config, found).assign(
         {
             name: (
                 (*config.axes.sizes, *variables[name].dims),
@@ -272,7 +266,7 @@ def compute(
         }
     )
     if warn:
-        warn_of_results(results, config)
+        _warn(results, config)
     return results
 
 
@@ -284,12 +278,13 @@ def _layout(config: Config, whole: bool = False) -> Layout:
     return Layout(sizes, sizes if whole else None, 1 if section is None else section.keep)
 
 
-def _sampled_dataset(config: Config, columns: Mapping[str, NDArray[Any]]) -> xr.Dataset:
-    """Dataset of the statistics of all cells."""
-    dims, known = tuple(config.axes.sizes), sampled.variables(config)
-    return _frame(config, None).assign(
-        {name: ((*dims, *known[name][0]), column, known[name][1].attributes) for name, column in columns.items()}
-    )
+def _variables(config: Config) -> Mapping[str, Variable]:
+    """Declarations of the variables of a sweep."""
+    return model_of(config.scene.structure).variables if config.sample is None else sampled.variables(config)
+
+
+def _warn(results: xr.Dataset, config: Config) -> None:
+    (warn_of_results if config.sample is None else warn_of_sample)(results, config)
 
 
 def write(
@@ -329,8 +324,7 @@ def write(
                 raise
         checkpoint.clear()
     with netcdf.reading(target) as results:
-        warn = warn_of_results if config.sample is None else warn_of_sample
-        warn(results, config)
+        _warn(results, config)
     return computed
 
 
@@ -362,29 +356,20 @@ def _write_file(config: Config, target: Path, layout: Layout, checkpoint: Checkp
     """Write the file of a sweep whose cells are all in the checkpoint, but for those that were inferred."""
     frame = _frame(config, found)
     frame.attrs["processors"] = ", ".join(sorted(checkpoint.processors))
+    destination = target, checkpoint.working_folder, frame, _variables(config)
     if config.sample is not None:
-        known = sampled.variables(config)
         chunks = ((region[:-1], sampled.statistics(config, sums)) for region, sums in checkpoint.chunks())
-        netcdf.write(
-            *(target, checkpoint.working_folder, frame),
-            {name: variable for name, (_, variable) in known.items()},
-            sampled.grid_layout(config),
-            chunks,
-            within={name: dims for name, (dims, _) in known.items()},
-        )
-        return
-    variables = model_of(config.scene.structure).variables
-    if found is None or config.refine is None:
-        within = {name: variable.dims for name, variable in variables.items() if variable.dims}
-        netcdf.write(target, checkpoint.working_folder, frame, variables, layout, checkpoint.chunks(), within=within)
-        return
-    refine = config.refine
+        netcdf.write(*destination, sampled.grid_layout(config), chunks)
+    elif found is None or config.refine is None:
+        netcdf.write(*destination, layout, checkpoint.chunks())
+    else:
+        refine = config.refine
 
-    def fill(region: tuple[slice, ...], missing: NDArray[np.bool_], columns: dict[str, NDArray[Any]]) -> bool:
-        complete(refine, found, region, columns)
-        return not (missing & (found.origin[region] != INFERRED)).any()
+        def fill(region: tuple[slice, ...], missing: NDArray[np.bool_], columns: dict[str, NDArray[Any]]) -> bool:
+            complete(refine, found, region, columns)
+            return not (missing & (found.origin[region] != INFERRED)).any()
 
-    netcdf.write(target, checkpoint.working_folder, frame, variables, layout, checkpoint.chunks(fill), gaps(OUTCOMES))
+        netcdf.write(*destination, layout, checkpoint.chunks(fill), gaps(OUTCOMES))
 
 
 def _holds_sweep(target: Path, checkpoint: Checkpoint) -> bool:

@@ -19,7 +19,7 @@ from ringsweep.errors import InputError
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.quantity import after_number
 from ringsweep.quantities.units import quantity, show
-from ringsweep.quantities.variables import words
+from ringsweep.quantities.variables import QUANTILE_ENDS, words
 from ringsweep.runs.boundaries import located, word_in
 from ringsweep.runs.executors import Execution
 from ringsweep.runs.regime_words import check_word
@@ -241,13 +241,12 @@ def distribution(
     ends = quantiles(summaries, told.sum(axis=1), size, np.array(LEVELS), sample.independent)
     parameter = sweepable(config.scene)[path]
     about = parameter.attributes
-    names = {"": "quantile", "_low": "lower end of a quantile", "_high": "upper end of a quantile"}
     return xr.Dataset(
         {
             "threshold": (("replicate", "sample"), found, about | {"long_name": f"{path} at which {regime} begins"}),
             **{
                 f"threshold_quantile{end}": ("quantile", column, about | {"long_name": f"{name} of the threshold"})
-                for (end, name), column in zip(names.items(), ends, strict=True)
+                for (end, name), column in zip(QUANTILE_ENDS.items(), ends, strict=True)
             },
         },
         coords={"quantile": ("quantile", list(LEVELS), {"units": "1", "long_name": "level of the quantile"})},

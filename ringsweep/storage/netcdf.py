@@ -71,7 +71,6 @@ def write(
     layout: Layout,
     chunks: Iterable[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]],
     gaps: Collection[str] = (),
-    within: Mapping[str, tuple[str, ...]] = MappingProxyType({}),
 ) -> None:
     """Write the dataset of a sweep chunk by chunk, completely or not at all. Memory holds a few chunks at a time.
 
@@ -84,15 +83,13 @@ def write(
     frame : xarray.Dataset
         Coordinates and attributes.
     variables : mapping of str to Variable
-        Declarations of the columns.
+        Declarations of the columns; their dimensions are those besides the grid.
     layout : Layout
         Chunks of the grid.
     chunks : iterable of tuple
         Slices of each chunk in the grid, and its columns in the shape of the chunk.
     gaps : collection of str
         Columns of whole numbers in which `MISSING` stands for no value: xarray reads them as floats with NaN.
-    within : mapping of str to tuple of str
-        Dimensions that columns have besides those of the grid.
 
     Raises
     ------
@@ -104,7 +101,7 @@ def write(
         with _naming_the_cause(target):
             with _created(temporary) as file:
                 _add(frame, file)
-                _write_chunks(file, frame, variables, layout, chunks, gaps, within)
+                _write_chunks(file, frame, variables, layout, chunks, gaps)
             _read_back(temporary)
             trailer.seal(temporary)
             put_in_place(temporary, target)
@@ -161,7 +158,6 @@ def _write_chunks(
     layout: Layout,
     chunks: Iterable[tuple[tuple[slice, ...], dict[str, NDArray[Any]]]],
     gaps: Collection[str],
-    within: Mapping[str, tuple[str, ...]],
 ) -> None:
     """Add the columns and the digests to a file."""
     dims = tuple(map(str, frame.sizes))[: len(layout.sizes)]
@@ -172,10 +168,10 @@ def _write_chunks(
             if name not in digests:
                 fill = MISSING if name in gaps else False
                 inner = column.shape[len(dims) :]
-                for dim, size in zip(within.get(name, ()), inner, strict=True):
+                for dim, size in zip(variables[name].dims, inner, strict=True):
                     if dim not in file.dimensions:
                         file.createDimension(dim, size)
-                all_dims = (*dims, *within.get(name, ()))
+                all_dims = (*dims, *variables[name].dims)
                 variable = file.createVariable(name, column.dtype, all_dims, fill_value=fill, **_chunked(layout, inner))
                 variable.set_auto_maskandscale(False)
                 _cache_one_chunk(variable)
