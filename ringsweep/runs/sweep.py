@@ -7,7 +7,7 @@ import math
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from threading import Event
@@ -247,7 +247,7 @@ def compute(
         raise InputError("sweep", f"{layout.total:.3g} cells do not fit into memory: name a file as output")
     check_room(config, layout.total // _parts_of_cell(config), None)
     store = MemoryStore(layout.total)
-    found = _compute_cells(config, layout, store, earlier, execution)
+    found = _Work(config, layout, store, earlier, execution).compute()
     columns = {name: column.reshape((*layout.sizes, *column.shape[1:])) for name, column in store.columns.items()}
     if config.sample is not None:
         columns = sampled.statistics(config, columns)
@@ -311,7 +311,7 @@ def write(
         computed = fresh or not _holds_sweep(target, checkpoint)
         if computed:
             try:
-                _compute_file(config, target, layout, checkpoint, earlier, execution)
+                _compute_file(_Work(config, layout, checkpoint, earlier, execution), target, checkpoint)
             except BaseException as error:
                 with suppress(InputError, OSError):
                     checkpoint.keep()
@@ -336,20 +336,19 @@ def _parts(config: Config) -> str:
     return "cells" if config.sample is None else "replicates of cells"
 
 
-def _compute_file(config: Config, target: Path, layout: Layout, checkpoint: Checkpoint, *options: Any) -> None:
+def _compute_file(work: _Work, target: Path, checkpoint: Checkpoint) -> None:
     """Compute the cells that the checkpoint lacks, and write the file from it."""
+    config, layout = work.config, work.layout
     finished = int(checkpoint.done.sum())
     check_room(config, (layout.total - finished) // _parts_of_cell(config), target.parent)
     if finished:
         logger.info("going on: %d of %d %s are done", finished, layout.total, _parts(config))
-    found = _compute_cells(config, layout, checkpoint, *options)
     try:
-        _write_file(config, target, layout, checkpoint, found)
+        _write_file(config, target, layout, checkpoint, work.compute())
     except DamagedTask as damage:
         logger.warning("%s: the missing cells are computed again", damage)
         checkpoint.scan()
-        found = _compute_cells(config, layout, checkpoint, *options)
-        _write_file(config, target, layout, checkpoint, found)
+        _write_file(config, target, layout, checkpoint, work.compute())
 
 
 def _write_file(config: Config, target: Path, layout: Layout, checkpoint: Checkpoint, found: Refined | None) -> None:
@@ -417,116 +416,112 @@ class MemoryStore:
         self.done[positions] = True
 
 
-def _compute_cells(
-    config: Config,
-    layout: Layout,
-    store: Checkpoint | MemoryStore,
-    earlier: EarlierSweep | EarlierSample | None,
-    execution: Execution,
-) -> Refined | None:
-    """Compute the cells that the store lacks, task after task: every cell, or those that a refinement asks for."""
-    if config.refine is not None and not isinstance(earlier, EarlierSample):
-        return _refine_cells(config, layout, store, earlier, execution)
-    continued = earlier if isinstance(earlier, EarlierSample) else None
-    if isinstance(earlier, EarlierSweep):
-        _take_shared(config, layout, store, earlier, store.done)
-    if not store.done.all():
-        with _open_tasks(config, layout, store, execution, layout.total, continued) as tasks:
-            if config.follow is None:
-                tasks.run(divide_into_tasks(store.done, tasks.sizes, tasks.stopped))
-            else:
-                dim, orders = config.follow.chains(config.axes)
-                chain = orders.shape[1], list(config.axes.sizes).index(dim)
-                tasks.run(divide_into_chains(layout, *chain, store.done, tasks.sizes, tasks.stopped))
-            if not store.done.all():
-                raise KeyboardInterrupt
-    return None
+@dataclass(frozen=True)
+class _Work:
+    """A sweep, the store of its cells, and what fills the store.
 
-
-def _refine_cells(
-    config: Config,
-    layout: Layout,
-    store: Checkpoint | MemoryStore,
-    earlier: EarlierSweep | None,
-    execution: Execution,
-) -> Refined:
-    """Compute the cells that a refinement asks for."""
-    labels = KnownLabels(config, layout.total)
-    for positions, columns in store.finished():
-        labels.put(positions, dict(columns))
-    # Which cells an earlier sweep must give is known at the end: until then its labels are enough.
-    if earlier is not None:
-        for positions, columns in earlier.shared_cells(config, layout, labels.known, labels.names):
-            labels.put(positions, columns)
-    with _open_tasks(config, layout, store, execution, None) as tasks:
-        tasks.notice = labels.put
-
-        def run(cells: NDArray[np.intp]) -> None:
-            tasks.run(divide_cells(cells, tasks.sizes, tasks.stopped))
-            if not labels.known[cells].all():
-                raise KeyboardInterrupt
-
-        found = decide(config, layout, labels, run)
-    if earlier is not None:
-        needed = np.zeros(layout.total, dtype=bool)
-        needed[layout.positions(np.nonzero(found.origin != INFERRED))] = True
-        _take_shared(config, layout, store, earlier, store.done | ~needed)
-    return found
-
-
-def _take_shared(
-    config: Config,
-    layout: Layout,
-    store: Checkpoint | MemoryStore,
-    earlier: EarlierSweep,
-    done: NDArray[np.bool_],
-) -> None:
-    """Take the cells that are not done from an earlier sweep, as far as it has them."""
-    taken = 0
-    for positions, columns in earlier.shared_cells(config, layout, done):
-        store.put(positions, columns, earlier.processors)
-        taken += len(positions)
-    level = logging.INFO if taken else logging.WARNING
-    logger.log(level, "%d of %d cells are taken from %s", taken, layout.total, earlier.path)
-
-
-@contextmanager
-def _open_tasks(
-    config: Config,
-    layout: Layout,
-    store: Checkpoint | MemoryStore,
-    execution: Execution,
-    total: int | None,
-    continued: EarlierSample | None = None,
-) -> Iterator[_Tasks]:
-    """Tasks that compute cells of a sweep.
-
-    `total` is the number of its cells, if all of them are computed. `continued` is the sampled sweep with fewer points
-    that goes on.
+    Attributes
+    ----------
+    config : Config
+    layout : Layout
+        Order of the cells, or of the parts of the cells of a sampled sweep.
+    store : Checkpoint or MemoryStore
+    earlier : EarlierSweep or EarlierSample, optional
+        Sweep whose cells are taken, or sampled sweep with fewer points that goes on.
+    execution : Execution
     """
 
-    def under_way() -> str:
-        learnt = not math.isnan(sizes.seconds_per_cell)
-        return "the tasks under way are done" if learnt else "compilation and the first cells are done"
+    config: Config
+    layout: Layout
+    store: Checkpoint | MemoryStore
+    earlier: EarlierSweep | EarlierSample | None
+    execution: Execution
 
-    with execution.open() as workers:
-        sizes = TaskSizes(1 if config.sample else config.solver.side_by_side, workers.concurrency)
-        # What is in memory is lost anyway: there the first Ctrl-C ends the sweep.
-        stopping = stop_on_interrupt(under_way) if isinstance(store, Checkpoint) else nullcontext(Event())
-        with stopping as stopped, progress_bar(total, execution.progress, int(store.done.sum())) as bar:
-            # Other processes get it with every task: points as they were written are long.
-            task: Callable[..., TaskResult] = partial(compute_task, replace(config, source={}), layout)
-            if config.sample is not None:
-                task = partial(sampled.compute_parts, replace(config, source={}), layout, continued)
-            tasks = _Tasks(task, store, workers, sizes, stopped, bar)
-            try:
-                yield tasks
-            finally:
-                tasks.store_waiting()
+    def compute(self) -> Refined | None:
+        """Compute the cells that the store lacks, task after task: every cell, or those that a refinement asks for."""
+        if self.config.refine is not None:
+            return self._refine()
+        self._take_shared(self.store.done)
+        if not self.store.done.all():
+            with self._open_tasks(self.layout.total) as tasks:
+                tasks.run(self._divided(tasks))
+                if not self.store.done.all():
+                    raise KeyboardInterrupt
+        return None
+
+    def _divided(self, tasks: _Tasks) -> Iterator[NDArray[np.integer]]:
+        """Cells of one task after another."""
+        config, done = self.config, self.store.done
+        if config.follow is None:
+            return divide_into_tasks(done, tasks.sizes, tasks.stopped)
+        dim, orders = config.follow.chains(config.axes)
+        chain = orders.shape[1], list(config.axes.sizes).index(dim)
+        return divide_into_chains(self.layout, *chain, done, tasks.sizes, tasks.stopped)
+
+    def _refine(self) -> Refined:
+        """Compute the cells that a refinement asks for."""
+        labels = KnownLabels(self.config, self.layout.total)
+        for positions, columns in self.store.finished():
+            labels.put(positions, dict(columns))
+        # Which cells an earlier sweep must give is known at the end: until then its labels are enough.
+        if isinstance(self.earlier, EarlierSweep):
+            for positions, columns in self.earlier.shared_cells(self.config, self.layout, labels.known, labels.names):
+                labels.put(positions, columns)
+        with self._open_tasks(None) as tasks:
+            tasks.notice = labels.put
+
+            def run(cells: NDArray[np.intp]) -> None:
+                tasks.run(divide_cells(cells, tasks.sizes, tasks.stopped))
+                if not labels.known[cells].all():
+                    raise KeyboardInterrupt
+
+            found = decide(self.config, self.layout, labels, run)
+        if self.earlier is not None:
+            needed = np.zeros(self.layout.total, dtype=bool)
+            needed[self.layout.positions(np.nonzero(found.origin != INFERRED))] = True
+            self._take_shared(self.store.done | ~needed)
+        return found
+
+    def _take_shared(self, done: NDArray[np.bool_]) -> None:
+        """Take the cells that are not done from the earlier sweep, as far as there is one that has them."""
+        if not isinstance(self.earlier, EarlierSweep):
+            return
+        taken = 0
+        for positions, columns in self.earlier.shared_cells(self.config, self.layout, done):
+            self.store.put(positions, columns, self.earlier.processors)
+            taken += len(positions)
+        level = logging.INFO if taken else logging.WARNING
+        logger.log(level, "%d of %d cells are taken from %s", taken, self.layout.total, self.earlier.path)
+
+    @contextmanager
+    def _open_tasks(self, total: int | None) -> Iterator[_Tasks]:
+        """Tasks that compute cells; `total` is the number of all, if all of them are computed."""
+
+        def under_way() -> str:
+            learnt = not math.isnan(sizes.seconds_per_cell)
+            return "the tasks under way are done" if learnt else "compilation and the first cells are done"
+
+        config, store, execution = self.config, self.store, self.execution
+        with execution.open() as workers:
+            sizes = TaskSizes(1 if config.sample else config.solver.side_by_side, workers.concurrency)
+            # What is in memory is lost anyway: there the first Ctrl-C ends the sweep.
+            stopping = stop_on_interrupt(under_way) if isinstance(store, Checkpoint) else nullcontext(Event())
+            with stopping as stopped, progress_bar(total, execution.progress, int(store.done.sum())) as bar:
+                # Other processes get it with every task: points as they were written are long.
+                sent = replace(config, source={})
+                task: Callable[..., TaskResult] = partial(compute_task, sent, self.layout)
+                if config.sample is not None:
+                    goes_on = self.earlier if isinstance(self.earlier, EarlierSample) else None
+                    task = partial(sampled.compute_parts, sent, self.layout, goes_on)
+                tasks = _Tasks(task, store, workers, sizes, stopped, bar)
+                try:
+                    yield tasks
+                finally:
+                    tasks.store_waiting()
 
 
 class _Tasks:
-    """Runs tasks and stores their results; made by :func:`_open_tasks`.
+    """Runs tasks and stores their results; made by :class:`_Work`.
 
     Attributes
     ----------
