@@ -11,30 +11,30 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from ringsweep.plots.fits import fit
+from ringsweep.plots.histories import history, history_panel
+from ringsweep.plots.maps import map_panel, regime_map
+from ringsweep.plots.page import save_page
+from ringsweep.plots.precision import precision_panel, work_precision
+from ringsweep.plots.probability import probability_panel, sensitivity_panel, survival_panel
 from ringsweep.plots.saving import SUFFIXES, save
+from ringsweep.plots.sections import (
+    bifurcation,
+    bifurcation_panel,
+    exponent_panel,
+    multiplier_circle,
+    multiplier_panel,
+    section_panel,
+)
+from ringsweep.plots.selection import cell
 from ringsweep.plots.style import REGIME_COLOURS, style
 
 if TYPE_CHECKING:
     from ringsweep.plots.films import animation, save_animation
-    from ringsweep.plots.fits import fit
-    from ringsweep.plots.histories import history, history_panel
     from ringsweep.plots.interactive import explore
     from ringsweep.plots.loops import friction_loop
-    from ringsweep.plots.maps import map_panel, regime_map
-    from ringsweep.plots.page import save_page
     from ringsweep.plots.phase import phase_portrait
     from ringsweep.plots.polar import polar_view
-    from ringsweep.plots.precision import precision_panel, work_precision
-    from ringsweep.plots.probability import probability_panel, sensitivity_panel, survival_panel
-    from ringsweep.plots.sections import (
-        bifurcation,
-        bifurcation_panel,
-        exponent_panel,
-        multiplier_circle,
-        multiplier_panel,
-        section_panel,
-    )
-    from ringsweep.plots.selection import cell
 
 __all__ = [
     "REGIME_COLOURS",
@@ -67,40 +67,22 @@ __all__ = [
     "work_precision",
 ]
 
-_MODULES = {
-    "regime_map": "maps",
-    "map_panel": "maps",
-    "history": "histories",
-    "history_panel": "histories",
-    "work_precision": "precision",
-    "precision_panel": "precision",
-    "probability_panel": "probability",
-    "survival_panel": "probability",
-    "sensitivity_panel": "probability",
-    "fit": "fits",
-    "bifurcation": "sections",
-    "bifurcation_panel": "sections",
-    "section_panel": "sections",
-    "exponent_panel": "sections",
-    "multiplier_panel": "sections",
-    "multiplier_circle": "sections",
-    "phase_portrait": "phase",
-    "friction_loop": "loops",
-    "polar_view": "polar",
+# Modules that need the models, which are slow to import: a map does not wait for them.
+_SLOW = {
     "animation": "films",
-    "save_animation": "films",
-    "save_page": "page",
-    "cell": "selection",
     "explore": "interactive",
+    "friction_loop": "loops",
+    "phase_portrait": "phase",
+    "polar_view": "polar",
+    "save_animation": "films",
 }
 
 
 def __getattr__(name: str) -> Any:
-    # A map needs neither the geometry of the ring nor the writers of animations, which are slow to import.
-    if name in _MODULES:
-        return getattr(import_module(f"ringsweep.plots.{_MODULES[name]}"), name)
+    if name in _SLOW:
+        return getattr(import_module(f"ringsweep.plots.{_SLOW[name]}"), name)
     raise AttributeError(f"module 'ringsweep.plots' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return [*globals(), *_MODULES]
+    return [*globals(), *_SLOW]
