@@ -14,11 +14,12 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from ringsweep.config import load
-from ringsweep.plots.datasets import configuration, mode_name
+from ringsweep.plots.datasets import mode_name
 from ringsweep.plots.labels import number_text
 from ringsweep.plots.phase import draw_belt_portrait
 from ringsweep.plots.polar import reference_force, round_down
 from ringsweep.plots.style import PAIR_COLOURS, REST, SMALL, on_page, page_colour
+from ringsweep.quantities.variables import configuration_of
 
 # Heights in the picture, where the body stands on the belt at 0.
 _BODY, _SPRING, _BELT, _ARROW = 0.5, 0.25, -0.18, 0.08
@@ -59,7 +60,7 @@ class BeltArtists:
         ax.add_patch(Rectangle((left, 0.0), self.wall - left, 0.7, facecolor=on_page("0.8"), **fixed))
         (self.marks,) = ax.plot([], [], color=on_page("0.2"), linewidth=1.4, zorder=2)
         (self.spring,) = ax.plot([], [], color=on_page("0.3"), linewidth=1.2, zorder=3)
-        scene = load(configuration(run)).scene
+        scene = load(configuration_of(run)).scene
         if any(value for path, value in scene.values.items() if path.startswith("spring.")):
             ax.plot([0.0, 0.0], [0.0, 0.66], color=on_page("0.5"), linewidth=0.8, linestyle=":", zorder=1)
             ax.text(0.0, 0.68, "spring relaxed", ha="center", va="bottom", fontsize=SMALL, color=on_page("0.35"))

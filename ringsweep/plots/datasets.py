@@ -5,7 +5,6 @@ A dataset made by hand has no attributes. So names of dimensions and variables d
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from itertools import chain
 from typing import Any
@@ -15,7 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError, nearest_name
-from ringsweep.quantities.variables import HISTORY, MODES
+from ringsweep.quantities.variables import HISTORY, MODES, configuration_of, swept
 
 #: Panels of a history by the variable that says where the body is: ``phi`` in a ring, ``x`` on a belt.
 #: Variables of one tuple share a panel.
@@ -204,35 +203,22 @@ def present(ds: xr.Dataset, names: Iterable[str]) -> list[str]:
     return [name for name in names if name in ds]
 
 
-def swept(ds: xr.Dataset) -> list[xr.DataArray]:
-    """Coordinates that stand for paths of the configuration."""
-    return [coordinate for coordinate in ds.coords.values() if "path" in coordinate.attrs]
-
-
 def is_numeric(data: xr.DataArray) -> bool:
     """Whether the values are numbers; names of friction laws are not."""
     return data.dtype.kind in "iuf"
 
 
-def configuration(ds: xr.Dataset) -> dict[str, Any]:
-    """The configuration that a dataset was made from.
-
-    Raises
-    ------
-    InputError
-        If the dataset has no attribute ``configuration``.
-    """
-    if "configuration" not in ds.attrs:
-        raise InputError("ds", "has no attribute configuration, so its scene is not known")
-    return dict(json.loads(ds.attrs["configuration"]))
+def numeric_names(ds: xr.Dataset) -> list[str]:
+    """Names of the variables that are numbers."""
+    return [str(name) for name, data in ds.data_vars.items() if is_numeric(data)]
 
 
 def scene_text(ds: xr.Dataset) -> list[str]:
     """What a picture says of the scene, as the user wrote it: law, drive, zone, belt, span, if they were not swept."""
     if "configuration" not in ds.attrs:
         return []
-    scene = configuration(ds).get("scene", {})
-    swept_here = {str(c.attrs["path"]) for c in ds.coords.values() if "path" in c.attrs}
+    scene = configuration_of(ds).get("scene", {})
+    swept_here = {str(c.attrs["path"]) for c in swept(ds)}
     found = []
     for path, before, after in _TOLD:
         section, _, key = path.partition(".")

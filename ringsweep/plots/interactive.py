@@ -16,13 +16,13 @@ from matplotlib.backends import BackendFilter, backend_registry
 from matplotlib.figure import Figure
 
 from ringsweep.errors import InputError
-from ringsweep.plots.datasets import is_sampled, swept
+from ringsweep.plots.datasets import is_sampled
 from ringsweep.plots.histories import draw_history
 from ringsweep.plots.labels import axis_label, displayed, number_text, plain_text, value_text
 from ringsweep.plots.maps import Map
 from ringsweep.plots.selection import cell, select
 from ringsweep.plots.style import SMALL
-from ringsweep.quantities.variables import words
+from ringsweep.quantities.variables import swept, words
 from ringsweep.runs import simulate
 
 # Inches. A notebook is some thousand pixels wide. The toolbar of a notebook lies on this part of the figure.

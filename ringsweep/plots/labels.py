@@ -11,10 +11,11 @@ import xarray as xr
 from matplotlib.axis import Axis
 
 from ringsweep.errors import InputError
-from ringsweep.plots.datasets import configuration, is_numeric, resolve, swept
+from ringsweep.plots.datasets import is_numeric, resolve
 from ringsweep.plots.style import angle_unit
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import NUMBER, quantity
+from ringsweep.quantities.variables import configuration_of, swept
 
 MINUS = "\N{MINUS SIGN}"
 TIMES = "\N{MULTIPLICATION SIGN}"
@@ -78,7 +79,7 @@ def in_units(ds: xr.Dataset, units: Mapping[str, str] | None = None) -> xr.Datas
     """
     ds = ds.copy()
     if "configuration" in ds.attrs:
-        source = configuration(ds)
+        source = configuration_of(ds)
         for coordinate in swept(ds):
             unit = _written_unit(source, str(coordinate.attrs["path"]))
             if unit and is_numeric(coordinate) and coordinate.attrs.get("units") != "rad":

@@ -14,7 +14,8 @@ from ringsweep.config import load
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
 from ringsweep.physics import ring
-from ringsweep.plots.datasets import configuration, on_ring, open_contacts, phases, require_history, require_one_run
+from ringsweep.plots.datasets import on_ring, open_contacts, phases, require_history, require_one_run
+from ringsweep.quantities.variables import configuration_of
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ class Rig:
     @classmethod
     def of(cls, ds: xr.Dataset) -> Rig:
         """Measures of the scene in the attribute ``configuration`` of a dataset."""
-        scene = load(configuration(ds)).scene
+        scene = load(configuration_of(ds)).scene
         model: Any = model_of(scene.structure)
         bodies = model.build_body({path: np.array([value]) for path, value in scene.values.items()})
         body = take(ring.completed(bodies), 0)

@@ -10,10 +10,11 @@ import numpy as np
 import xarray as xr
 
 from ringsweep.errors import InputError
-from ringsweep.plots.datasets import configuration, is_numeric, resolve, swept
+from ringsweep.plots.datasets import is_numeric, resolve
 from ringsweep.plots.labels import amount_text, long_name, plain_text, value_text
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity
+from ringsweep.quantities.variables import configuration_of, swept
 
 logger = logging.getLogger("ringsweep")
 
@@ -52,7 +53,7 @@ def cell(ds: xr.Dataset, sel: Mapping[str, float | str] | None = None) -> dict[s
     from ringsweep.config import with_values
 
     ds, _ = select(ds.drop_dims("section", errors="ignore"), sel or {})
-    if configuration(ds).get("sweep", {}).get("follow"):
+    if configuration_of(ds).get("sweep", {}).get("follow"):
         raise InputError(
             "ds", "follows an axis: a cell starts from the end of the one before, not from its configuration"
         )
@@ -60,7 +61,7 @@ def cell(ds: xr.Dataset, sel: Mapping[str, float | str] | None = None) -> dict[s
         left = ", ".join(f"{dim} ({size})" for dim, size in ds.sizes.items())
         raise InputError("sel", f"one cell is wanted, but {left} is left: hold it too")
     settings = [(coordinate.attrs["path"], coordinate.item()) for coordinate in swept(ds)]
-    return with_values(configuration(ds), settings).source
+    return with_values(configuration_of(ds), settings).source
 
 
 def select(ds: xr.Dataset, sel: Mapping[str, float | str]) -> tuple[xr.Dataset, list[str]]:

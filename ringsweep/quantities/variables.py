@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -388,3 +389,21 @@ def words(data: xr.DataArray) -> xr.DataArray:
     found = data.copy(data=text)
     found.attrs = {}
     return found
+
+
+def swept(ds: xr.Dataset) -> list[xr.DataArray]:
+    """Coordinates that stand for paths of the configuration."""
+    return [coordinate for coordinate in ds.coords.values() if "path" in coordinate.attrs]
+
+
+def configuration_of(ds: xr.Dataset) -> dict[str, Any]:
+    """The configuration that a dataset was made from.
+
+    Raises
+    ------
+    InputError
+        If the dataset has no attribute ``configuration``.
+    """
+    if "configuration" not in ds.attrs:
+        raise InputError("ds", "has no attribute configuration, so its scene is not known")
+    return dict(json.loads(ds.attrs["configuration"]))

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -17,7 +16,7 @@ from ringsweep.config.sections import suggestion
 from ringsweep.errors import InputError
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity, show
-from ringsweep.quantities.variables import INFERRED, meanings_of
+from ringsweep.quantities.variables import INFERRED, configuration_of, meanings_of, swept
 from ringsweep.runs.executors import Execution
 from ringsweep.runs.regime_words import check_word
 from ringsweep.runs.sweep import compute
@@ -74,11 +73,8 @@ def boundary(ds: xr.Dataset, regime: str, tolerance: float = 1e-6, *, jobs: int 
     >>> bool((found.error <= 1e-3).all())
     True
     """
-    label, _, _ = _checked(ds, regime)
     tolerance = quantity(tolerance, _TOLERANCE, "tolerance")
-    configuration = _config(ds)
-    check_word(regime, configuration.scene, configuration.axes.columns)
-    _check_cells(ds, label, configuration, jobs)
+    configuration = _checked_configuration(ds, regime, jobs)
     return located(ds, regime, configuration, tolerance, jobs=jobs)
 
 
@@ -93,7 +89,7 @@ def located(ds: xr.Dataset, regime: str, configuration: Config, tolerance: float
     axis = np.repeat(np.arange(len(dims)), [len(one) for one, _ in sides])
     if not len(low):
         logger.warning("no boundary of %s: no two neighbouring certified cells differ in it", regime)
-    columns = {str(name): c for name, c in ds.coords.items() if "path" in c.attrs}
+    columns = {str(c.name): c for c in swept(ds)}
     place = {name: _values(c, dims, low) for name, c in columns.items()}
     ends = np.zeros((2, len(low)))
     for k, dim in enumerate(dims):
@@ -101,27 +97,19 @@ def located(ds: xr.Dataset, regime: str, configuration: Config, tolerance: float
         ends[:, axis == k] = along[low[axis == k, k]], along[high[axis == k, k]]
     within = inside[tuple(low.T)]
     beyond = ds[label].values[tuple(np.where(within[:, None], high, low).T)].copy()
-    open_ = np.ones(len(low), dtype=bool)
-    while True:
-        middle = 0.5 * (ends[0] + ends[1])
-        open_ &= np.abs(ends[1] - ends[0]) > 2.0 * tolerance
-        open_ &= (middle != ends[0]) & (middle != ends[1])
-        if not open_.any():
-            break
-        values = {
-            name: np.where(axis == dims.index(name), middle, column)[open_] if name in dims else column[open_]
-            for name, column in place.items()
-        }
+
+    def run(which: NDArray[np.intp], at: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        values = {name: column[which] for name, column in place.items()}
+        for k, dim in enumerate(dims):
+            values[dim] = np.where(axis[which] == k, at, values[dim])
         found = _run(configuration, {columns[name].attrs["path"]: column for name, column in values.items()}, jobs)
         certified = (found["certified"].values == 1) | (not configuration.certifies)
         here = found[label].values == flag
-        which = np.flatnonzero(open_)
-        side = (here == within[which]) & certified
-        other = (here != within[which]) & certified
-        ends[0, which[side]], ends[1, which[other]] = middle[which[side]], middle[which[other]]
         outside = ~here & certified
         beyond[which[outside]] = found[label].values[outside]
-        open_[which[~(side | other)]] = False
+        return here == within[which], certified
+
+    bisect(ends, tolerance, run)
     for k, dim in enumerate(dims):
         place[dim] = np.where(axis == k, 0.5 * (ends[0] + ends[1]), place[dim])
     order, line = _joined(low, axis, ds[label].shape)
@@ -139,6 +127,38 @@ def located(ds: xr.Dataset, regime: str, configuration: Config, tolerance: float
         coords={name: ("vertex", column[order], columns[name].attrs) for name, column in place.items()},
         attrs={**ds.attrs, "boundary_of": regime, "boundary_tolerance": tolerance},
     )
+
+
+def bisect(
+    ends: NDArray[np.float64],
+    tolerance: float,
+    run: Callable[[NDArray[np.intp], NDArray[np.float64]], tuple[NDArray[np.bool_], NDArray[np.bool_]]],
+    only: NDArray[np.bool_] | None = None,
+) -> None:
+    """Halve intervals until the middle of each is within the tolerance, or a run in it is not certified.
+
+    Parameters
+    ----------
+    ends : ndarray of shape ``(2, intervals)``
+        Ends of the intervals, which move.
+    tolerance : float
+    run : callable
+        Takes numbers of intervals and a value in each; returns whether what it finds there is as at the first end, and
+        whether that is certified.
+    only : ndarray of bool, shape ``(intervals,)``, optional
+        Intervals that are halved; all by default.
+    """
+    left = np.ones(ends.shape[1], dtype=bool) if only is None else only.copy()
+    while True:
+        middle = 0.5 * (ends[0] + ends[1])
+        left &= (np.abs(ends[1] - ends[0]) > 2.0 * tolerance) & (middle != ends[0]) & (middle != ends[1])
+        which = np.flatnonzero(left)
+        if not len(which):
+            return
+        first, certified = run(which, middle[which])
+        for end, moves in enumerate((first & certified, ~first & certified)):
+            ends[end, which[moves]] = middle[which[moves]]
+        left[which[~certified]] = False
 
 
 def run_at(ds: xr.Dataset, held: Mapping[str, float], regime: str, *, jobs: int | None = None) -> xr.Dataset:
@@ -165,14 +185,12 @@ def run_at(ds: xr.Dataset, held: Mapping[str, float], regime: str, *, jobs: int 
     InputError
         As for :func:`boundary`.
     """
-    label, _, dims = _checked(ds, regime)
-    configuration = _config(ds)
-    check_word(regime, configuration.scene, configuration.axes.columns)
-    _check_cells(ds, label, configuration, jobs)
-    columns = {str(name): c for name, c in ds.coords.items() if "path" in c.attrs}
+    _checked_configuration(ds, regime, jobs)
+    _, _, dims = _checked(ds, regime)
+    columns = {str(c.name): c for c in swept(ds)}
     fixed = {name: held.get(name, c.item()) for name, c in columns.items() if name not in dims}
     values = {dim: columns[dim].values.tolist() for dim in dims} | {name: [value] for name, value in fixed.items()}
-    source = json.loads(ds.attrs["configuration"])
+    source = configuration_of(ds)
     sweep: dict[str, Any] = {"grid": {columns[name].attrs["path"]: along for name, along in values.items()}}
     if refine := source["sweep"].get("refine"):
         # Along the axes that are left, whichever were named.
@@ -205,21 +223,21 @@ def _checked(ds: xr.Dataset, regime: str) -> tuple[str, int, list[str]]:
         raise InputError("ds", "is no sweep: it has no regimes")
     label, flag = word_in(ds, regime)
     dims = [str(dim) for dim in ds["regime"].dims]
-    swept = [dim for dim in dims if dim in ds.coords and "path" in ds[dim].attrs and ds[dim].dtype.kind == "f"]
-    if dims != swept or not 1 <= len(dims) <= 2:
+    numeric = {c.name for c in swept(ds) if c.dtype.kind == "f"}
+    if not numeric.issuperset(dims) or not 1 <= len(dims) <= 2:
         raise InputError(
             "ds", f"has the dimensions {', '.join(dims) or 'none'}: one or two axes of numbers are needed; hold others"
         )
-    for name, coordinate in ds.coords.items():
-        if "path" in coordinate.attrs and name not in dims and coordinate.dims:
-            along = ", ".join(map(str, coordinate.dims))
-            raise InputError("ds", f"{name} varies along {along}: a boundary needs axes along which one number varies")
+    for coordinate in swept(ds):
+        if coordinate.name not in dims and coordinate.dims:
+            along, what = ", ".join(map(str, coordinate.dims)), coordinate.name
+            raise InputError("ds", f"{what} varies along {along}: a boundary needs axes along which one number varies")
     return label, flag, dims
 
 
 def _check_cells(ds: xr.Dataset, label: str, config: Config, jobs: int | None) -> None:
     """Refuse a dataset whose cells are not those of its configuration: bisection would run another scene."""
-    known = {str(c.attrs["path"]): c for c in ds.coords.values() if "path" in c.attrs}
+    known = {str(c.attrs["path"]): c for c in swept(ds)}
     for path, (_, column) in config.axes.columns.items():
         if path not in known:
             raise InputError("ds", f"has no coordinate for {path}, which its sweep varies: do not drop it")
@@ -259,10 +277,13 @@ def _values(coordinate: xr.DataArray, dims: list[str], cells: NDArray[np.intp]) 
     return np.array(np.broadcast_to(coordinate.values[index], len(cells)))
 
 
-def _config(ds: xr.Dataset) -> Config:
-    if "configuration" not in ds.attrs:
-        raise InputError("ds", "has no attribute configuration, so its scene is not known")
-    return load(json.loads(ds.attrs["configuration"]))
+def _checked_configuration(ds: xr.Dataset, regime: str, jobs: int | None) -> Config:
+    """Configuration of a map. Refuses a regime that it cannot have, and cells that are not those of its runs."""
+    label, _, _ = _checked(ds, regime)
+    config = load(configuration_of(ds))
+    check_word(regime, config.scene, config.axes.columns)
+    _check_cells(ds, label, config, jobs)
+    return config
 
 
 def _run(config: Config, values: dict[str, NDArray[Any]], jobs: int | None) -> xr.Dataset:

@@ -20,7 +20,7 @@ from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.quantity import after_number
 from ringsweep.quantities.units import quantity, show
 from ringsweep.quantities.variables import QUANTILE_ENDS, words
-from ringsweep.runs.boundaries import located, word_in
+from ringsweep.runs.boundaries import bisect, located, word_in
 from ringsweep.runs.executors import Execution
 from ringsweep.runs.regime_words import check_word
 from ringsweep.runs.sweep import compute
@@ -222,23 +222,18 @@ def distribution(
     known = np.logical_and.reduce(sure | (np.arange(len(values)) >= deciding[:, None]), axis=1)
     found: NDArray[np.float64] = np.where(never, np.inf, np.where(begins == 0, -np.inf, 0.0))
     inner = (found == 0.0) & known
-    low, high = values[np.maximum(begins - 1, 0)], values[begins]
-    open_ = inner.copy()
-    while True:
-        middle = 0.5 * (low + high)
-        open_ &= (high - low > 2.0 * tolerance) & (middle != low) & (middle != high)
-        if not open_.any():
-            break
-        which = np.flatnonzero(open_)
-        here, certain = runs(which, middle[which])
-        low[which[~here & certain]] = middle[which[~here & certain]]
-        high[which[here & certain]] = middle[which[here & certain]]
+    ends = values[np.stack([np.maximum(begins - 1, 0), begins])]
+
+    def run(which: NDArray[np.intp], at: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        here, certain = runs(which, at)
         known[which[~certain]] = False
-        open_[which[~certain]] = False
-    found = np.where(known, np.where(inner, 0.5 * (low + high), found), np.nan).reshape(sample.replicates, size)
+        return ~here, certain
+
+    bisect(ends, tolerance, run, inner)
+    found = np.where(known, np.where(inner, 0.5 * (ends[0] + ends[1]), found), np.nan).reshape(sample.replicates, size)
     told = known.reshape(found.shape)
     summaries = np.stack([summarised(row[own]) for row, own in zip(found, told, strict=True)])
-    ends = quantiles(summaries, told.sum(axis=1), size, np.array(LEVELS), sample.independent)
+    columns = quantiles(summaries, told.sum(axis=1), size, np.array(LEVELS), sample.independent)
     parameter = sweepable(config.scene)[path]
     about = parameter.attributes
     return xr.Dataset(
@@ -246,7 +241,7 @@ def distribution(
             "threshold": (("replicate", "sample"), found, about | {"long_name": f"{path} at which {regime} begins"}),
             **{
                 f"threshold_quantile{end}": ("quantile", column, about | {"long_name": f"{name} of the threshold"})
-                for (end, name), column in zip(QUANTILE_ENDS.items(), ends, strict=True)
+                for (end, name), column in zip(QUANTILE_ENDS.items(), columns, strict=True)
             },
         },
         coords={"quantile": ("quantile", list(LEVELS), {"units": "1", "long_name": "level of the quantile"})},
