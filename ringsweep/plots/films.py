@@ -30,7 +30,7 @@ from ringsweep.plots.labels import axis_label
 from ringsweep.plots.polar import RingArtists, states_at
 from ringsweep.plots.rig import belt_history, ring_history
 from ringsweep.plots.saving import suffix_of
-from ringsweep.plots.style import SMALL, folded, on_page, page_colour
+from ringsweep.plots.style import LEGEND, SMALL, folded, on_page, page_colour
 from ringsweep.runs.executors import progress_bar
 from ringsweep.storage.files import check_writable, replacing
 
@@ -191,8 +191,8 @@ class _Film:
             self.body = BeltArtists(above, below, run)
         time = run["time"].values
         self.states = states_at(run, np.linspace(time[0], time[-1], max(2, round(fps * duration))))
-        style: dict[str, Any] = {"ncols": 3, "fontsize": SMALL, "frameon": False, "columnspacing": 1}
-        left.legend(handles=self.body.legend_entries(), loc="outside lower center", **style)
+        entries = self.body.legend_entries()
+        left.legend(handles=entries, loc="outside lower center", ncols=3, columnspacing=1, **LEGEND)
         shown = [names for names in panels_of(run) if names not in (("epsilon",), ("impact_speed",))]
         panels = list(right.subplots(len(shown), 1, sharex=True))
         for panel, names in zip(panels, shown, strict=True):

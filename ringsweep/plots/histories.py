@@ -36,6 +36,7 @@ from ringsweep.plots.labels import axis_label, displayed, label_axis, long_name,
 from ringsweep.plots.style import (
     CURVE_COLOURS,
     CURVE_STYLES,
+    LEGEND,
     MARGIN,
     OPEN,
     PAIR_COLOURS,
@@ -262,8 +263,7 @@ def draw_history(figure: Figure | SubFigure, ds: xr.Dataset) -> None:
         # A line of each entry, its label, and the space around them.
         longest = max(map(len, lines[1])) + 11
         columns = max(1, min(most, letters(figure.bbox.width / float(figure.dpi)) // longest))
-        style: dict[str, Any] = {"fontsize": SMALL, "frameon": False, "handlelength": 4}
-        figure.legend(*lines, loc="outside upper center", ncols=columns, **style)
+        figure.legend(*lines, loc="outside upper center", ncols=columns, handlelength=4, **LEGEND)
     elif text := "\n".join(filter(None, (outcome(ds), "; ".join(scene_text(ds))))):
         inches = figure.bbox.width / float(figure.dpi)
         figure.suptitle("\n".join(folded([line], inches) for line in text.splitlines()), fontsize="medium")

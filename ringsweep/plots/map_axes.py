@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,7 +14,9 @@ from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
 from ringsweep.plots.datasets import WITHIN, is_numeric, resolve
-from ringsweep.plots.labels import axis_label, display_factor, number_text
+from ringsweep.plots.labels import axis_label, display_factor, number_text, value_text
+from ringsweep.plots.selection import select
+from ringsweep.quantities.variables import swept
 
 
 class _PlainNumbers(LogFormatterSciNotation):
@@ -122,14 +125,32 @@ class Axis:
             axis.set_ticks(range(len(self.names)), labels=self.names)
 
 
-def choose_axes(ds: xr.Dataset, data: xr.DataArray, x: str | None, y: str | None) -> tuple[Axis, Axis | None]:
-    """The horizontal axis, and the vertical one if a second quantity was swept.
+def choose_axes(
+    ds: xr.Dataset, var: str, sel: Mapping[str, float | str], x: str | None, y: str | None
+) -> tuple[xr.Dataset, list[str], Axis, Axis | None]:
+    """Hold coordinates of a variable, and choose the axes of its map.
+
+    Returns
+    -------
+    xarray.Dataset
+        Without the dimensions that are held.
+    list of str
+        What is held.
+    Axis, Axis
+        The horizontal axis, and the vertical one if a second quantity was swept.
 
     Raises
     ------
     InputError
-        If `x` or `y` is no coordinate of `data`, or both are the same.
+        If a single cell is left, `x` or `y` is no coordinate of the variable, or both are the same; see also
+        :func:`ringsweep.plots.selection.select`.
     """
+    # The texts also name what was held before, by `ds.isel` for example.
+    held = [value_text(coordinate) for coordinate in swept(ds) if not coordinate.dims]
+    ds, held_now = select(ds, sel)
+    data = ds[var]
+    if not data.dims:
+        raise InputError("sel" if sel else "ds", "a single cell has no map; at least one swept dimension must remain")
     candidates: list[str] = []
     for dim in [dim for dim in data.dims if dim not in WITHIN]:
         along = [str(name) for name, c in data.coords.items() if c.dims == (dim,)]
@@ -144,7 +165,7 @@ def choose_axes(ds: xr.Dataset, data: xr.DataArray, x: str | None, y: str | None
     y = y or next((name for name in candidates if name != x), None)
     if x is None or x == y:
         raise InputError("x", f"x and y must differ; choose from {', '.join(available)}")
-    return Axis.of(ds[x], ds), Axis.of(ds[y], ds) if y else None
+    return ds, [*held, *held_now], Axis.of(ds[x], ds), Axis.of(ds[y], ds) if y else None
 
 
 def is_scattered(horizontal: Axis, vertical: Axis | None) -> bool:

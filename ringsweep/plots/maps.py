@@ -23,7 +23,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
-from ringsweep.plots.datasets import is_numeric, is_sampled, require_sweep, resolve, scene_text, swept
+from ringsweep.plots.datasets import is_sampled, numeric_names, require_sweep, resolve, scene_text
 from ringsweep.plots.labels import (
     amount_text,
     axis_label,
@@ -36,8 +36,8 @@ from ringsweep.plots.labels import (
 )
 from ringsweep.plots.map_axes import Axis, as_matrix, choose_axes, is_scattered, thinned
 from ringsweep.plots.map_colours import CellWarning, ColourScale, cell_warnings, legend_entries
-from ringsweep.plots.selection import select
 from ringsweep.plots.style import (
+    LEGEND,
     MARGIN,
     NO_VALUE,
     PAIR_COLOURS,
@@ -58,7 +58,7 @@ from ringsweep.plots.style import (
     width_of,
 )
 from ringsweep.quantities.units import percent_at_most
-from ringsweep.quantities.variables import AUDITED, INFERRED
+from ringsweep.quantities.variables import AUDITED, INFERRED, swept
 
 _MOST_PANELS = 25
 
@@ -190,9 +190,9 @@ def regime_map(
     text = found.title_text(title, width)
     if found.entries and legend is not False:
         # A legend above the panels would cover a title of the figure, and one below them the label of the axis.
-        style: dict[str, Any] = {"fontsize": SMALL, "frameon": False, "handleheight": 1.4, "columnspacing": 1.2}
-        style |= {"title": text, "title_fontsize": "medium", "ncols": columns_of(found.entries, width)}
-        figure.legend(handles=found.entries, loc="outside upper center", **style)
+        style = LEGEND | {"handleheight": 1.4, "columnspacing": 1.2, "title": text, "title_fontsize": "medium"}
+        columns = columns_of(found.entries, width)
+        figure.legend(handles=found.entries, loc="outside upper center", ncols=columns, **style)
     elif text:
         figure.suptitle(text, fontsize="medium")
     return figure
@@ -318,16 +318,9 @@ class Map:
                 ds = ds.isel(
                     word=(ds["probability"] > 0.0).any([d for d in ds["probability"].dims if d != "word"]).values
                 )
-        var = resolve("var", var, [name for name, data in ds.data_vars.items() if is_numeric(data)])
-        # The title also names what was held before, by `ds.isel` for example.
-        held = [value_text(coordinate) for coordinate in swept(ds) if not coordinate.dims]
-        ds, held_now = select(ds, sel)
+        var = resolve("var", var, numeric_names(ds))
+        ds, held, horizontal, vertical = choose_axes(ds, var, sel, *axes)
         data = displayed(ds[var])
-        if not data.dims:
-            raise InputError(
-                "sel" if sel else "ds", "a single cell has no map; at least one swept dimension must remain"
-            )
-        horizontal, vertical = choose_axes(ds, data, *axes)
         scattered = is_scattered(horizontal, vertical)
         scale = ColourScale.of(data, *colours)
         warnings = cell_warnings(ds, data)
@@ -356,7 +349,7 @@ class Map:
             columns,
             drawn,
             legend_entries(scale, ds, data, warnings, scattered),
-            [name, *held, *held_now, *told, *thinning, *audit],
+            [name, *held, *told, *thinning, *audit],
         )
 
     @property

@@ -16,14 +16,14 @@ from matplotlib.colors import LogNorm, to_hex
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
-from ringsweep.plots.datasets import is_numeric, is_sampled, require_sweep, resolve, swept
+from ringsweep.plots.datasets import is_sampled, numeric_names, require_sweep, resolve
 from ringsweep.plots.labels import axis_label, displayed, in_units, long_name, plain_text, value_text
 from ringsweep.plots.map_axes import Axis, choose_axes, is_scattered, thinned
 from ringsweep.plots.map_colours import ZERO, ColourScale
 from ringsweep.plots.maps import audit_texts
 from ringsweep.plots.saving import suffix_of
-from ringsweep.plots.selection import select
 from ringsweep.plots.style import CURVE_COLOURS, NO_VALUE
+from ringsweep.quantities.variables import swept
 from ringsweep.storage.files import check_writable, replacing
 
 # Greatest number of cells along an axis, and in a page: a million make some 20 MB.
@@ -176,13 +176,9 @@ class _Sweep:
         ds = in_units(ds)
         if is_sampled(ds):
             raise InputError("ds", "is a sampled sweep, which has no runs to point at: draw a picture, *.png")
-        var = resolve("var", var, _numeric(ds))
-        held = [value_text(coordinate) for coordinate in swept(ds) if not coordinate.dims]
-        ds, held_now = select(ds, sel)
-        notes = [*held, *held_now, *audit_texts(ds)]
-        if not ds[var].dims:
-            raise InputError("sel" if sel else "ds", "a single cell has no map; at least one dimension must remain")
-        horizontal, vertical = choose_axes(ds, ds[var], x, y)
+        var = resolve("var", var, numeric_names(ds))
+        ds, held, horizontal, vertical = choose_axes(ds, var, sel, x, y)
+        notes = [*held, *audit_texts(ds)]
         scattered = vertical is not None and is_scattered(horizontal, vertical)
         axes = [axis for axis in (vertical, horizontal) if axis]
         whole = ds
@@ -201,7 +197,7 @@ class _Sweep:
             left = ", ".join(f"{dim} ({size})" for dim, size in template.sizes.items())
             raise InputError("sel", f"{left} are more than {_MOST_CELLS:,} cells: hold some of these: --sel DIM=VALUE")
         cells, variables, scales = {}, {}, {}
-        for name in _numeric(ds):
+        for name in numeric_names(ds):
             data = ds[name]
             if set(data.dims) != set(template.dims):
                 continue
@@ -224,10 +220,6 @@ class _Sweep:
             [_coordinate(c, template) for c in swept(ds) or template.coords.values() if c.dims],
             [[_slice_text(ds, dim, k) for k in range(ds.sizes[dim])] for dim in others],
         )
-
-
-def _numeric(ds: xr.Dataset) -> list[str]:
-    return [str(name) for name, data in ds.data_vars.items() if is_numeric(data)]
 
 
 def _column(

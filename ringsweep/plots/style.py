@@ -78,6 +78,9 @@ MARGIN = 0.7
 # Figures and cells of a grid of axes that are narrower have their legend below, not beside, inches.
 _NARROW = 4.6
 
+#: Look of every legend.
+LEGEND: dict[str, Any] = {"fontsize": SMALL, "frameon": False}
+
 # Letters of a legend in the room of a letter of the text.
 _LETTERS = 1.2
 
@@ -305,7 +308,7 @@ def place_legend(ax: Axes, handles: list[Artist], where: bool | str = True, **op
         return
     if where is True:
         where = "below" if is_narrow(width_of(ax)) else "beside"
-    common: dict[str, Any] = {"handles": handles, "fontsize": SMALL, "frameon": False}
+    common: dict[str, Any] = LEGEND | {"handles": handles}
     common |= {name: value for name, value in options.items() if name.startswith("handle")}
     if where == "beside":
         ax.legend(**common | {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)} | options)
@@ -349,9 +352,8 @@ def legend_above(ax: Axes, handles: list[Artist] | None = None) -> None:
         needed = sum(_length(str(handle.get_label())) + 6 for handle in handles)
         lines = math.ceil(needed / (_LETTERS * letters(width_of(ax) - 0.5 * MARGIN)))
         columns = math.ceil(len(handles) / lines)
-        style: dict[str, Any] = {"fontsize": SMALL, "frameon": False, "ncols": columns, "columnspacing": 1.2}
-        style |= {"borderaxespad": 0.1, "borderpad": 0.1, "handlelength": 1.8}
-        ax.legend(handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), **style)
+        style = LEGEND | {"columnspacing": 1.2, "borderaxespad": 0.1, "borderpad": 0.1, "handlelength": 1.8}
+        ax.legend(handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, **style)
 
 
 def small_ticks(*axes: Axes) -> None:

@@ -228,12 +228,10 @@ def _errors(labels: NDArray[np.int64], share: Floats, independent: bool) -> Floa
     for k in range(len(share)):
         inside, edge = labels == k, np.zeros(labels.shape, dtype=bool)
         for axis in range(labels.ndim):
-            differs = np.diff(inside, axis=axis)
-            before = [slice(None)] * labels.ndim
-            after = list(before)
-            before[axis], after[axis] = slice(None, -1), slice(1, None)
-            edge[tuple(before)] |= differs & inside[tuple(before)]
-            edge[tuple(after)] |= differs & inside[tuple(after)]
+            cells, at_edge = np.moveaxis(inside, axis, 0), np.moveaxis(edge, axis, 0)
+            differs = cells[:-1] != cells[1:]
+            at_edge[:-1] |= differs & cells[:-1]
+            at_edge[1:] |= differs & cells[1:]
         # A share of a cell between 0 and 1, each as probable as the others, has the variance 1/12.
         found[k] = np.sqrt(edge.sum() / 12.0) / labels.size
     return found

@@ -26,7 +26,6 @@ from ringsweep.quantities.variables import AUDITED, COMPUTED, INFERRED
 CONFIDENCE = 0.95
 
 _BESIDES = ((-1, 0), (1, 0), (0, -1), (0, 1))
-_INNER = slice(1, -1), slice(None, -2), slice(2, None)
 _NEAR = tuple((down, right) for down in range(-3, 4) for right in range(-3, 4) if 0 < abs(down) + abs(right) <= 3)
 
 Cells = NDArray[np.intp]
@@ -222,19 +221,19 @@ class _Grid:
         """Points that are not known and have a neighbour with another label."""
         found = np.zeros(self.labels.shape, dtype=bool)
         for axis in (1, 2):
-            low = (slice(None),) * axis + (slice(None, -1),)
-            high = (slice(None),) * axis + (slice(1, None),)
-            differ = (self.labels[low] != self.labels[high]) | (self.labels[low] < 0)
-            found[low] |= differ
-            found[high] |= differ
+            labels, beside = np.moveaxis(self.labels, axis, 0), np.moveaxis(found, axis, 0)
+            differ = (labels[:-1] != labels[1:]) | (labels[:-1] < 0)
+            beside[:-1] |= differ
+            beside[1:] |= differ
         return np.flatnonzero(found & ~self.known)
 
     def _near_thin(self) -> Cells:
         """Points that are not known, near a point that differs from those on both sides of it."""
         thin = np.zeros(self.labels.shape, dtype=bool)
         for axis in (1, 2):
-            inner, low, high = ((slice(None),) * axis + (part,) for part in _INNER)
-            thin[inner] |= (self.labels[inner] != self.labels[low]) & (self.labels[inner] != self.labels[high])
+            labels = np.moveaxis(self.labels, axis, 0)
+            differ = labels[:-1] != labels[1:]
+            np.moveaxis(thin, axis, 0)[1:-1] |= differ[:-1] & differ[1:]
         points = np.flatnonzero(thin)
         cells = np.union1d(points, self._around(points, _NEAR)[0])
         return cells[~self.known.flat[cells]]
