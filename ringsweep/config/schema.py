@@ -53,19 +53,18 @@ def schema() -> dict[str, Any]:
         {
             "model": _names(MODELS, "what moves"),
             LAW: _laws("friction law; may be missing where sweep goes through laws"),
-            "friction.laws": {
-                "description": "friction laws by formula: name -> mu, at_rest",
-                "type": "object",
-                "additionalProperties": {**_section({"mu": _formula(), "at_rest": _at_rest()}), "required": ["mu"]},
-            },
+            "friction.laws": _open(
+                "friction laws by formula: name -> mu, at_rest",
+                _section({"mu": _formula(), "at_rest": _at_rest()}, "mu"),
+            ),
             "friction.mu": _any_of([_formula(), _list(_number(TABLES["friction"]["mu"]))]),
             "friction.at_rest": _at_rest(),
             "friction.v": _list(_number(TABLES["friction"]["v"])),
-            "friction.file": {"type": "string", "description": "CSV file with columns v (m/s), mu"},
+            "friction.file": _text("CSV file with columns v (m/s), mu"),
             "drive.law": _drives(),
-            "initial.from": {"type": "string", "description": "result file of the run on the belt that goes on"},
-            "drive.file": {"type": "string", "description": "CSV file with columns t (s), theta (rad)"},
-            "force.file": {"type": "string", "description": "CSV file with columns t (s), force (N)"},
+            "initial.from": _text("result file of the run on the belt that goes on"),
+            "drive.file": _text("CSV file with columns t (s), theta (rad)"),
+            "force.file": _text("CSV file with columns t (s), force (N)"),
             **{
                 f"{section}.{name}": _list(_number(parameter))
                 for section in ("drive", "force")
@@ -79,15 +78,11 @@ def schema() -> dict[str, Any]:
     scene["required"] = ["model"]
     scene["properties"]["drive"]["required"] = ["law"]
     for section, what in {"friction": "friction law", "drive": "drive", "force": "force"}.items():
-        scene["properties"][section]["additionalProperties"] = _number(
-            Parameter("", f"parameter of a {what} by formula")
-        )
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "ringsweep configuration",
-        **_section({"scene": scene, "solver": _solver(), "record": _record(), "sweep": _sweep(list(known))}),
-        "required": ["scene"],
-    }
+        own_parameter = Parameter("", f"parameter of a {what} by formula")
+        scene["properties"][section]["additionalProperties"] = _number(own_parameter)
+    sections = {"scene": scene, "solver": _solver(), "record": _record(), "sweep": _sweep(list(known))}
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "ringsweep configuration"}
+    return head | _section(sections, "scene")
 
 
 def _number(parameter: Parameter) -> dict[str, Any]:
@@ -126,12 +121,14 @@ def _drives() -> dict[str, Any]:
     return found
 
 
+_VALUE, _TEXT, _FLAG = {"type": ["number", "string"]}, {"type": "string"}, {"type": "boolean"}
+
 # Variables of formulas.
 SPEED, TIME = "the sliding speed v", "the time t, s"
 
 
 def _formula(what: str = "friction coefficient", of: str = SPEED) -> dict[str, Any]:
-    return {"description": f"{what} as a formula of {of}", "type": "string"}
+    return _text(f"{what} as a formula of {of}")
 
 
 def _at_rest() -> dict[str, Any]:
@@ -155,12 +152,22 @@ def _nest(leaves: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
     return _list(children["0"]) if "0" in children else _section(children)
 
 
-def _section(properties: Mapping[str, Any]) -> dict[str, Any]:
-    return {"type": "object", "properties": dict(properties), "additionalProperties": False}
+def _section(properties: Mapping[str, Any], *required: str) -> dict[str, Any]:
+    found = {"type": "object", "properties": dict(properties), "additionalProperties": False}
+    return found | ({"required": list(required)} if required else {})
 
 
-def _list(items: dict[str, Any]) -> dict[str, Any]:
-    return {"type": "array", "items": items, "minItems": 1}
+def _open(about: str, values: dict[str, Any], **rest: Any) -> dict[str, Any]:
+    """Section whose keys are the user's."""
+    return {"description": about, "type": "object", **rest, "additionalProperties": values}
+
+
+def _list(items: dict[str, Any], **rest: Any) -> dict[str, Any]:
+    return {"type": "array", "items": items, "minItems": 1, **rest}
+
+
+def _text(about: str) -> dict[str, Any]:
+    return {"description": about, **_TEXT}
 
 
 def _any_of(options: list[dict[str, Any]]) -> dict[str, Any]:
@@ -174,9 +181,9 @@ def _constants(meanings: Mapping[str, str]) -> list[dict[str, str]]:
 def _record() -> dict[str, Any]:
     about = "whether a run tells its Lyapunov exponent and its Floquet multipliers"
     at = {"description": "instants of the points", "oneOf": _constants(INSTANTS)}
-    section = _section({"at": at, "keep": _number(KEEP), "period": _number(PERIOD)})
-    kept = {"description": "points of the motion that a run keeps", **section, "required": ["at"]}
-    exponent = {"description": about, "type": "boolean"}
+    section = _section({"at": at, "keep": _number(KEEP), "period": _number(PERIOD)}, "at")
+    kept = {"description": "points of the motion that a run keeps", **section}
+    exponent = {"description": about, **_FLAG}
     return {"description": "what a run records", **_section({"exponent": exponent, "section": kept})}
 
 
@@ -187,112 +194,75 @@ def _solver() -> dict[str, Any]:
         numbers = declared(method)
         options: dict[str, Any] = {"method": {"const": name, "description": _first_line(method)}}
         for option in dataclasses.fields(method):
-            if option.name in numbers:
-                options[option.name] = _number(numbers[option.name])
-            else:
-                options[option.name] = {"type": "boolean"}
-        methods.append({**_section(options), "required": ["method"]})
+            options[option.name] = _number(numbers[option.name]) if option.name in numbers else _FLAG
+        methods.append(_section(options, "method"))
     return {"description": "how time advances", "anyOf": methods}
 
 
 def _sweep(paths: list[str]) -> dict[str, Any]:
-    value = {"type": ["number", "string"]}
     arcs = "|".join(path.removeprefix("zones.0.") for path in paths if path.startswith("zones.0."))
-    laws = {LAW: _list(_laws("friction law"))}
+    laws = _list(_laws("friction law"))
     own = r"^(friction|drive|force)\.[A-Za-z][A-Za-z0-9_]*$"
-    names = {"anyOf": [{"enum": [*laws, *paths]}, {"pattern": rf"^zones\.[0-9]+\.({arcs})$"}, {"pattern": own}]}
+    names = {"anyOf": [{"enum": [LAW, *paths]}, {"pattern": rf"^zones\.[0-9]+\.({arcs})$"}, {"pattern": own}]}
     together = {"anyOf": [*names["anyOf"], {"pattern": r"^[^,\s]+(\s*,\s*[^,\s]+)+$"}]}
-    bounds = {"type": "array", "prefixItems": [value, value, _number(COUNT)], "minItems": 3, "maxItems": 3}
-    axis = {"anyOf": [_list(value), *(_section({kind: bounds}) for kind in ("linspace", "geomspace"))]}
+    bounds = {"type": "array", "prefixItems": [_VALUE, _VALUE, _number(COUNT)], "minItems": 3, "maxItems": 3}
+    axis = {"anyOf": [_list(_VALUE), *(_section({kind: bounds}) for kind in ("linspace", "geomspace"))]}
+    refined = {
+        **{key: _number(parameter) for key, parameter in NUMBERS.items()},
+        "also": _text("number that is interpolated where not run"),
+        "within": {"description": "largest error of that", **_VALUE},
+        "axes": {"description": "one or two paths that are refined (default: the longest two)"}
+        | _list(names, maxItems=2),
+    }
+    grid = "path -> values; every combination is run; paths with commas between them vary together"
+    of_laws = {LAW: laws | {"uniqueItems": True}}
+    points = "CSV file whose columns are paths and whose rows are runs, or its columns"
+    columns = _open("path -> values", _list(_VALUE), propertyNames=names, properties={LAW: laws})
     return _section(
         {
-            "grid": {
-                "description": "path -> values; every combination is run; paths with commas between them vary together",
-                "type": "object",
-                "propertyNames": together,
-                "properties": {LAW: {**laws[LAW], "uniqueItems": True}},
-                "additionalProperties": axis,
-            },
+            "grid": _open(grid, axis, propertyNames=together, properties=of_laws),
             "refine": {
                 "description": "compute only the boundaries of the map: every 32nd cell, then where neighbours differ",
-                "anyOf": [
-                    {"type": "boolean"},
-                    _section(
-                        {
-                            **{key: _number(parameter) for key, parameter in NUMBERS.items()},
-                            "also": {"description": "number that is interpolated where not run", "type": "string"},
-                            "within": {"description": "largest error of that", **value},
-                            "axes": {
-                                "description": "one or two paths that are refined (default: the longest two)",
-                                "type": "array",
-                                "items": names,
-                                "minItems": 1,
-                                "maxItems": 2,
-                            },
-                        }
-                    ),
-                ],
+                "anyOf": [_FLAG, _section(refined)],
             },
             "follow": {
                 "description": "axis along which each cell starts from the state in which the one before ended",
-                "anyOf": [
-                    {"type": "string"},
-                    {
-                        **_section({"axis": {"type": "string"}, "direction": {"oneOf": _constants(DIRECTIONS)}}),
-                        "required": ["axis"],
-                    },
-                ],
+                "anyOf": [_TEXT, _section({"axis": _TEXT, "direction": {"oneOf": _constants(DIRECTIONS)}}, "axis")],
             },
-            "sample": _sample(names),
-            "points": {
-                "description": "CSV file whose columns are paths and whose rows are runs, or its columns",
-                "anyOf": [
-                    {"type": "string"},
-                    {
-                        "type": "object",
-                        "propertyNames": names,
-                        "properties": laws,
-                        "additionalProperties": _list(value),
-                    },
-                ],
-            },
+            "sample": _sample(together, axis),
+            "points": {"description": points, "anyOf": [_TEXT, columns]},
         }
     )
 
 
-def _sample(names: dict[str, Any]) -> dict[str, Any]:
-    value = {"type": ["number", "string"]}
-    values = {"anyOf": [_list(value), {"type": "object", "additionalProperties": _list(value)}]}
+def _sample(names: dict[str, Any], axis: dict[str, Any]) -> dict[str, Any]:
     kinds: dict[str, Any] = {}
     for name, distribution in DISTRIBUTIONS.items():
         count = len(distribution.arguments)
         about = f"[{', '.join(distribution.arguments)}]"
-        kinds[name] = {"description": about, "type": "array", "items": value, "minItems": count, "maxItems": count}
-    kinds["values"] = {"description": "values, each as probable as the others", **values}
-    kinds["file"] = {"description": "CSV file with a column for each path; a row is a draw", "type": "string"}
-    kinds["over"] = {"description": "path that the draw is multiplied by", "type": "string"}
-    levels = _list({"type": ["number", "string"]})
+        kinds[name] = {"description": about, "type": "array", "items": _VALUE, "minItems": count, "maxItems": count}
+    columns = {"type": "object", "additionalProperties": _list(_VALUE)}
+    kinds["values"] = {
+        "description": "values, each as probable as the others",
+        "anyOf": [_list(_VALUE), columns],
+    }
+    kinds["file"] = _text("CSV file with a column for each path; a row is a draw")
+    kinds["over"] = _text("path that the draw is multiplied by")
+    drawn = "path -> distribution; paths with commas between them are drawn together"
     measure = {"enum": [*SENSITIVITIES]}
-    asked = _section({"of": _list({"type": "string"}), "method": measure})
-    times = {"anyOf": [_list(value), *(_section({kind: _list(value)}) for kind in ("linspace", "geomspace"))]}
     found = _section(
         {
             **{key: _number(parameter) for key, parameter in SAMPLE_NUMBERS.items()},
             "method": {"description": "how points are drawn", "enum": [*DESIGNS]},
-            "of": {
-                "description": "path -> distribution; paths with commas between them are drawn together",
-                "type": "object",
-                "propertyNames": {"anyOf": [*names["anyOf"], {"pattern": r"^[^,\s]+(\s*,\s*[^,\s]+)+$"}]},
-                "additionalProperties": _section(kinds),
-                "minProperties": 1,
-            },
-            "quantiles": {"description": "variable -> levels", "type": "object", "additionalProperties": levels},
-            "survival": {"description": "times at which it is asked whether the contacts still hold", **times},
+            "of": _open(drawn, _section(kinds), propertyNames=names, minProperties=1),
+            "quantiles": _open("variable -> levels", _list(_VALUE)),
+            "survival": {"description": "times at which it is asked whether the contacts still hold", **axis},
             "sensitivity": {
                 "description": "Sobol indices (true) or Morris's effects, and of which variables beside the regimes",
-                "anyOf": [{"type": "boolean"}, measure, {**asked, "required": ["of"]}],
+                "anyOf": [_FLAG, measure, _section({"of": _list(_TEXT), "method": measure}, "of")],
             },
-            "keep": {"description": "whether the result holds the runs too", "type": "boolean"},
-        }
+            "keep": {"description": "whether the result holds the runs too", **_FLAG},
+        },
+        *("n", "of"),
     )
-    return {"description": "uncertain parameters: each cell of the grid is sampled", **found, "required": ["n", "of"]}
+    return {"description": "uncertain parameters: each cell of the grid is sampled", **found}
