@@ -231,11 +231,11 @@ def _at_medians(result: Any) -> Any:
     return compute(nominal(result), Execution(progress=False))
 
 
-def _panel(draw: Callable[..., Any], result: Any, **options: Any) -> Any:
+def _panel(draw: Callable[..., Any], result: Any, height: float = 4.2, **options: Any) -> Any:
     """A new figure with one picture."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(7.6, 4.2), layout="constrained")
+    figure = Figure(figsize=(7.6, height), layout="constrained")
     draw(result, ax=figure.add_subplot(), **options)
     return figure
 
@@ -246,7 +246,6 @@ def _name_part(held: str) -> str:
 
 
 def _plot(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
-    from matplotlib.figure import Figure
 
     from ringsweep import plots
     from ringsweep.plots.datasets import is_sampled, resolve
@@ -286,9 +285,7 @@ def _plot(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
     elif arguments.kind is None:
         figure = plots.history(result)
     else:
-        figure = Figure(figsize=(7.6, 4.8), layout="constrained")
-        draw = plots.phase_portrait if arguments.kind == "phase" else plots.friction_loop
-        draw(result, ax=figure.add_subplot())
+        figure = _panel(plots.phase_portrait if arguments.kind == "phase" else plots.friction_loop, result, 4.8)
     _save(figure, target)
 
 
@@ -339,17 +336,8 @@ def threshold_command(arguments: argparse.Namespace) -> None:
     """Print the values at which a regime begins or ends."""
     from ringsweep.runs.thresholds import in_words, locate
 
-    found = locate(
-        arguments.config,
-        arguments.path,
-        arguments.regime,
-        (arguments.low, arguments.high),
-        arguments.tolerance,
-        scan=arguments.scan,
-        settings=arguments.set,
-        jobs=arguments.jobs,
-    )
-    print(in_words(found))
+    asked = arguments.config, arguments.path, arguments.regime, (arguments.low, arguments.high), arguments.tolerance
+    print(in_words(locate(*asked, scan=arguments.scan, settings=arguments.set, jobs=arguments.jobs)))
 
 
 def fit_command(arguments: argparse.Namespace) -> None:
@@ -362,35 +350,28 @@ def fit_command(arguments: argparse.Namespace) -> None:
 
     from ringsweep import plots
 
-    result = fitted(
-        arguments.config,
-        arguments.data,
-        ranges_of(arguments.vary),
-        start=arguments.start,
-        noise=arguments.noise,
-        settings=arguments.set,
-    )
+    options = {"start": arguments.start, "noise": arguments.noise, "settings": arguments.set}
+    result = fitted(arguments.config, arguments.data, ranges_of(arguments.vary), **options)
     _store(result, target, in_words(result))
     _draw(lambda: plots.fit(result), picture, f"ringsweep plot {target}")
 
 
 def _other_scene(target: Path, result: Any) -> str:
     """What the scene of a run that is there already has other than that of a result; empty if nothing."""
+    from ringsweep.quantities.variables import configuration_of
     from ringsweep.storage import netcdf
+    from ringsweep.storage.provenance import differences
 
     if not target.exists():
         return ""
     with netcdf.open_dataset(target) as earlier:
-        old, new = (_leaves(json.loads(ds.attrs["configuration"])["scene"]) for ds in (earlier, result))
-    return "; ".join(
-        f"{path} was {old.get(path, 'absent')}" for path in {**old, **new} if old.get(path) != new.get(path)
-    )
+        return differences(*(_leaves(configuration_of(ds)["scene"]) for ds in (earlier, result)))
 
 
-def _leaves(node: Any, path: str = "") -> dict[str, Any]:
+def _leaves(node: Any, path: str = "") -> dict[str, str]:
     """Values of a nested mapping by their dotted paths."""
     if not isinstance(node, dict):
-        return {path: node}
+        return {path: str(node)}
     return {p: v for key, child in node.items() for p, v in _leaves(child, f"{path}.{key}".lstrip(".")).items()}
 
 

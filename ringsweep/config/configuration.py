@@ -39,6 +39,7 @@ from ringsweep.errors import InputError
 from ringsweep.models.scene import LAW, Scene
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.units import is_plain, other_unit, show
+from ringsweep.quantities.variables import written
 
 logger = logging.getLogger("ringsweep")
 
@@ -346,9 +347,7 @@ def _warn_of_unit(given: str, taken: str, before: str, cure: str) -> None:
 
 def as_written(config: Config, path: str) -> Any:
     """A number as a configuration gives it, with its unit: in the scene, or else first on its axis; or None."""
-    node: Any = config.source.get("scene", {})
-    for key in path.split("."):
-        node = node.get(key) if isinstance(node, dict) else None
+    node = written(config.source, path)
     if node is None:
         sweep = config.source.get("sweep", {})
         for columns in (sweep.get("grid", {}), sweep.get("points", {})):

@@ -225,9 +225,7 @@ def read_sample(given: Any, scene: Scene, axes: Axes) -> Sample | None:
         method=method,
         quantiles=_quantiles(given.get("quantiles"), scene),
         survival=_survival(given.get("survival"), scene),
-        n=numbers["n"],
-        seed=numbers["seed"],
-        replicates=numbers["replicates"],
+        **numbers,
         sensitivity=sensitivity,
         sensitive=sensitive,
         keep=keep,
@@ -441,14 +439,12 @@ def _check_points(sample: Sample, scene: Scene, axes: Axes) -> None:
             for path in factor.paths:
                 values, parameter = found.columns[path][1], known[path]
                 assert isinstance(parameter, Parameter)
-                low = values <= parameter.lower if parameter.open_lower else values < parameter.lower
-                high = values >= parameter.upper if parameter.open_upper else values > parameter.upper
-                wrong = low | high | ~np.isfinite(values)
-                if wrong.any():
+                wrong = [end for end in (values.min(), values.max()) if not parameter.allows(float(end))]
+                if wrong:
                     unit = after_number(parameter.unit)
                     raise InputError(
                         f"sweep.sample.of.{factor.name}",
-                        f"draws {values[wrong].flat[0]:.3g}{unit}, but {parameter.long_name} must be "
+                        f"draws {wrong[0]:.3g}{unit}, but {parameter.long_name} must be "
                         f"{parameter.interval}{unit}: {_probability(sample, factor, parameter)} "
                         "(truncnormal and uniform have ends)",
                     )

@@ -91,14 +91,10 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     }
     values = _read_numbers(structures, leaves, swept)
     _warn_of_unused_numbers(structures, leaves)
-    _warn_of_lengths(
-        frozenset(
-            (path, values[path])
-            for path, known in numbers_of(structures).items()
-            if known.unit == "m" and path in values
-        )
-    )
-    for path, parameter in numbers_of(structures).items():
+    numbers = numbers_of(structures)
+    lengths = {path: values[path] for path, parameter in numbers.items() if parameter.unit == "m" and path in values}
+    _warn_of_lengths(frozenset(lengths.items()))
+    for path, parameter in numbers.items():
         if path in leaves:
             warn_of_plain_angle(path, leaves[path], parameter)
     return Scene(structures, values, scene)

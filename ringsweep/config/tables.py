@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 
 from ringsweep.config.sections import read_values
 from ringsweep.config.yaml_text import Document
-from ringsweep.errors import InputError, shortened
+from ringsweep.errors import InputError, nearest_name, shortened
 from ringsweep.quantities.parameters import Parameter
 
 #: Columns of the tables of a measured drive, force and friction curve, by section. The first column ascends.
@@ -94,8 +93,8 @@ def _wrong_columns(found: list[str], names: list[str]) -> str:
     """Message about the header of a file."""
     missing = [name for name in names if name not in found]
     hints = (
-        f"; did you mean `{near[0]}` by {shortened(name, 40)}?"
+        f"; did you mean `{near}` by {shortened(name, 40)}?"
         for name in found
-        if name not in names and (near := difflib.get_close_matches(name[:100].lower(), missing, n=1))
+        if name not in names and (near := nearest_name(name, missing))
     )
     return f"columns {', '.join(names)} are expected; got {', '.join(found)}{next(hints, '')}"

@@ -17,7 +17,7 @@ from ringsweep.config import load
 from ringsweep.plots.datasets import mode_name
 from ringsweep.plots.labels import number_text
 from ringsweep.plots.phase import draw_belt_portrait
-from ringsweep.plots.polar import reference_force, round_down
+from ringsweep.plots.polar import ARROWS, reference_force, round_down
 from ringsweep.plots.style import PAIR_COLOURS, REST, SMALL, on_page, page_colour
 from ringsweep.quantities.variables import configuration_of
 
@@ -69,17 +69,7 @@ class BeltArtists:
         self.body = Rectangle((0.0, 0.0), 2 * self.half, _BODY, facecolor=on_page("0.85"), zorder=4)
         self.body.set_edgecolor(on_page("0.2"))
         ax.add_patch(self.body)
-        self.friction = ax.quiver(
-            *np.zeros((4, 1)),
-            color=on_page(_FRICTION),
-            angles="xy",
-            scale_units="xy",
-            scale=1.0,
-            units="width",
-            width=0.01,
-            minlength=0.1,
-            zorder=6,
-        )
+        self.friction = ax.quiver(*np.zeros((4, 1)), color=on_page(_FRICTION), units="width", width=0.01, **ARROWS)
         halo = withStroke(linewidth=2.0, foreground=page_colour())
         self.name = ax.text(0.0, 0.0, "$F$", color=on_page(_FRICTION), va="center", zorder=7, path_effects=[halo])
         self._draw_scale_bar()

@@ -14,7 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError, nearest_name
-from ringsweep.quantities.variables import HISTORY, MODES, configuration_of, swept
+from ringsweep.quantities.variables import HISTORY, MODES, configuration_of, swept, written
 
 #: Panels of a history by the variable that says where the body is: ``phi`` in a ring, ``x`` on a belt.
 #: Variables of one tuple share a panel.
@@ -217,12 +217,11 @@ def scene_text(ds: xr.Dataset) -> list[str]:
     """What a picture says of the scene, as the user wrote it: law, drive, zone, belt, span, if they were not swept."""
     if "configuration" not in ds.attrs:
         return []
-    scene = configuration_of(ds).get("scene", {})
+    source = configuration_of(ds)
     swept_here = {str(c.attrs["path"]) for c in swept(ds)}
     found = []
     for path, before, after in _TOLD:
-        section, _, key = path.partition(".")
-        value = scene.get(section, {}).get(key) if isinstance(scene.get(section), dict) else None
+        value = written(source, path)
         if value is None or path in swept_here:
             continue
         is_number = isinstance(value, int | float)

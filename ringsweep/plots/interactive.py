@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from functools import partial
 from typing import Any
@@ -22,6 +21,7 @@ from ringsweep.plots.labels import axis_label, displayed, number_text, plain_tex
 from ringsweep.plots.maps import Map
 from ringsweep.plots.selection import cell, select
 from ringsweep.plots.style import SMALL
+from ringsweep.quantities.units import rounded_up
 from ringsweep.quantities.variables import swept, words
 from ringsweep.runs import simulate
 
@@ -170,18 +170,12 @@ def _description(one: xr.Dataset, found: Map) -> str:
         texts.append(f"{axis_label(found.data, found.ds)}: {number_text(value, '.6g')}")
         bound = float(displayed(one.get(f"{found.data.name}_error", xr.DataArray(np.nan))))
         if np.isfinite(bound):
-            texts.append(f"error at most {number_text(_upwards(bound), '.2g')}")
+            texts.append(f"error at most {number_text(rounded_up(bound), '.2g')}")
         elif f"{found.data.name}_error" in one and np.isfinite(value) and one.get("certified", 0) == 1:
             texts.append("no bound on the error: nearby runs diverge")
     if "certified" in one:
         texts.append(words(one["certified"]).item().replace("_", " ") or "inferred")
     return plain_text(", ".join(texts))
-
-
-def _upwards(bound: float) -> float:
-    """A bound with two digits, never smaller than it is."""
-    unit = 10.0 ** (math.floor(math.log10(bound)) - 1) if bound else 1.0
-    return math.ceil(bound / unit) * unit
 
 
 def _show_live(figure: Figure) -> None:

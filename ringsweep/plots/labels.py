@@ -15,7 +15,7 @@ from ringsweep.plots.datasets import is_numeric, resolve
 from ringsweep.plots.style import angle_unit
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import NUMBER, quantity
-from ringsweep.quantities.variables import configuration_of, swept
+from ringsweep.quantities.variables import configuration_of, swept, written
 
 MINUS = "\N{MINUS SIGN}"
 TIMES = "\N{MULTIPLICATION SIGN}"
@@ -107,11 +107,8 @@ def _written_unit(source: Mapping[str, Any], path: str) -> str:
     Different units along one axis count as none.
     """
     sweep = source.get("sweep") or {}
-    written = [found for key in ("grid", "points") if (found := _texts((sweep.get(key) or {}).get(path)))]
-    value: Any = source.get("scene")
-    for key in path.split("."):
-        value = value.get(key) if isinstance(value, Mapping) else None
-    texts = written[0] if written else _texts(value)
+    in_sweep = [found for key in ("grid", "points") if (found := _texts((sweep.get(key) or {}).get(path)))]
+    texts = in_sweep[0] if in_sweep else _texts(written(source, path))
     units = {text[match.end() :].strip() for text in texts if (match := NUMBER.match(text))}
     return units.pop() if len(units) == 1 else ""
 

@@ -19,7 +19,7 @@ from ringsweep.errors import InputError
 from ringsweep.plots.labels import number_text
 from ringsweep.plots.style import AFTERMATH_COLOURS, CLASS_COLOURS, NO_VALUE, REGIME_COLOURS, on_page
 from ringsweep.quantities.flags import FAILED, JAMMED
-from ringsweep.quantities.variables import INFERRED, SAMPLED, configuration_of, is_classification, meanings_of
+from ringsweep.quantities.variables import INFERRED, SAMPLED, configuration_of, is_classification, meanings_of, written
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ def _span(ds: xr.Dataset) -> str:
     """Span of the runs as text; empty if the dataset does not tell it, or if it was swept."""
     if "configuration" not in ds.attrs or any(c.attrs.get("path") == "time.span" for c in ds.coords.values()):
         return ""
-    span = configuration_of(ds).get("scene", {}).get("time", {}).get("span", "")
+    span = written(configuration_of(ds), "time.span") or ""
     return str(span) if isinstance(span, str) else f"{number_text(span, 'g')} s"
 
 

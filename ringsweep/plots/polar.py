@@ -36,6 +36,9 @@ from ringsweep.plots.style import (
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity
 
+#: Arrows whose lengths are in the units of the axes.
+ARROWS: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "minlength": 0.1, "zorder": 6}
+
 # Length of an arrow below which it has no name, as a multiple of the radius of the ring: the name would hide it.
 _SHORTEST = 0.04
 
@@ -261,21 +264,9 @@ class RingArtists:
 
     def _arrows(self, colours: list[str], width: float) -> Quiver:
         """An arrow of each colour; `width` is a multiple of the radius of the ring."""
-        return self.ax.quiver(
-            *np.zeros((4, len(colours))),
-            color=colours,
-            angles="xy",
-            scale_units="xy",
-            scale=1.0,
-            units="xy",
-            width=width * self.rig.radius,
-            # With long heads short arrows would all look alike.
-            minlength=0.1,
-            headwidth=3.2,
-            headlength=3.6,
-            headaxislength=3.2,
-            zorder=6,
-        )
+        # With long heads short arrows would all look alike.
+        look = ARROWS | {"headwidth": 3.2, "headlength": 3.6, "headaxislength": 3.2, "width": width * self.rig.radius}
+        return self.ax.quiver(*np.zeros((4, len(colours))), color=colours, units="xy", **look)
 
     def _draw_scale_bars(self) -> None:
         """Bars of round forces and of a round length below the ring."""

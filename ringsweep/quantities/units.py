@@ -145,8 +145,17 @@ def percent_at_most(share: float) -> str:
     >>> percent_at_most(0.0050159), percent_at_most(0.25), percent_at_most(0.0)
     ('0.51 %', '25 %', '0 %')
     """
-    digits = 3 - math.floor(math.log10(share)) if share > 0.0 else 0
-    return f"{100 * math.ceil(share * 10.0 ** (digits - 2) - 1e-9) / 10.0 ** (digits - 2):.3g} %"
+    return f"{100 * rounded_up(share):.3g} %"
+
+
+def rounded_up(number: float) -> float:
+    """A number that is not negative with two digits, rounded up. The errors of its last bits are no reason to do so.
+
+    >>> rounded_up(201.0), rounded_up(200.0), rounded_up(0.0)
+    (210.0, 200.0, 0.0)
+    """
+    unit = 10.0 ** (math.floor(math.log10(number)) - 1) if number > 0.0 else 1.0
+    return math.ceil(number / unit - 1e-9) * unit
 
 
 def is_plain(value: Any) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -407,3 +407,11 @@ def configuration_of(ds: xr.Dataset) -> dict[str, Any]:
     if "configuration" not in ds.attrs:
         raise InputError("ds", "has no attribute configuration, so its scene is not known")
     return dict(json.loads(ds.attrs["configuration"]))
+
+
+def written(configuration: Mapping[str, Any], path: str) -> Any:
+    """What a configuration says at a path of its scene; None if it says nothing there."""
+    node: Any = configuration.get("scene")
+    for key in path.split("."):
+        node = node.get(key) if isinstance(node, Mapping) else None
+    return node

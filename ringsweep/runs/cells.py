@@ -201,16 +201,9 @@ def _outcomes(
 @contextmanager
 def _named_if_long(axes: Axes, indices: Indices, compiles: bool) -> Iterator[None]:
     """Name the cells of a task, and say why one may be slow, if the block takes long."""
-    timer = Timer(
-        LONG,
-        logger.info,
-        (
-            "not done after %g s: %s; %sevents, or friction that changes within a tiny speed, take many steps",
-            LONG,
-            _place(axes, indices),
-            "kernels are still compiled, or " * compiles,
-        ),
-    )
+    message = "not done after %g s: %s; %sevents, or friction that changes within a tiny speed, take many steps"
+    also = "kernels are still compiled, or " * compiles
+    timer = Timer(LONG, logger.info, (message, LONG, _place(axes, indices), also))
     timer.daemon = True
     timer.start()
     try:

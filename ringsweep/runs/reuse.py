@@ -82,15 +82,12 @@ class EarlierSweep:
             | (set(config.scene.values) ^ set(self.config.scene.values))
         )
         ignored = {f"scene.{path}" for path in not_fixed}
-        old, new = (
-            {
-                name: value
-                for name, value in identity(one).items()
-                if name not in ignored and not name.startswith("sweep")
-            }
-            for one in (self.config, config)
-        )
-        return differences(old, new)
+
+        def fixed(of: Config) -> dict[str, str]:
+            known = identity(of).items()
+            return {name: text for name, text in known if name not in ignored and not name.startswith("sweep")}
+
+        return differences(fixed(self.config), fixed(config))
 
     def align_axes(self, config: Config) -> Config:
         """The new sweep, with the values of the earlier sweep where its own values differ by rounding only."""

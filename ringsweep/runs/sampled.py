@@ -198,17 +198,8 @@ def compute_parts(
 def _needed(config: Config) -> list[str]:
     """Outcomes that are reduced."""
     sample = _sample(config)
-    return list(
-        dict.fromkeys(
-            [
-                "regime",
-                "certified",
-                *([censored(config.scene)] if sample.survival else []),
-                *sample.quantiles,
-                *sample.sensitive,
-            ]
-        )
-    )
+    times = [censored(config.scene)] if sample.survival else []
+    return list(dict.fromkeys(["regime", "certified", *times, *sample.quantiles, *sample.sensitive]))
 
 
 def _reduce(sample: Sample, time: str, columns: Columns, shares: NDArray[np.float64]) -> Columns:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
 
 import numpy as np
 import xarray as xr
@@ -16,6 +15,7 @@ from ringsweep.physics import drives, ring, zones
 from ringsweep.physics.drives import Constant
 from ringsweep.quantities.flags import FAILED, JAMMED, REGIMES, RIDING, SEPARATING
 from ringsweep.quantities.quantity import after_number
+from ringsweep.quantities.units import rounded_up
 from ringsweep.quantities.variables import INFERRED
 from ringsweep.runs.cells import by_law, laws_at, values_at
 from ringsweep.solvers.automaton import PATIENCE
@@ -66,7 +66,7 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
     if unstable:
         if np.isfinite(largest):
             steps = config.solver.steps * largest / STABILITY_LIMIT
-            remedy = f"about {_two_digits_up(steps):.2g} steps are needed"
+            remedy = f"about {rounded_up(steps):.2g} steps are needed"
         else:
             remedy = "no step is small enough for a friction law that jumps"
         logger.warning(
@@ -105,13 +105,6 @@ def _hint_at_one_word(results: xr.Dataset, config: Config) -> None:
         REGIMES[found.pop()],
         ", does a contact meet the zone" if zones else "",
     )
-
-
-def _two_digits_up(number: float) -> float:
-    """A positive number, rounded up to two digits."""
-    unit = 10.0 ** (math.floor(math.log10(number)) - 1)
-    # The small number forgives rounding: 200 stays 200.
-    return math.ceil(number / unit - 1e-9) * unit
 
 
 def _warn_of_failures(results: xr.Dataset, config: Config) -> None:
@@ -171,13 +164,9 @@ def _hint_at_zone_never_met(results: xr.Dataset, config: Config) -> None:
     drawn = np.arange(regime.size) if regime.size <= _CELLS else np.sort(draw.integers(regime.size, size=_CELLS))
     if not all(_misses_zones(results, config, np.unravel_index(k, regime.shape)) for k in drawn):
         return
-    who = (
-        "the run"
-        if regime.size == 1
-        else f"{len(drawn)} of {regime.size} cells"
-        if regime.size > _CELLS
-        else "any cell"
-    )
+    who = "the run" if regime.size == 1 else "any cell"
+    if regime.size > _CELLS:
+        who = f"{len(drawn)} of {regime.size} cells"
     logger.info("no contact meets a zone in %s: zone.center is the angle from the bottom of the ring", who)
 
 

@@ -260,13 +260,7 @@ def _cache_one_chunk(variable: Any) -> None:
 def _chunked(layout: Layout, inner: tuple[int, ...]) -> dict[str, Any]:
     if layout.total * math.prod(inner) < COMPRESSED_FROM:
         return {}
-    return {
-        "compression": "zlib",
-        "complevel": 1,
-        "shuffle": True,
-        "fletcher32": True,
-        "chunksizes": (*layout.chunk, *inner),
-    }
+    return {"compression": "zlib", "complevel": 1, "fletcher32": True, "chunksizes": (*layout.chunk, *inner)}
 
 
 def check_kind(path: str | os.PathLike[str], mark: str, content: str) -> None:

@@ -66,18 +66,13 @@ def identity(config: Config) -> dict[str, str]:
     }
     if LAW not in axes.columns:
         found[f"scene.{LAW}"] = structure.law
-    if (curve := next((one.curve for one in scene.structures.values() if one.curve is not None), None)) is not None:
-        found["scene.friction"] = f"a table of {len(curve[0])} points ({_digest(*curve)})"
-    for law, own in scene.structures.items():
-        if own.own_law is not None:
-            found[f"scene.friction.laws.{law}"] = str(own.own_law.__doc__)
-    for path, formula in (("scene.drive.theta", structure.own_drive), ("scene.force.formula", structure.own_force)):
-        if formula is not None:
-            found[path] = str(formula.__doc__)
-    if structure.table is not None:
-        found["scene.drive"] = f"a table of {len(structure.table[0])} samples ({_digest(*structure.table)})"
-    if structure.force is not None:
-        found["scene.force"] = f"a table of {len(structure.force[0])} samples ({_digest(*structure.force)})"
+    curve = next((one.curve for one in scene.structures.values() if one.curve is not None), None)
+    for path, table in (("friction", curve), ("drive", structure.table), ("force", structure.force)):
+        if table is not None:
+            found[f"scene.{path}"] = f"a table of {len(table[0])} rows ({_digest(*table)})"
+    formulas = {f"friction.laws.{law}": own.own_law for law, own in scene.structures.items()}
+    formulas |= {"drive.theta": structure.own_drive, "force.formula": structure.own_force}
+    found |= {f"scene.{path}": str(formula.__doc__) for path, formula in formulas.items() if formula is not None}
     found |= {f"scene.{path}": repr(float(value)) for path, value in scene.values.items() if path not in axes.columns}
     if structure.exponent:
         found["record.exponent"] = "true"
