@@ -9,13 +9,13 @@ from __future__ import annotations
 import argparse
 import json
 import logging
-import re
 import sys
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import ringsweep
 from ringsweep.errors import InputError
 from ringsweep.quantities.quantity import after_number
 
@@ -59,7 +59,7 @@ def run_command(arguments: argparse.Namespace) -> None:
         print(describe(config, target, arguments.jobs, arguments.reuse))
         return
 
-    from ringsweep import plots
+    from ringsweep.cli import drawing
     from ringsweep.cli.report import summarise
     from ringsweep.runs.executors import Execution
     from ringsweep.runs.sweep import write
@@ -77,15 +77,17 @@ def run_command(arguments: argparse.Namespace) -> None:
         if not computed and _is_newer(picture, target):
             return
         if config.axes.sizes:
-            _draw(lambda: plots.regime_map(result), picture, f"ringsweep map {target}")
+            _draw(lambda: ringsweep.plots.regime_map(result), picture, f"ringsweep map {target}")
         elif config.sample is not None:
-            _draw(lambda: _panel(plots.probability_panel, result), picture, f"ringsweep plot {target}")
+            _draw(lambda: drawing.panel(ringsweep.plots.probability_panel, result), picture, f"ringsweep plot {target}")
 
 
 def _draw(figure: Callable[[], Any], picture: Path, command: str) -> None:
     """Draw the picture of a dataset. The dataset is complete, so a picture that fails is only a warning."""
+    from ringsweep.cli.drawing import save
+
     try:
-        _save(figure(), picture)
+        save(figure(), picture)
     except Exception as error:
         reason = error.problem if isinstance(error, InputError) else error
         logger.warning("%s is not drawn: %s (draw one with %s)", picture, reason, command)
@@ -107,23 +109,6 @@ def _silence_dask() -> None:
             logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
-def _picture_of(dataset: Path, output: str | None, *parts: str | None) -> Path:
-    """Path of a picture of a dataset: `output`, or its name with these parts; checked before anything is drawn."""
-    from ringsweep.storage import files
-
-    target = Path(output or dataset.with_name("-".join([dataset.stem, *filter(None, parts)]) + ".png"))
-    files.check_writable(target)
-    return target
-
-
-def _save(figure: Any, picture: Path) -> None:
-    """Save a figure, and say so."""
-    from ringsweep import plots
-
-    plots.save(figure, picture)
-    print(f"wrote {picture}")
-
-
 def _store(result: Any, target: Path, text: str) -> None:
     """Write a dataset, and print what it says."""
     from ringsweep.storage import netcdf
@@ -135,179 +120,16 @@ def _store(result: Any, target: Path, text: str) -> None:
 
 def map_command(arguments: argparse.Namespace) -> None:
     """Draw a variable of a sweep."""
-    _draw_stored(arguments, _draw_map)
+    from ringsweep.cli import drawing
+
+    drawing.draw_stored(arguments, drawing.draw_map)
 
 
 def plot_command(arguments: argparse.Namespace) -> None:
     """Draw a stored run, or stored errors against run time."""
-    _draw_stored(arguments, _plot)
+    from ringsweep.cli import drawing
 
-
-def _draw_stored(arguments: argparse.Namespace, draw: Callable[[argparse.Namespace, Path, Any], None]) -> None:
-    """Draw a file, which errors about a dataset name."""
-    from ringsweep.storage import netcdf
-
-    dataset = Path(arguments.dataset)
-    with netcdf.reading(dataset) as result:
-        try:
-            draw(arguments, dataset, result)
-        except InputError as error:
-            if error.path == "ds":
-                raise InputError(str(dataset), error.problem) from error
-            raise
-
-
-def _draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
-    from ringsweep import plots
-    from ringsweep.plots.sections import has_circle, has_diagram, points_of
-    from ringsweep.plots.selection import select
-    from ringsweep.quantities.variables import POINTS
-    from ringsweep.storage import netcdf
-
-    selection = dict(_selection(text) for text in arguments.sel)
-    fixed = {name.replace(".", "_") for name in selection}
-    diagram = arguments.var in POINTS
-    # A file of one axis is drawn as a diagram, unless something is asked for that only a map has.
-    plain = not (arguments.y or arguments.log or arguments.boundaries or str(arguments.output).endswith(".html"))
-    along = result.isel(dict.fromkeys(fixed & set(map(str, result.dims)), 0))
-    circle = str(arguments.var).startswith("multiplier_") and plain and has_circle(along)
-    if arguments.var is None:
-        diagram = plain and has_diagram(along)
-        arguments.var = points_of(result)[0] if diagram else "regime"
-    if arguments.var == "attractor" and points_of(result):
-        from ringsweep.runs.attractors import attractors
-
-        result = attractors(result)
-    # The name differs from that of the regime map of the sweep, which must not be replaced.
-    shown = None if arguments.var == "regime" else arguments.var
-    target = _picture_of(dataset, arguments.output, shown, *map(_name_part, arguments.sel))
-    page = target.suffix.lower() == ".html"
-    if page and arguments.log:
-        raise InputError("--log", "is for pictures, not for a page: name the output *.png")
-    if page and arguments.boundaries is not None:
-        raise InputError("--boundaries", "are drawn into pictures, not into a page: name the output *.png")
-    if arguments.tolerance is not None and arguments.boundaries is None:
-        raise InputError("--tolerance", "is that of --boundaries REGIME")
-    curves = None
-    if arguments.boundaries is not None:
-        from ringsweep.plots.datasets import is_sampled
-        from ringsweep.plots.selection import select_grid
-        from ringsweep.runs.boundaries import boundary, run_at
-
-        tolerance = 1e-6 if arguments.tolerance is None else arguments.tolerance
-        sampled = is_sampled(result)
-        located = _at_medians(result) if sampled else result
-        held = {name: value for name, value in selection.items() if name != "word" or not sampled}
-        located, missing = select_grid(located, held)
-        if missing:
-            located = run_at(located, missing, arguments.boundaries)
-        curves = boundary(located, arguments.boundaries, tolerance)
-        if sampled:
-            selection["word"] = arguments.boundaries
-        else:
-            # The picture shows the cells between which the curves lie.
-            result, selection = located, {}
-        written = dataset.with_name(f"{target.stem}-{arguments.boundaries}.nc")
-        netcdf.save(curves, written)
-        print(f"wrote {written}")
-    chosen = (arguments.x, arguments.y, arguments.var, selection)
-    if page:
-        plots.save_page(result, target, *chosen)
-        print(f"wrote {target}")
-    elif diagram:
-        _save(plots.bifurcation(result, arguments.x, arguments.var, selection), target)
-    elif circle:
-        _save(_panel(plots.multiplier_circle, select(result, selection)[0], x=arguments.x), target)
-    else:
-        _save(plots.regime_map(result, *chosen, curves, norm="log" if arguments.log else None), target)
-
-
-def _at_medians(result: Any) -> Any:
-    """The sweep of a sampled one in which every uncertain parameter has its median."""
-    from ringsweep.runs.executors import Execution
-    from ringsweep.runs.sampled import nominal
-    from ringsweep.runs.sweep import compute
-
-    return compute(nominal(result), Execution(progress=False))
-
-
-def _panel(draw: Callable[..., Any], result: Any, height: float = 4.2, **options: Any) -> Any:
-    """A new figure with one picture."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.6, height), layout="constrained")
-    draw(result, ax=figure.add_subplot(), **options)
-    return figure
-
-
-def _name_part(held: str) -> str:
-    """A setting as part of a file name, with no character that means something to a shell or to LaTeX."""
-    return re.sub(r"[^A-Za-z0-9_-]+", "-", held.replace(" ", "").replace("+", ""))
-
-
-def _plot(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
-
-    from ringsweep import plots
-    from ringsweep.plots.datasets import is_sampled, resolve
-
-    if "standard_error" in result:
-        given = (arguments.kind, arguments.law, arguments.word, arguments.begin, arguments.end)
-        if arguments.sel or any(option is not None for option in given):
-            raise InputError(str(dataset), "is a fit, of which there is one picture: leave other options out")
-        _save(plots.fit(result), Path(arguments.output or dataset.with_suffix(".png")))
-        return
-    if is_sampled(result):
-        _plot_sample(arguments, dataset, result)
-        return
-    if arguments.sel or arguments.word is not None or arguments.kind in _SAMPLE_KINDS:
-        option = "--sel" if arguments.sel else "--word" if arguments.word is not None else f"--kind {arguments.kind}"
-        raise InputError(option, f"is for a sampled sweep, and {dataset} is none")
-    if not {"time", "contender"} & set(result.dims):
-        raise InputError(str(dataset), f"is a sweep, not the history of a run: ringsweep map {dataset} draws it")
-    target = _picture_of(dataset, arguments.output, arguments.kind, arguments.law)
-    cut = slice(arguments.begin, arguments.end)
-    if "contender" in result.dims and (arguments.kind or arguments.law or cut != slice(None)):
-        raise InputError(str(dataset), "holds errors against run time: --kind, --law, --from, --to are for histories")
-    if arguments.law is not None:
-        if "friction_law" not in result.dims:
-            raise InputError("--law", f"{dataset} holds a run under one friction law only")
-        laws = map(str, result["friction_law"].values)
-        result = result.sel(friction_law=resolve("--law", arguments.law, laws))
-    if cut != slice(None):
-        times = result["time"].values
-        result = result.sel(time=cut)
-        if result.sizes["time"] < 2:
-            raise InputError(
-                "--from", f"{dataset} has times from {times[0]:g} to {times[-1]:g} s: none in this interval"
-            )
-    if "contender" in result.dims:
-        figure = plots.work_precision(result)
-    elif arguments.kind is None:
-        figure = plots.history(result)
-    else:
-        figure = _panel(plots.phase_portrait if arguments.kind == "phase" else plots.friction_loop, result, 4.8)
-    _save(figure, target)
-
-
-_SAMPLE_KINDS = ("probability", "survival", "sensitivity")
-
-
-def _plot_sample(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
-    """Draw one cell of a sampled sweep."""
-    from ringsweep import plots
-    from ringsweep.plots.selection import select
-
-    if arguments.law is not None or arguments.begin is not None or arguments.end is not None:
-        raise InputError(str(dataset), "is a sampled sweep: --law, --from, --to are for histories")
-    if arguments.kind not in (None, *_SAMPLE_KINDS):
-        raise InputError("--kind", f"{arguments.kind} is for histories; of {dataset}: {', '.join(_SAMPLE_KINDS)}")
-    kind = arguments.kind or "probability"
-    if arguments.word is not None and kind != "sensitivity":
-        raise InputError("--word", "is that of --kind sensitivity")
-    target = _picture_of(dataset, arguments.output, arguments.kind, *map(_name_part, arguments.sel))
-    result, _ = select(result, dict(_selection(text) for text in arguments.sel))
-    draw = getattr(plots, f"{kind}_panel")
-    _save(_panel(draw, result, **({"word": arguments.word} if arguments.word else {})), target)
+    drawing.draw_stored(arguments, drawing.draw_plot)
 
 
 def simulate_command(arguments: argparse.Namespace) -> None:
@@ -317,7 +139,6 @@ def simulate_command(arguments: argparse.Namespace) -> None:
     config = with_values(arguments.config, arguments.set)
     target, picture = _outputs(arguments.output or f"{config.name}-run.nc", "time", "history")
 
-    from ringsweep import plots
     from ringsweep.cli.report import print_events
     from ringsweep.runs.simulate import history
     from ringsweep.storage import netcdf
@@ -329,7 +150,7 @@ def simulate_command(arguments: argparse.Namespace) -> None:
     print(result.attrs["outcome"])
     print_events(result)
     print(f"wrote {target}")
-    _draw(lambda: plots.history(result), picture, f"ringsweep plot {target}")
+    _draw(lambda: ringsweep.plots.history(result), picture, f"ringsweep plot {target}")
 
 
 def threshold_command(arguments: argparse.Namespace) -> None:
@@ -348,12 +169,10 @@ def fit_command(arguments: argparse.Namespace) -> None:
     name = arguments.output or f"{load(arguments.config, arguments.set).name}-fit.nc"
     target, picture = _outputs(name, "standard_error", "fit")
 
-    from ringsweep import plots
-
     options = {"start": arguments.start, "noise": arguments.noise, "settings": arguments.set}
     result = fitted(arguments.config, arguments.data, ranges_of(arguments.vary), **options)
     _store(result, target, in_words(result))
-    _draw(lambda: plots.fit(result), picture, f"ringsweep plot {target}")
+    _draw(lambda: ringsweep.plots.fit(result), picture, f"ringsweep plot {target}")
 
 
 def _other_scene(target: Path, result: Any) -> str:
@@ -390,13 +209,12 @@ def animate_command(arguments: argparse.Namespace) -> None:
             "sweep", "several friction laws, but an animation shows one run: name its law by --set friction.law=..."
         )
 
-    from ringsweep import plots
     from ringsweep.plots.films import check_animation
     from ringsweep.runs.simulate import history
 
     check_animation(target)
     result = history(config)
-    plots.save_animation(result, target, progress=not arguments.quiet)
+    ringsweep.plots.save_animation(result, target, progress=not arguments.quiet)
     print(result.attrs["outcome"])
     print(f"wrote {target}")
 
@@ -410,7 +228,6 @@ def precision_command(arguments: argparse.Namespace) -> None:
         raise InputError("sweep.sample", "precision measures the cells of a grid: leave sample out")
     target, picture = _outputs(arguments.output or f"{config.name}-precision.nc", "contender", "error against run time")
 
-    from ringsweep import plots
     from ringsweep.cli.precision_table import report
     from ringsweep.runs.precision import measure
 
@@ -418,7 +235,7 @@ def precision_command(arguments: argparse.Namespace) -> None:
     options = {name: value for name, value in given.items() if value is not None}
     result = measure(config, **options, progress=not arguments.quiet)
     _store(result, target, report(result))
-    _draw(lambda: plots.work_precision(result), picture, f"ringsweep plot {target}")
+    _draw(lambda: ringsweep.plots.work_precision(result), picture, f"ringsweep plot {target}")
 
 
 def info_command(arguments: argparse.Namespace) -> None:
@@ -483,14 +300,6 @@ def schema_command(arguments: argparse.Namespace) -> None:
     from ringsweep.config.schema import schema
 
     print(json.dumps(schema(), indent=2, ensure_ascii=False))
-
-
-def _selection(text: str) -> tuple[str, str]:
-    """Coordinate and value of ``DIM=VALUE``."""
-    name, equals, value = (part.strip() for part in text.partition("="))
-    if not equals:
-        raise InputError("--sel", f"{text!r} is not of the form DIM=VALUE")
-    return name, value
 
 
 def _outputs(name: str, mark: str, content: str) -> tuple[Path, Path]:
