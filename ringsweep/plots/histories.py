@@ -294,14 +294,8 @@ def draw_panel(
         at, phase = _by_interval(time, phases(ds))
         for value, look in _shades().items():
             spans = [(at[i], at[j] - at[i]) for i, j in true_ranges(phase == value)]
-            axes.broken_barh(
-                spans,
-                (0, 1),
-                transform=axes.get_xaxis_transform(),
-                **look,
-                linewidth=0,
-                label=mode_name(value) if explain_shading and spans else None,
-            )
+            label = mode_name(value) if explain_shading and spans else None
+            axes.broken_barh(spans, (0, 1), transform=axes.get_xaxis_transform(), linewidth=0, label=label, **look)
     if names == ("impact_speed",):
         _draw_impacts(axes, ds)
         return
@@ -410,11 +404,8 @@ def _draw_laws(axes: Axes, ds: xr.Dataset, names: tuple[str, ...]) -> None:
     numbers = displayed(ds[name]).transpose("friction_law", "time").values
     regimes = words(ds["regime"]).values if "regime" in ds else None
     for k, law in enumerate(ds["friction_law"].values):
-        axes.plot(
-            *_envelope(ds["time"].values, numbers[k]),
-            **_law_style(k),
-            label=str(law) if regimes is None else f"{law}: {regimes[k]}",
-        )
+        label = str(law) if regimes is None else f"{law}: {regimes[k]}"
+        axes.plot(*_envelope(ds["time"].values, numbers[k]), label=label, **_law_style(k))
     axes.set_ylabel(_short_label(ds, name))
     axes.margins(x=0)
     if name.startswith(("normal", "gap")):

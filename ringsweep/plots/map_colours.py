@@ -120,8 +120,8 @@ def cell_warnings(ds: xr.Dataset, data: xr.DataArray) -> list[CellWarning]:
     reason.
     """
     if data.name not in ("regime", "motion", "aftermath"):
-        inferred = _missing_inferred(ds, data)
-        return [CellWarning(_NOT_RUN, "//////", "x", inferred)] if _has_two_kinds_of_missing(data, inferred) else []
+        apart = _inferred_apart(ds, data)
+        return [CellWarning(_NOT_RUN, "//////", "x", apart)] if apart.any() else []
     found = []
     if "certified" in ds:
         cells = (ds["certified"] == 0).broadcast_like(data)
@@ -150,7 +150,7 @@ def missing_text(ds: xr.Dataset, data: xr.DataArray) -> str:
     if name in _EVENTS and not ended_early and (span := _span(ds)):
         text += f"\nwithin {span}"
     inferred = _missing_inferred(ds, data)
-    if inferred.any() and not _has_two_kinds_of_missing(data, inferred):
+    if inferred.any() and not _inferred_apart(ds, data).any():
         text = _NOT_RUN if inferred.equals(missing) else f"{text}, or\n{_NOT_RUN}"
     return text
 
@@ -164,9 +164,13 @@ def _missing_inferred(ds: xr.Dataset, data: xr.DataArray) -> xr.DataArray:
     return missing & (ds["origin"] == INFERRED) if "origin" in ds else missing & False
 
 
-def _has_two_kinds_of_missing(data: xr.DataArray, inferred: xr.DataArray) -> bool:
-    """Whether some cells were inferred and others lack a value for another reason. A line cannot be hatched."""
-    return data.ndim > 1 and bool(inferred.any()) and not inferred.equals(data.isnull())
+def _inferred_apart(ds: xr.Dataset, data: xr.DataArray) -> xr.DataArray:
+    """Missing cells that were not run, if a map tells them from others that are missing; else none.
+
+    A line cannot: it has no hatching.
+    """
+    inferred = _missing_inferred(ds, data)
+    return inferred & (data.ndim > 1 and not inferred.equals(data.isnull()))
 
 
 # Events that a run may lack, and what it lacks if another variable is missing.
@@ -196,8 +200,7 @@ def legend_entries(
             if where.any():
                 entries.append(Patch(color=scale.colours(k), label=f"{meaning}, {_share(where)}"))
     if not shown.all():
-        inferred = _missing_inferred(ds, data)
-        other = ~shown & ~inferred.values if _has_two_kinds_of_missing(data, inferred) else ~shown
+        other = ~shown & ~_inferred_apart(ds, data).values
         entries.append(Patch(color=on_page(NO_VALUE), label=f"{missing_text(ds, data)}, {_share(other)}"))
     if isinstance(scale.norm, LogNorm) and (zero := data.values == 0.0).any():
         entries.append(Patch(color=ZERO, label=f"exactly 0, {_share(zero)}"))

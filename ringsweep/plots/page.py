@@ -411,25 +411,12 @@ def _document(sweep: _Sweep) -> Any:
     tell = CustomJSHover(code="return ringsweep_tell(special_vars)")
     for renderer in (drawn, *curve[-1:]):
         # Over a line, wherever the pointer is, the nearest cell tells its numbers.
-        plot.add_tools(
-            HoverTool(
-                tooltips=_TOOLTIP,
-                formatters={"@{value}": tell},
-                renderers=[renderer],
-                mode="vline" if renderer in curve else "mouse",
-                limit=1,
-            )
-        )
+        how = {"mode": "vline" if renderer in curve else "mouse", "limit": 1}
+        plot.add_tools(HoverTool(tooltips=_TOOLTIP, formatters={"@{value}": tell}, renderers=[renderer], **how))
     document = Document()
     notes = Div(text="; ".join([sweep.title, *sweep.notes]), render_as_text=True, sizing_mode="stretch_width")
-    document.add_root(
-        column(
-            notes,
-            row(variable, *slices, sizing_mode="stretch_width", styles={"flex-wrap": "wrap"}),
-            plot,
-            sizing_mode="stretch_both",
-        )
-    )
+    choosers = row(variable, *slices, sizing_mode="stretch_width", styles={"flex-wrap": "wrap"})
+    document.add_root(column(notes, choosers, plot, sizing_mode="stretch_both"))
     document.js_on_event(DocumentReady, show)
     return document
 

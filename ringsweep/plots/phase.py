@@ -251,9 +251,8 @@ def _draw_bands(ax: Axes, rig: Rig, angle: NDArray[Any], wrapped: bool) -> list[
     margin = 0.0 if wrapped else 0.05 * (high - low) or _turn() / 72.0
     low, high = low - margin, high + margin
     entries: list[Artist] = []
-    for number, (name, (center, half_angle)) in enumerate(
-        zip(arc_names(len(rig.arcs)), rig.arcs, strict=True), start=1
-    ):
+    arcs = zip(arc_names(len(rig.arcs)), rig.arcs, strict=True)
+    for number, (name, (center, half_angle)) in enumerate(arcs, start=1):
         for contact in rig.contacts:
             lines = ("///", "\\\\\\")[contact - 1] if len(rig.contacts) > 1 else None
             fill: dict[str, Any] = {"facecolor": arc_colour(number), "alpha": 0.35, "linewidth": 0}

@@ -153,13 +153,10 @@ class RingArtists:
         self.frictions = self._arrows(colours, 0.016)
         self.gravity = self._arrows([ink], 0.016)
         marks = [f"_{k}" if text else "" for k, text in zip(rig.contacts, texts, strict=True)]
+        names = [*(f"$N{mark}$" for mark in marks), *(f"$F{mark}$" for mark in marks), "$Mg$"]
         self.names = [
             ax.text(0.0, 0.0, name, color=colour, ha="center", va="center", zorder=8, path_effects=[halo])
-            for name, colour in (
-                *((f"$N{mark}$", colour) for mark, colour in zip(marks, colours, strict=True)),
-                *((f"$F{mark}$", colour) for mark, colour in zip(marks, colours, strict=True)),
-                ("$Mg$", ink),
-            )
+            for name, colour in zip(names, [*colours, *colours, ink], strict=True)
         ]
         self._draw_scale_bars()
         self.speeds = ax.text(0.5, 0.0, "", transform=ax.transAxes, ha="center", va="bottom", fontsize=SMALL)
@@ -273,14 +270,12 @@ class RingArtists:
         R = self.rig.radius
         y = -1.62 * R
         force, length = round_down(0.75 * self.reference), round_down(0.5 * R)
-        if self.magnification > 1.0:
+        magnified = self.magnification > 1.0
+        bars = [(force * self.scale, f"{force:g} N", "$N$, $Mg$" if magnified else "$N$, $F$, $Mg$")]
+        if magnified:
             friction = round_down(0.75 * self.reference / self.magnification)
-            bars = [
-                (force * self.scale, f"{force:g} N", "$N$, $Mg$"),
-                (friction * self.scale * self.magnification, f"{friction:g} N", f"$F$ ({TIMES}{self.magnification:g})"),
-            ]
-        else:
-            bars = [(force * self.scale, f"{force:g} N", "$N$, $F$, $Mg$")]
+            extent = friction * self.scale * self.magnification
+            bars.append((extent, f"{friction:g} N", f"$F$ ({TIMES}{self.magnification:g})"))
         bars.append((length, f"{1000 * length:g} mm", ""))
         style: dict[str, Any] = {"color": on_page("0.3"), "linewidth": 1.2}
         for x, (extent, text, what) in zip((-1.4 * R, -0.35 * R, 0.7 * R), bars, strict=False):

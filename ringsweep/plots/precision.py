@@ -160,16 +160,8 @@ def precision_panel(ds: xr.Dataset, error: str = "error_end", ax: Axes | None = 
     for method in drawn:
         own = rows[methods[rows] == method]
         style = _method_style(numbered.index(method))
-        ax.errorbar(
-            seconds[own],
-            low[own],
-            yerr=[np.zeros(len(own)), high[own] - low[own]],
-            linestyle="",
-            color=style["color"],
-            alpha=0.45,
-            elinewidth=1,
-            capsize=2.5,
-        )
+        bars = {"linestyle": "", "color": style["color"], "alpha": 0.45, "elinewidth": 1, "capsize": 2.5}
+        ax.errorbar(seconds[own], low[own], yerr=[np.zeros(len(own)), high[own] - low[own]], **bars)
         curves += ax.plot(seconds[own], low[own], label=str(method), **style)
         hollow = own[wrong[own]]
         ax.plot(seconds[hollow], low[hollow], **style | {"linestyle": "", "markerfacecolor": page_colour()})

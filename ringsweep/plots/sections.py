@@ -119,13 +119,9 @@ def bifurcation(
             if _DIRECTION in ds.dims:
                 # The diagram has the key to the directions; theirs would cover the name of the axis.
                 handles, texts = ax.get_legend_handles_labels()
-                legend_above(
-                    ax,
-                    [
-                        _dot(drawn.get_marker(), rcParams["text.color"], text.split(", ")[1])
-                        for drawn, text in zip(handles[:2], texts[:2], strict=True)
-                    ],
-                )
+                both = zip(handles[:2], texts[:2], strict=True)
+                colour = rcParams["text.color"]
+                legend_above(ax, [_dot(drawn.get_marker(), colour, text.split(", ")[1]) for drawn, text in both])
         elif (legend := exponent_panel(ds, x, ax).get_legend()) is not None:
             # The panel above has the key to the directions.
             legend.remove()

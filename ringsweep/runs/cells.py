@@ -216,14 +216,9 @@ def _name_longest(axes: Axes, indices: Indices, steps: NDArray[Any], seconds: fl
     """Name the cell that took most of a long task, and say which limit of steps stands for a minute."""
     longest = int(np.argmax(steps))
     place = _place(axes, {dim: along[longest : longest + 1] for dim, along in indices.items()})
-    most, total = float(steps[longest]), max(float(steps.sum()), 1.0)
-    logger.info(
-        "%s took %.2g steps, %.2g s; a run of %.2g steps takes a minute here: solver.max_steps bounds each",
-        place,
-        most,
-        seconds * most / total,
-        60.0 * total / seconds,
-    )
+    most, cost = float(steps[longest]), seconds / max(float(steps.sum()), 1.0)
+    message = "%s took %.2g steps, %.2g s; a run of %.2g steps takes a minute here: solver.max_steps bounds each"
+    logger.info(message, place, most, cost * most, 60.0 / cost)
 
 
 def _place(axes: Axes, indices: Indices) -> str:

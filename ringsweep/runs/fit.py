@@ -388,15 +388,10 @@ class _Problem:
             return found
 
         low, high = self.bounds[:, free]
+        start = np.clip(u[free], np.nextafter(low, high), np.nextafter(high, low))
+        accuracy = {"x_scale": "jac", "xtol": 1e-9, "ftol": 1e-10, "max_nfev": 60}
         best = least_squares(
-            lambda v: self.residuals(whole(v)),
-            np.clip(u[free], np.nextafter(low, high), np.nextafter(high, low)),
-            lambda v: self.jacobian(whole(v), free),
-            (low, high),
-            x_scale="jac",
-            xtol=1e-9,
-            ftol=1e-10,
-            max_nfev=60,
+            lambda v: self.residuals(whole(v)), start, lambda v: self.jacobian(whole(v), free), (low, high), **accuracy
         )
         return whole(best.x), 2.0 * float(best.cost)
 

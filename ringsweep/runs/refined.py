@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -90,14 +91,10 @@ def decide(config: Config, layout: Layout, labels: KnownLabels, run: Callable[[N
     sizes = config.axes.sizes
     dims = [*(dim for dim in sizes if dim not in config.refine.dims), *config.refine.dims]
     grid = tuple(sizes[dim] for dim in dims)
-    refined = [*(sizes[dim] for dim in config.refine.dims), 1][:2]
-    decisions = refine(
-        (int(np.prod(grid[: len(grid) - len(config.refine.dims)], dtype=int)), refined[0], refined[1]),
-        config.refine.stride,
-        config.refine.audit,
-        within=config.refine.within,
-        seed=SEED,
-    )
+    rows, columns = [*(sizes[dim] for dim in config.refine.dims), 1][:2]
+    layers = math.prod(grid[: len(grid) - len(config.refine.dims)])
+    asked = config.refine.stride, config.refine.audit
+    decisions = refine((layers, rows, columns), *asked, within=config.refine.within, seed=SEED)
     order = [dims.index(dim) for dim in sizes]
     answer = None
     while True:

@@ -232,11 +232,8 @@ def _warn_of_long_runs(results: xr.Dataset, config: Config, count: int) -> None:
         if latest > 0.0:
             remedy = f"the first slip, at k v t = mu_s F_N, needs a span of more than {soonest:.5g} s"
             remedy += f" to {latest:.5g} s" if latest > 1.01 * soonest else ""
-        who = (
-            "the body rides: it has"
-            if regime.size == 1
-            else f"{riding / regime.size:.1%} of the bodies ride: they have"
-        )
+        several = f"{riding / regime.size:.1%} of the bodies ride: they have"
+        who = "the body rides: it has" if regime.size == 1 else several
         logger.warning("%s not broken loose; %s", who, remedy)
 
 
