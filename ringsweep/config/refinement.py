@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ringsweep.config.axes import Axes, dimension
+from ringsweep.config.scene import outcome_numbers
 from ringsweep.config.sections import check_keys, one_of
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
@@ -117,10 +118,7 @@ def _also(section: dict[str, Any], scene: Scene) -> tuple[str | None, float | No
         )
     if "also" not in section:
         return None, None
-    model = model_of(scene.structure)
-    variables = model.variables
-    numbers = [name for name in model.outcomes if name not in model.absent and variables[name].dtype == "float64"]
-    also = one_of(section["also"], numbers, "sweep.refine.also", "is no number of this model")
-    unit = variables[also].unit
+    also = one_of(section["also"], outcome_numbers(scene), "sweep.refine.also", "is no number of this model")
+    unit = model_of(scene.structure).variables[also].unit
     error = Parameter(unit, f"largest error of {also} where it is interpolated", lower=0, open_lower=True)
     return also, quantity(section["within"], error, "sweep.refine.within")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ringsweep.config.axes import MAX_CELLS, Axes, dimension, paths_of, read_spacing, swept_parameter
 from ringsweep.config.consistency import check_consistency
-from ringsweep.config.scene import sweepable
+from ringsweep.config.scene import outcome_numbers, sweepable
 from ringsweep.config.sections import boolean, check_keys, one_of, read_values, suggestion
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS
@@ -21,7 +21,6 @@ from ringsweep.models.scene import Scene
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.quantity import after_number
 from ringsweep.quantities.units import quantity, show
-from ringsweep.quantities.variables import OUTCOMES
 from ringsweep.statistics import DISTRIBUTIONS, METHODS, saltelli, trajectories, unit_points
 
 #: Keys of ``sweep.sample`` with a number.
@@ -382,19 +381,13 @@ def _quantiles(given: Any, scene: Scene) -> dict[str, tuple[float, ...]]:
     where = "sweep.sample.quantiles"
     if not isinstance(given, dict) or not given:
         raise InputError(where, f"variables with lists of levels are expected, got {show(given)}")
-    names = _outcomes(scene)
+    names = outcome_numbers(scene)
     found = {}
     for name, levels in given.items():
         if name not in names:
             raise InputError(f"{where}.{name}", "is no number of this model" + suggestion(name, names))
         found[name] = tuple(sorted(set(read_values(levels, _LEVEL, f"{where}.{name}").tolist())))
     return found
-
-
-def _outcomes(scene: Scene) -> list[str]:
-    """Outcomes of the model that are numbers."""
-    model = MODELS[scene.structure.model]
-    return [name for name in model.outcomes if OUTCOMES[name].dtype == "float64" and name not in model.absent]
 
 
 def _sensitivity(given: Any, scene: Scene, timed: bool) -> tuple[str, tuple[str, ...]]:
@@ -411,7 +404,7 @@ def _sensitivity(given: Any, scene: Scene, timed: bool) -> tuple[str, tuple[str,
     if not isinstance(given["of"], list) or not given["of"]:
         raise InputError(f"{where}.of", f"a list of variables is expected, got {show(given['of'])}")
     time = censored(scene)
-    names = [name for name in _outcomes(scene) if name not in CENSORED or name == time]
+    names = [name for name in outcome_numbers(scene) if name not in CENSORED or name == time]
     for k, name in enumerate(given["of"]):
         if name == time and not timed:
             problem = f"{time} is missing in runs in which it does not happen: say at which times, by survival: [1 s]"

@@ -30,7 +30,7 @@ from ringsweep.config.sections import choose, missing_text, read_values, section
 from ringsweep.config.tables import TABLES, read_table
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
-from ringsweep.models import MODELS, WITH_IMPACT, parameters
+from ringsweep.models import MODELS, WITH_IMPACT, model_of, parameters
 from ringsweep.models.scene import LAW, Scene, Structure
 from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS, Dynamic, family_of
@@ -51,6 +51,13 @@ def sweepable(scene: Scene) -> dict[str, Parameter | Choice]:
     """Every path of a scene that a sweep can vary, with its parameter."""
     own = {law: structure.own_law for law, structure in scene.structures.items() if structure.own_law is not None}
     return {**numbers_of(scene.structures), LAW: law_choice(scene.structure.model, own)}
+
+
+def outcome_numbers(scene: Scene) -> list[str]:
+    """Outcomes of the scene's model that are numbers."""
+    model = model_of(scene.structure)
+    variables = model.variables
+    return [name for name in model.outcomes if name not in model.absent and variables[name].dtype == "float64"]
 
 
 def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | None) -> Scene:

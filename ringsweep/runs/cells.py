@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.compile import readable_compile_errors, take
-from ringsweep.config import Axes, Config
+from ringsweep.config import Axes, Config, sweepable
+from ringsweep.config.axes import dimension
 from ringsweep.config.follow import DIRECTION
 from ringsweep.models import batch, model_of
 from ringsweep.models.model import Continues
@@ -75,6 +76,15 @@ def by_law(scene: Scene, axes: Axes, indices: Indices, count: int) -> Iterator[t
         own = np.flatnonzero(laws == law)
         if len(own):
             yield structure, own
+
+
+def coordinates(scene: Scene, columns: Mapping[str, tuple[Any, Any]]) -> dict[str, Any]:
+    """Coordinates of a dataset by name: dimensions, values and attributes of paths that vary."""
+    known = sweepable(scene)
+    return {
+        dimension(path): (dims, column, {**known[path].attributes, "path": path})
+        for path, (dims, column) in columns.items()
+    }
 
 
 @dataclass(frozen=True)

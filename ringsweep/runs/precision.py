@@ -15,8 +15,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.compile import readable_compile_errors, take
-from ringsweep.config import Config, load, sweepable
-from ringsweep.config.axes import COUNT, dimension
+from ringsweep.config import Config, load
+from ringsweep.config.axes import COUNT
 from ringsweep.errors import InputError
 from ringsweep.models import Model, batch, model_of
 from ringsweep.models.scene import LAW
@@ -24,7 +24,7 @@ from ringsweep.quantities.flags import FAILED
 from ringsweep.quantities.parameters import Parameter
 from ringsweep.quantities.units import quantity
 from ringsweep.quantities.variables import OUTCOMES, PRECISION, Variable
-from ringsweep.runs.cells import values_of_cells
+from ringsweep.runs.cells import coordinates, values_of_cells
 from ringsweep.runs.contenders import TimedMethod, contenders_for, setting_of, solver_yaml, time_methods
 from ringsweep.runs.executors import interruptible, progress_bar
 from ringsweep.solvers.certificate import agree
@@ -227,8 +227,9 @@ def _dataset(
     columns["flagged"] = ("contender", "cell"), ~np.array(passed)
     columns |= {f"reference_{name}": (("cell",), error) for name, error in _errors(looser, tight, model).items()}
 
-    known, values = sweepable(scene), values_of_cells(scene, axes, sample)
-    along = {path: values[path] if path != LAW else [scene.structure.law] * len(sample) for path in axes.columns}
+    values = values_of_cells(scene, axes, sample)
+    law = [scene.structure.law] * len(sample)
+    along = {path: ("cell", law if path == LAW else values[path]) for path in axes.columns}
     return xr.Dataset(
         {
             name: (dims, np.asarray(column, dtype=PRECISION[name].dtype), _described(name, model).attributes)
@@ -243,10 +244,7 @@ def _dataset(
                 {"long_name": "text under solver in a configuration"},
             ),
             "cell": ("cell", sample, {"long_name": "number of the cell in the sweep, last dimension fastest"}),
-            **{
-                dimension(path): ("cell", column, {**known[path].attributes, "path": path})
-                for path, column in along.items()
-            },
+            **coordinates(scene, along),
         },
     ).assign_attrs(attributes(config))
 

@@ -18,14 +18,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsweep.config import Axes, Config, followed, load, read_axes, read_scene, read_solver, refined, sweepable
-from ringsweep.config.axes import dimension
+from ringsweep.config import Axes, Config, followed, load, read_axes, read_scene, read_solver, refined
 from ringsweep.config.follow import BOTH, DIRECTION
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
 from ringsweep.quantities.variables import INFERRED, OUTCOMES, Variable, error_attribute
 from ringsweep.runs import sampled
-from ringsweep.runs.cells import TaskResult, compute_task
+from ringsweep.runs.cells import TaskResult, compute_task, coordinates
 from ringsweep.runs.executors import Execution, Executor, progress_bar, stop_on_interrupt
 from ringsweep.runs.plan import check_room
 from ringsweep.runs.refined import KnownLabels, complete, decide, gaps, with_nan
@@ -595,23 +594,16 @@ class _Tasks:
 
 def _frame(config: Config, found: Refined | None) -> xr.Dataset:
     """Coordinates and attributes of the dataset of a sweep."""
-    refinement = {} if found is None or config.refine is None else refinement_attributes(config.refine, found)
-    known = sweepable(config.scene)
-    sample = {} if config.sample is None else sampled.coordinates(config)
-    about = {} if config.sample is None else sampled.attributes(config)
-    directions: dict[str, Any] = {}
-    if DIRECTION in config.axes.sizes:
-        about_it = {"long_name": f"direction in which {config.follow.path} is followed"} if config.follow else {}
-        directions = {DIRECTION: (DIRECTION, list(BOTH), about_it)}
-    return xr.Dataset(
-        coords={
-            dimension(path): (dims, column, {**known[path].attributes, "path": path})
-            for path, (dims, column) in config.axes.columns.items()
-        }
-        | sample
-        | directions,
-        attrs=attributes(config) | refinement | about,
-    )
+    coords, attrs = coordinates(config.scene, config.axes.columns), attributes(config)
+    if config.sample is not None:
+        coords |= sampled.coordinates(config)
+        attrs |= sampled.attributes(config)
+    if config.refine is not None and found is not None:
+        attrs |= refinement_attributes(config.refine, found)
+    if config.follow is not None and DIRECTION in config.axes.sizes:
+        about = {"long_name": f"direction in which {config.follow.path} is followed"}
+        coords[DIRECTION] = DIRECTION, list(BOTH), about
+    return xr.Dataset(coords=coords, attrs=attrs)
 
 
 def _earlier_sweep(
