@@ -102,7 +102,7 @@ def _warnings_in_one_line() -> Iterator[None]:
         yield
 
 
-def _fail(message: str, status: int, error: BaseException | None = None) -> int:
+def _fail(message: str, status: int, error: BaseException) -> int:
     notes = getattr(error, "__notes__", [])
     prefix = "\033[1;31mringsweep:\033[0m" if _is_coloured(sys.stderr) else "ringsweep:"
     print(prefix, escaped(" ".join("; ".join([message, *notes]).split())), file=sys.stderr)

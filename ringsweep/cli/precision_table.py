@@ -58,11 +58,9 @@ def _verdict(ds: xr.Dataset, unit: str) -> list[str]:
     wrong, worst, meets = wrong_and_worst(ds)
 
     def reached(k: int) -> str:
-        errors = (
-            f"errors up to {worst[k]:.1e} (with the uncertainty of the reference)"
-            if np.isfinite(worst[k])
-            else "runs that failed"
-        )
+        errors = "runs that failed"
+        if np.isfinite(worst[k]):
+            errors = f"errors up to {worst[k]:.1e} (with the uncertainty of the reference)"
         return f"{wrong[k] or 'no'} wrong regime{'' if wrong[k] == 1 else 's'}, {errors}"
 
     words.append(f"with certificates, the default, a run takes {attributes['certificate_cost']:.2g} times as long")

@@ -505,10 +505,9 @@ def _limit(variance: float, freedom: int, estimated: bool) -> float:
 def _covariance(jacobian: Floats, variance: float, paths: list[str]) -> tuple[Floats, list[str]]:
     """Covariance in scaled numbers, infinite where the data say nothing; and what the data do not tell, in words."""
     norms = np.linalg.norm(jacobian, axis=0)
-    told, greatest = [], norms.max()
-    blind = norms <= _SINGULAR * greatest if greatest > 0.0 else np.full(len(paths), True)
+    blind = ~(norms > _SINGULAR * norms.max())
     covariance = np.diag(np.where(blind, np.inf, 0.0))
-    told += [f"the data do not depend on {path}: it is not known" for path, no in zip(paths, blind, strict=True) if no]
+    told = [f"the data do not depend on {path}: it is not known" for path, no in zip(paths, blind, strict=True) if no]
     seen = np.flatnonzero(~blind)
     if len(seen):
         _, singular, directions = np.linalg.svd(jacobian[:, seen] / norms[seen], full_matrices=False)
@@ -522,11 +521,9 @@ def _covariance(jacobian: Floats, variance: float, paths: list[str]) -> tuple[Fl
         if not weak.any():
             deviations = np.sqrt(np.diag(inverse))
             alike = inverse / np.outer(deviations, deviations)
-            for i in range(len(seen)):
-                for j in range(i):
-                    if abs(alike[i, j]) >= _ALIKE:
-                        pair = f"{paths[seen[j]]} and {paths[seen[i]]}"
-                        told.append(f"the data hardly tell {pair} apart: their correlation is {alike[i, j]:.4f}")
+            for i, j in np.argwhere(np.tril(np.abs(alike) >= _ALIKE, -1)):
+                pair = f"{paths[seen[j]]} and {paths[seen[i]]}"
+                told.append(f"the data hardly tell {pair} apart: their correlation is {alike[i, j]:.4f}")
     return covariance, told
 
 

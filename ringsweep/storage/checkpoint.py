@@ -174,13 +174,9 @@ class Checkpoint:
         )
         for name, column in columns.items():
             cells[name] = column
-        members = {
-            "key": np.array(self.fingerprint),
-            "processor": np.array(processor),
-            "positions": positions.astype(np.uint32),
-        }
+        labels = {"key": np.array(self.fingerprint), "processor": np.array(processor)}
         content = io.BytesIO()
-        np.savez(content, allow_pickle=False, cells=cells, **members)
+        np.savez(content, allow_pickle=False, cells=cells, positions=positions.astype(np.uint32), **labels)
         stem = f"{self.fingerprint[:12]}-{positions[0]:010d}-{len(positions)}"
         name = f"{stem}-{_checksum(content.getvalue())}.npz"
         self.working_folder.check()
@@ -250,9 +246,8 @@ class Checkpoint:
                 within = positions[part] - start
                 missing[within] = False
                 for name, column in columns.items():
-                    chunk.setdefault(name, np.empty((stop - start, *column.shape[1:]), column.dtype))[within] = column[
-                        part
-                    ]
+                    whole = chunk.setdefault(name, np.empty((stop - start, *column.shape[1:]), column.dtype))
+                    whole[within] = column[part]
             shape = [s.stop - s.start for s in region]
             chunk = {name: column.reshape((*shape, *column.shape[1:])) for name, column in chunk.items()}
             known = complete is not None and complete(region, missing.reshape(shape), chunk)
