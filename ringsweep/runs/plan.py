@@ -51,10 +51,9 @@ def bytes_of_cell(config: Config) -> int:
     model = model_of(config.scene.structure)
     columns = model.columns(config.scene.structure)
     names = [*(name for name in columns if name not in model.absent), "steps", "certified", "uncertified_because"]
-    errors = (
-        [f"{name}_error" for name in with_errors(model.outcomes)] if getattr(config.solver, "certify", False) else []
-    )
-    return sum(np.dtype(OUTCOMES[name].dtype).itemsize for name in (*names, "stiffness", *errors))
+    bounded = with_errors(model.outcomes) if getattr(config.solver, "certify", False) else ()
+    names += ["stiffness", *(f"{name}_error" for name in bounded)]
+    return sum(np.dtype(OUTCOMES[name].dtype).itemsize for name in names)
 
 
 def check_room(config: Config, cells: int, folder: Path | None) -> None:

@@ -133,18 +133,15 @@ class EarlierSweep:
                 if not shared.any():
                     continue
                 part = ds.isel({dim: slice(along.min(), along.max() + 1) for dim, along in in_file.items()})
-                within = tuple(along - along.min() for along in in_file.values())
-                count = int(shared.sum())
-
-                def read(name: str, part: xr.Dataset = part, within: Any = within, count: int = count) -> NDArray[Any]:
-                    found = part[name].transpose(*in_file, ...).values[within]  # noqa: B023
-                    return np.broadcast_to(found, (count, *found.shape[bool(within) :]))
-
+                within = {dim: along - along.min() for dim, along in in_file.items()}
+                positions = positions[shared]
                 # What an earlier refined sweep has inferred is no cell of it.
-                run = read("origin") != INFERRED if "origin" in ds else np.ones(count, dtype=bool)
-                if run.any():
-                    columns = {name: read(name)[run].astype(OUTCOMES[name].dtype) for name in wanted}
-                    yield positions[shared][run], columns
+                if "origin" in ds:
+                    run = _in_cells(part["origin"], within, len(positions)) != INFERRED
+                    positions, within = positions[run], {dim: along[run] for dim, along in within.items()}
+                if len(positions):
+                    columns = {name: _in_cells(part[name], within, len(positions)) for name in wanted}
+                    yield positions, {name: column.astype(OUTCOMES[name].dtype) for name, column in columns.items()}
 
     def _locate(self, config: Config, indices: Indices, count: int) -> tuple[NDArray[np.bool_], Indices]:
         """Which of `count` cells of the new sweep the file holds, and the indices of these in the file."""
@@ -178,6 +175,12 @@ class EarlierSweep:
                 shared &= number >= 0
                 in_file[dim] = first[number]
         return shared, in_file
+
+
+def _in_cells(data: xr.DataArray, indices: Indices, count: int) -> NDArray[Any]:
+    """Values of a variable in cells; it may have further dimensions. Without indices all cells have one value."""
+    found = data.transpose(*indices, ...).values[tuple(indices.values())]
+    return np.broadcast_to(found, (count, *found.shape[bool(indices) :]))
 
 
 def _align(column: NDArray[np.float64], known: NDArray[np.float64]) -> NDArray[np.float64]:
