@@ -157,7 +157,7 @@ def _plot_sample(arguments: argparse.Namespace, dataset: Path, result: Any) -> N
         raise InputError("--word", "is that of --kind sensitivity")
     target = _picture_of(dataset, arguments.output, arguments.kind, *map(_name_part, arguments.sel))
     result, _ = select(result, dict(_selection(text) for text in arguments.sel))
-    draw = getattr(plots, f"{kind}panel")
+    draw = getattr(plots, f"{kind}_panel")
     save(panel(draw, result, **({"word": arguments.word} if arguments.word else {})), target)
 
 
