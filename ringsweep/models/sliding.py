@@ -6,10 +6,11 @@ from math import inf, isfinite, isnan
 
 import numpy as np
 
-from ringsweep.compile import inlined
-from ringsweep.models.interface import constant_step, implicit, modes, series
+from ringsweep.compile import hook, inlined
+from ringsweep.models.interface import audit, constant_step, implicit, modes, series
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2, SEPARATED_BOTH
 from ringsweep.models.parts import exceeds, larger_eigenvalue
+from ringsweep.models.slip import acceleration_slopes, couplings
 from ringsweep.numerics.functions import any_of, select
 from ringsweep.numerics.series import slope, value
 from ringsweep.physics import contact, drives, ring
@@ -105,6 +106,40 @@ def of_balances(scene, friction, normals, motion, forcing, rate, scales):
     violation = larger(violation, -least / (body.mass * terms * REACTION_TOLERANCE * tolerance))
     violation = larger(violation, ring.imbalance(body, *friction, *normals, acceleration, motion) / _UNBALANCED)
     return violation, ring.power(body, *friction, *normals, motion)
+
+
+@hook
+def audited(scene, mode, forcing, y):
+    """What the audit looks at, of a body on bristles.
+
+    Returns
+    -------
+    tuple
+        The :class:`ringsweep.models.slip.Slip` of the state `y`, the size of the terms of the acceleration, m/s^2, and
+        a violation already found.
+    """
+
+
+@audit.violation.implements(BristleRing, BristleBelt)
+def _bristle_violation(scene, mode, forcing, y, rates, s, tolerance):
+    now, terms, largest = audited(scene, mode, forcing, y)
+    body, v = scene.body, y[1]
+    if not ring.acceleration(body, *now.K, now.motion)[1] > 0.0:
+        largest = inf
+    scales = implicit.error_scales(scene, implicit.IMPLICIT_TOLERANCE * tolerance, y)
+    speed, deflection = scales[1], scales[2]
+    allowed = (1.0 / s + abs(acceleration_slopes(scene, now)[1])) * speed
+    by_bristles = couplings(now.bristles, scene, now)
+    for i in range(len(by_bristles)):
+        by_z, rate_v, rate_z = by_bristles[i]
+        allowed += abs(by_z) * deflection
+        error = abs(now.bristles[i].rate - rates[2 + i])
+        largest = larger(
+            largest, error / ((1.0 / s + abs(rate_z)) * deflection + abs(rate_v) * speed + _ROUNDING * abs(v))
+        )
+    normals = ring.reactions(body, *now.K, now.motion)
+    violation, power = of_balances(scene, now.K, normals, now.motion, forcing, rates[1], (allowed, terms, tolerance))
+    return larger(larger(largest, -mode.sign * v / speed), violation), power
 
 
 # ---- steps of constant length -----------------------------------------------------------------

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ringsweep.compile import inlined
-from ringsweep.models.belt.bristles import contact
 from ringsweep.models.belt.force import breakaway_force, length_scale, sliding, sliding_slopes, speed_scale
 from ringsweep.models.belt.record import Outcome
 from ringsweep.models.interface import audit, implicit
-from ringsweep.models.sliding import larger, of_balances
+from ringsweep.models.sliding import audited, larger, of_balances
+from ringsweep.models.slip import slip
 from ringsweep.physics import ring
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.forces import force_in
@@ -26,9 +26,6 @@ _SAME_SHARE, _SAME_STOPS = 0.1, 0.25
 
 # Errors of the steps around steady sliding look like a swing of a smaller share of the range of the displacement.
 _SMALLEST_SWING = 1e-2
-
-# Rounding of an acceleration, as a share of its largest terms.
-_ROUNDING = 1e-12
 
 
 # A separation is certain if the reaction needs more time to rise again than this multiple of the error of the instant.
@@ -71,19 +68,10 @@ def _energy(scene, forcing, y):
     return ring.energy(scene.body, (y[0], 0.0, y[1] + forcing[1]))
 
 
-@audit.violation.implements(BristleBelt)
-def _bristle_violation(scene, mode, forcing, y, rates, s, tolerance):
-    x, v, z = y
-    motion = x, force_in(scene.drive, forcing), v + forcing[1]
-    rate, rate_v, rate_z, K, slope_v, slope_z = contact(scene, v, z, 1.0 if v >= 0.0 else -1.0, mode.region)
-    _, speed, deflection, _ = implicit.error_scales(scene, implicit.IMPLICIT_TOLERANCE * tolerance, y)
-    by_v = sliding_slopes(scene, K, slope_v, 0.0, motion)[1]
-    by_z = ring.acceleration_slope(scene.body, K, K, slope_z, slope_z, motion)
-    scales = speed / s + abs(by_v) * speed + abs(by_z) * deflection, _terms(scene.body, motion, forcing), tolerance
-    normals = ring.reactions(scene.body, K, K, motion)
-    largest, power = of_balances(scene, (K, K), normals, motion, forcing, rates[1], scales)
-    allowed = (1.0 / s + abs(rate_z)) * deflection + abs(rate_v) * speed + _ROUNDING * abs(v)
-    return larger(larger(largest, abs(rate - rates[2]) / allowed), -mode.sign * v / speed), power
+@audited.implements(BristleBelt)
+def _audited(scene, mode, forcing, y):
+    now = slip(scene, mode, (), forcing, implicit.to_implicit(scene, forcing, y))
+    return now, _terms(scene.body, now.motion, forcing), 0.0
 
 
 def _outcome(rows):

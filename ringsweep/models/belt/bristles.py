@@ -10,17 +10,17 @@ from math import sqrt
 from typing import NamedTuple
 
 from ringsweep.compile import absorbed, inlined
-from ringsweep.models.belt.creep import view
-from ringsweep.models.belt.force import sliding_slopes
+from ringsweep.models.belt.force import length_scale, sliding_slopes
 from ringsweep.models.belt.record import begin
 from ringsweep.models.interface import constant_step, implicit, modes, recorder
 from ringsweep.models.interface.status import RUNNING, SEPARATED_1
 from ringsweep.models.parts import larger_eigenvalue
+from ringsweep.models.slip import Bundle, Slip, region_guards, slip
 from ringsweep.numerics.functions import any_of, select
 from ringsweep.numerics.memory import select_all
 from ringsweep.physics import drives, ring
 from ringsweep.physics.belt import BristleBelt
-from ringsweep.physics.forces import force_in, force_rate
+from ringsweep.physics.forces import force_in
 from ringsweep.physics.friction.bristles import after_yield, bristle, initial_deflection, region_guard, stick_speed
 from ringsweep.physics.friction.velocity import BAND, KINETIC
 
@@ -206,53 +206,37 @@ def _switch(scene, mode, guard, t, y):
     return RUNNING, Mode(mode.sign, region), (x, v, z)
 
 
-@absorbed
-def _in_step(scene, mode, forcing, x):
-    """Numbers of the motion, and what :func:`contact` returns."""
-    motion = x[0], force_in(scene.drive, forcing), x[1] + forcing[1]
-    return motion, contact(scene, x[1], x[2], float(mode.sign), mode.region)
+@implicit.to_implicit.implements(BristleBelt)
+def _to_implicit(scene, forcing, y):
+    return y[0] - forcing[0], y[1], y[2]
 
 
-@implicit.rates.implements(BristleBelt)
-def _implicit_rates(scene, mode, common, forcing, x):
-    motion, (rate, _, _, K, _, _) = _in_step(scene, mode, forcing, x)
-    return motion[2], ring.acceleration(scene.body, K, K, motion)[0] - forcing[2], rate
+@implicit.from_implicit.implements(BristleBelt)
+def _from_implicit(scene, forcing, x):
+    return x[0] + forcing[0], x[1], x[2]
 
 
-@implicit.linearise.implements(BristleBelt)
-def _linearise(scene, mode, common, t, forcing, x):
-    motion, (rate, rate_v, rate_z, K, slope_v, slope_z) = _in_step(scene, mode, forcing, x)
-    by_place, by_v, by_velocity, by_force = sliding_slopes(scene, K, slope_v, 0.0, motion)
-    by_z = ring.acceleration_slope(scene.body, K, K, slope_z, slope_z, motion)
-    by_time = by_velocity * forcing[2] + by_force * force_rate(scene.drive, forcing) - drives.jerk(scene.drive, t)
-    return (
-        (motion[2], ring.acceleration(scene.body, K, K, motion)[0] - forcing[2], rate),
-        (0.0, 1.0, by_place, by_v),
-        ((by_z, rate_v, rate_z),),
-        (forcing[2], by_time, 0.0),
-    )
+@slip.implements(BristleBelt)
+def _slip(scene, mode, common, forcing, x):
+    _, v, z = x
+    motion = x[0] + forcing[0], force_in(scene.drive, forcing), v + forcing[1]
+    rate, rate_v, rate_z, K, slope_v, slope_z = contact(scene, v, z, float(mode.sign), mode.region)
+    return Slip(motion, v, (K, K), (slope_v, slope_v), 0.0, (Bundle(rate, rate_v, rate_z, slope_z),))
+
+
+@region_guards.implements(BristleBelt)
+def _region_guards(scene, mode, common, x):
+    _, v, z = x
+    sign = float(mode.sign)
+    return sign * v, region_guard(scene.law, scene.mu_s, scene.mu_k, v, z, sign, mode.region)
 
 
 @implicit.error_scales.implements(BristleBelt)
 def _error_scales(scene, tolerance, x):
     deflection = scene.mu_s / scene.law.sigma0
     return (
-        tolerance * (abs(x[0]) + deflection),
+        tolerance * (length_scale(scene, abs(x[1])) + deflection),
         tolerance * (abs(x[1]) + recoil_speed(scene)),
         tolerance * deflection,
         tolerance * scene.mu_s * scene.body.gravity,
     )
-
-
-@implicit.guards_and_motion.implements(BristleBelt)
-def _guards_and_motion(scene, mode, common, forcing, x):
-    sign = float(mode.sign)
-    motion, (_, _, _, K, _, _) = _in_step(scene, mode, forcing, x)
-    fast = region_guard(scene.law, scene.mu_s, scene.mu_k, x[1], x[2], sign, mode.region)
-    return view(scene, forcing, x, x[0] - forcing[0], (K, 0.0), motion, (sign * x[1], fast))
-
-
-@implicit.row.implements(BristleBelt)
-def _implicit_row(scene, mode, forcing, x):
-    _, (place, velocity, _, force, _, _, _, _) = implicit.guards_and_motion(scene, mode, (), forcing, x)
-    return place, velocity, force, x[2], 0.0 if mode.region == BAND else float(mode.sign)

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from math import nan
 
-from ringsweep.compile import absorbed, inlined, unrolled
-from ringsweep.models.belt.force import length_scale, located, sliding, sliding_slopes
+from ringsweep.compile import inlined, unrolled
+from ringsweep.models.belt.force import if_force, length_scale, located
 from ringsweep.models.interface import implicit
+from ringsweep.models.slip import Slip, region_guards, relaxes, slip
 from ringsweep.physics import belt, drives, ring
-from ringsweep.physics.forces import force_rate
-from ringsweep.physics.friction.velocity import region_bounds, stiction_band
+from ringsweep.physics.forces import force_in
+from ringsweep.physics.friction.registry import holds_in_band
+from ringsweep.physics.friction.velocity import friction_in, stiction_band
 
 
 @implicit.is_stiff.implements(belt.Belt)
 def _is_stiff(scene, mode, y, linear):
-    (_, acceleration), (_, _, _, decay), _, _ = linear
-    natural_frequency = (scene.body.stiffness / scene.body.mass) ** 0.5
-    return -decay > 50.0 * natural_frequency and abs(acceleration) < 0.01 * -decay * stiction_band(scene.law)
+    return relaxes(scene, linear, (scene.body.stiffness / scene.body.mass) ** 0.5)
 
 
 @implicit.error_scales.implements(belt.Belt)
@@ -25,25 +25,15 @@ def _error_scales(scene, tolerance, x):
     return tolerance * length, tolerance * stiction_band(scene.law)
 
 
-@absorbed
-def _in_step(scene, forcing, x):
-    """What :func:`sliding` returns for the state of an implicit step."""
-    return sliding(scene, x[0] + forcing[0], x[1] + forcing[1], x[1], forcing)
-
-
-@implicit.rates.implements(belt.Belt)
-def _rates(scene, mode, common, forcing, x):
-    K, _, _, motion = _in_step(scene, forcing, x)
-    return x[1], ring.acceleration(scene.body, K, K, motion)[0] - forcing[2]
-
-
-@implicit.linearise.implements(belt.Belt)
-def _linearise(scene, mode, common, t, forcing, x):
-    K, slope, viscous, motion = _in_step(scene, forcing, x)
-    by_place, by_v, by_velocity, by_force = sliding_slopes(scene, K, slope, viscous, motion)
-    rate = by_place * forcing[1] + by_velocity * forcing[2] + by_force * force_rate(scene.drive, forcing)
-    acceleration = ring.acceleration(scene.body, K, K, motion)[0] - forcing[2]
-    return (x[1], acceleration), (0.0, 1.0, by_place, by_v), (), (0.0, rate - drives.jerk(scene.drive, t))
+@slip.implements(belt.Belt)
+def _slip(scene, mode, common, forcing, x):
+    v, sign = x[1], 1.0 if x[1] >= 0.0 else -1.0
+    mu, slope = friction_in(scene.law, mode.region, abs(v), (scene.mu_s, scene.mu_k))
+    # In a dead band friction balances all other forces.
+    yields = holds_in_band(scene.law) and mode.region < 0
+    viscous = 0.0 if yields else if_force(scene.body, scene.viscous, 0.0)
+    motion = x[0] + forcing[0], force_in(scene.drive, forcing) - viscous * v, v + forcing[1]
+    return Slip(motion, v, (-sign * mu, -sign * mu), (-slope, -slope), viscous / scene.body.mass, ())
 
 
 @inlined
@@ -52,31 +42,21 @@ def all_guards(body, normal, slow, fast):
     return ring.if_load_varies(body, (normal, slow, fast), (slow, fast))
 
 
-@inlined
-def view(scene, forcing, x, place, friction, motion, guards):
-    """View of a state in slip.
-
-    `place` is that on the belt, m, and `friction` are K and the viscous friction, N. `x` has the sliding velocity.
-    """
-    K, viscous = friction
-    acceleration, _ = ring.acceleration(scene.body, K, K, motion)
-    normal, _ = ring.reactions(scene.body, K, K, motion)
-    seen = motion[0], motion[2], acceleration, viscous - K * normal, place, x[1], forcing[2], _deflection(x, nan)
-    return all_guards(scene.body, normal, *guards), seen
+@implicit.guards_and_motion.implements(belt.Belt, belt.BristleBelt)
+def _guards_and_motion(scene, mode, common, forcing, x):
+    now, body = slip(scene, mode, common, forcing, x), scene.body
+    acceleration, _ = ring.acceleration(body, *now.K, now.motion)
+    normal, _ = ring.reactions(body, *now.K, now.motion)
+    friction = now.damping * body.mass * x[1] - now.K[0] * normal
+    place, _, velocity = now.motion
+    seen = place, velocity, acceleration, friction, x[0], x[1], forcing[2], _deflection(x, nan)
+    return all_guards(body, normal, *region_guards(scene, mode, common, x)), seen
 
 
 @unrolled
 def _deflection(length, x, missing):
     """Deflection of the bristles; `missing` without bristles."""
     return ["return x[2]" if length > 2 else "return missing"]
-
-
-@implicit.guards_and_motion.implements(belt.Belt)
-def _guards_and_motion(scene, mode, common, forcing, x):
-    K, _, viscous, motion = _in_step(scene, forcing, x)
-    low, high = region_bounds(scene.law, mode.region)
-    speed = mode.sign * x[1]
-    return view(scene, forcing, x, x[0], (K, viscous * x[1]), motion, (speed - low, high - speed))
 
 
 @implicit.seen.implements(belt.Belt, belt.BristleBelt)
@@ -91,7 +71,8 @@ def _near_zero(scene, motion):
     return all_guards(scene.body, 0.05 * scene.body.mass * scene.body.gravity, 0.0, 0.0)
 
 
-@implicit.row.implements(belt.Belt)
+@implicit.row.implements(belt.Belt, belt.BristleBelt)
 def _row(scene, mode, forcing, x):
-    _, (position, velocity, _, friction, _, _, _, _) = implicit.guards_and_motion(scene, mode, (), forcing, x)
-    return position, velocity, friction, 0.0, 0.0
+    _, motion = implicit.guards_and_motion(scene, mode, (), forcing, x)
+    state = 0.0 if mode.region < 0 else float(mode.sign)
+    return motion[0], motion[1], motion[3], _deflection(x, 0.0), state

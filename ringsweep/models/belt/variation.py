@@ -7,16 +7,15 @@ from math import inf
 from ringsweep.compile import hook
 from ringsweep.models import section, tangent
 from ringsweep.models.belt.bristles import recoil_speed
-from ringsweep.models.belt.force import if_force, sliding_slopes, stuck_gradient, stuck_rates
+from ringsweep.models.belt.force import stuck_gradient, stuck_rates
 from ringsweep.models.belt.record import with_tangent
 from ringsweep.models.belt.series import SLOW
 from ringsweep.models.interface import implicit, variation
 from ringsweep.physics import drives, ring
 from ringsweep.physics.belt import Belt, BristleBelt
-from ringsweep.physics.forces import force_in
 from ringsweep.physics.friction.bristles import region_guard
 from ringsweep.physics.friction.registry import holds_in_band
-from ringsweep.physics.friction.velocity import friction_in, stiction_band
+from ringsweep.physics.friction.velocity import stiction_band
 
 # Differences for the gradient of a guard of bristles, as a share of their speed and deflection.
 _SMALL = 1e-4
@@ -70,20 +69,6 @@ def _gradient(scene, mode, guard, t, y, rates):
     """Gradient of a guard by the state over the rate of the guard, in the mode that ends."""
 
 
-@variation.jacobian.implements(Belt)
-def _jacobian(scene, mode, t, y):
-    x, v = y
-    if mode.sign == 0:
-        return 0.0, 1.0, 0.0, 0.0
-    forcing = drives.turn(scene.drive, t)
-    mu, slope = friction_in(scene.law, mode.region, mode.sign * v, (scene.mu_s, scene.mu_k))
-    yields = holds_in_band(scene.law) and mode.region < 0
-    viscous = 0.0 if yields else if_force(scene.body, scene.viscous, 0.0)
-    motion = x, force_in(scene.drive, forcing) - viscous * v, v + forcing[1]
-    by_place, by_v, _, _ = sliding_slopes(scene, -mode.sign * mu, -slope, viscous, motion)
-    return 0.0, 1.0, by_place, by_v
-
-
 @_gradient.implements(Belt)
 def _gradient_of_guard(scene, mode, guard, t, y, rates):
     yields = holds_in_band(scene.law) and mode.region < 0 and guard == SLOW
@@ -102,7 +87,8 @@ def _gradient_of_guard(scene, mode, guard, t, y, rates):
 
 @variation.jacobian.implements(BristleBelt)
 def _bristle_jacobian(scene, mode, t, y):
-    linear = implicit.linearise(scene, mode, (), t, drives.turn(scene.drive, t), y)
+    forcing = drives.turn(scene.drive, t)
+    linear = implicit.linearise(scene, mode, (), t, forcing, implicit.to_implicit(scene, forcing, y))
     _, (_, _, by_place, by_v), ((by_z, rate_v, rate_z),), _ = linear
     return 0.0, 1.0, 0.0, by_place, by_v, by_z, 0.0, rate_v, rate_z
 

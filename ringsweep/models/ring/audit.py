@@ -12,13 +12,13 @@ from math import cos, inf, sin
 import numpy as np
 
 from ringsweep.compile import inlined, take
-from ringsweep.models.interface import audit, implicit
+from ringsweep.models.interface import audit
+from ringsweep.models.ring.bristles import slip_of
 from ringsweep.models.ring.contacts import coefficients_under
 from ringsweep.models.ring.record import Outcome
-from ringsweep.models.sliding import REACTION_TOLERANCE, larger, of_balances
+from ringsweep.models.sliding import REACTION_TOLERANCE, audited, larger, of_balances
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction import SetValued, family_of
-from ringsweep.physics.friction.bristles import bristle
 from ringsweep.physics.friction.velocity import friction_at, stiction_band
 from ringsweep.physics.zones import Segments, edge_ahead, roughest
 from ringsweep.quantities.flags import SEPARATING
@@ -88,37 +88,14 @@ def _energy(scene, forcing, y):
     return ring.energy(scene.body, (sin(y[0]), cos(y[0]), y[1] / scene.body.radius + forcing[1]))
 
 
-@audit.violation.implements(ring.BristleRing)
-def _bristle_violation(scene, mode, forcing, y, rates, s, tolerance):
-    body = scene.body
-    rho, v, z_1, z_2 = y
-    theta, ring_omega, ring_epsilon = forcing
-    omega = v / body.radius + ring_omega
-    motion = sin(rho + theta), cos(rho + theta), omega
-    under = ring.coefficients_at(scene, rho)
-    mu_s1, mu_k1, mu_s2, mu_k2 = under
-    largest = inf if _names_wrong_segment(scene, mode, rho, under) else 0.0
-    sign = 1.0 if v >= 0.0 else -1.0
-    rate_1, rate_v1, rate_z1, traction_1, by_v_1, by_z_1 = bristle(scene.law, mu_s1, mu_k1, v, z_1, sign, mode.region)
-    rate_2, rate_v2, rate_z2, traction_2, by_v_2, by_z_2 = bristle(scene.law, mu_s2, mu_k2, v, z_2, sign, mode.region)
-    K1, K2 = -traction_1, -traction_2
-    normals = ring.reactions(body, K1, K2, motion)
-    if not ring.acceleration(body, K1, K2, motion)[1] > 0.0:
-        largest = inf
-    terms = body.gravity + body.radius * (omega * omega + abs(ring_epsilon))
-    _, speed, deflection, _, _ = implicit.error_scales(scene, implicit.IMPLICIT_TOLERANCE * tolerance, y)
-    by_v = ring.acceleration_slope(body, K1, K2, -by_v_1, -by_v_2, motion)
-    by_1 = ring.acceleration_slope(body, K1, K2, -by_z_1, 0.0, motion)
-    by_2 = ring.acceleration_slope(body, K1, K2, 0.0, -by_z_2, motion)
-    allowed = speed / s + body.radius * (abs(by_v) * speed + (abs(by_1) + abs(by_2)) * deflection)
-    violation, power = of_balances(scene, (K1, K2), normals, motion, forcing, rates[1], (allowed, terms, tolerance))
-    for rate, dense_rate, rate_v, rate_z in (
-        (rate_1, rates[2], rate_v1, rate_z1),
-        (rate_2, rates[3], rate_v2, rate_z2),
-    ):
-        allowed = (1.0 / s + abs(rate_z)) * deflection + abs(rate_v) * speed
-        largest = larger(largest, abs(rate - dense_rate) / (allowed + _ROUNDING * abs(v)))
-    return larger(larger(largest, -mode.sign * v / speed), violation), power
+@audited.implements(ring.BristleRing)
+def _audited(scene, mode, forcing, y):
+    rho, v, _, _ = y
+    body, phi, omega = scene.body, rho + forcing[0], v / scene.body.radius + forcing[1]
+    under, sign = ring.coefficients_at(scene, rho), 1.0 if v >= 0.0 else -1.0
+    now = slip_of(scene, under, (sin(phi), cos(phi), omega), y, sign, mode.region)
+    terms = body.gravity + body.radius * (omega * omega + abs(forcing[2]))
+    return now, terms, inf if _names_wrong_segment(scene, mode, rho, under) else 0.0
 
 
 @audit.energy.implements(ring.BristleRing)

@@ -13,22 +13,20 @@ from typing import NamedTuple
 
 from ringsweep.compile import absorbed, inlined
 from ringsweep.models.interface import constant_step, implicit, modes
-from ringsweep.models.interface.shock import Located
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
 from ringsweep.models.parts import larger_eigenvalue
 from ringsweep.models.ring.contacts import (
     coefficients_at,
     coefficients_under,
-    edges_ahead,
     places_after_edge,
     places_at,
     places_beyond,
     zones_at,
-    zones_under,
 )
 from ringsweep.models.ring.creep import DETERMINANT, FAST, NORMAL_1, NORMAL_2, SLOW
 from ringsweep.models.ring.series import AT_ONCE, NEARLY_JAMMED
 from ringsweep.models.sliding import ENDS
+from ringsweep.models.slip import Bundle, Slip, couplings, region_guards, slip
 from ringsweep.numerics.functions import (
     any_of,
     select,
@@ -44,33 +42,29 @@ from ringsweep.physics.ring import BristleRing
 from ringsweep.physics.zones import roughest
 
 
-class Contacts(NamedTuple):
-    """Bristles of both contacts: rates of the deflections, K, and their derivatives by v and z."""
-
-    rates: tuple[float, float]
-    rates_v: tuple[float, float]
-    rates_z: tuple[float, float]
-    K1: float
-    K2: float
-    slopes_v: tuple[float, float]
-    slopes_z: tuple[float, float]
-
-
 @absorbed
-def _contacts(scene, under, v, z_1, z_2, sign, region):
-    """Bristles of both contacts; `under` are the coefficients under them, as `coefficients_under` returns them."""
+def slip_of(scene, under, motion, x, sign, region):
+    """The :class:`Slip` of a state of implicit steps, for floats and Lanes.
+
+    Parameters
+    ----------
+    scene : BristleRing
+    under : tuple of float
+        Coefficients under the contacts, as ``coefficients_under`` returns them.
+    motion : tuple of float
+        As for :func:`ringsweep.physics.ring.acceleration`.
+    x : tuple of float
+        The state; the place does not matter.
+    sign, region
+        As for :func:`ringsweep.physics.friction.presliding.bristle`.
+    """
+    _, v, z_1, z_2 = x
     mu_s1, mu_k1, mu_s2, mu_k2 = under
     rate_1, rate_v1, rate_z1, traction_1, by_v_1, by_z_1 = bristle(scene.law, mu_s1, mu_k1, v, z_1, sign, region)
     rate_2, rate_v2, rate_z2, traction_2, by_v_2, by_z_2 = bristle(scene.law, mu_s2, mu_k2, v, z_2, sign, region)
-    return Contacts(
-        (rate_1, rate_2),
-        (rate_v1, rate_v2),
-        (rate_z1, rate_z2),
-        -traction_1,
-        -traction_2,
-        (-by_v_1, -by_v_2),
-        (-by_z_1, -by_z_2),
-    )
+    first, second = Bundle(rate_1, rate_v1, rate_z1, -by_z_1), Bundle(rate_2, rate_v2, rate_z2, -by_z_2)
+    friction, slopes = (-traction_1, -traction_2), (-by_v_1, -by_v_2)
+    return Slip(motion, v / scene.body.radius, friction, slopes, 0.0, (first, second))
 
 
 @absorbed
@@ -132,21 +126,20 @@ def _initial_state_in_space(scene):
 
 
 @absorbed
-def _contacts_at(scene, y, forcing):
-    """Coefficients under both contacts, sliding velocity and its sign, and bristles, for floats and Lanes."""
+def _slip_in_space(scene, y, forcing, sine_and_cosine):
+    """Coefficients under both contacts, sign of the sliding velocity, state of implicit steps, and its slip."""
     phi, omega, z_1, z_2 = y
-    v = (omega - forcing[1]) * scene.body.radius
-    sign = select(v >= 0.0, 1.0, -1.0)
-    under = ring.coefficients_at(scene, phi - forcing[0])
-    return under, v, sign, _contacts(scene, under, v, z_1, z_2, sign, BAND)
+    x = phi - forcing[0], (omega - forcing[1]) * scene.body.radius, z_1, z_2
+    sign, under = select(x[1] >= 0.0, 1.0, -1.0), ring.coefficients_at(scene, x[0])
+    return under, sign, x, slip_of(scene, under, (*sine_and_cosine, omega), x, sign, BAND)
 
 
 @constant_step.rates.implements(BristleRing)
 def _rates(scene, now, y, forcing):
-    _, _, _, contacts = _contacts_at(scene, y, forcing)
-    sin_phi, cos_phi = sine_cosine_near(y[0], now.phi, now.sin_phi, now.cos_phi)
-    epsilon, _ = ring.acceleration(scene.body, contacts.K1, contacts.K2, (sin_phi, cos_phi, y[1]))
-    return y[1], epsilon, contacts.rates[0], contacts.rates[1]
+    near = sine_cosine_near(y[0], now.phi, now.sin_phi, now.cos_phi)
+    _, _, _, slides = _slip_in_space(scene, y, forcing, near)
+    first, second = slides.bristles
+    return y[1], ring.acceleration(scene.body, *slides.K, slides.motion)[0], first.rate, second.rate
 
 
 @constant_step.inspect.implements(BristleRing)
@@ -163,42 +156,30 @@ def _inspect_next(scene, before, y, forcing, afresh):
 @absorbed
 def _inspection(scene, y, forcing, sine_and_cosine):
     """Inspection of a state, given sine and cosine of the angle."""
-    (phi, omega, z_1, z_2), (sin_phi, cos_phi) = y, sine_and_cosine
-    motion = sin_phi, cos_phi, omega
     b = scene.body
-    under, v, sign, now = _contacts_at(scene, y, forcing)
-    stuck = _region_guard(scene, under, v, z_1, z_2, sign, BAND) > 0.0
-    epsilon, determinant = ring.acceleration(b, now.K1, now.K2, motion)
-    normal_1, normal_2 = ring.reactions(b, now.K1, now.K2, motion)
-    by_v, by_1, by_2 = _sliding_acceleration_slopes(scene, now, motion)
-    decay = max(-now.rates_z[0], -now.rates_z[1])
-    coupling = abs(by_1 * now.rates_v[0]) + abs(by_2 * now.rates_v[1])
+    under, sign, x, now = _slip_in_space(scene, y, forcing, sine_and_cosine)
+    stuck = _region_guard(scene, under, x[1], x[2], x[3], sign, BAND) > 0.0
+    epsilon, determinant = ring.acceleration(b, *now.K, now.motion)
+    normal_1, normal_2 = ring.reactions(b, *now.K, now.motion)
+    by_v = b.radius * ring.acceleration_slope(b, *now.K, *now.slopes, now.motion)
+    first, second = now.bristles
+    (by_1, _, _), (by_2, _, _) = couplings(now.bristles, scene, now)
+    decay = max(-first.rate_z, -second.rate_z)
+    coupling = abs(by_1 * first.rate_v) + abs(by_2 * second.rate_v)
     # The body swings even where friction is small.
-    by_phi, by_omega = ring.acceleration_gradient(b, now.K1, now.K2, motion)
+    by_phi, by_omega = ring.acceleration_gradient(b, *now.K, now.motion)
     return Inspection(
-        (omega, epsilon, now.rates[0], now.rates[1]),
+        (y[1], epsilon, first.rate, second.rate),
         normal_1,
         normal_2,
         determinant,
         (decay - by_v, coupling - decay * by_v),
         (by_omega, -by_phi),
-        v,
+        x[1],
         select(stuck, 1.0, 0.0),
-        phi,
-        sin_phi,
-        cos_phi,
+        y[0],
+        *sine_and_cosine,
     )
-
-
-@absorbed
-def _sliding_acceleration_slopes(scene, now, motion):
-    """Derivatives of the sliding acceleration by the sliding velocity through friction, and by both deflections."""
-    b = scene.body
-    v_1, v_2 = now.slopes_v
-    z_1, z_2 = now.slopes_z
-    by_K1 = b.radius * ring.acceleration_slope(b, now.K1, now.K2, 1.0, 0.0, motion)
-    by_K2 = b.radius * ring.acceleration_slope(b, now.K1, now.K2, 0.0, 1.0, motion)
-    return by_K1 * v_1 + by_K2 * v_2, by_K1 * z_1, by_K2 * z_2
 
 
 @constant_step.eigenvalue.implements(BristleRing)
@@ -257,14 +238,11 @@ def _initial_state(scene):
 def _initial_mode(scene, t, y):
     rho, v, z_1, z_2 = y
     place_1, place_2 = places_at(scene, rho)
-    theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
-    phi, omega = rho + theta, ring.angular_velocity(scene.body, v, ring_omega)
     sign = 1 if v > 0.0 else -1
     if v == 0.0:
-        mode = Mode(sign, BAND, place_1, place_2)
-        now = _contacts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(sign), BAND)
-        epsilon, _ = ring.acceleration(scene.body, now.K1, now.K2, (sin(phi), cos(phi), omega))
-        sign = 1 if epsilon > ring_epsilon else -1
+        now = _sliding_at(scene, Mode(sign, BAND, place_1, place_2), t, y)
+        epsilon, _ = ring.acceleration(scene.body, *now.K, now.motion)
+        sign = 1 if epsilon > drives.turn(scene.drive, t)[2] else -1
     place_1, place_2 = places_beyond(scene, place_1, place_2, rho, sign)
     mode = Mode(sign, BAND, place_1, place_2)
     if not _region_guard(scene, coefficients_under(scene, mode), v, z_1, z_2, float(sign), BAND) > 0.0:
@@ -274,31 +252,29 @@ def _initial_mode(scene, t, y):
 
 @inlined
 def _sliding_at(scene, mode, t, y):
-    """K at each contact, and motion: sine and cosine of the angle of the body, and its angular velocity."""
-    rho, v, z_1, z_2 = y
+    """The :class:`Slip` of a state of a mode."""
     theta, ring_omega, _ = drives.turn(scene.drive, t)
-    phi, omega = rho + theta, ring.angular_velocity(scene.body, v, ring_omega)
-    now = _contacts(scene, coefficients_under(scene, mode), v, z_1, z_2, float(mode.sign), mode.region)
-    return now.K1, now.K2, (sin(phi), cos(phi), omega)
+    phi, omega = y[0] + theta, ring.angular_velocity(scene.body, y[1], ring_omega)
+    under = coefficients_under(scene, mode)
+    return slip_of(scene, under, (sin(phi), cos(phi), omega), y, float(mode.sign), mode.region)
 
 
 @inlined
 def _after_jump(scene, mode, t, y):
     """Status after friction may have jumped."""
-    K1, K2, motion = _sliding_at(scene, mode, t, y)
-    if isnan(K1 + K2 + motion[0] + motion[2]):
+    now = _sliding_at(scene, mode, t, y)
+    if isnan(now.K[0] + now.K[1] + now.motion[0] + now.motion[2]):
         return BROKEN
-    return ENDS[contact.sliding(scene.body, K1, K2, motion)]
+    return ENDS[contact.sliding(scene.body, *now.K, now.motion)]
 
 
 @inlined
 def _status_at_zero_reaction(scene, mode, guard, t, y):
     """Status after a reaction has vanished: jam or separation."""
-    body = scene.body
-    K1, K2, motion = _sliding_at(scene, mode, t, y)
-    epsilon, determinant = ring.acceleration(body, K1, K2, motion)
-    normal_1, normal_2 = ring.reactions(body, K1, K2, motion)
-    scale = body.mass * (body.gravity + body.radius * (motion[2] * motion[2] + abs(epsilon)))
+    body, now = scene.body, _sliding_at(scene, mode, t, y)
+    epsilon, determinant = ring.acceleration(body, *now.K, now.motion)
+    normal_1, normal_2 = ring.reactions(body, *now.K, now.motion)
+    scale = body.mass * (body.gravity + body.radius * (now.motion[2] * now.motion[2] + abs(epsilon)))
     # Near a jam the polynomial of a reaction is inaccurate, and may vanish where the reaction does not.
     if (normal_1 if guard == NORMAL_1 else normal_2) > 1e-2 * scale:
         return JAM if not determinant > NEARLY_JAMMED * ring.free_determinant(body) else BROKEN
@@ -308,8 +284,8 @@ def _status_at_zero_reaction(scene, mode, guard, t, y):
 
 @modes.status_when_stalled.implements(BristleRing)
 def _status_when_stalled(scene, mode, t, y):
-    K1, K2, motion = _sliding_at(scene, mode, t, y)
-    _, determinant = ring.acceleration(scene.body, K1, K2, motion)
+    now = _sliding_at(scene, mode, t, y)
+    _, determinant = ring.acceleration(scene.body, *now.K, now.motion)
     return BROKEN if determinant > NEARLY_JAMMED * ring.free_determinant(scene.body) else JAM
 
 
@@ -330,63 +306,18 @@ def _switch(scene, mode, guard, t, y):
     return _after_jump(scene, mode, t, y), mode, y
 
 
-class Common(NamedTuple):
-    """What the equations have in common within a step.
-
-    Attributes
-    ----------
-    phi, sin_phi, cos_phi : float
-        Angle of the body at the beginning, rad; its sine and cosine.
-    under : tuple of float
-        Coefficients under the contacts, as ``coefficients_under`` returns them.
-    """
-
-    phi: float
-    sin_phi: float
-    cos_phi: float
-    under: tuple[float, float, float, float]
+@slip.implements(BristleRing)
+def _slip(scene, mode, common, forcing, x):
+    sine_cosine = sine_cosine_from(x[0] + forcing[0], common.phi, common.sin_phi, common.cos_phi)
+    motion = *sine_cosine, x[1] * common.per_radius + forcing[1]
+    return slip_of(scene, common.surfaces, motion, x, float(mode.sign), mode.region)
 
 
-@implicit.common.implements(BristleRing)
-def _common(scene, mode, forcing, x):
-    phi = x[0] + forcing[0]
-    return Common(phi, sin(phi), cos(phi), coefficients_under(scene, mode))
-
-
-@inlined
-def _in_step(scene, mode, common, forcing, x):
-    """Angle of the body in space, its motion (sine and cosine of the angle, angular velocity), and the bristles."""
-    rho, v, z_1, z_2 = x
-    phi, omega = rho + forcing[0], v / scene.body.radius + forcing[1]
-    sin_phi, cos_phi = sine_cosine_from(phi, common.phi, common.sin_phi, common.cos_phi)
-    now = _contacts(scene, common.under, v, z_1, z_2, float(mode.sign), mode.region)
-    return phi, (sin_phi, cos_phi, omega), now
-
-
-@implicit.rates.implements(BristleRing)
-def _implicit_rates(scene, mode, common, forcing, x):
-    radius = scene.body.radius
-    _, motion, now = _in_step(scene, mode, common, forcing, x)
-    epsilon, _ = ring.acceleration(scene.body, now.K1, now.K2, motion)
-    return x[1] / radius, radius * (epsilon - forcing[2]), now.rates[0], now.rates[1]
-
-
-@implicit.linearise.implements(BristleRing)
-def _linearise(scene, mode, common, t, forcing, x):
-    b = scene.body
-    radius = b.radius
-    _, ring_omega, ring_epsilon = forcing
-    _, motion, now = _in_step(scene, mode, common, forcing, x)
-    epsilon, _ = ring.acceleration(b, now.K1, now.K2, motion)
-    by_phi, by_omega = ring.acceleration_gradient(b, now.K1, now.K2, motion)
-    by_v, by_1, by_2 = _sliding_acceleration_slopes(scene, now, motion)
-    by_time = radius * (by_phi * ring_omega + by_omega * ring_epsilon - drives.jerk(scene.drive, t))
-    return (
-        (x[1] / radius, radius * (epsilon - ring_epsilon), now.rates[0], now.rates[1]),
-        (0.0, 1.0 / radius, radius * by_phi, by_omega + by_v),
-        ((by_1, now.rates_v[0], now.rates_z[0]), (by_2, now.rates_v[1], now.rates_z[1])),
-        (0.0, by_time, 0.0, 0.0),
-    )
+@region_guards.implements(BristleRing)
+def _region_guards(scene, mode, common, x):
+    _, v, z_1, z_2 = x
+    sign = float(mode.sign)
+    return sign * v, _region_guard(scene, common.surfaces, v, z_1, z_2, sign, mode.region)
 
 
 @implicit.error_scales.implements(BristleRing)
@@ -397,41 +328,6 @@ def _error_scales(scene, tolerance, x):
     load = scene.body.gravity + scene.body.radius
     speed = mu * sqrt(load / scene.law.sigma0) + abs(x[1])
     return tolerance, tolerance * speed, tolerance * deflection, tolerance * deflection, tolerance * mu * load
-
-
-@implicit.guards_and_motion.implements(BristleRing)
-def _guards_and_motion(scene, mode, common, forcing, x):
-    rho, v, z_1, z_2 = x
-    b, sign = scene.body, float(mode.sign)
-    phi, motion, now = _in_step(scene, mode, common, forcing, x)
-    epsilon, determinant = ring.acceleration(b, now.K1, now.K2, motion)
-    normal_1, normal_2 = ring.reactions(b, now.K1, now.K2, motion)
-    ahead_1, ahead_2 = edges_ahead(scene, mode, rho)
-    guards = (
-        determinant,
-        sign * v,
-        normal_1,
-        normal_2,
-        min(ahead_1, ahead_2),
-        _region_guard(scene, common.under, v, z_1, z_2, sign, mode.region),
-    )
-    return guards, (phi, motion[2], epsilon, forcing[1], z_1, z_2)
-
-
-@implicit.seen.implements(BristleRing)
-def _seen(scene, view):
-    guards, (phi, omega, epsilon, _, z_1, z_2) = view
-    size = scene.body.gravity / scene.body.radius + omega * omega + abs(epsilon)
-    return phi, omega, guards[NORMAL_1], guards[NORMAL_2], Located(epsilon, size), z_1, z_2
-
-
-@implicit.row.implements(BristleRing)
-def _implicit_row(scene, mode, forcing, x):
-    common = implicit.common(scene, mode, forcing, x)
-    guards, (phi, omega, epsilon, ring_omega, _, _) = implicit.guards_and_motion(scene, mode, common, forcing, x)
-    zone_1, zone_2 = zones_under(scene, mode)
-    state = 0.0 if mode.region == BAND else float(mode.sign)
-    return phi, omega, epsilon, guards[NORMAL_1], guards[NORMAL_2], ring_omega, zone_1, zone_2, state, x[2], x[3]
 
 
 @modes.in_space.implements(BristleRing)

@@ -6,7 +6,7 @@ from math import cos, sin
 
 from ringsweep.compile import inlined
 from ringsweep.models import tangent
-from ringsweep.models.interface import implicit, variation
+from ringsweep.models.interface import variation
 from ringsweep.models.ring.contacts import coefficients_under
 from ringsweep.models.ring.long_run import with_tangent
 from ringsweep.models.ring.record import with_long_run
@@ -46,18 +46,6 @@ def _advance(scene, record, h, rates, weights, work):
 def _switched(scene, record, mode, guard, t, y):
     before = record.long_run.tangent
     return _with(record, tangent.switched(before, _gradient(scene, mode, guard, t, y, before.rates)))
-
-
-@variation.jacobian.implements(Ring)
-def _jacobian(scene, mode, t, y):
-    if mode.sign == 0:
-        return 0.0, 1.0 / scene.body.radius, 0.0, 0.0
-    forcing = drives.turn(scene.drive, t)
-    # At the end of slip the velocity is zero but for rounding, which must not turn friction round.
-    v = mode.sign * max(mode.sign * y[1], 1e-300)
-    x = implicit.to_implicit(scene, forcing, (y[0], v))
-    _, by_state, _, _ = implicit.linearise(scene, mode, implicit.common(scene, mode, forcing, x), t, forcing, x)
-    return by_state
 
 
 @inlined

@@ -1,0 +1,159 @@
+"""A body that slides: the equations of its implicit steps, derived from its balances and from its friction.
+
+They are the same on the ring and on the belt, with bristles and without. The place in an implicit step is relative to
+the drive, so that no large numbers cancel in slow creep.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from ringsweep.compile import absorbed, hook, inlined, unrolled
+from ringsweep.models.interface import implicit, variation
+from ringsweep.numerics.terms import joined
+from ringsweep.physics import drives, ring
+from ringsweep.physics.belt import Belt, BristleBelt
+from ringsweep.physics.forces import force_rate
+from ringsweep.physics.friction.velocity import region_bounds, stiction_band
+from ringsweep.physics.ring import BristleRing, Ring
+
+
+class Bundle(NamedTuple):
+    """Bristles at a contact.
+
+    Attributes
+    ----------
+    rate, rate_v, rate_z : float
+        Rate of their deflection, m/s, and its derivatives by the sliding velocity, 1, and by the deflection, 1/s.
+    by_z : float
+        Derivative of K by the deflection, 1/m.
+    """
+
+    rate: float
+    rate_v: float
+    rate_z: float
+    by_z: float
+
+
+class Slip(NamedTuple):
+    """A body that slides, at an instant.
+
+    Attributes
+    ----------
+    motion : tuple of float
+        As for :func:`ringsweep.physics.ring.acceleration`.
+    place_rate : float
+        Rate of the place relative to the drive, rad/s or m/s.
+    K, slopes : tuple of float
+        Friction K at both contacts, 1, and its derivatives by the sliding velocity, s/m.
+    damping : float
+        Decay of the sliding velocity by viscous friction, 1/s.
+    bristles : tuple of Bundle
+    """
+
+    motion: Any
+    place_rate: float
+    K: tuple[float, float]
+    slopes: tuple[float, float]
+    damping: float
+    bristles: Any
+
+
+@hook(absorb=True)
+def slip(scene, mode, common, forcing, x):
+    """The :class:`Slip` of the state of an implicit step; see :func:`implicit.rates` for the arguments."""
+
+
+@hook(absorb=True)
+def region_guards(scene, mode, common, x):
+    """Guards of the lower and of the upper bound of the region of a mode: of the speed, or of the bristles."""
+
+
+@absorbed
+def acceleration_slopes(scene, now):
+    """Derivatives of the sliding acceleration by the place, by the sliding velocity, and by the velocity of the drive.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+    now : Slip
+    """
+    body, radius = scene.body, ring.radius(scene.body)
+    gradient = ring.acceleration_gradient(body, *now.K, now.motion)
+    by_friction = radius * ring.acceleration_slope(body, *now.K, *now.slopes, now.motion)
+    return radius * gradient[0], gradient[1] + by_friction - now.damping, radius * gradient[1]
+
+
+@unrolled
+def _deflection_rates(count, bristles):
+    return ["return (" + "".join(f"bristles[{i}].rate, " for i in range(count)) + ")"]
+
+
+@unrolled
+def _none(count, bristles):
+    return [f"return ({'0.0, ' * count})"]
+
+
+@unrolled
+def couplings(count, bristles, scene, now):
+    """Bristles and sliding velocity: the third result of :func:`implicit.linearise`."""
+    lines = ["radius = ring.radius(scene.body)"]
+    for i, slopes in zip(range(count), ("a.by_z, 0.0", "0.0, a.by_z"), strict=False):
+        by_z = f"radius * ring.acceleration_slope(scene.body, *now.K, {slopes}, now.motion)"
+        lines += [f"a = bristles[{i}]", f"bundle_{i} = {by_z}, a.rate_v, a.rate_z"]
+    return [*lines, "return (" + "".join(f"bundle_{i}, " for i in range(count)) + ")"]
+
+
+@implicit.rates.implements(Ring, BristleRing, Belt, BristleBelt)
+def _rates(scene, mode, common, forcing, x):
+    now = slip(scene, mode, common, forcing, x)
+    acceleration, _ = ring.acceleration(scene.body, *now.K, now.motion)
+    sliding = ring.radius(scene.body) * (acceleration - forcing[2])
+    return joined((now.place_rate, sliding), _deflection_rates(now.bristles))
+
+
+@implicit.linearise.implements(Ring, BristleRing, Belt, BristleBelt)
+def _linearise(scene, mode, common, t, forcing, x):
+    now, radius = slip(scene, mode, common, forcing, x), ring.radius(scene.body)
+    acceleration, _ = ring.acceleration(scene.body, *now.K, now.motion)
+    by_place, by_v, by_drive = acceleration_slopes(scene, now)
+    by_force = force_rate(scene.drive, forcing) / scene.body.mass
+    by_time = by_place * forcing[1] + by_drive * forcing[2] + by_force - radius * drives.jerk(scene.drive, t)
+    return (
+        joined((now.place_rate, radius * (acceleration - forcing[2])), _deflection_rates(now.bristles)),
+        (0.0, 1.0 / radius, by_place, by_v),
+        couplings(now.bristles, scene, now),
+        joined((0.0, by_time), _none(now.bristles)),
+    )
+
+
+@inlined
+def relaxes(scene, linear, frequency):
+    """Whether slip relaxes fast compared with the motion of the body, whose frequency is given, rad/s.
+
+    And the transient must be over: transients into the stiction band, and out of it at its top, are as fast as the
+    decay itself.
+    """
+    acceleration, decay = linear[0][1], -linear[1][3]
+    return decay > 50.0 * frequency and abs(acceleration) < 0.01 * decay * stiction_band(scene.law)
+
+
+@region_guards.implements(Ring, Belt)
+def _bounds_of_speed(scene, mode, common, x):
+    low, high = region_bounds(scene.law, mode.region)
+    speed = mode.sign * x[1]
+    return speed - low, high - speed
+
+
+@variation.jacobian.implements(Ring, Belt)
+def _jacobian(scene, mode, t, y):
+    per_radius = 1.0 / ring.radius(scene.body)
+    if mode.sign == 0:
+        return 0.0, per_radius, 0.0, 0.0
+    forcing = drives.turn(scene.drive, t)
+    # At the end of slip the velocity is zero but for rounding, which must not turn friction round.
+    v = mode.sign * max(mode.sign * y[1], 1e-300)
+    x = implicit.to_implicit(scene, forcing, (y[0], v))
+    now = slip(scene, mode, implicit.common(scene, mode, forcing, x), forcing, x)
+    by_place, by_v, _ = acceleration_slopes(scene, now)
+    return 0.0, per_radius, by_place, by_v
