@@ -145,13 +145,13 @@ def _linearise(scene, mode, common, t, forcing, x):
     nothing, (_, ring_omega, ring_epsilon) = (0.0, 0.0, 0.0, 0.0), forcing
     f = _frame(scene, mode, forcing, x)
     K, slope = _friction(scene, mode, common, x[1])
-    psi_dd, alpha_dd, _, _ = pivot.in_slip(scene, f, K)
+    found = pivot.solved_in_slip(scene, f, K, pivot.sides(scene, f), 0.0)
     # Columns of the Jacobian, and the derivative by time at a constant state.
-    by_place = _derivative(scene, f, K, psi_dd, slope, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    by_v = _derivative(scene, f, K, psi_dd, slope, (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    by_eta = _derivative(scene, f, K, psi_dd, slope, (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0))
-    by_rate = _derivative(scene, f, K, psi_dd, slope, (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
-    by_time = _derivative(scene, f, K, psi_dd, slope, nothing, (ring_omega, ring_epsilon, drives.jerk(scene.drive, t)))
+    by_place = _derivative(scene, f, (K, slope), found, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    by_v = _derivative(scene, f, (K, slope), found, (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    by_eta = _derivative(scene, f, (K, slope), found, (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0))
+    by_rate = _derivative(scene, f, (K, slope), found, (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+    by_time = _derivative(scene, f, (K, slope), found, nothing, (ring_omega, ring_epsilon, drives.jerk(scene.drive, t)))
     per_radius = 1.0 / scene.closed.body.radius
     rows = (
         (0.0, per_radius, 0.0, scene.balls.reach * per_radius),
@@ -160,32 +160,30 @@ def _linearise(scene, mode, common, t, forcing, x):
         (by_place[1], by_v[1], by_eta[1], by_rate[1]),
     )
     jacobian = 0.0, per_radius, by_place[0], by_v[0]
-    rates = _rates_from(scene, forcing, x, psi_dd, alpha_dd)
+    rates = _rates_from(scene, forcing, x, found[0], found[1])
     return rates, jacobian, implicit.Coupled(rows), (0.0, by_time[0], 0.0, by_time[1], 0.0)
 
 
 @inlined
-def _derivative(scene, f, K, psi_dd, slope, state, forcing):
-    """Derivatives of the rates of v and of eta_dot along a change of the state and of the forcing."""
+def _derivative(scene, f, friction, found, state, forcing):
+    """Derivatives of the rates of v and of eta_dot along a change of the state and of the forcing.
+
+    `friction` is K and its slope, `found` the solution of the balances. They are differentiated, see :mod:`pivot`.
+    """
     body, balls = scene.closed.body, scene.balls
-    mass, moment, gravity, radius, rho = body.mass, inertia(body), body.gravity, body.radius, balls.reach
+    (K, slope), (psi_dd, _, normal, along) = friction, found
     d_place, d_v, d_eta, d_rate = state
     d_theta, d_omega, d_epsilon = forcing
     d_alpha = d_place + d_theta - d_eta
-    d_psi_dot = (d_v + rho * d_rate) / radius + d_omega
+    d_psi_dot = (d_v + balls.reach * d_rate) / body.radius + d_omega
     d_alpha_dot = d_psi_dot - d_rate
-    d_u, d_w, d_q, d_K = -f.w * d_eta, f.u * d_eta, f.w * d_eta, slope * d_v
-    lever = f.w - K * f.q
-    d_lever = d_w - d_K * f.q - K * d_q
-    denominator = moment + mass * f.w * lever
+    d_u, d_w = -f.w * d_eta, f.u * d_eta
     square, d_square = f.psi_dot * f.psi_dot, 2.0 * f.psi_dot * d_psi_dot
-    x = pivot.load(scene, f) / denominator
-    d_load = d_u * square + f.u * d_square + 2.0 * rho * f.alpha_dot * d_alpha_dot - gravity * f.sin_alpha * d_alpha
-    d_x = (d_load - x * mass * (d_w * lever + f.w * d_lever)) / denominator
-    d_psi_dd = -mass * (d_lever * x + lever * d_x)
-    turned = d_u * psi_dd + f.u * d_psi_dd
-    pulled = moment * (d_K * x + K * d_x) + d_w * square + f.w * d_square - gravity * f.cos_alpha * d_alpha
-    d_alpha_dd = (pulled - turned) / rho
+    d_load = d_u * square + f.u * d_square + 2.0 * balls.reach * f.alpha_dot * d_alpha_dot
+    d_across = d_load - body.gravity * f.sin_alpha * d_alpha + d_w * psi_dd
+    d_along = body.gravity * f.cos_alpha * d_alpha - d_w * square - f.w * d_square + d_u * psi_dd
+    sides = body.mass * d_across, body.mass * d_along, -d_w * normal - d_u * along
+    d_psi_dd, d_alpha_dd, _, _ = pivot.solved_in_slip(scene, f, K, sides, slope * d_v * normal)
     return pivot.sliding_acceleration(scene, d_psi_dd, d_alpha_dd, d_epsilon), d_psi_dd - d_alpha_dd
 
 

@@ -10,13 +10,12 @@ the centre of mass is u outwards and w along the race, ``q = r - u``; F is the f
     M (\\rho \\ddot\\alpha + u \\ddot\\psi - w \\dot\\psi^2) &= -M g \\sin\\alpha + F \\\\
     J \\ddot\\psi &= -w N + q F
 
-In slip they give, with ``P = w - K q`` and ``G = g cos alpha + rho alpha_dot^2 + u psi_dot^2``,
+and a fourth equation: ``F = K N`` in slip; ``\\rho \\ddot\\alpha + r \\ddot\\psi = R \\ddot\\theta`` in stick. These
+equations are linear in both accelerations, N and F. So are those for their derivatives, and for the coefficients of
+their power series, with other right sides: :func:`solved_in_slip` and :func:`solved_in_stick` solve all of them.
 
-.. math::
-
-    N = \\frac{M J G}{J + M w P}, \\qquad \\ddot\\psi = -\\frac{M G P}{J + M w P}.
-
-The contact jams where the denominator, which is M J times the acceleration of its gap per unit of N, is not positive.
+In slip the contact jams where the determinant, which is M J times the acceleration of its gap per unit of N, is not
+positive.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from __future__ import annotations
 from math import cos, isnan, sin
 from typing import NamedTuple
 
-from ringsweep.compile import inlined
+from ringsweep.compile import inlined, replacing
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
 from ringsweep.models.ring.impact.mode import (
     RING,
@@ -61,6 +60,10 @@ class Frame(NamedTuple):
     alpha_dot: float
 
 
+#: Frame with other rates of psi and alpha.
+with_rates = replacing("psi_dot", "alpha_dot")
+
+
 @inlined
 def frame(scene, contact, turned, y, ring_omega):
     """Place and rates of a pivot on a contact, in the state `y`."""
@@ -91,27 +94,70 @@ def size(scene, f):
 
 
 @inlined
-def in_slip(scene, f, K):
-    """Accelerations of psi and alpha (rad/s^2), normal reaction (N), and denominator (kg m^2), in slip."""
+def sides(scene, f):
+    """Right sides of the three balances: the terms without accelerations and forces, N, N and N m."""
     body = scene.closed.body
-    moment = inertia(body)
-    lever = f.w - K * f.q
-    denominator = moment + body.mass * f.w * lever
-    x = load(scene, f) / denominator
-    psi_dd = -body.mass * lever * x
-    rest = K * moment * x - f.u * psi_dd + f.w * f.psi_dot * f.psi_dot - body.gravity * f.sin_alpha
-    return psi_dd, rest / scene.balls.reach, body.mass * moment * x, denominator
+    along = body.gravity * f.sin_alpha - f.w * f.psi_dot * f.psi_dot
+    return body.mass * load(scene, f), body.mass * along, 0.0
+
+
+@inlined
+def determinant(scene, f, K):
+    """Determinant of the equations in slip, kg m^2."""
+    return inertia(scene.closed.body) + scene.closed.body.mass * f.w * (f.w - K * f.q)
+
+
+@inlined
+def solved_in_slip(scene, f, K, sides, pull):
+    """Solution of the balances in slip.
+
+    Parameters
+    ----------
+    scene : ImpactRing
+    f : Frame
+    K : float
+        Friction per unit of N, 1.
+    sides : tuple of float
+        N less what is due to ``psi_dd``, F less what is due to both accelerations, and the moment ``J psi_dd + w N - q
+        F``: N, N, N m.
+    pull : float
+        ``F - K N``, N.
+
+    Returns
+    -------
+    tuple of float
+        Accelerations of psi and alpha, rad/s^2; N and F, N.
+    """
+    (across, along, turning), mass = sides, scene.closed.body.mass
+    inverse, lever, turning = 1.0 / determinant(scene, f, K), f.w - K * f.q, turning + f.q * pull
+    psi_dd = (turning - lever * across) * inverse
+    normal = (inertia(scene.closed.body) * across + mass * f.w * turning) * inverse
+    friction = pull + K * normal
+    return psi_dd, ((friction - along) / mass - f.u * psi_dd) / scene.balls.reach, normal, friction
+
+
+@inlined
+def solved_in_stick(scene, f, sides, carried):
+    """As :func:`solved_in_slip`, in stick: the touching point has the acceleration `carried` along the race, m/s^2."""
+    (across, along, turning), mass = sides, scene.closed.body.mass
+    inverse = 1.0 / (inertia(scene.closed.body) + mass * (f.w * f.w + f.q * f.q))
+    along = along + mass * carried
+    psi_dd = (turning + f.q * along - f.w * across) * inverse
+    alpha_dd = (carried - scene.balls.radius * psi_dd) / scene.balls.reach
+    return psi_dd, alpha_dd, across + mass * f.w * psi_dd, along - mass * f.q * psi_dd
+
+
+@inlined
+def in_slip(scene, f, K):
+    """Accelerations of psi and alpha (rad/s^2), normal reaction (N), and determinant (kg m^2), in slip."""
+    psi_dd, alpha_dd, normal, _ = solved_in_slip(scene, f, K, sides(scene, f), 0.0)
+    return psi_dd, alpha_dd, normal, determinant(scene, f, K)
 
 
 @inlined
 def in_stick(scene, f, ring_epsilon):
     """Accelerations of psi and alpha (rad/s^2), normal reaction and friction (N) while the contact sticks."""
-    body = scene.closed.body
-    along = body.radius * ring_epsilon + body.gravity * f.sin_alpha - f.w * f.psi_dot * f.psi_dot
-    across, mass = load(scene, f), body.mass
-    psi_dd = mass * (f.q * along - f.w * across) / (inertia(body) + mass * (f.w * f.w + f.q * f.q))
-    alpha_dd = (body.radius * ring_epsilon - scene.balls.radius * psi_dd) / scene.balls.reach
-    return psi_dd, alpha_dd, mass * (across + f.w * psi_dd), mass * (along - f.q * psi_dd)
+    return solved_in_stick(scene, f, sides(scene, f), scene.closed.body.radius * ring_epsilon)
 
 
 @inlined

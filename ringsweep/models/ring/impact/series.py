@@ -117,7 +117,7 @@ def _expand_pivot(scene, mode, t, y, tolerance, c):
     fresh = (mode.zeros_1 if mode.open == FIRST else mode.zeros_2) if y[2] == 0.0 else 0
     c[RING + PHI, 0], c[RING + V, 0], c[ETA, 0] = y[0], y[1], y[2]
     at = f, sin(delta), cos(delta), (0.0 if fresh > 1 else y[3]), fresh
-    sharpness = _expand_pivot_stick(scene, mode, at, c) if mode.sign == 0 else _expand_pivot_slip(scene, mode, at, c)
+    sharpness = _expand_pivot_motion(scene, mode, at, c)
     _expand_pivot_guards(scene, mode, f, place, y[2], fresh, c)
     per_angle = 1.0 / tolerance
     speed = body.radius * (1.0 + abs(f.psi_dot) + abs(f.alpha_dot))
@@ -142,133 +142,83 @@ def _expand_pivot(scene, mode, t, y, tolerance, c):
 
 
 @inlined
-def _expand_pivot_slip(scene, mode, at, c):
-    """Fill the series of a pivot that slips and return the sharpness of the friction law; see :mod:`pivot`."""
+def _expand_pivot_motion(scene, mode, at, c):
+    """Fill the series of a pivot, and the guards of its friction in stick; return the sharpness of the friction law.
+
+    Coefficient k of a product of two series is the sum of their coefficients 0 and k, crosswise, and of what is known
+    before. So the coefficients of accelerations and forces solve the balances with other right sides, see
+    :mod:`pivot`.
+    """
     f, s_d0, c_d0, eta_dot, fresh = at
-    body, balls, law = scene.closed.body, scene.balls, scene.law
-    mass, moment, gravity, race = body.mass, inertia(body), body.gravity, body.radius
-    rho, r, h = balls.reach, balls.radius, balls.offset
+    body, balls, law, slips = scene.closed.body, scene.balls, scene.law, mode.sign != 0
+    mass, gravity, race, rho, h = body.mass, body.gravity, body.radius, balls.reach, balls.offset
     a = side_of(holding(mode)) * balls.half_distance
     own_row = RING + (NORMAL_2 if mode.open == FIRST else NORMAL_1)
     sign = float(mode.sign)
     mu_s, mu_k, _ = coefficients_there(scene, place_of(mode))
     surfaces = mu_s, mu_k
     (mu,), begun, sharpness = begin_series(law, mode.region, sign * c[RING + V, 0], surfaces)
-    K_0 = -sign * mu
-    om_0, ad_0 = f.psi_dot, f.psi_dot - eta_dot
-    u_0, w_0, q_0, s_a0, c_a0 = f.u, f.w, f.q, f.sin_alpha, f.cos_alpha
-    P_0 = w_0 - K_0 * q_0
-    D_0 = moment + mass * w_0 * P_0
-    sq_0 = om_0 * om_0
-    X_0 = (gravity * c_a0 + rho * ad_0 * ad_0 + u_0 * sq_0) / D_0
-    per_D = 1.0 / D_0
-    epsilon = eps_0 = -mass * P_0 * X_0
-    alpha_dd = (moment * K_0 * X_0 - gravity * s_a0 - u_0 * eps_0 + w_0 * sq_0) / rho
+    K_0, f = (-sign * mu if slips else 0.0), pivot.with_rates(f, f.psi_dot, f.psi_dot - eta_dot)
+    om_0, ad_0, sq_0 = f.psi_dot, f.alpha_dot, f.psi_dot * f.psi_dot
+    if slips:
+        psi_dd, alpha_dd, N_0, F_0 = pivot.solved_in_slip(scene, f, K_0, pivot.sides(scene, f), 0.0)
+    else:
+        psi_dd, alpha_dd, N_0, F_0 = pivot.in_stick(scene, f, 2.0 * c[RING + THETA, 2])
+    psi_dd0, P_0 = psi_dd, f.w - K_0 * f.q
     if fresh == 3:
-        alpha_dd = epsilon
-    c[RING + OMEGA, 0], c[RING + EPSILON, 0], c[RING + SQUARE, 0] = om_0, eps_0, sq_0
-    c[own_row, 0] = mass * moment * X_0
-    least = LEAST_DETERMINANT * moment if varies(law, mode.region) else 0.0
-    c[RING + DETERMINANT, 0] = D_0 - least
+        alpha_dd = psi_dd
+    c[RING + OMEGA, 0], c[RING + EPSILON, 0], c[RING + SQUARE, 0], c[own_row, 0] = om_0, psi_dd, sq_0, N_0
+    least = LEAST_DETERMINANT * inertia(body) if varies(law, mode.region) else 0.0
+    if slips:
+        c[RING + DETERMINANT, 0] = pivot.determinant(scene, f, K_0) - least
+    else:
+        # Forward slip begins where friction against it no longer suffices.
+        c[RING + SLOW, 0], c[RING + FAST, 0] = mu_s * N_0 + F_0, mu_s * N_0 - F_0
     om_before, ad_before = om_0, ad_0
-    own = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    own = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     of_law = no_products(law, surfaces)
     first = newest = no_factors(joined(own, of_law))
     for k in range(1, ORDER + 1):
-        om, ad = epsilon * INVERSE[k], alpha_dd * INVERSE[k]
-        v = rho * ad + r * om - race * ((k + 1.0) * c[RING + THETA, k + 1])
+        om, ad, K, v = psi_dd * INVERSE[k], alpha_dd * INVERSE[k], 0.0, 0.0
         inner = inner_products(c, PRODUCTS, k, first, newest)
-        i_sa, i_ca, i_sd, i_cd, i_sq, i_ad, i_usq, i_wsq, i_Kq, i_wP, i_DX, i_PX, i_KX, i_ue = part_from(inner, own, ())
-        (mu,), law_left, law_right = series_term(
-            law, mode.region, k, sign * v, part_from(inner, of_law, own), begun, surfaces
+        i_sa, i_ca, i_sd, i_cd, i_sq, i_ad, i_usq, i_wsq, i_we, i_ue, i_wN, i_uF, i_KN, i_Ku, i_wP = part_from(
+            inner, own, ()
         )
-        K = -sign * mu
+        law_left = law_right = of_law
+        if slips:
+            v = rho * ad + balls.radius * om - race * ((k + 1.0) * c[RING + THETA, k + 1])
+            (mu,), law_left, law_right = series_term(
+                law, mode.region, k, sign * v, part_from(inner, of_law, own), begun, surfaces
+            )
+            K = -sign * mu
         dd_before = om_before - ad_before
-        s_a, c_a = (i_sa + ad_before * c_a0) * INVERSE[k], -(i_ca + ad_before * s_a0) * INVERSE[k]
+        s_a = (i_sa + ad_before * f.cos_alpha) * INVERSE[k]
+        c_a = -(i_ca + ad_before * f.sin_alpha) * INVERSE[k]
         s_d, c_d = (i_sd + dd_before * c_d0) * INVERSE[k], -(i_cd + dd_before * s_d0) * INVERSE[k]
+        # The lever q of friction is the radius of the ball less u.
         u, w = h * c_d - a * s_d, a * c_d + h * s_d
-        P = w - (i_Kq - K_0 * u + K * q_0)
-        D = mass * (i_wP + w * P_0 + w_0 * P)
         sq, squared = i_sq + 2.0 * om_0 * om, i_ad + 2.0 * ad_0 * ad
-        G = gravity * c_a + rho * squared + i_usq + u * sq_0 + u_0 * sq
-        x = (G - i_DX - D * X_0) * per_D
-        epsilon = -mass * (i_PX + P * X_0 + P_0 * x)
-        loaded = i_KX + K * X_0 + K_0 * x
-        turned = i_ue + u * eps_0 + u_0 * epsilon
-        alpha_dd = (moment * loaded - gravity * s_a - turned + i_wsq + w * sq_0 + w_0 * sq) / rho
-        left = (ad_before, ad_before, dd_before, dd_before, om, ad, u, w, K, w, D, P, K, u)
-        right = (c_a, s_a, c_d, s_d, om, ad, sq, sq, -u, P, x, x, x, epsilon)
+        across = gravity * c_a + rho * squared + i_usq + u * sq_0 + f.u * sq + i_we + w * psi_dd0
+        along = gravity * s_a - (i_wsq + w * sq_0 + f.w * sq) + i_ue + u * psi_dd0
+        sides = mass * across, mass * along, -(i_wN + w * N_0) - (i_uF + u * F_0)
+        P = w - (K * f.q - K_0 * u - i_Ku)
+        if slips:
+            psi_dd, alpha_dd, N, F = pivot.solved_in_slip(scene, f, K_0, sides, i_KN + K * N_0)
+            c[RING + DETERMINANT, k] = mass * (i_wP + w * P_0 + f.w * P)
+        else:
+            carried = race * ((k + 1.0) * (k + 2.0) * c[RING + THETA, k + 2])
+            psi_dd, alpha_dd, N, F = pivot.solved_in_stick(scene, f, sides, carried)
+            c[RING + SLOW, k], c[RING + FAST, k] = mu_s * N + F, mu_s * N - F
+        left = (ad_before, ad_before, dd_before, dd_before, om, ad, u, w, w, u, w, u, K, K, w)
+        right = (c_a, s_a, c_d, s_d, om, ad, sq, sq, psi_dd, psi_dd, N, F, N, u, P)
         newest = set_factors(c, PRODUCTS, k, joined(left, law_left), joined(right, law_right))
         first = newest if k == 1 else first
         c[RING + PHI, k], c[RING + OMEGA, k], c[RING + V, k] = om_before * INVERSE[k], om, v
-        c[RING + EPSILON, k], c[RING + SQUARE, k] = epsilon, sq
+        c[RING + EPSILON, k], c[RING + SQUARE, k], c[own_row, k] = psi_dd, sq, N
         c[ETA, k] = dd_before * INVERSE[k]
-        c[own_row, k], c[RING + DETERMINANT, k] = mass * moment * x, D
         c[RING + SIN, k], c[RING + COS, k] = s_d, c_d
         om_before, ad_before = om, ad
-    return sharpness
-
-
-@inlined
-def _expand_pivot_stick(scene, mode, at, c):
-    """Fill the series of a pivot that sticks, and the guards of its friction; see :func:`pivot.in_stick`."""
-    f, s_d0, c_d0, eta_dot, fresh = at
-    body, balls = scene.closed.body, scene.balls
-    mass, moment, gravity, race = body.mass, inertia(body), body.gravity, body.radius
-    rho, r, h = balls.reach, balls.radius, balls.offset
-    a = side_of(holding(mode)) * balls.half_distance
-    own_row = RING + (NORMAL_2 if mode.open == FIRST else NORMAL_1)
-    mu_s, _, _ = coefficients_there(scene, place_of(mode))
-    om_0, ad_0 = f.psi_dot, f.psi_dot - eta_dot
-    u_0, w_0, q_0, s_a0, c_a0 = f.u, f.w, f.q, f.sin_alpha, f.cos_alpha
-    sq_0 = om_0 * om_0
-    T_0 = race * (2.0 * c[RING + THETA, 2]) + gravity * s_a0 - w_0 * sq_0
-    G_0 = gravity * c_a0 + rho * ad_0 * ad_0 + u_0 * sq_0
-    Z_0 = moment + mass * (w_0 * w_0 + q_0 * q_0)
-    per_Z = 1.0 / Z_0
-    epsilon = eps_0 = mass * (q_0 * T_0 - w_0 * G_0) * per_Z
-    normal, along = mass * (G_0 + w_0 * eps_0), mass * (T_0 - q_0 * eps_0)
-    c[RING + OMEGA, 0], c[RING + EPSILON, 0], c[RING + SQUARE, 0] = om_0, eps_0, sq_0
-    c[own_row, 0] = normal
-    # Forward slip begins where friction against it no longer suffices.
-    c[RING + SLOW, 0], c[RING + FAST, 0] = mu_s * normal + along, mu_s * normal - along
-    om_before, ad_before = om_0, ad_0
-    own = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    first = newest = no_factors(own)
-    for k in range(1, ORDER + 1):
-        om = epsilon * INVERSE[k]
-        ad = (race * ((k + 1.0) * c[RING + THETA, k + 1]) - r * om) / rho
-        if fresh == 3 and k == 1:
-            ad = om
-        inner = inner_products(c, PRODUCTS, k, first, newest)
-        i_sa, i_ca, i_sd, i_cd, i_sq, i_ad, i_usq, i_wsq, i_qT, i_wG, i_ww, i_qq, i_Ze, i_we, i_qe = part_from(
-            inner, own, ()
-        )
-        dd_before = om_before - ad_before
-        s_a, c_a = (i_sa + ad_before * c_a0) * INVERSE[k], -(i_ca + ad_before * s_a0) * INVERSE[k]
-        s_d, c_d = (i_sd + dd_before * c_d0) * INVERSE[k], -(i_cd + dd_before * s_d0) * INVERSE[k]
-        u, w = h * c_d - a * s_d, a * c_d + h * s_d
-        sq, squared = i_sq + 2.0 * om_0 * om, i_ad + 2.0 * ad_0 * ad
-        ring_epsilon = (k + 1.0) * (k + 2.0) * c[RING + THETA, k + 2]
-        T = race * ring_epsilon + gravity * s_a - (i_wsq + w * sq_0 + w_0 * sq)
-        G = gravity * c_a + rho * squared + i_usq + u * sq_0 + u_0 * sq
-        Z = mass * (i_ww + 2.0 * w_0 * w + i_qq - 2.0 * q_0 * u)
-        lever = i_qT - u * T_0 + q_0 * T - (i_wG + w * G_0 + w_0 * G)
-        epsilon = (mass * lever - i_Ze - Z * eps_0) * per_Z
-        normal = mass * (G + i_we + w * eps_0 + w_0 * epsilon)
-        along = mass * (T - (i_qe - u * eps_0 + q_0 * epsilon))
-        left = (ad_before, ad_before, dd_before, dd_before, om, ad, u, w, -u, w, w, u, Z, w, -u)
-        right = (c_a, s_a, c_d, s_d, om, ad, sq, sq, T, G, w, u, epsilon, epsilon, epsilon)
-        newest = set_factors(c, PRODUCTS, k, left, right)
-        first = newest if k == 1 else first
-        c[RING + PHI, k], c[RING + OMEGA, k], c[RING + V, k] = om_before * INVERSE[k], om, 0.0
-        c[RING + EPSILON, k], c[RING + SQUARE, k] = epsilon, sq
-        c[ETA, k] = dd_before * INVERSE[k]
-        c[own_row, k] = normal
-        c[RING + SLOW, k], c[RING + FAST, k] = mu_s * normal + along, mu_s * normal - along
-        c[RING + SIN, k], c[RING + COS, k] = s_d, c_d
-        om_before, ad_before = om, ad
-    return 0.0
+    return sharpness if slips else 0.0
 
 
 @inlined
