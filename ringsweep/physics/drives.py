@@ -128,12 +128,19 @@ def _piece(knots, t):
     return low
 
 
-@shape.implements(Table)
-def _table(drive, t):
+@inlined
+def _cubic(drive, t):
+    """Taylor coefficients of the shape about time `t`, from the power 0 to 3."""
     j = _piece(drive.knots, t)
     x = t - drive.knots[j]
     c3, c2, c1, c0 = drive.coefficients[j]
-    return c0 + x * (c1 + x * (c2 + x * c3)), c1 + x * (2.0 * c2 + 3.0 * x * c3), 2.0 * c2 + 6.0 * x * c3
+    return c0 + x * (c1 + x * (c2 + x * c3)), c1 + x * (2.0 * c2 + 3.0 * x * c3), c2 + 3.0 * x * c3, c3
+
+
+@shape.implements(Table)
+def _table(drive, t):
+    s, rate, half, _ = _cubic(drive, t)
+    return s, rate, 2.0 * half
 
 
 @hook(absorb=True, optional=True)
@@ -232,15 +239,9 @@ def _expand_power(drive, t, order, theta, work):
 
 @expand.implements(Table)
 def _expand_table(drive, t, order, theta, work):
-    for k in range(4, order + 1):
-        theta[k] = 0.0
-    j = _piece(drive.knots, t)
-    x = t - drive.knots[j]
-    c3, c2, c1, c0 = drive.coefficients[j]
-    theta[0] = drive.amplitude * (c0 + x * (c1 + x * (c2 + x * c3)))
-    theta[1] = drive.amplitude * (c1 + x * (2.0 * c2 + 3.0 * x * c3))
-    theta[2] = drive.amplitude * (c2 + 3.0 * x * c3)
-    theta[3] = drive.amplitude * c3
+    terms = _cubic(drive, t)
+    for k in range(order + 1):
+        theta[k] = drive.amplitude * terms[k] if k < 4 else 0.0
 
 
 @hook(optional=True)
@@ -300,7 +301,7 @@ def _power_jerk(drive, t):
 
 @jerk.implements(Table)
 def _table_jerk(drive, t):
-    return 6.0 * drive.amplitude * drive.coefficients[_piece(drive.knots, t)][0]
+    return 6.0 * drive.amplitude * _cubic(drive, t)[3]
 
 
 #: Highest power of the series of a drive about a recent time.
