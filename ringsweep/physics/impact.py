@@ -21,7 +21,7 @@ from __future__ import annotations
 from math import atan2, cos, hypot, sin
 from typing import Any, NamedTuple
 
-from ringsweep.compile import hook, inlined
+from ringsweep.compile import hook, inlined, replacing
 from ringsweep.physics import ring
 from ringsweep.quantities.parameters import Leaf
 
@@ -136,17 +136,14 @@ def side_of(contact):
     return 1.0 if contact == 1 else -1.0
 
 
+_with_rates = replacing("psi_dot", "x_dot", "y_dot")
+
+
 @inlined
 def relative_to_race(motion, ring_omega):
     """Motion as an observer sees it who turns with the race, m/s and rad/s."""
-    return Motion(
-        motion.psi,
-        motion.psi_dot - ring_omega,
-        motion.x,
-        motion.x_dot + ring_omega * motion.y,
-        motion.y,
-        motion.y_dot - ring_omega * motion.x,
-    )
+    x_dot, y_dot = motion.x_dot + ring_omega * motion.y, motion.y_dot - ring_omega * motion.x
+    return _with_rates(motion, motion.psi_dot - ring_omega, x_dot, y_dot)
 
 
 @inlined
@@ -414,32 +411,10 @@ def impulses(mass, moment, first, second, touching, mu, restitution):
 @inlined
 def after_impact(mass, moment, first, second, motion, found):
     """Motion after an impact with the impulses `found`."""
-    return Motion(
-        motion.psi,
-        motion.psi_dot
-        + (
-            first.lever_n * found.normal_1
-            + first.lever_t * found.along_1
-            + second.lever_n * found.normal_2
-            + second.lever_t * found.along_2
-        )
-        / moment,
-        motion.x,
-        motion.x_dot
-        + (
-            first.cosine * found.along_1
-            - first.sine * found.normal_1
-            + second.cosine * found.along_2
-            - second.sine * found.normal_2
-        )
-        / mass,
-        motion.y,
-        motion.y_dot
-        + (
-            first.sine * found.along_1
-            + first.cosine * found.normal_1
-            + second.sine * found.along_2
-            + second.cosine * found.normal_2
-        )
-        / mass,
-    )
+    turning = across = up = 0.0
+    for ball, normal, along in ((first, found.normal_1, found.along_1), (second, found.normal_2, found.along_2)):
+        turning += ball.lever_n * normal + ball.lever_t * along
+        across += ball.cosine * along - ball.sine * normal
+        up += ball.sine * along + ball.cosine * normal
+    psi_dot = motion.psi_dot + turning / moment
+    return _with_rates(motion, psi_dot, motion.x_dot + across / mass, motion.y_dot + up / mass)
