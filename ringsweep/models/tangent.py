@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from ringsweep.compile import hook, inlined, replacing, unrolled
 from ringsweep.models.interface.variation import Exponent
 from ringsweep.numerics.collocation import stored, transition
+from ringsweep.numerics.terms import joined
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.ring import Ring
 
@@ -402,12 +403,6 @@ def _exponent(tangent):
     return (b.growth - b.first_growth) / (b.t - b.first_t), sqrt(b.squares / (b.number * (b.number - 1.0)))
 
 
-@unrolled
-def _followed(length, outcome, more):
-    """A tuple followed by six numbers."""
-    return ["return " + ", ".join([f"outcome[{i}]" for i in range(length)] + [f"more[{i}]" for i in range(6)])]
-
-
 @hook(optional=True)
 def with_exponent(tangent, outcome, period, scene):
     """Outcome of a run of this period, s, with exponent, its error and multipliers if they are asked for."""
@@ -419,7 +414,7 @@ def _with_exponent(tangent, outcome, period, scene):
     m = tangent.multipliers
     rate, error = exponent(tangent)
     if isnan(period) or isnan(m.first):
-        return _followed(outcome, (rate, error, nan, nan, nan, nan))
+        return joined(outcome, (rate, error, nan, nan, nan, nan))
     if scene.forcing_period == inf:
         # A shift in time neither grows nor decays, and says nothing.
         rate, error = m.rate_2, m.change_2
@@ -427,4 +422,4 @@ def _with_exponent(tangent, outcome, period, scene):
         # The mean of the blocks still holds the approach to the periodic motion. What is left of it shrinks by the
         # multiplier in each lap, and so do the changes.
         rate, error = m.rate_1, m.change_1 / (1.0 - m.first) if m.first < 1.0 else m.change_1
-    return _followed(outcome, (rate, error, m.first, m.second, m.angle_1, m.angle_2))
+    return joined(outcome, (rate, error, m.first, m.second, m.angle_1, m.angle_2))
