@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from ringsweep.compile import inlined
+from ringsweep.compile import add_scaled, inlined
 from ringsweep.models import tangent
 from ringsweep.models.interface import variation
 from ringsweep.models.ring.contacts import coefficients_under
@@ -15,7 +15,7 @@ from ringsweep.physics import contact, drives
 from ringsweep.physics.friction.velocity import stiction_band
 from ringsweep.physics.ring import Ring
 
-# Differences for the gradient of the reserve of friction: of the angle, rad, and as a share of the size of the rates.
+# Differences for the gradient of the reserve of friction: of the angle, rad, and of the time as a share of its scale.
 _SMALL = 1e-5
 
 
@@ -63,25 +63,19 @@ def _gradient(scene, mode, guard, t, y, rates):
 def _gradient_of_reserve(scene, mode, t, phi):
     """Gradient of the reserve of friction, whose zero ends stick, over its rate."""
     _, omega, epsilon = drives.turn(scene.drive, t)
-    slow = (scene.body.gravity / scene.body.radius) ** 0.5 + abs(omega)
-    step, step_omega, step_epsilon = _SMALL, _SMALL * slow, _SMALL * (slow * slow + abs(epsilon))
-    by_phi = (_reserve(scene, mode, phi + step, omega, epsilon) - _reserve(scene, mode, phi - step, omega, epsilon)) / (
-        2.0 * step
-    )
-    by_omega = (
-        _reserve(scene, mode, phi, omega + step_omega, epsilon)
-        - _reserve(scene, mode, phi, omega - step_omega, epsilon)
-    ) / (2.0 * step_omega)
-    by_epsilon = (
-        _reserve(scene, mode, phi, omega, epsilon + step_epsilon)
-        - _reserve(scene, mode, phi, omega, epsilon - step_epsilon)
-    ) / (2.0 * step_epsilon)
-    rate = by_phi * omega + by_omega * epsilon + by_epsilon * drives.jerk(scene.drive, t)
+    at, rates = (phi, omega, epsilon), (omega, epsilon, drives.jerk(scene.drive, t))
+    fast = (scene.body.gravity / scene.body.radius) ** 0.5 + abs(omega) + abs(epsilon) ** 0.5
+    by_phi = _reserve_rate(scene, mode, at, (1.0, 0.0, 0.0), _SMALL)
+    rate = _reserve_rate(scene, mode, at, rates, _SMALL / fast if fast > 0.0 else _SMALL)
     return by_phi / rate if rate != 0.0 else 0.0, 0.0
 
 
 @inlined
-def _reserve(scene, mode, phi, omega, epsilon):
+def _reserve_rate(scene, mode, at, rates, step):
+    """Rate of the reserve of friction, by differences, if angle, angular velocity and acceleration have these rates."""
     mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
-    _, reserve, _, _ = contact.stick(scene.body, mu_s1, mu_s2, (sin(phi), cos(phi), omega), epsilon)
-    return reserve
+    phi, omega, epsilon = add_scaled(at, step, rates)
+    _, above, _, _ = contact.stick(scene.body, mu_s1, mu_s2, (sin(phi), cos(phi), omega), epsilon)
+    phi, omega, epsilon = add_scaled(at, -step, rates)
+    _, below, _, _ = contact.stick(scene.body, mu_s1, mu_s2, (sin(phi), cos(phi), omega), epsilon)
+    return (above - below) / (2.0 * step)
