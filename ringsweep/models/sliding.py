@@ -13,6 +13,7 @@ from ringsweep.models.parts import exceeds, larger_eigenvalue
 from ringsweep.models.slip import acceleration_slopes, couplings
 from ringsweep.numerics.functions import any_of, select
 from ringsweep.numerics.series import slope, value
+from ringsweep.numerics.terms import set_terms, terms
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.friction.registry import holds_in_band
@@ -69,6 +70,35 @@ def _from_implicit(scene, forcing, x):
 def _motion(scene, forcing, x, linear):
     radius = ring.radius(scene.body)
     return x[1] / radius + forcing[1], linear[0][1] / radius + forcing[2]
+
+
+# ---- series ----------------------------------------------------------------------------------
+
+
+@inlined
+def expand_bounds(c, rows, mode, bounds, size):
+    """Fill the guards of slip for both bounds of the region of the friction law, m/s.
+
+    Parameters
+    ----------
+    c : ndarray of shape ``(rows, columns)``
+        Table of series.
+    rows : tuple of int
+        Rows of the sliding velocity, and of the guards of the lower and of the upper bound.
+    mode : NamedTuple
+    bounds : tuple of float
+        The bounds, m/s.
+    size : float
+        Size of the terms of the sliding acceleration, m/s^2.
+    """
+    (v, slow, fast), (low, high), sign = rows, bounds, float(mode.sign)
+    set_terms(c[slow], terms(c[v]) * sign)
+    set_terms(c[fast], terms(c[v]) * -sign)
+    c[slow, 0] = 0.0 if mode.entry_guard == slow else sign * c[v, 0] - low
+    c[fast, 0] = 0.0 if mode.entry_guard == fast else high - sign * c[v, 0]
+    # If friction does not drop at breakaway, the slope is zero there: what is computed is rounding.
+    if mode.entry_guard == slow and low == 0.0 and abs(c[v, 1]) <= 1e-12 * size:
+        c[slow, 1] = 0.0
 
 
 # ---- audit ------------------------------------------------------------------------------------

@@ -67,6 +67,24 @@ def step_size(last, previous):
     return h
 
 
+@inlined
+def step_within(c, units):
+    """Longest step within which the last two terms of several series stay within their tolerances, s.
+
+    Parameters
+    ----------
+    c : ndarray of shape ``(rows, columns)``
+        Table of series.
+    units : tuple of tuple
+        Row, and reciprocal of its tolerance, for each series.
+    """
+    last = previous = 0.0
+    for row, unit in units:
+        last = max(last, abs(c[row, ORDER]) * unit)
+        previous = max(previous, abs(c[row, ORDER - 1]) * unit)
+    return step_size(last, previous)
+
+
 @absorbed
 def variation(c, h):
     """Upper bound on the change of a series within a step of length `h`."""

@@ -1,7 +1,7 @@
 """The belt with bristles, for all solvers.
 
-The state is ``(x, velocity, z)`` for steps of constant length, with the velocity in space, and ``(x, v, z)`` for
-implicit steps, with the sliding velocity. z is the deflection of the bristles.
+The state is ``(x, velocity, z)`` for steps of constant length, with the velocity in space. Otherwise it is
+``(x, v, z)``, with the sliding velocity. z is the deflection of the bristles.
 """
 
 from __future__ import annotations

@@ -21,7 +21,8 @@ from ringsweep.models.belt.force import (
 )
 from ringsweep.models.interface import modes, series
 from ringsweep.models.interface.status import RUNNING, SEPARATED_1
-from ringsweep.numerics.series import INVERSE, ORDER, crossings, slope, step_size, value, variation
+from ringsweep.models.sliding import expand_bounds
+from ringsweep.numerics.series import INVERSE, ORDER, crossings, slope, step_within, value, variation
 from ringsweep.numerics.terms import (
     FACTOR_ROWS,
     MOST_GROUPS,
@@ -29,8 +30,6 @@ from ringsweep.numerics.terms import (
     no_factors,
     part_from,
     set_factors,
-    set_terms,
-    terms,
 )
 from ringsweep.physics import belt, drives, ring
 from ringsweep.physics.forces import expand_force, largest_force
@@ -226,41 +225,31 @@ def _expand(scene, mode, t, y, tolerance, c):
             if abs(c[mode.entry_guard, 1]) <= _level(scene, bound):
                 c[mode.entry_guard, 1] = 0.0
     else:
-        sign = float(mode.sign)
-        low, high = region_bounds(scene.law, mode.region)
         yielding = holds_in_band(scene.law) and mode.region < 0
         sharpness = _expand_slip(scene, mode, 0.0 if yielding else if_force(body, scene.viscous, 0.0), c)
-        set_terms(c[SLOW], terms(c[V]) * sign)
-        set_terms(c[FAST], terms(c[V]) * -sign)
-        c[SLOW, 0], c[FAST, 0] = sign * c[V, 0] - low, high - sign * c[V, 0]
+        size = (abs(c[FORCE, 0]) + ring.size(body, (c[X, 0], c[PUSH, 0], c[VELOCITY, 0]))) / body.mass
+        expand_bounds(c, (V, SLOW, FAST), mode, region_bounds(scene.law, mode.region), size)
         if yielding:
             # With a dead band the velocity of the belt is constant.
             for k in range(ORDER + 1):
                 load, pull = _held_term(body, c, k, 1.0 if k == 0 else 0.0, 0.0)
-                c[SLOW, k] = sign * pull - scene.mu_s * load
-        if mode.entry_guard in (SLOW, FAST):
-            c[mode.entry_guard, 0] = 0.0
-        # If friction does not drop at breakaway, the slope is zero there: what is computed is rounding.
-        if mode.entry_guard == SLOW and low == 0.0 and not yielding:
-            motion = c[X, 0], c[PUSH, 0], c[VELOCITY, 0]
-            terms_of_balance = abs(c[FORCE, 0]) + ring.size(body, motion)
-            if abs(c[V, 1]) <= 1e-12 * terms_of_balance / body.mass:
-                c[SLOW, 1] = 0.0
+                c[SLOW, k] = float(mode.sign) * pull - scene.mu_s * load
+            if mode.entry_guard == SLOW:
+                c[SLOW, 0] = 0.0
     # The unit of length is the distance that belt, body or load could move within a natural period of the spring.
     length = abs(c[X, 0]) + length_scale(scene, abs(c[VELOCITY, 0]) + abs(c[SHIFT, 1]))
     speed = speed_scale(scene, length)
     if mode.region < 0 and not holds_in_band(scene.law):
         # An error as large as the stiction band would keep the creep from becoming steady.
         speed = min(speed, 1e3 * stiction_band(scene.law))
-    last = max(abs(c[X, ORDER]) / length, abs(c[V, ORDER]) / speed)
-    previous = max(abs(c[X, ORDER - 1]) / length, abs(c[V, ORDER - 1]) / speed)
+    per_force = 0.0
     if mode.sign == 0 or (holds_in_band(scene.law) and mode.region < 0):
         # The guards are forces, whose series may converge more slowly than that of the motion.
         motion = length, largest_force(scene.drive), c[VELOCITY, 0]
         scale = abs(breakaway_force(scene, c[X, 0])) + ring.size(body, motion) + 1e-300
-        last = max(last, abs(c[SLOW, ORDER]) / scale)
-        previous = max(previous, abs(c[SLOW, ORDER - 1]) / scale)
-    h = step_size(last / tolerance, previous / tolerance)
+        per_force = 1.0 / (scale * tolerance)
+    units = (X, 1.0 / (length * tolerance)), (V, 1.0 / (speed * tolerance)), (SLOW, per_force)
+    h = step_within(c, units)
     return h if mode.sign == 0 else shorten_for_decay(sharpness, c[V], h)
 
 

@@ -16,7 +16,6 @@ from ringsweep.models.interface import constant_step, implicit, modes
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
 from ringsweep.models.parts import larger_eigenvalue
 from ringsweep.models.ring.contacts import (
-    coefficients_at,
     coefficients_under,
     places_after_edge,
     places_at,
@@ -24,7 +23,7 @@ from ringsweep.models.ring.contacts import (
     zones_at,
 )
 from ringsweep.models.ring.creep import DETERMINANT, FAST, NORMAL_1, NORMAL_2, SLOW
-from ringsweep.models.ring.series import AT_ONCE, NEARLY_JAMMED
+from ringsweep.models.ring.series import NEARLY_JAMMED, loads_in_slip, lost_in_slip
 from ringsweep.models.sliding import ENDS
 from ringsweep.models.slip import Bundle, Slip, couplings, region_guards, slip
 from ringsweep.numerics.functions import (
@@ -80,7 +79,7 @@ def _region_guard(scene, under, v, z_1, z_2, sign, region):
 def _initial_deflections(scene):
     """Deflections at launch, m."""
     v = ring.launch_velocity(scene) * scene.body.radius
-    mu_s1, mu_k1, mu_s2, mu_k2 = coefficients_at(scene, scene.initial_phi - drives.turn(scene.drive, 0.0)[0])
+    mu_s1, mu_k1, mu_s2, mu_k2 = ring.coefficients_at(scene, scene.initial_phi - drives.turn(scene.drive, 0.0)[0])
     return steady_deflection(scene.law, mu_s1, mu_k1, v), steady_deflection(scene.law, mu_s2, mu_k2, v)
 
 
@@ -268,20 +267,6 @@ def _after_jump(scene, mode, t, y):
     return ENDS[contact.sliding(scene.body, *now.K, now.motion)]
 
 
-@inlined
-def _status_at_zero_reaction(scene, mode, guard, t, y):
-    """Status after a reaction has vanished: jam or separation."""
-    body, now = scene.body, _sliding_at(scene, mode, t, y)
-    epsilon, determinant = ring.acceleration(body, *now.K, now.motion)
-    normal_1, normal_2 = ring.reactions(body, *now.K, now.motion)
-    scale = body.mass * (body.gravity + body.radius * (now.motion[2] * now.motion[2] + abs(epsilon)))
-    # Near a jam the polynomial of a reaction is inaccurate, and may vanish where the reaction does not.
-    if (normal_1 if guard == NORMAL_1 else normal_2) > 1e-2 * scale:
-        return JAM if not determinant > NEARLY_JAMMED * ring.free_determinant(body) else BROKEN
-    least = AT_ONCE * scale
-    return ENDS[contact.lost(body, guard == NORMAL_1 or normal_1 <= least, guard == NORMAL_2 or normal_2 <= least)]
-
-
 @modes.status_when_stalled.implements(BristleRing)
 def _status_when_stalled(scene, mode, t, y):
     now = _sliding_at(scene, mode, t, y)
@@ -296,7 +281,9 @@ def _switch(scene, mode, guard, t, y):
     if guard == DETERMINANT:
         return JAM, mode, y
     if guard in (NORMAL_1, NORMAL_2):
-        return _status_at_zero_reaction(scene, mode, guard, t, y), mode, y
+        now = _sliding_at(scene, mode, t, y)
+        loads = loads_in_slip(scene.body, now.K, now.motion)
+        return lost_in_slip(scene.body, loads, guard == NORMAL_1), mode, y
     if guard == SLOW:
         return RUNNING, Mode(-sign, BAND, place_1, place_2), (rho, 0.0, z_1, z_2)
     if guard == FAST:

@@ -50,15 +50,6 @@ def coefficients_under(scene, mode):
 
 
 @inlined
-def coefficients_at(scene, rho):
-    """Static and kinetic coefficient under contact 1 and contact 2, at the angle `rho` in the ring's frame, rad."""
-    offset = ring.contact_offset(scene.body)
-    mu_s1, mu_k1, _ = coefficients(scene.surface, segment(scene.surface, rho - offset))
-    mu_s2, mu_k2, _ = coefficients(scene.surface, segment(scene.surface, rho + offset))
-    return mu_s1, mu_k1, mu_s2, mu_k2
-
-
-@inlined
 def zones_under(scene, mode):
     """Number of the zone under each contact (0: none), in the segments of a mode."""
     _, _, zone_1 = coefficients(scene.surface, mode.place_1[0])

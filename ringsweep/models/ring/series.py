@@ -28,13 +28,13 @@ from ringsweep.models.ring.contacts import (
     places_beyond,
     zones_under,
 )
-from ringsweep.models.sliding import ENDS, REACTION_TOLERANCE
+from ringsweep.models.sliding import ENDS, REACTION_TOLERANCE, expand_bounds
 from ringsweep.numerics.series import (
     INVERSE,
     ORDER,
     crossings,
     differentiate,
-    step_size,
+    step_within,
     value,
     variation,
 )
@@ -72,7 +72,7 @@ _GUARDS = FACTORS + MOST_GROUPS * FACTOR_ROWS
 DETERMINANT, SLOW, NORMAL_1, NORMAL_2, EDGE, FAST = range(_GUARDS, _GUARDS + 6)
 
 # If one reaction vanishes and the other is smaller than this share of the load, both contacts separate.
-AT_ONCE = 1e-9
+_AT_ONCE = 1e-9
 
 # The body is about to jam if the determinant of the balances is smaller than the first share of its value without
 # friction. If friction varies with the speed, the body jams at the second share.
@@ -263,16 +263,19 @@ def _friction_at(scene, mode, t, v):
 
 
 @inlined
-def _sliding_at(scene, mode, t, y):
+def loads_in_slip(body, K, motion):
     """Determinant of the balances, both reactions and their scale in slip, from the balances and not from a series."""
-    phi, v = y
-    body = scene.body
-    K1, K2, omega = _friction_at(scene, mode, t, v)
-    motion = sin(phi), cos(phi), omega
-    epsilon, determinant = ring.acceleration(body, K1, K2, motion)
-    normal_1, normal_2 = ring.reactions(body, K1, K2, motion)
-    scale = body.mass * (body.gravity + body.radius * (omega * omega + abs(epsilon)))
+    epsilon, determinant = ring.acceleration(body, *K, motion)
+    normal_1, normal_2 = ring.reactions(body, *K, motion)
+    scale = body.mass * (body.gravity + body.radius * (motion[2] * motion[2] + abs(epsilon)))
     return determinant, normal_1, normal_2, scale
+
+
+@inlined
+def _loads_at(scene, mode, t, y):
+    """What :func:`loads_in_slip` returns for a state."""
+    K1, K2, omega = _friction_at(scene, mode, t, y[1])
+    return loads_in_slip(scene.body, (K1, K2), (sin(y[0]), cos(y[0]), omega))
 
 
 @inlined
@@ -280,29 +283,42 @@ def _is_jamming(scene, mode, t, y):
     """Whether slip is so near to a jam, where reactions grow without bound, that their signs mean nothing."""
     if mode.sign == 0:
         return False
-    determinant, _, _, _ = _sliding_at(scene, mode, t, y)
+    determinant, _, _, _ = _loads_at(scene, mode, t, y)
     return not determinant > NEARLY_JAMMED * ring.free_determinant(scene.body)
 
 
 @inlined
-def _after_zero_reaction(scene, mode, guard, t, y):
-    """Status, mode and state after a reaction has vanished."""
-    if mode.sign == 0:
-        # The contact opens, even if slip with both contacts closed were admissible: laws with a narrow stiction band
-        # still hold the body at this instant.
-        _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
-        mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
-        motion = sin(y[0]), cos(y[0]), ring_omega
-        _, _, normal_1, normal_2 = contact.stick(scene.body, mu_s1, mu_s2, motion, ring_epsilon)
-        scale = scene.body.mass * (scene.body.gravity + scene.body.radius * ring_omega * ring_omega)
-    else:
-        _, normal_1, normal_2, scale = _sliding_at(scene, mode, t, y)
-        # Near a jam the series of a reaction is inaccurate, and may vanish where the reaction does not.
-        if (normal_1 if guard == NORMAL_1 else normal_2) > 1e-2 * scale:
-            return JAM if _is_jamming(scene, mode, t, y) else BROKEN, mode, y
-    least = AT_ONCE * scale
-    opens_1, opens_2 = guard == NORMAL_1 or normal_1 <= least, guard == NORMAL_2 or normal_2 <= least
-    return ENDS[contact.lost(scene.body, opens_1, opens_2)], mode, y
+def lost_in_slip(body, loads, first):
+    """Status after the reaction of contact 1 (`first`) or of contact 2 has vanished in slip.
+
+    `loads` is what :func:`loads_in_slip` returned.
+    """
+    determinant, normal_1, normal_2, scale = loads
+    # Near a jam the series of a reaction is inaccurate, and may vanish where the reaction does not.
+    if (normal_1 if first else normal_2) > 1e-2 * scale:
+        return BROKEN if determinant > NEARLY_JAMMED * ring.free_determinant(body) else JAM
+    return _lost(body, (normal_1, normal_2), scale, first)
+
+
+@inlined
+def _lost(body, normals, scale, first):
+    least = _AT_ONCE * scale
+    return ENDS[contact.lost(body, first or normals[0] <= least, not first or normals[1] <= least)]
+
+
+@inlined
+def _after_zero_reaction(scene, mode, first, t, y):
+    """Status after a reaction has vanished, see :func:`lost_in_slip`."""
+    body = scene.body
+    if mode.sign != 0:
+        return lost_in_slip(body, _loads_at(scene, mode, t, y), first)
+    # The contact opens, even if slip with both contacts closed were admissible: laws with a narrow stiction band still
+    # hold the body at this instant.
+    _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
+    mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
+    motion = sin(y[0]), cos(y[0]), ring_omega
+    _, _, normal_1, normal_2 = contact.stick(body, mu_s1, mu_s2, motion, ring_epsilon)
+    return _lost(body, (normal_1, normal_2), body.mass * (body.gravity + body.radius * ring_omega * ring_omega), first)
 
 
 @modes.status_when_stalled.implements(ring.Ring)
@@ -320,7 +336,7 @@ def _switch(scene, mode, guard, t, y):
     phi, v = y
     sign, region, place_1, place_2 = mode.sign, mode.region, mode.place_1, mode.place_2
     if guard in (NORMAL_1, NORMAL_2):
-        return _after_zero_reaction(scene, mode, guard, t, y)
+        return _after_zero_reaction(scene, mode, guard == NORMAL_1, t, y), mode, y
     if guard == DETERMINANT:
         return JAM, mode, y
     if sign == 0:
@@ -371,17 +387,9 @@ def _expand(scene, mode, t, y, tolerance, c):
         per_load = max(per_load, 1e3)
     per_epsilon = per_load / (scene.body.gravity / scene.body.radius + c[SQUARE, 0] + abs(c[EPSILON, 0]))
     per_reaction = per_epsilon / (scene.body.mass * scene.body.radius)
-    last = previous = 0.0
-    for row, unit in (
-        (PHI, per_angle),
-        (V, per_velocity),
-        (EPSILON, per_epsilon),
-        (NORMAL_1, per_reaction),
-        (NORMAL_2, per_reaction),
-    ):
-        last = max(last, abs(c[row, ORDER]) * unit)
-        previous = max(previous, abs(c[row, ORDER - 1]) * unit)
-    return shorten_for_decay(sharpness, c[V], step_size(last, previous))
+    reactions = (NORMAL_1, per_reaction), (NORMAL_2, per_reaction)
+    h = step_within(c, ((PHI, per_angle), (V, per_velocity), (EPSILON, per_epsilon), *reactions))
+    return shorten_for_decay(sharpness, c[V], h)
 
 
 @inlined
@@ -452,21 +460,11 @@ def _term(balance, sine, cosine, omega, square, loaded_1, loaded_2):
 @inlined
 def _expand_slip_guards(scene, mode, c):
     """Fill the guards of slip for both ends of the region of the friction law, and for the nearer edge."""
-    low, high = region_bounds(scene.law, mode.region)
-    ahead_1, ahead_2 = edges_ahead(scene, mode, c[PHI, 0] - c[THETA, 0])
-    forward = float(mode.sign)
-    set_terms(c[SLOW], terms(c[V]) * forward)
-    set_terms(c[FAST], terms(c[V]) * -forward)
-    set_terms(c[EDGE], (terms(c[THETA]) - terms(c[PHI])) * forward)
-    c[SLOW, 0] = 0.0 if mode.entry_guard == SLOW else mode.sign * c[V, 0] - low
-    c[FAST, 0] = 0.0 if mode.entry_guard == FAST else high - mode.sign * c[V, 0]
-    c[EDGE, 0] = min(ahead_1, ahead_2)
-    # If friction does not drop at breakaway, the slope is zero there: what is computed is rounding.
-    if mode.entry_guard == SLOW and low == 0.0:
-        body = scene.body
-        size = body.gravity + body.radius * (c[SQUARE, 0] + abs(c[EPSILON, 0]) + 2.0 * abs(c[THETA, 2]))
-        if abs(c[V, 1]) <= 1e-12 * size:
-            c[SLOW, 1] = 0.0
+    body = scene.body
+    size = body.gravity + body.radius * (c[SQUARE, 0] + abs(c[EPSILON, 0]) + 2.0 * abs(c[THETA, 2]))
+    expand_bounds(c, (V, SLOW, FAST), mode, region_bounds(scene.law, mode.region), size)
+    set_terms(c[EDGE], (terms(c[THETA]) - terms(c[PHI])) * float(mode.sign))
+    c[EDGE, 0] = min(edges_ahead(scene, mode, c[PHI, 0] - c[THETA, 0]))
 
 
 @inlined
@@ -493,12 +491,9 @@ def _expand_stick(scene, mode, tolerance, c):
     c[EDGE, 0] = inf
     _expand_reserve(scene.body, mu_s1, mu_s2, c)
     c[DETERMINANT, 0] = inf
-    per_load = 1.0 / (scene.body.mass * (scene.body.gravity + scene.body.radius * c[SQUARE, 0]))
-    last, previous = 0.0, 0.0
-    for row, unit in ((PHI, 1.0), (SIN, 1.0), (COS, 1.0), (SLOW, per_load), (FAST, per_load)):
-        last = max(last, abs(c[row, ORDER]) * unit)
-        previous = max(previous, abs(c[row, ORDER - 1]) * unit)
-    return step_size(last / tolerance, previous / tolerance)
+    one = 1.0 / tolerance
+    per_load = one / (scene.body.mass * (scene.body.gravity + scene.body.radius * c[SQUARE, 0]))
+    return step_within(c, ((PHI, one), (SIN, one), (COS, one), (SLOW, per_load), (FAST, per_load)))
 
 
 @inlined

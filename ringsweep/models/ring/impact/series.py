@@ -57,8 +57,18 @@ from ringsweep.models.ring.series import (
     THETA,
     V,
 )
-from ringsweep.models.sliding import REACTION_TOLERANCE
-from ringsweep.numerics.series import INVERSE, ORDER, crossings, differentiate, slope, step_size, value, variation
+from ringsweep.models.sliding import REACTION_TOLERANCE, expand_bounds
+from ringsweep.numerics.series import (
+    INVERSE,
+    ORDER,
+    crossings,
+    differentiate,
+    slope,
+    step_size,
+    step_within,
+    value,
+    variation,
+)
 from ringsweep.numerics.terms import inner_products, joined, no_factors, part_from, set_factors, set_terms, terms
 from ringsweep.physics import drives, ring
 from ringsweep.physics.friction.velocity import (
@@ -128,17 +138,9 @@ def _expand_pivot(scene, mode, t, y, tolerance, c):
         per_load = max(per_load, 1e3)
     load = pivot.size(scene, f) + balls.reach * abs(c[RING + EPSILON, 0])
     own = RING + (NORMAL_2 if contact == 2 else NORMAL_1)
-    last = previous = 0.0
-    for row, unit in (
-        (RING + PHI, per_angle),
-        (ETA, per_angle),
-        (RING + V, per_angle / speed),
-        (RING + EPSILON, per_load * balls.reach / load),
-        (own, per_load / (body.mass * load)),
-    ):
-        last = max(last, abs(c[row, ORDER]) * unit)
-        previous = max(previous, abs(c[row, ORDER - 1]) * unit)
-    return shorten_for_decay(sharpness, c[RING + V], step_size(last, previous))
+    motion = (RING + PHI, per_angle), (ETA, per_angle), (RING + V, per_angle / speed)
+    loads = (RING + EPSILON, per_load * balls.reach / load), (own, per_load / (body.mass * load))
+    return shorten_for_decay(sharpness, c[RING + V], step_within(c, (*motion, *loads)))
 
 
 @inlined
@@ -235,18 +237,9 @@ def _expand_pivot_guards(scene, mode, f, place, eta, fresh, c):
     _expand_edges(scene, place, f.alpha - c[RING + THETA, 0], c)
     if mode.sign == 0:
         return
-    low, high = region_bounds(scene.law, mode.region)
-    forward = float(mode.sign)
-    set_terms(c[RING + SLOW], terms(c[RING + V]) * forward)
-    set_terms(c[RING + FAST], terms(c[RING + V]) * -forward)
-    c[RING + SLOW, 0] = 0.0 if mode.entry_guard == RING + SLOW else mode.sign * c[RING + V, 0] - low
-    c[RING + FAST, 0] = 0.0 if mode.entry_guard == RING + FAST else high - mode.sign * c[RING + V, 0]
-    # If friction does not drop at breakaway, the slope is zero there: what is computed is rounding.
-    if mode.entry_guard == RING + SLOW and low == 0.0:
-        body = scene.closed.body
-        size = pivot.size(scene, f) + body.radius * (abs(c[RING + EPSILON, 0]) + 2.0 * abs(c[RING + THETA, 2]))
-        if abs(c[RING + V, 1]) <= 1e-12 * size:
-            c[RING + SLOW, 1] = 0.0
+    body = scene.closed.body
+    size = pivot.size(scene, f) + body.radius * (abs(c[RING + EPSILON, 0]) + 2.0 * abs(c[RING + THETA, 2]))
+    expand_bounds(c, (RING + V, RING + SLOW, RING + FAST), mode, region_bounds(scene.law, mode.region), size)
 
 
 @inlined
