@@ -140,8 +140,7 @@ class TestSingleRun:
         assert run.normal_2.min() == run.normal_min_2
 
     def test_model_with_one_contact_has_no_variables_of_contact_2(self, scene):
-        alone = {key: value for key, value in scene.items() if key != "drive"}
-        alone |= {"model": "ring-single-contact", "body": {"mass": 0.076}}
+        alone = scene | {"model": "ring-single-contact", "body": {"mass": 0.076}}
         run = ringsweep.simulate(alone | {"initial": {"omega": 5.0}})
         assert "normal_1" in run
         assert not {"normal_2", "zone_2", "normal_min_2"} & set(run.variables)

@@ -111,7 +111,6 @@ class TestClosedForms:
         batch = stiction(
             {"initial.omega": omega, "zone.half_angle": half_angle, "zone.center": 1.0, "time.span": 20.0},
             model="ring-single-contact",
-            drive="none",
         )
         found = solve(Event(rtol=1e-12), batch)
         for i in range(n):
