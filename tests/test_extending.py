@@ -321,29 +321,20 @@ def test_incomplete_file_is_refused_in_one_line_that_names_what_is_missing(tmp_p
         assert message in line
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "solver", "message"),
-    [
-        ("law.sigma0 / mu_k", "law.sigma / mu_k", '"implicit"', "Unknown attribute 'sigma' of type Ductile"),
-        (
-            "    rest = 1.0 - share * z\n",
-            "    rest = 1.0 - share * z\n    if z > 0.0:\n        rest = 0.0 * rest\n",
-            '{"method": "rk4", "steps": 10}',
-            "use select in place of if",
-        ),
-    ],
-)
-def test_function_that_does_not_compile_is_told_in_one_line_by_file_and_line(tmp_path, old, new, solver, message):
-    script = f"""
+def test_branch_that_rk4_does_not_compile_is_told_in_one_line_by_file_and_line_with_the_cure(tmp_path):
+    old = "    rest = 1.0 - share * z\n"
+    new = old + "    if z > 0.0:\n        rest = 0.0 * rest\n"
+    script = """
+        friction = {"law": "dahl-ductile", "mu_k": 0.1, "sigma0": 1e3}
         try:
-            run({{**belt, "friction": {{"law": "dahl-ductile", "mu_k": 0.1, "sigma0": 1e3}}}}, {solver})
+            run({**belt, "friction": friction}, {"method": "rk4", "steps": 10})
         except InputError as error:
             print(error)
     """
     done = in_a_process(script, files_in(tmp_path, [("my_dahl.py", old, new)]), tmp_path / "cache")
     assert done.stdout.startswith("RINGSWEEP_LAWS: does not compile: my_dahl.py, line"), done.stderr[-2000:]
     assert done.stdout.count("\n") == 1
-    assert message in done.stdout
+    assert "use select in place of if" in done.stdout
 
 
 #: Changes of the examples that Python takes and Numba does not, and what is told of them.
@@ -374,6 +365,7 @@ def test_no_message_of_numba_reaches_a_user(tmp_path):
     assert done.returncode == 0, done.stderr[-2000:]
     lines = done.stdout.splitlines()
     assert len(lines) == 6
+    assert "Unknown attribute 'sigma' of type Ductile" in lines[0]
     for k, (name, (_, _, function)) in enumerate(NOT_COMPILED.items()):
         for line in lines[3 * k : 3 * k + 3]:
             assert re.match(rf"RINGSWEEP_LAWS: does not compile: {name}, line \d+: {function}: ", line), line
