@@ -745,7 +745,8 @@ class TestNarrowFeatures:
         assert found["certified"] == 0
 
     def test_run_fails_if_and_only_if_it_meets_negative_friction(self):
-        friction = {"law": "formula", "mu": TestNegativeFriction.DIP.mu, "at_rest": "mu_s", "w": 0.005}
+        dip = {"w": 0.005, "a": 0, "b": -0.25, "c": 0}
+        friction = {"law": "formula", "mu": self.PEAKS, "at_rest": "mu_s"} | dip
         assert outcome(launched(friction | {"vb": 0.31}))["regime"] == FAILED
         below = outcome(launched(friction | {"vb": 0.6}))
         assert below["regime"] != FAILED
