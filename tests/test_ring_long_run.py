@@ -1,6 +1,7 @@
 """What a rocking ring settles to: sections at each period of the drive, words, exponents and multipliers."""
 
 from copy import deepcopy
+from functools import cache
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -137,6 +138,18 @@ def test_points_of_one_contact_are_those_of_an_independent_integration():
     np.testing.assert_allclose(found.omega_section, expected[1], atol=1e-7)
 
 
+@cache
+def period_map(amplitude):
+    """Matrix of the derivative of the map of one period, after 40 periods, by differences."""
+    reference = Reference(amplitude, 1.0, 0.3)
+    state, sign, inside = reference.after(0.0, 40.0, *reference.begin(0.4))
+    columns = []
+    for d in 1e-6 * np.eye(2):
+        one, other = (reference.after(0.0, 1.0, state + way * d, sign, inside)[0] for way in (1.0, -1.0))
+        columns.append((one - other) / 2e-6)
+    return np.transpose(columns)
+
+
 @pytest.mark.parametrize("rtol", [1e-10, 1e-12, 1e-14])
 @pytest.mark.parametrize(("amplitude", "sticks"), [(1.0, True), (2.0, False)])
 def test_multipliers_are_those_of_the_period_map(amplitude, sticks, rtol):
@@ -146,13 +159,7 @@ def test_multipliers_are_those_of_the_period_map(amplitude, sticks, rtol):
     assert word(found) == "periodic"
     assert found.period.item() == pytest.approx(1.0, rel=1e-12)
     assert (found.stick_time.item() > 1.0) == sticks
-    reference = Reference(amplitude, 1.0, 0.3)
-    state, sign, inside = reference.after(0.0, 40.0, *reference.begin(0.4))
-    columns = []
-    for d in 1e-6 * np.eye(2):
-        one, other = (reference.after(0.0, 1.0, state + way * d, sign, inside)[0] for way in (1.0, -1.0))
-        columns.append((one - other) / 2e-6)
-    exact = np.linalg.eigvals(np.transpose(columns))
+    exact = np.linalg.eigvals(period_map(amplitude))
     values = np.sort(np.abs(exact))
     assert found.multiplier_1.item() == pytest.approx(values[1], rel=1e-6)
     assert found.multiplier_2.item() == pytest.approx(values[0], rel=1e-6, abs=1e-6)
