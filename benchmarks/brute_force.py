@@ -488,6 +488,10 @@ def aftermath_opinion(scene, word, verdict, count):
         count.list_scene(f"{said} by the compliant body", scene, f"{found.why}; {verdict.why}", word)
 
 
+#: Restitution up to which few impacts gain energy by Newton's law; their runs are not certified.
+SELDOM_GAINS = 0.8
+
+
 def compare(kind, batch, data, count):
     """Add the runs of a batch to its count."""
     belt = kind.model == "belt"
@@ -510,6 +514,9 @@ def compare(kind, batch, data, count):
         count.tally["runs"] += 1
         count.tally[state] += 1
         count.tally["certified" if certified else "uncertified"] += 1
+        if kind.impact and scene["impact"]["restitution"] <= SELDOM_GAINS:
+            count.tally["dissipative"] += 1
+            count.tally["dissipative, uncertified"] += not certified
         if state != "clear" or not certified:
             if count.verbose and state == "unresolved":
                 count.list_scene("unresolved", scene, verdict.why, "")
@@ -632,10 +639,13 @@ def main():
     _common.table(END_HEADER, end_rows(total.ends))
     cost = ", ".join(f"{name} {seconds:.0f} s" for name, seconds in total.seconds.items())
     print(f"CPU of all cores: {cost} (compilation included), seed {arguments.seed}")
+    moderate = f"Uncertified with restitution up to {SELDOM_GAINS}: {dissipative(total.tally)}"
+    print(moderate)
     if len(chosen) == 1 or not arguments.families:
         text = f"Seed {arguments.seed}; {cost}.\n\n{_common.markdown(HEADER, rows)}"
         text += "\n## Certified ends, and what a body on compliant contacts says of them\n\n"
         text += _common.markdown(END_HEADER, end_rows(total.ends))
+        text += f"\n{moderate}.\n"
         title = "Certified answers against an independent reference"
         name = "brute_force" if len(chosen) > 1 else f"brute_force_{next(iter(chosen)).replace(' ', '_')}"
         _common.publish(arguments, name, title, heading, text, figures(counts, total))
@@ -649,6 +659,12 @@ TITLES = {
     "far": "numbers at the ends of their ranges", "belt forced": "the belt, forced",
 }  # fmt: skip
 SUMMARY = ["family", "runs", "certified", "contradicted", "off", "uncertified", "ambiguous", "unresolved"]
+
+
+def dissipative(tally):
+    """How many runs are uncertified of those in which few impacts gain energy."""
+    runs, uncertified = tally["dissipative"], tally["dissipative, uncertified"]
+    return f"{uncertified} of {runs} ({100.0 * uncertified / max(runs, 1):.1f} %)"
 
 
 def figures(counts, total):
@@ -673,6 +689,7 @@ def figures(counts, total):
         "contradictions": str(total.tally["contradicted"]),
         "ends_asked": str(sum(ends.values())),
         **{f"ends_{word.replace(' ', '_')}": str(ends[word]) for word in OPINIONS},
+        **({"dissipative": dissipative(total.tally)} if counts.keys() == {"impact"} else {}),
     }
 
 
