@@ -640,12 +640,13 @@ def main():
     cost = ", ".join(f"{name} {seconds:.0f} s" for name, seconds in total.seconds.items())
     print(f"CPU of all cores: {cost} (compilation included), seed {arguments.seed}")
     moderate = f"Uncertified with restitution up to {SELDOM_GAINS}: {dissipative(total.tally)}"
-    print(moderate)
+    if total.tally["dissipative"]:
+        print(moderate)
     if len(chosen) == 1 or not arguments.families:
         text = f"Seed {arguments.seed}; {cost}.\n\n{_common.markdown(HEADER, rows)}"
         text += "\n## Certified ends, and what a body on compliant contacts says of them\n\n"
         text += _common.markdown(END_HEADER, end_rows(total.ends))
-        text += f"\n{moderate}.\n"
+        text += f"\n{moderate}.\n" if total.tally["dissipative"] else ""
         title = "Certified answers against an independent reference"
         name = "brute_force" if len(chosen) > 1 else f"brute_force_{next(iter(chosen)).replace(' ', '_')}"
         _common.publish(arguments, name, title, heading, text, figures(counts, total))
