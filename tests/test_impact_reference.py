@@ -241,6 +241,28 @@ def test_no_gap_of_a_falling_body_exceeds_that(omega):
     assert 0 < found["gap_max"] < 2 * (0.043378 - 0.010 - 0.025) * (1 + 1e-9)
 
 
+def test_a_contact_opens_where_it_breaks_away_into_a_slip_that_runs_away():
+    """So does one on springs, which does not know that the slip has a reaction of its own, and is not stable."""
+    scene = rig(
+        e=0.0176625,
+        friction={
+            "law": "tustin",
+            "alpha": 26.0328,
+            "rest": {"mu_s": 1.0503, "mu_k": 0.946182},
+            "rough": {"mu_s": 1.91715, "mu_k": 1.08523},
+        },
+        zone={"half_angle": math.pi, "center": math.pi},
+        drive={"law": "sinusoidal", "amplitude": -1.62689, "frequency": 0.834607, "phase": -1.18512},
+        initial={"phi": -0.0262079, "omega": -3.209390473552501},
+        time={"span": 0.36},
+    )
+    found, log = go_on(scene, keep=5)
+    assert log[:, 2].tolist() == [1, 2]
+    assert found["closed"] == 0
+    springs = rattling.follow(problem(scene), log[0, 0] - 1e-4, rattling.DEPTHS[-1])
+    assert found["position"] == pytest.approx(springs["phi_end"], abs=2e-3)
+
+
 @pytest.mark.parametrize("e", [0.1, 0.5, 0.9])
 def test_a_damper_of_the_second_opinion_returns_the_restitution_whatever_mass_and_stiffness(e):
     s = rattling.damping(e)
