@@ -73,8 +73,6 @@ COUNT, QUICK, SEED = 10_000, 300, 181
 FEW = ("stiction", "belt lugre", "impact")
 #: Of the certified runs whose contacts hold, the compliant body is asked about one in this many.
 HELD_EVERY = 20
-#: Opinion of springs that part from the rigid body in an impact at one contact while the other one holds.
-SHARED = "shared impact"
 #: Of the certified runs that lose a contact and go on, the compliant body is asked about one in this many.
 LOST_EVERY = 5
 #: Least error of the reference (rad, s, m): it looks at contacts an instant after an event.
@@ -481,7 +479,7 @@ def aftermath_opinion(scene, word, verdict, count):
         def rigid(until):
             return go_on(scene | {"time": {"span": float(until)}})[0]
 
-        said = SHARED if rattling.parts_in_shared_impact(p, t, rigid, log) else found.word
+        said = rattling.why_apart(p, t, rigid, log)
     count.seconds["compliant"] += time.process_time() - begin
     count.ends[f"lost, {word}", said or found.word] += 1
     if said == "contradicted":
@@ -586,7 +584,7 @@ def row(name, count):
     ]  # fmt: skip
 
 
-OPINIONS = ("confirmed", "contradicted", "undecided", SHARED)
+OPINIONS = ("confirmed", "contradicted", "undecided", rattling.SHARED)
 END_HEADER = ["end", "asked", *OPINIONS]
 
 

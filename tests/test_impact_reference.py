@@ -397,5 +397,5 @@ def test_springs_that_hit_a_little_later_part_only_in_the_impact_that_both_conta
         asked.append(until)
         return go_on(SHARED | {"time": {"span": float(until)}})[0]
 
-    assert rattling.parts_in_shared_impact(problem(SHARED), log[0, 0], rigid, log)
+    assert rattling.why_apart(problem(SHARED), log[0, 0], rigid, log) == rattling.SHARED
     assert 0.59 < asked[-1] < 0.671

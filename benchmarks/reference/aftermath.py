@@ -485,7 +485,7 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
     touching, e, mu, track = np.zeros(2, np.bool_), np.zeros(2), np.zeros(2), np.zeros(6)
     q[2] = position
     stand(p, position, speed, q)
-    opens, fresh, settled = False, True, False
+    opens, lifts, fresh, settled = False, False, True, False
     while True:
         if closed == both:
             # Both contacts hold until one is lost. At first this has been run already.
@@ -521,7 +521,7 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
             else:
                 lost = ONLY_1 if (end == OPEN_1) == (sense > 0.0) else ONLY_2
                 closed = CLOSED - lost
-            opens, t_recovered = True, math.nan
+            opens, lifts, t_recovered = True, True, math.nan
             separations += 2 if lost == CLOSED else 1
             if events < log.shape[0]:
                 log[events] = np.array([t, LOSS, lost, 0.0, 0.0])
@@ -555,8 +555,8 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
             open_time += t - since
             theta, ring_omega, _ = drive(p, t)
             free.pivot(p, closed, theta, ring_omega, y, q)
-        # Friction of a steep law follows the speed of a hop that is lower than the gaps are resolved.
-        blurred = found[0] <= touch(p, t, q) and p.v0 > 0.0
+        # A contact that is lost, and hits before its gap is resolved, hits with another speed than it seems.
+        blurred = lifts and found[0] <= touch(p, t, q)
         opens, found[0] = False, max(found[0], greatest)
         if end == LOSES:
             separations += 1
@@ -623,7 +623,7 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
                 now[4] += fy / p.mass
                 now[5] += moment / free.inertia(p)
         q += now
-        before, closed = closed, 0
+        before, closed, lifts = closed, 0, False
         slow = e.max() == 0.0 and max(after[0], after[2]) < rest
         settled = rests
         for i in (2, 1):
@@ -638,6 +638,10 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
                     if events < log.shape[0]:
                         log[events] = np.array([t, LOSS, i, 0.0, 0.0])
                     events += 1
+        if closed not in (0, both) and free.acceleration(p, q, drive(p, t)[2], 0.0, 0.0, 0.0, closed)[0] > 0.0:
+            # Friction could press the contact against the race, but nothing presses it yet.
+            separations += 1 if before & closed else 0
+            closed = 0
         if closed == both:
             t_recovered = t
         if touching[0] and touching[1]:
