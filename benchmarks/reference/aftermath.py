@@ -485,7 +485,7 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
     touching, e, mu, track = np.zeros(2, np.bool_), np.zeros(2), np.zeros(2), np.zeros(6)
     q[2] = position
     stand(p, position, speed, q)
-    opens, lifts, fresh, settled = False, False, True, False
+    opens, lifts, fresh, settled, turns = False, False, True, False, 0
     while True:
         if closed == both:
             # Both contacts hold until one is lost. At first this has been run already.
@@ -521,7 +521,7 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
             else:
                 lost = ONLY_1 if (end == OPEN_1) == (sense > 0.0) else ONLY_2
                 closed = CLOSED - lost
-            opens, lifts, t_recovered = True, True, math.nan
+            opens, lifts, turns, t_recovered = True, True, 0, math.nan
             separations += 2 if lost == CLOSED else 1
             if events < log.shape[0]:
                 log[events] = np.array([t, LOSS, lost, 0.0, 0.0])
@@ -566,6 +566,8 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
             closed = 0
             continue
         if end != MEETS:
+            # A body that jams as soon as it hits has not got through its impact.
+            tumbles -= turns if end == JAMMED and t == since else 0
             break
         if blurred:
             end = UNRESOLVED
@@ -623,7 +625,7 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
                 now[4] += fy / p.mass
                 now[5] += moment / free.inertia(p)
         q += now
-        before, closed, lifts = closed, 0, False
+        before, closed, lifts, turns = closed, 0, False, 0
         slow = e.max() == 0.0 and max(after[0], after[2]) < rest
         settled = rests
         for i in (2, 1):
@@ -646,7 +648,8 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
             t_recovered = t
         if touching[0] and touching[1]:
             turned = 1.0 if order(p, q) > 0.0 else -1.0
-            tumbles += 1 if turned != sense else 0
+            turns = 1 if turned != sense else 0
+            tumbles += turns
             sense = turned
         if single:
             q[5] = v / p.radius + ring_omega
