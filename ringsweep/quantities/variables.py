@@ -86,28 +86,29 @@ class Variable(Quantity):
         return attributes
 
 
-_regimes = dict(enumerate(REGIMES))
-_motions = {k: v for k, v in _regimes.items() if k not in (SEPARATING, JAMMED)}
+def classes(long_name: str, meanings: Mapping[int, str] | Collection[str], comment: str = "") -> Variable:
+    """A classification; flags of meanings that are given without them count from 0."""
+    flags = dict(meanings if isinstance(meanings, Mapping) else enumerate(meanings))
+    return Variable("1", long_name, dtype="int8", flags=flags, comment=comment)
 
 
-def _defined(names: Collection[str]) -> str:
-    """Definitions of regimes as one text."""
-    words = "; ".join(f"{name}: {DEFINITIONS[name]}" for name in names)
-    return f"a statement about the span of the run, not about all times; {words}"
+def explained(meanings: Mapping[str, str], names: Collection[str] | None = None) -> str:
+    """Names, or some of them, and what each says, as one text."""
+    return "; ".join(f"{name}: {meanings[name]}" for name in names or meanings)
+
+
+_MOTIONS = {flag: name for flag, name in enumerate(REGIMES) if flag not in (SEPARATING, JAMMED)}
+_STATEMENT = "a statement about the span of the run, not about all times; "
+#: Contacts in the order of their flag values.
+CONTACTS = ("none", "contact_1", "contact_2", "both")
 
 
 OUTCOMES: dict[str, Variable] = {
-    "regime": Variable("1", "regime of the run", dtype="int8", flags=_regimes, comment=_defined(REGIMES)),
-    "motion": Variable(
-        "1",
-        "motion up to the end of the run",
-        dtype="int8",
-        flags=_motions,
-        comment=_defined(_motions.values()),
+    "regime": classes("regime of the run", REGIMES, _STATEMENT + explained(DEFINITIONS)),
+    "motion": classes(
+        "motion up to the end of the run", _MOTIONS, _STATEMENT + explained(DEFINITIONS, _MOTIONS.values())
     ),
-    "separating_contact": Variable(
-        "1", "contact that separates", dtype="int8", flags={0: "none", 1: "contact_1", 2: "contact_2", 3: "both"}
-    ),
+    "separating_contact": classes("contact that separates", CONTACTS),
     "t_separation": Variable("s", "time of separation"),
     "t_end": Variable("s", "time at which the run ends"),
     "phi_end": Variable("rad", "angle of the body at the end"),
@@ -126,12 +127,10 @@ OUTCOMES: dict[str, Variable] = {
     "x_end": Variable("m", "displacement of the body at the end"),
     "velocity_end": Variable("m/s", "velocity of the body at the end"),
     "deflection_end": Variable("m", "deflection of the bristles at the end"),
-    "started_from": Variable(
-        "1",
+    "started_from": classes(
         "state from which the run started",
-        dtype="int8",
-        flags={0: "initial", 1: "end_of_the_cell_before"},
-        comment="a chain starts from `initial`, and again after a run that failed or ended before its span",
+        ("initial", "end_of_the_cell_before"),
+        "a chain starts from `initial`, and again after a run that failed or ended before its span",
     ),
     "x_min": Variable("m", "least displacement of the body"),
     "x_max": Variable("m", "greatest displacement of the body"),
@@ -142,13 +141,11 @@ OUTCOMES: dict[str, Variable] = {
     "stick_share": Variable("1", "share of a cycle in which the body sticks to the belt"),
     "stops_per_cycle": Variable("1", "stops in a cycle"),
     "swing": Variable("m", "distance between the extremes of the displacement in the last cycle"),
-    "settled": Variable("1", "whether the motion has settled", dtype="int8", flags={0: "not_settled", 1: "settled"}),
-    "long_run": Variable(
-        "1",
+    "settled": classes("whether the motion has settled", ("not_settled", "settled")),
+    "long_run": classes(
         "what the motion settles to",
-        dtype="int8",
-        flags=dict(enumerate(LONG_RUNS)),
-        comment="rest: at rest; steady: steady slip; periodic: returns each time; quasi-periodic: does not return, and "
+        LONG_RUNS,
+        "rest: at rest; steady: steady slip; periodic: returns each time; quasi-periodic: does not return, and "
         "the exponent is zero; chaotic: does not return, and the exponent is positive; unbounded: the swing grows "
         "steadily beyond all scales of the scene; transient: not settled, or nothing shows that it has",
     ),
@@ -182,34 +179,22 @@ OUTCOMES: dict[str, Variable] = {
     "impact_loss": Variable("J", "energy lost in impacts, relative to the moving ring"),
     "tumbles": Variable("1", "changes of the order of the contacts", dtype="int32"),
     "t_recovered": Variable("s", "time from which both contacts hold again"),
-    "aftermath": Variable(
-        "1",
+    "aftermath": classes(
         "what follows a lost contact",
-        dtype="int8",
-        flags=dict(enumerate(AFTERMATHS)),
-        comment="held: no contact was lost; recovered: all contacts hold at the end, in their first order; open: a "
+        AFTERMATHS,
+        "held: no contact was lost; recovered: all contacts hold at the end, in their first order; open: a "
         "contact is open at the end; tumbled: the contacts have touched in the other order",
     ),
     "steps": Variable("1", "steps of the integration", dtype="int64"),
     "stiffness": Variable("1", "largest stiffness met: magnitude of the eigenvalue times the step"),
-    "certified": Variable(
-        "1",
+    "certified": classes(
         "whether two resolutions agree on regime, motion and separating contact, and the run obeys its law",
-        dtype="int8",
-        flags={0: "not_certified", 1: "certified"},
+        ("not_certified", "certified"),
     ),
-    "uncertified_because": Variable(
-        "1",
-        "why the cell is not certified",
-        dtype="int8",
-        flags=dict(enumerate(DOUBTS)),
-        comment="; ".join(f"{name}: {meaning}" for name, meaning in DOUBTS.items()),
-    ),
-    "origin": Variable(
-        "1",
+    "uncertified_because": classes("why the cell is not certified", DOUBTS.keys(), explained(DOUBTS)),
+    "origin": classes(
         "whether the cell was run, or inferred from its neighbours",
-        dtype="int8",
-        flags={COMPUTED: "computed", INFERRED: "inferred", AUDITED: "audited"},
+        {COMPUTED: "computed", INFERRED: "inferred", AUDITED: "audited"},
     ),
     "level": Variable("1", "halvings of the blocks of the map around the cell", dtype="int8"),
 }
@@ -242,32 +227,33 @@ def error_attribute(name: str, columns: Collection[str]) -> dict[str, str]:
     return {"ancillary_variables": error} if error in columns else {}
 
 
-_EFFECT = "mean magnitude of the elementary effects on the indicator of each regime"
+def _with_ends(name: str, about: str) -> dict[str, Variable]:
+    """A number, and the ends of its interval."""
+    ends = {
+        f"{name}_{end}": Variable("1", f"{side} end of the 95 % interval: {about}")
+        for end, side in (("low", "lower"), ("high", "upper"))
+    }
+    return {name: Variable("1", about), **ends}
+
+
 _SHARE, _INDEX = "probability of each regime", "Sobol index of the indicator of each regime"
 
 #: Variables of each cell of a sampled sweep.
 SAMPLED: dict[str, Variable] = {
-    "probability": Variable("1", _SHARE, comment=_defined(REGIMES)),
-    "probability_low": Variable("1", f"lower end of the 95 % interval: {_SHARE}"),
-    "probability_high": Variable("1", f"upper end of the 95 % interval: {_SHARE}"),
+    **_with_ends("probability", _SHARE),
     "probability_numerics": Variable("1", "part of the length of the interval that runs without certificate add"),
     "runs": Variable("1", "runs of each replicate, without and with certificate", dtype="int32"),
     "lost": Variable("1", "runs of each replicate that have lost a contact, or slipped, by then", dtype="int32"),
-    "survival": Variable("1", "probability that a contact still holds, or that a body still rides"),
-    "survival_low": Variable("1", "lower end of the 95 % interval: survival"),
-    "survival_high": Variable("1", "upper end of the 95 % interval: survival"),
-    "sobol_first": Variable("1", f"first {_INDEX}"),
-    "sobol_first_low": Variable("1", f"lower end of the 95 % interval: first {_INDEX}"),
-    "sobol_first_high": Variable("1", f"upper end of the 95 % interval: first {_INDEX}"),
-    "sobol_total": Variable("1", f"total {_INDEX}"),
-    "sobol_total_low": Variable("1", f"lower end of the 95 % interval: total {_INDEX}"),
-    "sobol_total_high": Variable("1", f"upper end of the 95 % interval: total {_INDEX}"),
-    "morris_mu_star": Variable("1", _EFFECT),
-    "morris_mu_star_low": Variable("1", f"lower end of the 95 % interval: {_EFFECT}"),
-    "morris_mu_star_high": Variable("1", f"upper end of the 95 % interval: {_EFFECT}"),
+    **_with_ends("survival", "survival"),
+    **_with_ends("sobol_first", f"first {_INDEX}"),
+    **_with_ends("sobol_total", f"total {_INDEX}"),
+    **_with_ends("morris_mu_star", "mean magnitude of the elementary effects on the indicator of each regime"),
     "morris_sigma": Variable("1", "standard deviation of the elementary effects on the indicator of each regime"),
     "morris_sums": Variable("1", "sums of elementary effects, of their magnitudes and of their squares"),
     "sobol_sums": Variable("1", "sums of which the Sobol indices are made"),
+    # What differs from the ends of the interval.
+    "probability": Variable("1", _SHARE, comment=_STATEMENT + explained(DEFINITIONS)),
+    "survival": Variable("1", "probability that a contact still holds, or that a body still rides"),
 }
 
 #: What a quantile, and the ends of its 95 % interval, are called, by the end of the name of their variable.
@@ -291,7 +277,7 @@ HISTORY: dict[str, Variable] = {
     "deflection": Variable("m", "deflection of the bristles"),
     "deflection_1": Variable("m", "deflection of the bristles at contact 1"),
     "deflection_2": Variable("m", "deflection of the bristles at contact 2"),
-    "mode": Variable("1", "friction mode", dtype="int8", flags=MODES),
+    "mode": classes("friction mode", MODES),
     "y": Variable("m", "height of the centre of mass above the axis"),
     "gap_1": Variable("m", "gap of contact 1"),
     "gap_2": Variable("m", "gap of contact 2"),
@@ -303,9 +289,7 @@ EVENTS = {1: "separation", 2: "rebound", 3: "closure"}
 #: Impacts of a run, along the dimension ``impact``.
 IMPACTS: dict[str, Variable] = {
     "impact_time": Variable("s", "time of the impact"),
-    "impact_contact": Variable(
-        "1", "contact of the impact", dtype="int8", flags={1: "contact_1", 2: "contact_2", 3: "both"}
-    ),
+    "impact_contact": classes("contact of the impact", {1: "contact_1", 2: "contact_2", 3: "both"}),
     "impact_speed": Variable("m/s", "normal velocity before the impact"),
     "impulse": Variable("N s", "greatest normal impulse"),
 }
@@ -316,17 +300,12 @@ PRECISION: dict[str, Variable] = {
     "steps": Variable("1", "steps of the integration, mean over the cells"),
     "error_end": Variable("rad", "error of the angle of the body at the end"),
     "error_separation": Variable("s", "error of the time of separation, where both separate"),
-    "regime_wrong": Variable(
-        "1",
-        "whether regime, motion or separating contact differ from those of the reference",
-        dtype="int8",
-        flags={0: "right", 1: "wrong"},
+    "regime_wrong": classes(
+        "whether regime, motion or separating contact differ from those of the reference", ("right", "wrong")
     ),
-    "flagged": Variable(
-        "1",
+    "flagged": classes(
         "whether the certificate of this setting does not pass the answer: not certified, or replaced by a finer run's",
-        dtype="int8",
-        flags={0: "passed", 1: "flagged"},
+        ("passed", "flagged"),
     ),
     "reference_error_end": Variable("rad", "difference of the two tightest runs in the angle of the body at the end"),
     "reference_error_separation": Variable("s", "difference of the two tightest runs in the time of separation"),

@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.quantities.flags import JAMMED
-from ringsweep.quantities.variables import OUTCOMES, Variable
+from ringsweep.quantities.variables import CONTACTS, Variable, classes, explained
 
 #: Kinds of events, and what each says.
 KINDS = {
@@ -28,19 +28,8 @@ KINDS = {
 #: Variables along the dimension ``event``.
 VARIABLES = {
     "event_time": Variable("s", "time of the event"),
-    "event_kind": Variable(
-        "1",
-        "kind of the event",
-        dtype="int8",
-        flags=dict(enumerate(KINDS)),
-        comment="; ".join(f"{kind}: {meaning}" for kind, meaning in KINDS.items()),
-    ),
-    "event_contact": Variable(
-        "1",
-        "contact that the event concerns; none: the body as a whole",
-        dtype="int8",
-        flags=OUTCOMES["separating_contact"].flags,
-    ),
+    "event_kind": classes("kind of the event", KINDS.keys(), explained(KINDS)),
+    "event_contact": classes("contact that the event concerns; none: the body as a whole", CONTACTS),
 }
 
 _FLIGHT = 2
