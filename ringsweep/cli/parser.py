@@ -7,6 +7,7 @@ import math
 import re
 import shutil
 from contextlib import suppress
+from importlib.metadata import version
 from textwrap import dedent, indent
 from typing import Any, NoReturn
 
@@ -35,7 +36,9 @@ def build_parser() -> argparse.ArgumentParser:
         epilog="ringsweep COMMAND --help says more, with examples.",
         formatter_class=_formatter,
     )
-    parser.add_argument("--version", action=_Version)
+    parser.add_argument(
+        "--version", action="version", version=f"ringsweep {version('ringsweep')}", help="print the version"
+    )
     _add_verbosity(parser)
     parser.set_defaults(quiet=False, verbose=False)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
@@ -281,18 +284,6 @@ class _Parser(argparse.ArgumentParser):
             near = nearest_name(wrong[1], re.findall(r"[a-z]+", wrong[2]))
             message += f"; did you mean `{near}`?" if near else ""
         super().error(shortened(message, 1000))
-
-
-class _Version(argparse.Action):
-    """Prints the version, which is looked up only then."""
-
-    def __init__(self, **options: Any):
-        super().__init__(**options, nargs=0, help="print the version")
-
-    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
-        from importlib.metadata import version
-
-        parser.exit(message=f"ringsweep {version('ringsweep')}\n")
 
 
 def whole_number(text: str) -> int:

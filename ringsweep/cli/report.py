@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
-
 import numpy as np
 import xarray as xr
 
 from ringsweep.quantities.flags import CERTIFIED, FAILED, JAMMED, RIDING, SEPARATING
 from ringsweep.quantities.variables import DOUBTS, INFERRED, meanings_of, words
-from ringsweep.storage.chunks import Layout
+from ringsweep.storage.chunks import parts
 
 
 def summarise(result: xr.Dataset) -> None:
@@ -28,22 +25,22 @@ def summarise(result: xr.Dataset) -> None:
         return
     regime = result["regime"]
     print("cells:", regime.size)
-    _print_shares(regime)
+    _print_shares(result, "regime")
     if "aftermath" in result:
         print("contacts:")
-        _print_shares(result["aftermath"])
+        _print_shares(result, "aftermath")
         _print_losses(result)
-    if extremes := [extreme for name in _GREATEST if name in result and (extreme := _extreme(result[name]))]:
+    if extremes := [extreme for name in _GREATEST if name in result and (extreme := _extreme(result, name))]:
         print("greatest:", ", ".join(extremes))
     if "certified" in result:
         # NaN in a refined sweep, where no cell was run.
-        run = sum(np.count_nonzero(~np.isnan(part)) for part in _parts(result["certified"]))
-        share = sum(np.count_nonzero(part == 1) for part in _parts(result["certified"])) / run
+        run = sum(np.count_nonzero(~np.isnan(part)) for (part,) in parts(result, "certified"))
+        share = sum(np.count_nonzero(part == 1) for (part,) in parts(result, "certified")) / run
         # Rounding must not turn "nearly all" into 100 %.
         of = "" if run == regime.size else f" of the {run} cells run"
         print(f"certified: {share if share == 1.0 else min(share, 0.999):.1%}{of}")
     if "uncertified_because" in result:
-        for flag, name, count in _counts(result["uncertified_because"]):
+        for flag, name, count in _counts(result, "uncertified_because"):
             if flag != CERTIFIED:
                 print(f"  {count} not: {DOUBTS.get(name, name)}")
     if "settled" in result:
@@ -55,15 +52,13 @@ def summarise(result: xr.Dataset) -> None:
         print("refined:", result.attrs["audit"])
     lines = []
     for name in (str(name).removesuffix("_error") for name in result.data_vars if str(name).endswith("_error")):
-        bounds = np.concatenate([part[np.isfinite(part)] for part in _parts(result[f"{name}_error"])])
+        bounds = np.concatenate([part[np.isfinite(part)] for (part,) in parts(result, f"{name}_error")])
         if bounds.size:
             lines.append(f"  {name}: {np.median(bounds):.1e}, {bounds.max():.1e} {result[name].attrs.get('units', '')}")
     if lines:
         print("bounds on errors (median, largest):", *lines, sep="\n")
-    for name in ("phi_end_error", "x_end_error"):
-        if name not in result:
-            continue
-        both = zip(_parts(result["certified"]), _parts(result[name]), strict=True)
+    for name in {"phi_end_error", "x_end_error"} & set(result):
+        both = parts(result, "certified", name)
         if unbounded := sum(np.count_nonzero((certified == 1) & np.isnan(bound)) for certified, bound in both):
             print(f"no bound: {unbounded} certified cells, where nearby runs diverge")
 
@@ -72,31 +67,25 @@ def summarise(result: xr.Dataset) -> None:
 _GREATEST = ("jump_max", "normal_max_1", "normal_max_2", "gap_max", "impact_speed_max", "impulse_max")
 
 
-def _extreme(data: xr.DataArray) -> str:
-    """Name and largest value; nothing if all are missing."""
-    largest = float(np.fmax.reduce([np.fmax.reduce(part, axis=None) for part in _parts(data)]))
-    return "" if np.isnan(largest) else f"{data.name} {largest:.3g} {data.attrs.get('units', '')}"
+def _extreme(result: xr.Dataset, name: str) -> str:
+    """Name and largest value of a variable; nothing if all are missing."""
+    largest = float(np.fmax.reduce([np.fmax.reduce(part, axis=None) for (part,) in parts(result, name)]))
+    return "" if np.isnan(largest) else f"{name} {largest:.3g} {result[name].attrs.get('units', '')}"
 
 
-def _parts(data: xr.DataArray) -> Iterator[Any]:
-    """Values chunk by chunk: a dataset would keep all that was read at once."""
-    for _, _, region in Layout(data.shape).chunks():
-        yield np.atleast_1d(data.variable[region].values)
-
-
-def _counts(data: xr.DataArray) -> list[tuple[int, str, int]]:
+def _counts(result: xr.Dataset, variable: str) -> list[tuple[int, str, int]]:
     """Flag, name and number of cells of each class that occurs."""
-    meanings = meanings_of(data)
+    meanings = meanings_of(result[variable])
     counts = np.zeros(len(meanings), dtype=int)
-    for part in _parts(data):
+    for (part,) in parts(result, variable):
         counts += [np.count_nonzero(part == flag) for flag in meanings]
     return [(flag, name, int(n)) for (flag, name), n in zip(meanings.items(), counts, strict=True) if n]
 
 
-def _print_shares(data: xr.DataArray) -> None:
+def _print_shares(result: xr.Dataset, variable: str) -> None:
     """Print the number and the share of the cells of each class that occurs."""
-    for _, meaning, count in _counts(data):
-        print(f"  {meaning}: {count} ({count / data.size:.1%})")
+    for _, meaning, count in _counts(result, variable):
+        print(f"  {meaning}: {count} ({count / result[variable].size:.1%})")
 
 
 def _print_losses(result: xr.Dataset) -> None:
@@ -106,7 +95,7 @@ def _print_losses(result: xr.Dataset) -> None:
         if name not in result:
             continue
         # Inferred cells have no number; cells that lose no contact have no losses.
-        counts = np.concatenate([np.ravel(part[part > 0]) for part in _parts(result[name])])
+        counts = np.concatenate([part[part > 0] for (part,) in parts(result, name)])
         if counts.size:
             ends = f"{counts.min():.0f} to {counts.max():.0f}, median {np.median(counts):.0f}"
             told.append(f"{what} {counts[0]:.0f}" if result["regime"].size == 1 else f"{what} {ends}")

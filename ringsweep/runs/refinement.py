@@ -12,13 +12,12 @@ infers is audited.
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Generator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaln
 
 from ringsweep.quantities.variables import AUDITED, COMPUTED, INFERRED
 
@@ -378,22 +377,8 @@ def largest_number(total: int, drawn: int, wrong: int) -> int:
     wrong : int
         How many of the drawn ones are wrong.
     """
-    low, high = wrong, total - (drawn - wrong)
-    while low < high:
-        middle = (low + high + 1) // 2
-        if _probability(wrong, total, middle, drawn) > 1.0 - CONFIDENCE:
-            low = middle
-        else:
-            high = middle - 1
-    return low
+    # It is slow to import, and only an audit needs it.
+    from scipy.stats import hypergeom
 
-
-def _probability(most: int, total: int, marked: int, drawn: int) -> float:
-    """Probability that at most `most` of `drawn` cells are among the `marked` ones of `total` (hypergeometric)."""
-    number = np.arange(max(0, drawn - (total - marked)), min(most, marked, drawn) + 1)
-
-    def choices(of: Any, some: Any) -> Any:
-        return gammaln(of + 1) - gammaln(some + 1) - gammaln(of - some + 1)
-
-    ways = choices(marked, number) + choices(total - marked, drawn - number) - choices(total, drawn)
-    return float(np.exp(ways).sum())
+    more = range(wrong + 1, total - (drawn - wrong) + 1)
+    return wrong + bisect_left(more, CONFIDENCE - 1.0, key=lambda number: -hypergeom.cdf(wrong, total, number, drawn))

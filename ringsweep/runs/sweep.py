@@ -32,7 +32,7 @@ from ringsweep.runs.refined import attributes as refinement_attributes
 from ringsweep.runs.refinement import Refined
 from ringsweep.runs.reuse import EarlierSweep
 from ringsweep.runs.sampled import EarlierSample
-from ringsweep.runs.task_sizes import TaskSizes, divide_cells, divide_into_chains, divide_into_tasks
+from ringsweep.runs.task_sizes import TaskSizes, chains_of, divide_into_tasks
 from ringsweep.runs.warnings import warn_of_results, warn_of_sample
 from ringsweep.storage import netcdf
 from ringsweep.storage.checkpoint import Checkpoint, Columns, DamagedTask, open_checkpoint
@@ -443,19 +443,14 @@ class _Work:
         self._take_shared(self.store.done)
         if not self.store.done.all():
             with self._open_tasks(self.layout.total) as tasks:
-                tasks.run(self._divided(tasks))
+                follow, chains = self.config.follow, None
+                if follow is not None:
+                    dim, _ = follow.chains(self.config.axes)
+                    chains = chains_of(self.layout, list(self.config.axes.sizes).index(dim))
+                tasks.run(divide_into_tasks(self.store.done, tasks.sizes, tasks.stopped, chains))
                 if not self.store.done.all():
                     raise KeyboardInterrupt
         return None
-
-    def _divided(self, tasks: _Tasks) -> Iterator[NDArray[np.integer]]:
-        """Cells of one task after another."""
-        config, done = self.config, self.store.done
-        if config.follow is None:
-            return divide_into_tasks(done, tasks.sizes, tasks.stopped)
-        dim, orders = config.follow.chains(config.axes)
-        chain = orders.shape[1], list(config.axes.sizes).index(dim)
-        return divide_into_chains(self.layout, *chain, done, tasks.sizes, tasks.stopped)
 
     def _refine(self) -> Refined:
         """Compute the cells that a refinement asks for."""
@@ -470,7 +465,7 @@ class _Work:
             tasks.notice = labels.put
 
             def run(cells: NDArray[np.intp]) -> None:
-                tasks.run(divide_cells(cells, tasks.sizes, tasks.stopped))
+                tasks.run(divide_into_tasks(self.store.done, tasks.sizes, tasks.stopped, cells[:, None]))
                 if not labels.known[cells].all():
                     raise KeyboardInterrupt
 

@@ -63,48 +63,9 @@ class TaskSizes:
         return self.side_by_side * max(1, round(size / self.side_by_side))
 
 
-def divide_cells(cells: NDArray[np.integer], sizes: TaskSizes, stopped: Event) -> Iterator[NDArray[np.integer]]:
-    """Parts of some cells, which ascend; see :func:`divide_into_tasks`."""
-    start = 0
-    while start < len(cells) and not stopped.is_set():
-        stop = start + min(sizes.next(len(cells) - start), len(cells) - start)
-        yield cells[start:stop]
-        start = stop
-
-
-def divide_into_chains(
-    layout: Layout, chain: int, dim: int, done: NDArray[np.bool_], sizes: TaskSizes, stopped: Event
+def divide_into_tasks(
+    done: NDArray[np.bool_], sizes: TaskSizes, stopped: Event, groups: NDArray[np.integer] | None = None
 ) -> Iterator[NDArray[np.integer]]:
-    """Positions of the cells of one task after another, ascending: of whole chains, of which no cell is done.
-
-    Parameters
-    ----------
-    layout : Layout
-    chain : int
-        Number of cells of a chain.
-    dim : int
-        Place of their dimension among those of the layout.
-    done, sizes, stopped
-        As for :func:`divide_into_tasks`. Chains of which some cells are not done are computed again.
-    """
-    along = np.array(layout.sizes, dtype=np.intp)
-    along[dim] = 1
-    left = np.arange(layout.total // chain)
-
-    def cells(chains: NDArray[np.intp]) -> NDArray[np.intp]:
-        others = np.unravel_index(np.repeat(chains, chain), tuple(along))
-        within = np.tile(np.arange(chain), len(chains))
-        return layout.positions([within if k == dim else index for k, index in enumerate(others)])
-
-    while len(left) and not stopped.is_set():
-        size = max(sizes.next(len(left) * chain) // chain, sizes.side_by_side)
-        positions = np.sort(cells(left[:size]))
-        left = left[size:]
-        if not done[positions].all():
-            yield positions
-
-
-def divide_into_tasks(done: NDArray[np.bool_], sizes: TaskSizes, stopped: Event) -> Iterator[NDArray[np.integer]]:
     """Positions of the cells of one task after another, ascending.
 
     Parameters
@@ -114,17 +75,18 @@ def divide_into_tasks(done: NDArray[np.bool_], sizes: TaskSizes, stopped: Event)
     sizes : TaskSizes
     stopped : Event
         Once it is set there are no more tasks.
+    groups : ndarray of int, shape ``(groups, cells of a group)``, optional
+        Positions of cells that stay in one task; by default each cell is alone. A group of which some cells are not
+        done is computed again.
     """
-    left = len(done) - int(np.count_nonzero(done))
-    start = 0
-    while left and not stopped.is_set():
-        size = min(sizes.next(left), left)
-        left -= size
-        found: list[NDArray[np.integer]] = []
-        while size:
-            stop = start + max(size, CHUNK)
-            open_cells = start + np.flatnonzero(~done[start:stop])[:size]
-            found.append(open_cells)
-            size -= len(open_cells)
-            start = stop if size else int(open_cells[-1]) + 1
-        yield np.concatenate(found)
+    groups = np.flatnonzero(~done)[:, None] if groups is None else groups[~done[groups].all(axis=1)]
+    while len(groups) and not stopped.is_set():
+        count = max(sizes.next(groups.size) // groups.shape[1], sizes.side_by_side)
+        yield np.sort(groups[:count], axis=None)
+        groups = groups[count:]
+
+
+def chains_of(layout: Layout, dim: int) -> NDArray[np.intp]:
+    """Positions of the cells along the `dim`-th dimension of a grid, a row for each chain."""
+    positions = layout.positions(list(np.indices(layout.sizes).reshape(len(layout.sizes), -1)))
+    return np.moveaxis(positions.reshape(layout.sizes), dim, -1).reshape(-1, layout.sizes[dim])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
@@ -20,7 +21,7 @@ from ringsweep.quantities.variables import INFERRED
 from ringsweep.runs.cells import by_law, laws_at, values_at
 from ringsweep.solvers.automaton import PATIENCE
 from ringsweep.solvers.rk4 import STABILITY_LIMIT
-from ringsweep.storage.chunks import Layout
+from ringsweep.storage.chunks import Layout, parts
 
 # Least number of cells of which it is surprising that all have one regime, and of values that change nothing.
 _MAP, _ALONG = 16, 3
@@ -44,22 +45,18 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
     config : Config
         Configuration of the runs.
     """
-    ended = results["t_end"].variable
-    stiffness = results["stiffness"].variable if "stiffness" in results else None
     ended_at_start = unstable = 0
-    count = ended.size
+    count = results["t_end"].size
     if "regime" in results:
         _hint_at_one_word(results, config)
     largest = 0.0
-    origin = results["origin"].variable if "origin" in results else None
-    for _, _, region in Layout(ended.shape).chunks():
-        inferred = np.zeros((), dtype=bool) if origin is None else origin[region].values == INFERRED
+    for ended, stiffness, origin in parts(results, "t_end", "stiffness", "origin"):
+        inferred = origin == INFERRED
         count -= int(np.count_nonzero(inferred))
-        ended_at_start += int(np.count_nonzero(ended[region].values == 0.0))
+        ended_at_start += int(np.count_nonzero(ended == 0.0))
         if stiffness is not None:
-            values = stiffness[region].values
             # NaN is not within the limit either.
-            beyond = values[~((values <= STABILITY_LIMIT) | inferred)]
+            beyond = stiffness[~((stiffness <= STABILITY_LIMIT) | inferred)]
             unstable += beyond.size
             # Unlike max(), this keeps NaN.
             largest = float(np.maximum(largest, beyond.max(initial=0.0)))
@@ -89,19 +86,19 @@ def warn_of_results(results: xr.Dataset, config: Config) -> None:
 
 def _hint_at_one_word(results: xr.Dataset, config: Config) -> None:
     """Say what to look at where one word fills a map: its axes may not reach what decides."""
-    regime = results["regime"].variable
-    if regime.size < _MAP:
+    size = results["regime"].size
+    if size < _MAP:
         return
     found: set[int] = set()
-    for _, _, region in Layout(regime.shape).chunks():
-        found.update(np.unique(regime[region].values).tolist())
+    for (regime,) in parts(results, "regime"):
+        found.update(np.unique(regime).tolist())
         if len(found) > 1:
             return
     zones = any(structure.arcs for structure in config.scene.structures.values())
     logger.info(
         "all %d cells are %s: do the axes reach far enough, is the span long enough%s? "
         "ringsweep simulate shows one run",
-        regime.size,
+        size,
         REGIMES[found.pop()],
         ", does a contact meet the zone" if zones else "",
     )
@@ -109,16 +106,14 @@ def _hint_at_one_word(results: xr.Dataset, config: Config) -> None:
 
 def _warn_of_failures(results: xr.Dataset, config: Config) -> None:
     """Name the first run that failed, and say why."""
-    regime, first, count = results["regime"].variable, None, 0
-    for _, _, region in Layout(regime.shape).chunks():
-        failed = np.argwhere(np.atleast_1d(regime[region].values == FAILED))
-        if len(failed) and first is None:
-            first = [part.start + k for part, k in zip(region, failed[0].tolist(), strict=False)]
-        count += len(failed)
-    if first is None:
+    regime, start, failed = results["regime"].variable, 0, np.empty(0, dtype=np.intp)
+    for (part,) in parts(results, "regime"):
+        failed = np.append(failed, start + np.flatnonzero(part == FAILED))
+        start += part.size
+    if not len(failed):
         return
-    cell = {str(dim): k for dim, k in zip(regime.dims, first, strict=True)}
-    one = results.isel(cell)
+    first = Layout(regime.shape).indices(failed[:1])
+    one = results.isel({dim: int(k[0]) for dim, k in zip(regime.dims, first, strict=True)})
     steps = int(one["steps"]) if "steps" in one else 0
     finite = all(np.isfinite(float(one[name])) for name in ("phi_end", "omega_end", "velocity_end") if name in one)
     other = "another" if hasattr(config.solver, "rtol") else "solver.method event with another"
@@ -137,7 +132,7 @@ def _warn_of_failures(results: xr.Dataset, config: Config) -> None:
     who = "the run has failed"
     if regime.size > 1:
         at = ", ".join(f"{name} = {_value(axis)}" for name, axis in one.coords.items() if "path" in axis.attrs)
-        who = f"{count} of {regime.size} runs have failed; the first at {at}"
+        who = f"{len(failed)} of {regime.size} runs have failed; the first at {at}"
     logger.warning("%s: %s", who, why)
 
 
@@ -209,22 +204,21 @@ def _warn_of_long_runs(results: xr.Dataset, config: Config, count: int) -> None:
 
     `count` is the number of cells that were run. No others have a value of `settled`.
     """
-    regime, settled, ended = (results[name].variable for name in ("regime", "settled", "t_end"))
-    unsettled = riding = 0
+    size = results["regime"].size
+    layout = Layout(results["regime"].shape)
+    unsettled = riding = start = 0
     soonest, latest = np.inf, 0.0
-    for _, _, region in Layout(regime.shape).chunks():
-        words = regime[region].values
-        rides = words == RIDING
-        goes_on = ~np.isin(words, (RIDING, FAILED, SEPARATING, JAMMED))
-        unsettled += int(np.count_nonzero((settled[region].values == 0) & goes_on))
-        riding += int(np.count_nonzero(rides))
-        if rides.any():
-            firsts = np.array([part.start for part in region], dtype=np.intp)
-            spans = _spans_of_first_slip(config, np.argwhere(np.atleast_1d(rides)) + firsts if region else None)
-            spans = spans[np.isfinite(spans) & (spans > ended[region].values[rides])]
+    for regime, settled, ended in parts(results, "regime", "settled", "t_end"):
+        goes_on = ~np.isin(regime, (RIDING, FAILED, SEPARATING, JAMMED))
+        unsettled += int(np.count_nonzero((settled == 0) & goes_on))
+        if len(rides := np.flatnonzero(regime == RIDING)):
+            riding += len(rides)
+            spans = _spans_of_first_slip(config, layout.indices(start + rides), len(rides))
+            spans = spans[np.isfinite(spans) & (spans > ended.flat[rides])]
             soonest, latest = min(soonest, spans.min(initial=np.inf)), max(latest, spans.max(initial=0.0))
+        start += regime.size
     if unsettled:
-        who = "the motion has" if regime.size == 1 else f"{unsettled / count:.1%} of the motions have"
+        who = "the motion has" if size == 1 else f"{unsettled / count:.1%} of the motions have"
         what = "regime, share of stick and stops" if "stick_share" in results else "what it settles to"
         logger.warning("%s not settled: a longer span may change %s", who, what)
     if riding:
@@ -232,8 +226,8 @@ def _warn_of_long_runs(results: xr.Dataset, config: Config, count: int) -> None:
         if latest > 0.0:
             remedy = f"the first slip, at k v t = mu_s F_N, needs a span of more than {soonest:.5g} s"
             remedy += f" to {latest:.5g} s" if latest > 1.01 * soonest else ""
-        several = f"{riding / regime.size:.1%} of the bodies ride: they have"
-        who = "the body rides: it has" if regime.size == 1 else several
+        several = f"{riding / size:.1%} of the bodies ride: they have"
+        who = "the body rides: it has" if size == 1 else several
         logger.warning("%s not broken loose; %s", who, remedy)
 
 
@@ -256,7 +250,7 @@ def warn_of_sample(results: xr.Dataset, config: Config) -> None:
         logger.warning("%d runs failed", failed)
 
 
-def _spans_of_first_slip(config: Config, cells: NDArray[np.intp] | None) -> NDArray[np.float64]:
+def _spans_of_first_slip(config: Config, cells: Sequence[NDArray[np.intp]], count: int) -> NDArray[np.float64]:
     """Times at which bodies that ride on belts of constant velocity would slip, s; otherwise infinite.
 
     They are for a linear spring and a damper, and for no force.
@@ -264,8 +258,7 @@ def _spans_of_first_slip(config: Config, cells: NDArray[np.intp] | None) -> NDAr
     `cells` are indices along each dimension, shape ``(cells, dimensions)``; None for a single run.
     """
     scene, axes = config.scene, config.axes
-    count = 1 if cells is None else len(cells)
-    indices = {} if cells is None else dict(zip(axes.sizes, cells.T, strict=True))
+    indices = dict(zip(axes.sizes, cells, strict=True))
     spans = np.full(count, np.inf)
     for structure, own in by_law(scene, axes, indices, count):
         body = batch(structure, values_at(scene, axes, {dim: along[own] for dim, along in indices.items()}, len(own)))

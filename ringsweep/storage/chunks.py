@@ -9,9 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 #: Largest number of cells of a chunk: 256 KiB of a variable of doubles.
 CHUNK = 32_768
@@ -86,3 +90,17 @@ def chunk_shape(sizes: Sequence[int], most: int) -> tuple[int, ...]:
         longest = shape.index(max(shape))
         shape[longest] = -(-shape[longest] // 2)
     return tuple(shape)
+
+
+def parts(ds: xr.Dataset, *names: str) -> Iterator[list[Any]]:
+    """Values of variables of one shape, chunk by chunk: a dataset would keep all that was read at once.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+    *names : str
+        The dataset has the first one. In the place of another one that it lacks is None.
+    """
+    variables = [ds[name].variable if name in ds else None for name in names]
+    for _, _, region in Layout(ds[names[0]].shape).chunks():
+        yield [None if variable is None else np.atleast_1d(variable[region].values) for variable in variables]
