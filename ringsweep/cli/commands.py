@@ -177,6 +177,8 @@ def fit_command(arguments: argparse.Namespace) -> None:
 
 def _other_scene(target: Path, result: Any) -> str:
     """What the scene of a run that is there already has other than that of a result; empty if nothing."""
+    import pandas as pd
+
     from ringsweep.quantities.variables import configuration_of
     from ringsweep.storage import netcdf
     from ringsweep.storage.provenance import differences
@@ -184,14 +186,8 @@ def _other_scene(target: Path, result: Any) -> str:
     if not target.exists():
         return ""
     with netcdf.open_dataset(target) as earlier:
-        return differences(*(_leaves(configuration_of(ds)["scene"]) for ds in (earlier, result)))
-
-
-def _leaves(node: Any, path: str = "") -> dict[str, str]:
-    """Values of a nested mapping by their dotted paths."""
-    if not isinstance(node, dict):
-        return {path: str(node)}
-    return {p: v for key, child in node.items() for p, v in _leaves(child, f"{path}.{key}".lstrip(".")).items()}
+        scenes = (pd.json_normalize(configuration_of(ds)["scene"]).astype(str) for ds in (earlier, result))
+        return differences(*(scene.iloc[0].to_dict() for scene in scenes))
 
 
 def animate_command(arguments: argparse.Namespace) -> None:

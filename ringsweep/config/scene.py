@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
 from itertools import product
@@ -190,18 +190,18 @@ def _read_leaves(
     # Name a misspelt key, rather than the key that is missing because of it.
     laws = dict.fromkeys([*MODELS[model].laws, *friction.own, FORMULA, TABLE_LAW])
     paths = _Paths(_all_paths(model, zones or ("zones.0",), laws, friction.own, moved))
-    try:
-        return dict(_leaves(scene, "", paths))
-    except _UnknownKey as error:
-        path = f"scene.{error.section}.{error.key}" if error.section else f"scene.{error.key}"
-        hint = _belongs_elsewhere(error.section, str(error.key), paths, model)
+
+    def unknown(section: str, key: str) -> InputError:
+        hint = _belongs_elsewhere(section, key, paths, model)
         if hint is None:
-            known = paths.children[error.section]
+            known = paths.children[section]
             if friction.names:
                 near = _Paths(_all_paths(model, zones[:1] or ("zones.0",), friction.names, friction.own, moved))
-                known = near.children.get(error.section, known)
-            hint = suggestion(error.key, known)
-        raise InputError(path, f"unknown key{hint}") from None
+                known = near.children.get(section, known)
+            hint = suggestion(key, known)
+        return InputError(".".join(filter(None, ("scene", section, key))), f"unknown key{hint}")
+
+    return dict(_leaves(scene, "", paths, unknown))
 
 
 def _read_numbers(
@@ -370,16 +370,10 @@ class _Paths:
         return " or ".join(f"`{path}`" for path in sorted(found))
 
 
-class _UnknownKey(Exception):
-    """A key that no section of this path has in scenes of the model."""
-
-    def __init__(self, section: str, key: object):
-        self.section, self.key = section, key
-        super().__init__(section, key)
-
-
-def _leaves(node: Any, path: str, paths: _Paths) -> Iterator[tuple[str, Any]]:
-    """Path and value of every leaf below `node`."""
+def _leaves(
+    node: Any, path: str, paths: _Paths, unknown: Callable[[str, str], InputError]
+) -> Iterator[tuple[str, Any]]:
+    """Path and value of every leaf below `node`; `unknown` makes the error about a section and a key that it lacks."""
     where = f"scene.{path}".rstrip(".")
     items = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else None
     children = paths.children[path.rstrip(".")]
@@ -389,8 +383,8 @@ def _leaves(node: Any, path: str, paths: _Paths) -> Iterator[tuple[str, Any]]:
         full = f"{path}{key}"
         # Check the key, not the path: the single key "body.mass" would pass for `mass` under `body`.
         if str(key) not in children:
-            raise _UnknownKey(path.rstrip("."), key)
+            raise unknown(path.rstrip("."), str(key))
         if full in paths.known:
             yield full, value
         else:
-            yield from _leaves(value, f"{full}.", paths)
+            yield from _leaves(value, f"{full}.", paths, unknown)

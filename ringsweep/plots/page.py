@@ -289,26 +289,10 @@ def _slice_text(ds: xr.Dataset, dim: str, k: int) -> str:
 
 def _document(sweep: _Sweep) -> Any:
     """The document of Bokeh. The script beside this file fills it when the page is loaded."""
+    from bokeh import models
     from bokeh.document import Document
     from bokeh.events import DocumentReady
     from bokeh.layouts import column, row
-    from bokeh.models import (
-        ColorBar,
-        ColumnDataSource,
-        CustomJS,
-        CustomJSHover,
-        Div,
-        FixedTicker,
-        HoverTool,
-        InlineStyleSheet,
-        LinearColorMapper,
-        LogColorMapper,
-        LogTicker,
-        LogTickFormatter,
-        NoOverlap,
-        Range1d,
-        Select,
-    )
     from bokeh.plotting import figure
 
     horizontal, vertical = sweep.horizontal, sweep.vertical
@@ -331,33 +315,35 @@ def _document(sweep: _Sweep) -> Any:
     for axis, drawn in ((horizontal, plot.xaxis), (vertical, plot.yaxis)):
         if axis and axis.scale == "log":
             # Over less than two decades the ticks are those of a linear axis: many, of which those that fit are shown.
-            drawn.ticker, drawn.major_label_policy = LogTicker(desired_num_ticks=20), NoOverlap()
-            drawn.formatter = LogTickFormatter(min_exponent=4)
+            drawn.ticker, drawn.major_label_policy = models.LogTicker(desired_num_ticks=20), models.NoOverlap()
+            drawn.formatter = models.LogTickFormatter(min_exponent=4)
         if axis and axis.names:
-            drawn.ticker = FixedTicker(ticks=list(range(len(axis.names))))
+            drawn.ticker = models.FixedTicker(ticks=list(range(len(axis.names))))
             drawn.major_label_overrides = dict(enumerate(axis.names))
     bars = {}
     for name, about in sweep.variables.items():
         colours, low, high = sweep.scales[name]
-        kind = LogColorMapper if about["logarithmic"] else LinearColorMapper
-        ticker = {} if about["words"] is None else {"ticker": FixedTicker(ticks=list(range(len(about["words"]))))}
+        kind = models.LogColorMapper if about["logarithmic"] else models.LinearColorMapper
+        ticker = (
+            {} if about["words"] is None else {"ticker": models.FixedTicker(ticks=list(range(len(about["words"]))))}
+        )
         # Numbers of a page are rounded: the least one must not fall below the scale, where only zeros are.
         zeros = {"low": 0.99 * low, "low_color": ZERO} if about["logarithmic"] else {"low": low}
         mapper = kind(palette=colours, high=high, **zeros)
         style = {"color_mapper": mapper, "visible": False, **ticker}
-        bars[name] = [ColorBar(**style, major_label_text_font_size=f"{size}px") for size in (12, 11)]
+        bars[name] = [models.ColorBar(**style, major_label_text_font_size=f"{size}px") for size in (12, 11)]
         for bar, side in zip(bars[name], ("right", "below"), strict=True):
             plot.add_layout(bar, side)
-    paint = LinearColorMapper(palette=[NO_VALUE], nan_color=NO_VALUE)
+    paint = models.LinearColorMapper(palette=[NO_VALUE], nan_color=NO_VALUE)
     line, curve = None, []
     if sweep.scattered:
         columns, rows = np.arange(sweep.size), np.zeros(1, dtype=np.intp)
-        view = ColumnDataSource({"x": sweep.x, "y": sweep.y, "value": np.zeros(sweep.size, dtype=np.float32)})
+        view = models.ColumnDataSource({"x": sweep.x, "y": sweep.y, "value": np.zeros(sweep.size, dtype=np.float32)})
         size = float(np.clip(300 / math.sqrt(sweep.size), 5, 14))
         drawn = plot.scatter(
             "x", "y", size=size, line_color=None, fill_color={"field": "value", "transform": paint}, source=view
         )
-        doubtful = ColumnDataSource({"x": [], "y": []})
+        doubtful = models.ColumnDataSource({"x": [], "y": []})
         plot.scatter("x", "y", marker="x", size=0.6 * size, line_color="black", source=doubtful)
         edges = None
     else:
@@ -365,25 +351,25 @@ def _document(sweep: _Sweep) -> Any:
         columns, rows = (
             _cells_of_pixels(e, a.scale if a else "linear") for e, a in zip(edges, (horizontal, vertical), strict=True)
         )
-        view = ColumnDataSource({"value": [np.zeros((len(rows), len(columns)), dtype=np.float32)]})
+        view = models.ColumnDataSource({"value": [np.zeros((len(rows), len(columns)), dtype=np.float32)]})
         (left, right), (bottom, top) = ((float(e[0]), float(e[-1])) for e in edges)
-        plot.x_range, plot.y_range = Range1d(left, right), Range1d(bottom, top)
+        plot.x_range, plot.y_range = models.Range1d(left, right), models.Range1d(bottom, top)
         drawn = plot.image("value", x=left, y=bottom, dw=right - left, dh=top - bottom, source=view, color_mapper=paint)
-        doubtful = ColumnDataSource({"left": [], "right": [], "bottom": [], "top": []})
+        doubtful = models.ColumnDataSource({"left": [], "right": [], "bottom": [], "top": []})
         style = {"fill_color": None, "line_color": None, "hatch_pattern": "/", "hatch_scale": 8, "hatch_weight": 0.5}
         plot.quad("left", "right", "bottom", "top", source=doubtful, **style)
         if vertical is None:
-            line = ColumnDataSource({"x": horizontal.values, "value": np.zeros(sweep.size, dtype=np.float32)})
+            line = models.ColumnDataSource({"x": horizontal.values, "value": np.zeros(sweep.size, dtype=np.float32)})
             style = {"color": CURVE_COLOURS[0], "source": line}
             curve = [plot.line("x", "value", **style), plot.scatter("x", "value", size=5, **style)]
-    look = {"stylesheets": [InlineStyleSheet(css=_DARK)], "sizing_mode": "stretch_width"}
+    look = {"stylesheets": [models.InlineStyleSheet(css=_DARK)], "sizing_mode": "stretch_width"}
     names = [(name, about["title"]) for name, about in sweep.variables.items()]
-    variable = Select(title="variable", value=sweep.var, options=names, **look)
+    variable = models.Select(title="variable", value=sweep.var, options=names, **look)
     slices = [
-        Select(title="slice", value="0", options=[(str(k), text) for k, text in enumerate(texts)], **look)
+        models.Select(title="slice", value="0", options=[(str(k), text) for k, text in enumerate(texts)], **look)
         for texts in sweep.slices
     ]
-    show = CustomJS(
+    show = models.CustomJS(
         args={
             "plot": plot,
             "paint": paint,
@@ -408,13 +394,13 @@ def _document(sweep: _Sweep) -> Any:
     )
     for chooser in (variable, *slices):
         chooser.js_on_change("value", show)
-    tell = CustomJSHover(code="return ringsweep_tell(special_vars)")
+    tell = models.CustomJSHover(code="return ringsweep_tell(special_vars)")
     for renderer in (drawn, *curve[-1:]):
         # Over a line, wherever the pointer is, the nearest cell tells its numbers.
         how = {"mode": "vline" if renderer in curve else "mouse", "limit": 1}
-        plot.add_tools(HoverTool(tooltips=_TOOLTIP, formatters={"@{value}": tell}, renderers=[renderer], **how))
+        plot.add_tools(models.HoverTool(tooltips=_TOOLTIP, formatters={"@{value}": tell}, renderers=[renderer], **how))
     document = Document()
-    notes = Div(text="; ".join([sweep.title, *sweep.notes]), render_as_text=True, sizing_mode="stretch_width")
+    notes = models.Div(text="; ".join([sweep.title, *sweep.notes]), render_as_text=True, sizing_mode="stretch_width")
     choosers = row(variable, *slices, sizing_mode="stretch_width", styles={"flex-wrap": "wrap"})
     document.add_root(column(notes, choosers, plot, sizing_mode="stretch_both"))
     document.js_on_event(DocumentReady, show)

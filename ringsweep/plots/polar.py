@@ -16,7 +16,7 @@ from matplotlib.quiver import Quiver
 from numpy.typing import NDArray
 
 from ringsweep.errors import InputError
-from ringsweep.plots.datasets import mode_name, present
+from ringsweep.plots.datasets import mode_name
 from ringsweep.plots.labels import MINUS, TIMES, number_text
 from ringsweep.plots.rig import Rig, ring_history
 from ringsweep.plots.style import (
@@ -97,11 +97,8 @@ def states_at(run: xr.Dataset, times: NDArray[np.float64]) -> dict[str, NDArray[
     """State of a run at given times, by variable: numbers interpolated linearly, the mode of the sample before."""
     own = run["time"].values
     before = np.maximum(np.searchsorted(own, times, side="right") - 1, 0)
-    states: dict[str, NDArray[Any]] = {"time": times, "mode": run["mode"].values[before]}
-    ring = ("omega", "theta", "ring_omega", "y")
-    contacts = [f"{name}_{k}" for name in ("normal", "friction", "alpha", "gap") for k in (1, 2)]
-    belt = ("x", "velocity", "friction_force", "belt_x", "belt_velocity")
-    return states | {name: np.interp(times, own, run[name].values) for name in present(run, (*ring, *contacts, *belt))}
+    states = {str(name): np.interp(times, own, one.values) for name, one in run.items() if one.dims == ("time",)}
+    return states | {"time": times, "mode": run["mode"].values[before]}
 
 
 class RingArtists:

@@ -55,12 +55,12 @@ _DIRECTION = "direction"
 
 def has_diagram(ds: xr.Dataset) -> bool:
     """Whether a dataset holds sections along one axis."""
-    return bool(points_of(ds)) and len(_axes_of(ds)) == 1
+    return any(len(_axes_of(ds, name)) == 1 for name in points_of(ds)[:1])
 
 
 def has_circle(ds: xr.Dataset) -> bool:
     """Whether a dataset holds multipliers with their arguments along one axis."""
-    return "multiplier_angle_1" in ds and len(set(ds["multiplier_angle_1"].dims) - {_DIRECTION}) == 1
+    return len(_axes_of(ds, "multiplier_angle_1")) == 1
 
 
 def points_of(ds: xr.Dataset) -> list[str]:
@@ -68,8 +68,9 @@ def points_of(ds: xr.Dataset) -> list[str]:
     return [name for name in POINTS if name in ds]
 
 
-def _axes_of(ds: xr.Dataset) -> list[str]:
-    return [str(dim) for dim in ds[points_of(ds)[0]].dims if dim not in ("section", _DIRECTION)]
+def _axes_of(ds: xr.Dataset, name: str) -> list[str]:
+    """Dimensions of a variable beside its section and the direction; none without this variable."""
+    return [str(dim) for dim in ds[name].dims if dim not in ("section", _DIRECTION)] if name in ds else []
 
 
 def bifurcation(
@@ -429,7 +430,7 @@ def _require_section(ds: xr.Dataset) -> None:
 def _require_diagram(ds: xr.Dataset) -> None:
     _require_section(ds)
     if not has_diagram(ds):
-        along = ", ".join(_axes_of(ds)) or "no axis"
+        along = ", ".join(_axes_of(ds, points_of(ds)[0])) or "no axis"
         raise InputError("ds", f"has sections along {along}, and a diagram has one axis: hold the others by sel")
 
 
@@ -437,12 +438,11 @@ def _axis(ds: xr.Dataset, x: str | None, needed: str | None = None) -> Axis:
     """The axis of a diagram."""
     if needed is None:
         _require_diagram(ds)
-        (dim,) = _axes_of(ds)
-    else:
-        dims = [str(dim) for dim in ds[needed].dims if dim != _DIRECTION] if needed in ds else []
-        if len(dims) != 1:
-            raise InputError("ds", f"has no {needed} along one axis: record: {{exponent: true}} gives it")
-        (dim,) = dims
+        needed = points_of(ds)[0]
+    dims = _axes_of(ds, needed)
+    if len(dims) != 1:
+        raise InputError("ds", f"has no {needed} along one axis: record: {{exponent: true}} gives it")
+    (dim,) = dims
     along = [str(name) for name, coordinate in ds.coords.items() if coordinate.dims == (dim,)]
     name = resolve("x", x, along) if x else next(iter([*along, dim]))
     return Axis.of(ds[name], ds)
