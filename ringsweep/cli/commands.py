@@ -219,17 +219,14 @@ def precision_command(arguments: argparse.Namespace) -> None:
     """Measure error against run time, print a table and draw it."""
     from ringsweep.config import load
 
-    config = load(arguments.config)
-    if config.sample is not None:
-        raise InputError("sweep.sample", "precision measures the cells of a grid: leave sample out")
-    target, picture = _outputs(arguments.output or f"{config.name}-precision.nc", "contender", "error against run time")
+    name = arguments.output or f"{load(arguments.config).name}-precision.nc"
+    target, picture = _outputs(name, "contender", "error against run time")
 
     from ringsweep.cli.precision_table import report
-    from ringsweep.runs.precision import measure
 
     given = {name: getattr(arguments, name) for name in ("target", "cells", "rounds")}
     options = {name: value for name, value in given.items() if value is not None}
-    result = measure(config, **options, progress=not arguments.quiet)
+    result = ringsweep.precision(arguments.config, **options, progress=not arguments.quiet)
     _store(result, target, report(result))
     _draw(lambda: ringsweep.plots.work_precision(result), picture, f"ringsweep plot {target}")
 

@@ -241,11 +241,16 @@ def _validate(doc: Document) -> Config:
     for path, where in swept.items():
         if where in doc.locations:
             doc.locations[f"scene.{path}"] = doc.locations[where]
-    refine = read_refinement(tree.get("sweep", {}).get("refine"), scene, axes)
     if (sample := read_sample(sweep.get("sample"), scene, axes)) is None:
         check_consistency(scene, axes)
-    follow = read_follow(tree.get("sweep", {}).get("follow"), scene, axes)
-    return _checked(Config(scene, solver, with_direction(axes, follow), tree, doc.name, refine, sample, follow))
+    return assembled(Config(scene, solver, axes, tree, doc.name, sample=sample))
+
+
+def assembled(config: Config) -> Config:
+    """A configuration with what its source says under ``sweep.refine`` and ``sweep.follow``."""
+    scene, axes, sweep = config.scene, config.axes, config.source.get("sweep", {})
+    refine, follow = read_refinement(sweep.get("refine"), scene, axes), read_follow(sweep.get("follow"), scene, axes)
+    return _checked(dataclasses.replace(config, axes=with_direction(axes, follow), refine=refine, follow=follow))
 
 
 def _checked(config: Config) -> Config:
@@ -272,22 +277,6 @@ def _warn_of_plain_angles(scene: Scene, columns: Mapping[str, Any]) -> None:
         for path in paths_of(key):
             for value in ends:
                 warn_of_plain_angle(path, value, known[path])
-
-
-def followed(config: Config, follow: str | Mapping[str, Any] | None) -> Config:
-    """A configuration without ``sweep.follow``, with `follow` in its place.
-
-    Raises
-    ------
-    InputError
-        If `follow` is wrong, or runs of the scene cannot go on.
-    """
-    if follow is None:
-        return config
-    given = yaml_text.read({"follow": follow}).tree["follow"]
-    found = read_follow(given, config.scene, config.axes)
-    source = config.source | {"sweep": config.source.get("sweep", {}) | {"follow": given}}
-    return _checked(dataclasses.replace(config, axes=with_direction(config.axes, found), source=source, follow=found))
 
 
 def _apply_settings(doc: Document, settings: Iterable[Setting]) -> dict[str, tuple[Any, Any]]:

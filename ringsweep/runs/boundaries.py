@@ -12,6 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.config import Axes, Config, load
+from ringsweep.config.consistency import check_consistency
 from ringsweep.config.sections import suggestion
 from ringsweep.errors import InputError
 from ringsweep.quantities.parameters import Parameter
@@ -102,7 +103,9 @@ def located(ds: xr.Dataset, regime: str, configuration: Config, tolerance: float
         values = {name: column[which] for name, column in place.items()}
         for k, dim in enumerate(dims):
             values[dim] = np.where(axis[which] == k, at, values[dim])
-        found = _run(configuration, {columns[name].attrs["path"]: column for name, column in values.items()}, jobs)
+        found = run_points(
+            configuration, {columns[name].attrs["path"]: column for name, column in values.items()}, jobs
+        )
         certified = (found["certified"].values == 1) | (not configuration.certifies)
         here = found[label].values == flag
         outside = ~here & certified
@@ -253,7 +256,7 @@ def _check_cells(ds: xr.Dataset, label: str, config: Config, jobs: int | None) -
     cells = run[np.linspace(0, len(run) - 1, min(len(run), _CHECKED_CELLS)).astype(int)]
     dims = [str(dim) for dim in ds["regime"].dims]
     values = {path: _values(c, dims, cells) for path, c in known.items() if path in config.axes.columns}
-    again = _run(config, values, jobs)
+    again = run_points(config, values, jobs)
     sure = (ds["certified"].values[tuple(cells.T)] == 1) & (again["certified"].values == 1)
     if (sure & (again[label].values != ds[label].values[tuple(cells.T)])).any():
         raise InputError("ds", "has other regimes than runs of its configuration: was it put together from several?")
@@ -286,11 +289,12 @@ def _checked_configuration(ds: xr.Dataset, regime: str, jobs: int | None) -> Con
     return config
 
 
-def _run(config: Config, values: dict[str, NDArray[Any]], jobs: int | None) -> xr.Dataset:
-    """Run points; the progress of each of many rounds is not shown."""
-    count = len(next(iter(values.values())))
-    axes = Axes({"point": count}, {path: (("point",), column) for path, column in values.items()})
-    return compute(replace(config, axes=axes, refine=None), Execution(jobs, progress=False), warn=False)
+def run_points(config: Config, values: Mapping[str, NDArray[Any]], jobs: int | None) -> xr.Dataset:
+    """Run a configuration at some values of its paths; the progress of each of many rounds is not shown."""
+    axes = Axes({"point": len(next(iter(values.values())))}, {path: (("point",), at) for path, at in values.items()})
+    check_consistency(config.scene, axes)
+    points = replace(config, axes=axes, refine=None, sample=None)
+    return compute(points, Execution(jobs, progress=False), warn=False)
 
 
 def _joined(low: NDArray[np.intp], axis: NDArray[np.intp], shape: tuple[int, ...]) -> tuple[NDArray[np.intp], Any]:

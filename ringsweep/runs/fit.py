@@ -6,7 +6,7 @@ import logging
 import math
 import os
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ringsweep.compile import readable_compile_errors
 from ringsweep.config import Config, as_written, load, sweepable, tell_unit, with_values
-from ringsweep.config.axes import Axes, build_axes, swept_parameter
+from ringsweep.config.axes import swept_parameter
 from ringsweep.config.sections import read_values, suggestion
 from ringsweep.config.yaml_text import Document, name_and_unit
 from ringsweep.errors import InputError
@@ -26,10 +26,9 @@ from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.quantity import after_number
 from ringsweep.quantities.units import quantity, show
 from ringsweep.quantities.variables import HISTORY, Variable
-from ringsweep.runs.cells import compute_task
+from ringsweep.runs.boundaries import run_points
 from ringsweep.runs.executors import interruptible
 from ringsweep.statistics import CONFIDENCE, unit_points
-from ringsweep.storage.chunks import Layout
 from ringsweep.storage.provenance import attributes
 
 logger = logging.getLogger("ringsweep")
@@ -593,13 +592,10 @@ def _uncertified(problem: _Problem, best: Floats) -> int:
         return 0
     steps = np.concatenate([np.zeros((1, len(best))), _STEP * np.eye(len(best)), -_STEP * np.eye(len(best))])
     allowed = [u for u in best + steps if math.isfinite(problem.misfit(u))]
-    columns = np.array([problem.values(u) for u in allowed])
-    paths = [factor.path for factor in problem.factors]
-    axes: Axes = build_axes((path, path, ("point",), columns[:, k]) for k, path in enumerate(paths))
-    points = compute_task(
-        replace(problem.config, axes=axes), Layout((len(allowed),), (len(allowed),)), np.arange(len(allowed))
-    )
-    return int((points.columns["certified"] != 1).sum())
+    columns = np.array([problem.values(u) for u in allowed]).T
+    paths = (factor.path for factor in problem.factors)
+    points = run_points(problem.config, dict(zip(paths, columns, strict=True)), 1)
+    return int((points["certified"] != 1).sum())
 
 
 def _dataset(problem: _Problem, column: Variable, found: Any, run: Any) -> xr.Dataset:

@@ -108,20 +108,15 @@ def precision(
     >>> found.attrs["recommended"].startswith("method: ")
     True
     """
-    return measure(load(config), target=target, cells=cells, rounds=rounds, progress=progress)
-
-
-def measure(
-    config: Config, *, target: float = TARGET, cells: int = CELLS, rounds: int = ROUNDS, progress: bool = True
-) -> xr.Dataset:
-    """Measure a validated configuration; see :func:`precision`."""
-    return interruptible(partial(_measure, config, target, cells, rounds, progress))
+    return interruptible(partial(_measure, load(config), target, cells, rounds, progress))
 
 
 def _measure(config: Config, target: float, cells: int, rounds: int, progress: bool) -> xr.Dataset:
     target = quantity(target, _TARGET, "target")
     cells, rounds = int(quantity(cells, COUNT, "cells")), int(quantity(rounds, COUNT, "rounds"))
     scene = config.scene
+    if config.sample is not None:
+        raise InputError("sweep.sample", "precision measures the cells of a grid: leave sample out")
     if len(scene.structures) > 1:
         kind = "points" if LAW in config.source["sweep"].get("points", {}) else "grid"
         raise InputError(

@@ -18,8 +18,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsweep.config import Axes, Config, followed, load, read_axes, read_scene, read_solver, refined
+from ringsweep.config import Axes, Config, assembled, load, read_axes, read_scene, read_solver, refined
 from ringsweep.config.follow import BOTH, DIRECTION
+from ringsweep.config.yaml_text import read
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
 from ringsweep.quantities.variables import INFERRED, OUTCOMES, Variable, error_attribute
@@ -208,10 +209,12 @@ def sweep(
     found = read_axes(parsed, axes)
     method = read_solver(solver, parsed)
     given = {"method": solver} if isinstance(solver, str) else dict(solver)
-    source = {"scene": dict(parsed.source), "solver": given, "sweep": _sweep_section(found)}
+    also = {key: value for key, value in (("follow", follow), ("refine", refine)) if value not in (None, False)}
+    section = _sweep_section(found) | read(also).tree
+    source = {"scene": dict(parsed.source), "solver": given, "sweep": section}
     if record is not None:
         source["record"] = dict(record)
-    config = refined(followed(Config(parsed, method, found, source, name="ringsweep"), follow), refine)
+    config = assembled(Config(parsed, method, found, source, name="ringsweep"))
     return _run(config, output, Execution(jobs, scheduler, progress), fresh, reuse)
 
 

@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 
 from ringsweep.config import Config, as_written, load, sweepable, tell_unit, with_values, yaml_text
 from ringsweep.config.axes import Axes, dimension, sweep_section, swept_parameter, swept_paths
-from ringsweep.config.consistency import check_consistency
 from ringsweep.errors import InputError
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.quantity import after_number
 from ringsweep.quantities.units import quantity, show
 from ringsweep.quantities.variables import QUANTILE_ENDS, words
-from ringsweep.runs.boundaries import bisect, located, word_in
+from ringsweep.runs.boundaries import bisect, located, run_points, word_in
 from ringsweep.runs.executors import Execution
 from ringsweep.runs.regime_words import check_word
 from ringsweep.runs.sweep import compute
@@ -206,10 +205,7 @@ def distribution(
 
     def runs(points: NDArray[np.intp], at: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Whether runs of some points of the sample are in the regime, and whether they are certified."""
-        columns = {name: (("point",), column[points]) for name, column in drawn.items()}
-        axes = Axes({"point": len(points)}, {**columns, path: (("point",), at)})
-        check_consistency(config.scene, axes)
-        found = compute(replace(config, axes=axes, sample=None), Execution(jobs, progress=False), warn=False)
+        found = run_points(config, {name: column[points] for name, column in drawn.items()} | {path: at}, jobs)
         label, flag = word_in(found, regime)
         return found[label].values == flag, (found["certified"].values == 1) | (not config.certifies)
 
