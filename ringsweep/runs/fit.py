@@ -601,51 +601,41 @@ def _uncertified(problem: _Problem, best: Floats) -> int:
 def _dataset(problem: _Problem, column: Variable, found: Any, run: Any) -> xr.Dataset:
     best, covariance, half, profiles, minima = found
     history, misfit = run
-    width, own = problem.width, column.attributes
+    width, own = problem.width, {"units": column.units}
     covariance = covariance * np.outer(width, width)
     error = np.sqrt(np.diag(covariance))
     with np.errstate(invalid="ignore", divide="ignore"):
         correlation = covariance / np.outer(error, error)
     each = {"comment": "each in the unit of its parameter"}
-    value = problem.values(best)
-    lower, upper = (np.array([p[k] for p in profiles]) for k in (2, 3))
-    squares = {"long_name": "sum of squared residuals", "units": f"({column.unit})^2" if column.unit != "1" else "1"}
+    value, at = problem.values(best), ("parameter", "profile")
+    values, misfits, lower, upper = (np.array(part) for part in zip(*profiles, strict=True))
+    squares = {"units": f"({column.unit})^2" if column.unit != "1" else "1"}
     paths = [factor.path for factor in problem.factors]
     units = [factor.parameter.unit or "1" for factor in problem.factors]
 
-    def of_parameter(values: Any, name: str) -> Any:
-        return "parameter", np.asarray(values), {"long_name": name} | each
+    def variable(dims: Any, values: Any, name: str, about: dict[str, Any] = each) -> Any:
+        return dims, values, {"long_name": name} | about
 
     return xr.Dataset(
         {
-            "value": of_parameter(value, "fitted value"),
-            "standard_error": of_parameter(error, "standard error"),
-            "low": of_parameter(value - half * width, "lower end of the 95 % interval"),
-            "high": of_parameter(value + half * width, "upper end of the 95 % interval"),
-            "profile_low": of_parameter(problem.values(lower), "lower end by the profile likelihood"),
-            "profile_high": of_parameter(problem.values(upper), "upper end by the profile likelihood"),
-            "covariance": (("parameter", "other"), covariance, {"long_name": "covariance"} | each),
-            "correlation": (("parameter", "other"), correlation, {"long_name": "correlation", "units": "1"}),
-            "profile_value": (
-                ("parameter", "profile"),
-                np.array([p[0] for p in profiles]) * width[:, None] + problem.low[:, None],
-                {"long_name": "value at which the parameter is kept"} | each,
+            "value": variable("parameter", value, "fitted value"),
+            "standard_error": variable("parameter", error, "standard error"),
+            "low": variable("parameter", value - half * width, "lower end of the 95 % interval"),
+            "high": variable("parameter", value + half * width, "upper end of the 95 % interval"),
+            "profile_low": variable("parameter", problem.values(lower), "lower end by the profile likelihood"),
+            "profile_high": variable("parameter", problem.values(upper), "upper end by the profile likelihood"),
+            "covariance": variable(("parameter", "other"), covariance, "covariance"),
+            "correlation": variable(("parameter", "other"), correlation, "correlation", {"units": "1"}),
+            "profile_value": variable(at, problem.values(values.T).T, "value at which the parameter is kept"),
+            "profile_misfit": variable(at, misfits, "sum of squared residuals", squares),
+            "start_value": variable(
+                ("start", "parameter"), problem.values(np.array([u for u, _ in minima])), "value found from a start"
             ),
-            "profile_misfit": (("parameter", "profile"), np.array([p[1] for p in profiles]), squares),
-            "start_value": (
-                ("start", "parameter"),
-                problem.values(np.array([u for u, _ in minima])),
-                {"long_name": "value found from a start"} | each,
-            ),
-            "start_misfit": ("start", np.array([cost for _, cost in minima]), squares),
-            "misfit": ((), misfit, squares),
-            "measured": ("measurement", problem.measured, own | {"long_name": f"measured {column.long_name}"}),
-            "fitted": ("measurement", history, own | {"long_name": f"fitted {column.long_name}"}),
-            "residual": (
-                "measurement",
-                problem.measured - history,
-                own | {"long_name": "measurement minus fit"},
-            ),
+            "start_misfit": variable("start", [cost for _, cost in minima], "sum of squared residuals", squares),
+            "misfit": variable((), misfit, "sum of squared residuals", squares),
+            "measured": variable("measurement", problem.measured, f"measured {column.long_name}", own),
+            "fitted": variable("measurement", history, f"fitted {column.long_name}", own),
+            "residual": variable("measurement", problem.measured - history, "measurement minus fit", own),
         },
         coords={
             "parameter": ("parameter", paths, {"long_name": "fitted parameter"}),

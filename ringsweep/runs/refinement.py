@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
 
 from ringsweep.quantities.variables import AUDITED, COMPUTED, INFERRED
 
@@ -325,16 +326,15 @@ class _Blocks:
     def reopened(self, cells: Cells) -> Cells:
         """Inferred cells that are computed next, in the blocks of some cells and beside these blocks."""
         layer, row, column = np.unravel_index(cells, self.grid.shape)
-        before = self.halvings.copy()
+        before = self.halvings
         own = np.zeros(before.shape, dtype=bool)
-        for down in (-1, 0, 1):
-            for right in (-1, 0, 1):
-                rows = np.clip(row // self.grid.stride + down, 0, self.counts[0] - 1)
-                columns = np.clip(column // self.grid.stride + right, 0, self.counts[1] - 1)
-                self.halvings[layer, rows, columns] = np.maximum(self.halvings[layer, rows, columns], 1)
-                if down == right == 0:
-                    own[layer, rows, columns] = True
-        self.halvings[own] = before[own] + 1
+        # The last row and column of the grid belong to the blocks before them.
+        rows, columns = (
+            np.minimum(k // self.grid.stride, n - 1) for k, n in zip((row, column), self.counts, strict=True)
+        )
+        own[layer, rows, columns] = True
+        beside = binary_dilation(own, np.ones((1, 3, 3)))
+        self.halvings = np.where(own, before + 1, np.maximum(before, beside))
         found = [np.empty(0, dtype=np.intp)]
         for k, i, j in np.argwhere(self.halvings != before):
             step = max(self.grid.stride >> int(self.halvings[k, i, j]), 1)

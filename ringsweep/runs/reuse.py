@@ -19,7 +19,7 @@ from ringsweep.errors import InputError
 from ringsweep.models import parameters
 from ringsweep.models.scene import LAW
 from ringsweep.quantities.variables import INFERRED, OUTCOMES
-from ringsweep.runs.cells import Indices, laws_at, values_at
+from ringsweep.runs.cells import Indices, by_law, values_at
 from ringsweep.storage import netcdf
 from ringsweep.storage.chunks import Layout
 from ringsweep.storage.provenance import differences, fingerprint, identity
@@ -146,13 +146,11 @@ class EarlierSweep:
     def _locate(self, config: Config, indices: Indices, count: int) -> tuple[NDArray[np.bool_], Indices]:
         """Which of `count` cells of the new sweep the file holds, and the indices of these in the file."""
         values = values_at(config.scene, config.axes, indices, count)
-        laws = laws_at(config.scene, config.axes, indices, count)
         shared = np.zeros(count, dtype=bool)
         in_file = {dim: np.zeros(count, dtype=np.intp) for dim in self.axes.sizes}
-        for law, structure in config.scene.structures.items():
-            own = np.flatnonzero(laws == law)
+        for structure, own in by_law(config.scene, config.axes, indices, count):
             needed = {path: values[path][own] for path in parameters(structure) if path in values}
-            shared[own], found = self._locate_under_law({**needed, LAW: laws[own]})
+            shared[own], found = self._locate_under_law({**needed, LAW: np.full(len(own), structure.law)})
             for dim, along in found.items():
                 in_file[dim][own] = along
         return shared, {dim: along[shared] for dim, along in in_file.items()}

@@ -128,7 +128,16 @@ def _trace(config: Config, structure: Structure, samples: int) -> tuple[xr.Datas
     with readable_compile_errors():
         times, rows = config.solver.history(cell, samples, len(names))
     columns = dict(zip(names, rows.T, strict=True))
-    open_contacts = {name: columns.pop(name) for name in names if name.startswith("event_")}
+    of_rows = {name.removeprefix("event_"): columns.pop(name) for name in names if name.startswith("event_")}
+    told, impacts = list[Events](), dict[str, Any]()
+    if of_rows:
+        # An event stands in all rows until the next one; number 0 is none.
+        numbers, first = np.unique(of_rows["number"], return_index=True)
+        found = {name: column[first[numbers > 0]] for name, column in of_rows.items()}
+        impacts = _impacts(found)
+        for number, kind in EVENTS.items():
+            own = found["event"] == number
+            told.append(Events(kind, found["time"][own], found["contact"][own].astype(np.int8)))
     for name in columns:
         if name.startswith("normal_"):
             # Where friction jumps, a normal reaction may jump below zero. There the contact opens and the run ends.
@@ -144,37 +153,20 @@ def _trace(config: Config, structure: Structure, samples: int) -> tuple[xr.Datas
             for name, column in columns.items()
             if name not in model.absent
         }
-        | (_impacts(open_contacts) if open_contacts else {}),
+        | impacts,
         coords={"time": ("time", times, {"long_name": "time", "units": "s", "axis": "T"})},
     )
-    return run, _events_of(open_contacts) if open_contacts else []
-
-
-def _rows_of(events: dict[str, NDArray[np.float64]]) -> NDArray[np.intp]:
-    """Rows of a history in which each event shows first; those before the first event are left out."""
-    numbers, first = np.unique(events["event_number"], return_index=True)
-    return np.asarray(first[numbers > 0])
+    return run, told
 
 
 def _impacts(events: dict[str, NDArray[np.float64]]) -> dict[str, Any]:
     """Impacts of a run as variables of its history."""
-    rows = _rows_of(events)
-    rows = rows[events["event_event"][rows] > 1]
+    hits = events["event"] > 1
     columns = {"impact_time": "time", "impact_contact": "contact", "impact_speed": "speed", "impulse": "impulse"}
     return {
-        name: ("impact", events[f"event_{column}"][rows].astype(IMPACTS[name].dtype), IMPACTS[name].attributes)
+        name: ("impact", events[column][hits].astype(IMPACTS[name].dtype), IMPACTS[name].attributes)
         for name, column in columns.items()
     }
-
-
-def _events_of(events: dict[str, NDArray[np.float64]]) -> list[Events]:
-    """Lost contacts and impacts of a run as events."""
-    rows = _rows_of(events)
-    found = []
-    for number, kind in EVENTS.items():
-        own = rows[events["event_event"][rows] == number]
-        found.append(Events(kind, events["event_time"][own], events["event_contact"][own].astype(np.int8)))
-    return found
 
 
 # A last normal reaction above this share of the largest of the run means that the reaction jumped to zero.
