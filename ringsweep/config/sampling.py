@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from typing import Any
 
@@ -165,20 +165,11 @@ class Sample:
     @property
     def identity(self) -> dict[str, str]:
         """All that determines its results, by name."""
-        factors = {f"sweep.sample.of.{factor.name}": repr(factor) for factor in self.factors}
-        asked: dict[str, Any] = {
-            "quantiles": dict(self.quantiles),
-            "survival": self.survival,
-            "sensitivity": self.sensitivity,
-            "keep": self.keep,
-        }
-        if self.sensitive:
-            asked["sensitivity"] = self.sensitive
-        return factors | {
-            "sweep.sample.method": f"{self.method}, seed {self.seed}, {self.replicates} replicates",
-            "sweep.sample.n": str(self.n),
-            **{f"sweep.sample.{name}": repr(value) for name, value in asked.items()},
-        }
+        found = {f"sweep.sample.of.{factor.name}": repr(factor) for factor in self.factors}
+        for field in fields(self)[1:]:
+            key = "sensitivity.of" if field.name == "sensitive" else field.name
+            found[f"sweep.sample.{key}"] = str(getattr(self, field.name))
+        return found
 
 
 @lru_cache(maxsize=8)

@@ -8,8 +8,7 @@ import shutil
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from queue import Empty, SimpleQueue
-from threading import Thread
+from threading import Event, Thread
 from time import monotonic
 
 import joblib
@@ -208,43 +207,40 @@ def _measure(config: Config, layout: Layout) -> list[TaskResult] | None:
     draw = np.random.default_rng(0)
     few = layout.total <= _MOST
     drawn = draw.permutation(layout.total) if few else draw.integers(layout.total, size=_MOST)
-    answers: SimpleQueue[TaskResult | BaseException | None] = SimpleQueue()
     side = 1 if config.sample else config.solver.side_by_side
+    results: list[TaskResult] = []
+    errors: list[BaseException] = []
+    began = Event()
 
-    def compute(config: Config, layout: Layout, positions: NDArray[np.integer]) -> TaskResult:
+    def compute(positions: NDArray[np.integer]) -> None:
         if config.sample is None:
             # A cell that starts from another one costs about as much.
-            return compute_task(replace(config, follow=None), layout, positions)
-        return sampled.compute_parts(config, layout, None, positions)
+            results.append(compute_task(replace(config, follow=None), layout, positions))
+        else:
+            results.append(sampled.compute_parts(config, layout, None, positions))
 
     def work() -> None:
         try:
             # The first ones may compile or load kernels. They are run again.
-            answers.put(compute(config, layout, drawn[:side]))
-            start, stop, began = 0, side, monotonic()
-            while start < len(drawn) and monotonic() - began < _MEASURING / 2:
-                answers.put(compute(config, layout, drawn[start:stop]))
+            compute(drawn[:side])
+            began.set()
+            start, stop, until = 0, side, monotonic() + _MEASURING / 2
+            while start < len(drawn) and monotonic() < until:
+                compute(drawn[start:stop])
                 start, stop = stop, 2 * stop
-            answers.put(None)
         except BaseException as error:
-            answers.put(error)
+            errors.append(error)
+            began.set()
 
     # A thread, since cells may run longer than anyone waits.
-    Thread(target=work, daemon=True).start()
-    results: list[TaskResult] = []
-    deadline = monotonic() + _FIRST
-    while True:
-        try:
-            answer = answers.get(timeout=max(deadline - monotonic(), 0.0))
-        except Empty:
-            return results[1:] if results else None
-        if isinstance(answer, BaseException):
-            raise answer
-        if answer is None:
-            return results[1:]
-        if not results:
-            deadline = monotonic() + 2.0 * _MEASURING
-        results.append(answer)
+    thread = Thread(target=work, daemon=True)
+    thread.start()
+    if not began.wait(_FIRST):
+        return None
+    thread.join(2.0 * _MEASURING)
+    if errors:
+        raise errors[0]
+    return results[1:]
 
 
 def size(number: float) -> str:

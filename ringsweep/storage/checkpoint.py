@@ -102,7 +102,7 @@ class Checkpoint:
             If it left cells of another sweep.
         """
         before = _read_manifest(self.folder / MANIFEST)
-        if before and before != self.identity and self.task_files():
+        if before and before != self.identity and self.working_folder.finished_cells():
             changes = differences(before, self.identity)
             raise InputError(
                 str(self.folder),
@@ -113,17 +113,13 @@ class Checkpoint:
             self.working_folder.write(MANIFEST, json.dumps(self.identity, indent=1).encode())
         self.scan()
 
-    def task_files(self) -> list[Path]:
-        """All task files in the folder, usable or not."""
-        return self.working_folder.finished_cells()
-
     def scan(self) -> None:
         """Find out which cells are finished. Warns of damaged task files and of those of another sweep."""
         self.done[:] = False
         self.files.clear()
         self._held = None
         unusable = 0
-        for path in self.task_files():
+        for path in self.working_folder.finished_cells():
             try:
                 positions, _ = self.read(path)
             except DamagedTask as damage:
@@ -261,7 +257,7 @@ class Checkpoint:
         """Remove all files but the lock."""
         if not self.working_folder.is_own():
             return
-        for path in [*self.task_files(), self.folder / MANIFEST]:
+        for path in [*self.working_folder.finished_cells(), self.folder / MANIFEST]:
             path.unlink(missing_ok=True)
         self.working_folder.remove_temporary()
         self.files.clear()
