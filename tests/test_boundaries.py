@@ -72,13 +72,13 @@ class TestBoundary:
         assert not np.isclose(fewer.zone_half_angle[fewer.axis == 0], ds.zone_half_angle[4].item()).any()
 
     def test_run_that_is_not_certified_leaves_the_place_uncertain(self, ds, monkeypatch, caplog):
-        run = boundaries._run
+        run = boundaries.run_points
 
         def uncertified(*arguments):
             found = run(*arguments)
             return found.assign(certified=found.certified * 0)
 
-        monkeypatch.setattr(boundaries, "_run", uncertified)
+        monkeypatch.setattr(boundaries, "run_points", uncertified)
         found = ringsweep.boundary(ds, "separating", 1e-4)
         assert (found.error > 1e-4).all()
         assert "not certified" in caplog.text

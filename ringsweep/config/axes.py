@@ -15,7 +15,7 @@ from ringsweep.config.scene import sweepable
 from ringsweep.config.sections import MAX_LENGTH, check_keys, read_values, section_of, suggestion
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError, nearest_name
-from ringsweep.models.scene import Scene
+from ringsweep.models.scene import LAW, Scene, Structure
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.units import is_quantity, quantity, show
 from ringsweep.quantities.variables import OUTCOMES
@@ -29,6 +29,9 @@ _SPACINGS = ("linspace", "geomspace")
 
 #: Largest number of cells of a sweep. With 24 variables each they take some ten gigabytes on a disk.
 MAX_CELLS = 100_000_000
+
+#: Index of each of some cells along each dimension, by name of the dimension.
+Indices = Mapping[str, NDArray[np.intp]]
 
 #: A swept path, its place in the configuration (for messages), its dimensions and its values.
 Column = tuple[str, str, tuple[str, ...], NDArray[Any]]
@@ -215,3 +218,29 @@ def build_axes(columns: Iterable[Column]) -> Axes:
                 f"the dimension {name} has the name of this path, but the path has other dimensions: rename it",
             )
     return found
+
+
+def values_at(scene: Scene, axes: Axes, indices: Indices, count: int) -> dict[str, NDArray[np.float64]]:
+    """Values of every numeric path in `count` cells, each of shape ``(count,)``."""
+    values = {path: np.full(count, value) for path, value in scene.values.items()}
+    for path, (dims, column) in axes.columns.items():
+        if path != LAW:
+            values[path] = np.ascontiguousarray(column[tuple(indices[dim] for dim in dims)], dtype=float)
+    return values
+
+
+def laws_at(scene: Scene, axes: Axes, indices: Indices, count: int) -> NDArray[np.str_]:
+    """Names of the friction laws in `count` cells, shape ``(count,)``."""
+    if LAW not in axes.columns:
+        return np.full(count, scene.structure.law)
+    dims, names = axes.columns[LAW]
+    return np.asarray(names[tuple(indices[dim] for dim in dims)])
+
+
+def by_law(scene: Scene, axes: Axes, indices: Indices, count: int) -> Iterator[tuple[Structure, NDArray[np.intp]]]:
+    """Which of `count` cells have each friction law: a batch has one law, since each law has kernels of its own."""
+    laws = laws_at(scene, axes, indices, count)
+    for law, structure in scene.structures.items():
+        own = np.flatnonzero(laws == law)
+        if len(own):
+            yield structure, own

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ringsweep.config.axes import Axes
+from ringsweep.config.axes import Axes, by_law, values_at
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, batch
 from ringsweep.models.scene import LAW, Scene, Structure
@@ -39,13 +39,8 @@ def check_consistency(scene: Scene, axes: Axes) -> None:
         flat = np.arange(start, min(start + _CELLS_AT_ONCE, total))
         numbers = np.unravel_index(flat, shape)[1:]
         indices = {dim: along[number] for dim, along, number in zip(axes.sizes, checked, numbers, strict=True)}
-        values = {path: np.full(len(flat), value) for path, value in scene.values.items()}
-        values |= {path: column[tuple(indices[dim] for dim in dims)] for path, (dims, column) in axes.columns.items()}
-        laws = values.pop(LAW, np.full(len(flat), scene.structure.law))
-        for law, structure in scene.structures.items():
-            cells = laws == law
-            if not cells.any():
-                continue
+        values = values_at(scene, axes, indices, len(flat))
+        for structure, cells in by_law(scene, axes, indices, len(flat)):
             try:
                 made = batch(structure, {path: column[cells] for path, column in values.items()})
             except InputError as error:

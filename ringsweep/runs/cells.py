@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from ringsweep.compile import readable_compile_errors, take
 from ringsweep.config import Axes, Config, sweepable
-from ringsweep.config.axes import dimension
+from ringsweep.config.axes import Indices, by_law, dimension, values_at
 from ringsweep.config.follow import DIRECTION
 from ringsweep.models import batch, model_of
 from ringsweep.models.model import Continues
-from ringsweep.models.scene import LAW, Scene, Structure
+from ringsweep.models.scene import Scene, Structure
 from ringsweep.physics.drives import turn
 from ringsweep.quantities.flags import FAILED
 from ringsweep.quantities.variables import OUTCOMES
@@ -28,9 +28,6 @@ from ringsweep.solvers.certificate import with_errors
 from ringsweep.solvers.method import Result
 from ringsweep.storage.chunks import Layout
 from ringsweep.storage.provenance import environment, processor
-
-#: Index of each cell along each dimension, by name of the dimension.
-Indices = Mapping[str, NDArray[np.intp]]
 
 logger = logging.getLogger("ringsweep")
 
@@ -50,32 +47,6 @@ def values_of_cells(scene: Scene, axes: Axes, numbers: NDArray[np.intp]) -> dict
     """
     indices = np.unravel_index(numbers, tuple(axes.sizes.values()) or (1,))
     return values_at(scene, axes, dict(zip(axes.sizes, indices, strict=False)), len(numbers))
-
-
-def values_at(scene: Scene, axes: Axes, indices: Indices, count: int) -> dict[str, NDArray[np.float64]]:
-    """Values of every numeric path in `count` cells, each of shape ``(count,)``."""
-    values = {path: np.full(count, value) for path, value in scene.values.items()}
-    for path, (dims, column) in axes.columns.items():
-        if path != LAW:
-            values[path] = np.ascontiguousarray(column[tuple(indices[dim] for dim in dims)], dtype=float)
-    return values
-
-
-def laws_at(scene: Scene, axes: Axes, indices: Indices, count: int) -> NDArray[np.str_]:
-    """Names of the friction laws in `count` cells, shape ``(count,)``."""
-    if LAW not in axes.columns:
-        return np.full(count, scene.structure.law)
-    dims, names = axes.columns[LAW]
-    return np.asarray(names[tuple(indices[dim] for dim in dims)])
-
-
-def by_law(scene: Scene, axes: Axes, indices: Indices, count: int) -> Iterator[tuple[Structure, NDArray[np.intp]]]:
-    """Which of `count` cells have each friction law: a batch has one law, since each law has kernels of its own."""
-    laws = laws_at(scene, axes, indices, count)
-    for law, structure in scene.structures.items():
-        own = np.flatnonzero(laws == law)
-        if len(own):
-            yield structure, own
 
 
 def coordinates(scene: Scene, columns: Mapping[str, tuple[Any, Any]]) -> dict[str, Any]:

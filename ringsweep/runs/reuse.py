@@ -15,11 +15,11 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ringsweep.config import Config, load
+from ringsweep.config.axes import Indices, by_law, values_at
 from ringsweep.errors import InputError
 from ringsweep.models import parameters
 from ringsweep.models.scene import LAW
 from ringsweep.quantities.variables import INFERRED, OUTCOMES
-from ringsweep.runs.cells import Indices, by_law, values_at
 from ringsweep.storage import netcdf
 from ringsweep.storage.chunks import Layout
 from ringsweep.storage.provenance import differences, fingerprint, identity

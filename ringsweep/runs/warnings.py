@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ringsweep.compile import take
 from ringsweep.config import Config
+from ringsweep.config.axes import by_law, laws_at, values_at
 from ringsweep.models import batch
 from ringsweep.physics import drives, ring, zones
 from ringsweep.physics.drives import Constant
@@ -18,7 +19,6 @@ from ringsweep.quantities.flags import FAILED, JAMMED, REGIMES, RIDING, SEPARATI
 from ringsweep.quantities.quantity import after_number
 from ringsweep.quantities.units import rounded_up
 from ringsweep.quantities.variables import INFERRED
-from ringsweep.runs.cells import by_law, laws_at, values_at
 from ringsweep.solvers.automaton import PATIENCE
 from ringsweep.solvers.rk4 import STABILITY_LIMIT
 from ringsweep.storage.chunks import Layout, parts
