@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import ringsweep
-from ringsweep.cli.report import print_events
+from ringsweep.cli.report import events_in_words
 
 BELT = {
     "model": "belt",
@@ -53,7 +53,7 @@ class TestEvents:
         assert edges[-1] > alone.t_separation
         assert run.separations == 1
         assert f", with 1 loss of contact and {run.impacts.item():.0f} impacts" in run.attrs["outcome"]
-        print_events(run)
+        print(events_in_words(run))
         hardest = int(np.argmax(run.impact_speed.values))
         assert (
             f"hardest impact: {run.impact_speed_max.item():.6g} m/s at {run.impact_time.values[hardest]:.9g} s; "
@@ -74,5 +74,5 @@ class TestEvents:
         both = runs.sel(friction_law="stiction")
         np.testing.assert_array_equal(told(both, "breakaway"), told(alone, "breakaway"))
         assert runs.event_kind.dtype == alone.event_kind.dtype
-        print_events(runs)
+        print(events_in_words(runs))
         assert "stiction: events: breakaway 2, stop 2\n  7.3575 s breakaway\n" in capsys.readouterr().out

@@ -109,13 +109,14 @@ def _silence_dask() -> None:
             logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
-def _store(result: Any, target: Path, text: str) -> None:
-    """Write a dataset, and print what it says."""
+def _store(result: Any, target: Path, picture: Path, text: str, draw: str) -> None:
+    """Write a dataset, print what it says, and draw it by a function of `ringsweep.plots`."""
     from ringsweep.storage import netcdf
 
     netcdf.save(result, target)
     print(text)
     print(f"wrote {target}")
+    _draw(lambda: getattr(ringsweep.plots, draw)(result), picture, f"ringsweep plot {target}")
 
 
 def map_command(arguments: argparse.Namespace) -> None:
@@ -139,18 +140,13 @@ def simulate_command(arguments: argparse.Namespace) -> None:
     config = with_values(arguments.config, arguments.set)
     target, picture = _outputs(arguments.output or f"{config.name}-run.nc", "time", "history")
 
-    from ringsweep.cli.report import print_events
+    from ringsweep.cli.report import events_in_words
     from ringsweep.runs.simulate import history
-    from ringsweep.storage import netcdf
 
     result = history(config)
     if replaced := _other_scene(target, result):
         logger.info("%s held a run of another scene, which is replaced: %s", target, replaced)
-    netcdf.save(result, target)
-    print(result.attrs["outcome"])
-    print_events(result)
-    print(f"wrote {target}")
-    _draw(lambda: ringsweep.plots.history(result), picture, f"ringsweep plot {target}")
+    _store(result, target, picture, f"{result.attrs['outcome']}\n{events_in_words(result)}", "history")
 
 
 def threshold_command(arguments: argparse.Namespace) -> None:
@@ -171,8 +167,7 @@ def fit_command(arguments: argparse.Namespace) -> None:
 
     options = {"start": arguments.start, "noise": arguments.noise, "settings": arguments.set}
     result = fitted(arguments.config, arguments.data, ranges_of(arguments.vary), **options)
-    _store(result, target, in_words(result))
-    _draw(lambda: ringsweep.plots.fit(result), picture, f"ringsweep plot {target}")
+    _store(result, target, picture, in_words(result), "fit")
 
 
 def _other_scene(target: Path, result: Any) -> str:
@@ -227,8 +222,7 @@ def precision_command(arguments: argparse.Namespace) -> None:
     given = {name: getattr(arguments, name) for name in ("target", "cells", "rounds")}
     options = {name: value for name, value in given.items() if value is not None}
     result = ringsweep.precision(arguments.config, **options, progress=not arguments.quiet)
-    _store(result, target, report(result))
-    _draw(lambda: ringsweep.plots.work_precision(result), picture, f"ringsweep plot {target}")
+    _store(result, target, picture, report(result), "work_precision")
 
 
 def info_command(arguments: argparse.Namespace) -> None:

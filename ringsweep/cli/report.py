@@ -108,32 +108,31 @@ _FIRST, _LAST = 8, 4
 _OF_CONTACTS = ("separation", "rebound", "closure")
 
 
-def print_events(run: xr.Dataset) -> None:
-    """Print how many events of each kind a run has, and the first and the last of them."""
+def events_in_words(run: xr.Dataset) -> str:
+    """How many events of each kind a run has, and the first and the last of them, line by line."""
     if "friction_law" in run.dims:
-        for law in run["friction_law"].values:
-            print(f"{law}: ", end="")
-            print_events(run.sel(friction_law=law))
-        return
+        return "\n".join(f"{law}: {events_in_words(run.sel(friction_law=law))}" for law in run["friction_law"].values)
     kinds, contacts = words(run["event_kind"]).values, words(run["event_contact"]).values
     kinds = kinds[kinds != "none"]
     counts = [f"{kind} {np.count_nonzero(kinds == kind)}" for kind in dict.fromkeys(kinds.tolist())]
-    print("events:", ", ".join(counts) or "none")
+    lines = [f"events: {', '.join(counts) or 'none'}"]
     hits = np.flatnonzero(np.isin(kinds, _OF_CONTACTS[1:]))
     speeds = dict(zip(hits.tolist(), run["impact_speed"].values.tolist(), strict=False)) if len(hits) else {}
     told = np.flatnonzero(np.isin(kinds, _OF_CONTACTS) | (not speeds))
     left_out = range(_FIRST, len(told) - _LAST)
     for row, k in enumerate(told.tolist()):
         if row == left_out.start and len(left_out) > 1:
-            print(f"  ... {len(left_out)} more{', and the other kinds,' if speeds else ''} are in the file")
+            lines.append(f"  ... {len(left_out)} more{', and the other kinds,' if speeds else ''} are in the file")
         if row not in left_out or len(left_out) == 1:
             who = contacts[k].replace("contact_", " contact ").replace("both", " both contacts").replace("none", "")
             speed = f", {speeds[k]:.6g} m/s" if k in speeds else ""
-            print(f"  {run['event_time'].values[k]:.9g} s {kinds[k]}{who}{speed}")
+            lines.append(f"  {run['event_time'].values[k]:.9g} s {kinds[k]}{who}{speed}")
     if speeds:
         hardest = max(speeds, key=speeds.__getitem__)
         when = run["event_time"].values[hardest]
-        print(f"hardest impact: {speeds[hardest]:.6g} m/s at {when:.9g} s; greatest gap: {float(run['gap_max']):.6g} m")
+        gap = float(run["gap_max"])
+        lines.append(f"hardest impact: {speeds[hardest]:.6g} m/s at {when:.9g} s; greatest gap: {gap:.6g} m")
+    return "\n".join(lines)
 
 
 # Parameters of the greatest influence on a regime that are printed.
