@@ -347,23 +347,20 @@ def _numbers(given: Any, kind: str, parameter: Parameter, where: str) -> tuple[f
 
 def _ordered(factors: Mapping[str, Factor], scene: Scene, axes: Axes) -> tuple[Factor, ...]:
     """Factors, each after the one that it is multiplied by."""
-    waiting, found = dict(factors), list[Factor]()
-    drawn = {path for factor in factors.values() for path in factor.paths}
-    while waiting:
-        ready = [
-            where
-            for where, factor in waiting.items()
-            if factor.over not in drawn or any(factor.over in other.paths for other in found)
-        ]
-        if not ready:
-            where, factor = next(iter(waiting.items()))
-            raise InputError(f"{where}.over", f"{factor.over} is itself drawn over {factor.paths[0]}")
-        for where in ready:
-            over = waiting[where].over
-            if over is not None and over not in drawn and over not in axes.columns and over not in scene.values:
+    drawn = {path: where for where, factor in factors.items() for path in factor.paths}
+
+    def depth(where: str, through: tuple[str, ...] = ()) -> int:
+        """How many factors stand before one, each multiplied by the one before."""
+        over = factors[where].over
+        if over is None or over not in drawn:
+            if over is not None and over not in axes.columns and over not in scene.values:
                 raise InputError(f"{where}.over", f"{over} has no value in the scene, and no distribution")
-            found.append(waiting.pop(where))
-    return tuple(found)
+            return 0
+        if where in through:
+            raise InputError(f"{where}.over", f"{over} is itself drawn over {factors[where].paths[0]}")
+        return 1 + depth(drawn[over], (*through, where))
+
+    return tuple(factors[where] for where in sorted(factors, key=depth))
 
 
 def _quantiles(given: Any, scene: Scene) -> dict[str, tuple[float, ...]]:
