@@ -19,9 +19,7 @@ from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
 import ringsweep
-from ringsweep.config import configuration as configurations
-from ringsweep.config import load, read_axes, read_scene, with_values
-from ringsweep.config import scene as scenes
+from ringsweep.config import load, read_axes, read_scene, sections, with_values
 from ringsweep.config.axes import read_spacing
 from ringsweep.config.schema import _number, schema
 from ringsweep.config.solver import read_solver
@@ -470,7 +468,7 @@ ROCKING = {"law": "sinusoidal", "amplitude": "60 deg", "frequency": "2 Hz"}
     ],
 )
 def test_plain_number_in_the_place_of_another_unit_is_told(caplog, setting, told):
-    configurations._warn_of_unit.cache_clear()
+    sections.warn_once.cache_clear()
     scene = edited(drive=ROCKING, ring__radius="50 mm")
     for _ in range(2):
         with_values({"scene": scene}, [setting])
@@ -479,7 +477,7 @@ def test_plain_number_in_the_place_of_another_unit_is_told(caplog, setting, told
 
 
 def test_value_that_a_program_gives_is_in_si_units_without_a_word(caplog):
-    configurations._warn_of_unit.cache_clear()
+    sections.warn_once.cache_clear()
     config = with_values({"scene": edited(drive=ROCKING)}, [("drive.amplitude", 1.5)])
     assert config.scene.values["drive.amplitude"] == 1.5
     assert not caplog.records
@@ -487,7 +485,7 @@ def test_value_that_a_program_gives_is_in_si_units_without_a_word(caplog):
 
 @pytest.mark.parametrize(("amplitude", "told"), [(60, True), ("60 rad", False), ("3600 deg", False), (6.0, False)])
 def test_angle_of_many_turns_without_unit_gives_one_warning(caplog, amplitude, told):
-    scenes._warn_of_turns.cache_clear()
+    sections.warn_once.cache_clear()
     for _ in range(2):
         load({"scene": edited(drive=ROCKING | {"amplitude": amplitude})})
     text = "scene.drive.amplitude is 60 rad, 9.55 turns: is a unit missing?"
@@ -495,14 +493,14 @@ def test_angle_of_many_turns_without_unit_gives_one_warning(caplog, amplitude, t
 
 
 def test_axis_of_a_file_with_angles_of_many_turns_gives_a_warning(caplog, write):
-    scenes._warn_of_turns.cache_clear()
+    sections.warn_once.cache_clear()
     rocking = TEXT.replace("law: arctan", "law: sinusoidal\n    frequency: 1")
     load(write(rocking.replace("geomspace: [0.1, 10, 5]", "linspace: [10, 60, 5]")))
     assert ["scene.drive.amplitude is 60 rad" in record.getMessage() for record in caplog.records] == [True]
 
 
 def test_each_unused_parameter_of_another_law_gives_one_warning(caplog):
-    scenes.warn_of_unused.cache_clear()
+    sections.warn_once.cache_clear()
     with caplog.at_level(logging.WARNING, logger="ringsweep"):
         scene = read_scene(edited(friction__law="coulomb"))
         assert read_scene(edited(friction__law="coulomb")).values == scene.values

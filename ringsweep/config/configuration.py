@@ -7,11 +7,9 @@ Physics and solvers declare their parameters; error messages are made from these
 from __future__ import annotations
 
 import dataclasses
-import logging
 import os
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 from ringsweep.config import yaml_text
@@ -32,7 +30,7 @@ from ringsweep.config.follow import Follow, put_state, read_follow, run_to_conti
 from ringsweep.config.refinement import Refinement, read_refinement
 from ringsweep.config.sampling import Sample, read_sample
 from ringsweep.config.scene import parse_scene, sweepable, warn_of_plain_angle
-from ringsweep.config.sections import read_values, suggestion
+from ringsweep.config.sections import read_values, suggestion, warn_once
 from ringsweep.config.solver import read_solver
 from ringsweep.config.yaml_text import Document, scalar
 from ringsweep.errors import InputError
@@ -40,8 +38,6 @@ from ringsweep.models.scene import LAW, Scene
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.units import is_plain, other_unit, show
 from ringsweep.quantities.variables import written
-
-logger = logging.getLogger("ringsweep")
 
 #: A value to change: ``"PATH=VALUE"`` as a user types it, or path and value as a program gives them.
 Setting = str | tuple[str, Any]
@@ -324,14 +320,11 @@ def tell_unit(option: str, form: str, value: Any, before: Any, parameter: Parame
         return
     if unit := other_unit(before, parameter):
         taken = f"{value} {parameter.unit}" if parameter.unit != "1" else f"{value}, without unit"
-        cure = form.format(f"{value} {unit}")
-        _warn_of_unit(f"{option} {form.format(value)}", taken, show(before), f'{option} "{cure}"')
-
-
-@cache
-def _warn_of_unit(given: str, taken: str, before: str, cure: str) -> None:
-    """Warn once per process: one command reads its configuration several times."""
-    logger.warning("%s is taken as %s, where the configuration says %s; was `%s` meant?", given, taken, before, cure)
+        given, cure = form.format(value), form.format(f"{value} {unit}")
+        warn_once(
+            '%s %s is taken as %s, where the configuration says %s; was `%s "%s"` meant?',
+            *(option, given, taken, show(before), option, cure),
+        )
 
 
 def as_written(config: Config, path: str) -> Any:

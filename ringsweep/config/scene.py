@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
-from functools import cache
 from itertools import product
 from math import pi
 from typing import Any, NamedTuple
@@ -26,7 +24,7 @@ from ringsweep.config.friction import TABLE as TABLE_LAW
 from ringsweep.config.motion import FORMULA as FORMULA_DRIVE
 from ringsweep.config.motion import own_drive, own_force
 from ringsweep.config.record import read_record
-from ringsweep.config.sections import choose, missing_text, read_values, section_of, suggestion
+from ringsweep.config.sections import choose, missing_text, read_values, section_of, suggestion, warn_once
 from ringsweep.config.tables import TABLES, read_table
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
@@ -37,8 +35,6 @@ from ringsweep.physics.friction import LAWS, Dynamic, family_of
 from ringsweep.physics.friction.formula import NAMES
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.units import is_plain, quantity, show
-
-logger = logging.getLogger("ringsweep")
 
 # Ratio of lengths of one scene above which a unit may be wrong: 1 m in place of 1 mm.
 _LARGEST_RATIO = 1000.0
@@ -100,7 +96,7 @@ def parse_scene(doc: Document, swept: Collection[str], laws: tuple[str, Any] | N
     _warn_of_unused_numbers(structures, leaves)
     numbers = numbers_of(structures)
     lengths = {path: values[path] for path, parameter in numbers.items() if parameter.unit == "m" and path in values}
-    _warn_of_lengths(frozenset(lengths.items()))
+    _warn_of_lengths(lengths)
     for path, parameter in numbers.items():
         if path in leaves:
             warn_of_plain_angle(path, leaves[path], parameter)
@@ -246,7 +242,8 @@ def _warn_of_unused_numbers(structures: Mapping[str, Structure], leaves: Collect
                     f"scene.{path}", "cannot stand beside a table or a formula, which gives all of the force"
                 )
             is_drive = path.startswith("drive.")
-            warn_of_unused(path, *(("drive", first.drive) if is_drive else ("friction", " or ".join(structures))))
+            law = f"drive law {first.drive}" if is_drive else f"friction law {' or '.join(structures)}"
+            warn_once("scene.%s is not used: %s has no such parameter%s", path, law, laws_with(path))
 
 
 def _belongs_elsewhere(section: str, key: str, paths: _Paths, model: str) -> str | None:
@@ -269,13 +266,12 @@ def _belongs_elsewhere(section: str, key: str, paths: _Paths, model: str) -> str
     return None
 
 
-@cache
-def _warn_of_lengths(lengths: frozenset[tuple[str, float]]) -> None:
-    """Warn once per process of lengths so different that a unit may be wrong."""
-    given = sorted((abs(value), path) for path, value in lengths if value)
+def _warn_of_lengths(lengths: Mapping[str, float]) -> None:
+    """Warn of lengths so different that a unit may be wrong."""
+    given = sorted((abs(value), path) for path, value in lengths.items() if value)
     if given and given[-1][0] > _LARGEST_RATIO * given[0][0]:
         (short, small), (long, large) = given[0], given[-1]
-        logger.warning(
+        warn_once(
             "scene.%s is %g m and scene.%s is %g m: is a unit missing? A plain number is in metres",
             *(large, long, small, short),
         )
@@ -286,22 +282,11 @@ def warn_of_plain_angle(path: str, given: Any, parameter: Parameter | Choice) ->
     # Other than angles without limits are refused if they are this large.
     is_angle = isinstance(parameter, Parameter) and parameter.unit == "rad" and is_plain(given)
     if is_angle and abs(angle := float(given)) > _LARGEST_ANGLE:
-        _warn_of_turns(path, angle)
-
-
-@cache
-def _warn_of_turns(path: str, angle: float) -> None:
-    """Warn once per process: one command reads its configuration several times."""
-    logger.warning(
-        "scene.%s is %g rad, %.3g turns: is a unit missing? A plain number is in radians; write `%g deg` for degrees",
-        *(path, angle, abs(angle) / (2.0 * pi), angle),
-    )
-
-
-@cache
-def warn_of_unused(path: str, where: str, name: str) -> None:
-    """Warn once per process: one command reads its configuration several times."""
-    logger.warning("scene.%s is not used: %s law %s has no such parameter%s", path, where, name, laws_with(path))
+        warn_once(
+            "scene.%s is %g rad, %.3g turns: is a unit missing? A plain number is in radians; write `%g deg` for "
+            "degrees",
+            *(path, angle, abs(angle) / (2.0 * pi), angle),
+        )
 
 
 def numbers_of(structures: Mapping[str, Structure]) -> dict[str, Parameter]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,14 @@ from ringsweep.quantities.units import length_of, quantity, show, spelled
 
 #: Largest number of values on an axis or in a table.
 MAX_LENGTH = 1_000_000
+
+logger = logging.getLogger("ringsweep")
+
+
+@cache
+def warn_once(message: str, *arguments: Any) -> None:
+    """Warn once per process: one command reads its configuration several times."""
+    logger.warning(message, *arguments)
 
 
 def suggestion(word: object, known: Iterable[str]) -> str:
