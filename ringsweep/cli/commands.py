@@ -74,7 +74,7 @@ def run_command(arguments: argparse.Namespace) -> None:
         print(f"{target} holds this sweep already (--fresh computes it again)")
     with netcdf.reading(target) as result:
         summarise(result)
-        if not computed and _is_newer(picture, target):
+        if not computed and picture.exists() and picture.stat().st_mtime >= target.stat().st_mtime:
             return
         if config.axes.sizes:
             _draw(lambda: ringsweep.plots.regime_map(result), picture, f"ringsweep map {target}")
@@ -92,11 +92,6 @@ def _draw(figure: Callable[[], Any], picture: Path, command: str) -> None:
         reason = error.problem if isinstance(error, InputError) else error
         logger.warning("%s is not drawn: %s (draw one with %s)", picture, reason, command)
         logger.debug("where the picture failed", exc_info=True)
-
-
-def _is_newer(one: Path, other: Path) -> bool:
-    """Whether a file exists and is not older than another."""
-    return one.exists() and one.stat().st_mtime >= other.stat().st_mtime
 
 
 def _silence_dask() -> None:

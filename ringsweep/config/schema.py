@@ -61,7 +61,9 @@ def schema() -> dict[str, Any]:
             "friction.at_rest": _at_rest(),
             "friction.v": _list(_number(TABLES["friction"]["v"])),
             "friction.file": _text("CSV file with columns v (m/s), mu"),
-            "drive.law": _drives(),
+            "drive.law": _names(
+                DRIVES, "how the ring is driven", {FORMULA_DRIVE: "A formula of the time, under theta"}
+            ),
             "initial.from": _text("result file of the run on the belt that goes on"),
             "drive.file": _text("CSV file with columns t (s), theta (rad)"),
             "force.file": _text("CSV file with columns t (s), force (N)"),
@@ -99,26 +101,18 @@ def _number(parameter: Parameter) -> dict[str, Any]:
     return {"description": about, "anyOf": [bounds, {"type": "string"}]}
 
 
-def _names(registry: Mapping[str, Any], about: str) -> dict[str, Any]:
-    choices = [{"const": name, "description": _first_line(entry)} for name, entry in registry.items()]
-    return {"description": about, "type": "string", "oneOf": choices}
+def _names(registry: Mapping[str, Any], about: str, more: Mapping[str, str] | None = None) -> dict[str, Any]:
+    """Names of a registry, and further ones with their meanings."""
+    meanings = {name: _first_line(entry) for name, entry in registry.items()} | dict(more or {})
+    return {"description": about, "type": "string", "oneOf": _constants(meanings)}
 
 
 def _laws(about: str) -> dict[str, Any]:
     """Names of friction laws: those of the package, `formula`, `table`, and names that a user gives."""
-    known = _names(LAWS, about)
-    known["oneOf"] += [
-        {"const": FORMULA, "description": "A formula of the sliding speed, under mu"},
-        {"const": TABLE_LAW, "description": "Measured friction: a file, or lists v and mu"},
-    ]
+    formula, table = "A formula of the sliding speed, under mu", "Measured friction: a file, or lists v and mu"
+    known = _names(LAWS, about, {FORMULA: formula, TABLE_LAW: table})
     own = {"description": "a law of the section laws, or of the Python session", "minLength": 1}
     return {"description": about, "type": "string", "anyOf": [*known["oneOf"], own]}
-
-
-def _drives() -> dict[str, Any]:
-    found = _names(DRIVES, "how the ring is driven")
-    found["oneOf"].append({"const": FORMULA_DRIVE, "description": "A formula of the time, under theta"})
-    return found
 
 
 _VALUE, _TEXT, _FLAG = {"type": ["number", "string"]}, {"type": "string"}, {"type": "boolean"}

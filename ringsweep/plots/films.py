@@ -8,6 +8,7 @@ import json
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -125,9 +126,10 @@ def save_animation(
     """
     check_animation(path)
     film = _Film(ds, fps, duration)
+    writers: dict[str, Any] = {".mp4": partial(FFMpegWriter, codec="h264"), ".gif": _GifWriter, ".html": _HtmlWriter}
     bar = progress_bar(len(film.states["time"]), progress, unit="frame")
     with replacing(path) as temporary, film.fixed_background(), bar:
-        writer = _writer(Path(path).suffix.lower(), fps)
+        writer = writers[Path(path).suffix.lower()](fps=fps)
         film.animation().save(temporary, writer=writer, dpi=_DPI, progress_callback=lambda *_: bar.update())
 
 
@@ -334,9 +336,3 @@ class _HtmlWriter(_PaletteWriter):
         for name, value in values.items():
             page = page.replace(f"{{{name}}}", str(value))
         Path(self.outfile).write_text(page, encoding="utf-8")
-
-
-def _writer(suffix: str, fps: Any) -> AbstractMovieWriter:
-    if suffix == ".mp4":
-        return FFMpegWriter(fps=fps, codec="h264")
-    return _GifWriter(fps=fps) if suffix == ".gif" else _HtmlWriter(fps=fps)
