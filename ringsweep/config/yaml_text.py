@@ -106,34 +106,34 @@ class Document:
         except InputError as error:
             raise InputError(path, f"{file} {error.problem}") from None
         rows = csv.reader(io.StringIO(text, newline=""), strict=True)
+
+        def wrong(problem: str) -> InputError:
+            return InputError(path, problem, file=str(file), line=rows.line_num or None)
+
         try:
             header = next(rows, [])
             if len(header) == 1 and (mark := next((mark for mark in ";\t|" if mark in header[0]), None)):
-                problem = f"the columns are separated by {mark!r}: separate them by commas"
-                raise InputError(path, problem, file=str(file), line=1)
+                raise wrong(f"the columns are separated by {mark!r}: separate them by commas")
             columns: dict[str, tuple[str, list[Any]]] = {}
             for cell in header:
                 name, unit = name_and_unit(cell)
                 if not name or name in columns:
-                    raise InputError(
-                        path, f"column {show(cell)} has no name, or the name of another column", file=str(file), line=1
-                    )
+                    raise wrong(f"column {show(cell)} has no name, or the name of another column")
                 columns[name] = unit, []
             if not columns:
-                raise InputError(path, "the file is empty", file=str(file))
+                raise wrong("the file is empty")
             count = 0
             for row in rows:
                 if not any(cell.strip() for cell in row):
                     continue
                 if len(row) != len(columns):
-                    problem = f"{len(row)} values under {len(columns)} columns"
-                    raise InputError(path, problem, file=str(file), line=rows.line_num)
+                    raise wrong(f"{len(row)} values under {len(columns)} columns")
                 for (column, (unit, cells)), cell in zip(columns.items(), row, strict=True):
                     cells.append(scalar(f"{cell.strip()} {unit}".strip()))
                     self.locations[f"{section}.{column}.{count}"] = str(file), rows.line_num
                 count += 1
         except csv.Error as error:
-            raise InputError(path, f"not a CSV file: {error}", file=str(file), line=rows.line_num) from None
+            raise wrong(f"not a CSV file: {error}") from None
         for column in columns:
             self.locations[f"{section}.{column}"] = str(file), 1
         return {column: cells for column, (_, cells) in columns.items()}

@@ -93,9 +93,8 @@ _SHORT_NAMES = {
     "friction_force": "friction force",
 }
 
-_LEGEND = {"omega": "body", "ring_omega": "ring", "normal_1": "contact 1", "normal_2": "contact 2"}
-_LEGEND |= {"gap_1": "contact 1", "gap_2": "contact 2"}
-_LEGEND |= {"velocity": "body", "belt_velocity": "belt"}
+_LEGEND = {"omega": "body", "ring_omega": "ring", "velocity": "body", "belt_velocity": "belt"}
+_LEGEND |= {f"{name}_{k}": f"contact {k}" for name in ("normal", "gap") for k in (1, 2)}
 
 
 def history(ds: xr.Dataset) -> Figure:
