@@ -62,10 +62,14 @@ def draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
     curves = None
     if arguments.boundaries is not None:
         from ringsweep.runs.boundaries import boundary, run_at
+        from ringsweep.runs.executors import Execution
+        from ringsweep.runs.sampled import nominal
+        from ringsweep.runs.sweep import compute
 
         tolerance = 1e-6 if arguments.tolerance is None else arguments.tolerance
         sampled = is_sampled(result)
-        located = _at_medians(result) if sampled else result
+        # Of a sampled sweep the one in which every uncertain parameter has its median.
+        located = compute(nominal(result), Execution(progress=False)) if sampled else result
         held = {name: value for name, value in selection.items() if name != "word" or not sampled}
         located, missing = select_grid(located, held)
         if missing:
@@ -89,15 +93,6 @@ def draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
         save(panel(plots.multiplier_circle, select(result, selection)[0], x=arguments.x), target)
     else:
         save(plots.regime_map(result, *chosen, curves, norm="log" if arguments.log else None), target)
-
-
-def _at_medians(result: Any) -> Any:
-    """The sweep of a sampled one in which every uncertain parameter has its median."""
-    from ringsweep.runs.executors import Execution
-    from ringsweep.runs.sampled import nominal
-    from ringsweep.runs.sweep import compute
-
-    return compute(nominal(result), Execution(progress=False))
 
 
 def _name_part(held: str) -> str:
