@@ -513,8 +513,8 @@ def compare(kind, batch, data, count):
         count.tally[state] += 1
         count.tally["certified" if certified else "uncertified"] += 1
         if kind.impact and scene["impact"]["restitution"] <= SELDOM_GAINS:
-            count.tally["dissipative"] += 1
-            count.tally["dissipative, uncertified"] += not certified
+            count.tally["moderate restitution"] += 1
+            count.tally["moderate restitution, uncertified"] += not certified
         if state != "clear" or not certified:
             if count.verbose and state == "unresolved":
                 count.list_scene("unresolved", scene, verdict.why, "")
@@ -637,14 +637,14 @@ def main():
     _common.table(END_HEADER, end_rows(total.ends))
     cost = ", ".join(f"{name} {seconds:.0f} s" for name, seconds in total.seconds.items())
     print(f"CPU of all cores: {cost} (compilation included), seed {arguments.seed}")
-    moderate = f"Uncertified with restitution up to {SELDOM_GAINS}: {dissipative(total.tally)}"
-    if total.tally["dissipative"]:
+    moderate = f"Uncertified with restitution up to {SELDOM_GAINS}: {at_moderate_restitution(total.tally)}"
+    if total.tally["moderate restitution"]:
         print(moderate)
     if len(chosen) == 1 or not arguments.families:
         text = f"Seed {arguments.seed}; {cost}.\n\n{_common.markdown(HEADER, rows)}"
         text += "\n## Certified ends, and what a body on compliant contacts says of them\n\n"
         text += _common.markdown(END_HEADER, end_rows(total.ends))
-        text += f"\n{moderate}.\n" if total.tally["dissipative"] else ""
+        text += f"\n{moderate}.\n" if total.tally["moderate restitution"] else ""
         title = "Certified answers against an independent reference"
         name = "brute_force" if len(chosen) > 1 else f"brute_force_{next(iter(chosen)).replace(' ', '_')}"
         _common.publish(arguments, name, title, heading, text, figures(counts, total))
@@ -660,9 +660,9 @@ TITLES = {
 SUMMARY = ["family", "runs", "certified", "contradicted", "off", "uncertified", "ambiguous", "unresolved"]
 
 
-def dissipative(tally):
+def at_moderate_restitution(tally):
     """How many runs are uncertified of those in which few impacts gain energy."""
-    runs, uncertified = tally["dissipative"], tally["dissipative, uncertified"]
+    runs, uncertified = tally["moderate restitution"], tally["moderate restitution, uncertified"]
     return f"{uncertified} of {runs} ({100.0 * uncertified / max(runs, 1):.1f} %)"
 
 
@@ -688,7 +688,7 @@ def figures(counts, total):
         "contradictions": str(total.tally["contradicted"]),
         "ends_asked": str(sum(ends.values())),
         **{f"ends_{word.replace(' ', '_')}": str(ends[word]) for word in OPINIONS},
-        **({"dissipative": dissipative(total.tally)} if counts.keys() == {"impact"} else {}),
+        **({"moderate_restitution": at_moderate_restitution(total.tally)} if counts.keys() == {"impact"} else {}),
     }
 
 
