@@ -26,10 +26,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from benchmarks.reference.aftermath import AFTERMATH, follow
+from benchmarks.reference.aftermath import follow
 from benchmarks.reference.physics import JAMMED, OPEN_1, OPEN_2, OPEN_BOTH, SEVERAL
 from benchmarks.reference.problem import problem
-from benchmarks.reference.run import RESULT, UNRESOLVED, run
+from benchmarks.reference.run import UNRESOLVED, run
 
 TIGHT, LOOSE, SHIFT = 1e-9, 1e-7, 1e-6
 MOST_STEPS = 60_000
@@ -76,7 +76,7 @@ def _kind(found):
     motion = "revolving" if found["turned"] else "oscillatory" if found["reversals"] else "resting"
     end = found["end"]
     if end in (OPEN_1, OPEN_2, OPEN_BOTH):
-        return "separating", motion, end - OPEN_1 + 1
+        return "separating", motion, int(end - OPEN_1) + 1
     return ("jammed" if end in (JAMMED, SEVERAL) else motion), motion, 0
 
 
@@ -98,8 +98,8 @@ def go_on(scene, rtol=TIGHT, shift=0.0, keep=0):
     p = p._replace(restitution=min(1.0, p.restitution * (1.0 + shift)))
     exchanged = p._replace(offset=-p.offset, xi=p.xi - 2.0 * p.offset)
     log = np.zeros((keep, 5))
-    found = dict(zip(AFTERMATH, follow(p, exchanged, rtol, REST[rtol], MOST_STEPS, log), strict=True))
-    return found, log[: int(found["events"])]
+    found = follow(p, exchanged, rtol, REST[rtol], MOST_STEPS, log)
+    return found, log[: found["events"]]
 
 
 def word(found, single):
@@ -116,7 +116,7 @@ def judge(scene):
     belt, forced = scene["model"] == "belt", "force" in scene
     runs, most_steps, wider = [], MOST_STEPS * (20 if forced else 1), 100.0 if forced else 1.0
     for rtol, shift in VARIATIONS[: 2 if belt else 4]:
-        found = dict(zip(RESULT, run(problem(scene, 1.0 + shift), wider * rtol, shift, shift, most_steps), strict=True))
+        found = run(problem(scene, 1.0 + shift), wider * rtol, shift, shift, most_steps)
         runs.append(found)
         if found["end"] == UNRESOLVED:
             why = f"stopped at {found['t_end']:.6g} s after {found['steps']} steps and {found['events']} events"
@@ -126,7 +126,7 @@ def judge(scene):
     first, second = runs[:2]
     if forced and not abs(first["position"] - second["position"]) < 1e-8:
         # Errors may grow over hundreds of periods.
-        third = dict(zip(RESULT, run(problem(scene), TIGHT, 0.0, 0.0, most_steps), strict=True))
+        third = run(problem(scene), TIGHT, 0.0, 0.0, most_steps)
         if third["end"] != UNRESOLVED:
             first, second = third, first
     numbers, other = _numbers(first, belt), _numbers(second, belt)

@@ -12,9 +12,9 @@ than that stays closed.
 import math
 
 import numpy as np
-from numba import njit
 
 from benchmarks.reference import free
+from benchmarks.reference.compiled import copy, inner, kernel
 from benchmarks.reference.physics import (
     BACKWARD,
     CLOSED,
@@ -42,16 +42,28 @@ from benchmarks.reference.physics import (
 )
 from benchmarks.reference.problem import JUMP, POWER, SINGLE, SINUSOIDAL, TABLE
 from benchmarks.reference.radau import NODES, attempt, interpolate, jacobian
-from benchmarks.reference.run import EARLIEST, HELD, SAMPLES, UNRESOLVED, advance, run
+from benchmarks.reference.run import ANY, EARLIEST, HELD, RESULT, SAMPLES, UNRESOLVED, advance, run
 
-#: Return values of :func:`follow`, in this order. `tumbles` counts changes of order between instants at which both
-#: contacts touch; `passages` counts how often the rod passes over the axis.
-AFTERMATH = (
-    "end", "t_end", "position", "speed", "open_time", "flight_time", "gap_max", "separations", "impacts",
-    "impact_speed_max", "impulse_max", "impact_loss", "passages", "tumbles", "t_recovered", "closed", "steps", "events",
+#: What a run carries along. `closed` are the contacts that hold, `v` is the sliding velocity of the slower one of them,
+#: `order` the sign of :func:`order`, `order_closed` the same when both contacts touched last. `passages` counts how
+#: often the rod passes over the axis, `tumbles` changes of order between instants at which both contacts touch, `turns`
+#: those of the last impact. `event` is what the next contact problem comes after, `first` when a contact is first lost.
+#: A contact `lifts` from the loss of the first one up to the next impact. A body has `settled` if its last impact was
+#: plastic.
+STATE = np.dtype(
+    [(name, float) for name in (
+        "t_end", "v", "open_time", "flight_time", "gap_max", "impact_speed_max", "impulse_max", "impact_loss",
+        "t_recovered", "first", "order", "order_closed",
+    )]
+    + [(name, int) for name in (
+        "end", "closed", "separations", "impacts", "passages", "tumbles", "turns", "steps", "events", "event", "lifts",
+        "settled",
+    )]
 )  # fmt: skip
 #: Kinds of events in a log, whose rows are (time, kind, contact, speed, impulse).
-LOSS, HIT = 1, 2
+LOSS, HIT = np.array([1, 2])
+#: What else a contact problem may come after.
+NOTHING, BREAKAWAY = np.array([0, 3])
 #: Results of a pivot, beside the ends of a run: the other contact closes, or the closed contact opens.
 MEETS, LOSES = 11, 12
 #: A gap below this share of the radius, times angles, has closed: rounding leaves less.
@@ -74,21 +86,21 @@ ROW = 10.0
 _N, _A, _GAP, _SLOWER, _FASTER, _LOW, _HIGH, _STICK, _COUNT = range(9)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def order(p, q):
     """Sine of the angle from ball 1 to ball 2 seen from the axis; it changes its sign in a tumble."""
-    _, ux, uy, _, _ = free.ball(p, q, 1)
-    _, wx, wy, _, _ = free.ball(p, q, 2)
+    _, ux, uy, _, _ = free.ball(p, q, ONLY_1)
+    _, wx, wy, _, _ = free.ball(p, q, ONLY_2)
     return ux * wy - uy * wx
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def touch(p, t, q):
     """Gap that counts as closed: rounding leaves less."""
     return TOUCH * p.radius * (1.0 + abs(q[2]) + abs(drive(p, t)[0]))
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def place_of(p, closed, t, y):
     """Segment of the closed contact; on an edge the one that it moves into."""
     x, ring_omega = y[0], drive(p, t)[1]
@@ -97,7 +109,7 @@ def place_of(p, closed, t, y):
     return k - 1 if onward < 0.0 and x - bound(p, k) < 2e-14 else k
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def other_gap(p, closed, t, q, N, T):
     """Acceleration of the gap of the open contact."""
     epsilon = drive(p, t)[2]
@@ -105,14 +117,14 @@ def other_gap(p, closed, t, q, N, T):
     return free.acceleration(p, q, epsilon, fx, fy, moment, 3 - closed)[0]
 
 
-@njit(cache=True, error_model="numpy")
-def pivot_problem(p, closed, k, piece, t, y, opens, breaks=False):
+@inner
+def pivot_problem(p, closed, k, piece, t, y, event):
     """Contact problem of a body on one contact: the piece of slip, STICK, LOSES or JAMMED (above 5).
 
-    With `opens` the other contact has just been lost: its gap must open by its acceleration, which is zero where a
-    reaction has reached zero. With `breaks` friction has reached its limit, and the body does not stick.
+    The `event` is what has just happened. After a LOSS the gap of the other contact must open by its acceleration,
+    which is zero where a reaction has reached zero. After BREAKAWAY the body does not stick.
     """
-    q, shut = np.empty(6), -1e-6 * p.gravity
+    q, shut, opens = np.empty(6), -1e-6 * p.gravity, event == LOSS
     if not (is_set_valued(p) and y[2] == 0.0):
         N, _, _, _, _, A = on_one(p, closed, k, piece, t, y, q)
         if not A > LEAST_A:
@@ -120,7 +132,7 @@ def pivot_problem(p, closed, k, piece, t, y, opens, breaks=False):
         return LOSES if N <= 0.0 else STICK
     N, T, _, _, _, _ = on_one(p, closed, k, STICK, t, y, q)
     limit = p.mu_s[k % p.edges.size] * N
-    if not breaks and N > 0.0 and abs(T) <= limit and not (opens and other_gap(p, closed, t, q, N, T) < shut):
+    if event != BREAKAWAY and N > 0.0 and abs(T) <= limit and not (opens and other_gap(p, closed, t, q, N, T) < shut):
         return STICK
     found = JAMMED
     for sense in (FORWARD, BACKWARD):
@@ -137,13 +149,13 @@ def pivot_problem(p, closed, k, piece, t, y, opens, breaks=False):
     return found
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def rises(p, k, piece, v):
     """Whether friction rises with the speed of sliding. Then no contact jams, however small A may become."""
     return abs(friction(p, k, piece, 1.000001 * v, 0.0)[0]) > abs(friction(p, k, piece, v, 0.0)[0])
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def pivot_guard(p, closed, k, piece, t, y, g, q):
     """Write to g the guards of a body on one contact, which must stay positive."""
     N, T, _, _, _, A = on_one(p, closed, k, piece, t, y, q)
@@ -167,49 +179,84 @@ def pivot_guard(p, closed, k, piece, t, y, g, q):
         g[_FASTER] = high - speed + 1e-12 * high
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def pivot_root(p, closed, k, piece, t, h, y, Z, low, high, which, g, y_, q):
-    """Share of a step, between two shares, at which a guard (any guard if `which` is negative) reaches zero."""
-    y_[:] = y
+    """Share of a step, between two shares, at which a guard (or `ANY`) reaches zero."""
+    copy(y, y_)
     for _ in range(60):
         middle = 0.5 * (low + high)
         if not low < middle < high:
             break
         interpolate(y, Z, middle, 4, y_)
         pivot_guard(p, closed, k, piece, t + middle * h, y_, g, q)
-        if (g[which] if which >= 0 else g.min()) <= 0.0:
+        if (g.min() if which == ANY else g[which]) <= 0.0:
             high = middle
         else:
             low = middle
     return high
 
 
-@njit(cache=True, error_model="numpy")
-def watch(p, i, q, seen, found):
+@inner
+def watch(p, i, q, seen, s):
     """Track the greatest gap of contact i (`seen` holds its last two values) and the passages of the rod."""
     gap = free.contact(p, q, 0.0, i)[0]
     older, last = seen[2 * i - 2], seen[2 * i - 1]
-    found[0] = max(found[0], gap)
+    s.gap_max = max(s.gap_max, gap)
     bend = older - 2.0 * last + gap
     if last > older and last > gap and bend < 0.0:
-        found[0] = max(found[0], last - 0.125 * (gap - older) ** 2 / bend)
+        s.gap_max = max(s.gap_max, last - 0.125 * (gap - older) ** 2 / bend)
     seen[2 * i - 2], seen[2 * i - 1] = last, gap
     if p.model != SINGLE:
         side = order(p, q)
-        if side * found[2] < 0.0:
-            found[1] += 1.0
+        if side * s.order < 0.0:
+            s.passages += 1
         if side != 0.0:
-            found[2] = side
+            s.order = math.copysign(1.0, side)
 
 
-@njit(cache=True, error_model="numpy")
-def turn(p, closed, rtol, most_steps, t, y, opens, found):
-    """Run a body that pivots on one contact; y is overwritten.
+@inner
+def arrive(p, s, q, since, greatest):
+    """Count the time for which a contact was open, and what its end means for the impact before."""
+    s.open_time += s.t_end - since
+    if s.end == MEETS and s.lifts and s.gap_max <= touch(p, s.t_end, q):
+        # A contact that is lost, and hits before its gap is resolved, hits with another speed than it seems.
+        s.end = UNRESOLVED
+    if s.end == JAMMED and s.t_end == since:
+        # A body that jams as soon as it hits has not got through its impact.
+        s.tumbles -= s.turns
+    s.event, s.gap_max = NOTHING, max(s.gap_max, greatest)
 
-    Returns the end (MEETS, LOSES, JAMMED, HELD at the end of the span, UNRESOLVED), its time, and the steps.
+
+@inner
+def mount(p, s, q):
+    """State of a body that pivots on one contact, from its motion."""
+    t = s.t_end
+    theta, ring_omega, ring_epsilon = drive(p, t)
+    _, ux, uy, _, _ = free.ball(p, q, s.closed)
+    y = np.array([math.atan2(ux, -uy) - theta, q[2], s.v, q[5]])
+    at_launch = p.drive == POWER and p.exponent < 2.0 and t == s.first and (p.at_rest or p.speed == 0.0)
+    if at_launch and (t <= EARLIEST or (s.v == 0.0 and t <= 1e-10)):
+        # A ring with infinite acceleration takes along what is wedged on one contact: stick goes before slip.
+        y[2] = 0.0
+        k = place_of(p, s.closed, t, y)
+        if pivot_problem(p, s.closed, k, STICK, t, y, LOSS) == STICK:
+            # From rest, velocities are in proportion to the accelerations.
+            epsilon = on_one(p, s.closed, k, STICK, t, y, np.empty(6))[3]
+            y[3] = epsilon / ring_epsilon * ring_omega
+        else:
+            y[2] = s.v
+    return y
+
+
+@kernel
+def turn(p, rtol, most_steps, s, q):
+    """Run a body that pivots on one contact.
+
+    The end is MEETS, LOSES, JAMMED, HELD at the end of the span, or UNRESOLVED.
     """
-    set_valued, span = is_set_valued(p), p.span
-    y_, f, q, g = np.zeros(4), np.zeros(4), np.zeros(6), np.zeros(_COUNT)
+    closed, t, y, since, greatest, s.gap_max = s.closed, s.t_end, mount(p, s, q), s.t_end, s.gap_max, 0.0
+    set_valued, span, n = is_set_valued(p), p.span, 4
+    y_, f, q_, g = np.zeros(4), np.zeros(4), np.zeros(6), np.zeros(_COUNT)
     Z, Z_, previous = np.zeros((3, 4)), np.zeros((3, 4)), np.zeros(4)
     J, A, order_, b, work = np.zeros((4, 4)), np.zeros((12, 12)), np.zeros(12, np.int64), np.zeros(12), np.zeros((4, 4))
     G, scale, seen = np.zeros((SAMPLES + 2, _COUNT)), np.ones(4), np.full(4, math.nan)
@@ -220,19 +267,22 @@ def turn(p, closed, rtol, most_steps, t, y, opens, found):
             slow = min(slow, v)
     k = place_of(p, closed, t, y)
     piece = piece_of(p, y[2])
-    mode = pivot_problem(p, closed, k, piece, t, y, opens)
+    mode = pivot_problem(p, closed, k, piece, t, y, s.event)
     if set_valued and y[2] == 0.0:
         piece = mode
     if mode > FORWARD:
-        return mode, t, 0
+        s.end = mode
+        arrive(p, s, q, since, greatest)
+        return
     # A small hop is over soon.
-    N, T, _, _, _, _ = on_one(p, closed, k, piece, t, y, q)
-    _, rate, _ = free.contact(p, q, 0.0, 3 - closed)
-    hop = 2.0 * max(rate, 0.0) / max(abs(other_gap(p, closed, t, q, N, T)), 1e-300)
-    h, before, steps = 1e-6 if rate <= 0.0 else max(min(1e-4, 0.3 * hop), 1e-12), 0.0, 0
+    N, T, _, _, _, _ = on_one(p, closed, k, piece, t, y, q_)
+    _, rate, _ = free.contact(p, q_, 0.0, 3 - closed)
+    hop = 2.0 * max(rate, 0.0) / max(abs(other_gap(p, closed, t, q_, N, T)), 1e-300)
+    h, before, begin, s.end = 1e-6 if rate <= 0.0 else max(min(1e-4, 0.3 * hop), 1e-12), 0.0, s.steps, HELD
     while t < span:
-        if steps > most_steps:
-            return UNRESOLVED, t, steps
+        if s.steps - begin > most_steps:
+            s.end = UNRESOLVED
+            break
         longest = min(span / 20.0, 0.1 * min(math.sqrt(p.radius / p.gravity), 1.0 / max(abs(y[3]), 1e-3)))
         if p.drive == SINUSOIDAL:
             longest = min(longest, 0.05 / p.frequency)
@@ -245,7 +295,7 @@ def turn(p, closed, rtol, most_steps, t, y, opens, found):
         scale[2] = abs(y[2]) + slow
         scale[3] = abs(y[3]) + 0.1 * math.sqrt(p.gravity / p.radius)
         rates(p, closed, k, k, piece, t, y, f)
-        jacobian(p, closed, k, k, piece, t, y, f, scale, 4, J, work)
+        jacobian(p, closed, k, k, piece, t, y, f, scale, n, J, work)
         error = math.inf
         while True:
             h = min(h, longest)
@@ -254,21 +304,23 @@ def turn(p, closed, rtol, most_steps, t, y, opens, found):
             for i in range(3):
                 Z_[i] = 0.0
                 if before > 0.0:
-                    interpolate(previous, Z, 1.0 + NODES[i] * step / before, 4, y_)
-                    Z_[i] = y_ - y
-            error = attempt(p, closed, k, k, piece, t, step, y, f, J, scale, rtol, 4, Z_, A, order_, b, work)
-            steps += 1
-            if error <= 1.0 or step < 1e-17 or steps > most_steps:
+                    interpolate(previous, Z, 1.0 + NODES[i] * step / before, n, Z_[i])
+                    for j in range(n):
+                        Z_[i, j] -= y[j]
+            error = attempt(p, closed, k, k, piece, t, step, y, f, J, scale, rtol, n, Z_, A, order_, b, work)
+            s.steps += 1
+            if error <= 1.0 or step < 1e-17 or s.steps - begin > most_steps:
                 break
             before = 0.0
             h = step * (0.1 if error == math.inf else max(0.1, 0.9 * error**-0.25))
         if not error <= 1.0:
-            return (JAMMED if step < 1e-17 and not rises(p, k, piece, y[2]) else UNRESOLVED), t, steps
+            s.end = JAMMED if step < 1e-17 and not rises(p, k, piece, y[2]) else UNRESOLVED
+            break
         hit, at = -1, 1.0
         for i in range(SAMPLES + 2):
             x = i / SAMPLES
-            interpolate(y, Z_, x, 4, y_)
-            pivot_guard(p, closed, k, piece, t + x * step, y_, G[i], q)
+            interpolate(y, Z_, x, n, y_)
+            pivot_guard(p, closed, k, piece, t + x * step, y_, G[i], q_)
             if i >= 2:
                 for c in (_N, _A, _GAP, _SLOWER, _STICK):
                     a0, a1, a2 = G[i - 2, c], G[i - 1, c], G[i, c]
@@ -276,30 +328,30 @@ def turn(p, closed, rtol, most_steps, t, y, opens, found):
                         bend = a0 - 2.0 * a1 + a2
                         if a1 - 0.125 * (a2 - a0) ** 2 / bend <= 0.0:
                             x0 = x + (-1.0 - 0.5 * (a2 - a0) / bend) / SAMPLES
-                            interpolate(y, Z_, x0, 4, y_)
-                            pivot_guard(p, closed, k, piece, t + x0 * step, y_, g, q)
+                            interpolate(y, Z_, x0, n, y_)
+                            pivot_guard(p, closed, k, piece, t + x0 * step, y_, g, q_)
                             if g[c] <= 0.0 and x0 <= 1.0:
                                 at = pivot_root(
-                                    p, closed, k, piece, t, step, y, Z_, x0 - 1.0 / SAMPLES, x0, c, g, y_, q
+                                    p, closed, k, piece, t, step, y, Z_, x0 - 1.0 / SAMPLES, x0, c, g, y_, q_
                                 )
                                 hit = c
             if hit >= 0 or i > SAMPLES:
                 break
             if i > 0 and G[i].min() <= 0.0:
-                at = pivot_root(p, closed, k, piece, t, step, y, Z_, (i - 1) / SAMPLES, x, -1, g, y_, q)
-                interpolate(y, Z_, at, 4, y_)
-                pivot_guard(p, closed, k, piece, t + at * step, y_, g, q)
+                at = pivot_root(p, closed, k, piece, t, step, y, Z_, (i - 1) / SAMPLES, x, ANY, g, y_, q_)
+                interpolate(y, Z_, at, n, y_)
+                pivot_guard(p, closed, k, piece, t + at * step, y_, g, q_)
                 hit = np.argmin(g > 0.0)
                 break
             if i > 0:
-                watch(p, 3 - closed, q, seen, found)
+                watch(p, 3 - closed, q_, seen, s)
         if hit < 0:
-            previous[:] = y
-            interpolate(y, Z_, 1.0, 4, y_)
-            y[:] = y_
+            copy(y, previous)
+            interpolate(y, Z_, 1.0, n, y_)
+            copy(y_, y)
             if piece == STICK:
                 y[2] = 0.0
-            Z[:], before = Z_, step
+            Z, Z_, before = Z_, Z, step
             t = limit if last else t + step
             h = step * min(4.0, max(0.3, 0.9 * max(error, 1e-12) ** -0.25)) if not last else h
             continue
@@ -309,39 +361,43 @@ def turn(p, closed, rtol, most_steps, t, y, opens, found):
             if part <= 1e-16 * t:
                 break
             for i in range(3):
-                interpolate(y, Z_, NODES[i] * part / step, 4, y_)
-                Z[i] = y_ - y
-            if attempt(p, closed, k, k, piece, t, part, y, f, J, scale, rtol, 4, Z, A, order_, b, work) == math.inf:
+                interpolate(y, Z_, NODES[i] * part / step, n, Z[i])
+                for j in range(n):
+                    Z[i, j] -= y[j]
+            if attempt(p, closed, k, k, piece, t, part, y, f, J, scale, rtol, n, Z, A, order_, b, work) == math.inf:
                 break
-            Z_[:], step = Z, part
-            interpolate(y, Z_, 1.1, 4, y_)
-            pivot_guard(p, closed, k, piece, t + 1.1 * step, y_, g, q)
+            Z, Z_, step = Z_, Z, part
+            interpolate(y, Z_, 1.1, n, y_)
+            pivot_guard(p, closed, k, piece, t + 1.1 * step, y_, g, q_)
             beyond = g[hit]
-            interpolate(y, Z_, 0.9, 4, y_)
-            pivot_guard(p, closed, k, piece, t + 0.9 * step, y_, g, q)
+            interpolate(y, Z_, 0.9, n, y_)
+            pivot_guard(p, closed, k, piece, t + 0.9 * step, y_, g, q_)
             if not (beyond <= 0.0 < g[hit]):
                 break
-            at = pivot_root(p, closed, k, piece, t, step, y, Z_, 0.9, 1.1, hit, g, y_, q)
+            at = pivot_root(p, closed, k, piece, t, step, y, Z_, 0.9, 1.1, hit, g, y_, q_)
             part = at * step
-        interpolate(y, Z_, part / step, 4, y_)
-        y[:] = y_
+        interpolate(y, Z_, part / step, n, y_)
+        copy(y_, y)
         t += part
         before, h = 0.0, max(min(h, part), 1e-9)
         if piece == STICK:
             y[2] = 0.0
         if hit == _GAP:
-            return MEETS, t, steps
+            s.end = MEETS
+            break
         if hit == _N:
-            return LOSES, t, steps
+            s.end = LOSES
+            break
         if hit == _A:
-            return (UNRESOLVED if rises(p, k, piece, y[2]) else JAMMED), t, steps
+            s.end = UNRESOLVED if rises(p, k, piece, y[2]) else JAMMED
+            break
         if hit in (_LOW, _HIGH):
             k += 1 if hit == _HIGH else -1
         elif hit == _STICK:
             # Friction at its limit: the contact slides against it.
-            T = on_one(p, closed, k, STICK, t, y, q)[1]
+            T = on_one(p, closed, k, STICK, t, y, q_)[1]
             piece = BACKWARD if T > 0.0 else FORWARD
-            N, _, slide, _, _, A_ii = on_one(p, closed, k, piece, t, y, q)
+            N, _, slide, _, _, A_ii = on_one(p, closed, k, piece, t, y, q_)
             if N > 0.0 and piece * slide > -1e-6 * p.gravity and A_ii > LEAST_A:
                 continue
         elif hit == _FASTER:
@@ -357,15 +413,19 @@ def turn(p, closed, rtol, most_steps, t, y, opens, found):
         else:
             piece = -1 if piece > 0 else 1
             continue
-        mode = pivot_problem(p, closed, k, piece, t, y, False, hit == _STICK)
+        mode = pivot_problem(p, closed, k, piece, t, y, BREAKAWAY if hit == _STICK else NOTHING)
         if mode > FORWARD:
-            return mode, t, steps
+            s.end = mode
+            break
         if set_valued and y[2] == 0.0:
             piece = mode
-    return HELD, t, steps
+    s.t_end = t
+    theta, ring_omega, _ = drive(p, t)
+    free.pivot(p, closed, theta, ring_omega, y, q)
+    arrive(p, s, q, since, greatest)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def fall(p, t, q, s, out):
     """Write to `out` the motion of a body that has flown for a time s."""
     out[0], out[1] = q[0] + q[3] * s, q[1] + (q[4] - 0.5 * p.gravity * s) * s
@@ -373,32 +433,33 @@ def fall(p, t, q, s, out):
     out[3], out[4], out[5] = q[3], q[4] - p.gravity * s, q[5]
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def least_gap(p, q):
     """Lesser gap of both contacts."""
-    gap = free.contact(p, q, 0.0, 1)[0]
-    return gap if p.model == SINGLE else min(gap, free.contact(p, q, 0.0, 2)[0])
+    gap = free.contact(p, q, 0.0, ONLY_1)[0]
+    return gap if p.model == SINGLE else min(gap, free.contact(p, q, 0.0, ONLY_2)[0])
 
 
-@njit(cache=True, error_model="numpy")
-def fly(p, t, q, found):
-    """Fly up to an impact or to the end of the span; q is overwritten. Returns whether it hits, and the time."""
+@kernel
+def fly(p, s, q):
+    """Fly up to an impact, or to the end of the span."""
+    t, greatest, s.gap_max = s.t_end, s.gap_max, 0.0
     now, seen, closed = np.empty(6), np.full(4, math.nan), touch(p, t, q)
     # A gap that opens by its acceleration alone is open only after a while; a hop of a body is over soon.
-    s, older, last, ds = 0.0, 0.0, 0.0, 1e-9
+    flown, older, last, ds = 0.0, 0.0, 0.0, 1e-9
     angle = math.atan2(q[0], -q[1])
     while True:
-        fall(p, t, q, s, now)
+        fall(p, t, q, flown, now)
         speed = math.hypot(now[3], now[4]) + abs(now[5]) * (p.half_distance + p.offset)
         longest = 0.005 * min(math.sqrt(p.radius / p.gravity), p.radius / max(speed, 1e-9))
         # From a contact on, samples are dense at first.
-        ds = min(longest, 0.05 * s + 1e-9)
-        ahead = min(s + ds, p.span - t)
+        ds = min(longest, 0.05 * flown + 1e-9)
+        ahead = min(flown + ds, p.span - t)
         fall(p, t, q, ahead, now)
         gap = least_gap(p, now) + closed
-        low, high, hits = s, ahead, gap <= 0.0
+        low, high, hits = flown, ahead, gap <= 0.0
         if not hits and last < older and last < gap and last > 0.0:
-            a, b = max(s - ds, 0.0), ahead
+            a, b = max(flown - ds, 0.0), ahead
             for _ in range(50):
                 c, d = b - 0.6180339887 * (b - a), a + 0.6180339887 * (b - a)
                 fall(p, t, q, c, now)
@@ -410,7 +471,7 @@ def fly(p, t, q, found):
                     a = c
             fall(p, t, q, a, now)
             if least_gap(p, now) + closed <= 0.0:
-                low, high, hits = max(s - ds, 0.0), a, True
+                low, high, hits = max(flown - ds, 0.0), a, True
         if hits:
             for _ in range(80):
                 middle = 0.5 * (low + high)
@@ -425,22 +486,24 @@ def fly(p, t, q, found):
         fall(p, t, q, ahead, now)
         for i in (1, 2):
             if i == 1 or p.model != SINGLE:
-                watch(p, i, now, seen, found)
+                watch(p, i, now, seen, s)
         if p.model == SINGLE:
             # The angle of a single contact is that of its place.
             polar = math.atan2(now[0], -now[1])
             q[2] += polar - angle - 2.0 * math.pi * round((polar - angle) / (2.0 * math.pi))
             angle = polar
-        older, last, s = last, gap, ahead
-        if hits or s >= p.span - t:
+        older, last, flown = last, gap, ahead
+        if hits or flown >= p.span - t:
             position = q[2]
-            q[:] = now
+            copy(now, q)
             if p.model == SINGLE:
                 q[2] = position
-            return hits, t + s if hits else p.span
+            s.end, s.t_end = (MEETS, t + flown) if hits else (HELD, p.span)
+            s.flight_time += s.t_end - t
+            arrive(p, s, q, t, greatest)
+            return
 
 
-@njit(cache=True, error_model="numpy")
 def stand(p, phi, omega, q):
     """Write to q the motion of a body on both contacts at an angle of its centre of mass, psi excepted."""
     reach = p.xi if p.model != SINGLE else p.radius
@@ -448,7 +511,160 @@ def stand(p, phi, omega, q):
     q[3], q[4], q[5] = -omega * q[1], omega * q[0], omega
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
+def note(s, log, kind, contact, speed, impulse):
+    """Count an event, and write it to the log as long as there is room."""
+    if s.events < log.shape[0]:
+        row = log[s.events]
+        row[0], row[1], row[2], row[3], row[4] = s.t_end, kind, contact, speed, impulse
+    s.events += 1
+
+
+@inner
+def meet(p, rest, s, q, touching, e, mu):
+    """Find the contacts that touch, and their restitution and friction.
+
+    Returns those that hit, and the greatest closing speed above `rest` (0 if there is none).
+    """
+    theta, ring_omega, _ = drive(p, s.t_end)
+    hitting, near, fastest, n = 0, 3.0 * touch(p, s.t_end, q), 0.0, 1 if p.model == SINGLE else 2
+    # A contact that is as near, but opens, has just hit itself: such contacts hit in turn, not at once.
+    for i in range(1, n + 1):
+        gap, rate, _ = free.contact(p, q, ring_omega, i)
+        if not s.closed & i and gap < near and rate < 0.0:
+            hitting += i
+    for i in range(1, n + 1):
+        gap, rate, _ = free.contact(p, q, ring_omega, i)
+        if (s.closed | hitting) & i or (hitting == 0 and gap < near):
+            touching[i - 1] = True
+            _, ux, uy, _, _ = free.ball(p, q, i)
+            mu[i - 1] = p.mu_k[segment(p, math.atan2(ux, -uy) - theta) % p.edges.size]
+            if hitting & i and -rate > rest:
+                fastest = max(fastest, -rate)
+                e[i - 1] = p.restitution
+    return hitting, fastest
+
+
+@inner
+def push(p, ring_omega, hitting, touching, impulse, after, s, q, log):
+    """Change the motion by the impulses of an impact, and count it."""
+    vx = vy = spin = 0.0
+    for i in range(1, 3):
+        if touching[i - 1]:
+            _, rate, slide = free.contact(p, q, ring_omega, i)
+            N, T = impulse[2 * i - 2], impulse[2 * i - 1]
+            if hitting & i:
+                s.impact_speed_max = max(s.impact_speed_max, -rate)
+                s.impacts += 1
+            s.impact_loss -= 0.5 * (N * (rate + after[2 * i - 2]) + T * (slide + after[2 * i - 1]))
+            s.impulse_max = max(s.impulse_max, N)
+            fx, fy, moment = free.load(p, q, i, N, T)
+            vx += fx / p.mass
+            vy += fy / p.mass
+            spin += moment / free.inertia(p)
+    i = ONLY_2 if hitting == ONLY_2 else ONLY_1
+    note(s, log, HIT, hitting, -free.contact(p, q, ring_omega, i)[1], impulse[2 * i - 2])
+    q[3] += vx
+    q[4] += vy
+    q[5] += spin
+
+
+@inner
+def let_go(p, slow, touching, after, s, q, log):
+    """Find the contacts that hold after an impact; if it was `slow`, those that touch."""
+    before, s.closed = s.closed, 0
+    for i in range(2, 0, -1):
+        if touching[i - 1]:
+            if after[2 * i - 2] <= 1e-13 or slow:
+                # Both slide alike, or nearly so after a slow impact, in which one may stick.
+                if s.closed == 0 or abs(after[2 * i - 1]) < abs(s.v):
+                    s.v = after[2 * i - 1]
+                s.closed += i
+            elif before & i:
+                s.separations += 1
+                note(s, log, LOSS, i, 0.0, 0.0)
+    one = s.closed in (ONLY_1, ONLY_2) and p.model != SINGLE
+    if one and free.acceleration(p, q, drive(p, s.t_end)[2], 0.0, 0.0, 0.0, s.closed)[0] > 0.0:
+        # Friction could press the contact against the race, but nothing presses it yet.
+        s.separations += 1 if before & s.closed else 0
+        s.closed = 0
+
+
+@kernel
+def bounce(p, rest, s, q, log):
+    """Impact of all contacts that touch; `s.end` changes if the run ends in it."""
+    ring_omega = drive(p, s.t_end)[1]
+    touching, e, mu = np.zeros(2, np.bool_), np.zeros(2), np.zeros(2)
+    hitting, fastest = meet(p, rest, s, q, touching, e, mu)
+    rests = hitting > 0 and fastest == 0.0
+    count, impulse, after = free.shock(p, q, ring_omega, touching, e, mu)
+    if s.settled and rest < fastest <= ROW * rest:
+        if count != 1:
+            # Whether the body jams depends on where the row of rebounds is cut off.
+            s.end = UNRESOLVED
+            return
+        e[:], rests = 0.0, True
+        count, impulse, after = free.shock(p, q, ring_omega, touching, e, mu)
+    # At the end of a row of rebounds from both contacts the body rests, if it may.
+    if count == 0 or (count > 1 and not (rests and s.settled)):
+        s.end = JAMMED
+        return
+    push(p, ring_omega, hitting, touching, impulse, after, s, q, log)
+    let_go(p, e.max() == 0.0 and max(after[0], after[2]) < rest, touching, after, s, q, log)
+    s.lifts, s.settled, s.turns = False, rests, 0
+    if touching[0] and touching[1]:
+        turned = 1.0 if order(p, q) > 0.0 else -1.0
+        s.turns = 1 if turned != s.order_closed else 0
+        s.tumbles += s.turns
+        s.order_closed = turned
+    if p.model == SINGLE:
+        q[5] = s.v / p.radius + ring_omega
+
+
+@kernel
+def resume(p, t, phi, v):
+    """Start of a run with both contacts closed, as :func:`benchmarks.reference.run.advance` takes it."""
+    y = np.array([phi - drive(p, t)[0], v, 0.0, 0.0])
+    k1, k2 = segment(p, y[0] - p.beta), segment(p, y[0] + p.beta)
+    if v < 0.0:
+        k1, k2 = lower_segments(p, k1, k2, y[0])
+    piece = piece_of(p, v)
+    if is_set_valued(p) and v == 0.0:
+        piece = mode = resting_problem(p, k1, k2, t, y[0], 0.0)
+        if mode == BACKWARD:
+            k1, k2 = lower_segments(p, k1, k2, y[0])
+    else:
+        mode = sliding_problem(p, k1, k2, piece, t, y, 0.0)
+    return np.full(6, math.nan), t, y, k1, k2, piece, mode
+
+
+def part(p, rtol, rest, most_steps, both, s, q, log):
+    """Run a body that has lost a contact until both hold again, or the run ends."""
+    while s["closed"] != both:
+        if s["steps"] > most_steps or s["events"] > MOST_EVENTS:
+            s["end"] = UNRESOLVED
+            return
+        if s["closed"] == 0:
+            fly(p, s, q)
+        else:
+            turn(p, rtol, most_steps, s, q)
+        if s["end"] == LOSES:
+            lose(s, log, s["closed"])
+            continue
+        if s["end"] == MEETS:
+            bounce(p, rest, s, q, log)
+        if s["end"] != MEETS:
+            return
+    s["t_recovered"] = s["t_end"]
+
+
+def lose(s, log, contact):
+    """Count the loss of a contact, or of both."""
+    s["separations"] += 2 if contact == CLOSED else 1
+    s["closed"] -= contact
+    note(s, log, LOSS, contact, 0.0, 0.0)
+
+
 def follow(p, exchanged, rtol, rest, most_steps, log):
     """Run a scene with impacts.
 
@@ -466,197 +682,39 @@ def follow(p, exchanged, rtol, rest, most_steps, log):
 
     Returns
     -------
-    tuple
-        See ``AFTERMATH``.
+    dict
+        Position and speed at the end, and the numbers of ``STATE``, by name.
 
     """
     if p.restitution >= 1.0:
         # Rebounds without loss do not shrink.
         rest = 0.0
-    begin = run(p, rtol, 0.0, 0.0, most_steps)
-    end, t, position, speed, steps = begin[0], begin[1], begin[2], begin[3], begin[8]
-    v, piece = begin[14], begin[12]
-    set_valued, single = is_set_valued(p), p.model == SINGLE
+    single = p.model == SINGLE
     both = ONLY_1 if single else CLOSED
-    found = np.array([0.0, 0.0, 1.0])  # greatest gap, passages of the rod, order
-    open_time = flight_time = speed_max = impulse_max = loss = 0.0
-    separations, impacts, tumbles, events, t_recovered, sense = 0, 0, 0, 0, math.nan, 1.0
-    q, y, now, closed = np.zeros(6), np.zeros(4), np.zeros(6), both
-    touching, e, mu, track = np.zeros(2, np.bool_), np.zeros(2), np.zeros(2), np.zeros(6)
-    q[2] = position
-    stand(p, position, speed, q)
-    opens, lifts, fresh, settled, turns = False, False, True, False, 0
+    s, q = np.zeros(1, STATE)[0], np.zeros(6)
+    s["t_recovered"], s["order"], s["order_closed"] = math.nan, 1.0, 1.0
+    done, here, shift = run(p, rtol, 0.0, 0.0, most_steps), p, 0.0
+    s["first"] = done["t_end"]
     while True:
-        if closed == both:
-            # Both contacts hold until one is lost. At first this has been run already.
-            here = p if sense > 0.0 else exchanged
-            shift = 0.0 if sense > 0.0 else math.pi
-            if not fresh:
-                theta, ring_omega, _ = drive(p, t)
-                y[:] = 0.0
-                y[0], y[1] = q[2] + shift - theta, v
-                k1, k2 = segment(p, y[0] - p.beta), segment(p, y[0] + p.beta)
-                if v < 0.0:
-                    k1, k2 = lower_segments(p, k1, k2, y[0])
-                piece = piece_of(p, v)
-                if set_valued and v == 0.0:
-                    mode = resting_problem(here, k1, k2, t, y[0], 0.0)
-                    piece = mode
-                    if mode == BACKWARD:
-                        k1, k2 = lower_segments(p, k1, k2, y[0])
-                else:
-                    mode = sliding_problem(here, k1, k2, piece, t, y, 0.0)
-                track[:] = math.nan
-                done = advance(here, rtol, 0.0, 0.0, most_steps, track, t, y, k1, k2, piece, mode)
-                end, t, steps, v = done[0], done[1], steps + done[8], done[14]
-                q[2] = done[2] - shift
-                stand(here, done[2], done[3], q)
-            fresh = False
-            if end not in (OPEN_1, OPEN_2, OPEN_BOTH):
-                break
-            if single:
-                closed, lost = 0, ONLY_1
-            elif end == OPEN_BOTH:
-                closed, lost = 0, CLOSED
-            else:
-                lost = ONLY_1 if (end == OPEN_1) == (sense > 0.0) else ONLY_2
-                closed = CLOSED - lost
-            opens, lifts, turns, t_recovered = True, True, 0, math.nan
-            separations += 2 if lost == CLOSED else 1
-            if events < log.shape[0]:
-                log[events] = np.array([t, LOSS, lost, 0.0, 0.0])
-            events += 1
-        if steps > most_steps or events > MOST_EVENTS:
-            end = UNRESOLVED
+        # Both contacts hold until one is lost.
+        s["end"], s["closed"], s["t_end"], s["v"] = done["end"], both, done["t_end"], done["v"]
+        s["steps"] += done["steps"]
+        q[2] = done["position"] - shift
+        stand(here, done["position"], done["speed"], q)
+        if s["end"] not in (OPEN_1, OPEN_2, OPEN_BOTH):
             break
-        since, greatest, found[0] = t, found[0], 0.0
-        if closed == 0:
-            hits, t = fly(p, t, q, found)
-            flight_time += t - since
-            open_time += t - since
-            end = MEETS if hits else HELD
+        if single or s["end"] == OPEN_BOTH:
+            lost = both
         else:
-            theta, ring_omega, _ = drive(p, t)
-            _, ux, uy, _, _ = free.ball(p, q, closed)
-            y[0], y[1], y[2], y[3] = math.atan2(ux, -uy) - theta, q[2], v, q[5]
-            at_launch = p.drive == POWER and p.exponent < 2.0 and t == begin[1] and (p.at_rest or p.speed == 0.0)
-            if at_launch and (t <= EARLIEST or (v == 0.0 and t <= 1e-10)):
-                # A ring with infinite acceleration takes along what is wedged on one contact: stick goes before slip.
-                y[2] = 0.0
-                k = place_of(p, closed, t, y)
-                if pivot_problem(p, closed, k, STICK, t, y, True) == STICK:
-                    # From rest, velocities are in proportion to the accelerations.
-                    epsilon = on_one(p, closed, k, STICK, t, y, now)[3]
-                    y[3] = epsilon / drive(p, t)[2] * ring_omega
-                else:
-                    y[2] = v
-            end, t, more = turn(p, closed, rtol, most_steps, t, y, opens, found)
-            steps += more
-            open_time += t - since
-            theta, ring_omega, _ = drive(p, t)
-            free.pivot(p, closed, theta, ring_omega, y, q)
-        # A contact that is lost, and hits before its gap is resolved, hits with another speed than it seems.
-        blurred = lifts and found[0] <= touch(p, t, q)
-        opens, found[0] = False, max(found[0], greatest)
-        if end == LOSES:
-            separations += 1
-            if events < log.shape[0]:
-                log[events] = np.array([t, LOSS, closed, 0.0, 0.0])
-            events += 1
-            closed = 0
-            continue
-        if end != MEETS:
-            # A body that jams as soon as it hits has not got through its impact.
-            tumbles -= turns if end == JAMMED and t == since else 0
+            lost = ONLY_1 if (s["end"] == OPEN_1) == (s["order_closed"] > 0.0) else ONLY_2
+        s["event"], s["lifts"], s["turns"], s["t_recovered"] = LOSS, True, 0, math.nan
+        lose(s, log, lost)
+        part(p, rtol, rest, most_steps, both, s, q, log)
+        if s["closed"] != both:
             break
-        if blurred:
-            end = UNRESOLVED
-            break
-        # Impact. A contact that is as near, but opens, has just hit itself: such contacts hit in turn, not at once.
-        theta, ring_omega, _ = drive(p, t)
-        hitting, near, fastest = 0, 3.0 * touch(p, t, q), 0.0
-        for i in (1, 2):
-            gap, rate, _ = free.contact(p, q, ring_omega, i)
-            if not (i == 2 and single) and not closed & i and gap < near and rate < 0.0:
-                hitting += i
-        rests = hitting > 0
-        for i in (1, 2):
-            gap, rate, _ = free.contact(p, q, ring_omega, i)
-            touching[i - 1], e[i - 1], mu[i - 1] = False, 0.0, 0.0
-            if i == 2 and single:
-                break
-            if (closed | hitting) & i or (hitting == 0 and gap < near):
-                touching[i - 1] = True
-                _, ux, uy, _, _ = free.ball(p, q, i)
-                mu[i - 1] = p.mu_k[segment(p, math.atan2(ux, -uy) - theta) % p.edges.size]
-                if hitting & i and -rate > rest:
-                    fastest = max(fastest, -rate)
-                    e[i - 1], rests = p.restitution, False
-        count, impulse, after = free.shock(p, q, ring_omega, touching, e, mu)
-        if settled and rest < fastest <= ROW * rest:
-            if count != 1:
-                # Whether the body jams depends on where the row of rebounds is cut off.
-                end = UNRESOLVED
-                break
-            e[:], rests = 0.0, True
-            count, impulse, after = free.shock(p, q, ring_omega, touching, e, mu)
-        # At the end of a row of rebounds from both contacts the body rests, if it may.
-        if count == 0 or (count > 1 and not (rests and settled)):
-            end = JAMMED
-            break
-        for i in (1, 2):
-            if touching[i - 1]:
-                _, rate, slide = free.contact(p, q, ring_omega, i)
-                if hitting & i:
-                    speed_max = max(speed_max, -rate)
-                    impacts += 1
-                N, T = impulse[2 * i - 2], impulse[2 * i - 1]
-                loss -= 0.5 * (N * (rate + after[2 * i - 2]) + T * (slide + after[2 * i - 1]))
-                impulse_max = max(impulse_max, N)
-        if events < log.shape[0]:
-            i = 1 if hitting != 2 else 2
-            log[events] = np.array([t, HIT, hitting, -free.contact(p, q, ring_omega, i)[1], impulse[2 * i - 2]])
-        events += 1
-        now[:] = 0.0
-        for i in (1, 2):
-            if touching[i - 1]:
-                fx, fy, moment = free.load(p, q, i, impulse[2 * i - 2], impulse[2 * i - 1])
-                now[3] += fx / p.mass
-                now[4] += fy / p.mass
-                now[5] += moment / free.inertia(p)
-        q += now
-        before, closed, lifts, turns = closed, 0, False, 0
-        slow = e.max() == 0.0 and max(after[0], after[2]) < rest
-        settled = rests
-        for i in (2, 1):
-            if touching[i - 1]:
-                if after[2 * i - 2] <= 1e-13 or slow:
-                    # Both slide alike, or nearly so after a slow impact, in which one may stick.
-                    if closed == 0 or abs(after[2 * i - 1]) < abs(v):
-                        v = after[2 * i - 1]
-                    closed += i
-                elif before & i:
-                    separations += 1
-                    if events < log.shape[0]:
-                        log[events] = np.array([t, LOSS, i, 0.0, 0.0])
-                    events += 1
-        if closed not in (0, both) and free.acceleration(p, q, drive(p, t)[2], 0.0, 0.0, 0.0, closed)[0] > 0.0:
-            # Friction could press the contact against the race, but nothing presses it yet.
-            separations += 1 if before & closed else 0
-            closed = 0
-        if closed == both:
-            t_recovered = t
-        if touching[0] and touching[1]:
-            turned = 1.0 if order(p, q) > 0.0 else -1.0
-            turns = 1 if turned != sense else 0
-            tumbles += turns
-            sense = turned
-        if single:
-            q[5] = v / p.radius + ring_omega
-    if single and closed == 0:
-        _, _, _, _, along = free.ball(p, q, 1)
-        q[5] = along / math.hypot(q[0], q[1])
-    return (
-        end, t, q[2], q[5], open_time, flight_time, found[0], separations, impacts, speed_max, impulse_max, loss,
-        found[1], tumbles, t_recovered, closed, steps, events,
-    )  # fmt: skip
+        here, shift = (p, 0.0) if s["order_closed"] > 0.0 else (exchanged, math.pi)
+        start = resume(here, s["t_end"], q[2] + shift, s["v"])
+        done = dict(zip(RESULT, advance(here, rtol, 0.0, 0.0, most_steps, *start), strict=True))
+    if single and s["closed"] == 0:
+        q[5] = free.ball(p, q, ONLY_1)[4] / math.hypot(q[0], q[1])
+    return dict(zip(STATE.names, s.item(), strict=True)) | {"position": q[2], "speed": q[5]}

@@ -21,8 +21,8 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit
 
+from benchmarks.reference.compiled import copy, inner, kernel
 from benchmarks.reference.physics import (
     FORWARD,
     STICK,
@@ -38,7 +38,7 @@ from benchmarks.reference.physics import (
     stick_reactions,
 )
 from benchmarks.reference.problem import CUBIC, DAHL, LINEAR, POWER
-from benchmarks.reference.run import HELD, RESULT, run
+from benchmarks.reference.run import HELD, run
 
 #: Penetration under the load, in radii of the race, from soft to stiff.
 SOFT = 1e-5
@@ -81,7 +81,7 @@ _A = np.array(
 _E = np.array([71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0])
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def traction(p, v_rest, k, v, z):
     """Friction over reaction at a sliding velocity on segment k, and the rate of the bristles."""
     j = k % p.edges.size
@@ -101,7 +101,7 @@ def traction(p, v_rest, k, v, z):
     return -math.copysign(mu, v), 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def motion(p, springs, v_rest, t, y, f, found):
     """Write the rates of (x, y, psi, their rates, z1, z2) to f; gaps, reactions and sliding velocities to `found`."""
     theta, ring_omega, _ = drive(p, t)
@@ -127,7 +127,7 @@ def motion(p, springs, v_rest, t, y, f, found):
         found[i], found[2 + i], found[4 + i] = gap, N, v
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def trial(p, springs, v_rest, t, h, y, y_, K, found, scale, rtol):
     """Write a step from y, whose rates are K[0], to y_; returns the error in units of the tolerance."""
     n = y.size
@@ -147,7 +147,7 @@ def trial(p, springs, v_rest, t, h, y, y_, K, found, scale, rtol):
     return error
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def integrate(p, springs, v_rest, t, y, until, about, scale, longest, lasting, rtol, most_steps, most, out):
     """Run from t to `until`, or until a reaction exceeds `most`; y is overwritten.
 
@@ -174,8 +174,8 @@ def integrate(p, springs, v_rest, t, y, until, about, scale, longest, lasting, r
             h *= max(0.1, 0.9 * error**-0.2) if error < 1e30 else 0.1
             continue
         last, t = t, t + h
-        y[:] = y_
-        K[0] = K[6]
+        copy(y_, y)
+        copy(K[6], K[0])
         h *= min(4.0, 0.9 * max(error, 1e-9) ** -0.2)
         for i in range(2):
             if found[2 + i] > 0.0:
@@ -194,7 +194,7 @@ def integrate(p, springs, v_rest, t, y, until, about, scale, longest, lasting, r
     out[10], out[11] = steps, t
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def rigid_reactions(p, mode, piece, t, y):
     """Reactions of the rigid body at a state of the reference, and the saturation of its friction if it sticks."""
     k1, k2 = segment(p, y[0] - p.beta), segment(p, y[0] + p.beta)
@@ -242,7 +242,7 @@ def before(p, t, rtol=1e-9):
     """
     found = None
     if t > 0.0 or not (p.drive == POWER and p.exponent < 2.0):
-        found = dict(zip(RESULT, run(p._replace(span=max(t, 1e-12)), rtol, 0.0, 0.0, 60_000), strict=True))
+        found = run(p._replace(span=max(t, 1e-12)), rtol, 0.0, 0.0, 60_000)
     if found is not None and found["end"] != HELD and found["t_end"] > 1e-9:
         return None
     if found is None or found["end"] != HELD:

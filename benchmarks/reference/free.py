@@ -9,22 +9,22 @@ A single contact is ball 1 of a body without extent; its angle psi has no meanin
 import math
 
 import numpy as np
-from numba import njit
 
+from benchmarks.reference.compiled import copy, inner, kernel
 from benchmarks.reference.problem import SINGLE
 
 #: Error of a velocity at a contact, in velocities that it is the difference of.
 ROUNDING = 1e-15
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def arm(p, i, psi):
     """Centre of ball i, from the centre of mass."""
     a = p.half_distance if i == 2 else -p.half_distance
     return a * math.cos(psi) - p.offset * math.sin(psi), a * math.sin(psi) + p.offset * math.cos(psi)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def ball(p, q, i):
     """Distance of ball i from the axis, its unit vector outwards, and its velocity along both."""
     bx, by = arm(p, i, q[2])
@@ -35,14 +35,14 @@ def ball(p, q, i):
     return distance, ux, uy, ux * wx + uy * wy, ux * wy - uy * wx
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def contact(p, q, ring_omega, i):
     """Gap of contact i, its rate, and the sliding velocity."""
     distance, _, _, out, along = ball(p, q, i)
     return p.radius - p.ball_radius - distance, -out, along + p.ball_radius * q[5] - p.radius * ring_omega
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def load(p, q, i, N, T):
     """Force and moment about the centre of mass of contact i."""
     _, ux, uy, _, _ = ball(p, q, i)
@@ -52,13 +52,13 @@ def load(p, q, i, N, T):
     return fx, fy, rx * fy - ry * fx
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def inertia(p):
     """Moment of inertia; any number will do for a single contact."""
     return p.inertia if p.model != SINGLE else 1.0
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def acceleration(p, q, ring_epsilon, fx, fy, moment, i):
     """Accelerations of gap i and of sliding at contact i, and of psi, under a load on the body."""
     ax, ay, epsilon = fx / p.mass, fy / p.mass - p.gravity, moment / inertia(p)
@@ -72,7 +72,7 @@ def acceleration(p, q, ring_epsilon, fx, fy, moment, i):
     return gap, slide, epsilon
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def response(p, q, ring_epsilon, i, K):
     """What a reaction with friction K does at contact i: b and A of its gap, and of its sliding."""
     gap, slide, _ = acceleration(p, q, ring_epsilon, 0.0, 0.0, 0.0, i)
@@ -81,14 +81,14 @@ def response(p, q, ring_epsilon, i, K):
     return gap, (gap1 - gap) / p.mass, slide, (slide1 - slide) / p.mass
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def sliding_forces(p, q, ring_epsilon, i, K):
     """Only contact i is closed and slides with friction K: reaction, friction, and A (times the mass)."""
     b, a, _, _ = response(p, q, ring_epsilon, i, K)
     return -b / a, -K * b / a, a * p.mass
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def sticking_forces(p, q, ring_epsilon, i):
     """Only contact i is closed and sticks: reaction and friction."""
     b, a, s, c = response(p, q, ring_epsilon, i, 0.0)
@@ -99,7 +99,7 @@ def sticking_forces(p, q, ring_epsilon, i):
     return (a_t * s - c_t * b) / det, (c * b - a * s) / det
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def pivot(p, i, theta, ring_omega, y, q):
     """Write to q the motion of a body on contact i alone.
 
@@ -113,7 +113,7 @@ def pivot(p, i, theta, ring_omega, y, q):
     q[3], q[4], q[5] = -along * uy + y[3] * by, along * ux - y[3] * bx, y[3]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def shock(p, q, ring_omega, touching, e, mu):
     """Impact at all contacts that touch, by Newton's law with Moreau's complementarity and Coulomb friction.
 
@@ -159,7 +159,7 @@ def shock(p, q, ring_omega, touching, e, mu):
     return count, full, speeds
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def impact(G, before, e, mu, misfit=0.0):
     """Solutions of an impact of any body at n contacts, by trial of all 4^n modes.
 
@@ -199,9 +199,11 @@ def impact(G, before, e, mu, misfit=0.0):
             if mode[i] == 0:
                 A[N, N] = A[T, T] = G[N, N]
                 continue
-            A[N], b[N] = G[N], -(1.0 + e[i]) * before[N]
+            copy(G[N], A[N])
+            b[N] = -(1.0 + e[i]) * before[N]
             if mode[i] == 1:
-                A[T], b[T] = G[T], -before[T]
+                copy(G[T], A[T])
+                b[T] = -before[T]
                 stuck += 1
             else:
                 A[T, T], A[T, N] = G[N, N], G[N, N] * (mu[i] if mode[i] == 2 else -mu[i])

@@ -9,9 +9,9 @@ magnitude counts the intervals from rest outwards.
 import math
 
 import numpy as np
-from numba import njit
 
 from benchmarks.reference import free
+from benchmarks.reference.compiled import inner, kernel
 from benchmarks.reference.problem import (
     ARCTAN,
     BELT,
@@ -41,14 +41,14 @@ from benchmarks.reference.problem import (
 #: Where steps must end about a narrow bump of a law, in widths.
 BUMP_CORNERS = np.array([-6.0, -3.0, -1.5, 0.0, 1.5, 3.0, 6.0])
 #: Solutions of a contact problem: stick, slip backward or forward, contacts that separate, no solution, several.
-STICK, BACKWARD, FORWARD, OPEN_1, OPEN_2, OPEN_BOTH, JAMMED, SEVERAL = 0, -1, 1, 2, 3, 4, 5, 6
+STICK, BACKWARD, FORWARD, OPEN_1, OPEN_2, OPEN_BOTH, JAMMED, SEVERAL = np.array([0, -1, 1, 2, 3, 4, 5, 6])
 #: Which contacts are closed: only one of them, or both.
-ONLY_1, ONLY_2, CLOSED = 1, 2, 3
+ONLY_1, ONLY_2, CLOSED = np.array([1, 2, 3])
 #: A determinant below this share of its value without friction counts as zero.
 LEAST_DETERMINANT = 1e-6
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def drive(p, t):
     """Angle (or displacement) of the ring (or belt) and its first two derivatives."""
     a, n = p.amplitude, p.exponent
@@ -76,7 +76,7 @@ def drive(p, t):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def coefficient(p, piece, speed, mu_s, mu_k):
     """Friction coefficient of a law without bristles at a sliding speed, by the formula of a piece."""
     size = abs(piece)
@@ -112,7 +112,7 @@ def coefficient(p, piece, speed, mu_s, mu_k):
     return mu_k
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def steady(p, v, mu_s, mu_k):
     """Traction of bristles in steady sliding, without its viscous part."""
     if p.law == DAHL or p.law == RESET:
@@ -121,7 +121,7 @@ def steady(p, v, mu_s, mu_k):
     return mu_k + (mu_s - mu_k) * math.exp(-x * x)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def bristle(p, piece, v, z, mu_s, mu_k):
     """Rate of the deflection z of bristles, and their traction."""
     sign = 1.0 if piece > 0 else -1.0
@@ -143,7 +143,7 @@ def bristle(p, piece, v, z, mu_s, mu_k):
     return rate, p.sigma0 * z + p.sigma1 * rate + p.sigma2 * v
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def corners(p, piece):
     """Least and greatest sliding speed of a piece."""
     size = abs(piece)
@@ -171,23 +171,23 @@ def corners(p, piece):
     return 0.0, math.inf
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def piece_of(p, v):
     """Piece of a sliding velocity."""
-    size = 1
+    size = abs(FORWARD)
     while abs(v) >= corners(p, size)[1]:
         size += 1
     return size if v >= 0.0 else -size
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def bound(p, k):
     """Lower edge of segment k; k counts segments over all turns."""
     m = p.edges.size
     return p.edges[k % m] + TURN * (k // m)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def segment(p, x):
     """Segment of an angle in the frame of the ring; an edge belongs to the segment above it."""
     turns = math.floor(x / TURN)
@@ -199,7 +199,7 @@ def segment(p, x):
     return k
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def accelerations(p, phi, omega, ring_epsilon, N1, T1, N2, T2):
     """Newton-Euler equations of the body with three degrees of freedom, both of whose balls touch the race.
 
@@ -228,7 +228,7 @@ def accelerations(p, phi, omega, ring_epsilon, N1, T1, N2, T2):
     return gap1, gap2, sb * out1 + cb * on1 + spin, cb * on2 - sb * out2 + spin, angular
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def response(p, phi, omega, K1, K2):
     """Accelerations A N + b of both gaps under the reactions N of contacts with friction K1 N1 and K2 N2."""
     b1, b2, _, _, _ = accelerations(p, phi, omega, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -237,7 +237,7 @@ def response(p, phi, omega, K1, K2):
     return a11 - b1, a12 - b1, a21 - b2, a22 - b2, b1, b2
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def closed(p, phi, omega, K1, K2):
     """Both contacts closed and sliding: angular acceleration, reactions, and det A over its value without friction."""
     if p.model == SINGLE:
@@ -252,7 +252,7 @@ def closed(p, phi, omega, K1, K2):
     return epsilon, N1, N2, det / (f11 * f22 - f12 * f21)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def friction(p, k, piece, v, z):
     """Friction K of a contact on segment k, and the rate of its bristles."""
     j = k % p.edges.size
@@ -263,20 +263,20 @@ def friction(p, k, piece, v, z):
     return -sign * coefficient(p, piece, sign * v, p.mu_s[j], p.mu_k[j]), 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def pull(p, t, x):
     """Force of the spring and of the drive on a body on the belt."""
     return p.force * math.sin(TURN * p.force_frequency * t + p.force_phase) - (p.stiffness + p.cubic * x * x) * x
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def load_on_band(p, t, y):
     """Friction force with which a body on the belt keeps its sliding velocity."""
     theta, _, ring_epsilon = drive(p, t)
     return pull(p, t, y[0] + theta) - p.mass * ring_epsilon
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def state(p, k1, k2, piece, t, y):
     """Kinematics, reactions and rates of the bristles.
 
@@ -299,7 +299,7 @@ def state(p, k1, k2, piece, t, y):
     return phi, omega, epsilon, N1, N2, det, ring_epsilon, rate1, rate2
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def on_one(p, closed, k, piece, t, y, q):
     """Body on one closed contact (see :func:`free.pivot`), which sticks if `piece` is 0; its motion is written to q.
 
@@ -320,7 +320,7 @@ def on_one(p, closed, k, piece, t, y, q):
     return N, T, (0.0 if piece == STICK else slide), epsilon, onward, A
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def rates(p, closed, k1, k2, piece, t, y, f):
     """Write the rates of the state to f."""
     if closed != CLOSED:
@@ -332,7 +332,7 @@ def rates(p, closed, k1, k2, piece, t, y, f):
     f[1] = p.radius * (epsilon - ring_epsilon)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def factor(A, order, n):
     """LU factorisation of the leading n by n block of A, in place."""
     for i in range(n):
@@ -350,7 +350,7 @@ def factor(A, order, n):
                 A[r, c] -= A[r, i] * A[i, c]
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def substitute(A, order, b, n):
     """Solve for b with the LU factors, in place."""
     for i in range(n):
@@ -364,7 +364,7 @@ def substitute(A, order, b, n):
         b[i] /= A[i, i]
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def alone(p, phi, omega, ring_epsilon, held, N, T):
     """Accelerations of gap and sliding of contact `held` (1 or 2), which alone acts, and of the other gap."""
     if held == 1:
@@ -374,7 +374,7 @@ def alone(p, phi, omega, ring_epsilon, held, N, T):
     return gap, slide, other
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def one_open(p, phi, omega, ring_epsilon, held, K, stuck):
     """Only contact `held` (1 or 2) is closed; it sticks, or slides with friction K.
 
@@ -396,7 +396,7 @@ def one_open(p, phi, omega, ring_epsilon, held, K, stuck):
     return N, T, slide, other
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def opening(p, phi, omega, ring_epsilon, K1, K2, least, at_rest, s1, s2):
     """Which contact can separate while the other holds, or whether both can at once.
 
@@ -428,7 +428,7 @@ def opening(p, phi, omega, ring_epsilon, K1, K2, least, at_rest, s1, s2):
     return SEVERAL if several > 1 else found
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def sliding_problem(p, k1, k2, piece, t, y, least):
     """Contact problem at a sliding velocity that is not zero: the direction of slip, or how slip ends."""
     phi, omega, _, N1, N2, det, ring_epsilon, _, _ = state(p, k1, k2, piece, t, y)
@@ -444,7 +444,7 @@ def sliding_problem(p, k1, k2, piece, t, y, least):
     return opening(p, phi, omega, ring_epsilon, K1, K2, least, False, 0.0, 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def stick_reactions(p, k1, k2, t, rho):
     """Saturation of friction, and reactions, of a body that sticks to the ring; NaN if it cannot.
 
@@ -480,7 +480,7 @@ def stick_reactions(p, k1, k2, t, rho):
     return saturation, first, second
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def stick_reserves(p, k1, k2, t, rho, least):
     """Distances of a body in stick from breakaway and from the separation of each contact; positive if it can stick."""
     if p.model == BELT:
@@ -494,14 +494,14 @@ def stick_reserves(p, k1, k2, t, rho, least):
     return 1.0 - abs(kappa), N1 / weight - least, N2 / weight - least
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def stick_reserve(p, k1, k2, t, rho, least):
     """Least distance of a body in stick from breakaway and from separation; positive if it can stick."""
     slide, first, second = stick_reserves(p, k1, k2, t, rho, least)
     return min(slide, first, second)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def lower_segments(p, k1, k2, rho):
     """Segments of both contacts in slip backward: a contact on an edge belongs to the segment below it."""
     if rho - p.beta - bound(p, k1) <= 1e-14 * max(1.0, abs(rho)):
@@ -511,7 +511,7 @@ def lower_segments(p, k1, k2, rho):
     return k1, k2
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def resting_problem(p, k1, k2, t, rho, least):
     """Contact problem at rest on the ring under a set-valued law: the mode that follows."""
     if stick_reserve(p, k1, k2, t, rho, least) >= 0.0:
@@ -530,18 +530,18 @@ def resting_problem(p, k1, k2, t, rho, least):
     if found == JAMMED:
         phi, ring_omega, ring_epsilon = rho + drive(p, t)[0], drive(p, t)[1], drive(p, t)[2]
         m = p.edges.size
-        K1, K2 = -friction(p, k1, 1, 0.0, 0.0)[0], -friction(p, k2, 1, 0.0, 0.0)[0]
+        K1, K2 = -friction(p, k1, FORWARD, 0.0, 0.0)[0], -friction(p, k2, FORWARD, 0.0, 0.0)[0]
         found = opening(p, phi, ring_omega, ring_epsilon, K1, K2, least, True, p.mu_s[k1 % m], p.mu_s[k2 % m])
     return found
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def is_set_valued(p):
     """Whether the law is set-valued at rest."""
     return p.law <= JUMP
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def falls_at_rest(p):
     """Whether friction falls at once at breakaway."""
     return p.law == STICTION or p.law == BUMP or p.law == TENT or p.law == HUMP

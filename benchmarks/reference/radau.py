@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from numba import njit
 
+from benchmarks.reference.compiled import copy, inner
 from benchmarks.reference.physics import factor, rates, substitute
 
 _S = math.sqrt(6.0)
@@ -21,7 +21,7 @@ GAMMA = 1.0 / (3.0 + 3.0 ** (2.0 / 3.0) - 3.0 ** (1.0 / 3.0))
 ESTIMATE = np.array([-13.0 - 7.0 * _S, -13.0 + 7.0 * _S, -1.0]) / 3.0
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def interpolate(y, Z, x, n, out):
     """Write the collocation polynomial at a share x of the step to out."""
     c1, c2, c3 = NODES
@@ -32,12 +32,12 @@ def interpolate(y, Z, x, n, out):
         out[i] = y[i] + l1 * Z[0, i] + l2 * Z[1, i] + l3 * Z[2, i]
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def jacobian(p, closed, k1, k2, piece, t, y, f, scale, n, J, work):
     """Write the Jacobian of the rates, by differences, to J."""
     y_, f_ = work[0], work[1]
     for j in range(n):
-        y_[:] = y
+        copy(y, y_)
         delta = 1e-7 * scale[j]
         y_[j] += delta
         delta = y_[j] - y[j]
@@ -46,7 +46,7 @@ def jacobian(p, closed, k1, k2, piece, t, y, f, scale, n, J, work):
             J[i, j] = (f_[i] - f[i]) / delta
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def norm(b, rtol, scale, n):
     """Norm of an error in units of the tolerance; NaN if one of its components is NaN."""
     total = 0.0
@@ -55,7 +55,7 @@ def norm(b, rtol, scale, n):
     return math.sqrt(total)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def attempt(p, closed, k1, k2, piece, t, h, y, f, J, scale, rtol, n, Z, A, order, b, work):
     """Compute the stages Z of a step of length h from y, whose rates are f. Z holds a first guess.
 
@@ -71,7 +71,7 @@ def attempt(p, closed, k1, k2, piece, t, h, y, f, J, scale, rtol, n, Z, A, order
         A[i, i] += 1.0
     factor(A, order, m)
     F, y_ = work[:3], work[3]
-    y_[:] = y
+    copy(y, y_)
     last, done = math.inf, False
     for iteration in range(15):
         for r in range(3):

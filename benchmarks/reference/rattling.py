@@ -17,10 +17,10 @@ import math
 from itertools import pairwise
 
 import numpy as np
-from numba import njit
 from scipy.optimize import brentq
 
 from benchmarks.reference.aftermath import HIT, order
+from benchmarks.reference.compiled import copy, kernel
 from benchmarks.reference.compliant import Opinion, before, motion, place, rest_speed, smoothed, trial
 from benchmarks.reference.problem import SINGLE
 
@@ -60,7 +60,7 @@ def damping(e):
     return -math.expm1(-brentq(residual, 0.1 * (1.0 - e), 10.0 + 2.0 / e)) / e
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def rattle(p, s, k, settled, slow, settling, lasting, v_rest, t, y, until, scale, longest, rtol, most_steps, out):
     """Run from t to `until`; y is overwritten.
 
@@ -91,7 +91,7 @@ def rattle(p, s, k, settled, slow, settling, lasting, v_rest, t, y, until, scale
             h *= max(0.1, 0.9 * error**-0.2) if error < 1e30 else 0.1
             continue
         t += h
-        y[:] = y_
+        copy(y_, y)
         apart = False
         for i in range(n):
             arm = p.half_distance * (2.0 * i - 1.0)

@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from numba import njit
 
+from benchmarks.reference.compiled import copy, inner, kernel
 from benchmarks.reference.physics import (
     BACKWARD,
     CLOSED,
@@ -41,16 +41,18 @@ SAMPLES = 20
 #: Earliest time at which something happens on a ring whose acceleration is infinite at 0, s. Only the variation with
 #: positive slack follows what happens before.
 EARLIEST = 1e-14
-#: Return values of :func:`run`, in this order.
+#: Return values of :func:`advance`, in this order.
 RESULT = (
     "end", "t_end", "position", "speed", "reversals", "turned", "least_1", "least_2", "steps", "events", "t_least",
     "mode", "piece", "rho", "v", "z1", "z2",
 )  # fmt: skip
 # Guards: reactions, determinant, ends of the piece, edges of both segments, bristles.
 _N1, _N2, _DET, _SLOWER, _FASTER, _EDGE_1, _EDGE_2, _BRISTLE, _COUNT = range(9)
+#: Any of the guards.
+ANY = np.int64(-1)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def observe(p, track, phi, omega, slack):
     """Track direction, reversals, and the angle turned since the last reversal; `slack` shifts the thresholds."""
     before, last = track[4], track[5]
@@ -74,7 +76,7 @@ def observe(p, track, phi, omega, slack):
             track[0] = -1.0
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def guard(p, k1, k2, piece, t, y, least, g):
     """Write to g the guards, which must stay positive within a mode."""
     _, _, _, N1, N2, det, _, _, _ = state(p, k1, k2, piece, t, y)
@@ -106,24 +108,24 @@ def guard(p, k1, k2, piece, t, y, least, g):
         g[_BRISTLE] += 1e-12 * p.mu_s[0]
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def root(p, k1, k2, piece, t, h, y, Z, n, least, low, high, which, g, y_):
-    """Share of a step, between two shares, at which a guard (any guard if `which` is negative) reaches zero."""
-    y_[:] = y
+    """Share of a step, between two shares, at which a guard (or `ANY`) reaches zero."""
+    copy(y, y_)
     for _ in range(60):
         middle = 0.5 * (low + high)
         if not low < middle < high:
             break
         interpolate(y, Z, middle, n, y_)
         guard(p, k1, k2, piece, t + middle * h, y_, least, g)
-        if (g[which] if which >= 0 else g.min()) <= 0.0:
+        if (g.min() if which == ANY else g[which]) <= 0.0:
             high = middle
         else:
             low = middle
     return high
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def passage(p, k1, k2, t, y, least):
     """Contact problem while the sliding velocity jumps at launch, because the drive's acceleration is infinite at 0.
 
@@ -143,7 +145,7 @@ def passage(p, k1, k2, t, y, least):
     return STICK
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def after_stick(p, k1, k2, t, rho, least):
     """Mode after the end of stick, and the instant at which the contact problem has a solution.
 
@@ -166,7 +168,7 @@ def after_stick(p, k1, k2, t, rho, least):
     return found, t
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def advance(p, rtol, least, slack, most_steps, track, t, y, k1, k2, piece, mode):
     """Run on from an instant t at which the contact problem has been solved; `y` and `track` are overwritten."""
     set_valued, span, end = is_set_valued(p), p.span, HELD
@@ -291,7 +293,7 @@ def advance(p, rtol, least, slack, most_steps, track, t, y, k1, k2, piece, mode)
             break
         # Watch the inequalities. The last sample lies beyond the end of the step, to see a minimum at the end.
         hit, at = -1, 1.0
-        y_[:] = y
+        copy(y, y_)
         for i in range(SAMPLES + 2):
             x = i / SAMPLES
             interpolate(y, Z_, x, n, y_)
@@ -311,7 +313,7 @@ def advance(p, rtol, least, slack, most_steps, track, t, y, k1, k2, piece, mode)
             if hit >= 0 or i > SAMPLES:
                 break
             if i > 0 and G[i].min() <= 0.0:
-                at = root(p, k1, k2, piece, t, step, y, Z_, n, least, (i - 1) / SAMPLES, x, -1, g, y_)
+                at = root(p, k1, k2, piece, t, step, y, Z_, n, least, (i - 1) / SAMPLES, x, ANY, g, y_)
                 interpolate(y, Z_, at, n, y_)
                 guard(p, k1, k2, piece, t + at * step, y_, least, g)
                 hit = np.argmin(g > 0.0)
@@ -323,10 +325,10 @@ def advance(p, rtol, least, slack, most_steps, track, t, y, k1, k2, piece, mode)
                 least_1, least_2 = min(least_1, G[i, _N1]), min(least_2, G[i, _N2])
                 observe(p, track, y_[0] + theta, y_[1] / p.radius + ring_omega, slack)
         if hit < 0:
-            previous[:] = y
+            copy(y, previous)
             interpolate(y, Z_, 1.0, n, y_)
-            y[:] = y_
-            Z[:], before = Z_, step
+            copy(y_, y)
+            Z, Z_, before = Z_, Z, step
             t = limit if last else t + step
             h = step * min(4.0, max(0.3, 0.9 * max(error, 1e-12) ** -0.25)) if not last else h
             continue
@@ -341,7 +343,7 @@ def advance(p, rtol, least, slack, most_steps, track, t, y, k1, k2, piece, mode)
                     Z[i, j] = y_[j] - y[j]
             if attempt(p, CLOSED, k1, k2, piece, t, part, y, f, J, scale, rtol, n, Z, A, order, b, work) == math.inf:
                 break
-            Z_[:], step = Z, part
+            Z, Z_, step = Z_, Z, part
             interpolate(y, Z_, 1.1, n, y_)
             guard(p, k1, k2, piece, t + 1.1 * step, y_, least, g)
             beyond = g[hit]
@@ -352,7 +354,7 @@ def advance(p, rtol, least, slack, most_steps, track, t, y, k1, k2, piece, mode)
             at = root(p, k1, k2, piece, t, step, y, Z_, n, least, 0.9, 1.1, hit, g, y_)
             part = at * step
         interpolate(y, Z_, part / step, n, y_)
-        y[:] = y_
+        copy(y_, y)
         t += part
         events += 1
         before = 0.0
@@ -414,7 +416,7 @@ def advance(p, rtol, least, slack, most_steps, track, t, y, k1, k2, piece, mode)
     )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def slip_at_once(p, k1, k2, mode, rho, begin, instant, v, epsilon):
     """Slip from `begin`, at the velocity v, to `instant` on a ring whose acceleration is infinite at 0.
 
@@ -445,7 +447,7 @@ def slip_at_once(p, k1, k2, mode, rho, begin, instant, v, epsilon):
     return mode, instant, v + p.radius * (epsilon * (instant - begin) - drive(p, instant)[1] + drive(p, begin)[1])
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def leave_at_once(p, k1, k2, rho, earliest, instant, least):
     """Mode, time and sliding velocity after a launch at rest on a ring whose acceleration is infinite at 0.
 
@@ -495,30 +497,12 @@ def leave_at_once(p, k1, k2, rho, earliest, instant, least):
     return slip_at_once(p, j1, j2, mode, rho, t, instant, 0.0, state(p, j1, j2, mode, t, y)[2])
 
 
-@njit(cache=True, error_model="numpy")
-def run(p, rtol, least, slack, most_steps):
-    """Run a scene.
-
-    Parameters
-    ----------
-    p : Problem
-    rtol : float
-        Tolerance of the error estimate of a step. The estimate is of lower order than the step.
-    least : float
-        Reaction at which a contact is lost, in weights of the body.
-    slack : float
-        Relative shift of the full turn, and a thousandth of the relative shift of the threshold of a reversal.
-    most_steps : int
-
-    Returns
-    -------
-    tuple
-        See ``RESULT``.
-
-    """
+@kernel
+def launch(p, least, slack):
+    """Start of a run, as :func:`advance` takes it: track, time, state, segments, piece and mode."""
     set_valued, y = is_set_valued(p), np.zeros(4)
 
-    # Launch. If the acceleration of the drive is infinite at 0, the motion before `instant` is negligible.
+    # If the acceleration of the drive is infinite at 0, the motion before `instant` is negligible.
     t, instant = 0.0, 0.0
     if p.drive == POWER and p.exponent < 2.0:
         instant = 1e-13 if p.exponent < 1.5 else 1e-10
@@ -560,4 +544,28 @@ def run(p, rtol, least, slack, most_steps):
         piece = mode if y[1] == 0.0 else piece_of(p, y[1])
     if mode == BACKWARD and p.model != BELT:
         k1, k2 = lower_segments(p, k1, k2, y[0])
-    return advance(p, rtol, least, slack, most_steps, track, t, y, k1, k2, piece, mode)
+    return track, t, y, k1, k2, piece, mode
+
+
+def run(p, rtol, least, slack, most_steps):
+    """Run a scene.
+
+    Parameters
+    ----------
+    p : Problem
+    rtol : float
+        Tolerance of the error estimate of a step. The estimate is of lower order than the step.
+    least : float
+        Reaction at which a contact is lost, in weights of the body.
+    slack : float
+        Relative shift of the full turn, and a thousandth of the relative shift of the threshold of a reversal.
+    most_steps : int
+
+    Returns
+    -------
+    dict
+        Numbers by the names in ``RESULT``.
+
+    """
+    done = advance(p, rtol, least, slack, most_steps, *launch(p, least, slack))
+    return dict(zip(RESULT, done, strict=True))
