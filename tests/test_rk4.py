@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ringsweep.compile import take
+from ringsweep.models.inspection import Inspection
 from ringsweep.models.interface.constant_step import verdict
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING, SEPARATED_1, SEPARATED_2
 from ringsweep.models.ring.record import Outcome
-from ringsweep.models.ring.rk4 import Inspection
 from ringsweep.physics.friction.velocity import friction_at
 from ringsweep.physics.ring import acceleration, reactions
 from ringsweep.quantities.flags import FAILED, JAMMED, OSCILLATORY, REGIMES, RESTING, REVOLVING, SEPARATING
@@ -328,7 +328,7 @@ class TestCertificate:
 class TestVerdict:
     """Status of a run after a step, from the inspections at both ends."""
 
-    VALID = Inspection((1.0, 0.0), 0.1, 1.0, 1.0, 1.0, 0.0, -1.0, 0.0, 0.0, (0.0, 1.0, 1.0))
+    VALID = Inspection((1.0, 0.0), 0.1, 0.0, (0.0, 1.0, 1.0), 1.0, 1.0, 1.0, -0.1, 0.0, -1.0, 0.0, (), ())
 
     @pytest.mark.parametrize(
         ("change", "expected"),

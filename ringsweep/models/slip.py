@@ -85,7 +85,8 @@ def acceleration_slopes(scene, now):
 
 
 @unrolled
-def _deflection_rates(count, bristles):
+def deflection_rates(count, bristles):
+    """Rates of the deflections of the bristles, m/s."""
     return ["return (" + "".join(f"bristles[{i}].rate, " for i in range(count)) + ")"]
 
 
@@ -109,7 +110,7 @@ def _rates(scene, mode, common, forcing, x):
     now = slip(scene, mode, common, forcing, x)
     acceleration, _ = ring.acceleration(scene.body, *now.K, now.motion)
     sliding = ring.radius(scene.body) * (acceleration - forcing[2])
-    return joined((now.place_rate, sliding), _deflection_rates(now.bristles))
+    return joined((now.place_rate, sliding), deflection_rates(now.bristles))
 
 
 @implicit.linearise.implements(Ring, BristleRing, Belt, BristleBelt)
@@ -120,7 +121,7 @@ def _linearise(scene, mode, common, t, forcing, x):
     by_force = force_rate(scene.drive, forcing) / scene.body.mass
     by_time = by_place * forcing[1] + by_drive * forcing[2] + by_force - radius * drives.jerk(scene.drive, t)
     return (
-        joined((now.place_rate, radius * (acceleration - forcing[2])), _deflection_rates(now.bristles)),
+        joined((now.place_rate, radius * (acceleration - forcing[2])), deflection_rates(now.bristles)),
         (0.0, 1.0 / radius, by_place, by_v),
         couplings(now.bristles, scene, now),
         joined((0.0, by_time), _none(now.bristles)),

@@ -38,10 +38,8 @@ from itertools import combinations
 from typing import Any, NamedTuple
 
 from ringsweep.compile import absorbed, function_from_lines, hook, inlined
-from ringsweep.numerics.functions import opposing
 from ringsweep.physics import drives
 from ringsweep.physics.bodies import ANGLE, Coordinate, Equations
-from ringsweep.physics.friction.velocity import friction_at
 from ringsweep.physics.zones import PER_TURN, roughness
 from ringsweep.quantities.parameters import Leaf
 
@@ -535,27 +533,3 @@ def coefficients_at(scene, rho):
     mu_s1, mu_k1 = roughness(scene.surface, turns, -offset)
     mu_s2, mu_k2 = roughness(scene.surface, turns, offset)
     return mu_s1, mu_k1, mu_s2, mu_k2
-
-
-@absorbed
-def friction(scene, phi, omega, theta, ring_omega):
-    """Sliding velocity, and friction K at each contact with its slope.
-
-    Parameters
-    ----------
-    scene : Ring
-        One cell, or several in vector lanes.
-    phi, omega : float or Lanes
-        Angle, rad, and angular velocity, rad/s, of the body.
-    theta, ring_omega : float
-        Angle, rad, and angular velocity, rad/s, of the ring.
-
-    Returns
-    -------
-    tuple of float or Lanes
-        ``(v, K1, K2, dK1/domega, dK2/domega)``; m/s, 1, 1, s, s.
-    """
-    radius = scene.body.radius
-    v = (omega - ring_omega) * radius
-    mu_1, mu_2, slope_1, slope_2 = friction_at(scene.law, abs(v), coefficients_at(scene, phi - theta))
-    return v, opposing(mu_1, v), opposing(mu_2, v), -slope_1 * radius, -slope_2 * radius

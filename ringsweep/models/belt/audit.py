@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ringsweep.compile import inlined
-from ringsweep.models.belt.force import breakaway_force, length_scale, sliding, sliding_slopes, speed_scale
+from ringsweep.models.belt.force import breakaway_force, length_scale, sliding, speed_scale
 from ringsweep.models.belt.record import Outcome
 from ringsweep.models.interface import audit, implicit
 from ringsweep.models.sliding import audited, larger, of_balances
-from ringsweep.models.slip import slip
+from ringsweep.models.slip import acceleration_slopes, slip
 from ringsweep.physics import ring
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.forces import force_in
@@ -45,8 +45,9 @@ def _violation(scene, mode, forcing, y, rates, s, tolerance):
         sizes = ring.size(body, (length, push, velocity)) + body.mass * (body.gravity + abs(forcing[2]))
         largest = (abs(friction) - breakaway_force(scene, x)) / (tolerance * sizes + 1e-300)
     else:
-        K, slope, viscous, motion = sliding(scene, x, velocity, v, forcing)
-        relaxation = abs(sliding_slopes(scene, K, slope, viscous, motion)[1])
+        now = sliding(scene, x, velocity, v, forcing)
+        (K, _), motion = now.K, now.motion
+        relaxation = abs(acceleration_slopes(scene, now)[1])
         # In a dead band the sliding velocity need not have the direction of the force.
         if not (holds_in_band(scene.law) and mode.region < 0):
             if mode.region < 0:

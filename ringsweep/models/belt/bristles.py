@@ -10,13 +10,13 @@ from math import sqrt
 from typing import NamedTuple
 
 from ringsweep.compile import absorbed, inlined
-from ringsweep.models.belt.force import length_scale, sliding_slopes
+from ringsweep.models.belt.force import length_scale
 from ringsweep.models.belt.record import begin
+from ringsweep.models.inspection import slip_in_space
 from ringsweep.models.interface import constant_step, implicit, modes, recorder
 from ringsweep.models.interface.status import RUNNING, SEPARATED_1
-from ringsweep.models.parts import larger_eigenvalue
 from ringsweep.models.slip import Bundle, Slip, region_guards, slip
-from ringsweep.numerics.functions import any_of, select
+from ringsweep.numerics.functions import select
 from ringsweep.numerics.memory import select_all
 from ringsweep.physics import drives, ring
 from ringsweep.physics.belt import BristleBelt
@@ -38,16 +38,6 @@ def _in_band(scene, v, z, sign):
     return region_guard(scene.law, scene.mu_s, scene.mu_k, v, z, sign, BAND) > 0.0
 
 
-@absorbed
-def _contact_in_region(scene, v, z):
-    """Whether the contact counts as stuck, and :func:`contact` in its region, for floats and Lanes."""
-    sign = select(v >= 0.0, 1.0, -1.0)
-    stuck = _in_band(scene, v, z, sign)
-    a = contact(scene, v, z, sign, BAND)
-    b = contact(scene, v, z, sign, KINETIC)
-    return stuck, select_all(stuck, a, b)
-
-
 @inlined
 def recoil_speed(scene):
     """Speed of a body that bristles drive back from their largest deflection, m/s."""
@@ -58,39 +48,6 @@ def recoil_speed(scene):
 def _play(scene):
     """Distance that the body moves while its bristles go from one largest deflection to the other, m."""
     return 2.0 * scene.mu_s / scene.law.sigma0
-
-
-class Inspection(NamedTuple):
-    """Inspection of a state of the belt.
-
-    Attributes
-    ----------
-    rates : tuple of float
-        Time derivative of the state.
-    normal_1, normal_2 : float
-        Normal reaction, N.
-    determinant : float
-        1: the body cannot jam.
-    force : float
-        Friction force, N.
-    trace, product : float
-        Trace, 1/s, and determinant, 1/s^2, of the linearised contact.
-    stuck : float
-        1 if the contact counts as stuck, else 0.
-    place, v : float
-        Displacement relative to the belt, m, and sliding velocity, m/s.
-    """
-
-    rates: tuple[float, float, float]
-    normal_1: float
-    normal_2: float
-    determinant: float
-    force: float
-    trace: float
-    product: float
-    stuck: float
-    place: float
-    v: float
 
 
 @inlined
@@ -105,46 +62,14 @@ def _initial_state_in_space(scene):
     return scene.initial_x, velocity, _deflection_at_start(scene)
 
 
-@constant_step.rates.implements(BristleBelt)
-def _rates(scene, now, y, forcing):
-    _, (rate, _, _, K, _, _) = _contact_in_region(scene, y[1] - forcing[1], y[2])
-    motion = y[0], force_in(scene.drive, forcing), y[1]
-    return y[1], ring.acceleration(scene.body, K, K, motion)[0], rate
-
-
-@constant_step.inspect.implements(BristleBelt)
-def _inspect(scene, y, forcing):
-    body, v = scene.body, y[1] - forcing[1]
-    motion = y[0], force_in(scene.drive, forcing), y[1]
-    stuck, (rate, rate_v, rate_z, K, slope_v, slope_z) = _contact_in_region(scene, v, y[2])
-    acceleration, determinant = ring.acceleration(body, K, K, motion)
-    normal, _ = ring.reactions(body, K, K, motion)
-    by_place, by_v, _, _ = sliding_slopes(scene, K, slope_v, 0.0, motion)
-    by_z = ring.acceleration_slope(body, K, K, slope_z, slope_z, motion)
-    return Inspection(
-        (y[1], acceleration, rate),
-        normal,
-        normal,
-        determinant,
-        -K * normal,
-        rate_z + by_v,
-        by_v * rate_z - by_z * rate_v - by_place,
-        select(stuck, 1.0, 0.0),
-        y[0] - forcing[0],
-        v,
-    )
-
-
-@constant_step.eigenvalue.implements(BristleBelt)
-def _eigenvalue(scene, before, now, h, most):
-    if any_of(most == 0.0):
-        most = larger_eigenvalue(most, before.trace, before.product)
-    return larger_eigenvalue(most, now.trace, now.product)
-
-
-@constant_step.sticks.implements(BristleBelt)
-def _sticks(scene, before, now):
-    return before.stuck > 0.0
+@slip_in_space.implements(BristleBelt)
+def _slip_in_space(scene, y, v, forcing, angle):
+    sign = select(v >= 0.0, 1.0, -1.0)
+    stuck = _in_band(scene, v, y[2], sign)
+    a, b = contact(scene, v, y[2], sign, BAND), contact(scene, v, y[2], sign, KINETIC)
+    rate, rate_v, rate_z, K, slope_v, slope_z = select_all(stuck, a, b)
+    motion, bundle = (y[0], force_in(scene.drive, forcing), y[1]), Bundle(rate, rate_v, rate_z, slope_z)
+    return Slip(motion, v, (K, K), (slope_v, slope_v), 0.0, (bundle,)), select(stuck, 1.0, 0.0)
 
 
 @recorder.begin.implements(BristleBelt)
@@ -156,12 +81,6 @@ def _begin(scene, t, seen):
 def _keep_deflection(scene, row, column, y):
     if column < len(row):
         row[column] = y[2]
-
-
-@constant_step.row.implements(BristleBelt)
-def _row(scene, y, forcing):
-    now = constant_step.inspect(scene, y, forcing)
-    return y[0], y[1], now.force, y[2], 0.0 if now.stuck > 0.0 else 1.0 if y[1] > forcing[1] else -1.0
 
 
 class Mode(NamedTuple):

@@ -49,12 +49,12 @@ def _guards_and_motion(scene, mode, common, forcing, x):
     normal, _ = ring.reactions(body, *now.K, now.motion)
     friction = now.damping * body.mass * x[1] - now.K[0] * normal
     place, _, velocity = now.motion
-    seen = place, velocity, acceleration, friction, x[0], x[1], forcing[2], _deflection(x, nan)
+    seen = place, velocity, acceleration, friction, x[0], x[1], forcing[2], deflection(x, nan)
     return all_guards(body, normal, *region_guards(scene, mode, common, x)), seen
 
 
 @unrolled
-def _deflection(length, x, missing):
+def deflection(length, x, missing):
     """Deflection of the bristles; `missing` without bristles."""
     return ["return x[2]" if length > 2 else "return missing"]
 
@@ -75,4 +75,4 @@ def _near_zero(scene, motion):
 def _row(scene, mode, forcing, x):
     _, motion = implicit.guards_and_motion(scene, mode, (), forcing, x)
     state = 0.0 if mode.region < 0 else float(mode.sign)
-    return motion[0], motion[1], motion[3], _deflection(x, 0.0), state
+    return motion[0], motion[1], motion[3], deflection(x, 0.0), state

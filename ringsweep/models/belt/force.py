@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ringsweep.compile import absorbed, hook, inlined
 from ringsweep.models.interface import shock
+from ringsweep.models.slip import Slip
 from ringsweep.numerics.functions import opposing, select
 from ringsweep.physics import drives, ring
 from ringsweep.physics.belt import OnBelt
@@ -25,7 +26,7 @@ def _if_force(body, yes, no):
 
 @absorbed
 def sliding(scene, x, velocity, v, forcing):
-    """Friction of a body in slip, and the numbers of its motion.
+    """The :class:`Slip` of a body.
 
     Parameters
     ----------
@@ -39,16 +40,13 @@ def sliding(scene, x, velocity, v, forcing):
 
     Returns
     -------
-    tuple
-        ``(K, slope, viscous, motion)``: friction per unit of the normal reaction, its derivative by the sliding
-        velocity (s/m), the coefficient of viscous friction (N s/m), and the motion as
-        :func:`ringsweep.physics.ring.acceleration` takes it: displacement, given force, velocity. Friction balances the
-        other forces in a dead band, as far as it can.
+    Slip
+        Friction balances the other forces in a dead band, as far as it can.
     """
     mu, slope = friction_at(scene.law, abs(v), (scene.mu_s, scene.mu_k))
     found, push = (opposing(mu, v), -slope, if_force(scene.body, scene.viscous, 0.0)), force_in(scene.drive, forcing)
     K, slope, viscous = _in_dead_band(family(scene.law), scene, x, push, velocity, v, found)
-    return K, slope, viscous, (x, push - viscous * v, velocity)
+    return Slip((x, push - viscous * v, velocity), v, (K, K), (slope, slope), viscous / scene.body.mass, ())
 
 
 @hook(absorb=True, optional=True)
@@ -64,14 +62,6 @@ def _balancing(family, scene, x, push, velocity, v, found):
     load, _, friction, _ = ring.held(scene.body, 1.0, (x, push, velocity), x * x * x, 0.0, 0.0)
     needed = max(-scene.mu_s, min(scene.mu_s, friction / (load + 1e-300)))
     return select(held, needed, K), select(held, 0.0, slope), select(held, 0.0, viscous)
-
-
-@absorbed
-def sliding_slopes(scene, K, slope, viscous, motion):
-    """Derivatives of the acceleration by place, sliding velocity, velocity of the belt, and given force."""
-    by_place, by_velocity, by_force = ring.acceleration_gradient(scene.body, K, K, motion)
-    by_v = ring.acceleration_slope(scene.body, K, K, slope, slope, motion) - viscous * by_force
-    return by_place, by_velocity + by_v, by_velocity, by_force
 
 
 @absorbed

@@ -12,27 +12,22 @@ from math import cos, isnan, sin, sqrt
 from typing import NamedTuple
 
 from ringsweep.compile import absorbed, inlined
+from ringsweep.models.inspection import slip_in_space
 from ringsweep.models.interface import constant_step, implicit, modes
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
-from ringsweep.models.parts import larger_eigenvalue
 from ringsweep.models.ring.contacts import (
     coefficients_under,
     places_after_edge,
     places_at,
     places_beyond,
-    zones_at,
 )
 from ringsweep.models.ring.creep import DETERMINANT, FAST, NORMAL_1, NORMAL_2, SLOW
 from ringsweep.models.ring.series import NEARLY_JAMMED, loads_in_slip, lost_in_slip
 from ringsweep.models.sliding import ENDS
-from ringsweep.models.slip import Bundle, Slip, couplings, region_guards, slip
+from ringsweep.models.slip import Bundle, Slip, region_guards, slip
 from ringsweep.numerics.functions import (
-    any_of,
     select,
-    sine_cosine,
-    sine_cosine_carried,
     sine_cosine_from,
-    sine_cosine_near,
 )
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction.bristles import bristle, region_guard, steady_deflection
@@ -83,127 +78,18 @@ def _initial_deflections(scene):
     return steady_deflection(scene.law, mu_s1, mu_k1, v), steady_deflection(scene.law, mu_s2, mu_k2, v)
 
 
-class Inspection(NamedTuple):
-    """Inspection of a state of the ring.
-
-    Attributes
-    ----------
-    rates : tuple of float
-        Time derivative of the state.
-    normal_1, normal_2 : float
-        Normal reactions, N.
-    determinant : float
-        Determinant of the balances, kg m^2; the body jams where it is not positive.
-    creep, swing : tuple of float
-        Trace, 1/s, and determinant, 1/s^2, of two parts of the linearised equations: sliding with its bristles, and the
-        swing of the body.
-    v : float
-        Sliding velocity, m/s.
-    stuck : float
-        1 if the body counts as stuck, else 0.
-    phi, sin_phi, cos_phi : float
-        Angle of the body, rad, its sine and cosine.
-    """
-
-    rates: tuple[float, float, float, float]
-    normal_1: float
-    normal_2: float
-    determinant: float
-    creep: tuple[float, float]
-    swing: tuple[float, float]
-    v: float
-    stuck: float
-    phi: float
-    sin_phi: float
-    cos_phi: float
-
-
 @constant_step.initial_state.implements(BristleRing)
 def _initial_state_in_space(scene):
     z_1, z_2 = _initial_deflections(scene)
     return scene.initial_phi, scene.initial_omega, z_1, z_2
 
 
-@absorbed
-def _slip_in_space(scene, y, forcing, sine_and_cosine):
-    """Coefficients under both contacts, sign of the sliding velocity, state of implicit steps, and its slip."""
-    phi, omega, z_1, z_2 = y
-    x = phi - forcing[0], (omega - forcing[1]) * scene.body.radius, z_1, z_2
-    sign, under = select(x[1] >= 0.0, 1.0, -1.0), ring.coefficients_at(scene, x[0])
-    return under, sign, x, slip_of(scene, under, (*sine_and_cosine, omega), x, sign, BAND)
-
-
-@constant_step.rates.implements(BristleRing)
-def _rates(scene, now, y, forcing):
-    near = sine_cosine_near(y[0], now.phi, now.sin_phi, now.cos_phi)
-    _, _, _, slides = _slip_in_space(scene, y, forcing, near)
-    first, second = slides.bristles
-    return y[1], ring.acceleration(scene.body, *slides.K, slides.motion)[0], first.rate, second.rate
-
-
-@constant_step.inspect.implements(BristleRing)
-def _inspect(scene, y, forcing):
-    return _inspection(scene, y, forcing, sine_cosine(y[0]))
-
-
-@constant_step.inspect_next.implements(BristleRing)
-def _inspect_next(scene, before, y, forcing, afresh):
-    carried = sine_cosine_carried(y[0], before.phi, before.sin_phi, before.cos_phi, afresh)
-    return _inspection(scene, y, forcing, carried)
-
-
-@absorbed
-def _inspection(scene, y, forcing, sine_and_cosine):
-    """Inspection of a state, given sine and cosine of the angle."""
-    b = scene.body
-    under, sign, x, now = _slip_in_space(scene, y, forcing, sine_and_cosine)
-    stuck = _region_guard(scene, under, x[1], x[2], x[3], sign, BAND) > 0.0
-    epsilon, determinant = ring.acceleration(b, *now.K, now.motion)
-    normal_1, normal_2 = ring.reactions(b, *now.K, now.motion)
-    by_v = b.radius * ring.acceleration_slope(b, *now.K, *now.slopes, now.motion)
-    first, second = now.bristles
-    (by_1, _, _), (by_2, _, _) = couplings(now.bristles, scene, now)
-    decay = max(-first.rate_z, -second.rate_z)
-    coupling = abs(by_1 * first.rate_v) + abs(by_2 * second.rate_v)
-    # The body swings even where friction is small.
-    by_phi, by_omega = ring.acceleration_gradient(b, *now.K, now.motion)
-    return Inspection(
-        (y[1], epsilon, first.rate, second.rate),
-        normal_1,
-        normal_2,
-        determinant,
-        (decay - by_v, coupling - decay * by_v),
-        (by_omega, -by_phi),
-        x[1],
-        select(stuck, 1.0, 0.0),
-        y[0],
-        *sine_and_cosine,
-    )
-
-
-@constant_step.eigenvalue.implements(BristleRing)
-def _eigenvalue(scene, before, now, h, most):
-    if any_of(most == 0.0):
-        most = _larger_eigenvalue_at(before, most)
-    return _larger_eigenvalue_at(now, most)
-
-
-@absorbed
-def _larger_eigenvalue_at(now, most):
-    return larger_eigenvalue(larger_eigenvalue(most, now.creep[0], now.creep[1]), now.swing[0], now.swing[1])
-
-
-@constant_step.sticks.implements(BristleRing)
-def _sticks(scene, before, now):
-    return before.stuck > 0.0
-
-
-@constant_step.row.implements(BristleRing)
-def _row(scene, y, forcing):
-    now = constant_step.inspect(scene, y, forcing)
-    mode = 0.0 if now.stuck > 0.0 else 1.0 if now.v > 0.0 else -1.0
-    zone_1, zone_2 = zones_at(scene, y[0] - forcing[0])
-    return y[0], y[1], now.rates[1], now.normal_1, now.normal_2, forcing[1], zone_1, zone_2, mode, y[2], y[3]
+@slip_in_space.implements(BristleRing)
+def _slip_in_space(scene, y, v, forcing, angle):
+    rho, _, z_1, z_2 = y[0] - forcing[0], y[1], y[2], y[3]
+    sign, under = select(v >= 0.0, 1.0, -1.0), ring.coefficients_at(scene, rho)
+    stuck = select(_region_guard(scene, under, v, z_1, z_2, sign, BAND) > 0.0, 1.0, 0.0)
+    return slip_of(scene, under, (*angle, y[1]), (rho, v, z_1, z_2), sign, BAND), stuck
 
 
 class Mode(NamedTuple):

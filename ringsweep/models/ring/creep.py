@@ -90,12 +90,12 @@ def _guards_and_motion(scene, mode, common, forcing, x):
     slow, fast = region_guards(scene, mode, common, x)
     ahead = min(edges_ahead(scene, mode, x[0]))
     motion = x[0] + forcing[0], now.motion[2], epsilon, forcing[1]
-    return (determinant, slow, normal_1, normal_2, ahead, fast), joined(motion, _deflections(x))
+    return (determinant, slow, normal_1, normal_2, ahead, fast), joined(motion, deflections(x))
 
 
 @unrolled
-def _deflections(length, x):
-    """Deflections of the bristles in the state of an implicit step."""
+def deflections(length, x):
+    """Deflections of the bristles in a state."""
     return ["return (" + "".join(f"x[{i}], " for i in range(2, length)) + ")"]
 
 
