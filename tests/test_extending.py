@@ -226,7 +226,7 @@ INCOMPLETE = [
     ("my_dahl.py", "@stick_speed.implements(Ductile)", "", "friction law dahl-ductile has no presliding.stick_speed"),
     ("my_run_up.py", "@jerk.implements(RunUp)", "", "drive run-up has no drives.jerk"),
     ("my_disc.py", "@ring.body(", "_ = dict(", "model disc: OnDisc has no ring.free_determinant, ring.acceleration"),
-    ("my_disc.py", "K1*N1 - ", "K1*N2 - ", "'N2' is not defined"),
+    ("my_disc.py", "K1*N1 - ", "K1*N2 - ", "N2 is not known"),
     ("my_disc.py", "K1*N1 - ", "K1 - ", "a balance is a sum of multiples of"),
     ("my_dahl.py", '"dahl-ductile"', '"lugre"', "there is a friction law lugre already"),
     ("my_run_up.py", "_jerk(drive, t)", "_jerk(drive)", "the arguments of jerk are"),

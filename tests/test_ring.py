@@ -154,16 +154,62 @@ class TestDeclaredBalances:
     @pytest.mark.parametrize(
         ("balances", "message"),
         [
-            (("mass*gravty*cos_phi = N1", "mass*radius*phi_dd = K1*N1"), "'gravty' is not defined"),
+            (("mass*gravty*cos_phi = N1", "mass*radius*phi_dd = K1*N1"), "gravty is not known; did you mean gravity?"),
             (("mass*gravity = N1*N1", "mass*radius*phi_dd = K1*N1"), "a balance is a sum of multiples"),
             (("mass*gravity = 0", "mass*radius*phi_dd = K1*N1"), "do not determine"),
-            (("mass*gravity = sqrt(N1)", "mass*radius*phi_dd = K1*N1"), "sqrt"),
-            (("mass*gravity = N1",), "1 balances: give two"),
+            (("mass*gravity = sqrt(N1)", "mass*radius*phi_dd = K1*N1"), "sqrt is not known"),
+            (("mass/radius = N1", "mass*radius*phi_dd = K1*N1"), "only sums, .* such as a quotient"),
+            (("mass*gravity - N1", "mass*radius*phi_dd = K1*N1"), "an equation, with one `=`"),
+            (("mass*radius*phi_dd = K1*N1", "mass*gravity = N1"), "has no phi_dd: the last balance"),
+            (("mass*gravity = N1",), "1 in number: give two .* is a comma missing"),
         ],
     )
     def test_wrong_balance_is_told_with_its_text(self, balances, message):
         with pytest.raises(TypeError, match=f"OneContact: .*{message}"):
             ring.body(balances=balances, energy="0")(ring.OneContact)
+
+
+class Falling(NamedTuple):
+    """A particle on a race, with a field that equals a product of others."""
+
+    mass: float
+    radius: float
+    gravity: float
+    inertia: float
+    constants: tuple[float, ...] = ()
+
+
+class TestEnergy:
+    """The energy of a declared body, against the work of its friction and the terms of its last balance."""
+
+    BALANCES = "N1 = mass*gravity*cos_phi + mass*radius*omega**2", "mass*radius*phi_dd = K1*N1 - mass*gravity*sin_phi"
+    WEIGHT = "- mass*gravity*radius*cos_phi"
+
+    @pytest.mark.parametrize(
+        ("last", "energy", "message"),
+        [
+            (BALANCES[1], f"0.5*mass*radius**2*omega**2 {WEIGHT}", None),
+            (BALANCES[1], f"0.5*inertia*omega**2 {WEIGHT}", None),
+            # Drag, and a force that is constant, are work that is not in the energy.
+            (f"{BALANCES[1]} - gravity*radius*omega + 0.1*mass*gravity", f"0.5*inertia*omega**2 {WEIGHT}", None),
+            (BALANCES[1], f"inertia*omega**2 {WEIGHT}", "another inertia"),
+            (BALANCES[1].replace("K1*N1", "-K1*N1"), f"0.5*inertia*omega**2 {WEIGHT}", "a sign is wrong"),
+            (BALANCES[1], "0.5*inertia*omega**2 + mass*gravity*radius*cos_phi", "the potential energy"),
+            (BALANCES[1], "0.5*inertia*omega**2", "the potential energy"),
+        ],
+    )
+    def test_energy_that_contradicts_the_last_balance_is_refused(self, last, energy, message):
+        ring.body(balances=(self.BALANCES[0], last), energy=energy)(Falling)
+        bodies = Falling(np.array([0.3, 2.0]), np.array([0.2, 1.5]), 9.81, np.array([0.3 * 0.2**2, 2.0 * 1.5**2]))
+        if message is None:
+            assert ring.completed(bodies).mass is bodies.mass
+        else:
+            with pytest.raises(ValueError, match=message):
+                ring.completed(bodies)
+
+    def test_field_that_a_scale_needs_is_named(self):
+        with pytest.raises(TypeError, match=r"Bare: .* field radius, constants"):
+            ring.body(balances=self.BALANCES, energy="0")(NamedTuple("Bare", [("mass", float), ("gravity", float)]))
 
 
 @ring.body(

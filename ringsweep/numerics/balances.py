@@ -9,6 +9,7 @@ computed once.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from difflib import get_close_matches
 from typing import Any
 
 #: Symbols of a product with their powers, in alphabetical order.
@@ -112,9 +113,19 @@ def read(text: str, names: Iterable[str]) -> Polynomial:
         If the text is not a polynomial in these names.
     """
     left, _, right = text.rpartition("=")
+    symbols = {name: symbol(name) for name in names}
     try:
         # Texts are part of Python files.
-        return _polynomial(eval(f"({right}) - ({left or 0})", {"__builtins__": {}}, {n: symbol(n) for n in names}))
+        return _polynomial(eval(f"({right}) - ({left or 0})", {"__builtins__": {}}, symbols))
+    except NameError as error:
+        near = get_close_matches(str(error.name), symbols, 1)
+        hint = f"did you mean {near[0]}? " if near else ""
+        raise ValueError(f"{text!r}: {error.name} is not known; {hint}(known: {', '.join(symbols)})") from None
+    except (TypeError, RecursionError):
+        raise ValueError(
+            f"{text!r}: only sums, differences, products and whole powers (**) are taken; a field of the body holds "
+            "anything else, such as a quotient or a sine"
+        ) from None
     except Exception as error:
         raise ValueError(f"{text!r}: {error}") from None
 

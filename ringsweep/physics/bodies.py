@@ -11,7 +11,12 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ringsweep.numerics.balances import ONE, Polynomial, Source, determinant, evaluate, read, solve, symbol
+
+# Rounding of a sum as a share of its terms.
+_ROUNDING = 1e-9
 
 _CONTACTS = ("N1", "N2", "K1", "K2")
 _BY_K = {"K1": symbol("slope_1"), "K2": symbol("slope_2")}
@@ -31,12 +36,15 @@ class Coordinate(NamedTuple):
         Derivatives of these numbers by the coordinate; those that are missing are 0.
     product : str
         One product of these numbers. Balances are linear in it and in them.
+    lever : Polynomial or float
+        Way along the contacts for each unit of the coordinate.
     """
 
     acceleration: str
     motion: tuple[str, str, str]
     by_place: Mapping[str, Any]
     product: str
+    lever: Any
 
 
 #: Angle of a body that moves round an axis.
@@ -45,10 +53,11 @@ ANGLE = Coordinate(
     ("sin_phi", "cos_phi", "omega"),
     {"sin_phi": symbol("cos_phi"), "cos_phi": -symbol("sin_phi")},
     "omega**2",
+    symbol("radius"),
 )
 
 #: Displacement of a body along a line, on which a given force acts.
-LINE = Coordinate("x_dd", ("x", "force", "velocity"), {"x": 1.0}, "x**3")
+LINE = Coordinate("x_dd", ("x", "force", "velocity"), {"x": 1.0}, "x**3", 1.0)
 
 
 class Equations:
@@ -82,7 +91,8 @@ class Equations:
     ):
         self.texts, self.contacts = tuple(balances), len(balances) - 1
         if self.contacts not in (1, 2):
-            raise ValueError(f"{len(balances)} balances: give two for one contact, or three for two contacts")
+            problem = "give two for one contact, or three for two contacts; is a comma missing?"
+            raise ValueError(f"{len(balances)} in number: {problem}")
         self.coordinate, motion, acceleration = coordinate, coordinate.motion, coordinate.acceleration
         self.unknowns = (acceleration, "N1", "N2")[: 1 + self.contacts]
         products = "1", *motion, coordinate.product, "F1", "F2"
@@ -95,11 +105,15 @@ class Equations:
         single = [((name, 1),) for name in (acceleration, "N1", "N2")]
         taken = {(("K1", 1), ("N1", 1)), (("K2", 1), ("N2", 1)), *single, *self.basis}
         for text, balance in zip(balances, self.balances, strict=True):
+            if text.count("=") != 1:
+                raise ValueError(f"{text!r}: a balance is an equation, with one `=`")
             if not set(balance.parts((*motion, acceleration, *_CONTACTS))) <= taken:
                 raise ValueError(
                     f"{text!r}: a balance is a sum of multiples of {acceleration}, N1, N2, K1*N1, K2*N2, "
                     f"{', '.join(products[1:5])} and 1"
                 )
+        if not self.balances[-1].rate({acceleration: 1.0}):
+            raise ValueError(f"{balances[-1]!r} has no {acceleration}: the last balance is the one along the motion")
         self.numerators, self.whole = solve(self.balances, self.unknowns)
         free = sum(self.whole.substitute(_FREE).values())
         if free == 0.0:
@@ -112,6 +126,30 @@ class Equations:
     def constants(self, body: Any) -> tuple[Any, ...]:
         """Numbers of a body that depend on its fields only."""
         return tuple(evaluate(p, body) for p in self.source.constants.values())
+
+    def contradiction(self, body: Any) -> str | None:
+        """How energy and last balance of a body contradict each other; None if they do not.
+
+        The energy would only repeat the last balance if it were never compared with anything else. What friction does
+        to it must be the work of friction, and what depends on the place must follow from it.
+        """
+        (velocity, last), energy = (self.coordinate.motion[-1], self.balances[-1]), self.energy
+        by_place, by_velocity = (energy.rate(by) for by in self._rates()[:2])
+        inertia = last.rate({self.unknowns[0]: 1.0}) * symbol(velocity)
+        for K, N in (("K1", "N1"), ("K2", "N2"))[: self.contacts]:
+            work = by_velocity * last.rate({K: 1.0}).rate({N: 1.0}) + inertia * self.coordinate.lever
+            if not _vanishes(work, body, self.coordinate.motion):
+                return (
+                    f"{self.texts[-1]!r}: {K}*{N} does not do the work of friction on the energy: "
+                    "the kinetic energy has another inertia, or a sign is wrong"
+                )
+        held = dict.fromkeys((velocity, *_CONTACTS, self.unknowns[0]), 0.0)
+        work = by_place * inertia - by_velocity * last.substitute(held)
+        # A force that is constant or given need not be in the energy.
+        work = Polynomial(term for term in work.items() if set(dict(term[0])) & set(self.coordinate.by_place))
+        if not _vanishes(work, body, self.coordinate.motion):
+            return f"{self.texts[-1]!r}: the terms that depend on the place do not follow from the potential energy"
+        return None
 
     def lines(self, name: str) -> list[str]:
         """Body of the function of this name of :mod:`ringsweep.physics.ring`."""
@@ -214,6 +252,15 @@ class Equations:
     def _terms(self, balance: Polynomial) -> list[str]:
         parts = balance.parts((*self.coordinate.motion, self.unknowns[0], *_CONTACTS))
         return [self.source.value(Polynomial([(key, 1.0)]) * factor) for key, factor in parts.items()]
+
+
+def _vanishes(p: Polynomial, body: Any, motion: Collection[str]) -> bool:
+    """Whether a polynomial is 0 for a body, or for an array of bodies, at any motion, but for rounding."""
+    for factor in p.parts(motion).values():
+        terms = [evaluate(Polynomial([term]), body) for term in factor.items()]
+        if not np.all(abs(sum(terms)) <= _ROUNDING * sum(map(abs, terms))):
+            return False
+    return True
 
 
 def _in_terms(whole: Polynomial) -> Polynomial:

@@ -675,7 +675,11 @@ def _defined(name: str, qualified: str, text: str, unit: str) -> type:
     if not function.value.varies or not function.units:
         raise FormulaError("it must depend on t, and on a parameter, which has the unit")
     what = "force" if unit == "N" else "drive"
-    parameters = {name: Parameter(of, f"parameter {name} of the {what}") for name, of in function.units.items()}
+    unknown = "not known from the formula"
+    parameters = {
+        name: Parameter(of, f"parameter {name} of the {what}", unit_in_words="" if of else unknown)
+        for name, of in function.units.items()
+    }
     try:
         return _make(name, f"{text}, {unit}", function, parameters, qualified)
     except OverflowError:

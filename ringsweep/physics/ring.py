@@ -414,6 +414,9 @@ def body(
     """
 
     def declare(cls: Any) -> Any:
+        needed = ("mass", "gravity", *({"radius"} if coordinate is ANGLE else ()), "constants")
+        if missing := [field for field in needed if field not in getattr(cls, "_fields", ())]:
+            raise TypeError(f"{cls.__name__}: a NamedTuple with the field {', '.join(missing)} is needed")
         for count in range(len(optional) + 1):
             for absent in combinations(optional, count):
                 variant = _VARIANTS[cls, frozenset(absent)] = _without(cls, absent)
@@ -461,8 +464,17 @@ def having(cls: type, part: str) -> list[type]:
 
 
 def completed(body: Any) -> Any:
-    """The body with its constants: numbers that depend on its other fields only."""
-    return body._replace(constants=EQUATIONS[type(body)].constants(body))
+    """The body with its constants: numbers that depend on its other fields only.
+
+    Raises
+    ------
+    ValueError
+        If energy and balances contradict each other; the message says where.
+    """
+    equations = EQUATIONS[type(body)]
+    if problem := equations.contradiction(body):
+        raise ValueError(problem)
+    return body._replace(constants=equations.constants(body))
 
 
 @body(

@@ -150,8 +150,19 @@ class SingleContactRing(Model, Continues):
         rest = friction_coefficients(structure, "friction.rest", values)
         surface = zones.surface_of(arcs, *rest)
         surfaces = [rest, *((arc.mu_s, arc.mu_k) for arc in arcs)]
+        try:
+            body = self.build_body(values)
+        except KeyError as error:
+            known = ", ".join(self.parameters(structure))
+            raise InputError(
+                "scene.model", f"{self.name}: no parameter {error} for its body (known: {known})"
+            ) from None
+        try:
+            body = ring.completed(body)
+        except ValueError as error:
+            raise InputError("scene.model", f"{self.name}: {error}") from None
         return self.scene_type(structure)(
-            body=ring.completed(self.build_body(values)),
+            body=body,
             surface=surface,
             law=law_of(structure, values, surfaces),
             drive=drive_of(structure, values),
