@@ -1,6 +1,6 @@
 """Audit of runs that go on after a contact is lost.
 
-A pivot is put into the balances as :mod:`ringsweep.models.ring.impact.pivot` writes them, with the accelerations of the
+A pivot is put into the balances as :mod:`ringsweep.physics.pivot` declares them, with the accelerations of the
 dense output: they give the reaction and the friction, which must obey the law. Gaps follow from the places of the
 balls.
 """
@@ -14,14 +14,13 @@ import numpy as np
 from ringsweep.compile import inlined
 from ringsweep.models.interface import audit
 from ringsweep.models.ring.audit import undecided_on_contacts
-from ringsweep.models.ring.impact import pivot
 from ringsweep.models.ring.impact.mode import (
     BOTH,
     NONE,
     angle_when_closed,
     closed_mode,
     coefficients_there,
-    holding,
+    frame,
     place_of,
     ring_of,
 )
@@ -29,7 +28,7 @@ from ringsweep.models.ring.impact.record import OUTCOMES
 from ringsweep.models.ring.impact.switch import SUMMED, motion_of
 from ringsweep.models.ring.record import Outcome
 from ringsweep.models.sliding import REACTION_TOLERANCE, larger
-from ringsweep.physics import ring
+from ringsweep.physics import pivot, ring
 from ringsweep.physics.friction.velocity import friction_at, stiction_band
 from ringsweep.physics.impact import ImpactRing, contact_of, inertia
 from ringsweep.physics.zones import PER_TURN, edge_ahead, roughness
@@ -64,14 +63,15 @@ def _violation(scene, mode, forcing, y, rates, s, tolerance):
 def _violation_on_one_contact(scene, mode, forcing, y, rates, s, tolerance):
     body, balls = scene.closed.body, scene.balls
     theta, ring_omega, ring_epsilon = forcing
-    f = pivot.frame(scene, holding(mode), mode.turned, y, ring_omega)
+    f = frame(scene, y, ring_omega)
     v, largest = y[1], 0.0
     # psi_dot = (v + rho eta_dot)/R + ring_omega, and alpha = psi - eta but for a constant.
     psi_dd = (rates[1] + balls.reach * rates[3]) / body.radius + ring_epsilon
     alpha_dd = psi_dd - rates[3]
-    square, load = f.psi_dot * f.psi_dot, pivot.size(scene, f) + balls.reach * abs(psi_dd)
-    normal = body.mass * (pivot.load(scene, f) + f.w * psi_dd)
-    along = body.mass * (balls.reach * alpha_dd + f.u * psi_dd - f.w * square + body.gravity * f.sin_alpha)
+    load = pivot.size(f) + balls.reach * abs(psi_dd)
+    # What the balances of momentum lack without a reaction and friction.
+    normal, lack, _ = pivot.imbalance(f, (psi_dd, alpha_dd, 0.0, 0.0))
+    along = -lack
     mu_s, mu_k = roughness(scene.closed.surface, (f.alpha - theta) * PER_TURN, 0.0)
     of_mode = coefficients_there(scene, place_of(mode))
     if of_mode[0] != mu_s or of_mode[1] != mu_k:
@@ -89,9 +89,9 @@ def _violation_on_one_contact(scene, mode, forcing, y, rates, s, tolerance):
     else:
         mu, slope = friction_at(scene.law, abs(v), (mu_s, mu_k))
         short = abs(along + (mu if v > 0.0 else -mu) * normal)
-        relaxation = abs(slope) * (pivot.size(scene, f) + abs(normal) / body.mass)
+        relaxation = abs(slope) * (pivot.size(f) + abs(normal) / body.mass)
         largest = larger(largest, -mode.sign * v / (tolerance * speed))
-    moment = inertia(body) * psi_dd + f.w * normal - f.q * along
+    _, _, moment = pivot.imbalance(f, (psi_dd, alpha_dd, normal, along))
     rate = (1.0 / s + relaxation) * tolerance * speed + _ROUNDING * load
     per_force = 1.0 / (body.mass * (rate * REACTION_TOLERANCE * 1e-2 + REACTION_TOLERANCE * tolerance * load))
     largest = larger(largest, short * per_force)

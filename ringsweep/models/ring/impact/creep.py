@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 from ringsweep.compile import inlined
 from ringsweep.models.interface import implicit
 from ringsweep.models.interface.shock import Located
-from ringsweep.models.ring.impact import pivot
 from ringsweep.models.ring.impact.mode import (
     FIRST,
     NONE,
@@ -20,12 +19,13 @@ from ringsweep.models.ring.impact.mode import (
     closed_mode,
     coefficients_there,
     delta_when_closed,
+    frame,
     holding,
     place_of,
     ring_of,
 )
 from ringsweep.models.ring.impact.rows import row_of
-from ringsweep.physics import drives, ring
+from ringsweep.physics import drives, pivot, ring
 from ringsweep.physics.friction.velocity import friction_in, region_bounds, stiction_band
 from ringsweep.physics.impact import ImpactRing, inertia, side_of
 from ringsweep.physics.zones import edge_ahead
@@ -121,37 +121,34 @@ def _friction(scene, mode, common, v):
 
 
 @inlined
-def _frame(scene, mode, forcing, x):
-    y = x[0] + forcing[0], x[1], x[2], x[3]
-    return pivot.frame(scene, holding(mode), mode.turned, y, forcing[1])
+def _frame(scene, forcing, x):
+    return frame(scene, implicit.from_implicit(scene, forcing, x), forcing[1])
 
 
 @inlined
-def _rates_from(scene, forcing, x, psi_dd, alpha_dd):
-    v_dot = pivot.sliding_acceleration(scene, psi_dd, alpha_dd, forcing[2])
+def _rates_from(scene, forcing, x, f, found):
+    v_dot = pivot.sliding_acceleration(f, found, scene.closed.body.radius * forcing[2])
     turning = (x[1] + scene.balls.reach * x[3]) / scene.closed.body.radius
-    return turning, v_dot, x[3], psi_dd - alpha_dd, 0.0
+    return turning, v_dot, x[3], found[0] - found[1], 0.0
 
 
 @implicit.rates.implements(ImpactRing)
 def _rates(scene, mode, common, forcing, x):
-    K, _ = _friction(scene, mode, common, x[1])
-    psi_dd, alpha_dd, _, _ = pivot.in_slip(scene, _frame(scene, mode, forcing, x), K)
-    return _rates_from(scene, forcing, x, psi_dd, alpha_dd)
+    f, (K, _) = _frame(scene, forcing, x), _friction(scene, mode, common, x[1])
+    return _rates_from(scene, forcing, x, f, pivot.in_slip(f, K))
 
 
 @implicit.linearise.implements(ImpactRing)
 def _linearise(scene, mode, common, t, forcing, x):
     nothing, (_, ring_omega, ring_epsilon) = (0.0, 0.0, 0.0, 0.0), forcing
-    f = _frame(scene, mode, forcing, x)
-    K, slope = _friction(scene, mode, common, x[1])
-    found = pivot.solved_in_slip(scene, f, K, pivot.sides(scene, f), 0.0)
+    f, friction = _frame(scene, forcing, x), _friction(scene, mode, common, x[1])
+    found = pivot.in_slip(f, friction[0])
     # Columns of the Jacobian, and the derivative by time at a constant state.
-    by_place = _derivative(scene, f, (K, slope), found, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    by_v = _derivative(scene, f, (K, slope), found, (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    by_eta = _derivative(scene, f, (K, slope), found, (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0))
-    by_rate = _derivative(scene, f, (K, slope), found, (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
-    by_time = _derivative(scene, f, (K, slope), found, nothing, (ring_omega, ring_epsilon, drives.jerk(scene.drive, t)))
+    by_place = _derivative(scene, f, friction, found, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    by_v = _derivative(scene, f, friction, found, (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    by_eta = _derivative(scene, f, friction, found, (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0))
+    by_rate = _derivative(scene, f, friction, found, (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+    by_time = _derivative(scene, f, friction, found, nothing, (ring_omega, ring_epsilon, drives.jerk(scene.drive, t)))
     per_radius = 1.0 / scene.closed.body.radius
     rows = (
         (0.0, per_radius, 0.0, scene.balls.reach * per_radius),
@@ -160,7 +157,7 @@ def _linearise(scene, mode, common, t, forcing, x):
         (by_place[1], by_v[1], by_eta[1], by_rate[1]),
     )
     jacobian = 0.0, per_radius, by_place[0], by_v[0]
-    rates = _rates_from(scene, forcing, x, found[0], found[1])
+    rates = _rates_from(scene, forcing, x, f, found)
     return rates, jacobian, implicit.Coupled(rows), (0.0, by_time[0], 0.0, by_time[1], 0.0)
 
 
@@ -168,23 +165,16 @@ def _linearise(scene, mode, common, t, forcing, x):
 def _derivative(scene, f, friction, found, state, forcing):
     """Derivatives of the rates of v and of eta_dot along a change of the state and of the forcing.
 
-    `friction` is K and its slope, `found` the solution of the balances. They are differentiated, see :mod:`pivot`.
+    `friction` is K and its slope, `found` the solution of the balances.
     """
-    body, balls = scene.closed.body, scene.balls
-    (K, slope), (psi_dd, _, normal, along) = friction, found
-    d_place, d_v, d_eta, d_rate = state
-    d_theta, d_omega, d_epsilon = forcing
-    d_alpha = d_place + d_theta - d_eta
-    d_psi_dot = (d_v + balls.reach * d_rate) / body.radius + d_omega
-    d_alpha_dot = d_psi_dot - d_rate
-    d_u, d_w = -f.w * d_eta, f.u * d_eta
-    square, d_square = f.psi_dot * f.psi_dot, 2.0 * f.psi_dot * d_psi_dot
-    d_load = d_u * square + f.u * d_square + 2.0 * balls.reach * f.alpha_dot * d_alpha_dot
-    d_across = d_load - body.gravity * f.sin_alpha * d_alpha + d_w * psi_dd
-    d_along = body.gravity * f.cos_alpha * d_alpha - d_w * square - f.w * d_square + d_u * psi_dd
-    sides = body.mass * d_across, body.mass * d_along, -d_w * normal - d_u * along
-    d_psi_dd, d_alpha_dd, _, _ = pivot.solved_in_slip(scene, f, K, sides, slope * d_v * normal)
-    return pivot.sliding_acceleration(scene, d_psi_dd, d_alpha_dd, d_epsilon), d_psi_dd - d_alpha_dd
+    (K, slope), (d_place, d_v, d_eta, d_rate), (d_theta, d_omega, d_epsilon) = friction, state, forcing
+    radius, d_alpha = scene.closed.body.radius, d_place + d_theta - d_eta
+    d_psi_dot = (d_v + f.reach * d_rate) / radius + d_omega
+    squares = 2.0 * f.psi_dot * d_psi_dot, 2.0 * f.alpha_dot * (d_psi_dot - d_rate)
+    change = f.cos_alpha * d_alpha, -f.sin_alpha * d_alpha, -f.w * d_eta, f.u * d_eta, *squares
+    rest = pivot.imbalance_of_change(f, found, change, pivot.NO_PRODUCTS)
+    changed = pivot.solved_in_slip(f, K, (*rest, slope * d_v * found[2]))
+    return pivot.sliding_acceleration(f, changed, radius * d_epsilon), changed[0] - changed[1]
 
 
 @implicit.guards_and_motion.implements(ImpactRing)
@@ -195,17 +185,16 @@ def _guards_and_motion(scene, mode, common, forcing, x):
         guards, (_, omega, epsilon, _) = implicit.guards_and_motion(
             ring_of(scene, mode.turned), closed_mode(mode), common.closed, forcing, _closed_state(mode, x)
         )
-        determinant, slow, normal_1, normal_2, ahead, fast = guards
+        jams, slow, normal_1, normal_2, ahead, fast = guards
         if mode.turned == 1:
             normal_1, normal_2 = normal_2, normal_1
         load = 0.05 * body.mass * (body.gravity + body.radius * omega * omega)
         near = 0.02 * ring.free_determinant(body)
         found = Motion(psi, omega, epsilon, normal_1, normal_2, 0.0, 0.0, x[4], near, load, load)
-        return (determinant, slow, normal_1, normal_2, ahead, fast), found
+        return (jams, slow, normal_1, normal_2, ahead, fast), found
     contact = holding(mode)
-    f = _frame(scene, mode, forcing, x)
-    K, _ = _friction(scene, mode, common, x[1])
-    psi_dd, _, normal, denominator = pivot.in_slip(scene, f, K)
+    f, (K, _) = _frame(scene, forcing, x), _friction(scene, mode, common, x[1])
+    (psi_dd, _, normal, _), jams = pivot.in_slip(f, K), pivot.determinant(f, K)
     side = side_of(contact)
     beta, turn = side * delta_when_closed(body, contact, mode.turned), 0.5 * side * x[2]
     gap = 4.0 * balls.half_distance * cos(beta + turn) * sin(turn)
@@ -214,13 +203,13 @@ def _guards_and_motion(scene, mode, common, forcing, x):
     rho = f.alpha - forcing[0]
     above, below = edge_ahead(scene.closed.surface, place, 1) - rho, rho - edge_ahead(scene.closed.surface, place, -1)
     ahead = (above + _BEYOND) * (below + _BEYOND) if above < inf else inf
-    load = 0.05 * body.mass * pivot.size(scene, f)
+    load = 0.05 * body.mass * pivot.size(f)
     near = 0.02 * inertia(body)
     if mode.open == FIRST:
         found = Motion(psi, psi_dot, psi_dd, 0.0, normal, gap, 0.0, x[4], near, 0.0, load)
-        return (denominator, speed - low, gap, normal, ahead, high - speed), found
+        return (jams, speed - low, gap, normal, ahead, high - speed), found
     found = Motion(psi, psi_dot, psi_dd, normal, 0.0, 0.0, gap, x[4], near, load, 0.0)
-    return (denominator, speed - low, normal, gap, ahead, high - speed), found
+    return (jams, speed - low, normal, gap, ahead, high - speed), found
 
 
 @implicit.near_zero.implements(ImpactRing)

@@ -13,7 +13,7 @@ tells what the others are:
 
 from __future__ import annotations
 
-from math import pi
+from math import cos, pi, sin
 from typing import NamedTuple
 
 from ringsweep.compile import inlined, replacing
@@ -21,6 +21,8 @@ from ringsweep.models.ring.series import FAST
 from ringsweep.models.ring.series import Mode as ClosedMode
 from ringsweep.numerics.terms import FACTOR_ROWS
 from ringsweep.physics import ring
+from ringsweep.physics.impact import inertia, side_of
+from ringsweep.physics.pivot import Frame
 from ringsweep.physics.zones import coefficients
 
 #: Contacts that are open: none, contact 1, contact 2, both. A particle has contact 1 only.
@@ -198,3 +200,16 @@ def with_place(mode, place):
 def coefficients_there(scene, place):
     """Static and kinetic friction coefficient in a segment, and number of the zone."""
     return coefficients(scene.closed.surface, place[0])
+
+
+@inlined
+def frame(scene, y, ring_omega):
+    """Place and rates of the pivot in the state `y`."""
+    body, balls, code = scene.closed.body, scene.balls, int(y[6] + 0.5)
+    contact = 2 if code % TURNED == FIRST else 1
+    delta = delta_when_closed(body, contact, code // TURNED) + y[2]
+    alpha, psi_dot = y[0] - delta, (y[1] + balls.reach * y[3]) / body.radius + ring_omega
+    a, h, s, c, alpha_dot = side_of(contact) * balls.half_distance, balls.offset, sin(delta), cos(delta), psi_dot - y[3]
+    of_body = body.mass, inertia(body), body.gravity, balls.radius, balls.reach
+    of_place = alpha, sin(alpha), cos(alpha), h * c - a * s, a * c + h * s
+    return Frame(*of_body, *of_place, psi_dot, alpha_dot, psi_dot * psi_dot, alpha_dot * alpha_dot)

@@ -14,7 +14,6 @@ from math import atan2, cos, inf, pi, sin, sqrt
 from ringsweep.compile import inlined
 from ringsweep.models.interface import series
 from ringsweep.models.interface.shock import Located
-from ringsweep.models.ring.impact import pivot
 from ringsweep.models.ring.impact.mode import (
     BOTH,
     ETA,
@@ -35,12 +34,12 @@ from ringsweep.models.ring.impact.mode import (
     code_of,
     coefficients_there,
     delta_when_closed,
+    frame,
     holding,
     place_of,
     with_slip,
 )
 from ringsweep.models.ring.series import (
-    COS,
     DETERMINANT,
     EDGE,
     EPSILON,
@@ -51,7 +50,6 @@ from ringsweep.models.ring.series import (
     NORMAL_2,
     OMEGA,
     PHI,
-    SIN,
     SLOW,
     SQUARE,
     THETA,
@@ -70,7 +68,7 @@ from ringsweep.numerics.series import (
     variation,
 )
 from ringsweep.numerics.terms import inner_products, joined, no_factors, part_from, set_factors, set_terms, terms
-from ringsweep.physics import drives, ring
+from ringsweep.physics import drives, pivot, ring
 from ringsweep.physics.friction.velocity import (
     begin_series,
     no_products,
@@ -80,7 +78,7 @@ from ringsweep.physics.friction.velocity import (
     stiction_band,
     varies,
 )
-from ringsweep.physics.impact import ImpactRing, inertia, side_of
+from ringsweep.physics.impact import ImpactRing, side_of
 from ringsweep.physics.zones import edge_ahead
 
 # Size below which a gap and its rate may be rounding, as a share of rho and of the speed of the body.
@@ -120,15 +118,11 @@ def _fill_constant(row, number):
 @inlined
 def _expand_pivot(scene, mode, t, y, tolerance, c):
     body, balls = scene.closed.body, scene.balls
-    contact, place = holding(mode), place_of(mode)
-    ring_omega = c[RING + THETA, 1]
-    f = pivot.frame(scene, contact, mode.turned, y, ring_omega)
-    delta = delta_when_closed(body, contact, mode.turned) + y[2]
     fresh = (mode.zeros_1 if mode.open == FIRST else mode.zeros_2) if y[2] == 0.0 else 0
     c[RING + PHI, 0], c[RING + V, 0], c[ETA, 0] = y[0], y[1], y[2]
-    at = f, sin(delta), cos(delta), (0.0 if fresh > 1 else y[3]), fresh
-    sharpness = _expand_pivot_motion(scene, mode, at, c)
-    _expand_pivot_guards(scene, mode, f, place, y[2], fresh, c)
+    f = frame(scene, (y[0], y[1], y[2], 0.0 if fresh > 1 else y[3], 0.0, 0.0, y[6]), c[RING + THETA, 1])
+    sharpness = _expand_pivot_motion(scene, mode, f, fresh, c)
+    _expand_pivot_guards(scene, mode, f, place_of(mode), y[2], fresh, c)
     per_angle = 1.0 / tolerance
     speed = body.radius * (1.0 + abs(f.psi_dot) + abs(f.alpha_dot))
     if mode.region < 0:
@@ -136,89 +130,78 @@ def _expand_pivot(scene, mode, t, y, tolerance, c):
     per_load = 1.0 / REACTION_TOLERANCE * per_angle
     if varies(scene.law, mode.region):
         per_load = max(per_load, 1e3)
-    load = pivot.size(scene, f) + balls.reach * abs(c[RING + EPSILON, 0])
-    own = RING + (NORMAL_2 if contact == 2 else NORMAL_1)
+    load = pivot.size(f) + balls.reach * abs(c[RING + EPSILON, 0])
+    own = RING + (NORMAL_2 if mode.open == FIRST else NORMAL_1)
     motion = (RING + PHI, per_angle), (ETA, per_angle), (RING + V, per_angle / speed)
     loads = (RING + EPSILON, per_load * balls.reach / load), (own, per_load / (body.mass * load))
     return shorten_for_decay(sharpness, c[RING + V], step_within(c, (*motion, *loads)))
 
 
 @inlined
-def _expand_pivot_motion(scene, mode, at, c):
+def _expand_pivot_motion(scene, mode, f, fresh, c):
     """Fill the series of a pivot, and the guards of its friction in stick; return the sharpness of the friction law.
 
     Coefficient k of a product of two series is the sum of their coefficients 0 and k, crosswise, and of what is known
     before. So the coefficients of accelerations and forces solve the balances with other right sides, see
-    :mod:`pivot`.
+    :mod:`ringsweep.physics.pivot`.
     """
-    f, s_d0, c_d0, eta_dot, fresh = at
-    body, balls, law, slips = scene.closed.body, scene.balls, scene.law, mode.sign != 0
-    mass, gravity, race, rho, h = body.mass, body.gravity, body.radius, balls.reach, balls.offset
-    a = side_of(holding(mode)) * balls.half_distance
+    law, race, slips, sign = scene.law, scene.closed.body.radius, mode.sign != 0, float(mode.sign)
     own_row = RING + (NORMAL_2 if mode.open == FIRST else NORMAL_1)
-    sign = float(mode.sign)
     mu_s, mu_k, _ = coefficients_there(scene, place_of(mode))
     surfaces = mu_s, mu_k
     (mu,), begun, sharpness = begin_series(law, mode.region, sign * c[RING + V, 0], surfaces)
-    K_0, f = (-sign * mu if slips else 0.0), pivot.with_rates(f, f.psi_dot, f.psi_dot - eta_dot)
-    om_0, ad_0, sq_0 = f.psi_dot, f.alpha_dot, f.psi_dot * f.psi_dot
-    if slips:
-        psi_dd, alpha_dd, N_0, F_0 = pivot.solved_in_slip(scene, f, K_0, pivot.sides(scene, f), 0.0)
-    else:
-        psi_dd, alpha_dd, N_0, F_0 = pivot.in_stick(scene, f, 2.0 * c[RING + THETA, 2])
-    psi_dd0, P_0 = psi_dd, f.w - K_0 * f.q
+    K_0 = -sign * mu if slips else 0.0
+    solution = pivot.in_slip(f, K_0) if slips else pivot.in_stick(f, race * (2.0 * c[RING + THETA, 2]))
+    psi_dd, alpha_dd, N_0, F_0 = solution
+    # The lever of the force at the contact about the centre of mass, in slip.
+    q_0 = f.radius - f.u
+    lever_0 = f.w - K_0 * q_0
     if fresh == 3:
         alpha_dd = psi_dd
-    c[RING + OMEGA, 0], c[RING + EPSILON, 0], c[RING + SQUARE, 0], c[own_row, 0] = om_0, psi_dd, sq_0, N_0
-    least = LEAST_DETERMINANT * inertia(body) if varies(law, mode.region) else 0.0
+    c[RING + OMEGA, 0], c[RING + EPSILON, 0], c[RING + SQUARE, 0] = f.psi_dot, psi_dd, f.psi_square
+    c[own_row, 0] = N_0
     if slips:
-        c[RING + DETERMINANT, 0] = pivot.determinant(scene, f, K_0) - least
+        least = LEAST_DETERMINANT * f.inertia if varies(law, mode.region) else 0.0
+        c[RING + DETERMINANT, 0] = pivot.determinant(f, K_0) - least
     else:
         # Forward slip begins where friction against it no longer suffices.
         c[RING + SLOW, 0], c[RING + FAST, 0] = mu_s * N_0 + F_0, mu_s * N_0 - F_0
-    om_before, ad_before = om_0, ad_0
-    own = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    of_law = no_products(law, surfaces)
-    first = newest = no_factors(joined(own, of_law))
+    om_before, ad_before = f.psi_dot, f.alpha_dot
+    own = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    before_law, of_law = joined(own, pivot.NO_PRODUCTS), no_products(law, surfaces)
+    law_left = law_right = of_law
+    first = newest = no_factors(joined(before_law, of_law))
     for k in range(1, ORDER + 1):
         om, ad, K, v = psi_dd * INVERSE[k], alpha_dd * INVERSE[k], 0.0, 0.0
         inner = inner_products(c, PRODUCTS, k, first, newest)
-        i_sa, i_ca, i_sd, i_cd, i_sq, i_ad, i_usq, i_wsq, i_we, i_ue, i_wN, i_uF, i_KN, i_Ku, i_wP = part_from(
-            inner, own, ()
-        )
-        law_left = law_right = of_law
+        i_sa, i_ca, i_u, i_w, i_om, i_ad, i_KN, i_Ku, i_wl = part_from(inner, own, ())
         if slips:
-            v = rho * ad + balls.radius * om - race * ((k + 1.0) * c[RING + THETA, k + 1])
+            v = f.reach * ad + f.radius * om - race * ((k + 1.0) * c[RING + THETA, k + 1])
             (mu,), law_left, law_right = series_term(
-                law, mode.region, k, sign * v, part_from(inner, of_law, own), begun, surfaces
+                law, mode.region, k, sign * v, part_from(inner, of_law, before_law), begun, surfaces
             )
             K = -sign * mu
         dd_before = om_before - ad_before
-        s_a = (i_sa + ad_before * f.cos_alpha) * INVERSE[k]
-        c_a = -(i_ca + ad_before * f.sin_alpha) * INVERSE[k]
-        s_d, c_d = (i_sd + dd_before * c_d0) * INVERSE[k], -(i_cd + dd_before * s_d0) * INVERSE[k]
-        # The lever q of friction is the radius of the ball less u.
-        u, w = h * c_d - a * s_d, a * c_d + h * s_d
-        sq, squared = i_sq + 2.0 * om_0 * om, i_ad + 2.0 * ad_0 * ad
-        across = gravity * c_a + rho * squared + i_usq + u * sq_0 + f.u * sq + i_we + w * psi_dd0
-        along = gravity * s_a - (i_wsq + w * sq_0 + f.w * sq) + i_ue + u * psi_dd0
-        sides = mass * across, mass * along, -(i_wN + w * N_0) - (i_uF + u * F_0)
-        P = w - (K * f.q - K_0 * u - i_Ku)
+        s_a, c_a = (i_sa + ad_before * f.cos_alpha) * INVERSE[k], -(i_ca + ad_before * f.sin_alpha) * INVERSE[k]
+        u, w = -(i_u + dd_before * f.w) * INVERSE[k], (i_w + dd_before * f.u) * INVERSE[k]
+        change = s_a, c_a, u, w, i_om + 2.0 * f.psi_dot * om, i_ad + 2.0 * f.alpha_dot * ad
+        rest = pivot.imbalance_of_change(f, solution, change, part_from(inner, pivot.NO_PRODUCTS, own))
+        lever = w - K * q_0 + K_0 * u + i_Ku
         if slips:
-            psi_dd, alpha_dd, N, F = pivot.solved_in_slip(scene, f, K_0, sides, i_KN + K * N_0)
-            c[RING + DETERMINANT, k] = mass * (i_wP + w * P_0 + f.w * P)
+            found = pivot.solved_in_slip(f, K_0, (*rest, i_KN + K * N_0))
+            c[RING + DETERMINANT, k] = f.mass * (i_wl + w * lever_0 + f.w * lever)
         else:
-            carried = race * ((k + 1.0) * (k + 2.0) * c[RING + THETA, k + 2])
-            psi_dd, alpha_dd, N, F = pivot.solved_in_stick(scene, f, sides, carried)
-            c[RING + SLOW, k], c[RING + FAST, k] = mu_s * N + F, mu_s * N - F
-        left = (ad_before, ad_before, dd_before, dd_before, om, ad, u, w, w, u, w, u, K, K, w)
-        right = (c_a, s_a, c_d, s_d, om, ad, sq, sq, psi_dd, psi_dd, N, F, N, u, P)
+            found = pivot.solved_in_stick(f, (*rest, -race * ((k + 1.0) * (k + 2.0) * c[RING + THETA, k + 2])))
+            c[RING + SLOW, k], c[RING + FAST, k] = mu_s * found[2] + found[3], mu_s * found[2] - found[3]
+        psi_dd, alpha_dd, N, _ = found
+        left, right = pivot.left_factors(f, change, found), pivot.right_factors(f, change, found)
+        left = joined((ad_before, ad_before, dd_before, dd_before, om, ad, K, K, w), left)
+        right = joined((c_a, s_a, w, u, om, ad, N, u, lever), right)
         newest = set_factors(c, PRODUCTS, k, joined(left, law_left), joined(right, law_right))
         first = newest if k == 1 else first
         c[RING + PHI, k], c[RING + OMEGA, k], c[RING + V, k] = om_before * INVERSE[k], om, v
-        c[RING + EPSILON, k], c[RING + SQUARE, k], c[own_row, k] = psi_dd, sq, N
-        c[ETA, k] = dd_before * INVERSE[k]
-        c[RING + SIN, k], c[RING + COS, k] = s_d, c_d
+        c[RING + EPSILON, k], c[RING + SQUARE, k], c[own_row, k] = psi_dd, change[4], N
+        c[ETA, k], c[X, k], c[Y, k] = dd_before * INVERSE[k], u, w
         om_before, ad_before = om, ad
     return sharpness if slips else 0.0
 
@@ -228,8 +211,9 @@ def _expand_pivot_guards(scene, mode, f, place, eta, fresh, c):
     """Fill the gap of the open contact and its guard; in slip also the ends of the region and of the zone."""
     balls, contact = scene.balls, holding(mode)
     side = side_of(contact)
+    a, h = side * balls.half_distance, balls.offset
     gap, guard = (GAP_1, RING + NORMAL_1) if mode.open == FIRST else (GAP_2, RING + NORMAL_2)
-    set_terms(c[gap], terms(c[RING + SIN]) * (2.0 * side * balls.half_distance))
+    set_terms(c[gap], (terms(c[Y]) * h - terms(c[X]) * a) * (2.0 * a / (a * a + h * h)))
     # From the angle eta itself, so that the smallest gap has all its digits.
     beta = side * delta_when_closed(scene.closed.body, contact, mode.turned)
     c[gap, 0] = 4.0 * balls.half_distance * cos(beta + 0.5 * side * eta) * sin(0.5 * side * eta)
@@ -238,7 +222,7 @@ def _expand_pivot_guards(scene, mode, f, place, eta, fresh, c):
     if mode.sign == 0:
         return
     body = scene.closed.body
-    size = pivot.size(scene, f) + body.radius * (abs(c[RING + EPSILON, 0]) + 2.0 * abs(c[RING + THETA, 2]))
+    size = pivot.size(f) + body.radius * (abs(c[RING + EPSILON, 0]) + 2.0 * abs(c[RING + THETA, 2]))
     expand_bounds(c, (RING + V, RING + SLOW, RING + FAST), mode, region_bounds(scene.law, mode.region), size)
 
 

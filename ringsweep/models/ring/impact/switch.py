@@ -33,6 +33,7 @@ from ringsweep.models.ring.impact.mode import (
     code_of,
     coefficients_there,
     delta_when_closed,
+    frame,
     from_closed,
     holding,
     in_flight,
@@ -62,6 +63,7 @@ from ringsweep.physics.impact import (
     relative_to_race,
     side_of,
 )
+from ringsweep.physics.pivot import determinant, in_stick, load
 from ringsweep.physics.zones import cross_edge, edge_ahead, locate
 
 #: Rebounds that end so soon that the gap could not grow to this share of rho are summed: the contact closes. The place
@@ -96,7 +98,7 @@ def motion_of(scene, y, ring_omega):
         return Motion(y[0], omega, s, omega * c, -c, omega * s)
     if contacts == BOTH:
         return Motion(y[0], y[1], y[2], y[3], y[4], y[5])
-    f = pivot.frame(scene, 2 if contacts == FIRST else 1, turned, y, ring_omega)
+    f = frame(scene, y, ring_omega)
     out, along = balls.reach + f.u, balls.reach * f.alpha_dot + f.u * f.psi_dot
     inwards = f.w * f.psi_dot
     return Motion(
@@ -148,7 +150,7 @@ def _opened(scene, t, y, before, which, zeros, event):
             # In the frame of a pivot this contact stands a revolution ahead of its angle in the closed ring.
             places = places[0], (places[1][0], places[1][1] + 1)
         empty = (zeros, 0) if which == FIRST else (0, zeros)
-        if pivot.load(scene, pivot.frame(scene, contact, turned, state, ring_omega)) > 0.0:
+        if load(frame(scene, state, ring_omega)) > 0.0:
             stick = make(0, KINETIC, -1, places, (which, turned), empty, event)
             status, mode = pivot.begun(scene, t, state, stick, 0)
             return status, mode, state
@@ -191,8 +193,8 @@ def _taken_along(scene, t, wedged):
     if mode.open == NONE:
         return wedged
     _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
-    f = pivot.frame(scene, holding(mode), mode.turned, y, ring_omega)
-    psi_dd, alpha_dd, _, _ = pivot.in_stick(scene, f, ring_epsilon)
+    carried = scene.closed.body.radius * ring_epsilon
+    psi_dd, alpha_dd, _, _ = in_stick(frame(scene, y, ring_omega), carried)
     state = y[0], y[1], y[2], (psi_dd - alpha_dd) / ring_epsilon * ring_omega, y[4], y[5], y[6]
     return status, with_zeros(mode, min(mode.zeros_1, 1), min(mode.zeros_2, 1)), state
 
@@ -287,8 +289,7 @@ def _on_one_contact(scene, mode, guard, t, y):
         found, state = with_slip(mode, sign, region, entry_guard), (y[0], v, *y[2:])
         _, ring_omega, _ = drives.turn(scene.drive, t)
         K, _ = pivot.friction(scene, found, v)
-        f = pivot.frame(scene, holding(found), found.turned, state, ring_omega)
-        denominator = pivot.in_slip(scene, f, K)[3]
+        denominator = determinant(frame(scene, state, ring_omega), K)
         return (RUNNING if denominator > 0.0 else BROKEN if isnan(denominator) else JAM), found, state
     mu_s, _, _ = coefficients_there(scene, place_of(mode))
     # A contact that nothing holds passes through rest.
@@ -302,7 +303,7 @@ def _beyond_nearer_edge(scene, mode, t, y):
     """Place of the contact that holds in a pivot after it has crossed the nearer edge."""
     theta, ring_omega, _ = drives.turn(scene.drive, t)
     place, surface = place_of(mode), scene.closed.surface
-    rho = pivot.frame(scene, holding(mode), mode.turned, y, ring_omega).alpha - theta
+    rho = frame(scene, y, ring_omega).alpha - theta
     above, below = edge_ahead(surface, place, 1) - rho, rho - edge_ahead(surface, place, -1)
     return cross_edge(surface, place, 1 if above <= below else -1)
 
@@ -314,7 +315,7 @@ def _begun(scene, t, y, stick, stick_end):
     _, ring_omega, _ = drives.turn(scene.drive, t)
     contact, turned = holding(stick), stick.turned
     # Friction in stick may have pressed the ball against the race: when it drops, the contact opens.
-    if status == JAM and not pivot.load(scene, pivot.frame(scene, contact, turned, y, ring_omega)) > 0.0:
+    if status == JAM and not load(frame(scene, y, ring_omega)) > 0.0:
         zeros = (2, stick.zeros_2) if contact == 1 else (stick.zeros_1, 2)
         flight = in_flight((stick.place_1, stick.place_2), turned, zeros, opens(contact, stick.event.number, t))
         return RUNNING, flight, state_in_flight(motion_of(scene, y, ring_omega), turned)
@@ -511,7 +512,7 @@ def _falls(scene, mode, t, y, motion, contact):
     if mode.open == BOTH:
         acceleration = 0.0, 0.0, -gravity
     elif mode.open == contact:
-        psi_dd, alpha_dd, _ = pivot.acceleration(scene, mode, t, y)
+        psi_dd, alpha_dd, _, _ = pivot.acceleration(scene, mode, t, y)
         acceleration = _of_center(scene, mode, t, y, psi_dd, alpha_dd)
     else:
         return 0.0
@@ -572,7 +573,7 @@ def _last_rebounds_end(scene, mode, t, y, motion, contact, speed):
 def _of_center(scene, mode, t, y, psi_dd, alpha_dd):
     """Accelerations of psi, x and y in a pivot."""
     _, ring_omega, _ = drives.turn(scene.drive, t)
-    f = pivot.frame(scene, holding(mode), mode.turned, y, ring_omega)
+    f = frame(scene, y, ring_omega)
     reach, square = scene.balls.reach, f.psi_dot * f.psi_dot
     out = -reach * f.alpha_dot * f.alpha_dot - psi_dd * f.w - square * f.u
     along = reach * alpha_dd + psi_dd * f.u - square * f.w
@@ -621,11 +622,11 @@ def _next(scene, t, motion, mode, impact, event):
         rate = opening / (2.0 * balls.half_distance * side * cos(delta))
     which = FIRST if contact == 2 else SECOND
     state = motion.psi, v, away, rate, 0.0, 0.0, float(which + TURNED * turned)
-    f = pivot.frame(scene, contact, turned, state, ring_omega)
+    f = frame(scene, state, ring_omega)
     # A place counts the revolutions of the angle that the frame has.
     place = locate(scene.closed.surface, f.alpha - theta)
     places = (places[0], place) if contact == 2 else (place, places[1])
-    if pivot.load(scene, f) > 0.0:
+    if load(f) > 0.0:
         stick = make(0, KINETIC, -1, places, (which, turned), zeros, event)
         status, found_mode = pivot.begun(scene, t, state, stick, 0)
         return status, found_mode, state
@@ -651,9 +652,9 @@ def _status_when_stalled(scene, mode, t, y):
         return BROKEN
     _, ring_omega, _ = drives.turn(scene.drive, t)
     K, _ = pivot.friction(scene, mode, y[1])
-    f = pivot.frame(scene, holding(mode), mode.turned, y, ring_omega)
+    f = frame(scene, y, ring_omega)
     nearly = NEARLY_JAMMED * inertia(scene.closed.body)
-    return BROKEN if pivot.in_slip(scene, f, K)[3] > nearly else _jammed(scene, mode, y[1])
+    return BROKEN if determinant(f, K) > nearly else _jammed(scene, mode, y[1])
 
 
 @modes.sticks.implements(ImpactRing)
