@@ -115,27 +115,15 @@ def _enter(scene, record, t, seen):
     return with_base(record, recorder.enter(scene.closed, record.base, t, seen[:5]))
 
 
+_with_angles = replacing("lowest", "highest", "phi_min", "phi_max")
+_with_normals = replacing("normal_min_1", "normal_min_2", "normal_max_1", "normal_max_2")
+
+
 @inlined
 def renamed(base, shift):
     """Record of the motion with angles that are greater by `shift`, rad, and with the contacts exchanged."""
-    b = base
-    return of_ring.Record(
-        b.sense,
-        b.reversals,
-        b.lowest + shift,
-        b.highest + shift,
-        b.phi_min + shift,
-        b.phi_max + shift,
-        b.omega_min,
-        b.omega_max,
-        b.stick_time,
-        b.normal_min_2,
-        b.normal_min_1,
-        b.normal_max_2,
-        b.normal_max_1,
-        b.shocks,
-        b.long_run,
-    )
+    b = _with_normals(base, base.normal_min_2, base.normal_min_1, base.normal_max_2, base.normal_max_1)
+    return _with_angles(b, b.lowest + shift, b.highest + shift, b.phi_min + shift, b.phi_max + shift)
 
 
 @inlined
