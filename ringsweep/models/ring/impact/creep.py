@@ -7,7 +7,7 @@ While both contacts hold, the steps are those of the closed ring. In a pivot the
 from __future__ import annotations
 
 from math import cos, inf, pi, sin, sqrt
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ringsweep.compile import inlined
 from ringsweep.models.interface import implicit
@@ -65,14 +65,6 @@ class Motion(NamedTuple):
     load_2: float
 
 
-class Common(NamedTuple):
-    """What the equations have in common within a step: that of the closed ring, and coefficients of the one surface."""
-
-    closed: Any
-    mu_s: float
-    mu_k: float
-
-
 @inlined
 def _closed_state(mode, x):
     return (x[0] - pi if mode.turned == 1 else x[0]), x[1]
@@ -90,9 +82,7 @@ def _from_implicit(scene, forcing, x):
 
 @implicit.common.implements(ImpactRing)
 def _common(scene, mode, forcing, x):
-    closed = implicit.common(ring_of(scene, mode.turned), closed_mode(mode), forcing, _closed_state(mode, x))
-    mu_s, mu_k, _ = coefficients_there(scene, place_of(mode))
-    return Common(closed, mu_s, mu_k)
+    return implicit.common(ring_of(scene, mode.turned), closed_mode(mode), forcing, _closed_state(mode, x))
 
 
 @implicit.is_stiff.implements(ImpactRing)
@@ -113,10 +103,10 @@ def _error_scales(scene, tolerance, x):
 
 
 @inlined
-def _friction(scene, mode, common, v):
+def _friction(scene, mode, v):
     """K at the contact that holds, and its derivative, s/m."""
-    sign = 1.0 if v >= 0.0 else -1.0
-    mu, slope = friction_in(scene.law, mode.region, abs(v), (common.mu_s, common.mu_k))
+    sign, (mu_s, mu_k, _) = 1.0 if v >= 0.0 else -1.0, coefficients_there(scene, place_of(mode))
+    mu, slope = friction_in(scene.law, mode.region, abs(v), (mu_s, mu_k))
     return -sign * mu, -slope
 
 
@@ -134,14 +124,14 @@ def _rates_from(scene, forcing, x, f, found):
 
 @implicit.rates.implements(ImpactRing)
 def _rates(scene, mode, common, forcing, x):
-    f, (K, _) = _frame(scene, forcing, x), _friction(scene, mode, common, x[1])
+    f, (K, _) = _frame(scene, forcing, x), _friction(scene, mode, x[1])
     return _rates_from(scene, forcing, x, f, pivot.in_slip(f, K))
 
 
 @implicit.linearise.implements(ImpactRing)
 def _linearise(scene, mode, common, t, forcing, x):
     nothing, (_, ring_omega, ring_epsilon) = (0.0, 0.0, 0.0, 0.0), forcing
-    f, friction = _frame(scene, forcing, x), _friction(scene, mode, common, x[1])
+    f, friction = _frame(scene, forcing, x), _friction(scene, mode, x[1])
     found = pivot.in_slip(f, friction[0])
     # Columns of the Jacobian, and the derivative by time at a constant state.
     by_place = _derivative(scene, f, friction, found, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -183,18 +173,18 @@ def _guards_and_motion(scene, mode, common, forcing, x):
     psi, psi_dot = x[0] + forcing[0], (x[1] + balls.reach * x[3]) / body.radius + forcing[1]
     if mode.open == NONE:
         guards, (_, omega, epsilon, _) = implicit.guards_and_motion(
-            ring_of(scene, mode.turned), closed_mode(mode), common.closed, forcing, _closed_state(mode, x)
+            ring_of(scene, mode.turned), closed_mode(mode), common, forcing, _closed_state(mode, x)
         )
-        jams, slow, normal_1, normal_2, ahead, fast = guards
+        determinant, slow, normal_1, normal_2, ahead, fast = guards
         if mode.turned == 1:
             normal_1, normal_2 = normal_2, normal_1
         load = 0.05 * body.mass * (body.gravity + body.radius * omega * omega)
         near = 0.02 * ring.free_determinant(body)
         found = Motion(psi, omega, epsilon, normal_1, normal_2, 0.0, 0.0, x[4], near, load, load)
-        return (jams, slow, normal_1, normal_2, ahead, fast), found
+        return (determinant, slow, normal_1, normal_2, ahead, fast), found
     contact = holding(mode)
-    f, (K, _) = _frame(scene, forcing, x), _friction(scene, mode, common, x[1])
-    (psi_dd, _, normal, _), jams = pivot.in_slip(f, K), pivot.determinant(f, K)
+    f, (K, _) = _frame(scene, forcing, x), _friction(scene, mode, x[1])
+    (psi_dd, _, normal, _), determinant = pivot.in_slip(f, K), pivot.determinant(f, K)
     side = side_of(contact)
     beta, turn = side * delta_when_closed(body, contact, mode.turned), 0.5 * side * x[2]
     gap = 4.0 * balls.half_distance * cos(beta + turn) * sin(turn)
@@ -207,9 +197,9 @@ def _guards_and_motion(scene, mode, common, forcing, x):
     near = 0.02 * inertia(body)
     if mode.open == FIRST:
         found = Motion(psi, psi_dot, psi_dd, 0.0, normal, gap, 0.0, x[4], near, 0.0, load)
-        return (jams, speed - low, gap, normal, ahead, high - speed), found
+        return (determinant, speed - low, gap, normal, ahead, high - speed), found
     found = Motion(psi, psi_dot, psi_dd, normal, 0.0, 0.0, gap, x[4], near, load, 0.0)
-    return (jams, speed - low, normal, gap, ahead, high - speed), found
+    return (determinant, speed - low, normal, gap, ahead, high - speed), found
 
 
 @implicit.near_zero.implements(ImpactRing)
