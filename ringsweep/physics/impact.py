@@ -175,14 +175,12 @@ def contact_of(balls, contact, motion):
 
 
 @inlined
-def gap_acceleration(balls, contact, motion, acceleration):
-    """Second derivative of a gap, m/s^2; `acceleration` is that of psi, x and y."""
+def free_gap_acceleration(balls, contact, motion, gravity):
+    """Second derivative of a gap of a body without contacts, m/s^2."""
     (across, up), (x, y), (x_dot, y_dot) = _center_of_ball(balls, contact, motion)
-    rate, (turning, x_dd, y_dd) = motion.psi_dot, acceleration
-    x_dd, y_dd = x_dd - turning * up - rate * rate * across, y_dd + turning * across - rate * rate * up
-    distance = hypot(x, y)
+    square, distance = motion.psi_dot * motion.psi_dot, hypot(x, y)
     around = (x * y_dot - y * x_dot) / distance
-    return -(x * x_dd + y * y_dd + around * around) / distance
+    return (x * square * across + y * (square * up + gravity) - around * around) / distance
 
 
 class Impulses(NamedTuple):

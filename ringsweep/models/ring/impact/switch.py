@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import cos, isnan, pi, sin
 from typing import NamedTuple
 
-from ringsweep.compile import inlined
+from ringsweep.compile import inlined, replacing
 from ringsweep.models.interface import modes
 from ringsweep.models.interface.status import (
     BROKEN,
@@ -57,7 +57,7 @@ from ringsweep.physics.impact import (
     Motion,
     after_impact,
     contact_of,
-    gap_acceleration,
+    free_gap_acceleration,
     impulses,
     inertia,
     relative_to_race,
@@ -135,7 +135,7 @@ def _presses(scene, contact, motion):
     """Whether a free body closes the gap of a contact that touches."""
     gravity = scene.closed.body.gravity
     least = -_NO_LOAD * (gravity + scene.balls.reach * motion.psi_dot * motion.psi_dot)
-    return gap_acceleration(scene.balls, contact, motion, (0.0, 0.0, -gravity)) < least
+    return free_gap_acceleration(scene.balls, contact, motion, gravity) < least
 
 
 @inlined
@@ -331,10 +331,8 @@ def _impact_friction(scene, contact, theta):
     return friction_at(scene.law, abs(contact.slip), (mu_s, mu_k))[0]
 
 
-@inlined
-def _held(contact, v):
-    """A contact that holds: its gap does not change, and its sliding velocity is a state."""
-    return Contact(contact.alpha, contact.sine, contact.cosine, 0.0, 0.0, v, contact.lever_n, contact.lever_t)
+# A contact that holds: its gap does not change, and its sliding velocity is a state.
+_held = replacing("gap", "opening", "slip")
 
 
 class _Landing(NamedTuple):
@@ -454,9 +452,9 @@ def _landing(scene, mode, hit, t, y):
             hits_1 = hits_1 or (first.gap <= near and first.opening < 0.0)
             hits_2 = hits_2 or (second.gap <= near and second.opening < 0.0)
     elif hit == 2:
-        first, holds_1 = _held(first, y[1]), True
+        first, holds_1 = _held(first, 0.0, 0.0, y[1]), True
     else:
-        second, holds_2 = _held(second, y[1]), True
+        second, holds_2 = _held(second, 0.0, 0.0, y[1]), True
     mu = _impact_friction(scene, first, theta), _impact_friction(scene, second, theta)
     return _Landing(motion, (first, second), (holds_1, holds_2), mu), (hits_1, hits_2)
 
@@ -508,15 +506,16 @@ def _try(scene, mode, t, y, landing, hits, restitution, lasts):
 @inlined
 def _falls(scene, mode, t, y, motion, contact):
     """Acceleration with which the gap of an open contact closes, m/s^2; 0 if the contact holds."""
-    gravity, acceleration = scene.closed.body.gravity, (0.0, 0.0, 0.0)
+    body, balls = scene.closed.body, scene.balls
     if mode.open == BOTH:
-        acceleration = 0.0, 0.0, -gravity
-    elif mode.open == contact:
-        psi_dd, alpha_dd, _, _ = pivot.acceleration(scene, mode, t, y)
-        acceleration = _of_center(scene, mode, t, y, psi_dd, alpha_dd)
-    else:
+        return -free_gap_acceleration(balls, contact, motion, body.gravity)
+    if mode.open != contact:
         return 0.0
-    return -gap_acceleration(scene.balls, contact, motion, acceleration)
+    psi_dd, alpha_dd, _, _ = pivot.acceleration(scene, mode, t, y)
+    # The measure of this gap is arm*sin(delta) plus a constant. At a gap of zero both have the same rate.
+    arm, delta = 2.0 * side_of(holding(mode)) * balls.half_distance, delta_when_closed(body, holding(mode), mode.turned)
+    rate = arm * cos(delta) * y[3]
+    return arm * (sin(delta) * y[3] * y[3] - cos(delta) * (psi_dd - alpha_dd)) - rate * rate / balls.reach
 
 
 @inlined
@@ -567,17 +566,6 @@ def _last_rebounds_end(scene, mode, t, y, motion, contact, speed):
     still = mode.event.time + mode.event.lasts - t if mode.event.kind == CLOSES else 0.0
     falls = _falls(scene, mode, t, y, motion, contact)
     return max(still, _time_of_rebounds(falls, speed, 0.0, _FORBIDDEN * scene.balls.reach))
-
-
-@inlined
-def _of_center(scene, mode, t, y, psi_dd, alpha_dd):
-    """Accelerations of psi, x and y in a pivot."""
-    _, ring_omega, _ = drives.turn(scene.drive, t)
-    f = frame(scene, y, ring_omega)
-    reach, square = scene.balls.reach, f.psi_dot * f.psi_dot
-    out = -reach * f.alpha_dot * f.alpha_dot - psi_dd * f.w - square * f.u
-    along = reach * alpha_dd + psi_dd * f.u - square * f.w
-    return psi_dd, out * f.sin_alpha + along * f.cos_alpha, along * f.sin_alpha - out * f.cos_alpha
 
 
 @inlined
