@@ -97,6 +97,13 @@ def expand_bounds(c, rows, mode, bounds, size):
         c[slow, 1] = 0.0
 
 
+@inlined
+def speed_in(scene, mode, speed):
+    """Unit of the error of the sliding velocity, m/s: `speed`, or less in the stiction band."""
+    # An error as large as the band would keep the creep from becoming steady.
+    return min(speed, 1e3 * stiction_band(scene.law)) if mode.region < 0 else speed
+
+
 # ---- audit ------------------------------------------------------------------------------------
 
 

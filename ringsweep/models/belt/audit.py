@@ -8,13 +8,12 @@ from ringsweep.compile import inlined
 from ringsweep.models.belt.force import breakaway_force, length_scale, sliding, speed_scale
 from ringsweep.models.belt.record import Outcome
 from ringsweep.models.interface import audit, implicit
-from ringsweep.models.sliding import audited, larger, of_balances
+from ringsweep.models.sliding import audited, larger, of_balances, speed_in
 from ringsweep.models.slip import acceleration_slopes, slip
 from ringsweep.physics import ring
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.forces import force_in
 from ringsweep.physics.friction.registry import holds_in_band
-from ringsweep.physics.friction.velocity import stiction_band
 from ringsweep.quantities.flags import OSCILLATORY, SEPARATING
 
 # An oscillation is certain if the two runs of a cell differ by less than this share of its swing.
@@ -50,8 +49,7 @@ def _violation(scene, mode, forcing, y, rates, s, tolerance):
         relaxation = abs(acceleration_slopes(scene, now)[1])
         # In a dead band the sliding velocity need not have the direction of the force.
         if not (holds_in_band(scene.law) and mode.region < 0):
-            if mode.region < 0:
-                speed = min(speed, 1e3 * stiction_band(scene.law))
+            speed = speed_in(scene, mode, speed)
             largest = -mode.sign * v / (tolerance * speed)
     scales = (1.0 / s + relaxation) * tolerance * speed, _terms(body, motion, forcing), tolerance
     violation, power = of_balances(scene, (K, K), ring.reactions(body, K, K, motion), motion, forcing, rates[1], scales)

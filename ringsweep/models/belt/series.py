@@ -21,7 +21,7 @@ from ringsweep.models.belt.force import (
 )
 from ringsweep.models.interface import modes, series
 from ringsweep.models.interface.status import RUNNING, SEPARATED_1
-from ringsweep.models.sliding import expand_bounds
+from ringsweep.models.sliding import expand_bounds, speed_in
 from ringsweep.numerics.series import INVERSE, ORDER, crossings, slope, step_within, value, variation
 from ringsweep.numerics.terms import (
     FACTOR_ROWS,
@@ -239,9 +239,7 @@ def _expand(scene, mode, t, y, tolerance, c):
     # The unit of length is the distance that belt, body or load could move within a natural period of the spring.
     length = abs(c[X, 0]) + length_scale(scene, abs(c[VELOCITY, 0]) + abs(c[SHIFT, 1]))
     speed = speed_scale(scene, length)
-    if mode.region < 0 and not holds_in_band(scene.law):
-        # An error as large as the stiction band would keep the creep from becoming steady.
-        speed = min(speed, 1e3 * stiction_band(scene.law))
+    speed = speed if holds_in_band(scene.law) else speed_in(scene, mode, speed)
     per_force = 0.0
     if mode.sign == 0 or (holds_in_band(scene.law) and mode.region < 0):
         # The guards are forces, whose series may converge more slowly than that of the motion.

@@ -16,10 +16,10 @@ from ringsweep.models.interface import audit
 from ringsweep.models.ring.bristles import slip_of
 from ringsweep.models.ring.contacts import coefficients_under
 from ringsweep.models.ring.record import Outcome
-from ringsweep.models.sliding import REACTION_TOLERANCE, audited, larger, of_balances
+from ringsweep.models.sliding import REACTION_TOLERANCE, audited, larger, of_balances, speed_in
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction import SetValued, family_of
-from ringsweep.physics.friction.velocity import friction_at, stiction_band
+from ringsweep.physics.friction.velocity import friction_at
 from ringsweep.physics.zones import Segments, edge_ahead, roughest
 from ringsweep.quantities.flags import SEPARATING
 
@@ -72,8 +72,7 @@ def _violation(scene, mode, forcing, y, rates, s, tolerance):
         _, determinant = ring.acceleration(body, K1, K2, motion)
         normal_1, normal_2 = ring.reactions(body, K1, K2, motion)
         relaxation = body.radius * abs(ring.acceleration_slope(body, K1, K2, slope_1, slope_2, motion))
-        if mode.region < 0:
-            speed = min(speed, 1e3 * stiction_band(scene.law))
+        speed = speed_in(scene, mode, speed)
         largest = larger(largest, -mode.sign * v / (tolerance * speed))
         if not determinant > 0.0:
             largest = inf

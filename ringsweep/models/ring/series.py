@@ -28,7 +28,7 @@ from ringsweep.models.ring.contacts import (
     places_beyond,
     zones_under,
 )
-from ringsweep.models.sliding import ENDS, REACTION_TOLERANCE, expand_bounds
+from ringsweep.models.sliding import ENDS, REACTION_TOLERANCE, expand_bounds, speed_in
 from ringsweep.numerics.series import (
     INVERSE,
     ORDER,
@@ -374,11 +374,7 @@ def _expand(scene, mode, t, y, tolerance, c):
     sharpness = _expand_slip(scene, mode, c)
     _expand_slip_guards(scene, mode, c)
     per_angle = 1.0 / tolerance
-    speed = scene.body.radius * (1.0 + abs(c[OMEGA, 0]))
-    if mode.region < 0:
-        # An error as large as the stiction band would keep the creep from becoming steady.
-        speed = min(speed, 1e3 * stiction_band(scene.law))
-    per_velocity = per_angle / speed
+    per_velocity = per_angle / speed_in(scene, mode, scene.body.radius * (1.0 + abs(c[OMEGA, 0])))
     # An error of the reactions could add or hide a separation. A bound on the acceleration is not enough: varying
     # friction changes the reactions even of a body that is too inert to be accelerated.
     per_load = 1.0 / REACTION_TOLERANCE * per_angle

@@ -27,9 +27,9 @@ from ringsweep.models.ring.impact.mode import (
 from ringsweep.models.ring.impact.record import OUTCOMES
 from ringsweep.models.ring.impact.switch import SUMMED, motion_of
 from ringsweep.models.ring.record import Outcome
-from ringsweep.models.sliding import REACTION_TOLERANCE, larger
+from ringsweep.models.sliding import REACTION_TOLERANCE, larger, speed_in
 from ringsweep.physics import pivot, ring
-from ringsweep.physics.friction.velocity import friction_at, stiction_band
+from ringsweep.physics.friction.velocity import friction_at
 from ringsweep.physics.impact import ImpactRing, contact_of, inertia
 from ringsweep.physics.zones import PER_TURN, edge_ahead, roughness
 from ringsweep.quantities.flags import SEPARATING
@@ -80,9 +80,7 @@ def _violation_on_one_contact(scene, mode, forcing, y, rates, s, tolerance):
         largest = inf if min(ahead, abs((f.alpha - theta) - edge_ahead(surface, place, -1))) > _ON_EDGE else 0.0
         mu_s, mu_k = of_mode[0], of_mode[1]
     # Errors of the rates, and of friction by that of the sliding velocity, which the implicit steps allow.
-    speed = body.radius * (1.0 + abs(f.psi_dot) + abs(f.alpha_dot))
-    if mode.region < 0:
-        speed = min(speed, 1e3 * stiction_band(scene.law))
+    speed = speed_in(scene, mode, body.radius * (1.0 + abs(f.psi_dot) + abs(f.alpha_dot)))
     relaxation = 0.0
     if mode.sign == 0:
         short = max(0.0, abs(along) - mu_s * normal)

@@ -55,7 +55,7 @@ from ringsweep.models.ring.series import (
     THETA,
     V,
 )
-from ringsweep.models.sliding import REACTION_TOLERANCE, expand_bounds
+from ringsweep.models.sliding import REACTION_TOLERANCE, expand_bounds, speed_in
 from ringsweep.numerics.series import (
     INVERSE,
     ORDER,
@@ -75,7 +75,6 @@ from ringsweep.physics.friction.velocity import (
     region_bounds,
     series_term,
     shorten_for_decay,
-    stiction_band,
     varies,
 )
 from ringsweep.physics.impact import ImpactRing, side_of
@@ -124,9 +123,7 @@ def _expand_pivot(scene, mode, t, y, tolerance, c):
     sharpness = _expand_pivot_motion(scene, mode, f, fresh, c)
     _expand_pivot_guards(scene, mode, f, place_of(mode), y[2], fresh, c)
     per_angle = 1.0 / tolerance
-    speed = body.radius * (1.0 + abs(f.psi_dot) + abs(f.alpha_dot))
-    if mode.region < 0:
-        speed = min(speed, 1e3 * stiction_band(scene.law))
+    speed = speed_in(scene, mode, body.radius * (1.0 + abs(f.psi_dot) + abs(f.alpha_dot)))
     per_load = 1.0 / REACTION_TOLERANCE * per_angle
     if varies(scene.law, mode.region):
         per_load = max(per_load, 1e3)
