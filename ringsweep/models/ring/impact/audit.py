@@ -20,6 +20,7 @@ from ringsweep.models.ring.impact.mode import (
     angle_when_closed,
     closed_mode,
     coefficients_there,
+    distances_to_edges,
     frame,
     place_of,
     ring_of,
@@ -31,7 +32,7 @@ from ringsweep.models.sliding import REACTION_TOLERANCE, larger, speed_in
 from ringsweep.physics import pivot, ring
 from ringsweep.physics.friction.velocity import friction_at
 from ringsweep.physics.impact import ImpactRing, contact_of, inertia
-from ringsweep.physics.zones import PER_TURN, edge_ahead, roughness
+from ringsweep.physics.zones import PER_TURN, roughness
 from ringsweep.quantities.flags import SEPARATING
 
 # Rounding of an acceleration or a reaction as a share of its largest terms, and of a gap as a share of rho.
@@ -72,13 +73,10 @@ def _violation_on_one_contact(scene, mode, forcing, y, rates, s, tolerance):
     # What the balances of momentum lack without a reaction and friction.
     normal, lack, _ = pivot.imbalance(f, (psi_dd, alpha_dd, 0.0, 0.0))
     along = -lack
-    mu_s, mu_k = roughness(scene.closed.surface, (f.alpha - theta) * PER_TURN, 0.0)
-    of_mode = coefficients_there(scene, place_of(mode))
-    if of_mode[0] != mu_s or of_mode[1] != mu_k:
-        place, surface = place_of(mode), scene.closed.surface
-        ahead = abs(edge_ahead(surface, place, 1) - (f.alpha - theta))
-        largest = inf if min(ahead, abs((f.alpha - theta) - edge_ahead(surface, place, -1))) > _ON_EDGE else 0.0
-        mu_s, mu_k = of_mode[0], of_mode[1]
+    rho, (mu_s, mu_k, _) = f.alpha - theta, coefficients_there(scene, place_of(mode))
+    ahead, behind = distances_to_edges(scene, mode, rho)
+    if (mu_s, mu_k) != roughness(scene.closed.surface, rho * PER_TURN, 0.0) and min(abs(ahead), abs(behind)) > _ON_EDGE:
+        largest = inf
     # Errors of the rates, and of friction by that of the sliding velocity, which the implicit steps allow.
     speed = speed_in(scene, mode, body.radius * (1.0 + abs(f.psi_dot) + abs(f.alpha_dot)))
     relaxation = 0.0

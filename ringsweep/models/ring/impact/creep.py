@@ -6,7 +6,7 @@ While both contacts hold, the steps are those of the closed ring. In a pivot the
 
 from __future__ import annotations
 
-from math import cos, inf, pi, sin, sqrt
+from math import inf, pi, sqrt
 from typing import NamedTuple
 
 from ringsweep.compile import inlined
@@ -18,17 +18,16 @@ from ringsweep.models.ring.impact.mode import (
     TURNED,
     closed_mode,
     coefficients_there,
-    delta_when_closed,
+    distances_to_edges,
     frame,
-    holding,
+    gap_measure,
     place_of,
     ring_of,
 )
 from ringsweep.models.ring.impact.rows import row_of
 from ringsweep.physics import drives, pivot, ring
 from ringsweep.physics.friction.velocity import friction_in, region_bounds, stiction_band
-from ringsweep.physics.impact import ImpactRing, inertia, side_of
-from ringsweep.physics.zones import edge_ahead
+from ringsweep.physics.impact import ImpactRing, inertia
 
 # Error allowed to a gap, in units of that allowed to the angle: the instant of an impact follows from it.
 _GAP_TOLERANCE = 1e-2
@@ -169,8 +168,7 @@ def _derivative(scene, f, friction, found, state, forcing):
 
 @implicit.guards_and_motion.implements(ImpactRing)
 def _guards_and_motion(scene, mode, common, forcing, x):
-    body, balls = scene.closed.body, scene.balls
-    psi, psi_dot = x[0] + forcing[0], (x[1] + balls.reach * x[3]) / body.radius + forcing[1]
+    body, psi = scene.closed.body, x[0] + forcing[0]
     if mode.open == NONE:
         guards, (_, omega, epsilon, _) = implicit.guards_and_motion(
             ring_of(scene, mode.turned), closed_mode(mode), common, forcing, _closed_state(mode, x)
@@ -182,23 +180,17 @@ def _guards_and_motion(scene, mode, common, forcing, x):
         near = 0.02 * ring.free_determinant(body)
         found = Motion(psi, omega, epsilon, normal_1, normal_2, 0.0, 0.0, x[4], near, load, load)
         return (determinant, slow, normal_1, normal_2, ahead, fast), found
-    contact = holding(mode)
     f, (K, _) = _frame(scene, forcing, x), _friction(scene, mode, x[1])
     (psi_dd, _, normal, _), determinant = pivot.in_slip(f, K), pivot.determinant(f, K)
-    side = side_of(contact)
-    beta, turn = side * delta_when_closed(body, contact, mode.turned), 0.5 * side * x[2]
-    gap = 4.0 * balls.half_distance * cos(beta + turn) * sin(turn)
-    low, high = region_bounds(scene.law, mode.region)
-    speed, place = mode.sign * x[1], place_of(mode)
-    rho = f.alpha - forcing[0]
-    above, below = edge_ahead(scene.closed.surface, place, 1) - rho, rho - edge_ahead(scene.closed.surface, place, -1)
+    gap, speed, (low, high) = gap_measure(scene, mode, x[2]), mode.sign * x[1], region_bounds(scene.law, mode.region)
+    above, below = distances_to_edges(scene, mode, f.alpha - forcing[0])
     ahead = (above + _BEYOND) * (below + _BEYOND) if above < inf else inf
     load = 0.05 * body.mass * pivot.size(f)
     near = 0.02 * inertia(body)
     if mode.open == FIRST:
-        found = Motion(psi, psi_dot, psi_dd, 0.0, normal, gap, 0.0, x[4], near, 0.0, load)
+        found = Motion(psi, f.psi_dot, psi_dd, 0.0, normal, gap, 0.0, x[4], near, 0.0, load)
         return (determinant, speed - low, gap, normal, ahead, high - speed), found
-    found = Motion(psi, psi_dot, psi_dd, normal, 0.0, 0.0, gap, x[4], near, load, 0.0)
+    found = Motion(psi, f.psi_dot, psi_dd, normal, 0.0, 0.0, gap, x[4], near, load, 0.0)
     return (determinant, speed - low, normal, gap, ahead, high - speed), found
 
 

@@ -23,7 +23,7 @@ from ringsweep.numerics.terms import FACTOR_ROWS
 from ringsweep.physics import ring
 from ringsweep.physics.impact import inertia, side_of
 from ringsweep.physics.pivot import Frame
-from ringsweep.physics.zones import coefficients
+from ringsweep.physics.zones import coefficients, edge_ahead
 
 #: Contacts that are open: none, contact 1, contact 2, both. A particle has contact 1 only.
 NONE, FIRST, SECOND, BOTH = range(4)
@@ -213,3 +213,18 @@ def frame(scene, y, ring_omega):
     of_body = body.mass, inertia(body), body.gravity, balls.radius, balls.reach
     of_place = alpha, sin(alpha), cos(alpha), h * c - a * s, a * c + h * s
     return Frame(*of_body, *of_place, psi_dot, alpha_dot, psi_dot * psi_dot, alpha_dot * alpha_dot)
+
+
+@inlined
+def gap_measure(scene, mode, eta):
+    """Measure ``(rho^2 - |c|^2)/(2 rho)`` of the gap in a pivot, m: the smallest gap has all its digits."""
+    contact, side = holding(mode), side_of(holding(mode))
+    beta, turn = side * delta_when_closed(scene.closed.body, contact, mode.turned), 0.5 * side * eta
+    return 4.0 * scene.balls.half_distance * cos(beta + turn) * sin(turn)
+
+
+@inlined
+def distances_to_edges(scene, mode, rho):
+    """Distances of the contact that holds in a pivot, at the angle `rho` in the ring's frame, from both edges, rad."""
+    surface, place = scene.closed.surface, place_of(mode)
+    return edge_ahead(surface, place, 1) - rho, rho - edge_ahead(surface, place, -1)

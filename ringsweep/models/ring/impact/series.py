@@ -33,8 +33,9 @@ from ringsweep.models.ring.impact.mode import (
     Y,
     code_of,
     coefficients_there,
-    delta_when_closed,
+    distances_to_edges,
     frame,
+    gap_measure,
     holding,
     place_of,
     with_slip,
@@ -78,7 +79,6 @@ from ringsweep.physics.friction.velocity import (
     varies,
 )
 from ringsweep.physics.impact import ImpactRing, side_of
-from ringsweep.physics.zones import edge_ahead
 
 # Size below which a gap and its rate may be rounding, as a share of rho and of the speed of the body.
 _NOISE = 1e-13
@@ -121,7 +121,7 @@ def _expand_pivot(scene, mode, t, y, tolerance, c):
     c[RING + PHI, 0], c[RING + V, 0], c[ETA, 0] = y[0], y[1], y[2]
     f = frame(scene, (y[0], y[1], y[2], 0.0 if fresh > 1 else y[3], 0.0, 0.0, y[6]), c[RING + THETA, 1])
     sharpness = _expand_pivot_motion(scene, mode, f, fresh, c)
-    _expand_pivot_guards(scene, mode, f, place_of(mode), y[2], fresh, c)
+    _expand_pivot_guards(scene, mode, f, y[2], fresh, c)
     per_angle = 1.0 / tolerance
     speed = speed_in(scene, mode, body.radius * (1.0 + abs(f.psi_dot) + abs(f.alpha_dot)))
     per_load = 1.0 / REACTION_TOLERANCE * per_angle
@@ -204,18 +204,14 @@ def _expand_pivot_motion(scene, mode, f, fresh, c):
 
 
 @inlined
-def _expand_pivot_guards(scene, mode, f, place, eta, fresh, c):
+def _expand_pivot_guards(scene, mode, f, eta, fresh, c):
     """Fill the gap of the open contact and its guard; in slip also the ends of the region and of the zone."""
-    balls, contact = scene.balls, holding(mode)
-    side = side_of(contact)
-    a, h = side * balls.half_distance, balls.offset
+    a, h = side_of(holding(mode)) * scene.balls.half_distance, scene.balls.offset
     gap, guard = (GAP_1, RING + NORMAL_1) if mode.open == FIRST else (GAP_2, RING + NORMAL_2)
     set_terms(c[gap], (terms(c[Y]) * h - terms(c[X]) * a) * (2.0 * a / (a * a + h * h)))
-    # From the angle eta itself, so that the smallest gap has all its digits.
-    beta = side * delta_when_closed(scene.closed.body, contact, mode.turned)
-    c[gap, 0] = 4.0 * balls.half_distance * cos(beta + 0.5 * side * eta) * sin(0.5 * side * eta)
+    c[gap, 0] = gap_measure(scene, mode, eta)
     _divide(c, gap, guard, fresh)
-    _expand_edges(scene, place, f.alpha - c[RING + THETA, 0], c)
+    _expand_edges(scene, mode, f.alpha - c[RING + THETA, 0], c)
     if mode.sign == 0:
         return
     body = scene.closed.body
@@ -224,44 +220,38 @@ def _expand_pivot_guards(scene, mode, f, place, eta, fresh, c):
 
 
 @inlined
-def _expand_edges(scene, place, rho, c):
+def _expand_edges(scene, mode, rho, c):
     """Fill the guard of the edges of the segment under the contact; `rho` is its angle in the ring's frame.
 
     A ball that pivots moves over the ring either way, whatever the sense of its slip, and even if it rolls. So the
     guard is the product of the distances from both edges. A distance that is zero is divided by the time.
     """
-    above, below = edge_ahead(scene.closed.surface, place, 1) - rho, rho - edge_ahead(scene.closed.surface, place, -1)
+    above, below = distances_to_edges(scene, mode, rho)
     if not above < inf:
         return
-    nearer = -1.0 if above <= below else 1.0
-    near, far = (above, below) if above <= below else (below, above)
+    near, far, sense = (above, below, -1.0) if above <= below else (below, above, 1.0)
+    c[SPARE, 0], shift = near, 0
     for k in range(1, ORDER + 1):
-        c[SPARE, k] = c[RING + PHI, k] - c[ETA, k] - c[RING + THETA, k]
-    shift = 0
+        c[SPARE, k] = sense * (c[RING + PHI, k] - c[ETA, k] - c[RING + THETA, k])
     if near <= _ON_EDGE:
-        near, shift = 0.0, 1
+        shift = 1
         while shift < ORDER and c[SPARE, shift] == 0.0:
             shift += 1
-    row = c[RING + EDGE]
-    for k in range(ORDER + 1):
-        # The distance from the nearer edge, divided, and that from the other one.
-        c[OTHER, k] = nearer * c[SPARE, k + shift] if 0 < k + shift <= ORDER else 0.0
-    if shift == 0:
-        c[OTHER, 0] = near
+    _divide(c, SPARE, OTHER, shift)
     for k in range(ORDER + 1):
         total = c[OTHER, k] * far
         for j in range(k):
-            total -= c[OTHER, j] * nearer * c[SPARE, k - j]
-        row[k] = total
+            total -= c[OTHER, j] * c[SPARE, k - j]
+        c[RING + EDGE, k] = total
 
 
 @inlined
-def _divide(c, gap, guard, zeros):
-    """Guard of a gap whose first coefficients are zero: its series divided by that power of the time."""
+def _divide(c, row, quotient, zeros):
+    """Fill `quotient` with a series whose first coefficients are zero, divided by that power of the time."""
     for k in range(zeros):
-        c[gap, k] = 0.0
+        c[row, k] = 0.0
     for k in range(ORDER + 1):
-        c[guard, k] = c[gap, k + zeros] if k + zeros <= ORDER else 0.0
+        c[quotient, k] = c[row, k + zeros] if k + zeros <= ORDER else 0.0
 
 
 # ---- flight -----------------------------------------------------------------------------------

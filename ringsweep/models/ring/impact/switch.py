@@ -33,6 +33,7 @@ from ringsweep.models.ring.impact.mode import (
     code_of,
     coefficients_there,
     delta_when_closed,
+    distances_to_edges,
     frame,
     from_closed,
     holding,
@@ -64,7 +65,7 @@ from ringsweep.physics.impact import (
     side_of,
 )
 from ringsweep.physics.pivot import determinant, in_stick, load
-from ringsweep.physics.zones import cross_edge, edge_ahead, locate
+from ringsweep.physics.zones import cross_edge, locate
 
 #: Rebounds that end so soon that the gap could not grow to this share of rho are summed: the contact closes. The place
 #: is then wrong by about as much.
@@ -302,10 +303,8 @@ def _on_one_contact(scene, mode, guard, t, y):
 def _beyond_nearer_edge(scene, mode, t, y):
     """Place of the contact that holds in a pivot after it has crossed the nearer edge."""
     theta, ring_omega, _ = drives.turn(scene.drive, t)
-    place, surface = place_of(mode), scene.closed.surface
-    rho = frame(scene, y, ring_omega).alpha - theta
-    above, below = edge_ahead(surface, place, 1) - rho, rho - edge_ahead(surface, place, -1)
-    return cross_edge(surface, place, 1 if above <= below else -1)
+    above, below = distances_to_edges(scene, mode, frame(scene, y, ring_omega).alpha - theta)
+    return cross_edge(scene.closed.surface, place_of(mode), 1 if above <= below else -1)
 
 
 @inlined
