@@ -77,11 +77,10 @@ class Record(NamedTuple):
     lost: Lost
 
 
+_COUNTS = Lost._fields.index("separations")
+
 #: Outcomes behind those of the ring without impact. The last two are for certificates only.
-OUTCOMES = (
-    *("open_time", "flight_time", "gap_max", "separations", "impacts", "impact_speed_max", "impulse_max"),
-    *("impact_loss", "tumbles", "t_recovered", "aftermath", "word", "impact_violation"),
-)
+OUTCOMES = ("open_time", "flight_time", "gap_max", *Lost._fields[_COUNTS:], "aftermath", "word", "impact_violation")
 
 
 @inlined
@@ -191,19 +190,6 @@ def _conclude(scene, record, status, t, place, velocity):
         r.t_first if was_lost else nan,
         *o[4:],
     )
-    own = (
-        record.open_time,
-        record.flight_time,
-        true_gap(scene, record.gap_max),
-        r.separations,
-        r.impacts,
-        r.impact_speed_max,
-        r.impulse_max,
-        r.impact_loss,
-        r.tumbles,
-        r.t_recovered,
-        float(aftermath),
-        r.word,
-        r.violation,
-    )
+    gap_max = true_gap(scene, record.gap_max)
+    own = record.open_time, record.flight_time, gap_max, *r[_COUNTS:], float(aftermath), r.word, r.violation
     return joined(base, own)
