@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, isnan
+from math import cos, inf, isnan
 
 from ringsweep.compile import inlined
 from ringsweep.models.interface.status import BROKEN, JAM, RUNNING
@@ -39,10 +39,13 @@ def friction(scene, mode, v):
 
 
 @inlined
-def _heading(scene, y, sign):
-    """Direction in which the ball moves over the ring: a ball that does not roll moves as it slides, with `sign`."""
+def _slipping(scene, stick, y, rho, slip):
+    """Mode of a pivot that begins to slip; `slip` is the sign, the region of the law, and the entry guard."""
+    # Over the ring the ball moves in the direction of its slip, unless it rolls.
     rolls = y[1] - scene.balls.radius * y[3]
-    return sign if rolls == 0.0 else 1 if rolls > 0.0 else -1
+    heading = slip[0] if rolls == 0.0 else 1 if rolls > 0.0 else -1
+    place = leave_edge(scene.closed.surface, place_of(stick), rho, heading)
+    return with_slip(with_place(stick, place), *slip)
 
 
 @inlined
@@ -54,7 +57,7 @@ def begun(scene, t, y, stick, stick_end):
     """
     body = scene.closed.body
     theta, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
-    contact, place, v = holding(stick), place_of(stick), y[1]
+    contact, v = holding(stick), y[1]
     f, carried = frame(scene, y, ring_omega), body.radius * ring_epsilon
     rho = f.alpha - theta
     if isnan(f.alpha + f.psi_dot + ring_epsilon):
@@ -65,18 +68,16 @@ def begun(scene, t, y, stick, stick_end):
     arm = 2.0 * scene.balls.half_distance * side_of(contact) * cos(delta_when_closed(body, contact, stick.turned))
     shut = -_SHUT * size(f)
     if v == 0.0 and stiction_band(scene.law) == 0.0:
-        mu_s, _, _ = coefficients_there(scene, place)
+        mu_s, _, _ = coefficients_there(scene, place_of(stick))
         if stick_end == 0:
             psi_dd, alpha_dd, normal, along = in_stick(f, carried)
             holds = normal > least and abs(along) <= mu_s * normal and mu_s > 0.0
             if holds and not (touches and arm * (psi_dd - alpha_dd) < shut):
                 return RUNNING, stick
         region = region_at(scene.law, 0.0)
-        best, best_sign = -1e300, 0
-        several = False
+        best, best_mode, several = -inf, stick, False
         for sign in (1, -1):
-            there = leave_edge(scene.closed.surface, place, rho, _heading(scene, y, sign))
-            slip = with_slip(with_place(stick, there), sign, region, RING + SLOW)
+            slip = _slipping(scene, stick, y, rho, (sign, region, RING + SLOW))
             K, _ = friction(scene, slip, 0.0)
             found = in_slip(f, K)
             psi_dd, alpha_dd, normal, _ = found
@@ -88,21 +89,15 @@ def begun(scene, t, y, stick, stick_end):
                 continue
             if determinant(f, K) > 0.0 and normal > least and push > best:
                 several = several or (best > least / body.mass and push > least / body.mass)
-                best, best_sign = push, sign
-        if several:
-            return JAM, stick
-        # A tie: for example a contact without friction.
-        if best_sign == 0 or best < -least / body.mass:
-            return JAM, stick
-        there = leave_edge(scene.closed.surface, place, rho, _heading(scene, y, best_sign))
-        return RUNNING, with_slip(with_place(stick, there), best_sign, region, RING + SLOW)
+                best, best_mode = push, slip
+        # A push of nothing is a tie: for example a contact without friction.
+        return (JAM, stick) if several or not best > -least / body.mass else (RUNNING, best_mode)
     sign, region, entry_guard = (1 if v > 0.0 else -1), region_at(scene.law, abs(v)), -1
     if v == 0.0:
         # Friction is zero here, so that the ball slides in the direction in which the other forces accelerate it.
         sign = 1 if sliding_acceleration(f, in_slip(f, 0.0), carried) >= 0.0 else -1
         entry_guard = RING + SLOW
-    there = leave_edge(scene.closed.surface, place, rho, _heading(scene, y, sign))
-    slip = with_slip(with_place(stick, there), sign, region, entry_guard)
+    slip = _slipping(scene, stick, y, rho, (sign, region, entry_guard))
     K, _ = friction(scene, slip, v)
     return (RUNNING if determinant(f, K) > 0.0 else JAM), slip
 
