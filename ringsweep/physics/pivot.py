@@ -75,7 +75,7 @@ _BALANCES = [
     _read("mass*(reach*alpha_dd + u*psi_dd - w*psi_square) = -mass*gravity*sin_alpha + F"),
     _read("inertia*psi_dd = -w*N + (radius - u)*F"),
 ]
-# Right less left side of these is friction beyond that of slip, and the sliding acceleration.
+# The right side less the left one is ``K N - F``, and the sliding acceleration.
 _SLIP, _STICK = _read("F = K*N"), _read("carried = reach*alpha_dd + radius*psi_dd")
 
 # Products of two numbers that change.
@@ -89,7 +89,7 @@ _REST = "rest_0", "rest_1", "rest_2", "rest_3"
 
 
 def _function(found: Sequence[Polynomial], whole: Polynomial = ONE, **arguments: Iterable[str]) -> Any:
-    """Function of a frame, and of `arguments` with these numbers in them, that returns polynomials over `whole`."""
+    """Function of a frame and of `arguments`, which are numbers or tuples of symbols: polynomials over `whole`."""
     source = Source(Frame._fields, ("K",))
     source.begin(plain=True)
     values = ", ".join(source.quotient(p, whole) for p in found)
@@ -117,19 +117,21 @@ left_factors, right_factors = (
     for i in (0, 1)
 )
 
-#: Right less left sides of the balances, N, N and N m, from a frame and a solution.
+#: Right sides of the balances less the left ones, N, N and N m, from a frame and a solution.
 imbalance = _function(_BALANCES, solution=UNKNOWNS)
 
-#: The same of a change of the motion at constant unknowns, from a frame, a solution, the change, and what is to be
-#: added to the change of each product.
+#: Their change with the motion at constant unknowns, from a frame, a solution, the change of the motion, and what is to
+#: be added to the change of each product.
 imbalance_of_change = _function(
     [_change(p) for p in _BALANCES], solution=UNKNOWNS, change=_CHANGE.values(), inner=_INNER
 )
 
-#: Solution in slip, from a frame, K, and the terms without unknowns in the balances and in F - K N, N, N, N m, N.
+#: Solution in slip, from a frame, K, and what stands for the terms without unknowns: in the balances, N, N and N m, and
+#: for ``F - K N``, N.
 solved_in_slip = _function(*_solution(_SLIP), K="K", rest=_REST)
 
-#: Solution in stick, from a frame and the terms without unknowns in the balances and in the sliding acceleration.
+#: Solution in stick, from a frame and what stands for the terms without unknowns: in the balances, and in the sliding
+#: acceleration, m/s^2.
 solved_in_stick = _function(*_solution(_STICK), rest=_REST)
 
 #: Determinant of the equations in slip, kg m^2, from a frame and K: M J times the acceleration that a reaction of 1 N

@@ -34,7 +34,8 @@ TURNED = 4
 NO_EVENT, OPENS, REBOUNDS, CLOSES = range(4)
 
 # Rows of the table of series before those of the closed ring: KIND holds the code of the state; GAP_1 and GAP_2 are
-# ``(rho^2 - |c|^2)/(2 rho)``, a measure of the gap that has a series; ETA belongs to a pivot, X and Y to a flight.
+# ``(rho^2 - |c|^2)/(2 rho)``, a measure of the gap that has a series; ETA belongs to a pivot; X and Y are the centre of
+# mass in a flight, and u and w of a pivot.
 KIND, GAP_1, GAP_2, ETA, X, Y, SPARE, OTHER = range(8)
 #: Groups of products of a pivot that grow side by side, and their rows.
 GROUPS, PRODUCTS = 4, 8
