@@ -24,8 +24,8 @@ FILES = {name: text for text, name in re.findall(r"```python\n(# (my_\w+\.py)\n.
 #: The picture of the page. It is no file of RINGSWEEP_LAWS.
 PICTURE = FILES.pop("my_reactions.py")
 
-#: The formulas of friction and of a drive in a scene, and the one in Python.
-SECTION, DRIVE = (yaml.safe_load(text) for text in re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL))
+#: The formulas of friction and of a drive in a scene, the scene of the body on a disc, and the law in Python.
+SECTION, DRIVE, ON_DISC = (yaml.safe_load(text) for text in re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL))
 (IN_PYTHON,) = re.findall(r"```python\n(import ringsweep\n.*?)```", PAGE, re.DOTALL)
 
 #: A drive with functions of its own, as a drive needs them that is no formula.
@@ -67,6 +67,63 @@ def _jerk(drive, t):
 
 
 add_drive("run-up", RunUp)
+"""
+
+#: A body on two feet of one height: only the sum of their friction enters its balances.
+FEET = """# my_feet.py
+from typing import NamedTuple
+
+import numpy as np
+
+from ringsweep.models import add_model
+from ringsweep.models.ring import SingleContactRing
+from ringsweep.physics import contact, ring
+from ringsweep.quantities.parameters import Leaf, Parameter
+
+
+@ring.body(
+    balances=(
+        "N1 + N2 = mass*press",
+        "half*(N1 - N2) = -height*(K1*N1 + K2*N2)",
+        "mass*radius*phi_dd = K1*N1 + K2*N2 - mass*pull*sin_phi",
+    ),
+    energy="mass*radius*(0.5*radius*omega**2 - pull*cos_phi)",
+    offset="apart",
+)
+class OnFeet(NamedTuple):
+    mass: Leaf
+    radius: Leaf
+    gravity: Leaf
+    press: Leaf
+    pull: Leaf
+    half: Leaf
+    height: Leaf
+    apart: Leaf
+    constants: tuple[Leaf, ...] = ()
+
+
+@contact.opening.implements(OnFeet)
+def _opening(body, friction, static, slides, motion, epsilon):
+    first, second = ring.reactions(body, friction[0], friction[1], motion)
+    return contact.OPEN_1 if first < second else contact.OPEN_2
+
+
+class Feet(SingleContactRing):
+    name = "feet"
+    doc = "a body on two feet on a rotating inclined disc"
+    body_type = OnFeet
+    contacts = 2
+    absent = frozenset()
+    slope = Parameter("rad", "angle between the disc and the horizontal")
+    body = SingleContactRing.body | {"disc.slope": slope}
+
+    def build_body(self, values):
+        gravity, slope, radius = values["gravity"], values["disc.slope"], values["ring.radius"]
+        press, pull = gravity * np.cos(slope), gravity * np.sin(slope)
+        return OnFeet(values["body.mass"], radius, gravity, press, pull, 0.3 * radius, 0.2 * radius, 0.3 + 0.0 * radius)
+
+
+add_model(Feet())
 """
 
 #: Beginning of the scripts below.
@@ -190,6 +247,22 @@ CLAIMS = {
         scene |= {"friction": {"law": "coulomb", "rest": {"mu_k": 0.0}}, "initial": {"phi": 0.0, "omega": 3.0}}
         assert abs(run(scene, "event")["omega_end"] - 3.0 * np.exp(-1.0)) < 1e-9
     """,
+    "the scene of the page is a scene of the disc": f"""
+        from ringsweep.config.configuration import read_scene
+        assert read_scene({ON_DISC["scene"]}, None, None).structure.model == "disc"
+    """,
+    "two feet of one height move as one contact": """
+        friction = {"law": "weakening", "rest": {"mu_s": 0.4, "mu_k": 0.3}, "v1": 1.0}
+        scene = {**disc, "friction": friction, "drive": {"law": "run-up", "amplitude": 0.5, "tau": 1.0}}
+        scene |= {"initial": {"phi": 0.1, "omega": 3.0}, "time": {"span": 2.0}}
+        one, two = (run({**scene, "model": model}, "event") for model in ("disc", "feet"))
+        assert one["certified"] == two["certified"] == 1
+        assert 0.1 < one["stick_time"] < 1.9
+        for name in ("phi_end", "omega_end", "stick_time"):
+            assert abs(one[name] - two[name]) < 1e-9, (name, one[name].item(), two[name].item())
+        weight = 0.1 * 9.81 * np.cos(np.radians(40.0))
+        assert np.abs(two["normal_1"] + two["normal_2"] - weight).max() < 1e-12
+    """,
     "the method heun has order two": """
         initial = {"x": 0.5, "velocity": 0.0}
         scene = {**belt, "friction": {"law": "coulomb", "mu_k": 0.1}, "initial": initial, "time": {"span": 2.0}}
@@ -216,7 +289,8 @@ def test_examples_do_what_the_page_claims(tmp_path):
         assert old in in_air
         in_air = in_air.replace(old, new)
     (tmp_path / "my_disc_in_air.py").write_text(in_air, encoding="utf-8")
-    paths = [*files_in(tmp_path), tmp_path / "my_disc_in_air.py"]
+    (tmp_path / "my_feet.py").write_text(FEET, encoding="utf-8")
+    paths = [*files_in(tmp_path), tmp_path / "my_disc_in_air.py", tmp_path / "my_feet.py"]
     done = in_a_process(script, paths, tmp_path / "cache")
     assert done.returncode == 0, done.stderr[-2000:]
 

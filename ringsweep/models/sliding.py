@@ -14,6 +14,7 @@ from ringsweep.numerics.series import slope, value
 from ringsweep.numerics.terms import set_terms, terms
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.belt import Belt, BristleBelt
+from ringsweep.physics.friction.velocity import stiction_band
 from ringsweep.physics.ring import BristleRing, Ring
 
 #: Status of a run for each mode of :mod:`ringsweep.physics.contact`.

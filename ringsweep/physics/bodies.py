@@ -20,6 +20,7 @@ _ROUNDING = 1e-9
 
 _CONTACTS = ("N1", "N2", "K1", "K2")
 _BY_K = {"K1": symbol("slope_1"), "K2": symbol("slope_2")}
+_SIGN = "sign of the determinant"
 _FREE = {"K1": 0.0, "K2": 0.0, "slope_1": 1.0, "slope_2": 1.0}
 
 
@@ -115,17 +116,31 @@ class Equations:
         if not self.balances[-1].rate({acceleration: 1.0}):
             raise ValueError(f"{balances[-1]!r} has no {acceleration}: the last balance is the one along the motion")
         self.numerators, self.whole = solve(self.balances, self.unknowns)
-        free = sum(self.whole.substitute(_FREE).values())
-        if free == 0.0:
+        free = self.whole.substitute(_FREE)
+        if not free:
             raise ValueError(f"the balances do not determine {acceleration} and the reactions")
-        # Without friction the determinant is positive.
-        self.sign = 1.0 if free > 0.0 else -1.0
+        # For most bodies the determinant is positive then.
+        self.sign = -1.0 if sum(free.values()) < 0.0 else 1.0
         self.numerators, self.whole = [p * self.sign for p in self.numerators], self.whole * self.sign
+        self.free = free * self.sign
+        #: Whether friction at the two contacts enters the balances in different ways. Otherwise only its sum matters.
+        self.split = self.contacts == 2
+        if self.split and not solve(self._at_rest(), (self.unknowns[-1], "F1", "F2"))[1]:
+            self.split = False
+            if any(p.rate({"F1": 1.0}) != p.rate({"F2": 1.0}) for p in self._at_rest()):
+                raise ValueError("the balances do not determine how the contacts of a body at rest share its friction")
         self.source = Source(fields, ("K1", "K2", "slope_1", "slope_2", "one", "both"))
+        if self.whole != ONE:
+            # Without friction the determinant is positive: the first constant of a body is its sign as it is computed.
+            self.source.constants[_SIGN] = self.free
 
     def constants(self, body: Any) -> tuple[Any, ...]:
         """Numbers of a body that depend on its fields only."""
-        return tuple(evaluate(p, body) for p in self.source.constants.values())
+        found = [evaluate(p, body) for p in self.source.constants.values()]
+        if self.whole != ONE:
+            # One number for each body, also if no field is in the determinant.
+            found[0] = np.sign(found[0]) * (body.mass > 0.0)
+        return tuple(found)
 
     def contradiction(self, body: Any) -> str | None:
         """How energy and last balance of a body contradict each other; None if they do not.
@@ -140,8 +155,8 @@ class Equations:
             work = by_velocity * last.rate({K: 1.0}).rate({N: 1.0}) + inertia * self.coordinate.lever
             if not _vanishes(work, body, self.coordinate.motion):
                 return (
-                    f"{self.texts[-1]!r}: {K}*{N} does not do the work of friction on the energy: "
-                    "the kinetic energy has another inertia, or a sign is wrong"
+                    f"{self.texts[-1]!r}: {K}*{N} does not do the work of friction on the energy: the kinetic energy "
+                    "has another inertia, a sign is wrong, or the contacts do not slide at the field radius"
                 )
         held = dict.fromkeys((velocity, *_CONTACTS, self.unknowns[0]), 0.0)
         work = by_place * inertia - by_velocity * last.substitute(held)
@@ -149,6 +164,8 @@ class Equations:
         work = Polynomial(term for term in work.items() if set(dict(term[0])) & set(self.coordinate.by_place))
         if not _vanishes(work, body, self.coordinate.motion):
             return f"{self.texts[-1]!r}: the terms that depend on the place do not follow from the potential energy"
+        if self.split and _vanishes(solve(self._at_rest(), (self.unknowns[-1], "F1", "F2"))[1], body, ()):
+            return "friction at both contacts enters the balances in the same way for these numbers: declare it so"
         return None
 
     def lines(self, name: str) -> list[str]:
@@ -159,17 +176,18 @@ class Equations:
         jams = whole != ONE
         values: dict[str, Any] = {
             "contact_count": lambda: [str(self.contacts)],
-            "acceleration": lambda: [source.quotient(moment, whole), source.value(whole)],
+            "acceleration": lambda: [source.quotient(moment, whole), self._positive(source.value(whole))],
             "reactions": lambda: [source.quotient(p, whole) for p in (normals[0], normals[-1])],
             "acceleration_slope": lambda: [self._slope(moment, whole, {})],
             "friction_gain": lambda: [self._slope(moment, whole, _FREE)],
             "acceleration_gradient": lambda: [source.quotient(moment.rate(by), whole) for by in self._rates()],
-            "free_determinant": lambda: [source.value(whole.substitute(_FREE))],
+            "free_determinant": lambda: [self._positive(source.value(self.free))],
             "reaction_determinant": lambda: [f"abs({source.value(self._of_reactions())})"],
-            "determinant_terms": lambda: [source.value(_in_terms(whole)) if jams else "one"],
+            "determinant_terms": lambda: [self._positive(source.value(_in_terms(whole))) if jams else "one"],
             "slip_balance": self._slip_balance,
             "held": self._held,
             "driven": self._driven,
+            "if_split": lambda: ["yes" if self.split else "no"],
             "if_load_varies": lambda: ["yes" if jams or any(p.symbols - source.fields for p in normals) else "no"],
             "energy": lambda: [source.value(self.energy)],
             "power": lambda: [self._power()],
@@ -178,6 +196,10 @@ class Equations:
         }
         found = values[name]()
         return [*source.lines, "return " + (found[0] if len(found) == 1 else f"({', '.join(found)})")]
+
+    def _positive(self, determinant: str) -> str:
+        """Determinant with the sign with which it is positive without friction."""
+        return determinant if self.whole == ONE else f"body.constants[0] * {determinant}"
 
     def _rates(self) -> list[Mapping[str, Any]]:
         """Rates of the motion if the coordinate changes, its derivative, and then each number that is given."""
@@ -211,15 +233,23 @@ class Equations:
             rows.append(f"({', '.join(factors)})")
         return [rows[0], rows[1], rows[-1]]
 
+    def _at_rest(self) -> list[Polynomial]:
+        """Balances with the forces F1 and F2 in place of friction."""
+        return [p.substitute(_FREE) for p in self._forced()]
+
     def _held(self) -> list[str]:
-        unknowns = [self.unknowns[-1], "F1", "F2"][: 1 + self.contacts]
-        numerators, whole = solve([p.substitute(_FREE) for p in self._forced()], unknowns)
-        values = {self.unknowns[0]: symbol("epsilon"), "N1": symbol("normal")}
-        found = [self._linear(p.substitute(values), whole) for p in numerators]
-        return ["normal", *found] if self.contacts == 2 else [found[0], found[0], found[1], found[1]]
+        last, epsilon = self.unknowns[-1], {self.unknowns[0]: symbol("epsilon")}
+        if self.contacts == 1 or self.split:
+            unknowns = (last, "F1", "F2")[: 1 + self.contacts]
+            numerators, whole = solve(self._at_rest(), unknowns)
+            found = [self._linear(p.substitute(epsilon | {"N1": symbol("normal")}), whole) for p in numerators]
+            return ["normal", *found] if self.split else [found[0], found[0], found[1], found[1]]
+        together = [p.substitute({"F2": 0.0}) for p in self._at_rest()]
+        numerators, whole = solve(together, ("N1", "N2", "F1"))
+        return [*(self._linear(p.substitute(epsilon), whole) for p in numerators), "0.0"]
 
     def _driven(self) -> list[str]:
-        numerators, whole = solve([p.substitute(_FREE) for p in self._forced()], self.unknowns)
+        numerators, whole = solve(self._at_rest(), self.unknowns)
         given = dict.fromkeys(("F1", "F2", *(name for by in self._rates()[2:] for name in by)), 0.0)
         forces = [(name, numerators[0].rate({name: 1.0})) for name in ("F1", "F2")]
         # Forces are known last.

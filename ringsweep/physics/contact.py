@@ -71,11 +71,12 @@ def stick(body, m1, m2, motion, epsilon):
     friction, capacity = F1, m1 * N1
     if ring.contact_count(body) == 2:
         _, by_N2, by_F1, by_F2 = ring.held(body, 0.0, (0.0, 0.0, 0.0), 0.0, 0.0, 1.0)
-        square, linear, constant = sharing(m1, m2, (N2, F1, F2), (by_N2, by_F1, by_F2))
-        discriminant = linear * linear - 4.0 * square * constant
-        if not discriminant >= 0.0:
-            return 0.0, -inf, 0.0, 0.0
-        N1 = larger_root(square, linear, constant) if square > 0.0 else (F2 - F1) / (by_F1 - by_F2)
+        if ring.if_split(body, True, False):
+            at_zero, by_N1 = (N2, F1, F2), (by_N2, by_F1, by_F2)
+            square, linear, constant = sharing(m1, m2, at_zero, by_N1)
+            if not linear * linear - 4.0 * square * constant >= 0.0:
+                return 0.0, -inf, 0.0, 0.0
+            N1 = shared_load(m1, m2, at_zero, by_N1)
         N2 += by_N2 * N1
         friction, capacity = F1 + F2 + (by_F1 + by_F2) * N1, m1 * N1 + m2 * N2
     return -friction / capacity if capacity != 0.0 else 0.0, capacity - abs(friction), N1, N2
@@ -97,20 +98,37 @@ def sharing(m1, m2, at_zero, by_N1):
     Returns
     -------
     tuple of float
-        Coefficients of N_1^2 (1; greater than 0 unless m1 = m2 = 0) and of N_1, N, and constant term, N^2.
+        Coefficients of N_1^2, 1, and of N_1, N, and constant term, N^2.
     """
     (N2, F1, F2), (by_N2, by_F1, by_F2) = at_zero, by_N1
     return m2 * by_F1 * by_N2 - m1 * by_F2, m2 * (by_F1 * N2 + F1 * by_N2) - m1 * F2, m2 * F1 * N2
 
 
 @inlined
-def larger_root(square, linear, constant):
-    """Larger root of a quadratic equation with positive `square`.
+def shared_load(m1, m2, at_zero, by_N1):
+    """Reaction N_1 that solves the equation of :func:`sharing`, N.
 
-    If the smaller root is admissible the larger root is too, with larger reactions.
+    It is the larger root, unless only the smaller one is admissible. On a ring the larger root is admissible if the
+    smaller one is, with larger reactions. Without friction at rest the contacts share the friction force equally.
     """
+    (N2, F1, F2), (by_N2, by_F1, by_F2) = at_zero, by_N1
+    if m1 + m2 == 0.0:
+        return (F2 - F1) / (by_F1 - by_F2)
+    square, linear, constant = sharing(m1, m2, at_zero, by_N1)
     root = sqrt(max(linear * linear - 4.0 * square * constant, 0.0))
-    return 0.5 * (root - linear) / square if linear <= 0.0 else -2.0 * constant / (root + linear)
+    half = 0.5 * (root - linear) if linear <= 0.0 else -0.5 * (root + linear)
+    other = constant / half if half != 0.0 else 0.0
+    one = half / square if square != 0.0 else other
+    larger, smaller = (one, other) if one >= other else (other, one)
+    if _holds(m1, m2, larger, N2 + by_N2 * larger, F1 + F2 + (by_F1 + by_F2) * larger):
+        return larger
+    return smaller if _holds(m1, m2, smaller, N2 + by_N2 * smaller, F1 + F2 + (by_F1 + by_F2) * smaller) else larger
+
+
+@inlined
+def _holds(m1, m2, N1, N2, friction):
+    """Whether these reactions press, and hold a body at rest that needs this friction."""
+    return N1 > 0.0 and N2 > 0.0 and abs(friction) <= m1 * N1 + m2 * N2
 
 
 @hook(optional=True)
@@ -134,9 +152,14 @@ def opening(body, friction, static, slides, motion, epsilon):
     -------
     int
         OPEN_1, OPEN_2, OPEN_BOTH or IMPOSSIBLE. OPEN_BOTH also if each contact could open while the other one stays
-        closed: a mirror image must give the mirrored result. By default OPEN_1, for bodies with one contact.
+        closed: a mirror image must give the mirrored result. By default that of a body with one contact: it opens
+        unless the body presses on it without friction, for then friction has turned the sign of the reaction.
     """
-    return OPEN_1
+    load, _ = ring.reactions(body, 0.0, 0.0, motion)
+    if slides != 0:
+        _, determinant = ring.acceleration(body, *friction, motion)
+        load = 0.0 if determinant > 0.0 else load
+    return IMPOSSIBLE if load > _ROUNDING * body.mass * _scale(body, motion[2], epsilon) else OPEN_1
 
 
 @inlined

@@ -309,7 +309,8 @@ def held(body, one, motion, square, epsilon, normal):
     -------
     tuple of float
         ``(N1, N2, F1, F2)``: normal reactions, and friction along the race, positive in the direction of growing phi,
-        N. With one contact N2 and F2 repeat N1 and F1.
+        N. With one contact N2 and F2 repeat N1 and F1. Where :func:`if_split` says no, F1 is the sum, F2 is 0, and
+        `normal` is not used.
     """
 
 
@@ -324,6 +325,11 @@ def driven(body, one, motion, square, F1, F2):
     F1, F2 : float
         Friction along the race, positive in the direction of growing phi, N; on a belt with the force given there.
     """
+
+
+@_derived(absorb=True)
+def if_split(body, yes, no):
+    """`yes` if the balances tell the friction at one of two contacts from that at the other one, else `no`."""
 
 
 @_derived(absorb=True)

@@ -17,7 +17,7 @@ from ringsweep.models.model import Continues, Model, period_of, phases
 from ringsweep.models.parts import GRAVITY, MASS, SPAN, drive_of, friction_coefficients, law_of
 from ringsweep.models.ring import long_run, record
 from ringsweep.models.scene import Structure, Values, require
-from ringsweep.physics import drives, friction, ring, zones
+from ringsweep.physics import contact, drives, friction, ring, zones
 from ringsweep.physics.friction.presliding import steady_deflection
 from ringsweep.quantities.parameters import Parameter, declared
 
@@ -98,6 +98,10 @@ class SingleContactRing(Model, Continues):
 
     def required(self, structure: Structure) -> dict[type, tuple[Any, ...]]:
         """Hooks of the recorder, and hooks for the type of the body."""
+        if self.contacts == 2 and contact.opening.body_of(self.body_type) is contact.opening.body_of(object):
+            raise TypeError(
+                f"model {self.name}: {self.body_type.__name__} has no contact.opening, which says which contact opens"
+            )
         return super().required(structure) | {self.body_type: tuple(ring.DERIVED)}
 
     def _has_bristles(self, structure: Structure) -> bool:

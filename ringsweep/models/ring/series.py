@@ -508,8 +508,9 @@ def _expand_reserve(body, m1, m2, c):
         motion = c[SIN, k], c[COS, k], c[OMEGA, k]
         N1, N2, F1, F2 = ring.held(body, one, motion, c[SQUARE, k], c[EPSILON, k], 0.0)
         friction, capacity = F1, m1 * N1
-        if ring.contact_count(body) == 2:
-            square, linear, _ = contact.sharing(m1, m2, (N2, F1, F2), (by_N2, by_F1, by_F2))
+        if ring.if_split(body, True, False):
+            at_zero, by_N1 = (N2, F1, F2), (by_N2, by_F1, by_F2)
+            square, linear, _ = contact.sharing(m1, m2, at_zero, by_N1)
             rest, squared, mixed, both = part_from(inner_products(c, FACTORS, k, first, newest), own, ())
             # Where both roots meet, stick ends: no friction gives the acceleration of the ring.
             if k == 0:
@@ -517,15 +518,15 @@ def _expand_reserve(body, m1, m2, c):
                 constant = m2 * F1 * N2
                 first_term, last_term = linear * linear, 4.0 * square * constant
                 c[EDGE, 0] = first_term - last_term - _LEAST_DISCRIMINANT * (first_term + abs(last_term))
-                N1 = first_N1 = contact.larger_root(square, linear, constant) if square > 0.0 else 0.0
+                N1 = first_N1 = contact.shared_load(m1, m2, at_zero, by_N1)
             else:
                 constant = m2 * (first_F1 * N2 + F1 * first_N2 + rest)
                 c[EDGE, k] = 2.0 * first_linear * linear + squared - 4.0 * square * constant
                 N1 = -(square * both + mixed + linear * first_N1 + constant)
-                N1 = N1 / (2.0 * square * first_N1 + first_linear) if square > 0.0 else 0.0
+                N1 = N1 / (2.0 * square * first_N1 + first_linear) if m1 + m2 > 0.0 else (F2 - F1) / (by_F1 - by_F2)
                 newest = set_factors(c, FACTORS, k, (F1, linear, linear, N1), (N2, linear, N1, N1))
                 first = newest if k == 1 else first
-            N1 = N1 if square > 0.0 else (F2 - F1) / (by_F1 - by_F2)
+        if ring.contact_count(body) == 2:
             N2 += by_N2 * N1
             friction, capacity = F1 + F2 + (by_F1 + by_F2) * N1, m1 * N1 + m2 * N2
         c[NORMAL_1, k], c[NORMAL_2, k] = N1, N2
