@@ -252,7 +252,7 @@ def test_summary_of_a_file_reads_it_chunk_by_chunk(tmp_path, capsys):
     out = capsys.readouterr().out
     assert "resting: 2000000 (50.0%)" in out
     assert "phi_end: 1.0e-09, 1.0e-09" in out
-    assert "no bound: 3960000 certified cells" in out
+    assert "no bound where nearby runs diverge: 3960000 of the certified cells" in out
     # A variable has 32 MB.
     assert peak < 8e6
 

@@ -60,7 +60,7 @@ def summarise(result: xr.Dataset) -> None:
     for name in {"phi_end_error", "x_end_error"} & set(result):
         both = parts(result, "certified", name)
         if unbounded := sum(np.count_nonzero((certified == 1) & np.isnan(bound)) for certified, bound in both):
-            print(f"no bound: {unbounded} certified cells, where nearby runs diverge")
+            print(f"no bound where nearby runs diverge: {unbounded} of the certified cells")
 
 
 # What loads or shakes the body most, over all cells.

@@ -56,6 +56,9 @@ _MAGNIFIED = 3.0
 # and largest share of the energy turnover that is not work of friction.
 _MOST_VIOLATION, _MOST_UNEXPLAINED = 1e3, 5e-3
 
+# What a friction law of each family is, for messages.
+_WORDS: dict[type, str] = {SetValued: "is set-valued", Smooth: "is smooth", Dynamic: "has bristles"}
+
 
 def _select(batch: Any, cells: NDArray[np.intp]) -> Any:
     """The given cells of a batch; the batch itself, without a copy, if these are all cells."""
@@ -94,12 +97,11 @@ class _Piecewise(Method):
         InputError
             If the method does not take the friction law; and as in :meth:`Method.check`.
         """
-        if family_of(structure.law_type) not in self.families:
+        family = family_of(structure.law_type)
+        if family not in self.families:
             able = ", ".join(name for name, law in LAWS.items() if family_of(law) in self.families)
-            raise InputError(
-                "solver.method",
-                f"{self.name} does not take friction law {structure.law}: it takes {able}; auto takes all",
-            )
+            law = f"friction law {structure.law}, which {_WORDS[family]}"
+            raise InputError("solver.method", f"{self.name} does not take {law}: it takes {able}; auto takes all")
         super().check(structure)
 
     @abstractmethod
