@@ -139,9 +139,14 @@ def determinant(matrix: Sequence[Sequence[Polynomial]]) -> Polynomial:
     return found
 
 
+def coefficients(equations: Sequence[Polynomial], unknowns: Sequence[str]) -> list[list[Polynomial]]:
+    """Matrix of equations that are linear in their unknowns."""
+    return [[p.rate({name: 1.0}) for name in unknowns] for p in equations]
+
+
 def solve(equations: Sequence[Polynomial], unknowns: Sequence[str]) -> tuple[list[Polynomial], Polynomial]:
     """Numerators of the unknowns, and their common denominator: the determinant, or 1 if that is a single product."""
-    rows = [[p.rate({name: 1.0}) for name in unknowns] for p in equations]
+    rows = coefficients(equations, unknowns)
     rest = [-p.substitute(dict.fromkeys(unknowns, 0.0)) for p in equations]
     whole = determinant(rows)
     numerators = [

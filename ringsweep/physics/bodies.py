@@ -13,12 +13,24 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ringsweep.numerics.balances import ONE, Polynomial, Source, determinant, evaluate, read, solve, symbol
+from ringsweep.numerics.balances import (
+    ONE,
+    Polynomial,
+    Source,
+    coefficients,
+    determinant,
+    evaluate,
+    read,
+    solve,
+    symbol,
+)
 
 # Rounding of a sum as a share of its terms.
 _ROUNDING = 1e-9
 
 _CONTACTS = ("N1", "N2", "K1", "K2")
+# Symbols of what is derived from the balances, besides those of the balances themselves.
+_DERIVED = ("F1", "F2", "slope_1", "slope_2", "one", "both", "square", "epsilon")
 _BY_K = {"K1": symbol("slope_1"), "K2": symbol("slope_2")}
 _SIGN = "sign of the determinant"
 _FREE = {"K1": 0.0, "K2": 0.0, "slope_1": 1.0, "slope_2": 1.0}
@@ -101,6 +113,9 @@ class Equations:
         self.basis = [next(iter(read(text, (*motion, "F1", "F2")))) for text in products]
         names, lacks = {*fields, *absent, *motion}, dict.fromkeys(absent, 0.0)
         unknown = {*self.unknowns, *(f"K{i + 1}" for i in range(self.contacts))}
+        symbols = {*motion, acceleration, *_CONTACTS, *_DERIVED}
+        if doubled := symbols & set(fields):
+            raise ValueError(f"the field {min(doubled)} needs another name: {', '.join(sorted(symbols))} are symbols")
         self.balances = [read(text, names | unknown).substitute(lacks) for text in balances]
         self.energy = read(energy, names).substitute(lacks)
         single = [((name, 1),) for name in (acceleration, "N1", "N2")]
@@ -115,20 +130,15 @@ class Equations:
                 )
         if not self.balances[-1].rate({acceleration: 1.0}):
             raise ValueError(f"{balances[-1]!r} has no {acceleration}: the last balance is the one along the motion")
-        self.numerators, self.whole = solve(self.balances, self.unknowns)
-        free = self.whole.substitute(_FREE)
-        if not free:
+        #: Determinant without friction.
+        self.free = self._free_determinant(self.balances, self.unknowns)
+        if not self.free:
             raise ValueError(f"the balances do not determine {acceleration} and the reactions")
+        self.numerators, self.whole = solve(self.balances, self.unknowns)
         # For most bodies the determinant is positive then.
-        self.sign = -1.0 if sum(free.values()) < 0.0 else 1.0
+        self.sign = -1.0 if self.whole != ONE and sum(self.free.values()) < 0.0 else 1.0
         self.numerators, self.whole = [p * self.sign for p in self.numerators], self.whole * self.sign
-        self.free = free * self.sign
-        #: Whether friction at the two contacts enters the balances in different ways. Otherwise only its sum matters.
-        self.split = self.contacts == 2
-        if self.split and not solve(self._at_rest(), (self.unknowns[-1], "F1", "F2"))[1]:
-            self.split = False
-            if any(p.rate({"F1": 1.0}) != p.rate({"F2": 1.0}) for p in self._at_rest()):
-                raise ValueError("the balances do not determine how the contacts of a body at rest share its friction")
+        self.free *= self.sign
         self.source = Source(fields, ("K1", "K2", "slope_1", "slope_2", "one", "both"))
         if self.whole != ONE:
             # Without friction the determinant is positive: the first constant of a body is its sign as it is computed.
@@ -164,8 +174,8 @@ class Equations:
         work = Polynomial(term for term in work.items() if set(dict(term[0])) & set(self.coordinate.by_place))
         if not _vanishes(work, body, self.coordinate.motion):
             return f"{self.texts[-1]!r}: the terms that depend on the place do not follow from the potential energy"
-        if self.split and _vanishes(solve(self._at_rest(), (self.unknowns[-1], "F1", "F2"))[1], body, ()):
-            return "friction at both contacts enters the balances in the same way for these numbers: declare it so"
+        if np.any(evaluate(self.free, body) == 0.0):
+            return f"the balances do not determine {self.unknowns[0]} and the reactions for these numbers"
         return None
 
     def lines(self, name: str) -> list[str]:
@@ -173,7 +183,7 @@ class Equations:
         source, (moment, *normals), whole = self.source, self.numerators, self.whole
         # Such functions are seldom called, or must not use what is computed from the balances.
         source.begin(plain=name in ("reaction_determinant", "energy", "power", "imbalance", "size"))
-        jams = whole != ONE
+        jams, of_reactions = whole != ONE, self._free_determinant(self.balances[:-1], self.unknowns[1:])
         values: dict[str, Any] = {
             "contact_count": lambda: [str(self.contacts)],
             "acceleration": lambda: [source.quotient(moment, whole), self._positive(source.value(whole))],
@@ -181,13 +191,12 @@ class Equations:
             "acceleration_slope": lambda: [self._slope(moment, whole, {})],
             "friction_gain": lambda: [self._slope(moment, whole, _FREE)],
             "acceleration_gradient": lambda: [source.quotient(moment.rate(by), whole) for by in self._rates()],
-            "free_determinant": lambda: [self._positive(source.value(self.free))],
-            "reaction_determinant": lambda: [f"abs({source.value(self._of_reactions())})"],
+            "free_determinant": lambda: [self._positive(source.value(self.free)) if jams else "1.0"],
+            "reaction_determinant": lambda: [f"abs({source.value(of_reactions)})"],
             "determinant_terms": lambda: [self._positive(source.value(_in_terms(whole))) if jams else "one"],
             "slip_balance": self._slip_balance,
             "held": self._held,
             "driven": self._driven,
-            "if_split": lambda: ["yes" if self.split else "no"],
             "if_load_varies": lambda: ["yes" if jams or any(p.symbols - source.fields for p in normals) else "no"],
             "energy": lambda: [source.value(self.energy)],
             "power": lambda: [self._power()],
@@ -215,10 +224,9 @@ class Equations:
         taken = source.name(f"{source.quotient(moment, whole)} * {source.value(whole_change)}")
         return f"({source.value(change)} - {taken}) * {source.name(f'1.0 / {source.value(whole)}')}"
 
-    def _of_reactions(self) -> Polynomial:
-        """Determinant of all balances but the last, as equations for the reactions without friction."""
-        rows = [[p.rate({name: 1.0}).substitute(_FREE) for name in self.unknowns[1:]] for p in self.balances[:-1]]
-        return determinant(rows)
+    def _free_determinant(self, balances: Sequence[Polynomial], unknowns: Sequence[str]) -> Polynomial:
+        """Determinant of some balances without friction."""
+        return determinant(coefficients([p.substitute(_FREE) for p in balances], unknowns))
 
     def _forced(self) -> list[Polynomial]:
         """Balances with the forces F1 and F2 on top of friction."""
@@ -238,15 +246,10 @@ class Equations:
         return [p.substitute(_FREE) for p in self._forced()]
 
     def _held(self) -> list[str]:
-        last, epsilon = self.unknowns[-1], {self.unknowns[0]: symbol("epsilon")}
-        if self.contacts == 1 or self.split:
-            unknowns = (last, "F1", "F2")[: 1 + self.contacts]
-            numerators, whole = solve(self._at_rest(), unknowns)
-            found = [self._linear(p.substitute(epsilon | {"N1": symbol("normal")}), whole) for p in numerators]
-            return ["normal", *found] if self.split else [found[0], found[0], found[1], found[1]]
-        together = [p.substitute({"F2": 0.0}) for p in self._at_rest()]
-        numerators, whole = solve(together, ("N1", "N2", "F1"))
-        return [*(self._linear(p.substitute(epsilon), whole) for p in numerators), "0.0"]
+        numerators, whole = solve(self._at_rest(), (*self.unknowns[1:], "F1"))
+        given = {self.unknowns[0]: symbol("epsilon")}
+        *normals, friction = [self._linear(p.substitute(given), whole) for p in numerators]
+        return [normals[0], normals[-1], friction]
 
     def _driven(self) -> list[str]:
         numerators, whole = solve(self._at_rest(), self.unknowns)
@@ -258,7 +261,7 @@ class Equations:
 
     def _linear(self, p: Polynomial, whole: Polynomial) -> str:
         """Quotient with the symbols `one` and `square` in place of 1 and of the product of the motion."""
-        parts = p.parts((*self.coordinate.motion, "epsilon", "normal", "F1", "F2"))
+        parts = p.parts((*self.coordinate.motion, "epsilon", "F1", "F2"))
         changed = {self.basis[0]: symbol("one"), self.basis[4]: symbol("square")}
         terms = (changed.get(key, Polynomial([(key, 1.0)])) * factor for key, factor in parts.items())
         return self.source.quotient(sum(terms, Polynomial()), whole)

@@ -47,7 +47,7 @@ def stick(body, m1, m2, motion, epsilon):
     """Saturation of friction, and normal reactions, of a body that sticks to the ring.
 
     Friction is ``K_i = -kappa mu_s,i`` at both contacts, with the saturation ``kappa`` at which the angular
-    acceleration of the body equals that of the ring. The balances leave ``N_1`` open if there are two contacts. With
+    acceleration of the body equals that of the ring. The balances leave ``F_2`` open if there are two contacts. With
     friction in proportion to ``mu_s,i N_i`` it solves a quadratic equation.
 
     Parameters
@@ -67,67 +67,74 @@ def stick(body, m1, m2, motion, epsilon):
         N; normal reactions, N. With one contact N2 repeats N1. The reserve is minus infinity if no saturation gives
         this acceleration.
     """
-    N1, N2, F1, F2 = ring.held(body, 1.0, motion, motion[2] * motion[2], epsilon, 0.0)
+    N1, N2, F1 = ring.held(body, 1.0, motion, motion[2] * motion[2], epsilon, 0.0)
     friction, capacity = F1, m1 * N1
     if ring.contact_count(body) == 2:
-        _, by_N2, by_F1, by_F2 = ring.held(body, 0.0, (0.0, 0.0, 0.0), 0.0, 0.0, 1.0)
-        if ring.if_split(body, True, False):
-            at_zero, by_N1 = (N2, F1, F2), (by_N2, by_F1, by_F2)
-            square, linear, constant = sharing(m1, m2, at_zero, by_N1)
-            if not linear * linear - 4.0 * square * constant >= 0.0:
-                return 0.0, -inf, 0.0, 0.0
-            N1 = shared_load(m1, m2, at_zero, by_N1)
-        N2 += by_N2 * N1
-        friction, capacity = F1 + F2 + (by_F1 + by_F2) * N1, m1 * N1 + m2 * N2
+        at_zero, by_F2 = (N1, N2, F1), ring.held(body, 0.0, (0.0, 0.0, 0.0), 0.0, 0.0, 1.0)
+        square, linear, constant = sharing(m1, m2, at_zero, by_F2)
+        if not linear * linear - 4.0 * square * constant >= 0.0:
+            return 0.0, -inf, 0.0, 0.0
+        F2 = shared_friction(m1, m2, at_zero, by_F2)
+        N1, N2, friction = at(F2, at_zero, by_F2)
+        capacity = m1 * N1 + m2 * N2
     return -friction / capacity if capacity != 0.0 else 0.0, capacity - abs(friction), N1, N2
 
 
 @inlined
-def sharing(m1, m2, at_zero, by_N1):
-    """Coefficients of the quadratic equation for N_1 that makes friction proportional to m_i N_i at both contacts.
+def sharing(m1, m2, at_zero, by_F2):
+    """Coefficients of the quadratic equation for F_2 that makes friction proportional to m_i N_i at both contacts.
 
-    It is ``F1 m2 N2 = F2 m1 N1``, where N2, F1 and F2 are linear in N_1.
+    It is ``F1 m2 N2 = F2 m1 N1``, where N1, N2 and F1 are linear in F_2.
 
     Parameters
     ----------
     m1, m2 : float
         Static friction coefficients under the contacts, 1.
-    at_zero, by_N1 : tuple of float
-        N2, F1 and F2 at N_1 = 0, N, and their derivatives by N_1; see :func:`ringsweep.physics.ring.held`.
+    at_zero, by_F2 : tuple of float
+        N1, N2 and F1 at F_2 = 0, N, and their derivatives by F_2; see :func:`ringsweep.physics.ring.held`.
 
     Returns
     -------
     tuple of float
-        Coefficients of N_1^2, 1, and of N_1, N, and constant term, N^2.
+        Coefficients of F_2^2, 1, and of F_2, N, and constant term, N^2.
     """
-    (N2, F1, F2), (by_N2, by_F1, by_F2) = at_zero, by_N1
-    return m2 * by_F1 * by_N2 - m1 * by_F2, m2 * (by_F1 * N2 + F1 * by_N2) - m1 * F2, m2 * F1 * N2
+    (N1, N2, F1), (by_N1, by_N2, by_F1) = at_zero, by_F2
+    return m2 * by_F1 * by_N2 - m1 * by_N1, m2 * (by_F1 * N2 + F1 * by_N2) - m1 * N1, m2 * F1 * N2
 
 
 @inlined
-def shared_load(m1, m2, at_zero, by_N1):
-    """Reaction N_1 that solves the equation of :func:`sharing`, N.
+def shared_friction(m1, m2, at_zero, by_F2):
+    """Friction F_2 that solves the equation of :func:`sharing`, N.
 
-    It is the larger root, unless only the smaller one is admissible. On a ring the larger root is admissible if the
-    smaller one is, with larger reactions. Without friction at rest the contacts share the friction force equally.
+    Of two admissible roots it is the stable one: near it, a body with more friction against its motion is slower. There
+    the left side of the equation less the right side falls with F_2. On a ring this root is admissible if the other one
+    is. Without friction at rest the contacts share the friction force equally.
     """
-    (N2, F1, F2), (by_N2, by_F1, by_F2) = at_zero, by_N1
     if m1 + m2 == 0.0:
-        return (F2 - F1) / (by_F1 - by_F2)
-    square, linear, constant = sharing(m1, m2, at_zero, by_N1)
+        return at_zero[2] / (1.0 - by_F2[2])
+    square, linear, constant = sharing(m1, m2, at_zero, by_F2)
     root = sqrt(max(linear * linear - 4.0 * square * constant, 0.0))
-    half = 0.5 * (root - linear) if linear <= 0.0 else -0.5 * (root + linear)
-    other = constant / half if half != 0.0 else 0.0
-    one = half / square if square != 0.0 else other
-    larger, smaller = (one, other) if one >= other else (other, one)
-    if _holds(m1, m2, larger, N2 + by_N2 * larger, F1 + F2 + (by_F1 + by_F2) * larger):
-        return larger
-    return smaller if _holds(m1, m2, smaller, N2 + by_N2 * smaller, F1 + F2 + (by_F1 + by_F2) * smaller) else larger
+    total = root + abs(linear)
+    one = 2.0 * constant / total if total != 0.0 else 0.0
+    # With a smaller factor the other root is infinite.
+    other = 0.5 * total / square if abs(square) > 1e-200 else one
+    stable, unstable = (one, other) if linear <= 0.0 else (-other, -one)
+    if _holds(m1, m2, stable, at_zero, by_F2) or not _holds(m1, m2, unstable, at_zero, by_F2):
+        return stable
+    return unstable
 
 
 @inlined
-def _holds(m1, m2, N1, N2, friction):
-    """Whether these reactions press, and hold a body at rest that needs this friction."""
+def at(F2, at_zero, by_F2):
+    """Reactions N_1 and N_2, and friction of both contacts together, N, at a friction F_2."""
+    (N1, N2, F1), (by_N1, by_N2, by_F1) = at_zero, by_F2
+    return N1 + by_N1 * F2, N2 + by_N2 * F2, F1 + (1.0 + by_F1) * F2
+
+
+@inlined
+def _holds(m1, m2, F2, at_zero, by_F2):
+    """Whether the reactions press, and hold a body at rest that needs this friction."""
+    N1, N2, friction = at(F2, at_zero, by_F2)
     return N1 > 0.0 and N2 > 0.0 and abs(friction) <= m1 * N1 + m2 * N2
 
 

@@ -286,7 +286,7 @@ def determinant_terms(body, one, K1, K2, both):
 
 
 @_derived
-def held(body, one, motion, square, epsilon, normal):
+def held(body, one, motion, square, epsilon, F2):
     """Forces at the contacts from the balances and not from a friction law: so in stick too.
 
     They are linear in the arguments after `body`, so that coefficients of series can take their place.
@@ -302,15 +302,14 @@ def held(body, one, motion, square, epsilon, normal):
         Square of the angular velocity.
     epsilon : float
         Angular acceleration of the body, rad/s^2.
-    normal : float
-        Normal reaction at contact 1, N, which the balances do not determine if there are two contacts.
+    F2 : float
+        Friction at contact 2, N, which the balances do not determine; not used if there is one contact.
 
     Returns
     -------
     tuple of float
-        ``(N1, N2, F1, F2)``: normal reactions, and friction along the race, positive in the direction of growing phi,
-        N. With one contact N2 and F2 repeat N1 and F1. Where :func:`if_split` says no, F1 is the sum, F2 is 0, and
-        `normal` is not used.
+        ``(N1, N2, F1)``: normal reactions, and friction along the race at contact 1, positive in the direction of
+        growing phi, N. With one contact N2 repeats N1.
     """
 
 
@@ -325,11 +324,6 @@ def driven(body, one, motion, square, F1, F2):
     F1, F2 : float
         Friction along the race, positive in the direction of growing phi, N; on a belt with the force given there.
     """
-
-
-@_derived(absorb=True)
-def if_split(body, yes, no):
-    """`yes` if the balances tell the friction at one of two contacts from that at the other one, else `no`."""
 
 
 @_derived(absorb=True)

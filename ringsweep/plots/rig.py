@@ -95,8 +95,7 @@ def ring_history(ds: xr.Dataset) -> tuple[xr.Dataset, Rig]:
 def _on_race(ds: xr.Dataset, rig: Rig) -> dict[str, NDArray[Any]]:
     """Forces and places of a body whose contacts all hold, or of one with a single contact."""
     phi, omega = ds["phi"].values, ds["omega"].values
-    epsilon, first = ds["epsilon"].values, ds["normal_1"].values
-    _, _, *forces = ring.held(rig.body, 1.0, (np.sin(phi), np.cos(phi), omega), omega**2, epsilon, first)
+    forces = _friction(rig.body, phi, omega, ds["epsilon"].values, [ds[f"normal_{k}"].values for k in rig.contacts])
     distance = getattr(rig.body, "xi", rig.radius - rig.ball)
     if "gap_1" in ds:
         # A particle is drawn as a ball within the race.
@@ -106,6 +105,19 @@ def _on_race(ds: xr.Dataset, rig: Rig) -> dict[str, NDArray[Any]]:
         found[f"friction_{k}"] = np.where(open_contacts(ds)[0], 0.0, force) if "gap_1" in ds else force
         found[f"alpha_{k}"] = phi + rig.offset(k)
     return found
+
+
+def _friction(body: Any, phi: Any, omega: Any, epsilon: Any, normals: list[Any]) -> list[Any]:
+    """Friction at each contact, N: that at contact 2 follows from the reactions, which are linear in it."""
+    *at_zero, total = ring.held(body, 1.0, (np.sin(phi), np.cos(phi), omega), omega**2, epsilon, 0.0)
+    *by_F2, by_total = ring.held(body, 0.0, (0.0, 0.0, 0.0), 0.0, 0.0, 1.0)
+    if len(normals) == 1:
+        return [total]
+    squares = sum(by * by for by in by_F2)
+    # Where the reactions do not tell the contacts' friction apart, all of it is drawn at contact 1.
+    second = sum(by * (normal - zero) for by, normal, zero in zip(by_F2, normals, at_zero, strict=True))
+    second = second / squares if squares > 0.0 else 0.0 * total
+    return [total + by_total * second, second]
 
 
 def _off_race(ds: xr.Dataset, rig: Rig) -> dict[str, NDArray[Any]]:

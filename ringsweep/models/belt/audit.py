@@ -39,7 +39,7 @@ def _violation(scene, mode, forcing, y, rates, s, tolerance):
     speed, largest, relaxation = speed_scale(scene, length), 0.0, 0.0
     if mode.sign == 0:
         motion = x, push, velocity
-        normal, _, friction, _ = ring.held(body, 1.0, motion, x * x * x, forcing[2], 0.0)
+        normal, _, friction = ring.held(body, 1.0, motion, x * x * x, forcing[2], 0.0)
         K = friction / normal if normal != 0.0 else 0.0
         sizes = ring.size(body, (length, push, velocity)) + body.mass * (body.gravity + abs(forcing[2]))
         largest = (abs(friction) - breakaway_force(scene, x)) / (tolerance * sizes + 1e-300)

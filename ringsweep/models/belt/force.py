@@ -59,7 +59,7 @@ def _in_dead_band(family, scene, x, push, velocity, v, found):
 def _balancing(family, scene, x, push, velocity, v, found):
     K, slope, viscous = found
     held = abs(v) < stiction_band(scene.law)
-    load, _, friction, _ = ring.held(scene.body, 1.0, (x, push, velocity), x * x * x, 0.0, 0.0)
+    load, _, friction = ring.held(scene.body, 1.0, (x, push, velocity), x * x * x, 0.0, 0.0)
     needed = max(-scene.mu_s, min(scene.mu_s, friction / (load + 1e-300)))
     return select(held, needed, K), select(held, 0.0, slope), select(held, 0.0, viscous)
 
@@ -90,14 +90,14 @@ def stuck_rates(scene, t, x, forcing):
     _, velocity, acceleration = forcing[:3]
     push_rate, jerk = force_rate(scene.drive, forcing), drives.jerk(scene.drive, t)
     rates, cube_rate = (velocity, push_rate, acceleration), 3.0 * x * x * velocity
-    load, _, friction, _ = ring.held(scene.body, 0.0, rates, cube_rate, jerk, 0.0)
+    load, _, friction = ring.held(scene.body, 0.0, rates, cube_rate, jerk, 0.0)
     return -friction, scene.mu_s * load
 
 
 @inlined
 def stuck_gradient(scene, x):
     """Derivatives of :func:`stuck_pull` and :func:`breakaway_force` of a body at rest on the belt by place, N/m."""
-    load, _, friction, _ = ring.held(scene.body, 0.0, (1.0, 0.0, 0.0), 3.0 * x * x, 0.0, 0.0)
+    load, _, friction = ring.held(scene.body, 0.0, (1.0, 0.0, 0.0), 3.0 * x * x, 0.0, 0.0)
     return -friction, scene.mu_s * load
 
 

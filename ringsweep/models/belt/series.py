@@ -255,7 +255,7 @@ def _expand(scene, mode, t, y, tolerance, c):
 def _held_term(body, c, k, one, acceleration):
     """Coefficients `k` of the reaction and of the force that friction must balance; `one` is that of 1."""
     motion = c[X, k], c[PUSH, k], c[VELOCITY, k]
-    c[NORMAL, k], _, friction, _ = ring.held(body, one, motion, _cube_term(body, c, k), acceleration, 0.0)
+    c[NORMAL, k], _, friction = ring.held(body, one, motion, _cube_term(body, c, k), acceleration, 0.0)
     return c[NORMAL, k], -friction
 
 

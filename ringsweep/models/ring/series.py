@@ -499,18 +499,18 @@ def _expand_reserve(body, m1, m2, c):
     NORMAL_1, NORMAL_2; the reserves of friction, N, before forward slip (SLOW) and before backward slip (FAST). For two
     contacts also EDGE, the discriminant of the quadratic equation; with one contact it stays infinite.
     """
-    _, by_N2, by_F1, by_F2 = ring.held(body, 0.0, (0.0, 0.0, 0.0), 0.0, 0.0, 1.0)
-    first_N2 = first_F1 = first_linear = first_N1 = 0.0
+    by_F2 = ring.held(body, 0.0, (0.0, 0.0, 0.0), 0.0, 0.0, 1.0)
+    first_N2 = first_F1 = first_linear = first_F2 = 0.0
     own = 0.0, 0.0, 0.0, 0.0
     first = newest = no_factors(own)
     for k in range(ORDER + 1):
         one = 1.0 if k == 0 else 0.0
         motion = c[SIN, k], c[COS, k], c[OMEGA, k]
-        N1, N2, F1, F2 = ring.held(body, one, motion, c[SQUARE, k], c[EPSILON, k], 0.0)
+        N1, N2, F1 = ring.held(body, one, motion, c[SQUARE, k], c[EPSILON, k], 0.0)
         friction, capacity = F1, m1 * N1
-        if ring.if_split(body, True, False):
-            at_zero, by_N1 = (N2, F1, F2), (by_N2, by_F1, by_F2)
-            square, linear, _ = contact.sharing(m1, m2, at_zero, by_N1)
+        if ring.contact_count(body) == 2:
+            at_zero = N1, N2, F1
+            square, linear, _ = contact.sharing(m1, m2, at_zero, by_F2)
             rest, squared, mixed, both = part_from(inner_products(c, FACTORS, k, first, newest), own, ())
             # Where both roots meet, stick ends: no friction gives the acceleration of the ring.
             if k == 0:
@@ -518,17 +518,16 @@ def _expand_reserve(body, m1, m2, c):
                 constant = m2 * F1 * N2
                 first_term, last_term = linear * linear, 4.0 * square * constant
                 c[EDGE, 0] = first_term - last_term - _LEAST_DISCRIMINANT * (first_term + abs(last_term))
-                N1 = first_N1 = contact.shared_load(m1, m2, at_zero, by_N1)
+                F2 = first_F2 = contact.shared_friction(m1, m2, at_zero, by_F2)
             else:
                 constant = m2 * (first_F1 * N2 + F1 * first_N2 + rest)
                 c[EDGE, k] = 2.0 * first_linear * linear + squared - 4.0 * square * constant
-                N1 = -(square * both + mixed + linear * first_N1 + constant)
-                N1 = N1 / (2.0 * square * first_N1 + first_linear) if m1 + m2 > 0.0 else (F2 - F1) / (by_F1 - by_F2)
-                newest = set_factors(c, FACTORS, k, (F1, linear, linear, N1), (N2, linear, N1, N1))
+                F2 = -(square * both + mixed + linear * first_F2 + constant)
+                F2 = F2 / (2.0 * square * first_F2 + first_linear) if m1 + m2 > 0.0 else F1 / (1.0 - by_F2[2])
+                newest = set_factors(c, FACTORS, k, (F1, linear, linear, F2), (N2, linear, F2, F2))
                 first = newest if k == 1 else first
-        if ring.contact_count(body) == 2:
-            N2 += by_N2 * N1
-            friction, capacity = F1 + F2 + (by_F1 + by_F2) * N1, m1 * N1 + m2 * N2
+            N1, N2, friction = contact.at(F2, at_zero, by_F2)
+            capacity = m1 * N1 + m2 * N2
         c[NORMAL_1, k], c[NORMAL_2, k] = N1, N2
         c[SLOW, k], c[FAST, k] = capacity + friction, capacity - friction
 
