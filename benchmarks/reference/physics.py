@@ -171,7 +171,7 @@ def corners(p, piece):
     return 0.0, math.inf
 
 
-@inner
+@kernel
 def piece_of(p, v):
     """Piece of a sliding velocity."""
     size = abs(FORWARD)
