@@ -1,5 +1,6 @@
 """Bodies that are declared by their balances, against solutions that do not use what is derived from them."""
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -8,6 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from solutions import rod
 
+from ringsweep.errors import InputError
 from ringsweep.models.ring import SingleContactRing
 from ringsweep.models.scene import Structure
 from ringsweep.physics import contact, ring
@@ -215,6 +217,19 @@ class TestDeclaration:
         with pytest.raises(ValueError, match="do not determine phi_dd and the reactions for these numbers"):
             ring.completed(Loose(1.0, 1.0, 9.81, np.array([0.5, 0.0]), 5.0))
 
+    @pytest.mark.parametrize(
+        ("balances", "offset", "message"),
+        [
+            ("N1 = mass*gravity", "", "balances is one text"),
+            (("N1 == mass*gravity", "mass*phi_dd = K1*N1"), "", "with one `=`"),
+            (("N1 = mass*press", "mass*phi_dd = K1*N1"), "pres", "offset names the field pres, which does not exist"),
+            (("N1 = mass*gravty", "mass*phi_dd = K1*N1"), "", r"did you mean gravity\? \(known: K1, N1, cos_phi"),
+        ],
+    )
+    def test_slip_of_the_pen_is_told(self, balances, offset, message):
+        with pytest.raises(TypeError, match=message):
+            ring.body(balances=balances, energy="0.5*mass*omega**2", offset=offset)(Sledge)
+
     @pytest.mark.parametrize("name", ["epsilon", "F2", "one", "slope_1", "square", "omega", "K2"])
     def test_field_with_the_name_of_a_symbol_is_refused(self, name):
         cls = NamedTuple("Named", [(field, Any) for field in (*Sledge._fields, name)])
@@ -259,10 +274,47 @@ class TestSign:
         )
 
 
+class TestModel:
+    """A model whose body is declared, and mistakes in it."""
+
+    @staticmethod
+    def cells(made):
+        class OnSledge(SingleContactRing):
+            name, body_type = "sledge", Sledge
+
+            def build_body(self, values):
+                return made(values)
+
+        model = OnSledge()
+        structure = Structure("sledge", "coulomb", "arctan")
+        known = model.parameters(structure)
+        return model.build(structure, {path: np.full(2, p.default or 1.0) for path, p in known.items()})
+
+    def test_field_may_be_one_number_for_all_cells(self):
+        body = self.cells(lambda values: Sledge(values["body.mass"], values["ring.radius"], 9.81, 10.0, 5.0, 0)).body
+        assert all(np.shape(field) == (2,) for field in body[:6])
+
+    @pytest.mark.parametrize("wrong", [lambda values: Sledge(1.0), lambda values: math.cos(values["gravity"])])
+    def test_body_that_cannot_be_built_is_told(self, wrong):
+        with pytest.raises(InputError, match=r"sledge: build_body fails with TypeError: .* use NumPy"):
+            self.cells(wrong)
+
+    def test_contacts_are_those_of_the_balances(self):
+        class OnShoes(SingleContactRing):
+            name, body_type = "shoes", Brake
+
+        assert OnShoes.contacts == 2
+        assert not OnShoes.absent
+        with pytest.raises(TypeError, match=r"body_type Held is not declared by ring.body"):
+
+            class Wrong(SingleContactRing):
+                name, body_type = "wrong", Held
+
+
 class TestOpening:
     def test_body_on_two_contacts_must_say_which_one_opens(self):
         class Feet(SingleContactRing):
-            name, body_type, contacts = "feet", OnFeet, 2
+            name, body_type = "feet", OnFeet
 
         with pytest.raises(TypeError, match=r"model feet: OnFeet has no contact\.opening"):
             Feet().required(Structure("feet", "coulomb"))

@@ -294,6 +294,12 @@ def test_plain_end_of_an_interval_beside_another_unit_is_told(caplog: pytest.Log
     [
         ({}, {"body.mass": {"logspace": [1, 2, 3]}}, "sweep.grid.body.mass", "; did you mean `geomspace`, from the"),
         ({}, {"body.mass": {"linspce": [1, 2, 3]}}, "sweep.grid.body.mass", "; did you mean `linspace`, from the"),
+        (
+            {},
+            {"belt.velocity": {"linspace": [5, "60 cm/s", 8]}},
+            "sweep.grid.belt.velocity.linspace",
+            "5 has no unit, but the other end is in cm/s: give both a unit",
+        ),
         ({"solver": {"method": "auto"}}, {}, "scene.solver", "the section `solver` stands beside `scene`, not in it"),
         (
             {"drive": {"law": "power", "amplitude": "2 m", "exponent": 1.1}, "belt": None},

@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from solutions import rod
 
 import ringsweep
-from ringsweep.physics import ring
+from ringsweep.physics import contact, ring
 from ringsweep.quantities.flags import SEPARATING
 
 
@@ -182,6 +182,95 @@ def test_reactions_of_a_body_on_springs_grow_without_bound_where_det_A_is_negati
         for stiffness in (1e8, 1e10):
             reactions = on_springs(scene, *state, 1.2 * loads, stiffness, 60.0 * root_mass / np.sqrt(stiffness))
             assert reactions.max() > 100.0 * loads.max()
+
+
+def tilted_on_springs(body, mu_s, turn, stiffness):
+    """Angle at which a body on springs with dampers loses contact 1, while the ring slowly tilts it.
+
+    The ring turns by ``turn(t)``, which returns angle and rate. Friction is steep enough to hold the body.
+    """
+    M, J, R, xi, sin_beta, cos_beta, g = body
+    points = np.array([[-R * sin_beta, xi - R * cos_beta], [R * sin_beta, xi - R * cos_beta]])
+    damping = 0.6 * np.sqrt(stiffness * M)
+
+    def contacts(t, y):
+        cosine, sine = np.cos(y[2]), np.sin(y[2])
+        for point, mu in zip(points, mu_s, strict=True):
+            arm = np.array([cosine * point[0] - sine * point[1], sine * point[0] + cosine * point[1]])
+            place, velocity = y[:2] + arm, y[3:5] + y[5] * np.array([-arm[1], arm[0]])
+            distance = np.linalg.norm(place)
+            outward = place / distance
+            along = np.array([-outward[1], outward[0]])
+            N = max(0.0, stiffness * (distance - R) + damping * velocity @ outward) if distance > R else 0.0
+            yield N, N * (-outward - mu * np.tanh((velocity @ along - turn(t)[1] * distance) / 1e-6) * along), arm
+
+    def rates(t, y):
+        force, moment = M * g * np.array([0.0, -1.0]), 0.0
+        for _, push, arm in contacts(t, y):
+            force, moment = force + push, moment + arm[0] * push[1] - arm[1] * push[0]
+        return [*y[3:], *(force / M), moment / J]
+
+    def opens(t, y):
+        return next(contacts(t, y))[0] - 1e-6 * M * g if t > 0.05 else 1.0
+
+    opens.terminal = True
+    rate = turn(0.0)[1]
+    start = [0.0, -xi - 0.5 * M * g / stiffness, 0.0, rate * xi, 0.0, rate]
+    run = solve_ivp(rates, (0.0, 4.9), start, method="Radau", rtol=1e-6, atol=1e-12, events=opens)
+    return np.arctan2(run.y[0, -1], -run.y[1, -1])
+
+
+@pytest.mark.parametrize(
+    ("angle", "offset", "inertia", "mu_s", "tilt"),
+    [(0.118, 0.84, 0.753, (2.222, 0.174), 0.51), (0.116, 0.724, 0.626, (2.48, 0.488), 0.59)],
+)
+def test_body_sticks_on_where_the_determinant_vanishes_as_it_does_on_springs(angle, offset, inertia, mu_s, tilt):
+    """A narrow body is tilted until a contact opens; det A vanishes on the way."""
+    M, R, g, frequency = 0.1, 0.05, 9.81, 0.05
+    xi = offset * R * np.cos(angle)
+    body = rod(M, inertia * M * R**2, R, xi, np.sin(angle), np.cos(angle), g)
+    w = 2.0 * np.pi * frequency
+    scene = {
+        "model": "ring",
+        "body": {
+            "mass": M,
+            "inertia": inertia * M * R**2,
+            "half_distance": R * np.sin(angle),
+            "ball_radius": 0.0,
+            "center_offset": xi - R * np.cos(angle),
+        },
+        "ring": {"radius": R},
+        "friction": {
+            "law": "stiction",
+            "rough": {"mu_s": mu_s[0], "mu_k": mu_s[0]},
+            "rest": {"mu_s": mu_s[1], "mu_k": mu_s[1]},
+        },
+        "zone": {"half_angle": 0.6, "center": -0.6},
+        "drive": {"law": "sinusoidal", "amplitude": -tilt, "frequency": frequency},
+        "initial": {"omega": -tilt * w},
+        "time": {"span": 4.9},
+    }
+    found = ringsweep.sweep(scene, {"drive.amplitude": [-tilt]}, progress=False)
+    phi = found.phi_end.item()
+    assert found.certified == 1
+    assert found.separating_contact == 1
+    assert found.stick_time == found.t_end
+    determinants = []
+    for share in (0.4, 0.9):
+        at = np.sin(share * phi), np.cos(share * phi), 0.0
+        kappa = contact.stick(body, *mu_s, at, 0.0)[0]
+        determinants.append(ring.acceleration(body, -kappa * mu_s[0], -kappa * mu_s[1], at)[1])
+    assert determinants[0] > 0.0 > determinants[1]
+    ends = [
+        tilted_on_springs(
+            (M, inertia * M * R**2, R, xi, np.sin(angle), np.cos(angle), g),
+            mu_s,
+            lambda t: (-tilt * np.sin(w * t), -tilt * w * np.cos(w * t)),
+            stiffness,
+        )
+        for stiffness in (1e5, 1e7)
+    ]
+    np.testing.assert_allclose(ends, phi, rtol=5e-3)
 
 
 def test_wedged_body_is_taken_along_by_a_ring_that_starts_with_an_infinite_acceleration():

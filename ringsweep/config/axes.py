@@ -17,7 +17,7 @@ from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError, nearest_name
 from ringsweep.models.scene import LAW, Scene, Structure
 from ringsweep.quantities.parameters import Choice, Parameter
-from ringsweep.quantities.units import is_quantity, quantity, show
+from ringsweep.quantities.units import is_plain, is_quantity, other_unit, quantity, show, spelled
 from ringsweep.quantities.variables import OUTCOMES
 
 if TYPE_CHECKING:
@@ -170,6 +170,11 @@ def read_spacing(given: dict[str, Any], parameter: Parameter | Choice, where: st
     if not isinstance(bounds, list) or len(bounds) != 3:
         raise InputError(where, f"[first, last, count] is expected, got {show(bounds)}")
     first, last = (quantity(bound, parameter, f"{where}.{i}") for i, bound in enumerate(bounds[:2]))
+    for end, other in (bounds[:2], bounds[1::-1]):
+        unit = other_unit(spelled(other), parameter)
+        # Zero is the same in all units.
+        if unit and is_plain(end) and float(end) != 0.0:
+            raise InputError(where, f"{show(end)} has no unit, but the other end is in {unit}: give both a unit")
     count = int(quantity(bounds[2], COUNT, f"{where}.2"))
     if kind == "geomspace" and min(first, last) <= 0.0:
         raise InputError(where, f"both ends of geomspace must be greater than 0, got {first:g} and {last:g}")

@@ -119,8 +119,8 @@ def read(text: str, names: Iterable[str]) -> Polynomial:
         return _polynomial(eval(f"({right}) - ({left or 0})", {"__builtins__": {}}, symbols))
     except NameError as error:
         near = get_close_matches(str(error.name), symbols, 1)
-        hint = f"did you mean {near[0]}? " if near else ""
-        raise ValueError(f"{text!r}: {error.name} is not known; {hint}(known: {', '.join(symbols)})") from None
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise ValueError(f"{text!r}: {error.name} is not known{hint} (known: {', '.join(sorted(symbols))})") from None
     except (TypeError, RecursionError):
         raise ValueError(
             f"{text!r}: only sums, differences, products and whole powers (**) are taken; a field of the body holds "

@@ -111,7 +111,10 @@ class Equations:
         products = "1", *motion, coordinate.product, "F1", "F2"
         #: Products of the motion and of the forces F1 and F2 to which the solution is proportional.
         self.basis = [next(iter(read(text, (*motion, "F1", "F2")))) for text in products]
-        names, lacks = {*fields, *absent, *motion}, dict.fromkeys(absent, 0.0)
+        names, lacks = {*fields, *absent, *motion} - {"constants"}, dict.fromkeys(absent, 0.0)
+        for text in balances:
+            if text.count("=") != 1:
+                raise ValueError(f"{text!r}: a balance is an equation, with one `=`")
         unknown = {*self.unknowns, *(f"K{i + 1}" for i in range(self.contacts))}
         symbols = {*motion, acceleration, *_CONTACTS, *_DERIVED}
         if doubled := symbols & set(fields):
@@ -121,8 +124,6 @@ class Equations:
         single = [((name, 1),) for name in (acceleration, "N1", "N2")]
         taken = {(("K1", 1), ("N1", 1)), (("K2", 1), ("N2", 1)), *single, *self.basis}
         for text, balance in zip(balances, self.balances, strict=True):
-            if text.count("=") != 1:
-                raise ValueError(f"{text!r}: a balance is an equation, with one `=`")
             if not set(balance.parts((*motion, acceleration, *_CONTACTS))) <= taken:
                 raise ValueError(
                     f"{text!r}: a balance is a sum of multiples of {acceleration}, N1, N2, K1*N1, K2*N2, "

@@ -99,29 +99,67 @@ def sharing(m1, m2, at_zero, by_F2):
         Coefficients of F_2^2, 1, and of F_2, N, and constant term, N^2.
     """
     (N1, N2, F1), (by_N1, by_N2, by_F1) = at_zero, by_F2
-    return m2 * by_F1 * by_N2 - m1 * by_N1, m2 * (by_F1 * N2 + F1 * by_N2) - m1 * N1, m2 * F1 * N2
+    plus, minus = m2 * by_F1 * by_N2, m1 * by_N1
+    square = plus - minus if abs(plus - minus) > _ROUNDING * (abs(plus) + abs(minus)) else 0.0
+    return square, m2 * (by_F1 * N2 + F1 * by_N2) - m1 * N1, m2 * F1 * N2
 
 
 @inlined
-def shared_friction(m1, m2, at_zero, by_F2):
-    """Friction F_2 that solves the equation of :func:`sharing`, N.
+def roots(m1, m2, at_zero, by_F2):
+    """Both solutions F_2 of the equation of :func:`sharing`, N: first the stable one, then the other one.
 
-    Of two admissible roots it is the stable one: near it, a body with more friction against its motion is slower. There
-    the left side of the equation less the right side falls with F_2. On a ring this root is admissible if the other one
-    is. Without friction at rest the contacts share the friction force equally.
+    Near the stable one a body with more friction against its motion is slower. There the left side of the equation less
+    the right side falls with F_2. Without friction at rest the contacts share the friction force equally.
     """
     if m1 + m2 == 0.0:
-        return at_zero[2] / (1.0 - by_F2[2])
+        half = at_zero[2] / (1.0 - by_F2[2])
+        return half, half
     square, linear, constant = sharing(m1, m2, at_zero, by_F2)
     root = sqrt(max(linear * linear - 4.0 * square * constant, 0.0))
     total = root + abs(linear)
     one = 2.0 * constant / total if total != 0.0 else 0.0
     # With a smaller factor the other root is infinite.
     other = 0.5 * total / square if abs(square) > 1e-200 else one
-    stable, unstable = (one, other) if linear <= 0.0 else (-other, -one)
-    if _holds(m1, m2, stable, at_zero, by_F2) or not _holds(m1, m2, unstable, at_zero, by_F2):
+    return (one, other) if linear <= 0.0 else (-other, -one)
+
+
+@inlined
+def shared_friction(m1, m2, at_zero, by_F2):
+    """Friction F_2 of a body that sticks, N: the stable one of :func:`roots`, unless only the other one is admissible.
+
+    On a ring the stable one is admissible if the other one is.
+    """
+    stable, other = roots(m1, m2, at_zero, by_F2)
+    if _holds(m1, m2, stable, at_zero, by_F2) or not _holds(m1, m2, other, at_zero, by_F2):
         return stable
-    return unstable
+    return other
+
+
+@inlined
+def folds(body, m1, m2):
+    """Whether two states of stick can meet: whether the equation of :func:`sharing` is quadratic."""
+    if ring.contact_count(body) == 1:
+        return False
+    square, _, _ = sharing(m1, m2, (0.0, 0.0, 0.0), ring.held(body, 0.0, (0.0, 0.0, 0.0), 0.0, 0.0, 1.0))
+    return square != 0.0
+
+
+@inlined
+def loads_as_stick_ends(body, m1, m2, motion, epsilon, first):
+    """Normal reactions of a body that sticks, N, where that of contact 1 has vanished, or of contact 2 if not `first`.
+
+    Of both :func:`roots` it is the one at which this reaction is closer to zero. The other arguments are those of
+    :func:`stick`.
+    """
+    N1, N2, F1 = ring.held(body, 1.0, motion, motion[2] * motion[2], epsilon, 0.0)
+    if ring.contact_count(body) == 2:
+        at_zero, by_F2 = (N1, N2, F1), ring.held(body, 0.0, (0.0, 0.0, 0.0), 0.0, 0.0, 1.0)
+        stable, other = roots(m1, m2, at_zero, by_F2)
+        N1, N2, _ = at(stable, at_zero, by_F2)
+        other_1, other_2, _ = at(other, at_zero, by_F2)
+        if abs(other_1 if first else other_2) < abs(N1 if first else N2):
+            N1, N2 = other_1, other_2
+    return N1, N2
 
 
 @inlined

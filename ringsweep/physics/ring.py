@@ -32,7 +32,7 @@ from __future__ import annotations
 
 import inspect
 import sys
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from functools import partial
 from itertools import combinations
 from typing import Any, NamedTuple
@@ -383,7 +383,7 @@ _VARIANTS: dict[tuple[type, frozenset[str]], type] = {}
 
 def body(
     *,
-    balances: tuple[str, ...],
+    balances: Sequence[str],
     energy: str,
     offset: str = "",
     coordinate: Coordinate = ANGLE,
@@ -395,7 +395,7 @@ def body(
 
     Parameters
     ----------
-    balances : tuple of str
+    balances : sequence of str
         Two equations for a body with one contact, three for a body with two; see :mod:`ringsweep.physics.bodies`.
     energy : str
         Kinetic and potential energy, J.
@@ -417,6 +417,10 @@ def body(
         needed = ("mass", "gravity", *({"radius"} if coordinate is ANGLE else ()), "constants")
         if missing := [field for field in needed if field not in getattr(cls, "_fields", ())]:
             raise TypeError(f"{cls.__name__}: a NamedTuple with the field {', '.join(missing)} is needed")
+        if isinstance(balances, str):
+            raise TypeError(f"{cls.__name__}: balances is one text: give several, with commas between them")
+        if offset and offset not in cls._fields:
+            raise TypeError(f"{cls.__name__}: offset names the field {offset}, which does not exist")
         for count in range(len(optional) + 1):
             for absent in combinations(optional, count):
                 variant = _VARIANTS[cls, frozenset(absent)] = _without(cls, absent)

@@ -235,6 +235,8 @@ def _factor_or_error(unit: str, value: str, parameter: Parameter, path: str) -> 
     target = "has no unit" if parameter.unit == "1" else f"is in {parameter.unit}"
     try:
         return _factor(unit, parameter.unit)
+    except _pint().PintError:
+        raise InputError(path, f"{parameter.long_name} is declared in {parameter.unit!r}, no known unit") from None
     except LookupError:
         raise InputError(
             path, f"{show(value)}: {show(unit)} is not a known unit; {parameter.long_name} {target}"

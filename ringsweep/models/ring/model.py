@@ -32,6 +32,10 @@ def _is_recorded(structure: Structure) -> bool:
     return structure.exponent or structure.section is not None
 
 
+# Variables that a body with one contact lacks.
+_OF_CONTACT_2 = frozenset({"normal_min_2", "normal_max_2", "normal_2", "zone_2", "deflection_2"})
+
+
 class SingleContactRing(Model, Continues):
     """A small body on one contact with the ring (the paper's Fig. 13)."""
 
@@ -41,15 +45,30 @@ class SingleContactRing(Model, Continues):
     place: ClassVar[str] = "phi"
     ends: ClassVar[Mapping[str, str]] = {"phi_end": "phi", "omega_end": "omega"}
     driven: ClassVar[tuple[str, ...]] = ("theta",)
-    absent: ClassVar[frozenset[str]] = frozenset({"normal_min_2", "normal_max_2", "normal_2", "zone_2", "deflection_2"})
+    absent: ClassVar[frozenset[str]] = _OF_CONTACT_2
     body: ClassVar[dict[str, Parameter]] = {"body.mass": MASS, "ring.radius": RADIUS}
     has_exponent: ClassVar[bool] = True
     sections: ClassVar[tuple[str, ...]] = ("period",)
     contacts: ClassVar[int] = 1
-    """Number of contacts."""
+    """Number of contacts: that of the balances of the body."""
 
     body_type: ClassVar[type] = ring.OneContact
-    """Type of the body; the hooks of :data:`ring.DERIVED` are implemented for it."""
+    """Type of the body, which :func:`ring.body` declares."""
+
+    def __init_subclass__(cls) -> None:
+        """Take the number of contacts from the balances.
+
+        Raises
+        ------
+        TypeError
+            If the type of the body is not declared.
+        """
+        super().__init_subclass__()
+        if cls.body_type not in ring.EQUATIONS:
+            raise TypeError(f"model {cls.name}: body_type {cls.body_type.__name__} is not declared by ring.body")
+        cls.contacts = ring.EQUATIONS[cls.body_type].contacts
+        if "absent" not in vars(cls):
+            cls.absent = _OF_CONTACT_2 if cls.contacts == 1 else frozenset()
 
     def columns(self, structure: Structure) -> tuple[str, ...]:
         """Outcomes, and after them what is asked for: words of the long run, exponent and multipliers, the section."""
@@ -97,12 +116,12 @@ class SingleContactRing(Model, Continues):
         return ring.BristleRing if self._has_bristles(structure) else ring.Ring
 
     def required(self, structure: Structure) -> dict[type, tuple[Any, ...]]:
-        """Hooks of the recorder, and hooks for the type of the body."""
+        """Hooks of the recorder."""
         if self.contacts == 2 and contact.opening.body_of(self.body_type) is contact.opening.body_of(object):
             raise TypeError(
                 f"model {self.name}: {self.body_type.__name__} has no contact.opening, which says which contact opens"
             )
-        return super().required(structure) | {self.body_type: tuple(ring.DERIVED)}
+        return super().required(structure)
 
     def _has_bristles(self, structure: Structure) -> bool:
         return friction.family_of(structure.law_type) is friction.Dynamic
@@ -161,6 +180,17 @@ class SingleContactRing(Model, Continues):
             raise InputError(
                 "scene.model", f"{self.name}: no parameter {error} for its body (known: {known})"
             ) from None
+        except InputError:
+            raise
+        except Exception as error:
+            # Code of the user's own may fail in any way.
+            hint = "values are arrays with one number for each cell, so use NumPy for functions of them"
+            problem = f"{self.name}: build_body fails with {type(error).__name__}: {error} ({hint})"
+            raise InputError("scene.model", problem) from error
+        cells = len(values["time.span"])
+        body = body._replace(
+            **{name: np.full(cells, field) for name, field in body._asdict().items() if np.isscalar(field)}
+        )
         try:
             body = ring.completed(body)
         except ValueError as error:
@@ -204,9 +234,7 @@ class Ring(SingleContactRing):
 
     name = "ring"
     body_type = ring.TwoContacts
-    contacts = 2
     doc = "a two-contact body in a rotating ring"
-    absent = frozenset()
     body: ClassVar[dict[str, Parameter]] = {
         "body.mass": MASS,
         "body.inertia": Parameter("kg m^2", "central moment of inertia of the body", lower=0.0),

@@ -78,6 +78,10 @@ _AT_ONCE = 1e-9
 # friction. If friction varies with the speed, the body jams at the second share.
 NEARLY_JAMMED, LEAST_DETERMINANT = 1e-4, 1e-6
 
+# Where both roots of the equation of stick meet, a reaction may fall to zero at an infinite rate. If it is smaller
+# than this share of the load there, the contact opens.
+_LEAST_AT_FOLD = 1e-5
+
 # Near the instant at which both roots of the equation of stick meet, its series converge ever more slowly. A
 # discriminant below this share of its terms is zero.
 _LEAST_DISCRIMINANT = 1e-12
@@ -314,11 +318,19 @@ def _after_zero_reaction(scene, mode, first, t, y):
         return lost_in_slip(body, _loads_at(scene, mode, t, y), first)
     # The contact opens, even if slip with both contacts closed were admissible: laws with a narrow stiction band still
     # hold the body at this instant.
+    normals, scale = _loads_as_stick_ends(scene, mode, t, y, first)
+    return _lost(body, normals, scale, first)
+
+
+@inlined
+def _loads_as_stick_ends(scene, mode, t, y, first):
+    """Normal reactions where that of contact 1, or of contact 2, has vanished in stick; and the size of the load, N."""
+    body = scene.body
     _, ring_omega, ring_epsilon = drives.turn(scene.drive, t)
     mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
     motion = sin(y[0]), cos(y[0]), ring_omega
-    _, _, normal_1, normal_2 = contact.stick(body, mu_s1, mu_s2, motion, ring_epsilon)
-    return _lost(body, (normal_1, normal_2), body.mass * (body.gravity + body.radius * ring_omega * ring_omega), first)
+    normals = contact.loads_as_stick_ends(body, mu_s1, mu_s2, motion, ring_epsilon, first)
+    return normals, body.mass * (body.gravity + body.radius * ring_omega * ring_omega)
 
 
 @modes.status_when_stalled.implements(ring.Ring)
@@ -340,6 +352,11 @@ def _switch(scene, mode, guard, t, y):
     if guard == DETERMINANT:
         return JAM, mode, y
     if sign == 0:
+        mu_s1, _, mu_s2, _ = coefficients_under(scene, mode)
+        if guard == EDGE and contact.folds(scene.body, mu_s1, mu_s2):
+            (normal_1, normal_2), scale = _loads_as_stick_ends(scene, mode, t, y, True)
+            if min(normal_1, normal_2) <= _LEAST_AT_FOLD * scale:
+                return _lost(scene.body, (normal_1, normal_2), scale, normal_1 <= normal_2), mode, y
         stick_end = 1 if guard == SLOW else -1 if guard == FAST else 2
         status, mode = _mode_at_rest(scene, t, phi, place_1, place_2, stick_end)
         return status, mode, (phi, 0.0)
@@ -497,7 +514,8 @@ def _expand_reserve(body, m1, m2, c):
     """Fill the reactions and the guards of stick, from the series of the motion; see :func:`contact.sharing`.
 
     NORMAL_1, NORMAL_2; the reserves of friction, N, before forward slip (SLOW) and before backward slip (FAST). For two
-    contacts also EDGE, the discriminant of the quadratic equation; with one contact it stays infinite.
+    contacts also EDGE, the discriminant of the quadratic equation, or the factor of a linear one; with one contact it
+    stays infinite.
     """
     by_F2 = ring.held(body, 0.0, (0.0, 0.0, 0.0), 0.0, 0.0, 1.0)
     first_N2 = first_F1 = first_linear = first_F2 = 0.0
@@ -526,6 +544,9 @@ def _expand_reserve(body, m1, m2, c):
                 F2 = F2 / (2.0 * square * first_F2 + first_linear) if m1 + m2 > 0.0 else F1 / (1.0 - by_F2[2])
                 newest = set_factors(c, FACTORS, k, (F1, linear, linear, F2), (N2, linear, F2, F2))
                 first = newest if k == 1 else first
+            if square == 0.0:
+                # An equation that is linear leaves the share open where its factor vanishes.
+                c[EDGE, k] = -linear
             N1, N2, friction = contact.at(F2, at_zero, by_F2)
             capacity = m1 * N1 + m2 * N2
         c[NORMAL_1, k], c[NORMAL_2, k] = N1, N2

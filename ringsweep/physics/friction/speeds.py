@@ -335,7 +335,7 @@ class _Finder:
             if node.varies and node.kind in ("sqrt", "log", "power") and (self.at(node.parts[0], self.rest) == 0).any():
                 raise FormulaError(
                     "a root, a power or a logarithm of something that vanishes at rest has no power series there: "
-                    "take a whole exponent, or add a small constant"
+                    "write a whole exponent as a number, such as **2, or add a small constant"
                 )
         if self.expression.set_valued:
             excess = at_rest > mu_s * (1.0 + _ROUNDING) + _ROUNDING
