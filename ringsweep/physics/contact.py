@@ -347,9 +347,10 @@ def at_rest(body, static, forward, backward, motion, epsilon, released):
     if released == 0:
         _, reserve, n1, n2 = stick(body, m1, m2, motion, epsilon)
         load = body.mass * _scale(body, motion[2], epsilon)
-        held = min(reserve, min(n1, n2)) / load
         # Without friction or without a load the body cannot stick.
-        if held >= 0.0 and m1 + m2 > 0.0 and min(n1, n2) > _ROUNDING * load:
+        if m1 + m2 > 0.0 and min(n1, n2) > _ROUNDING * load:
+            held = min(reserve, min(n1, n2)) / load
+        if held >= 0.0:
             return STICK
     ahead = _slip_margin(body, 1.0, forward, released == 1 and forward == static, motion, epsilon)
     back = _slip_margin(body, -1.0, backward, released == -1 and backward == static, motion, epsilon)
