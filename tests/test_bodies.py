@@ -255,6 +255,61 @@ class TestOneContact:
             assert found == contact.OPEN_1
 
 
+class AboutCentre(NamedTuple):
+    """The body of the ring, whose last balance is that of the moments about the centre of mass."""
+
+    mass: Any
+    inertia: Any
+    radius: Any
+    xi: Any
+    beta: Any
+    sin_beta: Any
+    cos_beta: Any
+    gravity: Any
+    constants: tuple[Any, ...] = ()
+
+
+ABOUT_CENTRE = "inertia*phi_dd = -xi*sin_beta*(N1 - N2) + (radius - xi*cos_beta)*(K1*N1 + K2*N2)"
+
+
+class TestLastBalance:
+    OTHERS = (
+        "-mass*xi*omega**2 = mass*gravity*cos_phi - (N1 + N2)*cos_beta + (K1*N1 - K2*N2)*sin_beta",
+        "mass*xi*phi_dd = -mass*gravity*sin_phi + (N1 - N2)*sin_beta + (K1*N1 + K2*N2)*cos_beta",
+    )
+    KINETIC = "0.5*(inertia + mass*xi**2)*omega**2 - mass*gravity*xi*cos_phi"
+    RIG = 0.076, 4.47e-5, 0.0434, 0.0225, 0.74, float(np.sin(0.74)), float(np.cos(0.74)), 9.81
+
+    def test_moments_may_be_taken_about_another_point(self):
+        ring.body(balances=(*self.OTHERS, ABOUT_CENTRE), energy=self.KINETIC)(AboutCentre)
+        one, other = ring.completed(ring.TwoContacts(*self.RIG)), ring.completed(AboutCentre(*self.RIG))
+        at = 0.3, 0.95, 2.0
+        for K1, K2 in ((0.0, 0.0), (0.4, 0.1), (-0.7, 0.3)):
+            assert ring.acceleration(other, K1, K2, at)[0] == pytest.approx(ring.acceleration(one, K1, K2, at)[0])
+            assert ring.power(other, K1, K2, *ring.reactions(one, K1, K2, at), at) == pytest.approx(
+                ring.power(one, K1, K2, *ring.reactions(one, K1, K2, at), at)
+            )
+        assert contact.stick(other, 0.4, 0.2, at, 0.0) == pytest.approx(contact.stick(one, 0.4, 0.2, at, 0.0))
+
+    @pytest.mark.parametrize(
+        ("last", "energy", "message"),
+        [
+            (f"{ABOUT_CENTRE} + 0.1*radius*N1", KINETIC, "the work of friction|do not follow from the potential"),
+            (ABOUT_CENTRE.replace("radius - xi", "radius + xi"), KINETIC, "the work of friction"),
+            (ABOUT_CENTRE, KINETIC.replace("xi*cos_phi", "radius*cos_phi"), "do not follow from the potential energy"),
+        ],
+    )
+    def test_reaction_that_does_work_is_refused(self, last, energy, message):
+        ring.body(balances=(*self.OTHERS, last), energy=energy)(AboutCentre)
+        with pytest.raises(ValueError, match=message):
+            ring.completed(AboutCentre(*self.RIG))
+
+    def test_contact_without_friction_is_refused(self):
+        balances = "N1 = mass*press", "N2 = mass*press", "mass*radius*phi_dd = K2*N2 - mass*pull*sin_phi"
+        with pytest.raises(TypeError, match=r"K1\*N1 is in no balance"):
+            ring.body(balances=balances, energy=ENERGY)(Brake)
+
+
 class TestSign:
     @pytest.mark.parametrize("sign", [1.0, -1.0, -0.37])
     def test_balance_may_be_multiplied_by_a_number(self, sign):

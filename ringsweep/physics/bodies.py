@@ -131,6 +131,9 @@ class Equations:
                 )
         if not self.balances[-1].rate({acceleration: 1.0}):
             raise ValueError(f"{balances[-1]!r} has no {acceleration}: the last balance is the one along the motion")
+        for i in range(1, len(balances)):
+            if not any(p.rate({f"K{i}": 1.0}) for p in self.balances):
+                raise ValueError(f"K{i}*N{i} is in no balance: each contact has friction")
         #: Determinant without friction.
         self.free = self._free_determinant(self.balances, self.unknowns)
         if not self.free:
@@ -154,26 +157,27 @@ class Equations:
         return tuple(found)
 
     def contradiction(self, body: Any) -> str | None:
-        """How energy and last balance of a body contradict each other; None if they do not.
+        """How energy and balances of a body contradict each other; None if they do not.
 
-        The energy would only repeat the last balance if it were never compared with anything else. What friction does
-        to it must be the work of friction, and what depends on the place must follow from it.
+        The energy would only repeat the balances if it were never compared with anything else. Its rate must be the
+        work of friction, besides that of forces that do not depend on the place.
         """
-        (velocity, last), energy = (self.coordinate.motion[-1], self.balances[-1]), self.energy
-        by_place, by_velocity = (energy.rate(by) for by in self._rates()[:2])
-        inertia = last.rate({self.unknowns[0]: 1.0}) * symbol(velocity)
-        for K, N in (("K1", "N1"), ("K2", "N2"))[: self.contacts]:
-            work = by_velocity * last.rate({K: 1.0}).rate({N: 1.0}) + inertia * self.coordinate.lever
-            if not _vanishes(work, body, self.coordinate.motion):
+        velocity, (moment, *normals), whole = self.coordinate.motion[-1], self.numerators, self.whole
+        by_place, by_velocity = (self.energy.rate(by) for by in self._rates()[:2])
+        rate = by_place * symbol(velocity) * whole + by_velocity * moment
+        along = [symbol(f"K{i}") * N * self.coordinate.lever * symbol(velocity) for i, N in enumerate(normals, start=1)]
+        rest = rate - sum(along, Polynomial())
+        rest_free, whole_free = rest.substitute(_FREE), whole.substitute(_FREE)
+        excess = rest * whole_free - rest_free * whole
+        for i, other in (("1", "K2"), ("2", "K1"))[: self.contacts]:
+            if not _vanishes(excess.substitute({other: 0.0}), body, (*self.coordinate.motion, f"K{i}")):
                 return (
-                    f"{self.texts[-1]!r}: {K}*{N} does not do the work of friction on the energy: the kinetic energy "
+                    f"{self.texts[-1]!r}: K{i}*N{i} does not do the work of friction on the energy: the kinetic energy "
                     "has another inertia, a sign is wrong, or the contacts do not slide at the field radius"
                 )
-        held = dict.fromkeys((velocity, *_CONTACTS, self.unknowns[0]), 0.0)
-        work = by_place * inertia - by_velocity * last.substitute(held)
         # A force that is constant or given need not be in the energy.
-        work = Polynomial(term for term in work.items() if set(dict(term[0])) & set(self.coordinate.by_place))
-        if not _vanishes(work, body, self.coordinate.motion):
+        placed = Polynomial(term for term in rest_free.items() if set(dict(term[0])) & set(self.coordinate.by_place))
+        if not _vanishes(placed, body, self.coordinate.motion):
             return f"{self.texts[-1]!r}: the terms that depend on the place do not follow from the potential energy"
         if np.any(evaluate(self.free, body) == 0.0):
             return f"the balances do not determine {self.unknowns[0]} and the reactions for these numbers"
