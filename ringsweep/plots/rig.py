@@ -116,7 +116,7 @@ def _friction(body: Any, phi: Any, omega: Any, epsilon: Any, normals: list[Any])
     squares = sum(by * by for by in by_F2)
     # Where the reactions do not tell the contacts' friction apart, all of it is drawn at contact 1.
     second = sum(by * (normal - zero) for by, normal, zero in zip(by_F2, normals, at_zero, strict=True))
-    second = second / squares if squares > 0.0 else 0.0 * total
+    second = second / squares if squares > 1e-20 else 0.0 * total
     return [total + by_total * second, second]
 
 
