@@ -82,20 +82,13 @@ ring.body(
 )(Sledge)
 
 
-class Turned(NamedTuple):
-    """The body of the ring, one of whose balances has the other sign, with a field in place of a 1."""
+FIELDS = [(name, Any) for name in ring.TwoContacts._fields if name != "constants"]
 
-    mass: Any
-    inertia: Any
-    radius: Any
-    xi: Any
-    beta: Any
-    sin_beta: Any
-    cos_beta: Any
-    gravity: Any
-    sign: Any
-    constants: tuple[Any, ...] = ()
+#: The body of the ring, whose last balance is that of the moments about the centre of mass.
+AboutCentre = NamedTuple("AboutCentre", [*FIELDS, ("constants", tuple[Any, ...])])
 
+#: The body of the ring, one of whose balances has the other sign, with a field in place of a 1.
+Turned = NamedTuple("Turned", [*FIELDS, ("sign", Any), ("constants", tuple[Any, ...])])
 
 ring.body(
     balances=(
@@ -255,20 +248,6 @@ class TestOneContact:
             assert found == contact.OPEN_1
 
 
-class AboutCentre(NamedTuple):
-    """The body of the ring, whose last balance is that of the moments about the centre of mass."""
-
-    mass: Any
-    inertia: Any
-    radius: Any
-    xi: Any
-    beta: Any
-    sin_beta: Any
-    cos_beta: Any
-    gravity: Any
-    constants: tuple[Any, ...] = ()
-
-
 ABOUT_CENTRE = "inertia*phi_dd = -xi*sin_beta*(N1 - N2) + (radius - xi*cos_beta)*(K1*N1 + K2*N2)"
 
 
@@ -282,7 +261,7 @@ class TestLastBalance:
 
     def test_moments_may_be_taken_about_another_point(self):
         ring.body(balances=(*self.OTHERS, ABOUT_CENTRE), energy=self.KINETIC)(AboutCentre)
-        one, other = ring.completed(ring.TwoContacts(*self.RIG)), ring.completed(AboutCentre(*self.RIG))
+        one, other = ring.completed(ring.TwoContacts(*self.RIG)), ring.completed(AboutCentre(*self.RIG, ()))
         at = 0.3, 0.95, 2.0
         for K1, K2 in ((0.0, 0.0), (0.4, 0.1), (-0.7, 0.3)):
             assert ring.acceleration(other, K1, K2, at)[0] == pytest.approx(ring.acceleration(one, K1, K2, at)[0])
@@ -302,7 +281,7 @@ class TestLastBalance:
     def test_reaction_that_does_work_is_refused(self, last, energy, message):
         ring.body(balances=(*self.OTHERS, last), energy=energy)(AboutCentre)
         with pytest.raises(ValueError, match=message):
-            ring.completed(AboutCentre(*self.RIG))
+            ring.completed(AboutCentre(*self.RIG, ()))
 
     def test_contact_without_friction_is_refused(self):
         balances = "N1 = mass*press", "N2 = mass*press", "mass*radius*phi_dd = K2*N2 - mass*pull*sin_phi"
@@ -314,7 +293,7 @@ class TestSign:
     @pytest.mark.parametrize("sign", [1.0, -1.0, -0.37])
     def test_balance_may_be_multiplied_by_a_number(self, sign):
         body = rod(0.076, 4.47e-5, 0.0434, 0.0225, 0.74, 0.67, 9.81)
-        turned = ring.completed(Turned(*body[:8], sign))
+        turned = ring.completed(Turned(*body[:8], sign, ()))
         at = 0.3, 0.95, 2.0
         for K1, K2 in ((0.0, 0.0), (0.4, 0.1), (-2.0, 2.0), (5.0, -5.0)):
             (one, determinant), (other, theirs) = (
