@@ -224,6 +224,7 @@ class TestPint:
         ("15 mm", "rad", "the angle of an arc is its length divided by the radius"),
         ("15 deg", "1", "wrong unit"),
         ("3 bananas", "m", "not a known unit"),
+        ("3 m", "banana", "something is declared in 'banana', no known unit"),
         ("3 m^9^9^9", "m", "not a known unit"),
         ("3 rad", "", "takes a plain number"),
         ("0,1 m/s", "m/s", "a decimal point, not a comma"),

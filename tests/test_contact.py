@@ -225,6 +225,14 @@ class TestSliding:
         modes = [contact.sliding(body, 0.0, 0.0, (sin(3.1), cos(3.1), omega)) for omega in (0.0, 50.0)]
         assert modes == [OPEN_BOTH, CLOSED]
 
+    def test_body_at_rest_at_the_top_does_not_stick(self):
+        # Its reactions vanish at one root of stick, but for rounding.
+        body = rod(0.076, 4.47e-5, 0.043378, 0.022, 0.75, np.sqrt(1 - 0.75**2), 9.81)
+        at = sin(np.pi), cos(np.pi), 0.0
+        for static in ((0.2, 0.5), (0.5, 0.2), (0.0, 0.5), (0.5, 0.5)):
+            kinetic = 0.6 * static[0], 0.6 * static[1]
+            assert contact.at_rest(body, static, kinetic, kinetic, at, 0.0, 0) == OPEN_BOTH
+
     def test_body_with_one_contact_can_only_open_that_contact(self):
         body = ball(0.076, 0.043378, 9.81)
         assert contact.sliding(body, 0.1, 0.1, (sin(3.0), cos(3.0), 1.0)) == OPEN_1

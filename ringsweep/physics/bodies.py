@@ -169,11 +169,12 @@ class Equations:
         rest = rate - sum(along, Polynomial())
         rest_free, whole_free = rest.substitute(_FREE), whole.substitute(_FREE)
         excess = rest * whole_free - rest_free * whole
-        for i, other in (("1", "K2"), ("2", "K1"))[: self.contacts]:
-            if not _vanishes(excess.substitute({other: 0.0}), body, (*self.coordinate.motion, f"K{i}")):
+        for of, friction in (({"K1"}, "K1*N1"), ({"K2"}, "K2*N2"), ({"K1", "K2"}, "K1*N1 or K2*N2")):
+            terms = Polynomial(term for term in excess.items() if {"K1", "K2"} & set(dict(term[0])) == of)
+            if not _vanishes(terms, body, (*self.coordinate.motion, "K1", "K2")):
                 return (
-                    f"{self.texts[-1]!r}: K{i}*N{i} does not do the work of friction on the energy: the kinetic energy "
-                    "has another inertia, a sign is wrong, or the contacts do not slide at the field radius"
+                    f"{self.texts[-1]!r}: {friction} does not do the work of friction on the energy: the kinetic "
+                    "energy has another inertia, a sign is wrong, or the contacts do not slide at the field radius"
                 )
         # A force that is constant or given need not be in the energy.
         placed = Polynomial(term for term in rest_free.items() if set(dict(term[0])) & set(self.coordinate.by_place))

@@ -70,7 +70,7 @@ def stick(body, m1, m2, motion, epsilon):
     N1, N2, F1 = ring.held(body, 1.0, motion, motion[2] * motion[2], epsilon, 0.0)
     friction, capacity = F1, m1 * N1
     if ring.contact_count(body) == 2:
-        at_zero, by_F2 = (N1, N2, F1), ring.held(body, 0.0, (0.0, 0.0, 0.0), 0.0, 0.0, 1.0)
+        at_zero, by_F2 = (N1, N2, F1), by_friction(body)
         square, linear, constant = sharing(m1, m2, at_zero, by_F2)
         if not linear * linear - 4.0 * square * constant >= 0.0:
             return 0.0, -inf, 0.0, 0.0
@@ -78,6 +78,12 @@ def stick(body, m1, m2, motion, epsilon):
         N1, N2, friction = at(F2, at_zero, by_F2)
         capacity = m1 * N1 + m2 * N2
     return -friction / capacity if capacity != 0.0 else 0.0, capacity - abs(friction), N1, N2
+
+
+@inlined
+def by_friction(body):
+    """Derivatives of N1, N2 and F1 by the friction F_2, which the balances leave open; see :func:`ring.held`."""
+    return ring.held(body, 0.0, (0.0, 0.0, 0.0), 0.0, 0.0, 1.0)
 
 
 @inlined
@@ -108,8 +114,8 @@ def sharing(m1, m2, at_zero, by_F2):
 def roots(m1, m2, at_zero, by_F2):
     """Both solutions F_2 of the equation of :func:`sharing`, N: first the stable one, then the other one.
 
-    Near the stable one a body with more friction against its motion is slower. There the left side of the equation less
-    the right side falls with F_2. Without friction at rest the contacts share the friction force equally.
+    At the stable one a larger saturation slows the body down more: there the left side of the equation less the right
+    side falls with F_2. Without friction at rest the contacts share the friction force equally.
     """
     if m1 + m2 == 0.0:
         half = at_zero[2] / (1.0 - by_F2[2])
@@ -140,7 +146,7 @@ def folds(body, m1, m2):
     """Whether two states of stick can meet: whether the equation of :func:`sharing` is quadratic."""
     if ring.contact_count(body) == 1:
         return False
-    square, _, _ = sharing(m1, m2, (0.0, 0.0, 0.0), ring.held(body, 0.0, (0.0, 0.0, 0.0), 0.0, 0.0, 1.0))
+    square, _, _ = sharing(m1, m2, (0.0, 0.0, 0.0), by_friction(body))
     return square != 0.0
 
 
@@ -153,7 +159,7 @@ def loads_as_stick_ends(body, m1, m2, motion, epsilon, first):
     """
     N1, N2, F1 = ring.held(body, 1.0, motion, motion[2] * motion[2], epsilon, 0.0)
     if ring.contact_count(body) == 2:
-        at_zero, by_F2 = (N1, N2, F1), ring.held(body, 0.0, (0.0, 0.0, 0.0), 0.0, 0.0, 1.0)
+        at_zero, by_F2 = (N1, N2, F1), by_friction(body)
         stable, other = roots(m1, m2, at_zero, by_F2)
         N1, N2, _ = at(stable, at_zero, by_F2)
         other_1, other_2, _ = at(other, at_zero, by_F2)

@@ -13,7 +13,7 @@ from ringsweep.compile import take
 from ringsweep.config import load
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
-from ringsweep.physics import ring
+from ringsweep.physics import contact, ring
 from ringsweep.plots.datasets import on_ring, open_contacts, phases, require_history, require_one_run
 from ringsweep.quantities.variables import configuration_of
 
@@ -109,15 +109,15 @@ def _on_race(ds: xr.Dataset, rig: Rig) -> dict[str, NDArray[Any]]:
 
 def _friction(body: Any, phi: Any, omega: Any, epsilon: Any, normals: list[Any]) -> list[Any]:
     """Friction at each contact, N: that at contact 2 follows from the reactions, which are linear in it."""
-    *at_zero, total = ring.held(body, 1.0, (np.sin(phi), np.cos(phi), omega), omega**2, epsilon, 0.0)
-    *by_F2, by_total = ring.held(body, 0.0, (0.0, 0.0, 0.0), 0.0, 0.0, 1.0)
+    *at_zero, first = ring.held(body, 1.0, (np.sin(phi), np.cos(phi), omega), omega**2, epsilon, 0.0)
     if len(normals) == 1:
-        return [total]
+        return [first]
+    *by_F2, first_by_F2 = contact.by_friction(body)
     squares = sum(by * by for by in by_F2)
     # Where the reactions do not tell the contacts' friction apart, all of it is drawn at contact 1.
     second = sum(by * (normal - zero) for by, normal, zero in zip(by_F2, normals, at_zero, strict=True))
-    second = second / squares if squares > 1e-20 else 0.0 * total
-    return [total + by_total * second, second]
+    second = second / squares if squares > 1e-20 else 0.0 * first
+    return [first + first_by_F2 * second, second]
 
 
 def _off_race(ds: xr.Dataset, rig: Rig) -> dict[str, NDArray[Any]]:

@@ -517,7 +517,7 @@ def _expand_reserve(body, m1, m2, c):
     contacts also EDGE, the discriminant of the quadratic equation, or the factor of a linear one; with one contact it
     stays infinite.
     """
-    by_F2 = ring.held(body, 0.0, (0.0, 0.0, 0.0), 0.0, 0.0, 1.0)
+    by_F2 = contact.by_friction(body)
     first_N2 = first_F1 = first_linear = first_F2 = 0.0
     own = 0.0, 0.0, 0.0, 0.0
     first = newest = no_factors(own)
