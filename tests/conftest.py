@@ -1,5 +1,6 @@
 """Fixtures: the paper's rig, its figures, batches of cells and runs."""
 
+import signal
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType, SimpleNamespace
@@ -17,6 +18,11 @@ from ringsweep.solvers.rk4 import RK4
 
 settings.register_profile("ringsweep", deadline=None, derandomize=True)
 settings.load_profile("ringsweep")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Let tests interrupt themselves: a shell starts processes in the background with interrupts ignored."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 class ByFile(LoadScopeScheduling):

@@ -15,6 +15,7 @@ def ds(scene):
     return ringsweep.sweep(scene, {"drive.amplitude": [0.5, 2.0, 8.0], "zone.half_angle": ["5 deg", "15 deg"]})
 
 
+@pytest.mark.slow
 def test_words_and_boundary_are_those_of_the_functions(ds):
     xr.testing.assert_identical(ds.ringsweep.words(), ringsweep.words(ds.regime))
     xr.testing.assert_identical(ds.ringsweep.words("certified"), ringsweep.words(ds.certified))

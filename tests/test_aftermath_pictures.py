@@ -189,10 +189,12 @@ class TestOffTheRace:
         np.testing.assert_allclose(weight.get_offsets()[0], ball.center)
         assert axes.get_title().endswith("flight")
 
+    @pytest.mark.slow
     def test_film_moves_the_body_off_the_race(self, run, tmp_path):
         plots.save_animation(run, tmp_path / "film.gif", fps=2, duration=2, progress=False)
         assert (tmp_path / "film.gif").stat().st_size > 1000
 
+    @pytest.mark.slow
     def test_title_of_a_film_is_not_cut_off(self, run):
         words = (
             "separating (oscillatory), contact 2, t = 1.28478 s, then tumbled, with 8 losses of contact and 178 impacts"

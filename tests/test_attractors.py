@@ -76,6 +76,7 @@ class TestLabels:
         assert labels(sections([[5.0] * 4, [1.0] * 4, [1.0] * 4])) == [2, 1, 1]
 
 
+@pytest.mark.slow
 class TestShares:
     def spread(self, found, exact):
         return np.std([(one.share[2] - exact) / one.share_error[2] for one in found])
@@ -100,6 +101,7 @@ class TestShares:
         assert 0.3 < self.spread(found, np.pi * 0.09) < 1.5
 
 
+@pytest.mark.slow
 def test_labels_draw_a_map_and_have_an_uncertainty_exponent():
     i, j = np.indices((128, 128)) / 128
     x = np.where(i**2 + j**2 < 0.5, 1.0, 0.0)[..., None] * np.ones(4)
@@ -141,6 +143,7 @@ def basin(velocity, side=24, law=None):
     return ringsweep.attractors(belt(velocity, law, record=record, sweep={"grid": grid}))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("velocity", "published"), [(1.325, 0.1378), (1.5, 0.312), (1.55, 0.3636), (1.775, 0.5552)])
 def test_share_of_steady_sliding_is_that_of_the_published_basin(velocity, published):
     """Of launches at random, the share of 1.5 has a standard error of 0.007."""
@@ -154,6 +157,7 @@ def test_share_of_steady_sliding_is_that_of_the_published_basin(velocity, publis
     assert found.share.values[0] < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [None, {"law": "lugre", "mu_s": 0.6, "mu_k": 0.5, "sigma0": 1e3, "v_s": 0.1}])
 def test_where_all_launches_end_on_steady_slip_it_has_one_label(law):
     """Ends differ by what is left of the decay, which is the whole range of them."""
@@ -162,6 +166,7 @@ def test_where_all_launches_end_on_steady_slip_it_has_one_label(law):
     assert found.share.values.tolist() == [0.0, 1.0]
 
 
+@pytest.mark.slow
 class TestBranchesOfTheFrictionOscillator:
     def follow(self, velocities, direction, **initial):
         sweep = {

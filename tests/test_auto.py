@@ -294,6 +294,7 @@ class TestBody:
             assert found.phi_end[i] == pytest.approx(phi, abs=1e-8)
             assert found.motion[i] == REVOLVING
 
+    @pytest.mark.slow
     def test_launch_exactly_at_the_velocity_of_the_ring_agrees_with_launches_nearby(self, scenes):
         """The neighbours are slower and faster by 1e-9. A power law with exponent 1 moves at once."""
         rate = np.array([5.0, -5.0])
@@ -339,6 +340,7 @@ class TestTime:
         assert found.t_end == 1.5e4
         assert found.regime == OSCILLATORY
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("law", ["stiction", "bengisu-akay"])
     def test_body_at_rest_in_space_without_gravity_loses_both_contacts_at_launch(self, cells, law):
         """The ring moves under the body: the sum of sliding velocity and speed of the ring is zero but for rounding."""
@@ -353,6 +355,7 @@ class TestTime:
         assert (found.regime, found.certified) == (FAILED, 0)
         assert found.steps == PATIENCE
 
+    @pytest.mark.slow
     def test_drive_with_infinite_initial_acceleration_is_symmetric_and_converged(self, scenes):
         """The run with the opposite drive is its mirror image, and a tighter tolerance gives the same run."""
         amplitude = np.array([1e-3, 1.0, 20.0, -20.0, -1.0, 0.0])
@@ -365,6 +368,7 @@ class TestTime:
         np.testing.assert_allclose(found.phi_end[[2, 1]], -found.phi_end[[3, 4]], atol=1e-7)
         assert found.phi_end[5] == 0.0
 
+    @pytest.mark.slow
     def test_bound_on_the_velocity_of_a_body_that_such_a_drive_takes_along_is_true_and_small(self, cells):
         """Its first steps last 1e-14 s. An error of the place, divided by that time, would bound nothing."""
         exponent = np.array([1.3, 1.75, 1.95, 2.27])
@@ -394,6 +398,7 @@ class TestTime:
         assert (found.regime[0], found.separating_contact[0]) == (SEPARATING, 1)
         assert found.t_separation[0] < 1e-12
 
+    @pytest.mark.slow
     def test_oscillating_drive_gives_two_reversals_in_each_of_thousands_of_periods(self, cells):
         """Reversals and the share of stick are the same in a short and in a long run."""
         changes = {"drive.amplitude": 0.2, "drive.frequency": 4.5, "zone.half_angle": 0.0}
@@ -406,6 +411,7 @@ class TestTime:
         assert share[0] == pytest.approx(share[1], rel=0.05)
         assert found.certified.all()
 
+    @pytest.mark.slow
     def test_drive_from_a_table_agrees_with_the_drive_that_it_samples(self, cells):
         """They agree to the error of the spline. The scene without zones equals the one with a zone of zero width."""
         t, amplitude = np.linspace(0.0, 3.0, 1201), np.array([0.2, 2.0, 5.0, -5.0])

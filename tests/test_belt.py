@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from belts import with_all_parts
+from tiers import mostly_slow
 
 import ringsweep
 from ringsweep.quantities.flags import REGIMES
@@ -106,6 +107,7 @@ class TestCoulomb:
 
 
 class TestLaunch:
+    @pytest.mark.slow
     def test_launch_without_initial_values_is_at_rest_on_the_belt(self):
         scene = belt("tustin", alpha=10.0, span=10.0)
         del scene["initial"]
@@ -115,6 +117,7 @@ class TestLaunch:
         assert float(ringsweep.simulate(scene).velocity[0]) == pytest.approx(0.1 * pi, rel=1e-12)
 
 
+@pytest.mark.slow
 class TestViscous:
     """Under stiction and viscous friction c, slip is a damped oscillation about (F_c + c v_b)/k."""
 
@@ -158,6 +161,7 @@ class TestViscous:
         assert (last[4:] > 0.5 * critical[4:]).all()
 
 
+@pytest.mark.slow
 class TestKarnopp:
     """Within the dead band D_v the body keeps its sliding velocity, as on a belt that is slower by D_v."""
 
@@ -193,30 +197,36 @@ def exponent(law, of, values, limit, quantity, **fixed):
 class TestLimits:
     """Every regularised law tends to its limit with the power that theory gives."""
 
+    @pytest.mark.slow
     def test_threlfall_tends_to_coulomb_with_the_width_of_the_band(self):
         slopes = exponent("threlfall", {"v0": 1}, [1e-3, 1e-4, 1e-5], "coulomb", "x_max")
         np.testing.assert_allclose(slopes, 1.0, atol=0.01)
 
+    @pytest.mark.slow
     def test_piecewise_linear_tends_to_stiction_with_the_width_of_the_band(self):
         """The body breaks away at once at the corner of the law, so that only the creep before delays the slip."""
         slopes = exponent("piecewise-linear", {"v0": 1, "v1": 2}, [1e-4, 1e-5, 1e-6], "stiction", "first_slip")
         np.testing.assert_allclose(slopes, 1.0, atol=0.01)
 
+    @pytest.mark.slow
     def test_piecewise_cubic_tends_to_stiction_with_the_power_two_thirds_of_the_width(self):
         """The law is flat at its top: the passage over such a fold takes a time proportional to the power 2/3."""
         slopes = exponent("piecewise-cubic", {"v0": 1, "v1": 2}, [1e-4, 1e-5, 1e-6], "stiction", "x_max")
         np.testing.assert_allclose(slopes, 2 / 3, atol=0.02)
 
+    @pytest.mark.slow
     def test_karnopp_tends_to_stiction_with_the_root_of_the_dead_band(self):
         widths = [1e-4, 1e-5, 1e-6]
         found = [float(outcome(belt("karnopp", dead_band=width)).x_max) for width in widths]
         errors = np.abs(np.array(found) - float(outcome(belt()).x_max))
         np.testing.assert_allclose(np.diff(np.log(errors)) / np.diff(np.log(widths)), 0.5, atol=0.01)
 
+    @pytest.mark.slow
     def test_dahl_tends_to_coulomb_with_the_power_two_thirds_of_the_compliance(self):
         slopes = exponent("dahl", {"sigma0": 1}, [1e4, 1e5, 1e6], "coulomb", "x_max")
         np.testing.assert_allclose(slopes, -2 / 3, atol=0.01)
 
+    @pytest.mark.slow
     def test_reset_integrator_tends_to_stiction_with_the_compliance(self):
         slopes = exponent("reset-integrator", {"sigma0": 1}, [1e4, 1e5, 1e6], "stiction", "period", sigma1=300.0)
         np.testing.assert_allclose(slopes, -1.0, atol=0.01)
@@ -227,6 +237,7 @@ class TestLimits:
         slopes = exponent("lugre", {"v_s": 1}, [3e-3, 1e-3, 3e-4], "stiction", "x_max", **fixed)
         np.testing.assert_allclose(slopes, 2 / 3, atol=0.04)
 
+    @pytest.mark.slow
     def test_bengisu_akay_tends_to_tustin_with_the_width_of_the_band(self):
         """The velocity of creep in stick is proportional to the width of the band."""
         limit = float(outcome(belt("tustin", alpha=1e3)).period)
@@ -254,6 +265,7 @@ MILD = {
 class TestTwoMethods:
     """Methods agree where a constant step resolves the law; events set the order of its error."""
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(("law", "error"), [("lugre", 1e-4), ("bengisu-akay", 1e-7), ("karnopp", 0.1)])
     def test_auto_and_rk4_agree(self, law, error):
         scene = belt(law, span=20.0, start=0.0, **MILD[law])
@@ -285,6 +297,7 @@ class TestTwoMethods:
         for rtol in (1e-5, 1e-6, 1e-7):
             assert (abs(periods(rtol) - exact) < 20 * rtol * exact).all()
 
+    @pytest.mark.slow
     def test_rk4_step_too_long_for_bristles_has_no_certificate(self):
         """LuGre with steps of 5e-4 s: the trajectory is wrong, but finite."""
         scene = with_all_parts(belt("lugre", span=20.0, sigma0=1e5, sigma1=sqrt(1e5), sigma2=0.1, v_s=0.001))
@@ -307,6 +320,7 @@ class TestPaper:
         found = ringsweep.simulate(CONFIGS / "paper" / "fig09-12.yaml")
         return found.interp(time=np.linspace(0.0, 20.0, 20_001))
 
+    @pytest.mark.slow
     def test_motion_under_coulomb_is_near_dahl_and_under_stiction_near_lugre(self, runs):
         def distance(one, other):
             return float(np.sqrt(((runs.x.sel(friction_law=one) - runs.x.sel(friction_law=other)) ** 2).mean()))
@@ -315,6 +329,7 @@ class TestPaper:
         assert distance("stiction", "lugre") < 0.5 * min(distance("coulomb", "stiction"), distance("coulomb", "lugre"))
         assert [REGIMES[int(regime)] for regime in runs.regime] == ["oscillatory", "stick-slip"] * 2
 
+    @pytest.mark.slow
     def test_forces_of_the_four_laws_differ_most_just_after_the_start(self, runs):
         spread = runs.friction_force.max("friction_law") - runs.friction_force.min("friction_law")
         assert float(spread.idxmax()) < 0.001
@@ -383,7 +398,7 @@ class TestExtremes:
         {"initial.x": 50.0, "initial.velocity": -20.0},
     ]
 
-    @pytest.mark.parametrize("law", SMALL)
+    @pytest.mark.parametrize("law", mostly_slow(SMALL, ("stiction", "lugre")))
     def test_extreme_parameters_give_finite_outcomes(self, law):
         scene = belt(law, span=20.0, start=0.0, **self.SMALL[law])
         usual = {
@@ -431,7 +446,7 @@ class TestExtremes:
 class TestRegimes:
     """The word says what the motion settles to."""
 
-    @pytest.mark.parametrize("law", ["stiction", "karnopp"])
+    @pytest.mark.parametrize("law", mostly_slow(["stiction", "karnopp"], ("stiction",)))
     def test_friction_force_never_exceeds_the_breakaway_force(self, law):
         """From a distant launch the sliding velocity is zero many times before the body sticks."""
         of_law = {"dead_band": 1e-3} if law == "karnopp" else {}
@@ -440,12 +455,13 @@ class TestRegimes:
             assert float(found.force_max) <= 1.4715 * (1 + 1e-9)
             assert float(found.x_min) < -0.8 * abs(x)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("cycles", [2.4, 3.4, 5.4, 8.4])
     def test_decaying_oscillation_is_sliding(self, cycles):
         scene = belt("coulomb", viscous=0.3, start=0.0, span=cycles * 2 * pi / sqrt(2.0))
         assert REGIMES[int(outcome(with_all_parts(scene)).regime)] == "sliding"
 
-    @pytest.mark.parametrize("law", ["stiction", "bengisu-akay", "lugre", "dahl"])
+    @pytest.mark.parametrize("law", mostly_slow(["stiction", "bengisu-akay", "lugre", "dahl"], ("stiction", "lugre")))
     def test_body_that_sticks_to_the_end_is_sticking(self, law):
         of_law = TestExtremes.SMALL[law]
         without_spring = belt(law, k=0.0, start=-1.0, span=60.0, **of_law)
@@ -453,7 +469,7 @@ class TestRegimes:
         for scene in (without_spring, still):
             assert REGIMES[int(outcome(scene).regime)] == "sticking"
 
-    @pytest.mark.parametrize("law", ["reset-integrator", "lugre"])
+    @pytest.mark.parametrize("law", mostly_slow(["reset-integrator", "lugre"], ("lugre",)))
     def test_vibration_of_bristles_during_stick_does_not_count_as_slip(self, law):
         """On a slow belt the vibration of the bristles changes the sign of the velocity many times in one stick."""
         bristles = {"sigma0": 1000.0, "sigma1": 5.0} | ({"v_s": 0.001} if law == "lugre" else {})
@@ -465,12 +481,14 @@ class TestRegimes:
         np.testing.assert_allclose(found.period[1], found.period[2], rtol=1e-4)
         np.testing.assert_allclose(found.slips, (found.time_span - found.first_slip) // found.period[2] + 1, atol=1)
 
+    @pytest.mark.slow
     def test_body_that_creeps_to_equilibrium_is_sticking(self):
         scene = belt("bengisu-akay", v_b=0.0, v0=0.01, alpha=100.0) | {"initial": {"x": 1.5, "velocity": 0.0}}
         found = ringsweep.sweep(scene, {"time.span": [20.0, 60.0, 240.0, 1000.0]}, progress=False)
         assert (found.regime == REGIMES.index("sticking")).all()
         assert found.period.isnull().all()
 
+    @pytest.mark.slow
     def test_rk4_run_that_misses_the_first_stick_has_no_certificate(self):
         scene = belt(span=30.0) | {"initial": {"x": 0.5}}
         assert REGIMES[int(outcome(scene).regime)] == "stick-slip"
@@ -479,6 +497,7 @@ class TestRegimes:
             assert REGIMES[int(fixed.regime)] == "oscillatory"
             assert fixed.certified == 0
 
+    @pytest.mark.slow
     def test_body_that_sticks_to_an_oscillating_belt_is_riding(self):
         scene = belt(k=0.5, span=60.0)
         del scene["belt"], scene["initial"]
@@ -489,7 +508,7 @@ class TestRegimes:
         assert REGIMES[int(found.regime)] == "riding"
         assert found.settled == 1
 
-    @pytest.mark.parametrize("law", ["stiction", "bengisu-akay", "dahl", "lugre"])
+    @pytest.mark.parametrize("law", mostly_slow(["stiction", "bengisu-akay", "dahl", "lugre"], ("stiction", "lugre")))
     def test_regimes_equal_those_of_the_mirror_image(self, law):
         """Belt, place and velocity have the opposite sign."""
         rng = np.random.default_rng(5)
@@ -510,6 +529,7 @@ class TestRegimes:
         np.testing.assert_allclose(one.period, other.period, rtol=1e-5)
         np.testing.assert_array_equal(one.slips, other.slips)
 
+    @pytest.mark.slow
     def test_rk4_step_whose_stages_cross_zero_velocity_has_no_certificate(self):
         scene = belt(v_b=0.45, mu_k=0.139, mu_s=0.2245, k=5.19, start=0.0, span=20.0)
         fixed = outcome(scene, method="rk4", steps=20_000)
@@ -523,6 +543,7 @@ class TestInput:
         with pytest.raises(ringsweep.InputError, match=r"friction\.viscous.*dead band"):
             outcome(belt("karnopp", dead_band=0.01, viscous=100.0))
 
+    @pytest.mark.slow
     def test_belt_needs_either_a_velocity_or_a_drive(self):
         scene = belt()
         del scene["belt"]

@@ -9,6 +9,8 @@ from scipy.integrate import solve_ivp
 import ringsweep
 from ringsweep.quantities.flags import REGIMES
 
+pytestmark = pytest.mark.slow
+
 M, K, G = 1.3, 20.0, 9.81
 SMALL_STEPS = {"method": "rk4", "steps": 40_000}
 

@@ -156,6 +156,7 @@ def test_lap_of_four_that_becomes_one_of_two_is_no_period(shrinks):
     assert periods == {0.9: {2.0}, 0.99: set(), 1.0: {4.0}}[shrinks]
 
 
+@pytest.mark.slow
 def test_period_of_thirteen_cycles_is_found_in_each_span():
     """SciPy finds the same motion: it returns after thirteen periods of the force, and not before."""
     period = 2.0 * pi / 1.6

@@ -75,6 +75,7 @@ def energy(run):
 
 
 class TestHistory:
+    @pytest.mark.slow
     def test_history_has_place_and_velocity_of_the_belt(self, run, rocking):
         t = run.time.values
         np.testing.assert_allclose(run.belt_x, BELT * t, rtol=1e-14)

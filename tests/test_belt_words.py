@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from belts import with_all_parts
+from tiers import mostly_slow
 
 import ringsweep
 from ringsweep.quantities.flags import REGIMES
@@ -39,6 +40,7 @@ def words(found):
 
 
 class TestSticking:
+    @pytest.mark.slow
     def test_body_that_sticks_for_good_to_an_oscillating_belt_is_sticking(self):
         """The load of a stuck body is largest at the extremes of the belt, and stays below breakaway there."""
         of = scene(
@@ -51,7 +53,10 @@ class TestSticking:
         np.testing.assert_array_equal(found.stick_share, 1.0)
         np.testing.assert_allclose(found.stick_time - found.time_span, found.stick_time[2] - 1000.0, atol=1e-9)
 
-    @pytest.mark.parametrize(("law", "of_law"), [("stiction", {}), ("bengisu-akay", {"v0": 1e-4, "alpha": 1e4})])
+    @pytest.mark.parametrize(
+        ("law", "of_law"),
+        mostly_slow([("stiction", {}), ("bengisu-akay", {"v0": 1e-4, "alpha": 1e4})], [("stiction", {})]),
+    )
     def test_body_on_a_belt_at_rest_comes_to_stick_and_on_a_moving_belt_slips_again(self, law, of_law):
         of = scene(law, mu_s=0.15, mu_k=0.1, belt=0.0, x=2.0, velocity=0.0, **of_law)
         found = ringsweep.sweep(of, {"belt.velocity": [0.0, 1e-3, -1e-3]}, progress=False)
@@ -69,6 +74,7 @@ class TestRiding:
         assert found.first_slip.isnull().values.tolist() == [True, False]
 
 
+@pytest.mark.slow
 class TestRounding:
     """Rounded laws have the word of the law that they round."""
 
@@ -132,7 +138,7 @@ class TestSpan:
         "coulomb": [20.0, 21.2, 22.1, 40.0, 41.7],
     }
 
-    @pytest.mark.parametrize("case", CASES)
+    @pytest.mark.parametrize("case", mostly_slow(CASES, ("stiction",)))
     def test_neither_word_nor_first_slip_depend_on_the_span(self, case):
         found = runs(self.CASES[case], self.SPANS[case])
         assert len(set(words(found))) == 1
@@ -140,6 +146,7 @@ class TestSpan:
         assert found.settled[-2:].all()
         np.testing.assert_allclose(found.period[-1], found.period[-2], rtol=1e-5)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("law", ["tustin", "bengisu-akay"])
     def test_longer_settled_runs_have_the_same_word_and_numbers(self, law):
         """Each of the random scenes is run again, longer by fractions of a period of the belt."""
@@ -165,6 +172,7 @@ class TestSpan:
             np.testing.assert_allclose(values, values[:1].repeat(len(values), axis=0), rtol=5e-3, atol=5e-3)
 
 
+@pytest.mark.slow
 class TestPeriod:
     def test_undamped_body_that_is_driven_beside_its_resonance_does_not_return(self):
         """Without friction the free oscillation stays beside the forced one: no cycle repeats another."""
@@ -188,6 +196,7 @@ class TestPeriod:
         assert float(found.period[1]) == pytest.approx(2.0 * pi / sqrt(2.0), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_rk4_has_the_words_and_numbers_of_located_steps():
     rng = np.random.default_rng(11)
     of = scene("bengisu-akay", mu_s=0.2, mu_k=0.15, alpha=10.0, v0=0.02, drive=(0.1, 0.3), span=60.0)
@@ -205,6 +214,7 @@ def test_rk4_has_the_words_and_numbers_of_located_steps():
     np.testing.assert_allclose(fixed.x_max, located.x_max, rtol=1e-6)
 
 
+@pytest.mark.slow
 class TestBreakingLoose:
     """A body launched at the belt's speed rides until k v t = mu_s F_N, at 0.5 s."""
 
@@ -249,6 +259,7 @@ def test_cubic_spring_alone_pulls_a_stuck_body_loose_again_and_again():
     np.testing.assert_allclose(run.period[1:], 6.44443, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_body_that_slides_steadily_below_the_end_of_the_stiction_band_is_sliding():
     """Friction that grows with the speed cannot cause stick-slip."""
     friction = {"law": "bengisu-akay", "mu_s": 0.1, "mu_k": 0.1, "v0": 1.0, "alpha": 10.0}
@@ -279,12 +290,14 @@ class TestSteadySliding:
         assert words(found) == ["sliding", "sliding"]
         assert found.swing[0] > 10.0 * found.swing[1]
 
+    @pytest.mark.slow
     def test_swing_of_a_free_vibration_without_friction_is_twice_its_amplitude(self):
         found = runs(scene("coulomb", belt=0.1, x=0.2, velocity=0.0, span=60.0, mu_s=0.0, mu_k=0.0), 60.0)
         assert words(found) == ["oscillatory"]
         assert found.swing.item() == pytest.approx(0.4, rel=1e-9)
         assert found.settled.item() == 1
 
+    @pytest.mark.slow
     def test_forced_oscillation_without_a_spring_is_certified(self):
         of = scene("tustin", k=0.0, drive=(1.0, 2.0), span=20.0, mu_s=0.01, mu_k=0.01, alpha=1.0)
         found = runs(of, 20.0)

@@ -31,6 +31,7 @@ def labelled(labels):
 
 
 class TestBoundary:
+    @pytest.mark.slow
     def test_regime_changes_within_the_stated_error(self, scene, ds, curves):
         assert curves.sizes["vertex"] > 10
         assert (curves.error <= 1e-4).all()
@@ -137,6 +138,7 @@ class TestBoundary:
             ringsweep.boundary(ds, regime, tolerance)
         assert caught.value.path == path
 
+    @pytest.mark.slow
     def test_curves_are_drawn_over_the_map_and_written(self, ds, curves, tmp_path, capsys):
         from ringsweep.storage import netcdf
 
@@ -215,6 +217,7 @@ class TestValueThatTheMapLacks:
         netcdf.save(ds, "my.nc")
         return netcdf
 
+    @pytest.mark.slow
     def test_boundary_is_that_at_the_value_asked_for(self, folder, scene, caplog):
         assert cli.main(["map", "my.nc", *self.ASKED]) == 0
         assert "zone.half_angle: 15° is not in the dataset: the cells there are run" in caplog.messages
@@ -265,6 +268,7 @@ class TestUncertaintyExponent:
         assert float(found.exponent) == pytest.approx(1.0, abs=0.05)
         assert found.uncertain.values[0] > found.uncertain.values[-1]
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("side", [257, 512, 1000])
     def test_straight_lines_have_the_exponent_one_at_any_size_of_the_map(self, side):
         y, x = np.indices((side, side)) / side

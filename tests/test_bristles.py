@@ -370,6 +370,7 @@ def breakaways():
 class TestBreakaway:
     """The faster the load grows, the smaller is the breakaway force (Canudas de Wit et al. 1995, Fig. 4)."""
 
+    @pytest.mark.slow
     def test_breakaway_force_falls_with_the_rate_of_the_load(self, breakaways):
         assert (np.diff(breakaways) < 0.0).all()
         assert (breakaways < 1.5).all()

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from solutions import solve
+from tiers import mostly_slow
 
 from ringsweep.quantities.flags import REGIMES
 from ringsweep.solvers.event import Auto
@@ -38,7 +39,7 @@ def column(rows, name):
     return np.array([float(row[name] or "nan") for row in rows])
 
 
-@pytest.fixture(scope="module", params=["arctan", "power"])
+@pytest.fixture(scope="module", params=mostly_slow(["arctan", "power"], ("arctan",)))
 def both(request, scenes, cells):
     """Scenes of one drive, and the outcomes of `auto` for them, in one batch."""
     rows = [row for row in scenes if row["drive"] == request.param]

@@ -43,11 +43,13 @@ def rocking(cells):
 class TestDips:
     """A reaction that is negative only for a short time, within a step."""
 
+    @pytest.mark.slow
     def test_dip_of_a_reaction_during_creep_is_found(self, rocking):
         found = solve(Auto(), rocking(0.6017))
         assert (found.regime, found.separating_contact, found.certified) == (SEPARATING, 1, 1)
         assert found.t_separation == pytest.approx(0.21415, abs=1e-5)
 
+    @pytest.mark.slow
     def test_dips_under_a_smooth_law_agree_with_those_under_stiction(self, rocking):
         """The amplitudes go from values that keep the contact closed to values that open it for long."""
         amplitude = np.linspace(0.55, 0.65, 101)
@@ -364,6 +366,7 @@ class TestChaos:
         tolerances = (1e-8, 1e-10, 1e-13)
         return [ringsweep.sweep(cls.SCENE, axes, solver={"method": "event", "rtol": rtol}) for rtol in tolerances]
 
+    @pytest.mark.slow
     def test_numbers_of_runs_that_diverge_have_no_bound(self, found):
         ends = [[float(run[name][0]) for name in ("x_end", "velocity_end")] for run in found]
         assert np.ptp(ends, axis=0).max() > 0.1
@@ -381,6 +384,7 @@ class TestChaos:
             assert float(run.x_end_error[1]) < 1e-4
 
 
+@pytest.mark.slow
 def test_greatest_velocity_of_a_body_that_rides_on_a_belt_is_that_of_the_belt():
     scene = {
         "model": "belt",

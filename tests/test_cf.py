@@ -8,6 +8,8 @@ import pytest
 import ringsweep
 from ringsweep.storage import netcdf
 
+pytestmark = pytest.mark.slow
+
 runner = pytest.importorskip("compliance_checker.runner")
 
 BELT = {

@@ -226,6 +226,7 @@ def test_control_characters_of_a_file_and_of_a_name_are_escaped(folder, capsys):
     assert "no\\x1b[31m.nc: does not exist" in err
 
 
+@pytest.mark.slow
 def test_warning_of_a_library_is_a_line_of_the_log_with_control_characters_escaped(folder, capsys):
     """Matplotlib quotes what it cannot draw. Python would print the escape sequence, and a line of code."""
     assert main(["run", "case.yaml", "-o", "out.nc"]) == 0
@@ -245,6 +246,7 @@ def test_link_to_itself_is_no_output(folder, capsys):
     assert "loop.nc: is a symbolic link that leads to itself" in refused(capsys, "run", "case.yaml", "-o", "loop.nc")
 
 
+@pytest.mark.slow
 def test_part_of_a_history_is_drawn_and_a_run_of_another_scene_is_replaced_with_a_word(folder, capsys, caplog):
     for amplitude in ("2", "3"):
         assert main(["simulate", "case.yaml", "--set", f"drive.amplitude={amplitude}"]) == 0
@@ -270,12 +272,14 @@ def test_run_takes_values_from_the_command_line(folder):
     assert configuration["solver"]["steps"] == 500
 
 
+@pytest.mark.slow
 def test_uncertified_run_is_reported_as_not_certified(folder, capsys, caplog):
     assert main(["simulate", "case.yaml"]) == 0
     assert "not certified" in capsys.readouterr().out.splitlines()[0]
     assert "limit of stability of rk4" in caplog.text
 
 
+@pytest.mark.slow
 def test_run_that_ends_at_t_0_gives_a_warning(folder, capsys, caplog):
     """A body at rest at the top of the ring falls off at once."""
     wrong = ["initial.phi=180 deg", "solver.method=rk4"]
@@ -284,6 +288,7 @@ def test_run_that_ends_at_t_0_gives_a_warning(folder, capsys, caplog):
     assert "the run ends at t = 0" in caplog.text
 
 
+@pytest.mark.slow
 def test_map_of_a_history_is_refused_with_the_name_of_the_file(folder, capsys):
     assert main(["simulate", "case.yaml", "-q"]) == 0
     capsys.readouterr()
@@ -291,6 +296,7 @@ def test_map_of_a_history_is_refused_with_the_name_of_the_file(folder, capsys):
     assert message.startswith("ringsweep: case-run.nc: is the time history of one run, not a sweep; ringsweep plot")
 
 
+@pytest.mark.slow
 def test_plot_draws_what_simulate_and_precision_wrote_and_names_the_command_for_sweeps(folder, capsys):
     assert main(["simulate", "case.yaml", "-q"]) == 0
     Path("case-run.png").unlink()

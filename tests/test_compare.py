@@ -344,6 +344,7 @@ class TestCommands:
         assert "friction_law: coulomb, stiction, tustin\n" in out
         assert (folder / "laws-friction-law-tustin.png").exists()
 
+    @pytest.mark.slow
     def test_simulate_prints_a_line_for_each_law(self, folder, capsys):
         assert main(["simulate", "laws.yaml"]) == 0
         out, _ = capsys.readouterr()
@@ -352,6 +353,7 @@ class TestCommands:
         assert main(["info", "laws-run.nc"]) == 0
         assert "friction_law 3" in capsys.readouterr().out
 
+    @pytest.mark.slow
     def test_plot_draws_one_law_of_a_stored_run(self, folder, compared, capsys):
         netcdf.save(compared, "laws-run.nc")
         assert main(["plot", "laws-run.nc"]) == 0

@@ -57,6 +57,7 @@ def test_whole_file_is_verified(written, capsys):
     assert out[-1] == "digest: the file is what ringsweep wrote"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "name"),
     [
@@ -91,6 +92,7 @@ def test_changed_configuration_is_not_run(copy, capsys):
         assert "configuration" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_flipped_bit_of_a_large_file_is_told(scene, tmp_path, capsys):
     path = tmp_path / "out.nc"
     axes = {"drive.amplitude": np.geomspace(0.5, 8.0, 40), "zone.half_angle": np.radians(np.linspace(5, 40, 30))}

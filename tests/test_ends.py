@@ -97,6 +97,7 @@ class TestSlideThroughVanishingD:
 
 
 class TestReactionVanishesInStick:
+    @pytest.mark.slow
     def test_contact_opens_at_the_limit_of_laws_with_an_ever_narrower_band(self):
         *rows, contacts = np.loadtxt(LOST_IN_STICK.split("\n"), unpack=True)
         values = dict(zip(COLUMNS, rows, strict=True))
@@ -115,6 +116,7 @@ class TestReactionVanishesInStick:
         np.testing.assert_allclose(np.divide(late[:-1], late[1:]), 10.0, rtol=0.03)
 
 
+@pytest.mark.slow
 class TestLaunchOnIce:
     ICE = SWINGING | {
         "friction": {"law": "stiction", "rough": {"mu_s": 0.0, "mu_k": 0.0}, "rest": {"mu_s": 0.0, "mu_k": 0.0}}
@@ -144,6 +146,7 @@ class TestLaunchOnIce:
         assert found.certified == 1
 
 
+@pytest.mark.slow
 def test_stick_ends_where_no_saturation_holds_the_body_any_more():
     """Both roots of the equation of stick meet before friction is used up: then the body slides."""
     values = dict(zip(COLUMNS, [[value] for value in (

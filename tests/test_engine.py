@@ -139,6 +139,7 @@ class TestSingleRun:
         assert run.normal_2[-1] == 0.0
         assert run.normal_2.min() == run.normal_min_2
 
+    @pytest.mark.slow
     def test_model_with_one_contact_has_no_variables_of_contact_2(self, scene):
         alone = scene | {"model": "ring-single-contact", "body": {"mass": 0.076}}
         run = ringsweep.simulate(alone | {"initial": {"omega": 5.0}})

@@ -68,6 +68,7 @@ class TestEvents:
             held = (gap.values[at] == 0.0) & (gap.values[at + 1] == 0.0)
             assert np.isin(run.time.values[at][held], edges).all()
 
+    @pytest.mark.slow
     def test_runs_under_several_laws_have_tables_side_by_side(self, capsys):
         runs = ringsweep.simulate({"scene": BELT, "sweep": {"grid": {"friction.law": ["coulomb", "stiction"]}}})
         alone = ringsweep.simulate(BELT)

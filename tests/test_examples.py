@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
+from tiers import mostly_slow
 
 import ringsweep
 from ringsweep import cli, plots
@@ -17,6 +18,8 @@ PUBLIC = {
     for name in module.__all__
     if callable(getattr(module, name))
 }
+#: Functions whose examples need kernels that no other test needs.
+OF_OWN_KERNELS = {"ringsweep.fit", "ringsweep.friction_law", "ringsweep.precision", "ringsweep.plots.animation"}
 
 
 @pytest.fixture
@@ -27,7 +30,7 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.parametrize("name", PUBLIC)
+@pytest.mark.parametrize("name", mostly_slow(PUBLIC, set(PUBLIC) - OF_OWN_KERNELS))
 def test_examples_in_public_docstrings_are_correct(name, folder):
     drawing = {name: getattr(plots, name) for name in plots.__all__}
     (test,) = doctest.DocTestFinder(recurse=False).find(PUBLIC[name], name, globs=drawing)

@@ -124,6 +124,7 @@ class TestExplore:
         assert asked[0]["drive.amplitude"] == 8.0
         assert asked[0]["zone.half_angle"] == pytest.approx(np.radians(10.0))
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(("x", "y"), [(0.5, 10.0), (8.0, 20.0), (1.3, 48.0)])
     def test_click_draws_and_marks_the_cell_under_the_pointer(self, maps, asked, x, y):
         figure = plots.explore(maps)
@@ -186,6 +187,7 @@ class TestExplore:
         finally:
             pyplot.close("all")
 
+    @pytest.mark.slow
     def test_explore_may_exchange_axes_and_hold_others(self, scene, asked):
         maps = mapped(scene, AXES | {"friction.rough.mu_k": [0.25, 0.3]})
         with pytest.raises(InputError, match="friction_rough_mu_k"):

@@ -89,6 +89,7 @@ def test_exponent_of_the_oscillator_of_ueda():
     assert found.lyapunov.item() == pytest.approx(0.1034, abs=3.0 * found.lyapunov_error.item())
 
 
+@pytest.mark.slow
 def test_exponent_is_that_of_two_neighbouring_runs():
     """Pairs of runs, brought together again after each period, in random cells with and without stops."""
     cells, periods, distance = 20, 120, 1e-7
@@ -154,6 +155,7 @@ def test_steady_sliding_loses_its_stability_at_half_the_logarithm_of_ten():
     assert np.sign(slower.lyapunov.values).tolist() == [1.0, -1.0, -1.0]
 
 
+@pytest.mark.slow
 def test_multipliers_with_bristles_that_let_go():
     """The reset integrator jumps at breakaway and at each reversal. SciPy finds the derivative of its period map."""
     v_belt, force, frequency, damping, stiffness, damping_z, mu_s, mu_k = 0.2, 0.3, 0.8, 0.05, 5.0, 0.4, 0.35, 0.25
@@ -207,6 +209,7 @@ def test_multipliers_with_bristles_that_let_go():
     assert third < 1e-8
 
 
+@pytest.mark.slow
 def test_a_steep_smooth_law_has_the_multipliers_of_the_law_that_jumps():
     """With stops: what the stick erases under Coulomb's law, the creep of a smooth law takes away."""
     period = 2.0 * np.pi / 0.6
@@ -220,6 +223,7 @@ def test_a_steep_smooth_law_has_the_multipliers_of_the_law_that_jumps():
     assert (other.multiplier_2 < 1e-100).all()
 
 
+@pytest.mark.slow
 def test_friction_that_falls_within_a_micrometre_a_second_has_the_exponent_of_neighbouring_runs():
     """A step through the fall of friction holds many times in which a disturbance grows by a factor of e."""
     scene = {

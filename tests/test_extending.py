@@ -239,6 +239,7 @@ CLAIMS = {
 }
 
 
+@pytest.mark.slow
 def test_examples_do_what_the_page_claims(tmp_path):
     """All claims in one process, so that each kernel is compiled once."""
     script = "".join(f"\n# {claim}\n{textwrap.dedent(body)}" for claim, body in CLAIMS.items())
@@ -280,6 +281,7 @@ def changed(package, diff):
         path.write_text(text, encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_outcome_of_the_page_is_stored_and_drawn(tmp_path):
     """A body that swings without friction travels twice the width of a swing in each period."""
     package = tmp_path / "ringsweep"
@@ -321,6 +323,7 @@ def test_picture_of_the_page_shows_the_reactions_of_the_run(scene):
         found["reactions"](run.drop_vars("normal_2"), ax=Figure().add_subplot())
 
 
+@pytest.mark.slow
 def test_incomplete_file_ends_a_command_with_one_line(tmp_path):
     name, old, new, message = INCOMPLETE[0]
     paths = [path for path in files_in(tmp_path, [(name, old, new)]) if path.name == name]
@@ -331,6 +334,7 @@ def test_incomplete_file_ends_a_command_with_one_line(tmp_path):
     assert message in done.stderr
 
 
+@pytest.mark.slow
 def test_incomplete_file_is_refused_in_one_line_that_names_what_is_missing(tmp_path):
     paths = []
     for number, (name, old, new, _) in enumerate(INCOMPLETE):
@@ -354,6 +358,7 @@ def test_incomplete_file_is_refused_in_one_line_that_names_what_is_missing(tmp_p
         assert message in line
 
 
+@pytest.mark.slow
 def test_branch_that_rk4_does_not_compile_is_told_in_one_line_by_file_and_line_with_the_cure(tmp_path):
     old = "    rest = 1.0 - share * z\n"
     new = old + "    if z > 0.0:\n        rest = 0.0 * rest\n"
@@ -377,6 +382,7 @@ NOT_COMPILED = {
 }
 
 
+@pytest.mark.slow
 def test_no_message_of_numba_reaches_a_user(tmp_path):
     """A law and a drive that do not compile are told in one short line, under each method that takes them."""
     changes = [(name, old, new) for name, (old, new, _) in NOT_COMPILED.items()]
@@ -405,6 +411,7 @@ def test_no_message_of_numba_reaches_a_user(tmp_path):
             assert len(line) < 400
 
 
+@pytest.mark.slow
 def test_files_moved_into_the_package_register_what_they_hold(tmp_path):
     package = tmp_path / "ringsweep"
     shutil.copytree(Path(__file__).parents[1] / "ringsweep", package, ignore=shutil.ignore_patterns("__pycache__"))
@@ -422,6 +429,7 @@ def test_files_moved_into_the_package_register_what_they_hold(tmp_path):
     assert done.stdout == f"{package / 'config' / 'schema.py'} True True True\n", done.stderr[-2000:]
 
 
+@pytest.mark.slow
 def test_law_of_an_imported_file_is_refused_by_runs_since_edits_of_it_would_go_unnoticed(tmp_path):
     """The key of the cache of compiled code covers the package and the files of RINGSWEEP_LAWS."""
     (path,) = (path for path in files_in(tmp_path) if path.name == "my_dahl.py")

@@ -222,6 +222,7 @@ def test_names_are_on_the_disk_before_what_relies_on_them(config, monkeypatch):
     assert sorted(deleted) == ["delete it", "delete it", "delete it", "delete sweep.json"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["run", "simulate"])
 def test_name_that_the_locale_cannot_write_is_told_before_the_first_cell(config, command):
     bare = {name: value for name, value in os.environ.items() if not name.startswith(("LC_", "LANG"))}

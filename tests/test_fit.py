@@ -49,6 +49,7 @@ class TestFit:
         given = ringsweep.fit(BELT, {"t": t, "x (mm)": 1e3 * x}, {"belt.velocity": (0.05, 0.13)}, start=2, noise="3 mm")
         assert given.standard_error.item() == pytest.approx(0.003 / np.sqrt(t @ t), rel=1e-6)
 
+    @pytest.mark.slow
     def test_a_wrong_start_finds_the_numbers_that_made_the_history(self):
         """Friction of the scene is twice and half the true one."""
         data = measured(BELT, "x", T, 0.002, 2)
@@ -60,6 +61,7 @@ class TestFit:
         assert found.attrs["noise"] == pytest.approx(0.002, rel=0.25)
         assert found.attrs["held_measurements"] == found.attrs["uncertified_runs"] == 0
 
+    @pytest.mark.slow
     def test_history_after_a_lost_contact_is_the_last_state(self, scene, caplog):
         """The data go on at rest after the loss, for a tenth of the time before it."""
         lost = ringsweep.simulate(scene | {"drive": {"law": "arctan", "amplitude": 2.0}})
@@ -87,6 +89,7 @@ class TestWhatTheDataDoNotTell:
             ringsweep.fit(BELT, data, "friction.mu_k=0.02..0.14", start=2)
         assert "residuals are like their neighbours" not in caplog.text
 
+    @pytest.mark.slow
     def test_mass_and_stiffness_move_the_body_only_by_their_ratio(self, caplog):
         """Friction is proportional to the mass, so x'' = -(k/m) x + mu g."""
         data = measured(BELT, "x", T, 0.002, 3)
@@ -112,6 +115,7 @@ class TestWhatTheDataDoNotTell:
 
 
 class TestCommand:
+    @pytest.mark.slow
     def test_fit_is_printed_stored_and_drawn(self, tmp_path, capsys, monkeypatch):
         monkeypatch.chdir(tmp_path)
         data = measured(BELT, "x", T, 0.002, 2)

@@ -92,6 +92,7 @@ class TestBranches:
         expected[:, 0, 0] = expected[:, -1, 1] = 0
         assert np.array_equal(both.started_from, expected)
 
+    @pytest.mark.slow
     def test_the_same_cells_three_times_are_one_run_of_three_spans(self):
         points = {"points": {"force.frequency": [0.2] * 3}, "follow": "force.frequency"}
         scene = changed(LUGRE, "time", span=10.0)
@@ -137,6 +138,7 @@ class TestTheSameBits:
         assert np.array_equal(again.x_end, both.x_end)
 
 
+@pytest.mark.slow
 class TestAFileGoesOn:
     @pytest.mark.parametrize("simulated", [False, True])
     def test_two_runs_are_one_run_of_both_spans(self, simulated, tmp_path):
@@ -183,6 +185,7 @@ class TestErrors:
         moved["drive"] = {"law": "arctan", "amplitude": 1.0}
         self.refused(moved, "sweep.follow", "no phase", sweep=sweep)
 
+    @pytest.mark.slow
     def test_of_the_initial_state(self, tmp_path):
         self.refused(changed(LUGRE, "initial", deflection=1.0), "scene.initial.deflection", "up to 0.0015 m")
         beside = changed(LUGRE, "initial", x=1.0, **{"from": "a.nc"})
@@ -202,6 +205,7 @@ def test_a_cell_of_a_chain_has_no_configuration_of_its_own(both):
 
 
 class TestSweepsInPython:
+    @pytest.mark.slow
     def test_it_takes_record_and_follow_as_a_configuration_does(self, tmp_path):
         scene, follow = changed(HARDENING, "time", span=40.0), {"axis": "force.frequency", "direction": "both"}
         record, axes = {"section": {"at": "period", "keep": 4}}, {"force.frequency": FREQUENCIES[:3]}

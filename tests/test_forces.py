@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 from scipy.special import ellipj, ellipk
+from tiers import mostly_slow
 
 import ringsweep
 from ringsweep.compile import take
@@ -154,6 +155,7 @@ class TestStick:
         place = brentq(lambda x: x + 2.0 * x**3 + 0.8 * 0.3 - 0.25 - 1.5, 0.0, 2.0, xtol=1e-15)
         assert float(run.time[slips]) == pytest.approx(place / 0.3, rel=1e-12)
 
+    @pytest.mark.slow
     def test_cubic_spring_on_a_rocking_belt_breaks_loose_where_its_force_does(self):
         """The third power oscillates three times as fast as the belt, and the series of the guard with it."""
         scene = forced(friction=0.5, k=0.0, cubic=8.0)
@@ -168,6 +170,7 @@ class TestStick:
         slips = np.flatnonzero(run["mode"].values)[0]
         assert float(run.time[slips]) == pytest.approx(brentq(pull, 0.0, 5.0, xtol=1e-14), rel=1e-11)
 
+    @pytest.mark.slow
     def test_body_in_a_dead_band_is_held_while_friction_can_balance_the_force(self):
         """Karnopp's law: the body leaves the dead band when the excess of the force has made it fast enough."""
         rate = 0.2 * pi
@@ -271,13 +274,14 @@ def everything(rng, law="stiction", *, table=False):
 class TestMethods:
     """All parts together, by all methods and by SciPy."""
 
-    @pytest.mark.parametrize("table", [False, True], ids=["harmonic", "table"])
+    @pytest.mark.parametrize("table", mostly_slow([False, True], [False]), ids=["harmonic", "table"])
     def test_event_agrees_with_an_independent_integration(self, table):
         rng = np.random.default_rng(17)
         for _ in range(4):
             scene = everything(rng, table=table)
             np.testing.assert_allclose(end(scene), reference(scene, 6.0), atol=1e-9)
 
+    @pytest.mark.slow
     def test_event_and_implicit_and_rk4_agree_without_friction(self):
         scene = forced(c=0.2, cubic=3.0, x=0.5, force={"amplitude": 1.5, "frequency": 0.3, "constant": 0.2})
         exact = end(scene, EXACT)
@@ -290,12 +294,14 @@ class TestMethods:
         ]
         np.testing.assert_allclose(np.diff(np.log2(errors)), -4.0, atol=0.3)
 
+    @pytest.mark.slow
     def test_rk4_takes_the_force_of_a_table(self):
         scene = everything(np.random.default_rng(2), table=True)
         scene["friction"] |= {"mu_s": 0.0, "mu_k": 0.0}
         solver = {"method": "rk4", "steps": 6000, "certify": False}
         np.testing.assert_allclose(end(scene, solver), end(scene, EXACT), atol=1e-9)
 
+    @pytest.mark.slow
     def test_cells_with_different_forces_are_the_same_alone_and_side_by_side(self):
         """`rk4` groups cells by the shape of the force."""
         scene, solver = everything(np.random.default_rng(3)), {"method": "rk4", "steps": 500, "certify": False}
@@ -309,6 +315,7 @@ class TestMethods:
             alone = outcome(scene | {"force": force}, solver)
             assert float(cell.x_end) == pytest.approx(float(alone.x_end), abs=1e-12)
 
+    @pytest.mark.slow
     def test_smooth_law_tends_to_its_limit_with_all_parts(self):
         """Bengisu-Akay friction creeps, in implicit steps, where tustin sticks."""
         scene = forced(
@@ -330,6 +337,7 @@ class TestMethods:
             errors.append(abs(float(found.x_end - limit.x_end)))
         assert np.polyfit(np.log(bands), np.log(errors), 1)[0] == pytest.approx(1.0, abs=0.2)
 
+    @pytest.mark.slow
     def test_bristles_agree_between_implicit_and_rk4_with_all_parts(self):
         scene = everything(np.random.default_rng(7), "lugre")
         scene["friction"] |= {"sigma0": 300.0, "sigma1": 10.0, "sigma2": 0.1, "v_s": 0.05, "mu_s": 0.4, "mu_k": 0.3}
@@ -337,6 +345,7 @@ class TestMethods:
         np.testing.assert_allclose(end(scene), tight, atol=1e-5)
         np.testing.assert_allclose(end(scene, SMALL_STEPS), tight, atol=1e-6)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(("part", "expected"), [({"c": 50.0}, 50.0), ({"cubic": 600.0, "x": 1.0}, sqrt(1801.0))])
     def test_rk4_counts_damper_and_cubic_spring_in_the_stiffness(self, part, expected):
         """Eigenvalues are about c/m, and sqrt((k + 3 cubic x^2)/m). The belt is faster than the body."""
@@ -510,6 +519,7 @@ class TestParts:
             with pytest.raises(InputError, match=f"scene.{section}: unknown key"):
                 ringsweep.simulate(scene | {section: {"constant": 1.0}})
 
+    @pytest.mark.slow
     def test_force_from_a_file_is_stored_with_the_run_and_repeats_it(self, tmp_path):
         times = np.linspace(0.0, 12.0, 25)
         samples = np.sin(times)

@@ -373,6 +373,7 @@ class TestRegions:
         assert friction_at(law, 0.03, (0.5, 0.3)) == pytest.approx((0.35, -5.0), rel=1e-13)
         assert friction_at(law, 0.05, (0.5, 0.3)) == (0.3, 0.0)
 
+    @pytest.mark.slow
     @settings(max_examples=60)
     @given(st.floats(0.01, 1.0), st.floats(0.01, 1.0), st.floats(0.0, 3.0))
     def test_abs_min_and_max_are_those_of_numbers(self, w, u, v):
@@ -429,6 +430,7 @@ class TestRegions:
 class TestIntervals:
     """Bounds on a function over intervals of the speed, against values in between."""
 
+    @pytest.mark.slow
     @settings(max_examples=200)
     @given(trees, st.floats(0.0, 2.0), st.floats(1e-9, 1.0), st.lists(st.floats(0.0, 1.0), min_size=1, max_size=5))
     def test_interval_of_a_function_and_of_its_slopes_contains_their_values(self, tree, low, width, shares):
@@ -510,6 +512,7 @@ def featured(drawn):
     return text + ")", parameters, speeds[speeds > 0.0]
 
 
+@pytest.mark.slow
 class TestNoFeatureIsMissed:
     """Laws with bumps, dips, kinks and steps at any speed, against 1e5 samples of each."""
 
@@ -622,6 +625,7 @@ class TestBand:
         law = made(define(Definition("mu_s*tanh(v/w)")), w=0.01)
         assert stiction_band(law) == pytest.approx(0.01 * math.atanh(math.sqrt(0.99)), rel=1e-12)
 
+    @pytest.mark.slow
     def test_word_does_not_depend_on_a_grid(self):
         scene = belt(formula("mu_s*min(v/w, 1)", None, mu_s=0.4, w=0.1))
         words = ringsweep.sweep(scene, {"friction.w": np.linspace(0.09, 0.12, 16)}, progress=False).regime
@@ -712,6 +716,7 @@ def launched(friction):
     }
 
 
+@pytest.mark.slow
 class TestNarrowFeatures:
     """A body passes a narrow feature of friction; the answer is that of an integration which is told where it is."""
 
@@ -754,6 +759,7 @@ class TestNarrowFeatures:
 
 
 class TestMotion:
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         ("law", "method", "build"),
         [
@@ -771,6 +777,7 @@ class TestMotion:
         assert twin["regime"] == known["regime"]
         assert distance(twin, known, names) < 1e-9
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         ("text", "method"),
         [
@@ -785,10 +792,12 @@ class TestMotion:
         assert found["t_end"] < 60.0
         assert found["certified"] == 0
 
+    @pytest.mark.slow
     def test_run_that_does_not_meet_such_a_speed_does_not_fail(self):
         found = outcome(belt(formula("mu_s*sqrt(1 - v/w)", w=50.0), velocity=0.01, span=60.0))
         assert found["regime"] != FAILED
 
+    @pytest.mark.slow
     def test_parameter_of_a_formula_is_swept_like_any_other(self):
         swept = ringsweep.sweep(belt(LEINE), {"friction.delta": [1.0, 3.0]})
         assert swept["friction_delta"].attrs["units"] == "s m-1"
@@ -797,6 +806,7 @@ class TestMotion:
             assert swept["x_max"].sel(friction_delta=delta).item() == alone["x_max"].item()
         assert swept["x_max"][0] != swept["x_max"][1]
 
+    @pytest.mark.slow
     def test_laws_of_the_section_laws_are_swept_by_name(self):
         mu, at_rest, _ = TWINS["tustin"]
         friction = {
@@ -839,6 +849,7 @@ class TestLawsOfASession:
         with patch.dict(friction.LAWS), patch.dict(friction._REGISTERED):
             yield
 
+    @pytest.mark.slow
     def test_law_is_usable_at_once_and_can_be_replaced(self):
         """As when a cell of a notebook is edited and run again."""
         first, second = {"mu_s": 0.4, "delta": 3.0}, {"mu_s": 0.4, "mu_k": 0.25, "alpha": 3.0}
@@ -852,6 +863,7 @@ class TestLawsOfASession:
         # No run takes results of another formula for its own.
         assert found[0].attrs["fingerprint"] == found[2].attrs["fingerprint"] != found[1].attrs["fingerprint"]
 
+    @pytest.mark.slow
     def test_file_contains_the_law_and_another_process_repeats_the_run_from_it(self, tmp_path):
         ringsweep.friction_law("of-file", mu="mu_s/(1 + delta*v)", at_rest="mu_s")
         scene = belt({"law": "of-file", "mu_s": 0.4, "delta": 3.0})
@@ -891,6 +903,7 @@ def table(v=SPEEDS, mu=None, **more):
 
 
 class TestTable:
+    @pytest.mark.slow
     def test_table_of_a_formula_moves_a_body_as_the_formula_does(self):
         found = outcome(belt(table()))
         known = outcome(belt(LEINE | {"mu_s": 0.4}))
@@ -900,6 +913,7 @@ class TestTable:
         off = np.abs(PchipInterpolator(SPEEDS, 0.4 / (1 + 3 * SPEEDS))(v) - 0.4 / (1 + 3 * v)).max()
         assert float(abs(found["x_max"] - known["x_max"])) < 20 * off
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("method", ["event", {"method": "rk4", "steps": 40000}])
     def test_methods_agree_on_a_table(self, method):
         assert distance(outcome(belt(table(), span=5.0), method), outcome(belt(table(), span=5.0)), ["x_end"]) < 1e-3
@@ -917,11 +931,13 @@ class TestTable:
             assert (np.sign(b - a) * np.diff(inside) >= -1e-15).all()
         assert friction_at(law, 3.0, (0.5, 1.0)) == friction_at(law, 1e6, (0.5, 1.0)) == (0.41, 0.0)
 
+    @pytest.mark.slow
     def test_table_scaled_by_two_is_the_table_with_doubled_friction(self):
         one = outcome(belt(table(scale=2.0)))
         other = outcome(belt(table(mu=0.8 / (1 + 3 * SPEEDS))))
         assert distance(one, other, ("x_end", "x_max")) < 1e-10
 
+    @pytest.mark.slow
     def test_table_is_scaled_by_zone(self):
         _, _, parameters = TWINS["tustin"]
         sampled = 0.5 + 0.5 * np.exp(-parameters["alpha"] * SPEEDS)
@@ -935,6 +951,7 @@ class TestTable:
         assert distance(found, known, ("phi_end",)) < 1e-3
         assert distance(found, even, ("phi_end",)) > 1e-2
 
+    @pytest.mark.slow
     def test_table_is_set_valued_if_and_only_if_friction_at_rest_is_not_zero(self):
         """At rest on a belt that stands still, with the spring pulling: one law holds, the other creeps."""
         still = {"initial": {"x": 0.2, "velocity": 0.0}}
@@ -943,6 +960,7 @@ class TestTable:
         rising = table([0.0, 0.1, 1.0], [0.0, 0.4, 0.3])
         assert outcome(belt(rising, velocity=0.0, span=5.0, **still))["x_end"] < 0.199
 
+    @pytest.mark.slow
     def test_table_from_a_file_stands_in_the_stored_configuration(self, tmp_path):
         (tmp_path / "mu_v.csv").write_text("v,mu\n0,0.4\n0.1,0.3\n1,0.25\n")
         config = {"scene": belt({"law": "table", "file": str(tmp_path / "mu_v.csv")})}

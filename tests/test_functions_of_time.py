@@ -113,6 +113,7 @@ class TestDerived:
             np.testing.assert_allclose(series_of(b, t), expected, rtol=1e-11, atol=1e-14 * abs(expected).max())
         assert drives.period(b) == pytest.approx(drives.period(a))
 
+    @pytest.mark.slow
     def test_runs_under_such_formulas_are_the_runs_of_the_package(self):
         axes = {"initial.omega": np.linspace(-1.0, 1.0, 9)}
         for known, formula in ALIKE.values():
@@ -158,6 +159,7 @@ class TestDerived:
         assert [len(group) for group in _groups_by_drive(cells, np.arange(4))] == [3, 1]
         assert drives.without_shape(cells.drive).amplitude.tolist() == [-2.0, -4.0, -6.0, -2.0]
 
+    @pytest.mark.slow
     def test_examples_of_the_documentation_run_and_their_parameters_can_be_swept(self):
         assert len(EXAMPLES) == 4
         for drive in EXAMPLES:
@@ -177,6 +179,7 @@ class TestDerived:
 class TestSwitches:
     """Switches are knots: steps end there."""
 
+    @pytest.mark.slow
     def test_steps_end_at_the_end_of_a_ramp_and_the_run_is_certified(self):
         """A body that the ring carries breaks loose or not as the run-up says, and the hold is exact."""
         run_up = by(START, a="4 rad/s^2", t0="0 s", t1="0.35 s")
@@ -187,6 +190,7 @@ class TestSwitches:
         np.testing.assert_allclose(run.ring_omega.values[after], 1.4, rtol=1e-15)
         np.testing.assert_allclose(run.ring_omega.values[~after], 4.0 * run.time.values[~after], rtol=1e-14)
 
+    @pytest.mark.slow
     def test_stuck_body_breaks_loose_where_the_acceleration_jumps(self):
         """The ring starts at t0 with more than friction can give: the body stays behind from that instant on."""
         start = by(START, a="100 rad/s^2", t0="0.5 s", t1="1 s")
@@ -198,6 +202,7 @@ class TestSwitches:
         expected = 0.5 * 0.6 * 9.81 / 0.2 * 0.01**2
         assert float(run.phi_end) == pytest.approx(expected, rel=1e-3)
 
+    @pytest.mark.slow
     def test_narrow_feature_that_is_still_far_is_not_leapt_over(self):
         """Before the pulse the drive is at rest but for 1e-300, and a step could be as long as the span."""
         pulse = by("A*(1 + tanh((t - t1)/w))", A="3 deg", t1="0.9 s", w="1 ms")
@@ -327,6 +332,7 @@ class TestPeriods:
 
 
 class TestForces:
+    @pytest.mark.slow
     def test_chirp_of_belt_and_force_moves_a_body_as_scipy_says(self):
         chirp = {"A": "5 cm", "f": "0.3 Hz", "k": "0.2 Hz/s"}
         force = {"formula": "P*exp(-t/tau)*sin(w*t)", "P": "2 N", "tau": "3 s", "w": "4 rad/s", "constant": "0.5 N"}

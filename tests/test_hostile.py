@@ -9,6 +9,8 @@ import pytest
 
 from benchmarks.hostile.__main__ import PARTS
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.skipif(sys.platform == "win32", reason="attacks need fork and SIGKILL")
 def test_short_attacks_find_nothing():

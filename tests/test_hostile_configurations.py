@@ -9,6 +9,7 @@ from benchmarks.hostile.__main__ import SEED
 from ringsweep import cli
 
 
+@pytest.mark.slow
 def test_random_configurations_are_refused_in_one_line_or_run_to_finite_numbers(tmp_path):
     report = hostile.configurations(tmp_path, 50, SEED, hostile.COMMON)
     assert not report.broken

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 import yaml
+from tiers import mostly_slow
 
 import ringsweep
 from benchmarks.hostile.attack import same_bits
@@ -73,6 +74,7 @@ def power_of_friction(run):
     return total
 
 
+@pytest.mark.slow
 class TestParticle:
     def test_particle_that_leaves_smoothly_lands_at_minus_three_times_the_angle(self):
         """It leaves at phi and lands 4 sqrt(R/g) sin(d) sqrt(cos d) later, with d = pi - |phi|, at -3 phi."""
@@ -134,6 +136,7 @@ ROCKER = {
 
 
 class TestBody:
+    @pytest.mark.slow
     def test_body_that_rocks_in_ever_smaller_hops_comes_to_rest_on_both_contacts(self):
         """Moreau's time stepping, which has no events, gives this angle and rest after 0.0131 s (steps of 5e-7 s)."""
         run = ringsweep.sweep(ROCKER, {"time.span": [0.02]}, solver="auto", progress=False).squeeze()
@@ -172,7 +175,7 @@ class TestBody:
             np.testing.assert_allclose(mirrored[name].values[sure], drums[name].values[sure], rtol=1e-6, err_msg=name)
         np.testing.assert_allclose(mirrored.phi_end.values[sure], -drums.phi_end.values[sure], rtol=1e-6)
 
-    @pytest.mark.parametrize("law", ["stiction", "bengisu-akay"])
+    @pytest.mark.parametrize("law", mostly_slow(["stiction", "bengisu-akay"], ("stiction",)))
     def test_run_up_to_the_first_loss_is_the_run_without_impact(self, law):
         """But for rounding: the compiler fuses other products. Tolerances are alike: no retries."""
         rng, count = np.random.default_rng(31), 400
@@ -355,6 +358,7 @@ class TestBody:
         # Contact 2 holds throughout: both have not been closed again.
         assert np.isnan(found.t_recovered.values).all()
 
+    @pytest.mark.slow
     def test_reaction_that_changes_its_sign_through_infinity_jams_and_opens_no_contact(self):
         """The body pivots on a contact that would enter the race if it opened. The time is that of the reference."""
         scene = {
@@ -376,6 +380,7 @@ class TestBody:
         found = ringsweep.sweep(scene | {"impact": {"restitution": 0.0}}, {"time.span": [0.256649]}, progress=False)
         assert found.t_end.item() == pytest.approx(0.24783247, abs=1e-7)
 
+    @pytest.mark.slow
     def test_rising_friction_takes_a_body_along_on_one_contact_and_is_no_certified_jam(self):
         """The ring passes a bump of friction, on which contact 2 is lost and contact 1 comes near to a jam.
 
@@ -411,6 +416,7 @@ class TestBody:
         np.testing.assert_allclose(found.omega_end.values[:2], 0.75311, atol=4e-4)
         assert ringsweep.words(found.regime).values[2] == "failed"
 
+    @pytest.mark.slow
     def test_last_rebounds_that_friction_forbids_close_the_contact(self):
         """An impact at one contact while the other one holds need not have a solution with restitution.
 
@@ -504,6 +510,7 @@ class TestBody:
         assert found.t_end.item() == 1.0
         assert found.phi_end.item() == pytest.approx(1.9295466835627817, rel=1e-9)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         ("scene", "phi_end"),
         [
@@ -564,6 +571,7 @@ class TestBody:
         found = ringsweep.sweep({"model": "ring"} | scene, {"time.span": [scene["time"]["span"]]}, progress=False)
         assert found.phi_end.item() == pytest.approx(phi_end, abs=1e-6)
 
+    @pytest.mark.slow
     def test_contact_that_opens_where_friction_jumps_at_a_speed_opens_by_its_acceleration(self):
         """The gap grows like t^2. The numbers are those of the free body, integrated by SciPy with its own balances."""
         scene = JUMPING | {
@@ -577,6 +585,7 @@ class TestBody:
         assert run.impact_time.values[-1] == pytest.approx(0.25515686191877684, rel=1e-9)
         assert run.impact_speed.values[-1] == pytest.approx(0.0024191139510299285, rel=1e-6)
 
+    @pytest.mark.slow
     def test_body_that_has_no_motion_where_friction_jumps_at_a_speed_jams(self):
         """Under the greater friction contact 2 would pull, and contact 1 alone would press itself into the race."""
         scene = JUMPING | {
@@ -592,6 +601,7 @@ class TestBody:
         assert found.certified.item() == 1
         assert found.omega_end.item() == pytest.approx(-1.16804 / 0.0645043, rel=1e-12)
 
+    @pytest.mark.slow
     def test_body_that_is_wedged_on_one_contact_turns_faster_than_the_ring_that_jerks_it(self):
         """It has been at rest, and all accelerations are in proportion to that of the ring.
 
@@ -623,6 +633,7 @@ class TestBody:
         assert (run.normal_1.values[early] > 1e9).all()
         np.testing.assert_allclose(run.omega.values[early], ratio * run.ring_omega.values[early], rtol=1e-3)
 
+    @pytest.mark.slow
     def test_impact_of_a_wedged_body_has_its_solution_although_impulses_cancel(self):
         """Both impulses are 1e5 times the momentum. With 40 digits one of the 16 modes is admissible."""
         scene = {
@@ -645,6 +656,7 @@ class TestBody:
         assert found.phi_end.item() == pytest.approx(1.83277839, abs=1e-8)
         assert found.impulse_max.item() == pytest.approx(146.67072, rel=1e-5)
 
+    @pytest.mark.slow
     def test_contact_that_is_lost_where_no_mode_can_follow_jams_the_body_and_does_not_let_it_fly(self):
         """Contact 2 alone has A_22 < 0 and no load, and without both contacts the gap of contact 1 would close."""
         friction = {
@@ -682,6 +694,7 @@ class TestBody:
         assert np.ptp(found.t_end.values) < 1e-7
         assert found.certified.all()
 
+    @pytest.mark.slow
     def test_contact_that_opens_within_a_stiction_band_stays_open(self):
         """A body that a slow ring carries up loses a contact in a band of 1e-8 m/s and lifts it ever higher.
 
@@ -701,6 +714,7 @@ class TestBody:
         found = ringsweep.sweep(scene, axes, progress=False)
         assert found.gap_max.values.ravel() == pytest.approx(6.038e-4, abs=3e-7)
 
+    @pytest.mark.slow
     def test_rounding_of_a_formula_does_not_forbid_that_a_pivot_breaks_away(self):
         """Tustin's friction at rest rounds to the next number above mu_s, which is more than the stick can bear."""
         kinetic = np.array([0.10009512251045444, 0.022795588796030497, 0.054372165083124285])
@@ -726,6 +740,7 @@ class TestBody:
         assert (found.gap_max <= 2 * (0.043378 - 0.008 - 0.0315) + 1e-9).all()
         assert isinstance(found, xr.Dataset)
 
+    @pytest.mark.slow
     def test_bounds_cover_the_errors_of_what_follows_a_loss(self):
         """Impacts magnify errors, and a small gap has the error of the place. Checked by runs at rtol 1e-14."""
         rng = np.random.default_rng(29)
@@ -795,6 +810,7 @@ def refined_map(config_of_map):
 class TestSweep:
     """Sweeps over scenes with impacts are refined, verified and continued as all others are."""
 
+    @pytest.mark.slow
     def test_refined_map_follows_the_words_of_aftermath_within_one_regime(self, refined_map, full_map):
         ds = netcdf.load(refined_map)
         inferred, lost = ds.origin.values == INFERRED, full_map.regime.values == SEPARATING
@@ -815,6 +831,7 @@ class TestSweep:
             assert run[1:][edge].all()
             assert run[:-1][edge].all()
 
+    @pytest.mark.slow
     def test_computed_cells_of_a_refined_map_are_those_of_the_full_grid_bit_for_bit(self, refined_map, full_map):
         ds = netcdf.load(refined_map)
         run = ds.origin.values != INFERRED
@@ -832,6 +849,7 @@ class TestSweep:
         assert cli.main(["verify", str(changed)]) == 2
         assert "gap_max" in capsys.readouterr().err
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("count", [2, 9])
     def test_killed_sweep_continues_to_the_same_bits(self, config_of_map, refined_map, tmp_path, count):
         arguments = ["run", str(config_of_map), "-o", str(tmp_path / "out.nc")]

@@ -19,6 +19,8 @@ from benchmarks.reference.physics import CLOSED, ONLY_1
 from benchmarks.reference.problem import problem
 from benchmarks.reference.run import HELD
 
+pytestmark = pytest.mark.slow
+
 G = 9.81
 
 

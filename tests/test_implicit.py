@@ -42,6 +42,7 @@ class TestFigures:
         assert found.phi_max == pytest.approx(exact.phi_max, abs=1e-7)
         assert found.phi_end == pytest.approx(exact.phi_end, abs=1e-6)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("number", [25, 27])
     def test_figures_with_a_wide_band_agree_with_rk4(self, setting, number):
         """At v0 = 0.2 m/s nothing is stiff, and a small step converges."""
@@ -109,6 +110,7 @@ class TestLimit:
 class TestEnergy:
     """The energy of the body changes by the work of friction."""
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(("alpha", "v0"), [(100.0, 0.2), (10.0, 1e-2), (100.0, 1e-3)])
     def test_energy_changes_by_the_work_of_friction(self, setting, alpha, v0):
         """The tolerance covers the quadrature of the work over a sampled history."""

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from solutions import made
+from tiers import mostly_slow
 
 from ringsweep.compile import kernel, take
 from ringsweep.models import MODELS
@@ -137,10 +138,14 @@ FORMULAS = {
 }
 
 
+#: Names of these formulas, and of the laws that rk4 takes.
+IN_LANES = [*FORMULAS, *(name for name, law in LAWS.items() if family_of(law) is not Dynamic)]
+
+
 class TestFriction:
     """Friction in vector lanes, where all sides of switches are computed, against friction of floats."""
 
-    @pytest.mark.parametrize("name", [*FORMULAS, *(n for n, law in LAWS.items() if family_of(law) is not Dynamic)])
+    @pytest.mark.parametrize("name", mostly_slow(IN_LANES, ("powers", "arc", "stiction", "karnopp", "bengisu-akay")))
     def test_friction_in_lanes_agrees_with_friction_of_floats(self, name):
         rng = np.random.default_rng(2)
         cls = define(FORMULAS[name]) if name in FORMULAS else LAWS[name]
@@ -261,7 +266,7 @@ def integrate(batch, steps, names, *, order=None, serial=False):
 
 
 class TestEachLane:
-    @pytest.mark.parametrize(("model", "law"), SCENES)
+    @pytest.mark.parametrize(("model", "law"), mostly_slow(SCENES, [("ring", "bengisu-akay")]))
     def test_run_side_by_side_agrees_with_the_single_run_and_ignores_its_neighbours(self, cells, model, law):
         """Neighbours must not change a bit. Where friction jumps, rounding may move a jump by a step."""
         share = 1e-2 if family_of(LAWS[law]) is SetValued else 1e-9
@@ -281,6 +286,7 @@ class TestEachLane:
             for i, one in single.items():
                 np.testing.assert_array_equal(one[name][0], together[name][i], err_msg=name)
 
+    @pytest.mark.slow
     def test_runs_of_the_family_slip_stick_and_oscillate(self, cells):
         found = integrate(family(cells, "belt"), 6000, MODELS["belt"].outcomes)
         assert found["slips"].max() > 1
@@ -290,6 +296,7 @@ class TestEachLane:
         assert SEPARATING in found["regime"]
 
 
+@pytest.mark.slow
 def test_outcomes_do_not_depend_on_diagnosis(cells):
     batch = family(cells)
     kept, dropped = (RK4(1000, certify=False, diagnose=diagnose).run(batch, NAMES) for diagnose in (True, False))

@@ -286,6 +286,7 @@ class TestRegions:
                 assert (region < 0) == (high <= band)
                 assert (region >= 0) == (low >= band)
 
+    @pytest.mark.slow
     @given(widths)
     def test_stiction_band_is_a_parameter_or_zero(self, v0):
         for name in ("threlfall", "piecewise-linear", "piecewise-cubic"):
@@ -440,6 +441,7 @@ class TestCharacteristicValues:
         assert mu(law, v0) == pytest.approx(0.7615941559557649 * MU_K, rel=1e-14)
         assert mu(law, 100 * v0) == MU_K
 
+    @pytest.mark.slow
     @given(widths)
     def test_brown_mcphee_has_its_peak_mu_s_at_v_t(self, v_t):
         """The Stribeck part has its greatest value at v_t; the rest is kinetic friction but for 1 - tanh(4)."""
@@ -451,6 +453,7 @@ class TestCharacteristicValues:
         # It falls to mu_k with the third power of the speed.
         assert mu(law, 100 * v_t) - MU_K == pytest.approx((MU_S - MU_K) * 16e-6, rel=1e-3)
 
+    @pytest.mark.slow
     @given(widths, st.floats(1.0, 1e3))
     def test_andersson_is_gaussian_stribeck_times_tanh(self, v_s, steepness):
         k_t = steepness / v_s
@@ -541,6 +544,7 @@ def in_a_process(script, **environment):
 
 
 class TestOwnLaws:
+    @pytest.mark.slow
     def test_file_named_by_ringsweep_laws_adds_a_law(self, tmp_path):
         (tmp_path / "my_law.py").write_text(OWN)
         done = in_a_process(USE, RINGSWEEP_LAWS=str(tmp_path / "my_law.py"))

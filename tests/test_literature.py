@@ -8,6 +8,8 @@ from scipy import optimize, special
 
 import ringsweep
 
+pytestmark = pytest.mark.slow
+
 
 def oscillator(span, **changes):
     """Den Hartog's oscillator: a mass on a spring under Coulomb friction and a harmonic force; all numbers are 1."""

@@ -91,6 +91,7 @@ def test_folder_holds_notebooks():
     assert NOTEBOOKS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=[path.stem for path in NOTEBOOKS])
 def test_notebook_runs_and_gives_the_stored_kinds_of_output(path, tmp_path, monkeypatch):
     kept = nbformat.read(path, as_version=4)

@@ -111,6 +111,7 @@ def script(page):
     return values | {"pixels": pixels}
 
 
+@pytest.mark.slow
 def test_page_of_256_by_256_cells_is_smaller_than_5_megabytes(bokeh, tmp_path):
     """Numbers vary smoothly, as between the boundaries of a map; bounds on errors vary by chance."""
     ds, place = sweep(256, 256), np.linspace(0.0, 1.0, 256)
@@ -120,6 +121,7 @@ def test_page_of_256_by_256_cells_is_smaller_than_5_megabytes(bokeh, tmp_path):
     assert len(page_of(ds, tmp_path).encode()) < 5e6
 
 
+@pytest.mark.slow
 def test_page_loads_nothing_from_elsewhere(bokeh, tmp_path):
     page = page_of(sweep(4, 3), tmp_path)
     around = re.sub(r"(<script[^>]*>).*?</script>", r"\1", page, flags=re.S)
@@ -127,6 +129,7 @@ def test_page_loads_nothing_from_elsewhere(bokeh, tmp_path):
     assert "<b>chance" not in page
 
 
+@pytest.mark.slow
 def test_page_has_the_width_of_a_telephone_and_a_tooltip_of_less_than_half_of_it(bokeh, tmp_path):
     page = page_of(sweep(4, 3), tmp_path)
     assert re.search(r'<meta name="viewport" content="width=device-width', page.split("<body>")[0])
@@ -158,6 +161,7 @@ def test_page_holds_every_number_with_four_digits_and_no_bound_is_rounded_down(b
             np.testing.assert_allclose(cells[name], numbers, rtol=5e-5)
 
 
+@pytest.mark.slow
 def test_classes_of_a_page_are_those_that_occur(bokeh, tmp_path):
     ds = sweep(5, 4)
     ds["regime"][:] = 3

@@ -220,6 +220,7 @@ def tilted_on_springs(body, mu_s, turn, stiffness):
     return np.arctan2(run.y[0, -1], -run.y[1, -1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("angle", "offset", "inertia", "mu_s", "tilt"),
     [(0.118, 0.84, 0.753, (2.222, 0.174), 0.51), (0.116, 0.724, 0.626, (2.48, 0.488), 0.59)],
@@ -273,6 +274,7 @@ def test_body_sticks_on_where_the_determinant_vanishes_as_it_does_on_springs(ang
     np.testing.assert_allclose(ends, phi, rtol=5e-3)
 
 
+@pytest.mark.slow
 def test_wedged_body_is_taken_along_by_a_ring_that_starts_with_an_infinite_acceleration():
     """Its contacts are nearly opposite: the more the ring pulls, the more both press. Stick goes before slip.
 
@@ -299,6 +301,7 @@ def test_wedged_body_is_taken_along_by_a_ring_that_starts_with_an_infinite_accel
     assert found.phi_end.item() == pytest.approx(0.659025 - 1.86835 * t**1.1375, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_infinite_acceleration_of_the_ring_is_the_limit_of_great_ones():
     """It slides under the body, takes it along or pushes it off its contacts, as one of 1e9 rad/s^2 does."""
     rng, count = np.random.default_rng(29), 400

@@ -10,6 +10,7 @@ from benchmarks.peers import in_c, with_scipy
 from benchmarks.work_precision import RESTITUTION, SCENES, own
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["smooth", "limit"])
 def test_scipy_with_events_and_restarts_agrees_with_the_package(name):
     scene = SCENES[name]
@@ -30,6 +31,7 @@ def test_runge_kutta_in_c_agrees_with_rk4():
     np.testing.assert_allclose(theirs.separation, ours.separation, rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not (in_c.compiler("cc") and in_c.compiler("c++")), reason="no C or C++ compiler")
 def test_plain_and_vectorised_runge_kutta_agree_with_rk4():
     """In cells that fill no whole vector, and that run to the end under the smooth law."""
@@ -41,6 +43,7 @@ def test_plain_and_vectorised_runge_kutta_agree_with_rk4():
     assert len(set(plain.reversals)) > 1
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(in_c.compiler() is None, reason="no C compiler")
 def test_moreau_and_jeans_time_stepping_tends_to_the_package_at_first_order():
     """Impact law, mechanics and zones of the peer are its own, and it knows no events."""
@@ -65,6 +68,7 @@ def test_moreau_and_jeans_time_stepping_tends_to_the_package_at_first_order():
     assert errors[1] < min(0.01, 0.2 * errors[0])
 
 
+@pytest.mark.slow
 def test_table_of_speed_has_the_error_of_every_method():
     effort = speed.Effort(lanes=8, cells=2, sweep=0, steps=0.2, rounds=1)
     # Those whose kernels other tests compile too.

@@ -616,6 +616,7 @@ class TestPaper:
         yield
         plots.style()
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("width", [85, 170])
     @pytest.mark.parametrize("picture", PICTURES)
     def test_texts_are_on_the_page_and_apart_from_each_other(self, picture, width):
@@ -641,6 +642,7 @@ class TestPaper:
             plots.map_panel(named_sweep((5, 5, 2)), var=var, sel={"friction.rough.mu_k": 0.5}, ax=ax)
         assert_readable(figure)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("picture", PICTURES)
     def test_legends_are_no_smaller_than_ticks(self, picture):
         figure = PICTURES[picture]()
@@ -649,6 +651,7 @@ class TestPaper:
         least = min(text.get_fontsize() for legend in legends(figure) for text in legend.get_texts())
         assert least >= max(label.get_fontsize() for label in ticks)
 
+    @pytest.mark.slow
     def test_title_and_legend_of_a_map_can_be_replaced_placed_and_left_out(self):
         for draw in (plots.regime_map, lambda ds, **options: plots.map_panel(ds, ax=panel(), **options).figure):
             assert title(draw(make_sweep())) == "regime of the run"
@@ -1064,6 +1067,7 @@ class TestWorkPrecision:
             plots.regime_map(make_work())
 
 
+@pytest.mark.slow
 class TestBenchmarks:
     """Pictures of the stored results of the benchmarks."""
 

@@ -129,6 +129,7 @@ class TestErrors:
             plain = rerun(found, config, f"{found['solver'].values[k]}, certify: false")
             np.testing.assert_array_equal(found["error_end"][k], abs(plain["phi_end"] - reference["phi_end"]))
 
+    @pytest.mark.slow
     def test_reference_agrees_with_the_closed_form_within_its_uncertainty(self):
         found = ringsweep.precision({"scene": BELT}, rounds=1, progress=False)
         solver = yaml.safe_load(f"{{{found.attrs['reference']}}}")
@@ -180,6 +181,7 @@ class TestRecommendation:
     def test_solver_of_the_configuration_is_named_even_if_it_is_the_default(self, found):
         assert found.attrs["configured"] in found["solver"].values
 
+    @pytest.mark.slow
     def test_unreachable_target_is_reported_with_the_closest_solver(self, folder, capsys):
         assert main(["precision", "belt.yaml", "--target", "1e-40", "--rounds", "1"]) == 0
         out = capsys.readouterr().out
@@ -187,6 +189,7 @@ class TestRecommendation:
         assert f"met by none; closest is `{closest}`: no wrong regimes, errors up to" in out
         assert "\nsolver:" not in out
 
+    @pytest.mark.slow
     def test_configured_setting_competes_and_keeps_its_max_steps(self):
         solver = {"method": "event", "rtol": 2.5e-7, "max_steps": 1}
         found = ringsweep.precision({"scene": BELT, "solver": solver}, rounds=1, progress=False)
@@ -199,6 +202,7 @@ class TestRecommendation:
 
 
 class TestSample:
+    @pytest.mark.slow
     def test_sample_is_the_same_at_every_call_and_complete_for_small_sweeps(self, config, found):
         again = ringsweep.precision(config, cells=8, rounds=1, progress=False)
         np.testing.assert_array_equal(again["cell"], found["cell"])
@@ -207,6 +211,7 @@ class TestSample:
         np.testing.assert_array_equal(found["belt_velocity"], [0.05, 0.1])
         np.testing.assert_array_equal(found["friction_law"], ["stiction", "stiction"])
 
+    @pytest.mark.slow
     def test_cells_without_a_reference_are_left_out_and_counted(self, config, monkeypatch):
         monkeypatch.setattr(contenders, "_STEPS", (100,))
         monkeypatch.setattr(precision, "_TIGHTEST", {precision.Event: (1e-15, 1e-3)})
@@ -217,6 +222,7 @@ class TestSample:
         dropped = 16 - found.sizes["cell"]
         assert f"{found.sizes['cell']} of 4096 cells; {dropped} more were drawn" in found.attrs["sampled"]
 
+    @pytest.mark.slow
     def test_settings_that_would_take_too_long_are_left_out_and_named(self, monkeypatch):
         monkeypatch.setattr(contenders, "_BUDGET", 0.0)
         found = ringsweep.precision({"scene": BELT}, rounds=1, progress=False)
@@ -225,6 +231,7 @@ class TestSample:
             assert name in found.attrs["left_out"]
         assert found.attrs["left_out"] in report(found)
 
+    @pytest.mark.slow
     def test_law_that_rk4_does_not_take_is_measured_without_rk4(self):
         friction = {"law": "bristle", "mu_k": 0.1, "sigma0": 100.0, "seed": 1}
         found = ringsweep.precision({"scene": BELT | {"friction": friction}}, rounds=1, progress=False)
@@ -268,6 +275,7 @@ class TestInput:
         assert output in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_command_writes_dataset_and_picture_and_prints_table_and_solver(folder, capsys):
     assert main(["precision", "belt.yaml", "-o", "out.nc", "--rounds", "1"]) == 0
     out = capsys.readouterr().out
@@ -285,6 +293,7 @@ def test_command_writes_dataset_and_picture_and_prints_table_and_solver(folder, 
     assert pasted in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_result_of_another_kind_is_neither_replaced_nor_drawn(folder, capsys):
     assert main(["run", "belt.yaml", "-o", "sweep.nc"]) == 0
     assert main(["precision", "belt.yaml", "-o", "belt.nc", "--rounds", "1"]) == 0

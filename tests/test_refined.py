@@ -62,6 +62,7 @@ def stored(monkeypatch):
 
 
 class TestFile:
+    @pytest.mark.slow
     def test_computed_cells_equal_those_of_the_full_grid_bit_for_bit(self, ds, full):
         run = ds.origin.values != INFERRED
         assert 0.1 < run.mean() < 0.6
@@ -96,16 +97,19 @@ class TestFile:
         assert 0.0 < ds.attrs["audit_bound"] < 0.2
         assert "at 95 % confidence" in ds.attrs["audit"]
 
+    @pytest.mark.slow
     def test_file_equals_the_sweep_in_memory(self, config, ds):
         undated = {"date_created": "", "history": ""}
         in_memory = ringsweep.run(config, progress=False)
         xr.testing.assert_identical(ds.drop_attrs(deep=False), in_memory.drop_attrs(deep=False))
         assert in_memory.assign_attrs(undated).attrs == ds.assign_attrs(undated).attrs
 
+    @pytest.mark.slow
     def test_file_is_enough_to_repeat_its_sweep(self, refined, tmp_path):
         ringsweep.run(refined, tmp_path / "again.nc", progress=False).close()
         assert same_bits(refined, tmp_path / "again.nc")
 
+    @pytest.mark.slow
     def test_further_axis_makes_a_stack_of_refined_maps(self, scene):
         axes = {"zone.half_angle": AXES["zone.half_angle"], "friction.law": ["tustin", "stiction"]}
         axes["drive.amplitude"] = AXES["drive.amplitude"]
@@ -143,6 +147,7 @@ class TestFile:
         assert cli.main(["map", str(refined), "--var", "origin", "-o", str(tmp_path / "origin.png")]) == 0
 
 
+@pytest.mark.slow
 class TestContinuation:
     @pytest.mark.parametrize("count", [2, 9])
     def test_killed_sweep_continues_to_the_same_bits(self, config, refined, tmp_path, count):
@@ -182,6 +187,7 @@ class TestContinuation:
 
 
 class TestReuse:
+    @pytest.mark.slow
     def test_finer_refined_sweep_takes_computed_cells_of_a_coarser_one(self, scene, refined, ds, tmp_path, stored):
         finer = AXES | {"drive.amplitude": np.geomspace(0.5, 8.0, 81)}
         alone = ringsweep.sweep(scene, finer, refine=REFINE, progress=False)
@@ -238,6 +244,7 @@ class TestConfiguration:
         with pytest.raises(InputError, match="nothing can be refined"):
             ringsweep.run({"scene": scene}, refine=True)
 
+    @pytest.mark.slow
     def test_option_of_the_command_line_gives_the_defaults_and_keeps_what_is_configured(self, config, tmp_path):
         output = tmp_path / "out.nc"
         assert cli.main(["run", str(config), "--refine", "-o", str(output)]) == 0

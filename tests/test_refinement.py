@@ -201,6 +201,7 @@ class TestAudit:
         # Ten of twenty miss three wrong cells with a probability of 10.5 %, and four with 4.3 %.
         assert largest_number(20, 10, 0) == 3
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("kind", [tongues, islands, stripes, fractal])
     def test_stated_bound_covers_the_truth(self, kind):
         """Fifty maps of each kind; at a confidence of 95 % less than one in a hundred trials has 44 or fewer."""

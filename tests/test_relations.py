@@ -6,6 +6,7 @@ The scenes are random. Runs without a certificate are left out, and must be few.
 import numpy as np
 import pytest
 from solutions import solve
+from tiers import mostly_slow
 
 from ringsweep.quantities.flags import SEPARATING
 from ringsweep.solvers.event import Auto
@@ -51,7 +52,7 @@ def assert_alike(first, second, cells, atol=1e-6, **signs):
         assert np.quantile(difference, 0.995) < atol, name
 
 
-@pytest.fixture(params=["stiction", "bengisu-akay"])
+@pytest.fixture(params=mostly_slow(["stiction", "bengisu-akay"], ("stiction",)))
 def scenes(request, cells):
     """Batch under a set-valued or a smooth law, driven by the arctan law."""
     law = request.param
@@ -198,6 +199,7 @@ class TestEquivalentScenes:
 
 
 class TestLimits:
+    @pytest.mark.slow
     def test_two_contacts_that_approach_each_other_tend_to_one_contact(self, cells):
         """For a point mass, the difference tends to zero with the angle between the contacts."""
         rng = np.random.default_rng(30)

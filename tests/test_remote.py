@@ -16,6 +16,7 @@ import pytest
 import yaml
 from distributed import LocalCluster
 from joblib.externals.loky.process_executor import TerminatedWorkerError
+from tiers import mostly_slow
 
 import ringsweep
 from benchmarks.hostile.attack import same_bits
@@ -38,6 +39,7 @@ def cluster():
         yield cluster
 
 
+@pytest.mark.slow
 def test_task_of_a_killed_worker_is_computed_by_another(cluster, scene, tmp_path, monkeypatch):
     axes = {"drive.amplitude": np.geomspace(0.5, 8.0, 12), "zone.half_angle": np.radians(np.linspace(5.0, 40.0, 10))}
     ringsweep.sweep(scene, axes, tmp_path / "threads.nc", progress=False).close()
@@ -56,6 +58,7 @@ def test_task_of_a_killed_worker_is_computed_by_another(cluster, scene, tmp_path
     assert same_bits(tmp_path / "threads.nc", tmp_path / "dask.nc")
 
 
+@pytest.mark.slow
 def test_workers_of_a_scheduler_find_the_same_impacts_as_threads(cluster, scene, tmp_path):
     falls = scene | {"impact": {"restitution": 0.5}}
     axes = {"drive.amplitude": np.geomspace(0.5, 8.0, 6), "zone.half_angle": np.radians([10.0, 30.0])}
@@ -75,7 +78,7 @@ def by_threads(scene, tmp_path_factory):
     return axes, path
 
 
-@pytest.mark.parametrize("backend", ["loky", "threading"])
+@pytest.mark.parametrize("backend", mostly_slow(["loky", "threading"], ("threading",)))
 def test_workers_that_joblib_is_told_to_use_give_the_same_bits(scene, by_threads, tmp_path, monkeypatch, backend):
     axes, path = by_threads
     monkeypatch.setattr(TaskSizes, "max_cells", 4)
@@ -107,6 +110,7 @@ def _named_by_process():
     return named
 
 
+@pytest.mark.slow
 def test_tasks_of_killed_processes_are_computed_when_the_sweep_goes_on(scene, by_threads, tmp_path, monkeypatch):
     axes, path = by_threads
     monkeypatch.setattr(TaskSizes, "max_cells", 4)
@@ -158,6 +162,7 @@ input()
 """
 
 
+@pytest.mark.slow
 def test_killed_scheduler_is_told_in_one_line_and_what_is_finished_is_kept(scene, tmp_path, monkeypatch, capsys):
     axes = {"drive.amplitude": [0.5, 1.0, 2.0, 4.0], "zone.half_angle": [0.1, 0.2, 0.3, 0.4]}
     ringsweep.sweep(scene, axes, tmp_path / "threads.nc", progress=False).close()
@@ -186,6 +191,7 @@ def test_killed_scheduler_is_told_in_one_line_and_what_is_finished_is_kept(scene
     assert same_bits(tmp_path / "threads.nc", tmp_path / "dask.nc")
 
 
+@pytest.mark.slow
 def test_worker_of_another_version_is_refused(cluster, scene, monkeypatch):
     monkeypatch.setattr("ringsweep.runs.sweep.environment", lambda: {"numba": "99.0"})
     with pytest.raises(ringsweep.InputError, match=r"a worker has other versions.*numba was 99\.0"):
@@ -234,6 +240,7 @@ def test_address_of_another_kind_is_told_with_its_cure_before_a_client_tries_it(
         Execution(None, address).open().__enter__()
 
 
+@pytest.mark.slow
 def test_frozen_scheduler_does_not_hold_up_the_second_interrupt(scene, monkeypatch):
     """The scheduler takes no leave; without a bound the client would wait for a minute."""
     monkeypatch.setattr("ringsweep.runs.dask._LEAVE", 0.1)
@@ -262,6 +269,7 @@ def test_frozen_scheduler_does_not_hold_up_the_second_interrupt(scene, monkeypat
         frozen.set()
 
 
+@pytest.mark.slow
 def test_workers_that_pause_for_want_of_memory_are_told_with_the_likely_cure(monkeypatch, caplog):
     """A worker above its limit takes no task. Here the scheduler says so of one that works a second."""
     monkeypatch.setattr(remote, "_PAUSE", 0.05)
@@ -277,6 +285,7 @@ def test_workers_that_pause_for_want_of_memory_are_told_with_the_likely_cure(mon
     assert told == [f"all workers have paused, as their memory is nearly full ({remote._CURE})"]
 
 
+@pytest.mark.slow
 def test_workers_that_die_with_their_cells_are_told_with_the_likely_cure(scene, monkeypatch):
     monkeypatch.setattr("ringsweep.runs.dask._run_task", lambda *_: __import__("os")._exit(1))
     with (

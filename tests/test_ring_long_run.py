@@ -191,6 +191,7 @@ def test_a_rocking_ring_has_two_motions_at_one_frequency_and_the_past_tells_whic
     assert (apart.values > 0.1).tolist() == [False, False, False, True, False]
 
 
+@pytest.mark.slow
 def test_run_of_a_file_goes_on_from_its_end(tmp_path):
     file = tmp_path / "first.nc"
     ringsweep.run({"scene": RIG | {"time": {"span": 7.3}}}, file, jobs=1, progress=False).close()
@@ -214,6 +215,7 @@ def test_runs_whose_state_is_more_than_place_and_speed_cannot_go_on(change, word
     assert error.value.path == "sweep.follow"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["stiction", "bengisu-akay"])
 def test_exponents_are_those_of_two_neighbouring_runs(law):
     """Pairs of runs of two balls on a rod, brought together again after each period, in random cells."""
@@ -260,6 +262,7 @@ def test_exponents_are_those_of_two_neighbouring_runs(law):
     assert (difference <= 3.0 * error + 0.02).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["lugre", "bengisu-akay"])
 def test_points_of_laws_that_creep_are_states_at_whole_periods(law):
     """Each point is the end of a run over so many periods, and bristles bring both deflections."""
@@ -289,6 +292,7 @@ def measured(theta, period, periods):
     return {"law": "table", "time": time.tolist(), "theta": theta(time).tolist()}
 
 
+@pytest.mark.slow
 def test_a_measured_drive_takes_the_period_that_is_stated():
     """Without stick, whose end depends on the third derivative of the drive: a spline has little of it."""
     drive = {"law": "sinusoidal", "amplitude": 2.0, "frequency": 1.0}
@@ -299,6 +303,7 @@ def test_a_measured_drive_takes_the_period_that_is_stated():
     assert found.multiplier_1.item() == pytest.approx(exact.multiplier_1.item(), abs=1e-6)
 
 
+@pytest.mark.slow
 def test_the_record_changes_no_other_outcome():
     plain, asked = run(RIG, {}), run(RIG)
     added = set(asked.data_vars) - set(plain.data_vars)
@@ -309,6 +314,7 @@ def test_the_record_changes_no_other_outcome():
             assert plain[name].item() == pytest.approx(asked[name].item(), rel=1e-9, nan_ok=True)
 
 
+@pytest.mark.slow
 def test_words_do_not_change_with_the_span():
     """A body that rocks, one that a ring turns round, one that sticks for good, at 60, 120 and 300 periods."""
     cells = 20
@@ -332,6 +338,7 @@ def test_words_do_not_change_with_the_span():
     np.testing.assert_allclose(period[1:, first], np.broadcast_to(period[0, first], (2, first.sum())), rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_full_turns_do_not_count():
     """A ring that turns once in each period carries the body round: the motion returns."""
     even = {"mu_s": 0.9, "mu_k": 0.5}

@@ -424,6 +424,7 @@ class TestAnimation:
         assert films._speed(4.0, 4.0) == "real time"
         assert films._speed(30.0, 10.0) == "3 times faster than real"
 
+    @pytest.mark.slow
     def test_frame_on_a_fixed_background_equals_the_whole_picture(self, run):
         film = films._Film(run, 25.0, 1.0)
         pictures = []
@@ -438,6 +439,7 @@ class TestAnimation:
         films._Film(run, 25.0, 1.0)
         assert dict(matplotlib.rcParams) == before
 
+    @pytest.mark.slow
     def test_animation_is_written_as_gif(self, run, tmp_path):
         plots.save_animation(run, tmp_path / "run.gif", fps=10, duration=0.4)
         with Image.open(tmp_path / "run.gif") as film:
@@ -454,6 +456,7 @@ class TestAnimation:
         assert "http" not in page.replace("".join(picture for picture, *_ in frames), "")
         assert os.listdir(tmp_path) == ["run.HTML"]
 
+    @pytest.mark.slow
     def test_frames_of_a_page_hold_what_changes_and_make_the_whole_picture(self, run, tmp_path, monkeypatch):
         monkeypatch.setattr(films, "_WHOLE", 5)
         written = []
@@ -470,6 +473,7 @@ class TestAnimation:
         assert max(sizes[1:5]) < 0.4 * sizes[0]
         assert sizes[5] > 0.9 * sizes[0]
 
+    @pytest.mark.slow
     def test_film_of_a_page_has_three_megabytes_at_most(self, run, tmp_path):
         """Of a film of ten seconds, two seconds may take a fifth."""
         fifth = run.sel(time=slice(0.0, 0.2 * float(run["time"][-1])))

@@ -116,6 +116,7 @@ class TestOrder:
 class TestEnergy:
     """The energy of the body changes by the work of friction, also across edges and reversals."""
 
+    @pytest.mark.slow
     def test_energy_changes_by_the_work_of_friction(self, cells, history):
         changes = {
             "drive.amplitude": 5.0,
@@ -148,6 +149,7 @@ class TestEnergy:
         return np.abs(energy - energy[0] - work).max() / np.abs(work).max()
 
 
+@pytest.mark.slow
 class TestSingleContact:
     """A loop without friction."""
 
@@ -214,6 +216,7 @@ class TestFigures:
             assert (found.stiffness > 100 * STABILITY_LIMIT) == stiff
             assert found.certified == (not stiff)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         ("number", "step", "t_end", "phi_end"),
         [(30, 2e-7, 1.28477, 1.29125), (31, 1e-7, 0.14977, 2.04373), (33, 2e-7, 0.1727, 8.554)],
@@ -413,6 +416,7 @@ class TestEnd:
         assert found.regime == FAILED
         assert not found.certified
 
+    @pytest.mark.slow
     @given(
         st.floats(-1e300, 1e300, allow_subnormal=False),
         st.floats(-300, 300).map(lambda exponent: 10.0**exponent),
@@ -434,6 +438,7 @@ class TestEnd:
 
 
 class TestHistory:
+    @pytest.mark.slow
     def test_history_ends_in_the_final_state_of_the_run(self, figure, cells, run, history):
         drive, changes, steps = figure(25)
         batch = cells(changes | {"time.span": 3.0, "drive.amplitude": 2.0}, drive=drive)
@@ -444,6 +449,7 @@ class TestHistory:
         assert rows.normal_2.min() == pytest.approx(found.normal_min_2[0], abs=1e-11)
         np.testing.assert_allclose(rows.ring_omega, 2 * np.arctan(rows.t), rtol=1e-14)
 
+    @pytest.mark.slow
     def test_history_of_a_separating_run_ends_within_the_last_step(self, figure, cells, run, history):
         drive, changes, steps = figure(33)
         batch = cells(changes, drive=drive)

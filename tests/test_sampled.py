@@ -526,6 +526,7 @@ def test_a_sampled_sweep_cannot_be_refined() -> None:
 # Commands and pictures
 
 
+@pytest.mark.slow
 def test_commands_work_on_a_sampled_sweep(tmp_path: Any, capsys: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     grid = {"belt.velocity": {"linspace": [0.08, 0.12, 4]}, "time.span": {"linspace": [6.0, 9.0, 4]}}
@@ -610,6 +611,7 @@ def test_a_table_has_a_row_for_each_cell_and_regime() -> None:
     assert frame.groupby("belt_velocity").probability.sum().tolist() == [1.0] * 3
 
 
+@pytest.mark.slow
 def test_friction_laws_and_points_may_be_beside_a_sample() -> None:
     given = config(grid={"friction.law": ["stiction", "coulomb"]}, n=64)
     given["sweep"]["points"] = {"belt.velocity": [0.05, 0.1], "body.mass": [1.0, 1.1]}

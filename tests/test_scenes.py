@@ -27,6 +27,7 @@ def test_calls_by_name_and_by_address_are_found_in_assembly_code():
     assert scenes.code_of(text) == {"instructions": 3, "calls": ["exp", "atan"]}
 
 
+@pytest.mark.slow
 def test_kernel_calls_only_functions_that_its_scene_uses(code):
     assert code[LEANEST]["calls"] == []
     # Calls of the arctan drive.
@@ -34,6 +35,7 @@ def test_kernel_calls_only_functions_that_its_scene_uses(code):
     assert code[LEANEST]["instructions"] < code[CUT]["instructions"]
 
 
+@pytest.mark.slow
 def test_kernel_takes_no_function_from_what_its_scene_lacks(code):
     for one in code.values():
         assert one["optional"] == dict.fromkeys(scenes.OPTIONAL, 0)

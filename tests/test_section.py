@@ -75,6 +75,7 @@ def reference(times):
     return states[:, 0], states[:, 1] + v_belt, np.array(maxima)
 
 
+@pytest.mark.slow
 def test_points_at_each_period_of_the_force_are_those_of_an_independent_integration():
     x, velocity, _ = reference(4.0 * np.arange(1, 13))
     ds = run(FORCED, {"at": "period", "keep": 12})
@@ -86,6 +87,7 @@ def test_points_at_each_period_of_the_force_are_those_of_an_independent_integrat
     assert "deflection_section" not in ds
 
 
+@pytest.mark.slow
 def test_points_at_each_turn_are_the_maxima_of_an_independent_integration():
     *_, maxima = reference([48.0])
     ds = run(FORCED, {"at": "turn"})
@@ -95,6 +97,7 @@ def test_points_at_each_turn_are_the_maxima_of_an_independent_integration():
     np.testing.assert_array_equal(ds.velocity_section[: len(maxima)], 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("at", ["period", "turn"])
 def test_bristles_bring_their_deflection(at):
     v_belt, stiffness, damping, viscous, mu_s, mu_k, v_s = 0.1, 100.0, 2.0, 0.1, 0.15, 0.1, 0.05
@@ -121,6 +124,7 @@ def test_bristles_bring_their_deflection(at):
         assert np.isnan(ds[f"{name}_section"][len(states) :]).all()
 
 
+@pytest.mark.slow
 def test_the_last_points_are_kept_in_their_order_and_nothing_else_changes():
     spans = {"sweep": {"grid": {"time.span": [3.0, 7.0, 23.0, 44.0, 48.0]}}}
     every, few = (run(FORCED, {"at": "period", "keep": keep}, **spans) for keep in (64, 5))
@@ -139,6 +143,7 @@ def swept():
     return {"sweep": {"grid": {"force.frequency": np.linspace(0.1, 0.3, 5).tolist(), "force.amplitude": [0.2, 0.4]}}}
 
 
+@pytest.mark.slow
 def test_files_resume_and_reuse_hold_the_points(tmp_path, monkeypatch, swept):
     section, target = {"at": "period", "keep": 16384}, tmp_path / "out.nc"
     whole = run(FORCED, section, **swept)
@@ -170,6 +175,7 @@ def test_files_resume_and_reuse_hold_the_points(tmp_path, monkeypatch, swept):
     assert len(whole.ringsweep.to_frame()) == 10
 
 
+@pytest.mark.slow
 def test_sweep_over_laws_has_no_deflection_where_the_law_has_no_bristles():
     scene = deepcopy(FORCED)
     scene["friction"] |= {"sigma0": 100.0, "sigma1": 2.0, "sigma2": 0.1, "v_s": 0.05}

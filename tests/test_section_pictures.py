@@ -129,6 +129,7 @@ def test_the_command_draws_multipliers_of_one_axis_in_the_circle(multipliers, di
     assert (tmp_path / "one-multiplier_1.png").exists()
 
 
+@pytest.mark.slow
 def test_the_command_chooses_the_diagram_by_itself(diagram, tmp_path, capsys):
     file = tmp_path / "diagram.nc"
     diagram.to_netcdf(file)

@@ -83,6 +83,7 @@ steps = st.sampled_from([1e-9, 0.1, 1.0, 3.0])
 
 
 class TestFirstRoot:
+    @pytest.mark.slow
     @settings(max_examples=400)
     @given(st.floats(1e-6, 1), coefficients, steps)
     @example(1.0, [-1.0], 1.0)

@@ -55,6 +55,7 @@ def history():
 
 
 class TestParticle:
+    @pytest.mark.slow
     def test_largest_jump_is_that_of_friction_at_an_edge_a_stop_or_a_reversal(self, found, history):
         at = float(found.t_jump_max)
         after = int(np.searchsorted(history.time, at))
@@ -74,11 +75,13 @@ class TestParticle:
         assert float(found.normal_max_1) == pytest.approx(float(reaction.max()), rel=1e-5)
         assert "normal_max_2" not in found
 
+    @pytest.mark.slow
     def test_mirror_image_has_the_same_shocks(self, found):
         mirrored = one(PARTICLE | {"initial": {"omega": "-8 rad/s"}})
         for name in ("jump_max", "t_jump_max", "normal_max_1"):
             assert float(mirrored[name]) == pytest.approx(float(found[name]), rel=1e-9)
 
+    @pytest.mark.slow
     def test_constant_steps_do_not_locate_jumps(self, found):
         by_steps = one(
             PARTICLE | {"friction": PARTICLE["friction"] | {"law": "bengisu-akay", "alpha": 10, "v0": 0.1}},

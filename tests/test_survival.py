@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import xarray as xr
 import yaml
+from tiers import mostly_slow
 
 import ringsweep
 from benchmarks.hostile.attack import same_bits
@@ -112,7 +113,7 @@ def left(target):
 
 
 class TestContinuation:
-    @pytest.mark.parametrize("point", POINTS)
+    @pytest.mark.parametrize("point", mostly_slow(POINTS, ("after a rename",)))
     def test_killed_sweep_continues_to_the_same_bits(self, config, never_stopped, tmp_path, point):
         target = tmp_path / "out.nc"
         arguments = ["run", str(config), "-o", str(target)]
@@ -150,6 +151,7 @@ class TestContinuation:
         assert "the same command goes on" in message
 
     # An interrupt between opening a file and its block leaves the file to the garbage collector.
+    @pytest.mark.slow
     @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
     @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
     @pytest.mark.parametrize("jobs", ["1", "2"])
@@ -277,6 +279,7 @@ class TestCheckpoint:
         assert "its cells are computed again" in caplog.text
         assert same_bits(half_done, never_stopped)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("text", ["", "[1]", "5", "null", '{"scene.model": 1}', "\xff"])
     def test_sweep_continues_with_a_damaged_manifest(self, config, half_done, never_stopped, text):
         half_done.with_name("out.nc.partial").joinpath("sweep.json").write_bytes(text.encode("latin-1"))
@@ -450,7 +453,9 @@ class TestResultFile:
             xr.testing.assert_equal(found.load(), ringsweep.run({"scene": scene}, progress=False))
 
 
-@pytest.mark.parametrize("solver", ["auto", {"method": "rk4", "steps": 300}], ids=["event", "rk4"])
+@pytest.mark.parametrize(
+    "solver", mostly_slow(["auto", {"method": "rk4", "steps": 300}], ["auto"]), ids=["event", "rk4"]
+)
 def test_order_of_computation_does_not_change_bits(scene, monkeypatch, solver):
     axes = {"drive.amplitude": np.geomspace(0.5, 8.0, 9), "zone.half_angle": np.radians([5.0, 20.0, 40.0])}
     whole = ringsweep.sweep(scene, axes, solver=solver, progress=False, jobs=1)

@@ -42,6 +42,7 @@ class TestThreshold:
             ends = ringsweep.sweep(scene, {"drive.amplitude": [value - 1.001 * error, value + 1.001 * error]})
             assert (ringsweep.words(ends.regime).values == "separating").tolist() == [begins == 0, begins == 1]
 
+    @pytest.mark.slow
     def test_what_follows_a_lost_contact_has_thresholds_too(self, scene, tmp_path, capsys):
         """Runs beside each threshold differ in the word of the aftermath. Without `impact` there is none."""
         going_on = scene | {"impact": {"restitution": 0.5}}
@@ -83,6 +84,7 @@ class TestThreshold:
 
 
 class TestDistribution:
+    @pytest.mark.slow
     def test_uncertain_spring_makes_the_threshold_uncertain_in_proportion(self, tmp_path, capsys):
         """k v T = mu_s m g, with k even between 1.5 and 2.5 N/m: so is mu_s, and its quantiles are known."""
         of = {"spring.stiffness": {"uniform": [1.5, 2.5]}}

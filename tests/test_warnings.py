@@ -82,6 +82,7 @@ def test_reused_cells_give_the_warning_again(tmp_path, warned):
     assert warned(STIFF) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", [["run", "case.yaml"], ["simulate", "case.yaml"]])
 def test_command_prints_the_warning_once(tmp_path, command):
     (tmp_path / "case.yaml").write_text(yaml.safe_dump(config(sweep=True)))
@@ -92,6 +93,7 @@ def test_command_prints_the_warning_once(tmp_path, command):
     assert done.stderr.startswith("ringsweep: ")
 
 
+@pytest.mark.slow
 def test_plain_script_without_logging_prints_the_warning_once(tmp_path):
     (tmp_path / "case.yaml").write_text(yaml.safe_dump(config(sweep=True)))
     script = "import ringsweep; ringsweep.run('case.yaml', progress=False)"
@@ -100,6 +102,7 @@ def test_plain_script_without_logging_prints_the_warning_once(tmp_path):
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_quiet_command_still_prints_the_warning(tmp_path, monkeypatch, warned):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "case.yaml").write_text(yaml.safe_dump(config()))
@@ -165,6 +168,7 @@ def test_warning_names_the_share_of_cells_and_the_remedy(caplog, stiffness, mess
     assert found is message or all(part in found for part in message.split(".*"))
 
 
+@pytest.mark.slow
 def test_results_on_disk_are_read_chunk_by_chunk(tmp_path, caplog):
     netcdf.save(results([5.22, 2.0]), tmp_path / "out.nc")
     loaded = load(config())
@@ -231,6 +235,7 @@ def test_axis_that_changes_no_number_is_told(caplog):
     assert not told(axes | {"drive.amplitude": [2.0]})
 
 
+@pytest.mark.slow
 def test_summary_of_a_file_reads_it_chunk_by_chunk(tmp_path, capsys):
     values = np.zeros((2000, 2000))
     flags = {"flag_values": np.int8([0, 1]), "flag_meanings": "resting oscillatory"}
@@ -284,6 +289,7 @@ def test_task_that_runs_long_is_named_with_its_coordinates_and_then_its_longest_
     assert said[1].startswith("drive.amplitude = 2, zone.half_angle = 0.1 (SI units) took 3e+02 steps, ")
 
 
+@pytest.mark.slow
 def test_cells_whose_contacts_cannot_meet_a_zone_are_told(caplog):
     """A ring that swings by 10 deg, with a body near its bottom whose contacts are 48.5 deg from the centre."""
     drive = {"law": "sinusoidal", "amplitude": "10 deg"}
