@@ -1,17 +1,11 @@
 """The reference of ``benchmarks.brute_force`` after a lost contact, which knows nothing of the package."""
 
 import math
-import pkgutil
-from collections.abc import Iterator
-from importlib import import_module
-from inspect import getmembers, isfunction
-from types import CodeType
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-import benchmarks.reference
 from benchmarks.reference import free, go_on, rattling
 from benchmarks.reference.aftermath import MOST_EVENTS
 from benchmarks.reference.free import impact
@@ -22,23 +16,6 @@ from benchmarks.reference.run import HELD
 pytestmark = pytest.mark.slow
 
 G = 9.81
-
-
-def names_in(code: CodeType) -> Iterator[str]:
-    """Names that a function and the functions within it look up."""
-    yield from code.co_names
-    for part in code.co_consts:
-        if isinstance(part, CodeType):
-            yield from names_in(part)
-
-
-@pytest.mark.parametrize("module", [found.name for found in pkgutil.iter_modules(benchmarks.reference.__path__)])
-def test_python_calls_no_function_that_only_compiled_code_can_call(module):
-    # Such a call would end the process.
-    for _, function in getmembers(import_module(f"benchmarks.reference.{module}"), isfunction):
-        for name in names_in(function.__code__):
-            options = getattr(function.__globals__.get(name), "targetoptions", {})
-            assert not options.get("no_cpython_wrapper"), f"{function.__name__} calls {name}"
 
 
 def particle(radius, **changes):
