@@ -501,60 +501,75 @@ def taylor_lines(names: Mapping[str, str], value: Node, rate: Node, side: str, f
     writer.constants(value, *found, *numbers)
     _floats(writer, [value, *place, *numbers], side)
 
-    def term(node: Node, k: str) -> str:
-        """Coefficient `k` of a node."""
-        if node in place:
-            return f"work[{place[node]}, {k}]"
-        return polynomial(node, k) if is_polynomial(node) else linear_text(node, k)
+    stored: set[int] = set()
+    lags: dict[int, int] = dict.fromkeys(place.values(), 1)
 
-    def linear_text(node: Node, k: str) -> str:
+    def row(node: Node, lag: int) -> str:
+        """Coefficient k less a lag of a node with a row: a number that is still in a register."""
+        i = place[node]
+        lags[i] = max(lags[i], lag)
+        return f"w{i}_{lag}"
+
+    def term(node: Node, lag: int) -> str:
+        """Coefficient k less a lag of a node."""
+        if node in place:
+            return row(node, lag)
+        return polynomial(node, lag) if is_polynomial(node) else linear_text(node, lag)
+
+    def linear_text(node: Node, lag: int) -> str:
         a, b = node.parts
         if node.kind == "multiply":
-            return f"{writer.known[a]} * {term(b, k)}"
+            return f"{writer.known[a]} * {term(b, lag)}"
         # A constant has a coefficient 0 only.
-        return "(" + " + ".join(term(part, k) for part in (a, b) if part.varies or k != "k") + ")"
+        return "(" + " + ".join(term(part, lag) for part in (a, b) if part.varies or lag) + ")"
 
-    def polynomial(node: Node, k: str) -> str:
-        return (
-            "(" + "".join(f"{writer.known[p]} if {k} == {j} else " for j, p in enumerate(coefficients[node])) + "0.0)"
-        )
+    def polynomial(node: Node, lag: int) -> str:
+        choices = (f"{writer.known[p]} if k == {j + lag} else " for j, p in enumerate(coefficients[node]))
+        return "(" + "".join(choices) + "0.0)"
 
-    def product(left: Node, right: Node, first: int) -> str:
+    def product(left: Node, right: Node, first: int, scale: str = "") -> str:
         """Coefficient k of a product, with the coefficients of the left factor from `first` on."""
         if left in place:
+            stored.update((place[left], place[right]))
             writer.write("total = 0.0")
             with writer.block(f"for j in range({first}, k + 1):"):
                 writer.write(f"total += work[{place[left]}, j] * work[{place[right]}, k - j]")
-            return "total"
-        parts = [f"{writer.known[p]} * work[{place[right]}, k - {j}]" for j, p in enumerate(coefficients[left])]
-        return " + ".join(
-            part if j < 2 else f"({part} if k >= {j} else 0.0)" for j, part in enumerate(parts) if j >= first
-        )
+            return "total" + scale
+        terms = list(enumerate(coefficients[left]))[first:]
+        return " + ".join(f"{writer.known[p]}{scale} * {row(right, j)}" for j, p in terms)
 
     writer.write(f"factor = {factor}")
-    for node, i in place.items():
-        writer.write(f"work[{i}, 0] = {writer.known[node]}")
     inverses = {node: writer.new(f"1.0 / {writer.known[node.parts[1]]}") for node in place if node.kind == "divide"}
-    with writer.block("for k in range(1, order):"):
+    begin = len(writer.lines)
+    writer.write(f"theta[0] = factor * {writer.known[value]}")
+    with writer.block("for k in range(1, order + 1):"):
+        writer.write(f"theta[k] = factor * {term(rate, 1)} * INVERSE[k]")
         for node, i in place.items():
             p = node.parts
             if is_polynomial(node):
-                text = polynomial(node, "k")
+                text = polynomial(node, 0)
             elif node in linear:
-                text = linear_text(node, "k")
+                text = linear_text(node, 0)
             elif node.kind == "multiply":
                 text = product(p[0], p[1], 0) if p[1] in place else product(p[1], p[0], 0)
             elif node.kind == "divide":
-                text = f"({term(p[0], 'k') if p[0].varies else '0.0'} - ({product(p[1], node, 1)})) * {inverses[node]}"
+                # Each factor on coefficients before is known before the loop, which waits for nothing else.
+                dividend = f"{term(p[0], 0)} * {inverses[node]} " if p[0].varies else ""
+                text = f"{dividend}- ({product(p[1], node, 1, f' * {inverses[node]}')})"
             elif node.kind == "switch":
-                text = f"{term(p[0], 'k')} if {side.format(node.value)} else {term(p[1], 'k')}"
+                text = f"{term(p[0], 0)} if {side.format(node.value)} else {term(p[1], 0)}"
             else:
-                text = f"{term(derivative(node), 'k - 1')} * INVERSE[k]"
-            writer.write(f"work[{i}, k] = {text}")
-        writer.write("pass")
-    with writer.block("for k in range(1, order + 1):"):
-        writer.write(f"theta[k] = factor * {term(rate, 'k - 1')} * INVERSE[k]")
-    writer.write(f"theta[0] = factor * {writer.known[value]}")
+                text = f"{term(derivative(node), 1)} * INVERSE[k]"
+            writer.write(f"w{i}_0 = {text}")
+            writer.write(f"work[{i}, k] = w{i}_0")
+        for i, most in lags.items():
+            for lag in range(most, 0, -1):
+                writer.write(f"w{i}_{lag} = w{i}_{lag - 1}")
+    # Only factors of products of series are read from the scratch.
+    writer.lines[:] = [line for line in writer.lines if not any(f"work[{i}, k] =" in line for i in {*lags} - stored)]
+    for node, i in place.items():
+        started = [f"w{i}_1 = {writer.known[node]}", *(f"w{i}_{lag} = 0.0" for lag in range(2, lags[i] + 1))]
+        writer.lines[begin:begin] = [*started, *([f"work[{i}, 0] = {writer.known[node]}"] if i in stored else [])]
     return writer.lines
 
 
