@@ -263,7 +263,7 @@ def _text(monomial: Monomial, prefix: str = "") -> str:
     return " * ".join(prefix + name for name, power in monomial for _ in range(power)) or "1.0"
 
 
-def evaluate(p: Polynomial, values: Any) -> Any:
+def evaluate(p: Mapping[Monomial, float], values: Any) -> Any:
     """Value of a polynomial whose symbols are attributes of `values`."""
     found: Any = 0.0
     for monomial, factor in p.items():

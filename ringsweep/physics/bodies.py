@@ -9,6 +9,7 @@ acceleration, which its :class:`Coordinate` names, the normal reactions ``N1`` a
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -162,27 +163,43 @@ class Equations:
         The energy would only repeat the balances if it were never compared with anything else. Its rate must be the
         work of friction, besides that of forces that do not depend on the place.
         """
-        velocity, (moment, *normals), whole = self.coordinate.motion[-1], self.numerators, self.whole
-        by_place, by_velocity = (self.energy.rate(by) for by in self._rates()[:2])
-        rate = by_place * symbol(velocity) * whole + by_velocity * moment
-        along = [symbol(f"K{i}") * N * self.coordinate.lever * symbol(velocity) for i, N in enumerate(normals, start=1)]
-        rest = rate - sum(along, Polynomial())
-        rest_free, whole_free = rest.substitute(_FREE), whole.substitute(_FREE)
-        excess = rest * whole_free - rest_free * whole
-        for of, friction in (({"K1"}, "K1*N1"), ({"K2"}, "K2*N2"), ({"K1", "K2"}, "K1*N1 or K2*N2")):
-            terms = Polynomial(term for term in excess.items() if {"K1", "K2"} & set(dict(term[0])) == of)
-            if not _vanishes(terms, body, (*self.coordinate.motion, "K1", "K2")):
+        for friction, factors in self._excess_work:
+            if not _vanish(factors, body):
                 return (
                     f"{self.texts[-1]!r}: {friction} does not do the work of friction on the energy: the kinetic "
                     "energy has another inertia, a sign is wrong, or the contacts do not slide at the field radius"
                 )
-        # A force that is constant or given need not be in the energy.
-        placed = Polynomial(term for term in rest_free.items() if set(dict(term[0])) & set(self.coordinate.by_place))
-        if not _vanishes(placed, body, self.coordinate.motion):
+        if not _vanish(self._unbalanced, body):
             return f"{self.texts[-1]!r}: the terms that depend on the place do not follow from the potential energy"
         if np.any(evaluate(self.free, body) == 0.0):
             return f"the balances do not determine {self.unknowns[0]} and the reactions for these numbers"
         return None
+
+    @cached_property
+    def _work(self) -> Polynomial:
+        """Rate of the energy less the power of friction, times the determinant."""
+        velocity, (moment, *normals) = symbol(self.coordinate.motion[-1]), self.numerators
+        by_place, by_velocity = (self.energy.rate(by) for by in self._rates()[:2])
+        along = [symbol(f"K{i}") * N * self.coordinate.lever * velocity for i, N in enumerate(normals, start=1)]
+        return by_place * velocity * self.whole + by_velocity * moment - sum(along, Polynomial())
+
+    @cached_property
+    def _excess_work(self) -> list[tuple[str, list[Polynomial]]]:
+        """Friction of a contact, or of both, and factors that vanish if it does no other work on the energy."""
+        free, motion = self._work.substitute(_FREE), (*self.coordinate.motion, "K1", "K2")
+        excess = self._work * self.whole.substitute(_FREE) - free * self.whole
+        terms = {
+            text: Polynomial(term for term in excess.items() if {"K1", "K2"} & set(dict(term[0])) == of)
+            for of, text in (({"K1"}, "K1*N1"), ({"K2"}, "K2*N2"), ({"K1", "K2"}, "K1*N1 or K2*N2"))
+        }
+        return [(text, list(found.parts(motion).values())) for text, found in terms.items()]
+
+    @cached_property
+    def _unbalanced(self) -> list[Polynomial]:
+        """Factors that vanish if the forces that depend on the place follow from the energy; others need not."""
+        place, free = set(self.coordinate.by_place), self._work.substitute(_FREE).items()
+        placed = Polynomial(term for term in free if set(dict(term[0])) & place)
+        return list(placed.parts(self.coordinate.motion).values())
 
     def lines(self, name: str) -> list[str]:
         """Body of the function of this name of :mod:`ringsweep.physics.ring`."""
@@ -293,10 +310,10 @@ class Equations:
         return [self.source.value(Polynomial([(key, 1.0)]) * factor) for key, factor in parts.items()]
 
 
-def _vanishes(p: Polynomial, body: Any, motion: Collection[str]) -> bool:
-    """Whether a polynomial is 0 for a body, or for an array of bodies, at any motion, but for rounding."""
-    for factor in p.parts(motion).values():
-        terms = [evaluate(Polynomial([term]), body) for term in factor.items()]
+def _vanish(factors: Collection[Polynomial], body: Any) -> bool:
+    """Whether polynomials in its fields are 0 for a body, or for an array of bodies, but for rounding."""
+    for factor in factors:
+        terms = [evaluate(dict([term]), body) for term in factor.items()]
         if not np.all(abs(sum(terms)) <= _ROUNDING * sum(map(abs, terms))):
             return False
     return True
