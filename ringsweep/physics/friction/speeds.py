@@ -6,7 +6,6 @@ All are isolated by interval arithmetic, see :mod:`ringsweep.numerics.isolation`
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -35,8 +34,8 @@ _Surface = tuple[NDArray[np.float64], NDArray[np.float64]]
 # The stiction band ends where the slope has fallen to this share of the steepest slope below.
 _FLAT = 0.01
 
-# Results for at most so many sets of parameters are kept.
-_FEW = 16
+# Results for so many sets of parameters of a law are kept.
+_MOST_KEPT = 4096
 
 # Rounding of a friction coefficient.
 _ROUNDING = 1e-12
@@ -70,21 +69,34 @@ def hidden_fields(
     """
     table = np.stack([*columns.values(), *(column for surface in surfaces for column in surface)], axis=1)
     rows, cell_row = _distinct(table)
-    # The tasks of a sweep often share their few sets of parameters.
-    find = _fields_of_few if len(rows) <= _FEW else _fields_of
-    found = find(expression, tuple(columns), len(rows), rows.tobytes())
+    found = (_kept_fields if len(rows) <= _MOST_KEPT else _fields_of)(expression, tuple(columns), rows)
     return {name: np.ascontiguousarray(field[cell_row]) for name, field in found.items()}
 
 
-def _fields_of(expression: Expression, names: tuple[str, ...], count: int, content: bytes) -> dict[str, NDArray[Any]]:
-    """Fields of distinct sets of parameters: the numbers of a table with `count` rows."""
-    rows = np.frombuffer(content).reshape(count, -1)
+def _fields_of(expression: Expression, names: tuple[str, ...], rows: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
+    """Fields of distinct sets of parameters."""
     columns = {name: rows[:, k] for k, name in enumerate(names)}
-    pairs = rows[:, len(names) :].reshape(count, -1, 2)
+    pairs = rows[:, len(names) :].reshape(len(rows), -1, 2)
     return _Finder(expression, columns, [(pairs[:, i, 0], pairs[:, i, 1]) for i in range(pairs.shape[1])]).fields()
 
 
-_fields_of_few = lru_cache(maxsize=64)(_fields_of)
+# Fields by law, names and set of parameters.
+_kept: dict[Any, dict[bytes, Any]] = {}
+
+
+def _kept_fields(expression: Expression, names: tuple[str, ...], rows: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
+    """Fields of distinct sets of parameters, found once: the tasks of a sweep share many sets."""
+    kept, keys = _kept.setdefault((expression, names), {}), [row.tobytes() for row in rows]
+    # Another thread may empty what is kept.
+    own: dict[bytes, Any] = {key: kept.get(key) for key in keys}
+    if missing := [i for i, key in enumerate(keys) if own[key] is None]:
+        found = _fields_of(expression, names, rows[missing])
+        new = {keys[i]: {name: field[k] for name, field in found.items()} for k, i in enumerate(missing)}
+        if len(kept) + len(new) > _MOST_KEPT:
+            kept.clear()
+        kept.update(new)
+        own |= new
+    return {name: np.array([fields[name] for fields in own.values()]) for name in own[keys[0]]}
 
 
 def table_fields(
