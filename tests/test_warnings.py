@@ -265,8 +265,9 @@ def test_summary_of_a_file_reads_it_chunk_by_chunk(tmp_path, capsys):
 def test_task_that_runs_long_is_named_with_its_coordinates_and_then_its_longest_cell(monkeypatch):
     """Here each task does: the block ends after the line was written."""
     named = threading.Event()
-    monkeypatch.setattr(cells, "LONG", 0.0)
+    monkeypatch.setattr(cells, "LONG", 0.001)
     monkeypatch.setattr(cells, "_compiled", set())
+    cells._watch_from.cache_clear()
     run = RK4Method.run
 
     def slow(*arguments):
@@ -285,7 +286,7 @@ def test_task_that_runs_long_is_named_with_its_coordinates_and_then_its_longest_
     named.clear()
     cells.compute_task(given, Layout((2, 1)), np.arange(2))
     where = "drive.amplitude = 0.5 to 2, zone.half_angle = 0.1 (SI units)"
-    assert said[0].startswith(f"not done after 0 s: {where}; events")
+    assert said[0].startswith(f"not done after 0.001 s: {where}; events")
     assert said[1].startswith("drive.amplitude = 2, zone.half_angle = 0.1 (SI units) took 3e+02 steps, ")
 
 

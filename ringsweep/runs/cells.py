@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping
+import os
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import groupby
-from threading import Timer
-from time import perf_counter
+from threading import Thread, get_ident
+from time import monotonic, perf_counter, sleep
 from typing import Any
 
 import numpy as np
@@ -182,15 +184,35 @@ def _outcomes(
 @contextmanager
 def _named_if_long(axes: Axes, indices: Indices, compiles: bool) -> Iterator[None]:
     """Name the cells of a task, and say why one may be slow, if the block takes long."""
-    message = "not done after %g s: %s; %sevents, or friction that changes within a tiny speed, take many steps"
-    also = "kernels are still compiled, or " * compiles
-    timer = Timer(LONG, logger.info, (message, LONG, _place(axes, indices), also))
-    timer.daemon = True
-    timer.start()
+
+    def name() -> None:
+        message = "not done after %g s: %s; %sevents, or friction that changes within a tiny speed, take many steps"
+        logger.info(message, LONG, _place(axes, indices), "kernels are still compiled, or " * compiles)
+
+    _watch_from(os.getpid())
+    _under_way[get_ident()] = monotonic() + LONG, name
     try:
         yield
     finally:
-        timer.cancel()
+        _under_way.pop(get_ident(), None)
+
+
+# Tasks that this process computes, by thread: when each is long, and what names it then.
+_under_way: dict[int, tuple[float, Callable[[], None]]] = {}
+
+
+@cache
+def _watch_from(process: int) -> None:
+    """Name each task that is long. One thread watches all tasks: a timer for each would take longer than its cells."""
+
+    def watch() -> None:
+        while True:
+            sleep(0.1 * LONG)
+            for thread, (due, name) in list(_under_way.items()):
+                if monotonic() >= due and _under_way.pop(thread, None) is not None:
+                    name()
+
+    Thread(target=watch, daemon=True).start()
 
 
 def _name_longest(axes: Axes, indices: Indices, steps: NDArray[Any], seconds: float) -> None:
