@@ -102,7 +102,7 @@ class Local:
         ends the wait, or is thrown into the generator, what is finished is still handed over.
         """
         found: SimpleQueue[Result | BaseException | None] = SimpleQueue()
-        lock, expected = threading.Lock(), 1
+        lock, working = threading.Lock(), self._workers
         parallel = joblib.Parallel(self._jobs, return_as="generator_unordered", prefer="threads", batch_size=1)
 
         def finish(outcome: Result | BaseException) -> None:
@@ -113,32 +113,28 @@ class Local:
                     learn(outcome)
             found.put(outcome)
 
-        def end() -> None:
-            nonlocal expected
-            with lock:
-                expected -= 1
-            if not expected:
-                found.put(None)
-
-        def work_here(task: Positions) -> None:
-            # joblib takes some tasks ahead of time.
-            if not stopped.is_set():
-                finish(_attempt(compute, task))
-            end()
-
-        def counted() -> Iterator[Any]:
-            nonlocal expected
-            for task in tasks:
+        def work_here() -> None:
+            nonlocal working
+            while not stopped.is_set():
                 with lock:
-                    expected += 1
-                yield joblib.delayed(work_here)(task)
-            end()
+                    task = next(tasks, None)
+                if task is None:
+                    break
+                finish(_attempt(compute, task))
+            with lock:
+                working -= 1
+            # joblib would poll for the end of its calls, 10 ms for each round of a refined sweep.
+            if not working:
+                found.put(None)
 
         def work() -> None:
             try:
+                if self._workers == 1:
+                    work_here()
+                    return
                 if self._shared:
-                    # joblib polls for results, 10 ms for each round of a refined sweep: threads hand them over at once.
-                    for _ in parallel(counted()):
+                    # One call for each thread, which takes task after task: a call of joblib costs a millisecond.
+                    for _ in parallel(joblib.delayed(work_here)() for _ in range(self._workers)):
                         pass
                     return
                 _shield_from_interrupts()

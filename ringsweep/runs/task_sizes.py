@@ -39,6 +39,7 @@ class TaskSizes:
         self.workers = workers
         self.seconds = 0.0
         self.seconds_per_cell = math.nan
+        self._recent = [0.0, 0.0]
         self.largest = side_by_side
 
     def learn(self, result: TaskResult) -> TaskResult:
@@ -47,9 +48,10 @@ class TaskSizes:
         logger.debug("a task of %d cells: %s", cells, "compiling" if seconds is None else f"{seconds:.3g} s")
         if seconds is not None:
             self.seconds += seconds
-            cost = max(seconds, 1e-9) / cells
-            # Neighbours in the order of the layout are neighbours in the grid, and cost about as much.
-            self.seconds_per_cell = cost if math.isnan(self.seconds_per_cell) else 0.5 * (self.seconds_per_cell + cost)
+            # Neighbours in the order of the layout are neighbours in the grid, and cost about as much. A task has its
+            # own cost, so one of few cells says little.
+            self._recent = [0.5 * before + now for before, now in zip(self._recent, (seconds, cells), strict=True)]
+            self.seconds_per_cell = max(self._recent[0], 1e-9) / self._recent[1]
             self.largest = max(self.largest, cells)
         return result
 
@@ -58,7 +60,10 @@ class TaskSizes:
         if math.isnan(self.seconds_per_cell):
             return self.side_by_side
         seconds = min(max(0.01 * self.seconds, self.min_seconds), self.max_seconds)
-        share = max(left / (3 * max(self.workers(), 1)), self.last_seconds / self.seconds_per_cell)
+        workers = self.workers()
+        # A single worker waits for no other.
+        share = left if workers == 1 else left / (3 * max(workers, 1))
+        share = max(share, self.last_seconds / self.seconds_per_cell)
         size = min(seconds / self.seconds_per_cell, share, 8 * self.largest, self.max_cells)
         return self.side_by_side * max(1, round(size / self.side_by_side))
 
