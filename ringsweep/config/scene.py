@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
+from functools import lru_cache
 from itertools import product
 from math import pi
 from typing import Any, NamedTuple
@@ -331,10 +332,16 @@ def _all_paths(
     kinds = [*product(known, ("none",), ((), ("zone",), zones)), *product(known[:1], DRIVES, ((),))]
     for law, drive, arcs in kinds:
         structure = Structure(model, law, drive, arcs, own_law=own.get(law), impact=model in WITH_IMPACT)
-        paths |= dict.fromkeys(parameters(structure))
+        paths |= dict.fromkeys(_paths_under(structure, model_of(structure), structure.law_type, structure.drive_type))
     if moved is not None:
         paths |= dict.fromkeys(parameters(replace(moved, law=law, own_law=own.get(law))))
     return list(paths)
+
+
+@lru_cache(maxsize=4096)
+def _paths_under(structure: Structure, *registered: Any) -> tuple[str, ...]:
+    """Paths of the numbers of a scene, for as long as the same types are registered under its names."""
+    return tuple(parameters(structure))
 
 
 class _Paths:

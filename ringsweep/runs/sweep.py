@@ -257,16 +257,17 @@ def compute(
         complete(config.refine, found, tuple(slice(None) for _ in layout.sizes), columns)
         columns |= {name: with_nan(columns[name]) for name in gaps(columns)}
     variables = _variables(config)
-    results = _frame(config, found).assign(
-        {
-            name: (
-                (*config.axes.sizes, *variables[name].dims),
-                column,
-                variables[name].attributes | error_attribute(name, columns),
-            )
-            for name, column in columns.items()
-        }
-    )
+    frame = _frame(config, found)
+    data = {
+        name: (
+            (*config.axes.sizes, *variables[name].dims),
+            column,
+            variables[name].attributes | error_attribute(name, columns),
+        )
+        for name, column in columns.items()
+    }
+    # Half the time of `frame.assign(data)`.
+    results = xr.Dataset(data, frame.coords, frame.attrs)
     if warn:
         _warn(results, config)
     return results

@@ -101,6 +101,6 @@ def parts(ds: xr.Dataset, *names: str) -> Iterator[list[Any]]:
     *names : str
         The dataset has the first one. In the place of another one that it lacks is None.
     """
-    variables = [ds[name].variable if name in ds else None for name in names]
-    for _, _, region in Layout(ds[names[0]].shape).chunks():
+    variables = [ds.variables[name] if name in ds else None for name in names]
+    for _, _, region in Layout(ds.variables[names[0]].shape).chunks():
         yield [None if variable is None else np.atleast_1d(variable[region].values) for variable in variables]
