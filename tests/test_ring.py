@@ -112,7 +112,7 @@ class TestTwoContactBalances:
 
 def solution(body, K1, K2, phi, omega):
     """Angular acceleration and reactions from the balances as they are declared, solved as linear equations."""
-    texts = ring.EQUATIONS[type(body)].texts
+    texts = ring.equations_of(type(body)).texts
     known = {**body._asdict(), "sin_phi": sin(phi), "cos_phi": cos(phi), "omega": omega, "K1": K1, "K2": K2}
 
     def errors(unknowns):

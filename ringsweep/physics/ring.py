@@ -33,7 +33,7 @@ from __future__ import annotations
 import inspect
 import sys
 from collections.abc import Callable, Collection, Sequence
-from functools import partial
+from functools import cache, partial
 from itertools import combinations
 from typing import Any, NamedTuple
 
@@ -376,7 +376,8 @@ def size(body, motion):
 
 
 #: Balances of the bodies, and what follows from them, by the type of the body.
-EQUATIONS: dict[type, Equations] = {}
+# What :func:`body` was given, by type.
+_DECLARED: dict[type, tuple[Any, ...]] = {}
 
 _VARIANTS: dict[tuple[type, frozenset[str]], type] = {}
 
@@ -424,9 +425,13 @@ def body(
         for count in range(len(optional) + 1):
             for absent in combinations(optional, count):
                 variant = _VARIANTS[cls, frozenset(absent)] = _without(cls, absent)
-                _derive(variant, balances, energy, coordinate, absent)
+                _DECLARED[variant] = balances, energy, coordinate, absent
+                for function in DERIVED:
+                    function.implemented_by(variant, partial(_derive, variant))
                 if offset:
                     contact_offset.implements(variant)(function_from_lines("body", [f"return body.{offset}"], {}))
+        # A mistake is told where it is made.
+        equations_of(cls)
         return cls
 
     return declare
@@ -443,18 +448,37 @@ def _without(cls: Any, absent: tuple[str, ...]) -> Any:
     return found
 
 
-def _derive(cls: Any, balances: Any, energy: str, coordinate: Coordinate, absent: tuple[str, ...]) -> None:
-    """Give the functions in :data:`DERIVED` bodies for a type."""
+@cache
+def equations_of(cls: Any) -> Equations:
+    """Equations of a type that :func:`body` declares.
+
+    Raises
+    ------
+    KeyError
+        If it declares no such type.
+    TypeError
+        If a balance cannot be used; the message says why.
+    """
     try:
-        equations = EQUATIONS[cls] = Equations(cls._fields, balances, energy, coordinate, absent)
+        return Equations(cls._fields, *_DECLARED[cls])
     except ValueError as error:
         raise TypeError(f"{cls.__name__}: {error}") from None
-    own = {"motion": ", ".join(coordinate.motion), ANGLE.acceleration: coordinate.acceleration}
+
+
+@cache
+def _derive(cls: Any) -> Equations:
+    """Give the functions in :data:`DERIVED` bodies for a type, once a scene has it: there are many types of bodies.
+
+    The equations that it returns know all constants of the body.
+    """
+    equations = equations_of(cls)
+    own = {"motion": ", ".join(equations.coordinate.motion), ANGLE.acceleration: equations.coordinate.acceleration}
     for function in DERIVED:
         names = list(inspect.signature(function).parameters)
         named = [f"{own[name]} = {name}" for name in names if name in own]
         lines = [*named, *equations.lines(function.__name__)]
         function.implements(cls)(function_from_lines(", ".join(names), lines, {}))
+    return equations
 
 
 def variant(cls: type, absent: Collection[str]) -> type:
@@ -475,7 +499,7 @@ def completed(body: Any) -> Any:
     ValueError
         If energy and balances contradict each other; the message says where.
     """
-    equations = EQUATIONS[type(body)]
+    equations = _derive(type(body))  # type: ignore[arg-type]
     if problem := equations.contradiction(body):
         raise ValueError(problem)
     return body._replace(constants=equations.constants(body))

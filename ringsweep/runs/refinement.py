@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation
 
 from ringsweep.quantities.variables import AUDITED, COMPUTED, INFERRED
 
@@ -333,6 +332,9 @@ class _Blocks:
             np.minimum(k // self.grid.stride, n - 1) for k, n in zip((row, column), self.counts, strict=True)
         )
         own[layer, rows, columns] = True
+        # This import takes longer than a small sweep.
+        from scipy.ndimage import binary_dilation
+
         beside = binary_dilation(own, np.ones((1, 3, 3)))
         self.halvings = np.where(own, before + 1, np.maximum(before, beside))
         found = [np.empty(0, dtype=np.intp)]

@@ -64,9 +64,12 @@ class SingleContactRing(Model, Continues):
             If the type of the body is not declared.
         """
         super().__init_subclass__()
-        if cls.body_type not in ring.EQUATIONS:
-            raise TypeError(f"model {cls.name}: body_type {cls.body_type.__name__} is not declared by ring.body")
-        cls.contacts = ring.EQUATIONS[cls.body_type].contacts
+        try:
+            cls.contacts = ring.equations_of(cls.body_type).contacts
+        except KeyError:
+            raise TypeError(
+                f"model {cls.name}: body_type {cls.body_type.__name__} is not declared by ring.body"
+            ) from None
         if "absent" not in vars(cls):
             cls.absent = _OF_CONTACT_2 if cls.contacts == 1 else frozenset()
 
