@@ -2,14 +2,18 @@
 
 import json
 import os
+import stat
 
 import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.figure import Figure
 
 import ringsweep
+from ringsweep import plots
 from ringsweep.errors import InputError
+from ringsweep.plots.films import check_animation
 from ringsweep.quantities.variables import OUTCOMES
 from ringsweep.storage import files, netcdf, provenance
 
@@ -114,6 +118,23 @@ def test_unwritable_path_is_refused(tmp_path, name, problem):
         files.check_writable(tmp_path / name)
     assert caught.value.path == str(tmp_path / name)
     assert os.listdir(tmp_path) == ["file"]
+
+
+WRITERS = {
+    "run.nc": netcdf.save,
+    "run.svg": lambda _, path: plots.save(Figure(), path),
+    "run.html": plots.save_page,
+    "run.gif": lambda _, path: check_animation(path),
+}
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes with a name")
+@pytest.mark.parametrize(("name", "write"), WRITERS.items())
+def test_no_writer_replaces_a_pipe(sweep, tmp_path, name, write):
+    os.mkfifo(tmp_path / name)
+    with pytest.raises(InputError, match="is a device or a pipe"):
+        write(sweep, tmp_path / name)
+    assert stat.S_ISFIFO((tmp_path / name).stat().st_mode)
 
 
 def test_folder_without_permission_to_write_is_refused(tmp_path, monkeypatch):

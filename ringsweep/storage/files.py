@@ -43,8 +43,8 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     Raises
     ------
     InputError
-        If `path` is a folder, its folder does not exist or cannot be written, or the locale does not have its
-        characters.
+        If `path` is a folder, a device or a pipe, its folder does not exist or cannot be written, or the locale does
+        not have its characters.
     """
     check_name(path)
     if not str(path).isprintable():
@@ -52,8 +52,10 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     target = Path(path).resolve()
     folder = target.parent
     try:
-        if target.is_dir():
-            raise InputError(str(path), "is a folder; give the name of a file")
+        if target.exists() and not target.is_file():
+            # The finished file would take the place of a device or a pipe.
+            kind = "a folder" if target.is_dir() else "a device or a pipe"
+            raise InputError(str(path), f"is {kind}; give the name of a file")
         if not folder.exists():
             raise InputError(str(path), f"the folder {folder} does not exist; create it or choose another")
         if not folder.is_dir():
