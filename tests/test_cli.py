@@ -3,6 +3,7 @@
 import json
 import re
 import shlex
+import signal
 import subprocess
 import sys
 from itertools import product
@@ -11,6 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+import yaml
+from belts import with_all_parts
 from jsonschema import Draft202012Validator
 
 import ringsweep
@@ -22,6 +25,7 @@ from ringsweep.models import MODELS, parameters
 from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import DRIVES
 from ringsweep.physics.friction import LAWS
+from ringsweep.quantities.flags import FAILED, RIDING
 from ringsweep.quantities.variables import HISTORY, OUTCOMES
 from ringsweep.solvers import METHODS
 from ringsweep.storage import netcdf
@@ -327,7 +331,11 @@ def test_wrong_command_line_has_status_2(capsys, arguments):
 
 @pytest.mark.parametrize(
     ("error", "status", "message"),
-    [(KeyboardInterrupt(), 130, "interrupted"), (OSError("disk\nfull"), 1, "OSError: disk full")],
+    [
+        (KeyboardInterrupt(), 130, "interrupted"),
+        (KeyboardInterrupt(signal.SIGTERM), 143, "interrupted"),
+        (OSError("disk\nfull"), 1, "OSError: disk full"),
+    ],
 )
 def test_unexpected_error_and_interrupt_are_reported_in_one_line(monkeypatch, capsys, error, status, message):
     def fail(path):
@@ -336,6 +344,35 @@ def test_unexpected_error_and_interrupt_are_reported_in_one_line(monkeypatch, ca
     monkeypatch.setattr("ringsweep.storage.netcdf.check", fail)
     assert main(["info", "out.nc"]) == status
     assert capsys.readouterr().err == f"ringsweep: {message}\n"
+
+
+@pytest.mark.parametrize(("span", "status"), [("20 s", 0), ("2000 s", 1)])
+@pytest.mark.parametrize("verb", ["run", "simulate"])
+def test_status_is_1_if_every_run_has_failed(folder, capsys, verb, span, status):
+    belt = {"model": "belt", "body": {"mass": 1.0}, "spring": {"stiffness": 2.0}, "belt": {"velocity": 0.1}}
+    belt |= {"friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.1}, "time": {"span": span}}
+    few = {"method": "auto", "max_steps": 1000}
+    (folder / "belt.yaml").write_text(yaml.safe_dump({"scene": with_all_parts(belt), "solver": few}))
+    assert main([verb, "belt.yaml", "-o", "out.nc"]) == status
+    assert ("failed" in capsys.readouterr().out) == status
+    assert (folder / "out.nc").exists()
+    if verb == "run":
+        assert main([verb, "belt.yaml", "-o", "out.nc"]) == status
+
+
+@pytest.mark.parametrize(("failed", "status"), [([True, True], 1), ([True, False], 0), ([False, False], 0)])
+def test_status_of_a_sweep_and_of_a_sample(failed, status):
+    cells = np.array(failed)
+    sweep = xr.Dataset({"regime": ("cell", np.where(cells, FAILED, RIDING))})
+    words = {"probability": (("cell", "word"), np.stack([cells, ~cells], axis=1).astype(float))}
+    assert report.status_of(sweep) == status
+    assert report.status_of(xr.Dataset(words, {"word": ["failed", "riding"]})) == status
+
+
+def test_help_tells_the_exit_status(capsys):
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    assert "2 the input is wrong; 130 stopped by Ctrl-C; 143 stopped by SIGTERM" in capsys.readouterr().out
 
 
 def test_schema_is_printed_as_json(capsys):

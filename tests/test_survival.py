@@ -182,7 +182,7 @@ class TestContinuation:
         with monkeypatch.context() as patch:
             patch.setattr("ringsweep.runs.sweep.stop_on_interrupt", watched)
             patch.setattr("ringsweep.runs.sweep.compute_task", endless)
-            assert cli.main(command) == 130
+            assert cli.main(command) == 128 + number
         ended.set()
         assert "are done (Ctrl-C again: stop now" in caplog.text
         assert "interrupted" in capsys.readouterr().err

@@ -39,7 +39,7 @@ def init_command(arguments: argparse.Namespace) -> None:
     print(f"wrote {target}; next: ringsweep run {target}")
 
 
-def run_command(arguments: argparse.Namespace) -> None:
+def run_command(arguments: argparse.Namespace) -> int:
     """Run a sweep into a file, print a summary and draw the regime map."""
     from ringsweep.config import load, refined
 
@@ -57,10 +57,10 @@ def run_command(arguments: argparse.Namespace) -> None:
         if arguments.scheduler is not None:
             raise InputError("--dry-run", "measures threads of this machine: leave --backend dask out")
         print(describe(config, target, arguments.jobs, arguments.reuse))
-        return
+        return 0
 
     from ringsweep.cli import drawing
-    from ringsweep.cli.report import summarise
+    from ringsweep.cli.report import status_of, summarise
     from ringsweep.runs.executors import Execution
     from ringsweep.runs.sweep import write
     from ringsweep.storage import netcdf
@@ -74,12 +74,14 @@ def run_command(arguments: argparse.Namespace) -> None:
         print(f"{target} holds this sweep already (--fresh computes it again)")
     with netcdf.reading(target) as result:
         summarise(result)
+        status = status_of(result)
         if not computed and picture.exists() and picture.stat().st_mtime >= target.stat().st_mtime:
-            return
+            return status
         if config.axes.sizes:
             _draw(lambda: ringsweep.plots.regime_map(result), picture, f"ringsweep map {target}")
         elif config.sample is not None:
             _draw(lambda: drawing.panel(ringsweep.plots.probability_panel, result), picture, f"ringsweep plot {target}")
+    return status
 
 
 def _draw(figure: Callable[[], Any], picture: Path, command: str) -> None:
@@ -128,20 +130,21 @@ def plot_command(arguments: argparse.Namespace) -> None:
     drawing.draw_stored(arguments, drawing.draw_plot)
 
 
-def simulate_command(arguments: argparse.Namespace) -> None:
+def simulate_command(arguments: argparse.Namespace) -> int:
     """Run once, write the history and draw it."""
     from ringsweep.config import with_values
 
     config = with_values(arguments.config, arguments.set)
     target, picture = _outputs(arguments.output or f"{config.name}-run.nc", "time", "history")
 
-    from ringsweep.cli.report import events_in_words
+    from ringsweep.cli.report import events_in_words, status_of
     from ringsweep.runs.simulate import history
 
     result = history(config)
     if replaced := _other_scene(target, result):
         logger.info("%s held a run of another scene, which is replaced: %s", target, replaced)
     _store(result, target, picture, f"{result.attrs['outcome']}\n{events_in_words(result)}", "history")
+    return status_of(result)
 
 
 def threshold_command(arguments: argparse.Namespace) -> None:
@@ -180,7 +183,7 @@ def _other_scene(target: Path, result: Any) -> str:
         return differences(*(scene.iloc[0].to_dict() for scene in scenes))
 
 
-def animate_command(arguments: argparse.Namespace) -> None:
+def animate_command(arguments: argparse.Namespace) -> int:
     """Run once and write an animation."""
     from ringsweep.config import with_values
     from ringsweep.models import MODELS
@@ -195,6 +198,7 @@ def animate_command(arguments: argparse.Namespace) -> None:
             "sweep", "several friction laws, but an animation shows one run: name its law by --set friction.law=..."
         )
 
+    from ringsweep.cli.report import status_of
     from ringsweep.plots.films import check_animation
     from ringsweep.runs.simulate import history
 
@@ -203,6 +207,7 @@ def animate_command(arguments: argparse.Namespace) -> None:
     ringsweep.plots.save_animation(result, target, progress=not arguments.quiet)
     print(result.attrs["outcome"])
     print(f"wrote {target}")
+    return status_of(result)
 
 
 def precision_command(arguments: argparse.Namespace) -> None:

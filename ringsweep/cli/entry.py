@@ -30,7 +30,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit status: 0 if done, 2 if the input is wrong, 130 after Ctrl-C or SIGTERM, 1 for any other error.
+        Exit status: 0 if done, 2 if the input is wrong, 130 after Ctrl-C, 143 after SIGTERM, 1 after anything else, and
+        if every run has failed.
     """
     parser = build_parser()
     given = sys.argv[1:] if argv is None else list(argv)
@@ -62,13 +63,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     except InputError as error:
         return _fail(str(error), 2, error)
     except KeyboardInterrupt as error:
-        _fail("interrupted", 130, error)
+        number = signal.SIGTERM if signal.SIGTERM in error.args else signal.SIGINT
+        status = _fail("interrupted", 128 + number, error)
         if argv is None:
             # A regular exit would wait for a compilation that other threads have begun.
             with suppress(OSError):
                 sys.stdout.flush()
-            os._exit(130)
-        return 130
+            os._exit(status)
+        return status
     except BrokenPipeError:
         # The reader of the output, such as `head`, has closed it.
         sys.stdout = None
@@ -82,12 +84,16 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 @contextmanager
 def _terminable() -> Iterator[None]:
-    """Let SIGTERM do what Ctrl-C does."""
+    """Let SIGTERM do what Ctrl-C does; the interrupt has its number."""
+
+    def terminate(number: int, _: Any) -> None:
+        raise KeyboardInterrupt(number)
+
     if threading.current_thread() is not threading.main_thread():
         # Only the main thread can handle signals.
         yield
         return
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    before = signal.signal(signal.SIGTERM, terminate)
     try:
         yield
     finally:

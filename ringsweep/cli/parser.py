@@ -33,7 +33,9 @@ def build_parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="ringsweep",
         description="Regime maps of dry-friction systems whose friction coefficient jumps.",
-        epilog="ringsweep COMMAND --help says more, with examples.",
+        epilog="ringsweep COMMAND --help says more, with examples.\n\n"
+        "exit status: 0 done; 2 the input is wrong; 130 stopped by Ctrl-C; 143 stopped by SIGTERM;\n"
+        "1 anything else: an error, or every run has failed",
         formatter_class=_formatter,
     )
     parser.add_argument(

@@ -5,9 +5,16 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from ringsweep.quantities.flags import CERTIFIED, FAILED, JAMMED, RIDING, SEPARATING
+from ringsweep.quantities.flags import CERTIFIED, FAILED, JAMMED, REGIMES, RIDING, SEPARATING
 from ringsweep.quantities.variables import DOUBTS, INFERRED, meanings_of, words
 from ringsweep.storage.chunks import parts
+
+
+def status_of(result: xr.Dataset) -> int:
+    """Exit status of a command that has computed a dataset: 1 if every run has failed."""
+    if "probability" in result:
+        return int((result["probability"].sel(word=REGIMES[FAILED]) == 1.0).all())
+    return int((result["regime"] == FAILED).all())
 
 
 def summarise(result: xr.Dataset) -> None:

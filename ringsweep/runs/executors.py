@@ -237,6 +237,8 @@ def interruptible(function: Callable[[], Result]) -> Result:
 def stop_on_interrupt(under_way: Callable[[], str]) -> Iterator[threading.Event]:
     """Event that the first Ctrl-C or SIGTERM within the block sets. The second one acts as it does elsewhere.
 
+    The interrupt that ends the block has the number of the first signal.
+
     Parameters
     ----------
     under_way : callable
@@ -257,12 +259,17 @@ def stop_on_interrupt(under_way: Callable[[], str]) -> Iterator[threading.Event]
         # A second one that comes before the message is out would end the process without it.
         logger.info("stopping when %s (Ctrl-C again: stop now and lose that)", under_way())
         restore()
+        received.append(number)
         stopped.set()
 
+    received: list[int] = []
     for number in before:
         signal.signal(number, interrupt)
     try:
         yield stopped
+    except KeyboardInterrupt as error:
+        error.args = error.args or tuple(received)
+        raise
     finally:
         restore()
 
