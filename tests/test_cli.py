@@ -369,6 +369,30 @@ def test_status_of_a_sweep_and_of_a_sample(failed, status):
     assert report.status_of(xr.Dataset(words, {"word": ["failed", "riding"]})) == status
 
 
+CLOSED = {
+    "nothing is read": ("<&-", "out.nc", 0),
+    "errors have nowhere to go": ("2>&-", "out.nc", 0),
+    "output has nowhere to go": (">&-", "out.nc", 0),
+    "neither has": ("<&- >&- 2>&-", "out.nc", 0),
+    "output is full": (">/dev/full", "out.nc", 1),
+    "errors are full": ("2>/dev/full", "no.nc", 2),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a shell and /dev/full")
+@pytest.mark.parametrize(("redirection", "file", "status"), CLOSED.values(), ids=CLOSED)
+def test_status_does_not_depend_on_closed_streams(folder, redirection, file, status):
+    attributes = {"Conventions": "CF-1.11", "ringsweep_version": "0"}
+    netcdf.save(xr.Dataset({"t_end": ("cell", np.zeros(2))}, attrs=attributes), "out.nc")
+    command = f"{shlex.quote(sys.executable)} -m ringsweep verify {file} {redirection}"
+    done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
+    assert done.returncode == status
+    assert "Exception" not in done.stderr
+    assert "Traceback" not in done.stderr
+    assert netcdf.check("out.nc")
+
+
 def test_help_tells_the_exit_status(capsys):
     with pytest.raises(SystemExit):
         main(["--help"])

@@ -9,14 +9,13 @@ from __future__ import annotations
 import argparse
 import json
 import logging
-import sys
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import ringsweep
-from ringsweep.errors import InputError
+from ringsweep.errors import InputError, print_error
 from ringsweep.quantities.quantity import after_number
 
 logger = logging.getLogger("ringsweep")
@@ -245,7 +244,7 @@ def verify_command(arguments: argparse.Namespace) -> int:
             netcdf.verify(file)
         except InputError as error:
             status = 2
-            print("ringsweep:", error, file=sys.stderr)
+            print_error(str(error))
         else:
             print(f"{file}: is what ringsweep wrote")
     return status

@@ -16,7 +16,7 @@ from contextlib import contextmanager, redirect_stdout, suppress
 from typing import Any
 
 from ringsweep.cli.parser import build_parser
-from ringsweep.errors import InputError, escaped, nearest_name, shortened
+from ringsweep.errors import InputError, escaped, is_coloured, nearest_name, print_error, shortened
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -33,6 +33,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         Exit status: 0 if done, 2 if the input is wrong, 130 after Ctrl-C, 143 after SIGTERM, 1 after anything else, and
         if every run has failed.
     """
+    _open_closed_streams()
     parser = build_parser()
     given = sys.argv[1:] if argv is None else list(argv)
     if not given:
@@ -49,7 +50,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         hint = f"; did you mean --{near}?" if unknown[0].startswith("-") and near else hint
         parser.error(f"unrecognized arguments: {' '.join(unknown)}{hint}")
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
-    logging.getLogger().handlers[0].setFormatter(_Formatter(_is_coloured(sys.stderr)))
+    logging.getLogger().handlers[0].setFormatter(_Formatter(is_coloured(sys.stderr)))
     logging.getLogger("ringsweep").setLevel(
         logging.DEBUG if arguments.verbose else logging.WARNING if arguments.quiet else logging.INFO
     )
@@ -60,6 +61,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             redirect_stdout(None if arguments.quiet else _Escaped(sys.stdout)),
         ):
             status = arguments.command(arguments)
+        sys.stdout.flush()
     except InputError as error:
         return _fail(str(error), 2, error)
     except KeyboardInterrupt as error:
@@ -73,13 +75,29 @@ def main(argv: Sequence[str] | None = None) -> int:
         return status
     except BrokenPipeError:
         # The reader of the output, such as `head`, has closed it.
-        sys.stdout = None
+        _give_up_unwritable_output()
         return 0
     except Exception as error:
         if arguments.verbose:
             traceback.print_exception(error)
+        _give_up_unwritable_output()
         return _fail(shortened(f"{type(error).__name__}: {error}", 1500), 1, error)
     return status or 0
+
+
+def _open_closed_streams() -> None:
+    """Let streams that the shell has closed lead nowhere: else the next file would get the number of one of them."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
+
+
+def _give_up_unwritable_output() -> None:
+    """Keep the interpreter from trying again at its end to write what cannot be written."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        sys.stdout = None
 
 
 @contextmanager
@@ -110,13 +128,8 @@ def _warnings_in_one_line() -> Iterator[None]:
 
 def _fail(message: str, status: int, error: BaseException) -> int:
     notes = getattr(error, "__notes__", [])
-    prefix = "\033[1;31mringsweep:\033[0m" if _is_coloured(sys.stderr) else "ringsweep:"
-    print(prefix, escaped(" ".join("; ".join([message, *notes]).split())), file=sys.stderr)
+    print_error("; ".join([message, *notes]))
     return status
-
-
-def _is_coloured(stream: Any) -> bool:
-    return stream.isatty() and "NO_COLOR" not in os.environ and os.environ.get("TERM") != "dumb"
 
 
 class _Escaped(io.TextIOBase):
