@@ -1,5 +1,6 @@
 """The folder beside a file that is written: who may use it, what is removed from it, and what a power cut leaves."""
 
+import errno
 import os
 import signal
 import stat
@@ -155,6 +156,70 @@ class TestKilledWriter:
         with replacing(tmp_path / "out.nc") as temporary:
             temporary.touch()
         assert sorted(os.listdir(folder)) == before
+
+
+def refusing(number):
+    """A lock that a file system refuses with an error of this number."""
+
+    def lock(descriptor):
+        raise OSError(number, os.strerror(number))
+
+    return lock
+
+
+class TestLocks:
+    def test_lock_that_fails_leaves_no_folder(self, tmp_path, monkeypatch):
+        monkeypatch.setattr(files, "_lock", refusing(errno.EIO))
+        with pytest.raises(InputError, match="Input/output error"), replacing(tmp_path / "run.nc"):
+            pass
+        assert os.listdir(tmp_path) == []
+
+    @pytest.mark.parametrize("number", [errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP])
+    def test_file_system_without_locks_is_told_and_used(self, tmp_path, monkeypatch, caplog, number):
+        monkeypatch.setattr(files, "_lock", refusing(number))
+        with replacing(tmp_path / "run.nc") as temporary:
+            temporary.touch()
+        assert os.listdir(tmp_path) == ["run.nc"]
+        assert "this file system has no locks" in caplog.text
+
+    @pytest.mark.parametrize("number", [errno.EACCES, errno.EAGAIN])
+    def test_lock_of_another_process_is_told(self, tmp_path, monkeypatch, number):
+        monkeypatch.setattr(files, "_lock", refusing(number))
+        with pytest.raises(InputError, match="another ringsweep"), files.working_folder(tmp_path / "run.nc"):
+            pass
+
+    @pytest.mark.parametrize("content", ["", "4", "1234\nanother-machine\n"])
+    def test_file_of_a_lock_that_nobody_holds_locks_nothing(self, tmp_path, content):
+        folder = tmp_path / "run.nc.partial"
+        folder.mkdir()
+        (folder / "lock").write_text(content)
+        with replacing(tmp_path / "run.nc") as temporary:
+            temporary.touch()
+        assert os.listdir(tmp_path) == ["run.nc"]
+
+    def test_lock_that_another_process_removes_meanwhile_is_taken_again(self, tmp_path, monkeypatch):
+        lock, removals = files._lock, iter([True])
+
+        def late(descriptor):
+            if next(removals, False):
+                (tmp_path / "run.nc.partial" / "lock").unlink()
+            lock(descriptor)
+
+        monkeypatch.setattr(files, "_lock", late)
+        with files.working_folder(tmp_path / "run.nc") as folder:
+            assert folder.is_own()
+
+
+def test_full_disk_leaves_no_part_of_a_first_configuration(tmp_path, monkeypatch, capsys):
+    def full(path, text, **_):
+        path.write_bytes(text.encode()[:10])
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("pathlib.Path.write_text", full)
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["init", "my.yaml"]) == 2
+    assert "my.yaml: cannot be written: No space left on device" in capsys.readouterr().err
+    assert os.listdir(tmp_path) == []
 
 
 @pytest.mark.parametrize("method", ["put", "chunks"])

@@ -25,6 +25,8 @@ def init_command(arguments: argparse.Namespace) -> None:
     """Write a configuration from a template."""
     from importlib.resources import files
 
+    from ringsweep.storage.files import replacing
+
     target = Path(arguments.config)
     if target.exists():
         raise InputError(str(target), "exists already: name another file")
@@ -32,7 +34,8 @@ def init_command(arguments: argparse.Namespace) -> None:
         raise InputError(str(target), "is not the name of a configuration: name it *.yaml")
     text = (files("ringsweep.cli") / "templates" / f"{arguments.model}.yaml").read_text(encoding="utf-8")
     try:
-        target.write_text(text.replace("{name}", str(target)), encoding="utf-8")
+        with replacing(target) as temporary:
+            temporary.write_text(text.replace("{name}", str(target)), encoding="utf-8")
     except OSError as error:
         raise InputError(str(target), f"cannot be written: {error.strerror or error}") from error
     print(f"wrote {target}; next: ringsweep run {target}")

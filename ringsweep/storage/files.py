@@ -6,6 +6,8 @@ What a killed process left there is removed by the next one.
 
 from __future__ import annotations
 
+import errno
+import logging
 import os
 import re
 import secrets
@@ -15,10 +17,23 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-
-from filelock import FileLock, Timeout
+from time import monotonic, sleep
 
 from ringsweep.errors import InputError
+
+if sys.platform == "win32":
+    import msvcrt
+
+    def _lock(descriptor: int) -> None:
+        msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+else:
+    import fcntl
+
+    def _lock(descriptor: int) -> None:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+logger = logging.getLogger("ringsweep")
 
 MANIFEST = "sweep.json"
 
@@ -30,6 +45,12 @@ _TEMPORARY = re.compile(r"[0-9a-f]{8}\.tmp(\.\w+)?")
 
 # A file is complete within seconds of the computation that precedes it.
 _PATIENCE = 20.0
+
+# Seconds between two looks at a lock that another process has.
+_LOOK = 0.05
+
+# Errors of a file system that has no locks.
+_NO_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP)
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
@@ -119,11 +140,12 @@ def working_folder(target: Path, patience: float = 0.0) -> Iterator[WorkingFolde
         # A user who may not read the file may not read its cells either.
         mode = _permissions(target)
         mode |= 0o700 | (mode & 0o444) >> 2
-    lock = FileLock(folder / _LOCK, timeout=patience)
+    made, until = False, monotonic() + patience
     try:
         while True:
             with suppress(FileExistsError):
                 folder.mkdir(mode=mode)
+                made = True
                 if _permissions(folder) & 0o700 != 0o700:
                     folder.rmdir()
                     problem = (
@@ -134,13 +156,18 @@ def working_folder(target: Path, patience: float = 0.0) -> Iterator[WorkingFolde
             # Another process may remove the folder meanwhile, because it has finished.
             with suppress(FileNotFoundError):
                 _refuse_foreign(target, folder)
-                lock.acquire()
-                used = WorkingFolder(folder)
-                break
-            lock.release()
-    except Timeout:
-        raise InputError(str(target), f"another ringsweep is computing it (it uses {folder})") from None
+                try:
+                    used = WorkingFolder(folder)
+                    break
+                except BlockingIOError:
+                    if monotonic() >= until:
+                        raise InputError(str(target), f"another ringsweep is computing it (it uses {folder})") from None
+                    sleep(_LOOK)
     except OSError as error:
+        if made:
+            with suppress(OSError):
+                (folder / _LOCK).unlink(missing_ok=True)
+                folder.rmdir()
         raise InputError(str(target), f"cannot be written: {error.strerror or error}") from error
     try:
         if _permissions(folder) & ~mode:
@@ -159,7 +186,7 @@ def working_folder(target: Path, patience: float = 0.0) -> Iterator[WorkingFolde
                 (folder / MANIFEST).unlink(missing_ok=True)
                 # Windows does not remove a file that is open.
                 (folder / _LOCK).unlink(missing_ok=True)
-        lock.release()
+        used.release()
         if removable:
             with suppress(OSError):
                 (folder / _LOCK).unlink(missing_ok=True)
@@ -167,16 +194,41 @@ def working_folder(target: Path, patience: float = 0.0) -> Iterator[WorkingFolde
 
 
 class WorkingFolder:
-    """Folder beside a file that is written; made by :func:`working_folder`.
+    """Folder beside a file that is written, locked for this process; made by :func:`working_folder`.
 
     Attributes
     ----------
     path : Path
+
+    Raises
+    ------
+    BlockingIOError
+        If another process has locked it.
+    FileNotFoundError
+        If another process has removed it meanwhile.
     """
 
     def __init__(self, path: Path):
         self.path = path
-        self._lock = (path / _LOCK).lstat()
+        self._descriptor = os.open(path / _LOCK, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o644)
+        self._lock = os.fstat(self._descriptor)
+        try:
+            _lock(self._descriptor)
+            if not self.is_own():
+                raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
+        except OSError as error:
+            if error.errno not in _NO_LOCKS:
+                self.release()
+                # Some file systems, and Windows, call a lock of another process a lack of permission.
+                if isinstance(error, PermissionError):
+                    raise BlockingIOError(*error.args) from error
+                raise
+            logger.warning("%s: this file system has no locks; do not write the same file twice at once", path)
+
+    def release(self) -> None:
+        """Let other processes use the folder."""
+        # This ends the lock too.
+        os.close(self._descriptor)
 
     def is_own(self) -> bool:
         """Whether the folder is still the one that this process locked."""
