@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -83,6 +85,47 @@ class Accessor:
                 known = meanings_of(variable)
                 frame[name] = pd.Categorical(frame[name].map(known), categories=list(known.values()))
         return frame
+
+    def at(self, times: ArrayLike) -> xr.Dataset:
+        """A history at other times.
+
+        A history has two rows at the instant of an event, its states before and after it, so `interp` of xarray does
+        not take it. Here numbers are interpolated linearly between rows; up to an event from the row before it, from
+        the event on from the row after it. At an event itself they are those after it. Classifications have the value
+        of the row before. Outside the history numbers are NaN, and classifications have the value of its end.
+
+        Parameters
+        ----------
+        times : array-like of float
+            Times, s: a number, or several in any order.
+
+        Raises
+        ------
+        InputError
+            If the dataset is no history, or the times are no such numbers.
+
+        Examples
+        --------
+        A body stops at 1 s, and its acceleration jumps:
+
+        >>> import xarray as xr
+        >>> run = xr.Dataset({"epsilon": ("time", [2.0, 4.0, 0.0, 0.0])}, {"time": [0.0, 1.0, 1.0, 2.0]})
+        >>> run.ringsweep.at([0.5, 1.0, 1.5]).epsilon.values
+        array([3., 0., 0.])
+        """
+        from ringsweep.errors import InputError
+        from ringsweep.runs.events import history_at
+
+        if "time" not in self._ds.dims:
+            raise InputError("ds", "is no time history: ringsweep.simulate returns one")
+        try:
+            wanted = np.asarray(times, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise InputError("times", "numbers of seconds are expected") from error
+        if wanted.ndim > 1:
+            raise InputError("times", f"one dimension is expected, got {wanted.ndim}")
+        found = history_at(self._ds, np.atleast_1d(wanted))
+        return found if wanted.ndim else found.isel(time=0)
 
     def map(self, var: str = "regime", **options: Any) -> Figure:
         """A map of a variable; other arguments as for :func:`ringsweep.plots.regime_map`."""

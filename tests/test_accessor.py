@@ -3,6 +3,7 @@
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 import xarray as xr
 
@@ -52,6 +53,46 @@ def test_frames_of_a_history_have_a_row_for_each_sample_or_event(ds):
     assert events.event_kind.tolist() == ringsweep.words(run.event_kind).values.tolist()
     with pytest.raises(ringsweep.InputError, match="no dimension"):
         run.ringsweep.to_frame("point")
+
+
+class TestAHistoryAtOtherTimes:
+    @pytest.fixture
+    def run(self):
+        """A body that falls from 0 s, is stopped at 1 s, and is lost at 2 s. Two things happen at once at 1 s."""
+        time = [0.0, 1.0, 1.0, 1.0, 2.0, 2.0]
+        columns = {"velocity": [0.0, 10.0, 5.0, 0.0, 0.0, -1.0], "x": [0.0, 5.0, 5.0, 5.0, 5.0, 5.0]}
+        both = {name: ("time", column) for name, column in columns.items()}
+        both["mode"] = "time", np.array([1, 1, -1, 0, 0, 1], dtype="int8")
+        return xr.Dataset(both | {"t_end": 2.0}, {"time": ("time", time, {"units": "s"})})
+
+    def test_up_to_an_event_it_is_as_before_and_from_there_as_after(self, run):
+        at = run.ringsweep.at([0.5, 0.999, 1.0, 1.001, 1.999, 2.0])
+        assert at.velocity.values == pytest.approx([5.0, 9.99, 0.0, 0.0, 0.0, -1.0])
+        assert at.mode.values.tolist() == [1, 1, 0, 0, 0, 1]
+        assert (at.mode.dtype, at.t_end.item(), at.time.attrs) == ("int8", 2.0, {"units": "s"})
+
+    def test_outside_numbers_are_nan_and_classifications_those_of_the_end(self, run):
+        at = run.ringsweep.at([3.0, -1.0])
+        assert np.isnan(at.velocity).all()
+        assert at.mode.values.tolist() == [1, 1]
+
+    def test_one_time_has_no_dimension(self, run):
+        assert run.ringsweep.at(0.25).x.item() == 1.25
+
+    def test_runs_under_several_laws_end_each_at_its_own_time(self, run):
+        longer = run.assign_coords(time=run.time * 2.0)
+        law = xr.concat([run.ringsweep.at([0.0, 2.0, 4.0]), longer.ringsweep.at([0.0, 2.0, 4.0])], "friction_law")
+        found = law.ringsweep.at([2.0, 3.0]).x.values
+        assert found == pytest.approx(np.array([[5.0, np.nan], [5.0, 5.0]]), nan_ok=True)
+
+    @pytest.mark.parametrize(("times", "problem"), [("soon", "numbers"), ([[1.0]], "one dimension")])
+    def test_wrong_times_are_refused(self, run, times, problem):
+        with pytest.raises(ringsweep.InputError, match=problem):
+            run.ringsweep.at(times)
+
+    def test_sweep_is_no_history(self):
+        with pytest.raises(ringsweep.InputError, match="no time history"):
+            xr.Dataset().ringsweep.at(1.0)
 
 
 def test_dataset_in_place_of_a_scene_is_refused_with_what_to_call(ds):

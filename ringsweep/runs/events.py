@@ -1,4 +1,4 @@
-"""Events of a run as a table: edges of zones, stops, breakaways, reversals, lost contacts, impacts, jams."""
+"""Events of a run (edges, stops, breakaways, reversals, lost contacts, impacts, jams), and histories at other times."""
 
 from __future__ import annotations
 
@@ -43,6 +43,36 @@ class Events(NamedTuple):
     kind: str
     times: NDArray[np.float64]
     contacts: NDArray[np.int8]
+
+
+def history_at(run: xr.Dataset, times: NDArray[np.float64]) -> xr.Dataset:
+    """A history at other times.
+
+    A history has each event twice, before and after it. Between two rows numbers are interpolated, up to an event from
+    the row before it; at an event they have their values after it. Classifications have the value of the row before.
+    Outside the history numbers are NaN, and classifications have the value of its end.
+
+    Parameters
+    ----------
+    run : xarray.Dataset
+    times : ndarray of float64, shape ``(times,)``
+        Times, s.
+    """
+    own = run["time"].values
+    row = np.clip(np.searchsorted(own, times, side="right") - 1, 0, len(own) - 1)
+    after = np.minimum(row + 1, len(own) - 1)
+    inside = (times >= own[0]) & (times <= own[-1])
+    passed, length = times - own[row], own[after] - own[row]
+    between = inside & (passed > 0.0)
+    share = xr.Variable("time", np.divide(passed, length, out=np.zeros(len(times)), where=between))
+    found = run.isel(time=row).assign_coords(time=("time", times, run["time"].attrs))
+    for name, data in run.data_vars.items():
+        if data.dtype.kind == "f" and "time" in data.dims:
+            begin, end = found[name].variable, data.variable.isel(time=after)
+            # A row at its own time must not see the next one, which may be NaN.
+            values = xr.where(xr.Variable("time", between), begin + share * (end - begin), begin)
+            found[name] = found[name].copy(data=values.where(xr.Variable("time", inside)).transpose(*data.dims).data)
+    return found
 
 
 def _edges(run: xr.Dataset, outcome: xr.Dataset) -> Iterator[Events]:

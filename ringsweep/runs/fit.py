@@ -123,7 +123,7 @@ def fit(
     ... }
     >>> run = ringsweep.simulate(scene)
     >>> t = np.linspace(0.0, 20.0, 101)
-    >>> x = np.interp(t, run.time, run.x) + 1e-3 * np.random.default_rng(1).standard_normal(101)
+    >>> x = run.ringsweep.at(t).x.values + 1e-3 * np.random.default_rng(1).standard_normal(101)
     >>> found = ringsweep.fit(scene, {"t": t, "x": x}, "friction.mu_k, friction.mu_s=0.1..0.3")
     >>> found.value.round(2).values
     array([0.1 , 0.15])

@@ -19,7 +19,7 @@ from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import turn
 from ringsweep.quantities.flags import AFTERMATHS, REGIMES
 from ringsweep.quantities.variables import EVENTS, HISTORY, IMPACTS
-from ringsweep.runs.events import Events, events, side_by_side
+from ringsweep.runs.events import Events, events, history_at, side_by_side
 from ringsweep.runs.executors import Execution, interruptible
 from ringsweep.runs.sweep import compute
 from ringsweep.storage.provenance import attributes
@@ -114,7 +114,9 @@ def _history(config: Config, samples: int) -> xr.Dataset:
         words = _describe(outcome)
     else:
         times = np.unique(np.concatenate([run["time"] for run in runs.values()]))
-        joined = xr.concat([_resample(run, times) for run in runs.values()], "friction_law")
+        # Each law has impacts of its own.
+        alone = [run.drop_dims("impact", errors="ignore") for run in runs.values()]
+        joined = xr.concat([history_at(run, times) for run in alone], "friction_law")
         table = side_by_side(tables)
         words = "\n".join(f"{law}: {_describe(outcome.sel(friction_law=law))}" for law in runs)
     return joined.merge(outcome).merge(table).assign_attrs(attributes(config) | {"outcome": words})
@@ -185,21 +187,6 @@ def _open_contact_at_end(run: xr.Dataset, outcome: xr.Dataset) -> xr.Dataset:
         return run
     after = run.isel(time=[-1]).assign({name: 0.0 * run[name][-1:] for name in names})
     return xr.concat([run, after], "time", data_vars="all", combine_attrs="override")
-
-
-def _resample(run: xr.Dataset, times: NDArray[np.float64]) -> xr.Dataset:
-    """A history at other times. Numbers are interpolated; classifications have the value of the sample before."""
-    # An event stores the states before and after it at one instant: interpolation needs the second.
-    run = run.isel(time=np.append(np.diff(run["time"]) > 0.0, True))
-    # Each law has impacts of its own.
-    run = run.drop_dims("impact", errors="ignore")
-    own = run["time"].values
-    before = np.maximum(np.searchsorted(own, times, side="right") - 1, 0)
-    found = run.isel(time=before).assign_coords(time=("time", times, run["time"].attrs))
-    for name, data in run.items():
-        if data.dtype.kind == "f":
-            found[name] = found[name].copy(data=np.interp(times, own, data, right=np.nan))
-    return found
 
 
 def _counted(outcome: xr.Dataset) -> str:
