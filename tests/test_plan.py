@@ -1,6 +1,7 @@
 """What a sweep needs is told before it runs, and a sweep that cannot fit is refused."""
 
 from threading import Event
+from time import monotonic
 from types import SimpleNamespace
 
 import numpy as np
@@ -181,6 +182,28 @@ def test_cells_that_take_longer_than_the_measurement_are_not_waited_for(sweep, t
     found = plan.describe(load(sweep(8)), tmp_path / "a.nc", 2)
     ended.set()
     assert message in found
+
+
+@pytest.mark.parametrize(
+    ("solver", "limit"), [({"method": "auto"}, "max_steps"), ({"method": "rk4", "steps": 10**9}, "steps")]
+)
+def test_long_cells_are_not_waited_for_while_their_kernels_are_compiled(sweep, tmp_path, monkeypatch, solver, limit):
+    ended, limits = Event(), []
+
+    def compute(config, layout, positions):
+        limits.append(getattr(config.solver, limit))
+        if limits[-1] > 1e6:
+            ended.wait(60.0)
+        return TaskResult(positions, {}, None, {}, "")
+
+    monkeypatch.setattr(plan, "compute_task", compute)
+    began = monotonic()
+    found = plan.describe(load(sweep(8, solver=solver)), tmp_path / "a.nc", 2)
+    took = monotonic() - began
+    ended.set()
+    assert "time: more than 32 s on 2 threads" in found
+    assert took < 20.0
+    assert limits[0] <= 1000
 
 
 def test_numbers_at_the_edge_of_a_double_give_a_file_without_a_picture(scene, tmp_path, monkeypatch, caplog):

@@ -6,7 +6,7 @@ import math
 import os
 import shutil
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from threading import Event, Thread
 from time import monotonic
@@ -38,6 +38,9 @@ _FILE, _COMPRESSED = 40e3, 0.55
 
 # Most cells of a refined sweep of which it is estimated how many are run.
 _MOST_GUESSED = 1 << 20
+
+# Most steps of the cells that are run so that their kernels are compiled.
+_FEW = 1000
 
 # Seconds to measure cells, seconds to wait for the first ones (they may be compiled), and the most cells to measure.
 _MEASURING, _FIRST, _MOST = 1.0, 120.0, 100_000
@@ -208,11 +211,13 @@ def _measure(config: Config, layout: Layout) -> list[TaskResult] | None:
     few = layout.total <= _MOST
     drawn = draw.permutation(layout.total) if few else draw.integers(layout.total, size=_MOST)
     side = 1 if config.sample else config.solver.side_by_side
+    limits = {field.name for field in fields(config.solver)} & {"steps", "max_steps"}
+    few_steps = replace(config.solver, **{name: min(getattr(config.solver, name), _FEW) for name in limits})
     results: list[TaskResult] = []
     errors: list[BaseException] = []
     began = Event()
 
-    def compute(positions: NDArray[np.integer]) -> None:
+    def compute(config: Config, positions: NDArray[np.integer]) -> None:
         if config.sample is None:
             # A cell that starts from another one costs about as much.
             results.append(compute_task(replace(config, follow=None), layout, positions))
@@ -221,12 +226,12 @@ def _measure(config: Config, layout: Layout) -> list[TaskResult] | None:
 
     def work() -> None:
         try:
-            # The first ones may compile or load kernels. They are run again.
-            compute(drawn[:side])
+            # The first ones may compile or load kernels. Of them a few steps are enough.
+            compute(replace(config, solver=few_steps), drawn[:side])
             began.set()
             start, stop, until = 0, side, monotonic() + _MEASURING / 2
             while start < len(drawn) and monotonic() < until:
-                compute(drawn[start:stop])
+                compute(config, drawn[start:stop])
                 start, stop = stop, 2 * stop
         except BaseException as error:
             errors.append(error)
