@@ -11,6 +11,7 @@ from ringsweep import cli, plots
 from ringsweep.errors import InputError
 from ringsweep.quantities.variables import INFERRED
 from ringsweep.runs import boundaries
+from ringsweep.storage import netcdf
 
 AXES = {"drive.amplitude": np.geomspace(0.5, 8.0, 17), "zone.half_angle": np.radians(np.linspace(5.0, 40.0, 13))}
 
@@ -108,13 +109,32 @@ class TestBoundary:
             ringsweep.boundary(changed, "separating")
 
     def test_regime_without_cells_has_no_curve_and_a_warning(self, ds, tmp_path, capsys, caplog):
-        from ringsweep.storage import netcdf
-
         netcdf.save(ds, tmp_path / "my.nc")
         assert cli.main(["map", str(tmp_path / "my.nc"), "--boundaries", "jammed"]) == 0
         assert "no boundary of jammed" in capsys.readouterr().err + caplog.text
         assert cli.main(["info", str(tmp_path / "my-jammed.nc")]) == 0
         assert "boundary of jammed: 0 curves, 0 points" in capsys.readouterr().out
+
+    @pytest.mark.parametrize(
+        ("options", "problem"),
+        [(("--x", "x"), "'x'"), (("--var", "nonsense"), "nonsense"), (("-o", "no/where.png"), "does not exist")],
+    )
+    def test_what_cannot_be_drawn_is_told_before_a_boundary_is_located(
+        self, ds, tmp_path, monkeypatch, capsys, options, problem
+    ):
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr(boundaries, "boundary", lambda *_: pytest.fail("the boundary was located"))
+        netcdf.save(ds, "my.nc")
+        assert cli.main(["map", "my.nc", "--boundaries", "separating", *options]) == 2
+        assert problem in capsys.readouterr().err
+        assert [path.name for path in tmp_path.iterdir()] == ["my.nc"]
+
+    def test_boundary_does_not_replace_a_sweep(self, ds, tmp_path, monkeypatch, capsys):
+        monkeypatch.chdir(tmp_path)
+        for name in ("my.nc", "my-separating.nc"):
+            netcdf.save(ds, name)
+        assert cli.main(["map", "my.nc", "--boundaries", "separating"]) == 2
+        assert "my-separating.nc: holds a result of another kind" in capsys.readouterr().err
 
     def test_refusal_of_an_unknown_regime_names_the_nearest(self, ds):
         with pytest.raises(InputError, match=r"not a regime; did you mean `separating`\?"):
@@ -140,8 +160,6 @@ class TestBoundary:
 
     @pytest.mark.slow
     def test_curves_are_drawn_over_the_map_and_written(self, ds, curves, tmp_path, capsys):
-        from ringsweep.storage import netcdf
-
         figure = plots.regime_map(ds, boundaries=curves)
         lines = figure.axes[0].lines
         drawn = np.concatenate([line.get_xydata() for line in lines])
@@ -211,8 +229,6 @@ class TestValueThatTheMapLacks:
 
     @pytest.fixture
     def folder(self, ds, tmp_path, monkeypatch):
-        from ringsweep.storage import netcdf
-
         monkeypatch.chdir(tmp_path)
         netcdf.save(ds, "my.nc")
         return netcdf

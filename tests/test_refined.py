@@ -176,14 +176,14 @@ class TestContinuation:
         assert len(set(stored)) == len(stored)
         assert same_bits(tmp_path / "out.nc", refined)
 
-    def test_checkpoint_of_the_full_grid_is_not_continued_as_a_refined_one(self, config, refined, tmp_path, caplog):
+    def test_refined_sweep_is_not_replaced_by_one_of_the_full_grid(self, config, refined, tmp_path):
         target = tmp_path / "out.nc"
         target.write_bytes(refined.read_bytes())
         assert cli.main(["run", str(config), "-o", str(target)]) == 0
         given = yaml.safe_load(config.read_text())
         del given["sweep"]["refine"]
-        ringsweep.run(given, target, progress=False).close()
-        assert "sweep.refine was Refinement" in caplog.text
+        with pytest.raises(ringsweep.InputError, match=r"sweep\.refine was Refinement"):
+            ringsweep.run(given, target, progress=False)
 
 
 class TestReuse:

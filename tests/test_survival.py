@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import re
 import shutil
 import signal
 import threading
@@ -30,7 +31,7 @@ from ringsweep.storage import netcdf
 from ringsweep.storage.checkpoint import Checkpoint, open_checkpoint
 from ringsweep.storage.chunks import Layout
 from ringsweep.storage.files import MANIFEST, WorkingFolder
-from ringsweep.storage.provenance import identity
+from ringsweep.storage.provenance import differences, identity
 
 SWEEP = {
     "grid": {"drive.amplitude": {"geomspace": [0.5, 8.0, 9]}, "zone.half_angle": {"linspace": ["5 deg", "40 deg", 8]}}
@@ -317,15 +318,48 @@ class TestCheckpoint:
         assert "another ringsweep is computing it" in capsys.readouterr().err
         assert left(target) == []
 
-    def test_finished_sweep_is_not_computed_again_and_another_sweep_is_replaced_with_a_warning(
-        self, config, never_stopped, tmp_path, caplog
+    def test_finished_sweep_is_not_computed_again_and_another_one_does_not_replace_it(
+        self, config, never_stopped, tmp_path
     ):
         target = tmp_path / "out.nc"
         shutil.copy(never_stopped, target)
         assert not write(load(config), target, Execution(progress=False))
-        other = load(config.read_text() and {"scene": load(config).source["scene"] | {"time": {"span": "3 s"}}})
-        assert write(other, target, Execution(progress=False))
-        assert "scene.time.span was 4.0, is 3.0" in caplog.text
+        other = load(config, ["time.span=3 s"])
+        with pytest.raises(ringsweep.InputError, match=r"another sweep: scene\.time\.span was 4\.0, is 3\.0.*--fresh"):
+            write(other, target, Execution(progress=False))
+        assert same_bits(target, never_stopped)
+        assert write(other, target, Execution(progress=False), fresh=True)
+        assert float(netcdf.load(target).t_end.max()) <= 3.0
+
+    def test_sweep_begun_with_fresh_goes_on_beside_the_one_that_it_replaces(
+        self, config, half_done, never_stopped, caplog
+    ):
+        """Without --fresh, as the message of the interruption says."""
+        ringsweep.run({"scene": load(config).source["scene"]}, half_done.with_name("b.nc"), progress=False).close()
+        half_done.with_name("b.nc").rename(half_done)
+        ringsweep.run(config, half_done, progress=False).close()
+        assert "out.nc is replaced when this sweep is done" in caplog.text
+        assert same_bits(half_done, never_stopped)
+
+    def test_refinement_of_a_finished_sweep_does_not_replace_it(self, never_stopped, tmp_path, monkeypatch, capsys):
+        monkeypatch.chdir(tmp_path)
+        shutil.copy(never_stopped, "full.nc")
+        assert cli.main(["run", "full.nc", "--refine"]) == 2
+        message = capsys.readouterr().err
+        assert message.startswith("ringsweep: ")
+        assert "full.nc: holds another sweep: sweep.refine was absent" in message
+        assert same_bits(tmp_path / "full.nc", never_stopped)
+        assert left(tmp_path / "full.nc") == ["full.nc"]
+
+    def test_differences_are_told_without_digests(self, config):
+        one = load(config)
+        other = load({**one.source, "sweep": {"grid": {"drive.amplitude": {"linspace": [0.5, 8.0, 9]}}}})
+        same_ends = load({**one.source, "sweep": {"grid": {"drive.amplitude": {"geomspace": [0.5, 8.0, 9]}}}})
+        told = differences(identity(one) | {"sources": "0" * 64}, identity(other))
+        assert "the source code of ringsweep has changed" in told
+        told += differences(identity(other), identity(same_ends))
+        assert "sweep.drive.amplitude has other values (9 values, 0.5 to 8" in told
+        assert not re.search(r"\([0-9a-f]{12}\)|[0-9a-f]{32}", told)
 
 
 class TestFullDisk:

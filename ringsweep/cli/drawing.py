@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from ringsweep import plots
 from ringsweep.errors import InputError
 from ringsweep.plots.datasets import is_sampled, resolve
+from ringsweep.plots.maps import Map
 from ringsweep.plots.sections import has_circle, has_diagram, points_of
 from ringsweep.plots.selection import select, select_grid
 from ringsweep.quantities.variables import POINTS
@@ -61,6 +62,14 @@ def draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
         raise InputError("--tolerance", "is that of --boundaries REGIME")
     curves = None
     if arguments.boundaries is not None:
+        written = dataset.with_name(f"{target.stem}-{_name_part(arguments.boundaries)}.nc")
+        files.check_writable(written)
+        if written.exists():
+            netcdf.check_kind(written, "vertex", "boundary")
+        # What the picture cannot have is told before the boundary is computed.
+        word = {"word": arguments.boundaries} if is_sampled(result) else {}
+        Map.of(along, (arguments.x, arguments.y), arguments.var, word).check_takes_curves()
+
         from ringsweep.runs.boundaries import boundary, run_at
         from ringsweep.runs.executors import Execution
         from ringsweep.runs.sampled import nominal
@@ -80,7 +89,6 @@ def draw_map(arguments: argparse.Namespace, dataset: Path, result: Any) -> None:
         else:
             # The picture shows the cells between which the curves lie.
             result, selection = located, {}
-        written = dataset.with_name(f"{target.stem}-{arguments.boundaries}.nc")
         netcdf.save(curves, written)
         print(f"wrote {written}")
     chosen = (arguments.x, arguments.y, arguments.var, selection)

@@ -422,10 +422,14 @@ class Map:
             points = np.vstack([points, points[:1]])
         return points
 
-    def curve_entry(self, boundaries: xr.Dataset) -> Artist:
-        """Entry of the legend for the curves of boundaries."""
+    def check_takes_curves(self) -> None:
+        """Raise an error unless the curves of boundaries can be drawn over the map."""
         if self.scattered or len(self.panels) > 1:
             raise InputError("boundaries", "are drawn over one map of a grid: hold the other axes")
+
+    def curve_entry(self, boundaries: xr.Dataset) -> Artist:
+        """Entry of the legend for the curves of boundaries."""
+        self.check_takes_curves()
         for held in swept(self.ds):
             if not held.dims and held.name in boundaries.coords and (boundaries[held.name].values != held.values).any():
                 raise InputError("boundaries", f"are those of another map: this one has {plain_text(value_text(held))}")

@@ -36,7 +36,7 @@ from ringsweep.runs.sampled import EarlierSample
 from ringsweep.runs.task_sizes import TaskSizes, chains_of, divide_into_tasks
 from ringsweep.runs.warnings import warn_of_results, warn_of_sample
 from ringsweep.storage import netcdf
-from ringsweep.storage.checkpoint import Checkpoint, Columns, DamagedTask, open_checkpoint
+from ringsweep.storage.checkpoint import Checkpoint, Columns, DamagedTask, another_sweep, open_checkpoint
 from ringsweep.storage.chunks import Layout
 from ringsweep.storage.provenance import attributes, differences, environment, identity
 
@@ -375,7 +375,13 @@ def _write_file(config: Config, target: Path, layout: Layout, checkpoint: Checkp
 
 
 def _holds_sweep(target: Path, checkpoint: Checkpoint) -> bool:
-    """Whether a file holds the sweep of a checkpoint. Warns if it holds another sweep."""
+    """Whether a file holds the sweep of a checkpoint.
+
+    Raises
+    ------
+    InputError
+        If it holds another sweep, and no cell of this one is finished.
+    """
     if not target.exists():
         return False
     with netcdf.open_dataset(target) as ds:
@@ -386,6 +392,9 @@ def _holds_sweep(target: Path, checkpoint: Checkpoint) -> bool:
         changes = differences(identity(load(target)), checkpoint.identity) or "the version of ringsweep"
     except InputError:
         changes = "the keys that a configuration can have"
+    # Finished cells of this sweep beside it were begun with --fresh.
+    if not checkpoint.done.any():
+        raise another_sweep(str(target), "holds another sweep", changes)
     logger.warning("%s is replaced when this sweep is done; what changed: %s", target, changes)
     return False
 

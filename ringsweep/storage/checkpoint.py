@@ -104,11 +104,7 @@ class Checkpoint:
         before = _read_manifest(self.folder / MANIFEST)
         if before and before != self.identity and self.working_folder.finished_cells():
             changes = differences(before, self.identity)
-            raise InputError(
-                str(self.folder),
-                f"holds finished cells of another sweep: {changes}. --fresh (in Python fresh=True) starts over, "
-                "another output file keeps both",
-            )
+            raise another_sweep(str(self.folder), "holds finished cells of another sweep", changes)
         if before != self.identity:
             self.working_folder.write(MANIFEST, json.dumps(self.identity, indent=1).encode())
         self.scan()
@@ -263,6 +259,12 @@ class Checkpoint:
         self.files.clear()
         self._held = None
         self.done[:] = False
+
+
+def another_sweep(path: str, problem: str, changes: str) -> InputError:
+    """The error about a file or a folder with cells of another sweep, which a new sweep would replace."""
+    cure = "--fresh (in Python fresh=True) starts over, another output file keeps both"
+    return InputError(path, f"{problem}: {changes}. {cure}")
 
 
 class DamagedTask(Exception):

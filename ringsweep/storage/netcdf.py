@@ -270,9 +270,9 @@ def check_kind(path: str | os.PathLike[str], mark: str, content: str) -> None:
     ----------
     path : path-like
         File that exists.
-    mark : {"regime", "time", "contender", "probability", "standard_error"}
+    mark : {"regime", "time", "contender", "probability", "standard_error", "vertex"}
         Dimension or variable by which the kind is known: sweep, history, error against run time, sampled sweep,
-        or fit.
+        fit, or boundary.
     content : str
         Contents of the new file, for the message.
 
@@ -282,7 +282,7 @@ def check_kind(path: str | os.PathLike[str], mark: str, content: str) -> None:
         If it is no file of this package, or a result of another kind.
     """
     with open_dataset(path) as existing:
-        marks = ("contender", "time", "probability", "standard_error", "regime")
+        marks = ("contender", "time", "probability", "standard_error", "vertex", "regime")
         kinds = [kind for kind in marks if kind in existing.dims or kind in existing]
     if kinds[:1] != [mark]:
         raise InputError(str(path), f"holds a result of another kind: name another file for this {content}")

@@ -7,6 +7,7 @@ import dataclasses
 import hashlib
 import json
 import platform
+import re
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from functools import cache
@@ -93,6 +94,9 @@ def identity(config: Config) -> dict[str, str]:
     return found | {"solver": repr(config.solver)} | environment()
 
 
+# Digest of a column or a table, at the end of its description.
+_DIGEST = re.compile(r" \([0-9a-f]{12}\)$")
+
 # Differences that are named one by one.
 _MAX_NAMED = 4
 
@@ -103,13 +107,19 @@ def fingerprint(identity: Mapping[str, str]) -> str:
 
 
 def differences(old: Mapping[str, str], new: Mapping[str, str]) -> str:
-    """Differences between two identities in words."""
+    """Differences between two identities in words, without digests."""
     names = [name for name in {**new, **old} if old.get(name) != new.get(name)]
-    if "sources" in names:
-        # The sources tell more than the version, which stays the same in a checkout.
-        names = [name for name in names if name != "ringsweep"]
-    words = [f"{name} was {_short(old.get(name))}, is {_short(new.get(name))}" for name in names[:_MAX_NAMED]]
+    if "ringsweep" in names:
+        names = [name for name in names if name != "sources"]
+    words = [_difference(name, _short(old.get(name)), _short(new.get(name))) for name in names[:_MAX_NAMED]]
     return "; ".join(words + [f"and {len(names) - _MAX_NAMED} more"] * (len(names) > _MAX_NAMED))
+
+
+def _difference(name: str, old: str, new: str) -> str:
+    if name == "sources":
+        # The version stays the same in a checkout.
+        return "the source code of ringsweep has changed"
+    return f"{name} was {old}, is {new}" if old != new else f"{name} has other values ({new})"
 
 
 def attributes(config: Config) -> dict[str, Any]:
@@ -167,4 +177,5 @@ def _digest(*arrays: Any) -> str:
 def _short(value: str | None) -> str:
     if value is None:
         return "absent"
+    value = _DIGEST.sub("", value)
     return value if len(value) <= 100 else f"{value[:97]}..."
