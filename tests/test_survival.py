@@ -12,6 +12,7 @@ from dataclasses import replace
 from functools import partial
 from itertools import takewhile
 
+import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
@@ -330,6 +331,22 @@ class TestCheckpoint:
         assert same_bits(target, never_stopped)
         assert write(other, target, Execution(progress=False), fresh=True)
         assert float(netcdf.load(target).t_end.max()) <= 3.0
+
+    def test_damaged_file_does_not_count_as_a_finished_sweep(self, config, tmp_path, monkeypatch, capsys):
+        """Damage to the compressed values of a large file, which opening it does not read."""
+        target = tmp_path / "out.nc"
+        monkeypatch.setattr(netcdf, "COMPRESSED_FROM", 1)
+        command = ["run", str(config), "-o", str(target)]
+        assert cli.main(command) == 0
+        with netCDF4.Dataset(target, "r+") as file:
+            file["phi_end"][0, 0] += 1e-9
+        assert cli.main(command) == 2
+        out, message = capsys.readouterr()
+        assert "already" not in out
+        assert "not as ringsweep wrote them are phi_end" in message
+        assert message.endswith("--fresh (in Python fresh=True) computes it again\n")
+        assert cli.main([*command, "--fresh"]) == 0
+        assert netcdf.check(target)
 
     def test_sweep_begun_with_fresh_goes_on_beside_the_one_that_it_replaces(
         self, config, half_done, never_stopped, caplog

@@ -375,18 +375,23 @@ def _write_file(config: Config, target: Path, layout: Layout, checkpoint: Checkp
 
 
 def _holds_sweep(target: Path, checkpoint: Checkpoint) -> bool:
-    """Whether a file holds the sweep of a checkpoint.
+    """Whether a file holds the sweep of a checkpoint, undamaged.
 
     Raises
     ------
     InputError
-        If it holds another sweep, and no cell of this one is finished.
+        If it is damaged, or holds another sweep, and no cell of this one is finished.
     """
     if not target.exists():
         return False
     with netcdf.open_dataset(target) as ds:
         stored_fingerprint = ds.attrs.get("fingerprint")
     if stored_fingerprint == checkpoint.fingerprint:
+        try:
+            netcdf.check(target)
+        except InputError as error:
+            cure = "--fresh (in Python fresh=True) computes it again"
+            raise InputError(str(target), f"{error.problem}; {cure}") from error
         return True
     try:
         changes = differences(identity(load(target)), checkpoint.identity) or "the version of ringsweep"
