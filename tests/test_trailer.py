@@ -55,6 +55,29 @@ def test_file_that_another_program_changed_is_read_as_one_without_a_seal(path):
     assert netcdf.load(path).attrs["institution"] == "a laboratory"
 
 
+@pytest.mark.parametrize("command", ["verify", "info", "map", "run", "simulate", "precision"])
+@pytest.mark.parametrize(
+    ("side", "problem"),
+    [(32768, "declares 1.07e+09 cells: a file holds at most 1e+08"), (8192, "bytes of numbers, which")],
+    ids=["more cells than a sweep has", "more numbers than the file has"],
+)
+def test_numbers_that_are_declared_and_not_there_are_told_before_they_are_read(
+    tmp_path, capsys, command, side, problem
+):
+    """Chunks that nobody wrote take no space on the disk, but all of it in memory."""
+    with netCDF4.Dataset(tmp_path / "big.nc", "w") as file:
+        file.setncatts({"Conventions": "CF-1.11", "ringsweep_version": "0", "configuration": "{}"})
+        file.createDimension("x", side)
+        file.createDimension("y", side)
+        for name, kind in (("regime", "i1"), ("t_end", "f8")):
+            file.createVariable(name, kind, ("x", "y"), chunksizes=(256, 256), compression="zlib")
+    assert (tmp_path / "big.nc").stat().st_size < 40_000
+    assert cli.main([command, str(tmp_path / "big.nc")]) == 2
+    message = capsys.readouterr().err
+    assert problem in message
+    assert message.count("\n") == 1
+
+
 def test_other_readers_ignore_the_seal(path):
     assert trailer._MARK in path.read_bytes()[-trailer._LENGTH :]
     with xr.open_dataset(path) as ds:

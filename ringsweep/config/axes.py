@@ -17,6 +17,7 @@ from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError, nearest_name
 from ringsweep.models.scene import LAW, Scene, Structure
 from ringsweep.quantities.parameters import Choice, Parameter
+from ringsweep.quantities.trailer import MAX_CELLS
 from ringsweep.quantities.units import is_plain, is_quantity, other_unit, quantity, show, spelled
 from ringsweep.quantities.variables import OUTCOMES
 
@@ -26,9 +27,6 @@ if TYPE_CHECKING:
 COUNT = Parameter("1", "number of values", lower=1, upper=MAX_LENGTH, whole=True)
 
 _SPACINGS = ("linspace", "geomspace")
-
-#: Largest number of cells of a sweep. With 24 variables each they take some ten gigabytes on a disk.
-MAX_CELLS = 100_000_000
 
 #: Index of each of some cells along each dimension, by name of the dimension.
 Indices = Mapping[str, NDArray[np.intp]]

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.config.axes import MAX_CELLS, Axes, dimension, paths_of, read_spacing, swept_parameter
+from ringsweep.config.axes import Axes, dimension, paths_of, read_spacing, swept_parameter
 from ringsweep.config.consistency import check_consistency
 from ringsweep.config.scene import outcome_numbers, sweepable
 from ringsweep.config.sections import boolean, check_keys, one_of, read_values, suggestion
@@ -20,6 +20,7 @@ from ringsweep.models import MODELS
 from ringsweep.models.scene import Scene
 from ringsweep.quantities.parameters import Choice, Parameter
 from ringsweep.quantities.quantity import after_number
+from ringsweep.quantities.trailer import MAX_CELLS
 from ringsweep.quantities.units import quantity, show
 from ringsweep.statistics import DISTRIBUTIONS, METHODS, saltelli, trajectories, unit_points
 

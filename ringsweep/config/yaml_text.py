@@ -17,7 +17,6 @@ from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, BinaryIO
 
-import netCDF4
 import numpy as np
 import yaml
 
@@ -204,7 +203,7 @@ def _read_result(file: Path) -> Document:
     """The configuration in the attributes of a result file."""
     try:
         trailer.check(file, whole=False)
-        with netCDF4.Dataset(file) as content:
+        with trailer.opened(file) as content:
             others = {"time", "contender", "word"} & set(content.dimensions)
             is_sweep = "regime" in content.variables and not others
             recorded = Digests.read(content)

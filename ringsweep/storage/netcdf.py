@@ -217,7 +217,7 @@ def altered(path: str | os.PathLike[str], *, whole: bool, trusted: bool = False)
     if not trusted:
         with _reading_file(path):
             trailer.check(path, whole=whole)
-    with _reading_file(path), netCDF4.Dataset(Path(path).resolve()) as file:
+    with _reading_file(path), trailer.opened(path) as file:
         recorded = Digests.read(file)
         if recorded is None:
             return None
