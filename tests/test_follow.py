@@ -3,12 +3,18 @@
 import json
 from copy import deepcopy
 
+import netCDF4
 import numpy as np
 import pytest
+import xarray as xr
 from belts import with_all_parts
 
 import ringsweep
-from ringsweep import InputError
+from ringsweep import InputError, cli
+from ringsweep.config import load
+from ringsweep.quantities.flags import REGIMES
+from ringsweep.quantities.variables import OUTCOMES
+from ringsweep.storage import netcdf
 from ringsweep.storage.checkpoint import Checkpoint
 
 #: A spring that hardens, under a force: near 0.35 Hz a large and a small motion exist side by side.
@@ -40,7 +46,7 @@ LUGRE = with_all_parts({
 
 FREQUENCIES = [0.21, 0.24, 0.27, 0.3, 0.33, 0.36]
 
-OUTCOMES = "x_end", "velocity_end", "t_end", "swing", "certified", "started_from"
+NAMES = "x_end", "velocity_end", "t_end", "swing", "certified", "started_from"
 
 
 def run(scene, output=None, jobs=1, **sections):
@@ -110,7 +116,7 @@ class TestBranches:
 class TestTheSameBits:
     def test_with_two_jobs_and_from_a_file(self, both, tmp_path):
         found = branches(tmp_path / "a.nc", jobs=2)
-        for name in OUTCOMES:
+        for name in NAMES:
             assert np.array_equal(found[name], both[name], equal_nan=True), name
         assert found.direction.values.tolist() == ["up", "down"]
 
@@ -128,7 +134,7 @@ class TestTheSameBits:
             branches(tmp_path / "a.nc")
         monkeypatch.setattr(Checkpoint, "put", put)
         found = branches(tmp_path / "a.nc")
-        for name in OUTCOMES:
+        for name in NAMES:
             assert np.array_equal(found[name], both[name], equal_nan=True), name
 
     def test_from_the_configuration_in_the_file(self, both, tmp_path):
@@ -197,6 +203,63 @@ class TestErrors:
         run(LUGRE, tmp_path / "two.nc", sweep={"grid": {"initial.x": [0.0, 0.1]}}).close()
         several = changed(LUGRE, "initial", **{"from": str(tmp_path / "two.nc")})
         self.refused(several, "scene.initial.from", "2 runs")
+
+
+class TestFilesThatDoNotGoOn:
+    """Files of runs as `run` writes them, made by hand."""
+
+    @pytest.fixture
+    def file(self, tmp_path):
+        def write(name="first.nc", regime="oscillatory", runs=(), scene=LUGRE, **changed):
+            numbers = {"t_end": 7.0, "x_end": 0.01, "velocity_end": 0.1, "deflection_end": 1e-3} | changed
+            columns = {"regime": np.int8(REGIMES.index(regime))} | numbers
+            ds = xr.Dataset({n: (("run",) * len(runs), np.full(runs, v)) for n, v in columns.items()})
+            ds["regime"].attrs = OUTCOMES["regime"].attributes
+            attributes = {"Conventions": "CF-1.11", "ringsweep_version": "0", "configuration": {"scene": scene}}
+            netcdf.save(ds.assign_attrs(attributes), tmp_path / name)
+            return tmp_path / name
+
+        return write
+
+    def refused(self, file, words):
+        with pytest.raises(InputError) as error:
+            load({"scene": changed(LUGRE, "initial", **{"from": str(file)})})
+        assert error.value.path == "scene.initial.from"
+        assert words in error.value.problem
+
+    def test_sound_file_goes_on(self, file):
+        assert load({"scene": changed(LUGRE, "initial", **{"from": str(file())})}).scene.values["initial.x"] == 0.01
+
+    @pytest.mark.parametrize("regime", ["failed", "separating", "jammed"])
+    def test_run_that_ended_early(self, file, regime):
+        self.refused(file(regime=regime), f"is {regime}")
+
+    def test_run_without_a_number(self, file):
+        self.refused(file(x_end=np.nan), "no run that can go on")
+
+    def test_several_runs(self, file):
+        self.refused(file(runs=(2,)), "holds 2 runs")
+
+    def test_changed_number(self, file):
+        with netCDF4.Dataset(file(), "r+") as content:
+            content["x_end"][...] = 0.02
+        self.refused(file("other.nc").with_name("first.nc"), "not as ringsweep wrote them are x_end")
+
+    def test_damaged_bytes(self, file):
+        path = file()
+        path.write_bytes(path.read_bytes()[:-2000])
+        self.refused(path, "damaged")
+
+    def test_configuration_that_names_itself(self, tmp_path):
+        path = tmp_path / "loop.yaml"
+        path.write_text(json.dumps({"scene": changed(LUGRE, "initial", **{"from": "loop.yaml"})}))
+        self.refused(path, "is no result file")
+
+    def test_results_that_name_each_other(self, file, tmp_path):
+        for one, other in (("a.nc", "b.nc"), ("b.nc", "a.nc")):
+            file(one, scene=changed(LUGRE, "initial", **{"from": str(tmp_path / other)}))
+        self.refused(tmp_path / "a.nc", "a result holds its initial values")
+        assert cli.main(["run", str(tmp_path / "a.nc"), "--dry-run"]) == 2
 
 
 def test_a_cell_of_a_chain_has_no_configuration_of_its_own(both):

@@ -5,18 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.config.axes import Axes
 from ringsweep.config.sections import check_keys, one_of, suggestion
-from ringsweep.config.yaml_text import Document
+from ringsweep.config.yaml_text import Document, is_result
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, model_of
 from ringsweep.models.model import Continues
 from ringsweep.models.scene import LAW, Scene, Structure
 from ringsweep.physics.friction import TRAITS
+from ringsweep.quantities import trailer
+from ringsweep.quantities.digest import ALTERED, Digests
+from ringsweep.quantities.flags import FAILED, JAMMED, REGIMES, SEPARATING
 from ringsweep.quantities.units import show
 
 #: Dimension of a sweep that follows its axis in both directions, and its values.
@@ -127,7 +129,7 @@ def run_to_continue(doc: Document) -> str | None:
     Raises
     ------
     InputError
-        If it is no file name, or values stand beside it that the file gives.
+        If it is not the name of a result file, or values stand beside it that the file gives.
     """
     scene = doc.tree.get("scene")
     initial = scene.get("initial") if isinstance(scene, dict) else None
@@ -138,6 +140,11 @@ def run_to_continue(doc: Document) -> str | None:
         raise InputError("scene.initial.from", f"the name of a result file is expected, got {show(name)}")
     for key in initial:
         raise InputError(f"scene.initial.{key}", "cannot stand beside initial.from, which gives it: leave one out")
+    # A configuration could name another file in turn, without end. A result holds the values.
+    if not is_result(doc.folder / name):
+        raise InputError(
+            "scene.initial.from", f"{doc.folder / name} is no result file: `ringsweep run` or `simulate` writes one"
+        )
     return str(doc.folder / name)
 
 
@@ -182,25 +189,41 @@ def put_state(doc: Document, scene: Scene, file: str, before: Scene, axes: Axes,
         doc.tree["scene"].setdefault(section, {})[name] = float(value)
 
 
+# Regimes of runs that ended before their span, or at a motion that is none.
+_ENDED_EARLY = {REGIMES[flag] for flag in (FAILED, SEPARATING, JAMMED)}
+
+
 def _end_of(file: str, model: Continues) -> dict[str, NDArray[np.float64]]:
-    """Numbers at the end of the run of a model that a file holds."""
+    """Numbers at the end of the run of a model that a file holds.
+
+    Raises
+    ------
+    InputError
+        If the file is damaged, or does not hold one run that reached the end of its span.
+    """
     where = "scene.initial.from"
     try:
-        opened = netCDF4.Dataset(file)
-    except OSError:
-        raise InputError(where, f"{file} is no result file: `ringsweep run` or `simulate` writes one") from None
-    with opened as content:
-        found = {}
-        for name, last in {"t_end": "time", **model.ends}.items():
-            variable = content.variables.get(last if "time" in content.dimensions else name)
-            if variable is not None:
-                numbers = np.ma.filled(variable[:], np.nan).astype(float).ravel()
-                if "time" not in content.dimensions and len(numbers) != 1:
-                    raise InputError(where, f"{file} holds {len(numbers)} runs: name a file of one run")
-                found[name] = numbers[-1:]
+        trailer.check(file, whole=True)
+        with trailer.opened(file) as content:
+            recorded = Digests.read(content)
+            names = [name for name in ("t_end", *model.ends, "deflection_end") if name in content.variables]
+            if recorded is not None:
+                changed = recorded.altered(content, ["configuration"], ["regime", *names])
+                if changed:
+                    raise InputError(where, f"{ALTERED}: not as ringsweep wrote them are {', '.join(changed)}")
+            flags = np.ravel(content["regime"][:])
+            meanings = dict(zip(content["regime"].flag_values, content["regime"].flag_meanings.split(), strict=True))
+            found = {name: np.ma.filled(content[name][:], np.nan).astype(float).ravel() for name in names}
+    except InputError as error:
+        raise InputError(where, f"{file}: {error.problem}") from None
+    except Exception:
+        # On a damaged file the libraries raise errors of many kinds.
+        raise InputError(where, f"{file} holds no run, or is damaged") from None
+    if len(flags) != 1:
+        raise InputError(where, f"{file} holds {len(flags)} runs: name a file of one run")
+    if (regime := meanings.get(flags[0])) in _ENDED_EARLY:
+        raise InputError(where, f"the run in {file} is {regime}: it has no state that could go on")
     found.setdefault("deflection_end", np.zeros(1))
-    if not {"t_end", *model.ends} <= found.keys():
+    if not {"t_end", *model.ends} <= found.keys() or not all(np.isfinite(number).all() for number in found.values()):
         raise InputError(where, f"{file} holds no run that can go on")
-    if not all(np.isfinite(number).all() for number in found.values()):
-        raise InputError(where, f"the run in {file} failed: it has no state at its end")
     return found

@@ -24,7 +24,7 @@ from ringsweep.errors import InputError
 from ringsweep.quantities import trailer
 from ringsweep.quantities.digest import ALTERED, Digests
 from ringsweep.quantities.units import LONG_INTEGER, NUMBER, length_of, show, spelled
-from ringsweep.quantities.variables import OUTCOMES
+from ringsweep.quantities.variables import OUTCOMES, written
 
 logger = logging.getLogger("ringsweep")
 
@@ -159,7 +159,7 @@ def read(config: str | os.PathLike[str] | Mapping[str, Any]) -> Document:
     if not isinstance(config, str | os.PathLike):
         raise InputError("config", f"a path or a mapping is expected, got {show(config)}")
     file = Path(config)
-    if _is_result(file):
+    if is_result(file):
         return _read_result(file)
     text = _read(file, _LARGEST_CONFIGURATION)
     reader = _NodeReader(str(file))
@@ -184,7 +184,8 @@ def read(config: str | os.PathLike[str] | Mapping[str, Any]) -> Document:
     return Document(tree, file.parent, file.stem, reader.locations)
 
 
-def _is_result(file: Path) -> bool:
+def is_result(file: Path) -> bool:
+    """Whether a file is of the kind of a result: it begins as HDF5 does."""
     try:
         with _opened(file) as content:
             return content.read(8) == b"\x89HDF\r\n\x1a\n"
@@ -214,6 +215,8 @@ def _read_result(file: Path) -> Document:
                 if changed := recorded.altered(content, ["configuration"], axes_of_sweep):
                     raise InputError("", f"{ALTERED}: {', '.join(changed)}", file=str(file))
             tree = json.loads(content.getncattr("configuration"))
+            if "from" in (written(tree, "initial") or {}):
+                raise InputError("", f"{ALTERED}: a result holds its initial values", file=str(file))
             found = None
             if is_sweep:
                 found = {

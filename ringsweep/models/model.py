@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from typing import Any, ClassVar
 
 import numpy as np
@@ -39,11 +39,11 @@ class Continues(ABC):
 
     Attributes
     ----------
-    ends : mapping of str to str
-        Outcomes that are the state at the end, with the variables of a history whose last values they are.
+    ends : tuple of str
+        Outcomes that are the state at the end; under a law with bristles ``deflection_end`` besides.
     """
 
-    ends: ClassVar[Mapping[str, str]]
+    ends: ClassVar[tuple[str, ...]]
 
     def obstacle(self, structure: Structure) -> str | None:
         """Why runs of this structure cannot go on, for an error message; None if they can."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -36,7 +36,7 @@ class Belt(Model, Continues):
     """A mass on a spring on a moving belt (the paper's Fig. 1)."""
 
     name: ClassVar[str] = "belt"
-    ends: ClassVar[Mapping[str, str]] = {"x_end": "x", "velocity_end": "velocity", "deflection_end": "deflection"}
+    ends: ClassVar[tuple[str, ...]] = ("x_end", "velocity_end")
     doc: ClassVar[str] = "a mass on a spring on a moving belt"
     outcomes: ClassVar[tuple[str, ...]] = Outcome._fields
     place: ClassVar[str] = "x"

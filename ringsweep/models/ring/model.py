@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import replace
 from math import pi
 from typing import Any, ClassVar
@@ -43,7 +43,7 @@ class SingleContactRing(Model, Continues):
     doc: ClassVar[str] = "a small body in a rotating ring, one contact"
     outcomes: ClassVar[tuple[str, ...]] = record.Outcome._fields
     place: ClassVar[str] = "phi"
-    ends: ClassVar[Mapping[str, str]] = {"phi_end": "phi", "omega_end": "omega"}
+    ends: ClassVar[tuple[str, ...]] = ("phi_end", "omega_end")
     driven: ClassVar[tuple[str, ...]] = ("theta",)
     absent: ClassVar[frozenset[str]] = _OF_CONTACT_2
     body: ClassVar[dict[str, Parameter]] = {"body.mass": MASS, "ring.radius": RADIUS}
