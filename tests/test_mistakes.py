@@ -218,6 +218,13 @@ FITS: list[tuple[Any, Any, dict[str, Any], str]] = [
     (GOOD, "friction.mu_k", {"start": 0}, "start: 0 is not allowed"),
     (GOOD, "friction.mu_k", {"start": 1.5}, "start: 1.5 is not a whole number"),
     (GOOD, "friction.mu_k", {"noise": 0}, "noise: 0 m is not allowed"),
+    (GOOD, "friction.mu_k", {"noise": 1e308}, "noise: 1e+308 m is not allowed"),
+    (
+        GOOD | {"t": [1.7e9 + k for k in range(len(GOOD["t"]))]},
+        "friction.mu_k",
+        {},
+        "data.t: begins at 1.7e+09 s, after time.span, ",
+    ),
     (GOOD, "friction.mu_k", {"noise": "1 deg"}, "noise: "),
     (7, "friction.mu_k", {}, "data: a CSV file, a mapping or a DataFrame is expected"),
     ("nowhere.csv", "friction.mu_k", {}, "data: nowhere.csv cannot be read: No such file"),

@@ -149,7 +149,15 @@ def fitted(
     doc = Document({}, Path())
     with doc.locating_errors():
         problem, column = _problem(config, settings, factors, _columns(doc, data))
-    scatter = Parameter(column.unit, "noise of a measurement", lower=0.0, open_lower=True)
+        span = whole.scene.values.get("time.span", math.inf)
+        if problem.times[0] > span:
+            raise InputError(
+                "data.t",
+                f"begins at {problem.times[0]:g} s, after time.span, {span:g} s: times count from the launch; subtract "
+                "its time stamp from each, or raise time.span",
+            )
+    # Its square is computed with.
+    scatter = Parameter(column.unit, "noise of a measurement", lower=1e-150, upper=1e150)
     deviation = None if noise is None else quantity(noise, scatter, "noise")
     whole_number = Parameter("1", "number of starts", lower=1, upper=1000, whole=True)
     starts = int(quantity(STARTS if start is None else start, whole_number, "start"))
