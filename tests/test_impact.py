@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 import yaml
+from scipy.optimize import linprog
 from tiers import mostly_slow
 
 import ringsweep
@@ -16,6 +17,7 @@ from benchmarks.hostile.attack import same_bits
 from benchmarks.hostile.kills import killed_at
 from ringsweep import cli
 from ringsweep.errors import InputError
+from ringsweep.physics.impact import Balls, Motion, contact_of, impulses
 from ringsweep.quantities.flags import AFTERMATHS, SEPARATING
 from ringsweep.quantities.variables import INFERRED, LABELS
 from ringsweep.storage import netcdf
@@ -760,6 +762,90 @@ class TestBody:
         assert min(len(each) for each in covered.values()) > 60
         assert np.concatenate(list(covered.values())).mean() > 0.99
         assert min(each.mean() for each in covered.values()) > 0.97
+
+
+def thrown(rng):
+    """A body both of whose contacts hit the race: mass, inertia, shape, motion and friction."""
+    radius, ball = rng.uniform(0.04, 0.08), rng.uniform(0.004, 0.01)
+    reach = radius - ball
+    half, offset, psi = reach * rng.uniform(0.3, 0.9), reach * rng.uniform(-0.3, 0.3), rng.uniform(-3.0, 3.0)
+    mass, out = rng.uniform(0.05, 0.5), sqrt(reach**2 - half**2) + offset
+    along, turn, up = rng.normal(size=3)
+    motion = Motion(psi, turn / reach, out * sin(psi), along, -out * cos(psi), up)
+    inertia, mu = mass * half**2 * rng.uniform(0.3, 1.5), rng.uniform(0.1, 1.2, 2)
+    return mass, inertia, Balls(reach, ball, half, offset), motion, mu
+
+
+def hit(mass, inertia, balls, motion, mu):
+    first, second = contact_of(balls, 1, motion), contact_of(balls, 2, motion)
+    found = impulses(mass, inertia, first, second, (True, True), tuple(mu), (0.0, 0.0))
+    stuck = found.solutions == 1 and found[5:9] == (0.0, 0.0, 0.0, 0.0)
+    return stuck, np.array([found.normal_1, found.along_1, found.normal_2, found.along_2])
+
+
+def range_of_impulses(mass, inertia, balls, motion, mu):
+    """Both ends of the impulses within the cones of friction that stop a body; None if they have no end."""
+    center, axis = np.array([motion.x, motion.y]), np.array([cos(motion.psi), sin(motion.psi)])
+    line = center + balls.offset * np.array([-axis[1], axis[0]])
+    wrenches = []
+    for side in (-1.0, 1.0):
+        outwards = (line + side * balls.half_distance * axis) / balls.reach
+        tangent = np.array([-outwards[1], outwards[0]])
+        point = (balls.reach + balls.radius) * outwards - center
+        wrenches += [(*force, point[0] * force[1] - point[1] * force[0]) for force in (-outwards, tangent)]
+    cones = [[-mu[0], 1, 0, 0], [-mu[0], -1, 0, 0], [0, 0, -mu[1], 1], [0, 0, -mu[1], -1]]
+    stops = -np.array([mass * motion.x_dot, mass * motion.y_dot, inertia * motion.psi_dot])
+    ends = [
+        linprog((0, 0, 0, way), cones, np.zeros(4), np.transpose(wrenches), stops, bounds=(None, None))
+        for way in (1, -1)
+    ]
+    return [end.x for end in ends] if all(end.status == 0 for end in ends) else None
+
+
+class TestBothContactsStick:
+    def test_impulses_are_the_middle_of_what_friction_allows(self):
+        rng, compared = np.random.default_rng(3), 0
+        while compared < 50:
+            body = thrown(rng)
+            stuck, found = hit(*body)
+            ends = range_of_impulses(*body) if stuck else None
+            if ends is not None:
+                compared += 1
+                np.testing.assert_allclose(found, np.mean(ends, axis=0), rtol=1e-8, atol=1e-8 * found.max())
+
+    def test_impulses_are_mirrored_with_the_body_also_where_they_have_no_bound(self):
+        rng, compared = np.random.default_rng(4), 0
+        while compared < 200:
+            mass, inertia, balls, motion, mu = thrown(rng)
+            stuck, found = hit(mass, inertia, balls, motion, mu)
+            if stuck:
+                compared += 1
+                mirrored = motion._replace(psi=-motion.psi, psi_dot=-motion.psi_dot, x=-motion.x, x_dot=-motion.x_dot)
+                stuck, (n_1, t_1, n_2, t_2) = hit(mass, inertia, balls, mirrored, mu[::-1])
+                assert stuck
+                np.testing.assert_allclose((n_2, -t_2, n_1, -t_1), found, rtol=1e-9, atol=1e-9 * found.max())
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize("side", [1.0, -1.0])
+    def test_greatest_impulse_of_a_run_is_that_of_the_middle(self, side):
+        """Friction allows 0.0425668 to 0.0513271 N s, by a linear program over both cones."""
+        mu = {"mu_s": 0.558, "mu_k": 0.397}
+        scene = {
+            "model": "ring",
+            "body": {
+                "mass": 0.0916, "inertia": 2.565e-5, "half_distance": 0.02, "ball_radius": 0.00527,
+                "center_offset": 0.0069,
+            },
+            "ring": {"radius": 0.0462},
+            "friction": {"law": "stiction", "rest": mu, "rough": mu},
+            "zone": {"half_angle": 0.3},
+            "drive": {"law": "sinusoidal", "amplitude": side * 1.976, "frequency": 1.22, "phase": 0.425},
+            "initial": {"phi": side * 0.675},
+            "impact": {"restitution": 0.0},
+        }  # fmt: skip
+        found = ringsweep.sweep(scene, {"time.span": [3.3]}, progress=False)
+        assert found.certified.item() == 1
+        assert found.impulse_max.item() == pytest.approx(0.0469470, abs=1e-7)
 
 
 class TestRefused:

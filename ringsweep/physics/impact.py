@@ -283,7 +283,7 @@ def _shared_stick(mu, couplings, wanted, scale):
     least = _ROUNDING * (abs(d_1) + abs(s_1) + abs(d_2)) * scale
     if low > high + least:
         return False, 0.0, 0.0, 0.0, 0.0
-    z = 0.5 * (low + high) if low > -1e299 and high < 1e299 else low if low > -1e299 else min(high, 0.0)
+    z = 0.5 * (low + high) if low > -1e299 and high < 1e299 else low if low > -1e299 else high
     n_1, t_1, n_2 = n_1 + by_1 * z, t_1 + by_t * z, n_2 + by_2 * z
     return min(n_1, n_2) >= -least, n_1, t_1, n_2, z
 
@@ -325,8 +325,10 @@ def impulses(mass, moment, first, second, touching, mu, restitution):
     least_impulse, unit_mass = least / min(c_11[0], c_22[0]), max(c_11[0], c_22[0])
     solutions = 0
     best = Impulses(0, 0.0, 0.0, 0.0, 0.0, before[0], before[1], before[2], before[3], 0.0, 0.0)
-    for mode_1 in range(4 if touching[0] else 1):
-        for mode_2 in range(4 if touching[1] else 1):
+    # Several modes may give the same velocities; the first is kept. Two sticking contacts come first: only their mode
+    # knows the middle of the impulses that friction allows, the others are ends of their range.
+    for mode_1 in range(_STICK if touching[0] else _OPEN, -1, -1):
+        for mode_2 in range(_STICK if touching[1] else _OPEN, -1, -1):
             t_1 = t_2 = 0.0
             found = True
             if mode_1 == _STICK and mode_2 == _STICK:
