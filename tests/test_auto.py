@@ -415,7 +415,7 @@ class TestTime:
     def test_drive_from_a_table_agrees_with_the_drive_that_it_samples(self, cells):
         """They agree to the error of the spline. The scene without zones equals the one with a zone of zero width."""
         t, amplitude = np.linspace(0.0, 3.0, 1201), np.array([0.2, 2.0, 5.0, -5.0])
-        table = t, t * np.arctan(t) - 0.5 * np.log1p(t * t)
+        table = t, t * np.arctan(t) - 0.5 * np.log1p(t * t), "spline"
         structure = Structure("ring", "stiction", "table", (), table)
         values = {path: RIG.get(path, parameter.default) for path, parameter in parameters(structure).items()}
         values |= {"time.span": 3.0, "drive.amplitude": amplitude}

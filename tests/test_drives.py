@@ -1,5 +1,6 @@
 """Drives: angle, angular velocity and angular acceleration are consistent."""
 
+from itertools import pairwise
 from math import atan, inf, log, radians
 
 import numpy as np
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from ringsweep.compile import take
+from ringsweep.config import load
 from ringsweep.errors import InputError
 from ringsweep.models.parts import drive_of
 from ringsweep.models.scene import Structure
@@ -32,13 +34,13 @@ from ringsweep.physics.drives import (
 KNOTS = np.array([0.0, 0.4, 0.5, 1.1, 2.0, 3.0])
 
 
-def table(times, angles):
-    return Structure("ring", "coulomb", "table", table=(times, angles))
+def table(times, angles, interpolate="spline"):
+    return Structure("ring", "coulomb", "table", table=(times, angles, interpolate))
 
 
-def tabulated(angles, times=KNOTS, amplitude=1.0):
+def tabulated(angles, times=KNOTS, amplitude=1.0, interpolate="spline"):
     values = {"drive.amplitude": np.array([amplitude]), "time.span": np.array([times[-1]])}
-    return take(drive_of(table(times, np.asarray(angles, dtype=float)), values), 0)
+    return take(drive_of(table(times, np.asarray(angles, dtype=float), interpolate), values), 0)
 
 
 SAMPLES = [
@@ -149,6 +151,34 @@ class TestTable:
             assert here[0] == pytest.approx(angle, abs=1e-9)
             for side in (-1e-10, 1e-10):
                 np.testing.assert_allclose(shape(drive, knot + side), here, rtol=1e-6, atol=1e-6)
+
+    @pytest.mark.parametrize("interpolate", ["monotone", "linear"])
+    @given(st.lists(st.floats(-3, 3), min_size=len(KNOTS), max_size=len(KNOTS)))
+    def test_table_stays_between_neighbours_unless_it_is_a_spline(self, interpolate, samples):
+        course = tabulated(samples, interpolate=interpolate)
+        for k, (before, after) in enumerate(pairwise(samples)):
+            found = [shape(course, t)[0] for t in np.linspace(KNOTS[k], KNOTS[k + 1], 20)]
+            assert min(before, after) - 1e-12 <= min(found) <= max(found) <= max(before, after) + 1e-12
+
+    @given(st.lists(st.floats(-3, 3), min_size=len(KNOTS), max_size=len(KNOTS)))
+    def test_velocity_of_a_monotone_table_is_continuous(self, angles):
+        drive = tabulated(angles, interpolate="monotone")
+        for knot in KNOTS[1:-1]:
+            before, after = shape(drive, knot - 1e-10)[1], shape(drive, knot + 1e-10)[1]
+            assert after == pytest.approx(before, rel=1e-6, abs=1e-6)
+
+    def test_spline_that_overshoots_a_step_is_warned_of(self, scene, caplog):
+        step = {"law": "table", "time": [0.0, 0.5, 0.51, 1.0, 1.01, 5.0], "theta": [0.0, 0.0, 3.0, 3.0, 0.0, 0.0]}
+        load({"scene": scene | {"drive": step | {"interpolate": "monotone"}}})
+        assert not caplog.messages
+        load({"scene": scene | {"drive": step}})
+        assert "the spline leaves the range of its table by 1.85e+03" in caplog.text
+
+    def test_drive_of_straight_lines_is_refused_since_its_velocity_would_jump(self, scene):
+        drive = {"law": "table", "time": [0.0, 1.0, 5.0], "theta": [0.0, 1.0, 0.0], "interpolate": "linear"}
+        problem = "scene.drive.interpolate: 'linear' is no interpolation of a drive: choose spline or monotone"
+        with pytest.raises(InputError, match=problem):
+            load({"scene": scene | {"drive": drive}})
 
     def test_span_longer_than_the_table_is_an_input_error(self):
         values = {"drive.amplitude": np.ones(2), "time.span": np.array([3.0, 3.5])}

@@ -6,7 +6,7 @@ from math import asin, cos, pi, sin, sqrt
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 from scipy.special import ellipj, ellipk
 from tiers import mostly_slow
@@ -225,7 +225,7 @@ def reference(scene, span):
 
     def pull(t, x, v):
         if "time" in given:
-            push = given["amplitude"] * CubicSpline(given["time"], given["force"])(t)
+            push = given["amplitude"] * PchipInterpolator(given["time"], given["force"])(t)
         else:
             push = given["amplitude"] * sin(2.0 * pi * given["frequency"] * t + given["phase"])
         return push + given["constant"] - k * x - cubic * x**3 - c * (v + v_b)
@@ -280,6 +280,19 @@ class TestMethods:
         for _ in range(4):
             scene = everything(rng, table=table)
             np.testing.assert_allclose(end(scene), reference(scene, 6.0), atol=1e-9)
+
+    @pytest.mark.slow
+    def test_step_of_a_table_moves_the_body_as_its_ramps_do(self):
+        """Each change r of the rate of the force moves a frictionless body by r(s - sin s) after the time s."""
+        times, samples = [0.0, 0.5, 0.51, 1.0, 1.01, 6.0], [0.0, 0.0, 3.0, 3.0, 0.0, 0.0]
+        force = {"time": times, "force": samples, "interpolate": "linear"}
+        run = ringsweep.simulate(forced(span=6.0) | {"force": force})
+        rates = np.diff(samples, prepend=0.0) / np.diff(times, prepend=-1.0)
+        after = np.maximum(run.time.values[:, None] - times[:-1], 0.0)
+        x = ((after - np.sin(after)) * np.diff(rates[1:], prepend=0.0)).sum(axis=1)
+        np.testing.assert_allclose(run.x, x, atol=1e-9)
+        np.testing.assert_allclose(run.force, np.interp(run.time, times, samples), atol=1e-12)
+        assert run.certified.item() == 1
 
     @pytest.mark.slow
     def test_event_and_implicit_and_rk4_agree_without_friction(self):
@@ -508,6 +521,19 @@ class TestParts:
                 r"force\.frequency: cannot stand beside",
             ),
             ({"file": "no.csv"}, r"force\.file.*no\.csv"),
+            (
+                {"time": [0.0, 20.0], "force": [1.0, 2.0], "interpolate": "spline"},
+                r"force\.interpolate: 'spline' is no interpolation of a force: choose monotone or linear",
+            ),
+            ({"amplitude": 1.0, "frequency": 1.0, "interpolate": "linear"}, r"force\.time: missing: a table needs"),
+            (
+                {"formula": "A*sin(w*t)", "A": 1.0, "w": 1.0, "interpolate": "linear"},
+                r"interpolate: cannot stand beside",
+            ),
+            (
+                {"formula": "piecewise(t < t1, A, 0*A)", "A": 1.0, "t1": 1.0},
+                r"force jumps from 1 N to 0 N at t = 1 s: let it rise within a short time w, for example by the factor",
+            ),
         ],
     )
     def test_force_that_makes_no_sense_is_refused_by_its_path(self, force, message):

@@ -41,7 +41,7 @@ def own_force(force: Any) -> type | None:
     """
     if not isinstance(force, Mapping) or "formula" not in force:
         return None
-    for key in (*TABLES["force"], "file"):
+    for key in (*TABLES["force"], "file", "interpolate"):
         if key in force:
             raise InputError(f"scene.force.{key}", "cannot stand beside a formula: give one of them")
     return _defined(force["formula"], "N", "scene.force.formula")

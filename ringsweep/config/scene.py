@@ -26,7 +26,7 @@ from ringsweep.config.motion import FORMULA as FORMULA_DRIVE
 from ringsweep.config.motion import own_drive, own_force
 from ringsweep.config.record import read_record
 from ringsweep.config.sections import choose, missing_text, read_values, section_of, suggestion, warn_once
-from ringsweep.config.tables import TABLES, read_table
+from ringsweep.config.tables import TABLES, read_samples
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError
 from ringsweep.models import MODELS, WITH_IMPACT, model_of, parameters
@@ -173,10 +173,10 @@ def _takes_force(model: str) -> bool:
 def _read_tables(doc: Document, scene: dict[str, Any], moved: Structure) -> dict[str, Any]:
     """Tables of the drive and of the force, as fields of the structure."""
     force = scene.get("force")
-    measured = force is not None and any(name in force for name in (*TABLES["force"], "file"))
+    measured = force is not None and any(name in force for name in (*TABLES["force"], "file", "interpolate"))
     return {
-        "table": read_table(doc, scene["drive"], "drive", 4) if moved.drive == "table" else None,
-        "force": read_table(doc, scene["force"], "force", 4) if measured else None,
+        "table": read_samples(doc, scene["drive"], "drive") if moved.drive == "table" else None,
+        "force": read_samples(doc, scene["force"], "force") if measured else None,
     }
 
 
@@ -313,7 +313,7 @@ def _structural(model: str, drive: str, laws: Collection[str]) -> tuple[str, ...
     return (
         *formulas,
         *("model", LAW, "drive.law"),
-        *(f"{section}.{name}" for section in sections for name in (*TABLES[section], "file")),
+        *(f"{section}.{name}" for section in sections for name in (*TABLES[section], "file", "interpolate")),
         *(f"friction.{name}" for name in keys_of(laws)),
     )
 

@@ -18,7 +18,7 @@ from ringsweep.config.record import INSTANTS, KEEP, PERIOD
 from ringsweep.config.refinement import NUMBERS
 from ringsweep.config.sampling import NUMBERS as SAMPLE_NUMBERS
 from ringsweep.config.sampling import SENSITIVITIES
-from ringsweep.config.tables import TABLES
+from ringsweep.config.tables import INTERPOLATIONS, TABLES
 from ringsweep.models import MODELS, WITH_IMPACT, parameters
 from ringsweep.models.scene import LAW, Structure
 from ringsweep.physics.drives import DRIVES
@@ -71,6 +71,13 @@ def schema() -> dict[str, Any]:
                 f"{section}.{name}": _list(_number(parameter))
                 for section in ("drive", "force")
                 for name, parameter in TABLES[section].items()
+            },
+            **{
+                f"{section}.interpolate": {
+                    "description": "what joins the rows of the table",
+                    "oneOf": _constants(names),
+                }
+                for section, names in INTERPOLATIONS.items()
             },
             "drive.theta": _any_of([_formula("angle or displacement", TIME), _list(_number(TABLES["drive"]["theta"]))]),
             "force.formula": _formula("force on the body, N,", TIME),

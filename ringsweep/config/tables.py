@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ringsweep.config.sections import read_values
+from ringsweep.config.sections import one_of, read_values, warn_once
 from ringsweep.config.yaml_text import Document
 from ringsweep.errors import InputError, nearest_name, shortened
 from ringsweep.quantities.parameters import Parameter
@@ -25,7 +25,48 @@ TABLES = {
     },
 }
 
+#: What joins the rows of a table of the time, by section; the first name is the default.
+INTERPOLATIONS = {
+    # A stuck body feels the acceleration of the drive, and a jump of its velocity would be an impact.
+    "drive": {
+        "spline": "a cubic spline: its acceleration is continuous",
+        "monotone": "a cubic between each two rows that stays between them: its acceleration may jump at a row",
+    },
+    "force": {
+        "monotone": "a cubic between each two rows that stays between them: its rate is continuous",
+        "linear": "straight lines",
+    },
+}
+
+# Share of the range of a table that a spline through it may leave; a sine with six rows a period leaves less.
+_OVERSHOOT = 0.1
+
 _PLURAL = {"time": "times", "theta": "angles", "force": "forces", "v": "speeds", "mu": "coefficients"}
+
+
+def read_samples(
+    doc: Document, given: dict[str, Any], section: str
+) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:
+    """Times, samples and interpolation of a drive or a force from a table; see :func:`read_table`."""
+    known, where = INTERPOLATIONS[section], f"scene.{section}.interpolate"
+    problem = f"is no interpolation of a {section}: choose {' or '.join(known)}"
+    interpolate = one_of(given.get("interpolate", next(iter(known))), known, where, problem)
+    times, samples = read_table(doc, given, section, 4 if interpolate == "spline" else 2)
+    if interpolate == "spline":
+        _warn_of_overshoot(times, samples, section)
+    return times, samples, interpolate
+
+
+def _warn_of_overshoot(times: NDArray[np.float64], samples: NDArray[np.float64], section: str) -> None:
+    from scipy.interpolate import CubicSpline
+
+    between = CubicSpline(times, samples)(times[:-1] + np.diff(times) * np.linspace(0.0, 1.0, 9)[:, None])
+    beyond = max(np.max(between) - np.max(samples), np.min(samples) - np.min(between))
+    if beyond > _OVERSHOOT * np.ptp(samples):
+        warn_once(
+            "scene.%s: the spline leaves the range of its table by %.3g; `interpolate: monotone` stays between rows",
+            *(section, beyond),
+        )
 
 
 def read_table(

@@ -137,7 +137,12 @@ def by_formula(law: type, section: str, key: str, values: Values) -> Any:
 
 
 def table_of(
-    times: NDArray[np.float64], samples: NDArray[np.float64], amplitude: NDArray[np.float64], what: str, values: Values
+    times: NDArray[np.float64],
+    samples: NDArray[np.float64],
+    interpolate: str,
+    amplitude: NDArray[np.float64],
+    what: str,
+    values: Values,
 ) -> drives.Table:
     """Drive from a table, with fields of shape ``(cells, ...)``.
 
@@ -145,6 +150,8 @@ def table_of(
     ----------
     times, samples : ndarray of shape ``(samples,)``
         Times, s, and the measured quantity.
+    interpolate : str
+        What joins the samples; see :data:`ringsweep.config.tables.INTERPOLATIONS`.
     amplitude : ndarray of shape ``(cells,)``
         Factor on the measured quantity.
     what : str
@@ -165,10 +172,15 @@ def table_of(
         f"{{}} s is longer than the table of the {what}, which ends at {times[-1]:.6g} s",
     )
     # Few drives are tables, and this import takes longer than a small sweep.
-    from scipy.interpolate import CubicSpline
+    from scipy.interpolate import CubicSpline, PchipInterpolator
 
-    # A cubic spline has continuous second derivatives; a spline of higher degree would amplify noise in the table.
-    pieces = np.ascontiguousarray(CubicSpline(times, samples).c.T)
+    if interpolate == "linear":
+        zero = np.zeros(len(times) - 1)
+        pieces = np.stack([zero, zero, np.diff(samples) / np.diff(times), samples[:-1]], axis=1)
+    else:
+        # A spline of a higher degree would amplify noise in the table.
+        curve = CubicSpline if interpolate == "spline" else PchipInterpolator
+        pieces = np.ascontiguousarray(curve(times, samples).c.T)
     return drives.Table(
         amplitude,
         knots=np.broadcast_to(times, (cells, *times.shape)),

@@ -53,14 +53,14 @@ class Structure:
         Names of the model, the friction law and the drive.
     arcs : tuple of str
         Paths of the zones: ``()``, ``("zone",)`` or ``("zones.0", "zones.1", ...)``.
-    table : tuple of ndarray, optional
-        Times (s) and angles (rad) of a drive from a table, each of shape ``(samples,)``.
+    table : tuple, optional
+        Times (s) and angles (rad) of a drive from a table, each of shape ``(samples,)``, and its interpolation.
     own_law : type, optional
         Type of the friction law if the configuration defines it.
     curve : tuple of ndarray, optional
         Sliding speeds (m/s) and friction coefficients of a law from a table, each of shape ``(points,)``.
-    force : tuple of ndarray, optional
-        Times (s) and forces (N) of a force from a table, each of shape ``(samples,)``.
+    force : tuple, optional
+        Times (s) and forces (N) of a force from a table, each of shape ``(samples,)``, and its interpolation.
     own_drive, own_force : type, optional
         Types of the drive and of the force on the body if the configuration defines them by formulas.
     impact : bool
@@ -75,10 +75,10 @@ class Structure:
     law: str
     drive: str = "none"
     arcs: tuple[str, ...] = ()
-    table: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    table: tuple[NDArray[np.float64], NDArray[np.float64], str] | None = None
     own_law: type | None = None
     curve: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
-    force: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    force: tuple[NDArray[np.float64], NDArray[np.float64], str] | None = None
     own_drive: type | None = None
     own_force: type | None = None
     impact: bool = False

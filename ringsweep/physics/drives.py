@@ -39,7 +39,7 @@ class Power(NamedTuple):
 
 
 class Table(NamedTuple):
-    """Measured angle: a cubic spline through a table of times and angles; its second derivative is continuous.
+    """Measured course: a cubic between each two rows of a table of times and angles, or forces.
 
     ``knots``, of shape ``(n,)``, are the times, s. Row j of ``coefficients``, of shape ``(n - 1, 4)``, belongs to the
     piece from knot j: the cubic in t - knots[j], highest power first.

@@ -214,7 +214,10 @@ def check(
                 i = int(np.flatnonzero(jumps)[0])
                 a, b = (np.broadcast_to(x, jumps.shape)[i] for x in (before, after))
                 name, unit = continuous[order]
-                raise FormulaError(f"{name} jumps from {a:.6g} {unit} to {b:.6g} {unit} at t = {t[i]:.6g} s")
+                raise FormulaError(
+                    f"{name} jumps from {a:.6g} {unit} to {b:.6g} {unit} at t = {t[i]:.6g} s: let it rise within a "
+                    "short time w, for example by the factor (1 + tanh((t - t1)/w))/2"
+                )
 
 
 def largest(function: Function, values: Values, knots: NDArray[np.float64], spans: NDArray[np.float64]) -> Any:

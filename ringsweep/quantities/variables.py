@@ -274,6 +274,7 @@ HISTORY: dict[str, Variable] = {
     "belt_x": Variable("m", "displacement of the belt"),
     "belt_velocity": Variable("m/s", "velocity of the belt"),
     "friction_force": Variable("N", "friction force"),
+    "force": Variable("N", "applied force on the body"),
     "deflection": Variable("m", "deflection of the bristles"),
     "deflection_1": Variable("m", "deflection of the bristles at contact 1"),
     "deflection_2": Variable("m", "deflection of the bristles at contact 2"),

@@ -17,6 +17,7 @@ from ringsweep.errors import InputError
 from ringsweep.models import batch, model_of
 from ringsweep.models.scene import Structure
 from ringsweep.physics.drives import turn
+from ringsweep.physics.forces import Forced
 from ringsweep.quantities.flags import AFTERMATHS, REGIMES
 from ringsweep.quantities.variables import EVENTS, HISTORY, IMPACTS
 from ringsweep.runs.events import Events, events, history_at, side_by_side
@@ -148,6 +149,8 @@ def _trace(config: Config, structure: Structure, samples: int) -> tuple[xr.Datas
         drive = take(cell.drive, 0)
         motion = np.array([turn(drive, t) for t in times.tolist()])
         columns |= dict(zip(model.driven, motion.T, strict=False))
+        if isinstance(drive, Forced):
+            columns["force"] = motion[:, -1]
     variables = HISTORY | model.own_variables
     run = xr.Dataset(
         {

@@ -70,7 +70,8 @@ def identity(config: Config) -> dict[str, str]:
     curve = next((one.curve for one in scene.structures.values() if one.curve is not None), None)
     for path, table in (("friction", curve), ("drive", structure.table), ("force", structure.force)):
         if table is not None:
-            found[f"scene.{path}"] = f"a table of {len(table[0])} rows ({_digest(*table)})"
+            found[f"scene.{path}"] = f"a table of {len(table[0])} rows ({_digest(*table[:2])})"
+            found |= {f"scene.{path}.interpolate": interpolate for interpolate in table[2:]}
     formulas = {f"friction.laws.{law}": own.own_law for law, own in scene.structures.items()}
     formulas |= {"drive.theta": structure.own_drive, "force.formula": structure.own_force}
     found |= {f"scene.{path}": str(formula.__doc__) for path, formula in formulas.items() if formula is not None}
