@@ -12,6 +12,7 @@ from belts import with_all_parts
 import ringsweep
 from ringsweep import InputError, cli
 from ringsweep.config import load
+from ringsweep.models import batch
 from ringsweep.quantities.flags import REGIMES
 from ringsweep.quantities.variables import OUTCOMES
 from ringsweep.storage import netcdf
@@ -190,6 +191,23 @@ class TestErrors:
         del moved["belt"]
         moved["drive"] = {"law": "arctan", "amplitude": 1.0}
         self.refused(moved, "sweep.follow", "no phase", sweep=sweep)
+
+    def test_of_a_deflection_beyond_the_limit_of_its_own_cell(self):
+        scene = load({"scene": changed(LUGRE, "initial", deflection=0.0)}).scene
+        columns = {path: np.full(3, value) for path, value in scene.values.items()}
+        limit = (
+            scene.values["friction.mu_s"]
+            * scene.values["body.mass"]
+            * scene.values["gravity"]
+            / scene.values["friction.sigma0"]
+        )
+        columns["friction.mu_s"] = scene.values["friction.mu_s"] * np.array([0.8, 1.0, 2.0])
+        # A run under `dahl` ends up to a thousandth of a percent beyond the limit, which is its error.
+        columns["initial.deflection"] = limit * np.array([0.05, -1.0 - 1e-5, 2.0])
+        np.testing.assert_array_equal(batch(scene.structure, columns).initial_z, limit * np.array([0.05, -1.0, 2.0]))
+        columns["initial.deflection"][2] = 2.5 * limit
+        with pytest.raises(InputError, match=f"{2.5 * limit:.6g} m is not allowed: .* up to {2 * limit:.6g} m"):
+            batch(scene.structure, columns)
 
     @pytest.mark.slow
     def test_of_the_initial_state(self, tmp_path):
