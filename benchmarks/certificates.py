@@ -62,7 +62,7 @@ def measure(law: str, side: int, rounds: int) -> list[str]:
     points = {"drive.amplitude": amplitudes, "zone.half_angle": half_angles}
     made = config.load({"scene": ring(friction), "sweep": {"points": points}})
     prepared = batch(made.scene.structure, cells.values_of_cells(made.scene, made.axes, np.arange(side * side)))
-    width, looser = len(NAMES), method.looser(prepared)
+    width, looser = len(NAMES), method.looser()
     calls = {
         "run": lambda: method.integrate(prepared, width, audit=False),
         "held": lambda: method.integrate(prepared, width, audit=True),

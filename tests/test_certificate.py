@@ -288,8 +288,8 @@ class TestErrors:
             (Event(), "stiction", "arctan", 150),
             # Most steps end at events, so that a run at a looser tolerance takes the same steps.
             (Event(rtol=1e-5), "stiction", "arctan", 100),
-            (Implicit(), "bengisu-akay", "arctan", 100),
-            (Implicit(), "bengisu-akay", "power", 200),
+            (Implicit(), "bengisu-akay", "arctan", 300),
+            (Implicit(), "bengisu-akay", "power", 450),
         ],
     )
     def test_error_bounds_cover_the_true_errors(self, cells, method, law, drive, median):
@@ -321,6 +321,21 @@ class TestErrors:
             ratios.append((stated / np.where(error > 0.0, error, np.nan))[known])
         assert np.concatenate(covered).mean() > 0.99
         assert np.nanmedian(np.concatenate(ratios)) < median
+
+    @pytest.mark.slow
+    def test_difference_that_is_small_by_chance_does_not_make_the_bound_small(self):
+        """The reference is Radau at a tolerance of 1e-12, and RK4 in 160 000 steps."""
+        scene = {
+            "model": "ring",
+            "body": {"mass": 0.076, "inertia": 4.47e-5, "half_distance": 0.025, "ball_radius": 0.01},
+            "ring": {"radius": 0.043378},
+            "friction": {"law": "tanh", "v0": 0.01, "rough": {"mu_k": 0.3}, "rest": {"mu_k": 0.1}},
+            "zone": {"half_angle": 1.15},
+            "drive": {"law": "sinusoidal", "amplitude": 0.3, "frequency": 0.5},
+        }
+        found = ringsweep.sweep(scene, {"time.span": [5.0]}, progress=False)
+        error = abs(found.phi_end.item() + 0.0308159679686)
+        assert error <= found.phi_end_error.item() <= 2e-5
 
     def test_what_velocities_err_in_each_second_of_angle_is_in_their_bounds(self, cells):
         batch = cells({"time.span": 1.0}, law="stiction", drive="arctan")

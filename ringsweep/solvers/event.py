@@ -37,17 +37,20 @@ _MOST_STEPS = 100_000_000
 # A cell without a certificate is run again with a tolerance that is tighter by FACTOR, at most so many times.
 _MOST_RETRIES = 3
 
-# The second run of a certificate has looser tolerances, by FACTOR. Implicit steps within a stiction band lose accuracy
-# faster than the tolerance says: at a tolerance looser by FACTOR the difference would be thousands of errors.
-_CREEP_FACTOR = 3.0
+# Under a smooth law the errors of two runs are as good as independent: their signs and sizes depend on where steps end.
+# So a difference may be small by chance, and with it all numbers of a run, which have the error of its last breakaway.
+# Where runs differ by less than this share of the tolerance, a third one at a looser tolerance, by FACTOR / _THIRD, is
+# asked. Two differences are hardly small together.
+_CLOSE, _THIRD = 0.035, 3.0
 
 # Errors of a run that the difference from the second run does not show, found by experiment, see docs/accuracy.md. In
 # units of the remainder of a series: once in a run, and for each shared step. In units of the tolerance of an implicit
-# step: once in a run with bristles, and for each shared step of others.
-_ONCE, _SHARED, _ONCE_IMPLICIT, _SHARED_IMPLICIT = 0.2, 3.0, 0.05, 0.02
+# step: once in a run with bristles; for each shared step under smooth laws; and for each with bristles, whose fast
+# vibrations all runs damp.
+_ONCE, _SHARED, _ONCE_IMPLICIT, _SHARED_IMPLICIT, _SHARED_BRISTLES = 0.2, 3.0, 0.05, 0.02, 0.1
 
-# The errors of so many implicit steps average out: the difference is so much more certain, down to the least share.
-_REGULAR, _LEAST_SAFETY = 60.0, 0.3
+# Share of the largest relative difference that counts in every number of a run with bristles.
+_SHARE_BRISTLES = 0.2
 
 # Impacts magnify the errors before them: a small difference of two runs is then less certain by this factor.
 _MAGNIFIED = 3.0
@@ -123,11 +126,14 @@ class _Piecewise(Method):
         if not len(open_cells):
             return Result(rows, steps=steps, certified=because == CERTIFIED, because=because, errors=bounds)
         finer, distance = self, np.full(len(rows), np.inf)
-        looser = self.looser(batch)
-        second_rows, more_steps, _ = self.integrate(
-            audit.disturbed(_select(batch, open_cells)), len(outcomes), audit=False, tolerances=looser
-        )
+        looser = self.looser()
+        cells = audit.disturbed(_select(batch, open_cells))
+        second_rows, more_steps, _ = self.integrate(cells, len(outcomes), audit=False, tolerances=looser)
         new = Results(rows[open_cells], steps[open_cells], audits[open_cells])
+        if family_of(type(batch.law)) is Smooth:
+            self._ask_a_third(
+                TwoRuns(cells, new.rows, second_rows, outcomes), LocalErrors(*new.audits.T[3:]), more_steps
+            )
         for retry in range(_MOST_RETRIES + 1):
             runs = TwoRuns(_select(batch, open_cells), new.rows, second_rows, outcomes)
             because[open_cells], bounds[open_cells], distance[open_cells], may_converge = finer._compare(
@@ -185,22 +191,21 @@ class _Piecewise(Method):
             [(because != CERTIFIED, because), (~obeys_law, LAW_NOT_OBEYED), (chaotic, DIVERGES)], len(rows)
         )
         tolerance, implicit_tolerance = self.tolerances()
-        local = LocalErrors(*audits[:, 3:].T)
+        local, share = LocalErrors(*audits[:, 3:].T), self.share
         if of_bristles:
-            floor, safety = _ONCE_IMPLICIT * implicit_tolerance, np.full(len(rows), self.safety)
+            floor, share = implicit_tolerance * (_ONCE_IMPLICIT + _SHARED_BRISTLES * local.implicit), _SHARE_BRISTLES
         else:
             # Ratio of successive terms of a series at the end of a step; a geometric series is the remainder.
             ratio = tolerance ** (1.0 / ORDER)
             floor = tolerance * ratio / (1.0 - ratio) * (_ONCE + _SHARED * local.series)
             floor += _SHARED_IMPLICIT * implicit_tolerance * local.implicit
-            safety = self.safety * np.clip(_REGULAR / np.maximum(local.creep, 1.0), _LEAST_SAFETY, 1.0)
         # Errors average out along a smooth motion, not if an event magnifies those of the few steps before it.
         magnified, left_out = audit.magnified(batch, rows)
-        safety = np.where(magnified, _MAGNIFIED * self.safety, safety)
+        safety = np.where(magnified, _MAGNIFIED, 1.0) * self.safety
         bounds = errors(
             runs,
             safety=safety,
-            share=self.share,
+            share=share,
             steps=steps,
             floor=floor + left_out,
             rate_floor=tolerance * local.rate,
@@ -209,11 +214,27 @@ class _Piecewise(Method):
         may_converge = diverge & ~diverging(distance / FACTOR, self.tolerances()[of_bristles])
         return because, bounds, np.where(diverge, distance, np.inf), may_converge
 
-    def looser(self, batch: Any) -> tuple[float, float]:
+    def looser(self) -> tuple[float, float]:
         """Tolerances of the second run of a certificate, as :meth:`tolerances` returns them."""
         tolerance, implicit_tolerance = self.tolerances()
-        factor = _CREEP_FACTOR if family_of(type(batch.law)) is Smooth else FACTOR
-        return tolerance * FACTOR, implicit_tolerance * factor
+        return tolerance * FACTOR, implicit_tolerance * FACTOR
+
+    def _ask_a_third(self, runs: TwoRuns, local: LocalErrors, steps: NDArray[Any]) -> None:
+        """Move second runs that are close to the first to where third runs say that they would be expected.
+
+        `steps` of the second runs grow by those of the third.
+        """
+        batch, rows, second_rows, outcomes = runs
+        close = np.flatnonzero((apart(runs) < _CLOSE * self.tolerances()[1]) & (local.creep > 0.0))
+        if len(close):
+            tolerance, implicit_tolerance = self.looser()
+            tolerances = tolerance, implicit_tolerance / _THIRD
+            third = self.integrate(_select(batch, close), len(outcomes), audit=False, tolerances=tolerances)
+            with np.errstate(invalid="ignore"):
+                moved = _THIRD * (third.rows - rows[close])
+                farther = np.abs(moved) > np.abs(second_rows[close] - rows[close])
+            second_rows[close] = np.where(farther, rows[close] + moved, second_rows[close])
+            steps[close] += third.steps
 
     def integrate(
         self, batch: Any, width: int, *, audit: bool, tolerances: tuple[float, float] | None = None
