@@ -225,6 +225,18 @@ def substitute(a: Node, values: Mapping[Node, Node]) -> Node:
     return visit(a)
 
 
+def frequency(angle: Node) -> tuple[Node, Node] | None:
+    """Turns per unit of the variable of an angle that grows uniformly, and the angle at zero; None of another angle."""
+    rate = derivative(angle)
+    if rate.varies or any(node.kind == "switch" for node in nodes_of(angle)):
+        return None
+    turn, at_zero = number(2.0 * math.pi), substitute(angle, {SPEED: ZERO, TIME: ZERO})
+    # 2 pi f gives f itself, not its rounding.
+    if rate.kind == "multiply" and rate.parts[0].kind == "number":
+        return multiply(divide(rate.parts[0], turn), rate.parts[1]), at_zero
+    return divide(rate, turn), at_zero
+
+
 def rebuilt(node: Node, parts: list[Node]) -> Node:
     """Node of the same kind from other parts."""
     simple: dict[str, Callable[..., Node]] = {"add": add, "multiply": multiply, "divide": divide, "power": power}

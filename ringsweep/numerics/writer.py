@@ -1,7 +1,8 @@
 """Source code of expressions: for floats, for vector lanes, and for power series.
 
 Expressions are those of :mod:`ringsweep.numerics.expressions`. Each function returns the lines of a function body. A
-parameter has the source text that `names` gives it; the variable is called ``speed`` or ``t``.
+parameter has the source text that `names` gives it; the variable is called ``speed``. The time is the sum of ``now``
+and ``rest``, see :mod:`ringsweep.numerics.clock`; sines and cosines of it call ``phase``.
 
 In kernels an interval of the speed is known where a series is computed. There a switch is an ``if``, and only one side
 of it is computed. In vector lanes each lane may be on another side, so both sides are computed, except where no lane
@@ -16,7 +17,17 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache, partial
 
-from ringsweep.numerics.expressions import ONE, Node, add, derivative, multiply, nodes_of, number
+from ringsweep.numerics.expressions import (
+    ONE,
+    TIME,
+    Node,
+    add,
+    derivative,
+    frequency,
+    multiply,
+    nodes_of,
+    number,
+)
 
 _CALLS = ("exp", "log", "sqrt", "power", "tanh", "atan")
 
@@ -63,10 +74,19 @@ class _Writer:
         if node.kind == "symbol":
             return self.names[node.value]
         if node.kind == "variable":
-            return str(node.value)
+            return "now" if node is TIME else str(node.value)
+        if node.kind in ("sin", "cos") and (turning := frequency(node.parts[0])) is not None:
+            _straight(self, list(turning))
+            turns, start = (self.known[part] for part in turning)
+            return self.new(f"{node.kind}_of(phase({turns}, now, rest, {start}))")
         parts = [self.known[part] for part in node.parts]
         if node.kind in _OPERATORS:
-            return self.new(f" {_OPERATORS[node.kind]} ".join(parts))
+            text = f" {_OPERATORS[node.kind]} ".join(parts)
+            if TIME in node.parts and not (slope := derivative(node)).varies:
+                # In a sum or multiple of the time its rest is not lost.
+                _straight(self, [slope])
+                text += f" + {self.known[slope]} * rest"
+            return self.new(text)
         if node.kind in ("minimum", "maximum"):
             return self.new(f"{node.kind[:3]}({', '.join(parts)})")
         return self.new(f"{node.kind}_of({', '.join(parts)})")

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.compile import function_from_lines, hook, inlined, lacking, take
-from ringsweep.numerics import writer
+from ringsweep.numerics import clock, writer
 from ringsweep.numerics.expressions import ZERO, Node, derivative, evaluate, symbols_of
 from ringsweep.numerics.functions import raised
 from ringsweep.numerics.series import INVERSE
@@ -131,8 +131,9 @@ def _piece(knots, t):
 @inlined
 def _cubic(drive, t):
     """Taylor coefficients of the shape about time `t`, from the power 0 to 3."""
-    j = _piece(drive.knots, t)
-    x = t - drive.knots[j]
+    now, rest = clock.parts(t)
+    j = _piece(drive.knots, now)
+    x = (now - drive.knots[j]) + rest
     c3, c2, c1, c0 = drive.coefficients[j]
     return c0 + x * (c1 + x * (c2 + x * c3)), c1 + x * (2.0 * c2 + 3.0 * x * c3), c2 + 3.0 * x * c3, c3
 
@@ -149,6 +150,15 @@ def amplitude(drive):
     return drive.amplitude
 
 
+@hook(absorb=True, optional=True)
+def known_to(drive, t):
+    """The time, s, as the functions of a drive take it.
+
+    By default a number, where `t` may be an :class:`ringsweep.numerics.clock.Instant`; a table and a formula take both.
+    """
+    return clock.parts(t)[0]
+
+
 @hook(optional=True)
 def turn(drive, t):
     """Angle of the ring and its first two derivatives.
@@ -157,15 +167,16 @@ def turn(drive, t):
 
     Parameters
     ----------
-    drive, t
-        As for :func:`shape`.
+    drive : NamedTuple
+    t : float or Instant
+        Time, s.
 
     Returns
     -------
     tuple of float
         ``(theta, omega, epsilon)``, rad, rad/s, rad/s^2; on the belt m, m/s, m/s^2.
     """
-    theta, omega, epsilon = shape(drive, t)
+    theta, omega, epsilon = shape(drive, known_to(drive, t))
     a = amplitude(drive)
     # With an amplitude of zero the ring rests, even if the shape has an infinite acceleration.
     return a * theta, a * omega, a * epsilon if a != 0.0 else 0.0
@@ -237,11 +248,22 @@ def _expand_power(drive, t, order, theta, work):
         theta[k] = theta[k - 1] * (n - k + 1.0) / (k * t)
 
 
+@known_to.implements(Table)
+def _itself(drive, t):
+    return t
+
+
 @expand.implements(Table)
 def _expand_table(drive, t, order, theta, work):
     terms = _cubic(drive, t)
     for k in range(order + 1):
         theta[k] = drive.amplitude * terms[k] if k < 4 else 0.0
+
+
+@inlined
+def expand_at(drive, t, order, theta, work):
+    """What :func:`expand` does, about a time `t` that is a number or an :class:`ringsweep.numerics.clock.Instant`."""
+    expand(drive, known_to(drive, t), order, theta, work)
 
 
 @hook(optional=True)
@@ -537,6 +559,8 @@ _SCOPE = {
     "log1p_of": log1p,
     "log_of": log,
     "nan": nan,
+    "parts": clock.parts,
+    "phase": clock.phase,
     "power_of": raised,
     "sin_of": sin,
     "sqrt_of": sqrt,
@@ -544,7 +568,10 @@ _SCOPE = {
     "time_of": _time_of,
 }
 
-_SIDE = "t < drive.knots[{}]"
+_SIDE = "now < drive.knots[{}]"
+
+# Lines that give a time the two names that expressions have for it.
+_TIME = ["now, rest = parts(t)"]
 
 
 def _make(name: str, doc: str, function: Function, parameters: Mapping[str, Parameter], qualified: str = "") -> type:
@@ -566,15 +593,16 @@ def _make(name: str, doc: str, function: Function, parameters: Mapping[str, Para
         return [*lines[:-1], lines[-1].replace("return", f"return {before}") + "[0]"]
 
     implement(amplitude, "drive", number(factor))
-    implement(shape, "drive, t", writer.float_lines(names, [s, rate, second], _SIDE))
-    implement(jerk, "drive, t", number(derivative(second), "amplitude(drive) * "))
+    implement(shape, "drive, t", [*_TIME, *writer.float_lines(names, [s, rate, second], _SIDE)])
+    implement(jerk, "drive, t", [*_TIME, *number(derivative(second), "amplitude(drive) * ")])
     series = writer.taylor_lines(names, s, rate, _SIDE, "amplitude(drive)")
-    implement(expand, "drive, t, order, theta, work", series)
-    implement(top_speed, "drive", ["t = 0.0", *number(size_at_start(function.rate))])
+    implement(expand, "drive, t, order, theta, work", [*_TIME, *series])
+    known_to.implements(drive)(_itself)
+    implement(top_speed, "drive", ["now = rest = 0.0", *number(size_at_start(function.rate))])
     # The drives of the package have no narrow features.
     reach = writer.reach_lines(names, s, _SIDE) if qualified else []
     if function.knots or reach:
-        lines = ["h = inf", *reach, "found = t + h"]
+        lines = [*_TIME, "h = inf", *reach, "found = t + h"]
         lines += ["for knot in drive.knots:", "    if t < knot < found:", "        found = knot"] * bool(function.knots)
         implement(next_knot, "drive, t", [*lines, "return found"])
     elif writer.is_polynomial(rate):

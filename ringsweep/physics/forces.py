@@ -120,7 +120,7 @@ def expand_force(drive, t, order, force, work):
 
 @expand_force.implements(Forced)
 def _expand_force(drive, t, order, force, work):
-    drives.expand(drive.force, t, order, force, work)
+    drives.expand_at(drive.force, t, order, force, work)
     force[0] += drive.constant
 
 
@@ -167,7 +167,13 @@ def _not_varying(force, table, k):
 
 @drives.expand.implements(Forced)
 def _expand(drive, t, order, theta, work):
-    drives.expand(drive.motion, t, order, theta, work)
+    drives.expand_at(drive.motion, t, order, theta, work)
+
+
+@drives.known_to.implements(Forced)
+def _known_to(drive, t):
+    # Of the motion and of the force each may take another kind of time.
+    return t
 
 
 @drives.jerk.implements(Forced)

@@ -25,6 +25,7 @@ from ringsweep.numerics.expressions import (
     add,
     derivative,
     evaluate,
+    frequency,
     multiply,
     negative,
     nodes_of,
@@ -236,10 +237,10 @@ def period_of(node: Node, values: Values) -> Any:
     """
     found: dict[Node, Any] = {}
     for one in nodes_of(node):
-        if one.kind in ("sin", "cos") and not (slope := derivative(one.parts[0])).varies:
-            rate = abs(evaluate(slope, 0.0, values))
+        if one.kind in ("sin", "cos") and (turning := frequency(one.parts[0])) is not None:
+            turns = abs(evaluate(turning[0], 0.0, values))
             with np.errstate(divide="ignore"):
-                found[one] = np.where(rate > 0.0, 2.0 * np.pi / rate, 0.0)
+                found[one] = np.where(turns > 0.0, 1.0 / turns, 0.0)
             continue
         found[one] = inf if one.kind in ("variable", "switch") else 0.0
         for part in one.parts:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from ringsweep.compile import hook, inlined
 from ringsweep.models.interface import audit as audit_of_model
 from ringsweep.models.interface import implicit, series
+from ringsweep.numerics.clock import later
 from ringsweep.numerics.series import slope
 from ringsweep.physics import drives
 from ringsweep.physics.friction import Dynamic, SetValued, Smooth
@@ -74,8 +75,8 @@ def _audit_series_step(scene, step, c, tolerance, audit):
     first = _violation_in_series_step(scene, step, c, tolerance, EARLY * step.s)
     second = _violation_in_series_step(scene, step, c, tolerance, LATE * step.s)
     energy_before, energy_after = (
-        audit_of_model.energy(scene, drives.turn(scene.drive, step.t), step.y),
-        audit_of_model.energy(scene, drives.turn(scene.drive, step.t + step.s), step.y_next),
+        audit_of_model.energy(scene, drives.turn(scene.drive, step.now), step.y),
+        audit_of_model.energy(scene, drives.turn(scene.drive, later(step.now, step.s)), step.y_next),
     )
     return _audit_after(audit, first, second, energy_before, energy_after, step.s)
 
@@ -85,7 +86,7 @@ def _violation_in_series_step(scene, step, c, tolerance, s):
     state, rates, forcing = (
         series.state_at(scene, c, s),
         series.rates_at(scene, c, s),
-        drives.turn(scene.drive, step.t + s),
+        drives.turn(scene.drive, later(step.now, s)),
     )
     return audit_of_model.violation(scene, step.mode, forcing, state, rates, step.s, tolerance)
 
@@ -93,7 +94,7 @@ def _violation_in_series_step(scene, step, c, tolerance, s):
 @inlined
 def _ends(scene, step, course):
     """Forcing and state for implicit steps at both ends of a step."""
-    before, after = implicit.forcing(scene, course, step.t), implicit.forcing(scene, course, step.t + step.s)
+    before, after = implicit.forcing(scene, course, step.now.t), implicit.forcing(scene, course, step.now.t + step.s)
     x, x_next = implicit.to_implicit(scene, before, step.y), implicit.to_implicit(scene, after, step.y_next)
     return (before, x), (after, x_next)
 
@@ -114,7 +115,7 @@ def _audit_implicit_step(scene, step, scratch, tolerance, audit):
 @inlined
 def _violation_in_implicit_step(scene, step, scratch, ends, tolerance, fraction):
     (x, x_next), bends = ends, scratch.bends[0]
-    forcing = implicit.forcing(scene, scratch.course, step.t + fraction * step.s)
+    forcing = implicit.forcing(scene, scratch.course, step.now.t + fraction * step.s)
     state = implicit.from_implicit(scene, forcing, rosenbrock.dense(x, x_next, bends, fraction))
     rates = rosenbrock.dense_rates(x, x_next, bends, fraction, step.s)
     return audit_of_model.violation(scene, step.mode, forcing, state, rates, step.s, tolerance)
@@ -123,7 +124,7 @@ def _violation_in_implicit_step(scene, step, scratch, ends, tolerance, fraction)
 @inlined
 def _fall_rate_in_implicit_step(scene, step, scratch, guard):
     (before, x), (_, x_next) = _ends(scene, step, scratch.course)
-    late = implicit.forcing(scene, scratch.course, step.t + 0.9 * step.s)
+    late = implicit.forcing(scene, scratch.course, step.now.t + 0.9 * step.s)
     state = rosenbrock.dense(x, x_next, scratch.bends[0], 0.9)
     view = implicit.guards_and_motion(scene, step.mode, implicit.common(scene, step.mode, before, x), late, state)
     return view[0][guard - scratch.first_guard] / (0.1 * step.s)

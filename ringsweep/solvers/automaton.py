@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 from ringsweep.compile import Cells, borrowed, hook, inlined, kernel, take
 from ringsweep.models.interface import implicit, modes, recorder, series, simpler, variation
 from ringsweep.models.interface.status import BROKEN, COMPLETE, RUNNING
+from ringsweep.numerics.clock import Instant, later
 from ringsweep.numerics.series import ORDER
 from ringsweep.physics import drives
 from ringsweep.physics.friction import Dynamic, SetValued, Smooth, family
@@ -79,7 +80,7 @@ class Run(NamedTuple):
 
     record: Any
     mode: Any
-    t: float
+    now: Instant
     y: Any
     control: StepControl
     local: LocalErrors
@@ -112,7 +113,7 @@ def _step(family, scene, run, h_max, tolerances, scratch):
 @inlined
 def _creep(scene, run, h_max, tolerance, scratch):
     """Whether a mode is stiff, and the result of :func:`implicit_step` if it is; arguments as for :func:`_step`."""
-    start, control = start_at(scene, scratch.course, run.mode, run.t, run.y), run.control
+    start, control = start_at(scene, scratch.course, run.mode, run.now.t, run.y), run.control
     if not implicit.is_stiff(scene, run.mode, run.y, start.linear):
         return False, -1, 0.0, run.y, run.record, control, 0.0
     if control.last_h == 0.0:
@@ -130,7 +131,8 @@ def _step_series(family, scene, run, h_max, tolerances, scratch):
     if shared > 0.0 and modes.sticks(scene, run.mode):
         # The body moves as the drive does. After an infinite acceleration of the drive steps are so short that a bound
         # that follows from the error of the place, divided by the length of the step, would say nothing.
-        rate = abs(series.rates_at(scene, scratch.c, s)[0] - drives.turn(scene.drive, run.t + s)[1]) / tolerances[0]
+        velocity = drives.turn(scene.drive, later(run.now, s))[1]
+        rate = abs(series.rates_at(scene, scratch.c, s)[0] - velocity) / tolerances[0]
     local = LocalErrors(run.local.series + shared, run.local.rate + rate, 0.0, 0.0)
     return False, guard, s, y, record, run.control, local
 
@@ -149,7 +151,7 @@ def _step_either(family, scene, run, h_max, tolerances, scratch):
 
 @_step.implements(Dynamic)
 def _step_implicit(family, scene, run, h_max, tolerances, scratch):
-    start = start_at(scene, scratch.course, run.mode, run.t, run.y)
+    start = start_at(scene, scratch.course, run.mode, run.now.t, run.y)
     guard, s, y, record, control, error = implicit_step(
         scene, run.record, start, run.control, h_max, tolerances[1], scratch
     )
@@ -167,7 +169,7 @@ def _step_in_part(kind, scene, run, h_max, tolerances, scratch):
     if not simpler.is_simpler(scene, run.mode):
         return _step(family(scene.law), scene, run, h_max, tolerances, scratch)
     part, mode, y = simpler.part(scene, run.mode, run.y)
-    run_of_part = Run(simpler.part_of_record(scene, run.record, run.mode), mode, run.t, y, run.control, run.local)
+    run_of_part = Run(simpler.part_of_record(scene, run.record, run.mode), mode, run.now, y, run.control, run.local)
     first = simpler.first_row(scene)
     is_implicit, guard, s, y, record, control, local = _step(
         family(scene.law), part, run_of_part, h_max, tolerances, without_rows(scratch, first)
@@ -179,37 +181,37 @@ def _step_in_part(kind, scene, run, h_max, tolerances, scratch):
 
 
 @hook(optional=True)
-def _begin_in(kind, scene, mode, t, y, tolerances, c):
+def _begin_in(kind, scene, mode, now, y, tolerances, c):
     """Record at the beginning of a run of a scene, or of the simpler scene whose mode it is in."""
-    return _begin(family(scene.law), scene, mode, t, y, tolerances, c)
+    return _begin(family(scene.law), scene, mode, now, y, tolerances, c)
 
 
 @_begin_in.implements(simpler.Parted)
-def _begin_in_part(kind, scene, mode, t, y, tolerances, c):
+def _begin_in_part(kind, scene, mode, now, y, tolerances, c):
     if not simpler.is_simpler(scene, mode):
-        return _begin(family(scene.law), scene, mode, t, y, tolerances, c)
+        return _begin(family(scene.law), scene, mode, now, y, tolerances, c)
     part, part_mode, part_y = simpler.part(scene, mode, y)
-    record = _begin(family(scene.law), part, part_mode, t, part_y, tolerances, c[simpler.first_row(scene) :])
+    record = _begin(family(scene.law), part, part_mode, now, part_y, tolerances, c[simpler.first_row(scene) :])
     return simpler.begun(scene, record)
 
 
 @hook
-def _begin(family, scene, mode, t, y, tolerances, c):
+def _begin(family, scene, mode, now, y, tolerances, c):
     """Record at the beginning of a run."""
 
 
 @_begin.implements(SetValued, Smooth)
-def _begin_series(family, scene, mode, t, y, tolerances, c):
-    series.expand(scene, mode, t, y, tolerances[0], c)
-    return recorder.begin(scene, t, series.seen_at_start(scene, c))
+def _begin_series(family, scene, mode, now, y, tolerances, c):
+    series.expand(scene, mode, now, y, tolerances[0], c)
+    return recorder.begin(scene, now.t, series.seen_at_start(scene, c))
 
 
 @_begin.implements(Dynamic)
-def _begin_implicit(family, scene, mode, t, y, tolerances, c):
-    forcing = drives.turn(scene.drive, t)
+def _begin_implicit(family, scene, mode, now, y, tolerances, c):
+    forcing = drives.turn(scene.drive, now)
     x = implicit.to_implicit(scene, forcing, y)
     view = implicit.guards_and_motion(scene, mode, implicit.common(scene, mode, forcing, x), forcing, x)
-    return recorder.begin(scene, t, implicit.seen(scene, view))
+    return recorder.begin(scene, now.t, implicit.seen(scene, view))
 
 
 @hook
@@ -219,12 +221,12 @@ def _history_row(family, scene, step, c, s, y):
 
 @_history_row.implements(SetValued)
 def _row_series(family, scene, step, c, s, y):
-    return series.row(scene, step.mode, c, step.t + s, s)
+    return _row_of_series(scene, step, c, s)
 
 
 @_history_row.implements(Smooth)
 def _row_either(family, scene, step, c, s, y):
-    return _row_of_state(scene, step, s, y) if step.is_implicit else series.row(scene, step.mode, c, step.t + s, s)
+    return _row_of_state(scene, step, s, y) if step.is_implicit else _row_of_series(scene, step, c, s)
 
 
 @_history_row.implements(Dynamic)
@@ -233,27 +235,38 @@ def _row_implicit(family, scene, step, c, s, y):
 
 
 @inlined
+def _row_of_series(scene, step, c, s):
+    return series.row(scene, step.mode, c, later(step.now, s), s)
+
+
+@inlined
 def _row_of_state(scene, step, s, y):
-    forcing = drives.turn(scene.drive, step.t + s)
+    forcing = drives.turn(scene.drive, later(step.now, s))
     return implicit.row(scene, step.mode, forcing, implicit.to_implicit(scene, forcing, y))
 
 
 @inlined
-def _after_step(scene, mode, guard, t, s, h_max, y):
-    """Time, status, mode and state after a step of length `s` that `guard` ended (-1: none)."""
+def _until(limit, now):
+    """Time from an instant to a later one, s."""
+    return (limit - now.t) - now.rest
+
+
+@inlined
+def _after_step(scene, mode, guard, now, s, limit, y):
+    """Time, status, mode and state after a step of length `s`, at most up to `limit`, that `guard` ended (-1: none)."""
     # The sum of steps must not miss the end of the span, or a knot of the drive, by rounding.
     if s >= 0.0:
-        t = t + s if s < h_max else t + h_max
+        now = later(now, s) if s < _until(limit, now) else Instant(limit, 0.0)
     if not (isfinite(y[0]) and isfinite(y[1])):
-        return t, BROKEN, mode, y
+        return now, BROKEN, mode, y
     if not s >= 0.0:
-        return t, modes.status_when_stalled(scene, mode, t, y), mode, y
+        return now, modes.status_when_stalled(scene, mode, now, y), mode, y
     if guard >= 0:
-        status, mode, y = modes.switch(scene, mode, guard, t, y)
-        return t, status, mode, y
-    if t >= scene.span:
-        return t, COMPLETE, mode, y
-    return t, RUNNING, series.after_first_step(mode) if s > 0.0 else mode, y
+        status, mode, y = modes.switch(scene, mode, guard, now, y)
+        return now, status, mode, y
+    if now.t >= scene.span:
+        return now, COMPLETE, mode, y
+    return now, RUNNING, series.after_first_step(mode) if s > 0.0 else mode, y
 
 
 @inlined
@@ -287,7 +300,8 @@ def _store_row(scene, step, c, s, y, history, count):
         return count
     _fill(history.table[count], _history_row(family(scene.law), scene, step, c, s, y))
     # Rounding must not make times decrease.
-    times[count] = max(step.t + s, times[count - 1]) if count > 0 else step.t
+    t = later(step.now, s).t
+    times[count] = max(t, times[count - 1]) if count > 0 else t
     return count + 1
 
 
@@ -359,8 +373,9 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
         scene = take(batch, i)
         drives.new_course(scratch.course)
         t, y = modes.initial_state(scene)
-        status, mode = modes.initial_mode(scene, t, y)
-        begun = _begin_in(simpler.kind(scene), scene, mode, t, y, tolerances, c)
+        now = Instant(t, 0.0)
+        status, mode = modes.initial_mode(scene, now, y)
+        begun = _begin_in(simpler.kind(scene), scene, mode, now, y, tolerances, c)
         record = recorder.lend(scene, begun, take(rows, i))
         record = recorder.after_event(scene, record, mode, t)
         control = StepControl(1e-6 * scene.span, 0.0, 0.0)
@@ -372,9 +387,10 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
         is_implicit = False
         while status == RUNNING:
             # Near a jam, steps shorter than the rounding of time still move the state, but not for ever.
+            t = now.t
             stalled = stalled + 1 if t == t_before else 0
             if n == max_steps or stalled == _MOST_STALLED:
-                status = modes.status_when_stalled(scene, mode, t, y) if stalled == _MOST_STALLED else BROKEN
+                status = modes.status_when_stalled(scene, mode, now, y) if stalled == _MOST_STALLED else BROKEN
                 break
             if n > 0 and n % PATIENCE == 0:
                 # NaN is no gain either.
@@ -384,13 +400,14 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
                 t_judged = t
             t_before = t
             n += 1
-            h_max = min(scene.span, drives.next_knot(scene.drive, t)) - t
+            limit = min(scene.span, drives.next_knot(scene.drive, t))
+            h_max = _until(limit, now)
             control = StepControl(min(control.h, spacing), control.last_h, control.last_factor)
-            run = Run(record, mode, t, y, control, local)
+            run = Run(record, mode, now, y, control, local)
             is_implicit, guard, s, y_next, record, control, local = _step_in(
                 simpler.kind(scene), scene, run, h_max, tolerances, scratch
             )
-            step = Step(mode, is_implicit, t, s, y, y_next)
+            step = Step(mode, is_implicit, now, s, y, y_next)
             if len(history.times) > 0:
                 if count == len(history.times):
                     return count
@@ -404,10 +421,10 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
                 just_switched = guard >= 0 or (just_switched and s == 0.0)
             if audited and s > 0.0 and is_checked(n):
                 audit = audit_step(family(scene.law), scene, step, scratch, tolerances[0], audit)
-            t, status, mode, y = _after_step(scene, mode, guard, t, s, h_max, y_next)
+            now, status, mode, y = _after_step(scene, mode, guard, now, s, limit, y_next)
             if guard >= 0:
-                record = at_event(variation.asked(scene), scene, record, step.mode, guard, t, y_next)
-                record = recorder.after_event(scene, record, mode, t)
+                record = at_event(variation.asked(scene), scene, record, step.mode, guard, now, y_next)
+                record = recorder.after_event(scene, record, mode, now.t)
             # The regime of a run that goes on after a loss is that loss: what ends the run later does not count.
             decides = status != RUNNING or modes.first_loss(step.mode, mode)
             if audited and guard >= 0 and s > 0.0 and decides and guard_fall_rate == 0.0:
@@ -417,9 +434,9 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
                 count = _store_row(scene, step, c, 0.0, y, history, count)
         if count == 0:
             # A run that ends at launch has a history of one row.
-            step = Step(mode, is_implicit, t, 0.0, y, y)
+            step = Step(mode, is_implicit, now, 0.0, y, y)
             count = _store_row(scene, step, c, 0.0, y, history, count)
-        outcome = recorder.conclude(scene, record, status, t, *modes.in_space(scene, t, y))
+        outcome = recorder.conclude(scene, record, status, now.t, *modes.in_space(scene, now, y))
         for k in range(min(len(outcome), rows.shape[1])):
             rows[i, k] = outcome[k]
         recorder.keep_memory(scene, rows[i], len(outcome), y)

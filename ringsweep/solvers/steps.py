@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ringsweep.compile import borrowed, inlined
+from ringsweep.numerics.clock import Instant
 from ringsweep.numerics.series import STACK
 from ringsweep.numerics.terms import COLUMNS
 from ringsweep.physics import drives
@@ -50,15 +51,17 @@ class Step(NamedTuple):
     mode : NamedTuple
     is_implicit : bool
         Whether the step is implicit. If not, the table of series describes it.
-    t, s : float
-        Time at its beginning, and its length, s.
+    now : Instant
+        Time at its beginning, s.
+    s : float
+        Its length, s.
     y, y_next : tuple of float
         States at both ends.
     """
 
     mode: Any
     is_implicit: Any
-    t: float
+    now: Instant
     s: float
     y: Any
     y_next: Any

@@ -9,6 +9,7 @@ from math import isnan, nan
 
 from ringsweep.compile import inlined, replacing
 from ringsweep.models.interface import modes, recorder, series, variation
+from ringsweep.numerics.clock import later
 from ringsweep.numerics.series import ORDER, ascending, first_root
 from ringsweep.solvers.variation import along_series, enter_series
 
@@ -47,7 +48,7 @@ def _first_event(c, first, entry_guard, h, work):
 def _observe(scene, run, s, scratch):
     """Record after a step of length `s` of the series, with the extremes within the step."""
     c, instants = scratch.c, scratch.work[0]
-    record = recorder.enter(scene, run.record, run.t, series.seen_at_start(scene, c))
+    record = recorder.enter(scene, run.record, run.now.t, series.seen_at_start(scene, c))
     count = series.extremes(scene, record, run.mode, c, s, scratch.work)
     ascending(instants, count)
     stuck = modes.sticks(scene, run.mode)
@@ -55,7 +56,8 @@ def _observe(scene, run, s, scratch):
     for j in range(count + 1):
         now = instants[j] if j < count else s
         record = along_series(variation.asked(scene), scene, record, run, (before, now), scratch)
-        record = recorder.observe(scene, record, run.t + now, now - before, stuck, series.seen_at(scene, c, now, s))
+        t = later(run.now, now).t
+        record = recorder.observe(scene, record, t, now - before, stuck, series.seen_at(scene, c, now, s))
         before = now
     return record
 
@@ -83,7 +85,7 @@ def series_step(scene, run, h_max, tolerance, scratch):
         series meets the tolerance, s.
     """
     c = scratch.c
-    reach = series.expand(scene, run.mode, run.t, run.y, tolerance, c)
+    reach = series.expand(scene, run.mode, run.now, run.y, tolerance, c)
     run = _with_record(run, enter_series(variation.asked(scene), scene, run.record, run.mode, c))
     h = min(reach, h_max)
     guard, s = _first_event(c, scratch.first_guard, run.mode.entry_guard, h, scratch.work)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ringsweep.compile import hook
 from ringsweep.models.interface import implicit, series, variation
+from ringsweep.numerics.clock import later
 from ringsweep.numerics.collocation import FEW, MANY, WEIGHTS_OF_FEW, WEIGHTS_OF_MANY, largest_trace, store
 from ringsweep.solvers import rosenbrock
 
@@ -48,7 +49,7 @@ def _along_series(asked, scene, record, run, ends, scratch):
         end = low + width if low + 1.5 * width < high else high
         for i in range(len(MANY)):
             s = low + (end - low) * MANY[i]
-            store(variation.jacobian(scene, run.mode, run.t + s, series.state_at(scene, c, s)), i, work)
+            store(variation.jacobian(scene, run.mode, later(run.now, s), series.state_at(scene, c, s)), i, work)
         rates = series.rates_at(scene, c, end)
         if (end - low) * largest_trace(len(rates), len(MANY), work) > _MOST_GROWTH:
             width = 0.5 * (end - low)

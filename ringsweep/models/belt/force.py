@@ -5,6 +5,7 @@ from __future__ import annotations
 from ringsweep.compile import absorbed, hook, inlined
 from ringsweep.models.interface import shock
 from ringsweep.models.slip import Slip
+from ringsweep.numerics.clock import parts
 from ringsweep.numerics.functions import opposing, select
 from ringsweep.physics import drives, ring
 from ringsweep.physics.belt import OnBelt
@@ -88,7 +89,7 @@ def stuck_pull(scene, x, v, forcing):
 def stuck_rates(scene, t, x, forcing):
     """Time derivatives of :func:`stuck_pull` and :func:`breakaway_force` of a body at rest on the belt, N/s."""
     _, velocity, acceleration = forcing[:3]
-    push_rate, jerk = force_rate(scene.drive, forcing), drives.jerk(scene.drive, t)
+    push_rate, jerk = force_rate(scene.drive, forcing), drives.jerk(scene.drive, parts(t)[0])
     rates, cube_rate = (velocity, push_rate, acceleration), 3.0 * x * x * velocity
     load, _, friction = ring.held(scene.body, 0.0, rates, cube_rate, jerk, 0.0)
     return -friction, scene.mu_s * load

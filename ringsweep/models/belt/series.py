@@ -200,7 +200,7 @@ def _term_of_friction(body, c, k, K, load):
 
 @series.expand.implements(belt.Belt)
 def _expand(scene, mode, t, y, tolerance, c):
-    drives.expand(scene.drive, t, ORDER + 2, c[SHIFT], c[FACTORS:])
+    drives.expand_at(scene.drive, t, ORDER + 2, c[SHIFT], c[FACTORS:])
     body = scene.body
     if if_force(body, True, False):
         expand_force(scene.drive, t, ORDER, c[PUSH], c[FACTORS:])

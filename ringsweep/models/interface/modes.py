@@ -41,7 +41,7 @@ def initial_mode(scene, t, y):
     ----------
     scene : NamedTuple
         One cell.
-    t : float
+    t : Instant
         Time, s.
     y : tuple of float
         State at time `t`.
@@ -65,7 +65,7 @@ def switch(scene, mode, guard, t, y):
     guard : int
         Index of the guard: its row in the table of :mod:`series`, or its index among the guards of :mod:`implicit` if
         the model has no series.
-    t : float
+    t : Instant
         Time, s.
     y : tuple of float
         State at time `t`.
@@ -86,7 +86,7 @@ def status_when_stalled(scene, mode, t, y):
     ----------
     scene, mode : NamedTuple
         One cell, and its mode.
-    t : float
+    t : Instant
         Time, s.
     y : tuple of float
         State at time `t`.
@@ -141,7 +141,7 @@ def in_space(scene, t, y):
     ----------
     scene : NamedTuple
         One cell.
-    t : float
+    t : Instant
         Time, s.
     y : tuple of float
         State at time `t`.

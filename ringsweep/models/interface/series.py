@@ -35,7 +35,7 @@ def expand(scene, mode, t, y, tolerance, c):
     ----------
     scene, mode : NamedTuple
         One cell, and its mode.
-    t : float
+    t : Instant
         Time, s.
     y : tuple of float
         State at time `t`.
@@ -164,7 +164,7 @@ def row(scene, mode, c, t, s):
         One cell, and its mode.
     c : ndarray of shape ``(rows, columns)``
         Table of the step.
-    t : float
+    t : Instant
         Time of the row, s.
     s : float
         Time since the beginning of the step, s.

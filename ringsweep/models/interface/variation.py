@@ -41,7 +41,7 @@ def jacobian(scene, mode, t, y):
     ----------
     scene, mode : NamedTuple
         One cell, and its mode.
-    t : float
+    t : Instant
         Time, s.
     y : tuple of float
         State at time `t`.

@@ -29,6 +29,7 @@ from ringsweep.models.ring.contacts import (
     zones_under,
 )
 from ringsweep.models.sliding import ENDS, REACTION_TOLERANCE, expand_bounds, speed_in
+from ringsweep.numerics.clock import Instant, parts
 from ringsweep.numerics.series import (
     INVERSE,
     ORDER,
@@ -129,7 +130,7 @@ def _sliding_at_start_of_power(drive, scene, t, phi, launch):
     v = drives.velocity_at_beginning(drive, launch) * scene.body.radius
     if leaves_behind(drive, scene, t, v):
         theta, _, _ = drives.turn(drive, t)
-        status, mode = _mode_at_rest(scene, t, phi, *places_at(scene, phi - theta), 0)
+        status, mode = _mode_at_rest(scene, Instant(t, 0.0), phi, *places_at(scene, phi - theta), 0)
         # A body that is wedged between its contacts is taken along.
         if status == RUNNING and mode.sign == 0:
             return 0.0
@@ -145,7 +146,7 @@ def leaves_behind(drive, scene, t, v):
 @inlined
 def _jerked(drive, scene, t, v):
     """As :func:`leaves_behind`, under any law, for a drive that may accelerate infinitely at the beginning."""
-    if v == 0.0 or t != drives.beginning(drive) or ring.launch_velocity(scene) != 0.0:
+    if v == 0.0 or parts(t)[0] != drives.beginning(drive) or ring.launch_velocity(scene) != 0.0:
         return False
     return v == drives.velocity_at_beginning(drive, 0.0) * scene.body.radius
 
@@ -382,7 +383,7 @@ def _switch(scene, mode, guard, t, y):
 
 @series.expand.implements(ring.Ring)
 def _expand(scene, mode, t, y, tolerance, c):
-    drives.expand(scene.drive, t, ORDER + 2, c[THETA], c[FACTORS:])
+    drives.expand_at(scene.drive, t, ORDER + 2, c[THETA], c[FACTORS:])
     c[PHI, 0] = y[0]
     c[V, 0] = y[1]
     if mode.sign == 0:

@@ -19,6 +19,7 @@ from typing import NamedTuple
 from ringsweep.compile import inlined, replacing
 from ringsweep.models.ring.series import FAST
 from ringsweep.models.ring.series import Mode as ClosedMode
+from ringsweep.numerics.clock import parts
 from ringsweep.numerics.terms import FACTOR_ROWS
 from ringsweep.physics import ring
 from ringsweep.physics.impact import inertia, side_of
@@ -116,7 +117,7 @@ with_passed = replacing("passed")
 @inlined
 def opens(contact, number, t):
     """Event: contacts open (`contact`: 1, 2 or 3) after `number` events before."""
-    return Event(OPENS, contact, 0.0, 0.0, 0.0, 0.0, 0.0, number + 1, t, 0)
+    return Event(OPENS, contact, 0.0, 0.0, 0.0, 0.0, 0.0, number + 1, parts(t)[0], 0)
 
 
 @inlined

@@ -95,7 +95,7 @@ def _table_shape(scene):
 @series.expand.implements(ImpactRing)
 def _expand(scene, mode, t, y, tolerance, c):
     c[KIND, 0] = code_of(mode)
-    drives.expand(scene.drive, t, ORDER + 2, c[RING + THETA], c[RING + FACTORS :])
+    drives.expand_at(scene.drive, t, ORDER + 2, c[RING + THETA], c[RING + FACTORS :])
     if mode.open == BOTH:
         return _expand_flight(scene, mode, y, tolerance, c)
     # Guards of what ends slip or stick, unless they are filled below.

@@ -49,6 +49,7 @@ from ringsweep.models.ring.impact.mode import (
     with_zeros,
 )
 from ringsweep.models.ring.series import DETERMINANT, EDGE, FAST, NEARLY_JAMMED, NORMAL_1, NORMAL_2, SLOW, leaves_behind
+from ringsweep.numerics.clock import Instant, parts
 from ringsweep.physics import drives, ring
 from ringsweep.physics.friction.velocity import KINETIC, friction_at, region_bounds
 from ringsweep.physics.impact import (
@@ -180,7 +181,7 @@ def _after_closed(scene, status, mode, t, y, zeros, is_new):
 @modes.initial_state.implements(ImpactRing)
 def _initial_state(scene):
     t, (phi, v) = modes.initial_state(scene.closed)
-    _, _, state = _start(scene, t, phi, v)
+    _, _, state = _start(scene, Instant(t, 0.0), phi, v)
     return t, state
 
 
@@ -203,7 +204,7 @@ def _taken_along(scene, t, wedged):
 @inlined
 def _start(scene, t, phi, v):
     status, found = modes.initial_mode(scene.closed, t, (phi, v))
-    mode = from_closed(found, 0, Event(NO_EVENT, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, t, 0))
+    mode = from_closed(found, 0, Event(NO_EVENT, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, parts(t)[0], 0))
     if leaves_behind(scene.drive, scene.closed, t, v):
         wedged = _after_closed(scene, status, mode, t, (phi, 0.0), 2, False)
         # A body that is wedged on one contact is taken along.
@@ -491,7 +492,7 @@ def _try(scene, mode, t, y, landing, hits, restitution, lasts):
         found.violation,
         lasts,
         mode.event.number + 1,
-        t,
+        parts(t)[0],
         0,
     )
     impact = _Impact((first, second), touch, are_open, found)
@@ -553,7 +554,7 @@ def _rocking_ends(scene, mode, t, tried):
     if not (falls > 0.0 and speed < last.speed):
         return 0.0
     ratio = speed / last.speed
-    time = (2.0 * speed / falls + ratio * (t - last.time)) / (1.0 - ratio)
+    time = (2.0 * speed / falls + ratio * (parts(t)[0] - last.time)) / (1.0 - ratio)
     return time if time * time * falls <= _ROCKING * scene.balls.reach else 0.0
 
 
@@ -562,7 +563,7 @@ def _last_rebounds_end(scene, mode, t, y, motion, contact, speed):
     """Time until the rebounds of a contact end that hits with a speed which friction forbids; 0 if they go on."""
     # Where the rebounds of both contacts shrink together, those of one are summed while the other one is still open,
     # which hits before they would be over.
-    still = mode.event.time + mode.event.lasts - t if mode.event.kind == CLOSES else 0.0
+    still = mode.event.time + mode.event.lasts - parts(t)[0] if mode.event.kind == CLOSES else 0.0
     falls = _falls(scene, mode, t, y, motion, contact)
     return max(still, _time_of_rebounds(falls, speed, 0.0, _FORBIDDEN * scene.balls.reach))
 

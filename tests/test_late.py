@@ -1,0 +1,96 @@
+"""Late events: the millionth period of a force is as exact as the first."""
+
+from fractions import Fraction
+from math import atanh, cos, pi, ulp
+
+import numpy as np
+import pytest
+import xarray as xr
+from belts import with_all_parts
+
+import ringsweep
+from ringsweep.numerics.clock import Instant, later, phase
+
+STICTION = {"law": "stiction", "mu_s": 0.07, "mu_k": 0.05}
+
+LAWS = [
+    {"law": "coulomb", "mu_k": 0.05},
+    STICTION,
+    STICTION | {"law": "tustin", "alpha": 10.0},
+    STICTION | {"law": "gaussian-stribeck", "v_s": 0.1},
+    STICTION | {"law": "hyperbolic", "delta": 3.0},
+    STICTION | {"law": "karnopp", "dead_band": 1e-3},
+]
+
+
+def forced(friction, *, frequency, **changes):
+    """A body of 1 kg on a belt at rest, under a force of 1 N; it sticks twice in each period."""
+    force = {"amplitude": 1.0, "frequency": frequency, "phase": "90 deg"}
+    found = {"model": "belt", "body": {"mass": 1.0}, "spring": {"stiffness": 1.0}, "belt": {"velocity": 0.0}}
+    return with_all_parts(found | {"friction": friction, "force": force, "time": {"span": 1.0}} | changes)
+
+
+def runs(of, axes, **solver):
+    """Runs whose axes vary together."""
+    together = {path: xr.DataArray(np.asarray(values), dims="run") for path, values in axes.items()}
+    return ringsweep.sweep(of, together, progress=False, solver={"method": "auto"} | solver)
+
+
+class TestClock:
+    def test_sum_of_many_steps_loses_nothing(self):
+        rng = np.random.default_rng(1)
+        steps = 10.0 ** rng.uniform(-15.0, 2.0, 2000)
+        now, exact = Instant(1e6, 0.0), Fraction(10**6)
+        for step in steps.tolist():
+            now, exact = later(now, step), exact + Fraction(step)
+            assert abs(now.rest) <= 0.5 * ulp(now.t)
+        assert abs(Fraction(now.t) + Fraction(now.rest) - exact) < Fraction(1, 2**80)
+
+    def test_phase_is_as_exact_in_the_millionth_turn_as_in_the_first(self):
+        rng = np.random.default_rng(2)
+        for _ in range(500):
+            frequency, start = 10.0 ** rng.uniform(-3.0, 6.0), rng.uniform(-3.0, 3.0)
+            t = 1e6 * rng.uniform() / frequency
+            rest = rng.uniform(-0.5, 0.5) * ulp(t)
+            turns = Fraction(frequency) * (Fraction(t) + Fraction(rest))
+            within = float(turns - round(turns))
+            assert cos(phase(frequency, t, rest, start)) == pytest.approx(cos(2.0 * pi * within + start), abs=2e-15)
+
+
+class TestForcedBelts:
+    def test_no_run_of_a_map_fails_late(self):
+        frequency = np.append(0.0475, np.geomspace(0.02, 0.06, 7))
+        found = runs(forced(LAWS[0], frequency=1.0), {"force.frequency": frequency, "time.span": 2e4 + 0.0 * frequency})
+        assert (found.certified == 1).all()
+        assert (found.stick_time > 1000.0).all()
+
+    @pytest.mark.parametrize("unit", [1.0, 2.0**-13], ids=["hertz", "kilohertz"])
+    def test_displacement_repeats_to_rounding_after_ten_thousand_periods(self, unit):
+        """The spans are whole numbers of periods without rounding."""
+        of = forced(LAWS[0], frequency=3.0 / 64.0 / unit, spring={"stiffness": unit**-2})
+        found = runs(of, {"time.span": np.array([300.0, 600.0, 30000.0]) * 64.0 / 3.0 * unit})
+        assert (found.certified == 1).all()
+        np.testing.assert_allclose(found.x_end[1:], found.x_end[0], rtol=1e-13)
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize("friction", LAWS, ids=lambda friction: friction["law"])
+    def test_displacement_repeats_to_rounding_after_many_periods(self, friction):
+        """Over 1e5 periods, and one law over nearly 1e6."""
+        periods = np.array([300.0, 99999.0, 999999.0 if friction["law"] == "coulomb" else 99999.0 / 3.0])
+        found = runs(forced(friction, frequency=3.0 / 64.0), {"time.span": periods * 64.0 / 3.0}, max_steps=100_000_000)
+        assert (found.certified == 1).all()
+        np.testing.assert_allclose(found.x_end[1:], found.x_end[0], rtol=1e-13)
+
+    @pytest.mark.slow
+    def test_narrow_pulse_after_a_long_rest_breaks_the_body_loose(self):
+        """The pulse is up to 1e12 of its widths away; its time is known to the rounding of its largest term."""
+        width, mu_s = 1e-3, 0.2
+        of = forced(STICTION | {"mu_s": mu_s, "mu_k": 0.1}, frequency=1.0, gravity=10.0) | {
+            "force": {"formula": "F*(1 + tanh((t - t0)/w))/2", "F": 3.0, "t0": 1.0, "w": width}
+        }
+        middle = 10.0 ** np.arange(10)
+        found = runs(of, {"force.t0": middle, "time.span": middle + 5.0})
+        assert (found.certified == 1).all()
+        broken_loose = width * atanh(2.0 * mu_s * 10.0 / 3.0 - 1.0)
+        np.testing.assert_allclose(found.first_slip - middle, broken_loose, atol=1e-16 * middle[-1])
+        np.testing.assert_allclose(found.x_end, 4.0, rtol=1e-6)
