@@ -52,11 +52,12 @@ def cubic(omega, amplitude):
 def test_slow_growth_of_a_forced_motion_is_transient():
     """The damper takes less than the falling friction gives: the swing grows until the body sticks."""
     of = scene("tustin", 0.5, 0.1, x=0.5, mu_s=0.302, mu_k=0.3, alpha=1.0, damping=5e-4)
-    found = over(of, 0.5, [50, 100, 300, 1000])
-    assert words(found) == ["transient"] * 3 + ["periodic"]
-    np.testing.assert_array_equal(found.settled, [0, 0, 0, 1])
-    np.testing.assert_allclose(found.period, [np.nan, np.nan, np.nan, 4.0 * pi])
-    assert ringsweep.words(found.regime).values.tolist() == ["oscillatory"] * 3 + ["stick-slip"]
+    found = over(of, 0.5, [50, 100, 300, 1000, 2000])
+    # The body sticks from the 927th period on.
+    assert words(found) == ["transient"] * 4 + ["periodic"]
+    np.testing.assert_array_equal(found.settled, [0, 0, 0, 0, 1])
+    np.testing.assert_allclose(found.period, [*[np.nan] * 4, 4.0 * pi])
+    assert ringsweep.words(found.regime).values.tolist() == ["oscillatory"] * 3 + ["stick-slip"] * 2
 
 
 def test_resonance_without_bound_is_unbounded():
@@ -99,6 +100,80 @@ def test_the_exponent_tells_chaos_from_motion_on_a_torus():
         assert np.isnan(found.period).all()
     assert (chaotic.lyapunov > 3.0 * chaotic.lyapunov_error).all()
     assert (abs(torus.lyapunov) < 3.0 * torus.lyapunov_error).all()
+
+
+def test_word_does_not_change_where_the_span_passes_a_power_of_two_periods():
+    spans = [1000, 1020, 1024, 1025, 1030, 1035, 1060]
+    assert words(over(cubic(0.8, 0.5), 0.8, spans, True)) == ["chaotic"] * len(spans)
+    assert words(over(cubic(0.6, 0.8), 0.6, spans, True)) == ["quasi-periodic"] * len(spans)
+
+
+def hartog(ratio, friction, spans):
+    """Den Hartog's oscillator without a damper, from rest."""
+    of = scene("tustin", ratio, 1.0, v_belt=0.0, mu_s=friction, mu_k=friction, alpha=1.0)
+    return over(of, ratio, [span * ratio / (2.0 * pi) for span in spans])
+
+
+@pytest.mark.parametrize(("ratio", "friction"), [(0.25303, 0.05), (0.46835, 0.276), (0.48578, 0.276), (0.50321, 0.212)])
+def test_stops_of_a_settled_motion_are_those_of_longer_spans(ratio, friction):
+    """A stop that still comes in some of the laps is lost later, or comes in each of them."""
+    found = hartog(ratio, friction, [400.0, 800.0, 1600.0, 4000.0])
+    settled = found.settled.values == 1
+    assert settled[-1]
+    for name in ("stops_per_cycle", "period", "regime"):
+        np.testing.assert_allclose(found[name].values[settled], found[name].values[-1], rtol=1e-9)
+    np.testing.assert_allclose(found.stick_share.values[settled], found.stick_share.values[-1], rtol=0.01)
+
+
+def test_period_of_three_cycles_that_becomes_one_is_not_settled():
+    found = hartog(1.4967889908256882, 0.05, [800.0, 8000.0])
+    assert found.settled.values.tolist() == [0, 1]
+    assert found.period[1].item() == pytest.approx(2.0 * pi / 1.4967889908256882, rel=1e-9)
+
+
+@pytest.mark.parametrize("friction", [0.2, 0.3])
+def test_stops_that_shrink_for_ever_beside_a_continuum_of_motions_do_not_settle(friction):
+    """At half the natural frequency, without a damper, motions without stops lie side by side in a continuum."""
+    found = hartog(0.5, friction, [500.0, 2000.0, 8000.0])
+    assert words(found) == ["transient"] * 3
+    assert (found.stick_share[1:].values < 0.9 * found.stick_share[:-1].values).all()
+
+
+def test_drift_of_a_body_without_a_spring_under_a_force_that_vibrates():
+    """It slips forward for T (1 + P0/F)/2 of each period, so that friction takes the mean force P0 away.
+
+    With u = w t, forward from u1 to u2, the momentum gained there is (P0 - F)(u2 - u1) + P (cos u1 - cos u2) = 0.
+    """
+    mean, force, friction, omega = 0.05, 1.0, 0.3, 2.0
+    length = pi * (1.0 + mean / friction)
+    # cos u1 - cos u2 = 2 sin((u1 + u2)/2) sin(length/2); forward slip is about the maximum of the force, and later.
+    middle = pi - np.arcsin((friction - mean) * length / (2.0 * force * np.sin(length / 2.0)))
+    first = middle - length / 2.0
+
+    def distance(start, stop, drag):
+        """Distance in a slip that begins at rest; in units of 1/w^2."""
+        u = stop - start
+        return 0.5 * (mean + drag) * u**2 + force * (np.cos(start) * u + np.sin(start) - np.sin(stop))
+
+    moved = distance(first, first + length, -friction) + distance(first + length, first + 2.0 * pi, friction)
+    of = scene("tustin", omega, force, v_belt=0.0, mu_s=friction, mu_k=friction, alpha=1.0)
+    of = of | {"spring": {"stiffness": 0.0}, "force": of["force"] | {"constant": mean}}
+    found = over(of, omega, [0.9, 5, 50, 500], exponent=True)
+    assert words(found) == ["transient", "transient", "periodic", "periodic"]
+    np.testing.assert_allclose(found.drift[2:], moved / (2.0 * pi * omega), rtol=1e-8)
+    np.testing.assert_array_equal(found.settled, [0, 0, 1, 1])
+    np.testing.assert_allclose(found.period[2:], pi, rtol=1e-12)
+    # A shift in space neither grows nor decays.
+    np.testing.assert_allclose(found.multiplier_1[2:], 1.0, atol=1e-9)
+    assert (found.multiplier_2[2:] < 1.0).all()
+
+
+def test_drift_without_cycles_is_that_of_the_second_half_of_the_span():
+    """A body that brakes on a belt at rest, without a spring."""
+    of = scene("tustin", 1.0, 0.0, v_belt=0.0, mu_s=0.3, mu_k=0.3, alpha=1.0)
+    of = of | {"spring": {"stiffness": 0.0}, "initial": {"x": 0.0, "velocity": 1.0}}
+    found = over(of, 2.0 * pi, [1.0, 2.0, 20.0])
+    np.testing.assert_allclose(found.drift, [1.0 - 0.3 * 0.75, 1.0 - 0.3 * 1.5, 0.0], atol=1e-12)
 
 
 def branch(frequency, x, velocity, spans):
@@ -144,14 +219,14 @@ def test_motion_that_slowly_leaves_an_unstable_one_is_transient_until_it_has_fou
 @pytest.mark.parametrize("shrinks", [0.9, 0.99, 1.0])
 def test_lap_of_four_that_becomes_one_of_two_is_no_period(shrinks):
     """A period of two with a disturbance that each lap turns round and lets shrink, as beside a second flip."""
-    forced, k = SimpleNamespace(forcing_period=1.0, span=400.0), np.arange(400)
+    forced, k = SimpleNamespace(span=400.0), np.arange(400)
     orbit = (-1.0) ** k + 0.05 * shrinks ** (k // 2) * np.array([1.0, 1.0, -1.0, -1.0])[k % 4]
     found = cycles.begin(1.0, cycles.Mark(0.0, orbit[0], 0.0, 0.0, 0.0))
     periods = set()
     for t, x in enumerate(orbit[1:].tolist(), 1):
         mark = cycles.Mark(float(t), x, 0.0, 0.0, 0.0)
-        found = cycles.closed(forced, found, mark, float(t), True, 2.0, 2.0)
-        if cycles.returns_each_time(forced, found, 2.0, 0.0, (np.nan, np.nan)):
+        found = cycles.closed(forced, found, mark, float(t), True, 2.0, 2.0, 1.0)
+        if cycles.returns_each_time(forced, found, True, 2.0, 0.0, (np.nan, np.nan)):
             periods.add(found.period)
     assert periods == {0.9: {2.0}, 0.99: set(), 1.0: {4.0}}[shrinks]
 

@@ -65,6 +65,23 @@ def both():
     return branches().load()
 
 
+def test_swing_of_a_followed_cell_is_that_of_a_run_from_the_same_state():
+    """Where the span is a whole number of periods but for rounding, its last period counts."""
+    frequencies = np.linspace(0.2, 0.36, 24)
+    sweep = {"grid": {"force.frequency": frequencies.tolist()}, "follow": "force.frequency"}
+    scene, solver = HARDENING | {"time": {"span": 30.0}}, {"method": "auto", "certify": False}
+    followed = run(scene, sweep=sweep, solver=solver)
+    points = {
+        "force.frequency": frequencies.tolist(),
+        "initial.x": [0.0, *followed.x_end.values[:-1].tolist()],
+        "initial.velocity": [0.0, *followed.velocity_end.values[:-1].tolist()],
+        "time.span": (np.round(followed.t_end.values * frequencies) / frequencies).tolist(),
+    }
+    single = run(scene, sweep={"points": points}, solver=solver)
+    assert (single.t_end.values != followed.t_end.values).any()
+    np.testing.assert_allclose(single.swing.values, followed.swing.values, rtol=1e-9)
+
+
 def changed(scene, section, **values):
     scene = deepcopy(scene)
     scene.setdefault(section, {}).update(values)

@@ -1,6 +1,6 @@
 """Cycles of a motion, and evidence that it returns each time or has the same statistics in two parts of its record.
 
-A *cycle* is a period of the forcing; without forcing, it lasts from one turn of the motion to the next of its kind. At
+A *cycle* is a period of the forcing; in a free motion it lasts from one turn of the motion to the next of its kind. At
 the end of each cycle the state is compared with that one cycle before, and with a reference, which is replaced after
 ever more cycles (Brent's cycle detection). The first state that equals one of them closes a *lap*: the time since then
 is the period of the motion if each later lap returns too. After a lap that does not return, states must be closer to
@@ -11,11 +11,11 @@ The place x of the body is a displacement, or an angle on a ring; lengths in m a
 
 from __future__ import annotations
 
-from math import floor, inf, isnan, nan, sqrt
+from math import inf, isnan, nan, sqrt
 from typing import Any, NamedTuple
 
 from ringsweep.compile import absorbed, hook, inlined
-from ringsweep.numerics.functions import negated, select
+from ringsweep.numerics.functions import floor, negated, select
 from ringsweep.numerics.memory import select_all
 from ringsweep.quantities.flags import CHAOTIC, QUASI_PERIODIC, TRANSIENT
 
@@ -47,6 +47,9 @@ class Laps(NamedTuple):
         Distances between the ends of the last and of the first of them, as a share of the swing.
     near : float
         Greatest distance, as a share of the swing, at which a state has returned.
+    within, closest : float
+        Least distance, as a share of the swing, from the beginning of the present lap to the ends of its cycles up to
+        now, and of the last lap that returned to those of its cycles but the last; infinite if there are none.
     older, newer : Corner
         States after so many laps, the last two powers of two: `older` is at least half of the laps ago.
     """
@@ -55,6 +58,8 @@ class Laps(NamedTuple):
     gap: Any
     first_gap: Any
     near: Any
+    within: Any
+    closest: Any
     older: Corner
     newer: Corner
 
@@ -85,49 +90,53 @@ class Cycles(NamedTuple):
     Attributes
     ----------
     count, next : float
-        Number of the last cycle, and time at which the forcing ends its next period, s.
+        Number of the last cycle, and time that the record waits for, s: the end of the next period of the forcing.
     low, high : float
         Least and greatest displacement at turns since its end, m.
-    swing, swing_before, drift : float
-        Distance between the extremes of the last cycle, and of the cycle before, and displacement in it, m.
+    half_t, half_x : float
+        Time, s, and displacement, m, at the middle of the span, if it comes before the end of a cycle of the forcing;
+        else at the start.
+    swing, swing_before : float
+        Distance between the extremes of the last cycle, and of the cycle before, m.
     last, reference : Mark
         End of the last cycle, and the state with which later states are compared.
     since, most : float
         Cycles since the reference, and cycles after which it is replaced.
-    lap, half : float
-        Cycles in a lap, 0 if the motion did not return; and displacement after half of the last one, m, NaN if its
-        cycles are odd in number.
+    lap : float
+        Cycles in a lap, 0 if the motion did not return.
     laps : Laps
     sum, squares : float
         Sums of the swings of all cycles, m, and of their squares.
-    before, middle : Part
-        After the last two powers of two of cycles: at least half of the record comes after `before`.
-    period, share, stops : float
-        Duration of the last lap, s, NaN if the motion did not return. Share of stick and stops in a cycle, of the last
-        lap or of the cycles since the reference.
+    earlier, before, middle : Part
+        After the last three powers of two of cycles: at least half of the record comes after `before`.
+    period, share, stops, drift : float
+        Duration of the last lap, s, NaN if the motion did not return. Share of stick, stops in a cycle, and mean
+        velocity, m/s, of the last lap or of the cycles since the reference.
     """
 
     count: Any
     next: Any
     low: Any
     high: Any
+    half_t: Any
+    half_x: Any
     swing: Any
     swing_before: Any
-    drift: Any
     last: Mark
     reference: Mark
     since: Any
     most: Any
     lap: Any
-    half: Any
     laps: Laps
     sum: Any
     squares: Any
+    earlier: Part
     before: Part
     middle: Part
     period: Any
     share: Any
     stops: Any
+    drift: Any
 
 
 #: The motion has returned if displacement and velocity differ by less than this share of their swing in a cycle.
@@ -140,8 +149,8 @@ _NEAREST = 1e-5
 # laps must return. A free motion has no other way to return than to repeat itself.
 _EXACT, _LAPS, _LAPS_IF_FREE = 1e-7, 4.0, 1.0
 
-# A change that would add up to less than this share of the swing in ten spans is no trend.
-_TREND = 0.1
+# A change that would add up to less than this share of the swing in so many spans is no trend.
+_TREND, _SPANS = 0.1, 10.0
 
 # Gaps of laps shrink if the last one is less than this share of the first one.
 _SHRUNK = 0.3
@@ -162,6 +171,9 @@ _MERGING = 4.0
 # Stops in a cycle are the same if they differ by less.
 _SAME_STOPS = 1e-9
 
+# Share of a time by which rounding may change it.
+_SAME = 1e-13
+
 # An exponent is positive if it exceeds so many standard errors. It is zero if with so many it changes a disturbance by
 # less than the second share in a cycle.
 _POSITIVE, _ZERO = 3.0, 0.02
@@ -179,20 +191,40 @@ def difference(scene, x, other):
     return x - other
 
 
+@hook(absorb=True, optional=True)
+def place_counts(scene):
+    """1 if states at different places differ; 0 if the same motion is possible everywhere."""
+    return 1.0
+
+
 @absorbed
 def gap(scene, mark, x, velocity, swing, fast):
     """Distance of a state from a mark, as a share of the swing of place and velocity."""
-    far_x, far_v = abs(difference(scene, x, mark.x)), abs(velocity - mark.velocity)
+    far_x, far_v = place_counts(scene) * abs(difference(scene, x, mark.x)), abs(velocity - mark.velocity)
     return max(far_x / max(swing, 1e-300), far_v / max(fast, 1e-300))
 
 
 @inlined
-def begin(period, start):
-    """Cycles at the beginning of a run, which is the mark `start`; `period` is that of the forcing, s."""
+def begin(first, start):
+    """Cycles at the beginning of a run, which is the mark `start`; the record waits for the time `first`, s."""
     corner, part = Corner(0.0, start), Part(0.0, start, 0.0, 0.0, 0.0)
-    laps = Laps(0.0, 0.0, 0.0, RETURN, corner, corner)
-    sums = 0.0, 0.0, part, part, nan, nan, nan
-    return Cycles(0.0, period, start.x, start.x, 0.0, 0.0, 0.0, start, start, 0.0, 1.0, 0.0, nan, laps, *sums)
+    laps = Laps(0.0, 0.0, 0.0, RETURN, inf, inf, corner, corner)
+    sums = 0.0, 0.0, part, part, part, nan, nan, nan, nan
+    return Cycles(0.0, first, start.x, start.x, start.t, start.x, 0.0, 0.0, start, start, 0.0, 1.0, 0.0, laps, *sums)
+
+
+@absorbed
+def end_of(scene, cycle, count):
+    """Time at which a cycle of the duration `cycle` ends, s: the end of the span if only rounding separates them."""
+    end = count * cycle
+    return select(abs(end - scene.span) <= _SAME * scene.span, scene.span, end)
+
+
+@absorbed
+def number_at(c, cycle, t):
+    """Number of the last cycle of the duration `cycle` that has ended at the time `t`, when one is due."""
+    count = floor(t / cycle)
+    return max(c.count + 1.0, select(count * cycle > t, count - 1.0, count))
 
 
 @absorbed
@@ -203,11 +235,11 @@ def _with_corners(laps, first, again, start, mark):
     doubled = again & (laps.number >= 2.0 * max(newer.number, 1.0))
     older = select_all(first, begun, select_all(doubled, newer, older))
     newer = select_all(first, begun, select_all(doubled, here, newer))
-    return Laps(laps.number, laps.gap, laps.first_gap, laps.near, older, newer)
+    return Laps(laps.number, laps.gap, laps.first_gap, laps.near, laps.within, laps.closest, older, newer)
 
 
 @absorbed
-def closed(scene, c, mark, count, known, swing, fast):
+def closed(scene, c, mark, count, known, swing, fast, cycle):
     """Cycles after the end of a cycle.
 
     Parameters
@@ -223,6 +255,8 @@ def closed(scene, c, mark, count, known, swing, fast):
         Whether the state may be compared with earlier ones.
     swing, fast : float or Lanes
         Distance between the extremes of the place in the cycle, and the velocity that counts as much.
+    cycle : float or Lanes
+        Duration of a cycle, s; infinite if turns end it.
 
     Returns
     -------
@@ -238,6 +272,7 @@ def closed(scene, c, mark, count, known, swing, fast):
     open_lap = negated(returns) & (since < c.lap)
     lap = select(repeats, 1.0, select(returns, since, select(open_lap, c.lap, 0.0)))
     t_from = select(repeats, c.last.t, c.reference.t)
+    x_from = select(repeats, c.last.x, c.reference.x)
     total_from = select(repeats, c.last.total, c.reference.total)
     slips_from = select(repeats, c.last.slips, c.reference.slips)
     cycles = select(repeats, count - c.count, since)
@@ -254,6 +289,8 @@ def closed(scene, c, mark, count, known, swing, fast):
         select(returns, distance, c.laps.gap),
         select(returns & negated(again), distance, c.laps.first_gap),
         select((c.lap > 0.0) & (lap == 0.0), max(0.1 * near, _NEAREST), near),
+        select(renew, inf, min(c.laps.within, gap_reference)),
+        select(repeats, inf, select(returns, c.laps.within, c.laps.closest)),
         c.laps.older,
         c.laps.newer,
     )
@@ -263,32 +300,34 @@ def closed(scene, c, mark, count, known, swing, fast):
     here = Part(count, mark, swing, sum_now, squares)
     return Cycles(
         count,
-        (count + 1.0) * scene.forcing_period,
+        select(cycle < inf, end_of(scene, cycle, count + 1.0), c.next),
         mark.x,
         mark.x,
+        c.half_t,
+        c.half_x,
         swing,
         c.swing,
-        (mark.x - c.last.x) / (count - c.count),
         mark,
         select_all(renew, mark, c.reference),
         select(renew, 0.0, since),
         most,
         lap,
-        select(lap == c.lap, select(since + since == lap, mark.x, c.half), nan),
         laps,
         sum_now,
         squares,
+        select_all(halves, c.before, c.earlier),
         select_all(halves, c.middle, c.before),
         select_all(halves, here, c.middle),
         select(returns, (mark.t - t_from) * lap / cycles, select(keeps, c.period, nan)),
         select(keeps, c.share, (mark.total - total_from) / (mark.t - t_from)),
         select(keeps, c.stops, (mark.slips - slips_from) / cycles),
+        select(keeps, c.drift, (mark.x - x_from) / (mark.t - t_from)),
     )
 
 
 @inlined
-def returns_each_time(scene, c, fast, largest_multiplier, growth):
-    """Whether the motion returns each time, and no trend of its states would change it in ten spans.
+def returns_each_time(scene, c, forced, fast, largest_multiplier, growth):
+    """Whether the motion returns each time, and no trend of its states and stops would change it in ten spans.
 
     `fast` is that of the last cycle, see :func:`closed`; `largest_multiplier` is 0 if it is not known, `growth` is that
     of :func:`without_return`.
@@ -297,74 +336,82 @@ def returns_each_time(scene, c, fast, largest_multiplier, growth):
     laps = c.laps
     if isnan(c.period) or largest_multiplier > _UNSTABLE:
         return False
-    forced = scene.forcing_period < inf
     if laps.number < (_LAPS if forced else _LAPS_IF_FREE) and laps.gap > _EXACT:
         return False
-    if forced and exponent > _POSITIVE * error:
+    soon = _SPANS * scene.span
+    if forced and exponent > _POSITIVE * error and exponent * soon > 1.0:
         # It returns within the tolerance only, or stays beside a periodic motion for a while.
         return False
     # The corners are states at the ends of laps, and so is the reference.
     changed = gap(scene, laps.older.mark, c.reference.x, c.reference.velocity, c.swing, fast)
     change = changed / (laps.number - laps.older.number)
     # Laps of many cycles are few: there as many must come as there are cycles.
-    to_come = change * (10.0 * scene.span * max(c.lap, 1.0) / c.period)
+    to_come = change * (soon * max(c.lap, 1.0) / c.period)
     if laps.gap < _SHRUNK * laps.first_gap:
         # Gaps that shrink add up to a geometric series. On a torus they vary, but little in a few laps.
         ratio = (laps.gap / laps.first_gap) ** (1.0 / (laps.number - 1.0))
         to_come = min(to_come, laps.gap * ratio / (1.0 - ratio)) if ratio < 1.0 else to_come
     # Where disturbances change their sign in each lap, two of these laps return before one does.
-    merging = forced and abs(difference(scene, c.half, c.reference.x)) <= _MERGING * to_come * c.swing
-    return to_come <= _TREND and not merging
+    merging = forced and laps.closest <= _MERGING * to_come
+    if to_come > _TREND or merging:
+        return False
+    # Beside a continuum of motions stops may shrink for ever, and the states no longer change.
+    share, stops = stops_of_laps(c)
+    same = abs(stops - c.stops) < _SAME_STOPS and abs(share - c.share) <= RETURN * c.share + _SAME_STOPS
+    return same or not forced
 
 
 @inlined
-def stops_of_laps(c, period):
-    """Share of stick and stops in a cycle of a forced motion that returns.
-
-    They are those of the last lap, unless earlier ones have other stops: then those of the later half of the laps.
-    """
-    first = c.laps.older.mark
+def stops_of_laps(c):
+    """Share of stick and stops in a cycle of the last third of the laps, or of up to two thirds."""
+    older, newer = c.laps.older, c.laps.newer
+    first = newer.mark if c.laps.number >= 1.5 * newer.number > 0.0 else older.mark
     t = c.reference.t - first.t
-    stops = (c.reference.slips - first.slips) / floor(t / period + 0.5)
-    return (c.share, c.stops) if abs(stops - c.stops) < _SAME_STOPS else ((c.reference.total - first.total) / t, stops)
+    return (c.reference.total - first.total) / t, (c.reference.slips - first.slips) / floor(t * c.lap / c.period + 0.5)
 
 
 @inlined
-def part_sizes(c):
-    """Numbers of cycles in the two parts of the record that are compared."""
-    return c.middle.count - c.before.count, c.count - c.middle.count
+def parts(c):
+    """Beginnings of the two parts of the record that are compared; the second is not shorter than the first."""
+    if c.count - c.middle.count < c.middle.count - c.before.count:
+        return c.earlier, c.before
+    return c.before, c.middle
 
 
 @inlined
-def without_return(c, period, growth):
+def without_return(c, forced_by_period, cycle, growth):
     """What a forced motion that does not return settles to, as far as its record and its exponent tell.
 
     Parameters
     ----------
     c : Cycles
-        With at least one cycle in each part of the record.
-    period : float
-        Period of the forcing, s.
+    forced_by_period : bool
+        Whether the forcing has a period.
+    cycle : float
+        Duration of a cycle, s.
     growth : tuple of float
         Largest exponent and its standard error, 1/s; NaN if they are not known.
     """
-    (exponent, error), (first, second) = growth, part_sizes(c)
-    mean_1, mean_2 = (c.middle.sum - c.before.sum) / first, (c.sum - c.middle.sum) / second
-    scatter_1 = max((c.middle.squares - c.before.squares) / first - mean_1 * mean_1, 0.0)
-    scatter_2 = max((c.squares - c.middle.squares) / second - mean_2 * mean_2, 0.0)
+    (exponent, error), (begin_1, begin_2) = growth, parts(c)
+    first, second = begin_2.count - begin_1.count, c.count - begin_2.count
+    if isnan(exponent) or first < _FEWEST:
+        return TRANSIENT
+    mean_1, mean_2 = (begin_2.sum - begin_1.sum) / first, (c.sum - begin_2.sum) / second
+    scatter_1 = max((begin_2.squares - begin_1.squares) / first - mean_1 * mean_1, 0.0)
+    scatter_2 = max((c.squares - begin_2.squares) / second - mean_2 * mean_2, 0.0)
     allowed = _ERRORS * sqrt(scatter_1 * (1.0 / first + 1.0 / second)) + _SAME_SWING * mean_1
-    time_1, time_2 = c.middle.mark.t - c.before.mark.t, c.last.t - c.middle.mark.t
-    stick_1 = (c.middle.mark.total - c.before.mark.total) / time_1
-    stick_2 = (c.last.total - c.middle.mark.total) / time_2
+    time_1, time_2 = begin_2.mark.t - begin_1.mark.t, c.last.t - begin_2.mark.t
+    stick_1 = (begin_2.mark.total - begin_1.mark.total) / time_1
+    stick_2 = (c.last.total - begin_2.mark.total) / time_2
     same_stick = abs(stick_1 - stick_2) <= _SAME_STICK + 1.0 / sqrt(second)
-    if isnan(exponent) or first < _FEWEST or abs(mean_1 - mean_2) > allowed or not same_stick:
+    if abs(mean_1 - mean_2) > allowed or not same_stick:
         return TRANSIENT
     least, most = min(scatter_1, scatter_2), max(scatter_1, scatter_2)
+    grown, rounding = exponent * (time_1 + time_2), (_SCATTERED * mean_1) ** 2
     if exponent > _POSITIVE * error:
-        grown = exponent * (time_1 + time_2) > _GROWN and least > (_SCATTERED * mean_1) ** 2
-        # A few cycles tell no scatter.
-        return CHAOTIC if grown and (second < _FEWEST or most <= _SAME_SCATTER * least) else TRANSIENT
-    torus = c.lap == 0.0 and second >= _FEWEST and most <= _SAME_ON_TORUS * least
-    if torus and (abs(exponent) + _POSITIVE * error) * period <= _ZERO:
-        return QUASI_PERIODIC
-    return TRANSIENT
+        chaos = grown > _GROWN and rounding < least and most <= _SAME_SCATTER * least
+        return CHAOTIC if chaos else TRANSIENT
+    # Under forcing that does not repeat, neither does a motion that has forgotten its start.
+    drawn = not forced_by_period and grown < -_GROWN and most <= _SAME_SCATTER * max(least, rounding)
+    torus = (c.lap == 0.0 or not forced_by_period) and (abs(exponent) + _POSITIVE * error) * cycle <= _ZERO
+    return QUASI_PERIODIC if drawn or (torus and most <= _SAME_ON_TORUS * least) else TRANSIENT

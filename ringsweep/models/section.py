@@ -19,9 +19,6 @@ from ringsweep.quantities.parameters import Leaf
 # A maximum counts if the body has moved farther towards it than this share of the range of its displacement.
 _ROUNDING = 1e-6
 
-# Share of a time by which rounding may change it.
-_SAME = 1e-13
-
 
 class AtPeriod(NamedTuple):
     """What a scene asks for: points at the end of each period of the forcing.
@@ -209,19 +206,8 @@ def finish(asked, scene, record):
     """Put the points into their order in time."""
 
 
-@finish.implements(AtPeriod)
-def _finish_at_period(asked, scene, record):
-    p, last = record.section, record.last
-    count = p.number
-    if record.cycles.next < inf and record.cycles.next - last.t <= _SAME * last.t:
-        # But for rounding, the run ends with a period.
-        _store(p.deflections, asked, p, cycles.difference(scene, last.x, 0.0), last.velocity)
-        count += 1.0
-    _order(asked, p.row, count)
-
-
-@finish.implements(AtTurn)
-def _finish_at_turn(asked, scene, record):
+@finish.implements(AtPeriod, AtTurn)
+def _finish(asked, scene, record):
     _order(asked, record.section.row, record.section.number)
 
 

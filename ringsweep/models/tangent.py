@@ -366,7 +366,8 @@ def _multipliers(vector, flow, share, period, earlier):
 def _blocks(b, span, t, growth, ends):
     """Blocks up to now. In a forced motion they end with a period of the forcing (`ends`), unless it is long."""
     width = (1.0 - _SKIPPED) * span / _BLOCKS
-    if t < b.until or not (ends or t >= b.until + width):
+    # Where blocks end with periods of the forcing, rounding does not decide with which one.
+    if t < b.until * (1.0 - 1e-12) or not (ends or t >= b.until + width):
         return b
     until = _SKIPPED * span + width * (b.number + 2.0)
     if b.number < 0.0:

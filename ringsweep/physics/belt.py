@@ -86,7 +86,12 @@ class Belt(NamedTuple):
     span : float
         Span of time, s.
     forcing_period : float
-        Period of the forcing, s; infinite without a period.
+        Period that drive and force have in common, s; infinite without one.
+    cycle : float
+        Duration of a cycle, s: that period; a natural period if drive or force vary without one. Infinite in a free
+        motion, whose turns end its cycles.
+    place_counts : float
+        1 if a force depends on the displacement, else 0: without a spring all places are alike.
     asked : NamedTuple
         What the record is asked for beyond the outcomes; an empty tuple for nothing.
     section : NamedTuple
@@ -105,6 +110,8 @@ class Belt(NamedTuple):
     initial_v: Leaf
     span: Leaf
     forcing_period: Leaf
+    cycle: Leaf
+    place_counts: Leaf
     asked: Any = ()
     section: Any = ()
     initial_z: Any = ()

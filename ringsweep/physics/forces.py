@@ -6,10 +6,7 @@ and an amplitude A in N.
 
 from __future__ import annotations
 
-from math import inf
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from ringsweep.compile import hook
 from ringsweep.physics import drives
@@ -193,7 +190,4 @@ def _beginning(drive):
 
 @drives.period.implements(Forced)
 def _period(drive):
-    # Of a motion and a force that do not repeat, the other one decides.
-    periods = (drives.period(drive.motion), drives.force_period(drive.force))
-    found = common_period(*(np.where(np.isinf(period), 0.0, period) for period in periods))
-    return np.where(found == 0.0, inf, found)
+    return common_period(drives.period(drive.motion), drives.force_period(drive.force))

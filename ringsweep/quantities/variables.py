@@ -141,6 +141,9 @@ OUTCOMES: dict[str, Variable] = {
     "stick_share": Variable("1", "share of a cycle in which the body sticks to the belt"),
     "stops_per_cycle": Variable("1", "stops in a cycle"),
     "swing": Variable("m", "distance between the extremes of the displacement in the last cycle"),
+    "drift": Variable(
+        "m/s", "mean velocity of the body in the last cycles, or without them in the second half of the span"
+    ),
     "settled": classes("whether the motion has settled", ("not_settled", "settled")),
     "long_run": classes(
         "what the motion settles to",

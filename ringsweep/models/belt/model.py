@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
+from math import inf
 from typing import Any, ClassVar
 
 import numpy as np
@@ -165,8 +166,7 @@ class Belt(Model, Continues):
             fields["asked"] = Exponent()
         if structure.section is not None:
             fields["section"] = section.field(structure.section, SECTION, len(mass))
-        period = np.broadcast_to(drives.period(fields["drive"]), mass.shape).copy()
-        fields["forcing_period"] = period_of(structure, period)
+        fields |= _periods(structure, values, np.broadcast_to(drives.period(forced), mass.shape))
         fields["viscous"] = values.get("friction.viscous", np.zeros(len(mass)))
         if friction.family_of(law) is not friction.Dynamic:
             viscous, load = fields["viscous"], mass * gravity
@@ -236,6 +236,25 @@ class Belt(Model, Continues):
         else:
             return drive
         return forces.Forced(drive, force, constant, abs(constant) + largest)
+
+
+# Cycles in a span if neither the forcing nor a spring has a period.
+_CYCLES = 96
+
+
+def _periods(structure: Structure, values: Values, period: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    """Fields of a cell for its cycles, from the period of drive and force, s: 0 if neither varies."""
+    stiffness = values["spring.stiffness"]
+    repeats = period_of(structure, np.where(period > 0.0, period, inf))
+    with np.errstate(divide="ignore"):
+        natural = 2.0 * np.pi * np.sqrt(values["body.mass"] / stiffness)
+    natural = np.where(stiffness > 0.0, natural, values["time.span"] / _CYCLES)
+    rises = [values[path] != 0.0 for path in ("spring.cubic", "body.normal_stiffness") if path in values]
+    return {
+        "forcing_period": repeats,
+        "cycle": np.where((period > 0.0) & (repeats == inf), natural, repeats),
+        "place_counts": np.logical_or.reduce([stiffness > 0.0, *rises]).astype(float),
+    }
 
 
 def _largest_deflection(structure: Structure, values: Values) -> NDArray[np.float64]:

@@ -1,8 +1,8 @@
 """Record and outcome of runs on the belt: extremes, stops, cycles, and the word for what the motion settles to.
 
 A *stop* is an interval in which the body sticks to the belt, and stays longer than a motion that only passes or grazes
-the speed of the belt. A *cycle* is a period of the forcing; without forcing, it lasts from one turn of the displacement
-to the next of its kind. See :mod:`ringsweep.models.cycles`.
+the speed of the belt. A *cycle* is a period of the forcing, and a natural period if the forcing has none; in a free
+motion it lasts from one turn of the displacement to the next of its kind. See :mod:`ringsweep.models.cycles`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ringsweep.models.cycles import RETURN, Cycles, Mark
 from ringsweep.models.interface import recorder, shock
 from ringsweep.models.interface.status import BROKEN, COMPLETE, SEPARATED_1
 from ringsweep.models.turn import Interval, between, turn_within
-from ringsweep.numerics.functions import any_of, floor, lanes_body, negated, select, square_root
+from ringsweep.numerics.functions import any_of, lanes_body, negated, select, square_root
 from ringsweep.numerics.memory import select_all
 from ringsweep.physics import ring
 from ringsweep.physics.belt import Belt, BristleBelt
@@ -57,6 +57,7 @@ class Outcome(NamedTuple):
     stick_share: float
     stops_per_cycle: float
     swing: float
+    drift: float
     settled: float
     long_run: float
     force_max: float
@@ -160,7 +161,7 @@ class Record(NamedTuple):
 #: Record with another tangent.
 with_tangent = replacing("tangent")
 _with_shocks, _with_section = replacing("shocks"), replacing("section")
-_with_extremes = replacing("low", "high")
+_with_extremes, _with_half = replacing("low", "high"), replacing("next", "half_t", "half_x")
 
 # A swing has no bound if it is so many times the scales of the scene, and its growth in a cycle falls by less than the
 # second share between two parts of the record.
@@ -202,11 +203,23 @@ def begin(scene, t, seen, band, play):
         velocity,
         abs(force),
         Stops(1.0, t, 0.0, t, -max(least, 1e-300), nan, t, 0.0, 0.0, nan),
-        cycles.begin(scene.forcing_period, start),
+        cycles.begin(_first_time(scene), start),
         shock.begin(acceleration),
         tangent.begin(scene.asked, scene, t),
         (),
     )
+
+
+@inlined
+def _first_time(scene):
+    """Time that the record waits for first, s: the end of a cycle, or the middle of a span that is not as long."""
+    end = cycles.end_of(scene, scene.cycle, 1.0)
+    return end if end <= scene.span else 0.5 * scene.span
+
+
+@cycles.place_counts.implements(Belt, BristleBelt)
+def _place_counts(scene):
+    return scene.place_counts
 
 
 @recorder.lend.implements(Belt, BristleBelt)
@@ -340,9 +353,15 @@ def _pace(scene):
 
 @absorbed
 def _cycles(scene, r, stops, now, v, turn, span):
-    """Cycles after an interval in which the velocity changed its sign or a period of the forcing ended."""
-    c, last, period = r.cycles, r.last, scene.forcing_period
+    """Cycles after an interval in which the velocity changed its sign or a time came that the record waits for."""
+    c, last, period = r.cycles, r.last, scene.cycle
     due = now.t >= c.next
+    # Before a cycle has ended, this may be the middle of the span.
+    halfway = due & (c.next < cycles.end_of(scene, period, 1.0))
+    due = due & negated(halfway)
+    if any_of(halfway):
+        share = select(now.duration > 0.0, 1.0 - (now.t - c.next) / now.duration, 1.0)
+        c = select_all(halfway, _with_half(c, period, c.next, between(last, now, share)), c)
     low = select(turn.is_least, min(c.low, turn.x), c.low)
     high = select(turn.is_greatest, max(c.high, turn.x), c.high)
     # Without forcing a cycle ends where the body is farthest against the motion of the belt: no vibration of bristles
@@ -352,7 +371,7 @@ def _cycles(scene, r, stops, now, v, turn, span):
     far = high - low > max(r.play, _ROUNDING * span)
     turns = far & select(backward, turn.is_greatest, turn.is_least) & (period == inf)
     old = _with_extremes(c, low, high)
-    count = select(due, max(c.count + 1.0, floor(now.t / period)), c.count + select(turns, 1.0, 0.0))
+    count = select(due, cycles.number_at(c, period, now.t), c.count + select(turns, 1.0, 0.0))
     ended = due | turns
     if any_of(ended):
         share = select(now.duration > 0.0, 1.0 - (now.t - count * period) / now.duration, 1.0)
@@ -368,7 +387,7 @@ def _cycles(scene, r, stops, now, v, turn, span):
         fast = swing * (2.0 * pi) / _pace(scene)
         mark = Mark(t_mark, x_mark, v_mark, total, stops.slips)
         # Without forcing the launch is not the end of a cycle.
-        new = cycles.closed(scene, c, mark, count, due | (c.count > 0.0), swing, fast)
+        new = cycles.closed(scene, c, mark, count, due | (c.count > 0.0), swing, fast, period)
         return select_all(ended, new, old)
     return old
 
@@ -377,7 +396,7 @@ def _cycles(scene, r, stops, now, v, turn, span):
 def _conclude(scene, record, status, t, place, velocity):
     r, x = record, place
     section.finish(scene.section, scene, r)
-    motion, long_run, period, share, stops = _settles_to(scene, r, t)
+    motion, long_run, period, share, stops, drift = _settles_to(scene, r, t)
     if status == BROKEN or not (isfinite(x) and isfinite(velocity)):
         motion = FAILED
     if status != COMPLETE or motion == FAILED:
@@ -398,6 +417,7 @@ def _conclude(scene, record, status, t, place, velocity):
         share,
         stops,
         r.cycles.swing if stops == stops else nan,
+        drift,
         0.0 if long_run in (TRANSIENT, UNBOUNDED) else 1.0,
         float(long_run),
         r.force_max,
@@ -408,10 +428,32 @@ def _conclude(scene, record, status, t, place, velocity):
 
 @inlined
 def _settles_to(scene, r, t):
-    """Words for the motion and for what it settles to, period, share of stick and stops in a cycle."""
+    """Words for the motion and for what it settles to, period, share of stick and stops in a cycle, mean velocity."""
+    c, forced, repeats = r.cycles, scene.cycle < inf, scene.forcing_period < inf
+    returns = (repeats or not forced) and _returns_each_time(scene, r)
+    period, share, stops_per_cycle, swing = c.period if returns else nan, c.share, c.stops, c.swing
+    drift = (r.last.x - c.half_x) / (t - c.half_t) if t > c.half_t else r.last.velocity
+    if returns:
+        drift = c.drift
+    elif forced and c.count > c.before.count:
+        # The last cycles before the end differ from those before another end.
+        first = c.before.mark
+        share, drift = (c.last.total - first.total) / (c.last.t - first.t), (c.last.x - first.x) / (c.last.t - first.t)
+        stops_per_cycle = (c.last.slips - first.slips) / (c.count - c.before.count)
+        swing = c.swing if repeats else (c.sum - c.before.sum) / (c.count - c.before.count)
+    words = _words(scene, r, t, (returns, period, share, stops_per_cycle, swing, drift))
+    return *words, drift
+
+
+@inlined
+def _words(scene, r, t, of):
+    """Words for the motion and for what it settles to, period, share of stick and stops in a cycle.
+
+    `of` are what the cycles tell: whether the motion returns, period, share, stops, swing and mean velocity.
+    """
     c, stops = r.cycles, r.stops
-    forced, returns = scene.forcing_period < inf, _returns_each_time(scene, r)
-    period = c.period if returns else nan
+    returns, period, share, stops_per_cycle, swing, drift = of
+    forced, repeats = scene.cycle < inf, scene.forcing_period < inf
     stop = t - stops.start
     in_stop = stop > abs(stops.least)
     # On a belt at rest, or without a spring, the load on a stuck body does not grow.
@@ -421,21 +463,23 @@ def _settles_to(scene, r, t):
     stiffness = scene.body.mass * abs(ring.acceleration_gradient(scene.body, 0.0, 0.0, (ahead, 0.0, 0.0))[0])
     loads = stiffness * travel > _ROUNDING * 1e-3 * breakaway_force(scene, r.last.x)
     if forced:
-        # In stick the body may creep, but the belt does not carry it away.
-        for_good = c.share > 1.0 - 1e-9 and abs(c.drift) <= max(RETURN * c.swing, r.band * scene.forcing_period)
+        # In stick the body may creep, but the belt does not carry it to where the spring pulls it loose.
+        stuck, carried = (c.share, c.drift) if repeats else (share, drift)
+        carried = abs(carried) * scene.cycle * scene.place_counts
+        for_good = stuck > 1.0 - 1e-9 and carried <= max(RETURN * swing, r.band * scene.cycle)
     else:
         for_good = not loads
     # A stuck body that moves goes with its belt.
-    held = PERIODIC if forced and c.swing > max(r.play, r.band * scene.forcing_period) else REST
+    moves = forced and swing > max(r.play, r.band * scene.cycle)
+    held = REST if not moves else PERIODIC if repeats else _without_return(scene, r)
     still = STEADY if belt_velocity != 0.0 else REST
     rests = max(abs(r.last.velocity), abs(r.last.v_rate) * _pace(scene)) <= RETURN * abs(belt_velocity)
     if not forced and in_stop and rests and belt_velocity != 0.0:
         # The belt slides along under a body at rest, below the speed at which its friction no longer grows.
         return SLIDING, STEADY, nan, 0.0, 0.0
-    if in_stop and stops.least < 0.0:
-        return RIDING, held if for_good else TRANSIENT, c.period if for_good else nan, 1.0, 0.0
-    if in_stop and for_good:
-        return STICKING, held, c.period if forced else nan, 1.0, 0.0
+    if in_stop and (for_good or stops.least < 0.0):
+        motion = RIDING if stops.least < 0.0 else STICKING
+        return motion, held if for_good else TRANSIENT, c.period if for_good and repeats else nan, 1.0, 0.0
     natural = 2.0 * pi / sqrt(scene.body.stiffness / scene.body.mass) if scene.body.stiffness > 0.0 else inf
     slips_since = t - stops.slip_start
     if isnan(c.share) or (not forced and not in_stop and min(slips_since, t - c.last.t) > 2.0 * natural):
@@ -443,22 +487,15 @@ def _settles_to(scene, r, t):
         if in_stop or (stops.slips > 0.0 and slips_since < natural):
             return STICK_SLIP, TRANSIENT, nan, (stops.total + (stop if in_stop else 0.0)) / t, nan
         if natural < inf:
-            swing = max(r.x_max, r.last.x) - min(r.x_min, r.last.x)
-            steady = abs(r.last.velocity) * min(natural, scene.span) <= RETURN * swing
+            far = max(r.x_max, r.last.x) - min(r.x_min, r.last.x)
+            steady = abs(r.last.velocity) * min(natural, scene.span) <= RETURN * far
         else:
             steady = abs(r.last.v_rate) * scene.span <= RETURN * abs(r.last.v)
-        return SLIDING, still if steady else TRANSIENT, nan, 0.0, 0.0
-    share, stops_per_cycle = c.share, c.stops
-    if forced and not returns and c.last.t > c.before.mark.t:
-        # The last cycles before the end differ from those before another end.
-        share = (c.last.total - c.before.mark.total) / (c.last.t - c.before.mark.t)
-        stops_per_cycle = (c.last.slips - c.before.mark.slips) / (c.count - c.before.count)
-    if forced and returns:
-        share, stops_per_cycle = cycles.stops_of_laps(c, scene.forcing_period)
+        return SLIDING, still if steady and not forced else TRANSIENT, nan, 0.0, 0.0
     long_run = PERIODIC if returns else _without_return(scene, r)
     if stops_per_cycle > 0.0 or share > 0.0 or (in_stop and not forced):
         return STICK_SLIP, long_run, period, share, stops_per_cycle
-    if c.swing <= _ROUNDING * (r.x_max - r.x_min):
+    if scene.place_counts > 0.0 and swing <= _ROUNDING * (r.x_max - r.x_min):
         return SLIDING, still, nan, 0.0, 0.0
     # At a high frequency even a slow decay per cycle ends the motion within the span.
     decays = not forced and c.lap == 1.0 and abs(c.swing - c.swing_before) * c.count > _DECAY * c.swing
@@ -474,24 +511,26 @@ def _returns_each_time(scene, r):
     """Whether the motion returns each time, and no trend of its states would change it in ten spans."""
     fast = r.cycles.swing * (2.0 * pi) / _pace(scene)
     largest, growth = tangent.largest_multiplier(r.tangent), tangent.exponent(r.tangent)
-    return cycles.returns_each_time(scene, r.cycles, fast, largest, growth)
+    return cycles.returns_each_time(scene, r.cycles, scene.cycle < inf, fast, largest, growth)
 
 
 @inlined
 def _without_return(scene, r):
     """What a motion that does not return settles to, as far as two parts of its record and its exponent tell."""
     c = r.cycles
-    first, second = cycles.part_sizes(c)
-    if scene.forcing_period == inf or c.before.count < 1.0 or second < 1.0:
+    begin_1, begin_2 = cycles.parts(c)
+    first, second = begin_2.count - begin_1.count, c.count - begin_2.count
+    if scene.cycle == inf or first < 1.0:
         return TRANSIENT
     stiffness = scene.body.stiffness
     force = largest_force(scene.drive) + breakaway_force(scene, 0.0)
     scale = force / stiffness + abs(r.last.velocity - r.last.v) * _pace(scene) if stiffness > 0.0 else inf
-    growth = (c.middle.swing - c.before.swing) / first
+    growth = (begin_2.swing - begin_1.swing) / first
     if c.swing > _BEYOND * scale and growth > 0.0:
-        slower = (c.swing - c.middle.swing) / second < (1.0 - _SLOWER) * growth
+        slower = (c.swing - begin_2.swing) / second < (1.0 - _SLOWER) * growth
         return TRANSIENT if slower else UNBOUNDED
-    return cycles.without_return(c, scene.forcing_period, tangent.exponent(r.tangent))
+    repeats = scene.forcing_period < inf
+    return cycles.without_return(c, repeats, scene.cycle, tangent.exponent(r.tangent))
 
 
 @recorder.begin.implements(Belt)

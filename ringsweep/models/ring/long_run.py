@@ -76,7 +76,7 @@ def begin(asked, scene, t, seen):
 @begin.implements(Asked)
 def _begin(asked, scene, t, seen):
     phi, omega = seen[0], seen[1]
-    started = cycles.begin(scene.forcing_period, Mark(t, phi, omega, 0.0, 0.0))
+    started = cycles.begin(cycles.end_of(scene, scene.forcing_period, 1.0), Mark(t, phi, omega, 0.0, 0.0))
     return LongRun(Last(t, phi, omega), phi, phi, started, tangent.begin(scene.asked, scene, t), ())
 
 
@@ -149,13 +149,13 @@ def _observe(long_run, scene, stick_time, t, duration, seen):
     low, high = min(r.low, phi), max(r.high, phi)
     if t >= c.next:
         period = scene.forcing_period
-        count = max(c.count + 1.0, floor(t / period))
+        count = cycles.number_at(c, period, t)
         share = 1.0 - (t - count * period) / duration if duration > 0.0 else 1.0
         share = min(max(share, 0.0), 1.0)
         velocity = (1.0 - share) * r.last.velocity + share * omega
         mark = Mark(count * period, between(r.last, now, share), velocity, stick_time, 0.0)
         fast = (high - low) * (2.0 * pi) / _pace(scene)
-        cycles_now = cycles.closed(scene, c, mark, count, True, high - low, fast)
+        cycles_now = cycles.closed(scene, c, mark, count, True, high - low, fast, period)
         low = high = mark.x
     return LongRun(
         Last(t, phi, omega),
@@ -187,12 +187,11 @@ def _followed(long_run, outcome, scene, status):
     fast = c.swing * (2.0 * pi) / _pace(scene)
     word, period = TRANSIENT, nan
     if status == COMPLETE:
-        first, second = cycles.part_sizes(c)
         largest, growth = tangent.largest_multiplier(r.tangent), tangent.exponent(r.tangent)
-        if cycles.returns_each_time(scene, c, fast, largest, growth):
+        if cycles.returns_each_time(scene, c, True, fast, largest, growth):
             word, period = PERIODIC, c.period
-        elif c.before.count >= 1.0 and first >= 1.0 and second >= 1.0:
-            word = cycles.without_return(c, scene.forcing_period, growth)
+        else:
+            word = cycles.without_return(c, True, scene.forcing_period, growth)
     settled = 0.0 if word in (TRANSIENT, UNBOUNDED) else 1.0
     return tangent.with_exponent(r.tangent, joined(outcome, (period, settled, float(word))), period, scene)
 

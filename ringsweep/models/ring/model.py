@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
-from math import pi
+from math import inf, pi
 from typing import Any, ClassVar
 
 import numpy as np
@@ -101,7 +101,7 @@ class SingleContactRing(Model, Continues):
         drive, cells = drive_of(structure, values), len(values["time.span"])
         # Zones turn with the ring: its angle must return, not only its velocity.
         period = drives.force_period(drive) if structure.arcs else drives.period(drive)
-        return period_of(structure, np.broadcast_to(period, cells).copy())
+        return period_of(structure, np.broadcast_to(np.where(period == 0.0, inf, period), cells).copy())
 
     def regimes(self, paths: Collection[str]) -> tuple[str, ...]:
         """Regimes that runs can have."""
