@@ -508,27 +508,6 @@ class TestRegimes:
         assert REGIMES[int(found.regime)] == "riding"
         assert found.settled == 1
 
-    @pytest.mark.parametrize("law", mostly_slow(["stiction", "bengisu-akay", "dahl", "lugre"], ("stiction", "lugre")))
-    def test_regimes_equal_those_of_the_mirror_image(self, law):
-        """Belt, place and velocity have the opposite sign."""
-        rng = np.random.default_rng(5)
-        cases = {
-            "belt.velocity": rng.uniform(0.02, 0.4, 12),
-            "initial.x": rng.uniform(-2, 2, 12),
-            "initial.velocity": rng.uniform(-0.5, 0.5, 12),
-        }
-        scene = belt(law, span=40.0, **TestExtremes.SMALL[law])
-        one, other = (
-            ringsweep.sweep(
-                scene, {path: xr.DataArray(side * v, dims="case") for path, v in cases.items()}, progress=False
-            )
-            for side in (1, -1)
-        )
-        np.testing.assert_array_equal(one.regime, other.regime)
-        np.testing.assert_allclose(one.x_max, -other.x_min, rtol=1e-6, atol=1e-9)
-        np.testing.assert_allclose(one.period, other.period, rtol=1e-5)
-        np.testing.assert_array_equal(one.slips, other.slips)
-
     @pytest.mark.slow
     def test_rk4_step_whose_stages_cross_zero_velocity_has_no_certificate(self):
         scene = belt(v_b=0.45, mu_k=0.139, mu_s=0.2245, k=5.19, start=0.0, span=20.0)

@@ -169,14 +169,6 @@ class TestBody:
         gains = ringsweep.words(found.uncertified_because).values == "law_not_obeyed"
         assert gains.any(axis=(1, 2)).tolist() == [False, False, True]
 
-    def test_mirror_image_has_the_mirrored_run(self, drums):
-        mirrored = ringsweep.sweep(BODY, {"drive.amplitude": -AMPLITUDES}, progress=False)
-        sure = (drums.certified.values == 1) & (mirrored.certified.values == 1)
-        assert sure.sum() >= 8
-        for name in ("open_time", "gap_max", "impact_speed_max", "impacts", "tumbles", "aftermath", "regime"):
-            np.testing.assert_allclose(mirrored[name].values[sure], drums[name].values[sure], rtol=1e-6, err_msg=name)
-        np.testing.assert_allclose(mirrored.phi_end.values[sure], -drums.phi_end.values[sure], rtol=1e-6)
-
     @pytest.mark.parametrize("law", mostly_slow(["stiction", "bengisu-akay"], ("stiction",)))
     def test_run_up_to_the_first_loss_is_the_run_without_impact(self, law):
         """But for rounding: the compiler fuses other products. Tolerances are alike: no retries."""

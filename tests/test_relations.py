@@ -5,6 +5,8 @@ The scenes are random. Runs without a certificate are left out, and must be few.
 
 import numpy as np
 import pytest
+import relations
+from relations import Kind
 from solutions import solve
 from tiers import mostly_slow
 
@@ -12,8 +14,14 @@ from ringsweep.quantities.flags import SEPARATING
 from ringsweep.solvers.event import Auto
 
 COUNT = 1000
-KINDS = ("regime", "motion")
+WORDS = ("regime", "motion")
 PLACES = ("rough", "rest")
+
+#: Outcomes that are not yet as exact as their meaning asks.
+PENDING = {
+    *("force_max", "velocity_max", "omega_min", "omega_max", "normal_min_1", "normal_min_2"),
+    *("normal_max_1", "normal_max_2", "jump_max", "t_jump_max", "impulse_max"),
+}
 
 
 def draw(rng, count=COUNT, high=0.4):
@@ -43,7 +51,7 @@ def both_certified(first, second):
 
 
 def assert_alike(first, second, cells, atol=1e-6, **signs):
-    for name in KINDS:
+    for name in WORDS:
         np.testing.assert_array_equal(getattr(first, name)[cells], getattr(second, name)[cells], err_msg=name)
     for name in ("t_end", "phi_end", "omega_end"):
         a, b = getattr(first, name)[cells], signs.get(name, 1.0) * getattr(second, name)[cells]
@@ -70,79 +78,91 @@ def scenes(request, cells):
     return build
 
 
-class TestMirror:
-    """In the mirror image left and right are exchanged, and so are the contacts."""
+#: Kinds of scenes by name. The first ones take kernels that other tests take too.
+SPRING = ("spring.cubic", "damper.coefficient")
+LOADS = ("friction.viscous", "body.normal_stiffness", "force.constant")
+IN_STEP = {"drive.frequency": 0.5, "force.frequency": 1.0}
+BROAD = {"friction.alpha": 10.0, "friction.v0": 0.2}
+STEPS = {"method": "rk4", "steps": 4000}
+KINDS = {
+    "belt": Kind("belt", "stiction", force="harmonic", parts=SPRING, span=(2, 20)),
+    "belt-lugre": Kind("belt", "lugre", force="harmonic", parts=SPRING, span=(1, 8)),
+    "ring": Kind("ring", "stiction", "arctan", arcs=1),
+    "ring-smooth": Kind("ring", "bengisu-akay", "arctan", arcs=1),
+    "ring-impact": Kind("ring", "stiction", "arctan", arcs=1, impact=True),
+    "ring-rk4": Kind("ring", "bengisu-akay", "arctan", arcs=1, solver=STEPS, fixed=BROAD),
+    "ring-dahl": Kind("ring", "dahl", "arctan", arcs=1),
+    "belt-all": Kind("belt", "tustin", "sinusoidal", 0, "harmonic", SPRING + LOADS, span=(2, 20), fixed=IN_STEP),
+    "belt-load": Kind("belt", "stiction", "constant", force="constant", parts=LOADS[1:], span=(2, 40)),
+    "belt-no-spring": Kind("belt", "coulomb", "sinusoidal", span=(2, 20), fixed={"spring.stiffness": 0.0}),
+    "belt-section": Kind("belt", "hyperbolic", force="harmonic", span=(20, 60), record={"section": {"at": "period"}}),
+    "belt-clock": Kind("belt", "stiction", force="clocked", span=(2, 20)),
+    "belt-tables": Kind("belt", "coulomb", "table", force="table", span=(2, 20)),
+    "belt-karnopp": Kind("belt", "karnopp", force="harmonic", parts=LOADS[:1], span=(2, 20)),
+    "belt-smooth": Kind("belt", "bengisu-akay", force="harmonic", parts=SPRING, span=(2, 20)),
+    "belt-dahl": Kind("belt", "dahl", "sinusoidal", parts=LOADS[1:2], span=(1, 8)),
+    "belt-reset": Kind("belt", "reset-integrator", force="harmonic", span=(1, 8)),
+    "belt-rk4": Kind("belt", "bengisu-akay", "sinusoidal", span=(1, 8), solver=STEPS, fixed=BROAD),
+    "ring-zones": Kind("ring", "stiction", "sinusoidal", arcs=3),
+    "ring-power": Kind("ring", "coulomb", "power"),
+    "ring-clock": Kind("ring", "hyperbolic", "clocked"),
+    "ring-table": Kind("ring", "gaussian-stribeck", "table"),
+    "ring-implicit": Kind("ring", "brown-mcphee", solver="implicit"),
+    "ring-lugre": Kind("ring", "lugre", "constant", arcs=1),
+    "contact-rk4": Kind("ring-single-contact", "bengisu-akay", "sinusoidal", solver=STEPS, fixed=BROAD),
+    "ring-impacts": Kind("ring", "tustin", "sinusoidal", arcs=1, impact=True),
+    "contact": Kind("ring-single-contact", "stiction", "sinusoidal", arcs=1),
+    "contact-impact": Kind("ring-single-contact", "coulomb", "arctan", arcs=1, impact=True),
+}
 
-    def test_mirrored_scene_gives_the_mirrored_run(self, scenes):
-        values = draw(np.random.default_rng(21))
-        # One tenth of the bodies are launched with contact 2 on an edge of the zone, and not at rest.
-        edge = values["zone.center"] + values["zone.half_angle"] - np.arcsin(0.025 / 0.033378)
-        on_edge = (np.arange(COUNT) % 10 == 0) & (values["initial.omega"] != 0.0)
-        values["initial.phi"] = np.where(on_edge, edge, values["initial.phi"])
-        odd = ("zone.center", "drive.amplitude", "initial.phi", "initial.omega")
-        first = solve(Auto(), scenes(values))
-        second = solve(Auto(), scenes(values | {path: -values[path] for path in odd}))
-        cells = both_certified(first, second)
-        assert_alike(first, second, cells, phi_end=-1.0, omega_end=-1.0)
-        mirrored = np.array([0.0, 2.0, 1.0, 3.0])[second.separating_contact.astype(int)]
-        np.testing.assert_array_equal(first.separating_contact[cells], mirrored[cells])
-        assert {0, 1, 2, 3} == set(first.separating_contact)
+
+@pytest.fixture(scope="module", params=mostly_slow(KINDS, tuple(KINDS)[:7]))
+def drawn(request):
+    """Cells of a kind, and their outcomes."""
+    run = relations.random_scenes(KINDS[request.param], 100, np.random.default_rng(48))
+    return run, run.outcomes()
 
 
-class TestScales:
-    def test_mass_changes_forces_only_bit_for_bit(self, scenes):
-        """With 16 times the mass and the inertia, the forces are 16 times as large, and nothing else changes."""
-        values = draw(np.random.default_rng(23), 300)
-        body = {"body.mass": np.full(300, 0.076), "body.inertia": np.full(300, 4.47e-5)}
-        first = solve(Auto(), scenes(values | body))
-        second = solve(Auto(), scenes(values | {path: 16.0 * column for path, column in body.items()}))
-        for name in (*KINDS, "separating_contact", "t_end", "phi_end", "omega_end", "reversals", "steps", "certified"):
-            np.testing.assert_array_equal(getattr(first, name), getattr(second, name), err_msg=name)
-        np.testing.assert_array_equal(16.0 * first.normal_min_1, second.normal_min_1)
+class TestRandomScenes:
+    """What a mirror image, other units, another clock and another order make of random scenes of all features."""
 
-    def test_scaled_lengths_and_times_give_the_scaled_run(self, cells):
-        """On a ring at rest, with four times the lengths and twice the times."""
-        values = draw(np.random.default_rng(24))
-        values["drive.amplitude"][:] = 0.0
-        lengths = {"body.half_distance": 0.025, "body.ball_radius": 0.010, "ring.radius": 0.043378}
-        small = values | {path: np.full(COUNT, x) for path, x in lengths.items()}
-        large = values | {path: np.full(COUNT, 4.0 * x) for path, x in lengths.items()}
-        large |= {
-            "body.inertia": np.full(COUNT, 16.0 * 4.47e-5),
-            "initial.omega": 0.5 * values["initial.omega"],
-            "time.span": 2.0 * values["time.span"],
-            "classify.epsilon_omega": np.full(COUNT, 0.5e-3),
-        }
-        first, second = (solve(Auto(), cells(v, law="stiction", drive="arctan")) for v in (small, large))
-        certified = both_certified(first, second)
-        assert_alike(first, second, certified, t_end=0.5, omega_end=2.0)
-        np.testing.assert_array_equal(first.separating_contact[certified], second.separating_contact[certified])
+    @staticmethod
+    def assert_alike(first, second):
+        found = relations.differing(first, second)
+        assert {name: cells for name, cells in found.items() if name not in PENDING} == {}
+        # Where a run is close to another regime, rounding may decide whether it is too close.
+        assert (first.certified != second.certified).mean() <= 0.01
+        assert first.certified.mean() > 0.9
 
-    def test_scaled_lengths_and_times_give_the_scaled_run_under_infinite_initial_acceleration(self, cells):
-        """The drive is a power law with an exponent below 2; lengths are 16 times and times 4 times as large."""
-        rng = np.random.default_rng(25)
-        count, exponent = 300, rng.uniform(1.05, 1.95, 300)
-        values = {
-            "drive.amplitude": 10 ** rng.uniform(-1.5, 1, count),
-            "drive.exponent": exponent,
-            "time.span": rng.uniform(0.2, 1.0, count),
-            "zone.half_angle": rng.uniform(0.0, 3.0, count),
-        }
-        large = values | {
-            "body.half_distance": np.full(count, 16 * 0.025),
-            "body.ball_radius": np.full(count, 16 * 0.010),
-            "ring.radius": np.full(count, 16 * 0.043378),
-            "body.inertia": np.full(count, 256 * 4.47e-5),
-            "drive.amplitude": values["drive.amplitude"] / 4.0**exponent,
-            "time.span": 4.0 * values["time.span"],
-            "classify.epsilon_omega": np.full(count, 0.25e-3),
-            "friction.v0": np.full(count, 4 * 2e-6),
-            "friction.alpha": np.full(count, 0.25e5),
-        }
-        first, second = (solve(Auto(), cells(v, drive="power")) for v in (values, large))
-        certified = both_certified(first, second)
-        assert_alike(first, second, certified, t_end=0.25, omega_end=4.0)
-        np.testing.assert_array_equal(first.reversals[certified], second.reversals[certified])
+    @pytest.mark.parametrize("scales", [{"mass": 0.37, "length": 1.7, "time": 0.71}, {"mass": 2e3}, {"length": 3e-6}])
+    def test_outcomes_do_not_depend_on_the_units_of_mass_length_and_time(self, drawn, scales):
+        run, first = drawn
+        # The clock of this drive counts seconds.
+        scales = scales | ({"time": 1.0} if run.kind.drive == "arctan" else {})
+        second = relations.in_units(run, **scales).outcomes()
+        self.assert_alike(first, relations.in_first_units(second, scales))
+
+    def test_a_unit_of_mass_that_is_a_power_of_two_changes_no_bit(self, drawn):
+        run, first = drawn
+        second = relations.in_units(run, mass=2.0**10).outcomes()
+        assert relations.unequal(first, relations.in_first_units(second, {"mass": 2.0**10})) == {}
+
+    def test_mirror_image_has_the_mirrored_outcomes(self, drawn):
+        run, first = drawn
+        self.assert_alike(first, relations.mirror_of(relations.mirrored(run).outcomes()))
+
+    def test_whole_periods_of_the_forcing_later_the_outcomes_are_the_same(self, drawn):
+        run, first = drawn
+        for turns in (1, 9):
+            shifted = relations.later(run, turns)
+            if shifted.numbers.keys() & {"drive.frequency", "force.frequency"}:
+                self.assert_alike(first, shifted.outcomes())
+
+    def test_order_of_the_cells_and_number_of_jobs_change_no_bit(self, drawn):
+        run, first = drawn
+        order = np.random.default_rng(1).permutation(len(first.cell))
+        second = relations.in_order(run, order).outcomes(jobs=2)
+        assert relations.unequal(first, second.isel(cell=np.argsort(order))) == {}
 
 
 class TestShiftOfTime:

@@ -346,55 +346,6 @@ class TestMirror:
         (K1, K2), (slope_1, slope_2) = at(1)
         assert at(-1) == ((-K2, -K1), (slope_2, slope_1))
 
-    @pytest.mark.parametrize("number", [30, 33])
-    def test_run_of_a_figure_in_a_mirror_image_loses_the_other_contact(self, number, figure, cells, run):
-        """Launch, drive and zone are mirrored; the separation is at the same time."""
-        drive, changes, steps = figure(number)
-        found = run(cells(mirrored(changes | {"zone.center": 0.3}), drive=drive), steps)
-        self.assert_mirrored(found)
-        assert sorted(found.separating_contact) == [1, 2]
-
-    @given(
-        st.floats(-20, 20), st.floats(-20, 20), st.floats(-0.5, 0.5), st.floats(-3, 3), st.floats(0.01, 3), st.data()
-    )
-    def test_any_run_in_a_mirror_image_is_mirrored(self, cells, run, amplitude, omega, phi, center, half_angle, data):
-        changes = {
-            "drive.amplitude": amplitude,
-            "initial.omega": omega,
-            "initial.phi": phi,
-            "zone.center": center,
-            "zone.half_angle": half_angle,
-            "friction.alpha": 10.0,
-            "friction.v0": data.draw(st.floats(0.01, 0.3)),
-        }
-        self.assert_mirrored(run(cells(mirrored(changes), drive="arctan"), 500))
-
-    @staticmethod
-    def assert_mirrored(found):
-        for name in ("regime", "motion", "reversals", "turns", "steps"):
-            here, there = getattr(found, name)
-            assert here == there, name
-        for name in ("t_end", "stick_time", "stiffness"):
-            np.testing.assert_allclose(*getattr(found, name), rtol=1e-9, atol=1e-12, err_msg=name)
-        for name in ("phi_end", "omega_end"):
-            here, there = getattr(found, name)
-            assert here == pytest.approx(-there, rel=1e-9, abs=1e-9), name
-        for name in ("phi", "omega"):
-            low, high = getattr(found, f"{name}_min"), getattr(found, f"{name}_max")
-            np.testing.assert_allclose(low, -high[::-1], rtol=1e-9, atol=1e-9, err_msg=name)
-        np.testing.assert_allclose(found.normal_min_1, found.normal_min_2[::-1], rtol=1e-9, atol=1e-12)
-        contact = {0: 0, 1: 2, 2: 1}
-        assert found.separating_contact[1] == contact[found.separating_contact[0]]
-
-
-#: Parameters that change sign in a mirror image.
-ODD = {"drive.amplitude", "zone.center", "initial.phi", "initial.omega"}
-
-
-def mirrored(changes):
-    """Two cells: the given values, and their mirror image."""
-    return {path: np.array([value, -value if path in ODD else value]) for path, value in changes.items()}
-
 
 class TestGeometry:
     """Geometry of the paper's rig. The paper gives beta, but not the radius of the ring."""
