@@ -78,10 +78,11 @@ def friction_coefficients(
     return mu_s, mu_k
 
 
-def law_of(structure: Structure, values: Values, surfaces: list[Any]) -> Any:
+def law_of(structure: Structure, values: Values, surfaces: list[Any], speed: NDArray[np.float64]) -> Any:
     """Friction law with fields of shape ``(cells, ...)``, from the values by path.
 
-    `surfaces` are the pairs of friction coefficients of all surfaces of the scene.
+    `surfaces` are the pairs of friction coefficients of all surfaces of the scene, `speed` is that of the motion, m/s,
+    see :func:`ringsweep.physics.friction.speeds.hidden_fields`.
 
     Raises
     ------
@@ -100,7 +101,7 @@ def law_of(structure: Structure, values: Values, surfaces: list[Any]) -> Any:
         columns |= table_fields(*structure.curve, surfaces)
     elif law in EXPRESSIONS:
         try:
-            columns |= hidden_fields(EXPRESSIONS[law], columns, surfaces)
+            columns |= hidden_fields(EXPRESSIONS[law], columns, surfaces, speed)
         except FormulaError as error:
             own = "" if structure.law == "formula" else f"laws.{structure.law}."
             path = f"{own}at_rest" if structure.own_law is not None and error.key == "at_rest" else "law"

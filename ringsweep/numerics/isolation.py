@@ -408,7 +408,7 @@ def _running_maximum(
 
 
 def not_negligible(
-    enclosure: Enclosure, cells: Cells, factor: float
+    enclosure: Enclosure, cells: Cells, factor: float, speed: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Lowest and highest speed, m/s, at which ``exp(-factor * exponent)`` is not negligible; infinity and 0 for none.
 
@@ -416,6 +416,10 @@ def not_negligible(
     ----------
     enclosure : Enclosure
         Of the exponent.
+    cells : Cells
+    factor : float
+    speed : ndarray of shape ``(rows,)``
+        As for :func:`reach`.
     """
     first, last = np.full(enclosure.rows, np.inf), np.zeros(enclosure.rows)
 
@@ -424,7 +428,7 @@ def not_negligible(
         rate = _filled(enclosure(some.row, some.low, some.high, some.low, 1)[1], len(low))
         least = np.where((rate.low <= 0.0) & (rate.high >= 0.0), 0.0, np.minimum(abs(rate.low), abs(rate.high)))
         with np.errstate(invalid="ignore"):
-            small = factor * low > reach(factor * np.nan_to_num(least, nan=0.0))
+            small = factor * low > reach(factor * np.nan_to_num(least, nan=0.0), speed[some.row])
             kept = ~small & ((factor * high <= 10.0) | (factor * (high - low) < 2.0) | narrow | np.isnan(low))
         return np.where(small, 0, np.where(kept, 1, _OPEN)).astype(np.int8)
 
@@ -435,11 +439,11 @@ def not_negligible(
     return first, np.where(last >= FASTEST, np.inf, last)
 
 
-def reach(rate: NDArray[np.float64]) -> NDArray[np.float64]:
+def reach(rate: NDArray[np.float64], speed: NDArray[np.float64]) -> NDArray[np.float64]:
     """Exponent from which an exponential that decays at a rate, s/m, is negligible.
 
-    The rest of it changes a sliding velocity by less than 1e-17 m/s.
+    The rest of it changes a sliding velocity by less than the rounding of a speed, m/s.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
-        found: NDArray[np.float64] = np.clip(39.1 - np.log(rate), 10.0, 40.0)
+        found: NDArray[np.float64] = np.clip(36.8 - np.log(rate * speed), 10.0, 40.0)
     return found

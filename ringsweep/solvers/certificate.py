@@ -38,7 +38,7 @@ _MAY_LACK = (
     *(name for name, variable in OUTCOMES.items() if "section" in variable.dims),
 )
 
-# Relative difference of two final states that rounding explains.
+# Difference of two final states that rounding explains, as a share of the scale of a number.
 _SAME = 1e-14
 
 # Two runs have diverged if they differ by more than this share of the scale of a number, or by more than so many
@@ -145,11 +145,11 @@ def took_same_steps(runs: TwoRuns) -> NDArray[np.bool_]:
     The difference between such runs says nothing about the error. A body that sticks all the time is no such case: the
     drive alone decides its motion.
     """
-    ends = [column for column, name in enumerate(runs.outcomes) if name.endswith("_end")]
+    ends = [column for column, name in enumerate(with_errors(runs.outcomes)) if name.endswith("_end")]
     stuck = runs.column("stick_time") == runs.column("t_end")
-    a, b = runs.rows[:, ends], runs.second_rows[:, ends]
+    difference, scale = _differences(runs)
     with np.errstate(invalid="ignore"):
-        same = (np.abs(a - b) <= _SAME * (1.0 + np.abs(a))).all(axis=1)
+        same = (difference <= _SAME * scale)[:, ends].all(axis=1)
     return np.asarray(same & ~stuck)
 
 

@@ -167,6 +167,9 @@ class Belt(Model, Continues):
         if structure.section is not None:
             fields["section"] = section.field(structure.section, SECTION, len(mass))
         fields |= _periods(structure, values, np.broadcast_to(drives.period(forced), mass.shape))
+        # Without a spring the motion has no speed of its own.
+        stiffness = values["spring.stiffness"]
+        speed = mu_s * gravity * np.sqrt(np.divide(mass, stiffness, out=np.zeros_like(mass), where=stiffness > 0.0))
         fields["viscous"] = values.get("friction.viscous", np.zeros(len(mass)))
         if friction.family_of(law) is not friction.Dynamic:
             viscous, load = fields["viscous"], mass * gravity
@@ -177,7 +180,7 @@ class Belt(Model, Continues):
                     viscous,
                     "{} N s/m is too large: friction at the edge of the dead band exceeds friction within it",
                 )
-            return belt.Belt(**fields, law=law_of(structure, values, [(mu_s, mu_k)]))
+            return belt.Belt(**fields, law=law_of(structure, values, [(mu_s, mu_k)], speed))
         require(gravity > 0.0, "gravity", gravity, "{} m/s^2 is not allowed: a law with bristles needs a load")
         per_load = {
             path: value / (mass * gravity) for path, value in values.items() if path.startswith("friction.sigma")
@@ -193,7 +196,7 @@ class Belt(Model, Continues):
             # A run may end beyond the limit by its error.
             deflection = np.clip(deflection, -most, most)
         fields["initial_z"] = deflection
-        return belt.BristleBelt(**fields, law=law_of(structure, {**values, **per_load}, [(mu_s, mu_k)]))
+        return belt.BristleBelt(**fields, law=law_of(structure, {**values, **per_load}, [(mu_s, mu_k)], speed))
 
     def _drive(self, structure: Structure, values: Values) -> Any:
         """Drive of the belt, from ``belt.velocity`` or from ``drive``."""

@@ -201,7 +201,7 @@ class SingleContactRing(Model, Continues):
         return self.scene_type(structure)(
             body=body,
             surface=surface,
-            law=law_of(structure, values, surfaces),
+            law=law_of(structure, values, surfaces, np.sqrt(body.gravity * body.radius)),
             drive=drive_of(structure, values),
             initial_phi=values["initial.phi"],
             initial_omega=values["initial.omega"],

@@ -37,12 +37,18 @@ _FLAT = 0.01
 # Results for so many sets of parameters of a law are kept.
 _MOST_KEPT = 4096
 
+# Name of the speed of the motion among the parameters of a law. No parameter has a space in its name.
+_SPEED = "speed of the motion"
+
 # Rounding of a friction coefficient.
 _ROUNDING = 1e-12
 
 
 def hidden_fields(
-    expression: Expression, columns: Mapping[str, NDArray[np.float64]], surfaces: Sequence[_Surface]
+    expression: Expression,
+    columns: Mapping[str, NDArray[np.float64]],
+    surfaces: Sequence[_Surface],
+    speed: NDArray[np.float64] | float = 0.0,
 ) -> dict[str, NDArray[Any]]:
     """Fields of a law that follow from its parameters.
 
@@ -53,6 +59,8 @@ def hidden_fields(
         Parameters of the law.
     surfaces : sequence of tuple of ndarray of shape ``(cells,)``
         ``(mu_s, mu_k)`` of each surface of the scene.
+    speed : float or ndarray of shape ``(cells,)``
+        Speed of the motion, m/s: what changes it by less than its rounding is negligible. 0 if it is not known.
 
     Returns
     -------
@@ -67,6 +75,11 @@ def hidden_fields(
         If the formula has no value at rest, or another one than its kind needs; if friction jumps up at some speed; or
         if the speeds cannot be found.
     """
+    if any(threshold.kind in ("head", "tail") for threshold in expression.thresholds):
+        with np.errstate(divide="ignore"):
+            # Cells whose speeds are alike have the same fields.
+            octave = np.exp2(np.floor(np.log2(speed)))
+        columns = {**columns, _SPEED: np.broadcast_to(octave, len(surfaces[0][0]))}
     table = np.stack([*columns.values(), *(column for surface in surfaces for column in surface)], axis=1)
     rows, cell_row = _distinct(table)
     found = (_kept_fields if len(rows) <= _MOST_KEPT else _fields_of)(expression, tuple(columns), rows)
@@ -302,10 +315,10 @@ class _Finder:
         if not rate.varies and threshold.kind == "tail":
             offset, slope = (self.at(node, self.rest) for node in (exponent, rate))
             with np.errstate(all="ignore"):
-                found = (reach(scale * slope) / scale - offset) / slope
+                found = (reach(scale * slope, self.values[_SPEED]) / scale - offset) / slope
             found = np.where(slope > 0.0, np.maximum(found, 0.0), np.inf)
             return self.rest, self._of_all(found, np.max)
-        first, last = not_negligible(self._enclosed(exponent), self._cells(low, high), scale)
+        first, last = not_negligible(self._enclosed(exponent), self._cells(low, high), scale, self.values[_SPEED])
         return self._of_all(np.minimum(first, last), np.min), self._of_all(last, np.max)
 
     def _of_all(self, values: NDArray[np.float64], choose: Any) -> NDArray[np.float64]:
