@@ -101,6 +101,12 @@ class TestBelt:
         # The spring reaches breakaway when the belt has carried the body by mu_s m g / k.
         assert float(found.t_jump_max) == pytest.approx(0.15 * G / 2 / 0.1, rel=1e-9)
 
+    def test_of_jumps_that_differ_by_errors_only_the_first_tells_the_time(self):
+        """Each breakaway and each stop of a cycle makes the same jump."""
+        velocities = np.linspace(0.05, 0.2, 40)
+        found = ringsweep.sweep(BELT, {"belt.velocity": velocities}, progress=False)
+        np.testing.assert_allclose(found.t_jump_max, 0.15 * G / 2 / velocities, rtol=1e-9)
+
     def test_friction_without_a_drop_makes_no_jump(self):
         """The body is released at the speed of the belt, and friction that does not drop lets it slide on smoothly."""
         found = one(BELT | {"friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.15}, "time": {"span": "7.5 s"}})

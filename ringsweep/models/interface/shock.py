@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from ringsweep.compile import hook, inlined
 
-# A change of the acceleration below this share of its size is an error of the method.
+# A change of the acceleration below this share of its size, or of a jump, is an error of the method.
 _LEAST_SHARE = 1e-6
 
 
@@ -33,12 +33,16 @@ class Shocks(NamedTuple):
     ----------
     acceleration : float
         In rad/s^2 or m/s^2.
-    jump_max, t_jump_max : float
-        Magnitude of the jump, and its time, s; NaN if there was none.
+    jump_max : float
+        Magnitude of the largest jump.
+    first, t_jump_max : float
+        Magnitude of the first of the largest jumps, which differ from it by errors only, and its time, s; NaN if there
+        was none.
     """
 
     acceleration: float
     jump_max: float
+    first: float
     t_jump_max: float
 
 
@@ -50,7 +54,7 @@ def begin(seen):
 
 @begin.implements(Located)
 def _begin(seen):
-    return Shocks(seen.acceleration, 0.0, nan)
+    return Shocks(seen.acceleration, 0.0, 0.0, nan)
 
 
 @hook(absorb=True, optional=True)
@@ -61,7 +65,7 @@ def observe(shocks, seen):
 
 @observe.implements(Shocks)
 def _observe(shocks, seen):
-    return Shocks(seen.acceleration, shocks.jump_max, shocks.t_jump_max)
+    return Shocks(seen.acceleration, shocks.jump_max, shocks.first, shocks.t_jump_max)
 
 
 @inlined
@@ -69,7 +73,9 @@ def enter(shocks, t, seen):
     """Shocks at the beginning of a step at time `t`, where the acceleration may have jumped."""
     jump = abs(seen.acceleration - shocks.acceleration)
     if jump > shocks.jump_max and jump > _LEAST_SHARE * seen.size:
-        return Shocks(seen.acceleration, jump, t)
+        if jump > (1.0 + _LEAST_SHARE) * shocks.first:
+            return Shocks(seen.acceleration, jump, jump, t)
+        return Shocks(seen.acceleration, jump, shocks.first, shocks.t_jump_max)
     return observe(shocks, seen)
 
 
