@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
+from copy import deepcopy
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -121,6 +122,19 @@ class Run:
         axes = {path: xr.DataArray(column, dims="cell") for path, column in self.numbers.items()}
         own = {"solver": self.kind.solver, "record": self.kind.record, "jobs": 1, "progress": False}
         return ringsweep.sweep(self.scene, axes, **(own | options))
+
+
+def placed(run: Run, cell: int, *without: str) -> dict[str, Any]:
+    """The scene of one cell, with its numbers except those at the paths `without`."""
+    scene = deepcopy(run.scene)
+    for path, column in run.numbers.items():
+        *sections, name = path.split(".")
+        place = scene
+        for section in sections:
+            place = place[int(section)] if isinstance(place, list) else place.setdefault(section, {})
+        if path not in without:
+            place[name] = float(column[cell])
+    return scene
 
 
 # ---- random scenes ---------------------------------------------------------------------------
@@ -351,21 +365,21 @@ def sure(*runs: xr.Dataset) -> np.ndarray:
 
 
 def differing(first: xr.Dataset, second: xr.Dataset) -> dict[str, np.ndarray]:
-    """Cells, certified in both runs, whose outcomes differ: words at all, numbers by more than their bounds allow.
+    """Cells, certified in both runs, whose outcomes differ: words at all, numbers by more than threefold bounds.
 
-    Numbers without a bound may differ by a millionth of the greatest of their unit in the cell, or by thirty times the
+    Numbers without a bound may differ by a millionth of the greatest of their unit in the cell, or by ten times the
     bounds on the others. Where nearby runs diverge, so that the end has no bound, words alone are compared.
     """
     cells = sure(first, second)
     names = [str(name) for name in first.data_vars if name in second and name not in EFFORT]
-    bounds = {name: (first[name] + second[name]).values for name in names if name.endswith("_error")}
+    bounds = {name: 3.0 * (first[name] + second[name]).values for name in names if name.endswith("_error")}
     largest: dict[str, Any] = {}
     for name in names:
         if first[name].dtype == "float64":
             sizes = np.nan_to_num(abs(first[name].values), posinf=0.0).reshape(len(cells), -1).max(axis=1)
             largest[first[name].units] = np.maximum(largest.get(first[name].units, 1e-300), sizes)
     shares = [bound / largest[first[name].units] for name, bound in bounds.items()]
-    loose = 1e-6 + 30.0 * np.nan_to_num(shares).max(axis=0)
+    loose = 1e-6 + 10.0 * np.nan_to_num(shares).max(axis=0)
     steady = np.isfinite([bound for name, bound in bounds.items() if name in ("x_end_error", "phi_end_error")]).all(0)
     found = {}
     for name in names:

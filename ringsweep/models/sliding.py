@@ -99,6 +99,15 @@ def expand_bounds(c, rows, mode, bounds, size):
 
 
 @inlined
+def rate_at_rest(scene):
+    """Unit of the error of the angular velocity of a body at rest on a ring, rad/s: 1 rad/s, or that of a slow swing.
+
+    A unit that is too small makes steps a little shorter. One that is too large would hide the motion.
+    """
+    return min(1.0, (scene.body.gravity / scene.body.radius) ** 0.5 + 1.0 / scene.span)
+
+
+@inlined
 def speed_in(scene, mode, speed):
     """Unit of the error of the sliding velocity, m/s: `speed`, or less in the stiction band."""
     # An error as large as the band would keep the creep from becoming steady.

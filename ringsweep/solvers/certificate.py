@@ -207,7 +207,8 @@ def errors(
     steps : ndarray of shape ``(cells,)``
         Number of steps. Their rounding accumulates.
     floor, rate_floor : float or ndarray of shape ``(cells,)``
-        Errors that both runs share: relative errors, and relative errors per second, which velocities have in addition.
+        Errors that both runs share: relative errors, and errors of the rate of the place, rad/s or on a belt m/s, which
+        velocities have in addition.
 
     Returns
     -------
@@ -223,7 +224,8 @@ def errors(
         units = [OUTCOMES[name].units for name in names]
         for k, unit in enumerate(units):
             if unit.endswith(" s-1"):
-                bound[:, k] += rate_floor * scale[:, units.index(unit.removesuffix(" s-1"))]
+                place = units.index(unit.removesuffix(" s-1"))
+                bound[:, k] += rate_floor * (scale[:, place] if "rad" in units else 1.0)
     # A run that reaches the end of the span has an exact time of its end.
     reached = runs.column("regime") == runs.column("motion")
     bound[reached & (difference[:, names.index("t_end")] == 0.0), names.index("t_end")] = 0.0
@@ -239,7 +241,7 @@ def _differences(runs: TwoRuns) -> tuple[NDArray[np.float64], NDArray[np.float64
     with np.errstate(invalid="ignore", over="ignore"):
         difference = np.abs(a - runs.second_rows[:, columns])
     units = np.array([OUTCOMES[name].units for name in names])
-    scale, own_scales = np.empty_like(a), least_scales(runs.batch)
+    scale, own_scales = np.empty_like(a), {"s": np.minimum(1.0, runs.batch.span)} | least_scales(runs.batch)
     for unit in set(units.tolist()):
         of_unit = units == unit
         largest = np.nanmax(np.abs(a[:, of_unit]), axis=1, initial=0.0)

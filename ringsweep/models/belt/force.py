@@ -113,11 +113,18 @@ def _stiffness_of_cubic(body):
 
 
 @inlined
+def _time_without_spring(scene):
+    """Time in which a body without a spring moves by the unit of length, s: at most 1 s."""
+    return min(1.0, scene.forcing_period, scene.span)
+
+
+@inlined
 def length_scale(scene, velocity):
     """Length in units of which errors are measured, m, for a body with this velocity (m/s)."""
     body, cubic = scene.body, _cubic_stiffness(scene.body)
     load = scene.mu_s * body.gravity * body.mass + largest_force(scene.drive)
-    by_velocity, by_load = velocity, load / body.mass
+    time = _time_without_spring(scene)
+    by_velocity, by_load = velocity * time, load / body.mass * time * time
     if body.stiffness > 0.0:
         by_velocity, by_load = velocity * (body.mass / body.stiffness) ** 0.5, load / body.stiffness
     if cubic > 0.0:
@@ -132,4 +139,4 @@ def speed_scale(scene, length):
     """Speed in units of which errors are measured, m/s, for a motion over this length (m)."""
     body = scene.body
     stiffness_per_mass = (body.stiffness + max(_cubic_stiffness(body), 0.0) * length * length) / body.mass
-    return length * (stiffness_per_mass**0.5 if stiffness_per_mass > 0.0 else 1.0)
+    return length * stiffness_per_mass**0.5 if stiffness_per_mass > 0.0 else length / _time_without_spring(scene)

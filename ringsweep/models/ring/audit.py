@@ -16,7 +16,7 @@ from ringsweep.models.interface import audit
 from ringsweep.models.ring.bristles import slip_of
 from ringsweep.models.ring.contacts import coefficients_under
 from ringsweep.models.ring.record import Outcome
-from ringsweep.models.sliding import REACTION_TOLERANCE, audited, larger, of_balances, speed_in
+from ringsweep.models.sliding import REACTION_TOLERANCE, audited, larger, of_balances, rate_at_rest, speed_in
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction import SetValued, family_of
 from ringsweep.physics.friction.velocity import friction_at
@@ -60,7 +60,7 @@ def _violation(scene, mode, forcing, y, rates, s, tolerance):
     mu_s1, mu_k1, mu_s2, mu_k2 = under
     largest = inf if _names_wrong_segment(scene, mode, phi - theta, under) else 0.0
     terms = body.gravity + body.radius * (omega * omega + abs(ring_epsilon))
-    speed = body.radius * (1.0 + abs(omega))
+    speed = body.radius * (rate_at_rest(scene) + abs(omega))
     if mode.sign == 0:
         kappa, reserve, normal_1, normal_2 = contact.stick(body, mu_s1, mu_s2, motion, ring_epsilon)
         K1, K2 = -kappa * mu_s1, -kappa * mu_s2
@@ -111,6 +111,12 @@ _LAUNCH_TIME = 1e-13
 
 # A separation is certain if the reaction needs more time to rise again than this multiple of the error of the instant.
 _FALL_FACTOR = 5.0
+
+
+@audit.least_scales.implements(ring.Ring, ring.BristleRing)
+def least_rates(batch):
+    """The scale of an angular velocity at least, rad/s."""
+    return {"rad s-1": np.minimum(1.0, np.sqrt(batch.body.gravity / batch.body.radius) + 1.0 / batch.span)}
 
 
 @audit.undecided.implements(ring.Ring, ring.BristleRing)

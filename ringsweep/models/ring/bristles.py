@@ -23,7 +23,7 @@ from ringsweep.models.ring.contacts import (
 )
 from ringsweep.models.ring.creep import DETERMINANT, FAST, NORMAL_1, NORMAL_2, SLOW
 from ringsweep.models.ring.series import NEARLY_JAMMED, loads_in_slip, lost_in_slip
-from ringsweep.models.sliding import ENDS
+from ringsweep.models.sliding import ENDS, rate_at_rest
 from ringsweep.models.slip import Bundle, Slip, region_guards, slip
 from ringsweep.numerics.functions import (
     select,
@@ -197,8 +197,8 @@ def _region_guards(scene, mode, common, x):
 def _error_scales(scene, tolerance, x):
     mu, _ = roughest(scene.surface)
     deflection = mu / scene.law.sigma0
-    # Without gravity the load is that of a rotation at about 1 rad/s.
-    load = scene.body.gravity + scene.body.radius
+    # Without gravity the load is that of a slow rotation.
+    load = scene.body.gravity + scene.body.radius * rate_at_rest(scene) ** 2
     speed = mu * sqrt(load / scene.law.sigma0) + abs(x[1])
     return tolerance, tolerance * speed, tolerance * deflection, tolerance * deflection, tolerance * mu * load
 

@@ -28,7 +28,7 @@ from ringsweep.models.ring.contacts import (
     places_beyond,
     zones_under,
 )
-from ringsweep.models.sliding import ENDS, REACTION_TOLERANCE, expand_bounds, speed_in
+from ringsweep.models.sliding import ENDS, REACTION_TOLERANCE, expand_bounds, rate_at_rest, speed_in
 from ringsweep.numerics.clock import Instant, parts
 from ringsweep.numerics.series import (
     INVERSE,
@@ -392,7 +392,7 @@ def _expand(scene, mode, t, y, tolerance, c):
     sharpness = _expand_slip(scene, mode, c)
     _expand_slip_guards(scene, mode, c)
     per_angle = 1.0 / tolerance
-    per_velocity = per_angle / speed_in(scene, mode, scene.body.radius * (1.0 + abs(c[OMEGA, 0])))
+    per_velocity = per_angle / speed_in(scene, mode, scene.body.radius * (rate_at_rest(scene) + abs(c[OMEGA, 0])))
     # An error of the reactions could add or hide a separation. A bound on the acceleration is not enough: varying
     # friction changes the reactions even of a body that is too inert to be accelerated.
     per_load = 1.0 / REACTION_TOLERANCE * per_angle

@@ -13,7 +13,7 @@ import numpy as np
 
 from ringsweep.compile import inlined
 from ringsweep.models.interface import audit
-from ringsweep.models.ring.audit import undecided_on_contacts
+from ringsweep.models.ring.audit import least_rates, undecided_on_contacts
 from ringsweep.models.ring.impact.mode import (
     BOTH,
     NONE,
@@ -28,7 +28,7 @@ from ringsweep.models.ring.impact.mode import (
 from ringsweep.models.ring.impact.record import OUTCOMES
 from ringsweep.models.ring.impact.switch import SUMMED, motion_of
 from ringsweep.models.ring.record import Outcome
-from ringsweep.models.sliding import REACTION_TOLERANCE, larger, speed_in
+from ringsweep.models.sliding import REACTION_TOLERANCE, larger, rate_at_rest, speed_in
 from ringsweep.physics import pivot, ring
 from ringsweep.physics.friction.velocity import friction_at
 from ringsweep.physics.impact import ImpactRing, contact_of, inertia
@@ -78,7 +78,7 @@ def _violation_on_one_contact(scene, mode, forcing, y, rates, s, tolerance):
     if (mu_s, mu_k) != roughness(scene.closed.surface, rho * PER_TURN, 0.0) and min(abs(ahead), abs(behind)) > _ON_EDGE:
         largest = inf
     # Errors of the rates, and of friction by that of the sliding velocity, which the implicit steps allow.
-    speed = speed_in(scene, mode, body.radius * (1.0 + abs(f.psi_dot) + abs(f.alpha_dot)))
+    speed = speed_in(scene, mode, body.radius * (rate_at_rest(scene.closed) + abs(f.psi_dot) + abs(f.alpha_dot)))
     relaxation = 0.0
     if mode.sign == 0:
         short = max(0.0, abs(along) - mu_s * normal)
@@ -131,9 +131,9 @@ def _disturbed(batch):
 
 @audit.least_scales.implements(ImpactRing)
 def _least_scales(batch):
-    body, reach = batch.closed.body, batch.balls.reach
-    speed = reach * (1.0 + np.sqrt(body.gravity / reach))
-    return {"m": reach, "m s-1": speed, "N s": body.mass * speed, "J": body.mass * speed * speed}
+    body, reach, rates = batch.closed.body, batch.balls.reach, least_rates(batch.closed)
+    speed = reach * (rates["rad s-1"] + np.sqrt(body.gravity / reach))
+    return rates | {"m": reach, "m s-1": speed, "N s": body.mass * speed, "J": body.mass * speed * speed}
 
 
 @audit.magnified.implements(ImpactRing)

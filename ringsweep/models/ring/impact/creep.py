@@ -25,6 +25,7 @@ from ringsweep.models.ring.impact.mode import (
     ring_of,
 )
 from ringsweep.models.ring.impact.rows import row_of
+from ringsweep.models.sliding import rate_at_rest
 from ringsweep.physics import drives, pivot, ring
 from ringsweep.physics.friction.velocity import friction_in, region_bounds, stiction_band
 from ringsweep.physics.impact import ImpactRing, inertia
@@ -98,7 +99,13 @@ def _is_stiff(scene, mode, y, linear):
 def _error_scales(scene, tolerance, x):
     place, speed = implicit.error_scales(scene.closed, tolerance, (x[0], x[1]))
     gap = tolerance * _GAP_TOLERANCE
-    return place, speed, gap, gap * (1.0 + sqrt(scene.closed.body.gravity / scene.balls.reach)), 1.0
+    return (
+        place,
+        speed,
+        gap,
+        gap * (rate_at_rest(scene.closed) + sqrt(scene.closed.body.gravity / scene.balls.reach)),
+        1.0,
+    )
 
 
 @inlined

@@ -56,7 +56,7 @@ from ringsweep.models.ring.series import (
     THETA,
     V,
 )
-from ringsweep.models.sliding import REACTION_TOLERANCE, expand_bounds, speed_in
+from ringsweep.models.sliding import REACTION_TOLERANCE, expand_bounds, rate_at_rest, speed_in
 from ringsweep.numerics.series import (
     INVERSE,
     ORDER,
@@ -123,7 +123,7 @@ def _expand_pivot(scene, mode, t, y, tolerance, c):
     sharpness = _expand_pivot_motion(scene, mode, f, fresh, c)
     _expand_pivot_guards(scene, mode, f, y[2], fresh, c)
     per_angle = 1.0 / tolerance
-    speed = speed_in(scene, mode, body.radius * (1.0 + abs(f.psi_dot) + abs(f.alpha_dot)))
+    speed = speed_in(scene, mode, body.radius * (rate_at_rest(scene.closed) + abs(f.psi_dot) + abs(f.alpha_dot)))
     per_load = 1.0 / REACTION_TOLERANCE * per_angle
     if varies(scene.law, mode.region):
         per_load = max(per_load, 1e3)
