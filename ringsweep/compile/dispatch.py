@@ -68,6 +68,7 @@ def hook(stub: Callable[..., Any] | None = None, *, absorb: bool = False, option
 
     def implemented_by(cls: type, derive: Callable[[], Any]) -> None:
         derivations[cls] = derive
+        bodies.pop(cls, None)
 
     def body_of(cls: type) -> Callable[..., Any] | None:
         if cls in derivations and cls not in bodies:

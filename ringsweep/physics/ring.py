@@ -376,8 +376,8 @@ def size(body, motion):
 
 
 #: Balances of the bodies, and what follows from them, by the type of the body.
-# What :func:`body` was given, by type.
-_DECLARED: dict[type, tuple[Any, ...]] = {}
+# What makes the equations of each type that :func:`body` declares, once they are needed.
+_EQUATIONS: dict[type, Callable[[], Equations]] = {}
 
 _VARIANTS: dict[tuple[type, frozenset[str]], type] = {}
 
@@ -422,16 +422,21 @@ def body(
             raise TypeError(f"{cls.__name__}: balances is one text: give several, with commas between them")
         if offset and offset not in cls._fields:
             raise TypeError(f"{cls.__name__}: offset names the field {offset}, which does not exist")
+        try:
+            # A mistake is told where it is made.
+            whole = Equations(cls._fields, balances, energy, coordinate)
+        except ValueError as error:
+            raise TypeError(f"{cls.__name__}: {error}") from None
         for count in range(len(optional) + 1):
             for absent in combinations(optional, count):
                 variant = _VARIANTS[cls, frozenset(absent)] = _without(cls, absent)
-                _DECLARED[variant] = balances, energy, coordinate, absent
+                make = partial(Equations, variant._fields, balances, energy, coordinate, absent)
+                _EQUATIONS[variant] = cache(make) if absent else lambda: whole
+                _complete.pop(variant, None)
                 for function in DERIVED:
                     function.implemented_by(variant, partial(_derive, variant))
                 if offset:
                     contact_offset.implements(variant)(function_from_lines("body", [f"return body.{offset}"], {}))
-        # A mistake is told where it is made.
-        equations_of(cls)
         return cls
 
     return declare
@@ -448,29 +453,28 @@ def _without(cls: Any, absent: tuple[str, ...]) -> Any:
     return found
 
 
-@cache
-def equations_of(cls: Any) -> Equations:
+def equations_of(cls: type) -> Equations:
     """Equations of a type that :func:`body` declares.
 
     Raises
     ------
     KeyError
         If it declares no such type.
-    TypeError
-        If a balance cannot be used; the message says why.
     """
-    try:
-        return Equations(cls._fields, *_DECLARED[cls])
-    except ValueError as error:
-        raise TypeError(f"{cls.__name__}: {error}") from None
+    return _EQUATIONS[cls]()
 
 
-@cache
-def _derive(cls: Any) -> Equations:
+# Equations of the types for which the functions in :data:`DERIVED` have bodies.
+_complete: dict[type, Equations] = {}
+
+
+def _derive(cls: type) -> Equations:
     """Give the functions in :data:`DERIVED` bodies for a type, once a scene has it: there are many types of bodies.
 
     The equations that it returns know all constants of the body.
     """
+    if cls in _complete:
+        return _complete[cls]
     equations = equations_of(cls)
     own = {"motion": ", ".join(equations.coordinate.motion), ANGLE.acceleration: equations.coordinate.acceleration}
     for function in DERIVED:
@@ -478,6 +482,7 @@ def _derive(cls: Any) -> Equations:
         named = [f"{own[name]} = {name}" for name in names if name in own]
         lines = [*named, *equations.lines(function.__name__)]
         function.implements(cls)(function_from_lines(", ".join(names), lines, {}))
+    _complete[cls] = equations
     return equations
 
 
@@ -499,7 +504,7 @@ def completed(body: Any) -> Any:
     ValueError
         If energy and balances contradict each other; the message says where.
     """
-    equations = _derive(type(body))  # type: ignore[arg-type]
+    equations = _derive(type(body))
     if problem := equations.contradiction(body):
         raise ValueError(problem)
     return body._replace(constants=equations.constants(body))
