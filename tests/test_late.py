@@ -1,4 +1,4 @@
-"""Late events: the millionth period of a force is as exact as the first."""
+"""Late and slow events: the millionth period is as exact as the first, and a pull may grow as slowly as it likes."""
 
 from fractions import Fraction
 from math import atanh, cos, pi, ulp
@@ -10,6 +10,7 @@ from belts import with_all_parts
 
 import ringsweep
 from ringsweep.numerics.clock import Instant, later, phase
+from ringsweep.quantities.flags import REGIMES
 
 STICTION = {"law": "stiction", "mu_s": 0.07, "mu_k": 0.05}
 
@@ -94,3 +95,29 @@ class TestForcedBelts:
         broken_loose = width * atanh(2.0 * mu_s * 10.0 / 3.0 - 1.0)
         np.testing.assert_allclose(found.first_slip - middle, broken_loose, atol=1e-16 * middle[-1])
         np.testing.assert_allclose(found.x_end, 4.0, rtol=1e-6)
+
+
+class TestSlowPulls:
+    """Ratios of the time of breakaway to that of an oscillation from 1e3 to 1e12."""
+
+    RATIO = 10.0 ** np.arange(3, 13)
+    FRICTION = STICTION | {"mu_s": 0.2, "mu_k": 0.1}
+
+    def test_body_on_a_slow_belt_breaks_loose_where_friction_ends(self):
+        stiffness = 10.0 ** np.linspace(-2.0, 8.0, 10)
+        breaks = self.RATIO / np.sqrt(stiffness)
+        axes = {"spring.stiffness": stiffness, "belt.velocity": 2.0 / (stiffness * breaks), "time.span": 1.5 * breaks}
+        found = runs(forced(self.FRICTION, frequency=0.0, gravity=10.0, force={"amplitude": 0.0}), axes)
+        assert {REGIMES[int(regime)] for regime in found.regime} == {"stick-slip"}
+        np.testing.assert_allclose(found.first_slip, breaks, rtol=1e-13)
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize(
+        ("formula", "largest", "breaks"), [("c*t/T", 2.0, 1.0), ("c*(1 - cos(2*pi*t/T))", 2.0, 0.25)]
+    )
+    def test_slow_force_breaks_the_body_loose_where_friction_ends(self, formula, largest, breaks):
+        of = forced(self.FRICTION, frequency=0.0, gravity=10.0, spring={"stiffness": 1e6})
+        of["force"] = {"formula": formula, "c": largest, "T": 1.0}
+        period = self.RATIO / 1e3
+        found = runs(of, {"force.T": period, "time.span": 1.0001 * breaks * period})
+        np.testing.assert_allclose(found.first_slip, breaks * period, rtol=1e-13)

@@ -73,7 +73,7 @@ def _motion(scene, forcing, x, linear):
 
 
 @inlined
-def expand_bounds(c, rows, mode, bounds, size):
+def expand_bounds(c, rows, mode, bounds):
     """Fill the guards of slip for both bounds of the region of the friction law, m/s.
 
     Parameters
@@ -85,16 +85,22 @@ def expand_bounds(c, rows, mode, bounds, size):
     mode : NamedTuple
     bounds : tuple of float
         The bounds, m/s.
-    size : float
-        Size of the terms of the sliding acceleration, m/s^2.
     """
     (v, slow, fast), (low, high), sign = rows, bounds, float(mode.sign)
     set_terms(c[slow], terms(c[v]) * sign)
     set_terms(c[fast], terms(c[v]) * -sign)
     c[slow, 0] = 0.0 if mode.entry_guard == slow else sign * c[v, 0] - low
     c[fast, 0] = 0.0 if mode.entry_guard == fast else high - sign * c[v, 0]
-    # If friction does not drop at breakaway, the slope is zero there: what is computed is rounding.
-    if mode.entry_guard == slow and low == 0.0 and abs(c[v, 1]) <= 1e-12 * size:
+
+
+@inlined
+def level_at_breakaway(c, slow, mode, low, size):
+    """Let the guard of slip begin level, if it begins at zero and its rate is but rounding.
+
+    If friction does not drop at breakaway the rate is zero there. `size` is that of the terms of the sliding
+    acceleration, m/s^2.
+    """
+    if mode.entry_guard == slow and low == 0.0 and abs(c[slow, 1]) <= 1e-12 * size:
         c[slow, 1] = 0.0
 
 

@@ -85,6 +85,27 @@ def stuck_pull(scene, x, v, forcing):
     return -ring.held(scene.body, 1.0, (x, push, v + forcing[1]), x * x * x, forcing[2], 0.0)[2]
 
 
+# Share of the terms of a difference that is more than its rounding: four units in the last place.
+_ROUNDING = 2.0**-50
+
+
+@inlined
+def rounding_of_reserve(scene, motion, acceleration):
+    """More than the rounding of the difference of :func:`breakaway_force` and :func:`stuck_pull`, N.
+
+    Parameters
+    ----------
+    scene : NamedTuple
+    motion : tuple of float
+        Displacement, m, external force, N, and velocity in space, m/s.
+    acceleration : float
+        Acceleration of the belt, m/s^2.
+    """
+    body = scene.body
+    friction = scene.mu_s * body.mass * body.gravity + abs(breakaway_force(scene, motion[0]))
+    return _ROUNDING * (friction + ring.size(body, motion) + body.mass * abs(acceleration))
+
+
 @inlined
 def stuck_rates(scene, t, x, forcing):
     """Time derivatives of :func:`stuck_pull` and :func:`breakaway_force` of a body at rest on the belt, N/s."""

@@ -15,6 +15,7 @@ from ringsweep.models.belt.force import (
     if_force,
     length_scale,
     located,
+    rounding_of_reserve,
     speed_scale,
     stuck_pull,
     stuck_rates,
@@ -32,7 +33,7 @@ from ringsweep.numerics.terms import (
     set_factors,
 )
 from ringsweep.physics import belt, drives, ring
-from ringsweep.physics.forces import expand_force, largest_force
+from ringsweep.physics.forces import expand_force, force_in, largest_force
 from ringsweep.physics.friction.registry import holds_in_band
 from ringsweep.physics.friction.velocity import (
     KINETIC,
@@ -50,13 +51,6 @@ X, V, VELOCITY, ACCELERATION, FORCE, SHIFT, PUSH, SQUARE, CUBE, RATIO, FACTORS =
 _GUARDS = FACTORS + MOST_GROUPS * FACTOR_ROWS
 # The normal reaction is a guard only if it varies.
 NORMAL, SLOW, FAST = range(_GUARDS, _GUARDS + 3)
-
-# A pull that differs by less than this share from the breakaway force is equal to it.
-_ON_BOUND = 1e-12
-
-# A pull whose rate is less than this share of the breakaway force times the frequency is at its extreme: until then it
-# grows by less than the share above.
-_LEVEL = 1e-6
 
 
 class Mode(NamedTuple):
@@ -110,28 +104,20 @@ def _mode_at_rest(scene, t, x, v):
     """Mode of a set-valued law at a sliding velocity of zero or within the dead band."""
     forcing = drives.turn(scene.drive, t)
     pull, bound = stuck_pull(scene, x, v, forcing), breakaway_force(scene, x)
-    rate, bound_rate = stuck_rates(scene, t, x, forcing)
-    if bound > 0.0:
-        if abs(pull) <= bound * (1.0 - _ON_BOUND):
-            return Mode(0, KINETIC, -1)
-        if abs(pull) <= bound * (1.0 + _ON_BOUND):
-            # The pull only touches the breakaway force unless it still grows.
-            forward = pull > 0.0
-            if (rate if forward else -rate) - bound_rate <= _level(scene, bound):
-                return Mode(0, KINETIC, SLOW if forward else FAST)
+    motion = x, force_in(scene.drive, forcing), v + forcing[1]
+    if bound > 0.0 and abs(pull) <= bound + rounding_of_reserve(scene, motion, forcing[2]):
+        return Mode(0, KINETIC, -1)
     if pull == 0.0:
         # The rate of the pull decides, while the belt carries the body along.
-        pull = rate
-    # Without a dead band the sliding velocity, which is zero here, is a guard.
-    entry_guard = SLOW if stiction_band(scene.law) == 0.0 else -1
-    return Mode(1 if pull >= 0.0 else -1, region_at(scene.law, 0.0), entry_guard)
+        pull, _ = stuck_rates(scene, t, x, forcing)
+    return _loose(scene, 1 if pull >= 0.0 else -1)
 
 
 @inlined
-def _level(scene, bound):
-    """Rate of a pull, N/s, that counts as level beside the breakaway force `bound`."""
-    per_period = max(1.0 / scene.forcing_period, (scene.body.stiffness / scene.body.mass) ** 0.5)
-    return _LEVEL * bound * per_period
+def _loose(scene, sign):
+    """Mode of a body that has just broken loose."""
+    # Without a dead band the sliding velocity, which is zero here, is a guard.
+    return Mode(sign, region_at(scene.law, 0.0), SLOW if stiction_band(scene.law) == 0.0 else -1)
 
 
 @modes.switch.implements(belt.Belt)
@@ -141,11 +127,11 @@ def _switch(scene, mode, guard, t, y):
         return SEPARATED_1, mode, y
     sign, region = mode.sign, mode.region
     if sign == 0:
-        held = _mode_at_rest(scene, t, x, y[1])
-        # A pull that does not only touch the breakaway force reaches it twice at the same time.
-        if held.sign == 0 and mode.entry_guard != guard:
-            return RUNNING, held, y
-        return RUNNING, Mode(1 if guard == SLOW else -1, region_at(scene.law, 0.0), SLOW), y
+        # A long series may reach the breakaway force by its own error alone: one more, short step decides.
+        pull = stuck_pull(scene, x, y[1], drives.turn(scene.drive, t))
+        if mode.entry_guard != guard and abs(pull) <= breakaway_force(scene, x):
+            return RUNNING, Mode(0, KINETIC, guard), y
+        return RUNNING, _loose(scene, 1 if guard == SLOW else -1), y
     low, high = region_bounds(scene.law, region)
     if guard == FAST:
         return RUNNING, Mode(sign, region + 1, SLOW), (x, sign * high)
@@ -155,7 +141,7 @@ def _switch(scene, mode, guard, t, y):
         return RUNNING, Mode(sign, region - 1, FAST), (x, sign * low)
     if holds_in_band(scene.law) and region < 0:
         # The pull has fallen to the breakaway force.
-        return RUNNING, Mode(0, KINETIC, SLOW if sign > 0 else FAST), y
+        return RUNNING, Mode(0, KINETIC, -1), y
     if region < 0:
         return RUNNING, Mode(-sign, region, SLOW), (x, 0.0)
     return RUNNING, _mode_at_rest(scene, t, x, 0.0), (x, 0.0)
@@ -218,24 +204,20 @@ def _expand(scene, mode, t, y, tolerance, c):
             load, pull = _held_term(body, c, k, one, c[ACCELERATION, k])
             bound = scene.mu_s * load
             c[FORCE, k], c[SLOW, k], c[FAST, k] = pull, bound - pull, bound + pull
-        bound = breakaway_force(scene, y[0])
-        if mode.entry_guard in (SLOW, FAST):
-            c[mode.entry_guard, 0] = 0.0
-            # A pull that only touches the breakaway force is at its extreme.
-            if abs(c[mode.entry_guard, 1]) <= _level(scene, bound):
-                c[mode.entry_guard, 1] = 0.0
+        # A pull that reaches the breakaway force but for rounding only touches it. One that exceeds it by more than
+        # rounding accelerates the body, whatever friction is in slip: no event follows another one at the same time.
+        least = rounding_of_reserve(scene, (c[X, 0], c[PUSH, 0], c[VELOCITY, 0]), c[ACCELERATION, 0])
+        c[SLOW, 0] += least
+        c[FAST, 0] += least
     else:
         yielding = holds_in_band(scene.law) and mode.region < 0
         sharpness = _expand_slip(scene, mode, 0.0 if yielding else if_force(body, scene.viscous, 0.0), c)
-        size = (abs(c[FORCE, 0]) + ring.size(body, (c[X, 0], c[PUSH, 0], c[VELOCITY, 0]))) / body.mass
-        expand_bounds(c, (V, SLOW, FAST), mode, region_bounds(scene.law, mode.region), size)
+        expand_bounds(c, (V, SLOW, FAST), mode, region_bounds(scene.law, mode.region))
         if yielding:
             # With a dead band the velocity of the belt is constant.
             for k in range(ORDER + 1):
                 load, pull = _held_term(body, c, k, 1.0 if k == 0 else 0.0, 0.0)
                 c[SLOW, k] = float(mode.sign) * pull - scene.mu_s * load
-            if mode.entry_guard == SLOW:
-                c[SLOW, 0] = 0.0
     # The unit of length is the distance that belt, body or load could move within a natural period of the spring.
     length = abs(c[X, 0]) + length_scale(scene, abs(c[VELOCITY, 0]) + abs(c[SHIFT, 1]))
     speed = speed_scale(scene, length)

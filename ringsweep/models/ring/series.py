@@ -28,7 +28,7 @@ from ringsweep.models.ring.contacts import (
     places_beyond,
     zones_under,
 )
-from ringsweep.models.sliding import ENDS, REACTION_TOLERANCE, expand_bounds, rate_at_rest, speed_in
+from ringsweep.models.sliding import ENDS, REACTION_TOLERANCE, expand_bounds, level_at_breakaway, rate_at_rest, speed_in
 from ringsweep.numerics.clock import Instant, parts
 from ringsweep.numerics.series import (
     INVERSE,
@@ -476,7 +476,9 @@ def _expand_slip_guards(scene, mode, c):
     """Fill the guards of slip for both ends of the region of the friction law, and for the nearer edge."""
     body = scene.body
     size = body.gravity + body.radius * (c[SQUARE, 0] + abs(c[EPSILON, 0]) + 2.0 * abs(c[THETA, 2]))
-    expand_bounds(c, (V, SLOW, FAST), mode, region_bounds(scene.law, mode.region), size)
+    bounds = region_bounds(scene.law, mode.region)
+    expand_bounds(c, (V, SLOW, FAST), mode, bounds)
+    level_at_breakaway(c, SLOW, mode, bounds[0], size)
     set_terms(c[EDGE], (terms(c[THETA]) - terms(c[PHI])) * float(mode.sign))
     c[EDGE, 0] = min(edges_ahead(scene, mode, c[PHI, 0] - c[THETA, 0]))
 

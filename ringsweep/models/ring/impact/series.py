@@ -56,7 +56,7 @@ from ringsweep.models.ring.series import (
     THETA,
     V,
 )
-from ringsweep.models.sliding import REACTION_TOLERANCE, expand_bounds, rate_at_rest, speed_in
+from ringsweep.models.sliding import REACTION_TOLERANCE, expand_bounds, level_at_breakaway, rate_at_rest, speed_in
 from ringsweep.numerics.series import (
     INVERSE,
     ORDER,
@@ -216,7 +216,9 @@ def _expand_pivot_guards(scene, mode, f, eta, fresh, c):
         return
     body = scene.closed.body
     size = pivot.size(f) + body.radius * (abs(c[RING + EPSILON, 0]) + 2.0 * abs(c[RING + THETA, 2]))
-    expand_bounds(c, (RING + V, RING + SLOW, RING + FAST), mode, region_bounds(scene.law, mode.region), size)
+    bounds = region_bounds(scene.law, mode.region)
+    expand_bounds(c, (RING + V, RING + SLOW, RING + FAST), mode, bounds)
+    level_at_breakaway(c, RING + SLOW, mode, bounds[0], size)
 
 
 @inlined
