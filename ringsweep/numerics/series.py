@@ -92,6 +92,17 @@ def variation(c, h):
 
 
 @inlined
+def bounds_within(c, h):
+    """Bounds on the values of a series within a step of length `h`: those of the first three terms, and the rest."""
+    rest = h * total(abs(terms(c)) * powers(h) * numbers_from(_ABOVE, 0))
+    linear, square = c[1] * h, c[2] * h * h
+    turn = end = linear + square
+    if linear * (end + square) < 0.0:
+        turn = -0.25 * linear * linear / square
+    return c[0] + min(0.0, min(end, turn)) - rest, c[0] + max(0.0, max(end, turn)) + rest
+
+
+@inlined
 def first_root(c, h, work):
     """First zero in (0, h] of a series that is positive at 0.
 

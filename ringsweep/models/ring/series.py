@@ -33,11 +33,11 @@ from ringsweep.numerics.clock import Instant, parts
 from ringsweep.numerics.series import (
     INVERSE,
     ORDER,
+    bounds_within,
     crossings,
     differentiate,
     step_within,
     value,
-    variation,
 )
 from ringsweep.numerics.terms import (
     FACTOR_ROWS,
@@ -574,20 +574,21 @@ def _acceleration(scene, c, epsilon):
 
 @series.extremes.implements(ring.Ring)
 def _extremes(scene, record, mode, c, h, work):
-    count = 0
-    omega, omega_variation, phi_variation = c[OMEGA, 0], variation(c[OMEGA], h), variation(c[PHI], h)
-    may_reverse = abs(omega) <= omega_variation
+    count, (slowest, fastest) = 0, bounds_within(c[OMEGA], h)
+    may_reverse = slowest <= 0.0 <= fastest
     # Look for an extreme only if it could exceed the recorded ones, or if omega may change sign within the step.
-    if may_reverse and not (c[PHI, 0] - phi_variation >= record.lowest and c[PHI, 0] + phi_variation <= record.highest):
-        count = crossings(c[OMEGA], h, work, count)
-    if may_reverse or omega - omega_variation < record.omega_min or omega + omega_variation > record.omega_max:
+    if may_reverse:
+        least, greatest = bounds_within(c[PHI], h)
+        if least < record.lowest or greatest > record.highest:
+            count = crossings(c[OMEGA], h, work, count)
+    if may_reverse or slowest < record.omega_min or fastest > record.omega_max:
         count = crossings(c[EPSILON], h, work, count)
     for row, lowest, highest in (
         (NORMAL_1, record.normal_min_1, record.normal_max_1),
         (NORMAL_2, record.normal_min_2, record.normal_max_2),
     ):
-        change = variation(c[row], h)
-        if c[row, 0] - change < lowest or c[row, 0] + change > highest:
+        least, greatest = bounds_within(c[row], h)
+        if least < lowest or greatest > highest:
             differentiate(c[row], c[SPARE])
             count = crossings(c[SPARE], h, work, count)
     # The drive may end its next period.
