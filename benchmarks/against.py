@@ -1,6 +1,6 @@
 """The working tree against the fastest earlier tree: the same calls in turn, and which are slower.
 
-    python -m benchmarks.against            # against the commits in best.txt: about ten minutes, more the first time
+    python -m benchmarks.against            # against the commits in best.txt: ten minutes, and more the first time
     python -m benchmarks.against COMMIT     # against another commit
     python -m benchmarks.against --only event impact    # rows whose names contain one of these
 
@@ -78,15 +78,14 @@ class Tree:
             else:
                 archive = subprocess.run(["git", "archive", commit], cwd=ROOT, check=True, stdout=subprocess.PIPE)
                 subprocess.run(["tar", "-x", "-C", source], input=archive.stdout, check=True)
-            pip = [self.python, "-m", "pip", "install", "--quiet", "--force-reinstall"]
-            held = subprocess.run(
-                [sys.executable, "-m", "pip", "freeze", "--exclude", "ringsweep", "--exclude-editable"],
-                check=True, stdout=subprocess.PIPE,
-            )  # fmt: skip
-            (self.folder / "versions.txt").write_bytes(held.stdout)
-            if not done.exists():
-                subprocess.run([*pip, "--constraint", self.folder / "versions.txt", source], check=True)
-            subprocess.run([*pip, "--no-deps", source], check=True)
+            pip = [self.python, "-m", "pip", "install", "--quiet"]
+            if done.exists():
+                subprocess.run([*pip, "--force-reinstall", "--no-deps", source], check=True)
+            else:
+                freeze = [sys.executable, "-m", "pip", "freeze", "--exclude", "ringsweep", "--exclude-editable"]
+                held = self.folder / "versions.txt"
+                held.write_bytes(subprocess.run(freeze, check=True, stdout=subprocess.PIPE).stdout)
+                subprocess.run([*pip, "--constraint", held, source], check=True)
         done.touch()
 
     def environment(self, cache: Path | None = None) -> dict[str, str]:
