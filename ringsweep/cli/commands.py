@@ -7,7 +7,6 @@ quickly.
 from __future__ import annotations
 
 import argparse
-import json
 import logging
 from collections.abc import Callable
 from contextlib import suppress
@@ -16,7 +15,6 @@ from typing import Any
 
 import ringsweep
 from ringsweep.errors import InputError, print_error
-from ringsweep.quantities.quantity import after_number
 
 logger = logging.getLogger("ringsweep")
 
@@ -254,6 +252,10 @@ def verify_command(arguments: argparse.Namespace) -> int:
 
 
 def _print_summary(name: str, result: Any) -> None:
+    import json
+
+    from ringsweep.quantities.quantity import after_number
+
     print(result.attrs.get("title", name))
     print("dimensions:", ", ".join(f"{name} {size}" for name, size in result.sizes.items()) or "none: a single run")
     for name, axis in result.coords.items():
@@ -286,6 +288,8 @@ def _print_summary(name: str, result: Any) -> None:
 
 def schema_command(arguments: argparse.Namespace) -> None:
     """Print the JSON schema of the configuration."""
+    import json
+
     from ringsweep.config.schema import schema
 
     print(json.dumps(schema(), indent=2, ensure_ascii=False))

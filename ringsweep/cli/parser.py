@@ -7,7 +7,6 @@ import math
 import re
 import shutil
 from contextlib import suppress
-from importlib.metadata import version
 from textwrap import dedent, indent
 from typing import Any, NoReturn
 
@@ -38,9 +37,7 @@ def build_parser() -> argparse.ArgumentParser:
         "1 anything else: an error, or every run has failed",
         formatter_class=_formatter,
     )
-    parser.add_argument(
-        "--version", action="version", version=f"ringsweep {version('ringsweep')}", help="print the version"
-    )
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version")
     _add_verbosity(parser)
     parser.set_defaults(quiet=False, verbose=False)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
@@ -275,6 +272,16 @@ def _add_settings(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--set", action="append", default=[], metavar="PATH=VALUE", help="change a value: drive.amplitude=3"
     )
+
+
+class _Version(argparse.Action):
+    """Prints the version; to look it up takes as long as all else that ``--help`` needs."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> NoReturn:
+        from importlib.metadata import version
+
+        print("ringsweep", version("ringsweep"))
+        parser.exit()
 
 
 class _Parser(argparse.ArgumentParser):
