@@ -58,6 +58,9 @@ def setup(app: Any) -> dict[str, Any]:
     """Add the directive and the notes, write the files that the gallery reads, and import all public names."""
     app.add_directive("command-help", CommandHelp)
     app.connect("source-read", mark_older_results)
+    for older in GALLERY.glob("*.nc"):
+        # After an edit of the sources it holds another sweep, which is not replaced.
+        older.unlink()
     for model, name in (("ring", "my-sweep.yaml"), ("belt", "belt.yaml")):
         if not (path := GALLERY / name).exists():
             cli.main(["init", "-q", "--model", model, str(path)])

@@ -269,6 +269,14 @@ def test_part_of_a_history_is_drawn_and_a_run_of_another_scene_is_replaced_with_
     assert "has times from 0 to 10 s: none" in refused(capsys, "plot", "case-run.nc", "--from", "11")
 
 
+def test_history_does_not_replace_the_one_whose_scene_it_takes(folder, capsys):
+    attributes = {"Conventions": "CF-1.11", "ringsweep_version": "0"}
+    attributes["configuration"] = json.dumps(load("case.yaml").source)
+    run = xr.Dataset({"phi": ("time", np.zeros(2))}, {"time": [0.0, 1.0]}, attributes)
+    netcdf.save(run, "run.nc")
+    assert "run.nc: is the input" in refused(capsys, "simulate", "run.nc", "-o", "./run.nc")
+
+
 def test_run_takes_values_from_the_command_line(folder):
     assert main(["run", "case.yaml", "--set", "time.span=2 s", "--set", "solver.steps=500", "-o", "short.nc"]) == 0
     configuration = json.loads(netcdf.load("short.nc").attrs["configuration"])
@@ -428,7 +436,7 @@ def test_init_writes_a_valid_configuration_and_replaces_no_file(folder, capsys, 
     capsys.readouterr()
     assert "exists already" in refused(capsys, "init", "--model", model)
     assert "*.yaml" in refused(capsys, "init", "sweep.txt")
-    assert "cannot be written" in refused(capsys, "init", "nowhere/a.yaml")
+    assert "does not exist" in refused(capsys, "init", "nowhere/a.yaml")
 
 
 def test_examples_in_the_help_of_every_command_parse(capsys):

@@ -191,8 +191,8 @@ def test_long_cells_are_not_waited_for_while_their_kernels_are_compiled(sweep, t
     ended, limits = Event(), []
 
     def compute(config, layout, positions):
-        limits.append(getattr(config.solver, limit))
-        if limits[-1] > 1e6:
+        limits.append(most := getattr(config.solver, limit))
+        if most > 1e6:
             ended.wait(60.0)
         return TaskResult(positions, {}, None, {}, "")
 
@@ -203,7 +203,8 @@ def test_long_cells_are_not_waited_for_while_their_kernels_are_compiled(sweep, t
     ended.set()
     assert "time: more than 32 s on 2 threads" in found
     assert took < 20.0
-    assert limits[0] <= 1000
+    # A thread of the test before may still be running, with its own limit.
+    assert min(limits) <= 1000
 
 
 def test_numbers_at_the_edge_of_a_double_give_a_file_without_a_picture(scene, tmp_path, monkeypatch, caplog):

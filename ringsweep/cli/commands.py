@@ -136,6 +136,8 @@ def simulate_command(arguments: argparse.Namespace) -> int:
 
     config = with_values(arguments.config, arguments.set)
     target, picture = _outputs(arguments.output or f"{config.name}-run.nc", "time", "history")
+    if target.exists() and target.samefile(arguments.config):
+        raise InputError(str(target), "is the input: name another output")
 
     from ringsweep.cli.report import events_in_words, status_of
     from ringsweep.runs.simulate import history

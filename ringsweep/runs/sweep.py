@@ -95,8 +95,8 @@ def run(
     Raises
     ------
     InputError
-        If the configuration is wrong, the output cannot be written, another process computes it, or the folder beside
-        it holds cells of another sweep.
+        If the configuration is wrong, the output cannot be written, another process computes it, it is damaged, or it
+        or the folder beside it holds another sweep.
 
     Warns
     -----
