@@ -1,6 +1,7 @@
 """The command line: messages, exit status and files."""
 
 import json
+import os
 import re
 import shlex
 import signal
@@ -399,6 +400,85 @@ def test_status_does_not_depend_on_closed_streams(folder, redirection, file, sta
     assert "Exception" not in done.stderr
     assert "Traceback" not in done.stderr
     assert netcdf.check("out.nc")
+
+
+ENVIRONMENTS = {
+    "MPLBACKEND=nonsense": ("map", "matplotlib cannot be loaded (Key backend: 'nonsense'"),
+    "NUMBA_NUM_THREADS=0": ("run", "see NUMBA_NUM_THREADS: is one of them wrong?"),
+    "NUMBA_DISABLE_JIT=1": ("run", "NUMBA_DISABLE_JIT: is set, but ringsweep runs compiled code only: unset it"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("variable", ENVIRONMENTS)
+def test_environment_that_a_library_refuses_is_told_in_one_line(folder, variable):
+    command, problem = ENVIRONMENTS[variable]
+    attributes = {"Conventions": "CF-1.11", "ringsweep_version": "0"}
+    netcdf.save(xr.Dataset({"t_end": ("cell", np.zeros(2))}, attrs=attributes), "out.nc")
+    file = "out.nc" if command == "map" else "case.yaml"
+    environment = os.environ | dict([variable.split("=")])
+    call = [sys.executable, "-m", "ringsweep", command, file]
+    done = subprocess.run(call, capture_output=True, text=True, check=False, env=environment)
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.count("\n") == 1
+    assert problem in done.stderr
+
+
+@pytest.mark.parametrize("command", ["init", "run", "simulate", "info", "map", "plot", "verify", "animate"])
+def test_name_that_no_file_can_have_is_told(folder, capsys, command):
+    assert "File name too long" in refused(capsys, command, f"{'n' * 300}.yaml")
+
+
+def crafted(change):
+    """A sweep on a belt in a file that ringsweep did not write: `change` takes the dataset."""
+    scene = {"model": "belt", "body": {"mass": 1.0}, "spring": {"stiffness": 2.0}, "belt": {"velocity": 0.1}}
+    scene |= {"friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.1}, "time": {"span": 20.0}}
+    grid = {"belt.velocity": [0.05, 0.1], "friction.mu_s": [0.12, 0.15, 0.2]}
+    names = ("regime", "t_end", "x_end", "x_max", "certified", "steps")
+    numbers = np.arange(6.0).reshape(2, 3)
+    axes = {"belt_velocity": "belt.velocity", "friction_mu_s": "friction.mu_s"}
+    ds = xr.Dataset(
+        {name: (tuple(axes), (numbers % 2).astype(OUTCOMES[name].dtype), OUTCOMES[name].attributes) for name in names},
+        {dim: (dim, grid[path], {"path": path, "units": "1"}) for dim, path in axes.items()},
+        {"Conventions": "CF-1.11", "ringsweep_version": "0"},
+    )
+    ds.attrs["configuration"] = json.dumps({"scene": scene, "solver": "auto", "sweep": {"grid": grid}})
+    change(ds).to_netcdf("crafted.nc")
+
+
+CRAFTED = {
+    "configuration that is a list": lambda ds: ds.assign_attrs(configuration="[1]"),
+    "configuration that is a number": lambda ds: ds.assign_attrs(configuration="5"),
+    "sweep that is a number": lambda ds: ds.assign_attrs(configuration='{"scene": {}, "sweep": 1}'),
+    "text in x_end": lambda ds: ds.assign(x_end=ds.x_end.astype(str)),
+    "text in regime": lambda ds: ds.assign(regime=ds.regime.astype(str)),
+    "no x_max": lambda ds: ds.drop_vars("x_max"),
+    "no regime": lambda ds: ds.drop_vars("regime"),
+    "axis without its dimension": lambda ds: ds.isel(friction_mu_s=0, drop=True),
+    "no cells": lambda ds: ds.isel(friction_mu_s=slice(0, 0)),
+    "numbers at the end of doubles": lambda ds: ds.assign(x_end=ds.x_end * 0.0 + 1e308),
+    "flags that nobody knows": lambda ds: ds.assign(regime=ds.regime + np.int8(90)),
+}
+
+
+@pytest.mark.parametrize("change", CRAFTED.values(), ids=CRAFTED)
+def test_crafted_file_is_drawn_or_refused_in_one_line(folder, capsys, monkeypatch, change):
+    crafted(change)
+    monkeypatch.setattr("ringsweep.plots.save", lambda figure, path: Path(path).touch())
+    commands = [["info"], ["verify"], ["map"], ["map", "--var", "x_end"], ["map", "--var", "x_max"], ["plot"]]
+    commands += [["map", "--x", "belt_velocity"], ["run", "--set", "time.span=x"], ["simulate", "--set", "time.span=x"]]
+    for verb, *options in commands:
+        status = main([verb, "crafted.nc", *options])
+        _, message = capsys.readouterr()
+        assert status in (0, 2), message
+        assert message.count("\n") == (status == 2), message
+
+
+def test_error_about_a_file_that_ringsweep_wrote_is_no_error_of_the_file(folder):
+    attributes = {"Conventions": "CF-1.11", "ringsweep_version": "0"}
+    netcdf.save(xr.Dataset({"t_end": ("cell", np.zeros(2))}, attrs=attributes), "out.nc")
+    with pytest.raises(ZeroDivisionError), netcdf.reading("out.nc"):
+        raise ZeroDivisionError
 
 
 def test_help_tells_the_exit_status(capsys):

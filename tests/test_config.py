@@ -885,7 +885,9 @@ def test_scene_in_place_of_a_whole_configuration_is_refused_with_its_place():
         ("friction", {"law": "table", "v": [0, 5e-324, 1], "mu": [0.3, 0.2, 0.1]}, "scene.friction.mu.1"),
         ("friction", {"law": "table", "v": [0, 0.1, 1e308], "mu": [0.3, 0.2, 0.1]}, "scene.friction.mu.2"),
         ("drive", {"law": "table", "time": [0, 1e-308, 0.1, 9], "theta": [0, 1, 2, 3]}, "scene.drive.theta.1"),
-        ("drive", {"law": "table", "time": [0, 1, 2, 9], "theta": [0, 1e308, -1e308, 0]}, "scene.drive.theta.2"),
+        ("drive", {"law": "table", "time": [0, 1, 2, 9], "theta": [0, 1e308, -1e308, 0]}, "scene.drive.theta.1"),
+        ("drive", {"law": "table", "time": [0, 1, 2, 9], "theta": [0, 1, 2, 1e308]}, "scene.drive.theta.3"),
+        ("friction", {"law": "table", "v": [0, 0.1, 2], "mu": [0.3, 0.2, 1e308]}, "scene.friction.mu.2"),
     ],
 )
 def test_table_whose_curve_overflows_is_refused_with_its_row(section, table, path):

@@ -64,6 +64,15 @@ SAMPLES: list[tuple[dict[str, Any], str, str]] = [
     ({"sensitivity": "yes"}, "sweep.sample.sensitivity", "true, false, morris"),
     ({"sensitivity": "moris"}, "sweep.sample.sensitivity", "did you mean `morris`"),
     ({"of": {}}, "sweep.sample.of", "paths and distributions"),
+    *(
+        ({"of": {"body.mass": {kind: numbers}}}, f"sweep.sample.of.body.mass.{kind}", "beyond the range of numbers")
+        for kind, numbers in (
+            ("normal", [1e308, 1e308]),
+            ("lognormal", [1e-320, 0.1]),
+            ("lognormal", [1.0, 1e308]),
+            ("uniform", [-1e308, 1e308]),
+        )
+    ),
     ({"of": [1]}, "sweep.sample.of", "paths and distributions"),
     ({"of": {"friction.mus": {"normal": [1, 1]}}}, "sweep.sample.of.friction.mus", "did you mean `friction.mu_s`"),
     ({"of": {"friction.law": {"values": ["coulomb"]}}}, "sweep.sample.of.friction.law", "axis of sweep.grid"),

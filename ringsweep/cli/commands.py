@@ -23,9 +23,10 @@ def init_command(arguments: argparse.Namespace) -> None:
     """Write a configuration from a template."""
     from importlib.resources import files
 
-    from ringsweep.storage.files import replacing
+    from ringsweep.storage.files import check_writable, replacing
 
     target = Path(arguments.config)
+    check_writable(target)
     if target.exists():
         raise InputError(str(target), "exists already: name another file")
     if target.suffix not in (".yaml", ".yml"):

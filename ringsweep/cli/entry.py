@@ -33,7 +33,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         Exit status: 0 if done, 2 if the input is wrong, 130 after Ctrl-C, 143 after SIGTERM, 1 after anything else, and
         if every run has failed.
     """
-    _open_closed_streams()
+    _prepare_streams()
     parser = build_parser()
     given = sys.argv[1:] if argv is None else list(argv)
     if not given:
@@ -81,15 +81,35 @@ def main(argv: Sequence[str] | None = None) -> int:
         if arguments.verbose:
             traceback.print_exception(error)
         _give_up_unwritable_output()
+        if library := _importing(error):
+            names = [name for name in os.environ if name.startswith(_PREFIXES.get(library, f"{library.upper()}_"))]
+            about = f"{', '.join(names) or 'its environment variables'}: is one of them wrong?"
+            return _fail(f"{library} cannot be loaded ({error}); see {about}", 2, error)
         return _fail(shortened(f"{type(error).__name__}: {error}", 1500), 1, error)
     return status or 0
 
 
-def _open_closed_streams() -> None:
-    """Let streams that the shell has closed lead nowhere: else the next file would get the number of one of them."""
+# Beginnings of the names of the environment variables that a library reads, where they are not its own name.
+_PREFIXES = {"matplotlib": "MPL"}
+
+
+def _importing(error: BaseException) -> str | None:
+    """Name of the outermost library whose import has raised an error; None if another one was under way."""
+    for frame, _ in traceback.walk_tb(error.__traceback__):
+        module = str(frame.f_globals.get("__name__")).partition(".")[0]
+        if frame.f_code.co_name == "<module>" and module not in ("ringsweep", "__main__"):
+            return module
+    return None
+
+
+def _prepare_streams() -> None:
+    """Let streams that the shell has closed lead nowhere, and escape characters that the encoding of stdout lacks."""
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
+            # Else the next file would get the number of the stream.
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
 
 
 def _give_up_unwritable_output() -> None:
@@ -122,7 +142,9 @@ def _terminable() -> Iterator[None]:
 def _warnings_in_one_line() -> Iterator[None]:
     """Log warnings of libraries, which may quote what a file holds, without the lines of code that they come from."""
     with warnings.catch_warnings():
-        warnings.showwarning = lambda message, *_: logging.getLogger("ringsweep").warning("%s", message)
+        logger = logging.getLogger("ringsweep")
+        # What follows the first line may be the traceback of an error that a library has handled.
+        warnings.showwarning = lambda message, *_: logger.warning("%s", str(message).strip().partition("\n")[0])
         yield
 
 

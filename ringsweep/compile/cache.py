@@ -20,6 +20,9 @@ from ringsweep.errors import InputError
 
 logger = logging.getLogger("ringsweep")
 
+if getattr(numba.config, "DISABLE_JIT", 0):
+    raise InputError("NUMBA_DISABLE_JIT", "is set, but ringsweep runs compiled code only: unset it")
+
 #: The user's own files (friction laws, drives, models, methods), from the environment variable RINGSWEEP_LAWS.
 OWN_FILES = [Path(name) for name in os.environ.get("RINGSWEEP_LAWS", "").split(os.pathsep) if name]
 

@@ -37,6 +37,9 @@ KEYS = (*NUMBERS, "method", "of", "quantiles", "survival", "sensitivity", "keep"
 #: What `sweep.sample.sensitivity` can ask for; `true` is the first.
 SENSITIVITIES = ("sobol", "morris")
 
+# The least and the greatest share that a point of a sample can have, roughly.
+_FAR = np.array([1e-16, 1.0 - 1e-16])
+
 _LEVEL = Parameter("1", "level of a quantile", lower=0, upper=1, open_lower=True, open_upper=True)
 
 #: Numbers that tell when something happens, and that are missing where it does not.
@@ -343,6 +346,13 @@ def _numbers(given: Any, kind: str, parameter: Parameter, where: str) -> tuple[f
         found.append(number * abs(found[0]) if share else number)
     if problem := distribution.problem(*found):
         raise InputError(where, f"{problem}, got {show(given)} ({wanted})")
+    try:
+        with np.errstate(all="ignore"):
+            ends = distribution.quantile(_FAR, *found)
+    except OverflowError:
+        ends = np.full(2, np.inf)
+    if not np.isfinite(ends).all():
+        raise InputError(where, f"{show(given)} reaches beyond the range of numbers")
     return tuple(found)
 
 

@@ -44,6 +44,10 @@ _OVERSHOOT = 0.1
 _PLURAL = {"time": "times", "theta": "angles", "force": "forces", "v": "speeds", "mu": "coefficients"}
 
 
+# Factor by which numbers of a table may grow before they overflow.
+_ROOM = 1e100
+
+
 def read_samples(
     doc: Document, given: dict[str, Any], section: str
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:
@@ -118,9 +122,10 @@ def read_table(
         raise InputError(f"{where}.{first}.{i}", f"{x[i]:g} {unit} does not come after {x[i - 1]:g} {unit}")
     if x[0] > 0.0:
         raise InputError(f"{where}.{first}.0", f"the table begins at {x[0]:g} {unit}: it must begin at 0 {unit}")
-    # The coefficients of the cubics between rows.
+    # The coefficients of the cubics between rows, and what is computed from them, must not overflow.
     with np.errstate(all="ignore"):
-        steep = np.flatnonzero(~np.isfinite(np.diff(y) / np.diff(x) ** 3) | ~np.isfinite(np.diff(x) ** 3))
+        cube = np.diff(x) ** 3
+        steep = np.flatnonzero(~np.isfinite(_ROOM * np.diff(y) / cube) | ~np.isfinite(_ROOM * np.diff(y) + cube))
     if len(steep):
         i = int(steep[0]) + 1
         raise InputError(

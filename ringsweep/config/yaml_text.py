@@ -215,6 +215,8 @@ def _read_result(file: Path) -> Document:
                 if changed := recorded.altered(content, ["configuration"], axes_of_sweep):
                     raise InputError("", f"{ALTERED}: {', '.join(changed)}", file=str(file))
             tree = json.loads(content.getncattr("configuration"))
+            if not isinstance(tree, dict):
+                raise ValueError("a configuration is a mapping")
             if "from" in (written(tree, "initial") or {}):
                 raise InputError("", f"{ALTERED}: a result holds its initial values", file=str(file))
             found = None

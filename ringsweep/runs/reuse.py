@@ -55,7 +55,7 @@ class EarlierSweep:
         self.path = path
         if not netcdf.check(path):
             logger.warning("%s has no digest: damage to its cells would not be noticed", path)
-        with netcdf.open_dataset(path) as ds:
+        with netcdf.reading(path) as ds:
             if "regime" not in ds or "time" in ds.dims:
                 raise InputError(str(path), "holds no sweep whose cells could be reused")
             self.processors = str(ds.attrs.get("processors"))

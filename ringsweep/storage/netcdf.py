@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import stat
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -340,14 +341,22 @@ def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
 
 @contextmanager
 def reading(path: str | os.PathLike[str]) -> Iterator[xr.Dataset]:
-    """A file of this package, open for a block in which an error of the NetCDF library means that it is damaged."""
+    """A file of this package, open for a block in which an error means that the file is damaged or was made by hand.
+
+    An error about a file that is what was written stays as it is.
+    """
     with open_dataset(path) as ds:
         try:
             yield ds
-        except (OSError, RuntimeError) as error:
-            if "NetCDF: " not in str(error):
+        except (InputError, MemoryError):
+            raise
+        except Exception as error:
+            if "NetCDF: " in str(error):
+                raise InputError(str(path), _DAMAGED) from error
+            if isinstance(error, OSError) or altered(path, whole=True) == []:
                 raise
-            raise InputError(str(path), _DAMAGED) from error
+            problem = f"is not what ringsweep writes ({type(error).__name__}: {error})"
+            raise InputError(str(path), problem) from error
 
 
 def check(path: str | os.PathLike[str]) -> bool:
@@ -411,8 +420,14 @@ def _difference(names: Sequence[str]) -> str:
 
 
 def _check_exists(path: str | os.PathLike[str]) -> None:
-    if not Path(path).is_file():
-        raise InputError(str(path), "is not a file" if Path(path).exists() else "does not exist")
+    try:
+        kind = Path(path).stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        raise InputError(str(path), "does not exist") from None
+    except (OSError, ValueError) as error:
+        raise InputError(str(path), f"cannot be read: {getattr(error, 'strerror', error)}") from error
+    if not stat.S_ISREG(kind):
+        raise InputError(str(path), "is not a file")
     if Path(path).suffix.lower() in (".yaml", ".yml"):
         raise InputError(str(path), f"is a configuration, not a result: `ringsweep run {path}` writes one")
     check_name(path)
