@@ -220,6 +220,7 @@ OUTCOMES |= {
         *("t_separation", "t_end", "phi_end", "omega_end", "phi_min", "phi_max", "omega_min", "omega_max"),
         *("x_end", "velocity_end", "x_min", "x_max", "velocity_max", "period"),
         *("open_time", "flight_time", "gap_max", "impact_speed_max", "impulse_max", "impact_loss", "t_recovered"),
+        *("normal_min_1", "normal_min_2", "normal_max_1", "normal_max_2", "force_max", "jump_max"),
     )
 }
 

@@ -38,6 +38,9 @@ _MAY_LACK = (
     *(name for name, variable in OUTCOMES.items() if "section" in variable.dims),
 )
 
+# Forces, and jumps of the acceleration: they follow from the motion, and friction may magnify its errors.
+_FORCES = tuple(name for name, variable in OUTCOMES.items() if variable.units in ("N", "rad s-2"))
+
 # Difference of two final states that rounding explains, as a share of the scale of a number.
 _SAME = 1e-14
 
@@ -156,8 +159,8 @@ def took_same_steps(runs: TwoRuns) -> NDArray[np.bool_]:
 def apart(runs: TwoRuns) -> NDArray[np.float64]:
     """Largest difference between both runs of each cell in any number, relative to the scale of the number."""
     difference, scale = _differences(runs)
-    # Laps of other lengths are no measure of divergence.
-    lasting = [k for k, name in enumerate(with_errors(runs.outcomes)) if name != "period"]
+    # Laps of other lengths, and forces at other events, are no measure of divergence.
+    lasting = [k for k, name in enumerate(with_errors(runs.outcomes)) if name not in ("period", *_FORCES)]
     return _largest(difference[:, lasting], scale[:, lasting])
 
 
@@ -190,7 +193,14 @@ def with_errors(outcomes: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def errors(
-    runs: TwoRuns, *, safety: Any, share: float, steps: Any, floor: Any = 0.0, rate_floor: Any = 0.0
+    runs: TwoRuns,
+    *,
+    safety: Any,
+    share: float,
+    steps: Any,
+    floor: Any = 0.0,
+    rate_floor: Any = 0.0,
+    force_floor: float = 0.0,
 ) -> NDArray[np.float64]:
     """Bounds on the errors of runs, from second runs at another resolution.
 
@@ -209,6 +219,8 @@ def errors(
     floor, rate_floor : float or ndarray of shape ``(cells,)``
         Errors that both runs share: relative errors, and errors of the rate of the place, rad/s or on a belt m/s, which
         velocities have in addition.
+    force_floor : float
+        Relative error that forces and jumps have in addition.
 
     Returns
     -------
@@ -218,7 +230,8 @@ def errors(
     names = with_errors(runs.outcomes)
     difference, scale = _differences(runs)
     with np.errstate(invalid="ignore", over="ignore"):
-        least = share * _largest(difference, scale)[:, None] * scale
+        of_motion = [k for k, name in enumerate(names) if name not in _FORCES]
+        least = share * _largest(difference[:, of_motion], scale[:, of_motion])[:, None] * scale
         bound: NDArray[np.float64] = np.atleast_1d(safety)[:, None] * np.maximum(difference, least)
         bound += np.atleast_1d(floor + _ROUNDING * np.sqrt(1.0 + np.asarray(steps)))[:, None] * scale
         units = [OUTCOMES[name].units for name in names]
@@ -226,6 +239,8 @@ def errors(
             if unit.endswith(" s-1"):
                 place = units.index(unit.removesuffix(" s-1"))
                 bound[:, k] += rate_floor * (scale[:, place] if "rad" in units else 1.0)
+            if names[k] in _FORCES:
+                bound[:, k] += force_floor * scale[:, k]
     # A run that reaches the end of the span has an exact time of its end.
     reached = runs.column("regime") == runs.column("motion")
     bound[reached & (difference[:, names.index("t_end")] == 0.0), names.index("t_end")] = 0.0
@@ -245,7 +260,9 @@ def _differences(runs: TwoRuns) -> tuple[NDArray[np.float64], NDArray[np.float64
     for unit in set(units.tolist()):
         of_unit = units == unit
         largest = np.nanmax(np.abs(a[:, of_unit]), axis=1, initial=0.0)
-        scale[:, of_unit] = (largest + own_scales.get(unit, 0.0 if unit[0] in "mNJ" else 1.0))[:, None]
+        scale[:, of_unit] = (largest + own_scales.get(unit, 0.0 if unit[0] in "mNJ" or unit == "rad s-2" else 1.0))[
+            :, None
+        ]
     return difference, scale
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ringsweep.compile import inlined
 from ringsweep.models.interface import implicit, modes, recorder, variation
-from ringsweep.numerics.series import ORDER, ascending, first_root, value
+from ringsweep.numerics.series import ORDER, ascending, crossings, first_root, value
 from ringsweep.physics import drives
 from ringsweep.solvers import rosenbrock
 from ringsweep.solvers.steps import INSTANTS
@@ -350,6 +350,7 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
                 fractions[count] = _sign_change(scene, start, scratch, taken, begin, component, ends)
                 count += 1
         velocity, acceleration = view[1][1], view[1][2]
+    count = _extremes(scene, record, start, scratch, taken, (before, middle, after), count)
     for i in range(1 if near else 2, INSTANTS, 1 if near else INSTANTS):
         fractions[count] = i / INSTANTS
         count += 1
@@ -371,6 +372,56 @@ def implicit_step(scene, record, start, control, h_max, tolerance, scratch):
         record = recorder.observe(scene, record, t + fraction * h, duration, stuck, implicit.seen(scene, view))
         fraction_before = fraction
     return event, h, implicit.from_implicit(scene, end, x_next), record, control, h_norm if h < s or s == h_max else 0.0
+
+
+@inlined
+def _extremes(scene, record, start, scratch, taken, views, count):
+    """Append to ``work[0]`` the fractions of a step at which a quantity may exceed its recorded extremes.
+
+    A quantity is taken as the polynomial through its values at five instants. Its value at an extreme does not depend
+    on small errors of the instant.
+
+    `views` are those at the beginning, in the middle and at the end of the step; `count` is the number of fractions
+    before. The new number is returned.
+    """
+    exceeds = False
+    first, middle, last = (
+        implicit.sought(scene, record, views[0]),
+        implicit.sought(scene, record, views[1]),
+        implicit.sought(scene, record, views[2]),
+    )
+    for q in range(len(first)):
+        (a, least, greatest), b, c = first[q], middle[q][0], last[q][0]
+        bend = abs(a - 2.0 * b + c)
+        # The parabola through the three values is monotonic if their difference is twice as large as its bend.
+        turns = abs(c - a) < 4.0 * bend
+        beyond = max(a, max(b, c)) + 0.5 * bend > greatest or min(a, min(b, c)) - 0.5 * bend < least
+        exceeds = exceeds or (turns and beyond)
+    return _turns(scene, record, start, scratch, taken, views, count) if exceeds else count
+
+
+@inlined
+def _turns(scene, record, start, scratch, taken, views, count):
+    """Append to ``work[0]`` the fractions of a step at which quantities turn; see :func:`_extremes`."""
+    samples, work, row, quantities = scratch.samples, scratch.work[:-1], scratch.work[-1], 0
+    for i in range(INSTANTS + 1):
+        fraction = i / INSTANTS
+        view = views[i // 2]
+        if i % 2 == 1:
+            x = rosenbrock.dense(start.x, taken.x_next, scratch.bends[0], fraction)
+            view = _view_at(scene, start, scratch.course, fraction * taken.h, x)
+        sought = implicit.sought(scene, record, view)
+        quantities = len(sought)
+        for q in range(quantities):
+            samples[q, i] = sought[q][0]
+    for q in range(quantities):
+        for k in range(ORDER + 1):
+            row[k] = 0.0
+            if k < INSTANTS:
+                for i in range(INSTANTS + 1):
+                    row[k] += (k + 1.0) * _INTERPOLATION[k + 1, i] * samples[q, i]
+        count = crossings(row, 1.0, work, count)
+    return count
 
 
 @inlined

@@ -13,6 +13,7 @@ from ringsweep.compile import take
 from ringsweep.errors import InputError
 from ringsweep.models.interface import audit, implicit, modes, recorder, series
 from ringsweep.models.scene import Structure
+from ringsweep.models.sliding import REACTION_TOLERANCE
 from ringsweep.numerics.series import ORDER
 from ringsweep.physics import drives
 from ringsweep.physics.friction import LAWS, Dynamic, SetValued, Smooth, family_of, presliding
@@ -194,10 +195,12 @@ class _Piecewise(Method):
         local, share = LocalErrors(*audits[:, 3:].T), self.share
         if of_bristles:
             floor, share = implicit_tolerance * (_ONCE_IMPLICIT + _SHARED_BRISTLES * local.implicit), _SHARE_BRISTLES
+            force_floor = 0.0
         else:
             # Ratio of successive terms of a series at the end of a step; a geometric series is the remainder.
             ratio = tolerance ** (1.0 / ORDER)
-            floor = tolerance * ratio / (1.0 - ratio) * (_ONCE + _SHARED * local.series)
+            remainder = tolerance * ratio / (1.0 - ratio)
+            floor, force_floor = remainder * (_ONCE + _SHARED * local.series), REACTION_TOLERANCE * _ONCE * remainder
             floor += _SHARED_IMPLICIT * implicit_tolerance * local.implicit
         # Errors average out along a smooth motion, not if an event magnifies those of the few steps before it.
         magnified, left_out = audit.magnified(batch, rows)
@@ -209,6 +212,7 @@ class _Piecewise(Method):
             steps=steps,
             floor=floor + left_out,
             rate_floor=tolerance * local.rate,
+            force_floor=force_floor,
         )
         bounds[diverge] = np.nan
         may_converge = diverge & ~diverging(distance / FACTOR, self.tolerances()[of_bristles])

@@ -66,6 +66,11 @@ def _seen(scene, view):
     return x, velocity, friction, place, v, acceleration - belt_acceleration, jumps, deflection
 
 
+@implicit.sought.implements(belt.Belt, belt.BristleBelt)
+def _sought(scene, record, view):
+    return ((view[1][3], -record.force_max, record.force_max),)
+
+
 @implicit.near_zero.implements(belt.Belt, belt.BristleBelt)
 def _near_zero(scene, motion):
     return all_guards(scene.body, 0.05 * scene.body.mass * scene.body.gravity, 0.0, 0.0)

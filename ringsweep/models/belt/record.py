@@ -160,7 +160,7 @@ class Record(NamedTuple):
 
 #: Record with another tangent.
 with_tangent = replacing("tangent")
-_with_shocks, _with_section = replacing("shocks"), replacing("section")
+_entered, _with_section = replacing("force_max", "shocks"), replacing("section")
 _with_extremes, _with_half = replacing("low", "high"), replacing("next", "half_t", "half_x")
 
 # A swing has no bound if it is so many times the scales of the scene, and its growth in a cycle falls by less than the
@@ -540,4 +540,5 @@ def _begin(scene, t, seen):
 
 @recorder.enter.implements(Belt, BristleBelt)
 def _enter(scene, record, t, seen):
-    return _with_shocks(record, shock.enter(record.shocks, t, seen[6]))
+    # Friction may jump at an event, and both limits count.
+    return _entered(record, max(record.force_max, abs(seen[2])), shock.enter(record.shocks, t, seen[6]))

@@ -23,7 +23,7 @@ from ringsweep.models.belt.force import (
 from ringsweep.models.interface import modes, series
 from ringsweep.models.interface.status import RUNNING, SEPARATED_1
 from ringsweep.models.sliding import expand_bounds, speed_in
-from ringsweep.numerics.series import INVERSE, ORDER, crossings, slope, step_within, value, variation
+from ringsweep.numerics.series import INVERSE, ORDER, crossings, differentiate, slope, step_within, value, variation
 from ringsweep.numerics.terms import (
     FACTOR_ROWS,
     MOST_GROUPS,
@@ -292,12 +292,15 @@ def _seen_at(scene, c, s, h):
 
 @series.extremes.implements(belt.Belt)
 def _extremes(scene, record, mode, c, h, work):
-    count = 0
-    if abs(c[VELOCITY, 0]) <= variation(c[VELOCITY], h):
+    # Look for an extreme only if it could exceed the recorded one.
+    count, change = 0, variation(c[VELOCITY], h)
+    if abs(c[VELOCITY, 0]) <= change:
         count = crossings(c[VELOCITY], h, work, count)
-    # In slip friction has an extreme where the velocity has one.
-    if mode.sign != 0 or c[VELOCITY, 0] + variation(c[VELOCITY], h) > record.velocity_max:
+    if c[VELOCITY, 0] + change > record.velocity_max:
         count = crossings(c[ACCELERATION], h, work, count)
+    if abs(c[FORCE, 0]) + variation(c[FORCE], h) > record.force_max:
+        differentiate(c[FORCE], c[RATIO])
+        count = crossings(c[RATIO], h, work, count)
     # The forcing may end its next period.
     rest = record.cycles.next - record.last.t
     if 0.0 < rest < h:

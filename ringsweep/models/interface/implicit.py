@@ -305,6 +305,24 @@ def seen(scene, view):
 
 
 @hook
+def sought(scene, record, view):
+    """Quantities whose extremes the record keeps, beside place and velocity.
+
+    Parameters
+    ----------
+    scene, record : NamedTuple
+        One cell, and its record.
+    view : tuple
+        What :func:`guards_and_motion` returned for a state.
+
+    Returns
+    -------
+    tuple of tuple of float
+        For each quantity its value in the state, and the least and the greatest value recorded.
+    """
+
+
+@hook
 def row(scene, mode, forcing, x):
     """Row of a time history.
 
@@ -325,4 +343,4 @@ def row(scene, mode, forcing, x):
 
 
 #: Functions without a default, but for :func:`is_stiff`, which only smooth laws need.
-MEMBERS = (rates, linearise, error_scales, guards_and_motion, near_zero, motion, seen, row)
+MEMBERS = (rates, linearise, error_scales, guards_and_motion, near_zero, motion, seen, sought, row)

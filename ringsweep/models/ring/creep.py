@@ -115,6 +115,12 @@ def _seen(scene, view):
     return joined((phi, omega, guards[NORMAL_1], guards[NORMAL_2], Located(epsilon, size)), motion[4:])
 
 
+@implicit.sought.implements(ring.Ring, ring.BristleRing)
+def _sought(scene, record, view):
+    r, guards = record, view[0]
+    return (guards[NORMAL_1], r.normal_min_1, r.normal_max_1), (guards[NORMAL_2], r.normal_min_2, r.normal_max_2)
+
+
 @implicit.row.implements(ring.Ring, ring.BristleRing)
 def _row(scene, mode, forcing, x):
     common = implicit.common(scene, mode, forcing, x)

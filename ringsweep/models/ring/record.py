@@ -171,8 +171,9 @@ def conclude(record, status, t, phi, omega):
         # The last step ends after the reaction has vanished, and a reaction may jump below zero at the edge of a zone.
         0.0 if status in (SEPARATED_1, SEPARATED_BOTH) else max(r.normal_min_1, 0.0),
         0.0 if status in (SEPARATED_2, SEPARATED_BOTH) else max(r.normal_min_2, 0.0),
-        r.normal_max_1,
-        r.normal_max_2,
+        # A contact that is lost at launch has had no reaction.
+        max(r.normal_max_1, 0.0),
+        max(r.normal_max_2, 0.0),
         *shock.largest(r.shocks),
     )
 

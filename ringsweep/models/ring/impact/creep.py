@@ -220,6 +220,13 @@ def _seen(scene, view):
     return m.psi, m.psi_dot, m.normal_1, m.normal_2, Located(m.psi_dd, size), m.gap_1, m.gap_2, contacts
 
 
+@implicit.sought.implements(ImpactRing)
+def _sought(scene, record, view):
+    m, r, most = view[1], record.base, record.gap_max
+    reactions = (m.normal_1, r.normal_min_1, r.normal_max_1), (m.normal_2, r.normal_min_2, r.normal_max_2)
+    return (*reactions, (m.gap_1, 0.0, most), (m.gap_2, 0.0, most))
+
+
 @implicit.row.implements(ImpactRing)
 def _row(scene, mode, forcing, x):
     common = implicit.common(scene, mode, forcing, x)

@@ -422,9 +422,11 @@ def _extremes(scene, record, mode, c, h, work):
         count = crossings(c[RING + OMEGA], h, work, count)
     if abs(omega) <= change or omega - change < base.omega_min or omega + change > base.omega_max:
         count = crossings(c[RING + EPSILON], h, work, count)
-    own, highest = (RING + NORMAL_2, base.normal_max_2) if mode.open == FIRST else (RING + NORMAL_1, base.normal_max_1)
-    # A contact that has been lost has had a reaction of zero: only the greatest one is new.
-    if c[own, 0] + variation(c[own], h) > highest:
+    own, lowest, highest = RING + NORMAL_1, base.normal_min_1, base.normal_max_1
+    if mode.open == FIRST:
+        own, lowest, highest = RING + NORMAL_2, base.normal_min_2, base.normal_max_2
+    change = variation(c[own], h)
+    if c[own, 0] - change < lowest or c[own, 0] + change > highest:
         differentiate(c[own], c[SPARE])
         count = crossings(c[SPARE], h, work, count)
     return count

@@ -1,0 +1,172 @@
+"""Least and greatest numbers of a run: no instant of its history exceeds them, and they are those of closed forms."""
+
+import numpy as np
+import pytest
+from belts import with_all_parts
+from tiers import mostly_slow
+
+import ringsweep
+
+G = 9.81
+
+#: Parameters that the laws need besides coefficients of friction; speeds in units of that of the scene.
+LAWS = {
+    "stiction": {},
+    "tustin": {"alpha": 30.0},
+    "karnopp": {"dead_band": 1e-2},
+    "bengisu-akay": {"v0": 1e-2, "alpha": 30.0},
+    "andersson": {"v_s": 3e-2, "k_t": 300.0},
+    "lugre": {"sigma0": 2e3, "sigma1": 30.0, "sigma2": 0.0, "v_s": 1e-2},
+}
+
+#: Laws whose kernels other tests need too.
+COMMON = ("stiction", "bengisu-akay", "lugre")
+
+
+def belt(law, **changes):
+    """A body of 1 kg on a spring of 4 N/m, on a belt at rest."""
+    scene = {
+        "model": "belt",
+        "body": {"mass": 1.0},
+        "spring": {"stiffness": 4.0},
+        "belt": {"velocity": 0.0},
+        "friction": {"law": law, "mu_s": 0.4, "mu_k": 0.25, **LAWS[law]},
+        "time": {"span": 20.0},
+    }
+    return with_all_parts(scene | changes)
+
+
+def exceeds(run, name, values, greatest=True):
+    """By how much values of a history exceed a number of the run, in units of its bound.
+
+    The history is a run of its own, with other steps, and has errors too.
+    """
+    beyond = values.max() - run[name] if greatest else run[name] - values.min()
+    own = 1e-13 if '"event"' in run.attrs["solver"] else 3e-7
+    return float(beyond / (run[f"{name}_error"] + own * abs(values).max()))
+
+
+def of_belt(run):
+    """Excess of the history of a belt over each number that is called greatest or least."""
+    return {
+        "force_max": exceeds(run, "force_max", abs(run.friction_force)),
+        "velocity_max": exceeds(run, "velocity_max", run.velocity),
+        "x_max": exceeds(run, "x_max", run.x),
+        "x_min": exceeds(run, "x_min", run.x, greatest=False),
+    }
+
+
+def of_ring(run):
+    """The same of a ring."""
+    reactions = {f"normal_{end}_{i}": (f"normal_{i}", end) for i in (1, 2) for end in ("min", "max")}
+    motion = {f"{name}_{end}": (name, end) for name in ("phi", "omega") for end in ("min", "max")}
+    return {name: exceeds(run, name, run[of], end == "max") for name, (of, end) in (reactions | motion).items()}
+
+
+class TestForce:
+    @pytest.mark.parametrize("law", mostly_slow(("stiction", "tustin", "karnopp"), ("stiction",)))
+    @pytest.mark.parametrize("phase", [0.3, 2.0])
+    def test_force_on_a_body_that_is_held_is_that_of_a_whole_period(self, law, phase):
+        force = {"amplitude": 1.0, "frequency": 0.05, "phase": phase}
+        run = ringsweep.sweep(belt(law, force=force), {"time.span": [20.0]}, progress=False)
+        assert run.certified == 1
+        assert float(run.force_max[0]) == pytest.approx(1.0, abs=1e-14)
+        assert run.force_max_error < 1e-7
+
+    @pytest.mark.slow
+    def test_force_under_a_load_that_varies_is_greatest_where_the_body_turns(self):
+        """Against a fast belt friction is mu (m g + k_n x): the body swings about mu m g/(k - mu k_n)."""
+        mu, growth, stiffness = 0.25, 6.0, 4.0
+        scene = belt("stiction", belt={"velocity": 50.0}, initial={"x": 1.0, "velocity": 1.0})
+        scene["body"] = {"mass": 1.0, "normal_stiffness": growth}
+        run = ringsweep.sweep(scene, {"time.span": [20.0]}, progress=False).isel(time_span=0)
+        softened = stiffness - mu * growth
+        centre = mu * G / softened
+        farthest = centre + np.hypot(1.0 - centre, 1.0 / np.sqrt(softened))
+        assert float(run.force_max) == pytest.approx(mu * (G + growth * farthest), rel=1e-9)
+        assert abs(run.force_max - mu * (G + growth * farthest)) <= run.force_max_error
+
+    @pytest.mark.parametrize("law", mostly_slow(LAWS, COMMON))
+    def test_no_instant_of_a_history_exceeds_what_is_called_greatest(self, law):
+        rng = np.random.default_rng(48)
+        for _ in range(6):
+            force = {
+                "amplitude": rng.uniform(2.0, 8.0),
+                "frequency": rng.uniform(0.05, 0.8),
+                "phase": rng.uniform(0, 6),
+            }
+            speed = {"velocity": rng.choice([0.0, 1.0]) * rng.uniform(-1.0, 1.0)}
+            run = ringsweep.simulate(belt(law, force=force, belt=speed, damper={"coefficient": 0.2}), samples=3000)
+            assert max(of_belt(run).values()) <= 3.0
+            # Nor is the number far from what the history shows.
+            assert abs(run.friction_force).max() == pytest.approx(float(run.force_max), rel=2e-3)
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize("law", ["tustin", "bengisu-akay", "lugre"])
+    def test_no_instant_exceeds_it_on_a_belt_that_shakes_under_a_varying_load(self, law):
+        rng = np.random.default_rng(49)
+        for _ in range(6):
+            scene = belt(law)
+            scene["body"] = {"mass": 1.0, "normal_stiffness": rng.uniform(-2.0, 2.0)}
+            scene["drive"] = {"law": "sinusoidal", "amplitude": rng.uniform(0.2, 2.0), "frequency": rng.uniform(0.1, 1)}
+            del scene["belt"]
+            run = ringsweep.simulate(scene, samples=3000)
+            assert max(of_belt(run).values()) <= 3.0
+
+    @pytest.mark.parametrize("law", mostly_slow(("bengisu-akay", "andersson"), ("bengisu-akay",)))
+    def test_greatest_force_of_a_smooth_law_is_at_the_speed_of_its_greatest_friction(self, law):
+        force = {"amplitude": 8.0, "frequency": 0.2}
+        run = ringsweep.sweep(belt(law, force=force), {"time.span": [20.0]}, progress=False).isel(time_span=0)
+        v = np.linspace(0.0, 0.2, 200_001)
+        greatest = {
+            "bengisu-akay": 0.4,
+            "andersson": ((0.25 + 0.15 * np.exp(-((v / 3e-2) ** 2))) * np.tanh(300.0 * v)).max(),
+        }[law]
+        assert float(run.force_max) == pytest.approx(greatest * G, rel=1e-6)
+        assert abs(run.force_max - greatest * G) <= run.force_max_error
+
+
+RING = {
+    "model": "ring",
+    "body": {"mass": 0.076, "inertia": 4.47e-5, "half_distance": 0.025, "ball_radius": 0.01},
+    "ring": {"radius": 0.043378},
+    "friction": {"law": "bengisu-akay", "rough": {"mu_s": 0.5, "mu_k": 0.3}, "rest": {"mu_s": 0.2, "mu_k": 0.1}},
+    "zone": {"half_angle": "15 deg"},
+    "drive": {"law": "arctan", "amplitude": 0.4},
+    "time": {"span": 4.0},
+}
+
+
+class TestReactions:
+    @pytest.mark.parametrize("v0", [1e-5, 0.05])
+    def test_no_instant_of_a_history_exceeds_the_extremes(self, v0):
+        friction = RING["friction"] | {"v0": v0, "alpha": 100.0}
+        run = ringsweep.simulate(RING | {"friction": friction, "initial": {"phi": 0.6}}, samples=4000)
+        assert run.certified == 1
+        assert max(of_ring(run).values()) <= 3.0
+
+    def test_contact_that_is_lost_at_launch_has_had_no_reaction(self):
+        """At the top of a ring at rest, no contact carries the body."""
+        friction = RING["friction"] | {"v0": 1e-5, "alpha": 100.0}
+        run = ringsweep.simulate(
+            RING | {"friction": friction, "initial": {"phi": "100 deg", "omega": 3.0}}, samples=100
+        )
+        assert ringsweep.words(run.regime) == "separating"
+        assert run.t_end == 0.0
+        for i in (1, 2):
+            assert run[f"normal_max_{i}"] >= run[f"normal_min_{i}"] >= 0.0
+
+    @pytest.mark.slow
+    def test_contact_that_holds_in_a_pivot_has_its_least_reaction_there(self):
+        scene = RING | {
+            "friction": {"law": "stiction", "rough": {"mu_s": 0.5, "mu_k": 0.3}, "rest": {"mu_s": 0.2, "mu_k": 0.1}},
+            "impact": {"restitution": 0.4},
+        }
+        least = []
+        for omega in np.linspace(20.0, 40.0, 9):
+            run = ringsweep.simulate(scene | {"initial": {"phi": 0.5, "omega": omega}}, samples=4000)
+            assert max(of_ring(run).values()) <= 3.0
+            least += [float(run.normal_min_1), float(run.normal_min_2)]
+            gap = np.maximum(run.gap_1, run.gap_2)
+            assert exceeds(run, "gap_max", gap) <= 3.0
+        assert max(least) > 0.0
