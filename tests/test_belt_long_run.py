@@ -168,6 +168,29 @@ def test_drift_of_a_body_without_a_spring_under_a_force_that_vibrates():
     assert (found.multiplier_2[2:] < 1.0).all()
 
 
+@pytest.mark.slow
+def test_belt_that_vibrates_unevenly_conveys_at_the_speed_that_halves_its_period():
+    """The belt moves at a w (cos u + 0.2 cos 2u), u = w t. The body is slower than the belt for half of each period.
+
+    It gains mu g T/2 from u1 to u1 + pi, where it meets the belt: -2 a w cos u1 = mu g T/2.
+    """
+    a, omega, mu = 0.05, 10.0, 0.02
+    start = -np.arccos(-mu * 9.81 * pi / (2.0 * a * omega**2))
+    drift = a * omega * (np.cos(start) + 0.2 * np.cos(2.0 * start)) + mu * 9.81 * pi / (2.0 * omega)
+    of = {
+        "model": "belt",
+        "body": {"mass": 1.0},
+        "spring": {"stiffness": 0.0},
+        "drive": {"law": "formula", "theta": "a*(sin(w*t) + 0.1*sin(2*w*t))", "a": a, "w": omega},
+        "friction": {"law": "stiction", "mu_s": 0.03, "mu_k": mu},
+        "initial": {"x": 0.0, "velocity": 0.0},
+    }
+    found = ringsweep.sweep(of, {"time.span": [100.0, 1000.0]}, progress=False)
+    assert words(found) == ["periodic"] * 2
+    np.testing.assert_allclose(found.drift, drift, rtol=1e-7)
+    assert found.certified.values.tolist() == [1, 1]
+
+
 def test_drift_without_cycles_is_that_of_the_second_half_of_the_span():
     """A body that brakes on a belt at rest, without a spring."""
     of = scene("tustin", 1.0, 0.0, v_belt=0.0, mu_s=0.3, mu_k=0.3, alpha=1.0)
