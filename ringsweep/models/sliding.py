@@ -106,11 +106,12 @@ def level_at_breakaway(c, slow, mode, low, size):
 
 @inlined
 def rate_at_rest(scene):
-    """Unit of the error of the angular velocity of a body at rest on a ring, rad/s: 1 rad/s, or that of a slow swing.
+    """Unit of the error of the angular velocity of a body at rest on a ring, rad/s.
 
-    A unit that is too small makes steps a little shorter. One that is too large would hide the motion.
+    It is 1 rad/s, but at most the rate of a swing, and at least a 64th of that.
     """
-    return min(1.0, (scene.body.gravity / scene.body.radius) ** 0.5 + 1.0 / scene.span)
+    swing = (scene.body.gravity / scene.body.radius) ** 0.5 + 1.0 / scene.span
+    return max(min(1.0, swing), swing / 64.0)
 
 
 @inlined
