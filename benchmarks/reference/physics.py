@@ -328,7 +328,8 @@ def rates(p, closed, k1, k2, piece, t, y, f):
         f[1] = y[3]
         return
     _, _, epsilon, _, _, _, ring_epsilon, f[2], f[3] = state(p, k1, k2, piece, t, y)
-    f[0] = y[1] / p.radius
+    # In Karnopp's dead band the sliding velocity is zero; what the state holds is the momentum.
+    f[0] = 0.0 if p.law == KARNOPP and abs(piece) != 2 else y[1] / p.radius
     f[1] = p.radius * (epsilon - ring_epsilon)
 
 

@@ -97,7 +97,8 @@ def _sliding_velocity(scene, y, forcing):
 def rates(scene, y, forcing, angle):
     """Time derivative of a state; the arguments are those of :func:`slip_in_space`."""
     now, _ = slip_in_space(scene, y, _sliding_velocity(scene, y, forcing), forcing, angle)
-    return joined((y[1], ring.acceleration(scene.body, *now.K, now.motion)[0]), deflection_rates(now.bristles))
+    acceleration = ring.acceleration(scene.body, *now.K, now.motion)[0]
+    return joined((now.motion[2], acceleration), deflection_rates(now.bristles))
 
 
 @absorbed
@@ -110,7 +111,7 @@ def inspection(scene, y, place, forcing, angle):
     slope = ring.radius(body) * ring.acceleration_slope(body, *now.K, *now.slopes, now.motion)
     gradient = ring.acceleration_gradient(body, *now.K, now.motion)
     return Inspection(
-        joined((y[1], acceleration), deflection_rates(now.bristles)),
+        joined((now.motion[2], acceleration), deflection_rates(now.bristles)),
         v,
         place,
         now.motion,

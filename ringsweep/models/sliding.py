@@ -47,7 +47,7 @@ def _rates_at(scene, c, s):
     return slope(c[0], s), slope(c[1], s)
 
 
-@modes.in_space.implements(Ring, Belt, BristleBelt)
+@modes.in_space.implements(Ring, BristleBelt)
 def _in_space(scene, t, y):
     return y[0], y[1] / ring.radius(scene.body) + drives.turn(scene.drive, t)[1]
 

@@ -14,6 +14,7 @@ from ringsweep.numerics.terms import joined
 from ringsweep.physics import drives, ring
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.forces import force_rate
+from ringsweep.physics.friction.registry import holds_in_band
 from ringsweep.physics.friction.velocity import region_bounds, stiction_band
 from ringsweep.physics.ring import BristleRing, Ring
 
@@ -148,7 +149,9 @@ def _bounds_of_speed(scene, mode, common, x):
 
 @variation.jacobian.implements(Ring, Belt)
 def _jacobian(scene, mode, t, y):
-    per_radius = 1.0 / ring.radius(scene.body)
+    has_dead_band = holds_in_band(scene.law) and stiction_band(scene.law) > 0.0
+    in_dead_band = has_dead_band and (mode.sign == 0 or mode.region < 0)
+    per_radius = 0.0 if in_dead_band else 1.0 / ring.radius(scene.body)
     if mode.sign == 0:
         return 0.0, per_radius, 0.0, 0.0
     forcing = drives.turn(scene.drive, t)
@@ -157,4 +160,4 @@ def _jacobian(scene, mode, t, y):
     x = implicit.to_implicit(scene, forcing, (y[0], v))
     now = slip(scene, mode, implicit.common(scene, mode, forcing, x), forcing, x)
     by_place, by_v, _ = acceleration_slopes(scene, now)
-    return 0.0, per_radius, by_place, by_v
+    return 0.0, per_radius, by_place, 0.0 if in_dead_band else by_v

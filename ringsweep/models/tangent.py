@@ -158,11 +158,8 @@ def _length(length, vector, frequency):
 
 @unrolled
 def _saltation(length, gradient, before, after, keeps):
-    """Saltation matrix from the rates before and after an event, and the logarithm of its determinant.
-
-    The displacement has the same rate before and after.
-    """
-    lines = [f"jump{i} = {f'after[{i}] - before[{i}]' if i else '0.0'}" for i in range(length)]
+    """Saltation matrix from the rates before and after an event, and the logarithm of its determinant."""
+    lines = [f"jump{i} = after[{i}] - before[{i}]" for i in range(length)]
     entries = (
         f"{'keeps * ' if i == 1 else ''}({float(i == j)} + jump{i} * gradient[{j}])"
         for i in range(length)

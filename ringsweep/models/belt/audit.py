@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ringsweep.compile import inlined
-from ringsweep.models.belt.force import breakaway_force, length_scale, sliding, speed_scale
+from ringsweep.models.belt.force import breakaway_force, length_scale, moving, sliding, speed_scale
 from ringsweep.models.belt.record import Outcome
 from ringsweep.models.interface import audit, implicit
 from ringsweep.models.sliding import audited, larger, of_balances, speed_in
@@ -34,7 +34,8 @@ _FALL_FACTOR = 5.0
 @audit.violation.implements(Belt)
 def _violation(scene, mode, forcing, y, rates, s, tolerance):
     x, v = y
-    body, velocity, push = scene.body, v + forcing[1], force_in(scene.drive, forcing)
+    body, push = scene.body, force_in(scene.drive, forcing)
+    velocity = forcing[1] if mode.sign == 0 else moving(scene, v + forcing[1], v, forcing[1])
     length = abs(x) + length_scale(scene, abs(velocity) + abs(forcing[1]))
     speed, largest, relaxation = speed_scale(scene, length), 0.0, 0.0
     if mode.sign == 0:
@@ -64,7 +65,9 @@ def _terms(body, motion, forcing):
 
 @audit.energy.implements(Belt, BristleBelt)
 def _energy(scene, forcing, y):
-    return ring.energy(scene.body, (y[0], 0.0, y[1] + forcing[1]))
+    # The momentum in a dead band moves with the belt.
+    hidden = y[1] - moving(scene, y[1], y[1], 0.0)
+    return ring.energy(scene.body, (y[0], 0.0, y[1] + forcing[1])) - 0.5 * scene.body.mass * hidden * hidden
 
 
 @audited.implements(BristleBelt)

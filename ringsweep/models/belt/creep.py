@@ -32,7 +32,8 @@ def _slip(scene, mode, common, forcing, x):
     # In a dead band friction balances all other forces.
     yields = holds_in_band(scene.law) and mode.region < 0
     viscous = 0.0 if yields else if_force(scene.body, scene.viscous, 0.0)
-    motion = x[0] + forcing[0], force_in(scene.drive, forcing) - viscous * v, v + forcing[1]
+    velocity = forcing[1] if yields else v + forcing[1]
+    motion = x[0] + forcing[0], force_in(scene.drive, forcing) - viscous * v, velocity
     return Slip(motion, v, (-sign * mu, -sign * mu), (-slope, -slope), viscous / scene.body.mass, ())
 
 

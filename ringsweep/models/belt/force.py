@@ -26,6 +26,25 @@ def _if_force(body, yes, no):
 
 
 @absorbed
+def moving(scene, velocity, v, belt_velocity):
+    """Velocity of a body in the state `v`, m/s: `velocity`, but that of the belt in a dead band.
+
+    Karnopp's sliding velocity is zero in the band, where `v` is the momentum by the mass.
+    """
+    return _carried(family(scene.law), scene, velocity, v, belt_velocity)
+
+
+@hook(absorb=True, optional=True)
+def _carried(family, scene, velocity, v, belt_velocity):
+    return velocity
+
+
+@_carried.implements(SetValued)
+def _carried_in_band(family, scene, velocity, v, belt_velocity):
+    return select(abs(v) <= stiction_band(scene.law), belt_velocity, velocity)
+
+
+@absorbed
 def sliding(scene, x, velocity, v, forcing):
     """The :class:`Slip` of a body.
 

@@ -22,6 +22,7 @@ from ringsweep.numerics.memory import select_all
 from ringsweep.physics import ring
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.forces import largest_force
+from ringsweep.physics.friction.registry import holds_in_band
 from ringsweep.physics.friction.velocity import stiction_band
 from ringsweep.quantities.flags import (
     FAILED,
@@ -395,6 +396,9 @@ def _cycles(scene, r, stops, now, v, turn, span):
 @recorder.conclude.implements(Belt, BristleBelt)
 def _conclude(scene, record, status, t, place, velocity):
     r, x = record, place
+    if holds_in_band(scene.law) and r.band > 0.0:
+        # The state holds the momentum, which moves nothing in a dead band.
+        velocity = r.last.velocity
     section.finish(scene.section, scene, r)
     motion, long_run, period, share, stops, drift = _settles_to(scene, r, t)
     if status == BROKEN or not (isfinite(x) and isfinite(velocity)):

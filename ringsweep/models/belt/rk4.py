@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import nan
 
 from ringsweep.models.belt.creep import deflection
-from ringsweep.models.belt.force import sliding
+from ringsweep.models.belt.force import moving, sliding
 from ringsweep.models.inspection import inspection, rates, slip_in_space, word_of_mode
 from ringsweep.models.interface import constant_step
 from ringsweep.models.interface.shock import Unlocated
@@ -20,7 +20,7 @@ def _initial_state(scene):
 
 @slip_in_space.implements(Belt)
 def _slip_in_space(scene, y, v, forcing, angle):
-    return sliding(scene, y[0], y[1], v, forcing), ()
+    return sliding(scene, y[0], moving(scene, y[1], v, forcing[1]), v, forcing), ()
 
 
 @constant_step.rates.implements(Belt, BristleBelt)
@@ -36,10 +36,10 @@ def _inspect(scene, y, forcing):
 @constant_step.seen.implements(Belt, BristleBelt)
 def _seen(scene, y, now):
     # The record takes the rate of the sliding velocity from the differences of short steps.
-    return y[0], y[1], now.friction, now.place, now.v, 0.0, Unlocated(), nan
+    return y[0], now.motion[2], now.friction, now.place, moving(scene, now.v, now.v, 0.0), 0.0, Unlocated(), nan
 
 
 @constant_step.row.implements(Belt, BristleBelt)
 def _row(scene, y, forcing):
     now = constant_step.inspect(scene, y, forcing)
-    return y[0], y[1], now.friction, deflection(y, 0.0), word_of_mode(scene, now)
+    return y[0], now.motion[2], now.friction, deflection(y, 0.0), word_of_mode(scene, now)

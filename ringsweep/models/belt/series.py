@@ -15,6 +15,7 @@ from ringsweep.models.belt.force import (
     if_force,
     length_scale,
     located,
+    moving,
     rounding_of_reserve,
     speed_scale,
     stuck_pull,
@@ -81,6 +82,12 @@ def _initial_state(scene):
     return drives.beginning(scene.drive), (scene.initial_x, drives.velocity_at_beginning(scene.drive, scene.initial_v))
 
 
+@modes.in_space.implements(belt.Belt)
+def _in_space(scene, t, y):
+    forcing = drives.turn(scene.drive, t)
+    return y[0], moving(scene, y[1] + forcing[1], y[1], forcing[1])
+
+
 @series.table_shape.implements(belt.Belt)
 def _table_shape(scene):
     return FAST + 1, ring.if_load_varies(scene.body, NORMAL, SLOW)
@@ -92,7 +99,7 @@ def _initial_mode(scene, t, y):
     if ring.if_load_varies(scene.body, True, False) and breakaway_force(scene, x) <= 0.0:
         return SEPARATED_1, Mode(0, KINETIC, -1)
     if holds_in_band(scene.law) and abs(v) <= stiction_band(scene.law):
-        return RUNNING, _mode_at_rest(scene, t, x, v)
+        return RUNNING, _mode_at_rest(scene, t, x)
     if v == 0.0:
         pull = stuck_pull(scene, x, v, drives.turn(scene.drive, t))
         return RUNNING, Mode(1 if pull >= 0.0 else -1, region_at(scene.law, 0.0), SLOW)
@@ -100,11 +107,11 @@ def _initial_mode(scene, t, y):
 
 
 @inlined
-def _mode_at_rest(scene, t, x, v):
+def _mode_at_rest(scene, t, x):
     """Mode of a set-valued law at a sliding velocity of zero or within the dead band."""
     forcing = drives.turn(scene.drive, t)
-    pull, bound = stuck_pull(scene, x, v, forcing), breakaway_force(scene, x)
-    motion = x, force_in(scene.drive, forcing), v + forcing[1]
+    pull, bound = stuck_pull(scene, x, 0.0, forcing), breakaway_force(scene, x)
+    motion = x, force_in(scene.drive, forcing), forcing[1]
     if bound > 0.0 and abs(pull) <= bound + rounding_of_reserve(scene, motion, forcing[2]):
         return Mode(0, KINETIC, -1)
     if pull == 0.0:
@@ -128,7 +135,7 @@ def _switch(scene, mode, guard, t, y):
     sign, region = mode.sign, mode.region
     if sign == 0:
         # A long series may reach the breakaway force by its own error alone: one more, short step decides.
-        pull = stuck_pull(scene, x, y[1], drives.turn(scene.drive, t))
+        pull = stuck_pull(scene, x, 0.0, drives.turn(scene.drive, t))
         if mode.entry_guard != guard and abs(pull) <= breakaway_force(scene, x):
             return RUNNING, Mode(0, KINETIC, guard), y
         return RUNNING, _loose(scene, 1 if guard == SLOW else -1), y
@@ -137,14 +144,14 @@ def _switch(scene, mode, guard, t, y):
         return RUNNING, Mode(sign, region + 1, SLOW), (x, sign * high)
     if low > 0.0:
         if holds_in_band(scene.law) and region - 1 < 0:
-            return RUNNING, _mode_at_rest(scene, t, x, sign * low), (x, sign * low)
+            return RUNNING, _mode_at_rest(scene, t, x), (x, sign * low)
         return RUNNING, Mode(sign, region - 1, FAST), (x, sign * low)
     if holds_in_band(scene.law) and region < 0:
         # The pull has fallen to the breakaway force.
         return RUNNING, Mode(0, KINETIC, -1), y
     if region < 0:
         return RUNNING, Mode(-sign, region, SLOW), (x, 0.0)
-    return RUNNING, _mode_at_rest(scene, t, x, 0.0), (x, 0.0)
+    return RUNNING, _mode_at_rest(scene, t, x), (x, 0.0)
 
 
 @hook(optional=True)
@@ -192,38 +199,44 @@ def _expand(scene, mode, t, y, tolerance, c):
         expand_force(scene.drive, t, ORDER, c[PUSH], c[FACTORS:])
     c[X, 0], c[V, 0] = y
     c[VELOCITY, 0] = y[1] + c[SHIFT, 1]
-    sharpness = 0.0
-    if mode.sign == 0:
+    sharpness, yielding = 0.0, holds_in_band(scene.law) and mode.region < 0
+    if mode.sign == 0 or yielding:
         for k in range(ORDER + 1):
-            # The sliding velocity is constant: zero, or that on entry into the dead band.
-            one, v = (1.0, y[1]) if k == 0 else (0.0, 0.0)
-            c[V, k], c[VELOCITY, k] = v, (k + 1.0) * c[SHIFT, k + 1] + v
+            # The body moves as the belt does. In a dead band V is the momentum that is left, or builds up, by mass.
+            one = 1.0 if k == 0 else 0.0
+            c[VELOCITY, k] = (k + 1.0) * c[SHIFT, k + 1]
             c[ACCELERATION, k] = (k + 1.0) * (k + 2.0) * c[SHIFT, k + 2]
             if k > 0:
-                c[X, k] = c[SHIFT, k] + (y[1] if k == 1 else 0.0)
+                c[X, k] = c[SHIFT, k]
             load, pull = _held_term(body, c, k, one, c[ACCELERATION, k])
             bound = scene.mu_s * load
-            c[FORCE, k], c[SLOW, k], c[FAST, k] = pull, bound - pull, bound + pull
-        # A pull that reaches the breakaway force but for rounding only touches it. One that exceeds it by more than
-        # rounding accelerates the body, whatever friction is in slip: no event follows another one at the same time.
-        least = rounding_of_reserve(scene, (c[X, 0], c[PUSH, 0], c[VELOCITY, 0]), c[ACCELERATION, 0])
-        c[SLOW, 0] += least
-        c[FAST, 0] += least
+            if mode.sign == 0:
+                c[V, k], c[FORCE, k], c[SLOW, k], c[FAST, k] = y[1] * one, pull, bound - pull, bound + pull
+            else:
+                c[FORCE, k], c[SLOW, k] = mode.sign * bound, mode.sign * pull - bound
+                c[FAST, k] = region_bounds(scene.law, mode.region)[1] * one - mode.sign * c[V, k]
+                if k < ORDER:
+                    c[V, k + 1] = (pull - mode.sign * bound) * INVERSE[k + 1] / body.mass
+        if mode.sign == 0:
+            # A pull that reaches the breakaway force but for rounding only touches it. One that exceeds it by more
+            # accelerates the body, whatever friction is in slip: no event follows another one at the same time.
+            least = rounding_of_reserve(scene, (c[X, 0], c[PUSH, 0], c[VELOCITY, 0]), c[ACCELERATION, 0])
+            c[SLOW, 0] += least
+            c[FAST, 0] += least
     else:
-        yielding = holds_in_band(scene.law) and mode.region < 0
-        sharpness = _expand_slip(scene, mode, 0.0 if yielding else if_force(body, scene.viscous, 0.0), c)
+        sharpness = _expand_slip(scene, mode, if_force(body, scene.viscous, 0.0), c)
         expand_bounds(c, (V, SLOW, FAST), mode, region_bounds(scene.law, mode.region))
-        if yielding:
-            # With a dead band the velocity of the belt is constant.
-            for k in range(ORDER + 1):
-                load, pull = _held_term(body, c, k, 1.0 if k == 0 else 0.0, 0.0)
-                c[SLOW, k] = float(mode.sign) * pull - scene.mu_s * load
+        if _has_dead_band(scene) and mode.entry_guard == SLOW:
+            # A body whose momentum is that of the edge leaves the band as the pull reaches the breakaway force.
+            size = (abs(c[FORCE, 0]) + ring.size(body, (c[X, 0], c[PUSH, 0], c[VELOCITY, 0]))) / body.mass
+            if abs(c[V, 1]) <= 1e-12 * size:
+                c[SLOW, 1] = 0.0
     # The unit of length is the distance that belt, body or load could move within a natural period of the spring.
     length = abs(c[X, 0]) + length_scale(scene, abs(c[VELOCITY, 0]) + abs(c[SHIFT, 1]))
     speed = speed_scale(scene, length)
     speed = speed if holds_in_band(scene.law) else speed_in(scene, mode, speed)
     per_force = 0.0
-    if mode.sign == 0 or (holds_in_band(scene.law) and mode.region < 0):
+    if mode.sign == 0 or yielding:
         # The guards are forces, whose series may converge more slowly than that of the motion.
         motion = length, largest_force(scene.drive), c[VELOCITY, 0]
         scale = abs(breakaway_force(scene, c[X, 0])) + ring.size(body, motion) + 1e-300
@@ -231,6 +244,11 @@ def _expand(scene, mode, t, y, tolerance, c):
     units = (X, 1.0 / (length * tolerance)), (V, 1.0 / (speed * tolerance)), (SLOW, per_force)
     h = step_within(c, units)
     return h if mode.sign == 0 else shorten_for_decay(sharpness, c[V], h)
+
+
+@inlined
+def _has_dead_band(scene):
+    return holds_in_band(scene.law) and stiction_band(scene.law) > 0.0
 
 
 @inlined
@@ -276,7 +294,14 @@ def _expand_slip(scene, mode, viscous, c):
 @series.seen_at_start.implements(belt.Belt)
 def _seen_at_start(scene, c):
     acceleration = located(scene, c[X, 0], c[ACCELERATION, 0])
-    return c[X, 0], c[VELOCITY, 0], c[FORCE, 0], c[X, 0] - c[SHIFT, 0], c[V, 0], c[V, 1], acceleration, nan
+    v = _seen_sliding(scene, c[V, 0], c[VELOCITY, 0] - c[SHIFT, 1])
+    return c[X, 0], c[VELOCITY, 0], c[FORCE, 0], c[X, 0] - c[SHIFT, 0], v, c[V, 1], acceleration, nan
+
+
+@inlined
+def _seen_sliding(scene, v, difference):
+    """Sliding velocity of the body; `difference` is that of the velocities, which loses digits."""
+    return difference if _has_dead_band(scene) else v
 
 
 @series.seen_at.implements(belt.Belt)
@@ -287,7 +312,8 @@ def _seen_at(scene, c, s, h):
         velocity = 0.0
     x = value(c[X], s)
     acceleration = located(scene, x, value(c[ACCELERATION], s))
-    return x, velocity, value(c[FORCE], s), x - value(c[SHIFT], s), value(c[V], s), slope(c[V], s), acceleration, nan
+    v = _seen_sliding(scene, value(c[V], s), value(c[VELOCITY], s) - slope(c[SHIFT], s))
+    return x, velocity, value(c[FORCE], s), x - value(c[SHIFT], s), v, slope(c[V], s), acceleration, nan
 
 
 @series.extremes.implements(belt.Belt)

@@ -74,14 +74,14 @@ def _gradient_of_guard(scene, mode, guard, t, y, rates):
     yields = holds_in_band(scene.law) and mode.region < 0 and guard == SLOW
     if mode.sign != 0 and not yields:
         return 0.0, 1.0 / rates[1] if rates[1] != 0.0 else 0.0
-    x, v = y
+    x = y[0]
     # The guard is the breakaway force less the pull in one direction.
     way = (1.0 if guard == SLOW else -1.0) if mode.sign == 0 else float(mode.sign)
     forcing = drives.turn(scene.drive, t)
     pull, bound = stuck_gradient(scene, x)
     pull_rate, bound_rate = stuck_rates(scene, t, x, forcing)
     by_x = bound - way * pull
-    rate = bound_rate - way * pull_rate + by_x * v
+    rate = bound_rate - way * pull_rate
     return by_x / rate if rate != 0.0 else 0.0, 0.0
 
 

@@ -140,8 +140,8 @@ Karnopp = _law(
         F = \\operatorname{sgn}(F_e)\\, \\min(|F_e|, \\mu_s F_N) \\quad (|v| \\le D_v), \\qquad
         F = \\mu_k F_N \\operatorname{sgn} v \\quad (|v| > D_v)
 
-    with :math:`F_e` the force that friction must balance. While friction balances it, the contact keeps the speed at
-    which it entered the band.
+    with :math:`F_e` the force that friction must balance. Within the band the sliding velocity is zero: only the
+    momentum that is left, or that builds up after breakaway, has a speed v.
     """,
     mu="piecewise(v < dead_band, mu_s, mu_k)",
     at_rest="mu_s",
