@@ -83,6 +83,16 @@ class TestForcedBelts:
         np.testing.assert_allclose(found.x_end[1:], found.x_end[0], rtol=1e-13)
 
     @pytest.mark.slow
+    def test_two_tolerances_do_not_exclude_each_other_late(self):
+        """After some 50 000 periods the rounding of a time would be more than the errors of the runs."""
+        frequency, span = np.array([11.0, 13.0]) / 64.0, np.full(2, 240000.0)
+        axes = {"force.frequency": frequency, "time.span": span}
+        rough, fine = (runs(forced(LAWS[0], frequency=1.0), axes, method="event", rtol=rtol) for rtol in (1e-10, 1e-13))
+        assert (rough.certified == 1).all()
+        assert (fine.certified == 1).all()
+        assert (abs(rough.x_end - fine.x_end) <= rough.x_end_error + fine.x_end_error).all()
+
+    @pytest.mark.slow
     def test_narrow_pulse_after_a_long_rest_breaks_the_body_loose(self):
         """The pulse is up to 1e12 of its widths away; its time is known to the rounding of its largest term."""
         width, mu_s = 1e-3, 0.2
@@ -120,4 +130,21 @@ class TestSlowPulls:
         of["force"] = {"formula": formula, "c": largest, "T": 1.0}
         period = self.RATIO / 1e3
         found = runs(of, {"force.T": period, "time.span": 1.0001 * breaks * period})
-        np.testing.assert_allclose(found.first_slip, breaks * period, rtol=1e-13)
+        # Within the tolerance of a step; a series along a ramp has no error.
+        np.testing.assert_allclose(found.first_slip, breaks * period, rtol=1e-11)
+
+
+@pytest.mark.slow
+def test_angle_on_a_rocking_ring_repeats_to_rounding_after_ten_thousand_periods():
+    of = {
+        "model": "ring-single-contact",
+        "body": {"mass": 1.0},
+        "ring": {"radius": 1.0},
+        "friction": {"law": "stiction", "rest": {"mu_s": 0.4, "mu_k": 0.3}},
+        "drive": {"law": "sinusoidal", "amplitude": 1.0, "frequency": 0.25},
+        "time": {"span": 1.0},
+    }
+    found = runs(of, {"time.span": 4.0 * np.array([300.0, 301.0, 30000.0])})
+    assert (found.certified == 1).all()
+    assert (found.stick_time > 100.0).all()
+    np.testing.assert_allclose(found.phi_end[1:], found.phi_end[0], rtol=1e-13)
