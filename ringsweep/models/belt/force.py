@@ -41,7 +41,8 @@ def _carried(family, scene, velocity, v, belt_velocity):
 
 @_carried.implements(SetValued)
 def _carried_in_band(family, scene, velocity, v, belt_velocity):
-    return select(abs(v) <= stiction_band(scene.law), belt_velocity, velocity)
+    # The edge belongs to the band. Without a band the compiler sees that nothing is below 0.
+    return select(abs(v) < stiction_band(scene.law) * (1.0 + 1e-15), belt_velocity, velocity)
 
 
 @absorbed
