@@ -272,6 +272,9 @@ class TestFilesThatDoNotGoOn:
     def test_run_without_a_number(self, file):
         self.refused(file(x_end=np.nan), "no run that can go on")
 
+    def test_text_in_place_of_a_number(self, file):
+        self.refused(file(x_end="far"), "holds no run, or is damaged")
+
     def test_several_runs(self, file):
         self.refused(file(runs=(2,)), "holds 2 runs")
 

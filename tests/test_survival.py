@@ -319,9 +319,7 @@ class TestCheckpoint:
         assert "another ringsweep is computing it" in capsys.readouterr().err
         assert left(target) == []
 
-    def test_finished_sweep_is_not_computed_again_and_another_one_does_not_replace_it(
-        self, config, never_stopped, tmp_path
-    ):
+    def test_finished_sweep_is_neither_computed_again_nor_replaced_by_another(self, config, never_stopped, tmp_path):
         target = tmp_path / "out.nc"
         shutil.copy(never_stopped, target)
         assert not write(load(config), target, Execution(progress=False))

@@ -61,9 +61,7 @@ def test_file_that_another_program_changed_is_read_as_one_without_a_seal(path):
     [(32768, "declares 1.07e+09 cells: a file holds at most 1e+08"), (8192, "bytes of numbers, which")],
     ids=["more cells than a sweep has", "more numbers than the file has"],
 )
-def test_numbers_that_are_declared_and_not_there_are_told_before_they_are_read(
-    tmp_path, capsys, command, side, problem
-):
+def test_numbers_that_are_declared_but_not_there_are_never_read(tmp_path, capsys, command, side, problem):
     """Chunks that nobody wrote take no space on the disk, but all of it in memory."""
     with netCDF4.Dataset(tmp_path / "big.nc", "w") as file:
         file.setncatts({"Conventions": "CF-1.11", "ringsweep_version": "0", "configuration": "{}"})
