@@ -15,11 +15,11 @@ from ringsweep.physics.friction.velocity import EXPRESSIONS, friction_at
 from ringsweep.solvers.automaton import History, Results, integrate
 
 
-def made(law, surfaces=((0.5, 0.3),), **parameters):
-    """Friction law of one cell, made in the same way as in a sweep."""
+def made(law, surfaces=((0.5, 0.3),), motion=0.0, **parameters):
+    """Friction law of one cell, made in the same way as in a sweep; `motion` is the speed of the motion, m/s."""
     columns = {name: np.array([float(value)]) for name, value in parameters.items()}
     pairs = [tuple(np.array([float(mu)]) for mu in pair) for pair in surfaces]
-    return take(law(**columns, **hidden_fields(EXPRESSIONS[law], columns, pairs)), 0)
+    return take(law(**columns, **hidden_fields(EXPRESSIONS[law], columns, pairs, motion)), 0)
 
 
 def rod(mass, inertia, radius, xi, sin_beta, cos_beta, gravity):

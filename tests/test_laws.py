@@ -396,13 +396,15 @@ class TestCharacteristicValues:
             assert friction_at(law, 2 / alpha, (MU_S, MU_K)) == (MU_S, 0.0)
             assert law.thresholds[-1] == inf
 
-    @given(powers(1.0, 1e9), st.just(0.0) | powers(1e-6, 1.0))
-    def test_rest_of_a_tail_beyond_its_end_changes_the_velocity_by_1e_17(self, alpha, low):
-        """The integral of the tail from its end on is at most 1e-17 m/s, and not much less."""
-        law = made(LAWS["bengisu-akay"], alpha=alpha, v0=low) if low else made(LAWS["tustin"], alpha=alpha)
-        length = law.thresholds[-1] - low
-        rounding = 1 + 3 * alpha * np.spacing(low)
-        assert 1e-18 < exp(-alpha * length) / alpha < 1.1e-17 * rounding
+    @given(powers(1.0, 1e9), st.just(0.0) | powers(1e-6, 1.0), st.integers(-40, 6))
+    def test_rest_of_a_tail_changes_the_velocity_by_a_rounding_of_the_motion(self, alpha, low, octave):
+        """Its integral from its end on is 1e-16 of the speed of the motion, unless it is below rounding of friction."""
+        motion = 2.0**octave
+        of_law = {"alpha": alpha, "v0": low} if low else {"alpha": alpha}
+        law = made(LAWS["bengisu-akay" if low else "tustin"], motion=motion, **of_law)
+        rest, rounding = exp(-alpha * (law.thresholds[-1] - low)), 1 + 3 * alpha * np.spacing(low)
+        assert rest < max(1.1e-16 * motion * alpha * rounding, 4.3e-18)
+        assert rest > 1e-17 * min(motion * alpha, 0.1)
 
     @given(powers(1e-12, 1e6))
     def test_friction_of_coulomb_and_stiction_does_not_depend_on_the_speed(self, speed):
