@@ -132,7 +132,7 @@ def test_period_of_three_cycles_that_becomes_one_is_not_settled():
 
 
 @pytest.mark.parametrize("friction", [0.2, 0.3])
-def test_stops_that_shrink_for_ever_beside_a_continuum_of_motions_do_not_settle(friction):
+def test_stops_that_shrink_for_ever_beside_a_continuum_do_not_settle(friction):
     """At half the natural frequency, without a damper, motions without stops lie side by side in a continuum."""
     found = hartog(0.5, friction, [500.0, 2000.0, 8000.0])
     assert words(found) == ["transient"] * 3
@@ -169,7 +169,7 @@ def test_drift_of_a_body_without_a_spring_under_a_force_that_vibrates():
 
 
 @pytest.mark.slow
-def test_belt_that_vibrates_unevenly_conveys_at_the_speed_that_halves_its_period():
+def test_belt_that_vibrates_unevenly_conveys_a_body():
     """The belt moves at a w (cos u + 0.2 cos 2u), u = w t. The body is slower than the belt for half of each period.
 
     It gains mu g T/2 from u1 to u1 + pi, where it meets the belt: -2 a w cos u1 = mu g T/2.

@@ -103,7 +103,7 @@ def test_period_of_parts_that_repeat_and_of_parts_that_do_not():
 
 
 @pytest.mark.slow
-def test_exponent_under_a_table_is_the_slower_rate_of_the_damped_oscillator(tmp_path):
+def test_exponent_under_a_table_is_the_slower_rate_of_a_damped_oscillator(tmp_path):
     """Without friction disturbances decay like exp((sqrt(3) - 2) t) and exp(-(sqrt(3) + 2) t)."""
     found = run(of_table({"law": "coulomb", "mu_k": 0.0}, tmp_path), certify=True)
     assert found.certified.item() == 1
@@ -128,7 +128,7 @@ def test_exponent_of_stick_slip_under_a_table_is_that_under_the_same_sine(tmp_pa
 
 
 @pytest.mark.slow
-def test_words_under_two_incommensurate_forces_have_no_units_no_side_and_no_end():
+def test_words_under_two_incommensurate_forces_have_no_units_and_no_side():
     points = random_points(40, 5)
     signed = "belt.velocity", "initial.x", "initial.velocity", "force.A", "force.B"
     found = run(TWO_FORCES, points, certify=True)

@@ -411,7 +411,9 @@ def without_return(c, forced_by_period, cycle, growth):
     if exponent > _POSITIVE * error:
         chaos = grown > _GROWN and rounding < least and most <= _SAME_SCATTER * least
         return CHAOTIC if chaos else TRANSIENT
+    neutral = (abs(exponent) + _POSITIVE * error) * cycle <= _ZERO
+    if forced_by_period:
+        return QUASI_PERIODIC if neutral and c.lap == 0.0 and most <= _SAME_ON_TORUS * least else TRANSIENT
     # Under forcing that does not repeat, neither does a motion that has forgotten its start.
-    drawn = not forced_by_period and grown < -_GROWN and most <= _SAME_SCATTER * max(least, rounding)
-    torus = (c.lap == 0.0 or not forced_by_period) and (abs(exponent) + _POSITIVE * error) * cycle <= _ZERO
-    return QUASI_PERIODIC if drawn or (torus and most <= _SAME_ON_TORUS * least) else TRANSIENT
+    alike = most <= _SAME_SCATTER * max(least, rounding)
+    return QUASI_PERIODIC if alike and (neutral or grown < -_GROWN) else TRANSIENT
