@@ -113,6 +113,39 @@ class TestSeparation:
         assert word(found) == "separating"
         assert float(found.t_end) == 0.0
 
+    @pytest.mark.parametrize("start", [None, (0.0, 0.5), (0.0, 0.05)])
+    @pytest.mark.parametrize(
+        ("law", "growth"),
+        [
+            ({"law": "stiction"}, 8.0),
+            ({"law": "stiction"}, 80.0),
+            ({"law": "bengisu-akay", "v0": 1e-3, "alpha": 9}, 8.0),
+        ],
+    )
+    def test_body_whose_load_grows_from_nothing_goes_on_as_one_with_a_little(self, law, growth, start):
+        """Without gravity the load is k_n x: with the launch at x = 0 it begins at zero."""
+        first, second = (
+            outcome(scene(**law, growth=growth, start=start and (x, start[1]), span=0.5) | {"gravity": 0.0})
+            for x in (0.0, 1e-9)
+        )
+        assert first.certified == 1
+        assert word(first) == word(second) != "separating"
+        for name in ("x_end", "velocity_end", "force_max", "stick_time"):
+            assert float(first[name]) == pytest.approx(float(second[name]), rel=1e-6, abs=1e-9)
+
+    @pytest.mark.parametrize(("v_b", "velocity"), [(0.1, -0.5), (-0.1, -0.1), (0.0, 0.0)])
+    def test_body_whose_load_does_not_grow_from_nothing_separates_at_once(self, v_b, velocity):
+        found = outcome(scene(v_b=v_b, start=(0.0, velocity)) | {"gravity": 0.0})
+        assert word(found) == "separating"
+        assert float(found.t_end) == 0.0
+
+    def test_bristles_bear_a_load_that_grows_from_nothing(self):
+        start = (-1.25, 0.5)
+        found = scene("dahl", start=start, span=0.5) | {"gravity": 10.0, "body": {"mass": 1.0, "normal_stiffness": 8.0}}
+        found["friction"] = {"law": "dahl", "mu_k": 0.25, "sigma0": 300.0}
+        assert word(outcome(found)) != "separating"
+        assert word(outcome(found | {"initial": {"x": -1.25, "velocity": -0.5}})) == "separating"
+
     def test_swing_that_nearly_leaves_the_belt_is_not_certified(self):
         """The load at the turn is smaller than what the two runs can tell apart, or the run separates there."""
         mu, growth = 0.25, 8.0

@@ -108,8 +108,15 @@ def _initial_mode(scene, t, y):
         # The body begins to slide in the direction of the net force; without a net force the belt leaves it behind.
         sign = 1 if ring.acceleration(scene.body, K, K, motion)[0] > forcing[2] else -1
     mode = Mode(sign, BAND if _in_band(scene, v, z, float(sign)) else KINETIC)
-    opens = ring.if_load_varies(scene.body, True, False) and ring.reactions(scene.body, K, K, motion)[0] <= 0.0
-    return (SEPARATED_1 if opens else RUNNING), mode
+    load = ring.reactions(scene.body, K, K, motion)[0]
+    if load == 0.0:
+        # The contact holds if the load begins to grow.
+        ahead = motion[2] if motion[2] != 0.0 else ring.acceleration(scene.body, K, K, motion)[0]
+        load = ring.held(scene.body, 0.0, (ahead, 0.0, 0.0), 0.0, 0.0, 0.0)[0]
+        opens = load <= 0.0
+    else:
+        opens = load < 0.0
+    return (SEPARATED_1 if ring.if_load_varies(scene.body, opens, False) else RUNNING), mode
 
 
 @modes.switch.implements(BristleBelt)

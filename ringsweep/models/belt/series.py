@@ -96,7 +96,7 @@ def _table_shape(scene):
 @modes.initial_mode.implements(belt.Belt)
 def _initial_mode(scene, t, y):
     x, v = y
-    if ring.if_load_varies(scene.body, True, False) and breakaway_force(scene, x) <= 0.0:
+    if ring.if_load_varies(scene.body, True, False) and ring.reactions(scene.body, 0.0, 0.0, (x, 0.0, 0.0))[0] < 0.0:
         return SEPARATED_1, Mode(0, KINETIC, -1)
     if holds_in_band(scene.law) and abs(v) <= stiction_band(scene.law):
         return RUNNING, _mode_at_rest(scene, t, x)
@@ -111,12 +111,12 @@ def _mode_at_rest(scene, t, x):
     """Mode of a set-valued law at a sliding velocity of zero or within the dead band."""
     forcing = drives.turn(scene.drive, t)
     pull, bound = stuck_pull(scene, x, 0.0, forcing), breakaway_force(scene, x)
-    motion = x, force_in(scene.drive, forcing), forcing[1]
-    if bound > 0.0 and abs(pull) <= bound + rounding_of_reserve(scene, motion, forcing[2]):
+    least = rounding_of_reserve(scene, (x, force_in(scene.drive, forcing), forcing[1]), forcing[2])
+    if bound == 0.0 and pull == 0.0:
+        # Rates decide: a load that only begins to grow holds a pull that grows more slowly.
+        (pull, bound), least = stuck_rates(scene, t, x, forcing), 0.0
+    if bound > 0.0 and abs(pull) <= bound + least:
         return Mode(0, KINETIC, -1)
-    if pull == 0.0:
-        # The rate of the pull decides, while the belt carries the body along.
-        pull, _ = stuck_rates(scene, t, x, forcing)
     return _loose(scene, 1 if pull >= 0.0 else -1)
 
 
@@ -231,6 +231,8 @@ def _expand(scene, mode, t, y, tolerance, c):
             size = (abs(c[FORCE, 0]) + ring.size(body, (c[X, 0], c[PUSH, 0], c[VELOCITY, 0]))) / body.mass
             if abs(c[V, 1]) <= 1e-12 * size:
                 c[SLOW, 1] = 0.0
+    if ring.if_load_varies(body, c[NORMAL, 0] == 0.0, False):
+        _from_no_load(c, mode.sign == 0)
     # The unit of length is the distance that belt, body or load could move within a natural period of the spring.
     length = abs(c[X, 0]) + length_scale(scene, abs(c[VELOCITY, 0]) + abs(c[SHIFT, 1]))
     speed = speed_scale(scene, length)
@@ -249,6 +251,18 @@ def _expand(scene, mode, t, y, tolerance, c):
 @inlined
 def _has_dead_band(scene):
     return holds_in_band(scene.law) and stiction_band(scene.law) > 0.0
+
+
+@inlined
+def _from_no_load(c, sticks):
+    """Divide guards that are zero at launch by a power of the time: the load has yet to grow, or never does."""
+    for row, begins in ((NORMAL, True), (SLOW, sticks), (FAST, sticks)):
+        zeros = 0
+        while begins and zeros < ORDER and c[row, zeros] == 0.0:
+            zeros += 1
+        if zeros < ORDER:
+            for k in range(ORDER + 1):
+                c[row, k] = c[row, k + zeros] if k + zeros <= ORDER else 0.0
 
 
 @inlined
