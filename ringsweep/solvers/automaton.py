@@ -381,14 +381,14 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
         control = StepControl(1e-6 * scene.span, 0.0, 0.0)
         audit, guard_fall_rate, local = Audit(0.0, 0.0, 0.0), 0.0, LocalErrors(0.0, 0.0, 0.0, 0.0)
         n = stalled = 0
-        t_before = -1.0
+        t_before, s = t, scene.span
         t_judged, least_gain = t, scene.span * (PATIENCE / max_steps)
         just_switched = True
         is_implicit = False
         while status == RUNNING:
             # Near a jam, steps shorter than the rounding of time still move the state, but not for ever.
             t = now.t
-            stalled = stalled + 1 if t == t_before else 0
+            stalled = stalled + 1 if t_before + s == t_before else 0
             if n == max_steps or stalled == _MOST_STALLED:
                 status = modes.status_when_stalled(scene, mode, now, y) if stalled == _MOST_STALLED else BROKEN
                 break

@@ -200,7 +200,7 @@ class _Piecewise(Method):
             # Ratio of successive terms of a series at the end of a step; a geometric series is the remainder.
             ratio = tolerance ** (1.0 / ORDER)
             remainder = tolerance * ratio / (1.0 - ratio)
-            floor, force_floor = remainder * (_ONCE + _SHARED * local.series), REACTION_TOLERANCE * _ONCE * remainder
+            floor, force_floor = remainder * (_ONCE + _SHARED * local.series), REACTION_TOLERANCE * remainder
             floor += _SHARED_IMPLICIT * implicit_tolerance * local.implicit
         # Errors average out along a smooth motion, not if an event magnifies those of the few steps before it.
         magnified, left_out = audit.magnified(batch, rows)
