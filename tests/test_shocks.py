@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import ringsweep
+from ringsweep.models import MODELS
 
 G, RADIUS, MASS = 9.81, 0.2, 0.1
 
@@ -112,3 +113,11 @@ class TestBelt:
         found = one(BELT | {"friction": {"law": "stiction", "mu_s": 0.15, "mu_k": 0.15}, "time": {"span": "7.5 s"}})
         assert float(found.jump_max) == 0.0
         assert np.isnan(found.t_jump_max)
+
+
+@pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
+def test_bounds_have_the_units_of_their_numbers(model):
+    variables = model.variables
+    for name in variables:
+        if (bound := f"{name}_error") in variables:
+            assert variables[bound].units == variables[name].units, name

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -127,8 +128,13 @@ class Model(ABC):
 
     @property
     def variables(self) -> dict[str, Variable]:
-        """All variables of datasets of this model."""
-        return OUTCOMES | self.own_variables
+        """All variables of datasets of this model; a bound on an error has the unit of its number."""
+        bounds = {
+            bound: replace(OUTCOMES[bound], unit=own.unit, long_name=f"bound on the error: {own.long_name}")
+            for name, own in self.own_variables.items()
+            if (bound := f"{name}_error") in OUTCOMES
+        }
+        return OUTCOMES | self.own_variables | bounds
 
     def columns(self, structure: Structure) -> tuple[str, ...]:
         """Names of the columns of a run; a variable with a dimension of its own has several, side by side."""
