@@ -335,8 +335,8 @@ def integrate(batch, tolerances, max_steps, results, history):
     batch : NamedTuple
         Cells, as :func:`ringsweep.models.batch` makes them.
     tolerances : tuple of float
-        Relative error allowed to a step of the series, and to an implicit step. It applies to 1 rad, and to the
-        velocity at 1 rad/s + \\|omega\\| or at the width of the stiction band.
+        Relative error allowed to a step of the series, and to an implicit step; see
+        :func:`ringsweep.models.interface.series.expand`.
     max_steps : int
         Steps after which a run is given up as failed. It is given up before if :data:`PATIENCE` steps gain so little
         time that it would not end within `max_steps`.

@@ -40,8 +40,9 @@ def expand(scene, mode, t, y, tolerance, c):
     y : tuple of float
         State at time `t`.
     tolerance : float
-        Relative error allowed to a step. On a ring it applies to 1 rad, and to the velocity at
-        1 rad/s + \\|omega\\|; on a belt to the lengths and velocities of its motion.
+        Relative error allowed to a step. On a ring it applies to 1 rad, and to the velocity at \\|omega\\| and the rate
+        of :func:`ringsweep.models.sliding.rate_at_rest`; on a belt to the lengths and velocities of its motion; in a
+        stiction band to a velocity of at most its width.
     c : ndarray of shape ``(rows, columns)``
         Table, which is filled. The guards are positive while the mode holds. The guard in row ``mode.entry_guard`` is
         exactly zero at the beginning; with ``mode.entry_guard = -1`` there is none.
