@@ -291,7 +291,7 @@ PARITY = {
 }
 
 #: Outcomes that change their sign; extremes change places besides.
-ODD = r"(x|phi|velocity|omega|deflection(_[12])?)_(end|min|max|section)"
+ODD = r"(x|phi|velocity|omega|deflection(_[12])?)_(end|min|max|section)|drift"
 
 #: Outcomes that a mirror image does not tell: it would need the least velocity, or turns at the other side.
 _UNTOLD = r"velocity_max.*"
