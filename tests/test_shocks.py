@@ -116,8 +116,9 @@ class TestBelt:
 
 
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
-def test_bounds_have_the_units_of_their_numbers(model):
+def test_bounds_have_the_units_of_their_numbers_and_are_absent_with_them(model):
     variables = model.variables
+    assert {f"{name}_error" for name in model.absent} & variables.keys() <= model.absent
     for name in variables:
         if (bound := f"{name}_error") in variables:
             assert variables[bound].units == variables[name].units, name

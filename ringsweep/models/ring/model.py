@@ -33,7 +33,9 @@ def _is_recorded(structure: Structure) -> bool:
 
 
 # Variables that a body with one contact lacks.
-_OF_CONTACT_2 = frozenset({"normal_min_2", "normal_max_2", "normal_2", "zone_2", "deflection_2"})
+_OF_CONTACT_2 = frozenset(
+    {"normal_min_2", "normal_min_2_error", "normal_max_2", "normal_max_2_error", "normal_2", "zone_2", "deflection_2"}
+)
 
 
 class SingleContactRing(Model, Continues):
