@@ -238,7 +238,7 @@ def _observe(scene, record, t, duration, stuck, seen):
     place = _place(scene, r, place)
     side = select(stuck, 1.0, -1.0)
     if any_of((side * stops.side < 0.0) | _leaves(scene, r, place)):
-        stops = _stops(scene, r, now, stuck, place, v, force)
+        stops = _stops(scene, r, now, stuck, place, (v, v_rate), force)
     if any_of((r.last.velocity * velocity <= 0.0) | (t >= cycles_now.next)):
         turn = turn_within(r.last, now)
         x_min = select(turn.is_least, min(x_min, turn.x), x_min)
@@ -307,8 +307,12 @@ def _not_located(before, now):
 
 
 @absorbed
-def _stops(scene, r, now, stuck, place, v, force):
-    """Stops after an interval in which stick began or ended, or a slip became longer than the play."""
+def _stops(scene, r, now, stuck, place, sliding, force):
+    """Stops after an interval in which stick began or ended, or a slip became longer than the play.
+
+    `sliding` are the sliding velocity and its rate.
+    """
+    v, v_rate = sliding
     s, before, side = r.stops, now.t - now.duration, select(stuck, 1.0, -1.0)
     begins, ends = stuck & (s.side < 0.0), (side < 0.0) & (s.side > 0.0)
     stick_time = s.stick_time + select(ends, before - s.since, 0.0)
@@ -319,7 +323,8 @@ def _stops(scene, r, now, stuck, place, v, force):
     span = max(r.x_max, now.x) - min(r.x_min, now.x)
     scale = _AT_REST * square_root(scene.body.stiffness / scene.body.mass) * span
     rate = select(now.duration > 0.0, (v - r.last.v) / now.duration, 0.0)
-    slowing = max(abs(r.last.v_rate), abs(rate))
+    # Over an interval that is but rounding, this would be noise.
+    slowing = max(abs(r.last.v_rate), abs(_located(rate, v_rate)))
     passage = _PASSAGE * max(max(r.band, scale), abs(r.last.v)) / slowing
     # Under a greater pull than that of breakaway a set-valued law would let the body pass, maybe slowly.
     pull = _located(scene.body.mass * rate + force, r.last.pull)
@@ -367,8 +372,7 @@ def _cycles(scene, r, stops, now, v, turn, span):
     high = select(turn.is_greatest, max(c.high, turn.x), c.high)
     # Without forcing a cycle ends where the body is farthest against the motion of the belt: no vibration of bristles
     # in stick disturbs this turn.
-    frequency = square_root(scene.body.stiffness / scene.body.mass)
-    backward = v - now.velocity > 1e-6 * frequency * (high - low)
+    backward = v > now.velocity
     far = high - low > max(r.play, _ROUNDING * span)
     turns = far & select(backward, turn.is_greatest, turn.is_least) & (period == inf)
     old = _with_extremes(c, low, high)
