@@ -243,13 +243,13 @@ def _of_cubic(trace, minors, determinant):
 
 @hook(optional=True)
 def _disturbance(scene):
-    """A disturbance with a component along each component of the state."""
-    return 1.0, 1.0
+    """A disturbance with components along each component of the state that count alike, see :func:`frequency`."""
+    return 1.0 / frequency(scene), 1.0
 
 
 @_disturbance.implements(BristleBelt)
 def _of_three(scene):
-    return 1.0, 1.0, 1.0
+    return 1.0 / frequency(scene), 1.0, 1.0 / frequency(scene)
 
 
 @hook(optional=True)
@@ -266,14 +266,13 @@ def frequency(scene):
 @frequency.implements(Belt, BristleBelt)
 def _frequency(scene):
     natural = sqrt(abs(scene.body.stiffness) / scene.body.mass)
-    found = max(natural, 2.0 * pi / scene.forcing_period)
-    return found if found > 0.0 else 1.0
+    return max(natural, 2.0 * pi / min(scene.forcing_period, scene.span))
 
 
 @frequency.implements(Ring)
 def _frequency_on_ring(scene):
     radius = scene.body.radius
-    return radius * max(sqrt(scene.body.gravity / radius), 2.0 * pi / scene.forcing_period)
+    return radius * max(sqrt(scene.body.gravity / radius), 2.0 * pi / min(scene.forcing_period, scene.span))
 
 
 @begin.implements(Exponent)
