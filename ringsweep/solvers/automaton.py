@@ -7,10 +7,11 @@ Smooth laws take implicit steps where a mode relaxes much faster than it moves, 
 
 from __future__ import annotations
 
-from math import isfinite
+from math import inf, isfinite
 from typing import Any, NamedTuple
 
 from ringsweep.compile import Cells, borrowed, hook, inlined, kernel, take
+from ringsweep.models.interface import audit as audit_of_model
 from ringsweep.models.interface import implicit, modes, recorder, series, simpler, variation
 from ringsweep.models.interface.status import BROKEN, COMPLETE, RUNNING
 from ringsweep.numerics.clock import Instant, later
@@ -317,7 +318,7 @@ class Results(NamedTuple):
     audits : ndarray of shape ``(cells, 7)`` or ``(0, 7)``
         Unless empty, the audit of each run: the largest violation of the friction law, in units of the violation that
         the tolerance would explain; the share of the energy turnover that is not work of friction; the rate at which
-        the guard that ended the run fell, in its unit per second; :class:`LocalErrors`.
+        the reaction that ended the run fell, N/s, infinite if something else did; :class:`LocalErrors`.
     """
 
     rows: Any
@@ -428,7 +429,9 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
             # The regime of a run that goes on after a loss is that loss: what ends the run later does not count.
             decides = status != RUNNING or modes.first_loss(step.mode, mode)
             if audited and guard >= 0 and s > 0.0 and decides and guard_fall_rate == 0.0:
-                guard_fall_rate = fall_rate(family(scene.law), scene, step, scratch, guard)
+                # A reaction that jumps to zero at another event does not rise again before.
+                falls = audit_of_model.is_reaction(scene, guard)
+                guard_fall_rate = fall_rate(family(scene.law), scene, step, scratch, guard) if falls else inf
             if s == 0.0 and status != RUNNING:
                 # The history must show the end of a mode that lasts no time.
                 count = _store_row(scene, step, c, 0.0, y, history, count)

@@ -104,7 +104,7 @@ def doubts(runs: TwoRuns, fall_rates: Any) -> NDArray[np.int8]:
     ----------
     runs : TwoRuns
     fall_rates : ndarray of shape ``(cells,)``
-        Rate at which the guard that ended each run fell, in its unit per second.
+        As for :func:`ringsweep.models.interface.audit.undecided`.
 
     Returns
     -------

@@ -56,6 +56,12 @@ def energy(scene, forcing, y):
 
 
 @hook(optional=True)
+def is_reaction(scene, guard):
+    """Whether a guard that may end a run is a reaction, N. By default true: that of a belt."""
+    return True
+
+
+@hook(optional=True)
 def undecided(batch, rows, second_rows, fall_rates):
     """Which runs of a batch are so close to another regime that their error could change the regime.
 
@@ -68,7 +74,7 @@ def undecided(batch, rows, second_rows, fall_rates):
     rows, second_rows : ndarray of shape ``(cells, outcomes)``
         Outcomes of the runs, and of second runs at another resolution. Their difference estimates the error.
     fall_rates : ndarray of shape ``(cells,)``
-        Rate at which the guard that ended each run fell, in its unit per second.
+        Rate at which the reaction that ended each run fell, N/s; infinite if something else ended it.
 
     Returns
     -------

@@ -13,9 +13,11 @@ import numpy as np
 
 from ringsweep.compile import inlined, take
 from ringsweep.models.interface import audit
+from ringsweep.models.ring import creep
 from ringsweep.models.ring.bristles import slip_of
 from ringsweep.models.ring.contacts import coefficients_under
 from ringsweep.models.ring.record import Outcome
+from ringsweep.models.ring.series import NORMAL_1, NORMAL_2
 from ringsweep.models.sliding import REACTION_TOLERANCE, audited, larger, of_balances, rate_at_rest, speed_in
 from ringsweep.physics import contact, drives, ring
 from ringsweep.physics.friction import SetValued, family_of
@@ -118,6 +120,16 @@ def least_rates(batch):
     """The scale of an angular velocity at least, rad/s, see :func:`ringsweep.models.sliding.rate_at_rest`."""
     swing = np.sqrt(batch.body.gravity / batch.body.radius) + 1.0 / batch.span
     return {"rad s-1": np.maximum(np.minimum(1.0, swing), swing / 64.0)}
+
+
+@audit.is_reaction.implements(ring.Ring)
+def _is_reaction(scene, guard):
+    return guard in (NORMAL_1, NORMAL_2)
+
+
+@audit.is_reaction.implements(ring.BristleRing)
+def _is_reaction_on_bristles(scene, guard):
+    return guard in (creep.NORMAL_1, creep.NORMAL_2)
 
 
 @audit.undecided.implements(ring.Ring, ring.BristleRing)

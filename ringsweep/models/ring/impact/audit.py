@@ -17,6 +17,7 @@ from ringsweep.models.ring.audit import least_rates, undecided_on_contacts
 from ringsweep.models.ring.impact.mode import (
     BOTH,
     NONE,
+    RING,
     angle_when_closed,
     closed_mode,
     coefficients_there,
@@ -106,6 +107,11 @@ def _energy(scene, forcing, y):
 
 # Largest violation of the impact law, and gain of energy in an impact, in a certified run: shares of the scales.
 _MOST_VIOLATION = 1e-9
+
+
+@audit.is_reaction.implements(ImpactRing)
+def _is_reaction(scene, guard):
+    return audit.is_reaction(scene.closed, guard - RING)
 
 
 @audit.undecided.implements(ImpactRing)
