@@ -122,3 +122,11 @@ def test_bounds_have_the_units_of_their_numbers_and_are_absent_with_them(model):
     for name in variables:
         if (bound := f"{name}_error") in variables:
             assert variables[bound].units == variables[name].units, name
+
+
+def test_nothing_jumps_under_a_smooth_law_without_zones():
+    law = {"law": "bengisu-akay", "mu_s": 0.15, "mu_k": 0.1, "alpha": 100, "v0": 1e-4}
+    found = one(BELT | {"friction": law})
+    assert found.slips > 0
+    assert found.jump_max == 0.0
+    assert np.isnan(found.t_jump_max)

@@ -138,14 +138,21 @@ def _step_series(family, scene, run, h_max, tolerances, scratch):
     return False, guard, s, y, record, run.control, local
 
 
+@inlined
+def _goes_on(scene, run, guard, record):
+    """Record after a step under a smooth law: where no event ends the step nothing jumps, but the kind of step may."""
+    return recorder.after_event(scene, record, run.mode, run.mode, run.now.t) if guard < 0 else record
+
+
 @_step.implements(Smooth)
 def _step_either(family, scene, run, h_max, tolerances, scratch):
     if implicit.may_creep(scene, run.mode):
         is_stiff, guard, s, y, record, control, error = _creep(scene, run, h_max, tolerances[1], scratch)
         if is_stiff:
+            record = _goes_on(scene, run, guard, record)
             return True, guard, s, y, record, control, _after_creep(run.local, error)
     guard, s, y, record, reach = series_step(scene, run, h_max, tolerances[0], scratch)
-    local = run.local
+    local, record = run.local, _goes_on(scene, run, guard, record)
     local = LocalErrors(local.series + _shared(s, reach), local.rate, local.implicit, local.creep)
     return False, guard, s, y, record, StepControl(1e-6 * scene.span, 0.0, 0.0), local
 
@@ -378,7 +385,7 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
         status, mode = modes.initial_mode(scene, now, y)
         begun = _begin_in(simpler.kind(scene), scene, mode, now, y, tolerances, c)
         record = recorder.lend(scene, begun, take(rows, i))
-        record = recorder.after_event(scene, record, mode, t)
+        record = recorder.after_event(scene, record, mode, mode, t)
         control = StepControl(1e-6 * scene.span, 0.0, 0.0)
         audit, guard_fall_rate, local = Audit(0.0, 0.0, 0.0), 0.0, LocalErrors(0.0, 0.0, 0.0, 0.0)
         n = stalled = 0
@@ -425,7 +432,7 @@ def _integrate(batch, tolerances, max_steps, results, history, scratch):
             now, status, mode, y = _after_step(scene, mode, guard, now, s, limit, y_next)
             if guard >= 0:
                 record = at_event(variation.asked(scene), scene, record, step.mode, guard, now, y_next)
-                record = recorder.after_event(scene, record, mode, now.t)
+                record = recorder.after_event(scene, record, step.mode, mode, now.t)
             # The regime of a run that goes on after a loss is that loss: what ends the run later does not count.
             decides = status != RUNNING or modes.first_loss(step.mode, mode)
             if audited and guard >= 0 and s > 0.0 and decides and guard_fall_rate == 0.0:

@@ -22,6 +22,7 @@ from ringsweep.numerics.memory import select_all
 from ringsweep.physics import ring
 from ringsweep.physics.belt import Belt, BristleBelt
 from ringsweep.physics.forces import largest_force
+from ringsweep.physics.friction import family
 from ringsweep.physics.friction.registry import holds_in_band
 from ringsweep.physics.friction.velocity import stiction_band
 from ringsweep.quantities.flags import (
@@ -161,7 +162,7 @@ class Record(NamedTuple):
 
 #: Record with another tangent.
 with_tangent = replacing("tangent")
-_entered, _with_section = replacing("force_max", "shocks"), replacing("section")
+_entered, _with_section, _with_shocks = replacing("force_max", "shocks"), replacing("section"), replacing("shocks")
 _with_extremes, _with_half = replacing("low", "high"), replacing("next", "half_t", "half_x")
 
 # A swing has no bound if it is so many times the scales of the scene, and its growth in a cycle falls by less than the
@@ -544,6 +545,11 @@ def _without_return(scene, r):
 @recorder.begin.implements(Belt)
 def _begin(scene, t, seen):
     return begin(scene, t, seen, stiction_band(scene.law), -1.0)
+
+
+@recorder.after_event.implements(Belt)
+def _after_event(scene, record, before, mode, t):
+    return _with_shocks(record, shock.without_jump(family(scene.law), record.shocks))
 
 
 @recorder.enter.implements(Belt, BristleBelt)

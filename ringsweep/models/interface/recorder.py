@@ -141,7 +141,7 @@ def keep_memory(scene, row, column, y):
 
 
 @hook(optional=True)
-def after_event(scene, record, mode, t):
+def after_event(scene, record, before, mode, t):
     """Record after an event, at which a mode begins. Methods of constant step do not call it.
 
     Parameters
@@ -150,8 +150,8 @@ def after_event(scene, record, mode, t):
         One cell.
     record : NamedTuple
         Record before the event.
-    mode : NamedTuple
-        The mode that begins; also the first one of a run.
+    before, mode : NamedTuple
+        The modes that end and begin; one mode twice as it begins a run, and between steps under a smooth law.
     t : float
         Time of the event, s.
 

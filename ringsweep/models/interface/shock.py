@@ -9,7 +9,8 @@ from __future__ import annotations
 from math import nan
 from typing import NamedTuple
 
-from ringsweep.compile import hook, inlined
+from ringsweep.compile import hook, inlined, replacing
+from ringsweep.physics.friction import Smooth
 
 # A change of the acceleration below this share of its size, or of a jump, is an error of the method.
 _LEAST_SHARE = 1e-6
@@ -32,7 +33,7 @@ class Shocks(NamedTuple):
     Attributes
     ----------
     acceleration : float
-        In rad/s^2 or m/s^2.
+        In rad/s^2 or m/s^2; NaN after an event at which it does not jump.
     jump_max : float
         Magnitude of the largest jump.
     first, t_jump_max : float
@@ -44,6 +45,9 @@ class Shocks(NamedTuple):
     jump_max: float
     first: float
     t_jump_max: float
+
+
+_with_acceleration = replacing("acceleration")
 
 
 @hook(optional=True)
@@ -77,6 +81,17 @@ def enter(shocks, t, seen):
             return Shocks(seen.acceleration, jump, jump, t)
         return Shocks(seen.acceleration, jump, shocks.first, shocks.t_jump_max)
     return observe(shocks, seen)
+
+
+@hook(optional=True)
+def without_jump(law_family, shocks):
+    """Shocks after an event at which no coefficient of friction changes: under a smooth law nothing jumps there."""
+    return shocks
+
+
+@without_jump.implements(Smooth)
+def _without_jump(law_family, shocks):
+    return _with_acceleration(shocks, nan)
 
 
 @hook(optional=True)

@@ -12,6 +12,7 @@ from ringsweep.models.interface import recorder, shock
 from ringsweep.models.interface.status import BROKEN, JAM, SEPARATED_1, SEPARATED_2, SEPARATED_BOTH
 from ringsweep.models.ring import long_run
 from ringsweep.numerics.functions import any_of, select
+from ringsweep.physics.friction import family
 from ringsweep.physics.ring import BristleRing, Ring
 from ringsweep.quantities.flags import FAILED, JAMMED, OSCILLATORY, RESTING, REVOLVING, SEPARATING
 
@@ -179,7 +180,7 @@ def conclude(record, status, t, phi, omega):
 
 
 #: Record with another long run.
-with_long_run = replacing("long_run")
+with_long_run, _with_shocks = replacing("long_run"), replacing("shocks")
 
 
 @recorder.begin.implements(Ring, BristleRing)
@@ -203,6 +204,13 @@ def _observe(scene, record, t, duration, stuck, seen):
 @recorder.enter.implements(Ring, BristleRing)
 def _enter(scene, record, t, seen):
     return observe(record, shock.enter(record.shocks, t, seen[4]), 0.0, seen, scene.epsilon_omega)
+
+
+@recorder.after_event.implements(Ring)
+def _after_event(scene, record, before, mode, t):
+    if before.place_1 != mode.place_1 or before.place_2 != mode.place_2:
+        return record
+    return _with_shocks(record, shock.without_jump(family(scene.law), record.shocks))
 
 
 @recorder.conclude.implements(Ring, BristleRing)

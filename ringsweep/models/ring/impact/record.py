@@ -131,19 +131,19 @@ def _count(contacts):
 
 
 @recorder.after_event.implements(ImpactRing)
-def _after_event(scene, record, mode, t):
+def _after_event(scene, record, before, mode, t):
     r, event = record.lost, mode.event
     if event.number == r.number:
         return record
     # An impact may close all contacts, of which some open at once.
     passes = event.passed > 0
-    before = NONE if passes else int(r.open)
+    opened = NONE if passes else int(r.open)
     # Contacts that held and are open now.
-    lost = float((1 if mode.open % 2 == 1 and before % 2 == 0 else 0) + (2 if mode.open >= 2 and before < 2 else 0))
+    lost = float((1 if mode.open % 2 == 1 and opened % 2 == 0 else 0) + (2 if mode.open >= 2 and opened < 2 else 0))
     if ring.contact_count(scene.closed.body) == 1:
         lost = min(lost, 1.0)
     is_impact = event.kind in (REBOUNDS, CLOSES)
-    recovers = mode.open == NONE and before != NONE
+    recovers = mode.open == NONE and opened != NONE
     hit = event.contact if is_impact else 0
     # All contacts touch when those that were open hit, whatever they do afterwards.
     turned = float(mode.turned) if is_impact and hit == r.open else r.turned
