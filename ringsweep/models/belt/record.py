@@ -240,7 +240,7 @@ def _observe(scene, record, t, duration, stuck, seen):
     side = select(stuck, 1.0, -1.0)
     if any_of((side * stops.side < 0.0) | _leaves(scene, r, place)):
         stops = _stops(scene, r, now, stuck, place, (v, v_rate), force)
-    if any_of((r.last.velocity * velocity <= 0.0) | (t >= cycles_now.next)):
+    if any_of((r.last.velocity * velocity <= 0.0) | cycles.is_due(cycles_now, t)):
         turn = turn_within(r.last, now)
         x_min = select(turn.is_least, min(x_min, turn.x), x_min)
         x_max = select(turn.is_greatest, max(x_max, turn.x), x_max)
@@ -362,7 +362,7 @@ def _pace(scene):
 def _cycles(scene, r, stops, now, v, turn, span):
     """Cycles after an interval in which the velocity changed its sign or a time came that the record waits for."""
     c, last, period = r.cycles, r.last, scene.cycle
-    due = now.t >= c.next
+    due = cycles.is_due(c, now.t)
     # Before a cycle has ended, this may be the middle of the span.
     halfway = due & (c.next < cycles.end_of(scene, period, 1.0))
     due = due & negated(halfway)

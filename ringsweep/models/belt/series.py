@@ -341,11 +341,12 @@ def _extremes(scene, record, mode, c, h, work):
     if abs(c[FORCE, 0]) + variation(c[FORCE], h) > record.force_max:
         differentiate(c[FORCE], c[RATIO])
         count = crossings(c[RATIO], h, work, count)
-    # The forcing may end its next period.
-    rest = record.cycles.next - record.last.t
-    if 0.0 < rest < h:
-        work[0][count] = rest
-        count += 1
+    # The forcing may end its next period; after the middle of the span it may end its first.
+    due, t = record.cycles.next, record.last.t
+    for rest in (due - t, scene.cycle - t if due < scene.cycle else 0.0):
+        if 0.0 < rest < h:
+            work[0][count] = rest
+            count += 1
     return count
 
 

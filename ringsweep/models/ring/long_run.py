@@ -147,7 +147,7 @@ def _observe(long_run, scene, stick_time, t, duration, seen):
     phi, omega = seen[0], seen[1]
     now, cycles_now = Interval(t, duration, phi, omega), c
     low, high = min(r.low, phi), max(r.high, phi)
-    if t >= c.next:
+    if cycles.is_due(c, t):
         period = scene.forcing_period
         count = cycles.number_at(c, period, t)
         share = 1.0 - (t - count * period) / duration if duration > 0.0 else 1.0
