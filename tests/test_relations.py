@@ -20,10 +20,16 @@ COUNT = 1000
 WORDS = ("regime", "motion")
 PLACES = ("rough", "rest")
 
-#: Outcomes that are not yet as exact as their meaning asks.
+#: Outcomes by kind that are not yet as exact as their bounds say, in few cells. Before a jam reactions grow without
+#: bound, and velocities end like the root of the time left. The others: the greatest velocity of a belt without a
+#: spring, jumps under `tustin`, an exponent that is zero but for rounding, and one end under `lugre`.
+BEFORE_JAMS = {"omega_end", "omega_min", "omega_max", "normal_max_1", "normal_max_2"}
 PENDING = {
-    *("omega_min", "omega_max", "normal_min_1", "normal_min_2"),
-    *("normal_max_1", "normal_max_2", "jump_max", "t_jump_max"),
+    "ring-impacts": BEFORE_JAMS,
+    "ring-exponent": BEFORE_JAMS | {"lyapunov"},
+    "ring-lugre": {"omega_end", "stick_time"},
+    "belt-no-spring": {"velocity_max"},
+    "belt-all": {"jump_max"},
 }
 
 
@@ -135,9 +141,9 @@ class TestRandomScenes:
     """What a mirror image, other units, another clock and another order make of random scenes of all features."""
 
     @staticmethod
-    def assert_alike(first, second):
+    def assert_alike(first, second, pending=()):
         found = relations.differing(first, second)
-        assert {name: cells for name, cells in found.items() if name not in PENDING} == {}
+        assert {name: cells for name, cells in found.items() if name not in pending} == {}
         # Where a run is close to another regime, rounding may decide whether it is too close.
         assert (first.certified != second.certified).mean() <= 0.01
         assert first.certified.mean() > 0.9
@@ -147,12 +153,14 @@ class TestRandomScenes:
     )
     def test_outcomes_do_not_depend_on_the_units_of_mass_length_and_time(self, drawn, scales):
         run, first = drawn
-        # The clock of one drive counts seconds. The series of another begin 1e-14 s after its infinite acceleration.
-        if run.kind.drive == "arctan" or (run.kind.drive == "power" and "mass" not in scales):
+        # The clock of one drive counts seconds. A ring by another has an infinite acceleration at launch: reactions and
+        # jumps are those of an instant 1e-14 s later, whatever the clock.
+        if run.kind.drive in ("arctan", "power"):
             scales = {name: scale for name, scale in scales.items() if name != "time"}
         if scales:
             second = relations.in_units(run, **scales).outcomes()
-            self.assert_alike(first, relations.in_first_units(second, scales))
+            pending = next((PENDING.get(name, ()) for name, kind in KINDS.items() if kind == run.kind), ())
+            self.assert_alike(first, relations.in_first_units(second, scales), pending)
 
     @pytest.mark.slow
     def test_swing_of_weeks_is_as_exact_as_one_of_a_second(self):
@@ -165,6 +173,8 @@ class TestRandomScenes:
         run, first = drawn
         if "length" in scales and ("spring.cubic" in run.numbers or run.kind.law == "gaussian-stribeck"):
             pytest.skip("a unit of error is a cube root, or speeds are isolated between powers of ten")
+        if "length" in scales and run.kind.record == {"exponent": True}:
+            pytest.skip("the pivots of the variational equation compare angles with velocities")
         second = relations.in_units(run, **scales).outcomes()
         assert relations.unequal(first, relations.in_first_units(second, scales)) == {}
 
@@ -216,8 +226,7 @@ class TestSweeps:
             found.append(ds.rename(force_frequency="cell").drop_vars("cell"))
         first, second = found
         second = relations.mirror_of(second) if relation == "mirror" else relations.in_first_units(second, scales)
-        found = relations.differing(first, second)
-        assert {name: cells for name, cells in found.items() if name not in PENDING} == {}
+        assert relations.differing(first, second) == {}
 
     def test_probabilities_do_not_depend_on_the_units(self):
         run = relations.random_scenes(KINDS["belt"], 1, np.random.default_rng(5))
