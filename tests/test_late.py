@@ -133,6 +133,14 @@ class TestSlowPulls:
         # Within the tolerance of a step; a series along a ramp has no error.
         np.testing.assert_allclose(found.first_slip, breaks * period, rtol=1e-11)
 
+    def test_slips_count_however_short_they_are_beside_their_period(self):
+        frequency = 10.0 ** np.arange(-13, -2)
+        damped = forced(self.FRICTION, frequency=1.0, gravity=10.0, damper={"coefficient": 0.1})
+        damped["force"]["amplitude"] = 3.0
+        found = runs(damped, {"force.frequency": frequency, "time.span": 20.0 / frequency})
+        assert {REGIMES[int(regime)] for regime in found.regime} == {"stick-slip"}
+        np.testing.assert_array_equal(found.stops_per_cycle, 4.0)
+
 
 @pytest.mark.slow
 def test_angle_on_a_rocking_ring_repeats_to_rounding_after_ten_thousand_periods():

@@ -475,7 +475,9 @@ def _words(scene, r, t, of):
         # In stick the body may creep, but the belt does not carry it to where the spring pulls it loose.
         stuck, carried = (c.share, c.drift) if repeats else (share, drift)
         carried = abs(carried) * scene.cycle * scene.place_counts
-        for_good = stuck > 1.0 - 1e-9 and carried <= max(RETURN * swing, r.band * scene.cycle)
+        # A slip may be ever so short beside its cycle.
+        stays = stuck > 1.0 - 1e-9 and stops_per_cycle == 0.0
+        for_good = stays and carried <= max(RETURN * swing, r.band * scene.cycle)
     else:
         for_good = not loads
     # A stuck body that moves goes with its belt.
