@@ -375,7 +375,6 @@ def size(body, motion):
     """Sum of the magnitudes of the terms of the last balance without friction and inertia, N m, or N on a belt."""
 
 
-#: Balances of the bodies, and what follows from them, by the type of the body.
 # What makes the equations of each type that :func:`body` declares, once they are needed.
 _EQUATIONS: dict[type, Callable[[], Equations]] = {}
 
