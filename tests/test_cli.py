@@ -132,6 +132,15 @@ def test_picture_that_cannot_be_written_does_not_undo_the_dataset(folder, monkey
     assert (folder / "out.png").exists()
 
 
+def test_picture_is_not_said_to_lack_where_nobody_reads_the_output(folder, monkeypatch, caplog):
+    def closed(*_, **__):
+        raise BrokenPipeError(32, "Broken pipe")
+
+    monkeypatch.setattr("ringsweep.cli.drawing.save", closed)
+    assert main(["simulate", "case.yaml", "-o", "out.nc"]) == 0
+    assert "not drawn" not in caplog.text
+
+
 def test_file_that_is_no_result_is_not_replaced(folder, capsys):
     (folder / "notes.nc").write_text("mine")
     for options in ([], ["--fresh"]):

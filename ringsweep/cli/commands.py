@@ -91,6 +91,9 @@ def _draw(figure: Callable[[], Any], picture: Path, command: str) -> None:
 
     try:
         save(figure(), picture)
+    except BrokenPipeError:
+        # The picture is there, but nobody reads the output.
+        raise
     except Exception as error:
         reason = error.problem if isinstance(error, InputError) else error
         logger.warning("%s is not drawn: %s (draw one with %s)", picture, reason, command)
