@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -50,7 +50,8 @@ def run_command(arguments: argparse.Namespace) -> int:
         raise InputError("--scheduler", "is for --backend dask")
     config = refined(load(arguments.config, arguments.set), arguments.refine or None)
     kind = ("regime", "sweep") if config.sample is None else ("probability", "sampled sweep")
-    target, picture = _outputs(f"{config.name}.nc" if arguments.output is None else arguments.output, *kind)
+    name = f"{config.name}.nc" if arguments.output is None else arguments.output
+    target, picture = _outputs(name, *kind, (config.begins_from,))
 
     if arguments.dry_run:
         from ringsweep.runs.plan import describe
@@ -139,9 +140,8 @@ def simulate_command(arguments: argparse.Namespace) -> int:
     from ringsweep.config import with_values
 
     config = with_values(arguments.config, arguments.set)
-    target, picture = _outputs(arguments.output or f"{config.name}-run.nc", "time", "history")
-    if target.exists() and target.samefile(arguments.config):
-        raise InputError(str(target), "is the input: name another output")
+    inputs = arguments.config, config.begins_from
+    target, picture = _outputs(arguments.output or f"{config.name}-run.nc", "time", "history", inputs)
 
     from ringsweep.cli.report import events_in_words, status_of
     from ringsweep.runs.simulate import history
@@ -301,7 +301,7 @@ def schema_command(arguments: argparse.Namespace) -> None:
     print(json.dumps(schema(), indent=2, ensure_ascii=False))
 
 
-def _outputs(name: str, mark: str, content: str) -> tuple[Path, Path]:
+def _outputs(name: str, mark: str, content: str, inputs: Iterable[str | None] = ()) -> tuple[Path, Path]:
     """Paths of the dataset and of its picture, checked before any computation.
 
     Parameters
@@ -310,11 +310,13 @@ def _outputs(name: str, mark: str, content: str) -> tuple[Path, Path]:
         Path of the dataset.
     mark, content : str
         Kind of the result; see :func:`ringsweep.storage.netcdf.check_kind`.
+    inputs : iterable of str, optional
+        Files from which the result is computed.
 
     Raises
     ------
     InputError
-        If one of them cannot be written, or would replace a file that is no result of this kind.
+        If one of them cannot be written, or would replace a file that is no result of this kind, or an input.
     """
     from ringsweep.storage import files, netcdf
 
@@ -325,5 +327,7 @@ def _outputs(name: str, mark: str, content: str) -> tuple[Path, Path]:
         raise InputError(name, "is the name of the picture: name the dataset *.nc")
     files.check_writable(picture)
     if target.exists():
+        if any(file is not None and target.samefile(file) for file in inputs):
+            raise InputError(str(target), "is the input: name another output")
         netcdf.check_kind(target, mark, content)
     return target, picture

@@ -75,6 +75,8 @@ class Config:
         Uncertain parameters, which vary within each cell of the axes; None if there are none.
     follow : Follow, optional
         Axis along which each cell starts from the end of the one before; None if all start from ``initial``.
+    begins_from : str, optional
+        File that ``initial.from`` names.
     """
 
     scene: Scene
@@ -85,6 +87,7 @@ class Config:
     refine: Refinement | None = None
     sample: Sample | None = None
     follow: Follow | None = None
+    begins_from: str | None = None
 
     @property
     def certifies(self) -> bool:
@@ -242,7 +245,7 @@ def _validate(doc: Document) -> Config:
             doc.locations[f"scene.{path}"] = doc.locations[where]
     if (sample := read_sample(sweep.get("sample"), scene, axes)) is None:
         check_consistency(scene, axes)
-    return assembled(Config(scene, solver, axes, tree, doc.name, sample=sample))
+    return assembled(Config(scene, solver, axes, tree, doc.name, sample=sample, begins_from=file))
 
 
 def assembled(config: Config) -> Config:

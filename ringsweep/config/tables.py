@@ -53,7 +53,7 @@ def read_samples(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:
     """Times, samples and interpolation of a drive or a force from a table; see :func:`read_table`."""
     known, where = INTERPOLATIONS[section], f"scene.{section}.interpolate"
-    problem = f"is no interpolation of a {section}: choose {' or '.join(known)}"
+    problem = f"is no interpolation of a {section}"
     interpolate = one_of(given.get("interpolate", next(iter(known))), known, where, problem)
     times, samples = read_table(doc, given, section, 4 if interpolate == "spline" else 2)
     if interpolate == "spline":

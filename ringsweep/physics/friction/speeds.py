@@ -6,6 +6,7 @@ All are isolated by interval arithmetic, see :mod:`ringsweep.numerics.isolation`
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -93,13 +94,15 @@ def _fields_of(expression: Expression, names: tuple[str, ...], rows: NDArray[np.
     return _Finder(expression, columns, [(pairs[:, i, 0], pairs[:, i, 1]) for i in range(pairs.shape[1])]).fields()
 
 
-# Fields by law, names and set of parameters.
-_kept: dict[Any, dict[bytes, Any]] = {}
+@lru_cache(maxsize=64)
+def _kept(expression: Expression, names: tuple[str, ...]) -> dict[bytes, Any]:
+    """Fields of a law that are found already, by set of parameters."""
+    return {}
 
 
 def _kept_fields(expression: Expression, names: tuple[str, ...], rows: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
     """Fields of distinct sets of parameters, found once: the tasks of a sweep share many sets."""
-    kept, keys = _kept.setdefault((expression, names), {}), [row.tobytes() for row in rows]
+    kept, keys = _kept(expression, names), [row.tobytes() for row in rows]
     # Another thread may empty what is kept.
     own: dict[bytes, Any] = {key: kept.get(key) for key in keys}
     if missing := [i for i, key in enumerate(keys) if own[key] is None]:
