@@ -307,6 +307,16 @@ def _not_located(before, now):
     return before
 
 
+def _rate(by_difference, v_rate):
+    """Rate of the sliding velocity: over an interval that is but rounding, the one by difference would be noise."""
+    return v_rate if v_rate != 0.0 else by_difference
+
+
+@lanes_body(_rate)
+def _by_difference(by_difference, v_rate):
+    return by_difference
+
+
 @absorbed
 def _stops(scene, r, now, stuck, place, sliding, force):
     """Stops after an interval in which stick began or ended, or a slip became longer than the play.
@@ -324,8 +334,7 @@ def _stops(scene, r, now, stuck, place, sliding, force):
     span = max(r.x_max, now.x) - min(r.x_min, now.x)
     scale = _AT_REST * square_root(scene.body.stiffness / scene.body.mass) * span
     rate = select(now.duration > 0.0, (v - r.last.v) / now.duration, 0.0)
-    # Over an interval that is but rounding, this would be noise.
-    slowing = max(abs(r.last.v_rate), abs(_located(rate, v_rate)))
+    slowing = max(abs(r.last.v_rate), abs(_rate(rate, v_rate)))
     passage = _PASSAGE * max(max(r.band, scale), abs(r.last.v)) / slowing
     # Under a greater pull than that of breakaway a set-valued law would let the body pass, maybe slowly.
     pull = _located(scene.body.mass * rate + force, r.last.pull)
