@@ -23,6 +23,7 @@ from ringsweep.quantities.variables import EVENTS, HISTORY, IMPACTS
 from ringsweep.runs.events import Events, events, history_at, side_by_side
 from ringsweep.runs.executors import Execution, interruptible
 from ringsweep.runs.sweep import compute
+from ringsweep.solvers.steps import tabulate_motion
 from ringsweep.storage.provenance import attributes
 
 #: Approximate number of instants of a history.
@@ -147,7 +148,8 @@ def _trace(config: Config, structure: Structure, samples: int) -> tuple[xr.Datas
             columns[name][-1:] = np.maximum(columns[name][-1:], 0.0)
     if model.driven:
         drive = take(cell.drive, 0)
-        motion = np.array([turn(drive, t) for t in times.tolist()])
+        motion = np.empty((len(times), len(turn(drive, 0.0))))
+        tabulate_motion(drive, times, motion)
         columns |= dict(zip(model.driven, motion.T, strict=False))
         if isinstance(drive, Forced):
             columns["force"] = motion[:, -1]

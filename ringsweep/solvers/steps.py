@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ringsweep.compile import borrowed, inlined
+from ringsweep.compile import borrowed, inlined, kernel
 from ringsweep.numerics.clock import Instant
 from ringsweep.numerics.series import STACK
 from ringsweep.numerics.terms import COLUMNS
@@ -93,3 +93,12 @@ def scratch_for(rows: int, components: int, first_guard: int) -> Scratch:
         np.empty((MOST_GUARDS, INSTANTS + 1)),
         first_guard,
     )
+
+
+@kernel
+def tabulate_motion(drive, times, table):
+    """Fill a table of shape ``(times, numbers)`` with what :func:`ringsweep.physics.drives.turn` returns."""
+    for i in range(len(times)):
+        motion = drives.turn(drive, times[i])
+        for k in range(len(motion)):
+            table[i, k] = motion[k]
