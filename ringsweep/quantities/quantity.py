@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 _FACTOR = re.compile(r"([\s*/·]*)([A-Za-zµμ°%_]+)(?:\^|\*\*)?(-?[0-9]*)")
@@ -41,6 +42,7 @@ def after_number(unit: str) -> str:
     return "" if unit in ("", "1") else f" {unit}"
 
 
+@cache
 def cf_units(unit: str) -> str:
     """Unit in the spelling of the CF conventions.
 

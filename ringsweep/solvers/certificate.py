@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -186,6 +187,7 @@ def diverging(
     return found if distance_before is None else found | ~(distance <= _SHRUNK * distance_before)
 
 
+@cache
 def with_errors(outcomes: tuple[str, ...]) -> tuple[str, ...]:
     """Names of the outcomes that have a bound on their error; a run itself tells some of the errors."""
     errors = {name: f"{name}_error" for name in outcomes}
