@@ -75,6 +75,11 @@ class TestTaskSizes:
         sizes.learn(FinishedTask(1, 1e-6))
         assert sizes.next(10**9) == 8
 
+    def test_sweep_of_a_known_kind_needs_no_small_first_task(self):
+        TaskSizes(1, lambda: 1, "a kind of sweep").learn(FinishedTask(64, 0.004))
+        assert TaskSizes(1, lambda: 1, "a kind of sweep").next(64) >= 64
+        assert TaskSizes(1, lambda: 1, "another kind").next(64) == 1
+
     def test_task_size_is_a_multiple_of_the_runs_side_by_side(self):
         sizes = TaskSizes(16, lambda: 2)
         assert sizes.next(10**9) == 16

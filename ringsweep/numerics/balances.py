@@ -268,6 +268,7 @@ def evaluate(p: Mapping[Monomial, float], values: Any) -> Any:
     found: Any = 0.0
     for monomial, factor in p.items():
         for name, power in monomial:
-            factor = factor * getattr(values, name) ** power
+            value = getattr(values, name)
+            factor = factor * (value if power == 1 else value**power)
         found = found + factor
     return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
@@ -85,13 +85,18 @@ class TaskResult:
     processor: str
 
 
+def kernels_of(config: Config) -> Hashable:
+    """What decides which kernels the cells of a sweep compile."""
+    # They depend on the paths that have a value, but not on the numbers of a table.
+    structures = (replace(one, table=None, force=None, curve=None) for one in config.scene.structures.values())
+    return config.solver, frozenset((*config.scene.values, *config.axes.columns)), *structures
+
+
 def compute_task(config: Config, layout: Layout, positions: NDArray[np.integer]) -> TaskResult:
     """Compute the cells at some positions of the layout."""
     scene, axes = config.scene, config.axes
     indices = dict(zip(axes.sizes, layout.indices(positions), strict=True))
-    # Kernels depend on the paths that have a value, but not on the numbers of a table.
-    structures = (replace(one, table=None, force=None, curve=None) for one in scene.structures.values())
-    compiled = config.solver, frozenset((*scene.values, *axes.columns)), *structures
+    compiled = kernels_of(config)
     compiles = compiled not in _compiled
     start = perf_counter()
     columns: dict[str, NDArray[Any]] = {}

@@ -25,7 +25,7 @@ from ringsweep.errors import InputError
 from ringsweep.models import model_of
 from ringsweep.quantities.variables import INFERRED, OUTCOMES, Variable, error_attribute
 from ringsweep.runs import sampled
-from ringsweep.runs.cells import TaskResult, compute_task, coordinates
+from ringsweep.runs.cells import TaskResult, compute_task, coordinates, kernels_of
 from ringsweep.runs.executors import Execution, Executor, progress_bar, stop_on_interrupt
 from ringsweep.runs.plan import check_room
 from ringsweep.runs.refined import KnownLabels, complete, decide, gaps, with_nan
@@ -515,7 +515,9 @@ class _Work:
 
         config, store, execution = self.config, self.store, self.execution
         with execution.open() as workers:
-            sizes = TaskSizes(1 if config.sample else config.solver.side_by_side, workers.concurrency)
+            span = config.scene.values.get("time.span", 1.0)
+            kind = kernels_of(config), config.sample is None, round(math.log2(span))
+            sizes = TaskSizes(1 if config.sample else config.solver.side_by_side, workers.concurrency, kind)
             # What is in memory is lost anyway: there the first Ctrl-C ends the sweep.
             stopping = stop_on_interrupt(under_way) if isinstance(store, Checkpoint) else nullcontext(Event())
             with stopping as stopped, progress_bar(total, execution.progress, int(store.done.sum())) as bar:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from threading import Event
 
 import numpy as np
@@ -14,6 +14,10 @@ from ringsweep.runs.cells import TaskResult
 from ringsweep.storage.chunks import CHUNK, Layout
 
 logger = logging.getLogger("ringsweep")
+
+
+# Cost of recent tasks, s and cells, and cells of the largest one, by kind of sweep.
+_known: dict[Hashable, tuple[list[float], int]] = {}
 
 
 class TaskSizes:
@@ -28,19 +32,24 @@ class TaskSizes:
         Cells that the solver runs at once: sizes are multiples of it.
     workers : callable
         Returns the number of tasks that are computed at once.
+    kind : hashable, optional
+        Sweeps of one kind in this process have cells of about the same cost: the second one need not find it out.
     """
 
     #: Bounds on the seconds of a task; the last bound holds towards the end.
     min_seconds, max_seconds, last_seconds = 0.1, 2.0, 0.005
     max_cells = CHUNK
 
-    def __init__(self, side_by_side: int, workers: Callable[[], int]):
-        self.side_by_side = side_by_side
-        self.workers = workers
+    def __init__(self, side_by_side: int, workers: Callable[[], int], kind: Hashable = None):
+        self.side_by_side, self.workers, self.kind = side_by_side, workers, kind
         self.seconds = 0.0
-        self.seconds_per_cell = math.nan
-        self._recent = [0.0, 0.0]
-        self.largest = side_by_side
+        self._recent, self.largest = _known.get(kind, ([0.0, 0.0], side_by_side))
+
+    @property
+    def seconds_per_cell(self) -> float:
+        """Time that a cell of recent tasks took, s; NaN before the first one."""
+        seconds, cells = self._recent
+        return max(seconds, 1e-9) / cells if cells else math.nan
 
     def learn(self, result: TaskResult) -> TaskResult:
         """Update the cost of a cell from a finished task, which is returned."""
@@ -51,8 +60,9 @@ class TaskSizes:
             # Neighbours in the order of the layout are neighbours in the grid, and cost about as much. A task has its
             # own cost, so one of few cells says little.
             self._recent = [0.5 * before + now for before, now in zip(self._recent, (seconds, cells), strict=True)]
-            self.seconds_per_cell = max(self._recent[0], 1e-9) / self._recent[1]
             self.largest = max(self.largest, cells)
+            if self.kind is not None:
+                _known[self.kind] = self._recent, self.largest
         return result
 
     def next(self, left: int) -> int:
