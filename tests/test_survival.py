@@ -357,13 +357,30 @@ class TestCheckpoint:
         assert "out.nc is replaced when this sweep is done" in caplog.text
         assert same_bits(half_done, never_stopped)
 
+    def test_finished_sweep_is_told_beside_cells_of_the_one_that_would_replace_it(
+        self, config, half_done, never_stopped, capsys
+    ):
+        kept = tasks_of(half_done)
+        other = yaml.safe_load(config.read_text()) | {"solver": {"method": "event", "max_steps": 5000}}
+        other = config.with_name("other.yaml"), yaml.safe_dump(other)
+        other[0].write_text(other[1])
+        ringsweep.run(other[0], half_done.with_name("b.nc"), progress=False).close()
+        half_done.with_name("b.nc").rename(half_done)
+        assert cli.main(["run", str(other[0]), "-o", str(half_done)]) == 0
+        assert "already" in capsys.readouterr().out
+        assert tasks_of(half_done) == kept
+        half_done.unlink()
+        assert cli.main(["run", str(other[0]), "-o", str(half_done)]) == 2
+        assert "out.nc.partial: holds finished cells of another sweep" in capsys.readouterr().err
+
     def test_refinement_of_a_finished_sweep_does_not_replace_it(self, never_stopped, tmp_path, monkeypatch, capsys):
         monkeypatch.chdir(tmp_path)
         shutil.copy(never_stopped, "full.nc")
         assert cli.main(["run", "full.nc", "--refine"]) == 2
         message = capsys.readouterr().err
         assert message.startswith("ringsweep: ")
-        assert "full.nc: holds another sweep: sweep.refine was absent" in message
+        assert 'full.nc: holds another sweep: sweep.refine was absent, is axes: ["drive_amplitude", ' in message
+        assert "stride: 32, audit: 0.02" in message
         assert same_bits(tmp_path / "full.nc", never_stopped)
         assert left(tmp_path / "full.nc") == ["full.nc"]
 

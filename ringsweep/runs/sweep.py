@@ -325,7 +325,8 @@ def write(
                         f"{again} goes on"
                     )
                 raise
-        checkpoint.clear()
+        if not checkpoint.other:
+            checkpoint.clear()
     with netcdf.reading(target) as results:
         _warn(results, config)
     return computed
@@ -380,9 +381,11 @@ def _holds_sweep(target: Path, checkpoint: Checkpoint) -> bool:
     Raises
     ------
     InputError
-        If it is damaged, or holds another sweep, and no cell of this one is finished.
+        If it is damaged, or it or the folder beside it holds another sweep, and no cell of this one is finished.
     """
     if not target.exists():
+        if checkpoint.other:
+            raise another_sweep(str(checkpoint.folder), "holds finished cells of another sweep", checkpoint.other)
         return False
     with netcdf.open_dataset(target) as ds:
         stored_fingerprint = ds.attrs.get("fingerprint")

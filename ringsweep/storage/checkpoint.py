@@ -56,8 +56,7 @@ def open_checkpoint(
     Raises
     ------
     InputError
-        If another process uses the folder, it was not made by this package, it holds cells of another sweep, or it
-        cannot be written.
+        If another process uses the folder, it was not made by this package, or it cannot be written.
     """
     with working_folder(target) as folder:
         checkpoint = Checkpoint(folder, identity, layout)
@@ -80,6 +79,8 @@ class Checkpoint:
         Task files, with the first and the last position in each.
     processors : set of str
         Names of the processors that computed the cells.
+    other : str
+        What is different in the sweep whose finished cells the folder holds; empty if they are of this one.
     """
 
     def __init__(self, folder: WorkingFolder, identity: Mapping[str, str], layout: Layout):
@@ -91,20 +92,15 @@ class Checkpoint:
         self.done = np.zeros(layout.total, dtype=bool)
         self.files: dict[Path, tuple[int, int]] = {}
         self.processors: set[str] = set()
+        self.other = ""
         self._held: tuple[NDArray[np.intp], dict[str, NDArray[Any]], str] | None = None
 
     def resume(self) -> None:
-        """Read what an earlier run left.
-
-        Raises
-        ------
-        InputError
-            If it left cells of another sweep.
-        """
+        """Read what an earlier run left, unless that is of another sweep."""
         before = _read_manifest(self.folder / MANIFEST)
         if before and before != self.identity and self.working_folder.finished_cells():
-            changes = differences(before, self.identity)
-            raise another_sweep(str(self.folder), "holds finished cells of another sweep", changes)
+            self.other = differences(before, self.identity)
+            return
         if before != self.identity:
             self.working_folder.write(MANIFEST, json.dumps(self.identity, indent=1).encode())
         self.scan()

@@ -83,16 +83,22 @@ def identity(config: Config) -> dict[str, str]:
         if structure.section.period is not None:
             found["record.section.period"] = repr(structure.section.period)
     if config.follow is not None:
-        found["sweep.follow"] = repr(config.follow)
+        found["sweep.follow"] = _section(config.follow, path="axis")
     if config.refine is not None:
-        found["sweep.refine"] = repr(config.refine)
+        found["sweep.refine"] = _section(config.refine, dims="axes")
     found["sweep"] = ", ".join(f"{name} {size}" for name, size in axes.sizes.items()) or "a single run"
     for path, (dims, column) in axes.columns.items():
         ends = " to ".join(f"{end:.6g}" if column.dtype.kind == "f" else str(end) for end in column.flat[[0, -1]])
         found[f"sweep.{path}"] = f"{column.size} values, {ends}, along {' x '.join(dims)} ({_digest(column)})"
     if config.sample is not None:
         found |= config.sample.identity
-    return found | {"solver": repr(config.solver)} | environment()
+    return found | {"solver": f"method: {config.solver.name}, {_section(config.solver)}"} | environment()
+
+
+def _section(options: Any, **keys: str) -> str:
+    """Fields of a dataclass as keys and values of a configuration; `keys` are those that bear other names there."""
+    values = {keys.get(name, name): value for name, value in dataclasses.asdict(options).items() if value is not None}
+    return ", ".join(f"{key}: {json.dumps(value)}" for key, value in values.items())
 
 
 # Digest of a column or a table, at the end of its description.
