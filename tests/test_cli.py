@@ -1,5 +1,6 @@
 """The command line: messages, exit status and files."""
 
+import errno
 import json
 import os
 import re
@@ -360,6 +361,8 @@ def test_wrong_command_line_has_status_2(capsys, arguments):
         (KeyboardInterrupt(), 130, "interrupted"),
         (KeyboardInterrupt(signal.SIGTERM), 143, "interrupted"),
         (OSError("disk\nfull"), 1, "OSError: disk full"),
+        (OSError(errno.ENOSPC, "No space left on device"), 1, "No space left on device"),
+        (OSError(errno.EIO, "Input/output error", "out.nc"), 1, "out.nc: Input/output error"),
     ],
 )
 def test_unexpected_error_and_interrupt_are_reported_in_one_line(monkeypatch, capsys, error, status, message):
@@ -415,6 +418,8 @@ def test_status_does_not_depend_on_closed_streams(folder, redirection, file, sta
     assert done.returncode == status
     assert "Exception" not in done.stderr
     assert "Traceback" not in done.stderr
+    if redirection == ">/dev/full":
+        assert done.stderr == "ringsweep: the output cannot be written: No space left on device\n"
     assert netcdf.check("out.nc")
 
 

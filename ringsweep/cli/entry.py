@@ -61,7 +61,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             redirect_stdout(None if arguments.quiet else _Escaped(sys.stdout)),
         ):
             status = arguments.command(arguments)
-        sys.stdout.flush()
+            print(end="", flush=True)
     except InputError as error:
         return _fail(str(error), 2, error)
     except KeyboardInterrupt as error:
@@ -85,6 +85,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             names = [name for name in os.environ if name.startswith(_PREFIXES.get(library, f"{library.upper()}_"))]
             about = f"{', '.join(names) or 'its environment variables'}: is one of them wrong?"
             return _fail(f"{library} cannot be loaded ({error}); see {about}", 2, error)
+        if isinstance(error, OSError) and error.strerror:
+            return _fail(": ".join([str(error.filename)] * (error.filename is not None) + [error.strerror]), 1, error)
         return _fail(shortened(f"{type(error).__name__}: {error}", 1500), 1, error)
     return status or 0
 
@@ -162,12 +164,23 @@ class _Escaped(io.TextIOBase):
 
     def write(self, text: str) -> int:
         """Write a text."""
-        self._stream.write(escaped(text))
+        with _named_output():
+            self._stream.write(escaped(text))
         return len(text)
 
     def flush(self) -> None:
         """Flush the stream."""
-        self._stream.flush()
+        with _named_output():
+            self._stream.flush()
+
+
+@contextmanager
+def _named_output() -> Iterator[None]:
+    """Name the output in errors of writing it, as errors about files name the file."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, "the output cannot be written") from error
 
 
 class _Formatter(logging.Formatter):
