@@ -184,6 +184,21 @@ def test_cells_that_take_longer_than_the_measurement_are_not_waited_for(sweep, t
     assert message in found
 
 
+def test_time_of_long_cells_follows_from_their_first_steps(sweep, tmp_path, monkeypatch):
+    ended = Event()
+
+    def compute(config, layout, positions):
+        if config.solver.max_steps > 1000:
+            ended.wait(60.0)
+        reached = np.full(len(positions), 1e-4 * config.scene.values["time.span"])
+        return TaskResult(positions, {"t_end": reached}, 0.05 * len(positions), {}, "")
+
+    monkeypatch.setattr(plan, "compute_task", compute)
+    found = plan.describe(load(sweep(8, solver={"method": "auto", "max_steps": 10**9})), tmp_path / "a.nc", 2)
+    ended.set()
+    assert "time: about 4.4 h on 2 threads, once the kernels are compiled (from 1000 steps of a cell" in found
+
+
 @pytest.mark.parametrize(
     ("solver", "limit"), [({"method": "auto"}, "max_steps"), ({"method": "rk4", "steps": 10**9}, "steps")]
 )

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.config import Config
+from ringsweep.config.axes import values_at
 from ringsweep.errors import InputError
 from ringsweep.models import model_of
 from ringsweep.quantities.variables import INFERRED, LABELS, OUTCOMES
@@ -155,17 +156,18 @@ def _time(config: Config, layout: Layout, threads: int, taken: int) -> tuple[str
     count = layout.total - taken
     if not count:
         return "hardly any: no cell is run", ""
-    results = _measure(config, layout)
+    results, whole = _measure(config, layout)
     if results is None:
         return f"not known: the first cells took more than {_FIRST:.0f} s, compilation included", ""
     cells = sum(len(result.positions) for result in results)
-    cost = sum(result.seconds or 0.0 for result in results) / cells if cells else _MEASURING
+    cost = sum(result.seconds or 0.0 for result in results) / cells if cells else whole or _MEASURING
     seconds = cost * count / min(threads, count)
     what = "cells" if config.sample is None else "replicates of cells"
-    basis = (
-        f"measured on {cells} {what} spread over the grid" if cells else "one cell takes longer than the measurement"
-    )
-    about = "about" if cells else "more than"
+    basis = f"measured on {cells} {what} spread over the grid"
+    if not cells:
+        basis = f"from {_FEW} steps of a cell: a whole one takes longer than the measurement"
+        basis = basis if whole else "one cell takes longer than the measurement"
+    about = "about" if cells or whole else "more than"
     told = f"{about} {duration(seconds)} on {threads} threads, once the kernels are compiled ({basis})"
     run = 0 if taken else expected_cells(config, layout, results)
     if not run:
@@ -205,8 +207,23 @@ def expected_cells(config: Config, layout: Layout, results: list[TaskResult]) ->
     return int(np.count_nonzero(found.origin != INFERRED))
 
 
-def _measure(config: Config, layout: Layout) -> list[TaskResult] | None:
-    """Results of cells spread over the grid, without the first ones; None if these do not come."""
+def _whole(config: Config, layout: Layout, few: TaskResult) -> float:
+    """Seconds that a whole cell takes, from cells that were run with at most :data:`_FEW` steps; 0 if not known."""
+    steps = getattr(config.solver, "steps", None)
+    share = min(_FEW / (steps or getattr(config.solver, "max_steps", _FEW)), 1.0)
+    if "t_end" in few.columns and steps is None:
+        indices = dict(zip(config.axes.sizes, layout.indices(few.positions), strict=True))
+        spans = values_at(config.scene, config.axes, indices, len(few.positions))["time.span"]
+        share = max(share, float(np.mean(few.columns["t_end"] / spans)))
+    known = config.sample is None and few.seconds is not None
+    return few.seconds / len(few.positions) / share if known and few.seconds else 0.0
+
+
+def _measure(config: Config, layout: Layout) -> tuple[list[TaskResult] | None, float]:
+    """Results of cells spread over the grid, and seconds that a cell takes by a few steps of the first ones.
+
+    The first cells, which may compile kernels, are left out. If they do not come, there are no results: None.
+    """
     draw = np.random.default_rng(0)
     few = layout.total <= _MOST
     drawn = draw.permutation(layout.total) if few else draw.integers(layout.total, size=_MOST)
@@ -215,6 +232,7 @@ def _measure(config: Config, layout: Layout) -> list[TaskResult] | None:
     few_steps = replace(config.solver, **{name: min(getattr(config.solver, name), _FEW) for name in limits})
     results: list[TaskResult] = []
     errors: list[BaseException] = []
+    begun: list[float] = []
     began = Event()
 
     def compute(config: Config, positions: NDArray[np.integer]) -> None:
@@ -227,8 +245,10 @@ def _measure(config: Config, layout: Layout) -> list[TaskResult] | None:
     def work() -> None:
         try:
             # The first ones may compile or load kernels. Of them a few steps are enough.
-            compute(replace(config, solver=few_steps), drawn[:side])
-            began.set()
+            for _ in range(2):
+                compute(replace(config, solver=few_steps), drawn[:side])
+                began.set()
+            begun.append(_whole(config, layout, results.pop()))
             start, stop, until = 0, side, monotonic() + _MEASURING / 2
             while start < len(drawn) and monotonic() < until:
                 compute(config, drawn[start:stop])
@@ -241,11 +261,11 @@ def _measure(config: Config, layout: Layout) -> list[TaskResult] | None:
     thread = Thread(target=work, daemon=True)
     thread.start()
     if not began.wait(_FIRST):
-        return None
+        return None, 0.0
     thread.join(2.0 * _MEASURING)
     if errors:
         raise errors[0]
-    return results[1:]
+    return results[1:], begun[0] if begun else 0.0
 
 
 def size(number: float) -> str:
