@@ -209,9 +209,9 @@ def expected_cells(config: Config, layout: Layout, results: list[TaskResult]) ->
 
 def _whole(config: Config, layout: Layout, few: TaskResult) -> float:
     """Seconds that a whole cell takes, from cells that were run with at most :data:`_FEW` steps; 0 if not known."""
-    steps = getattr(config.solver, "steps", None)
-    share = min(_FEW / (steps or getattr(config.solver, "max_steps", _FEW)), 1.0)
-    if "t_end" in few.columns and steps is None:
+    most: int = getattr(config.solver, "steps", getattr(config.solver, "max_steps", _FEW))
+    share = min(_FEW / most, 1.0)
+    if "t_end" in few.columns and not hasattr(config.solver, "steps"):
         indices = dict(zip(config.axes.sizes, layout.indices(few.positions), strict=True))
         spans = values_at(config.scene, config.axes, indices, len(few.positions))["time.span"]
         share = max(share, float(np.mean(few.columns["t_end"] / spans)))
