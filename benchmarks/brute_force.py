@@ -647,49 +647,15 @@ def main():
         text += f"\n{moderate}.\n" if total.tally["moderate restitution"] else ""
         title = "Certified answers against an independent reference"
         name = "brute_force" if len(chosen) > 1 else f"brute_force_{next(iter(chosen)).replace(' ', '_')}"
-        _common.publish(arguments, name, title, heading, text, figures(counts, total))
-
-
-#: Rows of the table in the documents: families by title.
-TITLES = {
-    "one contact": "one contact", "several zones": "several zones", "high friction": "μ up to 2",
-    "geometry": "geometry", "drives": "six drives", "launches": "launches", "painleve": "narrow bodies, μ up to 4",
-    "features": "laws with bumps, dips, kinks and jumps", "ice": "launches on ice", "impact": "with impacts",
-    "far": "numbers at the ends of their ranges", "belt forced": "the belt, forced",
-}  # fmt: skip
-SUMMARY = ["family", "runs", "certified", "contradicted", "off", "uncertified", "ambiguous", "unresolved"]
+        runs = f"{total.tally['runs']:,}".replace(",", " ")
+        figures = {"runs": runs, "contradictions": str(total.tally["contradicted"])}
+        _common.publish(arguments, name, title, heading, text, figures)
 
 
 def at_moderate_restitution(tally):
     """How many runs are uncertified of those in which few impacts gain energy."""
     runs, uncertified = tally["moderate restitution"], tally["moderate restitution, uncertified"]
     return f"{uncertified} of {runs} ({100.0 * uncertified / max(runs, 1):.1f} %)"
-
-
-def figures(counts, total):
-    """What the documents take: a table with a row for the laws of the ring and one for those of the belt."""
-    merged = {}
-    for name, count in counts.items():
-        title = TITLES.get(name, "the belt, all laws" if name.startswith("belt ") else "the ring, all laws")
-        merged.setdefault(title, Counter()).update(count.tally)
-    rows = []
-    for title, tally in (merged | {"all": total.tally} if len(merged) > 1 else merged).items():
-        share = 100.0 * tally["uncertified"] / max(tally["runs"], 1)
-        words = {name: str(tally[name]) for name in SUMMARY[1:]} | {
-            "uncertified": f"{tally['uncertified']} ({share:.1f} %)"
-        }
-        rows.append([title, *(words[name] for name in SUMMARY[1:])])
-    ends = Counter()
-    for (_, word), number in total.ends.items():
-        ends[word] += number
-    return {
-        "summary": _common.markdown(SUMMARY, rows),
-        "runs": f"{total.tally['runs']:,}".replace(",", " "),
-        "contradictions": str(total.tally["contradicted"]),
-        "ends_asked": str(sum(ends.values())),
-        **{f"ends_{word.replace(' ', '_')}": str(ends[word]) for word in OPINIONS},
-        **({"moderate_restitution": at_moderate_restitution(total.tally)} if counts.keys() == {"impact"} else {}),
-    }
 
 
 # The 500 scenes of the tests.

@@ -107,8 +107,7 @@ def main() -> None:
             print(*rows[-1], flush=True)
     heading("Errors at the default tolerances, and bounds")
     table(HEADER, rows)
-    text = markdown(HEADER, rows)
-    publish(given, "errors", "Errors at the default tolerances, and bounds", where, text, {"all": text})
+    publish(given, "errors", "Errors at the default tolerances, and bounds", where, markdown(HEADER, rows))
 
 
 if __name__ == "__main__":

@@ -400,31 +400,6 @@ def over(found: Mapping[str, Any], name: str, other: str, method: str, per: str 
     return Times(one["wall"]).ratio(Times(two["wall"])) * two[per] / one[per]
 
 
-#: Rows of the table in the documents: what is added, to what, the scene with it, and what its ratio counts.
-CHOSEN = (
-    ("a first zone", "a uniform ring", "+ a zone", "steps"),
-    ("two more zones", "a ring with one", "+ two more zones", "steps"),
-    ("`tustin` as a formula", "the law of that name", "tustin as a formula", "steps"),
-    ("the drive as a formula", "the `arctan` drive", "drive as a formula", "steps"),
-    ("`impact`, while no contact is lost", "a ring with three zones", "+ impact", "runs"),
-    ("a section", "the belt, `stiction`", "belt + section", "runs"),
-    ("an exponent", "the belt, `stiction`", "belt + exponent", "runs"),
-    ("bristles: `lugre` in place of `stiction`", "the belt", "belt + bristles (lugre)", "runs"),
-)
-
-
-def costs(found: Mapping[str, Any]) -> list[list[str]]:
-    """Rows of the table in the documents: times longer under `rk4`, and under `event` or `implicit`."""
-    rows = []
-    for thing, base, name, per in CHOSEN:
-        rung = LADDER[name]
-        assert rung.before is not None
-        own = over(found, name, rung.before, "piecewise", per)
-        fixed = f"{over(found, name, rung.before, 'rk4'):.2f}" if "rk4" in rung.methods else "-"
-        rows.append([thing, base, f"{own:.2f} per {per.removesuffix('s')}", fixed])
-    return rows
-
-
 def main() -> None:
     """Measure, print, write."""
     given = command(__doc__).parse_args()
@@ -487,8 +462,7 @@ def main() -> None:
         heading(title)
         table(header, rows)
         report += f"\n## {title}\n\n{markdown(header, rows)}"
-    figures = {"costs": markdown(["added", "to", "`event` or `implicit`", "`rk4`, per run"], costs(found))}
-    publish(given, "scenes", "The cost of each thing in a scene", where, report, figures)
+    publish(given, "scenes", "The cost of each thing in a scene", where, report)
 
 
 LEFT_OUT = "Functions of optional things in a kernel"
