@@ -185,9 +185,7 @@ def main() -> None:
     settled = ", ".join(f"{n} {word[3:]}" for word, n in sorted(tally.items()) if word.startswith("as "))
     body += f"Settled: {settled}. {seconds:.0f} s, seed {given.seed}.\n"
     print(settled)
-    told = [name for name in (*WORDS, *EXPONENTS[:2]) if not name.startswith("not ")]
-    numbers = {name.replace(" ", "_"): f"{tally[name]:,}".replace(",", " ") for name in told}
-    _common.publish(given, "long_runs", "Long runs of a forced belt", where, body, numbers)
+    _common.publish(given, "long_runs", "Long runs of a forced belt", where, body)
 
 
 if __name__ == "__main__":
