@@ -144,9 +144,7 @@ def main() -> None:
     settled = ", ".join(f"{(words == word).sum()} {word}" for word in np.unique(words))
     text = f"Of {cells} runs {certified} are certified; they are {settled}. Medians of {ROUNDS} rounds, in turn."
     print(text)
-    ratios = [row[4] for row in rows[1:]]
-    numbers = {"cells": str(cells), "seconds": f"{ours.median:.1f}", "loose": ratios[0], "tight": ratios[1]}
-    publish(given, "diagram", "A bifurcation diagram", where, f"{markdown(header, rows)}\n{text}", numbers)
+    publish(given, "diagram", "A bifurcation diagram", where, f"{markdown(header, rows)}\n{text}")
 
 
 if __name__ == "__main__":

@@ -113,9 +113,7 @@ A grid over five axes, 2 s under stiction for each cell, with certificates, from
 {3**5} cells takes {start.wall:.1f} s and {start.memory / 2**20:.0f} MiB; rates count only the time beyond that.
 
 """
-    figures = {"fewest_cells": rows[0][0], "least_memory": f"{rows[0][4]} MiB", "bytes": rows[-1][5],
-               "most_cells": rows[-1][0], "most_memory": f"{rows[-1][4]} MiB"}  # fmt: skip
-    publish(given, "sizes", "Size of a sweep", where, about + markdown(header, rows), figures)
+    publish(given, "sizes", "Size of a sweep", where, about + markdown(header, rows))
 
 
 if __name__ == "__main__":
