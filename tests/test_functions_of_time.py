@@ -161,7 +161,7 @@ class TestDerived:
 
     @pytest.mark.slow
     def test_examples_of_the_documentation_run_and_their_parameters_can_be_swept(self):
-        assert len(EXAMPLES) == 4
+        assert len(EXAMPLES) == 3
         for drive in EXAMPLES:
             name = list(drive)[-1]
             units = declared(type(drive_of(drive)))[name].unit
