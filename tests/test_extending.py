@@ -16,10 +16,11 @@ from matplotlib.figure import Figure
 import ringsweep
 from ringsweep.errors import InputError
 
-PAGE = (Path(__file__).parents[1] / "docs" / "extending.md").read_text(encoding="utf-8")
+DOCS = Path(__file__).parents[1] / "docs"
+PAGE = (DOCS / "extending.md").read_text(encoding="utf-8")
 
 #: Example files of the page, by name.
-FILES = {name: text for text, name in re.findall(r"```python\n(# (my_\w+\.py)\n.*?)```", PAGE, re.DOTALL)}
+FILES = {path.name: path.read_text(encoding="utf-8") for path in sorted((DOCS / "examples").glob("my_*.py"))}
 
 #: The picture of the page. It is no file of RINGSWEEP_LAWS.
 PICTURE = FILES.pop("my_reactions.py")
@@ -27,47 +28,6 @@ PICTURE = FILES.pop("my_reactions.py")
 #: The formulas of friction and of a drive in a scene, the scene of the body on a disc, and the law in Python.
 SECTION, DRIVE, ON_DISC = (yaml.safe_load(text) for text in re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL))
 (IN_PYTHON,) = re.findall(r"```python\n(import ringsweep\n.*?)```", PAGE, re.DOTALL)
-
-#: A drive with functions of its own, as a drive needs them that is no formula.
-FILES["my_run_up.py"] = """# my_run_up.py
-from math import exp
-from typing import Annotated, NamedTuple
-
-from ringsweep.physics.drives import add_drive, expand, jerk, shape
-from ringsweep.quantities.parameters import Leaf, Parameter
-
-
-class RunUp(NamedTuple):
-    \"\"\"A ring that runs up to a constant speed: d theta/dt = amplitude (1 - exp(-t/tau)).\"\"\"
-
-    amplitude: Annotated[Leaf, Parameter("rad/s", "final angular velocity of the ring")]
-    tau: Annotated[Leaf, Parameter("s", "time constant of the run-up", lower=0.0, open_lower=True)]
-
-
-@shape.implements(RunUp)
-def _shape(drive, t):
-    rest = exp(-t / drive.tau)
-    return t - drive.tau * (1.0 - rest), 1.0 - rest, rest / drive.tau
-
-
-@expand.implements(RunUp)
-def _expand(drive, t, order, theta, work):
-    # Each term is the one before times -1/(k tau), but for the straight line t - tau.
-    term = drive.amplitude * drive.tau * exp(-t / drive.tau)
-    for k in range(order + 1):
-        theta[k] = term
-        term = -term / ((k + 1.0) * drive.tau)
-    theta[0] += drive.amplitude * (t - drive.tau)
-    theta[1] += drive.amplitude
-
-
-@jerk.implements(RunUp)
-def _jerk(drive, t):
-    return -drive.amplitude / (drive.tau * drive.tau) * exp(-t / drive.tau)
-
-
-add_drive("run-up", RunUp)
-"""
 
 #: Beginning of the scripts below.
 RUN = """
@@ -128,8 +88,10 @@ def in_a_process(script, paths, cache, package_folder=Path(__file__).parents[1])
     )
 
 
-def test_page_has_one_example_for_each_kind_of_extension():
-    assert list(FILES) == ["my_dahl.py", "my_disc.py", "my_brake.py", "my_heun.py", "my_run_up.py"]
+def test_page_names_every_example_file_and_quotes_the_disc_as_it_is():
+    assert {f"examples/{name}" for name in (*FILES, "my_reactions.py")} <= set(re.findall(r"\((.*?)\)", PAGE))
+    (quoted,) = re.findall(r"```python\n(@ring.body.*?)```", PAGE, re.DOTALL)
+    assert quoted in FILES["my_disc.py"]
 
 
 #: Claims of the page, each with a script that checks it.
