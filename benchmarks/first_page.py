@@ -102,7 +102,6 @@ With a coefficient of restitution of 0.5 the map takes {ratio:.2f} times the CPU
 
 {markdown(["`aftermath`", "share"], aftermath)}"""
     figures = {"map": markdown(header, rows), "misses": missing, "finds": least}
-    figures |= {"impact_ratio": f"{ratio:.1f}"} | dict(aftermath)
     publish(given, "first_page", "The map of the first page", where, body, figures)
 
 
