@@ -10,7 +10,7 @@ import yaml
 
 import ringsweep
 from ringsweep import cli
-from ringsweep.config import load, refined
+from ringsweep.config import load, with_refine
 from ringsweep.errors import InputError
 from ringsweep.quantities.variables import INFERRED
 from ringsweep.runs import plan
@@ -87,7 +87,7 @@ def test_dry_run_of_a_refined_sweep_tells_upper_bounds(sweep, capsys):
 def test_dry_run_estimates_how_many_cells_of_a_refined_map_are_run(sweep):
     """Of a known map, a disc, decisions ask for about as many cells as the measured ones let expect."""
     side, draw = 256, np.random.default_rng(1)
-    config = refined(load(sweep(side)), True)
+    config = with_refine(load(sweep(side)), True)
     layout = Layout((side, side))
 
     def columns(positions):
@@ -244,4 +244,4 @@ PEAKS = {512: 354e6, 1024: 465e6, 2048: 505e6, 4096: 892e6}
 
 @pytest.mark.parametrize("side", PEAKS)
 def test_memory_that_is_told_is_what_a_refined_map_took(sweep, side):
-    assert 0.95 < plan.memory_needed(refined(load(sweep(side)), True), False) / PEAKS[side] < 1.25
+    assert 0.95 < plan.memory_needed(with_refine(load(sweep(side)), True), False) / PEAKS[side] < 1.25

@@ -10,8 +10,8 @@ from ringsweep.config.configuration import (
     load,
     read_axes,
     read_scene,
-    refined,
     tell_unit,
+    with_refine,
     with_values,
 )
 from ringsweep.config.own_files import load_own_files
@@ -28,9 +28,9 @@ __all__ = [
     "read_axes",
     "read_scene",
     "read_solver",
-    "refined",
     "sweepable",
     "tell_unit",
+    "with_refine",
     "with_values",
 ]
 

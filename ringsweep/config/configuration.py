@@ -27,7 +27,7 @@ from ringsweep.config.axes import (
 )
 from ringsweep.config.consistency import check_consistency
 from ringsweep.config.follow import Follow, put_state, read_follow, run_to_continue, with_direction
-from ringsweep.config.refinement import Refinement, read_refinement
+from ringsweep.config.refine import Refinement, read_refinement
 from ringsweep.config.sampling import Sample, read_sample
 from ringsweep.config.scene import parse_scene, sweepable, warn_of_plain_angle
 from ringsweep.config.sections import read_values, suggestion, warn_once
@@ -128,7 +128,7 @@ def load(config: str | os.PathLike[str] | Mapping[str, Any], settings: Iterable[
     return dataclasses.replace(found, axes=with_direction(build_axes(columns), found.follow))
 
 
-def refined(config: Config, refine: Mapping[str, Any] | bool | None) -> Config:
+def with_refine(config: Config, refine: Mapping[str, Any] | bool | None) -> Config:
     """A configuration with `refine` in the place of its ``sweep.refine``; None and True keep one that it has.
 
     Raises

@@ -15,7 +15,7 @@ from ringsweep.config.friction import FORMULA
 from ringsweep.config.friction import TABLE as TABLE_LAW
 from ringsweep.config.motion import FORMULA as FORMULA_DRIVE
 from ringsweep.config.record import INSTANTS, KEEP, PERIOD
-from ringsweep.config.refinement import NUMBERS
+from ringsweep.config.refine import NUMBERS
 from ringsweep.config.sampling import NUMBERS as SAMPLE_NUMBERS
 from ringsweep.config.sampling import SENSITIVITIES
 from ringsweep.config.tables import INTERPOLATIONS, TABLES

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ringsweep.config import Config
-from ringsweep.config.refinement import Refinement
+from ringsweep.config.refine import Refinement
 from ringsweep.quantities.units import percent_at_most
 from ringsweep.quantities.variables import INFERRED, LABELS, MISSING, OUTCOMES
 from ringsweep.runs.refinement import Answer, Findings, Refined, refine

@@ -18,7 +18,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ringsweep.config import Axes, Config, assembled, load, read_axes, read_scene, read_solver, refined
+from ringsweep.config import Axes, Config, assembled, load, read_axes, read_scene, read_solver, with_refine
 from ringsweep.config.follow import BOTH, DIRECTION
 from ringsweep.config.yaml_text import read
 from ringsweep.errors import InputError
@@ -126,7 +126,7 @@ def run(
     >>> bool((ds.certified == 1).all())
     True
     """
-    loaded = refined(load(config), refine)
+    loaded = with_refine(load(config), refine)
     return _run(loaded, output, Execution(jobs, scheduler, progress), fresh, reuse)
 
 
