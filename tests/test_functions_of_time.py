@@ -273,6 +273,8 @@ class TestUnits:
     def test_values_are_converted(self):
         drive = drive_of(by("A*sin(w*t) + B*sin(2*pi*f*t)", A="90 deg", w="30 rpm", B=1.0, f="2 Hz"))
         np.testing.assert_allclose([drive.A, drive.w, drive.f], [[np.pi / 2], [np.pi], [2.0]])
+        moved = cells_of(belt(by("v*t + A*(1 - exp(-t/tau))", v="30 cm/s", A="3 cm", tau="200 ms"))).drive
+        np.testing.assert_allclose([moved.v, moved.A, moved.tau], [[0.3], [0.03], [0.2]])
 
     @pytest.mark.parametrize(
         ("section", "message"),

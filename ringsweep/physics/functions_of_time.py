@@ -30,7 +30,7 @@ from ringsweep.numerics.expressions import (
     negative,
     nodes_of,
 )
-from ringsweep.physics.friction.formula import FormulaError, Language, Reader, Threshold, Units, dimension, parsed
+from ringsweep.physics.friction.formula import FormulaError, Language, Reader, Threshold, Units, parsed, unit_of
 
 #: The language of drives and forces.
 LANGUAGE = Language(
@@ -131,7 +131,7 @@ def read_function(text: Any, unit: str, rate: str | None = None, *, infer_units:
     slope = derivative(value) if rate is None else reader.visit(parsed(rate, LANGUAGE), ())
     units = Units(LANGUAGE)
     if infer_units:
-        units.equal(units.visit(tree), dimension(unit), f"the formula, which is in {unit}")
+        units.equal(units.visit(tree), unit_of(unit), f"the formula, which is in {unit}")
     return Function(text, value, slope, unit, tuple(reader.thresholds), units.solved())
 
 
@@ -159,7 +159,7 @@ def _time_of(knot: Threshold, values: Values, known: Any) -> Any:
     return np.where((rate == 0.0) | grows, inf, root)
 
 
-# Jumps below this share of the largest value are rounding, s.
+# Jumps below this share of the largest value are rounding.
 _ROUNDING = 1e-9
 
 # Shares of a span at which a function is looked at: spread without a period.

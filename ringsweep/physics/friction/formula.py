@@ -354,39 +354,29 @@ def _finite(value: float) -> bool:
 
 # ---- units ------------------------------------------------------------------------------------
 
+#: Exponents of base units, and of the units of parameters: their names with a dot. No entry: no unit.
+Unit = Mapping[str, Fraction]
 
-#: Base units. The radian is no more than a mark: it tells rad/s from Hz, and never makes units contradict each other.
+# Base units. The radian is no more than a mark: it tells rad/s from Hz, and never makes units contradict each other.
 _BASE = ("N", "m", "rad", "s")
-_RADIAN = _BASE.index("rad")
+_NONE: Unit = {}
 
 
-@dataclass(frozen=True)
-class _Dimension:
-    """Exponents of the base units, plus multiples of the unknown exponents of parameters."""
-
-    known: tuple[Fraction, ...]
-    unknown: tuple[tuple[str, Fraction], ...] = ()
-
-    @property
-    def contradicts(self) -> bool:
-        """Whether it cannot be the ratio of equal units."""
-        return not self.unknown and any(exponent for i, exponent in enumerate(self.known) if i != _RADIAN)
-
-    def plus(self, other: _Dimension, factor: Fraction) -> _Dimension:
-        unknown = dict(self.unknown)
-        for name, share in other.unknown:
-            unknown[name] = unknown.get(name, Fraction(0)) + factor * share
-        known = (x + factor * y for x, y in zip(self.known, other.known, strict=True))
-        return _Dimension(tuple(known), tuple(item for item in unknown.items() if item[1]))
+def unit_of(text: str) -> Unit:
+    """Unit from a quotient of base units, such as ``"m/s"``."""
+    above, _, below = text.partition("/")
+    return {name: Fraction(power) for name, power in ((above, 1), (below, -1)) if name in _BASE}
 
 
-def dimension(unit: str) -> _Dimension:
-    """Dimension of a quotient of base units, such as ``"m/s"``."""
-    above, _, below = unit.partition("/")
-    return _Dimension(tuple(Fraction((name == above) - (name == below)) for name in _BASE))
+def _times(a: Unit, b: Unit, power: Fraction | int = 1) -> Unit:
+    """Product of a unit and a power of another one."""
+    product = {name: a.get(name, Fraction(0)) + power * b.get(name, Fraction(0)) for name in {**a, **b}}
+    return {name: exponent for name, exponent in product.items() if exponent}
 
 
-_NONE, _ANGLE = dimension("1"), dimension("rad")
+def _unknown(unit: Unit) -> list[str]:
+    """Parameters whose units a unit contains."""
+    return [name for name in unit if name.startswith(".")]
 
 
 class Units:
@@ -394,117 +384,95 @@ class Units:
 
     def __init__(self, language: Language = FRICTION) -> None:
         self.language = language
-        self.names: list[str] = []
-        self.equations: list[_Dimension] = []
-        self.wildcards = 0
+        self.names: dict[str, None] = {}
+        # Units of parameters as far as they are known: none contains another of these parameters.
+        self.found: dict[str, Unit] = {}
 
-    def visit(self, tree: ast.expr) -> _Dimension:
-        """Dimension of a part of the formula."""
-        if isinstance(tree, ast.Constant):
-            return self._any() if tree.value == 0 else _NONE
-        if isinstance(tree, ast.Name):
-            return self._of_name(tree.id)
-        if isinstance(tree, ast.UnaryOp):
-            return self.visit(tree.operand)
-        if isinstance(tree, ast.BinOp):
-            return self._binary(tree)
-        if isinstance(tree, ast.Compare):
-            first = self.visit(tree.left)
-            self.equal(first, self.visit(tree.comparators[0]), _shown(tree))
-            return first
-        assert isinstance(tree, ast.Call)
-        assert isinstance(tree.func, ast.Name)
-        if tree.func.id == "piecewise":
-            for condition in tree.args[:-1:2]:
-                self.visit(condition)
-            return self._alike([*tree.args[1::2], tree.args[-1]], tree)
-        if tree.func.id in ("min", "max", "abs"):
-            return self._alike(tree.args, tree)
-        inner = self.visit(tree.args[0])
-        if tree.func.id == "sqrt":
-            return _NONE.plus(inner, Fraction(1, 2))
-        self.equal(inner, _ANGLE if tree.func.id in ("sin", "cos", "tan") else _NONE, _shown(tree.args[0]))
+    def visit(self, tree: ast.expr) -> Unit:
+        """Unit of a part of the formula."""
+        match tree:
+            case ast.Constant(value=value):
+                # Zero has any unit.
+                return {f".{id(tree)}": Fraction(1)} if value == 0 else _NONE
+            case ast.Name(id=name):
+                if name in self.language.units:
+                    return unit_of(self.language.units[name])
+                self.names[name] = None
+                return {f".{name}": Fraction(1)}
+            case ast.UnaryOp(operand=inner):
+                return self.visit(inner)
+            case ast.BinOp(left=left, op=ast.Mult() | ast.Div() as operation, right=right):
+                return _times(self.visit(left), self.visit(right), 1 if isinstance(operation, ast.Mult) else -1)
+            case ast.BinOp(left=left, op=ast.Pow(), right=right):
+                return self._power(left, right)
+            case ast.BinOp(left=left, right=right) | ast.Compare(left=left, comparators=[right]):
+                return self._alike([left, right], tree)
+            case ast.Call(func=ast.Name(id="piecewise"), args=[*arguments]):
+                for condition in arguments[:-1:2]:
+                    self.visit(condition)
+                return self._alike([*arguments[1::2], arguments[-1]], tree)
+            case ast.Call(func=ast.Name(id="min" | "max" | "abs"), args=[*arguments]):
+                return self._alike(arguments, tree)
+            case ast.Call(func=ast.Name(id="sqrt"), args=[inner]):
+                return _times(_NONE, self.visit(inner), Fraction(1, 2))
+            case ast.Call(func=ast.Name(id=name), args=[inner]):
+                takes = "rad" if name in ("sin", "cos", "tan") else "1"
+                self.equal(self.visit(inner), unit_of(takes), _shown(inner))
         return _NONE
 
-    def _any(self) -> _Dimension:
-        # Zero has any unit.
-        self.wildcards += 1
-        return _Dimension(_NONE.known, ((f"0_{self.wildcards}", Fraction(1)),))
+    def _power(self, base: ast.expr, exponent: ast.expr) -> Unit:
+        unit, of_exponent = self.visit(base), self.visit(exponent)
+        varies = any(isinstance(node, ast.Name) and node.id == self.language.name for node in ast.walk(exponent))
+        value = SPEED if varies else Reader(self.language).visit(exponent, ())
+        self.equal(of_exponent, _NONE, _shown(exponent))
+        if value.kind == "number":
+            return _times(_NONE, unit, Fraction(value.value).limit_denominator(1000))
+        self.equal(unit, _NONE, _shown(base))
+        return _NONE
 
-    def _of_name(self, name: str) -> _Dimension:
-        if name in self.language.units:
-            return dimension(self.language.units[name])
-        if name not in self.names:
-            self.names.append(name)
-        return _Dimension(_NONE.known, ((name, Fraction(1)),))
+    def _alike(self, trees: list[ast.expr], whole: ast.expr) -> Unit:
+        first, *others = [self.visit(tree) for tree in trees]
+        for other in others:
+            self.equal(first, other, _shown(whole))
+        return first
 
-    def _binary(self, tree: ast.BinOp) -> _Dimension:
-        a, b = self.visit(tree.left), self.visit(tree.right)
-        if isinstance(tree.op, ast.Mult):
-            return a.plus(b, Fraction(1))
-        if isinstance(tree.op, ast.Div):
-            return a.plus(b, Fraction(-1))
-        if isinstance(tree.op, ast.Pow):
-            varies = any(isinstance(node, ast.Name) and node.id == self.language.name for node in ast.walk(tree.right))
-            exponent = SPEED if varies else Reader(self.language).visit(tree.right, ())
-            self.equal(b, _NONE, _shown(tree.right))
-            if exponent.kind == "number":
-                return _NONE.plus(a, Fraction(exponent.value).limit_denominator(1000))
-            self.equal(a, _NONE, _shown(tree.left))
-            return _NONE
-        self.equal(a, b, _shown(tree))
-        return a
-
-    def _alike(self, trees: list[ast.expr], whole: ast.expr) -> _Dimension:
-        found = [self.visit(tree) for tree in trees]
-        for other in found[1:]:
-            self.equal(found[0], other, _shown(whole))
-        return found[0]
-
-    def equal(self, a: _Dimension, b: _Dimension, where: str) -> None:
-        """Demand equal dimensions of two parts."""
-        equation = self._reduced(a.plus(b, Fraction(-1)))
-        if equation.contradicts:
+    def equal(self, a: Unit, b: Unit, where: str) -> None:
+        """Demand equal units of two parts."""
+        ratio = self._reduced(_times(a, b, -1))
+        if unknown := _unknown(ratio):
+            name = unknown[0]
+            self.found[name] = _times({name: Fraction(1)}, ratio, -1 / ratio[name])
+            self.found = {other: self._reduced(unit) for other, unit in self.found.items()}
+        elif ratio.keys() - {"rad"}:
             known = f"{self.language.name} is in {self.language.units[self.language.name]}"
             raise FormulaError(f"units do not fit in {where}: {self._text(a)} and {self._text(b)} ({known})")
-        if not equation.unknown:
-            return
-        name, share = equation.unknown[0]
-        scaled = _NONE.plus(equation, 1 / share)
-        self.equations = [self._without(other, name, scaled) for other in self.equations] + [scaled]
 
-    @staticmethod
-    def _without(dimension: _Dimension, name: str, equation: _Dimension) -> _Dimension:
-        share = dict(dimension.unknown).get(name)
-        return dimension.plus(equation, -share) if share else dimension
+    def _reduced(self, unit: Unit) -> Unit:
+        """The same unit, without those of parameters that are known."""
+        for name, power in unit.items():
+            if name in self.found:
+                unit = _times(_times(unit, {name: power}, -1), self.found[name], power)
+        return unit
 
-    def _reduced(self, dimension: _Dimension) -> _Dimension:
-        for equation in self.equations:
-            dimension = self._without(dimension, equation.unknown[0][0], equation)
-        return dimension
-
-    def _text(self, dimension: _Dimension) -> str:
-        found = self._reduced(dimension)
-        return "another unit" if found.unknown else (unit_text(found.known) or "a fractional unit")
+    def _text(self, unit: Unit) -> str:
+        found = self._reduced(unit)
+        return "another unit" if _unknown(found) else (unit_text(found) or "a fractional unit")
 
     def solved(self) -> dict[str, str]:
         """Unit of each parameter; ``""`` where it is not determined."""
-        found = {}
-        for name in self.names:
-            dimension = self._reduced(self._of_name(name))
-            found[name] = "" if dimension.unknown else unit_text(dimension.known)
-        return found
+        units = {name: self._reduced({f".{name}": Fraction(1)}) for name in self.names}
+        return {name: "" if _unknown(unit) else unit_text(unit) for name, unit in units.items()}
 
 
-def unit_text(exponents: tuple[Fraction, ...]) -> str:
-    """Unit with these exponents of the base units, such as ``"s/m"``; ``""`` if an exponent is not whole."""
+def unit_text(unit: Unit) -> str:
+    """Unit in words, such as ``"s/m"``; ``""`` if an exponent is not whole."""
     # An amplitude over an angular frequency is no square of an angle.
-    shown = [min(max(e, Fraction(0)), Fraction(1)) if i == _RADIAN else e for i, e in enumerate(exponents)]
-    if any(exponent.denominator != 1 for exponent in shown):
+    shown = {name: min(max(e, Fraction(0)), Fraction(1)) if name == "rad" else e for name, e in unit.items()}
+    if any(exponent.denominator != 1 for exponent in shown.values()):
         return ""
 
     def factors(sign: int) -> list[str]:
-        powers = [(name, sign * int(exponent)) for name, exponent in zip(_BASE, shown, strict=True)]
+        powers = [(name, sign * shown.get(name, Fraction(0))) for name in _BASE]
         return [name if power == 1 else f"{name}^{power}" for name, power in powers if power > 0]
 
     return "/".join([" ".join(factors(1)) or "1", *factors(-1)])
