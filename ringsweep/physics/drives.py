@@ -28,13 +28,14 @@ from ringsweep.physics.friction.formula import FormulaError
 from ringsweep.physics.functions_of_time import Function, check, knots_of, period_of, read_function, size_at_start
 from ringsweep.quantities.parameters import Leaf, Parameter
 
-_PER_SECOND_P = "rad/s^p with the exponent p, so write 2 for 2 rad/s^p"
+#: Unit of the amplitude of a power law, by that of the drive.
+PER_SECOND_P = {unit: f"{unit}/s^p with the exponent p, so write 2 for 2 {unit}/s^p" for unit in ("rad", "m")}
 
 
 class Power(NamedTuple):
     """Power law: :math:`s = t^n`. For 1 < n < 2 the acceleration is infinite at t = 0."""
 
-    amplitude: Annotated[float, Parameter("", "angle of the ring after one second", unit_in_words=_PER_SECOND_P)]
+    amplitude: Annotated[float, Parameter("", "angle of the ring after one second", unit_in_words=PER_SECOND_P["rad"])]
     exponent: Annotated[float, Parameter("1", "exponent of the power law", lower=1.0)]
 
 

@@ -111,7 +111,7 @@ class Belt(Model, Continues):
         if friction.family_of(law) is not friction.Dynamic:
             found["friction.viscous"] = Parameter("N s/m", "viscous friction (default: 0)", lower=0.0, optional=True)
         for name, p in declared(structure.drive_type).items():
-            found[f"drive.{name}"] = _along_a_line(p) if structure.own_drive is None else p
+            found[f"drive.{name}"] = _along_a_line(name, p) if structure.own_drive is None else p
         found["force.constant"] = forces.CONSTANT
         if structure.own_force is not None:
             found |= {f"force.{name}": p for name, p in declared(structure.own_force).items()}
@@ -266,13 +266,19 @@ def _largest_deflection(structure: Structure, values: Values) -> NDArray[np.floa
     return mu_s * values["body.mass"] * values["gravity"] / values["friction.sigma0"]
 
 
-def _along_a_line(parameter: Parameter) -> Parameter:
-    """A parameter of a drive for the belt, which moves along a line: m in place of rad."""
-    name = parameter.long_name.replace("angular velocity of the ring", "velocity of the belt")
-    name = name.replace("ring's angular velocity", "belt's velocity").replace("rocking angle", "displacement")
-    name = name.replace("angle of the ring", "displacement of the belt")
-    unit = {"rad": "m", "rad/s": "m/s"}.get(parameter.unit, parameter.unit)
-    in_words = parameter.unit_in_words.replace("rad", "m")
-    return replace(
-        parameter, long_name=name, unit=unit if "phase" not in name else parameter.unit, unit_in_words=in_words
-    )
+#: Words of the drives of a ring, and those of a belt, which moves along a line.
+_ON_A_LINE = {
+    "rad": "m",
+    "rad/s": "m/s",
+    "angular velocity of the ring": "velocity of the belt",
+    "amplitude of the ring's angular velocity": "amplitude of the belt's velocity",
+    "angle of the ring after one second": "displacement of the belt after one second",
+    drives.PER_SECOND_P["rad"]: drives.PER_SECOND_P["m"],
+    "amplitude of the rocking angle": "amplitude of the displacement",
+}
+
+
+def _along_a_line(name: str, p: Parameter) -> Parameter:
+    """A parameter of a drive, in the words for a belt. A phase is an angle there too."""
+    unit, about, in_words = (_ON_A_LINE.get(word, word) for word in (p.unit, p.long_name, p.unit_in_words))
+    return p if name == "phase" else replace(p, unit=unit, long_name=about, unit_in_words=in_words)
