@@ -153,24 +153,19 @@ def read(config: str | os.PathLike[str] | Mapping[str, Any]) -> Document:
         If it is no YAML mapping of plain values, or a result file without a configuration.
     """
     if isinstance(config, Mapping):
-        if _count(config, {}, 0) > MAX_VALUES:
-            raise InputError("", _TOO_MANY)
-        return Document(_plain_copy(config, "", 0))
+        return Document(_Reader().value(config))
     if not isinstance(config, str | os.PathLike):
         raise InputError("config", f"a path or a mapping is expected, got {show(config)}")
     file = Path(config)
     if is_result(file):
         return _read_result(file)
-    text = _read(file, _LARGEST_CONFIGURATION)
-    reader = _NodeReader(str(file))
+    text, reader = _read(file, _LARGEST_CONFIGURATION), _Reader(str(file))
     try:
         node = yaml.compose(text, Loader=yaml.SafeLoader)
         if not isinstance(node, yaml.MappingNode):
             found = "is empty" if node is None else "holds no mapping"
             raise InputError("", f"{found}: a configuration has the sections scene, solver and sweep", file=str(file))
-        if _count(node, {}, 0) > MAX_VALUES:
-            raise InputError("", _TOO_MANY, file=str(file))
-        tree = reader.value(node, "")
+        return Document(reader.value(node), file.parent, file.stem, reader.locations)
     except InputError:
         raise
     except yaml.MarkedYAMLError as error:
@@ -181,7 +176,6 @@ def read(config: str | os.PathLike[str] | Mapping[str, Any]) -> Document:
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         # On escapes of characters that do not exist PyYAML raises such errors.
         raise InputError("", f"not valid YAML: {' '.join(str(error).split())}", file=str(file)) from None
-    return Document(tree, file.parent, file.stem, reader.locations)
 
 
 def is_result(file: Path) -> bool:
@@ -235,7 +229,7 @@ def _read_result(file: Path) -> Document:
         raise InputError(
             "", "is damaged, or not a result of ringsweep: it holds no configuration", file=str(file)
         ) from error
-    return Document(_plain_copy(tree, "", 0), file.parent, file.stem, {"": (str(file), None)}, found)
+    return Document(_Reader().value(tree), file.parent, file.stem, {"": (str(file), None)}, found)
 
 
 def scalar(text: str) -> Any:
@@ -255,63 +249,65 @@ def scalar(text: str) -> Any:
     return text
 
 
-@dataclass
-class _NodeReader:
-    """Turns YAML nodes into plain values and records their lines."""
+class _Reader:
+    """Makes dicts, lists, numbers, booleans, None and strings of YAML nodes, whose lines it records, or of a mapping.
 
-    file: str
-    locations: dict[str, tuple[str, int | None]] = field(default_factory=dict)
-    ancestors: set[int] = field(default_factory=set)
+    Quantities of pint become strings.
+    """
 
-    def value(self, node: yaml.Node, path: str) -> Any:
+    def __init__(self, file: str | None = None):
+        self.file = file
+        self.locations: dict[str, tuple[str, int | None]] = {}
+
+    def value(self, given: Any, path: str = "", depth: int = 0) -> Any:
+        """Plain value of what stands at a path."""
+        if depth == 0 and _count(given, {}) > MAX_VALUES:
+            problem = f"more than {MAX_VALUES} values after expanding aliases; put long columns into a CSV file"
+            raise InputError("", problem, file=self.file)
+        if isinstance(given, yaml.Node):
+            self._locate(path, given)
+            if isinstance(given, yaml.ScalarNode):
+                return scalar(given.value) if given.style is None else given.value
+            given = given.value if isinstance(given, yaml.SequenceNode) else self._pairs(given, path)
+        if depth > _MAX_DEPTH:
+            _, line = self.locations.get(path, (None, None))
+            raise InputError(path, "nested too deeply, or an alias within itself", file=self.file, line=line)
+        if isinstance(given := spelled(given), Mapping):
+            for key in given:
+                if not isinstance(key, str):
+                    raise InputError(path, f"keys are text, got {show(key)}")
+            return {key: self.value(child, _join(path, key), depth + 1) for key, child in given.items()}
+        if isinstance(given, list | tuple | range) or (isinstance(given, np.ndarray) and given.ndim):
+            return [self.value(child, _join(path, i), depth + 1) for i, child in enumerate(given)]
+        return _plain(given, path)
+
+    def _locate(self, path: str, node: yaml.Node) -> None:
         line = node.start_mark.line + 1
-        self.locations.setdefault(path, (self.file, line))
+        self.locations.setdefault(path, (self.file or "", line))
         if node.tag not in _TAGS:
             raise InputError(path, f"the tag {node.tag} is not allowed", file=self.file, line=line)
-        if isinstance(node, yaml.ScalarNode):
-            return scalar(node.value) if node.style is None else node.value
-        if id(node) in self.ancestors or len(self.ancestors) >= _MAX_DEPTH:
-            raise InputError(path, "nested too deeply, or an alias within itself", file=self.file, line=line)
-        self.ancestors.add(id(node))
-        value = self.mapping(node, path) if isinstance(node, yaml.MappingNode) else self.sequence(node, path)
-        self.ancestors.remove(id(node))
-        return value
 
-    def mapping(self, node: yaml.MappingNode, path: str) -> dict[str, Any]:
-        found: dict[str, Any] = {}
+    def _pairs(self, node: yaml.Node, path: str) -> dict[str, yaml.Node]:
+        found: dict[str, yaml.Node] = {}
         for key, child in node.value:
             line = key.start_mark.line + 1
             if not isinstance(key, yaml.ScalarNode) or key.tag not in _TAGS:
                 raise InputError(path, "a key must be plain text", file=self.file, line=line)
-            child_path = _join(path, key.value)
             if key.value in found:
-                raise InputError(child_path, "given twice", file=self.file, line=line)
-            self.locations[child_path] = self.file, line
-            found[key.value] = self.value(child, child_path)
+                raise InputError(_join(path, key.value), "given twice", file=self.file, line=line)
+            self.locations[_join(path, key.value)] = self.file or "", line
+            found[key.value] = child
         return found
 
-    def sequence(self, node: yaml.Node, path: str) -> list[Any]:
-        return [self.value(child, _join(path, i)) for i, child in enumerate(node.value)]
 
-
-def _join(path: str, key: object) -> str:
-    return f"{path}.{key}" if path else str(key)
-
-
-_TOO_MANY = f"more than {MAX_VALUES} values after expanding aliases; put long columns into a CSV file"
-
-
-def _count(value: Any, known: dict[int, int], depth: int) -> int:
+def _count(value: Any, known: dict[int, int], depth: int = 0) -> int:
     """Number of values of YAML nodes or of nested containers, in a time that parts which occur often do not prolong."""
-    if isinstance(value, Mapping):
-        parts: Any = value.values()
-    elif isinstance(value, yaml.MappingNode):
-        parts = [child for _, child in value.value]
-    elif isinstance(value, yaml.SequenceNode):
-        parts = value.value
-    elif isinstance(value, list | tuple):
-        parts = value
-    else:
+    parts: Any = value.value if isinstance(value, yaml.CollectionNode) else value
+    if isinstance(value, yaml.MappingNode):
+        parts = [child for _, child in parts]
+    elif isinstance(value, Mapping):
+        parts = value.values()
+    elif not isinstance(parts, list | tuple):
         return length_of(value) if isinstance(value, np.ndarray | range) else 1
     if id(value) not in known:
         # A part that contains itself is refused later, as one that is nested too deeply.
@@ -320,18 +316,8 @@ def _count(value: Any, known: dict[int, int], depth: int) -> int:
     return known[id(value)]
 
 
-def _plain_copy(value: Any, path: str, depth: int) -> Any:
-    """A copy made of dicts, lists, numbers, booleans, None and strings only; quantities of pint become strings."""
-    if depth > _MAX_DEPTH:
-        raise InputError(path, "nested too deeply")
-    value = spelled(value)
-    if isinstance(value, Mapping):
-        for key in value:
-            if not isinstance(key, str):
-                raise InputError(path, f"keys are text, got {show(key)}")
-        return {key: _plain_copy(child, _join(path, key), depth + 1) for key, child in value.items()}
-    if isinstance(value, list | tuple | range) or (isinstance(value, np.ndarray) and value.ndim):
-        return [_plain_copy(child, _join(path, i), depth + 1) for i, child in enumerate(value)]
+def _plain(value: Any, path: str) -> str | bool | int | float | None:
+    """A value that is no container."""
     if value is None or isinstance(value, str):
         return value
     if isinstance(value, bool | np.bool_):
@@ -343,6 +329,10 @@ def _plain_copy(value: Any, path: str, depth: int) -> Any:
     if isinstance(value, Real):
         return float(value)
     raise InputError(path, f"{show(value)} is no value for a configuration: give text, a number, a list or a mapping")
+
+
+def _join(path: str, key: object) -> str:
+    return f"{path}.{key}" if path else str(key)
 
 
 def _read(file: Path, largest: int) -> str:
