@@ -9,6 +9,9 @@ import xarray as xr
 
 import ringsweep
 from ringsweep import plots
+from ringsweep.config import load
+from ringsweep.errors import InputError
+from ringsweep.runs import sweep
 
 
 @pytest.fixture(scope="module")
@@ -108,3 +111,55 @@ def test_map_has_the_title_of_the_function(ds):
 def test_accessor_is_there_for_a_file_that_xarray_alone_has_opened(imports):
     code = f"import {imports}; print(xr.Dataset().ringsweep.words.__name__)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "words"
+
+
+def mapped(scene, axes, points=False):
+    """Dataset of a sweep without computing it."""
+    return sweep._frame(load({"scene": scene, "sweep": {"points" if points else "grid": axes}}), None)
+
+
+class TestCell:
+    """Cells of a sweep as configurations."""
+
+    @pytest.fixture
+    def maps(self, scene):
+        axes = {"drive.amplitude": [0.5, 2.0, 8.0], "zone.half_angle": ["10 deg", "20 deg", "40 deg", "60 deg"]}
+        return mapped(scene, axes)
+
+    def test_cell_is_the_configuration_with_the_values_of_the_cell(self, maps, caplog):
+        found = plots.cell(maps, {"drive.amplitude": 1.9, "zone_half_angle": np.radians(39.0)})
+        assert "sweep" not in found
+        values = load(found).scene.values
+        assert values["drive.amplitude"] == 2.0
+        assert values["zone.half_angle"] == float(maps["zone_half_angle"][2])
+        assert caplog.messages == [
+            "drive.amplitude: 1.9 rad s⁻¹ is not in the dataset: the nearest value is taken, 2 rad s⁻¹",
+            "zone_half_angle: 39° is not in the dataset: the nearest value is taken, 40°",
+        ]
+
+    def test_cell_accepts_a_dataset_already_selected_with_xarray(self, maps):
+        found = plots.cell(maps.isel(drive_amplitude=2).sel(zone_half_angle=0.3, method="nearest"))
+        values = load(found).scene.values
+        assert (values["drive.amplitude"], values["zone.half_angle"]) == (8.0, float(maps["zone_half_angle"][1]))
+
+    def test_cell_of_points_is_selected_by_number(self, scene):
+        ds = mapped(scene, {"drive.amplitude": [0.5, 2.0, 8.0], "initial.omega": [3.0, 1.0, 2.0]}, points=True)
+        values = load(plots.cell(ds, {"point": 1})).scene.values
+        assert (values["drive.amplitude"], values["initial.omega"]) == (2.0, 1.0)
+
+    def test_cell_may_be_selected_by_law_and_by_a_number_of_an_arc(self, scene):
+        bare = {name: part for name, part in scene.items() if name != "zone"}
+        bare["friction"] = {"rest": scene["friction"]["rest"]}
+        bare["zones"] = [{"half_angle": "10 deg", "mu_s": 0.5, "mu_k": 0.3}]
+        ds = mapped(bare, {"friction.law": ["coulomb", "stiction"], "zones.0.mu_k": [0.2, 0.25]})
+        found = plots.cell(ds, {"friction.law": "coulomb", "zones.0.mu_k": 0.25})
+        assert found["scene"]["friction"]["law"] == "coulomb"
+        assert found["scene"]["zones"][0]["mu_k"] == 0.25
+
+    def test_cell_refuses_incomplete_selections_and_datasets_without_configuration(self, maps):
+        with pytest.raises(InputError, match=r"zone_half_angle \(4\) is left"):
+            plots.cell(maps, {"drive.amplitude": 2.0})
+        with pytest.raises(InputError, match="did you mean drive_amplitude"):
+            plots.cell(maps, {"drive.amplitud": 2.0})
+        with pytest.raises(InputError, match="no attribute configuration"):
+            plots.cell(maps.isel(drive_amplitude=0, zone_half_angle=0).drop_attrs())

@@ -31,7 +31,6 @@ from ringsweep.plots.style import REGIME_COLOURS, style
 
 if TYPE_CHECKING:
     from ringsweep.plots.films import animation, save_animation
-    from ringsweep.plots.interactive import explore
     from ringsweep.plots.loops import friction_loop
     from ringsweep.plots.phase import phase_portrait
     from ringsweep.plots.polar import polar_view
@@ -43,7 +42,6 @@ __all__ = [
     "bifurcation",
     "bifurcation_panel",
     "cell",
-    "explore",
     "exponent_panel",
     "fit",
     "friction_loop",
@@ -70,7 +68,6 @@ __all__ = [
 # Modules that need the models, which are slow to import: a map does not wait for them.
 _SLOW = {
     "animation": "films",
-    "explore": "interactive",
     "friction_loop": "loops",
     "phase_portrait": "phase",
     "polar_view": "polar",

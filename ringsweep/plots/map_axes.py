@@ -104,11 +104,6 @@ class Axis:
         edges[np.searchsorted(self.values, between)] = between
         return edges
 
-    def value_of(self, cell: xr.Dataset) -> float:
-        """Value as displayed of a single cell."""
-        value = cell[self.name]
-        return float(self.names.index(str(value.item()))) if self.names else value.item() * display_factor(value)
-
     def values_at(self, data: xr.DataArray) -> NDArray[Any]:
         """Value at every element of `data`, shape ``(data.size,)``."""
         unsorted = np.empty_like(self.values)

@@ -274,8 +274,6 @@ class Map:
         Texts of the title of each panel, and its index along the dimensions that are not axes.
     columns : int
         Columns of panels.
-    drawn : dict of str to ndarray
-        By dimension the indices in `ds` that are drawn, if these are not all.
     entries : list of Artist
         Entries of the legend.
     texts : list of str
@@ -291,7 +289,6 @@ class Map:
     warnings: list[CellWarning]
     panels: list[tuple[list[str], dict[str, int]]]
     columns: int
-    drawn: dict[str, NDArray[np.intp]]
     entries: list[Artist]
     texts: list[str]
 
@@ -347,7 +344,6 @@ class Map:
             [replace(warning, cells=warning.cells.isel(drawn)) for warning in warnings],
             panels,
             columns,
-            drawn,
             legend_entries(scale, ds, data, warnings, scattered),
             [name, *held, *told, *thinning, *audit],
         )
@@ -546,29 +542,6 @@ class Map:
         label = folded([axis_label(self.data, self.ds)], 0.75 * height_of(panels[0]) * (1 + (len(panels) > 1)))
         added = figure.colorbar(bar, ax=panels, label=label, ticks=ticks)
         small_ticks(added.ax)
-
-    def cell_at(self, axes: Axes, x: float, y: float) -> xr.Dataset:
-        """The cell that a map of one panel shows at a position, which is in the units of its axes."""
-        if self.scattered and self.vertical is not None:
-            points = np.column_stack([self.horizontal.values_at(self.data), self.vertical.values_at(self.data)])
-            # The nearest point on the screen, whatever the scales of the axes.
-            away = axes.transData.transform(points) - axes.transData.transform([(x, y)])
-            nearest = np.unravel_index(int(np.nanargmin((away**2).sum(axis=1))), self.data.shape)
-            return self.ds.isel(dict(zip(self.data.dims, map(int, nearest), strict=True)))
-        index = {}
-        for axis, at in ((self.horizontal, x), (self.vertical, y)):
-            if axis is not None:
-                k = int(axis.order[np.searchsorted(axis.edges[1:-1], at)])
-                (dim,) = axis.dims
-                index[dim] = int(self.drawn[dim][k]) if dim in self.drawn else k
-        return self.ds.isel(index)
-
-    def position(self, cell: xr.Dataset) -> tuple[float, float]:
-        """Position of a single cell in a map of one panel, in the units of its axes."""
-        if self.vertical:
-            return self.horizontal.value_of(cell), self.vertical.value_of(cell)
-        height = 0.5 if self.scale.meanings else float(displayed(cell[self.data.name]))
-        return self.horizontal.value_of(cell), height
 
 
 def audit_texts(ds: xr.Dataset) -> list[str]:
