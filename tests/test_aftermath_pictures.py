@@ -199,7 +199,7 @@ class TestOffTheRace:
         words = (
             "separating (oscillatory), contact 2, t = 1.28478 s, then tumbled, with 8 losses of contact and 178 impacts"
         )
-        figure = _Film(run.assign_attrs(outcome=words), 2.0, 1.0).figure
+        figure = _Film(run.assign_attrs(outcome=words), 2.0, 1.0)
         figure.draw_without_rendering()
         (title,) = (text for text in figure.findobj(Text) if text.get_text().startswith("separating"))
         box = title.get_window_extent()
